@@ -1,0 +1,27 @@
+"""Errors of the telemetry package.
+
+::
+
+    TelemetryError
+    ├── MediumError(OSError)          the bus could not be opened or was lost: the environment is at fault, retry or reconfigure
+    ├── DecodeError(ValueError)       bytes that are no message of ours; raised by the codec only, the link counts and drops
+    └── EncodeError(ValueError)       a message outside its declared range: a fault of the caller, nothing was sent
+"""
+
+from __future__ import annotations
+
+
+class TelemetryError(Exception):
+    """Root of every error of this package."""
+
+
+class MediumError(TelemetryError, OSError):
+    """The bus could not be opened or was lost; nothing was sent."""
+
+
+class DecodeError(TelemetryError, ValueError):
+    """The bytes are not a message of this schema."""
+
+
+class EncodeError(TelemetryError, ValueError):
+    """The message is outside its declared ranges; nothing was sent."""

@@ -1,0 +1,53 @@
+"""The table of key expressions, shared by code, documentation and error messages.
+
+Operators rely on these keys; ``docs/keys.md`` is checked against this table by a test.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Final
+
+ROOT: Final = "borechain"
+DEFAULT_RIG: Final = "rig-1"
+DEFAULT_ENDPOINT: Final = "tcp/127.0.0.1:7447"
+
+
+@dataclass(frozen=True, slots=True)
+class Key:
+    """One line of the table."""
+
+    template: str  # with {rig}, {tube}, ...
+    kind: str  # "publish", "query" or both
+    meaning: str
+
+
+PORT: Final = "borechain/{rig}/port/{tube}/{side}/{direction}"
+STEP: Final = "borechain/{rig}/bench/{process}/step"
+DONE: Final = "borechain/{rig}/bench/{process}/done"
+ATTACH: Final = "borechain/{rig}/bench/{process}/attach"
+WANTED: Final = "borechain/{rig}/bench/wanted"
+DEPTH: Final = "borechain/{rig}/surface/depth"
+LIVELINESS: Final = "borechain/{rig}/@liveliness/{process}"
+GROUND: Final = "borechain/{rig}/ground/{path}"
+COMMAND: Final = "borechain/{rig}/cmd/{name}"
+
+TABLE: Final[tuple[Key, ...]] = (
+    Key(PORT, "publish", "hop-by-hop link: frames of one tube end; side upper|lower, direction tx|rx"),
+    Key(DEPTH, "publish", "measured depth of the bit from tally and block position (msgpack: rig time, metres)"),
+    Key(STEP, "publish", "bench: an outside clock hands one process its next step"),
+    Key(DONE, "publish", "bench: the process has finished the step"),
+    Key(ATTACH, "publish", "bench: a process announces itself to the outside clock"),
+    Key(WANTED, "publish", "bench: the processes that ought to be alive now"),
+    Key(LIVELINESS, "liveliness", "token of a living process"),
+    Key("borechain/{rig}/ground/status", "query, publish", "rig time, depth, counts, health"),
+    Key("borechain/{rig}/ground/string", "query, publish", "tubes from top to bottom with depth and age"),
+    Key("borechain/{rig}/ground/nodes/{tube}", "query, publish", "last state of one node, stale or not"),
+    Key("borechain/{rig}/ground/stations", "query, publish", "all stations, fused"),
+    Key("borechain/{rig}/ground/stations/{n}", "query", "one station, fused"),
+    Key("borechain/{rig}/ground/stations/{n}/measurements", "query", "every cluster measured at one station"),
+    Key("borechain/{rig}/ground/measurements", "query", "every cluster measurement; ?station=2..5, ?tube=3"),
+    Key("borechain/{rig}/ground/trajectory", "query, publish", "positions with covariance; ?md=12.5, ?md=4..12"),
+    Key("borechain/{rig}/ground/events", "query", "events of the nodes; ?tube=3"),
+    Key("borechain/{rig}/cmd/{name}", "query", "operator command to the ground station; the reply is its outcome"),
+)

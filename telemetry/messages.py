@@ -1,0 +1,216 @@
+"""What is said on the string: one frozen definition a message, SI units and radians.
+
+Addresses are integers: ``ENCODER`` on the drive head, ``BASE`` the surface end, 1..``MAX_TUBE`` the tubes in
+the order of their first use (the first one drilled is the lowest). Times named ``*_at`` are seconds of rig time, the
+encoder node's clock, unless the field says that they are a node's own clock.
+"""
+
+from __future__ import annotations
+
+import enum
+from dataclasses import dataclass, field
+from typing import TypeAlias
+
+SCHEMA_VERSION = 1
+ENCODER = 0
+MAX_TUBE = 250
+BASE = 251
+
+Vector3: TypeAlias = tuple[float, float, float]
+Matrix3: TypeAlias = tuple[Vector3, Vector3, Vector3]
+Scalar: TypeAlias = None | bool | int | float | str
+HOPS_UNKNOWN = -1
+
+
+def address_name(address: int) -> str:
+    """Name of an address in key expressions: ``encoder``, ``base`` or the tube's number."""
+    return {ENCODER: "encoder", BASE: "base"}.get(address, str(address))
+
+
+class Side(enum.IntEnum):
+    """The two ends of a tube: ``UPPER`` looks to the rig, ``LOWER`` to the bit."""
+
+    UPPER = 0
+    LOWER = 1
+
+
+class Mode(enum.IntEnum):
+    """State of a node (execution states, node specification section 2)."""
+
+    BOOT = 0
+    STATIC_BIAS = 1
+    ALIGNMENT = 2
+    TRACKING = 3
+    STILL = 4
+    SURVEY = 5
+    HELD = 6
+    FAULT = 7
+
+
+class Severity(enum.IntEnum):
+    """How much an event matters to the crew."""
+
+    INFO = 0
+    WARNING = 1
+    ERROR = 2
+
+
+class NodeFlag(enum.IntFlag):
+    """What a node says of the trust in its own yaw."""
+
+    NONE = 0
+    YAW_UNTRUSTED = 1
+    AIDING_OLD = 2
+    INNOVATION_REJECTED = 4
+    RATE_EXCEEDED = 8
+    RESTORED = 16
+    CLOCK_UNSYNCHRONISED = 32
+    BIAS_UNKNOWN = 64
+    MOVED_DURING_STOP = 128
+
+
+@dataclass(frozen=True, slots=True)
+class Aiding:
+    """The yaw reference on its way down. ``yaw`` is the measurement, passed on unchanged by the scheme ``forward``.
+
+    The yaw of the receiver is ``yaw + offset`` (make-up angles of the joints passed so far), with the independent
+    variances ``yaw_var`` (random) and ``systematic_var`` (constant errors of joints; never averages away).
+    """
+
+    yaw: float  # rad, [0, 2 pi)
+    yaw_var: float  # rad^2, > 0
+    systematic_var: float  # rad^2, >= 0
+    offset: float  # rad, (-pi, pi]
+    rate: float  # rad/s about the tube axis
+    valid_at: float  # s, rig time
+    sequence: int  # number of the measurement: the same number is the same measurement, repeated
+    hops: int  # of the sender, 0 is the encoder
+
+
+@dataclass(frozen=True, slots=True)
+class Hello:
+    """Who is at the other end of this joint."""
+
+    tube: int
+    boot_count: int
+    hops: int  # from the encoder, HOPS_UNKNOWN before an upper neighbour told
+    mode: Mode
+    link_quality: float  # 0..1, share of this side's frames lately acknowledged or expected and received
+
+
+@dataclass(frozen=True, slots=True)
+class TimeRequest:
+    """First half of a two-way time exchange over one joint."""
+
+    asked_at: float  # s, clock of the asker
+
+
+@dataclass(frozen=True, slots=True)
+class TimeReply:
+    """Second half of the exchange: the upper neighbour answers in rig time."""
+
+    asked_at: float  # s, clock of the asker, echoed
+    received_at: float  # s, rig time
+    replied_at: float  # s, rig time
+    clock_var: float  # s^2, variance of the replier's own rig time
+
+
+@dataclass(frozen=True, slots=True)
+class NodeState:
+    """A node's account of itself, best effort, latest wins."""
+
+    tube: int
+    at: float  # s, rig time
+    hops: int
+    mode: Mode
+    yaw: float  # rad, [0, 2 pi)
+    yaw_var: float  # rad^2, random part
+    systematic_var: float  # rad^2
+    gyro_bias: Vector3  # rad/s
+    scale_factor: float  # 1, estimated error of the gyroscope's z scale
+    innovation: float  # rad, of the last aiding
+    innovation_var: float  # rad^2
+    aiding_age: float  # s since the last aiding used, inf before the first
+    clock_var: float  # s^2, of the node's rig time
+    flags: NodeFlag
+    cycles: int
+    overruns: int
+
+
+@dataclass(frozen=True, slots=True)
+class ImuMean:
+    """Mean specific force of one IMU over the moving average of a stop, body frame, calibrated."""
+
+    force: Vector3  # m/s^2
+    force_cov: Matrix3  # (m/s^2)^2, covariance of the mean
+
+
+@dataclass(frozen=True, slots=True)
+class SurveyMeasurement:
+    """One cluster at one stop. ``(tube, sequence)`` is its identity; kept by the tube until a ``Receipt`` came."""
+
+    tube: int
+    sequence: int
+    station_at: float  # s, rig time, end of the moving average
+    hops: int
+    imus: tuple[ImuMean, ...]
+    yaw: float  # rad
+    yaw_var: float  # rad^2, random
+    systematic_var: float  # rad^2
+    samples: int
+    settle_time: float  # s between the stop and the end of the average
+    flags: NodeFlag
+
+
+@dataclass(frozen=True, slots=True)
+class Receipt:
+    """The ground station stored ``(tube, sequence)`` durably; the tube may forget it."""
+
+    tube: int
+    sequence: int
+
+
+@dataclass(frozen=True, slots=True)
+class Command:
+    """An order to one node, acknowledged by a ``Reply`` with the same ``sequence`` (unique per ground station)."""
+
+    tube: int  # addressee
+    sequence: int
+    name: str  # take_survey, set_parameter
+    arguments: dict[str, Scalar] = field(default_factory=dict)
+
+
+@dataclass(frozen=True, slots=True)
+class Reply:
+    """Outcome of a command."""
+
+    tube: int  # who answers
+    sequence: int  # of the command
+    done: bool
+    detail: str
+
+
+@dataclass(frozen=True, slots=True)
+class Event:
+    """Something that happened. Shares the sequence with survey measurements and is acknowledged the same way."""
+
+    tube: int
+    sequence: int
+    at: float  # s, rig time
+    severity: Severity
+    code: str
+    arguments: dict[str, Scalar] = field(default_factory=dict)
+
+
+Message: TypeAlias = (
+    Aiding
+    | Hello
+    | TimeRequest
+    | TimeReply
+    | NodeState
+    | SurveyMeasurement
+    | Receipt
+    | Command
+    | Reply
+    | Event
+)
