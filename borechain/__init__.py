@@ -1,0 +1,3 @@
+"""The command ``borechain``: one small file a sub-command, each importing what it needs when it runs."""
+
+__version__ = "0.1.0"

@@ -1,0 +1,1 @@
+"""The firmware of one node of the drill string."""

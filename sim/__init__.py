@@ -1,0 +1,1 @@
+"""The world that nodes and ground station cannot tell from the real one, and the launcher of a whole rig."""

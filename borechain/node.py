@@ -1,0 +1,52 @@
+"""``borechain node``: what a tube's board runs."""
+
+from __future__ import annotations
+
+import math
+from pathlib import Path
+
+import click
+
+from borechain.faults import plain_faults
+from borechain.options import place_options
+
+
+@click.command()
+@click.option("--tube", type=int, required=True, help="Number of the tube, 1 is the lowest.")
+@click.option("--drive-joint-deg", type=float, default=0.0, help="Scribe-mark reading, drive head to this tube.")
+@click.option("--lower-joint-deg", type=float, default=0.0, help="Scribe-mark reading, this tube to the one below.")
+@click.option("--joint-std-deg", type=float, default=0.05, show_default=True, help="Error of a reading, 1 sigma.")
+@click.option("--mount-std-deg", type=float, default=0.05, show_default=True, help="Error of the IMU's mount, 1 sigma.")
+@click.option("--scheme", type=click.Choice(["forward", "estimate"]), default="forward", show_default=True)
+@place_options
+@plain_faults
+def node(
+    tube: int,
+    drive_joint_deg: float,
+    lower_joint_deg: float,
+    joint_std_deg: float,
+    mount_std_deg: float,
+    scheme: str,
+    rig_name: str,
+    endpoint: str,
+    folder: Path,
+) -> None:
+    """Run the node of one tube until its bench ends.
+
+    \b
+    Example:
+      borechain node --tube 1 --drive-joint-deg 12.5 --folder state/tube-1
+    """
+    from borechain.processes import Place, run_node
+    from node.firmware.settings import Joint, TubeSettings
+    from node.kernels.layout import Scheme
+
+    joint_std = math.radians(joint_std_deg)
+    settings = TubeSettings(
+        tube=tube,
+        drive_joint=Joint(math.radians(drive_joint_deg), joint_std),
+        lower_joint=Joint(math.radians(lower_joint_deg), joint_std),
+        mount_std=math.radians(mount_std_deg),
+        scheme=Scheme[scheme.upper()],
+    )
+    run_node(Place(rig_name, endpoint, folder), settings)

@@ -1,0 +1,47 @@
+"""Options that several sub-commands share."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import click
+
+from telemetry import keys
+
+FAULT_HELP = "Fault, as kill-node:3@600 or kill-node:3@600+20 (tube, s after the start, s down). Repeatable."
+
+
+def place_options(command: Callable[..., Any]) -> Callable[..., Any]:
+    """Options of every process: which rig, which router, which folder."""
+    for option in (
+        click.option("--rig", "rig_name", default=keys.DEFAULT_RIG, show_default=True, help="Name of the rig in key expressions."),
+        click.option("--endpoint", default=keys.DEFAULT_ENDPOINT, show_default=True, help="zenoh router to join."),
+        click.option(
+            "--folder", type=click.Path(path_type=Path, file_okay=False), default=Path("state"), show_default=True,
+            help="Where the process keeps what must survive a restart.",
+        ),
+    ):
+        command = option(command)
+    return command
+
+
+def parse_speed(_context: click.Context, _parameter: click.Parameter, value: str) -> float:
+    """``max`` or a factor of real time."""
+    if value == "max":
+        return float("inf")
+    try:
+        speed = float(value)
+    except ValueError:
+        raise click.BadParameter(f"expected max or a number, got {value}") from None
+    if not 0.0 < speed <= 1000.0:
+        raise click.BadParameter(f"expected max or a factor in (0, 1000], got {value}")
+    return speed
+
+
+speed_option = click.option(
+    "--speed", default="max", show_default=True, callback=parse_speed, metavar="max|X", help="As fast as possible, or X times real time."
+)
+fault_option = click.option("--fault", "faults", multiple=True, help=FAULT_HELP)
+seed_option = click.option("--seed", type=click.IntRange(0, 2**31 - 1), default=1, show_default=True, help="One seed, one result.")

@@ -1,0 +1,137 @@
+"""What each process of a rig runs, whether forked by the launcher or started by its command."""
+
+from __future__ import annotations
+
+import contextlib
+import ctypes
+import multiprocessing
+import signal
+import sys
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+from pathlib import Path
+
+import msgpack
+import setproctitle
+
+from groundstation.errors import GroundError
+from node.errors import NodeError
+from node.firmware.settings import TubeSettings
+from node.process.encoder_process import EncoderProcess
+from node.process.tube_process import TubeProcess
+from sim.errors import SimError
+from telemetry import keys
+from telemetry.errors import TelemetryError
+from telemetry.media.stepped import BenchClient, Stepped, serve
+from telemetry.media.zenoh_bus import open_client, open_router
+from telemetry.messages import BASE, ENCODER
+
+PR_SET_PDEATHSIG = 1
+CONNECT_TIMEOUT = 30.0  # wall s
+
+
+@dataclass(frozen=True, slots=True)
+class Place:
+    """Where a process finds its rig."""
+
+    rig: str
+    endpoint: str
+    folder: Path
+
+
+def run_node(place: Place, settings: TubeSettings) -> None:
+    """Node of one tube until the bench ends or a signal comes."""
+    run_on_bench(f"node {settings.tube}", place, settings.tube, lambda: TubeProcess(settings, place.folder))
+
+
+def run_encoder(place: Place) -> None:
+    """Encoder node on the drive head."""
+    run_on_bench("encoder", place, ENCODER, lambda: EncoderProcess(place.folder))
+
+
+def run_on_bench(name: str, place: Place, address: int, build: Callable[[], Stepped]) -> None:
+    """Build a process, join the bench and serve it; the token of life is last, when everything listens."""
+    begin_process(name)
+    with reporting(name), open_client(place.endpoint, timeout=CONNECT_TIMEOUT) as bus:
+        process = build()
+        client = BenchClient(bus, place.rig, address)
+        on_termination(client.stop)
+        serve(process, client)
+
+
+def run_ground(place: Place, tube_length: float) -> None:
+    """Ground station: the bench drives its link, operators ask it at any time."""
+    from groundstation.config import GroundConfig
+    from groundstation.process import GroundProcess
+
+    begin_process("ground")
+    with reporting("ground"), open_client(place.endpoint, timeout=CONNECT_TIMEOUT) as bus:
+        process = GroundProcess(GroundConfig(rig=place.rig, folder=place.folder, tube_length=tube_length))
+        with process.serving(bus):
+            client = BenchClient(bus, place.rig, BASE, hears_depth=True)
+            on_termination(client.stop)
+            serve(process, client)
+
+
+def run_medium(place: Place, scenario: Path, seed: int, speed: float, faults: tuple[str, ...], *, router: bool) -> None:
+    """World, joints and clock; in a rig without an outside router its session is the router."""
+    from sim.bench import Bench
+    from sim.medium import Medium, Progress
+    from sim.scenario import load_scenario
+    from sim.world import World
+
+    begin_process("medium")
+    with reporting("medium"):
+        world = World(load_scenario(scenario, faults), seed)
+        session = open_router(place.endpoint) if router else open_client(place.endpoint, timeout=CONNECT_TIMEOUT)
+        with session as bus:
+            wanted = bus.publisher(keys.WANTED.format(rig=place.rig))
+            bench = Bench(bus, place.rig)
+
+            def tell(progress: Progress) -> None:
+                wanted.put(pack_progress(progress))
+
+            medium = Medium(world, bench, tell, speed)
+            on_termination(medium.stop)
+            bus.liveliness_token(keys.LIVELINESS.format(rig=place.rig, process="medium"))
+            if medium.run():
+                medium.linger()
+
+
+def pack_progress(progress: object) -> bytes:
+    """Wire form of the medium's progress, read by the launcher's ``Tick``."""
+    from sim.medium import Progress
+
+    if not isinstance(progress, Progress):
+        raise TypeError(f"expected Progress, got {type(progress).__name__}")
+    p = progress
+    return bytes(msgpack.packb([p.phase, p.rig_time, p.begin, p.end, p.wanted, p.kill, p.finished]))
+
+
+def begin_process(name: str) -> None:
+    """Name the process for ``ps``, leave Ctrl-C to the launcher and end with the parent."""
+    setproctitle.setproctitle(f"borechain {name}")
+    if multiprocessing.parent_process() is None:
+        return
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    if sys.platform == "linux":
+        ctypes.CDLL(None).prctl(PR_SET_PDEATHSIG, signal.SIGTERM)
+
+
+def on_termination(stop: Callable[[], None]) -> None:
+    """End the main loop on SIGTERM, and on Ctrl-C where the process was started by its own command."""
+    signal.signal(signal.SIGTERM, lambda _number, _frame: stop())
+    if multiprocessing.parent_process() is None:
+        signal.signal(signal.SIGINT, lambda _number, _frame: stop())
+
+
+@contextlib.contextmanager
+def reporting(name: str) -> Iterator[None]:
+    """In a forked process print one line for an expected error; a command of its own reports by itself."""
+    try:
+        yield
+    except (SimError, NodeError, TelemetryError, GroundError, OSError) as error:
+        if multiprocessing.parent_process() is None:
+            raise
+        sys.stderr.write(f"borechain {name}: {error}\n")
+        sys.exit(1)

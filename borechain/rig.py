@@ -1,0 +1,181 @@
+"""``borechain rig``: a whole rig in real processes."""
+
+from __future__ import annotations
+
+import json
+import time
+from collections.abc import Callable
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import click
+
+from borechain.faults import plain_faults
+from borechain.options import fault_option, seed_option, speed_option
+from telemetry import keys
+
+if TYPE_CHECKING:
+    from sim.launcher import Tick
+    from sim.processes import ProcessTable
+    from sim.world import World
+    from telemetry.media.zenoh_bus import ZenohBus
+
+PRELOAD = ["borechain.warm"]
+
+
+@click.command()
+@click.argument("scenario", type=click.Path(path_type=Path))
+@speed_option
+@seed_option
+@fault_option
+@click.option("--transport", type=click.Choice(["zenoh"]), default="zenoh", show_default=True)
+@click.option("--rig", "rig_name", default=keys.DEFAULT_RIG, show_default=True, help="Name of the rig in key expressions.")
+@click.option("--endpoint", default=keys.DEFAULT_ENDPOINT, show_default=True, help="Where the rig's router listens.")
+@click.option("--out", type=click.Path(path_type=Path), help="New or empty folder for the run  [default: out/NAME/run-NNNN]")
+@click.option("--json", "as_json", is_flag=True, help="Print one JSON object and nothing else on stdout.")
+@plain_faults
+def rig(
+    scenario: Path,
+    speed: float,
+    seed: int,
+    faults: tuple[str, ...],
+    transport: str,
+    rig_name: str,
+    endpoint: str,
+    out: Path | None,
+    as_json: bool,
+) -> None:
+    """Drill SCENARIO tube by tube with one real process a tube, and show what the ground station makes of it.
+
+    \b
+    Examples:
+      borechain rig scenarios/wellbore-1.toml
+      borechain rig scenarios/wellbore-1.toml --speed 1 --fault kill-node:3@900
+    """
+    del transport
+    from sim.launcher import Launcher, check_port_free, next_run_folder, prepare_folder
+    from sim.report import write_files
+    from sim.scenario import load_scenario
+    from sim.world import World
+
+    world = World(load_scenario(scenario, faults), seed)
+    check_port_free(endpoint)
+    folder = out if out is not None else next_run_folder(Path("out") / scenario.stem)
+    prepare_folder(folder)
+    table = process_table(world, scenario, seed, speed, faults, rig_name, endpoint, folder)
+    started = time.monotonic()
+    with progress(world, quiet=as_json) as show:
+        answers = Launcher(table, rig_name, endpoint, show).run(lambda bus: ask(bus, rig_name))
+    result = result_of(answers, world)
+    result |= {"processes": 3 + world.scenario.tubes, "wall_s": round(time.monotonic() - started, 3)}
+    result["restarts"] = sum(table.restarts.values())
+    write_files(folder, result)
+    if as_json:
+        click.echo(json.dumps(result))
+    else:
+        show_result(result, folder)
+
+
+def process_table(
+    world: World, scenario: Path, seed: int, speed: float, faults: tuple[str, ...], rig_name: str, endpoint: str, folder: Path
+) -> ProcessTable:
+    """Every process of the rig, one line each."""
+    from borechain.processes import Place, run_encoder, run_ground, run_medium, run_node
+    from sim.launcher import private_folder
+    from sim.processes import ProcessTable, Spec
+
+    def place(name: str) -> Place:
+        return Place(rig_name, endpoint, private_folder(folder, name))
+
+    specs = {
+        "medium": Spec(run_medium, (place("medium"), scenario, seed, speed, faults, True)),
+        "encoder": Spec(run_encoder, (place("encoder"),)),
+        "base": Spec(run_ground, (place("ground"), world.scenario.tube_length)),
+    }
+    for tube in range(1, world.scenario.tubes + 1):
+        specs[str(tube)] = Spec(run_node, (place(f"tube-{tube}"), world.tube_settings(tube)))
+    return ProcessTable(specs, PRELOAD)
+
+
+def ask(bus: ZenohBus, rig_name: str) -> dict[str, Any]:
+    """Stations, trajectory and measurements as any operator would get them."""
+    return {path: get_json(bus, f"borechain/{rig_name}/ground/{path}") for path in ("stations", "measurements", "status")}
+
+
+def get_json(bus: ZenohBus, selector: str) -> Any:
+    """One reply of the ground station."""
+    from sim.errors import RigError
+
+    replies = bus.get(selector, timeout=10.0)
+    if len(replies) != 1 or replies[0].error is not None:
+        raise RigError(f"{selector}: expected one answer of the ground station, got {len(replies)}")
+    return json.loads(replies[0].payload)
+
+
+def result_of(answers: dict[str, Any], world: World) -> dict[str, Any]:
+    """The JSON object of the command."""
+    from sim.report import digest, figures, station_table
+
+    stations = station_table(answers["stations"]["stations"], world)
+    measurements = answers["measurements"]["measurements"]
+    return {
+        "stations": stations,
+        "figures": figures(stations, measurements, world),
+        "measurements": len(measurements),
+        "rig_s": round(world.end - world.begin, 3),
+        "digest": digest(stations),
+    }
+
+
+class progress:  # noqa: N801
+    """Progress bar on stderr, silent for scripts."""
+
+    def __init__(self, world: World, *, quiet: bool) -> None:
+        from rich.console import Console
+        from rich.progress import BarColumn, Progress, TextColumn, TimeRemainingColumn
+
+        self._bar = Progress(
+            TextColumn("{task.description:<16}"),
+            BarColumn(),
+            TextColumn("{task.completed:.0f}/{task.total:.0f} s of rig time"),
+            TimeRemainingColumn(),
+            console=Console(stderr=True),
+            disable=quiet,
+        )
+        self._task = self._bar.add_task("starting", total=world.end - world.begin)
+
+    def __enter__(self) -> Callable[[Tick], None]:
+        self._bar.start()
+        return self._show
+
+    def __exit__(self, *_: object) -> None:
+        self._bar.stop()
+
+    def _show(self, tick: Tick) -> None:
+        self._bar.update(self._task, completed=tick.rig_time - tick.begin, description=tick.phase)
+
+
+def show_result(result: dict[str, Any], folder: Path) -> None:
+    """Station table beside the truth, and the figures, for people."""
+    from rich.console import Console
+    from rich.table import Table
+
+    console = Console()
+    table = Table(title="Stations, measured beside truth")
+    for name in ("#", "MD m", "looks", "incl deg", "truth", "azi deg", "truth", "north m", "truth", "east m", "truth", "TVD m", "2 sigma cm"):
+        table.add_column(name, justify="right")
+    for s in result["stations"]:
+        t = s["truth"]
+        sigma_cm = 200.0 * max(s["sigma_north_m"], s["sigma_east_m"])
+        cells = [f"{s['inclination_deg']:.3f}", f"{t['inclination_deg']:.3f}", f"{s['azimuth_deg']:.2f}", f"{t['azimuth_deg']:.2f}"]
+        cells += [f"{s['north_m']:.4f}", f"{t['north_m']:.4f}", f"{s['east_m']:.4f}", f"{t['east_m']:.4f}", f"{s['tvd_m']:.4f}"]
+        table.add_row(str(s["station"]), f"{s['md_m']:.2f}", str(s["measurements"]), *cells, f"{sigma_cm:.2f}")
+    console.print(table)
+    for name, value in result["figures"].items():
+        shown = " ".join(f"{v:.4f}" for v in value) if isinstance(value, list) else f"{value:.4f}"
+        console.print(f"{name:22} {shown}")
+    console.print(
+        f"{len(result['stations'])} stations, {result['measurements']} measurements, {result['processes']} processes, "
+        f"{result['rig_s']:.0f} s of rig time in {result['wall_s']:.1f} s"
+    )
+    console.print(f"digest {result['digest']}\nfiles  {folder}", soft_wrap=True)

@@ -1,0 +1,77 @@
+"""The encoder node: counts of the drive head become the measurement that every tube below relies on.
+
+While the head turns, the moment of the last edge is known: at that moment the angle is exact but for the edge's own
+jitter. At rest the angle is somewhere inside one count, a constant error, so the rest gives one measurement, repeated
+under one sequence number and never averaged (thesis 3.6 takes it as white).
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+from telemetry.messages import Aiding
+
+COUNTS_PER_TURN = 4096  # 1024 lines, decoded in quadrature
+QUANTUM = 2.0 * math.pi / COUNTS_PER_TURN
+EDGE_STD = math.radians(0.003)
+
+
+@dataclass(frozen=True, slots=True)
+class EncoderSample:
+    """One reading of the counter."""
+
+    count: int  # since the counter was started
+    edge_at: float  # s, rig time of the last change of the count
+    rising: bool  # direction of that change
+
+
+class EncoderNode:
+    """Makes one aiding a cycle from the counter."""
+
+    def __init__(self, first_sequence: int = 0) -> None:
+        self.sequence = first_sequence
+        self._edge_at: float | None = None
+        self._edge_angle = 0.0
+        self._resting = False
+
+    def on_cycle(self, sample: EncoderSample, now: float) -> Aiding:
+        """Measure at ``now`` (s, rig time): the last edge while turning, the middle of the count at rest."""
+        if self._edge_at is not None and sample.edge_at > self._edge_at:
+            return self._turning(sample)
+        self._remember(sample)
+        return self._at_rest(sample, now)
+
+    def _turning(self, sample: EncoderSample) -> Aiding:
+        before_at, before_angle = self._edge_at, self._edge_angle
+        self._remember(sample)
+        elapsed = sample.edge_at - (before_at if before_at is not None else sample.edge_at)
+        self._resting = False
+        self.sequence += 1
+        rate = (self._edge_angle - before_angle) / elapsed
+        return aiding(self._edge_angle, EDGE_STD**2, rate, sample.edge_at, self.sequence)
+
+    def _at_rest(self, sample: EncoderSample, now: float) -> Aiding:
+        if not self._resting:
+            self._resting = True
+            self.sequence += 1
+        return aiding((sample.count + 0.5) * QUANTUM, QUANTUM**2 / 12.0, 0.0, now, self.sequence)
+
+    def _remember(self, sample: EncoderSample) -> None:
+        self._edge_at = sample.edge_at
+        self._edge_angle = (sample.count + (0 if sample.rising else 1)) * QUANTUM
+
+
+def aiding(angle: float, var: float, rate: float, valid_at: float, sequence: int) -> Aiding:
+    """Aiding of the encoder itself: no joint passed, no systematic error."""
+    yaw = angle % (2.0 * math.pi)
+    return Aiding(
+        yaw=yaw if yaw < 2.0 * math.pi else 0.0,
+        yaw_var=var,
+        systematic_var=0.0,
+        offset=0.0,
+        rate=rate,
+        valid_at=valid_at,
+        sequence=sequence,
+        hops=0,
+    )

@@ -1,0 +1,63 @@
+"""What a node keeps over a loss of power, as bytes: its state record and a blob of the telemetry."""
+
+from __future__ import annotations
+
+import struct
+import zlib
+
+import numpy as np
+
+from node.errors import SavedStateError
+from node.kernels.error_model import isolate
+from node.kernels.layout import LAYOUT_VERSION, STATE, Array, Err
+
+HEADER = struct.Struct("<4sHHQII I")  # magic, layout, reserved, generation, state bytes, blob bytes, crc of the rest
+MAGIC = b"BCSS"
+UNKNOWN_YAW_VAR = 3.29  # rad^2, uniform over the turn
+
+
+def pack(state: Array, blob: bytes, generation: int) -> bytes:
+    """Bytes of one slot: header with checksum, state record, blob."""
+    body = state.tobytes() + blob
+    head = HEADER.pack(MAGIC, LAYOUT_VERSION, 0, generation, STATE.itemsize, len(blob), 0)
+    return HEADER.pack(
+        MAGIC, LAYOUT_VERSION, 0, generation, STATE.itemsize, len(blob), zlib.crc32(body, zlib.crc32(head))
+    ) + body
+
+
+def unpack(data: bytes) -> tuple[Array, bytes, int]:
+    """State, blob and generation of one slot.
+
+    Raises
+    ------
+    SavedStateError
+        When the bytes are torn, damaged or of another layout; the message says which.
+    """
+    if len(data) < HEADER.size:
+        raise SavedStateError(f"saved state: expected at least {HEADER.size} bytes, got {len(data)}")
+    magic, layout, _, generation, state_size, blob_size, crc = HEADER.unpack_from(data)
+    if magic != MAGIC or layout != LAYOUT_VERSION or state_size != STATE.itemsize:
+        raise SavedStateError(f"saved state: expected layout {LAYOUT_VERSION} of {STATE.itemsize} bytes, got {layout}, {state_size}")
+    body = data[HEADER.size : HEADER.size + state_size + blob_size]
+    head = HEADER.pack(magic, layout, 0, generation, state_size, blob_size, 0)
+    if len(body) != state_size + blob_size or zlib.crc32(body, zlib.crc32(head)) != crc:
+        raise SavedStateError("saved state: checksum does not fit, the slot is torn or damaged")
+    return np.frombuffer(body[:state_size], STATE).copy(), body[state_size:], generation
+
+
+def resume(state: Array) -> None:
+    """Make a saved record ready for its first cycle after an outage of unknown length.
+
+    The constants (bias, scale, offset) are kept. The yaw is kept as the best guess; if the string was turning when
+    the state was saved nothing is known of it, so its variance says so and the first aiding decides.
+    """
+    record = state[0]
+    was_turning = int(record["still_cycles"]) == 0
+    for name in ("cycles", "consumed", "pending", "still_cycles", "rejected", "bias_count"):
+        record[name] = 0
+    record["bias_sum"] = 0.0
+    record["yaw"] = record["now_yaw"]
+    if was_turning:
+        record["last_sequence"] = -1
+        isolate(record["P"], int(Err.YAW), UNKNOWN_YAW_VAR)
+    record["now_P"] = record["P"]

@@ -1,0 +1,56 @@
+"""Settings of one node, validated where they enter and plain inside."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+from node.errors import ConfigurationError
+from node.kernels.layout import Scheme
+from telemetry.messages import MAX_TUBE
+
+
+@dataclass(frozen=True, slots=True)
+class Joint:
+    """A make-up angle as read from the scribe marks: yaw of the lower part minus yaw of the upper part."""
+
+    angle: float = 0.0  # rad
+    std: float = 0.0  # rad, constant error of the reading
+
+
+@dataclass(frozen=True, slots=True)
+class TubeSettings:
+    """What the crew knows of a tube when it is powered on."""
+
+    tube: int
+    drive_joint: Joint = Joint()  # to the drive head, while this is the top tube
+    lower_joint: Joint = Joint()  # to the tube below
+    mount_std: float = 0.0  # rad, IMU against the tube's marks, about the tube axis
+    scheme: Scheme = Scheme.FORWARD
+    state_every: int = 3  # cycles between two reports
+    aiding_old_after: float = 3.0  # s
+
+    def __post_init__(self) -> None:
+        """Refuse what cannot be.
+
+        Raises
+        ------
+        ConfigurationError
+            With the field, its range and what was given.
+        """
+        require(1 <= self.tube <= MAX_TUBE, f"tube: expected 1..{MAX_TUBE}, got {self.tube}")
+        require(self.state_every >= 1, f"state_every: expected at least 1 cycle, got {self.state_every}")
+        for name, std in (
+            ("drive_joint.std", self.drive_joint.std),
+            ("lower_joint.std", self.lower_joint.std),
+            ("mount_std", self.mount_std),
+        ):
+            require(math.isfinite(std) and std >= 0.0, f"{name}: expected a standard deviation in rad, got {std}")
+        for name, angle in (("drive_joint.angle", self.drive_joint.angle), ("lower_joint.angle", self.lower_joint.angle)):
+            require(math.isfinite(angle), f"{name}: expected an angle in rad, got {angle}")
+
+
+def require(condition: bool, message: str) -> None:
+    """Raise ``ConfigurationError`` with ``message`` unless ``condition``."""
+    if not condition:
+        raise ConfigurationError(message)

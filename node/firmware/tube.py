@@ -1,0 +1,245 @@
+"""One tube: hears aiding and IMU readings, says aiding, state, surveys and events."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from node.firmware.settings import TubeSettings
+from node.kernels.angles import from_binary, wrap
+from node.kernels.cycle import run_cycle
+from node.kernels.layout import DEG, Array, Err, Scheme, Status
+from node.kernels.relay import offer_aiding
+from telemetry.messages import (
+    Aiding,
+    Event,
+    ImuMean,
+    Mode,
+    NodeFlag,
+    NodeState,
+    Scalar,
+    Severity,
+    SurveyMeasurement,
+)
+
+VAR_FLOOR = (0.001 * DEG) ** 2
+EVENT_OF_STATUS: tuple[tuple[Status, str, Severity], ...] = (
+    (Status.STOPPED, "stopped", Severity.INFO),
+    (Status.STARTED, "started", Severity.INFO),
+    (Status.BIAS_KNOWN, "bias_known", Severity.INFO),
+    (Status.REFERENCE_CHANGED, "reference_changed", Severity.INFO),
+    (Status.YAW_RESET, "yaw_reset", Severity.WARNING),
+    (Status.RATE_EXCEEDED, "rate_exceeded", Severity.ERROR),
+    (Status.RATE_RECOVERED, "rate_recovered", Severity.WARNING),
+    (Status.NUMERIC_FAULT, "numeric_fault", Severity.ERROR),
+)
+
+
+@dataclass(frozen=True, slots=True)
+class ImuReading:
+    """Mean of one cycle, calibrated, body frame, on the node's own clock."""
+
+    start: float  # s
+    end: float  # s
+    rate: tuple[float, float, float]  # rad/s
+    force: tuple[float, float, float]  # m/s^2
+
+
+@dataclass(frozen=True, slots=True)
+class Surroundings:
+    """What the telemetry tells the firmware at a cycle: its place in the string and the time."""
+
+    joined: bool  # the upper joint is closed
+    hops: int
+    rig_now: float  # s, rig time of the cycle's end
+    clock_var: float  # s^2
+    synchronised: bool
+
+
+class Tube:
+    """State of one node and what it does at each event.
+
+    Parameters
+    ----------
+    settings : what the crew entered
+    config, state : one-record arrays of dtype ``CONFIG`` and ``STATE``, owned by the caller
+    next_sequence : source of the numbers of surveys and events, kept across restarts by the caller
+    restored : the state comes from a saved one
+    """
+
+    def __init__(
+        self, settings: TubeSettings, config: Array, state: Array, next_sequence: Callable[[], int], *, restored: bool
+    ) -> None:
+        self.settings = settings
+        self.config = config[0]
+        self.state = state[0]
+        self._next_sequence = next_sequence
+        self._restored = restored
+        self._cycles = 0
+        self._overruns = 0
+        self._rate, self._force = np.zeros(3), np.zeros(3)
+        self._rejecting = False
+
+    def on_aiding(self, aiding: Aiding, valid_local: float) -> Aiding | None:
+        """Take the reference from the upper end, valid at ``valid_local`` (s, own clock); returns what goes down.
+
+        ``forward`` hands the encoder's measurement on unchanged, at once; ``estimate`` waits for the cycle.
+        """
+        joint = self.settings.drive_joint if aiding.hops == 0 else None
+        offset = wrap(aiding.offset + (joint.angle if joint else 0.0))
+        systematic_var = aiding.systematic_var + (joint.std**2 if joint else 0.0)
+        offer_aiding(
+            self.state,
+            self.config,
+            aiding.yaw,
+            aiding.yaw_var,
+            systematic_var,
+            offset,
+            aiding.rate,
+            valid_local,
+            aiding.sequence,
+            aiding.hops,
+        )
+        if self.settings.scheme is not Scheme.FORWARD:
+            return None
+        below = self.settings.lower_joint
+        return replace(
+            aiding,
+            offset=wrap(offset + below.angle),
+            systematic_var=systematic_var + below.std**2,
+            hops=aiding.hops + 1,
+        )
+
+    def on_cycle(self, reading: ImuReading, around: Surroundings) -> Iterator[Aiding | SurveyMeasurement | Event | NodeState]:
+        """Run one execution cycle and yield what there is to say."""
+        self._rate[:] = reading.rate
+        self._force[:] = reading.force
+        if self._cycles and reading.start - self.state["now"] > 0.5 * (reading.end - reading.start):
+            self._overruns += 1
+        status = Status(
+            run_cycle(
+                self.state, self.config, self._rate, self._force, reading.start, reading.end, 1 if around.joined else 0
+            )
+        )
+        self._cycles += 1
+        yield from self._events(status, around)
+        if Status.SURVEY_READY in status:
+            yield self._survey(reading.end, around)
+        if self.settings.scheme is Scheme.ESTIMATE and self.state["yaw_known"]:
+            yield self._estimate(around)
+        if status or self._cycles % self.settings.state_every == 0:
+            yield self._report(reading.end, around)
+
+    def boot_event(self, rig_now: float) -> Event:
+        """Tell that the node started, and whether with its saved yaw."""
+        return self._event("restored" if self._restored else "booted", Severity.INFO, rig_now, {"yaw_deg": self.yaw / DEG})
+
+    def take_survey(self) -> None:
+        """Measure this station again at the next settled cycle of the present or the next stop."""
+        self.state["surveyed"] = 0
+
+    @property
+    def yaw(self) -> float:
+        """Yaw at the end of the newest cycle, rad in [0, 2 pi)."""
+        return float(from_binary(self.state["now_yaw"]))
+
+    @property
+    def yaw_var(self) -> float:
+        """Random variance of ``yaw``, rad^2."""
+        return max(float(self.state["now_P"][Err.YAW, Err.YAW]), VAR_FLOOR)
+
+    @property
+    def systematic_var(self) -> float:
+        """Variance of the constant errors of every joint above and of this node's mount, rad^2."""
+        return float(self.state["systematic_var"]) + self.settings.mount_std**2
+
+    def flags(self, around: Surroundings, now: float) -> NodeFlag:
+        """What the node says of the trust in its own yaw at ``now`` (s, own clock)."""
+        state = self.state
+        flags = NodeFlag.NONE
+        if not state["yaw_known"]:
+            flags |= NodeFlag.YAW_UNTRUSTED
+        if now - state["last_aided"] > self.settings.aiding_old_after:
+            flags |= NodeFlag.AIDING_OLD
+        if state["rejected"]:
+            flags |= NodeFlag.INNOVATION_REJECTED
+        if state["rate_exceeded"]:
+            flags |= NodeFlag.RATE_EXCEEDED
+        if self._restored:
+            flags |= NodeFlag.RESTORED
+        if not around.synchronised:
+            flags |= NodeFlag.CLOCK_UNSYNCHRONISED
+        if state["mode"] == Mode.STATIC_BIAS:
+            flags |= NodeFlag.BIAS_UNKNOWN
+        return flags
+
+    def _events(self, status: Status, around: Surroundings) -> Iterator[Event]:
+        for bit, code, severity in EVENT_OF_STATUS:
+            if bit in status:
+                yield self._event(code, severity, around.rig_now, {"yaw_deg": self.yaw / DEG})
+        rejecting = bool(self.state["rejected"])
+        if rejecting and not self._rejecting:
+            sigmas = abs(float(self.state["innovation"])) / math.sqrt(float(self.state["innovation_var"]))
+            yield self._event("aiding_rejected", Severity.WARNING, around.rig_now, {"sigmas": sigmas})
+        self._rejecting = rejecting
+
+    def _event(self, code: str, severity: Severity, rig_now: float, arguments: dict[str, Scalar]) -> Event:
+        return Event(self.settings.tube, self._next_sequence(), rig_now, severity, code, arguments)
+
+    def _survey(self, end: float, around: Surroundings) -> SurveyMeasurement:
+        state = self.state
+        cov = state["survey_force_cov"]
+        rows = tuple((float(row[0]), float(row[1]), float(row[2])) for row in cov)
+        force = state["survey_force"]
+        mean = ImuMean((float(force[0]), float(force[1]), float(force[2])), (rows[0], rows[1], rows[2]))
+        return SurveyMeasurement(
+            tube=self.settings.tube,
+            sequence=self._next_sequence(),
+            station_at=around.rig_now,
+            hops=around.hops,
+            imus=(mean,),
+            yaw=self.yaw,
+            yaw_var=self.yaw_var,
+            systematic_var=self.systematic_var,
+            samples=int(self.config["survey_samples"]),
+            settle_time=end - float(state["stopped_at"]),
+            flags=self.flags(around, end),
+        )
+
+    def _estimate(self, around: Surroundings) -> Aiding:
+        below = self.settings.lower_joint
+        return Aiding(
+            yaw=self.yaw,
+            yaw_var=self.yaw_var,
+            systematic_var=float(self.state["systematic_var"]) + below.std**2,
+            offset=wrap(below.angle),
+            rate=float(self.state["now_rate"]),
+            valid_at=around.rig_now,
+            sequence=int(self.state["cycles"]),
+            hops=max(around.hops, 1),
+        )
+
+    def _report(self, end: float, around: Surroundings) -> NodeState:
+        state = self.state
+        bias = state["static_bias"] + state["bias"]
+        return NodeState(
+            tube=self.settings.tube,
+            at=around.rig_now,
+            hops=around.hops,
+            mode=Mode(int(state["mode"])),
+            yaw=self.yaw,
+            yaw_var=self.yaw_var,
+            systematic_var=self.systematic_var,
+            gyro_bias=(float(bias[0]), float(bias[1]), float(bias[2])),
+            scale_factor=float(state["scale"]),
+            innovation=float(state["innovation"]),
+            innovation_var=float(state["innovation_var"]),
+            aiding_age=end - float(state["last_aided"]),
+            clock_var=around.clock_var,
+            flags=self.flags(around, end),
+            cycles=self._cycles,
+            overruns=self._overruns,
+        )

@@ -1,0 +1,41 @@
+"""Angles as floats and as binary angles (2^32 is one turn, wraps by itself and never loses resolution)."""
+
+from __future__ import annotations
+
+import math
+
+from node.kernels.jit import kernel
+
+TURN = 2.0 * math.pi
+BINARY_TURN = 4294967296.0
+
+
+@kernel
+def wrap(angle: float) -> float:
+    """Angle (rad) in (-pi, pi]."""
+    return math.pi - (math.pi - angle) % (2.0 * math.pi)
+
+
+@kernel
+def wrap_positive(angle: float) -> float:
+    """Angle (rad) in [0, 2 pi)."""
+    wrapped = angle % (2.0 * math.pi)
+    return wrapped if wrapped < 2.0 * math.pi else 0.0
+
+
+@kernel
+def to_binary(angle: float) -> int:
+    """Binary angle, 0 .. 2^32 - 1, nearest to ``angle`` (rad)."""
+    return int(math.floor(angle / (2.0 * math.pi) * 4294967296.0 + 0.5)) & 0xFFFFFFFF
+
+
+@kernel
+def from_binary(binary: int) -> float:
+    """Angle (rad) in [0, 2 pi) of a binary angle."""
+    return float(binary) * (2.0 * math.pi / 4294967296.0)
+
+
+@kernel
+def advance_binary(binary: int, increment: float) -> int:
+    """Binary angle turned by ``increment`` (rad), rounded to the nearest count."""
+    return (int(binary) + int(math.floor(increment / (2.0 * math.pi) * 4294967296.0 + 0.5))) & 0xFFFFFFFF

@@ -1,0 +1,42 @@
+"""One execution cycle of a node, compiled whole: modes, increments, filter, prediction to now."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+from node.kernels.fixed_lag import consume, predict_to_now, push
+from node.kernels.jit import kernel
+from node.kernels.layout import STATES, Array, Status
+from node.kernels.modes import STATIC_BIAS, guard_rate, is_quiet, learn_static_bias, step_modes
+
+NUMERIC_FAULT = int(Status.NUMERIC_FAULT)
+
+
+@kernel
+def run_cycle(state: Any, config: Any, rate: Array, force: Array, start: float, end: float, joined: int) -> int:
+    """Take one cycle's IMU reading and leave the yaw at its end in the ``now_*`` fields; returns ``Status`` bits.
+
+    Parameters
+    ----------
+    state, config : records of dtype ``STATE`` and ``CONFIG``
+    rate : (3,) mean angular rate over the cycle, calibrated, rad/s, body frame
+    force : (3,) mean specific force over the cycle, calibrated, m/s^2, body frame
+    start, end : s, the node's clock
+    joined : 1 while the upper joint is closed, else 0
+    """
+    for k in range(3):
+        if not (math.isfinite(rate[k]) and math.isfinite(force[k])):
+            return NUMERIC_FAULT
+    quiet = is_quiet(state, config, rate)
+    status = guard_rate(state, config, rate[2])
+    push(state, start, end, rate, force, quiet)
+    if state.mode == STATIC_BIAS:
+        status |= learn_static_bias(state, config, rate, end - start, quiet)
+    status |= consume(state, config)
+    predict_to_now(state, config)
+    status |= step_modes(state, config, quiet, joined, end)
+    for i in range(STATES):
+        if not (state.P[i, i] >= 0.0 and math.isfinite(state.P[i, i])):
+            return status | NUMERIC_FAULT
+    return status

@@ -1,0 +1,232 @@
+"""The filter at the epoch of its measurements: integrate up to the time of validity, update, predict to now.
+
+Delay compensation (thesis eq. 3.29): an aiding is for its time of validity, not for its arrival. The increments of
+the last cycles lie in a ring; the filter stays a cycle behind, passes each measurement at its own time and predicts a
+copy of itself to the present. Staying behind also tells from the next cycle whether the string really stood still.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+from node.kernels.angles import advance_binary, from_binary, to_binary, wrap
+from node.kernels.error_model import isolate, propagate
+from node.kernels.jit import kernel
+from node.kernels.layout import RING, STATES, Array, Err, Status
+from node.kernels.strapdown import rotate_down, yaw_rate
+from node.kernels.update import clear, feed_back, innovation_var, joseph, level, zero_rate
+
+PSI, BZ, D = int(Err.YAW), int(Err.BIAS_Z), int(Err.STAMP)
+AIDED, REJECTED, YAW_RESET = int(Status.AIDED), int(Status.REJECTED), int(Status.YAW_RESET)
+LATE_DROPPED = int(Status.LATE_DROPPED)
+BX = int(Err.BIAS_X)
+
+
+@kernel
+def push(state: Any, start: float, end: float, rate: Array, force: Array, quiet: int) -> None:
+    """Write one cycle's increments, local times (s), mean rate (3, rad/s) and mean specific force (3, m/s^2)."""
+    slot = state.cycles % RING
+    state.ring_start[slot] = start
+    state.ring_end[slot] = end
+    state.ring_quiet[slot] = quiet
+    for k in range(3):
+        state.ring_rate[slot, k] = rate[k]
+        state.ring_force[slot, k] = force[k]
+    state.cycles += 1
+    if state.cycles == 1:
+        state.epoch = start
+
+
+@kernel
+def stood_still(state: Any, cycle: int) -> bool:
+    """Whether the string stood still in ``cycle``: it and both neighbours were quiet."""
+    if state.ring_quiet[cycle % RING] == 0 or cycle == 0:
+        return False
+    if state.ring_quiet[(cycle - 1) % RING] == 0:
+        return False
+    return cycle + 1 >= state.cycles or state.ring_quiet[(cycle + 1) % RING] != 0
+
+
+@kernel
+def turn(state: Any, config: Any, cycle: int, dt: float, yaw: int, down: Array, P: Array) -> int:
+    """Integrate ``dt`` (s) of ``cycle`` into ``down`` and ``P``; returns the binary yaw. Still means no turn at all."""
+    slot = cycle % RING
+    if stood_still(state, cycle):
+        propagate(P, 0.0, dt, 0.0, config)
+        return yaw
+    wx = state.ring_rate[slot, 0] - state.static_bias[0] - state.bias[0]
+    wy = state.ring_rate[slot, 1] - state.static_bias[1] - state.bias[1]
+    wz = (state.ring_rate[slot, 2] - state.static_bias[2] - state.bias[2]) / (1.0 + state.scale)
+    rotate_down(down, wx, wy, wz, 0.5 * dt)
+    turned = yaw_rate(down, wx, wy, wz) * dt
+    rotate_down(down, wx, wy, wz, 0.5 * dt)
+    propagate(P, wz, dt, 1.0, config)
+    return advance_binary(yaw, turned)
+
+
+@kernel
+def advance(state: Any, config: Any, cycle: int, until: float) -> None:
+    """Move the filter's epoch to ``until`` (s), inside ``cycle`` or at its end."""
+    dt = until - state.epoch
+    if dt <= 0.0:
+        return
+    gap = state.ring_start[cycle % RING] - state.epoch
+    state.yaw = turn(state, config, cycle, dt, state.yaw, state.down, state.P)
+    if gap > 1e-3:
+        # cycles were lost: the rate of this one stands for them, and is not trusted further than its own size
+        missed = state.ring_rate[cycle % RING, 2] * gap
+        state.P[PSI, PSI] += missed * missed
+    for k in range(3):
+        state.bias[k] *= 2.718281828459045 ** (-dt / config.bias_tau[k])
+    state.epoch = until
+
+
+@kernel
+def interpolation_var(state: Any, cycle: int, at: float) -> float:
+    """Variance (rad^2) of taking the rate as constant inside ``cycle``, from the change of rate to its neighbours."""
+    slot = cycle % RING
+    inside = min(at - state.ring_start[slot], state.ring_end[slot] - at)
+    if inside <= 0.0 or cycle == 0:
+        return 0.0
+    change = state.ring_rate[slot, 2] - state.ring_rate[(cycle - 1) % RING, 2]
+    if cycle + 1 < state.cycles:
+        ahead = state.ring_rate[(cycle + 1) % RING, 2] - state.ring_rate[slot, 2]
+        change = max(abs(change), abs(ahead))
+    error = 0.5 * change * inside
+    return error * error
+
+
+@kernel
+def reset_yaw(state: Any, config: Any, yaw: float, var: float) -> None:
+    """Take the yaw from the aiding; the bias is re-inflated and no cross term is kept, for they are stale."""
+    state.yaw = to_binary(yaw)
+    isolate(state.P, PSI, var)
+    prior = config.bias_std[2] ** 2 + state.static_bias_var[2]
+    isolate(state.P, BZ, max(prior, state.P[BZ, BZ]))
+    state.bias[2] = 0.0
+    state.yaw_known = 1
+    state.rejected = 0
+
+
+@kernel
+def aid(state: Any, config: Any, yaw: float, r_var: float, rate: float, at: float) -> int:
+    """Update with a yaw ``z = psi + rate d`` at the filter's epoch; returns ``Status`` bits.
+
+    r = wrap(z - psi - rate d), gated at ``config.gate`` sigmas; after ``reject_limit`` rejections in a row the filter
+    says that it was wrong and starts again from the aiding.
+    """
+    if state.yaw_known == 0:
+        reset_yaw(state, config, yaw, r_var + (rate * config.stamp_std) ** 2)
+        state.last_aided = at
+        return AIDED | YAW_RESET
+    clear(state.h)
+    state.h[PSI] = 1.0
+    if config.stamp_std > 0.0:
+        state.h[D] = rate
+    s = innovation_var(state.P, state.h, r_var, state.ph)
+    residual = wrap(yaw - from_binary(state.yaw) - rate * state.stamp)
+    state.innovation = residual
+    state.innovation_var = s
+    if residual * residual > config.gate * config.gate * s:
+        state.rejected += 1
+        state.last_sequence = -1  # it was not used: its repetition at rest is to be judged again
+        if state.rejected < config.reject_limit:
+            return REJECTED
+        reset_yaw(state, config, yaw, r_var + (rate * config.stamp_std) ** 2)
+        isolate(state.P, D, config.stamp_std**2)
+        state.stamp = 0.0
+        state.last_aided = at
+        return REJECTED | AIDED | YAW_RESET
+    joseph(state.P, state.ph, s, state.gain)
+    feed_back(state, residual)
+    state.rejected = 0
+    state.last_aided = at
+    return AIDED
+
+
+@kernel
+def take_pending(state: Any, config: Any, cycle: int, until: float) -> int:
+    """Pass every waiting measurement valid up to ``until`` (s), oldest first; returns ``Status`` bits."""
+    status = 0
+    while state.pending > 0 and state.pending_at[0] <= until:
+        at = state.pending_at[0]
+        yaw, var, rate = state.pending_yaw[0], state.pending_var[0], state.pending_rate[0]
+        if at >= state.epoch:
+            advance(state, config, cycle, at)
+            status |= aid(state, config, yaw, var + interpolation_var(state, cycle, at), rate, at)
+        else:
+            status |= aid_late(state, config, yaw, var, rate, at)
+        drop_first_pending(state)
+    return status
+
+
+@kernel
+def aid_late(state: Any, config: Any, yaw: float, var: float, rate: float, at: float) -> int:
+    """A measurement older than the filter's epoch: carried forward by the increments since, their noise added."""
+    moved = yaw
+    earliest = state.epoch
+    cycle = state.consumed
+    while cycle >= 0 and cycle > state.cycles - RING and earliest > at:
+        slot = cycle % RING
+        begin = max(state.ring_start[slot], at)
+        if begin < earliest:
+            if not stood_still(state, cycle):
+                wz = (state.ring_rate[slot, 2] - state.static_bias[2] - state.bias[2]) / (1.0 + state.scale)
+                moved += wz * (earliest - begin)
+            earliest = begin
+        cycle -= 1
+    if earliest > at + 1e-3:
+        return LATE_DROPPED
+    lag = state.epoch - at
+    noise = config.gyro_noise[2] ** 2 * lag + state.P[BZ, BZ] * lag * lag
+    return aid(state, config, moved, var + noise, rate, at)
+
+
+@kernel
+def drop_first_pending(state: Any) -> None:
+    """Shift the queue of waiting measurements by one."""
+    state.pending -= 1
+    for k in range(state.pending):
+        state.pending_at[k] = state.pending_at[k + 1]
+        state.pending_yaw[k] = state.pending_yaw[k + 1]
+        state.pending_var[k] = state.pending_var[k + 1]
+        state.pending_rate[k] = state.pending_rate[k + 1]
+        state.pending_sequence[k] = state.pending_sequence[k + 1]
+
+
+@kernel
+def consume(state: Any, config: Any) -> int:
+    """Filter every cycle that is old enough; returns ``Status`` bits."""
+    status = 0
+    while state.consumed < state.cycles - config.lag_cycles:
+        cycle = state.consumed
+        slot = cycle % RING
+        end = state.ring_end[slot]
+        status |= take_pending(state, config, cycle, end)
+        advance(state, config, cycle, end)
+        if stood_still(state, cycle):
+            dt = end - state.ring_start[slot]
+            zero_rate(state, state.ring_rate[slot], dt, config)
+            level(state, state.ring_force[slot], config)
+        state.consumed += 1
+    return status
+
+
+@kernel
+def predict_to_now(state: Any, config: Any) -> None:
+    """Copy the filter and integrate the cycles it has not consumed yet: the yaw and covariance at the present."""
+    for i in range(STATES):
+        for j in range(STATES):
+            state.now_P[i, j] = state.P[i, j]
+    for k in range(3):
+        state.now_down[k] = state.down[k]
+    state.now_yaw = state.yaw
+    state.now = state.epoch
+    for cycle in range(state.consumed, state.cycles):
+        slot = cycle % RING
+        dt = state.ring_end[slot] - state.now
+        if dt > 0.0:
+            state.now_yaw = turn(state, config, cycle, dt, state.now_yaw, state.now_down, state.now_P)
+            state.now = state.ring_end[slot]
+    newest = (state.cycles - 1) % RING
+    state.now_rate = (state.ring_rate[newest, 2] - state.static_bias[2] - state.bias[2]) / (1.0 + state.scale)

@@ -1,0 +1,203 @@
+"""Memory of one node: the state record, the configuration record and the names of the error states.
+
+The state is one flat numpy record, so that saving a node is copying its bytes and a C compiler could declare the
+same struct. Source: thesis 3.5 (states), error-state form ``dx = true - estimate``.
+"""
+
+from __future__ import annotations
+
+import enum
+from typing import Any, Final, TypeAlias
+
+import numpy as np
+
+Array: TypeAlias = "np.ndarray[Any, np.dtype[Any]]"
+
+STATES: Final = 8
+RING: Final = 64
+PENDING: Final = 4
+LAYOUT_VERSION: Final = 1
+
+
+class Err(enum.IntEnum):
+    """Index of each error state in ``P``."""
+
+    TILT_X = 0  # rad, rotation of the body about its own x
+    TILT_Y = 1  # rad
+    YAW = 2  # rad
+    BIAS_X = 3  # rad/s
+    BIAS_Y = 4  # rad/s
+    BIAS_Z = 5  # rad/s
+    SCALE = 6  # 1, of the z gyroscope
+    STAMP = 7  # s, true time of validity of the aiding minus the node's idea of it
+
+
+class Status(enum.IntFlag):
+    """What one cycle did; each bit becomes an event or a message."""
+
+    NONE = 0
+    STOPPED = 1
+    STARTED = 2
+    SURVEY_READY = 4
+    BIAS_KNOWN = 8
+    AIDED = 16
+    REJECTED = 32
+    YAW_RESET = 64
+    RATE_EXCEEDED = 128
+    RATE_RECOVERED = 256
+    REFERENCE_CHANGED = 512
+    NUMERIC_FAULT = 1024
+    LATE_DROPPED = 2048
+
+
+class Scheme(enum.IntEnum):
+    """What a node passes on to the next one."""
+
+    FORWARD = 0  # the encoder's own measurement
+    ESTIMATE = 1  # the node's yaw and its variance, as published
+
+
+STATE: Final = np.dtype(
+    [
+        # the filter, at its own epoch (at most RING cycles behind now)
+        ("epoch", "f8"),  # s, node's clock
+        ("yaw", "u4"),  # binary angle, 2^32 is one turn
+        ("yaw_known", "i8"),
+        ("down", "f8", (3,)),  # unit vector of gravity, body frame
+        ("static_bias", "f8", (3,)),  # rad/s, constant part, from standing still
+        ("static_bias_var", "f8", (3,)),
+        ("bias", "f8", (3,)),  # rad/s, Gauss-Markov part
+        ("scale", "f8"),
+        ("stamp", "f8"),  # s
+        ("P", "f8", (STATES, STATES)),
+        # the same, predicted to the end of the newest cycle
+        ("now", "f8"),
+        ("now_yaw", "u4"),
+        ("now_down", "f8", (3,)),
+        ("now_rate", "f8"),
+        ("now_P", "f8", (STATES, STATES)),
+        # aiding: reference in use and measurements waiting for their epoch
+        ("reference_hops", "i8"),
+        ("reference_offset", "f8"),
+        ("systematic_var", "f8"),
+        ("last_sequence", "i8"),
+        ("last_aided", "f8"),  # s, node's clock, time of validity of the last measurement used
+        ("innovation", "f8"),
+        ("innovation_var", "f8"),
+        ("rejected", "i8"),  # in a row
+        ("pending", "i8"),
+        ("pending_at", "f8", (PENDING,)),
+        ("pending_yaw", "f8", (PENDING,)),
+        ("pending_var", "f8", (PENDING,)),
+        ("pending_rate", "f8", (PENDING,)),
+        ("pending_sequence", "i8", (PENDING,)),
+        # the increments of the last RING cycles
+        ("cycles", "i8"),  # written so far
+        ("consumed", "i8"),  # cycles the filter has passed completely
+        ("ring_start", "f8", (RING,)),
+        ("ring_end", "f8", (RING,)),
+        ("ring_rate", "f8", (RING, 3)),
+        ("ring_force", "f8", (RING, 3)),
+        ("ring_quiet", "i8", (RING,)),
+        # modes
+        ("mode", "i8"),
+        ("still_cycles", "i8"),
+        ("stopped_at", "f8"),
+        ("surveyed", "i8"),  # this stop already has its measurement
+        ("rate_exceeded", "i8"),
+        ("bias_count", "i8"),
+        ("bias_sum", "f8", (3,)),
+        # the last survey
+        ("survey_force", "f8", (3,)),
+        ("survey_force_cov", "f8", (3, 3)),
+        # work space of the updates
+        ("h", "f8", (STATES,)),
+        ("ph", "f8", (STATES,)),
+        ("gain", "f8", (STATES,)),
+    ],
+    align=True,
+)
+
+CONFIG: Final = np.dtype(
+    [
+        ("gyro_noise", "f8", (3,)),  # rad/s/sqrt(Hz)
+        ("bias_std", "f8", (3,)),  # rad/s, Gauss-Markov
+        ("bias_tau", "f8", (3,)),  # s
+        ("boot_bias_std", "f8"),  # rad/s, before the node has stood still for long enough
+        ("attitude_factor", "f8"),  # A of thesis eq. 4.14
+        ("bias_factor", "f8"),  # B of thesis eq. 4.15
+        ("scale_std", "f8"),  # prior; 0 switches the state off
+        ("stamp_std", "f8"),  # s, prior; 0 switches the state off
+        ("stamp_walk", "f8"),  # s/sqrt(s), wander of the node's clock error
+        ("still_walk", "f8"),  # rad/sqrt(s), what may turn unseen while still
+        ("aiding_floor_var", "f8"),  # rad^2 added to every aiding
+        ("force_std", "f8"),  # m/s^2, one sample
+        ("gravity", "f8"),  # m/s^2
+        ("gate", "f8"),  # sigmas
+        ("reject_limit", "i8"),  # rejected in a row before the yaw is reset
+        ("rate_limit", "f8"),  # rad/s
+        ("still_rate", "f8"),  # rad/s
+        ("lag_cycles", "i8"),  # the filter stays this far behind, to judge a cycle by its successor
+        ("survey_samples", "i8"),
+        ("settle_cycles", "i8"),
+        ("static_cycles", "i8"),
+    ],
+    align=True,
+)
+
+CYCLE_RATE_HZ: Final = 1.9
+PERIOD: Final = 1.0 / CYCLE_RATE_HZ
+DEG: Final = float(np.pi / 180.0)
+
+
+def default_config() -> Array:
+    """Configuration of an MPU6500-class node, one record of dtype ``CONFIG``.
+
+    The noise set is white plus Gauss-Markov, fitted to the measured Allan curve of the sensor (thesis Table V.1).
+    """
+    config = np.zeros(1, CONFIG)
+    record = config[0]
+    record["gyro_noise"] = np.array([8.538e-3, 6.799e-3, 7.313e-3]) * DEG
+    record["bias_std"] = np.array([1.2545e-2, 5.869e-3, 4.941e-3]) * DEG
+    record["bias_tau"] = 15.87
+    record["boot_bias_std"] = 0.05 * DEG
+    record["attitude_factor"] = 1.0
+    record["bias_factor"] = 1.0
+    record["scale_std"] = 1.5e-3
+    record["stamp_std"] = 2e-3
+    record["stamp_walk"] = 2e-5
+    record["still_walk"] = 2e-4 * DEG
+    record["aiding_floor_var"] = (0.002 * DEG) ** 2
+    record["force_std"] = 0.02 * DEG * 9.81
+    record["gravity"] = 9.81
+    record["gate"] = 5.0
+    record["reject_limit"] = 5
+    record["rate_limit"] = 2.0 * np.pi * 0.95
+    record["still_rate"] = 0.08 * DEG
+    record["lag_cycles"] = 1
+    record["survey_samples"] = 32
+    record["settle_cycles"] = 38
+    record["static_cycles"] = 95
+    return config
+
+
+def new_state(config: Array) -> Array:
+    """State of a node that knows nothing yet, one record of dtype ``STATE``."""
+    state = np.zeros(1, STATE)
+    record, settings = state[0], config[0]
+    priors = np.zeros(STATES)
+    priors[Err.TILT_X] = priors[Err.TILT_Y] = 1.0
+    priors[Err.YAW] = np.pi / np.sqrt(3.0)
+    priors[Err.BIAS_X : Err.BIAS_Z + 1] = settings["boot_bias_std"]
+    priors[Err.SCALE] = settings["scale_std"]
+    priors[Err.STAMP] = settings["stamp_std"]
+    record["P"] = np.diag(priors**2)
+    record["now_P"] = record["P"]
+    record["mode"] = 1
+    record["surveyed"] = 1
+    record["down"][2] = 1.0
+    record["reference_hops"] = -1
+    record["last_sequence"] = -1
+    record["last_aided"] = -np.inf
+    record["stopped_at"] = np.nan
+    return state

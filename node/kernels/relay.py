@@ -1,0 +1,84 @@
+"""Relay arithmetic: what a node takes in as aiding and what it hands down. Source: thesis 3.6 and node chapter 5.
+
+The measured yaw and its random variance stay what the encoder made them (scheme ``forward``); the make-up angles of
+the joints add to an offset, and their constant errors to a systematic variance that no filter averages away: it is
+treated as a consider parameter, so the filter's own variance is that of the yaw relative to the marks.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+from node.kernels.angles import wrap, wrap_positive
+from node.kernels.error_model import isolate
+from node.kernels.jit import kernel
+from node.kernels.layout import PENDING, Err, Status
+
+PSI, D = int(Err.YAW), int(Err.STAMP)
+REFERENCE_CHANGED = int(Status.REFERENCE_CHANGED)
+
+
+@kernel
+def offer_aiding(
+    state: Any,
+    config: Any,
+    yaw: float,
+    yaw_var: float,
+    systematic_var: float,
+    offset: float,
+    rate: float,
+    valid_at: float,
+    sequence: int,
+    hops: int,
+) -> int:
+    """Queue one aiding for the filter (angles rad, ``valid_at`` on the node's clock, s); returns status bits.
+
+    ``offset`` and ``systematic_var`` are those of this node: the sender's plus the joint between the two. A sequence
+    number already used is the same measurement again (at rest the encoder's quantisation is constant, not white), so
+    it refreshes the age and nothing else.
+    """
+    status = 0
+    if hops != state.reference_hops or abs(wrap(offset - state.reference_offset)) > 1e-9:
+        status = change_reference(state, config, systematic_var, offset, hops)
+    elif sequence == state.last_sequence:
+        if state.pending == 0 and state.yaw_known == 1:
+            state.last_aided = max(state.last_aided, valid_at)
+            return status
+        if state.pending > 0:
+            return status
+    if state.pending == PENDING:
+        return status
+    slot = state.pending
+    while slot > 0 and state.pending_at[slot - 1] > valid_at:
+        state.pending_at[slot] = state.pending_at[slot - 1]
+        state.pending_yaw[slot] = state.pending_yaw[slot - 1]
+        state.pending_var[slot] = state.pending_var[slot - 1]
+        state.pending_rate[slot] = state.pending_rate[slot - 1]
+        state.pending_sequence[slot] = state.pending_sequence[slot - 1]
+        slot -= 1
+    state.pending_at[slot] = valid_at
+    state.pending_yaw[slot] = wrap_positive(yaw + offset)
+    state.pending_var[slot] = yaw_var + config.aiding_floor_var
+    state.pending_rate[slot] = rate
+    state.pending_sequence[slot] = sequence
+    state.pending += 1
+    state.last_sequence = sequence
+    state.systematic_var = systematic_var
+    return status
+
+
+@kernel
+def change_reference(state: Any, config: Any, systematic_var: float, offset: float, hops: int) -> int:
+    """The chain above was made up anew: the yaw may step by the errors of the old and the new joints."""
+    first = state.reference_hops < 0
+    step_var = state.systematic_var + systematic_var
+    state.reference_hops = hops
+    state.reference_offset = offset
+    state.systematic_var = systematic_var
+    state.pending = 0
+    if first or state.yaw_known == 0:
+        return 0
+    isolate(state.P, PSI, state.P[PSI, PSI] + step_var)
+    if config.stamp_std > 0.0:
+        isolate(state.P, D, state.P[D, D] + config.stamp_std**2)
+    return REFERENCE_CHANGED

@@ -1,0 +1,20 @@
+"""Compile every entry point of the kernels, or load them from the cache, before the first cycle."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from node.kernels.angles import from_binary, wrap
+from node.kernels.cycle import run_cycle
+from node.kernels.layout import PERIOD, default_config, new_state
+from node.kernels.relay import offer_aiding
+
+
+def warm_up() -> None:
+    """Run one cycle and one aiding on a state that is thrown away."""
+    config = default_config()
+    state = new_state(config)
+    run_cycle(state[0], config[0], np.zeros(3), np.array([0.0, 0.0, -9.81]), 0.0, PERIOD, 1)
+    offer_aiding(state[0], config[0], 0.0, 1e-6, 0.0, 0.0, 0.0, 0.0, 1, 0)
+    from_binary(state[0]["now_yaw"])
+    wrap(0.0)

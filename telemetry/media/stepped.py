@@ -1,0 +1,197 @@
+"""Ports whose time comes from outside: a bench hands a process its events step by step.
+
+A process on a bench owns no clock. Each step names the events that are due for it, in order, with its own local
+time; frames wait in the queue of their port until a step names them, so that neither the load of the machine nor the
+order of arrival has any influence on what the process does. The answer names every frame that was sent and the next
+timer. ``serve`` is the whole main loop of such a process.
+"""
+
+from __future__ import annotations
+
+import math
+import queue
+from collections import deque
+from collections.abc import Iterable
+from dataclasses import dataclass
+from enum import IntEnum
+from typing import Any, Protocol
+
+import msgpack
+
+from telemetry import keys
+from telemetry.errors import MediumError
+from telemetry.media.zenoh_bus import ZenohBus
+from telemetry.messages import Side, address_name
+
+
+class Due(IntEnum):
+    """Kinds of events in a step."""
+
+    UPPER_FRAME = 0
+    LOWER_FRAME = 1
+    CYCLE = 2
+    TIMER = 3
+    DEPTH = 4
+
+
+@dataclass(frozen=True, slots=True)
+class DueEvent:
+    """One event for a process: its kind, its local time (s) and what belongs to it."""
+
+    kind: Due
+    at: float
+    data: Any = None  # CYCLE: [start, *sample]; frames and depths travel on keys of their own
+
+
+@dataclass(frozen=True, slots=True)
+class Sent:
+    """A frame that left the process at the local time ``at`` (s)."""
+
+    side: Side
+    at: float
+
+
+class Stepped(Protocol):
+    """What a process must offer to run on a bench."""
+
+    def on_frame(self, side: Side, frame: bytes, now: float) -> None:
+        """A frame arrived at one end."""
+
+    def on_cycle(self, data: Any, now: float) -> None:
+        """A cycle has ended at ``now`` with the sample ``data``."""
+
+    def on_depth(self, rig_time: float, md: float) -> None:
+        """The rig measured the depth of the bit (m)."""
+
+    def on_timer(self, now: float) -> None:
+        """A timer named by ``next_wake`` is due."""
+
+    def take_frames(self, now: float) -> list[tuple[Side, bytes]]:
+        """Frames to send now."""
+
+    def next_wake(self, now: float) -> float:
+        """Local time of the next timer, infinite if none."""
+
+
+def pack_step(number: int, events: Iterable[DueEvent]) -> bytes:
+    """Step on the wire."""
+    return bytes(msgpack.packb([number, [[int(e.kind), e.at, e.data] for e in events]]))
+
+
+def pack_done(number: int, sent: Iterable[Sent], wake_at: float) -> bytes:
+    """Answer to a step on the wire."""
+    return bytes(msgpack.packb([number, [[int(s.side), s.at] for s in sent], wake_at]))
+
+
+def unpack_done(payload: bytes) -> tuple[int, list[Sent], float]:
+    """Number of the step, frames sent in order and next timer (local time, s)."""
+    number, sent, wake_at = msgpack.unpackb(payload)
+    return number, [Sent(Side(side), at) for side, at in sent], wake_at
+
+
+class BenchClient:
+    """A process's end of the bench: its ports, its steps, its liveliness token."""
+
+    STEP, UPPER, LOWER, DEPTH, MASTER = range(5)
+
+    def __init__(self, bus: ZenohBus, rig: str, address: int, *, hears_depth: bool = False) -> None:
+        self._bus = bus
+        name = address_name(address)
+        self._arrived: queue.SimpleQueue[tuple[int, bytes]] = queue.SimpleQueue()
+        self._waiting: tuple[deque[bytes], ...] = tuple(deque() for _ in range(5))
+        self._done = bus.publisher(keys.DONE.format(rig=rig, process=name))
+        self._tx = {side: bus.publisher(port_key(rig, address, side, "tx")) for side in Side}
+        for side in Side:
+            self._listen(port_key(rig, address, side, "rx"), self.UPPER + int(side))
+        self._listen(keys.STEP.format(rig=rig, process=name), self.STEP)
+        if hears_depth:
+            self._listen(keys.DEPTH.format(rig=rig), self.DEPTH)
+        bus.liveliness_subscribe(keys.LIVELINESS.format(rig=rig, process="medium"), self._on_master)
+        self._token = bus.liveliness_token(keys.LIVELINESS.format(rig=rig, process=name))
+
+    def stop(self) -> None:
+        """Make ``next_step`` return None; may be called from a signal handler or another thread."""
+        self._arrived.put((self.MASTER, b""))
+
+    def next_step(self) -> tuple[int, list[tuple[DueEvent, bytes]]] | None:
+        """Next step with the frame of each frame event, or None when the bench has ended."""
+        payload = self._take(self.STEP)
+        if payload is None:
+            return None
+        number, rows = msgpack.unpackb(payload)
+        events: list[tuple[DueEvent, bytes]] = []
+        for kind, at, data in rows:
+            channel = {Due.UPPER_FRAME: self.UPPER, Due.LOWER_FRAME: self.LOWER, Due.DEPTH: self.DEPTH}.get(kind)
+            frame = b"" if channel is None else self._take(channel)
+            if frame is None:
+                return None
+            events.append((DueEvent(Due(kind), at, data), frame))
+        return number, events
+
+    def send(self, side: Side, frame: bytes) -> None:
+        """Put a frame on the wire of one end."""
+        self._tx[side].put(frame)
+
+    def finish(self, number: int, sent: list[Sent], wake_at: float) -> None:
+        """Answer the step."""
+        self._done.put(pack_done(number, sent, wake_at))
+
+    def _listen(self, key: str, channel: int) -> None:
+        self._bus.subscribe(key, lambda _key, payload: self._arrived.put((channel, payload)))
+
+    def _on_master(self, _key: str, alive: bool) -> None:
+        if not alive:
+            self.stop()
+
+    def _take(self, channel: int) -> bytes | None:
+        waiting = self._waiting[channel]
+        while not waiting:
+            arrived, payload = self._arrived.get()
+            if arrived == self.MASTER:
+                return None
+            self._waiting[arrived].append(payload)
+        return waiting.popleft()
+
+
+def port_key(rig: str, address: int, side: Side, direction: str) -> str:
+    """Key expression of one port and direction."""
+    return keys.PORT.format(rig=rig, tube=address_name(address), side=side.name.lower(), direction=direction)
+
+
+def serve(process: Stepped, client: BenchClient) -> None:
+    """Run ``process`` on the bench until the bench or ``client.stop`` ends it.
+
+    Raises
+    ------
+    MediumError
+        When the bus is lost.
+    """
+    while (step := client.next_step()) is not None:
+        number, events = step
+        sent: list[Sent] = []
+        now = -math.inf
+        for event, frame in events:
+            now = event.at
+            dispatch(process, event, frame)
+            for side, outgoing in process.take_frames(now):
+                client.send(side, outgoing)
+                sent.append(Sent(side, now))
+        client.finish(number, sent, process.next_wake(now))
+
+
+def dispatch(process: Stepped, event: DueEvent, frame: bytes) -> None:
+    """Hand one event to the process."""
+    match event.kind:
+        case Due.UPPER_FRAME:
+            process.on_frame(Side.UPPER, frame, event.at)
+        case Due.LOWER_FRAME:
+            process.on_frame(Side.LOWER, frame, event.at)
+        case Due.CYCLE:
+            process.on_cycle(event.data, event.at)
+        case Due.DEPTH:
+            rig_time, md = msgpack.unpackb(frame)
+            process.on_depth(rig_time, md)
+        case Due.TIMER:
+            process.on_timer(event.at)
+        case _:
+            raise MediumError(f"bench: a step of kind {event.kind} is unknown to this version")
