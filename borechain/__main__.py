@@ -49,7 +49,7 @@ class LazyGroup(click.Group):
 @click.group(cls=LazyGroup, context_settings={"help_option_names": ["-h", "--help"]})
 @click.version_option(__version__)
 def cli() -> None:
-    """Sensor nodes of a drill string, their simulator and their ground station.
+    r"""Sensor nodes of a drill string, their simulator and their ground station.
 
     \b
     Examples:

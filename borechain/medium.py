@@ -28,7 +28,7 @@ def medium(
     endpoint: str,
     folder: Path,
 ) -> None:
-    """Run the world of a scenario for processes that join by their own commands.
+    r"""Run the world of a scenario for processes that join by their own commands.
 
     \b
     Example:

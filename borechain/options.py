@@ -16,10 +16,15 @@ FAULT_HELP = "Fault, as kill-node:3@600 or kill-node:3@600+20 (tube, s after the
 def place_options(command: Callable[..., Any]) -> Callable[..., Any]:
     """Options of every process: which rig, which router, which folder."""
     for option in (
-        click.option("--rig", "rig_name", default=keys.DEFAULT_RIG, show_default=True, help="Name of the rig in key expressions."),
+        click.option(
+            "--rig", "rig_name", default=keys.DEFAULT_RIG, show_default=True, help="Name of the rig in key expressions."
+        ),
         click.option("--endpoint", default=keys.DEFAULT_ENDPOINT, show_default=True, help="zenoh router to join."),
         click.option(
-            "--folder", type=click.Path(path_type=Path, file_okay=False), default=Path("state"), show_default=True,
+            "--folder",
+            type=click.Path(path_type=Path, file_okay=False),
+            default=Path("state"),
+            show_default=True,
             help="Where the process keeps what must survive a restart.",
         ),
     ):
@@ -41,7 +46,14 @@ def parse_speed(_context: click.Context, _parameter: click.Parameter, value: str
 
 
 speed_option = click.option(
-    "--speed", default="max", show_default=True, callback=parse_speed, metavar="max|X", help="As fast as possible, or X times real time."
+    "--speed",
+    default="max",
+    show_default=True,
+    callback=parse_speed,
+    metavar="max|X",
+    help="As fast as possible, or X times real time.",
 )
 fault_option = click.option("--fault", "faults", multiple=True, help=FAULT_HELP)
-seed_option = click.option("--seed", type=click.IntRange(0, 2**31 - 1), default=1, show_default=True, help="One seed, one result.")
+seed_option = click.option(
+    "--seed", type=click.IntRange(0, 2**31 - 1), default=1, show_default=True, help="One seed, one result."
+)

@@ -13,13 +13,13 @@ from pathlib import Path
 
 import msgpack
 import setproctitle
-
 from groundstation.errors import GroundError
+from sim.errors import SimError
+
 from node.errors import NodeError
 from node.firmware.settings import TubeSettings
 from node.process.encoder_process import EncoderProcess
 from node.process.tube_process import TubeProcess
-from sim.errors import SimError
 from telemetry import keys
 from telemetry.errors import TelemetryError
 from telemetry.media.stepped import BenchClient, Stepped, serve
@@ -75,10 +75,11 @@ def run_ground(place: Place, tube_length: float) -> None:
 
 def run_medium(place: Place, scenario: Path, seed: int, speed: float, faults: tuple[str, ...], *, router: bool) -> None:
     """World, joints and clock; in a rig without an outside router its session is the router."""
-    from sim.bench import Bench
-    from sim.medium import Medium, Progress
     from sim.scenario import load_scenario
     from sim.world import World
+
+    from sim.bench import Bench
+    from sim.medium import Medium, Progress
 
     begin_process("medium")
     with reporting("medium"):

@@ -15,9 +15,10 @@ from borechain.options import fault_option, seed_option, speed_option
 from telemetry import keys
 
 if TYPE_CHECKING:
+    from sim.world import World
+
     from sim.launcher import Tick
     from sim.processes import ProcessTable
-    from sim.world import World
     from telemetry.media.zenoh_bus import ZenohBus
 
 PRELOAD = ["borechain.warm"]
@@ -29,9 +30,13 @@ PRELOAD = ["borechain.warm"]
 @seed_option
 @fault_option
 @click.option("--transport", type=click.Choice(["zenoh"]), default="zenoh", show_default=True)
-@click.option("--rig", "rig_name", default=keys.DEFAULT_RIG, show_default=True, help="Name of the rig in key expressions.")
+@click.option(
+    "--rig", "rig_name", default=keys.DEFAULT_RIG, show_default=True, help="Name of the rig in key expressions."
+)
 @click.option("--endpoint", default=keys.DEFAULT_ENDPOINT, show_default=True, help="Where the rig's router listens.")
-@click.option("--out", type=click.Path(path_type=Path), help="New or empty folder for the run  [default: out/NAME/run-NNNN]")
+@click.option(
+    "--out", type=click.Path(path_type=Path), help="New or empty folder for the run  [default: out/NAME/run-NNNN]"
+)
 @click.option("--json", "as_json", is_flag=True, help="Print one JSON object and nothing else on stdout.")
 @plain_faults
 def rig(
@@ -45,7 +50,7 @@ def rig(
     out: Path | None,
     as_json: bool,
 ) -> None:
-    """Drill SCENARIO tube by tube with one real process a tube, and show what the ground station makes of it.
+    r"""Drill SCENARIO tube by tube with one real process a tube, and show what the ground station makes of it.
 
     \b
     Examples:
@@ -53,10 +58,11 @@ def rig(
       borechain rig scenarios/wellbore-1.toml --speed 1 --fault kill-node:3@900
     """
     del transport
-    from sim.launcher import Launcher, check_port_free, next_run_folder, prepare_folder
-    from sim.report import write_files
     from sim.scenario import load_scenario
     from sim.world import World
+
+    from sim.launcher import Launcher, check_port_free, next_run_folder, prepare_folder
+    from sim.report import write_files
 
     world = World(load_scenario(scenario, faults), seed)
     check_port_free(endpoint)
@@ -77,7 +83,14 @@ def rig(
 
 
 def process_table(
-    world: World, scenario: Path, seed: int, speed: float, faults: tuple[str, ...], rig_name: str, endpoint: str, folder: Path
+    world: World,
+    scenario: Path,
+    seed: int,
+    speed: float,
+    faults: tuple[str, ...],
+    rig_name: str,
+    endpoint: str,
+    folder: Path,
 ) -> ProcessTable:
     """Every process of the rig, one line each."""
     from borechain.processes import Place, run_encoder, run_ground, run_medium, run_node
@@ -99,7 +112,9 @@ def process_table(
 
 def ask(bus: ZenohBus, rig_name: str) -> dict[str, Any]:
     """Stations, trajectory and measurements as any operator would get them."""
-    return {path: get_json(bus, f"borechain/{rig_name}/ground/{path}") for path in ("stations", "measurements", "status")}
+    return {
+        path: get_json(bus, f"borechain/{rig_name}/ground/{path}") for path in ("stations", "measurements", "status")
+    }
 
 
 def get_json(bus: ZenohBus, selector: str) -> Any:
@@ -162,13 +177,38 @@ def show_result(result: dict[str, Any], folder: Path) -> None:
 
     console = Console()
     table = Table(title="Stations, measured beside truth")
-    for name in ("#", "MD m", "looks", "incl deg", "truth", "azi deg", "truth", "north m", "truth", "east m", "truth", "TVD m", "2 sigma cm"):
+    for name in (
+        "#",
+        "MD m",
+        "looks",
+        "incl deg",
+        "truth",
+        "azi deg",
+        "truth",
+        "north m",
+        "truth",
+        "east m",
+        "truth",
+        "TVD m",
+        "2 sigma cm",
+    ):
         table.add_column(name, justify="right")
     for s in result["stations"]:
         t = s["truth"]
         sigma_cm = 200.0 * max(s["sigma_north_m"], s["sigma_east_m"])
-        cells = [f"{s['inclination_deg']:.3f}", f"{t['inclination_deg']:.3f}", f"{s['azimuth_deg']:.2f}", f"{t['azimuth_deg']:.2f}"]
-        cells += [f"{s['north_m']:.4f}", f"{t['north_m']:.4f}", f"{s['east_m']:.4f}", f"{t['east_m']:.4f}", f"{s['tvd_m']:.4f}"]
+        cells = [
+            f"{s['inclination_deg']:.3f}",
+            f"{t['inclination_deg']:.3f}",
+            f"{s['azimuth_deg']:.2f}",
+            f"{t['azimuth_deg']:.2f}",
+        ]
+        cells += [
+            f"{s['north_m']:.4f}",
+            f"{t['north_m']:.4f}",
+            f"{s['east_m']:.4f}",
+            f"{t['east_m']:.4f}",
+            f"{s['tvd_m']:.4f}",
+        ]
         table.add_row(str(s["station"]), f"{s['md_m']:.2f}", str(s["measurements"]), *cells, f"{sigma_cm:.2f}")
     console.print(table)
     for name, value in result["figures"].items():

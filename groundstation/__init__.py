@@ -1,0 +1,1 @@
+"""The ground station: the only thing an operator talks to."""

@@ -165,5 +165,3 @@ class Bench:
         name = key.rsplit("/", 1)[1]
         if name in self._addresses:
             self._events.put(("token", self._addresses[name], int(alive), b""))
-
-

@@ -60,7 +60,9 @@ def check_port_free(endpoint: str) -> None:
         try:
             probe.bind((host, int(port)))
         except OSError as error:
-            raise RigError(f"endpoint {endpoint}: {error.strerror}; choose another with --endpoint tcp/127.0.0.1:PORT") from error
+            raise RigError(
+                f"endpoint {endpoint}: {error.strerror}; choose another with --endpoint tcp/127.0.0.1:PORT"
+            ) from error
 
 
 def prepare_folder(folder: Path) -> None:
@@ -74,7 +76,9 @@ def prepare_folder(folder: Path) -> None:
     try:
         folder.mkdir(parents=True, exist_ok=True)
         if any(folder.iterdir()):
-            raise RigError(f"output folder {folder}: expected a new or empty folder, it holds an earlier run; choose another --out")
+            raise RigError(
+                f"output folder {folder}: expected a new or empty folder, it holds an earlier run; choose another --out"
+            )
         trial = folder / ".writable"
         trial.touch()
         trial.unlink()
@@ -105,7 +109,9 @@ class Launcher:
         try:
             self._table.start("medium")
             with open_client(self._endpoint, timeout=30.0) as bus:
-                bus.subscribe(keys.WANTED.format(rig=self._rig), lambda _key, payload: self._ticks.put(Tick.parse(payload)))
+                bus.subscribe(
+                    keys.WANTED.format(rig=self._rig), lambda _key, payload: self._ticks.put(Tick.parse(payload))
+                )
                 with interrupts_into(self._ticks):
                     self._supervise()
                 return ask(bus)
@@ -158,5 +164,3 @@ def next_run_folder(base: Path) -> Path:
 def private_folder(folder: Path, name: str) -> Path:
     """Folder of one process below the run's."""
     return folder / "state" / name
-
-

@@ -12,14 +12,18 @@ import heapq
 import math
 import queue
 import time
-from collections.abc import Callable, Iterator
+from collections import deque
+from collections.abc import Callable
 from dataclasses import dataclass, field
+from functools import partial
 
 import msgpack
 
 from sim.air import Air
 from sim.bench import Answer, Bench, FrameEvent
 from sim.errors import RigError
+from sim.faults import KillNode
+from sim.motion import Phase
 from sim.world import World
 from telemetry.media.stepped import Due, DueEvent
 from telemetry.messages import BASE, ENCODER, Side, address_name
@@ -64,6 +68,7 @@ class Medium:
         self.progress = Progress("starting", world.begin, world.begin, world.end, [ENCODER, BASE])
         self._queue: list[Entry] = []
         self._count = 0
+        self._cycle = 0
         self._wake: dict[int, float] = {}
         self._string: tuple[int, ...] = ()
         self._open_top = False
@@ -90,20 +95,18 @@ class Medium:
         RigError
             When a wanted process does not come.
         """
-        changes = self._changes()
-        change = next(changes)
-        self._schedule_cycles()
+        changes = deque(self._changes())
+        self._push(self.world.cycle_end(0), -1, None, b"")
         self._attach(ENCODER)
         self._attach(BASE)
         self._wall_begin = time.monotonic()
         while self._queue and not self._stopping:
-            if change is not None and change.at <= self._queue[0][0]:
-                change.apply()
-                change = next(changes, None)
+            if changes and changes[0].at <= self._queue[0][0]:
+                changes.popleft().apply()
                 continue
             limit = self._queue[0][0] + self.air.latency
-            if change is not None:
-                limit = min(limit, change.at)
+            if changes:
+                limit = min(limit, changes[0].at)
             self._pace(self._queue[0][0])
             self._round(limit)
         finished = not self._stopping
@@ -111,23 +114,24 @@ class Medium:
         self._tell(self.progress)
         return finished
 
-    def _changes(self) -> Iterator[Change]:
-        yield from sorted(self._planned(), key=lambda change: change.at)
-
-    def _planned(self) -> Iterator[Change]:
+    def _changes(self) -> list[Change]:
+        """Everything the schedule and the faults do to the rig, in order of time."""
+        changes = []
         for phase in self.world.phases:
-            yield Change(phase.start, lambda phase=phase: self._enter(phase.kind, phase.tube))
+            changes.append(Change(phase.start, partial(self._enter, phase)))
             if phase.kind == "add":
-                yield Change(phase.joint_closed, lambda phase=phase: self._close_joint(phase.tube))
+                changes.append(Change(phase.joint_closed, partial(self._close_joint, phase.tube)))
         for fault in self.world.faults:
-            yield Change(fault.at, lambda fault=fault: self._kill(fault.tube, fault.at + fault.down))
-            yield Change(fault.at + fault.down, lambda fault=fault: self._revive(fault.tube))
+            at = self.world.begin + fault.after
+            changes.append(Change(at, partial(self._kill, fault)))
+            changes.append(Change(at + fault.down, partial(self._want, fault.tube)))
+        return sorted(changes, key=lambda change: change.at)
 
-    def _enter(self, kind: str, tube: int) -> None:
-        self.progress.phase = f"{kind} tube {tube}"
-        if kind == "add":
+    def _enter(self, phase: Phase) -> None:
+        self.progress.phase = f"{phase.kind} tube {phase.tube}"
+        if phase.kind == "add":
             self._open_top = True
-            self._want(tube)
+            self._want(phase.tube)
         self._tell(self.progress)
 
     def _close_joint(self, tube: int) -> None:
@@ -148,23 +152,18 @@ class Medium:
                 return
         raise RigError(f"process {address_name(address)} did not attach within {ATTACH_LIMIT:.0f} s")
 
-    def _kill(self, tube: int, back_at: float) -> None:
-        if tube not in self.progress.wanted:
-            raise RigError(f"fault kill-node:{tube}: at {back_at:.0f} s of rig time there is no such node yet")
-        self.progress.wanted.remove(tube)
-        self.progress.kill = [tube]
-        self._tell(self.progress)
-        if not self.bench.wait_for(tube, alive=False, timeout=ATTACH_LIMIT):
-            raise RigError(f"fault kill-node:{tube}: the node's process was not killed within {ATTACH_LIMIT:.0f} s")
+    def _kill(self, fault: KillNode) -> None:
+        """Have the launcher cut a node's power; the rig's time goes on when it is gone."""
+        self.progress.wanted.remove(fault.tube)
+        self.progress.kill = [fault.tube]
+        for _ in range(int(ATTACH_LIMIT / TELL_EVERY)):
+            self._tell(self.progress)
+            if self._stopping or self.bench.wait_for(fault.tube, alive=False, timeout=TELL_EVERY):
+                break
+        else:
+            raise RigError(f"fault kill-node:{fault.tube}: nobody killed the node within {ATTACH_LIMIT:.0f} s")
         self.progress.kill = []
-        self._wake.pop(tube, None)
-
-    def _revive(self, tube: int) -> None:
-        self._want(tube)
-
-    def _schedule_cycles(self) -> None:
-        self._cycle = 0
-        self._push(self.world.cycle_end(0), -1, None, b"")
+        self._wake.pop(fault.tube, None)
 
     def _push(self, at: float, address: int, kind: Due | None, frame: bytes) -> None:
         self._count += 1
@@ -217,7 +216,9 @@ class Medium:
             if address == BASE:
                 continue
             local_start = self.world.local_clock(address, start)
-            sample = self.world.encoder_sample(at) if address == ENCODER else self.world.imu_sample(address, self._cycle)
+            sample = (
+                self.world.encoder_sample(at) if address == ENCODER else self.world.imu_sample(address, self._cycle)
+            )
             self._add(steps, true_time, address, Due.CYCLE, at, [local_start, *sample], b"")
         self._cycle += 1
         self.progress.rig_time = at

@@ -87,4 +87,6 @@ class ProcessTable:
         del self.running[name]
         self.restarts[name] = self.restarts.get(name, 0) + 1
         if self.restarts[name] > RESTART_LIMIT:
-            self.failures.append(f"process {name} ended {self.restarts[name]} times, last with status {process.exitcode}")
+            self.failures.append(
+                f"process {name} ended {self.restarts[name]} times, last with status {process.exitcode}"
+            )

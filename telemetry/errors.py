@@ -3,9 +3,9 @@
 ::
 
     TelemetryError
-    ├── MediumError(OSError)          the bus could not be opened or was lost: the environment is at fault, retry or reconfigure
-    ├── DecodeError(ValueError)       bytes that are no message of ours; raised by the codec only, the link counts and drops
-    └── EncodeError(ValueError)       a message outside its declared range: a fault of the caller, nothing was sent
+    ├── MediumError(OSError)          the bus could not be opened or was lost: retry or reconfigure
+    ├── DecodeError(ValueError)       bytes that are no message of ours; the link counts and drops them
+    └── EncodeError(ValueError)       a message outside its declared range: nothing was sent
 """
 
 from __future__ import annotations

@@ -18,7 +18,7 @@ BASE = 251
 
 Vector3: TypeAlias = tuple[float, float, float]
 Matrix3: TypeAlias = tuple[Vector3, Vector3, Vector3]
-Scalar: TypeAlias = None | bool | int | float | str
+Scalar: TypeAlias = bool | int | float | str | None
 HOPS_UNKNOWN = -1
 
 
@@ -203,14 +203,5 @@ class Event:
 
 
 Message: TypeAlias = (
-    Aiding
-    | Hello
-    | TimeRequest
-    | TimeReply
-    | NodeState
-    | SurveyMeasurement
-    | Receipt
-    | Command
-    | Reply
-    | Event
+    Aiding | Hello | TimeRequest | TimeReply | NodeState | SurveyMeasurement | Receipt | Command | Reply | Event
 )

@@ -1,0 +1,1 @@
+"""What the ground station runs: store, state, queries."""

@@ -1,0 +1,1 @@
+"""Survey mathematics; knows no service."""

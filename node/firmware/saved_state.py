@@ -20,9 +20,10 @@ def pack(state: Array, blob: bytes, generation: int) -> bytes:
     """Bytes of one slot: header with checksum, state record, blob."""
     body = state.tobytes() + blob
     head = HEADER.pack(MAGIC, LAYOUT_VERSION, 0, generation, STATE.itemsize, len(blob), 0)
-    return HEADER.pack(
-        MAGIC, LAYOUT_VERSION, 0, generation, STATE.itemsize, len(blob), zlib.crc32(body, zlib.crc32(head))
-    ) + body
+    return (
+        HEADER.pack(MAGIC, LAYOUT_VERSION, 0, generation, STATE.itemsize, len(blob), zlib.crc32(body, zlib.crc32(head)))
+        + body
+    )
 
 
 def unpack(data: bytes) -> tuple[Array, bytes, int]:
@@ -37,7 +38,9 @@ def unpack(data: bytes) -> tuple[Array, bytes, int]:
         raise SavedStateError(f"saved state: expected at least {HEADER.size} bytes, got {len(data)}")
     magic, layout, _, generation, state_size, blob_size, crc = HEADER.unpack_from(data)
     if magic != MAGIC or layout != LAYOUT_VERSION or state_size != STATE.itemsize:
-        raise SavedStateError(f"saved state: expected layout {LAYOUT_VERSION} of {STATE.itemsize} bytes, got {layout}, {state_size}")
+        raise SavedStateError(
+            f"saved state: expected layout {LAYOUT_VERSION} of {STATE.itemsize} bytes, got {layout}, {state_size}"
+        )
     body = data[HEADER.size : HEADER.size + state_size + blob_size]
     head = HEADER.pack(magic, layout, 0, generation, state_size, blob_size, 0)
     if len(body) != state_size + blob_size or zlib.crc32(body, zlib.crc32(head)) != crc:

@@ -46,7 +46,10 @@ class TubeSettings:
             ("mount_std", self.mount_std),
         ):
             require(math.isfinite(std) and std >= 0.0, f"{name}: expected a standard deviation in rad, got {std}")
-        for name, angle in (("drive_joint.angle", self.drive_joint.angle), ("lower_joint.angle", self.lower_joint.angle)):
+        for name, angle in (
+            ("drive_joint.angle", self.drive_joint.angle),
+            ("lower_joint.angle", self.lower_joint.angle),
+        ):
             require(math.isfinite(angle), f"{name}: expected an angle in rad, got {angle}")
 
 

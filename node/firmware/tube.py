@@ -113,7 +113,9 @@ class Tube:
             hops=aiding.hops + 1,
         )
 
-    def on_cycle(self, reading: ImuReading, around: Surroundings) -> Iterator[Aiding | SurveyMeasurement | Event | NodeState]:
+    def on_cycle(
+        self, reading: ImuReading, around: Surroundings
+    ) -> Iterator[Aiding | SurveyMeasurement | Event | NodeState]:
         """Run one execution cycle and yield what there is to say."""
         self._rate[:] = reading.rate
         self._force[:] = reading.force
@@ -135,7 +137,9 @@ class Tube:
 
     def boot_event(self, rig_now: float) -> Event:
         """Tell that the node started, and whether with its saved yaw."""
-        return self._event("restored" if self._restored else "booted", Severity.INFO, rig_now, {"yaw_deg": self.yaw / DEG})
+        return self._event(
+            "restored" if self._restored else "booted", Severity.INFO, rig_now, {"yaw_deg": self.yaw / DEG}
+        )
 
     def take_survey(self) -> None:
         """Measure this station again at the next settled cycle of the present or the next stop."""

@@ -6,9 +6,6 @@ import math
 
 from node.kernels.jit import kernel
 
-TURN = 2.0 * math.pi
-BINARY_TURN = 4294967296.0
-
 
 @kernel
 def wrap(angle: float) -> float:
@@ -26,7 +23,7 @@ def wrap_positive(angle: float) -> float:
 @kernel
 def to_binary(angle: float) -> int:
     """Binary angle, 0 .. 2^32 - 1, nearest to ``angle`` (rad)."""
-    return int(math.floor(angle / (2.0 * math.pi) * 4294967296.0 + 0.5)) & 0xFFFFFFFF
+    return math.floor(angle / (2.0 * math.pi) * 4294967296.0 + 0.5) & 0xFFFFFFFF
 
 
 @kernel
@@ -38,4 +35,4 @@ def from_binary(binary: int) -> float:
 @kernel
 def advance_binary(binary: int, increment: float) -> int:
     """Binary angle turned by ``increment`` (rad), rounded to the nearest count."""
-    return (int(binary) + int(math.floor(increment / (2.0 * math.pi) * 4294967296.0 + 0.5))) & 0xFFFFFFFF
+    return (int(binary) + math.floor(increment / (2.0 * math.pi) * 4294967296.0 + 0.5)) & 0xFFFFFFFF

@@ -10,7 +10,7 @@ import hashlib
 import os
 from collections.abc import Callable
 from pathlib import Path
-from typing import Any, TypeVar
+from typing import Any, TypeVar, cast
 
 import numba
 from numba import config, njit
@@ -33,10 +33,9 @@ def cache_folder() -> Path:
 
 
 if not os.environ.get("NUMBA_CACHE_DIR"):
-    config.CACHE_DIR = str(cache_folder())
+    vars(config)["CACHE_DIR"] = str(cache_folder())
 
 
 def kernel(function: Function) -> Function:
     """Compile ``function`` on its first call or load it from the cache."""
-    compiled: Function = njit(cache=True, error_model="numpy", fastmath=False)(function)
-    return compiled
+    return cast("Function", njit(cache=True, error_model="numpy")(function))

@@ -13,7 +13,11 @@ BX = int(Err.BIAS_X)
 PSI = int(Err.YAW)
 STATIC_BIAS, TRACKING, STILL, SURVEY, HELD = 1, 3, 4, 5, 6  # telemetry.messages.Mode, which kernels do not see
 STOPPED, STARTED, SURVEY_READY = int(Status.STOPPED), int(Status.STARTED), int(Status.SURVEY_READY)
-BIAS_KNOWN, RATE_EXCEEDED, RATE_RECOVERED = int(Status.BIAS_KNOWN), int(Status.RATE_EXCEEDED), int(Status.RATE_RECOVERED)
+BIAS_KNOWN, RATE_EXCEEDED, RATE_RECOVERED = (
+    int(Status.BIAS_KNOWN),
+    int(Status.RATE_EXCEEDED),
+    int(Status.RATE_RECOVERED),
+)
 UNBIASED_STILL_RATE = 0.0087  # rad/s, 0.5 deg/s: still, for a gyroscope whose bias is not known yet
 
 

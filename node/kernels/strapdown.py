@@ -9,11 +9,9 @@ and Appendix II give the same kinematics in Euler angles, which are singular at 
 from __future__ import annotations
 
 import math
-from typing import Any
 
 from node.kernels.jit import kernel
 from node.kernels.layout import Array
-
 
 
 @kernel
@@ -41,5 +39,5 @@ def rotate_down(down: Array, wx: float, wy: float, wz: float, dt: float) -> None
 
 @kernel
 def yaw_rate(down: Array, wx: float, wy: float, wz: float) -> float:
-    """psi' = wz + (wx ux + wy uy) / (1 + uz), the rate (rad/s) of the yaw about the tube axis."""
+    """Psi' = wz + (wx ux + wy uy) / (1 + uz), the rate (rad/s) of the yaw about the tube axis."""
     return wz + (wx * down[0] + wy * down[1]) / max(1.0 + down[2], 1e-3)

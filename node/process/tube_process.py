@@ -153,5 +153,3 @@ class TubeProcess:
 
     def _save(self) -> None:
         self._journal.save(self.state, msgpack.packb([self.boots, self.station.export_state()]))
-
-

@@ -1,0 +1,1 @@
+"""Published experiments, ours beside the printed values."""

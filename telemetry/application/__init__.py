@@ -1,0 +1,1 @@
+"""Who talks to whom: neighbours, time, surveys, commands."""

@@ -1,0 +1,1 @@
+"""The buses; the only room that knows their libraries."""

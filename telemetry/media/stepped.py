@@ -107,7 +107,7 @@ class BenchClient:
         if hears_depth:
             self._listen(keys.DEPTH.format(rig=rig), self.DEPTH)
         bus.liveliness_subscribe(keys.LIVELINESS.format(rig=rig, process="medium"), self._on_master)
-        self._token = bus.liveliness_token(keys.LIVELINESS.format(rig=rig, process=name))
+        bus.liveliness_token(keys.LIVELINESS.format(rig=rig, process=name))
 
     def stop(self) -> None:
         """Make ``next_step`` return None; may be called from a signal handler or another thread."""

@@ -1,0 +1,1 @@
+"""How payloads cross one joint."""

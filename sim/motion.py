@@ -1,0 +1,131 @@
+"""The motion of the string in closed form: schedule, turning of the drive head, depth of the bit.
+
+Every tube is drilled with one trapezoid of rotation (ramp up, constant rate, ramp down), and the bit advances in
+proportion to the turning. Rig time; angles in rad.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+
+Array = npt.NDArray[np.float64]
+
+
+@dataclass(frozen=True, slots=True)
+class Phase:
+    """One item of the schedule: ``add``, ``drill`` or ``stop`` of a tube, or the final ``finish``."""
+
+    kind: str
+    tube: int
+    start: float
+    end: float
+    joint_closed: float = 0.0  # of an ``add``
+
+
+@dataclass(frozen=True, slots=True)
+class Trapezoid:
+    """Turning by ``angle`` (rad) at up to ``rate`` (rad/s) with ramps of ``acceleration`` (rad/s^2)."""
+
+    angle: float
+    rate: float
+    acceleration: float
+
+    @property
+    def ramp(self) -> float:
+        """Duration of a ramp, s; a turn too short for the full rate is all ramp."""
+        return float(min(self.rate / self.acceleration, np.sqrt(self.angle / self.acceleration)))
+
+    @property
+    def duration(self) -> float:
+        """Duration of the whole, s."""
+        return 2.0 * self.ramp + (self.angle - self.acceleration * self.ramp**2) / (self.acceleration * self.ramp)
+
+    def turned(self, u: Array) -> tuple[Array, Array, Array]:
+        """Angle, rate and acceleration at the times ``u`` (s) after its start."""
+        a, r, d = self.acceleration, self.ramp, self.duration
+        u = np.clip(u, 0.0, d)
+        up, down = np.minimum(u, r), np.maximum(u - (d - r), 0.0)
+        flat = np.clip(u - r, 0.0, d - 2.0 * r)
+        angle = 0.5 * a * up**2 + a * r * flat + a * r * down - 0.5 * a * down**2
+        rate = a * up - a * down
+        inside = (u > 0.0) & (u < d)
+        acceleration = np.where(inside & (u < r), a, 0.0) - np.where(inside & (u > d - r), a, 0.0)
+        return angle, rate, acceleration
+
+    def time_of(self, angle: float) -> float:
+        """Time (s after its start) at which ``angle`` was reached, the inverse of ``turned``."""
+        a, r, d = self.acceleration, self.ramp, self.duration
+        ramp_angle = 0.5 * a * r * r
+        if angle <= ramp_angle:
+            return float(np.sqrt(2.0 * max(angle, 0.0) / a))
+        if angle <= self.angle - ramp_angle:
+            return float(r + (angle - ramp_angle) / (a * r))
+        return float(d - np.sqrt(2.0 * max(self.angle - angle, 0.0) / a))
+
+
+class Motion:
+    """Drive head and bit over the whole schedule.
+
+    Parameters
+    ----------
+    begin, add, joint, stop, finish : s, see the scenario's schedule
+    turn : of each tube
+    tubes, tube_length : number and m
+    first_angle : rad, of the drive head at the start
+    """
+
+    def __init__(
+        self,
+        begin: float,
+        add: float,
+        joint: float,
+        stop: float,
+        finish: float,
+        turn: Trapezoid,
+        tubes: int,
+        tube_length: float,
+        first_angle: float,
+    ) -> None:
+        self.begin = begin
+        self._turn = turn
+        self._tube_length = tube_length
+        self._first_angle = first_angle
+        phases: list[Phase] = []
+        at = begin
+        for tube in range(1, tubes + 1):
+            phases.append(Phase("add", tube, at, at + add, at + joint))
+            phases.append(Phase("drill", tube, at + add, at + add + turn.duration))
+            phases.append(Phase("stop", tube, phases[-1].end, phases[-1].end + stop))
+            at = phases[-1].end
+        phases.append(Phase("finish", tubes, at, at + finish))
+        self.phases = tuple(phases)
+        self.end = at + finish
+        self._starts = np.array([phase.start for phase in phases if phase.kind == "drill"])
+        self.make_ups = np.array([phase.joint_closed for phase in phases if phase.kind == "add"])
+
+    def drive(self, t: Array) -> tuple[Array, Array, Array]:
+        """Angle (rad, unwrapped), rate and acceleration of the drive head at rig times ``t`` (n,)."""
+        k = np.maximum(np.searchsorted(self._starts, t, side="right") - 1, 0)
+        angle, rate, acceleration = self._turn.turned(t - self._starts[k])
+        return self._first_angle + k * self._turn.angle + angle, rate, acceleration
+
+    def depth(self, t: Array) -> tuple[Array, Array, Array]:
+        """Measured depth of the bit (m) and its two derivatives at rig times ``t`` (n,)."""
+        angle, rate, acceleration = self.drive(t)
+        pitch = self._tube_length / self._turn.angle
+        return (angle - self._first_angle) * pitch, rate * pitch, acceleration * pitch
+
+    def time_of_angle(self, angle: float) -> float:
+        """Rig time at which the drive head reached ``angle``; the start for what it never had to reach."""
+        turned = angle - self._first_angle
+        if turned <= 0.0:
+            return self.begin
+        k = min(int(np.ceil(turned / self._turn.angle - 1e-12)) - 1, len(self._starts) - 1)
+        return float(self._starts[k]) + self._turn.time_of(turned - k * self._turn.angle)
+
+    def top(self, t: float) -> int:
+        """Number of the tube that the drive head holds at ``t``; 1 before the first joint is closed."""
+        return max(int(np.searchsorted(self.make_ups, t, side="right")), 1)

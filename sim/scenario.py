@@ -1,0 +1,218 @@
+"""Scenario files: TOML, every key documented here, unknown keys refused. Degrees and milliseconds at this edge only."""
+
+from __future__ import annotations
+
+import tomllib
+from pathlib import Path
+from typing import Annotated, Literal
+
+from pydantic import BaseModel, ConfigDict, Field, ValidationError
+
+from sim.borehole import Borehole, read_displacements, read_stations
+from sim.errors import ScenarioError
+from sim.faults import KillNode, parse_fault
+from telemetry.messages import MAX_TUBE
+
+MAX_RATE_DPS = 57.0 * 6.0  # 57 rev/min: half a turn a cycle is where one sample a cycle aliases
+Positive = Annotated[float, Field(gt=0.0)]
+NotNegative = Annotated[float, Field(ge=0.0)]
+Probability = Annotated[float, Field(ge=0.0, le=0.9)]
+Triple = tuple[NotNegative, NotNegative, NotNegative]
+
+
+class Section(BaseModel):
+    """Base of every table: frozen, unknown keys refused."""
+
+    model_config = ConfigDict(frozen=True, extra="forbid")
+
+
+class RigSection(Section):
+    """The string."""
+
+    tubes: int = Field(ge=1, le=MAX_TUBE, description="tubes drilled in, one after the other")
+    tube_length_m: Positive = Field(le=50.0, description="length of every tube")
+
+
+class PathSection(Section):
+    """The hole; exactly one of the two files, relative to the scenario."""
+
+    displacements: str | None = Field(None, description="CSV md_m,a_cm,b_cm: lateral displacement over one interval")
+    stations: str | None = Field(None, description="CSV md_m,inclination_deg,azimuth_deg")
+
+
+class ScheduleSection(Section):
+    """Times of one tube, s."""
+
+    begin_s: Positive = Field(1000.0, description="rig time at the start; never zero")
+    add_s: float = Field(
+        60.0, ge=10.0, description="string held while a tube is added; a node needs 50 s to find its bias"
+    )
+    joint_s: float = Field(5.0, ge=4.0, description="of it, joint open")
+    stop_s: float = Field(32.0, ge=22.0, description="standing still after drilling; a survey needs 20 s")
+    finish_s: float = Field(20.0, ge=5.0, description="after the last stop, for what is still on its way")
+
+
+class RotationSection(Section):
+    """Turning of the string while one tube is drilled."""
+
+    rate_dps: float = Field(71.0, gt=0.0, description="constant rate, deg/s")
+    acceleration_dps2: Positive = Field(35.0, description="of the ramps")
+    turns: float = Field(20.0, gt=0.0, description="for one tube length")
+
+
+class JointSection(Section):
+    """Constant angular errors, 1 sigma."""
+
+    reading_std_deg: NotNegative = Field(0.05, description="of the scribe marks at a joint")
+    mount_std_deg: NotNegative = Field(0.05, description="of the IMU against the tube's marks, about the axis")
+
+
+class GyroSection(Section):
+    """Gyroscope of every node, axes x, y, z."""
+
+    noise_dps_rthz: Triple = Field((8.538e-3, 6.799e-3, 7.313e-3), description="angle random walk")
+    bias_std_dps: Triple = Field((1.2545e-2, 5.869e-3, 4.941e-3), description="Gauss-Markov part")
+    bias_tau_s: Positive = 15.87
+    constant_bias_dps: tuple[float, float, float] = (0.02, -0.01, -0.02)
+    constant_bias_std_dps: NotNegative = 0.005
+    scale_factor_std: NotNegative = 1e-3
+    misalignment_std_deg: NotNegative = Field(0.0, description="left after calibration")
+    g_sensitivity_dps_per_g: NotNegative = 0.0
+    range_dps: Positive = 500.0
+    resolution_dps: NotNegative = Field(2.6e-3, description="500 deg/s / 32768 over 34 readings of one cycle")
+
+
+class AccelerometerSection(Section):
+    """Accelerometer of every node, after calibration."""
+
+    noise_deg: NotNegative = Field(0.02, description="one 1.9 Hz sample, as a tilt")
+    bias_std_deg: NotNegative = Field(0.002, description="left after calibration, each axis, as a tilt")
+    vibration_mps2: NotNegative = Field(0.05, description="while drilling")
+    radius_m: NotNegative = Field(0.02, description="of the IMU from the tube axis")
+    gravity_mps2: Positive = 9.81
+
+
+class EncoderSection(Section):
+    """Encoder of the drive head."""
+
+    counts_per_turn: int = Field(4096, ge=16, description="1024 lines in quadrature")
+
+
+class ClockSection(Section):
+    """Clocks of the nodes against the encoder's."""
+
+    offset_std_s: NotNegative = 20.0
+    drift_std_ppm: NotNegative = 10.0
+
+
+class MediumSection(Section):
+    """One hop between two tube ends."""
+
+    latency_ms: float = Field(3.0, ge=0.5)
+    jitter_ms: NotNegative = Field(0.3, description="mean of the exponential part")
+    loss: Probability = 0.01
+    duplicate: Probability = 0.001
+
+    @property
+    def latency(self) -> float:
+        """Latency, s."""
+        return self.latency_ms * 1e-3
+
+    @property
+    def jitter(self) -> float:
+        """Jitter, s."""
+        return self.jitter_ms * 1e-3
+
+
+class NodeSection(Section):
+    """Firmware settings of every node."""
+
+    scheme: Literal["forward", "estimate"] = "forward"
+
+
+class ScenarioFile(Section):
+    """A whole scenario file."""
+
+    rig: RigSection
+    path: PathSection
+    schedule: ScheduleSection = ScheduleSection()
+    rotation: RotationSection = RotationSection()
+    joints: JointSection = JointSection()
+    gyroscope: GyroSection = GyroSection()
+    accelerometer: AccelerometerSection = AccelerometerSection()
+    encoder: EncoderSection = EncoderSection()
+    clocks: ClockSection = ClockSection()
+    medium: MediumSection = MediumSection()
+    node: NodeSection = NodeSection()
+    faults: tuple[str, ...] = ()
+
+
+class Scenario:
+    """A validated scenario: its file's tables, the hole and the faults."""
+
+    def __init__(self, file: ScenarioFile, hole: Borehole, faults: tuple[KillNode, ...]) -> None:
+        self.file = file
+        self.hole = hole
+        self.faults = faults
+        self.tubes = file.rig.tubes
+        self.tube_length = file.rig.tube_length_m
+        self.medium = file.medium
+
+
+def load_scenario(path: Path, faults: tuple[str, ...] = ()) -> Scenario:
+    """Read and check a scenario; ``faults`` from the command line join those of the file.
+
+    Raises
+    ------
+    ScenarioError
+        One line: the file, the key or line, what was expected and what came.
+    """
+    file = _parse(path)
+    rate = file.rotation.rate_dps
+    if rate > MAX_RATE_DPS:
+        raise ScenarioError(
+            f"{path}: rotation.rate_dps: expected at most {MAX_RATE_DPS:g} deg/s (57 rev/min, "
+            f"half a turn a cycle), got {rate:g}; turn slower"
+        )
+    hole = _hole(path, file.path)
+    needed = file.rig.tubes * file.rig.tube_length_m
+    if hole.length + 1e-9 < needed:
+        raise ScenarioError(
+            f"{path}: rig.tubes: {file.rig.tubes} tubes of {file.rig.tube_length_m:g} m need a path of {needed:g} m, "
+            f"it ends at {hole.length:g} m; drill fewer tubes or extend the path"
+        )
+    parsed = tuple(parse_fault(text, file.rig.tubes) for text in (*file.faults, *faults))
+    return Scenario(file, hole, parsed)
+
+
+def _parse(path: Path) -> ScenarioFile:
+    try:
+        with path.open("rb") as file:
+            return ScenarioFile.model_validate(tomllib.load(file))
+    except OSError as error:
+        raise ScenarioError(f"{path}: {error.strerror}; expected a scenario file, see scenarios/") from error
+    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
+        raise ScenarioError(f"{path}: not TOML: {error}") from error
+    except ValidationError as error:
+        raise ScenarioError(f"{path}: {_first(error)}") from error
+
+
+def _first(error: ValidationError) -> str:
+    first = error.errors()[0]
+    key = ".".join(str(part) for part in first["loc"])
+    if first["type"] == "extra_forbidden":
+        section = ScenarioFile.model_fields.get(str(first["loc"][0]))
+        known = ScenarioFile.model_fields if len(first["loc"]) == 1 or section is None else None
+        if known is None and section is not None and isinstance(section.annotation, type):
+            known = section.annotation.model_fields
+        return f"{key}: unknown key; expected one of {', '.join(known or ())}"
+    return f"{key}: {first['msg']}, got {first['input']!r:.60}"
+
+
+def _hole(path: Path, section: PathSection) -> Borehole:
+    given = [name for name in (section.displacements, section.stations) if name is not None]
+    if len(given) != 1:
+        raise ScenarioError(f"{path}: path: expected exactly one of displacements and stations, got {len(given)}")
+    source = path.parent / given[0]
+    reader = read_displacements if section.displacements is not None else read_stations
+    return Borehole(*reader(source), where=str(source))

@@ -1,0 +1,202 @@
+"""The world of one scenario and seed: what every sensor reads and what the truth is, at any rig time, in any order."""
+
+from __future__ import annotations
+
+import math
+from functools import cached_property
+
+import numpy as np
+import numpy.typing as npt
+
+from node.firmware.settings import Joint, TubeSettings
+from node.kernels.layout import PERIOD, Scheme
+from sim.errors import ScenarioError
+from sim.faults import KillNode
+from sim.imu_errors import ImuErrors
+from sim.motion import Motion, Phase, Trapezoid
+from sim.scenario import Scenario
+from sim.truth import TubeTruth
+from telemetry.messages import BASE, ENCODER
+
+Array = npt.NDArray[np.float64]
+JOINTS, MOUNTS, CLOCKS, GYRO, ACCELEROMETER, DRIVE = range(6)
+
+
+def wrap(angle: float) -> float:
+    """Angle (rad) in (-pi, pi]."""
+    return math.pi - (math.pi - angle) % (2.0 * math.pi)
+
+
+class World:
+    """Truth and sensors.
+
+    Parameters
+    ----------
+    scenario : validated
+    seed : of every draw; a stream depends on the seed, its purpose and its tube, on nothing else
+
+    Raises
+    ------
+    ScenarioError
+        When a fault falls outside the schedule.
+    """
+
+    def __init__(self, scenario: Scenario, seed: int) -> None:
+        self.scenario = scenario
+        self.seed = seed
+        file = scenario.file
+        turn = Trapezoid(
+            file.rotation.turns * 2.0 * math.pi,
+            math.radians(file.rotation.rate_dps),
+            math.radians(file.rotation.acceleration_dps2),
+        )
+        s = file.schedule
+        first_angle = float(self._random(DRIVE, 0).uniform(0.0, 2.0 * math.pi))
+        self.motion = Motion(
+            s.begin_s, s.add_s, s.joint_s, s.stop_s, s.finish_s, turn, scenario.tubes, scenario.tube_length, first_angle
+        )
+        self.phases: tuple[Phase, ...] = self.motion.phases
+        self.begin = self.motion.begin
+        self.end = self.motion.end
+        self.faults: tuple[KillNode, ...] = scenario.faults
+        self._samples: dict[int, list[list[float]]] = {}
+        self._quantum = 2.0 * math.pi / file.encoder.counts_per_turn
+        self._check_faults()
+
+    def cycle_end(self, cycle: int) -> float:
+        """Rig time at which the cycle ``cycle`` (from 0) ends."""
+        return self.begin + (cycle + 1) * PERIOD
+
+    def imu_sample(self, tube: int, cycle: int) -> list[float]:
+        """Three mean rates (rad/s) and three mean specific forces (m/s^2) of one cycle, errors and all."""
+        if tube not in self._samples:
+            self._samples[tube] = self._all_samples(tube).tolist()
+        return self._samples[tube][cycle]
+
+    def encoder_sample(self, t: float) -> tuple[int, float, int]:
+        """Count, rig time of its last edge, and 1 (the string turns one way, so every edge rises)."""
+        angle = float(self.motion.drive(np.array([t]))[0][0])
+        count = math.floor(angle / self._quantum + 1e-9)
+        return count, min(self.motion.time_of_angle(count * self._quantum), t), 1
+
+    def bit_depth(self, t: float) -> float:
+        """Measured depth of the bit, m."""
+        return float(self.motion.depth(np.array([t]))[0][0])
+
+    def local_clock(self, address: int, t: float) -> float:
+        """What the clock of a process shows at rig time ``t`` (s)."""
+        offset, drift = self._clock(address)
+        return t + offset + drift * (t - self.begin)
+
+    def true_time(self, address: int, local: float) -> float:
+        """Rig time at which the clock of a process shows ``local`` (s)."""
+        offset, drift = self._clock(address)
+        return self.begin + (local - offset - self.begin) / (1.0 + drift)
+
+    def tube_settings(self, tube: int) -> TubeSettings:
+        """What the crew enters for a tube: the readings of its scribe marks and their stated errors."""
+        std = math.radians(self.scenario.file.joints.reading_std_deg)
+        drive, lower = self._joint_angles
+        drive_error, lower_error = self._joint_errors
+        return TubeSettings(
+            tube=tube,
+            drive_joint=Joint(wrap(drive[tube] + drive_error[tube]), std),
+            lower_joint=Joint(wrap(lower[tube] + lower_error[tube]), std),
+            mount_std=math.radians(self.scenario.file.joints.mount_std_deg),
+            scheme=Scheme[self.scenario.file.node.scheme.upper()],
+        )
+
+    def yaw_truth(self, tube: int, t: float) -> float:
+        """True yaw (rad, unwrapped) of the IMU's frame of a tube that is part of the string."""
+        return float(self.truth(tube).yaw(np.array([t]))[0])
+
+    def systematic_error(self, tube: int, t: float) -> float:
+        """Error of a yaw known only through the marks: estimate - truth = random error + this (rad)."""
+        drive_error, lower_error = self._joint_errors
+        top = max(self.motion.top(t), tube)
+        above = sum(lower_error[k] for k in range(tube + 1, top + 1))
+        return drive_error[top] + above - self._mounts[tube]
+
+    def truth_station(self, md: float) -> dict[str, float]:
+        """Direction and position of the hole at one depth, degrees and metres."""
+        inclination, azimuth = self.scenario.hole.direction(md)
+        north, east, tvd = self.scenario.hole.position(md)
+        return {
+            "md_m": md,
+            "inclination_deg": math.degrees(inclination),
+            "azimuth_deg": math.degrees(azimuth),
+            "north_m": float(north),
+            "east_m": float(east),
+            "tvd_m": float(tvd),
+        }
+
+    def truth(self, tube: int) -> TubeTruth:
+        """Perfect sensor of a tube."""
+        drive, _ = self._joint_angles
+        a = self.scenario.file.accelerometer
+        below = (tube - 1) * self.scenario.tube_length
+        # joints below the head are rigid: a tube keeps for ever the angle it had while it was the top one
+        joint = drive[tube] + self._mounts[tube]
+        return TubeTruth(self.scenario.hole, self.motion, below, joint, a.radius_m, a.gravity_mps2)
+
+    def _all_samples(self, tube: int) -> Array:
+        count = math.floor((self.end - self.begin) / PERIOD + 1e-9)
+        ends: Array = self.begin + PERIOD * np.arange(1.0, count + 1.0)
+        truth = self.truth(tube)
+        rate, force = truth.cycle_means(ends, PERIOD)
+        turning = (self.motion.drive(ends)[1] > 0.0) | (self.motion.drive(ends - PERIOD)[1] > 0.0)
+        errors = ImuErrors(self.scenario.file.gyroscope, self.scenario.file.accelerometer)
+        measured_rate = errors.gyro(self._random(GYRO, tube), rate, force, PERIOD)
+        measured_force = errors.accelerations(self._random(ACCELEROMETER, tube), force, turning.astype(float))
+        return np.concatenate([measured_rate, measured_force], axis=1)
+
+    @cached_property
+    def _joint_angles(self) -> tuple[list[float], list[float]]:
+        """True angles by tube (index 0 unused): drive head to tube while it is on top, tube to the one below.
+
+        The string stands while a tube is added, so the new pair of joints adds up to the old one.
+        """
+        random = self._random(JOINTS, 0)
+        drive, lower = [0.0], [0.0]
+        for tube in range(1, self.scenario.tubes + 1):
+            angle = float(random.uniform(-math.pi, math.pi))
+            lower.append(angle if tube > 1 else 0.0)
+            drive.append(drive[tube - 1] - angle if tube > 1 else angle)
+        return drive, lower
+
+    @cached_property
+    def _joint_errors(self) -> tuple[list[float], list[float]]:
+        random = self._random(JOINTS, 1)
+        std = math.radians(self.scenario.file.joints.reading_std_deg)
+        draws = std * random.standard_normal((self.scenario.tubes + 1, 2))
+        draws[:2, 1] = 0.0  # the lowest tube has no joint below
+        return draws[:, 0].tolist(), draws[:, 1].tolist()
+
+    @cached_property
+    def _mounts(self) -> list[float]:
+        std = math.radians(self.scenario.file.joints.mount_std_deg)
+        errors: list[float] = (std * self._random(MOUNTS, 0).standard_normal(self.scenario.tubes + 1)).tolist()
+        return errors
+
+    def _clock(self, address: int) -> tuple[float, float]:
+        if address == ENCODER:
+            return 0.0, 0.0
+        return self._clocks[0 if address == BASE else address]
+
+    @cached_property
+    def _clocks(self) -> list[tuple[float, float]]:
+        clocks = self.scenario.file.clocks
+        draws = self._random(CLOCKS, 0).standard_normal((self.scenario.tubes + 1, 2))
+        return [(clocks.offset_std_s * a, clocks.drift_std_ppm * 1e-6 * b) for a, b in draws.tolist()]
+
+    def _random(self, purpose: int, tube: int) -> np.random.Generator:
+        return np.random.Generator(np.random.Philox(np.random.SeedSequence([self.seed, purpose, tube])))
+
+    def _check_faults(self) -> None:
+        for fault in self.faults:
+            on = next(phase.start for phase in self.phases if phase.kind == "add" and phase.tube == fault.tube)
+            if not on < self.begin + fault.after < self.end - fault.down:
+                raise ScenarioError(
+                    f"fault kill-node:{fault.tube}@{fault.after:g}+{fault.down:g}: expected a time between "
+                    f"{on - self.begin:.0f} s, when the tube is added, and {self.end - fault.down - self.begin:.0f} s"
+                )

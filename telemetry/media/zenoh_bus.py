@@ -1,0 +1,211 @@
+"""zenoh as our bus: explicit endpoints, no scouting, bytes in and out. The only module that imports zenoh.
+
+Callbacks arrive on zenoh's own threads; whoever registers one must only put into a queue or take a lock.
+"""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
+from typing import Any
+
+import zenoh
+
+from telemetry.errors import MediumError
+
+MSGPACK = "application/msgpack"
+JSON = "application/json"
+
+
+@dataclass(frozen=True, slots=True)
+class Reply:
+    """One answer to a query: a payload on a key, or an error text."""
+
+    key: str
+    payload: bytes
+    error: str | None = None
+
+
+class Publisher:
+    """A key to put on: reliable, in order, sent at once."""
+
+    def __init__(self, publisher: zenoh.Publisher) -> None:
+        self._publisher = publisher
+
+    def put(self, payload: bytes) -> None:
+        """Send one payload.
+
+        Raises
+        ------
+        MediumError
+            When the session is closed.
+        """
+        try:
+            self._publisher.put(payload)
+        except zenoh.ZError as error:
+            raise MediumError(f"zenoh put on {self._publisher.key_expr}: {error}") from error
+
+
+class Query:
+    """A question that came in: selector, parameters, and the ways to answer it."""
+
+    def __init__(self, query: zenoh.Query) -> None:
+        self._query = query
+        self.selector_key = str(query.key_expr)
+        self.parameters: dict[str, str] = dict(_parameters(str(query.parameters)))
+
+    def intersects(self, key: str) -> bool:
+        """Whether the question asks for ``key``."""
+        return bool(self._query.key_expr.intersects(key))
+
+    def reply(self, key: str, payload: bytes, encoding: str = JSON) -> None:
+        """Answer on one key."""
+        self._query.reply(key, payload, encoding=encoding)
+
+    def reply_error(self, text: str) -> None:
+        """Say what was wrong with the question."""
+        self._query.reply_err(text.encode(), encoding="text/plain")
+
+
+class ZenohBus:
+    """One zenoh session. Open it after a fork, never before: an inherited session hangs."""
+
+    def __init__(self, session: zenoh.Session) -> None:
+        self._session = session
+        self._declared: list[Any] = []
+
+    def publisher(self, key: str, encoding: str = MSGPACK) -> Publisher:
+        """Publisher of ``key``, its encoding declared; blocks rather than drops when the line is full."""
+        blocking = zenoh.CongestionControl.BLOCK
+        declared = self._session.declare_publisher(key, encoding=encoding, congestion_control=blocking, express=True)
+        self._declared.append(declared)
+        return Publisher(declared)
+
+    def subscribe(self, pattern: str, callback: Callable[[str, bytes], None]) -> None:
+        """Call ``callback(key, payload)`` on a foreign thread for each sample."""
+        self._declared.append(
+            self._session.declare_subscriber(pattern, lambda s: callback(str(s.key_expr), s.payload.to_bytes()))
+        )
+
+    def queryable(self, pattern: str, handler: Callable[[Query], None]) -> None:
+        """Answer queries that intersect ``pattern`` with ``handler`` on a foreign thread."""
+
+        def answer(query: zenoh.Query) -> None:
+            with query:
+                handler(Query(query))
+
+        self._declared.append(self._session.declare_queryable(pattern, answer, complete=True))
+
+    def get(self, selector: str, timeout: float) -> list[Reply]:
+        """All answers to ``selector`` within ``timeout`` wall seconds.
+
+        Raises
+        ------
+        MediumError
+            When the selector is no valid key expression.
+        """
+        try:
+            replies = self._session.get(selector, timeout=timeout, consolidation=zenoh.ConsolidationMode.NONE)
+        except zenoh.ZError as error:
+            raise MediumError(f"selector {selector}: {error}") from error
+        return [_reply(reply) for reply in replies]
+
+    def liveliness_token(self, key: str) -> None:
+        """Be alive under ``key`` until the session or the process ends."""
+        self._declared.append(self._session.liveliness().declare_token(key))
+
+    def liveliness_subscribe(self, pattern: str, callback: Callable[[str, bool], None]) -> None:
+        """Call ``callback(key, alive)`` on a foreign thread for each token that comes, goes or is already there."""
+        self._declared.append(
+            self._session.liveliness().declare_subscriber(
+                pattern, lambda s: callback(str(s.key_expr), s.kind == zenoh.SampleKind.PUT), history=True
+            )
+        )
+
+    def close(self) -> None:
+        """Close the session; every declaration ends with it."""
+        self._declared.clear()
+        self._session.close()  # type: ignore[no-untyped-call]
+
+
+@contextmanager
+def open_router(endpoint: str) -> Iterator[ZenohBus]:
+    """Session in router mode that listens on ``endpoint`` and serves the others; no router program is needed.
+
+    Raises
+    ------
+    MediumError
+        When the endpoint cannot be listened on.
+    """
+    config = _config("router")
+    config.insert_json5("listen/endpoints", json.dumps([endpoint]))
+    config.insert_json5("listen/exit_on_failure", "true")
+    try:
+        session = zenoh.open(config)
+    except zenoh.ZError as error:
+        raise MediumError(
+            f"cannot listen on {endpoint}: {error}; is the port taken? choose another --endpoint"
+        ) from error
+    yield from _held(session)
+
+
+@contextmanager
+def open_client(endpoint: str, timeout: float) -> Iterator[ZenohBus]:
+    """Session that joins the router at ``endpoint``, tried for ``timeout`` wall seconds.
+
+    Raises
+    ------
+    MediumError
+        When no router answers there.
+    """
+    config = _config("client")
+    config.insert_json5("connect/endpoints", json.dumps([endpoint]))
+    config.insert_json5("connect/timeout_ms", str(int(timeout * 1000)))
+    config.insert_json5("connect/exit_on_failure", "true")
+    config.insert_json5("connect/retry", '{"period_init_ms": 50, "period_max_ms": 500, "period_increase_factor": 1.5}')
+    try:
+        session = zenoh.open(config)
+    except zenoh.ZError as error:
+        raise MediumError(f"no router at {endpoint} within {timeout:g} s: is the rig running there?") from error
+    yield from _held(session)
+
+
+def intersects(selector_key: str, key: str) -> bool:
+    """Whether two key expressions have a key in common; False for what is no key expression."""
+    try:
+        return bool(zenoh.KeyExpr(selector_key).intersects(zenoh.KeyExpr(key)))
+    except zenoh.ZError:
+        return False
+
+
+def _held(session: zenoh.Session) -> Iterator[ZenohBus]:
+    bus = ZenohBus(session)
+    try:
+        yield bus
+    finally:
+        bus.close()
+
+
+def _config(mode: str) -> zenoh.Config:
+    config = zenoh.Config()
+    config.insert_json5("mode", json.dumps(mode))
+    config.insert_json5("scouting/multicast/enabled", "false")
+    config.insert_json5("scouting/gossip/enabled", "false")
+    config.insert_json5("listen/endpoints", "[]")
+    return config
+
+
+def _reply(reply: zenoh.Reply) -> Reply:
+    if reply.ok is not None:
+        return Reply(str(reply.ok.key_expr), reply.ok.payload.to_bytes())
+    error = reply.err
+    return Reply("", b"", error.payload.to_string() if error is not None else "an empty reply")
+
+
+def _parameters(text: str) -> Iterator[tuple[str, str]]:
+    for part in text.split(";"):
+        name, _, value = part.partition("=")
+        if name:
+            yield name, value

@@ -1,0 +1,222 @@
+"""One joint's link as a pure state machine: frames in, payloads out, acknowledgement and retransmission.
+
+A frame is ``crc32 | msgpack [version, sender, epoch, count, ack_epoch, ack, ack_mask, entries]``; an entry is
+``[number, payload]``, number 0 for what may be lost. ``epoch`` names the sender's boot and session; whoever sees a
+new one starts to count from 1 again. Acknowledgement is cumulative plus a mask of the next 64 numbers and rides on
+whatever frame leaves next. Nothing that arrives raises, and every queue is bounded.
+"""
+
+from __future__ import annotations
+
+import math
+import zlib
+from collections import Counter, OrderedDict
+from dataclasses import dataclass
+from typing import Any
+
+import msgpack
+
+VERSION = 1
+WINDOW = 64
+QUEUE_LIMIT = 512
+BEST_EFFORT_LIMIT = 64
+MAX_FRAME = 16384
+ENTRIES_PER_FRAME = 8
+FIRST_TIMEOUT = 0.06  # s, one round trip and the wait of a lonely acknowledgement
+LAST_TIMEOUT = 2.0  # s
+ACK_DELAY = 0.02  # s
+SILENCE = 3.5  # s after which the other end is taken for gone
+BOOT_SHIFT = 16
+QUALITY_WEIGHT = 1.0 / 32.0
+
+
+@dataclass(slots=True)
+class Outstanding:
+    """A numbered payload on its way."""
+
+    payload: bytes
+    send_at: float
+    timeout: float = FIRST_TIMEOUT
+
+
+class HopLink:
+    """One end of one joint.
+
+    Parameters
+    ----------
+    address : of this process
+    boot_count : its starts so far, so that the other end can tell a restart from a long silence
+    """
+
+    def __init__(self, address: int, boot_count: int) -> None:
+        self._address = address
+        self._boot_count = boot_count
+        self._session = 0
+        self.peer: tuple[int, int] | None = None  # address and boot count of the other end
+        self.last_heard = -math.inf
+        self.quality = 1.0
+        self.counters: Counter[str] = Counter()
+        self._peer_epoch = 0
+        self._peer_count = 0
+        self._received = 0  # every number up to this one
+        self._received_mask = 0  # numbers after it, bit 0 is _received + 1
+        self._ack_due = math.inf
+        self._frames = 0
+        self._next_number = 1
+        self._outstanding: OrderedDict[int, Outstanding] = OrderedDict()
+        self._queue: OrderedDict[bytes, None] = OrderedDict()
+        self._best_effort: OrderedDict[object, bytes] = OrderedDict()
+
+    def is_up(self, now: float) -> bool:
+        """Whether the other end was heard lately."""
+        return now - self.last_heard <= SILENCE
+
+    def send_reliable(self, payload: bytes) -> None:
+        """Queue a payload that must arrive; one that is still queued or on its way is not queued again."""
+        if payload in self._queue or any(o.payload == payload for o in self._outstanding.values()):
+            return
+        if len(self._queue) >= QUEUE_LIMIT:
+            self._queue.popitem(last=False)
+            self.counters["reliable_dropped"] += 1
+        self._queue[payload] = None
+
+    def send_best_effort(self, payload: bytes, topic: object) -> None:
+        """Queue a payload that the newest of its ``topic`` replaces."""
+        self._best_effort.pop(topic, None)
+        if len(self._best_effort) >= BEST_EFFORT_LIMIT:
+            self._best_effort.popitem(last=False)
+            self.counters["best_effort_dropped"] += 1
+        self._best_effort[topic] = payload
+
+    def receive(self, frame: bytes, now: float) -> list[bytes]:
+        """Payloads of a frame that were not delivered before; garbage is counted and gives none."""
+        fields = self._parse(frame)
+        if fields is None:
+            self.counters["bad_frames"] += 1
+            return []
+        sender, epoch, count, ack_epoch, ack, ack_mask, entries = fields
+        self._meet(sender, epoch)
+        self._judge(count)
+        self.last_heard = now
+        self.counters["frames_received"] += 1
+        if ack_epoch == self.epoch:
+            self._acknowledged(ack, ack_mask)
+        return [payload for number, payload in entries if number == 0 or self._is_new(number, now)]
+
+    def take_frames(self, now: float) -> list[bytes]:
+        """Frames that are due now."""
+        frames = []
+        entries = self._due_entries(now)
+        while entries or self._ack_due <= now:
+            frames.append(self._build(entries[:ENTRIES_PER_FRAME]))
+            entries = entries[ENTRIES_PER_FRAME:]
+        return frames
+
+    def next_wake(self, now: float) -> float:
+        """When ``take_frames`` has something to do without further input, infinite if never."""
+        wake = self._ack_due
+        if self.is_up(now):
+            wake = min((o.send_at for o in self._outstanding.values()), default=math.inf) if wake == math.inf else wake
+        return wake
+
+    @property
+    def epoch(self) -> int:
+        """Boot and session of this end."""
+        return self._boot_count << BOOT_SHIFT | self._session & 0xFFFF
+
+    @property
+    def waiting(self) -> int:
+        """Payloads queued or on their way."""
+        return len(self._queue) + len(self._outstanding)
+
+    def _parse(self, frame: bytes) -> tuple[int, int, int, int, int, int, list[Any]] | None:
+        if not 5 < len(frame) <= MAX_FRAME or zlib.crc32(frame[4:]) != int.from_bytes(frame[:4], "little"):
+            return None
+        try:
+            version, *fields, entries = msgpack.unpackb(frame[4:], max_ext_len=0)
+        except (ValueError, TypeError, RecursionError, msgpack.UnpackException):
+            return None
+        if version != VERSION or len(fields) != 6 or not all(type(f) is int and f >= 0 for f in fields):
+            return None
+        if not isinstance(entries, list) or not all(_is_entry(entry) for entry in entries):
+            return None
+        return fields[0], fields[1], fields[2], fields[3], fields[4], fields[5], entries
+
+    def _meet(self, sender: int, epoch: int) -> None:
+        """Notice another process at the other end (start our numbers anew) or its new session (forget its numbers)."""
+        peer = (sender, epoch >> BOOT_SHIFT)
+        if peer != self.peer:
+            if self.peer is not None:
+                self._restart()
+            self.peer = peer
+            self.quality = 1.0
+            self._peer_epoch = -1
+        if epoch != self._peer_epoch:
+            self._peer_epoch = epoch
+            self._peer_count = 0
+            self._received, self._received_mask = 0, 0
+
+    def _restart(self) -> None:
+        self._session += 1
+        self._next_number = 1
+        again = OrderedDict((o.payload, None) for o in self._outstanding.values())
+        again.update(self._queue)
+        self._queue = again
+        self._outstanding.clear()
+
+    def _judge(self, count: int) -> None:
+        missed = max(min(count - self._peer_count - 1, 32), 0) if self._peer_count else 0
+        self._peer_count = max(self._peer_count, count)
+        self.quality *= (1.0 - QUALITY_WEIGHT) ** (missed + 1)
+        self.quality += QUALITY_WEIGHT
+
+    def _acknowledged(self, ack: int, mask: int) -> None:
+        for number in list(self._outstanding):
+            ahead = number - ack - 1
+            if ahead < 0 or (ahead < WINDOW and mask >> ahead & 1):
+                del self._outstanding[number]
+
+    def _is_new(self, number: int, now: float) -> bool:
+        self._ack_due = min(self._ack_due, now + ACK_DELAY)
+        ahead = number - self._received - 1
+        if ahead < 0 or ahead >= WINDOW or self._received_mask >> ahead & 1:
+            self.counters["repeated"] += 1
+            return False
+        self._received_mask |= 1 << ahead
+        while self._received_mask & 1:
+            self._received_mask >>= 1
+            self._received += 1
+        return True
+
+    def _due_entries(self, now: float) -> list[list[Any]]:
+        entries: list[list[Any]] = []
+        if self.is_up(now):
+            oldest = next(iter(self._outstanding), self._next_number)
+            while self._queue and self._next_number - oldest < WINDOW:
+                payload, _ = self._queue.popitem(last=False)
+                self._outstanding[self._next_number] = Outstanding(payload, now)
+                self._next_number += 1
+            for number, outstanding in self._outstanding.items():
+                if outstanding.send_at <= now:
+                    entries.append([number, outstanding.payload])
+                    outstanding.send_at = now + outstanding.timeout
+                    outstanding.timeout = min(2.0 * outstanding.timeout, LAST_TIMEOUT)
+        entries.extend([0, payload] for payload in self._best_effort.values())
+        self._best_effort.clear()
+        return entries
+
+    def _build(self, entries: list[list[Any]]) -> bytes:
+        self._frames += 1
+        self._ack_due = math.inf
+        self.counters["frames_sent"] += 1
+        peer_epoch = max(self._peer_epoch, 0)
+        fields = [VERSION, self._address, self.epoch, self._frames, peer_epoch, self._received, self._received_mask]
+        body: bytes = msgpack.packb([*fields, entries])
+        return zlib.crc32(body).to_bytes(4, "little") + body
+
+
+def _is_entry(entry: object) -> bool:
+    if not isinstance(entry, list) or len(entry) != 2:
+        return False
+    number, payload = entry
+    return type(number) is int and 0 <= number < 2**53 and isinstance(payload, bytes)

@@ -1,0 +1,227 @@
+"""The whole cycle on motion whose truth is known."""
+
+import math
+
+import numpy as np
+import pytest
+
+from node.kernels.angles import from_binary, wrap
+from node.kernels.cycle import run_cycle
+from node.kernels.layout import DEG, PERIOD, Err, Status, default_config, new_state
+from node.kernels.relay import offer_aiding
+from telemetry.messages import Mode
+
+START = 1000.0
+TILT = math.radians(2.0)
+SPIN = math.radians(71.0)
+
+
+class Bench:
+    """One node on a turning table without sensor noise; truth is ``yaw``."""
+
+    def __init__(self, bias_z: float = 0.0, scale: float = 0.0) -> None:
+        self.config = default_config()
+        self.state = new_state(self.config)
+        self.now = START
+        self.yaw = 1.0
+        self.bias_z, self.scale = bias_z, scale
+        self.sequence = 0
+
+    @property
+    def record(self) -> np.void:
+        return self.state[0]
+
+    def cycle(self, rate: float = 0.0, joined: int = 1) -> Status:
+        end = self.now + PERIOD
+        middle = self.yaw + 0.5 * rate * PERIOD
+        force = 9.81 * np.array(
+            [math.sin(TILT) * math.cos(-middle), math.sin(TILT) * math.sin(-middle), -math.cos(TILT)]
+        )
+        measured = np.array([0.0, 0.0, rate * (1.0 + self.scale) + self.bias_z])
+        status = run_cycle(self.record, self.config[0], measured, force, self.now, end, joined)
+        self.now = end
+        self.yaw += rate * PERIOD
+        return Status(status)
+
+    def aid(
+        self, rate: float = 0.0, age: float = 0.0, *, stamp_error: float = 0.0, fresh: bool = True, offset: float = 0.0
+    ) -> None:
+        self.sequence += fresh
+        offer_aiding(
+            self.record,
+            self.config[0],
+            self.yaw - offset - rate * age,
+            (0.003 * DEG) ** 2,
+            0.0,
+            offset,
+            rate,
+            self.now - age + stamp_error,
+            self.sequence,
+            0,
+        )
+
+    def error_deg(self) -> float:
+        return wrap(from_binary(self.record["now_yaw"]) - self.yaw) / DEG
+
+    def stand(self, cycles: int, *, aided: bool = True) -> None:
+        for _ in range(cycles):
+            self.cycle()
+            if aided:
+                self.aid(fresh=self.sequence == 0)
+
+    def spin(self, cycles: int, **aiding: float) -> None:
+        for _ in range(cycles):
+            self.cycle(SPIN)
+            self.aid(SPIN, **aiding)
+
+
+def test_static_bias_is_learned_in_fifty_seconds_and_then_yaw_stands() -> None:
+    bench = Bench(bias_z=-0.02 * DEG)
+    statuses = []
+    for _ in range(96):
+        statuses.append(bench.cycle())
+    assert Status.BIAS_KNOWN in statuses[94]
+    assert bench.record["static_bias"][2] == pytest.approx(-0.02 * DEG)
+    assert bench.record["mode"] in (Mode.TRACKING, Mode.STILL)
+    assert bench.record["static_bias_var"][2] > 0.0
+
+
+def test_first_aiding_sets_the_yaw() -> None:
+    bench = Bench()
+    bench.stand(4)
+    assert bench.error_deg() == pytest.approx(0.0, abs=1e-3)
+
+
+@pytest.mark.parametrize("delay", [0.0, 0.01, 0.1, 0.4, 0.9])
+def test_delayed_aiding_counts_at_its_time_of_validity(delay: float) -> None:
+    bench = Bench()
+    bench.stand(110)
+    bench.spin(60, age=delay)
+    assert abs(bench.error_deg()) < 0.04
+    assert bench.record["last_aided"] == pytest.approx(bench.now - PERIOD - delay, abs=PERIOD + 1e-6)
+
+
+def test_taking_a_delayed_aiding_at_its_arrival_costs_the_turn_of_the_delay() -> None:
+    bench = Bench()
+    bench.config[0]["stamp_std"] = 0.0
+    bench.stand(110)
+    bench.spin(60, age=0.1, stamp_error=0.1)
+    assert abs(bench.error_deg()) == pytest.approx(7.1, abs=0.5)
+
+
+def test_scale_factor_and_bias_are_found() -> None:
+    bench = Bench(bias_z=0.01 * DEG, scale=1e-3)
+    bench.stand(110)
+    for _ in range(3):
+        bench.spin(190)
+        bench.stand(60)
+    assert bench.record["scale"] == pytest.approx(1e-3, abs=2e-4)
+    assert abs(bench.error_deg()) < 0.02
+
+
+def test_a_constant_stamp_error_is_found_while_the_string_starts_and_stops() -> None:
+    bench = Bench()
+    bench.stand(110)
+    for _ in range(3):
+        bench.spin(190, stamp_error=0.002)
+        bench.stand(60)
+    assert abs(bench.error_deg()) < 0.02
+
+
+def test_an_outage_is_bridged_and_its_age_known() -> None:
+    bench = Bench(scale=5e-4)
+    bench.stand(110)
+    bench.spin(190)
+    for _ in range(57):
+        bench.cycle(SPIN)
+    sigma = math.sqrt(bench.record["now_P"][Err.YAW, Err.YAW]) / DEG
+    assert abs(bench.error_deg()) < 3.0 * sigma < 3.0
+    assert bench.now - bench.record["last_aided"] > 29.0
+
+
+def test_a_wrong_aiding_is_refused_and_a_lasting_one_believed() -> None:
+    bench = Bench()
+    bench.stand(110)
+    bench.spin(60)
+    bench.yaw += 0.5
+    bench.aid(SPIN)
+    bench.yaw -= 0.5
+    assert Status.REJECTED in bench.cycle(SPIN) | bench.cycle(SPIN)
+    assert abs(bench.error_deg()) < 0.1
+    bench.yaw += 0.5
+    seen = Status.NONE
+    for _ in range(8):
+        seen |= bench.cycle(SPIN)
+        bench.aid(SPIN)
+    assert Status.YAW_RESET in seen
+    bench.spin(10)
+    assert abs(bench.error_deg()) < 0.2
+
+
+def test_a_repeated_measurement_at_rest_is_used_once() -> None:
+    bench = Bench()
+    bench.stand(110)
+    before = bench.record["P"][Err.YAW, Err.YAW]
+    bench.stand(200)
+    assert bench.record["P"][Err.YAW, Err.YAW] >= before
+    assert bench.now - bench.record["last_aided"] < 1.1
+
+
+def test_a_new_joint_above_reopens_the_yaw_without_a_false_alarm() -> None:
+    bench = Bench()
+    bench.stand(110)
+    joint_std = 0.05 * DEG
+    offer_aiding(
+        bench.record, bench.config[0], bench.yaw - 0.3 + 0.1 * DEG, 1e-9, 2 * joint_std**2, 0.3, 0.0, bench.now, 99, 1
+    )
+    seen = bench.cycle() | bench.cycle() | bench.cycle()
+    assert Status.REJECTED not in seen
+    assert bench.error_deg() == pytest.approx(0.1, abs=0.02)
+
+
+def test_too_fast_a_string_is_flagged_and_never_aliased() -> None:
+    bench = Bench()
+    bench.stand(110)
+    assert Status.RATE_EXCEEDED in bench.cycle(2.0 * math.pi * 0.96)
+    assert bench.record["yaw_known"] == 0
+    bench.cycle(SPIN)
+    bench.spin(4)
+    assert bench.record["yaw_known"] == 1
+    assert abs(bench.error_deg()) < 0.5
+
+
+def test_a_stop_gives_one_survey_after_the_moving_average_has_settled() -> None:
+    bench = Bench()
+    bench.stand(110)
+    bench.spin(30)
+    ready = []
+    for k in range(80):
+        if Status.SURVEY_READY in bench.cycle():
+            ready.append(k)
+        bench.aid(fresh=k == 0)
+    assert ready == [int(bench.config[0]["settle_cycles"]) - 1]
+    expected = 9.81 * np.array(
+        [math.sin(TILT) * math.cos(bench.yaw), -math.sin(TILT) * math.sin(bench.yaw), -math.cos(TILT)]
+    )
+    np.testing.assert_allclose(bench.record["survey_force"], expected, atol=1e-9)
+
+
+def test_while_the_joint_is_open_the_node_holds_its_yaw() -> None:
+    bench = Bench(bias_z=0.01 * DEG)
+    bench.stand(110)
+    for _ in range(200):
+        bench.cycle(joined=0)
+    assert bench.record["mode"] == Mode.HELD
+    assert abs(bench.error_deg()) < 0.01
+
+
+@pytest.mark.parametrize("bad", [math.nan, math.inf, -math.inf])
+def test_a_sample_that_is_no_number_changes_nothing(bad: float) -> None:
+    bench = Bench()
+    bench.stand(10)
+    before = bench.state.tobytes()
+    status = run_cycle(
+        bench.record, bench.config[0], np.array([0, 0, bad]), np.zeros(3), bench.now, bench.now + PERIOD, 1
+    )
+    assert Status(status) == Status.NUMERIC_FAULT
+    assert bench.state.tobytes() == before
