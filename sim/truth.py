@@ -64,7 +64,7 @@ class TubeTruth:
         tangent, dtangent, _ = self._along(t)
         turning = self._motion.drive(t)[1]
         across = np.cross(tangent, dtangent)
-        body = np.einsum("nji,nj->ni", self.attitude(t), across)
+        body: Array = np.einsum("nji,nj->ni", self.attitude(t), across)
         twist = (tangent[:, 0] * dtangent[:, 1] - tangent[:, 1] * dtangent[:, 0]) / (1.0 + tangent[:, 2])
         body[:, 2] = turning - twist
         return body
@@ -73,7 +73,7 @@ class TubeTruth:
         """Specific force (n, 3, m/s^2): gravity, motion along the path and the circle around the axis."""
         acceleration = self._along(t)[2]
         acceleration[:, 2] -= self._gravity
-        body = np.einsum("nji,nj->ni", self.attitude(t), acceleration)
+        body: Array = np.einsum("nji,nj->ni", self.attitude(t), acceleration)
         _, rate, angular = self._motion.drive(t)
         body[:, 0] -= self._radius * rate**2
         body[:, 1] += self._radius * angular
@@ -94,8 +94,9 @@ class TubeTruth:
     def _along(self, t: Array) -> tuple[Array, Array, Array]:
         """Tangent, its time derivative and the acceleration of the tube, each (n, 3)."""
         bit, speed, thrust = self._motion.depth(t)
-        md = np.maximum(bit - self._below, 0.0)
-        tangent, curvature = self._hole.tangent(md)
+        inside = bit > self._below  # before, the tube waits upright at the collar
+        tangent, curvature = self._hole.tangent(np.where(inside, bit - self._below, 0.0))
+        speed, thrust = speed * inside, thrust * inside
         acceleration = thrust[:, None] * tangent + speed[:, None] ** 2 * curvature
         return tangent, speed[:, None] * curvature, acceleration
 

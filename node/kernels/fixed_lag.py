@@ -44,7 +44,7 @@ def stood_still(state: Any, cycle: int) -> bool:
         return False
     if state.ring_quiet[(cycle - 1) % RING] == 0:
         return False
-    return cycle + 1 >= state.cycles or state.ring_quiet[(cycle + 1) % RING] != 0
+    return bool(cycle + 1 >= state.cycles or state.ring_quiet[(cycle + 1) % RING] != 0)
 
 
 @kernel
@@ -93,7 +93,7 @@ def interpolation_var(state: Any, cycle: int, at: float) -> float:
         ahead = state.ring_rate[(cycle + 1) % RING, 2] - state.ring_rate[slot, 2]
         change = max(abs(change), abs(ahead))
     error = 0.5 * change * inside
-    return error * error
+    return float(error * error)
 
 
 @kernel

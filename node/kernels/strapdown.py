@@ -40,4 +40,4 @@ def rotate_down(down: Array, wx: float, wy: float, wz: float, dt: float) -> None
 @kernel
 def yaw_rate(down: Array, wx: float, wy: float, wz: float) -> float:
     """Psi' = wz + (wx ux + wy uy) / (1 + uz), the rate (rad/s) of the yaw about the tube axis."""
-    return wz + (wx * down[0] + wy * down[1]) / max(1.0 + down[2], 1e-3)
+    return float(wz + (wx * down[0] + wy * down[1]) / max(1.0 + down[2], 1e-3))

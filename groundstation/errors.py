@@ -1,0 +1,27 @@
+"""Errors of the ground station.
+
+::
+
+    GroundError
+    ├── SurveyError(ValueError)       numbers that are no survey: which value, which station
+    ├── SelectorError(ValueError)     a query nobody can answer: the message lists the valid names
+    └── StoreError(OSError)           the database cannot be opened or written: nothing was acknowledged
+"""
+
+from __future__ import annotations
+
+
+class GroundError(Exception):
+    """Root of every error of this package."""
+
+
+class SurveyError(GroundError, ValueError):
+    """The numbers given are no survey."""
+
+
+class SelectorError(GroundError, ValueError):
+    """The query cannot be answered; the message says what can."""
+
+
+class StoreError(GroundError, OSError):
+    """The database cannot be opened or written."""

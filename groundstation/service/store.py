@@ -1,0 +1,150 @@
+"""What the ground station keeps: every survey measurement and event, on the disk before it is acknowledged.
+
+A row is the message as it came (telemetry's payload) with the depth it was given. The same message twice is one row:
+identity is tube, sequence and content, so a tube that lost its memory and counts anew still gets its surveys stored.
+"""
+
+from __future__ import annotations
+
+import hashlib
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+
+import sqlalchemy as sa
+
+from groundstation.errors import StoreError
+from telemetry.errors import DecodeError
+from telemetry.messages import Event, SurveyMeasurement
+from telemetry.presentation.codec import decode, encode
+
+SCHEMA = 1
+METADATA = sa.MetaData()
+META = sa.Table(
+    "meta",
+    METADATA,
+    sa.Column("name", sa.String(32), primary_key=True),
+    sa.Column("value", sa.String(64), nullable=False),
+)
+MESSAGES = sa.Table(
+    "messages",
+    METADATA,
+    sa.Column("id", sa.Integer, primary_key=True),
+    sa.Column("tube", sa.Integer, nullable=False),
+    sa.Column("sequence", sa.BigInteger, nullable=False),
+    sa.Column("content", sa.String(32), nullable=False),
+    sa.Column("kind", sa.String(16), nullable=False),
+    sa.Column("md", sa.Float),
+    sa.Column("payload", sa.LargeBinary, nullable=False),
+    sa.UniqueConstraint("tube", "sequence", "content"),
+)
+DEPTHS = sa.Table(
+    "depths", METADATA, sa.Column("at", sa.Float, primary_key=True), sa.Column("md", sa.Float, nullable=False)
+)
+
+
+@dataclass(frozen=True, slots=True)
+class Stored:
+    """A message from the store and the depth (m) it was measured at, if known."""
+
+    message: SurveyMeasurement | Event
+    md: float | None
+
+
+class Store:
+    """Database of one rig.
+
+    Parameters
+    ----------
+    url : SQLAlchemy URL; SQLite runs in WAL mode with every commit forced to the disk
+
+    Raises
+    ------
+    StoreError
+        When the database cannot be opened, is none, or belongs to another version.
+    """
+
+    def __init__(self, url: str) -> None:
+        self._where = url.removeprefix("sqlite:///")
+        try:
+            if url.startswith("sqlite:///"):
+                Path(self._where).parent.mkdir(parents=True, exist_ok=True)
+            self._engine = sa.create_engine(url)
+            if self._engine.dialect.name == "sqlite":
+                sa.event.listen(self._engine, "connect", _durable)
+            METADATA.create_all(self._engine)
+            self.boots = self._begin()
+        except (sa.exc.SQLAlchemyError, OSError) as error:
+            reason = str(getattr(error, "orig", None) or getattr(error, "strerror", None) or error)
+            raise StoreError(
+                f"database {self._where}: {reason}; choose a writable --folder or another database"
+            ) from error
+
+    def add(self, message: SurveyMeasurement | Event, md: float | None) -> bool:
+        """Store a message; durable on return. False when it was already there.
+
+        Raises
+        ------
+        StoreError
+            When the disk refuses; nothing may be acknowledged then.
+        """
+        payload = encode(message)
+        content = hashlib.blake2b(payload, digest_size=16).hexdigest()
+        row = {"tube": message.tube, "sequence": message.sequence, "content": content}
+        try:
+            with self._engine.begin() as connection:
+                same = sa.and_(*(MESSAGES.c[name] == value for name, value in row.items()))
+                if connection.execute(sa.select(MESSAGES.c.id).where(same)).first() is not None:
+                    return False
+                kind = type(message).__name__
+                connection.execute(sa.insert(MESSAGES).values(**row, kind=kind, md=md, payload=payload))
+        except sa.exc.SQLAlchemyError as error:
+            raise StoreError(f"database {self._where}: {error}") from error
+        return True
+
+    def add_depth(self, at: float, md: float) -> None:
+        """Store that the bit stood at ``md`` (m) from rig time ``at`` (s) on."""
+        with self._engine.begin() as connection:
+            connection.execute(sa.delete(DEPTHS).where(DEPTHS.c.at == at))
+            connection.execute(sa.insert(DEPTHS).values(at=at, md=md))
+
+    def messages(self) -> Iterator[Stored]:
+        """Everything stored, in the order of arrival."""
+        with self._engine.connect() as connection:
+            for row in connection.execute(sa.select(MESSAGES).order_by(MESSAGES.c.id)):
+                try:
+                    message = decode(row.payload)
+                except DecodeError as error:
+                    raise StoreError(f"database {self._where}: message {row.id}: {error}") from error
+                if isinstance(message, SurveyMeasurement | Event):
+                    yield Stored(message, row.md)
+
+    def depths(self) -> list[tuple[float, float]]:
+        """Rig times (s) and depths (m) at which the bit came to stand."""
+        with self._engine.connect() as connection:
+            return [(row.at, row.md) for row in connection.execute(sa.select(DEPTHS).order_by(DEPTHS.c.at))]
+
+    def close(self) -> None:
+        """Close every connection."""
+        self._engine.dispose()
+
+    def _begin(self) -> int:
+        """Check the schema and count this start."""
+        with self._engine.begin() as connection:
+            found = dict(connection.execute(sa.select(META.c.name, META.c.value)).tuples().all())
+            if found and found.get("schema") != str(SCHEMA):
+                raise StoreError(f"database {self._where}: expected schema {SCHEMA}, got {found.get('schema')}")
+            boots = int(found.get("boots", "0")) + 1
+            connection.execute(sa.delete(META))
+            connection.execute(
+                sa.insert(META), [{"name": "schema", "value": str(SCHEMA)}, {"name": "boots", "value": str(boots)}]
+            )
+        return boots
+
+
+def _durable(connection: sa.engine.interfaces.DBAPIConnection, _record: object) -> None:
+    cursor = connection.cursor()
+    cursor.execute("PRAGMA journal_mode=WAL")
+    cursor.execute("PRAGMA synchronous=FULL")
+    cursor.execute("PRAGMA busy_timeout=5000")
+    cursor.close()

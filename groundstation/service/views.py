@@ -1,0 +1,278 @@
+"""What the ground station's keys hold, as plain objects: degrees, metres and seconds, the unit in every name."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from groundstation.errors import SelectorError, SurveyError
+from groundstation.service.core import Cluster, Knowledge, SurveyStation
+from groundstation.survey.resolve import angle_stds, angles
+from groundstation.survey.trajectory import Point, interpolate
+from telemetry.messages import Event, NodeFlag
+
+View = dict[str, Any]
+Parameters = dict[str, str]
+
+
+@dataclass(frozen=True, slots=True)
+class Range:
+    """Closed interval of a selector's parameter: ``4..12``, ``4..``, ``..12`` or a single value."""
+
+    low: float
+    high: float
+    single: bool
+
+    @classmethod
+    def parse(cls, name: str, text: str) -> Range:
+        """Range of a parameter.
+
+        Raises
+        ------
+        SelectorError
+            When it is neither a number nor a range.
+        """
+        first, dots, last = text.partition("..")
+        try:
+            low = float(first) if first or not dots else -math.inf
+            high = (float(last) if last else math.inf) if dots else low
+        except ValueError:
+            low = high = math.nan
+        if not low <= high:
+            raise SelectorError(f"parameter {name}: expected a number or a range such as {name}=4..12, got {text!r}")
+        return cls(low, high, not dots)
+
+    def holds(self, value: float) -> bool:
+        """Whether ``value`` lies inside, to the last millimetre."""
+        return self.low - 1e-3 <= value <= self.high + 1e-3
+
+
+def status(k: Knowledge, _p: Parameters) -> View:
+    """Rig time, depth, counts, health."""
+    stale = [tube for tube in k.order.tubes if k.is_stale(tube)]
+    return {
+        "rig": k.config.rig,
+        "rig_time_s": finite(k.rig_now),
+        "bit_md_m": k.depths.latest,
+        "tubes": len(k.order.tubes),
+        "stale_tubes": stale,
+        "stations": len(k.stations),
+        "measurements": sum(s.fusion.count for s in k.stations),
+        "unplaced_measurements": k.unplaced,
+        "refused_measurements": k.refused,
+        "health": "degraded" if stale or k.refused else "good",
+    }
+
+
+def string(k: Knowledge, _p: Parameters) -> View:
+    """Tubes from top to bottom."""
+    bit = k.depths.latest
+    rows = []
+    for tube in k.order.tubes:
+        below = k.order.length_below(tube)
+        md = None if bit is None or below is None else round(bit - below, 6)
+        rows.append({"tube": tube, "md_m": md, "age_s": finite(k.age(tube)), "stale": k.is_stale(tube)})
+    return {"rig_time_s": finite(k.rig_now), "tubes": rows}
+
+
+def node(k: Knowledge, tube: int) -> View:
+    """Last state of one node."""
+    s = k.nodes[tube]
+    return {
+        "tube": tube,
+        "at_s": s.at,
+        "age_s": finite(k.age(tube)),
+        "stale": k.is_stale(tube),
+        "hops": s.hops,
+        "mode": s.mode.name.lower(),
+        "yaw_deg": math.degrees(s.yaw),
+        "sigma_yaw_deg": math.degrees(math.sqrt(s.yaw_var)),
+        "sigma_systematic_deg": math.degrees(math.sqrt(s.systematic_var)),
+        "gyro_bias_dps": [math.degrees(b) for b in s.gyro_bias],
+        "scale_factor": s.scale_factor,
+        "innovation_deg": math.degrees(s.innovation),
+        "sigma_innovation_deg": math.degrees(math.sqrt(s.innovation_var)),
+        "aiding_age_s": finite(s.aiding_age),
+        "sigma_clock_s": math.sqrt(s.clock_var),
+        "flags": flag_names(s.flags),
+        "cycles": s.cycles,
+        "overruns": s.overruns,
+    }
+
+
+def stations(k: Knowledge, p: Parameters) -> View:
+    """All stations, fused; ``md`` selects."""
+    wanted = Range.parse("md", p["md"]) if "md" in p else None
+    rows = [station(k, n) for n, s in enumerate(k.stations, 1) if wanted is None or wanted.holds(s.md)]
+    return {"rig_time_s": finite(k.rig_now), "stations": rows}
+
+
+def station(k: Knowledge, n: int) -> View:
+    """One station, fused; ``n`` from 1."""
+    s = k.stations[n - 1]
+    fused = s.fusion.fused()
+    inclination, azimuth = angles(fused.lean, fused.down)
+    both = fused.cov + np.outer(fused.systematic, fused.systematic)
+    sigma_inclination, sigma_azimuth = angle_stds(fused.lean, fused.down, both)
+    row: View = {
+        "station": n,
+        "md_m": round(s.md, 6),
+        "inclination_deg": math.degrees(inclination),
+        "azimuth_deg": math.degrees(azimuth),
+        "sigma_inclination_deg": math.degrees(sigma_inclination),
+        "sigma_azimuth_deg": math.degrees(sigma_azimuth),
+        "measurements": s.fusion.count,
+    }
+    return row | position(point_of(k, s))
+
+
+def measurements(k: Knowledge, p: Parameters) -> View:
+    """Every cluster; ``station`` and ``tube`` select."""
+    by_station = Range.parse("station", p["station"]) if "station" in p else None
+    by_tube = Range.parse("tube", p["tube"]) if "tube" in p else None
+    rows = [
+        cluster(c, n)
+        for n, s in enumerate(k.stations, 1)
+        for c in s.clusters
+        if (by_station is None or by_station.holds(n)) and (by_tube is None or by_tube.holds(c.measurement.tube))
+    ]
+    return {"rig_time_s": finite(k.rig_now), "measurements": rows}
+
+
+def station_measurements(k: Knowledge, n: int) -> View:
+    """Every cluster of one station."""
+    rows = [cluster(c, n) for c in k.stations[n - 1].clusters]
+    return {"rig_time_s": finite(k.rig_now), "station": n, "measurements": rows}
+
+
+def cluster(c: Cluster, n: int) -> View:
+    """One cluster, resolved."""
+    m = c.measurement
+    inclination, azimuth = angles(c.direction.lean, c.direction.down)
+    sigma_inclination, sigma_azimuth = angle_stds(c.direction.lean, c.direction.down, c.direction.cov)
+    return {
+        "station": n,
+        "md_m": round(c.md, 6),
+        "tube": m.tube,
+        "sequence": m.sequence,
+        "station_at_s": m.station_at,
+        "hops": m.hops,
+        "inclination_deg": math.degrees(inclination),
+        "azimuth_deg": math.degrees(azimuth),
+        "sigma_inclination_deg": math.degrees(sigma_inclination),
+        "sigma_azimuth_deg": math.degrees(sigma_azimuth),
+        "yaw_deg": math.degrees(m.yaw),
+        "sigma_yaw_deg": math.degrees(math.sqrt(m.yaw_var)),
+        "sigma_systematic_deg": math.degrees(math.sqrt(m.systematic_var)),
+        "samples": m.samples,
+        "settle_s": m.settle_time,
+        "flags": flag_names(m.flags),
+        "quality": c.quality.name.lower().split("|") if c.quality and c.quality.name else [],
+    }
+
+
+def trajectory(k: Knowledge, p: Parameters) -> View:
+    """Positions with covariance: at the stations, in a range of depth, or interpolated at one depth."""
+    points = k.trajectory
+    if "md" in p:
+        wanted = Range.parse("md", p["md"])
+        if wanted.single:
+            try:
+                points = [interpolate(points, wanted.low)]
+            except SurveyError as error:
+                raise SelectorError(f"parameter md: {error}") from error
+        else:
+            points = [point for point in points if wanted.holds(point.md)]
+    return {"rig_time_s": finite(k.rig_now), "method": "balanced-tangential", "points": [point_view(q) for q in points]}
+
+
+def events(k: Knowledge, p: Parameters) -> View:
+    """What happened; ``tube`` selects."""
+    wanted = Range.parse("tube", p["tube"]) if "tube" in p else None
+    return {"events": [event(e) for e in k.events if wanted is None or wanted.holds(e.tube)]}
+
+
+def event(e: Event) -> View:
+    """One event."""
+    return {
+        "tube": e.tube,
+        "sequence": e.sequence,
+        "at_s": e.at,
+        "severity": e.severity.name.lower(),
+        "code": e.code,
+        "arguments": e.arguments,
+    }
+
+
+def point_view(point: Point) -> View:
+    """One point of the trajectory."""
+    inclination, azimuth = angles(point.tangent[:2], float(point.tangent[2]))
+    row: View = {
+        "md_m": round(point.md, 6),
+        "inclination_deg": math.degrees(inclination),
+        "azimuth_deg": math.degrees(azimuth),
+    }
+    return row | position(point) | {"covariance_m2": point.cov.tolist()}
+
+
+def position(point: Point) -> View:
+    """Position and its standard deviations."""
+    north, east, tvd = (float(x) for x in point.position)
+    sigma = np.sqrt(np.maximum(np.diag(point.cov), 0.0))
+    return {
+        "north_m": north,
+        "east_m": east,
+        "tvd_m": tvd,
+        "sigma_north_m": float(sigma[0]),
+        "sigma_east_m": float(sigma[1]),
+        "sigma_tvd_m": float(sigma[2]),
+    }
+
+
+def point_of(k: Knowledge, s: SurveyStation) -> Point:
+    """The trajectory's point at a station; the collar for one at its depth."""
+    return next((point for point in k.trajectory if point.md == s.md), k.trajectory[0])
+
+
+def flag_names(flags: NodeFlag) -> list[str]:
+    """Names of the flags that are set."""
+    return [flag.name.lower() for flag in NodeFlag if flag and flag in flags and flag.name]
+
+
+def finite(value: float) -> float | None:
+    """JSON has no infinity and no nan."""
+    return value if math.isfinite(value) else None
+
+
+@dataclass(frozen=True, slots=True)
+class Path:
+    """One answerable path below ``ground/``: what it shows and which parameters it takes."""
+
+    show: Callable[[Knowledge, Parameters], View]
+    parameters: tuple[str, ...] = ()
+
+
+FIXED: dict[str, Path] = {
+    "status": Path(status),
+    "string": Path(string),
+    "stations": Path(stations, ("md",)),
+    "measurements": Path(measurements, ("station", "tube")),
+    "trajectory": Path(trajectory, ("md",)),
+    "events": Path(events, ("tube",)),
+}
+PATTERNS = (*FIXED, "nodes/{tube}", "stations/{n}", "stations/{n}/measurements")
+
+
+def paths(k: Knowledge) -> dict[str, Path]:
+    """Every path that has an answer now."""
+    found = dict(FIXED)
+    for tube in sorted(k.nodes):
+        found[f"nodes/{tube}"] = Path(lambda known, _p, tube=tube: node(known, tube))  # type: ignore[misc]
+    for n in range(1, len(k.stations) + 1):
+        found[f"stations/{n}"] = Path(lambda known, _p, n=n: station(known, n))  # type: ignore[misc]
+        found[f"stations/{n}/measurements"] = Path(lambda known, _p, n=n: station_measurements(known, n))  # type: ignore[misc]
+    return found

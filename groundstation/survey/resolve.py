@@ -1,0 +1,118 @@
+"""From the specific force of a stop and the tracked yaw to the direction of the tube.
+
+The result is the lean vector l = (sin I cos A, sin I sin A), the horizontal part of the tube's downhole direction. It
+stays regular where the azimuth does not (I -> 0), so covariances are carried in it and converted at the end.
+Source: thesis eqs. 1.1-1.3, with the sign of the specific force of a body at rest (up).
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from enum import IntFlag
+
+import numpy as np
+import numpy.typing as npt
+
+from groundstation.errors import SurveyError
+
+Array = npt.NDArray[np.float64]
+GRAVITY_TOLERANCE = 0.005  # of g, |f| of a stop that was no stop
+SHORTEST_SETTLE = 16.0  # s, of the 32-point moving average
+
+
+class Quality(IntFlag):
+    """What is wrong with a stop; 0 is good."""
+
+    GOOD = 0
+    GRAVITY = 1  # |f| is not g
+    MOTION = 2  # the readings scatter more than the sensor does
+    SETTLE = 4  # the average began before the stop
+    SPREAD = 8  # the IMUs of the cluster disagree
+
+
+@dataclass(frozen=True, slots=True)
+class Lean:
+    """Direction of a tube in the north-east plane.
+
+    ``cov`` (2, 2) is random; ``systematic`` (2,) is the change of ``lean`` for one standard deviation of the constant
+    yaw error, a rank-one covariance that no averaging removes. ``down`` is the vertical part of the direction.
+    """
+
+    lean: Array
+    down: float
+    cov: Array
+    systematic: Array
+
+
+def resolve(
+    force: Array, force_cov: Array, yaw: float, yaw_var: float, systematic_var: float, bias_var: float = 0.0
+) -> Lean:
+    """Direction from a mean specific force.
+
+    Parameters
+    ----------
+    force, force_cov : (3,) m/s^2 and (3, 3), body frame x, y across, z downhole
+    yaw, yaw_var, systematic_var : rad and rad^2, of the body about its axis from reference north
+    bias_var : rad^2, of the accelerometer's bias left after calibration, as a tilt
+
+    Raises
+    ------
+    SurveyError
+        When the force vanishes or is not finite.
+    """
+    size = float(np.linalg.norm(force))
+    if not math.isfinite(size) or size < 1e-3 or not math.isfinite(yaw):
+        raise SurveyError(f"resolve: expected a finite specific force and yaw, got |f| = {size} m/s^2, yaw = {yaw} rad")
+    c, s = math.cos(yaw), math.sin(yaw)
+    turn = np.array([[c, -s, 0.0], [s, c, 0.0]])
+    unit = force / size
+    lean = turn @ unit
+    by_force = (turn - np.outer(lean, unit)) / size
+    by_yaw = np.array([-lean[1], lean[0]])
+    cov = by_force @ force_cov @ by_force.T + yaw_var * np.outer(by_yaw, by_yaw) + bias_var * np.eye(2)
+    return Lean(lean, float(-unit[2]), cov, math.sqrt(systematic_var) * by_yaw)
+
+
+def angles(lean: Array, down: float) -> tuple[float, float]:
+    """Inclination in [0, pi] and azimuth in [0, 2 pi) of a direction (rad)."""
+    inclination = math.atan2(math.hypot(lean[0], lean[1]), down)
+    azimuth = math.atan2(lean[1], lean[0]) % (2.0 * math.pi)
+    return inclination, azimuth if azimuth < 2.0 * math.pi else 0.0
+
+
+def angle_stds(lean: Array, down: float, cov: Array) -> tuple[float, float]:
+    """Standard deviations (rad) of inclination and azimuth; the azimuth's is at most pi, where nothing is known."""
+    size = math.hypot(lean[0], lean[1])
+    if size < 1e-9:
+        return math.sqrt(float(np.trace(cov)) / 2.0), math.pi
+    along = lean / size
+    across = np.array([-along[1], along[0]])
+    vertical = max(abs(down), 1e-6)
+    inclination = math.sqrt(max(float(along @ cov @ along), 0.0)) / vertical
+    azimuth = math.sqrt(max(float(across @ cov @ across), 0.0)) / size
+    return inclination, min(azimuth, math.pi)
+
+
+def combine_imus(forces: Array, covs: Array) -> tuple[Array, Array]:
+    """Inverse-variance mean of the IMUs of a cluster: forces (n, 3), covariances (n, 3, 3). Source: thesis eq. 3.42."""
+    information = np.linalg.inv(covs)
+    cov = np.linalg.inv(information.sum(axis=0))
+    mean = cov @ np.einsum("nij,nj->i", information, forces)
+    return mean, cov
+
+
+def check(forces: Array, covs: Array, gravity: float, samples: int, settle_time: float, sample_std: float) -> Quality:
+    """Quality of a stop; ``sample_std`` (m/s^2) is the sensor's own noise in one sample."""
+    quality = Quality.GOOD
+    mean, cov = combine_imus(forces, covs)
+    if abs(float(np.linalg.norm(mean)) - gravity) > GRAVITY_TOLERANCE * gravity:
+        quality |= Quality.GRAVITY
+    if float(np.max(np.diagonal(covs, axis1=1, axis2=2))) * samples > (3.0 * sample_std) ** 2:
+        quality |= Quality.MOTION
+    if settle_time < SHORTEST_SETTLE:
+        quality |= Quality.SETTLE
+    spread = forces - mean
+    if float(np.max(spread**2)) > 16.0 * float(np.max(np.diagonal(covs, axis1=1, axis2=2)) + np.max(np.diag(cov))):
+        quality |= Quality.SPREAD
+    return quality
