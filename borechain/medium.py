@@ -36,4 +36,4 @@ def medium(
     """
     from borechain.processes import Place, run_medium
 
-    run_medium(Place(rig_name, endpoint, folder), scenario, seed, speed, faults, router=router)
+    run_medium(Place(rig_name, endpoint, folder), scenario, seed, speed, faults, router)

@@ -73,7 +73,8 @@ def run_ground(place: Place, tube_length: float) -> None:
             serve(process, client)
 
 
-def run_medium(place: Place, scenario: Path, seed: int, speed: float, faults: tuple[str, ...], *, router: bool) -> None:
+def run_medium(place: Place, scenario: Path, seed: int, speed: float, faults: tuple[str, ...], router: bool
+) -> None:
     """World, joints and clock; in a rig without an outside router its session is the router."""
     from sim.scenario import load_scenario
     from sim.world import World

@@ -183,10 +183,10 @@ class Medium:
         true_time: dict[tuple[int, float], float] = {}
         while self._queue and self._queue[0][0] < limit:
             at, address, _, _, kind, frame = heapq.heappop(self._queue)
-            if address < 0:
+            if kind is None:
                 self._add_cycle(at, steps, true_time)
             elif kind is not Due.TIMER or self._wake.get(address) == at:
-                self._add(steps, true_time, address, kind or Due.TIMER, at, None, frame)
+                self._add(steps, true_time, address, kind, at, None, frame)
         answers = self.bench.round(steps)
         for address in sorted(answers):
             self._take(address, answers[address], true_time)
