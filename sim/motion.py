@@ -50,8 +50,8 @@ class Trapezoid:
         up, down = np.minimum(u, r), np.maximum(u - (d - r), 0.0)
         flat = np.clip(u - r, 0.0, d - 2.0 * r)
         angle = 0.5 * a * up**2 + a * r * flat + a * r * down - 0.5 * a * down**2
-        rate = a * up - a * down
         inside = (u > 0.0) & (u < d)
+        rate = np.where(inside, a * (up - down), 0.0)
         acceleration = np.where(inside & (u < r), a, 0.0) - np.where(inside & (u > d - r), a, 0.0)
         return angle, rate, acceleration
 
