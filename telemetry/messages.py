@@ -107,12 +107,14 @@ class TimeRequest:
 
 @dataclass(frozen=True, slots=True)
 class TimeReply:
-    """Second half of the exchange: the upper neighbour answers in rig time."""
+    """Second half of the exchange: the neighbour tells its own clock, and what it knows of rig time."""
 
     asked_at: float  # s, clock of the asker, echoed
-    received_at: float  # s, rig time
-    replied_at: float  # s, rig time
-    clock_var: float  # s^2, variance of the replier's own rig time
+    received_at: float  # s, clock of the replier
+    replied_at: float  # s, clock of the replier
+    rig_at: float  # s, rig time at replied_at, as the replier knows it
+    rig_rate: float  # rig seconds per second of the replier's clock
+    clock_var: float  # s^2, variance of rig_at
 
 
 @dataclass(frozen=True, slots=True)

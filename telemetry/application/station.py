@@ -115,6 +115,9 @@ class Station:
         payloads = link.receive(frame, now)
         if link.peer != before:
             self._hello_at = -math.inf
+            if side is self._sync_side and before is not None and link.peer is not None and link.peer[0] != before[0]:
+                self.clock.change_neighbour()
+                self._sync_at = -math.inf
         received = []
         for payload in payloads:
             try:
@@ -228,12 +231,12 @@ class Station:
             case Hello():
                 self._meet(side, message, now)
             case TimeRequest() if self.clock.synchronised and side is not self._sync_side:
-                rig = self.clock.rig_from_local(now)
-                var = min(self.clock.variance(now), 1e9)
-                self._links[side].send_best_effort(encode(TimeReply(message.asked_at, rig, rig, var)), Kind.TIME_REPLY)
+                clock = self.clock
+                var = min(clock.variance(now), 1e9)
+                reply = TimeReply(message.asked_at, now, now, clock.rig_from_local(now), clock.rig_rate, var)
+                self._links[side].send_best_effort(encode(reply), Kind.TIME_REPLY)
             case TimeReply() if side is self._sync_side:
-                asked, received, replied = message.asked_at, message.received_at, message.replied_at
-                self.clock.exchange(asked, received, replied, now, message.clock_var)
+                self.clock.exchange(message, now)
             case Aiding() if side is Side.UPPER:
                 return message
         return None

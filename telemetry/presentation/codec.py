@@ -214,6 +214,8 @@ FIELDS: dict[type[Any], tuple[Kind, tuple[Field, ...]]] = {
             number("asked_at", "a", -TIME, TIME),
             number("received_at", "r", -TIME, TIME),
             number("replied_at", "p", -TIME, TIME),
+            number("rig_at", "g", -TIME, TIME),
+            number("rig_rate", "k", 0.5, 2.0),
             number("clock_var", "v", 0.0, 1e9),
         ),
     ),
