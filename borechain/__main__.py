@@ -16,6 +16,7 @@ COMMANDS = {
     "encoder": ("borechain.encoder", "encoder", "Run the encoder node on the drive head."),
     "medium": ("borechain.medium", "medium", "Run world, joints and clock of a scenario."),
     "ground": ("borechain.ground", "ground", "Run the ground station."),
+    "router": ("borechain.router", "router", "Be the zenoh router of a rig whose processes start one by one."),
     "query": ("borechain.query", "query", "Ask a running ground station."),
     "watch": ("borechain.query", "watch", "Follow what a running ground station publishes."),
     "experiment": ("borechain.experiment", "experiment", "Rerun a published experiment beside ours."),

@@ -5,6 +5,7 @@ from __future__ import annotations
 import contextlib
 import ctypes
 import multiprocessing
+import queue
 import signal
 import sys
 from collections.abc import Callable, Iterator
@@ -13,13 +14,13 @@ from pathlib import Path
 
 import msgpack
 import setproctitle
-from groundstation.errors import GroundError
-from sim.errors import SimError
 
+from groundstation.errors import GroundError
 from node.errors import NodeError
 from node.firmware.settings import TubeSettings
 from node.process.encoder_process import EncoderProcess
 from node.process.tube_process import TubeProcess
+from sim.errors import SimError
 from telemetry import keys
 from telemetry.errors import TelemetryError
 from telemetry.media.stepped import BenchClient, Stepped, serve
@@ -40,7 +41,7 @@ class Place:
 
 
 def run_node(place: Place, settings: TubeSettings) -> None:
-    """Node of one tube until the bench ends or a signal comes."""
+    """Node of one tube until a signal comes."""
     run_on_bench(f"node {settings.tube}", place, settings.tube, lambda: TubeProcess(settings, place.folder))
 
 
@@ -73,14 +74,12 @@ def run_ground(place: Place, tube_length: float) -> None:
             serve(process, client)
 
 
-def run_medium(place: Place, scenario: Path, seed: int, speed: float, faults: tuple[str, ...], router: bool
-) -> None:
+def run_medium(place: Place, scenario: Path, seed: int, speed: float, faults: tuple[str, ...], router: bool) -> None:
     """World, joints and clock; in a rig without an outside router its session is the router."""
-    from sim.scenario import load_scenario
-    from sim.world import World
-
     from sim.bench import Bench
     from sim.medium import Medium, Progress
+    from sim.scenario import load_scenario
+    from sim.world import World
 
     begin_process("medium")
     with reporting("medium"):
@@ -95,9 +94,17 @@ def run_medium(place: Place, scenario: Path, seed: int, speed: float, faults: tu
 
             medium = Medium(world, bench, tell, speed)
             on_termination(medium.stop)
-            bus.liveliness_token(keys.LIVELINESS.format(rig=place.rig, process="medium"))
             if medium.run():
                 medium.linger()
+
+
+def run_router(endpoint: str) -> None:
+    """Be the router that the processes of a rig meet at, until a signal comes."""
+    stopped: queue.SimpleQueue[None] = queue.SimpleQueue()
+    begin_process("router")
+    with open_router(endpoint):
+        on_termination(lambda: stopped.put(None))
+        stopped.get()
 
 
 def pack_progress(progress: object) -> bytes:

@@ -15,10 +15,9 @@ from borechain.options import fault_option, seed_option, speed_option
 from telemetry import keys
 
 if TYPE_CHECKING:
-    from sim.world import World
-
     from sim.launcher import Tick
     from sim.processes import ProcessTable
+    from sim.world import World
     from telemetry.media.zenoh_bus import ZenohBus
 
 PRELOAD = ["borechain.warm"]
@@ -58,11 +57,10 @@ def rig(
       borechain rig scenarios/wellbore-1.toml --speed 1 --fault kill-node:3@900
     """
     del transport
-    from sim.scenario import load_scenario
-    from sim.world import World
-
     from sim.launcher import Launcher, check_port_free, next_run_folder, prepare_folder
     from sim.report import write_files
+    from sim.scenario import load_scenario
+    from sim.world import World
 
     world = World(load_scenario(scenario, faults), seed)
     check_port_free(endpoint)
@@ -175,44 +173,22 @@ def show_result(result: dict[str, Any], folder: Path) -> None:
     from rich.console import Console
     from rich.table import Table
 
-    console = Console()
-    table = Table(title="Stations, measured beside truth")
-    for name in (
-        "#",
-        "MD m",
-        "looks",
-        "incl deg",
-        "truth",
-        "azi deg",
-        "truth",
-        "north m",
-        "truth",
-        "east m",
-        "truth",
-        "TVD m",
-        "2 sigma cm",
-    ):
+    console = Console(width=max(Console().width, 100))
+    table = Table(title="Stations: measured, below it the truth")
+    for name in ("#", "MD m", "looks", "incl deg", "azi deg", "north m", "east m", "TVD m", "sigma N cm", "sigma E cm"):
         table.add_column(name, justify="right")
     for s in result["stations"]:
         t = s["truth"]
-        sigma_cm = 200.0 * max(s["sigma_north_m"], s["sigma_east_m"])
-        cells = [
-            f"{s['inclination_deg']:.3f}",
-            f"{t['inclination_deg']:.3f}",
-            f"{s['azimuth_deg']:.2f}",
-            f"{t['azimuth_deg']:.2f}",
+        lines = [
+            f"{s[key]:.{digits}f}\n[dim]{t[key]:.{digits}f}[/dim]"
+            for key, digits in (("inclination_deg", 3), ("azimuth_deg", 2), ("north_m", 4), ("east_m", 4), ("tvd_m", 4))
         ]
-        cells += [
-            f"{s['north_m']:.4f}",
-            f"{t['north_m']:.4f}",
-            f"{s['east_m']:.4f}",
-            f"{t['east_m']:.4f}",
-            f"{s['tvd_m']:.4f}",
-        ]
-        table.add_row(str(s["station"]), f"{s['md_m']:.2f}", str(s["measurements"]), *cells, f"{sigma_cm:.2f}")
+        sigmas = [f"{100.0 * s[key]:.3f}" for key in ("sigma_north_m", "sigma_east_m")]
+        table.add_row(str(s["station"]), f"{s['md_m']:.2f}", str(s["measurements"]), *lines, *sigmas)
     console.print(table)
     for name, value in result["figures"].items():
-        shown = " ".join(f"{v:.4f}" for v in value) if isinstance(value, list) else f"{value:.4f}"
+        values = value if isinstance(value, list) else [value]
+        shown = " ".join("-" if v is None else f"{v:.4f}" for v in values)
         console.print(f"{name:22} {shown}")
     console.print(
         f"{len(result['stations'])} stations, {result['measurements']} measurements, {result['processes']} processes, "

@@ -36,9 +36,9 @@ def wrap_deg(angle_deg: float) -> float:
     return 180.0 - (180.0 - angle_deg) % 360.0
 
 
-def rms(values: Sequence[float]) -> float:
-    """Root mean square, nan of nothing."""
-    return float(np.sqrt(np.mean(np.square(values)))) if len(values) else math.nan
+def rms(values: Sequence[float]) -> float | None:
+    """Root mean square, None of nothing."""
+    return float(np.sqrt(np.mean(np.square(values)))) if len(values) else None
 
 
 def station_table(stations: Sequence[dict[str, Any]], world: World) -> list[dict[str, Any]]:
@@ -52,15 +52,15 @@ def station_table(stations: Sequence[dict[str, Any]], world: World) -> list[dict
     return rows
 
 
-def yaw_errors(measurements: Sequence[dict[str, Any]], world: World) -> list[tuple[int, float, float, float]]:
-    """Hop, random yaw error (rad), random variance and total normalised error squared of each survey at rest."""
+def yaw_errors(measurements: Sequence[dict[str, Any]], world: World) -> list[tuple[int, float, float]]:
+    """Hop, random yaw error (rad) and total normalised error squared of each survey, all at rest."""
     rows = []
     for m in measurements:
         tube, at = int(m["tube"]), float(m["station_at_s"])
         total = math.radians(wrap_deg(m["yaw_deg"] - math.degrees(world.yaw_truth(tube, at))))
         random = total - world.systematic_error(tube, at)
         variance = math.radians(m["sigma_yaw_deg"]) ** 2 + math.radians(m["sigma_systematic_deg"]) ** 2
-        rows.append((int(m["hops"]), random, math.radians(m["sigma_yaw_deg"]) ** 2, total * total / variance))
+        rows.append((int(m["hops"]), random, total * total / variance))
     return rows
 
 
@@ -73,9 +73,9 @@ def figures(stations: Sequence[dict[str, Any]], measurements: Sequence[dict[str,
     return {
         "azimuth_rms_deg": rms([wrap_deg(s["azimuth_deg"] - s["truth"]["azimuth_deg"]) for s in leaning]),
         "inclination_rms_deg": rms([s["inclination_deg"] - s["truth"]["inclination_deg"] for s in stations]),
-        "toe_error_m": math.nan if toe is None else math.dist(position(toe), position(toe["truth"])),
-        "yaw_rms_deg_by_hop": [math.degrees(rms([row[1] for row in errors if row[0] == hop])) for hop in hops],
-        "nees_by_hop": [float(np.mean([row[3] for row in errors if row[0] == hop])) for hop in hops],
+        "toe_error_m": None if toe is None else math.dist(position(toe), position(toe["truth"])),
+        "yaw_rms_deg_by_hop": [rms([math.degrees(row[1]) for row in errors if row[0] == hop]) for hop in hops],
+        "nees_by_hop": [float(np.mean([row[2] for row in errors if row[0] == hop])) for hop in hops],
     }
 
 

@@ -165,7 +165,7 @@ def default_config() -> Array:
     record["bias_factor"] = 1.0
     record["scale_std"] = 1.5e-3
     record["stamp_std"] = 2e-3
-    record["stamp_walk"] = 2e-5
+    record["stamp_walk"] = 7e-6
     record["still_walk"] = 2e-4 * DEG
     record["aiding_floor_var"] = (0.002 * DEG) ** 2
     record["force_std"] = 0.02 * DEG * 9.81

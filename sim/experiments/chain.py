@@ -101,8 +101,8 @@ class Chain:
             self._relay(cycle, self._measure(encoder, end), onward)
             if cycle in wanted:
                 rows.append((*self._judge(end), wanted[cycle]))
-        columns = list(zip(*rows, strict=True))
-        return ChainRun(*(np.array(column) for column in columns[:4]), np.array(columns[4]))
+        error, var, total_error, total_var, turning = (np.array(column) for column in zip(*rows, strict=True))
+        return ChainRun(error, var, total_error, total_var, turning)
 
     def _tube(self, k: int, readings: list[Joint]) -> Tube:
         below = readings[k + 1] if k + 1 < len(readings) else Joint()

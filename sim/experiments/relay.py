@@ -1,4 +1,4 @@
-"""Consistency of the relay down the string: is a node's own variance the truth about its error, at every hop?
+"""Consistency of the relay down the string: whether a node's own variance is the truth about its error.
 
 NEES = mean of (error^2 / variance) over seeds at fixed epochs; 1 is honest, above 1 is overconfident. The reference
 column is what a study of the published scheme found at rest at hops 1, 2, 5 and 10.

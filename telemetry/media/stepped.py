@@ -92,7 +92,7 @@ def unpack_done(payload: bytes) -> tuple[int, list[Sent], float]:
 class BenchClient:
     """A process's end of the bench: its ports, its steps, its liveliness token."""
 
-    STEP, UPPER, LOWER, DEPTH, MASTER = range(5)
+    STEP, UPPER, LOWER, DEPTH, STOP = range(5)
 
     def __init__(self, bus: ZenohBus, rig: str, address: int, *, hears_depth: bool = False) -> None:
         self._bus = bus
@@ -106,15 +106,14 @@ class BenchClient:
         self._listen(keys.STEP.format(rig=rig, process=name), self.STEP)
         if hears_depth:
             self._listen(keys.DEPTH.format(rig=rig), self.DEPTH)
-        bus.liveliness_subscribe(keys.LIVELINESS.format(rig=rig, process="medium"), self._on_master)
         bus.liveliness_token(keys.LIVELINESS.format(rig=rig, process=name))
 
     def stop(self) -> None:
         """Make ``next_step`` return None; may be called from a signal handler or another thread."""
-        self._arrived.put((self.MASTER, b""))
+        self._arrived.put((self.STOP, b""))
 
     def next_step(self) -> tuple[int, list[tuple[DueEvent, bytes]]] | None:
-        """Next step with the frame of each frame event, or None when the bench has ended."""
+        """Next step with the frame of each frame event, or None after ``stop``."""
         payload = self._take(self.STEP)
         if payload is None:
             return None
@@ -139,15 +138,11 @@ class BenchClient:
     def _listen(self, key: str, channel: int) -> None:
         self._bus.subscribe(key, lambda _key, payload: self._arrived.put((channel, payload)))
 
-    def _on_master(self, _key: str, alive: bool) -> None:
-        if not alive:
-            self.stop()
-
     def _take(self, channel: int) -> bytes | None:
         waiting = self._waiting[channel]
         while not waiting:
             arrived, payload = self._arrived.get()
-            if arrived == self.MASTER:
+            if arrived == self.STOP:
                 return None
             self._waiting[arrived].append(payload)
         return waiting.popleft()
@@ -159,7 +154,7 @@ def port_key(rig: str, address: int, side: Side, direction: str) -> str:
 
 
 def serve(process: Stepped, client: BenchClient) -> None:
-    """Run ``process`` on the bench until the bench or ``client.stop`` ends it.
+    """Run ``process`` on the bench until ``client.stop`` ends it.
 
     Raises
     ------
