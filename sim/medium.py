@@ -213,7 +213,7 @@ class Medium:
         self._add(steps, true_time, BASE, Due.DEPTH, at, None, depth)
         self._add(steps, true_time, BASE, Due.TIMER, at, None, b"")
         for address in self.bench.alive():
-            if address == BASE:
+            if address == BASE or address not in self.progress.wanted:
                 continue
             local_start = self.world.local_clock(address, start)
             sample = (

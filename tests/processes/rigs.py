@@ -1,0 +1,97 @@
+"""Real rigs on loopback, each on a port of its own and in a process group of its own."""
+
+from __future__ import annotations
+
+import contextlib
+import json
+import os
+import queue
+import signal
+import socket
+import subprocess
+import sys
+import time
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+REPOSITORY = Path(__file__).parents[2]
+PATIENCE = 120.0
+
+
+def free_endpoint() -> str:
+    with socket.socket() as probe:
+        probe.bind(("127.0.0.1", 0))
+        return f"tcp/127.0.0.1:{probe.getsockname()[1]}"
+
+
+def command(*arguments: str) -> list[str]:
+    return [sys.executable, "-m", "borechain", *arguments]
+
+
+def titles_of_group(group: int) -> dict[int, str]:
+    """Command lines of the living processes of a process group, by pid."""
+    found = {}
+    for folder in Path("/proc").glob("[0-9]*"):
+        with contextlib.suppress(OSError):
+            fields = (folder / "stat").read_text().rpartition(")")[2].split()
+            if int(fields[2]) == group and fields[0] != "Z":
+                title = (folder / "cmdline").read_bytes().replace(b"\0", b" ").decode(errors="replace").strip()
+                found[int(folder.name)] = title
+    return found
+
+
+@dataclass
+class Rig:
+    """A running ``borechain rig`` and how to talk to it."""
+
+    process: subprocess.Popen[str]
+    endpoint: str
+    out: Path
+
+    def pid_of(self, title: str) -> int:
+        """Pid of the process with a title; waits until it is there."""
+        return self.until(lambda: next((p for p, t in titles_of_group(self.process.pid).items() if t == title), None))
+
+    def until(self, probe: Callable[[], Any]) -> Any:
+        """First answer of ``probe`` that is neither None nor False, while the rig lives."""
+        deadline = time.monotonic() + PATIENCE
+        idle: queue.SimpleQueue[None] = queue.SimpleQueue()
+        while time.monotonic() < deadline:
+            if answer := probe():
+                return answer
+            assert self.process.poll() is None, self.process.communicate()
+            with contextlib.suppress(queue.Empty):
+                idle.get(timeout=0.05)
+        raise AssertionError("gave up waiting")
+
+    def result(self) -> dict[str, Any]:
+        """The JSON object the rig ends with."""
+        output, errors = self.process.communicate(timeout=PATIENCE)
+        assert self.process.returncode == 0, errors
+        return dict(json.loads(output.splitlines()[-1]))
+
+
+@contextlib.contextmanager
+def running_rig(tmp_path: Path, *arguments: str, scenario: str = "scenarios/rig-3.toml") -> Iterator[Rig]:
+    endpoint, out = free_endpoint(), tmp_path / "run"
+    process = subprocess.Popen(
+        command("rig", scenario, "--json", "--endpoint", endpoint, "--out", str(out), *arguments),
+        cwd=REPOSITORY,
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
+        start_new_session=True,
+    )
+    try:
+        yield Rig(process, endpoint, out)
+    finally:
+        with contextlib.suppress(ProcessLookupError):
+            os.killpg(process.pid, signal.SIGKILL)
+        process.communicate()
+
+
+def run(*arguments: str, cwd: Path = REPOSITORY) -> subprocess.CompletedProcess[str]:
+    """A command to its end."""
+    return subprocess.run(command(*arguments), capture_output=True, text=True, cwd=cwd, check=False, timeout=PATIENCE)

@@ -1,0 +1,231 @@
+"""A whole rig in real processes."""
+
+import contextlib
+import csv
+import json
+import os
+import signal
+import subprocess
+import sys
+from pathlib import Path
+from typing import Any
+
+import pytest
+from rigs import run, running_rig, titles_of_group
+
+from telemetry.media.zenoh_bus import open_client
+
+GROUND = "borechain/*/ground"
+
+
+def drill(folder: Path, *arguments: str) -> dict[str, Any]:
+    with running_rig(folder, *arguments) as rig:
+        return rig.result()
+
+
+def test_three_tubes_give_three_stations_near_the_truth_and_leave_nothing_running(tmp_path: Path) -> None:
+    with running_rig(tmp_path, "--seed", "3") as rig:
+        result = rig.result()
+        assert titles_of_group(rig.process.pid) == {}
+    assert [s["measurements"] for s in result["stations"]] == [3, 2, 1]
+    assert [s["md_m"] for s in result["stations"]] == [2.0, 4.0, 6.0]
+    assert result["figures"]["inclination_rms_deg"] < 0.03
+    assert result["figures"]["toe_error_m"] < 0.005
+    assert max(result["figures"]["yaw_rms_deg_by_hop"]) < 0.05
+    assert result["processes"] == 6
+    with (rig.out / "stations.csv").open() as file:
+        assert [float(row["md_m"]) for row in csv.DictReader(file)] == [2.0, 4.0, 6.0]
+    assert json.loads((rig.out / "result.json").read_text())["digest"] == result["digest"]
+
+
+def test_the_seed_alone_decides_the_result_whatever_the_load(tmp_path: Path) -> None:
+    first = drill(tmp_path / "a", "--seed", "5")
+    with contextlib.ExitStack() as stack:
+        for _ in range(os.cpu_count() or 1):
+            competitor = subprocess.Popen([sys.executable, "-c", "while True: pass"])
+            stack.callback(competitor.wait)
+            stack.callback(competitor.kill)
+        second = drill(tmp_path / "b", "--seed", "5")
+    other = drill(tmp_path / "c", "--seed", "6")
+    assert first["digest"] == second["digest"]
+    assert first["stations"] == second["stations"]
+    assert first["digest"] != other["digest"]
+
+
+def test_one_process_a_tube_and_none_after_an_interrupt(tmp_path: Path) -> None:
+    expected = {"borechain medium", "borechain encoder", "borechain ground", "borechain node 1"}
+    with running_rig(tmp_path, "--speed", "1") as rig:
+        rig.until(lambda: expected <= set(titles_of_group(rig.process.pid).values()))
+        os.killpg(rig.process.pid, signal.SIGINT)
+        _, errors = rig.process.communicate(timeout=60.0)
+        assert rig.process.returncode == 1
+        assert "interrupted" in errors
+        assert "Traceback" not in errors
+        assert titles_of_group(rig.process.pid) == {}
+
+
+def test_operators_get_stations_while_the_rig_drills(tmp_path: Path, ask: Any) -> None:
+    with running_rig(tmp_path, "--speed", "20") as rig:
+
+        def two_stations() -> Any:
+            view = ask(rig, f"{GROUND}/trajectory")
+            return view if view and len(view["points"]) >= 3 else None
+
+        so_far = rig.until(two_stations)
+        assert [p["md_m"] for p in so_far["points"]][:3] == [0.0, 2.0, 4.0]
+        in_range = ask(rig, f"{GROUND}/trajectory?md=1..3")
+        assert [p["md_m"] for p in in_range["points"]] == [2.0]
+        between = ask(rig, f"{GROUND}/trajectory?md=1.5")
+        assert [p["md_m"] for p in between["points"]] == [1.5]
+        assert {m["station"] for m in ask(rig, f"{GROUND}/measurements?station=2")["measurements"]} == {2}
+        shown = run("query", f"{GROUND}/stations", "--endpoint", rig.endpoint, "--json")
+        assert shown.returncode == 0
+        assert len(json.loads(shown.stdout)["stations"]) >= 2
+        wrong = run("query", f"{GROUND}/trajektory", "--endpoint", rig.endpoint)
+        assert wrong.returncode == 2
+        for name in ("trajectory", "stations", "nodes/{tube}"):
+            assert name in wrong.stderr
+        refused = run("query", f"{GROUND}/trajectory?depth=3", "--endpoint", rig.endpoint)
+        assert refused.returncode == 2
+        assert "md" in refused.stderr
+        taken = run("query", "borechain/rig-1/cmd/take_survey?tube=1", "--endpoint", rig.endpoint, "--timeout", "40")
+        assert taken.returncode == 0, taken.stderr
+        assert json.loads(taken.stdout)["done"] is True
+
+
+def test_power_cut_of_a_node_makes_all_below_stale_and_loses_no_survey(tmp_path: Path) -> None:
+    """Tube 2 of 3 loses power at 302 s, while the string turns, for 15 s."""
+    began, cut, down = 1000.0, 302.0, 15.0
+    seen: list[dict[str, Any]] = []
+    fault = f"kill-node:2@{cut:g}+{down:g}"
+    with (
+        running_rig(tmp_path, "--speed", "40", "--fault", fault) as rig,
+        open_client(rig.endpoint, timeout=60.0) as bus,
+    ):
+        bus.subscribe("borechain/*/ground/string", lambda _key, payload: seen.append(json.loads(payload)))
+        bus.subscribe("borechain/*/ground/nodes/2", lambda _key, payload: seen.append(json.loads(payload)))
+        result = rig.result()
+    strings = [view for view in seen if "tubes" in view]
+    five_seconds_on = [v for v in strings if began + cut + 5.0 <= v["rig_time_s"] < began + cut + down]
+    assert five_seconds_on
+    for view in five_seconds_on:
+        assert {row["tube"]: row["stale"] for row in view["tubes"]} == {3: False, 2: True, 1: True}
+    after = [v for v in strings if v["rig_time_s"] > began + cut + down + 10.0]
+    assert after
+    assert not any(row["stale"] for row in after[-1]["tubes"])
+    back = [v for v in seen if v.get("tube") == 2 and v["at_s"] > began + cut + down]
+    assert "restored" in back[0]["flags"]
+    assert back[-1]["sigma_yaw_deg"] < 0.1
+    assert result["measurements"] == 6
+    assert max(result["figures"]["yaw_rms_deg_by_hop"]) < 0.05
+
+
+def test_a_node_killed_from_outside_is_restarted_and_loses_no_survey(tmp_path: Path, ask: Any) -> None:
+    with running_rig(tmp_path, "--speed", "30") as rig:
+        rig.until(lambda: (ask(rig, f"{GROUND}/status") or {}).get("measurements"))
+        os.kill(rig.pid_of("borechain node 1"), signal.SIGKILL)
+        rig.until(lambda: "restored" in {e["code"] for e in ask(rig, f"{GROUND}/events?tube=1")["events"]})
+        result = rig.result()
+    assert result["restarts"] == 1
+    assert result["measurements"] == 6
+
+
+def test_a_ground_station_killed_from_outside_keeps_every_survey(tmp_path: Path, ask: Any) -> None:
+    with running_rig(tmp_path, "--speed", "30") as rig:
+        rig.until(lambda: (ask(rig, f"{GROUND}/status") or {}).get("measurements"))
+        os.kill(rig.pid_of("borechain ground"), signal.SIGKILL)
+        result = rig.result()
+    assert result["restarts"] == 1
+    assert [s["measurements"] for s in result["stations"]] == [3, 2, 1]
+
+
+@pytest.fixture
+def scenario(tmp_path: Path) -> Path:
+    text = (Path(__file__).parents[2] / "scenarios" / "rig-3.toml").read_text()
+    path = tmp_path / "scenario.toml"
+    path.write_text(text)
+    (tmp_path / "wellbore-1-path.csv").write_text("md_m,a_cm,b_cm\n0,0,0\n2,-0.25,0.1\n4,-1,0.5\n6,-2,0.75\n")
+    return path
+
+
+def refused(path: Path, *arguments: str) -> subprocess.CompletedProcess[str]:
+    done = run("rig", str(path), *arguments, cwd=path.parent)
+    assert done.stdout == ""
+    assert "Traceback" not in done.stderr
+    assert len(done.stderr.strip().splitlines()) == 1, done.stderr
+    return done
+
+
+@pytest.mark.parametrize(
+    ("change", "named"),
+    [
+        (("tubes = 3", "tubes = 3\ncolour = 1"), "rig.colour"),
+        (("tube_length_m = 2.0", "tube_length_m = -2.0"), "rig.tube_length_m"),
+        (("turns = 5", "turns = 5\nrate_dps = 343"), "57 rev/min"),
+        (("tubes = 3", "tubes = 4"), "drill fewer tubes"),
+        (("[rig]", "[rig"), "not TOML"),
+        (("wellbore-1-path.csv", "missing.csv"), "missing.csv"),
+    ],
+)
+def test_a_scenario_that_cannot_be_is_refused_in_one_line(scenario: Path, change: tuple[str, str], named: str) -> None:
+    scenario.write_text(scenario.read_text().replace(*change))
+    before = sorted(scenario.parent.rglob("*"))
+    done = refused(scenario)
+    assert done.returncode == 2
+    assert named in done.stderr
+    assert sorted(scenario.parent.rglob("*")) == before
+
+
+@pytest.mark.parametrize(
+    ("rows", "named"),
+    [("0,0,0\n4,1,0\n2,1,0\n", "turns back"), ("0,0,0\n2,nonsense,0\n", "line 3"), ("0,0,0\n2,900,0\n", "cannot be")],
+)
+def test_a_path_that_cannot_be_is_refused_in_one_line(scenario: Path, rows: str, named: str) -> None:
+    (scenario.parent / "wellbore-1-path.csv").write_text("md_m,a_cm,b_cm\n" + rows)
+    done = refused(scenario)
+    assert done.returncode == 2
+    assert named in done.stderr
+
+
+@pytest.mark.parametrize("fault", ["kill-node:9@100", "kill-node:3@10", "melt:3@100"])
+def test_a_fault_that_cannot_be_is_refused_in_one_line(scenario: Path, fault: str) -> None:
+    done = refused(scenario, "--fault", fault)
+    assert done.returncode == 2
+    assert fault in done.stderr
+
+
+def test_a_missing_scenario_names_the_file(tmp_path: Path) -> None:
+    done = refused(tmp_path / "nowhere.toml")
+    assert done.returncode == 2
+    assert "nowhere.toml" in done.stderr
+
+
+def test_a_busy_port_names_the_remedy(scenario: Path, tmp_path: Path) -> None:
+    with running_rig(tmp_path / "other", "--speed", "1") as rig:
+        rig.pid_of("borechain node 1")
+        done = refused(scenario, "--endpoint", rig.endpoint, "--out", str(tmp_path / "second"))
+    assert done.returncode == 1
+    assert "--endpoint" in done.stderr
+    assert not (tmp_path / "second").exists()
+
+
+@pytest.mark.parametrize("folder", ["/proc/borechain", "stations.csv/run"])
+def test_an_output_folder_that_cannot_be_written_names_the_remedy(scenario: Path, folder: str) -> None:
+    (scenario.parent / "stations.csv").write_text("a file, not a folder")
+    done = refused(scenario, "--out", folder)
+    assert done.returncode == 1
+    assert "--out" in done.stderr
+
+
+def test_an_earlier_run_is_not_continued(scenario: Path, tmp_path: Path) -> None:
+    (tmp_path / "old").mkdir()
+    (tmp_path / "old" / "result.json").write_text("{}")
+    done = refused(scenario, "--out", str(tmp_path / "old"))
+    assert done.returncode == 1
+    assert (tmp_path / "old" / "result.json").read_text() == "{}"
+
+
+def test_asking_where_nobody_is_says_so() -> None:
+    done = run("query", f"{GROUND}/status", "--endpoint", "tcp/127.0.0.1:1", "--timeout", "0.5")
+    assert done.returncode == 1
+    assert "is the rig running" in done.stderr
