@@ -1,8 +1,8 @@
 """One joint's link as a pure state machine: frames in, payloads out, acknowledgement and retransmission.
 
 A frame is ``crc32 | msgpack [version, sender, epoch, count, ack_epoch, ack, ack_mask, entries]``; an entry is
-``[number, payload]``, number 0 for what may be lost. ``epoch`` names the sender's boot and session; whoever sees a
-new one starts to count from 1 again. Acknowledgement is cumulative plus a mask of the next 64 numbers and rides on
+``[number, payload]``, number 0 for what may be lost. ``epoch`` names the sender, its boot and session; whoever sees a
+new one starts to count from 1 again, and takes numbered payloads only from a sender that knows whom it talks to. Acknowledgement is cumulative plus a mask of the next 64 numbers and rides on
 whatever frame leaves next. Nothing that arrives raises, and every queue is bounded.
 """
 
@@ -26,7 +26,8 @@ FIRST_TIMEOUT = 0.06  # s, one round trip and the wait of a lonely acknowledgeme
 LAST_TIMEOUT = 2.0  # s
 ACK_DELAY = 0.02  # s
 SILENCE = 3.5  # s after which the other end is taken for gone
-BOOT_SHIFT = 16
+BOOT_SHIFT = 24
+SESSION_SHIFT = 8
 QUALITY_WEIGHT = 1.0 / 32.0
 
 
@@ -101,6 +102,8 @@ class HopLink:
         self.counters["frames_received"] += 1
         if ack_epoch == self.epoch:
             self._acknowledged(ack, ack_mask)
+        if not self._is_me(ack_epoch):
+            entries = [entry for entry in entries if entry[0] == 0]
         return [payload for number, payload in entries if number == 0 or self._is_new(number, now)]
 
     def take_frames(self, now: float) -> list[bytes]:
@@ -121,8 +124,8 @@ class HopLink:
 
     @property
     def epoch(self) -> int:
-        """Boot and session of this end."""
-        return self._boot_count << BOOT_SHIFT | self._session & 0xFFFF
+        """Boot, session and address of this end."""
+        return self._boot_count << BOOT_SHIFT | (self._session & 0xFFFF) << SESSION_SHIFT | self._address
 
     @property
     def waiting(self) -> int:
@@ -141,6 +144,10 @@ class HopLink:
         if not isinstance(entries, list) or not all(_is_entry(entry) for entry in entries):
             return None
         return fields[0], fields[1], fields[2], fields[3], fields[4], fields[5], entries
+
+    def _is_me(self, epoch: int) -> bool:
+        """Whether the other end means this process and not the one before a restart, whose numbers it still uses."""
+        return epoch >> BOOT_SHIFT == self._boot_count and epoch & 0xFF == self._address
 
     def _meet(self, sender: int, epoch: int) -> None:
         """Notice another process at the other end (start our numbers anew) or its new session (forget its numbers)."""

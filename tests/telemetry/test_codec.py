@@ -1,0 +1,174 @@
+import dataclasses
+import math
+from typing import Any
+
+import msgpack
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from telemetry.errors import DecodeError, EncodeError
+from telemetry.messages import (
+    BASE,
+    MAX_TUBE,
+    Aiding,
+    Command,
+    Event,
+    Hello,
+    ImuMean,
+    Mode,
+    NodeFlag,
+    NodeState,
+    Receipt,
+    Reply,
+    Severity,
+    SurveyMeasurement,
+    TimeReply,
+    TimeRequest,
+)
+from telemetry.presentation.codec import FIELDS, decode, encode, peek
+
+TURN = 2.0 * math.pi
+TUBE = st.integers(1, MAX_TUBE)
+SEQUENCE = st.integers(0, 2**53)
+TIME = st.floats(-1e12, 1e12)
+VAR = st.floats(0.0, 100.0)
+YAW = st.floats(0.0, TURN)
+HOPS = st.integers(-1, BASE)
+FLAGS = st.integers(0, 255).map(NodeFlag)
+VECTOR = st.tuples(*[st.floats(-10.0, 10.0)] * 3)
+SCALAR = st.none() | st.booleans() | st.integers(-(2**63), 2**63 - 1) | st.floats(allow_nan=False, allow_infinity=False)
+ARGUMENTS = st.dictionaries(st.text(max_size=20), SCALAR | st.text(max_size=50), max_size=8)
+IMU = st.builds(
+    lambda force, d: ImuMean(force, ((d, 0.0, 0.0), (0.0, d, 0.0), (0.0, 0.0, d))), VECTOR, st.floats(0.0, 1.0)
+)
+MESSAGES: dict[type, st.SearchStrategy[Any]] = {
+    Aiding: st.builds(Aiding, YAW, VAR, VAR, st.floats(-TURN, TURN), st.floats(-100, 100), TIME, SEQUENCE, HOPS),
+    Hello: st.builds(Hello, TUBE, st.integers(0, 2**32 - 1), HOPS, st.sampled_from(Mode), st.floats(0.0, 1.0)),
+    TimeRequest: st.builds(TimeRequest, TIME),
+    TimeReply: st.builds(TimeReply, TIME, TIME, TIME, TIME, st.floats(0.5, 2.0), st.floats(0.0, 1e9)),
+    NodeState: st.builds(
+        NodeState,
+        tube=TUBE,
+        at=TIME,
+        hops=HOPS,
+        mode=st.sampled_from(Mode),
+        yaw=YAW,
+        yaw_var=VAR,
+        systematic_var=VAR,
+        gyro_bias=VECTOR,
+        scale_factor=st.floats(-1.0, 1.0),
+        innovation=st.floats(-TURN, TURN),
+        innovation_var=VAR,
+        aiding_age=st.floats(0.0, math.inf),
+        clock_var=st.floats(0.0, 1e9),
+        flags=FLAGS,
+        cycles=SEQUENCE,
+        overruns=SEQUENCE,
+    ),
+    SurveyMeasurement: st.builds(
+        SurveyMeasurement,
+        tube=TUBE,
+        sequence=SEQUENCE,
+        station_at=TIME,
+        hops=HOPS,
+        imus=st.lists(IMU, min_size=1, max_size=4).map(tuple),
+        yaw=YAW,
+        yaw_var=VAR,
+        systematic_var=VAR,
+        samples=st.integers(1, 1000),
+        settle_time=st.floats(0.0, 1e6),
+        flags=FLAGS,
+    ),
+    Receipt: st.builds(Receipt, TUBE, SEQUENCE),
+    Command: st.builds(Command, TUBE, SEQUENCE, st.text(max_size=50), ARGUMENTS),
+    Reply: st.builds(Reply, TUBE, SEQUENCE, st.booleans(), st.text(max_size=256)),
+    Event: st.builds(Event, TUBE, SEQUENCE, TIME, st.sampled_from(Severity), st.text(max_size=50), ARGUMENTS),
+}
+ANY = st.one_of(*MESSAGES.values())
+
+
+def test_every_message_has_a_codec_and_a_test() -> None:
+    assert set(FIELDS) == set(MESSAGES)
+    for message, (_, fields) in FIELDS.items():
+        assert [field.name for field in fields] == [field.name for field in dataclasses.fields(message)]
+        assert len({field.key for field in fields}) == len(fields)
+
+
+@given(ANY)
+def test_decoding_gives_back_what_was_encoded(message: Any) -> None:
+    assert decode(encode(message)) == message
+
+
+@given(ANY)
+def test_the_envelope_tells_the_route_without_the_body(message: Any) -> None:
+    envelope = peek(encode(message))
+    if isinstance(message, Receipt | Command):
+        assert envelope.target == message.tube
+    else:
+        assert envelope.target == BASE
+        assert envelope.origin == getattr(message, "tube", 255)
+
+
+@given(st.binary(max_size=300))
+def test_random_bytes_are_refused_by_name(payload: bytes) -> None:
+    with pytest.raises(DecodeError):
+        decode(payload)
+
+
+@given(ANY, st.data())
+def test_truncated_payloads_are_refused(message: Any, data: st.DataObject) -> None:
+    payload = encode(message)
+    with pytest.raises(DecodeError):
+        decode(payload[: data.draw(st.integers(0, len(payload) - 1))])
+
+
+WRONG = st.one_of(
+    st.just(math.nan),
+    st.just(math.inf),
+    st.just(-math.inf),
+    st.just(1e300),
+    st.just(2**63),
+    st.just("text"),
+    st.just([]),
+    st.just([math.nan] * 3),
+    st.just({"a": {"b": 1}}),
+    st.none(),
+    st.booleans(),
+)
+
+
+@given(ANY, st.data())
+def test_a_wrong_value_in_the_right_shape_is_refused_or_within_range(message: Any, data: st.DataObject) -> None:
+    rows = msgpack.unpackb(encode(message))
+    key = data.draw(st.sampled_from(sorted(rows["b"])))
+    rows["b"][key] = data.draw(WRONG)
+    try:
+        decoded = decode(msgpack.packb(rows))
+    except DecodeError:
+        return
+    assert decode(encode(decoded)) == decoded  # what is accepted is a message like any other
+
+
+@pytest.mark.parametrize(
+    "change", [{"v": 2}, {"v": None}, {"k": 99}, {"k": True}, {"o": -1}, {"t": 1e9}, {"s": "x"}, {"b": 3}]
+)
+def test_a_wrong_envelope_is_refused(change: dict[str, Any]) -> None:
+    rows = msgpack.unpackb(encode(Receipt(3, 4))) | change
+    with pytest.raises(DecodeError):
+        decode(msgpack.packb(rows))
+
+
+@pytest.mark.parametrize(
+    "message",
+    [
+        Aiding(math.nan, 1.0, 0.0, 0.0, 0.0, 0.0, 1, 0),
+        Aiding(0.0, -1.0, 0.0, 0.0, 0.0, 0.0, 1, 0),
+        Aiding(7.0, 1.0, 0.0, 0.0, 0.0, 0.0, 1, 0),
+        Receipt(BASE + 1, 1),
+        Command(1, 1, "x" * 300),
+    ],
+)
+def test_a_message_out_of_range_is_not_sent(message: Any) -> None:
+    with pytest.raises(EncodeError):
+        encode(message)

@@ -1,0 +1,143 @@
+"""The link of one joint under every trouble a joint can have."""
+
+import math
+
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from telemetry.media.memory import MemoryPort, joint
+from telemetry.transport.hop import QUEUE_LIMIT, SILENCE, HopLink
+
+
+class Pair:
+    """Two links over one joint, on one clock."""
+
+    def __init__(self, seed: int = 0, **troubles: float) -> None:
+        self.ports = joint(seed, **troubles)
+        self.links = [HopLink(1, 1), HopLink(2, 1)]
+        self.got: list[list[bytes]] = [[], []]
+        self.now = 100.0
+
+    def run(self, duration: float, *, beat: float = 0.25) -> None:
+        """Let time pass in small steps; both ends say a best-effort beat now and then, as stations do."""
+        end = self.now + duration
+        beat_at = self.now
+        while self.now < end:
+            if self.now >= beat_at:
+                beat_at += beat
+                for link in self.links:
+                    link.send_best_effort(b"beat", "beat")
+            for k, (link, port) in enumerate(zip(self.links, self.ports, strict=True)):
+                for frame in port.receive(self.now):
+                    self.got[k].extend(p for p in link.receive(frame, self.now) if p != b"beat")
+                for frame in link.take_frames(self.now):
+                    port.send(frame, self.now)
+            self.now += 0.005
+
+
+def payloads(count: int) -> list[bytes]:
+    return [b"payload %d" % k for k in range(count)]
+
+
+@settings(max_examples=25)
+@given(
+    seed=st.integers(0, 1000),
+    loss=st.floats(0.0, 0.5),
+    duplicate=st.floats(0.0, 0.5),
+    corrupt=st.floats(0.0, 0.3),
+    jitter=st.floats(0.0, 0.05),
+    count=st.integers(1, 150),
+)
+def test_nothing_is_lost_and_nothing_comes_twice(
+    seed: int, loss: float, duplicate: float, corrupt: float, jitter: float, count: int
+) -> None:
+    pair = Pair(seed, loss=loss, duplicate=duplicate, corrupt=corrupt, jitter=jitter)
+    for payload in payloads(count):
+        pair.links[0].send_reliable(payload)
+        pair.links[1].send_reliable(payload + b" back")
+    pair.run(60.0)
+    assert sorted(pair.got[1]) == sorted(payloads(count))
+    assert sorted(pair.got[0]) == sorted(p + b" back" for p in payloads(count))
+    assert pair.links[0].waiting == pair.links[1].waiting == 0
+
+
+def test_a_restarted_peer_gets_what_it_had_not_acknowledged() -> None:
+    pair = Pair(loss=0.2)
+    pair.run(1.0)
+    for payload in payloads(20):
+        pair.links[0].send_reliable(payload)
+    pair.run(0.02)
+    pair.links[1] = HopLink(2, 2)
+    before = len(pair.got[1])
+    pair.run(20.0)
+    assert set(pair.got[1]) == set(payloads(20))
+    assert len(pair.got[1][before:]) == len(set(pair.got[1][before:]))
+
+
+def test_a_restarted_sender_is_understood_at_once() -> None:
+    pair = Pair()
+    pair.links[0].send_reliable(b"one")
+    pair.run(1.0)
+    pair.links[0] = HopLink(1, 2)
+    pair.links[0].send_reliable(b"two")
+    pair.run(1.0)
+    assert pair.got[1] == [b"one", b"two"]
+
+
+def test_another_tube_at_the_joint_gets_what_waits() -> None:
+    pair = Pair()
+    pair.run(1.0)
+    pair.ports[0].is_open = True
+    pair.links[0].send_reliable(b"waiting")
+    pair.run(SILENCE + 1.0)
+    pair.links[1] = HopLink(7, 1)
+    pair.got[1].clear()
+    pair.ports[0].is_open = False
+    pair.run(2.0)
+    assert pair.got[1] == [b"waiting"]
+
+
+def test_a_silent_peer_is_not_shouted_at_and_memory_stays_bounded() -> None:
+    pair = Pair()
+    pair.run(1.0)
+    pair.ports[0].is_open = True
+    pair.run(SILENCE + 1.0)
+    sent = pair.links[0].counters["frames_sent"]
+    for payload in payloads(3 * QUEUE_LIMIT):
+        pair.links[0].send_reliable(payload)
+    pair.run(10.0, beat=math.inf)
+    assert pair.links[0].counters["frames_sent"] <= sent + 1
+    assert pair.links[0].waiting <= QUEUE_LIMIT + 64
+    assert pair.links[0].counters["reliable_dropped"] > 0
+
+
+def test_the_newest_of_a_topic_wins() -> None:
+    link = HopLink(1, 1)
+    peer = HopLink(2, 1)
+    for k in range(10):
+        link.send_best_effort(b"state %d" % k, "state")
+    frames = link.take_frames(1.0)
+    assert [p for frame in frames for p in peer.receive(frame, 1.0)] == [b"state 9"]
+
+
+@given(st.binary(max_size=200))
+def test_garbage_is_counted_and_nothing_else(frame: bytes) -> None:
+    link = HopLink(1, 1)
+    assert link.receive(frame, 1.0) == []
+    assert link.counters["bad_frames"] == 1
+    assert link.peer is None
+
+
+def test_quality_tells_the_loss() -> None:
+    clean, lossy = Pair(1), Pair(1, loss=0.3)
+    clean.run(60.0)
+    lossy.run(60.0)
+    assert clean.links[0].quality == pytest.approx(1.0)
+    assert 0.4 < lossy.links[0].quality < 0.9
+
+
+def test_ports_without_another_end_swallow_frames() -> None:
+    port = MemoryPort()
+    port.send(b"x", 0.0)
+    assert port.receive(1.0) == []
