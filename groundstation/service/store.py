@@ -131,7 +131,7 @@ class Store:
     def _begin(self) -> int:
         """Check the schema and count this start."""
         with self._engine.begin() as connection:
-            found = dict(connection.execute(sa.select(META.c.name, META.c.value)).tuples().all())
+            found = {row.name: row.value for row in connection.execute(sa.select(META))}
             if found and found.get("schema") != str(SCHEMA):
                 raise StoreError(f"database {self._where}: expected schema {SCHEMA}, got {found.get('schema')}")
             boots = int(found.get("boots", "0")) + 1

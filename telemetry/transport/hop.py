@@ -2,8 +2,9 @@
 
 A frame is ``crc32 | msgpack [version, sender, epoch, count, ack_epoch, ack, ack_mask, entries]``; an entry is
 ``[number, payload]``, number 0 for what may be lost. ``epoch`` names the sender, its boot and session; whoever sees a
-new one starts to count from 1 again, and takes numbered payloads only from a sender that knows whom it talks to. Acknowledgement is cumulative plus a mask of the next 64 numbers and rides on
-whatever frame leaves next. Nothing that arrives raises, and every queue is bounded.
+new one starts to count from 1 again, and takes numbered payloads only from a sender that knows whom it talks to.
+Acknowledgement is cumulative plus a mask of the next 64 numbers and rides on whatever frame leaves next. Nothing that
+arrives raises, and every queue is bounded.
 """
 
 from __future__ import annotations

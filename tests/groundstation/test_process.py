@@ -1,0 +1,237 @@
+"""The ground station as a whole on a real bus: what it learns, what it answers, what survives."""
+
+import contextlib
+import json
+import math
+import socket
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import msgpack
+import pytest
+
+from groundstation.config import GroundConfig
+from groundstation.process import GroundProcess
+from telemetry.application.station import Station
+from telemetry.media.zenoh_bus import ZenohBus, open_client, open_router
+from telemetry.messages import (
+    Event,
+    ImuMean,
+    Mode,
+    NodeFlag,
+    NodeState,
+    Severity,
+    Side,
+    SurveyMeasurement,
+)
+
+VAR = (0.0034**2) / 32
+COV = ((VAR, 0.0, 0.0), (0.0, VAR, 0.0), (0.0, 0.0, VAR))
+GROUND = "borechain/*/ground"
+
+
+@pytest.fixture
+def buses() -> Iterator[tuple[ZenohBus, ZenohBus]]:
+    with socket.socket() as probe:
+        probe.bind(("127.0.0.1", 0))
+        endpoint = f"tcp/127.0.0.1:{probe.getsockname()[1]}"
+    with open_router(endpoint) as server, open_client(endpoint, timeout=10.0) as operator:
+        yield server, operator
+
+
+class Rig:
+    """A ground station and the station of tube 1, joined directly by hand: frames in, frames out."""
+
+    def __init__(self, folder: Path) -> None:
+        self.ground = GroundProcess(GroundConfig(folder=folder))
+        self.tube = Station(1, frozenset(Side), boot_count=1, is_clock_root=True)
+        self.now = 1000.0
+
+    def run(self, duration: float) -> None:
+        end = self.now + duration
+        while self.now < end:
+            self.tube.advance(self.now)
+            self.ground.on_timer(self.now)
+            for _ in range(3):
+                for _, frame in self.ground.take_frames(self.now):
+                    self.tube.receive(Side.UPPER, frame, self.now)
+                for side, frame in self.tube.take_frames(self.now):
+                    if side is Side.UPPER:
+                        self.ground.on_frame(Side.LOWER, frame, self.now)
+            self.now += 0.5
+
+    def depth(self, md: float) -> None:
+        for _ in range(3):
+            self.now += 0.5
+            self.ground.on_depth(self.now, md)
+
+    def state(self, tube: int, hops: int) -> None:
+        state = NodeState(
+            tube, self.now, hops, Mode.TRACKING, 1.0, 1e-6, 1e-6, (0.0, 0.0, 0.0), 0.0, 0.0, 1e-6, 0.1, 1e-8,
+            NodeFlag.NONE, 5, 0,
+        )  # fmt: skip
+        self.tube.send_state(state, self.now)
+        self.run(1.0)
+
+    def survey(self, tube: int, sequence: int, inclination_deg: float = 2.0) -> None:
+        lean = math.radians(inclination_deg)
+        imus = (ImuMean((9.81 * math.sin(lean), 0.0, -9.81 * math.cos(lean)), COV),)
+        message = SurveyMeasurement(tube, sequence, self.now, 1, imus, 0.0, 1e-8, 1e-8, 32, 20.0, NodeFlag.NONE)
+        self.tube.submit(message, self.now)
+        self.run(2.0)
+
+
+def ask(bus: ZenohBus, selector: str) -> Any:
+    replies = bus.get(selector, 10.0)
+    assert len(replies) == 1, replies
+    assert replies[0].error is None, replies[0].error
+    return json.loads(replies[0].payload)
+
+
+def refused(bus: ZenohBus, selector: str) -> str:
+    replies = bus.get(selector, 10.0)
+    assert len(replies) == 1
+    assert replies[0].error is not None
+    return replies[0].error
+
+
+@pytest.fixture
+def rig(tmp_path: Path, buses: tuple[ZenohBus, ZenohBus]) -> Iterator[tuple[Rig, ZenohBus]]:
+    """Two tubes, bit at 4 m, one survey at 2 m and two at 4 m."""
+    server, operator = buses
+    rig = Rig(tmp_path)
+    with rig.ground.serving(server):
+        rig.run(3.0)
+        rig.depth(2.0)
+        rig.state(1, 1)
+        rig.survey(1, 1)
+        rig.state(2, 1)
+        rig.state(1, 2)
+        rig.depth(4.0)
+        rig.survey(1, 2, inclination_deg=3.0)
+        rig.survey(2, 1)
+        yield rig, operator
+
+
+def test_surveys_find_their_stations(rig: tuple[Rig, ZenohBus]) -> None:
+    _, bus = rig
+    stations = ask(bus, f"{GROUND}/stations")["stations"]
+    assert [(s["station"], s["md_m"], s["measurements"]) for s in stations] == [(1, 2.0, 2), (2, 4.0, 1)]
+    assert stations[0]["inclination_deg"] == pytest.approx(2.0)
+    assert stations[1]["azimuth_deg"] == pytest.approx(0.0, abs=1e-6)
+    assert ask(bus, f"{GROUND}/stations/2")["md_m"] == 4.0
+    assert {m["tube"] for m in ask(bus, f"{GROUND}/stations/1/measurements")["measurements"]} == {1, 2}
+    assert [t["md_m"] for t in ask(bus, f"{GROUND}/string")["tubes"]] == [2.0, 4.0]
+    assert ask(bus, f"{GROUND}/status")["measurements"] == 3
+
+
+def test_a_range_answers_only_the_range(rig: tuple[Rig, ZenohBus]) -> None:
+    _, bus = rig
+    assert [p["md_m"] for p in ask(bus, f"{GROUND}/trajectory")["points"]] == [0.0, 2.0, 4.0]
+    assert [p["md_m"] for p in ask(bus, f"{GROUND}/trajectory?md=3..12")["points"]] == [4.0]
+    assert [p["md_m"] for p in ask(bus, f"{GROUND}/trajectory?md=..2")["points"]] == [0.0, 2.0]
+    assert [p["md_m"] for p in ask(bus, f"{GROUND}/trajectory?md=2.5")["points"]] == [2.5]
+    assert [s["station"] for s in ask(bus, f"{GROUND}/stations?md=2")["stations"]] == [1]
+    assert {m["tube"] for m in ask(bus, f"{GROUND}/measurements?tube=2")["measurements"]} == {2}
+
+
+def test_wildcards_get_every_key_they_name(rig: tuple[Rig, ZenohBus]) -> None:
+    _, bus = rig
+    assert {r.key.rsplit("/", 1)[1] for r in bus.get(f"{GROUND}/nodes/*", 10.0)} == {"1", "2"}
+
+
+@pytest.mark.parametrize(
+    ("selector", "named"),
+    [
+        ("trajektory", "stations/{n}/measurements"),
+        ("nodes/9", "nodes/{tube}"),
+        ("stations/3", "stations/{n}"),
+        ("trajectory?depth=3", "md"),
+        ("trajectory?md=abc", "md=4..12"),
+        ("trajectory?md=5..4", "md=4..12"),
+        ("trajectory?md=99", "0..4 m"),
+        ("status?accept=xml", "json or msgpack"),
+        ("status?md=3", "accept"),
+    ],
+)
+def test_a_wrong_selector_is_told_the_right_ones(rig: tuple[Rig, ZenohBus], selector: str, named: str) -> None:
+    assert named in refused(rig[1], f"{GROUND}/{selector}")
+
+
+def test_msgpack_on_request(rig: tuple[Rig, ZenohBus]) -> None:
+    _, bus = rig
+    reply = bus.get(f"{GROUND}/stations?accept=msgpack", 10.0)[0]
+    assert msgpack.unpackb(reply.payload)["stations"] == ask(bus, f"{GROUND}/stations")["stations"]
+
+
+def test_a_silent_node_goes_stale_and_comes_back(rig: tuple[Rig, ZenohBus]) -> None:
+    it, bus = rig
+    it.state(1, 2)
+    it.depth(4.0)
+    assert ask(bus, f"{GROUND}/nodes/1")["stale"] is False
+    it.run(5.0)
+    it.depth(4.0)
+    assert ask(bus, f"{GROUND}/nodes/1")["stale"] is True
+    assert ask(bus, f"{GROUND}/status")["stale_tubes"] == [2, 1]
+    it.state(1, 2)
+    it.depth(4.0)
+    assert ask(bus, f"{GROUND}/nodes/1")["stale"] is False
+
+
+def test_a_restart_forgets_and_doubles_nothing(
+    rig: tuple[Rig, ZenohBus], tmp_path: Path, buses: tuple[ZenohBus, ZenohBus]
+) -> None:
+    it, bus = rig
+    it.tube.submit(Event(1, 7, it.now, Severity.INFO, "stopped"), it.now)
+    it.run(2.0)
+    before = ask(bus, f"{GROUND}/stations")["stations"]
+    again = Rig(tmp_path)
+    again.now = it.now
+    knowledge = again.ground.knowledge
+    assert [(s.md, s.fusion.count) for s in knowledge.stations] == [(2.0, 2), (4.0, 1)]
+    assert [e.sequence for e in knowledge.events] == [7]
+    again.run(3.0)
+    again.tube.submit(next(iter(knowledge.stations[0].clusters)).measurement, again.now)  # its receipt was lost
+    again.run(2.0)
+    assert [(s.md, s.fusion.count) for s in knowledge.stations] == [(2.0, 2), (4.0, 1)]
+    assert again.tube.outbox_size == 0
+    assert before[0]["measurements"] == 2
+
+
+def test_a_survey_from_before_the_restart_finds_its_depth(tmp_path: Path) -> None:
+    first = Rig(tmp_path)
+    first.run(3.0)
+    first.depth(2.0)
+    first.depth(4.0)
+    when = first.now
+    first.depth(6.0)
+    first.ground.store.close()
+    again = Rig(tmp_path)
+    assert again.ground.knowledge.depths.at(when) == 4.0
+
+
+def test_a_survey_without_a_depth_is_kept_and_counted(tmp_path: Path) -> None:
+    rig = Rig(tmp_path)
+    rig.run(3.0)
+    rig.survey(1, 1)
+    assert rig.ground.knowledge.unplaced == 1
+    assert [s.md for s in rig.ground.store.messages()] == [None]
+    assert rig.tube.outbox_size == 0
+
+
+@contextlib.contextmanager
+def watching(bus: ZenohBus, key: str) -> Iterator[list[Any]]:
+    seen: list[Any] = []
+    bus.subscribe(key, lambda _key, payload: seen.append(json.loads(payload)))
+    yield seen
+
+
+def test_a_change_is_published_on_the_key_it_changes(rig: tuple[Rig, ZenohBus]) -> None:
+    it, bus = rig
+    with watching(bus, f"{GROUND}/stations") as seen:
+        ask(bus, f"{GROUND}/status")  # the subscription has arrived when a later question is answered
+        it.survey(2, 2)
+        ask(bus, f"{GROUND}/status")
+    assert seen
+    assert seen[-1]["stations"][0]["measurements"] == 3

@@ -1,0 +1,97 @@
+"""The store on a real file, killed in the middle of its work."""
+
+import os
+import signal
+import sqlite3
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from groundstation.errors import StoreError
+from groundstation.service.store import Store
+from telemetry.messages import Event, ImuMean, NodeFlag, Severity, SurveyMeasurement
+
+COV = ((1e-6, 0.0, 0.0), (0.0, 1e-6, 0.0), (0.0, 0.0, 1e-6))
+
+WRITER = """
+import sys
+from groundstation.service.store import Store
+from telemetry.messages import Event, Severity
+store = Store(sys.argv[1])
+for sequence in range(1, 100_000):
+    store.add(Event(1, sequence, 1.0, Severity.INFO, "stopped"), None)
+    print(sequence, flush=True)
+"""
+
+
+def survey(tube: int, sequence: int, yaw: float = 1.0) -> SurveyMeasurement:
+    imus = (ImuMean((0.1, 0.2, -9.8), COV),)
+    return SurveyMeasurement(tube, sequence, 1000.0, 1, imus, yaw, 1e-6, 1e-6, 32, 20.0, NodeFlag.NONE)
+
+
+def url(folder: Path) -> str:
+    return f"sqlite:///{folder / 'ground.sqlite'}"
+
+
+def test_what_was_added_is_there_after_a_restart_once(tmp_path: Path) -> None:
+    store = Store(url(tmp_path))
+    assert store.add(survey(1, 1), 2.0)
+    assert not store.add(survey(1, 1), 2.0)
+    assert store.add(Event(1, 2, 5.0, Severity.WARNING, "yaw_reset", {"yaw_deg": 3.0}), None)
+    store.add_depth(900.0, 2.0)
+    store.close()
+    again = Store(url(tmp_path))
+    assert [(s.message.sequence, s.md) for s in again.messages()] == [(1, 2.0), (2, None)]
+    assert not again.add(survey(1, 1), 2.0)
+    assert again.depths() == [(900.0, 2.0)]
+    assert again.boots == store.boots + 1
+
+
+def test_a_tube_that_counts_anew_is_not_taken_for_a_repetition(tmp_path: Path) -> None:
+    store = Store(url(tmp_path))
+    assert store.add(survey(1, 1), 2.0)
+    assert store.add(survey(1, 1, yaw=2.0), 2.0)
+
+
+@pytest.mark.parametrize("acknowledged", [3, 40, 150])
+def test_killed_at_any_moment_nothing_acknowledged_is_lost_or_doubled(tmp_path: Path, acknowledged: int) -> None:
+    writer = subprocess.Popen([sys.executable, "-c", WRITER, url(tmp_path)], stdout=subprocess.PIPE, text=True)
+    assert writer.stdout is not None
+    last = 0
+    for line in writer.stdout:
+        last = int(line)
+        if last >= acknowledged:
+            os.kill(writer.pid, signal.SIGKILL)
+            break
+    rest = writer.stdout.read().split()
+    writer.stdout.close()
+    writer.wait()
+    last = int(rest[-1]) if rest else last
+    stored = [s.message.sequence for s in Store(url(tmp_path)).messages()]
+    assert stored[:last] == list(range(1, last + 1))
+    assert len(stored) <= last + 1
+
+
+def test_a_folder_that_cannot_be_written_is_named(tmp_path: Path) -> None:
+    blocked = tmp_path / "file"
+    blocked.write_text("no folder")
+    with pytest.raises(StoreError, match="file"):
+        Store(url(blocked))
+
+
+def test_a_file_that_is_no_database_is_named_and_left_alone(tmp_path: Path) -> None:
+    (tmp_path / "ground.sqlite").write_text("this is a letter, not a database, and it is long enough to be read")
+    with pytest.raises(StoreError, match="not a database"):
+        Store(url(tmp_path))
+    assert (tmp_path / "ground.sqlite").read_text().startswith("this is a letter")
+
+
+def test_another_schema_is_refused(tmp_path: Path) -> None:
+    Store(url(tmp_path)).close()
+    with sqlite3.connect(tmp_path / "ground.sqlite") as connection:
+        connection.execute("update meta set value = '99' where name = 'schema'")
+    connection.close()
+    with pytest.raises(StoreError, match="schema 1, got 99"):
+        Store(url(tmp_path))
