@@ -11,19 +11,17 @@ from node.errors import SavedStateError
 from node.kernels.error_model import isolate
 from node.kernels.layout import LAYOUT_VERSION, STATE, Array, Err
 
-HEADER = struct.Struct("<4sHHQII I")  # magic, layout, reserved, generation, state bytes, blob bytes, crc of the rest
+HEADER = struct.Struct("<4sHHQII")  # magic, layout, reserved, generation, state bytes, blob bytes
+CHECKSUM = struct.Struct("<I")  # crc32 of header and body, between the two
 MAGIC = b"BCSS"
 UNKNOWN_YAW_VAR = 3.29  # rad^2, uniform over the turn
 
 
 def pack(state: Array, blob: bytes, generation: int) -> bytes:
-    """Bytes of one slot: header with checksum, state record, blob."""
+    """Bytes of one slot: header, checksum, state record, blob."""
+    head = HEADER.pack(MAGIC, LAYOUT_VERSION, 0, generation, STATE.itemsize, len(blob))
     body = state.tobytes() + blob
-    head = HEADER.pack(MAGIC, LAYOUT_VERSION, 0, generation, STATE.itemsize, len(blob), 0)
-    return (
-        HEADER.pack(MAGIC, LAYOUT_VERSION, 0, generation, STATE.itemsize, len(blob), zlib.crc32(body, zlib.crc32(head)))
-        + body
-    )
+    return head + CHECKSUM.pack(zlib.crc32(body, zlib.crc32(head))) + body
 
 
 def unpack(data: bytes) -> tuple[Array, bytes, int]:
@@ -34,16 +32,17 @@ def unpack(data: bytes) -> tuple[Array, bytes, int]:
     SavedStateError
         When the bytes are torn, damaged or of another layout; the message says which.
     """
-    if len(data) < HEADER.size:
-        raise SavedStateError(f"saved state: expected at least {HEADER.size} bytes, got {len(data)}")
-    magic, layout, _, generation, state_size, blob_size, crc = HEADER.unpack_from(data)
+    begin = HEADER.size + CHECKSUM.size
+    if len(data) < begin:
+        raise SavedStateError(f"saved state: expected at least {begin} bytes, got {len(data)}")
+    magic, layout, _, generation, state_size, blob_size = HEADER.unpack_from(data)
     if magic != MAGIC or layout != LAYOUT_VERSION or state_size != STATE.itemsize:
         raise SavedStateError(
-            f"saved state: expected layout {LAYOUT_VERSION} of {STATE.itemsize} bytes, got {layout}, {state_size}"
+            f"saved state: expected layout {LAYOUT_VERSION} of {STATE.itemsize} bytes, got {layout} of {state_size}"
         )
-    body = data[HEADER.size : HEADER.size + state_size + blob_size]
-    head = HEADER.pack(magic, layout, 0, generation, state_size, blob_size, 0)
-    if len(body) != state_size + blob_size or zlib.crc32(body, zlib.crc32(head)) != crc:
+    (crc,) = CHECKSUM.unpack_from(data, HEADER.size)
+    body = data[begin : begin + state_size + blob_size]
+    if len(body) != state_size + blob_size or zlib.crc32(body, zlib.crc32(data[: HEADER.size])) != crc:
         raise SavedStateError("saved state: checksum does not fit, the slot is torn or damaged")
     return np.frombuffer(body[:state_size], STATE).copy(), body[state_size:], generation
 

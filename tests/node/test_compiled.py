@@ -1,0 +1,67 @@
+"""How the kernels run: from the cache on a second start, and without allocating."""
+
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+COUNT_COMPILATIONS = """
+from node.kernels.warm import warm_up
+from node.kernels.cycle import run_cycle
+from node.kernels.relay import offer_aiding
+warm_up()
+for function in (run_cycle, offer_aiding):
+    print(sum(function.stats.cache_misses.values()), sum(function.stats.cache_hits.values()))
+"""
+COUNT_ALLOCATIONS = """
+import numpy as np
+from numba import njit
+from numba.core.runtime import _nrt_python, rtsys
+from node.kernels.cycle import run_cycle
+from node.kernels.layout import PERIOD, default_config, new_state
+from node.kernels.relay import offer_aiding
+
+_nrt_python.memsys_enable_stats()
+
+@njit
+def drive(state, config, rate, force, cycles):
+    for k in range(cycles):
+        start = 1000.0 + k * 0.5
+        run_cycle(state, config, rate, force, start, start + 0.5, 1)
+        offer_aiding(state, config, 0.1, 1e-6, 1e-6, 0.0, rate[2], start + 0.4, k, 0)
+
+def allocations(cycles):
+    config = default_config()
+    state = new_state(config)
+    before = rtsys.get_allocation_stats().alloc
+    drive(state[0], config[0], np.array([0.0, 0.0, 1.2]), np.array([0.0, 0.0, -9.8]), cycles)
+    return rtsys.get_allocation_stats().alloc - before
+
+allocations(1)
+print(allocations(1), allocations(1000))
+"""
+
+
+def run(program: str, **environment: str) -> list[list[int]]:
+    done = subprocess.run(
+        [sys.executable, "-c", program], env=os.environ | environment, capture_output=True, text=True, check=True
+    )
+    return [[int(number) for number in line.split()] for line in done.stdout.splitlines()]
+
+
+def test_a_second_start_does_not_compile(tmp_path: Path) -> None:
+    first = run(COUNT_COMPILATIONS, NUMBA_CACHE_DIR=str(tmp_path))
+    second = run(COUNT_COMPILATIONS, NUMBA_CACHE_DIR=str(tmp_path))
+    assert all(misses > 0 for misses, _ in first)
+    assert all(misses == 0 and hits > 0 for misses, hits in second)
+
+
+def test_the_cache_follows_the_sources() -> None:
+    from node.kernels.jit import cache_folder, source_digest
+
+    assert source_digest() in cache_folder().name
+
+
+def test_a_cycle_allocates_nothing() -> None:
+    ((once, often),) = run(COUNT_ALLOCATIONS)
+    assert once == often

@@ -1,0 +1,41 @@
+import math
+
+import pytest
+
+from node.firmware.encoder import EDGE_STD, QUANTUM, EncoderNode, EncoderSample
+
+
+def test_a_turning_head_is_known_at_its_last_edge() -> None:
+    encoder = EncoderNode()
+    encoder.on_cycle(EncoderSample(0, 1000.0, True), 1000.5)
+    aiding = encoder.on_cycle(EncoderSample(430, 1000.9, True), 1001.0)
+    assert aiding.yaw == pytest.approx(430 * QUANTUM)
+    assert aiding.valid_at == 1000.9
+    assert aiding.yaw_var == EDGE_STD**2
+    assert aiding.rate == pytest.approx(430 * QUANTUM / 0.9)
+
+
+def test_a_falling_edge_is_the_upper_border_of_its_count() -> None:
+    encoder = EncoderNode()
+    encoder.on_cycle(EncoderSample(100, 1000.0, True), 1000.5)
+    aiding = encoder.on_cycle(EncoderSample(49, 1000.9, False), 1001.0)
+    assert aiding.yaw == pytest.approx(50 * QUANTUM)
+    assert aiding.rate < 0.0
+
+
+def test_a_rest_is_one_measurement_however_often_it_is_said() -> None:
+    encoder = EncoderNode()
+    encoder.on_cycle(EncoderSample(0, 1000.0, True), 1000.5)
+    turning = encoder.on_cycle(EncoderSample(430, 1000.9, True), 1001.0)
+    rests = [encoder.on_cycle(EncoderSample(430, 1000.9, True), 1001.5 + k) for k in range(5)]
+    assert {r.sequence for r in rests} == {turning.sequence + 1}
+    assert rests[-1].valid_at == 1005.5
+    assert rests[0].yaw == pytest.approx(430.5 * QUANTUM)
+    assert rests[0].yaw_var == pytest.approx(QUANTUM**2 / 12.0)
+    assert math.degrees(math.sqrt(rests[0].yaw_var)) == pytest.approx(0.0254, abs=1e-4)
+    again = encoder.on_cycle(EncoderSample(440, 1006.0, True), 1006.5)
+    assert again.sequence == turning.sequence + 2
+
+
+def test_numbers_of_a_later_life_are_larger() -> None:
+    assert EncoderNode(2 << 32).on_cycle(EncoderSample(0, 1.0, True), 2.0).sequence > 1 << 33

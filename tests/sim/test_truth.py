@@ -1,0 +1,155 @@
+"""The world's truth in closed form: a perfect sensor gives zero error."""
+
+import math
+from pathlib import Path
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from groundstation.survey.resolve import angles, resolve
+from node.kernels.layout import PERIOD
+from sim.borehole import Borehole
+from sim.motion import Motion, Trapezoid
+from sim.scenario import load_scenario
+from sim.truth import TubeTruth
+from sim.world import World, wrap
+
+SCENARIOS = Path(__file__).parents[2] / "scenarios"
+TURN = Trapezoid(20.0 * 2.0 * math.pi, math.radians(71.0), math.radians(35.0))
+
+
+def steep_hole() -> Borehole:
+    md = np.array([0.0, 2.0, 4.0, 6.0, 9.0])
+    return Borehole(md, np.array([0.1, 0.5, 1.0, 1.4, 1.6]), np.array([0.2, 0.4, 1.0, 1.2, 1.0]))
+
+
+def motion() -> Motion:
+    return Motion(1000.0, 20.0, 5.0, 30.0, 5.0, TURN, 3, 2.0, 0.7)
+
+
+def perfect() -> TubeTruth:
+    return TubeTruth(steep_hole(), motion(), 0.0, 1.1, 0.05, 9.81)
+
+
+def test_rates_are_the_derivative_of_the_attitude() -> None:
+    truth, h = perfect(), 1e-4
+    for t in np.linspace(1021.0, 1500.0, 60):
+        around = truth.attitude(np.array([t - 2 * h, t - h, t, t + h, t + 2 * h]))
+        slope = (around[0] - 8.0 * around[1] + 8.0 * around[3] - around[4]) / (12.0 * h)
+        skew = around[2].T @ slope
+        numeric = np.array([skew[2, 1], skew[0, 2], skew[1, 0]])
+        np.testing.assert_allclose(truth.rate(np.array([t]))[0], numeric, atol=2e-8)
+
+
+def test_rates_integrated_give_the_attitude_back() -> None:
+    """A sixth-order Magnus integrator on the rates of one tube's drilling, against the attitude itself."""
+    truth, steps = perfect(), 20_000
+    begin, end = 1020.0 + TURN.ramp, 1020.0 + TURN.duration - TURN.ramp  # smooth: between the kinks of the ramps
+    t = np.linspace(begin, end, steps + 1)
+    dt = (end - begin) / steps
+    c = math.sqrt(15.0) / 10.0
+    w1, w2, w3 = (-truth.rate(t[:-1] + dt * (0.5 + s)) for s in (-c, 0.0, c))  # of the transposed attitude
+    a1, a2, a3 = dt * w2, dt * math.sqrt(15.0) / 3.0 * (w3 - w1), dt * 10.0 / 3.0 * (w3 - 2.0 * w2 + w1)
+    c1 = np.cross(a1, a2)
+    c2 = -np.cross(a1, 2.0 * a3 + c1) / 60.0
+    omega = a1 + a3 / 12.0 + np.cross(-20.0 * a1 - a3 + c1, a2 + c2) / 240.0
+    attitude = truth.attitude(np.array([begin]))[0]
+    for vector in omega:
+        angle = float(np.linalg.norm(vector))
+        skew = np.array([[0, -vector[2], vector[1]], [vector[2], 0, -vector[0]], [-vector[1], vector[0], 0]])
+        near = angle < 1e-8
+        s1 = 1.0 if near else math.sin(angle) / angle
+        s2 = 0.5 if near else (1.0 - math.cos(angle)) / angle**2
+        attitude = attitude @ (np.eye(3) - s1 * skew + s2 * skew @ skew)
+    np.testing.assert_allclose(attitude, truth.attitude(np.array([end]))[0], atol=1e-9)
+
+
+def test_specific_force_at_a_stop_resolves_to_the_exact_direction() -> None:
+    world = World(load_scenario(SCENARIOS / "wellbore-1.toml"), 4)
+    for phase in world.phases:
+        if phase.kind != "stop":
+            continue
+        for tube in range(1, phase.tube + 1):
+            t = np.array([phase.start + 20.0])
+            truth = world.truth(tube)
+            direction = resolve(truth.force(t)[0], np.eye(3), float(truth.yaw(t)[0]), 0.0, 0.0)
+            inclination, azimuth = angles(direction.lean, direction.down)
+            station = world.truth_station(world.bit_depth(float(t[0])) - (tube - 1) * 2.0)
+            assert math.degrees(inclination) == pytest.approx(station["inclination_deg"], abs=1e-9)
+            off = math.radians(math.degrees(azimuth) - station["azimuth_deg"])
+            assert abs(wrap(off)) * math.sin(inclination) < 1e-9
+
+
+def test_the_yaw_increment_of_a_cycle_is_exact() -> None:
+    truth = perfect()
+    ends = 1000.0 + PERIOD * np.arange(1.0, 400.0)
+    rate, _ = truth.cycle_means(ends, PERIOD)
+    turned = np.diff(truth.yaw(np.concatenate([ends[:1] - PERIOD, ends])))
+    straight = TubeTruth(
+        Borehole(np.array([0.0, 9.0]), np.array([0.5, 0.5]), np.array([1.0, 1.0])), motion(), 0.0, 1.1, 0.0, 9.81
+    )
+    exact, _ = straight.cycle_means(ends, PERIOD)
+    np.testing.assert_allclose(exact[:, 2] * PERIOD, turned, atol=1e-12)
+    assert np.abs(rate[:, 2] * PERIOD - turned).max() < 1e-2
+
+
+def test_an_accelerometer_off_the_axis_feels_the_circle() -> None:
+    hole = Borehole(np.array([0.0, 9.0]), np.zeros(2), np.zeros(2))
+    still, moving = TubeTruth(hole, motion(), 0.0, 0.0, 0.0, 9.81), TubeTruth(hole, motion(), 0.0, 0.0, 0.05, 9.81)
+    t = np.array([1060.0])
+    felt = moving.force(t)[0] - still.force(t)[0]
+    np.testing.assert_allclose(felt, [-0.05 * math.radians(71.0) ** 2, 0.0, 0.0], atol=1e-12)
+
+
+@settings(max_examples=50)
+@given(st.floats(0.0, 1.0))
+def test_the_time_of_an_angle_is_the_inverse_of_the_turning(part: float) -> None:
+    angle = part * TURN.angle
+    assert float(TURN.turned(np.array([TURN.time_of(angle)]))[0][0]) == pytest.approx(angle, abs=1e-9)
+
+
+def test_a_short_turn_is_all_ramp() -> None:
+    short = Trapezoid(0.01, 1.0, 1.0)
+    angle, rate, _ = short.turned(np.array([short.duration]))
+    assert angle[0] == pytest.approx(0.01)
+    assert rate[0] == 0.0
+
+
+@settings(max_examples=30)
+@given(st.floats(0.0, 1.0))
+def test_the_edge_of_the_encoder_is_the_moment_its_count_changed(part: float) -> None:
+    world = World(load_scenario(SCENARIOS / "rig-3.toml"), 2)
+    t = world.begin + 60.0 + part * (world.end - world.begin - 60.0)
+    count, edge, _ = world.encoder_sample(t)
+    quantum = 2.0 * math.pi / 4096
+    angle = float(world.motion.drive(np.array([t]))[0][0])
+    assert count * quantum - 1e-6 <= angle < (count + 1) * quantum + 1e-6
+    assert edge <= t
+    if edge > world.begin:
+        at_edge = float(world.motion.drive(np.array([edge]))[0][0])
+        assert at_edge == pytest.approx(count * quantum, abs=1e-9)
+
+
+def test_positions_follow_a_circular_arc() -> None:
+    radius, angle = 30.0, np.linspace(0.0, 1.4, 8)
+    hole = Borehole(radius * angle, angle, np.full(8, 0.7))
+    for md in (0.1, 10.0, 33.3, 42.0):
+        out = radius * (1.0 - math.cos(md / radius))
+        expected = [out * math.cos(0.7), out * math.sin(0.7), radius * math.sin(md / radius)]
+        np.testing.assert_allclose(hole.position(md), expected, atol=1e-9)
+        assert hole.direction(md) == pytest.approx((md / radius, 0.7))
+
+
+def test_the_printed_record_is_reproduced() -> None:
+    """Inclination and azimuth of thesis Table 4.1, by the exact rule: the print used another, 0.01 deg apart."""
+    world = World(load_scenario(SCENARIOS / "wellbore-1.toml"), 1)
+    printed = [
+        (2, 0.08, 248.20), (4, 0.32, 243.43), (6, 0.61, 249.44), (8, 0.89, 255.96), (10, 1.32, 257.47),
+        (12, 1.72, 253.07), (14, 2.35, 250.46), (16, 2.78, 252.03), (18, 3.00, 257.62), (20, 3.41, 260.34),
+    ]  # fmt: skip
+    for md, inclination_deg, azimuth_deg in printed:
+        station = world.truth_station(float(md))
+        assert station["inclination_deg"] == pytest.approx(inclination_deg, abs=0.012)
+        assert station["azimuth_deg"] == pytest.approx(azimuth_deg, abs=0.005)

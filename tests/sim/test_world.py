@@ -1,0 +1,96 @@
+"""Sensors, clocks and joints of a world: statistics, determinism, independence."""
+
+import math
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from node.kernels.layout import PERIOD
+from sim.imu_errors import ImuErrors, gauss_markov, quantise
+from sim.scenario import AccelerometerSection, GyroSection, load_scenario
+from sim.world import World, wrap
+from telemetry.messages import BASE, ENCODER, Side
+
+SCENARIO = load_scenario(Path(__file__).parents[2] / "scenarios" / "rig-3.toml")
+
+
+def test_samples_do_not_depend_on_who_asks_first() -> None:
+    one, other = World(SCENARIO, 7), World(SCENARIO, 7)
+    forward = [one.imu_sample(tube, cycle) for tube in (1, 2, 3) for cycle in range(50)]
+    backward = [other.imu_sample(tube, cycle) for tube in (3, 2, 1) for cycle in reversed(range(50))]
+    assert sorted(forward) == sorted(backward)
+    assert one.imu_sample(1, 3) != one.imu_sample(2, 3)
+    assert World(SCENARIO, 8).imu_sample(1, 3) != one.imu_sample(1, 3)
+
+
+def test_gauss_markov_has_its_variance_and_its_correlation_time() -> None:
+    random = np.random.default_rng(1)
+    std, tau = np.array([1.0, 2.0, 0.5]), 15.87
+    process = gauss_markov(random, 400_000, std, tau, PERIOD)
+    np.testing.assert_allclose(process.std(axis=0), std, rtol=0.03)
+    lag = round(tau / PERIOD)
+    correlation = (process[:-lag] * process[lag:]).mean(axis=0) / process.var(axis=0)
+    np.testing.assert_allclose(correlation, math.exp(-lag * PERIOD / tau), atol=0.03)
+
+
+def test_white_noise_is_the_angle_random_walk() -> None:
+    gyro = GyroSection(
+        bias_std_dps=(0.0, 0.0, 0.0),
+        constant_bias_dps=(0.0, 0.0, 0.0),
+        constant_bias_std_dps=0.0,
+        scale_factor_std=0.0,
+        resolution_dps=0.0,
+    )
+    zero = np.zeros((100_000, 3))
+    readings = ImuErrors(gyro, AccelerometerSection()).gyro(np.random.default_rng(1), zero, zero, PERIOD)
+    expected = np.radians(np.array(gyro.noise_dps_rthz)) / math.sqrt(PERIOD)
+    np.testing.assert_allclose(readings.std(axis=0), expected, rtol=0.02)
+
+
+def test_a_gyroscope_saturates_and_has_steps() -> None:
+    rates = np.radians(np.array([[-900.0, 0.0014, 900.0]]))
+    np.testing.assert_allclose(np.degrees(quantise(rates, 0.0026, 500.0)), [[-500.0, 0.0026, 500.0]], atol=1e-9)
+
+
+def test_readings_of_the_marks_explain_the_yaw_but_for_the_systematic_error() -> None:
+    world = World(SCENARIO, 3)
+    for top, t in ((1, 1040.0), (3, world.end - 5.0)):
+        settings = {tube: world.tube_settings(tube) for tube in range(1, top + 1)}
+        head = float(world.motion.drive(np.array([t]))[0][0])
+        for tube in range(1, top + 1):
+            above = sum(settings[k].lower_joint.angle for k in range(tube + 1, top + 1))
+            known = head + settings[top].drive_joint.angle + above
+            off = wrap(known - world.yaw_truth(tube, t) - world.systematic_error(tube, t))
+            assert off == pytest.approx(0.0, abs=1e-9)
+
+
+def test_a_tube_keeps_its_yaw_while_another_is_added_above() -> None:
+    world = World(SCENARIO, 3)
+    added = next(p for p in world.phases if p.kind == "add" and p.tube == 2)
+    assert world.yaw_truth(1, added.start) == world.yaw_truth(1, added.end)
+    before = wrap(world.systematic_error(1, added.joint_closed - 0.1))
+    after = wrap(world.systematic_error(1, added.joint_closed + 0.1))
+    assert before != after  # what is known of it comes through other joints now
+
+
+def test_clocks_differ_and_come_back() -> None:
+    world = World(SCENARIO, 1)
+    assert world.local_clock(ENCODER, 1234.5) == 1234.5
+    for address in (BASE, 1, 2, 3):
+        local = world.local_clock(address, 1234.5)
+        assert local != 1234.5
+        assert world.true_time(address, local) == pytest.approx(1234.5, abs=1e-9)
+
+
+def test_the_air_depends_on_the_port_and_nothing_else() -> None:
+    from sim.air import Air
+
+    one, other = Air(1, 0.003, 0.001, 0.2, 0.1), Air(1, 0.003, 0.001, 0.2, 0.1)
+    upper = [one.deliveries(1, Side.UPPER) for _ in range(3000)]
+    for _ in range(500):
+        other.deliveries(2, Side.LOWER)
+    assert upper == [other.deliveries(1, Side.UPPER) for _ in range(3000)]
+    assert sum(not d for d in upper) / 3000 == pytest.approx(0.2, abs=0.03)
+    assert sum(len(d) == 2 for d in upper) / 3000 == pytest.approx(0.1, abs=0.03)
+    assert min(delay for d in upper for delay in d) >= 0.003

@@ -1,0 +1,53 @@
+"""The repository against its own promises."""
+
+import importlib
+import re
+import tomllib
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).parents[1]
+PACKAGES = ("borechain", "node", "groundstation", "telemetry", "sim")
+
+
+@pytest.mark.parametrize("name", PACKAGES)
+def test_packages_come_from_this_checkout(name: str) -> None:
+    assert Path(str(importlib.import_module(name).__file__)).parent == ROOT / name
+
+
+def test_the_lock_holds_every_dependency_with_a_hash_and_no_address() -> None:
+    lock = (ROOT / "requirements.lock").read_text()
+    assert "://" not in lock
+    pinned = set(re.findall(r"^([a-z0-9-]+)==", lock, re.MULTILINE))
+    project = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]
+    named = [*project["dependencies"], *(d for extra in project["optional-dependencies"].values() for d in extra)]
+    assert {re.split(r"[><=]", d)[0].lower() for d in named} <= pinned
+    assert lock.count("--hash=sha256:") >= len(pinned)
+
+
+def test_documented_keys_are_the_table_of_the_code() -> None:
+    from telemetry.keys import TABLE
+
+    text = (ROOT / "docs" / "keys.md").read_text()
+    documented = re.findall(r"^\| `([^`]+)` \| ([^|]+) \| ([^|]+) \|$", text, re.MULTILINE)
+    assert documented == [(key.template, key.kind, key.meaning) for key in TABLE]
+
+
+def test_every_equation_named_in_a_kernel_is_in_the_document() -> None:
+    text = (ROOT / "docs" / "equations.md").read_text()
+    listed = set(re.findall(r"`(node\.kernels\.[a-z_.]+)`", text))
+    for name in listed:
+        module, _, function = name.rpartition(".")
+        assert hasattr(importlib.import_module(module), function), name
+    assert {
+        "node.kernels.strapdown.yaw_rate",
+        "node.kernels.error_model.propagate",
+        "node.kernels.update.joseph",
+    } <= listed
+
+
+def test_the_readme_has_the_two_commands() -> None:
+    text = (ROOT / "README.md").read_text()
+    assert "make rig" in text
+    assert "make test" in text
