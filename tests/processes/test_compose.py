@@ -1,0 +1,85 @@
+"""Every service of docker-compose.yml, run locally by its own command line."""
+
+import contextlib
+import json
+import math
+import subprocess
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import pytest
+import yaml
+from rigs import PATIENCE, REPOSITORY, command, free_endpoint
+
+from sim.scenario import load_scenario
+from sim.world import World
+from telemetry.media.zenoh_bus import ZenohBus, open_client
+
+SERVICES: dict[str, dict[str, Any]] = yaml.safe_load((REPOSITORY / "docker-compose.yml").read_text())["services"]
+
+
+def local(words: list[str], endpoint: str, folder: Path) -> list[str]:
+    """A service's command line with this machine's address and folder, at forty times real time."""
+    address = endpoint.removeprefix("tcp/")
+    swapped = [w.replace("router:7447", address).replace("0.0.0.0:7447", address) for w in words]
+    swapped = [str(folder) if w == "/state" else w for w in swapped]
+    if "--speed" in swapped:
+        swapped[swapped.index("--speed") + 1] = "40"
+    return command(*swapped)
+
+
+@contextlib.contextmanager
+def services(folder: Path) -> Iterator[tuple[dict[str, subprocess.Popen[str]], str]]:
+    endpoint = free_endpoint()
+    running: dict[str, subprocess.Popen[str]] = {}
+    try:
+        for name, service in SERVICES.items():
+            words = local([str(word) for word in service["command"]], endpoint, folder / name)
+            running[name] = subprocess.Popen(words, cwd=REPOSITORY, stderr=subprocess.PIPE, text=True)
+        yield running, endpoint
+    finally:
+        for process in running.values():
+            process.kill()
+            process.communicate()
+
+
+def ask(bus: ZenohBus, path: str) -> Any:
+    replies = [r for r in bus.get(f"borechain/*/ground/{path}", 10.0) if r.error is None]
+    return json.loads(replies[0].payload) if replies else {}
+
+
+def test_the_services_drill_two_tubes_together_and_end_when_asked(tmp_path: Path) -> None:
+    with services(tmp_path) as (running, endpoint), open_client(endpoint, timeout=PATIENCE) as bus:
+        while ask(bus, "status").get("measurements") != 3:
+            ended = {name: p.communicate()[1] for name, p in running.items() if p.poll() is not None}
+            assert not ended
+        stations = ask(bus, "stations")["stations"]
+        assert [s["measurements"] for s in stations] == [2, 1]
+        world = World(load_scenario(REPOSITORY / "scenarios" / "compose-2.toml"), 1)
+        for station in stations:
+            truth = world.truth_station(station["md_m"])
+            assert station["inclination_deg"] == pytest.approx(truth["inclination_deg"], abs=0.03)
+        for name, process in reversed(running.items()):
+            process.terminate()
+            _, errors = process.communicate(timeout=30.0)
+            assert process.returncode == 0, (name, errors)
+            assert errors == ""
+
+
+def test_the_joint_readings_are_those_of_the_scenario() -> None:
+    world = World(load_scenario(REPOSITORY / "scenarios" / "compose-2.toml"), 1)
+    for tube in (1, 2):
+        words = [str(word) for word in SERVICES[f"node-{tube}"]["command"]]
+        settings = world.tube_settings(tube)
+        readings = {"--drive-joint-deg": settings.drive_joint.angle}
+        if tube > 1:
+            readings["--lower-joint-deg"] = settings.lower_joint.angle
+        for option, angle in readings.items():
+            given = next(word for word in words if word.startswith(option)).partition("=")[2]
+            assert float(given) == pytest.approx(math.degrees(angle), abs=1e-3)
+
+
+def test_the_compose_file_has_a_router_encoder_medium_two_nodes_and_ground() -> None:
+    assert {name.split("-")[0] for name in SERVICES} == {"router", "encoder", "medium", "node", "ground"}
+    assert len(SERVICES) == 6
