@@ -25,7 +25,6 @@ class Key:
 PORT: Final = "borechain/{rig}/port/{tube}/{side}/{direction}"
 STEP: Final = "borechain/{rig}/bench/{process}/step"
 DONE: Final = "borechain/{rig}/bench/{process}/done"
-ATTACH: Final = "borechain/{rig}/bench/{process}/attach"
 WANTED: Final = "borechain/{rig}/bench/wanted"
 DEPTH: Final = "borechain/{rig}/surface/depth"
 LIVELINESS: Final = "borechain/{rig}/@liveliness/{process}"
@@ -33,11 +32,10 @@ GROUND: Final = "borechain/{rig}/ground/{path}"
 COMMAND: Final = "borechain/{rig}/cmd/{name}"
 
 TABLE: Final[tuple[Key, ...]] = (
-    Key(PORT, "publish", "hop-by-hop link: frames of one tube end; side upper|lower, direction tx|rx"),
+    Key(PORT, "publish", "hop-by-hop link: frames of one tube end; side upper or lower, direction tx or rx"),
     Key(DEPTH, "publish", "measured depth of the bit from tally and block position (msgpack: rig time, metres)"),
     Key(STEP, "publish", "bench: an outside clock hands one process its next step"),
     Key(DONE, "publish", "bench: the process has finished the step"),
-    Key(ATTACH, "publish", "bench: a process announces itself to the outside clock"),
     Key(WANTED, "publish", "bench: the processes that ought to be alive now"),
     Key(LIVELINESS, "liveliness", "token of a living process"),
     Key("borechain/{rig}/ground/status", "query, publish", "rig time, depth, counts, health"),
