@@ -30,9 +30,8 @@ def plain_faults(command: Callable[P, R]) -> Callable[P, R]:
     @functools.wraps(command)
     def guarded(*args: P.args, **kwargs: P.kwargs) -> R:
         from groundstation.errors import GroundError
-        from sim.errors import ScenarioError, SimError
-
         from node.errors import ConfigurationError, NodeError
+        from sim.errors import ScenarioError, SimError
         from telemetry.errors import TelemetryError
 
         try:

@@ -23,9 +23,9 @@ from node.process.tube_process import TubeProcess
 from sim.errors import SimError
 from telemetry import keys
 from telemetry.errors import TelemetryError
-from telemetry.media.stepped import BenchClient, Stepped, serve
+from telemetry.media.stepped import BenchClient, Stepped, serve, zenoh_ports
 from telemetry.media.zenoh_bus import open_client, open_router
-from telemetry.messages import BASE, ENCODER
+from telemetry.messages import BASE, ENCODER, Side
 
 PR_SET_PDEATHSIG = 1
 CONNECT_TIMEOUT = 30.0  # wall s
@@ -55,7 +55,7 @@ def run_on_bench(name: str, place: Place, address: int, build: Callable[[], Step
     begin_process(name)
     with reporting(name), open_client(place.endpoint, timeout=CONNECT_TIMEOUT) as bus:
         process = build()
-        client = BenchClient(bus, place.rig, address)
+        client = BenchClient(bus, place.rig, address, zenoh_ports(bus, place.rig, address, Side))
         on_termination(client.stop)
         serve(process, client)
 
@@ -69,7 +69,8 @@ def run_ground(place: Place, tube_length: float) -> None:
     with reporting("ground"), open_client(place.endpoint, timeout=CONNECT_TIMEOUT) as bus:
         process = GroundProcess(GroundConfig(rig=place.rig, folder=place.folder, tube_length=tube_length))
         with process.serving(bus):
-            client = BenchClient(bus, place.rig, BASE, hears_depth=True)
+            ports = zenoh_ports(bus, place.rig, BASE, [Side.LOWER])
+            client = BenchClient(bus, place.rig, BASE, ports, hears_depth=True)
             on_termination(client.stop)
             serve(process, client)
 

@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-import groundstation.process
-import sim.world
-
 import borechain.processes
+import groundstation.process
 import sim.bench
 import sim.medium
+import sim.world
 from node.kernels.warm import warm_up
 
 warm_up()

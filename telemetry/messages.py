@@ -66,7 +66,6 @@ class NodeFlag(enum.IntFlag):
     RESTORED = 16
     CLOCK_UNSYNCHRONISED = 32
     BIAS_UNKNOWN = 64
-    MOVED_DURING_STOP = 128
 
 
 @dataclass(frozen=True, slots=True)

@@ -27,7 +27,7 @@ class TubeSettings:
     lower_joint: Joint = Joint()  # to the tube below
     mount_std: float = 0.0  # rad, IMU against the tube's marks, about the tube axis
     scheme: Scheme = Scheme.FORWARD
-    state_every: int = 3  # cycles between two reports
+    state_every: int = 2  # cycles from one report to the next
     aiding_old_after: float = 3.0  # s
 
     def __post_init__(self) -> None:

@@ -132,7 +132,7 @@ class Tube:
             yield self._survey(reading.end, around)
         if self.settings.scheme is Scheme.ESTIMATE and self.state["yaw_known"]:
             yield self._estimate(around)
-        if status or self._cycles % self.settings.state_every == 0:
+        if status & ~Status.AIDED or self._cycles % self.settings.state_every == 0:
             yield self._report(reading.end, around)
 
     def boot_event(self, rig_now: float) -> Event:

@@ -1,18 +1,26 @@
-"""The contract of a medium: frames go out at one end of a joint and come in at the other, or do not.
+"""The contract of a medium: one end of a joint takes frames to send and hands over frames that came.
 
-A medium knows nothing of what frames mean. CAN becomes a second one by offering the same two calls.
+A medium knows nothing of what frames mean, and may lose, repeat, delay and reorder them. zenoh is one
+(``zenoh_bus.ZenohPort``); CAN becomes another by offering the same two calls.
 """
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import Protocol
 
 
 class Port(Protocol):
-    """One end of a joint."""
+    """One end of a joint on some bus."""
 
-    def send(self, frame: bytes, now: float) -> None:
-        """Put a frame on the wire at ``now`` (s)."""
+    def send(self, frame: bytes) -> None:
+        """Put a frame on the wire.
 
-    def receive(self, now: float) -> list[bytes]:
-        """Frames that have arrived by ``now`` (s), in the order of arrival."""
+        Raises
+        ------
+        MediumError
+            When the bus is lost.
+        """
+
+    def listen(self, deliver: Callable[[bytes], None]) -> None:
+        """Call ``deliver`` for every frame that arrives, possibly on a foreign thread."""

@@ -1,4 +1,4 @@
-"""A joint inside one process, with its troubles as plain fields. For tests and for simulations without processes."""
+"""A joint inside one process, with its troubles as plain fields and its time from outside. For tests of protocols."""
 
 from __future__ import annotations
 

@@ -11,16 +11,18 @@ from __future__ import annotations
 import math
 import queue
 from collections import deque
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from enum import IntEnum
+from functools import partial
 from typing import Any, Protocol
 
 import msgpack
 
 from telemetry import keys
 from telemetry.errors import MediumError
-from telemetry.media.zenoh_bus import ZenohBus
+from telemetry.media.medium import Port
+from telemetry.media.zenoh_bus import ZenohBus, ZenohPort
 from telemetry.messages import Side, address_name
 
 
@@ -90,22 +92,30 @@ def unpack_done(payload: bytes) -> tuple[int, list[Sent], float]:
 
 
 class BenchClient:
-    """A process's end of the bench: its ports, its steps, its liveliness token."""
+    """A process's end of the bench: its ports, its steps, its liveliness token.
+
+    Parameters
+    ----------
+    bus, rig, address : where the steps come from and who this is
+    ports : the ends of the tube, on whatever medium carries frames
+    hears_depth : whether the rig's depth is for this process
+    """
 
     STEP, UPPER, LOWER, DEPTH, STOP = range(5)
 
-    def __init__(self, bus: ZenohBus, rig: str, address: int, *, hears_depth: bool = False) -> None:
-        self._bus = bus
+    def __init__(
+        self, bus: ZenohBus, rig: str, address: int, ports: Mapping[Side, Port], *, hears_depth: bool = False
+    ) -> None:
         name = address_name(address)
         self._arrived: queue.SimpleQueue[tuple[int, bytes]] = queue.SimpleQueue()
         self._waiting: tuple[deque[bytes], ...] = tuple(deque() for _ in range(5))
         self._done = bus.publisher(keys.DONE.format(rig=rig, process=name))
-        self._tx = {side: bus.publisher(port_key(rig, address, side, "tx")) for side in Side}
-        for side in Side:
-            self._listen(port_key(rig, address, side, "rx"), self.UPPER + int(side))
-        self._listen(keys.STEP.format(rig=rig, process=name), self.STEP)
+        self._ports = ports
+        for side, port in ports.items():
+            port.listen(partial(self._arrive, self.UPPER + int(side)))
+        bus.subscribe(keys.STEP.format(rig=rig, process=name), lambda _key, step: self._arrive(self.STEP, step))
         if hears_depth:
-            self._listen(keys.DEPTH.format(rig=rig), self.DEPTH)
+            bus.subscribe(keys.DEPTH.format(rig=rig), lambda _key, depth: self._arrive(self.DEPTH, depth))
         bus.liveliness_token(keys.LIVELINESS.format(rig=rig, process=name))
 
     def stop(self) -> None:
@@ -129,14 +139,14 @@ class BenchClient:
 
     def send(self, side: Side, frame: bytes) -> None:
         """Put a frame on the wire of one end."""
-        self._tx[side].put(frame)
+        self._ports[side].send(frame)
 
     def finish(self, number: int, sent: list[Sent], wake_at: float) -> None:
         """Answer the step."""
         self._done.put(pack_done(number, sent, wake_at))
 
-    def _listen(self, key: str, channel: int) -> None:
-        self._bus.subscribe(key, lambda _key, payload: self._arrived.put((channel, payload)))
+    def _arrive(self, channel: int, payload: bytes) -> None:
+        self._arrived.put((channel, payload))
 
     def _take(self, channel: int) -> bytes | None:
         waiting = self._waiting[channel]
@@ -146,6 +156,13 @@ class BenchClient:
                 return None
             self._waiting[arrived].append(payload)
         return waiting.popleft()
+
+
+def zenoh_ports(bus: ZenohBus, rig: str, address: int, sides: Iterable[Side]) -> dict[Side, Port]:
+    """Ends of a tube on zenoh's port keys."""
+    return {
+        side: ZenohPort(bus, port_key(rig, address, side, "tx"), port_key(rig, address, side, "rx")) for side in sides
+    }
 
 
 def port_key(rig: str, address: int, side: Side, direction: str) -> str:

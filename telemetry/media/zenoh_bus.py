@@ -130,6 +130,23 @@ class ZenohBus:
         self._session.close()  # type: ignore[no-untyped-call]
 
 
+class ZenohPort:
+    """One end of a joint on two keys, see ``medium.Port``."""
+
+    def __init__(self, bus: ZenohBus, send_key: str, receive_key: str) -> None:
+        self._bus = bus
+        self._publisher = bus.publisher(send_key, encoding="application/octet-stream")
+        self._receive_key = receive_key
+
+    def send(self, frame: bytes) -> None:
+        """Put a frame on the wire."""
+        self._publisher.put(frame)
+
+    def listen(self, deliver: Callable[[bytes], None]) -> None:
+        """Call ``deliver`` on a foreign thread for every frame that arrives."""
+        self._bus.subscribe(self._receive_key, lambda _key, frame: deliver(frame))
+
+
 @contextmanager
 def open_router(endpoint: str) -> Iterator[ZenohBus]:
     """Session in router mode that listens on ``endpoint`` and serves the others; no router program is needed.
