@@ -11,7 +11,7 @@ import numpy as np
 from node.firmware.settings import TubeSettings
 from node.kernels.angles import from_binary, wrap
 from node.kernels.cycle import run_cycle
-from node.kernels.layout import DEG, Array, Err, Scheme, Status
+from node.kernels.layout import DEG, Array, Err, Scheme, Status, new_state
 from node.kernels.relay import offer_aiding
 from telemetry.messages import (
     Aiding,
@@ -34,7 +34,8 @@ EVENT_OF_STATUS: tuple[tuple[Status, str, Severity], ...] = (
     (Status.YAW_RESET, "yaw_reset", Severity.WARNING),
     (Status.RATE_EXCEEDED, "rate_exceeded", Severity.ERROR),
     (Status.RATE_RECOVERED, "rate_recovered", Severity.WARNING),
-    (Status.NUMERIC_FAULT, "numeric_fault", Severity.ERROR),
+    (Status.BAD_SAMPLE, "bad_sample", Severity.ERROR),
+    (Status.FILTER_FAULT, "filter_fault", Severity.ERROR),
 )
 
 
@@ -74,6 +75,7 @@ class Tube:
         self, settings: TubeSettings, config: Array, state: Array, next_sequence: Callable[[], int], *, restored: bool
     ) -> None:
         self.settings = settings
+        self._configs = config
         self.config = config[0]
         self.state = state[0]
         self._next_sequence = next_sequence
@@ -82,6 +84,7 @@ class Tube:
         self._overruns = 0
         self._rate, self._force = np.zeros(3), np.zeros(3)
         self._rejecting = False
+        self._noticed = Status.NONE  # between cycles
 
     def on_aiding(self, aiding: Aiding, valid_local: float) -> Aiding | None:
         """Take the reference from the upper end, valid at ``valid_local`` (s, own clock); returns what goes down.
@@ -91,17 +94,19 @@ class Tube:
         joint = self.settings.drive_joint if aiding.hops == 0 else None
         offset = wrap(aiding.offset + (joint.angle if joint else 0.0))
         systematic_var = aiding.systematic_var + (joint.std**2 if joint else 0.0)
-        offer_aiding(
-            self.state,
-            self.config,
-            aiding.yaw,
-            aiding.yaw_var,
-            systematic_var,
-            offset,
-            aiding.rate,
-            valid_local,
-            aiding.sequence,
-            aiding.hops,
+        self._noticed |= Status(
+            offer_aiding(
+                self.state,
+                self.config,
+                aiding.yaw,
+                aiding.yaw_var,
+                systematic_var,
+                offset,
+                aiding.rate,
+                valid_local,
+                aiding.sequence,
+                aiding.hops,
+            )
         )
         if self.settings.scheme is not Scheme.FORWARD:
             return None
@@ -121,12 +126,14 @@ class Tube:
         self._force[:] = reading.force
         if self._cycles and reading.start - self.state["now"] > 0.5 * (reading.end - reading.start):
             self._overruns += 1
-        status = Status(
-            run_cycle(
-                self.state, self.config, self._rate, self._force, reading.start, reading.end, 1 if around.joined else 0
-            )
+        joined = 1 if around.joined else 0
+        status = self._noticed | Status(
+            run_cycle(self.state, self.config, self._rate, self._force, reading.start, reading.end, joined)
         )
+        self._noticed = Status.NONE
         self._cycles += 1
+        if Status.FILTER_FAULT in status:
+            self._start_over()
         yield from self._events(status, around)
         if Status.SURVEY_READY in status:
             yield self._survey(reading.end, around)
@@ -189,6 +196,13 @@ class Tube:
             sigmas = abs(float(self.state["innovation"])) / math.sqrt(float(self.state["innovation_var"]))
             yield self._event("aiding_rejected", Severity.WARNING, around.rig_now, {"sigmas": sigmas})
         self._rejecting = rejecting
+
+    def _start_over(self) -> None:
+        """A covariance that is none: begin again from nothing but the constant bias."""
+        keep = {name: self.state[name].copy() for name in ("static_bias", "static_bias_var", "mode")}
+        fresh = new_state(self._configs)[0]
+        for name in fresh.dtype.names or ():
+            self.state[name] = keep.get(name, fresh[name])
 
     def _event(self, code: str, severity: Severity, rig_now: float, arguments: dict[str, Scalar]) -> Event:
         return Event(self.settings.tube, self._next_sequence(), rig_now, severity, code, arguments)

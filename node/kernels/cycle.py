@@ -10,7 +10,7 @@ from node.kernels.jit import kernel
 from node.kernels.layout import STATES, Array, Status
 from node.kernels.modes import STATIC_BIAS, guard_rate, is_quiet, learn_static_bias, step_modes
 
-NUMERIC_FAULT = int(Status.NUMERIC_FAULT)
+BAD_SAMPLE, FILTER_FAULT = int(Status.BAD_SAMPLE), int(Status.FILTER_FAULT)
 
 
 @kernel
@@ -27,7 +27,7 @@ def run_cycle(state: Any, config: Any, rate: Array, force: Array, start: float, 
     """
     for k in range(3):
         if not (math.isfinite(rate[k]) and math.isfinite(force[k])):
-            return NUMERIC_FAULT
+            return BAD_SAMPLE
     quiet = is_quiet(state, config, rate)
     status = guard_rate(state, config, rate[2])
     push(state, start, end, rate, force, quiet)
@@ -38,5 +38,5 @@ def run_cycle(state: Any, config: Any, rate: Array, force: Array, start: float, 
     status |= step_modes(state, config, quiet, joined, end)
     for i in range(STATES):
         if not (state.P[i, i] >= 0.0 and math.isfinite(state.P[i, i])):
-            return status | NUMERIC_FAULT
+            return status | FILTER_FAULT
     return status

@@ -46,8 +46,9 @@ class Status(enum.IntFlag):
     RATE_EXCEEDED = 128
     RATE_RECOVERED = 256
     REFERENCE_CHANGED = 512
-    NUMERIC_FAULT = 1024
+    BAD_SAMPLE = 1024
     LATE_DROPPED = 2048
+    FILTER_FAULT = 4096
 
 
 class Scheme(enum.IntEnum):

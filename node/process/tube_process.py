@@ -60,6 +60,7 @@ class TubeProcess:
                 self._on_aiding(message, now)
             elif isinstance(message, Command):
                 self.station.reply(self._obey(message), now)
+                self._save()
 
     def on_cycle(self, data: Any, now: float) -> None:
         """The IMU delivered a cycle: ``data`` is start (s), three rates (rad/s), three forces (m/s^2)."""

@@ -223,5 +223,5 @@ def test_a_sample_that_is_no_number_changes_nothing(bad: float) -> None:
     status = run_cycle(
         bench.record, bench.config[0], np.array([0, 0, bad]), np.zeros(3), bench.now, bench.now + PERIOD, 1
     )
-    assert Status(status) == Status.NUMERIC_FAULT
+    assert Status(status) == Status.BAD_SAMPLE
     assert bench.state.tobytes() == before

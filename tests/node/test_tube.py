@@ -135,5 +135,28 @@ def test_a_sample_that_is_no_number_is_an_event() -> None:
     around = Surroundings(True, 1, life.now, 1e-8, True)
     reading = ImuReading(life.now, life.now + PERIOD, (math.nan, 0.0, 0.0), (0.0, 0.0, 0.0))
     codes = [m.code for m in life.tube.on_cycle(reading, around) if isinstance(m, Event)]
-    assert codes == ["numeric_fault"]
+    assert codes == ["bad_sample"]
     assert np.isfinite(life.tube.yaw)
+
+
+def test_a_chain_made_up_anew_is_an_event() -> None:
+    life = Life(tube())
+    life.cycles(110)
+    life.tube.on_aiding(replace(AIDING, hops=1, offset=DRIVE.angle, systematic_var=1e-6), life.now)
+    around = Surroundings(True, 2, life.now + PERIOD, 1e-8, True)
+    reading = ImuReading(life.now, life.now + PERIOD, (0.0, 0.0, 0.0), (0.0, 0.0, -9.8))
+    codes = [m.code for m in life.tube.on_cycle(reading, around) if isinstance(m, Event)]
+    assert codes == ["reference_changed"]
+
+
+def test_a_broken_covariance_is_an_event_and_the_filter_starts_over() -> None:
+    life = Life(tube())
+    life.cycles(110)
+    bias = life.tube.state["static_bias"].copy()
+    life.tube.state["P"][2, 2] = math.nan
+    codes = [m.code for m in life.cycles(2) if isinstance(m, Event)]
+    assert "filter_fault" in codes
+    np.testing.assert_array_equal(life.tube.state["static_bias"], bias)
+    life.cycles(20, rate=1.2)
+    off = life.tube.yaw - (life.angle + DRIVE.angle)
+    assert math.remainder(off, 2 * math.pi) == pytest.approx(0.0, abs=1e-3)
