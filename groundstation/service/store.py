@@ -66,15 +66,18 @@ class Store:
 
     def __init__(self, url: str) -> None:
         self._where = url.removeprefix("sqlite:///")
+        self._engine = sa.create_engine(url)
         try:
-            if url.startswith("sqlite:///"):
-                Path(self._where).parent.mkdir(parents=True, exist_ok=True)
-            self._engine = sa.create_engine(url)
             if self._engine.dialect.name == "sqlite":
+                Path(self._where).parent.mkdir(parents=True, exist_ok=True)
                 sa.event.listen(self._engine, "connect", _durable)
             METADATA.create_all(self._engine)
             self.boots = self._begin()
+        except StoreError:
+            self.close()
+            raise
         except (sa.exc.SQLAlchemyError, OSError) as error:
+            self.close()
             reason = str(getattr(error, "orig", None) or getattr(error, "strerror", None) or error)
             raise StoreError(
                 f"database {self._where}: {reason}; choose a writable --folder or another database"

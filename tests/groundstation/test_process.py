@@ -4,7 +4,7 @@ import contextlib
 import json
 import math
 import socket
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
 
@@ -97,6 +97,20 @@ def refused(bus: ZenohBus, selector: str) -> str:
 
 
 @pytest.fixture
+def start(tmp_path: Path) -> Iterator[Callable[[], Rig]]:
+    """Start a ground station in the same folder, once more each time; all are closed in the end."""
+    started: list[Rig] = []
+
+    def make() -> Rig:
+        started.append(Rig(tmp_path))
+        return started[-1]
+
+    yield make
+    for rig in started:
+        rig.ground.store.close()
+
+
+@pytest.fixture
 def rig(tmp_path: Path, buses: tuple[ZenohBus, ZenohBus]) -> Iterator[tuple[Rig, ZenohBus]]:
     """Two tubes, bit at 4 m, one survey at 2 m and two at 4 m."""
     server, operator = buses
@@ -179,14 +193,12 @@ def test_a_silent_node_goes_stale_and_comes_back(rig: tuple[Rig, ZenohBus]) -> N
     assert ask(bus, f"{GROUND}/nodes/1")["stale"] is False
 
 
-def test_a_restart_forgets_and_doubles_nothing(
-    rig: tuple[Rig, ZenohBus], tmp_path: Path, buses: tuple[ZenohBus, ZenohBus]
-) -> None:
+def test_a_restart_forgets_and_doubles_nothing(rig: tuple[Rig, ZenohBus], start: Callable[[], Rig]) -> None:
     it, bus = rig
     it.tube.submit(Event(1, 7, it.now, Severity.INFO, "stopped"), it.now)
     it.run(2.0)
     before = ask(bus, f"{GROUND}/stations")["stations"]
-    again = Rig(tmp_path)
+    again = start()
     again.now = it.now
     knowledge = again.ground.knowledge
     assert [(s.md, s.fusion.count) for s in knowledge.stations] == [(2.0, 2), (4.0, 1)]
@@ -199,20 +211,20 @@ def test_a_restart_forgets_and_doubles_nothing(
     assert before[0]["measurements"] == 2
 
 
-def test_a_survey_from_before_the_restart_finds_its_depth(tmp_path: Path) -> None:
-    first = Rig(tmp_path)
+def test_a_survey_from_before_the_restart_finds_its_depth(start: Callable[[], Rig]) -> None:
+    first = start()
     first.run(3.0)
     first.depth(2.0)
     first.depth(4.0)
     when = first.now
     first.depth(6.0)
     first.ground.store.close()
-    again = Rig(tmp_path)
+    again = start()
     assert again.ground.knowledge.depths.at(when) == 4.0
 
 
-def test_a_survey_without_a_depth_is_kept_and_counted(tmp_path: Path) -> None:
-    rig = Rig(tmp_path)
+def test_a_survey_without_a_depth_is_kept_and_counted(start: Callable[[], Rig]) -> None:
+    rig = start()
     rig.run(3.0)
     rig.survey(1, 1)
     assert rig.ground.knowledge.unplaced == 1

@@ -5,6 +5,7 @@ import signal
 import sqlite3
 import subprocess
 import sys
+from contextlib import closing
 from pathlib import Path
 
 import pytest
@@ -42,17 +43,17 @@ def test_what_was_added_is_there_after_a_restart_once(tmp_path: Path) -> None:
     assert store.add(Event(1, 2, 5.0, Severity.WARNING, "yaw_reset", {"yaw_deg": 3.0}), None)
     store.add_depth(900.0, 2.0)
     store.close()
-    again = Store(url(tmp_path))
-    assert [(s.message.sequence, s.md) for s in again.messages()] == [(1, 2.0), (2, None)]
-    assert not again.add(survey(1, 1), 2.0)
-    assert again.depths() == [(900.0, 2.0)]
-    assert again.boots == store.boots + 1
+    with closing(Store(url(tmp_path))) as again:
+        assert [(s.message.sequence, s.md) for s in again.messages()] == [(1, 2.0), (2, None)]
+        assert not again.add(survey(1, 1), 2.0)
+        assert again.depths() == [(900.0, 2.0)]
+        assert again.boots == store.boots + 1
 
 
 def test_a_tube_that_counts_anew_is_not_taken_for_a_repetition(tmp_path: Path) -> None:
-    store = Store(url(tmp_path))
-    assert store.add(survey(1, 1), 2.0)
-    assert store.add(survey(1, 1, yaw=2.0), 2.0)
+    with closing(Store(url(tmp_path))) as store:
+        assert store.add(survey(1, 1), 2.0)
+        assert store.add(survey(1, 1, yaw=2.0), 2.0)
 
 
 @pytest.mark.parametrize("acknowledged", [3, 40, 150])
@@ -69,7 +70,8 @@ def test_killed_at_any_moment_nothing_acknowledged_is_lost_or_doubled(tmp_path: 
     writer.stdout.close()
     writer.wait()
     last = int(rest[-1]) if rest else last
-    stored = [s.message.sequence for s in Store(url(tmp_path)).messages()]
+    with closing(Store(url(tmp_path))) as store:
+        stored = [s.message.sequence for s in store.messages()]
     assert stored[:last] == list(range(1, last + 1))
     assert len(stored) <= last + 1
 

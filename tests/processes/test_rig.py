@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from rigs import run, running_rig, titles_of_group
+from rigs import free_endpoint, run, running_rig, titles_of_group
 
 from telemetry.media.zenoh_bus import open_client
 
@@ -149,7 +149,8 @@ def scenario(tmp_path: Path) -> Path:
 
 
 def refused(path: Path, *arguments: str) -> subprocess.CompletedProcess[str]:
-    done = run("rig", str(path), *arguments, cwd=path.parent)
+    endpoint = () if "--endpoint" in arguments else ("--endpoint", free_endpoint())
+    done = run("rig", str(path), *endpoint, *arguments, cwd=path.parent)
     assert done.stdout == ""
     assert "Traceback" not in done.stderr
     assert len(done.stderr.strip().splitlines()) == 1, done.stderr
