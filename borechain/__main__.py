@@ -50,7 +50,7 @@ class LazyGroup(click.Group):
 @click.group(cls=LazyGroup, context_settings={"help_option_names": ["-h", "--help"]})
 @click.version_option(__version__)
 def cli() -> None:
-    r"""Sensor nodes of a drill string, their simulator and their ground station.
+    """Sensor nodes of a drill string, their simulator and their ground station.
 
     \b
     Examples:

@@ -14,7 +14,7 @@ from borechain.options import place_options
 @place_options
 @plain_faults
 def encoder(rig_name: str, endpoint: str, folder: Path) -> None:
-    r"""Run the encoder node until it is stopped.
+    """Run the encoder node until it is stopped.
 
     \b
     Example:

@@ -25,7 +25,7 @@ RELAY_COLUMNS = (
 
 @click.group()
 def experiment() -> None:
-    r"""Rerun a published experiment beside ours.
+    """Rerun a published experiment beside ours.
 
     \b
     Example:

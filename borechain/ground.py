@@ -15,7 +15,7 @@ from borechain.options import place_options
 @place_options
 @plain_faults
 def ground(tube_length_m: float, rig_name: str, endpoint: str, folder: Path) -> None:
-    r"""Run the ground station of one rig.
+    """Run the ground station of one rig.
 
     \b
     Example:

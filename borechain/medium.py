@@ -28,7 +28,7 @@ def medium(
     endpoint: str,
     folder: Path,
 ) -> None:
-    r"""Run the world of a scenario for processes that join by their own commands.
+    """Run the world of a scenario for processes that join by their own commands.
 
     \b
     Example:

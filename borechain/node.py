@@ -31,7 +31,7 @@ def node(
     endpoint: str,
     folder: Path,
 ) -> None:
-    r"""Run the node of one tube until it is stopped.
+    """Run the node of one tube until it is stopped.
 
     \b
     Example:

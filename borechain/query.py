@@ -24,7 +24,7 @@ endpoint_option = click.option(
 @click.option("--json", "as_json", is_flag=True, help="One JSON object on one line.")
 @plain_faults
 def query(selector: str, endpoint: str, timeout: float, as_json: bool) -> None:
-    r"""Ask a running ground station for SELECTOR and print its answer.
+    """Ask a running ground station for SELECTOR and print its answer.
 
     \b
     Examples:
@@ -54,7 +54,7 @@ def query(selector: str, endpoint: str, timeout: float, as_json: bool) -> None:
 @click.option("--count", type=click.IntRange(1), help="Stop after so many lines.")
 @plain_faults
 def watch(selector: str, endpoint: str, count: int | None) -> None:
-    r"""Print what is published on SELECTOR, one JSON object a line, until Ctrl-C.
+    """Print what is published on SELECTOR, one JSON object a line, until Ctrl-C.
 
     \b
     Example:

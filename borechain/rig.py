@@ -49,7 +49,7 @@ def rig(
     out: Path | None,
     as_json: bool,
 ) -> None:
-    r"""Drill SCENARIO tube by tube with one real process a tube, and show what the ground station makes of it.
+    """Drill SCENARIO tube by tube with one real process a tube, and show what the ground station makes of it.
 
     \b
     Examples:

@@ -12,7 +12,7 @@ from telemetry import keys
 @click.option("--endpoint", default=keys.DEFAULT_ENDPOINT, show_default=True, help="Where to listen.")
 @plain_faults
 def router(endpoint: str) -> None:
-    r"""Be the zenoh router of a rig.
+    """Be the zenoh router of a rig.
 
     \b
     Example:

@@ -8,13 +8,13 @@ import threading
 from collections.abc import Iterator
 from concurrent.futures import Future
 from concurrent.futures import TimeoutError as FutureTimeoutError
-from typing import Any
 
 from groundstation.config import GroundConfig
 from groundstation.service.core import Knowledge
 from groundstation.service.queries import Queries, pack
 from groundstation.service.store import Store
 from telemetry import keys
+from telemetry.application.driven import Driven
 from telemetry.application.station import Station
 from telemetry.media.zenoh_bus import Query, ZenohBus
 from telemetry.messages import BASE, MAX_TUBE, Command, Event, Message, NodeState, Reply, Side, SurveyMeasurement
@@ -24,7 +24,7 @@ COMMANDS = ("take_survey",)
 BOOT_SHIFT = 20
 
 
-class GroundProcess:
+class GroundProcess(Driven):
     """Everything the ground station does at each event of its link; operators ask at any time, on other threads.
 
     Parameters
@@ -68,9 +68,6 @@ class GroundProcess:
         for received in self.station.receive(side, frame, now):
             self._take(received.message, now)
 
-    def on_cycle(self, data: Any, now: float) -> None:
-        """The ground station has no sensor."""
-
     def on_depth(self, rig_time: float, md: float) -> None:
         """The rig measured the depth of the bit."""
         with self._lock:
@@ -86,15 +83,7 @@ class GroundProcess:
                 command, outcome = self._orders.get_nowait()
                 self._ordered[command.sequence] = outcome
                 self.station.command(command, now)
-        self.station.advance(now)
-
-    def take_frames(self, now: float) -> list[tuple[Side, bytes]]:
-        """Frames to send now."""
-        return self.station.take_frames(now)
-
-    def next_wake(self, now: float) -> float:
-        """Local time of the next timer."""
-        return self.station.next_wake(now)
+        super().on_timer(now)
 
     def _take(self, message: Message, now: float) -> None:
         if isinstance(message, NodeState):

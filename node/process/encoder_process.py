@@ -7,11 +7,12 @@ from typing import Any
 
 from node.firmware.encoder import EncoderNode, EncoderSample
 from node.process.counter import BootCounter
+from telemetry.application.driven import Driven
 from telemetry.application.station import Station
 from telemetry.messages import ENCODER, Command, Reply, Side
 
 
-class EncoderProcess:
+class EncoderProcess(Driven):
     """Encoder node on the drive head: upper end to the base station, lower end to the top tube."""
 
     def __init__(self, folder: Path) -> None:
@@ -33,18 +34,3 @@ class EncoderProcess:
         aiding = self.encoder.on_cycle(EncoderSample(int(count), edge_at, bool(rising)), now)
         self.station.send_aiding(aiding, now)
         self.station.advance(now)
-
-    def on_depth(self, rig_time: float, md: float) -> None:
-        """The encoder does not hear the rig's depth."""
-
-    def on_timer(self, now: float) -> None:
-        """A retransmission may be due."""
-        self.station.advance(now)
-
-    def take_frames(self, now: float) -> list[tuple[Side, bytes]]:
-        """Frames to send now."""
-        return self.station.take_frames(now)
-
-    def next_wake(self, now: float) -> float:
-        """Local time of the next timer."""
-        return self.station.next_wake(now)

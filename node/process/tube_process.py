@@ -13,6 +13,7 @@ from node.firmware.settings import TubeSettings
 from node.firmware.tube import ImuReading, Surroundings, Tube
 from node.kernels.layout import Array, default_config, new_state
 from node.process.journal import Journal
+from telemetry.application.driven import Driven
 from telemetry.application.station import Station
 from telemetry.messages import Aiding, Command, Event, NodeState, Reply, Severity, Side, SurveyMeasurement
 
@@ -21,7 +22,7 @@ SYNCHRONISED_STD = 0.02  # s
 MAX_CLOCK_STD = 3600.0
 
 
-class TubeProcess:
+class TubeProcess(Driven):
     """Everything one tube's processor runs, without a clock or a bus of its own.
 
     Parameters
@@ -75,21 +76,6 @@ class TubeProcess:
         self.station.advance(now)
         if urgent or self._cycles % SAVE_EVERY == 0:
             self._save()
-
-    def on_depth(self, rig_time: float, md: float) -> None:
-        """A tube does not hear the rig's depth."""
-
-    def on_timer(self, now: float) -> None:
-        """A retransmission may be due."""
-        self.station.advance(now)
-
-    def take_frames(self, now: float) -> list[tuple[Side, bytes]]:
-        """Frames to send now."""
-        return self.station.take_frames(now)
-
-    def next_wake(self, now: float) -> float:
-        """Local time of the next timer."""
-        return self.station.next_wake(now)
 
     def _on_aiding(self, aiding: Aiding, now: float) -> None:
         clock = self.station.clock

@@ -156,15 +156,11 @@ def open_router(endpoint: str) -> Iterator[ZenohBus]:
     MediumError
         When the endpoint cannot be listened on.
     """
-    config = _config("router")
-    config.insert_json5("listen/endpoints", json.dumps([endpoint]))
-    config.insert_json5("listen/exit_on_failure", "true")
+    settings = {"listen/endpoints": [endpoint], "listen/exit_on_failure": True}
     try:
-        session = zenoh.open(config)
+        session = zenoh.open(_config("router", settings))
     except zenoh.ZError as error:
-        raise MediumError(
-            f"cannot listen on {endpoint}: {error}; is the port taken? choose another --endpoint"
-        ) from error
+        raise MediumError(f"cannot listen on {endpoint}: is it taken, is it tcp/HOST:PORT? see --endpoint") from error
     yield from _held(session)
 
 
@@ -177,13 +173,15 @@ def open_client(endpoint: str, timeout: float) -> Iterator[ZenohBus]:
     MediumError
         When no router answers there.
     """
-    config = _config("client")
-    config.insert_json5("connect/endpoints", json.dumps([endpoint]))
-    config.insert_json5("connect/timeout_ms", str(int(timeout * 1000)))
-    config.insert_json5("connect/exit_on_failure", "true")
-    config.insert_json5("connect/retry", '{"period_init_ms": 50, "period_max_ms": 500, "period_increase_factor": 1.5}')
+    settings = {
+        "listen/endpoints": [],
+        "connect/endpoints": [endpoint],
+        "connect/timeout_ms": int(timeout * 1000),
+        "connect/exit_on_failure": True,
+        "connect/retry": {"period_init_ms": 50, "period_max_ms": 500, "period_increase_factor": 1.5},
+    }
     try:
-        session = zenoh.open(config)
+        session = zenoh.open(_config("client", settings))
     except zenoh.ZError as error:
         raise MediumError(f"no router at {endpoint} within {timeout:g} s: is the rig running there?") from error
     yield from _held(session)
@@ -205,12 +203,12 @@ def _held(session: zenoh.Session) -> Iterator[ZenohBus]:
         bus.close()
 
 
-def _config(mode: str) -> zenoh.Config:
+def _config(mode: str, settings: dict[str, Any]) -> zenoh.Config:
+    """Session settings; nothing is ever looked for on the network."""
     config = zenoh.Config()
-    config.insert_json5("mode", json.dumps(mode))
-    config.insert_json5("scouting/multicast/enabled", "false")
-    config.insert_json5("scouting/gossip/enabled", "false")
-    config.insert_json5("listen/endpoints", "[]")
+    quiet = {"mode": mode, "scouting/multicast/enabled": False, "scouting/gossip/enabled": False}
+    for key, value in (quiet | settings).items():
+        config.insert_json5(key, json.dumps(value))
     return config
 
 

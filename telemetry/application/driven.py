@@ -1,0 +1,32 @@
+"""What every process with a station does when it is driven from outside, whatever it measures or stores."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from telemetry.application.station import Station
+from telemetry.messages import Side
+
+
+class Driven:
+    """Base of a process: hands time and frames to its ``station``; a subclass takes what it can use of the rest."""
+
+    station: Station
+
+    def on_cycle(self, data: Any, now: float) -> None:
+        """A cycle has ended; a process without a sensor has none."""
+
+    def on_depth(self, rig_time: float, md: float) -> None:
+        """The rig measured the depth of the bit (m); most processes do not hear it."""
+
+    def on_timer(self, now: float) -> None:
+        """Let time pass: hello, time requests, repetition."""
+        self.station.advance(now)
+
+    def take_frames(self, now: float) -> list[tuple[Side, bytes]]:
+        """Frames to send now."""
+        return self.station.take_frames(now)
+
+    def next_wake(self, now: float) -> float:
+        """Local time (s) of the next timer."""
+        return self.station.next_wake(now)
