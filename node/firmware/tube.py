@@ -29,6 +29,8 @@ VAR_FLOOR = (0.001 * DEG) ** 2
 EVENT_OF_STATUS: tuple[tuple[Status, str, Severity], ...] = (
     (Status.STOPPED, "stopped", Severity.INFO),
     (Status.STARTED, "started", Severity.INFO),
+    (Status.JOINT_OPENED, "joint_opened", Severity.INFO),
+    (Status.JOINT_CLOSED, "joint_closed", Severity.INFO),
     (Status.BIAS_KNOWN, "bias_known", Severity.INFO),
     (Status.REFERENCE_CHANGED, "reference_changed", Severity.INFO),
     (Status.YAW_RESET, "yaw_reset", Severity.WARNING),

@@ -49,6 +49,8 @@ class Status(enum.IntFlag):
     BAD_SAMPLE = 1024
     LATE_DROPPED = 2048
     FILTER_FAULT = 4096
+    JOINT_OPENED = 8192
+    JOINT_CLOSED = 16384
 
 
 class Scheme(enum.IntEnum):

@@ -13,6 +13,7 @@ BX = int(Err.BIAS_X)
 PSI = int(Err.YAW)
 STATIC_BIAS, TRACKING, STILL, SURVEY, HELD = 1, 3, 4, 5, 6  # telemetry.messages.Mode, which kernels do not see
 STOPPED, STARTED, SURVEY_READY = int(Status.STOPPED), int(Status.STARTED), int(Status.SURVEY_READY)
+JOINT_OPENED, JOINT_CLOSED = int(Status.JOINT_OPENED), int(Status.JOINT_CLOSED)
 BIAS_KNOWN, RATE_EXCEEDED, RATE_RECOVERED = (
     int(Status.BIAS_KNOWN),
     int(Status.RATE_EXCEEDED),
@@ -79,20 +80,23 @@ def guard_rate(state: Any, config: Any, rate_z: float) -> int:
 @kernel
 def step_modes(state: Any, config: Any, quiet: int, joined: int, end: float) -> int:
     """Move between tracking, still, survey and held at the end of a cycle (s, node's clock); returns status bits."""
+    status = JOINT_CLOSED if state.mode == HELD and (joined == 1 or quiet == 0) else 0
     if quiet == 0:
-        started = state.still_cycles > 0
+        if state.still_cycles > 0:
+            status |= STARTED
         state.still_cycles = 0
         state.surveyed = 0
         if state.mode != STATIC_BIAS:
             state.mode = TRACKING
-        return STARTED if started else 0
-    status = 0
+        return status
     if state.still_cycles == 0:
         state.stopped_at = end
-        status = STOPPED
+        status |= STOPPED
     state.still_cycles += 1
     if state.mode == STATIC_BIAS:
         return status
+    if joined == 0 and state.mode != HELD:
+        status |= JOINT_OPENED
     state.mode = STILL if joined == 1 else HELD
     if state.surveyed == 0 and joined == 1 and state.still_cycles >= config.settle_cycles:
         average_force(state, config.survey_samples)

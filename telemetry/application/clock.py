@@ -2,8 +2,8 @@
 
 Each node compares its own crystal with its neighbour's own crystal, two free-running clocks, by a two-state Kalman
 filter (offset, drift); rig time is then the neighbour's account of it, carried over that comparison. Comparing with
-the neighbour's filtered rig time instead would cascade the filters: each sees the corrections of all above it as
-drift and overshoots, which grew to 3 ms at ten hops where this way stays near 0.2 ms.
+the neighbour's filtered rig time instead would cascade the filters: each takes the corrections of all above it for
+drift and overshoots, so that errors grow with the hops instead of adding up.
 
 An exchange asked at t1, received t2, replied t3, back t4 measures ((t2 - t1) + (t3 - t4)) / 2, wrong by half the
 difference of its two delays.

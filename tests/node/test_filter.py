@@ -209,10 +209,12 @@ def test_a_stop_gives_one_survey_after_the_moving_average_has_settled() -> None:
 def test_while_the_joint_is_open_the_node_holds_its_yaw() -> None:
     bench = Bench(bias_z=0.01 * DEG)
     bench.stand(110)
-    for _ in range(200):
-        bench.cycle(joined=0)
+    held = [bench.cycle(joined=0) for _ in range(200)]
+    assert [Status.JOINT_OPENED in status for status in held] == [True] + [False] * 199
     assert bench.record["mode"] == Mode.HELD
     assert abs(bench.error_deg()) < 0.01
+    assert Status.JOINT_CLOSED in bench.cycle()
+    assert bench.record["mode"] == Mode.STILL
 
 
 @pytest.mark.parametrize("bad", [math.nan, math.inf, -math.inf])

@@ -153,3 +153,11 @@ def test_the_printed_record_is_reproduced() -> None:
         station = world.truth_station(float(md))
         assert station["inclination_deg"] == pytest.approx(inclination_deg, abs=0.012)
         assert station["azimuth_deg"] == pytest.approx(azimuth_deg, abs=0.005)
+
+
+def test_a_homokinetic_joint_and_a_parallel_transport_agree_over_the_record() -> None:
+    """The solid angle sum (1 - cos I) dA, by which the two kinds of string differ: docs/frames.md."""
+    hole = load_scenario(SCENARIOS / "wellbore-1.toml").hole
+    directions = np.array([hole.direction(md) for md in np.linspace(0.5, 20.0, 400)])
+    turned = np.diff(np.unwrap(directions[:, 1])) * (1.0 - np.cos(directions[1:, 0]))
+    assert math.degrees(np.abs(np.cumsum(turned)).max()) < 0.02

@@ -1,0 +1,93 @@
+"""Rig time down a chain of clocks that differ, over exchanges whose delays jitter."""
+
+import math
+
+import numpy as np
+import pytest
+
+from telemetry.application.clock import ClockFilter
+from telemetry.messages import TimeReply
+
+HOPS, LATENCY, JITTER = 10, 3e-3, 0.3e-3
+
+
+class Clocks:
+    """Ten nodes one below the other, each asking the one above: every second at first, every ten later."""
+
+    def __init__(self, seed: int) -> None:
+        self.random = np.random.default_rng(seed)
+        self.offset = 20.0 * self.random.standard_normal(HOPS)
+        self.drift = 10e-6 * self.random.standard_normal(HOPS)
+        self.filters = [ClockFilter() for _ in range(HOPS)]
+        self.root = ClockFilter(is_root=True)
+        self.next = [1000.0 + 0.05 * k for k in range(HOPS)]
+
+    def local(self, k: int, t: float) -> float:
+        return t if k < 0 else t + self.offset[k] + self.drift[k] * (t - 1000.0)
+
+    def clock(self, k: int) -> ClockFilter:
+        return self.root if k < 0 else self.filters[k]
+
+    def ask(self, k: int, t: float) -> None:
+        there, back = LATENCY + JITTER * self.random.standard_exponential(2)
+        above = self.clock(k - 1)
+        if above.synchronised:
+            at = self.local(k - 1, t + there)
+            reply = TimeReply(self.local(k, t), at, at, above.rig_from_local(at), above.rig_rate, above.variance(at))
+            self.filters[k].exchange(reply, self.local(k, t + there + back))
+
+    def run(self, duration: float) -> tuple[np.ndarray, np.ndarray]:
+        """Errors and stated deviations (n, hops), s."""
+        errors, stated = [], []
+        for t in np.arange(1000.0, 1000.0 + duration, 0.5):
+            for k, node in enumerate(self.filters):
+                if t >= self.next[k]:
+                    self.next[k] = t + (1.0 if node.exchanges < 30 else 10.0)
+                    self.ask(k, t)
+            if all(node.synchronised for node in self.filters):
+                errors.append([n.rig_from_local(self.local(k, t)) - t for k, n in enumerate(self.filters)])
+                stated.append([math.sqrt(n.variance(self.local(k, t))) for k, n in enumerate(self.filters)])
+        return np.array(errors), np.array(stated)
+
+
+def test_errors_add_up_down_the_chain_and_do_not_grow_beyond() -> None:
+    runs = [Clocks(seed).run(1800.0) for seed in range(12)]
+    errors, stated = np.array([r[0][60:] for r in runs]), np.array([r[1][60:] for r in runs])
+    assert np.abs(errors).max() < 1e-3
+    late = np.sqrt((errors[:, 600:] ** 2).mean(axis=(0, 1)))
+    assert late[-1] < 0.2e-3
+    assert late[-1] < 1.5 * math.sqrt(HOPS) * late[0]
+    normalised = (errors**2 / stated**2).mean(axis=(0, 1))
+    assert normalised.max() < 1.5
+
+
+def test_another_neighbour_is_compared_anew_and_rig_time_goes_on() -> None:
+    clocks = Clocks(1)
+    clocks.run(120.0)
+    node, t = clocks.filters[0], 1120.0
+    before = node.rig_from_local(clocks.local(0, t))
+    node.change_neighbour()
+    assert node.rig_from_local(clocks.local(0, t)) == before
+    reply = TimeReply(clocks.local(0, t), t + 500.0 + LATENCY, t + 500.0 + LATENCY, t + LATENCY, 1.0, 0.0)
+    node.exchange(reply, clocks.local(0, t + 2 * LATENCY))
+    assert node.rig_from_local(clocks.local(0, t)) == pytest.approx(t, abs=1e-3)
+    assert node.exchanges == 1
+
+
+def test_one_liar_is_not_believed_and_a_lasting_change_is() -> None:
+    clocks = Clocks(2)
+    clocks.run(120.0)
+    node, t = clocks.filters[0], 1120.0
+    for k in range(3):
+        asked = clocks.local(0, t + k)
+        reply = TimeReply(asked, t + k + 5.0, t + k + 5.0, t + k + 5.0, 1.0, 0.0)
+        node.exchange(reply, clocks.local(0, t + k + 2 * LATENCY))
+        off = node.rig_from_local(clocks.local(0, t + k)) - (t + k)
+        assert abs(off) < 1e-3 if k < 2 else off == pytest.approx(5.0, abs=0.01)
+
+
+def test_a_root_is_never_moved() -> None:
+    root = ClockFilter(is_root=True)
+    root.exchange(TimeReply(0.0, 9.0, 9.0, 9.0, 1.0, 0.0), 1.0)
+    assert root.rig_from_local(5.0) == 5.0
+    assert root.variance(5.0) == 0.0
