@@ -70,7 +70,7 @@ def main(arguments: list[str] | None = None) -> None:
         error.show()
         sys.exit(error.exit_code)
     except (click.Abort, KeyboardInterrupt):
-        click.echo("borechain: interrupted; every process was ended", err=True)
+        click.echo("borechain: interrupted", err=True)
         sys.exit(1)
 
 

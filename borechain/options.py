@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import tomllib
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -13,9 +14,35 @@ from telemetry import keys
 FAULT_HELP = "Fault, as kill-node:3@600 or kill-node:3@600+20 (tube, s after the start, s down). Repeatable."
 
 
+def read_config(context: click.Context, _parameter: click.Parameter, path: Path | None) -> None:
+    """Take the options of a command from a TOML file; what stands on the command line wins."""
+    if path is None:
+        return
+    try:
+        values = tomllib.loads(path.read_text())
+    except OSError as error:
+        raise click.BadParameter(f"{path}: {error.strerror}") from None
+    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
+        raise click.BadParameter(f"{path}: not TOML: {error}") from None
+    known = {option: p.name for p in context.command.params for option in p.opts if option.startswith("--")}
+    unknown = [name for name in values if f"--{name}" not in known or name == "config"]
+    if unknown:
+        names = ", ".join(sorted(option[2:] for option in known if option != "--config"))
+        raise click.BadParameter(f"{path}: {unknown[0]}: unknown key; expected one of {names}")
+    context.default_map = {known[f"--{name}"]: value for name, value in values.items()}
+
+
 def place_options(command: Callable[..., Any]) -> Callable[..., Any]:
-    """Options of every process: which rig, which router, which folder."""
+    """Options of every process: which rig, which router, which folder, and a file that holds any of its options."""
     for option in (
+        click.option(
+            "--config",
+            type=click.Path(path_type=Path, dir_okay=False),
+            callback=read_config,
+            is_eager=True,
+            expose_value=False,
+            help="TOML file with options of this command, named as here without the dashes in front.",
+        ),
         click.option(
             "--rig", "rig_name", default=keys.DEFAULT_RIG, show_default=True, help="Name of the rig in key expressions."
         ),

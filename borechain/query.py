@@ -45,7 +45,7 @@ def query(selector: str, endpoint: str, timeout: float, as_json: bool) -> None:
         raise InputFault(replies[0].error or "refused")
     if not answers:
         raise EnvironmentFault(nobody(selector, endpoint))
-    show({reply.key: json.loads(reply.payload) for reply in answers}, as_json=as_json)
+    show({reply.key: unpack(reply.payload) for reply in answers}, as_json=as_json)
 
 
 @click.command()
@@ -70,6 +70,13 @@ def watch(selector: str, endpoint: str, count: int | None) -> None:
             key, payload = arrived.get()
             click.echo(json.dumps({"key": key, "value": json.loads(payload)}))
             seen += 1
+
+
+def unpack(payload: bytes) -> Any:
+    """Value of a reply: JSON, or msgpack where the selector asked for it."""
+    import msgpack
+
+    return json.loads(payload) if payload[:1] == b"{" else msgpack.unpackb(payload)
 
 
 def nobody(selector: str, endpoint: str) -> str:

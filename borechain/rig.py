@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from borechain.faults import plain_faults
+from borechain.faults import EnvironmentFault, plain_faults
 from borechain.options import fault_option, seed_option, speed_option
 from telemetry import keys
 
@@ -68,8 +68,11 @@ def rig(
     prepare_folder(folder)
     table = process_table(world, scenario, seed, speed, faults, rig_name, endpoint, folder)
     started = time.monotonic()
-    with progress(world, quiet=as_json) as show:
-        answers = Launcher(table, rig_name, endpoint, show).run(lambda bus: ask(bus, rig_name))
+    try:
+        with progress(world, quiet=as_json) as show:
+            answers = Launcher(table, rig_name, endpoint, show).run(lambda bus: ask(bus, rig_name))
+    except KeyboardInterrupt:
+        raise EnvironmentFault(f"interrupted; every process was ended, what was stored is in {folder}") from None
     result = result_of(answers, world)
     result |= {"processes": 3 + world.scenario.tubes, "wall_s": round(time.monotonic() - started, 3)}
     result["restarts"] = sum(table.restarts.values())

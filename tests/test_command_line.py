@@ -2,6 +2,7 @@
 
 import subprocess
 import sys
+from pathlib import Path
 
 import pytest
 
@@ -40,6 +41,19 @@ def test_a_wrong_argument_is_refused_in_words(words: tuple[str, ...], named: str
     assert named in done.stderr
     assert "Traceback" not in done.stderr
     assert done.stdout == ""
+
+
+def test_options_may_stand_in_a_file(tmp_path: Path) -> None:
+    path = tmp_path / "node.toml"
+    path.write_text('tube = 0\nendpoint = "tcp/127.0.0.1:1"\n')
+    assert "expected 1..250, got 0" in run("node", "--config", str(path)).stderr
+    path.write_text("tube = 3\ncolour = 1\n")
+    refused = run("node", "--config", str(path))
+    assert refused.returncode == 2
+    assert "colour: unknown key; expected one of drive-joint-deg" in " ".join(refused.stderr.split())
+    path.write_text("tube = ")
+    assert "not TOML" in run("node", "--config", str(path)).stderr
+    assert run("node", "--config", str(tmp_path / "none.toml")).returncode == 2
 
 
 def test_the_version_is_told() -> None:
