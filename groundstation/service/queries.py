@@ -41,7 +41,7 @@ class Queries:
         for path in changed:
             if path in known:
                 if path not in self._publishers:
-                    self._publishers[path] = self._bus.publisher(self._key(path), JSON)
+                    self._publishers[path] = self._bus.publisher(self._key(path), JSON, droppable=True)
                 self._publishers[path].put(pack(known[path].show(self._knowledge, {}), "json"))
 
     def _key(self, path: str) -> str:

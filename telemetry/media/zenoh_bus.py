@@ -76,10 +76,14 @@ class ZenohBus:
         self._session = session
         self._declared: list[Any] = []
 
-    def publisher(self, key: str, encoding: str = MSGPACK) -> Publisher:
-        """Publisher of ``key``, its encoding declared; blocks rather than drops when the line is full."""
-        blocking = zenoh.CongestionControl.BLOCK
-        declared = self._session.declare_publisher(key, encoding=encoding, congestion_control=blocking, express=True)
+    def publisher(self, key: str, encoding: str = MSGPACK, *, droppable: bool = False) -> Publisher:
+        """Publisher of ``key``, its encoding declared.
+
+        When a line is full it waits, unless what it says is ``droppable``: then a slow listener misses some of it
+        and nobody waits for him.
+        """
+        control = zenoh.CongestionControl.DROP if droppable else zenoh.CongestionControl.BLOCK
+        declared = self._session.declare_publisher(key, encoding=encoding, congestion_control=control, express=True)
         self._declared.append(declared)
         return Publisher(declared)
 

@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from rigs import free_endpoint, run, running_rig, titles_of_group
+from rigs import command, free_endpoint, run, running_rig, titles_of_group
 
 from telemetry.media.zenoh_bus import open_client
 
@@ -91,6 +91,20 @@ def test_operators_get_stations_while_the_rig_drills(tmp_path: Path, ask: Any) -
         taken = run("query", "borechain/rig-1/cmd/take_survey?tube=1", "--endpoint", rig.endpoint, "--timeout", "40")
         assert taken.returncode == 0, taken.stderr
         assert json.loads(taken.stdout)["done"] is True
+
+
+def test_an_operator_who_does_not_read_stops_nobody(tmp_path: Path) -> None:
+    with running_rig(tmp_path, "--speed", "60") as rig:
+        rig.pid_of("borechain node 1")
+        watching = command("watch", f"{GROUND}/**", "--endpoint", rig.endpoint)
+        with subprocess.Popen(watching, stdout=subprocess.PIPE, text=True) as watcher:
+            assert watcher.stdout is not None
+            assert watcher.stdout.readline().startswith("{")
+            os.kill(watcher.pid, signal.SIGSTOP)
+            result = rig.result()
+            watcher.kill()
+    assert result["measurements"] == 6
+    assert result["restarts"] == 0
 
 
 def test_power_cut_of_a_node_makes_all_below_stale_and_loses_no_survey(tmp_path: Path) -> None:
