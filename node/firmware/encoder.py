@@ -15,6 +15,7 @@ from telemetry.messages import Aiding
 COUNTS_PER_TURN = 4096  # 1024 lines, decoded in quadrature
 QUANTUM = 2.0 * math.pi / COUNTS_PER_TURN
 EDGE_STD = math.radians(0.003)
+FASTEST = 100.0  # rad/s, what two edges in a bouncing instant may seem
 
 
 @dataclass(frozen=True, slots=True)
@@ -48,7 +49,7 @@ class EncoderNode:
         elapsed = sample.edge_at - (before_at if before_at is not None else sample.edge_at)
         self._resting = False
         self.sequence += 1
-        rate = (self._edge_angle - before_angle) / elapsed
+        rate = max(-FASTEST, min((self._edge_angle - before_angle) / elapsed, FASTEST))
         return aiding(self._edge_angle, EDGE_STD**2, rate, sample.edge_at, self.sequence)
 
     def _at_rest(self, sample: EncoderSample, now: float) -> Aiding:

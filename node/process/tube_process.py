@@ -5,16 +5,16 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Any
 
-import msgpack
-
 from node.errors import SavedStateError
 from node.firmware.saved_state import resume
 from node.firmware.settings import TubeSettings
 from node.firmware.tube import ImuReading, Surroundings, Tube
 from node.kernels.layout import Array, default_config, new_state
+from node.process.counter import BootCounter
 from node.process.journal import Journal
 from telemetry.application.driven import Driven
 from telemetry.application.station import Station
+from telemetry.errors import EncodeError
 from telemetry.messages import Aiding, Command, Event, NodeState, Reply, Severity, Side, SurveyMeasurement
 
 SAVE_EVERY = 19  # cycles, 10 s
@@ -36,9 +36,10 @@ class TubeProcess(Driven):
         self.settings = settings
         self.config = default_config() if config is None else config
         self._journal = Journal(folder)
+        # apart from the saved state: a neighbour must not take a life that lost it for an earlier one
+        self.boots = BootCounter(folder).boots
         saved, fault = self._load()
-        self.state, telemetry, boots = saved if saved else (new_state(self.config), None, 0)
-        self.boots = boots + 1
+        self.state, telemetry = saved if saved else (new_state(self.config), None)
         if saved:
             resume(self.state)
         self.station = Station(
@@ -98,13 +99,17 @@ class TubeProcess(Driven):
 
     def _say(self, said: Aiding | SurveyMeasurement | Event | NodeState, now: float) -> bool:
         """Hand a message to the telemetry; returns whether it must be saved before it may be lost."""
-        if isinstance(said, NodeState):
-            self.station.send_state(said, now)
-        elif isinstance(said, Aiding):
-            self.station.send_aiding(said, now)
-        else:
-            self.station.submit(said, now)
-            return True
+        try:
+            if isinstance(said, NodeState):
+                self.station.send_state(said, now)
+            elif isinstance(said, Aiding):
+                self.station.send_aiding(said, now)
+            else:
+                self.station.submit(said, now)
+                return True
+        except EncodeError:
+            # numbers beyond any range are the filter's trouble, which it reports itself; the cycle goes on
+            self.station.counters["unsayable"] += 1
         return False
 
     def _announce(self, rig_now: float, now: float) -> None:
@@ -128,15 +133,11 @@ class TubeProcess(Driven):
                 known = "take_survey"
                 return Reply(self.settings.tube, command.sequence, False, f"expected {known}, got {command.name}")
 
-    def _load(self) -> tuple[tuple[Array, bytes, int] | None, str]:
+    def _load(self) -> tuple[tuple[Array, bytes] | None, str]:
         try:
-            found = self._journal.load()
+            return self._journal.load(), ""
         except SavedStateError as error:
             return None, str(error)
-        if found is None:
-            return None, ""
-        boots, telemetry = msgpack.unpackb(found[1])
-        return (found[0], telemetry, boots), ""
 
     def _save(self) -> None:
-        self._journal.save(self.state, msgpack.packb([self.boots, self.station.export_state()]))
+        self._journal.save(self.state, self.station.export_state())

@@ -39,3 +39,9 @@ def test_a_rest_is_one_measurement_however_often_it_is_said() -> None:
 
 def test_numbers_of_a_later_life_are_larger() -> None:
     assert EncoderNode(2 << 32).on_cycle(EncoderSample(0, 1.0, True), 2.0).sequence > 1 << 33
+
+
+def test_two_edges_in_one_instant_are_no_infinite_rate() -> None:
+    encoder = EncoderNode()
+    encoder.on_cycle(EncoderSample(0, 1000.0, True), 1000.5)
+    assert encoder.on_cycle(EncoderSample(1, 1000.0 + 1e-9, True), 1001.0).rate == 100.0

@@ -65,7 +65,7 @@ def test_one_process_a_tube_and_none_after_an_interrupt(tmp_path: Path) -> None:
 
 
 def test_operators_get_stations_while_the_rig_drills(tmp_path: Path, ask: Any) -> None:
-    with running_rig(tmp_path, "--speed", "20") as rig:
+    with running_rig(tmp_path, "--speed", "8") as rig:
 
         def two_stations() -> Any:
             view = ask(rig, f"{GROUND}/trajectory")
@@ -135,7 +135,7 @@ def test_power_cut_of_a_node_makes_all_below_stale_and_loses_no_survey(tmp_path:
 
 
 def test_a_node_killed_from_outside_is_restarted_and_loses_no_survey(tmp_path: Path, ask: Any) -> None:
-    with running_rig(tmp_path, "--speed", "30") as rig:
+    with running_rig(tmp_path, "--speed", "20") as rig:
         rig.until(lambda: (ask(rig, f"{GROUND}/status") or {}).get("measurements"))
         os.kill(rig.pid_of("borechain node 1"), signal.SIGKILL)
         rig.until(lambda: "restored" in {e["code"] for e in ask(rig, f"{GROUND}/events?tube=1")["events"]})
@@ -145,7 +145,7 @@ def test_a_node_killed_from_outside_is_restarted_and_loses_no_survey(tmp_path: P
 
 
 def test_a_ground_station_killed_from_outside_keeps_every_survey(tmp_path: Path, ask: Any) -> None:
-    with running_rig(tmp_path, "--speed", "30") as rig:
+    with running_rig(tmp_path, "--speed", "20") as rig:
         rig.until(lambda: (ask(rig, f"{GROUND}/status") or {}).get("measurements"))
         os.kill(rig.pid_of("borechain ground"), signal.SIGKILL)
         result = rig.result()
