@@ -95,7 +95,8 @@ class Station:
         self.neighbours: dict[Side, Neighbour | None] = dict.fromkeys(Side)
         self.hops = 0 if address == ENCODER else HOPS_UNKNOWN
         self._links = {side: HopLink(address, boot_count) for side in sorted(sides)}
-        self._sync_side = Side.LOWER if address == BASE else Side.UPPER
+        toward_encoder = Side.LOWER if address == BASE else Side.UPPER
+        self._sync_side = None if is_clock_root else toward_encoder
         self._next_sequence = 1
         self._outbox = Outbox()
         self._answered: OrderedDict[int, bytes] = OrderedDict()
@@ -137,7 +138,7 @@ class Station:
         if now >= self._hello_at + HELLO_EVERY:
             self._hello_at = now
             self._send_hello()
-        if not self.clock.is_root and now >= self._sync_at + self._sync_pace() and self._sync_side in self._links:
+        if self._sync_side in self._links and now >= self._sync_at + self._sync_pace():
             self._sync_at = now
             self._links[self._sync_side].send_best_effort(encode(TimeRequest(now)), Kind.TIME_REQUEST)
         self._send_due(self._outbox, Side.UPPER, now)

@@ -237,6 +237,7 @@ def test_clocks_agree_with_the_encoder_down_the_chain() -> None:
     chain.run(120.0)
     for address in (BASE, 6, 5, 4, 3, 2, 1):
         clock = chain.stations[address].clock
+        assert clock.synchronised
         error = clock.rig_from_local(chain.local(address)) - chain.now
         assert abs(error) < 4.0 * math.sqrt(clock.variance(chain.local(address))) + 2e-3  # the loop's own step is 4 ms
         assert clock.local_from_rig(clock.rig_from_local(5.0)) == pytest.approx(5.0, abs=1e-6)
