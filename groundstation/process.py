@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import math
 import queue
 import threading
 from collections.abc import Iterator
@@ -47,6 +48,9 @@ class GroundProcess(Driven):
         self._orders: queue.SimpleQueue[tuple[Command, Future[Reply]]] = queue.SimpleQueue()
         self._ordered: dict[int, Future[Reply]] = {}
         self._next_command = self.store.boots << BOOT_SHIFT
+        self._stale: set[int] = set()
+        self.knowledge.order.restore(self.store.order())
+        self._kept_order = list(self.knowledge.order.tubes)
         for at, md in self.store.depths():
             self.knowledge.depths.restore(at, md)
         for stored in self.store.messages():
@@ -69,7 +73,9 @@ class GroundProcess(Driven):
             self._take(received.message, now)
 
     def on_depth(self, rig_time: float, md: float) -> None:
-        """The rig measured the depth of the bit."""
+        """The rig measured the depth of the bit; what is no number is not taken."""
+        if not (math.isfinite(rig_time) and math.isfinite(md)):
+            return
         with self._lock:
             self.knowledge.rig_now = rig_time
             if self.knowledge.depths.add(rig_time, md):
@@ -84,15 +90,34 @@ class GroundProcess(Driven):
                 self._ordered[command.sequence] = outcome
                 self.station.command(command, now)
         super().on_timer(now)
+        self._notice_silence(now)
+
+    def _notice_silence(self, now: float) -> None:
+        """Bring rig time forward, also where no depth comes any more, and tell who fell silent or came back."""
+        with self._lock:
+            if self.station.clock.synchronised:
+                self.knowledge.rig_now = self.station.clock.rig_from_local(now)
+            stale = {tube for tube in self.knowledge.nodes if self.knowledge.is_stale(tube)}
+            changed, self._stale = sorted(stale ^ self._stale), stale
+            if changed:
+                self._publish([*(f"nodes/{tube}" for tube in changed), "status", "string"])
+
+    def _keep_order(self) -> None:
+        """Store a new order of the string before anything is placed by it."""
+        if self.knowledge.order.tubes != self._kept_order:
+            self._kept_order = list(self.knowledge.order.tubes)
+            self.store.keep_order(self._kept_order)
 
     def _take(self, message: Message, now: float) -> None:
         if isinstance(message, NodeState):
             with self._lock:
                 self.knowledge.take_state(message)
+                self._keep_order()
                 self._publish([f"nodes/{message.tube}"])
         elif isinstance(message, SurveyMeasurement | Event):
             with self._lock:
                 md = self.knowledge.place(message) if isinstance(message, SurveyMeasurement) else None
+                self._keep_order()
                 if self.store.add(message, md):
                     self._publish(self._learn(message, md))
             self.station.acknowledge(message.tube, message.sequence, now)

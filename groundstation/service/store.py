@@ -6,6 +6,7 @@ identity is tube, sequence and content, so a tube that lost its memory and count
 
 from __future__ import annotations
 
+import contextlib
 import hashlib
 from collections.abc import Iterator
 from dataclasses import dataclass
@@ -19,6 +20,7 @@ from telemetry.messages import Event, SurveyMeasurement
 from telemetry.presentation.codec import decode, encode
 
 SCHEMA = 1
+SHOWN = 5  # tables named of a database that is not ours
 METADATA = sa.MetaData()
 META = sa.Table(
     "meta",
@@ -40,6 +42,12 @@ MESSAGES = sa.Table(
 )
 DEPTHS = sa.Table(
     "depths", METADATA, sa.Column("at", sa.Float, primary_key=True), sa.Column("md", sa.Float, nullable=False)
+)
+STRING = sa.Table(
+    "string",
+    METADATA,
+    sa.Column("place", sa.Integer, primary_key=True, autoincrement=False),
+    sa.Column("tube", sa.Integer, nullable=False),
 )
 
 
@@ -65,23 +73,22 @@ class Store:
     """
 
     def __init__(self, url: str) -> None:
-        self._where = url.removeprefix("sqlite:///")
-        self._engine = sa.create_engine(url)
+        self._engine = _engine_of(url)
+        address = self._engine.url
+        self._where = address.database or address.render_as_string(hide_password=True)
         try:
-            if self._engine.dialect.name == "sqlite":
-                Path(self._where).parent.mkdir(parents=True, exist_ok=True)
-                sa.event.listen(self._engine, "connect", _durable)
-            METADATA.create_all(self._engine)
-            self.boots = self._begin()
+            with self._refusing("; choose a writable --folder or another database"):
+                if self._engine.dialect.name == "sqlite":
+                    Path(address.database or "").parent.mkdir(parents=True, exist_ok=True)
+                self._check_schema()
+                if self._engine.dialect.name == "sqlite":
+                    self._engine.dispose()  # the connection that only looked is not durable
+                    sa.event.listen(self._engine, "connect", _durable)
+                METADATA.create_all(self._engine)
+                self.boots = self._begin()
         except StoreError:
             self.close()
             raise
-        except (sa.exc.SQLAlchemyError, OSError) as error:
-            self.close()
-            reason = str(getattr(error, "orig", None) or getattr(error, "strerror", None) or error)
-            raise StoreError(
-                f"database {self._where}: {reason}; choose a writable --folder or another database"
-            ) from error
 
     def add(self, message: SurveyMeasurement | Event, md: float | None) -> bool:
         """Store a message; durable on return. False when it was already there.
@@ -94,26 +101,23 @@ class Store:
         payload = encode(message)
         content = hashlib.blake2b(payload, digest_size=16).hexdigest()
         row = {"tube": message.tube, "sequence": message.sequence, "content": content}
-        try:
-            with self._engine.begin() as connection:
-                same = sa.and_(*(MESSAGES.c[name] == value for name, value in row.items()))
-                if connection.execute(sa.select(MESSAGES.c.id).where(same)).first() is not None:
-                    return False
-                kind = type(message).__name__
-                connection.execute(sa.insert(MESSAGES).values(**row, kind=kind, md=md, payload=payload))
-        except sa.exc.SQLAlchemyError as error:
-            raise StoreError(f"database {self._where}: {error}") from error
+        with self._refusing(), self._engine.begin() as connection:
+            same = sa.and_(*(MESSAGES.c[name] == value for name, value in row.items()))
+            if connection.execute(sa.select(MESSAGES.c.id).where(same)).first() is not None:
+                return False
+            kind = type(message).__name__
+            connection.execute(sa.insert(MESSAGES).values(**row, kind=kind, md=md, payload=payload))
         return True
 
     def add_depth(self, at: float, md: float) -> None:
         """Store that the bit stood at ``md`` (m) from rig time ``at`` (s) on."""
-        with self._engine.begin() as connection:
+        with self._refusing(), self._engine.begin() as connection:
             connection.execute(sa.delete(DEPTHS).where(DEPTHS.c.at == at))
             connection.execute(sa.insert(DEPTHS).values(at=at, md=md))
 
     def messages(self) -> Iterator[Stored]:
         """Everything stored, in the order of arrival."""
-        with self._engine.connect() as connection:
+        with self._refusing(), self._engine.connect() as connection:
             for row in connection.execute(sa.select(MESSAGES).order_by(MESSAGES.c.id)):
                 try:
                     message = decode(row.payload)
@@ -124,25 +128,70 @@ class Store:
 
     def depths(self) -> list[tuple[float, float]]:
         """Rig times (s) and depths (m) at which the bit came to stand."""
-        with self._engine.connect() as connection:
+        with self._refusing(), self._engine.connect() as connection:
             return [(row.at, row.md) for row in connection.execute(sa.select(DEPTHS).order_by(DEPTHS.c.at))]
+
+    def keep_order(self, tubes: list[int]) -> None:
+        """Store which tubes hang in the string, top first."""
+        with self._refusing(), self._engine.begin() as connection:
+            connection.execute(sa.delete(STRING))
+            connection.execute(sa.insert(STRING), [{"place": n, "tube": tube} for n, tube in enumerate(tubes, 1)])
+
+    def order(self) -> list[int]:
+        """Tubes of the string, top first."""
+        with self._refusing(), self._engine.connect() as connection:
+            return [row.tube for row in connection.execute(sa.select(STRING).order_by(STRING.c.place))]
 
     def close(self) -> None:
         """Close every connection."""
         self._engine.dispose()
 
+    @contextlib.contextmanager
+    def _refusing(self, remedy: str = "") -> Iterator[None]:
+        """Name the database and the reason in whatever it refuses."""
+        try:
+            yield
+        except StoreError:
+            raise
+        except (sa.exc.SQLAlchemyError, OSError) as error:
+            reason = str(getattr(error, "orig", None) or getattr(error, "strerror", None) or error)
+            raise StoreError(f"database {self._where}: {reason}{remedy}") from error
+
+    def _check_schema(self) -> None:
+        """Look without a change whether the database is new or one of ours."""
+        tables = sorted(sa.inspect(self._engine).get_table_names())
+        if tables and META.name not in tables:
+            raise StoreError(
+                f"database {self._where}: expected an empty one or that of a ground station, "
+                f"got tables {', '.join(tables[:SHOWN])}; choose another --folder or database"
+            )
+        found = self._meta() if tables else {}
+        if found and found.get("schema") != str(SCHEMA):
+            raise StoreError(f"database {self._where}: expected schema {SCHEMA}, got {found.get('schema')}")
+
+    def _meta(self) -> dict[str, str]:
+        with self._engine.connect() as connection:
+            return {row.name: row.value for row in connection.execute(sa.select(META))}
+
     def _begin(self) -> int:
-        """Check the schema and count this start."""
+        """Count this start."""
+        boots = int(self._meta().get("boots", "0")) + 1
         with self._engine.begin() as connection:
-            found = {row.name: row.value for row in connection.execute(sa.select(META))}
-            if found and found.get("schema") != str(SCHEMA):
-                raise StoreError(f"database {self._where}: expected schema {SCHEMA}, got {found.get('schema')}")
-            boots = int(found.get("boots", "0")) + 1
             connection.execute(sa.delete(META))
             connection.execute(
                 sa.insert(META), [{"name": "schema", "value": str(SCHEMA)}, {"name": "boots", "value": str(boots)}]
             )
         return boots
+
+
+def _engine_of(url: str) -> sa.Engine:
+    """Engine of a URL; a refusal does not repeat the URL, which may hold a password."""
+    try:
+        return sa.create_engine(url)
+    except (sa.exc.SQLAlchemyError, ImportError) as error:
+        raise StoreError(
+            f"database URL: expected one such as sqlite:///FILE whose driver is installed: {error}"
+        ) from error
 
 
 def _durable(connection: sa.engine.interfaces.DBAPIConnection, _record: object) -> None:

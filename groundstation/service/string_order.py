@@ -32,6 +32,11 @@ class StringOrder:
         if counts == list(range(1, len(counts) + 1)):
             self.tubes.sort(key=lambda known: self._hops[known])
 
+    def restore(self, tubes: list[int]) -> None:
+        """Take the order known before a restart, top first; it holds until reports complete another."""
+        self.tubes = list(tubes)
+        self._hops = {tube: place for place, tube in enumerate(tubes, 1)}
+
     def length_below(self, tube: int) -> float | None:
         """Length (m) of string below a tube's node, which sits at the tube's lower end; None for an unknown tube."""
         if tube not in self.tubes:

@@ -18,6 +18,8 @@ from groundstation.errors import SurveyError
 
 Array = npt.NDArray[np.float64]
 GRAVITY_TOLERANCE = 0.005  # of g, |f| of a stop that was no stop
+ASYMMETRY = 1e-9  # of the largest entry, rounding in the covariance of a node
+CONDITION = 1e14  # beyond it the inverse of a covariance is noise
 SHORTEST_SETTLE = 16.0  # s, of the 32-point moving average
 
 
@@ -59,7 +61,7 @@ def resolve(
     Raises
     ------
     SurveyError
-        When the force vanishes or is not finite.
+        When the force vanishes or is not finite, or nothing is uncertain in some direction of the lean.
     """
     size = float(np.linalg.norm(force))
     if not math.isfinite(size) or size < 1e-3 or not math.isfinite(yaw):
@@ -71,7 +73,19 @@ def resolve(
     by_force = (turn - np.outer(lean, unit)) / size
     by_yaw = np.array([-lean[1], lean[0]])
     cov = by_force @ force_cov @ by_force.T + yaw_var * np.outer(by_yaw, by_yaw) + bias_var * np.eye(2)
+    if not is_covariance(cov):
+        raise SurveyError(f"resolve: expected a positive definite covariance of the lean, got {cov.tolist()}")
     return Lean(lean, float(-unit[2]), cov, math.sqrt(systematic_var) * by_yaw)
+
+
+def is_covariance(covs: Array) -> bool:
+    """Whether every matrix of (..., k, k) is finite, symmetric, positive definite and safely invertible."""
+    if not np.all(np.isfinite(covs)):
+        return False
+    asymmetry = np.max(np.abs(covs - np.swapaxes(covs, -1, -2)), axis=(-2, -1))
+    values = np.linalg.eigvalsh(covs)
+    symmetric = np.all(asymmetry <= ASYMMETRY * np.max(np.abs(covs), axis=(-2, -1)))
+    return bool(symmetric and np.all(values[..., 0] * CONDITION > values[..., -1]))
 
 
 def angles(lean: Array, down: float) -> tuple[float, float]:
@@ -95,7 +109,15 @@ def angle_stds(lean: Array, down: float, cov: Array) -> tuple[float, float]:
 
 
 def combine_imus(forces: Array, covs: Array) -> tuple[Array, Array]:
-    """Inverse-variance mean of the IMUs of a cluster: forces (n, 3), covariances (n, 3, 3). Source: thesis eq. 3.42."""
+    """Inverse-variance mean of the IMUs of a cluster: forces (n, 3), covariances (n, 3, 3). Source: thesis eq. 3.42.
+
+    Raises
+    ------
+    SurveyError
+        When one of the covariances is none.
+    """
+    if not is_covariance(covs):
+        raise SurveyError(f"cluster: expected a positive definite force covariance of each IMU, got {covs.tolist()}")
     information = np.linalg.inv(covs)
     cov = np.linalg.inv(information.sum(axis=0))
     mean = cov @ np.einsum("nij,nj->i", information, forces)

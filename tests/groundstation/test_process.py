@@ -5,6 +5,7 @@ import json
 import math
 import socket
 from collections.abc import Callable, Iterator
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -28,6 +29,10 @@ from telemetry.messages import (
 
 VAR = (0.0034**2) / 32
 COV = ((VAR, 0.0, 0.0), (0.0, VAR, 0.0), (0.0, 0.0, VAR))
+NO_COV = ((VAR, 5.0, 0.0), (5.0, VAR, 0.0), (0.0, 0.0, VAR))
+MEASUREMENT = SurveyMeasurement(
+    1, 1, 0.0, 1, (ImuMean((0.0, 0.0, -9.81), COV),), 0.0, 1e-8, 1e-8, 32, 20.0, NodeFlag.NONE
+)
 GROUND = "borechain/*/ground"
 
 
@@ -193,6 +198,16 @@ def test_a_silent_node_goes_stale_and_comes_back(rig: tuple[Rig, ZenohBus]) -> N
     assert ask(bus, f"{GROUND}/nodes/1")["stale"] is False
 
 
+def test_silence_is_noticed_and_told_where_no_depth_comes_any_more(rig: tuple[Rig, ZenohBus]) -> None:
+    it, bus = rig
+    it.state(1, 2)
+    with watching(bus, f"{GROUND}/nodes/1") as seen:
+        ask(bus, f"{GROUND}/status")  # the subscription has arrived when a later question is answered
+        it.run(6.0)
+        assert ask(bus, f"{GROUND}/nodes/1")["stale"] is True
+    assert [node["stale"] for node in seen] == [True]
+
+
 def test_a_restart_forgets_and_doubles_nothing(rig: tuple[Rig, ZenohBus], start: Callable[[], Rig]) -> None:
     it, bus = rig
     it.tube.submit(Event(1, 7, it.now, Severity.INFO, "stopped"), it.now)
@@ -209,6 +224,45 @@ def test_a_restart_forgets_and_doubles_nothing(rig: tuple[Rig, ZenohBus], start:
     assert [(s.md, s.fusion.count) for s in knowledge.stations] == [(2.0, 2), (4.0, 1)]
     assert again.tube.outbox_size == 0
     assert before[0]["measurements"] == 2
+
+
+def test_a_survey_that_comes_before_any_state_after_a_restart_finds_its_station(start: Callable[[], Rig]) -> None:
+    first = start()
+    first.run(3.0)
+    first.depth(2.0)
+    first.state(1, 1)
+    first.state(2, 1)
+    first.state(1, 2)
+    first.depth(4.0)
+    first.ground.store.close()
+    again = start()
+    again.now = first.now
+    again.run(3.0)
+    again.survey(2, 1)
+    assert [(s.md, s.fusion.count) for s in again.ground.knowledge.stations] == [(2.0, 1)]
+
+
+def test_a_covariance_that_is_none_is_kept_and_counted_now_and_after_a_restart(start: Callable[[], Rig]) -> None:
+    rig = start()
+    rig.run(3.0)
+    rig.depth(2.0)
+    rig.state(1, 1)
+    rig.tube.submit(replace(MEASUREMENT, imus=(ImuMean((0.0, 0.0, -9.81), NO_COV),), station_at=rig.now), rig.now)
+    rig.run(2.0)
+    assert rig.tube.outbox_size == 0
+    assert (rig.ground.knowledge.refused, rig.ground.knowledge.stations) == (1, [])
+    rig.ground.store.close()
+    assert start().ground.knowledge.refused == 1
+
+
+@pytest.mark.parametrize(("at", "md"), [(math.nan, 2.0), (2000.0, math.inf), (-math.inf, math.nan)])
+def test_a_depth_that_is_no_number_is_not_taken(start: Callable[[], Rig], at: float, md: float) -> None:
+    rig = start()
+    rig.depth(2.0)
+    before = rig.ground.knowledge.rig_now
+    rig.ground.on_depth(at, md)
+    assert rig.ground.knowledge.depths.latest == 2.0
+    assert rig.ground.knowledge.rig_now == before
 
 
 def test_a_survey_from_before_the_restart_finds_its_depth(start: Callable[[], Rig]) -> None:

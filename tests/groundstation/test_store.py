@@ -5,6 +5,8 @@ import signal
 import sqlite3
 import subprocess
 import sys
+import tempfile
+from collections.abc import Iterator
 from contextlib import closing
 from pathlib import Path
 
@@ -24,6 +26,20 @@ store = Store(sys.argv[1])
 for sequence in range(1, 100_000):
     store.add(Event(1, sequence, 1.0, Severity.INFO, "stopped"), None)
     print(sequence, flush=True)
+"""
+
+
+OPENER = """
+import os, sys
+from groundstation.errors import StoreError
+from groundstation.service.store import Store
+Store("sqlite://").close()  # everything is imported before the rights are given up
+if os.geteuid() == 0:
+    os.setuid(65534)
+try:
+    Store(sys.argv[1])
+except StoreError as error:
+    print(error)
 """
 
 
@@ -76,6 +92,25 @@ def test_killed_at_any_moment_nothing_acknowledged_is_lost_or_doubled(tmp_path: 
     assert len(stored) <= last + 1
 
 
+@pytest.fixture
+def read_only_folder() -> Iterator[Path]:
+    """A folder whose parents anybody may pass, unlike those of ``tmp_path``."""
+    with tempfile.TemporaryDirectory() as name:
+        folder = Path(name)
+        folder.chmod(0o555)
+        yield folder
+        folder.chmod(0o755)
+
+
+def test_a_read_only_folder_is_named_with_a_remedy(read_only_folder: Path) -> None:
+    done = subprocess.run(
+        [sys.executable, "-c", OPENER, url(read_only_folder)], capture_output=True, text=True, check=True
+    )
+    assert str(read_only_folder) in done.stdout
+    assert "writable --folder" in done.stdout
+    assert list(read_only_folder.iterdir()) == []
+
+
 def test_a_folder_that_cannot_be_written_is_named(tmp_path: Path) -> None:
     blocked = tmp_path / "file"
     blocked.write_text("no folder")
@@ -88,6 +123,41 @@ def test_a_file_that_is_no_database_is_named_and_left_alone(tmp_path: Path) -> N
     with pytest.raises(StoreError, match="not a database"):
         Store(url(tmp_path))
     assert (tmp_path / "ground.sqlite").read_text().startswith("this is a letter")
+
+
+def test_a_database_of_something_else_is_refused_and_left_alone(tmp_path: Path) -> None:
+    path = tmp_path / "ground.sqlite"
+    with closing(sqlite3.connect(path)) as connection:
+        connection.execute("create table invoices (amount real)")
+    before = path.read_bytes()
+    with pytest.raises(StoreError, match="got tables invoices"):
+        Store(url(tmp_path))
+    assert path.read_bytes() == before
+
+
+@pytest.mark.parametrize("wrong", ["nonsense", "nosuch://somewhere/db", "postgresql+nosuch://me:secret@somewhere/db"])
+def test_a_url_that_is_none_is_refused_without_telling_a_password(wrong: str) -> None:
+    with pytest.raises(StoreError, match="database URL") as refused:
+        Store(wrong)
+    assert "secret" not in str(refused.value)
+
+
+def test_a_disk_that_refuses_is_an_error_of_the_store(tmp_path: Path) -> None:
+    with closing(Store(url(tmp_path))) as store:
+        with closing(sqlite3.connect(tmp_path / "ground.sqlite")) as connection:
+            connection.execute("drop table depths")
+        for use in (lambda: store.add_depth(1.0, 2.0), store.depths):
+            with pytest.raises(StoreError, match=r"ground\.sqlite"):
+                use()
+
+
+def test_the_order_of_the_string_is_kept(tmp_path: Path) -> None:
+    with closing(Store(url(tmp_path))) as store:
+        assert store.order() == []
+        store.keep_order([1])
+        store.keep_order([3, 2, 1])
+    with closing(Store(url(tmp_path))) as again:
+        assert again.order() == [3, 2, 1]
 
 
 def test_another_schema_is_refused(tmp_path: Path) -> None:

@@ -28,6 +28,18 @@ def test_a_silent_tube_keeps_its_place_and_an_unknown_one_has_none() -> None:
     assert 4 not in order.tubes
 
 
+def test_a_restored_order_holds_until_reports_complete_another() -> None:
+    order = StringOrder(2.0)
+    order.restore([3, 2, 1])
+    assert order.length_below(3) == 4.0
+    for tube, hops in ((1, 4), (3, 2), (4, 1)):  # tube 4 came while nobody listened; tube 2 is still silent
+        order.report(tube, hops)
+        assert [known for known in order.tubes if known != 4] == [3, 2, 1]
+    assert order.tubes == [4, 3, 2, 1]
+    order.report(2, 3)
+    assert order.tubes == [4, 3, 2, 1]
+
+
 def test_depth_is_that_of_the_time_asked_for() -> None:
     log = DepthLog()
     assert log.at(5.0) is None

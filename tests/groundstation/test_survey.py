@@ -91,6 +91,25 @@ def test_no_force_is_no_survey(force: np.ndarray) -> None:
         resolve(force, np.eye(3), 0.0, 0.0, 0.0)
 
 
+@pytest.mark.parametrize(
+    "cov",
+    [
+        np.zeros((3, 3)),
+        np.array([[1e-6, 5.0, 0.0], [5.0, 1e-6, 0.0], [0.0, 0.0, 1e-6]]),
+        np.array([[1e-6, 1e-7, 0.0], [-1e-7, 1e-6, 0.0], [0.0, 0.0, 1e-6]]),
+    ],
+    ids=["zero", "indefinite", "asymmetric"],
+)
+def test_what_is_no_covariance_is_no_survey(cov: np.ndarray) -> None:
+    with pytest.raises(SurveyError, match="force covariance"):
+        combine_imus(np.array([[0.0, 0.0, -G]]), cov[None])
+
+
+def test_a_direction_without_uncertainty_across_the_lean_is_no_survey() -> None:
+    with pytest.raises(SurveyError, match="lean"):
+        resolve(np.array([G, 0.0, 0.0]), np.eye(3) * 1e-6, 0.0, 1e-6, 0.0, bias_var=0.0)
+
+
 def test_quality_names_what_is_wrong() -> None:
     good, cov = force_at_rest(2.0 * DEG, 1.0, 0.0)[None, :], (np.eye(3) * (0.0034**2 / 32))[None, :, :]
     assert check(good, cov, G, 32, 19.0, 0.0034) == Quality.GOOD
@@ -156,6 +175,37 @@ def test_balanced_tangential_gives_the_printed_steps_of_table_4_29() -> None:
     steps_cm = 100.0 * np.diff([p.position for p in trajectory.points], axis=0)
     np.testing.assert_allclose(steps_cm[0], [-0.873, 1.511, 199.985], atol=5e-4 * 2)
     np.testing.assert_allclose(steps_cm[1], [-1.745, 3.023, 199.97], atol=5e-4 * 2)
+
+
+@given(
+    st.lists(st.tuples(st.floats(0.1, 30.0), st.floats(0.0, 1.0), st.floats(0.0, 6.28)), min_size=1, max_size=10),
+    st.sampled_from(Method),
+)
+def test_appending_gives_what_the_whole_hole_gives_at_once(
+    rows: list[tuple[float, float, float]], method: Method
+) -> None:
+    trajectory = Trajectory(method)
+    mds = np.cumsum([length for length, _, _ in rows])
+    leans = [lean_of(inclination, azimuth, 1e-3, 5e-3) for _, inclination, azimuth in rows]
+    for count, (md, lean) in enumerate(zip(mds, leans, strict=True), 1):
+        point = trajectory.append(float(md), lean)
+        again = Trajectory(method)
+        for earlier_md, earlier in zip(mds[:count], leans[:count], strict=True):
+            again.append(float(earlier_md), earlier)
+        np.testing.assert_array_equal(point.position, again.points[-1].position)
+        np.testing.assert_allclose(point.cov, covariance_at_once(mds[:count], leans[:count]), rtol=1e-9, atol=1e-18)
+
+
+def covariance_at_once(mds: np.ndarray, leans: list[Lean]) -> np.ndarray:
+    """Covariance of the last position from every station's weight in it: no running sum."""
+    ends = np.concatenate([[0.0], mds, mds[-1:]])
+    random, systematic = np.zeros((3, 3)), np.zeros(3)
+    for k, lean in enumerate(leans, 1):
+        weight = 0.5 * (ends[k + 1] - ends[k - 1])
+        jacobian = weight * np.array([[1.0, 0.0], [0.0, 1.0], -lean.lean / lean.down])
+        random = random + jacobian @ lean.cov @ jacobian.T
+        systematic = systematic + jacobian @ lean.systematic
+    return random + np.outer(systematic, systematic)
 
 
 def test_minimum_curvature_follows_a_circle() -> None:
