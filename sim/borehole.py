@@ -59,8 +59,14 @@ class Borehole:
         if len(self.md) < 2:
             raise ScenarioError(f"{where}: expected at least two stations, got {len(self.md)}")
         for k in range(len(self.md)):
-            if not (math.isfinite(inclination[k]) and math.isfinite(azimuth[k]) and 0.0 <= inclination[k] <= math.pi):
-                raise ScenarioError(f"{where}: station {k}: expected an inclination of 0..180 deg and an azimuth")
+            if not math.isfinite(self.md[k]):
+                raise ScenarioError(f"{where}: station {k}: expected a finite measured depth, got {self.md[k]:g}")
+            # straight up the smallest rotation from down is not defined
+            if not (math.isfinite(azimuth[k]) and 0.0 <= inclination[k] < math.pi):
+                raise ScenarioError(
+                    f"{where}: station {k}: expected an inclination of 0 to below 180 deg and an azimuth, "
+                    f"got {math.degrees(inclination[k]):g} and {math.degrees(azimuth[k]):g} deg"
+                )
         if self.md[0] != 0.0:
             raise ScenarioError(f"{where}: station 0: expected measured depth 0, got {self.md[0]:g} m")
         back = np.flatnonzero(~(np.diff(self.md) > 0.0))

@@ -19,6 +19,9 @@ class KillNode:
     after: float  # s after the start of the rig
     down: float  # s
 
+    def __str__(self) -> str:
+        return f"kill-node:{self.tube}@{self.after:g}+{self.down:g}"
+
 
 def parse_fault(text: str, tubes: int) -> KillNode:
     """Fault of a text.

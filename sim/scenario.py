@@ -21,9 +21,9 @@ Triple = tuple[NotNegative, NotNegative, NotNegative]
 
 
 class Section(BaseModel):
-    """Base of every table: frozen, unknown keys refused."""
+    """Base of every table: frozen, unknown keys, infinities and NaN refused."""
 
-    model_config = ConfigDict(frozen=True, extra="forbid")
+    model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False)
 
 
 class RigSection(Section):
@@ -47,7 +47,7 @@ class ScheduleSection(Section):
     add_s: float = Field(
         60.0, ge=10.0, description="string held while a tube is added; a node needs 50 s to find its bias"
     )
-    joint_s: float = Field(5.0, ge=4.0, description="of it, joint open")
+    joint_s: float = Field(5.0, ge=4.0, description="of it, joint open; shorter than add_s")
     stop_s: float = Field(32.0, ge=22.0, description="standing still after drilling; a survey needs 20 s")
     finish_s: float = Field(20.0, ge=5.0, description="after the last stop, for what is still on its way")
 
@@ -168,12 +168,7 @@ def load_scenario(path: Path, faults: tuple[str, ...] = ()) -> Scenario:
         One line: the file, the key or line, what was expected and what came.
     """
     file = _parse(path)
-    rate = file.rotation.rate_dps
-    if rate > MAX_RATE_DPS:
-        raise ScenarioError(
-            f"{path}: rotation.rate_dps: expected at most {MAX_RATE_DPS:g} deg/s (57 rev/min, "
-            f"half a turn a cycle), got {rate:g}; turn slower"
-        )
+    _check_motion(path, file)
     hole = _hole(path, file.path)
     needed = file.rig.tubes * file.rig.tube_length_m
     if hole.length + 1e-9 < needed:
@@ -181,8 +176,25 @@ def load_scenario(path: Path, faults: tuple[str, ...] = ()) -> Scenario:
             f"{path}: rig.tubes: {file.rig.tubes} tubes of {file.rig.tube_length_m:g} m need a path of {needed:g} m, "
             f"it ends at {hole.length:g} m; drill fewer tubes or extend the path"
         )
-    parsed = tuple(parse_fault(text, file.rig.tubes) for text in (*file.faults, *faults))
-    return Scenario(file, hole, parsed)
+    try:
+        own = tuple(parse_fault(text, file.rig.tubes) for text in file.faults)
+    except ScenarioError as error:
+        raise ScenarioError(f"{path}: faults: {error}") from error
+    return Scenario(file, hole, own + tuple(parse_fault(text, file.rig.tubes) for text in faults))
+
+
+def _check_motion(path: Path, file: ScenarioFile) -> None:
+    rate, schedule = file.rotation.rate_dps, file.schedule
+    if rate > MAX_RATE_DPS:
+        raise ScenarioError(
+            f"{path}: rotation.rate_dps: expected at most {MAX_RATE_DPS:g} deg/s (57 rev/min, "
+            f"half a turn a cycle), got {rate:g}; turn slower"
+        )
+    if schedule.joint_s >= schedule.add_s:
+        raise ScenarioError(
+            f"{path}: schedule.joint_s: expected less than add_s = {schedule.add_s:g} s, "
+            f"got {schedule.joint_s:g}; close the joint before drilling"
+        )
 
 
 def _parse(path: Path) -> ScenarioFile:

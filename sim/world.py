@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from functools import cached_property
+from itertools import pairwise
 
 import numpy as np
 import numpy.typing as npt
@@ -38,7 +39,7 @@ class World:
     Raises
     ------
     ScenarioError
-        When a fault falls outside the schedule.
+        When a fault falls outside the schedule, or cuts a node's power while the node is down.
     """
 
     def __init__(self, scenario: Scenario, seed: int) -> None:
@@ -197,6 +198,13 @@ class World:
             on = next(phase.start for phase in self.phases if phase.kind == "add" and phase.tube == fault.tube)
             if not on < self.begin + fault.after < self.end - fault.down:
                 raise ScenarioError(
-                    f"fault kill-node:{fault.tube}@{fault.after:g}+{fault.down:g}: expected a time between "
-                    f"{on - self.begin:.0f} s, when the tube is added, and {self.end - fault.down - self.begin:.0f} s"
+                    f"fault {fault}: expected a time between {on - self.begin:.0f} s, "
+                    f"when the tube is added, and {self.end - fault.down - self.begin:.0f} s"
+                )
+        in_order = sorted(self.faults, key=lambda fault: (fault.tube, fault.after))
+        for first, second in pairwise(in_order):
+            if first.tube == second.tube and second.after <= first.after + first.down:
+                raise ScenarioError(
+                    f"fault {second}: expected a time after {first.after + first.down:g} s, "
+                    f"for the node is down until then by {first}"
                 )
