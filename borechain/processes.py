@@ -11,6 +11,7 @@ import sys
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import msgpack
 import setproctitle
@@ -60,14 +61,14 @@ def run_on_bench(name: str, place: Place, address: int, build: Callable[[], Step
         serve(process, client)
 
 
-def run_ground(place: Place, tube_length: float) -> None:
-    """Ground station: the bench drives its link, operators ask it at any time."""
+def run_ground(place: Place, settings: dict[str, Any]) -> None:
+    """Ground station: the bench drives its link, operators ask it at any time; ``settings`` are of ``GroundConfig``."""
     from groundstation.config import GroundConfig
     from groundstation.process import GroundProcess
 
     begin_process("ground")
     with reporting("ground"), open_client(place.endpoint, timeout=CONNECT_TIMEOUT) as bus:
-        process = GroundProcess(GroundConfig(rig=place.rig, folder=place.folder, tube_length=tube_length))
+        process = GroundProcess(GroundConfig(rig=place.rig, folder=place.folder, **settings))
         with process.serving(bus):
             ports = zenoh_ports(bus, place.rig, BASE, [Side.LOWER])
             client = BenchClient(bus, place.rig, BASE, ports, hears_depth=True)

@@ -129,8 +129,10 @@ class GroundProcess(Driven):
         if isinstance(message, Event):
             self.knowledge.take_event(message)
             return []
+        before = list(self.knowledge.alarms.alarms), len(self.knowledge.moved)
         self.knowledge.take_survey(message, md)
-        return ["stations", "trajectory"]
+        after = self.knowledge.alarms.alarms, len(self.knowledge.moved)
+        return ["stations", "trajectory", "uncertainty", "column"] + (["alarms"] if before != after else [])
 
     def _publish(self, changed: list[str]) -> None:
         if self._queries is not None:

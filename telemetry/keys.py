@@ -46,6 +46,9 @@ TABLE: Final[tuple[Key, ...]] = (
     Key("borechain/{rig}/ground/stations/{n}/measurements", "query", "every cluster measured at one station"),
     Key("borechain/{rig}/ground/measurements", "query", "every cluster measurement; ?station=2..5, ?tube=3"),
     Key("borechain/{rig}/ground/trajectory", "query, publish", "positions with covariance; ?md=12.5, ?md=4..12"),
+    Key("borechain/{rig}/ground/uncertainty", "query, publish", "region of uncertainty, its sources; ?confidence=0.9"),
+    Key("borechain/{rig}/ground/column", "query, publish", "deviation from the design, projected to the target"),
+    Key("borechain/{rig}/ground/alarms", "query, publish", "tolerance alarms and stations where the hole moved"),
     Key("borechain/{rig}/ground/events", "query", "events of the nodes; ?tube=3"),
     Key("borechain/{rig}/cmd/{name}", "query", "operator command to the ground station; the reply is its outcome"),
 )

@@ -1,0 +1,1 @@
+"""Figures and reports of surveys, instruments and walls."""
