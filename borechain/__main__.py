@@ -19,6 +19,9 @@ COMMANDS = {
     "router": ("borechain.router", "router", "Be the zenoh router of a rig whose processes start one by one."),
     "query": ("borechain.query", "query", "Ask a running ground station."),
     "watch": ("borechain.query", "watch", "Follow what a running ground station publishes."),
+    "survey": ("borechain.survey", "survey", "Trajectory and region of uncertainty of a record."),
+    "wall": ("borechain.wall", "wall", "Judge the columns of a wall: overlap, thickness, probability of a gap."),
+    "bench": ("borechain.bench", "bench", "Measure speed side by side with other libraries."),
     "experiment": ("borechain.experiment", "experiment", "Rerun a published experiment beside ours."),
 }
 

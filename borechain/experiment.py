@@ -2,14 +2,15 @@
 
 from __future__ import annotations
 
-import csv
 import json
 from pathlib import Path
 from typing import Any
 
 import click
 
-from borechain.faults import EnvironmentFault, plain_faults
+from borechain.faults import plain_faults
+from borechain.survey_experiments import coverage, regions, weighting
+from borechain.tables import show_table, write_table
 
 RELAY_COLUMNS = (
     ("scheme", "scheme"),
@@ -33,10 +34,16 @@ def experiment() -> None:
     """
 
 
+for command in (coverage, regions, weighting):
+    experiment.add_command(command)
+
+
 @experiment.command("list")
 def list_() -> None:
     """Name every experiment."""
-    click.echo("relay   consistency of the yaw's variance at every hop, for both relay schemes")
+    for name in sorted(experiment.commands.keys() - {"list"}):
+        text = (experiment.commands[name].help or "").partition(".")[0].strip()
+        click.echo(f"{name:24} {' '.join(text.split())}")
 
 
 @experiment.command()
@@ -56,45 +63,15 @@ def relay(hops: int, seeds: int, out: Path | None, as_json: bool) -> None:
         task = bar.add_task("seeds", total=2 * seeds)
         result = run(hops, seeds, lambda: bar.advance(task))
     if out is not None:
-        write_table(out, result["cases"])
+        write_table(out / "relay.csv", result["cases"], RELAY_COLUMNS)
     if as_json:
         click.echo(json.dumps(result))
     else:
         show(result)
 
 
-def write_table(folder: Path, rows: list[dict[str, Any]]) -> None:
-    """Keep the table as CSV, landing whole."""
-    try:
-        folder.mkdir(parents=True, exist_ok=True)
-        fresh = folder / "relay.csv.new"
-        with fresh.open("w", newline="") as file:
-            writer = csv.writer(file, lineterminator="\n")
-            writer.writerow([key for key, _ in RELAY_COLUMNS])
-            writer.writerows([[cell(row[key]) for key, _ in RELAY_COLUMNS] for row in rows])
-        fresh.replace(folder / "relay.csv")
-    except OSError as error:
-        raise EnvironmentFault(f"{folder}: {error.strerror}; choose a writable folder with --out") from error
-
-
 def show(result: dict[str, Any]) -> None:
     """Print the table for people."""
-    from rich.console import Console
-    from rich.table import Table
-
-    table = Table(title=f"Relay over {result['hops']} hops, {result['seeds']} seeds")
-    for _, name in RELAY_COLUMNS:
-        table.add_column(name, justify="right")
-    for row in result["cases"]:
-        table.add_row(*(cell(row[key]) for key, _ in RELAY_COLUMNS))
-    console = Console()
-    console.print(table)
+    show_table(f"Relay over {result['hops']} hops, {result['seeds']} seeds", result["cases"], RELAY_COLUMNS)
     for scheme, good in result["consistent"].items():
-        console.print(f"{scheme}: every NEES within [0.5, 2]: {'yes' if good else 'no'}")
-
-
-def cell(value: Any) -> str:
-    """Four significant digits for numbers, nothing for nothing."""
-    if value is None:
-        return ""
-    return f"{value:.4g}" if isinstance(value, float) else str(value)
+        click.echo(f"{scheme}: every NEES within [0.5, 2]: {'yes' if good else 'no'}")
