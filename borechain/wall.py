@@ -29,7 +29,7 @@ def wall(file: Path, plot: Path | None, as_json: bool) -> None:
 
     \b
     Example:
-      borechain wall scenarios/wall-40.toml --plot wall.svg
+      borechain wall scenarios/walls/wall-40.toml --plot wall.svg
     """
     from groundstation.survey.wall import extra_column, joints, worst
     from groundstation.survey.wall_file import read_wall

@@ -10,7 +10,7 @@ import pytest
 
 ROOT = Path(__file__).parents[1]
 POTSDAM = ROOT / "scenarios" / "wellbore-1-path.csv"
-WALL = ROOT / "scenarios" / "wall-40.toml"
+WALL = ROOT / "scenarios" / "walls" / "wall-40.toml"
 
 
 def run(*words: object) -> subprocess.CompletedProcess[str]:

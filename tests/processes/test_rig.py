@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from rigs import command, free_endpoint, run, running_rig, titles_of_group
+from rigs import command, ends, free_endpoint, run, running_rig, titles_of_group
 
 from telemetry.media.zenoh_bus import open_client
 
@@ -26,7 +26,7 @@ def drill(folder: Path, *arguments: str) -> dict[str, Any]:
 def test_three_tubes_give_three_stations_near_the_truth_and_leave_nothing_running(tmp_path: Path) -> None:
     with running_rig(tmp_path, "--seed", "3") as rig:
         result = rig.result()
-        assert titles_of_group(rig.process.pid) == {}
+        assert ends(rig.process.pid)
     assert [s["measurements"] for s in result["stations"]] == [3, 2, 1]
     assert [s["md_m"] for s in result["stations"]] == [2.0, 4.0, 6.0]
     assert result["figures"]["inclination_rms_deg"] < 0.03
@@ -61,7 +61,7 @@ def test_one_process_a_tube_and_none_after_an_interrupt(tmp_path: Path) -> None:
         assert rig.process.returncode == 1
         assert "interrupted" in errors
         assert "Traceback" not in errors
-        assert titles_of_group(rig.process.pid) == {}
+        assert ends(rig.process.pid)
 
 
 def test_operators_get_stations_while_the_rig_drills(tmp_path: Path, ask: Any) -> None:
