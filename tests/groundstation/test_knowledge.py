@@ -130,6 +130,16 @@ def test_stations_that_changed_to_different_sides_did_not_move(tmp_path: Path) -
     assert knowing(tmp_path, measurements, 5).moved == []
 
 
+def test_a_neighbour_that_changed_at_another_stop_is_no_evidence(tmp_path: Path) -> None:
+    placed = [(1, 1, 2.0, 1.0), (2, 1, 4.0, 1.0), (2, 2, 4.0, 2.0), (1, 3, 2.0, 2.0)]
+    measurements = [(survey(tube, stop, 3 - tube, inclination), md) for tube, stop, md, inclination in placed]
+    assert knowing(tmp_path, measurements, 2).moved == []
+    measurements.append((survey(2, 3, 1, 2.0), 4.0))
+    assert [moved.md for moved in knowing(tmp_path, measurements, 2).moved] == []
+    measurements[2] = (survey(2, 2, 1, 1.0), 4.0)
+    assert sorted(moved.md for moved in knowing(tmp_path, measurements, 2).moved) == [2.0, 4.0]
+
+
 def result(knowledge: Knowledge) -> dict[str, Any]:
     """All that follows from the surveys."""
     stations = [

@@ -43,7 +43,7 @@ def titles_of_group(group: int) -> dict[int, str]:
 
 
 def ends(group: int) -> bool:
-    """Whether every process of a group ends by itself: the fork server may still be leaving when its parent has gone."""
+    """Whether every process of a group ends by itself; the fork server may leave a moment after its parent."""
     deadline = time.monotonic() + PATIENCE
     idle: queue.SimpleQueue[None] = queue.SimpleQueue()
     while titles_of_group(group) and time.monotonic() < deadline:
