@@ -156,7 +156,7 @@ class Knowledge:
         station = self._station_at(md)
         station.add(Cluster(measurement, md, direction, quality))
         self._judge_movement(measurement.station_at)
-        self._recompute(measurement.station_at)
+        self._recompute()
         return True
 
     def take_event(self, event: Event) -> None:
@@ -197,27 +197,38 @@ class Knowledge:
         )
 
     def _judge_movement(self, since: float) -> None:
-        """Drop earlier clusters where the hole moved, at every stop from rig time ``since`` (s) on.
+        """Drop earlier clusters where the hole moved, at every stop from the one at rig time ``since`` (s) on.
 
         Each stop is judged as a whole, so the order in which its surveys arrive changes nothing.
         """
-        since -= SAME_STOP
-        self.moved = [moved for moved in self.moved if moved.at < since]
-        late: list[tuple[float, int, int]] = []
-        for number, station in enumerate(self.stations):
-            places = [place for place, cluster in enumerate(station.clusters) if cluster.at >= since]
-            station.drops = [drop for drop in station.drops if drop not in places]
-            late.extend((station.clusters[place].at, number, place) for place in places)
-        for stop in _stops(sorted(late)):
+        stops = [stop for stop in self._stops() if stop[-1][0] >= since]
+        begin = stops[0][0][0]
+        self.moved = [moved for moved in self.moved if moved.at < begin]
+        for stop in stops:
+            for _, number, place in stop:
+                self.stations[number].drops = [d for d in self.stations[number].drops if d != place]
+        for stop in stops:
             self._judge_stop(stop)
 
+    def _stops(self) -> list[list[tuple[float, int, int]]]:
+        """Clusters as (time, station, place) in the order of time, parted where the string was not read for a while."""
+        every = sorted((c.at, n, place) for n, s in enumerate(self.stations) for place, c in enumerate(s.clusters))
+        stops: list[list[tuple[float, int, int]]] = []
+        for cluster in every:
+            if not stops or cluster[0] - stops[-1][-1][0] >= SAME_STOP:
+                stops.append([])
+            stops[-1].append(cluster)
+        return stops
+
     def _judge_stop(self, stop: list[tuple[float, int, int]]) -> None:
-        seen = {number: self.stations[number].departure(place) for _, number, place in stop}
-        for at, number, place in stop:
-            own = seen[number]
+        """Neighbours are the nearest stations above and below that were read at the same stop."""
+        by_depth = sorted(stop, key=lambda cluster: cluster[1:])
+        seen = [self.stations[number].departure(place) for _, number, place in by_depth]
+        for k, (at, number, place) in enumerate(by_depth):
+            own = seen[k]
             if own is None:
                 continue
-            around = [d for d in (seen.get(number - 1), seen.get(number + 1)) if d is not None]
+            around = [d for d in (*seen[max(k - 1, 0) : k], *seen[k + 1 : k + 2]) if d is not None]
             evidence = judge(own, around)
             if evidence.moved:
                 station = self.stations[number]
@@ -228,7 +239,7 @@ class Knowledge:
         """Direction of a station from the clusters that count."""
         return weighted(station.readings(), self.config.weighting)
 
-    def _recompute(self, at: float) -> None:
+    def _recompute(self) -> None:
         trajectory = Trajectory()
         direction = None
         for station in self.stations:
@@ -238,17 +249,8 @@ class Knowledge:
         self.trajectory = trajectory.points
         if direction is None:
             return
+        at = max(cluster.at for station in self.stations for cluster in station.clusters)
         worst = max((deviation(point, self.config.design) for point in self.trajectory[1:]), key=lambda d: d.ratio)
         self.projection = project(self.trajectory[-1], direction, self.config.design)
         self.alarms.judge("deviation", worst, at)
         self.alarms.judge("projection", self.projection, at)
-
-
-def _stops(late: list[tuple[float, int, int]]) -> list[list[tuple[float, int, int]]]:
-    """Clusters (time, station, place) in the order of time, parted into stops."""
-    stops: list[list[tuple[float, int, int]]] = []
-    for cluster in late:
-        if not stops or cluster[0] - stops[-1][0][0] >= SAME_STOP:
-            stops.append([])
-        stops[-1].append(cluster)
-    return stops

@@ -18,6 +18,7 @@ from groundstation.survey.resolve import Lean, angle_stds, angles
 from groundstation.survey.trajectory import Point
 
 Array = npt.NDArray[np.float64]
+STEEPEST = 0.05  # cosine between hole and axis, below which the hole does not come to the target's depth
 LEVELS = (0.5, 0.8, 1.0)  # of the tolerance, at which an alarm is due
 
 
@@ -136,10 +137,15 @@ def project(point: Point, direction: Lean, design: Design) -> Deviation:
     """
     offset = point.position - np.array(design.head)
     axis, across = design.axis, design.across
-    rest = (design.length - float(offset @ axis)) / max(float(point.tangent @ axis), 1e-3)
+    along = float(point.tangent @ axis)
+    if along < STEEPEST:
+        return deviation(point, design)
+    rest = (design.length - float(offset @ axis)) / along
     target = offset + rest * point.tangent
     if rest <= 0.0:
         return deviation(point, design)
+    # an error along the axis changes how far there is to go: what counts is its trace on the target's plane
+    across = across @ (np.eye(3) - np.outer(point.tangent, axis) / along)
     down = math.copysign(max(abs(direction.down), 1e-6), direction.down)
     jacobian = rest * (
         across @ np.array([[1.0, 0.0], [0.0, 1.0], [-direction.lean[0] / down, -direction.lean[1] / down]])
@@ -147,7 +153,9 @@ def project(point: Point, direction: Lean, design: Design) -> Deviation:
     turned = jacobian @ direction.total_cov @ jacobian.T
     here = across @ point.cov @ across.T
     root = _root(here) + _root(turned)
-    return Deviation(point.md + rest, design.length, across @ target, root @ root.T, design.tolerance.at(design.length))
+    return Deviation(
+        point.md + rest, design.length, design.across @ target, root @ root.T, design.tolerance.at(design.length)
+    )
 
 
 def _root(cov: Array) -> Array:

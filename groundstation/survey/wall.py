@@ -93,7 +93,7 @@ def at_depths(positions: Array, tangents: Array, covs: Array, depths: Array) -> 
     """Centres (w, z, 2) and covariances (w, z, 2, 2) at true vertical depths, of wells (w, n, 3) and (w, n, 3, 3).
 
     Between stations the centre follows the cubic that has the stations' places and slopes; nan further than ``TOE``
-    below the last.
+    above the first or below the last.
     A depth error moves the centre by the slope of the hole: the covariance is that of the plane at a fixed depth.
     """
     tvd = positions[..., 2]
@@ -110,7 +110,7 @@ def at_depths(positions: Array, tangents: Array, covs: Array, depths: Array) -> 
     plane = lateral @ covs @ np.swapaxes(lateral, -1, -2)
     g = f[..., None]
     cov = (1.0 - g) * plane[wells, k] + g * plane[wells, k + 1]
-    beyond = depths[None, :] > tvd[:, -1:] + TOE
+    beyond = (depths[None, :] > tvd[:, -1:] + TOE) | (depths[None, :] < tvd[:, :1] - TOE)
     centre[beyond] = np.nan
     return centre, cov
 
@@ -149,7 +149,15 @@ def worst_depths(found: Joints) -> npt.NDArray[np.intp]:
 
 
 def worst(found: Joints) -> tuple[int, int]:
-    """Joint and depth (indices) that most probably is too thin; of equals the thinnest."""
+    """Joint and depth (indices) that most probably is too thin; of equals the thinnest.
+
+    Raises
+    ------
+    SurveyError
+        When no joint is known at any depth.
+    """
+    if not np.any(np.isfinite(found.thickness)):
+        raise SurveyError("wall: expected two neighbours that reach a common depth, got none")
     depths = worst_depths(found)
     joints_ = np.arange(len(depths))
     best = np.lexsort((found.thickness[joints_, depths], -found.probability[joints_, depths]))[0]
