@@ -129,6 +129,9 @@ def survey(
 
 def station_rows(found: Analysis, sigma: float, north_of_site_deg: float) -> list[dict[str, Any]]:
     """One object a station; uncertainty at ``sigma`` standard deviations."""
+    from groundstation.survey.methods import referred
+
+    azimuths = referred(found.record.azimuth, math.radians(north_of_site_deg))
     rows = []
     for k, md in enumerate(found.record.md.tolist()):
         north, east, tvd = found.positions[k].tolist()
@@ -138,7 +141,7 @@ def station_rows(found: Analysis, sigma: float, north_of_site_deg: float) -> lis
                 "station": k,
                 "md_m": md,
                 "inclination_deg": math.degrees(found.record.inclination[k]),
-                "azimuth_deg": (math.degrees(found.record.azimuth[k]) + north_of_site_deg) % 360.0,
+                "azimuth_deg": math.degrees(azimuths[k]),
                 "north_m": north,
                 "east_m": east,
                 "tvd_m": tvd,

@@ -21,9 +21,11 @@ SWEEP_COLUMNS = tuple(
 )
 FILTERED_COLUMNS = (
     ("instrument", "instrument"),
+    ("station", "station"),
     ("unfiltered_cm", "gyro, cm"),
     ("filtered_cm", "0.25 deg azimuth, cm"),
 )
+MAGNETIC_COLUMNS = (("station", "station"), ("magnetic_deg", "magnetic, deg"), ("filtered_deg", "filtered, deg"))
 COVERAGE_COLUMNS = (
     ("case", "case"),
     ("published", "claimed, %"),
@@ -54,14 +56,15 @@ def regions(out: Path | None, as_json: bool) -> None:
         click.echo(json.dumps(result))
         return
     show_table("Region of uncertainty of wellbore 1", result["cases"], REGION_COLUMNS)
-    show_table("Lateral error at the toe: gyro against a held azimuth", result["filtered"], FILTERED_COLUMNS)
+    show_table("Lateral error: gyro against a held azimuth", result["filtered"], FILTERED_COLUMNS)
+    show_table("Azimuth error of a magnetic survey", result["magnetic"], MAGNETIC_COLUMNS)
 
 
 def draw_regions(folder: Path, result: dict[str, Any]) -> None:
     """Figures 4.5-4.7."""
     import numpy as np
 
-    from groundstation.report.plots_study import uncertainty_figure
+    from groundstation.report.plots_study import azimuth_error_figure, uncertainty_figure
     from groundstation.report.style import save
     from sim.experiments.published import wellbore_1
 
@@ -74,7 +77,14 @@ def draw_regions(folder: Path, result: dict[str, Any]) -> None:
                 axis = ("north", "east", "tvd").index(row["axis"])
                 ours[row["station"], axis], printed[row["station"], axis] = row["ours"], row["published"]
         tables[name] = (md[1:], ours[1:], printed[1:])
-    save(uncertainty_figure(tables), folder / "region-of-uncertainty.svg")
+    save(uncertainty_figure(tables, level="1 or 2 sigma, as printed"), folder / "region-of-uncertainty.svg")
+    held = {}
+    for name in dict.fromkeys(row["instrument"] for row in result["filtered"]):
+        rows = [row for row in result["filtered"] if row["instrument"] == name]
+        raw, kept = (np.array([row[key] for row in rows]) for key in ("unfiltered_cm", "filtered_cm"))
+        held[name] = (md[1:], raw, kept)
+    title = "Lateral error: gyro against an azimuth held to 0.25 deg"
+    save(azimuth_error_figure(held, 0.25, title), folder / "filtered.svg")
 
 
 @click.command()
@@ -94,10 +104,30 @@ def weighting(out: Path | None, as_json: bool) -> None:
     if out is not None:
         write_table(out / "weighting.csv", result["cases"], CASE_COLUMNS)
         write_table(out / "weighting-sweeps.csv", result["sweeps"], SWEEP_COLUMNS)
+        draw_weighting(out, result["sweeps"])
     if as_json:
         click.echo(json.dumps(result))
         return
     show_table("Remaining error at the fourth stop", result["cases"], CASE_COLUMNS)
+
+
+def draw_weighting(folder: Path, sweeps: list[dict[str, Any]]) -> None:
+    """Figures 4.28-4.37: what remains at station 2."""
+    import numpy as np
+
+    from groundstation.report.plots_study import weighting_figure
+    from groundstation.report.style import save
+
+    for angle in ("inclination", "azimuth"):
+        rows = [row for row in sweeps if row["changed"] == angle and row["station"] == 2]
+        changes = np.array(sorted({row["value_deg"] for row in rows}))
+        errors = {
+            scheme: np.array([np.hypot(r["north_cm"], r["east_cm"]) for r in rows if r["scheme"] == scheme])
+            for scheme in dict.fromkeys(row["scheme"] for row in rows)
+        }
+        start = changes - (1.0 if angle == "inclination" else 120.0)
+        figure = weighting_figure(start, errors, angle, f"Error left at station 2 when its {angle} changed")
+        save(figure, folder / f"weighting-{angle}.svg")
 
 
 @click.command()
@@ -125,7 +155,21 @@ def coverage(wells: int, strings: int, out: Path | None, as_json: bool) -> None:
         result = run(wells, strings, lambda: bar.advance(task))
     if out is not None:
         write_table(out / "coverage.csv", result["cases"], COVERAGE_COLUMNS)
+        draw_coverage(out, result)
     if as_json:
         click.echo(json.dumps(result))
         return
     show_table(f"Coverage over {result['wells']} wells", result["cases"], COVERAGE_COLUMNS)
+
+
+def draw_coverage(folder: Path, result: dict[str, Any]) -> None:
+    """Claimed confidence against the share inside."""
+    import numpy as np
+
+    from groundstation.report.plots_study import coverage_figure
+    from groundstation.report.style import save
+
+    toe = [row for row in result["cases"] if row["case"].startswith("plan ellipse, toe")]
+    claimed, inside = (np.array([row[key] for row in toe]) / 100.0 for key in ("published", "ours"))
+    title = f"Toes inside the claimed ellipse, {result['wells']} wells"
+    save(coverage_figure(claimed, {"plan ellipse at the toe": inside}, result["wells"], title), folder / "coverage.svg")

@@ -75,11 +75,23 @@ def result_of(found: Wall, judged: Joints, joint: int, depth: int, extra: ExtraC
         "wall": found.file.name,
         "columns": [column_row(found, k) for k in range(len(found.columns.names))],
         "required_thickness_m": found.file.thickness,
+        "margin": allowance(found),
         "joints": rows,
         "gaps": sum(row["thickness_m"] < found.file.thickness for row in rows),
         "doubtful": sum(row["probability"] >= LIKELY for row in rows),
         "worst": worst,
     }
+
+
+def allowance(found: Wall) -> dict[str, float] | None:
+    """How far one column alone may shift along the wall at its toe; None for a wall without a spacing."""
+    from groundstation.survey.wall import margin
+
+    if found.file.spacing is None:
+        return None
+    length = found.file.length or float(found.columns.depths[-1])
+    shift, angle = margin(found.file.radius, found.file.thickness, found.file.spacing, length)
+    return {"shift_cm": 100.0 * shift, "deviation_deg": math.degrees(angle)}
 
 
 def joint_row(found: Wall, judged: Joints, joint: int, depth: int, thinnest: int) -> dict[str, Any]:
@@ -135,6 +147,9 @@ def show(result: dict[str, Any]) -> None:
             f"{row['direction_deg']:.0f}",
         )
     console.print(table)
+    if result["margin"] is not None:
+        m = result["margin"]
+        console.print(f"one column alone may be {m['shift_cm']:.1f} cm off at its toe, {m['deviation_deg']:.3f} deg")
     over = [row for row in result["columns"] if row["used_percent"] >= 100.0]
     console.print(
         f"required {result['required_thickness_m']:g} m: "

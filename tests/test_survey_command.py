@@ -193,7 +193,7 @@ def test_an_instrument_that_errs_only_down_is_a_singular_covariance(tmp_path: Pa
         '[[term]]\nname = "A"\nvalue = 0.01\nunit = "m"\nmode = "random"\ndepth = "1"\n'
     )
     wall = changed(tmp_path, WALL.name, 'instrument = "relay"', f'instrument = "{tmp_path / "tape.toml"}"')
-    assert "station 1: the covariance is singular" in refused("wall", wall)
+    assert "station 1, north and east: the covariance is singular" in refused("wall", wall)
 
 
 def test_the_bench_lists_itself_and_refuses_others() -> None:

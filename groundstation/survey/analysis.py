@@ -69,9 +69,9 @@ def with_azimuth_error(tool: Tool, azimuth_error: float) -> Tool:
 
     This is the filtered against the unfiltered survey of thesis figures 4.24-4.27.
     """
-    kept = tuple(term for term in tool.terms if not _turns_azimuth_alone(term))
     constant = Term("AZIMUTH", azimuth_error, "rad", Mode.SYSTEMATIC, ("0", "0", "1"))
-    return tool.with_terms((*kept, constant))
+    gyro = [term.name for term in tool.terms if _turns_azimuth_alone(term)]
+    return tool.with_terms((*tool.terms, constant)).without(*gyro)
 
 
 def _turns_azimuth_alone(term: Term) -> bool:

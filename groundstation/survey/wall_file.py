@@ -13,6 +13,7 @@ import numpy.typing as npt
 
 from groundstation.errors import SurveyError
 from groundstation.survey.columns import Design, Tolerance, tolerance
+from groundstation.survey.ellipsoid import check_covariance
 from groundstation.survey.error_model import Leg, Site, Survey, propagate
 from groundstation.survey.instruments import Tool, load_tool
 from groundstation.survey.methods import Method, positions, tangents
@@ -235,10 +236,6 @@ def _check_values(path: Path, line: Array, md: Array, inclination_deg: Array, az
 
 def _check_covariances(path: Path, names: list[str], members: npt.NDArray[np.intp], cov: Array) -> None:
     smallest = np.linalg.eigvalsh(cov[:, 1:, :2, :2])[..., 0]
-    wrong = np.argwhere(~(smallest > 0.0))
-    if len(wrong):
-        well, station = wrong[0]
-        raise SurveyError(
-            f"{path}: column {names[members[well]]}, station {station + 1}: the covariance is singular; "
-            "expected an instrument that errs north and east"
-        )
+    for well, station in np.argwhere(~(smallest > 0.0))[:1]:
+        where = f"{path}: column {names[members[well]]}, station {station + 1}, north and east"
+        check_covariance(cov[well, station + 1, :2, :2], where)

@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from groundstation.survey.analysis import analyse, with_azimuth_error
+from groundstation.survey.analysis import analyse, magnetic_error, with_azimuth_error
 from groundstation.survey.error_model import Site
 from groundstation.survey.instruments import load_tool
 from groundstation.survey.methods import Method
@@ -42,7 +42,12 @@ def run() -> dict[str, Any]:
         for row in printed
         for k, axis in enumerate(AXES)
     ]
-    return {"experiment": "region-of-uncertainty", "cases": cases, "filtered": filtered(multiples)}
+    return {
+        "experiment": "region-of-uncertainty",
+        "cases": cases,
+        "filtered": filtered(multiples),
+        "magnetic": magnetic(),
+    }
 
 
 def half_widths_cm(instrument: str, multiple: float, azimuth_error_deg: float | None = None) -> Array:
@@ -56,17 +61,29 @@ def half_widths_cm(instrument: str, multiple: float, azimuth_error_deg: float | 
 
 
 def filtered(multiples: dict[str, float]) -> list[dict[str, Any]]:
-    """Lateral half-width at the last station with the gyro's terms and with the filter's azimuth."""
-    rows = []
+    """Lateral half-width of every station with the gyro's terms and with the filter's azimuth."""
+    rows: list[dict[str, Any]] = []
     for name, multiple in multiples.items():
         if "GD" not in [term.name for term in load_tool(name).terms]:
             continue
-        raw, held = (half_widths_cm(name, multiple, x)[-1] for x in (None, FILTERED_AZIMUTH_DEG))
-        rows.append(
+        raw, held = (half_widths_cm(name, multiple, x) for x in (None, FILTERED_AZIMUTH_DEG))
+        rows.extend(
             {
                 "instrument": name,
-                "unfiltered_cm": math.hypot(raw[0], raw[1]),
-                "filtered_cm": math.hypot(held[0], held[1]),
+                "station": k,
+                "unfiltered_cm": math.hypot(raw[k, 0], raw[k, 1]),
+                "filtered_cm": math.hypot(held[k, 0], held[k, 1]),
             }
+            for k in range(1, len(raw))
         )
     return rows
+
+
+def magnetic() -> list[dict[str, Any]]:
+    """Azimuth error of a magnetic survey at every station beside that of the filter (thesis Fig. 4.23), deg."""
+    record = wellbore_1()
+    errors = np.degrees(magnetic_error(record.inclination, record.azimuth))
+    return [
+        {"station": k, "magnetic_deg": float(errors[k]), "filtered_deg": FILTERED_AZIMUTH_DEG}
+        for k in range(1, len(errors))
+    ]
