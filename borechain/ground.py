@@ -7,14 +7,15 @@ from pathlib import Path
 import click
 
 from borechain.faults import plain_faults
-from borechain.options import place_options
+from borechain.options import key_option, place_options
 
 
 @click.command()
 @click.option("--tube-length-m", type=float, default=2.0, show_default=True, help="Length of every tube of the tally.")
+@key_option
 @place_options
 @plain_faults
-def ground(tube_length_m: float, rig_name: str, endpoint: str, folder: Path) -> None:
+def ground(tube_length_m: float, key_file: Path | None, rig_name: str, endpoint: str, folder: Path) -> None:
     """Run the ground station of one rig.
 
     \b
@@ -23,4 +24,4 @@ def ground(tube_length_m: float, rig_name: str, endpoint: str, folder: Path) -> 
     """
     from borechain.processes import Place, run_ground
 
-    run_ground(Place(rig_name, endpoint, folder), tube_length_m)
+    run_ground(Place(rig_name, endpoint, folder, key_file), tube_length_m)

@@ -5,6 +5,7 @@
     GroundError
     ├── SurveyError(ValueError)       numbers that are no survey: which value, which station
     ├── SelectorError(ValueError)     a query nobody can answer: the message lists the valid names
+    ├── ConfigurationError(ValueError) a setting that what was asked for needs: correct the option named
     └── StoreError(OSError)           the database cannot be opened or written: nothing was acknowledged
 """
 
@@ -21,6 +22,10 @@ class SurveyError(GroundError, ValueError):
 
 class SelectorError(GroundError, ValueError):
     """The query cannot be answered; the message says what can."""
+
+
+class ConfigurationError(GroundError, ValueError):
+    """A setting is missing or outside its range."""
 
 
 class StoreError(GroundError, OSError):

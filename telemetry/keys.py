@@ -47,5 +47,6 @@ TABLE: Final[tuple[Key, ...]] = (
     Key("borechain/{rig}/ground/measurements", "query", "every cluster measurement; ?station=2..5, ?tube=3"),
     Key("borechain/{rig}/ground/trajectory", "query, publish", "positions with covariance; ?md=12.5, ?md=4..12"),
     Key("borechain/{rig}/ground/events", "query", "events of the nodes; ?tube=3"),
+    Key("borechain/{rig}/ground/static_records", "query", "raw readings that nodes averaged at rest; ?tube=3"),
     Key("borechain/{rig}/cmd/{name}", "query", "operator command to the ground station; the reply is its outcome"),
 )

@@ -1,0 +1,1 @@
+"""Reports for people: figures and certificates; knows no service."""
