@@ -21,6 +21,9 @@ COMMANDS = {
     "watch": ("borechain.query", "watch", "Follow what a running ground station publishes."),
     "calibrate": ("borechain.calibrate", "calibrate", "Calibrate sensors from the records of a bench."),
     "allan": ("borechain.allan", "allan", "Say from a static record what noise a sensor has."),
+    "survey": ("borechain.survey", "survey", "Trajectory and region of uncertainty of a record."),
+    "wall": ("borechain.wall", "wall", "Judge the columns of a wall: overlap, thickness, probability of a gap."),
+    "bench": ("borechain.bench", "bench", "Measure speed side by side with other libraries."),
     "experiment": ("borechain.experiment", "experiment", "Rerun a published experiment beside ours."),
 }
 

@@ -2,25 +2,19 @@
 
 from __future__ import annotations
 
-import csv
 import json
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
 import click
 
-from borechain.faults import EnvironmentFault, plain_faults
+from borechain.faults import plain_faults
 from borechain.options import seed_option
+from borechain.survey_experiments import coverage, regions, weighting
+from borechain.tables import Columns, cell, write_table
 
-Columns = Sequence[tuple[str, str]]  # key in a row, heading for people
-EXPERIMENTS = {
-    "relay": "consistency of the yaw's variance at every hop, for both relay schemes",
-    "mwd": "calibration of synthetic MWD tools: iterations, errors before and after, beside another solver",
-    "allan": "Allan analysis of synthetic static records with the published noise of the node's sensor",
-    "records": "records of synthetic instruments, to try `calibrate` and `allan` on",
-}
 RELAY_COLUMNS: Columns = (
     ("scheme", "scheme"),
     ("hop", "hop"),
@@ -76,17 +70,16 @@ def experiment() -> None:
     """
 
 
+for command in (coverage, regions, weighting):
+    experiment.add_command(command)
+
+
 @experiment.command("list")
 def list_() -> None:
-    """Name every experiment.
-
-    \b
-    Example:
-      borechain experiment list
-    """
-    width = max(map(len, EXPERIMENTS))
-    for name, text in EXPERIMENTS.items():
-        click.echo(f"{name:{width}}   {text}")
+    """Name every experiment."""
+    for name in sorted(experiment.commands.keys() - {"list"}):
+        text = (experiment.commands[name].help or "").partition(".")[0].strip()
+        click.echo(f"{name:24} {' '.join(text.split())}")
 
 
 @experiment.command()
@@ -189,19 +182,9 @@ def progress(what: str, total: int, *, quiet: bool) -> Iterator[Callable[[], Non
 
 
 def keep(folder: Path | None, result: dict[str, Any], columns: Columns) -> None:
-    """Keep the table as CSV under the experiment's name, landing whole."""
-    if folder is None:
-        return
-    try:
-        folder.mkdir(parents=True, exist_ok=True)
-        fresh = folder / f"{result['experiment']}.csv.new"
-        with fresh.open("w", newline="") as file:
-            writer = csv.writer(file, lineterminator="\n")
-            writer.writerow([key for key, _ in columns])
-            writer.writerows([[cell(row[key]) for key, _ in columns] for row in result["cases"]])
-        fresh.replace(folder / f"{result['experiment']}.csv")
-    except OSError as error:
-        raise EnvironmentFault(f"{folder}: {error.strerror}; choose a writable folder with --out") from error
+    """Keep the table as CSV under the experiment's name."""
+    if folder is not None:
+        write_table(folder / f"{result['experiment']}.csv", result["cases"], columns)
 
 
 def tell(
@@ -230,10 +213,3 @@ def tell(
 def yes(good: bool) -> str:
     """A verdict in a word."""
     return "yes" if good else "no"
-
-
-def cell(value: Any) -> str:
-    """Four significant digits for numbers, nothing for nothing."""
-    if value is None:
-        return ""
-    return f"{value:.4g}" if isinstance(value, float) else str(value)

@@ -30,14 +30,14 @@ def plain_faults(command: Callable[P, R]) -> Callable[P, R]:
     @functools.wraps(command)
     def guarded(*args: P.args, **kwargs: P.kwargs) -> R:
         from groundstation.calibration.errors import CalibrationError
-        from groundstation.errors import GroundError
+        from groundstation.errors import GroundError, SurveyError, ToolError
         from node.errors import ConfigurationError, NodeError
         from sim.errors import ScenarioError, SimError
         from telemetry.errors import TelemetryError
 
         try:
             return command(*args, **kwargs)
-        except (ScenarioError, ConfigurationError, CalibrationError) as error:
+        except (ScenarioError, ConfigurationError, SurveyError, ToolError, CalibrationError) as error:
             raise InputFault(str(error)) from error
         except (SimError, NodeError, TelemetryError, GroundError, OSError) as error:
             raise EnvironmentFault(str(error)) from error

@@ -11,6 +11,7 @@ import sys
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import msgpack
 import setproctitle
@@ -67,14 +68,14 @@ def run_on_bench(name: str, place: Place, address: int, build: Callable[[], Step
         serve(process, client)
 
 
-def run_ground(place: Place, tube_length: float) -> None:
-    """Ground station: the bench drives its link, operators ask it at any time."""
+def run_ground(place: Place, settings: dict[str, Any]) -> None:
+    """Ground station: the bench drives its link, operators ask it at any time; ``settings`` are of ``GroundConfig``."""
     from groundstation.config import GroundConfig
     from groundstation.process import GroundProcess
 
     begin_process("ground")
     with reporting("ground"), open_client(place.endpoint, timeout=CONNECT_TIMEOUT) as bus:
-        config = GroundConfig(rig=place.rig, folder=place.folder, key_file=place.key_file, tube_length=tube_length)
+        config = GroundConfig(rig=place.rig, folder=place.folder, key_file=place.key_file, **settings)
         process = GroundProcess(config)
         with process.serving(bus):
             ports = zenoh_ports(bus, place.rig, BASE, [Side.LOWER])

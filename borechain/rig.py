@@ -107,17 +107,34 @@ def process_table(
     specs = {
         "medium": Spec(run_medium, (place("medium"), scenario, seed, speed, faults, True)),
         "encoder": Spec(run_encoder, (place("encoder"),)),
-        "base": Spec(run_ground, (place("ground"), world.scenario.tube_length)),
+        "base": Spec(run_ground, (place("ground"), ground_settings(world))),
     }
     for tube in range(1, world.scenario.tubes + 1):
         specs[str(tube)] = Spec(run_node, (place(f"tube-{tube}"), world.tube_settings(tube)))
     return ProcessTable(specs, PRELOAD)
 
 
+def ground_settings(world: World) -> dict[str, Any]:
+    """What the operator enters at the ground station: tally, design, and what calibration left."""
+    file = world.scenario.file
+    return {
+        "tube_length": world.scenario.tube_length,
+        "gravity": file.accelerometer.gravity_mps2,
+        "accelerometer_bias_std_deg": file.accelerometer.bias_std_deg,
+        "mount_std_deg": file.joints.mount_std_deg,
+        "target": file.design.length_m or world.scenario.tubes * world.scenario.tube_length,
+        "design_inclination_deg": file.design.inclination_deg,
+        "design_azimuth_deg": file.design.azimuth_deg,
+        "column_radius": file.design.radius_m,
+        "tolerance": file.design.tolerance,
+    }
+
+
 def ask(bus: ZenohBus, rig_name: str) -> dict[str, Any]:
     """Stations, trajectory and measurements as any operator would get them."""
     return {
-        path: get_json(bus, f"borechain/{rig_name}/ground/{path}") for path in ("stations", "measurements", "status")
+        path: get_json(bus, f"borechain/{rig_name}/ground/{path}")
+        for path in ("stations", "measurements", "column", "alarms")
     }
 
 
@@ -141,6 +158,8 @@ def result_of(answers: dict[str, Any], world: World) -> dict[str, Any]:
         "stations": stations,
         "figures": figures(stations, measurements, world),
         "measurements": len(measurements),
+        "column": {key: answers["column"][key] for key in ("worst", "projection", "dominant")},
+        "alarms": answers["alarms"]["active"],
         "rig_s": round(world.end - world.begin, 3),
         "digest": digest(stations),
     }
@@ -196,8 +215,22 @@ def show_result(result: dict[str, Any], folder: Path) -> None:
         values = value if isinstance(value, list) else [value]
         shown = " ".join("-" if v is None else f"{v:.4f}" for v in values)
         console.print(f"{name:22} {shown}")
+    show_column(result)
     console.print(
         f"{len(result['stations'])} stations, {result['measurements']} measurements, {result['processes']} processes, "
         f"{result['rig_s']:.0f} s of rig time in {result['wall_s']:.1f} s"
     )
     console.print(f"digest {result['digest']}\nfiles  {folder}", soft_wrap=True)
+
+
+def show_column(result: dict[str, Any]) -> None:
+    """Where the column is against its design, in a line each."""
+    for name in ("worst", "projection"):
+        d = result["column"][name]
+        if d is not None:
+            click.echo(
+                f"column {name:15} {d['deviation_cm']:.1f} +- {d['sigma_cm']:.2f} cm "
+                f"towards {d['direction_deg']:.0f} deg at {d['md_m']:.1f} m, {d['used_percent']:.0f} % of the tolerance"
+            )
+    for alarm in result["alarms"]:
+        click.echo(f"alarm  {alarm['kind']:15} {alarm['level_percent']} % of the tolerance at {alarm['md_m']:.1f} m")

@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+import math
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Literal
 
 from pydantic import BaseModel, ConfigDict, Field
 
+from groundstation.survey.columns import PRESETS, Design
+from groundstation.survey.fusion import Weighting
 from telemetry import keys
 
 Positive = Annotated[float, Field(gt=0.0)]
@@ -24,6 +27,13 @@ class GroundConfig(BaseModel):
     tube_length: Positive = Field(2.0, description="m, of every tube of the tally")
     gravity: Positive = Field(9.81, description="m/s^2, of the site")
     accelerometer_bias_std_deg: float = Field(0.002, ge=0.0, description="left after calibration, as a tilt")
+    mount_std_deg: float = Field(0.05, ge=0.0, description="of the IMU in its tube, about the axis")
+    weighting: Weighting = Field(Weighting.BAYES, description="how the readings of one station count")
+    target: Positive = Field(30.0, description="m, length of the design axis")
+    design_inclination_deg: float = Field(0.0, ge=0.0, le=180.0)
+    design_azimuth_deg: float = 0.0
+    column_radius: Positive = Field(0.6, description="m, of the finished column")
+    tolerance: Literal["en-12716", "5-cm", "0.27-deg"] = Field("en-12716", description="preset of columns.PRESETS")
     station_tolerance: Positive = Field(0.05, description="m, within which two surveys are at the same station")
     stale_after: Positive = Field(4.5, description="s of rig time without a state of a node")
 
@@ -36,3 +46,15 @@ class GroundConfig(BaseModel):
     def url(self) -> str:
         """Database to use."""
         return self.database_url or f"sqlite:///{self.folder / 'ground.sqlite'}"
+
+    @property
+    def design(self) -> Design:
+        """Axis of the column."""
+        return Design(
+            self.rig,
+            inclination=math.radians(self.design_inclination_deg),
+            azimuth=math.radians(self.design_azimuth_deg),
+            length=self.target,
+            radius=self.column_radius,
+            tolerance=PRESETS[self.tolerance],
+        )

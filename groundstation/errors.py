@@ -3,7 +3,8 @@
 ::
 
     GroundError
-    ├── SurveyError(ValueError)       numbers that are no survey: which value, which station
+    ├── SurveyError(ValueError)       numbers that are no survey: which file and line, which value, which station
+    ├── ToolError(ValueError)         an instrument model that cannot be used: which file, term and formula
     ├── SelectorError(ValueError)     a query nobody can answer: the message lists the valid names
     ├── ConfigurationError(ValueError) a setting that what was asked for needs: correct the option named
     └── StoreError(OSError)           the database cannot be opened or written: nothing was acknowledged
@@ -18,6 +19,10 @@ class GroundError(Exception):
 
 class SurveyError(GroundError, ValueError):
     """The numbers given are no survey."""
+
+
+class ToolError(GroundError, ValueError):
+    """The instrument model cannot be used."""
 
 
 class SelectorError(GroundError, ValueError):

@@ -189,8 +189,10 @@ class GroundProcess(Driven):
         if isinstance(message, StaticRecord):
             self.knowledge.take_static(message)
             return []
+        before = list(self.knowledge.alarms.alarms), len(self.knowledge.moved)
         self.knowledge.take_survey(message, md)
-        return ["stations", "trajectory"]
+        after = self.knowledge.alarms.alarms, len(self.knowledge.moved)
+        return ["stations", "trajectory", "uncertainty", "column"] + (["alarms"] if before != after else [])
 
     def _publish(self, changed: list[str]) -> None:
         if self._queries is not None:

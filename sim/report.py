@@ -26,6 +26,9 @@ STATION_KEYS = (
     "sigma_east_m",
     "sigma_tvd_m",
     "measurements",
+    "sigma_yaw_deg",
+    "sigma_systematic_deg",
+    "sigma_force_mps2",
 )
 TRUTH_KEYS = ("md_m", "inclination_deg", "azimuth_deg", "north_m", "east_m", "tvd_m")
 AZIMUTH_FROM_INCLINATION_DEG = 1.0  # below, the azimuth of a lean says nothing

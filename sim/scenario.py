@@ -130,6 +130,16 @@ class NodeSection(Section):
     scheme: Literal["forward", "estimate"] = "forward"
 
 
+class DesignSection(Section):
+    """The column that the hole is to become, as the ground station judges it."""
+
+    inclination_deg: float = Field(0.0, ge=0.0, le=180.0)
+    azimuth_deg: float = 0.0
+    length_m: Positive | None = Field(None, description="of the axis; what the tubes reach if absent")
+    radius_m: Positive = Field(0.6, description="of the finished column")
+    tolerance: Literal["en-12716", "5-cm", "0.27-deg"] = "en-12716"
+
+
 class ScenarioFile(Section):
     """A whole scenario file."""
 
@@ -144,6 +154,7 @@ class ScenarioFile(Section):
     clocks: ClockSection = ClockSection()
     medium: MediumSection = MediumSection()
     node: NodeSection = NodeSection()
+    design: DesignSection = DesignSection()
     faults: tuple[str, ...] = ()
 
 

@@ -7,18 +7,24 @@ from collections import deque
 from dataclasses import dataclass, field
 
 import numpy as np
+import numpy.typing as npt
 
 from groundstation.config import GroundConfig
 from groundstation.errors import SurveyError
+from groundstation.service.alarms import AlarmList
 from groundstation.service.string_order import DepthLog, StringOrder
-from groundstation.survey.fusion import StationFusion
+from groundstation.survey.columns import Deviation, deviation, project
+from groundstation.survey.fusion import Departure, Evidence, departure, judge, weighted
 from groundstation.survey.resolve import Lean, Quality, check, combine_imus, resolve
+from groundstation.survey.shared import SharedErrors
 from groundstation.survey.trajectory import Point, Trajectory
 from telemetry.messages import Event, NodeState, StaticRecord, SurveyMeasurement
 
+Array = npt.NDArray[np.float64]
 EVENTS_SHOWN = 10_000
 STATIC_RECORDS_SHOWN = 1_000
 ACCELEROMETER_NOISE_DEG = 0.02  # one sample, for the check of motion
+SAME_STOP = 15.0  # s, within which two surveys were taken at one stop
 
 
 @dataclass(frozen=True, slots=True)
@@ -30,19 +36,71 @@ class Cluster:
     direction: Lean
     quality: Quality
 
+    @property
+    def at(self) -> float:
+        """Rig time of the stop, s."""
+        return self.measurement.station_at
+
 
 @dataclass(slots=True)
 class SurveyStation:
-    """One depth of the hole and every cluster measured there."""
+    """One depth of the hole and every cluster measured there, oldest first.
+
+    ``drops`` are the places of clusters that found another hole than those before them.
+    """
 
     md: float
     clusters: list[Cluster] = field(default_factory=list)
-    fusion: StationFusion = field(default_factory=StationFusion)
+    drops: list[int] = field(default_factory=list)
+    _departures: dict[int, Departure] = field(default_factory=dict)
+
+    @property
+    def count(self) -> int:
+        """Clusters measured here."""
+        return len(self.clusters)
+
+    @property
+    def first(self) -> int:
+        """Place of the first cluster that counts."""
+        return self.first_before(self.count)
+
+    def first_before(self, place: int) -> int:
+        """Place of the first cluster that counted when the one at ``place`` came."""
+        return max((drop for drop in self.drops if drop < place), default=0)
 
     def add(self, cluster: Cluster) -> None:
-        """Fuse one more cluster."""
+        """Take one more cluster in the order of time; what was judged of later ones is forgotten."""
         self.clusters.append(cluster)
-        self.fusion.add(cluster.direction)
+        self.clusters.sort(key=lambda known: (known.at, known.measurement.tube))
+        self.forget(self.clusters.index(cluster))
+
+    def forget(self, place: int) -> None:
+        """Forget decisions from ``place`` on."""
+        self.drops = [drop for drop in self.drops if drop < place]
+        self._departures = {k: d for k, d in self._departures.items() if k < place}
+
+    def readings(self) -> list[Lean]:
+        """Directions of the clusters that count."""
+        return [cluster.direction for cluster in self.clusters[self.first :]]
+
+    def departure(self, place: int) -> Departure | None:
+        """How far the cluster at ``place`` departed from those before; None for the first of its hole."""
+        first = self.first_before(place)
+        if first == place:
+            return None
+        if place not in self._departures:
+            self._departures[place] = departure([c.direction for c in self.clusters[first : place + 1]])
+        return self._departures[place]
+
+
+@dataclass(frozen=True, slots=True)
+class Moved:
+    """The decision that the hole moved at a station, with its evidence."""
+
+    md: float
+    at: float  # s
+    dropped: int  # earlier clusters that no longer count
+    evidence: Evidence
 
 
 class Knowledge:
@@ -64,7 +122,11 @@ class Knowledge:
         self.unplaced = 0
         self.refused = 0
         self.rig_now = math.nan
+        self.shared = SharedErrors()
+        self.moved: list[Moved] = []
+        self.alarms = AlarmList()
         self.trajectory: list[Point] = Trajectory().points
+        self.projection: Deviation | None = None
 
     def take_state(self, state: NodeState) -> None:
         """Take a node's account of itself, unless a newer one is known."""
@@ -86,17 +148,17 @@ class Knowledge:
             return False
         forces = np.array([imu.force for imu in measurement.imus])
         covs = np.array([imu.force_cov for imu in measurement.imus])
-        bias_var = math.radians(self.config.accelerometer_bias_std_deg) ** 2
         try:
-            force, cov = combine_imus(forces, covs)
-            direction = resolve(force, cov, measurement.yaw, measurement.yaw_var, measurement.systematic_var, bias_var)
+            direction = self._direction(measurement, *combine_imus(forces, covs))
         except (SurveyError, np.linalg.LinAlgError):
             self.refused += 1
             return False
         noise = math.radians(ACCELEROMETER_NOISE_DEG) * self.config.gravity
         quality = check(forces, covs, self.config.gravity, measurement.samples, measurement.settle_time, noise)
-        self._station_at(md).add(Cluster(measurement, md, direction, quality))
-        self._recompute()
+        station = self._station_at(md)
+        station.add(Cluster(measurement, md, direction, quality))
+        self._judge_movement(measurement.station_at)
+        self._recompute(measurement.station_at)
         return True
 
     def take_event(self, event: Event) -> None:
@@ -128,9 +190,71 @@ class Knowledge:
         self.stations.sort(key=lambda known: known.md)
         return station
 
-    def _recompute(self) -> None:
+    def _direction(self, m: SurveyMeasurement, force: Array, force_cov: Array) -> Lean:
+        """Direction of a measurement with what it shares with others."""
+        resolved = resolve(force, force_cov, m.yaw, m.yaw_var)
+        return self.shared.reading(
+            resolved,
+            m.tube,
+            self.order.above(m.tube, m.hops),
+            m.systematic_var,
+            math.radians(self.config.mount_std_deg) ** 2,
+            math.radians(self.config.accelerometer_bias_std_deg) * self.config.gravity,
+        )
+
+    def _judge_movement(self, since: float) -> None:
+        """Drop earlier clusters where the hole moved, at every stop from rig time ``since`` (s) on.
+
+        Each stop is judged as a whole, so the order in which its surveys arrive changes nothing.
+        """
+        since -= SAME_STOP
+        self.moved = [moved for moved in self.moved if moved.at < since]
+        late: list[tuple[float, int, int]] = []
+        for number, station in enumerate(self.stations):
+            places = [place for place, cluster in enumerate(station.clusters) if cluster.at >= since]
+            station.drops = [drop for drop in station.drops if drop not in places]
+            late.extend((station.clusters[place].at, number, place) for place in places)
+        for stop in _stops(sorted(late)):
+            self._judge_stop(stop)
+
+    def _judge_stop(self, stop: list[tuple[float, int, int]]) -> None:
+        seen = {number: self.stations[number].departure(place) for _, number, place in stop}
+        for at, number, place in stop:
+            own = seen[number]
+            if own is None:
+                continue
+            around = [d for d in (seen.get(number - 1), seen.get(number + 1)) if d is not None]
+            evidence = judge(own, around)
+            if evidence.moved:
+                station = self.stations[number]
+                self.moved.append(Moved(station.md, at, place - station.first_before(place), evidence))
+                station.drops.append(place)
+
+    def fused(self, station: SurveyStation) -> Lean:
+        """Direction of a station from the clusters that count."""
+        return weighted(station.readings(), self.config.weighting)
+
+    def _recompute(self, at: float) -> None:
         trajectory = Trajectory()
+        direction = None
         for station in self.stations:
             if station.md > 0.0:
-                trajectory.append(station.md, station.fusion.fused())
+                direction = self.fused(station)
+                trajectory.append(station.md, direction)
         self.trajectory = trajectory.points
+        if direction is None:
+            return
+        worst = max((deviation(point, self.config.design) for point in self.trajectory[1:]), key=lambda d: d.ratio)
+        self.projection = project(self.trajectory[-1], direction, self.config.design)
+        self.alarms.judge("deviation", worst, at)
+        self.alarms.judge("projection", self.projection, at)
+
+
+def _stops(late: list[tuple[float, int, int]]) -> list[list[tuple[float, int, int]]]:
+    """Clusters (time, station, place) in the order of time, parted into stops."""
+    stops: list[list[tuple[float, int, int]]] = []
+    for cluster in late:
+        if not stops or cluster[0] - stops[-1][0][0] >= SAME_STOP:
+            stops.append([])
+        stops[-1].append(cluster)
+    return stops

@@ -37,6 +37,13 @@ class StringOrder:
         self.tubes = list(tubes)
         self._hops = {tube: place for place, tube in enumerate(tubes, 1)}
 
+    def above(self, tube: int, hops: int) -> list[int] | None:
+        """Tubes above one when it was ``hops`` from the encoder, lowest first; None where the order does not fit."""
+        if tube not in self.tubes:
+            return None
+        over = self.tubes[: self.tubes.index(tube)][::-1]
+        return over[: hops - 1] if 1 <= hops <= len(over) + 1 else None
+
     def length_below(self, tube: int) -> float | None:
         """Length (m) of string below a tube's node, which sits at the tube's lower end; None for an unknown tube."""
         if tube not in self.tubes:

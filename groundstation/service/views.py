@@ -10,10 +10,11 @@ from typing import Any
 import numpy as np
 
 from groundstation.errors import SelectorError, SurveyError
+from groundstation.service import column_views
 from groundstation.service.core import Cluster, Knowledge, SurveyStation
 from groundstation.survey.resolve import angle_stds, angles
 from groundstation.survey.trajectory import Point, interpolate
-from telemetry.messages import Event, NodeFlag, StaticRecord
+from telemetry.messages import Event, NodeFlag, StaticRecord, SurveyMeasurement
 
 View = dict[str, Any]
 Parameters = dict[str, str]
@@ -61,7 +62,7 @@ def status(k: Knowledge, _p: Parameters) -> View:
         "tubes": len(k.order.tubes),
         "stale_tubes": stale,
         "stations": len(k.stations),
-        "measurements": sum(s.fusion.count for s in k.stations),
+        "measurements": sum(s.count for s in k.stations),
         "unplaced_measurements": k.unplaced,
         "refused_measurements": k.refused,
         "health": "degraded" if stale or k.refused else "good",
@@ -116,10 +117,9 @@ def stations(k: Knowledge, p: Parameters) -> View:
 def station(k: Knowledge, n: int) -> View:
     """One station, fused; ``n`` from 1."""
     s = k.stations[n - 1]
-    fused = s.fusion.fused()
+    fused = k.fused(s)
     inclination, azimuth = angles(fused.lean, fused.down)
-    both = fused.cov + np.outer(fused.systematic, fused.systematic)
-    sigma_inclination, sigma_azimuth = angle_stds(fused.lean, fused.down, both)
+    sigma_inclination, sigma_azimuth = angle_stds(fused.lean, fused.down, fused.total_cov)
     row: View = {
         "station": n,
         "md_m": round(s.md, 6),
@@ -127,9 +127,21 @@ def station(k: Knowledge, n: int) -> View:
         "azimuth_deg": math.degrees(azimuth),
         "sigma_inclination_deg": math.degrees(sigma_inclination),
         "sigma_azimuth_deg": math.degrees(sigma_azimuth),
-        "measurements": s.fusion.count,
+        "measurements": s.count,
+        "dropped_measurements": s.first,
     }
+    row |= typical_reading([c.measurement for c in s.clusters[s.first :]])
     return row | position(point_of(k, s))
+
+
+def typical_reading(readings: list[SurveyMeasurement]) -> View:
+    """Root mean squares over the readings of a station; columns that ``borechain survey --instrument relay`` takes."""
+    force_vars = [float(np.mean([np.trace(np.array(imu.force_cov)) / 3.0 for imu in m.imus])) for m in readings]
+    return {
+        "sigma_yaw_deg": math.degrees(math.sqrt(float(np.mean([m.yaw_var for m in readings])))),
+        "sigma_systematic_deg": math.degrees(math.sqrt(float(np.mean([m.systematic_var for m in readings])))),
+        "sigma_force_mps2": math.sqrt(float(np.mean(force_vars))),
+    }
 
 
 def measurements(k: Knowledge, p: Parameters) -> View:
@@ -155,7 +167,7 @@ def cluster(c: Cluster, n: int) -> View:
     """One cluster, resolved."""
     m = c.measurement
     inclination, azimuth = angles(c.direction.lean, c.direction.down)
-    sigma_inclination, sigma_azimuth = angle_stds(c.direction.lean, c.direction.down, c.direction.cov)
+    sigma_inclination, sigma_azimuth = angle_stds(c.direction.lean, c.direction.down, c.direction.total_cov)
     return {
         "station": n,
         "md_m": round(c.md, 6),
@@ -290,6 +302,9 @@ FIXED: dict[str, Path] = {
     "trajectory": Path(trajectory, ("md",)),
     "events": Path(events, ("tube",)),
     "static_records": Path(static_records, ("tube",)),
+    "uncertainty": Path(column_views.uncertainty, ("confidence",)),
+    "column": Path(column_views.column),
+    "alarms": Path(column_views.alarms),
 }
 PATTERNS = (*FIXED, "nodes/{tube}", "stations/{n}", "stations/{n}/measurements")
 

@@ -1,46 +1,156 @@
 """All clusters that were measured at one station, as one direction.
 
-Recursive Bayes of independent readings is the sum of their information, so it takes any order and constant memory.
-The constant error (joints, mount) is shared by the readings; it is carried as a sensitivity, weighted with the same
-weights, and never averages away. Source: thesis eqs. 3.39-3.41.
+Tube by tube the string passes the same depth. Readings that found the same hole are combined by recursive Bayes, which
+is a running sum of information: order-independent and of constant memory. When the hole moved in between, later
+readings count more: weights k^p by their order, or the earlier ones are dropped when neighbouring stations saw the same
+change. What readings share (joints, mounts, biases) is carried with the same weights and never averages away by itself.
+Source: thesis 3.6 and 4.3, eqs. 3.39-3.42.
 """
 
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass, field
+from enum import Enum
 
 import numpy as np
 import numpy.typing as npt
 
 from groundstation.survey.resolve import Lean
+from groundstation.survey.shared import added
 
 Array = npt.NDArray[np.float64]
+# a departure in the plane is beyond this length as often (4.55 %) as one number is beyond two standard deviations
+DEPARTED = math.sqrt(-2.0 * math.log(math.erfc(math.sqrt(2.0))))
+QUADRATIC_TO = 4.0  # standard deviations up to which the adaptive scheme is quadratic
+
+
+class Weighting(Enum):
+    """How readings of one station count."""
+
+    BAYES = "bayes"
+    EQUAL = "equal"
+    LINEAR = "linear"
+    QUADRATIC = "quadratic"
+    CUBIC = "cubic"
+    ADAPTIVE = "adaptive"
+
+
+POWERS = {Weighting.EQUAL: 0, Weighting.LINEAR: 1, Weighting.QUADRATIC: 2, Weighting.CUBIC: 3}
 
 
 @dataclass(slots=True)
 class StationFusion:
-    """Running fusion of one station."""
+    """Running recursive Bayes of one station."""
 
     count: int = 0
     _information: Array = field(default_factory=lambda: np.zeros((2, 2)))
     _weighted: Array = field(default_factory=lambda: np.zeros(2))
-    _systematic: Array = field(default_factory=lambda: np.zeros(2))
+    _random: Array = field(default_factory=lambda: np.zeros((2, 2)))
+    _shared: Array = field(default_factory=lambda: np.zeros((2, 0)))
     _down: float = 0.0
 
     def add(self, reading: Lean) -> None:
-        """Take one more cluster."""
-        information = np.linalg.inv(reading.cov)
+        """Take one more cluster; it weighs by all it does not know, shared errors included."""
+        information = np.linalg.inv(reading.total_cov)
         self._information = self._information + information
         self._weighted = self._weighted + information @ reading.lean
-        self._systematic = self._systematic + information @ reading.systematic
+        self._random = self._random + information @ reading.cov @ information
+        self._shared = added(self._shared, information @ reading.shared)
         self._down += reading.down
         self.count += 1
 
     def fused(self) -> Lean:
-        """Posterior: mean, covariance (2, 2) and systematic sensitivity (2,)."""
-        cov = np.asarray(np.linalg.inv(self._information), np.float64)
-        lean = cov @ self._weighted
-        size = min(float(lean @ lean), 1.0)
-        down = math.copysign(math.sqrt(1.0 - size), self._down)
-        return Lean(lean, down, cov, cov @ self._systematic)
+        """Mean, random covariance (2, 2) and shared columns (2, s)."""
+        gain = np.asarray(np.linalg.inv(self._information), np.float64)
+        lean = gain @ self._weighted
+        return Lean(lean, vertical(lean, self._down), gain @ self._random @ gain, gain @ self._shared)
+
+
+def vertical(lean: Array, sense: float) -> float:
+    """Vertical part of a unit vector with the horizontal part ``lean``, downward where ``sense`` is positive."""
+    return math.copysign(math.sqrt(1.0 - min(float(lean @ lean), 1.0)), sense)
+
+
+def bayes(readings: Sequence[Lean]) -> Lean:
+    """Recursive Bayes of at least one reading."""
+    fusion = StationFusion()
+    for reading in readings:
+        fusion.add(reading)
+    return fusion.fused()
+
+
+def sequence_weights(count: int, power: int) -> Array:
+    """Weights (count,) k^p / sum, the newest largest. Source: thesis Table 4.30 (whose cubic row is garbled)."""
+    k = np.arange(1.0, count + 1.0) ** power
+    return np.asarray(k / k.sum())
+
+
+def weighted(readings: Sequence[Lean], scheme: Weighting) -> Lean:
+    """Readings of one station, oldest first, combined by a scheme."""
+    if scheme is Weighting.BAYES:
+        return bayes(readings)
+    if scheme is Weighting.ADAPTIVE:
+        scheme = adapted(readings)
+    weights = sequence_weights(len(readings), POWERS[scheme])
+    lean = np.sum([w * r.lean for w, r in zip(weights, readings, strict=True)], axis=0)
+    cov = np.sum([w * w * r.cov for w, r in zip(weights, readings, strict=True)], axis=0)
+    shared = np.zeros((2, 0))
+    for w, r in zip(weights, readings, strict=True):
+        shared = added(shared, w * r.shared)
+    return Lean(lean, vertical(lean, sum(r.down for r in readings)), cov, shared)
+
+
+def adapted(readings: Sequence[Lean]) -> Weighting:
+    """Linear for a small departure of the newest reading, quadratic for a larger, cubic for a large one."""
+    size = departure(readings)[1]
+    if size <= DEPARTED:
+        return Weighting.LINEAR
+    return Weighting.QUADRATIC if size <= QUADRATIC_TO else Weighting.CUBIC
+
+
+def departure(readings: Sequence[Lean]) -> tuple[Array, float]:
+    """How far the newest reading is from the earlier ones: vector (2,) and size in standard deviations; 0 for a first.
+
+    The covariance of the difference knows what the two have in common: an error of the same mount cancels.
+    """
+    if len(readings) < 2:
+        return np.zeros(2), 0.0
+    newest, earlier = readings[-1], bayes(readings[:-1])
+    difference = newest.lean - earlier.lean
+    apart = added(newest.shared, -earlier.shared)
+    cov = newest.cov + earlier.cov + apart @ apart.T
+    return difference, math.sqrt(float(difference @ np.linalg.solve(cov, difference)))
+
+
+Departure = tuple[Array, float]
+
+
+@dataclass(frozen=True, slots=True)
+class Evidence:
+    """Why a station is held for moved, or not: departures in standard deviations."""
+
+    own: float
+    neighbours: tuple[float, ...]
+    agree: bool
+
+    @property
+    def moved(self) -> bool:
+        """Whether earlier readings are to be dropped."""
+        return self.own > DEPARTED and self.agree
+
+
+def moved_hole(station: Sequence[Lean], neighbours: Sequence[Sequence[Lean]]) -> Evidence:
+    """Judge the newest reading of a station by those of its neighbours at the same pass.
+
+    A neighbour agrees when its own newest reading departed too, to the same side; all that have one must.
+    """
+    return judge(departure(station), [departure(other) for other in neighbours if len(other) > 1])
+
+
+def judge(departed: Departure, seen: Sequence[Departure]) -> Evidence:
+    """The same of departures already known; ``seen`` are those of the neighbours that have one."""
+    difference, own = departed
+    agree = bool(seen) and all(size > DEPARTED and float(d @ difference) > 0.0 for d, size in seen)
+    return Evidence(own, tuple(size for _, size in seen), agree)

@@ -37,26 +37,43 @@ class Quality(IntFlag):
 class Lean:
     """Direction of a tube in the north-east plane.
 
-    ``cov`` (2, 2) is random; ``systematic`` (2,) is the change of ``lean`` for one standard deviation of the constant
-    yaw error, a rank-one covariance that no averaging removes. ``down`` is the vertical part of the direction.
+    ``cov`` (2, 2) is random. ``shared`` (2, s) holds the change of ``lean`` for one standard deviation of each of the
+    ``s`` errors that readings share (joints, mounts, accelerometer biases); ``s`` may differ between readings, what is
+    missing is zero. ``down`` is the vertical part of the direction.
     """
 
     lean: Array
     down: float
     cov: Array
-    systematic: Array
+    shared: Array
+
+    @property
+    def total_cov(self) -> Array:
+        """Covariance (2, 2) with the shared errors in it."""
+        return np.asarray(self.cov + self.shared @ self.shared.T)
 
 
-def resolve(
-    force: Array, force_cov: Array, yaw: float, yaw_var: float, systematic_var: float, bias_var: float = 0.0
-) -> Lean:
+@dataclass(frozen=True, slots=True)
+class Resolved:
+    """A resolved stop: its direction, without shared errors, and how they would act on it."""
+
+    direction: Lean
+    by_force: Array  # (2, 3) change of the lean for one m/s^2 on each body axis
+    by_yaw: Array  # (2,) change of the lean for one rad of yaw
+
+    def sharing(self, shared: Array) -> Lean:
+        """The direction with its share (2, s) in the errors of others."""
+        d = self.direction
+        return Lean(d.lean, d.down, d.cov, shared)
+
+
+def resolve(force: Array, force_cov: Array, yaw: float, yaw_var: float) -> Resolved:
     """Direction from a mean specific force.
 
     Parameters
     ----------
     force, force_cov : (3,) m/s^2 and (3, 3), body frame x, y across, z downhole
-    yaw, yaw_var, systematic_var : rad and rad^2, of the body about its axis from reference north
-    bias_var : rad^2, of the accelerometer's bias left after calibration, as a tilt
+    yaw, yaw_var : rad and rad^2, of the body about its axis from reference north
 
     Raises
     ------
@@ -72,10 +89,10 @@ def resolve(
     lean = turn @ unit
     by_force = (turn - np.outer(lean, unit)) / size
     by_yaw = np.array([-lean[1], lean[0]])
-    cov = by_force @ force_cov @ by_force.T + yaw_var * np.outer(by_yaw, by_yaw) + bias_var * np.eye(2)
+    cov = by_force @ force_cov @ by_force.T + yaw_var * np.outer(by_yaw, by_yaw)
     if not is_covariance(cov):
         raise SurveyError(f"resolve: expected a positive definite covariance of the lean, got {cov.tolist()}")
-    return Lean(lean, float(-unit[2]), cov, math.sqrt(systematic_var) * by_yaw)
+    return Resolved(Lean(lean, float(-unit[2]), cov, np.zeros((2, 0))), by_force, by_yaw)
 
 
 def is_covariance(covs: Array) -> bool:

@@ -1,32 +1,26 @@
-"""From directions at measured depths to positions with their covariance.
+"""From directions at measured depths to positions with their covariance, one station appended at a time.
 
-Balanced tangential (default): dr = D/2 (t1 + t2). Minimum curvature: the same times (2/b) tan(b/2), b the angle
-between the tangents. A station enters two legs, so its weight in the position is half their summed length, and half
-the last leg for the last station: both kinds of covariance are kept by two running sums, and appending a station costs
-the same however many there are. Source: thesis 2.1-2.3 and eqs. I.1-I.12. Frame: north, east, down.
+A station enters two legs, so its weight in the position is half their summed length, and half the last leg for the last
+station (the Jacobian of the balanced tangential method, used for every method as the industry's error model does).
+Random and shared parts are kept by two running sums: appending costs the same however many stations there are.
+Source: thesis 2.1-2.3 and eqs. I.1-I.12. Frame: north, east, down.
 """
 
 from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from enum import Enum
 from itertools import pairwise
 
 import numpy as np
 import numpy.typing as npt
 
 from groundstation.errors import SurveyError
-from groundstation.survey.resolve import Lean
+from groundstation.survey.methods import OPPOSITE, Method, dogleg, leg, ratio_factor
+from groundstation.survey.resolve import Lean, angles
+from groundstation.survey.shared import added
 
 Array = npt.NDArray[np.float64]
-
-
-class Method(Enum):
-    """How a leg follows from the directions at its ends."""
-
-    BALANCED_TANGENTIAL = "balanced-tangential"
-    MINIMUM_CURVATURE = "minimum-curvature"
 
 
 @dataclass(frozen=True, slots=True)
@@ -36,7 +30,8 @@ class Point:
     md: float  # m
     tangent: Array  # (3,)
     position: Array  # (3,) m, north east down
-    cov: Array  # (3, 3) m^2, random and systematic
+    cov: Array  # (3, 3) m^2, random and shared
+    shared: Array  # (3, s) m, change for one standard deviation of every shared error
 
 
 def tangent_of(direction: Lean) -> Array:
@@ -48,16 +43,6 @@ def tangent_jacobian(direction: Lean) -> Array:
     """D tangent / d lean (3, 2); the vertical part follows from the unit length."""
     down = math.copysign(max(abs(direction.down), 1e-6), direction.down)
     return np.array([[1.0, 0.0], [0.0, 1.0], [-direction.lean[0] / down, -direction.lean[1] / down]])
-
-
-def bend(t1: Array, t2: Array) -> float:
-    """Angle (rad) between two unit vectors, exact for small ones."""
-    return math.atan2(float(np.linalg.norm(np.cross(t1, t2))), float(t1 @ t2))
-
-
-def ratio_factor(angle: float) -> float:
-    """(2/b) tan(b/2) of the minimum curvature method."""
-    return 1.0 + angle * angle / 12.0 if angle < 1e-6 else 2.0 / angle * math.tan(0.5 * angle)
 
 
 class Trajectory:
@@ -74,12 +59,13 @@ class Trajectory:
         self, method: Method = Method.BALANCED_TANGENTIAL, collar: Lean | None = None, start_md: float = 0.0
     ) -> None:
         self._method = method
-        first = collar or Lean(np.zeros(2), 1.0, np.zeros((2, 2)), np.zeros(2))
-        self._last = first
+        first = collar or Lean(np.zeros(2), 1.0, np.zeros((2, 2)), np.zeros((2, 0)))
+        jacobian = tangent_jacobian(first)
+        self._last_cov, self._last_shared = jacobian @ first.cov @ jacobian.T, jacobian @ first.shared  # of the tangent
         self._length = 0.0
         self._interior = np.zeros((3, 3))
-        self._interior_systematic = np.zeros(3)
-        self.points = [Point(start_md, tangent_of(first), np.zeros(3), np.zeros((3, 3)))]
+        self._interior_shared = np.zeros((3, 0))
+        self.points = [Point(start_md, tangent_of(first), np.zeros(3), np.zeros((3, 3)), np.zeros((3, 0)))]
 
     def append(self, md: float, direction: Lean) -> Point:
         """Add the station at ``md`` (m).
@@ -91,31 +77,30 @@ class Trajectory:
         """
         before = self.points[-1]
         length = md - before.md
-        if not length > 0.0:
+        if not 0.0 < length < math.inf:
             raise SurveyError(f"trajectory: expected a depth beyond {before.md:g} m, got {md:g} m")
-        tangent = tangent_of(direction)
-        factor = 1.0
-        if self._method is Method.MINIMUM_CURVATURE:
-            angle = bend(before.tangent, tangent)
-            if angle > math.pi - 1e-6:
-                raise SurveyError(f"trajectory: the hole turns back on itself between {before.md:g} and {md:g} m")
-            factor = ratio_factor(angle)
-        position = before.position + 0.5 * length * factor * (before.tangent + tangent)
-        self._interior = self._interior + self._share(self._last, 0.5 * (self._length + length))
-        self._interior_systematic = self._interior_systematic + 0.5 * (self._length + length) * (
-            tangent_jacobian(self._last) @ self._last.systematic
-        )
-        systematic = self._interior_systematic + 0.5 * length * (tangent_jacobian(direction) @ direction.systematic)
-        cov = self._interior + self._share(direction, 0.5 * length) + np.outer(systematic, systematic)
-        self._last, self._length = direction, length
-        point = Point(md, tangent, position, cov)
+        position = before.position + self._leg(before, length, direction)
+        weight = 0.5 * (self._length + length)
+        self._interior = self._interior + weight**2 * self._last_cov
+        self._interior_shared = added(self._interior_shared, weight * self._last_shared)
+        weight, jacobian = 0.5 * length, tangent_jacobian(direction)
+        self._last_cov, self._last_shared = jacobian @ direction.cov @ jacobian.T, jacobian @ direction.shared
+        shared = added(self._interior_shared, weight * self._last_shared)
+        cov = self._interior + weight**2 * self._last_cov + shared @ shared.T
+        self._length = length
+        point = Point(md, tangent_of(direction), position, cov, shared)
         self.points.append(point)
         return point
 
-    @staticmethod
-    def _share(direction: Lean, weight: float) -> Array:
-        jacobian = weight * tangent_jacobian(direction)
-        return np.asarray(jacobian @ direction.cov @ jacobian.T)
+    def _leg(self, before: Point, length: float, direction: Lean) -> Array:
+        if self._method is Method.BALANCED_TANGENTIAL:
+            return 0.5 * length * (before.tangent + tangent_of(direction))
+        i1, a1 = angles(before.tangent[:2], float(before.tangent[2]))
+        i2, a2 = angles(direction.lean, direction.down)
+        if self._method is Method.MINIMUM_CURVATURE and dogleg(math, i1, a1, i2, a2) > math.pi - OPPOSITE:
+            to = before.md + length
+            raise SurveyError(f"trajectory: the hole turns back on itself between {before.md:g} and {to:g} m")
+        return np.array(leg(math, self._method, length, i1, a1, i2, a2))
 
 
 def interpolate(points: list[Point], md: float) -> Point:
@@ -130,21 +115,23 @@ def interpolate(points: list[Point], md: float) -> Point:
         raise SurveyError(f"trajectory: expected a depth of {points[0].md:g}..{points[-1].md:g} m, got {md:g} m")
     for upper, lower in pairwise(points):
         if md <= lower.md:
-            return _on_arc(upper, lower, (md - upper.md) / (lower.md - upper.md))
+            return on_arc(upper, lower, (md - upper.md) / (lower.md - upper.md))
     return points[-1]
 
 
-def _on_arc(upper: Point, lower: Point, f: float) -> Point:
-    """Fraction ``f`` of a leg along its arc, scaled so that the leg ends where its method put the lower station."""
-    angle = bend(upper.tangent, lower.tangent)
+def on_arc(upper: Point, lower: Point, f: float) -> Point:
+    """Fraction ``f`` of a leg along its arc, bent evenly so that it ends where the method put the lower station."""
+    angle = math.atan2(
+        float(np.linalg.norm(np.cross(upper.tangent, lower.tangent))), float(upper.tangent @ lower.tangent)
+    )
     if angle < 1e-9:
         tangent = upper.tangent + f * (lower.tangent - upper.tangent)
     else:
         tangent = (math.sin((1.0 - f) * angle) * upper.tangent + math.sin(f * angle) * lower.tangent) / math.sin(angle)
-    chord = upper.tangent + lower.tangent
-    part = f * ratio_factor(f * angle) / ratio_factor(angle) * (upper.tangent + tangent)
-    leg = lower.position - upper.position
-    scale = float(np.linalg.norm(leg)) / float(np.linalg.norm(chord))
-    position = upper.position + scale * part
+    half = 0.5 * (lower.md - upper.md)
+    arc = half * f * ratio_factor(math, f * angle) * (upper.tangent + tangent)
+    whole = half * ratio_factor(math, angle) * (upper.tangent + lower.tangent)
+    position = upper.position + arc + f * (lower.position - upper.position - whole)
     cov = (1.0 - f) * upper.cov + f * lower.cov
-    return Point(upper.md + f * (lower.md - upper.md), tangent, position, cov)
+    shared = added((1.0 - f) * upper.shared, f * lower.shared)
+    return Point(upper.md + f * (lower.md - upper.md), tangent, position, cov, shared)

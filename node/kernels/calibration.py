@@ -53,7 +53,7 @@ def correct(sensor: Any, temperature: float, reading: Array) -> None:
     temperature : C, within COLDEST..HOTTEST
     reading : (3,) rad/s or m/s^2, in place
 
-    Source: thesis eq. 3.1 and Table III.2 (model), docs/decisions/0007-parameter-blocks.md (temperature).
+    Source: thesis eq. 3.1 and Table III.2 (model), docs/decisions/0009-parameter-blocks.md (temperature).
     """
     m, c, b = sensor.m, sensor.matrix, sensor.bias
     x = temperature - sensor.reference

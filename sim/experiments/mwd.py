@@ -111,7 +111,7 @@ class Duel:
 
 def duel(tool: Tool, heating: Heating, seed: int) -> Duel:
     """Ours against scipy's Levenberg-Marquardt from the same start."""
-    from scipy.optimize import least_squares  # type: ignore[import-untyped]
+    from scipy.optimize import least_squares
 
     parameters = 12 if heating is Heating.ROOM else 30
     record = measure(tool, make_design(heating, seed), seed)

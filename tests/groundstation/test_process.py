@@ -217,12 +217,12 @@ def test_a_restart_forgets_and_doubles_nothing(rig: tuple[Rig, ZenohBus], start:
     again = start()
     again.now = it.now
     knowledge = again.ground.knowledge
-    assert [(s.md, s.fusion.count) for s in knowledge.stations] == [(2.0, 2), (4.0, 1)]
+    assert [(s.md, s.count) for s in knowledge.stations] == [(2.0, 2), (4.0, 1)]
     assert [e.sequence for e in knowledge.events] == [7]
     again.run(3.0)
     again.tube.submit(next(iter(knowledge.stations[0].clusters)).measurement, again.now)  # its receipt was lost
     again.run(2.0)
-    assert [(s.md, s.fusion.count) for s in knowledge.stations] == [(2.0, 2), (4.0, 1)]
+    assert [(s.md, s.count) for s in knowledge.stations] == [(2.0, 2), (4.0, 1)]
     assert again.tube.outbox_size == 0
     assert before[0]["measurements"] == 2
 
@@ -240,7 +240,7 @@ def test_a_survey_that_comes_before_any_state_after_a_restart_finds_its_station(
     again.now = first.now
     again.run(3.0)
     again.survey(2, 1)
-    assert [(s.md, s.fusion.count) for s in again.ground.knowledge.stations] == [(2.0, 1)]
+    assert [(s.md, s.count) for s in again.ground.knowledge.stations] == [(2.0, 1)]
 
 
 def test_a_covariance_that_is_none_is_kept_and_counted_now_and_after_a_restart(start: Callable[[], Rig]) -> None:

@@ -42,6 +42,16 @@ def titles_of_group(group: int) -> dict[int, str]:
     return found
 
 
+def ends(group: int) -> bool:
+    """Whether every process of a group ends by itself; the fork server may leave a moment after its parent."""
+    deadline = time.monotonic() + PATIENCE
+    idle: queue.SimpleQueue[None] = queue.SimpleQueue()
+    while titles_of_group(group) and time.monotonic() < deadline:
+        with contextlib.suppress(queue.Empty):
+            idle.get(timeout=0.05)
+    return titles_of_group(group) == {}
+
+
 @dataclass
 class Rig:
     """A running ``borechain rig`` and how to talk to it."""

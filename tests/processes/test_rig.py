@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from rigs import command, free_endpoint, run, running_rig, titles_of_group
+from rigs import command, ends, free_endpoint, run, running_rig, titles_of_group
 
 from telemetry.media.zenoh_bus import open_client
 
@@ -26,7 +26,7 @@ def drill(folder: Path, *arguments: str) -> dict[str, Any]:
 def test_three_tubes_give_three_stations_near_the_truth_and_leave_nothing_running(tmp_path: Path) -> None:
     with running_rig(tmp_path, "--seed", "3") as rig:
         result = rig.result()
-        assert titles_of_group(rig.process.pid) == {}
+        assert ends(rig.process.pid)
     assert [s["measurements"] for s in result["stations"]] == [3, 2, 1]
     assert [s["md_m"] for s in result["stations"]] == [2.0, 4.0, 6.0]
     assert result["figures"]["inclination_rms_deg"] < 0.03
@@ -61,7 +61,7 @@ def test_one_process_a_tube_and_none_after_an_interrupt(tmp_path: Path) -> None:
         assert rig.process.returncode == 1
         assert "interrupted" in errors
         assert "Traceback" not in errors
-        assert titles_of_group(rig.process.pid) == {}
+        assert ends(rig.process.pid)
 
 
 def test_operators_get_stations_while_the_rig_drills(tmp_path: Path, ask: Any) -> None:
@@ -78,6 +78,20 @@ def test_operators_get_stations_while_the_rig_drills(tmp_path: Path, ask: Any) -
         between = ask(rig, f"{GROUND}/trajectory?md=1.5")
         assert [p["md_m"] for p in between["points"]] == [1.5]
         assert {m["station"] for m in ask(rig, f"{GROUND}/measurements?station=2")["measurements"]} == {2}
+        region = ask(rig, f"{GROUND}/uncertainty?confidence=0.9")
+        assert [s["md_m"] for s in region["stations"]][:3] == [0.0, 2.0, 4.0]
+        assert (
+            0.0
+            < region["stations"][2]["plan_ellipse"]["minor_m"]
+            < region["stations"][2]["plan_ellipse"]["major_m"]
+            < 0.01
+        )
+        assert set(region["stations"][2]["sources"]) == {"random", "joints", "mounts", "accelerometer_bias"}
+        column = ask(rig, f"{GROUND}/column")
+        assert column["design"]["tolerance"] == "en-12716"
+        assert column["worst"]["deviation_cm"] > 0.0
+        assert column["projection"]["along_m"] == 6.0
+        assert ask(rig, f"{GROUND}/alarms")["levels_percent"] == [50, 80, 100]
         shown = run("query", f"{GROUND}/stations", "--endpoint", rig.endpoint, "--json")
         assert shown.returncode == 0
         assert len(json.loads(shown.stdout)["stations"]) >= 2
@@ -91,6 +105,18 @@ def test_operators_get_stations_while_the_rig_drills(tmp_path: Path, ask: Any) -
         taken = run("query", "borechain/rig-1/cmd/take_survey?tube=1", "--endpoint", rig.endpoint, "--timeout", "40")
         assert taken.returncode == 0, taken.stderr
         assert json.loads(taken.stdout)["done"] is True
+
+
+def test_a_column_that_leaves_its_tolerance_raises_alarms(scenario: Path, tmp_path: Path) -> None:
+    scenario.write_text(
+        scenario.read_text() + '\n[design]\ninclination_deg = 10.0\nazimuth_deg = 90.0\ntolerance = "5-cm"\n'
+    )
+    with running_rig(tmp_path, scenario=str(scenario)) as rig:
+        result = rig.result()
+    assert {(a["kind"], a["level_percent"]) for a in result["alarms"]} == {
+        (kind, level) for kind in ("deviation", "projection") for level in (50, 80, 100)
+    }
+    assert result["column"]["worst"]["used_percent"] > 100.0
 
 
 def test_an_operator_who_does_not_read_stops_nobody(tmp_path: Path) -> None:

@@ -74,7 +74,7 @@ def test_specific_force_at_a_stop_resolves_to_the_exact_direction() -> None:
         for tube in range(1, phase.tube + 1):
             t = np.array([phase.start + 20.0])
             truth = world.truth(tube)
-            direction = resolve(truth.force(t)[0], np.eye(3), float(truth.yaw(t)[0]), 0.0, 0.0)
+            direction = resolve(truth.force(t)[0], np.eye(3), float(truth.yaw(t)[0]), 0.0).direction
             inclination, azimuth = angles(direction.lean, direction.down)
             station = world.truth_station(world.bit_depth(float(t[0])) - (tube - 1) * 2.0)
             assert math.degrees(inclination) == pytest.approx(station["inclination_deg"], abs=1e-9)

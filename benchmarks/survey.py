@@ -1,0 +1,159 @@
+"""Survey mathematics against welleng and wellpathpy, side by side in one run.
+
+Run it as ``borechain bench survey`` or by itself. Every pair is timed in alternating blocks, so that a slow spell of
+the machine meets both; a figure is the median of a block, a ratio the median over the blocks.
+"""
+
+from __future__ import annotations
+
+import json
+import statistics
+import subprocess
+import sys
+import time
+import warnings
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+
+from groundstation.survey.compiled_model import CompiledModel
+from groundstation.survey.error_model import Leg, Site, Survey, propagate
+from groundstation.survey.instruments import load_tool
+from groundstation.survey.methods import Method, positions
+from groundstation.survey.resolve import Lean
+from groundstation.survey.running_error import RunningUncertainty
+from groundstation.survey.trajectory import Trajectory
+
+STATIONS = 1000
+BLOCKS = 7
+REPEATS = 15
+IMPORTS = 5
+
+
+def median_time(work: Callable[[], Any], repeats: int) -> float:
+    """Median wall time (s) of one call, after one that warms up."""
+    work()
+    times = []
+    for _ in range(repeats):
+        begin = time.perf_counter()
+        work()
+        times.append(time.perf_counter() - begin)
+    return statistics.median(times)
+
+
+def compare(ours: Callable[[], Any], peer: Callable[[], Any], repeats: int = REPEATS) -> dict[str, float]:
+    """Seconds of both and how many times faster ours is."""
+    pairs = [(median_time(ours, repeats), median_time(peer, repeats)) for _ in range(BLOCKS)]
+    ratios = [p / o for o, p in pairs]
+    return {
+        "ours": statistics.median(o for o, _ in pairs),
+        "peer": statistics.median(p for _, p in pairs),
+        "ratio": statistics.median(ratios),
+        "ratio_min": min(ratios),
+        "ratio_max": max(ratios),
+    }
+
+
+def well() -> tuple[Any, Any, Any]:
+    """A well of 1000 stations from the vertical to the horizontal; m and rad."""
+    return np.linspace(0.0, 5000.0, STATIONS), np.linspace(0.0, np.pi / 2, STATIONS), np.linspace(0.2, 2.0, STATIONS)
+
+
+def import_time(module: str) -> float:
+    """Seconds a fresh interpreter takes to import a module, above one that imports nothing."""
+    times = []
+    for code in ("pass", f"import {module}"):
+        runs = []
+        for _ in range(IMPORTS):
+            begin = time.perf_counter()
+            subprocess.run([sys.executable, "-c", code], check=True)
+            runs.append(time.perf_counter() - begin)
+        times.append(statistics.median(runs))
+    return times[1] - times[0]
+
+
+def append_time() -> float:
+    """Median seconds to append one station up to 1000: position, and covariance with all sources of MWD Rev 5.1."""
+    md, inclination, azimuth = (x.tolist() for x in well())
+    tool, site = load_tool("mwd-rev5.1"), Site()
+    zero, none = np.zeros((2, 2)), np.zeros((2, 0))
+    leans = [
+        Lean(np.sin(i) * np.array([np.cos(a), np.sin(a)]), float(np.cos(i)), zero, none)
+        for i, a in zip(inclination, azimuth, strict=True)
+    ]
+    trajectory = Trajectory(Method.MINIMUM_CURVATURE)
+    running = RunningUncertainty(tool, site, md[0], inclination[0], azimuth[0], slot_allowance=True)
+    times = []
+    for k in range(1, STATIONS):
+        begin = time.perf_counter()
+        point = trajectory.append(md[k], leans[k])
+        running.append(md[k], inclination[k], azimuth[k], float(point.position[2]))
+        times.append(time.perf_counter() - begin)
+    return statistics.median(times)
+
+
+def run() -> dict[str, Any]:
+    """All ratios: seconds of ours, of the peer, and how many times faster ours is."""
+    import welleng
+    import wellpathpy
+
+    warnings.simplefilter("ignore")
+    md, inclination, azimuth = well()
+    inclination_deg, azimuth_deg = np.degrees(inclination), np.degrees(azimuth)
+    tool, site = load_tool("mwd-rev5.1"), Site(9.80665, 50_000.0, np.radians(72.0))
+    header = welleng.survey.SurveyHeader(
+        latitude=60, longitude=2, altitude=0, b_total=50_000, dip=72, declination=0, convergence=0, G=9.80665,
+        azi_reference="true",
+    )  # fmt: skip
+
+    model = CompiledModel(load_tool("mwd-rev5.1"))
+
+    def ours() -> Any:
+        return model.run(Method.MINIMUM_CURVATURE, md, inclination, azimuth, site)
+
+    def without_compiler() -> Any:
+        places = positions(Method.MINIMUM_CURVATURE, md, inclination, azimuth)
+        return propagate(Survey(md, inclination, azimuth, places[:, 2]), [Leg(tool)], site, slot_allowance=True)
+
+    def peer() -> Any:
+        return welleng.survey.Survey(md, inclination_deg, azimuth_deg, header=header, error_model="ISCWSA MWD Rev5.11")
+
+    def path() -> Any:
+        return positions(Method.MINIMUM_CURVATURE, md, inclination, azimuth)
+
+    def peer_path() -> Any:
+        return wellpathpy.deviation(md, inclination_deg, azimuth_deg).minimum_curvature()
+
+    appended = append_time()
+    ratios: dict[str, dict[str, float | None]] = {
+        "well of 1000 stations, MWD Rev 5.1, against welleng": dict(compare(ours, peer)),
+        "the same, alternating call by call": dict(alternating(ours, peer)),
+        "the same without the compiler, against welleng": dict(compare(without_compiler, peer)),
+        "positions of 1000 stations, against wellpathpy": dict(compare(path, peer_path)),
+        "append one station, all sources (no peer)": {"ours": appended, "peer": None, "ratio": None},
+    }
+    ours_import, peer_import = import_time("groundstation.survey.analysis"), import_time("welleng.survey")
+    ratios["import, against welleng"] = {
+        "ours": ours_import,
+        "peer": peer_import,
+        "ratio": peer_import / ours_import,
+    }
+    return {"bench": "survey", "stations": STATIONS, "ratios": ratios}
+
+
+def alternating(ours: Callable[[], Any], peer: Callable[[], Any]) -> dict[str, float]:
+    """The same with one call of each in turn: every call finds the caches and the heap as the other left them."""
+    pairs = []
+    for _ in range(BLOCKS * 3):
+        begin = time.perf_counter()
+        ours()
+        middle = time.perf_counter()
+        peer()
+        pairs.append((middle - begin, time.perf_counter() - middle))
+    o, p = (statistics.median(pair[k] for pair in pairs[1:]) for k in range(2))
+    return {"ours": o, "peer": p, "ratio": p / o}
+
+
+if __name__ == "__main__":
+    print(json.dumps(run(), indent=2))

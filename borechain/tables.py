@@ -1,0 +1,43 @@
+"""Tables of experiments: as CSV files that land whole, and for people."""
+
+from __future__ import annotations
+
+import csv
+import io
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+from borechain.files import write_whole
+
+Columns = Sequence[tuple[str, str]]  # key of a row, heading
+CASE_COLUMNS: Columns = (("case", "case"), ("published", "published"), ("ours", "ours"), ("unit", "unit"))
+
+
+def write_table(path: Path, rows: list[dict[str, Any]], columns: Columns) -> None:
+    """Keep a table as CSV."""
+    text = io.StringIO()
+    writer = csv.writer(text, lineterminator="\n")
+    writer.writerow([key for key, _ in columns])
+    writer.writerows([[cell(row[key]) for key, _ in columns] for row in rows])
+    write_whole(path, text.getvalue())
+
+
+def show_table(title: str, rows: list[dict[str, Any]], columns: Columns) -> None:
+    """Print a table."""
+    from rich.console import Console
+    from rich.table import Table
+
+    table = Table(title=title)
+    for _, heading in columns:
+        table.add_column(heading, justify="right")
+    for row in rows:
+        table.add_row(*(cell(row[key]) for key, _ in columns))
+    Console().print(table)
+
+
+def cell(value: Any) -> str:
+    """Four significant digits for numbers, nothing for nothing."""
+    if value is None:
+        return ""
+    return f"{value:.4g}" if isinstance(value, float) else str(value)

@@ -1,0 +1,285 @@
+"""Figure of a wall or a grid of columns: where a joint is too thin, by name, depth and direction.
+
+Source: thesis chapter 1. Frame: north, east, down; m.
+"""
+
+from __future__ import annotations
+
+import warnings
+from collections.abc import Callable
+from typing import Any, Literal
+
+import numpy as np
+import numpy.typing as npt
+from matplotlib.axes import Axes
+from matplotlib.colors import BoundaryNorm, ListedColormap
+from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
+from matplotlib.patches import Circle, Rectangle
+
+from groundstation.errors import SurveyError
+from groundstation.report.style import GREY, INK, LIGHT, SERIES, WRONG, new_figure, region, styled, tidy
+from groundstation.survey.ellipsoid import coverage_radius
+from groundstation.survey.wall import Columns, ExtraColumn, Joints, thickness, worst
+
+Array = npt.NDArray[np.float64]
+BAND = 0.95
+GREYS, ALARMS = ("#F2F2F2", "#D0D0D0", "#A6A6A6"), ("#E69F00", WRONG)
+SHADES = ("probability", "thickness")
+MOST_CELLS = 240  # along the wall; a cell narrower than that is lost on paper
+LINES = ("-", "--", ":", "-.")
+
+
+def joint_name(columns: Columns, found: Joints, joint: int) -> str:
+    """Names of its two columns."""
+    a, b = found.pairs[joint]
+    return f"{columns.names[a]}–{columns.names[b]}"
+
+
+def band_of_thickness(columns: Columns, found: Joints, joint: int) -> tuple[Array, Array]:
+    """Thickness (depths,) at both ends of the 95 % interval of the distance of the centres, along their line."""
+    a, b = found.pairs[joint]
+    apart = columns.centres[b] - columns.centres[a]
+    size = found.distance[joint]
+    unit = apart / np.maximum(size, 1e-9)[:, None]
+    std = np.sqrt(np.einsum("zi,zij,zj->z", unit, columns.covs[a] + columns.covs[b], unit))
+    wide = coverage_radius(BAND, 1) * std
+    return size + wide, np.maximum(size - wide, 0.0)
+
+
+def ranking(found: Joints) -> npt.NDArray[np.intp]:
+    """Joints, the one that most probably is too thin first; of equals the thinnest."""
+    probability = np.where(np.isfinite(found.probability), found.probability, -1.0).max(axis=1)
+    thin = np.where(np.isfinite(found.thickness), found.thickness, np.inf).min(axis=1)
+    return np.lexsort((thin, -probability))
+
+
+@styled
+def wall_figure(
+    columns: Columns,
+    found: Joints,
+    radius: float,
+    required: float,
+    extra: ExtraColumn | None,
+    title: str,
+    *,
+    shown: int = 3,
+    allowed: float = 0.05,
+    shade: Literal["probability", "thickness"] = "probability",
+) -> Figure:
+    """Thickness of the worst joints over depth, all joints as a map, the wall in plan and its worst joint enlarged.
+
+    Parameters
+    ----------
+    radius, required : of the columns and of their joints, m
+    extra : proposed column, drawn in plan
+    shown : joints whose thickness is drawn, at most 4
+    allowed : probability of a joint being too thin, beyond which it is marked
+    shade : of the map
+
+    Raises
+    ------
+    SurveyError
+        When no joint is known at any depth, or an option has no such value.
+    """
+    figure = new_figure(8.8, title)
+    _draw(figure, columns, found, (radius, required), extra, shown=shown, allowed=allowed, shade=shade)
+    return tidy(figure)
+
+
+def _draw(
+    figure: Figure,
+    columns: Columns,
+    found: Joints,
+    lengths: tuple[float, float],
+    extra: ExtraColumn | None,
+    *,
+    shown: int,
+    allowed: float,
+    shade: str,
+) -> None:
+    """Fill the figure; ``lengths`` are radius and required thickness, m."""
+    if shade not in SHADES or not 0.0 < allowed < 0.5 or not 1 <= shown <= len(LINES):
+        raise SurveyError(
+            f"plot: expected a shade of {', '.join(SHADES)}, allowed in 0..0.5 and shown of 1..{len(LINES)}, "
+            f"got {shade!r}, {allowed} and {shown}"
+        )
+    if not np.any(np.isfinite(found.thickness)):
+        raise SurveyError("plot: expected a joint whose two columns reach a common depth, got none")
+    radius, required = lengths
+    (over_depth, shades), (plan, zoom) = figure.subplots(2, 2, height_ratios=(1.15, 1.0))
+    bad = np.max(np.where(np.isfinite(found.probability), found.probability, 0.0), axis=1) > allowed
+    bad |= np.min(np.where(np.isfinite(found.thickness), found.thickness, np.inf), axis=1) < required
+    _thickness(over_depth, columns, found, lengths, ranking(found)[:shown], bad)
+    _map(shades, columns, found, lengths, allowed, shade)
+    _plan(plan, columns, found, radius, bad)
+    _zoom(zoom, columns, found, radius, bad, extra)
+
+
+def _thickness(
+    axes: Axes,
+    columns: Columns,
+    found: Joints,
+    lengths: tuple[float, float],
+    which: npt.NDArray[np.intp],
+    bad: npt.NDArray[np.bool_],
+) -> None:
+    """Thickness over depth; the band of the worst one only, for bands on bands say nothing."""
+    radius, required = lengths
+    for rank, joint in enumerate(which):
+        colour = (WRONG if rank == 0 else ALARMS[0]) if bad[joint] else (INK if rank == 0 else GREY)
+        axes.plot(found.thickness[joint], columns.depths, color=colour, ls=LINES[rank], lw=1.8 if rank == 0 else 1.3,
+                  label=joint_name(columns, found, int(joint)))  # fmt: skip
+        if rank == 0:
+            low, high = (thickness(d, radius) for d in band_of_thickness(columns, found, int(joint)))
+            axes.fill_betweenx(
+                columns.depths, low, high, color=colour, alpha=0.18, lw=0.0, label=f"its {100.0 * BAND:g} % band"
+            )
+    axes.axvline(required, color=INK, lw=1.0, ls=(0, (6, 2)), label=f"required, {required:g} m")
+    axes.set(xlabel="Thickness of the joint (m)", ylabel="TVD (m)", title="Worst joints")
+    axes.set_ylim(float(columns.depths[-1]), float(columns.depths[0]))
+    axes.legend(loc="upper center", bbox_to_anchor=(0.5, -0.16), ncols=2)
+
+
+def _map(axes: Axes, columns: Columns, found: Joints, lengths: tuple[float, float], allowed: float, shade: str) -> None:
+    """Joints along the wall, depth down; steps of grey where all is well."""
+    radius, required = lengths
+    colours: tuple[str, ...] = (*GREYS, *ALARMS)
+    bounds = [0.0, 1e-4 * allowed, 1e-2 * allowed, allowed, 0.5, 1.0]
+    values, label = found.probability, f"Probability of less than {required:g} m (-)"
+    if shade == "thickness":
+        values, label = found.thickness, "Thickness of the joint (m)"
+        thin = float(np.nanmin(values))
+        bounds, colours = np.linspace(required, 2.0 * radius, 4).tolist(), GREYS[::-1]
+        if required > 0.0:
+            bounds, colours = [0.0, *bounds], (ALARMS[0], *colours)
+        if thin < 0.0:  # there is a gap
+            bounds, colours = [thin, *bounds], (WRONG, *colours)
+    colormap = ListedColormap(list(colours))
+    count, depths = len(found.pairs), columns.depths
+    edge, cells = pooled(values, np.nanmin if shade == "thickness" else np.nanmax)
+    middles = 0.5 * (depths[1:] + depths[:-1])
+    edges = np.concatenate([depths[:1], middles, depths[-1:]])
+    picture = axes.pcolormesh(
+        edge,
+        edges,
+        np.ma.masked_invalid(cells.T),
+        cmap=colormap,
+        norm=BoundaryNorm(bounds, len(colours)),
+        rasterized=True,  # thousands of cells would make a vector file slow to open
+    )
+    axes.patch.set(hatch="////", edgecolor=GREY, linewidth=0.0)  # seen where no cell is drawn
+    joint, depth = worst(found)
+    axes.plot(joint, depths[depth], "o", ms=8.0, mfc="none", mec=INK, mew=1.4, clip_on=False, gid="worst")
+    axes.grid(visible=False)
+    axes.set_ylim(float(depths[-1]), float(depths[0]))
+    step = -(-count // 16)
+    axes.set_xticks(range(0, count, step), [joint_name(columns, found, k) for k in range(0, count, step)], rotation=90)
+    missing = "; hatched: not drilled" if np.any(~np.isfinite(values)) else ""
+    axes.set(ylabel="TVD (m)", title=f"All joints (ring: the worst{missing})")
+    bar = axes.figure.colorbar(picture, ax=axes, location="bottom", spacing="uniform", label=label, aspect=30, pad=0.02)
+    bar.ax.set_xticks(bounds, [f"{b:.2g}" for b in bounds])
+
+
+def pooled(values: Array, worst_of: Callable[..., Any]) -> tuple[Array, Array]:
+    """Edges along the wall and cells (at most ``MOST_CELLS``, depths): joints that share one show their worst."""
+    count = len(values)
+    step = -(-count // MOST_CELLS)
+    edge = np.append(np.arange(0, count, step), count) - 0.5
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", RuntimeWarning)  # a cell of nothing but nan stays nan
+        cells = [worst_of(values[k : k + step], axis=0) for k in range(0, count, step)]
+    return edge, np.array(cells)
+
+
+def _frame(axes: Axes, title: str) -> None:
+    axes.set_aspect("equal", adjustable="datalim")
+    axes.set(xlabel="East (m)", ylabel="North (m)", title=title)
+
+
+def _plan(axes: Axes, columns: Columns, found: Joints, radius: float, bad: npt.NDArray[np.bool_]) -> None:
+    """Whole wall at the depth of the worst joint."""
+    _, depth = worst(found)
+    touched = set(found.pairs[bad].ravel().tolist())
+    for k, centre in enumerate(columns.centres[:, depth]):
+        if np.all(np.isfinite(centre)):
+            face = WRONG if k in touched else LIGHT
+            axes.add_patch(Circle((centre[1], centre[0]), radius, fc=face, ec=GREY, lw=0.5, alpha=0.6, gid="column"))
+    axes.plot(columns.designs[:, 1], columns.designs[:, 0], ls="", marker="+", ms=3.0, mew=0.7, color=INK)
+    middle, half = _window(columns, found, radius)
+    corner = (float(middle[1] - half), float(middle[0] - half))
+    axes.add_patch(Rectangle(corner, 2.0 * half, 2.0 * half, fc="none", ec=INK, lw=0.8))
+    axes.autoscale_view()
+    note = " (coloured: a joint not safe)" if touched else ""
+    _frame(axes, f"Plan at {columns.depths[depth]:.1f} m{note}")
+
+
+def _window(columns: Columns, found: Joints, radius: float) -> tuple[Array, float]:
+    """Middle and half width (m) of the surroundings of the worst joint."""
+    joint, depth = worst(found)
+    both = columns.centres[found.pairs[joint], depth]
+    return both.mean(axis=0), 0.5 * float(found.distance[joint, depth]) + 1.45 * radius
+
+
+def _zoom(
+    axes: Axes,
+    columns: Columns,
+    found: Joints,
+    radius: float,
+    bad: npt.NDArray[np.bool_],
+    extra: ExtraColumn | None,
+) -> None:
+    """Columns around the worst joint: from head to toe, and as circles where it is worst."""
+    joint, depth = worst(found)
+    a, b = (int(k) for k in found.pairs[joint])
+    middle, half = _window(columns, found, radius)
+    sigma = coverage_radius(BAND, 2)
+    colour = WRONG if bad[joint] else INK
+    for k, way in enumerate(columns.centres):
+        here, known = way[depth], np.isfinite(way[:, 0])
+        if not np.any(known) or not np.all(np.abs(way[known][-1] - middle) < half + radius):
+            continue
+        axes.plot(way[known, 1], way[known, 0], "-", color=GREY, lw=1.0)
+        axes.plot(columns.designs[k, 1], columns.designs[k, 0], "+", color=INK, ms=6.0)
+        axes.plot(*way[known][-1, ::-1], "v", color=INK, ms=4.0)
+        if np.all(np.isfinite(here)):
+            axes.add_patch(Circle((here[1], here[0]), radius, fc=LIGHT, ec=GREY, lw=0.8, alpha=0.5, gid="column"))
+            region(axes, here[::-1], columns.covs[k, depth, ::-1, ::-1], sigma, fc="none", ec=SERIES[0], lw=1.0)
+    first, second = columns.centres[a, depth], columns.centres[b, depth]
+    along = (second - first) / max(float(found.distance[joint, depth]), 1e-9)
+    thick = float(found.thickness[joint, depth])
+    across = np.array([-along[1], along[0]])
+    labels: list[Array] = []
+    for k in (a, b, *(other for other in range(len(columns.names)) if other not in (a, b))):
+        here = columns.centres[k, depth]
+        place = here + 0.8 * radius * across
+        free = all(np.hypot(*(place - other)) > 0.6 * radius for other in labels)
+        if free and np.all(np.abs(here - middle) < half - 0.2 * radius):
+            labels.append(place)
+            weight = "bold" if k in (a, b) else "normal"
+            axes.text(place[1], place[0], columns.names[k], ha="center", va="center", weight=weight)
+    # a gap lies along the line of the centres
+    ends = 0.5 * (first + second) + 0.5 * abs(thick) * (across if thick > 0.0 else along) * np.array([[-1.0], [1.0]])
+    axes.plot(ends[:, 1], ends[:, 0], "|-" if thick < 0.0 else "-", color=colour, lw=2.4, solid_capstyle="butt")
+    if extra is not None:
+        axes.add_patch(Circle((extra.east, extra.north), radius, fc="none", ec=SERIES[1], ls="--", lw=1.5, gid="extra"))
+    kind = f"gap of {-thick:.2f} m" if thick <= 0.0 else f"{thick:.2f} m thick"
+    _frame(axes, f"{joint_name(columns, found, joint)} at {columns.depths[depth]:.1f} m: {kind}")
+    # automatic, so that the equal aspect may widen them
+    axes.set_xlim(float(middle[1] - half), float(middle[1] + half), auto=True)
+    axes.set_ylim(float(middle[0] - half), float(middle[0] + half), auto=True)
+    axes.figure.legend(handles=_legend(colour, extra), loc="outside lower left", ncols=3)
+
+
+def _legend(colour: str, extra: ExtraColumn | None) -> list[Any]:
+    handles: list[Any] = [
+        Line2D([], [], ls="", marker="+", color=INK, label="head as designed"),
+        Line2D([], [], color=GREY, marker="v", mfc=INK, mec=INK, label="hole to its toe"),
+        Line2D([], [], color=SERIES[0], lw=1.0, label=f"{100.0 * BAND:g} % region of the centre"),
+        Line2D([], [], color=colour, lw=2.4, label="worst joint"),
+    ]
+    if extra is not None:
+        verdict = "closes the gap" if extra.closes else "does not close the gap alone"
+        what = f"extra column, {extra.from_depth:.1f}–{extra.to_depth:.1f} m: {verdict}"
+        handles.append(Line2D([], [], color=SERIES[1], ls="--", lw=1.5, label=what))
+    return handles

@@ -1,0 +1,179 @@
+"""Is the column where it should be? Deviation from the design axis, tolerance, projection to the target.
+
+A design axis is a straight line from its head. At a depth along it the deviation is the part of the offset across it.
+For near-vertical columns inclination matters far more than azimuth; ``Dominant`` says which of the two does here.
+Source: EN 12716 for the preset of that name; thesis chapter 1 for 0.27 deg. Frame: north, east, down; m and rad.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+
+from groundstation.errors import SurveyError
+from groundstation.survey.resolve import Lean, angle_stds, angles
+from groundstation.survey.trajectory import Point
+
+Array = npt.NDArray[np.float64]
+LEVELS = (0.5, 0.8, 1.0)  # of the tolerance, at which an alarm is due
+
+
+@dataclass(frozen=True, slots=True)
+class Tolerance:
+    """Allowed deviation: ``start`` (m) at the head and ``growth`` (m/m) along the axis."""
+
+    name: str
+    start: float
+    growth: float
+
+    def at(self, along: float) -> float:
+        """Limit (m) at a length along the axis."""
+        return self.start + self.growth * along
+
+
+PRESETS = {
+    "en-12716": Tolerance("en-12716", 0.05, 0.02),
+    "5-cm": Tolerance("5-cm", 0.05, 0.0),
+    "0.27-deg": Tolerance("0.27-deg", 0.0, math.tan(math.radians(0.27))),
+}
+
+
+def tolerance(name: str) -> Tolerance:
+    """Preset by its name.
+
+    Raises
+    ------
+    SurveyError
+        Names the presets.
+    """
+    if name not in PRESETS:
+        raise SurveyError(f"tolerance: expected one of {', '.join(PRESETS)}, got {name!r}")
+    return PRESETS[name]
+
+
+@dataclass(frozen=True, slots=True)
+class Design:
+    """Axis of a column and what it is to become."""
+
+    name: str = "column"
+    head: tuple[float, float, float] = (0.0, 0.0, 0.0)  # m, in the frame of the trajectory
+    inclination: float = 0.0
+    azimuth: float = 0.0
+    length: float = 30.0  # m along the axis
+    radius: float = 0.6  # m, of the finished column
+    tolerance: Tolerance = PRESETS["en-12716"]
+
+    @property
+    def axis(self) -> Array:
+        """Unit vector (3,) down the axis."""
+        s = math.sin(self.inclination)
+        return np.array([s * math.cos(self.azimuth), s * math.sin(self.azimuth), math.cos(self.inclination)])
+
+    @property
+    def across(self) -> Array:
+        """Two unit vectors (2, 3) across the axis; for a vertical one they are north and east."""
+        c = math.cos(self.inclination)
+        a = np.array([c * math.cos(self.azimuth), c * math.sin(self.azimuth), -math.sin(self.inclination)])
+        b = np.array([-math.sin(self.azimuth), math.cos(self.azimuth), 0.0])
+        turn = np.array(
+            [[math.cos(self.azimuth), -math.sin(self.azimuth)], [math.sin(self.azimuth), math.cos(self.azimuth)]]
+        )
+        return np.asarray(turn @ np.stack([a, b]))
+
+
+@dataclass(frozen=True, slots=True)
+class Deviation:
+    """Where the column is against its design at one point."""
+
+    md: float
+    along: float  # m along the design axis
+    offset: Array  # (2,) m across the axis; north and east for a vertical one
+    cov: Array  # (2, 2) m^2
+    limit: float  # m
+
+    @property
+    def size(self) -> float:
+        """Distance (m) from the axis."""
+        return math.hypot(self.offset[0], self.offset[1])
+
+    @property
+    def std(self) -> float:
+        """Standard deviation (m) of the distance, along the offset (of the worst direction without one)."""
+        if self.size < 1e-9:
+            return math.sqrt(max(float(np.linalg.eigvalsh(self.cov)[-1]), 0.0))
+        unit = self.offset / self.size
+        return math.sqrt(max(float(unit @ self.cov @ unit), 0.0))
+
+    @property
+    def ratio(self) -> float:
+        """Share of the tolerance that is used up."""
+        return self.size / self.limit if self.limit > 0.0 else (math.inf if self.size > 0.0 else 0.0)
+
+    @property
+    def level(self) -> float:
+        """Highest alarm level reached, 0 for none."""
+        return max((level for level in LEVELS if self.ratio >= level), default=0.0)
+
+
+def deviation(point: Point, design: Design) -> Deviation:
+    """Deviation of one point of a trajectory."""
+    offset = point.position - np.array(design.head)
+    along = float(offset @ design.axis)
+    across = design.across
+    return Deviation(
+        point.md, along, across @ offset, across @ point.cov @ across.T, design.tolerance.at(max(along, 0.0))
+    )
+
+
+def project(point: Point, direction: Lean, design: Design) -> Deviation:
+    """Deviation at the target if the hole goes on straight from a point; its uncertainty grows with the way.
+
+    The direction's own error and that of the position are taken as one (fully correlated), for the last station is in
+    both: the larger of the two possible answers.
+    """
+    offset = point.position - np.array(design.head)
+    axis, across = design.axis, design.across
+    rest = (design.length - float(offset @ axis)) / max(float(point.tangent @ axis), 1e-3)
+    target = offset + rest * point.tangent
+    if rest <= 0.0:
+        return deviation(point, design)
+    down = math.copysign(max(abs(direction.down), 1e-6), direction.down)
+    jacobian = rest * (
+        across @ np.array([[1.0, 0.0], [0.0, 1.0], [-direction.lean[0] / down, -direction.lean[1] / down]])
+    )
+    turned = jacobian @ direction.total_cov @ jacobian.T
+    here = across @ point.cov @ across.T
+    root = _root(here) + _root(turned)
+    return Deviation(point.md + rest, design.length, across @ target, root @ root.T, design.tolerance.at(design.length))
+
+
+def _root(cov: Array) -> Array:
+    values, vectors = np.linalg.eigh(cov)
+    return np.asarray(vectors * np.sqrt(np.maximum(values, 0.0)) @ vectors.T)
+
+
+@dataclass(frozen=True, slots=True)
+class Dominant:
+    """Which angle the position of a column hangs on: lateral error (m) of each, over its length."""
+
+    by_inclination: float
+    by_azimuth: float
+
+    @property
+    def name(self) -> str:
+        """``inclination`` or ``azimuth``.
+
+        A tilt errs alike along and across the lean, so its error is in both numbers: the azimuth dominates when what it
+        adds to the tilt's is more than that.
+        """
+        return "azimuth" if self.by_azimuth > math.sqrt(2.0) * self.by_inclination else "inclination"
+
+
+def dominant(direction: Lean, length: float) -> Dominant:
+    """Lateral errors L cos I sigma_I and L sin I sigma_A of a hole that leans all along like ``direction``."""
+    inclination, _ = angles(direction.lean, direction.down)
+    std_i, std_a = angle_stds(direction.lean, direction.down, direction.total_cov)
+    return Dominant(length * abs(math.cos(inclination)) * std_i, length * math.sin(inclination) * std_a)

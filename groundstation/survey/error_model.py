@@ -1,0 +1,419 @@
+"""Region of uncertainty of a survey: every error source propagated along the hole.
+
+A source with one standard deviation sigma_i acts on station k through its weights dp_k/deps_i in depth, inclination and
+azimuth, and these on the two legs that meet there (balanced tangential Jacobians):
+
+    e_ik  = sigma_i (d dr_k/dp_k + d dr_k+1/dp_k) dp_k/deps_i        e*_iK = sigma_i (d dr_K/dp_K) dp_K/deps_i
+    random:            C_K = sum_{k<K} e_k e_k^T + e*_K e*_K^T
+    systematic in a leg of the survey, in the well, in all wells:
+                       C_K = (sum_{k<K} e_k + e*_K) (sum_{k<K} e_k + e*_K)^T      over the stations it is shared by
+
+A leg here is a part of the hole that one tool surveyed. Arrays are (..., n): leading axes are wells. Frame: north,
+east, down. Source: thesis 2.3 and eqs. I.1-I.12; Definition of the ISCWSA error model, revision 5.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from functools import lru_cache
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from groundstation.errors import SurveyError, ToolError
+from groundstation.survey.formulas import ARRAY, VARIABLES, Compiled, compile_formulas, is_zero
+from groundstation.survey.instruments import ZERO, Mode, Term, Tool
+
+Array = npt.NDArray[np.float64]
+VERTICAL = 1.75e-6  # rad, nearer than this to the vertical an azimuth has no value
+TINY = 1e-30  # rad, stands for an inclination of zero in formulas that divide by its sine
+NO_WEIGHT = 1e12  # a weight beyond this is a division by the sine of a vertical inclination
+EARTH_RATE = 7.292115e-5 * 3600.0  # rad/h
+# What a record may hold beyond directions, and what stands for it where it does not: a stop of our own chain, ten hops
+# down, with joints and mounts of 0.05 deg and 32 samples of 0.02 deg
+RECORD = {
+    "SigmaYaw": math.radians(0.02),
+    "SigmaSystematic": math.radians(0.17),
+    "SigmaForce": 6.1e-4,
+    "Readings": 1.0,
+}
+SECONDS_A_METRE = 50.0  # of a survey whose record has no times: thesis, 100 s for a rod of 2 m
+
+
+@dataclass(frozen=True, slots=True)
+class Site:
+    """What formulas know of the place; SI and rad, nT."""
+
+    gravity: float = 9.81
+    b_field: float = 50_000.0
+    dip: float = math.radians(70.0)
+    declination: float = 0.0  # of magnetic north against the reference of the azimuths
+    latitude: float = math.radians(52.0)
+
+
+@dataclass(frozen=True, slots=True)
+class Survey:
+    """Stations of one well or of many: (..., n); ``record`` holds further columns by the name of their variable."""
+
+    md: Array
+    inclination: Array
+    azimuth: Array
+    tvd: Array
+    record: Mapping[str, Array] = field(default_factory=dict)
+
+
+@dataclass(frozen=True, slots=True)
+class Leg:
+    """A part of the survey: the stations from ``first`` on, until the next leg begins, were taken with ``tool``."""
+
+    tool: Tool
+    first: int = 1
+
+
+@lru_cache(maxsize=64)
+def compiled(formulas: tuple[tuple[str, ...], ...], parameters: tuple[str, ...]) -> Compiled:
+    """One function for the formulas of many terms."""
+    return compile_formulas([text for row in formulas for text in row], parameters)
+
+
+def inputs_of(tool: Tool, site: Site, values: Mapping[str, Any]) -> list[Any]:
+    """Values of the variables and parameters in the order in which compiled formulas take them."""
+    known = {
+        "GField": site.gravity,
+        "BField": site.b_field,
+        "Dip": site.dip,
+        "Latitude": site.latitude,
+        "EarthRate": EARTH_RATE,
+        **values,
+    }
+    return [known[name] for name in VARIABLES] + list(tool.parameters.values())
+
+
+def station_values(survey: Survey, site: Site) -> dict[str, Array]:
+    """Variables of the stations from the second on, each with its predecessor: (..., n - 1)."""
+    md, azimuth = survey.md, survey.azimuth
+    inclination = np.maximum(survey.inclination, TINY)
+    time = survey.record.get("Time", SECONDS_A_METRE * md)
+    magnetic = azimuth - site.declination
+    values: dict[str, Array] = {"TVD": survey.tvd[..., 1:]}
+    for name, array in (("MD", md), ("Inc", inclination), ("Az", azimuth), ("AzT", azimuth), ("AzM", magnetic)):
+        values[name], values[f"{name}Prev"] = array[..., 1:], array[..., :-1]
+    values["Time"], values["TimePrev"] = time[..., 1:], time[..., :-1]
+    for name, default in RECORD.items():
+        values[name] = survey.record[name][..., 1:] if name in survey.record else np.float64(default)  # type: ignore[assignment]
+    return values
+
+
+class Geometry:
+    """What propagation needs of a survey, once for all sources: (..., n - 1) and lengths in m.
+
+    From revision 5 the industry's model allows the direction at the surface an error like that of the first station:
+    ``slot_allowance`` gives the first station the whole first leg.
+    """
+
+    def __init__(self, survey: Survey, *, slot_allowance: bool) -> None:
+        sine, cosine = np.sin(survey.inclination), np.cos(survey.inclination)
+        cos_a, sin_a = np.cos(survey.azimuth), np.sin(survey.azimuth)
+        self.upper = 0.5 * np.diff(survey.md, axis=-1)  # weight in the leg above
+        self.both = self.upper.copy()  # weight in both legs
+        self.both[..., :-1] += self.upper[..., 1:]
+        if slot_allowance:
+            self.both[..., 0] += self.upper[..., 0]
+            self.upper[..., 0] *= 2.0
+        tangent = (sine * cos_a, sine * sin_a, cosine)
+        self.by_depth = np.stack([0.5 * (t[..., 1:] + t[..., :-1]) for t in tangent])  # d dr_k / d MD_k
+        sine, cosine, cos_a, sin_a = (x[..., 1:] for x in (sine, cosine, cos_a, sin_a))
+        self.by_inclination = np.stack([cosine * cos_a, cosine * sin_a, -sine])
+        self.by_azimuth = np.stack([-sine * sin_a, sine * cos_a])
+        self.vertical = np.minimum(survey.inclination, math.pi - survey.inclination)[..., 1:] < VERTICAL
+        self.any_vertical = bool(np.any(self.vertical))
+
+
+class Source:
+    """One error source, wherever in the survey it acts: its rows are (leg, place in its tool, term)."""
+
+    def __init__(self, rows: list[tuple[int, int, Term]]) -> None:
+        self.rows = rows
+        self.name = rows[0][2].name
+        self.random = rows[0][2].mode is Mode.RANDOM
+        # what turns the azimuth alone moves nothing down
+        flat = all(is_zero(t.weights[0]) and is_zero(t.weights[1]) and t.position is None for _, _, t in rows)
+        self.axes = 2 if flat and all(is_zero((t.singular or ZERO)[2]) for _, _, t in rows) else 3
+
+
+@lru_cache(maxsize=64)
+def sources_of(legs: tuple[Leg, ...]) -> list[Source]:
+    """Sources of a survey: errors of a well or of all wells are one source in every leg that names them."""
+    found: dict[tuple[str, int], list[tuple[int, int, Term]]] = {}
+    for number, leg in enumerate(legs):
+        for t, term in enumerate(leg.tool.terms):
+            everywhere = term.mode in (Mode.WELL, Mode.GLOBAL)
+            found.setdefault((term.name, -1 if everywhere else number), []).append((number, t, term))
+    return [Source(rows) for rows in found.values()]
+
+
+@lru_cache(maxsize=64)
+def merged_sources(legs: tuple[Leg, ...]) -> list[Source]:
+    """The same sources for their sum alone: those with one formula are one, its variance the sum of theirs."""
+    found: dict[Any, list[Source]] = {}
+    for k, source in enumerate(sources_of(legs)):
+        number, _, term = source.rows[0]
+        alike = (number, source.random, term.weights, term.singular, term.position, term.unit)
+        found.setdefault(alike if len(source.rows) == 1 else k, []).append(source)
+    out = []
+    for group in found.values():
+        number, t, term = group[0].rows[0]
+        if len(group) == 1:
+            out.append(group[0])
+        else:
+            out.append(Source([(number, t, replace(term, value=math.hypot(*(s.rows[0][2].value for s in group))))]))
+    return out
+
+
+class Propagation:
+    """Effects of sources on the positions of one survey, one source at a time in the same few arrays.
+
+    ``inner`` (3, ..., n - 1) is e_k and ``last`` e*_k of the source asked for last, m, of the stations from the second;
+    of a source that acts on two axes the first two rows alone are written.
+    """
+
+    def __init__(self, survey: Survey, legs: Sequence[Leg], site: Site, geometry: Geometry) -> None:
+        self._geometry = g = geometry
+        self._legs = legs
+        values = station_values(survey, site)
+        self._weights = []
+        for leg in legs:
+            function = compiled(tuple(term.formulas for term in leg.tool.terms), tuple(leg.tool.parameters))
+            with np.errstate(all="ignore"):
+                self._weights.append(function(ARRAY, inputs_of(leg.tool, site, values)))
+        self.inner = np.empty((3, *g.upper.shape))
+        self.last = np.empty((3, *g.upper.shape))
+        self._work = np.empty(g.upper.shape)
+
+    def evaluate(self, source: Source) -> None:
+        """Write the effects of a source.
+
+        Raises
+        ------
+        ToolError
+            When a weight has no value at a station: the formula divides by zero there and no singular one is given.
+        """
+        self._axes = source.axes
+        if len(self._legs) == 1:
+            self._row(*source.rows[0])
+            return
+        inner, last = np.zeros_like(self.inner), np.zeros_like(self.last)
+        for row in source.rows:
+            self._row(*row)
+            begin = self._legs[row[0]].first - 1
+            end = self._legs[row[0] + 1].first - 1 if row[0] + 1 < len(self._legs) else None
+            inner[..., begin:end] += self.inner[..., begin:end]
+            last[..., begin:end] += self.last[..., begin:end]
+        self.inner[...], self.last[...] = inner, last
+
+    def sums(self) -> Array:
+        """Effect (axes, ..., n - 1) on every position of the source, if it stays the same; ``inner`` is used up."""
+        inner, last = self.inner[: self._axes], self.last[: self._axes]
+        np.cumsum(inner, axis=-1, out=inner)
+        last[..., 1:] += inner[..., :-1]
+        return last
+
+    def _row(self, number: int, t: int, term: Term) -> None:
+        g, flat = self._geometry, self._weights[number][9 * t : 9 * t + 9]
+        inner, last = self.inner[: self._axes], self.last[: self._axes]
+        sigma = term.sigma
+        if is_zero(term.weights[1]) and is_zero(term.weights[2]):
+            last[...] = 0.0
+        else:
+            self._turn(term, flat[1] * sigma, flat[2] * sigma, flat[3:6])
+        np.multiply(last, g.both, out=inner)
+        last *= g.upper
+        if not is_zero(term.weights[0]):
+            depth = flat[0] * sigma
+            shift = depth * g.by_depth
+            last += shift
+            inner += shift
+            inner[..., :-1] -= np.broadcast_to(depth, self._work.shape)[..., :-1] * g.by_depth[..., 1:]
+        if term.position is not None:
+            for c in range(3):
+                np.multiply(flat[6 + c], sigma, out=self._work)
+                last[c] += self._work
+                inner[c] += self._work
+        if not abs(float(last.sum())) < NO_WEIGHT or (g.any_vertical and self._lost(term, flat)):
+            tool = self._legs[number].tool.name
+            raise ToolError(f"{tool}: term {term.name}: its weight has no value at a station; give singular weights")
+
+    def _lost(self, term: Term, flat: list[Any]) -> bool:
+        """Whether a weight has no value where the hole is vertical and nothing stands for it."""
+        if term.singular is not None:
+            return False
+        vertical = self._geometry.vertical
+        return any(not np.all(np.abs(np.where(vertical, weight, 0.0)) < NO_WEIGHT) for weight in flat[:3])
+
+    def _turn(self, term: Term, inclination: Any, azimuth: Any, singular: list[Any]) -> None:
+        """Change of the tangent, into ``last``."""
+        g, out = self._geometry, self.last
+        if self._axes == 2:
+            np.multiply(g.by_azimuth, azimuth, out=out[:2])
+        else:
+            np.multiply(g.by_inclination, inclination, out=out)
+            if not is_zero(term.weights[2]):
+                for c in range(2):
+                    np.multiply(g.by_azimuth[c], azimuth, out=self._work)
+                    out[c] += self._work
+        if g.any_vertical and term.singular is not None:
+            for c, weight in enumerate(singular[: self._axes]):
+                out[c] = np.where(g.vertical, weight * term.sigma, out[c])
+
+
+PAIRS = ((0, 0), (0, 1), (1, 1), (0, 2), (1, 2), (2, 2))  # the first three are those of the plane
+
+
+class Sums:
+    """Running sums of the products of effects: the upper halves of (..., n - 1, 3, 3), one array a pair of axes."""
+
+    def __init__(self, shape: tuple[int, ...]) -> None:
+        self._own = np.zeros((6, *shape))  # constant sources, and the last station of random ones
+        self._before = np.zeros((6, *shape))  # random ones of the stations that have both legs
+        self._work = np.empty(shape)
+
+    def take(self, work: Propagation, source: Source) -> None:
+        """Evaluate a source and add it."""
+        work.evaluate(source)
+        if source.random:
+            self._add(self._before, work.inner[: source.axes])
+            self._add(self._own, work.last[: source.axes])
+        else:
+            self._add(self._own, work.sums())
+
+    def add_to(self, out: Array) -> None:
+        """Add the covariance of all that was taken to ``out`` (..., n, 3, 3)."""
+        before = np.cumsum(self._before, axis=-1)
+        for k, (a, b) in enumerate(PAIRS):
+            total = self._own[k]
+            total[..., 1:] += before[k][..., :-1]
+            out[..., 1:, a, b] += total
+            if a != b:
+                out[..., 1:, b, a] += total
+
+    def _add(self, parts: Array, effect: Array) -> None:
+        """Add v v^T of an effect (2 or 3, ..., n - 1)."""
+        for part, (a, b) in zip(parts, PAIRS if len(effect) == 3 else PAIRS[:3], strict=False):
+            np.multiply(effect[a], effect[b], out=self._work)
+            np.add(part, self._work, out=part)
+
+
+@dataclass(frozen=True, slots=True)
+class Uncertainty:
+    """Covariance of every position and what it is made of."""
+
+    survey: Survey
+    legs: tuple[Leg, ...]
+    site: Site
+    geometry: Geometry
+    cov: Array  # (..., n, 3, 3) m^2
+
+    def by_source(self) -> dict[str, Array]:
+        """Covariance (..., n, 3, 3) by the name of its source; from the second station on they add up to ``cov``."""
+        work = Propagation(self.survey, self.legs, self.site, self.geometry)
+        found: dict[str, Array] = {}
+        for source in sources_of(self.legs):
+            out = found.setdefault(source.name, np.zeros_like(self.cov))
+            sums = Sums(self.geometry.upper.shape)
+            sums.take(work, source)
+            sums.add_to(out)
+        return found
+
+    def at(self, md: float) -> Array:
+        """Covariance (3, 3) at any depth of one well: errors of the two stations around it, blended as the hole is.
+
+        Raises
+        ------
+        SurveyError
+            When ``md`` is outside the survey.
+        """
+        mds = self.survey.md
+        if not mds[0] <= md <= mds[-1]:
+            raise SurveyError(f"uncertainty: expected a depth of {mds[0]:g}..{mds[-1]:g} m, got {md:g} m")
+        k = min(int(np.searchsorted(mds, md, side="right")) - 1, len(mds) - 2)
+        f = float((md - mds[k]) / (mds[k + 1] - mds[k]))
+        across = self._between(k) if k > 0 else np.zeros((3, 3))
+        blend = (1.0 - f) ** 2 * self.cov[k] + f**2 * self.cov[k + 1] + f * (1.0 - f) * (across + across.T)
+        return np.asarray(blend)
+
+    def _between(self, k: int) -> Array:
+        """Covariance (3, 3) of the position of station k with that of the next."""
+        work = Propagation(self.survey, self.legs, self.site, self.geometry)
+        across = np.zeros((3, 3))
+        for source in sources_of(self.legs):
+            work.evaluate(source)
+            if source.random:
+                before, axes = work.inner[: source.axes, : k - 1], source.axes
+                own = np.outer(work.last[:axes, k - 1], work.inner[:axes, k - 1])
+                across[:axes, :axes] += before @ before.T + own
+            else:
+                sums = work.sums()
+                across[: source.axes, : source.axes] += np.outer(sums[:, k - 1], sums[:, k])
+        return across
+
+
+def propagate(survey: Survey, legs: Sequence[Leg], site: Site, *, slot_allowance: bool = False) -> Uncertainty:
+    """Covariance of the positions of a survey, or of many with as many stations.
+
+    Raises
+    ------
+    SurveyError, ToolError
+        When legs and survey do not fit, or a tool is used outside the inclinations it is made for.
+    """
+    firsts = [leg.first for leg in legs]
+    if not legs or firsts[0] != 1 or sorted(set(firsts)) != firsts or firsts[-1] >= survey.md.shape[-1]:
+        raise SurveyError(f"legs: expected to begin at station 1 and at growing stations of the survey, got {firsts}")
+    for leg, end in zip(legs, [*firsts[1:], survey.md.shape[-1]], strict=True):
+        _check_range(leg, survey, end)
+    g = Geometry(survey, slot_allowance=slot_allowance)
+    work = Propagation(survey, legs, site, g)
+    sums = Sums(g.upper.shape)
+    with np.errstate(invalid="ignore", over="ignore"):  # what has no value is refused by what comes of it
+        for source in merged_sources(tuple(legs)):
+            sums.take(work, source)
+    cov = np.zeros((*survey.md.shape, 3, 3))
+    sums.add_to(cov)
+    cov[..., 0, :, :] = surface_covariance(survey.md, survey.inclination, survey.azimuth, legs[0].tool)
+    return Uncertainty(survey, tuple(legs), site, g, cov)
+
+
+def _check_range(leg: Leg, survey: Survey, end: int) -> None:
+    inclination = survey.inclination[..., leg.first : end]
+    check_inclination(leg.tool, float(np.min(inclination)), float(np.max(inclination)))
+
+
+def check_inclination(tool: Tool, least: float, most: float) -> None:
+    """Refuse inclinations (rad) that a tool is not made for.
+
+    Raises
+    ------
+    ToolError
+        Names the tool, its range and the inclination.
+    """
+    low, high = tool.inclination_range
+    if least < low - 1e-9 or most > high + 1e-9:
+        found = math.degrees(least if least < low - 1e-9 else most)
+        raise ToolError(
+            f"{tool.name}: made for inclinations of {math.degrees(low):g}..{math.degrees(high):g} deg, "
+            f"the survey has {found:.4g} deg; choose another instrument"
+        )
+
+
+def surface_covariance(md: Array, inclination: Array, azimuth: Array, tool: Tool) -> Array:
+    """Covariance (..., 3, 3) of the first station of (..., n): its own depth reading, if it is at the datum."""
+    cov = np.zeros((*md.shape[:-1], 3, 3))
+    sine, cosine = np.sin(inclination[..., 0]), np.cos(inclination[..., 0])
+    along = np.stack([sine * np.cos(azimuth[..., 0]), sine * np.sin(azimuth[..., 0]), cosine], axis=-1)
+    at_datum = (md[..., 0] == 0.0)[..., None, None]
+    for term in tool.terms:
+        if term.mode is Mode.RANDOM and term.weights[0] == "1":
+            cov = cov + at_datum * term.sigma**2 * along[..., :, None] * along[..., None, :]
+    return cov

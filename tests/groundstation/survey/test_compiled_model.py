@@ -1,0 +1,62 @@
+"""The compiled loop against the arrays: the same numbers, the same refusals."""
+
+import math
+
+import numpy as np
+import pytest
+
+from groundstation.errors import SurveyError, ToolError
+from groundstation.survey.compiled_model import CompiledModel, write_model
+from groundstation.survey.error_model import Leg, Site, Survey, propagate
+from groundstation.survey.instruments import Mode, Term, Tool, load_tool, shipped
+from groundstation.survey.methods import Method, positions
+
+SITE = Site(9.80665, 50_300.0, math.radians(68.0), math.radians(2.0), math.radians(55.0))
+
+
+def wells(seed: int) -> list[tuple[np.ndarray, np.ndarray, np.ndarray]]:
+    random = np.random.default_rng(seed)
+    found = []
+    for count in (2, 3, 4, 30, 300):
+        md = np.concatenate([[0.0], np.cumsum(random.uniform(0.5, 40.0, count - 1))])
+        inclination = np.radians(np.clip(np.linspace(0.0, 25.0, count) + random.normal(0.0, 1.0, count), 0.0, 29.0))
+        azimuth = random.uniform(0.0, 6.0) + np.cumsum(random.normal(0.0, 0.05, count))
+        if count > 3:
+            inclination[:3] = 0.0
+        found.append((md, inclination, azimuth))
+    return found
+
+
+@pytest.mark.parametrize("name", shipped())
+def test_a_compiled_tool_gives_what_the_arrays_give(name: str) -> None:
+    tool = load_tool(name)
+    model = CompiledModel(tool)
+    for md, inclination, azimuth in wells(len(name)):
+        for method in (Method.MINIMUM_CURVATURE, Method.BALANCED_TANGENTIAL):
+            places, cov = model.run(method, md, inclination, azimuth, SITE)
+            expected = positions(method, md, inclination, azimuth)
+            np.testing.assert_allclose(places, expected, rtol=0.0, atol=1e-9)
+            survey = Survey(md, inclination, azimuth, expected[:, 2])
+            wanted = propagate(survey, [Leg(tool)], SITE, slot_allowance=tool.slot_allowance).cov
+            scale = np.trace(wanted, axis1=1, axis2=2)[:, None, None] + 1e-30
+            assert np.max(np.abs(cov - wanted) / scale) < 1e-11
+
+
+def test_the_written_loop_is_cached_by_its_text() -> None:
+    tool = load_tool("stim300")
+    assert write_model(tool) == write_model(load_tool("stim300"))
+    assert CompiledModel(tool)._function is not None
+
+
+def test_what_cannot_be_is_refused() -> None:
+    model = CompiledModel(load_tool("stim300"))
+    md, zero = np.array([0.0, 10.0, 20.0]), np.zeros(3)
+    with pytest.raises(SurveyError, match="balanced-tangential or minimum-curvature"):
+        model.run(Method.TANGENTIAL, md, zero, zero, SITE)
+    with pytest.raises(SurveyError, match="expected a depth beyond 10 m"):
+        model.run(Method.MINIMUM_CURVATURE, np.array([0.0, 10.0, 10.0]), zero, zero, SITE)
+    with pytest.raises(SurveyError, match="station 1: the hole turns straight back"):
+        model.run(Method.MINIMUM_CURVATURE, md, np.array([0.0, math.pi, math.pi]), zero, SITE)
+    endless = Tool("t", "t", (Term("A", 1.0, "deg", Mode.SYSTEMATIC, ("0", "1 / Sin(Inc)", "0")),))
+    with pytest.raises(ToolError, match="no value at station 1"):
+        CompiledModel(endless).run(Method.MINIMUM_CURVATURE, md, zero, zero, SITE)

@@ -1,0 +1,181 @@
+"""Direction of a stop from its specific force and yaw, against known answers and against sampling."""
+
+import math
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from groundstation.errors import SurveyError
+from groundstation.survey.resolve import (
+    Lean,
+    Quality,
+    angle_stds,
+    angles,
+    check,
+    combine_imus,
+    is_covariance,
+    resolve,
+)
+
+G = 9.81
+DEG = math.pi / 180.0
+
+
+def force_at_rest(inclination: float, azimuth: float, yaw: float) -> np.ndarray:
+    """Specific force of a tube at rest: up, in the body's axes."""
+    return G * np.array(
+        [
+            math.sin(inclination) * math.cos(azimuth - yaw),
+            math.sin(inclination) * math.sin(azimuth - yaw),
+            -math.cos(inclination),
+        ]
+    )
+
+
+def direction_of(force: np.ndarray, yaw: float) -> Lean:
+    return resolve(force, np.eye(3) * 1e-9, yaw, 0.0).direction
+
+
+@pytest.mark.parametrize("azimuth_deg", [0.0, 90.0, 180.0, 270.0])
+def test_a_tube_leaning_north_has_azimuth_zero_and_leaning_east_ninety(azimuth_deg: float) -> None:
+    direction = direction_of(force_at_rest(2.0 * DEG, azimuth_deg * DEG, yaw=0.0), 0.0)
+    inclination, azimuth = angles(direction.lean, direction.down)
+    assert inclination == pytest.approx(2.0 * DEG)
+    assert azimuth == pytest.approx(azimuth_deg * DEG, abs=1e-9)
+
+
+@given(
+    inclination=st.floats(1e-4, math.pi - 1e-4),
+    azimuth=st.floats(0.0, 2.0 * math.pi - 1e-6),
+    yaw=st.floats(-20.0, 20.0),
+)
+def test_direction_comes_back_whatever_the_yaw(inclination: float, azimuth: float, yaw: float) -> None:
+    direction = direction_of(force_at_rest(inclination, azimuth, yaw), yaw)
+    got = angles(direction.lean, direction.down)
+    assert got[0] == pytest.approx(inclination, abs=1e-9)
+    assert math.cos(got[1] - azimuth) == pytest.approx(1.0, abs=1e-12)
+
+
+@given(st.floats(-1.0, 1.0), st.floats(-1.0, 1.0), st.floats(-1.0, 1.0))
+def test_an_azimuth_is_never_a_whole_turn(north: float, east: float, down: float) -> None:
+    inclination, azimuth = angles(np.array([north, east]), down)
+    assert 0.0 <= azimuth < 2.0 * math.pi
+    assert 0.0 <= inclination <= math.pi
+
+
+def test_an_azimuth_a_hair_west_of_north_is_north() -> None:
+    assert angles(np.array([1.0, -1e-300]), 0.0)[1] == 0.0
+
+
+def test_a_vertical_tube_has_a_lean_of_zero_and_no_azimuth() -> None:
+    direction = resolve(np.array([0.0, 0.0, -G]), np.eye(3) * 1e-6, 1.0, 1e-4).direction
+    assert np.all(direction.lean == 0.0)
+    _, sigma_azimuth = angle_stds(direction.lean, direction.down, direction.cov)
+    assert sigma_azimuth == math.pi
+    assert np.all(np.isfinite(direction.cov))
+
+
+@given(
+    inclination=st.floats(0.0, 1.5),
+    azimuth=st.floats(0.0, 6.28),
+    yaw=st.floats(-7.0, 7.0),
+    size=st.floats(0.5, 20.0),
+)
+def test_what_an_error_does_is_the_slope_of_the_direction(
+    inclination: float, azimuth: float, yaw: float, size: float
+) -> None:
+    force, step = force_at_rest(inclination, azimuth, yaw) * size / G, 1e-5
+    found = resolve(force, np.eye(3), yaw, 0.0)
+    by_yaw = (direction_of(force, yaw + step).lean - direction_of(force, yaw - step).lean) / (2.0 * step)
+    np.testing.assert_allclose(found.by_yaw, by_yaw, atol=1e-8)
+    for axis, unit in enumerate(np.eye(3) * step):
+        slope = (direction_of(force + unit, yaw).lean - direction_of(force - unit, yaw).lean) / (2.0 * step)
+        np.testing.assert_allclose(found.by_force[:, axis], slope, atol=1e-8)
+
+
+def test_covariance_of_the_lean_is_what_sampling_gives() -> None:
+    generator = np.random.default_rng(1)
+    inclination, azimuth, yaw = 3.0 * DEG, 70.0 * DEG, 200.0 * DEG
+    force, force_std, yaw_std, joint_std = force_at_rest(inclination, azimuth, yaw), 3e-3, 0.3 * DEG, 0.2 * DEG
+    resolved = resolve(force, np.eye(3) * force_std**2, yaw, yaw_std**2)
+    claimed = resolved.sharing(joint_std * resolved.by_yaw[:, None])
+    samples = np.array(
+        [
+            direction_of(
+                force + force_std * generator.standard_normal(3),
+                yaw + yaw_std * generator.standard_normal() + joint_std * generator.standard_normal(),
+            ).lean
+            for _ in range(20_000)
+        ]
+    )
+    both = claimed.total_cov
+    np.testing.assert_allclose(np.cov(samples.T), both, rtol=0.05, atol=0.03 * float(np.trace(both)))
+    sampled = np.array([angles(lean, claimed.down) for lean in samples])
+    np.testing.assert_allclose(sampled.std(axis=0), angle_stds(claimed.lean, claimed.down, both), rtol=0.03)
+
+
+def test_a_direction_keeps_its_random_part_apart_from_what_it_shares() -> None:
+    resolved = resolve(force_at_rest(0.1, 1.0, 2.0), np.eye(3) * 1e-6, 2.0, 1e-6)
+    assert resolved.direction.shared.shape == (2, 0)
+    shared = np.array([[1e-3, 0.0], [0.0, 2e-3]])
+    lean = resolved.sharing(shared)
+    np.testing.assert_array_equal(lean.cov, resolved.direction.cov)
+    np.testing.assert_allclose(lean.total_cov - lean.cov, np.diag([1e-6, 4e-6]), atol=1e-18)
+
+
+@pytest.mark.parametrize("force", [np.zeros(3), np.array([math.nan, 0.0, 1.0]), np.array([math.inf, 0.0, 1.0])])
+def test_no_force_is_no_survey(force: np.ndarray) -> None:
+    with pytest.raises(SurveyError, match="specific force"):
+        resolve(force, np.eye(3), 0.0, 0.0)
+
+
+@pytest.mark.parametrize("yaw", [math.nan, math.inf, -math.inf])
+def test_a_yaw_that_is_no_number_is_no_survey(yaw: float) -> None:
+    with pytest.raises(SurveyError, match="yaw"):
+        resolve(np.array([0.0, 0.0, -G]), np.eye(3), yaw, 0.0)
+
+
+@pytest.mark.parametrize(
+    "cov",
+    [
+        np.zeros((3, 3)),
+        np.array([[1e-6, 5.0, 0.0], [5.0, 1e-6, 0.0], [0.0, 0.0, 1e-6]]),
+        np.array([[1e-6, 1e-7, 0.0], [-1e-7, 1e-6, 0.0], [0.0, 0.0, 1e-6]]),
+        np.diag([1e-6, math.nan, 1e-6]),
+    ],
+    ids=["zero", "indefinite", "asymmetric", "nan"],
+)
+def test_what_is_no_covariance_is_no_survey(cov: np.ndarray) -> None:
+    assert not is_covariance(cov)
+    with pytest.raises(SurveyError, match="force covariance"):
+        combine_imus(np.array([[0.0, 0.0, -G]]), cov[None])
+
+
+def test_one_bad_covariance_among_good_ones_is_found() -> None:
+    good = np.eye(3) * 1e-6
+    assert is_covariance(np.array([good, good]))
+    assert not is_covariance(np.array([good, -good]))
+
+
+def test_a_direction_without_uncertainty_across_the_lean_is_no_survey() -> None:
+    with pytest.raises(SurveyError, match="lean"):
+        resolve(np.array([G, 0.0, 0.0]), np.eye(3) * 1e-6, 0.0, 1e-6)
+
+
+def test_quality_names_what_is_wrong() -> None:
+    good, cov = force_at_rest(2.0 * DEG, 1.0, 0.0)[None, :], (np.eye(3) * (0.0034**2 / 32))[None, :, :]
+    assert check(good, cov, G, 32, 19.0, 0.0034) == Quality.GOOD
+    assert check(good * 1.01, cov, G, 32, 19.0, 0.0034) == Quality.GRAVITY
+    assert check(good, cov * 20.0, G, 32, 19.0, 0.0034) == Quality.MOTION
+    assert check(good, cov, G, 32, 3.0, 0.0034) == Quality.SETTLE
+    two = np.concatenate([good, good + np.array([0.02, 0.0, 0.0])])
+    assert Quality.SPREAD in check(two, np.concatenate([cov, cov]), G, 32, 19.0, 0.0034)
+
+
+def test_imus_of_a_cluster_weigh_by_their_inverse_variance() -> None:
+    forces = np.array([[1.0, 0.0, 0.0], [4.0, 0.0, 0.0]])
+    mean, cov = combine_imus(forces, np.array([np.eye(3), 2.0 * np.eye(3)]))
+    np.testing.assert_allclose(mean, [2.0, 0.0, 0.0])
+    np.testing.assert_allclose(cov, np.eye(3) * 2.0 / 3.0)

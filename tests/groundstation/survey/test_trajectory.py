@@ -1,0 +1,182 @@
+"""Positions and their covariance: printed steps, circles, one station at a time, sampling."""
+
+import math
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from groundstation.errors import SurveyError
+from groundstation.survey.methods import Method
+from groundstation.survey.resolve import Lean
+from groundstation.survey.trajectory import Trajectory, interpolate
+
+DEG = math.pi / 180.0
+
+
+def lean_of(inclination: float, azimuth: float, std: float = 1e-3, shared: np.ndarray | None = None) -> Lean:
+    lean = np.array([math.sin(inclination) * math.cos(azimuth), math.sin(inclination) * math.sin(azimuth)])
+    return Lean(lean, math.cos(inclination), std**2 * np.eye(2), np.zeros((2, 0)) if shared is None else shared)
+
+
+def turned(inclination: float, azimuth: float, std: float, yaw_stds: list[float]) -> Lean:
+    """A direction with one shared yaw error a column."""
+    lean = lean_of(inclination, azimuth, std)
+    shared = np.outer([-lean.lean[1], lean.lean[0]], yaw_stds)
+    return Lean(lean.lean, lean.down, lean.cov, shared)
+
+
+def test_balanced_tangential_gives_the_printed_steps_of_table_4_29() -> None:
+    trajectory = Trajectory()
+    for md in (2.0, 4.0):
+        trajectory.append(md, lean_of(1.0 * DEG, 120.0 * DEG))
+    steps_cm = 100.0 * np.diff([p.position for p in trajectory.points], axis=0)
+    np.testing.assert_allclose(steps_cm[0], [-0.873, 1.511, 199.985], atol=5e-4 * 2)
+    np.testing.assert_allclose(steps_cm[1], [-1.745, 3.023, 199.97], atol=5e-4 * 2)
+
+
+@given(
+    st.lists(
+        st.tuples(
+            st.floats(0.1, 30.0),
+            st.floats(0.0, 1.0),
+            st.floats(0.0, 6.28),
+            st.lists(st.floats(0.0, 0.02), min_size=0, max_size=4),
+        ),
+        min_size=1,
+        max_size=10,
+    ),
+    st.sampled_from(Method),
+)
+def test_appending_gives_what_the_whole_hole_gives_at_once(
+    rows: list[tuple[float, float, float, list[float]]], method: Method
+) -> None:
+    trajectory = Trajectory(method)
+    mds = np.cumsum([row[0] for row in rows])
+    leans = [turned(inclination, azimuth, 1e-3, yaw_stds) for _, inclination, azimuth, yaw_stds in rows]
+    for count, (md, lean) in enumerate(zip(mds, leans, strict=True), 1):
+        point = trajectory.append(float(md), lean)
+        again = Trajectory(method)
+        for earlier_md, earlier in zip(mds[:count], leans[:count], strict=True):
+            again.append(float(earlier_md), earlier)
+        np.testing.assert_array_equal(point.position, again.points[-1].position)
+        random, shared = parts_at_once(mds[:count], leans[:count])
+        np.testing.assert_allclose(point.cov, random + shared @ shared.T, rtol=1e-9, atol=1e-18)
+        np.testing.assert_allclose(point.shared, shared[:, : point.shared.shape[1]], rtol=1e-9, atol=1e-15)
+        assert not np.any(shared[:, point.shared.shape[1] :])
+
+
+def parts_at_once(mds: np.ndarray, leans: list[Lean]) -> tuple[np.ndarray, np.ndarray]:
+    """Random covariance and shared columns of the last position from every station's weight in it: no running sum."""
+    ends = np.concatenate([[0.0], mds, mds[-1:]])
+    random, shared = np.zeros((3, 3)), np.zeros((3, 4))
+    for k, lean in enumerate(leans, 1):
+        weight = 0.5 * (ends[k + 1] - ends[k - 1])
+        jacobian = weight * np.array([[1.0, 0.0], [0.0, 1.0], -lean.lean / lean.down])
+        random = random + jacobian @ lean.cov @ jacobian.T
+        shared[:, : lean.shared.shape[1]] += jacobian @ lean.shared
+    return random, shared
+
+
+def test_errors_that_stations_share_add_up_and_others_do_not() -> None:
+    def at_toe(columns: list[list[float]]) -> float:
+        trajectory = Trajectory()
+        for md, stds in zip((2.0, 4.0, 6.0, 8.0), columns, strict=True):
+            trajectory.append(md, turned(0.1, 0.0, 0.0, stds))
+        return math.sqrt(float(trajectory.points[-1].cov[1, 1]))
+
+    one = at_toe([[0.01]] * 4)
+    own = at_toe([[0.01 if k == n else 0.0 for k in range(4)] for n in range(4)])
+    across = 0.01 * math.sin(0.1)
+    assert one == pytest.approx(across * (2.0 + 2.0 + 2.0 + 1.0))
+    assert own == pytest.approx(across * math.sqrt(4.0 + 4.0 + 4.0 + 1.0))
+
+
+def test_the_collar_is_known_and_a_given_one_counts_with_half_the_first_leg() -> None:
+    vertical, leaning = Trajectory(), Trajectory(collar=lean_of(0.1, 0.0, 1e-3))
+    for trajectory in (vertical, leaning):
+        trajectory.append(2.0, lean_of(0.1, 0.0, 1e-3))
+    assert vertical.points[-1].position[0] == pytest.approx(math.sin(0.1))
+    assert leaning.points[-1].position[0] == pytest.approx(2.0 * math.sin(0.1))
+    assert vertical.points[-1].cov[0, 0] == pytest.approx(1e-6)
+    assert leaning.points[-1].cov[0, 0] == pytest.approx(2e-6)
+
+
+def test_minimum_curvature_follows_a_circle() -> None:
+    radius, azimuth = 30.0, 0.7
+    trajectory = Trajectory(Method.MINIMUM_CURVATURE)
+    for angle in (0.3, 0.8, 1.5):
+        trajectory.append(radius * angle, lean_of(angle, azimuth))
+    outward = radius * (1.0 - math.cos(1.5))
+    expected = [outward * math.cos(azimuth), outward * math.sin(azimuth), radius * math.sin(1.5)]
+    np.testing.assert_allclose(trajectory.points[-1].position, expected, atol=1e-9)
+
+
+def test_interpolation_runs_on_the_arc() -> None:
+    radius = 30.0
+    trajectory = Trajectory(Method.MINIMUM_CURVATURE)
+    trajectory.append(radius * 1.2, lean_of(1.2, 0.0))
+    point = interpolate(trajectory.points, radius * 0.5)
+    np.testing.assert_allclose(point.position, [radius * (1.0 - math.cos(0.5)), 0.0, radius * math.sin(0.5)], atol=1e-9)
+    np.testing.assert_allclose(point.tangent, [math.sin(0.5), 0.0, math.cos(0.5)], atol=1e-12)
+    for end in trajectory.points:
+        np.testing.assert_allclose(interpolate(trajectory.points, end.md).position, end.position, atol=1e-12)
+    with pytest.raises(SurveyError, match=r"0\.\.36 m"):
+        interpolate(trajectory.points, 40.0)
+
+
+@pytest.mark.parametrize("method", Method)
+def test_interpolation_meets_the_stations_of_every_method(method: Method) -> None:
+    trajectory = Trajectory(method)
+    for md, inclination, azimuth in [(2.0, 0.02, 1.0), (5.0, 0.3, 1.5), (9.0, 0.5, 2.5)]:
+        trajectory.append(md, lean_of(inclination, azimuth))
+    for end in trajectory.points:
+        np.testing.assert_allclose(interpolate(trajectory.points, end.md).position, end.position, atol=1e-12)
+        before, after = (interpolate(trajectory.points, min(max(end.md + d, 0.0), 9.0)) for d in (-1e-9, 1e-9))
+        np.testing.assert_allclose(before.position, after.position, atol=1e-8)
+
+
+def test_interpolation_in_a_straight_leg_is_the_straight_line() -> None:
+    trajectory = Trajectory(collar=lean_of(0.2, 1.0))
+    end = trajectory.append(10.0, lean_of(0.2, 1.0))
+    point = interpolate(trajectory.points, 2.5)
+    np.testing.assert_allclose(point.position, 0.25 * end.position, atol=1e-12)
+    np.testing.assert_allclose(point.tangent, end.tangent, atol=1e-12)
+
+
+@pytest.mark.parametrize("md", [2.0, 1.0, math.nan])
+def test_a_depth_that_does_not_grow_is_refused(md: float) -> None:
+    trajectory = Trajectory()
+    trajectory.append(2.0, lean_of(0.01, 0.0))
+    with pytest.raises(SurveyError, match="beyond 2 m"):
+        trajectory.append(md, lean_of(0.01, 0.0))
+    assert len(trajectory.points) == 2
+
+
+def test_a_hole_that_turns_back_on_itself_has_no_arc() -> None:
+    trajectory = Trajectory(Method.MINIMUM_CURVATURE)
+    trajectory.append(2.0, lean_of(0.5, 0.0))
+    back = Lean(np.array([-math.sin(0.5), 0.0]), -math.cos(0.5), 1e-6 * np.eye(2), np.zeros((2, 0)))
+    with pytest.raises(SurveyError, match="between 2 and 4 m"):
+        trajectory.append(4.0, back)
+
+
+def test_covariance_of_the_position_is_what_sampling_gives() -> None:
+    generator = np.random.default_rng(2)
+    mds, azimuths = [2.0, 4.0, 7.0, 8.0], [0.3, 0.5, 1.0, 1.1]
+    inclinations = [0.02, 0.05, 0.3, 0.4]
+    std, joint_std = 1e-3, 5e-3
+    claimed = Trajectory()
+    for md, inclination, azimuth in zip(mds, inclinations, azimuths, strict=True):
+        claimed.append(md, turned(inclination, azimuth, std, [joint_std]))
+    toes = []
+    for _ in range(20_000):
+        joint = joint_std * generator.standard_normal()
+        sampled = Trajectory()
+        for md, inclination, azimuth in zip(mds, inclinations, azimuths, strict=True):
+            lean = lean_of(inclination, azimuth + joint).lean + std * generator.standard_normal(2)
+            sampled.append(md, Lean(lean, math.sqrt(1.0 - float(lean @ lean)), np.zeros((2, 2)), np.zeros((2, 0))))
+        toes.append(sampled.points[-1].position)
+    expected = np.cov(np.array(toes).T)
+    np.testing.assert_allclose(claimed.points[-1].cov, expected, rtol=0.06, atol=0.03 * float(np.trace(expected)))

@@ -1,0 +1,406 @@
+"""Walls of columns: geometry, probability of a gap, as-built centres, the worst joint and the column that closes it."""
+
+import math
+from itertools import pairwise
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from scipy.special import ndtr
+from scipy.stats import ncx2
+
+from groundstation.errors import SurveyError
+from groundstation.survey.methods import Method, positions, tangents
+from groundstation.survey.trajectory import Point, on_arc
+from groundstation.survey.wall import (
+    Columns,
+    at_depths,
+    extra_column,
+    joints,
+    largest_distance,
+    margin,
+    neighbours_in_grid,
+    neighbours_in_line,
+    probability_beyond,
+    thickness,
+    worst,
+)
+
+DEG = math.pi / 180.0
+RADIUS, SPACING, REQUIRED, LENGTH = 0.60, 0.75, 0.80, 30.0
+LIMIT = 2.0 * math.sqrt(RADIUS**2 - 0.25 * REQUIRED**2)  # 0.894 m
+
+
+def rotation(angle: float) -> np.ndarray:
+    return np.array([[math.cos(angle), -math.sin(angle)], [math.sin(angle), math.cos(angle)]])
+
+
+def cov_of(std_a: float, std_b: float, angle: float = 0.0) -> np.ndarray:
+    turn = rotation(angle)
+    return turn @ np.diag([std_a**2, std_b**2]) @ turn.T
+
+
+def beyond(mean: np.ndarray, cov: np.ndarray, limit: float) -> float:
+    return float(probability_beyond(mean, cov, limit))
+
+
+def along_the_wide_axis(mean: np.ndarray, std_a: float, std_b: float, limit: float) -> float:
+    """The same probability by a fine trapezoid along the axis of ``std_b``, the other one in closed form."""
+    a, b = mean
+    reach = np.linspace(max(-limit, b - 12.0 * std_b), min(limit, b + 12.0 * std_b), 100_001)
+    chord = np.sqrt(np.maximum(limit**2 - reach**2, 0.0))
+    density = np.exp(-0.5 * ((reach - b) / std_b) ** 2) / (std_b * math.sqrt(math.tau))
+    tails = ndtr((-chord - a) / std_a) + ndtr((a - chord) / std_a)
+    outside = ndtr((-limit - b) / std_b) + ndtr((b - limit) / std_b)
+    return float(outside + np.trapezoid(density * tails, reach))
+
+
+def test_the_margin_of_the_published_wall() -> None:
+    shift, angle = margin(RADIUS, REQUIRED, SPACING, LENGTH)
+    assert shift == pytest.approx(0.1444, abs=5e-5)
+    assert math.degrees(angle) == pytest.approx(0.276, abs=5e-4)
+
+
+def test_half_the_margin_is_left_to_each_when_both_deviate() -> None:
+    shift, _ = margin(RADIUS, REQUIRED, SPACING, LENGTH)
+    for each in (0.5 * shift, 0.5 * shift + 1e-6):
+        both = thickness(np.array([SPACING + each + each]), RADIUS)[0]
+        assert both == pytest.approx(REQUIRED, abs=1e-5)
+        assert bool(both >= REQUIRED - 1e-9) is (each <= 0.5 * shift)
+
+
+def test_a_column_that_deviates_too_little_to_begin_with_has_a_negative_margin() -> None:
+    shift, angle = margin(RADIUS, REQUIRED, 1.0, LENGTH)
+    assert shift == pytest.approx(LIMIT - 1.0)
+    assert angle < 0.0
+
+
+@pytest.mark.parametrize(
+    ("distance", "expected"),
+    [(0.0, 1.2), (SPACING, 2.0 * math.sqrt(0.36 - 0.140625)), (LIMIT, 0.8), (1.2, 0.0), (1.3, -0.1), (3.0, -1.8)],
+)
+def test_a_joint_is_as_thick_as_its_lens_is_long_and_a_gap_is_negative(distance: float, expected: float) -> None:
+    assert thickness(np.array([distance]), RADIUS)[0] == pytest.approx(expected, abs=1e-12)
+
+
+@given(st.floats(0.1, 3.0), st.floats(0.0, 0.999))
+def test_the_largest_distance_makes_a_joint_of_just_the_thickness(radius: float, share: float) -> None:
+    required = 2.0 * radius * share
+    distance = largest_distance(radius, required)
+    assert thickness(np.array([distance]), radius)[0] == pytest.approx(required, abs=1e-6)
+
+
+@pytest.mark.parametrize("required", [1.2, 1.3, -0.1, math.nan])
+def test_a_joint_that_columns_never_make_is_refused(required: float) -> None:
+    with pytest.raises(SurveyError, match=r"below the diameter of 1\.2 m"):
+        largest_distance(0.6, required)
+
+
+@pytest.mark.parametrize("std", [0.0009, 0.003, 0.01, 0.03, 0.1, 0.5, 3.0])
+@pytest.mark.parametrize("direction", [0.0, 0.05, 0.3, 0.25 * math.pi, 1.53, 2.5, -3.1])
+def test_alike_in_all_directions_the_probability_is_the_noncentral_chi(std: float, direction: float) -> None:
+    checked = 0
+    for distance in [*np.linspace(0.0, 1.2, 13), *(LIMIT + std * np.linspace(-6.5, 3.0, 20))]:
+        expected = float(ncx2.sf((LIMIT / std) ** 2, 2, (distance / std) ** 2))
+        if distance >= 0.0 and 1e-12 < expected <= 1.0:
+            mean = distance * np.array([math.cos(direction), math.sin(direction)])
+            assert beyond(mean, cov_of(std, std), LIMIT) == pytest.approx(expected, rel=1e-6, abs=0.0), distance
+            checked += 1
+    assert checked > 10
+
+
+@pytest.mark.parametrize("std", [0.05, 0.1, 0.127])
+def test_about_the_centre_the_probability_is_rayleigh(std: float) -> None:
+    expected = math.exp(-0.5 * (LIMIT / std) ** 2)
+    assert beyond(np.zeros(2), cov_of(std, std), LIMIT) == pytest.approx(expected, rel=1e-9, abs=1e-19)
+
+
+@pytest.mark.parametrize(
+    ("mean", "std_a", "std_b", "angle"),
+    [
+        ((0.75, 0.0), 0.045, 0.020, 0.0),
+        ((0.60, 0.30), 0.030, 0.080, -1.0),
+        ((0.0, -0.50), 0.020, 0.125, 0.1),
+        ((0.80, 0.10), 0.033, 0.008, -0.4),
+    ],
+)
+def test_unlike_in_its_directions_it_is_what_sampling_gives(
+    mean: tuple[float, float], std_a: float, std_b: float, angle: float
+) -> None:
+    generator = np.random.default_rng(6)
+    draws = generator.standard_normal((400_000, 2)) * [std_a, std_b] @ rotation(angle).T + mean
+    sampled = float(np.mean(np.hypot(draws[:, 0], draws[:, 1]) > LIMIT))
+    assert 3e-4 < sampled < 1e-2
+    assert beyond(np.array(mean), cov_of(std_a, std_b, angle), LIMIT) == pytest.approx(sampled, rel=0.2)
+
+
+@pytest.mark.parametrize("ratio", [1.0, 2.0, 10.0, 100.0, 1000.0])
+@pytest.mark.parametrize("wide", [0.0009, 0.003, 0.01, 0.1, 1.0])
+def test_whatever_the_shape_of_the_region_it_is_the_integral(ratio: float, wide: float) -> None:
+    generator = np.random.default_rng(7)
+    checked = 0
+    for _ in range(30):
+        narrow, turn = wide / ratio, generator.uniform(0.0, math.tau)
+        towards = generator.choice([generator.uniform(0.0, math.tau), generator.normal(0.0, 0.1)])
+        size = LIMIT + generator.normal(0.0, 3.0) * wide
+        mean = size * np.array([math.cos(towards), math.sin(towards)])
+        expected = along_the_wide_axis(mean, narrow, wide, LIMIT)
+        if expected > 1e-11:
+            found = beyond(rotation(turn) @ mean, cov_of(narrow, wide, turn), LIMIT)
+            assert found == pytest.approx(expected, rel=1e-4, abs=0.0), (mean, turn)
+            checked += 1
+    assert checked > 10
+
+
+@pytest.mark.parametrize(("mean", "expected"), [(0.75, 0.0), (1.0, 1.0), (-1.0, 1.0)])
+def test_without_uncertainty_a_joint_is_thin_or_not(mean: float, expected: float) -> None:
+    for at in ([mean, 0.0], [0.0, mean]):
+        assert beyond(np.array(at), np.zeros((2, 2)), LIMIT) == expected
+
+
+def test_uncertain_in_one_direction_only_it_is_the_tail_of_one_number() -> None:
+    for angle in (0.0, 0.6, 2.0):
+        mean = rotation(angle) @ np.array([0.0, 0.75])
+        found = beyond(mean, cov_of(0.0, 0.05, angle), LIMIT)
+        assert found == pytest.approx(float(ndtr((0.75 - LIMIT) / 0.05)), rel=1e-6)
+
+
+Std = st.floats(1e-3, 1.0)
+Offset = st.floats(-1.5, 1.5)
+
+
+@given(Offset, Offset, Std, Std, st.floats(-4.0, 4.0), st.floats(0.05, 2.0))
+def test_turning_everything_changes_no_probability(
+    north: float, east: float, std_a: float, std_b: float, angle: float, limit: float
+) -> None:
+    mean, turn = np.array([north, east]), rotation(angle)
+    before = beyond(mean, cov_of(std_a, std_b), limit)
+    after = beyond(turn @ mean, turn @ cov_of(std_a, std_b) @ turn.T, limit)
+    assert 0.0 <= before <= 1.0
+    assert after == pytest.approx(before, rel=1e-4, abs=1e-12)
+
+
+@given(Offset, Offset, Std, Std, st.floats(-4.0, 4.0), st.floats(0.05, 2.0), st.floats(1.0, 2.0))
+def test_a_larger_limit_is_passed_less_often(
+    north: float, east: float, std_a: float, std_b: float, angle: float, limit: float, factor: float
+) -> None:
+    mean, cov = np.array([north, east]), cov_of(std_a, std_b, angle)
+    assert beyond(mean, cov, limit * factor) <= beyond(mean, cov, limit) * (1.0 + 1e-6) + 1e-12
+
+
+def test_many_joints_at_once_are_those_one_by_one() -> None:
+    generator = np.random.default_rng(8)
+    means = generator.normal(0.6, 0.2, (3, 5, 2))
+    roots = generator.normal(0.0, 0.1, (3, 5, 2, 2))
+    covs = roots @ np.swapaxes(roots, -1, -2)
+    together = probability_beyond(means, covs, LIMIT)
+    assert together.shape == (3, 5)
+    for at in np.ndindex(3, 5):
+        assert together[at] == pytest.approx(beyond(means[at], covs[at], LIMIT), rel=1e-12)
+
+
+def random_wells(count: int, stations: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Near-vertical wells surveyed every 2 m: measured depths, positions and tangents."""
+    generator = np.random.default_rng(9)
+    md = np.broadcast_to(2.0 * np.arange(stations), (count, stations))
+    lean = np.cumsum(generator.normal(0.0, 0.3 * DEG, (count, stations, 2)), axis=1)
+    inclination, azimuth = np.hypot(lean[..., 0], lean[..., 1]), np.arctan2(lean[..., 1], lean[..., 0])
+    return md, positions(Method.MINIMUM_CURVATURE, md, inclination, azimuth), tangents(inclination, azimuth)
+
+
+def centre_on_arc(md: np.ndarray, position: np.ndarray, tangent: np.ndarray, tvd: float) -> np.ndarray:
+    points = [
+        Point(float(m), t, p, np.zeros((3, 3)), np.zeros((3, 0))) for m, p, t in zip(md, position, tangent, strict=True)
+    ]
+    upper, lower = next((a, b) for a, b in pairwise(points) if tvd <= b.position[2])
+    low, high = 0.0, 1.0
+    for _ in range(50):
+        middle = 0.5 * (low + high)
+        low, high = (middle, high) if on_arc(upper, lower, middle).position[2] < tvd else (low, middle)
+    return on_arc(upper, lower, low).position[:2]
+
+
+def test_centres_at_a_depth_lie_on_the_arcs_of_the_wells() -> None:
+    md, position, tangent = random_wells(6, 16)
+    depths = np.linspace(0.0, 29.5, 60)
+    centres, _ = at_depths(position, tangent, np.zeros((6, 16, 3, 3)), depths)
+    for well in range(6):
+        for depth, centre in zip(depths, centres[well], strict=True):
+            np.testing.assert_allclose(
+                centre, centre_on_arc(md[well], position[well], tangent[well], depth), atol=0.0005
+            )
+
+
+def test_centres_at_the_depths_of_stations_are_the_stations() -> None:
+    _, position, tangent = random_wells(1, 10)
+    generator = np.random.default_rng(10)
+    root = generator.normal(0.0, 0.01, (1, 10, 3, 3))
+    covs = root @ np.swapaxes(root, -1, -2)
+    centres, plane = at_depths(position, tangent, covs, position[0, :, 2])
+    np.testing.assert_allclose(centres[0], position[0, :, :2], atol=1e-12)
+    slope = tangent[0, :, :2] / tangent[0, :, 2:]
+    for k in range(10):
+        lateral = np.concatenate([np.eye(2), -slope[k][:, None]], axis=1)
+        np.testing.assert_allclose(plane[0, k], lateral @ covs[0, k] @ lateral.T, rtol=1e-9)
+
+
+def test_below_its_toe_a_column_has_no_centre() -> None:
+    inclination = np.zeros((2, 4))
+    md = np.array([[0.0, 2.0, 4.0, 6.0], [0.0, 1.0, 2.0, 3.0]])
+    position = positions(Method.MINIMUM_CURVATURE, md, inclination, inclination)
+    centres, _ = at_depths(position, tangents(inclination, inclination), np.zeros((2, 4, 3, 3)), np.arange(8.0))
+    np.testing.assert_array_equal(np.isnan(centres[0, :, 0]), np.arange(8.0) > 6.0)
+    np.testing.assert_array_equal(np.isnan(centres[1, :, 1]), np.arange(8.0) > 3.0)
+
+
+def test_an_error_of_depth_moves_the_centre_by_the_slope_of_the_hole() -> None:
+    tilt = 20.0 * DEG
+    inclination, azimuth = np.full((1, 3), tilt), np.full((1, 3), 90.0 * DEG)
+    md = np.array([[0.0, 5.0, 10.0]])
+    position = positions(Method.MINIMUM_CURVATURE, md, inclination, azimuth)
+    covs = np.broadcast_to(np.diag([1e-6, 4e-6, 9e-4]), (1, 3, 3, 3))
+    centres, plane = at_depths(position, tangents(inclination, azimuth), covs, np.array([2.0, 7.0]))
+    np.testing.assert_allclose(centres[0], [[0.0, 2.0 * math.tan(tilt)], [0.0, 7.0 * math.tan(tilt)]], atol=1e-12)
+    expected = np.diag([1e-6, 4e-6 + 9e-4 * math.tan(tilt) ** 2])
+    np.testing.assert_allclose(plane[0], [expected, expected], atol=1e-15)
+
+
+DEPTHS = np.linspace(0.0, LENGTH, 61)
+
+
+def wall(deviating_deg: float = 0.5, std_per_m: float = 3e-4, count: int = 5) -> tuple[Columns, np.ndarray]:
+    """A wall to the east whose third column runs away to the east; centres uncertain in proportion to depth."""
+    designs = np.stack([np.zeros(count), SPACING * np.arange(count)], axis=1)
+    centres = np.repeat(designs[:, None, :], len(DEPTHS), axis=1)
+    centres[2, :, 1] += DEPTHS * math.tan(deviating_deg * DEG)
+    var = (std_per_m * DEPTHS + 1e-4) ** 2
+    covs = np.broadcast_to(var[:, None, None] * np.eye(2), (count, len(DEPTHS), 2, 2))
+    names = [f"C{k + 1}" for k in range(count)]
+    return Columns(names, DEPTHS, centres, covs, designs), neighbours_in_line(count, closed=False)
+
+
+def test_the_worst_joint_is_told_by_name_depth_and_direction() -> None:
+    columns, pairs = wall()
+    found = joints(columns, pairs, RADIUS, REQUIRED)
+    joint, depth = worst(found)
+    assert [columns.names[k] for k in found.pairs[joint]] == ["C2", "C3"]
+    assert columns.depths[depth] == 30.0
+    np.testing.assert_allclose(found.offset[joint, depth], [0.0, 30.0 * math.tan(0.5 * DEG)], atol=1e-12)
+    assert found.thickness[joint, depth] == pytest.approx(
+        2.0 * math.sqrt(RADIUS**2 - 0.25 * (SPACING + 30.0 * math.tan(0.5 * DEG)) ** 2)
+    )
+    np.testing.assert_array_equal(found.offset[0], np.zeros((len(DEPTHS), 2)))
+
+
+def test_a_joint_opens_where_the_column_has_used_up_the_margin() -> None:
+    columns, pairs = wall()
+    found = joints(columns, pairs, RADIUS, REQUIRED)
+    opens = (LIMIT - SPACING) / math.tan(0.5 * DEG)
+    np.testing.assert_array_equal(found.thickness[1] < REQUIRED, opens < DEPTHS)
+    assert np.all(found.thickness[[0, 2, 3]] > REQUIRED)
+    assert np.all((found.probability[1] > 0.5) == (opens < DEPTHS))
+    assert np.all(np.diff(found.probability[1]) >= -1e-9)
+
+
+def test_both_regions_of_uncertainty_count_towards_a_joint() -> None:
+    columns, pairs = wall(0.0)
+    found = joints(columns, pairs, RADIUS, REQUIRED)
+    std = math.sqrt(2.0) * (3e-4 * 30.0 + 1e-4)
+    expected = float(ncx2.sf((LIMIT / std) ** 2, 2, (SPACING / std) ** 2))
+    np.testing.assert_allclose(found.probability[:, -1], expected, rtol=1e-6)
+
+
+def test_the_more_probable_gap_is_worse_than_the_thinner_joint() -> None:
+    columns, pairs = wall(0.2)
+    covs = columns.covs.copy()
+    covs[0] = 0.2**2 * np.eye(2)
+    found = joints(Columns(columns.names, DEPTHS, columns.centres, covs, columns.designs), pairs, RADIUS, REQUIRED)
+    assert worst(found)[0] == 0
+    assert found.thickness[1, -1] < found.thickness[0, -1]
+
+
+def test_of_equally_probable_joints_the_thinnest_is_worst() -> None:
+    columns, pairs = wall(0.05)
+    certain = Columns(columns.names, DEPTHS, columns.centres, np.zeros_like(columns.covs), columns.designs)
+    found = joints(certain, pairs, RADIUS, REQUIRED)
+    np.testing.assert_array_equal(found.probability, 0.0)
+    assert worst(found) == (1, len(DEPTHS) - 1)
+
+
+def test_a_joint_with_a_column_that_ends_is_judged_as_far_as_it_goes() -> None:
+    columns, pairs = wall(0.5)
+    centres = columns.centres.copy()
+    centres[1, DEPTHS > 20.0] = np.nan
+    found = joints(Columns(columns.names, DEPTHS, centres, columns.covs, columns.designs), pairs, RADIUS, REQUIRED)
+    for values in (found.probability, found.thickness, found.distance):
+        np.testing.assert_array_equal(np.isnan(values[1]), DEPTHS > 20.0)
+        assert np.all(np.isfinite(values[2]))
+    joint, depth = worst(found)
+    assert (joint, DEPTHS[depth]) == (1, 20.0)
+    extra = extra_column(columns, found, 1, RADIUS, REQUIRED)
+    assert extra is not None
+    assert extra.to_depth == 20.0
+
+
+def test_an_extra_column_in_the_middle_closes_the_gap() -> None:
+    columns, pairs = wall()
+    found = joints(columns, pairs, RADIUS, REQUIRED)
+    extra = extra_column(columns, found, 1, RADIUS, REQUIRED)
+    assert extra is not None
+    assert extra.closes
+    assert (extra.from_depth, extra.to_depth) == (17.0, 30.0)
+    assert extra.north == pytest.approx(0.0, abs=1e-12)
+    first, last = (0.5 * z * math.tan(0.5 * DEG) for z in (17.0, 30.0))
+    assert extra.east == pytest.approx(1.5 * SPACING + 0.5 * (first + last))
+    for k in (1, 2):
+        far = np.abs(columns.centres[k, DEPTHS >= 17.0, 1] - extra.east)
+        assert np.all(thickness(far, RADIUS) >= REQUIRED)
+
+
+def test_a_gap_that_is_too_wide_is_not_closed_by_one_more_column() -> None:
+    columns, pairs = wall(3.0)
+    extra = extra_column(columns, joints(columns, pairs, RADIUS, REQUIRED), 1, RADIUS, REQUIRED)
+    assert extra is not None
+    assert not extra.closes
+
+
+def test_a_joint_that_is_thick_enough_needs_no_extra_column() -> None:
+    columns, pairs = wall()
+    assert extra_column(columns, joints(columns, pairs, RADIUS, REQUIRED), 0, RADIUS, REQUIRED) is None
+
+
+@pytest.mark.parametrize(
+    ("count", "closed", "expected"),
+    [
+        (4, False, [(0, 1), (1, 2), (2, 3)]),
+        (4, True, [(0, 1), (1, 2), (2, 3), (3, 0)]),
+        (3, True, [(0, 1), (1, 2), (2, 0)]),
+        (2, True, [(0, 1)]),
+        (2, False, [(0, 1)]),
+        (1, False, []),
+        (1, True, []),
+    ],
+)
+def test_neighbours_in_a_line_follow_each_other(count: int, closed: bool, expected: list[tuple[int, int]]) -> None:
+    assert [tuple(pair) for pair in neighbours_in_line(count, closed=closed)] == expected
+
+
+def test_neighbours_in_a_square_grid_are_those_beside_and_not_across() -> None:
+    heads = np.array([[north, east] for north in range(3) for east in range(3)], float) * SPACING
+    pairs = neighbours_in_grid(heads, SPACING)
+    assert len(pairs) == 12
+    np.testing.assert_allclose(np.linalg.norm(heads[pairs[:, 0]] - heads[pairs[:, 1]], axis=1), SPACING)
+    assert [tuple(pair) for pair in pairs[:3]] == [(0, 1), (0, 3), (1, 2)]
+    assert np.all(pairs[:, 0] < pairs[:, 1])
+
+
+def test_neighbours_in_a_triangular_grid_are_six_to_the_middle() -> None:
+    around = [[math.cos(k * math.pi / 3.0), math.sin(k * math.pi / 3.0)] for k in range(6)]
+    pairs = neighbours_in_grid(SPACING * np.array([[0.0, 0.0], *around]), SPACING)
+    assert np.count_nonzero(pairs == 0) == 6
+    assert len(pairs) == 12
+
+
+def test_columns_far_apart_have_no_neighbours() -> None:
+    assert neighbours_in_grid(np.array([[0.0, 0.0], [5.0, 5.0]]), SPACING).shape == (0, 2)

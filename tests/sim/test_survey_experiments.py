@@ -1,0 +1,55 @@
+"""Published survey figures beside ours, and whether the claimed ellipses hold the truth."""
+
+import math
+
+import pytest
+
+from sim.experiments import coverage, regions, weighting
+
+
+def test_weights_reduce_the_error_as_published() -> None:
+    cases = {row["case"]: row for row in weighting.run()["cases"]}
+    for station, looks in ((2, 3), (3, 2)):
+        for power, scheme in ((1, "linear"), (2, "quadratic"), (3, "cubic")):
+            last = looks**power / sum(k**power for k in range(1, looks + 1))
+            expected = (1.0 - last) / (1.0 - 1.0 / looks)
+            assert cases[f"station {station} {scheme}"]["ours"] == pytest.approx(expected, rel=1e-3)
+    for row in cases.values():
+        if row["published"] is not None:
+            assert row["ours"] == pytest.approx(row["published"], rel=0.02)
+
+
+def test_the_sweeps_grow_with_the_change_and_shrink_with_the_power() -> None:
+    rows = [r for r in weighting.run()["sweeps"] if r["changed"] == "inclination" and r["station"] == 2]
+    for scheme in ("equal", "linear", "quadratic", "cubic"):
+        errors = [math.hypot(r["north_cm"], r["east_cm"]) for r in rows if r["scheme"] == scheme]
+        assert len(errors) == 18
+        assert errors == sorted(errors)
+    last = {r["scheme"]: math.hypot(r["north_cm"], r["east_cm"]) for r in rows if r["value_deg"] == 10.0}
+    assert last["equal"] > last["linear"] > last["quadratic"] > last["cubic"]
+
+
+def test_every_printed_region_stands_beside_ours() -> None:
+    result = regions.run()
+    assert len(result["cases"]) == 5 * 10 * 3
+    for row in result["cases"]:
+        assert row["ratio"] == pytest.approx(row["ours"] / row["published"])
+        assert row["ours"] > 0.0
+    filtered = {row["instrument"]: row for row in result["filtered"]}
+    assert filtered["vectornav-100t"]["filtered_cm"] < filtered["vectornav-100t"]["unfiltered_cm"]
+
+
+def test_claimed_ellipses_hold_the_truth_as_often_as_they_say() -> None:
+    wells = 500
+    result = coverage.run(wells, 4, lambda: None)
+    for row in result["cases"]:
+        claimed = row["published"] / 100.0
+        allowed = 4.0 * math.sqrt(claimed * (1.0 - claimed) / wells)
+        assert abs(row["ours"] / 100.0 - claimed) < allowed, row
+
+
+def test_one_seed_drills_one_well() -> None:
+    pool = coverage.YawPool(*(0.0001 * (k + coverage.np.ones((coverage.TUBES, 3))) for k in range(2)))
+    first, second, other = (coverage.drill(seed, pool)[0] for seed in (1, 1, 2))
+    assert (first == second).all()
+    assert not (first == other).all()

@@ -1,0 +1,212 @@
+"""``borechain survey`` and ``borechain wall`` as their user meets them."""
+
+import json
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+ROOT = Path(__file__).parents[1]
+POTSDAM = ROOT / "scenarios" / "wellbore-1-path.csv"
+WALL = ROOT / "scenarios" / "walls" / "wall-40.toml"
+
+
+def run(*words: object) -> subprocess.CompletedProcess[str]:
+    command = [sys.executable, "-m", "borechain", *map(str, words)]
+    return subprocess.run(command, capture_output=True, text=True, check=False, timeout=120)
+
+
+def answer(*words: object) -> dict:
+    done = run(*words, "--json")
+    assert done.returncode == 0, done.stderr
+    assert len(done.stdout.splitlines()) == 1
+    return json.loads(done.stdout)
+
+
+def refused(*words: object) -> str:
+    done = run(*words)
+    assert done.returncode == 2, done.stderr
+    assert done.stdout == ""
+    assert "Traceback" not in done.stderr
+    assert len(done.stderr.strip().splitlines()) == 1
+    return done.stderr
+
+
+def test_the_published_record_comes_out_as_printed() -> None:
+    found = answer("survey", POTSDAM, "--displacement-rule", "thesis")["stations"]
+    printed = [
+        (0.08, 248.20), (0.32, 243.43), (0.61, 249.44), (0.89, 255.96), (1.32, 257.47),
+        (1.72, 253.07), (2.35, 250.46), (2.78, 252.03), (3.00, 257.62), (3.41, 260.34),
+    ]  # fmt: skip
+    assert len(found) == 11
+    for row, (inclination, azimuth) in zip(found[1:], printed, strict=True):
+        assert row["inclination_deg"] == pytest.approx(inclination, abs=0.00501)
+        assert row["azimuth_deg"] == pytest.approx(azimuth, abs=0.00501)
+        assert set(row["uncertainty"]) >= {"north_m", "east_m", "tvd_m", "covariance_m2"}
+
+
+def test_sigma_scales_the_region_and_leaves_the_covariance() -> None:
+    one, two = (answer("survey", POTSDAM, "--sigma", s)["stations"][-1]["uncertainty"] for s in (1, 2))
+    assert two["north_m"] == pytest.approx(2.0 * one["north_m"])
+    assert two["covariance_m2"] == one["covariance_m2"]
+
+
+def test_a_held_azimuth_replaces_the_gyro(tmp_path: Path) -> None:
+    raw = answer("survey", POTSDAM, "--instrument", "vectornav-100t")
+    held = answer("survey", POTSDAM, "--instrument", "vectornav-100t", "--azimuth-error-deg", "0.25")
+    assert {row["source"] for row in raw["sources"]} - {row["source"] for row in held["sources"]} == {"GD", "GRW"}
+    assert held["stations"][-1]["uncertainty"]["major_m"] < raw["stations"][-1]["uncertainty"]["major_m"]
+
+
+def test_files_of_a_survey_land_whole(tmp_path: Path) -> None:
+    table, plot, tool = tmp_path / "a" / "t.csv", tmp_path / "p.svg", tmp_path / "tool.json"
+    answer("survey", POTSDAM, "--instrument", "mwd-rev5.1", "--out", table, "--plot", plot, "--export-tool", tool)
+    assert len(table.read_text().splitlines()) == 12
+    assert plot.read_text().startswith("<?xml")
+    again = answer("survey", POTSDAM, "--instrument", tool)
+    first = answer("survey", POTSDAM, "--instrument", "mwd-rev5.1")
+    one, two = (f["stations"][-1]["uncertainty"]["covariance_m2"] for f in (first, again))
+    np.testing.assert_allclose(two, one, rtol=1e-9, atol=1e-15)
+    assert not list(tmp_path.rglob("*.new"))
+
+
+def test_depths_between_stations_and_a_collar_that_is_left_out(tmp_path: Path) -> None:
+    record = tmp_path / "s.csv"
+    record.write_text("md_m,inclination_deg,azimuth_deg\n2,0,0\n4,0,0\n")
+    found = answer("survey", record, "--from-collar", "--md", "3")
+    assert [row["md_m"] for row in found["stations"]] == [0.0, 2.0, 4.0]
+    assert found["at"][0]["tvd_m"] == pytest.approx(3.0)
+
+
+@pytest.mark.parametrize(
+    ("content", "named"),
+    [
+        ("md_m,inclination_deg,azimuth_deg\n0,0,0\n4,1,0\n2,1,0\n", "line 4: expected a measured depth beyond 4 m"),
+        ("md_m,inclination_deg,azimuth_deg\n0,0,0\n4,1,0\n4,1,0\n", "line 4: expected a measured depth beyond 4 m"),
+        ("md_m,inclination_deg,azimuth_deg\n0,0,0\n4,nan,0\n", "line 3: expected a finite inclination_deg, got nan"),
+        (
+            "md_m,inclination_deg,azimuth_deg\n0,0,0\n4,190,0\n",
+            "line 3: expected an inclination of 0..180 deg, got 190",
+        ),
+        ("md_m,inc,azi\n0,0,0\n4,1,0\n", "expected the columns md_m, a_cm, b_cm or md_m, inclination_deg, azimuth_deg"),
+        ("md_m,a_mm,b_mm\n0,0,0\n2,1,0\n", "a_mm is in another unit, expected a_cm"),
+        ("md_m,inclination_deg,azimuth_deg\n0,0,0\n", "expected at least two stations"),
+        ("", "the file is empty"),
+        ("md_m,a_cm,b_cm\n0,0,0\n2,300,0\n", "line 3: a displacement of 3 m over 2 m cannot be"),
+        ("md_m,a_cm,b_cm\n0,0,0\n2,x,0\n", "line 3: expected numbers, got a_cm = 'x'"),
+    ],
+)
+def test_a_record_that_cannot_be_is_refused_with_its_line(tmp_path: Path, content: str, named: str) -> None:
+    record = tmp_path / "record.csv"
+    record.write_text(content)
+    message = refused("survey", record)
+    assert str(record) in message
+    assert named in message
+
+
+@pytest.mark.parametrize(
+    ("change", "named"),
+    [
+        ('azimuth = "Sine(Inc)"', "term A: formula 'Sine(Inc)': unknown function sine"),
+        ('colour = "1"', "term A: colour: unknown key"),
+        ('inclination = "1 / Sin(Inc)"', "term A: its weight has no value at a station; give singular weights"),
+    ],
+)
+def test_a_tool_that_cannot_be_used_is_refused_with_its_term(tmp_path: Path, change: str, named: str) -> None:
+    tool = tmp_path / "tool.toml"
+    tool.write_text(
+        '[tool]\nname = "t"\ntitle = "t"\n[[term]]\nname = "A"\nvalue = 1.0\nunit = "deg"\nmode = "systematic"\n'
+        + change
+    )
+    record = tmp_path / "vertical.csv"
+    record.write_text("md_m,inclination_deg,azimuth_deg\n0,0,0\n10,0,0\n20,0,0\n")
+    assert named in refused("survey", record, "--instrument", tool)
+
+
+def test_unknown_instruments_depths_and_plots_are_refused(tmp_path: Path) -> None:
+    assert "expected one of gyro-continuous" in refused("survey", POTSDAM, "--instrument", "sextant")
+    assert "expected a depth of 0..20 m" in refused("survey", POTSDAM, "--md", "25")
+    assert "No such file" in refused("survey", tmp_path / "none.csv")
+    assert ".svg" in refused("survey", POTSDAM, "--plot", tmp_path / "plot.docx")
+
+
+def test_the_wall_names_its_gap_and_how_to_close_it(tmp_path: Path) -> None:
+    found = answer("wall", WALL, "--plot", tmp_path / "wall.png")
+    assert len(found["joints"]) == 39
+    worst = found["worst"]
+    assert worst["joint"] == "K020-K021"
+    assert worst["thickness_m"] < 0.8
+    assert worst["probability"] > 0.99
+    assert worst["depth_m"] == pytest.approx(30.0, abs=0.1)
+    assert worst["extra_column"]["closes"] is True
+    assert (tmp_path / "wall.png").read_bytes().startswith(b"\x89PNG")
+    people = run("wall", WALL)
+    assert "worst joint K020-K021" in people.stdout
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "named"),
+    [
+        ("radius_m = 0.60", "radius_m = -1", "radius_m: expected a positive number"),
+        ("radius_m = 0.60", "radius_m = 0.3", "expected a thickness below the diameter"),
+        ("thickness_m", "thickness_cm", "thickness_cm: unknown key"),
+        ('tolerance = "en-12716"', 'tolerance = "none"', "expected one of en-12716"),
+        ('tolerance = "en-12716"', 'layout = "circle"', "layout: expected one of line, shaft, grid"),
+        ('instrument = "relay"', 'instrument = "compass"', "no such instrument"),
+        ('heads = "wall-40-heads.csv"', 'heads = "none.csv"', "none.csv: No such file"),
+        ("name =", "name", "not TOML"),
+    ],
+)
+def test_a_wall_file_that_cannot_be_is_refused(tmp_path: Path, old: str, new: str, named: str) -> None:
+    assert named in refused("wall", changed(tmp_path, WALL.name, old, new))
+
+
+@pytest.mark.parametrize(
+    ("name", "old", "new", "named"),
+    [
+        (
+            "wall-40-stations.csv",
+            "K001,2.00,",
+            "K001,0.00,",
+            "line 4: column K001: expected a depth beyond 0 m, got 0 m",
+        ),
+        ("wall-40-stations.csv", "K001,2.00,", "K099,2.00,", "line 4: column K099 is not among the heads"),
+        ("wall-40-stations.csv", "K001,2.00,0", "K001,2.00,95", "line 4: expected an inclination below 90 deg"),
+        ("wall-40-stations.csv", "K001,2.00,", "K001,nan,", "line 4: expected a finite md_m"),
+        ("wall-40-heads.csv", "K002,0,", "K001,0,", "line 3: column K001 stands in line 2 already"),
+        ("wall-40-heads.csv", "K002,0,", "K002,inf,", "line 3: expected finite north_m and east_m"),
+        ("wall-40-heads.csv", "K002,", "K900,", "column K002 is not among the heads"),
+    ],
+)
+def test_columns_that_cannot_be_are_refused_with_their_line(
+    tmp_path: Path, name: str, old: str, new: str, named: str
+) -> None:
+    changed(tmp_path, name, old, new)
+    assert named in refused("wall", tmp_path / WALL.name)
+
+
+def test_an_instrument_that_errs_only_down_is_a_singular_covariance(tmp_path: Path) -> None:
+    (tmp_path / "tape.toml").write_text(
+        '[tool]\nname = "tape"\ntitle = "t"\n'
+        '[[term]]\nname = "A"\nvalue = 0.01\nunit = "m"\nmode = "random"\ndepth = "1"\n'
+    )
+    wall = changed(tmp_path, WALL.name, 'instrument = "relay"', f'instrument = "{tmp_path / "tape.toml"}"')
+    assert "station 1: the covariance is singular" in refused("wall", wall)
+
+
+def test_the_bench_lists_itself_and_refuses_others() -> None:
+    assert "survey" in run("bench").stdout.splitlines()
+    assert "expected one of" in refused("bench", "horses")
+
+
+def changed(folder: Path, name: str, old: str, new: str) -> Path:
+    """The shipped wall in a folder of its own, with one thing changed."""
+    for path in WALL.parent.glob("wall-40*"):
+        if not (folder / path.name).exists():
+            (folder / path.name).write_text(path.read_text())
+    text = (folder / name).read_text()
+    assert old in text
+    (folder / name).write_text(text.replace(old, new, 1))
+    return folder / name
