@@ -34,6 +34,8 @@ tests: $(STAMP)
 
 study: $(STAMP)  ## the long studies; their tables are committed in docs/results
 	$(BIN)/borechain experiment relay --hops 10 --seeds 40 --out docs/results
+	$(BIN)/borechain experiment mwd --tools 200 --out docs/results
+	$(BIN)/borechain experiment allan --records 20 --out docs/results
 	$(BIN)/borechain experiment coverage --wells 2000 --out docs/results
 	$(BIN)/borechain experiment region-of-uncertainty --out docs/results
 	$(BIN)/borechain experiment weighting --out docs/results

@@ -3,16 +3,19 @@
 from __future__ import annotations
 
 import json
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
 import click
 
 from borechain.faults import plain_faults
+from borechain.options import seed_option
 from borechain.survey_experiments import coverage, regions, weighting
-from borechain.tables import show_table, write_table
+from borechain.tables import Columns, cell, write_table
 
-RELAY_COLUMNS = (
+RELAY_COLUMNS: Columns = (
     ("scheme", "scheme"),
     ("hop", "hop"),
     ("yaw_rms_rest_deg", "yaw rms at rest, deg"),
@@ -22,6 +25,38 @@ RELAY_COLUMNS = (
     ("nees_total", "with joints"),
     ("published", "studied, at rest"),
 )
+MWD_COLUMNS: Columns = (
+    ("design", "design"),
+    ("parameters", "parameters"),
+    ("converged", "converged"),
+    ("iterations_median", "iterations, median"),
+    ("iterations_max", "largest"),
+    ("magnetometer_iterations_max", "largest, magnetometers"),
+    ("size_before_median", "G_L error before, g"),
+    ("size_after_max", "after, worst tool, g"),
+    ("published", "asked, g"),
+    ("tilt_before_median_deg", "tilt error before, deg"),
+    ("tilt_after_max_deg", "after, worst tool, deg"),
+    ("within_reach", "tools within reach"),
+    ("warned", "warned of the design"),
+    ("control_passed_before", "control passed before"),
+    ("control_passed_after", "after"),
+    ("cost_difference_max", "E beside another solver"),
+    ("time_over_other", "time over its, with our Jacobian"),
+    ("time_over_other_alone", "without"),
+)
+ALLAN_COLUMNS: Columns = (
+    ("axis", "axis"),
+    ("quantity", "quantity"),
+    ("unit", "unit"),
+    ("published", "truth"),
+    ("ours", "mean estimate"),
+    ("median_error_percent", "median error, %"),
+    ("error_95_percent", "95th percentile, %"),
+    ("raw_error_percent", "raw reading, mean error, %"),
+    ("coverage_95", "95 % intervals that hold"),
+)
+json_option = click.option("--json", "as_json", is_flag=True, help="Print one JSON object and nothing else on stdout.")
 
 
 @click.group()
@@ -29,7 +64,8 @@ def experiment() -> None:
     """Rerun a published experiment beside ours.
 
     \b
-    Example:
+    Examples:
+      borechain experiment list
       borechain experiment relay --hops 10 --seeds 40
     """
 
@@ -50,28 +86,130 @@ def list_() -> None:
 @click.option("--hops", type=click.IntRange(1, 50), default=10, show_default=True)
 @click.option("--seeds", type=click.IntRange(2, 10_000), default=40, show_default=True)
 @click.option("--out", type=click.Path(path_type=Path, file_okay=False), help="Folder for relay.csv.")
-@click.option("--json", "as_json", is_flag=True, help="Print one JSON object and nothing else on stdout.")
+@json_option
 @plain_faults
 def relay(hops: int, seeds: int, out: Path | None, as_json: bool) -> None:
-    """Judge at every hop whether a node's own variance is the truth about its error (NEES, 1 is honest)."""
+    """Judge at every hop whether a node's own variance is the truth about its error (NEES, 1 is honest).
+
+    \b
+    Example:
+      borechain experiment relay --hops 10 --seeds 40 --out docs/results
+    """
+    from sim.experiments.relay import run
+
+    with progress("seeds", 2 * seeds, quiet=as_json) as step:
+        result = run(hops, seeds, step)
+    keep(out, result, RELAY_COLUMNS)
+    ends = [f"{scheme}: every NEES within [0.5, 2]: {yes(good)}" for scheme, good in result["consistent"].items()]
+    tell(result, RELAY_COLUMNS, f"Relay over {hops} hops, {seeds} seeds", ends, as_json=as_json)
+
+
+@experiment.command()
+@click.option("--tools", type=click.IntRange(1, 10_000), default=200, show_default=True, help="Synthetic tools.")
+@click.option("--out", type=click.Path(path_type=Path, file_okay=False), help="Folder for mwd.csv.")
+@json_option
+@plain_faults
+def mwd(tools: int, out: Path | None, as_json: bool) -> None:
+    """Calibrate synthetic MWD tools at five designs of tilts, tool faces and temperatures.
+
+    \b
+    Example:
+      borechain experiment mwd --tools 200 --out docs/results
+    """
+    from sim.experiments.mwd import HEATINGS, run
+
+    with progress("tools", len(HEATINGS) * tools, quiet=as_json) as step:
+        result = run(tools, step)
+    keep(out, result, MWD_COLUMNS)
+    tell(result, MWD_COLUMNS, f"MWD calibration, {tools} tools a design", [], as_json=as_json, sideways=True)
+
+
+@experiment.command()
+@click.option("--records", type=click.IntRange(1, 10_000), default=20, show_default=True, help="Records of 2 h.")
+@click.option("--out", type=click.Path(path_type=Path, file_okay=False), help="Folder for allan.csv.")
+@json_option
+@plain_faults
+def allan(records: int, out: Path | None, as_json: bool) -> None:
+    """Recover the published noise of the node's sensor from synthetic records of 2 h at 65 Hz.
+
+    \b
+    Example:
+      borechain experiment allan --records 20 --out docs/results
+    """
+    from sim.experiments.allan import run
+
+    with progress("records", records, quiet=as_json) as step:
+        result = run(records, step)
+    keep(out, result, ALLAN_COLUMNS)
+    ends = [
+        f"{name}: median error {q['median_error_percent']:.2f} %, asked {q['asked_error_percent']} %, "
+        f"95 % intervals hold {q['coverage_95']:.1%}: {yes(q['reached'])}"
+        for name, q in result["quantities"].items()
+    ]
+    tell(result, ALLAN_COLUMNS, f"Allan analysis of {records} records", ends, as_json=as_json)
+
+
+@experiment.command()
+@click.option("--out", type=click.Path(path_type=Path, file_okay=False), required=True, help="Folder of the records.")
+@seed_option
+@json_option
+@plain_faults
+def records(out: Path, seed: int, as_json: bool) -> None:
+    """Write records of synthetic instruments: an MWD tool in its jig, oven and control, and a gyroscope at rest.
+
+    \b
+    Example:
+      borechain experiment records --out out/bench --seed 1
+    """
+    from sim.bench_files import write_records
+
+    names = write_records(out, seed)
+    if as_json:
+        click.echo(json.dumps({"experiment": "records", "seed": seed, "files": names}))
+    else:
+        click.echo("\n".join(names))
+
+
+@contextmanager
+def progress(what: str, total: int, *, quiet: bool) -> Iterator[Callable[[], None]]:
+    """Bar on stderr; yields the function that moves it on by one."""
     from rich.console import Console
     from rich.progress import Progress
 
-    from sim.experiments.relay import run
+    with Progress(console=Console(stderr=True), disable=quiet) as bar:
+        task = bar.add_task(what, total=total)
+        yield lambda: bar.advance(task)
 
-    with Progress(console=Console(stderr=True), disable=as_json) as bar:
-        task = bar.add_task("seeds", total=2 * seeds)
-        result = run(hops, seeds, lambda: bar.advance(task))
-    if out is not None:
-        write_table(out / "relay.csv", result["cases"], RELAY_COLUMNS)
+
+def keep(folder: Path | None, result: dict[str, Any], columns: Columns) -> None:
+    """Keep the table as CSV under the experiment's name."""
+    if folder is not None:
+        write_table(folder / f"{result['experiment']}.csv", result["cases"], columns)
+
+
+def tell(
+    result: dict[str, Any], columns: Columns, title: str, ends: list[str], *, as_json: bool, sideways: bool = False
+) -> None:
+    """Print the result: JSON for scripts, the table for people, ``sideways`` where it is wider than long."""
     if as_json:
         click.echo(json.dumps(result))
-    else:
-        show(result)
+        return
+    from rich.console import Console
+    from rich.table import Table
+
+    table, rows = Table(title=title), [[cell(row[key]) for key, _ in columns] for row in result["cases"]]
+    names = [name for _, name in columns]
+    head, *body = zip(*[names, *rows], strict=True) if sideways else (names, *rows)
+    for k, name in enumerate(head):
+        table.add_column(name, justify="left" if sideways and k == 0 else "right")
+    for row in body:
+        table.add_row(*row)
+    console = Console()
+    console.print(table)
+    for line in ends:
+        click.echo(line)
 
 
-def show(result: dict[str, Any]) -> None:
-    """Print the table for people."""
-    show_table(f"Relay over {result['hops']} hops, {result['seeds']} seeds", result["cases"], RELAY_COLUMNS)
-    for scheme, good in result["consistent"].items():
-        click.echo(f"{scheme}: every NEES within [0.5, 2]: {'yes' if good else 'no'}")
+def yes(good: bool) -> str:
+    """A verdict in a word."""
+    return "yes" if good else "no"

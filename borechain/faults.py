@@ -29,6 +29,7 @@ def plain_faults(command: Callable[P, R]) -> Callable[P, R]:
 
     @functools.wraps(command)
     def guarded(*args: P.args, **kwargs: P.kwargs) -> R:
+        from groundstation.calibration.errors import CalibrationError
         from groundstation.errors import GroundError, SurveyError, ToolError
         from node.errors import ConfigurationError, NodeError
         from sim.errors import ScenarioError, SimError
@@ -36,7 +37,7 @@ def plain_faults(command: Callable[P, R]) -> Callable[P, R]:
 
         try:
             return command(*args, **kwargs)
-        except (ScenarioError, ConfigurationError, SurveyError, ToolError) as error:
+        except (ScenarioError, ConfigurationError, SurveyError, ToolError, CalibrationError) as error:
             raise InputFault(str(error)) from error
         except (SimError, NodeError, TelemetryError, GroundError, OSError) as error:
             raise EnvironmentFault(str(error)) from error

@@ -8,7 +8,7 @@ from pathlib import Path
 import click
 
 from borechain.faults import plain_faults
-from borechain.options import place_options
+from borechain.options import key_option, place_options
 
 
 @click.command()
@@ -18,6 +18,7 @@ from borechain.options import place_options
 @click.option("--joint-std-deg", type=float, default=0.05, show_default=True, help="Error of a reading, 1 sigma.")
 @click.option("--mount-std-deg", type=float, default=0.05, show_default=True, help="Error of the IMU's mount, 1 sigma.")
 @click.option("--scheme", type=click.Choice(["forward", "estimate"]), default="forward", show_default=True)
+@key_option
 @place_options
 @plain_faults
 def node(
@@ -27,6 +28,7 @@ def node(
     joint_std_deg: float,
     mount_std_deg: float,
     scheme: str,
+    key_file: Path | None,
     rig_name: str,
     endpoint: str,
     folder: Path,
@@ -49,4 +51,4 @@ def node(
         mount_std=math.radians(mount_std_deg),
         scheme=Scheme[scheme.upper()],
     )
-    run_node(Place(rig_name, endpoint, folder), settings)
+    run_node(Place(rig_name, endpoint, folder, key_file), settings)

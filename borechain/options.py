@@ -59,6 +59,13 @@ def place_options(command: Callable[..., Any]) -> Callable[..., Any]:
     return command
 
 
+key_option = click.option(
+    "--key-file",
+    type=click.Path(path_type=Path, dir_okay=False),
+    help="Key of the rig, 64 hex digits, readable by its owner alone. Without it no parameter block is sent or taken.",
+)
+
+
 def parse_speed(_context: click.Context, _parameter: click.Parameter, value: str) -> float:
     """``max`` or a factor of real time."""
     if value == "max":

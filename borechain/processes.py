@@ -27,6 +27,7 @@ from telemetry.errors import TelemetryError
 from telemetry.media.stepped import BenchClient, Stepped, serve, zenoh_ports
 from telemetry.media.zenoh_bus import open_client, open_router
 from telemetry.messages import BASE, ENCODER, Side
+from telemetry.transport.authentication import read_key
 
 PR_SET_PDEATHSIG = 1
 CONNECT_TIMEOUT = 30.0  # wall s
@@ -39,11 +40,17 @@ class Place:
     rig: str
     endpoint: str
     folder: Path
+    key_file: Path | None = None  # of the rig
 
 
 def run_node(place: Place, settings: TubeSettings) -> None:
     """Node of one tube until a signal comes."""
-    run_on_bench(f"node {settings.tube}", place, settings.tube, lambda: TubeProcess(settings, place.folder))
+
+    def build() -> TubeProcess:
+        key = read_key(place.key_file) if place.key_file is not None else None
+        return TubeProcess(settings, place.folder, key=key)
+
+    run_on_bench(f"node {settings.tube}", place, settings.tube, build)
 
 
 def run_encoder(place: Place) -> None:
@@ -68,7 +75,8 @@ def run_ground(place: Place, settings: dict[str, Any]) -> None:
 
     begin_process("ground")
     with reporting("ground"), open_client(place.endpoint, timeout=CONNECT_TIMEOUT) as bus:
-        process = GroundProcess(GroundConfig(rig=place.rig, folder=place.folder, **settings))
+        config = GroundConfig(rig=place.rig, folder=place.folder, key_file=place.key_file, **settings)
+        process = GroundProcess(config)
         with process.serving(bus):
             ports = zenoh_ports(bus, place.rig, BASE, [Side.LOWER])
             client = BenchClient(bus, place.rig, BASE, ports, hears_depth=True)

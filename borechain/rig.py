@@ -97,9 +97,12 @@ def process_table(
     from borechain.processes import Place, run_encoder, run_ground, run_medium, run_node
     from sim.launcher import private_folder
     from sim.processes import ProcessTable, Spec
+    from telemetry.transport.authentication import new_key
+
+    key_file = new_key(folder / "rig.key")
 
     def place(name: str) -> Place:
-        return Place(rig_name, endpoint, private_folder(folder, name))
+        return Place(rig_name, endpoint, private_folder(folder, name), key_file)
 
     specs = {
         "medium": Spec(run_medium, (place("medium"), scenario, seed, speed, faults, True)),

@@ -3,25 +3,45 @@
 from __future__ import annotations
 
 import contextlib
+import itertools
 import math
 import queue
 import threading
-from collections.abc import Iterator
-from concurrent.futures import Future
+from collections.abc import Callable, Iterator
+from concurrent.futures import CancelledError, Future
 from concurrent.futures import TimeoutError as FutureTimeoutError
 
+from groundstation.calibration.errors import CalibrationError
 from groundstation.config import GroundConfig
+from groundstation.errors import ConfigurationError, SelectorError
 from groundstation.service.core import Knowledge
+from groundstation.service.orders import parse, reply_view, status_view
+from groundstation.service.parameters import block_of_files
 from groundstation.service.queries import Queries, pack
 from groundstation.service.store import Store
+from groundstation.service.uploads import Uploads
 from telemetry import keys
 from telemetry.application.driven import Driven
 from telemetry.application.station import Station
 from telemetry.media.zenoh_bus import Query, ZenohBus
-from telemetry.messages import BASE, MAX_TUBE, Command, Event, Message, NodeState, Reply, Side, SurveyMeasurement
+from telemetry.messages import (
+    BASE,
+    BlockStatus,
+    Command,
+    Event,
+    Kept,
+    Message,
+    NodeState,
+    Reply,
+    Scalar,
+    Side,
+    StaticRecord,
+    SurveyMeasurement,
+)
+from telemetry.parameters import ParameterBlock
+from telemetry.transport.authentication import read_key
 
 COMMAND_TIMEOUT = 30.0  # wall s
-COMMANDS = ("take_survey",)
 BOOT_SHIFT = 20
 
 
@@ -36,18 +56,21 @@ class GroundProcess(Driven):
     ------
     StoreError
         When the database cannot be opened.
+    KeyFileError
+        When a key file is configured and holds no key.
     """
 
     def __init__(self, config: GroundConfig) -> None:
         self.config = config
+        self._uploads = Uploads(read_key(config.key_file)) if config.key_file is not None else None
         self.store = Store(config.url)
         self.knowledge = Knowledge(config)
         self.station = Station(BASE, frozenset({Side.LOWER}), boot_count=self.store.boots)
         self._lock = threading.Lock()
         self._queries: Queries | None = None
-        self._orders: queue.SimpleQueue[tuple[Command, Future[Reply]]] = queue.SimpleQueue()
+        self._orders: queue.SimpleQueue[Callable[[float], None]] = queue.SimpleQueue()
         self._ordered: dict[int, Future[Reply]] = {}
-        self._next_command = self.store.boots << BOOT_SHIFT
+        self._numbers = itertools.count((self.store.boots << BOOT_SHIFT) + 1)
         self._stale: set[int] = set()
         self.knowledge.order.restore(self.store.order())
         self._kept_order = list(self.knowledge.order.tubes)
@@ -86,11 +109,43 @@ class GroundProcess(Driven):
         """Let time pass: hello, time requests, repetition, and commands that operators gave."""
         with contextlib.suppress(queue.Empty):
             while True:
-                command, outcome = self._orders.get_nowait()
-                self._ordered[command.sequence] = outcome
-                self.station.command(command, now)
+                self._orders.get_nowait()(now)
+        for segment in self._uploads.due(now) if self._uploads is not None else ():
+            self.station.send_segment(segment)
         super().on_timer(now)
         self._notice_silence(now)
+
+    def next_wake(self, now: float) -> float:
+        """Local time (s) of the next timer."""
+        due = self._uploads.next_due() if self._uploads is not None else math.inf
+        return min(super().next_wake(now), due)
+
+    def order(self, tube: int, name: str, arguments: dict[str, Scalar] | None = None) -> Future[Reply]:
+        """Send a command down with the next timer; from any thread."""
+        outcome: Future[Reply] = Future()
+        command = Command(tube, next(self._numbers), name, arguments or {})
+
+        def send(now: float) -> None:
+            self._ordered[command.sequence] = outcome
+            self.station.command(command, now)
+
+        self._orders.put(send)
+        return outcome
+
+    def upload(self, block: ParameterBlock) -> Future[BlockStatus]:
+        """Send a block to its tube until the tube has judged it; from any thread.
+
+        Raises
+        ------
+        ConfigurationError
+            When the ground station has no key of the rig.
+        """
+        if self._uploads is None:
+            raise ConfigurationError("key_file: expected the key file of the rig, without it no node takes a block")
+        uploads, number = self._uploads, next(self._numbers)
+        outcome: Future[BlockStatus] = Future()
+        self._orders.put(lambda now: uploads.start(block, number, outcome, now))
+        return outcome
 
     def _notice_silence(self, now: float) -> None:
         """Bring rig time forward, also where no depth comes any more, and tell who fell silent or came back."""
@@ -114,7 +169,7 @@ class GroundProcess(Driven):
                 self.knowledge.take_state(message)
                 self._keep_order()
                 self._publish([f"nodes/{message.tube}"])
-        elif isinstance(message, SurveyMeasurement | Event):
+        elif isinstance(message, SurveyMeasurement | Event | StaticRecord):
             with self._lock:
                 md = self.knowledge.place(message) if isinstance(message, SurveyMeasurement) else None
                 self._keep_order()
@@ -123,11 +178,16 @@ class GroundProcess(Driven):
             self.station.acknowledge(message.tube, message.sequence, now)
         elif isinstance(message, Reply) and message.sequence in self._ordered:
             self._ordered.pop(message.sequence).set_result(message)
+        elif isinstance(message, BlockStatus) and self._uploads is not None:
+            self._uploads.take(message)
 
-    def _learn(self, message: SurveyMeasurement | Event, md: float | None) -> list[str]:
+    def _learn(self, message: Kept, md: float | None) -> list[str]:
         """Take a stored message into the knowledge; returns the paths that changed."""
         if isinstance(message, Event):
             self.knowledge.take_event(message)
+            return []
+        if isinstance(message, StaticRecord):
+            self.knowledge.take_static(message)
             return []
         before = list(self.knowledge.alarms.alarms), len(self.knowledge.moved)
         self.knowledge.take_survey(message, md)
@@ -141,19 +201,30 @@ class GroundProcess(Driven):
     def _order(self, query: Query) -> None:
         """An operator's command: sent down at the next occasion, answered with its outcome."""
         name = query.selector_key.rsplit("/", 1)[1]
-        tube = query.parameters.get("tube", "")
-        if name not in COMMANDS or not tube.isdigit() or not 1 <= int(tube) <= MAX_TUBE:
-            query.reply_error(f"{query.selector_key}: expected cmd/{'|'.join(COMMANDS)}?tube=N with N of 1..{MAX_TUBE}")
-            return
-        self._next_command += 1
-        outcome: Future[Reply] = Future()
-        self._orders.put((Command(int(tube), self._next_command, name), outcome))
         try:
-            reply = outcome.result(timeout=COMMAND_TIMEOUT)
+            tube, arguments = parse(name, query.parameters)
+            if name == "upload_parameters":
+                view = status_view(name, self._upload_files(tube, arguments).result(timeout=COMMAND_TIMEOUT))
+            else:
+                view = reply_view(name, self.order(tube, name, arguments).result(timeout=COMMAND_TIMEOUT))
+        except (SelectorError, CalibrationError, ConfigurationError) as error:
+            query.reply_error(f"{query.selector_key}: {error}")
         except FutureTimeoutError:
             query.reply_error(
                 f"tube {tube} has not answered {name} within {COMMAND_TIMEOUT:.0f} s; it is still being asked"
             )
-            return
-        view = {"tube": reply.tube, "command": name, "done": reply.done, "detail": reply.detail}
-        query.reply(keys.COMMAND.format(rig=self.config.rig, name=name), pack(view, "json"))
+        except CancelledError:
+            query.reply_error(f"tube {tube}: another upload has taken the place of this one")
+        else:
+            query.reply(keys.COMMAND.format(rig=self.config.rig, name=name), pack(view, "json"))
+
+    def _upload_files(self, tube: int, arguments: dict[str, Scalar]) -> Future[BlockStatus]:
+        """Upload the calibrations that are named, as the version after the one in use unless a version is named."""
+        with self._lock:
+            state = self.knowledge.nodes.get(tube)
+        version = arguments.get("version")
+        if version is None and state is None:
+            raise SelectorError(f"tube {tube}: no state of it is known, and so no version; expected version=..")
+        number = int(version) if version is not None else (state.parameters_version if state else 0) + 1
+        names = str(arguments["gyroscope"]), str(arguments["accelerometer"])
+        return self.upload(block_of_files(self.config.calibrations, tube, number, *names))

@@ -5,7 +5,8 @@
     TelemetryError
     ├── MediumError(OSError)          the bus could not be opened or was lost: retry or reconfigure
     ├── DecodeError(ValueError)       bytes that are no message of ours; the link counts and drops them
-    └── EncodeError(ValueError)       a message outside its declared range: nothing was sent
+    ├── EncodeError(ValueError)       a message outside its declared range: nothing was sent
+    └── KeyFileError(ValueError)      the key of the rig is missing, open to others or none: correct the file
 """
 
 from __future__ import annotations
@@ -25,3 +26,7 @@ class DecodeError(TelemetryError, ValueError):
 
 class EncodeError(TelemetryError, ValueError):
     """The message is outside its declared ranges; nothing was sent."""
+
+
+class KeyFileError(TelemetryError, ValueError):
+    """The file holds no key that may be used."""

@@ -50,5 +50,6 @@ TABLE: Final[tuple[Key, ...]] = (
     Key("borechain/{rig}/ground/column", "query, publish", "deviation from the design, projected to the target"),
     Key("borechain/{rig}/ground/alarms", "query, publish", "tolerance alarms and stations where the hole moved"),
     Key("borechain/{rig}/ground/events", "query", "events of the nodes; ?tube=3"),
+    Key("borechain/{rig}/ground/static_records", "query", "raw readings that nodes averaged at rest; ?tube=3"),
     Key("borechain/{rig}/cmd/{name}", "query", "operator command to the ground station; the reply is its outcome"),
 )

@@ -20,6 +20,8 @@ Vector3: TypeAlias = tuple[float, float, float]
 Matrix3: TypeAlias = tuple[Vector3, Vector3, Vector3]
 Scalar: TypeAlias = bool | int | float | str | None
 HOPS_UNKNOWN = -1
+SEGMENT_SIZE = 192  # bytes of a block in one message; eight such messages and their frame stay below 4 KiB
+MAX_SEGMENTS = 32
 
 
 def address_name(address: int) -> str:
@@ -66,6 +68,16 @@ class NodeFlag(enum.IntFlag):
     RESTORED = 16
     CLOCK_UNSYNCHRONISED = 32
     BIAS_UNKNOWN = 64
+
+
+class UploadPhase(enum.IntEnum):
+    """How far the upload of a parameter block has come at the node."""
+
+    PARTIAL = 0  # segments are missing
+    WAITING = 1  # whole and checked, to be applied when the node stands still
+    APPLIED = 2  # on the node's disk and in use
+    REFUSED = 3  # the detail says why; the block before stays in use
+    UNTRUSTED = 4  # this segment was not made with the key of the rig
 
 
 @dataclass(frozen=True, slots=True)
@@ -136,6 +148,8 @@ class NodeState:
     flags: NodeFlag
     cycles: int
     overruns: int
+    parameters_version: int = 0  # of the block in use, 0 is the identity
+    parameters_hash: bytes = bytes(8)  # first bytes of its SHA-256
 
 
 @dataclass(frozen=True, slots=True)
@@ -177,7 +191,7 @@ class Command:
 
     tube: int  # addressee
     sequence: int
-    name: str  # take_survey, set_parameter
+    name: str  # take_survey, static_record, parameters
     arguments: dict[str, Scalar] = field(default_factory=dict)
 
 
@@ -203,6 +217,65 @@ class Event:
     arguments: dict[str, Scalar] = field(default_factory=dict)
 
 
+@dataclass(frozen=True, slots=True)
+class BlockSegment:
+    """One part of a parameter block on its way to a node, answered by a ``BlockStatus``."""
+
+    tube: int  # addressee
+    sequence: int  # of the upload, unique per ground station
+    version: int  # of the block, >= 1
+    digest: bytes  # SHA-256 of the whole block
+    count: int  # segments of the block
+    index: int  # of this one, from 0
+    data: bytes
+    tag: bytes  # HMAC-SHA256 under the rig's key of all the above
+
+
+@dataclass(frozen=True, slots=True)
+class BlockStatus:
+    """A node's account of an upload, and of the block that it uses meanwhile."""
+
+    tube: int
+    sequence: int  # of the upload
+    digest: bytes  # of the block that is uploaded
+    phase: UploadPhase
+    received: int  # bit k: segment k is on the node's disk
+    version: int  # of the block in use
+    in_use: bytes  # SHA-256 of the block in use
+    detail: str
+
+
+@dataclass(frozen=True, slots=True)
+class StaticRecord:
+    """Raw readings averaged at rest, before any correction. Kept and receipted like a survey measurement."""
+
+    tube: int
+    sequence: int
+    command: int  # sequence of the command that asked for it
+    begun_at: float  # s, rig time
+    ended_at: float  # s, rig time
+    samples: int
+    rate: Vector3  # rad/s
+    rate_cov: Matrix3  # (rad/s)^2, of one sample
+    force: Vector3  # m/s^2
+    force_cov: Matrix3  # (m/s^2)^2, of one sample
+    temperature: float  # C, mean
+    moved: bool  # it was not at rest all the time
+
+
 Message: TypeAlias = (
-    Aiding | Hello | TimeRequest | TimeReply | NodeState | SurveyMeasurement | Receipt | Command | Reply | Event
+    Aiding
+    | Hello
+    | TimeRequest
+    | TimeReply
+    | NodeState
+    | SurveyMeasurement
+    | Receipt
+    | Command
+    | Reply
+    | Event
+    | BlockSegment
+    | BlockStatus
+    | StaticRecord
 )
+Kept: TypeAlias = SurveyMeasurement | Event | StaticRecord  # by a tube until its receipt came

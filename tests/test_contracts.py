@@ -12,6 +12,7 @@ ROOT = Path(__file__).parents[1]
 PACKAGES = ("borechain", "groundstation", "node", "sim", "telemetry")
 FORBIDDEN = [
     ("telemetry/messages.py", "import node.errors"),
+    ("telemetry/parameters.py", "import telemetry.transport.hop"),
     ("node/errors.py", "import sim.errors"),
     ("groundstation/errors.py", "import sim.errors"),
     ("sim/errors.py", "import borechain.options"),

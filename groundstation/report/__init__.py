@@ -1,1 +1,1 @@
-"""Figures and reports of surveys, instruments and walls."""
+"""Reports for people: figures and certificates; knows no service."""

@@ -18,10 +18,11 @@ from groundstation.survey.fusion import Departure, Evidence, departure, judge, w
 from groundstation.survey.resolve import Lean, Quality, check, combine_imus, resolve
 from groundstation.survey.shared import SharedErrors
 from groundstation.survey.trajectory import Point, Trajectory
-from telemetry.messages import Event, NodeState, SurveyMeasurement
+from telemetry.messages import Event, NodeState, StaticRecord, SurveyMeasurement
 
 Array = npt.NDArray[np.float64]
 EVENTS_SHOWN = 10_000
+STATIC_RECORDS_SHOWN = 1_000
 ACCELEROMETER_NOISE_DEG = 0.02  # one sample, for the check of motion
 SAME_STOP = 15.0  # s, within which two surveys were taken at one stop
 
@@ -117,6 +118,7 @@ class Knowledge:
         self.nodes: dict[int, NodeState] = {}
         self.stations: list[SurveyStation] = []
         self.events: deque[Event] = deque(maxlen=EVENTS_SHOWN)
+        self.static_records: deque[StaticRecord] = deque(maxlen=STATIC_RECORDS_SHOWN)
         self.unplaced = 0
         self.refused = 0
         self.rig_now = math.nan
@@ -162,6 +164,10 @@ class Knowledge:
     def take_event(self, event: Event) -> None:
         """Remember what happened."""
         self.events.append(event)
+
+    def take_static(self, record: StaticRecord) -> None:
+        """Remember an average at rest."""
+        self.static_records.append(record)
 
     def age(self, tube: int) -> float:
         """Rig seconds since a node's newest state; infinite for one never heard."""

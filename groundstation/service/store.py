@@ -1,4 +1,4 @@
-"""What the ground station keeps: every survey measurement and event, on the disk before it is acknowledged.
+"""What the ground station keeps: surveys, static records and events, on the disk before they are acknowledged.
 
 A row is the message as it came (telemetry's payload) with the depth it was given. The same message twice is one row:
 identity is tube, sequence and content, so a tube that lost its memory and counts anew still gets its surveys stored.
@@ -16,7 +16,7 @@ import sqlalchemy as sa
 
 from groundstation.errors import StoreError
 from telemetry.errors import DecodeError
-from telemetry.messages import Event, SurveyMeasurement
+from telemetry.messages import Event, Kept, StaticRecord, SurveyMeasurement
 from telemetry.presentation.codec import decode, encode
 
 SCHEMA = 1
@@ -55,7 +55,7 @@ STRING = sa.Table(
 class Stored:
     """A message from the store and the depth (m) it was measured at, if known."""
 
-    message: SurveyMeasurement | Event
+    message: Kept
     md: float | None
 
 
@@ -90,7 +90,7 @@ class Store:
             self.close()
             raise
 
-    def add(self, message: SurveyMeasurement | Event, md: float | None) -> bool:
+    def add(self, message: Kept, md: float | None) -> bool:
         """Store a message; durable on return. False when it was already there.
 
         Raises
@@ -123,7 +123,7 @@ class Store:
                     message = decode(row.payload)
                 except DecodeError as error:
                     raise StoreError(f"database {self._where}: message {row.id}: {error}") from error
-                if isinstance(message, SurveyMeasurement | Event):
+                if isinstance(message, SurveyMeasurement | Event | StaticRecord):
                     yield Stored(message, row.md)
 
     def depths(self) -> list[tuple[float, float]]:

@@ -14,7 +14,7 @@ from groundstation.service import column_views
 from groundstation.service.core import Cluster, Knowledge, SurveyStation
 from groundstation.survey.resolve import angle_stds, angles
 from groundstation.survey.trajectory import Point, interpolate
-from telemetry.messages import Event, NodeFlag, SurveyMeasurement
+from telemetry.messages import Event, NodeFlag, StaticRecord, SurveyMeasurement
 
 View = dict[str, Any]
 Parameters = dict[str, str]
@@ -102,6 +102,8 @@ def node(k: Knowledge, tube: int) -> View:
         "flags": flag_names(s.flags),
         "cycles": s.cycles,
         "overruns": s.overruns,
+        "parameters_version": s.parameters_version,
+        "parameters_hash": s.parameters_hash.hex(),
     }
 
 
@@ -220,6 +222,30 @@ def event(e: Event) -> View:
     }
 
 
+def static_records(k: Knowledge, p: Parameters) -> View:
+    """Raw readings averaged at rest; ``tube`` selects."""
+    wanted = Range.parse("tube", p["tube"]) if "tube" in p else None
+    return {"static_records": [static_record(r) for r in k.static_records if wanted is None or wanted.holds(r.tube)]}
+
+
+def static_record(r: StaticRecord) -> View:
+    """One static record; the covariances are those of one sample."""
+    return {
+        "tube": r.tube,
+        "sequence": r.sequence,
+        "order": r.command,
+        "begun_at_s": r.begun_at,
+        "ended_at_s": r.ended_at,
+        "samples": r.samples,
+        "rate_rad_s": list(r.rate),
+        "rate_cov_rad2_s2": [list(row) for row in r.rate_cov],
+        "force_m_s2": list(r.force),
+        "force_cov_m2_s4": [list(row) for row in r.force_cov],
+        "temperature_c": r.temperature,
+        "moved": r.moved,
+    }
+
+
 def point_view(point: Point) -> View:
     """One point of the trajectory."""
     inclination, azimuth = angles(point.tangent[:2], float(point.tangent[2]))
@@ -275,6 +301,7 @@ FIXED: dict[str, Path] = {
     "measurements": Path(measurements, ("station", "tube")),
     "trajectory": Path(trajectory, ("md",)),
     "events": Path(events, ("tube",)),
+    "static_records": Path(static_records, ("tube",)),
     "uncertainty": Path(column_views.uncertainty, ("confidence",)),
     "column": Path(column_views.column),
     "alarms": Path(column_views.alarms),

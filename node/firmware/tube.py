@@ -8,10 +8,14 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from node.firmware.parameters import forget_bias, forget_tilt, record_of, recorrect
 from node.firmware.settings import TubeSettings
+from node.firmware.static_record import StaticRecorder
 from node.kernels.angles import from_binary, wrap
+from node.kernels.calibration import USUAL, calibrate
 from node.kernels.cycle import run_cycle
 from node.kernels.layout import DEG, Array, Err, Scheme, Status, new_state
+from node.kernels.modes import STATIC_BIAS
 from node.kernels.relay import offer_aiding
 from telemetry.messages import (
     Aiding,
@@ -22,10 +26,14 @@ from telemetry.messages import (
     NodeState,
     Scalar,
     Severity,
+    StaticRecord,
     SurveyMeasurement,
 )
+from telemetry.parameters import SHORT_HASH, ParameterBlock
 
 VAR_FLOOR = (0.001 * DEG) ** 2
+STILL_CYCLES = 4  # after which a node takes itself for standing
+LARGEST_OFFSET = 6.0 * DEG  # rad/s, zero-rate offset of a gyroscope never calibrated; the slow alignment turn is faster
 EVENT_OF_STATUS: tuple[tuple[Status, str, Severity], ...] = (
     (Status.STOPPED, "stopped", Severity.INFO),
     (Status.STARTED, "started", Severity.INFO),
@@ -43,12 +51,13 @@ EVENT_OF_STATUS: tuple[tuple[Status, str, Severity], ...] = (
 
 @dataclass(frozen=True, slots=True)
 class ImuReading:
-    """Mean of one cycle, calibrated, body frame, on the node's own clock."""
+    """Mean of one cycle as the sensor gives it, before any correction, on the node's own clock."""
 
     start: float  # s
     end: float  # s
     rate: tuple[float, float, float]  # rad/s
     force: tuple[float, float, float]  # m/s^2
+    temperature: float = USUAL  # C
 
 
 @dataclass(frozen=True, slots=True)
@@ -71,14 +80,23 @@ class Tube:
     config, state : one-record arrays of dtype ``CONFIG`` and ``STATE``, owned by the caller
     next_sequence : source of the numbers of surveys and events, kept across restarts by the caller
     restored : the state comes from a saved one
+    parameters : block in use; None is the identity
     """
 
     def __init__(
-        self, settings: TubeSettings, config: Array, state: Array, next_sequence: Callable[[], int], *, restored: bool
+        self,
+        settings: TubeSettings,
+        config: Array,
+        state: Array,
+        next_sequence: Callable[[], int],
+        *,
+        restored: bool,
+        parameters: ParameterBlock | None = None,
     ) -> None:
         self.settings = settings
         self._configs = config
         self.config = config[0]
+        self._states = state
         self.state = state[0]
         self._next_sequence = next_sequence
         self._restored = restored
@@ -87,6 +105,11 @@ class Tube:
         self._rate, self._force = np.zeros(3), np.zeros(3)
         self._rejecting = False
         self._noticed = Status.NONE  # between cycles
+        self._recorder = StaticRecorder()
+        self._slow_cycles = 0  # in a row, not faster than the offset of a gyroscope never calibrated
+        self._temperature = USUAL
+        self.parameters = parameters or ParameterBlock(settings.tube, 0)
+        self.use(self.parameters)
 
     def on_aiding(self, aiding: Aiding, valid_local: float) -> Aiding | None:
         """Take the reference from the upper end, valid at ``valid_local`` (s, own clock); returns what goes down.
@@ -122,10 +145,13 @@ class Tube:
 
     def on_cycle(
         self, reading: ImuReading, around: Surroundings
-    ) -> Iterator[Aiding | SurveyMeasurement | Event | NodeState]:
-        """Run one execution cycle and yield what there is to say."""
+    ) -> Iterator[Aiding | SurveyMeasurement | StaticRecord | Event | NodeState]:
+        """Correct the reading, run one execution cycle and yield what there is to say."""
         self._rate[:] = reading.rate
         self._force[:] = reading.force
+        self._temperature = reading.temperature
+        calibrate(self._correction[0], reading.temperature, self._rate, self._force)
+        self._slow_cycles = self._slow_cycles + 1 if max(map(abs, self._rate)) < LARGEST_OFFSET else 0
         if self._cycles and reading.start - self.state["now"] > 0.5 * (reading.end - reading.start):
             self._overruns += 1
         joined = 1 if around.joined else 0
@@ -137,6 +163,7 @@ class Tube:
         if Status.FILTER_FAULT in status:
             self._start_over()
         yield from self._events(status, around)
+        yield from self._record(reading, around)
         if Status.SURVEY_READY in status:
             yield self._survey(reading.end, around)
         if self.settings.scheme is Scheme.ESTIMATE and self.state["yaw_known"]:
@@ -153,6 +180,34 @@ class Tube:
     def take_survey(self) -> None:
         """Measure this station again at the next settled cycle of the present or the next stop."""
         self.state["surveyed"] = 0
+
+    def start_record(self, seconds: object, command: int) -> str:
+        """Average raw readings for ``seconds`` from the next cycle on; returns why not, or nothing."""
+        return self._recorder.start(seconds, command, standing=self.standing)
+
+    def prepare(self, block: ParameterBlock) -> None:
+        """Forget what was learnt under the present block and would be wrong under ``block``."""
+        if block.gyroscope != self.parameters.gyroscope:
+            forget_bias(self._states, self._configs)
+        if block.accelerometer != self.parameters.accelerometer:
+            forget_tilt(self._states)
+
+    def use(self, block: ParameterBlock) -> None:
+        """Correct readings by ``block`` from the next cycle on."""
+        recorrect(self._states, self.parameters, block, self._temperature)
+        self.parameters = block
+        self._correction = record_of(block)
+        self._short_hash = block.sha256()[:SHORT_HASH]
+
+    @property
+    def quiet(self) -> bool:
+        """Whether the node stands still by the block and the bias in use."""
+        return int(self.state["still_cycles"]) >= STILL_CYCLES
+
+    @property
+    def standing(self) -> bool:
+        """Whether the node may be at rest: quiet, or slow and without a bias, whose offset may look like a rate."""
+        return self.quiet or (self.state["mode"] == STATIC_BIAS and self._slow_cycles >= STILL_CYCLES)
 
     @property
     def yaw(self) -> float:
@@ -198,6 +253,16 @@ class Tube:
             sigmas = abs(float(self.state["innovation"])) / math.sqrt(float(self.state["innovation_var"]))
             yield self._event("aiding_rejected", Severity.WARNING, around.rig_now, {"sigmas": sigmas})
         self._rejecting = rejecting
+
+    def _record(self, reading: ImuReading, around: Surroundings) -> Iterator[StaticRecord | Event]:
+        recorder = self._recorder
+        if not recorder.running:
+            return
+        temperature = reading.temperature if math.isfinite(reading.temperature) else USUAL
+        recorder.take(reading.rate, reading.force, temperature, reading.start, standing=self.standing)
+        if recorder.is_due(reading.end):
+            record = recorder.finish(self.settings.tube, reading.end, around.rig_now, self._next_sequence)
+            yield record or self._event("static_record_empty", Severity.ERROR, around.rig_now, {})
 
     def _start_over(self) -> None:
         """A covariance that is none: begin again from nothing but the constant bias."""
@@ -262,4 +327,6 @@ class Tube:
             flags=self.flags(around, end),
             cycles=self._cycles,
             overruns=self._overruns,
+            parameters_version=self.parameters.version,
+            parameters_hash=self._short_hash,
         )

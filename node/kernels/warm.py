@@ -5,16 +5,23 @@ from __future__ import annotations
 import numpy as np
 
 from node.kernels.angles import from_binary, wrap
+from node.kernels.calibration import USUAL, calibrate, identity_parameters
 from node.kernels.cycle import run_cycle
 from node.kernels.layout import PERIOD, default_config, new_state
 from node.kernels.relay import offer_aiding
+from node.kernels.static_average import STATIC, add_static, has_moved
 
 
 def warm_up() -> None:
     """Run one cycle and one aiding on a state that is thrown away."""
     config = default_config()
     state = new_state(config)
-    run_cycle(state[0], config[0], np.zeros(3), np.array([0.0, 0.0, -9.81]), 0.0, PERIOD, 1)
+    rate, force = np.zeros(3), np.array([0.0, 0.0, -9.81])
+    calibrate(identity_parameters()[0], USUAL, rate, force)
+    average = np.zeros(1, STATIC)
+    add_static(average[0], rate, force, USUAL, 1)
+    has_moved(average[0], 3.0)
+    run_cycle(state[0], config[0], rate, force, 0.0, PERIOD, 1)
     offer_aiding(state[0], config[0], 0.0, 1e-6, 0.0, 0.0, 0.0, 0.0, 1, 0)
     from_binary(state[0]["now_yaw"])
     wrap(0.0)

@@ -6,20 +6,38 @@ from pathlib import Path
 from typing import Any
 
 from node.errors import SavedStateError
+from node.firmware.parameters import forget_bias, forget_tilt
 from node.firmware.saved_state import resume
 from node.firmware.settings import TubeSettings
 from node.firmware.tube import ImuReading, Surroundings, Tube
+from node.kernels.calibration import USUAL
 from node.kernels.layout import Array, default_config, new_state
 from node.process.counter import BootCounter
 from node.process.journal import Journal
+from node.process.parameter_keeper import ParameterKeeper, load_parameters
+from node.process.parameter_store import ParameterStore
 from telemetry.application.driven import Driven
 from telemetry.application.station import Station
 from telemetry.errors import EncodeError
-from telemetry.messages import Aiding, Command, Event, NodeState, Reply, Severity, Side, SurveyMeasurement
+from telemetry.messages import (
+    Aiding,
+    BlockSegment,
+    Command,
+    Event,
+    NodeState,
+    Reply,
+    Scalar,
+    Severity,
+    Side,
+    StaticRecord,
+    SurveyMeasurement,
+)
+from telemetry.presentation.fields import MAX_TEXT
 
 SAVE_EVERY = 19  # cycles, 10 s
 SYNCHRONISED_STD = 0.02  # s
 MAX_CLOCK_STD = 3600.0
+COMMANDS = ("take_survey", "static_record", "parameters")
 
 
 class TubeProcess(Driven):
@@ -30,9 +48,12 @@ class TubeProcess(Driven):
     settings : what the crew entered
     folder : where the state is saved
     config : one record of dtype ``CONFIG``; the default is that of an MPU6500-class node
+    key : of the rig; without one the node takes no parameter block
     """
 
-    def __init__(self, settings: TubeSettings, folder: Path, config: Array | None = None) -> None:
+    def __init__(
+        self, settings: TubeSettings, folder: Path, config: Array | None = None, key: bytes | None = None
+    ) -> None:
         self.settings = settings
         self.config = default_config() if config is None else config
         self._journal = Journal(folder)
@@ -42,20 +63,31 @@ class TubeProcess(Driven):
         self.state, telemetry = saved if saved else (new_state(self.config), None)
         if saved:
             resume(self.state)
+        store = ParameterStore(folder)
+        parameters = load_parameters(store, settings.tube)
+        self._fallback = "; ".join(store.faults)
+        if self._fallback:
+            forget_bias(self.state, self.config)
+            forget_tilt(self.state)
         self.station = Station(
             settings.tube,
             frozenset(Side),
             boot_count=self.boots,
             restored=telemetry,
         )
-        self.tube = Tube(settings, self.config, self.state, self.station.new_sequence, restored=saved is not None)
+        restored = saved is not None
+        next_sequence = self.station.new_sequence
+        self.tube = Tube(settings, self.config, self.state, next_sequence, restored=restored, parameters=parameters)
         self._cycles = 0
+        self._now = 0.0
         self._fault = fault
         self._announced = False
+        self._keeper = ParameterKeeper(self.tube, store, key, self._say_event, self._save)
         self._save()
 
     def on_frame(self, side: Side, frame: bytes, now: float) -> None:
         """A frame arrived at one end (``now``: s, own clock)."""
+        self._now = now
         for received in self.station.receive(side, frame, now):
             message = received.message
             if isinstance(message, Aiding) and received.side is Side.UPPER:
@@ -63,16 +95,25 @@ class TubeProcess(Driven):
             elif isinstance(message, Command):
                 self.station.reply(self._obey(message), now)
                 self._save()
+            elif isinstance(message, BlockSegment):
+                self.station.send_status(self._keeper.take(message, now))
 
     def on_cycle(self, data: Any, now: float) -> None:
-        """The IMU delivered a cycle: ``data`` is start (s), three rates (rad/s), three forces (m/s^2)."""
-        start, wx, wy, wz, fx, fy, fz = data
+        """The IMU delivered a cycle: ``data`` is start (s), three rates (rad/s), three forces (m/s^2), raw.
+
+        A sensor that knows its temperature (C) adds it.
+        """
+        start, wx, wy, wz, fx, fy, fz, *rest = data
+        self._now = now
+        reading = ImuReading(start, now, (wx, wy, wz), (fx, fy, fz), rest[0] if rest else USUAL)
         around = self._surroundings(now)
         if around.synchronised:
             self._announce(around.rig_now, now)
         urgent = False
-        for said in self.tube.on_cycle(ImuReading(start, now, (wx, wy, wz), (fx, fy, fz)), around):
+        for said in self.tube.on_cycle(reading, around):
             urgent |= self._say(said, now)
+        if (status := self._keeper.on_cycle(reading)) is not None:
+            self.station.send_status(status)
         self._cycles += 1
         self.station.advance(now)
         if urgent or self._cycles % SAVE_EVERY == 0:
@@ -97,7 +138,7 @@ class TubeProcess(Driven):
             synchronised=clock.synchronised and var < SYNCHRONISED_STD**2,
         )
 
-    def _say(self, said: Aiding | SurveyMeasurement | Event | NodeState, now: float) -> bool:
+    def _say(self, said: Aiding | SurveyMeasurement | StaticRecord | Event | NodeState, now: float) -> bool:
         """Hand a message to the telemetry; returns whether it must be saved before it may be lost."""
         try:
             if isinstance(said, NodeState):
@@ -119,19 +160,36 @@ class TubeProcess(Driven):
         self._announced = True
         self.station.submit(self.tube.boot_event(rig_now), now)
         if self._fault:
-            sequence = self.station.new_sequence()
-            detail = {"detail": self._fault[:200]}
-            event = Event(self.settings.tube, sequence, rig_now, Severity.ERROR, "saved_state_lost", dict(detail))
-            self.station.submit(event, now)
+            self._say_event(Severity.ERROR, "saved_state_lost", {"detail": self._fault[:200]})
+        if self._fallback:
+            in_use = self.tube.parameters
+            detail: dict[str, Scalar] = {"detail": self._fallback[:200], "in_use": in_use.version}
+            self._say_event(Severity.ERROR, "parameters_fallback", detail | {"hash": in_use.sha256().hex()})
+
+    def _say_event(self, severity: Severity, code: str, arguments: dict[str, Scalar]) -> None:
+        """Keep an event of the process, and save so that a cut does not lose it."""
+        rig_now = self.station.clock.rig_from_local(self._now)
+        self.station.submit(
+            Event(self.settings.tube, self.station.new_sequence(), rig_now, severity, code, arguments), self._now
+        )
+        self._save()
 
     def _obey(self, command: Command) -> Reply:
+        done, detail = True, ""
         match command.name:
             case "take_survey":
                 self.tube.take_survey()
-                return Reply(self.settings.tube, command.sequence, True, "at the next settled cycle")
+                detail = "at the next settled cycle"
+            case "static_record":
+                seconds = command.arguments.get("seconds")
+                refused = self.tube.start_record(seconds, command.sequence)
+                done, detail = not refused, refused or f"recording {seconds} s"
+            case "parameters":
+                block = self.tube.parameters
+                detail = f"version {block.version} sha256 {block.sha256().hex()}"
             case _:
-                known = "take_survey"
-                return Reply(self.settings.tube, command.sequence, False, f"expected {known}, got {command.name}")
+                done, detail = False, f"expected {', '.join(COMMANDS)}, got {command.name}"
+        return Reply(self.settings.tube, command.sequence, done, detail[:MAX_TEXT])
 
     def _load(self) -> tuple[tuple[Array, bytes] | None, str]:
         try:

@@ -21,16 +21,17 @@ from telemetry.messages import (
     ENCODER,
     HOPS_UNKNOWN,
     Aiding,
+    BlockSegment,
+    BlockStatus,
     Command,
-    Event,
     Hello,
+    Kept,
     Message,
     Mode,
     NodeState,
     Receipt,
     Reply,
     Side,
-    SurveyMeasurement,
     TimeReply,
     TimeRequest,
 )
@@ -43,7 +44,16 @@ SYNC_QUICK = 1.0  # s
 SYNC_SLOW = 10.0  # s
 ANSWERS_KEPT = 64
 ONE_HOP = (Kind.AIDING, Kind.HELLO, Kind.TIME_REQUEST, Kind.TIME_REPLY)
-RELIABLE = (Kind.SURVEY_MEASUREMENT, Kind.EVENT, Kind.REPLY, Kind.RECEIPT, Kind.COMMAND)
+RELIABLE = (
+    Kind.SURVEY_MEASUREMENT,
+    Kind.EVENT,
+    Kind.REPLY,
+    Kind.RECEIPT,
+    Kind.COMMAND,
+    Kind.BLOCK_SEGMENT,
+    Kind.BLOCK_STATUS,
+    Kind.STATIC_RECORD,
+)
 
 
 @dataclass(frozen=True, slots=True)
@@ -165,7 +175,7 @@ class Station:
         if Side.UPPER in self._links:
             self._links[Side.UPPER].send_best_effort(encode(state), (Kind.NODE_STATE, state.tube))
 
-    def submit(self, message: SurveyMeasurement | Event, now: float) -> None:
+    def submit(self, message: Kept, now: float) -> None:
         """Keep a message until the ground station has receipted it, and send it."""
         self._outbox.add(message.sequence, encode(message), now)
         self._send_due(self._outbox, Side.UPPER, now)
@@ -189,6 +199,14 @@ class Station:
         while len(self._answered) > ANSWERS_KEPT:
             self._answered.popitem(last=False)
         self._links[Side.UPPER].send_reliable(payload)
+
+    def send_segment(self, segment: BlockSegment) -> None:
+        """Send a part of a parameter block down; what is lost with a relay the upload repeats (base station)."""
+        self._links[Side.LOWER].send_reliable(encode(segment))
+
+    def send_status(self, status: BlockStatus) -> None:
+        """Tell the ground station how an upload stands."""
+        self._links[Side.UPPER].send_reliable(encode(status))
 
     def acknowledge(self, tube: int, sequence: int, now: float) -> None:
         """Tell a tube that its message is stored (base station)."""

@@ -7,7 +7,6 @@ envelope alone and hands the very same bytes on.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
 from dataclasses import dataclass
 from enum import IntEnum
 from typing import Any
@@ -17,12 +16,15 @@ import msgpack
 from telemetry.errors import DecodeError, EncodeError
 from telemetry.messages import (
     BASE,
+    MAX_SEGMENTS,
     SCHEMA_VERSION,
+    SEGMENT_SIZE,
     Aiding,
+    BlockSegment,
+    BlockStatus,
     Command,
     Event,
     Hello,
-    ImuMean,
     Message,
     Mode,
     NodeFlag,
@@ -30,15 +32,29 @@ from telemetry.messages import (
     Receipt,
     Reply,
     Severity,
+    StaticRecord,
     SurveyMeasurement,
     TimeReply,
     TimeRequest,
+    UploadPhase,
+)
+from telemetry.presentation.fields import (
+    MAX_BINARY,
+    Field,
+    arguments,
+    binary,
+    covariance,
+    imus,
+    number,
+    pack_imu,
+    same,
+    text,
+    truth,
+    vector,
+    whole,
 )
 
 MAX_PAYLOAD = 4096
-MAX_TEXT = 256
-MAX_ARGUMENTS = 32
-MAX_IMUS = 16
 TURN = 2.0 * math.pi
 NO_TARGET = 255
 
@@ -56,6 +72,9 @@ class Kind(IntEnum):
     COMMAND = 8
     REPLY = 9
     EVENT = 10
+    BLOCK_SEGMENT = 11
+    BLOCK_STATUS = 12
+    STATIC_RECORD = 13
 
 
 @dataclass(frozen=True, slots=True)
@@ -68,118 +87,8 @@ class Envelope:
     sequence: int
 
 
-@dataclass(frozen=True, slots=True)
-class Field:
-    """One field: attribute, short key, check (raises ValueError) and what is put on the wire."""
-
-    name: str
-    key: str
-    check: Callable[[Any], Any]
-    pack: Callable[[Any], Any]
-
-
-def _same(value: Any) -> Any:
-    return value
-
-
-def number(name: str, key: str, low: float, high: float) -> Field:
-    """Finite float in [low, high]."""
-
-    def check(value: Any) -> float:
-        if isinstance(value, bool) or not isinstance(value, int | float) or not low <= value <= high:
-            raise ValueError(f"{name}: expected a number in [{low:g}, {high:g}], got {value!r:.40}")
-        return float(value)
-
-    return Field(name, key, check, _same)
-
-
-def whole(name: str, key: str, low: int, high: int, wrap: Callable[[int], Any] = int) -> Field:
-    """Integer in [low, high]; ``wrap`` makes it an enumeration."""
-
-    def check(value: Any) -> Any:
-        if isinstance(value, bool) or not isinstance(value, int) or not low <= value <= high:
-            raise ValueError(f"{name}: expected an integer in [{low}, {high}], got {value!r:.40}")
-        return wrap(value)
-
-    return Field(name, key, check, int)
-
-
-def truth(name: str, key: str) -> Field:
-    """Boolean."""
-
-    def check(value: Any) -> bool:
-        if not isinstance(value, bool):
-            raise ValueError(f"{name}: expected true or false, got {value!r:.40}")
-        return value
-
-    return Field(name, key, check, _same)
-
-
-def text(name: str, key: str) -> Field:
-    """Short string."""
-
-    def check(value: Any) -> str:
-        if not isinstance(value, str) or len(value) > MAX_TEXT:
-            raise ValueError(f"{name}: expected at most {MAX_TEXT} characters, got {value!r:.40}")
-        return value
-
-    return Field(name, key, check, _same)
-
-
-def vector(name: str, key: str, limit: float) -> Field:
-    """Three finite numbers of magnitude up to ``limit``."""
-    return Field(name, key, lambda value: _vector(name, value, limit), list)
-
-
-def _vector(name: str, value: Any, limit: float) -> tuple[float, float, float]:
-    if not isinstance(value, list | tuple) or len(value) != 3:
-        raise ValueError(f"{name}: expected three numbers, got {value!r:.40}")
-    for item in value:
-        if isinstance(item, bool) or not isinstance(item, int | float) or not -limit <= item <= limit:
-            raise ValueError(f"{name}: expected numbers within +-{limit:g}, got {item!r:.40}")
-    return float(value[0]), float(value[1]), float(value[2])
-
-
-def _imus(value: Any) -> tuple[ImuMean, ...]:
-    if not isinstance(value, list | tuple) or not 1 <= len(value) <= MAX_IMUS:
-        raise ValueError(f"imus: expected 1..{MAX_IMUS} IMUs, got {value!r:.40}")
-    return tuple(_imu(item) for item in value)
-
-
-def _imu(item: Any) -> ImuMean:
-    if isinstance(item, ImuMean):
-        item = _pack_imu(item)
-    if not isinstance(item, list) or len(item) != 2 or not isinstance(item[1], list | tuple) or len(item[1]) != 3:
-        raise ValueError(f"imus: expected a mean and a 3x3 covariance, got {item!r:.40}")
-    rows = [_vector("force_cov", row, 1e6) for row in item[1]]
-    if min(rows[0][0], rows[1][1], rows[2][2]) < 0.0:
-        raise ValueError("force_cov: expected variances of zero or more")
-    return ImuMean(_vector("force", item[0], 1e3), (rows[0], rows[1], rows[2]))
-
-
-def _pack_imu(imu: ImuMean) -> list[Any]:
-    return [list(imu.force), [list(row) for row in imu.force_cov]]
-
-
-def _arguments(value: Any) -> dict[str, Any]:
-    if not isinstance(value, dict) or len(value) > MAX_ARGUMENTS:
-        raise ValueError(f"arguments: expected at most {MAX_ARGUMENTS} names, got {value!r:.40}")
-    for name, item in value.items():
-        if not isinstance(name, str) or len(name) > MAX_TEXT:
-            raise ValueError(f"arguments: expected a short name, got {name!r:.40}")
-        if not (item is None or isinstance(item, bool | int | float | str)):
-            raise ValueError(f"arguments: {name}: expected a scalar, got {item!r:.40}")
-        if isinstance(item, float) and not math.isfinite(item):
-            raise ValueError(f"arguments: {name}: expected a finite number, got {item}")
-        if isinstance(item, int) and not -(2**63) <= item < 2**63:
-            raise ValueError(f"arguments: {name}: expected a 64-bit integer")
-        if isinstance(item, str) and len(item) > MAX_TEXT:
-            raise ValueError(f"arguments: {name}: expected at most {MAX_TEXT} characters")
-    return value
-
-
 VARIANCE, TIME, U32, U53 = 100.0, 1e12, 2**32 - 1, 2**53
-ARGUMENTS = Field("arguments", "a", _arguments, _same)
+ARGUMENTS = Field("arguments", "a", arguments, same)
 TUBE = whole("tube", "t", 0, BASE)
 SEQUENCE = whole("sequence", "s", 0, U53)
 HOPS = whole("hops", "h", -1, BASE)
@@ -188,6 +97,7 @@ YAW_VAR = number("yaw_var", "yv", 0.0, VARIANCE)
 SYSTEMATIC = number("systematic_var", "sv", 0.0, VARIANCE)
 FLAGS = whole("flags", "f", 0, 0xFFFF, NodeFlag)
 MODE = whole("mode", "m", 0, 7, Mode)
+DIGEST = binary("digest", "d", 32, 32)
 
 FIELDS: dict[type[Any], tuple[Kind, tuple[Field, ...]]] = {
     Aiding: (
@@ -238,6 +148,8 @@ FIELDS: dict[type[Any], tuple[Kind, tuple[Field, ...]]] = {
             FLAGS,
             whole("cycles", "c", 0, U53),
             whole("overruns", "ov", 0, U53),
+            whole("parameters_version", "pv", 0, U32),
+            binary("parameters_hash", "ph", 8, 8),
         ),
     ),
     SurveyMeasurement: (
@@ -247,7 +159,7 @@ FIELDS: dict[type[Any], tuple[Kind, tuple[Field, ...]]] = {
             SEQUENCE,
             number("station_at", "at", -TIME, TIME),
             HOPS,
-            Field("imus", "i", _imus, lambda imus: [_pack_imu(imu) for imu in imus]),
+            Field("imus", "i", imus, lambda rows: [pack_imu(imu) for imu in rows]),
             YAW,
             YAW_VAR,
             SYSTEMATIC,
@@ -270,11 +182,54 @@ FIELDS: dict[type[Any], tuple[Kind, tuple[Field, ...]]] = {
             ARGUMENTS,
         ),
     ),
+    BlockSegment: (
+        Kind.BLOCK_SEGMENT,
+        (
+            TUBE,
+            SEQUENCE,
+            whole("version", "v", 1, U32),
+            DIGEST,
+            whole("count", "n", 1, MAX_SEGMENTS),
+            whole("index", "i", 0, MAX_SEGMENTS - 1),
+            binary("data", "b", 1, SEGMENT_SIZE),
+            binary("tag", "g", 32, 32),
+        ),
+    ),
+    BlockStatus: (
+        Kind.BLOCK_STATUS,
+        (
+            TUBE,
+            SEQUENCE,
+            DIGEST,
+            whole("phase", "p", 0, 4, UploadPhase),
+            whole("received", "r", 0, 2**MAX_SEGMENTS - 1),
+            whole("version", "v", 0, U32),
+            binary("in_use", "u", 32, 32),
+            text("detail", "x"),
+        ),
+    ),
+    StaticRecord: (
+        Kind.STATIC_RECORD,
+        (
+            TUBE,
+            SEQUENCE,
+            whole("command", "c", 0, U53),
+            number("begun_at", "ba", -TIME, TIME),
+            number("ended_at", "ea", -TIME, TIME),
+            whole("samples", "n", 2, U32),
+            vector("rate", "w", 100.0),
+            covariance("rate_cov", "wc"),
+            vector("force", "f", 1e3),
+            covariance("force_cov", "fc"),
+            number("temperature", "tc", -273.15, 1000.0),
+            truth("moved", "m"),
+        ),
+    ),
 }
 TYPE_OF: dict[Kind, tuple[type[Any], tuple[Field, ...]]] = {
     kind: (message, fields) for message, (kind, fields) in FIELDS.items()
 }
-DOWNWARD = (Kind.RECEIPT, Kind.COMMAND)
+DOWNWARD = (Kind.RECEIPT, Kind.COMMAND, Kind.BLOCK_SEGMENT)
 
 
 def encode(message: Message) -> bytes:
@@ -335,7 +290,7 @@ def _unpack(payload: bytes) -> dict[str, Any]:
     if len(payload) > MAX_PAYLOAD:
         raise DecodeError(f"payload: expected at most {MAX_PAYLOAD} bytes, got {len(payload)}")
     try:
-        rows = msgpack.unpackb(payload, max_str_len=MAX_PAYLOAD, max_bin_len=0, max_ext_len=0)
+        rows = msgpack.unpackb(payload, max_str_len=MAX_PAYLOAD, max_bin_len=MAX_BINARY, max_ext_len=0)
     except (ValueError, TypeError, RecursionError, msgpack.UnpackException) as error:
         raise DecodeError(f"payload: not msgpack: {error}") from error
     if not isinstance(rows, dict):

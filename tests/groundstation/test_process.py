@@ -24,6 +24,7 @@ from telemetry.messages import (
     NodeState,
     Severity,
     Side,
+    StaticRecord,
     SurveyMeasurement,
 )
 
@@ -301,3 +302,29 @@ def test_a_change_is_published_on_the_key_it_changes(rig: tuple[Rig, ZenohBus]) 
         ask(bus, f"{GROUND}/status")
     assert seen
     assert seen[-1]["stations"][0]["measurements"] == 3
+
+
+@pytest.mark.parametrize(
+    ("order", "named"),
+    [
+        ("dance?tube=1", "take_survey|static_record|parameters|upload_parameters"),
+        ("static_record?tube=1", "seconds"),
+        ("upload_parameters?tube=9;gyroscope=identity;accelerometer=identity", "version"),
+        ("upload_parameters?tube=1;gyroscope=identity;accelerometer=identity", "key_file"),
+        ("upload_parameters?tube=1;gyroscope=none;accelerometer=identity", "none.json"),
+        ("upload_parameters?tube=1;gyroscope=..%2Fsecret;accelerometer=identity", "name of a file"),
+    ],
+)
+def test_an_order_that_cannot_be_is_refused_by_name(rig: tuple[Rig, ZenohBus], order: str, named: str) -> None:
+    assert named in refused(rig[1], f"borechain/rig-1/cmd/{order}")
+
+
+def test_static_records_are_shown_by_tube(rig: tuple[Rig, ZenohBus]) -> None:
+    it, bus = rig
+    record = StaticRecord(1, 9, 77, 1.0, 21.0, 38, (0.0, 0.0, 0.1), COV, (0.0, 0.0, -9.8), COV, 30.0, False)
+    it.tube.submit(record, it.now)
+    it.run(2.0)
+    (row,) = ask(bus, f"{GROUND}/static_records?tube=1")["static_records"]
+    assert (row["order"], row["samples"], row["moved"], row["temperature_c"]) == (77, 38, False, 30.0)
+    assert ask(bus, f"{GROUND}/static_records?tube=2")["static_records"] == []
+    assert ask(bus, f"{GROUND}/nodes/1")["parameters_version"] == 0

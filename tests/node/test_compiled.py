@@ -8,33 +8,45 @@ from pathlib import Path
 COUNT_COMPILATIONS = """
 from node.kernels.warm import warm_up
 from node.kernels.cycle import run_cycle
+from node.kernels.calibration import calibrate
 from node.kernels.relay import offer_aiding
+from node.kernels.static_average import add_static, has_moved
 warm_up()
-for function in (run_cycle, offer_aiding):
+for function in (run_cycle, offer_aiding, calibrate, add_static, has_moved):
     print(sum(function.stats.cache_misses.values()), sum(function.stats.cache_hits.values()))
 """
 COUNT_ALLOCATIONS = """
 import numpy as np
 from numba import njit
 from numba.core.runtime import _nrt_python, rtsys
+from node.kernels.calibration import calibrate, identity_parameters
 from node.kernels.cycle import run_cycle
 from node.kernels.layout import PERIOD, default_config, new_state
 from node.kernels.relay import offer_aiding
+from node.kernels.static_average import STATIC, add_static, has_moved
 
 _nrt_python.memsys_enable_stats()
 
 @njit
-def drive(state, config, rate, force, cycles):
+def drive(state, config, parameters, average, raw_rate, raw_force, cycles):
+    rate, force = raw_rate.copy(), raw_force.copy()
     for k in range(cycles):
         start = 1000.0 + k * 0.5
+        for i in range(3):
+            rate[i], force[i] = raw_rate[i], raw_force[i]
+        add_static(average, rate, force, 30.0, 1)
+        has_moved(average, 3.0)
+        calibrate(parameters, 30.0, rate, force)
         run_cycle(state, config, rate, force, start, start + 0.5, 1)
         offer_aiding(state, config, 0.1, 1e-6, 1e-6, 0.0, rate[2], start + 0.4, k, 0)
 
 def allocations(cycles):
     config = default_config()
     state = new_state(config)
+    parameters, average = identity_parameters(), np.zeros(1, STATIC)
+    parameters["identity"] = 0
     before = rtsys.get_allocation_stats().alloc
-    drive(state[0], config[0], np.array([0.0, 0.0, 1.2]), np.array([0.0, 0.0, -9.8]), cycles)
+    drive(state[0], config[0], parameters[0], average[0], np.array([0.0, 0.0, 1.2]), np.array([0.0, 0.0, -9.8]), cycles)
     return rtsys.get_allocation_stats().alloc - before
 
 allocations(1)

@@ -10,8 +10,12 @@ from hypothesis import strategies as st
 from telemetry.errors import DecodeError, EncodeError
 from telemetry.messages import (
     BASE,
+    MAX_SEGMENTS,
     MAX_TUBE,
+    SEGMENT_SIZE,
     Aiding,
+    BlockSegment,
+    BlockStatus,
     Command,
     Event,
     Hello,
@@ -22,11 +26,14 @@ from telemetry.messages import (
     Receipt,
     Reply,
     Severity,
+    StaticRecord,
     SurveyMeasurement,
     TimeReply,
     TimeRequest,
+    UploadPhase,
 )
-from telemetry.presentation.codec import FIELDS, decode, encode, peek
+from telemetry.presentation.codec import FIELDS, MAX_PAYLOAD, decode, encode, peek
+from telemetry.transport.hop import ENTRIES_PER_FRAME, MAX_FRAME
 
 TURN = 2.0 * math.pi
 TUBE = st.integers(1, MAX_TUBE)
@@ -37,6 +44,9 @@ YAW = st.floats(0.0, TURN)
 HOPS = st.integers(-1, BASE)
 FLAGS = st.integers(0, 127).map(NodeFlag)
 VECTOR = st.tuples(*[st.floats(-10.0, 10.0)] * 3)
+U32 = st.integers(0, 2**32 - 1)
+HASH = st.binary(min_size=32, max_size=32)
+COV = st.builds(lambda d, c: ((d, c, 0.0), (c, d, 0.0), (0.0, 0.0, d)), st.floats(0.0, 1.0), st.floats(-1.0, 1.0))
 SCALAR = st.none() | st.booleans() | st.integers(-(2**63), 2**63 - 1) | st.floats(allow_nan=False, allow_infinity=False)
 ARGUMENTS = st.dictionaries(st.text(max_size=20), SCALAR | st.text(max_size=50), max_size=8)
 IMU = st.builds(
@@ -65,6 +75,8 @@ MESSAGES: dict[type, st.SearchStrategy[Any]] = {
         flags=FLAGS,
         cycles=SEQUENCE,
         overruns=SEQUENCE,
+        parameters_version=U32,
+        parameters_hash=st.binary(min_size=8, max_size=8),
     ),
     SurveyMeasurement: st.builds(
         SurveyMeasurement,
@@ -83,6 +95,43 @@ MESSAGES: dict[type, st.SearchStrategy[Any]] = {
     Receipt: st.builds(Receipt, TUBE, SEQUENCE),
     Command: st.builds(Command, TUBE, SEQUENCE, st.text(max_size=50), ARGUMENTS),
     Reply: st.builds(Reply, TUBE, SEQUENCE, st.booleans(), st.text(max_size=256)),
+    BlockSegment: st.builds(
+        BlockSegment,
+        TUBE,
+        SEQUENCE,
+        st.integers(1, 2**32 - 1),
+        HASH,
+        st.integers(1, MAX_SEGMENTS),
+        st.integers(0, MAX_SEGMENTS - 1),
+        st.binary(min_size=1, max_size=SEGMENT_SIZE),
+        HASH,
+    ),
+    BlockStatus: st.builds(
+        BlockStatus,
+        TUBE,
+        SEQUENCE,
+        HASH,
+        st.sampled_from(UploadPhase),
+        st.integers(0, 2**MAX_SEGMENTS - 1),
+        U32,
+        HASH,
+        st.text(max_size=256),
+    ),
+    StaticRecord: st.builds(
+        StaticRecord,
+        tube=TUBE,
+        sequence=SEQUENCE,
+        command=SEQUENCE,
+        begun_at=TIME,
+        ended_at=TIME,
+        samples=st.integers(2, 10000),
+        rate=VECTOR,
+        rate_cov=COV,
+        force=VECTOR,
+        force_cov=COV,
+        temperature=st.floats(-40.0, 150.0),
+        moved=st.booleans(),
+    ),
     Event: st.builds(Event, TUBE, SEQUENCE, TIME, st.sampled_from(Severity), st.text(max_size=50), ARGUMENTS),
 }
 ANY = st.one_of(*MESSAGES.values())
@@ -103,7 +152,7 @@ def test_decoding_gives_back_what_was_encoded(message: Any) -> None:
 @given(ANY)
 def test_the_envelope_tells_the_route_without_the_body(message: Any) -> None:
     envelope = peek(encode(message))
-    if isinstance(message, Receipt | Command):
+    if isinstance(message, Receipt | Command | BlockSegment):
         assert envelope.target == message.tube
     else:
         assert envelope.target == BASE
@@ -130,6 +179,8 @@ WRONG = st.one_of(
     st.just(1e300),
     st.just(2**63),
     st.just("text"),
+    st.just(b"bytes"),
+    st.just(b"x" * 200),
     st.just([]),
     st.just([math.nan] * 3),
     st.just({"a": {"b": 1}}),
@@ -167,8 +218,18 @@ def test_a_wrong_envelope_is_refused(change: dict[str, Any]) -> None:
         Aiding(7.0, 1.0, 0.0, 0.0, 0.0, 0.0, 1, 0),
         Receipt(BASE + 1, 1),
         Command(1, 1, "x" * 300),
+        BlockSegment(1, 1, 0, bytes(32), 1, 0, b"x", bytes(32)),
+        BlockSegment(1, 1, 1, bytes(31), 1, 0, b"x", bytes(32)),
+        BlockSegment(1, 1, 1, bytes(32), 1, 0, b"x" * (SEGMENT_SIZE + 1), bytes(32)),
+        BlockStatus(1, 1, bytes(32), UploadPhase.PARTIAL, 1 << MAX_SEGMENTS, 0, bytes(32), ""),
     ],
 )
 def test_a_message_out_of_range_is_not_sent(message: Any) -> None:
     with pytest.raises(EncodeError):
         encode(message)
+
+
+def test_eight_segments_fit_one_frame_and_each_one_payload() -> None:
+    worst = BlockSegment(250, 2**53, 2**32 - 1, bytes(32), 32, 31, b"x" * SEGMENT_SIZE, bytes(32))
+    assert len(encode(worst)) <= MAX_PAYLOAD
+    assert ENTRIES_PER_FRAME * (len(encode(worst)) + 16) + 128 <= 4096 <= MAX_FRAME

@@ -1,0 +1,1 @@
+"""Calibration mathematics, its records and its result; knows no service."""

@@ -1,0 +1,78 @@
+"""What a design of tilts, tool faces and temperatures can tell: the errors it leaves, over the whole sphere.
+
+Judged by its leverage, the largest error of size (in references) or angle (rad) anywhere on the sphere and in the
+record's temperatures, in errors of one reading: 0.3 for every attitude at every temperature, 1 to 2.5 where tool-face
+order or heating direction varies between tilts, 10 to 16 for a single heating ramp, above 1000 where a coefficient is
+open.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+import numpy.typing as npt
+
+from groundstation.calibration.errors import CalibrationError
+from groundstation.calibration.mwd_cost import Geometry, Problem, layout
+from groundstation.calibration.mwd_model import volts_of
+from groundstation.calibration.mwd_record import Record
+
+Array = npt.NDArray[np.float64]
+POOR_LEVERAGE = 6.0
+OPEN_LEVERAGE = 200.0
+RANK = 1e-11  # of the largest eigenvalue of the normal matrix with unit columns
+GRID_DEG = 30.0
+LEVELS = 5  # of temperature
+
+
+def covariance(problem: Problem, x: Array, free: Array) -> Array | None:
+    """(k, k) covariance of the parameters for residuals of variance 1; None where one of them is open."""
+    normal = free.T @ problem.terms(x).normal @ free
+    unit = np.sqrt(np.diag(normal))
+    if not np.all(unit > 0.0):
+        return None
+    values, axes = np.linalg.eigh(normal / np.outer(unit, unit))
+    if values[0] < RANK * values[-1]:
+        return None
+    scaled = free @ (axes / unit[:, None])
+    return np.asarray(scaled @ (scaled / values).T)
+
+
+def refuse_open(record: Record, problem: Problem, free: Array) -> None:
+    """Refuse a design that leaves a coefficient open, before anything is solved.
+
+    Raises
+    ------
+    CalibrationError
+        With what the design has.
+    """
+    x = np.zeros(len(free))
+    cov = covariance(problem, x, free)
+    if cov is None or max(predict(record, x, cov)) > OPEN_LEVERAGE:
+        angles = len(np.unique(np.round(np.degrees(record.angle))))
+        raise CalibrationError(
+            f"the design cannot tell its {len(x)} coefficients apart ({angles} reference angles, temperatures over "
+            f"{np.ptp(record.temperature):.1f} C): it needs more tilts, at least three tool faces at each, and for 30 "
+            "coefficients at least four temperatures"
+        )
+
+
+def predict(record: Record, x: Array, cov: Array) -> tuple[float, float]:
+    """Largest standard deviations of size (in references) and angle (rad) that the parameters' covariance leaves."""
+    steps = np.arange(0.0, 360.0, GRID_DEG)
+    polar, around = np.meshgrid(np.radians(steps[steps <= 180.0]), np.radians(steps))
+    sphere = np.stack([np.sin(polar) * np.cos(around), np.sin(polar) * np.sin(around), np.cos(polar)], axis=-1)
+    vector = np.tile(sphere.reshape(-1, 3), (LEVELS, 1))
+    levels = np.linspace(record.temperature.min(), record.temperature.max(), LEVELS)
+    temperature = np.repeat(levels, polar.size)
+    volts = volts_of(record.triad(x), vector * record.unit, temperature)
+    # the angle counts from the tool's axis for the magnetometers too: it stands for any direction
+    axis, size = np.tile([0.0, 0.0, 1.0], (len(vector), 1)), np.full(len(vector), record.unit)
+    angle = np.tile(polar.ravel(), LEVELS)
+    there = Record(volts, temperature, size, axis, angle, record.axes, record.volts_per_unit).problem(len(x))
+    local = there.local(x)
+    at = Geometry.of(local.vector, axis)
+    index, power = layout(there.powers)
+    rows = np.stack([at.radial, at.tangent / at.size[:, None]], axis=1) @ local.jacobian()
+    rows = rows[:, :, index] * there.theta[:, None, None] ** power
+    std = np.sqrt(np.maximum(np.einsum("nik,kl,nil->ni", rows, cov, rows), 0.0))
+    return float(std[:, 0].max()), float(std[:, 1].max())

@@ -1,0 +1,185 @@
+"""Calibration of the MWD tool: 12 parameters a triad at one temperature, 30 over a range of temperatures.
+
+Start: the nominal tool. Parameters: SF = nominal (1 + s) and B in units of the reference, polynomials in
+theta = (T - 30 C)/50 C; the result is in volts and units again.
+Accelerometers: tilt and |G| do not see a turn about the tool's axis, so one parameter is held by m_AB = m_BA; with a
+tool-face reference the solution is afterwards turned onto it, which changes neither tilt nor |G|. Standard errors of
+the misalignments hold the roll as known. Magnetometers have the vertical of the accelerometers as reference and need
+no such hold, so both triads end in one frame.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+import numpy.typing as npt
+
+from groundstation.calibration.errors import CalibrationError
+from groundstation.calibration.mwd_cost import Problem
+from groundstation.calibration.mwd_design import POOR_LEVERAGE, covariance, predict, refuse_open
+from groundstation.calibration.mwd_model import LOCAL, Triad, names, tool_face, turned, vectors
+from groundstation.calibration.mwd_newton import hold, minimise
+from groundstation.calibration.mwd_record import (
+    ACCELEROMETER_VOLTS_PER_G,
+    MAGNETOMETER_VOLTS_PER_MICROTESLA,
+    Record,
+    accelerometer_record,
+    check,
+    magnetometer_record,
+)
+
+Array = npt.NDArray[np.float64]
+ONE_TEMPERATURE = 3.0  # C, span beyond which 12 parameters are too few
+OUTLIER, OUTLIER_FLOOR = 15.0, 2e-3  # median residuals; of the reference or rad
+
+
+@dataclass(frozen=True, slots=True)
+class Errors:
+    """Errors over the readings of a record: of the size (unit) and of the tilt or dip (rad)."""
+
+    size_max: float
+    size_rms: float
+    angle_max: float
+    angle_rms: float
+
+
+@dataclass(frozen=True, slots=True)
+class MwdFit:
+    """A calibrated triad and what it rests on.
+
+    ``cost`` is E in units of the reference; ``standard_errors`` by name, in the units of the coefficients;
+    ``predicted_size_std`` (unit) and ``predicted_angle_std`` (rad) are the largest over the sphere and the record's
+    temperatures; ``temperatures`` (C) the range outside which the polynomials extrapolate.
+    """
+
+    triad: Triad
+    parameters: int
+    iterations: int
+    cost: float
+    coefficients: dict[str, float]
+    standard_errors: dict[str, float]
+    before: Errors
+    after: Errors
+    predicted_size_std: float
+    predicted_angle_std: float
+    temperatures: tuple[float, float]
+    warnings: tuple[str, ...]
+
+
+def solve_accelerometers(
+    volts: Array,
+    temperature: Array,
+    tilt: Array,
+    parameters: int = 30,
+    *,
+    tool_face_reference: Array | None = None,
+    volts_per_g: float = ACCELEROMETER_VOLTS_PER_G,
+) -> MwdFit:
+    """Coefficients of the accelerometers from voltages (n, 3), temperatures (n,) C and the jig's tilts (n,) rad.
+
+    Raises
+    ------
+    CalibrationError
+        When a reading cannot be, the design leaves a parameter open, or the search does not end.
+    """
+    fit = solve(accelerometer_record(volts, temperature, tilt, volts_per_g), parameters)
+    if tool_face_reference is None:
+        return fit
+    if tool_face_reference.shape != tilt.shape or not np.all(np.isfinite(tool_face_reference)):
+        raise CalibrationError(f"expected a finite tool-face reference for each of the {len(tilt)} readings")
+    wrong = tool_face(vectors(fit.triad, volts, temperature)) - tool_face_reference
+    roll = float(np.angle(np.sum(np.sin(tilt) ** 2 * np.exp(1j * wrong))))
+    triad = turned(fit.triad, roll)
+    return replace(fit, triad=triad, coefficients=_named(triad, parameters))
+
+
+def solve_magnetometers(
+    volts: Array,
+    temperature: Array,
+    gravity: Array,
+    size: Array | float,
+    dip: Array | float,
+    parameters: int = 30,
+    *,
+    volts_per_microtesla: float = MAGNETOMETER_VOLTS_PER_MICROTESLA,
+) -> MwdFit:
+    """Coefficients of the magnetometers from voltages (n, 3), temperatures (n,) C and calibrated gravity (n, 3).
+
+    ``size`` (microtesla) and ``dip`` (rad) are the site's field, constant or at each reading.
+
+    Raises
+    ------
+    CalibrationError
+        As ``solve_accelerometers``.
+    """
+    return solve(magnetometer_record(volts, temperature, gravity, size, dip, volts_per_microtesla), parameters)
+
+
+def solve(record: Record, parameters: int) -> MwdFit:
+    """Minimise the cost of a record and judge the result."""
+    check(record, parameters)
+    problem, free = record.problem(parameters), hold(parameters, record.axes)
+    refuse_open(record, problem, free)
+    x, iterations = minimise(problem, free)
+    _refuse_outlier(problem, x)
+    cost, unit_cov = problem.value(x), covariance(problem, x, free)
+    if unit_cov is None:
+        raise CalibrationError("the solution leaves a coefficient open though the design should not")
+    noise = float(np.sqrt(cost / (2 * len(record.volts) + int(problem.on_axis().sum()) - free.shape[1])))
+    size_leverage, angle_leverage = predict(record, x, unit_cov)
+    triad = record.triad(x)
+    return MwdFit(
+        triad,
+        parameters,
+        iterations,
+        cost,
+        _named(triad, parameters),
+        _named(record.triad(noise * np.sqrt(np.diag(unit_cov)), base=0.0), parameters),
+        _errors(problem, np.zeros_like(x), record.unit),
+        _errors(problem, x, record.unit),
+        noise * size_leverage * record.unit,
+        noise * angle_leverage,
+        (float(record.temperature.min()), float(record.temperature.max())),
+        tuple(_warnings(record, parameters, max(size_leverage, angle_leverage))),
+    )
+
+
+def _refuse_outlier(problem: Problem, x: Array) -> None:
+    """Name the reading that moved or was misread; systematic errors of a design are no outliers."""
+    found = []
+    for what, error in zip(("size", "angle"), np.abs(problem.errors(x)), strict=True):
+        limit = max(OUTLIER * float(np.median(error)), OUTLIER_FLOOR)
+        worst = int(np.argmax(error))
+        found.append((float(error[worst]) / limit, worst, what, float(error[worst]), limit))
+    excess, worst, what, size, limit = max(found)  # a wrong reading bends its neighbours: the worst of all is to blame
+    if excess > 1.0:
+        raise CalibrationError(
+            f"reading {worst + 1}: its {what} is off by {size:.2g} (limit {limit:.2g}) "
+            "from what the others say; it moved, was misread or has another attitude"
+        )
+
+
+def _errors(problem: Problem, x: Array, unit: float) -> Errors:
+    e_g, e_t = problem.errors(x)
+    size, angle = unit * np.abs(e_g), np.abs(e_t)
+    rms = [float(np.sqrt(np.mean(e**2))) for e in (size, angle)]
+    return Errors(float(size.max()), rms[0], float(angle.max()), rms[1])
+
+
+def _named(triad: Triad, parameters: int) -> dict[str, float]:
+    every = triad.coefficients()
+    return {name: every[name] for name in names(triad.axes, parameters)}
+
+
+def _warnings(record: Record, parameters: int, leverage: float) -> list[str]:
+    found = []
+    span = float(np.ptp(record.temperature))
+    if parameters == LOCAL and span > ONE_TEMPERATURE:
+        found.append(f"12 parameters hold at one temperature, the record spans {span:.1f} C")
+    if leverage > POOR_LEVERAGE:
+        found.append(
+            f"poor design: errors of {leverage:.1f} times a reading's are to be expected; "
+            "vary the order of tool faces or the direction of heating between tilts, and spread the tilts"
+        )
+    return found

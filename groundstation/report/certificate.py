@@ -1,0 +1,82 @@
+"""Calibration certificates as PDF: the same sheet and date give the same bytes, wherever they are made."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Sequence
+from dataclasses import dataclass
+from datetime import UTC, date, datetime
+from pathlib import Path
+from typing import Any, Literal
+
+import typst
+
+from groundstation.errors import GroundError
+from groundstation.report.figures import Panel, render
+from groundstation.report.sheet import Sheet
+
+TEMPLATE = Path(__file__).with_name("certificate.typ")
+
+
+class CertificateError(GroundError, RuntimeError):
+    """The certificate could not be set; nothing was written."""
+
+
+@dataclass(frozen=True, slots=True)
+class Identity:
+    """What was calibrated and from what: words, the day, the record with its hash, the block's hash, the software."""
+
+    subject: str
+    day: date
+    record: str
+    record_sha256: str
+    block_sha256: str | None
+    software: str
+
+
+def source(sheet: Sheet, panels: Sequence[Panel], identity: Identity) -> str:
+    """Everything the template sets, as JSON; figures as SVG text."""
+    return json.dumps(
+        {
+            "title": sheet.title,
+            "subject": identity.subject,
+            "day": identity.day.isoformat(),
+            "record": identity.record,
+            "record_sha256": identity.record_sha256,
+            "block_sha256": identity.block_sha256,
+            "software": identity.software,
+            "facts": [list(fact) for fact in sheet.facts],
+            "warnings": list(sheet.warnings),
+            "tables": [
+                {"title": t.title, "columns": list(t.columns), "rows": [list(row) for row in t.rows]}
+                for t in sheet.tables
+            ],
+            "figures": [{"caption": p.caption, "svg": render([p], "svg").decode()} for p in panels],
+        }
+    )
+
+
+def typeset(data: str, day: date) -> bytes:
+    """PDF of the JSON of ``source``; ``day`` is the document's date."""
+    return _compiled(data, day, "pdf")[0]
+
+
+def pages(data: str, day: date, ppi: float = 110.0) -> list[bytes]:
+    """The pages as PNG."""
+    return _compiled(data, day, "png", ppi)
+
+
+def certificate(sheet: Sheet, panels: Sequence[Panel], identity: Identity) -> bytes:
+    """PDF of a sheet and its figures."""
+    return typeset(source(sheet, panels, identity), identity.day)
+
+
+def _compiled(data: str, day: date, form: Literal["pdf", "png"], ppi: float | None = None) -> list[bytes]:
+    stamp = datetime(day.year, day.month, day.day, tzinfo=UTC)
+    try:
+        made: Any = typst.compile(
+            TEMPLATE, format=form, ppi=ppi, sys_inputs={"data": data}, ignore_system_fonts=True, timestamp=stamp
+        )
+    except typst.TypstError as error:
+        raise CertificateError(f"certificate: {error.message}") from error
+    return made if isinstance(made, list) else [made]

@@ -1,0 +1,95 @@
+"""Correction of raw readings by the parameters of a node, in the cycle, before anything else sees them."""
+
+from __future__ import annotations
+
+import math
+from typing import Any, Final
+
+import numpy as np
+
+from node.kernels.jit import kernel
+from node.kernels.layout import Array
+
+TERMS: Final = 4  # of a polynomial in T - T_ref, the constant included
+COLDEST: Final = -20.0  # C; beyond the polynomials are not followed
+HOTTEST: Final = 85.0
+USUAL: Final = 25.0  # C, of a reading that carries no temperature
+
+SENSOR: Final = [
+    ("matrix", "f8", (TERMS, 3, 3)),  # 1, 1/K, 1/K^2, 1/K^3
+    ("bias", "f8", (TERMS, 3)),  # rad/s or m/s^2, the same per K, K^2, K^3
+    ("reference", "f8"),  # C
+    ("m", "f8", (3, 3)),  # work space
+]
+PARAMETERS: Final = np.dtype(
+    [("identity", "i8"), ("gyroscope", np.dtype(SENSOR, align=True)), ("accelerometer", np.dtype(SENSOR, align=True))],
+    align=True,
+)
+
+
+def identity_parameters() -> Array:
+    """Parameters of a node before any upload, one record of dtype ``PARAMETERS``: readings stay as they are."""
+    made = np.zeros(1, PARAMETERS)
+    made["identity"] = 1
+    for sensor in ("gyroscope", "accelerometer"):
+        made[0][sensor]["matrix"][0] = np.eye(3)
+        made[0][sensor]["reference"] = USUAL
+    return made
+
+
+@kernel
+def polynomial(c0: float, c1: float, c2: float, c3: float, x: float) -> float:
+    """c0 + c1 x + c2 x^2 + c3 x^3, by Horner's scheme."""
+    return ((c3 * x + c2) * x + c1) * x + c0
+
+
+@kernel
+def correct(sensor: Any, temperature: float, reading: Array) -> None:
+    """Replace a raw ``reading`` (3) by w = M(T)^-1 (G - b(T)), solved by Cramer's rule.
+
+    Parameters
+    ----------
+    sensor : record of one sensor of ``PARAMETERS``
+    temperature : C, within COLDEST..HOTTEST
+    reading : (3,) rad/s or m/s^2, in place
+
+    Source: thesis eq. 3.1 and Table III.2 (model), docs/decisions/0009-parameter-blocks.md (temperature).
+    """
+    m, c, b = sensor.m, sensor.matrix, sensor.bias
+    x = temperature - sensor.reference
+    for i in range(3):
+        reading[i] -= polynomial(b[0, i], b[1, i], b[2, i], b[3, i], x)
+        for j in range(3):
+            m[i, j] = polynomial(c[0, i, j], c[1, i, j], c[2, i, j], c[3, i, j], x)
+    a0 = m[1, 1] * m[2, 2] - m[1, 2] * m[2, 1]
+    a1 = m[1, 2] * m[2, 0] - m[1, 0] * m[2, 2]
+    a2 = m[1, 0] * m[2, 1] - m[1, 1] * m[2, 0]
+    scale = 1.0 / (m[0, 0] * a0 + m[0, 1] * a1 + m[0, 2] * a2)
+    g0, g1, g2 = reading[0], reading[1], reading[2]
+    reading[0] = scale * (
+        a0 * g0 + (m[0, 2] * m[2, 1] - m[0, 1] * m[2, 2]) * g1 + (m[0, 1] * m[1, 2] - m[0, 2] * m[1, 1]) * g2
+    )
+    reading[1] = scale * (
+        a1 * g0 + (m[0, 0] * m[2, 2] - m[0, 2] * m[2, 0]) * g1 + (m[0, 2] * m[1, 0] - m[0, 0] * m[1, 2]) * g2
+    )
+    reading[2] = scale * (
+        a2 * g0 + (m[0, 1] * m[2, 0] - m[0, 0] * m[2, 1]) * g1 + (m[0, 0] * m[1, 1] - m[0, 1] * m[1, 0]) * g2
+    )
+
+
+@kernel
+def calibrate(parameters: Any, temperature: float, rate: Array, force: Array) -> None:
+    """Correct one cycle's raw ``rate`` (3, rad/s) and ``force`` (3, m/s^2) in place; the identity touches no bit.
+
+    Parameters
+    ----------
+    parameters : record of dtype ``PARAMETERS``
+    temperature : C; what is no number counts as ``USUAL``
+    """
+    if parameters.identity == 1:
+        return
+    if not math.isfinite(temperature):
+        temperature = USUAL
+    temperature = min(max(temperature, COLDEST), HOTTEST)
+    correct(parameters.gyroscope, temperature, rate)
+    correct(parameters.accelerometer, temperature, force)

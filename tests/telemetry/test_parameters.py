@@ -1,0 +1,64 @@
+"""The canonical bytes of a parameter block."""
+
+import hashlib
+import math
+import struct
+from dataclasses import replace
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from telemetry.errors import DecodeError
+from telemetry.parameters import BLOCK_SIZE, HEAD, UNIT, ParameterBlock, SensorParameters, unpack_block
+
+NUMBER = st.floats(allow_nan=False, allow_infinity=False)
+VECTOR = st.tuples(NUMBER, NUMBER, NUMBER)
+MATRIX = st.tuples(VECTOR, VECTOR, VECTOR)
+SENSOR = st.builds(SensorParameters, MATRIX, VECTOR, st.tuples(MATRIX, MATRIX, MATRIX), MATRIX, NUMBER)
+BLOCK = st.builds(ParameterBlock, st.integers(1, 250), st.integers(0, 2**32 - 1), SENSOR, SENSOR)
+
+
+@given(BLOCK)
+def test_a_block_is_its_bytes(block: ParameterBlock) -> None:
+    data = block.canonical()
+    assert len(data) == BLOCK_SIZE
+    assert unpack_block(data) == block
+    assert unpack_block(data).canonical() == data
+    assert block.sha256() == hashlib.sha256(data).digest()
+
+
+def test_every_number_is_in_the_hash() -> None:
+    plain = ParameterBlock(1, 1)
+    seen = {plain.sha256()}
+    count = len(list(plain.gyroscope.numbers()))
+    assert count == 49
+    for k in range(2 * count):
+        data = bytearray(plain.canonical())
+        struct.pack_into("<d", data, HEAD.size + 8 * k, 0.5)
+        seen.add(unpack_block(bytes(data)).sha256())
+    seen |= {ParameterBlock(2, 1).sha256(), ParameterBlock(1, 2).sha256()}
+    assert len(seen) == 2 * count + 3
+
+
+def test_a_negative_zero_is_a_zero() -> None:
+    turned = ParameterBlock(1, 1, SensorParameters(bias=(-0.0, 0.0, -0.0)))
+    assert turned.sha256() == ParameterBlock(1, 1).sha256()
+
+
+def test_rows_are_sensor_axes() -> None:
+    sensor = SensorParameters(matrix=((1.0, 0.1, 0.2), UNIT[1], UNIT[2]))
+    assert list(sensor.numbers())[:3] == [1.0, 0.1, 0.2]
+
+
+@given(st.binary(max_size=2 * BLOCK_SIZE))
+def test_random_bytes_are_no_block(data: bytes) -> None:
+    with pytest.raises(DecodeError):
+        unpack_block(data)
+
+
+@pytest.mark.parametrize("wrong", [math.nan, math.inf, -math.inf])
+def test_a_number_that_is_none_is_refused(wrong: float) -> None:
+    block = replace(ParameterBlock(1, 1), accelerometer=SensorParameters(reference=wrong))
+    with pytest.raises(DecodeError, match="finite"):
+        unpack_block(block.canonical())
