@@ -18,7 +18,7 @@ from borechain import __version__
 from borechain.faults import EnvironmentFault, InputFault
 
 if TYPE_CHECKING:
-    from groundstation.report.figures import Panel
+    from groundstation.report.panels import Panel
     from groundstation.report.sheet import Sheet
 
 PLOT_FORMATS = (".svg", ".png", ".pdf")
@@ -130,7 +130,7 @@ def drawn(outcome: Outcome, wanted: Wanted) -> dict[Path, bytes]:
     """Plot and certificate."""
     try:
         from groundstation.report.certificate import Identity, certificate
-        from groundstation.report.figures import render
+        from groundstation.report.panels import render
     except ImportError as error:
         raise EnvironmentFault(f"{error.name} is missing: plots and certificates need borechain[ground]") from error
     panels, files = outcome.panels(), {}

@@ -21,7 +21,9 @@ from groundstation.calibration.mwd_model import ACCELEROMETER_AXES, Triad, tempe
 from groundstation.calibration.mwd_solve import MwdFit
 from groundstation.calibration.quality import QualityReport
 from groundstation.report.calibration_sheets import AttitudeErrors, TriadErrors
-from groundstation.report.figures import AFTER, BEFORE, COLOURS, LIMIT, MARKERS, QUIET, Panel, row_of
+from groundstation.report.panels import AFTER, BEFORE, COLOURS, LIMIT, Panel, row_of
+from groundstation.report.style import GREY as QUIET
+from groundstation.report.style import MARKERS
 
 Array = npt.NDArray[np.float64]
 FEW = 24  # places that still have room for their names

@@ -12,7 +12,7 @@ from typing import Any, Literal
 import typst
 
 from groundstation.errors import GroundError
-from groundstation.report.figures import Panel, render
+from groundstation.report.panels import Panel, render
 from groundstation.report.sheet import Sheet
 
 TEMPLATE = Path(__file__).with_name("certificate.typ")

@@ -4,7 +4,7 @@ import json
 from datetime import date
 
 from groundstation.report.certificate import Identity, certificate, pages, source, typeset
-from groundstation.report.figures import Panel
+from groundstation.report.panels import Panel
 from groundstation.report.sheet import Sheet, Table, column, number
 
 RECORD, BLOCK = "ab" * 32, "cd" * 32

@@ -1,4 +1,4 @@
-"""Figures without a display: the same numbers give the same bytes. Text is drawn as paths, so no font is needed."""
+"""Figures of several panels, for reports: in the style of all figures, as bytes."""
 
 from __future__ import annotations
 
@@ -12,47 +12,12 @@ from matplotlib.axes import Axes
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure, SubFigure
 
+from groundstation.report.style import GREY, METADATA, SERIES, STYLE, WRONG
+
 WIDTH = 6.7  # in, the text width of an A4 page
-FORMATS = ("svg", "png", "pdf")
-INK, QUIET, GRID = "#1c2733", "#5d6b79", "#d9dee3"
-COLOURS = ("#0b6e99", "#c4501b", "#4a7c2c")  # of the three axes; apart in lightness too
-MARKERS = ("o", "s", "^")
-BEFORE, AFTER, LIMIT = "#9aa5b1", "#0b6e99", "#b3261e"
-STYLE: Any = {
-    "svg.fonttype": "path",
-    "svg.hashsalt": "borechain",
-    "font.family": "DejaVu Sans",
-    "font.size": 8.0,
-    "axes.titlesize": 8.5,
-    "axes.titlelocation": "left",
-    "axes.titleweight": "bold",
-    "axes.titlepad": 5.0,
-    "axes.labelsize": 8.0,
-    "axes.edgecolor": QUIET,
-    "axes.labelcolor": INK,
-    "axes.linewidth": 0.7,
-    "axes.grid": True,
-    "axes.axisbelow": True,
-    "axes.spines.top": False,
-    "axes.spines.right": False,
-    "grid.color": GRID,
-    "grid.linewidth": 0.5,
-    "xtick.color": QUIET,
-    "ytick.color": QUIET,
-    "xtick.labelcolor": INK,
-    "ytick.labelcolor": INK,
-    "text.color": INK,
-    "lines.linewidth": 1.2,
-    "lines.markersize": 4.0,
-    "legend.frameon": False,
-    "legend.fontsize": 7.5,
-    "savefig.facecolor": "white",
-}
-METADATA: dict[str, dict[str, Any]] = {
-    "svg": {"Date": None, "Creator": None},
-    "pdf": {"CreationDate": None, "Creator": None, "Producer": None},
-    "png": {"Software": None},
-}
+FORMATS = tuple(suffix.removeprefix(".") for suffix in METADATA)
+COLOURS = SERIES[:3]  # of the three axes
+BEFORE, AFTER, LIMIT = GREY, SERIES[0], WRONG
 
 
 @dataclass(frozen=True, slots=True)
@@ -75,7 +40,7 @@ def render(panels: Sequence[Panel], suffix: str) -> bytes:
                 part.suptitle(panel.caption, x=0.01, ha="left", fontsize=9.5, fontweight="bold")
             panel.draw(part)
         buffer = io.BytesIO()
-        figure.savefig(buffer, format=suffix, dpi=150, metadata=METADATA[suffix])
+        figure.savefig(buffer, format=suffix, dpi=150, metadata=METADATA[f".{suffix}"])
     return buffer.getvalue()
 
 
