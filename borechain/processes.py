@@ -84,8 +84,13 @@ def run_ground(place: Place, settings: dict[str, Any]) -> None:
             serve(process, client)
 
 
-def run_medium(place: Place, scenario: Path, seed: int, speed: float, faults: tuple[str, ...], router: bool) -> None:
-    """World, joints and clock; in a rig without an outside router its session is the router."""
+def run_medium(
+    place: Place, scenario: Path, seed: int, speed: float, faults: tuple[str, ...], router: bool, cued: bool = False
+) -> None:
+    """World, joints and clock; in a rig without an outside router its session is the router.
+
+    ``cued`` says that somebody plays the operator.
+    """
     from sim.bench import Bench
     from sim.medium import Medium, Progress
     from sim.scenario import load_scenario
@@ -102,7 +107,7 @@ def run_medium(place: Place, scenario: Path, seed: int, speed: float, faults: tu
             def tell(progress: Progress) -> None:
                 wanted.put(pack_progress(progress))
 
-            medium = Medium(world, bench, tell, speed)
+            medium = Medium(world, bench, tell, speed, cued=cued)
             on_termination(medium.stop)
             if medium.run():
                 medium.linger()
@@ -124,7 +129,7 @@ def pack_progress(progress: object) -> bytes:
     if not isinstance(progress, Progress):
         raise TypeError(f"expected Progress, got {type(progress).__name__}")
     p = progress
-    return bytes(msgpack.packb([p.phase, p.rig_time, p.begin, p.end, p.wanted, p.kill, p.finished]))
+    return bytes(msgpack.packb([p.phase, p.rig_time, p.begin, p.end, p.wanted, p.kill, p.finished, p.cue]))
 
 
 def begin_process(name: str) -> None:

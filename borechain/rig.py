@@ -70,7 +70,8 @@ def rig(
     started = time.monotonic()
     try:
         with progress(world, quiet=as_json) as show:
-            answers = Launcher(table, rig_name, endpoint, show).run(lambda bus: ask(bus, rig_name))
+            launcher = Launcher(table, rig_name, endpoint, show, operator_of(world, rig_name))
+            answers = launcher.run(lambda bus: ask(bus, rig_name))
     except KeyboardInterrupt:
         raise EnvironmentFault(f"interrupted; every process was ended, what was stored is in {folder}") from None
     result = result_of(answers, world)
@@ -105,13 +106,22 @@ def process_table(
         return Place(rig_name, endpoint, private_folder(folder, name), key_file)
 
     specs = {
-        "medium": Spec(run_medium, (place("medium"), scenario, seed, speed, faults, True)),
+        "medium": Spec(run_medium, (place("medium"), scenario, seed, speed, faults, True, True)),
         "encoder": Spec(run_encoder, (place("encoder"),)),
         "base": Spec(run_ground, (place("ground"), ground_settings(world))),
     }
     for tube in range(1, world.scenario.tubes + 1):
         specs[str(tube)] = Spec(run_node, (place(f"tube-{tube}"), world.tube_settings(tube)))
     return ProcessTable(specs, PRELOAD)
+
+
+def operator_of(world: World, rig_name: str) -> Callable[[ZenohBus, str], bool]:
+    """Who steps the calibration in the field, where the scenario has one."""
+    from sim.operator import Operator
+
+    if world.rack is None:
+        return lambda _bus, _cue: True
+    return Operator(world.rack, world.scenario.tubes, rig_name).act
 
 
 def ground_settings(world: World) -> dict[str, Any]:
@@ -134,7 +144,7 @@ def ask(bus: ZenohBus, rig_name: str) -> dict[str, Any]:
     """Stations, trajectory and measurements as any operator would get them."""
     return {
         path: get_json(bus, f"borechain/{rig_name}/ground/{path}")
-        for path in ("stations", "measurements", "column", "alarms")
+        for path in ("stations", "measurements", "column", "alarms", "recalibration")
     }
 
 
@@ -150,11 +160,12 @@ def get_json(bus: ZenohBus, selector: str) -> Any:
 
 def result_of(answers: dict[str, Any], world: World) -> dict[str, Any]:
     """The JSON object of the command."""
+    from sim.calibration_report import calibration
     from sim.report import digest, figures, station_table
 
     stations = station_table(answers["stations"]["stations"], world)
     measurements = answers["measurements"]["measurements"]
-    return {
+    result: dict[str, Any] = {
         "stations": stations,
         "figures": figures(stations, measurements, world),
         "measurements": len(measurements),
@@ -163,6 +174,9 @@ def result_of(answers: dict[str, Any], world: World) -> dict[str, Any]:
         "rig_s": round(world.end - world.begin, 3),
         "digest": digest(stations),
     }
+    if world.rack is not None:
+        result["calibration"] = calibration(answers["recalibration"], measurements, world)
+    return result
 
 
 class progress:  # noqa: N801
@@ -216,6 +230,8 @@ def show_result(result: dict[str, Any], folder: Path) -> None:
         shown = " ".join("-" if v is None else f"{v:.4f}" for v in values)
         console.print(f"{name:22} {shown}")
     show_column(result)
+    if "calibration" in result:
+        show_calibration(result["calibration"])
     console.print(
         f"{len(result['stations'])} stations, {result['measurements']} measurements, {result['processes']} processes, "
         f"{result['rig_s']:.0f} s of rig time in {result['wall_s']:.1f} s"
@@ -234,3 +250,13 @@ def show_column(result: dict[str, Any]) -> None:
             )
     for alarm in result["alarms"]:
         click.echo(f"alarm  {alarm['kind']:15} {alarm['level_percent']} % of the tolerance at {alarm['md_m']:.1f} m")
+
+
+def show_calibration(calibration: dict[str, Any]) -> None:
+    """What the calibration in the field was good for, and the block of each tube."""
+    errors = calibration["inclination_rms_deg"]
+    shown = ", ".join(f"{name} {'-' if value is None else f'{value:.4f}'}" for name, value in errors.items())
+    click.echo(f"calibration, inclination_rms_deg: {shown}")
+    for t in calibration["tubes"]:
+        cut = f", after its power cut {t['hash_after_restart'][:8]}" if t["restarted"] else ""
+        click.echo(f"tube {t['tube']:<3} block {t['hash_before'][:8]} -> {t['hash'][:8]} version {t['version']}{cut}")

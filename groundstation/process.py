@@ -13,13 +13,15 @@ from concurrent.futures import TimeoutError as FutureTimeoutError
 
 from groundstation.calibration.errors import CalibrationError
 from groundstation.config import GroundConfig
-from groundstation.errors import ConfigurationError, SelectorError
+from groundstation.errors import ConfigurationError, SelectorError, StoreError
 from groundstation.service.core import Knowledge
 from groundstation.service.orders import parse, reply_view, status_view
 from groundstation.service.parameters import block_of_files
 from groundstation.service.queries import Queries, pack
+from groundstation.service.recalibration import COMMAND, Recalibration
 from groundstation.service.store import Store
 from groundstation.service.uploads import Uploads
+from groundstation.service.views import FIXED
 from telemetry import keys
 from telemetry.application.driven import Driven
 from telemetry.application.station import Station
@@ -43,6 +45,7 @@ from telemetry.transport.authentication import read_key
 
 COMMAND_TIMEOUT = 30.0  # wall s
 BOOT_SHIFT = 20
+NO_KEY = "key_file: expected the key file of the rig, without it no node takes a block"
 
 
 class GroundProcess(Driven):
@@ -76,6 +79,12 @@ class GroundProcess(Driven):
         self._kept_order = list(self.knowledge.order.tubes)
         for at, md in self.store.depths():
             self.knowledge.depths.restore(at, md)
+        self.recalibration = Recalibration(
+            self.knowledge.recalibration,
+            self.store,
+            config.calibrations,
+            lambda tube: self._orders.put(lambda _now: self._give_up(tube)),
+        )
         for stored in self.store.messages():
             self._learn(stored.message, stored.md)
 
@@ -110,6 +119,8 @@ class GroundProcess(Driven):
         with contextlib.suppress(queue.Empty):
             while True:
                 self._orders.get_nowait()(now)
+        with self._lock:
+            self._recalibrate(now)
         for segment in self._uploads.due(now) if self._uploads is not None else ():
             self.station.send_segment(segment)
         super().on_timer(now)
@@ -141,11 +152,38 @@ class GroundProcess(Driven):
             When the ground station has no key of the rig.
         """
         if self._uploads is None:
-            raise ConfigurationError("key_file: expected the key file of the rig, without it no node takes a block")
+            raise ConfigurationError(NO_KEY)
         uploads, number = self._uploads, next(self._numbers)
         outcome: Future[BlockStatus] = Future()
+        with self._lock:
+            self.store.keep_block(block)
+            self.knowledge.recalibration.blocks[block.sha256().hex()] = block
         self._orders.put(lambda now: uploads.start(block, number, outcome, now))
         return outcome
+
+    def _recalibrate(self, now: float) -> None:
+        """Send what a calibration in the field asks for; kept before any of it leaves."""
+        procedure = self.knowledge.recalibration
+        for ask in procedure.due(now):
+            number = next(self._numbers)
+            procedure.sent(ask, number)
+            if ask.block is None:
+                self.station.command(Command(ask.tube, number, ask.name, ask.arguments), now)
+            elif self._uploads is not None:
+                outcome: Future[BlockStatus] = Future()
+                outcome.add_done_callback(self._uploaded)
+                self._uploads.start(ask.block, number, outcome, now)
+        if self.recalibration.keep():
+            self._publish(["recalibration"])
+
+    def _uploaded(self, outcome: Future[BlockStatus]) -> None:
+        if not outcome.cancelled():
+            with self._lock:
+                self.knowledge.recalibration.take_status(outcome.result())
+
+    def _give_up(self, tube: int) -> None:
+        if self._uploads is not None:
+            self._uploads.give_up(tube)
 
     def _notice_silence(self, now: float) -> None:
         """Bring rig time forward, also where no depth comes any more, and tell who fell silent or came back."""
@@ -178,6 +216,9 @@ class GroundProcess(Driven):
             self.station.acknowledge(message.tube, message.sequence, now)
         elif isinstance(message, Reply) and message.sequence in self._ordered:
             self._ordered.pop(message.sequence).set_result(message)
+        elif isinstance(message, Reply):
+            with self._lock:
+                self.knowledge.recalibration.take_reply(message, now)
         elif isinstance(message, BlockStatus) and self._uploads is not None:
             self._uploads.take(message)
 
@@ -201,6 +242,9 @@ class GroundProcess(Driven):
     def _order(self, query: Query) -> None:
         """An operator's command: sent down at the next occasion, answered with its outcome."""
         name = query.selector_key.rsplit("/", 1)[1]
+        if name == COMMAND:
+            self._order_recalibration(query)
+            return
         try:
             tube, arguments = parse(name, query.parameters)
             if name == "upload_parameters":
@@ -217,6 +261,21 @@ class GroundProcess(Driven):
             query.reply_error(f"tube {tube}: another upload has taken the place of this one")
         else:
             query.reply(keys.COMMAND.format(rig=self.config.rig, name=name), pack(view, "json"))
+
+    def _order_recalibration(self, query: Query) -> None:
+        """An operator's step of the calibration in the field, answered at once with how far it has come."""
+        try:
+            with self._lock:
+                if self._uploads is None:
+                    raise ConfigurationError(NO_KEY)
+                k = self.knowledge
+                self.recalibration.order(query.parameters, k.rig_now, k.order.tubes)
+                self._publish(["recalibration"])
+                view = FIXED["recalibration"].show(k, {})
+        except (SelectorError, CalibrationError, ConfigurationError, StoreError) as error:
+            query.reply_error(f"{query.selector_key}: {error}")
+        else:
+            query.reply(keys.COMMAND.format(rig=self.config.rig, name=COMMAND), pack(view, "json"))
 
     def _upload_files(self, tube: int, arguments: dict[str, Scalar]) -> Future[BlockStatus]:
         """Upload the calibrations that are named, as the version after the one in use unless a version is named."""

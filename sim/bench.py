@@ -61,10 +61,12 @@ class Bench:
         self._hang_limit = hang_limit
         self._seats: dict[int, Seat] = {}
         self._events: queue.SimpleQueue[tuple[str, int, int, bytes]] = queue.SimpleQueue()
+        self._cues: set[str] = set()  # that the operator has answered
         self._depth = bus.publisher(keys.DEPTH.format(rig=rig))
         self._addresses = {address_name(a): a for a in range(BASE + 1)}
         bus.subscribe(keys.PORT.format(rig=rig, tube="*", side="*", direction="tx"), self._on_tx)
         bus.subscribe(keys.DONE.format(rig=rig, process="*"), self._on_done)
+        bus.subscribe(keys.CUE.format(rig=rig), lambda _key, name: self._events.put(("cue", 0, 0, name)))
         bus.liveliness_subscribe(keys.LIVELINESS.format(rig=rig, process="*"), self._on_token)
 
     def alive(self) -> list[int]:
@@ -75,6 +77,14 @@ class Bench:
         """Wait (wall seconds) until a process has come or gone; returns whether it did."""
         deadline = time.monotonic() + timeout
         while (address in self._seats and self._seats[address].alive) != alive:
+            if not self._pump(deadline - time.monotonic()):
+                return False
+        return True
+
+    def wait_for_cue(self, name: str, timeout: float) -> bool:
+        """Wait (wall seconds) until the operator has done what cue ``name`` asks; returns whether he did."""
+        deadline = time.monotonic() + timeout
+        while name not in self._cues:
             if not self._pump(deadline - time.monotonic()):
                 return False
         return True
@@ -140,6 +150,8 @@ class Bench:
         seat = self._seats.get(address)
         if what == "token":
             self._seat(address, alive=bool(side))
+        elif what == "cue":
+            self._cues.add(payload.decode(errors="replace"))
         elif seat is not None and seat.alive:
             (seat.done if what == "done" else seat.tx[side]).append(payload)
         return True

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
-from sim.scenario import AccelerometerSection, GyroSection
+from sim.scenario import AccelerometerSection, DriftSection, GyroSection
 
 Array = npt.NDArray[np.float64]
 
@@ -24,6 +24,23 @@ def gauss_markov(random: np.random.Generator, count: int, std: Array, tau: float
     for k in range(1, count):
         draws[k] += phi * draws[k - 1]
     return draws * std
+
+
+@dataclass(frozen=True, slots=True)
+class Drift:
+    """Change of one IMU since its calibration: reading = matrix @ force + bias, and a rate at rest."""
+
+    matrix: Array  # (3, 3), row = sensor axis
+    bias: Array  # (3,) m/s^2
+    rate: Array  # (3,) rad/s
+
+    @classmethod
+    def draw(cls, section: DriftSection, random: np.random.Generator) -> Drift:
+        """Drift of one tube; small angles."""
+        matrix = math.radians(section.accelerometer_misalignment_std_deg) * random.standard_normal((3, 3))
+        np.fill_diagonal(matrix, 1.0 + section.accelerometer_scale_std * random.standard_normal(3))
+        bias = section.accelerometer_bias_std_mps2 * random.standard_normal(3)
+        return cls(matrix, bias, math.radians(section.gyroscope_bias_std_dps) * random.standard_normal(3))
 
 
 @dataclass(frozen=True, slots=True)

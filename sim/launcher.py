@@ -34,13 +34,14 @@ class Tick:
     wanted: tuple[str, ...]
     kill: tuple[str, ...]
     finished: bool
+    cue: str
 
     @classmethod
     def parse(cls, payload: bytes) -> Tick:
         """Progress from its wire form, see ``borechain medium``."""
-        phase, rig_time, begin, end, wanted, kill, finished = msgpack.unpackb(payload)
+        phase, rig_time, begin, end, wanted, kill, finished, cue = msgpack.unpackb(payload)
         names = tuple(address_name(address) for address in wanted)
-        return cls(phase, rig_time, begin, end, names, tuple(address_name(address) for address in kill), finished)
+        return cls(phase, rig_time, begin, end, names, tuple(address_name(address) for address in kill), finished, cue)
 
 
 def check_port_free(endpoint: str) -> None:
@@ -87,13 +88,29 @@ def prepare_folder(folder: Path) -> None:
 
 
 class Launcher:
-    """Supervises one run from the first process to the last answer."""
+    """Supervises one run from the first process to the last answer.
 
-    def __init__(self, table: ProcessTable, rig: str, endpoint: str, show: Callable[[Tick], None]) -> None:
+    Parameters
+    ----------
+    table : processes of the rig
+    rig, endpoint : where the keys are
+    show : called with every tick
+    act : plays the operator at a cue; False when the ground station did not answer and is to be asked again
+    """
+
+    def __init__(
+        self,
+        table: ProcessTable,
+        rig: str,
+        endpoint: str,
+        show: Callable[[Tick], None],
+        act: Callable[[ZenohBus, str], bool] = lambda _bus, _cue: True,
+    ) -> None:
         self._table = table
         self._rig = rig
         self._endpoint = endpoint
         self._show = show
+        self._act = act
         self._ticks: queue.SimpleQueue[Tick | None] = queue.SimpleQueue()
 
     def run(self, ask: Callable[[ZenohBus], dict[str, Any]]) -> dict[str, Any]:
@@ -113,13 +130,15 @@ class Launcher:
                     keys.WANTED.format(rig=self._rig), lambda _key, payload: self._ticks.put(Tick.parse(payload))
                 )
                 with interrupts_into(self._ticks):
-                    self._supervise()
+                    self._supervise(bus)
                 return ask(bus)
         finally:
             self._table.stop()
 
-    def _supervise(self) -> None:
+    def _supervise(self, bus: ZenohBus) -> None:
         wanted: tuple[str, ...] = ()
+        acted = ""
+        answer = bus.publisher(keys.CUE.format(rig=self._rig))
         while True:
             kill: tuple[str, ...] = ()
             try:
@@ -128,6 +147,9 @@ class Launcher:
                     raise KeyboardInterrupt
                 wanted, kill = tick.wanted, tick.kill
                 self._show(tick)
+                if tick.cue not in ("", acted) and self._act(bus, tick.cue):
+                    acted = tick.cue
+                    answer.put(acted.encode())
                 if tick.finished:
                     return
             except queue.Empty:

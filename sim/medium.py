@@ -22,7 +22,6 @@ import msgpack
 from sim.air import Air
 from sim.bench import Answer, Bench, FrameEvent
 from sim.errors import RigError
-from sim.faults import KillNode
 from sim.motion import Phase
 from sim.world import World
 from telemetry.media.stepped import Due, DueEvent
@@ -30,6 +29,7 @@ from telemetry.messages import BASE, ENCODER, Side, address_name
 
 ATTACH_LIMIT = 60.0  # wall s
 TELL_EVERY = 0.5  # wall s
+CUE_LIMIT = 120.0  # wall s
 REBOOT_TIME = 5.0  # rig s that a process may be missing before the rig's time waits for it
 Entry = tuple[float, int, int, int, "Due | None", bytes]
 
@@ -45,6 +45,7 @@ class Progress:
     wanted: list[int] = field(default_factory=list)
     kill: list[int] = field(default_factory=list)
     finished: bool = False
+    cue: str = ""  # what the operator is to do now
 
 
 class Medium:
@@ -56,12 +57,22 @@ class Medium:
     bench : the processes
     tell : called with the progress whenever what is wanted changes, and once a cycle
     speed : rig seconds per wall second, infinite for as fast as possible
+    cued : somebody plays the operator and is waited for, so that what he does falls on the same rig time in every run
     """
 
-    def __init__(self, world: World, bench: Bench, tell: Callable[[Progress], None], speed: float = math.inf) -> None:
+    def __init__(
+        self,
+        world: World,
+        bench: Bench,
+        tell: Callable[[Progress], None],
+        speed: float = math.inf,
+        *,
+        cued: bool = False,
+    ) -> None:
         self.world = world
         self.bench = bench
         self._tell = tell
+        self._cued = cued
         self._speed = speed
         medium = world.scenario.medium
         self.air = Air(world.seed, medium.latency, medium.jitter, medium.loss, medium.duplicate)
@@ -121,11 +132,17 @@ class Medium:
             changes.append(Change(phase.start, partial(self._enter, phase)))
             if phase.kind == "add":
                 changes.append(Change(phase.joint_closed, partial(self._close_joint, phase.tube)))
+        if (rack := self.world.rack) is not None:
+            changes.append(Change(rack.begin, self._enter_rack))
+            changes.append(Change(rack.end, self._leave_rack))
+            if self._cued:
+                changes += [Change(cue.at, partial(self._cue, cue.name)) for cue in rack.cues()]
         for fault in self.world.faults:
             at = self.world.begin + fault.after
-            changes.append(Change(at, partial(self._kill, fault)))
+            changes.append(Change(at, partial(self._cut_power, fault.tube)))
             changes.append(Change(at + fault.down, partial(self._want, fault.tube)))
-        return sorted(changes, key=lambda change: change.at)
+        # at one time the rack is left before the first tube is added
+        return sorted(changes, key=lambda change: (change.at, change.apply != self._leave_rack))
 
     def _enter(self, phase: Phase) -> None:
         self.progress.phase = f"{phase.kind} tube {phase.tube}"
@@ -133,6 +150,30 @@ class Medium:
             self._open_top = True
             self._want(phase.tube)
         self._tell(self.progress)
+
+    def _enter_rack(self) -> None:
+        self.progress.phase = "rack"
+        self._string = tuple(range(self.world.scenario.tubes, 0, -1))
+        for tube in reversed(self._string):
+            self._want(tube)
+
+    def _leave_rack(self) -> None:
+        """Part the tubes; each is switched off until it is added to the string."""
+        for tube in self._string:
+            if tube in self.progress.wanted:
+                self._cut_power(tube)
+        self._string = ()
+
+    def _cue(self, name: str) -> None:
+        """Let the operator act while the rig's time stands still."""
+        self.progress.cue = name
+        for _ in range(int(CUE_LIMIT / TELL_EVERY)):
+            self._tell(self.progress)
+            if self._stopping or self.bench.wait_for_cue(name, TELL_EVERY):
+                break
+        else:
+            raise RigError(f"operator: did nothing for {CUE_LIMIT:.0f} s when asked to {name}")
+        self.progress.cue = ""
 
     def _close_joint(self, tube: int) -> None:
         self._string = (tube, *self._string)
@@ -152,18 +193,18 @@ class Medium:
                 return
         raise RigError(f"process {address_name(address)} did not attach within {ATTACH_LIMIT:.0f} s")
 
-    def _kill(self, fault: KillNode) -> None:
+    def _cut_power(self, tube: int) -> None:
         """Have the launcher cut a node's power; the rig's time goes on when it is gone."""
-        self.progress.wanted.remove(fault.tube)
-        self.progress.kill = [fault.tube]
+        self.progress.wanted.remove(tube)
+        self.progress.kill = [tube]
         for _ in range(int(ATTACH_LIMIT / TELL_EVERY)):
             self._tell(self.progress)
-            if self._stopping or self.bench.wait_for(fault.tube, alive=False, timeout=TELL_EVERY):
+            if self._stopping or self.bench.wait_for(tube, alive=False, timeout=TELL_EVERY):
                 break
         else:
-            raise RigError(f"fault kill-node:{fault.tube}: nobody killed the node within {ATTACH_LIMIT:.0f} s")
+            raise RigError(f"fault kill-node:{tube}: nobody killed the node within {ATTACH_LIMIT:.0f} s")
         self.progress.kill = []
-        self._wake.pop(fault.tube, None)
+        self._wake.pop(tube, None)
 
     def _push(self, at: float, address: int, kind: Due | None, frame: bytes) -> None:
         self._count += 1
@@ -209,8 +250,9 @@ class Medium:
         self, at: float, steps: dict[int, list[FrameEvent]], true_time: dict[tuple[int, float], float]
     ) -> None:
         start = self.world.cycle_end(self._cycle - 1)
-        depth = bytes(msgpack.packb([at, self.world.bit_depth(at)]))
-        self._add(steps, true_time, BASE, Due.DEPTH, at, None, depth)
+        if at >= self.world.motion.begin:  # in the rack there is no bit
+            depth = bytes(msgpack.packb([at, self.world.bit_depth(at)]))
+            self._add(steps, true_time, BASE, Due.DEPTH, at, None, depth)
         self._add(steps, true_time, BASE, Due.TIMER, at, None, b"")
         for address in self.bench.alive():
             if address == BASE or address not in self.progress.wanted:

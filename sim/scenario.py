@@ -4,19 +4,23 @@ from __future__ import annotations
 
 import tomllib
 from pathlib import Path
-from typing import Annotated, Literal
+from typing import Annotated, Literal, get_args
 
+import numpy as np
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
+from groundstation.calibration.attitudes import rank_of, true_vectors
 from sim.borehole import Borehole, read_displacements, read_stations
 from sim.errors import ScenarioError
 from sim.faults import KillNode, parse_fault
 from telemetry.messages import MAX_TUBE
 
 MAX_RATE_DPS = 57.0 * 6.0  # 57 rev/min: half a turn a cycle is where one sample a cycle aliases
+RECORD_MARGIN = 8.0  # s at an attitude beside its record: the tubes settle and the order travels
 Positive = Annotated[float, Field(gt=0.0)]
 NotNegative = Annotated[float, Field(ge=0.0)]
 Probability = Annotated[float, Field(ge=0.0, le=0.9)]
+Angle = Annotated[float, Field(ge=-180.0, le=180.0)]
 Triple = tuple[NotNegative, NotNegative, NotNegative]
 
 
@@ -140,6 +144,29 @@ class DesignSection(Section):
     tolerance: Literal["en-12716", "5-cm", "0.27-deg"] = "en-12716"
 
 
+class DriftSection(Section):
+    """What became of the sensors since their last calibration, drawn for each tube and constant over the run."""
+
+    accelerometer_scale_std: float = Field(0.0, ge=0.0, le=0.04, description="of each axis")
+    accelerometer_misalignment_std_deg: float = Field(0.0, ge=0.0, le=2.0, description="of each axis to each other")
+    accelerometer_bias_std_mps2: float = Field(0.0, ge=0.0, le=0.4, description="of each axis")
+    gyroscope_bias_std_dps: float = Field(0.0, ge=0.0, le=0.1, description="of each axis; a node learns it at rest")
+
+
+class CalibrationSection(Section):
+    """A rack in which all tubes are calibrated, joined, before the first is drilled in; see docs/calibration.md."""
+
+    attitudes_deg: tuple[tuple[Angle, Angle], ...] = Field(
+        min_length=9, description="pitch and roll, deg; gravity's direction is (sin p, cos p sin r, cos p cos r)"
+    )
+    lead_s: float = Field(20.0, ge=15.0, description="at the first attitude, until every node has rig time")
+    hold_s: float = Field(30.0, ge=15.0, description="at rest at each attitude; 8 s more than record_s")
+    move_s: float = Field(8.0, ge=4.0, description="from one attitude to the next")
+    record_s: float = Field(20.0, ge=5.0, description="of the static record at each attitude")
+    apply_s: float = Field(120.0, ge=60.0, description="at rest after the last attitude, for the upload")
+    attitude_std_deg: NotNegative = Field(0.01, description="of the rack, about each axis, at each attitude")
+
+
 class ScenarioFile(Section):
     """A whole scenario file."""
 
@@ -155,6 +182,8 @@ class ScenarioFile(Section):
     medium: MediumSection = MediumSection()
     node: NodeSection = NodeSection()
     design: DesignSection = DesignSection()
+    drift: DriftSection | None = None
+    calibration: CalibrationSection | None = None
     faults: tuple[str, ...] = ()
 
 
@@ -180,6 +209,7 @@ def load_scenario(path: Path, faults: tuple[str, ...] = ()) -> Scenario:
     """
     file = _parse(path)
     _check_motion(path, file)
+    _check_calibration(path, file.calibration)
     hole = _hole(path, file.path)
     needed = file.rig.tubes * file.rig.tube_length_m
     if hole.length + 1e-9 < needed:
@@ -208,6 +238,23 @@ def _check_motion(path: Path, file: ScenarioFile) -> None:
         )
 
 
+def _check_calibration(path: Path, section: CalibrationSection | None) -> None:
+    if section is None:
+        return
+    if section.record_s + RECORD_MARGIN > section.hold_s:
+        raise ScenarioError(
+            f"{path}: calibration.record_s: expected at most hold_s - {RECORD_MARGIN:g} s = "
+            f"{section.hold_s - RECORD_MARGIN:g} s, got {section.record_s:g}; hold longer"
+        )
+    pitch, roll = np.radians(np.array(section.attitudes_deg)).T
+    rank = rank_of(np.column_stack([np.ones(len(pitch)), true_vectors(pitch, roll)]))
+    if rank < 4:
+        raise ScenarioError(
+            f"{path}: calibration.attitudes_deg: expected attitudes that determine bias and matrix (rank 4), "
+            f"got rank {rank}; add some of other tilts"
+        )
+
+
 def _parse(path: Path) -> ScenarioFile:
     try:
         with path.open("rb") as file:
@@ -226,8 +273,9 @@ def _first(error: ValidationError) -> str:
     if first["type"] == "extra_forbidden":
         section = ScenarioFile.model_fields.get(str(first["loc"][0]))
         known = ScenarioFile.model_fields if len(first["loc"]) == 1 or section is None else None
-        if known is None and section is not None and isinstance(section.annotation, type):
-            known = section.annotation.model_fields
+        if known is None and section is not None:
+            table = next(a for a in (*get_args(section.annotation), section.annotation) if a is not type(None))
+            known = table.model_fields if isinstance(table, type) and issubclass(table, BaseModel) else None
         return f"{key}: unknown key; expected one of {', '.join(known or ())}"
     return f"{key}: {first['msg']}, got {first['input']!r:.60}"
 

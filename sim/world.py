@@ -13,14 +13,15 @@ from node.firmware.settings import Joint, TubeSettings
 from node.kernels.layout import PERIOD, Scheme
 from sim.errors import ScenarioError
 from sim.faults import KillNode
-from sim.imu_errors import ImuErrors
+from sim.imu_errors import Drift, ImuErrors
 from sim.motion import Motion, Phase, Trapezoid
+from sim.rack import Rack
 from sim.scenario import Scenario
 from sim.truth import TubeTruth
 from telemetry.messages import BASE, ENCODER
 
 Array = npt.NDArray[np.float64]
-JOINTS, MOUNTS, CLOCKS, GYRO, ACCELEROMETER, DRIVE = range(6)
+JOINTS, MOUNTS, CLOCKS, GYRO, ACCELEROMETER, DRIVE, DRIFT, RACK = range(8)
 
 
 def wrap(angle: float) -> float:
@@ -53,11 +54,13 @@ class World:
         )
         s = file.schedule
         first_angle = float(self._random(DRIVE, 0).uniform(0.0, 2.0 * math.pi))
+        self.begin = s.begin_s
+        self.rack = None if file.calibration is None else Rack(file.calibration, self.begin)
+        drilling = s.begin_s if self.rack is None else self.rack.end
         self.motion = Motion(
-            s.begin_s, s.add_s, s.joint_s, s.stop_s, s.finish_s, turn, scenario.tubes, scenario.tube_length, first_angle
+            drilling, s.add_s, s.joint_s, s.stop_s, s.finish_s, turn, scenario.tubes, scenario.tube_length, first_angle
         )
         self.phases: tuple[Phase, ...] = self.motion.phases
-        self.begin = self.motion.begin
         self.end = self.motion.end
         self.faults: tuple[KillNode, ...] = scenario.faults
         self._samples: dict[int, list[list[float]]] = {}
@@ -78,7 +81,8 @@ class World:
         """Count, rig time of its last edge, and 1 (the string turns one way, so every edge rises)."""
         angle = float(self.motion.drive(np.array([t]))[0][0])
         count = math.floor(angle / self._quantum + 1e-9)
-        return count, min(self.motion.time_of_angle(count * self._quantum), t), 1
+        edge = self.motion.time_of_angle(count * self._quantum) if t > self.motion.begin else self.begin
+        return count, min(edge, t), 1
 
     def bit_depth(self, t: float) -> float:
         """Measured depth of the bit, m."""
@@ -140,15 +144,27 @@ class World:
         joint = drive[tube] + self._mounts[tube]
         return TubeTruth(self.scenario.hole, self.motion, below, joint, a.radius_m, a.gravity_mps2)
 
+    def drift(self, tube: int) -> Drift | None:
+        """What became of a tube's sensors since their calibration."""
+        section = self.scenario.file.drift
+        return None if section is None else Drift.draw(section, self._random(DRIFT, tube))
+
     def _all_samples(self, tube: int) -> Array:
         count = math.floor((self.end - self.begin) / PERIOD + 1e-9)
         ends: Array = self.begin + PERIOD * np.arange(1.0, count + 1.0)
-        truth = self.truth(tube)
+        truth, file = self.truth(tube), self.scenario.file
         rate, force = truth.cycle_means(ends, PERIOD)
+        if self.rack is not None:
+            racked = ends <= self.rack.end
+            held = self.rack.truth(self._random(RACK, tube), self._mounts[tube], file.accelerometer.gravity_mps2)
+            rate[racked], force[racked] = held.cycle_means(ends[racked], PERIOD)
         turning = (self.motion.drive(ends)[1] > 0.0) | (self.motion.drive(ends - PERIOD)[1] > 0.0)
-        errors = ImuErrors(self.scenario.file.gyroscope, self.scenario.file.accelerometer)
+        felt = force
+        if (drift := self.drift(tube)) is not None:
+            rate, felt = rate + drift.rate, force @ drift.matrix.T + drift.bias
+        errors = ImuErrors(file.gyroscope, file.accelerometer)
         measured_rate = errors.gyro(self._random(GYRO, tube), rate, force, PERIOD)
-        measured_force = errors.accelerations(self._random(ACCELEROMETER, tube), force, turning.astype(float))
+        measured_force = errors.accelerations(self._random(ACCELEROMETER, tube), felt, turning.astype(float))
         return np.concatenate([measured_rate, measured_force], axis=1)
 
     @cached_property
@@ -194,7 +210,10 @@ class World:
         return np.random.Generator(np.random.Philox(np.random.SeedSequence([self.seed, purpose, tube])))
 
     def _check_faults(self) -> None:
+        racked = self.rack.end if self.rack is not None else self.begin
         for fault in self.faults:
+            if self.begin + fault.after + fault.down < racked:
+                continue
             on = next(phase.start for phase in self.phases if phase.kind == "add" and phase.tube == fault.tube)
             if not on < self.begin + fault.after < self.end - fault.down:
                 raise ScenarioError(

@@ -26,6 +26,7 @@ PORT: Final = "borechain/{rig}/port/{tube}/{side}/{direction}"
 STEP: Final = "borechain/{rig}/bench/{process}/step"
 DONE: Final = "borechain/{rig}/bench/{process}/done"
 WANTED: Final = "borechain/{rig}/bench/wanted"
+CUE: Final = "borechain/{rig}/bench/cue"
 DEPTH: Final = "borechain/{rig}/surface/depth"
 LIVELINESS: Final = "borechain/{rig}/@liveliness/{process}"
 GROUND: Final = "borechain/{rig}/ground/{path}"
@@ -37,6 +38,7 @@ TABLE: Final[tuple[Key, ...]] = (
     Key(STEP, "publish", "bench: an outside clock hands one process its next step"),
     Key(DONE, "publish", "bench: the process has finished the step"),
     Key(WANTED, "publish", "bench: the processes that ought to be alive now"),
+    Key(CUE, "publish", "bench: the operator has done what the schedule had him do"),
     Key(LIVELINESS, "liveliness", "token of a living process"),
     Key("borechain/{rig}/ground/status", "query, publish", "rig time, depth, counts, health"),
     Key("borechain/{rig}/ground/string", "query, publish", "tubes from top to bottom with depth and age"),
@@ -51,5 +53,6 @@ TABLE: Final[tuple[Key, ...]] = (
     Key("borechain/{rig}/ground/alarms", "query, publish", "tolerance alarms and stations where the hole moved"),
     Key("borechain/{rig}/ground/events", "query", "events of the nodes; ?tube=3"),
     Key("borechain/{rig}/ground/static_records", "query", "raw readings that nodes averaged at rest; ?tube=3"),
+    Key("borechain/{rig}/ground/recalibration", "query, publish", "calibration in the field: progress and result"),
     Key("borechain/{rig}/cmd/{name}", "query", "operator command to the ground station; the reply is its outcome"),
 )

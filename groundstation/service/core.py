@@ -12,6 +12,7 @@ import numpy.typing as npt
 from groundstation.config import GroundConfig
 from groundstation.errors import SurveyError
 from groundstation.service.alarms import AlarmList
+from groundstation.service.field_procedure import FieldProcedure
 from groundstation.service.string_order import DepthLog, StringOrder
 from groundstation.survey.columns import Deviation, deviation, project
 from groundstation.survey.fusion import Departure, Evidence, departure, judge, weighted
@@ -127,9 +128,11 @@ class Knowledge:
         self.alarms = AlarmList()
         self.trajectory: list[Point] = Trajectory().points
         self.projection: Deviation | None = None
+        self.recalibration = FieldProcedure(config.gravity)
 
     def take_state(self, state: NodeState) -> None:
         """Take a node's account of itself, unless a newer one is known."""
+        self.recalibration.take_state(state)
         known = self.nodes.get(state.tube)
         if known is None or state.at >= known.at:
             self.nodes[state.tube] = state
@@ -168,6 +171,7 @@ class Knowledge:
     def take_static(self, record: StaticRecord) -> None:
         """Remember an average at rest."""
         self.static_records.append(record)
+        self.recalibration.take_record(record)
 
     def age(self, tube: int) -> float:
         """Rig seconds since a node's newest state; infinite for one never heard."""

@@ -17,6 +17,7 @@ import sqlalchemy as sa
 from groundstation.errors import StoreError
 from telemetry.errors import DecodeError
 from telemetry.messages import Event, Kept, StaticRecord, SurveyMeasurement
+from telemetry.parameters import ParameterBlock, unpack_block
 from telemetry.presentation.codec import decode, encode
 
 SCHEMA = 1
@@ -48,6 +49,18 @@ STRING = sa.Table(
     METADATA,
     sa.Column("place", sa.Integer, primary_key=True, autoincrement=False),
     sa.Column("tube", sa.Integer, nullable=False),
+)
+BLOCKS = sa.Table(
+    "blocks",
+    METADATA,
+    sa.Column("sha256", sa.String(64), primary_key=True),
+    sa.Column("content", sa.LargeBinary, nullable=False),
+)
+RECALIBRATION = sa.Table(
+    "recalibration",
+    METADATA,
+    sa.Column("id", sa.Integer, primary_key=True, autoincrement=False),
+    sa.Column("progress", sa.Text, nullable=False),
 )
 
 
@@ -141,6 +154,33 @@ class Store:
         """Tubes of the string, top first."""
         with self._refusing(), self._engine.connect() as connection:
             return [row.tube for row in connection.execute(sa.select(STRING).order_by(STRING.c.place))]
+
+    def keep_block(self, block: ParameterBlock) -> None:
+        """Store a parameter block before it is sent, so that what a tube uses can be named later."""
+        digest = block.sha256().hex()
+        with self._refusing(), self._engine.begin() as connection:
+            connection.execute(sa.delete(BLOCKS).where(BLOCKS.c.sha256 == digest))
+            connection.execute(sa.insert(BLOCKS).values(sha256=digest, content=block.canonical()))
+
+    def blocks(self) -> list[ParameterBlock]:
+        """Every block that was sent."""
+        with self._refusing(), self._engine.connect() as connection:
+            rows = connection.execute(sa.select(BLOCKS).order_by(BLOCKS.c.sha256)).all()
+        try:
+            return [unpack_block(row.content) for row in rows]
+        except DecodeError as error:
+            raise StoreError(f"database {self._where}: blocks: {error}") from error
+
+    def keep_progress(self, text: str) -> None:
+        """Store how far the calibration in the field has come."""
+        with self._refusing(), self._engine.begin() as connection:
+            connection.execute(sa.delete(RECALIBRATION))
+            connection.execute(sa.insert(RECALIBRATION).values(id=1, progress=text))
+
+    def progress(self) -> str | None:
+        """How far the calibration in the field had come."""
+        with self._refusing(), self._engine.connect() as connection:
+            return connection.execute(sa.select(RECALIBRATION.c.progress)).scalar()
 
     def close(self) -> None:
         """Close every connection."""

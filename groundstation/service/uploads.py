@@ -25,9 +25,13 @@ class Uploads:
     def start(self, block: ParameterBlock, sequence: int, outcome: Future[BlockStatus], now: float) -> None:
         """Begin an upload at ``now`` (s); one that still runs to the same tube is given up."""
         segments = split(block.canonical(), block.tube, sequence, block.version, self._key)
-        if (given_up := self._running.pop(block.tube, None)) is not None:
-            given_up[1].cancel()
+        self.give_up(block.tube)
         self._running[block.tube] = (Upload(segments, now), outcome)
+
+    def give_up(self, tube: int) -> None:
+        """End the upload to a tube, if one runs."""
+        if (given_up := self._running.pop(tube, None)) is not None:
+            given_up[1].cancel()
 
     def due(self, now: float) -> list[BlockSegment]:
         """Segments to send now."""

@@ -182,6 +182,7 @@ def cluster(c: Cluster, n: int) -> View:
         "yaw_deg": math.degrees(m.yaw),
         "sigma_yaw_deg": math.degrees(math.sqrt(m.yaw_var)),
         "sigma_systematic_deg": math.degrees(math.sqrt(m.systematic_var)),
+        "forces_mps2": [list(imu.force) for imu in m.imus],
         "samples": m.samples,
         "settle_s": m.settle_time,
         "flags": flag_names(m.flags),
@@ -226,6 +227,11 @@ def static_records(k: Knowledge, p: Parameters) -> View:
     """Raw readings averaged at rest; ``tube`` selects."""
     wanted = Range.parse("tube", p["tube"]) if "tube" in p else None
     return {"static_records": [static_record(r) for r in k.static_records if wanted is None or wanted.holds(r.tube)]}
+
+
+def recalibration(k: Knowledge, _p: Parameters) -> View:
+    """Calibration in the field: how far, and what it found."""
+    return {"rig_time_s": finite(k.rig_now)} | k.recalibration.view()
 
 
 def static_record(r: StaticRecord) -> View:
@@ -305,6 +311,7 @@ FIXED: dict[str, Path] = {
     "uncertainty": Path(column_views.uncertainty, ("confidence",)),
     "column": Path(column_views.column),
     "alarms": Path(column_views.alarms),
+    "recalibration": Path(recalibration),
 }
 PATTERNS = (*FIXED, "nodes/{tube}", "stations/{n}", "stations/{n}/measurements")
 

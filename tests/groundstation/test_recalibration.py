@@ -8,6 +8,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from memory_rig import Rig
 
 from groundstation.calibration.attitudes import fit
 from groundstation.calibration.block import Calibration, Provenance
@@ -17,120 +18,16 @@ from groundstation.process import GroundProcess
 from groundstation.service.orders import parse
 from groundstation.service.parameters import block_of
 from node.firmware.settings import TubeSettings
-from node.kernels.layout import DEG, PERIOD
-from node.process.encoder_process import EncoderProcess
+from node.kernels.layout import DEG
 from node.process.parameter_store import ParameterStore
 from node.process.tube_process import TubeProcess
-from telemetry.media.memory import MemoryPort, joint
-from telemetry.messages import BASE, ENCODER, BlockSegment, BlockStatus, Reply, Side, StaticRecord, UploadPhase
+from telemetry.messages import BASE, BlockSegment, BlockStatus, StaticRecord, UploadPhase
 from telemetry.parameters import ParameterBlock, SensorParameters
 from telemetry.transport.authentication import new_key, read_key
 
-STEP = 0.01
 MATRIX = np.array([[1.01, 0.004, -0.003], [0.002, 0.99, 0.005], [-0.001, 0.003, 1.005]])
 BIAS = np.array([0.05, -0.03, 0.08])
 Outcome = Future[BlockStatus]
-
-
-class Rig:
-    """Surface end, drive head and tubes, top tube first, on one clock; the bench turns and leans the tubes."""
-
-    def __init__(self, folder: Path, tubes: list[int], seed: int = 0, **troubles: float) -> None:
-        self.folder = folder
-        self.key_file = new_key(folder / "rig.key")
-        self.addresses = [BASE, ENCODER, *tubes]
-        self.joints = [joint(seed + k, **troubles) for k in range(len(self.addresses) - 1)]
-        self.now = 1000.0
-        self.rate = {tube: np.zeros(3) for tube in tubes}
-        self.force = {tube: np.array([0.0, 0.0, -9.81]) for tube in tubes}
-        self.processes: dict[int, GroundProcess | EncoderProcess | TubeProcess] = {}
-        self.sent: list[int] = []  # indices of the segments that left the ground station
-        self.said: list[BlockStatus] = []
-        for address in self.addresses:
-            self.start(address)
-
-    def start(self, address: int) -> None:
-        """Start a process, once more in its folder, as after a power cut."""
-        folder = self.folder / str(address)
-        if address == BASE:
-            if BASE in self.processes:
-                self.ground.store.close()
-            self.processes[BASE] = GroundProcess(GroundConfig(folder=folder, key_file=self.key_file))
-            self.watch()
-        elif address == ENCODER:
-            self.processes[ENCODER] = EncoderProcess(folder)
-        else:
-            self.processes[address] = TubeProcess(TubeSettings(address), folder, key=read_key(self.folder / "rig.key"))
-
-    def watch(self) -> None:
-        send, take = self.ground.station.send_segment, self.ground._take
-
-        def sending(segment: BlockSegment) -> None:
-            self.sent.append(segment.index)
-            send(segment)
-
-        def taking(message: object, now: float) -> None:
-            self.said.extend([message] if isinstance(message, BlockStatus) else [])
-            take(message, now)  # type: ignore[arg-type]
-
-        self.ground.station.send_segment = sending  # type: ignore[method-assign]
-        self.ground._take = taking  # type: ignore[method-assign]
-
-    @property
-    def ground(self) -> GroundProcess:
-        process = self.processes[BASE]
-        assert isinstance(process, GroundProcess)
-        return process
-
-    def tube(self, tube: int) -> TubeProcess:
-        process = self.processes[tube]
-        assert isinstance(process, TubeProcess)
-        return process
-
-    def run(self, duration: float, until: Callable[[], bool] = lambda: False) -> None:
-        end, cycle_at = self.now + duration, self.now
-        while self.now < end and not until():
-            if self.now >= cycle_at:
-                cycle_at += PERIOD
-                self.cycle()
-            for place, address in enumerate(self.addresses):
-                self.exchange(place, self.processes[address])
-            self.now += STEP
-
-    def cycle(self) -> None:
-        for address, process in self.processes.items():
-            if isinstance(process, TubeProcess):
-                reading = [self.now - PERIOD, *self.rate[address], *self.force[address], 30.0]
-                process.on_cycle([float(x) for x in reading], self.now)
-            elif isinstance(process, EncoderProcess):
-                process.on_cycle([self.now - PERIOD, 0, self.now - 100.0, 1], self.now)
-            process.on_timer(self.now)
-
-    def exchange(self, place: int, process: GroundProcess | EncoderProcess | TubeProcess) -> None:
-        ports: dict[Side, MemoryPort] = {}
-        if place > 0:
-            ports[Side.UPPER] = self.joints[place - 1][1]
-        if place < len(self.joints):
-            ports[Side.LOWER] = self.joints[place][0]
-        for side, port in ports.items():
-            for frame in port.receive(self.now):
-                process.on_frame(side, frame, self.now)
-        for side, frame in process.take_frames(self.now):
-            if side in ports:
-                ports[side].send(frame, self.now)
-
-    def upload(self, block: ParameterBlock, patience: float = 200.0) -> BlockStatus:
-        outcome = self.ground.upload(block)
-        self.run(patience, outcome.done)
-        return outcome.result(timeout=0.0)
-
-    def order(self, tube: int, name: str, **arguments: float) -> Reply:
-        outcome = self.ground.order(tube, name, dict(arguments))
-        self.run(60.0, outcome.done)
-        return outcome.result(timeout=0.0)
-
-    def codes(self, tube: int) -> list[str]:
-        return [event.code for event in self.ground.knowledge.events if event.tube == tube]
 
 
 def block(version: int = 1, tube: int = 1, bias: float = 1e-3) -> ParameterBlock:

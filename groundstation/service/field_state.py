@@ -1,0 +1,165 @@
+"""How far a calibration in the field has come: plain data that is kept in the database and shown to the operator."""
+
+from __future__ import annotations
+
+import enum
+import json
+import math
+from dataclasses import asdict, dataclass, field
+from typing import Any
+
+from telemetry.messages import Vector3
+from telemetry.parameters import ParameterBlock, SensorParameters, unpack_block
+
+View = dict[str, Any]
+
+
+class Stage(enum.StrEnum):
+    """Of the whole procedure."""
+
+    IDLE = "idle"
+    COLLECTING = "collecting"
+    SOLVED = "solved"  # shown, waits for the operator
+    UPLOADING = "uploading"
+    DONE = "done"
+
+
+class Phase(enum.StrEnum):
+    """Of one tube."""
+
+    COLLECTING = "collecting"
+    PROPOSED = "proposed"
+    CONFIRMED = "confirmed"  # to be uploaded
+    UPLOADING = "uploading"
+    VERIFYING = "verifying"
+    DONE = "done"  # the tube itself told the hash
+    REFUSED = "refused"  # the detail says by whom and why
+
+
+@dataclass(slots=True)
+class Attitude:
+    """A preset (rad) at which the tubes rested from rig time ``at`` to ``left`` (s; None while they are there)."""
+
+    pitch: float
+    roll: float
+    seconds: float
+    at: float
+    left: float | None = None
+
+
+@dataclass(slots=True)
+class Found:
+    """What the solution of one tube says of itself; m/s^2 and rad."""
+
+    residual_rms: float
+    bias_std: Vector3
+    matrix_std: float  # largest of the nine
+    condition: float
+    inclination_before: float  # rms over the attitudes
+    inclination_after: float
+
+
+@dataclass(slots=True)
+class TubeProgress:
+    """One tube's part."""
+
+    tube: int
+    phase: Phase = Phase.COLLECTING
+    detail: str = ""
+    version_before: int | None = None  # None until the tube told what it uses
+    hash_before: str = ""
+    orders: dict[int, int] = field(default_factory=dict)  # sequence of a command for a record: place of its attitude
+    proposed: str = ""  # canonical bytes of the block, hex
+    found: Found | None = None
+    calibration: str = ""  # its file
+    uploads: int = 0
+    restarted: bool = False  # while the block was on its way
+    hash_after_restart: str = ""
+    hash: str = ""  # that the tube told at the end
+
+    @property
+    def block(self) -> ParameterBlock | None:
+        """The proposed block."""
+        return unpack_block(bytes.fromhex(self.proposed)) if self.proposed else None
+
+
+@dataclass(slots=True)
+class Progress:
+    """The whole procedure."""
+
+    stage: Stage = Stage.IDLE
+    attitudes: list[Attitude] = field(default_factory=list)
+    tubes: dict[int, TubeProgress] = field(default_factory=dict)
+    proposal: str = ""  # hash of all proposed blocks
+
+    def to_json(self) -> str:
+        """Text for the database."""
+        return json.dumps(asdict(self), sort_keys=True)
+
+    @classmethod
+    def from_json(cls, text: str) -> Progress:
+        """Progress of a text that ``to_json`` made."""
+        whole = json.loads(text)
+        tubes = {}
+        for name, row in whole["tubes"].items():
+            found = row["found"]
+            if found is not None:
+                x, y, z = found["bias_std"]
+                found = Found(**found | {"bias_std": (x, y, z)})
+            orders = {int(sequence): place for sequence, place in row["orders"].items()}
+            tubes[int(name)] = TubeProgress(**row | {"phase": Phase(row["phase"]), "orders": orders, "found": found})
+        attitudes = [Attitude(**row) for row in whole["attitudes"]]
+        return cls(Stage(whole["stage"]), attitudes, tubes, whole["proposal"])
+
+
+def attitude_view(attitude: Attitude, number: int) -> View:
+    """One attitude, ``number`` from 1."""
+    return {
+        "attitude": number,
+        "pitch_deg": round(math.degrees(attitude.pitch), 9),
+        "roll_deg": round(math.degrees(attitude.roll), 9),
+        "told_at_s": attitude.at,
+        "left_at_s": attitude.left,
+    }
+
+
+def tube_view(tube: TubeProgress, records: int, before: ParameterBlock | None) -> View:
+    """One tube; ``records`` at rest so far, ``before`` the block it had if it is known."""
+    block, found = tube.block, tube.found
+    row: View = {
+        "tube": tube.tube,
+        "phase": tube.phase.value,
+        "detail": tube.detail,
+        "records": records,
+        "asked": len(tube.orders),
+        "version_before": tube.version_before,
+        "hash_before": tube.hash_before,
+        "accelerometer_before": None if before is None else sensor_view(before.accelerometer),
+        "version": None if block is None else block.version,
+        "hash_proposed": "" if block is None else block.sha256().hex(),
+        "accelerometer": None if block is None else sensor_view(block.accelerometer),
+        "uploads": tube.uploads,
+        "restarted": tube.restarted,
+        "hash_after_restart": tube.hash_after_restart,
+        "hash": tube.hash,
+    }
+    return row | {"solution": None if found is None else found_view(found)}
+
+
+def found_view(found: Found) -> View:
+    """What a solution says of itself."""
+    return {
+        "residual_rms_mps2": found.residual_rms,
+        "bias_std_mps2": list(found.bias_std),
+        "matrix_std": found.matrix_std,
+        "condition": found.condition,
+        "inclination_rms_deg": {
+            "before": math.degrees(found.inclination_before),
+            "after": math.degrees(found.inclination_after),
+        },
+    }
+
+
+def sensor_view(sensor: SensorParameters) -> View:
+    """Matrix and bias at the reference temperature."""
+    return {"matrix": [list(row) for row in sensor.matrix], "bias_mps2": list(sensor.bias)}
