@@ -18,6 +18,7 @@ from borechain.options import key_option, place_options
 @click.option("--joint-std-deg", type=float, default=0.05, show_default=True, help="Error of a reading, 1 sigma.")
 @click.option("--mount-std-deg", type=float, default=0.05, show_default=True, help="Error of the IMU's mount, 1 sigma.")
 @click.option("--scheme", type=click.Choice(["forward", "estimate"]), default="forward", show_default=True)
+@click.option("--imu", help="The node's own sensor: replay:FILE, mpu6500:BUS or mpu6500:BUS:ADDRESS.")
 @key_option
 @place_options
 @plain_faults
@@ -28,6 +29,7 @@ def node(
     joint_std_deg: float,
     mount_std_deg: float,
     scheme: str,
+    imu: str | None,
     key_file: Path | None,
     rig_name: str,
     endpoint: str,
@@ -42,6 +44,7 @@ def node(
     from borechain.processes import Place, run_node
     from node.firmware.settings import Joint, TubeSettings
     from node.kernels.layout import Scheme
+    from node.process.drivers.choice import imu_source
 
     joint_std = math.radians(joint_std_deg)
     settings = TubeSettings(
@@ -51,4 +54,4 @@ def node(
         mount_std=math.radians(mount_std_deg),
         scheme=Scheme[scheme.upper()],
     )
-    run_node(Place(rig_name, endpoint, folder, key_file), settings)
+    run_node(Place(rig_name, endpoint, folder, key_file), settings, imu_source(imu) if imu else None)

@@ -16,6 +16,7 @@ from groundstation.errors import ConfigurationError, SelectorError
 from groundstation.process import GroundProcess
 from groundstation.service.orders import parse
 from groundstation.service.parameters import block_of
+from node.firmware.sensor_faults import SensorLimits
 from node.firmware.settings import TubeSettings
 from node.kernels.layout import DEG, PERIOD
 from node.process.encoder_process import EncoderProcess
@@ -26,6 +27,7 @@ from telemetry.messages import BASE, ENCODER, BlockSegment, BlockStatus, Reply, 
 from telemetry.parameters import ParameterBlock, SensorParameters
 from telemetry.transport.authentication import new_key, read_key
 
+NOISELESS = SensorLimits(repeats_together=0, repeats_alone=0)
 STEP = 0.01
 MATRIX = np.array([[1.01, 0.004, -0.003], [0.002, 0.99, 0.005], [-0.001, 0.003, 1.005]])
 BIAS = np.array([0.05, -0.03, 0.08])
@@ -60,7 +62,9 @@ class Rig:
         elif address == ENCODER:
             self.processes[ENCODER] = EncoderProcess(folder)
         else:
-            self.processes[address] = TubeProcess(TubeSettings(address), folder, key=read_key(self.folder / "rig.key"))
+            self.processes[address] = TubeProcess(
+                TubeSettings(address, limits=NOISELESS), folder, key=read_key(self.folder / "rig.key")
+            )
 
     def watch(self) -> None:
         send, take = self.ground.station.send_segment, self.ground._take
@@ -244,7 +248,7 @@ def test_a_wrong_key_is_refused_with_one_event(rig: Rig) -> None:
 
 
 def test_a_node_without_a_key_takes_no_block_and_a_ground_station_without_one_sends_none(rig: Rig) -> None:
-    rig.processes[1] = TubeProcess(TubeSettings(1), rig.folder / "1")
+    rig.processes[1] = TubeProcess(TubeSettings(1, limits=NOISELESS), rig.folder / "1")
     rig.run(3.0)
     status = rig.upload(block())
     assert status.phase is UploadPhase.UNTRUSTED
@@ -327,7 +331,7 @@ def test_a_power_cut_at_any_step_of_the_change_leaves_one_block_whole(rig: Rig) 
     assert process.tube.parameters.version == 2
     versions = []
     for cut in cuts:
-        again = TubeProcess(TubeSettings(1), cut, key=read_key(rig.folder / "rig.key"))
+        again = TubeProcess(TubeSettings(1, limits=NOISELESS), cut, key=read_key(rig.folder / "rig.key"))
         versions.append(again.tube.parameters.version)
         assert again.tube.parameters == {1: block(1), 2: block(2, bias=2e-3)}[versions[-1]]
         assert again._fallback == ""
