@@ -39,6 +39,13 @@ study: $(STAMP)  ## the long studies; their tables are committed in docs/results
 	$(BIN)/borechain experiment coverage --wells 2000 --out docs/results
 	$(BIN)/borechain experiment region-of-uncertainty --out docs/results
 	$(BIN)/borechain experiment weighting --out docs/results
+	$(BIN)/borechain experiment update-modes --seeds 200 --out docs/results
+	$(BIN)/borechain experiment single-updates --seeds 200 --out docs/results
+	$(BIN)/borechain experiment two-nodes --seeds 200 --out docs/results
+	$(BIN)/borechain experiment tuning --seeds 100 --out docs/results
+	$(BIN)/borechain experiment delay --seeds 25 --out docs/results
+	$(BIN)/borechain experiment outage --seeds 60 --out docs/results
+	$(BIN)/borechain experiment fifty-nodes --seeds 16 --out docs/results
 
 lock:  ## pin the dependencies again, without addresses (needs pip-tools)
 	pip-compile --quiet --upgrade --generate-hashes --all-extras --allow-unsafe --strip-extras --no-annotate \

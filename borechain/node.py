@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from pathlib import Path
+from typing import Literal
 
 import click
 
@@ -17,7 +18,9 @@ from borechain.options import key_option, place_options
 @click.option("--lower-joint-deg", type=float, default=0.0, help="Scribe-mark reading, this tube to the one below.")
 @click.option("--joint-std-deg", type=float, default=0.05, show_default=True, help="Error of a reading, 1 sigma.")
 @click.option("--mount-std-deg", type=float, default=0.05, show_default=True, help="Error of the IMU's mount, 1 sigma.")
+@click.option("--kernel", type=click.Choice(["float64", "fixed"]), default="float64", show_default=True)
 @click.option("--scheme", type=click.Choice(["forward", "estimate"]), default="forward", show_default=True)
+@click.option("--imu", help="The node's own sensor: replay:FILE, mpu6500:BUS or mpu6500:BUS:ADDRESS.")
 @key_option
 @place_options
 @plain_faults
@@ -27,7 +30,9 @@ def node(
     lower_joint_deg: float,
     joint_std_deg: float,
     mount_std_deg: float,
+    kernel: Literal["float64", "fixed"],
     scheme: str,
+    imu: str | None,
     key_file: Path | None,
     rig_name: str,
     endpoint: str,
@@ -42,6 +47,7 @@ def node(
     from borechain.processes import Place, run_node
     from node.firmware.settings import Joint, TubeSettings
     from node.kernels.layout import Scheme
+    from node.process.drivers.choice import imu_source
 
     joint_std = math.radians(joint_std_deg)
     settings = TubeSettings(
@@ -50,5 +56,6 @@ def node(
         lower_joint=Joint(math.radians(lower_joint_deg), joint_std),
         mount_std=math.radians(mount_std_deg),
         scheme=Scheme[scheme.upper()],
+        kernel=kernel,
     )
-    run_node(Place(rig_name, endpoint, folder, key_file), settings)
+    run_node(Place(rig_name, endpoint, folder, key_file), settings, imu_source(imu) if imu else None)

@@ -19,6 +19,7 @@ import setproctitle
 from groundstation.errors import GroundError
 from node.errors import NodeError
 from node.firmware.settings import TubeSettings
+from node.process.drivers.source import EncoderSource, ImuSource
 from node.process.encoder_process import EncoderProcess
 from node.process.tube_process import TubeProcess
 from sim.errors import SimError
@@ -43,19 +44,19 @@ class Place:
     key_file: Path | None = None  # of the rig
 
 
-def run_node(place: Place, settings: TubeSettings) -> None:
-    """Node of one tube until a signal comes."""
+def run_node(place: Place, settings: TubeSettings, imu: ImuSource | None = None) -> None:
+    """Node of one tube until a signal comes; ``imu`` is its own sensor."""
 
     def build() -> TubeProcess:
         key = read_key(place.key_file) if place.key_file is not None else None
-        return TubeProcess(settings, place.folder, key=key)
+        return TubeProcess(settings, place.folder, key=key, imu=imu)
 
     run_on_bench(f"node {settings.tube}", place, settings.tube, build)
 
 
-def run_encoder(place: Place) -> None:
-    """Encoder node on the drive head."""
-    run_on_bench("encoder", place, ENCODER, lambda: EncoderProcess(place.folder))
+def run_encoder(place: Place, source: EncoderSource | None = None) -> None:
+    """Encoder node on the drive head; ``source`` is its own counter."""
+    run_on_bench("encoder", place, ENCODER, lambda: EncoderProcess(place.folder, source))
 
 
 def run_on_bench(name: str, place: Place, address: int, build: Callable[[], Stepped]) -> None:

@@ -4,7 +4,8 @@
 
     NodeError
     ├── ConfigurationError(ValueError)    a setting outside its range: correct the file or the flag named
-    └── SavedStateError(ValueError)       both slots of a saved state are unreadable: the node starts from nothing
+    ├── SavedStateError(ValueError)       both slots of a saved state are unreadable: the node starts from nothing
+    └── SensorError(OSError)              a sensor is absent or answers nonsense: it is tried again every cycle
 """
 
 from __future__ import annotations
@@ -20,3 +21,7 @@ class ConfigurationError(NodeError, ValueError):
 
 class SavedStateError(NodeError, ValueError):
     """The bytes are no saved state of this layout."""
+
+
+class SensorError(NodeError, OSError):
+    """A sensor is absent or answers nonsense."""

@@ -132,6 +132,7 @@ class NodeSection(Section):
     """Firmware settings of every node."""
 
     scheme: Literal["forward", "estimate"] = "forward"
+    kernel: Literal["float64", "fixed"] = Field("float64", description="the loop in floats or in integers")
 
 
 class DesignSection(Section):

@@ -109,6 +109,7 @@ class World:
             lower_joint=Joint(wrap(lower[tube] + lower_error[tube]), std),
             mount_std=math.radians(self.scenario.file.joints.mount_std_deg),
             scheme=Scheme[self.scenario.file.node.scheme.upper()],
+            kernel=self.scenario.file.node.kernel,
         )
 
     def yaw_truth(self, tube: int, t: float) -> float:

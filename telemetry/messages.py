@@ -68,6 +68,7 @@ class NodeFlag(enum.IntFlag):
     RESTORED = 16
     CLOCK_UNSYNCHRONISED = 32
     BIAS_UNKNOWN = 64
+    SENSOR_FAULT = 128  # a sensor is faulty, or has not yet proved itself again
 
 
 class UploadPhase(enum.IntEnum):

@@ -4,10 +4,15 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from typing import Final, Literal, TypeAlias, get_args
 
 from node.errors import ConfigurationError
+from node.firmware.sensor_faults import USUAL_LIMITS, SensorLimits
 from node.kernels.layout import Scheme
 from telemetry.messages import MAX_TUBE
+
+Kernel: TypeAlias = Literal["float64", "fixed"]
+KERNELS: Final = get_args(Kernel)
 
 
 @dataclass(frozen=True, slots=True)
@@ -29,6 +34,8 @@ class TubeSettings:
     scheme: Scheme = Scheme.FORWARD
     state_every: int = 2  # cycles from one report to the next
     aiding_old_after: float = 3.0  # s
+    kernel: Kernel = "float64"  # arithmetic of the loop; fixed is that of a controller without floats
+    limits: SensorLimits = USUAL_LIMITS  # of its IMU
 
     def __post_init__(self) -> None:
         """Refuse what cannot be.
@@ -40,6 +47,9 @@ class TubeSettings:
         """
         require(1 <= self.tube <= MAX_TUBE, f"tube: expected 1..{MAX_TUBE}, got {self.tube}")
         require(self.state_every >= 1, f"state_every: expected at least 1 cycle, got {self.state_every}")
+        age = self.aiding_old_after
+        require(math.isfinite(age) and age > 0.0, f"aiding_old_after: expected a time in s, got {age}")
+        require(self.kernel in KERNELS, f"kernel: expected one of {', '.join(KERNELS)}, got {self.kernel}")
         for name, std in (
             ("drive_joint.std", self.drive_joint.std),
             ("lower_joint.std", self.lower_joint.std),

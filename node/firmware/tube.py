@@ -8,8 +8,10 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from node.firmware.coarse_level import level_coarsely
 from node.firmware.parameters import forget_bias, forget_tilt, record_of, recorrect
-from node.firmware.settings import TubeSettings
+from node.firmware.sensor_guard import SensorGuard
+from node.firmware.settings import Kernel, TubeSettings
 from node.firmware.static_record import StaticRecorder
 from node.kernels.angles import from_binary, wrap
 from node.kernels.calibration import USUAL, calibrate
@@ -58,6 +60,7 @@ class ImuReading:
     rate: tuple[float, float, float]  # rad/s
     force: tuple[float, float, float]  # m/s^2
     temperature: float = USUAL  # C
+    saturated: bool = False  # a sample within the cycle was at the gyroscope's range, as the driver saw it
 
 
 @dataclass(frozen=True, slots=True)
@@ -69,6 +72,16 @@ class Surroundings:
     rig_now: float  # s, rig time of the cycle's end
     clock_var: float  # s^2
     synchronised: bool
+
+
+def kernel_of(kernel: Kernel) -> tuple[Callable[..., int], Callable[..., int]]:
+    """The cycle and the intake of aiding in the arithmetic chosen; the integer one is loaded only when it is used."""
+    if kernel == "float64":
+        return run_cycle, offer_aiding
+    from node.kernels.fixed.node import FixedNode
+
+    fixed = FixedNode()
+    return fixed.run_cycle, fixed.offer_aiding
 
 
 class Tube:
@@ -106,8 +119,10 @@ class Tube:
         self._rejecting = False
         self._noticed = Status.NONE  # between cycles
         self._recorder = StaticRecorder()
+        self._guard = SensorGuard(state, config, settings.limits)
         self._slow_cycles = 0  # in a row, not faster than the offset of a gyroscope never calibrated
         self._temperature = USUAL
+        self._run_cycle, self._offer_aiding = kernel_of(settings.kernel)
         self.parameters = parameters or ParameterBlock(settings.tube, 0)
         self.use(self.parameters)
 
@@ -119,20 +134,21 @@ class Tube:
         joint = self.settings.drive_joint if aiding.hops == 0 else None
         offset = wrap(aiding.offset + (joint.angle if joint else 0.0))
         systematic_var = aiding.systematic_var + (joint.std**2 if joint else 0.0)
-        self._noticed |= Status(
-            offer_aiding(
-                self.state,
-                self.config,
-                aiding.yaw,
-                aiding.yaw_var,
-                systematic_var,
-                offset,
-                aiding.rate,
-                valid_local,
-                aiding.sequence,
-                aiding.hops,
+        if self._guard.takes(aiding, offset, valid_local):
+            self._noticed |= Status(
+                self._offer_aiding(
+                    self.state,
+                    self.config,
+                    aiding.yaw,
+                    aiding.yaw_var,
+                    systematic_var,
+                    offset,
+                    aiding.rate,
+                    valid_local,
+                    aiding.sequence,
+                    aiding.hops,
+                )
             )
-        )
         if self.settings.scheme is not Scheme.FORWARD:
             return None
         below = self.settings.lower_joint
@@ -147,21 +163,29 @@ class Tube:
         self, reading: ImuReading, around: Surroundings
     ) -> Iterator[Aiding | SurveyMeasurement | StaticRecord | Event | NodeState]:
         """Correct the reading, run one execution cycle and yield what there is to say."""
+        if not self._guard.admits(reading.start, reading.end):
+            yield from self._sensor_events(around)
+            return
         self._rate[:] = reading.rate
         self._force[:] = reading.force
         self._temperature = reading.temperature
         calibrate(self._correction[0], reading.temperature, self._rate, self._force)
+        raw = (reading.rate, reading.force)
+        self._guard.before(raw, self._rate, self._force, saturated=reading.saturated, at=reading.end)
+        level_coarsely(self.state, self.config, self._rate, self._force)
         self._slow_cycles = self._slow_cycles + 1 if max(map(abs, self._rate)) < LARGEST_OFFSET else 0
         if self._cycles and reading.start - self.state["now"] > 0.5 * (reading.end - reading.start):
             self._overruns += 1
         joined = 1 if around.joined else 0
         status = self._noticed | Status(
-            run_cycle(self.state, self.config, self._rate, self._force, reading.start, reading.end, joined)
+            self._run_cycle(self.state, self.config, self._rate, self._force, reading.start, reading.end, joined)
         )
         self._noticed = Status.NONE
         self._cycles += 1
         if Status.FILTER_FAULT in status:
             self._start_over()
+        self._guard.after(status, reading.end)
+        yield from self._sensor_events(around)
         yield from self._events(status, around)
         yield from self._record(reading, around)
         if Status.SURVEY_READY in status:
@@ -227,7 +251,7 @@ class Tube:
     def flags(self, around: Surroundings, now: float) -> NodeFlag:
         """What the node says of the trust in its own yaw at ``now`` (s, own clock)."""
         state = self.state
-        flags = NodeFlag.NONE
+        flags = self._guard.flags
         if not state["yaw_known"]:
             flags |= NodeFlag.YAW_UNTRUSTED
         if now - state["last_aided"] > self.settings.aiding_old_after:
@@ -253,6 +277,10 @@ class Tube:
             sigmas = abs(float(self.state["innovation"])) / math.sqrt(float(self.state["innovation_var"]))
             yield self._event("aiding_rejected", Severity.WARNING, around.rig_now, {"sigmas": sigmas})
         self._rejecting = rejecting
+
+    def _sensor_events(self, around: Surroundings) -> Iterator[Event]:
+        for code, severity, arguments in self._guard.take_said():
+            yield self._event(code, severity, around.rig_now, arguments)
 
     def _record(self, reading: ImuReading, around: Surroundings) -> Iterator[StaticRecord | Event]:
         recorder = self._recorder

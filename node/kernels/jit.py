@@ -21,7 +21,7 @@ Function = TypeVar("Function", bound=Callable[..., Any])
 def source_digest() -> str:
     """Digest of every kernel source of this package and of the compiler's version."""
     digest = hashlib.sha256(numba.__version__.encode())
-    for source in sorted(Path(__file__).parent.glob("*.py")):
+    for source in sorted(Path(__file__).parent.rglob("*.py")):
         digest.update(source.name.encode() + source.read_bytes())
     return digest.hexdigest()[:16]
 

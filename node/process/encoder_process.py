@@ -2,20 +2,37 @@
 
 from __future__ import annotations
 
+import math
 from pathlib import Path
 from typing import Any
 
 from node.firmware.encoder import EncoderNode, EncoderSample
 from node.process.counter import BootCounter
+from node.process.drivers.source import EncoderSource, SafeEncoder
 from telemetry.application.driven import Driven
 from telemetry.application.station import Station
-from telemetry.messages import ENCODER, Command, Reply, Side
+from telemetry.messages import ENCODER, Command, Event, Reply, Scalar, Severity, Side
 
 
 class EncoderProcess(Driven):
-    """Encoder node on the drive head: upper end to the base station, lower end to the top tube."""
+    """Encoder node on the drive head: upper end to the base station, lower end to the top tube.
 
-    def __init__(self, folder: Path) -> None:
+    Parameters
+    ----------
+    folder : where its starts are counted
+    source : the node's own counter; without one a cycle brings its sample
+
+    Raises
+    ------
+    SensorError
+        When the counter is absent at the start.
+    """
+
+    def __init__(self, folder: Path, source: EncoderSource | None = None) -> None:
+        if source is not None:
+            source.start()
+        self._source = SafeEncoder(source, self._say) if source is not None else None
+        self._now = 0.0
         counter = BootCounter(folder)
         self.station = Station(ENCODER, frozenset(Side), boot_count=counter.boots, is_clock_root=True)
         # sequence numbers of a later boot are all larger, so a tube never takes a new measurement for an old one
@@ -30,7 +47,22 @@ class EncoderProcess(Driven):
 
     def on_cycle(self, data: Any, now: float) -> None:
         """The counter was read: ``data`` is start (s), count, time of its last edge (s), 1 if it rose."""
-        _, count, edge_at, rising = data
-        aiding = self.encoder.on_cycle(EncoderSample(int(count), edge_at, bool(rising)), now)
-        self.station.send_aiding(aiding, now)
+        self._now = now
+        sample = self._source.read(now) if self._source is not None else sample_of(data)
+        if sample is not None:
+            self.station.send_aiding(self.encoder.on_cycle(sample, now), now)
         self.station.advance(now)
+
+    def _say(self, severity: Severity, code: str, arguments: dict[str, Scalar]) -> None:
+        event = Event(ENCODER, self.station.new_sequence(), self._now, severity, code, arguments)
+        self.station.submit(event, self._now)
+
+
+def sample_of(data: Any) -> EncoderSample | None:
+    """Sample of a cycle; None for what is none."""
+    try:
+        _, count, edge_at, rising = data
+        sample = EncoderSample(int(count), float(edge_at), bool(rising))
+    except (TypeError, ValueError, OverflowError):
+        return None
+    return sample if math.isfinite(sample.edge_at) else None

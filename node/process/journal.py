@@ -48,9 +48,24 @@ class Journal:
     def save(self, state: Array, blob: bytes) -> None:
         """Write the older slot and force it to the disk before returning."""
         self._generation += 1
-        descriptor = os.open(self._slots[self._generation % 2], os.O_WRONLY | os.O_CREAT | os.O_TRUNC, 0o600)
+        slot = self._slots[self._generation % 2]
+        is_new = not slot.exists()
+        rest = memoryview(pack(state, blob, self._generation))
+        descriptor = os.open(slot, os.O_WRONLY | os.O_CREAT | os.O_TRUNC, 0o600)
         try:
-            os.write(descriptor, pack(state, blob, self._generation))
+            while rest:
+                rest = rest[os.write(descriptor, rest) :]
             os.fsync(descriptor)
         finally:
             os.close(descriptor)
+        if is_new:
+            sync_folder(slot.parent)
+
+
+def sync_folder(folder: Path) -> None:
+    """Force the names in ``folder`` to the disk: a new file is not kept by forcing its bytes alone."""
+    descriptor = os.open(folder, os.O_RDONLY)
+    try:
+        os.fsync(descriptor)
+    finally:
+        os.close(descriptor)

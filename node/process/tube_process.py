@@ -11,8 +11,9 @@ from node.firmware.saved_state import resume
 from node.firmware.settings import TubeSettings
 from node.firmware.tube import ImuReading, Surroundings, Tube
 from node.kernels.calibration import USUAL
-from node.kernels.layout import Array, default_config, new_state
+from node.kernels.layout import PERIOD, Array, default_config, new_state
 from node.process.counter import BootCounter
+from node.process.drivers.source import NOTHING, ImuSource, SafeImu
 from node.process.journal import Journal
 from node.process.parameter_keeper import ParameterKeeper, load_parameters
 from node.process.parameter_store import ParameterStore
@@ -49,12 +50,26 @@ class TubeProcess(Driven):
     folder : where the state is saved
     config : one record of dtype ``CONFIG``; the default is that of an MPU6500-class node
     key : of the rig; without one the node takes no parameter block
+    imu : the node's own sensor; without one a cycle brings its reading
+
+    Raises
+    ------
+    SensorError
+        When the sensor is absent at the start.
     """
 
     def __init__(
-        self, settings: TubeSettings, folder: Path, config: Array | None = None, key: bytes | None = None
+        self,
+        settings: TubeSettings,
+        folder: Path,
+        config: Array | None = None,
+        key: bytes | None = None,
+        imu: ImuSource | None = None,
     ) -> None:
         self.settings = settings
+        if imu is not None:
+            imu.start()
+        self._imu = SafeImu(imu, self._say_event) if imu is not None else None
         self.config = default_config() if config is None else config
         self._journal = Journal(folder)
         # apart from the saved state: a neighbour must not take a life that lost it for an earlier one
@@ -101,11 +116,13 @@ class TubeProcess(Driven):
     def on_cycle(self, data: Any, now: float) -> None:
         """The IMU delivered a cycle: ``data`` is start (s), three rates (rad/s), three forces (m/s^2), raw.
 
-        A sensor that knows its temperature (C) adds it.
+        A sensor that knows its temperature (C) adds it. A sensor of the node's own stands for the reading.
         """
-        start, wx, wy, wz, fx, fy, fz, *rest = data
         self._now = now
-        reading = ImuReading(start, now, (wx, wy, wz), (fx, fy, fz), rest[0] if rest else USUAL)
+        reading = reading_of(data, now)
+        if self._imu is not None:
+            sample = self._imu.read(reading.start, now)
+            reading = ImuReading(reading.start, now, sample.rate, sample.force, sample.temperature, sample.saturated)
         around = self._surroundings(now)
         if around.synchronised:
             self._announce(around.rig_now, now)
@@ -199,3 +216,16 @@ class TubeProcess(Driven):
 
     def _save(self) -> None:
         self._journal.save(self.state, self.station.export_state())
+
+
+def reading_of(data: Any, now: float) -> ImuReading:
+    """Reading of a cycle that ended at ``now`` (s, own clock); what is none is a reading of no numbers."""
+    try:
+        numbers = [float(item) for item in data]
+    except (TypeError, ValueError, OverflowError):
+        numbers = []
+    start = numbers[0] if numbers else now - PERIOD
+    if not 7 <= len(numbers) <= 8:
+        return ImuReading(start, now, NOTHING, NOTHING)
+    _, wx, wy, wz, fx, fy, fz, *rest = numbers
+    return ImuReading(start, now, (wx, wy, wz), (fx, fy, fz), rest[0] if rest else USUAL)

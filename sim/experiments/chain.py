@@ -13,7 +13,7 @@ import numpy as np
 import numpy.typing as npt
 
 from node.firmware.encoder import QUANTUM, EncoderNode, EncoderSample
-from node.firmware.settings import Joint, TubeSettings
+from node.firmware.settings import Joint, Kernel, TubeSettings
 from node.firmware.tube import ImuReading, Surroundings, Tube
 from node.kernels.angles import wrap
 from node.kernels.layout import PERIOD, Scheme, default_config, new_state
@@ -44,6 +44,7 @@ class ChainSetup:
     clock_wander_tau: float = 60.0  # s
     latency: float = 3e-3  # s, each hop
     loss: float = 0.01  # each hop
+    kernel: Kernel = "float64"
 
 
 @dataclass(frozen=True, slots=True)
@@ -113,6 +114,7 @@ class Chain:
             mount_std=self._setup.mount_std,
             scheme=self._setup.scheme,
             state_every=10**9,
+            kernel=self._setup.kernel,
         )
         config = default_config()
         return Tube(settings, config, new_state(config), iter(range(10**9)).__next__, restored=False)

@@ -9,6 +9,7 @@ import numpy as np
 
 from groundstation.config import GroundConfig
 from groundstation.process import GroundProcess
+from node.firmware.sensor_faults import SensorLimits
 from node.firmware.settings import TubeSettings
 from node.kernels.layout import PERIOD
 from node.process.encoder_process import EncoderProcess
@@ -19,6 +20,10 @@ from telemetry.parameters import ParameterBlock
 from telemetry.transport.authentication import new_key, read_key
 
 STEP = 0.01
+
+
+# readings here hold no noise: a stuck sensor looks like them
+NOISELESS = SensorLimits(repeats_together=0, repeats_alone=0)
 
 
 class Rig:
@@ -49,7 +54,9 @@ class Rig:
         elif address == ENCODER:
             self.processes[ENCODER] = EncoderProcess(folder)
         else:
-            self.processes[address] = TubeProcess(TubeSettings(address), folder, key=read_key(self.folder / "rig.key"))
+            self.processes[address] = TubeProcess(
+                TubeSettings(address, limits=NOISELESS), folder, key=read_key(self.folder / "rig.key")
+            )
 
     def watch(self) -> None:
         send, take = self.ground.station.send_segment, self.ground._take

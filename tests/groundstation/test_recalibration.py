@@ -8,7 +8,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from memory_rig import Rig
+from memory_rig import NOISELESS, Rig
 
 from groundstation.calibration.attitudes import fit
 from groundstation.calibration.block import Calibration, Provenance
@@ -141,7 +141,7 @@ def test_a_wrong_key_is_refused_with_one_event(rig: Rig) -> None:
 
 
 def test_a_node_without_a_key_takes_no_block_and_a_ground_station_without_one_sends_none(rig: Rig) -> None:
-    rig.processes[1] = TubeProcess(TubeSettings(1), rig.folder / "1")
+    rig.processes[1] = TubeProcess(TubeSettings(1, limits=NOISELESS), rig.folder / "1")
     rig.run(3.0)
     status = rig.upload(block())
     assert status.phase is UploadPhase.UNTRUSTED
@@ -224,7 +224,7 @@ def test_a_power_cut_at_any_step_of_the_change_leaves_one_block_whole(rig: Rig) 
     assert process.tube.parameters.version == 2
     versions = []
     for cut in cuts:
-        again = TubeProcess(TubeSettings(1), cut, key=read_key(rig.folder / "rig.key"))
+        again = TubeProcess(TubeSettings(1, limits=NOISELESS), cut, key=read_key(rig.folder / "rig.key"))
         versions.append(again.tube.parameters.version)
         assert again.tube.parameters == {1: block(1), 2: block(2, bias=2e-3)}[versions[-1]]
         assert again._fallback == ""

@@ -1,0 +1,205 @@
+/* The filter at the epoch of its measurements, a copy of it predicted to now; static, to be included once. */
+#ifndef BORECHAIN_FIXED_LAG_H
+#define BORECHAIN_FIXED_LAG_H
+
+#include "filter.h"
+
+#include <string.h>
+
+static void push(State *state, double start, double end, const double rate[3], const double force[3], int64_t quiet)
+{
+    int64_t slot = state->cycles % RING;
+    state->ring_start[slot] = start;
+    state->ring_end[slot] = end;
+    state->ring_quiet[slot] = quiet;
+    for (int k = 0; k < 3; k++) {
+        state->ring_rate[slot][k] = rate[k];
+        state->ring_force[slot][k] = force[k];
+    }
+    state->cycles++;
+    if (state->cycles == 1)
+        state->epoch = start;
+}
+
+static int stood_still(const State *state, int64_t cycle)
+{
+    if (state->ring_quiet[cycle % RING] == 0 || cycle == 0 || state->ring_quiet[(cycle - 1) % RING] == 0)
+        return 0;
+    return cycle + 1 >= state->cycles || state->ring_quiet[(cycle + 1) % RING] != 0;
+}
+
+static double spin(const State *state, int64_t slot)
+{
+    return (state->ring_rate[slot][2] - state->static_bias[2] - state->bias[2]) / (1.0 + state->scale);
+}
+
+static uint32_t turn(const State *state, const Config *config, int64_t cycle, double dt, uint32_t yaw, double down[3],
+                     Matrix P)
+{
+    int64_t slot = cycle % RING;
+    if (stood_still(state, cycle)) {
+        propagate(P, 0.0, dt, 0.0, config);
+        return yaw;
+    }
+    double wx = state->ring_rate[slot][0] - state->static_bias[0] - state->bias[0];
+    double wy = state->ring_rate[slot][1] - state->static_bias[1] - state->bias[1];
+    double wz = spin(state, slot);
+    rotate_down(down, wx, wy, wz, 0.5 * dt);
+    double turned = yaw_rate(down, wx, wy, wz) * dt;
+    rotate_down(down, wx, wy, wz, 0.5 * dt);
+    propagate(P, wz, dt, 1.0, config);
+    return advance_binary(yaw, turned);
+}
+
+static void advance(State *state, const Config *config, int64_t cycle, double until)
+{
+    double dt = until - state->epoch;
+    if (dt <= 0.0)
+        return;
+    double gap = state->ring_start[cycle % RING] - state->epoch;
+    state->yaw = turn(state, config, cycle, dt, state->yaw, state->down, state->P);
+    if (gap > 1e-3)
+        state->P[PSI][PSI] += square(state->ring_rate[cycle % RING][2] * gap);
+    for (int k = 0; k < 3; k++)
+        state->bias[k] *= exp(-dt / config->bias_tau[k]);
+    state->epoch = until;
+}
+
+static double interpolation_var(const State *state, int64_t cycle, double at)
+{
+    int64_t slot = cycle % RING;
+    double inside = smaller(at - state->ring_start[slot], state->ring_end[slot] - at);
+    if (inside <= 0.0 || cycle == 0)
+        return 0.0;
+    double change = state->ring_rate[slot][2] - state->ring_rate[(cycle - 1) % RING][2];
+    if (cycle + 1 < state->cycles) {
+        double ahead = state->ring_rate[(cycle + 1) % RING][2] - state->ring_rate[slot][2];
+        change = larger(fabs(change), fabs(ahead));
+    }
+    return square(0.5 * change * inside);
+}
+
+static void reset_yaw(State *state, const Config *config, double yaw, double var)
+{
+    state->yaw = to_binary(yaw);
+    isolate(state->P, PSI, var);
+    isolate(state->P, BZ, larger(square(config->bias_std[2]) + state->static_bias_var[2], state->P[BZ][BZ]));
+    state->bias[2] = 0.0;
+    state->yaw_known = 1;
+    state->rejected = 0;
+}
+
+static int64_t aid(State *state, const Config *config, double yaw, double r_var, double rate, double at)
+{
+    if (!state->yaw_known) {
+        reset_yaw(state, config, yaw, r_var + square(rate * config->stamp_std));
+        state->last_aided = at;
+        return AIDED | YAW_RESET;
+    }
+    clear(state->h);
+    state->h[PSI] = 1.0;
+    if (config->stamp_std > 0.0)
+        state->h[STAMP] = rate;
+    double s = innovation_var(state->P, state->h, r_var, state->ph);
+    double residual = wrap(yaw - from_binary(state->yaw) - rate * state->stamp);
+    state->innovation = residual;
+    state->innovation_var = s;
+    if (residual * residual > config->gate * config->gate * s) {
+        state->rejected++;
+        state->last_sequence = -1;
+        if (state->rejected < config->reject_limit)
+            return REJECTED;
+        reset_yaw(state, config, yaw, r_var + square(rate * config->stamp_std));
+        isolate(state->P, STAMP, square(config->stamp_std));
+        state->stamp = 0.0;
+        state->last_aided = at;
+        return REJECTED | AIDED | YAW_RESET;
+    }
+    joseph(state->P, state->ph, s, state->gain);
+    feed_back(state, residual);
+    state->rejected = 0;
+    state->last_aided = at;
+    return AIDED;
+}
+
+static int64_t aid_late(State *state, const Config *config, double yaw, double var, double rate, double at)
+{
+    double moved = yaw, earliest = state->epoch;
+    for (int64_t cycle = state->consumed; cycle >= 0 && cycle > state->cycles - RING && earliest > at; cycle--) {
+        int64_t slot = cycle % RING;
+        double begin = larger(state->ring_start[slot], at);
+        if (begin < earliest) {
+            if (!stood_still(state, cycle))
+                moved += spin(state, slot) * (earliest - begin);
+            earliest = begin;
+        }
+    }
+    if (earliest > at + 1e-3)
+        return LATE_DROPPED;
+    double lag = state->epoch - at;
+    double noise = square(config->gyro_noise[2]) * lag + state->P[BZ][BZ] * lag * lag;
+    return aid(state, config, moved, var + noise, rate, at);
+}
+
+static void move_pending(State *state, int64_t to, int64_t from)
+{
+    state->pending_at[to] = state->pending_at[from];
+    state->pending_yaw[to] = state->pending_yaw[from];
+    state->pending_var[to] = state->pending_var[from];
+    state->pending_rate[to] = state->pending_rate[from];
+    state->pending_sequence[to] = state->pending_sequence[from];
+}
+
+static int64_t take_pending(State *state, const Config *config, int64_t cycle, double until)
+{
+    int64_t status = 0;
+    while (state->pending > 0 && state->pending_at[0] <= until) {
+        double at = state->pending_at[0], yaw = state->pending_yaw[0];
+        double var = state->pending_var[0], rate = state->pending_rate[0];
+        if (at >= state->epoch) {
+            advance(state, config, cycle, at);
+            status |= aid(state, config, yaw, var + interpolation_var(state, cycle, at), rate, at);
+        } else {
+            status |= aid_late(state, config, yaw, var, rate, at);
+        }
+        state->pending--;
+        for (int64_t k = 0; k < state->pending; k++)
+            move_pending(state, k, k + 1);
+    }
+    return status;
+}
+
+static int64_t consume(State *state, const Config *config)
+{
+    int64_t status = 0;
+    while (state->consumed < state->cycles - config->lag_cycles) {
+        int64_t cycle = state->consumed, slot = cycle % RING;
+        double end = state->ring_end[slot];
+        status |= take_pending(state, config, cycle, end);
+        advance(state, config, cycle, end);
+        if (stood_still(state, cycle)) {
+            zero_rate(state, state->ring_rate[slot], end - state->ring_start[slot], config);
+            level(state, state->ring_force[slot], config);
+        }
+        state->consumed++;
+    }
+    return status;
+}
+
+static void predict_to_now(State *state, const Config *config)
+{
+    memcpy(state->now_P, state->P, sizeof state->P);
+    memcpy(state->now_down, state->down, sizeof state->down);
+    state->now_yaw = state->yaw;
+    state->now = state->epoch;
+    for (int64_t cycle = state->consumed; cycle < state->cycles; cycle++) {
+        double end = state->ring_end[cycle % RING], dt = end - state->now;
+        if (dt > 0.0) {
+            state->now_yaw = turn(state, config, cycle, dt, state->now_yaw, state->now_down, state->now_P);
+            state->now = end;
+        }
+    }
+    state->now_rate = spin(state, (state->cycles - 1) % RING);
+}
+
+#endif

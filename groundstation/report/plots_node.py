@@ -1,0 +1,197 @@
+"""Figures of the filter of a node: yaw and azimuth by update mode, tuning, delay, consistency.
+
+Source: thesis figures 4.11-4.22. Angles in deg, times in s, biases in deg/s.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
+from matplotlib.patches import Patch
+
+from groundstation.report.style import GREY, INK, LIGHT, MARKERS, SERIES, WRONG, new_figure, styled, tidy
+
+Array = npt.NDArray[np.float64]
+SMALLEST = 1e-3  # deg, below which an error is no longer drawn
+SHOWN = (0.005, 2.0)  # deg, of figures beside the published ones
+OURS_LABEL = "ours, 95 % interval"
+
+
+@dataclass(frozen=True, slots=True)
+class YawPanel:
+    """Yaw error of one case over time; deg."""
+
+    name: str
+    t: Array  # s after the stop
+    one: Array  # of one seed
+    rms: Mapping[str, Array]  # over seeds, by the state of the node
+    to_reach: float | None  # at rest
+
+
+@dataclass(frozen=True, slots=True)
+class Reach:
+    """One figure beside the published one and the one to reach; deg."""
+
+    name: str
+    ours: float
+    low: float
+    high: float
+    published: float | None
+    to_reach: float | None
+
+
+@styled
+def yaw_figure(panels: Sequence[YawPanel], title: str) -> Figure:
+    """Size of the yaw error around the stop at zero, a panel a case."""
+    rows = -(-len(panels) // 2)
+    figure = new_figure(1.1 + 1.9 * rows, title)
+    grid = figure.subplots(rows, 2, sharex=True, sharey=True, squeeze=False)
+    for axes in grid.flat[len(panels) :]:
+        axes.remove()
+    top = 1.5 * max(float(rms.max()) for panel in panels for rms in panel.rms.values())
+    for k, (axes, panel) in enumerate(zip(grid.flat, panels, strict=False)):
+        end = float(panel.t.max())
+        axes.axvspan(0.0, end, color=LIGHT, alpha=0.35, lw=0.0)
+        axes.plot(panel.t, np.maximum(np.abs(panel.one), SMALLEST), color=GREY, lw=0.5)
+        for colour, rms in zip(SERIES, panel.rms.values(), strict=False):
+            axes.plot(panel.t, rms, color=colour)
+        if panel.to_reach is not None:
+            axes.plot([0.0, end], [panel.to_reach] * 2, color=INK, ls="--", lw=0.9)
+        axes.set(title=panel.name, yscale="log", xlim=(float(panel.t.min()), end))
+        axes.set_ylim(SMALLEST, top)
+        if k % 2 == 0:
+            axes.set_ylabel("Yaw error (deg)")
+        if k + 2 >= len(panels):
+            axes.set_xlabel("Time after the stop (s)")
+            axes.tick_params(labelbottom=True)
+    names = list(panels[0].rms)
+    handles = [Line2D([], [], color=c, label=f"rms, {n}") for c, n in zip(SERIES, names, strict=False)]
+    handles.append(Line2D([], [], color=GREY, lw=0.5, label="one seed"))
+    handles.append(Line2D([], [], color=INK, ls="--", lw=0.9, label="to reach at rest"))
+    figure.legend(
+        handles=[*handles, Patch(color=LIGHT, alpha=0.35, label="at rest")], loc="outside lower left", ncols=5
+    )
+    return tidy(figure)
+
+
+@styled
+def reach_figure(panels: Mapping[str, Sequence[Reach]], title: str) -> Figure:
+    """Figures with their intervals beside the published ones and those to reach, a panel a quantity."""
+    longest = max(len(rows) for rows in panels.values())
+    figure = new_figure(1.3 + 0.24 * longest, title)
+    for axes, (quantity, rows) in zip(figure.subplots(1, len(panels), squeeze=False)[0], panels.items(), strict=True):
+        for y, reach in enumerate(rows):
+            missed = reach.to_reach is not None and reach.ours > reach.to_reach
+            colour = WRONG if missed else SERIES[0]
+            axes.plot([reach.low, reach.high], [y, y], color=colour, lw=2.0)
+            axes.plot(reach.ours, y, MARKERS[0], color=colour)
+            if reach.to_reach is not None:
+                axes.plot(reach.to_reach, y, "|", color=INK, ms=11.0, mew=1.4)
+            if reach.published is not None:
+                axes.plot(reach.published, y, "x", color=GREY, ms=6.0, mew=1.4)
+        axes.set(xscale="log", xlabel=f"{quantity}, rms (deg)", xlim=SHOWN, ylim=(len(rows) - 0.5, -0.5))
+        axes.set_yticks(range(len(rows)), [reach.name for reach in rows])
+    for axes in figure.axes[1:]:
+        axes.tick_params(labelleft=False)
+    handles = [
+        Line2D([], [], color=SERIES[0], marker=MARKERS[0], lw=2.0, label=OURS_LABEL),
+        Line2D([], [], color=WRONG, marker=MARKERS[0], lw=2.0, label="ours, not reached"),
+        Line2D([], [], color=INK, ls="", marker="|", ms=11.0, mew=1.4, label="to reach"),
+        Line2D([], [], color=GREY, ls="", marker="x", ms=6.0, mew=1.4, label="published"),
+    ]
+    figure.legend(handles=handles, loc="outside lower left", ncols=4)
+    return tidy(figure)
+
+
+@styled
+def bias_figure(groups: Mapping[str, Mapping[str, tuple[Array, Array]]], residual_dps: float, title: str) -> Figure:
+    """Error of the z bias after the stop at zero, a panel a tuning factor.
+
+    Parameters
+    ----------
+    groups : factor to name to times (n,) s and errors (n,) deg/s
+    residual_dps : deg/s, error that the filter began with
+    """
+    figure = new_figure(3.6, title)
+    for k, (axes, (factor, series)) in enumerate(
+        zip(figure.subplots(1, len(groups), sharey=True), groups.items(), strict=True)
+    ):
+        axes.axhline(residual_dps, color=GREY, ls="--", lw=0.9)
+        for colour, (name, (t, error)) in zip(SERIES, series.items(), strict=False):
+            axes.plot(t, np.abs(error), color=colour, label=name)
+        axes.set(title=factor, xlabel="Time after the stop (s)", xlim=(-5.0, 60.0), ylim=(0.0, 1.6 * residual_dps))
+        axes.legend(loc="upper right", ncols=2)
+        if k == 0:
+            axes.set_ylabel("Error of the z bias (deg/s)")
+    figure.legend(
+        handles=[Line2D([], [], color=GREY, ls="--", lw=0.9, label="left over by the boot")], loc="outside lower left"
+    )
+    return tidy(figure)
+
+
+@styled
+def delay_figure(
+    panels: Mapping[str, Mapping[str, tuple[Array, Array]]], published: tuple[Array, Array], to_reach: float, title: str
+) -> Figure:
+    """Yaw error over the delay of the aiding, a panel a state of the string.
+
+    Parameters
+    ----------
+    panels : state to form to delays (n,) ms and rms (n,) deg
+    published : delays (m,) ms and errors (m,) deg of the first panel, without compensation
+    to_reach : deg, in the first panel
+    """
+    figure = new_figure(3.6, title)
+    grid = figure.subplots(1, len(panels), sharey=True)
+    for axes, (state, forms) in zip(grid, panels.items(), strict=True):
+        for k, (form, (delays, rms)) in enumerate(forms.items()):
+            axes.plot(delays, rms, color=SERIES[k], marker=MARKERS[k], label=form)
+        axes.set(title=state, xlabel="Delay (ms)", yscale="log")
+    grid[0].plot(*published, "x", color=GREY, ms=8.0, mew=1.4, label="published, uncompensated")
+    grid[0].axhline(to_reach, color=INK, ls="--", lw=0.9, label="to reach, compensated")
+    grid[0].set_ylabel("Yaw error, rms (deg)")
+    figure.legend(*grid[0].get_legend_handles_labels(), loc="outside lower left", ncols=3)
+    return tidy(figure)
+
+
+@styled
+def consistency_figure(
+    panels: Mapping[tuple[str, str], Mapping[str, Array]], bounds: tuple[float, float], title: str
+) -> Figure:
+    """NEES over hops with the bounds of all cells, rows of states and columns of outages.
+
+    Parameters
+    ----------
+    panels : (state, outage) to loss to NEES (hops,)
+    bounds : of an honest filter; cells beyond are marked
+    """
+    states, outages = (list(dict.fromkeys(key[k] for key in panels)) for k in (0, 1))
+    figure = new_figure(1.0 + 1.9 * len(states), title)
+    grid = figure.subplots(len(states), len(outages), sharex=True, sharey=True, squeeze=False)
+    for (state, outage), losses in panels.items():
+        axes = grid[states.index(state), outages.index(outage)]
+        axes.axhspan(*bounds, color=LIGHT, alpha=0.6, lw=0.0)
+        axes.axhline(1.0, color=GREY, lw=0.8)
+        for k, values in enumerate(losses.values()):
+            hops = np.arange(1, len(values) + 1)
+            beyond = (values < bounds[0]) | (values > bounds[1])
+            axes.plot(hops, values, color=SERIES[k], marker=MARKERS[k])
+            axes.plot(hops[beyond], values[beyond], "o", ms=9.0, mfc="none", mec=WRONG, mew=1.2)
+        axes.set(title=f"{outage}, {state}", yscale="log")
+        axes.set_yticks([0.5, 0.7, 1.0, 1.4, 2.0])
+        axes.set_xticks(hops)
+    for axes in grid[:, 0]:
+        axes.set_ylabel("NEES")
+    for axes in grid[-1]:
+        axes.set_xlabel("Hop")
+    names = list(next(iter(panels.values())))
+    handles = [Line2D([], [], color=SERIES[k], marker=MARKERS[k], label=name) for k, name in enumerate(names)]
+    handles.append(Line2D([], [], ls="", marker="o", ms=9.0, mfc="none", mec=WRONG, label="beyond the bounds"))
+    handles_all = [*handles, Patch(color=LIGHT, alpha=0.6, label=f"{bounds[0]:g} to {bounds[1]:g}")]
+    figure.legend(handles=handles_all, loc="outside lower left", ncols=5)
+    return tidy(figure)

@@ -1,0 +1,89 @@
+"""The update with a measured yaw, in integers: gate, reset and recovery as in ``node.kernels.fixed_lag``."""
+
+from __future__ import annotations
+
+from typing import Any, Final
+
+from node.kernels.fixed.arithmetic import clamp, mul, shift
+from node.kernels.fixed.error_model import isolate
+from node.kernels.fixed.layout import ANGLE_Q, CEILING, LEVEL_Q, RATE_Q, UNIT, VAR_Q
+from node.kernels.fixed.trigonometry import TURN, counts, difference, radians
+from node.kernels.fixed.update import UNITY, feed_back, innovation_var, joseph
+from node.kernels.jit import kernel
+from node.kernels.layout import Err, Status
+
+PSI, BZ, D = int(Err.YAW), int(Err.BIAS_Z), int(Err.STAMP)
+AIDED, REJECTED, YAW_RESET = int(Status.AIDED), int(Status.REJECTED), int(Status.YAW_RESET)
+RATE_RIGHT: Final = RATE_Q + UNIT - LEVEL_Q  # from rad/s to rad a stamp unit in Q31
+LARGEST_STAMPED: Final = 1 << ANGLE_Q  # rad
+SQUARE_RIGHT: Final = ANGLE_Q - VAR_Q // 2
+
+
+@kernel
+def reset_yaw(state: Any, config: Any, yaw: int, var: int) -> None:
+    """Take the yaw (binary) from the aiding; the bias is re-inflated and no cross term is kept, for they are stale."""
+    state.yaw = yaw & TURN
+    isolate(state.P, PSI, min(var, CEILING))
+    isolate(state.P, BZ, max(min(config.bias_var[2] + state.static_bias_var[2], CEILING), state.P[BZ, BZ]))
+    state.bias[2] = 0
+    state.yaw_known = 1
+    state.rejected = 0
+
+
+@kernel
+def stamped(state: Any, rate: int) -> int:
+    """Rate d, rad in Q40, of a ``rate`` in rad/s, Q46."""
+    seconds = clamp(state, state.stamp, (1 << RATE_Q) - 1)  # Q46
+    angle = mul(rate, seconds >> (RATE_Q - LEVEL_Q))  # Q46
+    return clamp(state, shift(angle, RATE_Q - ANGLE_Q), LARGEST_STAMPED)
+
+
+@kernel
+def aid(state: Any, config: Any, yaw: int, r_var: int, rate: int, at: int) -> int:
+    """Update with a yaw ``z = psi + rate d`` at the filter's epoch; returns ``Status`` bits.
+
+    Parameters
+    ----------
+    yaw : binary angle
+    r_var : rad^2, Q56
+    rate : rad/s, Q46, up to 32
+    at : s, Q28
+    """
+    h = shift(rate, RATE_RIGHT)
+    unknown_var = r_var + mul(mul(config.stamp_var, h), h)
+    if state.yaw_known == 0:
+        reset_yaw(state, config, yaw, unknown_var)
+        state.last_aided = at
+        return AIDED | YAW_RESET
+    s = innovation_var(state, PSI, UNITY, D, h if config.stamp_on == 1 else 0, r_var)
+    residual = radians(difference(yaw, int(state.yaw) + counts(stamped(state, rate), ANGLE_Q)))
+    state.innovation = residual
+    state.innovation_var = s
+    coarse = shift(residual, SQUARE_RIGHT)
+    if mul(coarse * coarse, config.gate_inverse) > s:
+        state.rejected += 1
+        state.last_sequence = -1  # it was not used: its repetition at rest is to be judged again
+        if state.rejected < config.reject_limit:
+            return REJECTED
+        reset_yaw(state, config, yaw, unknown_var)
+        isolate(state.P, D, config.stamp_var)
+        state.stamp = 0
+        state.last_aided = at
+        return REJECTED | AIDED | YAW_RESET
+    joseph(state, s)
+    feed_back(state, residual)
+    state.rejected = 0
+    state.last_aided = at
+    return AIDED
+
+
+@kernel
+def drop_first_pending(state: Any) -> None:
+    """Shift the queue of waiting measurements by one."""
+    state.pending -= 1
+    for k in range(state.pending):
+        state.pending_at[k] = state.pending_at[k + 1]
+        state.pending_yaw[k] = state.pending_yaw[k + 1]
+        state.pending_var[k] = state.pending_var[k + 1]
+        state.pending_rate[k] = state.pending_rate[k + 1]
+        state.pending_sequence[k] = state.pending_sequence[k + 1]

@@ -1,0 +1,210 @@
+"""The filter at the epoch of its measurements, in integers: the float64 form is ``node.kernels.fixed_lag``."""
+
+from __future__ import annotations
+
+from typing import Any, Final
+
+from node.kernels.fixed.aiding import aid, drop_first_pending
+from node.kernels.fixed.arithmetic import mul, quotient, shift
+from node.kernels.fixed.error_model import decays, propagate, widen
+from node.kernels.fixed.layout import FAST, LONGEST_GAP, LONGEST_STEP, ONE_SECOND, RATE_Q, STEP_Q, TIME_Q, UNIT, VAR_Q
+from node.kernels.fixed.strapdown import half_turn, rotate_down, yaw_rate
+from node.kernels.fixed.trigonometry import TURN, counts
+from node.kernels.fixed.update import level, zero_rate
+from node.kernels.jit import kernel
+from node.kernels.layout import RING, STATES, Array, Err, Status
+
+PSI, BZ = int(Err.YAW), int(Err.BIAS_Z)
+LATE_DROPPED = int(Status.LATE_DROPPED)
+UNITY_SCALE: Final = 1 << 30
+SCALE_RIGHT: Final = RATE_Q - 30
+SQUARE_Q: Final = VAR_Q // 2  # of an angle whose square is a variance
+LARGEST_SQUARED: Final = 4 << SQUARE_Q  # rad
+GAP_RIGHT: Final = 10  # a gap of 2^12 s is a factor of 31 bits
+MISSED_GAP: Final = ONE_SECOND // 1000
+SLOT: Final = RING - 1  # RING is a power of two
+
+
+@kernel
+def push(state: Any, start: int, end: int, rate: Array, force: Array, quiet: int) -> None:
+    """Write one cycle's increments: times (s, Q28), mean rate (3, rad/s, Q46), mean specific force (3, g, Q26)."""
+    slot = state.cycles & SLOT
+    state.ring_start[slot] = start
+    state.ring_end[slot] = end
+    state.ring_quiet[slot] = quiet
+    for k in range(3):
+        state.ring_rate[slot, k] = rate[k]
+        state.ring_force[slot, k] = force[k]
+    state.cycles += 1
+    if state.cycles == 1:
+        state.epoch = start
+
+
+@kernel
+def stood_still(state: Any, cycle: int) -> int:
+    """Whether the string stood still in ``cycle``: it and both neighbours were quiet, 1 or 0."""
+    if state.ring_quiet[cycle & SLOT] == 0 or cycle == 0:
+        return 0
+    if state.ring_quiet[(cycle - 1) & SLOT] == 0:
+        return 0
+    return 1 if cycle + 1 >= state.cycles or state.ring_quiet[(cycle + 1) & SLOT] != 0 else 0
+
+
+@kernel
+def true_rate_z(state: Any, slot: int) -> int:
+    """(w_z - b_z) / (1 + s) of a ``slot`` of the ring, rad/s in Q46."""
+    one = UNITY_SCALE + shift(state.scale, SCALE_RIGHT)
+    return quotient(state.ring_rate[slot, 2] - state.static_bias[2] - state.bias[2], max(one, UNITY_SCALE >> 4))
+
+
+@kernel
+def turn(state: Any, config: Any, cycle: int, dt: int, yaw: int, down: Array, P: Array) -> int:
+    """Integrate ``dt`` (s, Q28) of ``cycle`` into ``down`` and ``P``; returns the binary yaw. Still means no turn."""
+    slot = cycle & SLOT
+    still = stood_still(state, cycle)
+    wx = state.ring_rate[slot, 0] - state.static_bias[0] - state.bias[0]
+    wy = state.ring_rate[slot, 1] - state.static_bias[1] - state.bias[1]
+    wz = true_rate_z(state, slot)
+    longest = LONGEST_STEP if abs(wz) < FAST else ONE_SECOND
+    while dt > 0:
+        piece = min(dt, longest)
+        dt -= piece
+        if still == 1:
+            propagate(state, P, 0, piece, 0, config)
+            continue
+        ax, ay, az, s, c = half_turn(wx, wy, wz, piece)
+        rotate_down(down, ax, ay, az, s, c)
+        yaw = (yaw + counts(mul(yaw_rate(down, wx, wy, wz), piece), STEP_Q)) & TURN
+        rotate_down(down, ax, ay, az, s, c)
+        propagate(state, P, wz, piece, 1, config)
+    return yaw
+
+
+@kernel
+def gap_held(state: Any, dt: int) -> int:
+    """``dt`` (s, Q28), not longer than what is integrated of cycles that were lost."""
+    if dt > LONGEST_GAP:
+        state.overflows += 1
+        return LONGEST_GAP
+    return dt
+
+
+@kernel
+def advance(state: Any, config: Any, cycle: int, until: int) -> None:
+    """Move the filter's epoch to ``until`` (s, Q28), inside ``cycle`` or at its end."""
+    dt = gap_held(state, until - state.epoch)
+    if dt <= 0:
+        return
+    gap = state.ring_start[cycle & SLOT] - state.epoch
+    state.yaw = turn(state, config, cycle, dt, int(state.yaw), state.down, state.P)
+    if gap > MISSED_GAP:
+        # cycles were lost: the rate of this one stands for them, and is not trusted further than its own size
+        missed = gap_angle(state.ring_rate[cycle & SLOT, 2], gap_held(state, gap))
+        widen(state, state.P, PSI, missed * missed)
+    while dt > 0:
+        piece = min(dt, LONGEST_STEP)
+        dt -= piece
+        decays(state, config, piece)
+        for k in range(3):
+            state.bias[k] = mul(state.bias[k], state.decay[k])
+    state.epoch = until
+
+
+@kernel
+def gap_angle(rate: int, gap: int) -> int:
+    """Size of ``rate`` (rad/s, Q46) times ``gap`` (s, Q28), rad in Q28, at most 4."""
+    angle = mul(abs(rate), gap >> GAP_RIGHT)
+    return min(shift(angle, STEP_Q - GAP_RIGHT - SQUARE_Q), LARGEST_SQUARED)
+
+
+@kernel
+def interpolation_var(state: Any, cycle: int, at: int) -> int:
+    """Variance (rad^2, Q56) of taking the rate as constant inside ``cycle``, from the change to its neighbours."""
+    slot = cycle & SLOT
+    inside = min(at - state.ring_start[slot], state.ring_end[slot] - at)
+    if inside <= 0 or cycle == 0:
+        return 0
+    change = abs(state.ring_rate[slot, 2] - state.ring_rate[(cycle - 1) & SLOT, 2])
+    if cycle + 1 < state.cycles:
+        change = max(change, abs(state.ring_rate[(cycle + 1) & SLOT, 2] - state.ring_rate[slot, 2]))
+    error = min(shift(mul(change, min(inside, LONGEST_STEP)), STEP_Q + 1 - SQUARE_Q), LARGEST_SQUARED)
+    return error * error
+
+
+@kernel
+def take_pending(state: Any, config: Any, cycle: int, until: int) -> int:
+    """Pass every waiting measurement valid up to ``until`` (s, Q28), oldest first; returns ``Status`` bits."""
+    status = 0
+    while state.pending > 0 and state.pending_at[0] <= until:
+        at = state.pending_at[0]
+        yaw, var, rate = int(state.pending_yaw[0]), state.pending_var[0], state.pending_rate[0]
+        if at >= state.epoch:
+            advance(state, config, cycle, at)
+            status |= aid(state, config, yaw, var + interpolation_var(state, cycle, at), rate, at)
+        else:
+            status |= aid_late(state, config, yaw, var, rate, at)
+        drop_first_pending(state)
+    return status
+
+
+@kernel
+def aid_late(state: Any, config: Any, yaw: int, var: int, rate: int, at: int) -> int:
+    """A measurement older than the filter's epoch: carried forward by the increments since, their noise added."""
+    moved = yaw
+    earliest = state.epoch
+    cycle = state.consumed
+    while cycle >= 0 and cycle > state.cycles - RING and earliest > at:
+        slot = cycle & SLOT
+        begin = max(state.ring_start[slot], at)
+        if begin < earliest:
+            if stood_still(state, cycle) == 0:
+                moved += counts(mul(true_rate_z(state, slot), min(earliest - begin, LONGEST_STEP)), STEP_Q)
+            earliest = begin
+        cycle -= 1
+    if earliest > at + MISSED_GAP:
+        return LATE_DROPPED
+    lag = state.epoch - at
+    return aid(state, config, moved & TURN, var + lag_var(state, config, lag), rate, at)
+
+
+@kernel
+def lag_var(state: Any, config: Any, lag: int) -> int:
+    """N^2 T + P_b T^2, rad^2 in Q56, of a ``lag`` T (s, Q28), which the ring keeps within 64 cycles."""
+    t = min(lag >> (TIME_Q - 25), (64 << 25) - 1)  # Q25, 31 bits
+    return (mul(config.noise_var[2], t) << 6) + shift(mul(mul(state.P[BZ, BZ], t), t), 2 * UNIT - 12)
+
+
+@kernel
+def consume(state: Any, config: Any) -> int:
+    """Filter every cycle that is old enough; returns ``Status`` bits."""
+    status = 0
+    while state.consumed < state.cycles - config.lag_cycles:
+        cycle = state.consumed
+        slot = cycle & SLOT
+        end = state.ring_end[slot]
+        status |= take_pending(state, config, cycle, end)
+        advance(state, config, cycle, end)
+        if stood_still(state, cycle) == 1:
+            zero_rate(state, state.ring_rate[slot], end - state.ring_start[slot], config)
+            level(state, state.ring_force[slot], config)
+        state.consumed += 1
+    return status
+
+
+@kernel
+def predict_to_now(state: Any, config: Any) -> None:
+    """Copy the filter and integrate the cycles it has not consumed yet: the yaw and covariance at the present."""
+    for i in range(STATES):
+        for j in range(STATES):
+            state.now_P[i, j] = state.P[i, j]
+    for k in range(3):
+        state.now_down[k] = state.down[k]
+    state.now_yaw = state.yaw
+    state.now = state.epoch
+    for cycle in range(state.consumed, state.cycles):
+        end = state.ring_end[cycle & SLOT]
+        dt = gap_held(state, end - state.now)
+        if dt > 0:
+            state.now_yaw = turn(state, config, cycle, dt, int(state.now_yaw), state.now_down, state.now_P)
+            state.now = end
+    state.now_rate = true_rate_z(state, (state.cycles - 1) & SLOT)

@@ -1,0 +1,123 @@
+"""Memory of one node in integers: Q formats, units of the error states, state and configuration records.
+
+A number in ``Qn`` is an integer that stands for itself times 2^-n. Biases, scale and stamp are counted in units of 2^-6
+of their SI unit, so that every variance fits one format, ``Q56`` of unit^2: see docs/decisions/0011-fixed-point.md.
+"""
+
+from __future__ import annotations
+
+from typing import Final
+
+import numpy as np
+
+from node.kernels.layout import PENDING, RING, STATES
+
+TIME_Q: Final = 28  # s, 3.7 ns
+RATE_Q: Final = 46  # rad/s, also of the scale (1) and the stamp (s): read as Q40 they count units of 2^-6
+VECTOR_Q: Final = 30  # of the unit vector down
+FORCE_Q: Final = 26  # g
+ANGLE_Q: Final = 40  # rad, residuals and corrections; whole yaws are binary angles
+STEP_Q: Final = RATE_Q + TIME_Q - 31  # rad, a rate times a time
+VAR_Q: Final = 56  # unit^2
+UNIT: Final = 6  # of biases, scale and stamp: 2^-6 rad/s, 2^-6, 2^-6 s; tilts and yaw count rad
+
+ONE_SECOND: Final = 1 << TIME_Q
+LONGEST_STEP: Final = 8 << TIME_Q  # a factor of 31 bits
+FAST: Final = 8 << RATE_Q  # rad/s, above which a step is one second at most
+LONGEST_GAP: Final = 4096 << TIME_Q  # of lost cycles that is integrated
+CEILING: Final = 12 << VAR_Q  # of any variance
+NEVER: Final = -(1 << 62)  # a time before all others
+FASTEST: Final = 32 << RATE_Q  # rad/s in a reading
+STRONGEST: Final = 32 << FORCE_Q  # g in a reading
+LEVEL_Q: Final = 31  # of factors between -1 and 1
+
+FIXED_STATE: Final = np.dtype(
+    [
+        ("overflows", "i8"),  # results that did not fit and were held at the end of their range
+        # the filter, at its own epoch
+        ("epoch", "i8"),  # s, Q28
+        ("yaw", "u4"),  # binary angle, 2^32 is one turn
+        ("yaw_known", "i8"),
+        ("down", "i8", (3,)),  # Q30
+        ("static_bias", "i8", (3,)),  # rad/s, Q46
+        ("static_bias_var", "i8", (3,)),  # unit^2, Q56
+        ("bias", "i8", (3,)),  # rad/s, Q46
+        ("scale", "i8"),  # Q46
+        ("stamp", "i8"),  # s, Q46
+        ("P", "i8", (STATES, STATES)),  # unit^2, Q56
+        # the same, predicted to the end of the newest cycle
+        ("now", "i8"),
+        ("now_yaw", "u4"),
+        ("now_down", "i8", (3,)),
+        ("now_rate", "i8"),
+        ("now_P", "i8", (STATES, STATES)),
+        # aiding
+        ("reference_hops", "i8"),
+        ("reference_offset", "u4"),  # binary angle
+        ("systematic_var", "i8"),  # rad^2, Q56
+        ("last_sequence", "i8"),
+        ("last_aided", "i8"),  # s, Q28
+        ("innovation", "i8"),  # rad, Q40
+        ("innovation_var", "i8"),  # rad^2, Q56
+        ("rejected", "i8"),
+        ("pending", "i8"),
+        ("pending_at", "i8", (PENDING,)),
+        ("pending_yaw", "u4", (PENDING,)),
+        ("pending_var", "i8", (PENDING,)),
+        ("pending_rate", "i8", (PENDING,)),
+        ("pending_sequence", "i8", (PENDING,)),
+        # the increments of the last RING cycles
+        ("cycles", "i8"),
+        ("consumed", "i8"),
+        ("ring_start", "i8", (RING,)),
+        ("ring_end", "i8", (RING,)),
+        ("ring_rate", "i8", (RING, 3)),  # rad/s, Q46
+        ("ring_force", "i8", (RING, 3)),  # g, Q26
+        ("ring_quiet", "i8", (RING,)),
+        # modes
+        ("mode", "i8"),
+        ("still_cycles", "i8"),
+        ("stopped_at", "i8"),
+        ("surveyed", "i8"),
+        ("rate_exceeded", "i8"),
+        ("bias_count", "i8"),
+        ("bias_sum", "i8", (3,)),  # rad/s, Q46
+        # the last survey
+        ("survey_force", "i8", (3,)),  # g, Q26
+        ("survey_force_cov", "i8", (3, 3)),  # g^2, Q52
+        # work space of the updates
+        ("ph", "i8", (STATES,)),  # P H^T, Q56
+        ("rest", "i8", (STATES,)),  # P H^T - S K, what rounding left
+        ("gain", "i8", (STATES,)),  # K 2^gain_q
+        ("gain_q", "i8"),
+        ("decay", "i8", (3,)),  # Q31
+    ],
+    align=True,
+)
+
+FIXED_CONFIG: Final = np.dtype(
+    [
+        ("walk", "i8", (3,)),  # (A N)^2, rad^2/s, Q56
+        ("rate_walk", "i8", (3,)),  # (A N)^2, unit^2 s, Q56
+        ("noise_var", "i8", (3,)),  # N^2, rad^2/s, Q56
+        ("bias_var", "i8", (3,)),  # sigma_b^2, unit^2, Q56
+        ("bias_drive", "i8", (3,)),  # (B sigma_b)^2, unit^2, Q56
+        ("bias_area", "i8", (3,)),  # N^2 + 2 sigma_b^2 tau, unit^2 s, Q56
+        ("bias_decay", "i8", (3,)),  # log2(e) / tau, 1/s, Q42
+        ("still_walk_var", "i8"),  # rad^2/s, Q56
+        ("stamp_on", "i8"),  # 1 when the time-stamp state is estimated
+        ("stamp_var", "i8"),  # unit^2, Q56
+        ("stamp_walk_var", "i8"),  # unit^2/s, Q56
+        ("aiding_floor_var", "i8"),  # rad^2, Q56
+        ("force_var", "i8"),  # g^2, Q56
+        ("gate_inverse", "i8"),  # 1 / gate^2, Q31
+        ("reject_limit", "i8"),
+        ("rate_limit", "i8"),  # rad/s, Q46
+        ("still_rate", "i8"),  # rad/s, Q46
+        ("lag_cycles", "i8"),
+        ("survey_samples", "i8"),
+        ("settle_cycles", "i8"),
+        ("static_cycles", "i8"),
+    ],
+    align=True,
+)

@@ -1,0 +1,85 @@
+"""What a node takes in as aiding, in integers; the arithmetic and its reasons are those of ``node.kernels.relay``."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from node.kernels.fixed.error_model import isolate
+from node.kernels.fixed.layout import CEILING
+from node.kernels.fixed.trigonometry import TURN, difference
+from node.kernels.jit import kernel
+from node.kernels.layout import PENDING, Err, Status
+
+PSI, D = int(Err.YAW), int(Err.STAMP)
+REFERENCE_CHANGED = int(Status.REFERENCE_CHANGED)
+
+
+@kernel
+def offer_aiding(
+    state: Any,
+    config: Any,
+    yaw: int,
+    yaw_var: int,
+    systematic_var: int,
+    offset: int,
+    rate: int,
+    valid_at: int,
+    sequence: int,
+    hops: int,
+) -> int:
+    """Queue one aiding for the filter; returns status bits.
+
+    Parameters
+    ----------
+    yaw, offset : binary angles
+    yaw_var, systematic_var : rad^2, Q56
+    rate : rad/s, Q46
+    valid_at : s on the node's clock, Q28
+    sequence, hops : as sent
+    """
+    if hops != state.reference_hops or abs(difference(offset, int(state.reference_offset))) > 1:
+        status = change_reference(state, config, systematic_var, offset, hops)
+    else:
+        status = 0
+        if sequence == state.last_sequence:
+            if state.pending == 0 and state.yaw_known == 1:
+                state.last_aided = max(state.last_aided, valid_at)
+                return status
+            if state.pending > 0:
+                return status
+    if state.pending == PENDING:
+        return status
+    slot = state.pending
+    while slot > 0 and state.pending_at[slot - 1] > valid_at:
+        state.pending_at[slot] = state.pending_at[slot - 1]
+        state.pending_yaw[slot] = state.pending_yaw[slot - 1]
+        state.pending_var[slot] = state.pending_var[slot - 1]
+        state.pending_rate[slot] = state.pending_rate[slot - 1]
+        state.pending_sequence[slot] = state.pending_sequence[slot - 1]
+        slot -= 1
+    state.pending_at[slot] = valid_at
+    state.pending_yaw[slot] = (yaw + offset) & TURN
+    state.pending_var[slot] = yaw_var + config.aiding_floor_var
+    state.pending_rate[slot] = rate
+    state.pending_sequence[slot] = sequence
+    state.pending += 1
+    state.last_sequence = sequence
+    state.systematic_var = systematic_var
+    return status
+
+
+@kernel
+def change_reference(state: Any, config: Any, systematic_var: int, offset: int, hops: int) -> int:
+    """The chain above was made up anew: the yaw may step by the errors of the old and the new joints."""
+    first = state.reference_hops < 0
+    step_var = state.systematic_var + systematic_var
+    state.reference_hops = hops
+    state.reference_offset = offset & TURN
+    state.systematic_var = systematic_var
+    state.pending = 0
+    if first or state.yaw_known == 0:
+        return 0
+    isolate(state.P, PSI, min(state.P[PSI, PSI] + step_var, CEILING))
+    if config.stamp_on == 1:
+        isolate(state.P, D, min(state.P[D, D] + config.stamp_var, CEILING))
+    return REFERENCE_CHANGED

@@ -1,0 +1,104 @@
+"""What a source of readings is, and how a fault of one becomes a named event instead of an end of the cycle."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Protocol, TypeVar
+
+from node.errors import SensorError
+from node.firmware.encoder import EncoderSample
+from node.kernels.calibration import USUAL
+from telemetry.messages import Scalar, Severity, Vector3
+
+NOTHING: Vector3 = (math.nan, math.nan, math.nan)
+
+Sample = TypeVar("Sample")
+Say = Callable[[Severity, str, dict[str, Scalar]], None]
+
+
+@dataclass(frozen=True, slots=True)
+class ImuSample:
+    """Mean of one cycle as the sensor gives it, before any correction."""
+
+    rate: Vector3  # rad/s
+    force: Vector3  # m/s^2
+    temperature: float = USUAL  # C
+    saturated: bool = False  # a reading within the cycle was at the gyroscope's range
+
+
+class ImuSource(Protocol):
+    """An IMU. ``start`` raises ``SensorError`` when it is absent; so does ``read``, at any later time."""
+
+    def start(self) -> None:
+        """Find and configure the sensor; again after a fault."""
+
+    def read(self, begin: float, end: float) -> ImuSample:
+        """Mean over the cycle from ``begin`` to ``end`` (s, own clock)."""
+
+    def close(self) -> None:
+        """Let the bus or the file go."""
+
+
+class EncoderSource(Protocol):
+    """A counter of the drive head; the same contract."""
+
+    def start(self) -> None:
+        """Find the counter; again after a fault."""
+
+    def read(self, now: float) -> EncoderSample:
+        """The counter at ``now`` (s, own clock)."""
+
+    def close(self) -> None:
+        """Let the file go."""
+
+
+class Alarm:
+    """Keeps a source going: its fault and its return are told once, and it is started again after every failure."""
+
+    def __init__(self, source: ImuSource | EncoderSource, say: Say, name: str) -> None:
+        self._source, self._say, self._name = source, say, name
+        self._failed = self._down = False
+
+    def call(self, read: Callable[[], Sample]) -> Sample | None:
+        """What ``read`` gives; None for this cycle when it fails."""
+        try:
+            if self._down:  # this cycle is lost: what the sensor has gathered so far is not that of a whole one
+                self._source.start()
+                self._down = False
+                return None
+            sample = read()
+        except SensorError as error:
+            if not self._failed:
+                self._say(Severity.ERROR, f"{self._name}_failed", {"detail": str(error)[:200]})
+            self._failed = self._down = True
+            return None
+        if self._failed:
+            self._say(Severity.WARNING, f"{self._name}_back", {})
+        self._failed = False
+        return sample
+
+
+class SafeImu:
+    """An IMU in use: with a fault its readings are no numbers."""
+
+    def __init__(self, source: ImuSource, say: Say) -> None:
+        self._source = source
+        self._alarm = Alarm(source, say, "sensor")
+
+    def read(self, begin: float, end: float) -> ImuSample:
+        """Mean over the cycle, whatever happens."""
+        return self._alarm.call(lambda: self._source.read(begin, end)) or ImuSample(NOTHING, NOTHING)
+
+
+class SafeEncoder:
+    """A counter in use: with a fault there is no sample, and so no aiding, which every node below sees grow old."""
+
+    def __init__(self, source: EncoderSource, say: Say) -> None:
+        self._source = source
+        self._alarm = Alarm(source, say, "encoder")
+
+    def read(self, now: float) -> EncoderSample | None:
+        """The counter, or None."""
+        return self._alarm.call(lambda: self._source.read(now))

@@ -1,0 +1,69 @@
+"""What a cycle of the integer kernel costs against one of the float64 kernel, in one run and inside compiled loops."""
+
+from __future__ import annotations
+
+import time
+from typing import Any
+
+import numpy as np
+
+from node.kernels import cycle, relay
+from node.kernels.fixed import cycle as fixed_cycle
+from node.kernels.fixed import relay as fixed_relay
+from node.kernels.fixed.border import learn_config, learn_state
+from node.kernels.fixed.layout import FORCE_Q, RATE_Q, TIME_Q, VAR_Q
+from node.kernels.jit import kernel
+from node.kernels.layout import DEG, PERIOD, Array, default_config, new_state
+
+AIDING_VAR = (0.003 * DEG) ** 2
+WARM = 400  # cycles before the clock is read
+STEP = round(PERIOD * 2.0**TIME_Q)
+QUARTER = STEP // 4
+FIXED_VAR = round(AIDING_VAR * 2.0**VAR_Q)
+GRAVITY = 9.81
+
+
+@kernel
+def drive(state: Any, config: Any, rate: Array, force: Array, first: int) -> None:
+    """Cycles of the float64 kernel, one for each row of ``rate`` (n, 3), each with an aiding."""
+    for k in range(rate.shape[0]):
+        start = 1000.0 + (first + k) * PERIOD
+        cycle.run_cycle(state, config, rate[k], force, start, start + PERIOD, 1)
+        relay.offer_aiding(state, config, 0.1, AIDING_VAR, 0.0, 0.0, rate[k, 2], start + 0.75 * PERIOD, first + k, 0)
+
+
+@kernel
+def drive_fixed(state: Any, config: Any, rate: Array, force: Array, first: int) -> None:
+    """The same of the integer kernel."""
+    for k in range(rate.shape[0]):
+        start = (1000 << TIME_Q) + (first + k) * STEP
+        fixed_cycle.run_cycle(state, config, rate[k], force, start, start + STEP, 1)
+        at = start + STEP - QUARTER
+        fixed_relay.offer_aiding(state, config, 68356527, FIXED_VAR, 0, 0, rate[k, 2], at, first + k, 0)
+
+
+def measure(cycles: int = 20_000, rounds: int = 7) -> list[dict[str, Any]]:
+    """Rows of kind of cycle, ns of either kernel (best of ``rounds``, taken in turns) and their ratio."""
+    random = np.random.default_rng(1)
+    config, force = default_config(), np.array([0.0, 0.0, -GRAVITY])
+    state = new_state(config)
+    fixed_config, _ = learn_config(config[0])
+    fixed_state = learn_state(state[0], GRAVITY, 0)
+    fixed_force = np.array([0, 0, -1 << FORCE_Q])
+    first, rows = 0, []
+    for case, spin, n in (("", 0.0, WARM), ("turning", 71.0 * DEG, cycles), ("rest", 0.0, cycles)):
+        floats, integers = [], []
+        for _ in range(rounds):
+            rate = 1e-5 * random.standard_normal((n, 3)) + np.array([0.0, 0.0, spin])
+            fixed_rate = np.rint(rate * 2.0**RATE_Q).astype(np.int64)
+            begin = time.process_time()
+            drive(state[0], config[0], rate, force, first)
+            middle = time.process_time()
+            drive_fixed(fixed_state[0], fixed_config[0], fixed_rate, fixed_force, first)
+            floats.append((middle - begin) / n * 1e9)
+            integers.append((time.process_time() - middle) / n * 1e9)
+            first += n
+        if case:
+            ns, fixed_ns = min(floats), min(integers)
+            rows.append({"case": case, "float64_ns": ns, "fixed_ns": fixed_ns, "ratio": fixed_ns / ns})
+    return rows

@@ -1,0 +1,213 @@
+"""Power cut at a thousand random instants of the saved state's writing: the old state or the new one, never another."""
+
+import errno
+import os
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from node.errors import SavedStateError
+from node.firmware.saved_state import pack
+from node.firmware.settings import TubeSettings
+from node.kernels.layout import LAYOUT_VERSION, PERIOD, default_config, new_state
+from node.process import journal as journal_module
+from node.process.counter import BootCounter
+from node.process.journal import Journal
+from node.process.tube_process import TubeProcess
+
+CUTS = 1000
+SECTOR = 512
+BOUNDARY = 1500  # weight of the instant between two calls, against 1 of a byte
+
+
+class PowerCutError(Exception):
+    """The node has no power."""
+
+
+class Disk:
+    """``os`` of a machine whose cache is lost with the power: what was not forced may be there, or in part, or not."""
+
+    O_WRONLY, O_CREAT, O_TRUNC, O_RDONLY = os.O_WRONLY, os.O_CREAT, os.O_TRUNC, os.O_RDONLY
+
+    def __init__(self, folder: Path, random: np.random.Generator) -> None:
+        self._folder, self._random = folder, random
+        self.forced: dict[str, bytes] = {p.name: p.read_bytes() for p in folder.iterdir()}
+        self.names = set(self.forced)
+        self._cached: dict[str, bytes] = {}
+        self._open: dict[int, str] = {}
+        self.left: float = np.inf
+        self.spent = 0
+
+    def open(self, path: Path, flags: int, mode: int = 0o777) -> int:
+        self._spend(BOUNDARY)
+        descriptor = os.open(path, flags, mode)
+        self._open[descriptor] = "" if path == self._folder else path.name
+        if flags & os.O_TRUNC:
+            self._cached[path.name] = b""
+        return descriptor
+
+    def write(self, descriptor: int, data: memoryview) -> int:
+        length = min(len(data), int(self._random.integers(1, 2 * len(data) + 1)))  # a call may write less
+        allowed = min(length, int(min(self.left, 2**40)))
+        os.write(descriptor, data[:allowed])
+        self._cached[self._open[descriptor]] += bytes(data[:allowed])
+        self._spend(length)
+        return length
+
+    def fsync(self, descriptor: int) -> None:
+        self._spend(BOUNDARY)
+        name = self._open[descriptor]
+        if name:
+            self.forced[name] = self._cached.pop(name)
+        else:
+            self.names = {p.name for p in self._folder.iterdir()}
+        self._spend(BOUNDARY)
+
+    def close(self, descriptor: int) -> None:
+        os.close(descriptor)
+        self._open.pop(descriptor)
+
+    def after_cut(self) -> None:
+        """Leave in the folder what a disk may hold."""
+        for name, cached in self._cached.items():
+            self._leave(name, cached)
+        for path in self._folder.iterdir():
+            if path.name not in self.names and self._random.random() < 0.5:
+                path.unlink()
+
+    def _leave(self, name: str, cached: bytes) -> None:
+        before = self.forced.get(name, b"")
+        length = int(self._random.choice([0, len(before), len(cached), self._random.integers(0, len(cached) + 1)]))
+        image = bytearray(before[:length].ljust(length, b"\0"))
+        for begin in range(0, min(length, len(cached)), SECTOR):
+            if self._random.random() < 0.7:
+                image[begin : begin + SECTOR] = cached[begin : begin + SECTOR][: length - begin]
+        (self._folder / name).write_bytes(bytes(image))
+
+    def _spend(self, cost: int) -> None:
+        self.spent += cost
+        self.left -= cost
+        if self.left < 0:
+            raise PowerCutError
+
+
+def marked(number: int) -> np.ndarray:
+    state = new_state(default_config())
+    state[0]["now_yaw"] = number
+    state[0]["ring_rate"] = number
+    return state
+
+
+def found(folder: Path) -> tuple[int, bytes] | None:
+    loaded = Journal(folder).load()
+    return None if loaded is None else (int(loaded[0][0]["now_yaw"]), loaded[1])
+
+
+def test_a_cut_at_any_instant_leaves_the_old_or_the_new_state(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    random = np.random.default_rng(20261121)
+    new, old = 0, 0
+    for cut in range(CUTS):
+        folder = tmp_path / str(cut)
+        journal = Journal(folder)
+        before = None
+        for k in range(int(random.integers(1, 6))):
+            before = (k + 1, random.bytes(int(random.integers(0, 3000))))
+            journal.save(marked(before[0]), before[1])
+        for life in range(int(random.integers(1, 4))):
+            wanted = (100 + life, random.bytes(int(random.integers(0, 3000))))
+            disk = Disk(folder, random)
+            total = len(pack(marked(0), wanted[1], 0)) + 3 * BOUNDARY
+            disk.left = float(random.integers(0, total + BOUNDARY))
+            survivor = Journal(folder)
+            assert found(folder) == before
+            survivor.load()
+            with monkeypatch.context() as patch:
+                patch.setattr(journal_module, "os", disk)
+                try:
+                    survivor.save(marked(wanted[0]), wanted[1])
+                    done = True
+                except PowerCutError:
+                    done = False
+            disk.after_cut()
+            after = found(folder)
+            assert after in (before, wanted)
+            assert after == wanted or not done, "what was saved is not lost"
+            new, old = new + (after == wanted), old + (after == before)
+            before = after
+    assert min(new, old) > CUTS / 10
+
+
+def test_the_first_state_ever_is_on_the_disk_with_its_name(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    for cut in range(100):
+        folder = tmp_path / str(cut)
+        journal = Journal(folder)
+        disk = Disk(folder, np.random.default_rng(cut))
+        with monkeypatch.context() as patch:
+            patch.setattr(journal_module, "os", disk)
+            journal.save(marked(7), b"first")
+        disk.after_cut()
+        assert found(folder) == (7, b"first")
+
+
+@pytest.mark.parametrize("error", [errno.ENOSPC, errno.EIO])
+def test_a_disk_that_is_full_spares_the_state_before(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, error: int
+) -> None:
+    journal = Journal(tmp_path)
+    journal.save(marked(1), b"one")
+
+    def refuse(*_: object) -> int:
+        raise OSError(error, os.strerror(error))
+
+    monkeypatch.setattr(journal_module.os, "write", refuse)
+    with pytest.raises(OSError, match=os.strerror(error)):
+        journal.save(marked(2), b"two")
+    monkeypatch.undo()
+    assert found(tmp_path) == (1, b"one")
+
+
+@pytest.mark.parametrize("left", ["", "1", "12", "12\n"])
+def test_a_cut_while_the_starts_are_counted_leaves_the_last_number(tmp_path: Path, left: str) -> None:
+    BootCounter(tmp_path)
+    (tmp_path / "boots.new").write_text(left)
+    assert BootCounter(tmp_path).boots == 2
+
+
+def test_a_count_of_starts_that_is_none_is_named(tmp_path: Path) -> None:
+    (tmp_path / "boots").write_text("many")
+    with pytest.raises(SavedStateError, match="boots"):
+        BootCounter(tmp_path)
+
+
+def other_version(slot: bytes) -> bytes:
+    return slot[:4] + (LAYOUT_VERSION + 1).to_bytes(2, "little") + slot[6:]
+
+
+@pytest.mark.parametrize(
+    "spoil", [other_version, lambda slot: slot[:-9], lambda slot: b"", lambda slot: b"\xff" * 9999]
+)
+def test_a_state_that_cannot_be_read_is_an_event_and_a_safe_start(tmp_path: Path, spoil) -> None:
+    random = np.random.default_rng(1)
+
+    def cycles(process: TubeProcess, count: int, now: float) -> float:
+        for _ in range(count):
+            now += PERIOD
+            noise = random.normal(0.0, 1e-4, 6)
+            process.on_cycle([now - PERIOD, *noise[:3], *noise[3:5], noise[5] - 9.8], now)
+        return now
+
+    process = TubeProcess(TubeSettings(3), tmp_path)
+    cycles(process, 110, 1000.0)
+    assert process.state[0]["static_bias_var"].any()
+    for path in tmp_path.glob("slot-*"):
+        path.write_bytes(spoil(path.read_bytes()))
+    again = TubeProcess(TubeSettings(3), tmp_path)
+    assert not again.state[0]["static_bias_var"].any()
+    assert again.state[0]["yaw_known"] == 0
+    told: list[tuple[str, object]] = []
+    again._say_event = lambda severity, code, arguments: told.append((code, arguments))  # type: ignore[method-assign]
+    again._announce(5.0, 5.0)
+    assert [code for code, _ in told] == ["saved_state_lost"]
+    assert "saved state" in str(told[0][1])
+    cycles(again, 3, 2000.0)

@@ -1,0 +1,242 @@
+"""A gyroscope that saturates, sticks, steps or changes its scale: flagged in time, survived, and recovered from."""
+
+import math
+from collections.abc import Callable
+
+import numpy as np
+import pytest
+from string_of_one import Sample, Spoil, StringOfOne
+
+from node.errors import ConfigurationError
+from node.firmware.sensor_faults import AidingWatch, Fault, ReadingWatch, SensorLimits
+from node.kernels.layout import DEG, PERIOD, Err
+from telemetry.messages import NodeFlag
+
+FLAGGED_WITHIN = 10  # cycles
+LASTS = 25  # cycles
+SETTLED = 30  # cycles after the recovery
+PLACES: dict[str, Callable[[StringOfOne], int]] = {
+    "turning": lambda s: s.turning(1),
+    "resting": lambda s: s.resting(0),
+    "starting": lambda s: s.turning(1, 0.0) - 4,
+    "stopping": lambda s: s.resting(0, 0.0) - 4,
+}
+
+
+def saturate(at: int) -> Spoil:
+    def spoil(cycle: int, sample: Sample) -> Sample:
+        return [*sample[:2], 500.0 * DEG, *sample[3:]] if at <= cycle < at + LASTS else sample
+
+    return spoil
+
+
+def stick(at: int, axes: tuple[int, ...]) -> Spoil:
+    held: Sample = []
+
+    def spoil(cycle: int, sample: Sample) -> Sample:
+        if cycle == at - 1:
+            held[:] = sample
+        return [held[k] if k in axes and at <= cycle < at + LASTS else sample[k] for k in range(6)]
+
+    return spoil
+
+
+def step(at: int, dps: float, until: int = 10**9) -> Spoil:
+    def spoil(cycle: int, sample: Sample) -> Sample:
+        return [*sample[:2], sample[2] + dps * DEG, *sample[3:]] if at <= cycle < until else sample
+
+    return spoil
+
+
+def rescale(at: int, factor: float) -> Spoil:
+    def spoil(cycle: int, sample: Sample) -> Sample:
+        return [*sample[:2], sample[2] * factor, *sample[3:]] if at <= cycle else sample
+
+    return spoil
+
+
+def void(at: int) -> Spoil:
+    def spoil(cycle: int, sample: Sample) -> Sample:
+        return [math.nan] * 6 if at <= cycle < at + LASTS else sample
+
+    return spoil
+
+
+KINDS: dict[str, tuple[Callable[[int], Spoil], set[str]]] = {
+    "saturated": (saturate, {"gyro_saturated"}),
+    "stuck": (lambda at: stick(at, (0, 1, 2)), {"gyro_stuck"}),
+    "stuck axis": (lambda at: stick(at, (2,)), {"gyro_stuck", "gyro_step"}),
+    "step 5 deg/s": (lambda at: step(at, -5.0), {"gyro_step"}),
+    "step 2 deg/s": (lambda at: step(at, 2.0), {"gyro_step"}),
+    "step 0.2 deg/s": (lambda at: step(at, 0.2), {"gyro_step"}),
+    "no numbers": (void, {"bad_sample"}),
+}
+
+
+@pytest.fixture(scope="module")
+def healthy() -> StringOfOne:
+    return StringOfOne(1).run()
+
+
+def test_a_healthy_sensor_raises_no_alarm(healthy: StringOfOne) -> None:
+    assert set(healthy.codes()) == {"bias_known", "started", "stopped", "yaw_reset"}
+    assert all(NodeFlag.SENSOR_FAULT not in state.flags for state in healthy.states)
+
+
+@pytest.mark.parametrize("place", PLACES)
+@pytest.mark.parametrize("kind", KINDS)
+@pytest.mark.parametrize("seed", [1, 2])
+def test_a_faulty_gyroscope_is_flagged_and_recovered_from(
+    kind: str, place: str, seed: int, healthy: StringOfOne
+) -> None:
+    at = PLACES[place](healthy)
+    make, names = KINDS[kind]
+    string = StringOfOne(seed, make(at)).run()
+    flagged = min(string.first(name, at) for name in names if name in string.codes(at))
+    assert flagged - at < FLAGGED_WITHIN
+    assert NodeFlag.SENSOR_FAULT | NodeFlag.YAW_UNTRUSTED in string.states[flagged].flags
+    recovered = [cycle for cycle, event in string.events if event.code == "sensor_recovered" and cycle >= at]
+    assert recovered
+    end = at + LASTS if "step" not in kind else flagged
+    assert recovered[-1] - end < 20
+    z = np.abs(string.error) / string.std
+    assert z[recovered[-1]] < 3.0
+    assert np.mean(z[recovered[-1] :] < 3.0) > 0.99
+    assert string.states[-1].flags == NodeFlag.NONE
+    assert abs(string.error[-1]) < 0.05 * DEG
+    untrusted = [NodeFlag.YAW_UNTRUSTED in state.flags for state in string.states]
+    unflagged = [k for k in range(at, string.cycles) if not untrusted[k] and z[k] > 5.0 and k > flagged]
+    assert not unflagged, "no unflagged divergence once the fault is known"
+
+
+def test_the_variance_of_a_yaw_nobody_knows_says_so(healthy: StringOfOne) -> None:
+    at = healthy.turning(1)
+    string = StringOfOne(1, saturate(at)).run()
+    assert np.all(string.std[at : at + LASTS] > 1.0)
+    assert np.all(np.isfinite(string.std))
+    codes = string.codes(at)
+    assert codes.count("gyro_saturated") == codes.count("sensor_recovered") == 1
+
+
+def test_a_step_that_goes_away_is_flagged_again_and_recovered_from(healthy: StringOfOne) -> None:
+    at = healthy.turning(1)
+    string = StringOfOne(1, step(at, 3.0, at + 30)).run()
+    codes = string.codes(at)
+    assert codes.count("gyro_step") == codes.count("sensor_recovered") == 2
+    assert string.first("gyro_step", at + 30) - (at + 30) < FLAGGED_WITHIN
+    assert abs(string.error[-1]) < 3.0 * string.std[-1]
+
+
+@pytest.mark.parametrize("factor", [1.03, 1.005])
+def test_a_new_scale_is_named_and_learnt(factor: float, healthy: StringOfOne) -> None:
+    at = healthy.resting(0)
+    string = StringOfOne(1, rescale(at, factor)).run()
+    assert "gyro_scale" in string.codes(at)
+    begins = healthy.turning(1, 0.0)
+    assert min(c for c, e in string.events if c >= at and e.code in ("gyro_scale", "gyro_step")) - begins < 10
+    assert string.codes(at)[-1] == "stopped"
+    assert abs(string.error[-1]) < 3.0 * string.std[-1]
+
+
+def test_no_cross_term_is_kept_when_a_fault_is_found(healthy: StringOfOne) -> None:
+    at = healthy.turning(1)
+    string = StringOfOne(1, step(at, 2.0))
+    for cycle in range(at + 12):
+        string._cycle(cycle, 1000.0 + (cycle + 1) * PERIOD)
+        if "gyro_step" in string.codes(at):
+            break
+    P = string.tube.state["P"]
+    for state in (Err.YAW, Err.BIAS_Z, Err.SCALE):
+        assert not np.any(np.delete(P[state], state))
+        assert P[state, state] > 0.0
+
+
+def test_a_stuck_or_saturated_accelerometer_is_flagged_and_no_survey_made_of_it(healthy: StringOfOne) -> None:
+    at = healthy.resting(0, 0.1)
+    held: Sample = []
+
+    def spoil(cycle: int, sample: Sample) -> Sample:
+        if cycle == at - 1:
+            held[:] = sample
+        return [*sample[:3], *held[3:]] if at <= cycle < at + 60 else sample
+
+    string = StringOfOne(1, spoil).run()
+    assert string.first("force_stuck") - at < FLAGGED_WITHIN
+    flags = string.states[at + 10].flags
+    assert NodeFlag.SENSOR_FAULT in flags
+    assert NodeFlag.YAW_UNTRUSTED not in flags
+    assert "sensor_recovered" in string.codes(at)
+    assert np.all(np.abs(string.error[at:]) < 5.0 * string.std[at:])
+
+
+@pytest.mark.parametrize("jump", [-1000.0, -0.8, 200.0, 1e9])
+def test_a_clock_that_jumps_is_told_and_the_yaw_taken_anew(jump: float, healthy: StringOfOne) -> None:
+    string = StringOfOne(1)
+    at = healthy.turning(1)
+    for cycle in range(at):
+        string._cycle(cycle, 1000.0 + (cycle + 1) * PERIOD)
+    string.shift = jump
+    for cycle in range(at, at + 40):
+        string._cycle(cycle, 1000.0 + (cycle + 1) * PERIOD)
+    assert string.codes(at)[0] == "clock_jumped"
+    assert string.codes(at).count("clock_jumped") == 1
+    assert NodeFlag.YAW_UNTRUSTED in string.states[at].flags
+    assert NodeFlag.YAW_UNTRUSTED not in string.states[-1].flags
+    assert abs(string.error[at + 39]) < 0.1 * DEG
+
+
+def test_times_that_are_none_are_told_once_and_change_nothing() -> None:
+    string = StringOfOne(1)
+    for cycle in range(20):
+        string._cycle(cycle, 1000.0 + (cycle + 1) * PERIOD)
+    before = string.tube.state.tobytes()
+    for shift in (math.nan, math.inf, -math.inf):
+        string.shift = shift
+        string._cycle(20, 1000.0 + 21 * PERIOD)
+    assert string.codes(20) == ["clock_jumped", "aiding_untimely"]
+    assert string.tube.state.tobytes() == before
+
+
+def test_a_wrong_aiding_is_no_step_of_the_gyroscope() -> None:
+    watch = AidingWatch()
+    assert watch.judge(0.0, 1e-4, 1.0, 0.5, rejected=False, reset=False) is None
+    for k in range(6):
+        assert watch.judge(0.5 + 1e-5 * (-1) ** k, 1e-4, 1.0, 1.0 + 0.5 * k, rejected=True, reset=False) is None
+
+
+def test_a_bias_that_grows_the_innovation_is_a_step_and_one_with_the_rate_a_scale() -> None:
+    watch = AidingWatch()
+    watch.judge(0.0, 1e-4, 1.0, 0.5, rejected=False, reset=False)
+    found = [watch.judge(0.01 * k, 1e-4, 1.0, 0.5 + 0.5 * k, rejected=True, reset=False) for k in (1, 2, 3)]
+    assert found[:2] == [None, None]
+    assert found[2] is not None
+    assert found[2].fault is Fault.GYRO_STEP
+    assert found[2].rate == pytest.approx(0.02)
+    assert found[2].steady
+    watch.forget()
+    watch.judge(0.0, 1e-4, 0.0, 0.5, rejected=False, reset=False)
+    spins, innovation = (0.2, 0.6, 1.0), 0.0
+    for k, spin in enumerate(spins):
+        innovation += 0.03 * spin * 0.5
+        last = watch.judge(innovation, 1e-4, spin, 1.0 + 0.5 * k, rejected=True, reset=False)
+    assert last is not None
+    assert last.fault is Fault.GYRO_SCALE
+
+
+def test_one_knock_is_no_fault_of_the_accelerometer() -> None:
+    watch = ReadingWatch(SensorLimits())
+    limit = SensorLimits().force_range
+    rates = [(1e-4 * k, 2e-4 * k, 3e-4 * k) for k in range(9)]
+    knocks = [(limit if 2 <= k <= 3 else 0.1 * k, 0.2 * k, 0.3 * k) for k in range(9)]
+    assert all(watch.judge(r, f, saturated=False) == (None, None) for r, f in zip(rates[1:], knocks[1:], strict=True))
+    for k in range(3):
+        gyro, accelerometer = watch.judge((1e-3 * k, 1.0 + k, 0.1 * k), (limit, k, 0.1 * k), saturated=k == 2)
+    assert (gyro, accelerometer) == (Fault.GYRO_SATURATED, Fault.FORCE_SATURATED)
+
+
+@pytest.mark.parametrize(
+    "change", [{"rate_range": 0.0}, {"force_range": math.nan}, {"repeats_alone": -1}, {"repeats_together": -1}]
+)
+def test_limits_that_cannot_be_are_refused_by_name(change: dict) -> None:
+    with pytest.raises(ConfigurationError, match=next(iter(change))):
+        SensorLimits(**change)

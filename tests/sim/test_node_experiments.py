@@ -1,0 +1,137 @@
+"""Published experiments of the node's filter: what is asked is reached, and a filter that is wrong is told so."""
+
+import json
+import math
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+from click.testing import CliRunner
+
+from borechain.experiment import experiment
+from node.kernels.layout import PERIOD, Scheme
+from sim.experiments import node_delay, node_modes, node_outage, node_tuning
+from sim.experiments.chain import ChainSetup
+from sim.experiments.node_lab import ENDS, REST, ROTATING, STOP, Lab, LabRun, LabSetup
+from sim.experiments.node_links import OnOff, Single
+from sim.experiments.node_trials import bootstrap, rms_deg
+
+SEEDS = 16
+SLACK = 1.5  # of the figure to reach, for few seeds
+KNOWN = node_modes.CLOCKS[", clock known"]
+
+
+def runs(setup: LabSetup, seeds: int = SEEDS) -> list[LabRun]:
+    return [Lab(setup, seed).run() for seed in range(1, seeds + 1)]
+
+
+def judged(case: node_modes.Case, found: list[LabRun]) -> dict[str, dict]:
+    return {row["quantity"]: row for row in node_modes.table(case, "", found)}
+
+
+@pytest.mark.parametrize(
+    "case", [c for name in ("update-modes", "single-updates") for c in node_modes.CASES[name]], ids=lambda c: c.name
+)
+def test_every_update_mode_is_within_reach(case: node_modes.Case) -> None:
+    rows = judged(case, runs(replace(case.setup, clock_prior=KNOWN)))
+    for quantity in ("yaw", "azimuth"):
+        assert rows[quantity]["ours"] < SLACK * rows[quantity]["to_reach"], rows[quantity]
+        assert rows[quantity]["low"] < rows[quantity]["ours"] < rows[quantity]["high"]
+
+
+def test_without_the_scale_factor_state_the_reach_is_missed() -> None:
+    case = next(c for c in node_modes.CASES["update-modes"] if c.name == "20 s on / 30 s off")
+    row = judged(case, runs(replace(case.setup, config=(("scale_std", 0.0),))))["yaw"]
+    assert row["reached"] is False
+    assert row["ours"] > 2.0 * row["to_reach"]
+
+
+def test_the_second_node_is_as_good_as_the_first() -> None:
+    found = runs(replace(node_modes.TWO, clock_prior=KNOWN))
+    for case in node_modes.CASES["two-nodes"]:
+        row = judged(case, found)["yaw"]
+        assert row["ours"] < SLACK * row["to_reach"]
+
+
+def test_one_seed_gives_one_run_whatever_else_runs() -> None:
+    first, second, other = (Lab(LabSetup(OnOff(20.0, 10.0)), seed).run() for seed in (3, 3, 4))
+    assert np.array_equal(first.error, second.error)
+    assert np.array_equal(first.azimuth_error, second.azimuth_error)
+    assert not np.array_equal(first.error, other.error)
+    job = (replace(node_outage.STRINGS, blocks=1), 7, 20.0)
+    assert np.array_equal(node_outage.run_seed(job).error, node_outage.run_seed(job).error)
+
+
+def test_an_experiment_over_a_pool_is_that_of_its_seeds() -> None:
+    stepped: list[None] = []
+    result = node_modes.run("two-nodes", 2, lambda: stepped.append(None))
+    assert len(stepped) == 2 * node_modes.batches("two-nodes")
+    alone = runs(node_modes.TWO, 2)
+    assert result["cases"][0]["ours"] == rms_deg([r.error[REST, 0] for r in alone])[0]
+    for row in result["cases"]:
+        assert {"case", "published", "ours", "unit", "to_reach", "reached"} <= row.keys()
+
+
+def test_a_larger_bias_factor_finds_the_bias_sooner() -> None:
+    times = {}
+    for factor in (1.0, 5.0):
+        found = runs(node_tuning.setup_of("bias_factor", factor))
+        times[factor] = node_tuning.convergence(node_tuning.mean_error_dps(found))
+    assert times[1.0] is not None
+    assert times[5.0] is not None
+    assert times[5.0] <= node_tuning.SLOWEST
+    assert times[5.0] < times[1.0]
+
+
+def test_a_bias_that_stays_never_converges() -> None:
+    assert node_tuning.convergence(np.full(len(ENDS), 0.02)) is None
+    decay = 0.02 * np.exp(-np.maximum(ENDS - STOP, 0.0) / 10.0)
+    time = node_tuning.convergence(decay)
+    assert time == pytest.approx(10.0 * math.log(10.0), abs=PERIOD)
+
+
+def test_a_delay_costs_nothing_when_compensated_and_its_angle_when_not() -> None:
+    late = {form: replace(setup, delay=0.1) for form, setup in node_delay.FORMS.items()}
+    errors = {form: rms_deg([r.error[ROTATING, 0] for r in runs(late[form], 4)])[0] for form in late}
+    assert errors["compensated"] < node_delay.TO_REACH_DEG
+    assert errors["dated by arrival"] == pytest.approx(0.1 * 71.0, rel=0.03)
+
+
+def test_links_pass_what_they_say() -> None:
+    t = ENDS
+    assert OnOff().passes(t).all()
+    assert OnOff(20.0, 60.0).passes(t).mean() == pytest.approx(0.25, abs=0.03)
+    for every in (1.0, 5.0, 60.0):
+        passed = Single(every).passes(t)
+        assert abs(int(passed.sum()) - t[-1] / every) <= 1.0
+        assert np.all(np.diff(t[passed]) > every - PERIOD - 1e-9)
+
+
+def test_outages_reach_the_whole_string() -> None:
+    chain = node_outage.OutageChain(ChainSetup(2, Scheme.FORWARD, blocks=1, loss=0.0), 1, 60.0)
+    assert chain._lost[:, 0].mean() == pytest.approx(0.75, abs=0.1)
+    assert not chain._lost[:, 1].any()
+
+
+def test_the_interval_holds_the_mean() -> None:
+    values = np.random.default_rng(1).exponential(size=400)
+    low, high = bootstrap(values)
+    assert low < values.mean() < high
+    assert high - low == pytest.approx(2 * 1.96 * values.std() / 20.0, rel=0.15)
+
+
+def test_the_commands_keep_tables_and_plots(tmp_path: Path) -> None:
+    for name, plots in (("two-nodes", ("two-nodes.svg", "two-nodes-reach.svg")), ("tuning", ("tuning.svg",))):
+        done = CliRunner().invoke(experiment, [name, "--seeds", "2", "--out", str(tmp_path), "--json"])
+        assert done.exit_code == 0, done.output
+        cases = json.loads(done.stdout)["cases"]
+        assert len((tmp_path / f"{name}.csv").read_text().splitlines()) == len(cases) + 1
+        for plot in plots:
+            assert (tmp_path / plot).read_text().startswith("<?xml")
+
+
+def test_every_command_is_listed() -> None:
+    listed = CliRunner().invoke(experiment, ["list"]).output
+    for name in ("update-modes", "single-updates", "two-nodes", "fifty-nodes", "tuning", "delay", "outage"):
+        assert f"\n{name} " in f"\n{listed}"
