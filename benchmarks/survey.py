@@ -18,7 +18,8 @@ from typing import Any
 import numpy as np
 
 from groundstation.survey.compiled_model import CompiledModel
-from groundstation.survey.error_model import Leg, Site, Survey, propagate
+from groundstation.survey.error_model import propagate
+from groundstation.survey.error_sources import Leg, Site, Survey
 from groundstation.survey.instruments import load_tool
 from groundstation.survey.methods import Method, positions
 from groundstation.survey.resolve import Lean

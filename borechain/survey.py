@@ -87,7 +87,7 @@ def survey(
       borechain survey stations.csv --method minimum-curvature --instrument mwd-rev5.1 --sigma 2 --plot survey.svg
     """
     from groundstation.survey.analysis import analyse, with_azimuth_error
-    from groundstation.survey.error_model import Site
+    from groundstation.survey.error_sources import Site
     from groundstation.survey.instruments import load_tool
     from groundstation.survey.methods import Method
     from groundstation.survey.records import DisplacementRule, read_record, with_collar

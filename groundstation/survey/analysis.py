@@ -8,7 +8,8 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
-from groundstation.survey.error_model import Leg, Site, Survey, Uncertainty, propagate
+from groundstation.survey.error_model import Uncertainty, propagate
+from groundstation.survey.error_sources import Leg, Site, Survey
 from groundstation.survey.formulas import is_zero
 from groundstation.survey.instruments import Mode, Term, Tool
 from groundstation.survey.methods import Method, closure, dogleg_severity, positions, vertical_section

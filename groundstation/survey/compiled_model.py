@@ -18,7 +18,8 @@ import numpy as np
 import numpy.typing as npt
 
 from groundstation.errors import SurveyError, ToolError
-from groundstation.survey.error_model import (
+from groundstation.survey.error_model import surface_covariance
+from groundstation.survey.error_sources import (
     EARTH_RATE,
     NO_WEIGHT,
     RECORD,
@@ -29,7 +30,6 @@ from groundstation.survey.error_model import (
     Site,
     Source,
     merged_sources,
-    surface_covariance,
 )
 from groundstation.survey.formulas import VARIABLES, is_zero, translate
 from groundstation.survey.instruments import Tool

@@ -13,14 +13,14 @@ import numpy as np
 import numpy.typing as npt
 
 from groundstation.errors import SurveyError, ToolError
-from groundstation.survey.error_model import (
+from groundstation.survey.error_model import check_inclination
+from groundstation.survey.error_sources import (
     NO_WEIGHT,
     RECORD,
     SECONDS_A_METRE,
     TINY,
     VERTICAL,
     Site,
-    check_inclination,
     compiled,
     inputs_of,
 )

@@ -14,7 +14,8 @@ import numpy.typing as npt
 from groundstation.errors import SurveyError
 from groundstation.survey.columns import Design, Tolerance, tolerance
 from groundstation.survey.ellipsoid import check_covariance
-from groundstation.survey.error_model import Leg, Site, Survey, propagate
+from groundstation.survey.error_model import propagate
+from groundstation.survey.error_sources import Leg, Site, Survey
 from groundstation.survey.instruments import Tool, load_tool
 from groundstation.survey.methods import Method, positions, tangents
 from groundstation.survey.records import read_columns

@@ -14,7 +14,7 @@ import numpy as np
 import numpy.typing as npt
 
 from groundstation.survey.analysis import analyse, magnetic_error, with_azimuth_error
-from groundstation.survey.error_model import Site
+from groundstation.survey.error_sources import Site
 from groundstation.survey.instruments import load_tool
 from groundstation.survey.methods import Method
 from sim.experiments.published import AXES, printed_regions, wellbore_1

@@ -14,7 +14,8 @@ from groundstation.errors import SurveyError
 from groundstation.report import plots, plots_study, plots_wall, style
 from groundstation.report.plots_wall import band_of_thickness, joint_name, ranking
 from groundstation.survey.columns import PRESETS, Design
-from groundstation.survey.error_model import Leg, Site, Survey, propagate
+from groundstation.survey.error_model import propagate
+from groundstation.survey.error_sources import Leg, Site, Survey
 from groundstation.survey.fusion import POWERS, sequence_weights
 from groundstation.survey.instruments import load_tool
 from groundstation.survey.methods import Method, positions

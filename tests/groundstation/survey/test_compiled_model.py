@@ -7,7 +7,8 @@ import pytest
 
 from groundstation.errors import SurveyError, ToolError
 from groundstation.survey.compiled_model import CompiledModel, write_model
-from groundstation.survey.error_model import Leg, Site, Survey, propagate
+from groundstation.survey.error_model import propagate
+from groundstation.survey.error_sources import Leg, Site, Survey
 from groundstation.survey.instruments import Mode, Term, Tool, load_tool, shipped
 from groundstation.survey.methods import Method, positions
 

@@ -10,7 +10,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from groundstation.errors import SurveyError, ToolError
-from groundstation.survey.error_model import RECORD, Leg, Site, Survey, Uncertainty, propagate
+from groundstation.survey.error_model import Uncertainty, propagate
+from groundstation.survey.error_sources import RECORD, Leg, Site, Survey
 from groundstation.survey.instruments import Mode, Term, Tool, load_tool, shipped
 from groundstation.survey.methods import Method, positions
 

@@ -15,7 +15,8 @@ from jsonschema import Draft202012Validator
 from referencing import Registry, Resource
 
 from groundstation.errors import ToolError
-from groundstation.survey.error_model import Leg, Site, Survey, propagate
+from groundstation.survey.error_model import propagate
+from groundstation.survey.error_sources import Leg, Site, Survey
 from groundstation.survey.instruments import Mode, Term, Tool, load_tool, parse_toml, shipped
 from groundstation.survey.iscwsa_json import XCL, parse_json, to_json
 from groundstation.survey.methods import Method, positions

@@ -8,7 +8,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from groundstation.errors import GroundError, SurveyError, ToolError
-from groundstation.survey.error_model import Leg, Site, Survey, propagate
+from groundstation.survey.error_model import propagate
+from groundstation.survey.error_sources import Leg, Site, Survey
 from groundstation.survey.formulas import VARIABLES
 from groundstation.survey.instruments import Mode, Term, Tool, load_tool, shipped
 from groundstation.survey.methods import Method, positions
