@@ -9,7 +9,6 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from groundstation.errors import SurveyError, ToolError
 from groundstation.survey.error_model import Uncertainty, propagate
 from groundstation.survey.error_sources import RECORD, Leg, Site, Survey
 from groundstation.survey.instruments import Mode, Term, Tool, load_tool, shipped
@@ -18,58 +17,19 @@ from groundstation.survey.methods import Method, positions
 with warnings.catch_warnings():
     warnings.simplefilter("ignore")
     import welleng.survey
-
-DEG = math.pi / 180.0
-SITE = Site(9.80665, 50_000.0, 72.0 * DEG, 3.0 * DEG, 60.0 * DEG)
-WELLS = 200  # against the independent library
-MWD = load_tool("mwd-rev5.1")
-Angles = tuple[np.ndarray, np.ndarray, np.ndarray]
-
-
-def tool_of(*terms: Term, **more: object) -> Tool:
-    return Tool("mine", "My tool", terms, **more)  # type: ignore[arg-type]
-
-
-def angle_term(name: str, sigma: float, mode: Mode, inclination: str = "0", azimuth: str = "0") -> Term:
-    return Term(name, sigma, "rad", mode, ("0", inclination, azimuth))
-
-
-def survey_of(md: np.ndarray, inclination: np.ndarray, azimuth: np.ndarray) -> Survey:
-    return Survey(md, inclination, azimuth, positions(Method.MINIMUM_CURVATURE, md, inclination, azimuth)[..., 2])
-
-
-def well_of(seed: int, count: int, steepest: float = 80.0 * DEG, first: float = 0.0) -> Survey:
-    rng = np.random.default_rng(seed)
-    md = np.concatenate([[0.0], np.cumsum(rng.uniform(1.0, 30.0, count - 1))])
-    inclination = np.linspace(first, steepest, count)
-    azimuth = np.cumsum(rng.normal(0.0, 0.1, count)) + rng.uniform(0.0, math.tau)
-    return survey_of(md, inclination, azimuth)
-
-
-def random_well(rng: np.random.Generator) -> Angles:
-    """From vertical to horizontal with 3 to 500 stations, degrees.
-
-    Where the first stations are exactly vertical their azimuth is 0: the library's slot allowance doubles one component
-    of a singular weight alone.
-    """
-    count = int(np.exp(rng.uniform(math.log(3), math.log(501))))
-    md = np.concatenate([[0.0], np.cumsum(rng.uniform(0.2, 30.0, count - 1))])
-    steepest = rng.uniform(0.0, 95.0)
-    inclination = np.clip(np.linspace(0.0, steepest, count) + rng.normal(0.0, 0.3, count), 0.0, 95.0)
-    azimuth = np.mod(rng.uniform(0.0, 360.0) + np.cumsum(rng.normal(0.0, 3.0, count)), 360.0)
-    kind = rng.integers(3)
-    if kind == 0:
-        inclination[: max(1, count // 4)] = 0.0
-    if kind == 1:
-        inclination[:] = np.maximum(inclination, 0.01)
-    azimuth[:2] *= inclination[:2] > 0.0
-    return md, inclination, azimuth
-
-
-def largest_difference(cov: np.ndarray, expected: np.ndarray) -> float:
-    """Of the stations from the second on, against the trace of what is expected."""
-    scale = np.trace(expected, axis1=-2, axis2=-1)[..., 1:, None, None]
-    return float(np.max(np.abs(cov - expected)[..., 1:, :, :] / np.where(scale > 0.0, scale, 1.0)))
+from wells import (
+    DEG,
+    MWD,
+    SITE,
+    WELLS,
+    angle_term,
+    hand_well,
+    largest_difference,
+    random_well,
+    survey_of,
+    tool_of,
+    well_of,
+)
 
 
 def test_the_accelerometer_example_has_its_printed_digits() -> None:
@@ -139,12 +99,6 @@ def test_the_sources_of_several_legs_add_up_to_the_whole() -> None:
     legs = [Leg(MWD), Leg(load_tool("rst-inclinometer"), 9), Leg(MWD, 17), Leg(load_tool("stim300"), 29)]
     found = propagate(survey, legs, SITE)
     np.testing.assert_allclose(sum(found.by_source().values())[1:], found.cov[1:], rtol=1e-10, atol=1e-15)  # type: ignore[index]
-
-
-def hand_well(count: int = 3) -> Survey:
-    """Vertical, stations every 10 m; an inclination error of sigma moves the second station 5 sigma north."""
-    md = 10.0 * np.arange(count)
-    return Survey(md, np.zeros(count), np.zeros(count), md)
 
 
 @pytest.mark.parametrize(
@@ -314,13 +268,6 @@ def test_between_stations_of_several_legs_it_goes_on_too() -> None:
                 np.testing.assert_allclose(found.at(near), found.cov[k], rtol=1e-5, atol=1e-9)
 
 
-@pytest.mark.parametrize("md", [-0.001, 30.001, math.nan, math.inf])
-def test_a_depth_outside_the_survey_is_refused(md: float) -> None:
-    found = propagate(hand_well(4), [Leg(MWD)], SITE)
-    with pytest.raises(SurveyError, match=r"expected a depth of 0\.\.30 m, got"):
-        found.at(md)
-
-
 @pytest.mark.parametrize("name", shipped())
 def test_many_wells_at_once_give_what_each_gives(name: str) -> None:
     rng = np.random.default_rng(20)
@@ -395,75 +342,6 @@ def test_from_vertical_to_nearly_vertical_the_region_goes_on(name: str) -> None:
     assert tool.terms
     for cov in regions[1:]:
         np.testing.assert_allclose(cov, regions[0], rtol=2e-2, atol=2e-3 * float(np.max(regions[0])))
-
-
-@pytest.mark.parametrize("inclination", [0.0, 1e-40, 1e-13])
-def test_a_weight_without_a_value_is_refused_by_its_term(inclination: float) -> None:
-    tool = tool_of(
-        angle_term("A", 0.01, Mode.RANDOM, "1"), angle_term("B", 0.01, Mode.SYSTEMATIC, "0", "1 / Sin(Inc)^3")
-    )
-    md = 10.0 * np.arange(3)
-    survey = Survey(md, np.full(3, inclination), np.ones(3), md)
-    with pytest.raises(ToolError, match="mine: term B: its weight has no value at a station; give singular weights"):
-        propagate(survey, [Leg(tool)], SITE)
-
-
-@pytest.mark.parametrize("tool", [MWD, load_tool("gyro-continuous"), load_tool("relay")], ids=lambda tool: tool.name)
-def test_without_singular_weights_a_vertical_hole_has_their_limit_or_is_refused(tool: Tool) -> None:
-    bare = tool.with_terms(
-        tuple(
-            Term(t.name, t.value, t.unit, t.mode, t.weights, None, t.position) if t.singular else t for t in tool.terms
-        )
-    )
-    survey = hand_well()
-    survey = Survey(survey.md, survey.inclination, np.full(3, 0.4), survey.tvd, {"SigmaForce": np.full(3, 0.01)})
-    try:
-        cov = propagate(survey, [Leg(bare)], SITE).cov
-    except ToolError:
-        return
-    np.testing.assert_allclose(cov, propagate(survey, [Leg(tool)], SITE).cov, rtol=1e-9, atol=1e-12)
-
-
-@pytest.mark.parametrize(
-    ("weights", "message"),
-    [
-        (("0", "1 / (MD - 10)", "0"), "term A"),
-        (("Sqrt(-MD)", "0", "0"), "term A"),
-        (("0", "0", "1/(TVD-TVD)"), "term A"),
-    ],
-)
-@pytest.mark.parametrize("mode", Mode)
-def test_a_division_by_zero_is_refused_in_every_mode(weights: tuple[str, str, str], message: str, mode: Mode) -> None:
-    survey = well_of(21, 4)
-    survey = Survey(np.array([0.0, 10.0, 20.0, 30.0]), survey.inclination, survey.azimuth, survey.tvd)
-    with pytest.raises(ToolError, match=message):
-        propagate(survey, [Leg(tool_of(Term("A", 1.0, "rad", mode, weights)))], SITE)
-
-
-def test_a_tool_outside_its_inclinations_is_refused() -> None:
-    tool = load_tool("rst-inclinometer")
-    survey = well_of(22, 10, steepest=30.5 * DEG)
-    message = r"rst-inclinometer: made for inclinations of 0\.\.30 deg, the survey has 30\.5 deg; choose another"
-    with pytest.raises(ToolError, match=message):
-        propagate(survey, [Leg(tool)], SITE)
-    with pytest.raises(ToolError, match=message):
-        propagate(survey, [Leg(MWD), Leg(tool, 8)], SITE)
-    assert propagate(survey, [Leg(tool), Leg(MWD, 9)], SITE).cov.shape == (10, 3, 3)
-    steep = well_of(22, 10, steepest=30.0 * DEG)
-    assert propagate(steep, [Leg(tool)], SITE).cov.shape == (10, 3, 3)
-
-
-def test_a_tool_for_steep_holes_is_refused_in_a_flat_one() -> None:
-    tool = tool_of(angle_term("A", 0.01, Mode.RANDOM, "1"), inclination_range=(20.0 * DEG, 90.0 * DEG))
-    survey = well_of(23, 5, steepest=10.0 * DEG, first=5.0 * DEG)
-    with pytest.raises(ToolError, match=r"mine: made for inclinations of 20\.\.90 deg"):
-        propagate(survey, [Leg(tool)], SITE)
-
-
-@pytest.mark.parametrize("firsts", [[], [0], [2], [1, 1], [1, 3, 2], [1, 4], [1, -1]])
-def test_legs_that_do_not_fit_the_survey_are_refused(firsts: list[int]) -> None:
-    with pytest.raises(SurveyError, match="legs: expected to begin at station 1 and at growing stations of the survey"):
-        propagate(hand_well(4), [Leg(MWD, first) for first in firsts], SITE)
 
 
 NAMED: list[tuple[str, Callable[[Survey], np.ndarray]]] = [
