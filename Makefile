@@ -4,7 +4,7 @@ VENV ?= .venv
 BIN := $(VENV)/bin
 STAMP := $(VENV)/.installed
 
-.PHONY: rig test check lint types contracts tests lock study clean
+.PHONY: rig test check lint types contracts tests explore lock study clean
 
 rig: $(STAMP)  ## set up and drill wellbore 1
 	$(BIN)/borechain rig scenarios/wellbore-1.toml --speed max --seed 1
@@ -31,6 +31,9 @@ contracts: $(STAMP)
 
 tests: $(STAMP)
 	$(BIN)/python -m pytest
+
+explore: $(STAMP)  ## the properties with examples that no run before has seen
+	HYPOTHESIS_PROFILE=explore $(BIN)/python -m pytest -m hypothesis
 
 study: $(STAMP)  ## the long studies; their tables are committed in docs/results
 	$(BIN)/borechain experiment relay --hops 10 --seeds 40 --out docs/results

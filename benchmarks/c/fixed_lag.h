@@ -48,6 +48,8 @@ static uint32_t turn(const State *state, const Config *config, int64_t cycle, do
     double turned = yaw_rate(down, wx, wy, wz) * dt;
     rotate_down(down, wx, wy, wz, 0.5 * dt);
     propagate(P, wz, dt, 1.0, config);
+    if (down[2] < INVERTED)
+        isolate(P, PSI, UNKNOWN_YAW_VAR);
     return advance_binary(yaw, turned);
 }
 

@@ -56,7 +56,7 @@ static int64_t guard_rate(State *state, const Config *config, double rate_z)
         int first = state->rate_exceeded == 0;
         state->rate_exceeded = 1;
         state->yaw_known = 0;
-        isolate(state->P, PSI, 3.29);
+        isolate(state->P, PSI, UNKNOWN_YAW_VAR);
         return first ? RATE_EXCEEDED : 0;
     }
     if (state->rate_exceeded) {

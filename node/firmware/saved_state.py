@@ -9,12 +9,11 @@ import numpy as np
 
 from node.errors import SavedStateError
 from node.kernels.error_model import isolate
-from node.kernels.layout import LAYOUT_VERSION, STATE, Array, Err
+from node.kernels.layout import LAYOUT_VERSION, STATE, UNKNOWN_YAW_VAR, Array, Err
 
 HEADER = struct.Struct("<4sHHQII")  # magic, layout, reserved, generation, state bytes, blob bytes
 CHECKSUM = struct.Struct("<I")  # crc32 of header and body, between the two
 MAGIC = b"BCSS"
-UNKNOWN_YAW_VAR = 3.29  # rad^2, uniform over the turn
 
 
 def pack(state: Array, blob: bytes, generation: int) -> bytes:

@@ -11,11 +11,11 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 
-from node.firmware.saved_state import UNKNOWN_YAW_VAR, resume
+from node.firmware.saved_state import resume
 from node.firmware.sensor_faults import AidingWatch, Fault, Mismatch, ReadingWatch, SensorLimits
 from node.kernels.angles import from_binary, wrap
 from node.kernels.error_model import isolate
-from node.kernels.layout import DEG, PERIOD, RING, Array, Err, Status
+from node.kernels.layout import DEG, PERIOD, RING, UNKNOWN_YAW_VAR, Array, Err, Status
 from node.kernels.modes import STATIC_BIAS
 from telemetry.messages import Aiding, NodeFlag, Scalar, Severity, Vector3
 

@@ -12,7 +12,7 @@ from typing import Any
 from node.kernels.angles import advance_binary, from_binary, to_binary, wrap
 from node.kernels.error_model import isolate, propagate
 from node.kernels.jit import kernel
-from node.kernels.layout import RING, STATES, Array, Err, Status
+from node.kernels.layout import INVERTED, RING, STATES, UNKNOWN_YAW_VAR, Array, Err, Status
 from node.kernels.strapdown import rotate_down, yaw_rate
 from node.kernels.update import clear, feed_back, innovation_var, joseph, level, zero_rate
 
@@ -49,7 +49,11 @@ def stood_still(state: Any, cycle: int) -> bool:
 
 @kernel
 def turn(state: Any, config: Any, cycle: int, dt: float, yaw: int, down: Array, P: Array) -> int:
-    """Integrate ``dt`` (s) of ``cycle`` into ``down`` and ``P``; returns the binary yaw. Still means no turn at all."""
+    """Integrate ``dt`` (s) of ``cycle`` into ``down`` and ``P``; returns the binary yaw. Still means no turn at all.
+
+    Near the inverted axis a cycle cannot resolve the yaw, whose kinematics are singular there: it is what the aiding
+    says, and its innovations teach nothing about the gyroscope.
+    """
     slot = cycle % RING
     if stood_still(state, cycle):
         propagate(P, 0.0, dt, 0.0, config)
@@ -61,6 +65,8 @@ def turn(state: Any, config: Any, cycle: int, dt: float, yaw: int, down: Array, 
     turned = yaw_rate(down, wx, wy, wz) * dt
     rotate_down(down, wx, wy, wz, 0.5 * dt)
     propagate(P, wz, dt, 1.0, config)
+    if down[2] < INVERTED:
+        isolate(P, PSI, UNKNOWN_YAW_VAR)
     return advance_binary(yaw, turned)
 
 

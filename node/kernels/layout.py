@@ -17,6 +17,8 @@ STATES: Final = 8
 RING: Final = 64
 PENDING: Final = 4
 LAYOUT_VERSION: Final = 1
+UNKNOWN_YAW_VAR: Final = 3.29  # rad^2, uniform over the turn
+INVERTED: Final = -0.9848077530122081  # downward part of the axis at 170 deg of inclination
 
 
 class Err(enum.IntEnum):

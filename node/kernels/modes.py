@@ -6,7 +6,7 @@ from typing import Any
 
 from node.kernels.error_model import isolate
 from node.kernels.jit import kernel
-from node.kernels.layout import Array, Err, Status
+from node.kernels.layout import UNKNOWN_YAW_VAR, Array, Err, Status
 from node.kernels.moving_average import average_force
 
 BX = int(Err.BIAS_X)
@@ -69,7 +69,7 @@ def guard_rate(state: Any, config: Any, rate_z: float) -> int:
         first = state.rate_exceeded == 0
         state.rate_exceeded = 1
         state.yaw_known = 0
-        isolate(state.P, PSI, 3.29)
+        isolate(state.P, PSI, UNKNOWN_YAW_VAR)
         return RATE_EXCEEDED if first else 0
     if state.rate_exceeded == 1:
         state.rate_exceeded = 0

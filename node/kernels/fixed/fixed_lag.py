@@ -6,13 +6,25 @@ from typing import Any, Final
 
 from node.kernels.fixed.aiding import aid, drop_first_pending
 from node.kernels.fixed.arithmetic import mul, quotient, shift
-from node.kernels.fixed.error_model import decays, propagate, widen
-from node.kernels.fixed.layout import FAST, LONGEST_GAP, LONGEST_STEP, ONE_SECOND, RATE_Q, STEP_Q, TIME_Q, UNIT, VAR_Q
+from node.kernels.fixed.error_model import decays, isolate, propagate, widen
+from node.kernels.fixed.layout import (
+    FAST,
+    LONGEST_GAP,
+    LONGEST_STEP,
+    ONE_SECOND,
+    RATE_Q,
+    STEP_Q,
+    TIME_Q,
+    UNIT,
+    UNKNOWN_VAR,
+    VAR_Q,
+    VECTOR_Q,
+)
 from node.kernels.fixed.strapdown import half_turn, rotate_down, yaw_rate
 from node.kernels.fixed.trigonometry import TURN, counts
 from node.kernels.fixed.update import level, zero_rate
 from node.kernels.jit import kernel
-from node.kernels.layout import RING, STATES, Array, Err, Status
+from node.kernels.layout import INVERTED, RING, STATES, Array, Err, Status
 
 PSI, BZ = int(Err.YAW), int(Err.BIAS_Z)
 LATE_DROPPED = int(Status.LATE_DROPPED)
@@ -22,6 +34,7 @@ SQUARE_Q: Final = VAR_Q // 2  # of an angle whose square is a variance
 LARGEST_SQUARED: Final = 4 << SQUARE_Q  # rad
 GAP_RIGHT: Final = 10  # a gap of 2^12 s is a factor of 31 bits
 MISSED_GAP: Final = ONE_SECOND // 1000
+INVERTED_DOWN: Final = round(INVERTED * 2.0**VECTOR_Q)
 SLOT: Final = RING - 1  # RING is a power of two
 
 
@@ -77,6 +90,8 @@ def turn(state: Any, config: Any, cycle: int, dt: int, yaw: int, down: Array, P:
         yaw = (yaw + counts(mul(yaw_rate(down, wx, wy, wz), piece), STEP_Q)) & TURN
         rotate_down(down, ax, ay, az, s, c)
         propagate(state, P, wz, piece, 1, config)
+    if still == 0 and down[2] < INVERTED_DOWN:
+        isolate(P, PSI, UNKNOWN_VAR)
     return yaw
 
 

@@ -10,7 +10,7 @@ from typing import Final
 
 import numpy as np
 
-from node.kernels.layout import PENDING, RING, STATES
+from node.kernels.layout import PENDING, RING, STATES, UNKNOWN_YAW_VAR
 
 TIME_Q: Final = 28  # s, 3.7 ns
 RATE_Q: Final = 46  # rad/s, also of the scale (1) and the stamp (s): read as Q40 they count units of 2^-6
@@ -26,6 +26,7 @@ LONGEST_STEP: Final = 8 << TIME_Q  # a factor of 31 bits
 FAST: Final = 8 << RATE_Q  # rad/s, above which a step is one second at most
 LONGEST_GAP: Final = 4096 << TIME_Q  # of lost cycles that is integrated
 CEILING: Final = 12 << VAR_Q  # of any variance
+UNKNOWN_VAR: Final = round(UNKNOWN_YAW_VAR * 2.0**VAR_Q)  # rad^2
 NEVER: Final = -(1 << 62)  # a time before all others
 FASTEST: Final = 32 << RATE_Q  # rad/s in a reading
 STRONGEST: Final = 32 << FORCE_Q  # g in a reading

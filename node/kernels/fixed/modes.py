@@ -6,7 +6,7 @@ from typing import Any, Final
 
 from node.kernels.fixed.arithmetic import quotient, shift
 from node.kernels.fixed.error_model import isolate
-from node.kernels.fixed.layout import CEILING, RATE_Q, TIME_Q, VAR_Q
+from node.kernels.fixed.layout import CEILING, RATE_Q, TIME_Q, UNKNOWN_VAR
 from node.kernels.fixed.moving_average import average_force
 from node.kernels.jit import kernel
 from node.kernels.layout import Array, Err, Status
@@ -18,7 +18,6 @@ JOINT_OPENED, JOINT_CLOSED = int(Status.JOINT_OPENED), int(Status.JOINT_CLOSED)
 BIAS_KNOWN = int(Status.BIAS_KNOWN)
 RATE_EXCEEDED, RATE_RECOVERED = int(Status.RATE_EXCEEDED), int(Status.RATE_RECOVERED)
 UNBIASED_STILL: Final = round(UNBIASED_STILL_RATE * 2.0**RATE_Q)  # rad/s, Q46
-UNKNOWN_YAW_VAR: Final = round(3.29 * 2.0**VAR_Q)  # rad^2, uniform over the turn
 
 
 @kernel
@@ -66,7 +65,7 @@ def guard_rate(state: Any, config: Any, rate_z: int) -> int:
         first = state.rate_exceeded == 0
         state.rate_exceeded = 1
         state.yaw_known = 0
-        isolate(state.P, PSI, UNKNOWN_YAW_VAR)
+        isolate(state.P, PSI, UNKNOWN_VAR)
         return RATE_EXCEEDED if first else 0
     if state.rate_exceeded == 1:
         state.rate_exceeded = 0
