@@ -66,7 +66,7 @@ INPUT = np.dtype(
     ],
     align=True,
 )
-HEARD = ("yaw", "yaw_var", "systematic_var", "offset", "turn_rate", "valid_at", "sequence", "hops")
+HEARD = ("yaw", "yaw_var", "systematic_var", "offset", "valid_at", "sequence", "hops")
 OUTPUT = np.dtype([("status", "i8"), ("yaw", "u4"), ("var", "f8", (STATES,))], align=True)
 FIXED_INPUT, FIXED_OUTPUT = (
     np.dtype([(name, "u4" if name == "yaw" and d is OUTPUT else "i8", d[name].shape) for name in d.names], align=True)
@@ -129,8 +129,7 @@ def looped(cycle: Any, offer: Any) -> Runner:
                 status = 0
                 if i.aided == 1:
                     status = offer(
-                        own, settings, i.yaw, i.yaw_var, i.systematic_var, i.offset, i.turn_rate, i.valid_at,
-                        i.sequence, i.hops,
+                        own, settings, i.yaw, i.yaw_var, i.systematic_var, i.offset, i.valid_at, i.sequence, i.hops,
                     )  # fmt: skip
                 out.status = status | cycle(own, settings, i.rate, i.force, i.start, i.end, i.joined)
                 out.yaw = own.now_yaw

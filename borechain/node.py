@@ -11,6 +11,8 @@ import click
 from borechain.faults import plain_faults
 from borechain.options import key_option, place_options
 
+SCHEMES = ("forward", "estimate", "intersection")
+
 
 @click.command()
 @click.option("--tube", type=int, required=True, help="Number of the tube, 1 is the lowest.")
@@ -19,7 +21,9 @@ from borechain.options import key_option, place_options
 @click.option("--joint-std-deg", type=float, default=0.05, show_default=True, help="Error of a reading, 1 sigma.")
 @click.option("--mount-std-deg", type=float, default=0.05, show_default=True, help="Error of the IMU's mount, 1 sigma.")
 @click.option("--kernel", type=click.Choice(["float64", "fixed"]), default="float64", show_default=True)
-@click.option("--scheme", type=click.Choice(["forward", "estimate"]), default="forward", show_default=True)
+@click.option(
+    "--scheme", type=click.Choice(["forward", "estimate", "intersection"]), default="forward", show_default=True
+)
 @click.option("--imu", help="The node's own sensor: replay:FILE, mpu6500:BUS or mpu6500:BUS:ADDRESS.")
 @key_option
 @place_options

@@ -100,6 +100,7 @@ class EncoderSection(Section):
     """Encoder of the drive head."""
 
     counts_per_turn: int = Field(4096, ge=16, description="1024 lines in quadrature")
+    edge_std_deg: NotNegative = Field(0.003, description="error of a line's place, constant for every line")
 
 
 class ClockSection(Section):
@@ -131,7 +132,7 @@ class MediumSection(Section):
 class NodeSection(Section):
     """Firmware settings of every node."""
 
-    scheme: Literal["forward", "estimate"] = "forward"
+    scheme: Literal["forward", "estimate", "intersection"] = "forward"
     kernel: Literal["float64", "fixed"] = Field("float64", description="the loop in floats or in integers")
 
 

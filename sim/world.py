@@ -11,6 +11,7 @@ import numpy.typing as npt
 
 from node.firmware.settings import Joint, TubeSettings
 from node.kernels.layout import PERIOD, Scheme
+from sim.encoder import Disc
 from sim.errors import ScenarioError
 from sim.faults import KillNode
 from sim.imu_errors import Drift, ImuErrors
@@ -21,7 +22,7 @@ from sim.truth import TubeTruth
 from telemetry.messages import BASE, ENCODER
 
 Array = npt.NDArray[np.float64]
-JOINTS, MOUNTS, CLOCKS, GYRO, ACCELEROMETER, DRIVE, DRIFT, RACK = range(8)
+JOINTS, MOUNTS, CLOCKS, GYRO, ACCELEROMETER, DRIVE, DRIFT, RACK, DISC = range(9)
 
 
 def wrap(angle: float) -> float:
@@ -64,7 +65,8 @@ class World:
         self.end = self.motion.end
         self.faults: tuple[KillNode, ...] = scenario.faults
         self._samples: dict[int, list[list[float]]] = {}
-        self._quantum = 2.0 * math.pi / file.encoder.counts_per_turn
+        edge_std = math.radians(file.encoder.edge_std_deg)
+        self._disc = Disc(self.motion, file.encoder.counts_per_turn, edge_std, self._random(DISC, 0))
         self._check_faults()
 
     def cycle_end(self, cycle: int) -> float:
@@ -79,10 +81,8 @@ class World:
 
     def encoder_sample(self, t: float) -> tuple[int, float, int]:
         """Count, rig time of its last edge, and 1 (the string turns one way, so every edge rises)."""
-        angle = float(self.motion.drive(np.array([t]))[0][0])
-        count = math.floor(angle / self._quantum + 1e-9)
-        edge = self.motion.time_of_angle(count * self._quantum) if t > self.motion.begin else self.begin
-        return count, min(edge, t), 1
+        count, edge_at = self._disc.sample(t)
+        return count, edge_at if t > self.motion.begin else self.begin, 1
 
     def bit_depth(self, t: float) -> float:
         """Measured depth of the bit, m."""

@@ -28,22 +28,41 @@ static int stood_still(const State *state, int64_t cycle)
     return cycle + 1 >= state->cycles || state->ring_quiet[(cycle + 1) % RING] != 0;
 }
 
-static double spin(const State *state, int64_t slot)
+static double true_rate_z(const State *state, double measured)
 {
-    return (state->ring_rate[slot][2] - state->static_bias[2] - state->bias[2]) / (1.0 + state->scale);
+    return (measured - state->static_bias[2] - state->bias[2]) / (1.0 + state->scale);
 }
 
-static uint32_t turn(const State *state, const Config *config, int64_t cycle, double dt, uint32_t yaw, double down[3],
-                     Matrix P)
+/* mean spin from begin to end inside a cycle: it changes linearly about the cycle's mean */
+static double spin(const State *state, int64_t cycle, double begin, double end)
+{
+    if (stood_still(state, cycle))
+        return 0.0;
+    int64_t slot = cycle % RING;
+    double slope = 0.0;
+    if (cycle > 0 && cycle + 1 < state->cycles) {
+        int64_t before = (cycle - 1) % RING, after = (cycle + 1) % RING;
+        double apart = 0.5 * (state->ring_start[after] + state->ring_end[after] - state->ring_start[before] -
+                              state->ring_end[before]);
+        slope = (state->ring_rate[after][2] - state->ring_rate[before][2]) / apart;
+    }
+    double inside = larger(begin, state->ring_start[slot]);
+    double off_centre = 0.5 * (inside + end - state->ring_start[slot] - state->ring_end[slot]);
+    return true_rate_z(state, state->ring_rate[slot][2] + slope * off_centre);
+}
+
+static uint32_t turn(const State *state, const Config *config, int64_t cycle, double begin, double end, uint32_t yaw,
+                     double down[3], Matrix P)
 {
     int64_t slot = cycle % RING;
+    double dt = end - begin;
     if (stood_still(state, cycle)) {
         propagate(P, 0.0, dt, 0.0, config);
         return yaw;
     }
     double wx = state->ring_rate[slot][0] - state->static_bias[0] - state->bias[0];
     double wy = state->ring_rate[slot][1] - state->static_bias[1] - state->bias[1];
-    double wz = spin(state, slot);
+    double wz = spin(state, cycle, begin, end);
     rotate_down(down, wx, wy, wz, 0.5 * dt);
     double turned = yaw_rate(down, wx, wy, wz) * dt;
     rotate_down(down, wx, wy, wz, 0.5 * dt);
@@ -59,7 +78,7 @@ static void advance(State *state, const Config *config, int64_t cycle, double un
     if (dt <= 0.0)
         return;
     double gap = state->ring_start[cycle % RING] - state->epoch;
-    state->yaw = turn(state, config, cycle, dt, state->yaw, state->down, state->P);
+    state->yaw = turn(state, config, cycle, state->epoch, until, state->yaw, state->down, state->P);
     if (gap > 1e-3)
         state->P[PSI][PSI] += square(state->ring_rate[cycle % RING][2] * gap);
     for (int k = 0; k < 3; k++)
@@ -70,15 +89,13 @@ static void advance(State *state, const Config *config, int64_t cycle, double un
 static double interpolation_var(const State *state, int64_t cycle, double at)
 {
     int64_t slot = cycle % RING;
-    double inside = smaller(at - state->ring_start[slot], state->ring_end[slot] - at);
-    if (inside <= 0.0 || cycle == 0)
+    if (cycle == 0)
         return 0.0;
-    double change = state->ring_rate[slot][2] - state->ring_rate[(cycle - 1) % RING][2];
-    if (cycle + 1 < state->cycles) {
-        double ahead = state->ring_rate[(cycle + 1) % RING][2] - state->ring_rate[slot][2];
-        change = larger(fabs(change), fabs(ahead));
-    }
-    return square(0.5 * change * inside);
+    double inside = smaller(at - state->ring_start[slot], state->ring_end[slot] - at);
+    double bend = 2.0 * (state->ring_rate[slot][2] - state->ring_rate[(cycle - 1) % RING][2]);
+    if (cycle + 1 < state->cycles)
+        bend = 0.5 * bend - (state->ring_rate[(cycle + 1) % RING][2] - state->ring_rate[slot][2]);
+    return square(0.25 * bend) * (square(inside) + state->P[STAMP][STAMP]);
 }
 
 static void reset_yaw(State *state, const Config *config, double yaw, double var)
@@ -103,7 +120,7 @@ static int64_t aid(State *state, const Config *config, double yaw, double r_var,
     if (config->stamp_std > 0.0)
         state->h[STAMP] = rate;
     double s = innovation_var(state->P, state->h, r_var, state->ph);
-    double residual = wrap(yaw - from_binary(state->yaw) - rate * state->stamp);
+    double residual = wrap(yaw - from_binary(state->yaw));
     state->innovation = residual;
     state->innovation_var = s;
     if (residual * residual > config->gate * config->gate * s) {
@@ -124,21 +141,23 @@ static int64_t aid(State *state, const Config *config, double yaw, double r_var,
     return AIDED;
 }
 
-static int64_t aid_late(State *state, const Config *config, double yaw, double var, double rate, double at)
+static int64_t aid_late(State *state, const Config *config, double yaw, double var, double at)
 {
-    double moved = yaw, earliest = state->epoch;
-    for (int64_t cycle = state->consumed; cycle >= 0 && cycle > state->cycles - RING && earliest > at; cycle--) {
+    double moved = yaw, rate = 0.0, earliest = state->epoch;
+    int64_t cycle = state->consumed;
+    for (; cycle >= 0 && cycle > state->cycles - RING && earliest > at; cycle--) {
         int64_t slot = cycle % RING;
         double begin = larger(state->ring_start[slot], at);
         if (begin < earliest) {
-            if (!stood_still(state, cycle))
-                moved += spin(state, slot) * (earliest - begin);
+            moved += spin(state, cycle, begin, earliest) * (earliest - begin);
+            rate = spin(state, cycle, begin, begin);
             earliest = begin;
         }
     }
     if (earliest > at + 1e-3)
         return LATE_DROPPED;
     double lag = state->epoch - at;
+    var += interpolation_var(state, cycle + 1, at);
     double noise = square(config->gyro_noise[2]) * lag + state->P[BZ][BZ] * lag * lag;
     return aid(state, config, moved, var + noise, rate, at);
 }
@@ -148,7 +167,6 @@ static void move_pending(State *state, int64_t to, int64_t from)
     state->pending_at[to] = state->pending_at[from];
     state->pending_yaw[to] = state->pending_yaw[from];
     state->pending_var[to] = state->pending_var[from];
-    state->pending_rate[to] = state->pending_rate[from];
     state->pending_sequence[to] = state->pending_sequence[from];
 }
 
@@ -156,13 +174,15 @@ static int64_t take_pending(State *state, const Config *config, int64_t cycle, d
 {
     int64_t status = 0;
     while (state->pending > 0 && state->pending_at[0] <= until) {
-        double at = state->pending_at[0], yaw = state->pending_yaw[0];
-        double var = state->pending_var[0], rate = state->pending_rate[0];
-        if (at >= state->epoch) {
-            advance(state, config, cycle, at);
-            status |= aid(state, config, yaw, var + interpolation_var(state, cycle, at), rate, at);
+        double at = state->pending_at[0] + state->stamp, yaw = state->pending_yaw[0], var = state->pending_var[0];
+        double held = smaller(at, until);
+        if (held >= state->epoch) {
+            advance(state, config, cycle, held);
+            yaw -= spin(state, cycle, held, at) * (at - held);
+            var += interpolation_var(state, cycle, at);
+            status |= aid(state, config, yaw, var, spin(state, cycle, held, held), at);
         } else {
-            status |= aid_late(state, config, yaw, var, rate, at);
+            status |= aid_late(state, config, yaw, var, at);
         }
         state->pending--;
         for (int64_t k = 0; k < state->pending; k++)
@@ -195,13 +215,13 @@ static void predict_to_now(State *state, const Config *config)
     state->now_yaw = state->yaw;
     state->now = state->epoch;
     for (int64_t cycle = state->consumed; cycle < state->cycles; cycle++) {
-        double end = state->ring_end[cycle % RING], dt = end - state->now;
-        if (dt > 0.0) {
-            state->now_yaw = turn(state, config, cycle, dt, state->now_yaw, state->now_down, state->now_P);
+        double end = state->ring_end[cycle % RING];
+        if (end > state->now) {
+            state->now_yaw = turn(state, config, cycle, state->now, end, state->now_yaw, state->now_down, state->now_P);
             state->now = end;
         }
     }
-    state->now_rate = spin(state, (state->cycles - 1) % RING);
+    state->now_rate = true_rate_z(state, state->ring_rate[(state->cycles - 1) % RING][2]);
 }
 
 #endif

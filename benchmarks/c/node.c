@@ -156,7 +156,6 @@ static int64_t offer_aiding(State *state, const Config *config, const Input *in)
     state->pending_at[slot] = in->valid_at;
     state->pending_yaw[slot] = wrap_positive(in->yaw + in->offset);
     state->pending_var[slot] = in->yaw_var + config->aiding_floor_var;
-    state->pending_rate[slot] = in->turn_rate;
     state->pending_sequence[slot] = in->sequence;
     state->pending++;
     state->last_sequence = in->sequence;

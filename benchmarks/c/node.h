@@ -32,7 +32,7 @@ typedef struct {
     int64_t last_sequence;
     double last_aided, innovation, innovation_var;
     int64_t rejected, pending;
-    double pending_at[PENDING], pending_yaw[PENDING], pending_var[PENDING], pending_rate[PENDING];
+    double pending_at[PENDING], pending_yaw[PENDING], pending_var[PENDING];
     int64_t pending_sequence[PENDING];
     /* increments of the last cycles */
     int64_t cycles, consumed;
@@ -53,7 +53,7 @@ typedef struct {
     double gyro_noise[3], bias_std[3], bias_tau[3];
     double boot_bias_std, attitude_factor, bias_factor, scale_std, stamp_std, stamp_walk, still_walk;
     double aiding_floor_var, force_std, gravity, gate;
-    int64_t reject_limit;
+    int64_t intersection, reject_limit;
     double rate_limit, still_rate;
     int64_t lag_cycles, survey_samples, settle_cycles, static_cycles;
 } Config;

@@ -49,6 +49,8 @@ class TubeSettings:
         require(self.state_every >= 1, f"state_every: expected at least 1 cycle, got {self.state_every}")
         age = self.aiding_old_after
         require(math.isfinite(age) and age > 0.0, f"aiding_old_after: expected a time in s, got {age}")
+        both = self.kernel == "fixed" and self.scheme is Scheme.INTERSECTION
+        require(not both, "scheme: expected forward or estimate with the kernel fixed, got intersection")
         require(self.kernel in KERNELS, f"kernel: expected one of {', '.join(KERNELS)}, got {self.kernel}")
         for name, std in (
             ("drive_joint.std", self.drive_joint.std),

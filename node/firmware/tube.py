@@ -16,6 +16,7 @@ from node.firmware.static_record import StaticRecorder
 from node.kernels.angles import from_binary, wrap
 from node.kernels.calibration import USUAL, calibrate
 from node.kernels.cycle import run_cycle
+from node.kernels.error_model import isolate
 from node.kernels.layout import DEG, Array, Err, Scheme, Status, new_state
 from node.kernels.modes import STATIC_BIAS
 from node.kernels.relay import offer_aiding
@@ -34,6 +35,7 @@ from telemetry.messages import (
 from telemetry.parameters import SHORT_HASH, ParameterBlock
 
 VAR_FLOOR = (0.001 * DEG) ** 2
+LEAST_STAMP, LARGEST_STAMP = 1e-4, 0.05  # s, prior of the time-stamp state, whatever the clock says
 STILL_CYCLES = 4  # after which a node takes itself for standing
 LARGEST_OFFSET = 6.0 * DEG  # rad/s, zero-rate offset of a gyroscope never calibrated; the slow alignment turn is faster
 EVENT_OF_STATUS: tuple[tuple[Status, str, Severity], ...] = (
@@ -49,6 +51,7 @@ EVENT_OF_STATUS: tuple[tuple[Status, str, Severity], ...] = (
     (Status.BAD_SAMPLE, "bad_sample", Severity.ERROR),
     (Status.FILTER_FAULT, "filter_fault", Severity.ERROR),
 )
+TOLD = Status(sum(bit for bit, _, _ in EVENT_OF_STATUS))
 
 
 @dataclass(frozen=True, slots=True)
@@ -110,6 +113,7 @@ class Tube:
         self._configs = config
         self.config = config[0]
         self._states = state
+        self.config["intersection"] = int(settings.scheme is Scheme.INTERSECTION)
         self.state = state[0]
         self._next_sequence = next_sequence
         self._restored = restored
@@ -122,6 +126,7 @@ class Tube:
         self._guard = SensorGuard(state, config, settings.limits)
         self._slow_cycles = 0  # in a row, not faster than the offset of a gyroscope never calibrated
         self._temperature = USUAL
+        self._stamp_walk, self._stamp_hops = float(self.config["stamp_walk"]), 0  # of one joint
         self._run_cycle, self._offer_aiding = kernel_of(settings.kernel)
         self.parameters = parameters or ParameterBlock(settings.tube, 0)
         self.use(self.parameters)
@@ -129,7 +134,7 @@ class Tube:
     def on_aiding(self, aiding: Aiding, valid_local: float) -> Aiding | None:
         """Take the reference from the upper end, valid at ``valid_local`` (s, own clock); returns what goes down.
 
-        ``forward`` hands the encoder's measurement on unchanged, at once; ``estimate`` waits for the cycle.
+        ``forward`` hands the encoder's measurement on unchanged, at once; the others wait for the cycle.
         """
         joint = self.settings.drive_joint if aiding.hops == 0 else None
         offset = wrap(aiding.offset + (joint.angle if joint else 0.0))
@@ -143,7 +148,6 @@ class Tube:
                     aiding.yaw_var,
                     systematic_var,
                     offset,
-                    aiding.rate,
                     valid_local,
                     aiding.sequence,
                     aiding.hops,
@@ -172,6 +176,7 @@ class Tube:
         calibrate(self._correction[0], reading.temperature, self._rate, self._force)
         raw = (reading.rate, reading.force)
         self._guard.before(raw, self._rate, self._force, saturated=reading.saturated, at=reading.end)
+        self._follow_clock(around)
         level_coarsely(self.state, self.config, self._rate, self._force)
         self._slow_cycles = self._slow_cycles + 1 if max(map(abs, self._rate)) < LARGEST_OFFSET else 0
         if self._cycles and reading.start - self.state["now"] > 0.5 * (reading.end - reading.start):
@@ -190,7 +195,7 @@ class Tube:
         yield from self._record(reading, around)
         if Status.SURVEY_READY in status:
             yield self._survey(reading.end, around)
-        if self.settings.scheme is Scheme.ESTIMATE and self.state["yaw_known"]:
+        if self.settings.scheme is not Scheme.FORWARD and self.state["yaw_known"]:
             yield self._estimate(around)
         if status & ~Status.AIDED or self._cycles % self.settings.state_every == 0:
             yield self._report(reading.end, around)
@@ -269,7 +274,7 @@ class Tube:
         return flags
 
     def _events(self, status: Status, around: Surroundings) -> Iterator[Event]:
-        for bit, code, severity in EVENT_OF_STATUS:
+        for bit, code, severity in EVENT_OF_STATUS if status & TOLD else ():
             if bit in status:
                 yield self._event(code, severity, around.rig_now, {"yaw_deg": self.yaw / DEG})
         rejecting = bool(self.state["rejected"])
@@ -291,6 +296,24 @@ class Tube:
         if recorder.is_due(reading.end):
             record = recorder.finish(self.settings.tube, reading.end, around.rig_now, self._next_sequence)
             yield record or self._event("static_record_empty", Severity.ERROR, around.rig_now, {})
+
+    def _follow_clock(self, around: Surroundings) -> None:
+        """Let the prior of the time-stamp state be what the clock says of itself, and its wander that of the hops.
+
+        The configuration is left alone while it is about right: another one costs the integer loop a conversion.
+        """
+        config = self.config
+        if not around.synchronised or config["stamp_std"] == 0.0:
+            return
+        std = min(max(math.sqrt(around.clock_var), LEAST_STAMP), LARGEST_STAMP)
+        hops = max(around.hops, 1)
+        if hops == self._stamp_hops and 0.8 < std / float(config["stamp_std"]) < 1.25:
+            return
+        self._stamp_hops = hops
+        config["stamp_std"] = std
+        config["stamp_walk"] = self._stamp_walk * math.sqrt(hops)
+        if self.state["last_aided"] == -math.inf:
+            isolate(self.state["P"], Err.STAMP, std * std)
 
     def _start_over(self) -> None:
         """A covariance that is none: begin again from nothing but the constant bias."""

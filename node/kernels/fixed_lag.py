@@ -14,7 +14,7 @@ from node.kernels.error_model import isolate, propagate
 from node.kernels.jit import kernel
 from node.kernels.layout import INVERTED, RING, STATES, UNKNOWN_YAW_VAR, Array, Err, Status
 from node.kernels.strapdown import rotate_down, yaw_rate
-from node.kernels.update import clear, feed_back, innovation_var, joseph, level, zero_rate
+from node.kernels.update import clear, feed_back, innovation_var, intersect, joseph, level, zero_rate
 
 PSI, BZ, D = int(Err.YAW), int(Err.BIAS_Z), int(Err.STAMP)
 AIDED, REJECTED, YAW_RESET = int(Status.AIDED), int(Status.REJECTED), int(Status.YAW_RESET)
@@ -48,19 +48,43 @@ def stood_still(state: Any, cycle: int) -> bool:
 
 
 @kernel
-def turn(state: Any, config: Any, cycle: int, dt: float, yaw: int, down: Array, P: Array) -> int:
-    """Integrate ``dt`` (s) of ``cycle`` into ``down`` and ``P``; returns the binary yaw. Still means no turn at all.
+def slope(state: Any, cycle: int) -> float:
+    """Change of the spin inside ``cycle`` (rad/s^2), from its neighbours' means; 0 while one of them is missing."""
+    if cycle == 0 or cycle + 1 >= state.cycles:
+        return 0.0
+    before, after = (cycle - 1) % RING, (cycle + 1) % RING
+    apart = 0.5 * (state.ring_start[after] + state.ring_end[after] - state.ring_start[before] - state.ring_end[before])
+    return float((state.ring_rate[after, 2] - state.ring_rate[before, 2]) / apart)
+
+
+@kernel
+def spin(state: Any, cycle: int, begin: float, end: float) -> float:
+    """Mean spin (rad/s) from ``begin`` to ``end`` (s) inside ``cycle``: it changes linearly about the cycle's mean."""
+    slot = cycle % RING
+    if stood_still(state, cycle):
+        return 0.0
+    inside = max(begin, state.ring_start[slot])  # the rest are cycles that were lost
+    off_centre = 0.5 * (inside + end - state.ring_start[slot] - state.ring_end[slot])
+    measured = state.ring_rate[slot, 2] + slope(state, cycle) * off_centre
+    return float((measured - state.static_bias[2] - state.bias[2]) / (1.0 + state.scale))
+
+
+@kernel
+def turn(state: Any, config: Any, cycle: int, begin: float, end: float, yaw: int, down: Array, P: Array) -> int:
+    """Integrate ``cycle`` from ``begin`` to ``end`` (s) into ``down`` and ``P``; returns the binary yaw.
+
+    Still means no turn at all.
 
     Near the inverted axis a cycle cannot resolve the yaw, whose kinematics are singular there: it is what the aiding
     says, and its innovations teach nothing about the gyroscope.
     """
-    slot = cycle % RING
+    slot, dt = cycle % RING, end - begin
     if stood_still(state, cycle):
         propagate(P, 0.0, dt, 0.0, config)
         return yaw
     wx = state.ring_rate[slot, 0] - state.static_bias[0] - state.bias[0]
     wy = state.ring_rate[slot, 1] - state.static_bias[1] - state.bias[1]
-    wz = (state.ring_rate[slot, 2] - state.static_bias[2] - state.bias[2]) / (1.0 + state.scale)
+    wz = spin(state, cycle, begin, end)
     rotate_down(down, wx, wy, wz, 0.5 * dt)
     turned = yaw_rate(down, wx, wy, wz) * dt
     rotate_down(down, wx, wy, wz, 0.5 * dt)
@@ -77,7 +101,7 @@ def advance(state: Any, config: Any, cycle: int, until: float) -> None:
     if dt <= 0.0:
         return
     gap = state.ring_start[cycle % RING] - state.epoch
-    state.yaw = turn(state, config, cycle, dt, state.yaw, state.down, state.P)
+    state.yaw = turn(state, config, cycle, state.epoch, until, state.yaw, state.down, state.P)
     if gap > 1e-3:
         # cycles were lost: the rate of this one stands for them, and is not trusted further than its own size
         missed = state.ring_rate[cycle % RING, 2] * gap
@@ -89,17 +113,19 @@ def advance(state: Any, config: Any, cycle: int, until: float) -> None:
 
 @kernel
 def interpolation_var(state: Any, cycle: int, at: float) -> float:
-    """Variance (rad^2) of taking the rate as constant inside ``cycle``, from the change of rate to its neighbours."""
+    """Variance (rad^2) of taking the spin as linear inside ``cycle``, from how its neighbours' means bend.
+
+    Where the drive starts or ends a ramp the spin at the edge of a cycle is wrong by up to a quarter of the bend, and
+    so are the angle from the edge to ``at`` (s) and the effect of the time stamp's error.
+    """
     slot = cycle % RING
     inside = min(at - state.ring_start[slot], state.ring_end[slot] - at)
-    if inside <= 0.0 or cycle == 0:
+    if cycle == 0:
         return 0.0
-    change = state.ring_rate[slot, 2] - state.ring_rate[(cycle - 1) % RING, 2]
+    bend = 2.0 * (state.ring_rate[slot, 2] - state.ring_rate[(cycle - 1) % RING, 2])
     if cycle + 1 < state.cycles:
-        ahead = state.ring_rate[(cycle + 1) % RING, 2] - state.ring_rate[slot, 2]
-        change = max(abs(change), abs(ahead))
-    error = 0.5 * change * inside
-    return float(error * error)
+        bend = 0.5 * bend - (state.ring_rate[(cycle + 1) % RING, 2] - state.ring_rate[slot, 2])
+    return float((0.25 * bend) ** 2 * (inside * inside + state.P[D, D]))
 
 
 @kernel
@@ -116,9 +142,10 @@ def reset_yaw(state: Any, config: Any, yaw: float, var: float) -> None:
 
 @kernel
 def aid(state: Any, config: Any, yaw: float, r_var: float, rate: float, at: float) -> int:
-    """Update with a yaw ``z = psi + rate d`` at the filter's epoch; returns ``Status`` bits.
+    """Update with a yaw at the filter's epoch, where the spin is ``rate`` (rad/s); returns ``Status`` bits.
 
-    r = wrap(z - psi - rate d), gated at ``config.gate`` sigmas; after ``reject_limit`` rejections in a row the filter
+    The epoch is that of the measurement by the present time-stamp offset, of which an error d adds rate d to z.
+    r = wrap(z - psi), gated at ``config.gate`` sigmas; after ``reject_limit`` rejections in a row the filter
     says that it was wrong and starts again from the aiding.
     """
     if state.yaw_known == 0:
@@ -129,8 +156,14 @@ def aid(state: Any, config: Any, yaw: float, r_var: float, rate: float, at: floa
     state.h[PSI] = 1.0
     if config.stamp_std > 0.0:
         state.h[D] = rate
+    if config.intersection == 1:
+        weight = intersect(state.P, state.h, r_var, state.ph)
+        if weight == 1.0:
+            state.last_aided = at
+            return AIDED
+        r_var /= 1.0 - weight
     s = innovation_var(state.P, state.h, r_var, state.ph)
-    residual = wrap(yaw - from_binary(state.yaw) - rate * state.stamp)
+    residual = wrap(yaw - from_binary(state.yaw))
     state.innovation = residual
     state.innovation_var = s
     if residual * residual > config.gate * config.gate * s:
@@ -152,38 +185,44 @@ def aid(state: Any, config: Any, yaw: float, r_var: float, rate: float, at: floa
 
 @kernel
 def take_pending(state: Any, config: Any, cycle: int, until: float) -> int:
-    """Pass every waiting measurement valid up to ``until`` (s), oldest first; returns ``Status`` bits."""
+    """Pass every waiting measurement valid up to ``until`` (s), oldest first; returns ``Status`` bits.
+
+    One that the time-stamp offset moves beyond ``until`` is not kept waiting: it is brought back by the spin.
+    """
     status = 0
     while state.pending > 0 and state.pending_at[0] <= until:
-        at = state.pending_at[0]
-        yaw, var, rate = state.pending_yaw[0], state.pending_var[0], state.pending_rate[0]
-        if at >= state.epoch:
-            advance(state, config, cycle, at)
-            status |= aid(state, config, yaw, var + interpolation_var(state, cycle, at), rate, at)
+        at = state.pending_at[0] + state.stamp
+        yaw, var = state.pending_yaw[0], state.pending_var[0]
+        held = min(at, until)
+        if held >= state.epoch:
+            advance(state, config, cycle, held)
+            yaw -= spin(state, cycle, held, at) * (at - held)
+            var += interpolation_var(state, cycle, at)
+            status |= aid(state, config, yaw, var, spin(state, cycle, held, held), at)
         else:
-            status |= aid_late(state, config, yaw, var, rate, at)
+            status |= aid_late(state, config, yaw, var, at)
         drop_first_pending(state)
     return status
 
 
 @kernel
-def aid_late(state: Any, config: Any, yaw: float, var: float, rate: float, at: float) -> int:
+def aid_late(state: Any, config: Any, yaw: float, var: float, at: float) -> int:
     """A measurement older than the filter's epoch: carried forward by the increments since, their noise added."""
-    moved = yaw
+    moved, rate = yaw, 0.0
     earliest = state.epoch
     cycle = state.consumed
     while cycle >= 0 and cycle > state.cycles - RING and earliest > at:
         slot = cycle % RING
         begin = max(state.ring_start[slot], at)
         if begin < earliest:
-            if not stood_still(state, cycle):
-                wz = (state.ring_rate[slot, 2] - state.static_bias[2] - state.bias[2]) / (1.0 + state.scale)
-                moved += wz * (earliest - begin)
+            moved += spin(state, cycle, begin, earliest) * (earliest - begin)
+            rate = spin(state, cycle, begin, begin)
             earliest = begin
         cycle -= 1
     if earliest > at + 1e-3:
         return LATE_DROPPED
     lag = state.epoch - at
+    var += interpolation_var(state, cycle + 1, at)
     noise = config.gyro_noise[2] ** 2 * lag + state.P[BZ, BZ] * lag * lag
     return aid(state, config, moved, var + noise, rate, at)
 
@@ -196,7 +235,6 @@ def drop_first_pending(state: Any) -> None:
         state.pending_at[k] = state.pending_at[k + 1]
         state.pending_yaw[k] = state.pending_yaw[k + 1]
         state.pending_var[k] = state.pending_var[k + 1]
-        state.pending_rate[k] = state.pending_rate[k + 1]
         state.pending_sequence[k] = state.pending_sequence[k + 1]
 
 
@@ -230,9 +268,9 @@ def predict_to_now(state: Any, config: Any) -> None:
     state.now = state.epoch
     for cycle in range(state.consumed, state.cycles):
         slot = cycle % RING
-        dt = state.ring_end[slot] - state.now
-        if dt > 0.0:
-            state.now_yaw = turn(state, config, cycle, dt, state.now_yaw, state.now_down, state.now_P)
-            state.now = state.ring_end[slot]
+        end = state.ring_end[slot]
+        if end > state.now:
+            state.now_yaw = turn(state, config, cycle, state.now, end, state.now_yaw, state.now_down, state.now_P)
+            state.now = end
     newest = (state.cycles - 1) % RING
     state.now_rate = (state.ring_rate[newest, 2] - state.static_bias[2] - state.bias[2]) / (1.0 + state.scale)

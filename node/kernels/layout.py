@@ -16,7 +16,7 @@ Array: TypeAlias = "np.ndarray[Any, np.dtype[Any]]"
 STATES: Final = 8
 RING: Final = 64
 PENDING: Final = 4
-LAYOUT_VERSION: Final = 1
+LAYOUT_VERSION: Final = 2
 UNKNOWN_YAW_VAR: Final = 3.29  # rad^2, uniform over the turn
 INVERTED: Final = -0.9848077530122081  # downward part of the axis at 170 deg of inclination
 
@@ -60,6 +60,7 @@ class Scheme(enum.IntEnum):
 
     FORWARD = 0  # the encoder's own measurement
     ESTIMATE = 1  # the node's yaw and its variance, as published
+    INTERSECTION = 2  # the same, taken in by covariance intersection
 
 
 STATE: Final = np.dtype(
@@ -94,7 +95,6 @@ STATE: Final = np.dtype(
         ("pending_at", "f8", (PENDING,)),
         ("pending_yaw", "f8", (PENDING,)),
         ("pending_var", "f8", (PENDING,)),
-        ("pending_rate", "f8", (PENDING,)),
         ("pending_sequence", "i8", (PENDING,)),
         # the increments of the last RING cycles
         ("cycles", "i8"),  # written so far
@@ -132,13 +132,14 @@ CONFIG: Final = np.dtype(
         ("attitude_factor", "f8"),  # A of thesis eq. 4.14
         ("bias_factor", "f8"),  # B of thesis eq. 4.15
         ("scale_std", "f8"),  # prior; 0 switches the state off
-        ("stamp_std", "f8"),  # s, prior; 0 switches the state off
+        ("stamp_std", "f8"),  # s, prior, until the clock tells its own; 0 switches the state off
         ("stamp_walk", "f8"),  # s/sqrt(s), wander of the node's clock error
         ("still_walk", "f8"),  # rad/sqrt(s), what may turn unseen while still
         ("aiding_floor_var", "f8"),  # rad^2 added to every aiding
         ("force_std", "f8"),  # m/s^2, one sample
         ("gravity", "f8"),  # m/s^2
         ("gate", "f8"),  # sigmas
+        ("intersection", "i8"),  # 1 while the aiding's error may be correlated with the node's own in any way
         ("reject_limit", "i8"),  # rejected in a row before the yaw is reset
         ("rate_limit", "f8"),  # rad/s
         ("still_rate", "f8"),  # rad/s
@@ -168,11 +169,11 @@ def default_config() -> Array:
     record["boot_bias_std"] = 0.05 * DEG
     record["attitude_factor"] = 1.0
     record["bias_factor"] = 1.0
-    record["scale_std"] = 1.5e-3
+    record["scale_std"] = 1e-3
     record["stamp_std"] = 2e-3
-    record["stamp_walk"] = 7e-6
+    record["stamp_walk"] = 3e-6
     record["still_walk"] = 2e-4 * DEG
-    record["aiding_floor_var"] = (0.002 * DEG) ** 2
+    record["aiding_floor_var"] = (0.001 * DEG) ** 2
     record["force_std"] = 0.02 * DEG * 9.81
     record["gravity"] = 9.81
     record["gate"] = 5.0

@@ -26,7 +26,6 @@ def offer_aiding(
     yaw_var: float,
     systematic_var: float,
     offset: float,
-    rate: float,
     valid_at: float,
     sequence: int,
     hops: int,
@@ -53,13 +52,11 @@ def offer_aiding(
         state.pending_at[slot] = state.pending_at[slot - 1]
         state.pending_yaw[slot] = state.pending_yaw[slot - 1]
         state.pending_var[slot] = state.pending_var[slot - 1]
-        state.pending_rate[slot] = state.pending_rate[slot - 1]
         state.pending_sequence[slot] = state.pending_sequence[slot - 1]
         slot -= 1
     state.pending_at[slot] = valid_at
     state.pending_yaw[slot] = wrap_positive(yaw + offset)
     state.pending_var[slot] = yaw_var + config.aiding_floor_var
-    state.pending_rate[slot] = rate
     state.pending_sequence[slot] = sequence
     state.pending += 1
     state.last_sequence = sequence

@@ -44,6 +44,24 @@ def joseph(P: Array, ph: Array, s: float, gain: Array) -> None:
 
 
 @kernel
+def intersect(P: Array, h: Array, r_var: float, ph: Array) -> float:
+    """Covariance intersection with a scalar measurement: the weight w of the node's own estimate, at most 1.
+
+    P becomes P / w, R is to become R / (1 - w), whatever the correlation of the two. The w with the least determinant
+    of the covariance afterwards is (n - 1) HPH' / (n (HPH' - R)); at 1 the measurement has nothing to give.
+    Source: Julier and Uhlmann, "A non-divergent estimation algorithm in the presence of unknown correlations", 1997.
+    """
+    own = innovation_var(P, h, 0.0, ph)
+    if own <= STATES * r_var:
+        return 1.0
+    weight = (STATES - 1) * own / (STATES * (own - r_var))
+    for i in range(STATES):
+        for j in range(STATES):
+            P[i, j] /= weight
+    return float(weight)
+
+
+@kernel
 def feed_back(state: Any, residual: float) -> None:
     """Closed loop: add K r to the estimates. ``state`` is the node's record, its ``gain`` is K."""
     ex, ey = state.gain[TX] * residual, state.gain[TY] * residual

@@ -22,6 +22,6 @@ def warm_up() -> None:
     add_static(average[0], rate, force, USUAL, 1)
     has_moved(average[0], 3.0)
     run_cycle(state[0], config[0], rate, force, 0.0, PERIOD, 1)
-    offer_aiding(state[0], config[0], 0.0, 1e-6, 0.0, 0.0, 0.0, 0.0, 1, 0)
+    offer_aiding(state[0], config[0], 0.0, 1e-6, 0.0, 0.0, 0.0, 1, 0)
     from_binary(state[0]["now_yaw"])
     wrap(0.0)

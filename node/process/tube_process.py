@@ -36,7 +36,7 @@ from telemetry.messages import (
 from telemetry.presentation.fields import MAX_TEXT
 
 SAVE_EVERY = 19  # cycles, 10 s
-SYNCHRONISED_STD = 0.02  # s
+SYNCHRONISED_STD = 0.05  # s, what the time-stamp state of the filter can take
 MAX_CLOCK_STD = 3600.0
 COMMANDS = ("take_survey", "static_record", "parameters")
 

@@ -12,12 +12,14 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
-from node.firmware.encoder import QUANTUM, EncoderNode, EncoderSample
+from node.firmware.encoder import COUNTS_PER_TURN, EDGE_STD, EncoderNode, EncoderSample
 from node.firmware.settings import Joint, Kernel, TubeSettings
 from node.firmware.tube import ImuReading, Surroundings, Tube
 from node.kernels.angles import wrap
 from node.kernels.layout import PERIOD, Scheme, default_config, new_state
 from sim.borehole import Borehole
+from sim.encoder import Disc
+from sim.experiments.node_links import Link, OnOff
 from sim.imu_errors import ImuErrors
 from sim.motion import Motion, Trapezoid
 from sim.scenario import AccelerometerSection, GyroSection
@@ -28,6 +30,7 @@ Array = npt.NDArray[np.float64]
 BEGIN, HOLD, JOINT_TIME, REST, FINISH = 1000.0, 60.0, 5.0, 60.0, 1.0  # s
 TURNS, RATE_DPS, ACCELERATION_DPS2 = 20.0, 71.0, 35.0
 INCLINATION_DEG = 2.0
+LINK_STREAM, DISC_STREAM = 4201, 4202
 
 
 @dataclass(frozen=True, slots=True)
@@ -44,6 +47,7 @@ class ChainSetup:
     clock_wander_tau: float = 60.0  # s
     latency: float = 3e-3  # s, each hop
     loss: float = 0.01  # each hop
+    link: Link = OnOff()  # noqa: RUF009
     kernel: Kernel = "float64"
 
 
@@ -75,9 +79,10 @@ class Chain:
 
     def __init__(self, setup: ChainSetup, seed: int) -> None:
         self._setup = setup
-        self._random = np.random.Generator(np.random.Philox(np.random.SeedSequence([seed, setup.hops])))
+        self._random = _stream(seed, setup.hops)
         self._motion = motion_of(setup, float(self._random.uniform(0.0, 2.0 * math.pi)))
         self._cycles = math.floor((self._motion.end - BEGIN) / PERIOD)
+        self._disc = Disc(self._motion, COUNTS_PER_TURN, EDGE_STD, _stream(seed, setup.hops, DISC_STREAM))
         hops = setup.hops
         angles = self._random.uniform(-math.pi, math.pi, hops)
         errors = setup.joint_std * self._random.standard_normal(hops)
@@ -87,6 +92,7 @@ class Chain:
         readings = [Joint(float(wrap(a + e)), setup.joint_std) for a, e in zip(angles, errors, strict=True)]
         self._clocks = self._clock_errors()
         self._lost = self._random.random((self._cycles, hops)) < setup.loss
+        self._lost[:, 0] |= ~self._passes(seed)
         self._tubes = [self._tube(k, readings) for k in range(hops)]
         ends: Array = BEGIN + PERIOD * np.arange(1.0, self._cycles + 1.0)
         self._samples = [self._sensor(k, ends) for k in range(hops)]
@@ -119,8 +125,17 @@ class Chain:
         config = default_config()
         return Tube(settings, config, new_state(config), iter(range(10**9)).__next__, restored=False)
 
+    def _passes(self, seed: int) -> npt.NDArray[np.bool_]:
+        """Whether the encoder is heard (cycles,); the phase of the link is that of the seed."""
+        random = _stream(seed, self._setup.hops, LINK_STREAM)
+        times = PERIOD * np.arange(1.0, self._cycles + 1.0)
+        return self._setup.link.passes(times + float(random.uniform(0.0, self._setup.link.repeats)))
+
     def _clock_errors(self) -> Array:
-        """Error of every node's rig time (cycles, hops), s: those of the joints above, added up."""
+        """Error of every node's rig time (cycles, hops), s: those of the joints above, added up.
+
+        A node dates its own cycles by its own crystal; what is wrong is when it takes an aiding to be valid.
+        """
         setup, n = self._setup, self._setup.hops
         phi = math.exp(-PERIOD / setup.clock_wander_tau)
         draws = self._random.standard_normal((self._cycles, n))
@@ -146,27 +161,23 @@ class Chain:
 
     def _cycle(self, k: int, cycle: int, end: float) -> Aiding | None:
         wx, wy, wz, fx, fy, fz = self._samples[k][cycle]
-        local = end + float(self._clocks[cycle, k])
         around = Surroundings(True, k + 1, end, self._setup.clock_std**2 * (k + 1), True)
-        start = end - PERIOD + float(self._clocks[max(cycle - 1, 0), k])
-        said = self._tubes[k].on_cycle(ImuReading(start, local, (wx, wy, wz), (fx, fy, fz)), around)
+        said = self._tubes[k].on_cycle(ImuReading(end - PERIOD, end, (wx, wy, wz), (fx, fy, fz)), around)
         return next((message for message in list(said) if isinstance(message, Aiding)), None)
 
     def _measure(self, encoder: EncoderNode, end: float) -> Aiding:
-        angle = float(self._motion.drive(np.array([end]))[0][0])
-        count = math.floor(angle / QUANTUM + 1e-9)
-        edge = self._motion.time_of_angle(count * QUANTUM)
-        return encoder.on_cycle(EncoderSample(count, min(edge, end), True), end)
+        count, edge_at = self._disc.sample(end)
+        return encoder.on_cycle(EncoderSample(count, edge_at, True), end)
 
     def _relay(self, cycle: int, measured: Aiding, onward: list[Aiding | None]) -> None:
-        """Down the string: ``forward`` hands on what came, ``estimate`` what each node said in its cycle."""
+        """Down the string: ``forward`` hands on what came, the others what each node said in its cycle."""
         aiding: Aiding | None = measured
         for k, tube in enumerate(self._tubes):
             if aiding is not None and not self._lost[cycle, k]:
                 passed = tube.on_aiding(aiding, aiding.valid_at + float(self._clocks[cycle, k]))
             else:
                 passed = None
-            aiding = onward[k] if self._setup.scheme is Scheme.ESTIMATE else passed
+            aiding = passed if self._setup.scheme is Scheme.FORWARD else onward[k]
 
     def _judge(self, end: float) -> tuple[list[float], list[float], list[float], list[float]]:
         truth = float(self._motion.drive(np.array([end]))[0][0])
@@ -175,6 +186,10 @@ class Chain:
         var = [tube.yaw_var for tube in self._tubes]
         total_var = [tube.yaw_var + tube.systematic_var for tube in self._tubes]
         return error, var, total, total_var
+
+
+def _stream(*key: int) -> np.random.Generator:
+    return np.random.Generator(np.random.Philox(np.random.SeedSequence(key)))
 
 
 def run_seed(job: tuple[ChainSetup, int]) -> ChainRun:

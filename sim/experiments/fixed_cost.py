@@ -29,7 +29,7 @@ def drive(state: Any, config: Any, rate: Array, force: Array, first: int) -> Non
     for k in range(rate.shape[0]):
         start = 1000.0 + (first + k) * PERIOD
         cycle.run_cycle(state, config, rate[k], force, start, start + PERIOD, 1)
-        relay.offer_aiding(state, config, 0.1, AIDING_VAR, 0.0, 0.0, rate[k, 2], start + 0.75 * PERIOD, first + k, 0)
+        relay.offer_aiding(state, config, 0.1, AIDING_VAR, 0.0, 0.0, start + 0.75 * PERIOD, first + k, 0)
 
 
 @kernel
@@ -39,7 +39,7 @@ def drive_fixed(state: Any, config: Any, rate: Array, force: Array, first: int) 
         start = (1000 << TIME_Q) + (first + k) * STEP
         fixed_cycle.run_cycle(state, config, rate[k], force, start, start + STEP, 1)
         at = start + STEP - QUARTER
-        fixed_relay.offer_aiding(state, config, 68356527, FIXED_VAR, 0, 0, rate[k, 2], at, first + k, 0)
+        fixed_relay.offer_aiding(state, config, 68356527, FIXED_VAR, 0, 0, at, first + k, 0)
 
 
 def measure(cycles: int = 20_000, rounds: int = 7) -> list[dict[str, Any]]:

@@ -40,7 +40,7 @@ class Input:
     rate: tuple[float, float, float]
     force: tuple[float, float, float]
     joined: int
-    aiding: tuple[float, float, float, int] | None  # yaw, rate, time of validity, sequence
+    aiding: tuple[float, float, int] | None  # yaw, time of validity, sequence
     turning: bool
 
 
@@ -94,7 +94,7 @@ def inputs(cycles: int, seed: int) -> Iterator[Input]:
         if now >= out_until:
             age = float(random.uniform(0.0, 0.1)) if spin > 0.0 else 0.0
             noise = math.sqrt(AIDING_VAR) * float(random.standard_normal())
-            aiding = (float(wrap_positive(yaw - spin * age + noise)), spin, end - age, sequence)
+            aiding = (float(wrap_positive(yaw - spin * age + noise)), end - age, sequence)
         joined = 0 if k > BLOCK - 40 and cycle % (7 * BLOCK) > 6 * BLOCK else 1
         yield Input(now, end, tuple(rate.tolist()), tuple(force.tolist()), joined, aiding, spin > 0.0)
         now = end
@@ -116,9 +116,9 @@ def compare(cycles: int, seed: int, step: Callable[[], None] = lambda: None) -> 
         sigma[k] = math.sqrt(shadow["now_P"][psi, psi] / reference["now_P"][psi, psi]) - 1.0
         turning[k], aided[k] = given.turning, given.aiding is not None
         if given.aiding is not None:
-            z, at_rate, at, sequence = given.aiding
-            offer_aiding(reference, config, z, AIDING_VAR, 1e-6, 0.3, at_rate, at, sequence, 0)
-            fixed.offer_aiding(shadow, config, z, AIDING_VAR, 1e-6, 0.3, at_rate, at, sequence, 0)
+            z, at, sequence = given.aiding
+            offer_aiding(reference, config, z, AIDING_VAR, 1e-6, 0.3, at, sequence, 0)
+            fixed.offer_aiding(shadow, config, z, AIDING_VAR, 1e-6, 0.3, at, sequence, 0)
         if k % 1000 == 999:
             step()
     return Comparison(yaw * (360.0 / 2**32), sigma, turning, aided, differs, fixed.overflows)

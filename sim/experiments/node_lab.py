@@ -14,12 +14,13 @@ import numpy as np
 import numpy.typing as npt
 
 from groundstation.survey.resolve import angles, resolve
-from node.firmware.encoder import QUANTUM, EncoderNode, EncoderSample
+from node.firmware.encoder import COUNTS_PER_TURN, EDGE_STD, EncoderNode, EncoderSample
 from node.firmware.settings import Joint, TubeSettings
 from node.firmware.tube import ImuReading, Surroundings, Tube
 from node.kernels.angles import wrap
 from node.kernels.layout import PERIOD, default_config, new_state
 from sim.borehole import Borehole
+from sim.encoder import Disc
 from sim.experiments.node_links import Link, OnOff
 from sim.imu_errors import ImuErrors, gauss_markov
 from sim.motion import Motion, Trapezoid
@@ -84,9 +85,10 @@ class Lab:
 
     def __init__(self, setup: LabSetup, seed: int) -> None:
         self._setup = setup
-        self._streams = np.random.SeedSequence([seed, STREAMS]).spawn(setup.hops + 1)
+        self._streams = np.random.SeedSequence([seed, STREAMS]).spawn(setup.hops + 2)
         random = _generator(self._streams[0])
         self._motion = motion_of(float(random.uniform(0.0, math.tau)))
+        self._disc = Disc(self._motion, COUNTS_PER_TURN, EDGE_STD, _generator(self._streams[-1]))
         phase = float(random.uniform(0.0, 1.0)) * setup.link.repeats
         self._passes = setup.link.passes(ENDS + phase)
         joints = random.uniform(-math.pi, math.pi, setup.hops)
@@ -95,7 +97,7 @@ class Lab:
         self._lost = random.random((CYCLES, setup.hops)) < setup.loss
         self._drive = self._motion.drive(BEGIN + ENDS)[0]
         self._sensors = [
-            _Sensor(setup, self._motion, float(a), s) for a, s in zip(self._true, self._streams[1:], strict=True)
+            _Sensor(setup, self._motion, float(a), s) for a, s in zip(self._true, self._streams[1:-1], strict=True)
         ]
         self._tubes = [_tube(setup, k, [*joints, 0.0]) for k in range(setup.hops)]
 
@@ -119,17 +121,13 @@ class Lab:
     def _cycle(self, k: int, cycle: int) -> SurveyMeasurement | None:
         wx, wy, wz, fx, fy, fz = self._sensors[k].samples[cycle]
         end = BEGIN + float(ENDS[cycle])
-        start = end - PERIOD + float(self._clocks[max(cycle - 1, 0), k])
-        local = end + float(self._clocks[cycle, k])
         around = Surroundings(True, k + 1, end, self._setup.clock_std**2 * (k + 1), True)
-        said = list(self._tubes[k].on_cycle(ImuReading(start, local, (wx, wy, wz), (fx, fy, fz)), around))
+        said = list(self._tubes[k].on_cycle(ImuReading(end - PERIOD, end, (wx, wy, wz), (fx, fy, fz)), around))
         return next((message for message in said if isinstance(message, SurveyMeasurement)), None)
 
     def _measure(self, encoder: EncoderNode, end: float) -> Aiding:
-        angle = float(self._motion.drive(np.array([end]))[0][0])
-        count = math.floor(angle / QUANTUM + 1e-9)
-        edge = self._motion.time_of_angle(count * QUANTUM)
-        return encoder.on_cycle(EncoderSample(count, min(edge, end), True), end)
+        count, edge_at = self._disc.sample(end)
+        return encoder.on_cycle(EncoderSample(count, edge_at, True), end)
 
     def _relay(self, cycle: int, measured: Aiding) -> None:
         """Down the string, before the next cycle ends: every node hands on what came."""
@@ -185,7 +183,10 @@ def _tube(setup: LabSetup, k: int, joints: list[float]) -> Tube:
 
 
 def _clock_errors(setup: LabSetup, random: np.random.Generator) -> Array:
-    """Error of every node's rig time (cycles, hops), s: those of the joints above, added up."""
+    """Error of every node's rig time (cycles, hops), s: those of the joints above, added up.
+
+    A node dates its own cycles by its own crystal; what is wrong is when it takes an aiding to be valid.
+    """
     constant = setup.clock_std * random.standard_normal(setup.hops)
     std = np.full(3, setup.clock_wander_std)
     wander = [gauss_markov(random, CYCLES, std, setup.clock_wander_tau, PERIOD)[:, 0] for _ in range(setup.hops)]

@@ -16,8 +16,8 @@ from typing import Any
 
 import numpy as np
 
-from node.kernels.layout import PERIOD, Scheme
-from sim.experiments.chain import Chain, ChainRun, ChainSetup
+from node.kernels.layout import Scheme
+from sim.experiments.chain import ChainRun, ChainSetup, run_seed
 from sim.experiments.node_links import OnOff
 
 HOPS = 5
@@ -28,22 +28,6 @@ USUAL = (0.88, 1.13)  # of a cell
 EVERY = (0.8, 1.25)  # of all cells
 OUTSIDE = 0.05  # share of cells that may lie outside the usual bounds
 STATES = ("at rest", "turning", "at rest, with joints")
-
-
-class OutageChain(Chain):
-    """A string whose encoder is heard for 20 s, then not for ``off`` s."""
-
-    def __init__(self, setup: ChainSetup, seed: int, off: float) -> None:
-        super().__init__(setup, seed)
-        link = OnOff(20.0, off)
-        random = np.random.Generator(np.random.Philox(np.random.SeedSequence([seed, setup.hops, 4201])))
-        times = PERIOD * np.arange(1.0, self._cycles + 1.0) + float(random.uniform(0.0, link.repeats))
-        self._lost[:, 0] |= ~link.passes(times)
-
-
-def run_seed(job: tuple[ChainSetup, int, float]) -> ChainRun:
-    """One seed, for a pool of processes."""
-    return OutageChain(*job).run()
 
 
 def batches() -> int:
@@ -57,7 +41,8 @@ def run(seeds: int, step: Callable[[], None]) -> dict[str, Any]:
     with multiprocessing.get_context("spawn").Pool(min(os.cpu_count() or 1, seeds)) as pool:
         for off in OUTAGES_S:
             for loss in LOSSES:
-                jobs = [(replace(STRINGS, loss=loss), seed, off) for seed in range(1, seeds + 1)]
+                setup = replace(STRINGS, loss=loss, link=OnOff(20.0, off))
+                jobs = [(setup, seed) for seed in range(1, seeds + 1)]
                 runs = []
                 for found in pool.imap(run_seed, jobs):
                     runs.append(found)

@@ -38,7 +38,7 @@ def drive(state, config, parameters, average, raw_rate, raw_force, cycles):
         has_moved(average, 3.0)
         calibrate(parameters, 30.0, rate, force)
         run_cycle(state, config, rate, force, start, start + 0.5, 1)
-        offer_aiding(state, config, 0.1, 1e-6, 1e-6, 0.0, rate[2], start + 0.4, k, 0)
+        offer_aiding(state, config, 0.1, 1e-6, 1e-6, 0.0, start + 0.4, k, 0)
 
 def allocations(cycles):
     config = default_config()

@@ -54,7 +54,6 @@ class Bench:
             (0.003 * DEG) ** 2,
             0.0,
             offset,
-            rate,
             self.now - age + stamp_error,
             self.sequence,
             0,
@@ -172,7 +171,7 @@ def test_a_new_joint_above_reopens_the_yaw_without_a_false_alarm() -> None:
     bench.stand(110)
     joint_std = 0.05 * DEG
     offer_aiding(
-        bench.record, bench.config[0], bench.yaw - 0.3 + 0.1 * DEG, 1e-9, 2 * joint_std**2, 0.3, 0.0, bench.now, 99, 1
+        bench.record, bench.config[0], bench.yaw - 0.3 + 0.1 * DEG, 1e-9, 2 * joint_std**2, 0.3, bench.now, 99, 1
     )
     seen = bench.cycle() | bench.cycle() | bench.cycle()
     assert Status.REJECTED not in seen

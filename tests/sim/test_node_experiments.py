@@ -12,7 +12,7 @@ from click.testing import CliRunner
 from borechain.experiment import experiment
 from node.kernels.layout import PERIOD, Scheme
 from sim.experiments import node_delay, node_modes, node_outage, node_tuning
-from sim.experiments.chain import ChainSetup
+from sim.experiments.chain import Chain, ChainSetup, run_seed
 from sim.experiments.node_lab import ENDS, REST, ROTATING, STOP, Lab, LabRun, LabSetup
 from sim.experiments.node_links import OnOff, Single
 from sim.experiments.node_trials import bootstrap, rms_deg
@@ -59,8 +59,8 @@ def test_one_seed_gives_one_run_whatever_else_runs() -> None:
     assert np.array_equal(first.error, second.error)
     assert np.array_equal(first.azimuth_error, second.azimuth_error)
     assert not np.array_equal(first.error, other.error)
-    job = (replace(node_outage.STRINGS, blocks=1), 7, 20.0)
-    assert np.array_equal(node_outage.run_seed(job).error, node_outage.run_seed(job).error)
+    job = (replace(node_outage.STRINGS, blocks=1, link=OnOff(20.0, 20.0)), 7)
+    assert np.array_equal(run_seed(job).error, run_seed(job).error)
 
 
 def test_an_experiment_over_a_pool_is_that_of_its_seeds() -> None:
@@ -109,7 +109,7 @@ def test_links_pass_what_they_say() -> None:
 
 
 def test_outages_reach_the_whole_string() -> None:
-    chain = node_outage.OutageChain(ChainSetup(2, Scheme.FORWARD, blocks=1, loss=0.0), 1, 60.0)
+    chain = Chain(ChainSetup(2, Scheme.FORWARD, blocks=1, loss=0.0, link=OnOff(20.0, 60.0)), 1)
     assert chain._lost[:, 0].mean() == pytest.approx(0.75, abs=0.1)
     assert not chain._lost[:, 1].any()
 

@@ -135,11 +135,25 @@ def test_the_edge_of_the_encoder_is_the_moment_its_count_changed(part: float) ->
     count, edge, _ = world.encoder_sample(t)
     quantum = 2.0 * math.pi / 4096
     angle = float(world.motion.drive(np.array([t]))[0][0])
-    assert count * quantum - 1e-6 <= angle < (count + 1) * quantum + 1e-6
+    out_of_place = 5.0 * math.radians(0.003)
+    assert count * quantum - out_of_place <= angle < (count + 1) * quantum + out_of_place
     assert edge <= t
     if edge > world.begin:
+        assert world.encoder_sample(edge + 1e-9)[0] == count
+        assert world.encoder_sample(edge - 1e-6)[0] == count - 1
+
+
+def test_the_lines_of_the_encoder_are_out_of_place_by_what_the_scenario_states() -> None:
+    scenario = load_scenario(SCENARIOS / "rig-3.toml")
+    world = World(scenario, 2)
+    spinning = world.begin + 65.0
+    errors = {}
+    for t in np.arange(spinning, spinning + 20.0, 0.01):
+        count, edge, _ = world.encoder_sample(float(t))
         at_edge = float(world.motion.drive(np.array([edge]))[0][0])
-        assert at_edge == pytest.approx(count * quantum, abs=1e-9)
+        errors[count] = math.degrees(at_edge - count * 2.0 * math.pi / 4096)
+    assert np.std(list(errors.values())) == pytest.approx(scenario.file.encoder.edge_std_deg, rel=0.1)
+    assert world.encoder_sample(spinning) == World(scenario, 2).encoder_sample(spinning)
 
 
 def test_positions_follow_a_circular_arc() -> None:

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from typing import Any, Final
 
-from node.kernels.fixed.arithmetic import clamp, mul, shift
+from node.kernels.fixed.arithmetic import mul, shift
 from node.kernels.fixed.error_model import isolate
 from node.kernels.fixed.layout import ANGLE_Q, CEILING, LEVEL_Q, RATE_Q, UNIT, VAR_Q
-from node.kernels.fixed.trigonometry import TURN, counts, difference, radians
+from node.kernels.fixed.trigonometry import TURN, difference, radians
 from node.kernels.fixed.update import UNITY, feed_back, innovation_var, joseph
 from node.kernels.jit import kernel
 from node.kernels.layout import Err, Status
@@ -15,7 +15,6 @@ from node.kernels.layout import Err, Status
 PSI, BZ, D = int(Err.YAW), int(Err.BIAS_Z), int(Err.STAMP)
 AIDED, REJECTED, YAW_RESET = int(Status.AIDED), int(Status.REJECTED), int(Status.YAW_RESET)
 RATE_RIGHT: Final = RATE_Q + UNIT - LEVEL_Q  # from rad/s to rad a stamp unit in Q31
-LARGEST_STAMPED: Final = 1 << ANGLE_Q  # rad
 SQUARE_RIGHT: Final = ANGLE_Q - VAR_Q // 2
 
 
@@ -31,16 +30,8 @@ def reset_yaw(state: Any, config: Any, yaw: int, var: int) -> None:
 
 
 @kernel
-def stamped(state: Any, rate: int) -> int:
-    """Rate d, rad in Q40, of a ``rate`` in rad/s, Q46."""
-    seconds = clamp(state, state.stamp, (1 << RATE_Q) - 1)  # Q46
-    angle = mul(rate, seconds >> (RATE_Q - LEVEL_Q))  # Q46
-    return clamp(state, shift(angle, RATE_Q - ANGLE_Q), LARGEST_STAMPED)
-
-
-@kernel
 def aid(state: Any, config: Any, yaw: int, r_var: int, rate: int, at: int) -> int:
-    """Update with a yaw ``z = psi + rate d`` at the filter's epoch; returns ``Status`` bits.
+    """Update with a yaw at the filter's epoch, where the spin is ``rate``; returns ``Status`` bits.
 
     Parameters
     ----------
@@ -56,7 +47,7 @@ def aid(state: Any, config: Any, yaw: int, r_var: int, rate: int, at: int) -> in
         state.last_aided = at
         return AIDED | YAW_RESET
     s = innovation_var(state, PSI, UNITY, D, h if config.stamp_on == 1 else 0, r_var)
-    residual = radians(difference(yaw, int(state.yaw) + counts(stamped(state, rate), ANGLE_Q)))
+    residual = radians(difference(yaw, int(state.yaw)))
     state.innovation = residual
     state.innovation_var = s
     coarse = shift(residual, SQUARE_RIGHT)
@@ -85,5 +76,4 @@ def drop_first_pending(state: Any) -> None:
         state.pending_at[k] = state.pending_at[k + 1]
         state.pending_yaw[k] = state.pending_yaw[k + 1]
         state.pending_var[k] = state.pending_var[k + 1]
-        state.pending_rate[k] = state.pending_rate[k + 1]
         state.pending_sequence[k] = state.pending_sequence[k + 1]

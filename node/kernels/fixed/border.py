@@ -53,7 +53,6 @@ FORMATS: Final = {
     "scale": RATE_Q,
     "stamp": RATE_Q,
     "now_rate": RATE_Q,
-    "pending_rate": RATE_Q,
     "ring_rate": RATE_Q,
     "bias_sum": RATE_Q,
     "down": VECTOR_Q,
@@ -149,7 +148,6 @@ def show_aiding(fixed: Any, state: Any) -> None:
         state.pending_at[k] = fixed.pending_at[k] * 2.0**-TIME_Q
         state.pending_yaw[k] = fixed.pending_yaw[k] * angle
         state.pending_var[k] = fixed.pending_var[k] * 2.0**-VAR_Q
-        state.pending_rate[k] = fixed.pending_rate[k] * 2.0**-RATE_Q
         state.pending_sequence[k] = fixed.pending_sequence[k]
 
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Any, Final
 
-from node.kernels.fixed.aiding import aid, drop_first_pending
+from node.kernels.fixed.aiding import RATE_RIGHT, aid, drop_first_pending
 from node.kernels.fixed.arithmetic import mul, quotient, shift
 from node.kernels.fixed.error_model import decays, isolate, propagate, widen
 from node.kernels.fixed.layout import (
@@ -26,7 +26,7 @@ from node.kernels.fixed.update import level, zero_rate
 from node.kernels.jit import kernel
 from node.kernels.layout import INVERTED, RING, STATES, Array, Err, Status
 
-PSI, BZ = int(Err.YAW), int(Err.BIAS_Z)
+PSI, BZ, D = int(Err.YAW), int(Err.BIAS_Z), int(Err.STAMP)
 LATE_DROPPED = int(Status.LATE_DROPPED)
 UNITY_SCALE: Final = 1 << 30
 SCALE_RIGHT: Final = RATE_Q - 30
@@ -35,6 +35,8 @@ LARGEST_SQUARED: Final = 4 << SQUARE_Q  # rad
 GAP_RIGHT: Final = 10  # a gap of 2^12 s is a factor of 31 bits
 MISSED_GAP: Final = ONE_SECOND // 1000
 INVERTED_DOWN: Final = round(INVERTED * 2.0**VECTOR_Q)
+ALL: Final = (1 << 31) - 1  # of a factor in Q31
+STAMP_RIGHT: Final = RATE_Q - TIME_Q
 SLOT: Final = RING - 1  # RING is a power of two
 
 
@@ -64,20 +66,41 @@ def stood_still(state: Any, cycle: int) -> int:
 
 
 @kernel
-def true_rate_z(state: Any, slot: int) -> int:
-    """(w_z - b_z) / (1 + s) of a ``slot`` of the ring, rad/s in Q46."""
+def true_rate_z(state: Any, measured: int) -> int:
+    """(w_z - b_z) / (1 + s), rad/s in Q46."""
     one = UNITY_SCALE + shift(state.scale, SCALE_RIGHT)
-    return quotient(state.ring_rate[slot, 2] - state.static_bias[2] - state.bias[2], max(one, UNITY_SCALE >> 4))
+    return quotient(measured - state.static_bias[2] - state.bias[2], max(one, UNITY_SCALE >> 4))
 
 
 @kernel
-def turn(state: Any, config: Any, cycle: int, dt: int, yaw: int, down: Array, P: Array) -> int:
-    """Integrate ``dt`` (s, Q28) of ``cycle`` into ``down`` and ``P``; returns the binary yaw. Still means no turn."""
+def spin(state: Any, cycle: int, begin: int, end: int) -> int:
+    """Mean spin (rad/s, Q46) from ``begin`` to ``end`` (s, Q28) inside ``cycle``: linear about its mean."""
+    if stood_still(state, cycle) == 1:
+        return 0
+    slot = cycle & SLOT
+    measured = state.ring_rate[slot, 2]
+    if cycle > 0 and cycle + 1 < state.cycles:
+        before, after = (cycle - 1) & SLOT, (cycle + 1) & SLOT
+        inside = max(begin, state.ring_start[slot])  # the rest are cycles that were lost
+        off = inside + end - state.ring_start[slot] - state.ring_end[slot]
+        apart = state.ring_start[after] + state.ring_end[after] - state.ring_start[before] - state.ring_end[before]
+        part = max(-ALL, min(quotient(off << 1, max(apart, 1)), ALL)) if abs(off) < LONGEST_STEP else 0
+        measured += mul(state.ring_rate[after, 2] - state.ring_rate[before, 2], part)
+    return true_rate_z(state, measured)
+
+
+@kernel
+def turn(state: Any, config: Any, cycle: int, begin: int, end: int, yaw: int, down: Array, P: Array) -> int:
+    """Integrate ``cycle`` from ``begin`` to ``end`` (s, Q28) into ``down`` and ``P``; returns the binary yaw.
+
+    Still means no turn.
+    """
     slot = cycle & SLOT
     still = stood_still(state, cycle)
     wx = state.ring_rate[slot, 0] - state.static_bias[0] - state.bias[0]
     wy = state.ring_rate[slot, 1] - state.static_bias[1] - state.bias[1]
-    wz = true_rate_z(state, slot)
+    wz = spin(state, cycle, begin, end)
+    dt = end - begin
     longest = LONGEST_STEP if abs(wz) < FAST else ONE_SECOND
     while dt > 0:
         piece = min(dt, longest)
@@ -111,7 +134,7 @@ def advance(state: Any, config: Any, cycle: int, until: int) -> None:
     if dt <= 0:
         return
     gap = state.ring_start[cycle & SLOT] - state.epoch
-    state.yaw = turn(state, config, cycle, dt, int(state.yaw), state.down, state.P)
+    state.yaw = turn(state, config, cycle, until - dt, until, int(state.yaw), state.down, state.P)
     if gap > MISSED_GAP:
         # cycles were lost: the rate of this one stands for them, and is not trusted further than its own size
         missed = gap_angle(state.ring_rate[cycle & SLOT, 2], gap_held(state, gap))
@@ -134,16 +157,17 @@ def gap_angle(rate: int, gap: int) -> int:
 
 @kernel
 def interpolation_var(state: Any, cycle: int, at: int) -> int:
-    """Variance (rad^2, Q56) of taking the rate as constant inside ``cycle``, from the change to its neighbours."""
-    slot = cycle & SLOT
-    inside = min(at - state.ring_start[slot], state.ring_end[slot] - at)
-    if inside <= 0 or cycle == 0:
+    """Variance (rad^2, Q56) of taking the spin as linear inside ``cycle``, from how its neighbours' means bend."""
+    if cycle == 0:
         return 0
-    change = abs(state.ring_rate[slot, 2] - state.ring_rate[(cycle - 1) & SLOT, 2])
+    slot = cycle & SLOT
+    inside = abs(min(at - state.ring_start[slot], state.ring_end[slot] - at))
+    bend = 2 * (state.ring_rate[slot, 2] - state.ring_rate[(cycle - 1) & SLOT, 2])
     if cycle + 1 < state.cycles:
-        change = max(change, abs(state.ring_rate[(cycle + 1) & SLOT, 2] - state.ring_rate[slot, 2]))
-    error = min(shift(mul(change, min(inside, LONGEST_STEP)), STEP_Q + 1 - SQUARE_Q), LARGEST_SQUARED)
-    return error * error
+        bend = (bend >> 1) - (state.ring_rate[(cycle + 1) & SLOT, 2] - state.ring_rate[slot, 2])
+    error = min(shift(mul(abs(bend), min(inside, LONGEST_STEP)), STEP_Q + 2 - SQUARE_Q), LARGEST_SQUARED)
+    a_unit = shift(bend, RATE_RIGHT + 2)
+    return error * error + mul(mul(state.P[D, D], a_unit), a_unit)
 
 
 @kernel
@@ -151,34 +175,39 @@ def take_pending(state: Any, config: Any, cycle: int, until: int) -> int:
     """Pass every waiting measurement valid up to ``until`` (s, Q28), oldest first; returns ``Status`` bits."""
     status = 0
     while state.pending > 0 and state.pending_at[0] <= until:
-        at = state.pending_at[0]
-        yaw, var, rate = int(state.pending_yaw[0]), state.pending_var[0], state.pending_rate[0]
-        if at >= state.epoch:
-            advance(state, config, cycle, at)
-            status |= aid(state, config, yaw, var + interpolation_var(state, cycle, at), rate, at)
+        at = state.pending_at[0] + shift(state.stamp, STAMP_RIGHT)
+        yaw, var = int(state.pending_yaw[0]), state.pending_var[0]
+        held = min(at, until)
+        if held >= state.epoch:
+            advance(state, config, cycle, held)
+            beyond = min(at - held, LONGEST_STEP)
+            yaw = (yaw - counts(mul(spin(state, cycle, held, at), beyond), STEP_Q)) & TURN
+            var += interpolation_var(state, cycle, at)
+            status |= aid(state, config, yaw, var, spin(state, cycle, held, held), at)
         else:
-            status |= aid_late(state, config, yaw, var, rate, at)
+            status |= aid_late(state, config, yaw, var, at)
         drop_first_pending(state)
     return status
 
 
 @kernel
-def aid_late(state: Any, config: Any, yaw: int, var: int, rate: int, at: int) -> int:
+def aid_late(state: Any, config: Any, yaw: int, var: int, at: int) -> int:
     """A measurement older than the filter's epoch: carried forward by the increments since, their noise added."""
-    moved = yaw
+    moved, rate = yaw, 0
     earliest = state.epoch
     cycle = state.consumed
     while cycle >= 0 and cycle > state.cycles - RING and earliest > at:
         slot = cycle & SLOT
         begin = max(state.ring_start[slot], at)
         if begin < earliest:
-            if stood_still(state, cycle) == 0:
-                moved += counts(mul(true_rate_z(state, slot), min(earliest - begin, LONGEST_STEP)), STEP_Q)
+            moved += counts(mul(spin(state, cycle, begin, earliest), min(earliest - begin, LONGEST_STEP)), STEP_Q)
+            rate = spin(state, cycle, begin, begin)
             earliest = begin
         cycle -= 1
     if earliest > at + MISSED_GAP:
         return LATE_DROPPED
     lag = state.epoch - at
+    var += interpolation_var(state, cycle + 1, at)
     return aid(state, config, moved & TURN, var + lag_var(state, config, lag), rate, at)
 
 
@@ -220,6 +249,6 @@ def predict_to_now(state: Any, config: Any) -> None:
         end = state.ring_end[cycle & SLOT]
         dt = gap_held(state, end - state.now)
         if dt > 0:
-            state.now_yaw = turn(state, config, cycle, dt, int(state.now_yaw), state.now_down, state.now_P)
+            state.now_yaw = turn(state, config, cycle, end - dt, end, int(state.now_yaw), state.now_down, state.now_P)
             state.now = end
-    state.now_rate = true_rate_z(state, (state.cycles - 1) & SLOT)
+    state.now_rate = true_rate_z(state, state.ring_rate[(state.cycles - 1) & SLOT, 2])

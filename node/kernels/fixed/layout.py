@@ -65,7 +65,6 @@ FIXED_STATE: Final = np.dtype(
         ("pending_at", "i8", (PENDING,)),
         ("pending_yaw", "u4", (PENDING,)),
         ("pending_var", "i8", (PENDING,)),
-        ("pending_rate", "i8", (PENDING,)),
         ("pending_sequence", "i8", (PENDING,)),
         # the increments of the last RING cycles
         ("cycles", "i8"),

@@ -24,7 +24,7 @@ from node.kernels.fixed.border import (
     to_fixed,
 )
 from node.kernels.fixed.cycle import run_cycle
-from node.kernels.fixed.layout import CEILING, FASTEST, FIXED_STATE, RATE_Q, TIME_Q, VAR_Q
+from node.kernels.fixed.layout import CEILING, FIXED_STATE, TIME_Q, VAR_Q
 from node.kernels.fixed.relay import offer_aiding
 from node.kernels.layout import Array, Status
 
@@ -76,7 +76,6 @@ class FixedNode:
         yaw_var: float,
         systematic_var: float,
         offset: float,
-        rate: float,
         valid_at: float,
         sequence: int,
         hops: int,
@@ -92,7 +91,6 @@ class FixedNode:
                 to_fixed(fixed, yaw_var, VAR_Q, CEILING),
                 to_fixed(fixed, systematic_var, VAR_Q, CEILING),
                 to_binary(offset),
-                to_fixed(fixed, rate, RATE_Q, FASTEST),
                 to_fixed(fixed, valid_at, TIME_Q, LARGEST),
                 sequence,
                 hops,
@@ -127,4 +125,4 @@ def warm_up() -> None:
     node = FixedNode()
     for _ in range(2):
         node.run_cycle(state[0], config[0], np.zeros(3), np.array([0.0, 0.0, -9.81]), 0.0, PERIOD, 1)
-        node.offer_aiding(state[0], config[0], 0.0, 1e-6, 0.0, 0.0, 0.0, 0.0, 1, 0)
+        node.offer_aiding(state[0], config[0], 0.0, 1e-6, 0.0, 0.0, 0.0, 1, 0)

@@ -22,7 +22,6 @@ def offer_aiding(
     yaw_var: int,
     systematic_var: int,
     offset: int,
-    rate: int,
     valid_at: int,
     sequence: int,
     hops: int,
@@ -33,7 +32,6 @@ def offer_aiding(
     ----------
     yaw, offset : binary angles
     yaw_var, systematic_var : rad^2, Q56
-    rate : rad/s, Q46
     valid_at : s on the node's clock, Q28
     sequence, hops : as sent
     """
@@ -54,13 +52,11 @@ def offer_aiding(
         state.pending_at[slot] = state.pending_at[slot - 1]
         state.pending_yaw[slot] = state.pending_yaw[slot - 1]
         state.pending_var[slot] = state.pending_var[slot - 1]
-        state.pending_rate[slot] = state.pending_rate[slot - 1]
         state.pending_sequence[slot] = state.pending_sequence[slot - 1]
         slot -= 1
     state.pending_at[slot] = valid_at
     state.pending_yaw[slot] = (yaw + offset) & TURN
     state.pending_var[slot] = yaw_var + config.aiding_floor_var
-    state.pending_rate[slot] = rate
     state.pending_sequence[slot] = sequence
     state.pending += 1
     state.last_sequence = sequence

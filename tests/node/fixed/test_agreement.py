@@ -40,9 +40,9 @@ def shown(cycles: int, seed: int) -> tuple[np.void, np.void, FixedNode]:
         run_cycle(reference, config, *reading)
         fixed.run_cycle(shadow, config, *reading)
         if given.aiding is not None:
-            yaw, rate, at, sequence = given.aiding
-            offer_aiding(reference, config, yaw, AIDING_VAR, 1e-6, -0.3, rate, at, sequence, 0)
-            fixed.offer_aiding(shadow, config, yaw, AIDING_VAR, 1e-6, -0.3, rate, at, sequence, 0)
+            yaw, at, sequence = given.aiding
+            offer_aiding(reference, config, yaw, AIDING_VAR, 1e-6, -0.3, at, sequence, 0)
+            fixed.offer_aiding(shadow, config, yaw, AIDING_VAR, 1e-6, -0.3, at, sequence, 0)
     return reference, shadow, fixed
 
 
@@ -100,7 +100,7 @@ def test_lost_cycles_are_bridged(hours: float) -> None:
     now = 1000.0
     for k in range(6):
         fixed.run_cycle(state, config, rate, force, now, now + PERIOD, 1)
-        fixed.offer_aiding(state, config, 1.0, 1e-9, 0.0, 0.0, 0.0, now, k, 0)
+        fixed.offer_aiding(state, config, 1.0, 1e-9, 0.0, 0.0, now, k, 0)
         now += PERIOD + (3600.0 * hours if k == 3 else 0.0)
     assert state["now"] == pytest.approx(now, abs=1e-6)
     assert state["now_yaw"] * 2.0 * np.pi / 2**32 == pytest.approx(1.0, abs=1e-6)
@@ -122,8 +122,8 @@ def reports(kernel: str, *, forget: bool) -> list[NodeState]:
         reading = ImuReading(given.start, given.end, given.rate, given.force)
         said += [message for message in node.on_cycle(reading, around) if isinstance(message, NodeState)]
         if given.aiding is not None:
-            yaw, rate, at, sequence = given.aiding
-            node.on_aiding(Aiding(yaw, AIDING_VAR, 0.0, 0.0, rate, at, sequence, 0), at)
+            yaw, at, sequence = given.aiding
+            node.on_aiding(Aiding(yaw, AIDING_VAR, 0.0, 0.0, given.rate[2], at, sequence, 0), at)
         if forget and k == 500:
             forget_bias(state, config)
             node.take_survey()

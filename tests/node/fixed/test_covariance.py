@@ -32,9 +32,9 @@ class Pair:
         self.now = end
         return status
 
-    def aid(self, yaw: float, rate: float, age: float, var: float = (0.003 * DEG) ** 2) -> None:
+    def aid(self, yaw: float, age: float, var: float = (0.003 * DEG) ** 2) -> None:
         self.sequence += 1
-        given = (yaw, var, 0.0, 0.0, rate, self.now - age, self.sequence, 0)
+        given = (yaw, var, 0.0, 0.0, self.now - age, self.sequence, 0)
         offer_aiding(self.reference, self.config, *given)
         self.fixed.offer_aiding(self.shadow, self.config, *given)
 
@@ -64,7 +64,7 @@ def test_whatever_comes_the_covariance_stays_one(
             force = -G * np.array([np.sin(inclination), 0.0, np.cos(inclination)]) + 3e-3 * random.standard_normal(3)
             status = pair.cycle(rate, force, dt)
             assert Status.FILTER_FAULT not in status
-            pair.aid(float(random.uniform(0, 6)), spin if moving else 0.0, age)
+            pair.aid(float(random.uniform(0, 6)), age)
             pair.check()  # corrections by such impossible readings may be held, and are then counted
 
 
@@ -76,7 +76,7 @@ def test_the_covariances_agree_entry_by_entry() -> None:
         force = -G * np.array([-0.3 * np.cos(yaw), 0.3 * np.sin(yaw), 0.954])
         pair.cycle(np.array([0.0, 0.0, spin]) + 1e-4 * random.standard_normal(3), force)
         yaw += spin * PERIOD
-        pair.aid(yaw % (2 * np.pi), spin, 0.05)
+        pair.aid(yaw % (2 * np.pi), 0.05)
         if k % 100 == 0:
             P, found = pair.reference["P"], pair.shadow["P"]
             sigma = np.sqrt(np.diag(P))
@@ -87,7 +87,7 @@ def test_an_outage_without_end_is_held_and_counted() -> None:
     pair = Pair()
     for _ in range(200):
         pair.cycle(np.zeros(3), np.array([0.0, 0.0, -G]))
-    pair.aid(1.0, 0.0, 0.0)
+    pair.aid(1.0, 0.0)
     for k in range(30_000):
         pair.cycle(np.array([0.0, 0.0, 5.0]), np.array([0.0, 0.0, -G]))
         if k % 500 == 0:

@@ -1,0 +1,39 @@
+"""The encoder's disc: how many of its lines have passed, and when the last one did. No line is quite in its place."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from sim.motion import Motion
+
+
+class Disc:
+    """Lines of an incremental encoder, decoded in quadrature, on the drive head.
+
+    Parameters
+    ----------
+    motion : of the drive head
+    counts_per_turn : edges of both tracks
+    edge_std : rad, error of a line's place, constant for every line
+    random : stream of the places
+    """
+
+    def __init__(self, motion: Motion, counts_per_turn: int, edge_std: float, random: np.random.Generator) -> None:
+        self._motion = motion
+        self._quantum = math.tau / counts_per_turn
+        limit = 0.4 * self._quantum  # lines do not change places
+        self._errors = np.clip(edge_std * random.standard_normal(counts_per_turn), -limit, limit)
+
+    def sample(self, t: float) -> tuple[int, float]:
+        """Count at rig time ``t`` (s) and the rig time (s) of its last edge."""
+        angle = float(self._motion.drive(np.array([t]))[0][0])
+        count = math.floor(angle / self._quantum + 0.5)
+        if self._place(count) > angle:
+            count -= 1
+        return count, min(self._motion.time_of_angle(self._place(count)), t)
+
+    def _place(self, count: int) -> float:
+        """Angle (rad) at which the edge that makes ``count`` passes."""
+        return count * self._quantum + float(self._errors[count % len(self._errors)])
