@@ -211,6 +211,7 @@ def draw_modes(folder: Path, result: dict[str, Any]) -> None:
     from groundstation.report.plots_node import Reach, YawPanel, reach_figure, yaw_figure
     from groundstation.report.style import save
     from sim.experiments.node_modes import CASES, clocks_of
+    from sim.experiments.node_published import FORMS
 
     name, traces = result["experiment"], result["traces"]
     panels = []
@@ -223,10 +224,12 @@ def draw_modes(folder: Path, result: dict[str, Any]) -> None:
         panels.append(YawPanel(case.name, t, one, rms, case.yaw))
     save(yaw_figure(panels, f"Yaw error: {name}, {result['seeds']} seeds"), folder / f"{name}.svg")
     reaches: dict[str, list[Reach]] = {}
+    figures = {(r["case"], r["quantity"]): r["ours"] for r in result["cases"]}
     for r in result["cases"]:
         if r["to_reach"] is not None:
             published = float(r["published"]) if isinstance(r["published"], float) else None
-            reach = Reach(r["case"], r["ours"], r["low"], r["high"], published, r["to_reach"])
+            simulated = [figures[key] for form in FORMS if (key := (f"{r['case']}, {form}", r["quantity"])) in figures]
+            reach = Reach(r["case"], r["ours"], r["low"], r["high"], published, r["to_reach"], tuple(simulated))
             reaches.setdefault(r["quantity"].capitalize(), []).append(reach)
     save(reach_figure(reaches, f"Reach: {name}, {result['seeds']} seeds"), folder / f"{name}-reach.svg")
 

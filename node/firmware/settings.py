@@ -11,7 +11,7 @@ from node.firmware.sensor_faults import USUAL_LIMITS, SensorLimits
 from node.kernels.layout import Scheme
 from telemetry.messages import MAX_TUBE
 
-Kernel: TypeAlias = Literal["float64", "fixed"]
+Kernel: TypeAlias = Literal["float64", "fixed", "published"]
 KERNELS: Final = get_args(Kernel)
 
 
@@ -34,7 +34,7 @@ class TubeSettings:
     scheme: Scheme = Scheme.FORWARD
     state_every: int = 2  # cycles from one report to the next
     aiding_old_after: float = 3.0  # s
-    kernel: Kernel = "float64"  # arithmetic of the loop; fixed is that of a controller without floats
+    kernel: Kernel = "float64"  # of the loop; fixed is for a controller without floats, published for experiments
     limits: SensorLimits = USUAL_LIMITS  # of its IMU
 
     def __post_init__(self) -> None:

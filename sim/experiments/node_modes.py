@@ -15,6 +15,7 @@ import numpy as np
 
 from sim.experiments.node_lab import REST, ROTATING, LabRun, LabSetup
 from sim.experiments.node_links import OnOff, Single
+from sim.experiments.node_published import EXPERIMENTS, FORMS, rows_of
 from sim.experiments.node_trials import rms_deg, row, trace, trials
 
 CLOCKS: dict[str, float | None] = {"": None, ", clock known": 0.25e-3}  # s; by the ending of a case's name
@@ -76,7 +77,8 @@ def clocks_of(name: str) -> dict[str, float | None]:
 
 def batches(name: str) -> int:
     """How many times all seeds are run."""
-    return len(clocks_of(name)) * len({case.setup for case in CASES[name]})
+    forms = len(FORMS) if name in EXPERIMENTS else 0
+    return (len(clocks_of(name)) + forms) * len({case.setup for case in CASES[name]})
 
 
 def run(name: str, seeds: int, step: Callable[[], None]) -> dict[str, Any]:
@@ -97,6 +99,8 @@ def run(name: str, seeds: int, step: Callable[[], None]) -> dict[str, Any]:
                     done = {case.setup: run_all(replace(case.setup, clock_prior=prior))}
                 cases += table(case, ending, done[case.setup])
                 traces[case.name + ending] = trace(done[case.setup], case.hop)
+        if name in EXPERIMENTS:
+            cases += rows_of([(case.name, case.setup, case.hop, case.published) for case in CASES[name]], run_all)
     return {"experiment": name, "seeds": seeds, "cases": cases, "traces": traces}
 
 
