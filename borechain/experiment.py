@@ -11,6 +11,7 @@ from typing import Any
 import click
 
 from borechain.faults import plain_faults
+from borechain.kernel_experiments import COMMANDS as KERNEL_COMMANDS
 from borechain.node_experiments import COMMANDS as NODE_COMMANDS
 from borechain.options import seed_option
 from borechain.survey_experiments import coverage, regions, weighting
@@ -71,7 +72,7 @@ def experiment() -> None:
     """
 
 
-for command in (coverage, regions, weighting, *NODE_COMMANDS):
+for command in (coverage, regions, weighting, *NODE_COMMANDS, *KERNEL_COMMANDS):
     experiment.add_command(command)
 
 

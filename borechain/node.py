@@ -20,10 +20,8 @@ SCHEMES = ("forward", "estimate", "intersection")
 @click.option("--lower-joint-deg", type=float, default=0.0, help="Scribe-mark reading, this tube to the one below.")
 @click.option("--joint-std-deg", type=float, default=0.05, show_default=True, help="Error of a reading, 1 sigma.")
 @click.option("--mount-std-deg", type=float, default=0.05, show_default=True, help="Error of the IMU's mount, 1 sigma.")
-@click.option("--kernel", type=click.Choice(["float64", "fixed"]), default="float64", show_default=True)
-@click.option(
-    "--scheme", type=click.Choice(["forward", "estimate", "intersection"]), default="forward", show_default=True
-)
+@click.option("--kernel", type=click.Choice(["float64", "fixed", "published"]), default="float64", show_default=True)
+@click.option("--scheme", type=click.Choice(SCHEMES), default="forward", show_default=True)
 @click.option("--imu", help="The node's own sensor: replay:FILE, mpu6500:BUS or mpu6500:BUS:ADDRESS.")
 @key_option
 @place_options
@@ -34,7 +32,7 @@ def node(
     lower_joint_deg: float,
     joint_std_deg: float,
     mount_std_deg: float,
-    kernel: Literal["float64", "fixed"],
+    kernel: Literal["float64", "fixed", "published"],
     scheme: str,
     imu: str | None,
     key_file: Path | None,

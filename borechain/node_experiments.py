@@ -210,23 +210,23 @@ def draw_modes(folder: Path, result: dict[str, Any]) -> None:
     """Yaw over time and the reach of every case, figures 4.11-4.22."""
     from groundstation.report.plots_node import Reach, YawPanel, reach_figure, yaw_figure
     from groundstation.report.style import save
-    from sim.experiments.node_modes import CASES, clocks_of
+    from sim.experiments.node_modes import CASES
+    from sim.experiments.node_published import FORMS
 
     name, traces = result["experiment"], result["traces"]
     panels = []
     for case in CASES[name]:
         seen = traces[case.name]["t"] >= -130.0
         t, one = traces[case.name]["t"][seen], traces[case.name]["one"][seen]
-        rms = {
-            f"clock {'known' if end else 'as shipped'}": traces[case.name + end]["rms"][seen] for end in clocks_of(name)
-        }
-        panels.append(YawPanel(case.name, t, one, rms, case.yaw))
+        panels.append(YawPanel(case.name, t, one, {"all seeds": traces[case.name]["rms"][seen]}, case.yaw))
     save(yaw_figure(panels, f"Yaw error: {name}, {result['seeds']} seeds"), folder / f"{name}.svg")
     reaches: dict[str, list[Reach]] = {}
+    figures = {(r["case"], r["quantity"]): r["ours"] for r in result["cases"]}
     for r in result["cases"]:
         if r["to_reach"] is not None:
             published = float(r["published"]) if isinstance(r["published"], float) else None
-            reach = Reach(r["case"], r["ours"], r["low"], r["high"], published, r["to_reach"])
+            simulated = [figures[key] for form in FORMS if (key := (f"{r['case']}, {form}", r["quantity"])) in figures]
+            reach = Reach(r["case"], r["ours"], r["low"], r["high"], published, r["to_reach"], tuple(simulated))
             reaches.setdefault(r["quantity"].capitalize(), []).append(reach)
     save(reach_figure(reaches, f"Reach: {name}, {result['seeds']} seeds"), folder / f"{name}-reach.svg")
 

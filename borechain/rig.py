@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     from sim.world import World
     from telemetry.media.zenoh_bus import ZenohBus
 
-PRELOAD = ["borechain.warm"]
+PRELOAD = {"float64": "borechain.warm", "fixed": "borechain.warm_all", "published": "borechain.warm_all"}  # by kernel
 
 
 @click.command()
@@ -112,7 +112,7 @@ def process_table(
     }
     for tube in range(1, world.scenario.tubes + 1):
         specs[str(tube)] = Spec(run_node, (place(f"tube-{tube}"), world.tube_settings(tube)))
-    return ProcessTable(specs, PRELOAD)
+    return ProcessTable(specs, [PRELOAD[world.scenario.file.node.kernel]])
 
 
 def operator_of(world: World, rig_name: str) -> Callable[[ZenohBus, str], bool]:

@@ -133,7 +133,9 @@ class NodeSection(Section):
     """Firmware settings of every node."""
 
     scheme: Literal["forward", "estimate", "intersection"] = "forward"
-    kernel: Literal["float64", "fixed"] = Field("float64", description="the loop in floats or in integers")
+    kernel: Literal["float64", "fixed", "published"] = Field(
+        "float64", description="the loop in floats, in integers, or in the published feed-forward form"
+    )
 
 
 class DesignSection(Section):

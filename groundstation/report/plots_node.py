@@ -18,7 +18,8 @@ from groundstation.report.style import GREY, INK, LIGHT, MARKERS, SERIES, WRONG,
 
 Array = npt.NDArray[np.float64]
 SMALLEST = 1e-3  # deg, below which an error is no longer drawn
-SHOWN = (0.005, 2.0)  # deg, of figures beside the published ones
+SHOWN = (0.005, 2.0)  # deg, of figures beside the published ones, at least
+FORM_MARKERS = {"published filter, simulated": MARKERS[3], "published scheme, simulated": MARKERS[2]}
 OURS_LABEL = "ours, 95 % interval"
 
 
@@ -43,6 +44,7 @@ class Reach:
     high: float
     published: float | None
     to_reach: float | None
+    simulated: tuple[float, ...] = ()  # the published filter and the published scheme
 
 
 @styled
@@ -83,6 +85,7 @@ def yaw_figure(panels: Sequence[YawPanel], title: str) -> Figure:
 def reach_figure(panels: Mapping[str, Sequence[Reach]], title: str) -> Figure:
     """Figures with their intervals beside the published ones and those to reach, a panel a quantity."""
     longest = max(len(rows) for rows in panels.values())
+    end = max(SHOWN[1], 1.5 * max(d for rows in panels.values() for row in rows for d in (row.ours, *row.simulated)))
     figure = new_figure(1.3 + 0.24 * longest, title)
     for axes, (quantity, rows) in zip(figure.subplots(1, len(panels), squeeze=False)[0], panels.items(), strict=True):
         for y, reach in enumerate(rows):
@@ -94,7 +97,9 @@ def reach_figure(panels: Mapping[str, Sequence[Reach]], title: str) -> Figure:
                 axes.plot(reach.to_reach, y, "|", color=INK, ms=11.0, mew=1.4)
             if reach.published is not None:
                 axes.plot(reach.published, y, "x", color=GREY, ms=6.0, mew=1.4)
-        axes.set(xscale="log", xlabel=f"{quantity}, rms (deg)", xlim=SHOWN, ylim=(len(rows) - 0.5, -0.5))
+            for marker, figure_deg in zip(FORM_MARKERS.values(), reach.simulated, strict=False):
+                axes.plot(figure_deg, y, marker, color=GREY, mfc="none")
+        axes.set(xscale="log", xlabel=f"{quantity}, rms (deg)", xlim=(SHOWN[0], end), ylim=(len(rows) - 0.5, -0.5))
         axes.set_yticks(range(len(rows)), [reach.name for reach in rows])
     for axes in figure.axes[1:]:
         axes.tick_params(labelleft=False)
@@ -104,7 +109,35 @@ def reach_figure(panels: Mapping[str, Sequence[Reach]], title: str) -> Figure:
         Line2D([], [], color=INK, ls="", marker="|", ms=11.0, mew=1.4, label="to reach"),
         Line2D([], [], color=GREY, ls="", marker="x", ms=6.0, mew=1.4, label="published"),
     ]
-    figure.legend(handles=handles, loc="outside lower left", ncols=4)
+    if any(row.simulated for rows in panels.values() for row in rows):
+        handles += [Line2D([], [], color=GREY, ls="", marker=m, mfc="none", label=n) for n, m in FORM_MARKERS.items()]
+    figure.legend(handles=handles, loc="outside lower left", ncols=3)
+    return tidy(figure)
+
+
+@styled
+def ingredients_figure(panels: Mapping[str, Mapping[str, Sequence[Reach]]], title: str) -> Figure:
+    """Figures of every ingredient left out, with their intervals, a panel a state and a colour a mode of aiding.
+
+    Parameters
+    ----------
+    panels : state to mode to rows, the same names in each; the first row is that of the filter as shipped
+    """
+    names = [row.name for row in next(iter(next(iter(panels.values())).values()))]
+    figure = new_figure(1.3 + 0.3 * len(names), title)
+    for axes, (state, modes) in zip(
+        figure.subplots(1, len(panels), sharex=True, squeeze=False)[0], panels.items(), strict=True
+    ):
+        for k, (mode, rows) in enumerate(modes.items()):
+            y = np.arange(len(rows)) + 0.3 * (k - 0.5 * (len(modes) - 1))
+            axes.axvline(rows[0].ours, color=SERIES[k], ls=":", lw=0.9)
+            axes.hlines(y, [row.low for row in rows], [row.high for row in rows], color=SERIES[k], lw=2.0)
+            axes.plot([row.ours for row in rows], y, MARKERS[k], color=SERIES[k], label=mode)
+        axes.set(xscale="log", xlabel=f"{state}, rms (deg)", ylim=(len(names) - 0.5, -0.5))
+        axes.set_yticks(range(len(names)), names)
+    for axes in figure.axes[1:]:
+        axes.tick_params(labelleft=False)
+    figure.legend(*figure.axes[0].get_legend_handles_labels(), loc="outside lower left", ncols=2)
     return tidy(figure)
 
 

@@ -11,7 +11,7 @@ from node.firmware.sensor_faults import USUAL_LIMITS, SensorLimits
 from node.kernels.layout import Scheme
 from telemetry.messages import MAX_TUBE
 
-Kernel: TypeAlias = Literal["float64", "fixed"]
+Kernel: TypeAlias = Literal["float64", "fixed", "published"]
 KERNELS: Final = get_args(Kernel)
 
 
@@ -34,7 +34,7 @@ class TubeSettings:
     scheme: Scheme = Scheme.FORWARD
     state_every: int = 2  # cycles from one report to the next
     aiding_old_after: float = 3.0  # s
-    kernel: Kernel = "float64"  # arithmetic of the loop; fixed is that of a controller without floats
+    kernel: Kernel = "float64"  # of the loop; fixed is for a controller without floats, published for experiments
     limits: SensorLimits = USUAL_LIMITS  # of its IMU
 
     def __post_init__(self) -> None:
@@ -49,9 +49,9 @@ class TubeSettings:
         require(self.state_every >= 1, f"state_every: expected at least 1 cycle, got {self.state_every}")
         age = self.aiding_old_after
         require(math.isfinite(age) and age > 0.0, f"aiding_old_after: expected a time in s, got {age}")
-        both = self.kernel == "fixed" and self.scheme is Scheme.INTERSECTION
-        require(not both, "scheme: expected forward or estimate with the kernel fixed, got intersection")
         require(self.kernel in KERNELS, f"kernel: expected one of {', '.join(KERNELS)}, got {self.kernel}")
+        alone = self.kernel != "float64" and self.scheme is Scheme.INTERSECTION
+        require(not alone, f"scheme: expected forward or estimate with the kernel {self.kernel}, got intersection")
         for name, std in (
             ("drive_joint.std", self.drive_joint.std),
             ("lower_joint.std", self.lower_joint.std),

@@ -78,9 +78,13 @@ class Surroundings:
 
 
 def kernel_of(kernel: Kernel) -> tuple[Callable[..., int], Callable[..., int]]:
-    """The cycle and the intake of aiding in the arithmetic chosen; the integer one is loaded only when it is used."""
+    """The cycle and the intake of aiding of the kernel chosen; all but the default are loaded only when used."""
     if kernel == "float64":
         return run_cycle, offer_aiding
+    if kernel == "published":
+        from node.kernels.published import cycle as published
+
+        return published.run_cycle, published.offer_aiding
     from node.kernels.fixed.node import FixedNode
 
     fixed = FixedNode()

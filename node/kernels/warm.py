@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 import numpy as np
 
 from node.kernels.angles import from_binary, wrap
@@ -12,16 +14,23 @@ from node.kernels.relay import offer_aiding
 from node.kernels.static_average import STATIC, add_static, has_moved
 
 
-def warm_up() -> None:
-    """Run one cycle and one aiding on a state that is thrown away."""
+def warm_loop(run_cycle: Callable[..., int], offer_aiding: Callable[..., int]) -> None:
+    """Run two cycles and two aidings on a state that is thrown away."""
     config = default_config()
     state = new_state(config)
+    rate, force = np.zeros(3), np.array([0.0, 0.0, -9.81])
+    for k in range(2):
+        run_cycle(state[0], config[0], rate, force, k * PERIOD, (k + 1) * PERIOD, 1)
+        offer_aiding(state[0], config[0], 0.0, 1e-6, 0.0, 0.0, 0.0, 1, 0)
+    from_binary(state[0]["now_yaw"])
+
+
+def warm_up() -> None:
+    """Run what the node needs with the default kernel."""
     rate, force = np.zeros(3), np.array([0.0, 0.0, -9.81])
     calibrate(identity_parameters()[0], USUAL, rate, force)
     average = np.zeros(1, STATIC)
     add_static(average[0], rate, force, USUAL, 1)
     has_moved(average[0], 3.0)
-    run_cycle(state[0], config[0], rate, force, 0.0, PERIOD, 1)
-    offer_aiding(state[0], config[0], 0.0, 1e-6, 0.0, 0.0, 0.0, 1, 0)
-    from_binary(state[0]["now_yaw"])
+    warm_loop(run_cycle, offer_aiding)
     wrap(0.0)

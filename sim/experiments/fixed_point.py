@@ -167,8 +167,8 @@ def run(cycles: int, seed: int, hops: int, seeds: int, step: Callable[[], None] 
     Returns
     -------
     dict
-        ``cases``: one row for each kind of cycle; ``nees``: one row a hop and kernel; ``overflows``, ``status_differs``
-        and ``within``, whether the limits hold.
+        ``cases``: one row for each kind of cycle, with the overflows and differences of status of the whole run;
+        ``nees``: one row a hop and kernel; ``within``, whether the limits hold.
     """
     found = compare(cycles, seed, step)
     within = bool(
@@ -177,12 +177,12 @@ def run(cycles: int, seed: int, hops: int, seeds: int, step: Callable[[], None] 
         and found.overflows == 0
     )
     return {
-        "experiment": "fixed_point",
+        "experiment": "fixed-point",
         "cycles": cycles,
         "seed": seed,
-        "cases": rows_of(found),
-        "overflows": found.overflows,
-        "status_differs": found.status_differs,
+        "cases": [
+            {**row, "overflows": found.overflows, "status_differs": found.status_differs} for row in rows_of(found)
+        ],
         "within": within,
         "nees": consistency(hops, seeds, step),
     }

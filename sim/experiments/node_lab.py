@@ -8,20 +8,21 @@ what the last outage left in the yaw counts. The phase of the aiding against the
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 import numpy.typing as npt
 
 from groundstation.survey.resolve import angles, resolve
 from node.firmware.encoder import COUNTS_PER_TURN, EDGE_STD, EncoderNode, EncoderSample
-from node.firmware.settings import Joint, TubeSettings
+from node.firmware.settings import Joint, Kernel, TubeSettings
 from node.firmware.tube import ImuReading, Surroundings, Tube
 from node.kernels.angles import wrap
-from node.kernels.layout import PERIOD, default_config, new_state
+from node.kernels.layout import PERIOD, Scheme, default_config, new_state
 from sim.borehole import Borehole
 from sim.encoder import Disc
 from sim.experiments.node_links import Link, OnOff
+from sim.experiments.plain_sensors import PlainEncoder, single_samples
 from sim.imu_errors import ImuErrors, gauss_markov
 from sim.motion import Motion, Trapezoid
 from sim.scenario import AccelerometerSection, GyroSection
@@ -53,8 +54,12 @@ class LabSetup:
     bias_step_dps: float = 0.0  # of the z gyroscope, from the first turn on: what the bias of the boot left over
     gyroscope: GyroSection = GyroSection()  # noqa: RUF009
     accelerometer: AccelerometerSection = AccelerometerSection(bias_std_deg=0.0)  # noqa: RUF009
-    clock_prior: float | None = None  # what the node is told of clock_std; None is the prior of the firmware as shipped
     config: tuple[tuple[str, float], ...] = ()
+    kernel: Kernel = "float64"
+    scheme: Scheme = Scheme.FORWARD
+    counts_per_turn: int | None = None  # of an encoder that is read without edge times; None is that of the firmware
+    instantaneous: bool = False  # the gyroscope is read once at the end of a cycle, not averaged over it
+    renumbered: bool = False  # at rest every cycle's aiding counts as a new measurement
 
 
 @dataclass(frozen=True, slots=True)
@@ -78,6 +83,8 @@ ENDS: Array = PERIOD * np.arange(1.0, CYCLES + 1.0)  # s after zero
 REST: Mask = (ENDS - PERIOD >= STOP) & (ENDS <= END)
 SETTLED: Mask = (ENDS >= STOP + RUN_IN) & (ENDS <= END)
 ROTATING: Mask = (STOP - TURN.duration + RUN_IN <= ENDS) & (STOP - TURN.ramp >= ENDS)
+FIRST_PERIOD = 50.0  # s, of turning, after which a link of 20 s on and 30 s off was heard for all of its 20 s
+ONCE_AIDED: Mask = ROTATING & (STOP - TURN.duration + FIRST_PERIOD <= ENDS)
 
 
 class Lab:
@@ -100,6 +107,8 @@ class Lab:
             _Sensor(setup, self._motion, float(a), s) for a, s in zip(self._true, self._streams[1:-1], strict=True)
         ]
         self._tubes = [_tube(setup, k, [*joints, 0.0]) for k in range(setup.hops)]
+        self._estimates: list[Aiding | None] = [None] * setup.hops  # of the last cycle, by scheme ``estimate``
+        self._plain = PlainEncoder(setup.counts_per_turn) if setup.counts_per_turn is not None else None
 
     def run(self) -> LabRun:
         """Let it rest, turn and rest."""
@@ -112,7 +121,8 @@ class Lab:
                 state = tube.state
                 yaw[cycle, k], var[cycle, k] = tube.yaw, tube.yaw_var
                 bias[cycle, k] = state["static_bias"][2] + state["bias"][2]
-            self._relay(cycle, self._measure(encoder, BEGIN + ENDS[cycle]))
+            measured = self._measure(encoder, BEGIN + ENDS[cycle])
+            self._relay(cycle, replace(measured, sequence=cycle) if self._setup.renumbered else measured)
         error = _wrapped(yaw - self._drive[:, None] - self._true[None, :])
         azimuth = [self._azimuth_error(k, yaw[REST, k], var[REST, k]) for k in range(self._setup.hops)]
         truth = np.stack([s.bias for s in self._sensors], axis=1)
@@ -123,9 +133,12 @@ class Lab:
         end = BEGIN + float(ENDS[cycle])
         around = Surroundings(True, k + 1, end, self._setup.clock_std**2 * (k + 1), True)
         said = list(self._tubes[k].on_cycle(ImuReading(end - PERIOD, end, (wx, wy, wz), (fx, fy, fz)), around))
+        self._estimates[k] = next((message for message in said if isinstance(message, Aiding)), None)
         return next((message for message in said if isinstance(message, SurveyMeasurement)), None)
 
     def _measure(self, encoder: EncoderNode, end: float) -> Aiding:
+        if self._plain is not None:
+            return self._plain.on_cycle(float(self._motion.drive(np.array([end]))[0][0]), end)
         count, edge_at = self._disc.sample(end)
         return encoder.on_cycle(EncoderSample(count, edge_at, True), end)
 
@@ -135,9 +148,11 @@ class Lab:
         for k, tube in enumerate(self._tubes):
             if aiding is None or self._lost[cycle, k]:
                 return
-            age = self._setup.delay + (k + 1) * self._setup.latency
+            hops = 1 if self._setup.scheme is Scheme.ESTIMATE else k + 1
+            age = self._setup.delay + hops * self._setup.latency
             valid_at = aiding.valid_at + (age if self._setup.dated_by_arrival else 0.0)
-            aiding = tube.on_aiding(aiding, valid_at + float(self._clocks[cycle, k]))
+            passed = tube.on_aiding(aiding, valid_at + float(self._clocks[cycle, k]))
+            aiding = self._estimates[k] if self._setup.scheme is Scheme.ESTIMATE else passed
 
     def _azimuth_error(self, k: int, yaw: Array, var: Array) -> float:
         force = np.array(self._sensors[k].samples)[REST, 3:]
@@ -153,10 +168,13 @@ class _Sensor:
         a, ends = setup.accelerometer, BEGIN + ENDS
         truth = TubeTruth(hole, motion, 0.0, angle, a.radius_m, a.gravity_mps2)
         rate, force = truth.cycle_means(ends, PERIOD)
+        sensor = setup.gyroscope
+        if setup.instantaneous:
+            rate, sensor = truth.rate(ends), single_samples(sensor, PERIOD)
         step = math.radians(setup.bias_step_dps) * (ends > BEGIN + STOP - TURN.duration)
         rate[:, 2] += step
         random = _generator(stream)
-        gyro = ImuErrors(setup.gyroscope, a).gyro(random, rate, force, PERIOD)
+        gyro = ImuErrors(sensor, a).gyro(random, rate, force, PERIOD)
         turning = (motion.drive(ends)[1] > 0.0).astype(float)
         acceleration = ImuErrors(setup.gyroscope, a).accelerations(random, force, turning)
         self.samples: list[list[float]] = np.concatenate([gyro, acceleration], axis=1).tolist()
@@ -174,11 +192,16 @@ def _generator(stream: np.random.SeedSequence) -> np.random.Generator:
 
 def _tube(setup: LabSetup, k: int, joints: list[float]) -> Tube:
     config = default_config()
-    if setup.clock_prior is not None:
-        config[0]["stamp_std"] = setup.clock_prior * math.sqrt(k + 1)
     for name, value in setup.config:
         config[0][name] = value
-    settings = TubeSettings(k + 1, drive_joint=Joint(joints[0]), lower_joint=Joint(joints[k + 1]), state_every=10**9)
+    settings = TubeSettings(
+        k + 1,
+        drive_joint=Joint(joints[0]),
+        lower_joint=Joint(joints[k + 1]),
+        scheme=setup.scheme,
+        state_every=10**9,
+        kernel=setup.kernel,
+    )
     return Tube(settings, config, new_state(config), iter(range(10**9)).__next__, restored=False)
 
 

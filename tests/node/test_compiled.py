@@ -5,6 +5,8 @@ import subprocess
 import sys
 from pathlib import Path
 
+import pytest
+
 COUNT_COMPILATIONS = """
 from node.kernels.warm import warm_up
 from node.kernels.cycle import run_cycle
@@ -16,15 +18,17 @@ for function in (run_cycle, offer_aiding, calibrate, add_static, has_moved):
     print(sum(function.stats.cache_misses.values()), sum(function.stats.cache_hits.values()))
 """
 COUNT_ALLOCATIONS = """
+import os
+from importlib import import_module
 import numpy as np
 from numba import njit
 from numba.core.runtime import _nrt_python, rtsys
 from node.kernels.calibration import calibrate, identity_parameters
-from node.kernels.cycle import run_cycle
 from node.kernels.layout import PERIOD, default_config, new_state
-from node.kernels.relay import offer_aiding
 from node.kernels.static_average import STATIC, add_static, has_moved
 
+run_cycle = import_module(os.environ["CYCLE"]).run_cycle
+offer_aiding = import_module(os.environ["RELAY"]).offer_aiding
 _nrt_python.memsys_enable_stats()
 
 @njit
@@ -74,6 +78,13 @@ def test_the_cache_follows_the_sources() -> None:
     assert source_digest() in cache_folder().name
 
 
-def test_a_cycle_allocates_nothing() -> None:
-    ((once, often),) = run(COUNT_ALLOCATIONS)
+@pytest.mark.parametrize(
+    ("cycle", "relay"),
+    [
+        ("node.kernels.cycle", "node.kernels.relay"),
+        ("node.kernels.published.cycle", "node.kernels.published.cycle"),
+    ],
+)
+def test_a_cycle_allocates_nothing(cycle: str, relay: str) -> None:
+    ((once, often),) = run(COUNT_ALLOCATIONS, CYCLE=cycle, RELAY=relay)
     assert once == often

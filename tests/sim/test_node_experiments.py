@@ -19,7 +19,6 @@ from sim.experiments.node_trials import bootstrap, rms_deg
 
 SEEDS = 16
 SLACK = 1.5  # of the figure to reach, for few seeds
-KNOWN = node_modes.CLOCKS[", clock known"]
 
 
 def runs(setup: LabSetup, seeds: int = SEEDS) -> list[LabRun]:
@@ -27,14 +26,14 @@ def runs(setup: LabSetup, seeds: int = SEEDS) -> list[LabRun]:
 
 
 def judged(case: node_modes.Case, found: list[LabRun]) -> dict[str, dict]:
-    return {row["quantity"]: row for row in node_modes.table(case, "", found)}
+    return {row["quantity"]: row for row in node_modes.table(case, found)}
 
 
 @pytest.mark.parametrize(
     "case", [c for name in ("update-modes", "single-updates") for c in node_modes.CASES[name]], ids=lambda c: c.name
 )
 def test_every_update_mode_is_within_reach(case: node_modes.Case) -> None:
-    rows = judged(case, runs(replace(case.setup, clock_prior=KNOWN)))
+    rows = judged(case, runs(case.setup))
     for quantity in ("yaw", "azimuth"):
         assert rows[quantity]["ours"] < SLACK * rows[quantity]["to_reach"], rows[quantity]
         assert rows[quantity]["low"] < rows[quantity]["ours"] < rows[quantity]["high"]
@@ -48,7 +47,7 @@ def test_without_the_scale_factor_state_the_reach_is_missed() -> None:
 
 
 def test_the_second_node_is_as_good_as_the_first() -> None:
-    found = runs(replace(node_modes.TWO, clock_prior=KNOWN))
+    found = runs(node_modes.TWO)
     for case in node_modes.CASES["two-nodes"]:
         row = judged(case, found)["yaw"]
         assert row["ours"] < SLACK * row["to_reach"]

@@ -27,6 +27,7 @@ from node.kernels.fixed.cycle import run_cycle
 from node.kernels.fixed.layout import CEILING, FIXED_STATE, TIME_Q, VAR_Q
 from node.kernels.fixed.relay import offer_aiding
 from node.kernels.layout import Array, Status
+from node.kernels.warm import warm_loop
 
 
 class FixedNode:
@@ -118,11 +119,5 @@ class FixedNode:
 
 def warm_up() -> None:
     """Compile the integer loop, or load it from the cache, on a state that is thrown away."""
-    from node.kernels.layout import PERIOD, default_config, new_state
-
-    config = default_config()
-    state = new_state(config)
     node = FixedNode()
-    for _ in range(2):
-        node.run_cycle(state[0], config[0], np.zeros(3), np.array([0.0, 0.0, -9.81]), 0.0, PERIOD, 1)
-        node.offer_aiding(state[0], config[0], 0.0, 1e-6, 0.0, 0.0, 0.0, 1, 0)
+    warm_loop(node.run_cycle, node.offer_aiding)

@@ -1,0 +1,16 @@
+"""What the fork server imports and compiles for nodes that run another kernel than the default one.
+
+It stands apart from ``warm``: to compile every kernel takes a fresh machine half a minute, which the usual rig saves.
+"""
+
+from __future__ import annotations
+
+from borechain import warm
+from node.firmware.settings import KERNELS
+from node.firmware.tube import kernel_of
+from node.kernels.warm import warm_loop
+
+for kernel in KERNELS:
+    warm_loop(*kernel_of(kernel))
+
+__all__ = ["warm"]

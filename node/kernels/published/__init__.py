@@ -1,0 +1,1 @@
+"""The published form of the filter, for the published experiments: Euler angles, explicit steps, feed-forward."""

@@ -1,0 +1,167 @@
+"""The published form beside ours, what each ingredient buys, integers against floats: figures, tables and commands."""
+
+import json
+import math
+import subprocess
+import sys
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+from click.testing import CliRunner
+
+from borechain.experiment import experiment
+from borechain.node import node
+from borechain.rig import PRELOAD
+from node.firmware.encoder import COUNTS_PER_TURN
+from node.firmware.settings import KERNELS
+from node.kernels.layout import PERIOD, Scheme
+from sim.experiments import node_ingredients, node_modes, node_published
+from sim.experiments.node_lab import REST, ROTATING, Lab, LabRun, LabSetup
+from sim.experiments.node_links import OnOff
+from sim.experiments.node_trials import rms_deg
+from sim.experiments.plain_sensors import LINES, SAMPLE_RATE_HZ, PlainEncoder, single_samples
+from sim.scenario import GyroSection, NodeSection
+
+SEEDS = 6
+LAB = LabSetup()
+
+
+def runs(setup: LabSetup, seeds: int = SEEDS) -> list[LabRun]:
+    return [Lab(setup, seed).run() for seed in range(1, seeds + 1)]
+
+
+def yaw(found: list[LabRun], window: np.ndarray = REST, hop: int = 0) -> float:
+    return rms_deg([r.error[window, hop] for r in found])[0]
+
+
+def test_the_published_filter_rests_like_the_thesis_and_diverges_while_it_turns() -> None:
+    found = runs(node_published.setup_of(LAB, "published filter"))
+    assert 0.02 < yaw(found) < 0.1
+    assert yaw(found, ROTATING) > 1.0
+    assert yaw(runs(LAB), ROTATING) < 0.05
+
+
+def test_the_published_scheme_is_as_far_off_as_it_was_found() -> None:
+    found = runs(node_published.setup_of(LAB, "published scheme"))
+    low, high = node_ingredients.STUDIED_DEG["published scheme"]
+    assert 0.5 * low < yaw(found) < high
+    assert yaw(found) > 5.0 * yaw(runs(LAB))
+
+
+def test_a_published_node_hands_its_own_yaw_down() -> None:
+    two = node_published.setup_of(node_modes.TWO, "published filter")
+    assert two.scheme is Scheme.ESTIMATE
+    found = runs(two, 3)
+    assert yaw(found, hop=1) < 0.2
+    said = np.array([r.var[REST] for r in found])
+    assert (said[:, -1, 1] < said[:, -1, 0]).all()  # taken as white, the errors of the first are averaged away
+
+
+def test_published_rows_stand_beside_the_thesis_and_ours() -> None:
+    result = node_modes.run("two-nodes", 2, lambda: None)
+    rows = {(row["case"], row["quantity"]): row for row in result["cases"]}
+    for case in node_modes.CASES["two-nodes"]:
+        assert (case.name, "azimuth") in rows
+        for form in node_published.FORMS:
+            row = rows[(f"{case.name}, {form}", "azimuth")]
+            assert row["published"] == case.published
+            assert row["low"] <= row["ours"] <= row["high"]
+            assert row["to_reach"] is None
+
+
+@pytest.mark.parametrize(
+    ("name", "link", "window", "factor"),
+    [
+        ("no scale-factor state", OnOff(), ROTATING, 2.0),
+        ("no delay compensation, instantaneous rate", OnOff(), REST, 10.0),
+        ("no delay compensation", OnOff(), ROTATING, 10.0),
+        ("instantaneous rate", OnOff(), ROTATING, 2.0),
+        ("no edge times, no quadrature", OnOff(), REST, 2.0),
+        ("no zero-rate update", OnOff(), REST, 5.0),
+    ],
+)
+def test_every_ingredient_is_missed(name: str, link: OnOff, window: np.ndarray, factor: float) -> None:
+    without = runs(replace(node_ingredients.INGREDIENTS[name], link=link))
+    assert yaw(without, window) > factor * yaw(runs(replace(LAB, link=link)), window)
+
+
+def test_each_ingredient_is_off_alone() -> None:
+    changed = {
+        name: {key for key in LabSetup.__slots__ if getattr(setup, key) != getattr(LAB, key)}
+        for name, setup in node_ingredients.INGREDIENTS.items()
+        if not name.startswith("published")
+    }
+    assert changed.pop("as shipped") == set()
+    assert changed["instantaneous rate"] == {"instantaneous"}
+    assert changed["no edge times"] == changed["no edge times, no quadrature"] == {"counts_per_turn"}
+    assert changed["no scale-factor state"] == changed["no zero-rate update"] == {"config"}
+    assert node_ingredients.INGREDIENTS["no edge times"].counts_per_turn == COUNTS_PER_TURN
+
+
+def test_a_plain_encoder_reads_the_middle_of_its_count() -> None:
+    encoder, quantum = PlainEncoder(LINES), math.tau / LINES
+    said = [encoder.on_cycle(angle, k * PERIOD) for k, angle in enumerate((0.1, 0.1, 1.0, 1.7, 1.7, 1.7))]
+    assert [a.sequence for a in said] == [1, 1, 2, 3, 4, 4]
+    assert [a.rate for a in said[2:4]] == pytest.approx([0.9 / PERIOD, 0.7 / PERIOD], abs=quantum / PERIOD)
+    assert all(abs(a.yaw - angle) <= 0.5 * quantum for a, angle in zip(said, (0.1, 0.1, 1.0, 1.7), strict=False))
+    assert said[0].yaw_var == pytest.approx(quantum**2 / 12.0)
+    assert [a.rate for a in (said[1], said[-1])] == [0.0, 0.0]
+
+
+def test_a_single_sample_has_the_noise_of_its_band() -> None:
+    gyroscope = GyroSection()
+    single = single_samples(gyroscope, PERIOD)
+    for one, mean in zip(single.noise_dps_rthz, gyroscope.noise_dps_rthz, strict=True):
+        assert one / math.sqrt(PERIOD) == pytest.approx(mean * math.sqrt(SAMPLE_RATE_HZ))
+
+
+def test_the_ingredients_command_keeps_table_and_plot(tmp_path: Path) -> None:
+    done = CliRunner().invoke(experiment, ["ingredients", "--seeds", "2", "--out", str(tmp_path), "--json"])
+    assert done.exit_code == 0, done.output
+    result = json.loads(done.stdout)
+    assert len(result["cases"]) == 2 * node_ingredients.batches()
+    assert len((tmp_path / "ingredients.csv").read_text().splitlines()) == len(result["cases"]) + 1
+    assert (tmp_path / "ingredients.svg").read_text().startswith("<?xml")
+
+
+def test_the_fixed_point_command_keeps_both_tables(tmp_path: Path) -> None:
+    words = ["fixed-point", "--cycles", "2000", "--seeds", "2", "--out", str(tmp_path), "--json"]
+    done = CliRunner().invoke(experiment, words)
+    assert done.exit_code == 0, done.output
+    result = json.loads(done.stdout)
+    assert result["within"] is True
+    assert sum(row["cycles"] for row in result["cases"]) == 2000
+    assert {row["kernel"] for row in result["nees"]} == {"float64", "fixed"}
+    for name, rows in (("fixed-point", result["cases"]), ("fixed-point-nees", result["nees"])):
+        assert len((tmp_path / f"{name}.csv").read_text().splitlines()) == len(rows) + 1
+
+
+@pytest.mark.parametrize("words", [["fixed-point", "--cycles", "1999"], ["ingredients", "--seeds", "1"]])
+def test_too_little_is_refused_in_one_line(words: list[str]) -> None:
+    done = CliRunner().invoke(experiment, words)
+    assert done.exit_code == 2
+    assert "is not in the range" in done.output
+
+
+def test_both_commands_are_listed() -> None:
+    listed = CliRunner().invoke(experiment, ["list"]).output
+    for name in ("ingredients", "fixed-point"):
+        assert f"\n{name} " in f"\n{listed}"
+
+
+def test_every_kernel_can_be_chosen_and_is_warmed_before_the_first_fork() -> None:
+    choice = next(p.type for p in node.params if p.name == "kernel")
+    assert tuple(choice.choices) == KERNELS  # type: ignore[attr-defined]
+    assert [NodeSection(kernel=kernel).kernel for kernel in KERNELS] == list(KERNELS)
+    assert set(PRELOAD) == set(KERNELS)
+    program = (
+        "import borechain.warm_all\n"
+        "from node.kernels import cycle\n"
+        "from node.kernels.fixed import cycle as fixed\n"
+        "from node.kernels.published import cycle as published\n"
+        "print(all(k.run_cycle.signatures for k in (cycle, fixed, published)))\n"
+    )
+    done = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, check=True)
+    assert done.stdout == "True\n"
