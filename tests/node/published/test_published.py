@@ -34,9 +34,9 @@ class Node:
         start, self.now = self.now, self.now + dt
         return Status(published.run_cycle(self.state, self.config, np.array(rate), self.force, start, self.now, 1))
 
-    def aid(self, yaw: float, rate: float = 0.0, age: float = 0.0, var: float = (0.003 * DEG) ** 2) -> None:
+    def aid(self, yaw: float, age: float = 0.0, var: float = (0.003 * DEG) ** 2) -> None:
         self.sequence += 1
-        given = (yaw % math.tau, var, 0.0, 0.0, rate, self.now - age, self.sequence, 0)
+        given = (yaw % math.tau, var, 0.0, 0.0, self.now - age, self.sequence, 0)
         published.offer_aiding(self.state, self.config, *given)
 
     def learn(self) -> None:
@@ -137,7 +137,7 @@ def test_an_aiding_is_moved_from_its_time_of_validity(age: float) -> None:
         for _ in range(10):
             node.cycle((0.0, 0.0, SPIN))
             yaw += SPIN * PERIOD
-            node.aid(yaw - SPIN * age, SPIN, told)
+            node.aid(yaw - SPIN * age, told)
         node.cycle()
         errors.append(math.remainder(node.yaw - yaw, math.tau))
     assert errors[0] == pytest.approx(0.0, abs=0.01 * DEG)
@@ -212,7 +212,7 @@ def test_whatever_comes_a_cycle_ends_with_numbers_or_says_so(
         for _ in range(cycles):
             wx, wy, wz = 0.05 * random.standard_normal(3) + np.array([0.0, 0.0, spin])
             status = node.cycle((float(wx), float(wy), float(wz)), dt)
-            node.aid(float(random.uniform(0.0, math.tau)), spin, age)
+            node.aid(float(random.uniform(0.0, math.tau)), age)
             P = node.state["now_P"]
             sound = np.isfinite(P).all() and (np.diag(P) >= 0.0).all()
             assert sound or Status.FILTER_FAULT in status
@@ -264,7 +264,7 @@ def test_six_states_are_estimated_and_the_other_two_stay_as_they_began() -> None
     node.learn()
     for k in range(60):
         node.cycle((0.0, 0.0, SPIN))
-        node.aid(1.0 + (k + 1) * SPIN * PERIOD, SPIN)
+        node.aid(1.0 + (k + 1) * SPIN * PERIOD)
     prior = new_state(default_config())[0]["P"]
     P = node.state["P"]
     for k in (int(Err.SCALE), int(Err.STAMP)):
