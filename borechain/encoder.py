@@ -12,9 +12,13 @@ from borechain.options import place_options
 
 @click.command()
 @click.option("--counter", help="The node's own counter: counter:FILE or replay:FILE.")
+@click.option("--torque-nm", type=float, default=0.0, help="Drilling torque, until a sensor tells it; 0: no torsion.")
+@click.option("--trapped-fraction", type=float, default=0.01, show_default=True, help="Of it after a stop, 1 sigma.")
 @place_options
 @plain_faults
-def encoder(counter: str | None, rig_name: str, endpoint: str, folder: Path) -> None:
+def encoder(
+    counter: str | None, torque_nm: float, trapped_fraction: float, rig_name: str, endpoint: str, folder: Path
+) -> None:
     """Run the encoder node until it is stopped.
 
     \b
@@ -22,6 +26,8 @@ def encoder(counter: str | None, rig_name: str, endpoint: str, folder: Path) -> 
       borechain encoder --folder state/encoder
     """
     from borechain.processes import Place, run_encoder
+    from node.firmware.torque import TorqueSettings
     from node.process.drivers.choice import encoder_source
 
-    run_encoder(Place(rig_name, endpoint, folder), encoder_source(counter) if counter else None)
+    torque = TorqueSettings(torque_nm, trapped_fraction)
+    run_encoder(Place(rig_name, endpoint, folder), encoder_source(counter) if counter else None, torque)

@@ -22,6 +22,11 @@ SCHEMES = ("forward", "estimate", "intersection")
 @click.option("--mount-std-deg", type=float, default=0.05, show_default=True, help="Error of the IMU's mount, 1 sigma.")
 @click.option("--kernel", type=click.Choice(["float64", "fixed", "published"]), default="float64", show_default=True)
 @click.option("--scheme", type=click.Choice(SCHEMES), default="forward", show_default=True)
+@click.option(
+    "--stiffness-nm", type=float, default=math.inf, help="Torque that twists the tube by 1 rad; rigid if absent."
+)
+@click.option("--torsion", type=click.Choice(["gate", "variance"]), default="gate", show_default=True)
+@click.option("--joints", type=click.Choice(["marks", "solved", "both"]), default="marks", show_default=True)
 @click.option("--imu", help="The node's own sensor: replay:FILE, mpu6500:BUS or mpu6500:BUS:ADDRESS.")
 @key_option
 @place_options
@@ -34,6 +39,9 @@ def node(
     mount_std_deg: float,
     kernel: Literal["float64", "fixed", "published"],
     scheme: str,
+    stiffness_nm: float,
+    torsion: Literal["gate", "variance"],
+    joints: Literal["marks", "solved", "both"],
     imu: str | None,
     key_file: Path | None,
     rig_name: str,
@@ -59,5 +67,8 @@ def node(
         mount_std=math.radians(mount_std_deg),
         scheme=Scheme[scheme.upper()],
         kernel=kernel,
+        stiffness=stiffness_nm,
+        torsion=torsion,
+        joints=joints,
     )
     run_node(Place(rig_name, endpoint, folder, key_file), settings, imu_source(imu) if imu else None)

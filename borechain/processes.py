@@ -19,6 +19,7 @@ import setproctitle
 from groundstation.errors import GroundError
 from node.errors import NodeError
 from node.firmware.settings import TubeSettings
+from node.firmware.torque import TorqueSettings
 from node.process.drivers.source import EncoderSource, ImuSource
 from node.process.encoder_process import EncoderProcess
 from node.process.tube_process import TubeProcess
@@ -54,9 +55,9 @@ def run_node(place: Place, settings: TubeSettings, imu: ImuSource | None = None)
     run_on_bench(f"node {settings.tube}", place, settings.tube, build)
 
 
-def run_encoder(place: Place, source: EncoderSource | None = None) -> None:
-    """Encoder node on the drive head; ``source`` is its own counter."""
-    run_on_bench("encoder", place, ENCODER, lambda: EncoderProcess(place.folder, source))
+def run_encoder(place: Place, source: EncoderSource | None = None, torque: TorqueSettings | None = None) -> None:
+    """Encoder node on the drive head; ``source`` is its own counter, ``torque`` that of the drive."""
+    run_on_bench("encoder", place, ENCODER, lambda: EncoderProcess(place.folder, source, torque))
 
 
 def run_on_bench(name: str, place: Place, address: int, build: Callable[[], Stepped]) -> None:

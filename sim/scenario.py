@@ -16,6 +16,7 @@ from sim.faults import KillNode, parse_fault
 from telemetry.messages import MAX_TUBE
 
 MAX_RATE_DPS = 57.0 * 6.0  # 57 rev/min: half a turn a cycle is where one sample a cycle aliases
+SURVEY_AFTER = 22.0  # s at rest, for a survey
 RECORD_MARGIN = 8.0  # s at an attitude beside its record: the tubes settle and the order travels
 Positive = Annotated[float, Field(gt=0.0)]
 NotNegative = Annotated[float, Field(ge=0.0)]
@@ -69,6 +70,24 @@ class JointSection(Section):
 
     reading_std_deg: NotNegative = Field(0.05, description="of the scribe marks at a joint")
     mount_std_deg: NotNegative = Field(0.05, description="of the IMU against the tube's marks, about the axis")
+
+
+class TorsionSection(Section):
+    """Twist of the string by the drilling torque; without this table the string is rigid."""
+
+    outer_diameter_m: Positive = Field(0.060, le=1.0, description="of every tube")
+    inner_diameter_m: NotNegative = Field(0.050, description="smaller than the outer one")
+    shear_modulus_gpa: float = Field(79.3, ge=1.0, le=1000.0, description="of steel")
+    bit_torque_nm: NotNegative = Field(500.0, le=1e5, description="while drilling, felt by every tube")
+    wall_friction_nm_per_m: NotNegative = Field(0.0, le=1e4, description="of each metre of string in the hole")
+    wind_s: Positive = Field(2.0, le=60.0, description="from the drive's start until the torque is full")
+    release_after_s: float = Field(0.0, ge=0.0, le=600.0, description="torque held after the drive's stop")
+    release_s: Positive = Field(3.0, le=60.0, description="then, until it is gone")
+    trapped_fraction: float = Field(
+        0.01, ge=0.0, le=0.5, description="of the twist, kept by friction after a stop; 1 sigma, drawn at each"
+    )
+    stick_slip: float = Field(0.0, ge=0.0, le=1.0, description="swing of the torque while drilling, of its full size")
+    stick_slip_hz: float = Field(0.2, gt=0.0, le=0.9, description="of the swing")
 
 
 class GyroSection(Section):
@@ -136,6 +155,12 @@ class NodeSection(Section):
     kernel: Literal["float64", "fixed", "published"] = Field(
         "float64", description="the loop in floats, in integers, or in the published feed-forward form"
     )
+    torsion: Literal["gate", "variance", "ignore"] = Field(
+        "gate", description="aiding under torque: not used, or with a variance; ignore: the rig knows no torque"
+    )
+    joints: Literal["marks", "solved", "both"] = Field(
+        "marks", description="after a tube was added: scribe marks, the saved yaw, or both by inverse variance"
+    )
 
 
 class DesignSection(Section):
@@ -179,6 +204,7 @@ class ScenarioFile(Section):
     schedule: ScheduleSection = ScheduleSection()
     rotation: RotationSection = RotationSection()
     joints: JointSection = JointSection()
+    torsion: TorsionSection | None = None
     gyroscope: GyroSection = GyroSection()
     accelerometer: AccelerometerSection = AccelerometerSection()
     encoder: EncoderSection = EncoderSection()
@@ -213,6 +239,7 @@ def load_scenario(path: Path, faults: tuple[str, ...] = ()) -> Scenario:
     """
     file = _parse(path)
     _check_motion(path, file)
+    _check_torsion(path, file)
     _check_calibration(path, file.calibration)
     hole = _hole(path, file.path)
     needed = file.rig.tubes * file.rig.tube_length_m
@@ -239,6 +266,28 @@ def _check_motion(path: Path, file: ScenarioFile) -> None:
         raise ScenarioError(
             f"{path}: schedule.joint_s: expected less than add_s = {schedule.add_s:g} s, "
             f"got {schedule.joint_s:g}; close the joint before drilling"
+        )
+
+
+def _check_torsion(path: Path, file: ScenarioFile) -> None:
+    section, schedule = file.torsion, file.schedule
+    if file.node.joints != "marks" and file.node.scheme != "forward":
+        raise ScenarioError(
+            f"{path}: node.joints: expected marks with the scheme {file.node.scheme}, "
+            f"got {file.node.joints}; only forward can solve them"
+        )
+    if section is None:
+        return
+    if section.inner_diameter_m >= section.outer_diameter_m:
+        raise ScenarioError(
+            f"{path}: torsion.inner_diameter_m: expected less than outer_diameter_m = "
+            f"{section.outer_diameter_m:g} m, got {section.inner_diameter_m:g}"
+        )
+    needed = section.release_after_s + section.release_s + SURVEY_AFTER
+    if schedule.stop_s < needed:
+        raise ScenarioError(
+            f"{path}: schedule.stop_s: expected at least {needed:g} s, the release of the torque and "
+            f"{SURVEY_AFTER:g} s for a survey, got {schedule.stop_s:g}; stop longer"
         )
 
 

@@ -1,10 +1,13 @@
 """What a perfect sensor in a tube would read: body rates and specific force, derived from hole and motion.
 
 The attitude of a tube is ``R_ned_from_body = R_min(tangent) R_z(psi)`` with psi the drive head's angle plus the joint
-angles above; its body rate is ``psi' z - (1 - cos I) A' z + R^T (t x t')`` and its specific force ``R^T (a - g)``.
+angles above, less the twist of the string; its body rate is ``psi' z - (1 - cos I) A' z + R^T (t x t')`` and its
+specific force ``R^T (a - g)``.
 """
 
 from __future__ import annotations
+
+from collections.abc import Callable
 
 import numpy as np
 import numpy.typing as npt
@@ -13,6 +16,7 @@ from sim.borehole import Borehole
 from sim.motion import Motion
 
 Array = npt.NDArray[np.float64]
+Twist = Callable[[Array], tuple[Array, Array, Array]]
 GAUSS_X, GAUSS_W = np.polynomial.legendre.leggauss(8)
 
 
@@ -38,10 +42,18 @@ class TubeTruth:
     joint_angle : rad, constant part of psi in the IMU's frame
     radius : m, IMU off the axis along its x
     gravity : m/s^2
+    twist : rad by which the tube lags the drive head at rig times (n,), with two derivatives; a rigid string has none
     """
 
     def __init__(
-        self, hole: Borehole, motion: Motion, below: float, joint_angle: float, radius: float, gravity: float
+        self,
+        hole: Borehole,
+        motion: Motion,
+        below: float,
+        joint_angle: float,
+        radius: float,
+        gravity: float,
+        twist: Twist | None = None,
     ) -> None:
         self._hole = hole
         self._motion = motion
@@ -49,10 +61,19 @@ class TubeTruth:
         self._joint_angle = joint_angle
         self._radius = radius
         self._gravity = gravity
+        self._twist = twist
+
+    def turned(self, t: Array) -> tuple[Array, Array, Array]:
+        """Angle (rad, unwrapped, without the joints), rate and acceleration of the tube about its axis, (n,) each."""
+        drive = self._motion.drive(t)
+        if self._twist is None:
+            return drive
+        lag = self._twist(t)
+        return drive[0] - lag[0], drive[1] - lag[1], drive[2] - lag[2]
 
     def yaw(self, t: Array) -> Array:
         """Psi of the IMU's frame (rad, unwrapped) at rig times (n,)."""
-        return np.asarray(self._motion.drive(t)[0] + self._joint_angle)
+        return np.asarray(self.turned(t)[0] + self._joint_angle)
 
     def attitude(self, t: Array) -> Array:
         """R_ned_from_body (n, 3, 3)."""
@@ -62,7 +83,7 @@ class TubeTruth:
     def rate(self, t: Array) -> Array:
         """Body rate (n, 3, rad/s)."""
         tangent, dtangent, _ = self._along(t)
-        turning = self._motion.drive(t)[1]
+        turning = self.turned(t)[1]
         across = np.cross(tangent, dtangent)
         body: Array = np.einsum("nji,nj->ni", self.attitude(t), across)
         twist = (tangent[:, 0] * dtangent[:, 1] - tangent[:, 1] * dtangent[:, 0]) / (1.0 + tangent[:, 2])
@@ -74,7 +95,7 @@ class TubeTruth:
         acceleration = self._along(t)[2]
         acceleration[:, 2] -= self._gravity
         body: Array = np.einsum("nji,nj->ni", self.attitude(t), acceleration)
-        _, rate, angular = self._motion.drive(t)
+        _, rate, angular = self.turned(t)
         body[:, 0] -= self._radius * rate**2
         body[:, 1] += self._radius * angular
         return body
@@ -86,8 +107,8 @@ class TubeTruth:
         weights = 0.5 * GAUSS_W
         rate = np.einsum("ngk,g->nk", self.rate(nodes).reshape(len(ends), -1, 3), weights)
         force = np.einsum("ngk,g->nk", self.force(nodes).reshape(len(ends), -1, 3), weights)
-        spin = self._motion.drive(nodes)[1].reshape(len(ends), -1) @ weights
-        increment = self._motion.drive(ends)[0] - self._motion.drive(ends - period)[0]
+        spin = self.turned(nodes)[1].reshape(len(ends), -1) @ weights
+        increment = self.turned(ends)[0] - self.turned(ends - period)[0]
         rate[:, 2] += increment / period - spin
         return rate, force
 

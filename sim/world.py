@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import math
-from functools import cached_property
+from functools import cached_property, partial
 from itertools import pairwise
 
 import numpy as np
 import numpy.typing as npt
 
 from node.firmware.settings import Joint, TubeSettings
+from node.firmware.torque import TorqueSettings
 from node.kernels.layout import PERIOD, Scheme
 from sim.encoder import Disc
 from sim.errors import ScenarioError
@@ -18,11 +19,13 @@ from sim.imu_errors import Drift, ImuErrors
 from sim.motion import Motion, Phase, Trapezoid
 from sim.rack import Rack
 from sim.scenario import Scenario
+from sim.torsion import StringTorsion, stiffness
 from sim.truth import TubeTruth
 from telemetry.messages import BASE, ENCODER
 
 Array = npt.NDArray[np.float64]
 JOINTS, MOUNTS, CLOCKS, GYRO, ACCELEROMETER, DRIVE, DRIFT, RACK, DISC = range(9)
+TORSION = 16  # apart from the rest, which may grow
 
 
 def wrap(angle: float) -> float:
@@ -61,6 +64,7 @@ class World:
         self.motion = Motion(
             drilling, s.add_s, s.joint_s, s.stop_s, s.finish_s, turn, scenario.tubes, scenario.tube_length, first_angle
         )
+        self.torsion = self._string_torsion()
         self.phases: tuple[Phase, ...] = self.motion.phases
         self.end = self.motion.end
         self.faults: tuple[KillNode, ...] = scenario.faults
@@ -79,10 +83,17 @@ class World:
             self._samples[tube] = self._all_samples(tube).tolist()
         return self._samples[tube][cycle]
 
-    def encoder_sample(self, t: float) -> tuple[int, float, int]:
-        """Count, rig time of its last edge, and 1 (the string turns one way, so every edge rises)."""
+    def encoder_sample(self, t: float) -> tuple[int, float, int] | tuple[int, float, int, float]:
+        """Count, rig time of its last edge, 1 (the string turns one way, so every edge rises) and the torque, N m.
+
+        A rig of a rigid string, or one that is to ignore its torsion, has no torque sensor.
+        """
         count, edge_at = self._disc.sample(t)
-        return count, edge_at if t > self.motion.begin else self.begin, 1
+        if t <= self.motion.begin:
+            edge_at = self.begin
+        if self.torsion is None or self.scenario.file.node.torsion == "ignore":
+            return count, edge_at, 1
+        return count, edge_at, 1, float(self.torsion.torque(np.array([t]))[0])
 
     def bit_depth(self, t: float) -> float:
         """Measured depth of the bit, m."""
@@ -110,18 +121,32 @@ class World:
             mount_std=math.radians(self.scenario.file.joints.mount_std_deg),
             scheme=Scheme[self.scenario.file.node.scheme.upper()],
             kernel=self.scenario.file.node.kernel,
+            stiffness=self._stiffness,
+            torsion="variance" if self.scenario.file.node.torsion == "variance" else "gate",
+            joints=self.scenario.file.node.joints,
         )
+
+    def torque_settings(self) -> TorqueSettings:
+        """What the crew enters at the encoder node; the drilling torque is what an encoder node starts from."""
+        section = self.scenario.file.torsion
+        if section is None or self.scenario.file.node.torsion == "ignore":
+            return TorqueSettings()
+        return TorqueSettings(section.bit_torque_nm, section.trapped_fraction)
 
     def yaw_truth(self, tube: int, t: float) -> float:
         """True yaw (rad, unwrapped) of the IMU's frame of a tube that is part of the string."""
         return float(self.truth(tube).yaw(np.array([t]))[0])
 
     def systematic_error(self, tube: int, t: float) -> float:
-        """Error of a yaw known only through the marks: estimate - truth = random error + this (rad)."""
+        """Error of a yaw known only through the marks: estimate - truth = random error + this (rad).
+
+        Where joints are solved it is the mark of the time when the tube was on top, and what each solution left.
+        """
         drive_error, lower_error = self._joint_errors
-        top = max(self.motion.top(t), tube)
+        top = max(self.motion.top(t), tube) if self.scenario.file.node.joints == "marks" else tube
         above = sum(lower_error[k] for k in range(tube + 1, top + 1))
-        return drive_error[top] + above - self._mounts[tube]
+        rigid = drive_error[top] + above - self._mounts[tube]
+        return rigid if self.torsion is None else rigid + float(self.torsion.twist(tube, np.array([t]))[0][0])
 
     def truth_station(self, md: float) -> dict[str, float]:
         """Direction and position of the hole at one depth, degrees and metres."""
@@ -143,12 +168,26 @@ class World:
         below = (tube - 1) * self.scenario.tube_length
         # joints below the head are rigid: a tube keeps for ever the angle it had while it was the top one
         joint = drive[tube] + self._mounts[tube]
-        return TubeTruth(self.scenario.hole, self.motion, below, joint, a.radius_m, a.gravity_mps2)
+        twist = None if self.torsion is None else partial(self.torsion.twist, tube)
+        return TubeTruth(self.scenario.hole, self.motion, below, joint, a.radius_m, a.gravity_mps2, twist)
 
     def drift(self, tube: int) -> Drift | None:
         """What became of a tube's sensors since their calibration."""
         section = self.scenario.file.drift
         return None if section is None else Drift.draw(section, self._random(DRIFT, tube))
+
+    @property
+    def _stiffness(self) -> float:
+        """Of a tube as the crew knows it, N m/rad."""
+        section = self.scenario.file.torsion
+        return math.inf if section is None else stiffness(section, self.scenario.tube_length)
+
+    def _string_torsion(self) -> StringTorsion | None:
+        section, tubes = self.scenario.file.torsion, self.scenario.tubes
+        if section is None:
+            return None
+        trapped = section.trapped_fraction * np.abs(self._random(TORSION, 0).standard_normal(tubes))
+        return StringTorsion(section, self.motion, self.scenario.tube_length, np.arange(1.0, tubes + 1.0), trapped)
 
     def _all_samples(self, tube: int) -> Array:
         count = math.floor((self.end - self.begin) / PERIOD + 1e-9)

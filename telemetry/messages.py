@@ -11,7 +11,7 @@ import enum
 from dataclasses import dataclass, field
 from typing import TypeAlias
 
-SCHEMA_VERSION = 1
+SCHEMA_VERSION = 2  # the newest; a payload carries the earliest that can say it
 ENCODER = 0
 MAX_TUBE = 250
 BASE = 251
@@ -86,7 +86,8 @@ class Aiding:
     """The yaw reference on its way down. ``yaw`` is the measurement, passed on unchanged by the scheme ``forward``.
 
     The yaw of the receiver is ``yaw + offset`` (make-up angles of the joints passed so far), with the independent
-    variances ``yaw_var`` (random) and ``systematic_var`` (constant errors of joints; never averages away).
+    variances ``yaw_var`` (random), ``systematic_var`` (constant errors of joints; never averages away) and
+    ``torsion_var`` (constant while the torque is). The last three fields came with schema version 2.
     """
 
     yaw: float  # rad, [0, 2 pi)
@@ -97,6 +98,9 @@ class Aiding:
     valid_at: float  # s, rig time
     sequence: int  # number of the measurement: the same number is the same measurement, repeated
     hops: int  # of the sender, 0 is the encoder
+    torque: float = 0.0  # N m >= 0, in the string: the drive's, or once released what may be trapped, 1 sigma
+    torsion_var: float = 0.0  # rad^2, of the twist by it in the tubes passed, beside systematic_var
+    under_torque: bool = False  # the drive holds the string twisted
 
 
 @dataclass(frozen=True, slots=True)

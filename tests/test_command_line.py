@@ -32,6 +32,9 @@ def test_every_command_has_help_with_an_example_on_a_line_of_its_own(name: str) 
         (("rig", "x.toml", "--speed", "0"), "expected max or a factor"),
         (("rig", "x.toml", "--seed", "-1"), "-1"),
         (("node", "--tube", "0"), "expected 1..250, got 0"),
+        (("node", "--tube", "1", "--stiffness-nm", "-1"), "stiffness: expected more than 0 N m/rad, got -1.0"),
+        (("node", "--tube", "1", "--joints", "both", "--scheme", "estimate"), "joints: expected marks with a scheme"),
+        (("encoder", "--torque-nm", "-5"), "torque.drilling: expected 0..1e+06 N m, got -5.0"),
         (("query", "borechain/#bad", "--endpoint", "nonsense"), "nonsense"),
     ],
 )

@@ -173,7 +173,7 @@ static void move_pending(State *state, int64_t to, int64_t from)
 static int64_t take_pending(State *state, const Config *config, int64_t cycle, double until)
 {
     int64_t status = 0;
-    while (state->pending > 0 && state->pending_at[0] <= until) {
+    while (state->pending > 0 && state->pending_at[0] <= until + CLOCK_SLACK) {
         double at = state->pending_at[0] + state->stamp, yaw = state->pending_yaw[0], var = state->pending_var[0];
         double held = smaller(at, until);
         if (held >= state->epoch) {

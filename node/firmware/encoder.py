@@ -8,8 +8,9 @@ under one sequence number and never averaged (thesis 3.6 takes it as white).
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
+from node.firmware.torque import TorqueSettings, TorqueWatch
 from telemetry.messages import Aiding
 
 COUNTS_PER_TURN = 4096  # 1024 lines, decoded in quadrature
@@ -25,23 +26,36 @@ class EncoderSample:
     count: int  # since the counter was started
     edge_at: float  # s, rig time of the last change of the count
     rising: bool  # direction of that change
+    torque: float | None = None  # N m, of the drive, where it has a sensor
 
 
 class EncoderNode:
-    """Makes one aiding a cycle from the counter."""
+    """Makes one aiding a cycle from the counter and the drive's torque."""
 
-    def __init__(self, first_sequence: int = 0) -> None:
+    def __init__(self, first_sequence: int = 0, torque: TorqueSettings | None = None) -> None:
         self.sequence = first_sequence
+        self._torque = TorqueWatch(torque or TorqueSettings())
+        self._holding = False
         self._edge_at: float | None = None
         self._edge_angle = 0.0
         self._resting = False
 
     def on_cycle(self, sample: EncoderSample, now: float) -> Aiding:
-        """Measure at ``now`` (s, rig time): the last edge while turning, the middle of the count at rest."""
-        if self._edge_at is not None and sample.edge_at > self._edge_at:
-            return self._turning(sample)
-        self._remember(sample)
-        return self._at_rest(sample, now)
+        """Measure at ``now`` (s, rig time): the last edge while turning, the middle of the count at rest.
+
+        A drive that grips or releases the string makes a new measurement of a rest: what it is worth has changed.
+        """
+        turning = self._edge_at is not None and sample.edge_at > self._edge_at
+        torque = self._torque.on_cycle(sample.torque, turning=turning)
+        if torque.holding != self._holding:
+            self._holding = torque.holding
+            self._resting = False
+        if turning:
+            measured = self._turning(sample)
+        else:
+            self._remember(sample)
+            measured = self._at_rest(sample, now)
+        return replace(measured, torque=torque.size, under_torque=torque.holding)
 
     def _turning(self, sample: EncoderSample) -> Aiding:
         before_at, before_angle = self._edge_at, self._edge_angle

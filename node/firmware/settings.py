@@ -8,11 +8,13 @@ from typing import Final, Literal, TypeAlias, get_args
 
 from node.errors import ConfigurationError
 from node.firmware.sensor_faults import USUAL_LIMITS, SensorLimits
-from node.kernels.layout import Scheme
+from node.kernels.layout import DEG, Scheme
 from telemetry.messages import MAX_TUBE
 
 Kernel: TypeAlias = Literal["float64", "fixed", "published"]
 KERNELS: Final = get_args(Kernel)
+TorsionRule: TypeAlias = Literal["gate", "variance"]
+JointRule: TypeAlias = Literal["marks", "solved", "both"]
 
 
 @dataclass(frozen=True, slots=True)
@@ -36,6 +38,10 @@ class TubeSettings:
     aiding_old_after: float = 3.0  # s
     kernel: Kernel = "float64"  # of the loop; fixed is for a controller without floats, published for experiments
     limits: SensorLimits = USUAL_LIMITS  # of its IMU
+    stiffness: float = math.inf  # N m/rad, G J / L of this tube; infinite: rigid
+    torsion: TorsionRule = "gate"  # aiding under torque: not used, or used with the variance of the twist
+    joints: JointRule = "marks"  # whence the angle of a joint made up above comes
+    unseen_std: float = 0.01 * DEG  # rad, what may turn unseen while a joint is made up
 
     def __post_init__(self) -> None:
         """Refuse what cannot be.
@@ -52,10 +58,19 @@ class TubeSettings:
         require(self.kernel in KERNELS, f"kernel: expected one of {', '.join(KERNELS)}, got {self.kernel}")
         alone = self.kernel != "float64" and self.scheme is Scheme.INTERSECTION
         require(not alone, f"scheme: expected forward or estimate with the kernel {self.kernel}, got intersection")
+        require(self.stiffness > 0.0, f"stiffness: expected more than 0 N m/rad, got {self.stiffness}")
+        for name, rule, rules in (
+            ("torsion", self.torsion, get_args(TorsionRule)),
+            ("joints", self.joints, get_args(JointRule)),
+        ):
+            require(rule in rules, f"{name}: expected one of {', '.join(rules)}, got {rule}")
+        solvable = self.joints == "marks" or self.scheme is Scheme.FORWARD
+        require(solvable, f"joints: expected marks with a scheme other than forward, got {self.joints}")
         for name, std in (
             ("drive_joint.std", self.drive_joint.std),
             ("lower_joint.std", self.lower_joint.std),
             ("mount_std", self.mount_std),
+            ("unseen_std", self.unseen_std),
         ):
             require(math.isfinite(std) and std >= 0.0, f"{name}: expected a standard deviation in rad, got {std}")
         for name, angle in (

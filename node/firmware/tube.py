@@ -9,15 +9,17 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from node.firmware.coarse_level import level_coarsely
+from node.firmware.make_up import MakeUp
 from node.firmware.parameters import forget_bias, forget_tilt, record_of, recorrect
 from node.firmware.sensor_guard import SensorGuard
 from node.firmware.settings import Kernel, TubeSettings
 from node.firmware.static_record import StaticRecorder
+from node.firmware.torsion import TubeTorsion
 from node.kernels.angles import from_binary, wrap
 from node.kernels.calibration import USUAL, calibrate
 from node.kernels.cycle import run_cycle
 from node.kernels.error_model import isolate
-from node.kernels.layout import DEG, Array, Err, Scheme, Status, new_state
+from node.kernels.layout import CLOCK_SLACK, DEG, Array, Err, Scheme, Status, new_state
 from node.kernels.modes import STATIC_BIAS
 from node.kernels.relay import offer_aiding
 from telemetry.messages import (
@@ -35,7 +37,7 @@ from telemetry.messages import (
 from telemetry.parameters import SHORT_HASH, ParameterBlock
 
 VAR_FLOOR = (0.001 * DEG) ** 2
-LEAST_STAMP, LARGEST_STAMP = 1e-4, 0.05  # s, prior of the time-stamp state, whatever the clock says
+LEAST_STAMP, LARGEST_STAMP = 1e-4, CLOCK_SLACK  # s, prior of the time-stamp state, whatever the clock says
 STILL_CYCLES = 4  # after which a node takes itself for standing
 LARGEST_OFFSET = 6.0 * DEG  # rad/s, zero-rate offset of a gyroscope never calibrated; the slow alignment turn is faster
 EVENT_OF_STATUS: tuple[tuple[Status, str, Severity], ...] = (
@@ -128,6 +130,8 @@ class Tube:
         self._noticed = Status.NONE  # between cycles
         self._recorder = StaticRecorder()
         self._guard = SensorGuard(state, config, settings.limits)
+        self._torsion = TubeTorsion(settings, state)
+        self._make_up = MakeUp(settings, state)
         self._slow_cycles = 0  # in a row, not faster than the offset of a gyroscope never calibrated
         self._temperature = USUAL
         self._stamp_walk, self._stamp_hops = float(self.config["stamp_walk"]), 0  # of one joint
@@ -143,14 +147,16 @@ class Tube:
         joint = self.settings.drive_joint if aiding.hops == 0 else None
         offset = wrap(aiding.offset + (joint.angle if joint else 0.0))
         systematic_var = aiding.systematic_var + (joint.std**2 if joint else 0.0)
-        if self._guard.takes(aiding, offset, valid_local):
+        twist_var = self._torsion.reaches(aiding)
+        offset, systematic_var = self._make_up.follow(aiding, offset, systematic_var, self._torsion.var, twist_var)
+        if self._guard.takes(aiding, offset, valid_local) and self._torsion.takes(aiding, valid_local):
             self._noticed |= Status(
                 self._offer_aiding(
                     self.state,
                     self.config,
                     aiding.yaw,
                     aiding.yaw_var,
-                    systematic_var,
+                    systematic_var + self._torsion.var,
                     offset,
                     valid_local,
                     aiding.sequence,
@@ -165,6 +171,7 @@ class Tube:
             offset=wrap(offset + below.angle),
             systematic_var=systematic_var + below.std**2,
             hops=aiding.hops + 1,
+            torsion_var=twist_var,
         )
 
     def on_cycle(
@@ -185,16 +192,14 @@ class Tube:
         self._slow_cycles = self._slow_cycles + 1 if max(map(abs, self._rate)) < LARGEST_OFFSET else 0
         if self._cycles and reading.start - self.state["now"] > 0.5 * (reading.end - reading.start):
             self._overruns += 1
-        joined = 1 if around.joined else 0
-        status = self._noticed | Status(
-            self._run_cycle(self.state, self.config, self._rate, self._force, reading.start, reading.end, joined)
-        )
+        status = self._noticed | self._run(reading, 1 if around.joined else 0)
         self._noticed = Status.NONE
         self._cycles += 1
         if Status.FILTER_FAULT in status:
             self._start_over()
         self._guard.after(status, reading.end)
         yield from self._sensor_events(around)
+        yield from self._string_events(around)
         yield from self._events(status, around)
         yield from self._record(reading, around)
         if Status.SURVEY_READY in status:
@@ -254,7 +259,7 @@ class Tube:
 
     @property
     def systematic_var(self) -> float:
-        """Variance of the constant errors of every joint above and of this node's mount, rad^2."""
+        """Variance of the constant errors of every joint above, of the twist and of this node's mount, rad^2."""
         return float(self.state["systematic_var"]) + self.settings.mount_std**2
 
     def flags(self, around: Surroundings, now: float) -> NodeFlag:
@@ -277,6 +282,17 @@ class Tube:
             flags |= NodeFlag.BIAS_UNKNOWN
         return flags
 
+    def _run(self, reading: ImuReading, joined: int) -> Status:
+        """One cycle of the loop; under torque it takes no survey, and that of this stop stays due."""
+        state, due = self.state, not self.state["surveyed"]
+        waits = due and self._torsion.keeps_survey(reading.end)
+        if waits:
+            state["surveyed"] = 1
+        status = self._run_cycle(state, self.config, self._rate, self._force, reading.start, reading.end, joined)
+        if waits:
+            state["surveyed"] = 0
+        return Status(status)
+
     def _events(self, status: Status, around: Surroundings) -> Iterator[Event]:
         for bit, code, severity in EVENT_OF_STATUS if status & TOLD else ():
             if bit in status:
@@ -289,6 +305,10 @@ class Tube:
 
     def _sensor_events(self, around: Surroundings) -> Iterator[Event]:
         for code, severity, arguments in self._guard.take_said():
+            yield self._event(code, severity, around.rig_now, arguments)
+
+    def _string_events(self, around: Surroundings) -> Iterator[Event]:
+        for code, severity, arguments in (*self._make_up.take_said(), *self._torsion.take_said()):
             yield self._event(code, severity, around.rig_now, arguments)
 
     def _record(self, reading: ImuReading, around: Surroundings) -> Iterator[StaticRecord | Event]:
@@ -351,7 +371,7 @@ class Tube:
 
     def _estimate(self, around: Surroundings) -> Aiding:
         below = self.settings.lower_joint
-        return Aiding(
+        own = Aiding(
             yaw=self.yaw,
             yaw_var=self.yaw_var,
             systematic_var=float(self.state["systematic_var"]) + below.std**2,
@@ -361,6 +381,7 @@ class Tube:
             sequence=int(self.state["cycles"]),
             hops=max(around.hops, 1),
         )
+        return self._torsion.of_estimate(own)
 
     def _report(self, end: float, around: Surroundings) -> NodeState:
         state = self.state

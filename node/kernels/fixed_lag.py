@@ -12,7 +12,7 @@ from typing import Any
 from node.kernels.angles import advance_binary, from_binary, to_binary, wrap
 from node.kernels.error_model import isolate, propagate
 from node.kernels.jit import kernel
-from node.kernels.layout import INVERTED, RING, STATES, UNKNOWN_YAW_VAR, Array, Err, Status
+from node.kernels.layout import CLOCK_SLACK, INVERTED, RING, STATES, UNKNOWN_YAW_VAR, Array, Err, Status
 from node.kernels.strapdown import rotate_down, yaw_rate
 from node.kernels.update import clear, feed_back, innovation_var, intersect, joseph, level, zero_rate
 
@@ -187,10 +187,10 @@ def aid(state: Any, config: Any, yaw: float, r_var: float, rate: float, at: floa
 def take_pending(state: Any, config: Any, cycle: int, until: float) -> int:
     """Pass every waiting measurement valid up to ``until`` (s), oldest first; returns ``Status`` bits.
 
-    One that the time-stamp offset moves beyond ``until`` is not kept waiting: it is brought back by the spin.
+    One that the error of the clock puts just beyond ``until`` is not kept waiting: it is brought back by the spin.
     """
     status = 0
-    while state.pending > 0 and state.pending_at[0] <= until:
+    while state.pending > 0 and state.pending_at[0] <= until + CLOCK_SLACK:
         at = state.pending_at[0] + state.stamp
         yaw, var = state.pending_yaw[0], state.pending_var[0]
         held = min(at, until)

@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import Any
 
 from node.firmware.encoder import EncoderNode, EncoderSample
+from node.firmware.torque import TorqueSettings
 from node.process.counter import BootCounter
 from node.process.drivers.source import EncoderSource, SafeEncoder
 from telemetry.application.driven import Driven
@@ -21,6 +22,7 @@ class EncoderProcess(Driven):
     ----------
     folder : where its starts are counted
     source : the node's own counter; without one a cycle brings its sample
+    torque : what the crew knows of the drive's torque; the default is a rigid string
 
     Raises
     ------
@@ -28,7 +30,7 @@ class EncoderProcess(Driven):
         When the counter is absent at the start.
     """
 
-    def __init__(self, folder: Path, source: EncoderSource | None = None) -> None:
+    def __init__(self, folder: Path, source: EncoderSource | None = None, torque: TorqueSettings | None = None) -> None:
         if source is not None:
             source.start()
         self._source = SafeEncoder(source, self._say) if source is not None else None
@@ -36,7 +38,7 @@ class EncoderProcess(Driven):
         counter = BootCounter(folder)
         self.station = Station(ENCODER, frozenset(Side), boot_count=counter.boots, is_clock_root=True)
         # sequence numbers of a later boot are all larger, so a tube never takes a new measurement for an old one
-        self.encoder = EncoderNode(first_sequence=counter.boots << 32)
+        self.encoder = EncoderNode(counter.boots << 32, torque)
 
     def on_frame(self, side: Side, frame: bytes, now: float) -> None:
         """A frame arrived at one end; the encoder obeys no commands of its own."""
@@ -46,7 +48,10 @@ class EncoderProcess(Driven):
                 self.station.reply(refusal, now)
 
     def on_cycle(self, data: Any, now: float) -> None:
-        """The counter was read: ``data`` is start (s), count, time of its last edge (s), 1 if it rose."""
+        """The counter was read: ``data`` is start (s), count, time of its last edge (s), 1 if it rose, torque (N m).
+
+        A drive without a torque sensor leaves the last one out.
+        """
         self._now = now
         sample = self._source.read(now) if self._source is not None else sample_of(data)
         if sample is not None:
@@ -61,8 +66,8 @@ class EncoderProcess(Driven):
 def sample_of(data: Any) -> EncoderSample | None:
     """Sample of a cycle; None for what is none."""
     try:
-        _, count, edge_at, rising = data
-        sample = EncoderSample(int(count), float(edge_at), bool(rising))
+        _, count, edge_at, rising, *torque = data
+        sample = EncoderSample(int(count), float(edge_at), bool(rising), *map(float, torque))
     except (TypeError, ValueError, OverflowError):
         return None
     return sample if math.isfinite(sample.edge_at) else None

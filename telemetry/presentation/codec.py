@@ -88,6 +88,7 @@ class Envelope:
 
 
 VARIANCE, TIME, U32, U53 = 100.0, 1e12, 2**32 - 1, 2**53
+TORQUE = 1e6  # N m
 ARGUMENTS = Field("arguments", "a", arguments, same)
 TUBE = whole("tube", "t", 0, BASE)
 SEQUENCE = whole("sequence", "s", 0, U53)
@@ -111,6 +112,9 @@ FIELDS: dict[type[Any], tuple[Kind, tuple[Field, ...]]] = {
             number("valid_at", "at", -TIME, TIME),
             SEQUENCE,
             HOPS,
+            number("torque", "q", 0.0, TORQUE).later(2, 0.0),
+            number("torsion_var", "tv", 0.0, VARIANCE).later(2, 0.0),
+            truth("under_torque", "u").later(2, False),
         ),
     ),
     Hello: (
@@ -229,11 +233,12 @@ FIELDS: dict[type[Any], tuple[Kind, tuple[Field, ...]]] = {
 TYPE_OF: dict[Kind, tuple[type[Any], tuple[Field, ...]]] = {
     kind: (message, fields) for message, (kind, fields) in FIELDS.items()
 }
+NEWEST: dict[Kind, int] = {kind: max(field.since for field in fields) for kind, fields in FIELDS.values()}
 DOWNWARD = (Kind.RECEIPT, Kind.COMMAND, Kind.BLOCK_SEGMENT)
 
 
 def encode(message: Message) -> bytes:
-    """Payload of a message.
+    """Payload of a message, in the earliest schema version that can say it.
 
     Raises
     ------
@@ -242,14 +247,17 @@ def encode(message: Message) -> bytes:
     """
     kind, fields = FIELDS[type(message)]
     body: dict[str, Any] = {}
+    said = (field.since for field in fields if field.since > 1 and getattr(message, field.name) != field.before)
+    version = max(said, default=1)
     try:
         for field in fields:
-            body[field.key] = field.pack(field.check(getattr(message, field.name)))
+            if field.since <= version:
+                body[field.key] = field.pack(field.check(getattr(message, field.name)))
     except ValueError as error:
         raise EncodeError(f"{type(message).__name__}: {error}") from error
     origin = getattr(message, "tube", NO_TARGET)
     target = origin if kind in DOWNWARD else BASE
-    envelope = {"v": SCHEMA_VERSION, "k": int(kind), "o": origin, "t": target, "s": getattr(message, "sequence", 0)}
+    envelope = {"v": version, "k": int(kind), "o": origin, "t": target, "s": getattr(message, "sequence", 0)}
     return bytes(msgpack.packb(envelope | {"b": body}))
 
 
@@ -268,7 +276,10 @@ def decode(payload: bytes) -> Message:
     if not isinstance(body, dict):
         raise DecodeError(f"{message.__name__}: expected a map of fields, got {body!r:.40}")
     try:
-        values = {field.name: field.check(body.get(field.key)) for field in fields}
+        values = {
+            field.name: field.check(body.get(field.key)) if field.since <= rows["v"] else field.before
+            for field in fields
+        }
     except ValueError as error:
         raise DecodeError(f"{message.__name__}: {error}") from error
     decoded: Message = message(**values)
@@ -300,10 +311,12 @@ def _unpack(payload: bytes) -> dict[str, Any]:
 
 def _envelope(rows: dict[str, Any]) -> Envelope:
     version, kind = rows.get("v"), rows.get("k")
-    if version != SCHEMA_VERSION:
-        raise DecodeError(f"payload: expected schema version {SCHEMA_VERSION}, got {version!r:.40}")
+    if type(version) is not int or not 1 <= version <= SCHEMA_VERSION:
+        raise DecodeError(f"payload: expected schema version 1 to {SCHEMA_VERSION}, got {version!r:.40}")
     if type(kind) is not int or kind not in TYPE_OF:
         raise DecodeError(f"payload: unknown kind {kind!r:.40}")
+    if version > NEWEST[Kind(kind)]:
+        raise DecodeError(f"payload: {Kind(kind).name.lower()}: expected version {NEWEST[Kind(kind)]}, got {version}")
     route = []
     for key, high in (("o", 255), ("t", 255), ("s", U53)):
         value = rows.get(key)

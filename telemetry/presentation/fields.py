@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 from telemetry.messages import ImuMean
@@ -17,12 +17,21 @@ MAX_BINARY = 256
 
 @dataclass(frozen=True, slots=True)
 class Field:
-    """One field: attribute, short key, check (raises ValueError) and what is put on the wire."""
+    """One field: attribute, short key, check (raises ValueError) and what is put on the wire.
+
+    A field of a later schema version has the value that stands for it in payloads of earlier ones.
+    """
 
     name: str
     key: str
     check: Callable[[Any], Any]
     pack: Callable[[Any], Any]
+    since: int = 1
+    before: Any = None
+
+    def later(self, since: int, before: Any) -> Field:
+        """The same field, first said in schema version ``since``; payloads without it mean ``before``."""
+        return replace(self, since=since, before=before)
 
 
 def same(value: Any) -> Any:

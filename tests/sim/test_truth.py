@@ -1,6 +1,7 @@
 """The world's truth in closed form: a perfect sensor gives zero error."""
 
 import math
+from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
@@ -12,7 +13,8 @@ from groundstation.survey.resolve import angles, resolve
 from node.kernels.layout import PERIOD
 from sim.borehole import Borehole
 from sim.motion import Motion, Trapezoid
-from sim.scenario import load_scenario
+from sim.scenario import TorsionSection, load_scenario
+from sim.torsion import StringTorsion
 from sim.truth import TubeTruth
 from sim.world import World, wrap
 
@@ -33,8 +35,16 @@ def perfect() -> TubeTruth:
     return TubeTruth(steep_hole(), motion(), 0.0, 1.1, 0.05, 9.81)
 
 
-def test_rates_are_the_derivative_of_the_attitude() -> None:
-    truth, h = perfect(), 1e-4
+def twisted() -> TubeTruth:
+    """A tube that lags the drive by some degrees and swings."""
+    section = TorsionSection(bit_torque_nm=800.0, wall_friction_nm_per_m=60.0, stick_slip=0.7, stick_slip_hz=0.3)
+    torsion = StringTorsion(section, motion(), 2.0, np.array([4.0, 5.0, 6.0]), np.array([0.1, 0.05, 0.2]))
+    return TubeTruth(steep_hole(), motion(), 0.0, 1.1, 0.05, 9.81, lambda t: torsion.twist(1, t))
+
+
+@pytest.mark.parametrize("string", [perfect, twisted])
+def test_rates_are_the_derivative_of_the_attitude(string: Callable[[], TubeTruth]) -> None:
+    truth, h = string(), 1e-4
     for t in np.linspace(1021.0, 1500.0, 60):
         around = truth.attitude(np.array([t - 2 * h, t - h, t, t + h, t + 2 * h]))
         slope = (around[0] - 8.0 * around[1] + 8.0 * around[3] - around[4]) / (12.0 * h)
@@ -43,10 +53,15 @@ def test_rates_are_the_derivative_of_the_attitude() -> None:
         np.testing.assert_allclose(truth.rate(np.array([t]))[0], numeric, atol=2e-8)
 
 
-def test_rates_integrated_give_the_attitude_back() -> None:
+SPINNING = (1020.0 + TURN.ramp, 1020.0 + TURN.duration - TURN.ramp)  # smooth: between the kinks of the ramps
+UNWINDING = (1020.0 + TURN.duration, 1020.0 + TURN.duration + 3.0)  # the drive stands
+
+
+@pytest.mark.parametrize(("string", "span"), [(perfect, SPINNING), (twisted, SPINNING), (twisted, UNWINDING)])
+def test_rates_integrated_give_the_attitude_back(string: Callable[[], TubeTruth], span: tuple[float, float]) -> None:
     """A sixth-order Magnus integrator on the rates of one tube's drilling, against the attitude itself."""
-    truth, steps = perfect(), 20_000
-    begin, end = 1020.0 + TURN.ramp, 1020.0 + TURN.duration - TURN.ramp  # smooth: between the kinks of the ramps
+    truth, steps = string(), 20_000
+    begin, end = span
     t = np.linspace(begin, end, steps + 1)
     dt = (end - begin) / steps
     c = math.sqrt(15.0) / 10.0
@@ -66,8 +81,9 @@ def test_rates_integrated_give_the_attitude_back() -> None:
     np.testing.assert_allclose(attitude, truth.attitude(np.array([end]))[0], atol=1e-9)
 
 
-def test_specific_force_at_a_stop_resolves_to_the_exact_direction() -> None:
-    world = World(load_scenario(SCENARIOS / "wellbore-1.toml"), 4)
+@pytest.mark.parametrize("name", ["wellbore-1.toml", "torsion-10.toml"])
+def test_specific_force_at_a_stop_resolves_to_the_exact_direction(name: str) -> None:
+    world = World(load_scenario(SCENARIOS / name), 4)
     for phase in world.phases:
         if phase.kind != "stop":
             continue
@@ -118,6 +134,22 @@ def test_an_accelerometer_off_the_axis_feels_the_circle() -> None:
 def test_the_time_of_an_angle_is_the_inverse_of_the_turning(part: float) -> None:
     angle = part * TURN.angle
     assert float(TURN.turned(np.array([TURN.time_of(angle)]))[0][0]) == pytest.approx(angle, abs=1e-9)
+
+
+def test_the_circle_around_the_axis_follows_the_tube_and_not_the_drive() -> None:
+    """While the drive stands and the string unwinds: -r w^2 and r w', with w the derivative of the tube's own yaw."""
+    straight = Borehole(np.array([0.0, 9.0]), np.zeros(2), np.zeros(2))
+    lag = StringTorsion(TorsionSection(), motion(), 2.0, np.full(3, 50.0), np.zeros(3))
+    still, off_axis = (
+        TubeTruth(straight, motion(), 0.0, 0.0, radius, 9.81, lambda t: lag.twist(1, t)) for radius in (0.0, 0.05)
+    )
+    t, h = UNWINDING[0] + np.linspace(0.1, 2.9, 29), 1e-3
+    felt = off_axis.force(t) - still.force(t)
+    before, now, after = (off_axis.yaw(t + shift) for shift in (-h, 0.0, h))
+    rate, angular = (after - before) / (2.0 * h), (after - 2.0 * now + before) / h**2
+    assert np.abs(rate).max() > 0.5
+    np.testing.assert_allclose(felt[:, 0], -0.05 * rate**2, atol=1e-6)
+    np.testing.assert_allclose(felt[:, 1], 0.05 * angular, atol=1e-6)
 
 
 def test_a_short_turn_is_all_ramp() -> None:

@@ -53,7 +53,20 @@ IMU = st.builds(
     lambda force, d: ImuMean(force, ((d, 0.0, 0.0), (0.0, d, 0.0), (0.0, 0.0, d))), VECTOR, st.floats(0.0, 1.0)
 )
 MESSAGES: dict[type, st.SearchStrategy[Any]] = {
-    Aiding: st.builds(Aiding, YAW, VAR, VAR, st.floats(-TURN, TURN), st.floats(-100, 100), TIME, SEQUENCE, HOPS),
+    Aiding: st.builds(
+        Aiding,
+        YAW,
+        VAR,
+        VAR,
+        st.floats(-TURN, TURN),
+        st.floats(-100, 100),
+        TIME,
+        SEQUENCE,
+        HOPS,
+        st.just(0.0) | st.floats(0.0, 1e6),
+        st.just(0.0) | VAR,
+        st.booleans(),
+    ),
     Hello: st.builds(Hello, TUBE, st.integers(0, 2**32 - 1), HOPS, st.sampled_from(Mode), st.floats(0.0, 1.0)),
     TimeRequest: st.builds(TimeRequest, TIME),
     TimeReply: st.builds(TimeReply, TIME, TIME, TIME, TIME, st.floats(0.5, 2.0), st.floats(0.0, 1e9)),
@@ -157,6 +170,38 @@ def test_the_envelope_tells_the_route_without_the_body(message: Any) -> None:
     else:
         assert envelope.target == BASE
         assert envelope.origin == getattr(message, "tube", 255)
+
+
+@given(MESSAGES[Aiding])
+def test_aiding_is_said_in_the_earliest_version_that_can(aiding: Aiding) -> None:
+    twisted = bool(aiding.torque or aiding.torsion_var or aiding.under_torque)
+    rows = msgpack.unpackb(encode(aiding))
+    assert rows["v"] == (2 if twisted else 1)
+    assert ({"q", "tv", "u"} <= set(rows["b"])) == twisted
+
+
+@given(MESSAGES[Aiding])
+def test_aiding_of_an_old_node_is_read_as_that_of_a_rigid_string(aiding: Aiding) -> None:
+    rigid = dataclasses.replace(aiding, torque=0.0, torsion_var=0.0, under_torque=False)
+    rows = msgpack.unpackb(encode(rigid))
+    rows["b"] |= {"q": 5.0, "tv": 1.0, "u": True}  # keys that version 1 does not know
+    assert decode(msgpack.packb(rows)) == rigid
+
+
+@pytest.mark.parametrize(
+    ("message", "version", "named"),
+    [
+        (Receipt(3, 4), 2, "receipt: expected version 1, got 2"),
+        (Receipt(3, 4), 3, "schema version 1 to 2, got 3"),
+        (Receipt(3, 4), 0, "schema version"),
+        (Receipt(3, 4), True, "schema version"),
+        (Aiding(1.0, 1e-8, 0.0, 0.0, 0.0, 1.0, 1, 0), 2, "torque"),
+    ],
+)
+def test_a_version_that_is_not_known_or_lacks_its_fields_is_refused(message: Any, version: int, named: str) -> None:
+    rows = msgpack.unpackb(encode(message)) | {"v": version}
+    with pytest.raises(DecodeError, match=named):
+        decode(msgpack.packb(rows))
 
 
 @given(st.binary(max_size=300))

@@ -24,7 +24,7 @@ from node.kernels.fixed.strapdown import half_turn, rotate_down, yaw_rate
 from node.kernels.fixed.trigonometry import TURN, counts
 from node.kernels.fixed.update import level, zero_rate
 from node.kernels.jit import kernel
-from node.kernels.layout import INVERTED, RING, STATES, Array, Err, Status
+from node.kernels.layout import CLOCK_SLACK, INVERTED, RING, STATES, Array, Err, Status
 
 PSI, BZ, D = int(Err.YAW), int(Err.BIAS_Z), int(Err.STAMP)
 LATE_DROPPED = int(Status.LATE_DROPPED)
@@ -37,6 +37,7 @@ MISSED_GAP: Final = ONE_SECOND // 1000
 INVERTED_DOWN: Final = round(INVERTED * 2.0**VECTOR_Q)
 ALL: Final = (1 << 31) - 1  # of a factor in Q31
 STAMP_RIGHT: Final = RATE_Q - TIME_Q
+SLACK: Final = round(CLOCK_SLACK * 2.0**TIME_Q)
 SLOT: Final = RING - 1  # RING is a power of two
 
 
@@ -174,7 +175,7 @@ def interpolation_var(state: Any, cycle: int, at: int) -> int:
 def take_pending(state: Any, config: Any, cycle: int, until: int) -> int:
     """Pass every waiting measurement valid up to ``until`` (s, Q28), oldest first; returns ``Status`` bits."""
     status = 0
-    while state.pending > 0 and state.pending_at[0] <= until:
+    while state.pending > 0 and state.pending_at[0] <= until + SLACK:
         at = state.pending_at[0] + shift(state.stamp, STAMP_RIGHT)
         yaw, var = int(state.pending_yaw[0]), state.pending_var[0]
         held = min(at, until)
