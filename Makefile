@@ -45,6 +45,7 @@ study: $(STAMP)  ## the long studies; their tables are committed in docs/results
 	$(BIN)/borechain experiment tuning --seeds 100 --out docs/results
 	$(BIN)/borechain experiment delay --seeds 25 --out docs/results
 	$(BIN)/borechain experiment outage --seeds 60 --out docs/results
+	$(BIN)/borechain experiment alignment --seeds 100 --out docs/results
 	$(BIN)/borechain experiment fifty-nodes --seeds 16 --out docs/results
 
 lock:  ## pin the dependencies again, without addresses (needs pip-tools)

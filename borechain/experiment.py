@@ -10,6 +10,7 @@ from typing import Any
 
 import click
 
+from borechain.alignment_experiment import alignment
 from borechain.faults import plain_faults
 from borechain.node_experiments import COMMANDS as NODE_COMMANDS
 from borechain.options import seed_option
@@ -71,7 +72,7 @@ def experiment() -> None:
     """
 
 
-for command in (coverage, regions, weighting, *NODE_COMMANDS):
+for command in (alignment, coverage, regions, weighting, *NODE_COMMANDS):
     experiment.add_command(command)
 
 

@@ -7,7 +7,9 @@ from dataclasses import dataclass
 from typing import Final, Literal, TypeAlias, get_args
 
 from node.errors import ConfigurationError
+from node.firmware.imu_settings import ImuSettings
 from node.firmware.sensor_faults import USUAL_LIMITS, SensorLimits
+from node.kernels.alignment import MAX_IMUS
 from node.kernels.layout import Scheme
 from telemetry.messages import MAX_TUBE
 
@@ -36,6 +38,7 @@ class TubeSettings:
     aiding_old_after: float = 3.0  # s
     kernel: Kernel = "float64"  # arithmetic of the loop; fixed is that of a controller without floats
     limits: SensorLimits = USUAL_LIMITS  # of its IMU
+    imus: tuple[ImuSettings, ...] = (ImuSettings(),)  # of its cluster
 
     def __post_init__(self) -> None:
         """Refuse what cannot be.
@@ -49,6 +52,8 @@ class TubeSettings:
         require(self.state_every >= 1, f"state_every: expected at least 1 cycle, got {self.state_every}")
         age = self.aiding_old_after
         require(math.isfinite(age) and age > 0.0, f"aiding_old_after: expected a time in s, got {age}")
+        count = len(self.imus)
+        require(1 <= count <= MAX_IMUS, f"imus: expected 1..{MAX_IMUS} IMUs, got {count}")
         require(self.kernel in KERNELS, f"kernel: expected one of {', '.join(KERNELS)}, got {self.kernel}")
         for name, std in (
             ("drive_joint.std", self.drive_joint.std),

@@ -16,7 +16,7 @@ Array: TypeAlias = "np.ndarray[Any, np.dtype[Any]]"
 STATES: Final = 8
 RING: Final = 64
 PENDING: Final = 4
-LAYOUT_VERSION: Final = 1
+LAYOUT_VERSION: Final = 2
 
 
 class Err(enum.IntEnum):
