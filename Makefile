@@ -48,6 +48,7 @@ study: $(STAMP)  ## the long studies; their tables are committed in docs/results
 	$(BIN)/borechain experiment tuning --seeds 100 --out docs/results
 	$(BIN)/borechain experiment delay --seeds 25 --out docs/results
 	$(BIN)/borechain experiment outage --seeds 60 --out docs/results
+	$(BIN)/borechain experiment alignment --seeds 100 --out docs/results
 	$(BIN)/borechain experiment fifty-nodes --seeds 16 --out docs/results
 	$(BIN)/borechain experiment ingredients --seeds 40 --out docs/results
 	$(BIN)/borechain experiment fixed-point --cycles 1000000 --out docs/results

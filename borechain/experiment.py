@@ -10,6 +10,7 @@ from typing import Any
 
 import click
 
+from borechain.alignment_experiment import alignment
 from borechain.faults import plain_faults
 from borechain.kernel_experiments import COMMANDS as KERNEL_COMMANDS
 from borechain.node_experiments import COMMANDS as NODE_COMMANDS
@@ -72,7 +73,7 @@ def experiment() -> None:
     """
 
 
-for command in (coverage, regions, weighting, *NODE_COMMANDS, *KERNEL_COMMANDS):
+for command in (alignment, coverage, regions, weighting, *NODE_COMMANDS, *KERNEL_COMMANDS):
     experiment.add_command(command)
 
 

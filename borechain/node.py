@@ -4,13 +4,18 @@ from __future__ import annotations
 
 import math
 from pathlib import Path
-from typing import Literal
+from typing import TYPE_CHECKING, Literal
 
 import click
 
 from borechain.faults import plain_faults
 from borechain.options import key_option, place_options
 
+if TYPE_CHECKING:
+    from node.firmware.imu_settings import ImuSettings
+    from telemetry.parameters import SensorParameters
+
+FILE = click.Path(path_type=Path, dir_okay=False)
 SCHEMES = ("forward", "estimate", "intersection")
 
 
@@ -27,7 +32,20 @@ SCHEMES = ("forward", "estimate", "intersection")
 )
 @click.option("--torsion", type=click.Choice(["gate", "variance"]), default="gate", show_default=True)
 @click.option("--joints", type=click.Choice(["marks", "solved", "both"]), default="marks", show_default=True)
-@click.option("--imu", help="The node's own sensor: replay:FILE, mpu6500:BUS or mpu6500:BUS:ADDRESS.")
+@click.option(
+    "--imu",
+    "sources",
+    multiple=True,
+    help="The node's own sensor: replay:FILE, mpu6500:BUS or mpu6500:BUS:ADDRESS; once for each of a cluster.",
+)
+@click.option("--imu-noise", "noises", type=float, multiple=True, help="Noise of an IMU, times the usual; for each.")
+@click.option(
+    "--imu-offset-mm", "offsets", type=(float, float), multiple=True, help="Place off the tube's axis, X Y; for each."
+)
+@click.option(
+    "--imu-gyroscope", "gyroscopes", type=FILE, multiple=True, help="Calibration of an IMU's gyroscope; for each."
+)
+@click.option("--imu-accelerometer", "accelerometers", type=FILE, multiple=True, help="Of its accelerometer; for each.")
 @key_option
 @place_options
 @plain_faults
@@ -42,7 +60,11 @@ def node(
     stiffness_nm: float,
     torsion: Literal["gate", "variance"],
     joints: Literal["marks", "solved", "both"],
-    imu: str | None,
+    sources: tuple[str, ...],
+    noises: tuple[float, ...],
+    offsets: tuple[tuple[float, float], ...],
+    gyroscopes: tuple[Path, ...],
+    accelerometers: tuple[Path, ...],
     key_file: Path | None,
     rig_name: str,
     endpoint: str,
@@ -53,6 +75,7 @@ def node(
     \b
     Example:
       borechain node --tube 1 --drive-joint-deg 12.5 --folder state/tube-1
+      borechain node --tube 1 --imu mpu6500:1:0x68 --imu mpu6500:1:0x69
     """
     from borechain.processes import Place, run_node
     from node.firmware.settings import Joint, TubeSettings
@@ -70,5 +93,63 @@ def node(
         stiffness=stiffness_nm,
         torsion=torsion,
         joints=joints,
+        imus=cluster(len(sources), noises, offsets, gyroscopes, accelerometers),
     )
-    run_node(Place(rig_name, endpoint, folder, key_file), settings, imu_source(imu) if imu else None)
+    run_node(Place(rig_name, endpoint, folder, key_file), settings, [imu_source(source) for source in sources])
+
+
+def cluster(
+    sources: int,
+    noises: tuple[float, ...],
+    offsets_mm: tuple[tuple[float, float], ...],
+    gyroscopes: tuple[Path, ...],
+    accelerometers: tuple[Path, ...],
+) -> tuple[ImuSettings, ...]:
+    """Settings of every IMU; an option that is absent leaves all of them as usual.
+
+    Raises
+    ------
+    ConfigurationError
+        When options were given for different numbers of IMUs.
+    CalibrationError
+        When a file holds no calibration of its sensor.
+    """
+    from node.errors import ConfigurationError
+    from node.firmware.imu_settings import ImuSettings
+
+    given = {
+        "imu": sources,
+        "imu-noise": len(noises),
+        "imu-offset-mm": len(offsets_mm),
+        "imu-gyroscope": len(gyroscopes),
+        "imu-accelerometer": len(accelerometers),
+    }
+    counts = {name: count for name, count in given.items() if count}
+    if len(set(counts.values())) > 1:
+        told = ", ".join(f"--{name} {count} times" for name, count in counts.items())
+        raise ConfigurationError(f"imus: expected as many of each option as there are IMUs, got {told}")
+    count = max(counts.values(), default=1)
+    rows = zip(
+        [(1e-3 * x, 1e-3 * y) for x, y in offsets_mm or ((0.0, 0.0),) * count],
+        noises or (1.0,) * count,
+        own_corrections("gyroscope", gyroscopes, count),
+        own_corrections("accelerometer", accelerometers, count),
+        strict=True,
+    )
+    return tuple(ImuSettings(*row) for row in rows)
+
+
+def own_corrections(sensor: str, files: tuple[Path, ...], count: int) -> list[SensorParameters]:
+    """Correction of one sensor of each of ``count`` IMUs; none without files."""
+    from groundstation.calibration.block import read
+    from groundstation.calibration.errors import CalibrationError
+    from groundstation.service.parameters import sensor_parameters
+    from telemetry.parameters import SensorParameters
+
+    corrections = []
+    for path in files:
+        calibration = read(path)
+        if calibration.sensor != sensor:
+            raise CalibrationError(f"{path}: sensor: expected {sensor}, got {calibration.sensor}")
+        corrections.append(sensor_parameters(calibration))
+    return corrections or [SensorParameters()] * count

@@ -202,7 +202,7 @@ def tell(result: dict[str, Any], columns: Columns, title: str, *, as_json: bool)
     if as_json:
         click.echo(json.dumps({key: value for key, value in result.items() if key != "traces"}))
     else:
-        intervals = [{"interval": f"{r['low']:.3f}-{r['high']:.3f}"} if "low" in r else {} for r in result["cases"]]
+        intervals = [{"interval": f"{r['low']:.3g}-{r['high']:.3g}"} if "low" in r else {} for r in result["cases"]]
         show_table(title, [r | i for r, i in zip(result["cases"], intervals, strict=True)], columns)
 
 

@@ -8,7 +8,7 @@ import multiprocessing
 import queue
 import signal
 import sys
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -45,12 +45,12 @@ class Place:
     key_file: Path | None = None  # of the rig
 
 
-def run_node(place: Place, settings: TubeSettings, imu: ImuSource | None = None) -> None:
-    """Node of one tube until a signal comes; ``imu`` is its own sensor."""
+def run_node(place: Place, settings: TubeSettings, imus: Sequence[ImuSource] = ()) -> None:
+    """Node of one tube until a signal comes; ``imus`` are its own sensors."""
 
     def build() -> TubeProcess:
         key = read_key(place.key_file) if place.key_file is not None else None
-        return TubeProcess(settings, place.folder, key=key, imu=imu)
+        return TubeProcess(settings, place.folder, key=key, imus=imus)
 
     run_on_bench(f"node {settings.tube}", place, settings.tube, build)
 

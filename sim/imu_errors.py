@@ -11,6 +11,7 @@ import numpy.typing as npt
 from sim.scenario import AccelerometerSection, DriftSection, GyroSection
 
 Array = npt.NDArray[np.float64]
+WANDERING = ("noise_dps_rthz", "bias_std_dps")
 
 
 def gauss_markov(random: np.random.Generator, count: int, std: Array, tau: float, step: float) -> Array:
@@ -49,6 +50,14 @@ class ImuErrors:
 
     gyroscope: GyroSection
     accelerometer: AccelerometerSection
+
+    def times(self, factor: float) -> ImuErrors:
+        """Those of an IMU whose noise is larger by ``factor``."""
+        if factor == 1.0:
+            return self
+        noise = {name: tuple(factor * x for x in getattr(self.gyroscope, name)) for name in WANDERING}
+        accelerometer = self.accelerometer.model_copy(update={"noise_deg": factor * self.accelerometer.noise_deg})
+        return ImuErrors(self.gyroscope.model_copy(update=noise), accelerometer)
 
     def gyro(self, random: np.random.Generator, rate: Array, force: Array, period: float) -> Array:
         """Readings (n, 3, rad/s) of the mean rates (n, 3), cycle after cycle of ``period`` (s)."""

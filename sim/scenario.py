@@ -10,6 +10,7 @@ import numpy as np
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
 from groundstation.calibration.attitudes import rank_of, true_vectors
+from node.kernels.alignment import MAX_IMUS
 from sim.borehole import Borehole, read_displacements, read_stations
 from sim.errors import ScenarioError
 from sim.faults import KillNode, parse_fault
@@ -70,6 +71,9 @@ class JointSection(Section):
 
     reading_std_deg: NotNegative = Field(0.05, description="of the scribe marks at a joint")
     mount_std_deg: NotNegative = Field(0.05, description="of the IMU against the tube's marks, about the axis")
+    mount_tilt_std_deg: float = Field(
+        0.0, ge=0.0, le=3.0, description="of each IMU against the tube's axis, pitch and roll; an alignment finds it"
+    )
 
 
 class TorsionSection(Section):
@@ -161,6 +165,10 @@ class NodeSection(Section):
     joints: Literal["marks", "solved", "both"] = Field(
         "marks", description="after a tube was added: scribe marks, the saved yaw, or both by inverse variance"
     )
+    imus: int = Field(1, ge=1, le=MAX_IMUS, description="in every tube")
+    imu_noise: tuple[Annotated[float, Field(ge=0.01, le=100.0)], ...] = Field(
+        (), description="of each IMU of a tube, times that of gyroscope and accelerometer; 1 where it is absent"
+    )
 
 
 class DesignSection(Section):
@@ -240,6 +248,11 @@ def load_scenario(path: Path, faults: tuple[str, ...] = ()) -> Scenario:
     file = _parse(path)
     _check_motion(path, file)
     _check_torsion(path, file)
+    if len(file.node.imu_noise) not in (0, file.node.imus):
+        raise ScenarioError(
+            f"{path}: node.imu_noise: expected {file.node.imus} factors, one for each of node.imus, "
+            f"got {len(file.node.imu_noise)}"
+        )
     _check_calibration(path, file.calibration)
     hole = _hole(path, file.path)
     needed = file.rig.tubes * file.rig.tube_length_m

@@ -32,6 +32,12 @@ def lean_rotation(tangent: Array) -> Array:
     return np.moveaxis(np.array(rows), -1, 0)
 
 
+def imu_frame(pitch: float, roll: float) -> Array:
+    """R_imu_from_tube (3, 3) of an IMU that reads pitch and roll (rad) in a plumb tube; no turn about the axis."""
+    axis = np.array([np.sin(pitch), np.cos(pitch) * np.sin(roll), np.cos(pitch) * np.cos(roll)])
+    return np.asarray(lean_rotation(axis[None])[0])
+
+
 class TubeTruth:
     """Perfect readings of one tube's IMU.
 

@@ -5,10 +5,12 @@ from __future__ import annotations
 import math
 from functools import cached_property, partial
 from itertools import pairwise
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 
+from node.firmware.imu_settings import ImuSettings
 from node.firmware.settings import Joint, TubeSettings
 from node.firmware.torque import TorqueSettings
 from node.kernels.layout import PERIOD, Scheme
@@ -20,7 +22,7 @@ from sim.motion import Motion, Phase, Trapezoid
 from sim.rack import Rack
 from sim.scenario import Scenario
 from sim.torsion import StringTorsion, stiffness
-from sim.truth import TubeTruth
+from sim.truth import TubeTruth, imu_frame
 from telemetry.messages import BASE, ENCODER
 
 Array = npt.NDArray[np.float64]
@@ -68,7 +70,8 @@ class World:
         self.phases: tuple[Phase, ...] = self.motion.phases
         self.end = self.motion.end
         self.faults: tuple[KillNode, ...] = scenario.faults
-        self._samples: dict[int, list[list[float]]] = {}
+        self._noises = file.node.imu_noise or (1.0,) * file.node.imus
+        self._samples: dict[int, list[list[Any]]] = {}
         edge_std = math.radians(file.encoder.edge_std_deg)
         self._disc = Disc(self.motion, file.encoder.counts_per_turn, edge_std, self._random(DISC, 0))
         self._check_faults()
@@ -77,10 +80,14 @@ class World:
         """Rig time at which the cycle ``cycle`` (from 0) ends."""
         return self.begin + (cycle + 1) * PERIOD
 
-    def imu_sample(self, tube: int, cycle: int) -> list[float]:
-        """Three mean rates (rad/s) and three mean specific forces (m/s^2) of one cycle, errors and all."""
+    def imu_sample(self, tube: int, cycle: int) -> list[Any]:
+        """Three mean rates (rad/s) and three mean specific forces (m/s^2) of one cycle, errors and all.
+
+        Of several IMUs a list of such lists.
+        """
         if tube not in self._samples:
-            self._samples[tube] = self._all_samples(tube).tolist()
+            one, *others = [self._all_samples(tube, imu).tolist() for imu in range(len(self._noises))]
+            self._samples[tube] = [list(rows) for rows in zip(one, *others, strict=True)] if others else one
         return self._samples[tube][cycle]
 
     def encoder_sample(self, t: float) -> tuple[int, float, int] | tuple[int, float, int, float]:
@@ -124,6 +131,7 @@ class World:
             stiffness=self._stiffness,
             torsion="variance" if self.scenario.file.node.torsion == "variance" else "gate",
             joints=self.scenario.file.node.joints,
+            imus=tuple(ImuSettings((self.scenario.file.accelerometer.radius_m, 0.0), noise) for noise in self._noises),
         )
 
     def torque_settings(self) -> TorqueSettings:
@@ -171,10 +179,16 @@ class World:
         twist = None if self.torsion is None else partial(self.torsion.twist, tube)
         return TubeTruth(self.scenario.hole, self.motion, below, joint, a.radius_m, a.gravity_mps2, twist)
 
-    def drift(self, tube: int) -> Drift | None:
+    def drift(self, tube: int, imu: int = 0) -> Drift | None:
         """What became of a tube's sensors since their calibration."""
         section = self.scenario.file.drift
-        return None if section is None else Drift.draw(section, self._random(DRIFT, tube))
+        return None if section is None else Drift.draw(section, self._random(DRIFT, tube, imu))
+
+    def imu_frame(self, tube: int, imu: int = 0) -> Array:
+        """R_imu_from_tube (3, 3): how an IMU (from 0) of a tube leans against the tube's axis."""
+        std = math.radians(self.scenario.file.joints.mount_tilt_std_deg)
+        pitch, roll = std * self._random(MOUNTS, tube, imu).standard_normal(2)
+        return imu_frame(pitch, roll)
 
     @property
     def _stiffness(self) -> float:
@@ -189,7 +203,7 @@ class World:
         trapped = section.trapped_fraction * np.abs(self._random(TORSION, 0).standard_normal(tubes))
         return StringTorsion(section, self.motion, self.scenario.tube_length, np.arange(1.0, tubes + 1.0), trapped)
 
-    def _all_samples(self, tube: int) -> Array:
+    def _all_samples(self, tube: int, imu: int) -> Array:
         count = math.floor((self.end - self.begin) / PERIOD + 1e-9)
         ends: Array = self.begin + PERIOD * np.arange(1.0, count + 1.0)
         truth, file = self.truth(tube), self.scenario.file
@@ -198,13 +212,15 @@ class World:
             racked = ends <= self.rack.end
             held = self.rack.truth(self._random(RACK, tube), self._mounts[tube], file.accelerometer.gravity_mps2)
             rate[racked], force[racked] = held.cycle_means(ends[racked], PERIOD)
+        frame = self.imu_frame(tube, imu)
+        rate, force = rate @ frame.T, force @ frame.T
         turning = (self.motion.drive(ends)[1] > 0.0) | (self.motion.drive(ends - PERIOD)[1] > 0.0)
         felt = force
-        if (drift := self.drift(tube)) is not None:
+        if (drift := self.drift(tube, imu)) is not None:
             rate, felt = rate + drift.rate, force @ drift.matrix.T + drift.bias
-        errors = ImuErrors(file.gyroscope, file.accelerometer)
-        measured_rate = errors.gyro(self._random(GYRO, tube), rate, force, PERIOD)
-        measured_force = errors.accelerations(self._random(ACCELEROMETER, tube), felt, turning.astype(float))
+        errors = ImuErrors(file.gyroscope, file.accelerometer).times(self._noises[imu])
+        measured_rate = errors.gyro(self._random(GYRO, tube, imu), rate, force, PERIOD)
+        measured_force = errors.accelerations(self._random(ACCELEROMETER, tube, imu), felt, turning.astype(float))
         return np.concatenate([measured_rate, measured_force], axis=1)
 
     @cached_property
@@ -246,8 +262,9 @@ class World:
         draws = self._random(CLOCKS, 0).standard_normal((self.scenario.tubes + 1, 2))
         return [(clocks.offset_std_s * a, clocks.drift_std_ppm * 1e-6 * b) for a, b in draws.tolist()]
 
-    def _random(self, purpose: int, tube: int) -> np.random.Generator:
-        return np.random.Generator(np.random.Philox(np.random.SeedSequence([self.seed, purpose, tube])))
+    def _random(self, purpose: int, tube: int, imu: int = 0) -> np.random.Generator:
+        further = [imu] if imu else []  # the first IMU of a tube draws what it draws alone
+        return np.random.Generator(np.random.Philox(np.random.SeedSequence([self.seed, purpose, tube, *further])))
 
     def _check_faults(self) -> None:
         racked = self.rack.end if self.rack is not None else self.begin

@@ -155,6 +155,7 @@ class NodeState:
     overruns: int
     parameters_version: int = 0  # of the block in use, 0 is the identity
     parameters_hash: bytes = bytes(8)  # first bytes of its SHA-256
+    alignment: Vector3 = (0.0, 0.0, 0.0)  # rad: pitch, roll and their standard error, 0 if not aligned
 
 
 @dataclass(frozen=True, slots=True)
@@ -196,7 +197,7 @@ class Command:
 
     tube: int  # addressee
     sequence: int
-    name: str  # take_survey, static_record, parameters
+    name: str  # take_survey, static_record, parameters, align, alignment
     arguments: dict[str, Scalar] = field(default_factory=dict)
 
 

@@ -21,7 +21,7 @@ class Order:
     needs: tuple[str, ...] = ()
 
 
-def _seconds(text: str) -> float:
+def _number(text: str) -> float:
     return float(text)
 
 
@@ -33,8 +33,10 @@ def _version(text: str) -> int:
 
 ORDERS: dict[str, Order] = {
     "take_survey": Order({}),
-    "static_record": Order({"seconds": _seconds}, ("seconds",)),
+    "static_record": Order({"seconds": _number}, ("seconds",)),
     "parameters": Order({}),
+    "align": Order({"method": str, "turns": _number}),
+    "alignment": Order({}),
     "upload_parameters": Order(
         {"gyroscope": str, "accelerometer": str, "version": _version}, ("gyroscope", "accelerometer")
     ),

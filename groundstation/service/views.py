@@ -14,7 +14,7 @@ from groundstation.service import column_views
 from groundstation.service.core import Cluster, Knowledge, SurveyStation
 from groundstation.survey.resolve import angle_stds, angles
 from groundstation.survey.trajectory import Point, interpolate
-from telemetry.messages import Event, NodeFlag, StaticRecord, SurveyMeasurement
+from telemetry.messages import Event, NodeFlag, NodeState, StaticRecord, SurveyMeasurement
 
 View = dict[str, Any]
 Parameters = dict[str, str]
@@ -104,7 +104,14 @@ def node(k: Knowledge, tube: int) -> View:
         "overruns": s.overruns,
         "parameters_version": s.parameters_version,
         "parameters_hash": s.parameters_hash.hex(),
+        "alignment": alignment(s),
     }
+
+
+def alignment(s: NodeState) -> View | None:
+    """Offset of an IMU's mount that a node corrects; None for one never aligned."""
+    pitch, roll, std = map(math.degrees, s.alignment)
+    return None if std == 0.0 else {"pitch_deg": pitch, "roll_deg": roll, "sigma_deg": std}
 
 
 def stations(k: Knowledge, p: Parameters) -> View:
@@ -136,12 +143,19 @@ def station(k: Knowledge, n: int) -> View:
 
 def typical_reading(readings: list[SurveyMeasurement]) -> View:
     """Root mean squares over the readings of a station; columns that ``borechain survey --instrument relay`` takes."""
-    force_vars = [float(np.mean([np.trace(np.array(imu.force_cov)) / 3.0 for imu in m.imus])) for m in readings]
+    force_vars = [force_var(m) for m in readings]
     return {
         "sigma_yaw_deg": math.degrees(math.sqrt(float(np.mean([m.yaw_var for m in readings])))),
         "sigma_systematic_deg": math.degrees(math.sqrt(float(np.mean([m.systematic_var for m in readings])))),
         "sigma_force_mps2": math.sqrt(float(np.mean(force_vars))),
     }
+
+
+def force_var(reading: SurveyMeasurement) -> float:
+    """Variance (m/s^2)^2 of the mean force of a cluster on one axis: its IMUs weigh by their own."""
+    variances = [float(np.trace(np.array(imu.force_cov)) / 3.0) for imu in reading.imus]
+    first = variances[0]
+    return first / sum(first / variance for variance in variances) if min(variances) > 0.0 else 0.0
 
 
 def measurements(k: Knowledge, p: Parameters) -> View:

@@ -81,6 +81,16 @@ class SensorGuard:
             flags |= NodeFlag.SENSOR_FAULT
         return flags
 
+    @property
+    def spin(self) -> float:
+        """Rate about the axis that is likely now, rad/s: the encoder's while it is fresh, else the last sane one."""
+        return self._rate if self.heard else self._sane_rate
+
+    @property
+    def heard(self) -> bool:
+        """Whether the encoder told its rate lately."""
+        return abs(float(self._state["now"]) - self._rate_at) <= RATE_AGE
+
     def take_said(self) -> list[Said]:
         """Code, severity and arguments of the events since the last call."""
         said, self._said = self._said, []

@@ -7,7 +7,9 @@ from dataclasses import dataclass
 from typing import Final, Literal, TypeAlias, get_args
 
 from node.errors import ConfigurationError
+from node.firmware.imu_settings import ImuSettings
 from node.firmware.sensor_faults import USUAL_LIMITS, SensorLimits
+from node.kernels.alignment import MAX_IMUS
 from node.kernels.layout import DEG, Scheme
 from telemetry.messages import MAX_TUBE
 
@@ -42,6 +44,7 @@ class TubeSettings:
     torsion: TorsionRule = "gate"  # aiding under torque: not used, or used with the variance of the twist
     joints: JointRule = "marks"  # whence the angle of a joint made up above comes
     unseen_std: float = 0.01 * DEG  # rad, what may turn unseen while a joint is made up
+    imus: tuple[ImuSettings, ...] = (ImuSettings(),)  # of its cluster
 
     def __post_init__(self) -> None:
         """Refuse what cannot be.
@@ -55,6 +58,8 @@ class TubeSettings:
         require(self.state_every >= 1, f"state_every: expected at least 1 cycle, got {self.state_every}")
         age = self.aiding_old_after
         require(math.isfinite(age) and age > 0.0, f"aiding_old_after: expected a time in s, got {age}")
+        count = len(self.imus)
+        require(1 <= count <= MAX_IMUS, f"imus: expected 1..{MAX_IMUS} IMUs, got {count}")
         require(self.kernel in KERNELS, f"kernel: expected one of {', '.join(KERNELS)}, got {self.kernel}")
         alone = self.kernel != "float64" and self.scheme is Scheme.INTERSECTION
         require(not alone, f"scheme: expected forward or estimate with the kernel {self.kernel}, got intersection")

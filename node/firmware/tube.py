@@ -8,6 +8,8 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from node.firmware.alignment import FASTEST, Aligner, alignment_text, angles_of, realign
+from node.firmware.cluster import Cluster
 from node.firmware.coarse_level import level_coarsely
 from node.firmware.make_up import MakeUp
 from node.firmware.parameters import forget_bias, forget_tilt, record_of, recorrect
@@ -15,6 +17,7 @@ from node.firmware.sensor_guard import SensorGuard
 from node.firmware.settings import Kernel, TubeSettings
 from node.firmware.static_record import StaticRecorder
 from node.firmware.torsion import TubeTorsion
+from node.kernels.alignment import new_mount, to_tube
 from node.kernels.angles import from_binary, wrap
 from node.kernels.calibration import USUAL, calibrate
 from node.kernels.cycle import run_cycle
@@ -66,6 +69,7 @@ class ImuReading:
     force: tuple[float, float, float]  # m/s^2
     temperature: float = USUAL  # C
     saturated: bool = False  # a sample within the cycle was at the gyroscope's range, as the driver saw it
+    others: tuple[ImuReading, ...] = ()  # of the further IMUs of a cluster, in the same cycle
 
 
 @dataclass(frozen=True, slots=True)
@@ -103,6 +107,7 @@ class Tube:
     next_sequence : source of the numbers of surveys and events, kept across restarts by the caller
     restored : the state comes from a saved one
     parameters : block in use; None is the identity
+    mount : one-record array of dtype ``MOUNT``, owned by the caller; None is that of an IMU never aligned
     """
 
     def __init__(
@@ -114,8 +119,10 @@ class Tube:
         *,
         restored: bool,
         parameters: ParameterBlock | None = None,
+        mount: Array | None = None,
     ) -> None:
         self.settings = settings
+        self._mount = new_mount() if mount is None else mount
         self._configs = config
         self.config = config[0]
         self._states = state
@@ -128,10 +135,20 @@ class Tube:
         self._rate, self._force = np.zeros(3), np.zeros(3)
         self._rejecting = False
         self._noticed = Status.NONE  # between cycles
+        self.raw: ImuReading | None = None  # of the last cycle, of all IMUs together
         self._recorder = StaticRecorder()
         self._guard = SensorGuard(state, config, settings.limits)
         self._torsion = TubeTorsion(settings, state)
         self._make_up = MakeUp(settings, state)
+        self._aligner = Aligner(self._mount, settings.imus, float(self.config["force_std"] / self.config["gravity"]))
+        self._axes = self._mount[0]["axis"][: len(settings.imus)]
+        self._unaligned = np.zeros((len(settings.imus), 3))  # m/s^2
+        self._rates, self._forces = np.zeros((2, len(settings.imus), 3))
+        own = [ParameterBlock(settings.tube, 0, imu.gyroscope, imu.accelerometer) for imu in settings.imus]
+        self._own = [record_of(block)[0] for block in own]
+        self._cluster: Cluster | None = None
+        if len(settings.imus) > 1:
+            self._cluster = Cluster(settings.imus, self._mount, state, config, settings.limits)
         self._slow_cycles = 0  # in a row, not faster than the offset of a gyroscope never calibrated
         self._temperature = USUAL
         self._stamp_walk, self._stamp_hops = float(self.config["stamp_walk"]), 0  # of one joint
@@ -178,13 +195,12 @@ class Tube:
         self, reading: ImuReading, around: Surroundings
     ) -> Iterator[Aiding | SurveyMeasurement | StaticRecord | Event | NodeState]:
         """Correct the reading, run one execution cycle and yield what there is to say."""
+        self.raw = reading
         if not self._guard.admits(reading.start, reading.end):
             yield from self._sensor_events(around)
             return
-        self._rate[:] = reading.rate
-        self._force[:] = reading.force
+        reading = self.raw = self._correct(reading)
         self._temperature = reading.temperature
-        calibrate(self._correction[0], reading.temperature, self._rate, self._force)
         raw = (reading.rate, reading.force)
         self._guard.before(raw, self._rate, self._force, saturated=reading.saturated, at=reading.end)
         self._follow_clock(around)
@@ -198,6 +214,9 @@ class Tube:
         if Status.FILTER_FAULT in status:
             self._start_over()
         self._guard.after(status, reading.end)
+        self._follow_alignment(reading)
+        if self._cluster is not None and self.quiet:
+            self._cluster.learn(self._rates)
         yield from self._sensor_events(around)
         yield from self._string_events(around)
         yield from self._events(status, around)
@@ -223,9 +242,31 @@ class Tube:
         """Average raw readings for ``seconds`` from the next cycle on; returns why not, or nothing."""
         return self._recorder.start(seconds, command, standing=self.standing)
 
+    def align(self, method: object, turns: object) -> str:
+        """Find the tube's axis in the coming slow turns, or drop the offset in use; returns why not, or nothing."""
+        if method == "none":
+            self._drop_alignment("ordered")
+            return ""
+        if self.state["mode"] == STATIC_BIAS:
+            return "the static bias is not known yet"
+        if self._guard.flags:
+            return "a sensor is faulty"
+        if abs(rate := float(self.state["now_rate"])) > FASTEST:
+            return f"too fast: {abs(rate) / DEG:.3g} deg/s, expected at most {FASTEST / DEG:g}"
+        return self._aligner.start(method, turns)
+
+    @property
+    def alignment(self) -> str:
+        """The alignment in use, in words."""
+        return alignment_text(self._mount, len(self._axes))
+
     def prepare(self, block: ParameterBlock) -> None:
         """Forget what was learnt under the present block and would be wrong under ``block``."""
+        if block.accelerometer != self.parameters.accelerometer:
+            self._drop_alignment("another block for the accelerometer")
         if block.gyroscope != self.parameters.gyroscope:
+            if self._aligner.running:
+                self._aligner.stop("another block for the gyroscope")
             forget_bias(self._states, self._configs)
         if block.accelerometer != self.parameters.accelerometer:
             forget_tilt(self._states)
@@ -303,8 +344,63 @@ class Tube:
             yield self._event("aiding_rejected", Severity.WARNING, around.rig_now, {"sigmas": sigmas})
         self._rejecting = rejecting
 
+    def _correct(self, reading: ImuReading) -> ImuReading:
+        """Leave rate and force of the cycle, corrected and in the tube's frame; returns the raw reading behind them."""
+        readings = self._readings(reading)
+        for k, one in enumerate(readings):
+            rate, force = self._rates[k], self._forces[k]
+            rate[:], force[:] = one.rate, one.force
+            if not self._own[k]["identity"]:
+                calibrate(self._own[k], one.temperature, rate, force)
+                readings[k] = replace(one, rate=tuple(rate.tolist()), force=tuple(force.tolist()))
+            calibrate(self._correction[0], one.temperature, rate, force)
+            self._unaligned[k] = force
+            to_tube(self._axes[k], rate)
+            to_tube(self._axes[k], force)
+        if self._cluster is None:
+            self._rate[:], self._force[:] = self._rates[0], self._forces[0]
+            return readings[0]
+        raw = [(one.rate, one.force, one.saturated) for one in readings]
+        self._cluster.take(raw, self._rates, self._forces, self._expected(), heard=self._guard.heard)
+        self._rate[:], self._force[:] = self._cluster.rate, self._cluster.force
+        used = [one.temperature for one, used in zip(readings, self._cluster.used, strict=True) if used]
+        temperature = math.fsum(used) / len(used) if used else USUAL
+        return ImuReading(reading.start, reading.end, *self._cluster.mean_raw(raw), temperature)
+
+    def _readings(self, reading: ImuReading) -> list[ImuReading]:
+        """Of every IMU of the cluster; no numbers of one that brought none."""
+        came = [reading, *reading.others][: len(self._axes)]
+        none = ImuReading(reading.start, reading.end, (math.nan,) * 3, (math.nan,) * 3)
+        return came + [none] * (len(self._axes) - len(came))
+
+    def _expected(self) -> Array:
+        """Rate (rad/s) and force (m/s^2) that the node would read in this cycle if nothing had changed: (6,)."""
+        state = self.state
+        rate = state["static_bias"] + state["bias"]
+        rate[2] += self._guard.spin
+        return np.concatenate([rate, -float(self.config["gravity"]) * state["now_down"]])
+
+    def _follow_alignment(self, reading: ImuReading) -> None:
+        if not self._aligner.running:
+            return
+        before = self._axes.copy()
+        used = np.full(len(before), not self._guard.flags)
+        if self._cluster is not None:
+            used &= self._cluster.used
+        rate = float(self.state["now_rate"])
+        aided = reading.end - float(self.state["last_aided"]) <= self.settings.aiding_old_after
+        yaw = self.yaw if aided else math.nan
+        if self._aligner.take(self._unaligned, rate, yaw, reading.start, reading.end, used):
+            realign(self._states, before, self._axes)
+
+    def _drop_alignment(self, reason: str) -> None:
+        before = self._axes.copy()
+        self._aligner.drop(reason)
+        realign(self._states, before, self._axes)
+
     def _sensor_events(self, around: Surroundings) -> Iterator[Event]:
-        for code, severity, arguments in self._guard.take_said():
+        cluster = self._cluster.take_said() if self._cluster is not None else []
+        for code, severity, arguments in (*self._guard.take_said(), *self._aligner.take_said(), *cluster):
             yield self._event(code, severity, around.rig_now, arguments)
 
     def _string_events(self, around: Surroundings) -> Iterator[Event]:
@@ -360,7 +456,7 @@ class Tube:
             sequence=self._next_sequence(),
             station_at=around.rig_now,
             hops=around.hops,
-            imus=(mean,),
+            imus=(self._cluster.survey(int(self.config["survey_samples"])) if self._cluster else ()) or (mean,),
             yaw=self.yaw,
             yaw_var=self.yaw_var,
             systematic_var=self.systematic_var,
@@ -386,11 +482,12 @@ class Tube:
     def _report(self, end: float, around: Surroundings) -> NodeState:
         state = self.state
         bias = state["static_bias"] + state["bias"]
+        pitch, roll = angles_of(self._axes[0])
         return NodeState(
             tube=self.settings.tube,
             at=around.rig_now,
             hops=around.hops,
-            mode=Mode(int(state["mode"])),
+            mode=Mode.ALIGNMENT if self._aligner.running else Mode(int(state["mode"])),
             yaw=self.yaw,
             yaw_var=self.yaw_var,
             systematic_var=self.systematic_var,
@@ -405,4 +502,5 @@ class Tube:
             overruns=self._overruns,
             parameters_version=self.parameters.version,
             parameters_hash=self._short_hash,
+            alignment=(pitch, roll, float(self._mount[0]["std"][0].max())),
         )

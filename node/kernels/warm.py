@@ -6,8 +6,10 @@ from collections.abc import Callable
 
 import numpy as np
 
+from node.kernels.alignment import OFFSET, SWEEP, add_to_sweep, fit_circle, new_mount, take_extremes, to_tube
 from node.kernels.angles import from_binary, wrap
 from node.kernels.calibration import USUAL, calibrate, identity_parameters
+from node.kernels.cluster import follow_offsets, fuse
 from node.kernels.cycle import run_cycle
 from node.kernels.layout import PERIOD, default_config, new_state
 from node.kernels.relay import offer_aiding
@@ -32,5 +34,12 @@ def warm_up() -> None:
     average = np.zeros(1, STATIC)
     add_static(average[0], rate, force, USUAL, 1)
     has_moved(average[0], 3.0)
+    to_tube(new_mount()[0]["axis"][0], force)
+    sweep, offset = np.zeros(1, SWEEP), np.zeros(1, OFFSET)
+    add_to_sweep(sweep[0], force, 0.0)
+    fit_circle(sweep[0], offset[0])
+    take_extremes(sweep[0], offset[0])
+    fuse(np.ones((2, 6)), np.ones(2), np.zeros(6))
+    follow_offsets(np.ones((2, 3)), rate, 1, new_mount()[0]["rate_offset"])
     warm_loop(run_cycle, offer_aiding)
     wrap(0.0)

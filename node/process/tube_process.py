@@ -2,14 +2,19 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-from node.errors import SavedStateError
+import numpy as np
+
+from node.errors import ConfigurationError, SavedStateError
 from node.firmware.parameters import forget_bias, forget_tilt
 from node.firmware.saved_state import resume
 from node.firmware.settings import TubeSettings
 from node.firmware.tube import ImuReading, Surroundings, Tube
+from node.kernels.alignment import MOUNT, new_mount
 from node.kernels.calibration import USUAL
 from node.kernels.layout import PERIOD, Array, default_config, new_state
 from node.process.counter import BootCounter
@@ -38,7 +43,8 @@ from telemetry.presentation.fields import MAX_TEXT
 SAVE_EVERY = 19  # cycles, 10 s
 SYNCHRONISED_STD = 0.05  # s, what the time-stamp state of the filter can take
 MAX_CLOCK_STD = 3600.0
-COMMANDS = ("take_survey", "static_record", "parameters")
+USUAL_TURNS = 2.0  # of an alignment
+COMMANDS = ("take_survey", "static_record", "parameters", "align", "alignment")
 
 
 class TubeProcess(Driven):
@@ -50,7 +56,7 @@ class TubeProcess(Driven):
     folder : where the state is saved
     config : one record of dtype ``CONFIG``; the default is that of an MPU6500-class node
     key : of the rig; without one the node takes no parameter block
-    imu : the node's own sensor; without one a cycle brings its reading
+    imus : the node's own sensors, as many as the settings have; without any a cycle brings its reading
 
     Raises
     ------
@@ -64,18 +70,23 @@ class TubeProcess(Driven):
         folder: Path,
         config: Array | None = None,
         key: bytes | None = None,
-        imu: ImuSource | None = None,
+        imus: Sequence[ImuSource] = (),
     ) -> None:
         self.settings = settings
-        if imu is not None:
+        if len(imus) not in (0, len(settings.imus)):
+            raise ConfigurationError(f"imus: expected {len(settings.imus)} sources, got {len(imus)}")
+        for imu in imus:
             imu.start()
-        self._imu = SafeImu(imu, self._say_event) if imu is not None else None
+        self._imus = [SafeImu(imu, self._say_event, k if len(imus) > 1 else 0) for k, imu in enumerate(imus, 1)]
         self.config = default_config() if config is None else config
         self._journal = Journal(folder)
         # apart from the saved state: a neighbour must not take a life that lost it for an earlier one
         self.boots = BootCounter(folder).boots
         saved, fault = self._load()
-        self.state, telemetry = saved if saved else (new_state(self.config), None)
+        self.state, blob = saved if saved else (new_state(self.config), None)
+        self.mount, telemetry = split_blob(blob)
+        self._cut = bool(self.mount[0]["aligning"])
+        self.mount[0]["aligning"] = 0
         if saved:
             resume(self.state)
         store = ParameterStore(folder)
@@ -84,6 +95,7 @@ class TubeProcess(Driven):
         if self._fallback:
             forget_bias(self.state, self.config)
             forget_tilt(self.state)
+            self.mount = new_mount()
         self.station = Station(
             settings.tube,
             frozenset(Side),
@@ -92,7 +104,15 @@ class TubeProcess(Driven):
         )
         restored = saved is not None
         next_sequence = self.station.new_sequence
-        self.tube = Tube(settings, self.config, self.state, next_sequence, restored=restored, parameters=parameters)
+        self.tube = Tube(
+            settings,
+            self.config,
+            self.state,
+            next_sequence,
+            restored=restored,
+            parameters=parameters,
+            mount=self.mount,
+        )
         self._cycles = 0
         self._now = 0.0
         self._fault = fault
@@ -116,20 +136,22 @@ class TubeProcess(Driven):
     def on_cycle(self, data: Any, now: float) -> None:
         """The IMU delivered a cycle: ``data`` is start (s), three rates (rad/s), three forces (m/s^2), raw.
 
-        A sensor that knows its temperature (C) adds it. A sensor of the node's own stands for the reading.
+        A sensor that knows its temperature (C) adds it. Of a cluster the numbers of each IMU are a list. Sensors of the
+        node's own stand for the reading.
         """
         self._now = now
         reading = reading_of(data, now)
-        if self._imu is not None:
-            sample = self._imu.read(reading.start, now)
-            reading = ImuReading(reading.start, now, sample.rate, sample.force, sample.temperature, sample.saturated)
+        if self._imus:
+            start, samples = reading.start, [imu.read(reading.start, now) for imu in self._imus]
+            first, *others = [ImuReading(start, now, s.rate, s.force, s.temperature, s.saturated) for s in samples]
+            reading = replace(first, others=tuple(others))
         around = self._surroundings(now)
         if around.synchronised:
             self._announce(around.rig_now, now)
         urgent = False
         for said in self.tube.on_cycle(reading, around):
             urgent |= self._say(said, now)
-        if (status := self._keeper.on_cycle(reading)) is not None:
+        if (status := self._keeper.on_cycle(self.tube.raw or reading)) is not None:
             self.station.send_status(status)
         self._cycles += 1
         self.station.advance(now)
@@ -178,6 +200,8 @@ class TubeProcess(Driven):
         self.station.submit(self.tube.boot_event(rig_now), now)
         if self._fault:
             self._say_event(Severity.ERROR, "saved_state_lost", {"detail": self._fault[:200]})
+        if self._cut:
+            self._say_event(Severity.WARNING, "alignment_refused", {"reason": "the power was cut"})
         if self._fallback:
             in_use = self.tube.parameters
             detail: dict[str, Scalar] = {"detail": self._fallback[:200], "in_use": in_use.version}
@@ -201,6 +225,13 @@ class TubeProcess(Driven):
                 seconds = command.arguments.get("seconds")
                 refused = self.tube.start_record(seconds, command.sequence)
                 done, detail = not refused, refused or f"recording {seconds} s"
+            case "align":
+                method, turns = command.arguments.get("method", "circle"), command.arguments.get("turns", USUAL_TURNS)
+                refused = self.tube.align(method, turns)
+                detail = refused or ("dropped" if method == "none" else f"turn the string slowly, {turns:g} turns")
+                done = not refused
+            case "alignment":
+                detail = self.tube.alignment
             case "parameters":
                 block = self.tube.parameters
                 detail = f"version {block.version} sha256 {block.sha256().hex()}"
@@ -215,17 +246,38 @@ class TubeProcess(Driven):
             return None, str(error)
 
     def _save(self) -> None:
-        self._journal.save(self.state, self.station.export_state())
+        self._journal.save(self.state, self.mount.tobytes() + self.station.export_state())
+
+
+def split_blob(blob: bytes | None) -> tuple[Array, bytes | None]:
+    """Mounts and telemetry of what is saved beside the state; those of a first start for None."""
+    if blob is None:
+        return new_mount(), None
+    return np.frombuffer(blob[: MOUNT.itemsize], MOUNT).copy(), blob[MOUNT.itemsize :]
 
 
 def reading_of(data: Any, now: float) -> ImuReading:
-    """Reading of a cycle that ended at ``now`` (s, own clock); what is none is a reading of no numbers."""
+    """Reading of a cycle that ended at ``now`` (s, own clock); what is none is a reading of no numbers.
+
+    ``data`` is the start and the numbers of the IMU, or the start and a list of numbers for each IMU of a cluster.
+    """
     try:
-        numbers = [float(item) for item in data]
+        start, *items = data
+        begin = float(start)
+        rows = items if items and all(isinstance(item, list | tuple) for item in items) else [items]
+    except (TypeError, ValueError, OverflowError):
+        return ImuReading(now - PERIOD, now, NOTHING, NOTHING)
+    first, *others = [imu_reading(row, begin, now) for row in rows]
+    return replace(first, others=tuple(others))
+
+
+def imu_reading(items: Any, start: float, end: float) -> ImuReading:
+    """Reading of one IMU from ``start`` to ``end`` (s, own clock): three rates, three forces, perhaps a temperature."""
+    try:
+        numbers = [float(item) for item in items]
     except (TypeError, ValueError, OverflowError):
         numbers = []
-    start = numbers[0] if numbers else now - PERIOD
-    if not 7 <= len(numbers) <= 8:
-        return ImuReading(start, now, NOTHING, NOTHING)
-    _, wx, wy, wz, fx, fy, fz, *rest = numbers
-    return ImuReading(start, now, (wx, wy, wz), (fx, fy, fz), rest[0] if rest else USUAL)
+    if not 6 <= len(numbers) <= 7:
+        return ImuReading(start, end, NOTHING, NOTHING)
+    wx, wy, wz, fx, fy, fz, *rest = numbers
+    return ImuReading(start, end, (wx, wy, wz), (fx, fy, fz), rest[0] if rest else USUAL)

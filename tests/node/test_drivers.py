@@ -304,7 +304,7 @@ class Watched(TubeProcess):
 def test_a_node_whose_sensor_goes_away_goes_on_untrusted_and_comes_back(tmp_path: Path) -> None:
     cycles = Cycles()
     random = np.random.default_rng(1)
-    process = Watched(TubeSettings(3), tmp_path, imu=cycles.driver)
+    process = Watched(TubeSettings(3), tmp_path, imus=[cycles.driver])
     now = 1000.0
     for k in range(200):
         cycles.chip.absent = 100 <= k < 120
@@ -327,7 +327,7 @@ def test_a_sensor_absent_at_the_start_is_an_error(tmp_path: Path) -> None:
     chip = EmulatedMpu6500()
     chip.absent = True
     with pytest.raises(SensorError, match="mpu6500"):
-        TubeProcess(TubeSettings(3), tmp_path, imu=Mpu6500(chip.connect))
+        TubeProcess(TubeSettings(3), tmp_path, imus=[Mpu6500(chip.connect)])
     with pytest.raises(SensorError, match="absent"):
         EncoderProcess(tmp_path, QuadratureFile(tmp_path / "absent"))
 

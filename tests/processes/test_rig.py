@@ -3,6 +3,7 @@
 import contextlib
 import csv
 import json
+import math
 import os
 import signal
 import subprocess
@@ -11,7 +12,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from rigs import command, ends, free_endpoint, run, running_rig, titles_of_group
+from rigs import REPOSITORY, command, ends, free_endpoint, run, running_rig, titles_of_group
 
 from telemetry.media.zenoh_bus import open_client
 
@@ -36,6 +37,19 @@ def test_three_tubes_give_three_stations_near_the_truth_and_leave_nothing_runnin
     with (rig.out / "stations.csv").open() as file:
         assert [float(row["md_m"]) for row in csv.DictReader(file)] == [2.0, 4.0, 6.0]
     assert json.loads((rig.out / "result.json").read_text())["digest"] == result["digest"]
+
+
+def test_two_imus_in_every_tube_make_surveys_of_less_noise(tmp_path: Path) -> None:
+    for file in (REPOSITORY / "scenarios").glob("*.csv"):
+        (tmp_path / file.name).write_bytes(file.read_bytes())
+    scenario = tmp_path / "cluster.toml"
+    scenario.write_text((REPOSITORY / "scenarios" / "rig-3.toml").read_text() + "\n[node]\nimus = 2\n")
+    with running_rig(tmp_path, "--seed", "3", scenario=str(scenario)) as rig:
+        stations = rig.result()["stations"]
+    assert [s["measurements"] for s in stations] == [3, 2, 1]
+    one = math.radians(0.02) * 9.81 / math.sqrt(32.0)  # of a mean, with one IMU
+    for station in stations:
+        assert station["sigma_force_mps2"] == pytest.approx(one / math.sqrt(2.0), rel=0.15)
 
 
 def test_the_seed_alone_decides_the_result_whatever_the_load(tmp_path: Path) -> None:

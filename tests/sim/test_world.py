@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 from node.kernels.layout import PERIOD
+from sim.errors import ScenarioError
 from sim.imu_errors import ImuErrors, gauss_markov, quantise
 from sim.scenario import AccelerometerSection, GyroSection, load_scenario
 from sim.world import World, wrap
@@ -95,3 +96,45 @@ def test_the_air_depends_on_the_port_and_nothing_else() -> None:
     assert sum(not d for d in upper) / 3000 == pytest.approx(0.2, abs=0.03)
     assert sum(len(d) == 2 for d in upper) / 3000 == pytest.approx(0.1, abs=0.03)
     assert min(delay for d in upper for delay in d) >= 0.003
+
+
+def scenario_of(tmp_path: Path, *replaced: tuple[str, str]) -> Path:
+    source = Path(__file__).parents[2] / "scenarios" / "rig-3.toml"
+    text = source.read_text()
+    for table, lines in replaced:
+        head = f"[{table}]\n"
+        text = text.replace(head, head + lines + "\n") if head in text else f"{text}\n{head}{lines}\n"
+    for file in source.parent.glob("*.csv"):
+        (tmp_path / file.name).write_bytes(file.read_bytes())
+    made = tmp_path / "scenario.toml"
+    made.write_text(text)
+    return made
+
+
+def test_a_tube_may_have_several_imus_and_the_first_reads_what_it_reads_alone(tmp_path: Path) -> None:
+    world = World(load_scenario(scenario_of(tmp_path, ("node", "imus = 2\nimu_noise = [1.0, 3.0]"))), 7)
+    alone = World(SCENARIO, 7)
+    rows = np.array([world.imu_sample(1, cycle) for cycle in range(90)])
+    assert rows.shape == (90, 2, 6)
+    np.testing.assert_array_equal(rows[:, 0], [alone.imu_sample(1, cycle) for cycle in range(90)])
+    spread = rows.std(axis=0)
+    assert np.all(spread[1, 3:] > 1.8 * spread[0, 3:])
+    assert abs(np.corrcoef(rows[:, 0, 3], rows[:, 1, 3])[0, 1]) < 0.4
+    assert [imu.noise for imu in world.tube_settings(1).imus] == [1.0, 3.0]
+
+
+def test_a_mount_leans_as_the_scenario_has_it_and_turns_nothing_else(tmp_path: Path) -> None:
+    world = World(load_scenario(scenario_of(tmp_path, ("joints", "mount_tilt_std_deg = 1.0"), ("node", "imus = 2"))), 7)
+    frames = [world.imu_frame(tube, imu) for tube in (1, 2, 3) for imu in (0, 1)]
+    leans = np.degrees([math.acos(frame[2, 2]) for frame in frames])
+    assert 0.1 < leans.mean() < 4.0
+    assert len(set(leans)) == len(leans)
+    plain = np.array([World(SCENARIO, 7).imu_sample(2, cycle) for cycle in range(60)]).mean(axis=0)
+    tilted = np.array([world.imu_sample(2, cycle)[0] for cycle in range(60)]).mean(axis=0)
+    np.testing.assert_allclose(tilted[3:], world.imu_frame(2) @ plain[3:], atol=1e-4)
+
+
+@pytest.mark.parametrize("lines", ["imus = 0", "imus = 9", "imus = 2\nimu_noise = [1.0]", "imu_noise = [1.0, 1.0]"])
+def test_a_cluster_that_cannot_be_is_refused_by_name(tmp_path: Path, lines: str) -> None:
+    with pytest.raises(ScenarioError, match=r"node\.imu"):
+        load_scenario(scenario_of(tmp_path, ("node", lines)))

@@ -57,8 +57,9 @@ class EncoderSource(Protocol):
 class Alarm:
     """Keeps a source going: its fault and its return are told once, and it is started again after every failure."""
 
-    def __init__(self, source: ImuSource | EncoderSource, say: Say, name: str) -> None:
+    def __init__(self, source: ImuSource | EncoderSource, say: Say, name: str, imu: int = 0) -> None:
         self._source, self._say, self._name = source, say, name
+        self._which: dict[str, Scalar] = {"imu": imu} if imu else {}
         self._failed = self._down = False
 
     def call(self, read: Callable[[], Sample]) -> Sample | None:
@@ -71,21 +72,21 @@ class Alarm:
             sample = read()
         except SensorError as error:
             if not self._failed:
-                self._say(Severity.ERROR, f"{self._name}_failed", {"detail": str(error)[:200]})
+                self._say(Severity.ERROR, f"{self._name}_failed", {"detail": str(error)[:200], **self._which})
             self._failed = self._down = True
             return None
         if self._failed:
-            self._say(Severity.WARNING, f"{self._name}_back", {})
+            self._say(Severity.WARNING, f"{self._name}_back", self._which)
         self._failed = False
         return sample
 
 
 class SafeImu:
-    """An IMU in use: with a fault its readings are no numbers."""
+    """An IMU in use: with a fault its readings are no numbers. ``imu`` is its number in a cluster, 0 if it is alone."""
 
-    def __init__(self, source: ImuSource, say: Say) -> None:
+    def __init__(self, source: ImuSource, say: Say, imu: int = 0) -> None:
         self._source = source
-        self._alarm = Alarm(source, say, "sensor")
+        self._alarm = Alarm(source, say, "sensor", imu)
 
     def read(self, begin: float, end: float) -> ImuSample:
         """Mean over the cycle, whatever happens."""
