@@ -9,7 +9,7 @@ from typing import Literal
 import click
 
 from borechain.faults import plain_faults
-from borechain.options import key_option, place_options
+from borechain.options import above_option, below_option, clock_option, key_option, own_neighbours, place_options
 
 
 @click.command()
@@ -20,7 +20,10 @@ from borechain.options import key_option, place_options
 @click.option("--mount-std-deg", type=float, default=0.05, show_default=True, help="Error of the IMU's mount, 1 sigma.")
 @click.option("--kernel", type=click.Choice(["float64", "fixed"]), default="float64", show_default=True)
 @click.option("--scheme", type=click.Choice(["forward", "estimate"]), default="forward", show_default=True)
-@click.option("--imu", help="The node's own sensor: replay:FILE, mpu6500:BUS or mpu6500:BUS:ADDRESS.")
+@click.option("--imu", help="The node's own sensor: replay:FILE, timed:FILE, mpu6500:BUS or mpu6500:BUS:ADDRESS.")
+@clock_option
+@above_option
+@below_option
 @key_option
 @place_options
 @plain_faults
@@ -33,6 +36,9 @@ def node(
     kernel: Literal["float64", "fixed"],
     scheme: str,
     imu: str | None,
+    clock: str,
+    above: int | None,
+    below: int | None,
     key_file: Path | None,
     rig_name: str,
     endpoint: str,
@@ -41,13 +47,15 @@ def node(
     """Run the node of one tube until it is stopped.
 
     \b
-    Example:
+    Examples:
       borechain node --tube 1 --drive-joint-deg 12.5 --folder state/tube-1
+      borechain node --tube 1 --clock own --imu mpu6500:1 --above 2 --folder state/tube-1
     """
-    from borechain.processes import Place, run_node
+    from borechain.processes import OwnTime, Place, run_node
     from node.firmware.settings import Joint, TubeSettings
     from node.kernels.layout import Scheme
     from node.process.drivers.choice import imu_source
+    from telemetry.messages import Side
 
     joint_std = math.radians(joint_std_deg)
     settings = TubeSettings(
@@ -58,4 +66,6 @@ def node(
         scheme=Scheme[scheme.upper()],
         kernel=kernel,
     )
-    run_node(Place(rig_name, endpoint, folder, key_file), settings, imu_source(imu) if imu else None)
+    neighbours = own_neighbours(clock, tube, ("--imu", imu), {Side.UPPER: above, Side.LOWER: below})
+    own_time = None if neighbours is None else OwnTime(neighbours)
+    run_node(Place(rig_name, endpoint, folder, key_file), settings, imu_source(imu) if imu else None, own_time)

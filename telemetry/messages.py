@@ -192,7 +192,7 @@ class Command:
 
     tube: int  # addressee
     sequence: int
-    name: str  # take_survey, static_record, parameters
+    name: str  # take_survey, static_record, parameters, timing
     arguments: dict[str, Scalar] = field(default_factory=dict)
 
 

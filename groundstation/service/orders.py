@@ -35,6 +35,7 @@ ORDERS: dict[str, Order] = {
     "take_survey": Order({}),
     "static_record": Order({"seconds": _seconds}, ("seconds",)),
     "parameters": Order({}),
+    "timing": Order({}),
     "upload_parameters": Order(
         {"gyroscope": str, "accelerometer": str, "version": _version}, ("gyroscope", "accelerometer")
     ),

@@ -9,6 +9,7 @@ from typing import Any
 from node.firmware.encoder import EncoderNode, EncoderSample
 from node.process.counter import BootCounter
 from node.process.drivers.source import EncoderSource, SafeEncoder
+from node.process.timing import CycleTiming, Stage
 from telemetry.application.driven import Driven
 from telemetry.application.station import Station
 from telemetry.messages import ENCODER, Command, Event, Reply, Scalar, Severity, Side
@@ -21,6 +22,7 @@ class EncoderProcess(Driven):
     ----------
     folder : where its starts are counted
     source : the node's own counter; without one a cycle brings its sample
+    timing : where the encoder's own clock keeps its measurements; on a bench nothing is measured
 
     Raises
     ------
@@ -28,7 +30,8 @@ class EncoderProcess(Driven):
         When the counter is absent at the start.
     """
 
-    def __init__(self, folder: Path, source: EncoderSource | None = None) -> None:
+    def __init__(self, folder: Path, source: EncoderSource | None = None, timing: CycleTiming | None = None) -> None:
+        self._timing = timing
         if source is not None:
             source.start()
         self._source = SafeEncoder(source, self._say) if source is not None else None
@@ -49,9 +52,16 @@ class EncoderProcess(Driven):
         """The counter was read: ``data`` is start (s), count, time of its last edge (s), 1 if it rose."""
         self._now = now
         sample = self._source.read(now) if self._source is not None else sample_of(data)
+        self._lap(Stage.READ)
         if sample is not None:
             self.station.send_aiding(self.encoder.on_cycle(sample, now), now)
-        self.station.advance(now)
+        if self._timing is None:  # an own clock lets time pass between the cycles
+            self.station.advance(now)
+        self._lap(Stage.REPORT)
+
+    def _lap(self, stage: Stage) -> None:
+        if self._timing is not None:
+            self._timing.lap(stage)
 
     def _say(self, severity: Severity, code: str, arguments: dict[str, Scalar]) -> None:
         event = Event(ENCODER, self.station.new_sequence(), self._now, severity, code, arguments)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from pathlib import Path
 from typing import Any
 
@@ -17,6 +18,7 @@ from node.process.drivers.source import NOTHING, ImuSource, SafeImu
 from node.process.journal import Journal
 from node.process.parameter_keeper import ParameterKeeper, load_parameters
 from node.process.parameter_store import ParameterStore
+from node.process.timing import CycleTiming, Stage
 from telemetry.application.driven import Driven
 from telemetry.application.station import Station
 from telemetry.errors import EncodeError
@@ -38,7 +40,8 @@ from telemetry.presentation.fields import MAX_TEXT
 SAVE_EVERY = 19  # cycles, 10 s
 SYNCHRONISED_STD = 0.02  # s
 MAX_CLOCK_STD = 3600.0
-COMMANDS = ("take_survey", "static_record", "parameters")
+COMMANDS = ("take_survey", "static_record", "parameters", "timing")
+OVERRUN_EVERY = 60.0  # s between two events about overruns, so that a board too slow is not slowed further
 
 
 class TubeProcess(Driven):
@@ -51,6 +54,7 @@ class TubeProcess(Driven):
     config : one record of dtype ``CONFIG``; the default is that of an MPU6500-class node
     key : of the rig; without one the node takes no parameter block
     imu : the node's own sensor; without one a cycle brings its reading
+    timing : where the node's own clock keeps its measurements; on a bench nothing is measured
 
     Raises
     ------
@@ -65,10 +69,14 @@ class TubeProcess(Driven):
         config: Array | None = None,
         key: bytes | None = None,
         imu: ImuSource | None = None,
+        timing: CycleTiming | None = None,
     ) -> None:
         self.settings = settings
+        self._timing = timing
+        self._overrun_told = -math.inf
         if imu is not None:
             imu.start()
+        self._source = imu
         self._imu = SafeImu(imu, self._say_event) if imu is not None else None
         self.config = default_config() if config is None else config
         self._journal = Journal(folder)
@@ -123,23 +131,46 @@ class TubeProcess(Driven):
         if self._imu is not None:
             sample = self._imu.read(reading.start, now)
             reading = ImuReading(reading.start, now, sample.rate, sample.force, sample.temperature, sample.saturated)
+        self._lap(Stage.READ)
         around = self._surroundings(now)
         if around.synchronised:
             self._announce(around.rig_now, now)
-        urgent = False
-        for said in self.tube.on_cycle(reading, around):
-            urgent |= self._say(said, now)
+        said = list(self.tube.on_cycle(reading, around))
+        self._lap(Stage.FILTER)
+        urgent = [self._say(message, now) for message in said]
         if (status := self._keeper.on_cycle(reading)) is not None:
             self.station.send_status(status)
         self._cycles += 1
-        self.station.advance(now)
-        if urgent or self._cycles % SAVE_EVERY == 0:
+        if self._timing is None:  # an own clock lets time pass between the cycles
+            self.station.advance(now)
+        self._lap(Stage.REPORT)
+        if any(urgent) or self._cycles % SAVE_EVERY == 0:
             self._save()
+            self._lap(Stage.SAVE)
+
+    def on_overrun(self, missed: int, now: float) -> None:
+        """The cycle took so long that ``missed`` later ones are left out."""
+        self.tube.overruns += 1
+        if now - self._overrun_told >= OVERRUN_EVERY:
+            self._overrun_told = now
+            self._say_event(Severity.WARNING, "overrun", {"missed": missed, "overruns": self.tube.overruns})
+
+    def close(self) -> None:
+        """Keep the newest state and let the sensor go."""
+        self._save()
+        if self._source is not None:
+            self._source.close()
+
+    def _lap(self, stage: Stage) -> None:
+        if self._timing is not None:
+            self._timing.lap(stage)
 
     def _on_aiding(self, aiding: Aiding, now: float) -> None:
         clock = self.station.clock
         if not clock.synchronised:
             return
+        if self._timing is not None:
+            self._timing.add(Stage.AIDING, clock.rig_from_local(now) - aiding.valid_at)
         onward = self.tube.on_aiding(aiding, clock.local_from_rig(aiding.valid_at))
         if onward is not None:
             self.station.send_aiding(onward, now)
@@ -204,6 +235,9 @@ class TubeProcess(Driven):
             case "parameters":
                 block = self.tube.parameters
                 detail = f"version {block.version} sha256 {block.sha256().hex()}"
+            case "timing":
+                done = self._timing is not None
+                detail = self._timing.line() if self._timing else "expected a node with a clock of its own"
             case _:
                 done, detail = False, f"expected {', '.join(COMMANDS)}, got {command.name}"
         return Reply(self.settings.tube, command.sequence, done, detail[:MAX_TEXT])

@@ -307,7 +307,7 @@ def test_a_change_is_published_on_the_key_it_changes(rig: tuple[Rig, ZenohBus]) 
 @pytest.mark.parametrize(
     ("order", "named"),
     [
-        ("dance?tube=1", "take_survey|static_record|parameters|upload_parameters"),
+        ("dance?tube=1", "take_survey|static_record|parameters|timing|upload_parameters"),
         ("static_record?tube=1", "seconds"),
         ("upload_parameters?tube=9;gyroscope=identity;accelerometer=identity", "version"),
         ("upload_parameters?tube=1;gyroscope=identity;accelerometer=identity", "key_file"),
