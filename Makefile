@@ -52,6 +52,7 @@ study: $(STAMP)  ## the long studies; their tables are committed in docs/results
 	$(BIN)/borechain experiment fifty-nodes --seeds 16 --out docs/results
 	$(BIN)/borechain experiment ingredients --seeds 40 --out docs/results
 	$(BIN)/borechain experiment fixed-point --cycles 1000000 --out docs/results
+	$(BIN)/borechain bench realtime --nodes 50 --seconds 120 --out docs/results
 
 lock:  ## pin the dependencies again, without addresses (needs pip-tools)
 	pip-compile --quiet --upgrade --generate-hashes --all-extras --allow-unsafe --strip-extras --no-annotate \

@@ -1,4 +1,4 @@
-"""``borechain bench``: speed beside other libraries, measured in one run."""
+"""``borechain bench``: speed beside other libraries, measured in one run, and a string in real time."""
 
 from __future__ import annotations
 
@@ -15,41 +15,72 @@ FOLDER = Path(__file__).parents[1] / "benchmarks"
 
 
 def benches() -> list[str]:
-    """Names of the benchmarks in the repository."""
-    return sorted(path.stem for path in FOLDER.glob("*.py"))
+    """Names of the benchmarks: those of the repository, and the one of the package."""
+    return sorted([*(path.stem for path in FOLDER.glob("*.py")), "realtime"])
 
 
-@click.command()
-@click.argument("name", required=False)
-@click.option("--json", "as_json", is_flag=True, help="Print one JSON object and nothing else on stdout.")
-@plain_faults
-def bench(name: str | None, as_json: bool) -> None:
+class Benches(click.Group):
+    """Every benchmark as a command, imported when it is called."""
+
+    def list_commands(self, ctx: click.Context) -> list[str]:
+        """Names in order."""
+        del ctx
+        return benches()
+
+    def get_command(self, ctx: click.Context, cmd_name: str) -> click.Command:
+        """One of them.
+
+        Raises
+        ------
+        InputFault
+            When there is none of that name.
+        """
+        del ctx
+        if cmd_name not in benches():
+            raise InputFault(f"expected one of {', '.join(benches())}, got {cmd_name!r}")
+        if cmd_name == "realtime":
+            from borechain.realtime import realtime
+
+            return realtime
+        return side_by_side(cmd_name)
+
+
+@click.group(cls=Benches, invoke_without_command=True)
+@click.pass_context
+def bench(context: click.Context) -> None:
     """Run the benchmark NAME, or list them. The peers are development dependencies; ``make test`` installs them.
 
     \b
-    Example:
+    Examples:
       borechain bench survey
+      borechain bench realtime --nodes 50 --seconds 120
     """
-    if not benches():
-        raise EnvironmentFault(f"{FOLDER}: no benchmarks here; run from a checkout of the repository")
-    if name is None:
+    if context.invoked_subcommand is None:
         click.echo("\n".join(benches()))
-        return
-    if name not in benches():
-        raise InputFault(f"expected one of {', '.join(benches())}, got {name!r}")
-    spec = importlib.util.spec_from_file_location(f"benchmarks_{name}", FOLDER / f"{name}.py")
-    if spec is None or spec.loader is None:
-        raise EnvironmentFault(f"{FOLDER / name}.py cannot be loaded")
-    module = importlib.util.module_from_spec(spec)
-    try:
-        spec.loader.exec_module(module)
-        result = module.run()
-    except ModuleNotFoundError as error:
-        raise EnvironmentFault(f"bench {name} needs {error.name}; install the development dependencies") from error
-    if as_json:
-        click.echo(json.dumps(result))
-    else:
-        show(result)
+
+
+def side_by_side(name: str) -> click.Command:
+    """The command of one file of the folder."""
+
+    @click.command(name, help="Speed beside other libraries, measured in one run.")
+    @click.option("--json", "as_json", is_flag=True, help="Print one JSON object and nothing else on stdout.")
+    @plain_faults
+    def command(as_json: bool) -> None:
+        spec = importlib.util.spec_from_file_location(f"benchmarks_{name}", FOLDER / f"{name}.py")
+        if spec is None or spec.loader is None:
+            raise EnvironmentFault(f"{FOLDER / name}.py cannot be loaded")
+        module = importlib.util.module_from_spec(spec)
+        try:
+            spec.loader.exec_module(module)
+            result = module.run()
+        except ModuleNotFoundError as error:
+            raise EnvironmentFault(f"bench {name} needs {error.name}; install the development dependencies") from error
+        if as_json:
+            click.echo(json.dumps(result))
+        else:
+            show(result)
+
+    return command
 
 
 def show(result: dict[str, Any]) -> None:

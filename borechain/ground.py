@@ -7,7 +7,7 @@ from pathlib import Path
 import click
 
 from borechain.faults import plain_faults
-from borechain.options import key_option, place_options
+from borechain.options import clock_option, key_option, place_options
 
 TOLERANCES = ("en-12716", "5-cm", "0.27-deg")
 WEIGHTINGS = ("bayes", "equal", "linear", "quadratic", "cubic", "adaptive")
@@ -23,6 +23,7 @@ WEIGHTINGS = ("bayes", "equal", "linear", "quadratic", "cubic", "adaptive")
 @click.option("--weighting", type=click.Choice(WEIGHTINGS), default=WEIGHTINGS[0], show_default=True)
 @click.option("--accelerometer-bias-std-deg", type=click.FloatRange(0.0), default=0.002, show_default=True)
 @click.option("--mount-std-deg", type=click.FloatRange(0.0), default=0.05, show_default=True)
+@clock_option
 @key_option
 @place_options
 @plain_faults
@@ -36,6 +37,7 @@ def ground(
     weighting: str,
     accelerometer_bias_std_deg: float,
     mount_std_deg: float,
+    clock: str,
     key_file: Path | None,
     rig_name: str,
     endpoint: str,
@@ -60,4 +62,4 @@ def ground(
         "accelerometer_bias_std_deg": accelerometer_bias_std_deg,
         "mount_std_deg": mount_std_deg,
     }
-    run_ground(Place(rig_name, endpoint, folder, key_file), settings)
+    run_ground(Place(rig_name, endpoint, folder, key_file), settings, own_clock=clock == "own")

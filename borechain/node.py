@@ -4,16 +4,13 @@ from __future__ import annotations
 
 import math
 from pathlib import Path
-from typing import TYPE_CHECKING, Literal
+from typing import Literal
 
 import click
 
+from borechain.cluster import cluster
 from borechain.faults import plain_faults
-from borechain.options import key_option, place_options
-
-if TYPE_CHECKING:
-    from node.firmware.imu_settings import ImuSettings
-    from telemetry.parameters import SensorParameters
+from borechain.options import above_option, below_option, clock_option, key_option, own_neighbours, place_options
 
 FILE = click.Path(path_type=Path, dir_okay=False)
 SCHEMES = ("forward", "estimate", "intersection")
@@ -36,7 +33,7 @@ SCHEMES = ("forward", "estimate", "intersection")
     "--imu",
     "sources",
     multiple=True,
-    help="The node's own sensor: replay:FILE, mpu6500:BUS or mpu6500:BUS:ADDRESS; once for each of a cluster.",
+    help="The node's own sensor: replay:FILE, timed:FILE, mpu6500:BUS or mpu6500:BUS:ADDRESS; for each.",
 )
 @click.option("--imu-noise", "noises", type=float, multiple=True, help="Noise of an IMU, times the usual; for each.")
 @click.option(
@@ -46,6 +43,9 @@ SCHEMES = ("forward", "estimate", "intersection")
     "--imu-gyroscope", "gyroscopes", type=FILE, multiple=True, help="Calibration of an IMU's gyroscope; for each."
 )
 @click.option("--imu-accelerometer", "accelerometers", type=FILE, multiple=True, help="Of its accelerometer; for each.")
+@clock_option
+@above_option
+@below_option
 @key_option
 @place_options
 @plain_faults
@@ -65,6 +65,9 @@ def node(
     offsets: tuple[tuple[float, float], ...],
     gyroscopes: tuple[Path, ...],
     accelerometers: tuple[Path, ...],
+    clock: str,
+    above: int | None,
+    below: int | None,
     key_file: Path | None,
     rig_name: str,
     endpoint: str,
@@ -73,14 +76,16 @@ def node(
     """Run the node of one tube until it is stopped.
 
     \b
-    Example:
+    Examples:
       borechain node --tube 1 --drive-joint-deg 12.5 --folder state/tube-1
       borechain node --tube 1 --imu mpu6500:1:0x68 --imu mpu6500:1:0x69
+      borechain node --tube 1 --clock own --imu mpu6500:1 --above 2 --folder state/tube-1
     """
-    from borechain.processes import Place, run_node
+    from borechain.processes import OwnTime, Place, run_node
     from node.firmware.settings import Joint, TubeSettings
     from node.kernels.layout import Scheme
     from node.process.drivers.choice import imu_source
+    from telemetry.messages import Side
 
     joint_std = math.radians(joint_std_deg)
     settings = TubeSettings(
@@ -95,61 +100,6 @@ def node(
         joints=joints,
         imus=cluster(len(sources), noises, offsets, gyroscopes, accelerometers),
     )
-    run_node(Place(rig_name, endpoint, folder, key_file), settings, [imu_source(source) for source in sources])
-
-
-def cluster(
-    sources: int,
-    noises: tuple[float, ...],
-    offsets_mm: tuple[tuple[float, float], ...],
-    gyroscopes: tuple[Path, ...],
-    accelerometers: tuple[Path, ...],
-) -> tuple[ImuSettings, ...]:
-    """Settings of every IMU; an option that is absent leaves all of them as usual.
-
-    Raises
-    ------
-    ConfigurationError
-        When options were given for different numbers of IMUs.
-    CalibrationError
-        When a file holds no calibration of its sensor.
-    """
-    from node.errors import ConfigurationError
-    from node.firmware.imu_settings import ImuSettings
-
-    given = {
-        "imu": sources,
-        "imu-noise": len(noises),
-        "imu-offset-mm": len(offsets_mm),
-        "imu-gyroscope": len(gyroscopes),
-        "imu-accelerometer": len(accelerometers),
-    }
-    counts = {name: count for name, count in given.items() if count}
-    if len(set(counts.values())) > 1:
-        told = ", ".join(f"--{name} {count} times" for name, count in counts.items())
-        raise ConfigurationError(f"imus: expected as many of each option as there are IMUs, got {told}")
-    count = max(counts.values(), default=1)
-    rows = zip(
-        [(1e-3 * x, 1e-3 * y) for x, y in offsets_mm or ((0.0, 0.0),) * count],
-        noises or (1.0,) * count,
-        own_corrections("gyroscope", gyroscopes, count),
-        own_corrections("accelerometer", accelerometers, count),
-        strict=True,
-    )
-    return tuple(ImuSettings(*row) for row in rows)
-
-
-def own_corrections(sensor: str, files: tuple[Path, ...], count: int) -> list[SensorParameters]:
-    """Correction of one sensor of each of ``count`` IMUs; none without files."""
-    from groundstation.calibration.block import read
-    from groundstation.calibration.errors import CalibrationError
-    from groundstation.service.parameters import sensor_parameters
-    from telemetry.parameters import SensorParameters
-
-    corrections = []
-    for path in files:
-        calibration = read(path)
-        if calibration.sensor != sensor:
-            raise CalibrationError(f"{path}: sensor: expected {sensor}, got {calibration.sensor}")
-        corrections.append(sensor_parameters(calibration))
-    return corrections or [SensorParameters()] * count
+    neighbours = own_neighbours(clock, tube, ("--imu", sources), {Side.UPPER: above, Side.LOWER: below})
+    own_time = None if neighbours is None else OwnTime(neighbours)
+    run_node(Place(rig_name, endpoint, folder, key_file), settings, [imu_source(s) for s in sources], own_time)

@@ -10,6 +10,7 @@ from typing import Any
 import click
 
 from telemetry import keys
+from telemetry.messages import BASE, ENCODER, MAX_TUBE, Side, address_name
 
 FAULT_HELP = "Fault, as kill-node:3@600 or kill-node:3@600+20 (tube, s after the start, s down). Repeatable."
 
@@ -64,6 +65,61 @@ key_option = click.option(
     type=click.Path(path_type=Path, dir_okay=False),
     help="Key of the rig, 64 hex digits, readable by its owner alone. Without it no parameter block is sent or taken.",
 )
+
+
+def parse_neighbour(_context: click.Context, _parameter: click.Parameter, value: str | None) -> int | None:
+    """Address of a neighbour by its name."""
+    named = {"encoder": ENCODER, "base": BASE}
+    if value is None or value in named:
+        return None if value is None else named[value]
+    if not value.isdecimal() or not 1 <= int(value) <= MAX_TUBE:
+        raise click.BadParameter(f"expected encoder, base or a tube 1..{MAX_TUBE}, got {value}")
+    return int(value)
+
+
+clock_option = click.option(
+    "--clock",
+    type=click.Choice(["bench", "own"]),
+    default="bench",
+    show_default=True,
+    help="Who says what time it is: a bench step by step, or this machine's own clock.",
+)
+above_option = click.option(
+    "--above", callback=parse_neighbour, help="Neighbour at the upper end, with --clock own: encoder, base or a tube."
+)
+below_option = click.option(
+    "--below", callback=parse_neighbour, help="Neighbour at the lower end, with --clock own: a tube."
+)
+
+
+def own_neighbours(
+    clock: str, address: int, sensor: tuple[str, str | tuple[str, ...] | None], ends: dict[Side, int | None]
+) -> dict[Side, int] | None:
+    """Who is at the ends of a process with a clock of its own; None on a bench.
+
+    ``sensor`` is the option that names it and what was given.
+
+    Raises
+    ------
+    ConfigurationError
+        When the options do not fit each other.
+    """
+    from node.errors import ConfigurationError
+
+    joined = {side: neighbour for side, neighbour in ends.items() if neighbour is not None}
+    if clock == "bench":
+        if joined:
+            raise ConfigurationError("--above and --below: expected --clock own with them, on a bench the medium joins")
+        return None
+    option, given = sensor
+    if not given:
+        raise ConfigurationError(f"--clock own: expected {option} with it, for no bench brings readings")
+    if address in joined.values() or len(set(joined.values())) < len(joined):
+        names = ", ".join(address_name(neighbour) for neighbour in joined.values())
+        raise ConfigurationError(
+            f"--above, --below: expected two others than {address_name(address)} itself, got {names}"
+        )
+    return joined
 
 
 def parse_speed(_context: click.Context, _parameter: click.Parameter, value: str) -> float:

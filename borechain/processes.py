@@ -4,11 +4,12 @@ from __future__ import annotations
 
 import contextlib
 import ctypes
+import json
 import multiprocessing
 import queue
 import signal
 import sys
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -22,17 +23,22 @@ from node.firmware.settings import TubeSettings
 from node.firmware.torque import TorqueSettings
 from node.process.drivers.source import EncoderSource, ImuSource
 from node.process.encoder_process import EncoderProcess
+from node.process.own_clock import Inbox, OwnClock, serve_by_own_clock
+from node.process.timing import CycleTiming
 from node.process.tube_process import TubeProcess
 from sim.errors import SimError
 from telemetry import keys
+from telemetry.application.driven import Driven
 from telemetry.errors import TelemetryError
+from telemetry.media.neighbours import neighbour_ports
 from telemetry.media.stepped import BenchClient, Stepped, serve, zenoh_ports
-from telemetry.media.zenoh_bus import open_client, open_router
+from telemetry.media.zenoh_bus import ZenohBus, open_client, open_router, use_few_threads
 from telemetry.messages import BASE, ENCODER, Side
 from telemetry.transport.authentication import read_key
 
 PR_SET_PDEATHSIG = 1
 CONNECT_TIMEOUT = 30.0  # wall s
+TIMING_FILE = "timing.json"
 
 
 @dataclass(frozen=True, slots=True)
@@ -45,19 +51,72 @@ class Place:
     key_file: Path | None = None  # of the rig
 
 
-def run_node(place: Place, settings: TubeSettings, imus: Sequence[ImuSource] = ()) -> None:
+@dataclass(frozen=True, slots=True)
+class OwnTime:
+    """How a process without a bench lives: who is at its ends, and how far its clock is off."""
+
+    neighbours: Mapping[Side, int]  # address of the process at each end that is joined
+    offset: float = 0.0  # s, of its clock against the machine's
+
+
+def run_node(
+    place: Place, settings: TubeSettings, imus: Sequence[ImuSource] = (), own_time: OwnTime | None = None
+) -> None:
     """Node of one tube until a signal comes; ``imus`` are its own sensors."""
 
-    def build() -> TubeProcess:
+    def build(timing: CycleTiming | None = None) -> TubeProcess:
         key = read_key(place.key_file) if place.key_file is not None else None
-        return TubeProcess(settings, place.folder, key=key, imus=imus)
+        return TubeProcess(settings, place.folder, key=key, imus=imus, timing=timing)
 
-    run_on_bench(f"node {settings.tube}", place, settings.tube, build)
+    name = f"node {settings.tube}"
+    if own_time is None:
+        run_on_bench(name, place, settings.tube, build)
+    else:
+        run_by_own_clock(name, place, settings.tube, own_time, build)
 
 
-def run_encoder(place: Place, source: EncoderSource | None = None, torque: TorqueSettings | None = None) -> None:
+def run_encoder(
+    place: Place,
+    source: EncoderSource | None = None,
+    own_time: OwnTime | None = None,
+    torque: TorqueSettings | None = None,
+) -> None:
     """Encoder node on the drive head; ``source`` is its own counter, ``torque`` that of the drive."""
-    run_on_bench("encoder", place, ENCODER, lambda: EncoderProcess(place.folder, source, torque))
+
+    def build(timing: CycleTiming | None = None) -> EncoderProcess:
+        return EncoderProcess(place.folder, source, torque, timing)
+
+    if own_time is None:
+        run_on_bench("encoder", place, ENCODER, build)
+    else:
+        run_by_own_clock("encoder", place, ENCODER, own_time, build)
+
+
+def run_by_own_clock(
+    name: str, place: Place, address: int, own_time: OwnTime, build: Callable[[CycleTiming], Driven]
+) -> None:
+    """Build a process and run it by its own clock; ``timing.json`` tells how that went, at the end and on SIGUSR1."""
+    begin_process(name)
+    use_few_threads()
+    timing, inbox = CycleTiming(), Inbox()
+    on_termination(inbox.stop)
+    with reporting(name), open_client(place.endpoint, timeout=CONNECT_TIMEOUT) as bus:
+        process = build(timing)
+        signal.signal(signal.SIGUSR1, lambda *_: inbox.put(lambda *_: tell(place.folder, timing)))
+        try:
+            ports = neighbour_ports(bus, place.rig, address, own_time.neighbours)
+            serve_by_own_clock(process, ports, inbox, OwnClock(own_time.offset), timing)
+        finally:
+            process.close()
+            tell(place.folder, timing)
+
+
+def tell(folder: Path, timing: CycleTiming) -> None:
+    """Write down how the time went; a full disk ends no node that was only asked."""
+    fresh = folder / f"{TIMING_FILE}.new"
+    with contextlib.suppress(OSError):
+        fresh.write_text(json.dumps(timing.report()) + "\n")
+        fresh.replace(folder / TIMING_FILE)
 
 
 def run_on_bench(name: str, place: Place, address: int, build: Callable[[], Stepped]) -> None:
@@ -70,8 +129,11 @@ def run_on_bench(name: str, place: Place, address: int, build: Callable[[], Step
         serve(process, client)
 
 
-def run_ground(place: Place, settings: dict[str, Any]) -> None:
-    """Ground station: the bench drives its link, operators ask it at any time; ``settings`` are of ``GroundConfig``."""
+def run_ground(place: Place, settings: dict[str, Any], *, own_clock: bool = False) -> None:
+    """Ground station: the bench or its own clock drives its link, operators ask it at any time.
+
+    ``settings`` are of ``GroundConfig``.
+    """
     from groundstation.config import GroundConfig
     from groundstation.process import GroundProcess
 
@@ -80,10 +142,28 @@ def run_ground(place: Place, settings: dict[str, Any]) -> None:
         config = GroundConfig(rig=place.rig, folder=place.folder, key_file=place.key_file, **settings)
         process = GroundProcess(config)
         with process.serving(bus):
+            if own_clock:
+                serve_ground(process, bus, place.rig)
+                return
             ports = zenoh_ports(bus, place.rig, BASE, [Side.LOWER])
             client = BenchClient(bus, place.rig, BASE, ports, hears_depth=True)
             on_termination(client.stop)
             serve(process, client)
+
+
+def serve_ground(process: Driven, bus: ZenohBus, rig: str) -> None:
+    """Run the ground station by its own clock, below it the encoder."""
+    inbox = Inbox()
+    on_termination(inbox.stop)
+
+    def hear_depth(_key: str, payload: bytes) -> None:
+        with contextlib.suppress(ValueError, TypeError, msgpack.UnpackException):  # what is no depth is not heard
+            rig_time, md = map(float, msgpack.unpackb(payload))
+            inbox.put(lambda listener, _now: listener.on_depth(rig_time, md))
+
+    bus.subscribe(keys.DEPTH.format(rig=rig), hear_depth)
+    ports = neighbour_ports(bus, rig, BASE, {Side.LOWER: ENCODER})
+    serve_by_own_clock(process, ports, inbox, OwnClock(), CycleTiming())
 
 
 def run_medium(

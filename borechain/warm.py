@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import gc
+
 import borechain.processes
 import groundstation.process
 import sim.bench
@@ -10,5 +12,8 @@ import sim.world
 from node.kernels.warm import warm_up
 
 warm_up()
+# a collection in a child writes into every object that it looks at: 45 MB of shared pages would become its own
+gc.collect()
+gc.freeze()
 
 __all__ = ["borechain", "groundstation", "sim"]

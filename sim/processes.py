@@ -47,6 +47,12 @@ class ProcessTable:
 
     _context: Any = None
 
+    def warm(self) -> None:
+        """Start the fork server and wait until it has imported everything."""
+        process = self._context.Process(target=nothing)
+        process.start()
+        process.join()
+
     def reconcile(self, wanted: list[str], kill: list[str]) -> None:
         """Start what is wanted and not running, kill what is to be killed, note what died by itself."""
         for name in kill:
@@ -90,3 +96,7 @@ class ProcessTable:
             self.failures.append(
                 f"process {name} ended {self.restarts[name]} times, last with status {process.exitcode}"
             )
+
+
+def nothing() -> None:
+    """What the first process forked does."""

@@ -197,7 +197,7 @@ class Command:
 
     tube: int  # addressee
     sequence: int
-    name: str  # take_survey, static_record, parameters, align, alignment
+    name: str  # take_survey, static_record, parameters, align, alignment, timing
     arguments: dict[str, Scalar] = field(default_factory=dict)
 
 

@@ -37,6 +37,7 @@ ORDERS: dict[str, Order] = {
     "parameters": Order({}),
     "align": Order({"method": str, "turns": _number}),
     "alignment": Order({}),
+    "timing": Order({}),
     "upload_parameters": Order(
         {"gyroscope": str, "accelerometer": str, "version": _version}, ("gyroscope", "accelerometer")
     ),

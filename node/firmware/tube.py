@@ -131,7 +131,7 @@ class Tube:
         self._next_sequence = next_sequence
         self._restored = restored
         self._cycles = 0
-        self._overruns = 0
+        self.overruns = 0
         self._rate, self._force = np.zeros(3), np.zeros(3)
         self._rejecting = False
         self._noticed = Status.NONE  # between cycles
@@ -207,7 +207,7 @@ class Tube:
         level_coarsely(self.state, self.config, self._rate, self._force)
         self._slow_cycles = self._slow_cycles + 1 if max(map(abs, self._rate)) < LARGEST_OFFSET else 0
         if self._cycles and reading.start - self.state["now"] > 0.5 * (reading.end - reading.start):
-            self._overruns += 1
+            self.overruns += 1
         status = self._noticed | self._run(reading, 1 if around.joined else 0)
         self._noticed = Status.NONE
         self._cycles += 1
@@ -499,7 +499,7 @@ class Tube:
             clock_var=around.clock_var,
             flags=self.flags(around, end),
             cycles=self._cycles,
-            overruns=self._overruns,
+            overruns=self.overruns,
             parameters_version=self.parameters.version,
             parameters_hash=self._short_hash,
             alignment=(pitch, roll, float(self._mount[0]["std"][0].max())),

@@ -10,6 +10,7 @@ from node.firmware.encoder import EncoderNode, EncoderSample
 from node.firmware.torque import TorqueSettings
 from node.process.counter import BootCounter
 from node.process.drivers.source import EncoderSource, SafeEncoder
+from node.process.timing import CycleTiming, Stage
 from telemetry.application.driven import Driven
 from telemetry.application.station import Station
 from telemetry.messages import ENCODER, Command, Event, Reply, Scalar, Severity, Side
@@ -23,6 +24,7 @@ class EncoderProcess(Driven):
     folder : where its starts are counted
     source : the node's own counter; without one a cycle brings its sample
     torque : what the crew knows of the drive's torque; the default is a rigid string
+    timing : where the encoder's own clock keeps its measurements; on a bench nothing is measured
 
     Raises
     ------
@@ -30,7 +32,14 @@ class EncoderProcess(Driven):
         When the counter is absent at the start.
     """
 
-    def __init__(self, folder: Path, source: EncoderSource | None = None, torque: TorqueSettings | None = None) -> None:
+    def __init__(
+        self,
+        folder: Path,
+        source: EncoderSource | None = None,
+        torque: TorqueSettings | None = None,
+        timing: CycleTiming | None = None,
+    ) -> None:
+        self._timing = timing
         if source is not None:
             source.start()
         self._source = SafeEncoder(source, self._say) if source is not None else None
@@ -54,9 +63,16 @@ class EncoderProcess(Driven):
         """
         self._now = now
         sample = self._source.read(now) if self._source is not None else sample_of(data)
+        self._lap(Stage.READ)
         if sample is not None:
             self.station.send_aiding(self.encoder.on_cycle(sample, now), now)
-        self.station.advance(now)
+        if self._timing is None:  # an own clock lets time pass between the cycles
+            self.station.advance(now)
+        self._lap(Stage.REPORT)
+
+    def _lap(self, stage: Stage) -> None:
+        if self._timing is not None:
+            self._timing.lap(stage)
 
     def _say(self, severity: Severity, code: str, arguments: dict[str, Scalar]) -> None:
         event = Event(ENCODER, self.station.new_sequence(), self._now, severity, code, arguments)

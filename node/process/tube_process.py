@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
@@ -22,6 +23,7 @@ from node.process.drivers.source import NOTHING, ImuSource, SafeImu
 from node.process.journal import Journal
 from node.process.parameter_keeper import ParameterKeeper, load_parameters
 from node.process.parameter_store import ParameterStore
+from node.process.timing import CycleTiming, Stage
 from telemetry.application.driven import Driven
 from telemetry.application.station import Station
 from telemetry.errors import EncodeError
@@ -44,7 +46,8 @@ SAVE_EVERY = 19  # cycles, 10 s
 SYNCHRONISED_STD = 0.05  # s, what the time-stamp state of the filter can take
 MAX_CLOCK_STD = 3600.0
 USUAL_TURNS = 2.0  # of an alignment
-COMMANDS = ("take_survey", "static_record", "parameters", "align", "alignment")
+COMMANDS = ("take_survey", "static_record", "parameters", "align", "alignment", "timing")
+OVERRUN_EVERY = 60.0  # s between two events about overruns, so that a board too slow is not slowed further
 
 
 class TubeProcess(Driven):
@@ -57,6 +60,7 @@ class TubeProcess(Driven):
     config : one record of dtype ``CONFIG``; the default is that of an MPU6500-class node
     key : of the rig; without one the node takes no parameter block
     imus : the node's own sensors, as many as the settings have; without any a cycle brings its reading
+    timing : where the node's own clock keeps its measurements; on a bench nothing is measured
 
     Raises
     ------
@@ -71,12 +75,16 @@ class TubeProcess(Driven):
         config: Array | None = None,
         key: bytes | None = None,
         imus: Sequence[ImuSource] = (),
+        timing: CycleTiming | None = None,
     ) -> None:
         self.settings = settings
+        self._timing = timing
+        self._overrun_told = -math.inf
         if len(imus) not in (0, len(settings.imus)):
             raise ConfigurationError(f"imus: expected {len(settings.imus)} sources, got {len(imus)}")
         for imu in imus:
             imu.start()
+        self._sources = imus
         self._imus = [SafeImu(imu, self._say_event, k if len(imus) > 1 else 0) for k, imu in enumerate(imus, 1)]
         self.config = default_config() if config is None else config
         self._journal = Journal(folder)
@@ -145,23 +153,46 @@ class TubeProcess(Driven):
             start, samples = reading.start, [imu.read(reading.start, now) for imu in self._imus]
             first, *others = [ImuReading(start, now, s.rate, s.force, s.temperature, s.saturated) for s in samples]
             reading = replace(first, others=tuple(others))
+        self._lap(Stage.READ)
         around = self._surroundings(now)
         if around.synchronised:
             self._announce(around.rig_now, now)
-        urgent = False
-        for said in self.tube.on_cycle(reading, around):
-            urgent |= self._say(said, now)
+        said = list(self.tube.on_cycle(reading, around))
+        self._lap(Stage.FILTER)
+        urgent = [self._say(message, now) for message in said]
         if (status := self._keeper.on_cycle(self.tube.raw or reading)) is not None:
             self.station.send_status(status)
         self._cycles += 1
-        self.station.advance(now)
-        if urgent or self._cycles % SAVE_EVERY == 0:
+        if self._timing is None:  # an own clock lets time pass between the cycles
+            self.station.advance(now)
+        self._lap(Stage.REPORT)
+        if any(urgent) or self._cycles % SAVE_EVERY == 0:
             self._save()
+            self._lap(Stage.SAVE)
+
+    def on_overrun(self, missed: int, now: float) -> None:
+        """The cycle took so long that ``missed`` later ones are left out."""
+        self.tube.overruns += 1
+        if now - self._overrun_told >= OVERRUN_EVERY:
+            self._overrun_told = now
+            self._say_event(Severity.WARNING, "overrun", {"missed": missed, "overruns": self.tube.overruns})
+
+    def close(self) -> None:
+        """Keep the newest state and let the sensor go."""
+        self._save()
+        for source in self._sources:
+            source.close()
+
+    def _lap(self, stage: Stage) -> None:
+        if self._timing is not None:
+            self._timing.lap(stage)
 
     def _on_aiding(self, aiding: Aiding, now: float) -> None:
         clock = self.station.clock
         if not clock.synchronised:
             return
+        if self._timing is not None:
+            self._timing.add(Stage.AIDING, clock.rig_from_local(now) - aiding.valid_at)
         onward = self.tube.on_aiding(aiding, clock.local_from_rig(aiding.valid_at))
         if onward is not None:
             self.station.send_aiding(onward, now)
@@ -235,6 +266,9 @@ class TubeProcess(Driven):
             case "parameters":
                 block = self.tube.parameters
                 detail = f"version {block.version} sha256 {block.sha256().hex()}"
+            case "timing":
+                done = self._timing is not None
+                detail = self._timing.line() if self._timing else "expected a node with a clock of its own"
             case _:
                 done, detail = False, f"expected {', '.join(COMMANDS)}, got {command.name}"
         return Reply(self.settings.tube, command.sequence, done, detail[:MAX_TEXT])

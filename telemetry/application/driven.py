@@ -13,8 +13,18 @@ class Driven:
 
     station: Station
 
+    def on_frame(self, side: Side, frame: bytes, now: float) -> None:
+        """A frame arrived at one end; what it says to this process is for a subclass to take."""
+        self.station.receive(side, frame, now)
+
     def on_cycle(self, data: Any, now: float) -> None:
         """A cycle has ended; a process without a sensor has none."""
+
+    def on_overrun(self, missed: int, now: float) -> None:
+        """A cycle ended at ``now`` when ``missed`` later ones should have begun; only an own clock tells."""
+
+    def close(self) -> None:
+        """The process ends as it was asked to: let sensors go, keep what is worth keeping."""
 
     def on_depth(self, rig_time: float, md: float) -> None:
         """The rig measured the depth of the bit (m); most processes do not hear it."""

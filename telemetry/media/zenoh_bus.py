@@ -6,6 +6,7 @@ Callbacks arrive on zenoh's own threads; whoever registers one must only put int
 from __future__ import annotations
 
 import json
+import os
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
@@ -17,6 +18,9 @@ from telemetry.errors import MediumError
 
 MSGPACK = "application/msgpack"
 JSON = "application/json"
+ONE_POOL = (
+    "(app: (worker_threads: 1), acc: (handover: app), tx: (handover: app), rx: (handover: app), net: (handover: app))"
+)
 
 
 @dataclass(frozen=True, slots=True)
@@ -93,6 +97,11 @@ class ZenohBus:
             self._session.declare_subscriber(pattern, lambda s: callback(str(s.key_expr), s.payload.to_bytes()))
         )
 
+    def subscribe_at_once(self, pattern: str, callback: Callable[[str, bytes], None]) -> None:
+        """The same on the thread that receives, not on one more: ``callback`` must only put into a queue."""
+        direct: Any = zenoh.handlers.Callback(lambda s: callback(str(s.key_expr), s.payload.to_bytes()), indirect=False)
+        self._declared.append(self._session.declare_subscriber(pattern, direct))
+
     def queryable(self, pattern: str, handler: Callable[[Query], None]) -> None:
         """Answer queries that intersect ``pattern`` with ``handler`` on a foreign thread."""
 
@@ -147,8 +156,16 @@ class ZenohPort:
         self._publisher.put(frame)
 
     def listen(self, deliver: Callable[[bytes], None]) -> None:
-        """Call ``deliver`` on a foreign thread for every frame that arrives."""
-        self._bus.subscribe(self._receive_key, lambda _key, frame: deliver(frame))
+        """Call ``deliver``, which only puts into a queue, on a foreign thread for every frame that arrives."""
+        self._bus.subscribe_at_once(self._receive_key, lambda _key, frame: deliver(frame))
+
+
+def use_few_threads() -> None:
+    """Have this process's sessions share one pool of threads: for a board, or many processes on a machine.
+
+    It works before the first session is opened; what stands in the environment already wins.
+    """
+    os.environ.setdefault("ZENOH_RUNTIME", ONE_POOL)
 
 
 @contextmanager

@@ -307,7 +307,7 @@ def test_a_change_is_published_on_the_key_it_changes(rig: tuple[Rig, ZenohBus]) 
 @pytest.mark.parametrize(
     ("order", "named"),
     [
-        ("dance?tube=1", "take_survey|static_record|parameters|align|alignment|upload_parameters"),
+        ("dance?tube=1", "take_survey|static_record|parameters|align|alignment|timing|upload_parameters"),
         ("static_record?tube=1", "seconds"),
         ("align?tube=1;turns=two", "turns"),
         ("align?tube=1;speed=7", "method"),

@@ -16,6 +16,7 @@ from node.process.drivers.mpu6500 import Mpu6500, open_bus
 from node.process.drivers.quadrature import QuadratureFile
 from node.process.drivers.replay import ReplayEncoder, ReplayImu
 from node.process.drivers.source import SafeEncoder, SafeImu
+from node.process.drivers.timed import TimedEncoder, TimedImu
 from node.process.encoder_process import EncoderProcess
 from node.process.tube_process import TubeProcess
 from telemetry.messages import Event, Severity
@@ -252,12 +253,16 @@ def test_a_counter_that_answers_nonsense_is_named(tmp_path: Path, content: str) 
         source.read(1.0)
 
 
-def test_sources_are_chosen_by_name() -> None:
-    assert isinstance(imu_source("replay:a.csv"), ReplayImu)
+def test_sources_are_chosen_by_name(tmp_path: Path) -> None:
+    recording = tmp_path / "a.csv"
+    recording.touch()
+    assert isinstance(imu_source(f"replay:{recording}"), ReplayImu)
+    assert isinstance(imu_source(f"timed:{recording}"), TimedImu)
     assert isinstance(imu_source("mpu6500:1"), Mpu6500)
     assert isinstance(imu_source("mpu6500:1:0x69"), Mpu6500)
     assert isinstance(encoder_source("counter:/sys/x"), QuadratureFile)
-    assert isinstance(encoder_source("replay:a.npy"), ReplayEncoder)
+    assert isinstance(encoder_source(f"replay:{recording}"), ReplayEncoder)
+    assert isinstance(encoder_source(f"timed:{recording}"), TimedEncoder)
     for text in ("", "replay:", "mpu6500:", "mpu6500:x", "mpu6500:-1", "mpu6500:1:0x70", "mpu9250:1"):
         with pytest.raises(ConfigurationError, match="imu: expected"):
             imu_source(text)

@@ -1,4 +1,4 @@
-"""A source by its name on the command line: ``replay:FILE``, ``mpu6500:1``, ``mpu6500:1:0x69``, ``counter:FILE``."""
+"""A source by its name on the command line: ``replay:FILE``, ``timed:FILE``, ``mpu6500:1``, ``counter:FILE``."""
 
 from __future__ import annotations
 
@@ -9,9 +9,10 @@ from node.process.drivers.mpu6500 import ADDRESS, Mpu6500, open_bus
 from node.process.drivers.quadrature import QuadratureFile
 from node.process.drivers.replay import ReplayEncoder, ReplayImu
 from node.process.drivers.source import EncoderSource, ImuSource
+from node.process.drivers.timed import TimedEncoder, TimedImu
 
-IMU_FORMS = "replay:FILE, mpu6500:BUS or mpu6500:BUS:ADDRESS"
-COUNTER_FORMS = "replay:FILE or counter:FILE"
+IMU_FORMS = "replay:FILE, timed:FILE, mpu6500:BUS or mpu6500:BUS:ADDRESS"
+COUNTER_FORMS = "replay:FILE, timed:FILE or counter:FILE"
 LARGEST_BUS = 255
 ADDRESSES = (0x68, 0x69)
 
@@ -22,11 +23,13 @@ def imu_source(text: str) -> ImuSource:
     Raises
     ------
     ConfigurationError
-        When it names none.
+        When it names none, or a recording that is not there.
     """
     kind, _, rest = text.partition(":")
     if kind == "replay" and rest:
-        return ReplayImu(Path(rest))
+        return ReplayImu(recording("imu", rest))
+    if kind == "timed" and rest:
+        return TimedImu(recording("imu", rest))
     if kind == "mpu6500":
         bus, _, address = rest.partition(":")
         try:
@@ -44,11 +47,26 @@ def encoder_source(text: str) -> EncoderSource:
     Raises
     ------
     ConfigurationError
-        When it names none.
+        When it names none, or a recording that is not there.
     """
     kind, _, rest = text.partition(":")
     if kind == "replay" and rest:
-        return ReplayEncoder(Path(rest))
+        return ReplayEncoder(recording("counter", rest))
+    if kind == "timed" and rest:
+        return TimedEncoder(recording("counter", rest))
     if kind == "counter" and rest:
         return QuadratureFile(Path(rest))
     raise ConfigurationError(f"counter: expected {COUNTER_FORMS}, got {text!r}")
+
+
+def recording(option: str, name: str) -> Path:
+    """File of a recording.
+
+    Raises
+    ------
+    ConfigurationError
+        When there is none of that name.
+    """
+    if not Path(name).is_file():
+        raise ConfigurationError(f"{option}: expected a recording, got {name}, which is no file")
+    return Path(name)

@@ -1,0 +1,219 @@
+"""Real processes on their own clocks over loopback: the yaw comes down, a killed node keeps it, the end is clean."""
+
+from __future__ import annotations
+
+import json
+import math
+import queue
+import shutil
+import signal
+import socket
+import subprocess
+import threading
+import time
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import Any
+
+import pytest
+from click.testing import CliRunner
+from rigs import PATIENCE, REPOSITORY, command, free_endpoint, run
+
+from borechain.encoder import encoder
+from borechain.node import node
+from node.process.own_clock import Inbox, OwnClock, serve_by_own_clock
+from node.process.timing import CycleTiming
+from node.process.tube_process import TubeProcess
+from sim.turning_string import TurningString
+from telemetry.application.driven import Driven
+from telemetry.application.station import Station
+from telemetry.media.neighbours import neighbour_ports
+from telemetry.media.zenoh_bus import ZenohBus, open_router
+from telemetry.messages import BASE, ENCODER, Command, Event, NodeFlag, NodeState, Reply, Side
+
+RIG = "own-clock"
+UNFIT = NodeFlag.YAW_UNTRUSTED | NodeFlag.CLOCK_UNSYNCHRONISED
+
+
+class Surface(Driven):
+    """The base station; what it hears goes into a queue."""
+
+    def __init__(self) -> None:
+        self.station = Station(BASE, frozenset({Side.LOWER}), boot_count=1)
+        self.inbox = Inbox()
+        self.heard: queue.SimpleQueue[Any] = queue.SimpleQueue()
+
+    def on_frame(self, side: Side, frame: bytes, now: float) -> None:
+        for received in self.station.receive(side, frame, now):
+            if isinstance(received.message, Event):
+                self.station.acknowledge(received.message.tube, received.message.sequence, now)
+            self.heard.put(received.message)
+
+    def first(self, kind: type, fits: Callable[[Any], bool]) -> Any:
+        """The next message of a kind that fits."""
+        deadline = time.monotonic() + PATIENCE
+        while True:
+            message = self.heard.get(timeout=max(deadline - time.monotonic(), 0.0))
+            if isinstance(message, kind) and fits(message):
+                return message
+
+
+class String:
+    """An encoder and a tube in processes of their own, and whatever else is started."""
+
+    def __init__(self, folder: Path, endpoint: str) -> None:
+        self.folder, self.endpoint = folder, endpoint
+        self.truth = TurningString(1, time.monotonic(), 600.0, 10.0, 700.0, seed=4, farthest_clock=0.0)
+        self.truth.record(folder)
+        self.running: dict[str, subprocess.Popen[str]] = {}
+
+    def start(self, name: str, *options: str) -> None:
+        words = command(name, "--clock", "own", "--rig", RIG, "--endpoint", self.endpoint, *options)
+        words += ["--folder", str(self.folder / name)]
+        self.running[name] = subprocess.Popen(
+            words, cwd=REPOSITORY, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
+        )
+
+    def start_encoder(self) -> None:
+        recording = f"timed:{self.folder / 'encoder.npy'}"
+        self.start("encoder", "--counter", recording, "--above", "base", "--below", "1")
+
+    def start_node(self) -> None:
+        recording, joint = f"timed:{self.folder / 'tube-1.npy'}", self.truth.settings(1).drive_joint
+        angle = f"--drive-joint-deg={math.degrees(joint.angle)}"
+        self.start("node", "--tube", "1", "--imu", recording, "--above", "encoder", angle)
+
+    def kill(self, name: str) -> None:
+        self.running[name].kill()
+        self.running.pop(name).communicate()
+
+    def end(self) -> None:
+        """Ask every process to end, and see that it does so in silence."""
+        for process in self.running.values():
+            process.send_signal(signal.SIGTERM)
+        for process in self.running.values():
+            assert process.communicate(timeout=PATIENCE) == ("", "")
+            assert process.returncode == 0
+        self.running.clear()
+
+
+@pytest.fixture
+def router() -> Iterator[tuple[str, ZenohBus]]:
+    endpoint = free_endpoint()
+    with open_router(endpoint) as bus:
+        yield endpoint, bus
+
+
+@pytest.fixture
+def string(tmp_path: Path, router: tuple[str, ZenohBus]) -> Iterator[String]:
+    string = String(tmp_path, router[0])
+    yield string
+    for name in list(string.running):
+        string.kill(name)
+
+
+@pytest.fixture
+def surface(router: tuple[str, ZenohBus]) -> Iterator[Surface]:
+    surface = Surface()
+    ports = neighbour_ports(router[1], RIG, BASE, {Side.LOWER: ENCODER})
+    arguments = (surface, ports, surface.inbox, OwnClock(), CycleTiming())
+    loop = threading.Thread(target=serve_by_own_clock, args=arguments)
+    loop.start()
+    yield surface
+    surface.inbox.stop()
+    loop.join()
+
+
+def test_a_node_finds_its_yaw_keeps_it_over_a_kill_and_ends_when_asked(
+    string: String, surface: Surface, tmp_path: Path
+) -> None:
+    string.start_encoder()
+    string.start_node()
+    state = surface.first(NodeState, lambda s: not s.flags & UNFIT)
+    assert abs(string.truth.yaw_error(1, state.yaw, state.at)) < 0.02
+    assert state.hops == 1
+    surface.inbox.put(lambda process, now: process.station.command(Command(1, 5, "timing"), now))
+    reply = surface.first(Reply, lambda r: r.sequence == 5)
+    assert reply.done
+    assert " aiding " in reply.detail
+
+    string.kill("node")
+    saved = tmp_path / "saved"
+    shutil.copytree(tmp_path / "node", saved)
+    kept = TubeProcess(string.truth.settings(1), saved)
+    assert abs(string.truth.yaw_error(1, kept.tube.yaw, state.at)) < 0.02
+
+    string.start_node()
+    event = surface.first(Event, lambda e: e.code == "restored")
+    assert event.tube == 1
+    state = surface.first(NodeState, lambda s: s.flags & NodeFlag.RESTORED and not s.flags & UNFIT)
+    assert abs(string.truth.yaw_error(1, state.yaw, state.at)) < 0.02
+
+    string.running["node"].send_signal(signal.SIGUSR1)
+    while not (tmp_path / "node" / "timing.json").exists():
+        surface.first(NodeState, lambda s: s.tube == 1)
+
+    string.end()
+    for name in ("encoder", "node"):
+        report = json.loads((tmp_path / name / "timing.json").read_text())
+        assert report["cycles"] > 0
+        assert report["stages_ms"]["cycle"]["count"] == report["cycles"]
+
+
+def test_an_operator_asks_a_node_how_its_time_goes(string: String, router: tuple[str, ZenohBus]) -> None:
+    string.start("ground")
+    string.start_encoder()
+    string.start_node()
+    deadline, replies = time.monotonic() + PATIENCE, []
+    while not replies and time.monotonic() < deadline:
+        found = router[1].get(f"borechain/{RIG}/cmd/timing?tube=1", 10.0)
+        replies = [json.loads(reply.payload) for reply in found if reply.error is None]
+    assert replies[0]["done"], replies
+    assert replies[0]["detail"].startswith("cycles ")
+    string.end()
+
+
+def test_the_bench_measures_every_process(tmp_path: Path) -> None:
+    done = run("bench", "realtime", "--nodes", "2", "--seconds", "4", "--endpoint", free_endpoint(),
+               "--out", str(tmp_path), "--json")  # fmt: skip
+    assert done.returncode == 0, done.stderr
+    result = json.loads(done.stdout)
+    assert [case["hop"] for case in result["cases"]] == [0, 1, 2]
+    for case in result["cases"]:
+        assert case["cycles"] > 0
+        assert 0.0 < case["private_mb"] <= case["pss_mb"]
+        assert case["cycle_median_ms"] <= case["cycle_p99_ms"] <= case["cycle_max_ms"]
+    assert result["total"]["private_mb"] == pytest.approx(sum(case["private_mb"] for case in result["cases"]))
+    assert len((tmp_path / "realtime.csv").read_text().splitlines()) == 4
+
+
+@pytest.mark.parametrize(
+    ("which", "words", "says"),
+    [
+        (node, ("--tube", "1", "--clock", "own"), "--clock own: expected --imu with it"),
+        (encoder, ("--clock", "own"), "--clock own: expected --counter with it"),
+        (node, ("--tube", "1", "--clock", "own", "--imu", "timed:none.npy"), "got none.npy, which is no file"),
+        (node, ("--tube", "1", "--clock", "sundial"), "'sundial' is not one of 'bench', 'own'"),
+        (node, ("--tube", "1", "--above", "2"), "expected --clock own with them"),
+        (node, ("--tube", "1", "--clock", "own", "--above", "sky"), "expected encoder, base or a tube 1..250, got sky"),
+        (node, ("--tube", "1", "--clock", "own", "--imu", "mpu6500:1", "--above", "1"), "others than 1 itself, got 1"),
+        (encoder, ("--clock", "own", "--counter", "counter:x", "--above", "3", "--below", "3"), "got 3, 3"),
+    ],
+)
+def test_options_that_cannot_be_are_refused(which: Any, words: tuple[str, ...], says: str) -> None:
+    done = CliRunner().invoke(which, words)
+    assert done.exit_code == 2
+    assert says in done.output
+    assert len([line for line in done.output.splitlines() if line.startswith("Error")]) == 1
+
+
+def test_a_busy_port_is_one_line() -> None:
+    with socket.socket() as taken:
+        taken.bind(("127.0.0.1", 0))
+        taken.listen()
+        endpoint = f"tcp/127.0.0.1:{taken.getsockname()[1]}"
+        done = run("bench", "realtime", "--nodes", "1", "--endpoint", endpoint)
+    assert done.returncode == 1
+    assert done.stderr.strip().splitlines() == [
+        f"Error: endpoint {endpoint}: Address already in use; choose another with --endpoint tcp/127.0.0.1:PORT"
+    ]
