@@ -47,6 +47,7 @@ study: $(STAMP)  ## the long studies; their tables are committed in docs/results
 	$(BIN)/borechain experiment two-nodes --seeds 200 --out docs/results
 	$(BIN)/borechain experiment tuning --seeds 100 --out docs/results
 	$(BIN)/borechain experiment delay --seeds 25 --out docs/results
+	$(BIN)/borechain experiment consistency --seeds 500 --control-seeds 100 --out docs/results
 	$(BIN)/borechain experiment outage --seeds 60 --out docs/results
 	$(BIN)/borechain experiment alignment --seeds 100 --out docs/results
 	$(BIN)/borechain experiment fifty-nodes --seeds 16 --out docs/results

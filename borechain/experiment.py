@@ -11,6 +11,7 @@ from typing import Any
 import click
 
 from borechain.alignment_experiment import alignment
+from borechain.consistency_experiment import consistency
 from borechain.faults import plain_faults
 from borechain.kernel_experiments import COMMANDS as KERNEL_COMMANDS
 from borechain.node_experiments import COMMANDS as NODE_COMMANDS
@@ -73,7 +74,7 @@ def experiment() -> None:
     """
 
 
-for command in (alignment, coverage, regions, weighting, *NODE_COMMANDS, *KERNEL_COMMANDS):
+for command in (alignment, consistency, coverage, regions, weighting, *NODE_COMMANDS, *KERNEL_COMMANDS):
     experiment.add_command(command)
 
 
@@ -98,9 +99,10 @@ def relay(hops: int, seeds: int, out: Path | None, as_json: bool) -> None:
     Example:
       borechain experiment relay --hops 10 --seeds 40 --out docs/results
     """
+    from node.kernels.layout import Scheme
     from sim.experiments.relay import run
 
-    with progress("seeds", 2 * seeds, quiet=as_json) as step:
+    with progress("seeds", len(Scheme) * seeds, quiet=as_json) as step:
         result = run(hops, seeds, step)
     keep(out, result, RELAY_COLUMNS)
     ends = [f"{scheme}: every NEES within [0.5, 2]: {yes(good)}" for scheme, good in result["consistent"].items()]

@@ -260,3 +260,40 @@ def alignment_figure(
     handles.append(Line2D([], [], color=GREY, ls=":", lw=0.9, label="published"))
     figure.legend(handles=handles, loc="outside lower left", ncols=4)
     return tidy(figure)
+
+
+@dataclass(frozen=True, slots=True)
+class SchemeNees:
+    """Consistency of one scheme at one epoch and hop."""
+
+    scheme: str
+    state: str
+    hop: int
+    nees: float
+    nees_total: float  # with the constant errors of joints and mounts
+
+
+def scheme_figure(found: Sequence[SchemeNees], bounds: tuple[float, float], title: str) -> Figure:
+    """NEES over hops of every scheme, at rest and turning; open markers count joints and mounts."""
+    states = list(dict.fromkeys(f.state for f in found))
+    schemes = list(dict.fromkeys(f.scheme for f in found))
+    figure = new_figure(4.2, title)
+    grid = figure.subplots(1, len(states), sharey=True, squeeze=False)[0]
+    for axes, state in zip(grid, states, strict=True):
+        axes.axhspan(*bounds, color=LIGHT, alpha=0.6, lw=0.0)
+        axes.axhline(1.0, color=GREY, lw=0.8)
+        for k, scheme in enumerate(schemes):
+            of = [f for f in found if f.scheme == scheme and f.state == state]
+            hops = [f.hop for f in of]
+            axes.plot(hops, [f.nees for f in of], ls="", color=SERIES[k], marker=MARKERS[k])
+            axes.plot(hops, [f.nees_total for f in of], ls="", color=SERIES[k], marker=MARKERS[k], mfc="none")
+        ticks = sorted({f.hop for f in found})
+        axes.set(title=state.capitalize(), xscale="log", yscale="log", xlabel="Hop")
+        axes.set_xticks(ticks, [f"{hop}" for hop in ticks])
+        axes.minorticks_off()
+    grid[0].set_ylabel("NEES")
+    handles = [Line2D([], [], ls="", color=SERIES[k], marker=MARKERS[k], label=s) for k, s in enumerate(schemes)]
+    handles.append(Line2D([], [], ls="", color=INK, marker="o", mfc="none", label="with joints and mounts"))
+    handles_all = [*handles, Patch(color=LIGHT, alpha=0.6, label=f"{bounds[0]:g} to {bounds[1]:g}")]
+    figure.legend(handles=handles_all, loc="outside lower left", ncols=5)
+    return tidy(figure)

@@ -34,33 +34,33 @@ def setup_of(scheme: Scheme, hops: int = HOPS) -> ChainSetup:
     return ChainSetup(hops, scheme, blocks=2, clock_std=5e-3, loss=LOSS, link=OnOff(20.0, 30.0))
 
 
-def run(seeds: int, step: Callable[[], None], hops: int = HOPS) -> dict[str, Any]:
+def run(seeds: int, controls: int, step: Callable[[], None], hops: int = HOPS) -> dict[str, Any]:
     """Table of every scheme; ``step`` is called after each seed of each scheme.
+
+    Parameters
+    ----------
+    seeds : of ``forward``
+    controls : seeds of the other schemes
 
     Returns
     -------
     dict
         ``cases``: rows of scheme, epoch and hop; ``schemes``: by scheme the ``outside`` share of its cells, the
-        ``worst`` NEES and whether it is ``consistent``; ``standard_error`` of a cell.
+        ``worst`` NEES, whether it is ``consistent``, its ``seeds`` and the ``standard_error`` of a cell.
     """
     cases: list[dict[str, Any]] = []
     schemes: dict[str, dict[str, Any]] = {}
     with multiprocessing.get_context("spawn").Pool(min(os.cpu_count() or 1, seeds)) as pool:
         for scheme in Scheme:
-            runs = []
-            for found in pool.imap(run_seed, [(setup_of(scheme, hops), seed) for seed in range(1, seeds + 1)]):
+            count, runs = seeds if scheme is Scheme.FORWARD else controls, []
+            for found in pool.imap(run_seed, [(setup_of(scheme, hops), seed) for seed in range(1, count + 1)]):
                 runs.append(found)
                 step()
             rows = table(scheme, runs)
             cases += rows
-            schemes[scheme.name.lower()] = verdict([row[name] for row in rows for name in ("nees", "nees_total")])
-    return {
-        "experiment": "consistency",
-        "seeds": seeds,
-        "cases": cases,
-        "schemes": schemes,
-        "standard_error": math.sqrt(2.0 / seeds),
-    }
+            judged = verdict([row[name] for row in rows for name in ("nees", "nees_total")])
+            schemes[scheme.name.lower()] = {**judged, "seeds": count, "standard_error": math.sqrt(2.0 / count)}
+    return {"experiment": "consistency", "seeds": seeds, "cases": cases, "schemes": schemes}
 
 
 def table(scheme: Scheme, runs: Sequence[ChainRun]) -> list[dict[str, Any]]:
