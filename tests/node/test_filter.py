@@ -4,9 +4,12 @@ import math
 
 import numpy as np
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 
 from node.kernels.angles import from_binary, wrap
 from node.kernels.cycle import run_cycle
+from node.kernels.fixed_lag import push, spin
 from node.kernels.layout import DEG, PERIOD, Err, Status, default_config, new_state
 from node.kernels.relay import offer_aiding
 from telemetry.messages import Mode
@@ -226,3 +229,42 @@ def test_a_sample_that_is_no_number_changes_nothing(bad: float) -> None:
     )
     assert Status(status) == Status.BAD_SAMPLE
     assert bench.state.tobytes() == before
+
+
+def ramp(rates: list[float]) -> np.void:
+    """State of a node that read the mean spins ``rates`` (rad/s)."""
+    state = new_state(default_config())[0]
+    for k, rate in enumerate(rates):
+        push(state, START + k * PERIOD, START + (k + 1) * PERIOD, np.array([0.0, 0.0, rate]), np.zeros(3), 0)
+    return state
+
+
+@given(st.floats(-2.0, 2.0), st.floats(-1.0, 1.0), st.floats(0.0, 1.0), st.floats(0.0, 1.0))
+def test_inside_a_cycle_the_spin_is_that_of_a_ramp(begin_rate: float, slope: float, a: float, b: float) -> None:
+    state = ramp([begin_rate + slope * (k + 0.5) * PERIOD for k in range(3)])
+    begin, end = START + (1.0 + min(a, b)) * PERIOD, START + (1.0 + max(a, b)) * PERIOD
+    expected = begin_rate + slope * (0.5 * (begin + end) - START)
+    assert spin(state, 1, begin, end) == pytest.approx(expected, abs=1e-9)
+
+
+@given(st.lists(st.floats(-2.0, 2.0), min_size=3, max_size=3), st.floats(0.0, 1.0))
+def test_the_parts_of_a_cycle_turn_as_far_as_the_whole(rates: list[float], part: float) -> None:
+    state = ramp(rates)
+    begin, end = START + PERIOD, START + 2.0 * PERIOD
+    middle = begin + part * PERIOD
+    parts = spin(state, 1, begin, middle) * (middle - begin) + spin(state, 1, middle, end) * (end - middle)
+    assert parts == pytest.approx(rates[1] * PERIOD, abs=1e-9)
+
+
+def test_a_clock_error_is_found_and_taken_off_where_it_acts() -> None:
+    for error in (-0.03, 0.004, 0.03):
+        bench = Bench()
+        bench.config[0]["stamp_std"] = 0.02
+        bench.state["P"][0, Err.STAMP, Err.STAMP] = 0.02**2
+        bench.stand(110)
+        for k in range(6):
+            bench.cycle(SPIN * (k + 0.5) / 6.0)  # a ramp: the spin at the time of validity is not the cycle's mean
+            bench.aid(SPIN * (k + 1.0) / 6.0, stamp_error=error)
+        bench.spin(60, stamp_error=error)
+        assert bench.record["stamp"] == pytest.approx(-error, abs=2e-4)
+        assert abs(bench.error_deg()) < 0.02

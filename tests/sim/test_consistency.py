@@ -1,0 +1,82 @@
+"""The consistency test of relay schemes: it accepts the truth and rejects the negative controls."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from click.testing import CliRunner
+
+from borechain.experiment import experiment
+from node.kernels.layout import Scheme
+from sim.experiments.chain import Chain, run_seed
+from sim.experiments.consistency import EVERY, run, setup_of, table, verdict
+
+HOPS, SEEDS = 5, 40
+
+
+@pytest.fixture(scope="module")
+def result() -> dict:
+    stepped: list[None] = []
+    found = run(SEEDS, SEEDS, lambda: stepped.append(None), hops=HOPS)
+    assert len(stepped) == 3 * SEEDS
+    return found
+
+
+def cells(result: dict, scheme: str, state: str, name: str = "nees") -> np.ndarray:
+    return np.array([r[name] for r in result["cases"] if (r["scheme"], r["state"]) == (scheme, state)])
+
+
+def test_forward_tells_the_truth(result: dict) -> None:
+    for state in ("turning", "at rest"):
+        for name in ("nees", "nees_total"):
+            found = cells(result, "forward", state, name)
+            assert found.mean() == pytest.approx(1.0, abs=0.25)
+            assert np.all((found > 0.45) & (found < 1.8))  # 3.5 standard errors of 40 seeds
+
+
+def test_estimate_is_rejected_at_every_hop_but_the_first(result: dict) -> None:
+    assert not result["schemes"]["estimate"]["consistent"]
+    assert result["schemes"]["estimate"]["worst"] > 10.0 * EVERY[1]
+    hops = np.array([r["hop"] for r in result["cases"] if (r["scheme"], r["state"]) == ("estimate", "at rest")])
+    assert np.all(cells(result, "estimate", "at rest")[hops > 1] > 2.0)
+
+
+def test_intersection_is_too_wide(result: dict) -> None:
+    assert not result["schemes"]["intersection"]["consistent"]
+    assert np.all(cells(result, "intersection", "at rest") < 0.8)
+
+
+def test_the_verdict_is_that_of_its_bounds() -> None:
+    assert verdict([1.0] * 19 + [1.2])["consistent"]
+    assert not verdict([1.0] * 9 + [1.2])["consistent"]  # a tenth outside
+    assert not verdict([1.0] * 99 + [1.3])["consistent"]
+    assert verdict([1.0, 0.5, 1.3])["worst"] == 0.5
+
+
+def test_clock_errors_are_felt() -> None:
+    """A node that is told of better clocks than it has must look dishonest."""
+    setup = replace(setup_of(Scheme.FORWARD, 1), blocks=1)
+
+    def nees(factor: float) -> float:
+        found = []
+        for seed in range(1, 9):
+            chain = Chain(replace(setup, clock_std=setup.clock_std / factor), seed)
+            chain._clocks = chain._clocks * factor
+            run = chain.run()
+            found.append(float((run.error**2 / run.var)[run.turning].mean()))
+        return float(np.mean(found))
+
+    assert nees(1.0) < 3.0
+    assert nees(20.0) > 10.0
+
+
+def test_a_table_has_a_row_an_epoch_and_hop() -> None:
+    setup = replace(setup_of(Scheme.FORWARD, 2), blocks=1)
+    rows = table(Scheme.FORWARD, [run_seed((setup, 1)), run_seed((setup, 2))])
+    assert [(r["state"], r["hop"]) for r in rows] == [("turning", 1), ("turning", 2), ("at rest", 1), ("at rest", 2)]
+
+
+def test_the_command_refuses_no_seeds() -> None:
+    done = CliRunner().invoke(experiment, ["consistency", "--seeds", "0"])
+    assert done.exit_code == 2
+    assert "--seeds" in done.output
