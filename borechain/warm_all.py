@@ -6,8 +6,8 @@ It stands apart from ``warm``: to compile every kernel takes a fresh machine hal
 from __future__ import annotations
 
 from borechain import warm
+from node.firmware.kernel_choice import kernel_of
 from node.firmware.settings import KERNELS
-from node.firmware.tube import kernel_of
 from node.kernels.warm import warm_loop
 
 for kernel in KERNELS:

@@ -4,27 +4,27 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 
 from node.firmware.alignment import FASTEST, Aligner, alignment_text, angles_of, realign
-from node.firmware.cluster import Cluster
 from node.firmware.coarse_level import level_coarsely
+from node.firmware.inputs import ImuReading, Surroundings
+from node.firmware.intake import Intake
+from node.firmware.kernel_choice import kernel_of
 from node.firmware.make_up import MakeUp
 from node.firmware.parameters import forget_bias, forget_tilt, record_of, recorrect
 from node.firmware.sensor_guard import SensorGuard
-from node.firmware.settings import Kernel, TubeSettings
+from node.firmware.settings import TubeSettings
 from node.firmware.static_record import StaticRecorder
+from node.firmware.time_stamp import TimeStampPrior
 from node.firmware.torsion import TubeTorsion
-from node.kernels.alignment import new_mount, to_tube
+from node.kernels.alignment import new_mount
 from node.kernels.angles import from_binary, wrap
-from node.kernels.calibration import USUAL, calibrate
-from node.kernels.cycle import run_cycle
-from node.kernels.error_model import isolate
-from node.kernels.layout import CLOCK_SLACK, DEG, Array, Err, Scheme, Status, new_state
+from node.kernels.calibration import USUAL
+from node.kernels.layout import DEG, Array, Err, Scheme, Status, new_state
 from node.kernels.modes import STATIC_BIAS
-from node.kernels.relay import offer_aiding
 from telemetry.messages import (
     Aiding,
     Event,
@@ -40,7 +40,6 @@ from telemetry.messages import (
 from telemetry.parameters import SHORT_HASH, ParameterBlock
 
 VAR_FLOOR = (0.001 * DEG) ** 2
-LEAST_STAMP, LARGEST_STAMP = 1e-4, CLOCK_SLACK  # s, prior of the time-stamp state, whatever the clock says
 STILL_CYCLES = 4  # after which a node takes itself for standing
 LARGEST_OFFSET = 6.0 * DEG  # rad/s, zero-rate offset of a gyroscope never calibrated; the slow alignment turn is faster
 EVENT_OF_STATUS: tuple[tuple[Status, str, Severity], ...] = (
@@ -57,44 +56,6 @@ EVENT_OF_STATUS: tuple[tuple[Status, str, Severity], ...] = (
     (Status.FILTER_FAULT, "filter_fault", Severity.ERROR),
 )
 TOLD = Status(sum(bit for bit, _, _ in EVENT_OF_STATUS))
-
-
-@dataclass(frozen=True, slots=True)
-class ImuReading:
-    """Mean of one cycle as the sensor gives it, before any correction, on the node's own clock."""
-
-    start: float  # s
-    end: float  # s
-    rate: tuple[float, float, float]  # rad/s
-    force: tuple[float, float, float]  # m/s^2
-    temperature: float = USUAL  # C
-    saturated: bool = False  # a sample within the cycle was at the gyroscope's range, as the driver saw it
-    others: tuple[ImuReading, ...] = ()  # of the further IMUs of a cluster, in the same cycle
-
-
-@dataclass(frozen=True, slots=True)
-class Surroundings:
-    """What the telemetry tells the firmware at a cycle: its place in the string and the time."""
-
-    joined: bool  # the upper joint is closed
-    hops: int
-    rig_now: float  # s, rig time of the cycle's end
-    clock_var: float  # s^2
-    synchronised: bool
-
-
-def kernel_of(kernel: Kernel) -> tuple[Callable[..., int], Callable[..., int]]:
-    """The cycle and the intake of aiding of the kernel chosen; all but the default are loaded only when used."""
-    if kernel == "float64":
-        return run_cycle, offer_aiding
-    if kernel == "published":
-        from node.kernels.published import cycle as published
-
-        return published.run_cycle, published.offer_aiding
-    from node.kernels.fixed.node import FixedNode
-
-    fixed = FixedNode()
-    return fixed.run_cycle, fixed.offer_aiding
 
 
 class Tube:
@@ -132,7 +93,6 @@ class Tube:
         self._restored = restored
         self._cycles = 0
         self.overruns = 0
-        self._rate, self._force = np.zeros(3), np.zeros(3)
         self._rejecting = False
         self._noticed = Status.NONE  # between cycles
         self.raw: ImuReading | None = None  # of the last cycle, of all IMUs together
@@ -141,17 +101,11 @@ class Tube:
         self._torsion = TubeTorsion(settings, state)
         self._make_up = MakeUp(settings, state)
         self._aligner = Aligner(self._mount, settings.imus, float(self.config["force_std"] / self.config["gravity"]))
-        self._axes = self._mount[0]["axis"][: len(settings.imus)]
-        self._unaligned = np.zeros((len(settings.imus), 3))  # m/s^2
-        self._rates, self._forces = np.zeros((2, len(settings.imus), 3))
-        own = [ParameterBlock(settings.tube, 0, imu.gyroscope, imu.accelerometer) for imu in settings.imus]
-        self._own = [record_of(block)[0] for block in own]
-        self._cluster: Cluster | None = None
-        if len(settings.imus) > 1:
-            self._cluster = Cluster(settings.imus, self._mount, state, config, settings.limits)
+        self._intake = Intake(settings, self._mount, state, config)
+        self._axes, self._cluster = self._intake.axes, self._intake.cluster
+        self._time_stamp = TimeStampPrior(state, config)
         self._slow_cycles = 0  # in a row, not faster than the offset of a gyroscope never calibrated
         self._temperature = USUAL
-        self._stamp_walk, self._stamp_hops = float(self.config["stamp_walk"]), 0  # of one joint
         self._run_cycle, self._offer_aiding = kernel_of(settings.kernel)
         self.parameters = parameters or ParameterBlock(settings.tube, 0)
         self.use(self.parameters)
@@ -199,13 +153,14 @@ class Tube:
         if not self._guard.admits(reading.start, reading.end):
             yield from self._sensor_events(around)
             return
-        reading = self.raw = self._correct(reading)
+        reading = self.raw = self._intake.take(reading, self._correction, self._expected(), heard=self._guard.heard)
+        rate, force = self._intake.rate, self._intake.force
         self._temperature = reading.temperature
         raw = (reading.rate, reading.force)
-        self._guard.before(raw, self._rate, self._force, saturated=reading.saturated, at=reading.end)
-        self._follow_clock(around)
-        level_coarsely(self.state, self.config, self._rate, self._force)
-        self._slow_cycles = self._slow_cycles + 1 if max(map(abs, self._rate)) < LARGEST_OFFSET else 0
+        self._guard.before(raw, rate, force, saturated=reading.saturated, at=reading.end)
+        self._time_stamp.follow(around)
+        level_coarsely(self.state, self.config, rate, force)
+        self._slow_cycles = self._slow_cycles + 1 if max(map(abs, rate)) < LARGEST_OFFSET else 0
         if self._cycles and reading.start - self.state["now"] > 0.5 * (reading.end - reading.start):
             self.overruns += 1
         status = self._noticed | self._run(reading, 1 if around.joined else 0)
@@ -216,7 +171,7 @@ class Tube:
         self._guard.after(status, reading.end)
         self._follow_alignment(reading)
         if self._cluster is not None and self.quiet:
-            self._cluster.learn(self._rates)
+            self._cluster.learn(self._intake.rates)
         yield from self._sensor_events(around)
         yield from self._string_events(around)
         yield from self._events(status, around)
@@ -329,7 +284,8 @@ class Tube:
         waits = due and self._torsion.keeps_survey(reading.end)
         if waits:
             state["surveyed"] = 1
-        status = self._run_cycle(state, self.config, self._rate, self._force, reading.start, reading.end, joined)
+        rate, force = self._intake.rate, self._intake.force
+        status = self._run_cycle(state, self.config, rate, force, reading.start, reading.end, joined)
         if waits:
             state["surveyed"] = 0
         return Status(status)
@@ -343,35 +299,6 @@ class Tube:
             sigmas = abs(float(self.state["innovation"])) / math.sqrt(float(self.state["innovation_var"]))
             yield self._event("aiding_rejected", Severity.WARNING, around.rig_now, {"sigmas": sigmas})
         self._rejecting = rejecting
-
-    def _correct(self, reading: ImuReading) -> ImuReading:
-        """Leave rate and force of the cycle, corrected and in the tube's frame; returns the raw reading behind them."""
-        readings = self._readings(reading)
-        for k, one in enumerate(readings):
-            rate, force = self._rates[k], self._forces[k]
-            rate[:], force[:] = one.rate, one.force
-            if not self._own[k]["identity"]:
-                calibrate(self._own[k], one.temperature, rate, force)
-                readings[k] = replace(one, rate=tuple(rate.tolist()), force=tuple(force.tolist()))
-            calibrate(self._correction[0], one.temperature, rate, force)
-            self._unaligned[k] = force
-            to_tube(self._axes[k], rate)
-            to_tube(self._axes[k], force)
-        if self._cluster is None:
-            self._rate[:], self._force[:] = self._rates[0], self._forces[0]
-            return readings[0]
-        raw = [(one.rate, one.force, one.saturated) for one in readings]
-        self._cluster.take(raw, self._rates, self._forces, self._expected(), heard=self._guard.heard)
-        self._rate[:], self._force[:] = self._cluster.rate, self._cluster.force
-        used = [one.temperature for one, used in zip(readings, self._cluster.used, strict=True) if used]
-        temperature = math.fsum(used) / len(used) if used else USUAL
-        return ImuReading(reading.start, reading.end, *self._cluster.mean_raw(raw), temperature)
-
-    def _readings(self, reading: ImuReading) -> list[ImuReading]:
-        """Of every IMU of the cluster; no numbers of one that brought none."""
-        came = [reading, *reading.others][: len(self._axes)]
-        none = ImuReading(reading.start, reading.end, (math.nan,) * 3, (math.nan,) * 3)
-        return came + [none] * (len(self._axes) - len(came))
 
     def _expected(self) -> Array:
         """Rate (rad/s) and force (m/s^2) that the node would read in this cycle if nothing had changed: (6,)."""
@@ -390,7 +317,7 @@ class Tube:
         rate = float(self.state["now_rate"])
         aided = reading.end - float(self.state["last_aided"]) <= self.settings.aiding_old_after
         yaw = self.yaw if aided else math.nan
-        if self._aligner.take(self._unaligned, rate, yaw, reading.start, reading.end, used):
+        if self._aligner.take(self._intake.unaligned, rate, yaw, reading.start, reading.end, used):
             realign(self._states, before, self._axes)
 
     def _drop_alignment(self, reason: str) -> None:
@@ -416,24 +343,6 @@ class Tube:
         if recorder.is_due(reading.end):
             record = recorder.finish(self.settings.tube, reading.end, around.rig_now, self._next_sequence)
             yield record or self._event("static_record_empty", Severity.ERROR, around.rig_now, {})
-
-    def _follow_clock(self, around: Surroundings) -> None:
-        """Let the prior of the time-stamp state be what the clock says of itself, and its wander that of the hops.
-
-        The configuration is left alone while it is about right: another one costs the integer loop a conversion.
-        """
-        config = self.config
-        if not around.synchronised or config["stamp_std"] == 0.0:
-            return
-        std = min(max(math.sqrt(around.clock_var), LEAST_STAMP), LARGEST_STAMP)
-        hops = max(around.hops, 1)
-        if hops == self._stamp_hops and 0.8 < std / float(config["stamp_std"]) < 1.25:
-            return
-        self._stamp_hops = hops
-        config["stamp_std"] = std
-        config["stamp_walk"] = self._stamp_walk * math.sqrt(hops)
-        if self.state["last_aided"] == -math.inf:
-            isolate(self.state["P"], Err.STAMP, std * std)
 
     def _start_over(self) -> None:
         """A covariance that is none: begin again from nothing but the constant bias."""

@@ -6,8 +6,9 @@ from collections import Counter
 from collections.abc import Callable
 from dataclasses import replace
 
+from node.firmware.inputs import ImuReading
 from node.firmware.parameters import Trial, Verdict, refusal, unfit
-from node.firmware.tube import ImuReading, Tube
+from node.firmware.tube import Tube
 from node.process.parameter_store import ParameterStore
 from telemetry.errors import DecodeError
 from telemetry.messages import BlockSegment, BlockStatus, Scalar, Severity, UploadPhase

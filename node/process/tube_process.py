@@ -11,10 +11,11 @@ from typing import Any
 import numpy as np
 
 from node.errors import ConfigurationError, SavedStateError
+from node.firmware.inputs import ImuReading, Surroundings
 from node.firmware.parameters import forget_bias, forget_tilt
 from node.firmware.saved_state import resume
 from node.firmware.settings import TubeSettings
-from node.firmware.tube import ImuReading, Surroundings, Tube
+from node.firmware.tube import Tube
 from node.kernels.alignment import MOUNT, new_mount
 from node.kernels.calibration import USUAL
 from node.kernels.layout import PERIOD, Array, default_config, new_state

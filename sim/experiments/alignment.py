@@ -23,8 +23,9 @@ from groundstation.survey.resolve import angles, resolve
 from node.firmware.alignment import METHODS, angles_of
 from node.firmware.encoder import QUANTUM, EncoderNode, EncoderSample
 from node.firmware.imu_settings import ImuSettings
+from node.firmware.inputs import ImuReading, Surroundings
 from node.firmware.settings import Kernel, TubeSettings
-from node.firmware.tube import ImuReading, Surroundings, Tube
+from node.firmware.tube import Tube
 from node.kernels.alignment import new_mount
 from node.kernels.layout import PERIOD, default_config, new_state
 from sim.borehole import Borehole

@@ -13,8 +13,9 @@ import numpy as np
 import numpy.typing as npt
 
 from node.firmware.encoder import COUNTS_PER_TURN, EDGE_STD, EncoderNode, EncoderSample
+from node.firmware.inputs import ImuReading, Surroundings
 from node.firmware.settings import Joint, Kernel, TubeSettings
-from node.firmware.tube import ImuReading, Surroundings, Tube
+from node.firmware.tube import Tube
 from node.kernels.angles import wrap
 from node.kernels.layout import PERIOD, Scheme, default_config, new_state
 from sim.borehole import Borehole

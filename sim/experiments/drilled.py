@@ -15,9 +15,10 @@ import numpy as np
 import numpy.typing as npt
 
 from node.firmware.encoder import QUANTUM, EncoderNode, EncoderSample
+from node.firmware.inputs import ImuReading, Surroundings
 from node.firmware.settings import Joint, JointRule, Kernel, TubeSettings
 from node.firmware.torque import TorqueSettings
-from node.firmware.tube import ImuReading, Surroundings, Tube
+from node.firmware.tube import Tube
 from node.kernels.angles import wrap
 from node.kernels.layout import PERIOD, default_config, new_state
 from sim.borehole import Borehole

@@ -13,8 +13,8 @@ from groundstation.service.orders import parse
 from groundstation.service.views import force_var, node, stations
 from groundstation.survey.resolve import combine_imus
 from node.firmware.imu_settings import ImuSettings
+from node.firmware.inputs import Surroundings
 from node.firmware.settings import TubeSettings
-from node.firmware.tube import Surroundings
 from node.kernels.layout import DEG, PERIOD
 from node.process.tube_process import TubeProcess
 from telemetry.messages import ImuMean, Mode, NodeFlag, Reply, SurveyMeasurement

@@ -6,8 +6,9 @@ from collections.abc import Callable
 import numpy as np
 
 from node.firmware.encoder import QUANTUM, EncoderNode, EncoderSample
+from node.firmware.inputs import ImuReading, Surroundings
 from node.firmware.settings import TubeSettings
-from node.firmware.tube import ImuReading, Surroundings, Tube
+from node.firmware.tube import Tube
 from node.kernels.angles import wrap
 from node.kernels.layout import PERIOD, Scheme, default_config, new_state
 from sim.borehole import Borehole

@@ -9,8 +9,9 @@ import pytest
 from node.errors import ConfigurationError
 from node.firmware.alignment import PATIENCE, rotation
 from node.firmware.imu_settings import ImuSettings
+from node.firmware.inputs import ImuReading, Surroundings
 from node.firmware.settings import Kernel, TubeSettings
-from node.firmware.tube import ImuReading, Surroundings, Tube
+from node.firmware.tube import Tube
 from node.kernels.alignment import new_mount
 from node.kernels.layout import DEG, PERIOD, default_config, new_state
 from node.process.tube_process import TubeProcess

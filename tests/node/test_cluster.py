@@ -17,8 +17,9 @@ from node.errors import ConfigurationError
 from node.firmware.alignment import rotation
 from node.firmware.cluster import DISAGREEING, HEALTHY
 from node.firmware.imu_settings import ImuSettings
+from node.firmware.inputs import ImuReading, Surroundings
 from node.firmware.settings import Kernel, TubeSettings
-from node.firmware.tube import ImuReading, Surroundings, Tube
+from node.firmware.tube import Tube
 from node.kernels.alignment import MAX_IMUS, new_mount
 from node.kernels.cluster import fuse
 from node.kernels.layout import DEG, PERIOD, Err, default_config, new_state

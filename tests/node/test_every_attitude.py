@@ -7,8 +7,9 @@ import numpy as np
 from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
+from node.firmware.inputs import ImuReading, Surroundings
 from node.firmware.settings import TubeSettings
-from node.firmware.tube import ImuReading, Surroundings, Tube
+from node.firmware.tube import Tube
 from node.kernels.angles import wrap
 from node.kernels.layout import DEG, PERIOD, default_config, new_state
 from telemetry.messages import Aiding, Event, NodeFlag

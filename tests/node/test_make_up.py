@@ -6,9 +6,10 @@ from dataclasses import replace
 import pytest
 
 from node.firmware.encoder import QUANTUM
+from node.firmware.inputs import ImuReading, Surroundings
 from node.firmware.sensor_faults import SensorLimits
 from node.firmware.settings import Joint, JointRule, TubeSettings
-from node.firmware.tube import ImuReading, Surroundings, Tube
+from node.firmware.tube import Tube
 from node.kernels.layout import DEG, PERIOD, default_config, new_state
 from telemetry.messages import Aiding, Event
 

@@ -7,10 +7,11 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from node.firmware.inputs import ImuReading, Surroundings
 from node.firmware.sensor_faults import SensorLimits
 from node.firmware.settings import TubeSettings
 from node.firmware.static_record import StaticRecorder
-from node.firmware.tube import ImuReading, Surroundings, Tube
+from node.firmware.tube import Tube
 from node.kernels.layout import DEG, PERIOD, default_config, new_state
 from node.kernels.static_average import STATIC, add_static, has_moved
 from telemetry.messages import Event, StaticRecord

@@ -8,9 +8,10 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from node.errors import ConfigurationError
+from node.firmware.inputs import ImuReading, Surroundings
 from node.firmware.sensor_faults import SensorLimits
 from node.firmware.settings import Joint, Kernel, TorsionRule, TubeSettings
-from node.firmware.tube import ImuReading, Surroundings, Tube
+from node.firmware.tube import Tube
 from node.kernels.layout import PERIOD, Err, Scheme, default_config, new_state
 from telemetry.messages import Aiding, Event, SurveyMeasurement
 

@@ -7,9 +7,10 @@ import numpy as np
 import pytest
 
 from node.errors import ConfigurationError
+from node.firmware.inputs import ImuReading, Surroundings
 from node.firmware.sensor_faults import SensorLimits
 from node.firmware.settings import Joint, TubeSettings
-from node.firmware.tube import ImuReading, Surroundings, Tube
+from node.firmware.tube import Tube
 from node.kernels.layout import PERIOD, Scheme, default_config, new_state
 from telemetry.messages import Aiding, Event, Mode, NodeFlag, NodeState, SurveyMeasurement
 

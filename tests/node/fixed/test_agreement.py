@@ -6,9 +6,11 @@ import numpy as np
 import pytest
 
 from node.errors import ConfigurationError
+from node.firmware.inputs import ImuReading, Surroundings
+from node.firmware.kernel_choice import kernel_of
 from node.firmware.parameters import forget_bias
 from node.firmware.settings import TubeSettings
-from node.firmware.tube import ImuReading, Surroundings, Tube, kernel_of
+from node.firmware.tube import Tube
 from node.kernels.cycle import run_cycle
 from node.kernels.fixed.border import COVARIANCE, learn_config, learn_state, show_aiding, show_covariance, show_cycle
 from node.kernels.fixed.layout import FIXED_STATE

@@ -7,8 +7,10 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from node.firmware.inputs import ImuReading, Surroundings
+from node.firmware.kernel_choice import kernel_of
 from node.firmware.settings import TubeSettings
-from node.firmware.tube import ImuReading, Surroundings, Tube, kernel_of
+from node.firmware.tube import Tube
 from node.kernels import cycle as default
 from node.kernels.error_model import BX, PSI, TX, TY
 from node.kernels.layout import DEG, PERIOD, STATES, Array, Err, Status, default_config, new_state

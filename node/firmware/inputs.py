@@ -1,0 +1,31 @@
+"""What one execution cycle of a node takes in."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from node.kernels.calibration import USUAL
+
+
+@dataclass(frozen=True, slots=True)
+class ImuReading:
+    """Mean of one cycle as the sensor gives it, before any correction, on the node's own clock."""
+
+    start: float  # s
+    end: float  # s
+    rate: tuple[float, float, float]  # rad/s
+    force: tuple[float, float, float]  # m/s^2
+    temperature: float = USUAL  # C
+    saturated: bool = False  # a sample within the cycle was at the gyroscope's range, as the driver saw it
+    others: tuple[ImuReading, ...] = ()  # of the further IMUs of a cluster, in the same cycle
+
+
+@dataclass(frozen=True, slots=True)
+class Surroundings:
+    """What the telemetry tells the firmware at a cycle: its place in the string and the time."""
+
+    joined: bool  # the upper joint is closed
+    hops: int
+    rig_now: float  # s, rig time of the cycle's end
+    clock_var: float  # s^2
+    synchronised: bool
