@@ -196,7 +196,7 @@ class TubeProcess(Driven):
             self._timing.add(Stage.AIDING, clock.rig_from_local(now) - aiding.valid_at)
         onward = self.tube.on_aiding(aiding, clock.local_from_rig(aiding.valid_at))
         if onward is not None:
-            self.station.send_aiding(onward, now)
+            self._say(onward, now)
 
     def _surroundings(self, now: float) -> Surroundings:
         clock = self.station.clock

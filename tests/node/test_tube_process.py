@@ -5,10 +5,12 @@ from pathlib import Path
 
 import pytest
 
-from node.firmware.settings import TubeSettings
+from node.firmware.settings import Joint, TubeSettings
 from node.kernels.layout import PERIOD
 from node.process.tube_process import TubeProcess
-from telemetry.messages import Side
+from telemetry.application.clock import ClockFilter
+from telemetry.messages import Aiding, Side
+from telemetry.presentation.codec import VARIANCE
 
 REST = (0.0, 0.0, 0.0, 0.0, 0.3, -9.8)
 
@@ -55,3 +57,14 @@ def test_no_reading_and_no_frame_ends_the_process(tmp_path: Path, wild: float) -
         process.take_frames(now)
     cycles(process, 110, now)
     assert process.state[0]["mode"] != 0
+
+
+def test_an_aiding_that_grew_beyond_what_can_be_said_is_not_handed_on(tmp_path: Path) -> None:
+    process = TubeProcess(TubeSettings(3, lower_joint=Joint(0.0, 0.1)), tmp_path)
+    process.station.clock = ClockFilter(is_root=True)
+    now = cycles(process, 110)
+    for var, unsayable in ((1e-4, 0), (VARIANCE, 1)):
+        process._on_aiding(Aiding(1.0, 1e-9, var, 0.0, 0.0, now, int(1 / var), 1), now)
+        assert process.station.counters["unsayable"] == unsayable
+    cycles(process, 3, now)
+    assert process.state[0]["yaw_known"]
