@@ -5,10 +5,12 @@ from __future__ import annotations
 import math
 from typing import Any
 
-from node.kernels.fixed_lag import consume, predict_to_now, push
+from node.kernels.fixed_lag import consume, predict_to_now
 from node.kernels.jit import kernel
 from node.kernels.layout import STATES, Array, Status
-from node.kernels.modes import STATIC_BIAS, guard_rate, is_quiet, learn_static_bias, step_modes
+from node.kernels.modes import STATIC_BIAS, SURVEY_READY, guard_rate, is_quiet, learn_static_bias, step_modes
+from node.kernels.moving_average import average_force
+from node.kernels.ring import push
 
 BAD_SAMPLE, FILTER_FAULT = int(Status.BAD_SAMPLE), int(Status.FILTER_FAULT)
 
@@ -36,6 +38,8 @@ def run_cycle(state: Any, config: Any, rate: Array, force: Array, start: float, 
     status |= consume(state, config)
     predict_to_now(state, config)
     status |= step_modes(state, config, quiet, joined, end)
+    if status & SURVEY_READY:
+        average_force(state, config.survey_samples)
     for i in range(STATES):
         if not (state.P[i, i] >= 0.0 and math.isfinite(state.P[i, i])):
             return status | FILTER_FAULT

@@ -13,6 +13,7 @@ from node.kernels.angles import advance_binary, from_binary, to_binary, wrap
 from node.kernels.error_model import isolate, propagate
 from node.kernels.jit import kernel
 from node.kernels.layout import CLOCK_SLACK, INVERTED, RING, STATES, UNKNOWN_YAW_VAR, Array, Err, Status
+from node.kernels.ring import drop_first_pending, stood_still
 from node.kernels.strapdown import rotate_down, yaw_rate
 from node.kernels.update import clear, feed_back, innovation_var, intersect, joseph, level, zero_rate
 
@@ -20,31 +21,6 @@ PSI, BZ, D = int(Err.YAW), int(Err.BIAS_Z), int(Err.STAMP)
 AIDED, REJECTED, YAW_RESET = int(Status.AIDED), int(Status.REJECTED), int(Status.YAW_RESET)
 LATE_DROPPED = int(Status.LATE_DROPPED)
 BX = int(Err.BIAS_X)
-
-
-@kernel
-def push(state: Any, start: float, end: float, rate: Array, force: Array, quiet: int) -> None:
-    """Write one cycle's increments, local times (s), mean rate (3, rad/s) and mean specific force (3, m/s^2)."""
-    slot = state.cycles % RING
-    state.ring_start[slot] = start
-    state.ring_end[slot] = end
-    state.ring_quiet[slot] = quiet
-    for k in range(3):
-        state.ring_rate[slot, k] = rate[k]
-        state.ring_force[slot, k] = force[k]
-    state.cycles += 1
-    if state.cycles == 1:
-        state.epoch = start
-
-
-@kernel
-def stood_still(state: Any, cycle: int) -> bool:
-    """Whether the string stood still in ``cycle``: it and both neighbours were quiet."""
-    if state.ring_quiet[cycle % RING] == 0 or cycle == 0:
-        return False
-    if state.ring_quiet[(cycle - 1) % RING] == 0:
-        return False
-    return bool(cycle + 1 >= state.cycles or state.ring_quiet[(cycle + 1) % RING] != 0)
 
 
 @kernel
@@ -225,17 +201,6 @@ def aid_late(state: Any, config: Any, yaw: float, var: float, at: float) -> int:
     var += interpolation_var(state, cycle + 1, at)
     noise = config.gyro_noise[2] ** 2 * lag + state.P[BZ, BZ] * lag * lag
     return aid(state, config, moved, var + noise, rate, at)
-
-
-@kernel
-def drop_first_pending(state: Any) -> None:
-    """Shift the queue of waiting measurements by one."""
-    state.pending -= 1
-    for k in range(state.pending):
-        state.pending_at[k] = state.pending_at[k + 1]
-        state.pending_yaw[k] = state.pending_yaw[k + 1]
-        state.pending_var[k] = state.pending_var[k + 1]
-        state.pending_sequence[k] = state.pending_sequence[k + 1]
 
 
 @kernel

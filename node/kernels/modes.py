@@ -7,7 +7,6 @@ from typing import Any
 from node.kernels.error_model import isolate
 from node.kernels.jit import kernel
 from node.kernels.layout import UNKNOWN_YAW_VAR, Array, Err, Status
-from node.kernels.moving_average import average_force
 
 BX = int(Err.BIAS_X)
 PSI = int(Err.YAW)
@@ -79,7 +78,10 @@ def guard_rate(state: Any, config: Any, rate_z: float) -> int:
 
 @kernel
 def step_modes(state: Any, config: Any, quiet: int, joined: int, end: float) -> int:
-    """Move between tracking, still, survey and held at the end of a cycle (s, node's clock); returns status bits."""
+    """Move between tracking, still, survey and held at the end of a cycle (s, node's clock); returns status bits.
+
+    It computes nothing, so it serves the integers too; with ``SURVEY_READY`` the caller is to average the force.
+    """
     status = JOINT_CLOSED if state.mode == HELD and (joined == 1 or quiet == 0) else 0
     if quiet == 0:
         if state.still_cycles > 0:
@@ -99,7 +101,6 @@ def step_modes(state: Any, config: Any, quiet: int, joined: int, end: float) -> 
         status |= JOINT_OPENED
     state.mode = STILL if joined == 1 else HELD
     if state.surveyed == 0 and joined == 1 and state.still_cycles >= config.settle_cycles:
-        average_force(state, config.survey_samples)
         state.surveyed = 1
         state.mode = SURVEY
         status |= SURVEY_READY

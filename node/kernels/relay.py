@@ -13,6 +13,7 @@ from node.kernels.angles import wrap, wrap_positive
 from node.kernels.error_model import isolate
 from node.kernels.jit import kernel
 from node.kernels.layout import PENDING, Err, Status
+from node.kernels.ring import make_room
 
 PSI, D = int(Err.YAW), int(Err.STAMP)
 REFERENCE_CHANGED = int(Status.REFERENCE_CHANGED)
@@ -47,18 +48,11 @@ def offer_aiding(
             return status
     if state.pending == PENDING:
         return status
-    slot = state.pending
-    while slot > 0 and state.pending_at[slot - 1] > valid_at:
-        state.pending_at[slot] = state.pending_at[slot - 1]
-        state.pending_yaw[slot] = state.pending_yaw[slot - 1]
-        state.pending_var[slot] = state.pending_var[slot - 1]
-        state.pending_sequence[slot] = state.pending_sequence[slot - 1]
-        slot -= 1
+    slot = make_room(state, valid_at)
     state.pending_at[slot] = valid_at
     state.pending_yaw[slot] = wrap_positive(yaw + offset)
     state.pending_var[slot] = yaw_var + config.aiding_floor_var
     state.pending_sequence[slot] = sequence
-    state.pending += 1
     state.last_sequence = sequence
     state.systematic_var = systematic_var
     return status

@@ -9,9 +9,10 @@ from hypothesis import strategies as st
 
 from node.kernels.angles import from_binary, wrap
 from node.kernels.cycle import run_cycle
-from node.kernels.fixed_lag import push, spin
+from node.kernels.fixed_lag import spin
 from node.kernels.layout import DEG, PERIOD, Err, Status, default_config, new_state
 from node.kernels.relay import offer_aiding
+from node.kernels.ring import push
 from telemetry.messages import Mode
 
 START = 1000.0

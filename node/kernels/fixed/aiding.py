@@ -66,14 +66,3 @@ def aid(state: Any, config: Any, yaw: int, r_var: int, rate: int, at: int) -> in
     state.rejected = 0
     state.last_aided = at
     return AIDED
-
-
-@kernel
-def drop_first_pending(state: Any) -> None:
-    """Shift the queue of waiting measurements by one."""
-    state.pending -= 1
-    for k in range(state.pending):
-        state.pending_at[k] = state.pending_at[k + 1]
-        state.pending_yaw[k] = state.pending_yaw[k + 1]
-        state.pending_var[k] = state.pending_var[k + 1]
-        state.pending_sequence[k] = state.pending_sequence[k + 1]

@@ -4,11 +4,13 @@ from __future__ import annotations
 
 from typing import Any
 
-from node.kernels.fixed.fixed_lag import consume, predict_to_now, push
-from node.kernels.fixed.modes import guard_rate, is_quiet, learn_static_bias, step_modes
+from node.kernels.fixed.fixed_lag import consume, predict_to_now
+from node.kernels.fixed.modes import guard_rate, is_quiet, learn_static_bias
+from node.kernels.fixed.moving_average import average_force
 from node.kernels.jit import kernel
 from node.kernels.layout import STATES, Array, Status
-from node.kernels.modes import STATIC_BIAS
+from node.kernels.modes import STATIC_BIAS, SURVEY_READY, step_modes
+from node.kernels.ring import push
 
 FILTER_FAULT = int(Status.FILTER_FAULT)
 
@@ -33,6 +35,8 @@ def run_cycle(state: Any, config: Any, rate: Array, force: Array, start: int, en
     status |= consume(state, config)
     predict_to_now(state, config)
     status |= step_modes(state, config, quiet, joined, end)
+    if status & SURVEY_READY:
+        average_force(state, config.survey_samples)
     for i in range(STATES):
         if state.P[i, i] < 0:
             return status | FILTER_FAULT

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Any, Final
 
-from node.kernels.fixed.aiding import RATE_RIGHT, aid, drop_first_pending
+from node.kernels.fixed.aiding import RATE_RIGHT, aid
 from node.kernels.fixed.arithmetic import mul, quotient, shift
 from node.kernels.fixed.error_model import decays, isolate, propagate, widen
 from node.kernels.fixed.layout import (
@@ -25,6 +25,7 @@ from node.kernels.fixed.trigonometry import TURN, counts
 from node.kernels.fixed.update import level, zero_rate
 from node.kernels.jit import kernel
 from node.kernels.layout import CLOCK_SLACK, INVERTED, RING, STATES, Array, Err, Status
+from node.kernels.ring import drop_first_pending, stood_still
 
 PSI, BZ, D = int(Err.YAW), int(Err.BIAS_Z), int(Err.STAMP)
 LATE_DROPPED = int(Status.LATE_DROPPED)
@@ -42,31 +43,6 @@ SLOT: Final = RING - 1  # RING is a power of two
 
 
 @kernel
-def push(state: Any, start: int, end: int, rate: Array, force: Array, quiet: int) -> None:
-    """Write one cycle's increments: times (s, Q28), mean rate (3, rad/s, Q46), mean specific force (3, g, Q26)."""
-    slot = state.cycles & SLOT
-    state.ring_start[slot] = start
-    state.ring_end[slot] = end
-    state.ring_quiet[slot] = quiet
-    for k in range(3):
-        state.ring_rate[slot, k] = rate[k]
-        state.ring_force[slot, k] = force[k]
-    state.cycles += 1
-    if state.cycles == 1:
-        state.epoch = start
-
-
-@kernel
-def stood_still(state: Any, cycle: int) -> int:
-    """Whether the string stood still in ``cycle``: it and both neighbours were quiet, 1 or 0."""
-    if state.ring_quiet[cycle & SLOT] == 0 or cycle == 0:
-        return 0
-    if state.ring_quiet[(cycle - 1) & SLOT] == 0:
-        return 0
-    return 1 if cycle + 1 >= state.cycles or state.ring_quiet[(cycle + 1) & SLOT] != 0 else 0
-
-
-@kernel
 def true_rate_z(state: Any, measured: int) -> int:
     """(w_z - b_z) / (1 + s), rad/s in Q46."""
     one = UNITY_SCALE + shift(state.scale, SCALE_RIGHT)
@@ -76,7 +52,7 @@ def true_rate_z(state: Any, measured: int) -> int:
 @kernel
 def spin(state: Any, cycle: int, begin: int, end: int) -> int:
     """Mean spin (rad/s, Q46) from ``begin`` to ``end`` (s, Q28) inside ``cycle``: linear about its mean."""
-    if stood_still(state, cycle) == 1:
+    if stood_still(state, cycle):
         return 0
     slot = cycle & SLOT
     measured = state.ring_rate[slot, 2]
@@ -106,7 +82,7 @@ def turn(state: Any, config: Any, cycle: int, begin: int, end: int, yaw: int, do
     while dt > 0:
         piece = min(dt, longest)
         dt -= piece
-        if still == 1:
+        if still:
             propagate(state, P, 0, piece, 0, config)
             continue
         ax, ay, az, s, c = half_turn(wx, wy, wz, piece)
@@ -114,7 +90,7 @@ def turn(state: Any, config: Any, cycle: int, begin: int, end: int, yaw: int, do
         yaw = (yaw + counts(mul(yaw_rate(down, wx, wy, wz), piece), STEP_Q)) & TURN
         rotate_down(down, ax, ay, az, s, c)
         propagate(state, P, wz, piece, 1, config)
-    if still == 0 and down[2] < INVERTED_DOWN:
+    if not still and down[2] < INVERTED_DOWN:
         isolate(P, PSI, UNKNOWN_VAR)
     return yaw
 
@@ -229,7 +205,7 @@ def consume(state: Any, config: Any) -> int:
         end = state.ring_end[slot]
         status |= take_pending(state, config, cycle, end)
         advance(state, config, cycle, end)
-        if stood_still(state, cycle) == 1:
+        if stood_still(state, cycle):
             zero_rate(state, state.ring_rate[slot], end - state.ring_start[slot], config)
             level(state, state.ring_force[slot], config)
         state.consumed += 1

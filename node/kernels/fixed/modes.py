@@ -7,10 +7,9 @@ from typing import Any, Final
 from node.kernels.fixed.arithmetic import quotient, shift
 from node.kernels.fixed.error_model import isolate
 from node.kernels.fixed.layout import CEILING, RATE_Q, TIME_Q, UNKNOWN_VAR
-from node.kernels.fixed.moving_average import average_force
 from node.kernels.jit import kernel
 from node.kernels.layout import Array, Err, Status
-from node.kernels.modes import HELD, STATIC_BIAS, STILL, SURVEY, TRACKING, UNBIASED_STILL_RATE
+from node.kernels.modes import STATIC_BIAS, TRACKING, UNBIASED_STILL_RATE
 
 BX, PSI = int(Err.BIAS_X), int(Err.YAW)
 STOPPED, STARTED, SURVEY_READY = int(Status.STOPPED), int(Status.STARTED), int(Status.SURVEY_READY)
@@ -71,32 +70,3 @@ def guard_rate(state: Any, config: Any, rate_z: int) -> int:
         state.rate_exceeded = 0
         return RATE_RECOVERED
     return 0
-
-
-@kernel
-def step_modes(state: Any, config: Any, quiet: int, joined: int, end: int) -> int:
-    """Move between tracking, still, survey and held at the end of a cycle (s, Q28); returns status bits."""
-    status = JOINT_CLOSED if state.mode == HELD and (joined == 1 or quiet == 0) else 0
-    if quiet == 0:
-        if state.still_cycles > 0:
-            status |= STARTED
-        state.still_cycles = 0
-        state.surveyed = 0
-        if state.mode != STATIC_BIAS:
-            state.mode = TRACKING
-        return status
-    if state.still_cycles == 0:
-        state.stopped_at = end
-        status |= STOPPED
-    state.still_cycles += 1
-    if state.mode == STATIC_BIAS:
-        return status
-    if joined == 0 and state.mode != HELD:
-        status |= JOINT_OPENED
-    state.mode = STILL if joined == 1 else HELD
-    if state.surveyed == 0 and joined == 1 and state.still_cycles >= config.settle_cycles:
-        average_force(state, config.survey_samples)
-        state.surveyed = 1
-        state.mode = SURVEY
-        status |= SURVEY_READY
-    return status

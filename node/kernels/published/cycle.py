@@ -13,11 +13,13 @@ from typing import Any
 from node.kernels import relay
 from node.kernels.angles import advance_binary, from_binary, wrap
 from node.kernels.error_model import BX, PSI, TX, TY, isolate
-from node.kernels.fixed_lag import AIDED, YAW_RESET, drop_first_pending, push, reset_yaw
+from node.kernels.fixed_lag import AIDED, YAW_RESET, reset_yaw
 from node.kernels.jit import kernel
 from node.kernels.layout import STATES, UNKNOWN_YAW_VAR, Array, Status
-from node.kernels.modes import STATIC_BIAS, guard_rate, is_quiet, learn_static_bias, step_modes
+from node.kernels.modes import STATIC_BIAS, SURVEY_READY, guard_rate, is_quiet, learn_static_bias, step_modes
+from node.kernels.moving_average import average_force
 from node.kernels.published.euler import ATTITUDE, error_rates, euler_rates, geometry_of, point_down, propagate, tilt_of
+from node.kernels.ring import drop_first_pending, push
 from node.kernels.update import clear, innovation_var, joseph
 
 BAD_SAMPLE, FILTER_FAULT = int(Status.BAD_SAMPLE), int(Status.FILTER_FAULT)
@@ -44,6 +46,8 @@ def run_cycle(state: Any, config: Any, rate: Array, force: Array, start: float, 
     status |= take_aiding(state, config)
     integrate(state, config, rate, end)
     status |= step_modes(state, config, quiet, joined, end)
+    if status & SURVEY_READY:
+        average_force(state, config.survey_samples)
     for i in range(STATES):
         for j in range(STATES):
             state.now_P[i, j] = state.P[i, j]

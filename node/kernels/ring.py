@@ -1,0 +1,63 @@
+"""The increments of the last cycles and the measurements that wait for theirs, for either arithmetic of the loop.
+
+Nothing is computed here, so the same functions serve the floats and the integers: numbers are copied and compared.
+"""
+
+from __future__ import annotations
+
+from typing import Any, TypeAlias
+
+from node.kernels.jit import kernel
+from node.kernels.layout import RING, Array
+
+Number: TypeAlias = float  # or an integer in the format of the state given
+
+
+@kernel
+def push(state: Any, start: Number, end: Number, rate: Array, force: Array, quiet: int) -> None:
+    """Write one cycle's increments: times on the node's clock, mean rate (3) and mean specific force (3)."""
+    slot = state.cycles % RING
+    state.ring_start[slot] = start
+    state.ring_end[slot] = end
+    state.ring_quiet[slot] = quiet
+    for k in range(3):
+        state.ring_rate[slot, k] = rate[k]
+        state.ring_force[slot, k] = force[k]
+    state.cycles += 1
+    if state.cycles == 1:
+        state.epoch = start
+
+
+@kernel
+def stood_still(state: Any, cycle: int) -> bool:
+    """Whether the string stood still in ``cycle``: it and both neighbours were quiet."""
+    if state.ring_quiet[cycle % RING] == 0 or cycle == 0:
+        return False
+    if state.ring_quiet[(cycle - 1) % RING] == 0:
+        return False
+    return bool(cycle + 1 >= state.cycles or state.ring_quiet[(cycle + 1) % RING] != 0)
+
+
+@kernel
+def make_room(state: Any, valid_at: Number) -> int:
+    """Place in the queue, which is ordered by time, for a measurement valid at ``valid_at``."""
+    slot = state.pending
+    while slot > 0 and state.pending_at[slot - 1] > valid_at:
+        state.pending_at[slot] = state.pending_at[slot - 1]
+        state.pending_yaw[slot] = state.pending_yaw[slot - 1]
+        state.pending_var[slot] = state.pending_var[slot - 1]
+        state.pending_sequence[slot] = state.pending_sequence[slot - 1]
+        slot -= 1
+    state.pending += 1
+    return int(slot)
+
+
+@kernel
+def drop_first_pending(state: Any) -> None:
+    """Shift the queue of waiting measurements by one."""
+    state.pending -= 1
+    for k in range(state.pending):
+        state.pending_at[k] = state.pending_at[k + 1]
+        state.pending_yaw[k] = state.pending_yaw[k + 1]
+        state.pending_var[k] = state.pending_var[k + 1]
+        state.pending_sequence[k] = state.pending_sequence[k + 1]
