@@ -14,7 +14,9 @@ from typing import Any
 import pytest
 from rigs import REPOSITORY, command, ends, free_endpoint, run, running_rig, titles_of_group
 
+from groundstation.service.store import Store
 from telemetry.media.zenoh_bus import open_client
+from telemetry.messages import Event
 
 GROUND = "borechain/*/ground"
 
@@ -50,6 +52,23 @@ def test_two_imus_in_every_tube_make_surveys_of_less_noise(tmp_path: Path) -> No
     one = math.radians(0.02) * 9.81 / math.sqrt(32.0)  # of a mean, with one IMU
     for station in stations:
         assert station["sigma_force_mps2"] == pytest.approx(one / math.sqrt(2.0), rel=0.15)
+
+
+def test_a_string_that_twists_is_surveyed_released_and_goes_on_at_every_joint(tmp_path: Path) -> None:
+    for file in (REPOSITORY / "scenarios").glob("*.csv"):
+        (tmp_path / file.name).write_bytes(file.read_bytes())
+    text = (REPOSITORY / "scenarios" / "torsion-10.toml").read_text()
+    scenario = tmp_path / "torsion-3.toml"
+    scenario.write_text(text.replace("tubes = 10", "tubes = 3"))
+    with running_rig(tmp_path, "--seed", "1", scenario=str(scenario)) as rig:
+        result = rig.result()
+    assert [s["measurements"] for s in result["stations"]] == [3, 2, 1]
+    assert max(result["figures"]["yaw_rms_deg_by_hop"]) < 0.1  # 1.1 deg a tube under torque
+    with contextlib.closing(Store(f"sqlite:///{rig.out / 'state' / 'ground' / 'ground.sqlite'}")) as store:
+        codes = [stored.message.code for stored in store.messages() if isinstance(stored.message, Event)]
+    assert codes.count("joint_solved") == 2
+    assert "string_released" in codes
+    assert not {"gyro_step", "gyro_scale", "joint_contradicts_marks"} & set(codes)
 
 
 def test_the_seed_alone_decides_the_result_whatever_the_load(tmp_path: Path) -> None:
