@@ -22,13 +22,37 @@ SCHEMES = ("forward", "estimate", "intersection")
 @click.option("--lower-joint-deg", type=float, default=0.0, help="Scribe-mark reading, this tube to the one below.")
 @click.option("--joint-std-deg", type=float, default=0.05, show_default=True, help="Error of a reading, 1 sigma.")
 @click.option("--mount-std-deg", type=float, default=0.05, show_default=True, help="Error of the IMU's mount, 1 sigma.")
-@click.option("--kernel", type=click.Choice(["float64", "fixed", "published"]), default="float64", show_default=True)
-@click.option("--scheme", type=click.Choice(SCHEMES), default="forward", show_default=True)
+@click.option(
+    "--kernel",
+    type=click.Choice(["float64", "fixed", "published"]),
+    default="float64",
+    show_default=True,
+    help="Arithmetic of the loop, or its published form.",
+)
+@click.option(
+    "--scheme",
+    type=click.Choice(SCHEMES),
+    default="forward",
+    show_default=True,
+    help="What goes down the string: the encoder's measurement, or the node's own estimate and how it is taken.",
+)
 @click.option(
     "--stiffness-nm", type=float, default=math.inf, help="Torque that twists the tube by 1 rad; rigid if absent."
 )
-@click.option("--torsion", type=click.Choice(["gate", "variance"]), default="gate", show_default=True)
-@click.option("--joints", type=click.Choice(["marks", "solved", "both"]), default="marks", show_default=True)
+@click.option(
+    "--torsion",
+    type=click.Choice(["gate", "variance"]),
+    default="gate",
+    show_default=True,
+    help="Aiding under torque: not used, or used with the variance of the twist.",
+)
+@click.option(
+    "--joints",
+    type=click.Choice(["marks", "solved", "both"]),
+    default="marks",
+    show_default=True,
+    help="Whence the angle of a joint comes that is made up above.",
+)
 @click.option(
     "--imu",
     "sources",

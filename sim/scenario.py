@@ -155,7 +155,9 @@ class MediumSection(Section):
 class NodeSection(Section):
     """Firmware settings of every node."""
 
-    scheme: Literal["forward", "estimate", "intersection"] = "forward"
+    scheme: Literal["forward", "estimate", "intersection"] = Field(
+        "forward", description="what is relayed: the encoder's measurement, or estimates (the two negative controls)"
+    )
     kernel: Literal["float64", "fixed", "published"] = Field(
         "float64", description="the loop in floats, in integers, or in the published feed-forward form"
     )
