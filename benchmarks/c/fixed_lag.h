@@ -33,22 +33,25 @@ static double true_rate_z(const State *state, double measured)
     return (measured - state->static_bias[2] - state->bias[2]) / (1.0 + state->scale);
 }
 
+static double slope(const State *state, int64_t cycle)
+{
+    if (cycle == 0 || cycle + 1 >= state->cycles)
+        return 0.0;
+    int64_t before = (cycle - 1) % RING, after = (cycle + 1) % RING;
+    double apart = 0.5 * (state->ring_start[after] + state->ring_end[after] - state->ring_start[before] -
+                          state->ring_end[before]);
+    return (state->ring_rate[after][2] - state->ring_rate[before][2]) / apart;
+}
+
 /* mean spin from begin to end inside a cycle: it changes linearly about the cycle's mean */
 static double spin(const State *state, int64_t cycle, double begin, double end)
 {
     if (stood_still(state, cycle))
         return 0.0;
     int64_t slot = cycle % RING;
-    double slope = 0.0;
-    if (cycle > 0 && cycle + 1 < state->cycles) {
-        int64_t before = (cycle - 1) % RING, after = (cycle + 1) % RING;
-        double apart = 0.5 * (state->ring_start[after] + state->ring_end[after] - state->ring_start[before] -
-                              state->ring_end[before]);
-        slope = (state->ring_rate[after][2] - state->ring_rate[before][2]) / apart;
-    }
     double inside = larger(begin, state->ring_start[slot]);
     double off_centre = 0.5 * (inside + end - state->ring_start[slot] - state->ring_end[slot]);
-    return true_rate_z(state, state->ring_rate[slot][2] + slope * off_centre);
+    return true_rate_z(state, state->ring_rate[slot][2] + slope(state, cycle) * off_centre);
 }
 
 static uint32_t turn(const State *state, const Config *config, int64_t cycle, double begin, double end, uint32_t yaw,
@@ -95,7 +98,8 @@ static double interpolation_var(const State *state, int64_t cycle, double at)
     double bend = 2.0 * (state->ring_rate[slot][2] - state->ring_rate[(cycle - 1) % RING][2]);
     if (cycle + 1 < state->cycles)
         bend = 0.5 * bend - (state->ring_rate[(cycle + 1) % RING][2] - state->ring_rate[slot][2]);
-    return square(0.25 * bend) * (square(inside) + state->P[STAMP][STAMP]);
+    double curved = slope(state, cycle) * state->P[STAMP][STAMP];
+    return square(0.25 * bend) * (square(inside) + state->P[STAMP][STAMP]) + 0.75 * curved * curved;
 }
 
 static void reset_yaw(State *state, const Config *config, double yaw, double var)

@@ -92,7 +92,8 @@ def interpolation_var(state: Any, cycle: int, at: float) -> float:
     """Variance (rad^2) of taking the spin as linear inside ``cycle``, from how its neighbours' means bend.
 
     Where the drive starts or ends a ramp the spin at the edge of a cycle is wrong by up to a quarter of the bend, and
-    so are the angle from the edge to ``at`` (s) and the effect of the time stamp's error.
+    so are the angle from the edge to ``at`` (s) and the effect of the time stamp's error d. On a ramp of slope a that
+    effect is w d + a d^2 / 2, of which the filter takes the first term: E[(a d^2 / 2)^2] = 3/4 a^2 P_dd^2.
     """
     slot = cycle % RING
     inside = min(at - state.ring_start[slot], state.ring_end[slot] - at)
@@ -101,7 +102,8 @@ def interpolation_var(state: Any, cycle: int, at: float) -> float:
     bend = 2.0 * (state.ring_rate[slot, 2] - state.ring_rate[(cycle - 1) % RING, 2])
     if cycle + 1 < state.cycles:
         bend = 0.5 * bend - (state.ring_rate[(cycle + 1) % RING, 2] - state.ring_rate[slot, 2])
-    return float((0.25 * bend) ** 2 * (inside * inside + state.P[D, D]))
+    curved = slope(state, cycle) * state.P[D, D]
+    return float((0.25 * bend) ** 2 * (inside * inside + state.P[D, D]) + 0.75 * curved * curved)
 
 
 @kernel

@@ -144,7 +144,20 @@ def interpolation_var(state: Any, cycle: int, at: int) -> int:
         bend = (bend >> 1) - (state.ring_rate[(cycle + 1) & SLOT, 2] - state.ring_rate[slot, 2])
     error = min(shift(mul(abs(bend), min(inside, LONGEST_STEP)), STEP_Q + 2 - SQUARE_Q), LARGEST_SQUARED)
     a_unit = shift(bend, RATE_RIGHT + 2)
-    return error * error + mul(mul(state.P[D, D], a_unit), a_unit)
+    return error * error + mul(mul(state.P[D, D], a_unit), a_unit) + curvature_var(state, cycle)
+
+
+@kernel
+def curvature_var(state: Any, cycle: int) -> int:
+    """Variance 3/4 (a P_dd)^2, rad^2 in Q56, of the time stamp's error on a ramp of the slope a."""
+    if cycle + 1 >= state.cycles:
+        return 0
+    before, after = (cycle - 1) & SLOT, (cycle + 1) & SLOT
+    apart = state.ring_start[after] + state.ring_end[after] - state.ring_start[before] - state.ring_end[before]
+    seconds = shift(quotient(state.P[D, D], max(apart, ONE_SECOND)), 30)  # P_dd over half of it, s in Q39
+    angle = mul(abs(state.ring_rate[after, 2] - state.ring_rate[before, 2]), seconds)
+    curved = min(shift(angle, RATE_Q + 39 - 31 - SQUARE_Q), LARGEST_SQUARED)
+    return (3 * curved * curved) >> 2
 
 
 @kernel
