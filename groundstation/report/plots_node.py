@@ -273,6 +273,7 @@ class SchemeNees:
     nees_total: float  # with the constant errors of joints and mounts
 
 
+@styled
 def scheme_figure(found: Sequence[SchemeNees], bounds: tuple[float, float], title: str) -> Figure:
     """NEES over hops of every scheme, at rest and turning; open markers count joints and mounts."""
     states = list(dict.fromkeys(f.state for f in found))
@@ -295,5 +296,5 @@ def scheme_figure(found: Sequence[SchemeNees], bounds: tuple[float, float], titl
     handles = [Line2D([], [], ls="", color=SERIES[k], marker=MARKERS[k], label=s) for k, s in enumerate(schemes)]
     handles.append(Line2D([], [], ls="", color=INK, marker="o", mfc="none", label="with joints and mounts"))
     handles_all = [*handles, Patch(color=LIGHT, alpha=0.6, label=f"{bounds[0]:g} to {bounds[1]:g}")]
-    figure.legend(handles=handles_all, loc="outside lower left", ncols=5)
+    figure.legend(handles=handles_all, loc="outside lower left", ncols=3)
     return tidy(figure)

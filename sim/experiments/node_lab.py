@@ -52,6 +52,7 @@ class LabSetup:
     clock_std: float = 0.2e-3  # each joint, constant
     clock_wander_std: float = 0.03e-3  # each joint, Gauss-Markov
     clock_wander_tau: float = 60.0
+    clock_told: float | None = None  # each joint, what a node's clock says of itself; None is clock_std
     bias_step_dps: float = 0.0  # of the z gyroscope, from the first turn on: what the bias of the boot left over
     gyroscope: GyroSection = GyroSection()  # noqa: RUF009
     accelerometer: AccelerometerSection = AccelerometerSection(bias_std_deg=0.0)  # noqa: RUF009
@@ -132,7 +133,8 @@ class Lab:
     def _cycle(self, k: int, cycle: int) -> SurveyMeasurement | None:
         wx, wy, wz, fx, fy, fz = self._sensors[k].samples[cycle]
         end = BEGIN + float(ENDS[cycle])
-        around = Surroundings(True, k + 1, end, self._setup.clock_std**2 * (k + 1), True)
+        told = self._setup.clock_std if self._setup.clock_told is None else self._setup.clock_told
+        around = Surroundings(True, k + 1, end, told**2 * (k + 1), True)
         said = list(self._tubes[k].on_cycle(ImuReading(end - PERIOD, end, (wx, wy, wz), (fx, fy, fz)), around))
         self._estimates[k] = next((message for message in said if isinstance(message, Aiding)), None)
         return next((message for message in said if isinstance(message, SurveyMeasurement)), None)

@@ -92,9 +92,11 @@ def test_a_bias_that_stays_never_converges() -> None:
 
 def test_a_delay_costs_nothing_when_compensated_and_its_angle_when_not() -> None:
     late = {form: replace(setup, delay=0.1) for form, setup in node_delay.FORMS.items()}
+    late[node_delay.FOUND] = replace(late[node_delay.FOUND], clock_told=0.1)
     errors = {form: rms_deg([r.error[ROTATING, 0] for r in runs(late[form], 4)])[0] for form in late}
     assert errors["compensated"] < node_delay.TO_REACH_DEG
     assert errors["dated by arrival"] == pytest.approx(0.1 * 71.0, rel=0.03)
+    assert errors[node_delay.FOUND] < node_delay.TO_REACH_DEG
 
 
 def test_links_pass_what_they_say() -> None:
