@@ -12,7 +12,7 @@ import math
 from dataclasses import dataclass
 
 from node.firmware.saved_state import resume
-from node.firmware.sensor_faults import AidingWatch, Fault, Mismatch, ReadingWatch, SensorLimits
+from node.firmware.sensor_faults import STEADY, AidingWatch, Fault, Mismatch, ReadingWatch, SensorLimits
 from node.kernels.angles import from_binary, wrap
 from node.kernels.error_model import isolate
 from node.kernels.layout import DEG, PERIOD, RING, UNKNOWN_YAW_VAR, Array, Err, Status
@@ -68,6 +68,7 @@ class SensorGuard:
         self._rate, self._rate_at, self._aiding_var = 0.0, -math.inf, 0.0
         self._sane_rate = 0.0
         self._step: Mismatch | None = None  # that the constant bias has taken
+        self._before_steps: tuple[float, float] | None = None  # rad/s, the constant bias then, and size of the first
         self._jumped = self._untimely = False
         self._said: list[Said] = []
 
@@ -244,7 +245,9 @@ class SensorGuard:
             change = -found.rate / found.spin if abs(found.spin) > DEG else LARGEST_SCALE
             scale_var = max(scale_var, min(abs(change), LARGEST_SCALE) ** 2)
             learnable = True
+            self._undo_steps()
         elif learnable:
+            self._before_steps = self._before_steps or (float(state["static_bias"][2]), abs(found.rate))
             state["static_bias"][2] -= found.rate
             prior += (0.1 * found.rate) ** 2
         isolate(state["P"], int(Err.YAW), UNKNOWN_YAW_VAR)
@@ -268,6 +271,15 @@ class SensorGuard:
             return found
         self._state["static_bias"][2] += before.rate
         return Mismatch(Fault.GYRO_SCALE, before.rate, before.spin, steady=True)
+
+    def _undo_steps(self) -> None:
+        """Steps that cancelled each other were the scale that is learnt now: the constant bias is that of before."""
+        if self._before_steps is None:
+            return
+        (constant, size), self._before_steps = self._before_steps, None
+        if abs(float(self._state["static_bias"][2]) - constant) < STEADY * size:
+            self._state["static_bias"][2] = constant
+            self._state["bias"][2] = 0.0
 
     def _recover(self) -> None:
         state = self._state

@@ -17,7 +17,7 @@ from telemetry.messages import Aiding, Event, NodeFlag
 SUBSTEPS = 16
 STILL, MOVING = 100, 160  # cycles
 G = 9.81
-INVERTED = 168.0 * DEG  # beyond, and two cycles after, a cycle does not resolve the yaw: it is that of the aiding
+INVERTED = 170.0 * DEG  # beyond, a cycle does not resolve the yaw: it is that of the aiding
 
 
 def attitude(inclination: float, azimuth: float, yaw: float) -> np.ndarray:
