@@ -97,8 +97,8 @@ def record_inputs(seed: int = SEED) -> Any:
         entry["joined"] = 0 if opened and opened[0] <= TUBE + 1 else 1
         if k + 1 == count:
             break
-        edge_count, edge_at, rising = world.encoder_sample(end)
-        aiding = encoder.on_cycle(EncoderSample(edge_count, edge_at, bool(rising)), end)
+        edge_count, edge_at, rising, torque, earlier = world.encoder_sample(end)
+        aiding = encoder.on_cycle(EncoderSample(edge_count, edge_at, bool(rising), torque, earlier), end)
         top = world.motion.top(end)
         if opened or random.random() > kept**top:
             continue

@@ -1,4 +1,4 @@
-"""The encoder's disc: how many of its lines have passed, and when the last one did. No line is quite in its place."""
+"""The encoder's disc: how many of its lines have passed, and when the last ones did. No line is quite in its place."""
 
 from __future__ import annotations
 
@@ -6,6 +6,7 @@ import math
 
 import numpy as np
 
+from node.firmware.stop import EDGES
 from sim.motion import Motion
 
 
@@ -26,13 +27,17 @@ class Disc:
         limit = 0.4 * self._quantum  # lines do not change places
         self._errors = np.clip(edge_std * random.standard_normal(counts_per_turn), -limit, limit)
 
-    def sample(self, t: float) -> tuple[int, float]:
-        """Count at rig time ``t`` (s) and the rig time (s) of its last edge."""
+    def sample(self, t: float) -> tuple[int, float, tuple[float, ...]]:
+        """Count at rig time ``t`` (s), the rig time (s) of its last edge and those of the edges before, newest first.
+
+        Edges that the head never passed have the time of the start.
+        """
         angle = float(self._motion.drive(np.array([t]))[0][0])
         count = math.floor(angle / self._quantum + 0.5)
         if self._place(count) > angle:
             count -= 1
-        return count, min(self._motion.time_of_angle(self._place(count)), t)
+        last, *earlier = (self._motion.time_of_angle(self._place(count - k)) for k in range(EDGES))
+        return count, min(last, t), tuple(earlier)
 
     def _place(self, count: int) -> float:
         """Angle (rad) at which the edge that makes ``count`` passes."""

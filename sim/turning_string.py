@@ -13,11 +13,12 @@ from pathlib import Path
 import numpy as np
 import numpy.typing as npt
 
-from node.firmware.encoder import QUANTUM
+from node.firmware.encoder import COUNTS_PER_TURN, EDGE_STD
 from node.firmware.settings import Joint, TubeSettings
 from node.kernels.angles import wrap
 from node.kernels.layout import PERIOD
 from sim.borehole import Borehole
+from sim.encoder import Disc
 from sim.experiments.chain import ACCELERATION_DPS2, INCLINATION_DEG, RATE_DPS
 from sim.imu_errors import ImuErrors
 from sim.motion import Motion, Trapezoid
@@ -28,6 +29,7 @@ from telemetry.messages import ENCODER
 Array = npt.NDArray[np.float64]
 ROWS_A_CYCLE = 4
 FARTHEST_CLOCK = 20.0  # s
+ENCODER_DISC = 1000  # stream of random numbers, apart from those of the tubes
 READING_STD = math.radians(0.05)  # rad, stated of joints and mounts
 
 
@@ -91,9 +93,9 @@ class TurningString:
             np.save(folder / f"tube-{tube}.npy", np.column_stack([ends + self.offset(tube), readings]))
 
     def _counts(self, ends: Array) -> Array:
-        counts = np.floor(self._motion.drive(ends)[0] / QUANTUM + 1e-9)
-        edges = np.array([self._motion.time_of_angle(float(count) * QUANTUM) for count in counts])
-        return np.column_stack([ends, counts, np.minimum(edges, ends), np.ones(len(ends))])
+        disc = Disc(self._motion, COUNTS_PER_TURN, EDGE_STD, self._random(ENCODER_DISC))
+        samples = [(end, *disc.sample(end)) for end in ends.tolist()]
+        return np.array([[end, count, edge, 1.0, *earlier] for end, count, edge, earlier in samples])
 
     def _readings(self, tube: int, ends: Array, step: float) -> Array:
         lean, random = math.radians(INCLINATION_DEG), self._random(tube)

@@ -90,17 +90,17 @@ class World:
             self._samples[tube] = [list(rows) for rows in zip(one, *others, strict=True)] if others else one
         return self._samples[tube][cycle]
 
-    def encoder_sample(self, t: float) -> tuple[int, float, int] | tuple[int, float, int, float]:
-        """Count, rig time of its last edge, 1 (the string turns one way, so every edge rises) and the torque, N m.
+    def encoder_sample(self, t: float) -> tuple[int, float, int, float | None, tuple[float, ...]]:
+        """Count, rig time of its last edge, 1 (the string turns one way, so every edge rises), torque, earlier edges.
 
-        A rig of a rigid string, or one that is to ignore its torsion, has no torque sensor.
+        A rig of a rigid string, or one that is to ignore its torsion, has no torque (N m): None.
         """
-        count, edge_at = self._disc.sample(t)
+        count, edge_at, earlier = self._disc.sample(t)
         if t <= self.motion.begin:
             edge_at = self.begin
         if self.torsion is None or self.scenario.file.node.torsion == "ignore":
-            return count, edge_at, 1
-        return count, edge_at, 1, float(self.torsion.torque(np.array([t]))[0])
+            return count, edge_at, 1, None, earlier
+        return count, edge_at, 1, float(self.torsion.torque(np.array([t]))[0]), earlier
 
     def bit_depth(self, t: float) -> float:
         """Measured depth of the bit, m."""

@@ -2,7 +2,8 @@
 
 While the head turns, the moment of the last edge is known: at that moment the angle is exact but for the edge's own
 jitter. At rest the angle is somewhere inside one count, a constant error, so the rest gives one measurement, repeated
-under one sequence number and never averaged (thesis 3.6 takes it as white).
+under one sequence number and never averaged (thesis 3.6 takes it as white). Where inside, the times of the last edges
+say, if they were taken (``node.firmware.stop``).
 """
 
 from __future__ import annotations
@@ -10,12 +11,14 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass, replace
 
+from node.firmware.stop import UNKNOWN, stopped_at
 from node.firmware.torque import TorqueSettings, TorqueWatch
 from telemetry.messages import Aiding
 
 COUNTS_PER_TURN = 4096  # 1024 lines, decoded in quadrature
 QUANTUM = 2.0 * math.pi / COUNTS_PER_TURN
 EDGE_STD = math.radians(0.003)
+STOP_STD = 1.5 * EDGE_STD / QUANTUM  # counts; the form of a stop is no exact power of time
 FASTEST = 100.0  # rad/s, what two edges in a bouncing instant may seem
 
 
@@ -27,6 +30,7 @@ class EncoderSample:
     edge_at: float  # s, rig time of the last change of the count
     rising: bool  # direction of that change
     torque: float | None = None  # N m, of the drive, where it has a sensor
+    earlier: tuple[float, ...] = ()  # s, times of the edges before the last in its direction, the newest first
 
 
 class EncoderNode:
@@ -39,9 +43,10 @@ class EncoderNode:
         self._edge_at: float | None = None
         self._edge_angle = 0.0
         self._resting = False
+        self._beyond: tuple[float, float] | None = None  # counts, counts^2: of the last edge, since the head stopped
 
     def on_cycle(self, sample: EncoderSample, now: float) -> Aiding:
-        """Measure at ``now`` (s, rig time): the last edge while turning, the middle of the count at rest.
+        """Measure at ``now`` (s, rig time): the last edge while turning, its place in the count at rest.
 
         A drive that grips or releases the string makes a new measurement of a rest: what it is worth has changed.
         """
@@ -61,7 +66,7 @@ class EncoderNode:
         before_at, before_angle = self._edge_at, self._edge_angle
         self._remember(sample)
         elapsed = sample.edge_at - (before_at if before_at is not None else sample.edge_at)
-        self._resting = False
+        self._resting, self._beyond = False, None
         self.sequence += 1
         rate = max(-FASTEST, min((self._edge_angle - before_angle) / elapsed, FASTEST))
         return aiding(self._edge_angle, EDGE_STD**2, rate, sample.edge_at, self.sequence)
@@ -70,7 +75,12 @@ class EncoderNode:
         if not self._resting:
             self._resting = True
             self.sequence += 1
-        return aiding((sample.count + 0.5) * QUANTUM, QUANTUM**2 / 12.0, 0.0, now, self.sequence)
+        if self._beyond is None:
+            times = (sample.edge_at, *sample.earlier)
+            self._beyond = stopped_at(times, STOP_STD) if sample.earlier else UNKNOWN
+        beyond, var = self._beyond
+        angle = self._edge_angle + (beyond if sample.rising else -beyond) * QUANTUM
+        return aiding(angle, var * QUANTUM**2, 0.0, now, self.sequence)
 
     def _remember(self, sample: EncoderSample) -> None:
         self._edge_at = sample.edge_at

@@ -57,9 +57,10 @@ class EncoderProcess(Driven):
                 self.station.reply(refusal, now)
 
     def on_cycle(self, data: Any, now: float) -> None:
-        """The counter was read: ``data`` is start (s), count, time of its last edge (s), 1 if it rose, torque (N m).
+        """The counter was read: ``data`` is start (s), count, time of its last edge (s), 1 if it rose, torque, edges.
 
-        A drive without a torque sensor leaves the last one out.
+        The torque (N m) is nil where the drive has no sensor for it; the edges are the times of those before the last.
+        Either may be left out.
         """
         self._now = now
         sample = self._source.read(now) if self._source is not None else sample_of(data)
@@ -82,8 +83,12 @@ class EncoderProcess(Driven):
 def sample_of(data: Any) -> EncoderSample | None:
     """Sample of a cycle; None for what is none."""
     try:
-        _, count, edge_at, rising, *torque = data
-        sample = EncoderSample(int(count), float(edge_at), bool(rising), *map(float, torque))
+        _, count, edge_at, rising, *more = data
+        if len(more) > 2:
+            return None
+        torque = None if not more or more[0] is None else float(more[0])
+        earlier = tuple(float(edge) for edge in more[1]) if len(more) > 1 else ()
+        sample = EncoderSample(int(count), float(edge_at), bool(rising), torque, earlier)
     except (TypeError, ValueError, OverflowError):
         return None
     return sample if math.isfinite(sample.edge_at) else None

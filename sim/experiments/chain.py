@@ -167,8 +167,8 @@ class Chain:
         return next((message for message in list(said) if isinstance(message, Aiding)), None)
 
     def _measure(self, encoder: EncoderNode, end: float) -> Aiding:
-        count, edge_at = self._disc.sample(end)
-        return encoder.on_cycle(EncoderSample(count, edge_at, True), end)
+        count, edge_at, earlier = self._disc.sample(end)
+        return encoder.on_cycle(EncoderSample(count, edge_at, True, earlier=earlier), end)
 
     def _relay(self, cycle: int, measured: Aiding, onward: list[Aiding | None]) -> None:
         """Down the string: ``forward`` hands on what came, the others what each node said in its cycle."""

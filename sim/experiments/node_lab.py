@@ -142,8 +142,8 @@ class Lab:
     def _measure(self, encoder: EncoderNode, end: float) -> Aiding:
         if self._plain is not None:
             return self._plain.on_cycle(float(self._motion.drive(np.array([end]))[0][0]), end)
-        count, edge_at = self._disc.sample(end)
-        return encoder.on_cycle(EncoderSample(count, edge_at, True), end)
+        count, edge_at, earlier = self._disc.sample(end)
+        return encoder.on_cycle(EncoderSample(count, edge_at, True, earlier=earlier), end)
 
     def _relay(self, cycle: int, measured: Aiding) -> None:
         """Down the string, before the next cycle ends: every node hands on what came."""

@@ -221,6 +221,13 @@ def test_a_recorded_counter_is_moved_to_now(tmp_path: Path) -> None:
         source.read(1001.0)
 
 
+def test_a_recorded_counter_may_tell_the_edges_before_the_last(tmp_path: Path) -> None:
+    np.savetxt(tmp_path / "counter.csv", [[10.0, 5, 9.9, 1, 9.8, 9.6]], delimiter=",")
+    source = ReplayEncoder(tmp_path / "counter.csv")
+    source.start()
+    assert source.read(20.0).earlier == pytest.approx((19.8, 19.6))
+
+
 def test_a_counter_file_is_unwrapped_and_its_edges_timed(tmp_path: Path) -> None:
     path = tmp_path / "count"
     path.write_text("4294967290\n")

@@ -39,11 +39,12 @@ def test_a_row_is_the_mean_since_the_row_before(tmp_path: Path) -> None:
 
 
 def test_the_counter_tells_the_newest_row_that_has_been(tmp_path: Path) -> None:
-    np.save(tmp_path / "counter.npy", np.column_stack([TIMES, np.arange(41.0), TIMES - 0.1, np.ones(41)]))
+    np.save(tmp_path / "counter.npy", np.column_stack([TIMES, np.arange(41.0), TIMES - 0.1, np.ones(41), TIMES - 0.2]))
     source = TimedEncoder(tmp_path / "counter.npy")
     source.start()
     assert source.read(100.49).count == 1
     assert source.read(100.5).edge_at == pytest.approx(100.4)
+    assert source.read(100.5).earlier == pytest.approx((100.3,))
     for t in (99.0, 120.0):
         with pytest.raises(SensorError, match=r"recorded from 100\.0 s to 110\.0 s, asked for"):
             source.read(t)

@@ -164,7 +164,7 @@ def test_a_short_turn_is_all_ramp() -> None:
 def test_the_edge_of_the_encoder_is_the_moment_its_count_changed(part: float) -> None:
     world = World(load_scenario(SCENARIOS / "rig-3.toml"), 2)
     t = world.begin + 60.0 + part * (world.end - world.begin - 60.0)
-    count, edge, _ = world.encoder_sample(t)
+    count, edge, *_ = world.encoder_sample(t)
     quantum = 2.0 * math.pi / 4096
     angle = float(world.motion.drive(np.array([t]))[0][0])
     out_of_place = 5.0 * math.radians(0.003)
@@ -181,7 +181,7 @@ def test_the_lines_of_the_encoder_are_out_of_place_by_what_the_scenario_states()
     spinning = world.begin + 65.0
     errors = {}
     for t in np.arange(spinning, spinning + 20.0, 0.01):
-        count, edge, _ = world.encoder_sample(float(t))
+        count, edge, *_ = world.encoder_sample(float(t))
         at_edge = float(world.motion.drive(np.array([edge]))[0][0])
         errors[count] = math.degrees(at_edge - count * 2.0 * math.pi / 4096)
     assert np.std(list(errors.values())) == pytest.approx(scenario.file.encoder.edge_std_deg, rel=0.1)

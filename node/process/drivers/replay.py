@@ -1,7 +1,8 @@
 """Recordings as sources. One row a cycle; a recording that has ended, or a row that is none, is a fault of the sensor.
 
 IMU: ``time, wx, wy, wz, fx, fy, fz`` and, if it was recorded, ``temperature``; s, rad/s, m/s^2, C.
-Encoder: ``time, count, edge_at, rising``; s, counts, s, 1 or 0.
+Encoder: ``time, count, edge_at, rising`` and, if they were taken, the times of the edges before the last in its
+direction, newest first; s, counts, s, 1 or 0, s. A row that has fewer of them repeats the oldest.
 A ``.npy`` file holds the same columns as an array of float64; a ``.csv`` file may begin with one line of names.
 """
 
@@ -15,12 +16,13 @@ import numpy.typing as npt
 
 from node.errors import SensorError
 from node.firmware.encoder import EncoderSample
+from node.firmware.stop import EDGES
 from node.kernels.calibration import USUAL
 from node.process.drivers.source import ImuSample
 
 Rows = npt.NDArray[np.float64]
 IMU_COLUMNS = (7, 8)
-ENCODER_COLUMNS = (4,)
+ENCODER_COLUMNS = tuple(range(4, 4 + EDGES))
 FARTHEST = 1e15  # of a count
 
 
@@ -79,13 +81,14 @@ class ReplayEncoder:
         """The next row."""
         if self._rows is None or self._next >= len(self._rows):
             raise SensorError(f"{self._path}: the recording has ended, or was not started")
-        at, count, edge_at, rising = (float(value) for value in self._rows[self._next])
+        at, count, edge_at, rising, *earlier = self._rows[self._next].tolist()
         self._next += 1
         if not (math.isfinite(at) and math.isfinite(edge_at) and abs(count) < FARTHEST and edge_at <= at):
             raise SensorError(f"{self._path}: row {self._next}: expected a count and an edge before its time")
         if self._shift is None:
             self._shift = now - at
-        return EncoderSample(int(count), edge_at + self._shift, rising > 0.5)
+        moved = tuple(edge + self._shift for edge in earlier)
+        return EncoderSample(int(count), edge_at + self._shift, rising > 0.5, earlier=moved)
 
     def close(self) -> None:
         """Nothing is held."""
@@ -105,12 +108,20 @@ def load_rows(path: Path, columns: tuple[int, ...]) -> Rows:
     except (OSError, ValueError, TypeError) as error:
         raise SensorError(f"{path}: {error}") from error
     if rows.ndim != 2 or len(rows) == 0 or rows.shape[1] not in columns:
-        wanted = " or ".join(map(str, columns))
+        wanted = f"{columns[0]} to {columns[-1]}"
         raise SensorError(f"{path}: expected rows of {wanted} columns, got an array of shape {rows.shape}")
     return rows
 
 
 def _load_csv(path: Path) -> Rows:
     lines = [line for line in path.read_text().splitlines() if line.strip()]
-    first = 1 if lines and any(c.isalpha() for c in lines[0].split(",")[0]) else 0
+    first = 1 if lines and _is_name(lines[0].split(",")[0]) else 0
     return np.array([[float(cell) for cell in line.split(",")] for line in lines[first:]])
+
+
+def _is_name(cell: str) -> bool:
+    try:
+        float(cell)
+    except ValueError:
+        return True
+    return False

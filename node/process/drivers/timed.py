@@ -74,8 +74,8 @@ class TimedEncoder:
         k = int(np.searchsorted(self._rows[:, 0], now, side="right"))
         if not 0 < k < len(self._rows):
             raise SensorError(outside(self._path, self._rows[:, 0], now))
-        _, count, edge_at, rising = self._rows[k - 1].tolist()
-        return EncoderSample(int(count), edge_at, rising > 0.5)
+        _, count, edge_at, rising, *earlier = self._rows[k - 1].tolist()
+        return EncoderSample(int(count), edge_at, rising > 0.5, earlier=tuple(earlier))
 
     def close(self) -> None:
         """Nothing is held."""
