@@ -50,7 +50,7 @@ study: $(STAMP)  ## the long studies; their tables are committed in docs/results
 	$(BIN)/borechain experiment consistency --seeds 500 --control-seeds 100 --out docs/results
 	$(BIN)/borechain experiment outage --seeds 60 --out docs/results
 	$(BIN)/borechain experiment alignment --seeds 100 --out docs/results
-	$(BIN)/borechain experiment fifty-nodes --seeds 16 --out docs/results
+	$(BIN)/borechain experiment fifty-nodes --seeds 200 --out docs/results
 	$(BIN)/borechain experiment ingredients --seeds 40 --out docs/results
 	$(BIN)/borechain experiment fixed-point --cycles 1000000 --out docs/results
 	$(BIN)/borechain bench realtime --nodes 50 --seconds 120 --out docs/results
