@@ -7,7 +7,7 @@ from typing import Any
 
 import click
 
-from borechain.node_experiments import COLUMNS, conduct, keep, options, tell
+from borechain.experiment_output import COLUMNS, conduct, keep, options, tell
 from borechain.tables import Columns
 
 WRITTEN: Columns = tuple(column for column in COLUMNS if column[0] not in ("to_reach", "reached"))

@@ -10,6 +10,7 @@ from typing import Any
 import click
 
 from borechain.faults import EnvironmentFault, InputFault, plain_faults
+from borechain.options import json_option
 
 FOLDER = Path(__file__).parents[1] / "benchmarks"
 
@@ -63,7 +64,7 @@ def side_by_side(name: str) -> click.Command:
     """The command of one file of the folder."""
 
     @click.command(name, help="Speed beside other libraries, measured in one run.")
-    @click.option("--json", "as_json", is_flag=True, help="Print one JSON object and nothing else on stdout.")
+    @json_option
     @plain_faults
     def command(as_json: bool) -> None:
         spec = importlib.util.spec_from_file_location(f"benchmarks_{name}", FOLDER / f"{name}.py")

@@ -16,6 +16,7 @@ import click
 
 from borechain import __version__
 from borechain.faults import EnvironmentFault, InputFault
+from borechain.options import json_option
 
 if TYPE_CHECKING:
     from groundstation.report.panels import Panel
@@ -99,7 +100,7 @@ def output_options(command: Callable[..., Outcome]) -> Callable[..., None]:
     path = click.Path(path_type=Path, dir_okay=False)
     decorated: Callable[..., None] = delivering
     for option in (
-        click.option("--json", "as_json", is_flag=True, help="Print one JSON object and nothing else on stdout."),
+        json_option,
         click.option("--subject", help="What was calibrated, for the certificate.  [default: name of FILE]"),
         click.option(
             "--date", type=click.DateTime(["%Y-%m-%d"]), help="Day of the calibration.  [default: today, UTC]"

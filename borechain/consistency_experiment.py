@@ -7,7 +7,7 @@ from typing import Any
 
 import click
 
-from borechain.node_experiments import bar, keep, options, tell
+from borechain.experiment_output import bar, keep, options, tell
 from borechain.tables import Columns
 
 COLUMNS: Columns = (

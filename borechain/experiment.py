@@ -3,21 +3,19 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager
 from pathlib import Path
-from typing import Any
 
 import click
 
 from borechain.alignment_experiment import alignment
 from borechain.consistency_experiment import consistency
+from borechain.experiment_output import bar, keep, out_option, seeds_option, tell, yes
 from borechain.faults import plain_faults
 from borechain.kernel_experiments import COMMANDS as KERNEL_COMMANDS
 from borechain.node_experiments import COMMANDS as NODE_COMMANDS
-from borechain.options import seed_option
+from borechain.options import json_option, seed_option
 from borechain.survey_experiments import coverage, regions, weighting
-from borechain.tables import Columns, cell, write_table
+from borechain.tables import Columns
 
 RELAY_COLUMNS: Columns = (
     ("scheme", "scheme"),
@@ -60,7 +58,6 @@ ALLAN_COLUMNS: Columns = (
     ("raw_error_percent", "raw reading, mean error, %"),
     ("coverage_95", "95 % intervals that hold"),
 )
-json_option = click.option("--json", "as_json", is_flag=True, help="Print one JSON object and nothing else on stdout.")
 
 
 @click.group()
@@ -88,8 +85,8 @@ def list_() -> None:
 
 @experiment.command()
 @click.option("--hops", type=click.IntRange(1, 50), default=10, show_default=True)
-@click.option("--seeds", type=click.IntRange(2, 10_000), default=40, show_default=True)
-@click.option("--out", type=click.Path(path_type=Path, file_okay=False), help="Folder for relay.csv.")
+@seeds_option
+@out_option
 @json_option
 @plain_faults
 def relay(hops: int, seeds: int, out: Path | None, as_json: bool) -> None:
@@ -102,16 +99,18 @@ def relay(hops: int, seeds: int, out: Path | None, as_json: bool) -> None:
     from node.kernels.layout import Scheme
     from sim.experiments.relay import run
 
-    with progress("seeds", len(Scheme) * seeds, quiet=as_json) as step:
+    with bar(len(Scheme) * seeds, quiet=as_json) as step:
         result = run(hops, seeds, step)
     keep(out, result, RELAY_COLUMNS)
-    ends = [f"{scheme}: every NEES within [0.5, 2]: {yes(good)}" for scheme, good in result["consistent"].items()]
-    tell(result, RELAY_COLUMNS, f"Relay over {hops} hops, {seeds} seeds", ends, as_json=as_json)
+    tell(result, RELAY_COLUMNS, f"Relay over {hops} hops, {seeds} seeds", as_json=as_json)
+    if not as_json:
+        for scheme, good in result["consistent"].items():
+            click.echo(f"{scheme}: every NEES within [0.5, 2]: {yes(good)}")
 
 
 @experiment.command()
 @click.option("--tools", type=click.IntRange(1, 10_000), default=200, show_default=True, help="Synthetic tools.")
-@click.option("--out", type=click.Path(path_type=Path, file_okay=False), help="Folder for mwd.csv.")
+@out_option
 @json_option
 @plain_faults
 def mwd(tools: int, out: Path | None, as_json: bool) -> None:
@@ -123,15 +122,15 @@ def mwd(tools: int, out: Path | None, as_json: bool) -> None:
     """
     from sim.experiments.mwd import HEATINGS, run
 
-    with progress("tools", len(HEATINGS) * tools, quiet=as_json) as step:
+    with bar(len(HEATINGS) * tools, quiet=as_json) as step:
         result = run(tools, step)
     keep(out, result, MWD_COLUMNS)
-    tell(result, MWD_COLUMNS, f"MWD calibration, {tools} tools a design", [], as_json=as_json, sideways=True)
+    tell(result, MWD_COLUMNS, f"MWD calibration, {tools} tools a design", as_json=as_json, sideways=True)
 
 
 @experiment.command()
 @click.option("--records", type=click.IntRange(1, 10_000), default=20, show_default=True, help="Records of 2 h.")
-@click.option("--out", type=click.Path(path_type=Path, file_okay=False), help="Folder for allan.csv.")
+@out_option
 @json_option
 @plain_faults
 def allan(records: int, out: Path | None, as_json: bool) -> None:
@@ -143,15 +142,14 @@ def allan(records: int, out: Path | None, as_json: bool) -> None:
     """
     from sim.experiments.allan import run
 
-    with progress("records", records, quiet=as_json) as step:
+    with bar(records, quiet=as_json) as step:
         result = run(records, step)
     keep(out, result, ALLAN_COLUMNS)
-    ends = [
-        f"{name}: median error {q['median_error_percent']:.2f} %, asked {q['asked_error_percent']} %, "
-        f"95 % intervals hold {q['coverage_95']:.1%}: {yes(q['reached'])}"
-        for name, q in result["quantities"].items()
-    ]
-    tell(result, ALLAN_COLUMNS, f"Allan analysis of {records} records", ends, as_json=as_json)
+    tell(result, ALLAN_COLUMNS, f"Allan analysis of {records} records", as_json=as_json)
+    if not as_json:
+        for name, q in result["quantities"].items():
+            asked = f"median error {q['median_error_percent']:.2f} %, asked {q['asked_error_percent']} %"
+            click.echo(f"{name}: {asked}, 95 % intervals hold {q['coverage_95']:.1%}: {yes(q['reached'])}")
 
 
 @experiment.command()
@@ -173,48 +171,3 @@ def records(out: Path, seed: int, as_json: bool) -> None:
         click.echo(json.dumps({"experiment": "records", "seed": seed, "files": names}))
     else:
         click.echo("\n".join(names))
-
-
-@contextmanager
-def progress(what: str, total: int, *, quiet: bool) -> Iterator[Callable[[], None]]:
-    """Bar on stderr; yields the function that moves it on by one."""
-    from rich.console import Console
-    from rich.progress import Progress
-
-    with Progress(console=Console(stderr=True), disable=quiet) as bar:
-        task = bar.add_task(what, total=total)
-        yield lambda: bar.advance(task)
-
-
-def keep(folder: Path | None, result: dict[str, Any], columns: Columns) -> None:
-    """Keep the table as CSV under the experiment's name."""
-    if folder is not None:
-        write_table(folder / f"{result['experiment']}.csv", result["cases"], columns)
-
-
-def tell(
-    result: dict[str, Any], columns: Columns, title: str, ends: list[str], *, as_json: bool, sideways: bool = False
-) -> None:
-    """Print the result: JSON for scripts, the table for people, ``sideways`` where it is wider than long."""
-    if as_json:
-        click.echo(json.dumps(result))
-        return
-    from rich.console import Console
-    from rich.table import Table
-
-    table, rows = Table(title=title), [[cell(row[key]) for key, _ in columns] for row in result["cases"]]
-    names = [name for _, name in columns]
-    head, *body = zip(*[names, *rows], strict=True) if sideways else (names, *rows)
-    for k, name in enumerate(head):
-        table.add_column(name, justify="left" if sideways and k == 0 else "right")
-    for row in body:
-        table.add_row(*row)
-    console = Console()
-    console.print(table)
-    for line in ends:
-        click.echo(line)
-
-
-def yes(good: bool) -> str:
-    """A verdict in a word."""
-    return "yes" if good else "no"

@@ -7,9 +7,9 @@ from typing import Any
 
 import click
 
+from borechain.experiment_output import COLUMNS, bar, conduct, keep, options, out_option, tell, yes
 from borechain.faults import plain_faults
-from borechain.node_experiments import COLUMNS, bar, conduct, json_option, keep, options, out_option, tell
-from borechain.options import seed_option
+from borechain.options import json_option, seed_option
 from borechain.tables import Columns, show_table, write_table
 
 INGREDIENT_COLUMNS: Columns = (("mode", "mode"), *COLUMNS)
@@ -82,8 +82,8 @@ def fixed_point(cycles: int, seeds: int, seed: int, out: Path | None, as_json: b
     tell(result, FIXED_COLUMNS, f"Fixed point against float64, {cycles} cycles", as_json=as_json)
     if not as_json:
         show_table(f"NEES of {NEES_HOPS} hops, {seeds} seeds", result["nees"], NEES_COLUMNS)
-        within = "yes" if result["within"] else "no"
-        click.echo(f"yaw within {LIMITS['yaw_deg']:g} deg, sigma within {LIMITS['sigma']:.0%}, no overflow: {within}")
+        asked = f"yaw within {LIMITS['yaw_deg']:g} deg, sigma within {LIMITS['sigma']:.0%}, no overflow"
+        click.echo(f"{asked}: {yes(result['within'])}")
 
 
 COMMANDS = (ingredients, fixed_point)

@@ -60,6 +60,7 @@ def place_options(command: Callable[..., Any]) -> Callable[..., Any]:
     return command
 
 
+json_option = click.option("--json", "as_json", is_flag=True, help="Print one JSON object and nothing else on stdout.")
 key_option = click.option(
     "--key-file",
     type=click.Path(path_type=Path, dir_okay=False),

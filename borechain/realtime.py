@@ -11,7 +11,7 @@ from typing import Any
 import click
 
 from borechain.faults import plain_faults
-from borechain.options import seed_option
+from borechain.options import json_option, seed_option
 from borechain.tables import Columns, show_table, write_table
 from telemetry import keys
 
@@ -44,7 +44,7 @@ COLUMNS: Columns = (
 @click.option("--seconds", type=click.FloatRange(4.0, 86400.0), default=120.0, show_default=True, help="Wall time.")
 @click.option("--endpoint", default=keys.DEFAULT_ENDPOINT, show_default=True, help="Where its router listens.")
 @click.option("--out", type=click.Path(path_type=Path, file_okay=False), help="Folder for realtime.csv.")
-@click.option("--json", "as_json", is_flag=True, help="Print one JSON object and nothing else on stdout.")
+@json_option
 @seed_option
 @plain_faults
 def realtime(nodes: int, seconds: float, endpoint: str, out: Path | None, as_json: bool, seed: int) -> None:

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from borechain.faults import EnvironmentFault, plain_faults
-from borechain.options import fault_option, seed_option, speed_option
+from borechain.options import fault_option, json_option, seed_option, speed_option
 from telemetry import keys
 
 if TYPE_CHECKING:
@@ -36,7 +36,7 @@ PRELOAD = {"float64": "borechain.warm", "fixed": "borechain.warm_all", "publishe
 @click.option(
     "--out", type=click.Path(path_type=Path), help="New or empty folder for the run  [default: out/NAME/run-NNNN]"
 )
-@click.option("--json", "as_json", is_flag=True, help="Print one JSON object and nothing else on stdout.")
+@json_option
 @plain_faults
 def rig(
     scenario: Path,

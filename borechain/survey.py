@@ -14,6 +14,7 @@ import click
 
 from borechain.faults import InputFault, plain_faults
 from borechain.files import write_whole
+from borechain.options import json_option
 
 if TYPE_CHECKING:
     from groundstation.survey.analysis import Analysis
@@ -54,7 +55,7 @@ SOURCES_SHOWN = 12
     "--plot", type=click.Path(path_type=Path, dir_okay=False), help="Plan, sections, uncertainty: PNG, SVG, PDF."
 )
 @click.option("--export-tool", type=click.Path(path_type=Path, dir_okay=False), help="Instrument as ISCWSA JSON.")
-@click.option("--json", "as_json", is_flag=True, help="Print one JSON object and nothing else on stdout.")
+@json_option
 @plain_faults
 def survey(
     file: Path,

@@ -2,19 +2,16 @@
 
 from __future__ import annotations
 
-import json
 from pathlib import Path
 from typing import Any
 
 import click
 
+from borechain.experiment_output import bar, keep, out_option, tell
 from borechain.faults import plain_faults
+from borechain.options import json_option
 from borechain.tables import CASE_COLUMNS, show_table, write_table
 
-out_option = click.option(
-    "--out", type=click.Path(path_type=Path, file_okay=False), help="Folder for tables and plots."
-)
-json_option = click.option("--json", "as_json", is_flag=True, help="Print one JSON object and nothing else on stdout.")
 REGION_COLUMNS = (*CASE_COLUMNS, ("ratio", "ratio"))
 SWEEP_COLUMNS = tuple(
     (name, name) for name in ("changed", "value_deg", "scheme", "station", "north_cm", "east_cm", "tvd_cm")
@@ -49,15 +46,11 @@ def regions(out: Path | None, as_json: bool) -> None:
     from sim.experiments.regions import run
 
     result = run()
-    if out is not None:
-        write_table(out / "region-of-uncertainty.csv", result["cases"], REGION_COLUMNS)
-        draw_regions(out, result)
-    if as_json:
-        click.echo(json.dumps(result))
-        return
-    show_table("Region of uncertainty of wellbore 1", result["cases"], REGION_COLUMNS)
-    show_table("Lateral error: gyro against a held azimuth", result["filtered"], FILTERED_COLUMNS)
-    show_table("Azimuth error of a magnetic survey", result["magnetic"], MAGNETIC_COLUMNS)
+    keep(out, result, REGION_COLUMNS, draw_regions)
+    tell(result, REGION_COLUMNS, "Region of uncertainty of wellbore 1", as_json=as_json)
+    if not as_json:
+        show_table("Lateral error: gyro against a held azimuth", result["filtered"], FILTERED_COLUMNS)
+        show_table("Azimuth error of a magnetic survey", result["magnetic"], MAGNETIC_COLUMNS)
 
 
 def draw_regions(folder: Path, result: dict[str, Any]) -> None:
@@ -101,23 +94,19 @@ def weighting(out: Path | None, as_json: bool) -> None:
     from sim.experiments.weighting import run
 
     result = run()
-    if out is not None:
-        write_table(out / "weighting.csv", result["cases"], CASE_COLUMNS)
-        write_table(out / "weighting-sweeps.csv", result["sweeps"], SWEEP_COLUMNS)
-        draw_weighting(out, result["sweeps"])
-    if as_json:
-        click.echo(json.dumps(result))
-        return
-    show_table("Remaining error at the fourth stop", result["cases"], CASE_COLUMNS)
+    keep(out, result, CASE_COLUMNS, draw_weighting)
+    tell(result, CASE_COLUMNS, "Remaining error at the fourth stop", as_json=as_json)
 
 
-def draw_weighting(folder: Path, sweeps: list[dict[str, Any]]) -> None:
-    """Figures 4.28-4.37: what remains at station 2."""
+def draw_weighting(folder: Path, result: dict[str, Any]) -> None:
+    """Figures 4.28-4.37: what remains at station 2, and the table of all sweeps."""
     import numpy as np
 
     from groundstation.report.plots_study import weighting_figure
     from groundstation.report.style import save
 
+    sweeps = result["sweeps"]
+    write_table(folder / "weighting-sweeps.csv", sweeps, SWEEP_COLUMNS)
     for angle in ("inclination", "azimuth"):
         rows = [row for row in sweeps if row["changed"] == angle and row["station"] == 2]
         changes = np.array(sorted({row["value_deg"] for row in rows}))
@@ -145,21 +134,12 @@ def coverage(wells: int, strings: int, out: Path | None, as_json: bool) -> None:
     Example:
       borechain experiment coverage --wells 2000
     """
-    from rich.console import Console
-    from rich.progress import Progress
-
     from sim.experiments.coverage import WELLS_A_JOB, run
 
-    with Progress(console=Console(stderr=True), disable=as_json) as bar:
-        task = bar.add_task("strings, then wells", total=strings + -(-wells // WELLS_A_JOB))
-        result = run(wells, strings, lambda: bar.advance(task))
-    if out is not None:
-        write_table(out / "coverage.csv", result["cases"], COVERAGE_COLUMNS)
-        draw_coverage(out, result)
-    if as_json:
-        click.echo(json.dumps(result))
-        return
-    show_table(f"Coverage over {result['wells']} wells", result["cases"], COVERAGE_COLUMNS)
+    with bar(strings + -(-wells // WELLS_A_JOB), quiet=as_json, what="strings, then wells") as step:
+        result = run(wells, strings, step)
+    keep(out, result, COVERAGE_COLUMNS, draw_coverage)
+    tell(result, COVERAGE_COLUMNS, f"Coverage over {result['wells']} wells", as_json=as_json)
 
 
 def draw_coverage(folder: Path, result: dict[str, Any]) -> None:

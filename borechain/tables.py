@@ -23,16 +23,18 @@ def write_table(path: Path, rows: list[dict[str, Any]], columns: Columns) -> Non
     write_whole(path, text.getvalue())
 
 
-def show_table(title: str, rows: list[dict[str, Any]], columns: Columns) -> None:
-    """Print a table."""
+def show_table(title: str, rows: list[dict[str, Any]], columns: Columns, *, sideways: bool = False) -> None:
+    """Print a table, ``sideways`` where it is wider than long."""
     from rich.console import Console
     from rich.table import Table
 
-    table = Table(title=title)
-    for _, heading in columns:
-        table.add_column(heading, justify="right")
-    for row in rows:
-        table.add_row(*(cell(row[key]) for key, _ in columns))
+    table, names = Table(title=title), [heading for _, heading in columns]
+    lines = [names, *([cell(row[key]) for key, _ in columns] for row in rows)]
+    head, *body = zip(*lines, strict=True) if sideways else lines
+    for k, heading in enumerate(head):
+        table.add_column(heading, justify="left" if sideways and k == 0 else "right", overflow="fold")
+    for line in body:
+        table.add_row(*line)
     Console().print(table)
 
 

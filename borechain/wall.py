@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from borechain.faults import plain_faults
+from borechain.options import json_option
 
 if TYPE_CHECKING:
     from groundstation.survey.wall import ExtraColumn, Joints
@@ -22,7 +23,7 @@ LIKELY = 0.01  # probability from which a joint is counted as doubtful
 @click.command()
 @click.argument("file", type=click.Path(path_type=Path))
 @click.option("--plot", type=click.Path(path_type=Path, dir_okay=False), help="Thickness over depth: PNG, SVG or PDF.")
-@click.option("--json", "as_json", is_flag=True, help="Print one JSON object and nothing else on stdout.")
+@json_option
 @plain_faults
 def wall(file: Path, plot: Path | None, as_json: bool) -> None:
     """Judge every joint of the wall or grid that FILE describes: thickness, probability of less, where to add a column.
