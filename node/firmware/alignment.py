@@ -12,6 +12,7 @@ from typing import Final
 import numpy as np
 
 from node.firmware.imu_settings import ImuSettings
+from node.firmware.said import Said
 from node.kernels.alignment import (
     CIRCLE,
     EXTREMES,
@@ -39,8 +40,6 @@ LEAST_LEAN = 20.0  # standard errors: with less the readings do not show that th
 MOST_LEAN = 60.0 * DEG  # beyond it gravity's circle is wide and its middle near the centre, which tells no axis
 SHAKING = 5.0  # times the noise of a sample at rest
 LARGEST_OFFSET = 10.0 * DEG  # of a mount; a block of parameters can hold no larger one either
-
-Said = tuple[str, Severity, dict[str, Scalar]]
 
 
 class Aligner:

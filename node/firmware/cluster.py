@@ -14,10 +14,11 @@ from typing import Final
 import numpy as np
 
 from node.firmware.imu_settings import ImuSettings
+from node.firmware.said import Said
 from node.firmware.sensor_faults import Fault, ReadingWatch, SensorLimits
 from node.kernels.cluster import follow_offsets, fuse
 from node.kernels.layout import DEG, RING, Array, Err
-from telemetry.messages import ImuMean, Scalar, Severity, Vector3
+from telemetry.messages import ImuMean, Severity, Vector3
 
 DISAGREEING: Final = 4  # cycles in a row, until an IMU is left out
 HEALTHY: Final = 20  # cycles in a row, until it is back
@@ -28,8 +29,6 @@ SPIN_APART: Final = np.array([0.02, 0.02, 0.02])  # of the spin, on each axis: w
 UNALIGNED_APART, UNALIGNED_SPIN = 1.0, np.array([0.2, 0.2, 0.02])  # the same of mounts never aligned
 CLEARLY: Final = 2.0  # times farther from what is expected: of two that disagree, the one to leave out
 SCALED: Final = ("gyro_noise", "bias_std", "force_std")  # of the configuration, with the noise of the cluster
-
-Said = tuple[str, Severity, dict[str, Scalar]]
 
 
 class Cluster:

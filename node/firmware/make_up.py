@@ -11,8 +11,8 @@ from __future__ import annotations
 
 import math
 
+from node.firmware.said import Said
 from node.firmware.settings import TubeSettings
-from node.firmware.torsion import Said
 from node.kernels.angles import from_binary, wrap
 from node.kernels.layout import DEG, Array, Err
 from telemetry.messages import Aiding, Severity

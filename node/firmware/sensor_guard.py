@@ -11,6 +11,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 
+from node.firmware.said import Said
 from node.firmware.saved_state import resume
 from node.firmware.sensor_faults import STEADY, AidingWatch, Fault, Mismatch, ReadingWatch, SensorLimits
 from node.kernels.angles import from_binary, wrap
@@ -30,8 +31,6 @@ RATE_AGE = 3.0  # s, of an encoder's rate that may stand for the gyroscope
 BACKWARD = PERIOD  # s, that a cycle may begin before the end of the last; beyond it is a jump of the clock
 LONGEST_CYCLE = 10.0 * PERIOD  # s
 FARTHEST = RING * PERIOD  # s, that a cycle may begin after the end of the last
-
-Said = tuple[str, Severity, dict[str, Scalar]]
 
 
 @dataclass(slots=True)

@@ -24,6 +24,7 @@ STEPS = 32
 PLACES = (np.arange(STEPS) + 0.5) / STEPS
 WORST = 2.5  # sum of squares by degree of freedom; beyond, the stop is of another kind
 UNKNOWN = (0.5, 1.0 / 12.0)
+FARTHEST, BOUNCE = 1e12, 1e-7  # s, of a time, and between two edges
 
 
 def stopped_at(times: tuple[float, ...], edge_std: float) -> tuple[float, float]:
@@ -44,11 +45,14 @@ def stopped_at(times: tuple[float, ...], edge_std: float) -> tuple[float, float]
     y = (np.arange(len(t)) + PLACES[:, None]) ** (1.0 / POWERS[:, None, None])  # (powers, places, edges)
     terms = np.stack([np.ones_like(y), -y, -(y**2)], axis=-1)
     # an edge out of place is early or late by its place's error over the rate; twice, as the rate follows from the fit
-    slopes = np.broadcast_to(np.array([0.0, (t[0] - t[-1]), 0.0]), (*y.shape[:2], 3))
-    slopes = slopes / (y[..., -1] - y[..., 0])[..., None]
-    for _ in range(2):
-        late = edge_std * np.abs(_pace(y, slopes))
-        slopes, square, information = _fit(terms, t, late)
+    slopes = np.zeros((*y.shape[:2], 3))
+    slopes[..., 1] = 1.0 / (y[..., -1] - y[..., 0])
+    try:
+        for _ in range(2):
+            late = edge_std * _pace(y, slopes)
+            slopes, square, information = _fit(terms, t, late)
+    except np.linalg.LinAlgError:
+        return UNKNOWN
     likely = -0.5 * square - np.log(late).sum(axis=-1) - 0.5 * information
     likely[slopes[..., 1] <= 0.0] = -np.inf
     if not np.min(square) < WORST * (len(t) - 3) or not np.isfinite(np.max(likely)):
@@ -60,16 +64,18 @@ def stopped_at(times: tuple[float, ...], edge_std: float) -> tuple[float, float]
 
 
 def _falling(times: tuple[float, ...]) -> Array:
-    """Times before the last edge (s), as long as each is older than the one before and finite."""
-    t = np.array(times, dtype=np.float64)
-    good = np.isfinite(t)
-    good[1:] &= np.diff(t) < 0.0
-    t = t[: int(np.argmin(good)) if not good.all() else len(t)]
-    return np.asarray(t - t[0] if len(t) else t)
+    """Times before the last edge in parts of all of them (0 to -1), as long as each is older than the one before."""
+    falling: list[float] = []
+    for time in times:
+        if not abs(time) < FARTHEST or (falling and not time < falling[-1] - BOUNCE):
+            break
+        falling.append(time)
+    t = np.array(falling)
+    return t if len(t) < 2 else (t - t[0]) / (t[0] - t[-1])
 
 
 def _pace(y: Array, slopes: Array) -> Array:
-    """Seconds a count at every edge, d t_k / d k; ``y`` is (k + x)^(1/p)."""
+    """Time a count at every edge, d t_k / d k; ``y`` is (k + x)^(1/p)."""
     p = POWERS[:, None, None]
     b, g = slopes[..., 1, None], slopes[..., 2, None]
     return np.asarray(np.maximum(np.abs(y ** (1.0 - p) * (b + 2.0 * g * y) / p), 1e-9))

@@ -11,13 +11,12 @@ from __future__ import annotations
 import math
 from dataclasses import replace
 
+from node.firmware.said import Said
 from node.firmware.settings import TubeSettings
 from node.kernels.layout import Array, Err
-from telemetry.messages import Aiding, Scalar, Severity
+from telemetry.messages import Aiding, Severity
 
 UNKNOWN_VAR = 10.0  # rad^2, of a twist of which nothing is known but for whole turns
-
-Said = tuple[str, Severity, dict[str, Scalar]]
 
 
 class TubeTorsion:

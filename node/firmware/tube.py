@@ -8,7 +8,8 @@ from dataclasses import replace
 
 import numpy as np
 
-from node.firmware.alignment import FASTEST, Aligner, alignment_text, angles_of, realign
+from node.firmware.account import Account
+from node.firmware.alignment import FASTEST, Aligner, alignment_text, realign
 from node.firmware.coarse_level import level_coarsely
 from node.firmware.inputs import ImuReading, Surroundings
 from node.firmware.intake import Intake
@@ -21,41 +22,23 @@ from node.firmware.static_record import StaticRecorder
 from node.firmware.time_stamp import TimeStampPrior
 from node.firmware.torsion import TubeTorsion
 from node.kernels.alignment import new_mount
-from node.kernels.angles import from_binary, wrap
+from node.kernels.angles import wrap
 from node.kernels.calibration import USUAL
-from node.kernels.layout import DEG, Array, Err, Scheme, Status, new_state
+from node.kernels.layout import DEG, Array, Scheme, Status, new_state
 from node.kernels.modes import STATIC_BIAS
 from telemetry.messages import (
     Aiding,
     Event,
-    ImuMean,
-    Mode,
     NodeFlag,
     NodeState,
-    Scalar,
     Severity,
     StaticRecord,
     SurveyMeasurement,
 )
 from telemetry.parameters import SHORT_HASH, ParameterBlock
 
-VAR_FLOOR = (0.001 * DEG) ** 2
 STILL_CYCLES = 4  # after which a node takes itself for standing
 LARGEST_OFFSET = 6.0 * DEG  # rad/s, zero-rate offset of a gyroscope never calibrated; the slow alignment turn is faster
-EVENT_OF_STATUS: tuple[tuple[Status, str, Severity], ...] = (
-    (Status.STOPPED, "stopped", Severity.INFO),
-    (Status.STARTED, "started", Severity.INFO),
-    (Status.JOINT_OPENED, "joint_opened", Severity.INFO),
-    (Status.JOINT_CLOSED, "joint_closed", Severity.INFO),
-    (Status.BIAS_KNOWN, "bias_known", Severity.INFO),
-    (Status.REFERENCE_CHANGED, "reference_changed", Severity.INFO),
-    (Status.YAW_RESET, "yaw_reset", Severity.WARNING),
-    (Status.RATE_EXCEEDED, "rate_exceeded", Severity.ERROR),
-    (Status.RATE_RECOVERED, "rate_recovered", Severity.WARNING),
-    (Status.BAD_SAMPLE, "bad_sample", Severity.ERROR),
-    (Status.FILTER_FAULT, "filter_fault", Severity.ERROR),
-)
-TOLD = Status(sum(bit for bit, _, _ in EVENT_OF_STATUS))
 
 
 class Tube:
@@ -91,9 +74,7 @@ class Tube:
         self.state = state[0]
         self._next_sequence = next_sequence
         self._restored = restored
-        self._cycles = 0
-        self.overruns = 0
-        self._rejecting = False
+        self.account = Account(settings, state, config, next_sequence, restored=restored)
         self._noticed = Status.NONE  # between cycles
         self.raw: ImuReading | None = None  # of the last cycle, of all IMUs together
         self._recorder = StaticRecorder()
@@ -161,11 +142,12 @@ class Tube:
         self._time_stamp.follow(around)
         level_coarsely(self.state, self.config, rate, force)
         self._slow_cycles = self._slow_cycles + 1 if max(map(abs, rate)) < LARGEST_OFFSET else 0
-        if self._cycles and reading.start - self.state["now"] > 0.5 * (reading.end - reading.start):
-            self.overruns += 1
+        account = self.account
+        if account.cycles and reading.start - self.state["now"] > 0.5 * (reading.end - reading.start):
+            account.overruns += 1
         status = self._noticed | self._run(reading, 1 if around.joined else 0)
         self._noticed = Status.NONE
-        self._cycles += 1
+        account.cycles += 1
         if Status.FILTER_FAULT in status:
             self._start_over()
         self._guard.after(status, reading.end)
@@ -173,19 +155,21 @@ class Tube:
         if self._cluster is not None and self.quiet:
             self._cluster.learn(self._intake.rates)
         yield from self._sensor_events(around)
-        yield from self._string_events(around)
-        yield from self._events(status, around)
+        yield from account.said([*self._make_up.take_said(), *self._torsion.take_said()], around)
+        yield from account.events(status, around)
         yield from self._record(reading, around)
         if Status.SURVEY_READY in status:
-            yield self._survey(reading.end, around)
+            samples = int(self.config["survey_samples"])
+            imus = self._cluster.survey(samples) if self._cluster is not None else ()
+            yield account.survey(reading.end, around, imus, self._guard.flags)
         if self.settings.scheme is not Scheme.FORWARD and self.state["yaw_known"]:
-            yield self._estimate(around)
-        if status & ~Status.AIDED or self._cycles % self.settings.state_every == 0:
-            yield self._report(reading.end, around)
+            yield self._torsion.of_estimate(account.estimate(around))
+        if status & ~Status.AIDED or account.cycles % self.settings.state_every == 0:
+            yield account.report(reading.end, around, self._guard.flags, self._mount[0], self._block)
 
     def boot_event(self, rig_now: float) -> Event:
         """Tell that the node started, and whether with its saved yaw."""
-        return self._event(
+        return self.account.event(
             "restored" if self._restored else "booted", Severity.INFO, rig_now, {"yaw_deg": self.yaw / DEG}
         )
 
@@ -231,7 +215,7 @@ class Tube:
         recorrect(self._states, self.parameters, block, self._temperature)
         self.parameters = block
         self._correction = record_of(block)
-        self._short_hash = block.sha256()[:SHORT_HASH]
+        self._block = (block.version, block.sha256()[:SHORT_HASH])
 
     @property
     def quiet(self) -> bool:
@@ -246,37 +230,21 @@ class Tube:
     @property
     def yaw(self) -> float:
         """Yaw at the end of the newest cycle, rad in [0, 2 pi)."""
-        return float(from_binary(self.state["now_yaw"]))
+        return self.account.yaw
 
     @property
     def yaw_var(self) -> float:
         """Random variance of ``yaw``, rad^2."""
-        return max(float(self.state["now_P"][Err.YAW, Err.YAW]), VAR_FLOOR)
+        return self.account.yaw_var
 
     @property
     def systematic_var(self) -> float:
         """Variance of the constant errors of every joint above, of the twist and of this node's mount, rad^2."""
-        return float(self.state["systematic_var"]) + self.settings.mount_std**2
+        return self.account.systematic_var
 
     def flags(self, around: Surroundings, now: float) -> NodeFlag:
         """What the node says of the trust in its own yaw at ``now`` (s, own clock)."""
-        state = self.state
-        flags = self._guard.flags
-        if not state["yaw_known"]:
-            flags |= NodeFlag.YAW_UNTRUSTED
-        if now - state["last_aided"] > self.settings.aiding_old_after:
-            flags |= NodeFlag.AIDING_OLD
-        if state["rejected"]:
-            flags |= NodeFlag.INNOVATION_REJECTED
-        if state["rate_exceeded"]:
-            flags |= NodeFlag.RATE_EXCEEDED
-        if self._restored:
-            flags |= NodeFlag.RESTORED
-        if not around.synchronised:
-            flags |= NodeFlag.CLOCK_UNSYNCHRONISED
-        if state["mode"] == Mode.STATIC_BIAS:
-            flags |= NodeFlag.BIAS_UNKNOWN
-        return flags
+        return self.account.flags(self._guard.flags, around, now)
 
     def _run(self, reading: ImuReading, joined: int) -> Status:
         """One cycle of the loop; under torque it takes no survey, and that of this stop stays due."""
@@ -289,16 +257,6 @@ class Tube:
         if waits:
             state["surveyed"] = 0
         return Status(status)
-
-    def _events(self, status: Status, around: Surroundings) -> Iterator[Event]:
-        for bit, code, severity in EVENT_OF_STATUS if status & TOLD else ():
-            if bit in status:
-                yield self._event(code, severity, around.rig_now, {"yaw_deg": self.yaw / DEG})
-        rejecting = bool(self.state["rejected"])
-        if rejecting and not self._rejecting:
-            sigmas = abs(float(self.state["innovation"])) / math.sqrt(float(self.state["innovation_var"]))
-            yield self._event("aiding_rejected", Severity.WARNING, around.rig_now, {"sigmas": sigmas})
-        self._rejecting = rejecting
 
     def _expected(self) -> Array:
         """Rate (rad/s) and force (m/s^2) that the node would read in this cycle if nothing had changed: (6,)."""
@@ -327,12 +285,8 @@ class Tube:
 
     def _sensor_events(self, around: Surroundings) -> Iterator[Event]:
         cluster = self._cluster.take_said() if self._cluster is not None else []
-        for code, severity, arguments in (*self._guard.take_said(), *self._aligner.take_said(), *cluster):
-            yield self._event(code, severity, around.rig_now, arguments)
-
-    def _string_events(self, around: Surroundings) -> Iterator[Event]:
-        for code, severity, arguments in (*self._make_up.take_said(), *self._torsion.take_said()):
-            yield self._event(code, severity, around.rig_now, arguments)
+        said = [*self._guard.take_said(), *self._aligner.take_said(), *cluster]
+        return self.account.said(said, around)
 
     def _record(self, reading: ImuReading, around: Surroundings) -> Iterator[StaticRecord | Event]:
         recorder = self._recorder
@@ -342,7 +296,7 @@ class Tube:
         recorder.take(reading.rate, reading.force, temperature, reading.start, standing=self.standing)
         if recorder.is_due(reading.end):
             record = recorder.finish(self.settings.tube, reading.end, around.rig_now, self._next_sequence)
-            yield record or self._event("static_record_empty", Severity.ERROR, around.rig_now, {})
+            yield record or self.account.event("static_record_empty", Severity.ERROR, around.rig_now, {})
 
     def _start_over(self) -> None:
         """A covariance that is none: begin again from nothing but the constant bias."""
@@ -350,66 +304,3 @@ class Tube:
         fresh = new_state(self._configs)[0]
         for name in fresh.dtype.names or ():
             self.state[name] = keep.get(name, fresh[name])
-
-    def _event(self, code: str, severity: Severity, rig_now: float, arguments: dict[str, Scalar]) -> Event:
-        return Event(self.settings.tube, self._next_sequence(), rig_now, severity, code, arguments)
-
-    def _survey(self, end: float, around: Surroundings) -> SurveyMeasurement:
-        state = self.state
-        cov = state["survey_force_cov"]
-        rows = tuple((float(row[0]), float(row[1]), float(row[2])) for row in cov)
-        force = state["survey_force"]
-        mean = ImuMean((float(force[0]), float(force[1]), float(force[2])), (rows[0], rows[1], rows[2]))
-        return SurveyMeasurement(
-            tube=self.settings.tube,
-            sequence=self._next_sequence(),
-            station_at=around.rig_now,
-            hops=around.hops,
-            imus=(self._cluster.survey(int(self.config["survey_samples"])) if self._cluster else ()) or (mean,),
-            yaw=self.yaw,
-            yaw_var=self.yaw_var,
-            systematic_var=self.systematic_var,
-            samples=int(self.config["survey_samples"]),
-            settle_time=end - float(state["stopped_at"]),
-            flags=self.flags(around, end),
-        )
-
-    def _estimate(self, around: Surroundings) -> Aiding:
-        below = self.settings.lower_joint
-        own = Aiding(
-            yaw=self.yaw,
-            yaw_var=self.yaw_var,
-            systematic_var=float(self.state["systematic_var"]) + below.std**2,
-            offset=wrap(below.angle),
-            rate=float(self.state["now_rate"]),
-            valid_at=around.rig_now,
-            sequence=int(self.state["cycles"]),
-            hops=max(around.hops, 1),
-        )
-        return self._torsion.of_estimate(own)
-
-    def _report(self, end: float, around: Surroundings) -> NodeState:
-        state = self.state
-        bias = state["static_bias"] + state["bias"]
-        pitch, roll = angles_of(self._axes[0])
-        return NodeState(
-            tube=self.settings.tube,
-            at=around.rig_now,
-            hops=around.hops,
-            mode=Mode.ALIGNMENT if self._aligner.running else Mode(int(state["mode"])),
-            yaw=self.yaw,
-            yaw_var=self.yaw_var,
-            systematic_var=self.systematic_var,
-            gyro_bias=(float(bias[0]), float(bias[1]), float(bias[2])),
-            scale_factor=float(state["scale"]),
-            innovation=float(state["innovation"]),
-            innovation_var=float(state["innovation_var"]),
-            aiding_age=end - float(state["last_aided"]),
-            clock_var=around.clock_var,
-            flags=self.flags(around, end),
-            cycles=self._cycles,
-            overruns=self.overruns,
-            parameters_version=self.parameters.version,
-            parameters_hash=self._short_hash,
-            alignment=(pitch, roll, float(self._mount[0]["std"][0].max())),
-        )

@@ -173,10 +173,10 @@ class TubeProcess(Driven):
 
     def on_overrun(self, missed: int, now: float) -> None:
         """The cycle took so long that ``missed`` later ones are left out."""
-        self.tube.overruns += 1
+        self.tube.account.overruns += 1
         if now - self._overrun_told >= OVERRUN_EVERY:
             self._overrun_told = now
-            self._say_event(Severity.WARNING, "overrun", {"missed": missed, "overruns": self.tube.overruns})
+            self._say_event(Severity.WARNING, "overrun", {"missed": missed, "overruns": self.tube.account.overruns})
 
     def close(self) -> None:
         """Keep the newest state and let the sensor go."""

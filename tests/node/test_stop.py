@@ -66,7 +66,10 @@ def test_a_hard_stop_is_not_believed_far(to_go, parameter: float) -> None:  # ty
     assert np.sqrt(np.mean(error**2)) < 1.2 * math.sqrt(1.0 / 12.0)
 
 
-@given(st.lists(st.floats(), max_size=2 * EDGES))
+RAGGED = st.lists(st.floats(1e-9, 1e9) | st.floats(0.01, 1.0), min_size=FEWEST, max_size=EDGES)
+
+
+@given(st.lists(st.floats(), max_size=2 * EDGES) | RAGGED.map(lambda gaps: (1e9 - np.cumsum(gaps)).tolist()))
 def test_whatever_the_times_are_the_place_is_inside_the_count(times: list[float]) -> None:
     mean, var = stopped_at(tuple(times), STOP_STD)
     assert 0.0 < mean < 1.0
