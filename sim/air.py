@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-import numpy as np
-
+from sim.streams import stream
 from telemetry.messages import Side
 
 BLOCK = 1024
@@ -47,7 +46,7 @@ class PortStream:
     """Draws of one port, made in blocks."""
 
     def __init__(self, seed: int, sender: int, side: Side) -> None:
-        self._random = np.random.Generator(np.random.Philox(np.random.SeedSequence([seed, 0xA1, sender, int(side)])))
+        self._random = stream(seed, 0xA1, sender, int(side))
         self._block: list[tuple[float, float, float]] = []
 
     def draw(self) -> tuple[float, float, float]:

@@ -55,6 +55,11 @@ class Borehole:
         legs = 0.5 * steps * (self._tangents[:-1] + self._tangents[1:]) * factor
         self._positions = np.concatenate([np.zeros((1, 3)), np.cumsum(legs, axis=0)])
 
+    @classmethod
+    def straight(cls, inclination: float, azimuth: float = 0.0, length: float = 1000.0) -> Borehole:
+        """A hole of ``length`` (m) in one direction (rad)."""
+        return cls(np.array([0.0, length]), np.full(2, inclination), np.full(2, azimuth))
+
     def _check(self, inclination: Array, azimuth: Array, where: str) -> None:
         if len(self.md) < 2:
             raise ScenarioError(f"{where}: expected at least two stations, got {len(self.md)}")

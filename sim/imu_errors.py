@@ -79,6 +79,11 @@ class ImuErrors:
         shaking = a.vibration_mps2 * turning[:, None] * random.standard_normal(force.shape)
         return np.asarray(force + bias + noise + shaking)
 
+    def readings(self, random: np.random.Generator, rate: Array, force: Array, turning: Array, period: float) -> Array:
+        """Both, one after the other from one stream, (n, 6)."""
+        gyro = self.gyro(random, rate, force, period)
+        return np.concatenate([gyro, self.accelerations(random, force, turning)], axis=1)
+
     def _distortion(self, random: np.random.Generator) -> Array:
         g = self.gyroscope
         matrix = math.radians(g.misalignment_std_deg) * random.standard_normal((3, 3))

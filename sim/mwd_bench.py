@@ -19,6 +19,7 @@ from groundstation.calibration.mwd_model import (
     Triad,
     volts_of,
 )
+from sim.streams import stream
 
 Array = npt.NDArray[np.float64]
 VOLTS_PER_G, VOLTS_PER_MICROTESLA = 3.0, 0.06
@@ -71,11 +72,6 @@ class Tool:
 
     accelerometers: Triad
     magnetometers: Triad
-
-
-def stream(seed: int, purpose: int) -> np.random.Generator:
-    """Random numbers of one tool and purpose."""
-    return np.random.Generator(np.random.Philox(np.random.SeedSequence([seed, purpose])))
 
 
 def draw_tool(seed: int) -> Tool:

@@ -23,6 +23,7 @@ from sim.experiments.chain import ACCELERATION_DPS2, INCLINATION_DEG, RATE_DPS
 from sim.imu_errors import ImuErrors
 from sim.motion import Motion, Trapezoid
 from sim.scenario import AccelerometerSection, GyroSection
+from sim.streams import stream
 from sim.truth import TubeTruth
 from telemetry.messages import ENCODER
 
@@ -57,7 +58,7 @@ class TurningString:
     ) -> None:
         self.tubes = tubes
         self._begin, self._length, self._seed = begin, length, seed
-        random = self._random(0)
+        random = stream(seed, 0)
         rate, acceleration = math.radians(RATE_DPS), math.radians(ACCELERATION_DPS2)
         turn = Trapezoid(rate * max(turning - rate / acceleration, 0.2 * turning), rate, acceleration)
         first_angle = float(random.uniform(0.0, 2.0 * math.pi))
@@ -93,13 +94,13 @@ class TurningString:
             np.save(folder / f"tube-{tube}.npy", np.column_stack([ends + self.offset(tube), readings]))
 
     def _counts(self, ends: Array) -> Array:
-        disc = Disc(self._motion, COUNTS_PER_TURN, EDGE_STD, self._random(ENCODER_DISC))
+        disc = Disc(self._motion, COUNTS_PER_TURN, EDGE_STD, stream(self._seed, ENCODER_DISC))
         samples = [(end, *disc.sample(end)) for end in ends.tolist()]
         return np.array([[end, count, edge, 1.0, *earlier] for end, count, edge, earlier in samples])
 
     def _readings(self, tube: int, ends: Array, step: float) -> Array:
-        lean, random = math.radians(INCLINATION_DEG), self._random(tube)
-        hole = Borehole(np.array([0.0, 1000.0]), np.array([lean, lean]), np.zeros(2))
+        lean, random = math.radians(INCLINATION_DEG), stream(self._seed, tube)
+        hole = Borehole.straight(lean)
         usual = AccelerometerSection()
         # the noise is stated for the mean of a whole cycle
         accelerometer = usual.model_copy(update={"noise_deg": usual.noise_deg * math.sqrt(ROWS_A_CYCLE)})
@@ -107,12 +108,8 @@ class TurningString:
         rate, force = truth.cycle_means(ends, step)
         errors = ImuErrors(GyroSection(), accelerometer)
         turning = (self._motion.drive(ends)[1] > 0.0).astype(float)
-        gyro = errors.gyro(random, rate, force, step)
-        return np.column_stack([gyro, errors.accelerations(random, force, turning)])
+        return errors.readings(random, rate, force, turning, step)
 
     def _angle(self, tube: int) -> float:
         """Sum of the joints from the drive head to a tube, rad."""
         return float(np.sum(self._joints[tube:]))
-
-    def _random(self, stream: int) -> np.random.Generator:
-        return np.random.Generator(np.random.Philox(np.random.SeedSequence([self._seed, stream])))

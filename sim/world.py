@@ -21,6 +21,7 @@ from sim.imu_errors import Drift, ImuErrors
 from sim.motion import Motion, Phase, Trapezoid
 from sim.rack import Rack
 from sim.scenario import Scenario
+from sim.streams import stream
 from sim.torsion import StringTorsion, stiffness
 from sim.truth import TubeTruth, imu_frame
 from telemetry.messages import BASE, ENCODER
@@ -264,7 +265,7 @@ class World:
 
     def _random(self, purpose: int, tube: int, imu: int = 0) -> np.random.Generator:
         further = [imu] if imu else []  # the first IMU of a tube draws what it draws alone
-        return np.random.Generator(np.random.Philox(np.random.SeedSequence([self.seed, purpose, tube, *further])))
+        return stream(self.seed, purpose, tube, *further)
 
     def _check_faults(self) -> None:
         racked = self.rack.end if self.rack is not None else self.begin

@@ -21,18 +21,20 @@ import numpy.typing as npt
 
 from groundstation.survey.resolve import angles, resolve
 from node.firmware.alignment import METHODS, angles_of
-from node.firmware.encoder import QUANTUM, EncoderNode, EncoderSample
+from node.firmware.encoder import COUNTS_PER_TURN, EDGE_STD, EncoderNode, EncoderSample
 from node.firmware.imu_settings import ImuSettings
 from node.firmware.inputs import ImuReading, Surroundings
 from node.firmware.settings import Kernel, TubeSettings
-from node.firmware.tube import Tube
 from node.kernels.alignment import new_mount
-from node.kernels.layout import PERIOD, default_config, new_state
+from node.kernels.layout import PERIOD, default_config
 from sim.borehole import Borehole
+from sim.encoder import Disc
+from sim.experiments.fresh import fresh_tube
 from sim.experiments.node_trials import bootstrap, row
 from sim.imu_errors import ImuErrors
 from sim.motion import Motion, Trapezoid
 from sim.scenario import AccelerometerSection, GyroSection
+from sim.streams import stream
 from sim.truth import TubeTruth, imu_frame
 from telemetry.messages import Event, SurveyMeasurement
 
@@ -73,42 +75,37 @@ class Bench:
 
     def __init__(self, setup: Setup, seed: int) -> None:
         self._setup = setup
-        random = np.random.Generator(np.random.Philox(np.random.SeedSequence([seed, STREAMS])))
+        random = stream(seed, STREAMS)
         turn = Trapezoid((setup.turns + 2.0 * SPARE) * math.tau, math.radians(setup.rate_dps), RAMP)
         first, heading = random.uniform(0.0, math.tau, 2)
         motion = Motion(BEGIN, REST, 5.0, STOP, 1.0, turn, 1, 0.0, float(first))
-        lean = np.full(2, math.radians(setup.inclination_deg))
-        hole = Borehole(np.array([0.0, 1000.0]), lean, np.full(2, heading))
+        hole = Borehole.straight(math.radians(setup.inclination_deg), float(heading))
         a = AccelerometerSection(noise_deg=setup.noise_deg, bias_std_deg=setup.bias_std_deg)
         self.tilts = math.radians(setup.mount_tilt_std_deg) * random.standard_normal(2)
         self._ends = BEGIN + PERIOD * np.arange(1.0, math.floor((motion.end - BEGIN) / PERIOD) + 1.0)
         truth = TubeTruth(hole, motion, 0.0, 0.0, a.radius_m, a.gravity_mps2)
         frame = imu_frame(*self.tilts)
         rate, force = (true @ frame.T for true in truth.cycle_means(self._ends, PERIOD))
-        self._motion, self._angles = motion, motion.drive(self._ends)[0].tolist()
+        self._disc = Disc(motion, COUNTS_PER_TURN, EDGE_STD, stream(seed, STREAMS, 1))
         errors = ImuErrors(GyroSection(), a)
-        gyro = errors.gyro(random, rate, force, PERIOD)
-        felt = errors.accelerations(random, force, np.zeros(len(force)))  # it turns and does not drill
-        self._samples = np.concatenate([gyro, felt], axis=1).tolist()
+        still = np.zeros(len(force))  # it turns and does not drill
+        self._samples = errors.readings(random, rate, force, still, PERIOD).tolist()
         self._radius = a.radius_m
 
     def run(self, method: str) -> Outcome:
         """Let one node rest, turn and rest; ``method`` is of its alignment, ``none`` leaves the mount as it is."""
-        config, mount = default_config(), new_mount()
-        config[0]["force_std"] *= self._setup.noise_deg / 0.02
+        mount, force_std = new_mount(), float(default_config()[0]["force_std"]) * self._setup.noise_deg / 0.02
         settings = TubeSettings(1, kernel=self._setup.kernel, imus=(ImuSettings((self._radius, 0.0)),))
-        numbers, encoder = iter(range(10**9)).__next__, EncoderNode()
-        tube = Tube(settings, config, new_state(config), numbers, restored=False, mount=mount)
+        tube, encoder = fresh_tube(settings, [("force_std", force_std)], mount), EncoderNode()
         said: list[Any] = []
-        cycles = zip(self._ends.tolist(), self._angles, self._samples, strict=True)
-        for end, angle, (wx, wy, wz, fx, fy, fz) in cycles:
+        cycles = zip(self._ends.tolist(), self._samples, strict=True)
+        for end, (wx, wy, wz, fx, fy, fz) in cycles:
             if method != "none" and end - PERIOD <= BEGIN + REST - 5.0 < end:
                 tube.align(method, self._setup.turns)
             reading = ImuReading(end - PERIOD, end, (wx, wy, wz), (fx, fy, fz))
             said += tube.on_cycle(reading, Surroundings(True, 1, end, 1e-8, True))
-            count = math.floor(angle / QUANTUM + 1e-9)
-            edge = min(self._motion.time_of_angle(count * QUANTUM), end)
-            aiding = encoder.on_cycle(EncoderSample(count, edge, True), end)
+            count, edge, earlier = self._disc.sample(end)
+            aiding = encoder.on_cycle(EncoderSample(count, edge, True, earlier=earlier), end)
             tube.on_aiding(aiding, aiding.valid_at)
         pitch, roll = angles_of(mount[0]["axis"][0])
         survey = [m for m in said if isinstance(m, SurveyMeasurement)][-1].imus[0]

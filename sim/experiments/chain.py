@@ -17,13 +17,15 @@ from node.firmware.inputs import ImuReading, Surroundings
 from node.firmware.settings import Joint, Kernel, TubeSettings
 from node.firmware.tube import Tube
 from node.kernels.angles import wrap
-from node.kernels.layout import PERIOD, Scheme, default_config, new_state
+from node.kernels.layout import PERIOD, Scheme
 from sim.borehole import Borehole
 from sim.encoder import Disc
+from sim.experiments.fresh import fresh_tube
 from sim.experiments.node_links import Link, OnOff
 from sim.imu_errors import ImuErrors
 from sim.motion import Motion, Trapezoid
 from sim.scenario import AccelerometerSection, GyroSection
+from sim.streams import stream
 from sim.truth import TubeTruth
 from telemetry.messages import Aiding
 
@@ -80,10 +82,10 @@ class Chain:
 
     def __init__(self, setup: ChainSetup, seed: int) -> None:
         self._setup = setup
-        self._random = _stream(seed, setup.hops)
+        self._random = stream(seed, setup.hops)
         self._motion = motion_of(setup, float(self._random.uniform(0.0, 2.0 * math.pi)))
         self._cycles = math.floor((self._motion.end - BEGIN) / PERIOD)
-        self._disc = Disc(self._motion, COUNTS_PER_TURN, EDGE_STD, _stream(seed, setup.hops, DISC_STREAM))
+        self._disc = Disc(self._motion, COUNTS_PER_TURN, EDGE_STD, stream(seed, setup.hops, DISC_STREAM))
         hops = setup.hops
         angles = self._random.uniform(-math.pi, math.pi, hops)
         errors = setup.joint_std * self._random.standard_normal(hops)
@@ -123,12 +125,11 @@ class Chain:
             state_every=10**9,
             kernel=self._setup.kernel,
         )
-        config = default_config()
-        return Tube(settings, config, new_state(config), iter(range(10**9)).__next__, restored=False)
+        return fresh_tube(settings)
 
     def _passes(self, seed: int) -> npt.NDArray[np.bool_]:
         """Whether the encoder is heard (cycles,); the phase of the link is that of the seed."""
-        random = _stream(seed, self._setup.hops, LINK_STREAM)
+        random = stream(seed, self._setup.hops, LINK_STREAM)
         times = PERIOD * np.arange(1.0, self._cycles + 1.0)
         return self._setup.link.passes(times + float(random.uniform(0.0, self._setup.link.repeats)))
 
@@ -147,17 +148,13 @@ class Chain:
         return np.cumsum(constant + setup.clock_wander_std * draws, axis=1)
 
     def _sensor(self, k: int, ends: Array) -> list[list[float]]:
-        lean = math.radians(INCLINATION_DEG)
-        hole = Borehole(np.array([0.0, 1000.0]), np.array([lean, lean]), np.zeros(2))
+        hole = Borehole.straight(math.radians(INCLINATION_DEG))
         a = AccelerometerSection()
         truth = TubeTruth(hole, self._motion, 0.0, float(self._true[k]), a.radius_m, a.gravity_mps2)
         rate, force = truth.cycle_means(ends, PERIOD)
         errors = ImuErrors(GyroSection(), a)
         turning = (self._motion.drive(ends)[1] > 0.0).astype(float)
-        gyro = errors.gyro(self._random, rate, force, PERIOD)
-        samples: list[list[float]] = np.concatenate(
-            [gyro, errors.accelerations(self._random, force, turning)], axis=1
-        ).tolist()
+        samples: list[list[float]] = errors.readings(self._random, rate, force, turning, PERIOD).tolist()
         return samples
 
     def _cycle(self, k: int, cycle: int, end: float) -> Aiding | None:
@@ -187,10 +184,6 @@ class Chain:
         var = [tube.yaw_var for tube in self._tubes]
         total_var = [tube.yaw_var + tube.systematic_var for tube in self._tubes]
         return error, var, total, total_var
-
-
-def _stream(*key: int) -> np.random.Generator:
-    return np.random.Generator(np.random.Philox(np.random.SeedSequence(key)))
 
 
 def run_seed(job: tuple[ChainSetup, int]) -> ChainRun:

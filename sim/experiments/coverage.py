@@ -30,6 +30,7 @@ from sim.borehole import Borehole
 from sim.experiments.chain import ChainSetup, run_seed
 from sim.experiments.published import wellbore_1
 from sim.scenario import AccelerometerSection, JointSection
+from sim.streams import stream
 
 Array = npt.NDArray[np.float64]
 TUBES = 10
@@ -63,7 +64,7 @@ class Rig:
     """One string of one well and what is wrong with it."""
 
     def __init__(self, seed: int) -> None:
-        self.random = np.random.Generator(np.random.Philox(np.random.SeedSequence([seed, 2000])))
+        self.random = stream(seed, 2000)
         joints, accelerometer = JointSection(), AccelerometerSection()
         self.joint_std = math.radians(joints.reading_std_deg)
         self.mount_std = math.radians(joints.mount_std_deg)

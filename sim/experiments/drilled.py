@@ -20,11 +20,13 @@ from node.firmware.settings import Joint, JointRule, Kernel, TubeSettings
 from node.firmware.torque import TorqueSettings
 from node.firmware.tube import Tube
 from node.kernels.angles import wrap
-from node.kernels.layout import PERIOD, default_config, new_state
+from node.kernels.layout import PERIOD
 from sim.borehole import Borehole
+from sim.experiments.fresh import fresh_tube
 from sim.imu_errors import ImuErrors
 from sim.motion import Motion, Trapezoid
 from sim.scenario import AccelerometerSection, GyroSection, TorsionSection
+from sim.streams import stream
 from sim.torsion import StringTorsion, stiffness
 from sim.truth import TubeTruth
 from telemetry.messages import Aiding, Event, SurveyMeasurement
@@ -85,7 +87,7 @@ class DrilledString:
 
     def __init__(self, setup: DrilledSetup, seed: int) -> None:
         self._setup = setup
-        self._random = np.random.Generator(np.random.Philox(np.random.SeedSequence([seed, setup.tubes, setup.blocks])))
+        self._random = stream(seed, setup.tubes, setup.blocks)
         turn = Trapezoid(setup.turns * 2.0 * math.pi, math.radians(RATE_DPS), math.radians(ACCELERATION_DPS2))
         angle = float(self._random.uniform(0.0, 2.0 * math.pi))
         self.motion = Motion(BEGIN, HOLD, JOINT_TIME, setup.stop, FINISH, turn, setup.blocks, setup.tube_length, angle)
@@ -153,8 +155,7 @@ class DrilledString:
 
     def _truth(self, tube: int) -> TubeTruth:
         setup, a = self._setup, AccelerometerSection()
-        lean = math.radians(INCLINATION_DEG)
-        hole = Borehole(np.array([0.0, 1000.0]), np.array([lean, lean]), np.zeros(2))
+        hole = Borehole.straight(math.radians(INCLINATION_DEG))
         top = max(tube, setup.first)
         joint = self._drive[top] + float(np.sum(self._lower[tube + 1 : top + 1])) + self._mounts[tube]
         twist = None if self._torsion is None else partial(self._torsion.twist, tube)
@@ -169,9 +170,7 @@ class DrilledString:
         rate, force = truth.cycle_means(self.ends, PERIOD)
         errors = ImuErrors(GyroSection(), AccelerometerSection())
         turning = (self.motion.drive(self.ends)[1] > 0.0).astype(float)
-        gyro = errors.gyro(self._random, rate, force, PERIOD)
-        felt = errors.accelerations(self._random, force, turning)
-        samples: list[list[float]] = np.concatenate([gyro, felt], axis=1).tolist()
+        samples: list[list[float]] = errors.readings(self._random, rate, force, turning, PERIOD).tolist()
         return samples
 
     def _tube(self, tube: int) -> Tube:
@@ -187,8 +186,7 @@ class DrilledString:
             torsion="variance" if setup.rule == "variance" else "gate",
             joints=setup.joints,
         )
-        config = default_config()
-        return Tube(settings, config, new_state(config), iter(range(10**9)).__next__, restored=False)
+        return fresh_tube(settings)
 
     def _cycle(self, run: DrilledRun, tube: int, count: int, cycle: int, end: float) -> None:
         setup = self._setup

@@ -19,9 +19,10 @@ from node.firmware.inputs import ImuReading, Surroundings
 from node.firmware.settings import Joint, Kernel, TubeSettings
 from node.firmware.tube import Tube
 from node.kernels.angles import wrap
-from node.kernels.layout import PERIOD, Scheme, default_config, new_state
+from node.kernels.layout import PERIOD, Scheme
 from sim.borehole import Borehole
 from sim.encoder import Disc
+from sim.experiments.fresh import fresh_tube
 from sim.experiments.node_links import Link, OnOff
 from sim.experiments.plain_sensors import PlainEncoder, single_samples
 from sim.imu_errors import ImuErrors, gauss_markov
@@ -167,7 +168,7 @@ class _Sensor:
     """Readings of one node over the run (cycles of six) and the true bias of its z gyroscope (cycles,) rad/s."""
 
     def __init__(self, setup: LabSetup, motion: Motion, angle: float, stream: np.random.SeedSequence) -> None:
-        hole = Borehole(np.array([0.0, 1000.0]), np.full(2, INCLINATION), np.zeros(2))
+        hole = Borehole.straight(INCLINATION)
         a, ends = setup.accelerometer, BEGIN + ENDS
         truth = TubeTruth(hole, motion, 0.0, angle, a.radius_m, a.gravity_mps2)
         rate, force = truth.cycle_means(ends, PERIOD)
@@ -194,9 +195,6 @@ def _generator(stream: np.random.SeedSequence) -> np.random.Generator:
 
 
 def _tube(setup: LabSetup, k: int, joints: list[float]) -> Tube:
-    config = default_config()
-    for name, value in setup.config:
-        config[0][name] = value
     settings = TubeSettings(
         k + 1,
         drive_joint=Joint(joints[0]),
@@ -205,7 +203,7 @@ def _tube(setup: LabSetup, k: int, joints: list[float]) -> Tube:
         state_every=10**9,
         kernel=setup.kernel,
     )
-    return Tube(settings, config, new_state(config), iter(range(10**9)).__next__, restored=False)
+    return fresh_tube(settings, setup.config)
 
 
 def _clock_errors(setup: LabSetup, random: np.random.Generator) -> Array:

@@ -8,11 +8,11 @@ import numpy as np
 from node.firmware.encoder import QUANTUM, EncoderNode, EncoderSample
 from node.firmware.inputs import ImuReading, Surroundings
 from node.firmware.settings import TubeSettings
-from node.firmware.tube import Tube
 from node.kernels.angles import wrap
-from node.kernels.layout import PERIOD, Scheme, default_config, new_state
+from node.kernels.layout import PERIOD, Scheme
 from sim.borehole import Borehole
 from sim.experiments.chain import BEGIN, INCLINATION_DEG, ChainSetup, motion_of
+from sim.experiments.fresh import fresh_tube
 from sim.imu_errors import ImuErrors
 from sim.scenario import AccelerometerSection, GyroSection
 from sim.truth import TubeTruth
@@ -30,22 +30,17 @@ class StringOfOne:
         self.motion = motion_of(ChainSetup(1, Scheme.FORWARD, blocks=blocks), float(random.uniform(0.0, 2.0 * math.pi)))
         self.cycles = math.floor((self.motion.end - BEGIN) / PERIOD)
         ends = BEGIN + PERIOD * np.arange(1.0, self.cycles + 1.0)
-        lean = math.radians(INCLINATION_DEG)
         a = AccelerometerSection()
-        hole = Borehole(np.array([0.0, 1000.0]), np.array([lean, lean]), np.zeros(2))
+        hole = Borehole.straight(math.radians(INCLINATION_DEG))
         truth = TubeTruth(hole, self.motion, 0.0, 0.0, a.radius_m, a.gravity_mps2)
         rate, force = truth.cycle_means(ends, PERIOD)
         errors = ImuErrors(GyroSection(), a)
         self.angles, self.rates = self.motion.drive(ends)[:2]
-        gyro = errors.gyro(random, rate, force, PERIOD)
-        felt = errors.accelerations(random, force, (self.rates > 0.0).astype(float))
-        self._samples = np.concatenate([gyro, felt], axis=1).tolist()
+        self._samples = errors.readings(random, rate, force, (self.rates > 0.0).astype(float), PERIOD).tolist()
         self._lost = random.random(self.cycles) < loss
         self._spoil = spoil
         self.shift = 0.0  # s, of the node's clock
-        config = default_config()
-        numbers = iter(range(10**9)).__next__
-        self.tube = Tube(TubeSettings(1, state_every=1), config, new_state(config), numbers, restored=False)
+        self.tube = fresh_tube(TubeSettings(1, state_every=1))
         self._encoder = EncoderNode()
         self.error = np.zeros(self.cycles)
         self.std = np.zeros(self.cycles)
