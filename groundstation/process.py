@@ -150,12 +150,16 @@ class GroundProcess(Driven):
         ------
         ConfigurationError
             When the ground station has no key of the rig.
+        SelectorError
+            While a calibration in the field uploads to the same tube: one of the two would never end.
         """
         if self._uploads is None:
             raise ConfigurationError(NO_KEY)
         uploads, number = self._uploads, next(self._numbers)
         outcome: Future[BlockStatus] = Future()
         with self._lock:
+            if self.knowledge.recalibration.uploads_to(block.tube):
+                raise SelectorError(f"tube {block.tube}: a calibration uploads to it; expected action=cancel before")
             self.store.keep_block(block)
             self.knowledge.recalibration.blocks[block.sha256().hex()] = block
         self._orders.put(lambda now: uploads.start(block, number, outcome, now))

@@ -165,6 +165,12 @@ class FieldProcedure:
         self._expect(*BEFORE_UPLOAD, Stage.UPLOADING)
         self.progress.stage = Stage.IDLE
 
+    def uploads_to(self, tube: int) -> bool:
+        """Whether a tube is to get its block, or to tell that it has it."""
+        progress = self.progress.tubes.get(tube)
+        phases = (Phase.CONFIRMED, *IN_UPLOAD)
+        return progress is not None and self.progress.stage is Stage.UPLOADING and progress.phase in phases
+
     def due(self, now: float) -> list[Ask]:
         """What to send at ``now`` (s, own clock)."""
         p = self.progress

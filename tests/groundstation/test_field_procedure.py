@@ -171,6 +171,20 @@ def test_a_ground_station_that_starts_again_goes_on(rig: Field, step: str) -> No
     assert [row["records"] for row in rig.view()["tubes"]] == [len(PRESETS)] * 2
 
 
+def test_no_other_block_comes_between_while_a_calibration_uploads(rig: Field) -> None:
+    rig.command("begin")
+    rig.run(3.0)
+    rig.collect(PRESETS)
+    rig.command("confirm", proposal=rig.command("solve")["proposal"])
+    for phase in ("confirmed", "uploading", "verifying"):
+        rig.run(30.0, lambda phase=phase: rig.phase(1) == phase)  # type: ignore[misc]
+        with pytest.raises(SelectorError, match="tube 1: a calibration uploads to it; expected action=cancel before"):
+            rig.ground.upload(ParameterBlock(1, 9, SensorParameters(bias=(1e-3, 0.0, 0.0))))
+    rig.run(120.0, rig.is_done)
+    check(rig)
+    assert rig.upload(ParameterBlock(1, 9, SensorParameters(bias=(1e-3, 0.0, 0.0)))).phase.name == "APPLIED"
+
+
 def test_a_tube_that_starts_again_is_asked_again_for_its_record(rig: Field) -> None:
     rig.command("begin")
     rig.run(3.0)
