@@ -98,7 +98,7 @@ def record_inputs(seed: int = SEED) -> Any:
         if k + 1 == count:
             break
         edge_count, edge_at, rising, torque, earlier = world.encoder_sample(end)
-        aiding = encoder.on_cycle(EncoderSample(edge_count, edge_at, bool(rising), torque, earlier), end)
+        aiding = encoder.on_cycle(EncoderSample(edge_count, edge_at, bool(rising), torque, earlier=earlier), end)
         top = world.motion.top(end)
         if opened or random.random() > kept**top:
             continue

@@ -1,9 +1,10 @@
 """The encoder node: counts of the drive head become the measurement that every tube below relies on.
 
 While the head turns, the moment of the last edge is known: at that moment the angle is exact but for the edge's own
-jitter. At rest the angle is somewhere inside one count, a constant error, so the rest gives one measurement, repeated
-under one sequence number and never averaged (thesis 3.6 takes it as white). Where inside, the times of the last edges
-say, if they were taken (``node.firmware.stop``).
+jitter. A counter that does not time its edges is read in the middle of its count. At rest the angle is somewhere inside
+one count, a constant error, so the rest gives one measurement, repeated under one sequence number and never averaged
+(thesis 3.6 takes it as white). Where inside, the times of the last edges say, if they were taken
+(``node.firmware.stop``).
 """
 
 from __future__ import annotations
@@ -30,6 +31,7 @@ class EncoderSample:
     edge_at: float  # s, rig time of the last change of the count
     rising: bool  # direction of that change
     torque: float | None = None  # N m, of the drive, where it has a sensor
+    timed: bool = True  # else the edge's time is that of the read
     earlier: tuple[float, ...] = ()  # s, times of the edges before the last in its direction, the newest first
 
 
@@ -69,7 +71,9 @@ class EncoderNode:
         self._resting, self._beyond = False, None
         self.sequence += 1
         rate = max(-FASTEST, min((self._edge_angle - before_angle) / elapsed, FASTEST))
-        return aiding(self._edge_angle, EDGE_STD**2, rate, sample.edge_at, self.sequence)
+        if sample.timed:
+            return aiding(self._edge_angle, EDGE_STD**2, rate, sample.edge_at, self.sequence)
+        return aiding((sample.count + 0.5) * QUANTUM, QUANTUM**2 / 12.0, rate, sample.edge_at, self.sequence)
 
     def _at_rest(self, sample: EncoderSample, now: float) -> Aiding:
         if not self._resting:

@@ -88,7 +88,7 @@ def sample_of(data: Any) -> EncoderSample | None:
             return None
         torque = None if not more or more[0] is None else float(more[0])
         earlier = tuple(float(edge) for edge in more[1]) if len(more) > 1 else ()
-        sample = EncoderSample(int(count), float(edge_at), bool(rising), torque, earlier)
+        sample = EncoderSample(int(count), float(edge_at), bool(rising), torque, earlier=earlier)
     except (TypeError, ValueError, OverflowError):
         return None
     return sample if math.isfinite(sample.edge_at) else None

@@ -236,7 +236,7 @@ def test_a_counter_file_is_unwrapped_and_its_edges_timed(tmp_path: Path) -> None
     assert source.read(1.0).count == 0
     path.write_text("4\n")
     sample = source.read(2.0)
-    assert (sample.count, sample.edge_at, sample.rising) == (10, 2.0, True)
+    assert (sample.count, sample.edge_at, sample.rising, sample.timed) == (10, 2.0, True, False)
     assert source.read(3.0).edge_at == 2.0
     (tmp_path / "direction").write_text("backward\n")
     path.write_text("0\n")

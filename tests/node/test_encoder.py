@@ -15,6 +15,15 @@ def test_a_turning_head_is_known_at_its_last_edge() -> None:
     assert aiding.rate == pytest.approx(430 * QUANTUM / 0.9)
 
 
+def test_a_counter_that_times_no_edge_is_known_to_a_count() -> None:
+    encoder = EncoderNode()
+    encoder.on_cycle(EncoderSample(0, 1000.5, True, timed=False), 1000.5)
+    aiding = encoder.on_cycle(EncoderSample(430, 1001.0, True, timed=False), 1001.0)
+    assert aiding.yaw == pytest.approx(430.5 * QUANTUM)
+    assert aiding.yaw_var == pytest.approx(QUANTUM**2 / 12.0)
+    assert (aiding.valid_at, aiding.rate) == (1001.0, pytest.approx(860 * QUANTUM))
+
+
 def test_a_falling_edge_is_the_upper_border_of_its_count() -> None:
     encoder = EncoderNode()
     encoder.on_cycle(EncoderSample(100, 1000.0, True), 1000.5)

@@ -79,7 +79,7 @@ def test_a_sample_may_bring_the_torque() -> None:
 
 
 def test_a_sample_may_bring_the_edges_before_the_last() -> None:
-    assert sample_of([0.0, 5, 1.0, 1, None, [0.9, 0.7]]) == EncoderSample(5, 1.0, True, None, (0.9, 0.7))
+    assert sample_of([0.0, 5, 1.0, 1, None, [0.9, 0.7]]) == EncoderSample(5, 1.0, True, earlier=(0.9, 0.7))
     assert sample_of([0.0, 5, 1.0, 1, 80, [0.9, "x"]]) is None
     assert sample_of([0.0, 5, 1.0, 1, 80, [0.9], 3]) is None
 

@@ -1,8 +1,7 @@
 """A quadrature counter as a file: Linux's counter subsystem, one number a line, ``count`` and perhaps ``direction``.
 
-The kernel keeps the count but not the time of its edges. While the head turns, the moment of the read is therefore
-taken for that of the last edge: half a count early on average, 0.09 degrees at most. The encoder node takes the
-middle of the count at rest.
+The kernel keeps the count but not the time of its edges, so the encoder node takes the middle of the count at the
+moment of the read, with the variance of a count, turning and at rest.
 Source: Linux, Documentation/ABI/testing/sysfs-bus-counter (``countY/count``, ``countY/direction``).
 """
 
@@ -39,7 +38,7 @@ class QuadratureFile:
         self._raw = self._read_file()
 
     def read(self, now: float) -> EncoderSample:
-        """Count since the first start and the time of its last change (s, own clock)."""
+        """Count since the first start and the time of the read that found its last change (s, own clock)."""
         raw = self._read_file()
         if self._raw is None:
             raise SensorError(f"{self._path}: not started")
@@ -51,7 +50,7 @@ class QuadratureFile:
             self._count += moved
             self._rising = self._direction(moved)
             self._edge_at = now
-        return EncoderSample(self._count, self._edge_at, self._rising)
+        return EncoderSample(self._count, self._edge_at, self._rising, timed=False)
 
     def close(self) -> None:
         """Nothing is held."""
