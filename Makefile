@@ -48,7 +48,8 @@ study: $(STAMP)  ## the long studies; their tables are committed in docs/results
 	$(BIN)/borechain experiment tuning --seeds 100 --out docs/results
 	$(BIN)/borechain experiment delay --seeds 25 --out docs/results
 	$(BIN)/borechain experiment consistency --seeds 500 --control-seeds 100 --out docs/results
-	$(BIN)/borechain experiment outage --seeds 60 --out docs/results
+	$(BIN)/borechain experiment consistency --seeds 500 --kernel fixed --out docs/results
+	$(BIN)/borechain experiment outage --seeds 240 --out docs/results
 	$(BIN)/borechain experiment alignment --seeds 100 --out docs/results
 	$(BIN)/borechain experiment fifty-nodes --seeds 200 --out docs/results
 	$(BIN)/borechain experiment ingredients --seeds 40 --out docs/results

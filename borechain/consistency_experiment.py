@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Any
+from typing import Any, Literal
 
 import click
 
@@ -28,22 +28,25 @@ COLUMNS: Columns = (
     type=click.IntRange(2, 10_000),
     help="Of the other schemes; as many if absent.",
 )
+@click.option("--kernel", type=click.Choice(["float64", "fixed"]), default="float64", show_default=True)
 @options
-def consistency(seeds: int, control_seeds: int | None, out: Path | None, as_json: bool) -> None:
+def consistency(
+    seeds: int, control_seeds: int | None, kernel: Literal["float64", "fixed"], out: Path | None, as_json: bool
+) -> None:
     """Consistency (NEES) to hop 50 under clock errors, loss, outages, joint and mount errors, by relay scheme.
 
     \b
-    Example:
+    Examples:
       borechain experiment consistency --seeds 500 --control-seeds 100 --out docs/results
+      borechain experiment consistency --seeds 500 --kernel fixed
     """
-    from node.kernels.layout import Scheme
-    from sim.experiments.consistency import EVERY, OUTSIDE, USUAL, run
+    from sim.experiments.consistency import EVERY, OUTSIDE, USUAL, run, schemes_of
 
     controls = control_seeds or seeds
-    with bar(seeds + (len(Scheme) - 1) * controls, quiet=as_json) as step:
-        result = run(seeds, controls, step)
+    with bar(seeds + (len(schemes_of(kernel)) - 1) * controls, quiet=as_json) as step:
+        result = run(seeds, controls, step, kernel=kernel)
     keep(out, result, COLUMNS, draw)
-    tell(result, COLUMNS, f"NEES to hop 50, {seeds} seeds", as_json=as_json)
+    tell(result, COLUMNS, f"NEES to hop 50, {kernel}, {seeds} seeds", as_json=as_json)
     if not as_json:
         for scheme, found in result["schemes"].items():
             outside = f"{found['outside']:.0%} of the cells outside {USUAL[0]:g}..{USUAL[1]:g} (allowed {OUTSIDE:.0%})"
@@ -62,5 +65,5 @@ def draw(folder: Path, result: dict[str, Any]) -> None:
     found = [
         SchemeNees(row["scheme"], row["state"], row["hop"], row["nees"], row["nees_total"]) for row in result["cases"]
     ]
-    title = f"NEES of relay schemes, {result['seeds']} seeds"
-    save(scheme_figure(found, EVERY, title), folder / "consistency.svg")
+    title = f"NEES of relay schemes, {result['kernel']}, {result['seeds']} seeds"
+    save(scheme_figure(found, EVERY, title), folder / f"{result['experiment']}.svg")

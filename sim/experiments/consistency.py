@@ -16,6 +16,7 @@ from typing import Any
 
 import numpy as np
 
+from node.firmware.settings import Kernel
 from node.kernels.layout import Scheme
 from sim.experiments.chain import ChainRun, ChainSetup, run_seed
 from sim.experiments.node_links import OnOff
@@ -29,12 +30,19 @@ OUTSIDE = 0.05  # share of cells that may lie outside the usual bounds
 STUDIED = {1: 1.0, 2: 2.6, 5: 10.0, 10: 27.0, 25: 83.0, 50: 178.0}  # NEES of ``estimate`` at rest, in another study
 
 
-def setup_of(scheme: Scheme, hops: int = HOPS) -> ChainSetup:
+def setup_of(scheme: Scheme, hops: int = HOPS, kernel: Kernel = "float64") -> ChainSetup:
     """The string of one scheme; shorter ones lose as much a hop."""
-    return ChainSetup(hops, scheme, blocks=2, clock_std=5e-3, loss=LOSS, link=OnOff(20.0, 30.0))
+    return ChainSetup(hops, scheme, blocks=2, clock_std=5e-3, loss=LOSS, link=OnOff(20.0, 30.0), kernel=kernel)
 
 
-def run(seeds: int, controls: int, step: Callable[[], None], hops: int = HOPS) -> dict[str, Any]:
+def schemes_of(kernel: Kernel) -> tuple[Scheme, ...]:
+    """Schemes that are judged; of another kernel than the reference the one that is used."""
+    return tuple(Scheme) if kernel == "float64" else (Scheme.FORWARD,)
+
+
+def run(
+    seeds: int, controls: int, step: Callable[[], None], hops: int = HOPS, kernel: Kernel = "float64"
+) -> dict[str, Any]:
     """Table of every scheme; ``step`` is called after each seed of each scheme.
 
     Parameters
@@ -51,16 +59,17 @@ def run(seeds: int, controls: int, step: Callable[[], None], hops: int = HOPS) -
     cases: list[dict[str, Any]] = []
     schemes: dict[str, dict[str, Any]] = {}
     with multiprocessing.get_context("spawn").Pool(min(os.cpu_count() or 1, seeds)) as pool:
-        for scheme in Scheme:
+        for scheme in schemes_of(kernel):
             count, runs = seeds if scheme is Scheme.FORWARD else controls, []
-            for found in pool.imap(run_seed, [(setup_of(scheme, hops), seed) for seed in range(1, count + 1)]):
+            for found in pool.imap(run_seed, [(setup_of(scheme, hops, kernel), seed) for seed in range(1, count + 1)]):
                 runs.append(found)
                 step()
             rows = table(scheme, runs)
             cases += rows
             judged = verdict([row[name] for row in rows for name in ("nees", "nees_total")])
             schemes[scheme.name.lower()] = {**judged, "seeds": count, "standard_error": math.sqrt(2.0 / count)}
-    return {"experiment": "consistency", "seeds": seeds, "cases": cases, "schemes": schemes}
+    name = "consistency" if kernel == "float64" else f"consistency-{kernel}"
+    return {"experiment": name, "kernel": kernel, "seeds": seeds, "cases": cases, "schemes": schemes}
 
 
 def table(scheme: Scheme, runs: Sequence[ChainRun]) -> list[dict[str, Any]]:

@@ -80,3 +80,12 @@ def test_the_command_refuses_no_seeds() -> None:
     done = CliRunner().invoke(experiment, ["consistency", "--seeds", "0"])
     assert done.exit_code == 2
     assert "--seeds" in done.output
+
+
+def test_of_the_integer_kernel_forward_alone_is_judged_beside_the_reference() -> None:
+    fixed = run(2, 2, lambda: None, hops=2, kernel="fixed")
+    assert (fixed["experiment"], fixed["schemes"].keys()) == ("consistency-fixed", {"forward"})
+    reference = [r["nees"] for r in run(2, 2, lambda: None, hops=2)["cases"] if r["scheme"] == "forward"]
+    found = [r["nees"] for r in fixed["cases"]]
+    assert found == pytest.approx(reference, rel=1e-2)
+    assert found != reference  # it is another kernel
