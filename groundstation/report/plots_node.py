@@ -50,9 +50,10 @@ class Reach:
 @styled
 def yaw_figure(panels: Sequence[YawPanel], title: str) -> Figure:
     """Size of the yaw error around the stop at zero, a panel a case."""
-    rows = -(-len(panels) // 2)
+    columns = min(2, len(panels))
+    rows = -(-len(panels) // columns)
     figure = new_figure(1.1 + 1.9 * rows, title)
-    grid = figure.subplots(rows, 2, sharex=True, sharey=True, squeeze=False)
+    grid = figure.subplots(rows, columns, sharex=True, sharey=True, squeeze=False)
     for axes in grid.flat[len(panels) :]:
         axes.remove()
     top = 1.5 * max(float(rms.max()) for panel in panels for rms in panel.rms.values())
@@ -66,9 +67,9 @@ def yaw_figure(panels: Sequence[YawPanel], title: str) -> Figure:
             axes.plot([0.0, end], [panel.to_reach] * 2, color=INK, ls="--", lw=0.9)
         axes.set(title=panel.name, yscale="log", xlim=(float(panel.t.min()), end))
         axes.set_ylim(SMALLEST, top)
-        if k % 2 == 0:
+        if k % columns == 0:
             axes.set_ylabel("Yaw error (deg)")
-        if k + 2 >= len(panels):
+        if k + columns >= len(panels):
             axes.set_xlabel("Time after the stop (s)")
             axes.tick_params(labelbottom=True)
     names = list(panels[0].rms)

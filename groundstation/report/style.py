@@ -95,15 +95,20 @@ def new_figure(height: float, title: str) -> Figure:
     return figure
 
 
+def plain(value: float) -> str:
+    """A tick's number: as it is up to a million, as a power of ten beyond."""
+    if value >= 1e6:
+        return f"$10^{{{np.log10(value):.3g}}}$"
+    return str(np.format_float_positional(value, 6, fractional=False, trim="-"))
+
+
 def tidy(figure: Figure) -> Figure:
     """Ticks at 1, 2 and 5 and their decades, written as plain numbers."""
     for axis in (axis for axes in figure.axes for axis in (axes.xaxis, axes.yaxis)):
         if isinstance(axis.get_major_locator(), AutoLocator):
             axis.set_major_locator(MaxNLocator(nbins=6, steps=[1, 2, 5, 10]))
         elif axis.get_scale() == "log":
-            axis.set_major_formatter(
-                FuncFormatter(lambda value, _: np.format_float_positional(value, 6, fractional=False, trim="-"))
-            )
+            axis.set_major_formatter(FuncFormatter(lambda value, _: plain(value)))
             axis.set_minor_formatter(NullFormatter())
     return figure
 
