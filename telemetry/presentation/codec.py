@@ -154,7 +154,7 @@ FIELDS: dict[type[Any], tuple[Kind, tuple[Field, ...]]] = {
             whole("overruns", "ov", 0, U53),
             whole("parameters_version", "pv", 0, U32),
             binary("parameters_hash", "ph", 8, 8),
-            vector("alignment", "al", TURN),
+            vector("alignment", "al", TURN).later(2, (0.0, 0.0, 0.0)),
         ),
     ),
     SurveyMeasurement: (

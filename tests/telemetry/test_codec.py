@@ -188,6 +188,14 @@ def test_aiding_of_an_old_node_is_read_as_that_of_a_rigid_string(aiding: Aiding)
     assert decode(msgpack.packb(rows)) == rigid
 
 
+@given(MESSAGES[NodeState])
+def test_a_state_of_a_node_never_aligned_is_said_as_before_there_was_an_alignment(state: NodeState) -> None:
+    aligned = state.alignment != (0.0, 0.0, 0.0)
+    rows = msgpack.unpackb(encode(state))
+    assert (rows["v"], "al" in rows["b"]) == ((2, True) if aligned else (1, False))
+    assert decode(msgpack.packb(rows)) == state
+
+
 @pytest.mark.parametrize(
     ("message", "version", "named"),
     [
