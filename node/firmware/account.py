@@ -162,7 +162,7 @@ class Account:
             tube=self._settings.tube,
             at=around.rig_now,
             hops=around.hops,
-            mode=Mode.ALIGNMENT if mount["aligning"] else Mode(int(state["mode"])),
+            mode=self._mode(sensors, aligning=bool(mount["aligning"])),
             yaw=self.yaw,
             yaw_var=self.yaw_var,
             systematic_var=self.systematic_var,
@@ -179,3 +179,9 @@ class Account:
             parameters_hash=block[1],
             alignment=(pitch, roll, float(mount["std"][0].max())),
         )
+
+    def _mode(self, sensors: NodeFlag, *, aligning: bool) -> Mode:
+        """State of the node: what the kernels follow, unless a sensor fails or an alignment is under way."""
+        if NodeFlag.SENSOR_FAULT in sensors:
+            return Mode.FAULT
+        return Mode.ALIGNMENT if aligning else Mode(int(self._state["mode"]))

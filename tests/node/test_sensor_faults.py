@@ -10,7 +10,7 @@ from string_of_one import Sample, Spoil, StringOfOne
 from node.errors import ConfigurationError
 from node.firmware.sensor_faults import AidingWatch, Fault, ReadingWatch, SensorLimits
 from node.kernels.layout import DEG, PERIOD, Err
-from telemetry.messages import NodeFlag
+from telemetry.messages import Mode, NodeFlag
 
 FLAGGED_WITHIN = 10  # cycles
 LASTS = 25  # cycles
@@ -81,6 +81,7 @@ def healthy() -> StringOfOne:
 def test_a_healthy_sensor_raises_no_alarm(healthy: StringOfOne) -> None:
     assert set(healthy.codes()) == {"bias_known", "started", "stopped", "yaw_reset"}
     assert all(NodeFlag.SENSOR_FAULT not in state.flags for state in healthy.states)
+    assert Mode.FAULT not in {state.mode for state in healthy.states}
 
 
 @pytest.mark.parametrize("place", PLACES)
@@ -95,6 +96,7 @@ def test_a_faulty_gyroscope_is_flagged_and_recovered_from(
     flagged = min(string.first(name, at) for name in names if name in string.codes(at))
     assert flagged - at < FLAGGED_WITHIN
     assert NodeFlag.SENSOR_FAULT | NodeFlag.YAW_UNTRUSTED in string.states[flagged].flags
+    assert string.states[flagged].mode is Mode.FAULT
     recovered = [cycle for cycle, event in string.events if event.code == "sensor_recovered" and cycle >= at]
     assert recovered
     end = at + LASTS if "step" not in kind else flagged
@@ -103,6 +105,7 @@ def test_a_faulty_gyroscope_is_flagged_and_recovered_from(
     assert z[recovered[-1]] < 3.0
     assert np.mean(z[recovered[-1] :] < 3.0) > 0.99
     assert string.states[-1].flags == NodeFlag.NONE
+    assert string.states[-1].mode in (Mode.STILL, Mode.SURVEY)
     assert abs(string.error[-1]) < 0.05 * DEG
     untrusted = [NodeFlag.YAW_UNTRUSTED in state.flags for state in string.states]
     unflagged = [k for k in range(at, string.cycles) if not untrusted[k] and z[k] > 5.0 and k > flagged]
