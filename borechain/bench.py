@@ -11,6 +11,7 @@ import click
 
 from borechain.faults import EnvironmentFault, InputFault, plain_faults
 from borechain.options import json_option
+from borechain.tables import console
 
 FOLDER = Path(__file__).parents[1] / "benchmarks"
 
@@ -86,7 +87,6 @@ def side_by_side(name: str) -> click.Command:
 
 def show(result: dict[str, Any]) -> None:
     """Table for people."""
-    from rich.console import Console
     from rich.table import Table
 
     table = Table(title=f"bench {result['bench']}")
@@ -94,8 +94,8 @@ def show(result: dict[str, Any]) -> None:
         table.add_column(heading, justify="right")
     for what, row in result["ratios"].items():
         ratio = row["ratio"]
-        table.add_row(what, seconds(row["ours"]), seconds(row["peer"]), "" if ratio is None else f"{ratio:.1f}")
-    Console().print(table)
+        table.add_row(what, seconds(row["ours"]), seconds(row["peer"]), "" if ratio is None else f"{ratio:.3g}")
+    console().print(table)
 
 
 def seconds(value: float | None) -> str:

@@ -17,6 +17,7 @@ import click
 from borechain import __version__
 from borechain.faults import EnvironmentFault, InputFault
 from borechain.options import json_option
+from borechain.tables import console
 
 if TYPE_CHECKING:
     from groundstation.report.panels import Panel
@@ -166,21 +167,20 @@ def land(files: dict[Path, bytes]) -> None:
 
 def show(sheet: Sheet, files: Sequence[Path]) -> None:
     """Print a sheet for people."""
-    from rich.console import Console
     from rich.table import Table
 
-    console = Console(width=max(Console().width, 110))
-    console.print(f"[bold]{sheet.title}[/bold]")
+    paper = console(110)
+    paper.print(f"[bold]{sheet.title}[/bold]")
     for name, value in sheet.facts:
-        console.print(f"{name:24} {value}", soft_wrap=True, highlight=False, markup=False)
+        paper.print(f"{name:24} {value}", soft_wrap=True, highlight=False, markup=False)
     for given in sheet.tables:
         table = Table(title=given.title, title_justify="left")
         for k, column in enumerate(given.columns):
             table.add_column(column, justify="right" if k else "left")
         for row in given.rows:
             table.add_row(*row)
-        console.print(table)
+        paper.print(table)
     for warning in sheet.warnings:
-        console.print(f"warning: {warning}", style="yellow", soft_wrap=True, highlight=False)
+        paper.print(f"warning: {warning}", style="yellow", soft_wrap=True, highlight=False)
     for path in files:
-        console.print(f"wrote {path}", soft_wrap=True, highlight=False, markup=False)
+        paper.print(f"wrote {path}", soft_wrap=True, highlight=False, markup=False)

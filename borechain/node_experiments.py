@@ -36,6 +36,11 @@ TUNING_COLUMNS: Columns = (
     ("scatter_dps", "scatter, deg/s"),
     ("yaw_rms_deg", "yaw rms at rest, deg"),
 )
+OUTAGE_SHOWN: Columns = (
+    ("case", "case"),
+    *((f"hop_{k}", f"hop {k}") for k in range(1, 6)),
+    ("reached", "reached"),
+)
 OUTAGE_COLUMNS: Columns = (
     ("case", "case"),
     *((f"hop_{k}", f"hop {k}") for k in range(1, 6)),
@@ -107,7 +112,7 @@ def outage(seeds: int, out: Path | None, as_json: bool) -> None:
 
     result = conduct(run, seeds, batches(), as_json=as_json)
     keep(out, result, OUTAGE_COLUMNS, draw_outage)
-    tell(result, OUTAGE_COLUMNS, f"NEES of five hops, {seeds} seeds", as_json=as_json)
+    tell(result, OUTAGE_SHOWN, f"NEES of five hops, {seeds} seeds", as_json=as_json)
     if not as_json:
         low, high = USUAL
         click.echo(f"{result['outside']:.0%} of the cells outside {low:g}..{high:g}, allowed {OUTSIDE:.0%}")

@@ -12,6 +12,7 @@ import click
 
 from borechain.faults import EnvironmentFault, plain_faults
 from borechain.options import fault_option, json_option, seed_option, speed_option
+from borechain.tables import console
 from telemetry import keys
 
 if TYPE_CHECKING:
@@ -209,10 +210,9 @@ class progress:  # noqa: N801
 
 def show_result(result: dict[str, Any], folder: Path) -> None:
     """Station table beside the truth, and the figures, for people."""
-    from rich.console import Console
     from rich.table import Table
 
-    console = Console(width=max(Console().width, 100))
+    paper = console(100)
     table = Table(title="Stations: measured, below it the truth")
     for name in ("#", "MD m", "looks", "incl deg", "azi deg", "north m", "east m", "TVD m", "sigma N cm", "sigma E cm"):
         table.add_column(name, justify="right")
@@ -224,19 +224,19 @@ def show_result(result: dict[str, Any], folder: Path) -> None:
         ]
         sigmas = [f"{100.0 * s[key]:.3f}" for key in ("sigma_north_m", "sigma_east_m")]
         table.add_row(str(s["station"]), f"{s['md_m']:.2f}", str(s["measurements"]), *lines, *sigmas)
-    console.print(table)
+    paper.print(table)
     for name, value in result["figures"].items():
         values = value if isinstance(value, list) else [value]
         shown = " ".join("-" if v is None else f"{v:.4f}" for v in values)
-        console.print(f"{name:22} {shown}")
+        paper.print(f"{name:22} {shown}")
     show_column(result)
     if "calibration" in result:
         show_calibration(result["calibration"])
-    console.print(
+    paper.print(
         f"{len(result['stations'])} stations, {result['measurements']} measurements, {result['processes']} processes, "
         f"{result['rig_s']:.0f} s of rig time in {result['wall_s']:.1f} s"
     )
-    console.print(f"digest {result['digest']}\nfiles  {folder}", soft_wrap=True)
+    paper.print(f"digest {result['digest']}\nfiles  {folder}", soft_wrap=True)
 
 
 def show_column(result: dict[str, Any]) -> None:

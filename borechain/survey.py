@@ -15,6 +15,7 @@ import click
 from borechain.faults import InputFault, plain_faults
 from borechain.files import write_whole
 from borechain.options import json_option
+from borechain.tables import console
 
 if TYPE_CHECKING:
     from groundstation.survey.analysis import Analysis
@@ -233,10 +234,9 @@ def export(tool: Tool, path: Path) -> None:
 
 def show(result: dict[str, Any]) -> None:
     """Tables for people."""
-    from rich.console import Console
     from rich.table import Table
 
-    console = Console(width=max(Console().width, 110))
+    paper = console(110)
     table = Table(title=f"{result['file']}: {result['method']}, {result['instrument']}, {result['sigma']:g} sigma")
     names = ("#", "MD m", "incl deg", "azi deg", "north m", "east m", "TVD m", "DLS deg/30m")
     for name in (*names, "+-N cm", "+-E cm", "+-TVD cm"):
@@ -254,13 +254,13 @@ def show(result: dict[str, Any]) -> None:
             f"{row['dogleg_severity_deg_per_30m']:.2f}",
             *(f"{100.0 * u[key]:.3f}" for key in ("north_m", "east_m", "tvd_m")),
         )
-    console.print(table)
+    paper.print(table)
     for row in result["at"]:
-        console.print(f"at {row['md_m']:g} m: {row['north_m']:.4f} {row['east_m']:.4f} {row['tvd_m']:.4f} m")
-    console.print(f"closure {result['closure_m']:.4f} m towards {result['closure_azimuth_deg']:.2f} deg")
+        paper.print(f"at {row['md_m']:g} m: {row['north_m']:.4f} {row['east_m']:.4f} {row['tvd_m']:.4f} m")
+    paper.print(f"closure {result['closure_m']:.4f} m towards {result['closure_azimuth_deg']:.2f} deg")
     parts = Table(title="What the uncertainty at the last station is made of, cm")
     for name in ("source", "north", "east", "TVD"):
         parts.add_column(name, justify="right")
     for row in result["sources"][:SOURCES_SHOWN]:
         parts.add_row(row["source"], *(f"{100.0 * row[key]:.4f}" for key in ("north_m", "east_m", "tvd_m")))
-    console.print(parts)
+    paper.print(parts)

@@ -4,13 +4,18 @@ from __future__ import annotations
 
 import csv
 import io
+import sys
 from collections.abc import Sequence
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from borechain.files import write_whole
 
+if TYPE_CHECKING:
+    from rich.console import Console
+
 Columns = Sequence[tuple[str, str]]  # key of a row, heading
+PAPER = 400  # characters
 CASE_COLUMNS: Columns = (("case", "case"), ("published", "published"), ("ours", "ours"), ("unit", "unit"))
 
 
@@ -25,7 +30,6 @@ def write_table(path: Path, rows: list[dict[str, Any]], columns: Columns) -> Non
 
 def show_table(title: str, rows: list[dict[str, Any]], columns: Columns, *, sideways: bool = False) -> None:
     """Print a table, ``sideways`` where it is wider than long."""
-    from rich.console import Console
     from rich.table import Table
 
     table, names = Table(title=title), [heading for _, heading in columns]
@@ -35,7 +39,14 @@ def show_table(title: str, rows: list[dict[str, Any]], columns: Columns, *, side
         table.add_column(heading, justify="left" if sideways and k == 0 else "right", overflow="fold")
     for line in body:
         table.add_row(*line)
-    Console().print(table)
+    console().print(table)
+
+
+def console(least: int = 0) -> Console:
+    """What tables are printed on: the terminal, ``least`` columns wide or more; paper, where there is none."""
+    from rich.console import Console
+
+    return Console(width=max(Console().width, least) if sys.stdout.isatty() else PAPER)
 
 
 def cell(value: Any) -> str:

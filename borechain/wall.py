@@ -11,6 +11,7 @@ import click
 
 from borechain.faults import plain_faults
 from borechain.options import json_option
+from borechain.tables import console
 
 if TYPE_CHECKING:
     from groundstation.survey.wall import ExtraColumn, Joints
@@ -130,10 +131,9 @@ def column_row(found: Wall, k: int) -> dict[str, Any]:
 
 def show(result: dict[str, Any]) -> None:
     """Worst joints and columns, for people."""
-    from rich.console import Console
     from rich.table import Table
 
-    console = Console(width=max(Console().width, 100))
+    paper = console(100)
     table = Table(title=f"{result['wall']}: the {SHOWN} most doubtful of {len(result['joints'])} joints")
     for name in ("joint", "depth m", "thickness m", "thinnest at m", "P(too thin)", "apart cm", "towards deg"):
         table.add_column(name, justify="right")
@@ -147,22 +147,22 @@ def show(result: dict[str, Any]) -> None:
             f"{row['moved_apart_cm']:.1f}",
             f"{row['direction_deg']:.0f}",
         )
-    console.print(table)
+    paper.print(table)
     if result["margin"] is not None:
         m = result["margin"]
-        console.print(f"one column alone may be {m['shift_cm']:.1f} cm off at its toe, {m['deviation_deg']:.3f} deg")
+        paper.print(f"one column alone may be {m['shift_cm']:.1f} cm off at its toe, {m['deviation_deg']:.3f} deg")
     over = [row for row in result["columns"] if row["used_percent"] >= 100.0]
-    console.print(
+    paper.print(
         f"required {result['required_thickness_m']:g} m: "
         f"{result['gaps']} of {len(result['joints'])} joints are thinner, "
         f"{result['doubtful']} are with a probability of {LIKELY:g} or more; "
         f"{len(over)} columns beyond their tolerance"
     )
     worst, extra = result["worst"], result["worst"]["extra_column"]
-    console.print(f"worst joint {worst['joint']} at {worst['depth_m']:g} m")
+    paper.print(f"worst joint {worst['joint']} at {worst['depth_m']:g} m")
     if extra is not None:
         verdict = "closes it" if extra["closes"] else "does not close it alone"
-        console.print(
+        paper.print(
             f"a column at north {extra['north_m']:.2f} m, east {extra['east_m']:.2f} m "
             f"from {extra['from_m']:g} to {extra['to_m']:g} m {verdict}"
         )
