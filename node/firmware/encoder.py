@@ -12,7 +12,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass, replace
 
-from node.firmware.stop import UNKNOWN, stopped_at
+from node.firmware.stop import stopped_at
 from node.firmware.torque import TorqueSettings, TorqueWatch
 from telemetry.messages import Aiding
 
@@ -80,8 +80,7 @@ class EncoderNode:
             self._resting = True
             self.sequence += 1
         if self._beyond is None:
-            times = (sample.edge_at, *sample.earlier)
-            self._beyond = stopped_at(times, STOP_STD) if sample.earlier else UNKNOWN
+            self._beyond = stopped_at((sample.edge_at, *sample.earlier), STOP_STD)
         beyond, var = self._beyond
         angle = self._edge_angle + (beyond if sample.rising else -beyond) * QUANTUM
         return aiding(angle, var * QUANTUM**2, 0.0, now, self.sequence)
