@@ -99,7 +99,7 @@ def relay(hops: int, seeds: int, out: Path | None, as_json: bool) -> None:
     from node.kernels.layout import Scheme
     from sim.experiments.relay import run
 
-    with bar(len(Scheme) * seeds, quiet=as_json) as step:
+    with bar(len(Scheme) * seeds, quiet=as_json, what="seeds") as step:
         result = run(hops, seeds, step)
     keep(out, result, RELAY_COLUMNS)
     tell(result, RELAY_COLUMNS, f"Relay over {hops} hops, {seeds} seeds", as_json=as_json)
@@ -122,7 +122,7 @@ def mwd(tools: int, out: Path | None, as_json: bool) -> None:
     """
     from sim.experiments.mwd import HEATINGS, run
 
-    with bar(len(HEATINGS) * tools, quiet=as_json) as step:
+    with bar(len(HEATINGS) * tools, quiet=as_json, what="tools") as step:
         result = run(tools, step)
     keep(out, result, MWD_COLUMNS)
     tell(result, MWD_COLUMNS, f"MWD calibration, {tools} tools a design", as_json=as_json, sideways=True)
@@ -142,7 +142,7 @@ def allan(records: int, out: Path | None, as_json: bool) -> None:
     """
     from sim.experiments.allan import run
 
-    with bar(records, quiet=as_json) as step:
+    with bar(records, quiet=as_json, what="records") as step:
         result = run(records, step)
     keep(out, result, ALLAN_COLUMNS)
     tell(result, ALLAN_COLUMNS, f"Allan analysis of {records} records", as_json=as_json)

@@ -293,6 +293,8 @@ def scheme_figure(found: Sequence[SchemeNees], bounds: tuple[float, float], titl
         axes.set(title=state.capitalize(), xscale="log", yscale="log", xlabel="Hop")
         axes.set_xticks(ticks, [f"{hop}" for hop in ticks])
         axes.minorticks_off()
+        if all(bounds[0] <= nees <= bounds[1] for f in found for nees in (f.nees, f.nees_total)):
+            axes.set_yticks([bounds[0], 0.9, 1.0, 1.1, bounds[1]])  # less than a decade has no decades to mark
     grid[0].set_ylabel("NEES")
     handles = [Line2D([], [], ls="", color=SERIES[k], marker=MARKERS[k], label=s) for k, s in enumerate(schemes)]
     handles.append(Line2D([], [], ls="", color=INK, marker="o", mfc="none", label="with joints and mounts"))

@@ -154,6 +154,8 @@ class SensorGuard:
         """See what the filter made of the cycle that ended at ``at`` (s, own clock)."""
         self._hold()
         state = self._state
+        if state["mode"] == STATIC_BIAS:
+            self._before_steps = None  # the constant bias is measured anew
         if state["mode"] == STATIC_BIAS or Status.REFERENCE_CHANGED in status or self._gyro.faulty:
             self._aidings.forget()
             return
