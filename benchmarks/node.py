@@ -25,7 +25,7 @@ from typing import Any
 import numpy as np
 from numba import njit
 
-from borechain.faults import EnvironmentFault
+from borechain.cli.faults import EnvironmentFault
 from node.firmware.encoder import EncoderNode, EncoderSample
 from node.kernels.angles import advance_binary, from_binary
 from node.kernels.cycle import run_cycle
@@ -34,8 +34,8 @@ from node.kernels.fixed_lag import aid
 from node.kernels.layout import CONFIG, CYCLE_RATE_HZ, DEG, PERIOD, STATE, STATES, default_config, new_state
 from node.kernels.relay import offer_aiding
 from node.kernels.strapdown import rotate_down, yaw_rate
-from sim.scenario import load_scenario
-from sim.world import World
+from sim.world.scenario import load_scenario
+from sim.world.world import World
 
 ROOT = Path(__file__).parents[1]
 SOURCE = Path(__file__).parent / "c" / "node.c"

@@ -22,7 +22,7 @@ from groundstation.survey.error_model import propagate
 from groundstation.survey.error_sources import Leg, Site, Survey
 from groundstation.survey.instruments import load_tool
 from groundstation.survey.methods import Method, positions
-from groundstation.survey.resolve import Lean
+from groundstation.survey.resolve import Direction
 from groundstation.survey.running_error import RunningUncertainty
 from groundstation.survey.trajectory import Trajectory
 
@@ -80,7 +80,7 @@ def append_time() -> float:
     tool, site = load_tool("mwd-rev5.1"), Site()
     zero, none = np.zeros((2, 2)), np.zeros((2, 0))
     leans = [
-        Lean(np.sin(i) * np.array([np.cos(a), np.sin(a)]), float(np.cos(i)), zero, none)
+        Direction(np.sin(i) * np.array([np.cos(a), np.sin(a)]), float(np.cos(i)), zero, none)
         for i, a in zip(inclination, azimuth, strict=True)
     ]
     trajectory = Trajectory(Method.MINIMUM_CURVATURE)

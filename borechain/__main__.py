@@ -11,20 +11,28 @@ import click
 from borechain import __version__
 
 COMMANDS = {
-    "rig": ("borechain.rig", "rig", "Drill a scenario with one real process a tube."),
-    "node": ("borechain.node", "node", "Run the node of one tube."),
-    "encoder": ("borechain.encoder", "encoder", "Run the encoder node on the drive head."),
-    "medium": ("borechain.medium", "medium", "Run world, joints and clock of a scenario."),
-    "ground": ("borechain.ground", "ground", "Run the ground station."),
-    "router": ("borechain.router", "router", "Be the zenoh router of a rig whose processes start one by one."),
-    "query": ("borechain.query", "query", "Ask a running ground station."),
-    "watch": ("borechain.query", "watch", "Follow what a running ground station publishes."),
-    "calibrate": ("borechain.calibrate", "calibrate", "Calibrate sensors from the records of a bench."),
-    "allan": ("borechain.allan", "allan", "Say from a static record what noise a sensor has."),
-    "survey": ("borechain.survey", "survey", "Trajectory and region of uncertainty of a record."),
-    "wall": ("borechain.wall", "wall", "Judge the columns of a wall: overlap, thickness, probability of a gap."),
-    "bench": ("borechain.bench", "bench", "Measure speed side by side with other libraries."),
-    "experiment": ("borechain.experiment", "experiment", "Rerun a published experiment beside ours."),
+    "rig": ("borechain.cli.rig.rig", "rig", "Drill a scenario with one real process a tube."),
+    "node": ("borechain.cli.node.node", "node", "Run the node of one tube."),
+    "encoder": ("borechain.cli.node.encoder", "encoder", "Run the encoder node on the drive head."),
+    "medium": ("borechain.cli.rig.medium", "medium", "Run world, joints and clock of a scenario."),
+    "ground": ("borechain.cli.ground.ground", "ground", "Run the ground station."),
+    "router": ("borechain.cli.rig.router", "router", "Be the zenoh router of a rig whose processes start one by one."),
+    "query": ("borechain.cli.ground.query", "query", "Ask a running ground station."),
+    "watch": ("borechain.cli.ground.query", "watch", "Follow what a running ground station publishes."),
+    "calibrate": (
+        "borechain.cli.calibrate.calibrate",
+        "calibrate",
+        "Calibrate sensors from laboratory records.",
+    ),
+    "allan": ("borechain.cli.calibrate.allan", "allan", "Say from a static record what noise a sensor has."),
+    "survey": ("borechain.cli.survey.survey", "survey", "Trajectory and region of uncertainty of a record."),
+    "wall": (
+        "borechain.cli.survey.wall",
+        "wall",
+        "Judge a wall: overlap, thickness, probability of a gap.",
+    ),
+    "bench": ("borechain.cli.bench.bench", "bench", "Measure speed side by side with other libraries."),
+    "experiment": ("borechain.cli.experiment.experiment", "experiment", "Rerun a published experiment beside ours."),
 }
 
 

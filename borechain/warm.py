@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import gc
 
-import borechain.processes
-import groundstation.process
-import sim.bench
-import sim.medium
-import sim.world
+import borechain.host
+import groundstation.service.process
+import sim.rig.bus_stepper
+import sim.rig.scheduler
+import sim.world.world
 from node.kernels.warm import warm_up
 
 warm_up()

@@ -8,6 +8,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Final
 
+from telemetry.messages import Side, address_name
+
 ROOT: Final = "borechain"
 DEFAULT_RIG: Final = "rig-1"
 DEFAULT_ENDPOINT: Final = "tcp/127.0.0.1:7447"
@@ -23,10 +25,10 @@ class Key:
 
 
 PORT: Final = "borechain/{rig}/port/{tube}/{side}/{direction}"
-STEP: Final = "borechain/{rig}/bench/{process}/step"
-DONE: Final = "borechain/{rig}/bench/{process}/done"
-WANTED: Final = "borechain/{rig}/bench/wanted"
-CUE: Final = "borechain/{rig}/bench/cue"
+STEP: Final = "borechain/{rig}/stepper/{process}/step"
+DONE: Final = "borechain/{rig}/stepper/{process}/done"
+WANTED: Final = "borechain/{rig}/stepper/wanted"
+CUE: Final = "borechain/{rig}/stepper/cue"
 DEPTH: Final = "borechain/{rig}/surface/depth"
 LIVELINESS: Final = "borechain/{rig}/@liveliness/{process}"
 GROUND: Final = "borechain/{rig}/ground/{path}"
@@ -35,10 +37,10 @@ COMMAND: Final = "borechain/{rig}/cmd/{name}"
 TABLE: Final[tuple[Key, ...]] = (
     Key(PORT, "publish", "hop-by-hop link: frames of one tube end; side upper or lower, direction tx or rx"),
     Key(DEPTH, "publish", "measured depth of the bit from tally and block position (msgpack: rig time, metres)"),
-    Key(STEP, "publish", "bench: an outside clock hands one process its next step"),
-    Key(DONE, "publish", "bench: the process has finished the step"),
-    Key(WANTED, "publish", "bench: the processes that ought to be alive now"),
-    Key(CUE, "publish", "bench: the operator has done what the schedule had him do"),
+    Key(STEP, "publish", "stepper: hands one process its next step"),
+    Key(DONE, "publish", "stepper: the process has finished the step"),
+    Key(WANTED, "publish", "stepper: the processes that ought to be alive now"),
+    Key(CUE, "publish", "stepper: the operator has done what the schedule had him do"),
     Key(LIVELINESS, "liveliness", "token of a living process"),
     Key("borechain/{rig}/ground/status", "query, publish", "rig time, depth, counts, health"),
     Key("borechain/{rig}/ground/string", "query, publish", "tubes from top to bottom with depth and age"),
@@ -56,3 +58,8 @@ TABLE: Final[tuple[Key, ...]] = (
     Key("borechain/{rig}/ground/recalibration", "query, publish", "calibration in the field: progress and result"),
     Key("borechain/{rig}/cmd/{name}", "query", "operator command to the ground station; the reply is its outcome"),
 )
+
+
+def port_key(rig: str, address: int, side: Side, direction: str) -> str:
+    """Key expression of one port and direction."""
+    return PORT.format(rig=rig, tube=address_name(address), side=side.name.lower(), direction=direction)

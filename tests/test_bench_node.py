@@ -16,8 +16,8 @@ import numpy as np
 import pytest
 from click.testing import CliRunner
 
-from borechain.bench import bench
-from borechain.faults import EnvironmentFault
+from borechain.cli.bench.bench import bench
+from borechain.cli.faults import EnvironmentFault
 from node.kernels.layout import Status, default_config, new_state
 
 COUNT = 2.0 * np.pi / 2.0**32  # rad

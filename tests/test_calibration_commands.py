@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 ROOT = Path(__file__).parents[1]
-DATA, BENCH = ROOT / "tests" / "data" / "calibration", ROOT / "scenarios" / "bench"
+DATA, BENCH = ROOT / "tests" / "data" / "calibration", ROOT / "scenarios" / "instruments"
 NODE_A1, VN100_GYRO = DATA / "calibration_node_a1_gyro.csv", DATA / "calibration_vn100_gyro.csv"
 VN100_ACCEL = DATA / "calibration_vn100_accel.csv"
 OVEN, ROOM, CONTROL = (BENCH / f"mwd-{name}.csv" for name in ("oven", "room", "control"))

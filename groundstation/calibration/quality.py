@@ -70,7 +70,7 @@ class QualityReport:
         return ["tool face inclination   azimuth       G_L", *rows, *ends, "PASS" if self.passed else "FAIL"]
 
 
-def judge(readings: Readings) -> QualityReport:
+def judge_readings(readings: Readings) -> QualityReport:
     """Verdict on twelve readings at one attitude.
 
     Raises

@@ -1,4 +1,4 @@
-"""Tables that a bench wrote: lines, cells and numbers, each refused with its file and line.
+"""Tables that a laboratory wrote: lines, cells and numbers, each refused with its file and line.
 
 Empty lines and lines that begin with ``#`` do not count; the first other line is the header.
 """

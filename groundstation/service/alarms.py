@@ -39,7 +39,7 @@ class AlarmList:
         """Alarms not cleared."""
         return [alarm for alarm in self.alarms if alarm.cleared_at is None]
 
-    def judge(self, kind: str, deviation: Deviation, at: float) -> bool:
+    def judge_deviation(self, kind: str, deviation: Deviation, at: float) -> bool:
         """Raise and clear by a new deviation at rig time ``at`` (s); whether anything changed."""
         changed = False
         for level in LEVELS:

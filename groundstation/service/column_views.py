@@ -9,7 +9,7 @@ import numpy as np
 
 from groundstation.errors import SelectorError, SurveyError
 from groundstation.service.alarms import Alarm
-from groundstation.service.core import Knowledge
+from groundstation.service.model import RigModel
 from groundstation.survey.columns import LEVELS, Deviation, deviation, dominant
 from groundstation.survey.ellipsoid import axes, coverage_radius, plan_ellipse
 from groundstation.survey.trajectory import Point
@@ -18,7 +18,7 @@ View = dict[str, Any]
 CONFIDENCE = 0.95
 
 
-def uncertainty(k: Knowledge, p: dict[str, str]) -> View:
+def uncertainty(k: RigModel, p: dict[str, str]) -> View:
     """Ellipse in plan and ellipsoid of every station at a confidence, and what they are made of."""
     confidence = _confidence(p.get("confidence"))
     plane, space = coverage_radius(confidence, 2), coverage_radius(confidence, 3)
@@ -39,7 +39,7 @@ def _confidence(text: str | None) -> float:
     return confidence
 
 
-def _region(k: Knowledge, point: Point, plane: float, space: float) -> View:
+def _region(k: RigModel, point: Point, plane: float, space: float) -> View:
     ellipse = plan_ellipse(point.cov, plane)
     sizes, directions = axes(point.cov, space)
     kinds = k.shared.by_kind(point.shared)
@@ -64,7 +64,7 @@ def _stds(cov: Any) -> View:
     return {"sigma_north_m": north, "sigma_east_m": east, "sigma_tvd_m": tvd}
 
 
-def column(k: Knowledge, _p: dict[str, str]) -> View:
+def column(k: RigModel, _p: dict[str, str]) -> View:
     """Deviation from the design axis at every station, projected to the target, and which angle dominates."""
     design = k.config.design
     rows = [deviation(point, design) for point in k.trajectory]
@@ -108,7 +108,7 @@ def deviation_view(d: Deviation) -> View:
     }
 
 
-def alarms(k: Knowledge, _p: dict[str, str]) -> View:
+def alarms(k: RigModel, _p: dict[str, str]) -> View:
     """Alarms that stand, those that were cleared, and stations at which the hole moved."""
     return {
         "levels_percent": [round(100.0 * level) for level in LEVELS],

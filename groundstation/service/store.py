@@ -18,7 +18,7 @@ from groundstation.errors import StoreError
 from telemetry.errors import DecodeError
 from telemetry.messages import Event, Kept, StaticRecord, SurveyMeasurement
 from telemetry.parameters import ParameterBlock, unpack_block
-from telemetry.presentation.codec import decode, encode
+from telemetry.presentation.msgpack_codec import decode, encode
 
 SCHEMA = 1
 SHOWN = 5  # tables named of a database that is not ours
@@ -103,7 +103,7 @@ class Store:
             self.close()
             raise
 
-    def add(self, message: Kept, md: float | None) -> bool:
+    def add_message(self, message: Kept, md: float | None) -> bool:
         """Store a message; durable on return. False when it was already there.
 
         Raises
@@ -144,13 +144,13 @@ class Store:
         with self._refusing(), self._engine.connect() as connection:
             return [(row.at, row.md) for row in connection.execute(sa.select(DEPTHS).order_by(DEPTHS.c.at))]
 
-    def keep_order(self, tubes: list[int]) -> None:
+    def keep_tally(self, tubes: list[int]) -> None:
         """Store which tubes hang in the string, top first."""
         with self._refusing(), self._engine.begin() as connection:
             connection.execute(sa.delete(STRING))
             connection.execute(sa.insert(STRING), [{"place": n, "tube": tube} for n, tube in enumerate(tubes, 1)])
 
-    def order(self) -> list[int]:
+    def tally(self) -> list[int]:
         """Tubes of the string, top first."""
         with self._refusing(), self._engine.connect() as connection:
             return [row.tube for row in connection.execute(sa.select(STRING).order_by(STRING.c.place))]

@@ -33,17 +33,17 @@ class Uploads:
         if (given_up := self._running.pop(tube, None)) is not None:
             given_up[1].cancel()
 
-    def due(self, now: float) -> list[BlockSegment]:
+    def due_segments(self, now: float) -> list[BlockSegment]:
         """Segments to send now."""
-        return [segment for upload, _ in self._running.values() for segment in upload.due(now)]
+        return [segment for upload, _ in self._running.values() for segment in upload.due_segments(now)]
 
     def next_due(self) -> float:
         """When something is due (s), infinite if nothing is under way."""
         return min((upload.next_due for upload, _ in self._running.values()), default=math.inf)
 
-    def take(self, status: BlockStatus) -> None:
+    def on_status(self, status: BlockStatus) -> None:
         """Take a node's account; its last word is the outcome."""
         upload, outcome = self._running.get(status.tube, (None, None))
-        if upload is not None and outcome is not None and upload.take(status):
+        if upload is not None and outcome is not None and upload.on_status(status):
             del self._running[status.tube]
             outcome.set_result(status)

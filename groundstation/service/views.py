@@ -11,7 +11,7 @@ import numpy as np
 
 from groundstation.errors import SelectorError, SurveyError
 from groundstation.service import column_views
-from groundstation.service.core import Cluster, Knowledge, SurveyStation
+from groundstation.service.model import ResolvedStop, RigModel, SurveyStation
 from groundstation.survey.resolve import angle_stds, angles
 from groundstation.survey.trajectory import Point, interpolate
 from telemetry.messages import Event, NodeFlag, NodeState, StaticRecord, SurveyMeasurement
@@ -52,14 +52,14 @@ class Range:
         return self.low - 1e-3 <= value <= self.high + 1e-3
 
 
-def status(k: Knowledge, _p: Parameters) -> View:
+def status(k: RigModel, _p: Parameters) -> View:
     """Rig time, depth, counts, health."""
-    stale = [tube for tube in k.order.tubes if k.is_stale(tube)]
+    stale = [tube for tube in k.tally.tubes if k.is_stale(tube)]
     return {
         "rig": k.config.rig,
         "rig_time_s": finite(k.rig_now),
         "bit_md_m": k.depths.latest,
-        "tubes": len(k.order.tubes),
+        "tubes": len(k.tally.tubes),
         "stale_tubes": stale,
         "stations": len(k.stations),
         "measurements": sum(s.count for s in k.stations),
@@ -69,18 +69,18 @@ def status(k: Knowledge, _p: Parameters) -> View:
     }
 
 
-def string(k: Knowledge, _p: Parameters) -> View:
+def string(k: RigModel, _p: Parameters) -> View:
     """Tubes from top to bottom."""
     bit = k.depths.latest
     rows = []
-    for tube in k.order.tubes:
-        below = k.order.length_below(tube)
+    for tube in k.tally.tubes:
+        below = k.tally.length_below(tube)
         md = None if bit is None or below is None else round(bit - below, 6)
         rows.append({"tube": tube, "md_m": md, "age_s": finite(k.age(tube)), "stale": k.is_stale(tube)})
     return {"rig_time_s": finite(k.rig_now), "tubes": rows}
 
 
-def node(k: Knowledge, tube: int) -> View:
+def node(k: RigModel, tube: int) -> View:
     """Last state of one node."""
     s = k.nodes[tube]
     return {
@@ -114,14 +114,14 @@ def alignment(s: NodeState) -> View | None:
     return None if std == 0.0 else {"pitch_deg": pitch, "roll_deg": roll, "sigma_deg": std}
 
 
-def stations(k: Knowledge, p: Parameters) -> View:
+def stations(k: RigModel, p: Parameters) -> View:
     """All stations, fused; ``md`` selects."""
     wanted = Range.parse("md", p["md"]) if "md" in p else None
     rows = [station(k, n) for n, s in enumerate(k.stations, 1) if wanted is None or wanted.holds(s.md)]
     return {"rig_time_s": finite(k.rig_now), "stations": rows}
 
 
-def station(k: Knowledge, n: int) -> View:
+def station(k: RigModel, n: int) -> View:
     """One station, fused; ``n`` from 1."""
     s = k.stations[n - 1]
     fused = k.fused(s)
@@ -158,7 +158,7 @@ def force_var(reading: SurveyMeasurement) -> float:
     return first / sum(first / variance for variance in variances) if min(variances) > 0.0 else 0.0
 
 
-def measurements(k: Knowledge, p: Parameters) -> View:
+def measurements(k: RigModel, p: Parameters) -> View:
     """Every cluster; ``station`` and ``tube`` select."""
     by_station = Range.parse("station", p["station"]) if "station" in p else None
     by_tube = Range.parse("tube", p["tube"]) if "tube" in p else None
@@ -171,13 +171,13 @@ def measurements(k: Knowledge, p: Parameters) -> View:
     return {"rig_time_s": finite(k.rig_now), "measurements": rows}
 
 
-def station_measurements(k: Knowledge, n: int) -> View:
+def station_measurements(k: RigModel, n: int) -> View:
     """Every cluster of one station."""
     rows = [cluster(c, n) for c in k.stations[n - 1].clusters]
     return {"rig_time_s": finite(k.rig_now), "station": n, "measurements": rows}
 
 
-def cluster(c: Cluster, n: int) -> View:
+def cluster(c: ResolvedStop, n: int) -> View:
     """One cluster, resolved."""
     m = c.measurement
     inclination, azimuth = angles(c.direction.lean, c.direction.down)
@@ -204,7 +204,7 @@ def cluster(c: Cluster, n: int) -> View:
     }
 
 
-def trajectory(k: Knowledge, p: Parameters) -> View:
+def trajectory(k: RigModel, p: Parameters) -> View:
     """Positions with covariance: at the stations, in a range of depth, or interpolated at one depth."""
     points = k.trajectory
     if "md" in p:
@@ -219,7 +219,7 @@ def trajectory(k: Knowledge, p: Parameters) -> View:
     return {"rig_time_s": finite(k.rig_now), "method": "balanced-tangential", "points": [point_view(q) for q in points]}
 
 
-def events(k: Knowledge, p: Parameters) -> View:
+def events(k: RigModel, p: Parameters) -> View:
     """What happened; ``tube`` selects."""
     wanted = Range.parse("tube", p["tube"]) if "tube" in p else None
     return {"events": [event(e) for e in k.events if wanted is None or wanted.holds(e.tube)]}
@@ -237,13 +237,13 @@ def event(e: Event) -> View:
     }
 
 
-def static_records(k: Knowledge, p: Parameters) -> View:
+def static_records(k: RigModel, p: Parameters) -> View:
     """Raw readings averaged at rest; ``tube`` selects."""
     wanted = Range.parse("tube", p["tube"]) if "tube" in p else None
     return {"static_records": [static_record(r) for r in k.static_records if wanted is None or wanted.holds(r.tube)]}
 
 
-def recalibration(k: Knowledge, _p: Parameters) -> View:
+def recalibration(k: RigModel, _p: Parameters) -> View:
     """Calibration in the field: how far, and what it found."""
     return {"rig_time_s": finite(k.rig_now)} | k.recalibration.view()
 
@@ -291,7 +291,7 @@ def position(point: Point) -> View:
     }
 
 
-def point_of(k: Knowledge, s: SurveyStation) -> Point:
+def point_of(k: RigModel, s: SurveyStation) -> Point:
     """The trajectory's point at a station; the collar for one at its depth."""
     return next((point for point in k.trajectory if point.md == s.md), k.trajectory[0])
 
@@ -310,7 +310,7 @@ def finite(value: float) -> float | None:
 class Path:
     """One answerable path below ``ground/``: what it shows and which parameters it takes."""
 
-    show: Callable[[Knowledge, Parameters], View]
+    show: Callable[[RigModel, Parameters], View]
     parameters: tuple[str, ...] = ()
 
 
@@ -330,7 +330,7 @@ FIXED: dict[str, Path] = {
 PATTERNS = (*FIXED, "nodes/{tube}", "stations/{n}", "stations/{n}/measurements")
 
 
-def paths(k: Knowledge) -> dict[str, Path]:
+def paths(k: RigModel) -> dict[str, Path]:
     """Every path that has an answer now."""
     found = dict(FIXED)
     for tube in sorted(k.nodes):

@@ -14,7 +14,7 @@ import numpy as np
 import numpy.typing as npt
 
 from groundstation.errors import SurveyError
-from groundstation.survey.resolve import Lean, angle_stds, angles
+from groundstation.survey.resolve import Direction, angle_stds, angles
 from groundstation.survey.trajectory import Point
 
 Array = npt.NDArray[np.float64]
@@ -129,7 +129,7 @@ def deviation(point: Point, design: Design) -> Deviation:
     )
 
 
-def project(point: Point, direction: Lean, design: Design) -> Deviation:
+def project(point: Point, direction: Direction, design: Design) -> Deviation:
     """Deviation at the target if the hole goes on straight from a point; its uncertainty grows with the way.
 
     The direction's own error and that of the position are taken as one (fully correlated), for the last station is in
@@ -180,7 +180,7 @@ class Dominant:
         return "azimuth" if self.by_azimuth > math.sqrt(2.0) * self.by_inclination else "inclination"
 
 
-def dominant(direction: Lean, length: float) -> Dominant:
+def dominant(direction: Direction, length: float) -> Dominant:
     """Lateral errors L cos I sigma_I and L sin I sigma_A of a hole that leans all along like ``direction``."""
     inclination, _ = angles(direction.lean, direction.down)
     std_i, std_a = angle_stds(direction.lean, direction.down, direction.total_cov)

@@ -149,7 +149,7 @@ class Sums:
         self._before = np.zeros((6, *shape))  # random ones of the stations that have both legs
         self._work = np.empty(shape)
 
-    def take(self, work: Propagation, source: Source) -> None:
+    def add_source(self, work: Propagation, source: Source) -> None:
         """Evaluate a source and add it."""
         work.evaluate(source)
         if source.random:
@@ -192,7 +192,7 @@ class Uncertainty:
         for source in sources_of(self.legs):
             out = found.setdefault(source.name, np.zeros_like(self.cov))
             sums = Sums(self.geometry.upper.shape)
-            sums.take(work, source)
+            sums.add_source(work, source)
             sums.add_to(out)
         return found
 
@@ -247,7 +247,7 @@ def propagate(survey: Survey, legs: Sequence[Leg], site: Site, *, slot_allowance
     sums = Sums(g.upper.shape)
     with np.errstate(invalid="ignore", over="ignore"):  # what has no value is refused by what comes of it
         for source in merged_sources(tuple(legs)):
-            sums.take(work, source)
+            sums.add_source(work, source)
     cov = np.zeros((*survey.md.shape, 3, 3))
     sums.add_to(cov)
     cov[..., 0, :, :] = surface_covariance(survey.md, survey.inclination, survey.azimuth, legs[0].tool)

@@ -17,7 +17,7 @@ from enum import Enum
 import numpy as np
 import numpy.typing as npt
 
-from groundstation.survey.resolve import Lean
+from groundstation.survey.resolve import Direction
 from groundstation.survey.shared import added
 
 Array = npt.NDArray[np.float64]
@@ -51,7 +51,7 @@ class StationFusion:
     _shared: Array = field(default_factory=lambda: np.zeros((2, 0)))
     _down: float = 0.0
 
-    def add(self, reading: Lean) -> None:
+    def add_reading(self, reading: Direction) -> None:
         """Take one more cluster; it weighs by all it does not know, shared errors included."""
         information = np.linalg.inv(reading.total_cov)
         self._information = self._information + information
@@ -61,11 +61,11 @@ class StationFusion:
         self._down += reading.down
         self.count += 1
 
-    def fused(self) -> Lean:
+    def fused(self) -> Direction:
         """Mean, random covariance (2, 2) and shared columns (2, s)."""
         gain = np.asarray(np.linalg.inv(self._information), np.float64)
         lean = gain @ self._weighted
-        return Lean(lean, vertical(lean, self._down), gain @ self._random @ gain, gain @ self._shared)
+        return Direction(lean, vertical(lean, self._down), gain @ self._random @ gain, gain @ self._shared)
 
 
 def vertical(lean: Array, sense: float) -> float:
@@ -73,11 +73,11 @@ def vertical(lean: Array, sense: float) -> float:
     return math.copysign(math.sqrt(1.0 - min(float(lean @ lean), 1.0)), sense)
 
 
-def bayes(readings: Sequence[Lean]) -> Lean:
+def bayes(readings: Sequence[Direction]) -> Direction:
     """Recursive Bayes of at least one reading."""
     fusion = StationFusion()
     for reading in readings:
-        fusion.add(reading)
+        fusion.add_reading(reading)
     return fusion.fused()
 
 
@@ -87,7 +87,7 @@ def sequence_weights(count: int, power: int) -> Array:
     return np.asarray(k / k.sum())
 
 
-def weighted(readings: Sequence[Lean], scheme: Weighting) -> Lean:
+def weighted(readings: Sequence[Direction], scheme: Weighting) -> Direction:
     """Readings of one station, oldest first, combined by a scheme."""
     if scheme is Weighting.BAYES:
         return bayes(readings)
@@ -99,10 +99,10 @@ def weighted(readings: Sequence[Lean], scheme: Weighting) -> Lean:
     shared = np.zeros((2, 0))
     for w, r in zip(weights, readings, strict=True):
         shared = added(shared, w * r.shared)
-    return Lean(lean, vertical(lean, sum(r.down for r in readings)), cov, shared)
+    return Direction(lean, vertical(lean, sum(r.down for r in readings)), cov, shared)
 
 
-def adapted(readings: Sequence[Lean]) -> Weighting:
+def adapted(readings: Sequence[Direction]) -> Weighting:
     """Linear for a small departure of the newest reading, quadratic for a larger, cubic for a large one."""
     size = departure(readings)[1]
     if size <= DEPARTED:
@@ -110,7 +110,7 @@ def adapted(readings: Sequence[Lean]) -> Weighting:
     return Weighting.QUADRATIC if size <= QUADRATIC_TO else Weighting.CUBIC
 
 
-def departure(readings: Sequence[Lean]) -> tuple[Array, float]:
+def departure(readings: Sequence[Direction]) -> tuple[Array, float]:
     """How far the newest reading is from the earlier ones: vector (2,) and size in standard deviations; 0 for a first.
 
     The covariance of the difference knows what the two have in common: an error of the same mount cancels.
@@ -141,15 +141,15 @@ class Evidence:
         return self.own > DEPARTED and self.agree
 
 
-def moved_hole(station: Sequence[Lean], neighbours: Sequence[Sequence[Lean]]) -> Evidence:
+def moved_hole(station: Sequence[Direction], neighbours: Sequence[Sequence[Direction]]) -> Evidence:
     """Judge the newest reading of a station by those of its neighbours at the same pass.
 
     A neighbour agrees when its own newest reading departed too, to the same side; all that have one must.
     """
-    return judge(departure(station), [departure(other) for other in neighbours if len(other) > 1])
+    return judge_departure(departure(station), [departure(other) for other in neighbours if len(other) > 1])
 
 
-def judge(departed: Departure, seen: Sequence[Departure]) -> Evidence:
+def judge_departure(departed: Departure, seen: Sequence[Departure]) -> Evidence:
     """The same of departures already known; ``seen`` are those of the neighbours that have one."""
     difference, own = departed
     agree = bool(seen) and all(size > DEPARTED and float(d @ difference) > 0.0 for d, size in seen)

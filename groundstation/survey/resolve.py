@@ -34,7 +34,7 @@ class Quality(IntFlag):
 
 
 @dataclass(frozen=True, slots=True)
-class Lean:
+class Direction:
     """Direction of a tube in the north-east plane.
 
     ``cov`` (2, 2) is random. ``shared`` (2, s) holds the change of ``lean`` for one standard deviation of each of the
@@ -57,14 +57,14 @@ class Lean:
 class Resolved:
     """A resolved stop: its direction, without shared errors, and how they would act on it."""
 
-    direction: Lean
+    direction: Direction
     by_force: Array  # (2, 3) change of the lean for one m/s^2 on each body axis
     by_yaw: Array  # (2,) change of the lean for one rad of yaw
 
-    def sharing(self, shared: Array) -> Lean:
+    def sharing(self, shared: Array) -> Direction:
         """The direction with its share (2, s) in the errors of others."""
         d = self.direction
-        return Lean(d.lean, d.down, d.cov, shared)
+        return Direction(d.lean, d.down, d.cov, shared)
 
 
 def resolve(force: Array, force_cov: Array, yaw: float, yaw_var: float) -> Resolved:
@@ -92,7 +92,7 @@ def resolve(force: Array, force_cov: Array, yaw: float, yaw_var: float) -> Resol
     cov = by_force @ force_cov @ by_force.T + yaw_var * np.outer(by_yaw, by_yaw)
     if not is_covariance(cov):
         raise SurveyError(f"resolve: expected a positive definite covariance of the lean, got {cov.tolist()}")
-    return Resolved(Lean(lean, float(-unit[2]), cov, np.zeros((2, 0))), by_force, by_yaw)
+    return Resolved(Direction(lean, float(-unit[2]), cov, np.zeros((2, 0))), by_force, by_yaw)
 
 
 def is_covariance(covs: Array) -> bool:

@@ -15,7 +15,7 @@ from itertools import pairwise
 import numpy as np
 import numpy.typing as npt
 
-from groundstation.survey.resolve import Lean, Resolved
+from groundstation.survey.resolve import Direction, Resolved
 
 Array = npt.NDArray[np.float64]
 Name = tuple[str | int, ...]
@@ -39,7 +39,7 @@ class SharedErrors:
         systematic_var: float,
         mount_var: float,
         force_bias_std: float,
-    ) -> Lean:
+    ) -> Direction:
         """Direction of a reading with its columns.
 
         Parameters

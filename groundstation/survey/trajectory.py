@@ -17,7 +17,7 @@ import numpy.typing as npt
 
 from groundstation.errors import SurveyError
 from groundstation.survey.methods import OPPOSITE, Method, dogleg, leg, ratio_factor
-from groundstation.survey.resolve import Lean, angles
+from groundstation.survey.resolve import Direction, angles
 from groundstation.survey.shared import added
 
 Array = npt.NDArray[np.float64]
@@ -34,12 +34,12 @@ class Point:
     shared: Array  # (3, s) m, change for one standard deviation of every shared error
 
 
-def tangent_of(direction: Lean) -> Array:
+def tangent_of(direction: Direction) -> Array:
     """Downhole unit vector (3,)."""
     return np.array([direction.lean[0], direction.lean[1], direction.down])
 
 
-def tangent_jacobian(direction: Lean) -> Array:
+def tangent_jacobian(direction: Direction) -> Array:
     """D tangent / d lean (3, 2); the vertical part follows from the unit length."""
     down = math.copysign(max(abs(direction.down), 1e-6), direction.down)
     return np.array([[1.0, 0.0], [0.0, 1.0], [-direction.lean[0] / down, -direction.lean[1] / down]])
@@ -56,10 +56,10 @@ class Trajectory:
     """
 
     def __init__(
-        self, method: Method = Method.BALANCED_TANGENTIAL, collar: Lean | None = None, start_md: float = 0.0
+        self, method: Method = Method.BALANCED_TANGENTIAL, collar: Direction | None = None, start_md: float = 0.0
     ) -> None:
         self._method = method
-        first = collar or Lean(np.zeros(2), 1.0, np.zeros((2, 2)), np.zeros((2, 0)))
+        first = collar or Direction(np.zeros(2), 1.0, np.zeros((2, 2)), np.zeros((2, 0)))
         jacobian = tangent_jacobian(first)
         self._last_cov, self._last_shared = jacobian @ first.cov @ jacobian.T, jacobian @ first.shared  # of the tangent
         self._length = 0.0
@@ -67,7 +67,7 @@ class Trajectory:
         self._interior_shared = np.zeros((3, 0))
         self.points = [Point(start_md, tangent_of(first), np.zeros(3), np.zeros((3, 3)), np.zeros((3, 0)))]
 
-    def append(self, md: float, direction: Lean) -> Point:
+    def append(self, md: float, direction: Direction) -> Point:
         """Add the station at ``md`` (m).
 
         Raises
@@ -92,7 +92,7 @@ class Trajectory:
         self.points.append(point)
         return point
 
-    def _leg(self, before: Point, length: float, direction: Lean) -> Array:
+    def _leg(self, before: Point, length: float, direction: Direction) -> Array:
         if self._method is Method.BALANCED_TANGENTIAL:
             return 0.5 * length * (before.tangent + tangent_of(direction))
         i1, a1 = angles(before.tangent[:2], float(before.tangent[2]))

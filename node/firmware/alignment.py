@@ -12,7 +12,7 @@ from typing import Final
 import numpy as np
 
 from node.firmware.imu_settings import ImuSettings
-from node.firmware.said import Said
+from node.firmware.pending_event import PendingEvent
 from node.kernels.alignment import (
     CIRCLE,
     EXTREMES,
@@ -63,16 +63,16 @@ class Aligner:
         self._ordered_at = self._last_end = math.nan
         self._steady = self._slow = 0
         self._force = np.zeros(3)
-        self._said: list[Said] = []
+        self._pending: list[PendingEvent] = []
 
     @property
     def running(self) -> bool:
         """Whether an alignment is under way."""
         return bool(self._method)
 
-    def take_said(self) -> list[Said]:
+    def drain_events(self) -> list[PendingEvent]:
         """Code, severity and arguments of the events since the last call."""
-        said, self._said = self._said, []
+        said, self._pending = self._pending, []
         return said
 
     def start(self, method: object, turns: object) -> str:
@@ -88,12 +88,12 @@ class Aligner:
         self._steady = self._slow = 0
         self._angle = self._sense = 0.0
         self._mount["aligning"] = 1
-        self._said.append(("alignment_begun", Severity.INFO, {"method": self._method, "turns": self._wanted}))
+        self._pending.append(("alignment_begun", Severity.INFO, {"method": self._method, "turns": self._wanted}))
         return ""
 
     def stop(self, reason: str) -> None:
         """End the alignment under way without an offset."""
-        self._said.append(("alignment_refused", Severity.WARNING, {"reason": reason, "turns": self._turns}))
+        self._pending.append(("alignment_refused", Severity.WARNING, {"reason": reason, "turns": self._turns}))
         self._end()
 
     def drop(self, reason: str) -> None:
@@ -103,9 +103,9 @@ class Aligner:
         if self._mount["method"]:
             for name in ("method", "axis", "std"):
                 self._mount[name] = new_mount()[0][name]
-            self._said.append(("alignment_dropped", Severity.WARNING, {"reason": reason}))
+            self._pending.append(("alignment_dropped", Severity.WARNING, {"reason": reason}))
 
-    def take(self, forces: Array, rate: float, yaw: float, start: float, end: float, used: Array) -> bool:
+    def on_turn_sample(self, forces: Array, rate: float, yaw: float, start: float, end: float, used: Array) -> bool:
         """Follow one cycle of the alignment under way; whether it ended with a new offset.
 
         Parameters
@@ -143,7 +143,7 @@ class Aligner:
         if self._steady >= STEADY_CYCLES:
             self._sense = math.copysign(1.0, rate)
             self._sweeps[:] = np.zeros(1, SWEEP)
-            self._said.append(("alignment_turning", Severity.INFO, {"rate_dps": rate / DEG}))
+            self._pending.append(("alignment_turning", Severity.INFO, {"rate_dps": rate / DEG}))
         elif end - self._ordered_at > PATIENCE:
             self.stop(f"timed out: the string stood still for {PATIENCE:g} s")
 
@@ -176,7 +176,7 @@ class Aligner:
             offset = self._offsets[k]
             self._mount["axis"][k] = offset["axis"]
             self._mount["std"][k] = offset["pitch_std"], offset["roll_std"]
-            self._said.append(("aligned", Severity.INFO, self._account(k, offset)))
+            self._pending.append(("aligned", Severity.INFO, self._account(k, offset)))
         self._mount["method"] = METHODS[self._method]
         self._end()
         return True

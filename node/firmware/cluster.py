@@ -14,7 +14,7 @@ from typing import Final
 import numpy as np
 
 from node.firmware.imu_settings import ImuSettings
-from node.firmware.said import Said
+from node.firmware.pending_event import PendingEvent
 from node.firmware.sensor_faults import Fault, ReadingWatch, SensorLimits
 from node.kernels.cluster import follow_offsets, fuse
 from node.kernels.layout import DEG, RING, Array, Err
@@ -59,12 +59,12 @@ class Cluster:
         self._cycles = 0
         self._faults: list[Fault | None] = [None] * count
         self._expected = np.zeros(3)  # rad/s, before the IMUs were apart
-        self._said: list[Said] = []
+        self._pending: list[PendingEvent] = []
         self._reweigh(self.used)
 
-    def take_said(self) -> list[Said]:
+    def drain_events(self) -> list[PendingEvent]:
         """Code, severity and arguments of the events since the last call."""
-        said, self._said = self._said, []
+        said, self._pending = self._pending, []
         return said
 
     @property
@@ -72,7 +72,7 @@ class Cluster:
         """Inverse variances (imus,) of the IMUs in use, 0 of the others; those of factor 1 have 1."""
         return np.where(self.used, self._noise**-2.0, 0.0)
 
-    def take(
+    def fuse_readings(
         self,
         raw: Sequence[tuple[Vector3, Vector3, bool]],
         rates: Array,
@@ -114,7 +114,7 @@ class Cluster:
         self._ring[:, slot], self._ring_used[:, slot] = forces, used
         self._cycles += 1
 
-    def learn(self, rates: Array) -> None:
+    def learn_offsets(self, rates: Array) -> None:
         """Take a cycle at rest, all IMUs in use, into the offsets of their gyroscopes: ``rates`` (imus, 3), rad/s."""
         if not self.used.all():
             return
@@ -148,7 +148,7 @@ class Cluster:
 
     def _sane(self, raw: Sequence[tuple[Vector3, Vector3, bool]]) -> Array:
         judged = zip(self._watches, raw, strict=True)
-        faults = [watch.judge(rate, force, saturated=saturated) for watch, (rate, force, saturated) in judged]
+        faults = [watch.find_faults(rate, force, saturated=saturated) for watch, (rate, force, saturated) in judged]
         self._faults = [gyro or accelerometer for gyro, accelerometer in faults]
         return np.array([fault is None for fault in self._faults])
 
@@ -184,11 +184,11 @@ class Cluster:
     def _tell(self, used: Array, sane: Array) -> None:
         for k in np.flatnonzero(used != self.used).tolist():
             if used[k]:
-                self._said.append(("imu_back", Severity.WARNING, {"imu": k + 1}))
+                self._pending.append(("imu_back", Severity.WARNING, {"imu": k + 1}))
             else:
                 fault = self._faults[k]
                 reason = "disagrees" if sane[k] or fault is None else fault.value
-                self._said.append(("imu_excluded", Severity.ERROR, {"imu": k + 1, "reason": reason}))
+                self._pending.append(("imu_excluded", Severity.ERROR, {"imu": k + 1, "reason": reason}))
 
     def _reweigh(self, used: Array) -> None:
         """Noise of the configuration for the IMUs ``used``, and the doubt in a bias that is now another mean.

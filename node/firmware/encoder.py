@@ -4,7 +4,7 @@ While the head turns, the moment of the last edge is known: at that moment the a
 jitter. A counter that does not time its edges is read in the middle of its count. At rest the angle is somewhere inside
 one count, a constant error, so the rest gives one measurement, repeated under one sequence number and never averaged
 (thesis 3.6 takes it as white). Where inside, the times of the last edges say, if they were taken
-(``node.firmware.stop``).
+(``node.firmware.edge_interpolation``).
 """
 
 from __future__ import annotations
@@ -12,7 +12,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass, replace
 
-from node.firmware.stop import stopped_at
+from node.firmware.edge_interpolation import stopped_at
 from node.firmware.torque import TorqueSettings, TorqueWatch
 from telemetry.messages import Aiding
 

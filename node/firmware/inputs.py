@@ -21,7 +21,7 @@ class ImuReading:
 
 
 @dataclass(frozen=True, slots=True)
-class Surroundings:
+class RigContext:
     """What the telemetry tells the firmware at a cycle: its place in the string and the time."""
 
     joined: bool  # the upper joint is closed

@@ -11,7 +11,7 @@ from __future__ import annotations
 
 import math
 
-from node.firmware.said import Said
+from node.firmware.pending_event import PendingEvent
 from node.firmware.settings import TubeSettings
 from node.kernels.angles import from_binary, wrap
 from node.kernels.layout import DEG, Array, Err
@@ -37,7 +37,7 @@ class MakeUp:
         self._path: tuple[int, float] | None = None  # hops and offset (rad) of the marks, in the aiding used last
         self._offset = 0.0  # rad, in their place
         self._var: float | None = None  # rad^2, of it; None: that of the marks
-        self._said: list[Said] = []
+        self._pending: list[PendingEvent] = []
 
     def follow(
         self, aiding: Aiding, marks: float, marks_var: float, torsion_var: float, twist_var: float
@@ -58,9 +58,9 @@ class MakeUp:
             return marks, marks_var
         return self._offset, self._var
 
-    def take_said(self) -> list[Said]:
+    def drain_events(self) -> list[PendingEvent]:
         """Code, severity and arguments of the events since the last call."""
-        said, self._said = self._said, []
+        said, self._pending = self._pending, []
         return said
 
     def _resume(self, aiding: Aiding, marks: float, twist_var: float) -> None:
@@ -106,13 +106,13 @@ class MakeUp:
             "turned": turned,
         }
         if is_new:
-            self._said.append(("joint_solved", Severity.INFO, dict(detail)))
+            self._pending.append(("joint_solved", Severity.INFO, dict(detail)))
         if contradicts:
-            self._said.append(("joint_contradicts_marks", Severity.WARNING, dict(detail)))
+            self._pending.append(("joint_contradicts_marks", Severity.WARNING, dict(detail)))
 
     def _refuse(self, aiding: Aiding, reason: str) -> None:
         self._var = None
-        self._said.append(("joint_not_solved", Severity.WARNING, {"reason": reason, "hops": aiding.hops + 1}))
+        self._pending.append(("joint_not_solved", Severity.WARNING, {"reason": reason, "hops": aiding.hops + 1}))
 
     def _refusal(self, aiding: Aiding, P: float) -> str:
         """Why the saved yaw cannot tell the joint, or nothing."""

@@ -98,7 +98,7 @@ class ReadingWatch:
         self._forces = Repeats(limits.repeats_together, limits.repeats_alone)
         self._clipped = 0
 
-    def judge(self, rate: Vector3, force: Vector3, *, saturated: bool) -> tuple[Fault | None, Fault | None]:
+    def find_faults(self, rate: Vector3, force: Vector3, *, saturated: bool) -> tuple[Fault | None, Fault | None]:
         """Faults of gyroscope and accelerometer in this cycle; rad/s, m/s^2.
 
         ``saturated`` is the driver's word that a sample within the cycle was at the gyroscope's range.
@@ -143,7 +143,7 @@ class AidingWatch:
         self._left, self._at = 0.0, None
         self._seen.clear()
 
-    def judge(
+    def find_mismatch(
         self, innovation: float, sigma: float, spin: float, now: float, *, rejected: bool, reset: bool
     ) -> Mismatch | None:
         """Take one judged aiding (rad, sigmas, rad/s, s); what it shows after enough of them."""

@@ -11,7 +11,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 
-from node.firmware.said import Said
+from node.firmware.pending_event import PendingEvent
 from node.firmware.saved_state import resume
 from node.firmware.sensor_faults import STEADY, AidingWatch, Fault, Mismatch, ReadingWatch, SensorLimits
 from node.kernels.angles import from_binary, wrap
@@ -69,7 +69,7 @@ class SensorGuard:
         self._step: Mismatch | None = None  # that the constant bias has taken
         self._before_steps: tuple[float, float] | None = None  # rad/s, the constant bias then, and size of the first
         self._jumped = self._untimely = False
-        self._said: list[Said] = []
+        self._pending: list[PendingEvent] = []
 
     @property
     def flags(self) -> NodeFlag:
@@ -91,12 +91,12 @@ class SensorGuard:
         """Whether the encoder told its rate lately."""
         return abs(float(self._state["now"]) - self._rate_at) <= RATE_AGE
 
-    def take_said(self) -> list[Said]:
+    def drain_events(self) -> list[PendingEvent]:
         """Code, severity and arguments of the events since the last call."""
-        said, self._said = self._said, []
+        said, self._pending = self._pending, []
         return said
 
-    def takes(self, aiding: Aiding, offset: float, valid_local: float) -> bool:
+    def gate_aiding(self, aiding: Aiding, offset: float, valid_local: float) -> bool:
         """Whether an aiding is for the filter, valid at ``valid_local`` (s, own clock); ``offset`` rad.
 
         One of a time that is none, or far ahead, would wait for ever and let no other pass.
@@ -106,7 +106,7 @@ class SensorGuard:
             state["cycles"] and valid_local - float(state["now"]) > LONGEST_CYCLE
         )
         if not timely and not self._untimely:
-            self._say("aiding_untimely", Severity.ERROR, {})
+            self._report("aiding_untimely", Severity.ERROR, {})
         self._untimely = not timely
         if not timely:
             return False
@@ -121,7 +121,7 @@ class SensorGuard:
         ahead = start - float(self._state["now"]) if self._state["cycles"] else 0.0
         jumped = not plain or not -BACKWARD <= ahead <= FARTHEST
         if jumped and not self._jumped:
-            self._say("clock_jumped", Severity.ERROR, {"by_s": ahead} if math.isfinite(ahead) else {})
+            self._report("clock_jumped", Severity.ERROR, {"by_s": ahead} if math.isfinite(ahead) else {})
         if not jumped and ahead < 0.0:  # the increments overlap, and the turn that was counted once is in doubt
             self._state["P"][Err.YAW, Err.YAW] += (float(self._state["now_rate"]) * ahead) ** 2
         self._jumped = jumped
@@ -132,7 +132,7 @@ class SensorGuard:
 
     def before(self, raw: tuple[Vector3, Vector3], rate: Array, force: Array, *, saturated: bool, at: float) -> None:
         """Judge the raw rate and force, and replace in ``rate`` and ``force`` (calibrated) what is not to be used."""
-        gyro, accelerometer = self._readings.judge(*raw, saturated=saturated)
+        gyro, accelerometer = self._readings.find_faults(*raw, saturated=saturated)
         state = self._state
         known = abs(at - self._rate_at) <= RATE_AGE
         measured = float(rate[2] - state["static_bias"][2] - state["bias"][2]) / (1.0 + float(state["scale"]))
@@ -163,7 +163,7 @@ class SensorGuard:
         if not rejected and (Status.AIDED not in status or Status.YAW_RESET in status):
             return
         sigma = math.sqrt(max(float(state["innovation_var"]), 0.0))
-        found = self._aidings.judge(
+        found = self._aidings.find_mismatch(
             float(state["innovation"]),
             sigma,
             float(state["now_rate"]),
@@ -172,7 +172,7 @@ class SensorGuard:
             reset=Status.YAW_RESET in status,
         )
         if found is not None:
-            self._learn(found)
+            self._learn_mismatch(found)
         elif self._gyro.proving:
             self._agreed = 0 if rejected else self._agreed + (sigma < NARROW_STD)
             if self._agreed >= AGREEING:
@@ -192,7 +192,7 @@ class SensorGuard:
         if fault is not None:
             told = Fault.BAD_SAMPLE in (trust.fault, fault) and trust is self._force
             if trust.fault is not fault and not told:
-                self._say(fault.value, Severity.ERROR, {})
+                self._report(fault.value, Severity.ERROR, {})
             trust.cycles = trust.cycles if trust.fault is not None else 0
             if trust is self._gyro and trust.fault is Fault.GYRO_STEP and trust.proving and self._step is not None:
                 self._state["static_bias"][2] += self._step.rate  # what looked like a step was this fault's beginning
@@ -223,7 +223,7 @@ class SensorGuard:
             for tilt in (Err.TILT_X, Err.TILT_Y):
                 isolate(state["P"], int(tilt), 1.0)
             state["surveyed"] = state["still_cycles"] = 0  # the average of a stop begins anew
-            self._say_recovered(trust)
+            self._report_recovered(trust)
             return
         trust.proving = True
         self._agreed = 0
@@ -234,7 +234,7 @@ class SensorGuard:
             isolate(state["P"], int(Err.BIAS_X) + k, max(prior, float(state["P"][Err.BIAS_X + k, Err.BIAS_X + k])))
         isolate(state["P"], int(Err.SCALE), float(state["P"][Err.SCALE, Err.SCALE]))
 
-    def _learn(self, found: Mismatch) -> None:
+    def _learn_mismatch(self, found: Mismatch) -> None:
         """A lasting mismatch belongs to the sensor: its bias or its scale takes it, and the yaw starts anew."""
         state, config, trust = self._state, self._config, self._gyro
         found = self._reconsider(found)
@@ -258,7 +258,7 @@ class SensorGuard:
         state["rejected"] = 0
         self._step = found if fault is Fault.GYRO_STEP and learnable else None
         if trust.fault is not fault:
-            self._say(fault.value, Severity.ERROR, {"mismatch_dps": found.rate / DEG, "spin_dps": found.spin / DEG})
+            self._report(fault.value, Severity.ERROR, {"mismatch_dps": found.rate / DEG, "spin_dps": found.spin / DEG})
         trust.cycles = trust.cycles if trust.fault is not None else 0
         trust.fault, trust.proving, trust.sane = fault, learnable, 0
         self._agreed = 0
@@ -291,15 +291,15 @@ class SensorGuard:
         var = max(float(state["P"][Err.YAW, Err.YAW]), self._aiding_var)
         isolate(state["P"], int(Err.YAW), var)
         state["now_P"][Err.YAW, Err.YAW] = max(float(state["now_P"][Err.YAW, Err.YAW]), var)
-        self._say_recovered(self._gyro)
+        self._report_recovered(self._gyro)
 
-    def _say_recovered(self, trust: Trust) -> None:
+    def _report_recovered(self, trust: Trust) -> None:
         if trust.fault is not None and not (trust is self._force and trust.fault is Fault.BAD_SAMPLE):
-            self._say("sensor_recovered", Severity.WARNING, {"after": trust.fault.value, "cycles": trust.cycles})
+            self._report("sensor_recovered", Severity.WARNING, {"after": trust.fault.value, "cycles": trust.cycles})
         trust.fault, trust.proving, trust.sane, trust.cycles = None, False, 0, 0
 
-    def _say(self, code: str, severity: Severity, arguments: dict[str, Scalar]) -> None:
-        self._said.append((code, severity, arguments))
+    def _report(self, code: str, severity: Severity, arguments: dict[str, Scalar]) -> None:
+        self._pending.append((code, severity, arguments))
 
 
 def begin_epoch(states: Array) -> None:

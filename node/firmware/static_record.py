@@ -42,7 +42,9 @@ class StaticRecorder:
         self._command, self._seconds, self._begun = command, float(seconds), math.nan
         return ""
 
-    def take(self, rate: Vector3, force: Vector3, temperature: float, start: float, *, standing: bool) -> None:
+    def append_reading(
+        self, rate: Vector3, force: Vector3, temperature: float, start: float, *, standing: bool
+    ) -> None:
         """Add one cycle's raw reading that began at ``start`` (s, own clock)."""
         if math.isnan(self._begun):
             self._begun = start

@@ -11,7 +11,7 @@ from __future__ import annotations
 import math
 from dataclasses import replace
 
-from node.firmware.said import Said
+from node.firmware.pending_event import PendingEvent
 from node.firmware.settings import TubeSettings
 from node.kernels.layout import Array, Err
 from telemetry.messages import Aiding, Severity
@@ -35,7 +35,7 @@ class TubeTorsion:
         self._wound = False  # since then the string was under torque
         self._torque, self._holding = 0.0, False
         self._heard_at = -math.inf
-        self._said: list[Said] = []
+        self._pending: list[PendingEvent] = []
 
     @property
     def var(self) -> float:
@@ -52,7 +52,7 @@ class TubeTorsion:
         joints = max(aiding.systematic_var - var, 0.0)
         return replace(aiding, systematic_var=joints, torque=self._torque, torsion_var=var, under_torque=self._holding)
 
-    def takes(self, aiding: Aiding, valid_local: float) -> bool:
+    def gate_aiding(self, aiding: Aiding, valid_local: float) -> bool:
         """Whether an aiding is for the filter; opens the filter's yaw where the twist has changed."""
         self._heard_at = valid_local
         self._torque, self._holding = aiding.torque, aiding.under_torque
@@ -77,7 +77,7 @@ class TubeTorsion:
         self._wound = False
         return True
 
-    def keeps_survey(self, now: float) -> bool:
+    def holds_survey(self, now: float) -> bool:
         """Whether at ``now`` (s, own clock) the survey waits: the yaw that counts is that of a released string.
 
         A drive that nobody tells of any more is not waited for: the survey goes by what the node itself knows.
@@ -85,11 +85,11 @@ class TubeTorsion:
         told = now - self._heard_at <= self._settings.aiding_old_after
         return self._holding and told and bool(self._state["still_cycles"])
 
-    def take_said(self) -> list[Said]:
+    def drain_events(self) -> list[PendingEvent]:
         """Code, severity and arguments of the events since the last call."""
-        said, self._said = self._said, []
+        said, self._pending = self._pending, []
         return said
 
     def _tell(self, aiding: Aiding, std: float) -> None:
         code = "string_under_torque" if aiding.under_torque else "string_released"
-        self._said.append((code, Severity.INFO, {"torque_nm": aiding.torque, "twist_sigma_deg": math.degrees(std)}))
+        self._pending.append((code, Severity.INFO, {"torque_nm": aiding.torque, "twist_sigma_deg": math.degrees(std)}))

@@ -8,14 +8,14 @@ from dataclasses import replace
 
 import numpy as np
 
-from node.firmware.account import Account
 from node.firmware.alignment import FASTEST, Aligner, alignment_text, realign
+from node.firmware.block_trial import forget_bias, forget_tilt, record_of, recorrect
 from node.firmware.coarse_level import level_coarsely
-from node.firmware.inputs import ImuReading, Surroundings
-from node.firmware.intake import Intake
+from node.firmware.imu_fusion import ImuFusion
+from node.firmware.inputs import ImuReading, RigContext
 from node.firmware.kernel_choice import kernel_of
 from node.firmware.make_up import MakeUp
-from node.firmware.parameters import forget_bias, forget_tilt, record_of, recorrect
+from node.firmware.reporter import Reporter
 from node.firmware.sensor_guard import SensorGuard
 from node.firmware.settings import TubeSettings
 from node.firmware.static_record import StaticRecorder
@@ -74,7 +74,7 @@ class Tube:
         self.state = state[0]
         self._next_sequence = next_sequence
         self._restored = restored
-        self.account = Account(settings, state, config, next_sequence, restored=restored)
+        self.reporter = Reporter(settings, state, config, next_sequence, restored=restored)
         self._noticed = Status.NONE  # between cycles
         self.raw: ImuReading | None = None  # of the last cycle, of all IMUs together
         self._recorder = StaticRecorder()
@@ -82,8 +82,8 @@ class Tube:
         self._torsion = TubeTorsion(settings, state)
         self._make_up = MakeUp(settings, state)
         self._aligner = Aligner(self._mount, settings.imus, float(self.config["force_std"] / self.config["gravity"]))
-        self._intake = Intake(settings, self._mount, state, config)
-        self._axes, self._cluster = self._intake.axes, self._intake.cluster
+        self._fusion = ImuFusion(settings, self._mount, state, config)
+        self._axes, self._cluster = self._fusion.axes, self._fusion.cluster
         self._time_stamp = TimeStampPrior(state, config)
         self._slow_cycles = 0  # in a row, not faster than the offset of a gyroscope never calibrated
         self._temperature = USUAL
@@ -101,7 +101,7 @@ class Tube:
         systematic_var = aiding.systematic_var + (joint.std**2 if joint else 0.0)
         twist_var = self._torsion.reaches(aiding)
         offset, systematic_var = self._make_up.follow(aiding, offset, systematic_var, self._torsion.var, twist_var)
-        if self._guard.takes(aiding, offset, valid_local) and self._torsion.takes(aiding, valid_local):
+        if self._guard.gate_aiding(aiding, offset, valid_local) and self._torsion.gate_aiding(aiding, valid_local):
             self._noticed |= Status(
                 self._offer_aiding(
                     self.state,
@@ -127,49 +127,49 @@ class Tube:
         )
 
     def on_cycle(
-        self, reading: ImuReading, around: Surroundings
+        self, reading: ImuReading, context: RigContext
     ) -> Iterator[Aiding | SurveyMeasurement | StaticRecord | Event | NodeState]:
         """Correct the reading, run one execution cycle and yield what there is to say."""
         self.raw = reading
         if not self._guard.admits(reading.start, reading.end):
-            yield from self._sensor_events(around)
+            yield from self._sensor_events(context)
             return
-        reading = self.raw = self._intake.take(reading, self._correction, self._expected(), heard=self._guard.heard)
-        rate, force = self._intake.rate, self._intake.force
+        reading = self.raw = self._fusion.fuse(reading, self._correction, self._expected(), heard=self._guard.heard)
+        rate, force = self._fusion.rate, self._fusion.force
         self._temperature = reading.temperature
         raw = (reading.rate, reading.force)
         self._guard.before(raw, rate, force, saturated=reading.saturated, at=reading.end)
-        self._time_stamp.follow(around)
+        self._time_stamp.follow(context)
         level_coarsely(self.state, self.config, rate, force)
         self._slow_cycles = self._slow_cycles + 1 if max(map(abs, rate)) < LARGEST_OFFSET else 0
-        account = self.account
-        if account.cycles and reading.start - self.state["now"] > 0.5 * (reading.end - reading.start):
-            account.overruns += 1
-        status = self._noticed | self._run(reading, 1 if around.joined else 0)
+        reporter = self.reporter
+        if reporter.cycles and reading.start - self.state["now"] > 0.5 * (reading.end - reading.start):
+            reporter.overruns += 1
+        status = self._noticed | self._run(reading, 1 if context.joined else 0)
         self._noticed = Status.NONE
-        account.cycles += 1
+        reporter.cycles += 1
         if Status.FILTER_FAULT in status:
             self._start_over()
         self._guard.after(status, reading.end)
         self._follow_alignment(reading)
         if self._cluster is not None and self.quiet:
-            self._cluster.learn(self._intake.rates)
-        yield from self._sensor_events(around)
-        yield from account.said([*self._make_up.take_said(), *self._torsion.take_said()], around)
-        yield from account.events(status, around)
-        yield from self._record(reading, around)
+            self._cluster.learn_offsets(self._fusion.rates)
+        yield from self._sensor_events(context)
+        yield from reporter.pending_events([*self._make_up.drain_events(), *self._torsion.drain_events()], context)
+        yield from reporter.events(status, context)
+        yield from self._record(reading, context)
         if Status.SURVEY_READY in status:
             samples = int(self.config["survey_samples"])
             imus = self._cluster.survey(samples) if self._cluster is not None else ()
-            yield account.survey(reading.end, around, imus, self._guard.flags)
+            yield reporter.survey(reading.end, context, imus, self._guard.flags)
         if self.settings.scheme is not Scheme.FORWARD and self.state["yaw_known"]:
-            yield self._torsion.of_estimate(account.estimate(around))
-        if status & ~Status.AIDED or account.cycles % self.settings.state_every == 0:
-            yield account.report(reading.end, around, self._guard.flags, self._mount[0], self._block)
+            yield self._torsion.of_estimate(reporter.estimate(context))
+        if status & ~Status.AIDED or reporter.cycles % self.settings.state_every == 0:
+            yield reporter.report(reading.end, context, self._guard.flags, self._mount[0], self._block)
 
     def boot_event(self, rig_now: float) -> Event:
         """Tell that the node started, and whether with its saved yaw."""
-        return self.account.event(
+        return self.reporter.event(
             "restored" if self._restored else "booted", Severity.INFO, rig_now, {"yaw_deg": self.yaw / DEG}
         )
 
@@ -230,29 +230,29 @@ class Tube:
     @property
     def yaw(self) -> float:
         """Yaw at the end of the newest cycle, rad in [0, 2 pi)."""
-        return self.account.yaw
+        return self.reporter.yaw
 
     @property
     def yaw_var(self) -> float:
         """Random variance of ``yaw``, rad^2."""
-        return self.account.yaw_var
+        return self.reporter.yaw_var
 
     @property
     def systematic_var(self) -> float:
         """Variance of the constant errors of every joint above, of the twist and of this node's mount, rad^2."""
-        return self.account.systematic_var
+        return self.reporter.systematic_var
 
-    def flags(self, around: Surroundings, now: float) -> NodeFlag:
+    def flags(self, context: RigContext, now: float) -> NodeFlag:
         """What the node says of the trust in its own yaw at ``now`` (s, own clock)."""
-        return self.account.flags(self._guard.flags, around, now)
+        return self.reporter.flags(self._guard.flags, context, now)
 
     def _run(self, reading: ImuReading, joined: int) -> Status:
         """One cycle of the loop; under torque it takes no survey, and that of this stop stays due."""
         state, due = self.state, not self.state["surveyed"]
-        waits = due and self._torsion.keeps_survey(reading.end)
+        waits = due and self._torsion.holds_survey(reading.end)
         if waits:
             state["surveyed"] = 1
-        rate, force = self._intake.rate, self._intake.force
+        rate, force = self._fusion.rate, self._fusion.force
         status = self._run_cycle(state, self.config, rate, force, reading.start, reading.end, joined)
         if waits:
             state["surveyed"] = 0
@@ -275,7 +275,7 @@ class Tube:
         rate = float(self.state["now_rate"])
         aided = reading.end - float(self.state["last_aided"]) <= self.settings.aiding_old_after
         yaw = self.yaw if aided else math.nan
-        if self._aligner.take(self._intake.unaligned, rate, yaw, reading.start, reading.end, used):
+        if self._aligner.on_turn_sample(self._fusion.unaligned, rate, yaw, reading.start, reading.end, used):
             realign(self._states, before, self._axes)
 
     def _drop_alignment(self, reason: str) -> None:
@@ -283,20 +283,20 @@ class Tube:
         self._aligner.drop(reason)
         realign(self._states, before, self._axes)
 
-    def _sensor_events(self, around: Surroundings) -> Iterator[Event]:
-        cluster = self._cluster.take_said() if self._cluster is not None else []
-        said = [*self._guard.take_said(), *self._aligner.take_said(), *cluster]
-        return self.account.said(said, around)
+    def _sensor_events(self, context: RigContext) -> Iterator[Event]:
+        cluster = self._cluster.drain_events() if self._cluster is not None else []
+        pending = [*self._guard.drain_events(), *self._aligner.drain_events(), *cluster]
+        return self.reporter.pending_events(pending, context)
 
-    def _record(self, reading: ImuReading, around: Surroundings) -> Iterator[StaticRecord | Event]:
+    def _record(self, reading: ImuReading, context: RigContext) -> Iterator[StaticRecord | Event]:
         recorder = self._recorder
         if not recorder.running:
             return
         temperature = reading.temperature if math.isfinite(reading.temperature) else USUAL
-        recorder.take(reading.rate, reading.force, temperature, reading.start, standing=self.standing)
+        recorder.append_reading(reading.rate, reading.force, temperature, reading.start, standing=self.standing)
         if recorder.is_due(reading.end):
-            record = recorder.finish(self.settings.tube, reading.end, around.rig_now, self._next_sequence)
-            yield record or self.account.event("static_record_empty", Severity.ERROR, around.rig_now, {})
+            record = recorder.finish(self.settings.tube, reading.end, context.rig_now, self._next_sequence)
+            yield record or self.reporter.event("static_record_empty", Severity.ERROR, context.rig_now, {})
 
     def _start_over(self) -> None:
         """A covariance that is none: begin again from nothing but the constant bias."""

@@ -10,13 +10,13 @@ from node.firmware.encoder import EncoderNode, EncoderSample
 from node.firmware.torque import TorqueSettings
 from node.process.counter import BootCounter
 from node.process.drivers.source import EncoderSource, SafeEncoder
-from node.process.timing import CycleTiming, Stage
-from telemetry.application.driven import Driven
-from telemetry.application.station import Station
+from telemetry.application.endpoint import Endpoint
 from telemetry.messages import ENCODER, Command, Event, Reply, Scalar, Severity, Side
+from telemetry.runtime.process import Process
+from telemetry.runtime.timing import CycleTiming, Stage
 
 
-class EncoderProcess(Driven):
+class EncoderProcess(Process):
     """Encoder node on the drive head: upper end to the base station, lower end to the top tube.
 
     Parameters
@@ -24,7 +24,7 @@ class EncoderProcess(Driven):
     folder : where its starts are counted
     source : the node's own counter; without one a cycle brings its sample
     torque : what the crew knows of the drive's torque; the default is a rigid string
-    timing : where the encoder's own clock keeps its measurements; on a bench nothing is measured
+    timing : where the encoder's own clock keeps its measurements; a stepped process has none
 
     Raises
     ------
@@ -42,19 +42,19 @@ class EncoderProcess(Driven):
         self._timing = timing
         if source is not None:
             source.start()
-        self._source = SafeEncoder(source, self._say) if source is not None else None
+        self._source = SafeEncoder(source, self._send_event) if source is not None else None
         self._now = 0.0
         counter = BootCounter(folder)
-        self.station = Station(ENCODER, frozenset(Side), boot_count=counter.boots, is_clock_root=True)
+        self.endpoint = Endpoint(ENCODER, frozenset(Side), boot_count=counter.boots, is_clock_root=True)
         # sequence numbers of a later boot are all larger, so a tube never takes a new measurement for an old one
         self.encoder = EncoderNode(counter.boots << 32, torque)
 
     def on_frame(self, side: Side, frame: bytes, now: float) -> None:
         """A frame arrived at one end; the encoder obeys no commands of its own."""
-        for received in self.station.receive(side, frame, now):
+        for received in self.endpoint.receive(side, frame, now):
             if isinstance(received.message, Command):
                 refusal = Reply(ENCODER, received.message.sequence, False, "the encoder node takes no commands")
-                self.station.reply(refusal, now)
+                self.endpoint.reply(refusal, now)
 
     def on_cycle(self, data: Any, now: float) -> None:
         """The counter was read: ``data`` is start (s), count, time of its last edge (s), 1 if it rose, torque, edges.
@@ -66,18 +66,18 @@ class EncoderProcess(Driven):
         sample = self._source.read(now) if self._source is not None else sample_of(data)
         self._lap(Stage.READ)
         if sample is not None:
-            self.station.send_aiding(self.encoder.on_cycle(sample, now), now)
+            self.endpoint.send_aiding(self.encoder.on_cycle(sample, now), now)
         if self._timing is None:  # an own clock lets time pass between the cycles
-            self.station.advance(now)
+            self.endpoint.advance(now)
         self._lap(Stage.REPORT)
 
     def _lap(self, stage: Stage) -> None:
         if self._timing is not None:
             self._timing.lap(stage)
 
-    def _say(self, severity: Severity, code: str, arguments: dict[str, Scalar]) -> None:
-        event = Event(ENCODER, self.station.new_sequence(), self._now, severity, code, arguments)
-        self.station.submit(event, self._now)
+    def _send_event(self, severity: Severity, code: str, arguments: dict[str, Scalar]) -> None:
+        event = Event(ENCODER, self.endpoint.new_sequence(), self._now, severity, code, arguments)
+        self.endpoint.submit(event, self._now)
 
 
 def sample_of(data: Any) -> EncoderSample | None:

@@ -11,22 +11,20 @@ from typing import Any
 import numpy as np
 
 from node.errors import ConfigurationError, SavedStateError
-from node.firmware.inputs import ImuReading, Surroundings
-from node.firmware.parameters import forget_bias, forget_tilt
+from node.firmware.block_trial import forget_bias, forget_tilt
+from node.firmware.inputs import ImuReading, RigContext
 from node.firmware.saved_state import resume
 from node.firmware.settings import TubeSettings
 from node.firmware.tube import Tube
 from node.kernels.alignment import MOUNT, new_mount
 from node.kernels.calibration import USUAL
 from node.kernels.layout import PERIOD, Array, default_config, new_state
+from node.process.block_store import BlockStore
+from node.process.block_updater import BlockUpdater, load_parameters
 from node.process.counter import BootCounter
 from node.process.drivers.source import NOTHING, ImuSource, SafeImu
 from node.process.journal import Journal
-from node.process.parameter_keeper import ParameterKeeper, load_parameters
-from node.process.parameter_store import ParameterStore
-from node.process.timing import CycleTiming, Stage
-from telemetry.application.driven import Driven
-from telemetry.application.station import Station
+from telemetry.application.endpoint import Endpoint
 from telemetry.errors import EncodeError
 from telemetry.messages import (
     Aiding,
@@ -42,6 +40,8 @@ from telemetry.messages import (
     SurveyMeasurement,
 )
 from telemetry.presentation.fields import MAX_TEXT
+from telemetry.runtime.process import Process
+from telemetry.runtime.timing import CycleTiming, Stage
 
 SAVE_EVERY = 19  # cycles, 10 s
 SYNCHRONISED_STD = 0.05  # s, what the time-stamp state of the filter can take
@@ -51,7 +51,7 @@ COMMANDS = ("take_survey", "static_record", "parameters", "align", "alignment", 
 OVERRUN_EVERY = 60.0  # s between two events about overruns, so that a board too slow is not slowed further
 
 
-class TubeProcess(Driven):
+class TubeProcess(Process):
     """Everything one tube's processor runs, without a clock or a bus of its own.
 
     Parameters
@@ -61,7 +61,7 @@ class TubeProcess(Driven):
     config : one record of dtype ``CONFIG``; the default is that of an MPU6500-class node
     key : of the rig; without one the node takes no parameter block
     imus : the node's own sensors, as many as the settings have; without any a cycle brings its reading
-    timing : where the node's own clock keeps its measurements; on a bench nothing is measured
+    timing : where the node's own clock keeps its measurements; a stepped process has none
 
     Raises
     ------
@@ -86,7 +86,7 @@ class TubeProcess(Driven):
         for imu in imus:
             imu.start()
         self._sources = imus
-        self._imus = [SafeImu(imu, self._say_event, k if len(imus) > 1 else 0) for k, imu in enumerate(imus, 1)]
+        self._imus = [SafeImu(imu, self._send_event, k if len(imus) > 1 else 0) for k, imu in enumerate(imus, 1)]
         self.config = default_config() if config is None else config
         self._journal = Journal(folder)
         # apart from the saved state: a neighbour must not take a life that lost it for an earlier one
@@ -98,21 +98,21 @@ class TubeProcess(Driven):
         self.mount[0]["aligning"] = 0
         if saved:
             resume(self.state)
-        store = ParameterStore(folder)
+        store = BlockStore(folder)
         parameters = load_parameters(store, settings.tube)
         self._fallback = "; ".join(store.faults)
         if self._fallback:
             forget_bias(self.state, self.config)
             forget_tilt(self.state)
             self.mount = new_mount()
-        self.station = Station(
+        self.endpoint = Endpoint(
             settings.tube,
             frozenset(Side),
             boot_count=self.boots,
             restored=telemetry,
         )
         restored = saved is not None
-        next_sequence = self.station.new_sequence
+        next_sequence = self.endpoint.new_sequence
         self.tube = Tube(
             settings,
             self.config,
@@ -126,21 +126,21 @@ class TubeProcess(Driven):
         self._now = 0.0
         self._fault = fault
         self._announced = False
-        self._keeper = ParameterKeeper(self.tube, store, key, self._say_event, self._save)
+        self._blocks = BlockUpdater(self.tube, store, key, self._send_event, self._save)
         self._save()
 
     def on_frame(self, side: Side, frame: bytes, now: float) -> None:
         """A frame arrived at one end (``now``: s, own clock)."""
         self._now = now
-        for received in self.station.receive(side, frame, now):
+        for received in self.endpoint.receive(side, frame, now):
             message = received.message
             if isinstance(message, Aiding) and received.side is Side.UPPER:
                 self._on_aiding(message, now)
             elif isinstance(message, Command):
-                self.station.reply(self._obey(message), now)
+                self.endpoint.reply(self._obey(message), now)
                 self._save()
             elif isinstance(message, BlockSegment):
-                self.station.send_status(self._keeper.take(message, now))
+                self.endpoint.send_status(self._blocks.on_segment(message, now))
 
     def on_cycle(self, data: Any, now: float) -> None:
         """The IMU delivered a cycle: ``data`` is start (s), three rates (rad/s), three forces (m/s^2), raw.
@@ -155,17 +155,17 @@ class TubeProcess(Driven):
             first, *others = [ImuReading(start, now, s.rate, s.force, s.temperature, s.saturated) for s in samples]
             reading = replace(first, others=tuple(others))
         self._lap(Stage.READ)
-        around = self._surroundings(now)
-        if around.synchronised:
-            self._announce(around.rig_now, now)
-        said = list(self.tube.on_cycle(reading, around))
+        context = self._context(now)
+        if context.synchronised:
+            self._announce(context.rig_now, now)
+        said = list(self.tube.on_cycle(reading, context))
         self._lap(Stage.FILTER)
-        urgent = [self._say(message, now) for message in said]
-        if (status := self._keeper.on_cycle(self.tube.raw or reading)) is not None:
-            self.station.send_status(status)
+        urgent = [self._send(message, now) for message in said]
+        if (status := self._blocks.on_cycle(self.tube.raw or reading)) is not None:
+            self.endpoint.send_status(status)
         self._cycles += 1
         if self._timing is None:  # an own clock lets time pass between the cycles
-            self.station.advance(now)
+            self.endpoint.advance(now)
         self._lap(Stage.REPORT)
         if any(urgent) or self._cycles % SAVE_EVERY == 0:
             self._save()
@@ -173,10 +173,10 @@ class TubeProcess(Driven):
 
     def on_overrun(self, missed: int, now: float) -> None:
         """The cycle took so long that ``missed`` later ones are left out."""
-        self.tube.account.overruns += 1
+        self.tube.reporter.overruns += 1
         if now - self._overrun_told >= OVERRUN_EVERY:
             self._overrun_told = now
-            self._say_event(Severity.WARNING, "overrun", {"missed": missed, "overruns": self.tube.account.overruns})
+            self._send_event(Severity.WARNING, "overrun", {"missed": missed, "overruns": self.tube.reporter.overruns})
 
     def close(self) -> None:
         """Keep the newest state and let the sensor go."""
@@ -189,39 +189,39 @@ class TubeProcess(Driven):
             self._timing.lap(stage)
 
     def _on_aiding(self, aiding: Aiding, now: float) -> None:
-        clock = self.station.clock
+        clock = self.endpoint.clock
         if not clock.synchronised:
             return
         if self._timing is not None:
-            self._timing.add(Stage.AIDING, clock.rig_from_local(now) - aiding.valid_at)
+            self._timing.add_duration(Stage.AIDING, clock.rig_from_local(now) - aiding.valid_at)
         onward = self.tube.on_aiding(aiding, clock.local_from_rig(aiding.valid_at))
         if onward is not None:
-            self._say(onward, now)
+            self._send(onward, now)
 
-    def _surroundings(self, now: float) -> Surroundings:
-        clock = self.station.clock
+    def _context(self, now: float) -> RigContext:
+        clock = self.endpoint.clock
         var = min(clock.variance(now), MAX_CLOCK_STD**2)
-        return Surroundings(
-            joined=self.station.neighbours[Side.UPPER] is not None,
-            hops=self.station.hops,
+        return RigContext(
+            joined=self.endpoint.neighbours[Side.UPPER] is not None,
+            hops=self.endpoint.hops,
             rig_now=clock.rig_from_local(now),
             clock_var=var,
             synchronised=clock.synchronised and var < SYNCHRONISED_STD**2,
         )
 
-    def _say(self, said: Aiding | SurveyMeasurement | StaticRecord | Event | NodeState, now: float) -> bool:
+    def _send(self, said: Aiding | SurveyMeasurement | StaticRecord | Event | NodeState, now: float) -> bool:
         """Hand a message to the telemetry; returns whether it must be saved before it may be lost."""
         try:
             if isinstance(said, NodeState):
-                self.station.send_state(said, now)
+                self.endpoint.send_state(said, now)
             elif isinstance(said, Aiding):
-                self.station.send_aiding(said, now)
+                self.endpoint.send_aiding(said, now)
             else:
-                self.station.submit(said, now)
+                self.endpoint.submit(said, now)
                 return True
         except EncodeError:
             # numbers beyond any range are the filter's trouble, which it reports itself; the cycle goes on
-            self.station.counters["unsayable"] += 1
+            self.endpoint.counters["unsayable"] += 1
         return False
 
     def _announce(self, rig_now: float, now: float) -> None:
@@ -229,21 +229,21 @@ class TubeProcess(Driven):
         if self._announced:
             return
         self._announced = True
-        self.station.submit(self.tube.boot_event(rig_now), now)
+        self.endpoint.submit(self.tube.boot_event(rig_now), now)
         if self._fault:
-            self._say_event(Severity.ERROR, "saved_state_lost", {"detail": self._fault[:200]})
+            self._send_event(Severity.ERROR, "saved_state_lost", {"detail": self._fault[:200]})
         if self._cut:
-            self._say_event(Severity.WARNING, "alignment_refused", {"reason": "the power was cut"})
+            self._send_event(Severity.WARNING, "alignment_refused", {"reason": "the power was cut"})
         if self._fallback:
             in_use = self.tube.parameters
             detail: dict[str, Scalar] = {"detail": self._fallback[:200], "in_use": in_use.version}
-            self._say_event(Severity.ERROR, "parameters_fallback", detail | {"hash": in_use.sha256().hex()})
+            self._send_event(Severity.ERROR, "parameters_fallback", detail | {"hash": in_use.sha256().hex()})
 
-    def _say_event(self, severity: Severity, code: str, arguments: dict[str, Scalar]) -> None:
+    def _send_event(self, severity: Severity, code: str, arguments: dict[str, Scalar]) -> None:
         """Keep an event of the process, and save so that a cut does not lose it."""
-        rig_now = self.station.clock.rig_from_local(self._now)
-        self.station.submit(
-            Event(self.settings.tube, self.station.new_sequence(), rig_now, severity, code, arguments), self._now
+        rig_now = self.endpoint.clock.rig_from_local(self._now)
+        self.endpoint.submit(
+            Event(self.settings.tube, self.endpoint.new_sequence(), rig_now, severity, code, arguments), self._now
         )
         self._save()
 
@@ -281,7 +281,7 @@ class TubeProcess(Driven):
             return None, str(error)
 
     def _save(self) -> None:
-        self._journal.save(self.state, self.mount.tobytes() + self.station.export_state())
+        self._journal.save(self.state, self.mount.tobytes() + self.endpoint.export_state())
 
 
 def split_blob(blob: bytes | None) -> tuple[Array, bytes | None]:

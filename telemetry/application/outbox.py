@@ -28,7 +28,7 @@ class Outbox:
     def __len__(self) -> int:
         return len(self._parcels)
 
-    def add(self, sequence: int, payload: bytes, now: float) -> None:
+    def keep_payload(self, sequence: int, payload: bytes, now: float) -> None:
         """Keep a payload; it is due at once."""
         self._parcels[sequence] = Parcel(payload, now)
 
@@ -36,7 +36,7 @@ class Outbox:
         """Forget a payload that arrived; False when it was not kept."""
         return self._parcels.pop(sequence, None) is not None
 
-    def due(self, now: float) -> Iterator[bytes]:
+    def due_payloads(self, now: float) -> Iterator[bytes]:
         """Payloads to send now; each is due again later, with growing patience."""
         for parcel in self._parcels.values():
             if parcel.send_at <= now:

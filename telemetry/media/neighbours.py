@@ -1,11 +1,11 @@
-"""Ports of a tube that stands on no bench: each end hears the neighbour's port itself, as if through a wire."""
+"""Ports of a tube that no stepper drives: each end hears the neighbour's port itself, as if through a wire."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping
 
-from telemetry.media.medium import Port
-from telemetry.media.stepped import port_key
+from telemetry import keys
+from telemetry.media.port import Port
 from telemetry.media.zenoh_bus import ZenohBus, ZenohPort
 from telemetry.messages import Side
 
@@ -14,6 +14,6 @@ def neighbour_ports(bus: ZenohBus, rig: str, address: int, neighbours: Mapping[S
     """Ends of the process ``address`` that have a neighbour; what leaves its lower end arrives here at the upper."""
     facing = {Side.UPPER: Side.LOWER, Side.LOWER: Side.UPPER}
     return {
-        side: ZenohPort(bus, port_key(rig, address, side, "tx"), port_key(rig, neighbour, facing[side], "tx"))
+        side: ZenohPort(bus, keys.port_key(rig, address, side, "tx"), keys.port_key(rig, neighbour, facing[side], "tx"))
         for side, neighbour in neighbours.items()
     }

@@ -97,8 +97,8 @@ class HopLink:
             self.counters["bad_frames"] += 1
             return []
         sender, epoch, count, ack_epoch, ack, ack_mask, entries = fields
-        self._meet(sender, epoch)
-        self._judge(count)
+        self._on_peer(sender, epoch)
+        self._update_quality(count)
         self.last_heard = now
         self.counters["frames_received"] += 1
         if ack_epoch == self.epoch:
@@ -150,7 +150,7 @@ class HopLink:
         """Whether the other end means this process and not the one before a restart, whose numbers it still uses."""
         return epoch >> BOOT_SHIFT == self._boot_count and epoch & 0xFF == self._address
 
-    def _meet(self, sender: int, epoch: int) -> None:
+    def _on_peer(self, sender: int, epoch: int) -> None:
         """Notice another process at the other end (start our numbers anew) or its new session (forget its numbers)."""
         peer = (sender, epoch >> BOOT_SHIFT)
         if peer != self.peer:
@@ -172,7 +172,7 @@ class HopLink:
         self._queue = again
         self._outstanding.clear()
 
-    def _judge(self, count: int) -> None:
+    def _update_quality(self, count: int) -> None:
         missed = max(min(count - self._peer_count - 1, 32), 0) if self._peer_count else 0
         self._peer_count = max(self._peer_count, count)
         self.quality *= (1.0 - QUALITY_WEIGHT) ** (missed + 1)

@@ -42,7 +42,7 @@ class Upload:
         self._received = 0
         self._untrusted = 0
 
-    def due(self, now: float) -> list[BlockSegment]:
+    def due_segments(self, now: float) -> list[BlockSegment]:
         """Segments to send now; when none is missing the first one, whose answer tells how it stands."""
         if now < self.next_due:
             return []
@@ -51,7 +51,7 @@ class Upload:
         missing = [segment for segment in self.segments if not self._received >> segment.index & 1]
         return missing or [self.segments[0]]
 
-    def take(self, status: BlockStatus) -> bool:
+    def on_status(self, status: BlockStatus) -> bool:
         """Take the node's account; True when it is its last word on this block."""
         first = self.segments[0]
         if (status.tube, status.sequence, status.digest) != (first.tube, first.sequence, first.digest):
@@ -76,7 +76,7 @@ class Assembly:
         """Whether a segment is part of this block."""
         return (segment.version, segment.digest, segment.count) == (self.version, self.digest, self.count)
 
-    def add(self, segment: BlockSegment) -> bool:
+    def add_segment(self, segment: BlockSegment) -> bool:
         """Keep a segment; False when it was there."""
         if segment.index in self._parts:
             return False

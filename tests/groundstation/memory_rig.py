@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 
 from groundstation.config import GroundConfig
-from groundstation.process import GroundProcess
+from groundstation.service.process import GroundProcess
 from node.firmware.sensor_faults import SensorLimits
 from node.firmware.settings import TubeSettings
 from node.kernels.layout import PERIOD
@@ -59,7 +59,7 @@ class Rig:
             )
 
     def watch(self) -> None:
-        send, take = self.ground.station.send_segment, self.ground._take
+        send, take = self.ground.endpoint.send_segment, self.ground._take
 
         def sending(segment: BlockSegment) -> None:
             self.sent.append(segment.index)
@@ -69,7 +69,7 @@ class Rig:
             self.said.extend([message] if isinstance(message, BlockStatus) else [])
             take(message, now)  # type: ignore[arg-type]
 
-        self.ground.station.send_segment = sending  # type: ignore[method-assign]
+        self.ground.endpoint.send_segment = sending  # type: ignore[method-assign]
         self.ground._take = taking  # type: ignore[method-assign]
 
     @property
@@ -126,4 +126,4 @@ class Rig:
         return outcome.result(timeout=0.0)
 
     def codes(self, tube: int) -> list[str]:
-        return [event.code for event in self.ground.knowledge.events if event.tube == tube]
+        return [event.code for event in self.ground.model.events if event.tube == tube]

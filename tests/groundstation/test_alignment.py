@@ -8,12 +8,12 @@ import pytest
 from memory_rig import NOISELESS, Rig
 
 from groundstation.config import GroundConfig
-from groundstation.service.core import Knowledge
-from groundstation.service.orders import parse
+from groundstation.service.commands import parse
+from groundstation.service.model import RigModel
 from groundstation.service.views import force_var, node, stations
 from groundstation.survey.resolve import combine_imus
 from node.firmware.imu_settings import ImuSettings
-from node.firmware.inputs import Surroundings
+from node.firmware.inputs import RigContext
 from node.firmware.settings import TubeSettings
 from node.kernels.layout import DEG, PERIOD
 from node.process.tube_process import TubeProcess
@@ -52,13 +52,13 @@ def test_an_alignment_is_ordered_followed_and_shown_at_the_surface(tmp_path: Pat
     rig.run(12.0)
     assert rig.ordered().detail == "the static bias is not known yet"
     rig.run(50.0)
-    assert node(rig.ground.knowledge, 1)["alignment"] is None
+    assert node(rig.ground.model, 1)["alignment"] is None
     reply = rig.ordered(method="circle", turns=1.0)
     assert (reply.done, reply.detail) == (True, "turn the string slowly, 1 turns")
     rig.spin = 10.0 * DEG
     rig.run(10.0)
-    assert rig.ground.knowledge.nodes[1].mode is Mode.ALIGNMENT
-    assert rig.ground.knowledge.nodes[2].mode is Mode.TRACKING
+    assert rig.ground.model.nodes[1].mode is Mode.ALIGNMENT
+    assert rig.ground.model.nodes[2].mode is Mode.TRACKING
     assert rig.ordered().detail == "an alignment is under way"
     rig.run(35.0)
     rig.spin = 0.0
@@ -66,9 +66,9 @@ def test_an_alignment_is_ordered_followed_and_shown_at_the_surface(tmp_path: Pat
     assert [code for code in rig.codes(1) if code.startswith("align")] == [
         "alignment_begun", "alignment_turning", "aligned",
     ]  # fmt: skip
-    pitch, roll, _ = rig.ground.knowledge.nodes[1].alignment
+    pitch, roll, _ = rig.ground.model.nodes[1].alignment
     assert (pitch, roll) == pytest.approx((PITCH, 0.0), abs=1e-5)
-    assert rig.ground.knowledge.nodes[1].mode is Mode.STILL
+    assert rig.ground.model.nodes[1].mode is Mode.STILL
 
 
 @pytest.mark.parametrize(
@@ -88,15 +88,15 @@ def test_two_imus_of_a_process_arrive_as_two_means(tmp_path: Path) -> None:
     settings = TubeSettings(1, limits=NOISELESS, imus=(ImuSettings(), ImuSettings(noise=2.0)))
     process = TubeProcess(settings, tmp_path)
     surveys: list[SurveyMeasurement] = []
-    submit = process.station.submit
+    submit = process.endpoint.submit
 
     def keep(message: object, now: float) -> None:
         surveys.extend([message] if isinstance(message, SurveyMeasurement) else [])
         submit(message, now)  # type: ignore[arg-type]
 
-    process.station.submit = keep  # type: ignore[method-assign, assignment]
+    process.endpoint.submit = keep  # type: ignore[method-assign, assignment]
     process.tube.take_survey()
-    process._surroundings = lambda now: Surroundings(True, 1, now, 1e-8, True)  # type: ignore[method-assign]
+    process._surroundings = lambda now: RigContext(True, 1, now, 1e-8, True)  # type: ignore[method-assign]
     now = 1000.0
     for _ in range(120):
         now += PERIOD
@@ -108,17 +108,17 @@ def test_two_imus_of_a_process_arrive_as_two_means(tmp_path: Path) -> None:
 
 
 def test_the_ground_station_weighs_all_imus_of_a_survey() -> None:
-    knowledge = Knowledge(GroundConfig(folder=Path(), tube_length=2.0))
+    model = RigModel(GroundConfig(folder=Path(), tube_length=2.0))
     for at in (999.0, 1001.0):
-        knowledge.depths.add(at, 2.0)
+        model.depths.append_reading(at, 2.0)
     lean, variances = 2.0 * DEG, (1e-8, 3e-8)
     imus = tuple(
         ImuMean((G * math.sin(angle), 0.0, -G * math.cos(angle)), ((v, 0.0, 0.0), (0.0, v, 0.0), (0.0, 0.0, v)))
         for angle, v in zip((lean, lean + 4e-4 / G), variances, strict=True)
     )
     survey = SurveyMeasurement(1, 1, 1000.0, 1, imus, 0.0, 1e-9, 1e-9, 32, 20.0, NodeFlag.NONE)
-    assert knowledge.take_survey(survey, 2.0)
-    row = stations(knowledge, {})["stations"][0]
+    assert model.on_survey(survey, 2.0)
+    row = stations(model, {})["stations"][0]
     assert row["inclination_deg"] * DEG == pytest.approx(lean + 1e-4 / G, abs=1e-9)
     assert row["sigma_force_mps2"] ** 2 == pytest.approx(0.75e-8)
     covs = np.array([imu.force_cov for imu in imus])

@@ -12,9 +12,9 @@ from memory_rig import Rig
 from groundstation.calibration.attitudes import true_vectors
 from groundstation.calibration.block import read
 from groundstation.errors import SelectorError
-from groundstation.service.field_procedure import Ask, FieldProcedure
-from groundstation.service.field_state import Phase, Progress, Stage
-from groundstation.service.recalibration import check_order
+from groundstation.service.recalibration.control import check_order
+from groundstation.service.recalibration.procedure import Ask, FieldProcedure
+from groundstation.service.recalibration.progress import Phase, Progress, Stage
 from node.kernels.layout import DEG
 from telemetry.messages import BASE, BlockSegment, Reply, StaticRecord
 from telemetry.parameters import ParameterBlock, SensorParameters
@@ -34,13 +34,13 @@ class Field(Rig):
         self.run(12.0)
 
     def command(self, action: str, **parameters: str) -> dict[str, Any]:
-        k = self.ground.knowledge
-        self.ground.recalibration.order({"action": action} | parameters, k.rig_now, k.order.tubes)
+        k = self.ground.model
+        self.ground.recalibration.order({"action": action} | parameters, k.rig_now, k.tally.tubes)
         return self.view()
 
     def view(self) -> dict[str, Any]:
         """What the key shows, as it stands on the wire."""
-        view: dict[str, Any] = json.loads(json.dumps(self.ground.knowledge.recalibration.view()))
+        view: dict[str, Any] = json.loads(json.dumps(self.ground.model.recalibration.view()))
         return view
 
     def lay(self, pitch_deg: float, roll_deg: float) -> None:
@@ -133,7 +133,7 @@ def test_the_gyroscope_of_the_block_in_use_stays(rig: Field) -> None:
 
 def test_a_block_of_another_ground_station_is_not_built_upon(rig: Field) -> None:
     rig.upload(ParameterBlock(1, 1, SensorParameters(bias=(1e-3, 0.0, 0.0))))
-    rig.ground.knowledge.recalibration.blocks.clear()
+    rig.ground.model.recalibration.blocks.clear()
     rig.command("begin", tubes="1,2")
     rig.collect(PRESETS)
     shown = {row["tube"]: row for row in rig.command("solve")["tubes"]}
@@ -204,18 +204,18 @@ def test_a_tube_cut_in_the_middle_of_its_upload_tells_its_old_block_and_is_asked
     rig.command("begin")
     rig.collect(PRESETS)
     before = rig.tube(1).tube.parameters.sha256().hex()
-    plain = rig.ground.station.send_segment
+    plain = rig.ground.endpoint.send_segment
 
     def lose(segment: BlockSegment) -> None:
         if segment.tube == 2 or segment.index < 2:
             plain(segment)
 
-    rig.ground.station.send_segment = lose  # type: ignore[method-assign]
+    rig.ground.endpoint.send_segment = lose  # type: ignore[method-assign]
     rig.command("confirm", proposal=rig.command("solve")["proposal"])
     rig.run(4.0)
     rig.start(1)
     assert rig.tube(1).tube.parameters.sha256().hex() == before
-    rig.ground.station.send_segment = plain  # type: ignore[method-assign]
+    rig.ground.endpoint.send_segment = plain  # type: ignore[method-assign]
     rig.run(60.0, rig.is_done)
     check(rig)
     rows = {row["tube"]: row for row in rig.view()["tubes"]}
@@ -235,7 +235,7 @@ def test_a_record_that_moved_is_taken_again_and_never_counts(rig: Field) -> None
     rig.run(SECONDS)
     rows = {row["tube"]: row for row in rig.view()["tubes"]}
     assert (rows[1]["records"], rows[2]["records"]) == (8, 9)
-    assert any(record.moved for record in rig.ground.knowledge.static_records)
+    assert any(record.moved for record in rig.ground.model.static_records)
     rig.run(30.0, rig.is_complete)
     rig.collect(PRESETS[9:])
     finish(rig)
@@ -250,7 +250,7 @@ def test_a_record_that_ends_after_the_tubes_left_does_not_count(rig: Field) -> N
     rig.run(4.0)
     rig.command("attitude", pitch_deg="90", roll_deg="0", seconds="8")  # told too early, and they are not there
     rig.run(6.0)
-    records = [record for record in rig.ground.knowledge.static_records if record.tube == 1]
+    records = [record for record in rig.ground.model.static_records if record.tube == 1]
     assert [record.moved for record in records] == [False, False]
     assert [row["records"] for row in rig.view()["tubes"]] == [1, 1]
 
@@ -354,7 +354,7 @@ def test_progress_comes_back_from_its_text(rig: Field) -> None:
     rig.command("begin")
     rig.collect(PRESETS)
     rig.command("solve")
-    progress = rig.ground.knowledge.recalibration.progress
+    progress = rig.ground.model.recalibration.progress
     assert Progress.from_json(progress.to_json()) == progress
     assert (progress.stage, progress.tubes[1].phase) == (Stage.SOLVED, Phase.PROPOSED)
     assert rig.ground.store.progress() == progress.to_json()
@@ -372,17 +372,17 @@ def test_records_are_matched_by_the_command_that_asked_for_them() -> None:
     (question,) = procedure.due(0.0)
     assert question == Ask(1, "parameters", {})
     procedure.sent(question, 41)
-    procedure.take_reply(Reply(1, 41, True, f"version 0 sha256 {ParameterBlock(1, 0).sha256().hex()}"), 1.0)
+    procedure.on_reply(Reply(1, 41, True, f"version 0 sha256 {ParameterBlock(1, 0).sha256().hex()}"), 1.0)
     procedure.attitude(0.0, 90.0 * DEG, 8.0, 100.0)
     (ask,) = procedure.due(1.0)
     assert (ask.name, ask.arguments) == ("static_record", {"seconds": 8.0})
     procedure.sent(ask, 42)
     assert procedure.due(10.0) == []
-    procedure.take_record(record(7, 110.0))  # an operator's own
+    procedure.on_static_record(record(7, 110.0))  # an operator's own
     assert procedure.view()["tubes"][0]["records"] == 0
     assert [a.name for a in procedure.due(1.0 + 8.0 + 15.0)] == ["static_record"]  # nothing came: once more
-    procedure.take_record(record(42, 90.0))  # of a tube that does not know rig time yet
+    procedure.on_static_record(record(42, 90.0))  # of a tube that does not know rig time yet
     assert procedure.view()["tubes"][0]["records"] == 0
-    procedure.take_record(record(42, 110.0))
+    procedure.on_static_record(record(42, 110.0))
     assert procedure.view()["tubes"][0]["records"] == 1
     assert procedure.due(math.inf) == []

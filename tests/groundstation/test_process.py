@@ -13,8 +13,8 @@ import msgpack
 import pytest
 
 from groundstation.config import GroundConfig
-from groundstation.process import GroundProcess
-from telemetry.application.station import Station
+from groundstation.service.process import GroundProcess
+from telemetry.application.endpoint import Endpoint
 from telemetry.media.zenoh_bus import ZenohBus, open_client, open_router
 from telemetry.messages import (
     Event,
@@ -51,7 +51,7 @@ class Rig:
 
     def __init__(self, folder: Path) -> None:
         self.ground = GroundProcess(GroundConfig(folder=folder))
-        self.tube = Station(1, frozenset(Side), boot_count=1, is_clock_root=True)
+        self.tube = Endpoint(1, frozenset(Side), boot_count=1, is_clock_root=True)
         self.now = 1000.0
 
     def run(self, duration: float) -> None:
@@ -216,13 +216,13 @@ def test_a_restart_forgets_and_doubles_nothing(rig: tuple[Rig, ZenohBus], start:
     before = ask(bus, f"{GROUND}/stations")["stations"]
     again = start()
     again.now = it.now
-    knowledge = again.ground.knowledge
-    assert [(s.md, s.count) for s in knowledge.stations] == [(2.0, 2), (4.0, 1)]
-    assert [e.sequence for e in knowledge.events] == [7]
+    model = again.ground.model
+    assert [(s.md, s.count) for s in model.stations] == [(2.0, 2), (4.0, 1)]
+    assert [e.sequence for e in model.events] == [7]
     again.run(3.0)
-    again.tube.submit(next(iter(knowledge.stations[0].clusters)).measurement, again.now)  # its receipt was lost
+    again.tube.submit(next(iter(model.stations[0].clusters)).measurement, again.now)  # its receipt was lost
     again.run(2.0)
-    assert [(s.md, s.count) for s in knowledge.stations] == [(2.0, 2), (4.0, 1)]
+    assert [(s.md, s.count) for s in model.stations] == [(2.0, 2), (4.0, 1)]
     assert again.tube.outbox_size == 0
     assert before[0]["measurements"] == 2
 
@@ -240,7 +240,7 @@ def test_a_survey_that_comes_before_any_state_after_a_restart_finds_its_station(
     again.now = first.now
     again.run(3.0)
     again.survey(2, 1)
-    assert [(s.md, s.count) for s in again.ground.knowledge.stations] == [(2.0, 1)]
+    assert [(s.md, s.count) for s in again.ground.model.stations] == [(2.0, 1)]
 
 
 def test_a_covariance_that_is_none_is_kept_and_counted_now_and_after_a_restart(start: Callable[[], Rig]) -> None:
@@ -251,19 +251,19 @@ def test_a_covariance_that_is_none_is_kept_and_counted_now_and_after_a_restart(s
     rig.tube.submit(replace(MEASUREMENT, imus=(ImuMean((0.0, 0.0, -9.81), NO_COV),), station_at=rig.now), rig.now)
     rig.run(2.0)
     assert rig.tube.outbox_size == 0
-    assert (rig.ground.knowledge.refused, rig.ground.knowledge.stations) == (1, [])
+    assert (rig.ground.model.refused, rig.ground.model.stations) == (1, [])
     rig.ground.store.close()
-    assert start().ground.knowledge.refused == 1
+    assert start().ground.model.refused == 1
 
 
 @pytest.mark.parametrize(("at", "md"), [(math.nan, 2.0), (2000.0, math.inf), (-math.inf, math.nan)])
 def test_a_depth_that_is_no_number_is_not_taken(start: Callable[[], Rig], at: float, md: float) -> None:
     rig = start()
     rig.depth(2.0)
-    before = rig.ground.knowledge.rig_now
+    before = rig.ground.model.rig_now
     rig.ground.on_depth(at, md)
-    assert rig.ground.knowledge.depths.latest == 2.0
-    assert rig.ground.knowledge.rig_now == before
+    assert rig.ground.model.depths.latest == 2.0
+    assert rig.ground.model.rig_now == before
 
 
 def test_a_survey_from_before_the_restart_finds_its_depth(start: Callable[[], Rig]) -> None:
@@ -275,14 +275,14 @@ def test_a_survey_from_before_the_restart_finds_its_depth(start: Callable[[], Ri
     first.depth(6.0)
     first.ground.store.close()
     again = start()
-    assert again.ground.knowledge.depths.at(when) == 4.0
+    assert again.ground.model.depths.at(when) == 4.0
 
 
 def test_a_survey_without_a_depth_is_kept_and_counted(start: Callable[[], Rig]) -> None:
     rig = start()
     rig.run(3.0)
     rig.survey(1, 1)
-    assert rig.ground.knowledge.unplaced == 1
+    assert rig.ground.model.unplaced == 1
     assert [s.md for s in rig.ground.store.messages()] == [None]
     assert rig.tube.outbox_size == 0
 

@@ -14,12 +14,12 @@ from groundstation.calibration.attitudes import fit
 from groundstation.calibration.block import Calibration, Provenance
 from groundstation.config import GroundConfig
 from groundstation.errors import ConfigurationError, SelectorError
-from groundstation.process import GroundProcess
-from groundstation.service.orders import parse
-from groundstation.service.parameters import block_of
+from groundstation.service.blocks import block_of
+from groundstation.service.commands import parse
+from groundstation.service.process import GroundProcess
 from node.firmware.settings import TubeSettings
 from node.kernels.layout import DEG
-from node.process.parameter_store import ParameterStore
+from node.process.block_store import BlockStore
 from node.process.tube_process import TubeProcess
 from telemetry.messages import BASE, BlockSegment, BlockStatus, StaticRecord, UploadPhase
 from telemetry.parameters import ParameterBlock, SensorParameters
@@ -49,7 +49,7 @@ def test_a_block_is_uploaded_applied_at_rest_and_told(rig: Rig) -> None:
     assert rig.tube(2).tube.parameters.version == 0
     rig.run(5.0)
     assert "parameters_applied" in rig.codes(1)
-    state = rig.ground.knowledge.nodes[1]
+    state = rig.ground.model.nodes[1]
     assert (state.parameters_version, state.parameters_hash) == (1, block().sha256()[:8])
     assert rig.order(1, "parameters").detail == f"version 1 sha256 {block().sha256().hex()}"
     rig.start(1)
@@ -83,19 +83,19 @@ def test_a_turning_node_waits_with_the_block_until_it_stands(rig: Rig) -> None:
 
 def lose(rig: Rig, keep: Callable[[BlockSegment], bool]) -> None:
     """Have the segments that are not kept disappear with a relay, until ``watch`` is called again."""
-    send = rig.ground.station.send_segment
-    rig.ground.station.send_segment = lambda s: send(s) if keep(s) else None  # type: ignore[method-assign]
+    send = rig.ground.endpoint.send_segment
+    rig.ground.endpoint.send_segment = lambda s: send(s) if keep(s) else None  # type: ignore[method-assign]
 
 
 def test_a_node_killed_in_the_middle_keeps_its_block_and_resumes(rig: Rig) -> None:
     assert rig.upload(block(1)).phase is UploadPhase.APPLIED
     rig.sent.clear()
-    plain = rig.ground.station.send_segment
+    plain = rig.ground.endpoint.send_segment
     lose(rig, lambda s: s.index < 2)
     outcome = rig.ground.upload(block(2, bias=2e-3))
     rig.run(3.0)
     assert rig.said[-1].received == 0b00011
-    rig.ground.station.send_segment = plain  # type: ignore[method-assign]
+    rig.ground.endpoint.send_segment = plain  # type: ignore[method-assign]
     rig.start(1)
     assert rig.tube(1).tube.parameters == block(1)
     rig.run(60.0, outcome.done)
@@ -114,7 +114,7 @@ def test_a_ground_station_that_restarts_goes_on_where_the_node_is(rig: Rig) -> N
 
 
 def test_a_segment_changed_on_its_way_is_refused_told_and_repeated(rig: Rig) -> None:
-    send, changed = rig.ground.station.send_segment, []
+    send, changed = rig.ground.endpoint.send_segment, []
 
     def tamper(segment: BlockSegment) -> None:
         if segment.index == 1 and not changed:
@@ -122,7 +122,7 @@ def test_a_segment_changed_on_its_way_is_refused_told_and_repeated(rig: Rig) -> 
             segment = replace(segment, data=bytes(len(segment.data)))
         send(segment)
 
-    rig.ground.station.send_segment = tamper  # type: ignore[method-assign]
+    rig.ground.endpoint.send_segment = tamper  # type: ignore[method-assign]
     assert rig.upload(block()).phase is UploadPhase.APPLIED
     rig.run(5.0)
     assert rig.tube(1).tube.parameters == block()
@@ -154,8 +154,8 @@ def test_a_node_without_a_key_takes_no_block_and_a_ground_station_without_one_se
 
 def test_what_was_recorded_of_an_old_upload_changes_nothing(rig: Rig) -> None:
     recorded: list[BlockSegment] = []
-    send = rig.ground.station.send_segment
-    rig.ground.station.send_segment = lambda s: (recorded.append(s), send(s))[1]  # type: ignore[func-returns-value, method-assign]
+    send = rig.ground.endpoint.send_segment
+    rig.ground.endpoint.send_segment = lambda s: (recorded.append(s), send(s))[1]  # type: ignore[func-returns-value, method-assign]
     rig.upload(block(1))
     rig.upload(block(2, bias=2e-3))
     rig.said.clear()
@@ -193,7 +193,7 @@ def test_a_disk_that_refuses_the_block_leaves_the_one_before(rig: Rig, monkeypat
         raise OSError(28, "No space left on device")
 
     with monkeypatch.context() as broken:
-        broken.setattr(ParameterStore, "keep", full)
+        broken.setattr(BlockStore, "keep", full)
         status = rig.upload(block())
     assert status.phase is UploadPhase.REFUSED
     assert "No space" in status.detail
@@ -207,8 +207,8 @@ def test_a_power_cut_at_any_step_of_the_change_leaves_one_block_whole(rig: Rig) 
     rig.run(70.0)
     home, cuts = rig.folder / "1", []
     process = rig.tube(1)
+    import node.process.block_store as store_room
     import node.process.journal as journal_room
-    import node.process.parameter_store as store_room
 
     plain_fsync = store_room.os.fsync
 
@@ -243,10 +243,10 @@ def test_a_damaged_block_falls_back_and_says_so(rig: Rig) -> None:
     rig.start(1)
     rig.run(15.0)
     assert rig.tube(1).tube.parameters == block(1)
-    (event,) = [e for e in rig.ground.knowledge.events if e.code == "parameters_fallback"]
+    (event,) = [e for e in rig.ground.model.events if e.code == "parameters_fallback"]
     assert event.arguments["in_use"] == 1
     assert event.arguments["hash"] == block(1).sha256().hex()
-    assert rig.ground.knowledge.nodes[1].parameters_hash == block(1).sha256()[:8]
+    assert rig.ground.model.nodes[1].parameters_hash == block(1).sha256()[:8]
     assert rig.upload(block(2, bias=2e-3)).phase is UploadPhase.APPLIED
 
 
@@ -255,15 +255,15 @@ def test_a_static_record_is_taken_stored_and_still_known_after_a_restart(rig: Ri
     assert reply.done
     rig.joints[0][0].is_open = True  # the surface end is cut off when the record is ready
     rig.run(30.0)
-    assert not rig.ground.knowledge.static_records
+    assert not rig.ground.model.static_records
     rig.joints[0][0].is_open = False
     rig.run(40.0)
-    (record,) = rig.ground.knowledge.static_records
+    (record,) = rig.ground.model.static_records
     assert (record.tube, record.command, record.moved) == (1, reply.sequence, False)
     assert record.temperature == pytest.approx(30.0)
-    assert rig.tube(1).station.outbox_size == 0
+    assert rig.tube(1).endpoint.outbox_size == 0
     rig.start(BASE)
-    assert list(rig.ground.knowledge.static_records) == [record]
+    assert list(rig.ground.model.static_records) == [record]
 
 
 def test_a_turning_node_takes_no_static_record(rig: Rig) -> None:
@@ -288,8 +288,8 @@ def test_an_accelerometer_is_calibrated_from_the_surface_end_to_end(rig: Rig) ->
         rig.rate[1] = np.array([0.0, 2.0 * DEG, 0.0])  # a gyroscope never calibrated
         rig.run(4.0)
         assert rig.order(1, "static_record", seconds=5.0).done
-        rig.run(12.0, lambda: len(rig.ground.knowledge.static_records) > len(readings))
-        readings.append(rig.ground.knowledge.static_records[-1])
+        rig.run(12.0, lambda: len(rig.ground.model.static_records) > len(readings))
+        readings.append(rig.ground.model.static_records[-1])
     assert not any(record.moved for record in readings)
     solved = fit(ATTITUDES, np.array([record.force for record in readings]))
     zeros = np.zeros((0, 3, 3)), np.zeros((0, 3))

@@ -24,7 +24,7 @@ from groundstation.service.store import Store
 from telemetry.messages import Event, Severity
 store = Store(sys.argv[1])
 for sequence in range(1, 100_000):
-    store.add(Event(1, sequence, 1.0, Severity.INFO, "stopped"), None)
+    store.add_message(Event(1, sequence, 1.0, Severity.INFO, "stopped"), None)
     print(sequence, flush=True)
 """
 
@@ -54,22 +54,22 @@ def url(folder: Path) -> str:
 
 def test_what_was_added_is_there_after_a_restart_once(tmp_path: Path) -> None:
     store = Store(url(tmp_path))
-    assert store.add(survey(1, 1), 2.0)
-    assert not store.add(survey(1, 1), 2.0)
-    assert store.add(Event(1, 2, 5.0, Severity.WARNING, "yaw_reset", {"yaw_deg": 3.0}), None)
+    assert store.add_message(survey(1, 1), 2.0)
+    assert not store.add_message(survey(1, 1), 2.0)
+    assert store.add_message(Event(1, 2, 5.0, Severity.WARNING, "yaw_reset", {"yaw_deg": 3.0}), None)
     store.add_depth(900.0, 2.0)
     store.close()
     with closing(Store(url(tmp_path))) as again:
         assert [(s.message.sequence, s.md) for s in again.messages()] == [(1, 2.0), (2, None)]
-        assert not again.add(survey(1, 1), 2.0)
+        assert not again.add_message(survey(1, 1), 2.0)
         assert again.depths() == [(900.0, 2.0)]
         assert again.boots == store.boots + 1
 
 
 def test_a_tube_that_counts_anew_is_not_taken_for_a_repetition(tmp_path: Path) -> None:
     with closing(Store(url(tmp_path))) as store:
-        assert store.add(survey(1, 1), 2.0)
-        assert store.add(survey(1, 1, yaw=2.0), 2.0)
+        assert store.add_message(survey(1, 1), 2.0)
+        assert store.add_message(survey(1, 1, yaw=2.0), 2.0)
 
 
 @pytest.mark.parametrize("acknowledged", [3, 40, 150])
@@ -153,11 +153,11 @@ def test_a_disk_that_refuses_is_an_error_of_the_store(tmp_path: Path) -> None:
 
 def test_the_order_of_the_string_is_kept(tmp_path: Path) -> None:
     with closing(Store(url(tmp_path))) as store:
-        assert store.order() == []
-        store.keep_order([1])
-        store.keep_order([3, 2, 1])
+        assert store.tally() == []
+        store.keep_tally([1])
+        store.keep_tally([3, 2, 1])
     with closing(Store(url(tmp_path))) as again:
-        assert again.order() == [3, 2, 1]
+        assert again.tally() == [3, 2, 1]
 
 
 def test_another_schema_is_refused(tmp_path: Path) -> None:

@@ -6,16 +6,16 @@ from collections.abc import Callable
 import numpy as np
 
 from node.firmware.encoder import QUANTUM, EncoderNode, EncoderSample
-from node.firmware.inputs import ImuReading, Surroundings
+from node.firmware.inputs import ImuReading, RigContext
 from node.firmware.settings import TubeSettings
 from node.kernels.angles import wrap
 from node.kernels.layout import PERIOD, Scheme
-from sim.borehole import Borehole
-from sim.experiments.chain import BEGIN, INCLINATION_DEG, ChainSetup, motion_of
-from sim.experiments.fresh import fresh_tube
-from sim.imu_errors import ImuErrors
-from sim.scenario import AccelerometerSection, GyroSection
-from sim.truth import TubeTruth
+from sim.studies.chain import BEGIN, INCLINATION_DEG, ChainSetup, motion_of
+from sim.studies.fresh import fresh_tube
+from sim.world.borehole import Borehole
+from sim.world.imu_errors import ImuErrors
+from sim.world.scenario import AccelerometerSection, GyroSection
+from sim.world.truth import TubeTruth
 from telemetry.messages import Event, NodeState
 
 Sample = list[float]  # three rates (rad/s), three forces (m/s^2)
@@ -75,7 +75,7 @@ class StringOfOne:
 
     def _cycle(self, cycle: int, end: float) -> None:
         wx, wy, wz, fx, fy, fz = self._spoil(cycle, list(self._samples[cycle]))
-        around = Surroundings(True, 1, end, 1e-8, True)
+        around = RigContext(True, 1, end, 1e-8, True)
         local = end + self.shift
         for said in self.tube.on_cycle(ImuReading(local - PERIOD, local, (wx, wy, wz), (fx, fy, fz)), around):
             if isinstance(said, Event):

@@ -9,13 +9,13 @@ import pytest
 from node.errors import ConfigurationError
 from node.firmware.alignment import PATIENCE, rotation
 from node.firmware.imu_settings import ImuSettings
-from node.firmware.inputs import ImuReading, Surroundings
+from node.firmware.inputs import ImuReading, RigContext
 from node.firmware.settings import Kernel, TubeSettings
 from node.firmware.tube import Tube
 from node.kernels.alignment import new_mount
 from node.kernels.layout import DEG, PERIOD, default_config, new_state
 from node.process.tube_process import TubeProcess
-from sim.experiments.alignment import Bench, Setup
+from sim.studies.alignment import Setup, Turn
 from telemetry.messages import Command, Event, Mode, NodeState, Severity, SurveyMeasurement
 from telemetry.parameters import ParameterBlock, SensorParameters
 
@@ -61,7 +61,7 @@ class Bored:
 
     def take(self, reading: ImuReading) -> None:
         self.now = reading.end
-        for said in self.tube.on_cycle(reading, Surroundings(True, 1, self.now, 1e-8, True)):
+        for said in self.tube.on_cycle(reading, RigContext(True, 1, self.now, 1e-8, True)):
             if isinstance(said, Event):
                 self.events.append(said)
             elif isinstance(said, NodeState):
@@ -129,7 +129,7 @@ def test_the_survey_after_it_is_that_of_the_tube(kernel: Kernel) -> None:
 @pytest.mark.parametrize("seed", range(1, 7))
 def test_with_the_sensors_of_the_world_a_survey_errs_by_the_mount_before_and_by_noise_after(seed: int) -> None:
     setup = Setup(bias_std_deg=0.002)
-    bench = Bench(setup, seed)
+    bench = Turn(setup, seed)
     found = {method: bench.run(method) for method in ("none", "circle", "extremes")}
     aligned = {method: abs(math.degrees(found[method].inclination_error)) for method in found}
     assert aligned["circle"] < 0.02

@@ -11,13 +11,13 @@ from hypothesis import given
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
-from borechain.node import node as command
+from borechain.cli.node.node import node as command
 from groundstation.survey.resolve import combine_imus
 from node.errors import ConfigurationError
 from node.firmware.alignment import rotation
 from node.firmware.cluster import DISAGREEING, HEALTHY
 from node.firmware.imu_settings import ImuSettings
-from node.firmware.inputs import ImuReading, Surroundings
+from node.firmware.inputs import ImuReading, RigContext
 from node.firmware.settings import Kernel, TubeSettings
 from node.firmware.tube import Tube
 from node.kernels.alignment import MAX_IMUS, new_mount
@@ -89,7 +89,7 @@ class Clustered:
             ]
             self.now += PERIOD
             reading = ImuReading(first.start, first.end, first.rate, first.force, others=tuple(others))
-            around = Surroundings(True, 1, self.now, 1e-8, True)
+            around = RigContext(True, 1, self.now, 1e-8, True)
             for said in self.tube.on_cycle(reading, around):
                 if isinstance(said, Event):
                     self.events.append(said)

@@ -7,7 +7,7 @@ import numpy as np
 from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
-from node.firmware.inputs import ImuReading, Surroundings
+from node.firmware.inputs import ImuReading, RigContext
 from node.firmware.settings import TubeSettings
 from node.firmware.tube import Tube
 from node.kernels.angles import wrap
@@ -67,7 +67,7 @@ class Walk:
         force = force + self.random.normal(0.0, 1e-5, 3)
         known, before = bool(self.tube.state["yaw_known"]), self.tube.yaw
         self.now += PERIOD
-        around = Surroundings(True, 1, self.now, 1e-8, True)
+        around = RigContext(True, 1, self.now, 1e-8, True)
         taken = ImuReading(self.now - PERIOD, self.now, tuple(rate.tolist()), tuple(force.tolist()))
         self.codes += [said.code for said in self.tube.on_cycle(taken, around) if isinstance(said, Event)]
         self.flags |= self.tube.flags(around, self.now)

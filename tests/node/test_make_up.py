@@ -6,7 +6,7 @@ from dataclasses import replace
 import pytest
 
 from node.firmware.encoder import QUANTUM
-from node.firmware.inputs import ImuReading, Surroundings
+from node.firmware.inputs import ImuReading, RigContext
 from node.firmware.sensor_faults import SensorLimits
 from node.firmware.settings import Joint, JointRule, TubeSettings
 from node.firmware.tube import Tube
@@ -39,7 +39,7 @@ class Bench:
         for _ in range(count):
             self.now += PERIOD
             reading = ImuReading(self.now - PERIOD, self.now, (0.0, 0.0, rate), (0.0, 0.3, -9.8))
-            around = Surroundings(aiding is not None, 1, self.now, 1e-8, True)
+            around = RigContext(aiding is not None, 1, self.now, 1e-8, True)
             self.events |= {m.code: m for m in self.tube.on_cycle(reading, around) if isinstance(m, Event)}
             if aiding is not None:
                 onward = self.tube.on_aiding(replace(aiding, valid_at=self.now), self.now)

@@ -10,11 +10,11 @@ import pytest
 from node.firmware.settings import TubeSettings
 from node.kernels.layout import PERIOD
 from node.process.drivers.timed import TimedImu
-from node.process.own_clock import OwnClock, Schedule, run_cycle, send
-from node.process.timing import CycleTiming, Stage
 from node.process.tube_process import TubeProcess
-from telemetry.application.station import Station
+from telemetry.application.endpoint import Endpoint
 from telemetry.messages import BASE, Command, Event, NodeState, Reply, Side
+from telemetry.runtime.own_clock import OwnClock, Schedule, run_cycle, send
+from telemetry.runtime.timing import CycleTiming, Stage
 
 BEGIN = 500.0
 STEP = 0.005  # s
@@ -41,9 +41,9 @@ class Pair:
         np.save(folder / "imu.npy", np.column_stack([times, np.tile([0.0, 0.0, 0.01, 0.0, 0.3, -9.8], (1200, 1))]))
         source = TimedImu(folder / "imu.npy")
         self.process = TubeProcess(TubeSettings(1, state_every=1), folder, imus=[source], timing=timing)
-        self.base = Station(BASE, frozenset({Side.LOWER}), boot_count=1)
+        self.base = Endpoint(BASE, frozenset({Side.LOWER}), boot_count=1)
         self.timing = timing or CycleTiming()
-        self.schedule = Schedule(BEGIN)
+        self.schedule = Schedule(BEGIN, PERIOD)
         self.began = BEGIN
         self.heard: list[object] = []
         self._on_the_wire: list[bytes] = []

@@ -202,26 +202,26 @@ def test_times_that_are_none_are_told_once_and_change_nothing() -> None:
 
 def test_a_wrong_aiding_is_no_step_of_the_gyroscope() -> None:
     watch = AidingWatch()
-    assert watch.judge(0.0, 1e-4, 1.0, 0.5, rejected=False, reset=False) is None
+    assert watch.find_mismatch(0.0, 1e-4, 1.0, 0.5, rejected=False, reset=False) is None
     for k in range(6):
-        assert watch.judge(0.5 + 1e-5 * (-1) ** k, 1e-4, 1.0, 1.0 + 0.5 * k, rejected=True, reset=False) is None
+        assert watch.find_mismatch(0.5 + 1e-5 * (-1) ** k, 1e-4, 1.0, 1.0 + 0.5 * k, rejected=True, reset=False) is None
 
 
 def test_a_bias_that_grows_the_innovation_is_a_step_and_one_with_the_rate_a_scale() -> None:
     watch = AidingWatch()
-    watch.judge(0.0, 1e-4, 1.0, 0.5, rejected=False, reset=False)
-    found = [watch.judge(0.01 * k, 1e-4, 1.0, 0.5 + 0.5 * k, rejected=True, reset=False) for k in (1, 2, 3)]
+    watch.find_mismatch(0.0, 1e-4, 1.0, 0.5, rejected=False, reset=False)
+    found = [watch.find_mismatch(0.01 * k, 1e-4, 1.0, 0.5 + 0.5 * k, rejected=True, reset=False) for k in (1, 2, 3)]
     assert found[:2] == [None, None]
     assert found[2] is not None
     assert found[2].fault is Fault.GYRO_STEP
     assert found[2].rate == pytest.approx(0.02)
     assert found[2].steady
     watch.forget()
-    watch.judge(0.0, 1e-4, 0.0, 0.5, rejected=False, reset=False)
+    watch.find_mismatch(0.0, 1e-4, 0.0, 0.5, rejected=False, reset=False)
     spins, innovation = (0.2, 0.6, 1.0), 0.0
     for k, spin in enumerate(spins):
         innovation += 0.03 * spin * 0.5
-        last = watch.judge(innovation, 1e-4, spin, 1.0 + 0.5 * k, rejected=True, reset=False)
+        last = watch.find_mismatch(innovation, 1e-4, spin, 1.0 + 0.5 * k, rejected=True, reset=False)
     assert last is not None
     assert last.fault is Fault.GYRO_SCALE
 
@@ -231,9 +231,11 @@ def test_one_knock_is_no_fault_of_the_accelerometer() -> None:
     limit = SensorLimits().force_range
     rates = [(1e-4 * k, 2e-4 * k, 3e-4 * k) for k in range(9)]
     knocks = [(limit if 2 <= k <= 3 else 0.1 * k, 0.2 * k, 0.3 * k) for k in range(9)]
-    assert all(watch.judge(r, f, saturated=False) == (None, None) for r, f in zip(rates[1:], knocks[1:], strict=True))
+    assert all(
+        watch.find_faults(r, f, saturated=False) == (None, None) for r, f in zip(rates[1:], knocks[1:], strict=True)
+    )
     for k in range(3):
-        gyro, accelerometer = watch.judge((1e-3 * k, 1.0 + k, 0.1 * k), (limit, k, 0.1 * k), saturated=k == 2)
+        gyro, accelerometer = watch.find_faults((1e-3 * k, 1.0 + k, 0.1 * k), (limit, k, 0.1 * k), saturated=k == 2)
     assert (gyro, accelerometer) == (Fault.GYRO_SATURATED, Fault.FORCE_SATURATED)
 
 

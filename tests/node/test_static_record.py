@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from node.firmware.inputs import ImuReading, Surroundings
+from node.firmware.inputs import ImuReading, RigContext
 from node.firmware.sensor_faults import SensorLimits
 from node.firmware.settings import TubeSettings
 from node.firmware.static_record import StaticRecorder
@@ -81,7 +81,7 @@ class Life:
         said: list[object] = []
         for _ in range(count):
             self.now += PERIOD
-            around = Surroundings(True, 1, self.now + 500.0, 1e-8, True)
+            around = RigContext(True, 1, self.now + 500.0, 1e-8, True)
             reading = ImuReading(self.now - PERIOD, self.now, (0.0, 0.0, rate + bias), self.force, temperature)
             said.extend(self.tube.on_cycle(reading, around))
         return said

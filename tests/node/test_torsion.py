@@ -8,7 +8,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from node.errors import ConfigurationError
-from node.firmware.inputs import ImuReading, Surroundings
+from node.firmware.inputs import ImuReading, RigContext
 from node.firmware.sensor_faults import SensorLimits
 from node.firmware.settings import Joint, Kernel, TorsionRule, TubeSettings
 from node.firmware.tube import Tube
@@ -46,7 +46,7 @@ class Bench:
         for _ in range(count):
             self.now += PERIOD
             reading = ImuReading(self.now - PERIOD, self.now, (0.0, 0.0, rate), (0.0, 0.3, -9.8))
-            self.said += self.tube.on_cycle(reading, Surroundings(True, 1, self.now, 1e-8, True))
+            self.said += self.tube.on_cycle(reading, RigContext(True, 1, self.now, 1e-8, True))
             if aiding is not None:
                 self.tube.on_aiding(replace(aiding, valid_at=self.now), self.now)
 

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from node.errors import ConfigurationError
-from node.firmware.inputs import ImuReading, Surroundings
+from node.firmware.inputs import ImuReading, RigContext
 from node.firmware.sensor_faults import SensorLimits
 from node.firmware.settings import Joint, TubeSettings
 from node.firmware.tube import Tube
@@ -41,7 +41,7 @@ class Life:
             self.now += PERIOD
             self.angle += rate * PERIOD
             self.sequence += rate != 0.0
-            around = Surroundings(True, 1, self.now, 1e-8, True)
+            around = RigContext(True, 1, self.now, 1e-8, True)
             reading = ImuReading(self.now - PERIOD, self.now, (0.0, 0.0, rate), (0.0, 0.3, -9.8))
             said.extend(self.tube.on_cycle(reading, around))
             aiding = replace(
@@ -115,7 +115,7 @@ def test_state_says_what_the_node_does_not_trust() -> None:
     last = [m for m in life.cycles(6) if isinstance(m, NodeState)][-1]
     assert last.flags == NodeFlag.NONE
     assert last.aiding_age < 2.0
-    unaided = Surroundings(True, 1, life.now + 60.0, 1e-8, False)
+    unaided = RigContext(True, 1, life.now + 60.0, 1e-8, False)
     reading = ImuReading(life.now + 60.0 - PERIOD, life.now + 60.0, (0.0, 0.0, 0.0), (0.0, 0.0, -9.8))
     flags = [m.flags for _ in range(3) for m in life.tube.on_cycle(reading, unaided) if isinstance(m, NodeState)][-1]
     assert NodeFlag.AIDING_OLD in flags
@@ -135,7 +135,7 @@ def test_settings_that_cannot_be_are_refused_by_name(change: dict) -> None:
 def test_a_sample_that_is_no_number_is_an_event() -> None:
     life = Life(tube())
     life.cycles(5)
-    around = Surroundings(True, 1, life.now, 1e-8, True)
+    around = RigContext(True, 1, life.now, 1e-8, True)
     reading = ImuReading(life.now, life.now + PERIOD, (math.nan, 0.0, 0.0), (0.0, 0.0, 0.0))
     codes = [m.code for m in life.tube.on_cycle(reading, around) if isinstance(m, Event)]
     assert codes == ["bad_sample"]
@@ -146,7 +146,7 @@ def test_a_chain_made_up_anew_is_an_event() -> None:
     life = Life(tube())
     life.cycles(110)
     life.tube.on_aiding(replace(AIDING, hops=1, offset=DRIVE.angle, systematic_var=1e-6), life.now)
-    around = Surroundings(True, 2, life.now + PERIOD, 1e-8, True)
+    around = RigContext(True, 2, life.now + PERIOD, 1e-8, True)
     reading = ImuReading(life.now, life.now + PERIOD, (0.0, 0.0, 0.0), (0.0, 0.0, -9.8))
     codes = [m.code for m in life.tube.on_cycle(reading, around) if isinstance(m, Event)]
     assert codes == ["reference_changed"]

@@ -10,7 +10,7 @@ from node.kernels.layout import PERIOD
 from node.process.tube_process import TubeProcess
 from telemetry.application.clock import ClockFilter
 from telemetry.messages import Aiding, Side
-from telemetry.presentation.codec import VARIANCE
+from telemetry.presentation.msgpack_codec import VARIANCE
 
 REST = (0.0, 0.0, 0.0, 0.0, 0.3, -9.8)
 
@@ -30,8 +30,8 @@ def test_a_later_life_goes_on_with_bias_and_numbers(tmp_path: Path) -> None:
     second = TubeProcess(TubeSettings(3), tmp_path)
     assert second.boots == first.boots + 1
     assert second.state[0]["mode"] == first.state[0]["mode"]
-    assert second.station.new_sequence() >= first.station.outbox_size + 1
-    assert second.station.outbox_size == first.station.outbox_size > 0
+    assert second.endpoint.new_sequence() >= first.endpoint.outbox_size + 1
+    assert second.endpoint.outbox_size == first.endpoint.outbox_size > 0
     cycles(second, 5, now + 30.0)
 
 
@@ -61,10 +61,10 @@ def test_no_reading_and_no_frame_ends_the_process(tmp_path: Path, wild: float) -
 
 def test_an_aiding_that_grew_beyond_what_can_be_said_is_not_handed_on(tmp_path: Path) -> None:
     process = TubeProcess(TubeSettings(3, lower_joint=Joint(0.0, 0.1)), tmp_path)
-    process.station.clock = ClockFilter(is_root=True)
+    process.endpoint.clock = ClockFilter(is_root=True)
     now = cycles(process, 110)
     for var, unsayable in ((1e-4, 0), (VARIANCE, 1)):
         process._on_aiding(Aiding(1.0, 1e-9, var, 0.0, 0.0, now, int(1 / var), 1), now)
-        assert process.station.counters["unsayable"] == unsayable
+        assert process.endpoint.counters["unsayable"] == unsayable
     cycles(process, 3, now)
     assert process.state[0]["yaw_known"]

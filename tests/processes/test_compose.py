@@ -12,8 +12,8 @@ import pytest
 import yaml
 from rigs import PATIENCE, REPOSITORY, command, free_endpoint
 
-from sim.scenario import load_scenario
-from sim.world import World
+from sim.world.scenario import load_scenario
+from sim.world.world import World
 from telemetry.media.zenoh_bus import ZenohBus, open_client
 
 SERVICES: dict[str, dict[str, Any]] = yaml.safe_load((REPOSITORY / "docker-compose.yml").read_text())["services"]

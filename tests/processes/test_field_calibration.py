@@ -15,9 +15,9 @@ from rigs import REPOSITORY, ends, free_endpoint, run, running_rig
 from groundstation.calibration.block import read
 from groundstation.calibration.field import inclination
 from groundstation.service.store import Store
-from sim.report import rms
-from sim.scenario import load_scenario
-from sim.world import World
+from sim.rig.report import rms
+from sim.world.scenario import load_scenario
+from sim.world.world import World
 from telemetry.messages import SurveyMeasurement
 from telemetry.parameters import ParameterBlock
 

@@ -19,34 +19,34 @@ import pytest
 from click.testing import CliRunner
 from rigs import PATIENCE, REPOSITORY, command, free_endpoint, run
 
-from borechain.encoder import encoder
-from borechain.node import node
-from node.process.own_clock import Inbox, OwnClock, serve_by_own_clock
-from node.process.timing import CycleTiming
+from borechain.cli.node.encoder import encoder
+from borechain.cli.node.node import node
 from node.process.tube_process import TubeProcess
-from sim.turning_string import TurningString
-from telemetry.application.driven import Driven
-from telemetry.application.station import Station
+from sim.studies.turning_string import TurningString
+from telemetry.application.endpoint import Endpoint
 from telemetry.media.neighbours import neighbour_ports
 from telemetry.media.zenoh_bus import ZenohBus, open_router
 from telemetry.messages import BASE, ENCODER, Command, Event, NodeFlag, NodeState, Reply, Side
+from telemetry.runtime.own_clock import Inbox, OwnClock, serve_by_own_clock
+from telemetry.runtime.process import Process
+from telemetry.runtime.timing import CycleTiming
 
 RIG = "own-clock"
 UNFIT = NodeFlag.YAW_UNTRUSTED | NodeFlag.CLOCK_UNSYNCHRONISED
 
 
-class Surface(Driven):
+class Surface(Process):
     """The base station; what it hears goes into a queue."""
 
     def __init__(self) -> None:
-        self.station = Station(BASE, frozenset({Side.LOWER}), boot_count=1)
+        self.endpoint = Endpoint(BASE, frozenset({Side.LOWER}), boot_count=1)
         self.inbox = Inbox()
         self.heard: queue.SimpleQueue[Any] = queue.SimpleQueue()
 
     def on_frame(self, side: Side, frame: bytes, now: float) -> None:
-        for received in self.station.receive(side, frame, now):
+        for received in self.endpoint.receive(side, frame, now):
             if isinstance(received.message, Event):
-                self.station.acknowledge(received.message.tube, received.message.sequence, now)
+                self.endpoint.acknowledge(received.message.tube, received.message.sequence, now)
             self.heard.put(received.message)
 
     def first(self, kind: type, fits: Callable[[Any], bool]) -> Any:
@@ -132,7 +132,7 @@ def test_a_node_finds_its_yaw_keeps_it_over_a_kill_and_ends_when_asked(
     state = surface.first(NodeState, lambda s: not s.flags & UNFIT)
     assert abs(string.truth.yaw_error(1, state.yaw, state.at)) < 0.02
     assert state.hops == 1
-    surface.inbox.put(lambda process, now: process.station.command(Command(1, 5, "timing"), now))
+    surface.inbox.put(lambda process, now: process.endpoint.command(Command(1, 5, "timing"), now))
     reply = surface.first(Reply, lambda r: r.sequence == 5)
     assert reply.done
     assert " aiding " in reply.detail
@@ -193,7 +193,7 @@ def test_the_bench_measures_every_process(tmp_path: Path) -> None:
         (node, ("--tube", "1", "--clock", "own"), "--clock own: expected --imu with it"),
         (encoder, ("--clock", "own"), "--clock own: expected --counter with it"),
         (node, ("--tube", "1", "--clock", "own", "--imu", "timed:none.npy"), "got none.npy, which is no file"),
-        (node, ("--tube", "1", "--clock", "sundial"), "'sundial' is not one of 'bench', 'own'"),
+        (node, ("--tube", "1", "--clock", "sundial"), "'sundial' is not one of 'stepper', 'own'"),
         (node, ("--tube", "1", "--above", "2"), "expected --clock own with them"),
         (node, ("--tube", "1", "--clock", "own", "--above", "sky"), "expected encoder, base or a tube 1..250, got sky"),
         (node, ("--tube", "1", "--clock", "own", "--imu", "mpu6500:1", "--above", "1"), "others than 1 itself, got 1"),

@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 from click.testing import CliRunner
 
-from borechain.experiment import experiment
-from sim.experiments.alignment import BASE, PUBLISHED_DEG, Bench, base_rows, ratio, run_seed
+from borechain.cli.experiment.experiment import experiment
+from sim.studies.alignment import BASE, PUBLISHED_DEG, Turn, base_rows, ratio, run_seed
 
 SEEDS = 24
 
@@ -45,7 +45,7 @@ def test_the_survey_after_is_as_good_as_the_offset(found: list) -> None:
 
 
 def test_the_integer_kernel_finds_the_same_mount() -> None:
-    floats, integers = (Bench(replace(BASE, kernel=kernel), 3).run("circle") for kernel in ("float64", "fixed"))
+    floats, integers = (Turn(replace(BASE, kernel=kernel), 3).run("circle") for kernel in ("float64", "fixed"))
     assert integers.error == pytest.approx(floats.error, abs=1e-6)
     assert integers.inclination_error == pytest.approx(floats.inclination_error, abs=1e-6)
 

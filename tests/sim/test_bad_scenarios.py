@@ -5,8 +5,8 @@ from pathlib import Path
 import pytest
 
 from sim.errors import ScenarioError
-from sim.scenario import load_scenario
-from sim.world import World
+from sim.world.scenario import load_scenario
+from sim.world.world import World
 
 SCENARIOS = Path(__file__).parents[2] / "scenarios"
 DISPLACEMENTS = 'displacements = "wellbore-1-path.csv"'

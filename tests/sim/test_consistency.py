@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 from click.testing import CliRunner
 
-from borechain.experiment import experiment
+from borechain.cli.experiment.experiment import experiment
 from node.kernels.layout import Scheme
-from sim.experiments.chain import Chain, run_seed
-from sim.experiments.consistency import EVERY, run, setup_of, table, verdict
+from sim.studies.chain import Chain, run_seed
+from sim.studies.consistency import EVERY, run, setup_of, table, verdict
 
 HOPS, SEEDS = 5, 40
 

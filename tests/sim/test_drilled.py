@@ -10,8 +10,8 @@ import pytest
 
 from node.firmware.settings import JointRule
 from node.kernels.layout import PERIOD
-from sim.experiments.drilled import BEGIN, DrilledRun, DrilledSetup, DrilledString
-from sim.scenario import TorsionSection
+from sim.studies.drilled import BEGIN, DrilledRun, DrilledSetup, DrilledString
+from sim.world.scenario import TorsionSection
 
 STEEL = TorsionSection()  # 60/50 mm, 500 N m, 1 % trapped
 SMALL = math.radians(0.02)

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from node.kernels.layout import Scheme
-from sim.experiments.chain import Chain, ChainSetup
-from sim.experiments.relay import run, table
+from sim.studies.chain import Chain, ChainSetup
+from sim.studies.relay import run, table
 
 SEEDS = 24
 

@@ -11,18 +11,18 @@ import numpy as np
 import pytest
 from click.testing import CliRunner
 
-from borechain.experiment import experiment
-from borechain.node import node
-from borechain.rig import PRELOAD
+from borechain.cli.experiment.experiment import experiment
+from borechain.cli.node.node import node
+from borechain.cli.rig.rig import PRELOAD
 from node.firmware.encoder import COUNTS_PER_TURN
 from node.firmware.settings import KERNELS
 from node.kernels.layout import PERIOD, Scheme
-from sim.experiments import node_ingredients, node_modes, node_published
-from sim.experiments.node_lab import REST, ROTATING, Lab, LabRun, LabSetup
-from sim.experiments.node_links import OnOff
-from sim.experiments.node_trials import rms_deg
-from sim.experiments.plain_sensors import LINES, SAMPLE_RATE_HZ, PlainEncoder, single_samples
-from sim.scenario import GyroSection, NodeSection
+from sim.studies import node_ingredients, node_modes, node_published
+from sim.studies.node_lab import REST, ROTATING, Lab, LabRun, LabSetup
+from sim.studies.node_links import OnOff
+from sim.studies.node_trials import rms_deg
+from sim.studies.plain_sensors import LINES, SAMPLE_RATE_HZ, PlainEncoder, single_samples
+from sim.world.scenario import GyroSection, NodeSection
 
 SEEDS = 6
 LAB = LabSetup()

@@ -9,13 +9,13 @@ import numpy as np
 import pytest
 from click.testing import CliRunner
 
-from borechain.experiment import experiment
+from borechain.cli.experiment.experiment import experiment
 from node.kernels.layout import PERIOD, Scheme
-from sim.experiments import node_delay, node_modes, node_outage, node_tuning
-from sim.experiments.chain import Chain, ChainSetup, run_seed
-from sim.experiments.node_lab import ENDS, REST, ROTATING, STOP, Lab, LabRun, LabSetup
-from sim.experiments.node_links import OnOff, Single
-from sim.experiments.node_trials import bootstrap, rms_deg
+from sim.studies import node_delay, node_modes, node_outage, node_tuning
+from sim.studies.chain import Chain, ChainSetup, run_seed
+from sim.studies.node_lab import ENDS, REST, ROTATING, STOP, Lab, LabRun, LabSetup
+from sim.studies.node_links import OnOff, Single
+from sim.studies.node_trials import bootstrap, rms_deg
 
 SEEDS = 16
 SLACK = 1.5  # of the figure to reach, for few seeds

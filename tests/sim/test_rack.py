@@ -9,10 +9,10 @@ import pytest
 from groundstation.calibration.attitudes import true_vectors
 from node.kernels.layout import PERIOD
 from sim.errors import ScenarioError
-from sim.imu_errors import Drift
-from sim.rack import Rack
-from sim.scenario import CalibrationSection, DriftSection, Scenario, load_scenario
-from sim.world import World
+from sim.world.imu_errors import Drift
+from sim.world.rack import Rack
+from sim.world.scenario import CalibrationSection, DriftSection, Scenario, load_scenario
+from sim.world.world import World
 
 SCENARIOS = Path(__file__).parents[2] / "scenarios"
 FIELD = SCENARIOS / "field-calibration.toml"

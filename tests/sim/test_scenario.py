@@ -4,7 +4,7 @@ import pytest
 
 from sim.errors import ScenarioError
 from sim.faults import KillNode, parse_fault
-from sim.scenario import load_scenario
+from sim.world.scenario import load_scenario
 
 SCENARIOS = Path(__file__).parents[2] / "scenarios"
 
@@ -15,7 +15,7 @@ def test_every_shipped_scenario_is_valid(path: Path) -> None:
 
 
 def test_every_key_is_documented_or_says_it_all() -> None:
-    from sim.scenario import ScenarioFile
+    from sim.world.scenario import ScenarioFile
 
     for section in ScenarioFile.model_fields.values():
         annotation = section.annotation

@@ -7,8 +7,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from sim.experiments.allan import run
-from sim.static_bench import (
+from sim.instruments.static_records import (
     BenchError,
     StaticNoise,
     arm_truth,
@@ -21,6 +20,7 @@ from sim.static_bench import (
     turn_table,
     white,
 )
+from sim.studies.allan import run
 
 MATRIX = np.array([[0.99, -0.02, 0.003], [0.015, 1.01, -0.004], [-0.001, 0.007, 0.98]])
 BIAS = np.array([0.2, 3.8, -1.0])

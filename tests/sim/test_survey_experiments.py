@@ -4,7 +4,7 @@ import math
 
 import pytest
 
-from sim.experiments import coverage, regions, weighting
+from sim.studies import coverage, regions, weighting
 
 
 def test_weights_reduce_the_error_as_published() -> None:

@@ -8,9 +8,9 @@ import pytest
 
 from node.kernels.layout import PERIOD
 from sim.errors import ScenarioError
-from sim.imu_errors import ImuErrors, gauss_markov, quantise
-from sim.scenario import AccelerometerSection, GyroSection, load_scenario
-from sim.world import World, wrap
+from sim.world.imu_errors import ImuErrors, gauss_markov, quantise
+from sim.world.scenario import AccelerometerSection, GyroSection, load_scenario
+from sim.world.world import World, wrap
 from telemetry.messages import BASE, ENCODER, Side
 
 SCENARIO = load_scenario(Path(__file__).parents[2] / "scenarios" / "rig-3.toml")
@@ -86,9 +86,9 @@ def test_clocks_differ_and_come_back() -> None:
 
 
 def test_the_air_depends_on_the_port_and_nothing_else() -> None:
-    from sim.air import Air
+    from sim.rig.link_channel import LinkChannel
 
-    one, other = Air(1, 0.003, 0.001, 0.2, 0.1), Air(1, 0.003, 0.001, 0.2, 0.1)
+    one, other = LinkChannel(1, 0.003, 0.001, 0.2, 0.1), LinkChannel(1, 0.003, 0.001, 0.2, 0.1)
     upper = [one.deliveries(1, Side.UPPER) for _ in range(3000)]
     for _ in range(500):
         other.deliveries(2, Side.LOWER)

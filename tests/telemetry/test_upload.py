@@ -32,7 +32,7 @@ def test_segments_in_any_order_and_twice_are_the_block(block: bytes, random: obj
     assembly = Assembly(5, parts[0].digest, parts[0].count)
     for part in parts:
         assert assembly.belongs(part)
-        assembly.add(part)
+        assembly.add_segment(part)
         restored = Assembly.restore(assembly.export())
         assert restored is not None
         assert restored.received == assembly.received
@@ -50,8 +50,8 @@ def test_a_block_of_no_size_is_not_split(size: int) -> None:
 def test_a_segment_swapped_for_another_is_not_the_block() -> None:
     first, second = segments()[:2]
     assembly = Assembly(5, first.digest, 2)
-    assembly.add(replace(first, data=second.data))
-    assembly.add(second)
+    assembly.add_segment(replace(first, data=second.data))
+    assembly.add_segment(second)
     assert assembly.block() is None
 
 
@@ -88,18 +88,18 @@ def test_another_key_makes_another_tag() -> None:
 
 def test_all_are_sent_once_and_then_what_is_missing() -> None:
     upload = Upload(segments(), 100.0)
-    assert upload.due(100.0) == list(segments())
-    assert upload.due(100.0 + FIRST_RETRY - 0.1) == []
-    assert not upload.take(status(UploadPhase.PARTIAL, 0b10101))
-    assert [s.index for s in upload.due(100.0 + FIRST_RETRY)] == [1, 3]
-    assert not upload.take(status(UploadPhase.PARTIAL, 0))  # the node lost them
-    assert len(upload.due(1000.0)) == 5
-    assert not upload.take(status(UploadPhase.WAITING, 0b11111))
-    assert [s.index for s in upload.due(2000.0)] == [0]
+    assert upload.due_segments(100.0) == list(segments())
+    assert upload.due_segments(100.0 + FIRST_RETRY - 0.1) == []
+    assert not upload.on_status(status(UploadPhase.PARTIAL, 0b10101))
+    assert [s.index for s in upload.due_segments(100.0 + FIRST_RETRY)] == [1, 3]
+    assert not upload.on_status(status(UploadPhase.PARTIAL, 0))  # the node lost them
+    assert len(upload.due_segments(1000.0)) == 5
+    assert not upload.on_status(status(UploadPhase.WAITING, 0b11111))
+    assert [s.index for s in upload.due_segments(2000.0)] == [0]
     for _ in range(10):
-        upload.due(upload.next_due)
+        upload.due_segments(upload.next_due)
     before = upload.next_due
-    upload.due(before)
+    upload.due_segments(before)
     assert upload.next_due - before == LAST_RETRY
 
 
@@ -107,13 +107,13 @@ def test_all_are_sent_once_and_then_what_is_missing() -> None:
 def test_the_last_word_ends_an_upload_and_only_of_its_own_block(phase: UploadPhase) -> None:
     upload = Upload(segments(), 100.0)
     for change in ({"tube": 4}, {"sequence": 76}, {"digest": bytes(32)}):
-        assert not upload.take(status(phase, **change))
-    assert upload.take(status(phase))
+        assert not upload.on_status(status(phase, **change))
+    assert upload.on_status(status(phase))
 
 
 def test_a_damaged_tag_is_repeated_and_a_wrong_key_given_up() -> None:
     upload = Upload(segments(), 100.0)
-    assert [upload.take(status(UploadPhase.UNTRUSTED)) for _ in range(UNTRUSTED_LIMIT)] == [False, False, True]
+    assert [upload.on_status(status(UploadPhase.UNTRUSTED)) for _ in range(UNTRUSTED_LIMIT)] == [False, False, True]
 
 
 def test_a_key_is_made_once_and_read_back(tmp_path: Path) -> None:

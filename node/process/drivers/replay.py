@@ -15,8 +15,8 @@ import numpy as np
 import numpy.typing as npt
 
 from node.errors import SensorError
+from node.firmware.edge_interpolation import EDGES
 from node.firmware.encoder import EncoderSample
-from node.firmware.stop import EDGES
 from node.kernels.calibration import USUAL
 from node.process.drivers.source import ImuSample
 

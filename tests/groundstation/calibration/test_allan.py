@@ -19,7 +19,7 @@ from groundstation.calibration.allan import (
 )
 from groundstation.calibration.allan_fit import design, fit, moments
 from groundstation.calibration.errors import CalibrationError
-from sim.static_bench import StaticNoise, static_record
+from sim.instruments.static_records import StaticNoise, static_record
 
 RATE = 20.0
 MPU_X = StaticNoise(white=8.9e-3, flicker=7.9e-3)

@@ -22,7 +22,7 @@ from groundstation.calibration.mwd_model import (
     turned,
     vectors,
 )
-from sim.mwd_bench import DIP, FIELD, Heating, draw_tool, make_design, measure, true_vectors
+from sim.instruments.mwd_jig import DIP, FIELD, Heating, draw_tool, make_design, measure, true_vectors
 
 DEG = math.pi / 180.0
 TINY = 1e-30  # imaginary, of a complex step

@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 
 from groundstation.errors import SurveyError
 from groundstation.survey.columns import PRESETS, Design, Deviation, deviation, dominant, project, tolerance
-from groundstation.survey.resolve import Lean, angles
+from groundstation.survey.resolve import Direction, angles
 from groundstation.survey.trajectory import Point
 
 DEG = math.pi / 180.0
@@ -33,9 +33,9 @@ def about_axis(axis: np.ndarray, angle: float) -> np.ndarray:
     return np.eye(3) + math.sin(angle) * cross + (1.0 - math.cos(angle)) * cross @ cross
 
 
-def lean_of(inclination: float, azimuth: float, cov: np.ndarray) -> Lean:
+def lean_of(inclination: float, azimuth: float, cov: np.ndarray) -> Direction:
     lean = np.array([math.sin(inclination) * math.cos(azimuth), math.sin(inclination) * math.sin(azimuth)])
-    return Lean(lean, math.cos(inclination), cov, np.zeros((2, 0)))
+    return Direction(lean, math.cos(inclination), cov, np.zeros((2, 0)))
 
 
 @pytest.mark.parametrize(
@@ -164,7 +164,7 @@ def test_the_uncertainty_of_a_projection_grows_with_the_way() -> None:
 
 
 def test_a_projection_counts_what_the_direction_shares() -> None:
-    direction = Lean(np.zeros(2), 1.0, 1e-6 * np.eye(2), np.array([[0.0], [3e-3]]))
+    direction = Direction(np.zeros(2), 1.0, 1e-6 * np.eye(2), np.array([[0.0], [3e-3]]))
     found = project(point_at([0.0, 0.0, 20.0], cov=np.zeros((3, 3))), direction, Design())
     np.testing.assert_allclose(found.cov, np.diag([1e-4, 1e-4 + 9e-4]), atol=1e-12)
 
@@ -191,7 +191,7 @@ def test_the_uncertainty_of_a_projection_is_the_slope_of_the_target(off: float) 
 
     def target(north: float, east: float) -> np.ndarray:
         lean = lean_of(inclination, azimuth, cov).lean + np.array([north, east])
-        direction = Lean(lean, math.sqrt(1.0 - float(lean @ lean)), cov, np.zeros((2, 0)))
+        direction = Direction(lean, math.sqrt(1.0 - float(lean @ lean)), cov, np.zeros((2, 0)))
         tangent = np.array([*lean, direction.down])
         return project(point_at(5.0 * design.axis, tangent, np.zeros((3, 3))), direction, design).offset
 
@@ -205,7 +205,7 @@ def test_the_uncertainty_of_a_projection_is_the_slope_of_the_target(off: float) 
     np.testing.assert_allclose(found.cov, expected, atol=0.01 * float(np.trace(expected)))
 
 
-def with_angle_stds(inclination: float, std_i: float, std_a: float) -> Lean:
+def with_angle_stds(inclination: float, std_i: float, std_a: float) -> Direction:
     """Leaning north, with standard deviations of inclination and azimuth."""
     s, c = math.sin(inclination), math.cos(inclination)
     return lean_of(inclination, 0.0, np.diag([(c * std_i) ** 2, (s * std_a) ** 2]))

@@ -20,30 +20,30 @@ from groundstation.survey.fusion import (
     sequence_weights,
     weighted,
 )
-from groundstation.survey.resolve import Lean
+from groundstation.survey.resolve import Direction
 from groundstation.survey.trajectory import Trajectory
 
 DEG = math.pi / 180.0
 NOTHING = np.zeros((2, 0))
 
 
-def lean_of(inclination: float, azimuth: float, std: float = 1e-3, joint_std: float = 0.0) -> Lean:
+def lean_of(inclination: float, azimuth: float, std: float = 1e-3, joint_std: float = 0.0) -> Direction:
     """A direction with one shared column, a joint's."""
     lean = np.array([math.sin(inclination) * math.cos(azimuth), math.sin(inclination) * math.sin(azimuth)])
     shared = joint_std * np.array([[-lean[1]], [lean[0]]])
-    return Lean(lean, math.cos(inclination), std**2 * np.eye(2), shared)
+    return Direction(lean, math.cos(inclination), std**2 * np.eye(2), shared)
 
 
-def near_vertical(north: float, east: float, cov: np.ndarray, shared: np.ndarray = NOTHING) -> Lean:
+def near_vertical(north: float, east: float, cov: np.ndarray, shared: np.ndarray = NOTHING) -> Direction:
     lean = np.array([north, east])
-    return Lean(lean, math.sqrt(1.0 - float(lean @ lean)), cov, shared)
+    return Direction(lean, math.sqrt(1.0 - float(lean @ lean)), cov, shared)
 
 
 def test_two_equal_readings_halve_the_variance_and_leave_the_joint_error_alone() -> None:
     fusion = StationFusion()
     reading = lean_of(2.0 * DEG, 1.0, 1e-3, joint_std=1e-2)
-    fusion.add(reading)
-    fusion.add(reading)
+    fusion.add_reading(reading)
+    fusion.add_reading(reading)
     fused = fusion.fused()
     np.testing.assert_allclose(fused.lean, reading.lean)
     np.testing.assert_allclose(fused.cov, reading.cov / 2.0, rtol=1e-9, atol=1e-18)
@@ -275,7 +275,7 @@ BACK = [lean_of(1.0 * DEG, 0.0), lean_of(1.0 * DEG, 0.0), lean_of(0.0, 0.0)]
     ],
 )  # fmt: skip
 def test_a_hole_moved_when_all_neighbours_saw_the_same(
-    station: list[Lean], neighbours: list[list[Lean]], moved: bool
+    station: list[Direction], neighbours: list[list[Direction]], moved: bool
 ) -> None:
     assert moved_hole(station, neighbours).moved is moved
 
@@ -292,7 +292,7 @@ def test_holes_that_never_moved_depart_as_often_as_said() -> None:
     generator = np.random.default_rng(4)
     trials, false_single, false_pair, false_three = 5000, 0, 0, 0
 
-    def station() -> list[Lean]:
+    def station() -> list[Direction]:
         common = generator.standard_normal(3)
         readings = []
         for k in range(3):

@@ -22,7 +22,7 @@ from groundstation.survey.methods import (
     vertical_section,
     wrap,
 )
-from groundstation.survey.resolve import Lean
+from groundstation.survey.resolve import Direction
 from groundstation.survey.trajectory import Trajectory, interpolate
 
 DEG = math.pi / 180.0
@@ -42,9 +42,9 @@ def of_rows(rows: list[tuple[float, float, float]]) -> Well:
     return np.cumsum(lengths), inclination, azimuth
 
 
-def lean_of(inclination: float, azimuth: float) -> Lean:
+def lean_of(inclination: float, azimuth: float) -> Direction:
     lean = np.array([math.sin(inclination) * math.cos(azimuth), math.sin(inclination) * math.sin(azimuth)])
-    return Lean(lean, math.cos(inclination), 1e-6 * np.eye(2), np.zeros((2, 0)))
+    return Direction(lean, math.cos(inclination), 1e-6 * np.eye(2), np.zeros((2, 0)))
 
 
 def turned(position: np.ndarray, angle: float) -> np.ndarray:

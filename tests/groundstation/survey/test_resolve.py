@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 
 from groundstation.errors import SurveyError
 from groundstation.survey.resolve import (
-    Lean,
+    Direction,
     Quality,
     angle_stds,
     angles,
@@ -34,7 +34,7 @@ def force_at_rest(inclination: float, azimuth: float, yaw: float) -> np.ndarray:
     )
 
 
-def direction_of(force: np.ndarray, yaw: float) -> Lean:
+def direction_of(force: np.ndarray, yaw: float) -> Direction:
     return resolve(force, np.eye(3) * 1e-9, yaw, 0.0).direction
 
 

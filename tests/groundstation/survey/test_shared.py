@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 
 from groundstation.survey.ellipsoid import coverage_radius
 from groundstation.survey.fusion import bayes
-from groundstation.survey.resolve import Lean, Resolved, resolve
+from groundstation.survey.resolve import Direction, Resolved, resolve
 from groundstation.survey.shared import SharedErrors, added, widened
 from groundstation.survey.trajectory import Trajectory
 
@@ -29,13 +29,13 @@ def stop(inclination: float = 0.2, azimuth: float = 1.0, yaw: float = 0.4) -> Re
     return resolve(force_at_rest(inclination, azimuth, yaw), np.eye(3) * 1e-6, yaw, 1e-6)
 
 
-def common_yaw_var(one: Lean, other: Lean) -> float:
+def common_yaw_var(one: Direction, other: Direction) -> float:
     """Variance (rad^2) of the yaw error that two readings of the same stop have in common."""
     by_yaw = stop().by_yaw
     return float(by_yaw @ (one.shared[:, : other.shared.shape[1]] @ other.shared[:, : one.shared.shape[1]].T) @ by_yaw)
 
 
-def yaw_only(errors: SharedErrors, tube: int, above: list[int] | None, joints: float, mount: float = 0.0) -> Lean:
+def yaw_only(errors: SharedErrors, tube: int, above: list[int] | None, joints: float, mount: float = 0.0) -> Direction:
     """Reading whose yaw errors are so large in unit of its slope that the common variance reads in rad^2."""
     size = float(stop().by_yaw @ stop().by_yaw)
     return errors.reading(stop(), tube, above, (joints + mount) / size**2, mount / size**2, 0.0)
@@ -203,7 +203,7 @@ class Drawn:
 
 def surveyed(drawn: Drawn, errors: SharedErrors) -> Trajectory:
     """Four tubes pass four stations: at stop t tube 1 is at station t and tube t, on top, at the first."""
-    readings: list[list[Lean]] = [[] for _ in MDS]
+    readings: list[list[Direction]] = [[] for _ in MDS]
     for stop_number in range(1, 5):
         for tube in range(1, stop_number + 1):
             station, above = stop_number - tube, list(range(tube + 1, stop_number + 1))

@@ -9,22 +9,22 @@ from hypothesis import strategies as st
 
 from groundstation.errors import SurveyError
 from groundstation.survey.methods import Method
-from groundstation.survey.resolve import Lean
+from groundstation.survey.resolve import Direction
 from groundstation.survey.trajectory import Trajectory, interpolate
 
 DEG = math.pi / 180.0
 
 
-def lean_of(inclination: float, azimuth: float, std: float = 1e-3, shared: np.ndarray | None = None) -> Lean:
+def lean_of(inclination: float, azimuth: float, std: float = 1e-3, shared: np.ndarray | None = None) -> Direction:
     lean = np.array([math.sin(inclination) * math.cos(azimuth), math.sin(inclination) * math.sin(azimuth)])
-    return Lean(lean, math.cos(inclination), std**2 * np.eye(2), np.zeros((2, 0)) if shared is None else shared)
+    return Direction(lean, math.cos(inclination), std**2 * np.eye(2), np.zeros((2, 0)) if shared is None else shared)
 
 
-def turned(inclination: float, azimuth: float, std: float, yaw_stds: list[float]) -> Lean:
+def turned(inclination: float, azimuth: float, std: float, yaw_stds: list[float]) -> Direction:
     """A direction with one shared yaw error a column."""
     lean = lean_of(inclination, azimuth, std)
     shared = np.outer([-lean.lean[1], lean.lean[0]], yaw_stds)
-    return Lean(lean.lean, lean.down, lean.cov, shared)
+    return Direction(lean.lean, lean.down, lean.cov, shared)
 
 
 def test_balanced_tangential_gives_the_printed_steps_of_table_4_29() -> None:
@@ -67,7 +67,7 @@ def test_appending_gives_what_the_whole_hole_gives_at_once(
         assert not np.any(shared[:, point.shared.shape[1] :])
 
 
-def parts_at_once(mds: np.ndarray, leans: list[Lean]) -> tuple[np.ndarray, np.ndarray]:
+def parts_at_once(mds: np.ndarray, leans: list[Direction]) -> tuple[np.ndarray, np.ndarray]:
     """Random covariance and shared columns of the last position from every station's weight in it: no running sum."""
     ends = np.concatenate([[0.0], mds, mds[-1:]])
     random, shared = np.zeros((3, 3)), np.zeros((3, 4))
@@ -157,7 +157,7 @@ def test_a_depth_that_does_not_grow_is_refused(md: float) -> None:
 def test_a_hole_that_turns_back_on_itself_has_no_arc() -> None:
     trajectory = Trajectory(Method.MINIMUM_CURVATURE)
     trajectory.append(2.0, lean_of(0.5, 0.0))
-    back = Lean(np.array([-math.sin(0.5), 0.0]), -math.cos(0.5), 1e-6 * np.eye(2), np.zeros((2, 0)))
+    back = Direction(np.array([-math.sin(0.5), 0.0]), -math.cos(0.5), 1e-6 * np.eye(2), np.zeros((2, 0)))
     with pytest.raises(SurveyError, match="between 2 and 4 m"):
         trajectory.append(4.0, back)
 
@@ -176,7 +176,7 @@ def test_covariance_of_the_position_is_what_sampling_gives() -> None:
         sampled = Trajectory()
         for md, inclination, azimuth in zip(mds, inclinations, azimuths, strict=True):
             lean = lean_of(inclination, azimuth + joint).lean + std * generator.standard_normal(2)
-            sampled.append(md, Lean(lean, math.sqrt(1.0 - float(lean @ lean)), np.zeros((2, 2)), np.zeros((2, 0))))
+            sampled.append(md, Direction(lean, math.sqrt(1.0 - float(lean @ lean)), np.zeros((2, 2)), np.zeros((2, 0))))
         toes.append(sampled.points[-1].position)
     expected = np.cov(np.array(toes).T)
     np.testing.assert_allclose(claimed.points[-1].cov, expected, rtol=0.06, atol=0.03 * float(np.trace(expected)))

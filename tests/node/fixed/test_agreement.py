@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 
 from node.errors import ConfigurationError
-from node.firmware.inputs import ImuReading, Surroundings
+from node.firmware.block_trial import forget_bias
+from node.firmware.inputs import ImuReading, RigContext
 from node.firmware.kernel_choice import kernel_of
-from node.firmware.parameters import forget_bias
 from node.firmware.settings import TubeSettings
 from node.firmware.tube import Tube
 from node.kernels.cycle import run_cycle
@@ -17,7 +17,7 @@ from node.kernels.fixed.layout import FIXED_STATE
 from node.kernels.fixed.node import FixedNode
 from node.kernels.layout import DEG, PERIOD, STATE, Array, Status, default_config, new_state
 from node.kernels.relay import offer_aiding
-from sim.experiments.fixed_point import AIDING_VAR, LIMITS, compare, inputs, rows_of
+from sim.studies.fixed_point import AIDING_VAR, LIMITS, compare, inputs, rows_of
 from telemetry.messages import Aiding, NodeState
 
 WORK_SPACE = {"h", "ph", "gain"}
@@ -120,7 +120,7 @@ def reports(kernel: str, *, forget: bool) -> list[NodeState]:
     node, config, state = tube(kernel)
     said = []
     for k, given in enumerate(inputs(1300, 6)):
-        around = Surroundings(True, 1, given.end, 1e-8, True)
+        around = RigContext(True, 1, given.end, 1e-8, True)
         reading = ImuReading(given.start, given.end, given.rate, given.force)
         said += [message for message in node.on_cycle(reading, around) if isinstance(message, NodeState)]
         if given.aiding is not None:

@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from node.firmware.inputs import ImuReading, Surroundings
+from node.firmware.inputs import ImuReading, RigContext
 from node.firmware.kernel_choice import kernel_of
 from node.firmware.settings import TubeSettings
 from node.firmware.tube import Tube
@@ -167,7 +167,7 @@ def turned(node: Tube, force: Array, spins: list[float]) -> list[list[NodeState 
         reading = ImuReading(now, now + PERIOD, tuple(rate.tolist()), tuple(force.tolist()))
         force = force + 1e-9 * random.standard_normal(3)  # bits of a live sensor
         now, yaw = now + PERIOD, yaw + spin * PERIOD
-        said.append([m for m in node.on_cycle(reading, Surroundings(True, 1, now, 1e-8, True)) if _told(m)])
+        said.append([m for m in node.on_cycle(reading, RigContext(True, 1, now, 1e-8, True)) if _told(m)])
         node.on_aiding(Aiding(yaw % math.tau, (0.003 * DEG) ** 2, 0.0, 0.0, spin, now, k, 0), now)
     return said
 

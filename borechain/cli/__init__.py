@@ -1,0 +1,1 @@
+"""The commands, a room a family; each imports what it needs when it runs."""

@@ -1,0 +1,107 @@
+"""``borechain bench``: speed beside other libraries, measured in one run, and a string in real time."""
+
+from __future__ import annotations
+
+import importlib.util
+import json
+from pathlib import Path
+from typing import Any
+
+import click
+
+from borechain.cli.faults import EnvironmentFault, InputFault, plain_faults
+from borechain.cli.options import json_option
+from borechain.cli.tables import console
+
+FOLDER = Path(__file__).parents[3] / "benchmarks"
+
+
+def benches() -> list[str]:
+    """Names of the benchmarks: those of the repository, and the one of the package."""
+    return sorted([*(path.stem for path in FOLDER.glob("*.py")), "realtime"])
+
+
+class Benches(click.Group):
+    """Every benchmark as a command, imported when it is called."""
+
+    def list_commands(self, ctx: click.Context) -> list[str]:
+        """Names in order."""
+        del ctx
+        return benches()
+
+    def get_command(self, ctx: click.Context, cmd_name: str) -> click.Command:
+        """One of them.
+
+        Raises
+        ------
+        InputFault
+            When there is none of that name.
+        """
+        del ctx
+        if cmd_name not in benches():
+            raise InputFault(f"expected one of {', '.join(benches())}, got {cmd_name!r}")
+        if cmd_name == "realtime":
+            from borechain.cli.bench.realtime import realtime
+
+            return realtime
+        return side_by_side(cmd_name)
+
+
+@click.group(cls=Benches, invoke_without_command=True)
+@click.pass_context
+def bench(context: click.Context) -> None:
+    """Run the benchmark NAME, or list them. The peers are development dependencies; ``make test`` installs them.
+
+    \b
+    Examples:
+      borechain bench survey
+      borechain bench realtime --nodes 50 --seconds 120
+    """
+    if context.invoked_subcommand is None:
+        click.echo("\n".join(benches()))
+
+
+def side_by_side(name: str) -> click.Command:
+    """The command of one file of the folder."""
+
+    @click.command(name, help="Speed beside other libraries, measured in one run.")
+    @json_option
+    @plain_faults
+    def command(as_json: bool) -> None:
+        spec = importlib.util.spec_from_file_location(f"benchmarks_{name}", FOLDER / f"{name}.py")
+        if spec is None or spec.loader is None:
+            raise EnvironmentFault(f"{FOLDER / name}.py cannot be loaded")
+        module = importlib.util.module_from_spec(spec)
+        try:
+            spec.loader.exec_module(module)
+            result = module.run()
+        except ModuleNotFoundError as error:
+            raise EnvironmentFault(f"bench {name} needs {error.name}; install the development dependencies") from error
+        if as_json:
+            click.echo(json.dumps(result))
+        else:
+            show(result)
+
+    return command
+
+
+def show(result: dict[str, Any]) -> None:
+    """Table for people."""
+    from rich.table import Table
+
+    table = Table(title=f"bench {result['bench']}")
+    for heading in ("what", "ours", "peer", "times faster"):
+        table.add_column(heading, justify="right")
+    for what, row in result["ratios"].items():
+        ratio = row["ratio"]
+        table.add_row(what, seconds(row["ours"]), seconds(row["peer"]), "" if ratio is None else f"{ratio:.3g}")
+    console().print(table)
+
+
+def seconds(value: float | None) -> str:
+    """A time with its unit."""
+    if value is None:
+        return ""
+    if value < 1e-3:
+        return f"{1e6 * value:.1f} us"
+    return f"{1e3 * value:.2f} ms" if value < 1.0 else f"{value:.2f} s"

@@ -1,0 +1,115 @@
+"""``borechain bench realtime``: a string of real node processes on their own clocks, over zenoh on loopback."""
+
+from __future__ import annotations
+
+import json
+import tempfile
+import time
+from pathlib import Path
+from typing import Any
+
+import click
+
+from borechain.cli.faults import plain_faults
+from borechain.cli.options import json_option, seed_option
+from borechain.cli.tables import Columns, show_table, write_table
+from telemetry import keys
+
+RIG = "realtime"
+START_ALLOWANCE = 0.25  # s a node, for which the string rests longer
+SPARE = 120.0  # s, that the recordings are longer than the run
+COLUMNS: Columns = (
+    ("process", "process"),
+    ("hop", "hop"),
+    ("cycles", "cycles"),
+    ("overruns", "overruns"),
+    ("start_median_ms", "start jitter, median, ms"),
+    ("start_p99_ms", "p99"),
+    ("start_max_ms", "max"),
+    ("cycle_median_ms", "cycle, median, ms"),
+    ("cycle_p99_ms", "p99"),
+    ("cycle_max_ms", "max"),
+    ("first_cycle_s", "first cycle ended after, s"),
+    ("cpu_percent", "CPU, %"),
+    ("private_mb", "private memory, MB"),
+    ("pss_mb", "PSS, MB"),
+    ("yaw_known", "yaw known"),
+    ("yaw_rest_deg", "yaw error at rest, rms, deg"),
+    ("yaw_turning_deg", "turning"),
+)
+
+
+@click.command()
+@click.option("--nodes", type=click.IntRange(1, 250), default=50, show_default=True)
+@click.option("--seconds", type=click.FloatRange(4.0, 86400.0), default=120.0, show_default=True, help="Wall time.")
+@click.option("--endpoint", default=keys.DEFAULT_ENDPOINT, show_default=True, help="Where its router listens.")
+@click.option("--out", type=click.Path(path_type=Path, file_okay=False), help="Folder for realtime.csv.")
+@json_option
+@seed_option
+@plain_faults
+def realtime(nodes: int, seconds: float, endpoint: str, out: Path | None, as_json: bool, seed: int) -> None:
+    """Run a string of real node processes on their own clocks and measure it: overruns, jitter, memory, yaw.
+
+    \b
+    Example:
+      borechain bench realtime --nodes 50 --seconds 120
+    """
+    from sim.rig.launcher import check_port_free
+    from sim.studies.realtime import run
+
+    check_port_free(endpoint)
+    with tempfile.TemporaryDirectory(prefix="borechain-") as place:
+        string, table = prepare(nodes, seconds, endpoint, Path(place), seed)
+        measured = run(string, table, RIG, endpoint, seconds, Path(place))
+        result: dict[str, Any] = {"bench": "realtime", "nodes": nodes, "seconds": seconds} | measured
+    if out is not None:
+        write_table(out / "realtime.csv", result["cases"], COLUMNS)
+    if as_json:
+        click.echo(json.dumps(result))
+    else:
+        show(result)
+
+
+def prepare(nodes: int, seconds: float, endpoint: str, folder: Path, seed: int) -> tuple[Any, Any]:
+    """Record the string and write the table of its processes."""
+    from borechain.host import OwnTime, Place, run_encoder, run_node
+    from node.process.drivers.timed import TimedEncoder, TimedImu
+    from sim.rig.processes import ProcessTable, Spec
+    from sim.studies.turning_string import TurningString
+    from telemetry.messages import BASE, ENCODER, Side
+
+    rest = START_ALLOWANCE * nodes + 0.5 * seconds
+    string = TurningString(nodes, time.monotonic(), rest, 0.25 * seconds, rest + seconds + SPARE, seed)
+    string.record(folder)
+    order = [BASE, ENCODER, *range(nodes, 0, -1)]
+    specs = {}
+    for place in range(1, len(order)):
+        address = order[place]
+        neighbours = {Side.UPPER: order[place - 1]}
+        if place + 1 < len(order):
+            neighbours[Side.LOWER] = order[place + 1]
+        own_time = OwnTime(neighbours, string.offset(address))
+        name = "encoder" if address == ENCODER else str(address)
+        at = Place(RIG, endpoint, folder / name)
+        if address == ENCODER:
+            specs[name] = Spec(run_encoder, (at, TimedEncoder(folder / "encoder.npy"), own_time))
+        else:
+            imu = TimedImu(folder / f"tube-{address}.npy")
+            specs[name] = Spec(run_node, (at, string.settings(address), [imu], own_time))
+    return string, ProcessTable(specs, ["borechain.warm"])
+
+
+def show(result: dict[str, Any]) -> None:
+    """Table for people: the worst of all, and the sums."""
+    worst, total = result["worst"], result["total"]
+    rows = [
+        {"what": key.replace("_", " "), "worst": worst[key], "total": total.get(key)}
+        for key, _ in COLUMNS
+        if key in worst
+    ]
+    show_table(
+        f"{result['nodes']} nodes in real time, {result['seconds']:g} s",
+        rows,
+        (("what", "figure"), ("worst", "worst process"), ("total", "all together")),
+    )
+    click.echo(f"router and base station: {result['router_and_base_cpu_percent']:.1f} % of a core")

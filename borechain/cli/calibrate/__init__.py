@@ -1,0 +1,1 @@
+"""Commands that calibrate sensors from records."""

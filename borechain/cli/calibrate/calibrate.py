@@ -1,0 +1,27 @@
+"""``borechain calibrate``: records of a laboratory to matrices, coefficients and verdicts."""
+
+from __future__ import annotations
+
+import click
+
+from borechain.cli.calibrate.linear import attitudes, turntable
+from borechain.cli.calibrate.mwd import magnetometer, mwd, qc
+
+
+@click.group()
+def calibrate() -> None:
+    """Calibrate sensors from the records of a laboratory, and control the result.
+
+    Formats and models are described in docs/calibration.md. A record that is none is refused with its line, and then
+    nothing is written.
+
+    \b
+    Examples:
+      borechain calibrate turntable gyroscope.csv --reference 720 --out gyroscope.json --certificate gyroscope.pdf
+      borechain calibrate attitudes accelerometer.csv --plot accelerometer.svg
+      borechain calibrate mwd scenarios/instruments/mwd-oven.csv --parameters 30 --out accelerometers.json
+    """
+
+
+for command in (turntable, attitudes, mwd, magnetometer, qc):
+    calibrate.add_command(command)

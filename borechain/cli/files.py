@@ -1,0 +1,25 @@
+"""Files that land whole or not at all."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from borechain.cli.faults import EnvironmentFault
+
+
+def write_whole(path: Path, text: str) -> None:
+    """Write a text file, its folder included.
+
+    Raises
+    ------
+    EnvironmentFault
+        When the place cannot be written; nothing is left behind.
+    """
+    fresh = path.with_name(f"{path.name}.new")
+    try:
+        path.parent.mkdir(parents=True, exist_ok=True)
+        fresh.write_text(text)
+        fresh.replace(path)
+    except OSError as error:
+        fresh.unlink(missing_ok=True)
+        raise EnvironmentFault(f"{path}: {error.strerror}; choose a writable place") from error

@@ -1,0 +1,1 @@
+"""Commands that run the ground station or ask it."""

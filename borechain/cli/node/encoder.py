@@ -1,0 +1,48 @@
+"""``borechain encoder``: the encoder node on the drive head."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import click
+
+from borechain.cli.faults import plain_faults
+from borechain.cli.options import above_option, below_option, clock_option, own_neighbours, place_options
+
+
+@click.command()
+@click.option("--counter", help="The node's own counter: counter:FILE, replay:FILE or timed:FILE.")
+@click.option("--torque-nm", type=float, default=0.0, help="Drilling torque, until a sensor tells it; 0: no torsion.")
+@click.option("--trapped-fraction", type=float, default=0.01, show_default=True, help="Of it after a stop, 1 sigma.")
+@clock_option
+@above_option
+@below_option
+@place_options
+@plain_faults
+def encoder(
+    counter: str | None,
+    torque_nm: float,
+    trapped_fraction: float,
+    clock: str,
+    above: int | None,
+    below: int | None,
+    rig_name: str,
+    endpoint: str,
+    folder: Path,
+) -> None:
+    """Run the encoder node until it is stopped.
+
+    \b
+    Examples:
+      borechain encoder --folder state/encoder
+      borechain encoder --clock own --counter replay:counter.csv --above base --below 2
+    """
+    from borechain.host import OwnTime, Place, run_encoder
+    from node.firmware.torque import TorqueSettings
+    from node.process.drivers.choice import encoder_source
+    from telemetry.messages import ENCODER, Side
+
+    neighbours = own_neighbours(clock, ENCODER, ("--counter", counter), {Side.UPPER: above, Side.LOWER: below})
+    own_time = None if neighbours is None else OwnTime(neighbours)
+    torque = TorqueSettings(torque_nm, trapped_fraction)
+    run_encoder(Place(rig_name, endpoint, folder), encoder_source(counter) if counter else None, own_time, torque)

@@ -1,0 +1,129 @@
+"""``borechain node``: what a tube's board runs."""
+
+from __future__ import annotations
+
+import math
+from pathlib import Path
+from typing import Literal
+
+import click
+
+from borechain.cli.faults import plain_faults
+from borechain.cli.node.cluster import cluster
+from borechain.cli.options import above_option, below_option, clock_option, key_option, own_neighbours, place_options
+
+FILE = click.Path(path_type=Path, dir_okay=False)
+SCHEMES = ("forward", "estimate", "intersection")
+
+
+@click.command()
+@click.option("--tube", type=int, required=True, help="Number of the tube, 1 is the lowest.")
+@click.option("--drive-joint-deg", type=float, default=0.0, help="Scribe-mark reading, drive head to this tube.")
+@click.option("--lower-joint-deg", type=float, default=0.0, help="Scribe-mark reading, this tube to the one below.")
+@click.option("--joint-std-deg", type=float, default=0.05, show_default=True, help="Error of a reading, 1 sigma.")
+@click.option("--mount-std-deg", type=float, default=0.05, show_default=True, help="Error of the IMU's mount, 1 sigma.")
+@click.option(
+    "--kernel",
+    type=click.Choice(["float64", "fixed", "published"]),
+    default="float64",
+    show_default=True,
+    help="Arithmetic of the loop, or its published form.",
+)
+@click.option(
+    "--scheme",
+    type=click.Choice(SCHEMES),
+    default="forward",
+    show_default=True,
+    help="What goes down the string: the encoder's measurement, or the node's own estimate and how it is taken.",
+)
+@click.option(
+    "--stiffness-nm", type=float, default=math.inf, help="Torque that twists the tube by 1 rad; rigid if absent."
+)
+@click.option(
+    "--torsion",
+    type=click.Choice(["gate", "variance"]),
+    default="gate",
+    show_default=True,
+    help="Aiding under torque: not used, or used with the variance of the twist.",
+)
+@click.option(
+    "--joints",
+    type=click.Choice(["marks", "solved", "both"]),
+    default="marks",
+    show_default=True,
+    help="Whence the angle of a joint comes that is made up above.",
+)
+@click.option(
+    "--imu",
+    "sources",
+    multiple=True,
+    help="The node's own sensor: replay:FILE, timed:FILE, mpu6500:BUS or mpu6500:BUS:ADDRESS; for each.",
+)
+@click.option("--imu-noise", "noises", type=float, multiple=True, help="Noise of an IMU, times the usual; for each.")
+@click.option(
+    "--imu-offset-mm", "offsets", type=(float, float), multiple=True, help="Place off the tube's axis, X Y; for each."
+)
+@click.option(
+    "--imu-gyroscope", "gyroscopes", type=FILE, multiple=True, help="Calibration of an IMU's gyroscope; for each."
+)
+@click.option("--imu-accelerometer", "accelerometers", type=FILE, multiple=True, help="Of its accelerometer; for each.")
+@clock_option
+@above_option
+@below_option
+@key_option
+@place_options
+@plain_faults
+def node(
+    tube: int,
+    drive_joint_deg: float,
+    lower_joint_deg: float,
+    joint_std_deg: float,
+    mount_std_deg: float,
+    kernel: Literal["float64", "fixed", "published"],
+    scheme: str,
+    stiffness_nm: float,
+    torsion: Literal["gate", "variance"],
+    joints: Literal["marks", "solved", "both"],
+    sources: tuple[str, ...],
+    noises: tuple[float, ...],
+    offsets: tuple[tuple[float, float], ...],
+    gyroscopes: tuple[Path, ...],
+    accelerometers: tuple[Path, ...],
+    clock: str,
+    above: int | None,
+    below: int | None,
+    key_file: Path | None,
+    rig_name: str,
+    endpoint: str,
+    folder: Path,
+) -> None:
+    """Run the node of one tube until it is stopped.
+
+    \b
+    Examples:
+      borechain node --tube 1 --drive-joint-deg 12.5 --folder state/tube-1
+      borechain node --tube 1 --imu mpu6500:1:0x68 --imu mpu6500:1:0x69
+      borechain node --tube 1 --clock own --imu mpu6500:1 --above 2 --folder state/tube-1
+    """
+    from borechain.host import OwnTime, Place, run_node
+    from node.firmware.settings import Joint, TubeSettings
+    from node.kernels.layout import Scheme
+    from node.process.drivers.choice import imu_source
+    from telemetry.messages import Side
+
+    joint_std = math.radians(joint_std_deg)
+    settings = TubeSettings(
+        tube=tube,
+        drive_joint=Joint(math.radians(drive_joint_deg), joint_std),
+        lower_joint=Joint(math.radians(lower_joint_deg), joint_std),
+        mount_std=math.radians(mount_std_deg),
+        scheme=Scheme[scheme.upper()],
+        kernel=kernel,
+        stiffness=stiffness_nm,
+        torsion=torsion,
+        joints=joints,
+        imus=cluster(len(sources), noises, offsets, gyroscopes, accelerometers),
+    )
+    neighbours = own_neighbours(clock, tube, ("--imu", sources), {Side.UPPER: above, Side.LOWER: below})
+    own_time = None if neighbours is None else OwnTime(neighbours)
+    run_node(Place(rig_name, endpoint, folder, key_file), settings, [imu_source(s) for s in sources], own_time)

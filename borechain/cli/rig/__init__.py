@@ -1,0 +1,1 @@
+"""Commands that run a rig or a part of its world."""

@@ -1,0 +1,39 @@
+"""``borechain medium``: world, joints and clock of a scenario."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import click
+
+from borechain.cli.faults import plain_faults
+from borechain.cli.options import fault_option, place_options, seed_option, speed_option
+
+
+@click.command()
+@click.argument("scenario", type=click.Path(path_type=Path))
+@seed_option
+@speed_option
+@fault_option
+@click.option("--router/--no-router", default=False, help="Be the router of this rig, instead of joining one.")
+@place_options
+@plain_faults
+def medium(
+    scenario: Path,
+    seed: int,
+    speed: float,
+    faults: tuple[str, ...],
+    router: bool,
+    rig_name: str,
+    endpoint: str,
+    folder: Path,
+) -> None:
+    """Run the world of a scenario for processes that join by their own commands.
+
+    \b
+    Example:
+      borechain medium scenarios/compose-2.toml --speed 1
+    """
+    from borechain.host import Place, run_medium
+
+    run_medium(Place(rig_name, endpoint, folder), scenario, seed, speed, faults, router)

@@ -1,0 +1,262 @@
+"""``borechain rig``: a whole rig in real processes."""
+
+from __future__ import annotations
+
+import json
+import time
+from collections.abc import Callable
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import click
+
+from borechain.cli.faults import EnvironmentFault, plain_faults
+from borechain.cli.options import fault_option, json_option, seed_option, speed_option
+from borechain.cli.tables import console
+from telemetry import keys
+
+if TYPE_CHECKING:
+    from sim.rig.launcher import Tick
+    from sim.rig.processes import ProcessTable
+    from sim.world.world import World
+    from telemetry.media.zenoh_bus import ZenohBus
+
+PRELOAD = {"float64": "borechain.warm", "fixed": "borechain.warm_all", "published": "borechain.warm_all"}  # by kernel
+
+
+@click.command()
+@click.argument("scenario", type=click.Path(path_type=Path))
+@speed_option
+@seed_option
+@fault_option
+@click.option("--transport", type=click.Choice(["zenoh"]), default="zenoh", show_default=True)
+@click.option(
+    "--rig", "rig_name", default=keys.DEFAULT_RIG, show_default=True, help="Name of the rig in key expressions."
+)
+@click.option("--endpoint", default=keys.DEFAULT_ENDPOINT, show_default=True, help="Where the rig's router listens.")
+@click.option(
+    "--out", type=click.Path(path_type=Path), help="New or empty folder for the run  [default: out/NAME/run-NNNN]"
+)
+@json_option
+@plain_faults
+def rig(
+    scenario: Path,
+    speed: float,
+    seed: int,
+    faults: tuple[str, ...],
+    transport: str,
+    rig_name: str,
+    endpoint: str,
+    out: Path | None,
+    as_json: bool,
+) -> None:
+    """Drill SCENARIO tube by tube with one real process a tube, and show what the ground station makes of it.
+
+    \b
+    Examples:
+      borechain rig scenarios/wellbore-1.toml
+      borechain rig scenarios/wellbore-1.toml --speed 1 --fault kill-node:3@900
+    """
+    del transport
+    from sim.rig.launcher import Launcher, check_port_free, next_run_folder, prepare_folder
+    from sim.rig.report import write_files
+    from sim.world.scenario import load_scenario
+    from sim.world.world import World
+
+    world = World(load_scenario(scenario, faults), seed)
+    check_port_free(endpoint)
+    folder = out if out is not None else next_run_folder(Path("out") / scenario.stem)
+    prepare_folder(folder)
+    table = process_table(world, scenario, seed, speed, faults, rig_name, endpoint, folder)
+    started = time.monotonic()
+    try:
+        with progress(world, quiet=as_json) as show:
+            launcher = Launcher(table, rig_name, endpoint, show, operator_of(world, rig_name))
+            answers = launcher.run(lambda bus: ask(bus, rig_name))
+    except KeyboardInterrupt:
+        raise EnvironmentFault(f"interrupted; every process was ended, what was stored is in {folder}") from None
+    result = result_of(answers, world)
+    result |= {"processes": 3 + world.scenario.tubes, "wall_s": round(time.monotonic() - started, 3)}
+    result["restarts"] = sum(table.restarts.values())
+    write_files(folder, result)
+    if as_json:
+        click.echo(json.dumps(result))
+    else:
+        show_result(result, folder)
+
+
+def process_table(
+    world: World,
+    scenario: Path,
+    seed: int,
+    speed: float,
+    faults: tuple[str, ...],
+    rig_name: str,
+    endpoint: str,
+    folder: Path,
+) -> ProcessTable:
+    """Every process of the rig, one line each."""
+    from borechain.host import Place, run_encoder, run_ground, run_medium, run_node
+    from sim.rig.launcher import private_folder
+    from sim.rig.processes import ProcessTable, Spec
+    from telemetry.transport.authentication import new_key
+
+    key_file = new_key(folder / "rig.key")
+
+    def place(name: str) -> Place:
+        return Place(rig_name, endpoint, private_folder(folder, name), key_file)
+
+    specs = {
+        "medium": Spec(run_medium, (place("medium"), scenario, seed, speed, faults, True, True)),
+        "encoder": Spec(run_encoder, (place("encoder"), None, None, world.torque_settings())),
+        "base": Spec(run_ground, (place("ground"), ground_settings(world))),
+    }
+    for tube in range(1, world.scenario.tubes + 1):
+        specs[str(tube)] = Spec(run_node, (place(f"tube-{tube}"), world.tube_settings(tube)))
+    return ProcessTable(specs, [PRELOAD[world.scenario.file.node.kernel]])
+
+
+def operator_of(world: World, rig_name: str) -> Callable[[ZenohBus, str], bool]:
+    """Who steps the calibration in the field, where the scenario has one."""
+    from sim.rig.operator import Operator
+
+    if world.rack is None:
+        return lambda _bus, _cue: True
+    return Operator(world.rack, world.scenario.tubes, rig_name).act_on_cue
+
+
+def ground_settings(world: World) -> dict[str, Any]:
+    """What the operator enters at the ground station: tally, design, and what calibration left."""
+    file = world.scenario.file
+    return {
+        "tube_length": world.scenario.tube_length,
+        "gravity": file.accelerometer.gravity_mps2,
+        "accelerometer_bias_std_deg": file.accelerometer.bias_std_deg,
+        "mount_std_deg": file.joints.mount_std_deg,
+        "target": file.design.length_m or world.scenario.tubes * world.scenario.tube_length,
+        "design_inclination_deg": file.design.inclination_deg,
+        "design_azimuth_deg": file.design.azimuth_deg,
+        "column_radius": file.design.radius_m,
+        "tolerance": file.design.tolerance,
+    }
+
+
+def ask(bus: ZenohBus, rig_name: str) -> dict[str, Any]:
+    """Stations, trajectory and measurements as any operator would get them."""
+    return {
+        path: get_json(bus, f"borechain/{rig_name}/ground/{path}")
+        for path in ("stations", "measurements", "column", "alarms", "recalibration")
+    }
+
+
+def get_json(bus: ZenohBus, selector: str) -> Any:
+    """One reply of the ground station."""
+    from sim.errors import RigError
+
+    replies = bus.get(selector, timeout=10.0)
+    if len(replies) != 1 or replies[0].error is not None:
+        raise RigError(f"{selector}: expected one answer of the ground station, got {len(replies)}")
+    return json.loads(replies[0].payload)
+
+
+def result_of(answers: dict[str, Any], world: World) -> dict[str, Any]:
+    """The JSON object of the command."""
+    from sim.rig.calibration_report import calibration
+    from sim.rig.report import digest, figures, station_table
+
+    stations = station_table(answers["stations"]["stations"], world)
+    measurements = answers["measurements"]["measurements"]
+    result: dict[str, Any] = {
+        "stations": stations,
+        "figures": figures(stations, measurements, world),
+        "measurements": len(measurements),
+        "column": {key: answers["column"][key] for key in ("worst", "projection", "dominant")},
+        "alarms": answers["alarms"]["active"],
+        "rig_s": round(world.end - world.begin, 3),
+        "digest": digest(stations),
+    }
+    if world.rack is not None:
+        result["calibration"] = calibration(answers["recalibration"], measurements, world)
+    return result
+
+
+class progress:  # noqa: N801
+    """Progress bar on stderr, silent for scripts."""
+
+    def __init__(self, world: World, *, quiet: bool) -> None:
+        from rich.console import Console
+        from rich.progress import BarColumn, Progress, TextColumn, TimeRemainingColumn
+
+        self._bar = Progress(
+            TextColumn("{task.description:<16}"),
+            BarColumn(),
+            TextColumn("{task.completed:.0f}/{task.total:.0f} s of rig time"),
+            TimeRemainingColumn(),
+            console=Console(stderr=True),
+            disable=quiet,
+        )
+        self._task = self._bar.add_task("starting", total=world.end - world.begin)
+
+    def __enter__(self) -> Callable[[Tick], None]:
+        self._bar.start()
+        return self._show
+
+    def __exit__(self, *_: object) -> None:
+        self._bar.stop()
+
+    def _show(self, tick: Tick) -> None:
+        self._bar.update(self._task, completed=tick.rig_time - tick.begin, description=tick.phase)
+
+
+def show_result(result: dict[str, Any], folder: Path) -> None:
+    """Station table beside the truth, and the figures, for people."""
+    from rich.table import Table
+
+    paper = console(100)
+    table = Table(title="Stations: measured, below it the truth")
+    for name in ("#", "MD m", "looks", "incl deg", "azi deg", "north m", "east m", "TVD m", "sigma N cm", "sigma E cm"):
+        table.add_column(name, justify="right")
+    for s in result["stations"]:
+        t = s["truth"]
+        lines = [
+            f"{s[key]:.{digits}f}\n[dim]{t[key]:.{digits}f}[/dim]"
+            for key, digits in (("inclination_deg", 3), ("azimuth_deg", 2), ("north_m", 4), ("east_m", 4), ("tvd_m", 4))
+        ]
+        sigmas = [f"{100.0 * s[key]:.3f}" for key in ("sigma_north_m", "sigma_east_m")]
+        table.add_row(str(s["station"]), f"{s['md_m']:.2f}", str(s["measurements"]), *lines, *sigmas)
+    paper.print(table)
+    for name, value in result["figures"].items():
+        values = value if isinstance(value, list) else [value]
+        shown = " ".join("-" if v is None else f"{v:.4f}" for v in values)
+        paper.print(f"{name:22} {shown}")
+    show_column(result)
+    if "calibration" in result:
+        show_calibration(result["calibration"])
+    paper.print(
+        f"{len(result['stations'])} stations, {result['measurements']} measurements, {result['processes']} processes, "
+        f"{result['rig_s']:.0f} s of rig time in {result['wall_s']:.1f} s"
+    )
+    paper.print(f"digest {result['digest']}\nfiles  {folder}", soft_wrap=True)
+
+
+def show_column(result: dict[str, Any]) -> None:
+    """Where the column is against its design, in a line each."""
+    for name in ("worst", "projection"):
+        d = result["column"][name]
+        if d is not None:
+            click.echo(
+                f"column {name:15} {d['deviation_cm']:.1f} +- {d['sigma_cm']:.2f} cm "
+                f"towards {d['direction_deg']:.0f} deg at {d['md_m']:.1f} m, {d['used_percent']:.0f} % of the tolerance"
+            )
+    for alarm in result["alarms"]:
+        click.echo(f"alarm  {alarm['kind']:15} {alarm['level_percent']} % of the tolerance at {alarm['md_m']:.1f} m")
+
+
+def show_calibration(calibration: dict[str, Any]) -> None:
+    """What the calibration in the field was good for, and the block of each tube."""
+    errors = calibration["inclination_rms_deg"]
+    shown = ", ".join(f"{name} {'-' if value is None else f'{value:.4f}'}" for name, value in errors.items())
+    click.echo(f"calibration, inclination_rms_deg: {shown}")
+    for t in calibration["tubes"]:
+        cut = f", after its power cut {t['hash_after_restart'][:8]}" if t["restarted"] else ""
+        click.echo(f"tube {t['tube']:<3} block {t['hash_before'][:8]} -> {t['hash'][:8]} version {t['version']}{cut}")

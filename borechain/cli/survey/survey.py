@@ -1,0 +1,266 @@
+"""``borechain survey``: trajectory and region of uncertainty of a record."""
+
+from __future__ import annotations
+
+import csv
+import datetime
+import io
+import json
+import math
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import click
+
+from borechain.cli.faults import InputFault, plain_faults
+from borechain.cli.files import write_whole
+from borechain.cli.options import json_option
+from borechain.cli.tables import console
+
+if TYPE_CHECKING:
+    from groundstation.survey.analysis import Analysis
+    from groundstation.survey.instruments import Tool
+
+METHODS = ("tangential", "balanced-tangential", "average-angle", "radius-of-curvature", "minimum-curvature")
+SOURCES_SHOWN = 12
+
+
+@click.command()
+@click.argument("file", type=click.Path(path_type=Path))
+@click.option("--method", type=click.Choice(METHODS), default="balanced-tangential", show_default=True)
+@click.option(
+    "--instrument",
+    default="relay",
+    show_default=True,
+    metavar="NAME|FILE",
+    help="Shipped tool, or a TOML or JSON file.",
+)
+@click.option(
+    "--sigma", type=click.FloatRange(0.0, min_open=True), default=1.0, show_default=True, help="Of the result."
+)
+@click.option("--azimuth-error-deg", type=click.FloatRange(0.0), help="Constant error in place of the gyro's.")
+@click.option("--displacement-rule", type=click.Choice(["exact", "thesis"]), default="exact", show_default=True)
+@click.option("--from-collar", is_flag=True, help="Begin at a vertical collar at 0 m that the file leaves out.")
+@click.option("--md", type=float, multiple=True, help="Further depth (m) to answer for, on the arc. Repeatable.")
+@click.option(
+    "--north-of-site-deg", type=float, default=0.0, help="Azimuth of the site's north from true or grid north."
+)
+@click.option("--section-azimuth-deg", type=float, default=0.0, show_default=True, help="Of the vertical section.")
+@click.option("--gravity", type=float, default=9.81, show_default=True, help="m/s^2.")
+@click.option("--field-nt", type=float, default=50_000.0, show_default=True, help="Magnetic field, for magnetic tools.")
+@click.option("--dip-deg", type=float, default=70.0, show_default=True)
+@click.option("--declination-deg", type=float, default=0.0, show_default=True, help="Of magnetic against site north.")
+@click.option("--latitude-deg", type=float, default=52.0, show_default=True)
+@click.option("--out", type=click.Path(path_type=Path, dir_okay=False), help="Station table as CSV.")
+@click.option(
+    "--plot", type=click.Path(path_type=Path, dir_okay=False), help="Plan, sections, uncertainty: PNG, SVG, PDF."
+)
+@click.option("--export-tool", type=click.Path(path_type=Path, dir_okay=False), help="Instrument as ISCWSA JSON.")
+@json_option
+@plain_faults
+def survey(
+    file: Path,
+    method: str,
+    instrument: str,
+    sigma: float,
+    azimuth_error_deg: float | None,
+    displacement_rule: str,
+    from_collar: bool,
+    md: tuple[float, ...],
+    north_of_site_deg: float,
+    section_azimuth_deg: float,
+    gravity: float,
+    field_nt: float,
+    dip_deg: float,
+    declination_deg: float,
+    latitude_deg: float,
+    out: Path | None,
+    plot: Path | None,
+    export_tool: Path | None,
+    as_json: bool,
+) -> None:
+    """Compute trajectory and region of uncertainty of FILE.
+
+    FILE is a CSV of stations (md_m, inclination_deg, azimuth_deg) or of lateral displacements (md_m, a_cm, b_cm).
+
+    \b
+    Examples:
+      borechain survey scenarios/wellbore-1-path.csv --displacement-rule thesis
+      borechain survey stations.csv --method minimum-curvature --instrument mwd-rev5.1 --sigma 2 --plot survey.svg
+    """
+    from groundstation.survey.analysis import analyse, with_azimuth_error
+    from groundstation.survey.error_sources import Site
+    from groundstation.survey.instruments import load_tool
+    from groundstation.survey.methods import Method
+    from groundstation.survey.records import DisplacementRule, read_record, with_collar
+
+    record = read_record(file, DisplacementRule(displacement_rule))
+    if from_collar:
+        record = with_collar(record)
+    tool = load_tool(instrument)
+    if azimuth_error_deg is not None:
+        tool = with_azimuth_error(tool, math.radians(azimuth_error_deg))
+    site = Site(gravity, field_nt, math.radians(dip_deg), math.radians(declination_deg), math.radians(latitude_deg))
+    outside = [depth for depth in md if not record.md[0] <= depth <= record.md[-1]]
+    if outside:
+        raise InputFault(f"--md {outside[0]:g}: expected a depth of {record.md[0]:g}..{record.md[-1]:g} m")
+    found = analyse(record, Method(method), tool, site, math.radians(section_azimuth_deg))
+    rows = station_rows(found, sigma, north_of_site_deg)
+    result = {
+        "file": str(file),
+        "method": method,
+        "instrument": tool.name,
+        "sigma": sigma,
+        "stations": rows,
+        "at": [at_depth(found, depth, sigma) for depth in md],
+        "closure_m": float(found.closure_distance[-1]),
+        "closure_azimuth_deg": math.degrees(found.closure_azimuth[-1]),
+        "sources": sources(found, sigma),
+    }
+    if out is not None:
+        write_whole(out, table_text(rows))
+    if plot is not None:
+        draw(found, tool, sigma, str(file), plot)
+    if export_tool is not None:
+        export(tool, export_tool)
+    if as_json:
+        click.echo(json.dumps(result))
+    else:
+        show(result)
+
+
+def station_rows(found: Analysis, sigma: float, north_of_site_deg: float) -> list[dict[str, Any]]:
+    """One object a station; uncertainty at ``sigma`` standard deviations."""
+    from groundstation.survey.methods import referred
+
+    azimuths = referred(found.record.azimuth, math.radians(north_of_site_deg))
+    rows = []
+    for k, md in enumerate(found.record.md.tolist()):
+        north, east, tvd = found.positions[k].tolist()
+        severity = 0.0 if k == 0 else float(found.dogleg_severity[k - 1])
+        rows.append(
+            {
+                "station": k,
+                "md_m": md,
+                "inclination_deg": math.degrees(found.record.inclination[k]),
+                "azimuth_deg": math.degrees(azimuths[k]),
+                "north_m": north,
+                "east_m": east,
+                "tvd_m": tvd,
+                "dogleg_severity_deg_per_30m": math.degrees(severity) * 30.0,
+                "closure_m": float(found.closure_distance[k]),
+                "vertical_section_m": float(found.vertical_section[k]),
+                "uncertainty": region(found.uncertainty.cov[k], sigma),
+            }
+        )
+    return rows
+
+
+def region(cov: Any, sigma: float) -> dict[str, Any]:
+    """Region of uncertainty: half-widths at ``sigma`` standard deviations, and the covariance (1 sigma)."""
+    from groundstation.survey.ellipsoid import plan_ellipse
+
+    ellipse = plan_ellipse(cov, sigma)
+    half = [sigma * math.sqrt(max(float(cov[i, i]), 0.0)) for i in range(3)]
+    return {
+        "north_m": half[0],
+        "east_m": half[1],
+        "tvd_m": half[2],
+        "major_m": ellipse.major,
+        "minor_m": ellipse.minor,
+        "azimuth_deg": math.degrees(ellipse.azimuth),
+        "covariance_m2": cov.tolist(),
+    }
+
+
+def at_depth(found: Analysis, md: float, sigma: float) -> dict[str, Any]:
+    """Position on the arc and its uncertainty at any depth."""
+    import numpy as np
+
+    from groundstation.survey.methods import tangents
+    from groundstation.survey.trajectory import Point, interpolate
+
+    directions = tangents(found.record.inclination, found.record.azimuth)
+    none, no_columns = np.zeros((3, 3)), np.zeros((3, 0))
+    points = [
+        Point(float(m), t, p, none, no_columns)
+        for m, t, p in zip(found.record.md, directions, found.positions, strict=True)
+    ]
+    point = interpolate(points, md)
+    north, east, tvd = point.position.tolist()
+    place = {"md_m": md, "north_m": north, "east_m": east, "tvd_m": tvd}
+    return place | {"uncertainty": region(found.uncertainty.at(md), sigma)}
+
+
+def sources(found: Analysis, sigma: float) -> list[dict[str, Any]]:
+    """Contribution of every source at the last station, largest first."""
+    rows = []
+    for name, cov in found.uncertainty.by_source().items():
+        north, east, tvd = (sigma * math.sqrt(max(float(cov[-1, i, i]), 0.0)) for i in range(3))
+        rows.append({"source": name, "north_m": north, "east_m": east, "tvd_m": tvd})
+    return sorted(rows, key=lambda row: -math.hypot(row["north_m"], row["east_m"], row["tvd_m"]))
+
+
+def table_text(rows: list[dict[str, Any]]) -> str:
+    """Station table as CSV."""
+    text = io.StringIO()
+    writer = csv.writer(text, lineterminator="\n")
+    plain = [key for key in rows[0] if key != "uncertainty"]
+    half = ("north_m", "east_m", "tvd_m")
+    writer.writerow([*plain, *(f"uncertainty_{key}" for key in half)])
+    writer.writerows([[*(row[key] for key in plain), *(row["uncertainty"][key] for key in half)] for row in rows])
+    return text.getvalue()
+
+
+def draw(found: Analysis, tool: Tool, sigma: float, title: str, path: Path) -> None:
+    """Plan view, sections and uncertainty."""
+    from groundstation.report.plots import survey_figure
+    from groundstation.report.style import save
+    from groundstation.survey.ellipsoid import probability_of
+
+    confidence = probability_of(sigma, 2)
+    figure = survey_figure(
+        found.record.md, found.positions, found.uncertainty.cov, confidence, f"{title}, {tool.name}, {sigma:g} sigma"
+    )
+    save(figure, path)
+
+
+def export(tool: Tool, path: Path) -> None:
+    """Instrument as ISCWSA JSON."""
+    from groundstation.survey.iscwsa_json import to_json
+
+    write_whole(path, to_json(tool, datetime.datetime.now(datetime.UTC).date()))
+
+
+def show(result: dict[str, Any]) -> None:
+    """Tables for people."""
+    from rich.table import Table
+
+    paper = console(110)
+    table = Table(title=f"{result['file']}: {result['method']}, {result['instrument']}, {result['sigma']:g} sigma")
+    names = ("#", "MD m", "incl deg", "azi deg", "north m", "east m", "TVD m", "DLS deg/30m")
+    for name in (*names, "+-N cm", "+-E cm", "+-TVD cm"):
+        table.add_column(name, justify="right")
+    for row in result["stations"]:
+        u = row["uncertainty"]
+        table.add_row(
+            str(row["station"]),
+            f"{row['md_m']:.2f}",
+            f"{row['inclination_deg']:.2f}",
+            f"{row['azimuth_deg']:.2f}",
+            f"{row['north_m']:.4f}",
+            f"{row['east_m']:.4f}",
+            f"{row['tvd_m']:.4f}",
+            f"{row['dogleg_severity_deg_per_30m']:.2f}",
+            *(f"{100.0 * u[key]:.3f}" for key in ("north_m", "east_m", "tvd_m")),
+        )
+    paper.print(table)
+    for row in result["at"]:
+        paper.print(f"at {row['md_m']:g} m: {row['north_m']:.4f} {row['east_m']:.4f} {row['tvd_m']:.4f} m")
+    paper.print(f"closure {result['closure_m']:.4f} m towards {result['closure_azimuth_deg']:.2f} deg")
+    parts = Table(title="What the uncertainty at the last station is made of, cm")
+    for name in ("source", "north", "east", "TVD"):
+        parts.add_column(name, justify="right")
+    for row in result["sources"][:SOURCES_SHOWN]:
+        parts.add_row(row["source"], *(f"{100.0 * row[key]:.4f}" for key in ("north_m", "east_m", "tvd_m")))
+    paper.print(parts)

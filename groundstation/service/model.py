@@ -1,0 +1,266 @@
+"""The ground station's knowledge of one rig: string, nodes, stations, trajectory. No I/O."""
+
+from __future__ import annotations
+
+import math
+from collections import deque
+from dataclasses import dataclass, field
+
+import numpy as np
+import numpy.typing as npt
+
+from groundstation.config import GroundConfig
+from groundstation.errors import SurveyError
+from groundstation.service.alarms import AlarmList
+from groundstation.service.recalibration.procedure import FieldProcedure
+from groundstation.service.tally import DepthLog, Tally
+from groundstation.survey.columns import Deviation, deviation, project
+from groundstation.survey.fusion import Departure, Evidence, departure, judge_departure, weighted
+from groundstation.survey.resolve import Direction, Quality, check, combine_imus, resolve
+from groundstation.survey.shared import SharedErrors
+from groundstation.survey.trajectory import Point, Trajectory
+from telemetry.messages import Event, NodeState, StaticRecord, SurveyMeasurement
+
+Array = npt.NDArray[np.float64]
+EVENTS_SHOWN = 10_000
+STATIC_RECORDS_SHOWN = 1_000
+ACCELEROMETER_NOISE_DEG = 0.02  # one sample, for the check of motion
+SAME_STOP = 15.0  # s, within which two surveys were taken at one stop
+
+
+@dataclass(frozen=True, slots=True)
+class ResolvedStop:
+    """One resolved survey measurement."""
+
+    measurement: SurveyMeasurement
+    md: float
+    direction: Direction
+    quality: Quality
+
+    @property
+    def at(self) -> float:
+        """Rig time of the stop, s."""
+        return self.measurement.station_at
+
+
+@dataclass(slots=True)
+class SurveyStation:
+    """One depth of the hole and every cluster measured there, oldest first.
+
+    ``drops`` are the places of clusters that found another hole than those before them.
+    """
+
+    md: float
+    clusters: list[ResolvedStop] = field(default_factory=list)
+    drops: list[int] = field(default_factory=list)
+    _departures: dict[int, Departure] = field(default_factory=dict)
+
+    @property
+    def count(self) -> int:
+        """Clusters measured here."""
+        return len(self.clusters)
+
+    @property
+    def first(self) -> int:
+        """Place of the first cluster that counts."""
+        return self.first_before(self.count)
+
+    def first_before(self, place: int) -> int:
+        """Place of the first cluster that counted when the one at ``place`` came."""
+        return max((drop for drop in self.drops if drop < place), default=0)
+
+    def add_stop(self, cluster: ResolvedStop) -> None:
+        """Take one more cluster in the order of time; what was judged of later ones is forgotten."""
+        self.clusters.append(cluster)
+        self.clusters.sort(key=lambda known: (known.at, known.measurement.tube))
+        self.forget(self.clusters.index(cluster))
+
+    def forget(self, place: int) -> None:
+        """Forget decisions from ``place`` on."""
+        self.drops = [drop for drop in self.drops if drop < place]
+        self._departures = {k: d for k, d in self._departures.items() if k < place}
+
+    def readings(self) -> list[Direction]:
+        """Directions of the clusters that count."""
+        return [cluster.direction for cluster in self.clusters[self.first :]]
+
+    def departure(self, place: int) -> Departure | None:
+        """How far the cluster at ``place`` departed from those before; None for the first of its hole."""
+        first = self.first_before(place)
+        if first == place:
+            return None
+        if place not in self._departures:
+            self._departures[place] = departure([c.direction for c in self.clusters[first : place + 1]])
+        return self._departures[place]
+
+
+@dataclass(frozen=True, slots=True)
+class Moved:
+    """The decision that the hole moved at a station, with its evidence."""
+
+    md: float
+    at: float  # s
+    dropped: int  # earlier clusters that no longer count
+    evidence: Evidence
+
+
+class RigModel:
+    """Everything an operator can ask for.
+
+    Parameters
+    ----------
+    config : of the ground station
+    """
+
+    def __init__(self, config: GroundConfig) -> None:
+        self.config = config
+        self.tally = Tally(config.tube_length)
+        self.depths = DepthLog()
+        self.nodes: dict[int, NodeState] = {}
+        self.stations: list[SurveyStation] = []
+        self.events: deque[Event] = deque(maxlen=EVENTS_SHOWN)
+        self.static_records: deque[StaticRecord] = deque(maxlen=STATIC_RECORDS_SHOWN)
+        self.unplaced = 0
+        self.refused = 0
+        self.rig_now = math.nan
+        self.shared = SharedErrors()
+        self.moved: list[Moved] = []
+        self.alarms = AlarmList()
+        self.trajectory: list[Point] = Trajectory().points
+        self.projection: Deviation | None = None
+        self.recalibration = FieldProcedure(config.gravity)
+
+    def on_state(self, state: NodeState) -> None:
+        """Take a node's account of itself, unless a newer one is known."""
+        self.recalibration.on_state(state)
+        known = self.nodes.get(state.tube)
+        if known is None or state.at >= known.at:
+            self.nodes[state.tube] = state
+            self.tally.on_hops(state.tube, state.hops)
+
+    def place(self, measurement: SurveyMeasurement) -> float | None:
+        """Measured depth (m) of the tube's node when it surveyed; None when the bit's depth then is not known."""
+        self.tally.on_hops(measurement.tube, self._hops_if_unknown(measurement))
+        bit, below = self.depths.at(measurement.station_at), self.tally.length_below(measurement.tube)
+        return None if bit is None or below is None else bit - below
+
+    def on_survey(self, measurement: SurveyMeasurement, md: float | None) -> bool:
+        """Resolve and fuse a stored measurement; False when it belongs to no depth or is no survey."""
+        if md is None:
+            self.unplaced += 1
+            return False
+        forces = np.array([imu.force for imu in measurement.imus])
+        covs = np.array([imu.force_cov for imu in measurement.imus])
+        try:
+            direction = self._direction(measurement, *combine_imus(forces, covs))
+        except (SurveyError, np.linalg.LinAlgError):
+            self.refused += 1
+            return False
+        noise = math.radians(ACCELEROMETER_NOISE_DEG) * self.config.gravity
+        quality = check(forces, covs, self.config.gravity, measurement.samples, measurement.settle_time, noise)
+        station = self._station_at(md)
+        station.add_stop(ResolvedStop(measurement, md, direction, quality))
+        self._judge_movement(measurement.station_at)
+        self._recompute()
+        return True
+
+    def on_event(self, event: Event) -> None:
+        """Remember what happened."""
+        self.events.append(event)
+
+    def on_static_record(self, record: StaticRecord) -> None:
+        """Remember an average at rest."""
+        self.static_records.append(record)
+        self.recalibration.on_static_record(record)
+
+    def age(self, tube: int) -> float:
+        """Rig seconds since a node's newest state; infinite for one never heard."""
+        state = self.nodes.get(tube)
+        return math.inf if state is None else self.rig_now - state.at
+
+    def is_stale(self, tube: int) -> bool:
+        """Whether a node has been silent for too long."""
+        return not self.age(tube) <= self.config.stale_after
+
+    def _hops_if_unknown(self, measurement: SurveyMeasurement) -> int:
+        return measurement.hops if measurement.tube not in self.tally.tubes else -1
+
+    def _station_at(self, md: float) -> SurveyStation:
+        for station in self.stations:
+            if abs(station.md - md) <= self.config.station_tolerance:
+                return station
+        station = SurveyStation(md)
+        self.stations.append(station)
+        self.stations.sort(key=lambda known: known.md)
+        return station
+
+    def _direction(self, m: SurveyMeasurement, force: Array, force_cov: Array) -> Direction:
+        """Direction of a measurement with what it shares with others."""
+        resolved = resolve(force, force_cov, m.yaw, m.yaw_var)
+        return self.shared.reading(
+            resolved,
+            m.tube,
+            self.tally.above(m.tube, m.hops),
+            m.systematic_var,
+            math.radians(self.config.mount_std_deg) ** 2,
+            math.radians(self.config.accelerometer_bias_std_deg) * self.config.gravity,
+        )
+
+    def _judge_movement(self, since: float) -> None:
+        """Drop earlier clusters where the hole moved, at every stop from the one at rig time ``since`` (s) on.
+
+        Each stop is judged as a whole, so the order in which its surveys arrive changes nothing.
+        """
+        stops = [stop for stop in self._stops() if stop[-1][0] >= since]
+        begin = stops[0][0][0]
+        self.moved = [moved for moved in self.moved if moved.at < begin]
+        for stop in stops:
+            for _, number, place in stop:
+                self.stations[number].drops = [d for d in self.stations[number].drops if d != place]
+        for stop in stops:
+            self._judge_stop(stop)
+
+    def _stops(self) -> list[list[tuple[float, int, int]]]:
+        """Clusters as (time, station, place) in the order of time, parted where the string was not read for a while."""
+        every = sorted((c.at, n, place) for n, s in enumerate(self.stations) for place, c in enumerate(s.clusters))
+        stops: list[list[tuple[float, int, int]]] = []
+        for cluster in every:
+            if not stops or cluster[0] - stops[-1][-1][0] >= SAME_STOP:
+                stops.append([])
+            stops[-1].append(cluster)
+        return stops
+
+    def _judge_stop(self, stop: list[tuple[float, int, int]]) -> None:
+        """Neighbours are the nearest stations above and below that were read at the same stop."""
+        by_depth = sorted(stop, key=lambda cluster: cluster[1:])
+        seen = [self.stations[number].departure(place) for _, number, place in by_depth]
+        for k, (at, number, place) in enumerate(by_depth):
+            own = seen[k]
+            if own is None:
+                continue
+            around = [d for d in (*seen[max(k - 1, 0) : k], *seen[k + 1 : k + 2]) if d is not None]
+            evidence = judge_departure(own, around)
+            if evidence.moved:
+                station = self.stations[number]
+                self.moved.append(Moved(station.md, at, place - station.first_before(place), evidence))
+                station.drops.append(place)
+
+    def fused(self, station: SurveyStation) -> Direction:
+        """Direction of a station from the clusters that count."""
+        return weighted(station.readings(), self.config.weighting)
+
+    def _recompute(self) -> None:
+        trajectory = Trajectory()
+        direction = None
+        for station in self.stations:
+            if station.md > 0.0:
+                direction = self.fused(station)
+                trajectory.append(station.md, direction)
+        self.trajectory = trajectory.points
+        if direction is None:
+            return
+        at = max(cluster.at for station in self.stations for cluster in station.clusters)
+        worst = max((deviation(point, self.config.design) for point in self.trajectory[1:]), key=lambda d: d.ratio)
+        self.projection = project(self.trajectory[-1], direction, self.config.design)
+        self.alarms.judge_deviation("deviation", worst, at)
+        self.alarms.judge_deviation("projection", self.projection, at)

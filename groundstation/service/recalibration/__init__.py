@@ -1,0 +1,1 @@
+"""Calibration of a string in a rack, stepped by an operator."""

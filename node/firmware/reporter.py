@@ -1,0 +1,187 @@
+"""What a node says of itself: its yaw and the trust in it, events, surveys, its state."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterable, Iterator
+
+from node.firmware.alignment import angles_of
+from node.firmware.inputs import RigContext
+from node.firmware.pending_event import PendingEvent
+from node.firmware.settings import TubeSettings
+from node.kernels.angles import from_binary, wrap
+from node.kernels.layout import DEG, Array, Err, Status
+from telemetry.messages import (
+    Aiding,
+    Event,
+    ImuMean,
+    Mode,
+    NodeFlag,
+    NodeState,
+    Scalar,
+    Severity,
+    SurveyMeasurement,
+)
+
+VAR_FLOOR = (0.001 * DEG) ** 2
+EVENT_OF_STATUS: tuple[tuple[Status, str, Severity], ...] = (
+    (Status.STOPPED, "stopped", Severity.INFO),
+    (Status.STARTED, "started", Severity.INFO),
+    (Status.JOINT_OPENED, "joint_opened", Severity.INFO),
+    (Status.JOINT_CLOSED, "joint_closed", Severity.INFO),
+    (Status.BIAS_KNOWN, "bias_known", Severity.INFO),
+    (Status.REFERENCE_CHANGED, "reference_changed", Severity.INFO),
+    (Status.YAW_RESET, "yaw_reset", Severity.WARNING),
+    (Status.RATE_EXCEEDED, "rate_exceeded", Severity.ERROR),
+    (Status.RATE_RECOVERED, "rate_recovered", Severity.WARNING),
+    (Status.BAD_SAMPLE, "bad_sample", Severity.ERROR),
+    (Status.FILTER_FAULT, "filter_fault", Severity.ERROR),
+)
+TOLD = Status(sum(bit for bit, _, _ in EVENT_OF_STATUS))
+
+
+class Reporter:
+    """One node's words.
+
+    Parameters
+    ----------
+    settings : what the crew entered
+    states, configs : the node's records, one-element arrays
+    next_sequence : source of the numbers of surveys and events
+    restored : the state comes from a saved one
+    """
+
+    def __init__(
+        self, settings: TubeSettings, states: Array, configs: Array, next_sequence: Callable[[], int], *, restored: bool
+    ) -> None:
+        self._settings, self._state, self._config = settings, states[0], configs[0]
+        self._next_sequence = next_sequence
+        self._restored = restored
+        self._rejecting = False
+        self.cycles = self.overruns = 0
+
+    @property
+    def yaw(self) -> float:
+        """Yaw at the end of the newest cycle, rad in [0, 2 pi)."""
+        return float(from_binary(self._state["now_yaw"]))
+
+    @property
+    def yaw_var(self) -> float:
+        """Random variance of ``yaw``, rad^2."""
+        return max(float(self._state["now_P"][Err.YAW, Err.YAW]), VAR_FLOOR)
+
+    @property
+    def systematic_var(self) -> float:
+        """Variance of the constant errors of every joint above, of the twist and of this node's mount, rad^2."""
+        return float(self._state["systematic_var"]) + self._settings.mount_std**2
+
+    def flags(self, sensors: NodeFlag, context: RigContext, now: float) -> NodeFlag:
+        """What the node says of the trust in its own yaw at ``now`` (s, own clock), beside that in its sensors."""
+        state, flags = self._state, sensors
+        if not state["yaw_known"]:
+            flags |= NodeFlag.YAW_UNTRUSTED
+        if now - state["last_aided"] > self._settings.aiding_old_after:
+            flags |= NodeFlag.AIDING_OLD
+        if state["rejected"]:
+            flags |= NodeFlag.INNOVATION_REJECTED
+        if state["rate_exceeded"]:
+            flags |= NodeFlag.RATE_EXCEEDED
+        if self._restored:
+            flags |= NodeFlag.RESTORED
+        if not context.synchronised:
+            flags |= NodeFlag.CLOCK_UNSYNCHRONISED
+        if state["mode"] == Mode.STATIC_BIAS:
+            flags |= NodeFlag.BIAS_UNKNOWN
+        return flags
+
+    def events(self, status: Status, context: RigContext) -> Iterator[Event]:
+        """What a cycle found."""
+        for bit, code, severity in EVENT_OF_STATUS if status & TOLD else ():
+            if bit in status:
+                yield self.event(code, severity, context.rig_now, {"yaw_deg": self.yaw / DEG})
+        rejecting = bool(self._state["rejected"])
+        if rejecting and not self._rejecting:
+            sigmas = abs(float(self._state["innovation"])) / math.sqrt(float(self._state["innovation_var"]))
+            yield self.event("aiding_rejected", Severity.WARNING, context.rig_now, {"sigmas": sigmas})
+        self._rejecting = rejecting
+
+    def pending_events(self, pending: Iterable[PendingEvent], context: RigContext) -> Iterator[Event]:
+        """Events of the parts of the firmware that have no number of their own for them."""
+        for code, severity, arguments in pending:
+            yield self.event(code, severity, context.rig_now, arguments)
+
+    def event(self, code: str, severity: Severity, rig_now: float, arguments: dict[str, Scalar]) -> Event:
+        """One event, numbered."""
+        return Event(self._settings.tube, self._next_sequence(), rig_now, severity, code, arguments)
+
+    def survey(
+        self, end: float, context: RigContext, imus: tuple[ImuMean, ...], sensors: NodeFlag
+    ) -> SurveyMeasurement:
+        """Measurement of this station, which ended at ``end`` (s, own clock); without ``imus`` by the fused reading."""
+        state = self._state
+        cov = state["survey_force_cov"]
+        rows = tuple((float(row[0]), float(row[1]), float(row[2])) for row in cov)
+        force = state["survey_force"]
+        mean = ImuMean((float(force[0]), float(force[1]), float(force[2])), (rows[0], rows[1], rows[2]))
+        return SurveyMeasurement(
+            tube=self._settings.tube,
+            sequence=self._next_sequence(),
+            station_at=context.rig_now,
+            hops=context.hops,
+            imus=imus or (mean,),
+            yaw=self.yaw,
+            yaw_var=self.yaw_var,
+            systematic_var=self.systematic_var,
+            samples=int(self._config["survey_samples"]),
+            settle_time=end - float(state["stopped_at"]),
+            flags=self.flags(sensors, context, end),
+        )
+
+    def estimate(self, context: RigContext) -> Aiding:
+        """The node's own yaw as aiding for the tube below."""
+        below = self._settings.lower_joint
+        return Aiding(
+            yaw=self.yaw,
+            yaw_var=self.yaw_var,
+            systematic_var=float(self._state["systematic_var"]) + below.std**2,
+            offset=wrap(below.angle),
+            rate=float(self._state["now_rate"]),
+            valid_at=context.rig_now,
+            sequence=int(self._state["cycles"]),
+            hops=max(context.hops, 1),
+        )
+
+    def report(
+        self, end: float, context: RigContext, sensors: NodeFlag, mount: Array, block: tuple[int, bytes]
+    ) -> NodeState:
+        """Reporter at ``end`` (s, own clock); ``mount`` is the alignment in use, ``block`` version and short hash."""
+        state = self._state
+        bias = state["static_bias"] + state["bias"]
+        pitch, roll = angles_of(mount["axis"][0])
+        return NodeState(
+            tube=self._settings.tube,
+            at=context.rig_now,
+            hops=context.hops,
+            mode=self._mode(sensors, aligning=bool(mount["aligning"])),
+            yaw=self.yaw,
+            yaw_var=self.yaw_var,
+            systematic_var=self.systematic_var,
+            gyro_bias=(float(bias[0]), float(bias[1]), float(bias[2])),
+            scale_factor=float(state["scale"]),
+            innovation=float(state["innovation"]),
+            innovation_var=float(state["innovation_var"]),
+            aiding_age=end - float(state["last_aided"]),
+            clock_var=context.clock_var,
+            flags=self.flags(sensors, context, end),
+            cycles=self.cycles,
+            overruns=self.overruns,
+            parameters_version=block[0],
+            parameters_hash=block[1],
+            alignment=(pitch, roll, float(mount["std"][0].max())),
+        )
+
+    def _mode(self, sensors: NodeFlag, *, aligning: bool) -> Mode:
+        """State of the node: what the kernels follow, unless a sensor fails or an alignment is under way."""
+        if NodeFlag.SENSOR_FAULT in sensors:
+            return Mode.FAULT
+        return Mode.ALIGNMENT if aligning else Mode(int(self._state["mode"]))

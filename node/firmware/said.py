@@ -1,7 +1,0 @@
-"""What a part of the firmware has to say; the node's account makes events of it."""
-
-from __future__ import annotations
-
-from telemetry.messages import Scalar, Severity
-
-Said = tuple[str, Severity, dict[str, Scalar]]  # code, severity and arguments of an event

@@ -1,0 +1,1 @@
+"""Synthetic jigs, ovens and records of a calibration laboratory."""

@@ -1,0 +1,1 @@
+"""A whole rig: its schedule, its joints, its processes and its result."""

@@ -1,0 +1,179 @@
+"""The stepper's end of the stepped ports: hands steps to processes over the bus and gathers their answers."""
+
+from __future__ import annotations
+
+import queue
+import time
+from collections import deque
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+from telemetry import keys
+from telemetry.media.zenoh_bus import Publisher, ZenohBus
+from telemetry.messages import BASE, Side, address_name
+from telemetry.runtime.stepped import DueEvent, Sent, pack_step, unpack_done
+
+FrameEvent = tuple[DueEvent, bytes]  # the frame travels on the key of its port
+
+
+@dataclass(frozen=True, slots=True)
+class Answer:
+    """What one process did in a step: frames it sent, in order, and its next timer (s, its clock)."""
+
+    frames: list[tuple[Sent, bytes]]
+    wake_at: float
+
+
+class Seat:
+    """The stepper's view of one process."""
+
+    def __init__(self, bus: ZenohBus, rig: str, address: int) -> None:
+        self.address = address
+        self.alive = False
+        self.step_number = 0
+        self.tx: tuple[deque[bytes], deque[bytes]] = (deque(), deque())
+        self.done: deque[bytes] = deque()
+        self.step = bus.publisher(keys.STEP.format(rig=rig, process=address_name(address)))
+        self.rx: tuple[Publisher, Publisher] = (
+            bus.publisher(keys.port_key(rig, address, Side.UPPER, "rx")),
+            bus.publisher(keys.port_key(rig, address, Side.LOWER, "rx")),
+        )
+
+    def reset(self) -> None:
+        """Forget what a dead process left half-said."""
+        self.done.clear()
+        for waiting in self.tx:
+            waiting.clear()
+
+
+class BusStepper:
+    """Rounds of steps with a barrier after each; a process that dies or hangs is dropped from the barrier.
+
+    Parameters
+    ----------
+    bus, rig : where the keys are
+    hang_limit : wall seconds after which a process that does not answer is taken for dead
+    """
+
+    def __init__(self, bus: ZenohBus, rig: str, *, hang_limit: float = 20.0) -> None:
+        self._bus = bus
+        self._rig = rig
+        self._hang_limit = hang_limit
+        self._seats: dict[int, Seat] = {}
+        self._events: queue.SimpleQueue[tuple[str, int, int, bytes]] = queue.SimpleQueue()
+        self._cues: set[str] = set()  # that the operator has answered
+        self._depth = bus.publisher(keys.DEPTH.format(rig=rig))
+        self._addresses = {address_name(a): a for a in range(BASE + 1)}
+        bus.subscribe(keys.PORT.format(rig=rig, tube="*", side="*", direction="tx"), self._on_tx)
+        bus.subscribe(keys.DONE.format(rig=rig, process="*"), self._on_done)
+        bus.subscribe(keys.CUE.format(rig=rig), lambda _key, name: self._events.put(("cue", 0, 0, name)))
+        bus.liveliness_subscribe(keys.LIVELINESS.format(rig=rig, process="*"), self._on_token)
+
+    def alive(self) -> list[int]:
+        """Addresses that answer, in ascending order."""
+        return sorted(a for a, seat in self._seats.items() if seat.alive)
+
+    def wait_for(self, address: int, *, alive: bool, timeout: float) -> bool:
+        """Wait (wall seconds) until a process has come or gone; returns whether it did."""
+        deadline = time.monotonic() + timeout
+        while (address in self._seats and self._seats[address].alive) != alive:
+            if not self._pump(deadline - time.monotonic()):
+                return False
+        return True
+
+    def wait_for_cue(self, name: str, timeout: float) -> bool:
+        """Wait (wall seconds) until the operator has done what cue ``name`` asks; returns whether he did."""
+        deadline = time.monotonic() + timeout
+        while name not in self._cues:
+            if not self._pump(deadline - time.monotonic()):
+                return False
+        return True
+
+    def drop(self, address: int) -> None:
+        """Take a process out of the barrier."""
+        if address in self._seats:
+            self._seats[address].alive = False
+            self._seats[address].reset()
+
+    def round(self, steps: Mapping[int, list[FrameEvent]]) -> dict[int, Answer]:
+        """Give each process its events and wait until all have answered; those that died are missing."""
+        waiting: set[int] = set()
+        for address in sorted(steps):
+            seat = self._seats.get(address)
+            if seat is not None and seat.alive:
+                self._send(seat, steps[address])
+                waiting.add(address)
+        answers: dict[int, Answer] = {}
+        deadline = time.monotonic() + self._hang_limit
+        while waiting:
+            for address in sorted(waiting):
+                seat = self._seats[address]
+                if not seat.alive:
+                    waiting.discard(address)
+                elif (answer := self._answer(seat)) is not None:
+                    answers[address] = answer
+                    waiting.discard(address)
+            if waiting and not self._pump(deadline - time.monotonic()):
+                for address in waiting:
+                    self.drop(address)
+                break
+        return answers
+
+    def _send(self, seat: Seat, events: list[FrameEvent]) -> None:
+        for event, frame in events:
+            if event.kind <= Side.LOWER:
+                seat.rx[event.kind].put(frame)
+            elif frame:
+                self._depth.put(frame)
+        seat.step_number += 1
+        seat.step.put(pack_step(seat.step_number, [event for event, _ in events]))
+
+    def _answer(self, seat: Seat) -> Answer | None:
+        while seat.done:
+            number, sent, wake_at = unpack_done(seat.done[0])
+            if number != seat.step_number:
+                seat.done.popleft()
+                continue
+            counts = [sum(s.side == side for s in sent) for side in Side]
+            if len(seat.tx[0]) < counts[0] or len(seat.tx[1]) < counts[1]:
+                return None
+            seat.done.popleft()
+            return Answer([(s, seat.tx[s.side].popleft()) for s in sent], wake_at)
+        return None
+
+    def _pump(self, timeout: float) -> bool:
+        """Take one arrival from the bus's threads; False when none came in time."""
+        try:
+            what, address, side, payload = self._events.get(timeout=max(timeout, 0.0))
+        except queue.Empty:
+            return False
+        seat = self._seats.get(address)
+        if what == "token":
+            self._seat(address, alive=bool(side))
+        elif what == "cue":
+            self._cues.add(payload.decode(errors="replace"))
+        elif seat is not None and seat.alive:
+            (seat.done if what == "done" else seat.tx[side]).append(payload)
+        return True
+
+    def _seat(self, address: int, *, alive: bool) -> None:
+        seat = self._seats.get(address)
+        if seat is None:
+            seat = self._seats[address] = Seat(self._bus, self._rig, address)
+        seat.reset()
+        seat.alive = alive
+
+    def _on_tx(self, key: str, payload: bytes) -> None:
+        _, _, _, name, side, _ = key.split("/")
+        if name in self._addresses:
+            self._events.put(("tx", self._addresses[name], int(side == "lower"), payload))
+
+    def _on_done(self, key: str, payload: bytes) -> None:
+        name = key.split("/")[3]
+        if name in self._addresses:
+            self._events.put(("done", self._addresses[name], 0, payload))
+
+    def _on_token(self, key: str, alive: bool) -> None:
+        name = key.rsplit("/", 1)[1]
+        if name in self._addresses:
+            self._events.put(("token", self._addresses[name], int(alive), b""))

@@ -1,0 +1,188 @@
+"""Runs a whole rig: starts the processes, follows the medium's progress, asks the ground station for the result."""
+
+from __future__ import annotations
+
+import contextlib
+import queue
+import signal
+import socket
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import msgpack
+
+from sim.errors import RigError
+from sim.rig.processes import ProcessTable
+from telemetry import keys
+from telemetry.media.zenoh_bus import ZenohBus, open_client
+from telemetry.messages import address_name
+
+SUPERVISE_EVERY = 0.2  # wall s
+QUERY_TIMEOUT = 10.0  # wall s
+
+
+@dataclass(frozen=True, slots=True)
+class Tick:
+    """What the medium tells while it drills."""
+
+    phase: str
+    rig_time: float
+    begin: float
+    end: float
+    wanted: tuple[str, ...]
+    kill: tuple[str, ...]
+    finished: bool
+    cue: str
+
+    @classmethod
+    def parse(cls, payload: bytes) -> Tick:
+        """Progress from its wire form, see ``borechain medium``."""
+        phase, rig_time, begin, end, wanted, kill, finished, cue = msgpack.unpackb(payload)
+        names = tuple(address_name(address) for address in wanted)
+        return cls(phase, rig_time, begin, end, names, tuple(address_name(address) for address in kill), finished, cue)
+
+
+def check_port_free(endpoint: str) -> None:
+    """Refuse an endpoint that another program listens on.
+
+    Raises
+    ------
+    RigError
+        Naming the port and the remedy.
+    """
+    protocol, _, address = endpoint.partition("/")
+    host, _, port = address.rpartition(":")
+    if protocol != "tcp" or not port.isdigit():
+        raise RigError(f"endpoint: expected tcp/HOST:PORT, got {endpoint}")
+    with socket.socket() as probe:
+        probe.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
+        try:
+            probe.bind((host, int(port)))
+        except OSError as error:
+            raise RigError(
+                f"endpoint {endpoint}: {error.strerror}; choose another with --endpoint tcp/127.0.0.1:PORT"
+            ) from error
+
+
+def prepare_folder(folder: Path) -> None:
+    """Make the output folder; it must be new or empty, for a run must not continue another one's saved states.
+
+    Raises
+    ------
+    RigError
+        When it cannot be made or written, or holds an earlier run.
+    """
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+        if any(folder.iterdir()):
+            raise RigError(
+                f"output folder {folder}: expected a new or empty folder, it holds an earlier run; choose another --out"
+            )
+        trial = folder / ".writable"
+        trial.touch()
+        trial.unlink()
+    except OSError as error:
+        raise RigError(f"output folder {folder}: {error.strerror}; choose a writable folder with --out") from error
+
+
+class Launcher:
+    """Supervises one run from the first process to the last answer.
+
+    Parameters
+    ----------
+    table : processes of the rig
+    rig, endpoint : where the keys are
+    show : called with every tick
+    act : plays the operator at a cue; False when the ground station did not answer and is to be asked again
+    """
+
+    def __init__(
+        self,
+        table: ProcessTable,
+        rig: str,
+        endpoint: str,
+        show: Callable[[Tick], None],
+        act: Callable[[ZenohBus, str], bool] = lambda _bus, _cue: True,
+    ) -> None:
+        self._table = table
+        self._rig = rig
+        self._endpoint = endpoint
+        self._show = show
+        self._act = act
+        self._ticks: queue.SimpleQueue[Tick | None] = queue.SimpleQueue()
+
+    def run(self, ask: Callable[[ZenohBus], dict[str, Any]]) -> dict[str, Any]:
+        """Drill to the end of the schedule, then return what ``ask`` got from the ground station.
+
+        Raises
+        ------
+        RigError
+            When a process fails for good.
+        KeyboardInterrupt
+            On Ctrl-C; every process has ended by then.
+        """
+        try:
+            self._table.start("medium")
+            with open_client(self._endpoint, timeout=30.0) as bus:
+                bus.subscribe(
+                    keys.WANTED.format(rig=self._rig), lambda _key, payload: self._ticks.put(Tick.parse(payload))
+                )
+                with interrupts_into(self._ticks):
+                    self._supervise(bus)
+                return ask(bus)
+        finally:
+            self._table.stop()
+
+    def _supervise(self, bus: ZenohBus) -> None:
+        wanted: tuple[str, ...] = ()
+        acted = ""
+        answer = bus.publisher(keys.CUE.format(rig=self._rig))
+        while True:
+            kill: tuple[str, ...] = ()
+            try:
+                tick = self._ticks.get(timeout=SUPERVISE_EVERY)
+                if tick is None:
+                    raise KeyboardInterrupt
+                wanted, kill = tick.wanted, tick.kill
+                self._show(tick)
+                if tick.cue not in ("", acted) and self._act(bus, tick.cue):
+                    acted = tick.cue
+                    answer.put(acted.encode())
+                if tick.finished:
+                    return
+            except queue.Empty:
+                pass
+            medium = self._table.running.get("medium")
+            if medium is None or medium.exitcode is not None:
+                raise RigError("the medium process ended before the schedule did; its message stands above")
+            self._table.reconcile(list(wanted), list(kill))
+            if self._table.failures:
+                raise RigError(self._table.failures[0])
+
+
+@contextlib.contextmanager
+def interrupts_into(ticks: queue.SimpleQueue[Tick | None]) -> Iterator[None]:
+    """Turn Ctrl-C and a termination request into the end of the supervision."""
+
+    def interrupt(_number: int, _frame: object) -> None:
+        ticks.put(None)
+
+    before = {number: signal.signal(number, interrupt) for number in (signal.SIGINT, signal.SIGTERM)}
+    try:
+        yield
+    finally:
+        for number, handler in before.items():
+            signal.signal(number, handler)
+
+
+def next_run_folder(base: Path) -> Path:
+    """First ``run-NNNN`` of ``base`` that does not exist yet."""
+    number = 1 + max((int(p.name[4:]) for p in base.glob("run-[0-9]*") if p.name[4:].isdigit()), default=0)
+    return base / f"run-{number:04d}"
+
+
+def private_folder(folder: Path, name: str) -> Path:
+    """Folder of one process below the run's."""
+    return folder / "state" / name

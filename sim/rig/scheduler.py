@@ -1,0 +1,318 @@
+"""The medium process: world, joints and clock of a rig, as a discrete-event simulation over real processes.
+
+Events are ordered by rig time. All that fall within one hop's latency of the first are independent of each other (a
+frame sent now cannot arrive sooner), so they are handed out together and the rig's time moves on when everyone has
+answered. The load of the machine and the pace change nothing but the wall time.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import heapq
+import math
+import queue
+import time
+from collections import deque
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from functools import partial
+
+import msgpack
+
+from sim.errors import RigError
+from sim.rig.bus_stepper import Answer, BusStepper, FrameEvent
+from sim.rig.link_channel import LinkChannel
+from sim.world.motion import Phase
+from sim.world.world import World
+from telemetry.messages import BASE, ENCODER, Side, address_name
+from telemetry.runtime.stepped import Due, DueEvent
+
+ATTACH_LIMIT = 60.0  # wall s
+TELL_EVERY = 0.5  # wall s
+CUE_LIMIT = 120.0  # wall s
+REBOOT_TIME = 5.0  # rig s that a process may be missing before the rig's time waits for it
+Entry = tuple[float, int, int, int, "Due | None", bytes]
+
+
+@dataclass(slots=True)
+class Progress:
+    """What the rig is doing, for whoever watches."""
+
+    phase: str
+    rig_time: float
+    begin: float
+    end: float
+    wanted: list[int] = field(default_factory=list)
+    kill: list[int] = field(default_factory=list)
+    finished: bool = False
+    cue: str = ""  # what the operator is to do now
+
+
+class Scheduler:
+    """Conducts one scenario.
+
+    Parameters
+    ----------
+    world : truth, sensors and schedule
+    stepper : the processes
+    tell : called with the progress whenever what is wanted changes, and once a cycle
+    speed : rig seconds per wall second, infinite for as fast as possible
+    cued : somebody plays the operator and is waited for, so that what he does falls on the same rig time in every run
+    """
+
+    def __init__(
+        self,
+        world: World,
+        stepper: BusStepper,
+        tell: Callable[[Progress], None],
+        speed: float = math.inf,
+        *,
+        cued: bool = False,
+    ) -> None:
+        self.world = world
+        self.stepper = stepper
+        self._tell = tell
+        self._cued = cued
+        self._speed = speed
+        medium = world.scenario.medium
+        self.air = LinkChannel(world.seed, medium.latency, medium.jitter, medium.loss, medium.duplicate)
+        self.progress = Progress("starting", world.begin, world.begin, world.end, [ENCODER, BASE])
+        self._queue: list[Entry] = []
+        self._count = 0
+        self._cycle = 0
+        self._wake: dict[int, float] = {}
+        self._string: tuple[int, ...] = ()
+        self._open_top = False
+        self._missing_since: dict[int, float] = {}
+        self._stopping = False
+        self._interrupt: queue.SimpleQueue[None] = queue.SimpleQueue()  # its put is safe inside a signal handler
+        self._wall_begin = 0.0
+
+    def stop(self) -> None:
+        """End after the present round; may be called from a signal handler."""
+        self._stopping = True
+        self._interrupt.put(None)
+
+    def linger(self) -> None:
+        """Keep the bus and the processes alive after the schedule, until ``stop``."""
+        while not self._stopping:
+            self._interrupt.get()
+
+    def run(self) -> bool:
+        """Drill; returns whether the schedule was finished.
+
+        Raises
+        ------
+        RigError
+            When a wanted process does not come.
+        """
+        changes = deque(self._changes())
+        self._push(self.world.cycle_end(0), -1, None, b"")
+        self._attach(ENCODER)
+        self._attach(BASE)
+        self._wall_begin = time.monotonic()
+        while self._queue and not self._stopping:
+            if changes and changes[0].at <= self._queue[0][0]:
+                changes.popleft().apply()
+                continue
+            limit = self._queue[0][0] + self.air.latency
+            if changes:
+                limit = min(limit, changes[0].at)
+            self._pace(self._queue[0][0])
+            self._round(limit)
+        finished = not self._stopping
+        self.progress.finished = finished
+        self._tell(self.progress)
+        return finished
+
+    def _changes(self) -> list[Change]:
+        """Everything the schedule and the faults do to the rig, in order of time."""
+        changes = []
+        for phase in self.world.phases:
+            changes.append(Change(phase.start, partial(self._enter, phase)))
+            if phase.kind == "add":
+                changes.append(Change(phase.joint_closed, partial(self._close_joint, phase.tube)))
+        if (rack := self.world.rack) is not None:
+            changes.append(Change(rack.begin, self._enter_rack))
+            changes.append(Change(rack.end, self._leave_rack))
+            if self._cued:
+                changes += [Change(cue.at, partial(self._cue, cue.name)) for cue in rack.cues()]
+        for fault in self.world.faults:
+            at = self.world.begin + fault.after
+            changes.append(Change(at, partial(self._cut_power, fault.tube)))
+            changes.append(Change(at + fault.down, partial(self._want, fault.tube)))
+        # at one time the rack is left before the first tube is added
+        return sorted(changes, key=lambda change: (change.at, change.apply != self._leave_rack))
+
+    def _enter(self, phase: Phase) -> None:
+        self.progress.phase = f"{phase.kind} tube {phase.tube}"
+        if phase.kind == "add":
+            self._open_top = True
+            self._want(phase.tube)
+        self._tell(self.progress)
+
+    def _enter_rack(self) -> None:
+        self.progress.phase = "rack"
+        self._string = tuple(range(self.world.scenario.tubes, 0, -1))
+        for tube in reversed(self._string):
+            self._want(tube)
+
+    def _leave_rack(self) -> None:
+        """Part the tubes; each is switched off until it is added to the string."""
+        for tube in self._string:
+            if tube in self.progress.wanted:
+                self._cut_power(tube)
+        self._string = ()
+
+    def _cue(self, name: str) -> None:
+        """Let the operator act while the rig's time stands still."""
+        self.progress.cue = name
+        for _ in range(int(CUE_LIMIT / TELL_EVERY)):
+            self._tell(self.progress)
+            if self._stopping or self.stepper.wait_for_cue(name, TELL_EVERY):
+                break
+        else:
+            raise RigError(f"operator: did nothing for {CUE_LIMIT:.0f} s when asked to {name}")
+        self.progress.cue = ""
+
+    def _close_joint(self, tube: int) -> None:
+        self._string = (tube, *self._string)
+        self._open_top = False
+
+    def _want(self, tube: int) -> None:
+        if tube not in self.progress.wanted:
+            self.progress.wanted.append(tube)
+        self._tell(self.progress)
+        self._attach(tube)
+
+    def _attach(self, address: int) -> None:
+        """Tell again and again that the process is wanted (who starts it may listen later) until it is there."""
+        for _ in range(int(ATTACH_LIMIT / TELL_EVERY)):
+            self._tell(self.progress)
+            if self._stopping or self.stepper.wait_for(address, alive=True, timeout=TELL_EVERY):
+                return
+        raise RigError(f"process {address_name(address)} did not attach within {ATTACH_LIMIT:.0f} s")
+
+    def _cut_power(self, tube: int) -> None:
+        """Have the launcher cut a node's power; the rig's time goes on when it is gone."""
+        self.progress.wanted.remove(tube)
+        self.progress.kill = [tube]
+        for _ in range(int(ATTACH_LIMIT / TELL_EVERY)):
+            self._tell(self.progress)
+            if self._stopping or self.stepper.wait_for(tube, alive=False, timeout=TELL_EVERY):
+                break
+        else:
+            raise RigError(f"fault kill-node:{tube}: nobody killed the node within {ATTACH_LIMIT:.0f} s")
+        self.progress.kill = []
+        self._wake.pop(tube, None)
+
+    def _push(self, at: float, address: int, kind: Due | None, frame: bytes) -> None:
+        self._count += 1
+        rank = 9 if kind is None else int(kind)
+        heapq.heappush(self._queue, (at, address, rank, self._count, kind, frame))
+
+    def _pace(self, rig_time: float) -> None:
+        if math.isinf(self._speed):
+            return
+        ahead = (rig_time - self.world.begin) / self._speed - (time.monotonic() - self._wall_begin)
+        if ahead > 0.0:
+            with contextlib.suppress(queue.Empty):
+                self._interrupt.get(timeout=ahead)
+
+    def _round(self, limit: float) -> None:
+        steps: dict[int, list[FrameEvent]] = {}
+        true_time: dict[tuple[int, float], float] = {}
+        while self._queue and self._queue[0][0] < limit:
+            at, address, _, _, kind, frame = heapq.heappop(self._queue)
+            if kind is None:
+                self._add_cycle(at, steps, true_time)
+            elif kind is not Due.TIMER or self._wake.get(address) == at:
+                self._add(steps, true_time, address, kind, at, None, frame)
+        answers = self.stepper.round(steps)
+        for address in sorted(answers):
+            self._on_answer(address, answers[address], true_time)
+
+    def _add(
+        self,
+        steps: dict[int, list[FrameEvent]],
+        true_time: dict[tuple[int, float], float],
+        address: int,
+        kind: Due,
+        at: float,
+        data: object,
+        frame: bytes,
+    ) -> None:
+        local = self.world.local_clock(address, at)
+        true_time[address, local] = at
+        steps.setdefault(address, []).append((DueEvent(kind, local, data), frame))
+
+    def _add_cycle(
+        self, at: float, steps: dict[int, list[FrameEvent]], true_time: dict[tuple[int, float], float]
+    ) -> None:
+        start = self.world.cycle_end(self._cycle - 1)
+        if at >= self.world.motion.begin:  # in the rack there is no bit
+            depth = bytes(msgpack.packb([at, self.world.bit_depth(at)]))
+            self._add(steps, true_time, BASE, Due.DEPTH, at, None, depth)
+        self._add(steps, true_time, BASE, Due.TIMER, at, None, b"")
+        for address in self.stepper.alive():
+            if address == BASE or address not in self.progress.wanted:
+                continue
+            local_start = self.world.local_clock(address, start)
+            sample = (
+                self.world.encoder_sample(at) if address == ENCODER else self.world.imu_sample(address, self._cycle)
+            )
+            self._add(steps, true_time, address, Due.CYCLE, at, [local_start, *sample], b"")
+        self._cycle += 1
+        self.progress.rig_time = at
+        self._tell(self.progress)
+        self._wait_for_missing(at)
+        following = self.world.cycle_end(self._cycle)
+        if following <= self.world.end:
+            self._push(following, -1, None, b"")
+        else:
+            self._queue.clear()
+
+    def _wait_for_missing(self, at: float) -> None:
+        """A process that died unasked is missed for the time of a reboot; then the rig waits for it to come back."""
+        alive = set(self.stepper.alive())
+        for address in self.progress.wanted:
+            if address in alive:
+                self._missing_since.pop(address, None)
+            elif at - self._missing_since.setdefault(address, at) >= REBOOT_TIME:
+                self._attach(address)
+
+    def _on_answer(self, address: int, answer: Answer, true_time: dict[tuple[int, float], float]) -> None:
+        for sent, frame in answer.frames:
+            at = true_time[address, sent.at]
+            end = self._other_end(address, sent.side)
+            for delay in self.air.deliveries(address, sent.side):
+                if end is not None:
+                    self._push(at + delay, end[0], Due(int(end[1])), frame)
+        wake = self.world.true_time(address, answer.wake_at) if math.isfinite(answer.wake_at) else math.inf
+        if math.isfinite(wake) and self._wake.get(address) != wake:
+            self._push(wake, address, Due.TIMER, b"")
+        self._wake[address] = wake
+
+    def _other_end(self, address: int, side: Side) -> tuple[int, Side] | None:
+        """Which port a port looks into now; None at the bit, at the surface and at an open joint."""
+        chain = (BASE, ENCODER, *self._string)
+        if address not in chain or (self._open_top and (address, side) in self._open_ends()):
+            return None
+        place = chain.index(address) + (1 if side is Side.LOWER else -1)
+        if not 0 <= place < len(chain):
+            return None
+        return chain[place], Side.UPPER if side is Side.LOWER else Side.LOWER
+
+    def _open_ends(self) -> set[tuple[int, Side]]:
+        ends = {(ENCODER, Side.LOWER)}
+        if self._string:
+            ends.add((self._string[0], Side.UPPER))
+        return ends
+
+
+@dataclass(frozen=True, slots=True)
+class Change:
+    """Something the schedule does to the rig at a rig time."""
+
+    at: float
+    apply: Callable[[], None]

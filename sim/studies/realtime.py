@@ -1,0 +1,212 @@
+"""A whole string of node processes on their own clocks: what it costs, whether it keeps time, and whether it works."""
+
+from __future__ import annotations
+
+import contextlib
+import json
+import math
+import os
+import signal
+import time
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+from node.kernels.layout import PERIOD
+from sim.errors import RigError
+from sim.rig.processes import ProcessTable
+from sim.studies.turning_string import TurningString
+from telemetry.application.endpoint import Endpoint
+from telemetry.media.neighbours import neighbour_ports
+from telemetry.media.zenoh_bus import open_router
+from telemetry.messages import BASE, ENCODER, NodeFlag, NodeState, Side, address_name
+from telemetry.runtime.own_clock import Inbox, OwnClock, serve_by_own_clock
+from telemetry.runtime.process import Process
+from telemetry.runtime.timing import CycleTiming
+
+TICKS = os.sysconf("SC_CLK_TCK")  # a second, of the CPU time in /proc
+COME_LIMIT = 60.0  # s, until every node was heard
+KIB, MIB = 1024.0, 1024.0**2
+
+
+@dataclass(slots=True)
+class Heard:
+    """What the surface has heard of one node's yaw, rad."""
+
+    states: int = 0
+    known: bool = False
+    resting: list[float] = field(default_factory=list)
+    turning: list[float] = field(default_factory=list)
+
+    def on_state(self, state: NodeState, error: float, *, turns: bool) -> None:
+        """Take a state and the error of its yaw."""
+        self.states += 1
+        self.known = not state.flags & NodeFlag.YAW_UNTRUSTED
+        if self.known:
+            (self.turning if turns else self.resting).append(error)
+
+
+class Surface(Process):
+    """The base station's end of the string: hears every node through all above it, and ends the run."""
+
+    def __init__(self, string: TurningString, seconds: float, inbox: Inbox, table: ProcessTable) -> None:
+        self.endpoint = Endpoint(BASE, frozenset({Side.LOWER}), boot_count=1)
+        self.heard = {tube: Heard() for tube in range(1, string.tubes + 1)}
+        self.interrupted = False
+        self.begun_at: float | None = None  # s, when the last node was heard first
+        self.cpu_before: dict[str, float] = {}
+        self._string, self._seconds, self._inbox, self._table = string, seconds, inbox, table
+        self._until = time.monotonic() + COME_LIMIT
+
+    def on_frame(self, side: Side, frame: bytes, now: float) -> None:
+        """A frame arrived from the encoder."""
+        for received in self.endpoint.receive(side, frame, now):
+            state = received.message
+            if isinstance(state, NodeState) and state.tube in self.heard:
+                error = self._string.yaw_error(state.tube, state.yaw, state.at)
+                self.heard[state.tube].on_state(state, error, turns=self._string.turns_at(state.at))
+
+    def on_cycle(self, data: Any, now: float) -> None:
+        """See that every process lives, until the time is over."""
+        ended = [name for name, process in self._table.running.items() if process.exitcode is not None]
+        if ended:
+            raise RigError(f"process {ended[0]} ended before the run did; its message stands above")
+        if self.begun_at is None and all(heard.states for heard in self.heard.values()):
+            self.begun_at, self._until = now, now + self._seconds
+            self.cpu_before = {name: cpu_seconds(pid) for name, pid in pids(self._table).items()}
+        if now >= self._until:
+            self._inbox.stop()
+
+    def interrupt(self) -> None:
+        """End at once; may be called from a signal handler."""
+        self.interrupted = True
+        self._inbox.stop()
+
+
+def run(
+    string: TurningString, table: ProcessTable, rig: str, endpoint: str, seconds: float, folder: Path
+) -> dict[str, Any]:
+    """Start every process of ``table``, let the string live for ``seconds`` once all are heard, and judge it.
+
+    ``folder`` is where each process keeps ``NAME/timing.json``.
+
+    Raises
+    ------
+    RigError
+        When a process ends early or is never heard.
+    KeyboardInterrupt
+        On Ctrl-C; every process has ended by then.
+    """
+    inbox = Inbox()
+    surface = Surface(string, seconds, inbox, table)
+    begun: dict[str, float] = {}
+    try:
+        table.warm()
+        with open_router(endpoint) as bus, interrupts(surface.interrupt):
+            for name in table.specs:
+                begun[name] = time.monotonic()
+                table.start(name)
+            ports = neighbour_ports(bus, rig, BASE, {Side.LOWER: ENCODER})
+            serve_by_own_clock(surface, ports, inbox, OwnClock(), CycleTiming(), PERIOD)
+            if surface.interrupted:
+                raise KeyboardInterrupt
+            if surface.begun_at is None:
+                silent = [address_name(tube) for tube, heard in surface.heard.items() if not heard.states]
+                raise RigError(f"tube {', '.join(silent)}: nothing heard within {COME_LIMIT:.0f} s")
+            span = time.monotonic() - surface.begun_at
+            costs = {
+                name: {
+                    "cpu_percent": 100.0 * (cpu_seconds(pid) - surface.cpu_before[name]) / span,
+                    **footprint(pid),
+                }
+                for name, pid in pids(table).items()
+            }
+            own = 100.0 * time.process_time() / (time.monotonic() - begun[next(iter(begun))])
+            table.stop()
+    finally:
+        table.stop()
+    rows = []
+    for name, cost in costs.items():
+        tube = ENCODER if name == "encoder" else int(name)
+        report = json.loads((folder / name / "timing.json").read_text())
+        first = report["first_cycle_at_s"] - string.offset(tube) - begun[name]
+        rows.append(row(name, tube, string.tubes, report, first) | cost | yaw_figures(surface.heard.get(tube)))
+    return {"cases": rows, "worst": worst(rows), "total": total(rows), "router_and_base_cpu_percent": own}
+
+
+def row(name: str, tube: int, tubes: int, report: dict[str, Any], first: float) -> dict[str, Any]:
+    """Times of one process, ms but for the first cycle."""
+    start, cycle = report["stages_ms"]["start"], report["stages_ms"]["cycle"]
+    return {
+        "process": name,
+        "hop": 0 if tube == ENCODER else tubes - tube + 1,
+        "cycles": report["cycles"],
+        "overruns": report["overruns"],
+        **{f"start_{figure}_ms": start[figure] for figure in ("median", "p99", "max")},
+        **{f"cycle_{figure}_ms": cycle[figure] for figure in ("median", "p99", "max")},
+        "first_cycle_s": first,
+    }
+
+
+def yaw_figures(heard: Heard | None) -> dict[str, Any]:
+    """Whether the yaw is known at last, and its rms error (deg); nothing of the encoder."""
+    if heard is None:
+        return {"yaw_known": None, "yaw_rest_deg": None, "yaw_turning_deg": None}
+    return {
+        "yaw_known": heard.known,
+        "yaw_rest_deg": rms_deg(heard.resting),
+        "yaw_turning_deg": rms_deg(heard.turning),
+    }
+
+
+def worst(rows: list[dict[str, Any]]) -> dict[str, Any]:
+    """The largest of every figure, the smallest of what is to be many."""
+    found: dict[str, Any] = {}
+    for key in rows[0]:
+        values = [r[key] for r in rows if r[key] is not None]
+        if key not in ("process", "hop"):
+            found[key] = None if not values else min(values) if key in ("cycles", "yaw_known") else max(values)
+    return found
+
+
+def total(rows: list[dict[str, Any]]) -> dict[str, Any]:
+    """Sums of what adds up."""
+    return {key: sum(r[key] for r in rows) for key in ("cycles", "overruns", "cpu_percent", "private_mb", "pss_mb")}
+
+
+def rms_deg(errors: list[float]) -> float | None:
+    """Root mean square, deg; None of none."""
+    return math.degrees(math.sqrt(sum(e * e for e in errors) / len(errors))) if errors else None
+
+
+def pids(table: ProcessTable) -> dict[str, int]:
+    """Pid of every running process."""
+    return {name: process.pid for name, process in table.running.items() if process.pid is not None}
+
+
+def cpu_seconds(pid: int) -> float:
+    """CPU time of a process so far, in user and system, s."""
+    fields = Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()
+    return (int(fields[11]) + int(fields[12])) / TICKS
+
+
+def footprint(pid: int) -> dict[str, float]:
+    """Memory of a process: what it alone holds, and its share of what it holds with others; MB."""
+    kib: dict[str, int] = {}
+    for line in Path(f"/proc/{pid}/smaps_rollup").read_text().splitlines()[1:]:
+        name, value, *_ = line.split()
+        kib[name.rstrip(":")] = int(value)
+    private = kib["Private_Clean"] + kib["Private_Dirty"]
+    return {"private_mb": private * KIB / MIB, "pss_mb": kib["Pss"] * KIB / MIB}
+
+
+@contextlib.contextmanager
+def interrupts(act: Callable[[], None]) -> Iterator[None]:
+    """Have Ctrl-C and a termination request call ``act``."""
+    before = {number: signal.signal(number, lambda _n, _f: act()) for number in (signal.SIGINT, signal.SIGTERM)}
+    try:
+        yield
+    finally:
+        for number, handler in before.items():
+            signal.signal(number, handler)

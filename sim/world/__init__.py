@@ -1,0 +1,1 @@
+"""Truth and sensors of one scenario and seed."""

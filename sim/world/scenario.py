@@ -1,0 +1,357 @@
+"""Scenario files: TOML, every key documented here, unknown keys refused. Degrees and milliseconds at this edge only."""
+
+from __future__ import annotations
+
+import tomllib
+from pathlib import Path
+from typing import Annotated, Literal, get_args
+
+import numpy as np
+from pydantic import BaseModel, ConfigDict, Field, ValidationError
+
+from groundstation.calibration.attitudes import rank_of, true_vectors
+from node.kernels.alignment import MAX_IMUS
+from sim.errors import ScenarioError
+from sim.faults import KillNode, parse_fault
+from sim.world.borehole import Borehole, read_displacements, read_stations
+from telemetry.messages import MAX_TUBE
+
+MAX_RATE_DPS = 57.0 * 6.0  # 57 rev/min: half a turn a cycle is where one sample a cycle aliases
+SURVEY_AFTER = 22.0  # s at rest, for a survey
+RECORD_MARGIN = 8.0  # s at an attitude beside its record: the tubes settle and the order travels
+Positive = Annotated[float, Field(gt=0.0)]
+NotNegative = Annotated[float, Field(ge=0.0)]
+Probability = Annotated[float, Field(ge=0.0, le=0.9)]
+Angle = Annotated[float, Field(ge=-180.0, le=180.0)]
+Triple = tuple[NotNegative, NotNegative, NotNegative]
+
+
+class Section(BaseModel):
+    """Base of every table: frozen, unknown keys, infinities and NaN refused."""
+
+    model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False)
+
+
+class RigSection(Section):
+    """The string."""
+
+    tubes: int = Field(ge=1, le=MAX_TUBE, description="tubes drilled in, one after the other")
+    tube_length_m: Positive = Field(le=50.0, description="length of every tube")
+
+
+class PathSection(Section):
+    """The hole; exactly one of the two files, relative to the scenario."""
+
+    displacements: str | None = Field(None, description="CSV md_m,a_cm,b_cm: lateral displacement over one interval")
+    stations: str | None = Field(None, description="CSV md_m,inclination_deg,azimuth_deg")
+
+
+class ScheduleSection(Section):
+    """Times of one tube, s."""
+
+    begin_s: Positive = Field(1000.0, description="rig time at the start; never zero")
+    add_s: float = Field(
+        60.0, ge=10.0, description="string held while a tube is added; a node needs 50 s to find its bias"
+    )
+    joint_s: float = Field(5.0, ge=4.0, description="of it, joint open; shorter than add_s")
+    stop_s: float = Field(32.0, ge=22.0, description="standing still after drilling; a survey needs 20 s")
+    finish_s: float = Field(20.0, ge=5.0, description="after the last stop, for what is still on its way")
+
+
+class RotationSection(Section):
+    """Turning of the string while one tube is drilled."""
+
+    rate_dps: float = Field(71.0, gt=0.0, description="constant rate, deg/s")
+    acceleration_dps2: Positive = Field(35.0, description="of the ramps")
+    turns: float = Field(20.0, gt=0.0, description="for one tube length")
+
+
+class JointSection(Section):
+    """Constant angular errors, 1 sigma."""
+
+    reading_std_deg: NotNegative = Field(0.05, description="of the scribe marks at a joint")
+    mount_std_deg: NotNegative = Field(0.05, description="of the IMU against the tube's marks, about the axis")
+    mount_tilt_std_deg: float = Field(
+        0.0, ge=0.0, le=3.0, description="of each IMU against the tube's axis, pitch and roll; an alignment finds it"
+    )
+
+
+class TorsionSection(Section):
+    """Twist of the string by the drilling torque; without this table the string is rigid."""
+
+    outer_diameter_m: Positive = Field(0.060, le=1.0, description="of every tube")
+    inner_diameter_m: NotNegative = Field(0.050, description="smaller than the outer one")
+    shear_modulus_gpa: float = Field(79.3, ge=1.0, le=1000.0, description="of steel")
+    bit_torque_nm: NotNegative = Field(500.0, le=1e5, description="while drilling, felt by every tube")
+    wall_friction_nm_per_m: NotNegative = Field(0.0, le=1e4, description="of each metre of string in the hole")
+    wind_s: Positive = Field(2.0, le=60.0, description="from the drive's start until the torque is full")
+    release_after_s: float = Field(0.0, ge=0.0, le=600.0, description="torque held after the drive's stop")
+    release_s: Positive = Field(3.0, le=60.0, description="then, until it is gone")
+    trapped_fraction: float = Field(
+        0.01, ge=0.0, le=0.5, description="of the twist, kept by friction after a stop; 1 sigma, drawn at each"
+    )
+    stick_slip: float = Field(0.0, ge=0.0, le=1.0, description="swing of the torque while drilling, of its full size")
+    stick_slip_hz: float = Field(0.2, gt=0.0, le=0.9, description="of the swing")
+
+
+class GyroSection(Section):
+    """Gyroscope of every node, axes x, y, z."""
+
+    noise_dps_rthz: Triple = Field((8.538e-3, 6.799e-3, 7.313e-3), description="angle random walk")
+    bias_std_dps: Triple = Field((1.2545e-2, 5.869e-3, 4.941e-3), description="Gauss-Markov part")
+    bias_tau_s: Positive = 15.87
+    constant_bias_dps: tuple[float, float, float] = (0.02, -0.01, -0.02)
+    constant_bias_std_dps: NotNegative = 0.005
+    scale_factor_std: NotNegative = 1e-3
+    misalignment_std_deg: NotNegative = Field(0.0, description="left after calibration")
+    g_sensitivity_dps_per_g: NotNegative = 0.0
+    range_dps: Positive = 500.0
+    resolution_dps: NotNegative = Field(2.6e-3, description="500 deg/s / 32768 over 34 readings of one cycle")
+
+
+class AccelerometerSection(Section):
+    """Accelerometer of every node, after calibration."""
+
+    noise_deg: NotNegative = Field(0.02, description="one 1.9 Hz sample, as a tilt")
+    bias_std_deg: NotNegative = Field(0.002, description="left after calibration, each axis, as a tilt")
+    vibration_mps2: NotNegative = Field(0.05, description="while drilling")
+    radius_m: NotNegative = Field(0.02, description="of the IMU from the tube axis")
+    gravity_mps2: Positive = 9.81
+
+
+class EncoderSection(Section):
+    """Encoder of the drive head."""
+
+    counts_per_turn: int = Field(4096, ge=16, description="1024 lines in quadrature")
+    edge_std_deg: NotNegative = Field(0.003, description="error of a line's place, constant for every line")
+
+
+class ClockSection(Section):
+    """Clocks of the nodes against the encoder's."""
+
+    offset_std_s: NotNegative = 20.0
+    drift_std_ppm: NotNegative = 10.0
+
+
+class MediumSection(Section):
+    """One hop between two tube ends."""
+
+    latency_ms: float = Field(3.0, ge=0.5)
+    jitter_ms: NotNegative = Field(0.3, description="mean of the exponential part")
+    loss: Probability = 0.01
+    duplicate: Probability = 0.001
+
+    @property
+    def latency(self) -> float:
+        """Latency, s."""
+        return self.latency_ms * 1e-3
+
+    @property
+    def jitter(self) -> float:
+        """Jitter, s."""
+        return self.jitter_ms * 1e-3
+
+
+class NodeSection(Section):
+    """Firmware settings of every node."""
+
+    scheme: Literal["forward", "estimate", "intersection"] = Field(
+        "forward", description="what is relayed: the encoder's measurement, or estimates (the two negative controls)"
+    )
+    kernel: Literal["float64", "fixed", "published"] = Field(
+        "float64", description="the loop in floats, in integers, or in the published feed-forward form"
+    )
+    torsion: Literal["gate", "variance", "ignore"] = Field(
+        "gate", description="aiding under torque: not used, or with a variance; ignore: the rig knows no torque"
+    )
+    joints: Literal["marks", "solved", "both"] = Field(
+        "marks", description="after a tube was added: scribe marks, the saved yaw, or both by inverse variance"
+    )
+    imus: int = Field(1, ge=1, le=MAX_IMUS, description="in every tube")
+    imu_noise: tuple[Annotated[float, Field(ge=0.01, le=100.0)], ...] = Field(
+        (), description="of each IMU of a tube, times that of gyroscope and accelerometer; 1 where it is absent"
+    )
+
+
+class DesignSection(Section):
+    """The column that the hole is to become, as the ground station judges it."""
+
+    inclination_deg: float = Field(0.0, ge=0.0, le=180.0)
+    azimuth_deg: float = 0.0
+    length_m: Positive | None = Field(None, description="of the axis; what the tubes reach if absent")
+    radius_m: Positive = Field(0.6, description="of the finished column")
+    tolerance: Literal["en-12716", "5-cm", "0.27-deg"] = "en-12716"
+
+
+class DriftSection(Section):
+    """What became of the sensors since their last calibration, drawn for each tube and constant over the run."""
+
+    accelerometer_scale_std: float = Field(0.0, ge=0.0, le=0.04, description="of each axis")
+    accelerometer_misalignment_std_deg: float = Field(0.0, ge=0.0, le=2.0, description="of each axis to each other")
+    accelerometer_bias_std_mps2: float = Field(0.0, ge=0.0, le=0.4, description="of each axis")
+    gyroscope_bias_std_dps: float = Field(0.0, ge=0.0, le=0.1, description="of each axis; a node learns it at rest")
+
+
+class CalibrationSection(Section):
+    """A rack in which all tubes are calibrated, joined, before the first is drilled in; see docs/calibration.md."""
+
+    attitudes_deg: tuple[tuple[Angle, Angle], ...] = Field(
+        min_length=9, description="pitch and roll, deg; gravity's direction is (sin p, cos p sin r, cos p cos r)"
+    )
+    lead_s: float = Field(20.0, ge=15.0, description="at the first attitude, until every node has rig time")
+    hold_s: float = Field(30.0, ge=15.0, description="at rest at each attitude; 8 s more than record_s")
+    move_s: float = Field(8.0, ge=4.0, description="from one attitude to the next")
+    record_s: float = Field(20.0, ge=5.0, description="of the static record at each attitude")
+    apply_s: float = Field(120.0, ge=60.0, description="at rest after the last attitude, for the upload")
+    attitude_std_deg: NotNegative = Field(0.01, description="of the rack, about each axis, at each attitude")
+
+
+class ScenarioFile(Section):
+    """A whole scenario file."""
+
+    rig: RigSection
+    path: PathSection
+    schedule: ScheduleSection = ScheduleSection()
+    rotation: RotationSection = RotationSection()
+    joints: JointSection = JointSection()
+    torsion: TorsionSection | None = None
+    gyroscope: GyroSection = GyroSection()
+    accelerometer: AccelerometerSection = AccelerometerSection()
+    encoder: EncoderSection = EncoderSection()
+    clocks: ClockSection = ClockSection()
+    medium: MediumSection = MediumSection()
+    node: NodeSection = NodeSection()
+    design: DesignSection = DesignSection()
+    drift: DriftSection | None = None
+    calibration: CalibrationSection | None = None
+    faults: tuple[str, ...] = ()
+
+
+class Scenario:
+    """A validated scenario: its file's tables, the hole and the faults."""
+
+    def __init__(self, file: ScenarioFile, hole: Borehole, faults: tuple[KillNode, ...]) -> None:
+        self.file = file
+        self.hole = hole
+        self.faults = faults
+        self.tubes = file.rig.tubes
+        self.tube_length = file.rig.tube_length_m
+        self.medium = file.medium
+
+
+def load_scenario(path: Path, faults: tuple[str, ...] = ()) -> Scenario:
+    """Read and check a scenario; ``faults`` from the command line join those of the file.
+
+    Raises
+    ------
+    ScenarioError
+        One line: the file, the key or line, what was expected and what came.
+    """
+    file = _parse(path)
+    _check_motion(path, file)
+    _check_torsion(path, file)
+    if len(file.node.imu_noise) not in (0, file.node.imus):
+        raise ScenarioError(
+            f"{path}: node.imu_noise: expected {file.node.imus} factors, one for each of node.imus, "
+            f"got {len(file.node.imu_noise)}"
+        )
+    _check_calibration(path, file.calibration)
+    hole = _hole(path, file.path)
+    needed = file.rig.tubes * file.rig.tube_length_m
+    if hole.length + 1e-9 < needed:
+        raise ScenarioError(
+            f"{path}: rig.tubes: {file.rig.tubes} tubes of {file.rig.tube_length_m:g} m need a path of {needed:g} m, "
+            f"it ends at {hole.length:g} m; drill fewer tubes or extend the path"
+        )
+    try:
+        own = tuple(parse_fault(text, file.rig.tubes) for text in file.faults)
+    except ScenarioError as error:
+        raise ScenarioError(f"{path}: faults: {error}") from error
+    return Scenario(file, hole, own + tuple(parse_fault(text, file.rig.tubes) for text in faults))
+
+
+def _check_motion(path: Path, file: ScenarioFile) -> None:
+    rate, schedule = file.rotation.rate_dps, file.schedule
+    if rate > MAX_RATE_DPS:
+        raise ScenarioError(
+            f"{path}: rotation.rate_dps: expected at most {MAX_RATE_DPS:g} deg/s (57 rev/min, "
+            f"half a turn a cycle), got {rate:g}; turn slower"
+        )
+    if schedule.joint_s >= schedule.add_s:
+        raise ScenarioError(
+            f"{path}: schedule.joint_s: expected less than add_s = {schedule.add_s:g} s, "
+            f"got {schedule.joint_s:g}; close the joint before drilling"
+        )
+
+
+def _check_torsion(path: Path, file: ScenarioFile) -> None:
+    section, schedule = file.torsion, file.schedule
+    if file.node.joints != "marks" and file.node.scheme != "forward":
+        raise ScenarioError(
+            f"{path}: node.joints: expected marks with the scheme {file.node.scheme}, "
+            f"got {file.node.joints}; only forward can solve them"
+        )
+    if section is None:
+        return
+    if section.inner_diameter_m >= section.outer_diameter_m:
+        raise ScenarioError(
+            f"{path}: torsion.inner_diameter_m: expected less than outer_diameter_m = "
+            f"{section.outer_diameter_m:g} m, got {section.inner_diameter_m:g}"
+        )
+    needed = section.release_after_s + section.release_s + SURVEY_AFTER
+    if schedule.stop_s < needed:
+        raise ScenarioError(
+            f"{path}: schedule.stop_s: expected at least {needed:g} s, the release of the torque and "
+            f"{SURVEY_AFTER:g} s for a survey, got {schedule.stop_s:g}; stop longer"
+        )
+
+
+def _check_calibration(path: Path, section: CalibrationSection | None) -> None:
+    if section is None:
+        return
+    if section.record_s + RECORD_MARGIN > section.hold_s:
+        raise ScenarioError(
+            f"{path}: calibration.record_s: expected at most hold_s - {RECORD_MARGIN:g} s = "
+            f"{section.hold_s - RECORD_MARGIN:g} s, got {section.record_s:g}; hold longer"
+        )
+    pitch, roll = np.radians(np.array(section.attitudes_deg)).T
+    rank = rank_of(np.column_stack([np.ones(len(pitch)), true_vectors(pitch, roll)]))
+    if rank < 4:
+        raise ScenarioError(
+            f"{path}: calibration.attitudes_deg: expected attitudes that determine bias and matrix (rank 4), "
+            f"got rank {rank}; add some of other tilts"
+        )
+
+
+def _parse(path: Path) -> ScenarioFile:
+    try:
+        with path.open("rb") as file:
+            return ScenarioFile.model_validate(tomllib.load(file))
+    except OSError as error:
+        raise ScenarioError(f"{path}: {error.strerror}; expected a scenario file, see scenarios/") from error
+    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
+        raise ScenarioError(f"{path}: not TOML: {error}") from error
+    except ValidationError as error:
+        raise ScenarioError(f"{path}: {_first(error)}") from error
+
+
+def _first(error: ValidationError) -> str:
+    first = error.errors()[0]
+    key = ".".join(str(part) for part in first["loc"])
+    if first["type"] == "extra_forbidden":
+        section = ScenarioFile.model_fields.get(str(first["loc"][0]))
+        known = ScenarioFile.model_fields if len(first["loc"]) == 1 or section is None else None
+        if known is None and section is not None:
+            table = next(a for a in (*get_args(section.annotation), section.annotation) if a is not type(None))
+            known = table.model_fields if isinstance(table, type) and issubclass(table, BaseModel) else None
+        return f"{key}: unknown key; expected one of {', '.join(known or ())}"
+    return f"{key}: {first['msg']}, got {first['input']!r:.60}"
+
+
+def _hole(path: Path, section: PathSection) -> Borehole:
+    given = [name for name in (section.displacements, section.stations) if name is not None]
+    if len(given) != 1:
+        raise ScenarioError(f"{path}: path: expected exactly one of displacements and stations, got {len(given)}")
+    source = path.parent / given[0]
+    reader = read_displacements if section.displacements is not None else read_stations
+    return Borehole(*reader(source), where=str(source))

@@ -1,0 +1,287 @@
+"""The world of one scenario and seed: what every sensor reads and what the truth is, at any rig time, in any order."""
+
+from __future__ import annotations
+
+import math
+from functools import cached_property, partial
+from itertools import pairwise
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from node.firmware.imu_settings import ImuSettings
+from node.firmware.settings import Joint, TubeSettings
+from node.firmware.torque import TorqueSettings
+from node.kernels.layout import PERIOD, Scheme
+from sim.errors import ScenarioError
+from sim.faults import KillNode
+from sim.world.disc import Disc
+from sim.world.imu_errors import Drift, ImuErrors
+from sim.world.motion import Motion, Phase, Trapezoid
+from sim.world.rack import Rack
+from sim.world.scenario import Scenario
+from sim.world.streams import stream
+from sim.world.torsion import StringTorsion, stiffness
+from sim.world.truth import TubeTruth, imu_frame
+from telemetry.messages import BASE, ENCODER
+
+Array = npt.NDArray[np.float64]
+JOINTS, MOUNTS, CLOCKS, GYRO, ACCELEROMETER, DRIVE, DRIFT, RACK, DISC = range(9)
+TORSION = 16  # apart from the rest, which may grow
+
+
+def wrap(angle: float) -> float:
+    """Angle (rad) in (-pi, pi]."""
+    return math.pi - (math.pi - angle) % (2.0 * math.pi)
+
+
+class World:
+    """Truth and sensors.
+
+    Parameters
+    ----------
+    scenario : validated
+    seed : of every draw; a stream depends on the seed, its purpose and its tube, on nothing else
+
+    Raises
+    ------
+    ScenarioError
+        When a fault falls outside the schedule, or cuts a node's power while the node is down.
+    """
+
+    def __init__(self, scenario: Scenario, seed: int) -> None:
+        self.scenario = scenario
+        self.seed = seed
+        file = scenario.file
+        turn = Trapezoid(
+            file.rotation.turns * 2.0 * math.pi,
+            math.radians(file.rotation.rate_dps),
+            math.radians(file.rotation.acceleration_dps2),
+        )
+        s = file.schedule
+        first_angle = float(self._random(DRIVE, 0).uniform(0.0, 2.0 * math.pi))
+        self.begin = s.begin_s
+        self.rack = None if file.calibration is None else Rack(file.calibration, self.begin)
+        drilling = s.begin_s if self.rack is None else self.rack.end
+        self.motion = Motion(
+            drilling, s.add_s, s.joint_s, s.stop_s, s.finish_s, turn, scenario.tubes, scenario.tube_length, first_angle
+        )
+        self.torsion = self._string_torsion()
+        self.phases: tuple[Phase, ...] = self.motion.phases
+        self.end = self.motion.end
+        self.faults: tuple[KillNode, ...] = scenario.faults
+        self._noises = file.node.imu_noise or (1.0,) * file.node.imus
+        self._samples: dict[int, list[list[Any]]] = {}
+        edge_std = math.radians(file.encoder.edge_std_deg)
+        self._disc = Disc(self.motion, file.encoder.counts_per_turn, edge_std, self._random(DISC, 0))
+        self._check_faults()
+
+    def cycle_end(self, cycle: int) -> float:
+        """Rig time at which the cycle ``cycle`` (from 0) ends."""
+        return self.begin + (cycle + 1) * PERIOD
+
+    def imu_sample(self, tube: int, cycle: int) -> list[Any]:
+        """Three mean rates (rad/s) and three mean specific forces (m/s^2) of one cycle, errors and all.
+
+        Of several IMUs a list of such lists.
+        """
+        if tube not in self._samples:
+            one, *others = [self._all_samples(tube, imu).tolist() for imu in range(len(self._noises))]
+            self._samples[tube] = [list(rows) for rows in zip(one, *others, strict=True)] if others else one
+        return self._samples[tube][cycle]
+
+    def encoder_sample(self, t: float) -> tuple[int, float, int, float | None, tuple[float, ...]]:
+        """Count, rig time of its last edge, 1 (the string turns one way, so every edge rises), torque, earlier edges.
+
+        A rig of a rigid string, or one that is to ignore its torsion, has no torque (N m): None.
+        """
+        count, edge_at, earlier = self._disc.sample(t)
+        if t <= self.motion.begin:
+            edge_at = self.begin
+        if self.torsion is None or self.scenario.file.node.torsion == "ignore":
+            return count, edge_at, 1, None, earlier
+        return count, edge_at, 1, float(self.torsion.torque(np.array([t]))[0]), earlier
+
+    def bit_depth(self, t: float) -> float:
+        """Measured depth of the bit, m."""
+        return float(self.motion.depth(np.array([t]))[0][0])
+
+    def local_clock(self, address: int, t: float) -> float:
+        """What the clock of a process shows at rig time ``t`` (s)."""
+        offset, drift = self._clock(address)
+        return t + offset + drift * (t - self.begin)
+
+    def true_time(self, address: int, local: float) -> float:
+        """Rig time at which the clock of a process shows ``local`` (s)."""
+        offset, drift = self._clock(address)
+        return self.begin + (local - offset - self.begin) / (1.0 + drift)
+
+    def tube_settings(self, tube: int) -> TubeSettings:
+        """What the crew enters for a tube: the readings of its scribe marks and their stated errors."""
+        std = math.radians(self.scenario.file.joints.reading_std_deg)
+        drive, lower = self._joint_angles
+        drive_error, lower_error = self._joint_errors
+        return TubeSettings(
+            tube=tube,
+            drive_joint=Joint(wrap(drive[tube] + drive_error[tube]), std),
+            lower_joint=Joint(wrap(lower[tube] + lower_error[tube]), std),
+            mount_std=math.radians(self.scenario.file.joints.mount_std_deg),
+            scheme=Scheme[self.scenario.file.node.scheme.upper()],
+            kernel=self.scenario.file.node.kernel,
+            stiffness=self._stiffness,
+            torsion="variance" if self.scenario.file.node.torsion == "variance" else "gate",
+            joints=self.scenario.file.node.joints,
+            imus=tuple(ImuSettings((self.scenario.file.accelerometer.radius_m, 0.0), noise) for noise in self._noises),
+        )
+
+    def torque_settings(self) -> TorqueSettings:
+        """What the crew enters at the encoder node; the drilling torque is what an encoder node starts from."""
+        section = self.scenario.file.torsion
+        if section is None or self.scenario.file.node.torsion == "ignore":
+            return TorqueSettings()
+        return TorqueSettings(section.bit_torque_nm, section.trapped_fraction)
+
+    def yaw_truth(self, tube: int, t: float) -> float:
+        """True yaw (rad, unwrapped) of the IMU's frame of a tube that is part of the string."""
+        return float(self.truth(tube).yaw(np.array([t]))[0])
+
+    def systematic_error(self, tube: int, t: float) -> float:
+        """Error of a yaw known only through the marks: estimate - truth = random error + this (rad).
+
+        Where joints are solved it is the mark of the time when the tube was on top, and what each solution left.
+        """
+        drive_error, lower_error = self._joint_errors
+        top = max(self.motion.top(t), tube) if self.scenario.file.node.joints == "marks" else tube
+        above = sum(lower_error[k] for k in range(tube + 1, top + 1))
+        rigid = drive_error[top] + above - self._mounts[tube]
+        return rigid if self.torsion is None else rigid + float(self.torsion.twist(tube, np.array([t]))[0][0])
+
+    def truth_station(self, md: float) -> dict[str, float]:
+        """Direction and position of the hole at one depth, degrees and metres."""
+        inclination, azimuth = self.scenario.hole.direction(md)
+        north, east, tvd = self.scenario.hole.position(md)
+        return {
+            "md_m": md,
+            "inclination_deg": math.degrees(inclination),
+            "azimuth_deg": math.degrees(azimuth),
+            "north_m": float(north),
+            "east_m": float(east),
+            "tvd_m": float(tvd),
+        }
+
+    def truth(self, tube: int) -> TubeTruth:
+        """Perfect sensor of a tube."""
+        drive, _ = self._joint_angles
+        a = self.scenario.file.accelerometer
+        below = (tube - 1) * self.scenario.tube_length
+        # joints below the head are rigid: a tube keeps for ever the angle it had while it was the top one
+        joint = drive[tube] + self._mounts[tube]
+        twist = None if self.torsion is None else partial(self.torsion.twist, tube)
+        return TubeTruth(self.scenario.hole, self.motion, below, joint, a.radius_m, a.gravity_mps2, twist)
+
+    def drift(self, tube: int, imu: int = 0) -> Drift | None:
+        """What became of a tube's sensors since their calibration."""
+        section = self.scenario.file.drift
+        return None if section is None else Drift.draw(section, self._random(DRIFT, tube, imu))
+
+    def imu_frame(self, tube: int, imu: int = 0) -> Array:
+        """R_imu_from_tube (3, 3): how an IMU (from 0) of a tube leans against the tube's axis."""
+        std = math.radians(self.scenario.file.joints.mount_tilt_std_deg)
+        pitch, roll = std * self._random(MOUNTS, tube, imu).standard_normal(2)
+        return imu_frame(pitch, roll)
+
+    @property
+    def _stiffness(self) -> float:
+        """Of a tube as the crew knows it, N m/rad."""
+        section = self.scenario.file.torsion
+        return math.inf if section is None else stiffness(section, self.scenario.tube_length)
+
+    def _string_torsion(self) -> StringTorsion | None:
+        section, tubes = self.scenario.file.torsion, self.scenario.tubes
+        if section is None:
+            return None
+        trapped = section.trapped_fraction * np.abs(self._random(TORSION, 0).standard_normal(tubes))
+        return StringTorsion(section, self.motion, self.scenario.tube_length, np.arange(1.0, tubes + 1.0), trapped)
+
+    def _all_samples(self, tube: int, imu: int) -> Array:
+        count = math.floor((self.end - self.begin) / PERIOD + 1e-9)
+        ends: Array = self.begin + PERIOD * np.arange(1.0, count + 1.0)
+        truth, file = self.truth(tube), self.scenario.file
+        rate, force = truth.cycle_means(ends, PERIOD)
+        if self.rack is not None:
+            racked = ends <= self.rack.end
+            held = self.rack.truth(self._random(RACK, tube), self._mounts[tube], file.accelerometer.gravity_mps2)
+            rate[racked], force[racked] = held.cycle_means(ends[racked], PERIOD)
+        frame = self.imu_frame(tube, imu)
+        rate, force = rate @ frame.T, force @ frame.T
+        turning = (self.motion.drive(ends)[1] > 0.0) | (self.motion.drive(ends - PERIOD)[1] > 0.0)
+        felt = force
+        if (drift := self.drift(tube, imu)) is not None:
+            rate, felt = rate + drift.rate, force @ drift.matrix.T + drift.bias
+        errors = ImuErrors(file.gyroscope, file.accelerometer).times(self._noises[imu])
+        measured_rate = errors.gyro(self._random(GYRO, tube, imu), rate, force, PERIOD)
+        measured_force = errors.accelerations(self._random(ACCELEROMETER, tube, imu), felt, turning.astype(float))
+        return np.concatenate([measured_rate, measured_force], axis=1)
+
+    @cached_property
+    def _joint_angles(self) -> tuple[list[float], list[float]]:
+        """True angles by tube (index 0 unused): drive head to tube while it is on top, tube to the one below.
+
+        The string stands while a tube is added, so the new pair of joints adds up to the old one.
+        """
+        random = self._random(JOINTS, 0)
+        drive, lower = [0.0], [0.0]
+        for tube in range(1, self.scenario.tubes + 1):
+            angle = float(random.uniform(-math.pi, math.pi))
+            lower.append(angle if tube > 1 else 0.0)
+            drive.append(drive[tube - 1] - angle if tube > 1 else angle)
+        return drive, lower
+
+    @cached_property
+    def _joint_errors(self) -> tuple[list[float], list[float]]:
+        random = self._random(JOINTS, 1)
+        std = math.radians(self.scenario.file.joints.reading_std_deg)
+        draws = std * random.standard_normal((self.scenario.tubes + 1, 2))
+        draws[:2, 1] = 0.0  # the lowest tube has no joint below
+        return draws[:, 0].tolist(), draws[:, 1].tolist()
+
+    @cached_property
+    def _mounts(self) -> list[float]:
+        std = math.radians(self.scenario.file.joints.mount_std_deg)
+        errors: list[float] = (std * self._random(MOUNTS, 0).standard_normal(self.scenario.tubes + 1)).tolist()
+        return errors
+
+    def _clock(self, address: int) -> tuple[float, float]:
+        if address == ENCODER:
+            return 0.0, 0.0
+        return self._clocks[0 if address == BASE else address]
+
+    @cached_property
+    def _clocks(self) -> list[tuple[float, float]]:
+        clocks = self.scenario.file.clocks
+        draws = self._random(CLOCKS, 0).standard_normal((self.scenario.tubes + 1, 2))
+        return [(clocks.offset_std_s * a, clocks.drift_std_ppm * 1e-6 * b) for a, b in draws.tolist()]
+
+    def _random(self, purpose: int, tube: int, imu: int = 0) -> np.random.Generator:
+        further = [imu] if imu else []  # the first IMU of a tube draws what it draws alone
+        return stream(self.seed, purpose, tube, *further)
+
+    def _check_faults(self) -> None:
+        racked = self.rack.end if self.rack is not None else self.begin
+        for fault in self.faults:
+            if self.begin + fault.after + fault.down < racked:
+                continue
+            on = next(phase.start for phase in self.phases if phase.kind == "add" and phase.tube == fault.tube)
+            if not on < self.begin + fault.after < self.end - fault.down:
+                raise ScenarioError(
+                    f"fault {fault}: expected a time between {on - self.begin:.0f} s, "
+                    f"when the tube is added, and {self.end - fault.down - self.begin:.0f} s"
+                )
+        in_order = sorted(self.faults, key=lambda fault: (fault.tube, fault.after))
+        for first, second in pairwise(in_order):
+            if first.tube == second.tube and second.after <= first.after + first.down:
+                raise ScenarioError(
+                    f"fault {second}: expected a time after {first.after + first.down:g} s, "
+                    f"for the node is down until then by {first}"
+                )

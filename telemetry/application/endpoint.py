@@ -1,0 +1,314 @@
+"""One process of the string in conversation with its neighbours, and through them with the ground station.
+
+A station owns a link at each end. What is for one hop it handles itself (neighbours, time); what travels it passes
+on as the bytes that came; what is for it, it decodes and hands to its process. All of it is driven from outside by
+``receive``, ``advance`` and ``take_frames``; there is no clock, thread or socket in here.
+"""
+
+from __future__ import annotations
+
+import math
+from collections import Counter, OrderedDict
+from dataclasses import dataclass, replace
+
+import msgpack
+
+from telemetry.application.clock import ClockFilter
+from telemetry.application.outbox import Outbox
+from telemetry.errors import DecodeError
+from telemetry.messages import (
+    BASE,
+    ENCODER,
+    HOPS_UNKNOWN,
+    Aiding,
+    BlockSegment,
+    BlockStatus,
+    Command,
+    Hello,
+    Kept,
+    Message,
+    Mode,
+    NodeState,
+    Receipt,
+    Reply,
+    Side,
+    TimeReply,
+    TimeRequest,
+)
+from telemetry.presentation.msgpack_codec import DOWNWARD, Envelope, Kind, decode, encode, peek
+from telemetry.transport.hop import HopLink
+
+HELLO_EVERY = 1.0  # s
+SYNC_BURST = 30  # exchanges at the quick pace after a start
+SYNC_QUICK = 1.0  # s
+SYNC_SLOW = 10.0  # s
+ANSWERS_KEPT = 64
+ONE_HOP = (Kind.AIDING, Kind.HELLO, Kind.TIME_REQUEST, Kind.TIME_REPLY)
+RELIABLE = (
+    Kind.SURVEY_MEASUREMENT,
+    Kind.EVENT,
+    Kind.REPLY,
+    Kind.RECEIPT,
+    Kind.COMMAND,
+    Kind.BLOCK_SEGMENT,
+    Kind.BLOCK_STATUS,
+    Kind.STATIC_RECORD,
+)
+
+
+@dataclass(frozen=True, slots=True)
+class Received:
+    """A message for this process and the end it came in at."""
+
+    message: Message
+    side: Side
+
+
+@dataclass(frozen=True, slots=True)
+class Neighbour:
+    """Who is at the other side of a joint."""
+
+    tube: int
+    boot_count: int
+    hops: int
+    mode: Mode
+    link_quality: float
+    last_heard: float
+
+
+class Endpoint:
+    """Telemetry of one process.
+
+    Parameters
+    ----------
+    address : ``BASE``, ``ENCODER`` or the tube's number
+    sides : ends that exist; the base has only its lower one
+    boot_count : starts so far, kept by the process
+    is_clock_root : whether the own clock is rig time
+    restored : bytes of ``export_state`` before the restart, or None
+    """
+
+    def __init__(
+        self,
+        address: int,
+        sides: frozenset[Side],
+        *,
+        boot_count: int,
+        is_clock_root: bool = False,
+        restored: bytes | None = None,
+    ) -> None:
+        self.address = address
+        self.boot_count = boot_count
+        self.clock = ClockFilter(is_root=is_clock_root)
+        self.counters: Counter[str] = Counter()
+        self.mode = Mode.BOOT
+        self.neighbours: dict[Side, Neighbour | None] = dict.fromkeys(Side)
+        self.hops = 0 if address == ENCODER else HOPS_UNKNOWN
+        self._links = {side: HopLink(address, boot_count) for side in sorted(sides)}
+        toward_encoder = Side.LOWER if address == BASE else Side.UPPER
+        self._sync_side = None if is_clock_root else toward_encoder
+        self._next_sequence = 1
+        self._outbox = Outbox()
+        self._answered: OrderedDict[int, bytes] = OrderedDict()
+        self._commands = Outbox()
+        self._hello_at = -math.inf
+        self._sync_at = -math.inf
+        if restored is not None:
+            self._restore(restored)
+
+    def receive(self, side: Side, frame: bytes, now: float) -> list[Received]:
+        """Take a frame from one end; returns the messages for this process. Garbage is counted."""
+        link = self._links.get(side)
+        if link is None:
+            self.counters["no_such_end"] += 1
+            return []
+        before = link.peer
+        payloads = link.receive(frame, now)
+        if link.peer != before:
+            self._hello_at = -math.inf
+            if side is self._sync_side and before is not None and link.peer is not None and link.peer[0] != before[0]:
+                self.clock.change_neighbour()
+                self._sync_at = -math.inf
+        received = []
+        for payload in payloads:
+            try:
+                message = self._handle(side, payload, now)
+            except DecodeError:
+                self.counters["bad_payloads"] += 1
+                continue
+            if message is not None:
+                received.append(Received(message, side))
+        return received
+
+    def advance(self, now: float) -> None:
+        """Let time pass: neighbours that fell silent, hello, time requests, end-to-end repetition."""
+        for side, link in self._links.items():
+            if self.neighbours[side] is not None and not link.is_up(now):
+                self.neighbours[side] = None
+        if now >= self._hello_at + HELLO_EVERY:
+            self._hello_at = now
+            self._send_hello()
+        if self._sync_side in self._links and now >= self._sync_at + self._sync_pace():
+            self._sync_at = now
+            self._links[self._sync_side].send_best_effort(encode(TimeRequest(now)), Kind.TIME_REQUEST)
+        self._send_due(self._outbox, Side.UPPER, now)
+        self._send_due(self._commands, Side.LOWER, now)
+
+    def take_frames(self, now: float) -> list[tuple[Side, bytes]]:
+        """Frames to put on the wire now."""
+        return [(side, frame) for side, link in self._links.items() for frame in link.take_frames(now)]
+
+    def next_wake(self, now: float) -> float:
+        """Local time (s) at which ``advance`` and ``take_frames`` have work that no frame brings."""
+        return min((link.next_wake(now) for link in self._links.values()), default=math.inf)
+
+    def send_aiding(self, aiding: Aiding, now: float) -> None:
+        """Hand the reference to the tube below; the newest replaces one that still waits."""
+        del now
+        if Side.LOWER in self._links:
+            self._links[Side.LOWER].send_best_effort(encode(aiding), Kind.AIDING)
+
+    def send_state(self, state: NodeState, now: float) -> None:
+        """Send the node's account of itself up the string."""
+        del now
+        self.mode = state.mode
+        if Side.UPPER in self._links:
+            self._links[Side.UPPER].send_best_effort(encode(state), (Kind.NODE_STATE, state.tube))
+
+    def submit(self, message: Kept, now: float) -> None:
+        """Keep a message until the ground station has receipted it, and send it."""
+        self._outbox.keep_payload(message.sequence, encode(message), now)
+        self._send_due(self._outbox, Side.UPPER, now)
+
+    def new_sequence(self) -> int:
+        """Number of the next survey or event."""
+        sequence = self._next_sequence
+        self._next_sequence += 1
+        return sequence
+
+    def command(self, command: Command, now: float) -> None:
+        """Send an order down the string until its reply comes (base station)."""
+        self._commands.keep_payload(command.sequence, encode(command), now)
+        self._send_due(self._commands, Side.LOWER, now)
+
+    def reply(self, reply: Reply, now: float) -> None:
+        """Answer a command; the answer is kept, so that a repeated command is answered and not obeyed again."""
+        del now
+        payload = encode(reply)
+        self._answered[reply.sequence] = payload
+        while len(self._answered) > ANSWERS_KEPT:
+            self._answered.popitem(last=False)
+        self._links[Side.UPPER].send_reliable(payload)
+
+    def send_segment(self, segment: BlockSegment) -> None:
+        """Send a part of a parameter block down; what is lost with a relay the upload repeats (base station)."""
+        self._links[Side.LOWER].send_reliable(encode(segment))
+
+    def send_status(self, status: BlockStatus) -> None:
+        """Tell the ground station how an upload stands."""
+        self._links[Side.UPPER].send_reliable(encode(status))
+
+    def acknowledge(self, tube: int, sequence: int, now: float) -> None:
+        """Tell a tube that its message is stored (base station)."""
+        del now
+        self._links[Side.LOWER].send_reliable(encode(Receipt(tube, sequence)))
+
+    @property
+    def outbox_size(self) -> int:
+        """Surveys and events that the ground station has not receipted yet."""
+        return len(self._outbox)
+
+    def link_counters(self) -> dict[str, int]:
+        """Counts of all that went wrong or was dropped, of both ends."""
+        total = Counter(self.counters)
+        for link in self._links.values():
+            total.update(link.counters)
+        return dict(total)
+
+    def export_state(self) -> bytes:
+        """What must survive a restart: numbers, unreceipted messages, answered commands."""
+        return bytes(
+            msgpack.packb([self._next_sequence, self._outbox.contents(), list(self._answered.items()), self.hops])
+        )
+
+    def _restore(self, saved: bytes) -> None:
+        self._next_sequence, parcels, answered, self.hops = msgpack.unpackb(saved)
+        for sequence, payload in parcels:
+            self._outbox.keep_payload(sequence, payload, -math.inf)
+        self._answered.update((sequence, payload) for sequence, payload in answered)
+
+    def _handle(self, side: Side, payload: bytes, now: float) -> Message | None:
+        envelope = peek(payload)
+        if envelope.kind in ONE_HOP:
+            return self._handle_one_hop(side, decode(payload), now)
+        if envelope.kind in DOWNWARD:
+            return self._handle_downward(envelope, payload)
+        return self._handle_upward(envelope, payload)
+
+    def _handle_one_hop(self, side: Side, message: Message, now: float) -> Message | None:
+        match message:
+            case Hello():
+                self._meet(side, message, now)
+            case TimeRequest() if self.clock.synchronised and side is not self._sync_side:
+                clock = self.clock
+                var = min(clock.variance(now), 1e9)
+                reply = TimeReply(message.asked_at, now, now, clock.rig_from_local(now), clock.rig_rate, var)
+                self._links[side].send_best_effort(encode(reply), Kind.TIME_REPLY)
+            case TimeReply() if side is self._sync_side:
+                self.clock.exchange(message, now)
+            case Aiding() if side is Side.UPPER:
+                return message
+        return None
+
+    def _meet(self, side: Side, hello: Hello, now: float) -> None:
+        self.neighbours[side] = Neighbour(
+            hello.tube, hello.boot_count, hello.hops, hello.mode, self._links[side].quality, now
+        )
+        if side is Side.UPPER and hello.hops != HOPS_UNKNOWN and hello.hops + 1 != self.hops:
+            self.hops = hello.hops + 1
+            self._hello_at = -math.inf
+
+    def _handle_upward(self, envelope: Envelope, payload: bytes) -> Message | None:
+        if self.address != BASE:
+            self._pass(Side.UPPER, envelope, payload)
+            return None
+        message = decode(payload)
+        if isinstance(message, Reply) and not self._commands.settle(message.sequence):
+            return None
+        return message
+
+    def _handle_downward(self, envelope: Envelope, payload: bytes) -> Message | None:
+        if envelope.target != self.address:
+            self._pass(Side.LOWER, envelope, payload)
+            return None
+        message = decode(payload)
+        if isinstance(message, Receipt):
+            self._outbox.settle(message.sequence)
+            return None
+        if isinstance(message, Command) and message.sequence in self._answered:
+            self._links[Side.UPPER].send_reliable(self._answered[message.sequence])
+            return None
+        return message
+
+    def _pass(self, side: Side, envelope: Envelope, payload: bytes) -> None:
+        """Hand on the very bytes that came."""
+        link = self._links.get(side)
+        if link is None:
+            self.counters["nowhere_to_go"] += 1
+        elif envelope.kind in RELIABLE:
+            link.send_reliable(payload)
+        else:
+            link.send_best_effort(payload, (envelope.kind, envelope.origin))
+
+    def _send_hello(self) -> None:
+        hello = Hello(self.address, self.boot_count, self.hops, self.mode, 1.0)
+        for link in self._links.values():
+            link.send_best_effort(encode(replace(hello, link_quality=link.quality)), Kind.HELLO)
+
+    def _sync_pace(self) -> float:
+        return SYNC_QUICK if self.clock.exchanges < SYNC_BURST else SYNC_SLOW
+
+    def _send_due(self, outbox: Outbox, side: Side, now: float) -> None:
+        if side in self._links:
+            for payload in outbox.due_payloads(now):
+                self._links[side].send_reliable(payload)

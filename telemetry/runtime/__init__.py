@@ -1,0 +1,1 @@
+"""What drives a process: steps from outside, or a clock of its own."""

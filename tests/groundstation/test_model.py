@@ -1,0 +1,384 @@
+"""What the ground station makes of surveys, without any bus: stations, holes that moved, columns, alarms, views."""
+
+import math
+import random
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
+
+from groundstation.config import GroundConfig
+from groundstation.errors import SelectorError
+from groundstation.service import column_views
+from groundstation.service.model import RigModel
+from groundstation.survey.ellipsoid import plan_ellipse
+from groundstation.survey.resolve import angles
+from telemetry.messages import ImuMean, NodeFlag, SurveyMeasurement
+
+G = 9.81
+DEG = math.pi / 180.0
+VAR = (0.0034**2) / 32
+COV = ((VAR, 0.0, 0.0), (0.0, VAR, 0.0), (0.0, 0.0, VAR))
+BETWEEN_STOPS = 600.0  # s
+Placed = tuple[SurveyMeasurement, float]
+
+
+def survey(
+    tube: int, stop: int, hops: int, inclination_deg: float, azimuth_deg: float = 0.0, apart: float = 0.5
+) -> SurveyMeasurement:
+    """One IMU of a tube at a stop; the tubes answer one after the other."""
+    inclination, azimuth, yaw = inclination_deg * DEG, azimuth_deg * DEG, 0.3 * tube
+    s = math.sin(inclination)
+    force = (G * s * math.cos(azimuth - yaw), G * s * math.sin(azimuth - yaw), -G * math.cos(inclination))
+    return SurveyMeasurement(
+        tube, stop, BETWEEN_STOPS * stop + apart * tube, hops, (ImuMean(force, COV),), yaw, (0.01 * DEG) ** 2,
+        (0.1 * DEG) ** 2, 32, 20.0, NodeFlag.NONE,
+    )  # fmt: skip
+
+
+def passes(stops: int, inclination_deg: Callable[[int, int], float], apart: float = 0.5) -> list[Placed]:
+    """Tube 1 is at the bit and one tube is added on top a stop: at stop t tube k is at station t - k + 1."""
+    return [
+        (
+            survey(tube, stop, stop - tube + 1, inclination_deg(stop, stop - tube + 1), apart=apart),
+            2.0 * (stop - tube + 1),
+        )
+        for stop in range(1, stops + 1)
+        for tube in range(1, stop + 1)
+    ]
+
+
+def knowing(tmp_path: Path, measurements: list[Placed], tubes: int = 0, **settings: Any) -> RigModel:
+    """RigModel of surveys in the order in which they come; the string's order is known beforehand."""
+    model = RigModel(GroundConfig(folder=tmp_path, **settings))
+    model.tally.restore(list(range(tubes, 0, -1)))
+    for measurement, md in measurements:
+        assert model.on_survey(measurement, md)
+    return model
+
+
+def inclination_deg(model: RigModel, station: int) -> float:
+    fused = model.fused(model.stations[station])
+    return angles(fused.lean, fused.down)[0] / DEG
+
+
+def test_readings_of_a_hole_that_stays_all_count(tmp_path: Path) -> None:
+    model = knowing(tmp_path, passes(5, lambda _stop, _station: 1.0), 5)
+    assert [(s.md, s.count, s.first) for s in model.stations] == [
+        (2.0, 5, 0), (4.0, 4, 0), (6.0, 3, 0), (8.0, 2, 0), (10.0, 1, 0),
+    ]  # fmt: skip
+    assert model.moved == []
+    assert [p.md for p in model.trajectory] == [0.0, 2.0, 4.0, 6.0, 8.0, 10.0]
+
+
+def moving(stops: int, at_stop: int) -> list[Placed]:
+    """A hole of 1 deg that is at 2 deg from a stop on."""
+    return passes(stops, lambda stop, _station: 2.0 if stop >= at_stop else 1.0)
+
+
+@pytest.mark.parametrize("order", ["from the bit up", "from the top down", "odd tubes first", "even tubes first"])
+@pytest.mark.parametrize("stops", [3, 4, 5, 6])
+def test_a_hole_that_moved_drops_what_was_read_before(tmp_path: Path, order: str, stops: int) -> None:
+    measurements = moving(stops, stops)
+    place: dict[str, Callable[[int], tuple[int, int]]] = {
+        "from the bit up": lambda tube: (0, tube),
+        "from the top down": lambda tube: (0, -tube),
+        "odd tubes first": lambda tube: ((tube + 1) % 2, tube),
+        "even tubes first": lambda tube: (tube % 2, tube),
+    }
+    measurements.sort(key=lambda placed: (placed[0].sequence, place[order](placed[0].tube)))
+    model = knowing(tmp_path, measurements, stops)
+    for station, known in enumerate(model.stations):
+        assert inclination_deg(model, station) == pytest.approx(2.0, abs=1e-6), known.md
+        assert known.first == known.count - 1
+    assert sorted(moved.md for moved in model.moved) == [2.0 * n for n in range(1, stops)]
+    assert sorted(moved.dropped for moved in model.moved) == list(range(1, stops))
+
+
+def test_the_evidence_of_a_movement_is_kept(tmp_path: Path) -> None:
+    model = knowing(tmp_path, moving(4, 4), 4)
+    assert model.moved
+    for moved in model.moved:
+        assert moved.evidence.moved
+        assert moved.evidence.own > 10.0
+        assert 1 <= len(moved.evidence.neighbours) <= 2
+        assert min(moved.evidence.neighbours) > 10.0
+        assert moved.at == pytest.approx(4 * BETWEEN_STOPS, abs=5.0)
+
+
+def test_readings_after_a_movement_count_together(tmp_path: Path) -> None:
+    model = knowing(tmp_path, moving(6, 5), 6)
+    first = model.stations[0]
+    assert (first.count, first.first) == (6, 4)
+    assert len(first.readings()) == 2
+    assert inclination_deg(model, 0) == pytest.approx(2.0, abs=1e-6)
+    assert {moved.at // BETWEEN_STOPS for moved in model.moved} == {5}
+
+
+@pytest.mark.parametrize("outlier", [1, 2, 3, 4])
+def test_an_outlier_at_one_station_drops_nothing(tmp_path: Path, outlier: int) -> None:
+    measurements = passes(5, lambda stop, station: 2.0 if (stop, station) == (5, outlier) else 1.0)
+    model = knowing(tmp_path, measurements, 5)
+    assert model.moved == []
+    assert all(known.first == 0 for known in model.stations)
+    assert 1.0 < inclination_deg(model, outlier - 1) < 2.0
+
+
+def test_stations_that_changed_to_different_sides_did_not_move(tmp_path: Path) -> None:
+    measurements = passes(5, lambda stop, station: 1.0 if stop < 5 else (2.0 if station % 2 else 0.2))
+    assert knowing(tmp_path, measurements, 5).moved == []
+
+
+def test_a_neighbour_that_changed_at_another_stop_is_no_evidence(tmp_path: Path) -> None:
+    placed = [(1, 1, 2.0, 1.0), (2, 1, 4.0, 1.0), (2, 2, 4.0, 2.0), (1, 3, 2.0, 2.0)]
+    measurements = [(survey(tube, stop, 3 - tube, inclination), md) for tube, stop, md, inclination in placed]
+    assert knowing(tmp_path, measurements, 2).moved == []
+    measurements.append((survey(2, 3, 1, 2.0), 4.0))
+    measurements[2] = (survey(2, 2, 1, 1.0), 4.0)
+    assert sorted(moved.md for moved in knowing(tmp_path, measurements, 2).moved) == [2.0, 4.0]
+
+
+def result(model: RigModel) -> dict[str, Any]:
+    """All that follows from the surveys."""
+    stations = [
+        (s.md, s.first, [(c.measurement.tube, c.measurement.sequence) for c in s.clusters]) for s in model.stations
+    ]
+    fused = [model.fused(s) for s in model.stations]
+    directions = [np.concatenate([f.lean, [f.down], f.cov.ravel(), f.total_cov.ravel()]) for f in fused]
+    points = [np.concatenate([[p.md], p.position, p.cov.ravel()]) for p in model.trajectory]
+    assert model.projection is not None
+    projection = [np.concatenate([model.projection.offset, model.projection.cov.ravel()])]
+    moved = sorted((m.md, m.at, m.dropped) for m in model.moved)
+    return {
+        "stations": stations, "directions": directions, "points": points, "projection": projection, "moved": moved,
+    }  # fmt: skip
+
+
+def differing(one: dict[str, Any], other: dict[str, Any]) -> list[str]:
+    """What differs by more than the order in which shared errors were met, and so are summed, explains."""
+    return [name for name, value in one.items() if not same(value, other[name])]
+
+
+def same(one: Any, other: Any) -> bool:
+    if one and isinstance(one[0], np.ndarray):
+        return all(np.allclose(a, b, rtol=1e-10, atol=1e-18) for a, b in zip(one, other, strict=True))
+    return bool(one == other)
+
+
+@settings(max_examples=10, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@given(shuffler=st.randoms(use_true_random=False))
+@pytest.mark.parametrize("apart", [0.5, 4.0, 7.0, 16.0])
+@pytest.mark.parametrize("moves", [False, True], ids=["stays", "moves"])
+def test_surveys_may_come_in_any_order(tmp_path: Path, moves: bool, apart: float, shuffler: random.Random) -> None:
+    measurements = passes(4, lambda stop, station: 1.0 + 0.1 * station + (1.0 if moves and stop == 4 else 0.0), apart)
+    expected = result(knowing(tmp_path, measurements, 4))
+    shuffled = measurements[:]
+    shuffler.shuffle(shuffled)
+    assert differing(result(knowing(tmp_path, shuffled, 4)), expected) == []
+
+
+def halves(moved_from: int) -> list[Placed]:
+    """Stops at half and at whole tubes: each reads every second station."""
+    return [
+        (survey(tube, stop, 4 - tube, 2.0 if stop >= moved_from else 1.0), 2.0 * (4 - tube) + 1.0 * (stop % 2))
+        for stop in range(1, 7)
+        for tube in (1, 2, 3)
+    ]
+
+
+def test_stations_between_others_do_not_hide_that_the_hole_moved(tmp_path: Path) -> None:
+    model = knowing(tmp_path, halves(moved_from=5), 3)
+    assert sorted(moved.md for moved in model.moved) == [2.0, 3.0, 4.0, 5.0, 6.0, 7.0]
+    assert [inclination_deg(model, n) for n in range(6)] == pytest.approx([2.0] * 6, abs=1e-6)
+
+
+def test_a_station_that_was_met_later_changes_no_earlier_decision(tmp_path: Path) -> None:
+    between = (survey(1, 9, 1, 1.0), 3.0)
+    in_order, early = (knowing(tmp_path, m, 4) for m in ([*moving(4, 4), between], [between, *moving(4, 4)]))
+    assert sorted(moved.md for moved in in_order.moved) == [2.0, 4.0, 6.0]
+    assert differing(result(early), result(in_order)) == []
+
+
+def test_a_late_survey_clears_no_alarm_before_it_was_raised(tmp_path: Path) -> None:
+    late = (survey(1, 1, 1, 2.0, azimuth_deg=180.0), 2.0)
+    model = knowing(tmp_path, [(survey(1, 2, 1, 2.0), 4.0), late], 1, tolerance="5-cm")
+    assert any(alarm.cleared_at is not None for alarm in model.alarms.alarms)
+    for alarm in model.alarms.alarms:
+        assert alarm.cleared_at is None or alarm.cleared_at >= alarm.raised_at
+
+
+def test_surveys_of_one_stop_that_come_late_change_nothing(tmp_path: Path) -> None:
+    measurements = moving(5, 5)
+    late = [placed for placed in measurements if placed[0].sequence == 2]
+    others = [placed for placed in measurements if placed[0].sequence != 2]
+    in_order, out_of_order = (result(knowing(tmp_path, m, 5)) for m in (measurements, others + late))
+    assert differing(out_of_order, in_order) == []
+
+
+def test_a_measurement_that_is_none_is_counted_and_changes_nothing(tmp_path: Path) -> None:
+    model = knowing(tmp_path, passes(2, lambda _stop, _station: 1.0), 2)
+    before = result(model)
+    bad = SurveyMeasurement(1, 9, 2000.0, 1, (ImuMean((0.0, 0.0, 0.0), COV),), 0.0, 1e-8, 1e-8, 32, 20.0, NodeFlag.NONE)
+    assert not model.take_survey(bad, 2.0)
+    assert not model.on_survey(survey(1, 10, 1, 1.0), None)
+    assert (model.refused, model.unplaced) == (1, 1)
+    assert differing(result(model), before) == []
+
+
+def test_the_random_part_of_a_station_shrinks_and_its_joints_stay(tmp_path: Path) -> None:
+    def stds(count: int) -> dict[str, Any]:
+        measurements = [(survey(1, stop, 1, 5.0), 2.0) for stop in range(1, count + 1)]
+        view = column_views.uncertainty(knowing(tmp_path, measurements, 1), {})
+        return view["stations"][-1]["sources"]
+
+    one, nine = stds(1), stds(9)
+    assert nine["random"]["sigma_north_m"] == pytest.approx(one["random"]["sigma_north_m"] / 3.0, rel=1e-6)
+    for kind in ("joints", "mounts", "accelerometer_bias"):
+        assert nine[kind]["sigma_east_m"] == pytest.approx(one[kind]["sigma_east_m"], rel=1e-6)
+
+
+def test_uncertainty_is_told_at_a_confidence_with_its_sources(tmp_path: Path) -> None:
+    model = knowing(tmp_path, passes(4, lambda _stop, station: 1.0 + station), 4)
+    view = column_views.uncertainty(model, {})
+    assert view["confidence"] == 0.95
+    assert view["sigma_plane"] == pytest.approx(2.4477, abs=1e-4)
+    assert view["sigma_space"] == pytest.approx(2.7955, abs=1e-4)
+    assert [row["md_m"] for row in view["stations"]] == [0.0, 2.0, 4.0, 6.0, 8.0]
+    for row, point in zip(view["stations"], model.trajectory, strict=True):
+        ellipse, sources = plan_ellipse(point.cov, view["sigma_plane"]), row["sources"]
+        assert row["plan_ellipse"]["major_m"] == pytest.approx(ellipse.major)
+        assert row["plan_ellipse"]["minor_m"] == pytest.approx(ellipse.minor)
+        assert row["plan_ellipse"]["azimuth_deg"] == pytest.approx(math.degrees(ellipse.azimuth))
+        sizes = [axis["semi_axis_m"] for axis in row["ellipsoid"]]
+        variances = np.maximum(np.linalg.eigvalsh(point.cov)[::-1], 0.0)
+        assert sizes == pytest.approx(list(2.7955 * np.sqrt(variances)), rel=1e-4, abs=1e-9)
+        for axis, name in enumerate(("sigma_north_m", "sigma_east_m", "sigma_tvd_m")):
+            squares = sum(source[name] ** 2 for source in sources.values())
+            assert squares == pytest.approx(point.cov[axis, axis], rel=1e-6, abs=1e-15)
+    assert set(view["stations"][-1]["sources"]) == {"random", "mounts", "joints", "accelerometer_bias"}
+
+
+def test_another_confidence_scales_the_regions(tmp_path: Path) -> None:
+    model = knowing(tmp_path, passes(2, lambda _stop, _station: 1.0), 2)
+    half = column_views.uncertainty(model, {"confidence": "0.5"})
+    assert half["confidence"] == 0.5
+    assert half["sigma_plane"] == pytest.approx(math.sqrt(2.0 * math.log(2.0)))
+    major, wanted = half["stations"][-1]["plan_ellipse"]["major_m"], model.trajectory[-1].cov
+    assert major == pytest.approx(half["sigma_plane"] * math.sqrt(np.linalg.eigvalsh(wanted[:2, :2])[-1]))
+
+
+@pytest.mark.parametrize("text", ["", "abc", "0", "1", "-0.5", "95", "nan", "inf", "1e-999"])
+def test_a_confidence_that_is_none_is_refused(tmp_path: Path, text: str) -> None:
+    with pytest.raises(SelectorError, match="confidence"):
+        column_views.uncertainty(RigModel(GroundConfig(folder=tmp_path)), {"confidence": text})
+
+
+def test_views_of_nothing_have_the_collar_alone(tmp_path: Path) -> None:
+    model = RigModel(GroundConfig(folder=tmp_path))
+    assert [row["md_m"] for row in column_views.uncertainty(model, {})["stations"]] == [0.0]
+    column = column_views.column(model, {})
+    assert [row["deviation_cm"] for row in column["stations"]] == [0.0]
+    assert column["projection"] is None
+    assert column["dominant"] is None
+    alarms = column_views.alarms(model, {})
+    assert (alarms["active"], alarms["cleared"], alarms["moved"]) == ([], [], [])
+
+
+def column_of(tmp_path: Path, inclination: float, azimuth: float, **settings: Any) -> tuple[RigModel, dict[str, Any]]:
+    """Five stations of a hole that leans alike all along, each read by the tube at the bit."""
+    measurements = [(survey(1, stop, 1, inclination, azimuth), 2.0 * stop) for stop in range(1, 6)]
+    model = knowing(tmp_path, measurements, 1, **settings)
+    return model, column_views.column(model, {})
+
+
+def test_a_column_is_told_in_centimetres_percent_and_degrees(tmp_path: Path) -> None:
+    model, view = column_of(tmp_path, 1.0, 120.0)
+    assert view["design"] == {
+        "inclination_deg": 0.0, "azimuth_deg": 0.0, "target_m": 30.0, "radius_m": 0.6, "tolerance": "en-12716",
+    }  # fmt: skip
+    toe, point = view["stations"][-1], model.trajectory[-1]
+    lateral = 9.0 * math.sin(DEG)  # the first leg starts vertical
+    assert toe["md_m"] == 10.0
+    assert toe["deviation_cm"] == pytest.approx(100.0 * lateral, rel=1e-6)
+    assert toe["north_cm"] == pytest.approx(-50.0 * lateral, rel=1e-6)
+    assert toe["east_cm"] == pytest.approx(100.0 * lateral * math.sqrt(0.75), rel=1e-6)
+    assert toe["direction_deg"] == pytest.approx(120.0)
+    assert toe["along_m"] == pytest.approx(point.position[2])
+    assert toe["deviation_percent"] == pytest.approx(100.0 * lateral / point.position[2], rel=1e-6)
+    assert toe["limit_cm"] == pytest.approx(5.0 + 2.0 * point.position[2])
+    assert toe["used_percent"] == pytest.approx(100.0 * 100.0 * lateral / toe["limit_cm"], rel=1e-6)
+    assert toe["level_percent"] == 50
+    unit = np.array([math.cos(120.0 * DEG), math.sin(120.0 * DEG)])
+    assert toe["sigma_cm"] == pytest.approx(100.0 * math.sqrt(unit @ point.cov[:2, :2] @ unit), rel=1e-6)
+    assert view["worst"] == max(view["stations"], key=lambda row: row["used_percent"])
+
+
+def test_a_column_is_projected_to_its_target(tmp_path: Path) -> None:
+    _, view = column_of(tmp_path, 1.0, 120.0)
+    toe, projection = view["stations"][-1], view["projection"]
+    expected = toe["deviation_cm"] + 100.0 * (30.0 - toe["along_m"]) * math.tan(DEG)
+    assert projection["deviation_cm"] == pytest.approx(expected, rel=1e-6)
+    assert projection["along_m"] == 30.0
+    assert projection["limit_cm"] == pytest.approx(65.0)
+    assert projection["sigma_cm"] > toe["sigma_cm"]
+
+
+def test_the_view_says_which_angle_dominates(tmp_path: Path) -> None:
+    _, steep = column_of(tmp_path, 0.3, 10.0)
+    assert steep["dominant"]["angle"] == "inclination"
+    assert steep["dominant"]["by_inclination_m"] > 0.0
+    _, flat = column_of(tmp_path, 60.0, 10.0, design_inclination_deg=60.0, design_azimuth_deg=10.0)
+    assert flat["dominant"]["angle"] == "azimuth"
+
+
+def test_a_column_along_its_inclined_design_deviates_by_its_vertical_start_alone(tmp_path: Path) -> None:
+    _, view = column_of(tmp_path, 10.0, 70.0, design_inclination_deg=10.0, design_azimuth_deg=70.0)
+    start = 100.0 * math.sin(10.0 * DEG)  # 1 m of the first leg is vertical
+    assert [row["deviation_cm"] for row in view["stations"][1:]] == pytest.approx([start] * 5, rel=1e-6)
+    assert view["projection"]["deviation_cm"] == pytest.approx(start, rel=1e-6)
+
+
+def test_a_column_that_leaves_its_tolerance_raises_alarms_with_their_threshold(tmp_path: Path) -> None:
+    model, _ = column_of(tmp_path, 1.0, 120.0, tolerance="5-cm")
+    view = column_views.alarms(model, {})
+    assert view["levels_percent"] == [50, 80, 100]
+    deviations = {row["level_percent"]: row for row in view["active"] if row["kind"] == "deviation"}
+    assert set(deviations) == {50, 80, 100}
+    assert deviations[50]["threshold_cm"] == pytest.approx(2.5)
+    assert deviations[80]["threshold_cm"] == pytest.approx(4.0)
+    # 1, 3, 5 stations' sum of sines: 1.75 cm at 2 m, 5.24 cm at 4 m
+    assert deviations[50]["md_m"] == deviations[100]["md_m"] == 4.0
+    assert deviations[100]["deviation_cm"] == pytest.approx(300.0 * math.sin(DEG), rel=1e-6)
+    assert deviations[50]["raised_at_s"] == pytest.approx(2 * BETWEEN_STOPS, abs=5.0)
+    assert deviations[50]["cleared_at_s"] is None
+    projected = [row for row in view["active"] if row["kind"] == "projection"]
+    assert {row["raised_at_s"] for row in projected} == {BETWEEN_STOPS + 0.5}
+    assert view["cleared"] == []
+
+
+def test_an_alarm_of_a_projection_is_cleared_when_the_hole_is_steered_back(tmp_path: Path) -> None:
+    measurements = [(survey(1, stop, 1, 2.0), 2.0 * stop) for stop in range(1, 3)]
+    measurements += [(survey(1, stop, 1, 0.0), 2.0 * stop) for stop in range(3, 6)]
+    view = column_views.alarms(knowing(tmp_path, measurements, 1), {})
+    cleared = {row["level_percent"]: row for row in view["cleared"] if row["kind"] == "projection"}
+    assert set(cleared) == {50, 80, 100}
+    assert cleared[100]["cleared_at_s"] == pytest.approx(3 * BETWEEN_STOPS + 0.5)
+    assert [row for row in view["active"] if row["kind"] == "projection"] == []
+
+
+def test_the_alarms_tell_of_stations_that_moved(tmp_path: Path) -> None:
+    model = knowing(tmp_path, moving(4, 4), 4)
+    view = column_views.alarms(model, {})["moved"]
+    assert len(view) == len(model.moved) > 0
+    for row, moved in zip(view, model.moved, strict=True):
+        assert row == {
+            "md_m": moved.md,
+            "at_s": moved.at,
+            "dropped_measurements": moved.dropped,
+            "departure_sigma": moved.evidence.own,
+            "neighbours_sigma": list(moved.evidence.neighbours),
+        }

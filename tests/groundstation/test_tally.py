@@ -1,0 +1,51 @@
+from groundstation.service.tally import DepthLog, Tally
+
+
+def test_a_tube_added_at_the_top_leaves_the_depths_of_the_others() -> None:
+    order = Tally(2.0)
+    order.on_hops(1, 1)
+    assert order.tubes == [1]
+    order.on_hops(2, 1)  # before tube 1 has heard that it is second now
+    assert order.tubes == [2, 1]
+    order.on_hops(1, 2)
+    assert [order.length_below(tube) for tube in (2, 1)] == [2.0, 0.0]
+
+
+def test_counts_decide_once_they_are_complete() -> None:
+    order = Tally(2.0)
+    for tube, hops in ((1, 3), (3, 1), (2, 2)):
+        order.on_hops(tube, hops)
+    assert order.tubes == [3, 2, 1]
+
+
+def test_a_silent_tube_keeps_its_place_and_an_unknown_one_has_none() -> None:
+    order = Tally(2.0)
+    for tube, hops in ((3, 1), (2, 2), (1, 3), (3, 1)):
+        order.on_hops(tube, hops)
+    assert order.length_below(2) == 2.0
+    assert order.length_below(9) is None
+    order.on_hops(4, -1)
+    assert 4 not in order.tubes
+
+
+def test_a_restored_order_holds_until_reports_complete_another() -> None:
+    order = Tally(2.0)
+    order.restore([3, 2, 1])
+    assert order.length_below(3) == 4.0
+    for tube, hops in ((1, 4), (3, 2), (4, 1)):  # tube 4 came while nobody listened; tube 2 is still silent
+        order.on_hops(tube, hops)
+        assert [known for known in order.tubes if known != 4] == [3, 2, 1]
+    assert order.tubes == [4, 3, 2, 1]
+    order.on_hops(2, 3)
+    assert order.tubes == [4, 3, 2, 1]
+
+
+def test_depth_is_that_of_the_time_asked_for() -> None:
+    log = DepthLog()
+    assert log.at(5.0) is None
+    readings = [(1.0, 0.0), (2.0, 0.5), (3.0, 1.0), (4.0, 1.0), (5.0, 1.0), (6.0, 1.5)]
+    stands = [log.append_reading(at, md) for at, md in readings]
+    assert stands == [False, False, False, True, False, False]
+    assert [log.at(t) for t in (0.5, 2.5, 4.5, 6.0)] == [None, 0.5, 1.0, 1.5]
+    assert log.latest == 1.5
+    assert log.append_reading(2.0, 9.0) is False

@@ -1,0 +1,250 @@
+"""A chain of stations over joints with troubles: base, encoder and tubes."""
+
+import math
+from dataclasses import replace
+
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from telemetry.application.endpoint import Endpoint, Received
+from telemetry.media.memory import MemoryPort, joint
+from telemetry.messages import (
+    BASE,
+    ENCODER,
+    Aiding,
+    Command,
+    Event,
+    ImuMean,
+    Message,
+    NodeFlag,
+    Reply,
+    Severity,
+    Side,
+    SurveyMeasurement,
+)
+
+TICK = 1.0 / 1.9
+AIDING = Aiding(1.0, 1e-6, 0.0, 0.0, 0.1, 100.0, 1, 0)
+
+
+def survey(tube: int, sequence: int) -> SurveyMeasurement:
+    cov = ((1e-6, 0.0, 0.0), (0.0, 1e-6, 0.0), (0.0, 0.0, 1e-6))
+    imu = ImuMean((0.1, 0.0, -9.8), cov)
+    return SurveyMeasurement(tube, sequence, 100.0, 1, (imu,), 1.0, 1e-6, 1e-6, 32, 20.0, NodeFlag.NONE)
+
+
+class Chain:
+    """Stations from the surface down and the joints between them, on clocks of their own."""
+
+    def __init__(self, tubes: list[int], seed: int = 0, **troubles: float) -> None:
+        self.addresses = [BASE, ENCODER, *tubes]
+        self.troubles = troubles
+        self.stations = {address: self.build(address, 1) for address in self.addresses}
+        self.joints: list[tuple[MemoryPort, MemoryPort]] = []
+        for k in range(len(self.addresses) - 1):
+            self.joints.append(joint(seed + k, **troubles))
+        self.now = 1000.0
+        self.got: dict[int, list[Message]] = {address: [] for address in self.addresses}
+
+    @staticmethod
+    def build(address: int, boots: int, restored: bytes | None = None) -> Endpoint:
+        sides = frozenset({Side.LOWER}) if address == BASE else frozenset(Side)
+        return Endpoint(address, sides, boot_count=boots, is_clock_root=address == ENCODER, restored=restored)
+
+    def local(self, address: int) -> float:
+        return self.now if address == ENCODER else (self.now - 1000.0) * (1.0 + address * 1e-7) + 17.0 * address
+
+    def port(self, address: int, side: Side) -> MemoryPort | None:
+        place = self.addresses.index(address)
+        if side is Side.UPPER:
+            return self.joints[place - 1][1] if place > 0 else None
+        return self.joints[place][0] if place < len(self.joints) else None
+
+    def run(self, duration: float) -> None:
+        end, cycle_at = self.now + duration, self.now
+        while self.now < end:
+            if self.now >= cycle_at:
+                cycle_at += TICK
+                for address, station in self.stations.items():
+                    station.advance(self.local(address))
+            for address, station in self.stations.items():
+                self.exchange(address, station)
+            self.now += 0.004
+
+    def exchange(self, address: int, station: Endpoint) -> None:
+        now = self.local(address)
+        for side in Side:
+            port = self.port(address, side)
+            for frame in port.receive(self.now) if port else []:
+                for received in station.receive(side, frame, now):
+                    self.take(address, station, received, now)
+        for side, frame in station.take_frames(now):
+            port = self.port(address, side)
+            if port:
+                port.send(frame, self.now)
+
+    def take(self, address: int, station: Endpoint, received: Received, now: float) -> None:
+        self.got[address].append(received.message)
+        match received.message:
+            case SurveyMeasurement() | Event() as kept:
+                station.acknowledge(kept.tube, kept.sequence, now)
+            case Command() as command:
+                station.reply(Reply(address, command.sequence, True, command.name), now)
+            case Aiding() as aiding:
+                station.send_aiding(replace(aiding, hops=aiding.hops + 1), now)
+
+    def surveys(self) -> list[tuple[int, int]]:
+        return [(m.tube, m.sequence) for m in self.got[BASE] if isinstance(m, SurveyMeasurement)]
+
+
+def test_neighbours_and_hops_are_found_without_configuration() -> None:
+    chain = Chain([3, 2, 1])
+    chain.run(10.0)
+    assert [chain.stations[a].hops for a in (ENCODER, 3, 2, 1)] == [0, 1, 2, 3]
+    two = chain.stations[2].neighbours
+    assert two[Side.UPPER] is not None
+    assert two[Side.UPPER].tube == 3
+    assert two[Side.LOWER] is not None
+    assert two[Side.LOWER].tube == 1
+    assert chain.stations[1].neighbours[Side.LOWER] is None
+
+
+def test_a_tube_added_at_the_top_moves_all_others_down() -> None:
+    chain = Chain([1])
+    chain.run(6.0)
+    assert chain.stations[1].hops == 1
+    chain.addresses.insert(2, 2)
+    chain.stations[2] = chain.build(2, 1)
+    chain.got[2] = []
+    chain.joints[1:] = [joint(50), joint(51)]
+    chain.run(8.0)
+    assert [chain.stations[a].hops for a in (2, 1)] == [1, 2]
+    lower = chain.stations[ENCODER].neighbours[Side.LOWER]
+    assert lower is not None
+    assert lower.tube == 2
+
+
+def test_a_silent_neighbour_is_noticed() -> None:
+    chain = Chain([2, 1])
+    chain.run(5.0)
+    chain.joints[2][0].is_open = True
+    chain.run(5.0)
+    assert chain.stations[1].neighbours[Side.UPPER] is None
+    assert chain.stations[2].neighbours[Side.LOWER] is None
+    assert chain.stations[2].neighbours[Side.UPPER] is not None
+
+
+@settings(max_examples=6)
+@given(seed=st.integers(0, 1000), loss=st.floats(0.0, 0.3), duplicate=st.floats(0.0, 0.3))
+def test_surveys_arrive_once_each_and_are_receipted(seed: int, loss: float, duplicate: float) -> None:
+    chain = Chain([4, 3, 2, 1], seed, loss=loss, duplicate=duplicate, corrupt=0.05, jitter=0.003)
+    chain.run(5.0)
+    for tube in (1, 2, 3, 4):
+        for _ in range(3):
+            station = chain.stations[tube]
+            station.submit(survey(tube, station.new_sequence()), chain.local(tube))
+    chain.run(60.0)
+    assert sorted(set(chain.surveys())) == [(t, s) for t in (1, 2, 3, 4) for s in (1, 2, 3)]
+    assert [chain.stations[t].outbox_size for t in (1, 2, 3, 4)] == [0, 0, 0, 0]
+
+
+def test_a_relay_that_dies_with_surveys_in_its_hands_loses_none() -> None:
+    chain = Chain([3, 2, 1])
+    chain.run(5.0)
+    chain.joints[2][0].is_open = True  # tube 2 cannot hand on what it takes from tube 1
+    chain.joints[2][1].is_open = True
+    for _ in range(5):
+        station = chain.stations[1]
+        station.submit(survey(1, station.new_sequence()), chain.local(1))
+    chain.run(2.0)
+    chain.stations[2] = chain.build(2, 2, chain.stations[2].export_state())
+    chain.joints[2][0].is_open = chain.joints[2][1].is_open = False
+    chain.run(40.0)
+    assert sorted(set(chain.surveys())) == [(1, s) for s in range(1, 6)]
+
+
+def test_a_tube_that_restarts_before_its_receipt_sends_again_and_counts_on() -> None:
+    chain = Chain([2, 1])
+    chain.run(5.0)
+    chain.joints[1][0].is_open = True
+    station = chain.stations[1]
+    station.submit(survey(1, station.new_sequence()), chain.local(1))
+    chain.run(1.0)
+    chain.stations[1] = chain.build(1, 2, chain.stations[1].export_state())
+    chain.joints[1][0].is_open = False
+    assert chain.stations[1].new_sequence() == 2
+    chain.run(40.0)
+    assert set(chain.surveys()) == {(1, 1)}
+    assert chain.stations[1].outbox_size == 0
+
+
+def test_a_command_is_obeyed_once_and_answered_whatever_is_lost() -> None:
+    chain = Chain([2, 1], seed=3, loss=0.3, duplicate=0.3)
+    chain.run(5.0)
+    chain.stations[BASE].command(Command(1, 77, "take_survey"), chain.local(BASE))
+    chain.run(60.0)
+    assert [m for m in chain.got[1] if isinstance(m, Command)] == [Command(1, 77, "take_survey")]
+    assert [m for m in chain.got[BASE] if isinstance(m, Reply)] == [Reply(1, 77, True, "take_survey")]
+
+
+def test_a_command_repeated_after_a_restart_is_answered_from_memory() -> None:
+    chain = Chain([1])
+    chain.run(5.0)
+    chain.stations[BASE].command(Command(1, 5, "take_survey"), chain.local(BASE))
+    chain.run(5.0)
+    chain.stations[1] = chain.build(1, 2, chain.stations[1].export_state())
+    chain.stations[BASE] = chain.build(BASE, 2)
+    chain.run(5.0)
+    chain.stations[BASE].command(Command(1, 5, "take_survey"), chain.local(BASE))
+    chain.run(10.0)
+    assert len([m for m in chain.got[1] if isinstance(m, Command)]) == 1
+    assert len([m for m in chain.got[BASE] if isinstance(m, Reply)]) == 2
+
+
+def test_aiding_goes_down_hop_by_hop_and_only_down() -> None:
+    chain = Chain([3, 2, 1])
+    chain.run(5.0)
+    chain.stations[ENCODER].send_aiding(AIDING, chain.now)
+    chain.run(1.0)
+    for hops, tube in enumerate((3, 2, 1)):
+        assert [m for m in chain.got[tube] if isinstance(m, Aiding)] == [replace(AIDING, hops=hops)]
+    assert not [m for m in chain.got[BASE] if isinstance(m, Aiding)]
+
+
+def test_a_relay_hands_on_the_very_bytes_that_came(monkeypatch: pytest.MonkeyPatch) -> None:
+    import telemetry.application.endpoint as room
+
+    chain = Chain([2, 1])
+    chain.run(5.0)
+    encoded: list[int] = []
+    plain = room.encode
+
+    def counted(message: Message) -> bytes:
+        encoded.extend([1] if isinstance(message, Event) else [])
+        return plain(message)
+
+    monkeypatch.setattr(room, "encode", counted)
+    event = Event(1, chain.stations[1].new_sequence(), 100.0, Severity.INFO, "stopped")
+    chain.stations[1].submit(event, chain.local(1))
+    chain.run(3.0)
+    assert event in chain.got[BASE]
+    assert len(encoded) == 1
+
+
+def test_clocks_agree_with_the_encoder_down_the_chain() -> None:
+    chain = Chain([6, 5, 4, 3, 2, 1], jitter=0.3e-3)
+    chain.run(120.0)
+    for address in (BASE, 6, 5, 4, 3, 2, 1):
+        clock = chain.stations[address].clock
+        assert clock.synchronised
+        error = clock.rig_from_local(chain.local(address)) - chain.now
+        assert abs(error) < 4.0 * math.sqrt(clock.variance(chain.local(address))) + 2e-3  # the loop's own step is 4 ms
+        assert clock.local_from_rig(clock.rig_from_local(5.0)) == pytest.approx(5.0, abs=1e-6)
+
+
+@given(st.binary(max_size=100), st.sampled_from(Side))
+def test_any_bytes_on_any_port_are_counted_and_dropped(frame: bytes, side: Side) -> None:
+    station = Chain.build(1, 1)
+    assert station.receive(side, frame, 1.0) == []
+    assert sum(station.link_counters().values()) == 1
