@@ -6,22 +6,12 @@ import queue
 import time
 from collections import deque
 from collections.abc import Mapping
-from dataclasses import dataclass
 
+from sim.rig.stepper import Answer, FrameEvent
 from telemetry import keys
 from telemetry.media.zenoh_bus import Publisher, ZenohBus
 from telemetry.messages import BASE, Side, address_name
-from telemetry.runtime.stepped import DueEvent, Sent, pack_step, unpack_done
-
-FrameEvent = tuple[DueEvent, bytes]  # the frame travels on the key of its port
-
-
-@dataclass(frozen=True, slots=True)
-class Answer:
-    """What one process did in a step: frames it sent, in order, and its next timer (s, its clock)."""
-
-    frames: list[tuple[Sent, bytes]]
-    wake_at: float
+from telemetry.runtime.stepped import pack_step, unpack_done
 
 
 class Seat:
@@ -47,7 +37,9 @@ class Seat:
 
 
 class BusStepper:
-    """Rounds of steps with a barrier after each; a process that dies or hangs is dropped from the barrier.
+    """Steps processes over the bus, see ``sim.rig.stepper.Stepper``.
+
+    A process that dies or hangs is dropped from the barrier at the end of a round.
 
     Parameters
     ----------

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from typing import Any
+from typing import Any, Protocol
 
 from sim.errors import RigError
 from sim.world.rack import Rack
@@ -11,50 +11,78 @@ from telemetry import keys
 from telemetry.media.zenoh_bus import ZenohBus
 
 PATIENCE = 10.0  # wall s
+COMMAND = "recalibrate"
+
+
+class Doors(Protocol):
+    """How an operator reaches the ground station; an answer of None means that it did not answer yet."""
+
+    def ask(self, path: str) -> dict[str, Any] | None:
+        """What the ground station shows on ``path``."""
+
+    def command(self, name: str, parameters: dict[str, str]) -> dict[str, Any] | None:
+        """Outcome of a command.
+
+        Raises
+        ------
+        RigError
+            When the ground station refuses it.
+        """
+
+
+class BusDoors:
+    """The ground station's keys on the bus."""
+
+    def __init__(self, bus: ZenohBus, rig: str) -> None:
+        self._bus = bus
+        self._rig = rig
+
+    def ask(self, path: str) -> dict[str, Any] | None:
+        """See ``Doors``."""
+        return self._get(keys.GROUND.format(rig=self._rig, path=path))
+
+    def command(self, name: str, parameters: dict[str, str]) -> dict[str, Any] | None:
+        """See ``Doors``."""
+        selector = keys.COMMAND.format(rig=self._rig, name=name)
+        return self._get(f"{selector}?{';'.join(f'{key}={value}' for key, value in parameters.items())}")
+
+    def _get(self, selector: str) -> dict[str, Any] | None:
+        replies = self._bus.get(selector, PATIENCE)
+        if not replies:
+            return None
+        if replies[0].error is not None:
+            raise RigError(f"{selector}: {replies[0].error}")
+        return dict(json.loads(replies[0].payload))
 
 
 class Operator:
-    """Asks for a calibration, tells each attitude, looks at the result and confirms it.
+    """Asks for a calibration, enters each attitude, looks at the result and confirms it.
 
     Parameters
     ----------
     rack : where the tubes lie
     tubes : number of them
-    rig : name in key expressions
     """
 
-    def __init__(self, rack: Rack, tubes: int, rig: str) -> None:
-        self._rig = rig
+    def __init__(self, rack: Rack, tubes: int) -> None:
         section = rack.section
-        told = {"action": "attitude", "seconds": f"{section.record_s:g}"}
-        self._orders = {"begin": {"action": "begin", "tubes": ",".join(str(tube) for tube in range(1, tubes + 1))}}
+        entered = {"action": "attitude", "seconds": f"{section.record_s:g}"}
+        self._commands = {"begin": {"action": "begin", "tubes": ",".join(str(tube) for tube in range(1, tubes + 1))}}
         for number, (pitch, roll) in enumerate(section.attitudes_deg, 1):
-            self._orders[f"attitude {number}"] = told | {"pitch_deg": f"{pitch:g}", "roll_deg": f"{roll:g}"}
-        self._orders["solve"] = {"action": "solve"}
+            self._commands[f"attitude {number}"] = entered | {"pitch_deg": f"{pitch:g}", "roll_deg": f"{roll:g}"}
+        self._commands["solve"] = {"action": "solve"}
 
-    def act_on_cue(self, bus: ZenohBus, cue: str) -> bool:
-        """Do what ``cue`` names; False when nobody answered.
+    def act_on_cue(self, doors: Doors, cue: str) -> bool:
+        """Do what ``cue`` names; False when the ground station did not answer.
 
         Raises
         ------
         RigError
             When the ground station refuses.
         """
-        if cue == "confirm":
-            shown = self._ask(bus, keys.GROUND.format(rig=self._rig, path="recalibration"))
-            if shown is None:
-                return False
-            order = {"action": "confirm", "proposal": str(shown["proposal"])}
-        else:
-            order = self._orders[cue]
-        command = keys.COMMAND.format(rig=self._rig, name="recalibrate")
-        return self._ask(bus, f"{command}?{';'.join(f'{key}={value}' for key, value in order.items())}") is not None
-
-    @staticmethod
-    def _ask(bus: ZenohBus, selector: str) -> dict[str, Any] | None:
-        replies = bus.get(selector, PATIENCE)
-        if not replies:
-            return None
-        if replies[0].error is not None:
-            raise RigError(f"calibration: {replies[0].error}")
-        return dict(json.loads(replies[0].payload))
+        if cue != "confirm":
+            return doors.command(COMMAND, self._commands[cue]) is not None
+        shown = doors.ask("recalibration")
+        if shown is None:
+            return False
+        return doors.command(COMMAND, {"action": "confirm", "proposal": str(shown["proposal"])}) is not None

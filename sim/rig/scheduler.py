@@ -20,8 +20,8 @@ from functools import partial
 import msgpack
 
 from sim.errors import RigError
-from sim.rig.bus_stepper import Answer, BusStepper, FrameEvent
 from sim.rig.link_channel import LinkChannel
+from sim.rig.stepper import Answer, FrameEvent, Stepper
 from sim.world.motion import Phase
 from sim.world.world import World
 from telemetry.messages import BASE, ENCODER, Side, address_name
@@ -54,7 +54,7 @@ class Scheduler:
     Parameters
     ----------
     world : truth, sensors and schedule
-    stepper : the processes
+    stepper : hands the steps to the processes
     tell : called with the progress whenever what is wanted changes, and once a cycle
     speed : rig seconds per wall second, infinite for as fast as possible
     cued : somebody plays the operator and is waited for, so that what he does falls on the same rig time in every run
@@ -63,7 +63,7 @@ class Scheduler:
     def __init__(
         self,
         world: World,
-        stepper: BusStepper,
+        stepper: Stepper,
         tell: Callable[[Progress], None],
         speed: float = math.inf,
         *,

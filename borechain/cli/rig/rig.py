@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import time
 from collections.abc import Callable
+from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -18,9 +19,11 @@ from telemetry import keys
 if TYPE_CHECKING:
     from sim.rig.launcher import Tick
     from sim.rig.processes import ProcessTable
+    from sim.rig.scheduler import Progress
     from sim.world.world import World
     from telemetry.media.zenoh_bus import ZenohBus
 
+ASKED = ("stations", "measurements", "column", "alarms", "recalibration")
 PRELOAD = {"float64": "borechain.warm", "fixed": "borechain.warm_all", "published": "borechain.warm_all"}  # by kernel
 
 
@@ -29,6 +32,7 @@ PRELOAD = {"float64": "borechain.warm", "fixed": "borechain.warm_all", "publishe
 @speed_option
 @seed_option
 @fault_option
+@click.option("--inline", is_flag=True, help="Run it all in this one process, without a bus: same result, less CPU.")
 @click.option("--transport", type=click.Choice(["zenoh"]), default="zenoh", show_default=True)
 @click.option(
     "--rig", "rig_name", default=keys.DEFAULT_RIG, show_default=True, help="Name of the rig in key expressions."
@@ -44,6 +48,7 @@ def rig(
     speed: float,
     seed: int,
     faults: tuple[str, ...],
+    inline: bool,
     transport: str,
     rig_name: str,
     endpoint: str,
@@ -58,31 +63,67 @@ def rig(
       borechain rig scenarios/wellbore-1.toml --speed 1 --fault kill-node:3@900
     """
     del transport
-    from sim.rig.launcher import Launcher, check_port_free, next_run_folder, prepare_folder
+    from sim.rig.launcher import check_port_free, next_run_folder, prepare_folder
     from sim.rig.report import write_files
     from sim.world.scenario import load_scenario
     from sim.world.world import World
 
     world = World(load_scenario(scenario, faults), seed)
-    check_port_free(endpoint)
+    if not inline:
+        check_port_free(endpoint)
     folder = out if out is not None else next_run_folder(Path("out") / scenario.stem)
     prepare_folder(folder)
-    table = process_table(world, scenario, seed, speed, faults, rig_name, endpoint, folder)
     started = time.monotonic()
     try:
         with progress(world, quiet=as_json) as show:
-            launcher = Launcher(table, rig_name, endpoint, show, operator_of(world, rig_name))
-            answers = launcher.run(lambda bus: ask(bus, rig_name))
+            if inline:
+                ran = drill_inline(world, speed, rig_name, folder, show)
+            else:
+                table = process_table(world, scenario, seed, speed, faults, rig_name, endpoint, folder)
+                ran = drill_in_processes(world, table, rig_name, endpoint, show)
     except KeyboardInterrupt:
         raise EnvironmentFault(f"interrupted; every process was ended, what was stored is in {folder}") from None
-    result = result_of(answers, world)
-    result |= {"processes": 3 + world.scenario.tubes, "wall_s": round(time.monotonic() - started, 3)}
-    result["restarts"] = sum(table.restarts.values())
+    result = result_of(ran.answers, world)
+    result |= {"processes": ran.processes, "wall_s": round(time.monotonic() - started, 3), "restarts": ran.restarts}
     write_files(folder, result)
     if as_json:
         click.echo(json.dumps(result))
     else:
         show_result(result, folder)
+
+
+@dataclass(frozen=True, slots=True)
+class Ran:
+    """A rig that has finished: what its ground station answered, and what ran."""
+
+    answers: dict[str, Any]
+    processes: int
+    restarts: int
+
+
+def drill_in_processes(
+    world: World, table: ProcessTable, rig_name: str, endpoint: str, show: Callable[[Tick | Progress], None]
+) -> Ran:
+    """Drill with one real process a tube."""
+    from sim.rig.launcher import Launcher
+
+    launcher = Launcher(table, rig_name, endpoint, show, operator_of(world, rig_name))
+    answers = launcher.run(lambda bus: ask(bus, rig_name))
+    return Ran(answers, len(table.specs), sum(table.restarts.values()))
+
+
+def drill_inline(
+    world: World, speed: float, rig_name: str, folder: Path, show: Callable[[Tick | Progress], None]
+) -> Ran:
+    """Drill with objects in this process."""
+    from borechain.inline import InlineRig
+
+    rig = InlineRig(world, ground_settings(world), rig_name, folder)
+    rig.run(show, speed)
+    try:
+        return Ran({path: rig.ask(path) for path in ASKED}, 1, 0)
+    finally:
+        rig.close()
 
 
 def process_table(
@@ -118,11 +159,12 @@ def process_table(
 
 def operator_of(world: World, rig_name: str) -> Callable[[ZenohBus, str], bool]:
     """Who steps the calibration in the field, where the scenario has one."""
-    from sim.rig.operator import Operator
+    from sim.rig.operator import BusDoors, Operator
 
     if world.rack is None:
         return lambda _bus, _cue: True
-    return Operator(world.rack, world.scenario.tubes, rig_name).act_on_cue
+    operator = Operator(world.rack, world.scenario.tubes)
+    return lambda bus, cue: operator.act_on_cue(BusDoors(bus, rig_name), cue)
 
 
 def ground_settings(world: World) -> dict[str, Any]:
@@ -143,10 +185,7 @@ def ground_settings(world: World) -> dict[str, Any]:
 
 def ask(bus: ZenohBus, rig_name: str) -> dict[str, Any]:
     """Stations, trajectory and measurements as any operator would get them."""
-    return {
-        path: get_json(bus, f"borechain/{rig_name}/ground/{path}")
-        for path in ("stations", "measurements", "column", "alarms", "recalibration")
-    }
+    return {path: get_json(bus, f"borechain/{rig_name}/ground/{path}") for path in ASKED}
 
 
 def get_json(bus: ZenohBus, selector: str) -> Any:
@@ -197,14 +236,14 @@ class progress:  # noqa: N801
         )
         self._task = self._bar.add_task("starting", total=world.end - world.begin)
 
-    def __enter__(self) -> Callable[[Tick], None]:
+    def __enter__(self) -> Callable[[Tick | Progress], None]:
         self._bar.start()
         return self._show
 
     def __exit__(self, *_: object) -> None:
         self._bar.stop()
 
-    def _show(self, tick: Tick) -> None:
+    def _show(self, tick: Tick | Progress) -> None:
         self._bar.update(self._task, completed=tick.rig_time - tick.begin, description=tick.phase)
 
 

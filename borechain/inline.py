@@ -1,0 +1,97 @@
+"""A whole rig inside this process: firmware, links and ground station as objects, stepped by the scheduler.
+
+Everything that a rig of processes runs is here but the bus and the operating system's processes. The digest is the
+same, bit for bit, at a fraction of the CPU time; nobody can ask it while it runs.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from functools import partial
+from pathlib import Path
+from typing import Any
+
+from groundstation.config import GroundConfig
+from groundstation.errors import GroundError
+from groundstation.service.process import GroundProcess
+from groundstation.service.views import FIXED
+from node.process.encoder_process import EncoderProcess
+from node.process.tube_process import TubeProcess
+from sim.errors import RigError
+from sim.rig.in_process import Build, InProcessStepper
+from sim.rig.launcher import private_folder
+from sim.rig.operator import Operator
+from sim.rig.scheduler import Progress, Scheduler
+from sim.world.world import World
+from telemetry.messages import BASE, ENCODER
+from telemetry.transport.authentication import new_key, read_key
+
+
+class InlineRig:
+    """Builds every process of a rig and drills with them.
+
+    Parameters
+    ----------
+    world : truth, sensors and schedule
+    settings : of ``GroundConfig``, what the operator enters at the ground station
+    rig : its name
+    folder : new, of the whole run
+    """
+
+    def __init__(self, world: World, settings: dict[str, Any], rig: str, folder: Path) -> None:
+        self.world = world
+        key_file = new_key(folder / "rig.key")
+        config = GroundConfig(rig=rig, folder=private_folder(folder, "ground"), key_file=key_file, **settings)
+        builders: dict[int, Build] = {
+            BASE: partial(GroundProcess, config),
+            ENCODER: partial(EncoderProcess, private_folder(folder, "encoder"), torque=world.torque_settings()),
+        }
+        for tube in range(1, world.scenario.tubes + 1):
+            place, key = private_folder(folder, f"tube-{tube}"), read_key(key_file)
+            builders[tube] = partial(TubeProcess, world.tube_settings(tube), place, key=key)
+        self.stepper = InProcessStepper(builders, self._act_on_cue)
+
+    @property
+    def ground(self) -> GroundProcess:
+        """The ground station, once the schedule has begun."""
+        process = self.stepper.processes[BASE]
+        if not isinstance(process, GroundProcess):
+            raise TypeError(f"expected the ground station at the base, got {type(process).__name__}")
+        return process
+
+    def run(self, show: Callable[[Progress], None] = lambda _progress: None, speed: float = math.inf) -> None:
+        """Drill to the end of the schedule.
+
+        Raises
+        ------
+        RigError
+            When the schedule asks for what the rig has not, or the ground station refuses the operator.
+        """
+
+        def follow(progress: Progress) -> None:
+            self.stepper.follow(progress)
+            show(progress)
+
+        Scheduler(self.world, self.stepper, follow, speed, cued=True).run()
+
+    def ask(self, path: str) -> dict[str, Any]:
+        """What the ground station shows on ``path``, see docs/keys.md."""
+        return FIXED[path].show(self.ground.model, {})
+
+    def command(self, name: str, parameters: dict[str, str]) -> dict[str, Any]:
+        """Have the ground station obey an operator's command."""
+        model = self.ground.model
+        try:
+            self.ground.recalibration.order(parameters, model.rig_now, model.tally.tubes)
+        except GroundError as error:
+            raise RigError(f"{name}: {error}") from error
+        return self.ask("recalibration")
+
+    def close(self) -> None:
+        """Close the ground station's database."""
+        self.ground.store.close()
+
+    def _act_on_cue(self, cue: str) -> bool:
+        rack = self.world.rack
+        return rack is None or Operator(rack, self.world.scenario.tubes).act_on_cue(self, cue)

@@ -1,0 +1,82 @@
+"""The string as objects in this process: the same scheduler, firmware, links and ground station, without a bus.
+
+A process is built when the schedule wants it and dropped when its power is cut; built again, it finds in its folder
+what the one before saved. The digests are those of the rig with real processes, bit for bit.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+
+from sim.errors import RigError
+from sim.rig.scheduler import Progress
+from sim.rig.stepper import Answer, FrameEvent
+from telemetry.messages import address_name
+from telemetry.runtime.process import Process
+from telemetry.runtime.stepped import Sent, dispatch
+
+Build = Callable[[], Process]
+
+
+class InProcessStepper:
+    """Steps objects; see ``sim.rig.stepper.Stepper``.
+
+    Parameters
+    ----------
+    builders : how to start the process of each address, as its computer would after its power came
+    act_on_cue : plays the operator; False when he could not act yet
+    """
+
+    def __init__(self, builders: Mapping[int, Build], act_on_cue: Callable[[str], bool] = lambda _cue: True) -> None:
+        self._builders = builders
+        self._act_on_cue = act_on_cue
+        self.processes: dict[int, Process] = {}
+
+    def follow(self, progress: Progress) -> None:
+        """Make what runs equal to what the schedule wants."""
+        for address in progress.kill:
+            self.drop(address)
+        for address in progress.wanted:
+            if address not in self.processes:
+                self.processes[address] = self._build(address)
+
+    def alive(self) -> list[int]:
+        """Addresses that run, in ascending order."""
+        return sorted(self.processes)
+
+    def wait_for(self, address: int, *, alive: bool, timeout: float) -> bool:
+        """Whether a process has come or gone; nothing here takes time."""
+        del timeout
+        return (address in self.processes) == alive
+
+    def wait_for_cue(self, name: str, timeout: float) -> bool:
+        """Have the operator act at once."""
+        del timeout
+        return self._act_on_cue(name)
+
+    def drop(self, address: int) -> None:
+        """Cut the power of a process: nothing of it is left but its folder."""
+        self.processes.pop(address, None)
+
+    def round(self, steps: Mapping[int, list[FrameEvent]]) -> dict[int, Answer]:
+        """Step each process in turn; within a round none depends on another."""
+        return {
+            address: step(self.processes[address], steps[address])
+            for address in sorted(steps)
+            if address in self.processes
+        }
+
+    def _build(self, address: int) -> Process:
+        if address not in self._builders:
+            raise RigError(f"process {address_name(address)}: this rig has no such process")
+        return self._builders[address]()
+
+
+def step(process: Process, events: list[FrameEvent]) -> Answer:
+    """One step of one process: its events in order, and after each the frames that it sends."""
+    frames: list[tuple[Sent, bytes]] = []
+    now = events[-1][0].at
+    for event, frame in events:
+        dispatch(process, event, frame)
+        frames += [(Sent(side, event.at), outgoing) for side, outgoing in process.take_frames(event.at)]
+    return Answer(frames, process.next_wake(now))

@@ -1,0 +1,38 @@
+"""What the scheduler of a rig needs of whoever hands out its steps: processes on a bus, or objects in this process."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Protocol
+
+from telemetry.runtime.stepped import DueEvent, Sent
+
+FrameEvent = tuple[DueEvent, bytes]  # an event and its frame, empty where it has none
+
+
+@dataclass(frozen=True, slots=True)
+class Answer:
+    """What one process did in a step: frames it sent, in order, and its next timer (s, its clock)."""
+
+    frames: list[tuple[Sent, bytes]]
+    wake_at: float
+
+
+class Stepper(Protocol):
+    """Hands out the steps of a rig and collects what the processes answer."""
+
+    def alive(self) -> list[int]:
+        """Addresses that answer, in ascending order."""
+
+    def wait_for(self, address: int, *, alive: bool, timeout: float) -> bool:
+        """Wait (wall seconds) until a process has come or gone; returns whether it did."""
+
+    def wait_for_cue(self, name: str, timeout: float) -> bool:
+        """Wait (wall seconds) until the operator has done what cue ``name`` asks; returns whether he did."""
+
+    def drop(self, address: int) -> None:
+        """Step a process no more."""
+
+    def round(self, steps: Mapping[int, list[FrameEvent]]) -> dict[int, Answer]:
+        """Give each process its events and wait until all have answered; those that died are missing."""
