@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from sim.world.streams import stream
+from sim.world.streams import Stream, stream
 from telemetry.messages import Side
 
 BLOCK = 1024
@@ -46,7 +46,7 @@ class PortStream:
     """Draws of one port, made in blocks."""
 
     def __init__(self, seed: int, sender: int, side: Side) -> None:
-        self._random = stream(seed, 0xA1, sender, int(side))
+        self._random = stream(seed, Stream.LINK, sender, int(side))
         self._block: list[tuple[float, float, float]] = []
 
     def draw(self) -> tuple[float, float, float]:

@@ -226,6 +226,9 @@ class Scheduler:
             at, address, _, _, kind, frame = heapq.heappop(self._queue)
             if kind is None:
                 self._add_cycle(at, steps, true_time)
+            elif kind is Due.CYCLE:
+                if address in self.stepper.alive():
+                    self._add_sample(at, address, int.from_bytes(frame), steps, true_time)
             elif kind is not Due.TIMER or self._wake.get(address) == at:
                 self._add(steps, true_time, address, kind, at, None, frame)
         answers = self.stepper.round(steps)
@@ -249,7 +252,6 @@ class Scheduler:
     def _add_cycle(
         self, at: float, steps: dict[int, list[FrameEvent]], true_time: dict[tuple[int, float], float]
     ) -> None:
-        start = self.world.cycle_end(self._cycle - 1)
         if at >= self.world.motion.begin:  # in the rack there is no bit
             depth = bytes(msgpack.packb([at, self.world.bit_depth(at)]))
             self._add(steps, true_time, BASE, Due.DEPTH, at, None, depth)
@@ -257,11 +259,11 @@ class Scheduler:
         for address in self.stepper.alive():
             if address == BASE or address not in self.progress.wanted:
                 continue
-            local_start = self.world.local_clock(address, start)
-            sample = (
-                self.world.encoder_sample(at) if address == ENCODER else self.world.imu_sample(address, self._cycle)
-            )
-            self._add(steps, true_time, address, Due.CYCLE, at, [local_start, *sample], b"")
+            phase = 0.0 if address == ENCODER else self.world.phase(address)
+            if phase > 0.0:
+                self._push(at + phase, address, Due.CYCLE, self._cycle.to_bytes(8))
+            else:
+                self._add_sample(at, address, self._cycle, steps, true_time)
         self._cycle += 1
         self.progress.rig_time = at
         self._tell(self.progress)
@@ -271,6 +273,20 @@ class Scheduler:
             self._push(following, -1, None, b"")
         else:
             self._queue.clear()
+
+    def _add_sample(
+        self,
+        at: float,
+        address: int,
+        cycle: int,
+        steps: dict[int, list[FrameEvent]],
+        true_time: dict[tuple[int, float], float],
+    ) -> None:
+        """The sample of one process's cycle, which ends at ``at``."""
+        start = self.world.cycle_end(cycle - 1) + (at - self.world.cycle_end(cycle))
+        sample = self.world.encoder_sample(at) if address == ENCODER else self.world.imu_sample(address, cycle)
+        data = [self.world.local_clock(address, start), *sample]
+        self._add(steps, true_time, address, Due.CYCLE, at, data, b"")
 
     def _wait_for_missing(self, at: float) -> None:
         """A process that died unasked is missed for the time of a reboot; then the rig waits for it to come back."""

@@ -13,11 +13,11 @@ from collections.abc import Callable
 from dataclasses import replace
 from typing import Any
 
+from sim.rig.plain_encoder import LINES
 from sim.studies.node_lab import REST, ROTATING, LabSetup
 from sim.studies.node_links import OnOff
 from sim.studies.node_published import DELAY, FORMS, setup_of
 from sim.studies.node_trials import rms_deg, row, trials
-from sim.studies.plain_sensors import LINES
 
 OURS = LabSetup()
 MODES = {"continuous": OnOff(), "20 s on / 30 s off": OnOff(20.0, 30.0)}

@@ -20,12 +20,12 @@ from node.firmware.settings import Joint, Kernel, TubeSettings
 from node.firmware.tube import Tube
 from node.kernels.angles import wrap
 from node.kernels.layout import PERIOD, Scheme
+from sim.rig.plain_encoder import PlainEncoder
 from sim.studies.fresh import fresh_tube
 from sim.studies.node_links import Link, OnOff
-from sim.studies.plain_sensors import PlainEncoder, single_samples
 from sim.world.borehole import Borehole
 from sim.world.disc import Disc
-from sim.world.imu_errors import ImuErrors, gauss_markov
+from sim.world.imu_errors import ImuErrors, gauss_markov, single_samples
 from sim.world.motion import Motion, Trapezoid
 from sim.world.scenario import AccelerometerSection, GyroSection
 from sim.world.truth import TubeTruth

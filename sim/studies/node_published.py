@@ -11,9 +11,9 @@ from dataclasses import replace
 from typing import Any
 
 from node.kernels.layout import Scheme
+from sim.rig.plain_encoder import LINES
 from sim.studies.node_lab import REST, LabRun, LabSetup
 from sim.studies.node_trials import Trials, rms_deg, row
-from sim.studies.plain_sensors import LINES
 
 DELAY = 10e-3  # s
 EXPERIMENTS = ("update-modes", "single-updates", "two-nodes")

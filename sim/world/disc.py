@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 
 import numpy as np
 
@@ -19,10 +20,20 @@ class Disc:
     counts_per_turn : edges of both tracks
     edge_std : rad, error of a line's place, constant for every line
     random : stream of the places
+    turned_at, turned_by : (k,) s and rad >= 0, jumps of the head while it is free of the string
     """
 
-    def __init__(self, motion: Motion, counts_per_turn: int, edge_std: float, random: np.random.Generator) -> None:
+    def __init__(
+        self,
+        motion: Motion,
+        counts_per_turn: int,
+        edge_std: float,
+        random: np.random.Generator,
+        turned_at: Sequence[float] = (),
+        turned_by: Sequence[float] = (),
+    ) -> None:
         self._motion = motion
+        self._jumps = tuple(zip(turned_at, turned_by, strict=True))
         self._quantum = math.tau / counts_per_turn
         limit = 0.4 * self._quantum  # lines do not change places
         self._errors = np.clip(edge_std * random.standard_normal(counts_per_turn), -limit, limit)
@@ -32,12 +43,29 @@ class Disc:
 
         Edges that the head never passed have the time of the start.
         """
-        angle = float(self._motion.drive(np.array([t]))[0][0])
+        angle = self._angle(t)
         count = math.floor(angle / self._quantum + 0.5)
         if self._place(count) > angle:
             count -= 1
-        last, *earlier = (self._motion.time_of_angle(self._place(count - k)) for k in range(EDGES))
+        last, *earlier = (self._time_of(self._place(count - k)) for k in range(EDGES))
         return count, min(last, t), tuple(earlier)
+
+    def _angle(self, t: float) -> float:
+        """Of the head (rad, unwrapped), its free turns included."""
+        free = sum(by for at, by in self._jumps if at <= t)
+        return float(self._motion.drive(np.array([t]))[0][0]) + free
+
+    def _time_of(self, angle: float) -> float:
+        """When the head was at ``angle`` first: inside a jump at its time, else when the string got so far."""
+        free = 0.0
+        for at, by in self._jumps:
+            string = float(self._motion.drive(np.array([at]))[0][0])
+            if angle <= string + free:
+                break
+            if angle <= string + free + by:
+                return at
+            free += by
+        return self._motion.time_of_angle(angle - free)
 
     def _place(self, count: int) -> float:
         """Angle (rad) at which the edge that makes ``count`` passes."""

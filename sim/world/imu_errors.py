@@ -11,6 +11,7 @@ import numpy.typing as npt
 from sim.world.scenario import AccelerometerSection, DriftSection, GyroSection
 
 Array = npt.NDArray[np.float64]
+SAMPLE_RATE_HZ = 65.0  # of the gyroscope, whose single sample has the noise of this band. Source: thesis Table V.1
 WANDERING = ("noise_dps_rthz", "bias_std_dps")
 
 
@@ -98,3 +99,10 @@ def quantise(rate: Array, resolution_dps: float, range_dps: float) -> Array:
         step = math.radians(resolution_dps)
         rate = np.round(rate / step) * step
     return np.clip(rate, -limit, limit)
+
+
+def single_samples(gyroscope: GyroSection, period: float) -> GyroSection:
+    """The gyroscope whose mean over ``period`` (s) is as noisy as one sample of the one given."""
+    spread = math.sqrt(period * SAMPLE_RATE_HZ)
+    x, y, z = (noise * spread for noise in gyroscope.noise_dps_rthz)
+    return gyroscope.model_copy(update={"noise_dps_rthz": (x, y, z)})

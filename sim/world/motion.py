@@ -1,7 +1,8 @@
 """The motion of the string in closed form: schedule, turning of the drive head, depth of the bit.
 
-Every tube is drilled with one trapezoid of rotation (ramp up, constant rate, ramp down), and the bit advances in
-proportion to the turning. Rig time; angles in rad.
+The schedule is a row of blocks: a tube is added (or the string is held, where none is), turned with one trapezoid of
+rotation (ramp up, constant rate, ramp down), and stands still. The bit advances in proportion to the turning. Rig time;
+angles in rad.
 """
 
 from __future__ import annotations
@@ -16,7 +17,10 @@ Array = npt.NDArray[np.float64]
 
 @dataclass(frozen=True, slots=True)
 class Phase:
-    """One item of the schedule: ``add``, ``drill`` or ``stop`` of a tube, or the final ``finish``."""
+    """One item of the schedule: ``add`` or ``hold``, ``drill`` and ``stop`` of a block, or the final ``finish``.
+
+    ``tube`` is the top tube.
+    """
 
     kind: str
     tube: int
@@ -73,8 +77,12 @@ class Motion:
     ----------
     begin, add, joint, stop, finish : s, see the scenario's schedule
     turn : of each tube
-    tubes, tube_length : number and m
+    tubes, tube_length : number at the end, and m
     first_angle : rad, of the drive head at the start
+    at_start : tubes in the hole at the start, one is added before each block after the first; with none the first
+        block begins with the first tube
+    blocks : number of them; as many as it takes to add every tube if absent
+    advance : m of the bit in one block; a tube's length if absent
     """
 
     def __init__(
@@ -88,18 +96,28 @@ class Motion:
         tubes: int,
         tube_length: float,
         first_angle: float,
+        *,
+        at_start: int = 0,
+        blocks: int | None = None,
+        advance: float | None = None,
     ) -> None:
         self.begin = begin
         self._turn = turn
-        self._tube_length = tube_length
+        self._advance = tube_length if advance is None else advance
+        self._depth_at_start = at_start * tube_length
         self._first_angle = first_angle
+        self._at_start = at_start
+        first = max(at_start, 1)
+        count = tubes - first + 1 if blocks is None else blocks
+        self.lengths = np.minimum(first + np.arange(count), tubes)  # tubes in the string in each block
         phases: list[Phase] = []
-        at = begin
-        for tube in range(1, tubes + 1):
-            phases.append(Phase("add", tube, at, at + add, at + joint))
+        at, before = begin, at_start
+        for tube in self.lengths.tolist():
+            added = tube > before
+            phases.append(Phase("add" if added else "hold", tube, at, at + add, at + joint if added else 0.0))
             phases.append(Phase("drill", tube, at + add, at + add + turn.duration))
             phases.append(Phase("stop", tube, phases[-1].end, phases[-1].end + stop))
-            at = phases[-1].end
+            at, before = phases[-1].end, tube
         phases.append(Phase("finish", tubes, at, at + finish))
         self.phases = tuple(phases)
         self.end = at + finish
@@ -115,8 +133,8 @@ class Motion:
     def depth(self, t: Array) -> tuple[Array, Array, Array]:
         """Measured depth of the bit (m) and its two derivatives at rig times ``t`` (n,)."""
         angle, rate, acceleration = self.drive(t)
-        pitch = self._tube_length / self._turn.angle
-        return (angle - self._first_angle) * pitch, rate * pitch, acceleration * pitch
+        pitch = self._advance / self._turn.angle
+        return self._depth_at_start + (angle - self._first_angle) * pitch, rate * pitch, acceleration * pitch
 
     def time_of_angle(self, angle: float) -> float:
         """Rig time at which the drive head reached ``angle``; the start for what it never had to reach."""
@@ -128,4 +146,4 @@ class Motion:
 
     def top(self, t: float) -> int:
         """Number of the tube that the drive head holds at ``t``; 1 before the first joint is closed."""
-        return max(int(np.searchsorted(self.make_ups, t, side="right")), 1)
+        return max(self._at_start + int(np.searchsorted(self.make_ups, t, side="right")), 1)

@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
+import math
 import tomllib
 from pathlib import Path
-from typing import Annotated, Literal, get_args
+from typing import Annotated, Any, Literal, get_args
 
 import numpy as np
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
@@ -35,15 +36,24 @@ class Section(BaseModel):
 class RigSection(Section):
     """The string."""
 
-    tubes: int = Field(ge=1, le=MAX_TUBE, description="tubes drilled in, one after the other")
+    tubes: int = Field(ge=1, le=MAX_TUBE, description="tubes of the string at the end")
     tube_length_m: Positive = Field(le=50.0, description="length of every tube")
+    tubes_at_start: int = Field(0, ge=0, description="of them in the hole at the start; the others are added on top")
+
+
+class StraightSection(Section):
+    """A straight hole."""
+
+    inclination_deg: float = Field(0.0, ge=0.0, lt=180.0)
+    azimuth_deg: Angle = 0.0
 
 
 class PathSection(Section):
-    """The hole; exactly one of the two files, relative to the scenario."""
+    """The hole; exactly one of the three, files relative to the scenario."""
 
     displacements: str | None = Field(None, description="CSV md_m,a_cm,b_cm: lateral displacement over one interval")
     stations: str | None = Field(None, description="CSV md_m,inclination_deg,azimuth_deg")
+    straight: StraightSection | None = Field(None, description="a hole in one direction, as long as it takes")
 
 
 class ScheduleSection(Section):
@@ -56,6 +66,9 @@ class ScheduleSection(Section):
     joint_s: float = Field(5.0, ge=4.0, description="of it, joint open; shorter than add_s")
     stop_s: float = Field(32.0, ge=22.0, description="standing still after drilling; a survey needs 20 s")
     finish_s: float = Field(20.0, ge=5.0, description="after the last stop, for what is still on its way")
+    blocks: int | None = Field(
+        None, ge=1, le=1000, description="of adding or holding, drilling and stopping; one a tube if absent"
+    )
 
 
 class RotationSection(Section):
@@ -63,7 +76,8 @@ class RotationSection(Section):
 
     rate_dps: float = Field(71.0, gt=0.0, description="constant rate, deg/s")
     acceleration_dps2: Positive = Field(35.0, description="of the ramps")
-    turns: float = Field(20.0, gt=0.0, description="for one tube length")
+    turns: float = Field(20.0, gt=0.0, description="of one block, for one tube length")
+    advance_m: NotNegative | None = Field(None, description="of the bit in one block; one tube length if absent")
 
 
 class JointSection(Section):
@@ -74,6 +88,8 @@ class JointSection(Section):
     mount_tilt_std_deg: float = Field(
         0.0, ge=0.0, le=3.0, description="of each IMU against the tube's axis, pitch and roll; an alignment finds it"
     )
+    unseen_std_deg: NotNegative = Field(0.0, description="what the string below turns unseen at each make-up")
+    head_turn_deg: NotNegative = Field(0.0, description="about how far the head turns, free of the string, at each")
 
 
 class TorsionSection(Section):
@@ -105,6 +121,8 @@ class GyroSection(Section):
     scale_factor_std: NotNegative = 1e-3
     misalignment_std_deg: NotNegative = Field(0.0, description="left after calibration")
     g_sensitivity_dps_per_g: NotNegative = 0.0
+    bias_step_dps: float = Field(0.0, description="of the z axis, from the first turning on")
+    instantaneous: bool = Field(False, description="read once at the end of a cycle, not averaged over it")
     range_dps: Positive = 500.0
     resolution_dps: NotNegative = Field(2.6e-3, description="500 deg/s / 32768 over 34 readings of one cycle")
 
@@ -124,17 +142,33 @@ class EncoderSection(Section):
 
     counts_per_turn: int = Field(4096, ge=16, description="1024 lines in quadrature")
     edge_std_deg: NotNegative = Field(0.003, description="error of a line's place, constant for every line")
+    edge_times: bool = Field(True, description="the counter times its edges; else a count is read once a cycle")
+    phase: Literal["locked", "random"] = Field(
+        "locked", description="of the tubes' cycles against the encoder's: at one time, or drawn for each tube"
+    )
 
 
 class ClockSection(Section):
-    """Clocks of the nodes against the encoder's."""
+    """Clocks of the nodes against the encoder's; the last four where ``medium.link`` is off."""
 
     offset_std_s: NotNegative = 20.0
     drift_std_ppm: NotNegative = 10.0
+    joint_std_ms: NotNegative = Field(0.2, description="of rig time across each joint, constant")
+    wander_std_ms: NotNegative = Field(0.03, description="of it across each joint, Gauss-Markov")
+    wander_tau_s: Positive = Field(60.0, description="of the wander")
+    stated_std_ms: NotNegative | None = Field(None, description="what a node takes joint_std_ms for, if not the truth")
 
 
 class MediumSection(Section):
     """One hop between two tube ends."""
+
+    link: Literal["on", "off"] = Field(
+        "on", description="off: aiding goes from firmware to firmware without frames; for studies of many seeds"
+    )
+    delay_ms: NotNegative = Field(0.0, lt=500.0, description="of the aiding beside its hops, where the link is off")
+    dated_by: Literal["validity", "arrival"] = Field(
+        "validity", description="when a node takes an aiding to be valid, where the link is off"
+    )
 
     latency_ms: float = Field(3.0, ge=0.5)
     jitter_ms: NotNegative = Field(0.3, description="mean of the exponential part")
@@ -152,6 +186,15 @@ class MediumSection(Section):
         return self.jitter_ms * 1e-3
 
 
+class AidingSection(Section):
+    """When the encoder is heard at all, where the link is off; the phase is drawn for each seed."""
+
+    on_s: Positive = Field(20.0, description="heard for so long")
+    off_s: NotNegative = Field(0.0, description="and then not for so long")
+    every_s: Positive | None = Field(None, description="one measurement at a time, instead of on and off")
+    renumbered: bool = Field(False, description="at rest every cycle's aiding counts as a new measurement")
+
+
 class NodeSection(Section):
     """Firmware settings of every node."""
 
@@ -166,6 +209,9 @@ class NodeSection(Section):
     )
     joints: Literal["marks", "solved", "both"] = Field(
         "marks", description="after a tube was added: scribe marks, the saved yaw, or both by inverse variance"
+    )
+    tuning: dict[str, float] = Field(
+        default_factory=dict, description="fields of the filter's configuration, where the link is off"
     )
     imus: int = Field(1, ge=1, le=MAX_IMUS, description="in every tube")
     imu_noise: tuple[Annotated[float, Field(ge=0.01, le=100.0)], ...] = Field(
@@ -220,6 +266,7 @@ class ScenarioFile(Section):
     encoder: EncoderSection = EncoderSection()
     clocks: ClockSection = ClockSection()
     medium: MediumSection = MediumSection()
+    aiding: AidingSection = AidingSection()
     node: NodeSection = NodeSection()
     design: DesignSection = DesignSection()
     drift: DriftSection | None = None
@@ -239,6 +286,21 @@ class Scenario:
         self.medium = file.medium
 
 
+def scenario_of(tables: dict[str, Any], faults: tuple[str, ...] = ()) -> Scenario:
+    """A scenario of its tables, without a file; its path is ``straight`` or absolute.
+
+    Raises
+    ------
+    ScenarioError
+        As ``load_scenario``.
+    """
+    where = Path("scenario")
+    try:
+        return _checked(where, ScenarioFile.model_validate(tables), faults)
+    except ValidationError as error:
+        raise ScenarioError(f"{where}: {_first(error)}") from error
+
+
 def load_scenario(path: Path, faults: tuple[str, ...] = ()) -> Scenario:
     """Read and check a scenario; ``faults`` from the command line join those of the file.
 
@@ -247,8 +309,12 @@ def load_scenario(path: Path, faults: tuple[str, ...] = ()) -> Scenario:
     ScenarioError
         One line: the file, the key or line, what was expected and what came.
     """
-    file = _parse(path)
+    return _checked(path, _parse(path), faults)
+
+
+def _checked(path: Path, file: ScenarioFile, faults: tuple[str, ...]) -> Scenario:
     _check_motion(path, file)
+    _check_link(path, file)
     _check_torsion(path, file)
     if len(file.node.imu_noise) not in (0, file.node.imus):
         raise ScenarioError(
@@ -256,8 +322,8 @@ def load_scenario(path: Path, faults: tuple[str, ...] = ()) -> Scenario:
             f"got {len(file.node.imu_noise)}"
         )
     _check_calibration(path, file.calibration)
-    hole = _hole(path, file.path)
-    needed = file.rig.tubes * file.rig.tube_length_m
+    needed = _depth(file)
+    hole = _hole(path, file.path, needed)
     if hole.length + 1e-9 < needed:
         raise ScenarioError(
             f"{path}: rig.tubes: {file.rig.tubes} tubes of {file.rig.tube_length_m:g} m need a path of {needed:g} m, "
@@ -277,11 +343,45 @@ def _check_motion(path: Path, file: ScenarioFile) -> None:
             f"{path}: rotation.rate_dps: expected at most {MAX_RATE_DPS:g} deg/s (57 rev/min, "
             f"half a turn a cycle), got {rate:g}; turn slower"
         )
+    if file.rig.tubes_at_start > file.rig.tubes:
+        raise ScenarioError(
+            f"{path}: rig.tubes_at_start: expected at most tubes = {file.rig.tubes}, got {file.rig.tubes_at_start}"
+        )
+    if _blocks(file) < file.rig.tubes - max(file.rig.tubes_at_start, 1) + 1:
+        raise ScenarioError(
+            f"{path}: schedule.blocks: expected at least one for each tube that is added, got {schedule.blocks}"
+        )
     if schedule.joint_s >= schedule.add_s:
         raise ScenarioError(
             f"{path}: schedule.joint_s: expected less than add_s = {schedule.add_s:g} s, "
             f"got {schedule.joint_s:g}; close the joint before drilling"
         )
+
+
+def _blocks(file: ScenarioFile) -> int:
+    return file.schedule.blocks or file.rig.tubes - max(file.rig.tubes_at_start, 1) + 1
+
+
+def _depth(file: ScenarioFile) -> float:
+    """Depth (m) of the bit at the end."""
+    rig, advance = file.rig, file.rotation.advance_m
+    return rig.tube_length_m * rig.tubes_at_start + _blocks(file) * (rig.tube_length_m if advance is None else advance)
+
+
+def _check_link(path: Path, file: ScenarioFile) -> None:
+    """Settings of a string without a link stand beside ``link = "off"`` only: on a link they would do nothing."""
+    if file.medium.link == "off":
+        return
+    usual = {
+        "medium.delay_ms": file.medium.delay_ms == 0.0,
+        "medium.dated_by": file.medium.dated_by == "validity",
+        "aiding": file.aiding == AidingSection(),
+        "encoder.edge_times": file.encoder.edge_times,
+        "node.tuning": not file.node.tuning,
+    }
+    for key, holds in usual.items():
+        if not holds:
+            raise ScenarioError(f'{path}: {key}: expected medium.link = "off" with it; a link decides that by itself')
 
 
 def _check_torsion(path: Path, file: ScenarioFile) -> None:
@@ -348,10 +448,15 @@ def _first(error: ValidationError) -> str:
     return f"{key}: {first['msg']}, got {first['input']!r:.60}"
 
 
-def _hole(path: Path, section: PathSection) -> Borehole:
-    given = [name for name in (section.displacements, section.stations) if name is not None]
-    if len(given) != 1:
-        raise ScenarioError(f"{path}: path: expected exactly one of displacements and stations, got {len(given)}")
-    source = path.parent / given[0]
+def _hole(path: Path, section: PathSection, length: float) -> Borehole:
+    files = [name for name in (section.displacements, section.stations) if name is not None]
+    given = len(files) + (section.straight is not None)
+    if given != 1:
+        raise ScenarioError(f"{path}: path: expected exactly one of displacements, stations and straight, got {given}")
+    if section.straight is not None:
+        straight = section.straight
+        end = max(length, 1.0)
+        return Borehole.straight(math.radians(straight.inclination_deg), math.radians(straight.azimuth_deg), end)
+    source = path.parent / files[0]
     reader = read_displacements if section.displacements is not None else read_stations
     return Borehole(*reader(source), where=str(source))

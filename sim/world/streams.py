@@ -1,8 +1,35 @@
-"""Streams of random numbers: whoever draws has one of its own, so that nothing else changes what it gets."""
+"""Streams of random numbers: whoever draws has one of its own, so that nothing else changes what it gets.
+
+``Stream`` is the one table of purposes. A stream is named by the seed, its purpose and what parts it further (a tube,
+an IMU, a port), so that no draw depends on the order of others. A number once given is never used for another purpose.
+"""
 
 from __future__ import annotations
 
+from enum import IntEnum
+
 import numpy as np
+
+
+class Stream(IntEnum):
+    """Purpose of a stream."""
+
+    JOINTS = 0  # 0: true angles, 1: errors of their readings
+    MOUNTS = 1  # 0: about the axis; tube and IMU: tilt
+    CLOCKS = 2
+    GYRO = 3
+    ACCELEROMETER = 4
+    DRIVE = 5  # angle of the head at the start
+    DRIFT = 6  # of sensors since their calibration
+    RACK = 7
+    DISC = 8  # places of the encoder's lines
+    TORSION = 16  # what friction traps
+    SLIPS = 17  # what turns unseen at a make-up, and how far the head turns meanwhile
+    PHASES = 18  # of the cycles of tubes against that of the encoder
+    AIDING_PHASE = 19  # of the times in which aiding passes
+    AIDING_LOSS = 20
+    AIDING_CLOCKS = 21  # errors of rig time where no link synchronises it
+    LINK = 0xA1  # fate and delays of the frames of one port
 
 
 def stream(*key: int) -> np.random.Generator:

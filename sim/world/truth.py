@@ -49,6 +49,7 @@ class TubeTruth:
     radius : m, IMU off the axis along its x
     gravity : m/s^2
     twist : rad by which the tube lags the drive head at rig times (n,), with two derivatives; a rigid string has none
+    unseen : rad by which the tube has slipped at rig times (n,), in jumps that no gyroscope sees
     """
 
     def __init__(
@@ -60,6 +61,7 @@ class TubeTruth:
         radius: float,
         gravity: float,
         twist: Twist | None = None,
+        unseen: Callable[[Array], Array] | None = None,
     ) -> None:
         self._hole = hole
         self._motion = motion
@@ -68,6 +70,7 @@ class TubeTruth:
         self._radius = radius
         self._gravity = gravity
         self._twist = twist
+        self._unseen = unseen
 
     def turned(self, t: Array) -> tuple[Array, Array, Array]:
         """Angle (rad, unwrapped, without the joints), rate and acceleration of the tube about its axis, (n,) each."""
@@ -79,7 +82,8 @@ class TubeTruth:
 
     def yaw(self, t: Array) -> Array:
         """Psi of the IMU's frame (rad, unwrapped) at rig times (n,)."""
-        return np.asarray(self.turned(t)[0] + self._joint_angle)
+        slipped = 0.0 if self._unseen is None else self._unseen(t)
+        return np.asarray(self.turned(t)[0] + self._joint_angle + slipped)
 
     def attitude(self, t: Array) -> Array:
         """R_ned_from_body (n, 3, 3)."""

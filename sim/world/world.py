@@ -17,18 +17,17 @@ from node.kernels.layout import PERIOD, Scheme
 from sim.errors import ScenarioError
 from sim.faults import KillNode
 from sim.world.disc import Disc
-from sim.world.imu_errors import Drift, ImuErrors
+from sim.world.imu_errors import Drift, ImuErrors, single_samples
 from sim.world.motion import Motion, Phase, Trapezoid
 from sim.world.rack import Rack
 from sim.world.scenario import Scenario
-from sim.world.streams import stream
+from sim.world.streams import Stream, stream
 from sim.world.torsion import StringTorsion, stiffness
 from sim.world.truth import TubeTruth, imu_frame
 from telemetry.messages import BASE, ENCODER
 
 Array = npt.NDArray[np.float64]
-JOINTS, MOUNTS, CLOCKS, GYRO, ACCELEROMETER, DRIVE, DRIFT, RACK, DISC = range(9)
-TORSION = 16  # apart from the rest, which may grow
+FREE_BEFORE = 1.0  # s before a joint is closed, at which a free head turns
 
 
 def wrap(angle: float) -> float:
@@ -60,13 +59,25 @@ class World:
             math.radians(file.rotation.acceleration_dps2),
         )
         s = file.schedule
-        first_angle = float(self._random(DRIVE, 0).uniform(0.0, 2.0 * math.pi))
+        first_angle = float(self._random(Stream.DRIVE, 0).uniform(0.0, 2.0 * math.pi))
         self.begin = s.begin_s
         self.rack = None if file.calibration is None else Rack(file.calibration, self.begin)
         drilling = s.begin_s if self.rack is None else self.rack.end
         self.motion = Motion(
-            drilling, s.add_s, s.joint_s, s.stop_s, s.finish_s, turn, scenario.tubes, scenario.tube_length, first_angle
+            drilling,
+            s.add_s,
+            s.joint_s,
+            s.stop_s,
+            s.finish_s,
+            turn,
+            scenario.tubes,
+            scenario.tube_length,
+            first_angle,
+            at_start=file.rig.tubes_at_start,
+            blocks=s.blocks,
+            advance=file.rotation.advance_m,
         )
+        self._made_up = self.motion.make_ups if file.rig.tubes_at_start else self.motion.make_ups[1:]
         self.torsion = self._string_torsion()
         self.phases: tuple[Phase, ...] = self.motion.phases
         self.end = self.motion.end
@@ -74,12 +85,29 @@ class World:
         self._noises = file.node.imu_noise or (1.0,) * file.node.imus
         self._samples: dict[int, list[list[Any]]] = {}
         edge_std = math.radians(file.encoder.edge_std_deg)
-        self._disc = Disc(self.motion, file.encoder.counts_per_turn, edge_std, self._random(DISC, 0))
+        free_at = (self._made_up - FREE_BEFORE).tolist() if file.joints.head_turn_deg else []
+        free_by = self._free_turns.tolist() if file.joints.head_turn_deg else []
+        disc_random = self._random(Stream.DISC, 0)
+        self._disc = Disc(self.motion, file.encoder.counts_per_turn, edge_std, disc_random, free_at, free_by)
         self._check_faults()
 
+    @property
+    def cycles(self) -> int:
+        """Cycles of the whole schedule."""
+        return math.floor((self.end - self.begin) / PERIOD + 1e-9)
+
+    @cached_property
+    def ends(self) -> Array:
+        """Rig times (cycles,) at which the cycles of the encoder end."""
+        return np.asarray(self.begin + PERIOD * np.arange(1.0, self.cycles + 1.0))
+
     def cycle_end(self, cycle: int) -> float:
-        """Rig time at which the cycle ``cycle`` (from 0) ends."""
+        """Rig time at which the cycle ``cycle`` (from 0) of the encoder ends."""
         return self.begin + (cycle + 1) * PERIOD
+
+    def phase(self, tube: int) -> float:
+        """Time (s) by which a tube's cycles end after those of the encoder, less than a cycle."""
+        return self._phases[tube]
 
     def imu_sample(self, tube: int, cycle: int) -> list[Any]:
         """Three mean rates (rad/s) and three mean specific forces (m/s^2) of one cycle, errors and all.
@@ -124,7 +152,7 @@ class World:
         drive_error, lower_error = self._joint_errors
         return TubeSettings(
             tube=tube,
-            drive_joint=Joint(wrap(drive[tube] + drive_error[tube]), std),
+            drive_joint=Joint(wrap(drive[tube] - self._turned_before(tube) + drive_error[tube]), std),
             lower_joint=Joint(wrap(lower[tube] + lower_error[tube]), std),
             mount_std=math.radians(self.scenario.file.joints.mount_std_deg),
             scheme=Scheme[self.scenario.file.node.scheme.upper()],
@@ -147,15 +175,27 @@ class World:
         return float(self.truth(tube).yaw(np.array([t]))[0])
 
     def systematic_error(self, tube: int, t: float) -> float:
-        """Error of a yaw known only through the marks: estimate - truth = random error + this (rad).
+        """Constant part of a yaw's error at one rig time, rad; see ``systematic_errors``."""
+        return float(self.systematic_errors(tube, np.array([t]))[0])
+
+    def systematic_errors(self, tube: int, t: Array) -> Array:
+        """Errors (n,) of a yaw known only through the marks: estimate - truth = random error + this (rad).
 
         Where joints are solved it is the mark of the time when the tube was on top, and what each solution left.
         """
+        if self.scenario.file.node.joints == "marks":
+            by_top = {top: self._marks_error(tube, top) for top in range(tube, self.scenario.tubes + 1)}
+            rigid = np.array([by_top[max(self.motion.top(at), tube)] for at in t.tolist()])
+        else:
+            made_up = max(self.scenario.file.rig.tubes_at_start, tube)
+            rigid = self._marks_error(tube, made_up) - self.unseen(tube, t)
+        return rigid if self.torsion is None else rigid + self.torsion.twist(tube, t)[0]
+
+    def _marks_error(self, tube: int, top: int) -> float:
+        """What the marks from the head to a tube are wrong by while ``top`` is the top tube, rad."""
         drive_error, lower_error = self._joint_errors
-        top = max(self.motion.top(t), tube) if self.scenario.file.node.joints == "marks" else tube
         above = sum(lower_error[k] for k in range(tube + 1, top + 1))
-        rigid = drive_error[top] + above - self._mounts[tube]
-        return rigid if self.torsion is None else rigid + float(self.torsion.twist(tube, np.array([t]))[0][0])
+        return drive_error[top] + above - self._mounts[tube]
 
     def truth_station(self, md: float) -> dict[str, float]:
         """Direction and position of the hole at one depth, degrees and metres."""
@@ -178,17 +218,24 @@ class World:
         # joints below the head are rigid: a tube keeps for ever the angle it had while it was the top one
         joint = drive[tube] + self._mounts[tube]
         twist = None if self.torsion is None else partial(self.torsion.twist, tube)
-        return TubeTruth(self.scenario.hole, self.motion, below, joint, a.radius_m, a.gravity_mps2, twist)
+        slips = partial(self.unseen, tube) if self.scenario.file.joints.unseen_std_deg else None
+        return TubeTruth(self.scenario.hole, self.motion, below, joint, a.radius_m, a.gravity_mps2, twist, slips)
+
+    def unseen(self, tube: int, t: Array) -> Array:
+        """What a tube has slipped (rad) by rig times (n,) since its own make-up, at the make-ups of those above."""
+        first = max(tube - max(self.scenario.file.rig.tubes_at_start, 1), 0)
+        sums = np.concatenate([np.zeros(first + 1), np.cumsum(self._slips[first:])])
+        return np.asarray(sums[np.searchsorted(self._made_up, t, side="right")])
 
     def drift(self, tube: int, imu: int = 0) -> Drift | None:
         """What became of a tube's sensors since their calibration."""
         section = self.scenario.file.drift
-        return None if section is None else Drift.draw(section, self._random(DRIFT, tube, imu))
+        return None if section is None else Drift.draw(section, self._random(Stream.DRIFT, tube, imu))
 
     def imu_frame(self, tube: int, imu: int = 0) -> Array:
         """R_imu_from_tube (3, 3): how an IMU (from 0) of a tube leans against the tube's axis."""
         std = math.radians(self.scenario.file.joints.mount_tilt_std_deg)
-        pitch, roll = std * self._random(MOUNTS, tube, imu).standard_normal(2)
+        pitch, roll = std * self._random(Stream.MOUNTS, tube, imu).standard_normal(2)
         return imu_frame(pitch, roll)
 
     @property
@@ -198,31 +245,82 @@ class World:
         return math.inf if section is None else stiffness(section, self.scenario.tube_length)
 
     def _string_torsion(self) -> StringTorsion | None:
-        section, tubes = self.scenario.file.torsion, self.scenario.tubes
+        section = self.scenario.file.torsion
         if section is None:
             return None
-        trapped = section.trapped_fraction * np.abs(self._random(TORSION, 0).standard_normal(tubes))
-        return StringTorsion(section, self.motion, self.scenario.tube_length, np.arange(1.0, tubes + 1.0), trapped)
+        lengths = self.motion.lengths.astype(float)
+        trapped = section.trapped_fraction * np.abs(self._random(Stream.TORSION, 0).standard_normal(len(lengths)))
+        return StringTorsion(section, self.motion, self.scenario.tube_length, lengths, trapped)
 
     def _all_samples(self, tube: int, imu: int) -> Array:
-        count = math.floor((self.end - self.begin) / PERIOD + 1e-9)
-        ends: Array = self.begin + PERIOD * np.arange(1.0, count + 1.0)
+        return self.readings(tube, self.ends + self.phase(tube), PERIOD, imu)
+
+    def readings(self, tube: int, ends: Array, period: float, imu: int = 0) -> Array:
+        """Readings (n, 6) of the means over ``period`` (s) that end at the rig times ``ends`` (n,), one after another.
+
+        The noise of the accelerometer is stated for one cycle, and so is larger over less.
+        """
         truth, file = self.truth(tube), self.scenario.file
-        rate, force = truth.cycle_means(ends, PERIOD)
+        rate, force = truth.cycle_means(ends, period)
+        gyroscope, accelerometer = file.gyroscope, file.accelerometer
+        if gyroscope.instantaneous:
+            rate, gyroscope = truth.rate(ends), single_samples(gyroscope, period)
+        if period != PERIOD:
+            noise_deg = accelerometer.noise_deg * math.sqrt(PERIOD / period)
+            accelerometer = accelerometer.model_copy(update={"noise_deg": noise_deg})
         if self.rack is not None:
             racked = ends <= self.rack.end
-            held = self.rack.truth(self._random(RACK, tube), self._mounts[tube], file.accelerometer.gravity_mps2)
-            rate[racked], force[racked] = held.cycle_means(ends[racked], PERIOD)
+            held = self.rack.truth(self._random(Stream.RACK, tube), self._mounts[tube], file.accelerometer.gravity_mps2)
+            rate[racked], force[racked] = held.cycle_means(ends[racked], period)
         frame = self.imu_frame(tube, imu)
         rate, force = rate @ frame.T, force @ frame.T
-        turning = (self.motion.drive(ends)[1] > 0.0) | (self.motion.drive(ends - PERIOD)[1] > 0.0)
+        turning = (self.motion.drive(ends)[1] > 0.0) | (self.motion.drive(ends - period)[1] > 0.0)
+        rate[:, 2] += self._bias_step(ends)
         felt = force
         if (drift := self.drift(tube, imu)) is not None:
             rate, felt = rate + drift.rate, force @ drift.matrix.T + drift.bias
-        errors = ImuErrors(file.gyroscope, file.accelerometer).times(self._noises[imu])
-        measured_rate = errors.gyro(self._random(GYRO, tube, imu), rate, force, PERIOD)
-        measured_force = errors.accelerations(self._random(ACCELEROMETER, tube, imu), felt, turning.astype(float))
+        errors = ImuErrors(gyroscope, accelerometer).times(self._noises[imu])
+        measured_rate = errors.gyro(self._random(Stream.GYRO, tube, imu), rate, force, period)
+        measured_force = errors.accelerations(
+            self._random(Stream.ACCELEROMETER, tube, imu), felt, turning.astype(float)
+        )
         return np.concatenate([measured_rate, measured_force], axis=1)
+
+    def gyro_bias(self, tube: int) -> Array:
+        """True bias (cycles,) of a tube's z gyroscope, rad/s: the draws of its readings without noise and scale."""
+        clean = {"noise_dps_rthz": (0.0, 0.0, 0.0), "scale_factor_std": 0.0, "resolution_dps": 0.0}
+        section = self.scenario.file.gyroscope.model_copy(update=clean)
+        still = np.zeros((self.cycles, 3))
+        errors = ImuErrors(section, self.scenario.file.accelerometer)
+        drawn = errors.gyro(self._random(Stream.GYRO, tube), still, still, PERIOD)[:, 2]
+        return np.asarray(drawn + self._bias_step(self.ends + self.phase(tube)))
+
+    def _bias_step(self, ends: Array) -> Array:
+        turns_from = next(phase.start for phase in self.phases if phase.kind == "drill")
+        return np.asarray(math.radians(self.scenario.file.gyroscope.bias_step_dps) * (ends > turns_from))
+
+    @cached_property
+    def _phases(self) -> list[float]:
+        draws = PERIOD * self._random(Stream.PHASES, 0).random(self.scenario.tubes + 1)
+        locked = self.scenario.file.encoder.phase == "locked"
+        return [0.0] * len(draws) if locked else draws.tolist()
+
+    @cached_property
+    def _slips(self) -> Array:
+        """What the string below turns unseen at each make-up, rad."""
+        std = math.radians(self.scenario.file.joints.unseen_std_deg)
+        return np.asarray(std * self._random(Stream.SLIPS, 0).standard_normal(len(self._made_up)))
+
+    @cached_property
+    def _free_turns(self) -> Array:
+        """What the head turns, free of the string, before each make-up, rad."""
+        size = math.radians(self.scenario.file.joints.head_turn_deg)
+        return np.asarray(size * self._random(Stream.SLIPS, 1).uniform(0.5, 1.5, len(self._made_up)))
+
+    def _turned_before(self, tube: int) -> float:
+        """What the head has turned free of the string when a tube is made up to it, rad."""
+        made_up = tube - max(self.scenario.file.rig.tubes_at_start, 1)
+        return float(np.sum(self._free_turns[: max(made_up, 0)]))
 
     @cached_property
     def _joint_angles(self) -> tuple[list[float], list[float]]:
@@ -230,17 +328,19 @@ class World:
 
         The string stands while a tube is added, so the new pair of joints adds up to the old one.
         """
-        random = self._random(JOINTS, 0)
+        random = self._random(Stream.JOINTS, 0)
         drive, lower = [0.0], [0.0]
         for tube in range(1, self.scenario.tubes + 1):
             angle = float(random.uniform(-math.pi, math.pi))
+            made_up = tube - max(self.scenario.file.rig.tubes_at_start, 1)
+            slip = float(self._slips[made_up - 1]) if made_up > 0 else 0.0
             lower.append(angle if tube > 1 else 0.0)
-            drive.append(drive[tube - 1] - angle if tube > 1 else angle)
+            drive.append(drive[tube - 1] - angle + slip if tube > 1 else angle)
         return drive, lower
 
     @cached_property
     def _joint_errors(self) -> tuple[list[float], list[float]]:
-        random = self._random(JOINTS, 1)
+        random = self._random(Stream.JOINTS, 1)
         std = math.radians(self.scenario.file.joints.reading_std_deg)
         draws = std * random.standard_normal((self.scenario.tubes + 1, 2))
         draws[:2, 1] = 0.0  # the lowest tube has no joint below
@@ -249,7 +349,7 @@ class World:
     @cached_property
     def _mounts(self) -> list[float]:
         std = math.radians(self.scenario.file.joints.mount_std_deg)
-        errors: list[float] = (std * self._random(MOUNTS, 0).standard_normal(self.scenario.tubes + 1)).tolist()
+        errors: list[float] = (std * self._random(Stream.MOUNTS, 0).standard_normal(self.scenario.tubes + 1)).tolist()
         return errors
 
     def _clock(self, address: int) -> tuple[float, float]:
@@ -260,10 +360,10 @@ class World:
     @cached_property
     def _clocks(self) -> list[tuple[float, float]]:
         clocks = self.scenario.file.clocks
-        draws = self._random(CLOCKS, 0).standard_normal((self.scenario.tubes + 1, 2))
+        draws = self._random(Stream.CLOCKS, 0).standard_normal((self.scenario.tubes + 1, 2))
         return [(clocks.offset_std_s * a, clocks.drift_std_ppm * 1e-6 * b) for a, b in draws.tolist()]
 
-    def _random(self, purpose: int, tube: int, imu: int = 0) -> np.random.Generator:
+    def _random(self, purpose: Stream, tube: int, imu: int = 0) -> np.random.Generator:
         further = [imu] if imu else []  # the first IMU of a tube draws what it draws alone
         return stream(self.seed, purpose, tube, *further)
 

@@ -17,11 +17,11 @@ from borechain.cli.rig.rig import PRELOAD
 from node.firmware.encoder import COUNTS_PER_TURN
 from node.firmware.settings import KERNELS
 from node.kernels.layout import PERIOD, Scheme
+from sim.rig.plain_encoder import LINES, SAMPLE_RATE_HZ, PlainEncoder, single_samples
 from sim.studies import node_ingredients, node_modes, node_published
 from sim.studies.node_lab import REST, ROTATING, Lab, LabRun, LabSetup
 from sim.studies.node_links import OnOff
 from sim.studies.node_trials import rms_deg
-from sim.studies.plain_sensors import LINES, SAMPLE_RATE_HZ, PlainEncoder, single_samples
 from sim.world.scenario import GyroSection, NodeSection
 
 SEEDS = 6

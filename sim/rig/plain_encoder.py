@@ -6,13 +6,9 @@ import math
 from typing import Final
 
 from node.firmware.encoder import aiding
-from sim.world.scenario import GyroSection
 from telemetry.messages import Aiding
 
 LINES: Final = 1024  # of the encoder, counted once each. Source: thesis 4.2
-SAMPLE_RATE_HZ: Final = (
-    65.0  # of the gyroscope, whose single sample has the noise of this band. Source: thesis Table V.1
-)
 
 
 class PlainEncoder:
@@ -37,10 +33,3 @@ class PlainEncoder:
         self._sequence += int(moved != 0 or not self._resting)
         self._count, self._at, self._resting = count, now, not moved
         return aiding((count + 0.5) * self._quantum, self._quantum**2 / 12.0, rate, now, self._sequence)
-
-
-def single_samples(gyroscope: GyroSection, period: float) -> GyroSection:
-    """The gyroscope whose mean over ``period`` (s) is as noisy as one sample of the one given."""
-    spread = math.sqrt(period * SAMPLE_RATE_HZ)
-    x, y, z = (noise * spread for noise in gyroscope.noise_dps_rthz)
-    return gyroscope.model_copy(update={"noise_dps_rthz": (x, y, z)})

@@ -1,0 +1,252 @@
+"""The string with its link switched off: the firmware of every node on the world's sensors, aiding handed on directly.
+
+Schedule, truth, sensors, joints, torsion and encoder are those of the world that a rig drills in; the firmware is the
+node's. What stands for the link are its effects: each hop loses aiding, delays it and adds an error of rig time. There
+are no frames, files or processes, so that a study of hundreds of seeds costs minutes. ``medium.link = "off"`` in
+a scenario asks for it; ``sim.rig.in_process`` is the string with its link.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+import numpy.typing as npt
+
+from node.firmware.encoder import EncoderNode, EncoderSample
+from node.firmware.inputs import ImuReading, RigContext
+from node.firmware.tube import Tube
+from node.kernels.angles import wrap
+from node.kernels.layout import PERIOD, Scheme, default_config, new_state
+from sim.errors import ScenarioError
+from sim.rig.plain_encoder import PlainEncoder
+from sim.world.imu_errors import gauss_markov
+from sim.world.scenario import AidingSection
+from sim.world.streams import Stream, stream
+from sim.world.world import World
+from telemetry.messages import Aiding, Event, NodeState, SurveyMeasurement
+
+Array = npt.NDArray[np.float64]
+Mask = npt.NDArray[np.bool_]
+Sample = list[float]  # three rates (rad/s), three forces (m/s^2)
+Spoil = Callable[[int, int, Sample], Sample]
+SILENT_AFTER = 3.5  # s, until a node takes the neighbour above for gone
+NEVER = 10**9  # cycles
+
+
+@dataclass(frozen=True, slots=True)
+class Survey:
+    """One survey, judged at the cycle that made it."""
+
+    cycle: int
+    tube: int
+    error: float  # rad, yaw with all constant errors, less the truth
+    measurement: SurveyMeasurement
+
+
+@dataclass(slots=True)
+class StringRun:
+    """What the nodes of one seed knew: arrays are (cycles, tubes), tube 1 first; NaN before a tube is powered."""
+
+    ends: Array  # (cycles,) rig time, s
+    turning: Mask  # (cycles,)
+    yaw: Array  # rad, at the end of the tube's own cycle
+    total_error: Array  # rad, estimate less truth
+    systematic_error: Array  # rad, of it the part of joints, mounts and twist
+    var: Array  # rad^2, random part as the node states it
+    systematic_var: Array  # rad^2, as the node states it
+    gyro_bias: Array  # rad/s, z axis, estimate
+    surveys: list[Survey] = field(default_factory=list)
+    events: list[tuple[int, Event]] = field(default_factory=list)  # with the cycle
+    states: list[tuple[int, NodeState]] = field(default_factory=list)  # with the cycle
+
+    @property
+    def error(self) -> Array:
+        """Random part of the yaw error (cycles, tubes), rad."""
+        return wrapped(self.total_error - self.systematic_error)
+
+    @property
+    def total_var(self) -> Array:
+        """Stated variance of ``total_error``, rad^2."""
+        return self.var + self.systematic_var
+
+
+class DirectString:
+    """One string of one world.
+
+    Parameters
+    ----------
+    world : of a scenario whose link is off
+    state_every : cycles between two states of a node; by default none is made
+    spoil : changes the sample of a tube in a cycle before its firmware reads it
+
+    Raises
+    ------
+    ScenarioError
+        When the scenario has its link on.
+    """
+
+    def __init__(
+        self, world: World, *, state_every: int = NEVER, spoil: Spoil = lambda _tube, _cycle, sample: sample
+    ) -> None:
+        self.world, self._file = world, world.scenario.file
+        if self._file.medium.link != "off":
+            raise ScenarioError('medium.link: expected "off" for a string without frames')
+        self._spoil = spoil
+        self.tubes = {tube: self._fresh_tube(tube, state_every) for tube in range(1, world.scenario.tubes + 1)}
+        self._encoder = EncoderNode(torque=world.torque_settings())
+        sensor = self._file.encoder
+        self._plain = None if sensor.edge_times else PlainEncoder(sensor.counts_per_turn)
+        self.passes = aiding_passes(self._file.aiding, world.ends - world.begin, world.seed)
+        self._lost = self._losses()
+        self._clocks = self._clock_errors()
+        self._phases = {tube: world.phase(tube) for tube in self.tubes}
+        self._adds = [phase for phase in world.phases if phase.kind == "add"]
+        self._own: dict[int, Aiding | None] = {}  # what each node said in its cycle, by the schemes of estimates
+        self.run = self._empty_run()
+
+    def drill(self) -> StringRun:
+        """Every cycle of the schedule; returns what the nodes knew."""
+        for _ in self.steps():
+            pass
+        return self.run
+
+    def steps(self) -> Iterator[int]:
+        """Cycle by cycle, each yielded when it is done, so that a study may act between two."""
+        for cycle in range(self.world.cycles):
+            end = self.world.cycle_end(cycle)
+            string = self._string_at(end)
+            measured = self._measure(cycle, end)
+            locked = self._file.encoder.phase == "locked"
+            if not locked:
+                self._relay(cycle, measured, string, end)
+            for tube in string:
+                self._run_cycle(cycle, tube, string)
+            if locked:  # cycles end with the encoder's, and what it measures then arrives after them
+                self._relay(cycle, measured, string, end)
+            yield cycle
+
+    def _fresh_tube(self, tube: int, state_every: int) -> Tube:
+        config = default_config()
+        for name, value in self._file.node.tuning.items():
+            if name not in (config.dtype.names or ()):
+                raise ScenarioError(f"node.tuning.{name}: expected one of {', '.join(config.dtype.names or ())}")
+            config[0][name] = value
+        settings = replace(self.world.tube_settings(tube), state_every=state_every)
+        return Tube(settings, config, new_state(config), iter(range(NEVER)).__next__, restored=False)
+
+    def _losses(self) -> Mask:
+        """Whether an aiding is lost on the hop to a tube, (cycles, tubes)."""
+        shape = (self.world.cycles, self.world.scenario.tubes)
+        return np.asarray(stream(self.world.seed, Stream.AIDING_LOSS).random(shape) < self._file.medium.loss)
+
+    def _clock_errors(self) -> Array:
+        """Error of each hop's rig time (cycles, hops), s: those of the joints above, added up.
+
+        A node dates its own cycles by its own crystal; what is wrong is when it takes an aiding to be valid.
+        """
+        clocks, tubes = self._file.clocks, self.world.scenario.tubes
+        random = stream(self.world.seed, Stream.AIDING_CLOCKS)
+        constant = 1e-3 * clocks.joint_std_ms * random.standard_normal(tubes)
+        std = np.full(3, 1e-3 * clocks.wander_std_ms)
+        wander = [gauss_markov(random, self.world.cycles, std, clocks.wander_tau_s, PERIOD)[:, 0] for _ in range(tubes)]
+        return np.cumsum(constant + np.stack(wander, axis=1), axis=1)
+
+    def _string_at(self, end: float) -> list[int]:
+        """Tubes that are powered, from the top down."""
+        added = sum(phase.start <= end for phase in self._adds)
+        return list(range(self._file.rig.tubes_at_start + added, 0, -1))
+
+    def _is_open(self, t: float, since: float = 0.0) -> bool:
+        """Whether the joint below the head is open, and was for ``since`` s."""
+        return any(phase.start + since < t < phase.joint_closed for phase in self._adds)
+
+    def _run_cycle(self, cycle: int, tube: int, string: Sequence[int]) -> None:
+        top = string[0]
+        begin = self.world.cycle_end(cycle - 1) + self._phases[tube]
+        end = self.world.cycle_end(cycle) + self._phases[tube]
+        firmware = self.tubes[tube]
+        wx, wy, wz, fx, fy, fz = self._spoil(tube, cycle, self.world.imu_sample(tube, cycle))
+        said = list(
+            firmware.on_cycle(ImuReading(begin, end, (wx, wy, wz), (fx, fy, fz)), self._context(tube, top, end))
+        )
+        self._own[tube] = next((message for message in said if isinstance(message, Aiding)), None)
+        self._keep(cycle, tube, end, firmware)
+        for message in said:
+            if isinstance(message, SurveyMeasurement):
+                self.run.surveys.append(Survey(cycle, tube, float(self.run.total_error[cycle, tube - 1]), message))
+            elif isinstance(message, Event):
+                self.run.events.append((cycle, message))
+            elif isinstance(message, NodeState):
+                self.run.states.append((cycle, message))
+
+    def _context(self, tube: int, top: int, end: float) -> RigContext:
+        """What the link would tell: the new tube's joint is open at once, that below it once it is missed."""
+        growing = self._is_open(end)
+        unjoined = growing and (tube == top or (tube == top - 1 and self._is_open(end, SILENT_AFTER)))
+        hops = top - tube + 1
+        clocks = self._file.clocks
+        stated = clocks.joint_std_ms if clocks.stated_std_ms is None else clocks.stated_std_ms
+        return RigContext(not unjoined, hops, end, (1e-3 * stated) ** 2 * hops, True)
+
+    def _measure(self, cycle: int, end: float) -> Aiding:
+        count, edge_at, rising, torque, earlier = self.world.encoder_sample(end)
+        if self._plain is not None:
+            head = float(self.world.motion.drive(np.array([end]))[0][0])
+            measured = self._plain.on_cycle(head, end)
+        else:
+            measured = self._encoder.on_cycle(EncoderSample(count, edge_at, bool(rising), torque, earlier=earlier), end)
+        return replace(measured, sequence=cycle) if self._file.aiding.renumbered else measured
+
+    def _relay(self, cycle: int, measured: Aiding, string: Sequence[int], end: float) -> None:
+        """Down the string: ``forward`` hands on what came, the others what each node said in its cycle."""
+        aiding: Aiding | None = measured if self.passes[cycle] and not self._is_open(end) else None
+        medium = self._file.medium
+        for hop, tube in enumerate(string):
+            firmware = self.tubes[tube]
+            scheme = firmware.settings.scheme
+            passed = None
+            if aiding is not None and not self._lost[cycle, hop]:
+                travelled = 1e-3 * medium.delay_ms + medium.latency * (hop + 1 if scheme is Scheme.FORWARD else 1)
+                late = travelled if medium.dated_by == "arrival" else 0.0
+                passed = firmware.on_aiding(aiding, aiding.valid_at + late + float(self._clocks[cycle, hop]))
+            aiding = passed if scheme is Scheme.FORWARD else self._own.get(tube)
+
+    def _empty_run(self) -> StringRun:
+        world, tubes = self.world, self.world.scenario.tubes
+        shape = (world.cycles, tubes)
+        yaw, total, systematic, var, systematic_var, bias = np.full((6, *shape), math.nan)
+        self._truth = np.stack([world.truth(tube).yaw(world.ends + self._phases[tube]) for tube in self.tubes], axis=1)
+        self._systematic = np.stack(
+            [world.systematic_errors(tube, world.ends + self._phases[tube]) for tube in self.tubes], axis=1
+        )
+        turning = world.motion.drive(world.ends)[1] > 0.0
+        return StringRun(world.ends, turning, yaw, total, systematic, var, systematic_var, bias)
+
+    def _keep(self, cycle: int, tube: int, end: float, firmware: Tube) -> None:
+        run, column = self.run, tube - 1
+        run.yaw[cycle, column] = yaw = firmware.yaw
+        run.total_error[cycle, column] = wrap(yaw - self._truth[cycle, column])
+        run.systematic_error[cycle, column] = self._systematic[cycle, column]
+        run.var[cycle, column] = firmware.yaw_var
+        run.systematic_var[cycle, column] = firmware.systematic_var
+        state = firmware.state
+        run.gyro_bias[cycle, column] = state["static_bias"][2] + state["bias"][2]
+
+
+def aiding_passes(section: AidingSection, t: Array, seed: int) -> Mask:
+    """Whether the encoder is heard in each cycle that ends at ``t`` (cycles,) s. Source: update modes, thesis 4.2."""
+    every = section.every_s
+    repeats = section.on_s + section.off_s if every is None else every
+    shifted = t + repeats * float(stream(seed, Stream.AIDING_PHASE).random())
+    if every is None:
+        return np.asarray(np.mod(shifted, repeats) < section.on_s)
+    number = np.floor(shifted / every + 1e-9)  # the first cycle of every interval
+    return np.asarray(np.diff(number, prepend=np.floor((shifted[0] - PERIOD) / every + 1e-9)) > 0.0)
+
+
+def wrapped(angle: Array) -> Array:
+    """Angles in [-pi, pi), rad."""
+    return np.asarray(np.mod(angle + math.pi, math.tau) - math.pi)
