@@ -1,4 +1,4 @@
-"""A world recorded for every node of a string: what nodes with clocks of their own play by the clock (``timed:FILE``)."""
+"""A world recorded for every node of a string: what nodes with clocks of their own play by the clock."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ ROWS_A_CYCLE = 4
 
 
 def record(world: World, folder: Path) -> None:
-    """Write ``encoder.npy`` and ``tube-N.npy`` for every tube, in the times of their own clocks; see ``drivers.timed``."""
+    """Write ``encoder.npy`` and ``tube-N.npy`` for every tube, in the times of their own clocks (``timed:FILE``)."""
     step = PERIOD / ROWS_A_CYCLE
     ends = world.begin + step * np.arange(1.0, (world.end - world.begin) / step)
     np.save(folder / "encoder.npy", counts(world, ends))
