@@ -128,6 +128,11 @@ def log_if_needed(axes: Axes, values: Iterable[Array]) -> None:
         axes.set_ylim(bottom=0.0)
 
 
+def above_zero(values: Array) -> Array:
+    """Zero has no place on a logarithmic axis."""
+    return np.where(values > 0.0, values, np.nan)
+
+
 def region(axes: Axes, centre: Sequence[float] | Array, cov: Array, sigma: float, **look: Any) -> bool:
     """Draw the ellipse of a covariance (2, 2) around ``centre``, in the order of the axes; False when it has none."""
     if not float(np.trace(cov)) > 0.0:

@@ -11,8 +11,8 @@ import numpy.typing as npt
 from groundstation.calibration.mwd_files import FULL_HEADER
 from sim.instruments.mwd_jig import DIP, FIELD, BenchRecord, Heating, Tool, draw_tool, make_design, measure
 from sim.instruments.static_records import StaticNoise, static_record
-from sim.studies.allan import BIAS_INSTABILITY, RANDOM_WALK, RATE
-from sim.studies.mwd import CONTROL, control_design
+from sim.studies.allan.run import BIAS_INSTABILITY, RANDOM_WALK, RATE
+from sim.studies.mwd.run import CONTROL, control_design
 
 STATIC_DURATION = 1800.0  # s
 UNITS = "Tilt and tool face in deg, temperature in C, accelerometers A B C and magnetometers X Y Z in volts"

@@ -19,7 +19,7 @@ from node.firmware.tube import Tube
 from node.kernels.angles import wrap
 from node.kernels.layout import PERIOD, Scheme
 from sim.studies.fresh import fresh_tube
-from sim.studies.node_links import Link, OnOff
+from sim.studies.links import Link, OnOff
 from sim.world.borehole import Borehole
 from sim.world.disc import Disc
 from sim.world.imu_errors import ImuErrors

@@ -22,7 +22,7 @@ from node.kernels.angles import wrap
 from node.kernels.layout import PERIOD, Scheme
 from sim.rig.plain_encoder import PlainEncoder
 from sim.studies.fresh import fresh_tube
-from sim.studies.node_links import Link, OnOff
+from sim.studies.links import Link, OnOff
 from sim.world.borehole import Borehole
 from sim.world.disc import Disc
 from sim.world.imu_errors import ImuErrors, gauss_markov, single_samples

@@ -11,7 +11,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from groundstation.errors import SurveyError
-from groundstation.report import plots, plots_study, plots_wall, style
+from groundstation.report import plots, plots_wall, style
 from groundstation.report.plots_wall import band_of_thickness, joint_name, ranking
 from groundstation.survey.columns import PRESETS, Design
 from groundstation.survey.error_model import propagate
@@ -30,6 +30,9 @@ from groundstation.survey.wall import (
     thickness,
     worst,
 )
+from sim.studies.coverage.figure import coverage_figure
+from sim.studies.region_of_uncertainty.figure import azimuth_error_figure, uncertainty_figure
+from sim.studies.weighting.figure import weighting_figure
 
 # thesis Table 4.1, the field record of a 20 m bore at Potsdam
 POTSDAM = """md_m,b_cm,a_cm
@@ -77,7 +80,7 @@ def uncertainty_of(bore: Survey) -> Figure:
     for name in INSTRUMENTS:
         stds = 200.0 * np.sqrt(np.diagonal(covariances(bore, name), axis1=1, axis2=2))[1:]
         found[name] = (bore.md[1:], stds, PRINTED_RST if name == "rst-inclinometer" else None)
-    return plots_study.uncertainty_figure(found, "Uncertainty of bore 1", ("B", "A", "TVD"))
+    return uncertainty_figure(found, "Uncertainty of bore 1", ("B", "A", "TVD"))
 
 
 def azimuth_error_of(bore: Survey) -> Figure:
@@ -88,14 +91,14 @@ def azimuth_error_of(bore: Survey) -> Figure:
             for cov in (covariances(bore, name), 0.1 * covariances(bore, name))
         ]
         found[name] = (bore.md[1:], lateral[0], lateral[1])
-    return plots_study.azimuth_error_figure(found, 0.25, "Gyro terms or a filter, bore 1")
+    return azimuth_error_figure(found, 0.25, "Gyro terms or a filter, bore 1")
 
 
 def weighting_of() -> Figure:
     changes = np.arange(0.5, 9.1, 0.5)
     jump = 100.0 * (np.sin(np.radians(1.0 + changes)) - np.sin(np.radians(1.0)))
     errors = {scheme.value: jump * (1.0 - sequence_weights(3, power)[-1]) for scheme, power in POWERS.items()}
-    return plots_study.weighting_figure(
+    return weighting_figure(
         changes, errors, "inclination", "Station 2 at t4", {"linear": (np.array([2.0]), np.array([1.74]))}
     )
 
@@ -104,7 +107,7 @@ def coverage_of() -> Figure:
     claimed = np.array([0.1, 0.3, 0.5, 0.6827, 0.8, 0.9, 0.95, 0.99])
     off = np.array([0.01, -0.02, 0.015, 0.0, -0.01, 0.005, 0.004, 0.0])
     observed = {"relay": claimed + off, "too sure of itself": claimed - 0.12 * claimed * (1.0 - claimed) * 4.0}
-    return plots_study.coverage_figure(claimed, observed, 500, "Coverage of the regions")
+    return coverage_figure(claimed, observed, 500, "Coverage of the regions")
 
 
 def made_wall(count: int = 12, lean: float = 0.35, spread: float = 0.02) -> tuple[Columns, Joints]:
@@ -297,7 +300,7 @@ def test_weighting_reduces_by_the_share_of_the_newest_reading() -> None:
     assert ratios == pytest.approx([1.0, 0.75, 0.536, 0.375], abs=1e-3)  # thesis Fig. 4.35
     assert len(drawn(remaining, "published")) == 1
     with pytest.raises(SurveyError, match="scheme equal"):
-        plots_study.weighting_figure(np.ones(1), {"linear": np.ones(1)}, "inclination", "x")
+        weighting_figure(np.ones(1), {"linear": np.ones(1)}, "inclination", "x")
 
 
 @pytest.mark.parametrize("trials", [1, 20, 500])
@@ -307,7 +310,7 @@ def test_the_band_of_coverage_is_that_of_the_binomial_distribution(trials: int) 
     counts = np.arange(trials + 1)
     for confidence in (0.05, 0.5, 0.9, 0.99):
         low, high = binom.ppf([0.025, 0.975], trials, confidence)
-        axes = plots_study.coverage_figure(
+        axes = coverage_figure(
             np.full(trials + 1, confidence), {"all": counts / trials}, trials, "every count there is"
         ).axes[0]
         marked = np.round(drawn(axes, "outside")[0].get_ydata() * trials / 100.0)
@@ -320,7 +323,7 @@ def test_coverage_marks_what_is_outside_the_band() -> None:
         assert len(good) == 0
         assert len(bad) >= 3
     with pytest.raises(SurveyError, match="confidences"):
-        plots_study.coverage_figure(np.array([1.0]), {"a": np.array([1.0])}, 10, "x")
+        coverage_figure(np.array([1.0]), {"a": np.array([1.0])}, 10, "x")
 
 
 def test_wall_figure_shows_the_worst_joint_its_columns_and_the_extra_one() -> None:

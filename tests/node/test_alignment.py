@@ -15,7 +15,7 @@ from node.firmware.tube import Tube
 from node.kernels.alignment import new_mount
 from node.kernels.layout import DEG, PERIOD, default_config, new_state
 from node.process.tube_process import TubeProcess
-from sim.studies.alignment import Setup, Turn
+from sim.studies.alignment.run import Setup, Turn
 from telemetry.messages import Command, Event, Mode, NodeState, Severity, SurveyMeasurement
 from telemetry.parameters import ParameterBlock, SensorParameters
 

@@ -9,7 +9,7 @@ import pytest
 from click.testing import CliRunner
 
 from borechain.cli.experiment.experiment import experiment
-from sim.studies.alignment import BASE, PUBLISHED_DEG, Turn, base_rows, ratio, run_seed
+from sim.studies.alignment.run import BASE, PUBLISHED_DEG, Turn, base_rows, ratio, run_seed
 
 SEEDS = 24
 

@@ -9,7 +9,7 @@ from click.testing import CliRunner
 from borechain.cli.experiment.experiment import experiment
 from node.kernels.layout import Scheme
 from sim.studies.chain import Chain, run_seed
-from sim.studies.consistency import EVERY, run, setup_of, table, verdict
+from sim.studies.consistency.run import EVERY, run, setup_of, table, verdict
 
 HOPS, SEEDS = 5, 40
 

@@ -7,7 +7,7 @@ import pytest
 
 from node.kernels.layout import Scheme
 from sim.studies.chain import Chain, ChainSetup
-from sim.studies.relay import run, table
+from sim.studies.relay.run import run, table
 
 SEEDS = 24
 

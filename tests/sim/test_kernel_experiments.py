@@ -18,10 +18,12 @@ from node.firmware.encoder import COUNTS_PER_TURN
 from node.firmware.settings import KERNELS
 from node.kernels.layout import PERIOD, Scheme
 from sim.rig.plain_encoder import LINES, SAMPLE_RATE_HZ, PlainEncoder, single_samples
-from sim.studies import node_ingredients, node_modes, node_published
+from sim.studies import published_form
+from sim.studies.ingredients import run as ingredients
+from sim.studies.links import OnOff
+from sim.studies.modes import run as modes
 from sim.studies.node_lab import REST, ROTATING, Lab, LabRun, LabSetup
-from sim.studies.node_links import OnOff
-from sim.studies.node_trials import rms_deg
+from sim.studies.trials import rms_deg
 from sim.world.scenario import GyroSection, NodeSection
 
 SEEDS = 6
@@ -37,21 +39,21 @@ def yaw(found: list[LabRun], window: np.ndarray = REST, hop: int = 0) -> float:
 
 
 def test_the_published_filter_rests_like_the_thesis_and_diverges_while_it_turns() -> None:
-    found = runs(node_published.setup_of(LAB, "published filter"))
+    found = runs(published_form.setup_of(LAB, "published filter"))
     assert 0.02 < yaw(found) < 0.1
     assert yaw(found, ROTATING) > 1.0
     assert yaw(runs(LAB), ROTATING) < 0.05
 
 
 def test_the_published_scheme_is_as_far_off_as_it_was_found() -> None:
-    found = runs(node_published.setup_of(LAB, "published scheme"))
-    low, high = node_ingredients.STUDIED_DEG["published scheme"]
+    found = runs(published_form.setup_of(LAB, "published scheme"))
+    low, high = ingredients.STUDIED_DEG["published scheme"]
     assert 0.5 * low < yaw(found) < high
     assert yaw(found) > 5.0 * yaw(runs(LAB))
 
 
 def test_a_published_node_hands_its_own_yaw_down() -> None:
-    two = node_published.setup_of(node_modes.TWO, "published filter")
+    two = published_form.setup_of(modes.TWO, "published filter")
     assert two.scheme is Scheme.ESTIMATE
     found = runs(two, 3)
     assert yaw(found, hop=1) < 0.2
@@ -60,11 +62,11 @@ def test_a_published_node_hands_its_own_yaw_down() -> None:
 
 
 def test_published_rows_stand_beside_the_thesis_and_ours() -> None:
-    result = node_modes.run("two-nodes", 2, lambda: None)
+    result = modes.run("two-nodes", 2, lambda: None)
     rows = {(row["case"], row["quantity"]): row for row in result["cases"]}
-    for case in node_modes.CASES["two-nodes"]:
+    for case in modes.CASES["two-nodes"]:
         assert (case.name, "azimuth") in rows
-        for form in node_published.FORMS:
+        for form in published_form.FORMS:
             row = rows[(f"{case.name}, {form}", "azimuth")]
             assert row["published"] == case.published
             assert row["low"] <= row["ours"] <= row["high"]
@@ -83,21 +85,21 @@ def test_published_rows_stand_beside_the_thesis_and_ours() -> None:
     ],
 )
 def test_every_ingredient_is_missed(name: str, link: OnOff, window: np.ndarray, factor: float) -> None:
-    without = runs(replace(node_ingredients.INGREDIENTS[name], link=link))
+    without = runs(replace(ingredients.INGREDIENTS[name], link=link))
     assert yaw(without, window) > factor * yaw(runs(replace(LAB, link=link)), window)
 
 
 def test_each_ingredient_is_off_alone() -> None:
     changed = {
         name: {key for key in LabSetup.__slots__ if getattr(setup, key) != getattr(LAB, key)}
-        for name, setup in node_ingredients.INGREDIENTS.items()
+        for name, setup in ingredients.INGREDIENTS.items()
         if not name.startswith("published")
     }
     assert changed.pop("as shipped") == set()
     assert changed["instantaneous rate"] == {"instantaneous"}
     assert changed["no edge times"] == changed["no edge times, no quadrature"] == {"counts_per_turn"}
     assert changed["no scale-factor state"] == changed["no zero-rate update"] == {"config"}
-    assert node_ingredients.INGREDIENTS["no edge times"].counts_per_turn == COUNTS_PER_TURN
+    assert ingredients.INGREDIENTS["no edge times"].counts_per_turn == COUNTS_PER_TURN
 
 
 def test_a_plain_encoder_reads_the_middle_of_its_count() -> None:
@@ -121,7 +123,7 @@ def test_the_ingredients_command_keeps_table_and_plot(tmp_path: Path) -> None:
     done = CliRunner().invoke(experiment, ["ingredients", "--seeds", "2", "--out", str(tmp_path), "--json"])
     assert done.exit_code == 0, done.output
     result = json.loads(done.stdout)
-    assert len(result["cases"]) == 2 * node_ingredients.batches()
+    assert len(result["cases"]) == 2 * ingredients.steps(1)
     assert len((tmp_path / "ingredients.csv").read_text().splitlines()) == len(result["cases"]) + 1
     assert (tmp_path / "ingredients.svg").read_text().startswith("<?xml")
 

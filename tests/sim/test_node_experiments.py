@@ -11,11 +11,14 @@ from click.testing import CliRunner
 
 from borechain.cli.experiment.experiment import experiment
 from node.kernels.layout import PERIOD, Scheme
-from sim.studies import node_delay, node_modes, node_outage, node_tuning
 from sim.studies.chain import Chain, ChainSetup, run_seed
+from sim.studies.delay import run as delay
+from sim.studies.links import OnOff, Single
+from sim.studies.modes import run as modes
 from sim.studies.node_lab import ENDS, REST, ROTATING, STOP, Lab, LabRun, LabSetup
-from sim.studies.node_links import OnOff, Single
-from sim.studies.node_trials import bootstrap, rms_deg
+from sim.studies.outage import run as outage
+from sim.studies.trials import bootstrap, rms_deg
+from sim.studies.tuning import run as tuning
 
 SEEDS = 16
 SLACK = 1.5  # of the figure to reach, for few seeds
@@ -25,14 +28,14 @@ def runs(setup: LabSetup, seeds: int = SEEDS) -> list[LabRun]:
     return [Lab(setup, seed).run() for seed in range(1, seeds + 1)]
 
 
-def judged(case: node_modes.Case, found: list[LabRun]) -> dict[str, dict]:
-    return {row["quantity"]: row for row in node_modes.table(case, found)}
+def judged(case: modes.Case, found: list[LabRun]) -> dict[str, dict]:
+    return {row["quantity"]: row for row in modes.table(case, found)}
 
 
 @pytest.mark.parametrize(
-    "case", [c for name in ("update-modes", "single-updates") for c in node_modes.CASES[name]], ids=lambda c: c.name
+    "case", [c for name in ("update-modes", "single-updates") for c in modes.CASES[name]], ids=lambda c: c.name
 )
-def test_every_update_mode_is_within_reach(case: node_modes.Case) -> None:
+def test_every_update_mode_is_within_reach(case: modes.Case) -> None:
     rows = judged(case, runs(case.setup))
     for quantity in ("yaw", "azimuth"):
         assert rows[quantity]["ours"] < SLACK * rows[quantity]["to_reach"], rows[quantity]
@@ -40,15 +43,15 @@ def test_every_update_mode_is_within_reach(case: node_modes.Case) -> None:
 
 
 def test_without_the_scale_factor_state_the_reach_is_missed() -> None:
-    case = next(c for c in node_modes.CASES["update-modes"] if c.name == "20 s on / 30 s off")
+    case = next(c for c in modes.CASES["update-modes"] if c.name == "20 s on / 30 s off")
     row = judged(case, runs(replace(case.setup, config=(("scale_std", 0.0),))))["yaw"]
     assert row["reached"] is False
     assert row["ours"] > 2.0 * row["to_reach"]
 
 
 def test_the_second_node_is_as_good_as_the_first() -> None:
-    found = runs(node_modes.TWO)
-    for case in node_modes.CASES["two-nodes"]:
+    found = runs(modes.TWO)
+    for case in modes.CASES["two-nodes"]:
         row = judged(case, found)["yaw"]
         assert row["ours"] < SLACK * row["to_reach"]
 
@@ -58,15 +61,15 @@ def test_one_seed_gives_one_run_whatever_else_runs() -> None:
     assert np.array_equal(first.error, second.error)
     assert np.array_equal(first.azimuth_error, second.azimuth_error)
     assert not np.array_equal(first.error, other.error)
-    job = (replace(node_outage.STRINGS, blocks=1, link=OnOff(20.0, 20.0)), 7)
+    job = (replace(outage.STRINGS, blocks=1, link=OnOff(20.0, 20.0)), 7)
     assert np.array_equal(run_seed(job).error, run_seed(job).error)
 
 
 def test_an_experiment_over_a_pool_is_that_of_its_seeds() -> None:
     stepped: list[None] = []
-    result = node_modes.run("two-nodes", 2, lambda: stepped.append(None))
-    assert len(stepped) == 2 * node_modes.batches("two-nodes")
-    alone = runs(node_modes.TWO, 2)
+    result = modes.run("two-nodes", 2, lambda: stepped.append(None))
+    assert len(stepped) == modes.steps("two-nodes", 2)
+    alone = runs(modes.TWO, 2)
     assert result["cases"][0]["ours"] == rms_deg([r.error[REST, 0] for r in alone])[0]
     for row in result["cases"]:
         assert {"case", "published", "ours", "unit", "to_reach", "reached"} <= row.keys()
@@ -75,28 +78,28 @@ def test_an_experiment_over_a_pool_is_that_of_its_seeds() -> None:
 def test_a_larger_bias_factor_finds_the_bias_sooner() -> None:
     times = {}
     for factor in (1.0, 5.0):
-        found = runs(node_tuning.setup_of("bias_factor", factor))
-        times[factor] = node_tuning.convergence(node_tuning.mean_error_dps(found))
+        found = runs(tuning.setup_of("bias_factor", factor))
+        times[factor] = tuning.convergence(tuning.mean_error_dps(found))
     assert times[1.0] is not None
     assert times[5.0] is not None
-    assert times[5.0] <= node_tuning.SLOWEST
+    assert times[5.0] <= tuning.SLOWEST
     assert times[5.0] < times[1.0]
 
 
 def test_a_bias_that_stays_never_converges() -> None:
-    assert node_tuning.convergence(np.full(len(ENDS), 0.02)) is None
+    assert tuning.convergence(np.full(len(ENDS), 0.02)) is None
     decay = 0.02 * np.exp(-np.maximum(ENDS - STOP, 0.0) / 10.0)
-    time = node_tuning.convergence(decay)
+    time = tuning.convergence(decay)
     assert time == pytest.approx(10.0 * math.log(10.0), abs=PERIOD)
 
 
 def test_a_delay_costs_nothing_when_compensated_and_its_angle_when_not() -> None:
-    late = {form: replace(setup, delay=0.1) for form, setup in node_delay.FORMS.items()}
-    late[node_delay.FOUND] = replace(late[node_delay.FOUND], clock_told=0.1)
+    late = {form: replace(setup, delay=0.1) for form, setup in delay.FORMS.items()}
+    late[delay.FOUND] = replace(late[delay.FOUND], clock_told=0.1)
     errors = {form: rms_deg([r.error[ROTATING, 0] for r in runs(late[form], 4)])[0] for form in late}
-    assert errors["compensated"] < node_delay.TO_REACH_DEG
+    assert errors["compensated"] < delay.TO_REACH_DEG
     assert errors["dated by arrival"] == pytest.approx(0.1 * 71.0, rel=0.03)
-    assert errors[node_delay.FOUND] < node_delay.TO_REACH_DEG
+    assert errors[delay.FOUND] < delay.TO_REACH_DEG
 
 
 def test_links_pass_what_they_say() -> None:

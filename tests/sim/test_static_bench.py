@@ -20,7 +20,7 @@ from sim.instruments.static_records import (
     turn_table,
     white,
 )
-from sim.studies.allan import run
+from sim.studies.allan.run import run
 
 MATRIX = np.array([[0.99, -0.02, 0.003], [0.015, 1.01, -0.004], [-0.001, 0.007, 0.98]])
 BIAS = np.array([0.2, 3.8, -1.0])

@@ -4,11 +4,13 @@ import math
 
 import pytest
 
-from sim.studies import coverage, regions, weighting
+from sim.studies.coverage import run as coverage
+from sim.studies.region_of_uncertainty import run as regions
+from sim.studies.weighting import run as weighting
 
 
 def test_weights_reduce_the_error_as_published() -> None:
-    cases = {row["case"]: row for row in weighting.run()["cases"]}
+    cases = {row["case"]: row for row in weighting.run(lambda: None)["cases"]}
     for station, looks in ((2, 3), (3, 2)):
         for power, scheme in ((1, "linear"), (2, "quadratic"), (3, "cubic")):
             last = looks**power / sum(k**power for k in range(1, looks + 1))
@@ -20,7 +22,7 @@ def test_weights_reduce_the_error_as_published() -> None:
 
 
 def test_the_sweeps_grow_with_the_change_and_shrink_with_the_power() -> None:
-    rows = [r for r in weighting.run()["sweeps"] if r["changed"] == "inclination" and r["station"] == 2]
+    rows = [r for r in weighting.run(lambda: None)["sweeps"] if r["changed"] == "inclination" and r["station"] == 2]
     for scheme in ("equal", "linear", "quadratic", "cubic"):
         errors = [math.hypot(r["north_cm"], r["east_cm"]) for r in rows if r["scheme"] == scheme]
         assert len(errors) == 18
@@ -30,7 +32,7 @@ def test_the_sweeps_grow_with_the_change_and_shrink_with_the_power() -> None:
 
 
 def test_every_printed_region_stands_beside_ours() -> None:
-    result = regions.run()
+    result = regions.run(lambda: None)
     assert len(result["cases"]) == 5 * 10 * 3
     for row in result["cases"]:
         assert row["ratio"] == pytest.approx(row["ours"] / row["published"])

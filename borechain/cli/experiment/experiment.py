@@ -1,66 +1,53 @@
-"""``borechain experiment``: published experiments, ours beside the printed values."""
+"""``borechain experiment``: every study of the table `sim.studies.table` as a command, and the commands about all."""
 
 from __future__ import annotations
 
 import json
+import shlex
+from collections.abc import Callable
 from pathlib import Path
+from typing import TYPE_CHECKING, Any
 
 import click
 
-from borechain.cli.experiment.alignment import alignment
-from borechain.cli.experiment.consistency import consistency
-from borechain.cli.experiment.kernel import COMMANDS as KERNEL_COMMANDS
-from borechain.cli.experiment.node import COMMANDS as NODE_COMMANDS
-from borechain.cli.experiment.output import bar, keep, out_option, seeds_option, tell, yes
-from borechain.cli.experiment.survey import coverage, regions, weighting
+from borechain.cli.experiment.output import keep, progress, show
+from borechain.cli.experiment.records import records
 from borechain.cli.faults import plain_faults
-from borechain.cli.options import json_option, seed_option
-from borechain.cli.tables import Columns
+from borechain.cli.options import json_option
 
-RELAY_COLUMNS: Columns = (
-    ("scheme", "scheme"),
-    ("hop", "hop"),
-    ("yaw_rms_rest_deg", "yaw rms at rest, deg"),
-    ("yaw_rms_turning_deg", "turning, deg"),
-    ("nees_rest", "NEES at rest"),
-    ("nees_turning", "turning"),
-    ("nees_total", "with joints"),
-    ("published", "studied, at rest"),
-)
-MWD_COLUMNS: Columns = (
-    ("design", "design"),
-    ("parameters", "parameters"),
-    ("converged", "converged"),
-    ("iterations_median", "iterations, median"),
-    ("iterations_max", "largest"),
-    ("magnetometer_iterations_max", "largest, magnetometers"),
-    ("size_before_median", "G_L error before, g"),
-    ("size_after_max", "after, worst tool, g"),
-    ("published", "asked, g"),
-    ("tilt_before_median_deg", "tilt error before, deg"),
-    ("tilt_after_max_deg", "after, worst tool, deg"),
-    ("within_reach", "tools within reach"),
-    ("warned", "warned of the design"),
-    ("control_passed_before", "control passed before"),
-    ("control_passed_after", "after"),
-    ("cost_difference_max", "E beside another solver"),
-    ("time_over_other", "time over its, with our Jacobian"),
-    ("time_over_other_alone", "without"),
-)
-ALLAN_COLUMNS: Columns = (
-    ("axis", "axis"),
-    ("quantity", "quantity"),
-    ("unit", "unit"),
-    ("published", "truth"),
-    ("ours", "mean estimate"),
-    ("median_error_percent", "median error, %"),
-    ("error_95_percent", "95th percentile, %"),
-    ("raw_error_percent", "raw reading, mean error, %"),
-    ("coverage_95", "95 % intervals that hold"),
+if TYPE_CHECKING:
+    from sim.studies.study import Option, Study
+
+RESULTS = "docs/results"
+out_option = click.option(
+    "--out", type=click.Path(path_type=Path, file_okay=False), help="Folder for the table and plots."
 )
 
 
-@click.group()
+@plain_faults
+def studies() -> dict[str, Study]:
+    """The table, loaded when a command asks for it."""
+    from sim.studies.table import STUDIES
+
+    return STUDIES
+
+
+class Studies(click.Group):
+    """A command for every study, beside those of the group itself."""
+
+    def list_commands(self, ctx: click.Context) -> list[str]:
+        """Names in order."""
+        return sorted([*super().list_commands(ctx), *studies()])
+
+    def get_command(self, ctx: click.Context, cmd_name: str) -> click.Command | None:
+        """One of them."""
+        found = super().get_command(ctx, cmd_name)
+        if found is None and cmd_name in studies():
+            return command_of(studies()[cmd_name])
+        return found
+
+
+@click.group(cls=Studies)
 def experiment() -> None:
     """Rerun a published experiment beside ours.
 
@@ -71,103 +58,67 @@ def experiment() -> None:
     """
 
 
-for command in (alignment, consistency, coverage, regions, weighting, *NODE_COMMANDS, *KERNEL_COMMANDS):
-    experiment.add_command(command)
+experiment.add_command(records)
 
 
 @experiment.command("list")
-def list_() -> None:
+@click.pass_context
+def list_(context: click.Context) -> None:
     """Name every experiment."""
-    for name in sorted(experiment.commands.keys() - {"list"}):
-        text = (experiment.commands[name].help or "").partition(".")[0].strip()
-        click.echo(f"{name:24} {' '.join(text.split())}")
+    group = experiment
+    for name in group.list_commands(context):
+        command = group.get_command(context, name)
+        if command is not None and name not in ABOUT_ALL:
+            text = (command.help or "").partition(".")[0].strip()
+            click.echo(f"{name:24} {' '.join(text.split())}")
 
 
-@experiment.command()
-@click.option("--hops", type=click.IntRange(1, 50), default=10, show_default=True)
-@seeds_option
+@experiment.command("all")
+@click.option("--short", is_flag=True, help="With few seeds, to see that all of them work.")
 @out_option
-@json_option
+@click.pass_context
 @plain_faults
-def relay(hops: int, seeds: int, out: Path | None, as_json: bool) -> None:
-    """Judge at every hop whether a node's own variance is the truth about its error (NEES, 1 is honest).
+def all_(context: click.Context, short: bool, out: Path | None) -> None:
+    """Run every study of the table as the committed results have it: hours.
 
     \b
     Example:
-      borechain experiment relay --hops 10 --seeds 40 --out docs/results
+      borechain experiment all --out docs/results
     """
-    from node.kernels.layout import Scheme
-    from sim.studies.relay import run
-
-    with bar(len(Scheme) * seeds, quiet=as_json, what="seeds") as step:
-        result = run(hops, seeds, step)
-    keep(out, result, RELAY_COLUMNS)
-    tell(result, RELAY_COLUMNS, f"Relay over {hops} hops, {seeds} seeds", as_json=as_json)
-    if not as_json:
-        for scheme, good in result["consistent"].items():
-            click.echo(f"{scheme}: every NEES within [0.5, 2]: {yes(good)}")
+    folder = [] if out is None else ["--out", str(out)]
+    for study in studies().values():
+        for words in (study.short,) if short else study.full:
+            click.echo(f"borechain experiment {study.name} {words}".rstrip(), err=True)
+            command_of(study).main([*shlex.split(words), *folder], standalone_mode=False, parent=context)
 
 
-@experiment.command()
-@click.option("--tools", type=click.IntRange(1, 10_000), default=200, show_default=True, help="Synthetic tools.")
-@out_option
-@json_option
-@plain_faults
-def mwd(tools: int, out: Path | None, as_json: bool) -> None:
-    """Calibrate synthetic MWD tools at five designs of tilts, tool faces and temperatures.
-
-    \b
-    Example:
-      borechain experiment mwd --tools 200 --out docs/results
-    """
-    from sim.studies.mwd import HEATINGS, run
-
-    with bar(len(HEATINGS) * tools, quiet=as_json, what="tools") as step:
-        result = run(tools, step)
-    keep(out, result, MWD_COLUMNS)
-    tell(result, MWD_COLUMNS, f"MWD calibration, {tools} tools a design", as_json=as_json, sideways=True)
+ABOUT_ALL = ("all", "list")
 
 
-@experiment.command()
-@click.option("--records", type=click.IntRange(1, 10_000), default=20, show_default=True, help="Records of 2 h.")
-@out_option
-@json_option
-@plain_faults
-def allan(records: int, out: Path | None, as_json: bool) -> None:
-    """Recover the published noise of the node's sensor from synthetic records of 2 h at 65 Hz.
+def command_of(study: Study) -> click.Command:
+    """The command of one study: what it takes, its folder and the form of its output."""
 
-    \b
-    Example:
-      borechain experiment allan --records 20 --out docs/results
-    """
-    from sim.studies.allan import run
+    @plain_faults
+    def run(out: Path | None, as_json: bool, **given: Any) -> None:
+        with progress(study.steps(given), study.counts, quiet=as_json) as step:
+            result = study.run(given, step)
+        keep(study, result, out)
+        if as_json:
+            click.echo(json.dumps(study.told(result)))
+        else:
+            show(study, given, result)
 
-    with bar(records, quiet=as_json, what="records") as step:
-        result = run(records, step)
-    keep(out, result, ALLAN_COLUMNS)
-    tell(result, ALLAN_COLUMNS, f"Allan analysis of {records} records", as_json=as_json)
-    if not as_json:
-        for name, q in result["quantities"].items():
-            asked = f"median error {q['median_error_percent']:.2f} %, asked {q['asked_error_percent']} %"
-            click.echo(f"{name}: {asked}, 95 % intervals hold {q['coverage_95']:.1%}: {yes(q['reached'])}")
+    command: Callable[..., None] = json_option(out_option(run))
+    for option in reversed(study.takes):
+        command = option_of(option)(command)
+    lines = [f"  borechain experiment {study.name} {words}".rstrip() + f" --out {RESULTS}" for words in study.full]
+    heading = "Example:" if len(lines) == 1 else "Examples:"
+    return click.command(study.name, help="\n".join([study.help, "", "\b", heading, *lines]))(command)
 
 
-@experiment.command()
-@click.option("--out", type=click.Path(path_type=Path, file_okay=False), required=True, help="Folder of the records.")
-@seed_option
-@json_option
-@plain_faults
-def records(out: Path, seed: int, as_json: bool) -> None:
-    """Write records of synthetic instruments: an MWD tool in its jig, oven and control, and a gyroscope at rest.
-
-    \b
-    Example:
-      borechain experiment records --out out/records --seed 1
-    """
-    from sim.instruments.record_files import write_records
-
-    names = write_records(out, seed)
-    if as_json:
-        click.echo(json.dumps({"experiment": "records", "seed": seed, "files": names}))
-    else:
-        click.echo("\n".join(names))
+def option_of(option: Option) -> Callable[..., Any]:
+    """Something a study takes, as an option of its command."""
+    kind = click.Choice(option.choices) if option.choices else click.IntRange(option.least, option.most)
+    return click.option(
+        f"--{option.name}", type=kind, default=option.default, show_default=True, help=option.help or None
+    )

@@ -17,7 +17,7 @@ from groundstation.calibration.mwd_newton import direction, hold, minimise
 from groundstation.calibration.mwd_record import accelerometer_record, magnetometer_record
 from groundstation.calibration.mwd_solve import solve_accelerometers, solve_magnetometers
 from sim.instruments.mwd_jig import DIP, FIELD, Heating, Tool, draw_tool, make_design, measure
-from sim.studies.mwd import Outcome, calibrate, run
+from sim.studies.mwd.run import Outcome, calibrate, run
 
 TOOLS = 20
 DESIGNS = [Heating.ROOM, Heating.SHUFFLED, Heating.ALTERNATING]

@@ -17,7 +17,7 @@ from node.kernels.fixed.layout import FIXED_STATE
 from node.kernels.fixed.node import FixedNode
 from node.kernels.layout import DEG, PERIOD, STATE, Array, Status, default_config, new_state
 from node.kernels.relay import offer_aiding
-from sim.studies.fixed_point import AIDING_VAR, LIMITS, compare, inputs, rows_of
+from sim.studies.fixed_point.run import AIDING_VAR, LIMITS, compare, inputs, rows_of
 from telemetry.messages import Aiding, NodeState
 
 WORK_SPACE = {"h", "ph", "gain"}

@@ -1,0 +1,1 @@
+"""Mount of an IMU from slow turns."""

@@ -1,0 +1,1 @@
+"""Allan analysis of synthetic records."""

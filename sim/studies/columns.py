@@ -1,0 +1,140 @@
+"""Columns of the studies' tables: key of a row and its heading."""
+
+from __future__ import annotations
+
+from sim.studies.study import Columns
+
+
+def plain(*keys: str) -> Columns:
+    """Columns headed by their key."""
+    return tuple((key, key) for key in keys)
+
+
+HOPS: Columns = tuple((f"hop_{k}", f"hop {k}") for k in range(1, 6))
+CASES = plain("case", "published", "ours", "unit")
+INTERVALS = plain("case", "quantity", "published", "ours", "low", "high", "unit", "to_reach", "reached")
+INTERVALS_SHOWN: Columns = (
+    ("case", "case"),
+    ("quantity", "rms, deg, of"),
+    ("published", "published"),
+    ("ours", "ours"),
+    ("interval", "95 %"),
+    ("to_reach", "to reach"),
+    ("reached", "reached"),
+)
+RELAY: Columns = (
+    ("scheme", "scheme"),
+    ("hop", "hop"),
+    ("yaw_rms_rest_deg", "yaw rms at rest, deg"),
+    ("yaw_rms_turning_deg", "turning, deg"),
+    ("nees_rest", "NEES at rest"),
+    ("nees_turning", "turning"),
+    ("nees_total", "with joints"),
+    ("published", "studied, at rest"),
+)
+MWD: Columns = (
+    ("design", "design"),
+    ("parameters", "parameters"),
+    ("converged", "converged"),
+    ("iterations_median", "iterations, median"),
+    ("iterations_max", "largest"),
+    ("magnetometer_iterations_max", "largest, magnetometers"),
+    ("size_before_median", "G_L error before, g"),
+    ("size_after_max", "after, worst tool, g"),
+    ("published", "asked, g"),
+    ("tilt_before_median_deg", "tilt error before, deg"),
+    ("tilt_after_max_deg", "after, worst tool, deg"),
+    ("within_reach", "tools within reach"),
+    ("warned", "warned of the design"),
+    ("control_passed_before", "control passed before"),
+    ("control_passed_after", "after"),
+    ("cost_difference_max", "E beside another solver"),
+    ("time_over_other", "time over its, with our Jacobian"),
+    ("time_over_other_alone", "without"),
+)
+ALLAN: Columns = (
+    ("axis", "axis"),
+    ("quantity", "quantity"),
+    ("unit", "unit"),
+    ("published", "truth"),
+    ("ours", "mean estimate"),
+    ("median_error_percent", "median error, %"),
+    ("error_95_percent", "95th percentile, %"),
+    ("raw_error_percent", "raw reading, mean error, %"),
+    ("coverage_95", "95 % intervals that hold"),
+)
+COVERAGE: Columns = (
+    ("case", "case"),
+    ("published", "claimed, %"),
+    ("ours", "inside, %"),
+    ("half_interval", "+- (95 %)"),
+    ("unit", "unit"),
+)
+REGION: Columns = (*CASES, ("ratio", "ratio"))
+FILTERED: Columns = (
+    ("instrument", "instrument"),
+    ("station", "station"),
+    ("unfiltered_cm", "gyro, cm"),
+    ("filtered_cm", "0.25 deg azimuth, cm"),
+)
+MAGNETIC: Columns = (("station", "station"), ("magnetic_deg", "magnetic, deg"), ("filtered_deg", "filtered, deg"))
+SWEEPS = plain("changed", "value_deg", "scheme", "station", "north_cm", "east_cm", "tvd_cm")
+TUNING: Columns = (
+    ("case", "case"),
+    ("published", "published"),
+    ("ours", "bias converged"),
+    ("unit", "unit"),
+    ("to_reach", "to reach"),
+    ("reached", "reached"),
+    ("left_dps", "error left, deg/s"),
+    ("scatter_dps", "scatter, deg/s"),
+    ("yaw_rms_deg", "yaw rms at rest, deg"),
+)
+CONSISTENCY: Columns = (
+    ("case", "case"),
+    ("yaw_rms_deg", "yaw rms, deg"),
+    ("yaw_sigma_deg", "stated sigma, deg"),
+    ("nees", "NEES"),
+    ("nees_total", "with joints and mounts"),
+    ("published", "studied"),
+    ("ours", "ours"),
+    ("unit", "unit"),
+)
+OUTAGE: Columns = (("case", "case"), *HOPS, *plain("published", "ours", "unit", "to_reach", "reached"))
+OUTAGE_SHOWN: Columns = (("case", "case"), *HOPS, ("reached", "reached"))
+ALIGNMENT = plain("case", "quantity", "published", "ours", "low", "high", "unit")
+ALIGNMENT_SHOWN: Columns = (
+    ("case", "case"),
+    ("quantity", "quantity"),
+    ("published", "published"),
+    ("ours", "ours, rms"),
+    ("interval", "95 %"),
+    ("unit", "unit"),
+)
+INGREDIENTS: Columns = (("mode", "mode"), *INTERVALS)
+INGREDIENTS_SHOWN: Columns = (
+    ("case", "case"),
+    ("mode", "aiding"),
+    ("quantity", "rms, deg, of"),
+    ("ours", "ours"),
+    ("interval", "95 %"),
+    ("published", "studied"),
+)
+FIXED_POINT: Columns = (
+    ("case", "case"),
+    ("cycles", "cycles"),
+    ("yaw_max_deg", "yaw, largest, deg"),
+    ("yaw_rms_deg", "rms, deg"),
+    ("sigma_max", "sigma, largest, of 1"),
+    ("overflows", "overflows"),
+    ("status_differs", "status differs"),
+)
+FIXED_POINT_NEES: Columns = (
+    ("kernel", "kernel"),
+    ("hop", "hop"),
+    ("yaw_rms_rest_deg", "yaw rms at rest, deg"),
+    ("yaw_rms_turning_deg", "turning, deg"),
+    ("nees_rest", "NEES at rest"),
+    ("nees_turning", "turning"),
+    ("nees_total", "with joints"),
+)

@@ -1,0 +1,1 @@
+"""How often the claimed ellipse holds the true position."""

@@ -1,0 +1,51 @@
+"""Delay of the aiding: yaw error while rotating and at rest, with the time of validity and with that of arrival.
+
+Source: thesis eq. 3.29. Without compensation the node takes an aiding as valid when it arrives; the published form has
+no time-stamp state. The third form has that state and a clock that says it may be wrong by the delay, up to the 50 ms
+that a node believes. Clocks are perfect here. At rest is from 20 s after the stop. The figures beside ours are those
+of a study of the published scheme.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import Any
+
+from sim.studies.node_lab import ROTATING, SETTLED, LabSetup
+from sim.studies.pool import Step
+from sim.studies.trials import rms_deg, row, trials
+
+DELAYS_MS = (0.0, 10.0, 30.0, 100.0)
+PLAIN = LabSetup(latency=0.0, clock_std=0.0, clock_wander_std=0.0)
+FOUND = "dated by arrival, with time-stamp state"
+FORMS = {
+    "compensated": PLAIN,
+    "dated by arrival": replace(PLAIN, dated_by_arrival=True, config=(("stamp_std", 0.0),)),
+    FOUND: replace(PLAIN, dated_by_arrival=True),
+}
+TO_REACH_DEG = 0.04  # compensated, rotating
+STUDIED_DEG = {("dated by arrival", 10.0): 0.7, ("dated by arrival", 100.0): 7.2}
+
+
+def steps(seeds: int) -> int:
+    """Runs of one seed."""
+    return seeds * len(DELAYS_MS) * len(FORMS)
+
+
+def run(seeds: int, step: Step) -> dict[str, Any]:
+    """Rows of every form and delay."""
+    cases = []
+    with trials(seeds, step) as run_all:
+        for form, setup in FORMS.items():
+            for delay in DELAYS_MS:
+                told = None if form != FOUND else max(1e-3 * delay, 1e-3)
+                runs = run_all(replace(setup, delay=1e-3 * delay, clock_told=told))
+                turning, rest = (rms_deg([r.error[window, 0] for r in runs]) for window in (ROTATING, SETTLED))
+                name, reach = f"{form}, {delay:g} ms", TO_REACH_DEG if form == "compensated" else None
+                studied = STUDIED_DEG.get((form, delay))
+                rows = [
+                    row(name, "yaw, rotating", turning, published=studied, to_reach=reach),
+                    row(name, "yaw, at rest", rest),
+                ]
+                cases += [{**r, "form": form, "delay_ms": delay} for r in rows]
+    return {"experiment": "delay", "seeds": seeds, "cases": cases}

@@ -1,0 +1,1 @@
+"""The integer kernel against the float64 kernel."""

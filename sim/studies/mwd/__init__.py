@@ -1,0 +1,1 @@
+"""Calibration of synthetic MWD tools."""

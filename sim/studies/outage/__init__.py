@@ -1,0 +1,1 @@
+"""Consistency of five nodes over outages and losses."""

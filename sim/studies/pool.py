@@ -1,0 +1,43 @@
+"""The one pool of processes: seeds over all cores, in their order, with progress."""
+
+from __future__ import annotations
+
+import multiprocessing
+import os
+from collections.abc import Callable, Iterable, Iterator
+from contextlib import contextmanager
+from typing import Protocol, TypeVar
+
+Job = TypeVar("Job")
+Found = TypeVar("Found")
+Step = Callable[[], None]
+
+
+class RunAll(Protocol):
+    """Runs jobs over the cores of a pool."""
+
+    def __call__(self, work: Callable[[Job], Found], jobs: Iterable[Job]) -> list[Found]:
+        """Results of ``work`` in the order of ``jobs``; both must be picklable."""
+
+
+@contextmanager
+def over_cores(most: int, step: Step) -> Iterator[RunAll]:
+    """Yield the function that runs jobs on all cores, ``most`` at a time; ``step`` is called after each job.
+
+    Starting a process compiles the kernels anew, so a study keeps one pool for all its batches.
+    """
+    with multiprocessing.get_context("spawn").Pool(min(os.cpu_count() or 1, most)) as pool:
+
+        def run_all(work: Callable[[Job], Found], jobs: Iterable[Job]) -> list[Found]:
+            results = []
+            for found in pool.imap(work, jobs):
+                results.append(found)
+                step()
+            return results
+
+        yield run_all
+
+
+def seeded(setup: Job, count: int) -> list[tuple[Job, int]]:
+    """Jobs of one setup with the seeds 1..``count``."""
+    return [(setup, seed) for seed in range(1, count + 1)]

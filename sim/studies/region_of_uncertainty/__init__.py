@@ -1,0 +1,1 @@
+"""Regions of uncertainty of wellbore 1."""

@@ -1,0 +1,1 @@
+"""Whether a node knows its own error at every hop, by relay scheme."""

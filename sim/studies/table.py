@@ -1,0 +1,179 @@
+"""Table of studies: the command ``experiment``, ``make study`` and the tests know a study from its line here alone.
+
+A study more is a package with ``run`` and, if it draws, ``figure`` (see `sim.studies.study`), and a line here.
+"""
+
+from __future__ import annotations
+
+from sim.studies import columns
+from sim.studies.study import MODULES, Option, Study, Table, by_name
+
+SEEDS = Option("seeds", 40, 2, 10_000)
+SEED = Option("seed", 1, 0, 2**31 - 1, help="One seed, one result.")
+MODES = {
+    "update-modes": "Yaw and azimuth at rest under continuous aiding and under 20 s on and 5 to 60 s off.",
+    "single-updates": "Yaw and azimuth at rest under single updates from one a second to one a minute.",
+    "two-nodes": "Yaw and azimuth at rest of two nodes, the second aided through the first.",
+    "fifty-nodes": "Yaw of the last of fifty nodes: clocks off by 5 ms a joint, 30 % lost, 20 s on and 30 s off.",
+}
+
+STUDIES = by_name(
+    [
+        Study(
+            "relay",
+            "Judge at every hop whether a node's own variance is the truth about its error (NEES, 1 is honest).",
+            f"{MODULES}.relay",
+            (Table("Relay over {hops} hops, {seeds} seeds", columns.RELAY, columns.RELAY),),
+            (Option("hops", 10, 1, 50), SEEDS),
+            counts="seeds",
+            drawn=False,
+            full=("--hops 10 --seeds 40",),
+            short="--hops 2 --seeds 2",
+        ),
+        Study(
+            "mwd",
+            "Calibrate synthetic MWD tools at five designs of tilts, tool faces and temperatures.",
+            f"{MODULES}.mwd",
+            (Table("MWD calibration, {tools} tools a design", columns.MWD, columns.MWD, sideways=True),),
+            (Option("tools", 200, 1, 10_000, help="Synthetic tools."),),
+            counts="tools",
+            drawn=False,
+            full=("--tools 200",),
+            short="--tools 1",
+        ),
+        Study(
+            "allan",
+            "Recover the published noise of the node's sensor from synthetic records of 2 h at 65 Hz.",
+            f"{MODULES}.allan",
+            (Table("Allan analysis of {records} records", columns.ALLAN, columns.ALLAN),),
+            (Option("records", 20, 1, 10_000, help="Records of 2 h."),),
+            counts="records",
+            drawn=False,
+            full=("--records 20",),
+            short="--records 1",
+        ),
+        Study(
+            "coverage",
+            "How often the claimed ellipse holds the true position, over wells drilled with the rig's own numbers.",
+            f"{MODULES}.coverage",
+            (Table("Coverage over {wells} wells", columns.COVERAGE, columns.COVERAGE),),
+            (Option("wells", 2000, 100, 1_000_000), Option("strings", 100, 2, 10_000, help="Whose filters are run.")),
+            counts="strings, then wells",
+            full=("--wells 2000",),
+            short="--wells 100 --strings 2",
+        ),
+        Study(
+            "region-of-uncertainty",
+            "Regions of uncertainty of wellbore 1 for five instruments, the printed tables beside ours.",
+            f"{MODULES}.region_of_uncertainty",
+            (
+                Table("Region of uncertainty of wellbore 1", columns.REGION, columns.REGION),
+                Table("Lateral error: gyro against a held azimuth", shown=columns.FILTERED, rows="filtered"),
+                Table("Azimuth error of a magnetic survey", shown=columns.MAGNETIC, rows="magnetic"),
+            ),
+        ),
+        Study(
+            "weighting",
+            "Weights of the readings of one station when the hole moves, the published reductions beside ours.",
+            f"{MODULES}.weighting",
+            (
+                Table("Remaining error at the fourth stop", columns.CASES, columns.CASES),
+                Table("Errors of every change", columns.SWEEPS, rows="sweeps", suffix="-sweeps"),
+            ),
+        ),
+        *(
+            Study(
+                name,
+                words,
+                f"{MODULES}.modes",
+                (Table("{experiment}, {seeds} seeds", columns.INTERVALS, columns.INTERVALS_SHOWN),),
+                (SEEDS,),
+                fixed={"name": name},
+                full=("--seeds 200",),
+                short="--seeds 2",
+            )
+            for name, words in MODES.items()
+        ),
+        Study(
+            "tuning",
+            "Time from the stop until the bias is found, over the tuning factors A and B.",
+            f"{MODULES}.tuning",
+            (Table("Tuning, {seeds} seeds", columns.TUNING, columns.TUNING),),
+            (SEEDS,),
+            full=("--seeds 100",),
+            short="--seeds 2",
+        ),
+        Study(
+            "delay",
+            "Yaw error over the delay of the aiding, with its time of validity and with that of its arrival.",
+            f"{MODULES}.delay",
+            (Table("Delay, {seeds} seeds", columns.INTERVALS, columns.INTERVALS_SHOWN),),
+            (SEEDS,),
+            full=("--seeds 25",),
+            short="--seeds 2",
+        ),
+        Study(
+            "consistency",
+            "Consistency (NEES) to hop 50 under clock errors, loss, outages, joint and mount errors, by relay scheme.",
+            f"{MODULES}.consistency",
+            (Table("NEES to hop 50, {kernel}, {seeds} seeds", columns.CONSISTENCY, columns.CONSISTENCY),),
+            (
+                Option("control-seeds", None, 2, 10_000, help="Of the other schemes; as many if absent."),
+                Option("kernel", "float64", choices=("float64", "fixed")),
+                SEEDS,
+            ),
+            full=("--seeds 500 --control-seeds 100", "--seeds 500 --kernel fixed"),
+            short="--seeds 2 --kernel fixed",
+        ),
+        Study(
+            "outage",
+            "Consistency (NEES) of a string of five over the length of outages and the loss of every hop.",
+            f"{MODULES}.outage",
+            (Table("NEES of five hops, {seeds} seeds", columns.OUTAGE, columns.OUTAGE_SHOWN),),
+            (SEEDS,),
+            full=("--seeds 240",),
+            short="--seeds 2",
+        ),
+        Study(
+            "alignment",
+            "Mount of an IMU from two slow turns: a circle fit beside (max + min) / 2, and the survey after.",
+            f"{MODULES}.alignment",
+            (Table("Alignment, {seeds} seeds", columns.ALIGNMENT, columns.ALIGNMENT_SHOWN),),
+            (SEEDS,),
+            full=("--seeds 100",),
+            short="--seeds 2",
+        ),
+        Study(
+            "ingredients",
+            "Yaw at rest and rotating with one ingredient of the filter or of its sensors switched off at a time.",
+            f"{MODULES}.ingredients",
+            (Table("Ingredients, {seeds} seeds", columns.INGREDIENTS, columns.INGREDIENTS_SHOWN),),
+            (SEEDS,),
+            full=("--seeds 40",),
+            short="--seeds 2",
+        ),
+        Study(
+            "fixed-point",
+            "Compare the integer kernel with the float64 kernel on the same inputs, cycle by cycle, and their NEES.",
+            f"{MODULES}.fixed_point",
+            (
+                Table("Fixed point against float64, {cycles} cycles", columns.FIXED_POINT, columns.FIXED_POINT),
+                Table(
+                    "NEES of 5 hops, {seeds} seeds",
+                    columns.FIXED_POINT_NEES,
+                    columns.FIXED_POINT_NEES,
+                    rows="nees",
+                    suffix="-nees",
+                ),
+            ),
+            (
+                Option("cycles", 1_000_000, 2000, 100_000_000),
+                Option("seeds", 24, 2, 10_000, help="Of the NEES."),
+                SEED,
+            ),
+            drawn=False,
+            full=("--cycles 1000000",),
+            short="--cycles 2000 --seeds 2",
+        ),
+    ]
+)

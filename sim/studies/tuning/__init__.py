@@ -1,0 +1,1 @@
+"""Tuning factors of the filter."""
