@@ -1,10 +1,10 @@
-"""Entry point: the group of sub-commands, loaded on use, and the last line of defence against tracebacks."""
+"""Entry point: the table of commands, loaded on use; ``python -m borechain`` is the same."""
 
 from __future__ import annotations
 
 import importlib
 import sys
-from typing import Any
+from importlib.util import find_spec
 
 import click
 
@@ -12,11 +12,16 @@ from borechain import __version__
 
 COMMANDS = {
     "rig": ("borechain.cli.rig.rig", "rig", "Drill a scenario with one real process a tube."),
-    "node": ("borechain.cli.node.node", "node", "Run the node of one tube."),
-    "encoder": ("borechain.cli.node.encoder", "encoder", "Run the encoder node on the drive head."),
+    "scenario": ("borechain.cli.scenario.scenario", "scenario", "List and show the scenarios of the program."),
+    "node": ("node.process.tube_command", "node", "Run the node of one tube."),
+    "encoder": ("node.process.encoder_command", "encoder", "Run the encoder node on the drive head."),
     "medium": ("borechain.cli.rig.medium", "medium", "Run world, joints and clock of a scenario."),
-    "ground": ("borechain.cli.ground.ground", "ground", "Run the ground station."),
-    "router": ("borechain.cli.rig.router", "router", "Be the zenoh router of a rig whose processes start one by one."),
+    "ground": ("groundstation.command", "ground", "Run the ground station."),
+    "router": (
+        "borechain.cli.rig.router",
+        "router",
+        "Run the zenoh router of a rig whose processes are started one by one.",
+    ),
     "query": ("borechain.cli.ground.query", "query", "Ask a running ground station."),
     "watch": ("borechain.cli.ground.query", "watch", "Follow what a running ground station publishes."),
     "calibrate": (
@@ -24,7 +29,7 @@ COMMANDS = {
         "calibrate",
         "Calibrate sensors from laboratory records.",
     ),
-    "allan": ("borechain.cli.calibrate.allan", "allan", "Say from a static record what noise a sensor has."),
+    "allan": ("borechain.cli.calibrate.allan", "allan", "Noise of a sensor from a static record."),
     "survey": ("borechain.cli.survey.survey", "survey", "Trajectory and region of uncertainty of a record."),
     "wall": (
         "borechain.cli.survey.wall",
@@ -67,24 +72,21 @@ def cli() -> None:
 
     \b
     Examples:
-      borechain rig scenarios/wellbore-1.toml --speed max --seed 1
+      borechain rig wellbore-1 --speed max --seed 1
       borechain query 'borechain/*/ground/trajectory?md=4..12'
     """
 
 
 def main(arguments: list[str] | None = None) -> None:
-    """Run the command line and exit: 0 done, 1 the job failed, 2 wrong arguments or input."""
+    """Run the command line and exit: 0 done, 1 the job could not be done here, 2 wrong arguments or input."""
     try:
-        result: Any = cli.main(args=arguments, prog_name="borechain", standalone_mode=False)
-        sys.exit(result if isinstance(result, int) else 0)
-    except click.exceptions.Exit as exit_:
-        sys.exit(exit_.exit_code)
-    except click.ClickException as error:
-        error.show()
-        sys.exit(error.exit_code)
-    except (click.Abort, KeyboardInterrupt):
-        click.echo("borechain: interrupted", err=True)
-        sys.exit(1)
+        from telemetry.runtime.command_line import run
+    except ModuleNotFoundError as error:
+        if (error.name or "").partition(".")[0] != "telemetry":
+            raise
+        found = find_spec("telemetry")
+        sys.exit(f"borechain: expected the package telemetry of borechain, got {found.origin if found else 'none'}")
+    run(cli, "borechain", arguments)
 
 
 if __name__ == "__main__":

@@ -13,7 +13,6 @@ from pathlib import Path
 from typing import Any
 
 from groundstation.config import GroundConfig
-from groundstation.errors import GroundError
 from groundstation.service.process import GroundProcess
 from groundstation.service.views import FIXED
 from node.process.encoder_process import EncoderProcess
@@ -24,6 +23,7 @@ from sim.rig.launcher import private_folder
 from sim.rig.operator import Operator
 from sim.rig.scheduler import Progress, Scheduler
 from sim.world.world import World
+from telemetry.errors import BorechainError
 from telemetry.messages import BASE, ENCODER
 from telemetry.transport.authentication import new_key, read_key
 
@@ -84,7 +84,7 @@ class InlineRig:
         model = self.ground.model
         try:
             self.ground.recalibration.order(parameters, model.rig_now, model.tally.tubes)
-        except GroundError as error:
+        except BorechainError as error:
             raise RigError(f"{name}: {error}") from error
         return self.ask("recalibration")
 

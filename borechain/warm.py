@@ -5,7 +5,8 @@ from __future__ import annotations
 import gc
 
 import borechain.host
-import groundstation.service.process
+import groundstation.host
+import node.process.host
 import sim.rig.bus_stepper
 import sim.rig.scheduler
 import sim.world.world
@@ -16,4 +17,4 @@ warm_up()
 gc.collect()
 gc.freeze()
 
-__all__ = ["borechain", "groundstation", "sim"]
+__all__ = ["borechain", "groundstation", "node", "sim"]

@@ -4,10 +4,11 @@ from __future__ import annotations
 
 import math
 from pathlib import Path
-from typing import Annotated, Literal
+from typing import Annotated, Any, Literal
 
-from pydantic import BaseModel, ConfigDict, Field
+from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
+from groundstation.errors import ConfigurationError
 from groundstation.survey.columns import PRESETS, Design
 from groundstation.survey.fusion import Weighting
 from telemetry import keys
@@ -58,3 +59,19 @@ class GroundConfig(BaseModel):
             radius=self.column_radius,
             tolerance=PRESETS[self.tolerance],
         )
+
+
+def checked_config(**settings: Any) -> GroundConfig:
+    """Configuration of settings as they were given.
+
+    Raises
+    ------
+    ConfigurationError
+        One line: which setting, what was expected and what came.
+    """
+    try:
+        return GroundConfig(**settings)
+    except ValidationError as error:
+        first = error.errors()[0]
+        name = ".".join(str(part) for part in first["loc"])
+        raise ConfigurationError(f"{name}: {first['msg']}, got {first['input']!r:.60}") from error

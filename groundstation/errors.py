@@ -3,25 +3,27 @@
 ::
 
     GroundError
-    ├── SurveyError(ValueError)       numbers that are no survey: which file and line, which value, which station
-    ├── ToolError(ValueError)         an instrument model that cannot be used: which file, term and formula
-    ├── SelectorError(ValueError)     a query nobody can answer: the message lists the valid names
-    ├── ConfigurationError(ValueError) a setting that what was asked for needs: correct the option named
-    └── StoreError(OSError)           the database cannot be opened or written: nothing was acknowledged
+    ├── SurveyError(InputError, ValueError)    invalid survey numbers: which file and line, value, station
+    ├── ToolError(InputError, ValueError)      an instrument model that cannot be used: which file, term and formula
+    ├── SelectorError(ValueError)              a query nobody can answer: the message lists the valid names
+    ├── ConfigurationError(InputError, ValueError)    a setting that what was asked for needs: correct the option named
+    └── StoreError(OSError)                    the database cannot be opened or written: nothing was acknowledged
 """
 
 from __future__ import annotations
 
+from telemetry.errors import BorechainError, InputError
 
-class GroundError(Exception):
+
+class GroundError(BorechainError):
     """Root of every error of this package."""
 
 
-class SurveyError(GroundError, ValueError):
+class SurveyError(GroundError, InputError, ValueError):
     """The numbers given are no survey."""
 
 
-class ToolError(GroundError, ValueError):
+class ToolError(GroundError, InputError, ValueError):
     """The instrument model cannot be used."""
 
 
@@ -29,7 +31,7 @@ class SelectorError(GroundError, ValueError):
     """The query cannot be answered; the message says what can."""
 
 
-class ConfigurationError(GroundError, ValueError):
+class ConfigurationError(GroundError, InputError, ValueError):
     """A setting is missing or outside its range."""
 
 

@@ -3,19 +3,21 @@
 ::
 
     NodeError
-    ├── ConfigurationError(ValueError)    a setting outside its range: correct the file or the flag named
-    ├── SavedStateError(ValueError)       both slots of a saved state are unreadable: the node starts from nothing
-    └── SensorError(OSError)              a sensor is absent or answers nonsense: it is tried again every cycle
+    ├── ConfigurationError(InputError, ValueError)    a setting outside its range: correct the file or the flag named
+    ├── SavedStateError(ValueError)              both slots of a saved state are unreadable: the node starts afresh
+    └── SensorError(OSError)                  a sensor is absent or answers nonsense: tried again every cycle
 """
 
 from __future__ import annotations
 
+from telemetry.errors import BorechainError, InputError
 
-class NodeError(Exception):
+
+class NodeError(BorechainError):
     """Root of every error of this package."""
 
 
-class ConfigurationError(NodeError, ValueError):
+class ConfigurationError(NodeError, InputError, ValueError):
     """A setting is outside its range."""
 
 

@@ -3,19 +3,21 @@
 ::
 
     SimError
-    ├── ScenarioError(ValueError)    a scenario file, path file or fault that cannot be: correct the place named
-    ├── RigError(RuntimeError)       the rig could not run here: the message names the remedy
-    └── StudyError(ValueError)       a table of studies or instruments that cannot be: correct the line named
+    ├── ScenarioError(InputError, ValueError)    an invalid scenario, path or fault: correct the place named
+    ├── RigError(RuntimeError)                   the rig could not run here: the message names the remedy
+    └── StudyError(ValueError)                   an invalid table of studies or instruments: correct the line named
 """
 
 from __future__ import annotations
 
+from telemetry.errors import BorechainError, InputError
 
-class SimError(Exception):
+
+class SimError(BorechainError):
     """Root of every error of this package."""
 
 
-class ScenarioError(SimError, ValueError):
+class ScenarioError(SimError, InputError, ValueError):
     """The scenario cannot be; nothing was started."""
 
 

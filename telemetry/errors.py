@@ -1,18 +1,31 @@
-"""Errors of the telemetry package.
+"""The root of every error of this program, and the errors of the telemetry package.
 
 ::
+
+    BorechainError
+    ├── InputError                    what the user gave is wrong: correct it, nothing was started; exit status 2
+    └── TelemetryError, NodeError, GroundError, SimError    the root of each package
 
     TelemetryError
     ├── MediumError(OSError)          the bus could not be opened or was lost: retry or reconfigure
     ├── DecodeError(ValueError)       bytes that are no message of ours; the link counts and drops them
     ├── EncodeError(ValueError)       a message outside its declared range: nothing was sent
-    └── KeyFileError(ValueError)      the key of the rig is missing, open to others or none: correct the file
+    ├── KeyFileError(ValueError)      the key of the rig is missing, open to others or none: correct the file
+    └── CalibrationError(InputError, ValueError)    a record, a design or a file that gives no calibration
 """
 
 from __future__ import annotations
 
 
-class TelemetryError(Exception):
+class BorechainError(Exception):
+    """Root of every error of ours, so that the edge can report one in a line without knowing its package."""
+
+
+class InputError(BorechainError):
+    """An argument or a file of the user is wrong; the message says where, what was expected and what came."""
+
+
+class TelemetryError(BorechainError):
     """Root of every error of this package."""
 
 
@@ -30,3 +43,7 @@ class EncodeError(TelemetryError, ValueError):
 
 class KeyFileError(TelemetryError, ValueError):
     """The file holds no key that may be used."""
+
+
+class CalibrationError(TelemetryError, InputError, ValueError):
+    """The record, the design or the file gives no calibration; the message says where and why; nothing was written."""

@@ -1,15 +1,7 @@
-"""The error of the calibration room.
-
-::
-
-    GroundError
-    └── CalibrationError(ValueError)   a record, a design or a block that is no calibration: nothing was written
-"""
+"""The error of the calibration room; the node, which reads a calibration file too, shares it."""
 
 from __future__ import annotations
 
-from groundstation.errors import GroundError
+from telemetry.errors import CalibrationError
 
-
-class CalibrationError(GroundError, ValueError):
-    """The record, the design or the block is no calibration; the message says where and why."""
+__all__ = ["CalibrationError"]

@@ -11,10 +11,10 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
-from groundstation.calibration.errors import CalibrationError
+from telemetry.calibration import check_invertible
+from telemetry.errors import CalibrationError
 
 Array = npt.NDArray[np.float64]
-SINGULAR = 1e6  # condition beyond which the axes of a sensor are not three
 
 
 @dataclass(frozen=True, slots=True)
@@ -69,15 +69,3 @@ def as_observations(positive: Array, negative: Array, reference: float) -> tuple
     """Truth (6, 3) and readings (6, 3) of a table, for the estimators that take any set of attitudes."""
     truth = reference * np.eye(3)
     return np.concatenate([truth, -truth]), np.concatenate([positive, negative])
-
-
-def check_invertible(matrix: Array) -> None:
-    """Refuse a matrix that cannot be inverted.
-
-    Raises
-    ------
-    CalibrationError
-        When an entry is not finite or the axes are not independent.
-    """
-    if not np.all(np.isfinite(matrix)) or not np.linalg.cond(matrix) < SINGULAR:
-        raise CalibrationError(f"matrix: expected three independent sensor axes, got {matrix.tolist()}")

@@ -3,20 +3,22 @@
 from __future__ import annotations
 
 import math
-import tomllib
 from pathlib import Path
-from typing import Annotated, Any, Literal, get_args
+from typing import Annotated, Any, Literal
 
 import numpy as np
-from pydantic import BaseModel, ConfigDict, Field, ValidationError
+from pydantic import BaseModel, ConfigDict, Field
 
 from groundstation.calibration.attitudes import rank_of, true_vectors
 from node.kernels.alignment import MAX_IMUS
 from sim.errors import ScenarioError
 from sim.faults import KillNode, parse_fault
 from sim.world.borehole import Borehole, read_displacements, read_stations
+from sim.world.parsing import read_toml, validate
+from sim.world.shipped import find_scenario
 from telemetry.messages import MAX_TUBE
 
+VERSION = 1  # of the format
 MAX_RATE_DPS = 57.0 * 6.0  # 57 rev/min: half a turn a cycle is where one sample a cycle aliases
 SURVEY_AFTER = 22.0  # s at rest, for a survey
 RECORD_MARGIN = 8.0  # s at an attitude beside its record: the tubes settle and the order travels
@@ -255,6 +257,7 @@ class CalibrationSection(Section):
 class ScenarioFile(Section):
     """A whole scenario file."""
 
+    version: int = Field(VERSION, ge=1, description="of this format; a newer one is refused")
     rig: RigSection
     path: PathSection
     schedule: ScheduleSection = ScheduleSection()
@@ -295,21 +298,21 @@ def scenario_of(tables: dict[str, Any], faults: tuple[str, ...] = ()) -> Scenari
         As ``load_scenario``.
     """
     where = Path("scenario")
-    try:
-        return _checked(where, ScenarioFile.model_validate(tables), faults)
-    except ValidationError as error:
-        raise ScenarioError(f"{where}: {_first(error)}") from error
+    return _checked(where, validate(where, tables, ScenarioFile, VERSION), faults)
 
 
 def load_scenario(path: Path, faults: tuple[str, ...] = ()) -> Scenario:
-    """Read and check a scenario; ``faults`` from the command line join those of the file.
+    """Read and check a scenario: a file, or the name of one that comes with the program.
+
+    ``faults`` from the command line join those of the file.
 
     Raises
     ------
     ScenarioError
         One line: the file, the key or line, what was expected and what came.
     """
-    return _checked(path, _parse(path), faults)
+    path = find_scenario(path)
+    return _checked(path, validate(path, read_toml(path), ScenarioFile, VERSION), faults)
 
 
 def _checked(path: Path, file: ScenarioFile, faults: tuple[str, ...]) -> Scenario:
@@ -421,31 +424,6 @@ def _check_calibration(path: Path, section: CalibrationSection | None) -> None:
             f"{path}: calibration.attitudes_deg: expected attitudes that determine bias and matrix (rank 4), "
             f"got rank {rank}; add some of other tilts"
         )
-
-
-def _parse(path: Path) -> ScenarioFile:
-    try:
-        with path.open("rb") as file:
-            return ScenarioFile.model_validate(tomllib.load(file))
-    except OSError as error:
-        raise ScenarioError(f"{path}: {error.strerror}; expected a scenario file, see scenarios/") from error
-    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
-        raise ScenarioError(f"{path}: not TOML: {error}") from error
-    except ValidationError as error:
-        raise ScenarioError(f"{path}: {_first(error)}") from error
-
-
-def _first(error: ValidationError) -> str:
-    first = error.errors()[0]
-    key = ".".join(str(part) for part in first["loc"])
-    if first["type"] == "extra_forbidden":
-        section = ScenarioFile.model_fields.get(str(first["loc"][0]))
-        known = ScenarioFile.model_fields if len(first["loc"]) == 1 or section is None else None
-        if known is None and section is not None:
-            table = next(a for a in (*get_args(section.annotation), section.annotation) if a is not type(None))
-            known = table.model_fields if isinstance(table, type) and issubclass(table, BaseModel) else None
-        return f"{key}: unknown key; expected one of {', '.join(known or ())}"
-    return f"{key}: {first['msg']}, got {first['input']!r:.60}"
 
 
 def _hole(path: Path, section: PathSection, length: float) -> Borehole:

@@ -9,7 +9,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from groundstation.calibration.block import Calibration, Provenance
+from groundstation.calibration.block import Calibration, Provenance, model_of
 from groundstation.service.blocks import block_of
 from node.firmware.block_trial import record_of
 from node.kernels.calibration import COLDEST, HOTTEST, USUAL, calibrate, identity_parameters
@@ -107,4 +107,4 @@ def test_the_node_corrects_as_the_ground_station_solved(powers: int, tmp_path: P
     block = block_of(1, 1, gyroscope, accelerometer)
     rate, force = corrected(block, (0.3, -0.2, 1.2), (0.1, 0.2, -9.7), 41.0)
     for got, solved, raw in ((rate, gyroscope, (0.3, -0.2, 1.2)), (force, accelerometer, (0.1, 0.2, -9.7))):
-        np.testing.assert_allclose(got, solved.model().correct(np.array(raw), np.array(41.0)), atol=1e-13)
+        np.testing.assert_allclose(got, model_of(solved).correct(np.array(raw), np.array(41.0)), atol=1e-13)

@@ -11,7 +11,6 @@ from hypothesis import given
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
-from borechain.cli.node.node import node as command
 from groundstation.survey.resolve import combine_imus
 from node.errors import ConfigurationError
 from node.firmware.alignment import rotation
@@ -24,6 +23,7 @@ from node.kernels.alignment import MAX_IMUS, new_mount
 from node.kernels.cluster import fuse
 from node.kernels.layout import DEG, PERIOD, Err, default_config, new_state
 from node.process.drivers.replay import ReplayImu
+from node.process.tube_command import node as command
 from node.process.tube_process import TubeProcess, reading_of
 from telemetry.messages import Event, NodeFlag, Severity, SurveyMeasurement
 from telemetry.parameters import SensorParameters

@@ -146,7 +146,7 @@ def test_one_error_of_the_bus_is_tried_again_and_a_lasting_one_named() -> None:
 
 def test_a_missing_library_and_a_missing_bus_are_named(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setitem(sys.modules, "smbus2", None)
-    with pytest.raises(SensorError, match=r"install borechain\[board\]"):
+    with pytest.raises(SensorError, match=r"pip install 'borechain\[board\]'"):
         open_bus(1)
     monkeypatch.undo()
     pytest.importorskip("smbus2")

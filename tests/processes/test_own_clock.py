@@ -19,8 +19,8 @@ import pytest
 from click.testing import CliRunner
 from rigs import PATIENCE, REPOSITORY, command, free_endpoint, run
 
-from borechain.cli.node.encoder import encoder
-from borechain.cli.node.node import node
+from node.process.encoder_command import encoder
+from node.process.tube_command import node
 from node.process.tube_process import TubeProcess
 from sim.studies.turning_string import TurningString
 from telemetry.application.endpoint import Endpoint

@@ -32,7 +32,17 @@ def refusal(scenario: Path, *faults: str) -> str:
     ("old", "new", "named"),
     [
         ("tubes = 3", "tubes = 3\ncolour = 1", "rig.colour: unknown key; expected one of tubes, tube_length_m"),
-        ("[rig]", "[colour]\n[rig]", "colour: unknown key; expected one of rig, path"),
+        ("[rig]", "[colour]\n[rig]", "colour: unknown key; expected one of version, rig, path"),
+        ("tubes = 3", "tube = 3", "rig.tube: unknown key; did you mean tubes? expected one of tubes, tube_length_m"),
+        ("[schedule]", "[shedule]", "shedule: unknown key; did you mean schedule? expected one of version, rig, path"),
+        (
+            "[rig]",
+            "[torsion]\nouter_diameter = 0.06\n[rig]",
+            "torsion.outer_diameter: unknown key; did you mean outer",
+        ),
+        ("[rig]", "version = 2\n[rig]", "version: expected at most 1, got 2; it needs a newer borechain"),
+        ("[rig]", 'version = "new"\n[rig]', "version: "),
+        ("[rig]", "version = 0\n[rig]", "version: "),
         ("tubes = 3", 'tubes = "three"', "rig.tubes"),
         ("tube_length_m = 2.0", "tube_length_m = -2.0", "rig.tube_length_m"),
         ("turns = 5", "turns = -5", "rotation.turns"),

@@ -12,18 +12,19 @@ import pytest
 from click.testing import CliRunner
 
 from borechain.cli.experiment.experiment import experiment
-from borechain.cli.node.node import node
 from borechain.cli.rig.rig import PRELOAD
 from node.firmware.encoder import COUNTS_PER_TURN
 from node.firmware.settings import KERNELS
 from node.kernels.layout import PERIOD, Scheme
-from sim.rig.plain_encoder import LINES, SAMPLE_RATE_HZ, PlainEncoder, single_samples
+from node.process.tube_command import node
+from sim.rig.plain_encoder import LINES, PlainEncoder
 from sim.studies import published_form
 from sim.studies.ingredients import run as ingredients
 from sim.studies.links import OnOff
 from sim.studies.modes import run as modes
 from sim.studies.node_lab import REST, ROTATING, Lab, LabRun, LabSetup
 from sim.studies.trials import rms_deg
+from sim.world.imu_errors import SAMPLE_RATE_HZ, single_samples
 from sim.world.scenario import GyroSection, NodeSection
 
 SEEDS = 6

@@ -72,11 +72,12 @@ def realtime(nodes: int, seconds: float, endpoint: str, out: Path | None, as_jso
 
 def prepare(nodes: int, seconds: float, endpoint: str, folder: Path, seed: int) -> tuple[Any, Any]:
     """Record the string and write the table of its processes."""
-    from borechain.host import OwnTime, Place, run_encoder, run_node
     from node.process.drivers.timed import TimedEncoder, TimedImu
+    from node.process.host import run_encoder, run_node
     from sim.rig.processes import ProcessTable, Spec
     from sim.studies.turning_string import TurningString
     from telemetry.messages import BASE, ENCODER, Side
+    from telemetry.runtime.hosting import OwnTime, Place
 
     rest = START_ALLOWANCE * nodes + 0.5 * seconds
     string = TurningString(nodes, time.monotonic(), rest, 0.25 * seconds, rest + seconds + SPARE, seed)

@@ -6,8 +6,9 @@ from pathlib import Path
 
 import click
 
-from borechain.cli.faults import plain_faults
-from borechain.cli.options import fault_option, place_options, seed_option, speed_option
+from borechain.cli.faults import needs, plain_faults
+from borechain.cli.options import fault_option, seed_option, speed_option
+from telemetry.runtime.options import place_options
 
 
 @click.command()
@@ -17,6 +18,7 @@ from borechain.cli.options import fault_option, place_options, seed_option, spee
 @fault_option
 @click.option("--router/--no-router", default=False, help="Be the router of this rig, instead of joining one.")
 @place_options
+@needs("scipy")
 @plain_faults
 def medium(
     scenario: Path,
@@ -34,6 +36,7 @@ def medium(
     Example:
       borechain medium scenarios/compose-2.toml --speed 1
     """
-    from borechain.host import Place, run_medium
+    from borechain.host import run_medium
+    from telemetry.runtime.hosting import Place
 
     run_medium(Place(rig_name, endpoint, folder), scenario, seed, speed, faults, router)

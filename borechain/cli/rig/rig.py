@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from borechain.cli.faults import EnvironmentFault, plain_faults
+from borechain.cli.faults import EnvironmentFault, needs, plain_faults
 from borechain.cli.options import fault_option, json_option, seed_option, speed_option
 from borechain.cli.tables import console
 from telemetry import keys
@@ -42,6 +42,7 @@ PRELOAD = {"float64": "borechain.warm", "fixed": "borechain.warm_all", "publishe
     "--out", type=click.Path(path_type=Path), help="New or empty folder for the run  [default: out/NAME/run-NNNN]"
 )
 @json_option
+@needs("rich", "scipy", "sqlalchemy")
 @plain_faults
 def rig(
     scenario: Path,
@@ -59,8 +60,8 @@ def rig(
 
     \b
     Examples:
-      borechain rig scenarios/wellbore-1.toml
-      borechain rig scenarios/wellbore-1.toml --speed 1 --fault kill-node:3@900
+      borechain rig wellbore-1
+      borechain rig wellbore-1 --speed 1 --fault kill-node:3@900
     """
     del transport
     from sim.rig.launcher import check_port_free, next_run_folder, prepare_folder
@@ -137,9 +138,12 @@ def process_table(
     folder: Path,
 ) -> ProcessTable:
     """Every process of the rig, one line each."""
-    from borechain.host import Place, run_encoder, run_ground, run_medium, run_node
+    from borechain.host import run_medium
+    from groundstation.host import run_ground
+    from node.process.host import run_encoder, run_node
     from sim.rig.launcher import private_folder
     from sim.rig.processes import ProcessTable, Spec
+    from telemetry.runtime.hosting import Place
     from telemetry.transport.authentication import new_key
 
     key_file = new_key(folder / "rig.key")

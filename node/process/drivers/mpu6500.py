@@ -67,7 +67,7 @@ def open_bus(number: int) -> Bus:
     try:
         library: Any = importlib.import_module("smbus2")
     except ImportError as error:
-        raise SensorError("mpu6500: needs smbus2; install borechain[board]") from error
+        raise SensorError("mpu6500: needs the extra board: pip install 'borechain[board]'") from error
     try:
         return cast("Bus", library.SMBus(number))
     except OSError as error:

@@ -10,7 +10,7 @@ import pytest
 
 from groundstation.calibration.errors import CalibrationError
 from groundstation.calibration.records import read_attitudes, read_static, read_turn_table
-from groundstation.errors import GroundError
+from telemetry.errors import InputError
 
 DATA = Path(__file__).parents[2] / "data" / "calibration"
 POS_NEG = "axis,x_pos,x_neg,y_pos,y_neg,z_pos,z_neg"
@@ -47,7 +47,7 @@ def static(folder: Path, samples: np.ndarray, npy: bool = False) -> Path:
 
 
 def test_the_error_is_one_of_the_ground_station_and_a_value_error() -> None:
-    assert issubclass(CalibrationError, GroundError)
+    assert issubclass(CalibrationError, InputError)
     assert issubclass(CalibrationError, ValueError)
 
 

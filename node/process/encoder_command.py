@@ -1,4 +1,4 @@
-"""``borechain encoder``: the encoder node on the drive head."""
+"""``borechain encoder`` and ``python -m node encoder``: the encoder node on the drive head."""
 
 from __future__ import annotations
 
@@ -6,14 +6,25 @@ from pathlib import Path
 
 import click
 
-from borechain.cli.faults import plain_faults
-from borechain.cli.options import above_option, below_option, clock_option, own_neighbours, place_options
+from telemetry.runtime.command_line import plain_faults
+from telemetry.runtime.options import above_option, below_option, clock_option, own_neighbours, place_options
 
 
 @click.command()
-@click.option("--counter", help="The node's own counter: counter:FILE, replay:FILE or timed:FILE.")
-@click.option("--torque-nm", type=float, default=0.0, help="Drilling torque, until a sensor tells it; 0: no torsion.")
-@click.option("--trapped-fraction", type=float, default=0.01, show_default=True, help="Of it after a stop, 1 sigma.")
+@click.option("--counter", help="The encoder's own counter: counter:FILE, replay:FILE or timed:FILE.")
+@click.option(
+    "--torque-nm",
+    type=float,
+    default=0.0,
+    help="Drilling torque while no sensor measures it; 0: the string does not twist.",
+)
+@click.option(
+    "--trapped-fraction",
+    type=float,
+    default=0.01,
+    show_default=True,
+    help="Share of the torque still in the string after a stop, standard deviation.",
+)
 @clock_option
 @above_option
 @below_option
@@ -37,10 +48,11 @@ def encoder(
       borechain encoder --folder state/encoder
       borechain encoder --clock own --counter replay:counter.csv --above base --below 2
     """
-    from borechain.host import OwnTime, Place, run_encoder
     from node.firmware.torque import TorqueSettings
     from node.process.drivers.choice import encoder_source
+    from node.process.host import run_encoder
     from telemetry.messages import ENCODER, Side
+    from telemetry.runtime.hosting import OwnTime, Place
 
     neighbours = own_neighbours(clock, ENCODER, ("--counter", counter), {Side.UPPER: above, Side.LOWER: below})
     own_time = None if neighbours is None else OwnTime(neighbours)

@@ -1,4 +1,4 @@
-"""Options of ``borechain node`` that tell of several IMUs, as the settings of its cluster."""
+"""Options of the node's command about several IMUs, as the settings of its cluster."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ def cluster(
     ConfigurationError
         When options were given for different numbers of IMUs.
     CalibrationError
-        When a file holds no calibration of its sensor.
+        When a file is not a calibration of its sensor.
     """
     from node.errors import ConfigurationError
     from node.firmware.imu_settings import ImuSettings
@@ -53,9 +53,8 @@ def cluster(
 
 def own_corrections(sensor: str, files: tuple[Path, ...], count: int) -> list[SensorParameters]:
     """Correction of one sensor of each of ``count`` IMUs; none without files."""
-    from groundstation.calibration.block import read
-    from groundstation.calibration.errors import CalibrationError
-    from groundstation.service.blocks import sensor_parameters
+    from telemetry.calibration import read, sensor_parameters
+    from telemetry.errors import CalibrationError
     from telemetry.parameters import SensorParameters
 
     corrections = []

@@ -1,4 +1,4 @@
-"""``borechain node``: what a tube's board runs."""
+"""``borechain node`` and ``python -m node``: what a tube's board runs."""
 
 from __future__ import annotations
 
@@ -8,9 +8,16 @@ from typing import Literal
 
 import click
 
-from borechain.cli.faults import plain_faults
-from borechain.cli.node.cluster import cluster
-from borechain.cli.options import above_option, below_option, clock_option, key_option, own_neighbours, place_options
+from node.process.cluster_options import cluster
+from telemetry.runtime.command_line import check_installed, plain_faults
+from telemetry.runtime.options import (
+    above_option,
+    below_option,
+    clock_option,
+    key_option,
+    own_neighbours,
+    place_options,
+)
 
 FILE = click.Path(path_type=Path, dir_okay=False)
 SCHEMES = ("forward", "estimate", "intersection")
@@ -18,55 +25,88 @@ SCHEMES = ("forward", "estimate", "intersection")
 
 @click.command()
 @click.option("--tube", type=int, required=True, help="Number of the tube, 1 is the lowest.")
-@click.option("--drive-joint-deg", type=float, default=0.0, help="Scribe-mark reading, drive head to this tube.")
-@click.option("--lower-joint-deg", type=float, default=0.0, help="Scribe-mark reading, this tube to the one below.")
-@click.option("--joint-std-deg", type=float, default=0.05, show_default=True, help="Error of a reading, 1 sigma.")
-@click.option("--mount-std-deg", type=float, default=0.05, show_default=True, help="Error of the IMU's mount, 1 sigma.")
+@click.option(
+    "--drive-joint-deg", type=float, default=0.0, help="Angle read from the scribe marks, drive head to this tube."
+)
+@click.option(
+    "--lower-joint-deg", type=float, default=0.0, help="Angle read from the scribe marks, this tube to the one below."
+)
+@click.option("--joint-std-deg", type=float, default=0.05, show_default=True, help="Standard error of such a reading.")
+@click.option(
+    "--mount-std-deg",
+    type=float,
+    default=0.05,
+    show_default=True,
+    help="Standard error of the IMU's mounting about the tube's axis.",
+)
 @click.option(
     "--kernel",
     type=click.Choice(["float64", "fixed", "published"]),
     default="float64",
     show_default=True,
-    help="Arithmetic of the loop, or its published form.",
+    help="Filter in floating point, in integers, or in its published form (for comparison only).",
 )
 @click.option(
     "--scheme",
     type=click.Choice(SCHEMES),
     default="forward",
     show_default=True,
-    help="What goes down the string: the encoder's measurement, or the node's own estimate and how it is taken.",
+    help="What is relayed down the string: the encoder's measurement, or (for comparison) the node's own estimate.",
 )
 @click.option(
-    "--stiffness-nm", type=float, default=math.inf, help="Torque that twists the tube by 1 rad; rigid if absent."
+    "--stiffness-nm",
+    type=float,
+    default=math.inf,
+    help="Torsional stiffness of the tube, N m per rad; rigid if absent.",
 )
 @click.option(
     "--torsion",
     type=click.Choice(["gate", "variance"]),
     default="gate",
     show_default=True,
-    help="Aiding under torque: not used, or used with the variance of the twist.",
+    help="Yaw from above while the string is under torque: ignored, or used with the variance of the twist.",
 )
 @click.option(
     "--joints",
     type=click.Choice(["marks", "solved", "both"]),
     default="marks",
     show_default=True,
-    help="Whence the angle of a joint comes that is made up above.",
+    help="Source of the angle of a joint made up above: scribe marks, the node's saved yaw, or both.",
 )
 @click.option(
     "--imu",
     "sources",
     multiple=True,
-    help="The node's own sensor: replay:FILE, timed:FILE, mpu6500:BUS or mpu6500:BUS:ADDRESS; for each.",
-)
-@click.option("--imu-noise", "noises", type=float, multiple=True, help="Noise of an IMU, times the usual; for each.")
-@click.option(
-    "--imu-offset-mm", "offsets", type=(float, float), multiple=True, help="Place off the tube's axis, X Y; for each."
+    help="The node's own IMU: replay:FILE, timed:FILE, mpu6500:BUS or mpu6500:BUS:ADDRESS. Repeat for several.",
 )
 @click.option(
-    "--imu-gyroscope", "gyroscopes", type=FILE, multiple=True, help="Calibration of an IMU's gyroscope; for each."
+    "--imu-noise",
+    "noises",
+    type=float,
+    multiple=True,
+    help="Noise of an IMU as a multiple of the default. Once for each IMU.",
 )
-@click.option("--imu-accelerometer", "accelerometers", type=FILE, multiple=True, help="Of its accelerometer; for each.")
+@click.option(
+    "--imu-offset-mm",
+    "offsets",
+    type=(float, float),
+    multiple=True,
+    help="Position of an IMU off the tube's axis, X Y. Once for each IMU.",
+)
+@click.option(
+    "--imu-gyroscope",
+    "gyroscopes",
+    type=FILE,
+    multiple=True,
+    help="Calibration file of an IMU's gyroscope. Once for each IMU.",
+)
+@click.option(
+    "--imu-accelerometer",
+    "accelerometers",
+    type=FILE,
+    multiple=True,
+    help="Calibration file of an IMU's accelerometer. Once for each IMU.",
+)
 @clock_option
 @above_option
 @below_option
@@ -105,12 +145,15 @@ def node(
       borechain node --tube 1 --imu mpu6500:1:0x68 --imu mpu6500:1:0x69
       borechain node --tube 1 --clock own --imu mpu6500:1 --above 2 --folder state/tube-1
     """
-    from borechain.host import OwnTime, Place, run_node
     from node.firmware.settings import Joint, TubeSettings
     from node.kernels.layout import Scheme
     from node.process.drivers.choice import imu_source
+    from node.process.host import run_node
     from telemetry.messages import Side
+    from telemetry.runtime.hosting import OwnTime, Place
 
+    if any(source.startswith("mpu6500") for source in sources):
+        check_installed("smbus2")
     joint_std = math.radians(joint_std_deg)
     settings = TubeSettings(
         tube=tube,

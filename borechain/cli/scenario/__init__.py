@@ -1,0 +1,1 @@
+"""Commands about the scenarios that come with the program."""

@@ -1,0 +1,49 @@
+"""What hosts a node or the encoder, whether a launcher forked it or its command started it."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from node.firmware.settings import TubeSettings
+from node.firmware.torque import TorqueSettings
+from node.kernels.layout import PERIOD
+from node.process.drivers.source import EncoderSource, ImuSource
+from node.process.encoder_process import EncoderProcess
+from node.process.tube_process import TubeProcess
+from telemetry.messages import ENCODER
+from telemetry.runtime.hosting import OwnTime, Place, run_by_own_clock, run_stepped
+from telemetry.runtime.timing import CycleTiming
+from telemetry.transport.authentication import read_key
+
+
+def run_node(
+    place: Place, settings: TubeSettings, imus: Sequence[ImuSource] = (), own_time: OwnTime | None = None
+) -> None:
+    """Node of one tube until a signal comes; ``imus`` are its own sensors."""
+    key = read_key(place.key_file) if place.key_file is not None else None
+
+    def build(timing: CycleTiming | None = None) -> TubeProcess:
+        return TubeProcess(settings, place.folder, key=key, imus=imus, timing=timing)
+
+    name = f"node {settings.tube}"
+    if own_time is None:
+        run_stepped(name, place, settings.tube, build)
+    else:
+        run_by_own_clock(name, place, settings.tube, own_time, build, PERIOD)
+
+
+def run_encoder(
+    place: Place,
+    source: EncoderSource | None = None,
+    own_time: OwnTime | None = None,
+    torque: TorqueSettings | None = None,
+) -> None:
+    """Encoder node on the drive head; ``source`` is its own counter, ``torque`` that of the drive."""
+
+    def build(timing: CycleTiming | None = None) -> EncoderProcess:
+        return EncoderProcess(place.folder, source, torque, timing)
+
+    if own_time is None:
+        run_stepped("encoder", place, ENCODER, build)
+    else:
+        run_by_own_clock("encoder", place, ENCODER, own_time, build, PERIOD)

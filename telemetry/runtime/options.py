@@ -1,0 +1,117 @@
+"""Options of every process: which rig, which router, which folder, which clock and who is at its ends."""
+
+from __future__ import annotations
+
+import tomllib
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import click
+
+from telemetry import keys
+from telemetry.messages import BASE, ENCODER, MAX_TUBE, Side, address_name
+from telemetry.runtime.command_line import InputFault
+
+
+def read_config(context: click.Context, _parameter: click.Parameter, path: Path | None) -> None:
+    """Take the options of a command from a TOML file; what stands on the command line wins."""
+    if path is None:
+        return
+    try:
+        values = tomllib.loads(path.read_text())
+    except OSError as error:
+        raise click.BadParameter(f"{path}: {error.strerror}") from None
+    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
+        raise click.BadParameter(f"{path}: not TOML: {error}") from None
+    known = {option: p.name for p in context.command.params for option in p.opts if option.startswith("--")}
+    unknown = [name for name in values if f"--{name}" not in known or name == "config"]
+    if unknown:
+        names = ", ".join(sorted(option[2:] for option in known if option != "--config"))
+        raise click.BadParameter(f"{path}: {unknown[0]}: unknown key; expected one of {names}")
+    context.default_map = {known[f"--{name}"]: value for name, value in values.items()}
+
+
+def place_options(command: Callable[..., Any]) -> Callable[..., Any]:
+    """Options of every process: which rig, which router, which folder, and a file that holds any of its options."""
+    for option in (
+        click.option(
+            "--config",
+            type=click.Path(path_type=Path, dir_okay=False),
+            callback=read_config,
+            is_eager=True,
+            expose_value=False,
+            help="TOML file with options of this command, named as here without the dashes in front.",
+        ),
+        click.option(
+            "--rig", "rig_name", default=keys.DEFAULT_RIG, show_default=True, help="Name of the rig in key expressions."
+        ),
+        click.option("--endpoint", default=keys.DEFAULT_ENDPOINT, show_default=True, help="zenoh router to join."),
+        click.option(
+            "--folder",
+            type=click.Path(path_type=Path, file_okay=False),
+            default=Path("state"),
+            show_default=True,
+            help="Where the process keeps what must survive a restart.",
+        ),
+    ):
+        command = option(command)
+    return command
+
+
+key_option = click.option(
+    "--key-file",
+    type=click.Path(path_type=Path, dir_okay=False),
+    help="Key of the rig, 64 hex digits, readable by its owner alone. Without it no parameter block is sent or taken.",
+)
+
+
+def parse_neighbour(_context: click.Context, _parameter: click.Parameter, value: str | None) -> int | None:
+    """Address of a neighbour by its name."""
+    named = {"encoder": ENCODER, "base": BASE}
+    if value is None or value in named:
+        return None if value is None else named[value]
+    if not value.isdecimal() or not 1 <= int(value) <= MAX_TUBE:
+        raise click.BadParameter(f"expected encoder, base or a tube 1..{MAX_TUBE}, got {value}")
+    return int(value)
+
+
+clock_option = click.option(
+    "--clock",
+    type=click.Choice(["stepper", "own"]),
+    default="stepper",
+    show_default=True,
+    help="What drives the process: a stepper, step by step, or this machine's own clock.",
+)
+above_option = click.option(
+    "--above", callback=parse_neighbour, help="Neighbour at the upper end, with --clock own: encoder, base or a tube."
+)
+below_option = click.option(
+    "--below", callback=parse_neighbour, help="Neighbour at the lower end, with --clock own: a tube."
+)
+
+
+def own_neighbours(
+    clock: str, address: int, sensor: tuple[str, str | tuple[str, ...] | None], ends: dict[Side, int | None]
+) -> dict[Side, int] | None:
+    """Who is at the ends of a process with a clock of its own; None where a stepper drives it.
+
+    ``sensor`` is the option that names it and what was given.
+
+    Raises
+    ------
+    InputFault
+        When the options do not fit each other.
+    """
+    joined = {side: neighbour for side, neighbour in ends.items() if neighbour is not None}
+    if clock == "stepper":
+        if joined:
+            raise InputFault("--above and --below: expected --clock own with them; otherwise the medium joins")
+        return None
+    option, given = sensor
+    if not given:
+        raise InputFault(f"--clock own: expected {option} with it, since no stepper brings readings")
+    if address in joined.values() or len(set(joined.values())) < len(joined):
+        names = ", ".join(address_name(neighbour) for neighbour in joined.values())
+        raise InputFault(f"--above, --below: expected two others than {address_name(address)} itself, got {names}")
+    return joined
