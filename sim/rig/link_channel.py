@@ -1,4 +1,4 @@
-"""The medium between two joined tube ends: latency, jitter, loss and duplication, drawn per direction of a joint."""
+"""What happens to frames between two joined tube ends: latency, jitter, loss, copies and damage, drawn per port."""
 
 from __future__ import annotations
 
@@ -6,40 +6,48 @@ from sim.world.streams import Stream, stream
 from telemetry.messages import Side
 
 BLOCK = 1024
+DAMAGE = 1  # of a port's streams: which bit is flipped; apart from the fates, so that damage shifts no other draw
 
 
 class LinkChannel:
-    """Delays of the copies of a frame that arrive, from streams of their own for each port.
+    """Copies of frames that arrive, each with its delay; every port has streams of its own.
+
+    ``severed`` holds the ports that carry nothing for now, a plain field to be switched by whoever tests.
 
     Parameters
     ----------
     seed : of the rig; the draws of a port depend on it, the port and how many frames left the port, on nothing else
     latency, jitter : s, constant part and mean of the exponential part of one hop
-    loss, duplicate : probabilities of a frame
+    loss, duplicate, corrupt : probabilities of a frame, and of a copy
     """
 
-    def __init__(self, seed: int, latency: float, jitter: float, loss: float, duplicate: float) -> None:
+    def __init__(
+        self, seed: int, latency: float, jitter: float, loss: float, duplicate: float, corrupt: float = 0.0
+    ) -> None:
         self._seed = seed
         self.latency = latency
         self._jitter = jitter
         self._loss = loss
         self._duplicate = duplicate
+        self._corrupt = corrupt
         self._streams: dict[tuple[int, Side], PortStream] = {}
+        self.severed: set[tuple[int, Side]] = set()
         self.lost = 0
 
-    def deliveries(self, sender: int, side: Side) -> tuple[float, ...]:
-        """Delay (s) of each copy of the next frame leaving this port; empty when it is lost."""
-        stream = self._streams.get((sender, side))
-        if stream is None:
-            stream = self._streams[sender, side] = PortStream(self._seed, sender, side)
-        fate, wait, again = stream.draw()
-        if fate < self._loss:
+    def deliveries(self, sender: int, side: Side, frame: bytes) -> list[tuple[float, bytes]]:
+        """Delay (s) and bytes of each copy of the next frame leaving this port; none when it is lost."""
+        drawn = self._streams.get((sender, side))
+        if drawn is None:
+            drawn = self._streams[sender, side] = PortStream(self._seed, sender, side)
+        fate, wait, again = drawn.draw()
+        if fate < self._loss or (sender, side) in self.severed:
             self.lost += 1
-            return ()
+            return []
         first = self.latency + self._jitter * wait
+        delays = [first]
         if fate > 1.0 - self._duplicate:
-            return first, first + self.latency + self._jitter * again
-        return (first,)
+            delays.append(first + self.latency + self._jitter * again)
+        return [(delay, drawn.damage(frame, self._corrupt)) for delay in delays]
 
 
 class PortStream:
@@ -47,6 +55,7 @@ class PortStream:
 
     def __init__(self, seed: int, sender: int, side: Side) -> None:
         self._random = stream(seed, Stream.LINK, sender, int(side))
+        self._damage = stream(seed, Stream.LINK, sender, int(side), DAMAGE)
         self._block: list[tuple[float, float, float]] = []
 
     def draw(self) -> tuple[float, float, float]:
@@ -57,3 +66,11 @@ class PortStream:
             self._block = list(zip(fate.tolist(), waits[:, 0].tolist(), waits[:, 1].tolist(), strict=True))
             self._block.reverse()
         return self._block.pop()
+
+    def damage(self, frame: bytes, probability: float) -> bytes:
+        """The frame, one bit of it flipped with a probability."""
+        if probability == 0.0 or self._damage.random() >= probability:
+            return frame
+        damaged = bytearray(frame)
+        damaged[int(self._damage.integers(len(damaged)))] ^= 1 << int(self._damage.integers(8))
+        return bytes(damaged)

@@ -75,7 +75,9 @@ class Scheduler:
         self._cued = cued
         self._speed = speed
         medium = world.scenario.medium
-        self.air = LinkChannel(world.seed, medium.latency, medium.jitter, medium.loss, medium.duplicate)
+        self.channel = LinkChannel(
+            world.seed, medium.latency, medium.jitter, medium.loss, medium.duplicate, medium.corrupt
+        )
         self.progress = Progress("starting", world.begin, world.begin, world.end, [ENCODER, BASE])
         self._queue: list[Entry] = []
         self._count = 0
@@ -84,6 +86,7 @@ class Scheduler:
         self._string: tuple[int, ...] = ()
         self._open_top = False
         self._missing_since: dict[int, float] = {}
+        self._changes: deque[Change] = deque()
         self._stopping = False
         self._interrupt: queue.SimpleQueue[None] = queue.SimpleQueue()  # its put is safe inside a signal handler
         self._wall_begin = 0.0
@@ -106,26 +109,39 @@ class Scheduler:
         RigError
             When a wanted process does not come.
         """
-        changes = deque(self._changes())
-        self._push(self.world.cycle_end(0), -1, None, b"")
-        self._attach(ENCODER)
-        self._attach(BASE)
-        self._wall_begin = time.monotonic()
-        while self._queue and not self._stopping:
-            if changes and changes[0].at <= self._queue[0][0]:
-                changes.popleft().apply()
-                continue
-            limit = self._queue[0][0] + self.air.latency
-            if changes:
-                limit = min(limit, changes[0].at)
-            self._pace(self._queue[0][0])
-            self._round(limit)
+        self.begin()
+        self.advance()
         finished = not self._stopping
         self.progress.finished = finished
         self._tell(self.progress)
         return finished
 
-    def _changes(self) -> list[Change]:
+    def begin(self) -> None:
+        """Have the first processes started and everything that will change put in order of time."""
+        self._changes = deque(self._all_changes())
+        self._push(self.world.cycle_end(0), -1, None, b"")
+        self._attach(ENCODER)
+        self._attach(BASE)
+        if self.world.rack is None:
+            at_start = self.world.scenario.file.rig.tubes_at_start
+            self._string = tuple(range(at_start, 0, -1))
+            for tube in reversed(self._string):
+                self._want(tube)
+        self._wall_begin = time.monotonic()
+
+    def advance(self, to: float = math.inf, until: Callable[[], bool] = lambda: False) -> None:
+        """Let the rig's time pass to ``to`` (s), to the end of the schedule, or until something holds."""
+        while self._queue and self._queue[0][0] <= to and not self._stopping and not until():
+            if self._changes and self._changes[0].at <= self._queue[0][0]:
+                self._changes.popleft().apply()
+                continue
+            limit = self._queue[0][0] + self.channel.latency
+            if self._changes:
+                limit = min(limit, self._changes[0].at)
+            self._pace(self._queue[0][0])
+            self._round(limit)
+
+    def _all_changes(self) -> list[Change]:
         """Everything the schedule and the faults do to the rig, in order of time."""
         changes = []
         for phase in self.world.phases:
@@ -301,9 +317,9 @@ class Scheduler:
         for sent, frame in answer.frames:
             at = true_time[address, sent.at]
             end = self._other_end(address, sent.side)
-            for delay in self.air.deliveries(address, sent.side):
+            for delay, arriving in self.channel.deliveries(address, sent.side, frame):
                 if end is not None:
-                    self._push(at + delay, end[0], Due(int(end[1])), frame)
+                    self._push(at + delay, end[0], Due(int(end[1])), arriving)
         wake = self.world.true_time(address, answer.wake_at) if math.isfinite(answer.wake_at) else math.inf
         if math.isfinite(wake) and self._wake.get(address) != wake:
             self._push(wake, address, Due.TIMER, b"")

@@ -176,6 +176,7 @@ class MediumSection(Section):
     jitter_ms: NotNegative = Field(0.3, description="mean of the exponential part")
     loss: Probability = 0.01
     duplicate: Probability = 0.001
+    corrupt: Probability = Field(0.0, description="one bit of a frame's copy is flipped")
 
     @property
     def latency(self) -> float:

@@ -85,17 +85,26 @@ def test_clocks_differ_and_come_back() -> None:
         assert world.true_time(address, local) == pytest.approx(1234.5, abs=1e-9)
 
 
-def test_the_air_depends_on_the_port_and_nothing_else() -> None:
+def test_a_link_channel_depends_on_the_port_and_nothing_else() -> None:
     from sim.rig.link_channel import LinkChannel
 
+    frame = bytes(40)
     one, other = LinkChannel(1, 0.003, 0.001, 0.2, 0.1), LinkChannel(1, 0.003, 0.001, 0.2, 0.1)
-    upper = [one.deliveries(1, Side.UPPER) for _ in range(3000)]
+    upper = [one.deliveries(1, Side.UPPER, frame) for _ in range(3000)]
     for _ in range(500):
-        other.deliveries(2, Side.LOWER)
-    assert upper == [other.deliveries(1, Side.UPPER) for _ in range(3000)]
+        other.deliveries(2, Side.LOWER, frame)
+    assert upper == [other.deliveries(1, Side.UPPER, frame) for _ in range(3000)]
     assert sum(not d for d in upper) / 3000 == pytest.approx(0.2, abs=0.03)
     assert sum(len(d) == 2 for d in upper) / 3000 == pytest.approx(0.1, abs=0.03)
-    assert min(delay for d in upper for delay in d) >= 0.003
+    assert min(delay for d in upper for delay, _ in d) >= 0.003
+    damaging = LinkChannel(1, 0.003, 0.001, 0.2, 0.1, 0.5)
+    damaged = [damaging.deliveries(1, Side.UPPER, frame) for _ in range(3000)]
+    assert [[delay for delay, _ in d] for d in damaged] == [[delay for delay, _ in d] for d in upper]
+    copies = [copy for d in damaged for _, copy in d]
+    assert sum(copy != frame for copy in copies) / len(copies) == pytest.approx(0.5, abs=0.05)
+    assert all(sum(byte.bit_count() for byte in copy) <= 1 for copy in copies)
+    damaging.severed.add((1, Side.UPPER))
+    assert damaging.deliveries(1, Side.UPPER, frame) == []
 
 
 def scenario_of(tmp_path: Path, *replaced: tuple[str, str]) -> Path:
