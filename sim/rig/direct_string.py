@@ -9,7 +9,7 @@ a scenario asks for it; ``sim.rig.in_process`` is the string with its link.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
@@ -17,16 +17,16 @@ import numpy.typing as npt
 
 from node.firmware.encoder import EncoderNode, EncoderSample
 from node.firmware.inputs import ImuReading, RigContext
+from node.firmware.reporter import VAR_FLOOR
 from node.firmware.tube import Tube
-from node.kernels.angles import wrap
-from node.kernels.layout import PERIOD, Scheme, default_config, new_state
+from node.kernels.layout import PERIOD, Err, Scheme, default_config, new_state
 from sim.errors import ScenarioError
 from sim.rig.plain_encoder import PlainEncoder
 from sim.world.imu_errors import gauss_markov
 from sim.world.scenario import AidingSection
 from sim.world.streams import Stream, stream
 from sim.world.world import World
-from telemetry.messages import Aiding, Event, NodeState, SurveyMeasurement
+from telemetry.messages import Aiding, Event, Message, NodeState, SurveyMeasurement
 
 Array = npt.NDArray[np.float64]
 Mask = npt.NDArray[np.bool_]
@@ -34,6 +34,7 @@ Sample = list[float]  # three rates (rad/s), three forces (m/s^2)
 Spoil = Callable[[int, int, Sample], Sample]
 SILENT_AFTER = 3.5  # s, until a node takes the neighbour above for gone
 NEVER = 10**9  # cycles
+TURN_OF_BINARY = math.tau / 2.0**32
 
 
 @dataclass(frozen=True, slots=True)
@@ -95,7 +96,11 @@ class DirectString:
         if self._file.medium.link != "off":
             raise ScenarioError('medium.link: expected "off" for a string without frames')
         self._spoil = spoil
-        self.tubes = {tube: self._fresh_tube(tube, state_every) for tube in range(1, world.scenario.tubes + 1)}
+        count = world.scenario.tubes
+        self._configs = self._tuned_configs(count)
+        # the records of all tubes in one array, so that a cycle is read off in a few operations
+        self._states = np.concatenate([new_state(self._configs[k : k + 1]) for k in range(count)])
+        self.tubes = {tube: self._fresh_tube(tube, state_every) for tube in range(1, count + 1)}
         self._encoder = EncoderNode(torque=world.torque_settings())
         sensor = self._file.encoder
         self._plain = None if sensor.edge_times else PlainEncoder(sensor.counts_per_turn)
@@ -104,6 +109,7 @@ class DirectString:
         self._clocks = self._clock_errors()
         self._phases = {tube: world.phase(tube) for tube in self.tubes}
         self._adds = [phase for phase in world.phases if phase.kind == "add"]
+        self._mount_var = math.radians(self._file.joints.mount_std_deg) ** 2
         self._own: dict[int, Aiding | None] = {}  # what each node said in its cycle, by the schemes of estimates
         self.run = self._empty_run()
 
@@ -122,20 +128,26 @@ class DirectString:
             locked = self._file.encoder.phase == "locked"
             if not locked:
                 self._relay(cycle, measured, string, end)
-            for tube in string:
-                self._run_cycle(cycle, tube, string)
+            said = {tube: self._run_cycle(cycle, tube, string) for tube in string}
+            self._keep(cycle, string, said)
             if locked:  # cycles end with the encoder's, and what it measures then arrives after them
                 self._relay(cycle, measured, string, end)
             yield cycle
 
-    def _fresh_tube(self, tube: int, state_every: int) -> Tube:
+    def _tuned_configs(self, count: int) -> Array:
         config = default_config()
+        names = config.dtype.names or ()
         for name, value in self._file.node.tuning.items():
-            if name not in (config.dtype.names or ()):
-                raise ScenarioError(f"node.tuning.{name}: expected one of {', '.join(config.dtype.names or ())}")
+            if name not in names:
+                raise ScenarioError(f"node.tuning.{name}: expected one of {', '.join(names)}")
             config[0][name] = value
+        return np.repeat(config, count)
+
+    def _fresh_tube(self, tube: int, state_every: int) -> Tube:
         settings = replace(self.world.tube_settings(tube), state_every=state_every)
-        return Tube(settings, config, new_state(config), iter(range(NEVER)).__next__, restored=False)
+        own = slice(tube - 1, tube)
+        numbers = iter(range(NEVER)).__next__
+        return Tube(settings, self._configs[own], self._states[own], numbers, restored=False)
 
     def _losses(self) -> Mask:
         """Whether an aiding is lost on the hop to a tube, (cycles, tubes)."""
@@ -163,24 +175,12 @@ class DirectString:
         """Whether the joint below the head is open, and was for ``since`` s."""
         return any(phase.start + since < t < phase.joint_closed for phase in self._adds)
 
-    def _run_cycle(self, cycle: int, tube: int, string: Sequence[int]) -> None:
-        top = string[0]
-        begin = self.world.cycle_end(cycle - 1) + self._phases[tube]
-        end = self.world.cycle_end(cycle) + self._phases[tube]
-        firmware = self.tubes[tube]
+    def _run_cycle(self, cycle: int, tube: int, string: Sequence[int]) -> list[Message]:
+        phase = self._phases[tube]
+        begin, end = self.world.cycle_end(cycle - 1) + phase, self.world.cycle_end(cycle) + phase
         wx, wy, wz, fx, fy, fz = self._spoil(tube, cycle, self.world.imu_sample(tube, cycle))
-        said = list(
-            firmware.on_cycle(ImuReading(begin, end, (wx, wy, wz), (fx, fy, fz)), self._context(tube, top, end))
-        )
-        self._own[tube] = next((message for message in said if isinstance(message, Aiding)), None)
-        self._keep(cycle, tube, end, firmware)
-        for message in said:
-            if isinstance(message, SurveyMeasurement):
-                self.run.surveys.append(Survey(cycle, tube, float(self.run.total_error[cycle, tube - 1]), message))
-            elif isinstance(message, Event):
-                self.run.events.append((cycle, message))
-            elif isinstance(message, NodeState):
-                self.run.states.append((cycle, message))
+        reading = ImuReading(begin, end, (wx, wy, wz), (fx, fy, fz))
+        return list(self.tubes[tube].on_cycle(reading, self._context(tube, string[0], end)))
 
     def _context(self, tube: int, top: int, end: float) -> RigContext:
         """What the link would tell: the new tube's joint is open at once, that below it once it is missed."""
@@ -225,15 +225,27 @@ class DirectString:
         turning = world.motion.drive(world.ends)[1] > 0.0
         return StringRun(world.ends, turning, yaw, total, systematic, var, systematic_var, bias)
 
-    def _keep(self, cycle: int, tube: int, end: float, firmware: Tube) -> None:
-        run, column = self.run, tube - 1
-        run.yaw[cycle, column] = yaw = firmware.yaw
-        run.total_error[cycle, column] = wrap(yaw - self._truth[cycle, column])
-        run.systematic_error[cycle, column] = self._systematic[cycle, column]
-        run.var[cycle, column] = firmware.yaw_var
-        run.systematic_var[cycle, column] = firmware.systematic_var
-        state = firmware.state
-        run.gyro_bias[cycle, column] = state["static_bias"][2] + state["bias"][2]
+    def _keep(self, cycle: int, string: Sequence[int], said: Mapping[int, Sequence[Message]]) -> None:
+        """Read off every record of the string, then take what the nodes had to say."""
+        run, states = self.run, self._states[: len(string)]
+        row = np.s_[cycle, : len(string)]
+        run.yaw[row] = states["now_yaw"] * TURN_OF_BINARY
+        run.total_error[row] = wrapped(run.yaw[row] - self._truth[row])
+        run.systematic_error[row] = self._systematic[row]
+        run.var[row] = np.maximum(states["now_P"][:, Err.YAW, Err.YAW], VAR_FLOOR)
+        run.systematic_var[row] = states["systematic_var"] + self._mount_var
+        run.gyro_bias[row] = states["static_bias"][:, 2] + states["bias"][:, 2]
+        for tube, messages in said.items():
+            self._own[tube] = None
+            for message in messages:
+                if isinstance(message, Aiding):
+                    self._own[tube] = message
+                elif isinstance(message, SurveyMeasurement):
+                    run.surveys.append(Survey(cycle, tube, float(run.total_error[cycle, tube - 1]), message))
+                elif isinstance(message, Event):
+                    run.events.append((cycle, message))
+                elif isinstance(message, NodeState):
+                    run.states.append((cycle, message))
 
 
 def aiding_passes(section: AidingSection, t: Array, seed: int) -> Mask:

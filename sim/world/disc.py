@@ -6,9 +6,12 @@ import math
 from collections.abc import Sequence
 
 import numpy as np
+import numpy.typing as npt
 
 from node.firmware.edge_interpolation import EDGES
 from sim.world.motion import Motion
+
+Array = npt.NDArray[np.float64]
 
 
 class Disc:
@@ -38,22 +41,25 @@ class Disc:
         limit = 0.4 * self._quantum  # lines do not change places
         self._errors = np.clip(edge_std * random.standard_normal(counts_per_turn), -limit, limit)
 
-    def sample(self, t: float) -> tuple[int, float, tuple[float, ...]]:
-        """Count at rig time ``t`` (s), the rig time (s) of its last edge and those of the edges before, newest first.
+    def angles(self, t: Array) -> Array:
+        """Of the head (n,) rad, unwrapped, at rig times ``t`` (n,) s, its free turns included."""
+        angle = self._motion.drive(t)[0]
+        for at, by in self._jumps:
+            angle = angle + by * (at <= t)
+        return angle
 
-        Edges that the head never passed have the time of the start.
+    def sample(self, t: float, angle: float | None = None) -> tuple[int, float, tuple[float, ...]]:
+        """Count with the head at ``angle`` at rig time ``t`` (s), the rig time of its last edge and of those before.
+
+        Newest first. Edges that the head never passed have the time of the start. The angle is worked out if absent.
         """
-        angle = self._angle(t)
+        if angle is None:
+            angle = float(self.angles(np.array([t]))[0])
         count = math.floor(angle / self._quantum + 0.5)
         if self._place(count) > angle:
             count -= 1
         last, *earlier = (self._time_of(self._place(count - k)) for k in range(EDGES))
         return count, min(last, t), tuple(earlier)
-
-    def _angle(self, t: float) -> float:
-        """Of the head (rad, unwrapped), its free turns included."""
-        free = sum(by for at, by in self._jumps if at <= t)
-        return float(self._motion.drive(np.array([t]))[0][0]) + free
 
     def _time_of(self, angle: float) -> float:
         """When the head was at ``angle`` first: inside a jump at its time, else when the string got so far."""

@@ -124,7 +124,7 @@ class World:
 
         A rig of a rigid string, or one that is to ignore its torsion, has no torque (N m): None.
         """
-        count, edge_at, earlier = self._disc.sample(t)
+        count, edge_at, earlier = self._disc.sample(t, self._head_angles.get(t))
         if t <= self.motion.begin:
             edge_at = self.begin
         if self.torsion is None or self.scenario.file.node.torsion == "ignore":
@@ -298,6 +298,11 @@ class World:
     def _bias_step(self, ends: Array) -> Array:
         turns_from = next(phase.start for phase in self.phases if phase.kind == "drill")
         return np.asarray(math.radians(self.scenario.file.gyroscope.bias_step_dps) * (ends > turns_from))
+
+    @cached_property
+    def _head_angles(self) -> dict[float, float]:
+        """Angle of the head (rad) at the end of every cycle, by its rig time."""
+        return dict(zip(self.ends.tolist(), self._disc.angles(self.ends).tolist(), strict=True))
 
     @cached_property
     def _phases(self) -> list[float]:
