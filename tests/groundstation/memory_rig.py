@@ -59,7 +59,7 @@ class Rig:
             )
 
     def watch(self) -> None:
-        send, take = self.ground.endpoint.send_segment, self.ground._take
+        send, take = self.ground.endpoint.send_segment, self.ground._on_message
 
         def sending(segment: BlockSegment) -> None:
             self.sent.append(segment.index)
@@ -70,7 +70,7 @@ class Rig:
             take(message, now)  # type: ignore[arg-type]
 
         self.ground.endpoint.send_segment = sending  # type: ignore[method-assign]
-        self.ground._take = taking  # type: ignore[method-assign]
+        self.ground._on_message = taking  # type: ignore[method-assign]
 
     @property
     def ground(self) -> GroundProcess:

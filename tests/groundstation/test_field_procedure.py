@@ -369,20 +369,20 @@ def record(command: int, ended_at: float) -> StaticRecord:
 def test_records_are_matched_by_the_command_that_asked_for_them() -> None:
     procedure = FieldProcedure(9.81)
     procedure.begin([1])
-    (question,) = procedure.due(0.0)
+    (question,) = procedure.due_requests(0.0)
     assert question == Ask(1, "parameters", {})
     procedure.sent(question, 41)
     procedure.on_reply(Reply(1, 41, True, f"version 0 sha256 {ParameterBlock(1, 0).sha256().hex()}"), 1.0)
     procedure.attitude(0.0, 90.0 * DEG, 8.0, 100.0)
-    (ask,) = procedure.due(1.0)
+    (ask,) = procedure.due_requests(1.0)
     assert (ask.name, ask.arguments) == ("static_record", {"seconds": 8.0})
     procedure.sent(ask, 42)
-    assert procedure.due(10.0) == []
+    assert procedure.due_requests(10.0) == []
     procedure.on_static_record(record(7, 110.0))  # an operator's own
     assert procedure.view()["tubes"][0]["records"] == 0
-    assert [a.name for a in procedure.due(1.0 + 8.0 + 15.0)] == ["static_record"]  # nothing came: once more
+    assert [a.name for a in procedure.due_requests(1.0 + 8.0 + 15.0)] == ["static_record"]  # nothing came: once more
     procedure.on_static_record(record(42, 90.0))  # of a tube that does not know rig time yet
     assert procedure.view()["tubes"][0]["records"] == 0
     procedure.on_static_record(record(42, 110.0))
     assert procedure.view()["tubes"][0]["records"] == 1
-    assert procedure.due(math.inf) == []
+    assert procedure.due_requests(math.inf) == []

@@ -193,7 +193,7 @@ def test_a_disk_that_refuses_the_block_leaves_the_one_before(rig: Rig, monkeypat
         raise OSError(28, "No space left on device")
 
     with monkeypatch.context() as broken:
-        broken.setattr(BlockStore, "keep", full)
+        broken.setattr(BlockStore, "keep_block", full)
         status = rig.upload(block())
     assert status.phase is UploadPhase.REFUSED
     assert "No space" in status.detail

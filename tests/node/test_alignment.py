@@ -313,7 +313,7 @@ def test_an_offset_survives_the_power_and_an_alignment_that_was_cut_is_told(tmp_
     assert powered.cycles(8).order("align", method="extremes")[0]
     powered.cycles(20, SLOW).cut()
     events: list[tuple[str, object]] = []
-    powered.process._say_event = lambda _, code, arguments: events.append((code, arguments))  # type: ignore[method-assign]
+    powered.process._send_event = lambda _, code, arguments: events.append((code, arguments))  # type: ignore[method-assign]
     powered.process._announce(5.0, 5.0)
     assert events == [("alignment_refused", {"reason": "the power was cut"})]
     assert powered.process.mount.tobytes() == kept

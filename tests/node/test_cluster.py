@@ -341,9 +341,9 @@ def test_sources_of_a_board_are_fused_and_one_that_ends_is_told_by_its_number(tm
     settings = TubeSettings(3, imus=clustered.settings.imus)
     process = TubeProcess(settings, tmp_path / "node", imus=sources)
     told: list[tuple[str, object]] = []
-    process._say_event = lambda _, code, arguments: told.append((code, arguments.get("imu")))  # type: ignore[method-assign]
+    process._send_event = lambda _, code, arguments: told.append((code, arguments.get("imu")))  # type: ignore[method-assign]
     for imu in process._imus:
-        imu._alarm._say = process._say_event
+        imu._alarm._say = process._send_event
     for k in range(30):
         process.on_cycle(None, 1000.0 + (k + 1) * PERIOD)
         raw = process.tube.raw

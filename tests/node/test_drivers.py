@@ -304,13 +304,13 @@ def events(process: TubeProcess) -> list[str]:
 class Watched(TubeProcess):
     """Keeps what the tube says."""
 
-    def _say(self, said, now: float) -> bool:
+    def _send(self, said, now: float) -> bool:
         self.said = [*getattr(self, "said", []), (now, said)] if isinstance(said, Event) else getattr(self, "said", [])
-        return super()._say(said, now)
+        return super()._send(said, now)
 
-    def _say_event(self, severity, code, arguments) -> None:
+    def _send_event(self, severity, code, arguments) -> None:
         self.said = [*getattr(self, "said", []), (0.0, Event(3, 0, 0.0, severity, code, arguments))]
-        super()._say_event(severity, code, arguments)
+        super()._send_event(severity, code, arguments)
 
 
 def test_a_node_whose_sensor_goes_away_goes_on_untrusted_and_comes_back(tmp_path: Path) -> None:

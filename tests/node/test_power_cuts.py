@@ -206,7 +206,7 @@ def test_a_state_that_cannot_be_read_is_an_event_and_a_safe_start(tmp_path: Path
     assert not again.state[0]["static_bias_var"].any()
     assert again.state[0]["yaw_known"] == 0
     told: list[tuple[str, object]] = []
-    again._say_event = lambda severity, code, arguments: told.append((code, arguments))  # type: ignore[method-assign]
+    again._send_event = lambda severity, code, arguments: told.append((code, arguments))  # type: ignore[method-assign]
     again._announce(5.0, 5.0)
     assert [code for code, _ in told] == ["saved_state_lost"]
     assert "saved state" in str(told[0][1])
