@@ -64,9 +64,7 @@ def bench(context: click.Context) -> None:
     if context.invoked_subcommand is None:
         click.echo("\n".join(benches()))
         if not FOLDER.is_dir():
-            click.echo(
-                "the benchmarks beside other libraries are in the repository, not in this installation", err=True
-            )
+            click.echo("the benchmarks beside other libraries are in the repository, not here", err=True)
 
 
 def side_by_side(name: str) -> click.Command:
@@ -84,7 +82,9 @@ def side_by_side(name: str) -> click.Command:
             spec.loader.exec_module(module)
             result = module.run()
         except ModuleNotFoundError as error:
-            raise EnvironmentFault(f"bench {name} needs {error.name}: pip install 'borechain[dev]'") from error
+            raise EnvironmentFault(
+                f"bench {name} needs {error.name}; install the development dependencies: pip install 'borechain[dev]'"
+            ) from error
         if as_json:
             click.echo(json.dumps(result))
         else:
