@@ -10,12 +10,13 @@ from telemetry.runtime.command_line import needs, plain_faults
 from telemetry.runtime.options import clock_option, key_option, place_options
 
 TOLERANCES = ("en-12716", "5-cm", "0.27-deg")
+POSITIVE = click.FloatRange(0.0, min_open=True)
 WEIGHTINGS = ("bayes", "equal", "linear", "quadratic", "cubic", "adaptive")
 
 
 @click.command()
-@click.option("--tube-length-m", type=float, default=2.0, show_default=True, help="Length of every tube.")
-@click.option("--target-m", type=float, default=30.0, show_default=True, help="Length of the design axis.")
+@click.option("--tube-length-m", type=POSITIVE, default=2.0, show_default=True, help="Length of every tube.")
+@click.option("--target-m", type=POSITIVE, default=30.0, show_default=True, help="Length of the design axis.")
 @click.option(
     "--design-inclination-deg",
     type=click.FloatRange(0.0, 180.0),
@@ -24,7 +25,7 @@ WEIGHTINGS = ("bayes", "equal", "linear", "quadratic", "cubic", "adaptive")
     help="Of the design axis; 0 is vertical.",
 )
 @click.option("--design-azimuth-deg", type=float, default=0.0, show_default=True, help="Of the design axis.")
-@click.option("--column-radius-m", type=float, default=0.6, show_default=True, help="Radius of the finished column.")
+@click.option("--column-radius-m", type=POSITIVE, default=0.6, show_default=True, help="Radius of the finished column.")
 @click.option(
     "--tolerance",
     type=click.Choice(TOLERANCES),

@@ -4,7 +4,21 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from borechain.cli.faults import EnvironmentFault
+from borechain.cli.faults import EnvironmentFault, InputFault
+
+PLOT_FORMATS = (".svg", ".png", ".pdf")
+
+
+def check_suffix(option: str, path: Path | None, *suffixes: str) -> None:
+    """Refuse the name of a file in a format that is not written, before anything is computed.
+
+    Raises
+    ------
+    InputFault
+        Naming the option and the suffixes.
+    """
+    if path is not None and path.suffix.lower() not in suffixes:
+        raise InputFault(f"{option} {path}: expected a name that ends in {', '.join(suffixes)}")
 
 
 def write_whole(path: Path, text: str) -> None:

@@ -4,10 +4,25 @@ from __future__ import annotations
 
 import click
 
+from telemetry.runtime.command_line import check_installed
+
 FAULT_HELP = "Fault, as kill-node:3@600 or kill-node:3@600+20 (tube, s after the start, s down). Repeatable."
 
 
-json_option = click.option("--json", "as_json", is_flag=True, help="Print one JSON object and nothing else on stdout.")
+def check_tables(context: click.Context, _parameter: click.Parameter, as_json: bool) -> bool:
+    """Refuse a job before it begins whose tables for people could not be printed here."""
+    if not as_json and not context.resilient_parsing:
+        check_installed("rich")
+    return as_json
+
+
+json_option = click.option(
+    "--json",
+    "as_json",
+    is_flag=True,
+    callback=check_tables,
+    help="Print one JSON object on stdout, and nothing else there.",
+)
 
 
 def parse_speed(_context: click.Context, _parameter: click.Parameter, value: str) -> float:

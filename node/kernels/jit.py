@@ -2,12 +2,18 @@
 
 Numba stamps a cache entry with the file of the function alone, not with the files of the functions it calls, so an
 edited callee would go on running in its old form. The cache folder therefore carries a digest of all kernel sources.
+
+Where that folder cannot be written, a temporary one is used and said so once; processes started from here inherit it.
 """
 
 from __future__ import annotations
 
+import contextlib
 import hashlib
 import os
+import stat
+import sys
+import tempfile
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any, TypeVar, cast
@@ -28,12 +34,41 @@ def source_digest() -> str:
 
 def cache_folder() -> Path:
     """Folder of the compiled kernels: ``$XDG_CACHE_HOME/borechain/kernels-<digest>``."""
-    home = Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache")
+    home = Path(os.environ.get("XDG_CACHE_HOME") or Path("~/.cache").expanduser())
     return home / "borechain" / f"kernels-{source_digest()}"
 
 
+def fallback_folder() -> Path:
+    """Temporary folder of this user alone; what another one has put there is code and is never loaded."""
+    folder = Path(tempfile.gettempdir()) / f"borechain-{os.getuid()}-kernels-{source_digest()}"
+    with contextlib.suppress(FileExistsError):
+        folder.mkdir(mode=0o700)
+    found = folder.lstat()
+    if found.st_uid == os.getuid() and stat.S_ISDIR(found.st_mode) and stat.S_IMODE(found.st_mode) == 0o700:
+        return folder
+    return Path(tempfile.mkdtemp(prefix="borechain-kernels-"))
+
+
+def use_cache() -> None:
+    """Have numba keep the compiled kernels in their folder, or in a temporary one."""
+    folder = cache_folder()
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+        with tempfile.TemporaryFile(dir=folder):
+            pass
+    except (OSError, RuntimeError) as error:
+        refused, folder = folder, fallback_folder()
+        os.environ["NUMBA_CACHE_DIR"] = str(folder)
+        reason = getattr(error, "strerror", None) or error
+        sys.stderr.write(
+            f"borechain: compiled kernels are kept in {folder}, for {refused} cannot be written ({reason}); "
+            "set XDG_CACHE_HOME to a folder that can\n"
+        )
+    vars(config)["CACHE_DIR"] = str(folder)
+
+
 if not os.environ.get("NUMBA_CACHE_DIR"):
-    vars(config)["CACHE_DIR"] = str(cache_folder())
+    use_cache()
 
 
 def kernel(function: Function) -> Function:

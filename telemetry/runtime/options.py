@@ -32,6 +32,22 @@ def read_config(context: click.Context, _parameter: click.Parameter, path: Path 
     context.default_map = {known[f"--{name}"]: value for name, value in values.items()}
 
 
+def parse_endpoint(_context: click.Context, _parameter: click.Parameter, value: str) -> str:
+    """An address as zenoh writes it."""
+    protocol, _, place = value.partition("/")
+    host, _, port = place.rpartition(":")
+    if not (protocol.isalpha() and host and port.isdecimal()):
+        raise click.BadParameter(f"expected tcp/HOST:PORT, got {value}")
+    return value
+
+
+def endpoint_option(text: str) -> Callable[[Callable[..., Any]], Callable[..., Any]]:
+    """Option ``--endpoint``; ``text`` says what is there."""
+    return click.option(
+        "--endpoint", default=keys.DEFAULT_ENDPOINT, show_default=True, callback=parse_endpoint, help=text
+    )
+
+
 def place_options(command: Callable[..., Any]) -> Callable[..., Any]:
     """Options of every process: which rig, which router, which folder, and a file that holds any of its options."""
     for option in (
@@ -46,7 +62,7 @@ def place_options(command: Callable[..., Any]) -> Callable[..., Any]:
         click.option(
             "--rig", "rig_name", default=keys.DEFAULT_RIG, show_default=True, help="Name of the rig in key expressions."
         ),
-        click.option("--endpoint", default=keys.DEFAULT_ENDPOINT, show_default=True, help="zenoh router to join."),
+        endpoint_option("zenoh router to join."),
         click.option(
             "--folder",
             type=click.Path(path_type=Path, file_okay=False),

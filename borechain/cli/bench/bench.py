@@ -38,6 +38,8 @@ class Benches(click.Group):
             When there is none of that name.
         """
         del ctx
+        if cmd_name != "realtime" and not FOLDER.is_dir():
+            raise EnvironmentFault(f"bench {cmd_name}: the benchmarks beside other libraries are in the repository")
         if cmd_name not in benches():
             raise InputFault(f"expected one of {', '.join(benches())}, got {cmd_name!r}")
         if cmd_name == "realtime":
@@ -50,7 +52,9 @@ class Benches(click.Group):
 @click.group(cls=Benches, invoke_without_command=True)
 @click.pass_context
 def bench(context: click.Context) -> None:
-    """Run the benchmark NAME, or list them. The peers are development dependencies; ``make test`` installs them.
+    """Run the benchmark NAME, or list them.
+
+    Those beside other libraries are in the repository, and the libraries in the extra dev; ``make test`` installs it.
 
     \b
     Examples:
@@ -59,6 +63,8 @@ def bench(context: click.Context) -> None:
     """
     if context.invoked_subcommand is None:
         click.echo("\n".join(benches()))
+        if not FOLDER.is_dir():
+            click.echo("the benchmarks beside other libraries are in the repository, not here", err=True)
 
 
 def side_by_side(name: str) -> click.Command:
@@ -76,7 +82,9 @@ def side_by_side(name: str) -> click.Command:
             spec.loader.exec_module(module)
             result = module.run()
         except ModuleNotFoundError as error:
-            raise EnvironmentFault(f"bench {name} needs {error.name}; install the development dependencies") from error
+            raise EnvironmentFault(
+                f"bench {name} needs {error.name}; install the development dependencies: pip install 'borechain[dev]'"
+            ) from error
         if as_json:
             click.echo(json.dumps(result))
         else:

@@ -10,7 +10,7 @@ from typing import Any
 
 import click
 
-from borechain.cli.faults import plain_faults
+from borechain.cli.faults import needs, plain_faults
 from borechain.cli.options import json_option, seed_option
 from borechain.cli.tables import Columns, show_table, write_table
 from telemetry import keys
@@ -46,6 +46,7 @@ COLUMNS: Columns = (
 @click.option("--out", type=click.Path(path_type=Path, file_okay=False), help="Folder for realtime.csv.")
 @json_option
 @seed_option
+@needs("scipy", "sqlalchemy")
 @plain_faults
 def realtime(nodes: int, seconds: float, endpoint: str, out: Path | None, as_json: bool, seed: int) -> None:
     """Run a string of real node processes on their own clocks and measure it: overruns, jitter, memory, yaw.

@@ -16,14 +16,15 @@ import click
 
 from borechain import __version__
 from borechain.cli.faults import EnvironmentFault, InputFault
+from borechain.cli.files import PLOT_FORMATS, check_suffix
 from borechain.cli.options import json_option
 from borechain.cli.tables import console
+from telemetry.runtime.command_line import check_installed
 
 if TYPE_CHECKING:
     from groundstation.report.panels import Panel
     from groundstation.report.sheet import Sheet
 
-PLOT_FORMATS = (".svg", ".png", ".pdf")
 file_argument = click.argument("file", type=click.Path(path_type=Path, dir_okay=False))
 full_scale_option = click.option(
     "--full-scale",
@@ -59,13 +60,12 @@ class Wanted:
 
     def check(self) -> None:
         """Refuse paths that cannot be meant, before anything is computed."""
-        if self.plot is not None and self.plot.suffix not in PLOT_FORMATS:
-            raise InputFault(f"--plot {self.plot}: expected a name that ends in {', '.join(PLOT_FORMATS)}")
-        if self.certificate is not None and self.certificate.suffix != ".pdf":
-            raise InputFault(f"--certificate {self.certificate}: expected a name that ends in .pdf")
         paths = [self.file, *filter(None, (self.out, self.plot, self.certificate))]
         if len({path.resolve() for path in paths}) < len(paths):
             raise InputFault("expected different files for the record, --out, --plot and --certificate")
+        check_suffix("--plot", self.plot, *PLOT_FORMATS)
+        check_suffix("--certificate", self.certificate, ".pdf")
+        check_suffix("--out", self.out, ".json")
 
 
 @contextlib.contextmanager
@@ -96,6 +96,8 @@ def output_options(command: Callable[..., Outcome]) -> Callable[..., None]:
         day = (date or datetime.now(UTC)).date()
         wanted = Wanted(file, out, plot, certificate, day, subject or file.stem, as_json)
         wanted.check()
+        if plot is not None or certificate is not None:
+            check_installed("matplotlib", "typst")
         deliver(command(file=file, day=day.isoformat(), **options), wanted)
 
     path = click.Path(path_type=Path, dir_okay=False)
@@ -130,11 +132,9 @@ def deliver(outcome: Outcome, wanted: Wanted) -> None:
 
 def drawn(outcome: Outcome, wanted: Wanted) -> dict[Path, bytes]:
     """Plot and certificate."""
-    try:
-        from groundstation.report.certificate import Identity, certificate
-        from groundstation.report.panels import render
-    except ImportError as error:
-        raise EnvironmentFault(f"{error.name} is missing: plots and certificates need borechain[ground]") from error
+    from groundstation.report.certificate import Identity, certificate
+    from groundstation.report.panels import render
+
     panels, files = outcome.panels(), {}
     if wanted.plot is not None:
         files[wanted.plot] = render(panels, wanted.plot.suffix[1:])

@@ -5,22 +5,30 @@ from __future__ import annotations
 import json
 import queue
 import sys
+import time
 from typing import Any
 
 import click
 
 from borechain.cli.faults import EnvironmentFault, InputFault, plain_faults
 from telemetry import keys
+from telemetry.runtime.options import endpoint_option
 
-endpoint_option = click.option(
-    "--endpoint", default=keys.DEFAULT_ENDPOINT, show_default=True, help="Router of the rig."
-)
+SILENCE = 5.0  # wall s without a sample before ``watch`` says so
+TIMEOUT = "Timeout"  # zenoh's text for an answer that did not come
+rig_option = endpoint_option("Router of the rig.")
 
 
 @click.command()
 @click.argument("selector")
-@endpoint_option
-@click.option("--timeout", type=click.FloatRange(0.1, 600.0), default=5.0, show_default=True, help="Wall seconds.")
+@rig_option
+@click.option(
+    "--timeout",
+    type=click.FloatRange(0.1, 600.0),
+    default=5.0,
+    show_default=True,
+    help="Seconds to wait for the router, and then for the answer.",
+)
 @click.option("--json", "as_json", is_flag=True, help="One JSON object on one line.")
 @plain_faults
 def query(selector: str, endpoint: str, timeout: float, as_json: bool) -> None:
@@ -32,57 +40,106 @@ def query(selector: str, endpoint: str, timeout: float, as_json: bool) -> None:
       borechain query 'borechain/*/ground/trajectory?md=4..12'
       borechain query 'borechain/rig-1/cmd/take_survey?tube=3' --timeout 40
     """
-    from telemetry.errors import MediumError
     from telemetry.media.zenoh_bus import open_client
 
+    check_selector(selector)
     with open_client(endpoint, timeout=timeout) as bus:
-        try:
-            replies = bus.get(selector, timeout)
-        except MediumError as error:
-            raise InputFault(str(error)) from error
+        replies = bus.get(selector, timeout)
     answers = [reply for reply in replies if reply.error is None]
+    if not answers and any(reply.error != TIMEOUT for reply in replies):
+        raise InputFault(next(reply.error or "refused" for reply in replies if reply.error != TIMEOUT))
     if not answers and replies:
-        raise InputFault(replies[0].error or "refused")
+        raise EnvironmentFault(f"{selector}: no answer within {timeout:g} s; a longer --timeout may help")
     if not answers:
-        raise EnvironmentFault(nobody(selector, endpoint))
-    show({reply.key: unpack(reply.payload) for reply in answers}, as_json=as_json)
+        raise EnvironmentFault(f"{selector}: nobody at {endpoint} answers it; is a ground station running? {known()}")
+    show({reply.key: value_of(reply.payload) for reply in answers}, as_json=as_json)
 
 
 @click.command()
 @click.argument("selector")
-@endpoint_option
+@rig_option
 @click.option("--count", type=click.IntRange(1), help="Stop after so many lines.")
+@click.option("--timeout", type=click.FloatRange(0.1), help="Give up after so many seconds without a line.")
 @plain_faults
-def watch(selector: str, endpoint: str, count: int | None) -> None:
+def watch(selector: str, endpoint: str, count: int | None, timeout: float | None) -> None:
     """Print what is published on SELECTOR, one JSON object a line, until Ctrl-C.
 
+    A binary value is shown decoded where it is msgpack, else as {"hex": ...}.
+
     \b
-    Example:
+    Examples:
       borechain watch 'borechain/*/ground/nodes/*'
+      borechain watch 'borechain/rig-1/ground/status' --count 1 --timeout 10
     """
     from telemetry.media.zenoh_bus import open_client
 
+    check_selector(selector)
     arrived: queue.SimpleQueue[tuple[str, bytes]] = queue.SimpleQueue()
     with open_client(endpoint, timeout=5.0) as bus:
         bus.subscribe(selector, lambda key, payload: arrived.put((key, payload)))
         seen = 0
         while count is None or seen < count:
-            key, payload = arrived.get()
-            click.echo(json.dumps({"key": key, "value": json.loads(payload)}))
+            key, payload = next_sample(arrived, selector, timeout)
+            click.echo(json.dumps({"key": key, "value": value_of(payload)}))
             seen += 1
 
 
-def unpack(payload: bytes) -> Any:
-    """Value of a reply: JSON, or msgpack where the selector asked for it."""
+def check_selector(selector: str) -> None:
+    """Refuse what is no key expression before anything connects.
+
+    Raises
+    ------
+    InputFault
+        Naming the keys there are.
+    """
+    from telemetry.media.zenoh_bus import intersects
+
+    key = selector.partition("?")[0]
+    if not intersects(key, key):
+        raise InputFault(f"{selector}: expected a key expression, as borechain/*/ground/status; {known()}")
+
+
+def next_sample(
+    arrived: queue.SimpleQueue[tuple[str, bytes]], selector: str, timeout: float | None
+) -> tuple[str, bytes]:
+    """The next sample; a silence is reported on stderr once, and ends the command after ``timeout`` (s).
+
+    Raises
+    ------
+    EnvironmentFault
+        When nothing came in time.
+    """
+    begin = time.monotonic()
+    patience = SILENCE if timeout is None else min(SILENCE, timeout)
+    try:
+        return arrived.get(timeout=patience)
+    except queue.Empty:
+        click.echo(f"nothing on {selector} for {patience:g} s; waiting, Ctrl-C ends it. {known('publish')}", err=True)
+    try:
+        return arrived.get(timeout=None if timeout is None else max(0.0, begin + timeout - time.monotonic()))
+    except queue.Empty:
+        raise EnvironmentFault(f"{selector}: nothing was published within {timeout:g} s") from None
+
+
+def value_of(payload: bytes) -> Any:
+    """Value of a payload: JSON, msgpack where it can be shown as JSON, or the bytes in hex."""
     import msgpack
 
-    return json.loads(payload) if payload[:1] == b"{" else msgpack.unpackb(payload)
+    try:
+        return json.loads(payload)
+    except ValueError:
+        pass
+    try:
+        value = msgpack.unpackb(payload)
+        json.dumps(value)
+    except (ValueError, TypeError, msgpack.UnpackException):
+        return {"hex": payload.hex()}
+    return value
 
 
-def nobody(selector: str, endpoint: str) -> str:
-    """What to say when no ground station feels asked."""
-    known = ", ".join(key.template for key in keys.TABLE if "query" in key.kind)
-    return f"{selector}: nobody at {endpoint} answers it; is a ground station running? keys are {known}"
+def known(kind: str = "query") -> str:
+    """Which keys can be asked for, or are published."""
+    return f"keys are {', '.join(key.template for key in keys.TABLE if kind in key.kind)}"
 
 
 def show(values: dict[str, Any], *, as_json: bool) -> None:

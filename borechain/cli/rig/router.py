@@ -5,14 +5,14 @@ from __future__ import annotations
 import click
 
 from borechain.cli.faults import plain_faults
-from telemetry import keys
+from telemetry.runtime.options import endpoint_option
 
 
 @click.command()
-@click.option("--endpoint", default=keys.DEFAULT_ENDPOINT, show_default=True, help="Where to listen.")
+@endpoint_option("Where to listen.")
 @plain_faults
 def router(endpoint: str) -> None:
-    """Be the zenoh router of a rig.
+    """Run the zenoh router of a rig.
 
     \b
     Example:

@@ -9,7 +9,6 @@ import click
 
 from borechain.cli.faults import EnvironmentFault, plain_faults
 from borechain.cli.files import write_whole
-from borechain.cli.options import json_option
 
 
 @click.group()
@@ -27,7 +26,7 @@ def scenario() -> None:
 
 
 @scenario.command("list")
-@json_option
+@click.option("--json", "as_json", is_flag=True, help="Print one JSON object.")
 @plain_faults
 def list_(as_json: bool) -> None:
     """Name every scenario, with what its file says of itself."""

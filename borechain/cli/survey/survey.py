@@ -13,9 +13,10 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from borechain.cli.faults import InputFault, plain_faults
-from borechain.cli.files import write_whole
+from borechain.cli.files import PLOT_FORMATS, check_suffix, write_whole
 from borechain.cli.options import json_option
 from borechain.cli.tables import console
+from telemetry.runtime.command_line import check_installed
 
 if TYPE_CHECKING:
     from groundstation.survey.analysis import Analysis
@@ -51,7 +52,7 @@ SOURCES_SHOWN = 12
 @click.option("--dip-deg", type=float, default=70.0, show_default=True)
 @click.option("--declination-deg", type=float, default=0.0, show_default=True, help="Of magnetic against site north.")
 @click.option("--latitude-deg", type=float, default=52.0, show_default=True)
-@click.option("--out", type=click.Path(path_type=Path, dir_okay=False), help="Station table as CSV.")
+@click.option("--out", type=click.Path(path_type=Path, dir_okay=False), help="Station table, a .csv file.")
 @click.option(
     "--plot", type=click.Path(path_type=Path, dir_okay=False), help="Plan, sections, uncertainty: PNG, SVG, PDF."
 )
@@ -94,6 +95,11 @@ def survey(
     from groundstation.survey.methods import Method
     from groundstation.survey.records import DisplacementRule, read_record, with_collar
 
+    check_suffix("--out", out, ".csv")
+    check_suffix("--plot", plot, *PLOT_FORMATS)
+    check_suffix("--export-tool", export_tool, ".json")
+    if plot is not None:
+        check_installed("matplotlib")
     record = read_record(file, DisplacementRule(displacement_rule))
     if from_collar:
         record = with_collar(record)
@@ -202,7 +208,7 @@ def sources(found: Analysis, sigma: float) -> list[dict[str, Any]]:
 
 
 def table_text(rows: list[dict[str, Any]]) -> str:
-    """Station table as CSV."""
+    """Station table, a .csv file."""
     text = io.StringIO()
     writer = csv.writer(text, lineterminator="\n")
     plain = [key for key in rows[0] if key != "uncertainty"]

@@ -10,8 +10,10 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from borechain.cli.faults import plain_faults
+from borechain.cli.files import PLOT_FORMATS, check_suffix
 from borechain.cli.options import json_option
 from borechain.cli.tables import console
+from telemetry.runtime.command_line import check_installed
 
 if TYPE_CHECKING:
     from groundstation.survey.wall import ExtraColumn, Joints
@@ -36,6 +38,8 @@ def wall(file: Path, plot: Path | None, as_json: bool) -> None:
     from groundstation.survey.wall import extra_column, joints, worst
     from groundstation.survey.wall_file import read_wall
 
+    check_suffix("--plot", plot, *PLOT_FORMATS)
+    check_installed("scipy", *(["matplotlib"] if plot is not None else []))
     found = read_wall(file)
     judged = joints(found.columns, found.pairs, found.file.radius, found.file.thickness)
     joint, depth = worst(judged)

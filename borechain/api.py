@@ -1,0 +1,207 @@
+"""The program for notebooks and scripts: what the commands do, as functions with values instead of text.
+
+Load a scenario and drill it in this process, compute surveys and walls, calibrate, ask a running ground station. SI and
+radians inside the values; names with a unit (``md_m``, ``inclination_deg``) mean that unit. Errors are of
+``BorechainError`` and say in one line what was expected and what came. Examples: docs/api.md.
+"""
+
+from __future__ import annotations
+
+import json
+import math
+import tempfile
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from telemetry import keys
+from telemetry.errors import BorechainError, InputError, MediumError
+
+if TYPE_CHECKING:
+    from groundstation.calibration.attitudes import Fit
+    from groundstation.survey.analysis import Analysis
+    from groundstation.survey.error_sources import Site
+    from groundstation.survey.wall import Joints
+    from groundstation.survey.wall_file import Wall
+    from sim.world.scenario import Scenario
+
+__all__ = [
+    "BorechainError",
+    "InputError",
+    "JudgedWall",
+    "calibrate_attitudes",
+    "calibrate_turntable",
+    "drill",
+    "load",
+    "query",
+    "scenarios",
+    "survey",
+    "wall",
+]
+
+
+@dataclass(frozen=True, slots=True)
+class JudgedWall:
+    """A wall and its joints; ``worst`` is the index of the most doubtful joint and of its depth."""
+
+    wall: Wall
+    joints: Joints
+    worst: tuple[int, int]
+
+
+def scenarios() -> list[str]:
+    """Names of the scenarios that come with the program."""
+    from sim.world.shipped import shipped_names
+
+    return shipped_names()
+
+
+def load(scenario: str | Path, faults: tuple[str, ...] = ()) -> Scenario:
+    """Read and check a scenario: a name of ``scenarios``, or a file.
+
+    Raises
+    ------
+    ScenarioError
+        The file, the key, what was expected and what came.
+    """
+    from sim.world.scenario import load_scenario
+
+    return load_scenario(Path(scenario), faults)
+
+
+def drill(scenario: Scenario, seed: int = 1, folder: Path | None = None) -> dict[str, Any]:
+    """Drill a scenario in this process, without a bus; the same bits as the rig of processes.
+
+    Parameters
+    ----------
+    scenario : of ``load``
+    seed : one seed, one result
+    folder : new or empty, keeps database and saved states; without one nothing is kept
+
+    Returns
+    -------
+    The object that ``borechain rig --json`` prints: ``stations``, ``figures``, ``digest`` and more.
+
+    Raises
+    ------
+    RigError
+        When the folder is in use, or the schedule cannot be drilled.
+    """
+    if folder is not None:
+        return _drill(scenario, seed, folder)
+    with tempfile.TemporaryDirectory(prefix="borechain-") as place:
+        return _drill(scenario, seed, Path(place))
+
+
+def _drill(scenario: Scenario, seed: int, folder: Path) -> dict[str, Any]:
+    from borechain.cli.rig.rig import drill_inline, result_of
+    from sim.rig.launcher import prepare_folder
+    from sim.world.world import World
+
+    world = World(scenario, seed)
+    prepare_folder(folder)
+    ran = drill_inline(world, math.inf, keys.DEFAULT_RIG, folder, lambda _progress: None)
+    return result_of(ran.answers, world)
+
+
+def survey(
+    file: str | Path,
+    *,
+    method: str = "balanced-tangential",
+    instrument: str = "relay",
+    displacement_rule: str = "exact",
+    site: Site | None = None,
+    section_azimuth: float = 0.0,
+) -> Analysis:
+    """Trajectory and region of uncertainty of a record of stations or of lateral displacements.
+
+    Parameters
+    ----------
+    file : CSV of md_m,inclination_deg,azimuth_deg or of md_m,a_cm,b_cm
+    method, instrument, displacement_rule : as the options of ``borechain survey``
+    site : gravity, magnetic field and latitude; the default is that of the command
+    section_azimuth : of the vertical section, rad
+
+    Raises
+    ------
+    SurveyError, ToolError
+        When the record or the instrument cannot be used.
+    """
+    from groundstation.survey.analysis import analyse
+    from groundstation.survey.error_sources import Site
+    from groundstation.survey.instruments import load_tool
+    from groundstation.survey.methods import Method
+    from groundstation.survey.records import DisplacementRule, read_record
+
+    place = site or Site(9.81, 50_000.0, math.radians(70.0), 0.0, math.radians(52.0))
+    record = read_record(Path(file), DisplacementRule(displacement_rule))
+    return analyse(record, Method(method), load_tool(instrument), place, section_azimuth)
+
+
+def wall(file: str | Path) -> JudgedWall:
+    """Every joint of a wall or grid: distance, thickness, probability of less than is required.
+
+    Raises
+    ------
+    SurveyError
+        When the file or one that it names cannot be used.
+    """
+    from groundstation.survey.wall import joints, worst
+    from groundstation.survey.wall_file import read_wall
+
+    found = read_wall(Path(file))
+    judged = joints(found.columns, found.pairs, found.file.radius, found.file.thickness)
+    return JudgedWall(found, judged, worst(judged))
+
+
+def calibrate_turntable(file: str | Path, reference: float) -> Fit:
+    """Matrix and bias of a triad from a turn table's record, with their standard errors.
+
+    ``reference`` is the true rate or specific force of the first column of each pair, in the unit of the file, which
+    is also the unit of the result.
+
+    Raises
+    ------
+    CalibrationError
+        The file and line, what was expected and what came.
+    """
+    from groundstation.calibration.attitudes import fit
+    from groundstation.calibration.records import read_turn_table
+    from groundstation.calibration.turntable import as_observations
+
+    record = read_turn_table(Path(file), reference)
+    return fit(*as_observations(record.positive, record.negative, reference))
+
+
+def calibrate_attitudes(file: str | Path) -> Fit:
+    """Matrix (m/s^2 per g) and bias (m/s^2) of an accelerometer from mean readings at preset pitch and roll.
+
+    Raises
+    ------
+    CalibrationError
+        The file and line, what was expected and what came.
+    """
+    from groundstation.calibration.attitudes import fit, true_vectors
+    from groundstation.calibration.records import read_attitudes
+
+    record = read_attitudes(Path(file))
+    return fit(true_vectors(record.pitch, record.roll), record.readings)
+
+
+def query(selector: str, endpoint: str = keys.DEFAULT_ENDPOINT, timeout: float = 5.0) -> dict[str, Any]:
+    """What a running ground station answers to ``selector`` (docs/keys.md), by key.
+
+    Raises
+    ------
+    MediumError
+        When nobody answers within ``timeout`` (s), or the ground station refuses.
+    """
+    from telemetry.media.zenoh_bus import open_client
+
+    with open_client(endpoint, timeout) as bus:
+        replies = bus.get(selector, timeout)
+    answers = {reply.key: json.loads(reply.payload) for reply in replies if reply.error is None}
+    if not answers:
+        reason = replies[0].error if replies else f"nobody answers at {endpoint}"
+        raise MediumError(f"{selector}: {reason}")
+    return answers
