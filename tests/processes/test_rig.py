@@ -71,15 +71,19 @@ def test_a_string_that_twists_is_surveyed_released_and_goes_on_at_every_joint(tm
     assert not {"gyro_step", "gyro_scale", "joint_contradicts_marks"} & set(codes)
 
 
-def test_the_seed_alone_decides_the_result_whatever_the_load(tmp_path: Path) -> None:
+def test_the_seed_alone_decides_the_result_whatever_the_load_and_the_engine(tmp_path: Path) -> None:
     first = drill(tmp_path / "a", "--seed", "5")
+    inline = drill(tmp_path / "inline", "--seed", "5", "--inline")
+    assert (inline["processes"], first["processes"]) == (1, 6)
+    assert inline["stations"] == first["stations"]
+    assert inline["digest"] == first["digest"]
     with contextlib.ExitStack() as stack:
         for _ in range(os.cpu_count() or 1):
             competitor = subprocess.Popen([sys.executable, "-c", "while True: pass"])
             stack.callback(competitor.wait)
             stack.callback(competitor.kill)
         second = drill(tmp_path / "b", "--seed", "5")
-    other = drill(tmp_path / "c", "--seed", "6")
+    other = drill(tmp_path / "c", "--seed", "6", "--inline")
     assert first["digest"] == second["digest"]
     assert first["stations"] == second["stations"]
     assert first["digest"] != other["digest"]

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from borechain.cli.faults import EnvironmentFault, needs, plain_faults
+from borechain.cli.faults import EnvironmentFault, InputFault, needs, plain_faults
 from borechain.cli.options import fault_option, json_option, seed_option, speed_option
 from borechain.cli.tables import console
 from telemetry import keys
@@ -70,6 +70,10 @@ def rig(
     from sim.world.world import World
 
     world = World(load_scenario(scenario, faults), seed)
+    if world.scenario.medium.link == "off":
+        raise InputFault(
+            f'{scenario}: medium.link: expected "on" for a rig; only studies run without a link'
+        )
     if not inline:
         check_port_free(endpoint)
     folder = out if out is not None else next_run_folder(Path("out") / scenario.stem)
@@ -275,8 +279,9 @@ def show_result(result: dict[str, Any], folder: Path) -> None:
     show_column(result)
     if "calibration" in result:
         show_calibration(result["calibration"])
+    processes = "one process" if result["processes"] == 1 else f"{result['processes']} processes"
     paper.print(
-        f"{len(result['stations'])} stations, {result['measurements']} measurements, {result['processes']} processes, "
+        f"{len(result['stations'])} stations, {result['measurements']} measurements, {processes}, "
         f"{result['rig_s']:.0f} s of rig time in {result['wall_s']:.1f} s"
     )
     paper.print(f"digest {result['digest']}\nfiles  {folder}", soft_wrap=True)
