@@ -9,7 +9,8 @@ import msgpack
 
 from telemetry import keys
 from telemetry.media.zenoh_bus import open_client, open_router
-from telemetry.runtime.hosting import CONNECT_TIMEOUT, Place, begin_process, on_termination, reporting
+from telemetry.media.zenoh_port import CONNECT_TIMEOUT
+from telemetry.runtime.hosting import Place, begin_process, on_termination, reporting
 
 
 def run_medium(

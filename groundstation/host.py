@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+from functools import partial
 from typing import Any
 
 import msgpack
@@ -11,13 +12,15 @@ from groundstation.config import checked_config
 from groundstation.service.process import GroundProcess
 from node.kernels.layout import PERIOD
 from telemetry import keys
-from telemetry.media.neighbours import neighbour_ports
+from telemetry.media.neighbours import neighbour_ports, stepped_ports
 from telemetry.media.zenoh_bus import ZenohBus
+from telemetry.media.zenoh_port import ZenohMedium
 from telemetry.messages import BASE, ENCODER, Side
-from telemetry.runtime.hosting import Place, begin_process, joined, on_termination, reporting
-from telemetry.runtime.own_clock import Inbox, OwnClock, serve_by_own_clock
+from telemetry.runtime.event_loop import run, stop_on_signals
+from telemetry.runtime.hosting import Place, begin_process, complain, joined, on_termination, reporting
+from telemetry.runtime.own_clock import OwnClock, OwnClockLoop
 from telemetry.runtime.process import Process
-from telemetry.runtime.stepped import StepClient, serve, zenoh_ports
+from telemetry.runtime.step_client import StepClient, serve
 from telemetry.runtime.timing import CycleTiming
 
 
@@ -37,24 +40,24 @@ def run_ground(place: Place, settings: dict[str, Any], *, own_clock: bool = Fals
         process = GroundProcess(checked_config(rig=place.rig, folder=place.folder, key_file=place.key_file, **settings))
         with joined(place) as bus, process.serving(bus):
             if own_clock:
-                serve_ground(process, bus, place.rig)
+                run(serve_ground(process, bus, place.rig))
                 return
-            ports = zenoh_ports(bus, place.rig, BASE, [Side.LOWER])
+            ports = stepped_ports(ZenohMedium(bus), place.rig, BASE, [Side.LOWER])
             client = StepClient(bus, place.rig, BASE, ports, hears_depth=True)
             on_termination(client.stop)
-            serve(process, client)
+            serve(process, client, partial(complain, "ground"))
 
 
-def serve_ground(process: Process, bus: ZenohBus, rig: str) -> None:
+async def serve_ground(process: Process, bus: ZenohBus, rig: str) -> None:
     """Run the ground station by its own clock, below it the encoder."""
-    inbox = Inbox()
-    on_termination(inbox.stop)
+    ports = neighbour_ports(ZenohMedium(bus), rig, BASE, {Side.LOWER: ENCODER})
+    loop = OwnClockLoop(process, ports, OwnClock(), CycleTiming(), PERIOD, partial(complain, "ground"))
+    stop_on_signals(loop.stop)
 
     def hear_depth(_key: str, payload: bytes) -> None:
-        with contextlib.suppress(ValueError, TypeError, msgpack.UnpackException):  # what is no depth is not heard
+        with contextlib.suppress(ValueError, TypeError, msgpack.UnpackException):  # anything else is no depth
             rig_time, md = map(float, msgpack.unpackb(payload))
-            inbox.put(lambda listener, _now: listener.on_depth(rig_time, md))
+            loop.call(lambda listener, _now: listener.on_depth(rig_time, md))
 
     bus.subscribe(keys.DEPTH.format(rig=rig), hear_depth)
-    ports = neighbour_ports(bus, rig, BASE, {Side.LOWER: ENCODER})
-    serve_by_own_clock(process, ports, inbox, OwnClock(), CycleTiming(), PERIOD)
+    await loop.run()

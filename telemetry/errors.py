@@ -8,6 +8,7 @@
 
     TelemetryError
     ├── MediumError(OSError)          the bus could not be opened or was lost: retry or reconfigure
+    │   └── UnknownMediumError(ValueError)  no medium of that name: correct the configuration
     ├── DecodeError(ValueError)       bytes that are no message of ours; the link counts and drops them
     ├── EncodeError(ValueError)       a message outside its declared range: nothing was sent
     ├── KeyFileError(ValueError)      the key of the rig is missing, open to others or none: correct the file
@@ -31,6 +32,10 @@ class TelemetryError(BorechainError):
 
 class MediumError(TelemetryError, OSError):
     """The bus could not be opened or was lost; nothing was sent."""
+
+
+class UnknownMediumError(MediumError, ValueError):
+    """No medium of that name; the message lists those that there are."""
 
 
 class DecodeError(TelemetryError, ValueError):

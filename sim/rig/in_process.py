@@ -13,7 +13,7 @@ from sim.rig.scheduler import Progress
 from sim.rig.stepper import Answer, FrameEvent
 from telemetry.messages import address_name
 from telemetry.runtime.process import Process
-from telemetry.runtime.stepped import Sent, dispatch
+from telemetry.runtime.stepped import Sent, run_step
 
 Build = Callable[[], Process]
 
@@ -75,8 +75,5 @@ class InProcessStepper:
 def step(process: Process, events: list[FrameEvent]) -> Answer:
     """One step of one process: its events in order, and after each the frames that it sends."""
     frames: list[tuple[Sent, bytes]] = []
-    now = events[-1][0].at
-    for event, frame in events:
-        dispatch(process, event, frame)
-        frames += [(Sent(side, event.at), outgoing) for side, outgoing in process.take_frames(event.at)]
-    return Answer(frames, process.next_wake(now))
+    wake_at = run_step(process, events, lambda sent, frame: frames.append((sent, frame.payload)))
+    return Answer(frames, wake_at)

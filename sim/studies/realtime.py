@@ -19,9 +19,13 @@ from sim.rig.processes import ProcessTable
 from sim.studies.turning_string import TurningString
 from telemetry.application.endpoint import Endpoint
 from telemetry.media.neighbours import neighbour_ports
+from telemetry.media.port import Medium
 from telemetry.media.zenoh_bus import open_router
+from telemetry.media.zenoh_port import ZenohMedium
 from telemetry.messages import BASE, ENCODER, NodeFlag, NodeState, Side, address_name
-from telemetry.runtime.own_clock import Inbox, OwnClock, serve_by_own_clock
+from telemetry.runtime.event_loop import run as run_loop
+from telemetry.runtime.event_loop import stop_on_signals
+from telemetry.runtime.own_clock import OwnClock, OwnClockLoop
 from telemetry.runtime.process import Process
 from telemetry.runtime.timing import CycleTiming
 
@@ -50,14 +54,23 @@ class Heard:
 class Surface(Process):
     """The base station's end of the string: hears every node through all above it, and ends the run."""
 
-    def __init__(self, string: TurningString, seconds: float, inbox: Inbox, table: ProcessTable) -> None:
+    def __init__(self, string: TurningString, seconds: float, table: ProcessTable) -> None:
         self.endpoint = Endpoint(BASE, frozenset({Side.LOWER}), boot_count=1)
         self.heard = {tube: Heard() for tube in range(1, string.tubes + 1)}
         self.interrupted = False
         self.begun_at: float | None = None  # s, when the last node was heard first
         self.cpu_before: dict[str, float] = {}
-        self._string, self._seconds, self._inbox, self._table = string, seconds, inbox, table
+        self._string, self._seconds, self._table = string, seconds, table
+        self._loop: OwnClockLoop | None = None
         self._until = time.monotonic() + COME_LIMIT
+
+    async def live(self, medium: Medium, rig: str) -> None:
+        """Listen until the time is over."""
+        ports = neighbour_ports(medium, rig, BASE, {Side.LOWER: ENCODER})
+        self._loop = OwnClockLoop(self, ports, OwnClock(), CycleTiming(), PERIOD)
+        stop_on_signals(self.interrupt)
+        if not self.interrupted:
+            await self._loop.run()
 
     def on_frame(self, side: Side, frame: bytes, now: float) -> None:
         """A frame arrived from the encoder."""
@@ -75,13 +88,14 @@ class Surface(Process):
         if self.begun_at is None and all(heard.states for heard in self.heard.values()):
             self.begun_at, self._until = now, now + self._seconds
             self.cpu_before = {name: cpu_seconds(pid) for name, pid in pids(self._table).items()}
-        if now >= self._until:
-            self._inbox.stop()
+        if now >= self._until and self._loop is not None:
+            self._loop.stop()
 
     def interrupt(self) -> None:
-        """End at once; may be called from a signal handler."""
+        """End at once."""
         self.interrupted = True
-        self._inbox.stop()
+        if self._loop is not None:
+            self._loop.stop()
 
 
 def run(
@@ -98,8 +112,7 @@ def run(
     KeyboardInterrupt
         On Ctrl-C; every process has ended by then.
     """
-    inbox = Inbox()
-    surface = Surface(string, seconds, inbox, table)
+    surface = Surface(string, seconds, table)
     begun: dict[str, float] = {}
     try:
         table.warm()
@@ -107,8 +120,7 @@ def run(
             for name in table.specs:
                 begun[name] = time.monotonic()
                 table.start(name)
-            ports = neighbour_ports(bus, rig, BASE, {Side.LOWER: ENCODER})
-            serve_by_own_clock(surface, ports, inbox, OwnClock(), CycleTiming(), PERIOD)
+            run_loop(surface.live(ZenohMedium(bus), rig))
             if surface.interrupted:
                 raise KeyboardInterrupt
             if surface.begun_at is None:

@@ -16,6 +16,7 @@ import msgpack
 from telemetry.application.clock import ClockFilter
 from telemetry.application.outbox import Outbox
 from telemetry.errors import DecodeError
+from telemetry.media.port import Frame, Priority
 from telemetry.messages import (
     BASE,
     ENCODER,
@@ -54,6 +55,21 @@ RELIABLE = (
     Kind.BLOCK_STATUS,
     Kind.STATIC_RECORD,
 )
+PRIORITIES: dict[Kind, Priority] = {
+    Kind.TIME_REQUEST: Priority.TIME,
+    Kind.TIME_REPLY: Priority.TIME,
+    Kind.AIDING: Priority.AIDING,
+    Kind.HELLO: Priority.HELLO,
+    Kind.COMMAND: Priority.COMMAND,
+    Kind.RECEIPT: Priority.COMMAND,
+    Kind.SURVEY_MEASUREMENT: Priority.SURVEY,
+    Kind.EVENT: Priority.SURVEY,
+    Kind.REPLY: Priority.SURVEY,
+    Kind.NODE_STATE: Priority.STATE,
+    Kind.STATIC_RECORD: Priority.SURVEY,
+    Kind.BLOCK_STATUS: Priority.SURVEY,
+    Kind.BLOCK_SEGMENT: Priority.BLOCK,
+}
 
 
 @dataclass(frozen=True, slots=True)
@@ -150,11 +166,11 @@ class Endpoint:
             self._send_hello()
         if self._sync_side in self._links and now >= self._sync_at + self._sync_pace():
             self._sync_at = now
-            self._links[self._sync_side].send_best_effort(encode(TimeRequest(now)), Kind.TIME_REQUEST)
+            self._links[self._sync_side].send_best_effort(encode(TimeRequest(now)), Kind.TIME_REQUEST, Priority.TIME)
         self._send_due(self._outbox, Side.UPPER, now)
         self._send_due(self._commands, Side.LOWER, now)
 
-    def take_frames(self, now: float) -> list[tuple[Side, bytes]]:
+    def take_frames(self, now: float) -> list[tuple[Side, Frame]]:
         """Frames to put on the wire now."""
         return [(side, frame) for side, link in self._links.items() for frame in link.take_frames(now)]
 
@@ -166,14 +182,14 @@ class Endpoint:
         """Hand the reference to the tube below; the newest replaces one that still waits."""
         del now
         if Side.LOWER in self._links:
-            self._links[Side.LOWER].send_best_effort(encode(aiding), Kind.AIDING)
+            self._links[Side.LOWER].send_best_effort(encode(aiding), Kind.AIDING, Priority.AIDING)
 
     def send_state(self, state: NodeState, now: float) -> None:
         """Send the node's account of itself up the string."""
         del now
         self.mode = state.mode
         if Side.UPPER in self._links:
-            self._links[Side.UPPER].send_best_effort(encode(state), (Kind.NODE_STATE, state.tube))
+            self._links[Side.UPPER].send_best_effort(encode(state), (Kind.NODE_STATE, state.tube), Priority.STATE)
 
     def submit(self, message: Kept, now: float) -> None:
         """Keep a message until the ground station has receipted it, and send it."""
@@ -202,7 +218,7 @@ class Endpoint:
 
     def send_segment(self, segment: BlockSegment) -> None:
         """Send a part of a parameter block down; what is lost with a relay the upload repeats (base station)."""
-        self._links[Side.LOWER].send_reliable(encode(segment))
+        self._links[Side.LOWER].send_reliable(encode(segment), Priority.BLOCK)
 
     def send_status(self, status: BlockStatus) -> None:
         """Tell the ground station how an upload stands."""
@@ -211,7 +227,7 @@ class Endpoint:
     def acknowledge(self, tube: int, sequence: int, now: float) -> None:
         """Tell a tube that its message is stored (base station)."""
         del now
-        self._links[Side.LOWER].send_reliable(encode(Receipt(tube, sequence)))
+        self._links[Side.LOWER].send_reliable(encode(Receipt(tube, sequence)), Priority.COMMAND)
 
     @property
     def outbox_size(self) -> int:
@@ -253,7 +269,7 @@ class Endpoint:
                 clock = self.clock
                 var = min(clock.variance(now), 1e9)
                 reply = TimeReply(message.asked_at, now, now, clock.rig_from_local(now), clock.rig_rate, var)
-                self._links[side].send_best_effort(encode(reply), Kind.TIME_REPLY)
+                self._links[side].send_best_effort(encode(reply), Kind.TIME_REPLY, Priority.TIME)
             case TimeReply() if side is self._sync_side:
                 self.clock.exchange(message, now)
             case Aiding() if side is Side.UPPER:
@@ -296,19 +312,20 @@ class Endpoint:
         if link is None:
             self.counters["nowhere_to_go"] += 1
         elif envelope.kind in RELIABLE:
-            link.send_reliable(payload)
+            link.send_reliable(payload, PRIORITIES[envelope.kind])
         else:
-            link.send_best_effort(payload, (envelope.kind, envelope.origin))
+            link.send_best_effort(payload, (envelope.kind, envelope.origin), PRIORITIES[envelope.kind])
 
     def _send_hello(self) -> None:
         hello = Hello(self.address, self.boot_count, self.hops, self.mode, 1.0)
         for link in self._links.values():
-            link.send_best_effort(encode(replace(hello, link_quality=link.quality)), Kind.HELLO)
+            link.send_best_effort(encode(replace(hello, link_quality=link.quality)), Kind.HELLO, Priority.HELLO)
 
     def _sync_pace(self) -> float:
         return SYNC_QUICK if self.clock.exchanges < SYNC_BURST else SYNC_SLOW
 
     def _send_due(self, outbox: Outbox, side: Side, now: float) -> None:
+        priority = Priority.COMMAND if side is Side.LOWER else Priority.SURVEY
         if side in self._links:
             for payload in outbox.due_payloads(now):
-                self._links[side].send_reliable(payload)
+                self._links[side].send_reliable(payload, priority)

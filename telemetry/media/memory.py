@@ -1,66 +1,142 @@
-"""A joint inside one process, with its troubles as plain fields and its time from outside. For tests of protocols."""
+"""A joint inside one process, with its faults as plain fields and its time from outside."""
 
 from __future__ import annotations
 
 import heapq
 import random
+from collections import Counter
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass, field
+
+from telemetry.errors import MediumError
+from telemetry.media.port import MAX_FRAME, Frame, TubeEnd
+from telemetry.media.send_queue import SendQueue
+
+Deliver = Callable[[bytes], object]
 
 
 @dataclass(slots=True)
 class MemoryPort:
-    """One end; ``other`` is the opposite one. Probabilities are of each frame sent from this end."""
+    """One end, see ``port.Port``; ``other`` is the opposite one. Probabilities are of each frame sent from this end.
+
+    A frame without delay is delivered as it is sent; one with a delay when ``advance`` of the other end says so.
+    """
 
     seed: int = 0
-    latency: float = 0.003  # s
+    latency: float = 0.0  # s
     jitter: float = 0.0  # s, mean
     loss: float = 0.0
     duplicate: float = 0.0
     corrupt: float = 0.0
-    is_open: bool = False  # an open joint carries nothing
+    is_open: bool = False  # electrically: an open joint carries nothing
     other: MemoryPort | None = None
-    sent: int = 0
+    now: float = 0.0  # s
+    largest_payload: int = MAX_FRAME
+    _deliver: Deliver | None = None
+    _closed: bool = False
     _arriving: list[tuple[float, int, bytes]] = field(default_factory=list)
-    _random: random.Random = field(default_factory=random.Random)
-    _order: int = 0
+    _arrivals: int = 0
+    _random: random.Random = field(init=False)
+    _queue: SendQueue = field(init=False)
 
     def __post_init__(self) -> None:
-        """Seed the troubles."""
-        self._random.seed(self.seed)
+        """Seed the faults."""
+        self._random = random.Random(self.seed)
+        self._queue = SendQueue(self.largest_payload)
 
-    def send(self, frame: bytes, now: float) -> None:
-        """Put a frame on the wire: it arrives later, twice, damaged or not at all."""
-        self.sent += 1
-        if self.other is None or self.is_open or self.other.is_open or self._random.random() < self.loss:
+    @property
+    def is_up(self) -> bool:
+        """Whether somebody listens at the other end of a closed joint."""
+        return self.other is not None and self.other._deliver is not None and not (self.is_open or self.other.is_open)
+
+    @property
+    def counters(self) -> Counter[str]:
+        """Frames that did not leave, by reason."""
+        return self._queue.counters
+
+    def send(self, frame: Frame) -> bool:
+        """Send a frame: it arrives later, twice, damaged or not at all."""
+        accepted = self._queue.offer(frame)
+        self.flush()
+        return accepted
+
+    def flush(self) -> None:
+        """Send what waits."""
+        if self._closed:
+            raise MediumError("port in memory: it is closed")
+        self._queue.drain(lambda: self.is_up, self._transmit)
+
+    def listen(self, deliver: Deliver) -> None:
+        """Call ``deliver`` for every frame that arrives."""
+        self._deliver = deliver
+
+    def advance(self, now: float) -> None:
+        """Deliver what has arrived by ``now`` (s), from which on frames leave."""
+        self.now = now
+        while self._arriving and self._arriving[0][0] <= now and self._deliver is not None:
+            self._deliver(heapq.heappop(self._arriving)[2])
+
+    def close(self) -> None:
+        """Let the end go."""
+        self._closed, self._deliver = True, None
+
+    def _transmit(self, payload: bytes) -> None:
+        if self.other is None or self._random.random() < self.loss:
             return
         for _ in range(2 if self._random.random() < self.duplicate else 1):
             delay = self.latency + (self._random.expovariate(1.0 / self.jitter) if self.jitter else 0.0)
-            arrived = self._damage(frame) if self._random.random() < self.corrupt else frame
-            self.other._arriving_push(now + delay, arrived)
+            arrived = self._damage(payload) if self._random.random() < self.corrupt else payload
+            self.other._arrive(self.now + delay, arrived, at_once=delay == 0.0)
 
-    def receive(self, now: float) -> list[bytes]:
-        """Frames that have arrived by ``now``."""
-        frames = []
-        while self._arriving and self._arriving[0][0] <= now:
-            frames.append(heapq.heappop(self._arriving)[2])
-        return frames
+    def _arrive(self, at: float, payload: bytes, *, at_once: bool) -> None:
+        if at_once and self._deliver is not None:
+            self._deliver(payload)
+            return
+        self._arrivals += 1
+        heapq.heappush(self._arriving, (at, self._arrivals, payload))
 
-    def next_arrival(self) -> float | None:
-        """When the next frame arrives."""
-        return self._arriving[0][0] if self._arriving else None
-
-    def _arriving_push(self, at: float, frame: bytes) -> None:
-        self._order += 1
-        heapq.heappush(self._arriving, (at, self._order, frame))
-
-    def _damage(self, frame: bytes) -> bytes:
-        damaged = bytearray(frame)
-        damaged[self._random.randrange(len(damaged))] ^= 1 << self._random.randrange(8)
+    def _damage(self, payload: bytes) -> bytes:
+        damaged = bytearray(payload)
+        if damaged:
+            damaged[self._random.randrange(len(damaged))] ^= 1 << self._random.randrange(8)
         return bytes(damaged)
 
 
-def joint(seed: int = 0, **troubles: float) -> tuple[MemoryPort, MemoryPort]:
-    """Two ends joined, with the same troubles in both directions."""
-    upper, lower = MemoryPort(2 * seed, **troubles), MemoryPort(2 * seed + 1, **troubles)  # type: ignore[arg-type]
+def joint(seed: int = 0, latency: float = 0.003, **faults: float) -> tuple[MemoryPort, MemoryPort]:
+    """Two ends joined, with the same faults in both directions; ``latency`` in s."""
+    upper = MemoryPort(2 * seed, latency, **faults)  # type: ignore[arg-type]
+    lower = MemoryPort(2 * seed + 1, latency, **faults)  # type: ignore[arg-type]
     upper.other, lower.other = lower, upper
     return upper, lower
+
+
+class MemoryMedium:
+    """Ends of one process's rigs, joined as soon as both are there."""
+
+    def __init__(self) -> None:
+        self._ports: dict[tuple[str, int, int], MemoryPort] = {}
+
+    def open_port(self, end: TubeEnd) -> MemoryPort:
+        """Port of one end."""
+        standing = self._ports.get(place(end))
+        if standing is not None and not standing._closed:
+            raise MediumError(f"port in memory: the {end.side.name.lower()} end of {end.address} is taken")
+        port = self._ports[place(end)] = MemoryPort()
+        if end.neighbour is not None and (other := self._ports.get(place(end.facing))) is not None:
+            port.other, other.other = other, port
+        return port
+
+
+def place(end: TubeEnd) -> tuple[str, int, int]:
+    """What makes an end the same end."""
+    return end.rig, end.address, int(end.side)
+
+
+_nets: dict[str, MemoryMedium] = {}
+
+
+@contextmanager
+def open_medium(where: str) -> Iterator[MemoryMedium]:
+    """The net of the name ``where`` in this process."""
+    yield _nets.setdefault(where, MemoryMedium())

@@ -1,19 +1,18 @@
-"""Ports of a tube that no stepper drives: each end hears the neighbour's port itself, as if through a wire."""
+"""Ports of a process, one for each of its ends."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 
-from telemetry import keys
-from telemetry.media.port import Port
-from telemetry.media.zenoh_bus import ZenohBus, ZenohPort
+from telemetry.media.port import Medium, Port, TubeEnd
 from telemetry.messages import Side
 
 
-def neighbour_ports(bus: ZenohBus, rig: str, address: int, neighbours: Mapping[Side, int]) -> dict[Side, Port]:
-    """Ends of the process ``address`` that have a neighbour; what leaves its lower end arrives here at the upper."""
-    facing = {Side.UPPER: Side.LOWER, Side.LOWER: Side.UPPER}
-    return {
-        side: ZenohPort(bus, keys.port_key(rig, address, side, "tx"), keys.port_key(rig, neighbour, facing[side], "tx"))
-        for side, neighbour in neighbours.items()
-    }
+def neighbour_ports(medium: Medium, rig: str, address: int, neighbours: Mapping[Side, int]) -> dict[Side, Port]:
+    """Ends of the process ``address`` that have a neighbour; what leaves its lower end arrives there at the upper."""
+    return {side: medium.open_port(TubeEnd(rig, address, side, other)) for side, other in neighbours.items()}
+
+
+def stepped_ports(medium: Medium, rig: str, address: int, sides: Iterable[Side]) -> dict[Side, Port]:
+    """Ends of the process ``address`` that a stepper joins with others as the schedule wants."""
+    return {side: medium.open_port(TubeEnd(rig, address, side)) for side in sides}

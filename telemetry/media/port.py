@@ -1,26 +1,123 @@
-"""The contract of a medium: one end of a joint takes frames to send and hands over frames that came.
+"""The contract of a medium: ports that carry frames over a joint, one at each end.
 
-A medium knows nothing of what frames mean, and may lose, repeat, delay and reorder them. zenoh is one
-(``zenoh_bus.ZenohPort``); CAN becomes another by offering the same two calls.
+A medium knows nothing of what frames mean and may lose, repeat, delay and reorder them; the link above it
+(``transport.hop``) repairs that. A port never blocks for want of another end: what it cannot send waits in a bounded
+queue (``send_queue``), and what the queue cannot hold is dropped and counted.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections import Counter
+from collections.abc import Callable, Hashable
+from dataclasses import dataclass
+from enum import IntEnum
 from typing import Protocol
+
+from telemetry.messages import Side
+
+MAX_FRAME = 16384  # bytes, largest frame of the hop link
+
+
+class Priority(IntEnum):
+    """Class of a frame; the smaller number goes first, as with the identifiers of a CAN bus."""
+
+    TIME = 0  # a clock exchange; once it had to wait it is worthless
+    AIDING = 1
+    HELLO = 2
+    COMMAND = 3  # commands, receipts, acknowledgements
+    SURVEY = 4  # surveys, events, replies
+    STATE = 5
+    BLOCK = 6
+
+
+@dataclass(frozen=True, slots=True)
+class Frame:
+    """What a link hands to its port.
+
+    Parameters
+    ----------
+    payload : the bytes on the wire
+    priority : class of its most urgent content
+    topic : best effort: a newer frame of the same topic replaces one that still waits; None: must not be lost
+    """
+
+    payload: bytes
+    priority: Priority = Priority.SURVEY
+    topic: Hashable | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class TubeEnd:
+    """Which end of which process a port serves, and whose port it faces."""
+
+    rig: str
+    address: int
+    side: Side
+    neighbour: int | None = None  # address at the other side of the joint; None: a stepper joins
+
+    @property
+    def facing(self) -> TubeEnd:
+        """The end that this one looks into.
+
+        Raises
+        ------
+        ValueError
+            When a stepper decides that from moment to moment.
+        """
+        if self.neighbour is None:
+            raise ValueError(f"end of {self.address}: expected a neighbour, got none")
+        opposite = Side.LOWER if self.side is Side.UPPER else Side.UPPER
+        return TubeEnd(self.rig, self.neighbour, opposite, self.address)
 
 
 class Port(Protocol):
-    """One end of a joint on some bus."""
+    """One end of a joint on some bus; all calls come from one thread."""
 
-    def send(self, frame: bytes) -> None:
-        """Put a frame on the wire.
+    @property
+    def largest_payload(self) -> int:
+        """Bytes of the largest frame that is accepted."""
+
+    @property
+    def is_up(self) -> bool:
+        """Whether somebody listens at the other end."""
+
+    @property
+    def counters(self) -> Counter[str]:
+        """Frames that did not leave, by reason: ``too_large``, ``replaced``, ``dropped``, ``outdated``."""
+
+    def send(self, frame: Frame) -> bool:
+        """Send a frame now, or as soon as the other end is there; returns False for one that is too large.
 
         Raises
         ------
         MediumError
-            When the bus is lost.
+            When the port is closed or the bus is lost.
         """
 
-    def listen(self, deliver: Callable[[bytes], None]) -> None:
-        """Call ``deliver`` for every frame that arrives, possibly on a foreign thread."""
+    def flush(self) -> None:
+        """Send what waits, if the other end is there.
+
+        Raises
+        ------
+        MediumError
+            When the port is closed or the bus is lost.
+        """
+
+    def listen(self, deliver: Callable[[bytes], object]) -> None:
+        """Call ``deliver``, which must only put into a queue, for every frame that arrives; maybe on another thread."""
+
+    def close(self) -> None:
+        """Let the end go; the other end sees that nobody listens. A second call does nothing."""
+
+
+class Medium(Protocol):
+    """A bus that was opened."""
+
+    def open_port(self, end: TubeEnd) -> Port:
+        """Port of one end.
+
+        Raises
+        ------
+        MediumError
+            When the bus is lost or the end is taken.
+        """

@@ -8,7 +8,7 @@ from __future__ import annotations
 import json
 import os
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from typing import Any
 
@@ -51,6 +51,27 @@ class Publisher:
         except zenoh.ZError as error:
             raise MediumError(f"zenoh put on {self._publisher.key_expr}: {error}") from error
 
+    @property
+    def is_heard(self) -> bool:
+        """Whether anybody subscribes to the key."""
+        status: Any = self._publisher.matching_status
+        return bool(status.matching)
+
+    def close(self) -> None:
+        """Put nothing more."""
+        undeclare(self._publisher)
+
+
+class Subscription:
+    """What a subscriber was declared as."""
+
+    def __init__(self, subscriber: Any) -> None:
+        self._subscriber = subscriber
+
+    def close(self) -> None:
+        """Hear nothing more."""
+        undeclare(self._subscriber)
+
 
 class Query:
     """A question that came in: selector, parameters, and the ways to answer it."""
@@ -67,6 +88,10 @@ class Query:
     def reply(self, key: str, payload: bytes, encoding: str = JSON) -> None:
         """Answer on one key."""
         self._query.reply(key, payload, encoding=encoding)
+
+    def finish(self) -> None:
+        """Tell the asker that no more answers come; for queries of ``queryable_kept``."""
+        self._query.drop()  # type: ignore[no-untyped-call]
 
     def reply_error(self, text: str) -> None:
         """Say what was wrong with the question."""
@@ -91,18 +116,18 @@ class ZenohBus:
         self._declared.append(declared)
         return Publisher(declared)
 
-    def subscribe(self, pattern: str, callback: Callable[[str, bytes], None]) -> None:
+    def subscribe(self, pattern: str, callback: Callable[[str, bytes], object]) -> None:
         """Call ``callback(key, payload)`` on a foreign thread for each sample."""
         self._declared.append(
             self._session.declare_subscriber(pattern, lambda s: callback(str(s.key_expr), s.payload.to_bytes()))
         )
 
-    def subscribe_at_once(self, pattern: str, callback: Callable[[str, bytes], None]) -> None:
+    def subscribe_at_once(self, pattern: str, callback: Callable[[str, bytes], object]) -> Subscription:
         """The same on the thread that receives, not on one more: ``callback`` must only put into a queue."""
         direct: Any = zenoh.handlers.Callback(lambda s: callback(str(s.key_expr), s.payload.to_bytes()), indirect=False)
-        self._declared.append(self._session.declare_subscriber(pattern, direct))
+        return Subscription(self._session.declare_subscriber(pattern, direct))
 
-    def queryable(self, pattern: str, handler: Callable[[Query], None]) -> None:
+    def queryable(self, pattern: str, handler: Callable[[Query], object]) -> None:
         """Answer queries that intersect ``pattern`` with ``handler`` on a foreign thread."""
 
         def answer(query: zenoh.Query) -> None:
@@ -110,6 +135,10 @@ class ZenohBus:
                 handler(Query(query))
 
         self._declared.append(self._session.declare_queryable(pattern, answer, complete=True))
+
+    def queryable_kept(self, pattern: str, handler: Callable[[Query], object]) -> None:
+        """Hand queries that intersect ``pattern`` to ``handler`` on a foreign thread; ``Query.finish`` ends each."""
+        self._declared.append(self._session.declare_queryable(pattern, lambda q: handler(Query(q)), complete=True))
 
     def get(self, selector: str, timeout: float) -> list[Reply]:
         """All answers to ``selector`` within ``timeout`` wall seconds.
@@ -141,23 +170,6 @@ class ZenohBus:
         """Close the session; every declaration ends with it."""
         self._declared.clear()
         self._session.close()  # type: ignore[no-untyped-call]
-
-
-class ZenohPort:
-    """One end of a joint on two keys, see ``medium.Port``."""
-
-    def __init__(self, bus: ZenohBus, send_key: str, receive_key: str) -> None:
-        self._bus = bus
-        self._publisher = bus.publisher(send_key, encoding="application/octet-stream")
-        self._receive_key = receive_key
-
-    def send(self, frame: bytes) -> None:
-        """Put a frame on the wire."""
-        self._publisher.put(frame)
-
-    def listen(self, deliver: Callable[[bytes], None]) -> None:
-        """Call ``deliver``, which only puts into a queue, on a foreign thread for every frame that arrives."""
-        self._bus.subscribe_at_once(self._receive_key, lambda _key, frame: deliver(frame))
 
 
 def use_few_threads() -> None:
@@ -206,6 +218,12 @@ def open_client(endpoint: str, timeout: float) -> Iterator[ZenohBus]:
     except zenoh.ZError as error:
         raise MediumError(f"no router at {endpoint} within {timeout:g} s: is the rig running there?") from error
     yield from _held(session)
+
+
+def undeclare(declared: Any) -> None:
+    """End a declaration; with its session it has ended already."""
+    with suppress(zenoh.ZError):
+        declared.undeclare()
 
 
 def intersects(selector_key: str, key: str) -> bool:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import asyncio
 import contextlib
 import ctypes
 import json
@@ -10,21 +11,25 @@ import signal
 import sys
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
+from typing import Any
 
 import setproctitle
 
-from telemetry.media.neighbours import neighbour_ports
+from telemetry.media.neighbours import neighbour_ports, stepped_ports
+from telemetry.media.table import open_medium
 from telemetry.media.zenoh_bus import ZenohBus, open_client, use_few_threads
+from telemetry.media.zenoh_port import CONNECT_TIMEOUT, ZenohMedium
 from telemetry.messages import Side
 from telemetry.runtime.command_line import EnvironmentFault, fault_of
-from telemetry.runtime.own_clock import Inbox, OwnClock, serve_by_own_clock
+from telemetry.runtime.event_loop import run, stop_on_signals
+from telemetry.runtime.own_clock import OwnClock, OwnClockLoop
 from telemetry.runtime.process import Process
-from telemetry.runtime.stepped import StepClient, Stepped, serve, zenoh_ports
+from telemetry.runtime.step_client import StepClient, serve
 from telemetry.runtime.timing import CycleTiming
 
 PR_SET_PDEATHSIG = 1
-CONNECT_TIMEOUT = 30.0  # wall s
 TIMING_FILE = "timing.json"
 
 
@@ -49,23 +54,51 @@ class OwnTime:
 def run_by_own_clock(
     name: str, place: Place, address: int, own_time: OwnTime, build: Callable[[CycleTiming], Process], period: float
 ) -> None:
-    """Build a process and run it by its own clock, a cycle every ``period`` (s).
+    """Build a process and run it by its own clock, a cycle every ``period`` (s), until a signal ends it.
 
-    ``timing.json`` says how that went, at the end and on SIGUSR1.
+    What is wrong with its options, recordings or folder is found before anything is connected. ``timing.json`` says how
+    the time went, at the end and on SIGUSR1.
     """
     begin_process(name)
     use_few_threads()
-    timing, inbox = CycleTiming(), Inbox()
-    on_termination(inbox.stop)
-    with reporting(name), joined(place) as bus:
-        process = build(timing)
-        signal.signal(signal.SIGUSR1, lambda *_: inbox.put(lambda *_: tell(place.folder, timing)))
+    with reporting(name):
+        run(live_by_own_clock(name, place, address, own_time, build, period))
+
+
+async def live_by_own_clock(
+    name: str, place: Place, address: int, own_time: OwnTime, build: Callable[[CycleTiming], Process], period: float
+) -> None:
+    """``run_by_own_clock`` on the running loop."""
+    timing = CycleTiming()
+    make_folder(place)
+    with contextlib.closing(build(timing)) as process, open_medium(f"zenoh:{place.endpoint}") as medium:
+        ports = neighbour_ports(medium, place.rig, address, own_time.neighbours)
+        loop = OwnClockLoop(process, ports, OwnClock(own_time.offset), timing, period, partial(complain, name))
+
+        def write() -> None:
+            write_timing(place.folder, timing.report() | loop.losses())
+
+        stop_on_signals(loop.stop)
+        asyncio.get_running_loop().add_signal_handler(signal.SIGUSR1, write)
         try:
-            ports = neighbour_ports(bus, place.rig, address, own_time.neighbours)
-            serve_by_own_clock(process, ports, inbox, OwnClock(own_time.offset), timing, period)
+            await loop.run()
         finally:
-            process.close()
-            tell(place.folder, timing)
+            write()
+
+
+def run_stepped(name: str, place: Place, address: int, build: Callable[[], Process]) -> None:
+    """Build a process, join the stepper and serve it; the token of life is last, when everything listens.
+
+    What is wrong with its options, recordings or folder is found before anything is connected.
+    """
+    begin_process(name)
+    with reporting(name):
+        make_folder(place)
+        process = build()
+        with joined(place) as bus:
+            client = StepClient(bus, place.rig, address, stepped_ports(ZenohMedium(bus), place.rig, address, Side))
+            on_termination(client.stop)
+            serve(process, client, partial(complain, name))
 
 
 @contextlib.contextmanager
@@ -79,30 +112,37 @@ def joined(place: Place) -> Iterator[ZenohBus]:
     MediumError
         When no router answers.
     """
-    try:
-        place.folder.mkdir(parents=True, exist_ok=True)
-    except OSError as error:
-        raise EnvironmentFault(f"--folder {place.folder}: {error.strerror}; choose a writable place") from error
+    make_folder(place)
     with open_client(place.endpoint, timeout=CONNECT_TIMEOUT) as bus:
         yield bus
 
 
-def tell(folder: Path, timing: CycleTiming) -> None:
+def make_folder(place: Place) -> None:
+    """Have the folder of a process.
+
+    Raises
+    ------
+    EnvironmentFault
+        When it cannot be made.
+    """
+    try:
+        place.folder.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise EnvironmentFault(f"--folder {place.folder}: {error.strerror}; choose a writable place") from error
+
+
+def write_timing(folder: Path, report: dict[str, Any]) -> None:
     """Write down how the time went; a full disk ends no node that was only asked."""
     fresh = folder / f"{TIMING_FILE}.new"
     with contextlib.suppress(OSError):
-        fresh.write_text(json.dumps(timing.report()) + "\n")
+        fresh.write_text(json.dumps(report) + "\n")
         fresh.replace(folder / TIMING_FILE)
 
 
-def run_stepped(name: str, place: Place, address: int, build: Callable[[], Stepped]) -> None:
-    """Build a process, join the stepper and serve it; the token of life is last, when everything listens."""
-    begin_process(name)
-    with reporting(name), joined(place) as bus:
-        process = build()
-        client = StepClient(bus, place.rig, address, zenoh_ports(bus, place.rig, address, Side))
-        on_termination(client.stop)
-        serve(process, client)
+def complain(name: str, line: str) -> None:
+    """Say on stderr what somebody should look after; the process goes on."""
+    sys.stderr.write(f"borechain {name}: {line}\n")
+    sys.stderr.flush()
 
 
 def begin_process(name: str) -> None:

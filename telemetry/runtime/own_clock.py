@@ -9,18 +9,21 @@ reply are equally long on their way. The process is the very object that a stepp
 from __future__ import annotations
 
 import math
-import queue
 import time
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
 from functools import partial
+from typing import Any
 
 from telemetry.media.port import Port
 from telemetry.messages import Side
+from telemetry.runtime.inbox import Inbox
 from telemetry.runtime.process import Process
 from telemetry.runtime.timing import CycleTiming, Stage
 
 FRAMES_TOGETHER = 16  # taken before what they made is sent, while more wait
+ABSENT_LIMIT = 60.0  # s without a neighbour until that is reported
+Act = Callable[[Process, float], None]
 
 
 @dataclass(frozen=True, slots=True)
@@ -60,89 +63,139 @@ class Schedule:
         return missed
 
 
-class Inbox:
-    """What comes from the ports' threads, in one queue; its ``stop`` may be called from a signal handler."""
+class AbsenceWatch:
+    """Finds the ends at which nobody has been heard for ``limit`` s, and names each once until somebody is."""
 
-    def __init__(self) -> None:
-        self._arrived: queue.SimpleQueue[Callable[[Process, float], None] | None] = queue.SimpleQueue()
+    def __init__(self, sides: Iterable[Side], begin: float, limit: float = ABSENT_LIMIT) -> None:
+        self._limit = limit
+        self._heard_at = dict.fromkeys(sides, begin)
+        self._reported: set[Side] = set()
 
-    def listen(self, ports: Mapping[Side, Port]) -> None:
-        """Take the frames of every port."""
+    def find(self, neighbours: Mapping[Side, object], now: float) -> list[Side]:
+        """Ends that are newly found silent; ``neighbours`` holds None where nobody is heard."""
+        found = []
+        for side, heard_at in self._heard_at.items():
+            if neighbours.get(side) is not None:
+                self._heard_at[side] = now
+                self._reported.discard(side)
+            elif now - heard_at >= self._limit and side not in self._reported:
+                self._reported.add(side)
+                found.append(side)
+        return found
+
+
+class OwnClockLoop:
+    """Runs a process by its own clock as a task of the running asyncio loop.
+
+    Parameters
+    ----------
+    process : what is run
+    ports : its ends that have a neighbour
+    clock, timing : its clock, and where the durations are kept
+    period : s, of a cycle
+    report : takes a line about an end at which nobody is heard
+    """
+
+    def __init__(
+        self,
+        process: Process,
+        ports: Mapping[Side, Port],
+        clock: OwnClock,
+        timing: CycleTiming,
+        period: float,
+        report: Callable[[str], None] = lambda line: None,
+    ) -> None:
+        self._process, self._ports, self._clock, self._timing = process, ports, clock, timing
+        self._report = report
+        self._inbox: Inbox[Act] = Inbox()
+        self._read_until = clock.now()
+        self._schedule = Schedule(self._read_until, period)
+        self._absence = AbsenceWatch(ports, self._read_until)
+        self._synchronised = -math.inf  # deadline before which the clocks were synchronised
+        self._unsent = 0
         for side, port in ports.items():
-            port.listen(partial(self._frame, side))
+            port.listen(partial(self._on_frame, side))
 
-    def put(self, act: Callable[[Process, float], None]) -> None:
-        """Have ``act(process, now)`` called by the loop."""
-        self._arrived.put(act)
+    def call(self, act: Act) -> None:
+        """Have ``act(process, now)`` called; from any thread."""
+        self._inbox.put(act)
 
     def stop(self) -> None:
-        """End the loop."""
-        self._arrived.put(None)
+        """End ``run``; from any thread or signal handler of the loop."""
+        self._inbox.close()
 
-    def next_arrival(self, timeout: float) -> Callable[[Process, float], None] | None:
-        """What came next, or None after ``stop``.
+    async def run(self) -> None:
+        """Run until ``stop``.
 
         Raises
         ------
-        queue.Empty
-            When nothing came for ``timeout`` s.
+        MediumError
+            When the bus is lost.
         """
-        return self._arrived.get(timeout=timeout) if timeout > 0.0 else self._arrived.get_nowait()
+        while not self._inbox.is_closed:
+            now = self._clock.now()
+            await self._inbox.wait(min(self._next_moment(), self._process.next_wake(now)) - now)
+            if not self._inbox.is_closed:
+                self._take_one()
+                self._do_due()
 
-    @property
-    def empty(self) -> bool:
-        """Whether nothing waits."""
-        return self._arrived.empty()
+    def losses(self) -> dict[str, Any]:
+        """Frames that never arrived at the process or never left it, for a report."""
+        ports = {
+            side.name.lower(): {"is_up": port.is_up, "not_sent": dict(port.counters)}
+            for side, port in self._ports.items()
+        }
+        return {"inbox_dropped": self._inbox.dropped, "ports": ports}
 
-    def _frame(self, side: Side, frame: bytes) -> None:
-        self._arrived.put(lambda process, now: process.on_frame(side, frame, now))
+    def _next_moment(self) -> float:
+        """Next deadline, or the middle of the time before it."""
+        schedule = self._schedule
+        return schedule.due if self._synchronised >= schedule.due else schedule.halfway
 
+    def _take_one(self) -> None:
+        """One frame or call that waits, or else the timer that is due."""
+        act = self._inbox.take()
+        now = self._clock.now()
+        if act is not None:
+            self._timing.begin()
+            act(self._process, now)
+            self._timing.lap(Stage.FRAME)
+            self._unsent += 1
+        elif now < self._next_moment():
+            self._process.on_timer(now)
 
-def serve_by_own_clock(
-    process: Process, ports: Mapping[Side, Port], inbox: Inbox, clock: OwnClock, timing: CycleTiming, period: float
-) -> None:
-    """Run ``process`` from now on until ``inbox.stop``, a cycle every ``period`` (s).
-
-    Raises
-    ------
-    MediumError
-        When the bus is lost.
-    """
-    inbox.listen(ports)
-    read_until = clock.now()
-    schedule = Schedule(read_until, period)
-    synchronised = -math.inf  # deadline before which the clocks were synchronised
-    unsent = 0
-    while True:
-        halfway = schedule.halfway if synchronised < schedule.due else math.inf
-        now = clock.now()
-        try:
-            act = inbox.next_arrival(min(schedule.due, halfway, process.next_wake(now)) - now)
-        except queue.Empty:
-            now = clock.now()
-            if now < min(schedule.due, halfway):
-                process.on_timer(now)
+    def _do_due(self) -> None:
+        """The cycle or the synchronisation that is due, or else send what the frames so far have made."""
+        now = self._clock.now()
+        if now >= self._schedule.due:
+            self._read_until = run_cycle(
+                self._process, self._ports, self._schedule, self._read_until, self._clock, self._timing
+            )
+        elif now >= self._next_moment():
+            self._synchronise(now)
+        elif self._inbox and self._unsent < FRAMES_TOGETHER:
+            return
         else:
-            if act is None:
-                return
-            timing.begin()
-            act(process, clock.now())
-            timing.lap(Stage.FRAME)
-            unsent += 1
-        now = clock.now()
-        if now >= schedule.due:
-            read_until = run_cycle(process, ports, schedule, read_until, clock, timing)
-            unsent = 0
-        elif now >= halfway:
-            timing.begin()
-            process.on_timer(now)
-            send(process, ports, now)
-            timing.lap(Stage.SYNCHRONISE)
-            synchronised = schedule.due
-            unsent = 0
-        elif inbox.empty or unsent >= FRAMES_TOGETHER:
-            send(process, ports, now)
-            unsent = 0
+            send(self._process, self._ports, now)
+        self._unsent = 0
+
+    def _synchronise(self, now: float) -> None:
+        self._timing.begin()
+        self._process.on_timer(now)
+        for port in self._ports.values():
+            port.flush()
+        send(self._process, self._ports, now)
+        self._timing.lap(Stage.SYNCHRONISE)
+        self._synchronised = self._schedule.due
+        for side in self._absence.find(self._process.endpoint.neighbours, now):
+            state = "up" if self._ports[side].is_up else "down"
+            self._report(
+                f"{side.name.lower()} end: nobody heard for {ABSENT_LIMIT:.0f} s, the port is {state}; "
+                "does the neighbour run, and is it the right one?"
+            )
+
+    def _on_frame(self, side: Side, frame: bytes) -> None:
+        self._inbox.put(lambda process, now: process.on_frame(side, frame, now))
 
 
 def run_cycle(
@@ -170,7 +223,7 @@ def run_cycle(
 
 
 def send(process: Process, ports: Mapping[Side, Port], now: float) -> None:
-    """Put on the wire what is due; an end without a neighbour says nothing to nobody."""
+    """Put on the wire what is due; an end without a neighbour sends nothing."""
     for side, frame in process.take_frames(now):
         if side in ports:
             ports[side].send(frame)

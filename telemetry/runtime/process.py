@@ -1,42 +1,47 @@
-"""What every process with an endpoint does when it is driven from outside, whatever it measures or stores."""
+"""The interface of a process: everything it does when events come, whoever drives it."""
 
 from __future__ import annotations
 
 from typing import Any
 
 from telemetry.application.endpoint import Endpoint
+from telemetry.media.port import Frame
 from telemetry.messages import Side
 
 
 class Process:
-    """Base of a process: hands time and frames to its ``endpoint``; a subclass takes what it can use of the rest."""
+    """Base of a process: hands time and frames to its ``endpoint``; a subclass takes what it can use of the rest.
+
+    It is driven by a stepper (``stepped``) or by a clock of its own (``own_clock``) and knows neither. All calls come
+    from one thread, ``now`` is its own clock (s).
+    """
 
     endpoint: Endpoint
 
     def on_frame(self, side: Side, frame: bytes, now: float) -> None:
-        """A frame arrived at one end; what it says to this process is for a subclass to take."""
+        """A frame arrived at one end; the messages for this process are for a subclass to take."""
         self.endpoint.receive(side, frame, now)
 
     def on_cycle(self, data: Any, now: float) -> None:
-        """A cycle has ended; a process without a sensor has none."""
+        """A cycle has ended with the sample ``data``; a process without a sensor ignores it."""
 
     def on_overrun(self, missed: int, now: float) -> None:
-        """A cycle ended at ``now`` when ``missed`` later ones should have begun; only an own clock tells."""
-
-    def close(self) -> None:
-        """The process ends as it was asked to: let sensors go, keep what is worth keeping."""
+        """A cycle ended at ``now`` when ``missed`` later ones should have begun; only an own clock reports it."""
 
     def on_depth(self, rig_time: float, md: float) -> None:
         """The rig measured the depth of the bit (m); most processes do not hear it."""
 
     def on_timer(self, now: float) -> None:
-        """Let time pass: hello, time requests, repetition."""
+        """A timer named by ``next_wake`` is due: hello, time requests, repetition."""
         self.endpoint.advance(now)
 
-    def take_frames(self, now: float) -> list[tuple[Side, bytes]]:
+    def take_frames(self, now: float) -> list[tuple[Side, Frame]]:
         """Frames to send now."""
         return self.endpoint.take_frames(now)
 
     def next_wake(self, now: float) -> float:
-        """Local time (s) of the next timer."""
+        """Local time (s) of the next timer, infinite if none."""
         return self.endpoint.next_wake(now)
+
+    def close(self) -> None:
+        """The process ends as it was asked to: let sensors go, keep what is worth keeping."""

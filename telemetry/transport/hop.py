@@ -12,16 +12,18 @@ from __future__ import annotations
 import math
 import zlib
 from collections import Counter, OrderedDict
+from collections.abc import Hashable, Iterable
 from dataclasses import dataclass
 from typing import Any
 
 import msgpack
 
+from telemetry.media.port import MAX_FRAME, Frame, Priority
+
 VERSION = 1
 WINDOW = 64
 QUEUE_LIMIT = 512
 BEST_EFFORT_LIMIT = 64
-MAX_FRAME = 16384
 ENTRIES_PER_FRAME = 8
 FIRST_TIMEOUT = 0.06  # s, one round trip and the wait of a lonely acknowledgement
 LAST_TIMEOUT = 2.0  # s
@@ -30,6 +32,7 @@ SILENCE = 3.5  # s after which the other end is taken for gone
 BOOT_SHIFT = 24
 SESSION_SHIFT = 8
 QUALITY_WEIGHT = 1.0 / 32.0
+ACKNOWLEDGEMENT = "acknowledgement"  # topic of a frame that holds nothing else
 
 
 @dataclass(slots=True)
@@ -37,8 +40,19 @@ class Outstanding:
     """A numbered payload on its way."""
 
     payload: bytes
+    priority: Priority
     send_at: float
     timeout: float = FIRST_TIMEOUT
+
+
+@dataclass(frozen=True, slots=True)
+class Entry:
+    """A payload that is due; best effort has the number 0 and a topic."""
+
+    number: int
+    payload: bytes
+    priority: Priority
+    topic: Hashable | None = None
 
 
 class HopLink:
@@ -66,29 +80,29 @@ class HopLink:
         self._frames = 0
         self._next_number = 1
         self._outstanding: OrderedDict[int, Outstanding] = OrderedDict()
-        self._queue: OrderedDict[bytes, None] = OrderedDict()
-        self._best_effort: OrderedDict[object, bytes] = OrderedDict()
+        self._queue: OrderedDict[bytes, Priority] = OrderedDict()
+        self._best_effort: OrderedDict[Hashable, tuple[bytes, Priority]] = OrderedDict()
 
     def is_up(self, now: float) -> bool:
         """Whether the other end was heard lately."""
         return now - self.last_heard <= SILENCE
 
-    def send_reliable(self, payload: bytes) -> None:
+    def send_reliable(self, payload: bytes, priority: Priority = Priority.SURVEY) -> None:
         """Queue a payload that must arrive; one that is still queued or on its way is not queued again."""
         if payload in self._queue or any(o.payload == payload for o in self._outstanding.values()):
             return
         if len(self._queue) >= QUEUE_LIMIT:
             self._queue.popitem(last=False)
             self.counters["reliable_dropped"] += 1
-        self._queue[payload] = None
+        self._queue[payload] = priority
 
-    def send_best_effort(self, payload: bytes, topic: object) -> None:
+    def send_best_effort(self, payload: bytes, topic: Hashable, priority: Priority = Priority.STATE) -> None:
         """Queue a payload that the newest of its ``topic`` replaces."""
         self._best_effort.pop(topic, None)
         if len(self._best_effort) >= BEST_EFFORT_LIMIT:
             self._best_effort.popitem(last=False)
             self.counters["best_effort_dropped"] += 1
-        self._best_effort[topic] = payload
+        self._best_effort[topic] = payload, priority
 
     def receive(self, frame: bytes, now: float) -> list[bytes]:
         """Payloads of a frame that were not delivered before; garbage is counted and gives none."""
@@ -107,7 +121,7 @@ class HopLink:
             entries = [entry for entry in entries if entry[0] == 0]
         return [payload for number, payload in entries if number == 0 or self._is_new(number, now)]
 
-    def take_frames(self, now: float) -> list[bytes]:
+    def take_frames(self, now: float) -> list[Frame]:
         """Frames that are due now."""
         frames = []
         entries = self._due_entries(now)
@@ -167,7 +181,7 @@ class HopLink:
     def _restart(self) -> None:
         self._session += 1
         self._next_number = 1
-        again = OrderedDict((o.payload, None) for o in self._outstanding.values())
+        again = OrderedDict((o.payload, o.priority) for o in self._outstanding.values())
         again.update(self._queue)
         self._queue = again
         self._outstanding.clear()
@@ -196,31 +210,40 @@ class HopLink:
             self._received += 1
         return True
 
-    def _due_entries(self, now: float) -> list[list[Any]]:
-        entries: list[list[Any]] = []
+    def _due_entries(self, now: float) -> list[Entry]:
+        entries: list[Entry] = []
         if self.is_up(now):
             oldest = next(iter(self._outstanding), self._next_number)
             while self._queue and self._next_number - oldest < WINDOW:
-                payload, _ = self._queue.popitem(last=False)
-                self._outstanding[self._next_number] = Outstanding(payload, now)
+                payload, priority = self._queue.popitem(last=False)
+                self._outstanding[self._next_number] = Outstanding(payload, priority, now)
                 self._next_number += 1
             for number, outstanding in self._outstanding.items():
                 if outstanding.send_at <= now:
-                    entries.append([number, outstanding.payload])
+                    entries.append(Entry(number, outstanding.payload, outstanding.priority))
                     outstanding.send_at = now + outstanding.timeout
                     outstanding.timeout = min(2.0 * outstanding.timeout, LAST_TIMEOUT)
-        entries.extend([0, payload] for payload in self._best_effort.values())
+        entries.extend(Entry(0, payload, priority, topic) for topic, (payload, priority) in self._best_effort.items())
         self._best_effort.clear()
         return entries
 
-    def _build(self, entries: list[list[Any]]) -> bytes:
+    def _build(self, entries: list[Entry]) -> Frame:
         self._frames += 1
         self._ack_due = math.inf
         self.counters["frames_sent"] += 1
         peer_epoch = max(self._peer_epoch, 0)
         fields = [VERSION, self._address, self.epoch, self._frames, peer_epoch, self._received, self._received_mask]
-        body: bytes = msgpack.packb([*fields, entries])
-        return zlib.crc32(body).to_bytes(4, "little") + body
+        body: bytes = msgpack.packb([*fields, [[entry.number, entry.payload] for entry in entries]])
+        priority = min((entry.priority for entry in entries), default=Priority.COMMAND)
+        return Frame(zlib.crc32(body).to_bytes(4, "little") + body, priority, common_topic(entries))
+
+
+def common_topic(entries: Iterable[Entry]) -> Hashable | None:
+    """Topic of a frame with these entries: theirs together where all are best effort, None where one is numbered."""
+    topics = tuple(entry.topic for entry in entries)
+    if not topics:
+        return ACKNOWLEDGEMENT
+    return None if None in topics else topics
 
 
 def _is_entry(entry: object) -> bool:

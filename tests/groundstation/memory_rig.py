@@ -26,6 +26,14 @@ STEP = 0.01
 NOISELESS = SensorLimits(repeats_together=0, repeats_alone=0)
 
 
+def arrived(port: MemoryPort, now: float) -> list[bytes]:
+    """Frames that have come to a port by ``now``."""
+    frames: list[bytes] = []
+    port.listen(frames.append)
+    port.advance(now)
+    return frames
+
+
 class Rig:
     """Surface end, drive head and tubes, top tube first, on one clock; the bench turns and leans the tubes."""
 
@@ -109,11 +117,11 @@ class Rig:
         if place < len(self.joints):
             ports[Side.LOWER] = self.joints[place][0]
         for side, port in ports.items():
-            for frame in port.receive(self.now):
+            for frame in arrived(port, self.now):
                 process.on_frame(side, frame, self.now)
         for side, frame in process.take_frames(self.now):
             if side in ports:
-                ports[side].send(frame, self.now)
+                ports[side].send(frame)
 
     def upload(self, block: ParameterBlock, patience: float = 200.0) -> BlockStatus:
         outcome = self.ground.upload(block)

@@ -61,10 +61,10 @@ class Rig:
             self.ground.on_timer(self.now)
             for _ in range(3):
                 for _, frame in self.ground.take_frames(self.now):
-                    self.tube.receive(Side.UPPER, frame, self.now)
+                    self.tube.receive(Side.UPPER, frame.payload, self.now)
                 for side, frame in self.tube.take_frames(self.now):
                     if side is Side.UPPER:
-                        self.ground.on_frame(Side.LOWER, frame, self.now)
+                        self.ground.on_frame(Side.LOWER, frame.payload, self.now)
             self.now += 0.5
 
     def depth(self, md: float) -> None:

@@ -1,6 +1,5 @@
 """A tube under its own clock, its time told by the test: overruns, the account of its timing, its end."""
 
-from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -12,6 +11,7 @@ from node.kernels.layout import PERIOD
 from node.process.drivers.timed import TimedImu
 from node.process.tube_process import TubeProcess
 from telemetry.application.endpoint import Endpoint
+from telemetry.media.memory import joint
 from telemetry.messages import BASE, Command, Event, NodeState, Reply, Side
 from telemetry.runtime.own_clock import OwnClock, Schedule, run_cycle, send
 from telemetry.runtime.timing import CycleTiming, Stage
@@ -34,7 +34,7 @@ class ToldClock(OwnClock):
 
 
 class Pair:
-    """A tube below a base station that hears all it says, and is itself the port between them."""
+    """A tube below a base station that hears all it says."""
 
     def __init__(self, folder: Path, timing: CycleTiming | None) -> None:
         times = BEGIN - 1.0 + 0.1 * np.arange(1200.0)
@@ -47,26 +47,23 @@ class Pair:
         self.began = BEGIN
         self.heard: list[object] = []
         self._on_the_wire: list[bytes] = []
-
-    def send(self, frame: bytes) -> None:
-        self._on_the_wire.append(frame)
-
-    def listen(self, deliver: Callable[[bytes], None]) -> None:
-        """Frames from the base are handed over by ``cycle``."""
+        above, below = joint(latency=0.0)
+        above.listen(self._on_the_wire.append)
+        self._ports = {Side.UPPER: below}
 
     def cycle(self, late: float, lasting: float) -> None:
         """One cycle, late by and lasting for the given times (s), and all frames that follow from it."""
         self.process.on_timer(self.schedule.halfway)
         start = self.schedule.due + late
         clock = ToldClock(moments=(start, start + lasting))
-        self.began = run_cycle(self.process, {Side.UPPER: self}, self.schedule, self.began, clock, self.timing)
+        self.began = run_cycle(self.process, self._ports, self.schedule, self.began, clock, self.timing)
         now = start + lasting
         self.base.advance(now)
         for _ in range(12):
             now += STEP
             for _, frame in self.base.take_frames(now):
-                self.process.on_frame(Side.UPPER, frame, now)
-            send(self.process, {Side.UPPER: self}, now)
+                self.process.on_frame(Side.UPPER, frame.payload, now)
+            send(self.process, self._ports, now)
             for frame in self._on_the_wire:
                 self.heard += [received.message for received in self.base.receive(Side.LOWER, frame, now)]
             self._on_the_wire.clear()

@@ -19,6 +19,7 @@ import pytest
 from click.testing import CliRunner
 from rigs import PATIENCE, REPOSITORY, command, free_endpoint, run
 
+from node.kernels.layout import PERIOD
 from node.process.encoder_command import encoder
 from node.process.tube_command import node
 from node.process.tube_process import TubeProcess
@@ -26,8 +27,10 @@ from sim.studies.turning_string import TurningString
 from telemetry.application.endpoint import Endpoint
 from telemetry.media.neighbours import neighbour_ports
 from telemetry.media.zenoh_bus import ZenohBus, open_router
+from telemetry.media.zenoh_port import ZenohMedium
 from telemetry.messages import BASE, ENCODER, Command, Event, NodeFlag, NodeState, Reply, Side
-from telemetry.runtime.own_clock import Inbox, OwnClock, serve_by_own_clock
+from telemetry.runtime import event_loop
+from telemetry.runtime.own_clock import OwnClock, OwnClockLoop
 from telemetry.runtime.process import Process
 from telemetry.runtime.timing import CycleTiming
 
@@ -38,9 +41,10 @@ UNFIT = NodeFlag.YAW_UNTRUSTED | NodeFlag.CLOCK_UNSYNCHRONISED
 class Surface(Process):
     """The base station; what it hears goes into a queue."""
 
+    loop: OwnClockLoop
+
     def __init__(self) -> None:
         self.endpoint = Endpoint(BASE, frozenset({Side.LOWER}), boot_count=1)
-        self.inbox = Inbox()
         self.heard: queue.SimpleQueue[Any] = queue.SimpleQueue()
 
     def on_frame(self, side: Side, frame: bytes, now: float) -> None:
@@ -115,13 +119,20 @@ def string(tmp_path: Path, router: tuple[str, ZenohBus]) -> Iterator[String]:
 @pytest.fixture
 def surface(router: tuple[str, ZenohBus]) -> Iterator[Surface]:
     surface = Surface()
-    ports = neighbour_ports(router[1], RIG, BASE, {Side.LOWER: ENCODER})
-    arguments = (surface, ports, surface.inbox, OwnClock(), CycleTiming())
-    loop = threading.Thread(target=serve_by_own_clock, args=arguments)
-    loop.start()
+    running: queue.SimpleQueue[OwnClockLoop] = queue.SimpleQueue()
+
+    async def live() -> None:
+        ports = neighbour_ports(ZenohMedium(router[1]), RIG, BASE, {Side.LOWER: ENCODER})
+        loop = OwnClockLoop(surface, ports, OwnClock(), CycleTiming(), PERIOD)
+        running.put(loop)
+        await loop.run()
+
+    thread = threading.Thread(target=lambda: event_loop.run(live()))
+    thread.start()
+    surface.loop = running.get(timeout=PATIENCE)
     yield surface
-    surface.inbox.stop()
-    loop.join()
+    surface.loop.stop()
+    thread.join()
 
 
 def test_a_node_finds_its_yaw_keeps_it_over_a_kill_and_ends_when_asked(
@@ -132,7 +143,7 @@ def test_a_node_finds_its_yaw_keeps_it_over_a_kill_and_ends_when_asked(
     state = surface.first(NodeState, lambda s: not s.flags & UNFIT)
     assert abs(string.truth.yaw_error(1, state.yaw, state.at)) < 0.02
     assert state.hops == 1
-    surface.inbox.put(lambda process, now: process.endpoint.command(Command(1, 5, "timing"), now))
+    surface.loop.call(lambda process, now: process.endpoint.command(Command(1, 5, "timing"), now))
     reply = surface.first(Reply, lambda r: r.sequence == 5)
     assert reply.done
     assert " aiding " in reply.detail

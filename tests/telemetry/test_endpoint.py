@@ -34,6 +34,14 @@ def survey(tube: int, sequence: int) -> SurveyMeasurement:
     return SurveyMeasurement(tube, sequence, 100.0, 1, (imu,), 1.0, 1e-6, 1e-6, 32, 20.0, NodeFlag.NONE)
 
 
+def arrived(port: MemoryPort, now: float) -> list[bytes]:
+    """Frames that have come to a port by ``now``."""
+    frames: list[bytes] = []
+    port.listen(frames.append)
+    port.advance(now)
+    return frames
+
+
 class Chain:
     """Stations from the surface down and the joints between them, on clocks of their own."""
 
@@ -76,13 +84,13 @@ class Chain:
         now = self.local(address)
         for side in Side:
             port = self.port(address, side)
-            for frame in port.receive(self.now) if port else []:
+            for frame in arrived(port, self.now) if port else []:
                 for received in station.receive(side, frame, now):
                     self.take(address, station, received, now)
         for side, frame in station.take_frames(now):
             port = self.port(address, side)
             if port:
-                port.send(frame, self.now)
+                port.send(frame)
 
     def take(self, address: int, station: Endpoint, received: Received, now: float) -> None:
         self.got[address].append(received.message)

@@ -7,7 +7,16 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from telemetry.media.memory import MemoryPort, joint
-from telemetry.transport.hop import QUEUE_LIMIT, SILENCE, HopLink
+from telemetry.media.port import Priority
+from telemetry.transport.hop import ACK_DELAY, ACKNOWLEDGEMENT, QUEUE_LIMIT, SILENCE, HopLink
+
+
+def arrived(port: MemoryPort, now: float) -> list[bytes]:
+    """Frames that have come to a port by ``now``."""
+    frames: list[bytes] = []
+    port.listen(frames.append)
+    port.advance(now)
+    return frames
 
 
 class Pair:
@@ -29,10 +38,10 @@ class Pair:
                 for link in self.links:
                     link.send_best_effort(b"beat", "beat")
             for k, (link, port) in enumerate(zip(self.links, self.ports, strict=True)):
-                for frame in port.receive(self.now):
+                for frame in arrived(port, self.now):
                     self.got[k].extend(p for p in link.receive(frame, self.now) if p != b"beat")
                 for frame in link.take_frames(self.now):
-                    port.send(frame, self.now)
+                    port.send(frame)
             self.now += 0.005
 
 
@@ -118,7 +127,7 @@ def test_the_newest_of_a_topic_wins() -> None:
     for k in range(10):
         link.send_best_effort(b"state %d" % k, "state")
     frames = link.take_frames(1.0)
-    assert [p for frame in frames for p in peer.receive(frame, 1.0)] == [b"state 9"]
+    assert [p for frame in frames for p in peer.receive(frame.payload, 1.0)] == [b"state 9"]
 
 
 @given(st.binary(max_size=200))
@@ -137,7 +146,19 @@ def test_quality_tells_the_loss() -> None:
     assert 0.4 < lossy.links[0].quality < 0.9
 
 
-def test_ports_without_another_end_swallow_frames() -> None:
-    port = MemoryPort()
-    port.send(b"x", 0.0)
-    assert port.receive(1.0) == []
+def test_a_frame_names_its_class_and_its_topic() -> None:
+    link, peer = HopLink(1, 1), HopLink(2, 1)
+    link.send_best_effort(b"hello", "hello", Priority.HELLO)
+    (hello,) = link.take_frames(1.0)
+    assert (hello.priority, hello.topic) == (Priority.HELLO, ("hello",))
+    peer.receive(hello.payload, 1.0)
+    peer.send_best_effort(b"hello", "hello", Priority.HELLO)
+    (answer,) = peer.take_frames(1.0)
+    link.receive(answer.payload, 1.0)
+    link.send_reliable(b"block", Priority.BLOCK)
+    link.send_best_effort(b"aiding", "aiding", Priority.AIDING)
+    (mixed,) = link.take_frames(1.0)
+    assert (mixed.priority, mixed.topic) == (Priority.AIDING, None)
+    assert sorted(peer.receive(mixed.payload, 1.0)) == [b"aiding", b"block"]
+    (acknowledgement,) = peer.take_frames(1.0 + ACK_DELAY)
+    assert (acknowledgement.priority, acknowledgement.topic) == (Priority.COMMAND, ACKNOWLEDGEMENT)

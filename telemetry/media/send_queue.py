@@ -1,0 +1,62 @@
+"""Frames that wait for a port: a bounded queue by priority, in which the newest of a topic replaces what waits."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Callable
+
+from telemetry.media.port import Frame, Priority
+
+SEND_LIMIT = 64  # frames
+
+
+class SendQueue:
+    """Frames on their way out: urgent ones first, and of one priority the oldest first.
+
+    When it is full, best effort goes first: the least urgent frame with a topic, the oldest of those. Frames that must
+    not be lost are refused only where nothing else waits; the link repeats them.
+
+    Parameters
+    ----------
+    largest : bytes, of a payload
+    limit : frames that may wait
+    """
+
+    def __init__(self, largest: int, limit: int = SEND_LIMIT) -> None:
+        self._largest = largest
+        self._limit = limit
+        self._waiting: list[Frame] = []  # by age
+        self.counters: Counter[str] = Counter()
+
+    def __len__(self) -> int:
+        return len(self._waiting)
+
+    def offer(self, frame: Frame) -> bool:
+        """Put a frame in; returns False for one that is too large."""
+        if len(frame.payload) > self._largest:
+            self.counters["too_large"] += 1
+            return False
+        if frame.topic is not None:
+            self._remove("replaced", [f for f in self._waiting if f.topic == frame.topic])
+        self._waiting.append(frame)
+        if len(self._waiting) > self._limit:
+            self._remove("dropped", [self._most_dispensable()])
+        return True
+
+    def drain(self, is_up: Callable[[], bool], put: Callable[[bytes], None]) -> None:
+        """Hand frames to ``put`` while ``is_up``; a clock exchange that has to wait is forgotten."""
+        while self._waiting and is_up():
+            frame = min(self._waiting, key=lambda f: f.priority)
+            self._waiting.remove(frame)
+            put(frame.payload)
+        if self._waiting:
+            self._remove("outdated", [f for f in self._waiting if f.priority is Priority.TIME])
+
+    def _most_dispensable(self) -> Frame:
+        best_effort = [frame for frame in self._waiting if frame.topic is not None]
+        return max(best_effort, key=lambda f: f.priority) if best_effort else self._waiting[-1]
+
+    def _remove(self, reason: str, frames: list[Frame]) -> None:
+        for frame in frames:
+            self._waiting.remove(frame)
+            self.counters[reason] += 1

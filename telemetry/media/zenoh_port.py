@@ -1,0 +1,92 @@
+"""zenoh as a medium: a joint is two keys, and each end hears what the other puts on its own."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+
+from telemetry import keys
+from telemetry.errors import MediumError
+from telemetry.media.port import MAX_FRAME, Frame, TubeEnd
+from telemetry.media.send_queue import SendQueue
+from telemetry.media.zenoh_bus import Subscription, ZenohBus, open_client
+
+CONNECT_TIMEOUT = 30.0  # s
+
+
+class ZenohPort:
+    """One end of a joint on two keys, see ``port.Port``; it is up while anybody subscribes to ``send_key``."""
+
+    largest_payload = MAX_FRAME
+
+    def __init__(self, bus: ZenohBus, send_key: str, receive_key: str) -> None:
+        self._bus = bus
+        self._send_key, self._receive_key = send_key, receive_key
+        self._publisher = bus.publisher(send_key, encoding="application/octet-stream")
+        self._subscription: Subscription | None = None
+        self._queue = SendQueue(self.largest_payload)
+        self._closed = False
+
+    @property
+    def is_up(self) -> bool:
+        """Whether the other end listens."""
+        return not self._closed and self._publisher.is_heard
+
+    @property
+    def counters(self) -> Counter[str]:
+        """Frames that did not leave, by reason."""
+        return self._queue.counters
+
+    def send(self, frame: Frame) -> bool:
+        """Send a frame now, or as soon as the other end is there."""
+        accepted = self._queue.offer(frame)
+        self.flush()
+        return accepted
+
+    def flush(self) -> None:
+        """Send what waits, if the other end is there."""
+        if self._closed:
+            raise MediumError(f"port {self._send_key}: it is closed")
+        self._queue.drain(lambda: self._publisher.is_heard, self._publisher.put)
+
+    def listen(self, deliver: Callable[[bytes], object]) -> None:
+        """Call ``deliver``, which only puts into a queue, on a foreign thread for every frame that arrives."""
+        self._subscription = self._bus.subscribe_at_once(self._receive_key, lambda _key, frame: deliver(frame))
+
+    def close(self) -> None:
+        """Let the end go."""
+        if self._closed:
+            return
+        self._closed = True
+        self._publisher.close()
+        if self._subscription is not None:
+            self._subscription.close()
+
+
+class ZenohMedium:
+    """Ends of a tube on one session."""
+
+    def __init__(self, bus: ZenohBus) -> None:
+        self._bus = bus
+
+    def open_port(self, end: TubeEnd) -> ZenohPort:
+        """Port of one end: it hears the neighbour's, or the stepper that joins ends as the schedule wants."""
+        heard = keys.port_key(end.rig, end.address, end.side, "rx")
+        if end.neighbour is not None:
+            facing = end.facing
+            heard = keys.port_key(facing.rig, facing.address, facing.side, "tx")
+        return ZenohPort(self._bus, keys.port_key(end.rig, end.address, end.side, "tx"), heard)
+
+
+@contextmanager
+def open_medium(where: str) -> Iterator[ZenohMedium]:
+    """Session with the router at the endpoint ``where``.
+
+    Raises
+    ------
+    MediumError
+        When no router answers there.
+    """
+    with open_client(where or keys.DEFAULT_ENDPOINT, CONNECT_TIMEOUT) as bus:
+        yield ZenohMedium(bus)

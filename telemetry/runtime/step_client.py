@@ -1,0 +1,187 @@
+"""A process's end of a stepper on the bus, for a plain loop (``serve``) or an asyncio loop (``serve_stepped``).
+
+Frames wait until a step names them, so that neither the load of the machine nor the order of arrival has any
+influence on what the process does.
+"""
+
+from __future__ import annotations
+
+import queue
+from collections import Counter, deque
+from collections.abc import Callable, Mapping
+from functools import partial
+
+from telemetry import keys
+from telemetry.media.port import Frame, Port
+from telemetry.media.zenoh_bus import ZenohBus
+from telemetry.messages import Side, address_name
+from telemetry.runtime.inbox import Inbox
+from telemetry.runtime.process import Process
+from telemetry.runtime.stepped import Due, DueEvent, Sent, pack_done, run_step, unpack_step
+
+ABSENT_LIMIT = 60.0  # wall s without a first step until that is reported
+STEP, STOP = -1, -2  # channels beside those of events that carry bytes: frames and depths
+CHANNELS = (STEP, Due.UPPER_FRAME, Due.LOWER_FRAME, Due.DEPTH)
+Arrival = tuple[int, bytes]  # channel, payload
+Step = tuple[int, list[tuple[DueEvent, bytes]]]  # number, events and the bytes of each
+Report = Callable[[str], None]
+
+
+class StepAssembler:
+    """Puts steps together with the frames they name, in whatever order these arrive."""
+
+    def __init__(self) -> None:
+        self._waiting: dict[int, deque[bytes]] = {channel: deque() for channel in CHANNELS}
+        self._step: tuple[int, list[DueEvent]] | None = None
+
+    def add(self, channel: int, payload: bytes) -> None:
+        """Take what arrived on a channel."""
+        self._waiting[channel].append(payload)
+
+    def take_step(self) -> Step | None:
+        """The next step once all its frames are here."""
+        if self._step is None:
+            if not self._waiting[STEP]:
+                return None
+            self._step = unpack_step(self._waiting[STEP].popleft())
+        number, events = self._step
+        needed = Counter(event.kind for event in events if event.kind in CHANNELS)
+        if any(len(self._waiting[channel]) < count for channel, count in needed.items()):
+            return None
+        self._step = None
+        return number, [(e, self._waiting[e.kind].popleft() if e.kind in CHANNELS else b"") for e in events]
+
+
+class StepEnd:
+    """What both clients are: ports, steps in, answers out, token of life.
+
+    Parameters
+    ----------
+    bus, rig, address : where the steps come from and who this is
+    ports : the ends of the tube, on whatever medium carries frames
+    arrive : takes arrivals on foreign threads
+    hears_depth : whether the rig's depth is for this process
+    """
+
+    def __init__(
+        self,
+        bus: ZenohBus,
+        rig: str,
+        address: int,
+        ports: Mapping[Side, Port],
+        arrive: Callable[[Arrival], object],
+        *,
+        hears_depth: bool,
+    ) -> None:
+        name = address_name(address)
+        self.absence = f"{name}: no step came in {ABSENT_LIMIT:.0f} s; is the medium of {rig} running?"
+        self.assembler = StepAssembler()
+        self._ports = ports
+        self._done = bus.publisher(keys.DONE.format(rig=rig, process=name))
+        for side, port in ports.items():
+            port.listen(partial(_put_frame, arrive, int(side)))
+        bus.subscribe(keys.STEP.format(rig=rig, process=name), lambda _key, step: arrive((STEP, step)))
+        if hears_depth:
+            bus.subscribe(keys.DEPTH.format(rig=rig), lambda _key, depth: arrive((Due.DEPTH, depth)))
+        bus.liveliness_token(keys.LIVELINESS.format(rig=rig, process=name))
+
+    def run(self, process: Process, step: Step) -> None:
+        """Have ``process`` do a step and answer it."""
+        number, events = step
+        sent: list[Sent] = []
+
+        def send(what: Sent, frame: Frame) -> None:
+            if self._ports[what.side].send(frame):
+                sent.append(what)
+
+        wake_at = run_step(process, events, send)
+        self._done.put(pack_done(number, sent, wake_at))
+
+
+class StepClient(StepEnd):
+    """Client of a process without a loop of its own: ``next_step`` blocks."""
+
+    def __init__(
+        self, bus: ZenohBus, rig: str, address: int, ports: Mapping[Side, Port], *, hears_depth: bool = False
+    ) -> None:
+        self._arrived: queue.SimpleQueue[Arrival] = queue.SimpleQueue()
+        super().__init__(bus, rig, address, ports, self._arrived.put, hears_depth=hears_depth)
+
+    def stop(self) -> None:
+        """Make ``next_step`` return None; may be called from a signal handler or another thread."""
+        self._arrived.put((STOP, b""))
+
+    def next_step(self, timeout: float | None = None) -> Step | None:
+        """Next step with the frame of each frame event, or None after ``stop``.
+
+        Raises
+        ------
+        queue.Empty
+            When nothing arrived for ``timeout`` wall seconds.
+        """
+        while (step := self.assembler.take_step()) is None:
+            channel, payload = self._arrived.get(timeout=timeout)
+            if channel == STOP:
+                return None
+            self.assembler.add(channel, payload)
+        return step
+
+
+class AsyncStepClient(StepEnd):
+    """Client of a process whose asyncio loop has other work too, such as operators' questions."""
+
+    def __init__(
+        self, bus: ZenohBus, rig: str, address: int, ports: Mapping[Side, Port], *, hears_depth: bool = False
+    ) -> None:
+        self.inbox: Inbox[Arrival] = Inbox()
+        super().__init__(bus, rig, address, ports, self.inbox.put, hears_depth=hears_depth)
+
+    def stop(self) -> None:
+        """Make ``next_step`` return None; may be called from another thread."""
+        self.inbox.close()
+
+    async def next_step(self) -> Step | None:
+        """Next step with the frame of each frame event, or None after ``stop``."""
+        while (step := self.assembler.take_step()) is None:
+            arrival = await self.inbox.get()
+            if arrival is None:
+                return None
+            self.assembler.add(*arrival)
+        return step
+
+
+def serve(process: Process, client: StepClient, report: Report = lambda line: None) -> None:
+    """Run ``process`` step by step until ``client.stop`` ends it; ``report`` takes a line when no first step comes.
+
+    Raises
+    ------
+    MediumError
+        When the bus is lost.
+    """
+    try:
+        step = client.next_step(ABSENT_LIMIT)
+    except queue.Empty:
+        report(client.absence)
+        step = client.next_step()
+    while step is not None:
+        client.run(process, step)
+        step = client.next_step()
+
+
+async def serve_stepped(process: Process, client: AsyncStepClient, report: Report = lambda line: None) -> None:
+    """``serve`` on the running loop, whose other tasks get their turn between two steps.
+
+    Raises
+    ------
+    MediumError
+        When the bus is lost.
+    """
+    await client.inbox.wait(ABSENT_LIMIT)
+    if not client.inbox and not client.inbox.is_closed:
+        report(client.absence)
+    while (step := await client.next_step()) is not None:
+        client.run(process, step)
+
+
+def _put_frame(arrive: Callable[[Arrival], object], channel: int, frame: bytes) -> None:
+    arrive((channel, frame))
