@@ -35,25 +35,8 @@ tests: $(STAMP)
 explore: $(STAMP)  ## the properties with examples that no run before has seen
 	HYPOTHESIS_PROFILE=explore $(BIN)/python -m pytest -m hypothesis
 
-study: $(STAMP)  ## the long studies; their tables are committed in docs/results
-	$(BIN)/borechain experiment relay --hops 10 --seeds 40 --out docs/results
-	$(BIN)/borechain experiment mwd --tools 200 --out docs/results
-	$(BIN)/borechain experiment allan --records 20 --out docs/results
-	$(BIN)/borechain experiment coverage --wells 2000 --out docs/results
-	$(BIN)/borechain experiment region-of-uncertainty --out docs/results
-	$(BIN)/borechain experiment weighting --out docs/results
-	$(BIN)/borechain experiment update-modes --seeds 200 --out docs/results
-	$(BIN)/borechain experiment single-updates --seeds 200 --out docs/results
-	$(BIN)/borechain experiment two-nodes --seeds 200 --out docs/results
-	$(BIN)/borechain experiment tuning --seeds 100 --out docs/results
-	$(BIN)/borechain experiment delay --seeds 25 --out docs/results
-	$(BIN)/borechain experiment consistency --seeds 500 --control-seeds 100 --out docs/results
-	$(BIN)/borechain experiment consistency --seeds 500 --kernel fixed --out docs/results
-	$(BIN)/borechain experiment outage --seeds 240 --out docs/results
-	$(BIN)/borechain experiment alignment --seeds 100 --out docs/results
-	$(BIN)/borechain experiment fifty-nodes --seeds 200 --out docs/results
-	$(BIN)/borechain experiment ingredients --seeds 40 --out docs/results
-	$(BIN)/borechain experiment fixed-point --cycles 1000000 --out docs/results
+study: $(STAMP)  ## every study of the table, with many seeds; their tables are committed in docs/results
+	$(BIN)/borechain experiment all --out docs/results
 	$(BIN)/borechain bench realtime --nodes 50 --seconds 120 --out docs/results
 
 lock:  ## pin the dependencies again, without addresses (needs pip-tools)

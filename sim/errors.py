@@ -5,7 +5,7 @@
     SimError
     ├── ScenarioError(InputError, ValueError)    an invalid scenario, path or fault: correct the place named
     ├── RigError(RuntimeError)                   the rig could not run here: the message names the remedy
-    └── StudyError(ValueError)                   an invalid table of studies or instruments: correct the line named
+    └── TableError(ValueError)                   an invalid table of studies or instruments: correct the line named
 """
 
 from __future__ import annotations
@@ -25,5 +25,5 @@ class RigError(SimError, RuntimeError):
     """The rig could not run; what was stored is kept."""
 
 
-class StudyError(SimError, ValueError):
-    """The table of studies or of instruments cannot be; no command is offered."""
+class TableError(SimError, ValueError):
+    """A table of studies or instruments cannot be; nothing of it is offered."""

@@ -12,6 +12,7 @@ from enum import Enum
 import numpy as np
 import numpy.typing as npt
 
+from groundstation.calibration.mwd_files import FULL_HEADER
 from groundstation.calibration.mwd_model import (
     ACCELEROMETER_AXES,
     MAGNETOMETER_AXES,
@@ -19,6 +20,8 @@ from groundstation.calibration.mwd_model import (
     Triad,
     volts_of,
 )
+from groundstation.calibration.quality import TOOL_FACES
+from sim.instruments.instrument import Records
 from sim.world.streams import stream
 
 Array = npt.NDArray[np.float64]
@@ -33,6 +36,9 @@ COLDEST, HOTTEST = 25.0, 80.0  # C
 NOISE = 1e-4  # of g or of the field, a reading
 JIG_STD = math.radians(0.01)  # each axis
 FIELD, DIP = 50.0, math.radians(65.0)  # microtesla, of the site
+CONTROL = 2 * 10**6  # added to a tool's seed for its quality control
+CONTROL_INCLINATION, CONTROL_TEMPERATURE = math.radians(45.0), 25.0
+UNITS = "Tilt and tool face in deg, temperature in C, accelerometers A B C and magnetometers X Y Z in volts"
 
 
 class Heating(Enum):
@@ -57,7 +63,7 @@ class Design:
 
 
 @dataclass(frozen=True, slots=True)
-class BenchRecord:
+class JigRecord:
     """Voltages (n, 3) and temperatures (n,) of a design; the attitudes of the design are the references."""
 
     gravity_volts: Array
@@ -132,6 +138,13 @@ def fresh_design(seed: int, hot: bool, count: int = 400) -> Design:
     return Design(tilt, face, azimuth, temperature)
 
 
+def control_design() -> Design:
+    """Twelve tool faces at the attitude of the quality control."""
+    face = 2.0 * np.pi * np.arange(TOOL_FACES) / TOOL_FACES
+    same = np.ones(TOOL_FACES)
+    return Design(CONTROL_INCLINATION * same, face, 0.5 * same, CONTROL_TEMPERATURE * same)
+
+
 def true_vectors(tilt: Array, tool_face: Array, azimuth: Array) -> tuple[Array, Array]:
     """Gravity (n, 3) g with C flipped and field (n, 3) microtesla that an ideal tool shows at the attitudes."""
     ned_from_body = attitudes(tilt, tool_face, azimuth)
@@ -143,7 +156,7 @@ def attitudes(tilt: Array, tool_face: Array, azimuth: Array) -> Array:
     return np.asarray(_rotation(2, azimuth) @ _rotation(1, tilt) @ _rotation(2, tool_face))
 
 
-def measure(tool: Tool, design: Design, seed: int, *, noise: float = NOISE, jig_std: float = JIG_STD) -> BenchRecord:
+def measure(tool: Tool, design: Design, seed: int, *, noise: float = NOISE, jig_std: float = JIG_STD) -> JigRecord:
     """Readings of a tool; the jig stands a little beside its nominal attitudes."""
     random = stream(seed, 3)
     n = len(design.tilt)
@@ -152,7 +165,7 @@ def measure(tool: Tool, design: Design, seed: int, *, noise: float = NOISE, jig_
     gravity, field = _seen(turn @ attitudes(design.tilt, design.tool_face, design.azimuth))
     gravity = gravity + noise * random.standard_normal((n, 3))
     field = field + noise * FIELD * random.standard_normal((n, 3))
-    return BenchRecord(
+    return JigRecord(
         volts_of(tool.accelerometers, gravity, design.temperature),
         volts_of(tool.magnetometers, field, design.temperature),
         design.temperature,
@@ -174,3 +187,39 @@ def _rotation(axis: int, angle: Array) -> Array:
     rotation[:, i, i] = rotation[:, j, j] = np.cos(angle)
     rotation[:, i, j], rotation[:, j, i] = -np.sin(angle), np.sin(angle)
     return rotation
+
+
+def records(seed: int) -> Records:
+    """A tool in its jig, in the oven and at its quality control."""
+    tool = draw_tool(seed)
+    designs = {
+        "mwd-room": (
+            make_design(Heating.ROOM, seed),
+            seed,
+            "one temperature, 7 tilts, 12 tool faces each: 12 parameters",
+        ),
+        "mwd-oven": (make_design(Heating.SHUFFLED, seed), seed, "heated anew at each of 7 tilts, 24 tool faces each"),
+        "mwd-control": (control_design(), seed + CONTROL, "12 tool faces at one attitude: quality control"),
+    }
+    files = {}
+    for name, (design, draw, words) in designs.items():
+        lines = [f"# Synthetic MWD tool {seed}, {words}. {UNITS}.", *record_lines(measure(tool, design, draw))]
+        files[f"{name}.csv"] = ("\n".join(lines) + "\n").encode()
+    truth = {
+        "accelerometers": tool.accelerometers.coefficients(),
+        "magnetometers": tool.magnetometers.coefficients(),
+        "field_ut": FIELD,
+        "dip_deg": float(np.degrees(DIP)),
+    }
+    return Records(files, truth)
+
+
+def record_lines(record: JigRecord) -> list[str]:
+    """Header and rows of a record, volts to the microvolt."""
+    angles = np.degrees(record.design.tilt), np.degrees(record.design.tool_face) % 360.0
+    columns = np.column_stack([*angles, record.temperature, record.gravity_volts, record.field_volts])
+    return [FULL_HEADER, *(",".join([*_cells(row[:3], 3), *_cells(row[3:], 6)]) for row in columns)]
+
+
+def _cells(values: Array, digits: int) -> list[str]:
+    return [f"{value:.{digits}f}" for value in values]

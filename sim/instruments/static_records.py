@@ -1,12 +1,13 @@
-"""A laboratory in software: sensors at rest, on a turn table and on a robot arm, with every parameter known.
+"""A sensor at rest in software: noise with every parameter known.
 
 Noise is drawn in the frequency domain from the spectrum of its sample means, on a circle at least twice as long as the
 record, so that the ends do not know of each other. One seed gives one record, whatever else is drawn from it.
-Source: N. J. Kasdin, Proc. IEEE 83 (1995) 802, for noise of a given spectrum; thesis appendix III for the table.
+Source: N. J. Kasdin, Proc. IEEE 83 (1995) 802, for noise of a given spectrum.
 """
 
 from __future__ import annotations
 
+import io
 import math
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -15,15 +16,16 @@ import numpy as np
 import numpy.typing as npt
 
 from groundstation.calibration.allan_fit import flicker_spectrum
-from sim.errors import SimError
+from sim.instruments.instrument import InstrumentError, Records
 
 Array = npt.NDArray[np.float64]
 MEMORY = 20.0  # correlation times that a circle must be longer than the record
 COMPONENTS = ("white", "flicker", "gauss_markov", "random_walk")
-
-
-class BenchError(SimError, ValueError):
-    """The laboratory was asked for what cannot be."""
+# MPU6500, 2 h at 65 Hz: deg/s/sqrt(Hz), deg/s. Source: thesis Table V.1.
+RANDOM_WALK = (8.9e-3, 6.9e-3, 7.38e-3)
+BIAS_INSTABILITY = (7.9e-3, 3.83e-3, 3.33e-3)
+RATE = 65.0  # Hz
+DURATION = 1800.0  # s, of the record that is written
 
 
 @dataclass(frozen=True, slots=True)
@@ -44,15 +46,30 @@ class StaticNoise:
     def __post_init__(self) -> None:
         sizes = (self.white, self.flicker, self.walk, self.bias_std)
         if not (all(math.isfinite(s) and s >= 0.0 for s in sizes) and self.bias_tau > 0.0):
-            raise BenchError(f"static noise: expected finite sizes of at least 0 and bias_tau > 0, got {self}")
+            raise InstrumentError(f"static noise: expected finite sizes of at least 0 and bias_tau > 0, got {self}")
 
 
 def static_record(axes: tuple[StaticNoise, ...], count: int, rate: float, seed: int) -> Array:
     """Readings (count, axes) at rest at ``rate`` (Hz); each component of each axis has a stream of its own."""
     if count < 2 or not (math.isfinite(rate) and rate > 0.0):
-        raise BenchError(f"static record: expected two readings or more at a positive rate, got {count} at {rate} Hz")
+        raise InstrumentError(
+            f"static record: expected two readings or more at a positive rate, got {count} at {rate} Hz"
+        )
     streams = np.random.SeedSequence(seed).spawn(len(axes))
     return np.stack([_axis(axis, count, rate, s) for axis, s in zip(axes, streams, strict=True)], axis=1)
+
+
+def mpu6500() -> tuple[StaticNoise, ...]:
+    """The three axes of the node's own gyroscope, deg/s."""
+    return tuple(StaticNoise(white=n, flicker=f) for n, f in zip(RANDOM_WALK, BIAS_INSTABILITY, strict=True))
+
+
+def records(seed: int) -> Records:
+    """Half an hour of that gyroscope at rest as an array of float32, deg/s."""
+    content = io.BytesIO()
+    np.save(content, static_record(mpu6500(), round(DURATION * RATE), RATE, seed).astype(np.float32))
+    truth = {"random_walk_dps_rthz": RANDOM_WALK, "bias_instability_dps": BIAS_INSTABILITY, "rate_hz": RATE}
+    return Records({"static.npy": content.getvalue()}, {"gyroscope": truth})
 
 
 def white(random: np.random.Generator, count: int, density: float, rate: float) -> Array:
@@ -100,74 +117,6 @@ def shaped(random: np.random.Generator, count: int, length: int, spectrum: Calla
     bins[1:] = amplitude * (parts[0] + 1j * parts[1])
     bins[-1] = amplitude[-1] * parts[0, -1] * math.sqrt(2.0)  # the Nyquist frequency has a real part alone
     return np.asarray(np.fft.irfft(bins, length)[:count])
-
-
-def turn_table(
-    random: np.random.Generator,
-    matrix: Array,
-    bias: Array,
-    reference: float,
-    noise_std: float = 0.0,
-    axis_std: float = 0.0,
-) -> Array:
-    """Table (3, 6) of mean readings, G = M w + b: row = the axis turned, column pair = the sensor's axis, + then -.
-
-    ``noise_std`` is of each mean; ``axis_std`` (rad) is the rig's misalignment across the axis turned, each way, fixed.
-    """
-    table = np.empty((3, 6))
-    for turned in range(3):
-        across = axis_std * random.standard_normal(3)
-        across[turned] = 0.0
-        axis = np.eye(3)[turned] + across
-        axis /= np.linalg.norm(axis)
-        for way, sign in enumerate((1.0, -1.0)):
-            table[turned, way::2] = matrix @ (sign * reference * axis) + bias + noise_std * random.standard_normal(3)
-    return table
-
-
-@dataclass(frozen=True, slots=True)
-class ArmRecord:
-    """Robot-arm record as published: preset pitch and roll (k,), rad; mean readings (k, 3) with covariance (3, 3)."""
-
-    pitch: Array
-    roll: Array
-    readings: Array
-    cov: Array
-
-
-def arm_truth(pitch: Array, roll: Array, yaw: float = 0.0) -> Array:
-    """Specific force (k, 3) in g at preset attitudes (rad), of a rig frame turned by ``yaw`` (rad) from the sensor's.
-
-    x = sin p, y = cos p sin r, z = cos p cos r. Source: AHRS-calibration paper.
-    """
-    level = np.stack([np.sin(pitch), np.cos(pitch) * np.sin(roll), np.cos(pitch) * np.cos(roll)], axis=1)
-    c, s = math.cos(yaw), math.sin(yaw)
-    return np.asarray(level @ np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]]).T)
-
-
-def robot_arm(
-    random: np.random.Generator,
-    pitch: Array,
-    roll: Array,
-    matrix: Array,
-    bias: Array,
-    *,
-    noise_std: float = 0.0,
-    samples: int = 1000,
-    attitude_std: float = 0.0,
-    yaw: float = 0.0,
-) -> ArmRecord:
-    """Mean readings G = M f + b at preset attitudes (k,); ``matrix`` maps g to the reading's unit, as published.
-
-    ``noise_std`` is of one of ``samples`` readings of a mean; ``attitude_std`` (rad) is the arm's, in pitch and roll.
-    """
-    if pitch.ndim != 1 or pitch.shape != roll.shape or samples < 1:
-        raise BenchError(f"robot arm: expected equal (k,) pitch and roll, got {pitch.shape}, {roll.shape}, {samples}")
-    errors = attitude_std * random.standard_normal((2, pitch.size))
-    mean_std = noise_std / math.sqrt(samples)
-    force = arm_truth(pitch + errors[0], roll + errors[1], yaw)
-    readings = force @ matrix.T + bias + mean_std * random.standard_normal(force.shape)
-    return ArmRecord(pitch, roll, readings, mean_std**2 * np.eye(3))
 
 
 def _axis(noise: StaticNoise, count: int, rate: float, stream: np.random.SeedSequence) -> Array:

@@ -6,11 +6,13 @@ import multiprocessing
 import os
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
+from functools import partial
 from typing import Protocol, TypeVar
 
 Job = TypeVar("Job")
 Found = TypeVar("Found")
 Step = Callable[[], None]
+FEW = 2  # jobs at a time, that this process does itself
 
 
 class RunAll(Protocol):
@@ -24,8 +26,11 @@ class RunAll(Protocol):
 def over_cores(most: int, step: Step) -> Iterator[RunAll]:
     """Yield the function that runs jobs on all cores, ``most`` at a time; ``step`` is called after each job.
 
-    Starting a process compiles the kernels anew, so a study keeps one pool for all its batches.
+    A process takes seconds to start, so a study keeps one pool for all its batches, and `FEW` need none.
     """
+    if most <= FEW:
+        yield partial(_here, step)
+        return
     with multiprocessing.get_context("spawn").Pool(min(os.cpu_count() or 1, most)) as pool:
 
         def run_all(work: Callable[[Job], Found], jobs: Iterable[Job]) -> list[Found]:
@@ -36,6 +41,14 @@ def over_cores(most: int, step: Step) -> Iterator[RunAll]:
             return results
 
         yield run_all
+
+
+def _here(step: Step, work: Callable[[Job], Found], jobs: Iterable[Job]) -> list[Found]:
+    results = []
+    for job in jobs:
+        results.append(work(job))
+        step()
+    return results
 
 
 def seeded(setup: Job, count: int) -> list[tuple[Job, int]]:

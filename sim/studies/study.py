@@ -12,12 +12,10 @@ A study lives in a package of its own:
 from __future__ import annotations
 
 import importlib
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from types import MappingProxyType
 from typing import Any
-
-from sim.errors import StudyError
 
 Columns = tuple[tuple[str, str], ...]  # key of a row, heading
 Result = dict[str, Any]
@@ -101,20 +99,3 @@ class Study:
     def _of(self, module: str, function: str) -> Callable[..., Any]:
         chosen: Callable[..., Any] = getattr(importlib.import_module(f"{self.module}.{module}"), function)
         return chosen
-
-
-def by_name(studies: Iterable[Study]) -> dict[str, Study]:
-    """The table of studies.
-
-    Raises
-    ------
-    StudyError
-        When two have one name.
-    """
-    table: dict[str, Study] = {}
-    for study in studies:
-        if study.name in table:
-            modules = f"{table[study.name].module} and {study.module}"
-            raise StudyError(f"table of studies: expected one study of each name, got {study.name!r} from {modules}")
-        table[study.name] = study
-    return table

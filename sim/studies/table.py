@@ -5,8 +5,9 @@ A study more is a package with ``run`` and, if it draws, ``figure`` (see `sim.st
 
 from __future__ import annotations
 
+from sim.named import by_name
 from sim.studies import columns
-from sim.studies.study import MODULES, Option, Study, Table, by_name
+from sim.studies.study import MODULES, Option, Study, Table
 
 SEEDS = Option("seeds", 40, 2, 10_000)
 SEED = Option("seed", 1, 0, 2**31 - 1, help="One seed, one result.")
@@ -18,6 +19,7 @@ MODES = {
 }
 
 STUDIES = by_name(
+    "studies",
     [
         Study(
             "relay",
@@ -175,5 +177,5 @@ STUDIES = by_name(
             full=("--cycles 1000000",),
             short="--cycles 2000 --seeds 2",
         ),
-    ]
+    ],
 )

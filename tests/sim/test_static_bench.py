@@ -7,19 +7,18 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from sim.instruments.instrument import InstrumentError
+from sim.instruments.robot_arm import arm_truth, robot_arm
 from sim.instruments.static_records import (
-    BenchError,
     StaticNoise,
-    arm_truth,
     flicker,
     gauss_markov,
     random_walk,
-    robot_arm,
     shaped,
     static_record,
-    turn_table,
     white,
 )
+from sim.instruments.turn_table import turn_table
 from sim.studies.allan.run import run
 
 MATRIX = np.array([[0.99, -0.02, 0.003], [0.015, 1.01, -0.004], [-0.001, 0.007, 0.98]])
@@ -151,15 +150,15 @@ def test_robot_arm_attitude_error_moves_the_level_axes_first() -> None:
 
 
 def test_refuses_what_cannot_be() -> None:
-    with pytest.raises(BenchError, match="at least 0"):
+    with pytest.raises(InstrumentError, match="at least 0"):
         StaticNoise(white=-1.0)
-    with pytest.raises(BenchError, match="bias_tau"):
+    with pytest.raises(InstrumentError, match="bias_tau"):
         StaticNoise(bias_std=1.0, bias_tau=0.0)
-    with pytest.raises(BenchError, match="static record"):
+    with pytest.raises(InstrumentError, match="static record"):
         static_record((StaticNoise(1.0),), 1, 10.0, 0)
-    with pytest.raises(BenchError, match="static record"):
+    with pytest.raises(InstrumentError, match="static record"):
         static_record((StaticNoise(1.0),), 10, math.nan, 0)
-    with pytest.raises(BenchError, match="robot arm"):
+    with pytest.raises(InstrumentError, match="robot arm"):
         robot_arm(np.random.default_rng(0), np.zeros(3), np.zeros(2), MATRIX, BIAS)
 
 

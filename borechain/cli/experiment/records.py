@@ -17,15 +17,16 @@ from borechain.cli.options import json_option, seed_option
 @json_option
 @plain_faults
 def records(out: Path, seed: int, as_json: bool) -> None:
-    """Write records of synthetic instruments: an MWD tool in its jig, oven and control, and a gyroscope at rest.
+    """Write what the synthetic instruments of a laboratory would have written, with the truth beside.
 
     \b
     Example:
       borechain experiment records --out out/records --seed 1
     """
     from sim.instruments.record_files import write_records
+    from sim.instruments.table import INSTRUMENTS
 
-    names = write_records(out, seed)
+    names = write_records(out, seed, INSTRUMENTS.values())
     if as_json:
         click.echo(json.dumps({"experiment": "records", "seed": seed, "files": names}))
     else:

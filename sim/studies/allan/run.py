@@ -14,14 +14,10 @@ import numpy as np
 
 from groundstation.calibration.allan import AllanResult, analyse
 from groundstation.calibration.allan_fit import Estimate
-from sim.instruments.static_records import StaticNoise, static_record
+from sim.instruments.static_records import BIAS_INSTABILITY, RANDOM_WALK, RATE, mpu6500, static_record
 from sim.studies.pool import Step
 
-# MPU6500, 2 h at 65 Hz: deg/s/sqrt(Hz), deg/s. Source: thesis Table V.1.
-RANDOM_WALK = (8.9e-3, 6.9e-3, 7.38e-3)
-BIAS_INSTABILITY = (7.9e-3, 3.83e-3, 3.33e-3)
-RATE = 65.0
-DURATION = 7200.0
+DURATION = 7200.0  # s
 ASKED = {"random_walk": 0.77, "bias_instability": 4.2}  # %
 UNITS = {"random_walk": "deg/s/sqrt(Hz)", "bias_instability": "deg/s"}
 COVERAGE = 0.95
@@ -42,10 +38,9 @@ def run(records: int, step: Step) -> dict[str, Any]:
         reading's mean error (%) and coverage; ``quantities``: the same over the axes, with what is asked; ``walks``:
         axes in which a rate random walk was seen that is not there.
     """
-    noise = tuple(StaticNoise(white=n, flicker=f) for n, f in zip(RANDOM_WALK, BIAS_INSTABILITY, strict=True))
     fits: list[list[AllanResult]] = []
     for seed in range(1, records + 1):
-        fits.append(analyse(static_record(noise, round(DURATION * RATE), RATE, seed), RATE))
+        fits.append(analyse(static_record(mpu6500(), round(DURATION * RATE), RATE, seed), RATE))
         step()
     cases: list[dict[str, Any]] = []
     quantities: dict[str, dict[str, Any]] = {}

@@ -18,16 +18,17 @@ from groundstation.calibration.mwd_model import Triad, evaluate, nominal, tilt, 
 from groundstation.calibration.mwd_newton import hold, minimise
 from groundstation.calibration.mwd_record import accelerometer_record
 from groundstation.calibration.mwd_solve import MwdFit, solve_accelerometers, solve_magnetometers
-from groundstation.calibration.quality import TOOL_FACES, judge_readings
+from groundstation.calibration.quality import judge_readings
 from sim.instruments.mwd_jig import (
+    CONTROL,
     DIP,
     FIELD,
     VOLTS_PER_G,
     VOLTS_PER_MICROTESLA,
-    BenchRecord,
-    Design,
     Heating,
+    JigRecord,
     Tool,
+    control_design,
     draw_tool,
     fresh_design,
     make_design,
@@ -36,8 +37,7 @@ from sim.instruments.mwd_jig import (
 from sim.studies.pool import Step
 
 Array = npt.NDArray[np.float64]
-FRESH, CONTROL = 10**6, 2 * 10**6  # added to a tool's seed for records of their own
-CONTROL_INCLINATION, CONTROL_TEMPERATURE = math.radians(45.0), 25.0
+FRESH = 10**6  # added to a tool's seed for the attitudes that its calibration has not seen
 HEATINGS = (Heating.ROOM, Heating.SOAK, Heating.SHUFFLED, Heating.ALTERNATING, Heating.SINGLE_RAMP)
 REACH = {  # size in g, tilt in deg, iterations
     12: {"size": 2e-4, "tilt_deg": 0.01, "iterations": 5},
@@ -78,20 +78,13 @@ def calibrate(tool: Tool, heating: Heating, seed: int) -> Outcome:
     )
 
 
-def control_design() -> Design:
-    """Twelve tool faces at the attitude of the quality control."""
-    face = 2.0 * np.pi * np.arange(TOOL_FACES) / TOOL_FACES
-    same = np.ones(TOOL_FACES)
-    return Design(CONTROL_INCLINATION * same, face, 0.5 * same, CONTROL_TEMPERATURE * same)
-
-
-def passes(accelerometers: Triad, magnetometers: Triad, record: BenchRecord) -> bool:
+def passes(accelerometers: Triad, magnetometers: Triad, record: JigRecord) -> bool:
     """Quality control of a tool with these coefficients."""
     seen = evaluate(accelerometers, magnetometers, record.gravity_volts, record.field_volts, record.temperature)
     return judge_readings(seen).passed
 
 
-def worst(triad: Triad, record: BenchRecord) -> tuple[float, float]:
+def worst(triad: Triad, record: JigRecord) -> tuple[float, float]:
     """Largest error of |G| (g) and of the tilt (deg) over a record without noise."""
     gravity = vectors(triad, record.gravity_volts, record.temperature)
     size = np.abs(np.linalg.norm(gravity, axis=1) - 1.0)

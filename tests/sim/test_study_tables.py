@@ -1,0 +1,155 @@
+"""The tables of studies and instruments: what a line buys, and every study with few seeds."""
+
+import csv
+import json
+import shlex
+import textwrap
+from pathlib import Path
+
+import pytest
+from click.testing import CliRunner, Result
+
+from borechain.cli.experiment.experiment import experiment
+from sim.errors import TableError
+from sim.instruments.instrument import Instrument
+from sim.instruments.table import INSTRUMENTS
+from sim.named import by_name
+from sim.studies.pool import over_cores, seeded
+from sim.studies.study import Option, Study, Table
+from sim.studies.table import STUDIES
+
+RESULTS = Path(__file__).parents[2] / "docs" / "results"
+STUDY = """
+    from groundstation.report.style import new_figure
+
+    def steps(throws):
+        return throws
+
+    def run(throws, step):
+        for _ in range(throws):
+            step()
+        return {"experiment": "coin", "throws": throws, "cases": [{"case": "heads", "published": 0.5, "ours": 0.25}]}
+
+    def verdicts(result):
+        return [f"{result['throws']} throws are few"]
+
+    def figures(result):
+        return {"coin": new_figure(2.0, "A coin")}
+"""
+INSTRUMENT = """
+    from sim.instruments.instrument import Records
+
+    def records(seed):
+        return Records({"plumb.csv": b"angle_deg\\n0\\n"}, {"plumb": {"seed": seed}})
+"""
+
+
+def ask(*words: object) -> Result:
+    return CliRunner().invoke(experiment, [str(word) for word in words])
+
+
+@pytest.fixture
+def place(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """A folder on the import path, for packages that only a test has."""
+    folder = tmp_path / "packages"
+    folder.mkdir()
+    monkeypatch.syspath_prepend(str(folder))
+    return folder
+
+
+def test_a_study_is_added_by_its_line(place: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    (place / "coin").mkdir()
+    for module in ("run", "figure"):
+        (place / "coin" / f"{module}.py").write_text(textwrap.dedent(STUDY))
+    columns = (("case", "case"), ("published", "claimed"), ("ours", "ours"))
+    line = Study(
+        "coin",
+        "Whether a coin is fair.",
+        "coin",
+        (Table("{throws} throws", columns, columns),),
+        (Option("throws", 4, 1, 10),),
+        full=("--throws 9",),
+    )
+    monkeypatch.setitem(STUDIES, "coin", line)
+    assert "\ncoin                     Whether a coin is fair\n" in ask("list").output
+    assert "borechain experiment coin --throws 9 --out docs/results" in ask("coin", "--help").output
+    shown = ask("coin", "--out", tmp_path)
+    assert shown.exit_code == 0, shown.output
+    assert "4 throws are few" in shown.output
+    assert (tmp_path / "coin.csv").read_text() == "case,published,ours\nheads,0.5,0.25\n"
+    assert (tmp_path / "coin.svg").read_text().startswith("<?xml")
+    assert json.loads(ask("coin", "--throws", 2, "--json").stdout)["throws"] == 2
+    assert "is not in the range 1<=x<=10" in ask("coin", "--throws", 11).output
+
+
+def test_an_instrument_is_added_by_its_line(place: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    (place / "plumb_line.py").write_text(textwrap.dedent(INSTRUMENT))
+    for name in [*INSTRUMENTS]:
+        monkeypatch.delitem(INSTRUMENTS, name)
+    monkeypatch.setitem(INSTRUMENTS, "plumb", Instrument("plumb", "a plumb line", "plumb_line"))
+    done = ask("records", "--out", tmp_path, "--seed", 3, "--json")
+    assert done.exit_code == 0, done.output
+    assert json.loads(done.stdout)["files"] == [str(tmp_path / name) for name in ("plumb.csv", "truth.json")]
+    assert (tmp_path / "plumb.csv").read_text() == "angle_deg\n0\n"
+    assert json.loads((tmp_path / "truth.json").read_text()) == {"plumb": {"seed": 3}}
+
+
+@pytest.mark.parametrize("table", [STUDIES, INSTRUMENTS], ids=["studies", "instruments"])
+def test_two_lines_of_one_name_are_refused_in_one_line(table: dict) -> None:
+    name, line = next(iter(table.items()))
+    with pytest.raises(TableError) as refused:
+        by_name("lines", [*table.values(), line])
+    assert str(refused.value) == (
+        f"table of lines: expected one line of each name, got {name!r} in {line.module} and {line.module}"
+    )
+
+
+def test_no_study_takes_the_name_of_a_command_of_the_group() -> None:
+    assert not set(experiment.commands) & set(STUDIES)
+
+
+@pytest.mark.parametrize("study", STUDIES.values(), ids=lambda study: study.name)
+def test_every_study_runs_with_few_seeds_and_keeps_what_its_line_says(study: Study, tmp_path: Path) -> None:
+    done = ask(study.name, *shlex.split(study.short), "--out", tmp_path, "--json")
+    assert done.exit_code == 0, done.output
+    result = json.loads(done.stdout)
+    assert "traces" not in result
+    for table in study.tables:
+        assert result[table.rows]
+        if table.kept:
+            name = f"{result['experiment']}{table.suffix}.csv"
+            with (tmp_path / name).open(newline="") as file:
+                head, *rows = csv.reader(file)
+            assert head == [key for key, _ in table.kept]
+            assert len(rows) == len(result[table.rows])
+            assert head == (RESULTS / name).read_text().splitlines()[0].split(",")  # as the committed one
+    drawn = {path.name for path in tmp_path.glob("*.svg")}
+    assert bool(drawn) == study.drawn
+    assert all((RESULTS / name).exists() for name in drawn)
+
+
+def test_the_arguments_of_make_study_are_ones_that_the_studies_take() -> None:
+    for study in STUDIES.values():
+        command = experiment.get_command(None, study.name)  # type: ignore[arg-type]
+        for words in study.full:
+            command.make_context(study.name, shlex.split(words))  # type: ignore[union-attr]
+
+
+@pytest.mark.parametrize("words", [["fixed-point", "--cycles", "1999"], ["ingredients", "--seeds", "1"]])
+def test_too_little_is_refused_in_one_line(words: list[str]) -> None:
+    done = ask(*words)
+    assert done.exit_code == 2
+    assert "is not in the range" in done.output
+
+
+def times_seed(job: tuple[int, int]) -> int:
+    return job[0] * job[1]
+
+
+@pytest.mark.parametrize("seeds", [2, 3])
+def test_the_pool_keeps_the_order_of_its_seeds_and_tells_of_each(seeds: int) -> None:
+    stepped: list[None] = []
+    with over_cores(seeds, lambda: stepped.append(None)) as run_all:
+        assert run_all(times_seed, seeded(10, seeds)) == [10 * seed for seed in range(1, seeds + 1)]
+        assert len(stepped) == seeds
+        assert run_all(times_seed, seeded(7, 1)) == [7]
