@@ -10,10 +10,9 @@ import numpy.typing as npt
 
 from groundstation.calibration.records import ATTITUDES_HEADER, STANDARD_GRAVITY
 from sim.instruments.instrument import InstrumentError, Records
-from sim.world.streams import stream
+from sim.world.streams import Stream, stream
 
 Array = npt.NDArray[np.float64]
-STREAM = 3002
 PITCHES_DEG = (0.0, 30.0, -30.0, 0.0, 0.0, 60.0, -60.0, 0.0, 0.0, 45.0, -45.0, 0.0)
 ROLLS_DEG = (0.0, 0.0, 0.0, 30.0, -30.0, 0.0, 0.0, 90.0, -90.0, 120.0, -120.0, 180.0)
 SCALE_STD, MISALIGNMENT_STD = 5e-3, 1e-2
@@ -69,7 +68,7 @@ def robot_arm(
 
 def records(seed: int) -> Records:
     """Means of one accelerometer at twelve attitudes, m/s^2."""
-    random = stream(seed, STREAM)
+    random = stream(seed, Stream.ROBOT_ARM)
     scale = np.eye(3) + MISALIGNMENT_STD * random.standard_normal((3, 3))
     np.fill_diagonal(scale, 1.0 + SCALE_STD * random.standard_normal(3))
     matrix, bias = STANDARD_GRAVITY * scale, BIAS_STD * random.standard_normal(3)

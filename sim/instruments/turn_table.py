@@ -7,10 +7,9 @@ import numpy.typing as npt
 
 from groundstation.calibration.records import AXES, TURN_TABLE_HEADERS
 from sim.instruments.instrument import Records
-from sim.world.streams import stream
+from sim.world.streams import Stream, stream
 
 Array = npt.NDArray[np.float64]
-STREAM = 3001
 REFERENCE_DPS = 720.0
 SCALE_STD, MISALIGNMENT_STD = 5e-3, 1e-2
 BIAS_STD_DPS, NOISE_STD_DPS, AXIS_STD = 2.0, 0.01, 1e-4  # of the sensor, of a mean reading, of the table (rad)
@@ -41,7 +40,7 @@ def turn_table(
 
 def records(seed: int) -> Records:
     """Table of one gyroscope, deg/s."""
-    random = stream(seed, STREAM)
+    random = stream(seed, Stream.TURN_TABLE)
     matrix = np.eye(3) + MISALIGNMENT_STD * random.standard_normal((3, 3))
     np.fill_diagonal(matrix, 1.0 + SCALE_STD * random.standard_normal(3))
     bias = BIAS_STD_DPS * random.standard_normal(3)

@@ -7,37 +7,42 @@ a cycle, and aiding that is 10 ms old and dated by its arrival; a node hands its
 
 from __future__ import annotations
 
-from dataclasses import replace
 from typing import Any
 
-from node.kernels.layout import Scheme
 from sim.rig.plain_encoder import LINES
-from sim.studies.node_lab import REST, LabRun, LabSetup
+from sim.studies.lab import REST, LabRun
+from sim.studies.scenarios import Tables, changed
 from sim.studies.trials import Trials, rms_deg, row
 
-DELAY = 10e-3  # s
+DELAY_MS = 10.0
 EXPERIMENTS = ("update-modes", "single-updates", "two-nodes")
 FORMS = ("published filter", "published scheme")
 
 
-def setup_of(setup: LabSetup, form: str) -> LabSetup:
+def setup_of(setup: Tables, form: str) -> Tables:
     """A laboratory string with one of ``FORMS`` in place of ours."""
-    filtered = replace(setup, kernel="published", scheme=Scheme.ESTIMATE)
+    filtered = changed(setup, node={"kernel": "published", "scheme": "estimate"})
     if form == "published filter":
         return filtered
-    return replace(filtered, delay=DELAY, dated_by_arrival=True, counts_per_turn=LINES, instantaneous=True)
+    return changed(
+        filtered,
+        medium={"delay_ms": DELAY_MS, "dated_by": "arrival"},
+        encoder={"counts_per_turn": LINES, "edge_times": False},
+        gyroscope={"instantaneous": True},
+    )
 
 
-def rows_of(cases: list[tuple[str, LabSetup, int, float | str | None]], run_all: Trials) -> list[dict[str, Any]]:
+def rows_of(cases: list[tuple[str, Tables, int, float | str | None]], run_all: Trials) -> list[dict[str, Any]]:
     """Rows of yaw and azimuth of every form and case: its name, setup, hop and the thesis's azimuth rms (deg)."""
     rows: list[dict[str, Any]] = []
     for form in FORMS:
-        done: dict[LabSetup, list[LabRun]] = {}
+        last: Tables | None = None
+        runs: list[LabRun] = []
         for name, setup, hop, published in cases:
-            if setup not in done:
-                done[setup] = run_all(setup_of(setup, form))
-            yaw = rms_deg([r.error[REST, hop] for r in done[setup]])
-            azimuth = rms_deg([r.azimuth_error[hop : hop + 1] for r in done[setup]])
+            if setup is not last:
+                last, runs = setup, run_all(setup_of(setup, form))
+            yaw = rms_deg([r.error[REST, hop] for r in runs])
+            azimuth = rms_deg([r.azimuth_error[hop : hop + 1] for r in runs])
             rows.append(row(f"{name}, {form}", "yaw", yaw))
             rows.append(row(f"{name}, {form}", "azimuth", azimuth, published=published))
     return rows

@@ -10,13 +10,14 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from sim.studies.node_lab import ENDS, STOP, LabRun, LabSetup, run_seed
+from sim.studies.lab import ENDS, STOP, LabRun, run_seed
 from sim.studies.pool import Step, over_cores, seeded
+from sim.studies.scenarios import Tables
 
 Array = npt.NDArray[np.float64]
 RESAMPLES = 2000
 SHOWN_SEED = 0  # index of the seed that figures show by itself
-Trials = Callable[[LabSetup], list[LabRun]]
+Trials = Callable[[Tables], list[LabRun]]
 
 
 @contextmanager

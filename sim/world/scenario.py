@@ -20,6 +20,7 @@ from telemetry.messages import MAX_TUBE
 
 VERSION = 1  # of the format
 MAX_RATE_DPS = 57.0 * 6.0  # 57 rev/min: half a turn a cycle is where one sample a cycle aliases
+LEAST_LATENCY_MS = 0.5  # of a hop with a link
 SURVEY_AFTER = 22.0  # s at rest, for a survey
 RECORD_MARGIN = 8.0  # s at an attitude beside its record: the tubes settle and the order travels
 Positive = Annotated[float, Field(gt=0.0)]
@@ -172,7 +173,7 @@ class MediumSection(Section):
         "validity", description="when a node takes an aiding to be valid, where the link is off"
     )
 
-    latency_ms: float = Field(3.0, ge=0.5)
+    latency_ms: NotNegative = Field(3.0, description="at least 0.5 where the link is on")
     jitter_ms: NotNegative = Field(0.3, description="mean of the exponential part")
     loss: Probability = 0.01
     duplicate: Probability = 0.001
@@ -376,6 +377,10 @@ def _check_link(path: Path, file: ScenarioFile) -> None:
     """Settings of a string without a link stand beside ``link = "off"`` only: on a link they would do nothing."""
     if file.medium.link == "off":
         return
+    if file.medium.latency_ms < LEAST_LATENCY_MS:
+        raise ScenarioError(
+            f"{path}: medium.latency_ms: expected at least {LEAST_LATENCY_MS:g} ms, got {file.medium.latency_ms:g}"
+        )
     usual = {
         "medium.delay_ms": file.medium.delay_ms == 0.0,
         "medium.dated_by": file.medium.dated_by == "validity",

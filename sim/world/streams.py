@@ -29,7 +29,19 @@ class Stream(IntEnum):
     AIDING_PHASE = 19  # of the times in which aiding passes
     AIDING_LOSS = 20
     AIDING_CLOCKS = 21  # errors of rig time where no link synchronises it
+    WELLS = 2000  # a string in one of many wells, for the coverage of ellipses
+    TURN_TABLE = 3001  # a gyroscope and its table
+    ROBOT_ARM = 3002  # an accelerometer and its arm
     LINK = 0xA1  # fate and delays of the frames of one port
+
+
+class JigStream(IntEnum):
+    """Purpose of a stream of an MWD tool, whose seeds are apart from those of strings."""
+
+    TOOL = 0  # its true coefficients
+    DESIGN = 1  # order of the tool faces
+    FRESH = 2  # attitudes that no calibration has seen
+    READINGS = 3  # noise, and the stand of the jig
 
 
 def stream(*key: int) -> np.random.Generator:

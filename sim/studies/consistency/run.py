@@ -16,9 +16,9 @@ import numpy as np
 
 from node.firmware.settings import Kernel
 from node.kernels.layout import Scheme
-from sim.studies.chain import ChainRun, ChainSetup, run_seed
-from sim.studies.links import OnOff
+from sim.studies.epochs import EpochRun, resting, run_seed
 from sim.studies.pool import Step, over_cores, seeded
+from sim.studies.scenarios import Tables, changed, on_off
 
 HOPS = 50
 SHOWN = (1, 2, 5, 10, 25, 50)
@@ -29,9 +29,10 @@ OUTSIDE = 0.05  # share of cells that may lie outside the usual bounds
 STUDIED = {1: 1.0, 2: 2.6, 5: 10.0, 10: 27.0, 25: 83.0, 50: 178.0}  # NEES of ``estimate`` at rest, in another study
 
 
-def setup_of(scheme: Scheme, hops: int = HOPS, kernel: Kernel = "float64") -> ChainSetup:
+def setup_of(scheme: Scheme, hops: int = HOPS, kernel: Kernel = "float64") -> Tables:
     """The string of one scheme; shorter ones lose as much a hop."""
-    return ChainSetup(hops, scheme, blocks=2, clock_std=5e-3, loss=LOSS, link=OnOff(20.0, 30.0), kernel=kernel)
+    string = resting(hops, scheme, kernel, blocks=2, loss=LOSS)
+    return changed(string, clocks={"joint_std_ms": 5.0}, aiding=on_off(20.0, 30.0))
 
 
 def schemes_of(kernel: Kernel) -> tuple[Scheme, ...]:
@@ -73,7 +74,7 @@ def run(
     return {"experiment": name, "kernel": kernel, "seeds": seeds, "cases": cases, "schemes": schemes}
 
 
-def table(scheme: Scheme, runs: Sequence[ChainRun]) -> list[dict[str, Any]]:
+def table(scheme: Scheme, runs: Sequence[EpochRun]) -> list[dict[str, Any]]:
     """One row an epoch and hop."""
     error, var = np.array([r.error for r in runs]), np.array([r.var for r in runs])
     total = np.array([r.total_error for r in runs]) ** 2 / np.array([r.total_var for r in runs])

@@ -2,7 +2,7 @@
 
 Every well is drilled anew: tubes pass the stations one after the other, with mounts, joints and accelerometer biases
 drawn as in a rig's scenario, and with the yaw errors and variances that our filter itself produced at rest in simulated
-strings (``chain``), drawn by hop. The readings go through the ground station's own mathematics: resolve, shared errors,
+strings (`epochs`), drawn by hop. The readings go through the ground station's own mathematics: resolve, shared errors,
 recursive Bayes, trajectory. Source of the geometry: thesis Table 4.1 and Table 4.26.
 """
 
@@ -22,13 +22,12 @@ from groundstation.survey.methods import tangents
 from groundstation.survey.resolve import resolve
 from groundstation.survey.shared import SharedErrors
 from groundstation.survey.trajectory import Trajectory
-from node.kernels.layout import Scheme
-from sim.studies.chain import ChainSetup, run_seed
+from sim.studies.epochs import resting, run_seed
 from sim.studies.pool import RunAll, Step, over_cores
 from sim.studies.published import wellbore_1
 from sim.world.borehole import Borehole
 from sim.world.scenario import AccelerometerSection, JointSection
-from sim.world.streams import stream
+from sim.world.streams import Stream, stream
 
 Array = npt.NDArray[np.float64]
 TUBES = 10
@@ -50,7 +49,7 @@ class YawPool:
 
 def yaw_pool(strings: int, run_all: RunAll) -> YawPool:
     """Let the real filter run in ``strings`` simulated strings and keep what it knew at rest."""
-    runs = run_all(run_seed, [(ChainSetup(TUBES, Scheme.FORWARD), FIRST_STRING + seed) for seed in range(strings)])
+    runs = run_all(run_seed, [(resting(TUBES), FIRST_STRING + seed) for seed in range(strings)])
     error, var = (np.concatenate([getattr(r, name)[~r.turning] for r in runs]).T for name in ("error", "var"))
     return YawPool(error, var)
 
@@ -59,7 +58,7 @@ class Rig:
     """One string of one well and what is wrong with it."""
 
     def __init__(self, seed: int) -> None:
-        self.random = stream(seed, 2000)
+        self.random = stream(seed, Stream.WELLS)
         joints, accelerometer = JointSection(), AccelerometerSection()
         self.joint_std = math.radians(joints.reading_std_deg)
         self.mount_std = math.radians(joints.mount_std_deg)

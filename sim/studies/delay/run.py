@@ -8,20 +8,21 @@ of a study of the published scheme.
 
 from __future__ import annotations
 
-from dataclasses import replace
 from typing import Any
 
-from sim.studies.node_lab import ROTATING, SETTLED, LabSetup
+from sim.studies.lab import LAB, ROTATING, SETTLED
 from sim.studies.pool import Step
+from sim.studies.scenarios import changed
 from sim.studies.trials import rms_deg, row, trials
 
 DELAYS_MS = (0.0, 10.0, 30.0, 100.0)
-PLAIN = LabSetup(latency=0.0, clock_std=0.0, clock_wander_std=0.0)
+PLAIN = changed(LAB, medium={"latency_ms": 0.0}, clocks={"joint_std_ms": 0.0, "wander_std_ms": 0.0})
+ARRIVAL = {"dated_by": "arrival"}
 FOUND = "dated by arrival, with time-stamp state"
 FORMS = {
     "compensated": PLAIN,
-    "dated by arrival": replace(PLAIN, dated_by_arrival=True, config=(("stamp_std", 0.0),)),
-    FOUND: replace(PLAIN, dated_by_arrival=True),
+    "dated by arrival": changed(PLAIN, medium=ARRIVAL, node={"tuning": {"stamp_std": 0.0}}),
+    FOUND: changed(PLAIN, medium=ARRIVAL),
 }
 TO_REACH_DEG = 0.04  # compensated, rotating
 STUDIED_DEG = {("dated by arrival", 10.0): 0.7, ("dated by arrival", 100.0): 7.2}
@@ -38,8 +39,8 @@ def run(seeds: int, step: Step) -> dict[str, Any]:
     with trials(seeds, step) as run_all:
         for form, setup in FORMS.items():
             for delay in DELAYS_MS:
-                told = None if form != FOUND else max(1e-3 * delay, 1e-3)
-                runs = run_all(replace(setup, delay=1e-3 * delay, clock_told=told))
+                stated = max(delay, 1.0) if form == FOUND else None
+                runs = run_all(changed(setup, medium={"delay_ms": delay}, clocks={"stated_std_ms": stated}))
                 turning, rest = (rms_deg([r.error[window, 0] for r in runs]) for window in (ROTATING, SETTLED))
                 name, reach = f"{form}, {delay:g} ms", TO_REACH_DEG if form == "compensated" else None
                 studied = STUDIED_DEG.get((form, delay))

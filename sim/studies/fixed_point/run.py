@@ -2,7 +2,7 @@
 
 One node turns and rests; its aiding comes late, stays out for half a minute to half an hour, and comes both at rest
 and while turning. Cycles are lost and joints opened now and then. Both kernels get the same numbers, and at the end
-of every cycle their yaw, sigma and status are compared. A short chain of either kernel then tells of consistency.
+of every cycle their yaw, sigma and status are compared. A short string with either is then judged for consistency.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ from node.kernels.cycle import run_cycle
 from node.kernels.fixed.node import FixedNode
 from node.kernels.layout import DEG, PERIOD, Err, Scheme, default_config, new_state
 from node.kernels.relay import offer_aiding
-from sim.studies.chain import ChainSetup, run_seed
+from sim.studies.epochs import resting, run_seed
 from sim.studies.pool import Step, over_cores, seeded
 from sim.studies.relay.run import table
 
@@ -151,12 +151,12 @@ def rows_of(found: Comparison) -> list[dict[str, Any]]:
 
 
 def consistency(hops: int, seeds: int, step: Step) -> list[dict[str, Any]]:
-    """NEES of a short chain of either kernel, one row a hop and kernel."""
+    """NEES of a short string with either kernel, one row a hop and kernel."""
     rows: list[dict[str, Any]] = []
     kernels: tuple[Kernel, ...] = ("float64", "fixed")
     with over_cores(seeds, step) as run_all:
         for kernel in kernels:
-            runs = run_all(run_seed, seeded(ChainSetup(hops, Scheme.FORWARD, kernel=kernel), seeds))
+            runs = run_all(run_seed, seeded(resting(hops, kernel=kernel), seeds))
             rows.extend({"kernel": kernel, **row} for row in table(Scheme.FORWARD, runs))
     return rows
 

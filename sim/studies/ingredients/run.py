@@ -9,31 +9,30 @@ ours are the ranges that a study of the published scheme found at rest over the 
 
 from __future__ import annotations
 
-from dataclasses import replace
 from typing import Any
 
 from sim.rig.plain_encoder import LINES
-from sim.studies.links import OnOff
-from sim.studies.node_lab import REST, ROTATING, LabSetup
+from sim.studies.lab import LAB, REST, ROTATING
 from sim.studies.pool import Step
-from sim.studies.published_form import DELAY, FORMS, setup_of
+from sim.studies.published_form import DELAY_MS, FORMS, setup_of
+from sim.studies.scenarios import Tables, changed, on_off
 from sim.studies.trials import rms_deg, row, trials
 
-OURS = LabSetup()
-MODES = {"continuous": OnOff(), "20 s on / 30 s off": OnOff(20.0, 30.0)}
-LATE = replace(OURS, delay=DELAY, dated_by_arrival=True, config=(("stamp_std", 0.0),))
-UNSTILL = replace(OURS, config=(("still_rate", 0.0),))
-INGREDIENTS: dict[str, LabSetup] = {
-    "as shipped": OURS,
-    "no scale-factor state": replace(OURS, config=(("scale_std", 0.0),)),
-    "no delay compensation, instantaneous rate": replace(LATE, instantaneous=True),
+MODES = {"continuous": on_off(20.0, 0.0), "20 s on / 30 s off": on_off(20.0, 30.0)}
+LATE = changed(LAB, medium={"delay_ms": DELAY_MS, "dated_by": "arrival"}, node={"tuning": {"stamp_std": 0.0}})
+INSTANTANEOUS = {"instantaneous": True}
+UNSTILL = changed(LAB, node={"tuning": {"still_rate": 0.0}})
+INGREDIENTS: dict[str, Tables] = {
+    "as shipped": LAB,
+    "no scale-factor state": changed(LAB, node={"tuning": {"scale_std": 0.0}}),
+    "no delay compensation, instantaneous rate": changed(LATE, gyroscope=INSTANTANEOUS),
     "no delay compensation": LATE,
-    "instantaneous rate": replace(OURS, instantaneous=True),
-    "no edge times": replace(OURS, counts_per_turn=4 * LINES),
-    "no edge times, no quadrature": replace(OURS, counts_per_turn=LINES),
+    "instantaneous rate": changed(LAB, gyroscope=INSTANTANEOUS),
+    "no edge times": changed(LAB, encoder={"counts_per_turn": 4 * LINES, "edge_times": False}),
+    "no edge times, no quadrature": changed(LAB, encoder={"counts_per_turn": LINES, "edge_times": False}),
     "no zero-rate update": UNSTILL,
-    "no zero-rate update, new measurements at rest": replace(UNSTILL, renumbered=True),
-    **{form: setup_of(OURS, form) for form in FORMS},
+    "no zero-rate update, new measurements at rest": changed(UNSTILL, aiding={"renumbered": True}),
+    **{form: setup_of(LAB, form) for form in FORMS},
 }
 STUDIED_DEG: dict[str, tuple[float, float]] = {
     "no scale-factor state": (0.3, 4.0),
@@ -55,7 +54,7 @@ def run(seeds: int, step: Step) -> dict[str, Any]:
         for name, setup in INGREDIENTS.items():
             studied = "-".join(f"{end:g}" for end in STUDIED_DEG.get(name, ())) or None
             for mode, link in MODES.items():
-                runs = run_all(replace(setup, link=link))
+                runs = run_all(changed(setup, aiding=link))
                 for quantity, window in WINDOWS.items():
                     figure = rms_deg([r.error[window, 0] for r in runs])
                     beside = studied if window is REST else None

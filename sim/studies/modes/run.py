@@ -7,18 +7,20 @@ nodes turn, the scale factor is unknown until the first aiding; the figure from 
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass
+from itertools import groupby
 from typing import Any
 
 import numpy as np
 
-from sim.studies.links import OnOff, Single
-from sim.studies.node_lab import ONCE_AIDED, REST, ROTATING, LabRun, LabSetup
+from sim.studies.lab import LAB, ONCE_AIDED, REST, ROTATING, LabRun
 from sim.studies.pool import Step
 from sim.studies.published_form import EXPERIMENTS, FORMS, rows_of
+from sim.studies.scenarios import Tables, changed, complete, on_off
 from sim.studies.trials import rms_deg, row, trace, trials
 
-FIFTY_CLOCK = 5e-3  # s, each joint
+FIFTY_CLOCK_MS = 5.0  # each joint
 FIFTY_LOSS = 1.0 - 0.7 ** (1.0 / 50.0)  # each hop, so that 30 % is lost on the way to hop 50
 
 
@@ -27,7 +29,7 @@ class Case:
     """One line of thesis 4.2 at one hop; deg. ``published`` is an azimuth rms."""
 
     name: str
-    setup: LabSetup
+    setup: Tables
     published: float | str | None
     yaw: float
     azimuth: float | None
@@ -36,18 +38,24 @@ class Case:
 
 
 def _on_off(off: float, published: float, yaw: float, azimuth: float) -> Case:
-    return Case(f"20 s on / {off:g} s off", LabSetup(OnOff(20.0, off)), published, yaw, azimuth)
+    return Case(f"20 s on / {off:g} s off", changed(LAB, aiding=on_off(20.0, off)), published, yaw, azimuth)
 
 
 def _single(hertz: float, published: float | str, yaw: float, azimuth: float) -> Case:
-    return Case(f"single, {hertz:g} Hz", LabSetup(Single(1.0 / hertz)), published, yaw, azimuth)
+    return Case(f"single, {hertz:g} Hz", changed(LAB, aiding={"every_s": 1.0 / hertz}), published, yaw, azimuth)
 
 
-TWO = LabSetup(hops=2)
-FIFTY = LabSetup(OnOff(20.0, 30.0), hops=50, clock_std=FIFTY_CLOCK, loss=FIFTY_LOSS)
+TWO = changed(LAB, rig=complete(2))
+FIFTY = changed(
+    LAB,
+    rig=complete(50),
+    aiding=on_off(20.0, 30.0),
+    clocks={"joint_std_ms": FIFTY_CLOCK_MS},
+    medium={"loss": FIFTY_LOSS},
+)
 CASES = {
     "update-modes": (
-        Case("continuous 1.9 Hz", LabSetup(), 0.029, 0.013, 0.035),
+        Case("continuous 1.9 Hz", LAB, 0.029, 0.013, 0.035),
         _on_off(5.0, 0.250, 0.013, 0.035),
         _on_off(10.0, 0.384, 0.018, 0.038),
         _on_off(30.0, 0.351, 0.042, 0.050),
@@ -71,7 +79,14 @@ CASES = {
 def steps(name: str, seeds: int) -> int:
     """Runs of one seed."""
     forms = len(FORMS) if name in EXPERIMENTS else 0
-    return seeds * (1 + forms) * len({case.setup for case in CASES[name]})
+    return seeds * (1 + forms) * len(list(setups(name)))
+
+
+def setups(name: str) -> Iterator[tuple[Tables, list[Case]]]:
+    """Every setup with its cases, which stand one after the other."""
+    for _, cases in groupby(CASES[name], key=lambda case: id(case.setup)):
+        found = list(cases)
+        yield found[0].setup, found
 
 
 def run(name: str, seeds: int, step: Step) -> dict[str, Any]:
@@ -85,12 +100,11 @@ def run(name: str, seeds: int, step: Step) -> dict[str, Any]:
     cases: list[dict[str, Any]] = []
     traces: dict[str, Any] = {}
     with trials(seeds, step) as run_all:
-        done: dict[LabSetup, list[LabRun]] = {}
-        for case in CASES[name]:
-            if case.setup not in done:
-                done = {case.setup: run_all(case.setup)}
-            cases += table(case, done[case.setup])
-            traces[case.name] = trace(done[case.setup], case.hop)
+        for setup, of_setup in setups(name):
+            runs = run_all(setup)
+            for case in of_setup:
+                cases += table(case, runs)
+                traces[case.name] = trace(runs, case.hop)
         if name in EXPERIMENTS:
             cases += rows_of([(case.name, case.setup, case.hop, case.published) for case in CASES[name]], run_all)
     return {"experiment": name, "seeds": seeds, "cases": cases, "traces": traces}

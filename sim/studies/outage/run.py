@@ -1,6 +1,6 @@
 """Consistency of a lossy string of five: NEES at fixed epochs over the length of outages and the loss of every hop.
 
-The strings are those of ``chain``, with joint and mount errors drawn from their stated sigma; aiding leaves the encoder
+The strings are those of `epochs`, with joint and mount errors drawn from their stated sigma; aiding leaves the encoder
 for 20 s and then not for the length of the outage. Epochs are 10 s before the end of each turning and of each rest, a
 cell is a hop at rest or turning. Honest is a mean NEES of 1.
 """
@@ -8,20 +8,17 @@ cell is a hop at rest or turning. Honest is a mean NEES of 1.
 from __future__ import annotations
 
 import math
-from dataclasses import replace
 from typing import Any
 
 import numpy as np
 
-from node.kernels.layout import Scheme
-from sim.studies.chain import ChainRun, ChainSetup, run_seed
-from sim.studies.links import OnOff
+from sim.studies.epochs import BLOCKS, EpochRun, resting, run_seed
 from sim.studies.pool import Step, over_cores, seeded
+from sim.studies.scenarios import changed, on_off
 
 HOPS = 5
 OUTAGES_S = (0.0, 20.0, 60.0)
 LOSSES = (0.0, 0.1, 0.3)
-STRINGS = ChainSetup(HOPS, Scheme.FORWARD)
 USUAL = (0.88, 1.13)  # of a cell
 EVERY = (0.8, 1.25)  # of all cells
 OUTSIDE = 0.05  # share of cells that may lie outside the usual bounds
@@ -39,16 +36,16 @@ def run(seeds: int, step: Step) -> dict[str, Any]:
     with over_cores(seeds, step) as run_all:
         for off in OUTAGES_S:
             for loss in LOSSES:
-                setup = replace(STRINGS, loss=loss, link=OnOff(20.0, off))
+                setup = changed(resting(HOPS, loss=loss), aiding=on_off(20.0, off))
                 cases += table(off, loss, run_all(run_seed, seeded(setup, seeds)))
     cells = np.array([[r[f"hop_{k + 1}"] for k in range(HOPS)] for r in cases])
     outside = float(np.mean((cells < USUAL[0]) | (cells > USUAL[1])))
     # of the mean of squares of normal errors; a joint is drawn once a seed, a filter's error once an epoch
-    errors = {"epochs": math.sqrt(2.0 / (seeds * STRINGS.blocks)), "joints": math.sqrt(2.0 / seeds)}
+    errors = {"epochs": math.sqrt(2.0 / (seeds * BLOCKS)), "joints": math.sqrt(2.0 / seeds)}
     return {"experiment": "outage", "seeds": seeds, "cases": cases, "outside": outside, "standard_errors": errors}
 
 
-def table(off: float, loss: float, runs: list[ChainRun]) -> list[dict[str, Any]]:
+def table(off: float, loss: float, runs: list[EpochRun]) -> list[dict[str, Any]]:
     """Rows of one string: at rest, turning, and at rest with the errors of joints and mounts."""
     turning = runs[0].turning
     nees = np.array([r.error**2 / r.var for r in runs])

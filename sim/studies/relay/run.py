@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 
 from node.kernels.layout import Scheme
-from sim.studies.chain import ChainRun, ChainSetup, run_seed
+from sim.studies.epochs import EpochRun, resting, run_seed
 from sim.studies.pool import Step, over_cores, seeded
 
 STUDIED_NEES_AT_REST = {1: 1.0, 2: 2.6, 5: 10.0, 10: 27.0}
@@ -37,7 +37,7 @@ def run(hops: int, seeds: int, step: Step) -> dict[str, Any]:
     consistent: dict[str, bool] = {}
     with over_cores(seeds, step) as run_all:
         for scheme in Scheme:
-            rows = table(scheme, run_all(run_seed, seeded(ChainSetup(hops, scheme), seeds)))
+            rows = table(scheme, run_all(run_seed, seeded(resting(hops, scheme), seeds)))
             cases.extend(rows)
             low, high = CONSISTENT
             consistent[scheme.name.lower()] = all(
@@ -46,7 +46,7 @@ def run(hops: int, seeds: int, step: Step) -> dict[str, Any]:
     return {"experiment": "relay", "hops": hops, "seeds": seeds, "cases": cases, "consistent": consistent}
 
 
-def table(scheme: Scheme, runs: list[ChainRun]) -> list[dict[str, Any]]:
+def table(scheme: Scheme, runs: list[EpochRun]) -> list[dict[str, Any]]:
     """One row a hop."""
     error, var = np.array([r.error for r in runs]), np.array([r.var for r in runs])
     total, total_var = np.array([r.total_error for r in runs]), np.array([r.total_var for r in runs])

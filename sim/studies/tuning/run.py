@@ -14,8 +14,9 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from sim.studies.node_lab import END, ENDS, REST, STOP, LabRun, LabSetup
+from sim.studies.lab import END, ENDS, LAB, REST, STOP, LabRun
 from sim.studies.pool import Step
+from sim.studies.scenarios import Tables, changed
 from sim.studies.trials import rms_deg, trials
 
 Array = npt.NDArray[np.float64]
@@ -35,9 +36,9 @@ FACTORS: tuple[tuple[str, str, float], ...] = (
 )
 
 
-def setup_of(factor: str, value: float) -> LabSetup:
+def setup_of(factor: str, value: float) -> Tables:
     """The laboratory string under one factor of the firmware's configuration."""
-    return LabSetup(bias_step_dps=RESIDUAL_DPS, config=((factor, value),))
+    return changed(LAB, gyroscope={"bias_step_dps": RESIDUAL_DPS}, node={"tuning": {factor: value}})
 
 
 def steps(seeds: int) -> int:

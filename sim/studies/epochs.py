@@ -1,0 +1,78 @@
+"""A string that turns and rests several times, as a scenario, judged at fixed epochs.
+
+Joints and mounts err by their stated sigma, clocks by theirs, and every hop loses some aiding. Epochs are 10 s before
+the end of each turning and of each rest, so that samples of one seed are nearly independent.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+
+from node.kernels.layout import PERIOD, Scheme
+from sim.rig.direct_string import DirectString
+from sim.studies.lab import ACCELERATION_DPS2, RATE_DPS, TURNS
+from sim.studies.scenarios import Tables, complete
+from sim.world.scenario import scenario_of
+from sim.world.world import World
+
+Array = npt.NDArray[np.float64]
+BLOCKS = 3  # of turning and resting
+BEFORE_END = 10.0  # s
+RESTING: Tables = {
+    "rig": complete(1),
+    "path": {"straight": {"inclination_deg": 2.0}},
+    "schedule": {"add_s": 60.0, "stop_s": 60.0, "finish_s": 5.0, "blocks": BLOCKS},
+    "rotation": {"turns": TURNS, "rate_dps": RATE_DPS, "acceleration_dps2": ACCELERATION_DPS2},
+    "medium": {"link": "off"},
+}
+
+
+@dataclass(frozen=True, slots=True)
+class EpochRun:
+    """Yaw errors (rad) and variances (rad^2) at the fixed epochs: (epochs, hops) each, from the head down."""
+
+    error: Array  # besides the constant errors of joints and mounts
+    var: Array
+    total_error: Array
+    total_var: Array
+    turning: npt.NDArray[np.bool_]  # (epochs,)
+
+
+def resting(
+    hops: int, scheme: Scheme = Scheme.FORWARD, kernel: str = "float64", blocks: int = BLOCKS, loss: float = 0.01
+) -> Tables:
+    """The string of ``hops`` tubes."""
+    return {
+        **RESTING,
+        "rig": complete(hops),
+        "schedule": {**RESTING["schedule"], "blocks": blocks},
+        "medium": {"link": "off", "loss": loss},
+        "node": {"scheme": scheme.name.lower(), "kernel": kernel},
+    }
+
+
+def run_seed(job: tuple[Tables, int]) -> EpochRun:
+    """One seed of one scenario, for a pool of processes."""
+    tables, seed = job
+    world = World(scenario_of(dict(tables)), seed)
+    return judge(DirectString(world))
+
+
+def judge(string: DirectString) -> EpochRun:
+    """Drill a string and keep what its nodes knew at the fixed epochs."""
+    at, turning = epochs_of(string.world)
+    run = string.drill()
+    rows = (run.error, run.var, run.total_error, run.total_var)
+    error, var, total_error, total_var = (values[at, ::-1] for values in rows)
+    return EpochRun(error, var, total_error, total_var, turning)
+
+
+def epochs_of(world: World) -> tuple[npt.NDArray[np.intp], npt.NDArray[np.bool_]]:
+    """Cycles (epochs,) at which a filter is judged, and whether the string turns then."""
+    phases = [phase for phase in world.phases if phase.kind in ("drill", "stop")]
+    cycles = [math.floor((phase.end - BEFORE_END - world.begin) / PERIOD) for phase in phases]
+    return np.array(cycles), np.array([phase.kind == "drill" for phase in phases])
