@@ -77,6 +77,8 @@ class StringRun:
 class DirectString:
     """One string of one world.
 
+    ``clock_shifts`` moves the clock of a tube by so many seconds, a plain field to be changed by whoever tests.
+
     Parameters
     ----------
     world : of a scenario whose link is off
@@ -109,6 +111,7 @@ class DirectString:
         self._clocks = self._clock_errors()
         self._phases = {tube: world.phase(tube) for tube in self.tubes}
         self._adds = [phase for phase in world.phases if phase.kind == "add"]
+        self.clock_shifts: dict[int, float] = {}
         self._mount_var = math.radians(self._file.joints.mount_std_deg) ** 2
         self._own: dict[int, Aiding | None] = {}  # what each node said in its cycle, by the schemes of estimates
         self.run = self._empty_run()
@@ -178,8 +181,9 @@ class DirectString:
     def _run_cycle(self, cycle: int, tube: int, string: Sequence[int]) -> list[Message]:
         phase = self._phases[tube]
         begin, end = self.world.cycle_end(cycle - 1) + phase, self.world.cycle_end(cycle) + phase
+        shift = self.clock_shifts.get(tube, 0.0)
         wx, wy, wz, fx, fy, fz = self._spoil(tube, cycle, self.world.imu_sample(tube, cycle))
-        reading = ImuReading(begin, end, (wx, wy, wz), (fx, fy, fz))
+        reading = ImuReading(begin + shift, end + shift, (wx, wy, wz), (fx, fy, fz))
         return list(self.tubes[tube].on_cycle(reading, self._context(tube, string[0], end)))
 
     def _context(self, tube: int, top: int, end: float) -> RigContext:
@@ -211,7 +215,8 @@ class DirectString:
             if aiding is not None and not self._lost[cycle, hop]:
                 travelled = 1e-3 * medium.delay_ms + medium.latency * (hop + 1 if scheme is Scheme.FORWARD else 1)
                 late = travelled if medium.dated_by == "arrival" else 0.0
-                passed = firmware.on_aiding(aiding, aiding.valid_at + late + float(self._clocks[cycle, hop]))
+                error = float(self._clocks[cycle, hop]) + self.clock_shifts.get(tube, 0.0)
+                passed = firmware.on_aiding(aiding, aiding.valid_at + late + error)
             aiding = passed if scheme is Scheme.FORWARD else self._own.get(tube)
 
     def _empty_run(self) -> StringRun:

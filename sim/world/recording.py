@@ -8,11 +8,13 @@ import numpy as np
 import numpy.typing as npt
 
 from node.kernels.layout import PERIOD
-from sim.world.world import World
+from sim.world.scenario import scenario_of
+from sim.world.world import World, wrap
 from telemetry.messages import ENCODER
 
 Array = npt.NDArray[np.float64]
 ROWS_A_CYCLE = 4
+SHORTEST_REST, SHORTEST_STOP = 10.0, 30.0  # s, that a scenario allows
 
 
 def record(world: World, folder: Path) -> None:
@@ -32,3 +34,44 @@ def counts(world: World, ends: Array) -> Array:
         count, edge_at, rising, _, earlier = world.encoder_sample(end)
         rows.append([world.local_clock(ENCODER, end), count, edge_at, rising, *earlier])
     return np.array(rows, float)
+
+
+def turning_once(
+    tubes: int, begin: float, rest: float, turning: float, length: float, seed: int, clock_std: float
+) -> World:
+    """A complete string that rests, turns once and rests, in the time of this machine's clock.
+
+    Parameters
+    ----------
+    tubes : number of them
+    begin : s, encoder's clock
+    rest, turning, length : s, at rest before the turning, of the turning, and of all
+    seed : of every draw
+    clock_std : s, of a node's clock against the encoder's
+    """
+    rate_dps, acceleration_dps2 = 71.0, 35.0
+    ramp = rate_dps / acceleration_dps2
+    level = max(turning - ramp, 0.2 * turning)
+    held = max(rest, SHORTEST_REST)
+    return World(
+        scenario_of(
+            {
+                "rig": {"tubes": tubes, "tubes_at_start": tubes, "tube_length_m": 1.0},
+                "path": {"straight": {"inclination_deg": 2.0}},
+                "schedule": {"begin_s": begin, "add_s": held, "stop_s": max(length - held, SHORTEST_STOP), "blocks": 1},
+                "rotation": {"turns": level * rate_dps / 360.0, "rate_dps": rate_dps},
+                "clocks": {"offset_std_s": clock_std, "drift_std_ppm": 0.0},
+            }
+        ),
+        seed,
+    )
+
+
+def turns_at(world: World, at: float) -> bool:
+    """Whether the string turned at the rig time ``at`` (s) or within the two cycles before it."""
+    return bool(np.any(world.motion.drive(np.linspace(at - 2.0 * PERIOD, at, 3))[1] > 0.0))
+
+
+def yaw_error(world: World, tube: int, yaw: float, at: float) -> float:
+    """What a yaw (rad) stated for the rig time ``at`` (s) is off, rad, beside the constant errors of the marks."""
+    return wrap(yaw - world.yaw_truth(tube, at) - world.systematic_error(tube, at))

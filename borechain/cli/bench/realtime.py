@@ -17,6 +17,7 @@ from telemetry import keys
 
 RIG = "realtime"
 START_ALLOWANCE = 0.25  # s a node, for which the string rests longer
+CLOCK_STD = 10.0  # s, of a node's clock against the encoder's
 SPARE = 120.0  # s, that the recordings are longer than the run
 COLUMNS: Columns = (
     ("process", "process"),
@@ -56,12 +57,12 @@ def realtime(nodes: int, seconds: float, endpoint: str, out: Path | None, as_jso
       borechain bench realtime --nodes 50 --seconds 120
     """
     from sim.rig.launcher import check_port_free
-    from sim.studies.realtime import run
+    from sim.rig.realtime import run
 
     check_port_free(endpoint)
     with tempfile.TemporaryDirectory(prefix="borechain-") as place:
-        string, table = prepare(nodes, seconds, endpoint, Path(place), seed)
-        measured = run(string, table, RIG, endpoint, seconds, Path(place))
+        world, table = prepare(nodes, seconds, endpoint, Path(place), seed)
+        measured = run(world, table, RIG, endpoint, seconds, Path(place))
         result: dict[str, Any] = {"bench": "realtime", "nodes": nodes, "seconds": seconds} | measured
     if out is not None:
         write_table(out / "realtime.csv", result["cases"], COLUMNS)
@@ -76,13 +77,15 @@ def prepare(nodes: int, seconds: float, endpoint: str, folder: Path, seed: int) 
     from node.process.drivers.timed import TimedEncoder, TimedImu
     from node.process.host import run_encoder, run_node
     from sim.rig.processes import ProcessTable, Spec
-    from sim.studies.turning_string import TurningString
+    from sim.rig.realtime import clock_offset
+    from sim.world.recording import record, turning_once
     from telemetry.messages import BASE, ENCODER, Side
     from telemetry.runtime.hosting import OwnTime, Place
 
     rest = START_ALLOWANCE * nodes + 0.5 * seconds
-    string = TurningString(nodes, time.monotonic(), rest, 0.25 * seconds, rest + seconds + SPARE, seed)
-    string.record(folder)
+    length = rest + seconds + SPARE
+    world = turning_once(nodes, time.monotonic(), rest, 0.25 * seconds, length, seed, CLOCK_STD)
+    record(world, folder)
     order = [BASE, ENCODER, *range(nodes, 0, -1)]
     specs = {}
     for place in range(1, len(order)):
@@ -90,15 +93,15 @@ def prepare(nodes: int, seconds: float, endpoint: str, folder: Path, seed: int) 
         neighbours = {Side.UPPER: order[place - 1]}
         if place + 1 < len(order):
             neighbours[Side.LOWER] = order[place + 1]
-        own_time = OwnTime(neighbours, string.offset(address))
+        own_time = OwnTime(neighbours, clock_offset(world, address))
         name = "encoder" if address == ENCODER else str(address)
         at = Place(RIG, endpoint, folder / name)
         if address == ENCODER:
             specs[name] = Spec(run_encoder, (at, TimedEncoder(folder / "encoder.npy"), own_time))
         else:
             imu = TimedImu(folder / f"tube-{address}.npy")
-            specs[name] = Spec(run_node, (at, string.settings(address), [imu], own_time))
-    return string, ProcessTable(specs, ["borechain.warm"])
+            specs[name] = Spec(run_node, (at, world.tube_settings(address), [imu], own_time))
+    return world, ProcessTable(specs, ["borechain.warm"])
 
 
 def show(result: dict[str, Any]) -> None:

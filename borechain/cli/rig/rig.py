@@ -71,9 +71,7 @@ def rig(
 
     world = World(load_scenario(scenario, faults), seed)
     if world.scenario.medium.link == "off":
-        raise InputFault(
-            f'{scenario}: medium.link: expected "on" for a rig; only studies run without a link'
-        )
+        raise InputFault(f'{scenario}: medium.link: expected "on" for a rig; only studies run without a link')
     if not inline:
         check_port_free(endpoint)
     folder = out if out is not None else next_run_folder(Path("out") / scenario.stem)

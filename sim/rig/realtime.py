@@ -16,7 +16,8 @@ from typing import Any
 from node.kernels.layout import PERIOD
 from sim.errors import RigError
 from sim.rig.processes import ProcessTable
-from sim.studies.turning_string import TurningString
+from sim.world.recording import turns_at, yaw_error
+from sim.world.world import World
 from telemetry.application.endpoint import Endpoint
 from telemetry.media.neighbours import neighbour_ports
 from telemetry.media.port import Medium
@@ -54,13 +55,13 @@ class Heard:
 class Surface(Process):
     """The base station's end of the string: hears every node through all above it, and ends the run."""
 
-    def __init__(self, string: TurningString, seconds: float, table: ProcessTable) -> None:
+    def __init__(self, world: World, seconds: float, table: ProcessTable) -> None:
         self.endpoint = Endpoint(BASE, frozenset({Side.LOWER}), boot_count=1)
-        self.heard = {tube: Heard() for tube in range(1, string.tubes + 1)}
+        self.heard = {tube: Heard() for tube in range(1, world.scenario.tubes + 1)}
         self.interrupted = False
         self.begun_at: float | None = None  # s, when the last node was heard first
         self.cpu_before: dict[str, float] = {}
-        self._string, self._seconds, self._table = string, seconds, table
+        self._world, self._seconds, self._table = world, seconds, table
         self._loop: OwnClockLoop | None = None
         self._until = time.monotonic() + COME_LIMIT
 
@@ -77,8 +78,8 @@ class Surface(Process):
         for received in self.endpoint.receive(side, frame, now):
             state = received.message
             if isinstance(state, NodeState) and state.tube in self.heard:
-                error = self._string.yaw_error(state.tube, state.yaw, state.at)
-                self.heard[state.tube].on_state(state, error, turns=self._string.turns_at(state.at))
+                error = yaw_error(self._world, state.tube, state.yaw, state.at)
+                self.heard[state.tube].on_state(state, error, turns=turns_at(self._world, state.at))
 
     def on_cycle(self, data: Any, now: float) -> None:
         """See that every process lives, until the time is over."""
@@ -98,9 +99,7 @@ class Surface(Process):
             self._loop.stop()
 
 
-def run(
-    string: TurningString, table: ProcessTable, rig: str, endpoint: str, seconds: float, folder: Path
-) -> dict[str, Any]:
+def run(world: World, table: ProcessTable, rig: str, endpoint: str, seconds: float, folder: Path) -> dict[str, Any]:
     """Start every process of ``table``, let the string live for ``seconds`` once all are heard, and judge it.
 
     ``folder`` is where each process keeps ``NAME/timing.json``.
@@ -112,7 +111,7 @@ def run(
     KeyboardInterrupt
         On Ctrl-C; every process has ended by then.
     """
-    surface = Surface(string, seconds, table)
+    surface = Surface(world, seconds, table)
     begun: dict[str, float] = {}
     try:
         table.warm()
@@ -142,9 +141,14 @@ def run(
     for name, cost in costs.items():
         tube = ENCODER if name == "encoder" else int(name)
         report = json.loads((folder / name / "timing.json").read_text())
-        first = report["first_cycle_at_s"] - string.offset(tube) - begun[name]
-        rows.append(row(name, tube, string.tubes, report, first) | cost | yaw_figures(surface.heard.get(tube)))
+        first = report["first_cycle_at_s"] - clock_offset(world, tube) - begun[name]
+        rows.append(row(name, tube, world.scenario.tubes, report, first) | cost | yaw_figures(surface.heard.get(tube)))
     return {"cases": rows, "worst": worst(rows), "total": total(rows), "router_and_base_cpu_percent": own}
+
+
+def clock_offset(world: World, address: int) -> float:
+    """Clock of a process minus that of the encoder, s; in a string in real time none drifts."""
+    return world.local_clock(address, world.begin) - world.begin
 
 
 def row(name: str, tube: int, tubes: int, report: dict[str, Any], first: float) -> dict[str, Any]:
