@@ -19,6 +19,7 @@ from node.firmware.encoder import EncoderNode, EncoderSample
 from node.firmware.inputs import ImuReading, RigContext
 from node.firmware.reporter import VAR_FLOOR
 from node.firmware.tube import Tube
+from node.kernels.alignment import new_mount
 from node.kernels.layout import PERIOD, Err, Scheme, default_config, new_state
 from sim.errors import ScenarioError
 from sim.rig.plain_encoder import PlainEncoder
@@ -100,6 +101,7 @@ class DirectString:
         self._configs = self._tuned_configs(count)
         # the records of all tubes in one array, so that a cycle is read off in a few operations
         self._states = np.concatenate([new_state(self._configs[k : k + 1]) for k in range(count)])
+        self.mounts = {tube: new_mount() for tube in range(1, count + 1)}  # of their IMUs, as aligned
         self.tubes = {tube: self._fresh_tube(tube, state_every) for tube in range(1, count + 1)}
         self._encoder = EncoderNode(torque=world.torque_settings())
         sensor = self._file.encoder
@@ -111,6 +113,7 @@ class DirectString:
         self._adds = [phase for phase in world.phases if phase.kind == "add"]
         self._mount_var = math.radians(self._file.joints.mount_std_deg) ** 2
         self._own: dict[int, Aiding | None] = {}  # what each node said in its cycle, by the schemes of estimates
+        self.clock_shift = 0.0  # s, by which the clocks of all nodes have jumped
         self.run = self._empty_run()
 
     def drill(self) -> StringRun:
@@ -146,8 +149,8 @@ class DirectString:
     def _fresh_tube(self, tube: int, state_every: int) -> Tube:
         settings = replace(self.world.tube_settings(tube), state_every=state_every)
         own = slice(tube - 1, tube)
-        numbers = iter(range(NEVER)).__next__
-        return Tube(settings, self._configs[own], self._states[own], numbers, restored=False)
+        numbers, mount = iter(range(NEVER)).__next__, self.mounts[tube]
+        return Tube(settings, self._configs[own], self._states[own], numbers, restored=False, mount=mount)
 
     def _losses(self) -> Mask:
         """Whether an aiding is lost on the hop to a tube, (cycles, tubes)."""
@@ -178,8 +181,9 @@ class DirectString:
     def _run_cycle(self, cycle: int, tube: int, string: Sequence[int]) -> list[Message]:
         phase = self._phases[tube]
         begin, end = self.world.cycle_end(cycle - 1) + phase, self.world.cycle_end(cycle) + phase
+        shift = self.clock_shift
         wx, wy, wz, fx, fy, fz = self._spoil(tube, cycle, self.world.imu_sample(tube, cycle))
-        reading = ImuReading(begin, end, (wx, wy, wz), (fx, fy, fz))
+        reading = ImuReading(begin + shift, end + shift, (wx, wy, wz), (fx, fy, fz))
         return list(self.tubes[tube].on_cycle(reading, self._context(tube, string[0], end)))
 
     def _context(self, tube: int, top: int, end: float) -> RigContext:
@@ -211,7 +215,8 @@ class DirectString:
             if aiding is not None and not self._lost[cycle, hop]:
                 travelled = 1e-3 * medium.delay_ms + medium.latency * (hop + 1 if scheme is Scheme.FORWARD else 1)
                 late = travelled if medium.dated_by == "arrival" else 0.0
-                passed = firmware.on_aiding(aiding, aiding.valid_at + late + float(self._clocks[cycle, hop]))
+                wrong = float(self._clocks[cycle, hop]) + self.clock_shift
+                passed = firmware.on_aiding(aiding, aiding.valid_at + late + wrong)
             aiding = passed if scheme is Scheme.FORWARD else self._own.get(tube)
 
     def _empty_run(self) -> StringRun:

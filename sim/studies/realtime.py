@@ -13,10 +13,16 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
+from node.kernels.angles import wrap
 from node.kernels.layout import PERIOD
 from sim.errors import RigError
 from sim.rig.processes import ProcessTable
-from sim.studies.turning_string import TurningString
+from sim.studies.lab import ACCELERATION_DPS2, RATE_DPS
+from sim.studies.scenarios import complete
+from sim.world.scenario import scenario_of
+from sim.world.world import World
 from telemetry.application.endpoint import Endpoint
 from telemetry.media.neighbours import neighbour_ports
 from telemetry.media.port import Medium
@@ -30,8 +36,53 @@ from telemetry.runtime.process import Process
 from telemetry.runtime.timing import CycleTiming
 
 TICKS = os.sysconf("SC_CLK_TCK")  # a second, of the CPU time in /proc
+LEAST_REST, LEAST_STOP = 10.0, 22.0  # s, of a scenario
 COME_LIMIT = 60.0  # s, until every node was heard
 KIB, MIB = 1024.0, 1024.0**2
+
+
+def world_of(tubes: int, begin: float, rest: float, turning: float, length: float, seed: int, clocks: float) -> World:
+    """A complete string that rests, turns and rests in the time of this machine's clock.
+
+    Parameters
+    ----------
+    tubes : number of them, 1 is the lowest
+    begin : s, encoder's clock
+    rest, turning, length : s, at rest before the turning, of the turning, and of all
+    seed : of every draw
+    clocks : s, 1 sigma of a node's clock from the encoder's
+    """
+    ramp = RATE_DPS / ACCELERATION_DPS2
+    turns = RATE_DPS * max(turning - ramp, 0.2 * turning) / 360.0
+    tables = {
+        "rig": complete(tubes),
+        "path": {"straight": {"inclination_deg": 2.0}},
+        "schedule": {
+            "begin_s": begin,
+            "add_s": max(rest, LEAST_REST),
+            "stop_s": max(length - rest - turning, LEAST_STOP),
+            "finish_s": 5.0,
+            "blocks": 1,
+        },
+        "rotation": {"turns": turns, "rate_dps": RATE_DPS, "acceleration_dps2": ACCELERATION_DPS2},
+        "clocks": {"offset_std_s": clocks, "drift_std_ppm": 0.0},
+    }
+    return World(scenario_of(tables), seed)
+
+
+def offset(world: World, tube: int) -> float:
+    """Clock of a node minus that of the encoder, s."""
+    return world.local_clock(tube, world.begin) - world.begin
+
+
+def yaw_error(world: World, tube: int, yaw: float, at: float) -> float:
+    """What a yaw (rad) stated for the rig time ``at`` (s) is off, besides joints and mounts, rad."""
+    return float(wrap(yaw - world.yaw_truth(tube, at) - world.systematic_error(tube, at)))
+
+
+def turns_at(world: World, at: float) -> bool:
+    """Whether the string turned at the rig time ``at`` or within the two cycles before it."""
+    return bool(np.any(world.motion.drive(np.linspace(at - 2.0 * PERIOD, at, 3))[1] > 0.0))
 
 
 @dataclass(slots=True)
@@ -54,9 +105,9 @@ class Heard:
 class Surface(Process):
     """The base station's end of the string: hears every node through all above it, and ends the run."""
 
-    def __init__(self, string: TurningString, seconds: float, table: ProcessTable) -> None:
+    def __init__(self, string: World, seconds: float, table: ProcessTable) -> None:
         self.endpoint = Endpoint(BASE, frozenset({Side.LOWER}), boot_count=1)
-        self.heard = {tube: Heard() for tube in range(1, string.tubes + 1)}
+        self.heard = {tube: Heard() for tube in range(1, string.scenario.tubes + 1)}
         self.interrupted = False
         self.begun_at: float | None = None  # s, when the last node was heard first
         self.cpu_before: dict[str, float] = {}
@@ -77,8 +128,8 @@ class Surface(Process):
         for received in self.endpoint.receive(side, frame, now):
             state = received.message
             if isinstance(state, NodeState) and state.tube in self.heard:
-                error = self._string.yaw_error(state.tube, state.yaw, state.at)
-                self.heard[state.tube].on_state(state, error, turns=self._string.turns_at(state.at))
+                error = yaw_error(self._string, state.tube, state.yaw, state.at)
+                self.heard[state.tube].on_state(state, error, turns=turns_at(self._string, state.at))
 
     def on_cycle(self, data: Any, now: float) -> None:
         """See that every process lives, until the time is over."""
@@ -98,9 +149,7 @@ class Surface(Process):
             self._loop.stop()
 
 
-def run(
-    string: TurningString, table: ProcessTable, rig: str, endpoint: str, seconds: float, folder: Path
-) -> dict[str, Any]:
+def run(string: World, table: ProcessTable, rig: str, endpoint: str, seconds: float, folder: Path) -> dict[str, Any]:
     """Start every process of ``table``, let the string live for ``seconds`` once all are heard, and judge it.
 
     ``folder`` is where each process keeps ``NAME/timing.json``.
@@ -142,8 +191,8 @@ def run(
     for name, cost in costs.items():
         tube = ENCODER if name == "encoder" else int(name)
         report = json.loads((folder / name / "timing.json").read_text())
-        first = report["first_cycle_at_s"] - string.offset(tube) - begun[name]
-        rows.append(row(name, tube, string.tubes, report, first) | cost | yaw_figures(surface.heard.get(tube)))
+        first = report["first_cycle_at_s"] - offset(string, tube) - begun[name]
+        rows.append(row(name, tube, string.scenario.tubes, report, first) | cost | yaw_figures(surface.heard.get(tube)))
     return {"cases": rows, "worst": worst(rows), "total": total(rows), "router_and_base_cpu_percent": own}
 
 

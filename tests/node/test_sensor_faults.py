@@ -9,7 +9,7 @@ from string_of_one import Sample, Spoil, StringOfOne
 
 from node.errors import ConfigurationError
 from node.firmware.sensor_faults import AidingWatch, Fault, ReadingWatch, SensorLimits
-from node.kernels.layout import DEG, PERIOD, Err
+from node.kernels.layout import DEG, Err
 from telemetry.messages import Mode, NodeFlag
 
 FLAGGED_WITHIN = 10  # cycles
@@ -144,10 +144,9 @@ def test_a_new_scale_is_named_and_learnt(factor: float, healthy: StringOfOne) ->
 def test_no_cross_term_is_kept_when_a_fault_is_found(healthy: StringOfOne) -> None:
     at = healthy.turning(1)
     string = StringOfOne(1, step(at, 2.0))
-    for cycle in range(at + 12):
-        string._cycle(cycle, 1000.0 + (cycle + 1) * PERIOD)
-        if "gyro_step" in string.codes(at):
-            break
+    string.advance(at)
+    while "gyro_step" not in string.codes(at):
+        string.advance(1)
     P = string.tube.state["P"]
     for state in (Err.YAW, Err.BIAS_Z, Err.SCALE):
         assert not np.any(np.delete(P[state], state))
@@ -176,11 +175,8 @@ def test_a_stuck_or_saturated_accelerometer_is_flagged_and_no_survey_made_of_it(
 def test_a_clock_that_jumps_is_told_and_the_yaw_taken_anew(jump: float, healthy: StringOfOne) -> None:
     string = StringOfOne(1)
     at = healthy.turning(1)
-    for cycle in range(at):
-        string._cycle(cycle, 1000.0 + (cycle + 1) * PERIOD)
-    string.shift = jump
-    for cycle in range(at, at + 40):
-        string._cycle(cycle, 1000.0 + (cycle + 1) * PERIOD)
+    string.advance(at).string.clock_shift = jump
+    string.advance(40)
     assert string.codes(at)[0] == "clock_jumped"
     assert string.codes(at).count("clock_jumped") == 1
     assert NodeFlag.YAW_UNTRUSTED in string.states[at].flags
@@ -190,12 +186,11 @@ def test_a_clock_that_jumps_is_told_and_the_yaw_taken_anew(jump: float, healthy:
 
 def test_times_that_are_none_are_told_once_and_change_nothing() -> None:
     string = StringOfOne(1)
-    for cycle in range(20):
-        string._cycle(cycle, 1000.0 + (cycle + 1) * PERIOD)
+    string.advance(20)
     before = string.tube.state.tobytes()
     for shift in (math.nan, math.inf, -math.inf):
-        string.shift = shift
-        string._cycle(20, 1000.0 + 21 * PERIOD)
+        string.string.clock_shift = shift
+        string.advance(1)
     assert string.codes(20) == ["clock_jumped", "aiding_untimely"]
     assert string.tube.state.tobytes() == before
 

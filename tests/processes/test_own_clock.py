@@ -23,7 +23,8 @@ from node.kernels.layout import PERIOD
 from node.process.encoder_command import encoder
 from node.process.tube_command import node
 from node.process.tube_process import TubeProcess
-from sim.studies.turning_string import TurningString
+from sim.studies.realtime import world_of, yaw_error
+from sim.world.recording import record
 from telemetry.application.endpoint import Endpoint
 from telemetry.media.neighbours import neighbour_ports
 from telemetry.media.zenoh_bus import ZenohBus, open_router
@@ -67,8 +68,8 @@ class String:
 
     def __init__(self, folder: Path, endpoint: str) -> None:
         self.folder, self.endpoint = folder, endpoint
-        self.truth = TurningString(1, time.monotonic(), 600.0, 10.0, 700.0, seed=4, farthest_clock=0.0)
-        self.truth.record(folder)
+        self.truth = world_of(1, time.monotonic(), 600.0, 10.0, 700.0, seed=4, clocks=0.0)
+        record(self.truth, folder)
         self.running: dict[str, subprocess.Popen[str]] = {}
 
     def start(self, name: str, *options: str) -> None:
@@ -83,7 +84,7 @@ class String:
         self.start("encoder", "--counter", recording, "--above", "base", "--below", "1")
 
     def start_node(self) -> None:
-        recording, joint = f"timed:{self.folder / 'tube-1.npy'}", self.truth.settings(1).drive_joint
+        recording, joint = f"timed:{self.folder / 'tube-1.npy'}", self.truth.tube_settings(1).drive_joint
         angle = f"--drive-joint-deg={math.degrees(joint.angle)}"
         self.start("node", "--tube", "1", "--imu", recording, "--above", "encoder", angle)
 
@@ -141,7 +142,7 @@ def test_a_node_finds_its_yaw_keeps_it_over_a_kill_and_ends_when_asked(
     string.start_encoder()
     string.start_node()
     state = surface.first(NodeState, lambda s: not s.flags & UNFIT)
-    assert abs(string.truth.yaw_error(1, state.yaw, state.at)) < 0.02
+    assert abs(yaw_error(string.truth, 1, state.yaw, state.at)) < 0.02
     assert state.hops == 1
     surface.loop.call(lambda process, now: process.endpoint.command(Command(1, 5, "timing"), now))
     reply = surface.first(Reply, lambda r: r.sequence == 5)
@@ -151,14 +152,14 @@ def test_a_node_finds_its_yaw_keeps_it_over_a_kill_and_ends_when_asked(
     string.kill("node")
     saved = tmp_path / "saved"
     shutil.copytree(tmp_path / "node", saved)
-    kept = TubeProcess(string.truth.settings(1), saved)
-    assert abs(string.truth.yaw_error(1, kept.tube.yaw, state.at)) < 0.02
+    kept = TubeProcess(string.truth.tube_settings(1), saved)
+    assert abs(yaw_error(string.truth, 1, kept.tube.yaw, state.at)) < 0.02
 
     string.start_node()
     event = surface.first(Event, lambda e: e.code == "restored")
     assert event.tube == 1
     state = surface.first(NodeState, lambda s: s.flags & NodeFlag.RESTORED and not s.flags & UNFIT)
-    assert abs(string.truth.yaw_error(1, state.yaw, state.at)) < 0.02
+    assert abs(yaw_error(string.truth, 1, state.yaw, state.at)) < 0.02
 
     string.running["node"].send_signal(signal.SIGUSR1)
     while not (tmp_path / "node" / "timing.json").exists():

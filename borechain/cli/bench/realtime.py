@@ -17,6 +17,7 @@ from telemetry import keys
 
 RIG = "realtime"
 START_ALLOWANCE = 0.25  # s a node, for which the string rests longer
+CLOCK_STD = 20.0  # s, of a node's clock from the encoder's
 SPARE = 120.0  # s, that the recordings are longer than the run
 COLUMNS: Columns = (
     ("process", "process"),
@@ -76,13 +77,14 @@ def prepare(nodes: int, seconds: float, endpoint: str, folder: Path, seed: int) 
     from node.process.drivers.timed import TimedEncoder, TimedImu
     from node.process.host import run_encoder, run_node
     from sim.rig.processes import ProcessTable, Spec
-    from sim.studies.turning_string import TurningString
+    from sim.studies.realtime import offset, world_of
+    from sim.world.recording import record
     from telemetry.messages import BASE, ENCODER, Side
     from telemetry.runtime.hosting import OwnTime, Place
 
     rest = START_ALLOWANCE * nodes + 0.5 * seconds
-    string = TurningString(nodes, time.monotonic(), rest, 0.25 * seconds, rest + seconds + SPARE, seed)
-    string.record(folder)
+    string = world_of(nodes, time.monotonic(), rest, 0.25 * seconds, rest + seconds + SPARE, seed, CLOCK_STD)
+    record(string, folder)
     order = [BASE, ENCODER, *range(nodes, 0, -1)]
     specs = {}
     for place in range(1, len(order)):
@@ -90,14 +92,14 @@ def prepare(nodes: int, seconds: float, endpoint: str, folder: Path, seed: int) 
         neighbours = {Side.UPPER: order[place - 1]}
         if place + 1 < len(order):
             neighbours[Side.LOWER] = order[place + 1]
-        own_time = OwnTime(neighbours, string.offset(address))
+        own_time = OwnTime(neighbours, offset(string, address))
         name = "encoder" if address == ENCODER else str(address)
         at = Place(RIG, endpoint, folder / name)
         if address == ENCODER:
             specs[name] = Spec(run_encoder, (at, TimedEncoder(folder / "encoder.npy"), own_time))
         else:
             imu = TimedImu(folder / f"tube-{address}.npy")
-            specs[name] = Spec(run_node, (at, string.settings(address), [imu], own_time))
+            specs[name] = Spec(run_node, (at, string.tube_settings(address), [imu], own_time))
     return string, ProcessTable(specs, ["borechain.warm"])
 
 
