@@ -19,6 +19,7 @@ from node.firmware.encoder import EncoderNode, EncoderSample
 from node.firmware.inputs import ImuReading, RigContext
 from node.firmware.reporter import VAR_FLOOR
 from node.firmware.tube import Tube
+from node.kernels.alignment import new_mount
 from node.kernels.layout import PERIOD, Err, Scheme, default_config, new_state
 from sim.errors import ScenarioError
 from sim.rig.plain_encoder import PlainEncoder
@@ -102,6 +103,7 @@ class DirectString:
         self._configs = self._tuned_configs(count)
         # the records of all tubes in one array, so that a cycle is read off in a few operations
         self._states = np.concatenate([new_state(self._configs[k : k + 1]) for k in range(count)])
+        self.mounts = {tube: new_mount() for tube in range(1, count + 1)}  # of their IMUs, as aligned
         self.tubes = {tube: self._fresh_tube(tube, state_every) for tube in range(1, count + 1)}
         self._encoder = EncoderNode(torque=world.torque_settings())
         sensor = self._file.encoder
@@ -149,8 +151,8 @@ class DirectString:
     def _fresh_tube(self, tube: int, state_every: int) -> Tube:
         settings = replace(self.world.tube_settings(tube), state_every=state_every)
         own = slice(tube - 1, tube)
-        numbers = iter(range(NEVER)).__next__
-        return Tube(settings, self._configs[own], self._states[own], numbers, restored=False)
+        numbers, mount = iter(range(NEVER)).__next__, self.mounts[tube]
+        return Tube(settings, self._configs[own], self._states[own], numbers, restored=False, mount=mount)
 
     def _losses(self) -> Mask:
         """Whether an aiding is lost on the hop to a tube, (cycles, tubes)."""

@@ -234,9 +234,13 @@ class World:
 
     def imu_frame(self, tube: int, imu: int = 0) -> Array:
         """R_imu_from_tube (3, 3): how an IMU (from 0) of a tube leans against the tube's axis."""
+        return imu_frame(*self.imu_tilt(tube, imu))
+
+    def imu_tilt(self, tube: int, imu: int = 0) -> tuple[float, float]:
+        """Pitch and roll (rad) of that lean."""
         std = math.radians(self.scenario.file.joints.mount_tilt_std_deg)
-        pitch, roll = std * self._random(Stream.MOUNTS, tube, imu).standard_normal(2)
-        return imu_frame(pitch, roll)
+        pitch, roll = (std * self._random(Stream.MOUNTS, tube, imu).standard_normal(2)).tolist()
+        return pitch, roll
 
     @property
     def _stiffness(self) -> float:

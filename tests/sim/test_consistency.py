@@ -1,17 +1,23 @@
 """The consistency test of relay schemes: it accepts the truth and rejects the negative controls."""
 
-from dataclasses import replace
-
 import numpy as np
 import pytest
 from click.testing import CliRunner
 
 from borechain.cli.experiment.experiment import experiment
 from node.kernels.layout import Scheme
-from sim.studies.chain import Chain, run_seed
+from sim.rig.direct_string import DirectString
 from sim.studies.consistency.run import EVERY, run, setup_of, table, verdict
+from sim.studies.epochs import judge, run_seed
+from sim.studies.scenarios import Tables, changed
+from sim.world.scenario import scenario_of
+from sim.world.world import World
 
 HOPS, SEEDS = 5, 40
+
+
+def shorter(setup: Tables) -> Tables:
+    return changed(setup, schedule={"blocks": 1})
 
 
 @pytest.fixture(scope="module")
@@ -55,14 +61,13 @@ def test_the_verdict_is_that_of_its_bounds() -> None:
 
 def test_clock_errors_are_felt() -> None:
     """A node that is told of better clocks than it has must look dishonest."""
-    setup = replace(setup_of(Scheme.FORWARD, 1), blocks=1)
+    setup = shorter(setup_of(Scheme.FORWARD, 1))
 
     def nees(factor: float) -> float:
         found = []
+        told = changed(setup, clocks={"stated_std_ms": 5.0 / factor})
         for seed in range(1, 9):
-            chain = Chain(replace(setup, clock_std=setup.clock_std / factor), seed)
-            chain._clocks = chain._clocks * factor
-            run = chain.run()
+            run = judge(DirectString(World(scenario_of(dict(told)), seed)))
             found.append(float((run.error**2 / run.var)[run.turning].mean()))
         return float(np.mean(found))
 
@@ -71,7 +76,7 @@ def test_clock_errors_are_felt() -> None:
 
 
 def test_a_table_has_a_row_an_epoch_and_hop() -> None:
-    setup = replace(setup_of(Scheme.FORWARD, 2), blocks=1)
+    setup = shorter(setup_of(Scheme.FORWARD, 2))
     rows = table(Scheme.FORWARD, [run_seed((setup, 1)), run_seed((setup, 2))])
     assert [(r["state"], r["hop"]) for r in rows] == [("turning", 1), ("turning", 2), ("at rest", 1), ("at rest", 2)]
 

@@ -6,8 +6,11 @@ import numpy as np
 import pytest
 
 from node.kernels.layout import Scheme
-from sim.studies.chain import Chain, ChainSetup
+from sim.rig.direct_string import DirectString
+from sim.studies.epochs import judge, resting, run_seed
 from sim.studies.relay.run import run, table
+from sim.world.scenario import scenario_of
+from sim.world.world import World
 
 SEEDS = 24
 
@@ -36,15 +39,13 @@ def test_estimate_is_caught_overconfident_beyond_the_first_hop(result: dict) -> 
 
 
 def test_one_seed_gives_one_result() -> None:
-    setup = ChainSetup(2, Scheme.FORWARD, blocks=1)
-    first, second, other = Chain(setup, 1).run(), Chain(setup, 1).run(), Chain(setup, 2).run()
+    first, second, other = (run_seed((resting(2, blocks=1), seed)) for seed in (1, 1, 2))
     assert np.array_equal(first.error, second.error)
     assert not np.array_equal(first.error, other.error)
 
 
 def test_a_lossy_string_stays_honest() -> None:
-    setup = ChainSetup(3, Scheme.FORWARD, loss=0.3)
-    judged = table(Scheme.FORWARD, [Chain(setup, seed).run() for seed in range(1, 13)])
+    judged = table(Scheme.FORWARD, [run_seed((resting(3, loss=0.3), seed)) for seed in range(1, 13)])
     for row in judged:
         assert row["yaw_rms_rest_deg"] < 0.05
         assert row["nees_rest"] < 2.5
@@ -53,8 +54,8 @@ def test_a_lossy_string_stays_honest() -> None:
 
 def test_innovations_are_white_enough_to_be_believed() -> None:
     """NIS: r^2 / S averaged over many updates, near 1 for a filter that knows its own size."""
-    chain = Chain(ChainSetup(1, Scheme.FORWARD), 5)
-    tube = chain._tubes[0]
+    string = DirectString(World(scenario_of(dict(resting(1))), 5))
+    tube = string.tubes[1]
     ratios = []
     plain = tube.on_cycle
 
@@ -66,6 +67,6 @@ def test_innovations_are_white_enough_to_be_believed() -> None:
         return iter(said)
 
     tube.on_cycle = watched  # type: ignore[method-assign]
-    chain.run()
+    judge(string)
     assert len(ratios) > 400
     assert 0.5 < float(np.mean(ratios)) < 1.5

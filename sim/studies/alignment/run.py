@@ -19,29 +19,20 @@ import numpy.typing as npt
 
 from groundstation.survey.resolve import angles, resolve
 from node.firmware.alignment import METHODS, angles_of
-from node.firmware.encoder import COUNTS_PER_TURN, EDGE_STD, EncoderNode, EncoderSample
-from node.firmware.imu_settings import ImuSettings
-from node.firmware.inputs import ImuReading, RigContext
-from node.firmware.settings import Kernel, TubeSettings
-from node.kernels.alignment import new_mount
+from node.firmware.settings import Kernel
 from node.kernels.layout import PERIOD, default_config
-from sim.studies.fresh import fresh_tube
+from sim.rig.direct_string import DirectString
 from sim.studies.pool import Step, over_cores, seeded
+from sim.studies.scenarios import Tables, complete
 from sim.studies.trials import bootstrap, row
-from sim.world.borehole import Borehole
-from sim.world.disc import Disc
-from sim.world.imu_errors import ImuErrors
-from sim.world.motion import Motion, Trapezoid
-from sim.world.scenario import AccelerometerSection, GyroSection
-from sim.world.streams import stream
-from sim.world.truth import TubeTruth, imu_frame
-from telemetry.messages import Event, SurveyMeasurement
+from sim.world.scenario import scenario_of
+from sim.world.world import World
 
 Array = npt.NDArray[np.float64]
-BEGIN, REST, STOP = 1000.0, 60.0, 32.0  # s; rig time at zero, rest before and after the turn
+REST, STOP = 60.0, 32.0  # s, before and after the turn
+ASKED = 5.0  # s before the turn, when the node is asked to align
 SPARE = 0.25  # turns, before the first that counts and after the last
-RAMP = math.radians(35.0)  # rad/s^2
-STREAMS = 2100  # of random numbers, apart from those of other experiments
+USUAL_NOISE_DEG = 0.02
 PUBLISHED_DEG = {"circle": 0.0014, "extremes": 0.0086}
 NAMES = {"circle": "circle", "extremes": "(max + min) / 2"}
 
@@ -58,6 +49,25 @@ class Setup:
     bias_std_deg: float = 0.0  # of the accelerometer, each axis
     kernel: Kernel = "float64"
 
+    def tables(self) -> Tables:
+        """The scenario."""
+        usual = float(default_config()[0]["force_std"])
+        return {
+            "rig": complete(1),
+            "path": {"straight": {"inclination_deg": self.inclination_deg}},
+            "schedule": {"add_s": REST, "stop_s": STOP, "finish_s": 5.0, "blocks": 1},
+            "rotation": {"turns": self.turns + 2.0 * SPARE, "rate_dps": self.rate_dps, "advance_m": 0.0},
+            "joints": {"reading_std_deg": 0.0, "mount_std_deg": 0.0, "mount_tilt_std_deg": self.mount_tilt_std_deg},
+            "accelerometer": {
+                "noise_deg": self.noise_deg,
+                "bias_std_deg": self.bias_std_deg,
+                "vibration_mps2": 0.0,  # it turns and does not drill
+            },
+            "clocks": {"joint_std_ms": 0.0, "wander_std_ms": 0.0, "stated_std_ms": 0.1},
+            "medium": {"link": "off", "loss": 0.0},
+            "node": {"kernel": self.kernel, "tuning": {"force_std": usual * self.noise_deg / USUAL_NOISE_DEG}},
+        }
+
 
 @dataclass(frozen=True, slots=True)
 class Outcome:
@@ -70,51 +80,30 @@ class Outcome:
 
 
 class Turn:
-    """Sensors of one seed, and as many nodes as are asked to listen to them."""
+    """World of one seed, and as many nodes as are asked to listen to its sensors."""
 
     def __init__(self, setup: Setup, seed: int) -> None:
         self._setup = setup
-        random = stream(seed, STREAMS)
-        turn = Trapezoid((setup.turns + 2.0 * SPARE) * math.tau, math.radians(setup.rate_dps), RAMP)
-        first, heading = random.uniform(0.0, math.tau, 2)
-        motion = Motion(BEGIN, REST, 5.0, STOP, 1.0, turn, 1, 0.0, float(first))
-        hole = Borehole.straight(math.radians(setup.inclination_deg), float(heading))
-        a = AccelerometerSection(noise_deg=setup.noise_deg, bias_std_deg=setup.bias_std_deg)
-        self.tilts = math.radians(setup.mount_tilt_std_deg) * random.standard_normal(2)
-        self._ends = BEGIN + PERIOD * np.arange(1.0, math.floor((motion.end - BEGIN) / PERIOD) + 1.0)
-        truth = TubeTruth(hole, motion, 0.0, 0.0, a.radius_m, a.gravity_mps2)
-        frame = imu_frame(*self.tilts)
-        rate, force = (true @ frame.T for true in truth.cycle_means(self._ends, PERIOD))
-        self._disc = Disc(motion, COUNTS_PER_TURN, EDGE_STD, stream(seed, STREAMS, 1))
-        errors = ImuErrors(GyroSection(), a)
-        still = np.zeros(len(force))  # it turns and does not drill
-        self._samples = errors.readings(random, rate, force, still, PERIOD).tolist()
-        self._radius = a.radius_m
+        self._world = World(scenario_of(dict(setup.tables())), seed)
+        self.tilts = np.array(self._world.imu_tilt(1))
 
     def run(self, method: str) -> Outcome:
         """Let one node rest, turn and rest; ``method`` is of its alignment, ``none`` leaves the mount as it is."""
-        mount, force_std = new_mount(), float(default_config()[0]["force_std"]) * self._setup.noise_deg / 0.02
-        settings = TubeSettings(1, kernel=self._setup.kernel, imus=(ImuSettings((self._radius, 0.0)),))
-        tube, encoder = fresh_tube(settings, [("force_std", force_std)], mount), EncoderNode()
-        said: list[Any] = []
-        cycles = zip(self._ends.tolist(), self._samples, strict=True)
-        for end, (wx, wy, wz, fx, fy, fz) in cycles:
-            if method != "none" and end - PERIOD <= BEGIN + REST - 5.0 < end:
-                tube.align(method, self._setup.turns)
-            reading = ImuReading(end - PERIOD, end, (wx, wy, wz), (fx, fy, fz))
-            said += tube.on_cycle(reading, RigContext(True, 1, end, 1e-8, True))
-            count, edge, earlier = self._disc.sample(end)
-            aiding = encoder.on_cycle(EncoderSample(count, edge, True, earlier=earlier), end)
-            tube.on_aiding(aiding, aiding.valid_at)
-        pitch, roll = angles_of(mount[0]["axis"][0])
-        survey = [m for m in said if isinstance(m, SurveyMeasurement)][-1].imus[0]
+        string, asked_at = DirectString(self._world), self._world.begin + REST - ASKED
+        for cycle in string.steps():
+            end = self._world.cycle_end(cycle)
+            if method != "none" and end <= asked_at < end + PERIOD:
+                string.tubes[1].align(method, self._setup.turns)
+        mount = string.mounts[1][0]
+        pitch, roll = angles_of(mount["axis"][0])
+        survey = string.run.surveys[-1].measurement.imus[0]
         direction = resolve(np.array(survey.force), np.array(survey.force_cov), 0.0, 1e-12).direction
         inclination = angles(direction.lean, direction.down)[0]
         return Outcome(
             (pitch - float(self.tilts[0]), roll - float(self.tilts[1])),
-            (float(mount[0]["std"][0, 0]), float(mount[0]["std"][0, 1])),
+            (float(mount["std"][0, 0]), float(mount["std"][0, 1])),
             inclination - math.radians(self._setup.inclination_deg),
-            tuple(m.code for m in said if isinstance(m, Event)),
+            tuple(event.code for _, event in string.run.events),
         )
 
 
