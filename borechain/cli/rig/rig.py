@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from borechain.cli.faults import EnvironmentFault, InputFault, needs, plain_faults
-from borechain.cli.options import fault_option, json_option, seed_option, speed_option
+from borechain.cli.options import fault_option, json_option, scenario_argument, seed_option, speed_option
 from borechain.cli.tables import console
 from telemetry import keys
 
@@ -28,7 +28,7 @@ PRELOAD = {"float64": "borechain.warm", "fixed": "borechain.warm_all", "publishe
 
 
 @click.command()
-@click.argument("scenario", type=click.Path(path_type=Path))
+@scenario_argument
 @speed_option
 @seed_option
 @fault_option
@@ -71,9 +71,7 @@ def rig(
 
     world = World(load_scenario(scenario, faults), seed)
     if world.scenario.medium.link == "off":
-        raise InputFault(
-            f'{scenario}: medium.link: expected "on" for a rig; only studies run without a link'
-        )
+        raise InputFault(f'{scenario}: medium.link: expected "on" for a rig; only studies run without a link')
     if not inline:
         check_port_free(endpoint)
     folder = out if out is not None else next_run_folder(Path("out") / scenario.stem)
