@@ -1,5 +1,6 @@
 """The command line as its user meets it."""
 
+import os
 import subprocess
 import sys
 from pathlib import Path
@@ -70,6 +71,33 @@ def test_options_may_stand_in_a_file(tmp_path: Path) -> None:
     path.write_text("tube = ")
     assert "not TOML" in run("node", "--config", str(path)).stderr
     assert run("node", "--config", str(tmp_path / "none.toml")).returncode == 2
+
+
+@pytest.mark.parametrize(
+    ("words", "offered"),
+    [
+        ("borechain ri", {"plain,rig"}),
+        ("borechain rig well", {"plain,wellbore-1", "file,well"}),
+        ("borechain survey x.csv --method mini", {"plain,minimum-curvature"}),
+    ],
+)
+def test_a_shell_completes_commands_scenarios_and_options(words: str, offered: set[str]) -> None:
+    variables = {"_BORECHAIN_COMPLETE": "bash_complete", "COMP_WORDS": words, "COMP_CWORD": str(words.count(" "))}
+    command = [sys.executable, "-c", "from borechain.__main__ import main; main()"]
+    done = subprocess.run(command, env=os.environ | variables, capture_output=True, text=True, check=False, timeout=60)
+    assert done.stderr == ""
+    assert set(done.stdout.split()) == offered
+
+
+def test_a_shell_gets_its_completion_script() -> None:
+    command = [sys.executable, "-c", "from borechain.__main__ import main; main()"]
+    for shell in ("bash", "zsh", "fish"):
+        variables = {"_BORECHAIN_COMPLETE": f"{shell}_source"}
+        done = subprocess.run(
+            command, env=os.environ | variables, capture_output=True, text=True, check=False, timeout=60
+        )
+        assert done.returncode == 0, done.stderr
+        assert "_BORECHAIN_COMPLETE" in done.stdout
 
 
 def test_the_version_is_told() -> None:

@@ -2,10 +2,29 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+
 import click
+from click.shell_completion import CompletionItem
 
 from telemetry.runtime.command_line import check_installed
 
+
+class ScenarioPath(click.Path):
+    """A scenario: the name of one that comes with the program, or a file; completed from both."""
+
+    def __init__(self) -> None:
+        super().__init__(path_type=Path)
+
+    def shell_complete(self, ctx: click.Context, param: click.Parameter, incomplete: str) -> list[CompletionItem]:
+        """Names that begin like the word, then files."""
+        from sim.world.shipped import shipped_names
+
+        names = [CompletionItem(name) for name in shipped_names() if name.startswith(incomplete)]
+        return [*names, *super().shell_complete(ctx, param, incomplete)]
+
+
+scenario_argument = click.argument("scenario", type=ScenarioPath())
 FAULT_HELP = "Fault, as kill-node:3@600 or kill-node:3@600+20 (tube, s after the start, s down). Repeatable."
 
 

@@ -7,12 +7,12 @@ from pathlib import Path
 import click
 
 from borechain.cli.faults import needs, plain_faults
-from borechain.cli.options import fault_option, seed_option, speed_option
+from borechain.cli.options import fault_option, scenario_argument, seed_option, speed_option
 from telemetry.runtime.options import place_options
 
 
 @click.command()
-@click.argument("scenario", type=click.Path(path_type=Path))
+@scenario_argument
 @seed_option
 @speed_option
 @fault_option
@@ -34,7 +34,7 @@ def medium(
 
     \b
     Example:
-      borechain medium scenarios/compose-2.toml --speed 1
+      borechain medium compose-2 --speed 1
     """
     from borechain.host import run_medium
     from telemetry.runtime.hosting import Place

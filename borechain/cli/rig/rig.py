@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from borechain.cli.faults import EnvironmentFault, InputFault, needs, plain_faults
-from borechain.cli.options import fault_option, json_option, seed_option, speed_option
+from borechain.cli.options import fault_option, json_option, scenario_argument, seed_option, speed_option
 from borechain.cli.tables import console
 from telemetry import keys
 
@@ -28,7 +28,7 @@ PRELOAD = {"float64": "borechain.warm", "fixed": "borechain.warm_all", "publishe
 
 
 @click.command()
-@click.argument("scenario", type=click.Path(path_type=Path))
+@scenario_argument
 @speed_option
 @seed_option
 @fault_option

@@ -9,10 +9,11 @@ import click
 
 from borechain.cli.faults import EnvironmentFault, plain_faults
 from borechain.cli.files import write_whole
+from borechain.cli.options import scenario_argument
 
 
-@click.group()
-def scenario() -> None:
+@click.group("scenario")
+def group() -> None:
     """List and show the scenarios that come with the program.
 
     A command that takes a scenario takes its name or a path of your own.
@@ -25,7 +26,7 @@ def scenario() -> None:
     """
 
 
-@scenario.command("list")
+@group.command("list")
 @click.option("--json", "as_json", is_flag=True, help="Print one JSON object.")
 @plain_faults
 def list_(as_json: bool) -> None:
@@ -40,25 +41,25 @@ def list_(as_json: bool) -> None:
         click.echo(f"{name:20} {text}")
 
 
-@scenario.command()
-@click.argument("name", type=click.Path(path_type=Path))
+@group.command()
+@scenario_argument
 @plain_faults
-def show(name: Path) -> None:
+def show(scenario: Path) -> None:
     """Print the file of a scenario."""
     from sim.world.shipped import find_scenario
 
-    click.echo(find_scenario(name).read_text(encoding="utf-8"), nl=False)
+    click.echo(find_scenario(scenario).read_text(encoding="utf-8"), nl=False)
 
 
-@scenario.command()
-@click.argument("name", type=click.Path(path_type=Path))
+@group.command()
+@scenario_argument
 @click.argument("folder", type=click.Path(path_type=Path, file_okay=False))
 @plain_faults
-def copy(name: Path, folder: Path) -> None:
+def copy(scenario: Path, folder: Path) -> None:
     """Copy a scenario with the path of its hole to FOLDER, to be changed there; nothing is overwritten."""
     from sim.world.shipped import files_of, find_scenario
 
-    files = files_of(find_scenario(name))
+    files = files_of(find_scenario(scenario))
     taken = [folder / file.name for file in files if (folder / file.name).exists()]
     if taken:
         raise EnvironmentFault(f"{taken[0]}: already there; choose another folder")

@@ -1,0 +1,50 @@
+"""Where compiled kernels are kept: a folder that cannot be written is replaced by a temporary one, and said so once."""
+
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+PROGRAM = (
+    "import subprocess, sys; from numba import config; from node.kernels import jit; print(config.CACHE_DIR);"
+    "subprocess.run([sys.executable, '-c', 'import node.kernels.jit'], check=True)"
+)
+
+
+def start(cache: Path, temporary: Path) -> subprocess.CompletedProcess[str]:
+    kept = {name: value for name, value in os.environ.items() if not name.startswith("NUMBA")}
+    return subprocess.run(
+        [sys.executable, "-c", PROGRAM],
+        env=kept | {"XDG_CACHE_HOME": str(cache), "TMPDIR": str(temporary)},
+        capture_output=True,
+        text=True,
+        check=True,
+        timeout=60,
+    )
+
+
+def test_a_folder_that_can_be_written_is_used_without_a_word(tmp_path: Path) -> None:
+    done = start(tmp_path / "cache", tmp_path)
+    assert Path(done.stdout.strip()).parent == tmp_path / "cache" / "borechain"
+    assert done.stderr == ""
+
+
+def test_another_is_used_and_named_once_for_all_processes(tmp_path: Path) -> None:
+    (tmp_path / "file").touch()
+    done = start(tmp_path / "file", tmp_path)
+    folder = Path(done.stdout.strip())
+    assert folder.parent == tmp_path
+    assert folder.stat().st_mode & 0o777 == 0o700
+    assert len(done.stderr.splitlines()) == 1
+    assert f"kept in {folder}, for {tmp_path / 'file'}" in done.stderr
+    assert Path(start(tmp_path / "file", tmp_path).stdout.strip()) == folder
+
+
+@pytest.mark.parametrize("mode", [0o777, 0o750])
+def test_a_temporary_folder_that_others_can_write_is_not_trusted(tmp_path: Path, mode: int) -> None:
+    (tmp_path / "file").touch()
+    offered = Path(start(tmp_path / "file", tmp_path).stdout.strip())
+    offered.chmod(mode)
+    assert Path(start(tmp_path / "file", tmp_path).stdout.strip()) != offered
