@@ -57,3 +57,21 @@ def test_every_result_has_one_caption_and_every_caption_its_file() -> None:
 @pytest.mark.parametrize("command", [f"{s.name} {words}".strip() for s in STUDIES.values() for words in s.full])
 def test_a_caption_names_the_command_as_it_is_run(command: str) -> None:
     assert f"`{command}`" in captions()
+
+
+@pytest.mark.parametrize("document", ["docs/architecture.md", "CONTRIBUTING.md"])
+def test_every_file_a_guide_names_is_there(document: str) -> None:
+    named = re.findall(
+        r"`((?:borechain|docs|groundstation|node|sim|telemetry|tests)/[a-z0-9_./-]+)`", (ROOT / document).read_text()
+    )
+    assert named
+    assert [name for name in named if not (ROOT / name).exists()] == []
+
+
+def test_every_decision_is_in_the_index() -> None:
+    folder = ROOT / "docs" / "decisions"
+    listed = re.findall(r"^\| \[(\d+)\]\(([^)]+)\) \| (.+) \|$", (folder / "README.md").read_text(), re.MULTILINE)
+    pages = sorted(path.name for path in folder.glob("0*.md"))
+    assert [page for _, page, _ in listed] == pages
+    for number, page, title in listed:
+        assert (folder / page).read_text().startswith(f"# {number}. {title}\n")
