@@ -3,13 +3,22 @@ PYTHON ?= python3
 VENV ?= .venv
 BIN := $(VENV)/bin
 STAMP := $(VENV)/.installed
+# one worker a core; a worker that has nothing left takes tests from another
+PYTEST := $(BIN)/python -m pytest --numprocesses auto --maxprocesses 8 --dist worksteal
 
-.PHONY: rig test check lint types contracts tests explore lock study clean
+.DEFAULT_GOAL := rig
+.PHONY: help rig test quick check lint types contracts tests statistical explore lock study clean
+
+help:  ## list the targets
+	@awk -F ':.*## ' '/^[a-z]+:.*## / { printf "make %-12s %s\n", $$1, $$2 }' $(MAKEFILE_LIST)
 
 rig: $(STAMP)  ## set up and drill wellbore 1
 	$(BIN)/borechain rig scenarios/wellbore-1.toml --speed max --seed 1
 
-test: check tests  ## set up and run every check and every test
+test: check tests  ## set up and run every check and every test, in parallel
+
+quick: check  ## lint, types, contracts and the fast tests: under 90 s
+	$(PYTEST) -m "not (slow or process or install or statistical)"
 
 $(STAMP): requirements.lock pyproject.toml
 	$(PYTHON) -m venv $(VENV)
@@ -17,25 +26,28 @@ $(STAMP): requirements.lock pyproject.toml
 	$(BIN)/python -m pip install --quiet --no-build-isolation --no-deps --editable .
 	touch $@
 
-check: lint types contracts
+check: lint types contracts  ## lint, types and import contracts
 
-lint: $(STAMP)
+lint: $(STAMP)  ## ruff: rules and format
 	$(BIN)/ruff check .
 	$(BIN)/ruff format --check .
 
-types: $(STAMP)
+types: $(STAMP)  ## mypy, strict
 	$(BIN)/mypy
 
-contracts: $(STAMP)
+contracts: $(STAMP)  ## which package may import which
 	$(BIN)/lint-imports
 
-tests: $(STAMP)
-	$(BIN)/python -m pytest
+tests: $(STAMP)  ## every test but the statistical ones at full size
+	$(PYTEST) -m "not statistical"
+
+statistical: $(STAMP)  ## the statistical tests at full size; part of `make study`
+	$(PYTEST) -m statistical
 
 explore: $(STAMP)  ## the properties with examples that no run before has seen
 	HYPOTHESIS_PROFILE=explore $(BIN)/python -m pytest -m hypothesis
 
-study: $(STAMP)  ## every study of the table, with many seeds; their tables are committed in docs/results
+study: $(STAMP) statistical  ## every study of the table, with many seeds; their tables are committed in docs/results
 	$(BIN)/borechain experiment all --out docs/results
 	$(BIN)/borechain bench realtime --nodes 50 --seconds 120 --out docs/results
 
@@ -44,5 +56,5 @@ lock:  ## pin the dependencies again, without addresses (needs pip-tools)
 	  --no-header --no-emit-index-url --no-emit-find-links --no-emit-trusted-host --no-emit-options \
 	  --output-file requirements.lock pyproject.toml
 
-clean:
+clean:  ## remove the environment and every cache
 	rm -rf $(VENV) .pytest_cache .mypy_cache .ruff_cache .hypothesis .import_linter_cache

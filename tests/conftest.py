@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import os
+from pathlib import Path
 
+import pytest
 from hypothesis import settings
 
 # the first example of a property compiles the kernel, which no deadline of an example can foresee; the same commit
@@ -11,3 +13,16 @@ from hypothesis import settings
 settings.register_profile("borechain", deadline=None, derandomize=True)
 settings.register_profile("explore", deadline=None, print_blob=True)
 settings.load_profile(os.environ.get("HYPOTHESIS_PROFILE", "borechain"))
+
+MARKER_OF_FOLDER = {"processes": "process", "install": "install"}
+
+
+@pytest.hookimpl(tryfirst=True)  # before `-m` selects
+def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
+    """Mark the tests of a folder that costs alike."""
+    tests = Path(__file__).parent
+    for item in items:
+        if item.path.is_relative_to(tests):
+            folder = item.path.relative_to(tests).parts[0]
+            if folder in MARKER_OF_FOLDER:
+                item.add_marker(MARKER_OF_FOLDER[folder])

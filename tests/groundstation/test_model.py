@@ -169,6 +169,7 @@ def same(one: Any, other: Any) -> bool:
     return bool(one == other)
 
 
+@pytest.mark.slow
 @settings(max_examples=10, suppress_health_check=[HealthCheck.function_scoped_fixture])
 @given(shuffler=st.randoms(use_true_random=False))
 @pytest.mark.parametrize("apart", [0.5, 4.0, 7.0, 16.0])

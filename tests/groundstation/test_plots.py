@@ -149,6 +149,7 @@ def drawn(axes: Axes, gid: str) -> list:
     return [artist for artist in axes.get_children() if artist.get_gid() == gid]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", BUILDERS)
 def test_a_figure_is_the_same_bytes_twice_and_has_no_date(name: str, bore: Survey, tmp_path: Path) -> None:
     for suffix in (".png", ".svg"):
@@ -161,6 +162,7 @@ def test_a_figure_is_the_same_bytes_twice_and_has_no_date(name: str, bore: Surve
     assert b"<dc:date>" not in first
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("name", "across", "up"),
     [
@@ -194,6 +196,7 @@ def visible_texts(figure: Figure) -> list[tuple[str, np.ndarray]]:
     return found
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", BUILDERS)
 def test_no_text_lies_on_another_or_beyond_the_page(name: str, bore: Survey) -> None:
     from matplotlib.backends.backend_agg import FigureCanvasAgg
@@ -246,6 +249,7 @@ def test_the_plan_has_east_to_the_right_and_the_ellipse_its_size(bore: Survey) -
     assert np.ptp(ellipse.get_xy(), axis=0) / 2.0 == pytest.approx(100.0 * 2.4477 * np.array([0.04, 0.01]), rel=1e-3)
 
 
+@pytest.mark.slow
 def test_exaggeration_in_the_label_is_that_of_the_drawing(bore: Survey, tmp_path: Path) -> None:
     figure = survey_of(bore)
     style.save(figure, tmp_path / "a.png")
@@ -404,6 +408,7 @@ def test_an_unknown_suffix_names_the_known_and_leaves_the_old_file(name: str, tm
     assert [p.name for p in tmp_path.iterdir()] == [name]
 
 
+@pytest.mark.slow
 def test_pdf_is_the_same_bytes_twice_and_a_missing_folder_is_named(tmp_path: Path) -> None:
     for name in ("a.pdf", "b.PDF"):
         style.save(weighting_of(), tmp_path / name)

@@ -72,6 +72,7 @@ def test_a_tube_that_counts_anew_is_not_taken_for_a_repetition(tmp_path: Path) -
         assert store.add_message(survey(1, 1, yaw=2.0), 2.0)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("acknowledged", [3, 40, 150])
 def test_killed_at_any_moment_nothing_acknowledged_is_lost_or_doubled(tmp_path: Path, acknowledged: int) -> None:
     writer = subprocess.Popen([sys.executable, "-c", WRITER, url(tmp_path)], stdout=subprocess.PIPE, text=True)

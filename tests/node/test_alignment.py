@@ -91,6 +91,7 @@ class Bored:
         return str(event.arguments["reason"])
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("kernel", ["float64", "fixed"])
 @pytest.mark.parametrize(("method", "sigma_deg"), [("circle", 0.0015), ("extremes", 0.0086)])
 @pytest.mark.parametrize("rate", [SLOW, -SLOW, 3.0 * DEG])
@@ -126,6 +127,7 @@ def test_the_survey_after_it_is_that_of_the_tube(kernel: Kernel) -> None:
     np.testing.assert_allclose(bored.tube.state["down"], -np.array(after.force) / G, atol=0.02 * DEG)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("seed", range(1, 7))
 def test_with_the_sensors_of_the_world_a_survey_errs_by_the_mount_before_and_by_noise_after(seed: int) -> None:
     setup = Setup(bias_std_deg=0.002)

@@ -109,6 +109,7 @@ def test_an_arc_has_no_middle(share: float) -> None:
     assert fit_circle(sweep[0], np.zeros(1, OFFSET)[0]) == 0
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("method", METHODS)
 @pytest.mark.parametrize("lean", [0.3, 2.0, 10.0])
 @pytest.mark.parametrize("count", [1, 2, 4])

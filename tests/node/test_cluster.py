@@ -122,6 +122,7 @@ def test_the_fused_reading_is_the_mean_by_inverse_variance(count: int, data: st.
     np.testing.assert_array_equal(again, fused)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("noises", "factor"), [((1.0, 1.0), math.sqrt(0.5)), ((1.0, 2.0), math.sqrt(0.8)),
                                                 ((1.0, 1.0, 1.0, 1.0), 0.5)])  # fmt: skip
 def test_the_noise_falls_with_the_root_of_the_number(noises: tuple[float, ...], factor: float) -> None:
@@ -159,6 +160,7 @@ def test_a_survey_has_the_mean_and_covariance_of_each_imu(kernel: Kernel) -> Non
     assert math.degrees(inclination) == pytest.approx(2.0, abs=0.02)
 
 
+@pytest.mark.slow
 def test_two_imus_halve_the_variance_of_a_survey() -> None:
     """60 stops: the ratio of two variances of 120 numbers each has a standard error of 18 %."""
     errors: dict[int, list[float]] = {1: [], 2: []}
@@ -186,6 +188,7 @@ FAULTS = {
 }
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("fault", FAULTS)
 @pytest.mark.parametrize("count", [2, 3])
 @pytest.mark.parametrize("which", [0, 1])

@@ -65,6 +65,7 @@ def run(program: str, **environment: str) -> list[list[int]]:
     return [[int(number) for number in line.split()] for line in done.stdout.splitlines()]
 
 
+@pytest.mark.slow
 def test_a_second_start_does_not_compile(tmp_path: Path) -> None:
     first = run(COUNT_COMPILATIONS, NUMBA_CACHE_DIR=str(tmp_path))
     second = run(COUNT_COMPILATIONS, NUMBA_CACHE_DIR=str(tmp_path))
@@ -78,6 +79,7 @@ def test_the_cache_follows_the_sources() -> None:
     assert source_digest() in cache_folder().name
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("cycle", "relay"),
     [

@@ -47,6 +47,7 @@ def errors(to_go, parameter: float) -> tuple[np.ndarray, np.ndarray]:  # type: i
     return error, normalised
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("to_go", "parameter", "better"),
     [(power, 2.0, 1.6), (power, 2.3, 1.8), (power, 3.0, 2.2), (power, 3.5, 2.2), (viscous, 0.05, 2.2),

@@ -33,6 +33,7 @@ def transition(wz: float, dt: float) -> np.ndarray:
     return f
 
 
+@pytest.mark.slow
 def test_yaw_error_grows_with_bias_and_scale_as_the_integrator_does() -> None:
     wz, dt = 1.2, PERIOD
     f = transition(wz, dt)

@@ -4,6 +4,7 @@ import itertools
 import math
 
 import numpy as np
+import pytest
 from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
@@ -103,6 +104,7 @@ TURNS = st.floats(-math.pi, math.pi)
 SPINS = st.sampled_from([0.0, 7.0, -35.0, 71.0, -71.0])
 
 
+@pytest.mark.slow
 @settings(max_examples=40)
 @given(ANGLES, ANGLES, TURNS, TURNS, SPINS)
 @example(0.0, math.pi, 0.3, 1.0, 71.0)
@@ -129,6 +131,7 @@ def test_a_walk_over_inclinations_and_rotations_never_jumps(
     assert walk.error() < 0.1 * DEG
 
 
+@pytest.mark.slow
 def test_every_inclination_and_rotation_is_stood_at() -> None:
     for inclination in np.radians(np.arange(0.0, 181.0, 15.0)):
         for yaw in np.radians(np.arange(0.0, 360.0, 60.0)):

@@ -104,6 +104,7 @@ def found(folder: Path) -> tuple[int, bytes] | None:
     return None if loaded is None else (int(loaded[0][0]["now_yaw"]), loaded[1])
 
 
+@pytest.mark.slow
 def test_a_cut_at_any_instant_leaves_the_old_or_the_new_state(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     random = np.random.default_rng(20261121)
     new, old = 0, 0

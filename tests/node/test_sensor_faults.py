@@ -84,6 +84,7 @@ def test_a_healthy_sensor_raises_no_alarm(healthy: StringOfOne) -> None:
     assert Mode.FAULT not in {state.mode for state in healthy.states}
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("place", PLACES)
 @pytest.mark.parametrize("kind", KINDS)
 @pytest.mark.parametrize("seed", [1, 2])

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import itertools
 import json
 import os
 import queue
@@ -18,12 +19,22 @@ from typing import Any
 
 REPOSITORY = Path(__file__).parents[2]
 PATIENCE = 120.0
+FIRST_PORT, SHARE = 12_000, 1_000
+NUMBERS = itertools.count(os.getpid())
 
 
 def free_endpoint() -> str:
-    with socket.socket() as probe:
-        probe.bind(("127.0.0.1", 0))
-        return f"tcp/127.0.0.1:{probe.getsockname()[1]}"
+    """An endpoint nobody has, and nobody gets before the rig listens there.
+
+    The system never hands out ports of this range by itself, and every worker of the tests looks in its own share.
+    """
+    worker = int(os.environ.get("PYTEST_XDIST_WORKER", "gw0").removeprefix("gw")) % 20
+    for number in NUMBERS:
+        with contextlib.suppress(OSError), socket.socket() as probe:
+            endpoint = ("127.0.0.1", FIRST_PORT + SHARE * worker + number % SHARE)
+            probe.bind(endpoint)
+            return f"tcp/{endpoint[0]}:{endpoint[1]}"
+    raise AssertionError("unreachable")
 
 
 def command(*arguments: str) -> list[str]:

@@ -50,6 +50,7 @@ class Clocks:
         return np.array(errors), np.array(stated)
 
 
+@pytest.mark.slow
 def test_errors_add_up_down_the_chain_and_do_not_grow_beyond() -> None:
     runs = [Clocks(seed).run(1800.0) for seed in range(12)]
     errors, stated = np.array([r[0][60:] for r in runs]), np.array([r[1][60:] for r in runs])

@@ -143,6 +143,7 @@ def test_a_silent_neighbour_is_noticed() -> None:
     assert chain.stations[2].neighbours[Side.UPPER] is not None
 
 
+@pytest.mark.slow
 @settings(max_examples=6)
 @given(seed=st.integers(0, 1000), loss=st.floats(0.0, 0.3), duplicate=st.floats(0.0, 0.3))
 def test_surveys_arrive_once_each_and_are_receipted(seed: int, loss: float, duplicate: float) -> None:
@@ -240,6 +241,7 @@ def test_a_relay_hands_on_the_very_bytes_that_came(monkeypatch: pytest.MonkeyPat
     assert len(encoded) == 1
 
 
+@pytest.mark.slow
 def test_clocks_agree_with_the_encoder_down_the_chain() -> None:
     chain = Chain([6, 5, 4, 3, 2, 1], jitter=0.3e-3)
     chain.run(120.0)

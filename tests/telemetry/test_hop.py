@@ -49,6 +49,7 @@ def payloads(count: int) -> list[bytes]:
     return [b"payload %d" % k for k in range(count)]
 
 
+@pytest.mark.slow
 @settings(max_examples=25)
 @given(
     seed=st.integers(0, 1000),

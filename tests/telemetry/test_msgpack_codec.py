@@ -157,6 +157,7 @@ def test_every_message_has_a_codec_and_a_test() -> None:
         assert len({field.key for field in fields}) == len(fields)
 
 
+@pytest.mark.slow
 @given(ANY)
 def test_decoding_gives_back_what_was_encoded(message: Any) -> None:
     assert decode(encode(message)) == message

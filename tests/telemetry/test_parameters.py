@@ -19,6 +19,7 @@ SENSOR = st.builds(SensorParameters, MATRIX, VECTOR, st.tuples(MATRIX, MATRIX, M
 BLOCK = st.builds(ParameterBlock, st.integers(1, 250), st.integers(0, 2**32 - 1), SENSOR, SENSOR)
 
 
+@pytest.mark.slow
 @given(BLOCK)
 def test_a_block_is_its_bytes(block: ParameterBlock) -> None:
     data = block.canonical()

@@ -133,6 +133,7 @@ def test_scales_with_the_unit_and_ignores_the_mean(scale: float, offset: float) 
             assert getattr(getattr(other, term), name) == pytest.approx(wanted, rel=1e-4, abs=0.0)
 
 
+@pytest.mark.slow
 @given(seed=st.integers(0, 10_000), rate=st.sampled_from([2.0, 20.0, 65.0]))
 @settings(max_examples=15, deadline=None)
 def test_white_noise_falls_with_slope_minus_one_half(seed: int, rate: float) -> None:
@@ -153,6 +154,7 @@ def test_rate_only_names_the_seconds() -> None:
     assert fast.random_walk.value == pytest.approx(math.sqrt(10.0), rel=0.05)  # the same readings, ten times as slow
 
 
+@pytest.mark.slow
 def test_two_hours_at_65_hz_give_back_what_they_were_made_of() -> None:
     truths = ((8.9e-3, 7.9e-3), (6.9e-3, 3.83e-3), (7.38e-3, 3.33e-3))
     readings = static_record(tuple(StaticNoise(white=n, flicker=f) for n, f in truths), 468_000, 65.0, seed=5)
@@ -271,6 +273,7 @@ def spoiled(how: str) -> np.ndarray:
     return y
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("how", "message"),
     [

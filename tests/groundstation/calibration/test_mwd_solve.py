@@ -102,6 +102,7 @@ def test_the_hessian_is_indefinite_at_the_start_and_the_step_leads_down_all_the_
     assert indefinite > TOOLS // 2
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("heating", DESIGNS)
 def test_good_designs_converge_within_ten_iterations(outcomes: dict, heating: Heating) -> None:
     for outcome in outcomes[heating]:
@@ -135,6 +136,7 @@ def test_control_fails_before_and_passes_after(outcomes: dict, heating: Heating)
     assert all(o.passed_after for o in outcomes[heating])
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("heating", [*DESIGNS, Heating.SINGLE_RAMP])
 def test_an_independent_solver_ends_in_the_same_minimum(heating: Heating) -> None:
     for seed in range(1, 6):
@@ -203,6 +205,7 @@ def test_twelve_parameters_over_a_range_of_temperatures_are_warned_about() -> No
     assert any("one temperature" in w for w in fit.warnings)
 
 
+@pytest.mark.slow
 def test_table_of_the_experiment_has_a_row_for_each_design() -> None:
     steps: list[int] = []
     table = run(2, lambda: steps.append(1))
@@ -285,6 +288,7 @@ class TestRefusals:
             refuse_open(made, made.problem(12), hold(12, "ABC"))
 
 
+@pytest.mark.slow
 @settings(deadline=None, max_examples=10)
 @given(seed=st.integers(0, 10**6))
 def test_magnetometers_reach_the_accuracy_of_the_accelerometers(seed: int) -> None:

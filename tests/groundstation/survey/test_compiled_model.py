@@ -28,6 +28,7 @@ def wells(seed: int) -> list[tuple[np.ndarray, np.ndarray, np.ndarray]]:
     return found
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", shipped())
 def test_a_compiled_tool_gives_what_the_arrays_give(name: str) -> None:
     tool = load_tool(name)

@@ -64,6 +64,7 @@ def test_a_survey_without_times_takes_a_hundred_seconds_for_a_rod_of_two_metres(
     assert propagate(Survey(md, *angles, md), [Leg(tool)], SITE).cov[1, 1, 1] == pytest.approx((1e-4 * 100.0) ** 2)
 
 
+@pytest.mark.slow
 def test_every_source_of_the_mwd_model_agrees_with_the_independent_library() -> None:
     rng = np.random.default_rng(10)
     header = welleng.survey.SurveyHeader(
@@ -302,6 +303,7 @@ def test_every_covariance_is_one(seed: int, name: str, count: int, allowance: bo
     assert least_share(found) >= -1e-12
 
 
+@pytest.mark.slow
 @given(st.integers(0, 10_000), st.floats(-7.0, 7.0))
 def test_turning_a_hole_turns_the_region_of_a_tool_that_knows_no_north(seed: int, angle: float) -> None:
     survey = well_of(seed, 12, first=1.0 * DEG)

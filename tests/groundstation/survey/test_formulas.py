@@ -284,6 +284,7 @@ def grown(inner: st.SearchStrategy[tuple[str, Direct]]) -> st.SearchStrategy[tup
 TREES = st.recursive(leaf(), grown, max_leaves=15)
 
 
+@pytest.mark.slow
 @settings(max_examples=400)
 @given(st.lists(TREES, min_size=1, max_size=4), st.lists(st.floats(-3.0, 3.0), min_size=24, max_size=24))
 def test_numbers_and_wells_give_what_the_tree_gives(trees: list[tuple[str, Direct]], numbers: list[float]) -> None:

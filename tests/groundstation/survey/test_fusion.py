@@ -288,6 +288,7 @@ def test_the_evidence_names_every_departure_that_was_looked_at() -> None:
     assert not evidence.agree
 
 
+@pytest.mark.slow
 def test_holes_that_never_moved_depart_as_often_as_said() -> None:
     generator = np.random.default_rng(4)
     trials, false_single, false_pair, false_three = 5000, 0, 0, 0

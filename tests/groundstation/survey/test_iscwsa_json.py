@@ -85,6 +85,7 @@ def refusal(text: str) -> str:
     return ""
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("path", [f for f in FILES if name_of(f) not in REFUSED], ids=lambda path: path.stem)
 def test_published_models_give_the_regions_their_publisher_computes(path: Path) -> None:
     text = path.read_text("utf-8")
@@ -355,6 +356,7 @@ MODELS = st.fixed_dictionaries(
 )
 
 
+@pytest.mark.slow
 @settings(max_examples=400)
 @given((MODELS | ANYTHING).map(json.dumps) | st.text(max_size=30))
 @example(text_of(row(), metadata=[1]))

@@ -262,6 +262,7 @@ HEADERS = st.one_of(
 )
 
 
+@pytest.mark.slow
 @ON_DISK
 @given(HEADERS, st.lists(st.lists(CELLS, min_size=1, max_size=5).map(",".join), max_size=6))
 def test_random_rows_are_a_record_or_refused(tmp_path: Path, header: str, rows: list[str]) -> None:

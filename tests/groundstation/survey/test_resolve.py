@@ -95,6 +95,7 @@ def test_what_an_error_does_is_the_slope_of_the_direction(
         np.testing.assert_allclose(found.by_force[:, axis], slope, atol=1e-8)
 
 
+@pytest.mark.slow
 def test_covariance_of_the_lean_is_what_sampling_gives() -> None:
     generator = np.random.default_rng(1)
     inclination, azimuth, yaw = 3.0 * DEG, 70.0 * DEG, 200.0 * DEG

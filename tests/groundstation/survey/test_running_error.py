@@ -58,6 +58,7 @@ def append(running: RunningUncertainty, survey: Survey, k: int) -> np.ndarray:
     return running.append(*row, {name: float(values[k]) for name, values in survey.record.items()})
 
 
+@pytest.mark.slow
 @settings(max_examples=40)
 @pytest.mark.parametrize("name", shipped())
 @given(rows=STATIONS, seed=st.none() | st.integers(0, 1000), allowance=st.booleans())
@@ -213,6 +214,7 @@ def test_a_tool_outside_its_inclinations_is_refused_as_for_the_whole_survey() ->
     np.testing.assert_array_equal(running.append(*row), twin.append(*row))
 
 
+@pytest.mark.slow
 @given(STATIONS, st.sampled_from(shipped()))
 def test_a_region_only_needs_what_its_tool_asks_of_the_record(
     rows: list[tuple[float, float, float]], name: str

@@ -239,6 +239,7 @@ def campaign() -> Campaign:
     return Campaign(claimed, errors, np.array([trajectory.points[-1].cov for trajectory in found]))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("station", range(4))
 def test_the_claimed_covariance_of_a_position_is_that_of_drawn_strings(campaign: Campaign, station: int) -> None:
     axes = 2 if station == 0 else 3  # the depth of a single station follows from its place in plan

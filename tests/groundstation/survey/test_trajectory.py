@@ -162,6 +162,7 @@ def test_a_hole_that_turns_back_on_itself_has_no_arc() -> None:
         trajectory.append(4.0, back)
 
 
+@pytest.mark.slow
 def test_covariance_of_the_position_is_what_sampling_gives() -> None:
     generator = np.random.default_rng(2)
     mds, azimuths = [2.0, 4.0, 7.0, 8.0], [0.3, 0.5, 1.0, 1.1]

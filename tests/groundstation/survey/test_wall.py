@@ -100,6 +100,7 @@ def test_a_joint_that_columns_never_make_is_refused(required: float) -> None:
         largest_distance(0.6, required)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("std", [0.0009, 0.003, 0.01, 0.03, 0.1, 0.5, 3.0])
 @pytest.mark.parametrize("direction", [0.0, 0.05, 0.3, 0.25 * math.pi, 1.53, 2.5, -3.1])
 def test_alike_in_all_directions_the_probability_is_the_noncentral_chi(std: float, direction: float) -> None:
@@ -138,6 +139,7 @@ def test_unlike_in_its_directions_it_is_what_sampling_gives(
     assert beyond(np.array(mean), cov_of(std_a, std_b, angle), LIMIT) == pytest.approx(sampled, rel=0.2)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("ratio", [1.0, 2.0, 10.0, 100.0, 1000.0])
 @pytest.mark.parametrize("wide", [0.0009, 0.003, 0.01, 0.1, 1.0])
 def test_whatever_the_shape_of_the_region_it_is_the_integral(ratio: float, wide: float) -> None:
@@ -226,6 +228,7 @@ def centre_on_arc(md: np.ndarray, position: np.ndarray, tangent: np.ndarray, tvd
     return on_arc(upper, lower, low).position[:2]
 
 
+@pytest.mark.slow
 def test_centres_at_a_depth_lie_on_the_arcs_of_the_wells() -> None:
     md, position, tangent = random_wells(6, 16)
     depths = np.linspace(0.0, 29.5, 60)

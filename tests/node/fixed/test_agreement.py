@@ -24,6 +24,7 @@ WORK_SPACE = {"h", "ph", "gain"}
 G = 9.81
 
 
+@pytest.mark.slow
 def test_four_thousand_cycles_agree() -> None:
     found = compare(4000, 3)
     rows = rows_of(found)
@@ -132,6 +133,7 @@ def reports(kernel: str, *, forget: bool) -> list[NodeState]:
     return said
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("forget", [False, True])
 def test_a_node_says_the_same_on_either_kernel(forget: bool) -> None:
     floats, integers = reports("float64", forget=forget), reports("fixed", forget=forget)

@@ -68,6 +68,7 @@ def test_whatever_comes_the_covariance_stays_one(
             pair.check()  # corrections by such impossible readings may be held, and are then counted
 
 
+@pytest.mark.slow
 def test_the_covariances_agree_entry_by_entry() -> None:
     pair, random = Pair(), np.random.default_rng(5)
     yaw = 1.0
@@ -83,6 +84,7 @@ def test_the_covariances_agree_entry_by_entry() -> None:
             np.testing.assert_allclose(found / np.outer(sigma, sigma), P / np.outer(sigma, sigma), atol=1e-4)
 
 
+@pytest.mark.slow
 def test_an_outage_without_end_is_held_and_counted() -> None:
     pair = Pair()
     for _ in range(200):

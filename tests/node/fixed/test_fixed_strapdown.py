@@ -23,6 +23,7 @@ def fixed_down(down: np.ndarray) -> np.ndarray:
     return np.rint(down * ONE).astype(np.int64)
 
 
+@pytest.mark.slow
 @settings(max_examples=200)
 @given(
     st.floats(0.0, math.pi),

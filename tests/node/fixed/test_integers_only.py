@@ -5,6 +5,8 @@ import subprocess
 import sys
 from pathlib import Path
 
+import pytest
+
 import node.kernels.fixed
 
 OUTSIDE = {"__init__", "border", "node"}  # the border, where floats become integers
@@ -96,6 +98,7 @@ def inspect(program: str, cache: Path) -> str:
     ).stdout
 
 
+@pytest.mark.slow
 def test_the_loop_holds_no_float(tmp_path: Path) -> None:
     assert inspect(LOOP, tmp_path) == ""
 
