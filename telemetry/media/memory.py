@@ -48,7 +48,10 @@ class MemoryPort:
     @property
     def is_up(self) -> bool:
         """Whether somebody listens at the other end of a closed joint."""
-        return self.other is not None and self.other._deliver is not None and not (self.is_open or self.other.is_open)
+        other = self.other
+        if self._closed or other is None or other._deliver is None:
+            return False
+        return not (self.is_open or other.is_open)
 
     @property
     def counters(self) -> Counter[str]:

@@ -136,7 +136,7 @@ class OwnClockLoop:
             now = self._clock.now()
             await self._inbox.wait(min(self._next_moment(), self._process.next_wake(now)) - now)
             if not self._inbox.is_closed:
-                self._take_one()
+                self._take_waiting()
                 self._do_due()
 
     def losses(self) -> dict[str, Any]:
@@ -152,17 +152,21 @@ class OwnClockLoop:
         schedule = self._schedule
         return schedule.due if self._synchronised >= schedule.due else schedule.halfway
 
-    def _take_one(self) -> None:
-        """One frame or call that waits, or else the timer that is due."""
+    def _take_waiting(self) -> None:
+        """Frames and calls that wait, until something else is due; where there are none, the timer that is due."""
         act = self._inbox.take()
         now = self._clock.now()
-        if act is not None:
+        if act is None and now < self._next_moment():
+            self._process.on_timer(now)
+        while act is not None:
             self._timing.begin()
             act(self._process, now)
             self._timing.lap(Stage.FRAME)
             self._unsent += 1
-        elif now < self._next_moment():
-            self._process.on_timer(now)
+            now = self._clock.now()
+            if self._unsent >= FRAMES_TOGETHER or now >= self._next_moment():
+                break
+            act = self._inbox.take()
 
     def _do_due(self) -> None:
         """The cycle or the synchronisation that is due, or else send what the frames so far have made."""
@@ -173,8 +177,6 @@ class OwnClockLoop:
             )
         elif now >= self._next_moment():
             self._synchronise(now)
-        elif self._inbox and self._unsent < FRAMES_TOGETHER:
-            return
         else:
             send(self._process, self._ports, now)
         self._unsent = 0

@@ -1,0 +1,247 @@
+"""What drives a process: steps on a bus and in memory, the inbox of a loop, an end at which nobody is."""
+
+from __future__ import annotations
+
+import asyncio
+import socket
+import threading
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+from itertools import pairwise
+
+import pytest
+
+from sim.rig.bus_stepper import BusStepper
+from sim.rig.stepper import Answer, FrameEvent
+from telemetry.application.endpoint import Endpoint
+from telemetry.errors import MediumError
+from telemetry.media.neighbours import neighbour_ports, stepped_ports
+from telemetry.media.port import Frame, TubeEnd
+from telemetry.media.zenoh_bus import JSON, Query, ZenohBus, open_client, open_router
+from telemetry.media.zenoh_port import ZenohMedium
+from telemetry.messages import ENCODER, Side
+from telemetry.runtime import step_client
+from telemetry.runtime.inbox import INBOX_LIMIT, Inbox
+from telemetry.runtime.own_clock import ABSENT_LIMIT, AbsenceWatch, OwnClock, OwnClockLoop
+from telemetry.runtime.process import Process
+from telemetry.runtime.step_client import STEP, AsyncStepClient, StepAssembler, StepClient, serve, serve_stepped
+from telemetry.runtime.stepped import Due, DueEvent, pack_step, run_step, unpack_step
+from telemetry.runtime.timing import CycleTiming
+
+PATIENCE = 30.0
+RIG = "runtime"
+
+
+class Plain(Process):
+    """The encoder's conversation and nothing else; keeps the depths it hears."""
+
+    def __init__(self) -> None:
+        self.endpoint = Endpoint(ENCODER, frozenset(Side), boot_count=1, is_clock_root=True)
+        self.depths: list[tuple[float, float]] = []
+
+    def on_depth(self, rig_time: float, md: float) -> None:
+        self.depths.append((rig_time, md))
+
+
+@dataclass(frozen=True)
+class Router:
+    endpoint: str
+    bus: ZenohBus
+
+
+@pytest.fixture
+def router() -> Iterator[Router]:
+    with socket.socket() as probe:
+        probe.bind(("127.0.0.1", 0))
+        endpoint = f"tcp/127.0.0.1:{probe.getsockname()[1]}"
+    with open_router(endpoint) as bus:
+        yield Router(endpoint, bus)
+
+
+def steps() -> list[list[FrameEvent]]:
+    """Timers and frames of a neighbour at both ends."""
+    below = Endpoint(1, frozenset(Side), boot_count=1)
+    below.advance(10.0)
+    hellos = dict(below.take_frames(10.0))
+    return [
+        [(DueEvent(Due.TIMER, 10.0), b"")],
+        [
+            (DueEvent(Due.LOWER_FRAME, 10.1), hellos[Side.UPPER].payload),
+            (DueEvent(Due.UPPER_FRAME, 10.2), hellos[Side.LOWER].payload),
+            (DueEvent(Due.TIMER, 10.3), b""),
+        ],
+        [(DueEvent(Due.CYCLE, 11.4, [10.8, 1, 11.0, 1]), b""), (DueEvent(Due.TIMER, 11.4), b"")],
+    ]
+
+
+def answers_of(stepper: BusStepper) -> list[Answer]:
+    assert stepper.wait_for(ENCODER, alive=True, timeout=PATIENCE)
+    return [stepper.round({ENCODER: step})[ENCODER] for step in steps()]
+
+
+def answers_in_memory() -> list[Answer]:
+    process, answers = Plain(), []
+    for step in steps():
+        frames: list[tuple[object, bytes]] = []
+        wake_at = run_step(process, step, lambda sent, frame, to=frames: to.append((sent, frame.payload)))
+        answers.append(Answer(frames, wake_at))  # type: ignore[arg-type]
+    return answers
+
+
+class TestSteps:
+    def test_a_plain_loop_answers_as_an_object_does(self, router: Router) -> None:
+        stepper = BusStepper(router.bus, RIG)
+        with open_client(router.endpoint, PATIENCE) as bus:
+            client = StepClient(bus, RIG, ENCODER, stepped_ports(ZenohMedium(bus), RIG, ENCODER, Side))
+            thread = threading.Thread(target=serve, args=(Plain(), client))
+            thread.start()
+            try:
+                assert answers_of(stepper) == answers_in_memory()
+            finally:
+                client.stop()
+                thread.join()
+
+    async def test_an_asyncio_loop_does_too_and_answers_operators_meanwhile(self, router: Router) -> None:
+        stepper = BusStepper(router.bus, RIG)
+        with open_client(router.endpoint, PATIENCE) as bus:
+            questions: Inbox[Query] = Inbox()
+            bus.queryable_kept("operator/question", questions.put)
+            client = AsyncStepClient(bus, RIG, ENCODER, stepped_ports(ZenohMedium(bus), RIG, ENCODER, Side))
+            serving = asyncio.create_task(serve_stepped(Plain(), client))
+            answering = asyncio.create_task(answer(questions))
+            assert await asyncio.to_thread(answers_of, stepper) == answers_in_memory()
+            (reply,) = await asyncio.to_thread(router.bus.get, "operator/question", PATIENCE)
+            assert reply.payload == b"on the loop"
+            client.stop()
+            questions.close()
+            await asyncio.wait_for(asyncio.gather(serving, answering), PATIENCE)
+
+    async def test_a_stepper_that_never_comes_is_reported(
+        self, router: Router, monkeypatch: pytest.MonkeyPatch
+    ) -> None:
+        monkeypatch.setattr(step_client, "ABSENT_LIMIT", 0.01)
+        reported: Inbox[str] = Inbox()
+        with open_client(router.endpoint, PATIENCE) as bus:
+            plain, other = StepClient(bus, RIG, 1, {}), AsyncStepClient(bus, RIG, 2, {})
+            thread = threading.Thread(target=serve, args=(Plain(), plain, reported.put))
+            thread.start()
+            serving = asyncio.create_task(serve_stepped(Plain(), other, reported.put))
+            lines = [await asyncio.wait_for(reported.get(), PATIENCE) for _ in range(2)]
+            plain.stop()
+            other.stop()
+            await asyncio.wait_for(serving, PATIENCE)
+            thread.join()
+        assert sorted(str(line).partition(":")[0] for line in lines) == ["1", "2"]
+        assert all("is the medium of runtime running?" in str(line) for line in lines)
+
+    def test_a_step_waits_for_its_frames_in_any_order_of_arrival(self) -> None:
+        assembler = StepAssembler()
+        assembler.add(Due.LOWER_FRAME, b"early")
+        assert assembler.take_step() is None
+        events = [DueEvent(Due.LOWER_FRAME, 1.0), DueEvent(Due.UPPER_FRAME, 2.0), DueEvent(Due.TIMER, 3.0)]
+        assembler.add(STEP, pack_step(7, events))
+        assert assembler.take_step() is None
+        assembler.add(Due.UPPER_FRAME, b"late")
+        assert assembler.take_step() == (7, list(zip(events, [b"early", b"late", b""], strict=True)))
+        assert assembler.take_step() is None
+
+    def test_a_step_of_another_version_is_one_line(self) -> None:
+        with pytest.raises(MediumError, match="step 3: 99 is not a valid Due; is it of another version"):
+            unpack_step(pack_step(3, [DueEvent(99, 1.0)]))  # type: ignore[arg-type]
+
+
+async def answer(questions: Inbox[Query]) -> None:
+    while (query := await questions.get()) is not None:
+        query.reply("operator/question", b"on the loop", JSON)
+        query.finish()
+
+
+class TestInbox:
+    async def test_what_finds_it_full_is_counted(self) -> None:
+        inbox: Inbox[int] = Inbox(limit=10)
+        threads = [threading.Thread(target=lambda: [inbox.put(k) for k in range(100)]) for _ in range(4)]
+        for thread in threads:
+            thread.start()
+        for thread in threads:
+            thread.join()
+        assert (len(inbox), inbox.dropped) == (10, 390)
+        assert await inbox.get() == 0
+        assert inbox.put(5)
+
+    async def test_order_is_kept_and_nothing_is_lost_while_it_is_taken(self) -> None:
+        inbox: Inbox[int] = Inbox()
+        thread = threading.Thread(target=lambda: [inbox.put(k) for k in range(1000)])
+        thread.start()
+        got = [await asyncio.wait_for(inbox.get(), PATIENCE) for _ in range(1000)]
+        thread.join()
+        assert all(b - a == 1 for a, b in pairwise(k for k in got if k is not None))
+        assert (len(got), inbox.dropped) == (1000, 0)
+
+    async def test_it_waits_no_longer_than_asked(self) -> None:
+        inbox: Inbox[int] = Inbox()
+        await asyncio.wait_for(inbox.wait(0.01), PATIENCE)
+        assert inbox.take() is None
+
+    async def test_a_closed_one_gives_nothing(self) -> None:
+        inbox: Inbox[int] = Inbox()
+        inbox.put(1)
+        waiting = asyncio.create_task(inbox.get())
+        inbox.close()
+        assert await asyncio.wait_for(waiting, PATIENCE) is None
+
+    def test_one_whose_loop_has_ended_is_let_alone(self) -> None:
+        async def make() -> Inbox[int]:
+            return Inbox()
+
+        inbox = asyncio.run(make())
+        inbox.put(1)
+        inbox.close()
+
+
+class TestOwnClock:
+    async def test_frames_that_find_the_loop_full_are_counted(self, router: Router) -> None:
+        flood = 3000
+        medium = ZenohMedium(router.bus)
+        ports = neighbour_ports(medium, RIG, ENCODER, {Side.LOWER: 1})
+        process = Plain()
+        loop = OwnClockLoop(process, ports, OwnClock(), CycleTiming(), 0.5)
+        sender = medium.open_port(TubeEnd(RIG, 1, Side.UPPER, ENCODER))
+        await until(lambda: sender.is_up)
+        for k in range(flood):
+            sender.send(Frame(b"%d" % k))
+        await until(lambda: loop.losses()["inbox_dropped"] == flood - INBOX_LIMIT)
+        assert loop.losses()["ports"]["lower"] == {"is_up": False, "not_sent": {}}
+        running = asyncio.create_task(loop.run())
+        await until(lambda: process.endpoint.link_counters().get("bad_frames") == INBOX_LIMIT)
+        loop.stop()
+        await asyncio.wait_for(running, PATIENCE)
+
+    async def test_calls_come_to_the_process_in_order_on_the_loop(self, router: Router) -> None:
+        process = Plain()
+        loop = OwnClockLoop(process, {}, OwnClock(), CycleTiming(), 0.5)
+        running = asyncio.create_task(loop.run())
+        await asyncio.to_thread(loop.call, lambda p, now: p.on_depth(1.0, 2.0))
+        await asyncio.to_thread(loop.call, lambda p, now: loop.stop())
+        await asyncio.wait_for(running, PATIENCE)
+        assert process.depths == [(1.0, 2.0)]
+
+    def test_a_silent_end_is_named_once_until_somebody_is_heard(self) -> None:
+        watch = AbsenceWatch(Side, begin=100.0)
+        nobody: dict[Side, object] = dict.fromkeys(Side)
+        upper = nobody | {Side.UPPER: "encoder"}
+        assert watch.find(upper, 101.0) == []
+        assert watch.find(upper, 100.0 + ABSENT_LIMIT) == [Side.LOWER]
+        assert watch.find(nobody, 101.0 + ABSENT_LIMIT) == []
+        assert watch.find(nobody, 101.0 + 2.0 * ABSENT_LIMIT) == [Side.UPPER]
+        assert watch.find(nobody | {Side.LOWER: "tube"}, 102.0 + 2.0 * ABSENT_LIMIT) == []
+        assert watch.find(nobody, 103.0 + 3.0 * ABSENT_LIMIT) == [Side.LOWER]
+
+
+async def until(probe: Callable[[], bool]) -> None:
+    """Wait until ``probe`` holds."""
+
+    async def poll() -> None:
+        while not probe():
+            await asyncio.sleep(0.005)
+
+    await asyncio.wait_for(poll(), PATIENCE)
