@@ -4,34 +4,70 @@ Errors are squared and divided by the variance stated (NEES, 1 is honest) over f
 """
 
 import math
+from typing import Any
 
 import numpy as np
 import pytest
 
 from node.firmware.settings import JointRule
 from node.kernels.layout import PERIOD
-from sim.studies.drilled import BEGIN, DrilledRun, DrilledSetup, DrilledString
-from sim.world.scenario import TorsionSection
+from sim.rig.direct_string import DirectString, StringRun
+from sim.world.scenario import scenario_of
+from sim.world.world import World
 
-STEEL = TorsionSection()  # 60/50 mm, 500 N m, 1 % trapped
-SMALL = math.radians(0.02)
-
-
-def runs(setup: DrilledSetup, seeds: int) -> list[DrilledRun]:
-    return [DrilledString(setup, seed).run() for seed in range(1, seeds + 1)]
+STEEL: dict[str, float] = {}  # the usual section: 60/50 mm, 500 N m, 1 % trapped
+SMALL_DEG = 0.02
 
 
-def nees(found: list[DrilledRun], tube: int) -> float:
-    return float(np.mean([value for run in found for value in run.nees(tube)]))
+def string_of(
+    seed: int,
+    first: int,
+    blocks: int,
+    *,
+    added: int = 0,
+    torsion: dict[str, float] | None = None,
+    node: dict[str, Any] | None = None,
+    joints: dict[str, float] | None = None,
+) -> DirectString:
+    """A string of ``first`` tubes, of 3 m, that is turned in ``blocks``; one tube is ``added`` before each further."""
+    tables: dict[str, Any] = {
+        "rig": {"tubes": first + added, "tubes_at_start": first, "tube_length_m": 3.0},
+        "path": {"straight": {"inclination_deg": 2.0}},
+        "schedule": {"add_s": 58.0, "stop_s": 32.0, "finish_s": 5.0, "blocks": blocks},
+        "rotation": {"turns": 5.0},
+        "joints": {"unseen_std_deg": 0.01} | (joints or {}),
+        "clocks": {"wander_std_ms": 0.0},
+        "medium": {"link": "off"},
+        "node": node or {},
+    }
+    if torsion is not None:
+        tables["torsion"] = torsion
+    return DirectString(World(scenario_of(tables), seed))
 
 
-def twisted(hops: int, rule: str) -> DrilledSetup:
-    return DrilledSetup(hops, 3, torsion=STEEL, rule=rule, joint_std=SMALL, mount_std=SMALL)  # type: ignore[arg-type]
+def nees(found: list[StringRun], tube: int) -> float:
+    """Mean over all surveys of a tube of error squared over the variance stated."""
+    values = [
+        survey.error**2 / (survey.measurement.yaw_var + survey.measurement.systematic_var)
+        for run in found
+        for survey in run.surveys
+        if survey.tube == tube
+    ]
+    return float(np.mean(values))
+
+
+def twisted(seed: int, hops: int, rule: str) -> DirectString:
+    exact = {"reading_std_deg": SMALL_DEG, "mount_std_deg": SMALL_DEG}
+    return string_of(seed, hops, 3, torsion=STEEL, node={"torsion": rule}, joints=exact)
+
+
+def twisted_runs(hops: int, rule: str, seeds: int) -> list[StringRun]:
+    return [twisted(seed, hops, rule).drill() for seed in range(1, seeds + 1)]
 
 
 @pytest.mark.parametrize(("hops", "rule", "seeds"), [(10, "gate", 10), (10, "variance", 10), (50, "gate", 5)])
 def test_surveys_of_a_string_with_trapped_torque_are_honest(hops: int, rule: str, seeds: int) -> None:
-    found = runs(twisted(hops, rule), seeds)
+    found = twisted_runs(hops, rule, seeds)
     for run in found:
         assert len(run.surveys) == 3 * hops  # every node, every stop
         codes = {event.code for _, event in run.events}
@@ -39,7 +75,7 @@ def test_surveys_of_a_string_with_trapped_torque_are_honest(hops: int, rule: str
     low, high = (0.5, 1.7)
     assert low < nees(found, 1) < high
     assert low < nees(found, hops // 2) < high
-    last = [error for run in found for _, tube, error, _ in run.surveys if tube == 1]
+    last = [survey.error for run in found for survey in run.surveys if survey.tube == 1]
     trapped = 0.01 * hops * 1.645  # deg, 1 sigma
     assert math.degrees(float(np.sqrt(np.mean(np.square(last))))) == pytest.approx(trapped, rel=0.4)
 
@@ -47,7 +83,7 @@ def test_surveys_of_a_string_with_trapped_torque_are_honest(hops: int, rule: str
 @pytest.mark.parametrize(("hops", "seeds"), [(10, 6), (50, 2)])
 def test_a_rig_that_ignores_torsion_is_caught_overconfident(hops: int, seeds: int) -> None:
     """The negative control: the unwinding string is taken for a faulty gyroscope, and what is trapped is not stated."""
-    found = runs(twisted(hops, "ignore"), seeds)
+    found = twisted_runs(hops, "ignore", seeds)
     assert nees(found, 1) > 4.0
     assert any(event.code in ("gyro_step", "aiding_rejected") for _, event in found[0].events)
 
@@ -55,46 +91,52 @@ def test_a_rig_that_ignores_torsion_is_caught_overconfident(hops: int, seeds: in
 def test_a_gated_node_dead_reckons_the_twist_and_a_varied_one_states_it() -> None:
     """While drilling: the one follows its gyroscope, which sees the string wind up, the other the drive."""
     for rule, most in (("gate", 1.0), ("variance", 1.7 * 16.45)):
-        string = DrilledString(twisted(10, rule), 3)
-        run = string.run()
-        turning = string.motion.drive(run.ends)[1] > 1.0
-        late = turning & (run.ends > BEGIN + 200.0)  # the scale factor is known from the first rests
-        error = np.degrees(run.error[late, 0])
+        string = twisted(3, 10, rule)
+        run = string.drill()
+        turning = string.world.motion.drive(run.ends)[1] > 1.0
+        late = turning & (run.ends > string.world.begin + 200.0)  # the scale factor is known from the first rests
+        error = np.degrees(run.total_error[late, 0])
         assert np.abs(error).max() < most
         if rule == "variance":
             assert np.abs(error).mean() == pytest.approx(16.45, abs=1.0)
 
 
 def test_the_integer_kernel_copes_as_well() -> None:
-    setup = DrilledSetup(3, 2, torsion=STEEL, joints="solved", added=1)
-    fixed = DrilledString(DrilledSetup(3, 2, torsion=STEEL, joints="solved", added=1, kernel="fixed"), 2).run()
-    floats = DrilledString(setup, 2).run()
+    fixed, floats = (
+        string_of(2, 3, 2, added=1, torsion=STEEL, node={"joints": "solved", "kernel": kernel}).drill()
+        for kernel in ("fixed", "float64")
+    )
     assert len(fixed.surveys) == len(floats.surveys) == 7
-    np.testing.assert_allclose(np.array(fixed.surveys), np.array(floats.surveys), rtol=0.01, atol=2e-6)
+    told = [
+        np.array([(s.cycle, s.tube, s.error, s.measurement.yaw_var, s.measurement.systematic_var) for s in run.surveys])
+        for run in (fixed, floats)
+    ]
+    np.testing.assert_allclose(told[0], told[1], rtol=0.01, atol=2e-6)
     assert [e.code for _, e in fixed.events] == [e.code for _, e in floats.events]
 
 
-def growing(joints: JointRule, head_turn: float = 0.0) -> DrilledSetup:
-    return DrilledSetup(2, 4, added=3, joints=joints, head_turn=head_turn)
+def growing(seed: int, joints: JointRule, head_turn_deg: float = 0.0) -> DirectString:
+    return string_of(seed, 2, 4, added=3, node={"joints": joints}, joints={"head_turn_deg": head_turn_deg})
 
 
-def steps_deg(string: DrilledString, run: DrilledRun) -> list[float]:
+def steps_deg(string: DirectString) -> list[float]:
     """Change of the estimated yaw of the two lowest tubes over each make-up, beyond what they truly turned."""
     found: list[float] = []
-    for add in [phase for phase in string.motion.phases if phase.kind == "add"][1:]:
-        before, after = (int((t - BEGIN) / PERIOD) for t in (add.start - 2.0, add.end - 5.0))
-        slipped = [string.unseen(tube, add.end) - string.unseen(tube, add.start) for tube in (1, 2)]
-        found += np.degrees(run.error[after, :2] - run.error[before, :2] + slipped).tolist()
+    world, error = string.world, string.run.total_error
+    for add in [phase for phase in world.phases if phase.kind == "add"]:
+        before, after = (int((t - world.begin) / PERIOD) for t in (add.start - 2.0, add.end - 5.0))
+        slipped = [float(np.diff(world.unseen(tube, np.array([add.start, add.end])))[0]) for tube in (1, 2)]
+        found += np.degrees(error[after, :2] - error[before, :2] + slipped).tolist()
     return found
 
 
-@pytest.mark.parametrize(("joints", "head_turn"), [("solved", 0.0), ("solved", 3.0), ("both", 0.0), ("marks", 0.0)])
+@pytest.mark.parametrize(("joints", "head_turn"), [("solved", 0.0), ("solved", 172.0), ("both", 0.0), ("marks", 0.0)])
 def test_a_string_that_grows_stays_honest(joints: JointRule, head_turn: float) -> None:
-    strings = [DrilledString(growing(joints, head_turn), seed) for seed in range(1, 21)]
-    found = [string.run() for string in strings]
+    strings = [growing(seed, joints, head_turn) for seed in range(1, 21)]
+    found = [string.drill() for string in strings]
     for tube in range(1, 6):
         assert 0.4 < nees(found, tube) < 1.6
-    steps = np.array([step for string, run in zip(strings, found, strict=True) for step in steps_deg(string, run)])
+    steps = np.array([step for string in strings for step in steps_deg(string)])
     if joints == "solved":
         assert np.abs(steps).max() < 1e-3  # the yaw below goes on
     else:
@@ -108,15 +150,17 @@ def test_solved_joints_do_not_add_up_as_marks_do() -> None:
     """At the lowest of five tubes: four marks and the head's against one mark and what slipped unseen."""
     last: dict[str, float] = {}
     for joints in ("marks", "solved", "both"):
-        run = DrilledString(growing(joints), 1).run()  # type: ignore[arg-type]
-        last[joints] = max(var for block, tube, _, var in run.surveys if (block, tube) == (3, 1))
+        run = growing(1, joints).drill()  # type: ignore[arg-type]
+        newest = [survey.measurement for survey in run.surveys if survey.tube == 1][-1]
+        last[joints] = newest.yaw_var + newest.systematic_var
     assert last["solved"] < 0.7 * last["marks"]
     assert last["both"] <= last["solved"]
 
 
 def test_a_string_that_slipped_far_contradicts_its_marks() -> None:
-    setup = DrilledSetup(2, 2, added=1, joints="solved", unseen_std=math.radians(5.0))
-    events = [event for run in runs(setup, 3) for _, event in run.events]
+    slipping = {"unseen_std_deg": 5.0}
+    strings = [string_of(seed, 2, 2, added=1, node={"joints": "solved"}, joints=slipping) for seed in (1, 2, 3)]
+    events = [event for string in strings for _, event in string.drill().events]
     warned = [event for event in events if event.code == "joint_contradicts_marks"]
     assert warned
     for event in warned:
@@ -125,7 +169,6 @@ def test_a_string_that_slipped_far_contradicts_its_marks() -> None:
 
 
 def test_one_seed_gives_one_run() -> None:
-    setup = DrilledSetup(2, 2, added=1, torsion=STEEL)
-    first, second, other = (DrilledString(setup, seed).run() for seed in (1, 1, 2))
+    first, second, other = (string_of(seed, 2, 2, added=1, torsion=STEEL).drill() for seed in (1, 1, 2))
     assert first.surveys == second.surveys
     assert first.surveys != other.surveys
