@@ -1,17 +1,12 @@
 """The published form beside ours, what each ingredient buys, integers against floats: figures, tables and commands."""
 
-import json
 import math
 import subprocess
 import sys
-from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 import pytest
-from click.testing import CliRunner
 
-from borechain.cli.experiment.experiment import experiment
 from borechain.cli.rig.rig import PRELOAD
 from node.firmware.encoder import COUNTS_PER_TURN
 from node.firmware.settings import KERNELS
@@ -20,19 +15,18 @@ from node.process.tube_command import node
 from sim.rig.plain_encoder import LINES, PlainEncoder
 from sim.studies import published_form
 from sim.studies.ingredients import run as ingredients
-from sim.studies.links import OnOff
+from sim.studies.lab import LAB, REST, ROTATING, LabRun, run_seed
 from sim.studies.modes import run as modes
-from sim.studies.node_lab import REST, ROTATING, Lab, LabRun, LabSetup
+from sim.studies.scenarios import Tables, changed, on_off
 from sim.studies.trials import rms_deg
 from sim.world.imu_errors import SAMPLE_RATE_HZ, single_samples
 from sim.world.scenario import GyroSection, NodeSection
 
 SEEDS = 6
-LAB = LabSetup()
 
 
-def runs(setup: LabSetup, seeds: int = SEEDS) -> list[LabRun]:
-    return [Lab(setup, seed).run() for seed in range(1, seeds + 1)]
+def runs(setup: Tables, seeds: int = SEEDS) -> list[LabRun]:
+    return [run_seed((setup, seed)) for seed in range(1, seeds + 1)]
 
 
 def yaw(found: list[LabRun], window: np.ndarray = REST, hop: int = 0) -> float:
@@ -55,7 +49,7 @@ def test_the_published_scheme_is_as_far_off_as_it_was_found() -> None:
 
 def test_a_published_node_hands_its_own_yaw_down() -> None:
     two = published_form.setup_of(modes.TWO, "published filter")
-    assert two.scheme is Scheme.ESTIMATE
+    assert two["node"]["scheme"] == Scheme.ESTIMATE.name.lower()
     found = runs(two, 3)
     assert yaw(found, hop=1) < 0.2
     said = np.array([r.var[REST] for r in found])
@@ -77,30 +71,42 @@ def test_published_rows_stand_beside_the_thesis_and_ours() -> None:
 @pytest.mark.parametrize(
     ("name", "link", "window", "factor"),
     [
-        ("no scale-factor state", OnOff(), ROTATING, 2.0),
-        ("no delay compensation, instantaneous rate", OnOff(), REST, 10.0),
-        ("no delay compensation", OnOff(), ROTATING, 10.0),
-        ("instantaneous rate", OnOff(), ROTATING, 2.0),
-        ("no edge times, no quadrature", OnOff(), REST, 2.0),
-        ("no zero-rate update", OnOff(), REST, 5.0),
+        ("no scale-factor state", on_off(20.0, 0.0), ROTATING, 2.0),
+        ("no delay compensation, instantaneous rate", on_off(20.0, 0.0), REST, 10.0),
+        ("no delay compensation", on_off(20.0, 0.0), ROTATING, 10.0),
+        ("instantaneous rate", on_off(20.0, 0.0), ROTATING, 2.0),
+        ("no edge times, no quadrature", on_off(20.0, 0.0), REST, 2.0),
+        ("no zero-rate update", on_off(20.0, 0.0), REST, 5.0),
     ],
 )
-def test_every_ingredient_is_missed(name: str, link: OnOff, window: np.ndarray, factor: float) -> None:
-    without = runs(replace(ingredients.INGREDIENTS[name], link=link))
-    assert yaw(without, window) > factor * yaw(runs(replace(LAB, link=link)), window)
+def test_every_ingredient_is_missed(name: str, link: dict, window: np.ndarray, factor: float) -> None:
+    without = runs(changed(ingredients.INGREDIENTS[name], aiding=link))
+    assert yaw(without, window) > factor * yaw(runs(changed(LAB, aiding=link)), window)
 
 
 def test_each_ingredient_is_off_alone() -> None:
-    changed = {
-        name: {key for key in LabSetup.__slots__ if getattr(setup, key) != getattr(LAB, key)}
+    differing = {
+        name: {
+            f"{section}.{key}"
+            for section, values in setup.items()
+            for key, value in values.items()
+            if LAB.get(section, {}).get(key) != value
+        }
         for name, setup in ingredients.INGREDIENTS.items()
         if not name.startswith("published")
     }
-    assert changed.pop("as shipped") == set()
-    assert changed["instantaneous rate"] == {"instantaneous"}
-    assert changed["no edge times"] == changed["no edge times, no quadrature"] == {"counts_per_turn"}
-    assert changed["no scale-factor state"] == changed["no zero-rate update"] == {"config"}
-    assert ingredients.INGREDIENTS["no edge times"].counts_per_turn == COUNTS_PER_TURN
+    assert differing.pop("as shipped") == set()
+    assert differing["instantaneous rate"] == {"gyroscope.instantaneous"}
+    assert (
+        differing["no edge times"]
+        == differing["no edge times, no quadrature"]
+        == {
+            "encoder.counts_per_turn",
+            "encoder.edge_times",
+        }
+    )
+    assert differing["no scale-factor state"] == differing["no zero-rate update"] == {"node.tuning"}
+    assert ingredients.INGREDIENTS["no edge times"]["encoder"]["counts_per_turn"] == COUNTS_PER_TURN
 
 
 def test_a_plain_encoder_reads_the_middle_of_its_count() -> None:
@@ -118,40 +124,6 @@ def test_a_single_sample_has_the_noise_of_its_band() -> None:
     single = single_samples(gyroscope, PERIOD)
     for one, mean in zip(single.noise_dps_rthz, gyroscope.noise_dps_rthz, strict=True):
         assert one / math.sqrt(PERIOD) == pytest.approx(mean * math.sqrt(SAMPLE_RATE_HZ))
-
-
-def test_the_ingredients_command_keeps_table_and_plot(tmp_path: Path) -> None:
-    done = CliRunner().invoke(experiment, ["ingredients", "--seeds", "2", "--out", str(tmp_path), "--json"])
-    assert done.exit_code == 0, done.output
-    result = json.loads(done.stdout)
-    assert len(result["cases"]) == 2 * ingredients.steps(1)
-    assert len((tmp_path / "ingredients.csv").read_text().splitlines()) == len(result["cases"]) + 1
-    assert (tmp_path / "ingredients.svg").read_text().startswith("<?xml")
-
-
-def test_the_fixed_point_command_keeps_both_tables(tmp_path: Path) -> None:
-    words = ["fixed-point", "--cycles", "2000", "--seeds", "2", "--out", str(tmp_path), "--json"]
-    done = CliRunner().invoke(experiment, words)
-    assert done.exit_code == 0, done.output
-    result = json.loads(done.stdout)
-    assert result["within"] is True
-    assert sum(row["cycles"] for row in result["cases"]) == 2000
-    assert {row["kernel"] for row in result["nees"]} == {"float64", "fixed"}
-    for name, rows in (("fixed-point", result["cases"]), ("fixed-point-nees", result["nees"])):
-        assert len((tmp_path / f"{name}.csv").read_text().splitlines()) == len(rows) + 1
-
-
-@pytest.mark.parametrize("words", [["fixed-point", "--cycles", "1999"], ["ingredients", "--seeds", "1"]])
-def test_too_little_is_refused_in_one_line(words: list[str]) -> None:
-    done = CliRunner().invoke(experiment, words)
-    assert done.exit_code == 2
-    assert "is not in the range" in done.output
-
-
-def test_both_commands_are_listed() -> None:
-    listed = CliRunner().invoke(experiment, ["list"]).output
-    for name in ("ingredients", "fixed-point"):
-        assert f"\n{name} " in f"\n{listed}"
 
 
 def test_every_kernel_can_be_chosen_and_is_warmed_before_the_first_fork() -> None:

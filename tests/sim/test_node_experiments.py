@@ -1,31 +1,29 @@
 """Published experiments of the node's filter: what is asked is reached, and a filter that is wrong is told so."""
 
-import json
 import math
-from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 import pytest
-from click.testing import CliRunner
 
-from borechain.cli.experiment.experiment import experiment
-from node.kernels.layout import PERIOD, Scheme
-from sim.studies.chain import Chain, ChainSetup, run_seed
+from node.kernels.layout import PERIOD
+from sim.rig.direct_string import DirectString, aiding_passes
+from sim.studies import epochs
 from sim.studies.delay import run as delay
-from sim.studies.links import OnOff, Single
+from sim.studies.lab import ENDS, LAB, REST, ROTATING, STOP, LabRun, run_seed
 from sim.studies.modes import run as modes
-from sim.studies.node_lab import ENDS, REST, ROTATING, STOP, Lab, LabRun, LabSetup
 from sim.studies.outage import run as outage
+from sim.studies.scenarios import Tables, changed, on_off
 from sim.studies.trials import bootstrap, rms_deg
 from sim.studies.tuning import run as tuning
+from sim.world.scenario import AidingSection, scenario_of
+from sim.world.world import World
 
 SEEDS = 16
 SLACK = 1.5  # of the figure to reach, for few seeds
 
 
-def runs(setup: LabSetup, seeds: int = SEEDS) -> list[LabRun]:
-    return [Lab(setup, seed).run() for seed in range(1, seeds + 1)]
+def runs(setup: Tables, seeds: int = SEEDS) -> list[LabRun]:
+    return [run_seed((setup, seed)) for seed in range(1, seeds + 1)]
 
 
 def judged(case: modes.Case, found: list[LabRun]) -> dict[str, dict]:
@@ -44,7 +42,7 @@ def test_every_update_mode_is_within_reach(case: modes.Case) -> None:
 
 def test_without_the_scale_factor_state_the_reach_is_missed() -> None:
     case = next(c for c in modes.CASES["update-modes"] if c.name == "20 s on / 30 s off")
-    row = judged(case, runs(replace(case.setup, config=(("scale_std", 0.0),))))["yaw"]
+    row = judged(case, runs(changed(case.setup, node={"tuning": {"scale_std": 0.0}})))["yaw"]
     assert row["reached"] is False
     assert row["ours"] > 2.0 * row["to_reach"]
 
@@ -57,12 +55,12 @@ def test_the_second_node_is_as_good_as_the_first() -> None:
 
 
 def test_one_seed_gives_one_run_whatever_else_runs() -> None:
-    first, second, other = (Lab(LabSetup(OnOff(20.0, 10.0)), seed).run() for seed in (3, 3, 4))
+    first, second, other = (run_seed((changed(LAB, aiding=on_off(20.0, 10.0)), seed)) for seed in (3, 3, 4))
     assert np.array_equal(first.error, second.error)
     assert np.array_equal(first.azimuth_error, second.azimuth_error)
     assert not np.array_equal(first.error, other.error)
-    job = (replace(outage.STRINGS, blocks=1, link=OnOff(20.0, 20.0)), 7)
-    assert np.array_equal(run_seed(job).error, run_seed(job).error)
+    job = (changed(epochs.resting(outage.HOPS, blocks=1), aiding=on_off(20.0, 20.0)), 7)
+    assert np.array_equal(epochs.run_seed(job).error, epochs.run_seed(job).error)
 
 
 def test_an_experiment_over_a_pool_is_that_of_its_seeds() -> None:
@@ -94,28 +92,12 @@ def test_a_bias_that_stays_never_converges() -> None:
 
 
 def test_a_delay_costs_nothing_when_compensated_and_its_angle_when_not() -> None:
-    late = {form: replace(setup, delay=0.1) for form, setup in delay.FORMS.items()}
-    late[delay.FOUND] = replace(late[delay.FOUND], clock_told=0.1)
+    late = {form: changed(setup, medium={"delay_ms": 100.0}) for form, setup in delay.FORMS.items()}
+    late[delay.FOUND] = changed(late[delay.FOUND], clocks={"stated_std_ms": 100.0})
     errors = {form: rms_deg([r.error[ROTATING, 0] for r in runs(late[form], 4)])[0] for form in late}
     assert errors["compensated"] < delay.TO_REACH_DEG
     assert errors["dated by arrival"] == pytest.approx(0.1 * 71.0, rel=0.03)
     assert errors[delay.FOUND] < delay.TO_REACH_DEG
-
-
-def test_links_pass_what_they_say() -> None:
-    t = ENDS
-    assert OnOff().passes(t).all()
-    assert OnOff(20.0, 60.0).passes(t).mean() == pytest.approx(0.25, abs=0.03)
-    for every in (1.0, 5.0, 60.0):
-        passed = Single(every).passes(t)
-        assert abs(int(passed.sum()) - t[-1] / every) <= 1.0
-        assert np.all(np.diff(t[passed]) > every - PERIOD - 1e-9)
-
-
-def test_outages_reach_the_whole_string() -> None:
-    chain = Chain(ChainSetup(2, Scheme.FORWARD, blocks=1, loss=0.0, link=OnOff(20.0, 60.0)), 1)
-    assert chain._lost[:, 0].mean() == pytest.approx(0.75, abs=0.1)
-    assert not chain._lost[:, 1].any()
 
 
 def test_the_interval_holds_the_mean() -> None:
@@ -125,17 +107,20 @@ def test_the_interval_holds_the_mean() -> None:
     assert high - low == pytest.approx(2 * 1.96 * values.std() / 20.0, rel=0.15)
 
 
-def test_the_commands_keep_tables_and_plots(tmp_path: Path) -> None:
-    for name, plots in (("two-nodes", ("two-nodes.svg", "two-nodes-reach.svg")), ("tuning", ("tuning.svg",))):
-        done = CliRunner().invoke(experiment, [name, "--seeds", "2", "--out", str(tmp_path), "--json"])
-        assert done.exit_code == 0, done.output
-        cases = json.loads(done.stdout)["cases"]
-        assert len((tmp_path / f"{name}.csv").read_text().splitlines()) == len(cases) + 1
-        for plot in plots:
-            assert (tmp_path / plot).read_text().startswith("<?xml")
+def test_aiding_passes_as_its_scenario_says() -> None:
+    t = ENDS
+    assert aiding_passes(AidingSection(), t, 1).all()
+    assert aiding_passes(AidingSection(on_s=20.0, off_s=60.0), t, 1).mean() == pytest.approx(0.25, abs=0.03)
+    for every in (1.0, 5.0, 60.0):
+        passed = aiding_passes(AidingSection(every_s=every), t, 1)
+        assert abs(int(passed.sum()) - t[-1] / every) <= 1.0
+        assert np.all(np.diff(t[passed]) > every - PERIOD - 1e-9)
 
 
-def test_every_command_is_listed() -> None:
-    listed = CliRunner().invoke(experiment, ["list"]).output
-    for name in ("update-modes", "single-updates", "two-nodes", "fifty-nodes", "tuning", "delay", "outage"):
-        assert f"\n{name} " in f"\n{listed}"
+def test_outages_reach_the_whole_string() -> None:
+    tables = changed(epochs.resting(2, blocks=1, loss=0.0), aiding=on_off(20.0, 60.0))
+    string = DirectString(World(scenario_of(dict(tables)), 1))
+    assert string.passes.mean() == pytest.approx(0.25, abs=0.1)
+    run = string.drill()
+    silent = np.flatnonzero(~string.passes & run.turning)
+    assert (run.var[silent[-1]] > run.var[silent[0]]).all()  # both nodes dead-reckon, nothing is lost but the encoder
