@@ -18,6 +18,7 @@ PACKAGES = ("borechain", "groundstation", "node", "sim", "telemetry")
 FORBIDDEN = [
     ("telemetry/messages.py", "import node.errors"),
     ("telemetry/parameters.py", "import telemetry.transport.hop"),
+    ("telemetry/calibration.py", "import telemetry.media.port"),
     ("node/errors.py", "import sim.errors"),
     ("groundstation/errors.py", "import sim.errors"),
     ("sim/errors.py", "import borechain.cli.options"),

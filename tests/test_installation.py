@@ -201,8 +201,15 @@ def test_every_command_helps_and_does_its_job_or_names_the_extra_it_needs(
     assert (environment.folder / "run").exists() == (extra == "ground")
     if extra == "ground":
         assert [station["md_m"] for station in json.loads(drilled.stdout)["stations"]] == [2.0, 4.0, 6.0]
+        assert "Usage: python -m groundstation" in environment.run("--help", program=("-m", "groundstation")).stdout
     else:
         assert NEEDS.fullmatch(drilled.stderr)
+        assert NEEDS.fullmatch(environment.run(program=("-m", "groundstation")).stderr)
+    overwritten = environment.site / "node" / "__init__.py"
+    overwritten.write_text('"""Somebody else\'s, installed over ours."""\n')
+    refused = environment.run("router")
+    assert (refused.returncode, len(refused.stderr.splitlines())) == (1, 1)
+    assert str(overwritten) in refused.stderr
 
 
 @pytest.fixture

@@ -3,6 +3,7 @@
 import json
 from pathlib import Path
 
+import pytest
 from click.testing import CliRunner, Result
 
 from borechain.cli.scenario.scenario import group
@@ -26,6 +27,12 @@ def test_a_scenario_is_shown_by_its_name_or_its_path() -> None:
     text = (SCENARIOS / "rig-3.toml").read_text()
     assert run("show", "rig-3").output == text
     assert run("show", SCENARIOS / "rig-3.toml").output == text
+
+
+def test_a_folder_of_the_same_name_hides_no_scenario(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "rig-3").mkdir()
+    assert run("show", "rig-3").exit_code == 0
 
 
 def test_a_copy_can_be_drilled_and_overwrites_nothing(tmp_path: Path) -> None:

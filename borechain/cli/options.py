@@ -25,7 +25,9 @@ class ScenarioPath(click.Path):
 
 
 scenario_argument = click.argument("scenario", type=ScenarioPath())
-FAULT_HELP = "Fault, as kill-node:3@600 or kill-node:3@600+20 (tube, s after the start, s down). Repeatable."
+FAULT_HELP = (
+    "Fault to inject: kill-node:3@600 kills the node of tube 3 after 600 s, kill-node:3@600+20 for 20 s. Repeatable."
+)
 
 
 def check_tables(context: click.Context, _parameter: click.Parameter, as_json: bool) -> bool:
@@ -67,5 +69,9 @@ speed_option = click.option(
 )
 fault_option = click.option("--fault", "faults", multiple=True, help=FAULT_HELP)
 seed_option = click.option(
-    "--seed", type=click.IntRange(0, 2**31 - 1), default=1, show_default=True, help="One seed, one result."
+    "--seed",
+    type=click.IntRange(0, 2**31 - 1),
+    default=1,
+    show_default=True,
+    help="Seed of every random error; the same seed gives the same result.",
 )

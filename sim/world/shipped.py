@@ -45,7 +45,7 @@ def find_scenario(given: Path) -> Path:
     ScenarioError
         When it is neither; the message says which names there are.
     """
-    if given.exists() or given.suffix or len(given.parts) > 1:
+    if given.is_file() or given.suffix or len(given.parts) > 1:
         return given
     names = shipped_names()
     if given.name in names:

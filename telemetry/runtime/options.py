@@ -57,7 +57,7 @@ def place_options(command: Callable[..., Any]) -> Callable[..., Any]:
             callback=read_config,
             is_eager=True,
             expose_value=False,
-            help="TOML file with options of this command, named as here without the dashes in front.",
+            help="TOML file with options of this command, by their names without the leading dashes.",
         ),
         click.option(
             "--rig", "rig_name", default=keys.DEFAULT_RIG, show_default=True, help="Name of the rig in key expressions."

@@ -41,8 +41,14 @@ COLUMNS: Columns = (
 
 
 @click.command()
-@click.option("--nodes", type=click.IntRange(1, 250), default=50, show_default=True)
-@click.option("--seconds", type=click.FloatRange(4.0, 86400.0), default=120.0, show_default=True, help="Wall time.")
+@click.option("--nodes", type=click.IntRange(1, 250), default=50, show_default=True, help="Tubes of the string.")
+@click.option(
+    "--seconds",
+    type=click.FloatRange(4.0, 86400.0),
+    default=120.0,
+    show_default=True,
+    help="Duration of the measurement.",
+)
 @click.option("--endpoint", default=keys.DEFAULT_ENDPOINT, show_default=True, help="Where its router listens.")
 @click.option("--out", type=click.Path(path_type=Path, file_okay=False), help="Folder for realtime.csv.")
 @json_option

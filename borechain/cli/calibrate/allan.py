@@ -22,14 +22,16 @@ if TYPE_CHECKING:
 @click.option(
     "--rate", type=click.FloatRange(1.0, 1e6), required=True, metavar="HZ", help="Readings per second of FILE."
 )
-@click.option("--unit", default="deg/s", show_default=True, help="Unit of FILE, for the report; nothing is converted.")
+@click.option(
+    "--unit", default="deg/s", show_default=True, help="Unit of FILE, shown in the report; nothing is converted."
+)
 @full_scale_option
 @plain_faults
 @output_options
 def allan(file: Path, day: str, rate: float, unit: str, full_scale: float) -> Outcome:
     """Allan deviation of a static record: a CSV with the columns x,y,z, or an .npy of shape (n, 3).
 
-    Angle random walk N and bias floor F are fitted with their 95 % intervals; raw readings of the curve stand beside.
+    Angle random walk N and bias floor F are fitted, with 95 % intervals; the values read off the curve are given too.
 
     \b
     Examples:

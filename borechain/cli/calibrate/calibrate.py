@@ -10,10 +10,10 @@ from borechain.cli.calibrate.mwd import magnetometer, mwd, qc
 
 @click.group()
 def calibrate() -> None:
-    """Calibrate sensors from the records of a laboratory, and control the result.
+    """Calibrate sensors from laboratory records, and check a calibrated tool.
 
-    Formats and models are described in docs/calibration.md. A record that is none is refused with its line, and then
-    nothing is written.
+    Formats and models are described in docs/calibration.md. An invalid record is refused with
+    its line, and nothing is written.
 
     \b
     Examples:

@@ -62,7 +62,7 @@ class Linear:
 @plain_faults
 @output_options
 def turntable(file: Path, day: str, reference: float, unit: str, temperature_c: float, full_scale: float) -> Outcome:
-    """Matrix and bias from a turn table FILE: a row for each axis turned, a pair of columns for each sensor axis.
+    """Matrix and bias of a triad from a turn-table record: a row per axis turned, two columns per sensor axis.
 
     \b
     Examples:
@@ -100,7 +100,7 @@ def turntable(file: Path, day: str, reference: float, unit: str, temperature_c: 
     "--free-yaw",
     type=click.Path(path_type=Path, dir_okay=False),
     metavar="REFERENCE",
-    help="Free the yaw of the rig; REFERENCE holds the matrix that fixes it: a file of --out, or TOML with `matrix`.",
+    help="Solve for the fixture's yaw too; REFERENCE holds the known matrix: a file of --out, or TOML with `matrix`.",
 )
 @temperature_option
 @full_scale_option

@@ -27,7 +27,7 @@ parameters_option = click.option(
     "--parameters",
     type=click.Choice(["12", "30"]),
     required=True,
-    help="12 for a record at one temperature, 30 for one that is heated.",
+    help="12 for a record at one temperature, 30 for a record over temperature.",
 )
 accelerometers_option = click.option(
     "--accelerometers", type=calibration_path, help="Calibration of the accelerometers, a file of `mwd --out`."
@@ -37,7 +37,7 @@ accelerometers_option = click.option(
 @click.command()
 @file_argument
 @parameters_option
-@click.option("--tool-face", is_flag=True, help="Turn the solution onto the jig's tool faces; without, m_AB = m_BA.")
+@click.option("--tool-face", is_flag=True, help="Align the solution with the jig's tool faces; otherwise m_AB = m_BA.")
 @full_scale_option
 @plain_faults
 @output_options
@@ -60,8 +60,14 @@ def mwd(file: Path, day: str, parameters: str, tool_face: bool, full_scale: floa
 @file_argument
 @parameters_option
 @accelerometers_option
-@click.option("--field-ut", "--field", "field_ut", type=click.FloatRange(1.0, 100.0), help="Field of the site, uT.")
-@click.option("--dip-deg", type=click.FloatRange(-90.0, 90.0), help="Dip of the site, below the horizontal.")
+@click.option(
+    "--field-ut",
+    "--field",
+    "field_ut",
+    type=click.FloatRange(1.0, 100.0),
+    help="Strength of the site's magnetic field, uT.",
+)
+@click.option("--dip-deg", type=click.FloatRange(-90.0, 90.0), help="Dip of the site's field below the horizontal.")
 @full_scale_option
 @plain_faults
 @output_options
@@ -76,8 +82,8 @@ def magnetometer(
 ) -> Outcome:
     """Coefficients of the magnetometers of an MWD tool, with the site's field and dip as references.
 
-    The vertical comes from --accelerometers, or from accelerometers calibrated on the same record. Field and dip stand
-    in the columns field_ut,dip_deg of FILE where they are not given.
+    The vertical comes from --accelerometers, or from accelerometers calibrated on the same record. Field and dip
+    that are not given are read from the columns field_ut,dip_deg of FILE.
 
     \b
     Example:
@@ -113,9 +119,10 @@ def magnetometer(
 @plain_faults
 @output_options
 def qc(file: Path, day: str, accelerometers: Path | None, magnetometers: Path | None, full_scale: float) -> Outcome:
-    """Control a tool: twelve tool faces at one attitude must agree in inclination, azimuth and G_L.
+    """Check a tool: readings at twelve tool faces of one attitude must agree in inclination, azimuth and G_L.
 
-    A triad without a calibration is taken as drawn. The exit status is 0 for either verdict: read `passed`.
+    A triad without a calibration file has the nominal coefficients. The exit status is 0 whether the tool passes or
+    not: read `passed`.
 
     \b
     Example:

@@ -30,7 +30,7 @@ full_scale_option = click.option(
     "--full-scale",
     type=click.FloatRange(0.0, min_open=True),
     default=1e30,
-    help="Range of the sensor in the unit of its readings; a reading at it is saturated and refused.",
+    help="Range of the sensor, in the unit of its readings; a saturated reading is refused.",
 )
 
 
@@ -110,7 +110,7 @@ def output_options(command: Callable[..., Outcome]) -> Callable[..., None]:
         ),
         click.option("--certificate", type=path, help="Certificate as PDF."),
         click.option("--plot", type=path, help="Figures as .svg, .png or .pdf."),
-        click.option("--out", type=path, help="The calibration as JSON, with where it comes from."),
+        click.option("--out", type=path, help="Result as a .json file, with the record it was made from."),
     ):
         decorated = option(decorated)
     return decorated

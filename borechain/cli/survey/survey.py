@@ -28,35 +28,67 @@ SOURCES_SHOWN = 12
 
 @click.command()
 @click.argument("file", type=click.Path(path_type=Path))
-@click.option("--method", type=click.Choice(METHODS), default="balanced-tangential", show_default=True)
+@click.option(
+    "--method",
+    type=click.Choice(METHODS),
+    default="balanced-tangential",
+    show_default=True,
+    help="How the path between two stations is computed.",
+)
 @click.option(
     "--instrument",
     default="relay",
     show_default=True,
     metavar="NAME|FILE",
-    help="Shipped tool, or a TOML or JSON file.",
+    help="Error model: the name of one that comes with the program, or a TOML or JSON file.",
 )
 @click.option(
-    "--sigma", type=click.FloatRange(0.0, min_open=True), default=1.0, show_default=True, help="Of the result."
+    "--sigma",
+    type=click.FloatRange(0.0, min_open=True),
+    default=1.0,
+    show_default=True,
+    help="Standard deviations of the result.",
 )
-@click.option("--azimuth-error-deg", type=click.FloatRange(0.0), help="Constant error in place of the gyro's.")
-@click.option("--displacement-rule", type=click.Choice(["exact", "thesis"]), default="exact", show_default=True)
-@click.option("--from-collar", is_flag=True, help="Begin at a vertical collar at 0 m that the file leaves out.")
-@click.option("--md", type=float, multiple=True, help="Further depth (m) to answer for, on the arc. Repeatable.")
+@click.option(
+    "--azimuth-error-deg", type=click.FloatRange(0.0), help="One constant azimuth error in place of the gyro's terms."
+)
+@click.option(
+    "--displacement-rule",
+    type=click.Choice(["exact", "thesis"]),
+    default="exact",
+    show_default=True,
+    help="How lateral displacements become angles.",
+)
+@click.option("--from-collar", is_flag=True, help="Add a vertical station at 0 m, where FILE begins deeper.")
+@click.option("--md", type=float, multiple=True, help="Also give the position at this depth, m. Repeatable.")
 @click.option(
     "--north-of-site-deg", type=float, default=0.0, help="Azimuth of the site's north from true or grid north."
 )
-@click.option("--section-azimuth-deg", type=float, default=0.0, show_default=True, help="Of the vertical section.")
-@click.option("--gravity", type=float, default=9.81, show_default=True, help="m/s^2.")
-@click.option("--field-nt", type=float, default=50_000.0, show_default=True, help="Magnetic field, for magnetic tools.")
-@click.option("--dip-deg", type=float, default=70.0, show_default=True)
-@click.option("--declination-deg", type=float, default=0.0, show_default=True, help="Of magnetic against site north.")
-@click.option("--latitude-deg", type=float, default=52.0, show_default=True)
+@click.option(
+    "--section-azimuth-deg", type=float, default=0.0, show_default=True, help="Azimuth of the vertical section."
+)
+@click.option("--gravity", type=float, default=9.81, show_default=True, help="Gravity of the site, m/s^2.")
+@click.option(
+    "--field-nt",
+    type=float,
+    default=50_000.0,
+    show_default=True,
+    help="Magnetic field of the site, for magnetic tools.",
+)
+@click.option("--dip-deg", type=float, default=70.0, show_default=True, help="Dip of the magnetic field.")
+@click.option(
+    "--declination-deg", type=float, default=0.0, show_default=True, help="Magnetic declination from site north."
+)
+@click.option("--latitude-deg", type=float, default=52.0, show_default=True, help="Latitude, for gyroscopes.")
 @click.option("--out", type=click.Path(path_type=Path, dir_okay=False), help="Station table, a .csv file.")
 @click.option(
-    "--plot", type=click.Path(path_type=Path, dir_okay=False), help="Plan, sections, uncertainty: PNG, SVG, PDF."
+    "--plot",
+    type=click.Path(path_type=Path, dir_okay=False),
+    help="Plan, sections and uncertainty as .svg, .png or .pdf.",
 )
-@click.option("--export-tool", type=click.Path(path_type=Path, dir_okay=False), help="Instrument as ISCWSA JSON.")
+@click.option(
+    "--export-tool", type=click.Path(path_type=Path, dir_okay=False), help="Error model as an ISCWSA .json file."
+)
 @json_option
 @plain_faults
 def survey(

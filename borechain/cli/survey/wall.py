@@ -25,11 +25,13 @@ LIKELY = 0.01  # probability from which a joint is counted as doubtful
 
 @click.command()
 @click.argument("file", type=click.Path(path_type=Path))
-@click.option("--plot", type=click.Path(path_type=Path, dir_okay=False), help="Thickness over depth: PNG, SVG or PDF.")
+@click.option(
+    "--plot", type=click.Path(path_type=Path, dir_okay=False), help="Thickness over depth as .svg, .png or .pdf."
+)
 @json_option
 @plain_faults
 def wall(file: Path, plot: Path | None, as_json: bool) -> None:
-    """Judge every joint of the wall or grid that FILE describes: thickness, probability of less, where to add a column.
+    """Judge every joint of the wall or grid in FILE: thickness, probability of a gap, where to add a column.
 
     \b
     Example:
