@@ -13,6 +13,8 @@ from node.kernels.layout import PERIOD
 from sim.studies.drilled import BEGIN, DrilledRun, DrilledSetup, DrilledString
 from sim.world.scenario import TorsionSection
 
+pytestmark = pytest.mark.slow
+
 STEEL = TorsionSection()  # 60/50 mm, 500 N m, 1 % trapped
 SMALL = math.radians(0.02)
 
@@ -29,7 +31,10 @@ def twisted(hops: int, rule: str) -> DrilledSetup:
     return DrilledSetup(hops, 3, torsion=STEEL, rule=rule, joint_std=SMALL, mount_std=SMALL)  # type: ignore[arg-type]
 
 
-@pytest.mark.parametrize(("hops", "rule", "seeds"), [(10, "gate", 10), (10, "variance", 10), (50, "gate", 5)])
+@pytest.mark.parametrize(
+    ("hops", "rule", "seeds"),
+    [(10, "gate", 10), (10, "variance", 10), pytest.param(50, "gate", 5, marks=pytest.mark.statistical)],
+)
 def test_surveys_of_a_string_with_trapped_torque_are_honest(hops: int, rule: str, seeds: int) -> None:
     found = runs(twisted(hops, rule), seeds)
     for run in found:
@@ -44,7 +49,7 @@ def test_surveys_of_a_string_with_trapped_torque_are_honest(hops: int, rule: str
     assert math.degrees(float(np.sqrt(np.mean(np.square(last))))) == pytest.approx(trapped, rel=0.4)
 
 
-@pytest.mark.parametrize(("hops", "seeds"), [(10, 6), (50, 2)])
+@pytest.mark.parametrize(("hops", "seeds"), [(10, 6), pytest.param(50, 2, marks=pytest.mark.statistical)])
 def test_a_rig_that_ignores_torsion_is_caught_overconfident(hops: int, seeds: int) -> None:
     """The negative control: the unwinding string is taken for a faulty gyroscope, and what is trapped is not stated."""
     found = runs(twisted(hops, "ignore"), seeds)

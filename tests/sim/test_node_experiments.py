@@ -20,6 +20,8 @@ from sim.studies.outage import run as outage
 from sim.studies.trials import bootstrap, rms_deg
 from sim.studies.tuning import run as tuning
 
+pytestmark = pytest.mark.slow
+
 SEEDS = 16
 SLACK = 1.5  # of the figure to reach, for few seeds
 
