@@ -178,7 +178,7 @@ def test_a_tube_obeys_an_added_command_and_its_ranges_hold(copy: Path) -> None:
     obeyed, beyond, missing = out.splitlines()
     assert obeyed == "True|blinking|{'times': 2}"
     assert beyond.startswith("False|")
-    assert "1..9" in beyond
+    assert "[1, 9], got 10" in beyond
     assert missing.startswith("False|")
     assert "times" in missing
 

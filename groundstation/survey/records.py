@@ -42,7 +42,7 @@ class Record:
 
 
 def read_record(path: Path, rule: DisplacementRule = DisplacementRule.EXACT) -> Record:
-    """Record of either kind, told apart by its header.
+    """Record of either kind, distinguished by its header.
 
     Raises
     ------

@@ -37,7 +37,7 @@ STOOD_CYCLES = 4  # too slow in a row
 LARGEST_GAP = 5.0  # s, between two cycles
 LARGEST_STEP = 3.0 * DEG  # of the yaw in a cycle, beyond what the gyroscope turned
 LEAST_LEAN = 20.0  # standard errors: with less the readings do not show that they turned with the tube
-MOST_LEAN = 60.0 * DEG  # beyond it gravity's circle is wide and its middle near the centre, which tells no axis
+MOST_LEAN = 60.0 * DEG  # beyond it gravity's circle is wide and its middle near the centre, which determines no axis
 SHAKING = 5.0  # times the noise of a sample at rest
 LARGEST_OFFSET = 10.0 * DEG  # of a mount; a block of parameters can hold no larger one either
 

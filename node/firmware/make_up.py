@@ -18,7 +18,7 @@ from node.kernels.layout import DEG, Array, Err
 from telemetry.messages import Aiding, Severity
 
 SAME = 1e-8  # rad, between two offsets of one string
-LARGEST_STD = 1.0 * DEG  # of a saved yaw that can tell a joint
+LARGEST_STD = 1.0 * DEG  # of a saved yaw that can solve a joint
 CONTRADICTION = 4.0  # sigmas between marks and solution
 
 
@@ -27,7 +27,7 @@ class MakeUp:
 
     Parameters
     ----------
-    settings : ``joints`` says whence their angles come
+    settings : ``joints`` is the source of their angles
     states : the node's record, one-element array
     """
 
@@ -115,7 +115,7 @@ class MakeUp:
         self._pending.append(("joint_not_solved", Severity.WARNING, {"reason": reason, "hops": aiding.hops + 1}))
 
     def _refusal(self, aiding: Aiding, P: float) -> str:
-        """Why the saved yaw cannot tell the joint, or nothing."""
+        """Why the saved yaw cannot solve the joint; empty if it can."""
         state = self._state
         if not state["yaw_known"] or P > LARGEST_STD**2:
             return "the saved yaw is not known"

@@ -1,9 +1,9 @@
-"""Is the sensor sane? What its raw readings tell by themselves, and what the filter's innovations tell of them.
+"""Is the sensor sane? What its raw readings show by themselves, and what the filter's innovations show of them.
 
 ========== ======================================================================= =================
 fault      evidence                                                                flagged after
 ========== ======================================================================= =================
-bad sample a number that is none                                                   1 cycle
+bad sample a number that is not finite                                             1 cycle
 saturated  a reading at the configured range (3 cycles for the accelerometer)      1 cycle
 stuck      three axes, or one, that repeat bit for bit                             4, 8 repeats
 step       innovations beyond the gate that grow, while the readings look sane     3 aidings in a row
@@ -11,7 +11,7 @@ scale      the same, in proportion to the rate                                  
 ========== ======================================================================= =================
 
 A wrong aiding makes one large innovation that then stays; a wrong gyroscope makes it grow with every cycle. That is
-how the two are told apart. A string that unwinds below a standing drive head looks like a step.
+how the two are distinguished. A string that unwinds below a standing drive head looks like a step.
 """
 
 from __future__ import annotations
@@ -127,7 +127,7 @@ class Mismatch:
     fault: Fault
     rate: float  # rad/s, true minus measured
     spin: float  # rad/s, true, at the same time
-    steady: bool  # the last two aidings tell the same mismatch
+    steady: bool  # the last two aidings show the same mismatch
 
 
 class AidingWatch:

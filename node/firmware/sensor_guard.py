@@ -88,7 +88,7 @@ class SensorGuard:
 
     @property
     def heard(self) -> bool:
-        """Whether the encoder told its rate lately."""
+        """Whether the encoder reported its rate lately."""
         return abs(float(self._state["now"]) - self._rate_at) <= RATE_AGE
 
     def drain_events(self) -> list[PendingEvent]:
@@ -99,7 +99,7 @@ class SensorGuard:
     def gate_aiding(self, aiding: Aiding, offset: float, valid_local: float) -> bool:
         """Whether an aiding is for the filter, valid at ``valid_local`` (s, own clock); ``offset`` rad.
 
-        One of a time that is none, or far ahead, would wait for ever and let no other pass.
+        One with an invalid time, or one far ahead, would wait for ever and hold up all others.
         """
         state = self._state
         timely = math.isfinite(valid_local) and not (
