@@ -109,7 +109,7 @@ class Trial:
     """A checked block and the question whether it fits a node that stands still, before it is taken for good.
 
     At rest the corrected rate is near zero and the corrected force is gravity. A block that would make a body at rest
-    look turning must never be used: the node would never count as standing still again, and would take no further block.
+    look turning must never be used: the node would never count as standing still again and take no further block.
     """
 
     def __init__(self, block: ParameterBlock, gravity: float) -> None:
