@@ -19,7 +19,7 @@ from groundstation.survey.methods import bearing
 
 Array = npt.NDArray[np.float64]
 DISPLACEMENTS = ("md_m", "a_cm", "b_cm")
-LARGEST = 1e12  # beyond it a number is no depth and no angle
+LARGEST = 1e12  # beyond it a number is neither a depth nor an angle
 STATIONS = ("md_m", "inclination_deg", "azimuth_deg")
 
 

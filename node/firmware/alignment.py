@@ -132,7 +132,7 @@ class Aligner:
             self.stop("the string turned back")
         else:
             moved = rate * (max(gap, 0.0) + end - start)
-            # an aided yaw knows the turn best; unaided it wobbles with the mount, and where it is set anew it jumps
+            # an aided yaw knows the turn best; unaided it wobbles with the mount, and where it is set again it jumps
             followed = abs(wrap(turned - moved)) < LARGEST_STEP
             return self._sweep(forces, rate, turned if followed else moved, 0.5 * rate * (end - start))
         return False

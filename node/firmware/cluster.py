@@ -81,7 +81,7 @@ class Cluster:
         *,
         heard: bool,
     ) -> None:
-        """Judge one cycle, and leave its fused rate and force in ``rate`` and ``force``; no numbers if none is sane.
+        """Judge one cycle, and leave its fused rate and force in ``rate`` and ``force``; nan if none is sane.
 
         Parameters
         ----------
@@ -93,7 +93,7 @@ class Cluster:
         rates = rates - self._mount["rate_offset"][: len(rates)]
         sane = self._sane(raw)
         readings = np.concatenate([rates, forces], axis=1)
-        if not heard and self._apart.any():  # what was fused since is no witness against one of them
+        if not heard and self._apart.any():  # what was fused since is not evidence against one of them
             expected = np.concatenate([self._expected, expected[3:]])
         self._expected = expected[:3]
         agrees = self._agree(readings, sane, expected)

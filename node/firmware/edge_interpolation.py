@@ -17,7 +17,7 @@ import numpy as np
 import numpy.typing as npt
 
 Array = npt.NDArray[np.float64]
-EDGES = 12  # that are kept; of more, the stop is no power of time any more
+EDGES = 12  # that are kept; over more of them the stop is no longer a power of time
 FEWEST = 8
 POWERS = np.array([1.5, 2.0, 3.0])
 STEPS = 32

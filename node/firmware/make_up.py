@@ -64,7 +64,7 @@ class MakeUp:
         return said
 
     def _resume(self, aiding: Aiding, marks: float, twist_var: float) -> None:
-        """After a start the solution of before stands, if the string is the same as then."""
+        """After a start the earlier solution stands, if the string is still the same."""
         state = self._state
         hops, reference = int(state["reference_hops"]), float(state["reference_offset"])
         if hops >= 0 and hops != aiding.hops:
@@ -92,7 +92,7 @@ class MakeUp:
         is_new = aiding.hops == 1 and self._path is not None and self._path[0] == 0
         share = 1.0
         if is_new and self._settings.joints == "both" and not contradicts:
-            # the marks of two new joints are independent of all before; farther down the chain they are no news
+            # the marks of two new joints are independent of all before; farther down the chain they bring nothing new
             share = marks_var / (marks_var + var)
         self._offset = solved if share == 1.0 else float(wrap(marks + share * off))
         self._var = share * var

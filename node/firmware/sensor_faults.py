@@ -25,7 +25,7 @@ from node.errors import ConfigurationError
 from telemetry.messages import Vector3
 
 NEAR_RANGE = 0.999  # of the range, from where a reading counts as saturated
-FORCE_CYCLES = 3  # in a row at the range: one knock is no fault of the accelerometer
+FORCE_CYCLES = 3  # in a row at the range: one knock is not a fault of the accelerometer
 DISAGREEMENTS = 3  # aidings in a row
 GROWTH = 1.5  # sigmas from one aiding to the next, in one direction
 SMALLEST_STEP = math.radians(0.03)  # rad/s
@@ -139,7 +139,7 @@ class AidingWatch:
         self._seen: deque[tuple[float, float]] = deque(maxlen=DISAGREEMENTS + 1)  # mismatch and true spin, rad/s
 
     def forget(self) -> None:
-        """Begin anew: the yaw was set, or the reference is another one."""
+        """Begin again: the yaw was set, or the reference is another one."""
         self._left, self._at = 0.0, None
         self._seen.clear()
 
