@@ -14,15 +14,15 @@ settings.register_profile("borechain", deadline=None, derandomize=True)
 settings.register_profile("explore", deadline=None, print_blob=True)
 settings.load_profile(os.environ.get("HYPOTHESIS_PROFILE", "borechain"))
 
-MARKER_OF_FOLDER = {"processes": "process", "install": "install"}
+MARKER_OF = {"processes": "process", "test_installation.py": "install"}  # first part of the path below tests/
 
 
 @pytest.hookimpl(tryfirst=True)  # before `-m` selects
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
-    """Mark the tests of a folder that costs alike."""
+    """Mark the tests of a folder or file whose tests cost alike."""
     tests = Path(__file__).parent
     for item in items:
         if item.path.is_relative_to(tests):
-            folder = item.path.relative_to(tests).parts[0]
-            if folder in MARKER_OF_FOLDER:
-                item.add_marker(MARKER_OF_FOLDER[folder])
+            first = item.path.relative_to(tests).parts[0]
+            if first in MARKER_OF:
+                item.add_marker(MARKER_OF[first])

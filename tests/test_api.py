@@ -11,6 +11,7 @@ from telemetry.errors import MediumError
 ROOT = Path(__file__).parents[1]
 
 
+@pytest.mark.slow
 def test_the_examples_of_the_document_hold(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(ROOT)
     done = doctest.testfile(

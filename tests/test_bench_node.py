@@ -20,6 +20,8 @@ from borechain.cli.bench.bench import bench
 from borechain.cli.faults import EnvironmentFault
 from node.kernels.layout import Status, default_config, new_state
 
+pytestmark = pytest.mark.slow
+
 COUNT = 2.0 * np.pi / 2.0**32  # rad
 SOURCE = Path(__file__).parents[1] / "benchmarks" / "node.py"
 BETWEEN_CYCLES = ("bias", "scale", "stamp", "down", "P", "now_P", "now_down", "survey_force", "survey_force_cov")

@@ -10,6 +10,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+pytestmark = pytest.mark.slow
+
 ROOT = Path(__file__).parents[1]
 DATA, BENCH = ROOT / "tests" / "data" / "calibration", ROOT / "scenarios" / "instruments"
 NODE_A1, VN100_GYRO = DATA / "calibration_node_a1_gyro.csv", DATA / "calibration_vn100_gyro.csv"

@@ -16,6 +16,7 @@ def run(*words: str) -> subprocess.CompletedProcess[str]:
     )
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", sorted(COMMANDS))
 def test_every_command_has_help_with_an_example_on_a_line_of_its_own(name: str) -> None:
     done = run(name, "--help")
@@ -24,6 +25,7 @@ def test_every_command_has_help_with_an_example_on_a_line_of_its_own(name: str) 
     assert "\\b" not in done.stdout
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("words", "named"),
     [
@@ -58,6 +60,7 @@ def test_a_wrong_argument_is_refused_in_words(words: tuple[str, ...], named: str
     assert done.stdout == ""
 
 
+@pytest.mark.slow
 def test_options_may_stand_in_a_file(tmp_path: Path) -> None:
     path = tmp_path / "node.toml"
     path.write_text('tube = 0\nendpoint = "tcp/127.0.0.1:1"\n')

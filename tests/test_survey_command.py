@@ -60,6 +60,7 @@ def test_a_held_azimuth_replaces_the_gyro(tmp_path: Path) -> None:
     assert held["stations"][-1]["uncertainty"]["major_m"] < raw["stations"][-1]["uncertainty"]["major_m"]
 
 
+@pytest.mark.slow
 def test_files_of_a_survey_land_whole(tmp_path: Path) -> None:
     table, plot, tool = tmp_path / "a" / "t.csv", tmp_path / "p.svg", tmp_path / "tool.json"
     answer("survey", POTSDAM, "--instrument", "mwd-rev5.1", "--out", table, "--plot", plot, "--export-tool", tool)
@@ -80,6 +81,7 @@ def test_depths_between_stations_and_a_collar_that_is_left_out(tmp_path: Path) -
     assert found["at"][0]["tvd_m"] == pytest.approx(3.0)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("content", "named"),
     [
@@ -125,6 +127,7 @@ def test_a_tool_that_cannot_be_used_is_refused_with_its_term(tmp_path: Path, cha
     assert named in refused("survey", record, "--instrument", tool)
 
 
+@pytest.mark.slow
 def test_unknown_instruments_depths_and_plots_are_refused(tmp_path: Path) -> None:
     assert "expected one of gyro-continuous" in refused("survey", POTSDAM, "--instrument", "sextant")
     assert "expected a depth of 0..20 m" in refused("survey", POTSDAM, "--md", "25")
@@ -132,6 +135,7 @@ def test_unknown_instruments_depths_and_plots_are_refused(tmp_path: Path) -> Non
     assert ".svg" in refused("survey", POTSDAM, "--plot", tmp_path / "plot.docx")
 
 
+@pytest.mark.slow
 def test_the_wall_names_its_gap_and_how_to_close_it(tmp_path: Path) -> None:
     found = answer("wall", WALL, "--plot", tmp_path / "wall.png")
     assert len(found["joints"]) == 39
@@ -146,6 +150,7 @@ def test_the_wall_names_its_gap_and_how_to_close_it(tmp_path: Path) -> None:
     assert "worst joint K020-K021" in people.stdout
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("old", "new", "named"),
     [
@@ -163,6 +168,7 @@ def test_a_wall_file_that_cannot_be_is_refused(tmp_path: Path, old: str, new: st
     assert named in refused("wall", changed(tmp_path, WALL.name, old, new))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("name", "old", "new", "named"),
     [

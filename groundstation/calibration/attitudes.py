@@ -118,7 +118,7 @@ def fit(truth: Array, readings: Array, covs: Array | None = None) -> Fit:
 def fit_free_yaw(truth: Array, readings: Array, like: Array, covs: Array | None = None) -> Fit:
     """Bias, matrix and the yaw of the rig: readings = b + K Rz(yaw) truth, with K nearest to ``like`` in x and y.
 
-    A full matrix swallows any yaw, so one sensor cannot tell them apart and the residuals are those of ``fit``: what
+    A full matrix swallows any yaw, so one sensor cannot separate the two and the residuals are those of ``fit``: what
     fixes the yaw is ``like`` (3, 3), the matrix of an earlier calibration or of the mounting. Only its first two rows
     and columns count; an entry that is NaN is not known and does not count either.
 
@@ -160,7 +160,7 @@ def least_squares(basis: Array, scale: Array, readings: Array, covs: Array | Non
     Raises
     ------
     CalibrationError
-        When neither ``covs`` nor a reading more than unknowns is there to tell the noise.
+        When neither ``covs`` nor a reading more than unknowns is there to estimate the noise from.
     """
     n, k = basis.shape
     if covs is None and n <= k:

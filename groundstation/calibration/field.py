@@ -56,7 +56,7 @@ def solve(rests: Sequence[Rest], gravity: float, day: str) -> FieldResult:
     ------
     CalibrationError
         When a record moved or is none, the attitudes are too few or leave something open, or the residuals say that
-        an attitude was not the one that was told; it says which.
+        an attitude was not the one reported; it names which.
     """
     _check(rests, gravity)
     forces = np.array([rest.record.force for rest in rests])

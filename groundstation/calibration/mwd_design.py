@@ -1,4 +1,4 @@
-"""What a design of tilts, tool faces and temperatures can tell: the errors it leaves, over the whole sphere.
+"""What a design of tilts, tool faces and temperatures can determine: the errors it leaves, over the whole sphere.
 
 Judged by its leverage, the largest error of size (in references) or angle (rad) anywhere on the sphere and in the
 record's temperatures, in errors of one reading: 0.3 for every attitude at every temperature, 1 to 2.5 where tool-face

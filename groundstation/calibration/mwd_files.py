@@ -75,7 +75,7 @@ def read_mwd(path: Path, limit: float = LARGEST) -> MwdRecord:
     Raises
     ------
     CalibrationError
-        When the file is none, lacks an axis, holds what is no number, saturates, or its units are others.
+        When the file is not a record, lacks an axis, holds a cell that is not a number, saturates, or has other units.
     """
     table = read_table(path, HEADERS)
     rows = np.array([table.numbers(k, 0) for k in range(len(table.lines))])

@@ -1,4 +1,4 @@
-"""Static readings of one triad with their references, and what is no such record."""
+"""Static readings of one triad with their references, and the refusal of anything else."""
 
 from __future__ import annotations
 
@@ -91,7 +91,7 @@ def magnetometer_record(
 
 
 def check(record: Record, parameters: int) -> None:
-    """Refuse what is no record.
+    """Refuse an invalid record.
 
     Raises
     ------

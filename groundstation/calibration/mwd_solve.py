@@ -146,7 +146,7 @@ def solve(record: Record, parameters: int) -> MwdFit:
 
 
 def _refuse_outlier(problem: Problem, x: Array) -> None:
-    """Name the reading that moved or was misread; systematic errors of a design are no outliers."""
+    """Name the reading that moved or was misread; systematic errors of a design are not outliers."""
     found = []
     for what, error in zip(("size", "angle"), np.abs(problem.errors(x)), strict=True):
         limit = max(OUTLIER * float(np.median(error)), OUTLIER_FLOOR)

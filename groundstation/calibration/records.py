@@ -86,7 +86,7 @@ def read_turn_table(path: Path, reference: float, unit: float = 1.0, limit: floa
     Raises
     ------
     CalibrationError
-        When the file is no turn table, an axis is missing, a reading is saturated or its unit is not the reference's.
+        When the file is not a turn table, lacks an axis, has a saturated reading, or its unit is not the reference's.
     """
     table = read_table(path, TURN_TABLE_HEADERS)
     rows = {}
@@ -143,7 +143,7 @@ def read_static(
     Raises
     ------
     CalibrationError
-        When the file is no such record, is too short, saturates, moved, or its unit is not that of ``size``.
+        When the file is not such a record, is too short, saturates, moved, or its unit is not that of ``size``.
     """
     if path.suffix == ".npy":
         data = read_bytes(path)

@@ -1,8 +1,8 @@
 """How every figure looks, and how it becomes a file.
 
 Figures are 188 mm wide: they fit an A4 page as they are. Grey is normal; the one strong colour (``WRONG``) marks what
-is out of tolerance and nothing else. Series have the colours of Okabe and Ito, which the colour-blind tell apart, and a
-marker each. Figures are built without pyplot and hold no date: the same numbers give the same bytes.
+is out of tolerance and nothing else. Series have the colours of Okabe and Ito, which the colour-blind distinguish, and
+a marker each. Figures are built without pyplot and hold no date: the same numbers give the same bytes.
 """
 
 from __future__ import annotations

@@ -47,7 +47,7 @@ def analyse(record: Record, method: Method, tool: Tool, site: Site, section_azim
     Raises
     ------
     SurveyError, ToolError
-        When the record is no survey, or the tool cannot be used on it.
+        When the record is not a survey, or the tool cannot be used on it.
     """
     places = positions(method, record.md, record.inclination, record.azimuth)
     extra = {name: record.columns[c] * f for c, (name, f) in RECORD_COLUMNS.items() if c in record.columns}

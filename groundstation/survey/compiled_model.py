@@ -136,7 +136,7 @@ class CompiledModel:
         Raises
         ------
         SurveyError, ToolError
-            When the arrays are no survey, the method is not one of the two, or a weight has no value at a station.
+            When the arrays are not a survey, the method is not one of the two, or a weight has no value at a station.
         """
         check_stations(md, inclination, azimuth)
         if method not in (Method.BALANCED_TANGENTIAL, Method.MINIMUM_CURVATURE):

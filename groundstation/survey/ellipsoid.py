@@ -86,7 +86,7 @@ def outline(cov: Array, sigma: float, points: int = 73) -> Array:
 
 
 def check_covariance(cov: Array, where: str) -> None:
-    """Refuse what is no covariance (k, k).
+    """Refuse a matrix that is not a covariance (k, k).
 
     Raises
     ------

@@ -150,7 +150,7 @@ def parse(text: str) -> ast.expr:
     Raises
     ------
     ToolError
-        When the text is no formula.
+        When the text is not a formula.
     """
     if len(text) > LONGEST:
         raise ToolError(f"expected a formula of at most {LONGEST} characters, got {len(text)}")

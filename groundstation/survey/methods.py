@@ -98,7 +98,7 @@ def _where_leaning(m: Any, inclination: Any, azimuth: Any, other: Any) -> Any:
 
 
 def check_stations(md: Array, inclination: Array, azimuth: Array, where: str = "survey") -> None:
-    """Refuse arrays (..., n) that are no survey.
+    """Refuse arrays (..., n) that are not a survey.
 
     Raises
     ------
@@ -131,7 +131,7 @@ def positions(method: Method, md: Array, inclination: Array, azimuth: Array) -> 
     Raises
     ------
     SurveyError
-        When the numbers are no survey, or an arc of minimum curvature turns straight back.
+        When the numbers are not a survey, or an arc of minimum curvature turns straight back.
     """
     check_stations(md, inclination, azimuth)
     i1, i2, a1, a2 = inclination[..., :-1], inclination[..., 1:], azimuth[..., :-1], azimuth[..., 1:]

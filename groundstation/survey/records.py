@@ -19,7 +19,7 @@ from groundstation.survey.methods import bearing
 
 Array = npt.NDArray[np.float64]
 DISPLACEMENTS = ("md_m", "a_cm", "b_cm")
-LARGEST = 1e12  # beyond it a number is no depth and no angle
+LARGEST = 1e12  # beyond it a number is neither a depth nor an angle
 STATIONS = ("md_m", "inclination_deg", "azimuth_deg")
 
 
@@ -42,7 +42,7 @@ class Record:
 
 
 def read_record(path: Path, rule: DisplacementRule = DisplacementRule.EXACT) -> Record:
-    """Record of either kind, told apart by its header.
+    """Record of either kind, distinguished by its header.
 
     Raises
     ------

@@ -150,7 +150,7 @@ class RunningUncertainty:
 
 
 def check_direction(tool: Tool, md: float, inclination: float, azimuth: float, tvd: float) -> None:
-    """Refuse a station that is none, or that the tool is not made for.
+    """Refuse an invalid station, or one that the tool is not made for.
 
     Raises
     ------

@@ -74,7 +74,7 @@ class SharedErrors:
 
     @staticmethod
     def _chain(tube: int, above: Sequence[int] | None) -> list[Name]:
-        """Joints between the drive head and a tube. A node tells the sum of their variances, not its parts."""
+        """Joints between the drive head and a tube. A node reports the sum of their variances, not its parts."""
         if above is None:
             return [("string",)]
         names = [tube, *above]

@@ -37,7 +37,7 @@ STOOD_CYCLES = 4  # too slow in a row
 LARGEST_GAP = 5.0  # s, between two cycles
 LARGEST_STEP = 3.0 * DEG  # of the yaw in a cycle, beyond what the gyroscope turned
 LEAST_LEAN = 20.0  # standard errors: with less the readings do not show that they turned with the tube
-MOST_LEAN = 60.0 * DEG  # beyond it gravity's circle is wide and its middle near the centre, which tells no axis
+MOST_LEAN = 60.0 * DEG  # beyond it gravity's circle is wide and its middle near the centre, which determines no axis
 SHAKING = 5.0  # times the noise of a sample at rest
 LARGEST_OFFSET = 10.0 * DEG  # of a mount; a block of parameters can hold no larger one either
 
@@ -132,7 +132,7 @@ class Aligner:
             self.stop("the string turned back")
         else:
             moved = rate * (max(gap, 0.0) + end - start)
-            # an aided yaw knows the turn best; unaided it wobbles with the mount, and where it is set anew it jumps
+            # an aided yaw knows the turn best; unaided it wobbles with the mount, and where it is set again it jumps
             followed = abs(wrap(turned - moved)) < LARGEST_STEP
             return self._sweep(forces, rate, turned if followed else moved, 0.5 * rate * (end - start))
         return False

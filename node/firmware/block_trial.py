@@ -70,7 +70,7 @@ def refusal(block: ParameterBlock, tube: int, in_use: ParameterBlock) -> str:
 
 
 def forget_bias(state: Array, config: Array) -> None:
-    """Learn the static bias anew, as after a first start: what was learnt was that of other parameters."""
+    """Learn the static bias again, as after a first start: what was learnt was that of other parameters."""
     record, settings = state[0], config[0]
     for name in ("static_bias", "static_bias_var", "bias", "bias_sum", "scale", "bias_count"):
         record[name] = 0
@@ -81,7 +81,7 @@ def forget_bias(state: Array, config: Array) -> None:
 
 
 def forget_tilt(state: Array) -> None:
-    """Level anew at rest: against another accelerometer model an old tilt would be explained as a gyroscope's bias."""
+    """Level again at rest: against another accelerometer model an old tilt would be explained as a gyroscope's bias."""
     for k in (Err.TILT_X, Err.TILT_Y):
         isolate(state[0]["P"], int(k), 1.0)
 
@@ -109,7 +109,7 @@ class Trial:
     """A checked block and the question whether it fits a node that stands still, before it is taken for good.
 
     At rest the corrected rate is near zero and the corrected force is gravity. A block that would make a body at rest
-    look turning must never be used: the node could not be told to stand still again, and would take no further block.
+    look turning must never be used: the node would never count as standing still again and take no further block.
     """
 
     def __init__(self, block: ParameterBlock, gravity: float) -> None:

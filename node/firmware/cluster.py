@@ -22,7 +22,7 @@ from telemetry.messages import ImuMean, Severity, Vector3
 
 DISAGREEING: Final = 4  # cycles in a row, until an IMU is left out
 HEALTHY: Final = 20  # cycles in a row, until it is back
-LEARNT: Final = 32  # cycles at rest, from which offsets tell a disagreement
+LEARNT: Final = 32  # cycles at rest, after which offsets show a disagreement
 MEMORY: Final = 1000  # cycles at rest, of the running mean of an offset
 RATE_APART, FORCE_APART = 0.5 * DEG, 0.3  # rad/s, m/s^2, between IMUs that agree
 SPIN_APART: Final = np.array([0.02, 0.02, 0.02])  # of the spin, on each axis: what scale and mount may be off by
@@ -81,19 +81,19 @@ class Cluster:
         *,
         heard: bool,
     ) -> None:
-        """Judge one cycle, and leave its fused rate and force in ``rate`` and ``force``; no numbers if none is sane.
+        """Judge one cycle, and leave its fused rate and force in ``rate`` and ``force``; nan if none is sane.
 
         Parameters
         ----------
         raw : rate (rad/s), force (m/s^2) and the driver's word of saturation, of each IMU
         rates, forces : (imus, 3) the same, corrected and in the tube's frame
         expected : (6,) rate and force that the node expects in this cycle
-        heard : the encoder told the expected rate; else it is what the cluster itself read
+        heard : the encoder reported the expected rate; else it is what the cluster itself read
         """
         rates = rates - self._mount["rate_offset"][: len(rates)]
         sane = self._sane(raw)
         readings = np.concatenate([rates, forces], axis=1)
-        if not heard and self._apart.any():  # what was fused since is no witness against one of them
+        if not heard and self._apart.any():  # what was fused since is not evidence against one of them
             expected = np.concatenate([self._expected, expected[3:]])
         self._expected = expected[:3]
         agrees = self._agree(readings, sane, expected)

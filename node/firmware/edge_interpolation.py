@@ -1,4 +1,4 @@
-"""Where inside a count the drive head stopped: the times of its last edges tell how it slowed down.
+"""Where inside a count the drive head stopped: the times of its last edges show how it slowed down.
 
 A head that slows down as ``counts to go = c (time to go)^p`` passes the edge k counts before its last one at
 
@@ -7,7 +7,7 @@ A head that slows down as ``counts to go = c (time to go)^p`` passes the edge k 
 with x in 0..1 what it went beyond the last edge. A brake of constant torque has p = 2, a drive that eases out p = 3 or
 1.5; g is the first order of friction that grows with the rate. For every x and p the times are linear in T, b and g, so
 their weighted sum of squares, with T, b and g integrated out, is the likelihood of x. Stops like none of these are
-told by their residuals, and the place in the count stays unknown.
+recognised by their residuals, and the place in the count stays unknown.
 Source: least squares with flat priors, integrated in closed form (any text on linear models); see decision 0016.
 """
 
@@ -17,7 +17,7 @@ import numpy as np
 import numpy.typing as npt
 
 Array = npt.NDArray[np.float64]
-EDGES = 12  # that are kept; of more, the stop is no power of time any more
+EDGES = 12  # that are kept; over more of them the stop is no longer a power of time
 FEWEST = 8
 POWERS = np.array([1.5, 2.0, 3.0])
 STEPS = 32

@@ -19,7 +19,7 @@ from telemetry.messages import Aiding
 COUNTS_PER_TURN = 4096  # 1024 lines, decoded in quadrature
 QUANTUM = 2.0 * math.pi / COUNTS_PER_TURN
 EDGE_STD = math.radians(0.003)
-STOP_STD = 1.5 * EDGE_STD / QUANTUM  # counts; the form of a stop is no exact power of time
+STOP_STD = 1.5 * EDGE_STD / QUANTUM  # counts; the form of a stop is not exactly a power of time
 FASTEST = 100.0  # rad/s, what two edges in a bouncing instant may seem
 
 

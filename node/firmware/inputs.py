@@ -22,7 +22,7 @@ class ImuReading:
 
 @dataclass(frozen=True, slots=True)
 class RigContext:
-    """What the telemetry tells the firmware at a cycle: its place in the string and the time."""
+    """What the firmware gets from the telemetry at a cycle: its place in the string and the time."""
 
     joined: bool  # the upper joint is closed
     hops: int

@@ -18,7 +18,7 @@ from node.kernels.layout import DEG, Array, Err
 from telemetry.messages import Aiding, Severity
 
 SAME = 1e-8  # rad, between two offsets of one string
-LARGEST_STD = 1.0 * DEG  # of a saved yaw that can tell a joint
+LARGEST_STD = 1.0 * DEG  # of a saved yaw that can solve a joint
 CONTRADICTION = 4.0  # sigmas between marks and solution
 
 
@@ -27,7 +27,7 @@ class MakeUp:
 
     Parameters
     ----------
-    settings : ``joints`` says whence their angles come
+    settings : ``joints`` is the source of their angles
     states : the node's record, one-element array
     """
 
@@ -64,7 +64,7 @@ class MakeUp:
         return said
 
     def _resume(self, aiding: Aiding, marks: float, twist_var: float) -> None:
-        """After a start the solution of before stands, if the string is the same as then."""
+        """After a start the earlier solution stands, if the string is still the same."""
         state = self._state
         hops, reference = int(state["reference_hops"]), float(state["reference_offset"])
         if hops >= 0 and hops != aiding.hops:
@@ -92,7 +92,7 @@ class MakeUp:
         is_new = aiding.hops == 1 and self._path is not None and self._path[0] == 0
         share = 1.0
         if is_new and self._settings.joints == "both" and not contradicts:
-            # the marks of two new joints are independent of all before; farther down the chain they are no news
+            # the marks of two new joints are independent of all before; farther down the chain they bring nothing new
             share = marks_var / (marks_var + var)
         self._offset = solved if share == 1.0 else float(wrap(marks + share * off))
         self._var = share * var
@@ -115,7 +115,7 @@ class MakeUp:
         self._pending.append(("joint_not_solved", Severity.WARNING, {"reason": reason, "hops": aiding.hops + 1}))
 
     def _refusal(self, aiding: Aiding, P: float) -> str:
-        """Why the saved yaw cannot tell the joint, or nothing."""
+        """Why the saved yaw cannot solve the joint; empty if it can."""
         state = self._state
         if not state["yaw_known"] or P > LARGEST_STD**2:
             return "the saved yaw is not known"

@@ -1,9 +1,9 @@
-"""Is the sensor sane? What its raw readings tell by themselves, and what the filter's innovations tell of them.
+"""Is the sensor sane? What its raw readings show by themselves, and what the filter's innovations show of them.
 
 ========== ======================================================================= =================
 fault      evidence                                                                flagged after
 ========== ======================================================================= =================
-bad sample a number that is none                                                   1 cycle
+bad sample a number that is not finite                                             1 cycle
 saturated  a reading at the configured range (3 cycles for the accelerometer)      1 cycle
 stuck      three axes, or one, that repeat bit for bit                             4, 8 repeats
 step       innovations beyond the gate that grow, while the readings look sane     3 aidings in a row
@@ -11,7 +11,7 @@ scale      the same, in proportion to the rate                                  
 ========== ======================================================================= =================
 
 A wrong aiding makes one large innovation that then stays; a wrong gyroscope makes it grow with every cycle. That is
-how the two are told apart. A string that unwinds below a standing drive head looks like a step.
+how the two are distinguished. A string that unwinds below a standing drive head looks like a step.
 """
 
 from __future__ import annotations
@@ -25,7 +25,7 @@ from node.errors import ConfigurationError
 from telemetry.messages import Vector3
 
 NEAR_RANGE = 0.999  # of the range, from where a reading counts as saturated
-FORCE_CYCLES = 3  # in a row at the range: one knock is no fault of the accelerometer
+FORCE_CYCLES = 3  # in a row at the range: one knock is not a fault of the accelerometer
 DISAGREEMENTS = 3  # aidings in a row
 GROWTH = 1.5  # sigmas from one aiding to the next, in one direction
 SMALLEST_STEP = math.radians(0.03)  # rad/s
@@ -127,7 +127,7 @@ class Mismatch:
     fault: Fault
     rate: float  # rad/s, true minus measured
     spin: float  # rad/s, true, at the same time
-    steady: bool  # the last two aidings tell the same mismatch
+    steady: bool  # the last two aidings show the same mismatch
 
 
 class AidingWatch:
@@ -139,7 +139,7 @@ class AidingWatch:
         self._seen: deque[tuple[float, float]] = deque(maxlen=DISAGREEMENTS + 1)  # mismatch and true spin, rad/s
 
     def forget(self) -> None:
-        """Begin anew: the yaw was set, or the reference is another one."""
+        """Begin again: the yaw was set, or the reference is another one."""
         self._left, self._at = 0.0, None
         self._seen.clear()
 

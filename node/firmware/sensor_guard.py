@@ -1,7 +1,7 @@
 """What a node does about a faulty sensor: the safe state, the way back, and the events of both.
 
-While the gyroscope's readings are wrong the encoder's rate stands for them and the yaw's variance is that of a yaw
-nobody knows. A step or a new scale is learnt: the readings go on, the constant bias takes the mismatch, and the
+While the gyroscope's readings are wrong the encoder's rate stands for them and the yaw's variance is that of an unknown
+yaw. A step or a new scale is learnt: the readings go on, the constant bias takes the mismatch, and the
 variances of yaw and bias are opened. Either way no cross term is kept. The node trusts itself again when readings are
 sane and several aidings in a row agree within a gate that is narrow again.
 """
@@ -88,7 +88,7 @@ class SensorGuard:
 
     @property
     def heard(self) -> bool:
-        """Whether the encoder told its rate lately."""
+        """Whether the encoder reported its rate lately."""
         return abs(float(self._state["now"]) - self._rate_at) <= RATE_AGE
 
     def drain_events(self) -> list[PendingEvent]:
@@ -99,7 +99,7 @@ class SensorGuard:
     def gate_aiding(self, aiding: Aiding, offset: float, valid_local: float) -> bool:
         """Whether an aiding is for the filter, valid at ``valid_local`` (s, own clock); ``offset`` rad.
 
-        One of a time that is none, or far ahead, would wait for ever and let no other pass.
+        One with an invalid time, or one far ahead, would wait for ever and hold up all others.
         """
         state = self._state
         timely = math.isfinite(valid_local) and not (
@@ -155,7 +155,7 @@ class SensorGuard:
         self._hold()
         state = self._state
         if state["mode"] == STATIC_BIAS:
-            self._before_steps = None  # the constant bias is measured anew
+            self._before_steps = None  # the constant bias is measured again
         if state["mode"] == STATIC_BIAS or Status.REFERENCE_CHANGED in status or self._gyro.faulty:
             self._aidings.forget()
             return
@@ -222,7 +222,7 @@ class SensorGuard:
         if trust is self._force:
             for tilt in (Err.TILT_X, Err.TILT_Y):
                 isolate(state["P"], int(tilt), 1.0)
-            state["surveyed"] = state["still_cycles"] = 0  # the average of a stop begins anew
+            state["surveyed"] = state["still_cycles"] = 0  # the average of a stop begins again
             self._report_recovered(trust)
             return
         trust.proving = True
@@ -235,7 +235,7 @@ class SensorGuard:
         isolate(state["P"], int(Err.SCALE), float(state["P"][Err.SCALE, Err.SCALE]))
 
     def _learn_mismatch(self, found: Mismatch) -> None:
-        """A lasting mismatch belongs to the sensor: its bias or its scale takes it, and the yaw starts anew."""
+        """A lasting mismatch belongs to the sensor: its bias or its scale takes it, and the yaw starts again."""
         state, config, trust = self._state, self._config, self._gyro
         found = self._reconsider(found)
         fault = found.fault
@@ -274,7 +274,7 @@ class SensorGuard:
         return Mismatch(Fault.GYRO_SCALE, before.rate, before.spin, steady=True)
 
     def _undo_steps(self) -> None:
-        """Steps that cancelled each other were the scale that is learnt now: the constant bias is that of before."""
+        """Steps that cancelled each other were the scale that is learnt now: the constant bias is the earlier one."""
         if self._before_steps is None:
             return
         (constant, size), self._before_steps = self._before_steps, None
@@ -303,7 +303,7 @@ class SensorGuard:
 
 
 def begin_epoch(states: Array) -> None:
-    """After a jump of the clock: times and increments of before are void, and how far the string turned is unknown."""
+    """After a jump of the clock: earlier times and increments are void, and how far the string turned is unknown."""
     resume(states)
     state = states[0]
     state["yaw_known"] = 0

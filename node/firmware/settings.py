@@ -42,7 +42,7 @@ class TubeSettings:
     limits: SensorLimits = USUAL_LIMITS  # of its IMU
     stiffness: float = math.inf  # N m/rad, G J / L of this tube; infinite: rigid
     torsion: TorsionRule = "gate"  # aiding under torque: not used, or used with the variance of the twist
-    joints: JointRule = "marks"  # whence the angle of a joint made up above comes
+    joints: JointRule = "marks"  # source of the angle of a joint made up above
     unseen_std: float = 0.01 * DEG  # rad, what may turn unseen while a joint is made up
     imus: tuple[ImuSettings, ...] = (ImuSettings(),)  # of its cluster
 

@@ -20,7 +20,7 @@ FREEING = 0.5  # of the largest torque, from which on a grip replaces what anoth
 class TorqueSettings:
     """What the crew knows of the drive."""
 
-    drilling: float = 0.0  # N m, before a start, and while the head turns where no sensor tells it; 0: a rigid string
+    drilling: float = 0.0  # N m, before a start, and while the head turns if there is no sensor; 0: a rigid string
     trapped_fraction: float = 0.01  # of the torque, that may stay in a released string, 1 sigma
     dead_band: float = 1.0  # N m, what a released drive may read
     release_cycles: int = 4  # within the dead band

@@ -1,4 +1,4 @@
-"""Twist of the string between the drive head and one node, as the aiding tells it.
+"""Twist of the string between the drive head and one node, as the aiding reports it.
 
 The twist of the tubes passed adds up, for the torque is one and the same: ``sigma = |T| sum L / (G J)``, and its square
 is handed down. It is constant while the torque is, so no filter may average it away. Between two torques the yaw turns
@@ -80,7 +80,7 @@ class TubeTorsion:
     def holds_survey(self, now: float) -> bool:
         """Whether at ``now`` (s, own clock) the survey waits: the yaw that counts is that of a released string.
 
-        A drive that nobody tells of any more is not waited for: the survey goes by what the node itself knows.
+        A drive that is no longer reported is not waited for: the survey goes by what the node itself knows.
         """
         told = now - self._heard_at <= self._settings.aiding_old_after
         return self._holding and told and bool(self._state["still_cycles"])

@@ -1,4 +1,4 @@
-"""One tube: hears aiding and IMU readings, says aiding, state, surveys and events."""
+"""One tube: takes aiding and IMU readings, gives aiding, state, surveys and events."""
 
 from __future__ import annotations
 
@@ -168,7 +168,7 @@ class Tube:
             yield reporter.report(reading.end, context, self._guard.flags, self._mount[0], self._block)
 
     def boot_event(self, rig_now: float) -> Event:
-        """Tell that the node started, and whether with its saved yaw."""
+        """Report that the node started, and whether with its saved yaw."""
         return self.reporter.event(
             "restored" if self._restored else "booted", Severity.INFO, rig_now, {"yaw_deg": self.yaw / DEG}
         )
@@ -299,7 +299,7 @@ class Tube:
             yield record or self.reporter.event("static_record_empty", Severity.ERROR, context.rig_now, {})
 
     def _start_over(self) -> None:
-        """A covariance that is none: begin again from nothing but the constant bias."""
+        """Invalid covariance: restart the filter, keep the constant bias."""
         keep = {name: self.state[name].copy() for name in ("static_bias", "static_bias_var", "mode")}
         fresh = new_state(self._configs)[0]
         for name in fresh.dtype.names or ():

@@ -11,6 +11,8 @@ from click.testing import CliRunner
 from borechain.cli.experiment.experiment import experiment
 from sim.studies.alignment.run import BASE, PUBLISHED_DEG, Turn, base_rows, ratio, run_seed
 
+pytestmark = pytest.mark.slow
+
 SEEDS = 24
 
 

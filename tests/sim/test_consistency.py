@@ -13,6 +13,8 @@ from sim.studies.scenarios import Tables, changed
 from sim.world.scenario import scenario_of
 from sim.world.world import World
 
+pytestmark = pytest.mark.slow
+
 HOPS, SEEDS = 5, 40
 
 

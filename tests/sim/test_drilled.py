@@ -15,6 +15,8 @@ from sim.rig.direct_string import DirectString, StringRun
 from sim.world.scenario import scenario_of
 from sim.world.world import World
 
+pytestmark = pytest.mark.slow
+
 STEEL: dict[str, float] = {}  # the usual section: 60/50 mm, 500 N m, 1 % trapped
 SMALL_DEG = 0.02
 
@@ -65,7 +67,10 @@ def twisted_runs(hops: int, rule: str, seeds: int) -> list[StringRun]:
     return [twisted(seed, hops, rule).drill() for seed in range(1, seeds + 1)]
 
 
-@pytest.mark.parametrize(("hops", "rule", "seeds"), [(10, "gate", 10), (10, "variance", 10), (50, "gate", 5)])
+@pytest.mark.parametrize(
+    ("hops", "rule", "seeds"),
+    [(10, "gate", 10), (10, "variance", 10), pytest.param(50, "gate", 5, marks=pytest.mark.statistical)],
+)
 def test_surveys_of_a_string_with_trapped_torque_are_honest(hops: int, rule: str, seeds: int) -> None:
     found = twisted_runs(hops, rule, seeds)
     for run in found:
@@ -80,7 +85,7 @@ def test_surveys_of_a_string_with_trapped_torque_are_honest(hops: int, rule: str
     assert math.degrees(float(np.sqrt(np.mean(np.square(last))))) == pytest.approx(trapped, rel=0.4)
 
 
-@pytest.mark.parametrize(("hops", "seeds"), [(10, 6), (50, 2)])
+@pytest.mark.parametrize(("hops", "seeds"), [(10, 6), pytest.param(50, 2, marks=pytest.mark.statistical)])
 def test_a_rig_that_ignores_torsion_is_caught_overconfident(hops: int, seeds: int) -> None:
     """The negative control: the unwinding string is taken for a faulty gyroscope, and what is trapped is not stated."""
     found = twisted_runs(hops, "ignore", seeds)

@@ -12,6 +12,8 @@ from sim.studies.relay.run import run, table
 from sim.world.scenario import scenario_of
 from sim.world.world import World
 
+pytestmark = pytest.mark.slow
+
 SEEDS = 24
 
 

@@ -22,6 +22,8 @@ from sim.studies.trials import rms_deg
 from sim.world.imu_errors import SAMPLE_RATE_HZ, single_samples
 from sim.world.scenario import GyroSection, NodeSection
 
+pytestmark = pytest.mark.slow
+
 SEEDS = 6
 
 

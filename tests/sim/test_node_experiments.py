@@ -18,6 +18,8 @@ from sim.studies.tuning import run as tuning
 from sim.world.scenario import AidingSection, scenario_of
 from sim.world.world import World
 
+pytestmark = pytest.mark.slow
+
 SEEDS = 16
 SLACK = 1.5  # of the figure to reach, for few seeds
 

@@ -12,6 +12,8 @@ from sim.rig.direct_string import DirectString, StringRun, aiding_passes
 from sim.world.scenario import AidingSection, scenario_of
 from sim.world.world import World
 
+pytestmark = pytest.mark.slow
+
 FAINT = 1e-6  # readings without any noise would look like those of a stuck sensor
 IDEAL_GYRO = {
     "noise_dps_rthz": (FAINT, FAINT, FAINT),

@@ -108,6 +108,7 @@ def test_no_study_takes_the_name_of_a_command_of_the_group() -> None:
     assert not set(experiment.commands) & set(STUDIES)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("study", STUDIES.values(), ids=lambda study: study.name)
 def test_every_study_runs_with_few_seeds_and_keeps_what_its_line_says(study: Study, tmp_path: Path) -> None:
     done = ask(study.name, *shlex.split(study.short), "--out", tmp_path, "--json")

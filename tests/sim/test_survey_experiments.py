@@ -8,6 +8,8 @@ from sim.studies.coverage import run as coverage
 from sim.studies.region_of_uncertainty import run as regions
 from sim.studies.weighting import run as weighting
 
+pytestmark = pytest.mark.slow
+
 
 def test_weights_reduce_the_error_as_published() -> None:
     cases = {row["case"]: row for row in weighting.run(lambda: None)["cases"]}
