@@ -90,7 +90,7 @@ class BlockStore:
             replace(slot, data)
         except OSError:
             with contextlib.suppress(OSError):
-                if slot.read_bytes() == data:  # in its place, but not surely on the disk: it must not win later
+                if slot.read_bytes() == data:  # in place but perhaps not on the disk: it must not win later
                     slot.unlink()
             raise
         self._generation = generation

@@ -1,4 +1,4 @@
-"""The block in use and the one that is on its way: gathers segments, checks, waits for rest, keeps, tells."""
+"""The parameter block in use and its successor: gather segments, check, wait for rest, store, report."""
 
 from __future__ import annotations
 
@@ -65,7 +65,7 @@ class BlockUpdater:
         return self._gather(segment)
 
     def on_cycle(self, reading: ImuReading) -> BlockStatus | None:
-        """Try the block that waits on a cycle's raw reading; returns what to tell when that decided it."""
+        """Try the waiting block on a cycle's raw reading; returns the status to send once it is decided."""
         if self._trial is None:
             return None
         tube = self._tube
@@ -80,7 +80,7 @@ class BlockUpdater:
         return self._apply(block)
 
     def _restore(self) -> Assembly | None:
-        """Segments of before the restart, unless they are of a block that was applied just then."""
+        """Segments kept before the restart, unless their block was applied just then."""
         saved = self._store.upload()
         assembly = Assembly.restore(saved) if saved else None
         return assembly if assembly is not None and assembly.version > self._tube.parameters.version else None
@@ -93,7 +93,7 @@ class BlockUpdater:
         return ""
 
     def _outdated(self, segment: BlockSegment) -> str:
-        """Why a segment is older than what the node has or is getting; what was recorded of old tells nothing new."""
+        """Why a segment is outdated, empty if it is not; a replayed old upload is refused here."""
         if segment.version <= self._tube.parameters.version:
             return f"version: expected newer than {self._tube.parameters.version}, got {segment.version}"
         if self._assembly is not None and segment.version < self._assembly.version:
@@ -109,7 +109,7 @@ class BlockUpdater:
             try:
                 self._store.keep_upload(assembly.export())
             except OSError:
-                self.counters["upload_not_kept"] += 1  # it is only asked for again after a restart
+                self.counters["upload_not_kept"] += 1  # the ground station repeats it after a restart
             if assembly.complete and (refused := self._check(assembly)):
                 return refused
         phase = UploadPhase.WAITING if self._trial is not None else UploadPhase.PARTIAL

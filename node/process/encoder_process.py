@@ -24,7 +24,7 @@ class EncoderProcess(Process):
     folder : where its starts are counted
     source : the node's own counter; without one a cycle brings its sample
     torque : what the crew knows of the drive's torque; the default is a rigid string
-    timing : where the encoder's own clock keeps its measurements; a stepped process has none
+    timing : durations of its cycles with an own clock; None where it is stepped
 
     Raises
     ------
@@ -50,7 +50,7 @@ class EncoderProcess(Process):
         self.encoder = EncoderNode(counter.boots << 32, torque)
 
     def on_frame(self, side: Side, frame: bytes, now: float) -> None:
-        """A frame arrived at one end; the encoder obeys no commands of its own."""
+        """A frame arrived at one end; the encoder refuses commands."""
         for received in self.endpoint.receive(side, frame, now):
             if isinstance(received.message, Command):
                 refusal = Reply(ENCODER, received.message.sequence, False, "the encoder node takes no commands")
@@ -67,7 +67,7 @@ class EncoderProcess(Process):
         self._lap(Stage.READ)
         if sample is not None:
             self.endpoint.send_aiding(self.encoder.on_cycle(sample, now), now)
-        if self._timing is None:  # an own clock lets time pass between the cycles
+        if self._timing is None:  # an own clock advances time between the cycles
             self.endpoint.advance(now)
         self._lap(Stage.REPORT)
 
@@ -81,7 +81,7 @@ class EncoderProcess(Process):
 
 
 def sample_of(data: Any) -> EncoderSample | None:
-    """Sample of a cycle; None for what is none."""
+    """Sample of a cycle; None if the data are invalid."""
     try:
         _, count, edge_at, rising, *more = data
         if len(more) > 2:

@@ -1,4 +1,4 @@
-"""A tube as a process: firmware, telemetry station and saved state, driven by events."""
+"""A tube as a process: firmware, telemetry endpoint and saved state, driven by events."""
 
 from __future__ import annotations
 
@@ -61,7 +61,7 @@ class TubeProcess(Process):
     config : one record of dtype ``CONFIG``; the default is that of an MPU6500-class node
     key : of the rig; without one the node takes no parameter block
     imus : the node's own sensors, as many as the settings have; without any a cycle brings its reading
-    timing : where the node's own clock keeps its measurements; a stepped process has none
+    timing : durations of its cycles with an own clock; None where it is stepped
 
     Raises
     ------
@@ -89,7 +89,7 @@ class TubeProcess(Process):
         self._imus = [SafeImu(imu, self._send_event, k if len(imus) > 1 else 0) for k, imu in enumerate(imus, 1)]
         self.config = default_config() if config is None else config
         self._journal = Journal(folder)
-        # apart from the saved state: a neighbour must not take a life that lost it for an earlier one
+        # apart from the saved state: a node that lost its state must not look like an earlier boot
         self.boots = BootCounter(folder).boots
         saved, fault = self._load()
         self.state, blob = saved if saved else (new_state(self.config), None)
@@ -164,7 +164,7 @@ class TubeProcess(Process):
         if (status := self._blocks.on_cycle(self.tube.raw or reading)) is not None:
             self.endpoint.send_status(status)
         self._cycles += 1
-        if self._timing is None:  # an own clock lets time pass between the cycles
+        if self._timing is None:  # an own clock advances time between the cycles
             self.endpoint.advance(now)
         self._lap(Stage.REPORT)
         if any(urgent) or self._cycles % SAVE_EVERY == 0:
@@ -179,7 +179,7 @@ class TubeProcess(Process):
             self._send_event(Severity.WARNING, "overrun", {"missed": missed, "overruns": self.tube.reporter.overruns})
 
     def close(self) -> None:
-        """Keep the newest state and let the sensor go."""
+        """Save the newest state and release the sensors."""
         self._save()
         for source in self._sources:
             source.close()
@@ -220,12 +220,12 @@ class TubeProcess(Process):
                 self.endpoint.submit(said, now)
                 return True
         except EncodeError:
-            # numbers beyond any range are the filter's trouble, which it reports itself; the cycle goes on
+            # the filter reports numbers out of range itself; the cycle goes on
             self.endpoint.counters["unsayable"] += 1
         return False
 
     def _announce(self, rig_now: float, now: float) -> None:
-        """Tell once, as soon as rig time is known, that the node started and what it found on its disk."""
+        """Report the start once rig time is known, and what was found on the disk."""
         if self._announced:
             return
         self._announced = True
@@ -285,14 +285,14 @@ class TubeProcess(Process):
 
 
 def split_blob(blob: bytes | None) -> tuple[Array, bytes | None]:
-    """Mounts and telemetry of what is saved beside the state; those of a first start for None."""
+    """Mounts and telemetry saved beside the state; those of a first start for None."""
     if blob is None:
         return new_mount(), None
     return np.frombuffer(blob[: MOUNT.itemsize], MOUNT).copy(), blob[MOUNT.itemsize :]
 
 
 def reading_of(data: Any, now: float) -> ImuReading:
-    """Reading of a cycle that ended at ``now`` (s, own clock); what is none is a reading of no numbers.
+    """Reading of a cycle that ended at ``now`` (s, own clock); invalid data give a reading of NaN.
 
     ``data`` is the start and the numbers of the IMU, or the start and a list of numbers for each IMU of a cluster.
     """

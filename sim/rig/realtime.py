@@ -63,12 +63,13 @@ class Surface(Process):
         self.cpu_before: dict[str, float] = {}
         self._world, self._seconds, self._table = world, seconds, table
         self._loop: OwnClockLoop | None = None
-        self._until = time.monotonic() + COME_LIMIT
+        self._until = math.inf
 
     async def live(self, medium: Medium, rig: str) -> None:
         """Listen until the time is over."""
         ports = neighbour_ports(medium, rig, BASE, {Side.LOWER: ENCODER})
         self._loop = OwnClockLoop(self, ports, OwnClock(), CycleTiming(), PERIOD)
+        self._until = time.monotonic() + COME_LIMIT
         stop_on_signals(self.interrupt)
         if not self.interrupted:
             await self._loop.run()

@@ -1,6 +1,6 @@
 """zenoh as our bus: explicit endpoints, no scouting, bytes in and out. The only module that imports zenoh.
 
-Callbacks arrive on zenoh's own threads; whoever registers one must only put into a queue or take a lock.
+Callbacks arrive on zenoh's own threads; a callback must only put into a queue or take a lock.
 """
 
 from __future__ import annotations
@@ -33,7 +33,7 @@ class Reply:
 
 
 class Publisher:
-    """A key to put on: reliable, in order, sent at once."""
+    """Publisher of one key: reliable, in order, sent at once."""
 
     def __init__(self, publisher: zenoh.Publisher) -> None:
         self._publisher = publisher
@@ -58,23 +58,23 @@ class Publisher:
         return bool(status.matching)
 
     def close(self) -> None:
-        """Put nothing more."""
+        """Stop publishing."""
         undeclare(self._publisher)
 
 
 class Subscription:
-    """What a subscriber was declared as."""
+    """A subscription that can be closed."""
 
     def __init__(self, subscriber: Any) -> None:
         self._subscriber = subscriber
 
     def close(self) -> None:
-        """Hear nothing more."""
+        """Stop the subscription."""
         undeclare(self._subscriber)
 
 
 class Query:
-    """A question that came in: selector, parameters, and the ways to answer it."""
+    """An incoming query: selector, parameters and its replies."""
 
     def __init__(self, query: zenoh.Query) -> None:
         self._query = query
@@ -82,7 +82,7 @@ class Query:
         self.parameters: dict[str, str] = dict(_parameters(str(query.parameters)))
 
     def intersects(self, key: str) -> bool:
-        """Whether the question asks for ``key``."""
+        """Whether the query covers ``key``."""
         return bool(self._query.key_expr.intersects(key))
 
     def reply(self, key: str, payload: bytes, encoding: str = JSON) -> None:
@@ -94,7 +94,7 @@ class Query:
         self._query.drop()  # type: ignore[no-untyped-call]
 
     def reply_error(self, text: str) -> None:
-        """Say what was wrong with the question."""
+        """Answer with an error."""
         self._query.reply_err(text.encode(), encoding="text/plain")
 
 
@@ -108,8 +108,7 @@ class ZenohBus:
     def publisher(self, key: str, encoding: str = MSGPACK, *, droppable: bool = False) -> Publisher:
         """Publisher of ``key``, its encoding declared.
 
-        When a line is full it waits, unless what it says is ``droppable``: then a slow listener misses some of it
-        and nobody waits for him.
+        When a line is full a put waits, unless it is ``droppable``: then a slow listener misses some samples.
         """
         control = zenoh.CongestionControl.DROP if droppable else zenoh.CongestionControl.BLOCK
         declared = self._session.declare_publisher(key, encoding=encoding, congestion_control=control, express=True)
@@ -123,7 +122,7 @@ class ZenohBus:
         )
 
     def subscribe_at_once(self, pattern: str, callback: Callable[[str, bytes], object]) -> Subscription:
-        """The same on the thread that receives, not on one more: ``callback`` must only put into a queue."""
+        """Call ``callback`` on the receiving thread itself, so it must only put into a queue."""
         direct: Any = zenoh.handlers.Callback(lambda s: callback(str(s.key_expr), s.payload.to_bytes()), indirect=False)
         return Subscription(self._session.declare_subscriber(pattern, direct))
 
@@ -155,7 +154,7 @@ class ZenohBus:
         return [_reply(reply) for reply in replies]
 
     def liveliness_token(self, key: str) -> None:
-        """Be alive under ``key`` until the session or the process ends."""
+        """Declare a liveliness token on ``key`` until the session or the process ends."""
         self._declared.append(self._session.liveliness().declare_token(key))
 
     def liveliness_subscribe(self, pattern: str, callback: Callable[[str, bool], None]) -> None:
@@ -173,9 +172,9 @@ class ZenohBus:
 
 
 def use_few_threads() -> None:
-    """Have this process's sessions share one pool of threads: for a board, or many processes on a machine.
+    """Let the sessions of this process share one thread pool: for boards, and many processes on one machine.
 
-    It works before the first session is opened; what stands in the environment already wins.
+    Call it before the first session is opened; an existing environment setting wins.
     """
     os.environ.setdefault("ZENOH_RUNTIME", ONE_POOL)
 
@@ -243,7 +242,7 @@ def _held(session: zenoh.Session) -> Iterator[ZenohBus]:
 
 
 def _config(mode: str, settings: dict[str, Any]) -> zenoh.Config:
-    """Session settings; nothing is ever looked for on the network."""
+    """Session settings, without any scouting on the network."""
     config = zenoh.Config()
     quiet = {"mode": mode, "scouting/multicast/enabled": False, "scouting/gossip/enabled": False}
     for key, value in (quiet | settings).items():

@@ -45,7 +45,7 @@ class Place:
 
 @dataclass(frozen=True, slots=True)
 class OwnTime:
-    """How a process with a clock of its own lives: who is at its ends, and how far its clock is off."""
+    """Settings of a process with a clock of its own: its neighbours and its clock's offset."""
 
     neighbours: Mapping[Side, int]  # address of the process at each end that is joined
     offset: float = 0.0  # s, of its clock against the machine's
@@ -103,7 +103,7 @@ def run_stepped(name: str, place: Place, address: int, build: Callable[[], Proce
 
 @contextlib.contextmanager
 def joined(place: Place) -> Iterator[ZenohBus]:
-    """Session of a process at its rig; what can be wrong with its folder is said before a router is waited for.
+    """Session of a process at its rig; a folder that cannot be made is reported before waiting for a router.
 
     Raises
     ------
@@ -118,7 +118,7 @@ def joined(place: Place) -> Iterator[ZenohBus]:
 
 
 def make_folder(place: Place) -> None:
-    """Have the folder of a process.
+    """Create the folder of a process.
 
     Raises
     ------
@@ -132,7 +132,7 @@ def make_folder(place: Place) -> None:
 
 
 def write_timing(folder: Path, report: dict[str, Any]) -> None:
-    """Write down how the time went; a full disk ends no node that was only asked."""
+    """Write ``timing.json``; a full disk does not end the process."""
     fresh = folder / f"{TIMING_FILE}.new"
     with contextlib.suppress(OSError):
         fresh.write_text(json.dumps(report) + "\n")
@@ -140,7 +140,7 @@ def write_timing(folder: Path, report: dict[str, Any]) -> None:
 
 
 def complain(name: str, line: str) -> None:
-    """Say on stderr what somebody should look after; the process goes on."""
+    """Write a warning to stderr; the process goes on."""
     sys.stderr.write(f"borechain {name}: {line}\n")
     sys.stderr.flush()
 

@@ -1,4 +1,4 @@
-"""The main loop of a process that owns its clock: a board in its tube, where no stepper hands out the time.
+"""The loop of a process with a clock of its own: a board in its tube, without a stepper.
 
 Cycles are due at ``begin + k period`` of the monotonic clock, so that no delay of one moves the next. A cycle that has
 not ended when the next is due is an overrun: the deadlines that have passed are left out and the next reading covers
@@ -28,12 +28,12 @@ Act = Callable[[Process, float], None]
 
 @dataclass(frozen=True, slots=True)
 class OwnClock:
-    """The machine's monotonic clock, moved by ``offset`` (s): two boards agree on no time."""
+    """The machine's monotonic clock plus ``offset`` (s); clocks of two boards are unrelated."""
 
     offset: float = 0.0
 
     def now(self) -> float:
-        """Own time, s; never near zero but after a start of the machine."""
+        """Own time, s."""
         return time.monotonic() + self.offset
 
 
@@ -56,7 +56,7 @@ class Schedule:
         return self.due - 0.5 * self._period
 
     def finish(self, now: float) -> int:
-        """Go on to the first deadline after ``now``; returns how many have passed that are left out."""
+        """Move on to the first deadline after ``now``; returns how many deadlines were skipped."""
         following = max(self._number + 1, math.floor((now - self._begin) / self._period) + 1)
         missed = following - self._number - 1
         self._number = following

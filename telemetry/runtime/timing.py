@@ -1,4 +1,4 @@
-"""How long the parts of a cycle take, and how late it starts: statistics in constant memory.
+"""Durations of the parts of a cycle and its start delay: statistics in constant memory.
 
 A duration falls into one of 256 bins, 32 to a decade from 1 us to 100 s, so a quantile is at most one bin, 7.5 %,
 above the true one and never below it; count, mean and largest are exact.
@@ -22,12 +22,12 @@ class Stage(enum.Enum):
 
     SYNCHRONISE = "synchronise"  # 1: neighbours, hello, time request
     START = "start"  # 2: how late the cycle starts behind its deadline
-    AIDING = "aiding"  # 3 to 5: from the aiding's time of validity to its coming here; nobody asks, the encoder tells
-    FRAME = "frame"  # 5: one frame from a neighbour, taken and passed on
+    AIDING = "aiding"  # 3 to 5: from the aiding's time of validity to its arrival
+    FRAME = "frame"  # 5: one frame from a neighbour, handled
     READ = "read"  # 6: the sensor
     FILTER = "filter"  # 6: calibrate, integrate, filter
-    REPORT = "report"  # 6: what is said is encoded and queued
-    SAVE = "save"  # 6: the state onto the disk, where it was due
+    REPORT = "report"  # 6: messages encoded and queued
+    SAVE = "save"  # 6: state written to disk, when due
     SEND = "send"  # 6: frames handed to the bus
     CYCLE = "cycle"  # 6: all of it
 

@@ -203,7 +203,7 @@ def test_the_bench_measures_every_process(tmp_path: Path) -> None:
     [
         (node, ("--tube", "1", "--clock", "own"), "--clock own: expected --imu with it"),
         (encoder, ("--clock", "own"), "--clock own: expected --counter with it"),
-        (node, ("--tube", "1", "--clock", "own", "--imu", "timed:none.npy"), "got none.npy, which is no file"),
+        (node, ("--tube", "1", "--clock", "own", "--imu", "timed:none.npy"), "got none.npy, which is not a file"),
         (node, ("--tube", "1", "--clock", "sundial"), "'sundial' is not one of 'stepper', 'own'"),
         (node, ("--tube", "1", "--above", "2"), "expected --clock own with them"),
         (node, ("--tube", "1", "--clock", "own", "--above", "sky"), "expected encoder, base or a tube 1..250, got sky"),

@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from telemetry.application.endpoint import Endpoint, Received
+from telemetry.application.endpoint import PRIORITIES, Endpoint, Received
 from telemetry.media.memory import MemoryPort, joint
 from telemetry.messages import (
     BASE,
@@ -23,6 +23,7 @@ from telemetry.messages import (
     Side,
     SurveyMeasurement,
 )
+from telemetry.presentation.msgpack_codec import Kind
 
 TICK = 1.0 / 1.9
 AIDING = Aiding(1.0, 1e-6, 0.0, 0.0, 0.1, 100.0, 1, 0)
@@ -258,3 +259,7 @@ def test_any_bytes_on_any_port_are_counted_and_dropped(frame: bytes, side: Side)
     station = Chain.build(1, 1)
     assert station.receive(side, frame, 1.0) == []
     assert sum(station.link_counters().values()) == 1
+
+
+def test_every_kind_of_message_has_a_priority() -> None:
+    assert set(PRIORITIES) == set(Kind)

@@ -5,6 +5,7 @@ from __future__ import annotations
 import asyncio
 import socket
 import threading
+import time
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from itertools import pairwise
@@ -41,6 +42,13 @@ class Plain(Process):
 
     def on_depth(self, rig_time: float, md: float) -> None:
         self.depths.append((rig_time, md))
+
+
+class HastyClock(OwnClock):
+    """Shows a minute every 0.3 s."""
+
+    def now(self) -> float:
+        return 200.0 * time.monotonic()
 
 
 @dataclass(frozen=True)
@@ -224,6 +232,18 @@ class TestOwnClock:
         await asyncio.to_thread(loop.call, lambda p, now: loop.stop())
         await asyncio.wait_for(running, PATIENCE)
         assert process.depths == [(1.0, 2.0)]
+
+    async def test_a_neighbour_that_never_comes_is_a_line_and_no_hang(self, router: Router) -> None:
+        reported: Inbox[str] = Inbox()
+        ports = neighbour_ports(ZenohMedium(router.bus), RIG, ENCODER, {Side.LOWER: 1})
+        loop = OwnClockLoop(Plain(), ports, HastyClock(), CycleTiming(), 0.5, reported.put)
+        running = asyncio.create_task(loop.run())
+        line = await asyncio.wait_for(reported.get(), PATIENCE)
+        loop.stop()
+        await asyncio.wait_for(running, PATIENCE)
+        assert line is not None
+        assert line.startswith("lower end: nobody heard for 60 s, the port is down")
+        assert not loop.losses()["ports"]["lower"]["is_up"]
 
     def test_a_silent_end_is_named_once_until_somebody_is_heard(self) -> None:
         watch = AbsenceWatch(Side, begin=100.0)

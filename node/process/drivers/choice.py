@@ -18,12 +18,12 @@ ADDRESSES = (0x68, 0x69)
 
 
 def imu_source(text: str) -> ImuSource:
-    """Source of a text.
+    """Source named by an option.
 
     Raises
     ------
     ConfigurationError
-        When it names none, or a recording that is not there.
+        When the name is unknown or its recording does not exist.
     """
     kind, _, rest = text.partition(":")
     if kind == "replay" and rest:
@@ -42,12 +42,12 @@ def imu_source(text: str) -> ImuSource:
 
 
 def encoder_source(text: str) -> EncoderSource:
-    """Source of a text.
+    """Source named by an option.
 
     Raises
     ------
     ConfigurationError
-        When it names none, or a recording that is not there.
+        When the name is unknown or its recording does not exist.
     """
     kind, _, rest = text.partition(":")
     if kind == "replay" and rest:
@@ -68,5 +68,5 @@ def recording(option: str, name: str) -> Path:
         When there is none of that name.
     """
     if not Path(name).is_file():
-        raise ConfigurationError(f"{option}: expected a recording, got {name}, which is no file")
+        raise ConfigurationError(f"{option}: expected a recording, got {name}, which is not a file")
     return Path(name)

@@ -53,7 +53,7 @@ class Bus(Protocol):
         """Up to 32 registers, or bytes of the FIFO."""
 
     def close(self) -> None:
-        """Let the bus go."""
+        """Release the bus."""
 
 
 def open_bus(number: int) -> Bus:
@@ -158,7 +158,7 @@ class Mpu6500:
         return sample
 
     def close(self) -> None:
-        """Let the bus go."""
+        """Release the bus."""
         if self._bus is not None:
             self._bus.close()
             self._bus = None

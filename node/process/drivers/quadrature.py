@@ -34,7 +34,7 @@ class QuadratureFile:
         self._rising = True
 
     def start(self) -> None:
-        """See that the counter can be read; a count that jumped while it could not is taken over as it is."""
+        """Check that the counter can be read; a jump while it could not be read is accepted."""
         self._raw = self._read_file()
 
     def read(self, now: float) -> EncoderSample:
@@ -53,7 +53,7 @@ class QuadratureFile:
         return EncoderSample(self._count, self._edge_at, self._rising, timed=False)
 
     def close(self) -> None:
-        """Nothing is held."""
+        """Nothing to release."""
 
     def _direction(self, moved: int) -> bool:
         try:

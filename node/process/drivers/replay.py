@@ -1,4 +1,4 @@
-"""Recordings as sources. One row a cycle; a recording that has ended, or a row that is none, is a fault of the sensor.
+"""Recordings as sources, one row a cycle. The end of a recording and a row without numbers are sensor faults.
 
 IMU: ``time, wx, wy, wz, fx, fy, fz`` and, if it was recorded, ``temperature``; s, rad/s, m/s^2, C.
 Encoder: ``time, count, edge_at, rising`` and, if they were taken, the times of the edges before the last in its
@@ -35,7 +35,7 @@ class ReplayImu:
         self._next = 0
 
     def start(self) -> None:
-        """Read the file on the first start; later ones go on behind the row that failed."""
+        """Read the file on the first start; later starts continue after the row that failed."""
         if self._rows is None:
             self._rows = load_rows(self._path, IMU_COLUMNS)
 
@@ -49,7 +49,7 @@ class ReplayImu:
         )
 
     def close(self) -> None:
-        """Nothing is held."""
+        """Nothing to release."""
 
     def _take(self) -> Rows:
         if self._rows is None:
@@ -73,7 +73,7 @@ class ReplayEncoder:
         self._shift: float | None = None
 
     def start(self) -> None:
-        """Read the file on the first start; later ones go on behind the row that failed."""
+        """Read the file on the first start; later starts continue after the row that failed."""
         if self._rows is None:
             self._rows = load_rows(self._path, ENCODER_COLUMNS)
 
@@ -91,7 +91,7 @@ class ReplayEncoder:
         return EncoderSample(int(count), edge_at + self._shift, rising > 0.5, earlier=moved)
 
     def close(self) -> None:
-        """Nothing is held."""
+        """Nothing to release."""
 
 
 def load_rows(path: Path, columns: tuple[int, ...]) -> Rows:

@@ -1,4 +1,4 @@
-"""What a source of readings is, and how a fault of one becomes a named event instead of an end of the cycle."""
+"""Sources of readings, and how a fault of one becomes an event instead of ending the cycle."""
 
 from __future__ import annotations
 
@@ -32,30 +32,30 @@ class ImuSource(Protocol):
     """An IMU. ``start`` raises ``SensorError`` when it is absent; so does ``read``, at any later time."""
 
     def start(self) -> None:
-        """Find and configure the sensor; again after a fault."""
+        """Find and configure the sensor; called again after a fault."""
 
     def read(self, begin: float, end: float) -> ImuSample:
         """Mean over the cycle from ``begin`` to ``end`` (s, own clock)."""
 
     def close(self) -> None:
-        """Let the bus or the file go."""
+        """Release the bus or the file."""
 
 
 class EncoderSource(Protocol):
     """A counter of the drive head; the same contract."""
 
     def start(self) -> None:
-        """Find the counter; again after a fault."""
+        """Find the counter; called again after a fault."""
 
     def read(self, now: float) -> EncoderSample:
         """The counter at ``now`` (s, own clock)."""
 
     def close(self) -> None:
-        """Let the file go."""
+        """Release the file."""
 
 
 class Alarm:
-    """Keeps a source going: its fault and its return are told once, and it is started again after every failure."""
+    """Keeps a source going: reports its fault and its return once each, and restarts it after every failure."""
 
     def __init__(self, source: ImuSource | EncoderSource, say: Say, name: str, imu: int = 0) -> None:
         self._source, self._say, self._name = source, say, name
@@ -65,7 +65,7 @@ class Alarm:
     def call(self, read: Callable[[], Sample]) -> Sample | None:
         """What ``read`` gives; None for this cycle when it fails."""
         try:
-            if self._down:  # this cycle is lost: what the sensor has gathered so far is not that of a whole one
+            if self._down:  # this cycle is lost: the sensor has not gathered data over all of it
                 self._source.start()
                 self._down = False
                 return None
@@ -82,7 +82,7 @@ class Alarm:
 
 
 class SafeImu:
-    """An IMU in use: with a fault its readings are no numbers. ``imu`` is its number in a cluster, 0 if it is alone."""
+    """An IMU in use; during a fault its readings are NaN. ``imu`` is its number in a cluster, 0 if it is alone."""
 
     def __init__(self, source: ImuSource, say: Say, imu: int = 0) -> None:
         self._source = source
@@ -94,7 +94,7 @@ class SafeImu:
 
 
 class SafeEncoder:
-    """A counter in use: with a fault there is no sample, and so no aiding, which every node below sees grow old."""
+    """A counter in use; during a fault there is no sample and so no aiding, and every node below sees it grow old."""
 
     def __init__(self, source: EncoderSource, say: Say) -> None:
         self._source = source

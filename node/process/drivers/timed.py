@@ -1,4 +1,4 @@
-"""Recordings played by the clock: whatever moment is asked for, they tell what was recorded at that time.
+"""Recordings played by the clock: a read returns what was recorded at that time.
 
 The columns are those of ``drivers.replay``; the times are those of the node's own clock, in ascending order. A row of
 an IMU is the mean since the row before, so the mean over any cycle follows from the running integral, and neither the
@@ -42,7 +42,7 @@ class TimedImu:
         return ImuSample((wx, wy, wz), (fx, fy, fz), rest[0] if rest else USUAL)
 
     def close(self) -> None:
-        """Nothing is held."""
+        """Nothing to release."""
 
     def _at(self, t: float) -> Rows:
         if self._times is None or self._integral is None:
@@ -56,7 +56,7 @@ class TimedImu:
 
 
 class TimedEncoder:
-    """A counter's recording by the clock: the newest row that is not of the future."""
+    """A counter's recording by the clock: the newest row that is not in the future."""
 
     def __init__(self, path: Path) -> None:
         self._path = path
@@ -78,7 +78,7 @@ class TimedEncoder:
         return EncoderSample(int(count), edge_at, rising > 0.5, earlier=tuple(earlier))
 
     def close(self) -> None:
-        """Nothing is held."""
+        """Nothing to release."""
 
 
 def load_times(path: Path, columns: tuple[int, ...]) -> Rows:
@@ -87,7 +87,7 @@ def load_times(path: Path, columns: tuple[int, ...]) -> Rows:
     Raises
     ------
     SensorError
-        When the file is no recording of this width, holds no number or steps back in time; the message names the row.
+        When the width is wrong, a value is not finite or time steps back; the message names the row.
     """
     rows = load_rows(path, columns)
     if not np.all(np.isfinite(rows)):
@@ -100,5 +100,5 @@ def load_times(path: Path, columns: tuple[int, ...]) -> Rows:
 
 
 def outside(path: Path, times: Rows, t: float) -> str:
-    """What a moment is that the recording does not hold."""
+    """Error text for a time outside the recording."""
     return f"{path}: recorded from {times[0]:.1f} s to {times[-1]:.1f} s, asked for {t:.1f} s"
