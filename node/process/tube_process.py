@@ -39,7 +39,7 @@ from telemetry.messages import (
     StaticRecord,
     SurveyMeasurement,
 )
-from telemetry.presentation.fields import MAX_TEXT
+from telemetry.quantities import MAX_TEXT
 from telemetry.runtime.process import Process
 from telemetry.runtime.timing import CycleTiming, Stage
 

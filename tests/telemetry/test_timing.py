@@ -8,7 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from node.kernels.layout import PERIOD
-from telemetry.presentation.fields import MAX_TEXT
+from telemetry.quantities import MAX_TEXT
 from telemetry.runtime.own_clock import Schedule
 from telemetry.runtime.timing import BIN_RATIO, CycleTiming, Durations, Stage
 
