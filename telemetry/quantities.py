@@ -65,7 +65,7 @@ class Quantity:
         """The resolution as it is told to people."""
         if self.step_db:
             return f"{self.step_db:g} dB"
-        return f"{self.step:g}" if self.step else ""
+        return f"{self.step:.1g}" if self.step else ""
 
 
 POWERS_OF_TWO = {2**power: f"2^{power}" for power in range(20, 64)}

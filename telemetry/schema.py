@@ -137,7 +137,6 @@ FLAGS = _integer("flags", "f", 0, 0xFFFF, "trust in the own yaw, bits of the tab
 MODE = _integer("mode", "m", 0, 7, "execution state", enumeration=Mode)
 DIGEST = _binary("digest", "d", 32, 32, "SHA-256 of the whole block")
 ARGUMENTS = Field("arguments", ValueKind.SCALARS, "by name", key="a")
-CLOCK_VAR = "variance of the rig time told"
 ONE_HOP, UP, DOWN, ONCE = "one hop", "up", "down", "sent once"
 EACH_HOP = "acknowledged on each hop"
 RECEIPTED = "the ground station's receipt"
@@ -197,7 +196,7 @@ SCHEMA: tuple[MessageSpec, ...] = (
             _time("replied_at", "p", "clock of the replier when it replied"),
             _time("rig_at", "g", "rig time at replied_at"),
             _number("rig_rate", "k", "1", 0.5, 2.0, "rig seconds per second of the replier's clock", step=1e-9),
-            _variance("clock_var", "v", "s^2", 1e9, CLOCK_VAR),
+            _variance("clock_var", "v", "s^2", 1e9, "of rig_at"),
         ),
     ),
     MessageSpec(

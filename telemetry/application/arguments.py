@@ -75,7 +75,7 @@ def parse_tube(spec: CommandSpec, parameters: Mapping[str, str]) -> int:
         When it is missing or not a tube's number.
     """
     text = parameters.get("tube", "")
-    if not text.isdecimal() or not 1 <= int(text) <= MAX_TUBE:
+    if not text.isdecimal() or len(text) > len(str(MAX_TUBE)) or not 1 <= int(text) <= MAX_TUBE:
         raise CommandError(f"expected cmd/{spec.name}?tube=N with N of 1..{MAX_TUBE}, got {text[:SHORT]!r}")
     return int(text)
 

@@ -128,7 +128,7 @@ COMMANDS: tuple[CommandSpec, ...] = (
     CommandSpec(
         "timing",
         ObeyedBy.TUBE,
-        "says how late its cycles start and how long their stages take, if it has a clock of its own",
+        f"says how late its cycles start and how long their stages take, with a clock of its own: {', '.join(STAGES)}",
         reply=(
             _result("cycles", INTEGER, "since the start", "1"),
             _result("overruns", INTEGER, "cycles that ended too late", "1"),
