@@ -1,4 +1,4 @@
-"""What a named value may be: kind, unit, range and meaning, said once for messages, commands and keys."""
+"""What a named value may be: kind, unit, range and meaning, described once for messages, commands and keys."""
 
 from __future__ import annotations
 
@@ -36,7 +36,7 @@ class Quantity:
 
     ``low`` and ``high`` bound a number, the members of a list, the length of bytes, or the magnitude of a vector
     (``high``). ``step`` is the smallest difference worth telling, in the unit; a medium with few bits rounds to it.
-    Where ``step`` is a ratio in dB (variances) ``step_db`` says so.
+    Of variances it is a ratio, ``step_db``.
     """
 
     name: str
@@ -51,7 +51,7 @@ class Quantity:
 
     @property
     def range_text(self) -> str:
-        """The range as it is told to people; empty when there is none."""
+        """The range as people read it; empty when there is no limit."""
         if self.choices:
             return ", ".join(self.choices)
         if self.kind is ValueKind.VECTOR:
@@ -62,7 +62,7 @@ class Quantity:
 
     @property
     def step_text(self) -> str:
-        """The resolution as it is told to people."""
+        """The resolution as people read it."""
         if self.step_db:
             return f"{self.step_db:g} dB"
         return f"{self.step:.1g}" if self.step else ""

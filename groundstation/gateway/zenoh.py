@@ -69,7 +69,7 @@ class ZenohGateway:
         self._inbox.close()
 
     def _arrive(self, handle: Handler, query: Query) -> None:
-        """Take a query on a thread of the bus."""
+        """Queue a query, on a thread of the bus."""
         if not self._inbox.put((handle, query)):
             refuse(query, BUSY)
 

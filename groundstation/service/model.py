@@ -71,7 +71,7 @@ class SurveyStation:
         return max((drop for drop in self.drops if drop < place), default=0)
 
     def add_stop(self, cluster: ResolvedStop) -> None:
-        """Take one more cluster in the order of time; what was judged of later ones is forgotten."""
+        """Add a cluster in the order of time; what was judged of later ones is forgotten."""
         self.clusters.append(cluster)
         self.clusters.sort(key=lambda known: (known.at, known.measurement.tube))
         self.forget(self.clusters.index(cluster))
@@ -133,7 +133,7 @@ class RigModel:
         self.orders = OrderBook()
 
     def on_state(self, state: NodeState) -> None:
-        """Take a node's account of itself, unless a newer one is known."""
+        """Handle a node's state, unless a newer one is known."""
         self.recalibration.on_state(state)
         known = self.nodes.get(state.tube)
         if known is None or state.at >= known.at:

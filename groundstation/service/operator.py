@@ -151,7 +151,7 @@ class Operator:
         self.changed(["recalibration"])
 
     def reply_of(self, order: Order) -> View:
-        """What who ordered is told: the order, or how far the calibration in the field has come."""
+        """Answer to whoever ordered: the order, or how far the calibration in the field has come."""
         return self.ask(f"orders/{order.number}" if order.tube is not None else "recalibration")
 
     def take_pending(self) -> list[Outgoing]:
@@ -188,7 +188,7 @@ class Operator:
             self._orders.fail(overtaken, f"order {upload.number} uploads another block")
 
     def on_block_status(self, status: BlockStatus) -> None:
-        """Take a tube's account of an upload."""
+        """Handle a tube's status of an upload."""
         ended = self._uploads is not None and self._uploads.on_status(status)
         self._orders.on_block_status(status, ended=ended)
         if ended:

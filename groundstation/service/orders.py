@@ -33,8 +33,8 @@ class OrderState(enum.StrEnum):
 class Order:
     """One order.
 
-    ``tube`` is None for an order to the ground station. ``answered`` says that who ordered it can be told something:
-    the tube obeyed or refused, or the order ended.
+    ``tube`` is None for an order to the ground station. ``answered`` means that whoever ordered can have an
+    answer: the tube obeyed or refused, or the order ended.
     """
 
     number: int
@@ -68,7 +68,7 @@ class Order:
             self._waiting.append(act)
 
     def advance(self, state: OrderState, detail: str = "", *, answered: bool = True) -> None:
-        """Take a new state."""
+        """Change the state."""
         self.state, self.detail = state, detail
         if answered and not self.answered:
             self.answered = True
@@ -117,7 +117,7 @@ class OrderBook:
             self._advance(order, OrderState.DONE, detail)
 
     def on_reply(self, reply: Reply) -> None:
-        """Take a tube's answer to a command."""
+        """Handle a tube's answer to a command."""
         order = self._orders.get(reply.sequence)
         if order is None or order.tube != reply.tube or order.state is not OrderState.SENT:
             return
@@ -129,7 +129,7 @@ class OrderBook:
             self._advance(order, state, reply.detail)
 
     def on_block_status(self, status: BlockStatus, *, ended: bool) -> None:
-        """Take a tube's account of an upload; ``ended`` says that it is the last word."""
+        """Handle a tube's status of an upload; ``ended`` marks the last word."""
         order = self._orders.get(status.sequence)
         if order is None or order.ended or order.tube != status.tube:
             return
@@ -149,13 +149,13 @@ class OrderBook:
                 self._advance(order, OrderState.ACKNOWLEDGED, detail, answered=False)
 
     def on_static_record(self, record: StaticRecord) -> None:
-        """Take the result of an order for a record."""
+        """Handle the result of an order for a record."""
         order = self._orders.get(record.command)
         if order is not None and order.tube == record.tube:
             self.finish(record.command, "the tube moved" if record.moved else "")
 
     def on_event(self, event: Event) -> None:
-        """Take the news that a record of a tube, which takes one at a time, holds nothing."""
+        """Handle the event that the record of a tube, which takes one at a time, is empty."""
         if event.code == RECORD_EMPTY:
             for order in list(self):
                 if order.tube == event.tube and order.spec.goes_on and order.state is OrderState.ACKNOWLEDGED:

@@ -42,7 +42,7 @@ class Uploads:
         return min((upload.next_due for upload in self._running.values()), default=math.inf)
 
     def on_status(self, status: BlockStatus) -> bool:
-        """Take a node's account of an upload; True when it is the last word on one that is under way."""
+        """Handle a node's status of an upload; True when it is the last word on one that is under way."""
         upload = self._running.get(status.tube)
         if upload is None or not upload.on_status(status):
             return False

@@ -32,7 +32,7 @@ class CommandHandlers:
     Parameters
     ----------
     tube : firmware of the node
-    timing : where the node's own clock keeps its measurements; a stepped process has none
+    timing : where the node's own clock keeps its measurements; None in a stepped process
     """
 
     def __init__(self, tube: Tube, timing: CycleTiming | None) -> None:

@@ -42,8 +42,8 @@ class Argument:
 class CommandSpec:
     """One command.
 
-    ``action`` parts the steps of a command that has several. ``goes_on`` says that work begins when the tube answers;
-    its result, a static record, carries the number of the order.
+    ``action`` distinguishes the steps of a command that has several. ``goes_on``: the work begins when the tube
+    answers, and its result, a static record, carries the number of the order.
     """
 
     name: str
@@ -197,7 +197,7 @@ def find_command(name: str, action: str = "") -> CommandSpec:
     Raises
     ------
     CommandError
-        When there is none; it lists those that there are.
+        When there is no such command; the message lists the known ones.
     """
     lines = [spec for spec in COMMANDS if spec.name == name]
     if not lines:

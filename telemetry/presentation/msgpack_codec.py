@@ -41,7 +41,7 @@ DOWNWARD = (Kind.RECEIPT, Kind.COMMAND, Kind.BLOCK_SEGMENT)
 
 
 def encode(message: Message) -> bytes:
-    """Payload of a message, in the earliest schema version that can say it.
+    """Payload of a message, in the earliest schema version that can express it.
 
     Raises
     ------
@@ -50,8 +50,8 @@ def encode(message: Message) -> bytes:
     """
     kind, fields = FIELDS[type(message)]
     body: dict[str, Any] = {}
-    said = (field.since for field in fields if field.since > 1 and getattr(message, field.name) != field.before)
-    version = max(said, default=1)
+    needed = (field.since for field in fields if field.since > 1 and getattr(message, field.name) != field.before)
+    version = max(needed, default=1)
     try:
         for field in fields:
             if field.since <= version:

@@ -1,8 +1,8 @@
-"""Calibration in the field as a state machine: tell attitudes, gather records, solve, show, confirm, upload, verify.
+"""Calibration in the field as a state machine: enter attitudes, gather records, solve, show, confirm, upload, verify.
 
-No clock, no bus, no disk: the process asks what is ``due``, hands in what tubes say and keeps ``progress`` in the
-database, so that a break or a restart costs a repetition at most. A record belongs to an attitude by the sequence of
-the command that asked for it, and counts when the tubes rested there until it ended.
+No clock, no bus, no disk: the process asks for the requests that are due, hands in what tubes answer and keeps
+``progress`` in the database, so that a break or a restart costs a repetition at most. A record belongs to an attitude
+by the number of the order that asked for it, and counts when the tubes rested there until it ended.
 """
 
 from __future__ import annotations
@@ -83,14 +83,14 @@ class FieldProcedure:
         if p.stage in (*BEFORE_UPLOAD, Stage.UPLOADING) and p.attitudes:
             raise SelectorError(f"a calibration of tubes {_list(p.tubes)} is {p.stage}; expected action=cancel before")
         if not tubes:
-            raise SelectorError("tubes: expected those of the string, none is known")
+            raise SelectorError("tubes: expected those of the string, no tube is known")
         self.progress = Progress(Stage.COLLECTING, [], {tube: TubeProgress(tube) for tube in sorted(set(tubes))})
         self._records.clear()
         self._again.clear()
         self._questions.clear()
 
     def attitude(self, pitch: float, roll: float, seconds: float, rig_now: float) -> None:
-        """Take it that the tubes rest at ``pitch`` and ``roll`` (rad); what was solved before is dropped.
+        """The tubes now rest at ``pitch`` and ``roll`` (rad); what was solved before is dropped.
 
         Raises
         ------
@@ -112,7 +112,7 @@ class FieldProcedure:
         Raises
         ------
         SelectorError
-            When no calibration is collecting or no tube can be solved; it says why of each.
+            When no calibration is collecting, or no tube can be solved; the message has the reason of each.
         """
         self._expect(*BEFORE_UPLOAD)
         p = self.progress
@@ -129,7 +129,7 @@ class FieldProcedure:
         p.stage, p.proposal = Stage.SOLVED, hashlib.sha256(b"".join(hashes)).hexdigest()
 
     def proposed(self, proposal: str) -> list[tuple[ParameterBlock, str]]:
-        """Blocks that ``proposal`` names, each with the text of its calibration; none when they are under way.
+        """Blocks that ``proposal`` names, each with the text of its calibration; empty when they are under way.
 
         Raises
         ------
@@ -166,7 +166,7 @@ class FieldProcedure:
         self.progress.stage = Stage.IDLE
 
     def uploads_to(self, tube: int) -> bool:
-        """Whether a tube is to get its block, or to tell that it has it."""
+        """Whether a tube is to get its block, or to confirm that it has it."""
         progress = self.progress.tubes.get(tube)
         phases = (Phase.CONFIRMED, *IN_UPLOAD)
         return progress is not None and self.progress.stage is Stage.UPLOADING and progress.phase in phases
@@ -190,7 +190,7 @@ class FieldProcedure:
             self._questions[number] = request.tube
 
     def on_reply(self, reply: Reply, now: float) -> None:
-        """Take a tube's answer to a command; that to a foreign one changes nothing."""
+        """Handle a tube's answer to a command; that to a foreign one changes nothing."""
         tube = self.progress.tubes.get(reply.tube)
         if tube is None:
             return
@@ -202,7 +202,7 @@ class FieldProcedure:
             self._on_block_in_use(tube, reply)
 
     def on_static_record(self, record: StaticRecord) -> None:
-        """Take a record; one that moved is asked for again while the tubes are still there."""
+        """Handle a record; one that moved is asked for again while the tubes are still there."""
         tube = self.progress.tubes.get(record.tube)
         if tube is not None and record.command in tube.orders:
             self._records[record.command] = record
@@ -223,7 +223,7 @@ class FieldProcedure:
             tube.hash_after_restart = self._whole_hash(tube, state.parameters_hash.hex())
 
     def on_block_status(self, status: BlockStatus) -> None:
-        """Take the last word on an upload."""
+        """Handle the last word on an upload."""
         tube = self.progress.tubes.get(status.tube)
         if tube is None or tube.phase is not Phase.UPLOADING or (block := tube.block) is None:
             return
