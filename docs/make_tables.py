@@ -14,7 +14,7 @@ DOCS = Path(__file__).parent
 sys.path.insert(0, str(DOCS.parent))
 
 from groundstation.service.answers import Fields  # noqa: E402
-from groundstation.service.views import FIXED, MEMBERS  # noqa: E402
+from groundstation.service.paths import FIXED, MEMBERS  # noqa: E402
 from telemetry import keys  # noqa: E402
 from telemetry.application.arguments import shown_name, shown_range  # noqa: E402
 from telemetry.application.commands import COMMANDS, Argument, CommandSpec  # noqa: E402

@@ -62,6 +62,11 @@ TABLE: Final[tuple[Key, ...]] = (
 )
 
 
+def is_order(selector: str) -> bool:
+    """Whether a selector orders something of the ground station."""
+    return selector.split("?", maxsplit=1)[0].split("/")[2:3] == ["cmd"]
+
+
 def port_key(rig: str, address: int, side: Side, direction: str) -> str:
     """Key expression of one port and direction."""
     return PORT.format(rig=rig, tube=address_name(address), side=side.name.lower(), direction=direction)

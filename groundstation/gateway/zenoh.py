@@ -15,8 +15,9 @@ import msgpack
 
 from groundstation.errors import GroundError, SelectorError
 from groundstation.service.orders import Order
+from groundstation.service.paths import PATTERNS, Path, find, paths
 from groundstation.service.process import GroundProcess
-from groundstation.service.views import PATTERNS, Parameters, Path, find, paths
+from groundstation.service.views import Parameters
 from telemetry import keys
 from telemetry.errors import TelemetryError
 from telemetry.media.zenoh_bus import JSON, MSGPACK, Publisher, Query, ZenohBus

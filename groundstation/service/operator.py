@@ -17,11 +17,12 @@ from groundstation.errors import ConfigurationError, SelectorError
 from groundstation.service.blocks import block_of_files
 from groundstation.service.model import RigModel
 from groundstation.service.orders import Order, OrderState
+from groundstation.service.paths import find
 from groundstation.service.recalibration.control import Recalibration
 from groundstation.service.recalibration.procedure import Request
 from groundstation.service.store import Store
 from groundstation.service.uploads import Uploads
-from groundstation.service.views import View, find
+from groundstation.service.views import View
 from telemetry.application.arguments import check_arguments, parse_parameters, parse_tube
 from telemetry.application.commands import COMMANDS, CommandSpec, ObeyedBy, find_command
 from telemetry.errors import CommandError

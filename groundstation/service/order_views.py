@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from typing import Any
 
+from groundstation.errors import SelectorError
 from groundstation.service.model import RigModel
 from groundstation.service.orders import Order
 from telemetry.application.arguments import shown_values
@@ -15,6 +16,14 @@ View = dict[str, Any]
 def orders(k: RigModel, _p: dict[str, str]) -> View:
     """The newest orders, the oldest of them first."""
     return {"rig_time_s": k.rig_now if math.isfinite(k.rig_now) else None, "orders": [order_view(o) for o in k.orders]}
+
+
+def order(k: RigModel, number: int) -> View:
+    """One order."""
+    found = k.orders.get(number)
+    if found is None:
+        raise SelectorError(f"orders/{number}: no such order")
+    return order_view(found)
 
 
 def order_view(order: Order) -> View:

@@ -6,7 +6,7 @@ import jsonschema
 
 from groundstation.service.answers import Fields, object_schema
 from groundstation.service.model import RigModel
-from groundstation.service.views import paths
+from groundstation.service.paths import paths
 
 
 def check_answer(view: dict[str, Any], fields: Fields) -> None:

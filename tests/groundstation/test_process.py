@@ -2,10 +2,12 @@
 
 import asyncio
 import contextlib
+import itertools
 import json
 import math
 import socket
 from collections.abc import AsyncIterator, Callable, Iterator
+from concurrent.futures import ThreadPoolExecutor, as_completed
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -384,6 +386,20 @@ async def test_an_order_waits_for_nobody_and_its_course_is_published(
         assert await ask(bus, f"{GROUND}/orders/{number}") == answer
     assert [view["state"] for view in seen if view["order"] == number] == ["sent", "done"]
     silent.cancel()
+
+
+async def test_more_questions_than_can_wait_are_refused_at_once(
+    start: Callable[[], Rig], buses: tuple[ZenohBus, ZenohBus], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("groundstation.gateway.zenoh.WAITING", 2)
+    server, operator = buses
+    async with answering(start().ground, server):
+        with ThreadPoolExecutor(4) as askers:
+            asked = [askers.submit(operator.get, f"{GROUND}/status", 10.0) for _ in range(4)]
+            refused = [future.result() for future in itertools.islice(as_completed(asked), 2)]  # the loop stands still
+            answered = await asyncio.gather(*map(asyncio.wrap_future, asked))
+    assert all("ask again later" in str(replies[0].error) for replies in refused)
+    assert sum(replies[0].error is None for replies in answered) == 2
 
 
 async def test_an_order_without_an_answer_names_its_number_and_key(

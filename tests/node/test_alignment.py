@@ -7,7 +7,8 @@ import numpy as np
 import pytest
 
 from node.errors import ConfigurationError
-from node.firmware.alignment import PATIENCE, rotation
+from node.firmware import static_record
+from node.firmware.alignment import FEWEST, METHODS, MOST, PATIENCE, rotation
 from node.firmware.imu_settings import ImuSettings
 from node.firmware.inputs import ImuReading, RigContext
 from node.firmware.settings import Kernel, TubeSettings
@@ -17,7 +18,7 @@ from node.kernels.layout import DEG, PERIOD, default_config, new_state
 from node.process.command_handlers import CommandHandlers
 from node.process.tube_process import TubeProcess
 from sim.studies.alignment.run import Setup, Turn
-from telemetry.application.commands import COMMANDS, ObeyedBy
+from telemetry.application.commands import COMMANDS, METHOD, SECONDS, TURNS, ObeyedBy
 from telemetry.messages import Command, Event, Mode, NodeState, Reply, Severity, SurveyMeasurement
 from telemetry.parameters import ParameterBlock, SensorParameters
 
@@ -342,6 +343,12 @@ def test_a_process_refuses_an_order_with_its_reason(tmp_path: Path) -> None:
         assert reason in reply.detail
     assert "alignment, timing, got 'dance'" in powered.order("dance").detail
     assert "seconds" in powered.order("static_record").detail
+
+
+def test_the_table_of_commands_has_the_bounds_of_the_firmware() -> None:
+    assert (SECONDS.quantity.low, SECONDS.quantity.high) == (static_record.SHORTEST, static_record.LONGEST)
+    assert (TURNS.quantity.low, TURNS.quantity.high) == (FEWEST, MOST)
+    assert METHOD.quantity.choices == (*METHODS, "none")
 
 
 def test_every_command_of_a_tube_has_its_method() -> None:
