@@ -14,7 +14,6 @@ from typing import Any
 
 from groundstation.config import GroundConfig
 from groundstation.service.process import GroundProcess
-from groundstation.service.views import FIXED
 from node.process.encoder_process import EncoderProcess
 from node.process.tube_process import TubeProcess
 from sim.errors import RigError
@@ -77,16 +76,15 @@ class InlineRig:
 
     def ask(self, path: str) -> dict[str, Any]:
         """What the ground station shows on ``path``, see docs/keys.md."""
-        return FIXED[path].show(self.ground.model, {})
+        return self.ground.operator.ask(path)
 
     def command(self, name: str, parameters: dict[str, str]) -> dict[str, Any]:
         """Have the ground station obey an operator's command."""
-        model = self.ground.model
+        operator = self.ground.operator
         try:
-            self.ground.recalibration.order(parameters, model.rig_now, model.tally.tubes)
+            return operator.reply_of(operator.order(name, parameters))
         except BorechainError as error:
             raise RigError(f"{name}: {error}") from error
-        return self.ask("recalibration")
 
     def close(self) -> None:
         """Close the ground station's database."""

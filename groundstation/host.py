@@ -1,14 +1,17 @@
-"""What hosts the ground station, whether a launcher forked it or its command started it."""
+"""What hosts the ground station: its link, its gateways and its answers on one asyncio loop."""
 
 from __future__ import annotations
 
+import asyncio
 import contextlib
+from collections.abc import AsyncIterator, Callable
 from functools import partial
 from typing import Any
 
 import msgpack
 
 from groundstation.config import checked_config
+from groundstation.gateway.zenoh import ZenohGateway
 from groundstation.service.process import GroundProcess
 from node.kernels.layout import PERIOD
 from telemetry import keys
@@ -17,15 +20,16 @@ from telemetry.media.zenoh_bus import ZenohBus
 from telemetry.media.zenoh_port import ZenohMedium
 from telemetry.messages import BASE, ENCODER, Side
 from telemetry.runtime.event_loop import run, stop_on_signals
-from telemetry.runtime.hosting import Place, begin_process, complain, joined, on_termination, reporting
+from telemetry.runtime.hosting import Place, begin_process, complain, joined, reporting
 from telemetry.runtime.own_clock import OwnClock, OwnClockLoop
-from telemetry.runtime.process import Process
-from telemetry.runtime.step_client import StepClient, serve
+from telemetry.runtime.step_client import AsyncStepClient, serve_stepped
 from telemetry.runtime.timing import CycleTiming
+
+NAME = "ground"
 
 
 def run_ground(place: Place, settings: dict[str, Any], *, own_clock: bool = False) -> None:
-    """Ground station: a stepper or its own clock drives its link, operators ask it at any time.
+    """Ground station: a stepper or its own clock drives its link, operators come in at any time.
 
     ``settings`` are those of ``GroundConfig``.
 
@@ -34,30 +38,56 @@ def run_ground(place: Place, settings: dict[str, Any], *, own_clock: bool = Fals
     ConfigurationError
         When a setting is outside its range; nothing was opened.
     """
-    begin_process("ground")
-    with reporting("ground"):
+    begin_process(NAME)
+    with reporting(NAME):
         # settings, key and database are looked at before half a minute is spent on a router that may be absent
-        process = GroundProcess(checked_config(rig=place.rig, folder=place.folder, key_file=place.key_file, **settings))
-        with joined(place) as bus, process.serving(bus):
-            if own_clock:
-                run(serve_ground(process, bus, place.rig))
-                return
-            ports = stepped_ports(ZenohMedium(bus), place.rig, BASE, [Side.LOWER])
-            client = StepClient(bus, place.rig, BASE, ports, hears_depth=True)
-            on_termination(client.stop)
-            serve(process, client, partial(complain, "ground"))
+        config = checked_config(rig=place.rig, folder=place.folder, key_file=place.key_file, **settings)
+        with contextlib.closing(GroundProcess(config)) as process, joined(place) as bus:
+            run(serve_by_own_clock(process, bus) if own_clock else serve_on_stepper(process, bus))
 
 
-async def serve_ground(process: Process, bus: ZenohBus, rig: str) -> None:
-    """Run the ground station by its own clock, below it the encoder."""
-    ports = neighbour_ports(ZenohMedium(bus), rig, BASE, {Side.LOWER: ENCODER})
-    loop = OwnClockLoop(process, ports, OwnClock(), CycleTiming(), PERIOD, partial(complain, "ground"))
-    stop_on_signals(loop.stop)
+async def serve_by_own_clock(process: GroundProcess, bus: ZenohBus) -> None:
+    """Run the ground station by its own clock, below it the encoder, until a signal ends it."""
+    rig = process.config.rig
+    async with answering(process, bus) as answers:
+        ports = neighbour_ports(ZenohMedium(bus), rig, BASE, {Side.LOWER: ENCODER})
+        loop = OwnClockLoop(process, ports, OwnClock(), CycleTiming(), PERIOD, partial(complain, NAME))
+        process.operator.wake = lambda: loop.call(lambda woken, now: woken.on_timer(now))
+        bus.subscribe(keys.DEPTH.format(rig=rig), partial(hear_depth, loop))
+        end_with(answers, loop.stop)
+        await loop.run()
 
-    def hear_depth(_key: str, payload: bytes) -> None:
-        with contextlib.suppress(ValueError, TypeError, msgpack.UnpackException):  # anything else is no depth
-            rig_time, md = map(float, msgpack.unpackb(payload))
-            loop.call(lambda listener, _now: listener.on_depth(rig_time, md))
 
-    bus.subscribe(keys.DEPTH.format(rig=rig), hear_depth)
-    await loop.run()
+async def serve_on_stepper(process: GroundProcess, bus: ZenohBus) -> None:
+    """Run the ground station step by step until a signal ends it; between two steps operators are answered."""
+    rig = process.config.rig
+    async with answering(process, bus) as answers:
+        ports = stepped_ports(ZenohMedium(bus), rig, BASE, [Side.LOWER])
+        client = AsyncStepClient(bus, rig, BASE, ports, hears_depth=True)  # its token of life is last
+        end_with(answers, client.stop)
+        await serve_stepped(process, client, partial(complain, NAME))
+
+
+@contextlib.asynccontextmanager
+async def answering(process: GroundProcess, bus: ZenohBus) -> AsyncIterator[asyncio.Task[None]]:
+    """Have operators on ``bus`` answered while the context lasts; yields the task that does it."""
+    gateway = ZenohGateway(bus, process)
+    task = asyncio.create_task(gateway.serve())
+    try:
+        yield task
+    finally:
+        gateway.close()
+        await task
+
+
+def end_with(answers: asyncio.Task[None], stop: Callable[[], None]) -> None:
+    """Have ``stop`` called by signals, and when nobody is answered any more: a launcher then starts anew."""
+    stop_on_signals(stop)
+    answers.add_done_callback(lambda _task: stop())
+
+
+def hear_depth(loop: OwnClockLoop, _key: str, payload: bytes) -> None:
+    """Hand a depth of the rig to the process; anything else is no depth."""
+    with contextlib.suppress(ValueError, TypeError, msgpack.UnpackException):
+        rig_time, md = map(float, msgpack.unpackb(payload))
+        loop.call(lambda process, _now: process.on_depth(rig_time, md))

@@ -11,6 +11,7 @@
     │   └── UnknownMediumError(ValueError)  no medium of that name: correct the configuration
     ├── DecodeError(ValueError)       bytes that are no message of ours; the link counts and drops them
     ├── EncodeError(ValueError)       a message outside its declared range: nothing was sent
+    ├── CommandError(ValueError)      an order outside the table of commands: nothing was sent
     ├── KeyFileError(ValueError)      the key of the rig is missing, open to others or none: correct the file
     └── CalibrationError(InputError, ValueError)    a record, a design or a file that gives no calibration
 """
@@ -44,6 +45,10 @@ class DecodeError(TelemetryError, ValueError):
 
 class EncodeError(TelemetryError, ValueError):
     """The message is outside its declared ranges; nothing was sent."""
+
+
+class CommandError(TelemetryError, ValueError):
+    """The order is not one of the table, or an argument is missing, unknown or out of range; nothing was sent."""
 
 
 class KeyFileError(TelemetryError, ValueError):

@@ -56,8 +56,15 @@ TABLE: Final[tuple[Key, ...]] = (
     Key("borechain/{rig}/ground/events", "query", "events of the nodes; ?tube=3"),
     Key("borechain/{rig}/ground/static_records", "query", "raw readings that nodes averaged at rest; ?tube=3"),
     Key("borechain/{rig}/ground/recalibration", "query, publish", "calibration in the field: progress and result"),
+    Key("borechain/{rig}/ground/orders", "query, publish", "the newest orders with their course and outcome"),
+    Key("borechain/{rig}/ground/orders/{n}", "query, publish", "one order"),
     Key("borechain/{rig}/cmd/{name}", "query", "operator command to the ground station; the reply is its outcome"),
 )
+
+
+def is_order(selector: str) -> bool:
+    """Whether a selector orders something of the ground station."""
+    return selector.split("?", maxsplit=1)[0].split("/")[2:3] == ["cmd"]
 
 
 def port_key(rig: str, address: int, side: Side, direction: str) -> str:

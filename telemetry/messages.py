@@ -11,7 +11,7 @@ import enum
 from dataclasses import dataclass, field
 from typing import TypeAlias
 
-SCHEMA_VERSION = 2  # the newest; a payload carries the earliest that can say it
+SCHEMA_VERSION = 3  # the newest; a payload carries the earliest that can say it
 ENCODER = 0
 MAX_TUBE = 250
 BASE = 251
@@ -19,6 +19,7 @@ BASE = 251
 Vector3: TypeAlias = tuple[float, float, float]
 Matrix3: TypeAlias = tuple[Vector3, Vector3, Vector3]
 Scalar: TypeAlias = bool | int | float | str | None
+Value: TypeAlias = Scalar | tuple[float, ...]
 HOPS_UNKNOWN = -1
 SEGMENT_SIZE = 192  # bytes of a block in one message; eight such messages and their frame stay below 4 KiB
 MAX_SEGMENTS = 32
@@ -197,18 +198,19 @@ class Command:
 
     tube: int  # addressee
     sequence: int
-    name: str  # take_survey, static_record, parameters, align, alignment, timing
+    name: str  # one of telemetry.application.commands
     arguments: dict[str, Scalar] = field(default_factory=dict)
 
 
 @dataclass(frozen=True, slots=True)
 class Reply:
-    """Outcome of a command."""
+    """Outcome of a command. ``values`` came with schema version 3."""
 
     tube: int  # who answers
     sequence: int  # of the command
     done: bool
-    detail: str
+    detail: str  # why it was refused, or what happens now; for people, never to be parsed
+    values: dict[str, Value] = field(default_factory=dict)  # what the table of commands promises
 
 
 @dataclass(frozen=True, slots=True)

@@ -1,65 +1,104 @@
-"""The ground station's keys on the bus: one queryable for all of them, and publications when they change."""
+"""The ground station's keys on the bus: what is asked and ordered comes in, what changes is published.
+
+The bus's own threads only put queries into a bounded inbox; everything else happens on the loop of the ground station.
+"""
 
 from __future__ import annotations
 
+import asyncio
 import json
-import threading
+from collections.abc import Callable
+from functools import partial
 from typing import Any
 
 import msgpack
 
-from groundstation.errors import SelectorError
-from groundstation.service.model import RigModel
-from groundstation.service.views import PATTERNS, Parameters, Path, paths
+from groundstation.errors import GroundError, SelectorError
+from groundstation.service.orders import Order
+from groundstation.service.paths import PATTERNS, Path, find, paths
+from groundstation.service.process import GroundProcess
+from groundstation.service.views import Parameters
 from telemetry import keys
+from telemetry.errors import TelemetryError
 from telemetry.media.zenoh_bus import JSON, MSGPACK, Publisher, Query, ZenohBus
+from telemetry.runtime.inbox import Inbox
 
+WAITING = 256  # queries that may wait to be answered, and orders that may be awaited
+ORDER_TIMEOUT = 30.0  # wall s, for which who ordered is kept waiting
+BUSY = f"the ground station has {WAITING} questions to answer; ask again later"
 COMMON_PARAMETERS = ("accept",)
 ENCODINGS = {"json": JSON, "msgpack": MSGPACK}
+WHO = "zenoh"  # ordered, where the order does not say
+
+Handler = Callable[[Query], None]
 
 
-class Queries:
-    """Answers selectors and publishes changes.
+class ZenohGateway:
+    """Gateway to the operator's doors; made on the running loop.
 
     Parameters
     ----------
-    bus : where
-    model : what
-    lock : held by whoever changes the model; questions come on the bus's own threads
+    bus : where the keys are
+    process : whose keys
     """
 
-    def __init__(self, bus: ZenohBus, model: RigModel, lock: threading.Lock) -> None:
+    def __init__(self, bus: ZenohBus, process: GroundProcess) -> None:
         self._bus = bus
-        self._model = model
-        self._lock = lock
+        self._rig = process.config.rig
+        self._process = process
+        self._operator = process.operator
+        self._inbox: Inbox[tuple[Handler, Query]] = Inbox(WAITING)
+        self._awaited: set[asyncio.Task[None]] = set()
         self._publishers: dict[str, Publisher] = {}
-        bus.queryable(self._key("**"), self._answer)
+        process.listeners.append(self._publish)
+        bus.queryable_kept(self._key("**"), partial(self._arrive, self._answer))
+        bus.queryable_kept(keys.COMMAND.format(rig=self._rig, name="*"), partial(self._arrive, self._take_order))
 
-    def publish(self, changed: list[str]) -> None:
-        """Put the present value of each path; the lock must be held."""
-        known = paths(self._model)
-        for path in changed:
-            if path in known:
-                if path not in self._publishers:
-                    self._publishers[path] = self._bus.publisher(self._key(path), JSON, droppable=True)
-                self._publishers[path].put(pack(known[path].show(self._model, {}), "json"))
+    async def serve(self) -> None:
+        """Answer until ``close``."""
+        try:
+            while (arrived := await self._inbox.get()) is not None:
+                handle, query = arrived
+                handle(query)
+        finally:
+            for task in self._awaited:
+                task.cancel()
+
+    def close(self) -> None:
+        """Answer nothing more; from the loop or a signal handler of it."""
+        self._process.listeners.remove(self._publish)
+        self._inbox.close()
+
+    def _arrive(self, handle: Handler, query: Query) -> None:
+        """Queue a query, on a thread of the bus."""
+        if not self._inbox.put((handle, query)):
+            refuse(query, BUSY)
 
     def _key(self, path: str) -> str:
-        return keys.GROUND.format(rig=self._model.config.rig, path=path)
+        return keys.GROUND.format(rig=self._rig, path=path)
+
+    def _publish(self, changed: list[str]) -> None:
+        """Put the present value of each path."""
+        for path in changed:
+            view = pack(find(self._process.model, path).show(self._process.model, {}), "json")
+            if path not in self._publishers:
+                self._publishers[path] = self._bus.publisher(self._key(path), JSON, droppable=True)
+            self._publishers[path].put(view)
 
     def _answer(self, query: Query) -> None:
         try:
-            with self._lock:
-                replies = self._replies(query)
+            replies = self._replies(query)
         except SelectorError as error:
-            query.reply_error(str(error))
+            refuse(query, str(error))
             return
         encoding = ENCODINGS[query.parameters.get("accept", "json")]
         for key, payload in replies:
             query.reply(key, payload, encoding)
+        query.finish()
 
     def _replies(self, query: Query) -> list[tuple[str, bytes]]:
-        found = {path: view for path, view in paths(self._model).items() if query.intersects(self._key(path))}
+        model = self._process.model
+        found = {path: view for path, view in paths(model).items() if query.intersects(self._key(path))}
         if not found:
             raise SelectorError(
                 f"{query.selector_key}: no such key; expected below {self._key('')}: {', '.join(PATTERNS)}"
@@ -69,7 +108,46 @@ class Queries:
             raise SelectorError(f"parameter accept: expected json or msgpack, got {accept!r}")
         parameters = {name: value for name, value in query.parameters.items() if name not in COMMON_PARAMETERS}
         check_parameters(found, parameters)
-        return [(self._key(path), pack(view.show(self._model, parameters), accept)) for path, view in found.items()]
+        return [(self._key(path), pack(view.show(model, parameters), accept)) for path, view in found.items()]
+
+    def _take_order(self, query: Query) -> None:
+        """Accept an order; its answer is awaited beside all other work."""
+        if len(self._awaited) >= WAITING:
+            refuse(query, BUSY)
+            return
+        name = query.selector_key.rsplit("/", 1)[1]
+        try:
+            order = self._operator.order(name, query.parameters, query.parameters.get("by", WHO))
+        except (GroundError, TelemetryError) as error:
+            refuse(query, f"{query.selector_key}: {error}")
+            return
+        task = asyncio.create_task(self._reply_when_answered(query, order))
+        self._awaited.add(task)
+        task.add_done_callback(self._awaited.discard)
+
+    async def _reply_when_answered(self, query: Query, order: Order) -> None:
+        answered = asyncio.Event()
+        order.when_answered(answered.set)
+        name = order.spec.name
+        try:
+            async with asyncio.timeout(ORDER_TIMEOUT):
+                await answered.wait()
+        except TimeoutError:
+            refuse(
+                query,
+                f"order {order.number}: tube {order.tube} has not answered {name} within {ORDER_TIMEOUT:.0f} s; "
+                f"it is still being asked, see {self._key(f'orders/{order.number}')}",
+            )
+        else:
+            key = keys.COMMAND.format(rig=self._rig, name=name)
+            query.reply(key, pack(self._operator.reply_of(order), "json"))
+            query.finish()
+
+
+def refuse(query: Query, reason: str) -> None:
+    """End a query with what is wrong with it."""
+    query.reply_error(reason)
+    query.finish()
 
 
 def check_parameters(found: dict[str, Path], parameters: Parameters) -> None:

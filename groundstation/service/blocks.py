@@ -37,7 +37,7 @@ def block_of_files(folder: Path, tube: int, version: int, gyroscope: str, accele
     Raises
     ------
     CalibrationError
-        When a name is none, its file holds no calibration or one of another sensor.
+        When a name is invalid, or its file holds no calibration or that of another sensor.
     """
     return block_of(tube, version, _read(folder, gyroscope), _read(folder, accelerometer))
 

@@ -12,6 +12,7 @@ import numpy.typing as npt
 from groundstation.config import GroundConfig
 from groundstation.errors import SurveyError
 from groundstation.service.alarms import AlarmList
+from groundstation.service.orders import OrderBook
 from groundstation.service.recalibration.procedure import FieldProcedure
 from groundstation.service.tally import DepthLog, Tally
 from groundstation.survey.columns import Deviation, deviation, project
@@ -70,7 +71,7 @@ class SurveyStation:
         return max((drop for drop in self.drops if drop < place), default=0)
 
     def add_stop(self, cluster: ResolvedStop) -> None:
-        """Take one more cluster in the order of time; what was judged of later ones is forgotten."""
+        """Add a cluster in the order of time; what was judged of later ones is forgotten."""
         self.clusters.append(cluster)
         self.clusters.sort(key=lambda known: (known.at, known.measurement.tube))
         self.forget(self.clusters.index(cluster))
@@ -129,9 +130,10 @@ class RigModel:
         self.trajectory: list[Point] = Trajectory().points
         self.projection: Deviation | None = None
         self.recalibration = FieldProcedure(config.gravity)
+        self.orders = OrderBook()
 
     def on_state(self, state: NodeState) -> None:
-        """Take a node's account of itself, unless a newer one is known."""
+        """Handle a node's state, unless a newer one is known."""
         self.recalibration.on_state(state)
         known = self.nodes.get(state.tube)
         if known is None or state.at >= known.at:
@@ -167,10 +169,12 @@ class RigModel:
     def on_event(self, event: Event) -> None:
         """Remember what happened."""
         self.events.append(event)
+        self.orders.on_event(event)
 
     def on_static_record(self, record: StaticRecord) -> None:
         """Remember an average at rest."""
         self.static_records.append(record)
+        self.orders.on_static_record(record)
         self.recalibration.on_static_record(record)
 
     def age(self, tube: int) -> float:

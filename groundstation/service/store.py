@@ -82,7 +82,7 @@ class Store:
     Raises
     ------
     StoreError
-        When the database cannot be opened, is none, or belongs to another version.
+        When the database cannot be opened, is no database, or belongs to another version.
     """
 
     def __init__(self, url: str) -> None:

@@ -22,7 +22,7 @@ class Tally:
         self.tubes: list[int] = []
 
     def on_hops(self, tube: int, hops: int) -> None:
-        """Take the hop count that a tube reports, 1 at the top."""
+        """Handle the hop count that a tube reports, 1 at the top."""
         if hops < 1:
             return
         self._hops[tube] = hops
@@ -33,7 +33,7 @@ class Tally:
             self.tubes.sort(key=lambda known: self._hops[known])
 
     def restore(self, tubes: list[int]) -> None:
-        """Take the order known before a restart, top first; it holds until reports complete another."""
+        """Restore the order known before a restart, top first; it holds until reports complete another."""
         self.tubes = list(tubes)
         self._hops = {tube: place for place, tube in enumerate(tubes, 1)}
 
@@ -61,7 +61,7 @@ class DepthLog:
         self._md: list[float] = []
 
     def append_reading(self, at: float, md: float) -> bool:
-        """Take a reading; True when the bit has come to stand at a new depth."""
+        """Add a reading; True when the bit has come to rest at a new depth."""
         if self._at and at <= self._at[-1]:
             return False
         came_to_stand = len(self._md) >= 2 and md == self._md[-1] != self._md[-2]
@@ -75,7 +75,7 @@ class DepthLog:
         return came_to_stand
 
     def restore(self, at: float, md: float) -> None:
-        """Take a stored depth, standing from ``at`` on."""
+        """Restore a stored depth, at rest from ``at`` on."""
         self._at.append(at)
         self._md.append(md)
 

@@ -3,14 +3,12 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
 from groundstation.errors import SelectorError, SurveyError
-from groundstation.service import column_views
 from groundstation.service.model import ResolvedStop, RigModel, SurveyStation
 from groundstation.survey.resolve import angle_stds, angles
 from groundstation.survey.trajectory import Point, interpolate
@@ -304,38 +302,3 @@ def flag_names(flags: NodeFlag) -> list[str]:
 def finite(value: float) -> float | None:
     """JSON has no infinity and no nan."""
     return value if math.isfinite(value) else None
-
-
-@dataclass(frozen=True, slots=True)
-class Path:
-    """One answerable path below ``ground/``: what it shows and which parameters it takes."""
-
-    show: Callable[[RigModel, Parameters], View]
-    parameters: tuple[str, ...] = ()
-
-
-FIXED: dict[str, Path] = {
-    "status": Path(status),
-    "string": Path(string),
-    "stations": Path(stations, ("md",)),
-    "measurements": Path(measurements, ("station", "tube")),
-    "trajectory": Path(trajectory, ("md",)),
-    "events": Path(events, ("tube",)),
-    "static_records": Path(static_records, ("tube",)),
-    "uncertainty": Path(column_views.uncertainty, ("confidence",)),
-    "column": Path(column_views.column),
-    "alarms": Path(column_views.alarms),
-    "recalibration": Path(recalibration),
-}
-PATTERNS = (*FIXED, "nodes/{tube}", "stations/{n}", "stations/{n}/measurements")
-
-
-def paths(k: RigModel) -> dict[str, Path]:
-    """Every path that has an answer now."""
-    found = dict(FIXED)
-    for tube in sorted(k.nodes):
-        found[f"nodes/{tube}"] = Path(lambda known, _p, tube=tube: node(known, tube))  # type: ignore[misc]
-    for n in range(1, len(k.stations) + 1):
-        found[f"stations/{n}"] = Path(lambda known, _p, n=n: station(known, n))  # type: ignore[misc]
-        found[f"stations/{n}/measurements"] = Path(lambda known, _p, n=n: station_measurements(known, n))  # type: ignore[misc]
-    return found

@@ -26,7 +26,7 @@ from node.kernels.alignment import (
 )
 from node.kernels.angles import wrap
 from node.kernels.layout import DEG, PERIOD, Array
-from telemetry.messages import Scalar, Severity
+from telemetry.messages import Scalar, Severity, Value
 
 METHODS: Final = {"circle": CIRCLE, "extremes": EXTREMES}
 SLOWEST, FASTEST = 2.0 * DEG, 15.0 * DEG  # rad/s, of the turn
@@ -210,19 +210,21 @@ class Aligner:
         self._mount["aligning"] = 0
 
 
-def alignment_text(mount: Array, imus: int) -> str:
-    """The alignment in use, for a reply: method and each IMU's pitch and roll with standard errors, deg."""
+def alignment_in_use(mount: Array, imus: int) -> dict[str, Value]:
+    """The alignment in use, for a reply: method, and of each IMU pitch, roll and their standard errors (rad)."""
     record = mount[0]
     names = {number: name for name, number in METHODS.items()}
     if int(record["method"]) not in names:
-        return "none"
-    rows = [
-        f"IMU {k + 1}: pitch {p / DEG:.4f} +- {sp / DEG:.4f}, roll {r / DEG:.4f} +- {sr / DEG:.4f} deg"
-        for k, ((p, r), (sp, sr)) in enumerate(
-            zip(map(angles_of, record["axis"][:imus]), record["std"][:imus], strict=True)
-        )
-    ]
-    return f"{names[int(record['method'])]}; {'; '.join(rows)}"
+        return {"method": "none"}
+    angles = [angles_of(axis) for axis in record["axis"][:imus]]
+    stds = record["std"][:imus]
+    return {
+        "method": names[int(record["method"])],
+        "pitch": tuple(float(pitch) for pitch, _ in angles),
+        "pitch_std": tuple(float(pitch) for pitch, _ in stds),
+        "roll": tuple(float(roll) for _, roll in angles),
+        "roll_std": tuple(float(roll) for _, roll in stds),
+    }
 
 
 def realign(state: Array, before: Array, after: Array) -> None:

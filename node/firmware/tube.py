@@ -8,7 +8,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from node.firmware.alignment import FASTEST, Aligner, alignment_text, realign
+from node.firmware.alignment import FASTEST, Aligner, alignment_in_use, realign
 from node.firmware.block_trial import forget_bias, forget_tilt, record_of, recorrect
 from node.firmware.coarse_level import level_coarsely
 from node.firmware.imu_fusion import ImuFusion
@@ -34,6 +34,7 @@ from telemetry.messages import (
     Severity,
     StaticRecord,
     SurveyMeasurement,
+    Value,
 )
 from telemetry.parameters import SHORT_HASH, ParameterBlock
 
@@ -195,9 +196,9 @@ class Tube:
         return self._aligner.start(method, turns)
 
     @property
-    def alignment(self) -> str:
-        """The alignment in use, in words."""
-        return alignment_text(self._mount, len(self._axes))
+    def alignment(self) -> dict[str, Value]:
+        """The alignment in use: method and angles (rad) of each IMU."""
+        return alignment_in_use(self._mount, len(self._axes))
 
     def prepare(self, block: ParameterBlock) -> None:
         """Forget what was learnt under the present block and would be wrong under ``block``."""

@@ -21,6 +21,7 @@ from node.kernels.calibration import USUAL
 from node.kernels.layout import PERIOD, Array, default_config, new_state
 from node.process.block_store import BlockStore
 from node.process.block_updater import BlockUpdater, load_parameters
+from node.process.command_handlers import CommandHandlers
 from node.process.counter import BootCounter
 from node.process.drivers.source import NOTHING, ImuSource, SafeImu
 from node.process.journal import Journal
@@ -32,22 +33,18 @@ from telemetry.messages import (
     Command,
     Event,
     NodeState,
-    Reply,
     Scalar,
     Severity,
     Side,
     StaticRecord,
     SurveyMeasurement,
 )
-from telemetry.presentation.fields import MAX_TEXT
 from telemetry.runtime.process import Process
 from telemetry.runtime.timing import CycleTiming, Stage
 
 SAVE_EVERY = 19  # cycles, 10 s
 SYNCHRONISED_STD = 0.05  # s, what the time-stamp state of the filter can take
 MAX_CLOCK_STD = 3600.0
-USUAL_TURNS = 2.0  # of an alignment
-COMMANDS = ("take_survey", "static_record", "parameters", "align", "alignment", "timing")
 OVERRUN_EVERY = 60.0  # s between two events about overruns, so that a board too slow is not slowed further
 
 
@@ -122,6 +119,7 @@ class TubeProcess(Process):
             parameters=parameters,
             mount=self.mount,
         )
+        self._commands = CommandHandlers(self.tube, timing)
         self._cycles = 0
         self._now = 0.0
         self._fault = fault
@@ -137,7 +135,7 @@ class TubeProcess(Process):
             if isinstance(message, Aiding) and received.side is Side.UPPER:
                 self._on_aiding(message, now)
             elif isinstance(message, Command):
-                self.endpoint.reply(self._obey(message), now)
+                self.endpoint.reply(self._commands.obey(message), now)
                 self._save()
             elif isinstance(message, BlockSegment):
                 self.endpoint.send_status(self._blocks.on_segment(message, now))
@@ -246,33 +244,6 @@ class TubeProcess(Process):
             Event(self.settings.tube, self.endpoint.new_sequence(), rig_now, severity, code, arguments), self._now
         )
         self._save()
-
-    def _obey(self, command: Command) -> Reply:
-        done, detail = True, ""
-        match command.name:
-            case "take_survey":
-                self.tube.take_survey()
-                detail = "at the next settled cycle"
-            case "static_record":
-                seconds = command.arguments.get("seconds")
-                refused = self.tube.start_record(seconds, command.sequence)
-                done, detail = not refused, refused or f"recording {seconds} s"
-            case "align":
-                method, turns = command.arguments.get("method", "circle"), command.arguments.get("turns", USUAL_TURNS)
-                refused = self.tube.align(method, turns)
-                detail = refused or ("dropped" if method == "none" else f"turn the string slowly, {turns:g} turns")
-                done = not refused
-            case "alignment":
-                detail = self.tube.alignment
-            case "parameters":
-                block = self.tube.parameters
-                detail = f"version {block.version} sha256 {block.sha256().hex()}"
-            case "timing":
-                done = self._timing is not None
-                detail = self._timing.line() if self._timing else "expected a node with a clock of its own"
-            case _:
-                done, detail = False, f"expected {', '.join(COMMANDS)}, got {command.name}"
-        return Reply(self.settings.tube, command.sequence, done, detail[:MAX_TEXT])
 
     def _load(self) -> tuple[tuple[Array, bytes] | None, str]:
         try:

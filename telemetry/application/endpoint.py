@@ -36,7 +36,8 @@ from telemetry.messages import (
     TimeReply,
     TimeRequest,
 )
-from telemetry.presentation.msgpack_codec import DOWNWARD, Envelope, Kind, decode, encode, peek
+from telemetry.presentation.msgpack_codec import DOWNWARD, Envelope, decode, encode, peek
+from telemetry.schema import Kind
 from telemetry.transport.hop import HopLink
 
 HELLO_EVERY = 1.0  # s

@@ -1,37 +1,102 @@
-"""The fields of messages: what each may hold and how it is put on the wire."""
+"""How each kind of field is checked and put into msgpack."""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from copy import copy
+from dataclasses import dataclass
 from typing import Any
 
 from telemetry.messages import ImuMean
+from telemetry.quantities import (
+    MAX_ARGUMENTS,
+    MAX_IMUS,
+    MAX_LIST,
+    MAX_TEXT,
+    Quantity,
+    ValueKind,
+    check_binary,
+    check_boolean,
+    check_integer,
+    check_number,
+    check_text,
+)
+from telemetry.schema import Field
 
-MAX_TEXT = 256
-MAX_ARGUMENTS = 32
-MAX_IMUS = 16
 MAX_BINARY = 256
+LARGEST_COVARIANCE, LARGEST_FORCE = 1e6, 1e3  # (m/s^2)^2 and the like, m/s^2
+
+Check = Callable[[Quantity, Any], Any]
 
 
 @dataclass(frozen=True, slots=True)
-class Field:
-    """One field: attribute, short key, check (raises ValueError) and what is put on the wire.
-
-    A field of a later schema version has the value that stands for it in payloads of earlier ones.
-    """
+class FieldCodec:
+    """One field on the wire: attribute, short key, check (raises ValueError) and what is packed."""
 
     name: str
     key: str
     check: Callable[[Any], Any]
     pack: Callable[[Any], Any]
-    since: int = 1
-    before: Any = None
+    since: int
+    before: Any
 
-    def later(self, since: int, before: Any) -> Field:
-        """The same field, first said in schema version ``since``; payloads without it mean ``before``."""
-        return replace(self, since=since, before=before)
+    def default(self) -> Any:
+        """The value that stands for the field in payloads of earlier schema versions."""
+        return copy(self.before)
+
+
+def codec_of(field: Field) -> FieldCodec:
+    """Codec of one line of the schema."""
+    check, pack = CODECS[field.kind]
+    if field.enumeration is not None:
+        check = enumerated(field.enumeration)
+    return FieldCodec(field.name, field.key, lambda value: check(field, value), pack, field.since, field.before)
+
+
+def enumerated(enumeration: Callable[[int], Any]) -> Check:
+    """Check of an integer that stands for a member or for flags."""
+    return lambda q, value: enumeration(check_integer(q, value))
+
+
+def check_vector(q: Quantity, value: Any) -> tuple[float, float, float]:
+    """Three finite numbers of magnitude up to the limit."""
+    return _vector(q.name, value, q.high)
+
+
+def check_covariance(q: Quantity, value: Any) -> tuple[tuple[float, float, float], ...]:
+    """Three rows of three finite numbers, variances of zero or more on the diagonal."""
+    if not isinstance(value, list | tuple) or len(value) != 3:
+        raise ValueError(f"{q.name}: expected a 3x3 covariance, got {value!r:.40}")
+    return _covariance(q.name, value)
+
+
+def check_imus(q: Quantity, value: Any) -> tuple[ImuMean, ...]:
+    """Means of the IMUs of a cluster."""
+    if not isinstance(value, list | tuple) or not 1 <= len(value) <= MAX_IMUS:
+        raise ValueError(f"{q.name}: expected 1..{MAX_IMUS} IMUs, got {value!r:.40}")
+    return tuple(_imu(item) for item in value)
+
+
+def check_scalars(q: Quantity, value: Any) -> dict[str, Any]:
+    """Named scalars."""
+    _check_names(q, value)
+    for name, item in value.items():
+        _check_scalar(q, name, item)
+    return dict(value)
+
+
+def check_values(q: Quantity, value: Any) -> dict[str, Any]:
+    """Named scalars and lists of finite numbers."""
+    _check_names(q, value)
+    checked = {}
+    for name, item in value.items():
+        if isinstance(item, list | tuple):
+            checked[name] = _numbers(q, name, item)
+        else:
+            _check_scalar(q, name, item)
+            checked[name] = item
+    return checked
 
 
 def same(value: Any) -> Any:
@@ -39,64 +104,28 @@ def same(value: Any) -> Any:
     return value
 
 
-def number(name: str, key: str, low: float, high: float) -> Field:
-    """Finite float in [low, high]."""
-
-    def check(value: Any) -> float:
-        if isinstance(value, bool) or not isinstance(value, int | float) or not low <= value <= high:
-            raise ValueError(f"{name}: expected a number in [{low:g}, {high:g}], got {value!r:.40}")
-        return float(value)
-
-    return Field(name, key, check, same)
+def pack_rows(rows: Any) -> list[list[float]]:
+    """A matrix on the wire."""
+    return [list(row) for row in rows]
 
 
-def whole(name: str, key: str, low: int, high: int, wrap: Callable[[int], Any] = int) -> Field:
-    """Integer in [low, high]; ``wrap`` makes it an enumeration."""
-
-    def check(value: Any) -> Any:
-        if isinstance(value, bool) or not isinstance(value, int) or not low <= value <= high:
-            raise ValueError(f"{name}: expected an integer in [{low}, {high}], got {value!r:.40}")
-        return wrap(value)
-
-    return Field(name, key, check, int)
+def pack_imus(imus: Any) -> list[Any]:
+    """IMUs on the wire: each its mean, then the rows of its covariance."""
+    return [[list(imu.force), pack_rows(imu.force_cov)] for imu in imus]
 
 
-def truth(name: str, key: str) -> Field:
-    """Boolean."""
-
-    def check(value: Any) -> bool:
-        if not isinstance(value, bool):
-            raise ValueError(f"{name}: expected true or false, got {value!r:.40}")
-        return value
-
-    return Field(name, key, check, same)
-
-
-def text(name: str, key: str) -> Field:
-    """Short string."""
-
-    def check(value: Any) -> str:
-        if not isinstance(value, str) or len(value) > MAX_TEXT:
-            raise ValueError(f"{name}: expected at most {MAX_TEXT} characters, got {value!r:.40}")
-        return value
-
-    return Field(name, key, check, same)
-
-
-def binary(name: str, key: str, low: int, high: int) -> Field:
-    """Bytes, ``low`` to ``high`` of them."""
-
-    def check(value: Any) -> bytes:
-        if not isinstance(value, bytes) or not low <= len(value) <= high:
-            raise ValueError(f"{name}: expected {low}..{high} bytes, got {value!r:.40}")
-        return value
-
-    return Field(name, key, check, same)
-
-
-def vector(name: str, key: str, limit: float) -> Field:
-    """Three finite numbers of magnitude up to ``limit``."""
-    return Field(name, key, lambda value: _vector(name, value, limit), list)
+CODECS: dict[ValueKind, tuple[Check, Callable[[Any], Any]]] = {
+    ValueKind.NUMBER: (check_number, same),
+    ValueKind.INTEGER: (check_integer, int),
+    ValueKind.BOOLEAN: (check_boolean, same),
+    ValueKind.TEXT: (check_text, same),
+    ValueKind.BINARY: (check_binary, same),
+    ValueKind.VECTOR: (check_vector, list),
+    ValueKind.COVARIANCE: (check_covariance, pack_rows),
+    ValueKind.IMUS: (check_imus, pack_imus),
+    ValueKind.SCALARS: (check_scalars, same),
+    ValueKind.VALUES: (check_values, same),
+}
 
 
 def _vector(name: str, value: Any, limit: float) -> tuple[float, float, float]:
@@ -108,56 +137,45 @@ def _vector(name: str, value: Any, limit: float) -> tuple[float, float, float]:
     return float(value[0]), float(value[1]), float(value[2])
 
 
-def covariance(name: str, key: str) -> Field:
-    """Three rows of three finite numbers, variances of zero or more on the diagonal."""
-    return Field(name, key, lambda value: _covariance(name, value), lambda rows: [list(row) for row in rows])
-
-
 def _covariance(name: str, value: Any) -> tuple[tuple[float, float, float], ...]:
-    if not isinstance(value, list | tuple) or len(value) != 3:
-        raise ValueError(f"{name}: expected a 3x3 covariance, got {value!r:.40}")
-    rows = [_vector(name, row, 1e6) for row in value]
+    rows = [_vector(name, row, LARGEST_COVARIANCE) for row in value]
     if min(rows[0][0], rows[1][1], rows[2][2]) < 0.0:
         raise ValueError(f"{name}: expected variances of zero or more")
     return rows[0], rows[1], rows[2]
 
 
-def imus(value: Any) -> tuple[ImuMean, ...]:
-    """Check of a cluster's means."""
-    if not isinstance(value, list | tuple) or not 1 <= len(value) <= MAX_IMUS:
-        raise ValueError(f"imus: expected 1..{MAX_IMUS} IMUs, got {value!r:.40}")
-    return tuple(_imu(item) for item in value)
-
-
 def _imu(item: Any) -> ImuMean:
     if isinstance(item, ImuMean):
-        item = pack_imu(item)
+        item = pack_imus([item])[0]
     if not isinstance(item, list) or len(item) != 2 or not isinstance(item[1], list | tuple) or len(item[1]) != 3:
         raise ValueError(f"imus: expected a mean and a 3x3 covariance, got {item!r:.40}")
-    rows = [_vector("force_cov", row, 1e6) for row in item[1]]
-    if min(rows[0][0], rows[1][1], rows[2][2]) < 0.0:
-        raise ValueError("force_cov: expected variances of zero or more")
-    return ImuMean(_vector("force", item[0], 1e3), (rows[0], rows[1], rows[2]))
+    first, second, third = _covariance("force_cov", item[1])
+    return ImuMean(_vector("force", item[0], LARGEST_FORCE), (first, second, third))
 
 
-def pack_imu(imu: ImuMean) -> list[Any]:
-    """One IMU on the wire: mean, then the rows of its covariance."""
-    return [list(imu.force), [list(row) for row in imu.force_cov]]
-
-
-def arguments(value: Any) -> dict[str, Any]:
-    """Check of named scalars."""
+def _check_names(q: Quantity, value: Any) -> None:
     if not isinstance(value, dict) or len(value) > MAX_ARGUMENTS:
-        raise ValueError(f"arguments: expected at most {MAX_ARGUMENTS} names, got {value!r:.40}")
-    for name, item in value.items():
+        raise ValueError(f"{q.name}: expected at most {MAX_ARGUMENTS} names, got {value!r:.40}")
+    for name in value:
         if not isinstance(name, str) or len(name) > MAX_TEXT:
-            raise ValueError(f"arguments: expected a short name, got {name!r:.40}")
-        if not (item is None or isinstance(item, bool | int | float | str)):
-            raise ValueError(f"arguments: {name}: expected a scalar, got {item!r:.40}")
-        if isinstance(item, float) and not math.isfinite(item):
-            raise ValueError(f"arguments: {name}: expected a finite number, got {item}")
-        if isinstance(item, int) and not -(2**63) <= item < 2**63:
-            raise ValueError(f"arguments: {name}: expected a 64-bit integer")
-        if isinstance(item, str) and len(item) > MAX_TEXT:
-            raise ValueError(f"arguments: {name}: expected at most {MAX_TEXT} characters")
-    return value
+            raise ValueError(f"{q.name}: expected a short name, got {name!r:.40}")
+
+
+def _check_scalar(q: Quantity, name: str, item: Any) -> None:
+    if not (item is None or isinstance(item, bool | int | float | str)):
+        raise ValueError(f"{q.name}: {name}: expected a scalar, got {item!r:.40}")
+    if isinstance(item, float) and not math.isfinite(item):
+        raise ValueError(f"{q.name}: {name}: expected a finite number, got {item}")
+    if isinstance(item, int) and not -(2**63) <= item < 2**63:
+        raise ValueError(f"{q.name}: {name}: expected a 64-bit integer")
+    if isinstance(item, str) and len(item) > MAX_TEXT:
+        raise ValueError(f"{q.name}: {name}: expected at most {MAX_TEXT} characters")
+
+
+def _numbers(q: Quantity, name: str, items: Any) -> tuple[float, ...]:
+    for item in items:
+        if isinstance(item, bool) or not isinstance(item, int | float) or not math.isfinite(item):
+            raise ValueError(f"{q.name}: {name}: expected finite numbers, got {item!r:.40}")
+    if len(items) > MAX_LIST:
+        raise ValueError(f"{q.name}: {name}: expected at most {MAX_LIST} numbers, got {len(items)}")
+    return tuple(float(item) for item in items)

@@ -120,18 +120,3 @@ class CycleTiming:
             "first_cycle_at_s": self.first_cycle_at if self.cycles else None,
             "stages_ms": {stage.value: durations.summary_ms() for stage, durations in self.stages.items()},
         }
-
-    def line(self) -> str:
-        """The same in a line that a reply can carry: 99th percentile and largest of each stage, ms."""
-        parts = [
-            f"{stage.value} {short_ms(durations.quantile(0.99))}/{short_ms(durations.largest)}"
-            for stage, durations in self.stages.items()
-            if durations.count
-        ]
-        return f"cycles {self.cycles} overruns {self.overruns} ms p99/max: {' '.join(parts)}"
-
-
-def short_ms(seconds: float) -> str:
-    """Milliseconds in at most five characters, up to a minute and a half."""
-    milliseconds = 1e3 * seconds
-    return f"{milliseconds:.2f}" if milliseconds < 99.995 else f"{milliseconds:.0f}"

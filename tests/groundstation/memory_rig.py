@@ -8,6 +8,7 @@ from pathlib import Path
 import numpy as np
 
 from groundstation.config import GroundConfig
+from groundstation.service.orders import Order
 from groundstation.service.process import GroundProcess
 from node.firmware.sensor_faults import SensorLimits
 from node.firmware.settings import TubeSettings
@@ -15,7 +16,7 @@ from node.kernels.layout import PERIOD
 from node.process.encoder_process import EncoderProcess
 from node.process.tube_process import TubeProcess
 from telemetry.media.memory import MemoryPort, joint
-from telemetry.messages import BASE, ENCODER, BlockSegment, BlockStatus, Reply, Side
+from telemetry.messages import BASE, ENCODER, BlockSegment, BlockStatus, Side
 from telemetry.parameters import ParameterBlock
 from telemetry.transport.authentication import new_key, read_key
 
@@ -67,18 +68,18 @@ class Rig:
             )
 
     def watch(self) -> None:
-        send, take = self.ground.endpoint.send_segment, self.ground._on_message
+        send, hear = self.ground.endpoint.send_segment, self.ground.operator.on_block_status
 
         def sending(segment: BlockSegment) -> None:
             self.sent.append(segment.index)
             send(segment)
 
-        def taking(message: object, now: float) -> None:
-            self.said.extend([message] if isinstance(message, BlockStatus) else [])
-            take(message, now)  # type: ignore[arg-type]
+        def hearing(status: BlockStatus) -> None:
+            self.said.append(status)
+            hear(status)
 
         self.ground.endpoint.send_segment = sending  # type: ignore[method-assign]
-        self.ground._on_message = taking  # type: ignore[method-assign]
+        self.ground.operator.on_block_status = hearing  # type: ignore[method-assign]
 
     @property
     def ground(self) -> GroundProcess:
@@ -124,14 +125,18 @@ class Rig:
                 ports[side].send(frame)
 
     def upload(self, block: ParameterBlock, patience: float = 200.0) -> BlockStatus:
-        outcome = self.ground.upload(block)
-        self.run(patience, outcome.done)
-        return outcome.result(timeout=0.0)
+        """Upload a block and wait for the tube's last word on it."""
+        order = self.ground.operator.upload(block)
+        self.run(patience, lambda: order.ended)
+        assert order.ended
+        return next(status for status in reversed(self.said) if status.sequence == order.number)
 
-    def order(self, tube: int, name: str, **arguments: float) -> Reply:
-        outcome = self.ground.order(tube, name, dict(arguments))
-        self.run(60.0, outcome.done)
-        return outcome.result(timeout=0.0)
+    def order(self, tube: int, name: str, **arguments: float | str) -> Order:
+        """Order something of a tube and wait for its answer."""
+        order = self.ground.operator.command(tube, name, arguments)
+        self.run(60.0, lambda: order.answered)
+        assert order.answered
+        return order
 
     def codes(self, tube: int) -> list[str]:
         return [event.code for event in self.ground.model.events if event.tube == tube]

@@ -8,8 +8,8 @@ import pytest
 from memory_rig import NOISELESS, Rig
 
 from groundstation.config import GroundConfig
-from groundstation.service.commands import parse
 from groundstation.service.model import RigModel
+from groundstation.service.orders import Order
 from groundstation.service.views import force_var, node, stations
 from groundstation.survey.resolve import combine_imus
 from node.firmware.imu_settings import ImuSettings
@@ -17,7 +17,7 @@ from node.firmware.inputs import RigContext
 from node.firmware.settings import TubeSettings
 from node.kernels.layout import DEG, PERIOD
 from node.process.tube_process import TubeProcess
-from telemetry.messages import ImuMean, Mode, NodeFlag, Reply, SurveyMeasurement
+from telemetry.messages import ImuMean, Mode, NodeFlag, SurveyMeasurement
 
 G = 9.81
 PITCH = 0.6 * DEG
@@ -41,10 +41,8 @@ class Bored(Rig):
             self.force[tube] = frame @ force
         super().cycle()
 
-    def ordered(self, **arguments: float | str) -> Reply:
-        outcome = self.ground.order(1, "align", dict(arguments))
-        self.run(20.0, outcome.done)
-        return outcome.result(timeout=0)
+    def ordered(self, **arguments: float | str) -> Order:
+        return self.order(1, "align", **arguments)
 
 
 def test_an_alignment_is_ordered_followed_and_shown_at_the_surface(tmp_path: Path) -> None:
@@ -54,7 +52,7 @@ def test_an_alignment_is_ordered_followed_and_shown_at_the_surface(tmp_path: Pat
     rig.run(50.0)
     assert node(rig.ground.model, 1)["alignment"] is None
     reply = rig.ordered(method="circle", turns=1.0)
-    assert (reply.done, reply.detail) == (True, "turn the string slowly, 1 turns")
+    assert (reply.done, reply.values) == (True, {"method": "circle", "turns": 1.0})
     rig.spin = 10.0 * DEG
     rig.run(10.0)
     assert rig.ground.model.nodes[1].mode is Mode.ALIGNMENT
@@ -71,18 +69,6 @@ def test_an_alignment_is_ordered_followed_and_shown_at_the_surface(tmp_path: Pat
     assert rig.ground.model.nodes[1].mode is Mode.STILL
 
 
-@pytest.mark.parametrize(
-    ("given", "expected"),
-    [
-        ({}, {}),
-        ({"method": "extremes", "turns": "3"}, {"method": "extremes", "turns": 3.0}),
-        ({"turns": "1.5"}, {"turns": 1.5}),
-    ],
-)
-def test_the_parameters_of_an_order_are_words_and_numbers(given: dict, expected: dict) -> None:
-    assert parse("align", {"tube": "3"} | given) == (3, expected)
-
-
 def test_two_imus_of_a_process_arrive_as_two_means(tmp_path: Path) -> None:
     random = np.random.default_rng(1)
     settings = TubeSettings(1, limits=NOISELESS, imus=(ImuSettings(), ImuSettings(noise=2.0)))
@@ -96,7 +82,7 @@ def test_two_imus_of_a_process_arrive_as_two_means(tmp_path: Path) -> None:
 
     process.endpoint.submit = keep  # type: ignore[method-assign, assignment]
     process.tube.take_survey()
-    process._surroundings = lambda now: RigContext(True, 1, now, 1e-8, True)  # type: ignore[method-assign]
+    process._context = lambda now: RigContext(True, 1, now, 1e-8, True)  # type: ignore[method-assign]
     now = 1000.0
     for _ in range(120):
         now += PERIOD

@@ -8,12 +8,13 @@ from typing import Any
 import numpy as np
 import pytest
 from memory_rig import Rig
+from schemas import check_answer
 
 from groundstation.calibration.attitudes import true_vectors
 from groundstation.calibration.block import read
 from groundstation.errors import SelectorError
-from groundstation.service.recalibration.control import check_order
-from groundstation.service.recalibration.procedure import Ask, FieldProcedure
+from groundstation.service import key_fields
+from groundstation.service.recalibration.procedure import FieldProcedure, Request
 from groundstation.service.recalibration.progress import Phase, Progress, Stage
 from node.kernels.layout import DEG
 from telemetry.messages import BASE, BlockSegment, Reply, StaticRecord
@@ -34,13 +35,13 @@ class Field(Rig):
         self.run(12.0)
 
     def command(self, action: str, **parameters: str) -> dict[str, Any]:
-        k = self.ground.model
-        self.ground.recalibration.order({"action": action} | parameters, k.rig_now, k.tally.tubes)
+        self.ground.operator.order("recalibrate", {"action": action} | parameters)
         return self.view()
 
     def view(self) -> dict[str, Any]:
         """What the key shows, as it stands on the wire."""
         view: dict[str, Any] = json.loads(json.dumps(self.ground.model.recalibration.view()))
+        check_answer({"rig_time_s": None} | view, key_fields.RECALIBRATION)
         return view
 
     def lay(self, pitch_deg: float, roll_deg: float) -> None:
@@ -179,7 +180,7 @@ def test_no_other_block_comes_between_while_a_calibration_uploads(rig: Field) ->
     for phase in ("confirmed", "uploading", "verifying"):
         rig.run(30.0, lambda phase=phase: rig.phase(1) == phase)  # type: ignore[misc]
         with pytest.raises(SelectorError, match="tube 1: a calibration uploads to it; expected action=cancel before"):
-            rig.ground.upload(ParameterBlock(1, 9, SensorParameters(bias=(1e-3, 0.0, 0.0))))
+            rig.ground.operator.upload(ParameterBlock(1, 9, SensorParameters(bias=(1e-3, 0.0, 0.0))))
     rig.run(120.0, rig.is_done)
     check(rig)
     assert rig.upload(ParameterBlock(1, 9, SensorParameters(bias=(1e-3, 0.0, 0.0)))).phase.name == "APPLIED"
@@ -327,9 +328,9 @@ def test_an_empty_string_is_not_calibrated(tmp_path: Path) -> None:
         ({"action": "confirm"}, "proposal"),
     ],
 )
-def test_an_order_that_is_none_is_told_what_can_be(parameters: dict[str, str], named: str) -> None:
+def test_an_order_that_is_none_is_told_what_can_be(rig: Field, parameters: dict[str, str], named: str) -> None:
     with pytest.raises(SelectorError) as refused:
-        check_order(parameters)
+        rig.ground.operator.order("recalibrate", parameters)
     assert named in str(refused.value)
 
 
@@ -339,14 +340,14 @@ def test_an_order_that_is_none_is_told_what_can_be(parameters: dict[str, str], n
         ({"action": "attitude", "pitch_deg": "200", "roll_deg": "0", "seconds": "9"}, "pitch_deg: expected -180..180"),
         ({"action": "attitude", "pitch_deg": "0", "roll_deg": "nan", "seconds": "9"}, "roll_deg"),
         ({"action": "attitude", "pitch_deg": "0", "roll_deg": "0", "seconds": "1"}, "seconds: expected 5..3600"),
-        ({"action": "begin", "tubes": "1,x"}, "tubes: expected numbers"),
+        ({"action": "begin", "tubes": "1,x"}, "tubes: expected integers of 1..250"),
     ],
 )
 def test_a_parameter_out_of_range_is_named(rig: Field, parameters: dict[str, str], named: str) -> None:
     if parameters["action"] == "attitude":
         rig.command("begin")
     with pytest.raises(SelectorError) as refused:
-        rig.ground.recalibration.order(parameters, 1000.0, [1])
+        rig.ground.operator.order("recalibrate", parameters)
     assert named in str(refused.value)
 
 
@@ -370,13 +371,13 @@ def test_records_are_matched_by_the_command_that_asked_for_them() -> None:
     procedure = FieldProcedure(9.81)
     procedure.begin([1])
     (question,) = procedure.due_requests(0.0)
-    assert question == Ask(1, "parameters", {})
-    procedure.sent(question, 41)
-    procedure.on_reply(Reply(1, 41, True, f"version 0 sha256 {ParameterBlock(1, 0).sha256().hex()}"), 1.0)
+    assert question == Request(1, "parameters", {})
+    procedure.on_sent(question, 41)
+    procedure.on_reply(Reply(1, 41, True, "", {"version": 0, "sha256": ParameterBlock(1, 0).sha256().hex()}), 1.0)
     procedure.attitude(0.0, 90.0 * DEG, 8.0, 100.0)
     (ask,) = procedure.due_requests(1.0)
     assert (ask.name, ask.arguments) == ("static_record", {"seconds": 8.0})
-    procedure.sent(ask, 42)
+    procedure.on_sent(ask, 42)
     assert procedure.due_requests(10.0) == []
     procedure.on_static_record(record(7, 110.0))  # an operator's own
     assert procedure.view()["tubes"][0]["records"] == 0

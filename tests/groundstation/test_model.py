@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
+from schemas import check_answers
 
 from groundstation.config import GroundConfig
 from groundstation.errors import SelectorError
@@ -224,7 +225,7 @@ def test_a_measurement_that_is_none_is_counted_and_changes_nothing(tmp_path: Pat
     model = knowing(tmp_path, passes(2, lambda _stop, _station: 1.0), 2)
     before = result(model)
     bad = SurveyMeasurement(1, 9, 2000.0, 1, (ImuMean((0.0, 0.0, 0.0), COV),), 0.0, 1e-8, 1e-8, 32, 20.0, NodeFlag.NONE)
-    assert not model.take_survey(bad, 2.0)
+    assert not model.on_survey(bad, 2.0)
     assert not model.on_survey(survey(1, 10, 1, 1.0), None)
     assert (model.refused, model.unplaced) == (1, 1)
     assert differing(result(model), before) == []
@@ -373,6 +374,7 @@ def test_an_alarm_of_a_projection_is_cleared_when_the_hole_is_steered_back(tmp_p
 
 def test_the_alarms_tell_of_stations_that_moved(tmp_path: Path) -> None:
     model = knowing(tmp_path, moving(4, 4), 4)
+    check_answers(model)
     view = column_views.alarms(model, {})["moved"]
     assert len(view) == len(model.moved) > 0
     for row, moved in zip(view, model.moved, strict=True):

@@ -1,18 +1,23 @@
 """The ground station as a whole on a real bus: what it learns, what it answers, what survives."""
 
+import asyncio
 import contextlib
+import itertools
 import json
 import math
 import socket
-from collections.abc import Callable, Iterator
+from collections.abc import AsyncIterator, Callable, Iterator
+from concurrent.futures import ThreadPoolExecutor, as_completed
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 import msgpack
 import pytest
+from schemas import check_answers
 
 from groundstation.config import GroundConfig
+from groundstation.host import answering
 from groundstation.service.process import GroundProcess
 from telemetry.application.endpoint import Endpoint
 from telemetry.media.zenoh_bus import ZenohBus, open_client, open_router
@@ -22,6 +27,7 @@ from telemetry.messages import (
     Mode,
     NodeFlag,
     NodeState,
+    Reply,
     Severity,
     Side,
     StaticRecord,
@@ -88,15 +94,15 @@ class Rig:
         self.run(2.0)
 
 
-def ask(bus: ZenohBus, selector: str) -> Any:
-    replies = bus.get(selector, 10.0)
+async def ask(bus: ZenohBus, selector: str) -> Any:
+    replies = await asyncio.to_thread(bus.get, selector, 10.0)
     assert len(replies) == 1, replies
     assert replies[0].error is None, replies[0].error
     return json.loads(replies[0].payload)
 
 
-def refused(bus: ZenohBus, selector: str) -> str:
-    replies = bus.get(selector, 10.0)
+async def refused(bus: ZenohBus, selector: str) -> str:
+    replies = await asyncio.to_thread(bus.get, selector, 10.0)
     assert len(replies) == 1
     assert replies[0].error is not None
     return replies[0].error
@@ -117,48 +123,49 @@ def start(tmp_path: Path) -> Iterator[Callable[[], Rig]]:
 
 
 @pytest.fixture
-def rig(tmp_path: Path, buses: tuple[ZenohBus, ZenohBus]) -> Iterator[tuple[Rig, ZenohBus]]:
+async def rig(tmp_path: Path, buses: tuple[ZenohBus, ZenohBus]) -> AsyncIterator[tuple[Rig, ZenohBus]]:
     """Two tubes, bit at 4 m, one survey at 2 m and two at 4 m."""
     server, operator = buses
     rig = Rig(tmp_path)
-    with rig.ground.serving(server):
-        rig.run(3.0)
-        rig.depth(2.0)
-        rig.state(1, 1)
-        rig.survey(1, 1)
-        rig.state(2, 1)
-        rig.state(1, 2)
-        rig.depth(4.0)
-        rig.survey(1, 2, inclination_deg=3.0)
-        rig.survey(2, 1)
-        yield rig, operator
+    with contextlib.closing(rig.ground):
+        async with answering(rig.ground, server):
+            rig.run(3.0)
+            rig.depth(2.0)
+            rig.state(1, 1)
+            rig.survey(1, 1)
+            rig.state(2, 1)
+            rig.state(1, 2)
+            rig.depth(4.0)
+            rig.survey(1, 2, inclination_deg=3.0)
+            rig.survey(2, 1)
+            yield rig, operator
 
 
-def test_surveys_find_their_stations(rig: tuple[Rig, ZenohBus]) -> None:
+async def test_surveys_find_their_stations(rig: tuple[Rig, ZenohBus]) -> None:
     _, bus = rig
-    stations = ask(bus, f"{GROUND}/stations")["stations"]
+    stations = (await ask(bus, f"{GROUND}/stations"))["stations"]
     assert [(s["station"], s["md_m"], s["measurements"]) for s in stations] == [(1, 2.0, 2), (2, 4.0, 1)]
     assert stations[0]["inclination_deg"] == pytest.approx(2.0)
     assert stations[1]["azimuth_deg"] == pytest.approx(0.0, abs=1e-6)
-    assert ask(bus, f"{GROUND}/stations/2")["md_m"] == 4.0
-    assert {m["tube"] for m in ask(bus, f"{GROUND}/stations/1/measurements")["measurements"]} == {1, 2}
-    assert [t["md_m"] for t in ask(bus, f"{GROUND}/string")["tubes"]] == [2.0, 4.0]
-    assert ask(bus, f"{GROUND}/status")["measurements"] == 3
+    assert (await ask(bus, f"{GROUND}/stations/2"))["md_m"] == 4.0
+    assert {m["tube"] for m in (await ask(bus, f"{GROUND}/stations/1/measurements"))["measurements"]} == {1, 2}
+    assert [t["md_m"] for t in (await ask(bus, f"{GROUND}/string"))["tubes"]] == [2.0, 4.0]
+    assert (await ask(bus, f"{GROUND}/status"))["measurements"] == 3
 
 
-def test_a_range_answers_only_the_range(rig: tuple[Rig, ZenohBus]) -> None:
+async def test_a_range_answers_only_the_range(rig: tuple[Rig, ZenohBus]) -> None:
     _, bus = rig
-    assert [p["md_m"] for p in ask(bus, f"{GROUND}/trajectory")["points"]] == [0.0, 2.0, 4.0]
-    assert [p["md_m"] for p in ask(bus, f"{GROUND}/trajectory?md=3..12")["points"]] == [4.0]
-    assert [p["md_m"] for p in ask(bus, f"{GROUND}/trajectory?md=..2")["points"]] == [0.0, 2.0]
-    assert [p["md_m"] for p in ask(bus, f"{GROUND}/trajectory?md=2.5")["points"]] == [2.5]
-    assert [s["station"] for s in ask(bus, f"{GROUND}/stations?md=2")["stations"]] == [1]
-    assert {m["tube"] for m in ask(bus, f"{GROUND}/measurements?tube=2")["measurements"]} == {2}
+    assert [p["md_m"] for p in (await ask(bus, f"{GROUND}/trajectory"))["points"]] == [0.0, 2.0, 4.0]
+    assert [p["md_m"] for p in (await ask(bus, f"{GROUND}/trajectory?md=3..12"))["points"]] == [4.0]
+    assert [p["md_m"] for p in (await ask(bus, f"{GROUND}/trajectory?md=..2"))["points"]] == [0.0, 2.0]
+    assert [p["md_m"] for p in (await ask(bus, f"{GROUND}/trajectory?md=2.5"))["points"]] == [2.5]
+    assert [s["station"] for s in (await ask(bus, f"{GROUND}/stations?md=2"))["stations"]] == [1]
+    assert {m["tube"] for m in (await ask(bus, f"{GROUND}/measurements?tube=2"))["measurements"]} == {2}
 
 
-def test_wildcards_get_every_key_they_name(rig: tuple[Rig, ZenohBus]) -> None:
+async def test_wildcards_get_every_key_they_name(rig: tuple[Rig, ZenohBus]) -> None:
     _, bus = rig
-    assert {r.key.rsplit("/", 1)[1] for r in bus.get(f"{GROUND}/nodes/*", 10.0)} == {"1", "2"}
+    assert {r.key.rsplit("/", 1)[1] for r in await asyncio.to_thread(bus.get, f"{GROUND}/nodes/*", 10.0)} == {"1", "2"}
 
 
 @pytest.mark.parametrize(
@@ -175,45 +182,62 @@ def test_wildcards_get_every_key_they_name(rig: tuple[Rig, ZenohBus]) -> None:
         ("status?md=3", "accept"),
     ],
 )
-def test_a_wrong_selector_is_told_the_right_ones(rig: tuple[Rig, ZenohBus], selector: str, named: str) -> None:
-    assert named in refused(rig[1], f"{GROUND}/{selector}")
+async def test_a_wrong_selector_is_told_the_right_ones(rig: tuple[Rig, ZenohBus], selector: str, named: str) -> None:
+    assert named in await refused(rig[1], f"{GROUND}/{selector}")
 
 
-def test_msgpack_on_request(rig: tuple[Rig, ZenohBus]) -> None:
+async def test_every_answer_has_the_fields_that_its_key_promises(rig: tuple[Rig, ZenohBus]) -> None:
+    it, _ = rig
+    it.survey(1, 3, inclination_deg=40.0)  # out of any tolerance
+    it.tube.submit(Event(1, 9, it.now, Severity.WARNING, "overrun", {"missed": 3, "share": None}), it.now)
+    it.tube.submit(
+        StaticRecord(1, 10, 77, 1.0, 21.0, 38, (0.0, 0.0, 0.1), COV, (0.0, 0.0, -9.8), COV, 30.0, False), it.now
+    )
+    it.ground.operator.command(1, "align", {"turns": 3.0})
+    it.run(2.0)
+    number = next(iter(it.ground.model.orders)).number
+    assert check_answers(it.ground.model) >= {
+        "nodes/1", "stations/2", "stations/2/measurements", "alarms", "events", f"orders/{number}",
+    }  # fmt: skip
+    alarms = it.ground.operator.ask("alarms")
+    assert alarms["active"]
+
+
+async def test_msgpack_on_request(rig: tuple[Rig, ZenohBus]) -> None:
     _, bus = rig
-    reply = bus.get(f"{GROUND}/stations?accept=msgpack", 10.0)[0]
-    assert msgpack.unpackb(reply.payload)["stations"] == ask(bus, f"{GROUND}/stations")["stations"]
+    (reply,) = await asyncio.to_thread(bus.get, f"{GROUND}/stations?accept=msgpack", 10.0)
+    assert msgpack.unpackb(reply.payload)["stations"] == (await ask(bus, f"{GROUND}/stations"))["stations"]
 
 
-def test_a_silent_node_goes_stale_and_comes_back(rig: tuple[Rig, ZenohBus]) -> None:
+async def test_a_silent_node_goes_stale_and_comes_back(rig: tuple[Rig, ZenohBus]) -> None:
     it, bus = rig
     it.state(1, 2)
     it.depth(4.0)
-    assert ask(bus, f"{GROUND}/nodes/1")["stale"] is False
+    assert (await ask(bus, f"{GROUND}/nodes/1"))["stale"] is False
     it.run(5.0)
     it.depth(4.0)
-    assert ask(bus, f"{GROUND}/nodes/1")["stale"] is True
-    assert ask(bus, f"{GROUND}/status")["stale_tubes"] == [2, 1]
+    assert (await ask(bus, f"{GROUND}/nodes/1"))["stale"] is True
+    assert (await ask(bus, f"{GROUND}/status"))["stale_tubes"] == [2, 1]
     it.state(1, 2)
     it.depth(4.0)
-    assert ask(bus, f"{GROUND}/nodes/1")["stale"] is False
+    assert (await ask(bus, f"{GROUND}/nodes/1"))["stale"] is False
 
 
-def test_silence_is_noticed_and_told_where_no_depth_comes_any_more(rig: tuple[Rig, ZenohBus]) -> None:
+async def test_silence_is_noticed_and_told_where_no_depth_comes_any_more(rig: tuple[Rig, ZenohBus]) -> None:
     it, bus = rig
     it.state(1, 2)
     with watching(bus, f"{GROUND}/nodes/1") as seen:
-        ask(bus, f"{GROUND}/status")  # the subscription has arrived when a later question is answered
+        await ask(bus, f"{GROUND}/status")  # the subscription has arrived when a later question is answered
         it.run(6.0)
-        assert ask(bus, f"{GROUND}/nodes/1")["stale"] is True
+        assert (await ask(bus, f"{GROUND}/nodes/1"))["stale"] is True
     assert [node["stale"] for node in seen] == [True]
 
 
-def test_a_restart_forgets_and_doubles_nothing(rig: tuple[Rig, ZenohBus], start: Callable[[], Rig]) -> None:
+async def test_a_restart_forgets_and_doubles_nothing(rig: tuple[Rig, ZenohBus], start: Callable[[], Rig]) -> None:
     it, bus = rig
     it.tube.submit(Event(1, 7, it.now, Severity.INFO, "stopped"), it.now)
     it.run(2.0)
-    before = ask(bus, f"{GROUND}/stations")["stations"]
+    before = (await ask(bus, f"{GROUND}/stations"))["stations"]
     again = start()
     again.now = it.now
     model = again.ground.model
@@ -294,12 +318,12 @@ def watching(bus: ZenohBus, key: str) -> Iterator[list[Any]]:
     yield seen
 
 
-def test_a_change_is_published_on_the_key_it_changes(rig: tuple[Rig, ZenohBus]) -> None:
+async def test_a_change_is_published_on_the_key_it_changes(rig: tuple[Rig, ZenohBus]) -> None:
     it, bus = rig
     with watching(bus, f"{GROUND}/stations") as seen:
-        ask(bus, f"{GROUND}/status")  # the subscription has arrived when a later question is answered
+        await ask(bus, f"{GROUND}/status")  # the subscription has arrived when a later question is answered
         it.survey(2, 2)
-        ask(bus, f"{GROUND}/status")
+        await ask(bus, f"{GROUND}/status")
     assert seen
     assert seen[-1]["stations"][0]["measurements"] == 3
 
@@ -308,25 +332,93 @@ def test_a_change_is_published_on_the_key_it_changes(rig: tuple[Rig, ZenohBus]) 
     ("order", "named"),
     [
         ("dance?tube=1", "take_survey|static_record|parameters|align|alignment|timing|upload_parameters"),
+        ("take_survey", "tube=N"),
+        ("take_survey?tube=251", "1..250"),
+        ("take_survey?tube=99", "tube 99: not in the string; expected one of 2, 1"),
+        ("take_survey?tube=1;seconds=5", "seconds"),
         ("static_record?tube=1", "seconds"),
+        ("static_record?tube=1;seconds=long", "seconds: expected 5..3600, got 'long'"),
+        ("static_record?tube=1;seconds=4", "seconds: expected 5..3600, got '4'"),
+        ("static_record?tube=1;seconds=nan", "seconds: expected 5..3600, got 'nan'"),
+        ("align?tube=1;method=round", "method: expected circle, extremes, none, got 'round'"),
         ("align?tube=1;turns=two", "turns"),
         ("align?tube=1;speed=7", "method"),
-        ("upload_parameters?tube=9;gyroscope=identity;accelerometer=identity", "version"),
+        ("upload_parameters?tube=9;gyroscope=identity;accelerometer=identity", "tube 9: not in the string; expected"),
+        ("upload_parameters?tube=1;gyroscope=identity", "accelerometer"),
+        ("upload_parameters?tube=1;gyroscope=g;accelerometer=a;version=0", "version: expected an integer of 1..2^32-1"),
         ("upload_parameters?tube=1;gyroscope=identity;accelerometer=identity", "key_file"),
+        ("recalibrate", "begin|attitude|solve|confirm|cancel"),
+        ("recalibrate?action=begin", "key_file"),
         ("upload_parameters?tube=1;gyroscope=none;accelerometer=identity", "none.json"),
         ("upload_parameters?tube=1;gyroscope=..%2Fsecret;accelerometer=identity", "name of a file"),
     ],
 )
-def test_an_order_that_cannot_be_is_refused_by_name(rig: tuple[Rig, ZenohBus], order: str, named: str) -> None:
-    assert named in refused(rig[1], f"borechain/rig-1/cmd/{order}")
+async def test_an_order_that_cannot_be_is_refused_by_name(rig: tuple[Rig, ZenohBus], order: str, named: str) -> None:
+    it, bus = rig
+    reason = await refused(bus, f"borechain/rig-1/cmd/{order}")
+    assert named in reason
+    assert "\n" not in reason
+    assert not it.ground.operator.has_pending
+    assert (await ask(bus, f"{GROUND}/orders"))["orders"] == []
 
 
-def test_static_records_are_shown_by_tube(rig: tuple[Rig, ZenohBus]) -> None:
+async def test_an_order_waits_for_nobody_and_its_course_is_published(
+    rig: tuple[Rig, ZenohBus],
+) -> None:
+    it, bus = rig
+    with watching(bus, f"{GROUND}/orders/*") as seen:
+        silent = asyncio.create_task(ask(bus, "borechain/*/cmd/take_survey?tube=2;by=anna"))
+        live = asyncio.create_task(ask(bus, "borechain/rig-1/cmd/parameters?tube=1"))
+        orders: list[Any] = []
+        while len(orders) < 2:
+            orders = (await ask(bus, f"{GROUND}/orders"))["orders"]
+        assert {(o["command"], o["tube"], o["by"], o["state"], o["done"]) for o in orders} == {
+            ("take_survey", 2, "anna", "sent", None),
+            ("parameters", 1, "zenoh", "sent", None),
+        }
+        number = next(o["order"] for o in orders if o["tube"] == 1)
+        it.run(1.0)
+        it.tube.reply(Reply(1, number, True, "", {"version": 7, "sha256": "ab", "of a later node": 1}), it.now)
+        it.run(1.0)
+        answer = await live
+        assert (answer["state"], answer["done"], answer["values"]) == ("done", True, {"version": 7, "sha256": "ab"})
+        assert not silent.done()
+        assert await ask(bus, f"{GROUND}/orders/{number}") == answer
+    assert [view["state"] for view in seen if view["order"] == number] == ["sent", "done"]
+    silent.cancel()
+
+
+async def test_more_questions_than_can_wait_are_refused_at_once(
+    start: Callable[[], Rig], buses: tuple[ZenohBus, ZenohBus], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("groundstation.gateway.zenoh.WAITING", 2)
+    server, operator = buses
+    async with answering(start().ground, server):
+        with ThreadPoolExecutor(4) as askers:
+            asked = [askers.submit(operator.get, f"{GROUND}/status", 10.0) for _ in range(4)]
+            refused = [future.result() for future in itertools.islice(as_completed(asked), 2)]  # the loop stands still
+            answered = await asyncio.gather(*map(asyncio.wrap_future, asked))
+    assert all("ask again later" in str(replies[0].error) for replies in refused)
+    assert sum(replies[0].error is None for replies in answered) == 2
+
+
+async def test_an_order_without_an_answer_names_its_number_and_key(
+    rig: tuple[Rig, ZenohBus], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    it, bus = rig
+    monkeypatch.setattr("groundstation.gateway.zenoh.ORDER_TIMEOUT", 0.05)
+    reason = await refused(bus, "borechain/rig-1/cmd/take_survey?tube=1")
+    (order,) = it.ground.model.orders
+    assert f"order {order.number}: tube 1 has not answered take_survey" in reason
+    assert f"borechain/rig-1/ground/orders/{order.number}" in reason
+
+
+async def test_static_records_are_shown_by_tube(rig: tuple[Rig, ZenohBus]) -> None:
     it, bus = rig
     record = StaticRecord(1, 9, 77, 1.0, 21.0, 38, (0.0, 0.0, 0.1), COV, (0.0, 0.0, -9.8), COV, 30.0, False)
     it.tube.submit(record, it.now)
     it.run(2.0)
-    (row,) = ask(bus, f"{GROUND}/static_records?tube=1")["static_records"]
+    (row,) = (await ask(bus, f"{GROUND}/static_records?tube=1"))["static_records"]
     assert (row["order"], row["samples"], row["moved"], row["temperature_c"]) == (77, 38, False, 30.0)
-    assert ask(bus, f"{GROUND}/static_records?tube=2")["static_records"] == []
-    assert ask(bus, f"{GROUND}/nodes/1")["parameters_version"] == 0
+    assert (await ask(bus, f"{GROUND}/static_records?tube=2"))["static_records"] == []
+    assert (await ask(bus, f"{GROUND}/nodes/1"))["parameters_version"] == 0

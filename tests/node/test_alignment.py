@@ -7,16 +7,19 @@ import numpy as np
 import pytest
 
 from node.errors import ConfigurationError
-from node.firmware.alignment import PATIENCE, rotation
+from node.firmware import static_record
+from node.firmware.alignment import FEWEST, METHODS, MOST, PATIENCE, rotation
 from node.firmware.imu_settings import ImuSettings
 from node.firmware.inputs import ImuReading, RigContext
 from node.firmware.settings import Kernel, TubeSettings
 from node.firmware.tube import Tube
 from node.kernels.alignment import new_mount
 from node.kernels.layout import DEG, PERIOD, default_config, new_state
+from node.process.command_handlers import CommandHandlers
 from node.process.tube_process import TubeProcess
 from sim.studies.alignment.run import Setup, Turn
-from telemetry.messages import Command, Event, Mode, NodeState, Severity, SurveyMeasurement
+from telemetry.application.commands import COMMANDS, METHOD, SECONDS, TURNS, ObeyedBy
+from telemetry.messages import Command, Event, Mode, NodeState, Reply, Severity, SurveyMeasurement
 from telemetry.parameters import ParameterBlock, SensorParameters
 
 G = 9.81
@@ -112,7 +115,7 @@ def test_an_alignment_tells_every_step_and_finds_the_mount(
     assert modes[-1] in (Mode.STILL, Mode.SURVEY)
     pitch, roll, std = bored.states[-1].alignment
     assert (pitch, roll) == pytest.approx(TILT, abs=4.0 * std)
-    assert bored.tube.alignment.startswith(method)
+    assert bored.tube.alignment["method"] == method
 
 
 @pytest.mark.parametrize("kernel", ["float64", "fixed"])
@@ -260,14 +263,14 @@ def test_an_offset_is_dropped_on_order_and_with_its_accelerometer() -> None:
     bored = Bored().ordered().turned().cycles(10)
     assert bored.tube.align("none", 2.0) == ""
     assert bored.cycles(1).codes()[-1] == "alignment_dropped"
-    assert bored.tube.alignment == "none"
+    assert bored.tube.alignment == {"method": "none"}
     assert bored.states[-1].alignment == (0.0, 0.0, 0.0)
     bored = Bored().ordered().turned().cycles(10)
     bored.tube.prepare(ParameterBlock(1, 1, gyroscope=SensorParameters(bias=(1e-4, 0.0, 0.0))))
-    assert bored.tube.alignment != "none"
+    assert bored.tube.alignment["method"] != "none"
     bored.tube.prepare(ParameterBlock(1, 2, accelerometer=SensorParameters(bias=(0.01, 0.0, 0.0))))
     assert bored.cycles(1).codes()[-1] == "alignment_dropped"
-    assert bored.tube.alignment == "none"
+    assert bored.tube.alignment == {"method": "none"}
 
 
 def test_another_block_for_the_gyroscope_ends_the_alignment_under_way() -> None:
@@ -291,10 +294,10 @@ class Powered(Bored):
             self.process.take_frames(self.now)
         return self
 
-    def order(self, name: str, **arguments: float | str) -> tuple[bool, str]:
-        reply = self.process._obey(Command(1, 1, name, dict(arguments)))
+    def order(self, name: str, **arguments: float | str) -> Reply:
+        reply = self.process._commands.obey(Command(1, 1, name, dict(arguments)))
         self.process._save()
-        return reply.done, reply.detail
+        return reply
 
     def cut(self) -> "Powered":
         self.process = TubeProcess(TubeSettings(1), self.folder)
@@ -304,32 +307,53 @@ class Powered(Bored):
 def test_an_offset_survives_the_power_and_an_alignment_that_was_cut_is_told(tmp_path: Path) -> None:
     powered = Powered(tmp_path)
     powered.known()
-    assert powered.order("alignment") == (True, "none")
-    assert powered.order("align", turns=1.0)[0]
+    assert powered.order("alignment").values == {"method": "none"}
+    assert powered.order("align", turns=1.0).values == {"method": "circle", "turns": 1.0}
     powered.turned(1.2).cycles(5)
-    told = powered.order("alignment")[1]
-    assert told.startswith("circle; IMU 1: pitch 0.")
+    found = powered.order("alignment").values
+    assert found["method"] == "circle"
+    assert found["pitch"] == pytest.approx([TILT[0]], abs=4.0 * found["pitch_std"][0])
     kept = powered.process.mount.tobytes()
-    assert powered.cut().order("alignment")[1] == told
+    assert powered.cut().order("alignment").values == found
     assert powered.process.mount.tobytes() == kept
-    assert powered.cycles(8).order("align", method="extremes")[0]
+    assert powered.cycles(8).order("align", method="extremes").done
     powered.cycles(20, SLOW).cut()
     events: list[tuple[str, object]] = []
     powered.process._send_event = lambda _, code, arguments: events.append((code, arguments))  # type: ignore[method-assign]
     powered.process._announce(5.0, 5.0)
     assert events == [("alignment_refused", {"reason": "the power was cut"})]
     assert powered.process.mount.tobytes() == kept
-    assert powered.order("align", method="none") == (True, "dropped")
-    assert powered.cut().order("alignment") == (True, "none")
+    assert powered.order("align", method="none").detail == "dropped"
+    assert powered.cut().order("alignment").values == {"method": "none"}
 
 
 def test_a_process_refuses_an_order_with_its_reason(tmp_path: Path) -> None:
     powered = Powered(tmp_path)
-    assert powered.order("align") == (False, "the static bias is not known yet")
+    assert powered.order("align") == Reply(1, 1, False, "the static bias is not known yet")
     powered.known()
-    done, detail = powered.order("align", method="round")
-    assert not done
-    assert "circle, extremes" in detail
+    for arguments, reason in (
+        ({"method": "round"}, "method: expected circle, extremes, none, got 'round'"),
+        ({"method": True}, "method: expected at most"),
+        ({"turns": "two"}, "turns: expected a number in [1, 20], got 'two'"),
+        ({"turns": 21.0}, "turns: expected a number in [1, 20], got 21.0"),
+        ({"speed": 1.0}, "got speed"),
+    ):
+        reply = powered.order("align", **arguments)
+        assert not reply.done
+        assert reason in reply.detail
+    assert "alignment, timing, got 'dance'" in powered.order("dance").detail
+    assert "seconds" in powered.order("static_record").detail
+
+
+def test_the_table_of_commands_has_the_bounds_of_the_firmware() -> None:
+    assert (SECONDS.quantity.low, SECONDS.quantity.high) == (static_record.SHORTEST, static_record.LONGEST)
+    assert (TURNS.quantity.low, TURNS.quantity.high) == (FEWEST, MOST)
+    assert METHOD.quantity.choices == (*METHODS, "none")
+
+
+def test_every_command_of_a_tube_has_its_method() -> None:
+    documented = {spec.name for spec in COMMANDS if spec.by is ObeyedBy.TUBE}
+    assert documented == {name for name in vars(CommandHandlers) if name[0] != "_"} - {"obey"}
 
 
 @pytest.mark.parametrize(

@@ -10,7 +10,7 @@ from node.kernels.layout import PERIOD
 from node.process.tube_process import TubeProcess
 from telemetry.application.clock import ClockFilter
 from telemetry.messages import Aiding, Side
-from telemetry.presentation.msgpack_codec import VARIANCE
+from telemetry.schema import VARIANCE
 
 REST = (0.0, 0.0, 0.0, 0.0, 0.3, -9.8)
 

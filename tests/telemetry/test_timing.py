@@ -8,9 +8,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from node.kernels.layout import PERIOD
-from telemetry.presentation.fields import MAX_TEXT
+from telemetry.application.commands import STAGES
 from telemetry.runtime.own_clock import Schedule
-from telemetry.runtime.timing import BIN_RATIO, CycleTiming, Durations, Stage
+from telemetry.runtime.timing import BIN_RATIO, Durations, Stage
 
 seconds = st.floats(2e-6, 50.0)
 
@@ -54,10 +54,5 @@ def test_deadlines_stay_on_their_grid_and_a_late_end_leaves_out_those_that_passe
         left_out += missed
 
 
-def test_a_report_of_the_slowest_board_fits_a_reply() -> None:
-    timing = CycleTiming()
-    for stage in Stage:
-        timing.add_duration(stage, 98.7654321)
-    timing.cycles = timing.overruns = 99_999_999
-    assert len(timing.line()) <= MAX_TEXT
-    assert "cycle 98765/98765" in timing.line()
+def test_the_table_of_commands_names_every_stage() -> None:
+    assert tuple(stage.value for stage in Stage) == STAGES

@@ -15,6 +15,7 @@ from telemetry import keys
 from telemetry.runtime.options import endpoint_option
 
 SILENCE = 5.0  # wall s without a sample before ``watch`` says so
+PATIENCE, ORDER_PATIENCE = 5.0, 40.0  # s; the ground station itself waits 30 s for a tube
 TIMEOUT = "Timeout"  # zenoh's text for an answer that did not come
 rig_option = endpoint_option("Router of the rig.")
 
@@ -25,31 +26,30 @@ rig_option = endpoint_option("Router of the rig.")
 @click.option(
     "--timeout",
     type=click.FloatRange(0.1, 600.0),
-    default=5.0,
-    show_default=True,
-    help="Seconds to wait for the router, and then for the answer.",
+    help="Seconds to wait for the router, and then for the answer  [default: 5; 40 for an order]",
 )
 @click.option("--json", "as_json", is_flag=True, help="One JSON object on one line.")
 @plain_faults
-def query(selector: str, endpoint: str, timeout: float, as_json: bool) -> None:
+def query(selector: str, endpoint: str, timeout: float | None, as_json: bool) -> None:
     """Ask a running ground station for SELECTOR and print its answer.
 
     \b
     Examples:
       borechain query 'borechain/*/ground/trajectory'
       borechain query 'borechain/*/ground/trajectory?md=4..12'
-      borechain query 'borechain/rig-1/cmd/take_survey?tube=3' --timeout 40
+      borechain query 'borechain/rig-1/cmd/take_survey?tube=3'
     """
     from telemetry.media.zenoh_bus import open_client
 
     check_selector(selector)
-    with open_client(endpoint, timeout=timeout) as bus:
-        replies = bus.get(selector, timeout)
+    patience = timeout or (ORDER_PATIENCE if keys.is_order(selector) else PATIENCE)
+    with open_client(endpoint, timeout=timeout or PATIENCE) as bus:
+        replies = bus.get(selector, patience)
     answers = [reply for reply in replies if reply.error is None]
     if not answers and any(reply.error != TIMEOUT for reply in replies):
         raise InputFault(next(reply.error or "refused" for reply in replies if reply.error != TIMEOUT))
     if not answers and replies:
-        raise EnvironmentFault(f"{selector}: no answer within {timeout:g} s; a longer --timeout may help")
+        raise EnvironmentFault(f"{selector}: no answer within {patience:g} s; a longer --timeout may help")
     if not answers:
         raise EnvironmentFault(f"{selector}: nobody at {endpoint} answers it; is a ground station running? {known()}")
     show({reply.key: value_of(reply.payload) for reply in answers}, as_json=as_json)

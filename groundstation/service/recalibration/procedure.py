@@ -1,8 +1,8 @@
-"""Calibration in the field as a state machine: tell attitudes, gather records, solve, show, confirm, upload, verify.
+"""Calibration in the field as a state machine: enter attitudes, gather records, solve, show, confirm, upload, verify.
 
-No clock, no bus, no disk: the process asks what is ``due``, hands in what tubes say and keeps ``progress`` in the
-database, so that a break or a restart costs a repetition at most. A record belongs to an attitude by the sequence of
-the command that asked for it, and counts when the tubes rested there until it ended.
+No clock, no bus, no disk: the process asks for the requests that are due, hands in what tubes answer and keeps
+``progress`` in the database, so that a break or a restart costs a repetition at most. A record belongs to an attitude
+by the number of the order that asked for it, and counts when the tubes rested there until it ended.
 """
 
 from __future__ import annotations
@@ -37,7 +37,7 @@ BEFORE_UPLOAD, IN_UPLOAD = (Stage.COLLECTING, Stage.SOLVED), (Phase.UPLOADING, P
 
 
 @dataclass(frozen=True, slots=True)
-class Ask:
+class Request:
     """Something to send to a tube: a command, or a block."""
 
     tube: int
@@ -83,14 +83,14 @@ class FieldProcedure:
         if p.stage in (*BEFORE_UPLOAD, Stage.UPLOADING) and p.attitudes:
             raise SelectorError(f"a calibration of tubes {_list(p.tubes)} is {p.stage}; expected action=cancel before")
         if not tubes:
-            raise SelectorError("tubes: expected those of the string, none is known")
+            raise SelectorError("tubes: expected those of the string, no tube is known")
         self.progress = Progress(Stage.COLLECTING, [], {tube: TubeProgress(tube) for tube in sorted(set(tubes))})
         self._records.clear()
         self._again.clear()
         self._questions.clear()
 
     def attitude(self, pitch: float, roll: float, seconds: float, rig_now: float) -> None:
-        """Take it that the tubes rest at ``pitch`` and ``roll`` (rad); what was solved before is dropped.
+        """The tubes now rest at ``pitch`` and ``roll`` (rad); what was solved before is dropped.
 
         Raises
         ------
@@ -112,7 +112,7 @@ class FieldProcedure:
         Raises
         ------
         SelectorError
-            When no calibration is collecting or no tube can be solved; it says why of each.
+            When no calibration is collecting, or no tube can be solved; the message has the reason of each.
         """
         self._expect(*BEFORE_UPLOAD)
         p = self.progress
@@ -129,7 +129,7 @@ class FieldProcedure:
         p.stage, p.proposal = Stage.SOLVED, hashlib.sha256(b"".join(hashes)).hexdigest()
 
     def proposed(self, proposal: str) -> list[tuple[ParameterBlock, str]]:
-        """Blocks that ``proposal`` names, each with the text of its calibration; none when they are under way.
+        """Blocks that ``proposal`` names, each with the text of its calibration; empty when they are under way.
 
         Raises
         ------
@@ -166,31 +166,31 @@ class FieldProcedure:
         self.progress.stage = Stage.IDLE
 
     def uploads_to(self, tube: int) -> bool:
-        """Whether a tube is to get its block, or to tell that it has it."""
+        """Whether a tube is to get its block, or to confirm that it has it."""
         progress = self.progress.tubes.get(tube)
         phases = (Phase.CONFIRMED, *IN_UPLOAD)
         return progress is not None and self.progress.stage is Stage.UPLOADING and progress.phase in phases
 
-    def due_requests(self, now: float) -> list[Ask]:
+    def due_requests(self, now: float) -> list[Request]:
         """What to send at ``now`` (s, own clock)."""
         p = self.progress
-        asks = []
+        requests = []
         for tube in p.tubes.values() if p.stage in (*BEFORE_UPLOAD, Stage.UPLOADING) else ():
-            if now >= self._again.get(tube.tube, -math.inf) and (ask := self._next_ask(tube)) is not None:
-                seconds = ask.arguments.get("seconds", 0.0)
+            if now >= self._again.get(tube.tube, -math.inf) and (request := self._next_request(tube)) is not None:
+                seconds = request.arguments.get("seconds", 0.0)
                 self._again[tube.tube] = now + SILENT_AGAIN + float(seconds or 0.0)
-                asks.append(ask)
-        return asks
+                requests.append(request)
+        return requests
 
-    def sent(self, ask: Ask, sequence: int) -> None:
-        """Take the number that a command got."""
-        if ask.name == "static_record":
-            self.progress.tubes[ask.tube].orders[sequence] = len(self.progress.attitudes) - 1
-        elif ask.block is None:
-            self._questions[sequence] = ask.tube
+    def on_sent(self, request: Request, number: int) -> None:
+        """Remember the number that a request got as an order."""
+        if request.name == "static_record":
+            self.progress.tubes[request.tube].orders[number] = len(self.progress.attitudes) - 1
+        elif request.block is None:
+            self._questions[number] = request.tube
 
     def on_reply(self, reply: Reply, now: float) -> None:
-        """Take a tube's answer to a command; that to a foreign one changes nothing."""
+        """Handle a tube's answer to a command; that to a foreign one changes nothing."""
         tube = self.progress.tubes.get(reply.tube)
         if tube is None:
             return
@@ -198,11 +198,11 @@ class FieldProcedure:
             tube.detail = reply.detail
             self._again[tube.tube] = now + REFUSED_AGAIN
         elif self._questions.pop(reply.sequence, None) == reply.tube:
-            self._again.pop(tube.tube, None)
-            self._on_block_in_use(tube, reply.detail)
+            self._again[tube.tube] = now + REFUSED_AGAIN
+            self._on_block_in_use(tube, reply)
 
     def on_static_record(self, record: StaticRecord) -> None:
-        """Take a record; one that moved is asked for again while the tubes are still there."""
+        """Handle a record; one that moved is asked for again while the tubes are still there."""
         tube = self.progress.tubes.get(record.tube)
         if tube is not None and record.command in tube.orders:
             self._records[record.command] = record
@@ -223,7 +223,7 @@ class FieldProcedure:
             tube.hash_after_restart = self._whole_hash(tube, state.parameters_hash.hex())
 
     def on_block_status(self, status: BlockStatus) -> None:
-        """Take the last word on an upload."""
+        """Handle the last word on an upload."""
         tube = self.progress.tubes.get(status.tube)
         if tube is None or tube.phase is not Phase.UPLOADING or (block := tube.block) is None:
             return
@@ -246,18 +246,18 @@ class FieldProcedure:
             "tubes": [tube_view(tube, len(self._rests(tube)), self._before(tube)) for tube in p.tubes.values()],
         }
 
-    def _next_ask(self, tube: TubeProgress) -> Ask | None:
+    def _next_request(self, tube: TubeProgress) -> Request | None:
         p = self.progress
         if tube.version_before is None or tube.phase is Phase.VERIFYING:
-            return Ask(tube.tube, "parameters", {})
+            return Request(tube.tube, "parameters", {})
         if p.stage is Stage.COLLECTING and p.attitudes and p.attitudes[-1].left is None:
             place = len(p.attitudes) - 1
             if place not in self._good(tube):
-                return Ask(tube.tube, "static_record", {"seconds": p.attitudes[place].seconds})
+                return Request(tube.tube, "static_record", {"seconds": p.attitudes[place].seconds})
         if p.stage is Stage.UPLOADING and tube.phase is Phase.CONFIRMED:
             tube.phase = Phase.UPLOADING
             tube.uploads += 1
-            return Ask(tube.tube, "upload_parameters", {}, tube.block)
+            return Request(tube.tube, "upload_parameters", {}, tube.block)
         return None
 
     def _good(self, tube: TubeProgress) -> dict[int, StaticRecord]:
@@ -288,14 +288,20 @@ class FieldProcedure:
         identity = ParameterBlock(tube.tube, 0)
         return identity if tube.hash_before == identity.sha256().hex() else self.blocks.get(tube.hash_before)
 
-    def _on_block_in_use(self, tube: TubeProgress, told: str) -> None:
-        version, _, digest = told.removeprefix("version ").partition(" sha256 ")
-        if tube.version_before is None and version.isdigit():
-            tube.version_before, tube.hash_before = int(version), digest
+    def _on_block_in_use(self, tube: TubeProgress, reply: Reply) -> None:
+        version, digest = reply.values.get("version"), reply.values.get("sha256")
+        if not isinstance(version, int) or not isinstance(digest, str):
+            tube.detail = f"expected version and sha256 of the block in use, got {reply.detail or 'neither'}"
+            return
+        self._again.pop(tube.tube, None)
+        if tube.version_before is None:
+            tube.version_before, tube.hash_before = version, digest
         elif tube.phase is Phase.VERIFYING and (block := tube.block) is not None:
             tube.hash = digest
             same = digest == block.sha256().hex()
-            tube.phase, tube.detail = (Phase.DONE, "") if same else (Phase.REFUSED, f"it uses {told}")
+            tube.phase, tube.detail = (
+                (Phase.DONE, "") if same else (Phase.REFUSED, f"it uses version {version} {digest}")
+            )
             self._end_if_all_ended()
 
     def _whole_hash(self, tube: TubeProgress, short: str) -> str:

@@ -32,7 +32,7 @@ class Phase(enum.StrEnum):
     CONFIRMED = "confirmed"  # to be uploaded
     UPLOADING = "uploading"
     VERIFYING = "verifying"
-    DONE = "done"  # the tube itself told the hash
+    DONE = "done"  # the tube itself reported the hash
     REFUSED = "refused"  # the detail says by whom and why
 
 
@@ -49,7 +49,7 @@ class Attitude:
 
 @dataclass(slots=True)
 class Found:
-    """What the solution of one tube says of itself; m/s^2 and rad."""
+    """Figures of the solution of one tube; m/s^2 and rad."""
 
     residual_rms: float
     bias_std: Vector3
@@ -75,7 +75,7 @@ class TubeProgress:
     uploads: int = 0
     restarted: bool = False  # while the block was on its way
     hash_after_restart: str = ""
-    hash: str = ""  # that the tube told at the end
+    hash: str = ""  # that the tube reported at the end
 
     @property
     def block(self) -> ParameterBlock | None:
@@ -147,7 +147,7 @@ def tube_view(tube: TubeProgress, records: int, before: ParameterBlock | None) -
 
 
 def found_view(found: Found) -> View:
-    """What a solution says of itself."""
+    """Figures of a solution."""
     return {
         "residual_rms_mps2": found.residual_rms,
         "bias_std_mps2": list(found.bias_std),

@@ -16,7 +16,7 @@ from telemetry.parameters import ParameterBlock
 
 @dataclass(frozen=True, slots=True)
 class Proposal:
-    """Block of one tube, what its solution says of itself, and the text of its calibration's file."""
+    """Block of one tube, the figures of its solution, and the text of its calibration's file."""
 
     block: ParameterBlock
     found: Found
@@ -29,7 +29,7 @@ def propose(rests: Sequence[Rest], before: ParameterBlock, gravity: float, day: 
     Raises
     ------
     CalibrationError
-        When the records give none.
+        When the records give no solution.
     """
     result = solve(rests, gravity, day)
     made, old = result.calibration, before.accelerometer

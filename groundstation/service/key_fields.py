@@ -1,0 +1,319 @@
+"""The fields of every answer of the ground station, with what they mean; the unit stands in the name."""
+
+from __future__ import annotations
+
+from groundstation.service.answers import (
+    Fields,
+    group,
+    integer,
+    integers,
+    mapping,
+    number,
+    numbers,
+    rows,
+    text,
+    texts,
+    truth,
+)
+from groundstation.service.orders import OrderState
+from groundstation.service.recalibration.progress import Phase, Stage
+from telemetry.messages import Mode, NodeFlag, Severity
+
+RIG_TIME = number("rig_time_s", "rig time now", null=True)
+TUBE = integer("tube", "number of the tube")
+MD = number("md_m", "measured depth")
+FLAGS = texts("flags", "trust in the own yaw", *(str(flag.name).lower() for flag in NodeFlag if flag))
+YAW: Fields = (
+    number("yaw_deg", "yaw"),
+    number("sigma_yaw_deg", "random standard deviation of the yaw"),
+    number("sigma_systematic_deg", "constant errors of joints; never averages away"),
+)
+ANGLES: Fields = (
+    number("inclination_deg", "from the vertical"),
+    number("azimuth_deg", "from north, clockwise"),
+)
+SIGMA_ANGLES: Fields = (
+    number("sigma_inclination_deg", "standard deviation"),
+    number("sigma_azimuth_deg", "standard deviation"),
+)
+POSITION: Fields = (
+    number("north_m", "from the collar"),
+    number("east_m", "from the collar"),
+    number("tvd_m", "true vertical depth"),
+    number("sigma_north_m", "standard deviation"),
+    number("sigma_east_m", "standard deviation"),
+    number("sigma_tvd_m", "standard deviation"),
+)
+COVARIANCE = numbers("covariance_m2", "of north, east, down", 2)
+
+STATUS: Fields = (
+    text("rig", "name"),
+    RIG_TIME,
+    number("bit_md_m", "measured depth of the bit", null=True),
+    integer("tubes", "in the string"),
+    integers("stale_tubes", "tubes that have been silent for too long"),
+    integer("stations", "depths surveyed"),
+    integer("measurements", "surveys that belong to a station"),
+    integer("unplaced_measurements", "surveys without a known depth"),
+    integer("refused_measurements", "surveys with invalid numbers"),
+    text("health", "", "good", "degraded"),
+)
+STRING: Fields = (
+    RIG_TIME,
+    rows(
+        "tubes",
+        (
+            TUBE,
+            number("md_m", "measured depth of its node", null=True),
+            number("age_s", "since its newest state", null=True),
+            truth("stale", "silent for too long"),
+        ),
+    ),
+)
+NODE: Fields = (
+    TUBE,
+    number("at_s", "rig time of this state"),
+    number("age_s", "since then", null=True),
+    truth("stale", "silent for too long"),
+    integer("hops", "distance from the encoder in tubes, -1 unknown"),
+    text("mode", "execution state", *(mode.name.lower() for mode in Mode)),
+    *YAW,
+    numbers("gyro_bias_dps", "estimated bias of the gyroscope, x y z"),
+    number("scale_factor", "estimated error of the gyroscope's z scale"),
+    number("innovation_deg", "of the last aiding"),
+    number("sigma_innovation_deg", "standard deviation of the innovation"),
+    number("aiding_age_s", "since the last aiding used", null=True),
+    number("sigma_clock_s", "of the node's rig time"),
+    FLAGS,
+    integer("cycles", "since its start"),
+    integer("overruns", "cycles that ended too late"),
+    integer("parameters_version", "of the parameter block in use, 0 is the identity"),
+    text("parameters_hash", "first 8 bytes of its SHA-256, hexadecimal"),
+    group(
+        "alignment",
+        (
+            number("pitch_deg", "offset of the mount"),
+            number("roll_deg", "offset of the mount"),
+            number("sigma_deg", "of both"),
+        ),
+        null=True,
+    ),
+)
+STATION: Fields = (
+    integer("station", "number, from the collar down"),
+    MD,
+    *ANGLES,
+    *SIGMA_ANGLES,
+    integer("measurements", "clusters measured here"),
+    integer("dropped_measurements", "of them from before the hole moved"),
+    number("sigma_yaw_deg", "root mean square of those that count"),
+    number("sigma_systematic_deg", "root mean square of those that count"),
+    number("sigma_force_mps2", "root mean square of those that count, one axis"),
+    *POSITION,
+)
+STATIONS: Fields = (RIG_TIME, rows("stations", STATION))
+MEASUREMENT: Fields = (
+    integer("station", "number, from the collar down"),
+    MD,
+    TUBE,
+    integer("sequence", "the tube's number of it"),
+    number("station_at_s", "rig time, end of the average"),
+    integer("hops", "distance from the encoder in tubes"),
+    *ANGLES,
+    *SIGMA_ANGLES,
+    *YAW,
+    numbers("forces_mps2", "mean specific force of each IMU", 2),
+    integer("samples", "in the mean"),
+    number("settle_s", "between the stop and the end of the average"),
+    FLAGS,
+    texts("quality", "checks that it failed"),
+)
+MEASUREMENTS: Fields = (RIG_TIME, rows("measurements", MEASUREMENT))
+STATION_MEASUREMENTS: Fields = (RIG_TIME, integer("station", "number"), rows("measurements", MEASUREMENT))
+TRAJECTORY: Fields = (
+    RIG_TIME,
+    text("method", "how the stations are joined", "balanced-tangential"),
+    rows("points", (MD, *ANGLES, *POSITION, COVARIANCE)),
+)
+EVENTS: Fields = (
+    rows(
+        "events",
+        (
+            TUBE,
+            integer("sequence", "the tube's number of it"),
+            number("at_s", "rig time"),
+            text("severity", "", *(severity.name.lower() for severity in Severity)),
+            text("code", "what happened"),
+            mapping("arguments", "of the event"),
+        ),
+    ),
+)
+STATIC_RECORDS: Fields = (
+    rows(
+        "static_records",
+        (
+            TUBE,
+            integer("sequence", "the tube's number of it"),
+            integer("order", "number of the order that asked for it"),
+            number("begun_at_s", "rig time"),
+            number("ended_at_s", "rig time"),
+            integer("samples", "in the means"),
+            numbers("rate_rad_s", "mean, raw"),
+            numbers("rate_cov_rad2_s2", "of one sample", 2),
+            numbers("force_m_s2", "mean, raw"),
+            numbers("force_cov_m2_s4", "of one sample", 2),
+            number("temperature_c", "mean"),
+            truth("moved", "it was not at rest all the time"),
+        ),
+    ),
+)
+STDS: Fields = POSITION[3:]
+UNCERTAINTY: Fields = (
+    number("confidence", "share of true positions inside"),
+    number("sigma_plane", "standard deviations to the ellipse"),
+    number("sigma_space", "standard deviations to the ellipsoid"),
+    rows(
+        "stations",
+        (
+            MD,
+            COVARIANCE,
+            group(
+                "plan_ellipse",
+                (
+                    number("major_m", "semi-axis"),
+                    number("minor_m", "semi-axis"),
+                    number("azimuth_deg", "of the major one"),
+                ),
+            ),
+            rows("ellipsoid", (number("semi_axis_m"), numbers("direction", "unit vector: north, east, down"))),
+            mapping("sources", fields=STDS),
+        ),
+    ),
+)
+DEVIATION: Fields = (
+    MD,
+    number("along_m", "along the design axis"),
+    number("north_cm", "from the design axis"),
+    number("east_cm", "from the design axis"),
+    number("deviation_cm", "from the design axis"),
+    number("sigma_cm", "standard deviation of the deviation"),
+    number("deviation_percent", "of the length"),
+    number("direction_deg", "azimuth of the deviation"),
+    number("limit_cm", "tolerance at this depth"),
+    number("used_percent", "of the tolerance"),
+    number("level_percent", "highest alarm level reached"),
+)
+COLUMN: Fields = (
+    group(
+        "design",
+        (
+            number("inclination_deg", "of the axis"),
+            number("azimuth_deg", "of the axis"),
+            number("target_m", "length of the axis"),
+            number("radius_m", "of the finished column"),
+            text("tolerance", "preset"),
+        ),
+    ),
+    rows("stations", DEVIATION),
+    group("worst", DEVIATION),
+    group("projection", DEVIATION, null=True),
+    group(
+        "dominant",
+        (
+            text("angle", "which matters more for the position of the toe"),
+            number("by_inclination_m", "part of the uncertainty"),
+            number("by_azimuth_m", "part of the uncertainty"),
+        ),
+        null=True,
+    ),
+)
+ALARM: Fields = (
+    text("kind", "", "deviation", "projection"),
+    number("level_percent", "of the tolerance"),
+    number("raised_at_s", "rig time of the survey that raised it"),
+    MD,
+    number("deviation_cm", "then"),
+    number("sigma_cm", "standard deviation of the deviation"),
+    number("threshold_cm", "passed"),
+    number("cleared_at_s", "rig time", null=True),
+)
+ALARMS: Fields = (
+    numbers("levels_percent", "of the tolerance"),
+    rows("active", ALARM),
+    rows("cleared", ALARM),
+    rows(
+        "moved",
+        (
+            MD,
+            number("at_s", "rig time"),
+            integer("dropped_measurements", "that no longer count"),
+            number("departure_sigma", "of the new survey from those before"),
+            numbers("neighbours_sigma", "of the stations beside it"),
+        ),
+    ),
+)
+SENSOR: Fields = (numbers("matrix", "row = sensor axis", 2), numbers("bias_mps2", "at the reference temperature"))
+RECALIBRATION: Fields = (
+    RIG_TIME,
+    text("state", "", *Stage),
+    text("proposal", "hash to confirm"),
+    rows(
+        "attitudes",
+        (
+            integer("attitude", "number, from 1"),
+            number("pitch_deg", "of the tubes' axis"),
+            number("roll_deg", "about the tubes' axis"),
+            number("told_at_s", "rig time at which it was entered"),
+            number("left_at_s", "rig time; null while the tubes are there", null=True),
+        ),
+    ),
+    rows(
+        "tubes",
+        (
+            TUBE,
+            text("phase", "", *Phase),
+            text("detail", "why it is refused, or what is missing"),
+            integer("records", "at rest so far"),
+            integer("asked", "records asked for"),
+            integer("version_before", "of the block in use at the beginning", null=True),
+            text("hash_before", "of that block"),
+            group("accelerometer_before", SENSOR, null=True),
+            integer("version", "of the proposed block", null=True),
+            text("hash_proposed", "of the proposed block"),
+            group("accelerometer", SENSOR, null=True),
+            integer("uploads", "begun"),
+            truth("restarted", "while the block was on its way"),
+            text("hash_after_restart", "of the block in use then"),
+            text("hash", "that the tube reported at the end"),
+            group(
+                "solution",
+                (
+                    number("residual_rms_mps2", "of the fit"),
+                    numbers("bias_std_mps2", "standard deviation, x y z"),
+                    number("matrix_std", "largest of the nine"),
+                    number("condition", "of the fit"),
+                    group(
+                        "inclination_rms_deg",
+                        (number("before", "over the attitudes"), number("after", "over the attitudes")),
+                    ),
+                ),
+                null=True,
+            ),
+        ),
+    ),
+)
+ORDER: Fields = (
+    integer("order", "number, never used twice"),
+    number("at_s", "rig time at which it was accepted", null=True),
+    text("utc", "the same in UTC"),
+    text("by", "who ordered"),
+    integer("tube", "null for an order to the ground station", null=True),
+    text("command", "name"),
+    text("action", "step of a command that has several"),
+    mapping("arguments", "as they were ordered"),
+    text("state", "", *OrderState),
+    truth("done", "whether it was obeyed; null before the answer", null=True),
+    text("detail", "why it was refused, or what happens now"),
+    mapping("values", "of the reply, see the table of commands"),
+)
+ORDERS: Fields = (RIG_TIME, rows("orders", ORDER))

@@ -1,0 +1,248 @@
+"""The doors of the ground station: ask, order, upload, recalibrate; the same for every gateway.
+
+A plain object without bus, lock or thread: whoever calls does so from the thread that also drives the process.
+"""
+
+from __future__ import annotations
+
+import datetime
+import itertools
+from collections import deque
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from typing import Any
+
+from groundstation.config import GroundConfig
+from groundstation.errors import ConfigurationError, SelectorError
+from groundstation.service.blocks import block_of_files
+from groundstation.service.model import RigModel
+from groundstation.service.orders import Order, OrderState
+from groundstation.service.paths import find
+from groundstation.service.recalibration.control import Recalibration
+from groundstation.service.recalibration.procedure import Request
+from groundstation.service.store import Store
+from groundstation.service.uploads import Uploads
+from groundstation.service.views import View
+from telemetry.application.arguments import check_arguments, parse_parameters, parse_tube
+from telemetry.application.commands import COMMANDS, CommandSpec, ObeyedBy, find_command
+from telemetry.errors import CommandError
+from telemetry.messages import BlockStatus, Command
+from telemetry.parameters import ParameterBlock
+
+BOOT_SHIFT = 20  # orders of one start of the ground station, as a power of two
+NO_KEY = "key_file: expected the key file of the rig, without it no node takes a block"
+RECALIBRATION = "recalibration"  # who orders what the calibration in the field asks for
+
+
+@dataclass(frozen=True, slots=True)
+class BlockUpload:
+    """A block to send to its tube under the number of its order."""
+
+    number: int
+    block: ParameterBlock
+
+
+Outgoing = Command | BlockUpload
+
+
+class Operator:
+    """What operators may do, whatever gateway they come in by.
+
+    Parameters
+    ----------
+    config : of the ground station
+    model, store : what it knows, and where it keeps it
+    uploads : that are under way; None without a key of the rig
+    """
+
+    def __init__(self, config: GroundConfig, model: RigModel, store: Store, uploads: Uploads | None) -> None:
+        self._config = config
+        self._model = model
+        self._store = store
+        self._uploads = uploads
+        self._orders = model.orders
+        self._numbers = itertools.count((store.boots << BOOT_SHIFT) + 1)
+        self._pending: deque[Outgoing] = deque()
+        self._recalibration = Recalibration(model.recalibration, store, config.calibrations, self._cancel_upload)
+        self._handlers: dict[str, Callable[[Order], None]] = {
+            spec.name: getattr(self, spec.name) for spec in COMMANDS if spec.by is ObeyedBy.GROUND
+        }
+        self.wake: Callable[[], None] = lambda: None  # called when something is to be sent
+        self.changed: Callable[[list[str]], None] = lambda _paths: None  # called with the paths that changed
+
+    def ask(self, path: str, parameters: Mapping[str, str] | None = None) -> View:
+        """Answer of the path below ``ground/``, see docs/keys.md.
+
+        Raises
+        ------
+        SelectorError
+            When there is no such path, or a parameter cannot be; it lists what can.
+        """
+        return find(self._model, path).show(self._model, dict(parameters or {}))
+
+    def order(self, name: str, parameters: Mapping[str, str], by: str = "operator") -> Order:
+        """Accept an order as an operator writes it.
+
+        Raises
+        ------
+        SelectorError
+            When the command, its tube or a parameter cannot be; nothing is sent.
+        CalibrationError, ConfigurationError, StoreError
+            When the ground station cannot obey; nothing is sent.
+        """
+        try:
+            spec = find_command(name, parameters.get("action", ""))
+            tube = None if spec.action else parse_tube(spec, parameters)
+            arguments = parse_parameters(spec, parameters)
+        except CommandError as error:
+            raise SelectorError(str(error)) from error
+        return self._accept(spec, tube, arguments, by)
+
+    def command(self, tube: int, name: str, arguments: Mapping[str, Any] | None = None, by: str = "operator") -> Order:
+        """Accept an order for a tube with arguments in SI.
+
+        Raises
+        ------
+        SelectorError
+            When the command, the tube or an argument cannot be; nothing is sent.
+        """
+        given = dict(arguments or {})
+        try:
+            spec = find_command(name)
+            check_arguments(spec, given)
+        except CommandError as error:
+            raise SelectorError(str(error)) from error
+        return self._accept(spec, tube, given, by)
+
+    def upload(self, block: ParameterBlock, by: str = "operator") -> Order:
+        """Send a block to its tube until the tube has judged it.
+
+        Raises
+        ------
+        ConfigurationError
+            When the ground station has no key of the rig.
+        SelectorError
+            When the tube is unknown, or a calibration in the field uploads to it: one of the two would never end.
+        """
+        self._check_key()
+        self._check_tube(block.tube)
+        order = self._new_order(find_command("upload_parameters"), block.tube, {"version": block.version}, by)
+        self._start_upload(order, block)
+        self._keep(order)
+        return order
+
+    def upload_parameters(self, order: Order) -> None:
+        """Upload the calibrations that are named, as the version after the one in use unless a version is named."""
+        tube, arguments = order.tube or 0, order.arguments
+        version, state = arguments.get("version"), self._model.nodes.get(tube)
+        if version is None and state is None:
+            raise SelectorError(f"tube {tube}: its state, and so its version, is not known yet; expected version=..")
+        if version is None and state is not None:
+            version = state.parameters_version + 1
+        names = arguments["gyroscope"], arguments["accelerometer"]
+        block = block_of_files(self._config.calibrations, tube, int(version or 0), *names)
+        self._check_key()
+        self._start_upload(order, block)
+
+    def recalibrate(self, order: Order) -> None:
+        """Take a step of the calibration in the field."""
+        self._check_key()
+        self._recalibration.step(order.spec.action, order.arguments, self._model.rig_now, self._model.tally.tubes)
+        order.advance(OrderState.DONE)
+        self.changed(["recalibration"])
+
+    def reply_of(self, order: Order) -> View:
+        """Answer to whoever ordered: the order, or how far the calibration in the field has come."""
+        return self.ask(f"orders/{order.number}" if order.tube is not None else "recalibration")
+
+    def take_pending(self) -> list[Outgoing]:
+        """What is to be sent now."""
+        pending = list(self._pending)
+        self._pending.clear()
+        return pending
+
+    @property
+    def has_pending(self) -> bool:
+        """Whether something is to be sent."""
+        return bool(self._pending)
+
+    def due_requests(self, now: float) -> list[Outgoing]:
+        """What the calibration in the field asks for at ``now`` (s, own clock); kept before any of it leaves."""
+        procedure = self._model.recalibration
+        outgoing: list[Outgoing] = []
+        for request in procedure.due_requests(now):
+            order = self._new_order(find_command(request.name), request.tube, _arguments(request), RECALIBRATION)
+            procedure.on_sent(request, order.number)
+            self._keep(order, wake=False)
+            if request.block is not None:
+                outgoing.append(BlockUpload(order.number, request.block))
+            else:
+                outgoing.append(Command(request.tube, order.number, request.name, request.arguments))
+        if self._recalibration.keep_progress():
+            self.changed(["recalibration"])
+        return outgoing
+
+    def start_upload(self, upload: BlockUpload, now: float) -> None:
+        """Begin an upload at ``now`` (s, own clock)."""
+        if self._uploads is not None:
+            overtaken = self._uploads.start(upload.block, upload.number, now)
+            self._orders.fail(overtaken, f"order {upload.number} uploads another block")
+
+    def on_block_status(self, status: BlockStatus) -> None:
+        """Handle a tube's status of an upload."""
+        ended = self._uploads is not None and self._uploads.on_status(status)
+        self._orders.on_block_status(status, ended=ended)
+        if ended:
+            self._model.recalibration.on_block_status(status)
+
+    def publish_orders(self) -> None:
+        """Have the orders that changed published."""
+        if numbers := self._orders.drain_changed():
+            self.changed(["orders", *(f"orders/{number}" for number in numbers)])
+
+    def _accept(self, spec: CommandSpec, tube: int | None, arguments: dict[str, Any], by: str) -> Order:
+        if tube is not None:
+            self._check_tube(tube)
+        order = self._new_order(spec, tube, arguments, by)
+        if spec.by is ObeyedBy.GROUND:
+            self._handlers[spec.name](order)
+        elif tube is not None:
+            self._pending.append(Command(tube, order.number, spec.name, arguments))
+        self._keep(order)
+        return order
+
+    def _new_order(self, spec: CommandSpec, tube: int | None, arguments: dict[str, Any], by: str) -> Order:
+        utc = datetime.datetime.now(datetime.UTC).isoformat(timespec="milliseconds")
+        return Order(next(self._numbers), spec, tube, arguments, by, self._model.rig_now, utc)
+
+    def _keep(self, order: Order, *, wake: bool = True) -> None:
+        self._orders.add(order)
+        self.publish_orders()
+        if wake:
+            self.wake()
+
+    def _start_upload(self, order: Order, block: ParameterBlock) -> None:
+        """Keep a block, so that what the tube uses later can be named, and have it sent."""
+        if self._model.recalibration.uploads_to(block.tube):
+            raise SelectorError(f"tube {block.tube}: a calibration uploads to it; expected action=cancel before")
+        self._store.keep_block(block)
+        self._model.recalibration.blocks[block.sha256().hex()] = block
+        self._pending.append(BlockUpload(order.number, block))
+
+    def _cancel_upload(self, tube: int) -> None:
+        if self._uploads is not None:
+            self._orders.fail(self._uploads.cancel(tube), "cancelled")
+
+    def _check_key(self) -> None:
+        if self._uploads is None:
+            raise ConfigurationError(NO_KEY)
+
+    def _check_tube(self, tube: int) -> None:
+        known = self._model.tally.tubes + [t for t in sorted(self._model.nodes) if t not in self._model.tally.tubes]
+        if tube not in known:
+            expected = f"expected one of {', '.join(map(str, known))}" if known else "no tube has reported yet"
+            raise SelectorError(f"tube {tube}: not in the string; {expected}")
+
+
+def _arguments(request: Request) -> dict[str, Any]:
+    return dict(request.arguments) if request.block is None else {"version": request.block.version}

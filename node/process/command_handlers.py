@@ -1,0 +1,97 @@
+"""What a tube does when it is ordered to: one method for each command of the table that a tube obeys."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
+from typing import Any
+
+from node.firmware.tube import Tube
+from telemetry.application.arguments import check_arguments
+from telemetry.application.commands import COMMANDS, ObeyedBy
+from telemetry.errors import CommandError
+from telemetry.messages import Command, Reply, Value
+from telemetry.quantities import MAX_TEXT
+from telemetry.runtime.timing import CycleTiming
+
+SPECS = {spec.name: spec for spec in COMMANDS if spec.by is ObeyedBy.TUBE}
+
+
+@dataclass(frozen=True, slots=True)
+class Outcome:
+    """Whether an order is obeyed, why not or what happens now, and what the table of commands promises."""
+
+    done: bool
+    detail: str = ""
+    values: dict[str, Value] = field(default_factory=dict)
+
+
+class CommandHandlers:
+    """Obeys orders; a command without its method here is an error at the start.
+
+    Parameters
+    ----------
+    tube : firmware of the node
+    timing : where the node's own clock keeps its measurements; None in a stepped process
+    """
+
+    def __init__(self, tube: Tube, timing: CycleTiming | None) -> None:
+        self._tube = tube
+        self._timing = timing
+        self._handlers: dict[str, Callable[[Mapping[str, Any], int], Outcome]] = {
+            name: getattr(self, name) for name in SPECS
+        }
+
+    def obey(self, command: Command) -> Reply:
+        """Outcome of a command; a wrong name, argument or range is refused before anything is done."""
+        try:
+            if command.name not in SPECS:
+                raise CommandError(f"expected {', '.join(SPECS)}, got {command.name!r:.40}")
+            arguments = check_arguments(SPECS[command.name], command.arguments)
+        except CommandError as error:
+            outcome = Outcome(False, str(error))
+        else:
+            outcome = self._handlers[command.name](arguments, command.sequence)
+        return Reply(
+            self._tube.settings.tube, command.sequence, outcome.done, outcome.detail[:MAX_TEXT], outcome.values
+        )
+
+    def take_survey(self, _arguments: Mapping[str, Any], _sequence: int) -> Outcome:
+        """Measure the station again."""
+        self._tube.take_survey()
+        return Outcome(True, "at the next settled cycle")
+
+    def static_record(self, arguments: Mapping[str, Any], sequence: int) -> Outcome:
+        """Average raw readings at rest."""
+        seconds = arguments["seconds"]
+        if refused := self._tube.start_record(seconds, sequence):
+            return Outcome(False, refused)
+        return Outcome(True, "recording", {"seconds": seconds})
+
+    def parameters(self, _arguments: Mapping[str, Any], _sequence: int) -> Outcome:
+        """Name the parameter block in use."""
+        block = self._tube.parameters
+        return Outcome(True, values={"version": block.version, "sha256": block.sha256().hex()})
+
+    def align(self, arguments: Mapping[str, Any], _sequence: int) -> Outcome:
+        """Find the mount of the IMUs in the coming turns, or drop it."""
+        method, turns = arguments["method"], arguments["turns"]
+        if refused := self._tube.align(method, turns):
+            return Outcome(False, refused)
+        if method == "none":
+            return Outcome(True, "dropped", {"method": method})
+        return Outcome(True, "turn the string slowly", {"method": method, "turns": turns})
+
+    def alignment(self, _arguments: Mapping[str, Any], _sequence: int) -> Outcome:
+        """Name the alignment in use."""
+        return Outcome(True, values=self._tube.alignment)
+
+    def timing(self, _arguments: Mapping[str, Any], _sequence: int) -> Outcome:
+        """Say how late the cycles start and how long their stages take."""
+        if self._timing is None:
+            return Outcome(False, "expected a node with a clock of its own")
+        values: dict[str, Value] = {"cycles": self._timing.cycles, "overruns": self._timing.overruns}
+        for stage, durations in self._timing.stages.items():
+            if durations.count:
+                values |= {f"{stage.value}_p99": durations.quantile(0.99), f"{stage.value}_max": durations.largest}
+        return Outcome(True, values=values)

@@ -1,0 +1,210 @@
+"""What an operator may order: one line a command, read by the node, the ground station and the documentation.
+
+To add a command, add its line to ``COMMANDS`` and a method of its name: to ``node.process.command_handlers`` for one
+that a tube obeys, to ``groundstation.service.operator`` for one that the ground station obeys itself. Values are SI
+and radians; an operator reads and writes them with the unit in the name (``pitch_deg``).
+"""
+
+from __future__ import annotations
+
+import enum
+import math
+from dataclasses import dataclass
+from typing import Any
+
+from telemetry.errors import CommandError
+from telemetry.messages import MAX_TUBE, Scalar
+from telemetry.parameters import MAX_VERSION
+from telemetry.quantities import Quantity, ValueKind
+
+SHORTEST_RECORD, LONGEST_RECORD = 5.0, 3600.0  # s
+FEWEST_TURNS, MOST_TURNS = 1.0, 20.0
+STAGES = ("synchronise", "start", "aiding", "frame", "read", "filter", "report", "save", "send", "cycle")
+
+
+class ObeyedBy(enum.Enum):
+    """Who obeys a command."""
+
+    TUBE = "tube"
+    GROUND = "ground station"
+
+
+@dataclass(frozen=True, slots=True)
+class Argument:
+    """An argument: what it may be, whether it is needed, and what stands for it where it is left out."""
+
+    quantity: Quantity
+    needed: bool = False
+    default: Scalar = None
+
+
+@dataclass(frozen=True, slots=True)
+class CommandSpec:
+    """One command.
+
+    ``action`` distinguishes the steps of a command that has several. ``goes_on``: the work begins when the tube
+    answers, and its result, a static record, carries the number of the order.
+    """
+
+    name: str
+    by: ObeyedBy
+    meaning: str
+    arguments: tuple[Argument, ...] = ()
+    reply: tuple[Quantity, ...] = ()
+    action: str = ""
+    goes_on: bool = False
+
+
+def _argument(name: str, kind: ValueKind, meaning: str, **more: Any) -> Argument:
+    needed, default = more.pop("needed", False), more.pop("default", None)
+    return Argument(Quantity(name, kind, meaning, **more), needed, default)
+
+
+def _result(name: str, kind: ValueKind, meaning: str, unit: str = "") -> Quantity:
+    return Quantity(name, kind, meaning, unit)
+
+
+NUMBER, INTEGER, TEXT = ValueKind.NUMBER, ValueKind.INTEGER, ValueKind.TEXT
+SECONDS = _argument(
+    "seconds", NUMBER, "length of the record", unit="s", low=SHORTEST_RECORD, high=LONGEST_RECORD, needed=True
+)
+METHOD = _argument(
+    "method",
+    TEXT,
+    "how the mount is found; none drops what was found",
+    choices=("circle", "extremes", "none"),
+    default="circle",
+)
+TURNS = _argument(
+    "turns", NUMBER, "slow turns of the string to use", unit="1", low=FEWEST_TURNS, high=MOST_TURNS, default=2.0
+)
+VERSION = _argument(
+    "version",
+    INTEGER,
+    "of the new block; one more than that of the tube's last state when left out",
+    unit="1",
+    low=1,
+    high=MAX_VERSION,
+)
+FILE = "file of the folder `calibrations` without its `.json`, or `identity`"
+SHA256 = _result("sha256", TEXT, "hash of the parameter block in use")
+ONE_AN_IMU = "one an IMU"
+
+COMMANDS: tuple[CommandSpec, ...] = (
+    CommandSpec("take_survey", ObeyedBy.TUBE, "measures its station again at the next settled cycle"),
+    CommandSpec(
+        "static_record",
+        ObeyedBy.TUBE,
+        "averages its raw readings at rest; the record appears under `ground/static_records` with the order's number",
+        (SECONDS,),
+        (_result("seconds", NUMBER, "length of the record", "s"),),
+        goes_on=True,
+    ),
+    CommandSpec(
+        "parameters",
+        ObeyedBy.TUBE,
+        "names the parameter block in use",
+        reply=(_result("version", INTEGER, "of the block in use, 0 is the identity", "1"), SHA256),
+    ),
+    CommandSpec(
+        "align",
+        ObeyedBy.TUBE,
+        "finds the mount of its IMUs in the coming slow turns, or drops it ([operating](operate.md#alignment))",
+        (METHOD, TURNS),
+        (_result("method", TEXT, "that is used"), _result("turns", NUMBER, "that are waited for", "1")),
+    ),
+    CommandSpec(
+        "alignment",
+        ObeyedBy.TUBE,
+        "names the alignment in use",
+        reply=(
+            _result("method", TEXT, "circle, extremes or none"),
+            _result("pitch", ValueKind.NUMBERS, ONE_AN_IMU, "rad"),
+            _result("pitch_std", ValueKind.NUMBERS, ONE_AN_IMU, "rad"),
+            _result("roll", ValueKind.NUMBERS, ONE_AN_IMU, "rad"),
+            _result("roll_std", ValueKind.NUMBERS, ONE_AN_IMU, "rad"),
+        ),
+    ),
+    CommandSpec(
+        "timing",
+        ObeyedBy.TUBE,
+        f"says how late its cycles start and how long their stages take, with a clock of its own: {', '.join(STAGES)}",
+        reply=(
+            _result("cycles", INTEGER, "since the start", "1"),
+            _result("overruns", INTEGER, "cycles that ended too late", "1"),
+            *(
+                _result(f"{stage}_{which}", NUMBER, f"of {stage}, {text}; left out where nothing was measured", "s")
+                for stage in STAGES
+                for which, text in (("p99", "99th percentile"), ("max", "largest"))
+            ),
+        ),
+    ),
+    CommandSpec(
+        "upload_parameters",
+        ObeyedBy.GROUND,
+        "sends the tube a new parameter block until the tube has judged it",
+        (_argument("gyroscope", TEXT, FILE, needed=True), _argument("accelerometer", TEXT, FILE, needed=True), VERSION),
+        (
+            _result("phase", TEXT, "applied, refused or untrusted"),
+            _result("version", INTEGER, "of the block in use", "1"),
+            SHA256,
+        ),
+    ),
+    CommandSpec(
+        "recalibrate",
+        ObeyedBy.GROUND,
+        "starts a calibration in the field and asks the tubes for their blocks in use",
+        (_argument("tubes", ValueKind.INTEGERS, "as 1,2,3; those of the string when left out", low=1, high=MAX_TUBE),),
+        action="begin",
+    ),
+    CommandSpec(
+        "recalibrate",
+        ObeyedBy.GROUND,
+        "the tubes now rest at this attitude: asks each for a static record",
+        (
+            _argument("pitch", NUMBER, "of the tubes' axis", unit="rad", low=-math.pi, high=math.pi, needed=True),
+            _argument("roll", NUMBER, "about the tubes' axis", unit="rad", low=-math.pi, high=math.pi, needed=True),
+            SECONDS,
+        ),
+        action="attitude",
+    ),
+    CommandSpec(
+        "recalibrate",
+        ObeyedBy.GROUND,
+        "solves what has come; the reply shows the proposed blocks and their `proposal`",
+        action="solve",
+    ),
+    CommandSpec(
+        "recalibrate",
+        ObeyedBy.GROUND,
+        "uploads the proposed blocks, if they are those that were shown",
+        (_argument("proposal", TEXT, "hash that the solution showed", needed=True),),
+        action="confirm",
+    ),
+    CommandSpec(
+        "recalibrate",
+        ObeyedBy.GROUND,
+        "ends the calibration; a block that a tube has stays there",
+        action="cancel",
+    ),
+)
+NAMES = tuple(dict.fromkeys(spec.name for spec in COMMANDS))
+
+
+def find_command(name: str, action: str = "") -> CommandSpec:
+    """Line of the table.
+
+    Raises
+    ------
+    CommandError
+        When there is no such command; the message lists the known ones.
+    """
+    lines = [spec for spec in COMMANDS if spec.name == name]
+    if not lines:
+        raise CommandError(f"expected cmd/{'|'.join(NAMES)}, got {name!r:.40}")
+    for spec in lines:
+        if spec.action == action:
+            return spec
+    if not any(spec.action for spec in lines):
+        raise CommandError(f"cmd/{name}: expected no action, got {action!r:.40}")
+    raise CommandError(f"expected cmd/{name}?action={'|'.join(spec.action for spec in lines)}, got {action!r:.40}")

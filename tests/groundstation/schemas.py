@@ -1,0 +1,24 @@
+"""Checks of real answers against the fields that their keys promise."""
+
+from typing import Any
+
+import jsonschema
+
+from groundstation.service.answers import Fields, object_schema
+from groundstation.service.model import RigModel
+from groundstation.service.paths import paths
+
+
+def check_answer(view: dict[str, Any], fields: Fields) -> None:
+    """An answer has the fields of its key, all of them and no others."""
+    schema = object_schema(fields)
+    jsonschema.Draft202012Validator.check_schema(schema)
+    jsonschema.validate(view, schema)
+
+
+def check_answers(model: RigModel) -> set[str]:
+    """Every answer that a model has; returns their paths."""
+    found = paths(model)
+    for path in found.values():
+        check_answer(path.show(model, {}), path.fields)
+    return set(found)
