@@ -6,9 +6,11 @@ import shlex
 import textwrap
 from pathlib import Path
 
+import numpy as np
 import pytest
 from click.testing import CliRunner, Result
 
+from borechain.cli.calibrate.calibrate import calibrate
 from borechain.cli.experiment.experiment import experiment
 from sim.errors import TableError
 from sim.instruments.instrument import Instrument
@@ -92,6 +94,23 @@ def test_an_instrument_is_added_by_its_line(place: Path, tmp_path: Path, monkeyp
     assert json.loads(done.stdout)["files"] == [str(tmp_path / name) for name in ("plumb.csv", "truth.json")]
     assert (tmp_path / "plumb.csv").read_text() == "angle_deg\n0\n"
     assert json.loads((tmp_path / "truth.json").read_text()) == {"plumb": {"seed": 3}}
+
+
+@pytest.mark.parametrize(
+    ("name", "words", "matrix", "allowed"),
+    [
+        ("turntable", ["--reference", "720"], "matrix", 1e-3),  # the table's own axes lean by 1e-4 rad
+        ("attitudes", [], "matrix_mps2_per_g", 5e-3),
+    ],
+)
+def test_a_calibration_finds_the_truth_of_its_instrument(
+    name: str, words: list[str], matrix: str, allowed: float, tmp_path: Path
+) -> None:
+    assert ask("records", "--out", tmp_path, "--seed", 2).exit_code == 0
+    done = CliRunner().invoke(calibrate, [name, str(tmp_path / f"{name}.csv"), *words, "--json"])
+    assert done.exit_code == 0, done.output
+    truth = json.loads((tmp_path / "truth.json").read_text())[name]
+    np.testing.assert_allclose(json.loads(done.stdout)["matrix"], truth[matrix], atol=allowed)
 
 
 @pytest.mark.parametrize("table", [STUDIES, INSTRUMENTS], ids=["studies", "instruments"])
