@@ -21,6 +21,8 @@ from sim.studies.study import Option, Study, Table
 from sim.studies.table import STUDIES
 
 RESULTS = Path(__file__).parents[2] / "docs" / "results"
+# ten seconds of CPU or more with two seeds; the modes share the code of two-nodes, the others have tests of their own
+LONG = {"update-modes", "single-updates", "fifty-nodes", "delay", "consistency", "outage"}
 STUDY = """
     from groundstation.report.style import new_figure
 
@@ -127,7 +129,11 @@ def test_no_study_takes_the_name_of_a_command_of_the_group() -> None:
     assert not set(experiment.commands) & set(STUDIES)
 
 
-@pytest.mark.parametrize("study", STUDIES.values(), ids=lambda study: study.name)
+def costs(study: Study) -> list[pytest.MarkDecorator]:
+    return [pytest.mark.statistical] if study.name in LONG else [pytest.mark.slow]
+
+
+@pytest.mark.parametrize("study", [pytest.param(s, id=s.name, marks=costs(s)) for s in STUDIES.values()])
 def test_every_study_runs_with_few_seeds_and_keeps_what_its_line_says(study: Study, tmp_path: Path) -> None:
     done = ask(study.name, *shlex.split(study.short), "--out", tmp_path, "--json")
     assert done.exit_code == 0, done.output
