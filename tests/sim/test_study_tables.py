@@ -6,9 +6,11 @@ import shlex
 import textwrap
 from pathlib import Path
 
+import numpy as np
 import pytest
 from click.testing import CliRunner, Result
 
+from borechain.cli.calibrate.calibrate import calibrate
 from borechain.cli.experiment.experiment import experiment
 from sim.errors import TableError
 from sim.instruments.instrument import Instrument
@@ -19,6 +21,8 @@ from sim.studies.study import Option, Study, Table
 from sim.studies.table import STUDIES
 
 RESULTS = Path(__file__).parents[2] / "docs" / "results"
+# ten seconds of CPU or more with two seeds; the modes share the code of two-nodes, the others have tests of their own
+LONG = {"update-modes", "single-updates", "fifty-nodes", "delay", "consistency", "outage"}
 STUDY = """
     from groundstation.report.style import new_figure
 
@@ -94,6 +98,23 @@ def test_an_instrument_is_added_by_its_line(place: Path, tmp_path: Path, monkeyp
     assert json.loads((tmp_path / "truth.json").read_text()) == {"plumb": {"seed": 3}}
 
 
+@pytest.mark.parametrize(
+    ("name", "words", "matrix", "allowed"),
+    [
+        ("turntable", ["--reference", "720"], "matrix", 1e-3),  # the table's own axes lean by 1e-4 rad
+        ("attitudes", [], "matrix_mps2_per_g", 5e-3),
+    ],
+)
+def test_a_calibration_finds_the_truth_of_its_instrument(
+    name: str, words: list[str], matrix: str, allowed: float, tmp_path: Path
+) -> None:
+    assert ask("records", "--out", tmp_path, "--seed", 2).exit_code == 0
+    done = CliRunner().invoke(calibrate, [name, str(tmp_path / f"{name}.csv"), *words, "--json"])
+    assert done.exit_code == 0, done.output
+    truth = json.loads((tmp_path / "truth.json").read_text())[name]
+    np.testing.assert_allclose(json.loads(done.stdout)["matrix"], truth[matrix], atol=allowed)
+
+
 @pytest.mark.parametrize("table", [STUDIES, INSTRUMENTS], ids=["studies", "instruments"])
 def test_two_lines_of_one_name_are_refused_in_one_line(table: dict) -> None:
     name, line = next(iter(table.items()))
@@ -108,8 +129,11 @@ def test_no_study_takes_the_name_of_a_command_of_the_group() -> None:
     assert not set(experiment.commands) & set(STUDIES)
 
 
-@pytest.mark.slow
-@pytest.mark.parametrize("study", STUDIES.values(), ids=lambda study: study.name)
+def costs(study: Study) -> list[pytest.MarkDecorator]:
+    return [pytest.mark.statistical] if study.name in LONG else [pytest.mark.slow]
+
+
+@pytest.mark.parametrize("study", [pytest.param(s, id=s.name, marks=costs(s)) for s in STUDIES.values()])
 def test_every_study_runs_with_few_seeds_and_keeps_what_its_line_says(study: Study, tmp_path: Path) -> None:
     done = ask(study.name, *shlex.split(study.short), "--out", tmp_path, "--json")
     assert done.exit_code == 0, done.output
