@@ -88,6 +88,7 @@ class Scheduler:
         self._missing_since: dict[int, float] = {}
         self._changes: deque[Change] = deque()
         self._stopping = False
+        self.now = world.begin  # s, rig time of the newest event
         self._interrupt: queue.SimpleQueue[None] = queue.SimpleQueue()  # its put is safe inside a signal handler
         self._wall_begin = 0.0
 
@@ -240,6 +241,7 @@ class Scheduler:
         true_time: dict[tuple[int, float], float] = {}
         while self._queue and self._queue[0][0] < limit:
             at, address, _, _, kind, frame = heapq.heappop(self._queue)
+            self.now = at
             if kind is None:
                 self._add_cycle(at, steps, true_time)
             elif kind is Due.CYCLE:

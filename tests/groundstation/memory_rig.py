@@ -1,9 +1,10 @@
-"""A string in memory: ground station, encoder node and tubes as processes over joints with troubles, on one clock."""
+"""A string whose tubes are held by hand: the one string in this process, its readings set by the test."""
 
 from __future__ import annotations
 
 from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -12,63 +13,95 @@ from groundstation.service.orders import Order
 from groundstation.service.process import GroundProcess
 from node.firmware.sensor_faults import SensorLimits
 from node.firmware.settings import TubeSettings
-from node.kernels.layout import PERIOD
 from node.process.encoder_process import EncoderProcess
 from node.process.tube_process import TubeProcess
-from telemetry.media.memory import MemoryPort, joint
+from sim.rig.in_process import Build, InProcessStepper
+from sim.rig.scheduler import Scheduler
+from sim.world.scenario import scenario_of
+from sim.world.world import World
 from telemetry.messages import BASE, ENCODER, BlockSegment, BlockStatus, Side
 from telemetry.parameters import ParameterBlock
 from telemetry.transport.authentication import new_key, read_key
 
-STEP = 0.01
-
-
 # readings here hold no noise: a stuck sensor looks like them
 NOISELESS = SensorLimits(repeats_together=0, repeats_alone=0)
+HELD_S = 50_000.0  # longer than any test lasts
 
 
-def arrived(port: MemoryPort, now: float) -> list[bytes]:
-    """Frames that have come to a port by ``now``."""
-    frames: list[bytes] = []
-    port.listen(frames.append)
-    port.advance(now)
-    return frames
+class HandWorld(World):
+    """A string that hangs complete and is not drilled; the test turns and leans every tube as it likes."""
+
+    def __init__(self, tubes: int, seed: int, before_cycle: Callable[[], None], **medium: float) -> None:
+        usual = {"latency_ms": 3.0, "jitter_ms": 0.0, "loss": 0.0, "duplicate": 0.0}
+        tables: dict[str, Any] = {
+            "rig": {"tubes": tubes, "tubes_at_start": tubes, "tube_length_m": 2.0},
+            "path": {"straight": {}},
+            "schedule": {"add_s": HELD_S, "blocks": 1},
+            "clocks": {"offset_std_s": 0.0, "drift_std_ppm": 0.0},
+            "medium": usual | medium,
+        }
+        super().__init__(scenario_of(tables), seed)
+        self.rate = {tube: np.zeros(3) for tube in range(1, tubes + 1)}  # rad/s
+        self.force = {tube: np.array([0.0, 0.0, -9.81]) for tube in range(1, tubes + 1)}  # m/s^2
+        self._before_cycle = before_cycle
+
+    def imu_sample(self, tube: int, cycle: int) -> list[float]:
+        return [float(x) for x in (*self.rate[tube], *self.force[tube], 30.0)]
+
+    def encoder_sample(self, t: float) -> tuple[int, float, int, float | None, tuple[float, ...]]:
+        """The head stands; it is read first in every cycle."""
+        self._before_cycle()
+        return 0, t - 100.0, 1, None, ()
 
 
 class Rig:
-    """Surface end, drive head and tubes, top tube first, on one clock; the bench turns and leans the tubes."""
+    """Surface end, drive head and tubes, top tube first, on one clock."""
 
-    def __init__(self, folder: Path, tubes: list[int], seed: int = 0, **troubles: float) -> None:
+    def __init__(self, folder: Path, tubes: list[int], seed: int = 0, **medium: float) -> None:
+        assert tubes == list(range(len(tubes), 0, -1))
         self.folder = folder
         self.key_file = new_key(folder / "rig.key")
-        self.addresses = [BASE, ENCODER, *tubes]
-        self.joints = [joint(seed + k, **troubles) for k in range(len(self.addresses) - 1)]
-        self.now = 1000.0
-        self.rate = {tube: np.zeros(3) for tube in tubes}
-        self.force = {tube: np.array([0.0, 0.0, -9.81]) for tube in tubes}
-        self.processes: dict[int, GroundProcess | EncoderProcess | TubeProcess] = {}
         self.sent: list[int] = []  # indices of the segments that left the ground station
         self.said: list[BlockStatus] = []
-        for address in self.addresses:
-            self.start(address)
+        self.world = HandWorld(len(tubes), seed, self.cycle, **medium)
+        self.rate, self.force = self.world.rate, self.world.force
+        builders: dict[int, Build] = {address: lambda a=address: self.build(a) for address in (BASE, ENCODER, *tubes)}  # type: ignore[misc]
+        self.stepper = InProcessStepper(builders)
+        self.scheduler = Scheduler(self.world, self.stepper, self.stepper.follow)
+        self.processes = self.stepper.processes
+        self.now = self.world.begin
+        self.scheduler.begin()
 
-    def start(self, address: int) -> None:
-        """Start a process, once more in its folder, as after a power cut."""
+    def build(self, address: int) -> GroundProcess | EncoderProcess | TubeProcess:
+        """A process, in its folder."""
         folder = self.folder / str(address)
         if address == BASE:
-            if BASE in self.processes:
-                self.ground.store.close()
-            self.processes[BASE] = GroundProcess(GroundConfig(folder=folder, key_file=self.key_file))
-            self.watch()
-        elif address == ENCODER:
-            self.processes[ENCODER] = EncoderProcess(folder)
-        else:
-            self.processes[address] = TubeProcess(
-                TubeSettings(address, limits=NOISELESS), folder, key=read_key(self.folder / "rig.key")
-            )
+            ground = GroundProcess(GroundConfig(folder=folder, key_file=self.key_file))
+            self.watch(ground)
+            return ground
+        if address == ENCODER:
+            return EncoderProcess(folder)
+        return TubeProcess(TubeSettings(address, limits=NOISELESS), folder, key=read_key(self.folder / "rig.key"))
 
-    def watch(self) -> None:
-        send, hear = self.ground.endpoint.send_segment, self.ground.operator.on_block_status
+    def start(self, address: int) -> None:
+        """Start a process once more, as after a power cut."""
+        if address == BASE:
+            self.ground.store.close()
+        self.processes[address] = self.build(address)
+
+    def part(self, upper: int, lower: int) -> None:
+        """Open a joint: nothing passes between the two."""
+        self.scheduler.channel.severed |= {(upper, Side.LOWER), (lower, Side.UPPER)}
+
+    def join(self, upper: int, lower: int) -> None:
+        """Close it again."""
+        self.scheduler.channel.severed -= {(upper, Side.LOWER), (lower, Side.UPPER)}
+
+    def cycle(self) -> None:
+        """What happens before a cycle is read; for a subclass."""
+
+    def watch(self, ground: GroundProcess) -> None:
+        send, hear = ground.endpoint.send_segment, ground.operator.on_block_status
 
         def sending(segment: BlockSegment) -> None:
             self.sent.append(segment.index)
@@ -78,8 +111,8 @@ class Rig:
             self.said.append(status)
             hear(status)
 
-        self.ground.endpoint.send_segment = sending  # type: ignore[method-assign]
-        self.ground.operator.on_block_status = hearing  # type: ignore[method-assign]
+        ground.endpoint.send_segment = sending  # type: ignore[method-assign]
+        ground.operator.on_block_status = hearing  # type: ignore[method-assign]
 
     @property
     def ground(self) -> GroundProcess:
@@ -93,36 +126,10 @@ class Rig:
         return process
 
     def run(self, duration: float, until: Callable[[], bool] = lambda: False) -> None:
-        end, cycle_at = self.now + duration, self.now
-        while self.now < end and not until():
-            if self.now >= cycle_at:
-                cycle_at += PERIOD
-                self.cycle()
-            for place, address in enumerate(self.addresses):
-                self.exchange(place, self.processes[address])
-            self.now += STEP
-
-    def cycle(self) -> None:
-        for address, process in self.processes.items():
-            if isinstance(process, TubeProcess):
-                reading = [self.now - PERIOD, *self.rate[address], *self.force[address], 30.0]
-                process.on_cycle([float(x) for x in reading], self.now)
-            elif isinstance(process, EncoderProcess):
-                process.on_cycle([self.now - PERIOD, 0, self.now - 100.0, 1], self.now)
-            process.on_timer(self.now)
-
-    def exchange(self, place: int, process: GroundProcess | EncoderProcess | TubeProcess) -> None:
-        ports: dict[Side, MemoryPort] = {}
-        if place > 0:
-            ports[Side.UPPER] = self.joints[place - 1][1]
-        if place < len(self.joints):
-            ports[Side.LOWER] = self.joints[place][0]
-        for side, port in ports.items():
-            for frame in arrived(port, self.now):
-                process.on_frame(side, frame, self.now)
-        for side, frame in process.take_frames(self.now):
-            if side in ports:
-                ports[side].send(frame)
+        """Let ``duration`` (s) of rig time pass, or less where ``until`` holds before."""
+        end = self.now + duration
+        self.scheduler.advance(end, until)
+        self.now = max(self.now, min(end, self.scheduler.now)) if until() else end
 
     def upload(self, block: ParameterBlock, patience: float = 200.0) -> BlockStatus:
         """Upload a block and wait for the tube's last word on it."""

@@ -25,12 +25,12 @@ def rig(tmp_path: Path) -> Rig:
 
 
 def test_an_order_to_a_silent_tube_holds_no_other_up_and_is_obeyed_once_it_is_back(rig: Rig) -> None:
-    rig.joints[2][0].is_open = True  # tube 1 hangs in the hole, and nothing reaches it
+    rig.part(2, 1)  # tube 1 hangs in the hole, and nothing reaches it
     silent = rig.ground.operator.command(1, "take_survey")
     assert rig.order(2, "parameters").state is OrderState.DONE
     rig.run(60.0)
     assert (silent.state, silent.done) == (OrderState.SENT, None)
-    rig.joints[2][0].is_open = False
+    rig.join(2, 1)
     rig.run(70.0, lambda: silent.answered)
     assert (silent.state, silent.detail) == (OrderState.DONE, "at the next settled cycle")
 

@@ -20,7 +20,7 @@ from node.firmware.settings import TubeSettings
 from node.kernels.layout import DEG
 from node.process.block_store import BlockStore
 from node.process.tube_process import TubeProcess
-from telemetry.messages import BASE, BlockSegment, StaticRecord, UploadPhase
+from telemetry.messages import BASE, ENCODER, BlockSegment, StaticRecord, UploadPhase
 from telemetry.parameters import ParameterBlock, SensorParameters
 from telemetry.transport.authentication import new_key, read_key
 
@@ -56,7 +56,7 @@ def test_a_block_is_uploaded_applied_at_rest_and_told(rig: Rig) -> None:
 
 @pytest.mark.parametrize("seed", range(3))
 def test_a_block_arrives_through_loss_repetition_disorder_and_damage(tmp_path: Path, seed: int) -> None:
-    rig = Rig(tmp_path, [3, 2, 1], seed, loss=0.3, duplicate=0.3, corrupt=0.05, jitter=0.05)
+    rig = Rig(tmp_path, [3, 2, 1], seed, loss=0.3, duplicate=0.3, corrupt=0.05, jitter_ms=50.0)
     rig.run(12.0)
     for version in (1, 2):
         assert rig.upload(block(version, bias=1e-3 * version)).phase is UploadPhase.APPLIED
@@ -251,10 +251,10 @@ def test_a_damaged_block_falls_back_and_says_so(rig: Rig) -> None:
 def test_a_static_record_is_taken_stored_and_still_known_after_a_restart(rig: Rig) -> None:
     order = rig.order(1, "static_record", seconds=20.0)
     assert (order.state, order.done, order.values) == (OrderState.ACKNOWLEDGED, True, {"seconds": 20.0})
-    rig.joints[0][0].is_open = True  # the surface end is cut off when the record is ready
+    rig.part(BASE, ENCODER)  # the surface end is cut off when the record is ready
     rig.run(30.0)
     assert not rig.ground.model.static_records
-    rig.joints[0][0].is_open = False
+    rig.join(BASE, ENCODER)
     rig.run(40.0)
     assert order.state is OrderState.DONE
     (record,) = rig.ground.model.static_records
