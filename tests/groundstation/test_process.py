@@ -230,6 +230,7 @@ async def test_silence_is_noticed_and_told_where_no_depth_comes_any_more(rig: tu
         await ask(bus, f"{GROUND}/status")  # the subscription has arrived when a later question is answered
         it.run(6.0)
         assert (await ask(bus, f"{GROUND}/nodes/1"))["stale"] is True
+        await published(bus, lambda: bool(seen))
     assert [node["stale"] for node in seen] == [True]
 
 
@@ -311,6 +312,12 @@ def test_a_survey_without_a_depth_is_kept_and_counted(start: Callable[[], Rig]) 
     assert rig.tube.outbox_size == 0
 
 
+async def published(bus: ZenohBus, arrived: Callable[[], bool]) -> None:
+    """Wait for a sample, which comes on a thread of its own."""
+    while not arrived():
+        await ask(bus, f"{GROUND}/status")
+
+
 @contextlib.contextmanager
 def watching(bus: ZenohBus, key: str) -> Iterator[list[Any]]:
     seen: list[Any] = []
@@ -323,8 +330,7 @@ async def test_a_change_is_published_on_the_key_it_changes(rig: tuple[Rig, Zenoh
     with watching(bus, f"{GROUND}/stations") as seen:
         await ask(bus, f"{GROUND}/status")  # the subscription has arrived when a later question is answered
         it.survey(2, 2)
-        await ask(bus, f"{GROUND}/status")
-    assert seen
+        await published(bus, lambda: bool(seen))
     assert seen[-1]["stations"][0]["measurements"] == 3
 
 
@@ -384,6 +390,7 @@ async def test_an_order_waits_for_nobody_and_its_course_is_published(
         assert (answer["state"], answer["done"], answer["values"]) == ("done", True, {"version": 7, "sha256": "ab"})
         assert not silent.done()
         assert await ask(bus, f"{GROUND}/orders/{number}") == answer
+        await published(bus, lambda: any(view["order"] == number and view["state"] == "done" for view in seen))
     assert [view["state"] for view in seen if view["order"] == number] == ["sent", "done"]
     silent.cancel()
 
