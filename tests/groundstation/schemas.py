@@ -1,5 +1,6 @@
 """Checks of real answers against the fields that their keys promise."""
 
+import functools
 from typing import Any
 
 import jsonschema
@@ -9,11 +10,17 @@ from groundstation.service.model import RigModel
 from groundstation.service.paths import paths
 
 
-def check_answer(view: dict[str, Any], fields: Fields) -> None:
-    """An answer has the fields of its key, all of them and no others."""
+@functools.cache
+def validator(fields: Fields) -> jsonschema.Draft202012Validator:
+    """Validator of the answers that have these fields."""
     schema = object_schema(fields)
     jsonschema.Draft202012Validator.check_schema(schema)
-    jsonschema.validate(view, schema)
+    return jsonschema.Draft202012Validator(schema)
+
+
+def check_answer(view: dict[str, Any], fields: Fields) -> None:
+    """An answer has the fields of its key, all of them and no others."""
+    validator(fields).validate(view)
 
 
 def check_answers(model: RigModel) -> set[str]:
