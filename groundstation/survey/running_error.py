@@ -141,7 +141,8 @@ class RunningUncertainty:
         weights = self._sigma * np.array(flat).reshape(-1, 9)
         sine, cosine = math.sin(inclination), math.cos(inclination)
         c, s = math.cos(azimuth), math.sin(azimuth)
-        turn = weights[:, 1:3] @ np.array([[cosine * c, cosine * s, -sine], [-sine * s, sine * c, 0.0]])
+        with np.errstate(invalid="ignore"):  # an infinite weight is refused below; some processors warn of it here
+            turn = weights[:, 1:3] @ np.array([[cosine * c, cosine * s, -sine], [-sine * s, sine * c, 0.0]])
         if min(inclination, math.pi - inclination) < VERTICAL:
             turn[self._singular] = weights[self._singular, 3:6]
         if not float(np.abs(weights).max(initial=0.0)) < NO_WEIGHT and self._lost(weights, inclination):
