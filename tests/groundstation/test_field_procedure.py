@@ -162,7 +162,7 @@ def test_a_ground_station_that_starts_again_goes_on(rig: Field, step: str) -> No
         rig.run(3.0)
     rig.command("confirm", proposal=proposal)
     if step == "uploading":
-        rig.run(0.5)
+        rig.run(5.0, lambda: rig.phase(1) == "uploading")
         assert rig.phase(1) == "uploading"
         rig.start(BASE)
     if step == "verifying":

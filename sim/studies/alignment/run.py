@@ -84,14 +84,14 @@ class Turn:
 
     def __init__(self, setup: Setup, seed: int) -> None:
         self._setup = setup
-        self._world = World(scenario_of(dict(setup.tables())), seed)
-        self.tilts = np.array(self._world.imu_tilt(1))
+        self.world = World(scenario_of(dict(setup.tables())), seed)
+        self.tilts = np.array(self.world.imu_tilt(1))
 
     def run(self, method: str) -> Outcome:
         """Let one node rest, turn and rest; ``method`` is of its alignment, ``none`` leaves the mount as it is."""
-        string, asked_at = DirectString(self._world), self._world.begin + REST - ASKED
+        string, asked_at = DirectString(self.world), self.world.begin + REST - ASKED
         for cycle in string.steps():
-            end = self._world.cycle_end(cycle)
+            end = self.world.cycle_end(cycle)
             if method != "none" and end <= asked_at < end + PERIOD:
                 string.tubes[1].align(method, self._setup.turns)
         mount = string.mounts[1][0]
