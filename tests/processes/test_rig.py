@@ -46,7 +46,7 @@ def test_two_imus_in_every_tube_make_surveys_of_less_noise(tmp_path: Path) -> No
         (tmp_path / file.name).write_bytes(file.read_bytes())
     scenario = tmp_path / "cluster.toml"
     scenario.write_text((REPOSITORY / "scenarios" / "rig-3.toml").read_text() + "\n[node]\nimus = 2\n")
-    with running_rig(tmp_path, "--seed", "3", scenario=str(scenario)) as rig:
+    with running_rig(tmp_path, "--seed", "3", "--inline", scenario=str(scenario)) as rig:
         stations = rig.result()["stations"]
     assert [s["measurements"] for s in stations] == [3, 2, 1]
     one = math.radians(0.02) * 9.81 / math.sqrt(32.0)  # of a mean, with one IMU
@@ -60,7 +60,7 @@ def test_a_string_that_twists_is_surveyed_released_and_goes_on_at_every_joint(tm
     text = (REPOSITORY / "scenarios" / "torsion-10.toml").read_text()
     scenario = tmp_path / "torsion-3.toml"
     scenario.write_text(text.replace("tubes = 10", "tubes = 3"))
-    with running_rig(tmp_path, "--seed", "1", scenario=str(scenario)) as rig:
+    with running_rig(tmp_path, "--seed", "1", "--inline", scenario=str(scenario)) as rig:
         result = rig.result()
     assert [s["measurements"] for s in result["stations"]] == [3, 2, 1]
     assert max(result["figures"]["yaw_rms_deg_by_hop"]) < 0.1  # 1.1 deg a tube under torque
@@ -148,7 +148,7 @@ def test_a_column_that_leaves_its_tolerance_raises_alarms(scenario: Path, tmp_pa
     scenario.write_text(
         scenario.read_text() + '\n[design]\ninclination_deg = 10.0\nazimuth_deg = 90.0\ntolerance = "5-cm"\n'
     )
-    with running_rig(tmp_path, scenario=str(scenario)) as rig:
+    with running_rig(tmp_path, "--inline", scenario=str(scenario)) as rig:
         result = rig.result()
     assert {(a["kind"], a["level_percent"]) for a in result["alarms"]} == {
         (kind, level) for kind in ("deviation", "projection") for level in (50, 80, 100)

@@ -17,9 +17,9 @@ pytestmark = pytest.mark.slow
 SEEDS = 24
 
 
-@pytest.fixture(scope="module")
-def result() -> dict:
-    return run(4, SEEDS, lambda: None)
+@pytest.fixture(scope="module", params=[2, pytest.param(4, marks=pytest.mark.statistical)])
+def result(request: pytest.FixtureRequest) -> dict:
+    return run(request.param, SEEDS, lambda: None)
 
 
 def rows(result: dict, scheme: str) -> list[dict]:

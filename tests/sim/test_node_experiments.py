@@ -32,8 +32,19 @@ def judged(case: modes.Case, found: list[LabRun]) -> dict[str, dict]:
     return {row["quantity"]: row for row in modes.table(case, found)}
 
 
+def cost(case: modes.Case) -> list[pytest.MarkDecorator]:
+    """The modes between those of `make test` run in `make study`."""
+    ends = ("continuous 1.9 Hz", "20 s on / 30 s off", "20 s on / 60 s off", "single, 1 Hz", "single, 0.0167 Hz")
+    return [] if case.name in ends else [pytest.mark.statistical]
+
+
 @pytest.mark.parametrize(
-    "case", [c for name in ("update-modes", "single-updates") for c in modes.CASES[name]], ids=lambda c: c.name
+    "case",
+    [
+        pytest.param(c, id=c.name, marks=cost(c))
+        for name in ("update-modes", "single-updates")
+        for c in modes.CASES[name]
+    ],
 )
 def test_every_update_mode_is_within_reach(case: modes.Case) -> None:
     rows = judged(case, runs(case.setup))
