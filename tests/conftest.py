@@ -7,12 +7,18 @@ from pathlib import Path
 
 import pytest
 from hypothesis import settings
+from hypothesis.internal.conjecture import providers
 
 # the first example of a property compiles the kernel, which no deadline of an example can foresee; the same commit
 # gives the same examples everywhere, and new ones are looked for by `make explore`
 settings.register_profile("borechain", deadline=None, derandomize=True)
 settings.register_profile("explore", deadline=None, print_blob=True)
-settings.load_profile(os.environ.get("HYPOTHESIS_PROFILE", "borechain"))
+PROFILE = os.environ.get("HYPOTHESIS_PROFILE", "borechain")
+settings.load_profile(PROFILE)
+if PROFILE == "borechain":
+    # numbers that stand in our modules are tried as examples, of those modules that happen to be imported: which worker
+    # ran what before would change the examples
+    providers._get_local_constants = providers.Constants
 
 MARKER_OF = {"processes": "process", "test_installation.py": "install"}  # first part of the path below tests/
 

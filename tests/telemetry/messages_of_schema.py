@@ -51,7 +51,7 @@ def values(field: Field) -> st.SearchStrategy[Any]:
         case ValueKind.VALUES:
             numbers = st.lists(FINITE, max_size=MAX_LIST).map(tuple)
             return st.dictionaries(NAMES, SCALAR | numbers, max_size=8)
-    raise NotImplementedError(field.kind)
+    raise AssertionError(f"no values are drawn for a field of kind {field.kind}")
 
 
 def messages(message: type) -> st.SearchStrategy[Any]:

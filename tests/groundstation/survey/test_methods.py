@@ -290,7 +290,7 @@ def test_between_stations_the_interpolated_point_lies_on_the_arc(
     trajectory = Trajectory(Method.MINIMUM_CURVATURE, lean_of(inclination[0], azimuth[0]), float(md[0]))
     for row in zip(md[1:], inclination[1:], azimuth[1:], strict=True):
         trajectory.append(float(row[0]), lean_of(float(row[1]), float(row[2])))
-    at = float(md[0] + f * (md[-1] - md[0]))
+    at = min(float(md[0] + f * (md[-1] - md[0])), float(md[-1]))  # the sum may round beyond the end
     point = interpolate(trajectory.points, at)
     upper = max((p for p in trajectory.points if p.md <= at), key=lambda p: p.md)
     assert point.md == pytest.approx(at)
