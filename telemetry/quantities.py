@@ -88,6 +88,8 @@ def check_number(q: Quantity, value: Any) -> float:
     ValueError
         Naming the value, what was expected and what was got; so do all the checks below.
     """
+    if type(value) is float and q.low <= value <= q.high:
+        return value
     if isinstance(value, bool) or not isinstance(value, int | float) or not q.low <= value <= q.high:
         raise ValueError(f"{q.name}: expected a number in [{q.low:g}, {q.high:g}], got {value!r:.40}")
     return float(value)
@@ -95,6 +97,8 @@ def check_number(q: Quantity, value: Any) -> float:
 
 def check_integer(q: Quantity, value: Any) -> int:
     """Integer in the range."""
+    if type(value) is int and q.low <= value <= q.high:
+        return value
     if isinstance(value, bool) or not isinstance(value, int) or not q.low <= value <= q.high:
         raise ValueError(f"{q.name}: expected an integer in [{q.low}, {q.high}], got {value!r:.40}")
     return value

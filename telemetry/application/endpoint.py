@@ -36,7 +36,7 @@ from telemetry.messages import (
     TimeReply,
     TimeRequest,
 )
-from telemetry.presentation.msgpack_codec import DOWNWARD, Envelope, decode, encode, peek
+from telemetry.presentation.msgpack_codec import DOWNWARD, Envelope, Opened, decode_opened, encode, open_payload
 from telemetry.schema import Kind
 from telemetry.transport.hop import HopLink
 
@@ -255,12 +255,13 @@ class Endpoint:
         self._answered.update((sequence, payload) for sequence, payload in answered)
 
     def _handle(self, side: Side, payload: bytes, now: float) -> Message | None:
-        envelope = peek(payload)
-        if envelope.kind in ONE_HOP:
-            return self._handle_one_hop(side, decode(payload), now)
-        if envelope.kind in DOWNWARD:
-            return self._handle_downward(envelope, payload)
-        return self._handle_upward(envelope, payload)
+        opened = open_payload(payload)
+        kind = opened.envelope.kind
+        if kind in ONE_HOP:
+            return self._handle_one_hop(side, decode_opened(opened), now)
+        if kind in DOWNWARD:
+            return self._handle_downward(opened, payload)
+        return self._handle_upward(opened, payload)
 
     def _handle_one_hop(self, side: Side, message: Message, now: float) -> Message | None:
         match message:
@@ -285,20 +286,20 @@ class Endpoint:
             self.hops = hello.hops + 1
             self._hello_at = -math.inf
 
-    def _handle_upward(self, envelope: Envelope, payload: bytes) -> Message | None:
+    def _handle_upward(self, opened: Opened, payload: bytes) -> Message | None:
         if self.address != BASE:
-            self._pass(Side.UPPER, envelope, payload)
+            self._pass(Side.UPPER, opened.envelope, payload)
             return None
-        message = decode(payload)
+        message = decode_opened(opened)
         if isinstance(message, Reply) and not self._commands.settle(message.sequence):
             return None
         return message
 
-    def _handle_downward(self, envelope: Envelope, payload: bytes) -> Message | None:
-        if envelope.target != self.address:
-            self._pass(Side.LOWER, envelope, payload)
+    def _handle_downward(self, opened: Opened, payload: bytes) -> Message | None:
+        if opened.envelope.target != self.address:
+            self._pass(Side.LOWER, opened.envelope, payload)
             return None
-        message = decode(payload)
+        message = decode_opened(opened)
         if isinstance(message, Receipt):
             self._outbox.settle(message.sequence)
             return None

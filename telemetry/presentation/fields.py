@@ -6,6 +6,7 @@ import math
 from collections.abc import Callable
 from copy import copy
 from dataclasses import dataclass
+from functools import partial
 from typing import Any
 
 from telemetry.messages import ImuMean
@@ -32,12 +33,12 @@ Check = Callable[[Quantity, Any], Any]
 
 @dataclass(frozen=True, slots=True)
 class FieldCodec:
-    """One field on the wire: attribute, short key, check (raises ValueError) and what is packed."""
+    """One field on the wire: attribute, short key, check (raises ValueError), and what is packed if not the value."""
 
     name: str
     key: str
     check: Callable[[Any], Any]
-    pack: Callable[[Any], Any]
+    pack: Callable[[Any], Any] | None
     since: int
     before: Any
 
@@ -51,7 +52,7 @@ def codec_of(field: Field) -> FieldCodec:
     check, pack = CODECS[field.kind]
     if field.enumeration is not None:
         check = enumerated(field.enumeration)
-    return FieldCodec(field.name, field.key, lambda value: check(field, value), pack, field.since, field.before)
+    return FieldCodec(field.name, field.key, partial(check, field), pack, field.since, field.before)
 
 
 def enumerated(enumeration: Callable[[int], Any]) -> Check:
@@ -99,11 +100,6 @@ def check_values(q: Quantity, value: Any) -> dict[str, Any]:
     return checked
 
 
-def same(value: Any) -> Any:
-    """The value as it is."""
-    return value
-
-
 def pack_rows(rows: Any) -> list[list[float]]:
     """A matrix on the wire."""
     return [list(row) for row in rows]
@@ -114,17 +110,17 @@ def pack_imus(imus: Any) -> list[Any]:
     return [[list(imu.force), pack_rows(imu.force_cov)] for imu in imus]
 
 
-CODECS: dict[ValueKind, tuple[Check, Callable[[Any], Any]]] = {
-    ValueKind.NUMBER: (check_number, same),
+CODECS: dict[ValueKind, tuple[Check, Callable[[Any], Any] | None]] = {
+    ValueKind.NUMBER: (check_number, None),
     ValueKind.INTEGER: (check_integer, int),
-    ValueKind.BOOLEAN: (check_boolean, same),
-    ValueKind.TEXT: (check_text, same),
-    ValueKind.BINARY: (check_binary, same),
+    ValueKind.BOOLEAN: (check_boolean, None),
+    ValueKind.TEXT: (check_text, None),
+    ValueKind.BINARY: (check_binary, None),
     ValueKind.VECTOR: (check_vector, list),
     ValueKind.COVARIANCE: (check_covariance, pack_rows),
     ValueKind.IMUS: (check_imus, pack_imus),
-    ValueKind.SCALARS: (check_scalars, same),
-    ValueKind.VALUES: (check_values, same),
+    ValueKind.SCALARS: (check_scalars, None),
+    ValueKind.VALUES: (check_values, None),
 }
 
 
@@ -132,6 +128,8 @@ def _vector(name: str, value: Any, limit: float) -> tuple[float, float, float]:
     if not isinstance(value, list | tuple) or len(value) != 3:
         raise ValueError(f"{name}: expected three numbers, got {value!r:.40}")
     for item in value:
+        if type(item) is float and -limit <= item <= limit:
+            continue
         if isinstance(item, bool) or not isinstance(item, int | float) or not -limit <= item <= limit:
             raise ValueError(f"{name}: expected numbers within +-{limit:g}, got {item!r:.40}")
     return float(value[0]), float(value[1]), float(value[2])

@@ -6,22 +6,24 @@ the envelope alone and hands the very same bytes on.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-from typing import Any
+from collections.abc import Callable
+from operator import attrgetter
+from typing import Any, NamedTuple
 
 import msgpack
 
 from telemetry.errors import DecodeError, EncodeError
 from telemetry.messages import BASE, SCHEMA_VERSION, Message
-from telemetry.presentation.fields import MAX_BINARY, FieldCodec, codec_of
-from telemetry.schema import SCHEMA, U53, Kind
+from telemetry.presentation.fields import MAX_BINARY, codec_of
+from telemetry.schema import SCHEMA, U53, Kind, MessageSpec
 
 MAX_PAYLOAD = 4096
 NO_TARGET = 255
+HIGHEST_ADDRESS = 255
+DOWNWARD = (Kind.RECEIPT, Kind.COMMAND, Kind.BLOCK_SEGMENT)
 
 
-@dataclass(frozen=True, slots=True)
-class Envelope:
+class Envelope(NamedTuple):
     """What a relay needs to know of a payload."""
 
     kind: Kind
@@ -30,14 +32,39 @@ class Envelope:
     sequence: int
 
 
-FIELDS: dict[type[Any], tuple[Kind, tuple[FieldCodec, ...]]] = {
-    spec.message: (spec.kind, tuple(codec_of(field) for field in spec.fields)) for spec in SCHEMA
-}
-TYPE_OF: dict[Kind, tuple[type[Any], tuple[FieldCodec, ...]]] = {
-    kind: (message, fields) for message, (kind, fields) in FIELDS.items()
-}
-NEWEST: dict[Kind, int] = {spec.kind: spec.newest for spec in SCHEMA}
-DOWNWARD = (Kind.RECEIPT, Kind.COMMAND, Kind.BLOCK_SEGMENT)
+class Opened(NamedTuple):
+    """A payload whose envelope has been read, its fields not yet."""
+
+    envelope: Envelope
+    rows: dict[str, Any]
+
+
+class MessageCodec:
+    """One message on the wire, made from its line of the schema; what every message needs is looked up here once."""
+
+    def __init__(self, spec: MessageSpec) -> None:
+        self.kind = spec.kind
+        self.message = spec.message
+        self.newest = spec.newest
+        self.fields = tuple(codec_of(field) for field in spec.fields)
+        self.later = tuple(field for field in self.fields if field.since > 1)
+        self.goes_down = spec.kind in DOWNWARD
+        names = [field.name for field in self.fields]
+        self.values: Callable[[Any], Any] = attrgetter(*names) if len(names) > 1 else lambda m: (getattr(m, names[0]),)
+        self.origin = attrgetter("tube") if "tube" in names else lambda _message: NO_TARGET
+        self.sequence = attrgetter("sequence") if "sequence" in names else lambda _message: 0
+
+    def version_of(self, message: Message) -> int:
+        """Earliest schema version that can express it."""
+        version = 1
+        for field in self.later:
+            if field.since > version and getattr(message, field.name) != field.before:
+                version = field.since
+        return version
+
+
+CODECS: dict[type[Any], MessageCodec] = {spec.message: MessageCodec(spec) for spec in SCHEMA}
+CODEC_OF: dict[int, MessageCodec] = {int(codec.kind): codec for codec in CODECS.values()}
 
 
 def encode(message: Message) -> bytes:
@@ -48,20 +75,20 @@ def encode(message: Message) -> bytes:
     EncodeError
         When a field is outside its range.
     """
-    kind, fields = FIELDS[type(message)]
-    body: dict[str, Any] = {}
-    needed = (field.since for field in fields if field.since > 1 and getattr(message, field.name) != field.before)
-    version = max(needed, default=1)
+    codec = CODECS[type(message)]
+    version = codec.version_of(message)
     try:
-        for field in fields:
-            if field.since <= version:
-                body[field.key] = field.pack(field.check(getattr(message, field.name)))
+        body = {
+            field.key: field.pack(field.check(value)) if field.pack is not None else field.check(value)
+            for field, value in zip(codec.fields, codec.values(message), strict=True)
+            if field.since <= version
+        }
     except ValueError as error:
         raise EncodeError(f"{type(message).__name__}: {error}") from error
-    origin = getattr(message, "tube", NO_TARGET)
-    target = origin if kind in DOWNWARD else BASE
-    envelope = {"v": version, "k": int(kind), "o": origin, "t": target, "s": getattr(message, "sequence", 0)}
-    return bytes(msgpack.packb(envelope | {"b": body}))
+    origin = codec.origin(message)
+    target = origin if codec.goes_down else BASE
+    rows = {"v": version, "k": int(codec.kind), "o": origin, "t": target, "s": codec.sequence(message), "b": body}
+    return bytes(msgpack.packb(rows))
 
 
 def decode(payload: bytes) -> Message:
@@ -72,20 +99,39 @@ def decode(payload: bytes) -> Message:
     DecodeError
         Whatever else the bytes are.
     """
+    return decode_opened(open_payload(payload))
+
+
+def open_payload(payload: bytes) -> Opened:
+    """Payload with its envelope read and checked.
+
+    Raises
+    ------
+    DecodeError
+        When the bytes have no envelope of this version.
+    """
     rows = _unpack(payload)
-    kind = _envelope(rows).kind
-    message, fields = TYPE_OF[kind]
-    body = rows.get("b")
+    return Opened(_envelope(rows), rows)
+
+
+def decode_opened(opened: Opened) -> Message:
+    """Message of an opened payload.
+
+    Raises
+    ------
+    DecodeError
+        When a field is missing or outside its range.
+    """
+    codec = CODEC_OF[opened.envelope.kind]
+    body, version = opened.rows.get("b"), opened.rows["v"]
     if not isinstance(body, dict):
-        raise DecodeError(f"{message.__name__}: expected a map of fields, got {body!r:.40}")
+        raise DecodeError(f"{codec.message.__name__}: expected a map of fields, got {body!r:.40}")
+    get = body.get
     try:
-        values = {
-            field.name: field.check(body.get(field.key)) if field.since <= rows["v"] else field.default()
-            for field in fields
-        }
+        values = [field.check(get(field.key)) if field.since <= version else field.default() for field in codec.fields]
     except ValueError as error:
-        raise DecodeError(f"{message.__name__}: {error}") from error
-    decoded: Message = message(**values)
+        raise DecodeError(f"{codec.message.__name__}: {error}") from error
+    decoded: Message = codec.message(*values)
     return decoded
 
 
@@ -97,7 +143,7 @@ def peek(payload: bytes) -> Envelope:
     DecodeError
         When the bytes have no envelope of this version.
     """
-    return _envelope(_unpack(payload))
+    return open_payload(payload).envelope
 
 
 def _unpack(payload: bytes) -> dict[str, Any]:
@@ -113,17 +159,21 @@ def _unpack(payload: bytes) -> dict[str, Any]:
 
 
 def _envelope(rows: dict[str, Any]) -> Envelope:
-    version, kind = rows.get("v"), rows.get("k")
+    get = rows.get
+    version, kind = get("v"), get("k")
     if type(version) is not int or not 1 <= version <= SCHEMA_VERSION:
         raise DecodeError(f"payload: expected schema version 1 to {SCHEMA_VERSION}, got {version!r:.40}")
-    if type(kind) is not int or kind not in TYPE_OF:
+    codec = CODEC_OF.get(kind) if type(kind) is int else None
+    if codec is None:
         raise DecodeError(f"payload: unknown kind {kind!r:.40}")
-    if version > NEWEST[Kind(kind)]:
-        raise DecodeError(f"payload: {Kind(kind).name.lower()}: expected version {NEWEST[Kind(kind)]}, got {version}")
-    route = []
-    for key, high in (("o", 255), ("t", 255), ("s", U53)):
-        value = rows.get(key)
-        if type(value) is not int or not 0 <= value <= high:
-            raise DecodeError(f"payload: envelope field {key}: expected 0..{high}, got {value!r:.40}")
-        route.append(value)
-    return Envelope(Kind(kind), route[0], route[1], route[2])
+    if version > codec.newest:
+        raise DecodeError(f"payload: {codec.kind.name.lower()}: expected version {codec.newest}, got {version}")
+    origin = _route(rows, "o", HIGHEST_ADDRESS)
+    return Envelope(codec.kind, origin, _route(rows, "t", HIGHEST_ADDRESS), _route(rows, "s", U53))
+
+
+def _route(rows: dict[str, Any], key: str, high: int) -> int:
+    value = rows.get(key)
+    if type(value) is not int or not 0 <= value <= high:
+        raise DecodeError(f"payload: envelope field {key}: expected 0..{high}, got {value!r:.40}")
+    return value

@@ -7,27 +7,29 @@ import contextlib
 import math
 import threading
 from collections import deque
+from collections.abc import Callable
 from typing import Generic, TypeVar
 
 INBOX_LIMIT = 1024
 T = TypeVar("T")
 
 
-class Inbox(Generic[T]):
+class Mailbox(Generic[T]):
     """Belongs to the running loop; anything may be put in from any thread, and is taken out on the loop.
 
     Parameters
     ----------
-    limit : items that may wait; one that finds the inbox full is dropped
+    arrived : called on the loop, once for all that was put in since it was called last, and after ``close``
+    limit : items that may wait; one that finds the box full is dropped
     """
 
-    def __init__(self, limit: int = INBOX_LIMIT) -> None:
+    def __init__(self, arrived: Callable[[], None], limit: int = INBOX_LIMIT) -> None:
         self.dropped = 0
+        self._arrived = arrived
         self._limit = limit
         self._loop = asyncio.get_running_loop()
         self._lock = threading.Lock()
         self._items: deque[T] = deque()
-        self._arrived = asyncio.Event()
         self._wake_is_due = False
         self._closed = False
 
@@ -40,7 +42,7 @@ class Inbox(Generic[T]):
         return self._closed
 
     def put(self, item: T) -> bool:
-        """Put an item in, from any thread; never waits, and returns False for one that finds the inbox full."""
+        """Put an item in, from any thread; never waits, and returns False for one that finds the box full."""
         with self._lock:
             if len(self._items) >= self._limit:
                 self.dropped += 1
@@ -58,6 +60,25 @@ class Inbox(Generic[T]):
         """The oldest item, or None where there is none."""
         return self._items.popleft() if self._items and not self._closed else None
 
+    def _wake(self) -> None:
+        if self._wake_is_due:
+            return
+        self._wake_is_due = True
+        with contextlib.suppress(RuntimeError):  # the loop has ended, and with it all interest
+            self._loop.call_soon_threadsafe(self._tell)
+
+    def _tell(self) -> None:
+        self._wake_is_due = False
+        self._arrived()
+
+
+class Inbox(Mailbox[T]):
+    """A mailbox that a task waits at."""
+
+    def __init__(self, limit: int = INBOX_LIMIT) -> None:
+        self._anything = asyncio.Event()
+        super().__init__(self._anything.set, limit)
+
     async def get(self) -> T | None:
         """The oldest item as soon as there is one, or None after ``close``."""
         while not self._items and not self._closed:
@@ -69,21 +90,10 @@ class Inbox(Generic[T]):
         if self._items or self._closed or timeout <= 0.0:
             await asyncio.sleep(0)
             return
-        self._arrived.clear()
-        timer = self._loop.call_later(timeout, self._arrived.set) if math.isfinite(timeout) else None
+        self._anything.clear()
+        timer = self._loop.call_later(timeout, self._anything.set) if math.isfinite(timeout) else None
         try:
-            await self._arrived.wait()
+            await self._anything.wait()
         finally:
             if timer is not None:
                 timer.cancel()
-
-    def _wake(self) -> None:
-        if self._wake_is_due:
-            return
-        self._wake_is_due = True
-        with contextlib.suppress(RuntimeError):  # the loop has ended, and with it all interest
-            self._loop.call_soon_threadsafe(self._set_arrived)
-
-    def _set_arrived(self) -> None:
-        self._wake_is_due = False
-        self._arrived.set()

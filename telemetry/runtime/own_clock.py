@@ -8,6 +8,7 @@ reply are equally long on their way. The process is the very object that a stepp
 
 from __future__ import annotations
 
+import asyncio
 import math
 import time
 from collections.abc import Callable, Iterable, Mapping
@@ -17,7 +18,7 @@ from typing import Any
 
 from telemetry.media.port import Port
 from telemetry.messages import Side
-from telemetry.runtime.inbox import Inbox
+from telemetry.runtime.inbox import Mailbox
 from telemetry.runtime.process import Process
 from telemetry.runtime.timing import CycleTiming, Stage
 
@@ -85,7 +86,10 @@ class AbsenceWatch:
 
 
 class OwnClockLoop:
-    """Runs a process by its own clock as a task of the running asyncio loop.
+    """Runs a process by its own clock on the running asyncio loop.
+
+    What arrives is handled in the callback that announces it, without a task in between: fifty processes on two cores
+    spend more on turns of their loops than on frames.
 
     Parameters
     ----------
@@ -107,7 +111,11 @@ class OwnClockLoop:
     ) -> None:
         self._process, self._ports, self._clock, self._timing = process, ports, clock, timing
         self._report = report
-        self._inbox: Inbox[Act] = Inbox()
+        self._asyncio = asyncio.get_running_loop()
+        self._inbox: Mailbox[Act] = Mailbox(self._on_arrival)
+        self._ended: asyncio.Future[None] | None = None
+        self._timer: asyncio.TimerHandle | None = None
+        self._timer_due = math.inf  # s, own clock
         self._read_until = clock.now()
         self._schedule = Schedule(self._read_until, period)
         self._absence = AbsenceWatch(ports, self._read_until)
@@ -132,12 +140,13 @@ class OwnClockLoop:
         MediumError
             When the bus is lost.
         """
-        while not self._inbox.is_closed:
-            now = self._clock.now()
-            await self._inbox.wait(min(self._next_moment(), self._process.next_wake(now)) - now)
-            if not self._inbox.is_closed:
-                self._take_waiting()
-                self._do_due()
+        self._ended = self._asyncio.create_future()
+        self._on_arrival()
+        try:
+            await self._ended
+        finally:
+            self._ended = None
+            self._set_timer(math.inf)
 
     def losses(self) -> dict[str, Any]:
         """Frames that never arrived at the process or never left it, for a report."""
@@ -146,6 +155,42 @@ class OwnClockLoop:
             for side, port in self._ports.items()
         }
         return {"inbox_dropped": self._inbox.dropped, "ports": ports}
+
+    def _on_arrival(self) -> None:
+        """Something has arrived, or is due."""
+        if self._ended is None or self._ended.done():
+            return
+        try:
+            if self._inbox.is_closed:
+                self._ended.set_result(None)
+            else:
+                self._turn()
+        except Exception as error:
+            self._ended.set_exception(error)
+
+    def _on_timer(self) -> None:
+        self._timer, self._timer_due = None, math.inf
+        self._on_arrival()
+
+    def _turn(self) -> None:
+        """Do what waits and what is due, and come again: at once for what still waits, else when more is due."""
+        self._take_waiting()
+        self._do_due()
+        if len(self._inbox):
+            self._asyncio.call_soon(self._on_arrival)
+            return
+        wake_at = min(self._next_moment(), self._process.next_wake(self._clock.now()))
+        if wake_at < self._timer_due:
+            self._set_timer(wake_at)
+
+    def _set_timer(self, due: float) -> None:
+        """Have ``_on_timer`` called at ``due`` (s, own clock) and no earlier moment, or never."""
+        if self._timer is not None:
+            self._timer.cancel()
+            self._timer = None
+        self._timer_due = due
+        if math.isfinite(due):
+            self._timer = self._asyncio.call_later(max(due - self._clock.now(), 0.0), self._on_timer)
 
     def _next_moment(self) -> float:
         """Next deadline, or the middle of the time before it."""

@@ -14,7 +14,7 @@ import zlib
 from collections import Counter, OrderedDict
 from collections.abc import Hashable, Iterable
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, NamedTuple
 
 import msgpack
 
@@ -45,8 +45,7 @@ class Outstanding:
     timeout: float = FIRST_TIMEOUT
 
 
-@dataclass(frozen=True, slots=True)
-class Entry:
+class Entry(NamedTuple):
     """A payload that is due; best effort has the number 0 and a topic."""
 
     number: int
