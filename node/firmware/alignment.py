@@ -7,7 +7,7 @@ offset of pitch and roll, or with the reason why there is none. The offset in us
 from __future__ import annotations
 
 import math
-from typing import Final
+from typing import Any, Final
 
 import numpy as np
 
@@ -47,13 +47,13 @@ class Aligner:
 
     Parameters
     ----------
-    mount : one record of dtype ``MOUNT``, saved by the caller
+    mount : record of dtype ``MOUNT``, saved by the caller
     imus : of the cluster
     noise : rad, of one sample of a force at rest, as a tilt
     """
 
-    def __init__(self, mount: Array, imus: tuple[ImuSettings, ...], noise: float) -> None:
-        self._mount = mount[0]
+    def __init__(self, mount: Any, imus: tuple[ImuSettings, ...], noise: float) -> None:
+        self._mount = mount
         self._imus = imus
         self._noise = noise
         self._sweeps, self._offsets = np.zeros(len(imus), SWEEP), np.zeros(len(imus), OFFSET)
@@ -69,6 +69,11 @@ class Aligner:
     def running(self) -> bool:
         """Whether an alignment is under way."""
         return bool(self._method)
+
+    @property
+    def idle(self) -> bool:
+        """Whether there is nothing to follow and nothing to say."""
+        return not self._method and not self._pending
 
     def drain_events(self) -> list[PendingEvent]:
         """Code, severity and arguments of the events since the last call."""
@@ -210,16 +215,15 @@ class Aligner:
         self._mount["aligning"] = 0
 
 
-def alignment_in_use(mount: Array, imus: int) -> dict[str, Value]:
+def alignment_in_use(mount: Any, imus: int) -> dict[str, Value]:
     """The alignment in use, for a reply: method, and of each IMU pitch, roll and their standard errors (rad)."""
-    record = mount[0]
     names = {number: name for name, number in METHODS.items()}
-    if int(record["method"]) not in names:
+    if int(mount["method"]) not in names:
         return {"method": "none"}
-    angles = [angles_of(axis) for axis in record["axis"][:imus]]
-    stds = record["std"][:imus]
+    angles = [angles_of(axis) for axis in mount["axis"][:imus]]
+    stds = mount["std"][:imus]
     return {
-        "method": names[int(record["method"])],
+        "method": names[int(mount["method"])],
         "pitch": tuple(float(pitch) for pitch, _ in angles),
         "pitch_std": tuple(float(pitch) for pitch, _ in stds),
         "roll": tuple(float(roll) for _, roll in angles),
@@ -227,16 +231,16 @@ def alignment_in_use(mount: Array, imus: int) -> dict[str, Value]:
     }
 
 
-def realign(state: Array, before: Array, after: Array) -> None:
+def realign(state: Any, before: Array, after: Array) -> None:
     """Turn what a node's record holds in the tube's frame when the axes (imus, 3) change; fused by their mean.
 
     The covariance stays: turning it by so little changes it in the second order.
     """
     if np.array_equal(before, after):
         return
-    record, turn = state[0], rotation(after.sum(axis=0)) @ rotation(before.sum(axis=0)).T
+    turn = rotation(after.sum(axis=0)) @ rotation(before.sum(axis=0)).T
     for name in ("down", "now_down", "static_bias", "bias", "ring_rate", "ring_force"):
-        record[name] = record[name] @ turn.T
+        state[name] = state[name] @ turn.T
 
 
 def rotation(axis: Array) -> Array:

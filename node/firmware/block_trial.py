@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 import enum
+from typing import Any
 
 import numpy as np
 
 from node.kernels.calibration import COLDEST, HOTTEST, USUAL, calibrate, identity_parameters
-from node.kernels.error_model import isolate
-from node.kernels.layout import DEG, Array, Err
-from node.kernels.modes import STATIC_BIAS, UNBIASED_STILL_RATE
+from node.kernels.layout import DEG, Array
+from node.kernels.modes import UNBIASED_STILL_RATE
 from telemetry.messages import Vector3
 from telemetry.parameters import POWERS, ParameterBlock, SensorParameters
 
@@ -69,32 +69,15 @@ def refusal(block: ParameterBlock, tube: int, in_use: ParameterBlock) -> str:
     return ""
 
 
-def forget_bias(state: Array, config: Array) -> None:
-    """Learn the static bias again, as after a first start: what was learnt was that of other parameters."""
-    record, settings = state[0], config[0]
-    for name in ("static_bias", "static_bias_var", "bias", "bias_sum", "scale", "bias_count"):
-        record[name] = 0
-    record["mode"] = STATIC_BIAS
-    for k in (Err.BIAS_X, Err.BIAS_Y, Err.BIAS_Z):
-        isolate(record["P"], int(k), float(settings["boot_bias_std"]) ** 2)
-    isolate(record["P"], int(Err.SCALE), float(settings["scale_std"]) ** 2)
-
-
-def forget_tilt(state: Array) -> None:
-    """Level again at rest: against another accelerometer model an old tilt would be explained as a gyroscope's bias."""
-    for k in (Err.TILT_X, Err.TILT_Y):
-        isolate(state[0]["P"], int(k), 1.0)
-
-
-def recorrect(state: Array, before: ParameterBlock, after: ParameterBlock, temperature: float) -> None:
+def recorrect(state: Any, before: ParameterBlock, after: ParameterBlock, temperature: float) -> None:
     """Read the cycles that are still in the ring, which ``before`` corrected, by ``after`` instead."""
     for name, ring in (("gyroscope", "ring_rate"), ("accelerometer", "ring_force")):
         old, new = getattr(before, name), getattr(after, name)
         if old != new:
             matrix, bias = model_at(old, temperature)
-            raw = state[0][ring] @ matrix.T + bias
+            raw = state[ring] @ matrix.T + bias
             matrix, bias = model_at(new, temperature)
-            state[0][ring] = np.linalg.solve(matrix, (raw - bias).T).T
+            state[ring] = np.linalg.solve(matrix, (raw - bias).T).T
 
 
 def model_at(sensor: SensorParameters, temperature: float) -> tuple[Array, Array]:

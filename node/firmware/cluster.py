@@ -8,17 +8,19 @@ is learnt and taken off, so that the fused rate, and the bias that the filter kn
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
 from typing import Final
 
 import numpy as np
 
 from node.firmware.imu_settings import ImuSettings
 from node.firmware.pending_event import PendingEvent
-from node.firmware.sensor_faults import Fault, ReadingWatch, SensorLimits
 from node.kernels.cluster import follow_offsets, fuse
-from node.kernels.layout import DEG, RING, Array, Err
-from telemetry.messages import ImuMean, Severity, Vector3
+from node.kernels.events import Fault
+from node.kernels.layout import DEG, RING, Array
+from node.kernels.record import FX, READINGS, SATURATED, WX
+from node.kernels.resets import doubt_bias
+from node.kernels.sensor_watch import find_faults
+from telemetry.messages import ImuMean, Severity
 
 DISAGREEING: Final = 4  # cycles in a row, until an IMU is left out
 HEALTHY: Final = 20  # cycles in a row, until it is back
@@ -37,27 +39,27 @@ class Cluster:
     Parameters
     ----------
     imus : at least two
-    mount : one record of dtype ``MOUNT``, saved by the caller
-    state, config : records of the node; the configuration's noise is that of an IMU of factor 1, and is kept at that of
-        the IMUs in use
-    limits : of each IMU
+    crew : settings of the tube, one-element array of dtype ``SETTINGS``
+    nodes, configs : records of the node, one-element arrays; the configuration's noise is that of an IMU of factor 1,
+        and is kept at that of the IMUs in use
     """
 
-    def __init__(
-        self, imus: tuple[ImuSettings, ...], mount: Array, state: Array, config: Array, limits: SensorLimits
-    ) -> None:
+    def __init__(self, imus: tuple[ImuSettings, ...], crew: Array, nodes: Array, configs: Array) -> None:
         count = len(imus)
         self.used = np.ones(count, np.bool_)
         self.force = np.zeros(3)  # fused, of the last cycle
         self.rate = np.zeros(3)
-        self._mount, self._state, self._config = mount[0], state[0], config[0]
+        self._crew, self._mount = crew[0], nodes[0]["mount"]
+        self._state, self._config = nodes[0]["filter"], configs[0]
         self._noise = np.array([imu.noise for imu in imus])
         self._plain = {name: np.copy(self._config[name]) for name in SCALED}
-        self._watches = [ReadingWatch(limits) for _ in imus]
+        self._watches = np.zeros(count, READINGS)
+        for sensor in ("rates", "forces"):
+            self._watches[sensor]["last"] = np.nan
         self._apart, self._well = np.zeros(count, np.int64), np.zeros(count, np.int64)
         self._ring, self._ring_used = np.zeros((count, RING, 3)), np.zeros((count, RING), np.bool_)
         self._cycles = 0
-        self._faults: list[Fault | None] = [None] * count
+        self._faults = [Fault.NONE] * count
         self._expected = np.zeros(3)  # rad/s, before the IMUs were apart
         self._pending: list[PendingEvent] = []
         self._reweigh(self.used)
@@ -74,7 +76,7 @@ class Cluster:
 
     def fuse_readings(
         self,
-        raw: Sequence[tuple[Vector3, Vector3, bool]],
+        readings: Array,
         rates: Array,
         forces: Array,
         expected: Array,
@@ -85,18 +87,18 @@ class Cluster:
 
         Parameters
         ----------
-        raw : rate (rad/s), force (m/s^2) and the driver's word of saturation, of each IMU
+        readings : (imus, 8) raw, see ``node.kernels.step.node_step``
         rates, forces : (imus, 3) the same, corrected and in the tube's frame
         expected : (6,) rate and force that the node expects in this cycle
         heard : the encoder reported the expected rate; else it is what the cluster itself read
         """
         rates = rates - self._mount["rate_offset"][: len(rates)]
-        sane = self._sane(raw)
-        readings = np.concatenate([rates, forces], axis=1)
+        sane = self._sane(readings)
+        corrected = np.concatenate([rates, forces], axis=1)
         if not heard and self._apart.any():  # what was fused since is not evidence against one of them
             expected = np.concatenate([self._expected, expected[3:]])
         self._expected = expected[:3]
-        agrees = self._agree(readings, sane, expected)
+        agrees = self._agree(corrected, sane, expected)
         self._apart = np.where(sane & ~agrees, self._apart + 1, 0)
         self._well = np.where(sane & agrees, self._well + 1, 0)
         used = self.used & sane & (self._apart < DISAGREEING) | (~self.used & (self._well >= HEALTHY))
@@ -108,7 +110,7 @@ class Cluster:
         self.used = used
         fused = np.full(6, math.nan)
         if used.any():
-            fuse(readings, self.weights, fused)
+            fuse(corrected, self.weights, fused)
         self.rate[:], self.force[:] = fused[:3], fused[3:]
         slot = self._cycles % RING
         self._ring[:, slot], self._ring_used[:, slot] = forces, used
@@ -124,13 +126,12 @@ class Cluster:
         follow_offsets(rates, mean, samples, self._mount["rate_offset"])
         self._mount["rate_samples"] = samples
 
-    def mean_raw(self, raw: Sequence[tuple[Vector3, Vector3, bool]]) -> tuple[Vector3, Vector3]:
+    def mean_raw(self, readings: Array) -> tuple[Array, Array]:
         """Fused raw rate and force: those of the one sensor that a block of parameters corrects."""
         fused = np.full(6, math.nan)
         if self.used.any():
-            fuse(np.array([[*rate, *force] for rate, force, _ in raw]), self.weights, fused)
-        wx, wy, wz, fx, fy, fz = fused.tolist()
-        return (wx, wy, wz), (fx, fy, fz)
+            fuse(readings[:, : FX + 3], self.weights, fused)
+        return fused[:3], fused[3:]
 
     def survey(self, samples: int) -> tuple[ImuMean, ...]:
         """Mean force of each IMU that was in use over the newest ``samples`` cycles, with the covariance of the mean.
@@ -146,11 +147,13 @@ class Cluster:
                 means.append(ImuMean((fx, fy, fz), ((xx, xy, xz), (yx, yy, yz), (zx, zy, zz))))
         return tuple(means)
 
-    def _sane(self, raw: Sequence[tuple[Vector3, Vector3, bool]]) -> Array:
-        judged = zip(self._watches, raw, strict=True)
-        faults = [watch.find_faults(rate, force, saturated=saturated) for watch, (rate, force, saturated) in judged]
-        self._faults = [gyro or accelerometer for gyro, accelerometer in faults]
-        return np.array([fault is None for fault in self._faults])
+    def _sane(self, readings: Array) -> Array:
+        for k, row in enumerate(readings):
+            saturated = int(row[SATURATED] != 0.0)
+            rate, force = row[WX : WX + 3], row[FX : FX + 3]
+            gyro, accelerometer = find_faults(self._watches[k], self._crew, rate, force, saturated)
+            self._faults[k] = Fault(gyro or accelerometer)
+        return np.array([fault is Fault.NONE for fault in self._faults])
 
     def _agree(self, readings: Array, sane: Array, expected: Array) -> Array:
         """Which of the sane IMUs agree with the rest; of two apart the one clearly farther from ``expected`` is not."""
@@ -187,7 +190,7 @@ class Cluster:
                 self._pending.append(("imu_back", Severity.WARNING, {"imu": k + 1}))
             else:
                 fault = self._faults[k]
-                reason = "disagrees" if sane[k] or fault is None else fault.value
+                reason = "disagrees" if sane[k] or fault is Fault.NONE else fault.name.lower()
                 self._pending.append(("imu_excluded", Severity.ERROR, {"imu": k + 1, "reason": reason}))
 
     def _reweigh(self, used: Array) -> None:
@@ -203,4 +206,4 @@ class Cluster:
         share = float(np.sum((moved * self._noise) ** 2))
         for k in range(3):
             doubt = share * float(self._plain["bias_std"][k]) ** 2
-            self._state["P"][Err.BIAS_X + k, Err.BIAS_X + k] += doubt
+            doubt_bias(self._state, k, doubt)

@@ -1,75 +1,53 @@
-"""Readings of a node's IMUs on their way into the loop: corrected, turned into the tube's frame, fused."""
+"""Readings of a cluster's IMUs on their way into the step: corrected, turned into the tube's frame, fused."""
 
 from __future__ import annotations
 
 import math
-from dataclasses import replace
 
 import numpy as np
 
-from node.firmware.block_trial import record_of
 from node.firmware.cluster import Cluster
-from node.firmware.inputs import ImuReading
 from node.firmware.settings import TubeSettings
-from node.kernels.alignment import to_tube
-from node.kernels.calibration import USUAL, calibrate
+from node.kernels.calibration import USUAL
+from node.kernels.guard import is_heard
 from node.kernels.layout import Array
-from telemetry.parameters import ParameterBlock
+from node.kernels.record import FX, TEMPERATURE, WX
+from node.kernels.step import correct_one, correct_reading
 
 
 class ImuFusion:
-    """What the loop gets of one cycle.
+    """Leaves in the node's record what one IMU would have read.
 
     Parameters
     ----------
-    settings : of the tube, with those of every IMU
-    mount, states, configs : the node's records, one-element arrays
+    settings : of the tube, with those of at least two IMUs
+    crew : the same as a record, one-element array of dtype ``SETTINGS``
+    nodes, configs : the node's records, one-element arrays
     """
 
-    def __init__(self, settings: TubeSettings, mount: Array, states: Array, configs: Array) -> None:
+    def __init__(self, settings: TubeSettings, crew: Array, nodes: Array, configs: Array) -> None:
         count = len(settings.imus)
-        self.rate, self.force = np.zeros(3), np.zeros(3)  # rad/s, m/s^2, of all IMUs together, tube's frame
-        self.rates, self._forces = np.zeros((2, count, 3))  # of each
-        self.unaligned = np.zeros((count, 3))  # m/s^2, corrected, in the frame of each IMU
-        self.axes = mount[0]["axis"][:count]
-        own = [ParameterBlock(settings.tube, 0, imu.gyroscope, imu.accelerometer) for imu in settings.imus]
-        self._own = [record_of(block)[0] for block in own]
-        self.cluster: Cluster | None = None
-        if count > 1:
-            self.cluster = Cluster(settings.imus, mount, states, configs, settings.limits)
+        self.rates, self._forces = np.zeros((2, count, 3))  # of each, tube's frame
+        self.cluster = Cluster(settings.imus, crew, nodes, configs)
+        self._node, self._gravity = nodes[0], float(configs["gravity"][0])
 
-    def fuse(self, reading: ImuReading, correction: Array, expected: Array, *, heard: bool) -> ImuReading:
-        """Leave ``rate`` and ``force`` of the cycle; returns the raw reading behind them.
+    def fuse(self, parameters: Array, readings: Array) -> None:
+        """Correct and fuse one cycle's ``readings`` (imus, 8); ``parameters`` as ``node.kernels.step.node_step``."""
+        node = self._node
+        for k in range(len(readings)):
+            correct_reading(node, parameters, readings, k)
+            self.rates[k], self._forces[k] = readings[k, WX : WX + 3], readings[k, FX : FX + 3]
+            correct_one(node, parameters, k, readings[k, TEMPERATURE], self.rates[k], self._forces[k])
+        cluster = self.cluster
+        cluster.fuse_readings(readings, self.rates, self._forces, self._expected(), heard=bool(is_heard(node)))
+        node["rate"], node["force"] = cluster.rate, cluster.force
+        node["raw_rate"], node["raw_force"] = cluster.mean_raw(readings)
+        used = readings[cluster.used, TEMPERATURE].tolist()
+        node["temperature"] = math.fsum(used) / len(used) if used else USUAL
 
-        Parameters
-        ----------
-        correction : the parameter block in use, one-element array
-        expected : (6,) rad/s and m/s^2, the reading if nothing had changed
-        heard : the encoder's rate is known
-        """
-        readings = self._readings(reading)
-        for k, one in enumerate(readings):
-            rate, force = self.rates[k], self._forces[k]
-            rate[:], force[:] = one.rate, one.force
-            if not self._own[k]["identity"]:
-                calibrate(self._own[k], one.temperature, rate, force)
-                readings[k] = replace(one, rate=tuple(rate.tolist()), force=tuple(force.tolist()))
-            calibrate(correction[0], one.temperature, rate, force)
-            self.unaligned[k] = force
-            to_tube(self.axes[k], rate)
-            to_tube(self.axes[k], force)
-        if self.cluster is None:
-            self.rate[:], self.force[:] = self.rates[0], self._forces[0]
-            return readings[0]
-        raw = [(one.rate, one.force, one.saturated) for one in readings]
-        self.cluster.fuse_readings(raw, self.rates, self._forces, expected, heard=heard)
-        self.rate[:], self.force[:] = self.cluster.rate, self.cluster.force
-        used = [one.temperature for one, used in zip(readings, self.cluster.used, strict=True) if used]
-        temperature = math.fsum(used) / len(used) if used else USUAL
-        return ImuReading(reading.start, reading.end, *self.cluster.mean_raw(raw), temperature)
-
-    def _readings(self, reading: ImuReading) -> list[ImuReading]:
-        """Of every IMU of the cluster; no numbers of one that brought none."""
-        came = [reading, *reading.others][: len(self.axes)]
-        none = ImuReading(reading.start, reading.end, (math.nan,) * 3, (math.nan,) * 3)
-        return came + [none] * (len(self.axes) - len(came))
+    def _expected(self) -> Array:
+        """Rate (rad/s) and force (m/s^2) that the node would read in this cycle if nothing had changed: (6,)."""
+        state, guard = self._node["filter"], self._node["guard"]
+        rate = state["static_bias"] + state["bias"]
+        rate[2] += guard["rate"] if is_heard(self._node) else guard["sane_rate"]
+        return np.concatenate([rate, -self._gravity * state["now_down"]])

@@ -3,21 +3,30 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from typing import NamedTuple
 
 from node.firmware.settings import Kernel
-from node.kernels.cycle import run_cycle
-from node.kernels.relay import offer_aiding
 
 
-def kernel_of(kernel: Kernel) -> tuple[Callable[..., int], Callable[..., int]]:
-    """The cycle and the intake of aiding of the kernel chosen; all but the default are loaded only when used."""
+class Loop(NamedTuple):
+    """The cycle and the intake of aiding of a kernel, with the signatures of ``node.kernels``."""
+
+    run_cycle: Callable[..., int]
+    offer_aiding: Callable[..., int]
+
+
+def kernel_of(kernel: Kernel) -> Loop | None:
+    """The loop of the kernel chosen; None is that of float64, which the step holds compiled in.
+
+    All but the default are loaded only when used.
+    """
     if kernel == "float64":
-        return run_cycle, offer_aiding
+        return None
     if kernel == "published":
         from node.kernels.published import cycle as published
 
-        return published.run_cycle, published.offer_aiding
+        return Loop(published.run_cycle, published.offer_aiding)
     from node.kernels.fixed.node import FixedNode
 
     fixed = FixedNode()
-    return fixed.run_cycle, fixed.offer_aiding
+    return Loop(fixed.run_cycle, fixed.offer_aiding)

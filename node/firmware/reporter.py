@@ -10,7 +10,7 @@ from node.firmware.inputs import RigContext
 from node.firmware.pending_event import PendingEvent
 from node.firmware.settings import TubeSettings
 from node.kernels.angles import from_binary, wrap
-from node.kernels.layout import DEG, Array, Err, Status
+from node.kernels.layout import DEG, Array, Err
 from telemetry.messages import (
     Aiding,
     Event,
@@ -24,20 +24,6 @@ from telemetry.messages import (
 )
 
 VAR_FLOOR = (0.001 * DEG) ** 2
-EVENT_OF_STATUS: tuple[tuple[Status, str, Severity], ...] = (
-    (Status.STOPPED, "stopped", Severity.INFO),
-    (Status.STARTED, "started", Severity.INFO),
-    (Status.JOINT_OPENED, "joint_opened", Severity.INFO),
-    (Status.JOINT_CLOSED, "joint_closed", Severity.INFO),
-    (Status.BIAS_KNOWN, "bias_known", Severity.INFO),
-    (Status.REFERENCE_CHANGED, "reference_changed", Severity.INFO),
-    (Status.YAW_RESET, "yaw_reset", Severity.WARNING),
-    (Status.RATE_EXCEEDED, "rate_exceeded", Severity.ERROR),
-    (Status.RATE_RECOVERED, "rate_recovered", Severity.WARNING),
-    (Status.BAD_SAMPLE, "bad_sample", Severity.ERROR),
-    (Status.FILTER_FAULT, "filter_fault", Severity.ERROR),
-)
-TOLD = Status(sum(bit for bit, _, _ in EVENT_OF_STATUS))
 
 
 class Reporter:
@@ -46,19 +32,28 @@ class Reporter:
     Parameters
     ----------
     settings : what the crew entered
-    states, configs : the node's records, one-element arrays
+    nodes, configs : the node's records, one-element arrays
     next_sequence : source of the numbers of surveys and events
     restored : the state comes from a saved one
     """
 
     def __init__(
-        self, settings: TubeSettings, states: Array, configs: Array, next_sequence: Callable[[], int], *, restored: bool
+        self, settings: TubeSettings, nodes: Array, configs: Array, next_sequence: Callable[[], int], *, restored: bool
     ) -> None:
-        self._settings, self._state, self._config = settings, states[0], configs[0]
+        self._settings, self._node, self._config = settings, nodes[0], configs[0]
+        self._state = self._node["filter"]
         self._next_sequence = next_sequence
         self._restored = restored
-        self._rejecting = False
-        self.cycles = self.overruns = 0
+
+    @property
+    def sensor_flags(self) -> NodeFlag:
+        """What a reader of the node's yaw must know of its sensors."""
+        flags, guard = NodeFlag.NONE, self._node["guard"]
+        if guard["gyro"]["fault"]:
+            flags |= NodeFlag.SENSOR_FAULT | NodeFlag.YAW_UNTRUSTED
+        if guard["force"]["fault"]:
+            flags |= NodeFlag.SENSOR_FAULT
+        return flags
 
     @property
     def yaw(self) -> float:
@@ -75,9 +70,9 @@ class Reporter:
         """Variance of the constant errors of every joint above, of the twist and of this node's mount, rad^2."""
         return float(self._state["systematic_var"]) + self._settings.mount_std**2
 
-    def flags(self, sensors: NodeFlag, context: RigContext, now: float) -> NodeFlag:
-        """What the node says of the trust in its own yaw at ``now`` (s, own clock), beside that in its sensors."""
-        state, flags = self._state, sensors
+    def flags(self, context: RigContext, now: float) -> NodeFlag:
+        """What the node says of the trust in its own yaw at ``now`` (s, own clock)."""
+        state, flags = self._state, self.sensor_flags
         if not state["yaw_known"]:
             flags |= NodeFlag.YAW_UNTRUSTED
         if now - state["last_aided"] > self._settings.aiding_old_after:
@@ -94,17 +89,6 @@ class Reporter:
             flags |= NodeFlag.BIAS_UNKNOWN
         return flags
 
-    def events(self, status: Status, context: RigContext) -> Iterator[Event]:
-        """What a cycle found."""
-        for bit, code, severity in EVENT_OF_STATUS if status & TOLD else ():
-            if bit in status:
-                yield self.event(code, severity, context.rig_now, {"yaw_deg": self.yaw / DEG})
-        rejecting = bool(self._state["rejected"])
-        if rejecting and not self._rejecting:
-            sigmas = abs(float(self._state["innovation"])) / math.sqrt(float(self._state["innovation_var"]))
-            yield self.event("aiding_rejected", Severity.WARNING, context.rig_now, {"sigmas": sigmas})
-        self._rejecting = rejecting
-
     def pending_events(self, pending: Iterable[PendingEvent], context: RigContext) -> Iterator[Event]:
         """Events of the parts of the firmware that have no number of their own for them."""
         for code, severity, arguments in pending:
@@ -114,9 +98,7 @@ class Reporter:
         """One event, numbered."""
         return Event(self._settings.tube, self._next_sequence(), rig_now, severity, code, arguments)
 
-    def survey(
-        self, end: float, context: RigContext, imus: tuple[ImuMean, ...], sensors: NodeFlag
-    ) -> SurveyMeasurement:
+    def survey(self, end: float, context: RigContext, imus: tuple[ImuMean, ...]) -> SurveyMeasurement:
         """Measurement of this station, which ended at ``end`` (s, own clock); without ``imus`` by the fused reading."""
         state = self._state
         cov = state["survey_force_cov"]
@@ -134,7 +116,7 @@ class Reporter:
             systematic_var=self.systematic_var,
             samples=int(self._config["survey_samples"]),
             settle_time=end - float(state["stopped_at"]),
-            flags=self.flags(sensors, context, end),
+            flags=self.flags(context, end),
         )
 
     def estimate(self, context: RigContext) -> Aiding:
@@ -151,18 +133,16 @@ class Reporter:
             hops=max(context.hops, 1),
         )
 
-    def report(
-        self, end: float, context: RigContext, sensors: NodeFlag, mount: Array, block: tuple[int, bytes]
-    ) -> NodeState:
-        """Reporter at ``end`` (s, own clock); ``mount`` is the alignment in use, ``block`` version and short hash."""
-        state = self._state
+    def report(self, end: float, context: RigContext, block: tuple[int, bytes]) -> NodeState:
+        """Account at ``end`` (s, own clock); ``block`` is version and short hash of the parameters in use."""
+        state, mount = self._state, self._node["mount"]
         bias = state["static_bias"] + state["bias"]
         pitch, roll = angles_of(mount["axis"][0])
         return NodeState(
             tube=self._settings.tube,
             at=context.rig_now,
             hops=context.hops,
-            mode=self._mode(sensors, aligning=bool(mount["aligning"])),
+            mode=self._mode(aligning=bool(mount["aligning"])),
             yaw=self.yaw,
             yaw_var=self.yaw_var,
             systematic_var=self.systematic_var,
@@ -172,16 +152,16 @@ class Reporter:
             innovation_var=float(state["innovation_var"]),
             aiding_age=end - float(state["last_aided"]),
             clock_var=context.clock_var,
-            flags=self.flags(sensors, context, end),
-            cycles=self.cycles,
-            overruns=self.overruns,
+            flags=self.flags(context, end),
+            cycles=int(self._node["cycles"]),
+            overruns=int(self._node["overruns"]),
             parameters_version=block[0],
             parameters_hash=block[1],
             alignment=(pitch, roll, float(mount["std"][0].max())),
         )
 
-    def _mode(self, sensors: NodeFlag, *, aligning: bool) -> Mode:
+    def _mode(self, *, aligning: bool) -> Mode:
         """State of the node: what the kernels follow, unless a sensor fails or an alignment is under way."""
-        if NodeFlag.SENSOR_FAULT in sensors:
+        if NodeFlag.SENSOR_FAULT in self.sensor_flags:
             return Mode.FAULT
         return Mode.ALIGNMENT if aligning else Mode(int(self._state["mode"]))

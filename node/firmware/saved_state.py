@@ -1,4 +1,4 @@
-"""What a node keeps over a loss of power, as bytes: its state record and a blob of the telemetry."""
+"""What a node keeps over a loss of power, as bytes: its record and a blob of the telemetry."""
 
 from __future__ import annotations
 
@@ -8,8 +8,9 @@ import zlib
 import numpy as np
 
 from node.errors import SavedStateError
-from node.kernels.error_model import isolate
-from node.kernels.layout import LAYOUT_VERSION, STATE, UNKNOWN_YAW_VAR, Array, Err
+from node.kernels.layout import Array
+from node.kernels.record import NODE, NODE_LAYOUT, forget_session
+from node.kernels.resets import resume as resume_filter
 
 HEADER = struct.Struct("<4sHHQII")  # magic, layout, reserved, generation, state bytes, blob bytes
 CHECKSUM = struct.Struct("<I")  # crc32 of header and body, between the two
@@ -17,8 +18,8 @@ MAGIC = b"BCSS"
 
 
 def pack(state: Array, blob: bytes, generation: int) -> bytes:
-    """Bytes of one slot: header, checksum, state record, blob."""
-    head = HEADER.pack(MAGIC, LAYOUT_VERSION, 0, generation, STATE.itemsize, len(blob))
+    """Bytes of one slot: header, checksum, record, blob."""
+    head = HEADER.pack(MAGIC, NODE_LAYOUT, 0, generation, NODE.itemsize, len(blob))
     body = state.tobytes() + blob
     return head + CHECKSUM.pack(zlib.crc32(body, zlib.crc32(head))) + body
 
@@ -35,30 +36,27 @@ def unpack(data: bytes) -> tuple[Array, bytes, int]:
     if len(data) < begin:
         raise SavedStateError(f"saved state: expected at least {begin} bytes, got {len(data)}")
     magic, layout, _, generation, state_size, blob_size = HEADER.unpack_from(data)
-    if magic != MAGIC or layout != LAYOUT_VERSION or state_size != STATE.itemsize:
+    if magic != MAGIC or layout != NODE_LAYOUT or state_size != NODE.itemsize:
         raise SavedStateError(
-            f"saved state: expected layout {LAYOUT_VERSION} of {STATE.itemsize} bytes, got {layout} of {state_size}"
+            f"saved state: expected layout {NODE_LAYOUT} of {NODE.itemsize} bytes, got {layout} of {state_size}"
         )
     (crc,) = CHECKSUM.unpack_from(data, HEADER.size)
     body = data[begin : begin + state_size + blob_size]
     if len(body) != state_size + blob_size or zlib.crc32(body, zlib.crc32(data[: HEADER.size])) != crc:
         raise SavedStateError("saved state: checksum does not fit, the slot is torn or damaged")
-    return np.frombuffer(body[:state_size], STATE).copy(), body[state_size:], generation
+    return np.frombuffer(bytearray(body[:state_size]), NODE), body[state_size:], generation
 
 
-def resume(state: Array) -> None:
-    """Make a saved record ready for its first cycle after an outage of unknown length.
+def resume(nodes: Array) -> bool:
+    """Make a saved node ready for its first cycle after an outage of unknown length; whether it cut an alignment.
 
-    The constants (bias, scale, offset) are kept. The yaw is kept as the best guess; if the string was turning when
-    the state was saved nothing is known of it, so its variance says so and the first aiding decides.
+    What is learnt stays: constants, mounts, trust in the sensors, the twist. What belongs to the session goes, and
+    nobody knows what torque there was meanwhile.
     """
-    record = state[0]
-    was_turning = int(record["still_cycles"]) == 0
-    for name in ("cycles", "consumed", "pending", "still_cycles", "rejected", "bias_count"):
-        record[name] = 0
-    record["bias_sum"] = 0.0
-    record["yaw"] = record["now_yaw"]
-    if was_turning:
-        record["last_sequence"] = -1
-        isolate(record["P"], int(Err.YAW), UNKNOWN_YAW_VAR)
-    record["now_P"] = record["P"]
+    forget_session(nodes)
+    node = nodes[0]
+    resume_filter(node["filter"])
+    node["twist"]["wound"] = 1
+    was_cut = bool(node["mount"]["aligning"])
+    node["mount"]["aligning"] = 0
+    return was_cut

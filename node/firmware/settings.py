@@ -6,11 +6,14 @@ import math
 from dataclasses import dataclass
 from typing import Final, Literal, TypeAlias, get_args
 
+import numpy as np
+
 from node.errors import ConfigurationError
 from node.firmware.imu_settings import ImuSettings
-from node.firmware.sensor_faults import USUAL_LIMITS, SensorLimits
+from node.firmware.sensor_limits import USUAL_LIMITS, SensorLimits
 from node.kernels.alignment import MAX_IMUS
-from node.kernels.layout import DEG, Scheme
+from node.kernels.layout import DEG, Array, Scheme
+from node.kernels.record import SETTINGS
 from telemetry.messages import MAX_TUBE
 
 Kernel: TypeAlias = Literal["float64", "fixed", "published"]
@@ -89,3 +92,20 @@ def require(condition: bool, message: str) -> None:
     """Raise ``ConfigurationError`` with ``message`` unless ``condition``."""
     if not condition:
         raise ConfigurationError(message)
+
+
+def crew_record(settings: TubeSettings, configs: Array) -> Array:
+    """Settings as the step reads them, one record of dtype ``SETTINGS``; ``configs`` is the node's configuration."""
+    made = np.zeros(1, SETTINGS)
+    crew, limits = made[0], settings.limits
+    crew["drive_angle"], crew["drive_var"] = settings.drive_joint.angle, settings.drive_joint.std**2
+    crew["lower_angle"], crew["lower_var"] = settings.lower_joint.angle, settings.lower_joint.std**2
+    crew["unseen_var"] = settings.unseen_std**2
+    crew["scheme"], crew["state_every"] = int(settings.scheme), settings.state_every
+    crew["torsion_gate"], crew["joints"] = int(settings.torsion == "gate"), get_args(JointRule).index(settings.joints)
+    crew["stamp_walk"] = configs["stamp_walk"][0]
+    for name in ("stiffness", "aiding_old_after"):
+        crew[name] = getattr(settings, name)
+    for name in ("rate_range", "force_range", "repeats_together", "repeats_alone"):
+        crew[name] = getattr(limits, name)
+    return made

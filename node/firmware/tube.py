@@ -9,23 +9,41 @@ from dataclasses import replace
 import numpy as np
 
 from node.firmware.alignment import FASTEST, Aligner, alignment_in_use, realign
-from node.firmware.block_trial import forget_bias, forget_tilt, record_of, recorrect
-from node.firmware.coarse_level import level_coarsely
+from node.firmware.block_trial import record_of, recorrect
+from node.firmware.event_table import take_events
 from node.firmware.imu_fusion import ImuFusion
 from node.firmware.inputs import ImuReading, RigContext
 from node.firmware.kernel_choice import kernel_of
-from node.firmware.make_up import MakeUp
 from node.firmware.reporter import Reporter
-from node.firmware.sensor_guard import SensorGuard
-from node.firmware.settings import TubeSettings
+from node.firmware.settings import TubeSettings, crew_record
 from node.firmware.static_record import StaticRecorder
-from node.firmware.time_stamp import TimeStampPrior
-from node.firmware.torsion import TubeTorsion
-from node.kernels.alignment import new_mount
-from node.kernels.angles import wrap
 from node.kernels.calibration import USUAL
-from node.kernels.layout import DEG, Array, Scheme, Status, new_state
+from node.kernels.cycle import run_cycle as float_cycle
+from node.kernels.layout import DEG, Array, Scheme
 from node.kernels.modes import STATIC_BIAS
+from node.kernels.record import MOMENT, READING
+from node.kernels.resets import forget_bias, lose_tilt
+from node.kernels.step import (
+    ADMITTED,
+    ONWARD,
+    SAY_ESTIMATE,
+    SAY_EVENTS,
+    SAY_STATE,
+    SAY_SURVEY,
+    STILL_CYCLES,
+    USED,
+    admit,
+    correct,
+    finish,
+    hand_down,
+    judge,
+    node_aiding,
+    node_step,
+    prepare,
+    say_events,
+    take_aiding,
+)
+from node.kernels.twist import twist_var
 from telemetry.messages import (
     Aiding,
     Event,
@@ -38,57 +56,50 @@ from telemetry.messages import (
 )
 from telemetry.parameters import SHORT_HASH, ParameterBlock
 
-STILL_CYCLES = 4  # after which a node takes itself for standing
-LARGEST_OFFSET = 6.0 * DEG  # rad/s, zero-rate offset of a gyroscope never calibrated; the slow alignment turn is faster
+Said = Aiding | SurveyMeasurement | StaticRecord | Event | NodeState
 
 
 class Tube:
-    """State of one node and what it does at each event.
+    """One node: its record, and what it says of it.
 
     Parameters
     ----------
     settings : what the crew entered
-    config, state : one-record arrays of dtype ``CONFIG`` and ``STATE``, owned by the caller
+    configs, nodes : one-element arrays of dtype ``CONFIG`` and ``NODE``, owned by the caller
     next_sequence : source of the numbers of surveys and events, kept across restarts by the caller
-    restored : the state comes from a saved one
+    restored : the record comes from a saved one
     parameters : block in use; None is the identity
-    mount : one-record array of dtype ``MOUNT``, owned by the caller; None is that of an IMU never aligned
     """
 
     def __init__(
         self,
         settings: TubeSettings,
-        config: Array,
-        state: Array,
+        configs: Array,
+        nodes: Array,
         next_sequence: Callable[[], int],
         *,
         restored: bool,
         parameters: ParameterBlock | None = None,
-        mount: Array | None = None,
     ) -> None:
         self.settings = settings
-        self._mount = new_mount() if mount is None else mount
-        self._configs = config
-        self.config = config[0]
-        self._states = state
+        self.configs, self.nodes = configs, nodes
+        self.config, self.node = configs[0], nodes[0]
         self.config["intersection"] = int(settings.scheme is Scheme.INTERSECTION)
-        self.state = state[0]
+        self.state, self._mount = self.node["filter"], self.node["mount"]
+        self._crew = crew_record(settings, configs)
         self._next_sequence = next_sequence
         self._restored = restored
-        self.reporter = Reporter(settings, state, config, next_sequence, restored=restored)
-        self._noticed = Status.NONE  # between cycles
-        self.raw: ImuReading | None = None  # of the last cycle, of all IMUs together
+        self.reporter = Reporter(settings, nodes, configs, next_sequence, restored=restored)
         self._recorder = StaticRecorder()
-        self._guard = SensorGuard(state, config, settings.limits)
-        self._torsion = TubeTorsion(settings, state)
-        self._make_up = MakeUp(settings, state)
-        self._aligner = Aligner(self._mount, settings.imus, float(self.config["force_std"] / self.config["gravity"]))
-        self._fusion = ImuFusion(settings, self._mount, state, config)
-        self._axes, self._cluster = self._fusion.axes, self._fusion.cluster
-        self._time_stamp = TimeStampPrior(state, config)
-        self._slow_cycles = 0  # in a row, not faster than the offset of a gyroscope never calibrated
-        self._temperature = USUAL
-        self._run_cycle, self._offer_aiding = kernel_of(settings.kernel)
+        count = len(settings.imus)
+        noise = float(self.config["force_std"] / self.config["gravity"])
+        self._aligner = Aligner(self._mount, settings.imus, noise)
+        self._axes = self._mount["axis"][:count]
+        self._fusion = ImuFusion(settings, self._crew, nodes, configs) if count > 1 else None
+        self._loop = kernel_of(settings.kernel)
+        own = [ParameterBlock(settings.tube, 0, imu.gyroscope, imu.accelerometer) for imu in settings.imus]
+        self._corrections = np.concatenate([record_of(block) for block in (own[0], *own)])
+        self._readings, self._moment, self._aiding = np.zeros((count, READING)), np.zeros(MOMENT), np.zeros(11)
         self.parameters = parameters or ParameterBlock(settings.tube, 0)
         self.use(self.parameters)
 
@@ -97,82 +108,61 @@ class Tube:
 
         ``forward`` hands the encoder's measurement on unchanged, at once; the others wait for the cycle.
         """
-        joint = self.settings.drive_joint if aiding.hops == 0 else None
-        offset = wrap(aiding.offset + (joint.angle if joint else 0.0))
-        systematic_var = aiding.systematic_var + (joint.std**2 if joint else 0.0)
-        twist_var = self._torsion.reaches(aiding)
-        offset, systematic_var = self._make_up.follow(aiding, offset, systematic_var, self._torsion.var, twist_var)
-        if self._guard.gate_aiding(aiding, offset, valid_local) and self._torsion.gate_aiding(aiding, valid_local):
-            self._noticed |= Status(
-                self._offer_aiding(
-                    self.state,
-                    self.config,
-                    aiding.yaw,
-                    aiding.yaw_var,
-                    systematic_var + self._torsion.var,
-                    offset,
-                    valid_local,
-                    aiding.sequence,
-                    aiding.hops,
-                )
-            )
-        if self.settings.scheme is not Scheme.FORWARD:
+        a, taken = aiding, self._aiding
+        taken[:] = (
+            *(a.yaw, a.yaw_var, a.systematic_var, a.offset, a.rate, valid_local, a.sequence, a.hops),
+            *(a.torque, a.torsion_var, a.under_torque),
+        )
+        if self._loop is None:
+            gates = node_aiding(self.nodes, self.configs, self._crew, taken)
+        else:
+            gates = self._offer(a, valid_local, taken)
+        if not gates & ONWARD:
             return None
-        below = self.settings.lower_joint
-        return replace(
-            aiding,
-            offset=wrap(offset + below.angle),
-            systematic_var=systematic_var + below.std**2,
-            hops=aiding.hops + 1,
-            torsion_var=twist_var,
+        node = self.node
+        return Aiding(
+            a.yaw,
+            a.yaw_var,
+            float(node["down_systematic"]),
+            float(node["down_offset"]),
+            a.rate,
+            a.valid_at,
+            a.sequence,
+            a.hops + 1,
+            a.torque,
+            float(node["down_torsion"]),
+            a.under_torque,
         )
 
-    def on_cycle(
-        self, reading: ImuReading, context: RigContext
-    ) -> Iterator[Aiding | SurveyMeasurement | StaticRecord | Event | NodeState]:
-        """Correct the reading, run one execution cycle and yield what there is to say."""
-        self.raw = reading
-        if not self._guard.admits(reading.start, reading.end):
-            yield from self._sensor_events(context)
-            return
-        reading = self.raw = self._fusion.fuse(reading, self._correction, self._expected(), heard=self._guard.heard)
-        rate, force = self._fusion.rate, self._fusion.force
-        self._temperature = reading.temperature
-        raw = (reading.rate, reading.force)
-        self._guard.before(raw, rate, force, saturated=reading.saturated, at=reading.end)
-        self._time_stamp.follow(context)
-        level_coarsely(self.state, self.config, rate, force)
-        self._slow_cycles = self._slow_cycles + 1 if max(map(abs, rate)) < LARGEST_OFFSET else 0
-        reporter = self.reporter
-        if reporter.cycles and reading.start - self.state["now"] > 0.5 * (reading.end - reading.start):
-            reporter.overruns += 1
-        status = self._noticed | self._run(reading, 1 if context.joined else 0)
-        self._noticed = Status.NONE
-        reporter.cycles += 1
-        if Status.FILTER_FAULT in status:
-            self._start_over()
-        self._guard.after(status, reading.end)
-        self._follow_alignment(reading)
-        if self._cluster is not None and self.quiet:
-            self._cluster.learn_offsets(self._fusion.rates)
-        yield from self._sensor_events(context)
-        yield from reporter.pending_events([*self._make_up.drain_events(), *self._torsion.drain_events()], context)
-        yield from reporter.events(status, context)
-        yield from self._record(reading, context)
-        if Status.SURVEY_READY in status:
-            samples = int(self.config["survey_samples"])
-            imus = self._cluster.survey(samples) if self._cluster is not None else ()
-            yield reporter.survey(reading.end, context, imus, self._guard.flags)
-        if self.settings.scheme is not Scheme.FORWARD and self.state["yaw_known"]:
-            yield self._torsion.of_estimate(reporter.estimate(context))
-        if status & ~Status.AIDED or reporter.cycles % self.settings.state_every == 0:
-            yield reporter.report(reading.end, context, self._guard.flags, self._mount[0], self._block)
+    def on_cycle(self, reading: ImuReading, context: RigContext) -> list[Said]:
+        """Take a cycle's reading in; returns what there is to say."""
+        moment = (reading.start, reading.end, context.joined, context.hops, context.clock_var, context.synchronised)
+        self._moment[:] = moment
+        rows = self._readings
+        rows[0] = (*reading.rate, *reading.force, reading.temperature, reading.saturated)
+        if self._loop is None and self._fusion is None and self._aligner.idle:
+            says = node_step(self.nodes, self.configs, self._crew, self._corrections, rows, self._moment)
+            said: list[Said] = []
+        else:
+            for k in range(1, len(rows)):
+                rows[k] = _row_of(reading.others[k - 1]) if k <= len(reading.others) else math.nan
+            says, said = self._run_in_parts(reading, context)
+        if says in (0, ADMITTED) and not self._recorder.running:
+            return said
+        return said + list(self._say(says, reading, context))
 
     def boot_event(self, rig_now: float) -> Event:
         """Report that the node started, and whether with its saved yaw."""
         return self.reporter.event(
             "restored" if self._restored else "booted", Severity.INFO, rig_now, {"yaw_deg": self.yaw / DEG}
         )
+
+    @property
+    def raw(self) -> ImuReading:
+        """Raw reading of the newest cycle, of all IMUs together; its times are not told."""
+        node = self.node
+        (wx, wy, wz), (fx, fy, fz) = node["raw_rate"].tolist(), node["raw_force"].tolist()
+        return ImuReading(math.nan, math.nan, (wx, wy, wz), (fx, fy, fz), float(node["temperature"]))
 
     def take_survey(self) -> None:
         """Measure this station again at the next settled cycle of the present or the next stop."""
@@ -189,7 +179,7 @@ class Tube:
             return ""
         if self.state["mode"] == STATIC_BIAS:
             return "the static bias is not known yet"
-        if self._guard.flags:
+        if self.reporter.sensor_flags:
             return "a sensor is faulty"
         if abs(rate := float(self.state["now_rate"])) > FASTEST:
             return f"too fast: {abs(rate) / DEG:.3g} deg/s, expected at most {FASTEST / DEG:g}"
@@ -207,15 +197,15 @@ class Tube:
         if block.gyroscope != self.parameters.gyroscope:
             if self._aligner.running:
                 self._aligner.stop("another block for the gyroscope")
-            forget_bias(self._states, self._configs)
+            forget_bias(self.state, self.config)
         if block.accelerometer != self.parameters.accelerometer:
-            forget_tilt(self._states)
+            lose_tilt(self.state)
 
     def use(self, block: ParameterBlock) -> None:
         """Correct readings by ``block`` from the next cycle on."""
-        recorrect(self._states, self.parameters, block, self._temperature)
+        recorrect(self.state, self.parameters, block, float(self.node["temperature"]))
         self.parameters = block
-        self._correction = record_of(block)
+        self._corrections[0] = record_of(block)[0]
         self._block = (block.version, block.sha256()[:SHORT_HASH])
 
     @property
@@ -226,7 +216,7 @@ class Tube:
     @property
     def standing(self) -> bool:
         """Whether the node may be at rest: quiet, or slow and without a bias, whose offset may look like a rate."""
-        return self.quiet or (self.state["mode"] == STATIC_BIAS and self._slow_cycles >= STILL_CYCLES)
+        return self.quiet or (self.state["mode"] == STATIC_BIAS and int(self.node["slow_cycles"]) >= STILL_CYCLES)
 
     @property
     def yaw(self) -> float:
@@ -245,63 +235,103 @@ class Tube:
 
     def flags(self, context: RigContext, now: float) -> NodeFlag:
         """What the node says of the trust in its own yaw at ``now`` (s, own clock)."""
-        return self.reporter.flags(self._guard.flags, context, now)
+        return self.reporter.flags(context, now)
 
-    def _run(self, reading: ImuReading, joined: int) -> Status:
-        """One cycle of the loop; under torque it takes no survey, and that of this stop stays due."""
-        state, due = self.state, not self.state["surveyed"]
-        waits = due and self._torsion.holds_survey(reading.end)
-        if waits:
-            state["surveyed"] = 1
-        rate, force = self._fusion.rate, self._fusion.force
-        status = self._run_cycle(state, self.config, rate, force, reading.start, reading.end, joined)
-        if waits:
-            state["surveyed"] = 0
-        return Status(status)
+    def _offer(self, aiding: Aiding, valid_local: float, taken: Array) -> int:
+        """``node_aiding`` with another loop than that of float64."""
+        node, gates = self.node, int(take_aiding(self.nodes, self.configs, self._crew, taken))
+        if gates & USED and self._loop is not None:
+            systematic_var = float(node["down_systematic"]) + twist_var(node["twist"])
+            node["noticed"] |= self._loop.offer_aiding(
+                self.state,
+                self.config,
+                aiding.yaw,
+                aiding.yaw_var,
+                systematic_var,
+                float(node["down_offset"]),
+                valid_local,
+                aiding.sequence,
+                aiding.hops,
+            )
+        if gates & ONWARD:
+            hand_down(self.nodes, self._crew)
+        return gates
 
-    def _expected(self) -> Array:
-        """Rate (rad/s) and force (m/s^2) that the node would read in this cycle if nothing had changed: (6,)."""
-        state = self.state
-        rate = state["static_bias"] + state["bias"]
-        rate[2] += self._guard.spin
-        return np.concatenate([rate, -float(self.config["gravity"]) * state["now_down"]])
+    def _run_in_parts(self, reading: ImuReading, context: RigContext) -> tuple[int, list[Said]]:
+        """``node_step`` with another loop, several IMUs or an alignment under way; what it says, and what is said."""
+        node, moment = self.node, self._moment
+        if not admit(self.nodes, moment):
+            return int(say_events(node)), []
+        saturated = int(reading.saturated)
+        if self._fusion is None:
+            correct(self.nodes, self._corrections, self._readings)
+        else:
+            self._fusion.fuse(self._corrections, self._readings)
+            saturated = 0
+        waits = prepare(self.nodes, self.configs, self._crew, moment, saturated)
+        run_cycle = self._loop.run_cycle if self._loop is not None else float_cycle
+        args = (node["rate"], node["force"], reading.start, reading.end, int(context.joined))
+        status = run_cycle(self.state, self.config, *args)
+        judge(self.nodes, self.configs, moment, int(status), waits)
+        self._follow_alignment(reading)
+        if self._fusion is not None and self.quiet:
+            self._fusion.cluster.learn_offsets(self._fusion.rates)
+        pending = [*take_events(node["events"]), *self._aligner.drain_events()]
+        if self._fusion is not None:
+            pending += self._fusion.cluster.drain_events()
+        return int(finish(self.nodes, self._crew)), list(self.reporter.pending_events(pending, context))
+
+    def _say(self, says: int, reading: ImuReading, context: RigContext) -> Iterator[Said]:
+        """What the step has to say, in order."""
+        reporter = self.reporter
+        if says & SAY_EVENTS:
+            yield from reporter.pending_events(take_events(self.node["events"]), context)
+        if says & ADMITTED and self._recorder.running:
+            yield from self._record(reading, context)
+        if says & SAY_SURVEY:
+            samples = int(self.config["survey_samples"])
+            imus = self._fusion.cluster.survey(samples) if self._fusion is not None else ()
+            yield reporter.survey(reading.end, context, imus)
+        if says & SAY_ESTIMATE:
+            yield self._of_estimate(reporter.estimate(context))
+        if says & SAY_STATE:
+            yield reporter.report(reading.end, context, self._block)
+
+    def _of_estimate(self, aiding: Aiding) -> Aiding:
+        """The node's own yaw as aiding, with the twist that it was aided under."""
+        twist = self.node["twist"]
+        var = float(twist_var(twist))
+        joints = max(aiding.systematic_var - var, 0.0)
+        torque, holding = float(twist["torque"]), bool(twist["holding"])
+        return replace(aiding, systematic_var=joints, torque=torque, torsion_var=var, under_torque=holding)
 
     def _follow_alignment(self, reading: ImuReading) -> None:
         if not self._aligner.running:
             return
         before = self._axes.copy()
-        used = np.full(len(before), not self._guard.flags)
-        if self._cluster is not None:
-            used &= self._cluster.used
+        used = np.full(len(before), not self.reporter.sensor_flags)
+        if self._fusion is not None:
+            used &= self._fusion.cluster.used
         rate = float(self.state["now_rate"])
         aided = reading.end - float(self.state["last_aided"]) <= self.settings.aiding_old_after
         yaw = self.yaw if aided else math.nan
-        if self._aligner.on_turn_sample(self._fusion.unaligned, rate, yaw, reading.start, reading.end, used):
-            realign(self._states, before, self._axes)
+        unaligned = self.node["unaligned"][: len(before)]
+        if self._aligner.on_turn_sample(unaligned, rate, yaw, reading.start, reading.end, used):
+            realign(self.state, before, self._axes)
 
     def _drop_alignment(self, reason: str) -> None:
         before = self._axes.copy()
         self._aligner.drop(reason)
-        realign(self._states, before, self._axes)
-
-    def _sensor_events(self, context: RigContext) -> Iterator[Event]:
-        cluster = self._cluster.drain_events() if self._cluster is not None else []
-        pending = [*self._guard.drain_events(), *self._aligner.drain_events(), *cluster]
-        return self.reporter.pending_events(pending, context)
+        realign(self.state, before, self._axes)
 
     def _record(self, reading: ImuReading, context: RigContext) -> Iterator[StaticRecord | Event]:
-        recorder = self._recorder
-        if not recorder.running:
-            return
-        temperature = reading.temperature if math.isfinite(reading.temperature) else USUAL
-        recorder.append_reading(reading.rate, reading.force, temperature, reading.start, standing=self.standing)
+        recorder, raw = self._recorder, self.raw
+        temperature = raw.temperature if math.isfinite(raw.temperature) else USUAL
+        recorder.append_reading(raw.rate, raw.force, temperature, reading.start, standing=self.standing)
         if recorder.is_due(reading.end):
             record = recorder.finish(self.settings.tube, reading.end, context.rig_now, self._next_sequence)
             yield record or self.reporter.event("static_record_empty", Severity.ERROR, context.rig_now, {})
 
-    def _start_over(self) -> None:
-        """Invalid covariance: restart the filter, keep the constant bias."""
-        keep = {name: self.state[name].copy() for name in ("static_bias", "static_bias_var", "mode")}
-        fresh = new_state(self._configs)[0]
-        for name in fresh.dtype.names or ():
-            self.state[name] = keep.get(name, fresh[name])
+
+def _row_of(reading: ImuReading) -> tuple[float, ...]:
+    return (*reading.rate, *reading.force, reading.temperature, reading.saturated)

@@ -64,6 +64,11 @@ class BlockUpdater:
             return self._status(segment.digest, UploadPhase.REFUSED, reason)
         return self._gather(segment)
 
+    @property
+    def trying(self) -> bool:
+        """Whether a block waits for readings at rest."""
+        return self._trial is not None
+
     def on_cycle(self, reading: ImuReading) -> BlockStatus | None:
         """Try the waiting block on a cycle's raw reading; returns the status to send once it is decided."""
         if self._trial is None:

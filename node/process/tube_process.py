@@ -11,14 +11,15 @@ from typing import Any
 import numpy as np
 
 from node.errors import ConfigurationError, SavedStateError
-from node.firmware.block_trial import forget_bias, forget_tilt
 from node.firmware.inputs import ImuReading, RigContext
 from node.firmware.saved_state import resume
 from node.firmware.settings import TubeSettings
 from node.firmware.tube import Tube
-from node.kernels.alignment import MOUNT, new_mount
+from node.kernels.alignment import new_mount
 from node.kernels.calibration import USUAL
-from node.kernels.layout import PERIOD, Array, default_config, new_state
+from node.kernels.layout import PERIOD, Array, default_config
+from node.kernels.record import new_node
+from node.kernels.resets import forget_bias, lose_tilt
 from node.process.block_store import BlockStore
 from node.process.block_updater import BlockUpdater, load_parameters
 from node.process.command_handlers import CommandHandlers
@@ -89,19 +90,16 @@ class TubeProcess(Process):
         # apart from the saved state: a node that lost its state must not look like an earlier boot
         self.boots = BootCounter(folder).boots
         saved, fault = self._load()
-        self.state, blob = saved if saved else (new_state(self.config), None)
-        self.mount, telemetry = split_blob(blob)
-        self._cut = bool(self.mount[0]["aligning"])
-        self.mount[0]["aligning"] = 0
-        if saved:
-            resume(self.state)
+        self.nodes, telemetry = saved if saved else (new_node(self.config), None)
+        self._cut = resume(self.nodes) if saved else False
         store = BlockStore(folder)
         parameters = load_parameters(store, settings.tube)
         self._fallback = "; ".join(store.faults)
         if self._fallback:
-            forget_bias(self.state, self.config)
-            forget_tilt(self.state)
-            self.mount = new_mount()
+            state = self.nodes[0]["filter"]
+            forget_bias(state, self.config[0])
+            lose_tilt(state)
+            self.nodes["mount"] = new_mount()
         self.endpoint = Endpoint(
             settings.tube,
             frozenset(Side),
@@ -113,11 +111,10 @@ class TubeProcess(Process):
         self.tube = Tube(
             settings,
             self.config,
-            self.state,
+            self.nodes,
             next_sequence,
             restored=restored,
             parameters=parameters,
-            mount=self.mount,
         )
         self._commands = CommandHandlers(self.tube, timing)
         self._cycles = 0
@@ -126,6 +123,11 @@ class TubeProcess(Process):
         self._announced = False
         self._blocks = BlockUpdater(self.tube, store, key, self._send_event, self._save)
         self._save()
+
+    @property
+    def state(self) -> Array:
+        """The filter of the node, one-element array of dtype ``STATE``."""
+        return np.asarray(self.nodes["filter"])
 
     def on_frame(self, side: Side, frame: bytes, now: float) -> None:
         """A frame arrived at one end (``now``: s, own clock)."""
@@ -156,10 +158,10 @@ class TubeProcess(Process):
         context = self._context(now)
         if context.synchronised:
             self._announce(context.rig_now, now)
-        said = list(self.tube.on_cycle(reading, context))
+        said = self.tube.on_cycle(reading, context)
         self._lap(Stage.FILTER)
         urgent = [self._send(message, now) for message in said]
-        if (status := self._blocks.on_cycle(self.tube.raw or reading)) is not None:
+        if self._blocks.trying and (status := self._blocks.on_cycle(self.tube.raw)) is not None:
             self.endpoint.send_status(status)
         self._cycles += 1
         if self._timing is None:  # an own clock advances time between the cycles
@@ -171,10 +173,10 @@ class TubeProcess(Process):
 
     def on_overrun(self, missed: int, now: float) -> None:
         """The cycle took so long that ``missed`` later ones are left out."""
-        self.tube.reporter.overruns += 1
+        self.tube.node["overruns"] += 1
         if now - self._overrun_told >= OVERRUN_EVERY:
             self._overrun_told = now
-            self._send_event(Severity.WARNING, "overrun", {"missed": missed, "overruns": self.tube.reporter.overruns})
+            self._send_event(Severity.WARNING, "overrun", {"missed": missed, "overruns": int(self.tube.node["overruns"])})
 
     def close(self) -> None:
         """Save the newest state and release the sensors."""
@@ -252,14 +254,7 @@ class TubeProcess(Process):
             return None, str(error)
 
     def _save(self) -> None:
-        self._journal.save(self.state, self.mount.tobytes() + self.endpoint.export_state())
-
-
-def split_blob(blob: bytes | None) -> tuple[Array, bytes | None]:
-    """Mounts and telemetry saved beside the state; those of a first start for None."""
-    if blob is None:
-        return new_mount(), None
-    return np.frombuffer(blob[: MOUNT.itemsize], MOUNT).copy(), blob[MOUNT.itemsize :]
+        self._journal.save(self.nodes, self.endpoint.export_state())
 
 
 def reading_of(data: Any, now: float) -> ImuReading:

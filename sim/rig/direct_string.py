@@ -19,8 +19,8 @@ from node.firmware.encoder import EncoderNode, EncoderSample
 from node.firmware.inputs import ImuReading, RigContext
 from node.firmware.reporter import VAR_FLOOR
 from node.firmware.tube import Tube
-from node.kernels.alignment import new_mount
-from node.kernels.layout import PERIOD, Err, Scheme, default_config, new_state
+from node.kernels.layout import PERIOD, Err, Scheme, default_config
+from node.kernels.record import new_node
 from sim.errors import ScenarioError
 from sim.rig.plain_encoder import PlainEncoder
 from sim.world.imu_errors import gauss_markov
@@ -102,8 +102,7 @@ class DirectString:
         count = world.scenario.tubes
         self._configs = self._tuned_configs(count)
         # the records of all tubes in one array, so that a cycle is read off in a few operations
-        self._states = np.concatenate([new_state(self._configs[k : k + 1]) for k in range(count)])
-        self.mounts = {tube: new_mount() for tube in range(1, count + 1)}  # of their IMUs, as aligned
+        self.nodes = np.concatenate([new_node(self._configs[k : k + 1]) for k in range(count)])
         self.tubes = {tube: self._fresh_tube(tube, state_every) for tube in range(1, count + 1)}
         self._encoder = EncoderNode(torque=world.torque_settings())
         sensor = self._file.encoder
@@ -151,8 +150,7 @@ class DirectString:
     def _fresh_tube(self, tube: int, state_every: int) -> Tube:
         settings = replace(self.world.tube_settings(tube), state_every=state_every)
         own = slice(tube - 1, tube)
-        numbers, mount = iter(range(NEVER)).__next__, self.mounts[tube]
-        return Tube(settings, self._configs[own], self._states[own], numbers, restored=False, mount=mount)
+        return Tube(settings, self._configs[own], self.nodes[own], iter(range(NEVER)).__next__, restored=False)
 
     def _losses(self) -> Mask:
         """Whether an aiding is lost on the hop to a tube, (cycles, tubes)."""
@@ -180,13 +178,13 @@ class DirectString:
         """Whether the joint below the head is open, and was for ``since`` s."""
         return any(phase.start + since < t < phase.joint_closed for phase in self._adds)
 
-    def _run_cycle(self, cycle: int, tube: int, string: Sequence[int]) -> list[Message]:
+    def _run_cycle(self, cycle: int, tube: int, string: Sequence[int]) -> Sequence[Message]:
         phase = self._phases[tube]
         begin, end = self.world.cycle_end(cycle - 1) + phase, self.world.cycle_end(cycle) + phase
         shift = self.clock_shifts.get(tube, 0.0)
         wx, wy, wz, fx, fy, fz = self._spoil(tube, cycle, self.world.imu_sample(tube, cycle))
         reading = ImuReading(begin + shift, end + shift, (wx, wy, wz), (fx, fy, fz))
-        return list(self.tubes[tube].on_cycle(reading, self._context(tube, string[0], end)))
+        return self.tubes[tube].on_cycle(reading, self._context(tube, string[0], end))
 
     def _context(self, tube: int, top: int, end: float) -> RigContext:
         """What the link would tell: the new tube's joint is open at once, that below it once it is missed."""
@@ -234,7 +232,7 @@ class DirectString:
 
     def _keep(self, cycle: int, string: Sequence[int], said: Mapping[int, Sequence[Message]]) -> None:
         """Read off every record of the string, then take what the nodes had to say."""
-        run, states = self.run, self._states[: len(string)]
+        run, states = self.run, self.nodes["filter"][: len(string)]
         row = np.s_[cycle, : len(string)]
         run.yaw[row] = states["now_yaw"] * TURN_OF_BINARY
         run.total_error[row] = wrapped(run.yaw[row] - self._truth[row])

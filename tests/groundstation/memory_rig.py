@@ -11,7 +11,7 @@ import numpy as np
 from groundstation.config import GroundConfig
 from groundstation.service.orders import Order
 from groundstation.service.process import GroundProcess
-from node.firmware.sensor_faults import SensorLimits
+from node.firmware.sensor_limits import SensorLimits
 from node.firmware.settings import TubeSettings
 from node.process.encoder_process import EncoderProcess
 from node.process.tube_process import TubeProcess

@@ -13,8 +13,8 @@ from node.firmware.imu_settings import ImuSettings
 from node.firmware.inputs import ImuReading, RigContext
 from node.firmware.settings import Kernel, TubeSettings
 from node.firmware.tube import Tube
-from node.kernels.alignment import new_mount
-from node.kernels.layout import DEG, PERIOD, default_config, new_state
+from node.kernels.layout import DEG, PERIOD, default_config
+from node.kernels.record import new_node
 from node.process.command_handlers import CommandHandlers
 from node.process.tube_process import TubeProcess
 from sim.studies.alignment.run import Setup, Turn
@@ -34,11 +34,11 @@ class Bored:
     def __init__(
         self, lean: float = 2.0 * DEG, tilt: tuple[float, float] = TILT, kernel: Kernel = "float64", shake: float = 1.0
     ) -> None:
-        config, self.mount = default_config(), new_mount()
+        config = default_config()
         self.random = np.random.default_rng(5)
         settings = TubeSettings(1, state_every=1, kernel=kernel)
         numbers = iter(range(10**9)).__next__
-        self.tube = Tube(settings, config, new_state(config), numbers, restored=False, mount=self.mount)
+        self.tube = Tube(settings, config, new_node(config), numbers, restored=False)
         pitch, roll = tilt
         axis = np.array([math.sin(pitch), math.cos(pitch) * math.sin(roll), math.cos(pitch) * math.cos(roll)])
         self.frame = rotation(axis).T
@@ -259,11 +259,11 @@ def test_lost_cycles_end_it_and_a_few_do_not() -> None:
 
 def test_what_was_refused_leaves_the_offset_in_use() -> None:
     bored = Bored().ordered().turned().cycles(10)
-    kept = bored.mount.tobytes()
+    kept = bored.tube.node["mount"].tobytes()
     assert bored.tube.align("circle", 2.0) == ""
     bored.turned(1.0).cycles(10)
     assert "too few" in bored.reason()
-    assert bored.mount.tobytes() == kept
+    assert bored.tube.node["mount"].tobytes() == kept
 
 
 def test_an_offset_is_dropped_on_order_and_with_its_accelerometer() -> None:
@@ -320,16 +320,16 @@ def test_an_offset_survives_the_power_and_an_alignment_that_was_cut_is_told(tmp_
     found = powered.order("alignment").values
     assert found["method"] == "circle"
     assert found["pitch"] == pytest.approx([TILT[0]], abs=4.0 * found["pitch_std"][0])
-    kept = powered.process.mount.tobytes()
+    kept = powered.process.nodes["mount"].tobytes()
     assert powered.cut().order("alignment").values == found
-    assert powered.process.mount.tobytes() == kept
+    assert powered.process.nodes["mount"].tobytes() == kept
     assert powered.cycles(8).order("align", method="extremes").done
     powered.cycles(20, SLOW).cut()
     events: list[tuple[str, object]] = []
     powered.process._send_event = lambda _, code, arguments: events.append((code, arguments))  # type: ignore[method-assign]
     powered.process._announce(5.0, 5.0)
     assert events == [("alignment_refused", {"reason": "the power was cut"})]
-    assert powered.process.mount.tobytes() == kept
+    assert powered.process.nodes["mount"].tobytes() == kept
     assert powered.order("align", method="none").detail == "dropped"
     assert powered.cut().order("alignment").values == {"method": "none"}
 

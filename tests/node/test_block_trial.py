@@ -11,7 +11,6 @@ from node.firmware.block_trial import (
     STILL_CYCLES,
     Trial,
     Verdict,
-    forget_bias,
     record_of,
     recorrect,
     refusal,
@@ -19,6 +18,7 @@ from node.firmware.block_trial import (
 )
 from node.kernels.calibration import calibrate
 from node.kernels.layout import DEG, Err, default_config, new_state
+from node.kernels.resets import forget_bias
 from telemetry.messages import Matrix3
 from telemetry.parameters import UNIT, ZERO, ParameterBlock, SensorParameters
 
@@ -129,7 +129,7 @@ def test_forgetting_the_bias_leaves_the_yaw() -> None:
     state[0]["static_bias"], state[0]["bias"], state[0]["scale"], state[0]["mode"] = 1e-3, 1e-4, 1e-3, 4
     state[0]["P"][Err.YAW, Err.YAW] = 1e-8
     state[0]["P"][Err.YAW, Err.BIAS_Z] = state[0]["P"][Err.BIAS_Z, Err.YAW] = 1e-9
-    forget_bias(state, config)
+    forget_bias(state[0], config[0])
     assert not np.any(state[0]["static_bias"])
     assert not np.any(state[0]["bias"])
     assert state[0]["mode"] == 1
@@ -152,6 +152,6 @@ def test_what_waits_in_the_ring_is_read_by_the_new_block() -> None:
         calibrate(record_of(before)[0], 31.0, raw[k, :3], raw[k, 3:])
         calibrate(record_of(after)[0], 31.0, expected[k, :3], expected[k, 3:])
     state[0]["ring_rate"], state[0]["ring_force"] = raw[:, :3], raw[:, 3:]
-    recorrect(state, before, after, 31.0)
+    recorrect(state[0], before, after, 31.0)
     np.testing.assert_allclose(state[0]["ring_rate"], expected[:, :3], atol=1e-12)
     np.testing.assert_allclose(state[0]["ring_force"], expected[:, 3:], atol=1e-12)

@@ -21,7 +21,8 @@ from node.firmware.settings import Kernel, TubeSettings
 from node.firmware.tube import Tube
 from node.kernels.alignment import MAX_IMUS, new_mount
 from node.kernels.cluster import fuse
-from node.kernels.layout import DEG, PERIOD, Err, default_config, new_state
+from node.kernels.layout import DEG, PERIOD, Err, default_config
+from node.kernels.record import new_node
 from node.process.drivers.replay import ReplayImu
 from node.process.tube_command import node as command
 from node.process.tube_process import TubeProcess, reading_of
@@ -47,12 +48,12 @@ class Clustered:
     ) -> None:
         self.noises, self.biases = np.array(noises), biases
         self.random = np.random.default_rng(3)
-        self.config, self.mount = default_config(), new_mount()
+        self.config = default_config()
         imus = tuple(ImuSettings(noise=noise) for noise in noises)
         self.settings = TubeSettings(1, state_every=1, kernel=kernel, imus=imus)
         numbers = iter(range(10**9)).__next__
         self.tube = Tube(
-            self.settings, self.config, new_state(self.config), numbers, restored=False, mount=self.mount
+            self.settings, self.config, new_node(self.config), numbers, restored=False
         )  # fmt: skip
         self.frames = [np.eye(3)] * len(noises)
         for k, (pitch, roll) in enumerate(tilts):
@@ -278,8 +279,8 @@ def test_an_imu_that_sits_the_other_way_round_is_corrected_by_itself(count: int)
     clustered = Clustered((1.0,) * count)
     imus = [ImuSettings()] * (count - 1) + [ImuSettings(gyroscope=turned, accelerometer=turned)]
     clustered.tube = Tube(
-        replace(clustered.settings, imus=tuple(imus)), clustered.config, new_state(clustered.config),
-        iter(range(10**9)).__next__, restored=False, mount=clustered.mount,
+        replace(clustered.settings, imus=tuple(imus)), clustered.config, new_node(clustered.config),
+        iter(range(10**9)).__next__, restored=False,
     )  # fmt: skip
     clustered.frames[-1] = np.diag([-1.0, -1.0, 1.0])
     clustered.cycles(110).cycles(20, SPIN).cycles(60)
@@ -311,8 +312,8 @@ def test_the_offsets_survive_the_power(tmp_path: Path) -> None:
         process.on_cycle([start, *clustered.rows(0.0)], clustered.now)
     process._save()
     again = TubeProcess(settings, tmp_path)
-    kept = again.mount[0]["rate_offset"]
-    np.testing.assert_array_equal(kept, process.mount[0]["rate_offset"])
+    kept = again.nodes[0]["mount"]["rate_offset"]
+    np.testing.assert_array_equal(kept, process.nodes[0]["mount"]["rate_offset"])
     assert kept[0] - kept[1] == pytest.approx(BIASES[0] - BIASES[1], abs=0.01 * DEG)
 
 
@@ -355,8 +356,8 @@ def test_sources_of_a_board_are_fused_and_one_that_ends_is_told_by_its_number(tm
         if k < 25:
             np.testing.assert_allclose([*raw.rate, *raw.force], wanted, atol=1e-12)
     assert told == [("sensor_failed", 2)]
-    assert process.tube._cluster is not None
-    assert process.tube._cluster.used.tolist() == [True, False]
+    assert process.tube._fusion is not None
+    assert process.tube._fusion.cluster.used.tolist() == [True, False]
     with pytest.raises(ConfigurationError, match="2 sources"):
         TubeProcess(settings, tmp_path / "other", imus=sources[:1])
 

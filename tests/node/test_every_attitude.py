@@ -12,7 +12,8 @@ from node.firmware.inputs import ImuReading, RigContext
 from node.firmware.settings import TubeSettings
 from node.firmware.tube import Tube
 from node.kernels.angles import wrap
-from node.kernels.layout import DEG, PERIOD, default_config, new_state
+from node.kernels.layout import DEG, PERIOD, default_config
+from node.kernels.record import new_node
 from telemetry.messages import Aiding, Event, NodeFlag
 
 SUBSTEPS = 16
@@ -52,7 +53,7 @@ class Walk:
     def __init__(self, inclination: float, azimuth: float, yaw: float, *, aided: bool = True) -> None:
         config = default_config()
         numbers = iter(range(10**9)).__next__
-        self.tube = Tube(TubeSettings(1, state_every=1), config, new_state(config), numbers, restored=False)
+        self.tube = Tube(TubeSettings(1, state_every=1), config, new_node(config), numbers, restored=False)
         self.place = (inclination, yaw)
         self.azimuth, self.aided = azimuth, aided
         self.now = 1000.0

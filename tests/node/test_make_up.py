@@ -7,10 +7,11 @@ import pytest
 
 from node.firmware.encoder import QUANTUM
 from node.firmware.inputs import ImuReading, RigContext
-from node.firmware.sensor_faults import SensorLimits
+from node.firmware.sensor_limits import SensorLimits
 from node.firmware.settings import Joint, JointRule, TubeSettings
 from node.firmware.tube import Tube
-from node.kernels.layout import DEG, PERIOD, default_config, new_state
+from node.kernels.layout import DEG, PERIOD, default_config
+from node.kernels.record import forget_session, new_node
 from telemetry.messages import Aiding, Event
 
 OLD = 0.05 * DEG  # of the mark between the head and this tube while it was on top
@@ -30,7 +31,7 @@ class Bench:
         config = default_config()
         limits = SensorLimits(repeats_together=0, repeats_alone=0)
         self.settings = TubeSettings(3, Joint(0.5, OLD), joints=rule, limits=limits, **change)  # type: ignore[arg-type]
-        self.tube = Tube(self.settings, config, new_state(config), iter(range(1, 10**6)).__next__, restored=False)
+        self.tube = Tube(self.settings, config, new_node(config), iter(range(1, 10**6)).__next__, restored=False)
         self.now = 1000.0
         self.events: dict[str, Event] = {}
 
@@ -141,7 +142,8 @@ def test_a_string_that_does_not_stand_solves_nothing(change: dict) -> None:
 
 
 def restarted(bench: Bench) -> Tube:
-    return Tube(bench.settings, bench.tube._configs, bench.tube._states, iter(range(9)).__next__, restored=True)
+    forget_session(bench.tube.nodes)
+    return Tube(bench.settings, bench.tube.configs, bench.tube.nodes, iter(range(9)).__next__, restored=True)
 
 
 def test_the_solution_is_kept_over_a_restart_and_for_later_measurements() -> None:

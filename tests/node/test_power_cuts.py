@@ -10,7 +10,8 @@ import pytest
 from node.errors import SavedStateError
 from node.firmware.saved_state import pack
 from node.firmware.settings import TubeSettings
-from node.kernels.layout import LAYOUT_VERSION, PERIOD, default_config, new_state
+from node.kernels.layout import PERIOD, default_config
+from node.kernels.record import NODE_LAYOUT, new_node
 from node.process import journal as journal_module
 from node.process.counter import BootCounter
 from node.process.journal import Journal
@@ -93,19 +94,19 @@ class Disk:
 
 
 def marked(number: int) -> np.ndarray:
-    state = new_state(default_config())
-    state[0]["now_yaw"] = number
-    state[0]["ring_rate"] = number
+    state = new_node(default_config())
+    state[0]["filter"]["now_yaw"] = number
+    state[0]["filter"]["ring_rate"] = number
     return state
 
 
 def found(folder: Path) -> tuple[int, bytes] | None:
     loaded = Journal(folder).load()
-    return None if loaded is None else (int(loaded[0][0]["now_yaw"]), loaded[1])
+    return None if loaded is None else (int(loaded[0][0]["filter"]["now_yaw"]), loaded[1])
 
 
 @pytest.mark.slow
-def test_a_cut_at_any_instant_leaves_the_old_or_the_new_state(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_cut_at_any_instant_leaves_the_old_or_the_new_node(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     random = np.random.default_rng(20261121)
     new, old = 0, 0
     for cut in range(CUTS):
@@ -182,7 +183,7 @@ def test_a_count_of_starts_that_is_none_is_named(tmp_path: Path) -> None:
 
 
 def other_version(slot: bytes) -> bytes:
-    return slot[:4] + (LAYOUT_VERSION + 1).to_bytes(2, "little") + slot[6:]
+    return slot[:4] + (NODE_LAYOUT + 1).to_bytes(2, "little") + slot[6:]
 
 
 @pytest.mark.parametrize(

@@ -10,23 +10,23 @@ from hypothesis import strategies as st
 
 from node.errors import SavedStateError
 from node.firmware.saved_state import pack, resume, unpack
-from node.kernels.layout import DEG, STATE, Err, default_config, new_state
+from node.kernels.layout import DEG, Err, default_config
+from node.kernels.record import new_node
 from node.process.counter import BootCounter
 from node.process.journal import Journal
 
 
 def state(yaw: int) -> np.ndarray:
-    made = new_state(default_config())
-    made[0]["now_yaw"] = yaw
-    made[0]["static_bias"] = [1e-4, 2e-4, 3e-4]
+    made = new_node(default_config())
+    made["filter"]["now_yaw"] = yaw
+    made["filter"]["static_bias"] = [1e-4, 2e-4, 3e-4]
     return made
 
 
 @given(st.binary(max_size=300), st.integers(0, 2**60))
 def test_a_slot_gives_back_what_was_packed(blob: bytes, generation: int) -> None:
     got, got_blob, got_generation = unpack(pack(state(7), blob, generation))
-    for name in STATE.names or ():
-        np.testing.assert_array_equal(got[name], state(7)[name])
+    assert got.tobytes() == state(7).tobytes()
     assert (got_blob, got_generation) == (blob, generation)
 
 
@@ -61,7 +61,7 @@ def test_the_newest_good_slot_wins_wherever_the_writing_was_cut(tmp_path: Path) 
     (tmp_path / "slot-1").write_bytes(third)
     found = Journal(tmp_path).load()
     assert found is not None
-    assert (int(found[0][0]["now_yaw"]), found[1]) == (3, b"three")
+    assert (int(found[0][0]["filter"]["now_yaw"]), found[1]) == (3, b"three")
     assert slots[0] == (tmp_path / "slot-0").read_bytes()
 
 
@@ -89,20 +89,20 @@ def test_saving_goes_on_where_an_earlier_life_ended(tmp_path: Path) -> None:
 
 def test_a_node_that_turned_keeps_its_constants_and_doubts_its_yaw() -> None:
     saved = state(12345)
-    saved[0]["P"][Err.YAW, Err.YAW] = (0.01 * DEG) ** 2
-    saved[0]["still_cycles"] = 0
+    saved[0]["filter"]["P"][Err.YAW, Err.YAW] = (0.01 * DEG) ** 2
+    saved[0]["filter"]["still_cycles"] = 0
     resume(saved)
-    assert int(saved[0]["yaw"]) == 12345
-    assert saved[0]["P"][Err.YAW, Err.YAW] == pytest.approx(math.pi**2 / 3.0, rel=1e-3)
-    np.testing.assert_array_equal(saved[0]["static_bias"], [1e-4, 2e-4, 3e-4])
+    assert int(saved[0]["filter"]["yaw"]) == 12345
+    assert saved[0]["filter"]["P"][Err.YAW, Err.YAW] == pytest.approx(math.pi**2 / 3.0, rel=1e-3)
+    np.testing.assert_array_equal(saved[0]["filter"]["static_bias"], [1e-4, 2e-4, 3e-4])
 
 
 def test_a_node_that_stood_still_keeps_its_yaw_and_its_trust() -> None:
     saved = state(12345)
-    saved[0]["P"][Err.YAW, Err.YAW] = (0.01 * DEG) ** 2
-    saved[0]["still_cycles"] = 40
+    saved[0]["filter"]["P"][Err.YAW, Err.YAW] = (0.01 * DEG) ** 2
+    saved[0]["filter"]["still_cycles"] = 40
     resume(saved)
-    assert saved[0]["P"][Err.YAW, Err.YAW] == (0.01 * DEG) ** 2
+    assert saved[0]["filter"]["P"][Err.YAW, Err.YAW] == (0.01 * DEG) ** 2
 
 
 def test_boots_are_counted_on_the_disk(tmp_path: Path) -> None:

@@ -8,8 +8,13 @@ import pytest
 from string_of_one import Sample, Spoil, StringOfOne
 
 from node.errors import ConfigurationError
-from node.firmware.sensor_faults import AidingWatch, Fault, ReadingWatch, SensorLimits
-from node.kernels.layout import DEG, Err
+from node.firmware.sensor_limits import SensorLimits
+from node.firmware.settings import TubeSettings, crew_record
+from node.kernels.aiding_watch import find_mismatch, forget
+from node.kernels.events import Fault
+from node.kernels.layout import DEG, Err, default_config
+from node.kernels.record import AIDINGS, MISMATCH, new_node
+from node.kernels.sensor_watch import find_faults
 from telemetry.messages import Mode, NodeFlag
 
 FLAGGED_WITHIN = 10  # cycles
@@ -198,43 +203,65 @@ def test_times_that_are_none_are_told_once_and_change_nothing() -> None:
     assert string.tube.state.tobytes() == before
 
 
+class Watched:
+    """The watch over the aidings of one node, with what it found last."""
+
+    def __init__(self) -> None:
+        self.watch, self.found = np.zeros(1, AIDINGS)[0], np.zeros(1, MISMATCH)[0]
+        forget(self.watch)
+
+    def takes(self, innovation: float, spin: float, now: float, *, rejected: bool = True) -> Fault:
+        find_mismatch(self.watch, self.found, innovation, 1e-4, spin, now, int(rejected), 0)
+        return Fault(int(self.found["fault"]))
+
+
 def test_a_wrong_aiding_is_no_step_of_the_gyroscope() -> None:
-    watch = AidingWatch()
-    assert watch.find_mismatch(0.0, 1e-4, 1.0, 0.5, rejected=False, reset=False) is None
+    watched = Watched()
+    assert watched.takes(0.0, 1.0, 0.5, rejected=False) is Fault.NONE
     for k in range(6):
-        assert watch.find_mismatch(0.5 + 1e-5 * (-1) ** k, 1e-4, 1.0, 1.0 + 0.5 * k, rejected=True, reset=False) is None
+        assert watched.takes(0.5 + 1e-5 * (-1) ** k, 1.0, 1.0 + 0.5 * k) is Fault.NONE
 
 
 def test_a_bias_that_grows_the_innovation_is_a_step_and_one_with_the_rate_a_scale() -> None:
-    watch = AidingWatch()
-    watch.find_mismatch(0.0, 1e-4, 1.0, 0.5, rejected=False, reset=False)
-    found = [watch.find_mismatch(0.01 * k, 1e-4, 1.0, 0.5 + 0.5 * k, rejected=True, reset=False) for k in (1, 2, 3)]
-    assert found[:2] == [None, None]
-    assert found[2] is not None
-    assert found[2].fault is Fault.GYRO_STEP
-    assert found[2].rate == pytest.approx(0.02)
-    assert found[2].steady
-    watch.forget()
-    watch.find_mismatch(0.0, 1e-4, 0.0, 0.5, rejected=False, reset=False)
+    watched = Watched()
+    watched.takes(0.0, 1.0, 0.5, rejected=False)
+    found = [watched.takes(0.01 * k, 1.0, 0.5 + 0.5 * k) for k in (1, 2, 3)]
+    assert found == [Fault.NONE, Fault.NONE, Fault.GYRO_STEP]
+    assert float(watched.found["rate"]) == pytest.approx(0.02)
+    assert watched.found["steady"]
+    forget(watched.watch)
+    watched.takes(0.0, 0.0, 0.5, rejected=False)
     spins, innovation = (0.2, 0.6, 1.0), 0.0
     for k, spin in enumerate(spins):
         innovation += 0.03 * spin * 0.5
-        last = watch.find_mismatch(innovation, 1e-4, spin, 1.0 + 0.5 * k, rejected=True, reset=False)
-    assert last is not None
-    assert last.fault is Fault.GYRO_SCALE
+        last = watched.takes(innovation, spin, 1.0 + 0.5 * k)
+    assert last is Fault.GYRO_SCALE
+
+
+def test_a_growth_over_half_a_turn_is_that_of_the_shorter_way() -> None:
+    watched = Watched()
+    watched.takes(math.pi - 0.005, 1.0, 0.5)
+    for k in (1, 2):
+        watched.takes(math.remainder(math.pi - 0.005 + 0.01 * k, math.tau), 1.0, 0.5 + 0.5 * k)
+    assert watched.takes(math.remainder(math.pi + 0.025, math.tau), 1.0, 2.0) is Fault.GYRO_STEP
+    assert float(watched.found["rate"]) == pytest.approx(0.02)
 
 
 def test_one_knock_is_no_fault_of_the_accelerometer() -> None:
-    watch = ReadingWatch(SensorLimits())
-    limit = SensorLimits().force_range
-    rates = [(1e-4 * k, 2e-4 * k, 3e-4 * k) for k in range(9)]
-    knocks = [(limit if 2 <= k <= 3 else 0.1 * k, 0.2 * k, 0.3 * k) for k in range(9)]
-    assert all(
-        watch.find_faults(r, f, saturated=False) == (None, None) for r, f in zip(rates[1:], knocks[1:], strict=True)
-    )
+    limits = SensorLimits()
+    crew = crew_record(TubeSettings(1, limits=limits), default_config())[0]
+    watch = new_node(default_config())[0]["guard"]["readings"]
+
+    def faults(rate: list[float], force: list[float], saturated: int = 0) -> tuple[int, int]:
+        return find_faults(watch, crew, np.array(rate), np.array(force), saturated)
+
+    limit = limits.force_range
+    rates = [[1e-4 * k, 2e-4 * k, 3e-4 * k] for k in range(9)]
+    knocks = [[limit if 2 <= k <= 3 else 0.1 * k, 0.2 * k, 0.3 * k] for k in range(9)]
+    assert all(faults(r, f) == (Fault.NONE, Fault.NONE) for r, f in zip(rates[1:], knocks[1:], strict=True))
     for k in range(3):
-        gyro, accelerometer = watch.find_faults((1e-3 * k, 1.0 + k, 0.1 * k), (limit, k, 0.1 * k), saturated=k == 2)
-    assert (gyro, accelerometer) == (Fault.GYRO_SATURATED, Fault.FORCE_SATURATED)
+        found = faults([1e-3 * k, 1.0 + k, 0.1 * k], [limit, float(k), 0.1 * k], int(k == 2))
+    assert found == (Fault.GYRO_SATURATED, Fault.FORCE_SATURATED)
 
 
 @pytest.mark.parametrize(

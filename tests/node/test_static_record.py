@@ -8,11 +8,12 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from node.firmware.inputs import ImuReading, RigContext
-from node.firmware.sensor_faults import SensorLimits
+from node.firmware.sensor_limits import SensorLimits
 from node.firmware.settings import TubeSettings
 from node.firmware.static_record import StaticRecorder
 from node.firmware.tube import Tube
-from node.kernels.layout import DEG, PERIOD, default_config, new_state
+from node.kernels.layout import DEG, PERIOD, default_config
+from node.kernels.record import new_node
 from node.kernels.static_average import STATIC, add_static, has_moved
 from telemetry.messages import Event, StaticRecord
 from telemetry.parameters import ParameterBlock, SensorParameters
@@ -72,7 +73,7 @@ class Life:
         config = default_config()
         numbers = iter(range(1, 10**6)).__next__
         self.tube = Tube(
-            TubeSettings(3, limits=NOISELESS), config, new_state(config), numbers, restored=False, parameters=parameters
+            TubeSettings(3, limits=NOISELESS), config, new_node(config), numbers, restored=False, parameters=parameters
         )
         self.now = 1000.0
         self.force = (0.0, 0.1, -9.81)

@@ -9,10 +9,11 @@ from hypothesis import strategies as st
 
 from node.errors import ConfigurationError
 from node.firmware.inputs import ImuReading, RigContext
-from node.firmware.sensor_faults import SensorLimits
+from node.firmware.sensor_limits import SensorLimits
 from node.firmware.settings import Joint, Kernel, TorsionRule, TubeSettings
 from node.firmware.tube import Tube
-from node.kernels.layout import PERIOD, Err, Scheme, default_config, new_state
+from node.kernels.layout import PERIOD, Err, Scheme, default_config
+from node.kernels.record import new_node
 from telemetry.messages import Aiding, Event, SurveyMeasurement
 
 STIFFNESS = 17_413.0  # N m/rad, 60/50 mm, 3 m
@@ -32,7 +33,7 @@ def tube(rule: TorsionRule = "gate", kernel: Kernel = "float64", scheme: Scheme 
         stiffness=STIFFNESS,
         torsion=rule,
     )
-    return Tube(settings, config, new_state(config), iter(range(1, 10**6)).__next__, restored=False)
+    return Tube(settings, config, new_node(config), iter(range(1, 10**6)).__next__, restored=False)
 
 
 class Bench:

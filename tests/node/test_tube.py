@@ -8,10 +8,11 @@ import pytest
 
 from node.errors import ConfigurationError
 from node.firmware.inputs import ImuReading, RigContext
-from node.firmware.sensor_faults import SensorLimits
+from node.firmware.sensor_limits import SensorLimits
 from node.firmware.settings import Joint, TubeSettings
 from node.firmware.tube import Tube
-from node.kernels.layout import PERIOD, Scheme, default_config, new_state
+from node.kernels.layout import PERIOD, Scheme, default_config
+from node.kernels.record import new_node
 from telemetry.messages import Aiding, Event, Mode, NodeFlag, NodeState, SurveyMeasurement
 
 DRIVE, LOWER = Joint(0.5, 1e-3), Joint(-0.2, 2e-3)
@@ -22,7 +23,7 @@ AIDING = Aiding(1.0, 1e-8, 0.0, 0.0, 0.0, 1000.0, 5, 0)
 def tube(scheme: Scheme = Scheme.FORWARD) -> Tube:
     config = default_config()
     settings = TubeSettings(3, DRIVE, LOWER, mount_std=3e-3, scheme=scheme, limits=NOISELESS)
-    return Tube(settings, config, new_state(config), iter(range(1, 10**6)).__next__, restored=False)
+    return Tube(settings, config, new_node(config), iter(range(1, 10**6)).__next__, restored=False)
 
 
 class Life:

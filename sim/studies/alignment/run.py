@@ -94,7 +94,7 @@ class Turn:
             end = self.world.cycle_end(cycle)
             if method != "none" and end <= asked_at < end + PERIOD:
                 string.tubes[1].align(method, self._setup.turns)
-        mount = string.mounts[1][0]
+        mount = string.nodes[0]["mount"]
         pitch, roll = angles_of(mount["axis"][0])
         survey = string.run.surveys[-1].measurement.imus[0]
         direction = resolve(np.array(survey.force), np.array(survey.force_cov), 0.0, 1e-12).direction

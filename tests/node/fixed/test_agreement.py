@@ -6,7 +6,6 @@ import numpy as np
 import pytest
 
 from node.errors import ConfigurationError
-from node.firmware.block_trial import forget_bias
 from node.firmware.inputs import ImuReading, RigContext
 from node.firmware.kernel_choice import kernel_of
 from node.firmware.settings import TubeSettings
@@ -16,6 +15,8 @@ from node.kernels.fixed.border import COVARIANCE, learn_config, learn_state, sho
 from node.kernels.fixed.layout import FIXED_STATE
 from node.kernels.fixed.node import FixedNode
 from node.kernels.layout import DEG, PERIOD, STATE, Array, Status, default_config, new_state
+from node.kernels.record import new_node
+from node.kernels.resets import forget_bias
 from node.kernels.relay import offer_aiding
 from sim.studies.fixed_point.run import AIDING_VAR, LIMITS, compare, inputs, rows_of
 from telemetry.messages import Aiding, NodeState
@@ -110,15 +111,14 @@ def test_lost_cycles_are_bridged(hours: float) -> None:
     assert (fixed.overflows > 0) == (hours > 4096.0 / 3600.0)
 
 
-def tube(kernel: str) -> tuple[Tube, Array, Array]:
+def tube(kernel: str) -> Tube:
     config = default_config()
-    state = new_state(config)
     settings = TubeSettings(1, state_every=10, kernel=kernel)
-    return Tube(settings, config, state, iter(range(10**6)).__next__, restored=False), config, state
+    return Tube(settings, config, new_node(config), iter(range(10**6)).__next__, restored=False)
 
 
 def reports(kernel: str, *, forget: bool) -> list[NodeState]:
-    node, config, state = tube(kernel)
+    node = tube(kernel)
     said = []
     for k, given in enumerate(inputs(1300, 6)):
         around = RigContext(True, 1, given.end, 1e-8, True)
@@ -128,7 +128,7 @@ def reports(kernel: str, *, forget: bool) -> list[NodeState]:
             yaw, at, sequence = given.aiding
             node.on_aiding(Aiding(yaw, AIDING_VAR, 0.0, 0.0, given.rate[2], at, sequence, 0), at)
         if forget and k == 500:
-            forget_bias(state, config)
+            forget_bias(node.state, node.config)
             node.take_survey()
     return said
 
@@ -147,7 +147,7 @@ def test_a_node_says_the_same_on_either_kernel(forget: bool) -> None:
 
 def test_float64_is_the_default_and_untouched() -> None:
     assert TubeSettings(1).kernel == "float64"
-    assert kernel_of("float64") == (run_cycle, offer_aiding)
+    assert kernel_of("float64") is None
 
 
 def test_an_unknown_kernel_is_refused() -> None:

@@ -1,0 +1,70 @@
+"""What a node has to say of itself: codes with numbers in a ring of its record, until somebody takes them out."""
+
+from __future__ import annotations
+
+import enum
+import math
+from typing import Any
+
+from node.kernels.jit import kernel
+from node.kernels.record import EVENTS_KEPT
+
+NONE = math.nan  # of a number that an event does not have
+
+
+class Fault(enum.IntEnum):
+    """What is wrong with a sensor; the number is the code of its event."""
+
+    NONE = 0
+    BAD_SAMPLE = 1
+    GYRO_SATURATED = 2
+    GYRO_STUCK = 3
+    GYRO_STEP = 4
+    GYRO_SCALE = 5
+    FORCE_SATURATED = 6
+    FORCE_STUCK = 7
+
+
+class Code(enum.IntEnum):
+    """Events of the step; ``node.firmware.event_table`` has their names, severities and texts."""
+
+    BAD_SAMPLE = 1
+    GYRO_SATURATED = 2
+    GYRO_STUCK = 3
+    GYRO_STEP = 4
+    GYRO_SCALE = 5
+    FORCE_SATURATED = 6
+    FORCE_STUCK = 7
+    SENSOR_RECOVERED = 8
+    CLOCK_JUMPED = 9
+    AIDING_UNTIMELY = 10
+    STRING_UNDER_TORQUE = 11
+    STRING_RELEASED = 12
+    JOINT_SOLVED = 13
+    JOINT_CONTRADICTS_MARKS = 14
+    JOINT_NOT_SOLVED = 15
+    STOPPED = 16
+    STARTED = 17
+    JOINT_OPENED = 18
+    JOINT_CLOSED = 19
+    BIAS_KNOWN = 20
+    REFERENCE_CHANGED = 21
+    YAW_RESET = 22
+    RATE_EXCEEDED = 23
+    RATE_RECOVERED = 24
+    UNREADABLE = 25
+    FILTER_FAULT = 26
+    AIDING_REJECTED = 27
+
+
+@kernel
+def tell(node: Any, code: int, a: float, b: float, c: float, d: float) -> None:
+    """Put an event with up to four numbers (NaN: none) into the ring; where it is full the oldest is lost."""
+    events = node.events
+    event = events.ring[events.told % EVENTS_KEPT]
+    event.code = code
+    event.numbers[0] = a
+    event.numbers[1] = b
+    event.numbers[2] = c
+    event.numbers[3] = d
+    events.told += 1

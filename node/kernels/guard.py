@@ -1,0 +1,283 @@
+"""What a node does about a faulty sensor: the safe state, the way back, and the events of both.
+
+While the gyroscope's readings are wrong the encoder's rate stands for them and the yaw's variance is that of an unknown
+yaw. A step or a new scale is learnt: the readings go on, the constant bias takes the mismatch, and the
+variances of yaw and bias are opened. Either way no cross term is kept. The node trusts itself again when readings are
+sane and several aidings in a row agree within a gate that is narrow again.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import Any, Final
+
+from node.kernels.aiding_watch import STEADY, find_mismatch, forget
+from node.kernels.angles import from_binary, wrap
+from node.kernels.events import NONE, Code, Fault, tell
+from node.kernels.jit import kernel
+from node.kernels.layout import DEG, PERIOD, RING, Err, Status
+from node.kernels.modes import STATIC_BIAS
+from node.kernels.resets import (
+    begin_epoch,
+    lose_tilt,
+    lose_yaw,
+    lose_yaw_ahead,
+    open_biases,
+    open_yaw,
+    settle_yaw,
+    take_mismatch,
+)
+from node.kernels.sensor_watch import find_faults
+
+SANE_CYCLES: Final = 3  # in a row, until the readings are used again; more than the filter's lag
+AGREEING: Final = 4  # aidings in a row, until the node is trusted again
+NARROW_STD: Final = 1.0 * DEG  # of an innovation that can show agreement
+LEARNT_STD: Final = 0.05 * DEG  # rad/s, error of a bias that was read from a mismatch
+LARGEST_STEP: Final = 10.0 * DEG  # rad/s, that a bias may take; a gyroscope farther off is not listened to
+CREDIBLE: Final = 0.5 * LARGEST_STEP  # rad/s, from the encoder's rate, of a gyroscope that may be listened to again
+LARGEST_SCALE: Final = 0.1  # 1, that is looked for
+RATE_AGE: Final = 3.0  # s, of an encoder's rate that may stand for the gyroscope
+BACKWARD: Final = PERIOD  # s, that a cycle may begin before the end of the last; beyond it is a jump of the clock
+LONGEST_CYCLE: Final = 10.0 * PERIOD  # s
+FARTHEST: Final = RING * PERIOD  # s, that a cycle may begin after the end of the last
+PSI, BZ, S = int(Err.YAW), int(Err.BIAS_Z), int(Err.SCALE)
+BAD_SAMPLE, GYRO_STEP, GYRO_SCALE = int(Fault.BAD_SAMPLE), int(Fault.GYRO_STEP), int(Fault.GYRO_SCALE)
+AIDING_UNTIMELY, CLOCK_JUMPED = int(Code.AIDING_UNTIMELY), int(Code.CLOCK_JUMPED)
+SENSOR_RECOVERED = int(Code.SENSOR_RECOVERED)
+AIDED, REJECTED, YAW_RESET = int(Status.AIDED), int(Status.REJECTED), int(Status.YAW_RESET)
+REFERENCE_CHANGED = int(Status.REFERENCE_CHANGED)
+
+
+@kernel
+def is_faulty(trust: Any) -> bool:
+    """Whether a sensor's readings are not to be relied on."""
+    return bool(trust.fault != 0 and trust.proving == 0)
+
+
+@kernel
+def is_heard(node: Any) -> bool:
+    """Whether the encoder reported its rate lately."""
+    return bool(abs(node.filter.now - node.guard.rate_at) <= RATE_AGE)
+
+
+@kernel
+def gate_aiding(node: Any, config: Any, yaw: float, yaw_var: float, rate: float, valid_local: float) -> bool:
+    """Whether an aiding is for the filter, valid at ``valid_local`` (s, own clock); ``yaw`` (rad) is this node's.
+
+    One with an invalid time, or one far ahead, would wait for ever and hold up all others.
+    """
+    state, guard = node.filter, node.guard
+    timely = math.isfinite(valid_local) and not (state.cycles > 0 and valid_local - state.now > LONGEST_CYCLE)
+    if not timely and guard.untimely == 0:
+        tell(node, AIDING_UNTIMELY, NONE, NONE, NONE, NONE)
+    guard.untimely = 0 if timely else 1
+    if not timely:
+        return False
+    guard.rate, guard.rate_at, guard.aiding_var = rate, valid_local, yaw_var
+    if guard.gyro.fault != 0 or contradicts(node, config, yaw, valid_local):
+        state.last_sequence = -1  # a repetition at rest is to be judged again
+    return True
+
+
+@kernel
+def contradicts(node: Any, config: Any, yaw: float, valid_local: float) -> bool:
+    """Whether a reference at rest (rad) is beyond the gate while the gyroscope says that the node turns."""
+    state, guard = node.filter, node.guard
+    if guard.rate != 0.0 or state.still_cycles > 0 or state.yaw_known == 0 or state.mode == STATIC_BIAS:
+        return False
+    then = from_binary(state.now_yaw) + state.now_rate * (valid_local - state.now)
+    var = state.now_P[PSI, PSI] + guard.aiding_var
+    return bool(abs(wrap(yaw - then)) > config.gate * math.sqrt(var))
+
+
+@kernel
+def admits(node: Any, start: float, end: float) -> bool:
+    """Whether a cycle of these times (s, own clock) can be run; a clock that jumped begins a new epoch."""
+    state, guard = node.filter, node.guard
+    plain = math.isfinite(start) and math.isfinite(end) and 0.0 < end - start <= LONGEST_CYCLE
+    ahead = start - state.now if state.cycles > 0 else 0.0
+    jumped = not plain or not -BACKWARD <= ahead <= FARTHEST
+    if jumped and guard.jumped == 0:
+        tell(node, CLOCK_JUMPED, ahead if math.isfinite(ahead) else NONE, NONE, NONE, NONE)
+    if not jumped and ahead < 0.0:  # the increments overlap, and the turn that was counted once is in doubt
+        open_yaw(state, (state.now_rate * ahead) ** 2)
+    guard.jumped = 1 if jumped else 0
+    if jumped and plain:
+        begin_epoch(state)
+        forget(guard.aidings)
+    return plain
+
+
+@kernel
+def guard_reading(node: Any, config: Any, settings: Any, saturated: int, at: float) -> None:
+    """Judge the raw reading, and replace in ``node.rate`` and ``node.force`` what is not to be used."""
+    state, guard, rate, force = node.filter, node.guard, node.rate, node.force
+    gyro, accelerometer = find_faults(guard.readings, settings, node.raw_rate, node.raw_force, saturated)
+    known = abs(at - guard.rate_at) <= RATE_AGE
+    measured = (rate[2] - state.static_bias[2] - state.bias[2]) / (1.0 + state.scale)
+    if gyro == 0 and is_faulty(guard.gyro) and known and abs(measured - guard.rate) > CREDIBLE:
+        gyro = guard.gyro.fault
+    follow_gyro(node, config, gyro)
+    follow_force(node, accelerometer)
+    if gyro != 0:
+        for k in range(3):
+            rate[k] = state.static_bias[k] + state.bias[k]
+        rate[2] += (guard.rate if known else guard.sane_rate) * (1.0 + state.scale)
+    else:
+        guard.sane_rate = measured
+    if accelerometer != 0:
+        for k in range(3):
+            force[k] = -config.gravity * state.now_down[k]
+    hold(node)
+
+
+@kernel
+def judge_cycle(node: Any, config: Any, status: int, at: float) -> None:
+    """See what the filter made of the cycle that ended at ``at`` (s, own clock)."""
+    hold(node)
+    state, guard = node.filter, node.guard
+    if state.mode == STATIC_BIAS:
+        guard.before_steps = math.nan  # the constant bias is measured again
+    if state.mode == STATIC_BIAS or status & REFERENCE_CHANGED or is_faulty(guard.gyro):
+        forget(guard.aidings)
+        return
+    rejected = 1 if status & REJECTED else 0
+    reset = 1 if status & YAW_RESET else 0
+    if rejected == 0 and (status & AIDED == 0 or reset == 1):
+        return
+    sigma = math.sqrt(max(state.innovation_var, 0.0))
+    find_mismatch(guard.aidings, guard.found, state.innovation, sigma, state.now_rate, at, rejected, reset)
+    if guard.found.fault != 0:
+        learn_mismatch(node, config)
+    elif guard.gyro.proving == 1:
+        guard.agreed = 0 if rejected == 1 else guard.agreed + (1 if sigma < NARROW_STD else 0)
+        if guard.agreed >= AGREEING:
+            recover_gyro(node)
+
+
+@kernel
+def follow_gyro(node: Any, config: Any, fault: int) -> None:
+    """Take one cycle's judgement of the gyroscope."""
+    guard, trust = node.guard, node.guard.gyro
+    if fault != 0:
+        if trust.fault != fault:
+            tell(node, fault, NONE, NONE, NONE, NONE)
+        if trust.fault == 0:
+            trust.cycles = 0
+        if trust.fault == GYRO_STEP and trust.proving == 1 and guard.step.fault != 0:
+            node.filter.static_bias[2] += guard.step.rate  # what looked like a step was this fault's beginning
+            guard.step.fault = 0
+        trust.fault, trust.proving, trust.sane = fault, 0, 0
+    elif is_faulty(trust):
+        trust.sane += 1
+        if trust.sane > SANE_CYCLES:
+            trust.proving = 1
+            guard.agreed = 0
+            forget(guard.aidings)
+            lose_yaw_ahead(node.filter)
+            open_biases(node.filter, config)
+    if trust.fault != 0:
+        trust.cycles += 1
+
+
+@kernel
+def follow_force(node: Any, fault: int) -> None:
+    """Take one cycle's judgement of the accelerometer."""
+    trust, state = node.guard.force, node.filter
+    if fault != 0:
+        told = BAD_SAMPLE in (trust.fault, fault)  # by the gyroscope, whose reading it is too
+        if trust.fault != fault and not told:
+            tell(node, fault, NONE, NONE, NONE, NONE)
+        if trust.fault == 0:
+            trust.cycles = 0
+        trust.fault, trust.proving, trust.sane = fault, 0, 0
+    elif is_faulty(trust):
+        trust.sane += 1
+        if trust.sane > SANE_CYCLES:
+            lose_tilt(state)
+            state.surveyed = 0
+            state.still_cycles = 0  # the average of a stop begins again
+            if trust.fault != BAD_SAMPLE:
+                tell(node, SENSOR_RECOVERED, float(trust.fault), float(trust.cycles), NONE, NONE)
+            trust.fault, trust.proving, trust.sane, trust.cycles = 0, 0, 0, 0
+    if trust.fault != 0:
+        trust.cycles += 1
+
+
+@kernel
+def hold(node: Any) -> None:
+    """Keep the safe state around a cycle: what needs the faulty sensor is unknown, and nothing is learnt."""
+    state = node.filter
+    if is_faulty(node.guard.gyro):
+        lose_yaw(state)
+        state.bias_count = 0
+        for k in range(3):
+            state.bias_sum[k] = 0.0
+    if is_faulty(node.guard.force):
+        state.surveyed = 1
+
+
+@kernel
+def learn_mismatch(node: Any, config: Any) -> None:
+    """A lasting mismatch belongs to the sensor: its bias or its scale takes it, and the yaw starts again."""
+    state, guard, trust, found = node.filter, node.guard, node.guard.gyro, node.guard.found
+    reconsider(node)
+    prior = max(config.bias_std[2] ** 2 + state.static_bias_var[2], LEARNT_STD**2)
+    scale_var = state.P[S, S]
+    learnable = found.steady == 1 and abs(found.rate) <= LARGEST_STEP
+    if found.fault == GYRO_SCALE and config.scale_std > 0.0:
+        change = -found.rate / found.spin if abs(found.spin) > DEG else LARGEST_SCALE
+        scale_var = max(scale_var, min(abs(change), LARGEST_SCALE) ** 2)
+        learnable = True
+        undo_steps(node)
+    elif learnable:
+        if math.isnan(guard.before_steps):
+            guard.before_steps, guard.first_step = state.static_bias[2], abs(found.rate)
+        state.static_bias[2] -= found.rate
+        prior += (0.1 * found.rate) ** 2
+    take_mismatch(state, prior, scale_var)
+    state.rejected = 0
+    guard.step.fault = found.fault if found.fault == GYRO_STEP and learnable else 0
+    guard.step.rate, guard.step.spin, guard.step.steady = found.rate, found.spin, found.steady
+    if trust.fault != found.fault:
+        tell(node, found.fault, found.rate / DEG, found.spin / DEG, NONE, NONE)
+    if trust.fault == 0:
+        trust.cycles = 0
+    trust.fault, trust.proving, trust.sane = found.fault, 1 if learnable else 0, 0
+    guard.agreed = 0
+
+
+@kernel
+def reconsider(node: Any) -> None:
+    """What a change of speed takes back was no step but the scale; the constant bias gets back what it took."""
+    found, before = node.guard.found, node.guard.step
+    if before.fault == 0 or abs(found.spin - before.spin) < 0.5 * abs(before.spin):
+        return
+    if found.steady == 0 or abs(found.rate + before.rate) > 0.2 * abs(before.rate):
+        return
+    node.filter.static_bias[2] += before.rate
+    found.fault, found.rate, found.spin, found.steady = GYRO_SCALE, before.rate, before.spin, 1
+
+
+@kernel
+def undo_steps(node: Any) -> None:
+    """Steps that cancelled each other were the scale that is learnt now: the constant bias is the earlier one."""
+    state, guard = node.filter, node.guard
+    constant, guard.before_steps = guard.before_steps, math.nan
+    if math.isnan(constant):
+        return
+    if abs(state.static_bias[2] - constant) < STEADY * guard.first_step:
+        state.static_bias[2] = constant
+        state.bias[2] = 0.0
+
+
+@kernel
+def recover_gyro(node: Any) -> None:
+    """The gyroscope has proved itself."""
+    state, guard, trust = node.filter, node.guard, node.guard.gyro
+    if trust.fault == GYRO_STEP:  # it lasts, and the Gauss-Markov part would forget it
+        state.static_bias[2] += state.bias[2]
+        state.bias[2] = 0.0
+    settle_yaw(state, guard.aiding_var)
+    tell(node, SENSOR_RECOVERED, float(trust.fault), float(trust.cycles), NONE, NONE)
+    trust.fault, trust.proving, trust.sane, trust.cycles = 0, 0, 0, 0

@@ -1,0 +1,184 @@
+"""All memory of one node as one record: what it is aided and moved by, what it trusts, and what it has yet to say.
+
+The record is flat bytes: copying them saves the node, an array of them is a string, and a C compiler could declare it.
+``node.kernels.layout`` holds the filter inside it; here is what stands around the filter.
+"""
+
+from __future__ import annotations
+
+from typing import Final
+
+import numpy as np
+
+from node.kernels.alignment import MAX_IMUS, MOUNT, new_mount
+from node.kernels.layout import STATE, Array, new_state
+
+NODE_LAYOUT: Final = 3  # of the saved record; 1 and 2 held the filter alone
+EVENTS_KEPT: Final = 32  # that wait to be said
+NUMBERS: Final = 4  # of one event
+DISAGREEMENTS: Final = 3  # aidings in a row, until a mismatch is a fault
+UNSAID: Final = -1  # of a place that nothing was written to
+
+TRUST: Final = np.dtype(
+    [
+        ("fault", "i8"),  # ``Fault``; 0 is none
+        ("proving", "i8"),  # its readings are used again and have yet to agree with the aiding
+        ("sane", "i8"),  # cycles in a row
+        ("cycles", "i8"),  # since it was flagged
+    ],
+    align=True,
+)
+REPEATS: Final = np.dtype([("last", "f8", (3,)), ("counts", "i8", (3,))], align=True)  # NaN before the first reading
+READINGS: Final = np.dtype([("rates", REPEATS), ("forces", REPEATS), ("clipped", "i8")], align=True)
+AIDINGS: Final = np.dtype(
+    [
+        ("left", "f8"),  # rad, of the last innovation, not corrected
+        ("at", "f8"),  # s, of it; NaN: none yet
+        ("seen", "i8"),  # mismatches in a row
+        ("mismatch", "f8", (DISAGREEMENTS + 1,)),  # rad/s
+        ("spin", "f8", (DISAGREEMENTS + 1,)),  # rad/s, true, at the same time
+    ],
+    align=True,
+)
+MISMATCH: Final = np.dtype(
+    [
+        ("fault", "i8"),  # 0: there is none
+        ("rate", "f8"),  # rad/s, true minus measured
+        ("spin", "f8"),  # rad/s, true
+        ("steady", "i8"),  # the last two aidings show the same
+    ],
+    align=True,
+)
+GUARD: Final = np.dtype(
+    [
+        ("readings", READINGS),
+        ("aidings", AIDINGS),
+        ("gyro", TRUST),
+        ("force", TRUST),
+        ("agreed", "i8"),  # aidings in a row, of a gyroscope that proves itself
+        ("rate", "f8"),  # rad/s, that the encoder told last
+        ("rate_at", "f8"),  # s, own clock
+        ("aiding_var", "f8"),  # rad^2, of that aiding
+        ("sane_rate", "f8"),  # rad/s about the axis, the gyroscope's last sane one
+        ("found", MISMATCH),  # work space
+        ("step", MISMATCH),  # that the constant bias has taken
+        ("before_steps", "f8"),  # rad/s, the constant bias before the first step; NaN: it took none
+        ("first_step", "f8"),  # rad/s, size of that
+        ("jumped", "i8"),  # the clock, in the cycle before
+        ("untimely", "i8"),  # the aiding before
+    ],
+    align=True,
+)
+TWIST: Final = np.dtype(
+    [
+        ("known", "i8"),  # an aiding has been used
+        ("std", "f8"),  # rad, of the twist in it
+        ("held", "i8"),  # it was under torque
+        ("wound", "i8"),  # since then the string was under torque
+        ("torque", "f8"),  # N m, in the last aiding heard
+        ("holding", "i8"),  # the drive held the string then
+        ("heard_at", "f8"),  # s, own clock
+    ],
+    align=True,
+)
+JOINTS: Final = np.dtype(
+    [
+        ("hops", "i8"),  # of the aiding used last; -1: none yet
+        ("marks", "f8"),  # rad, offset of the marks in it
+        ("solved", "i8"),  # ``offset`` and ``var`` stand in the place of the marks'
+        ("offset", "f8"),  # rad
+        ("var", "f8"),  # rad^2
+    ],
+    align=True,
+)
+EVENT: Final = np.dtype([("code", "i8"), ("numbers", "f8", (NUMBERS,))], align=True)
+EVENTS: Final = np.dtype([("told", "i8"), ("said", "i8"), ("ring", EVENT, (EVENTS_KEPT,))], align=True)
+NODE: Final = np.dtype(
+    [
+        ("filter", STATE),
+        ("mount", MOUNT),
+        ("guard", GUARD),
+        ("twist", TWIST),
+        ("joints", JOINTS),
+        ("events", EVENTS),
+        ("cycles", "i8"),  # since the start
+        ("overruns", "i8"),  # cycles that came too late
+        ("status", "i8"),  # of the newest cycle
+        ("noticed", "i8"),  # status bits found between two cycles
+        ("rejecting", "i8"),  # aidings were rejected in the cycle before
+        ("slow_cycles", "i8"),  # in a row, not faster than the offset of a gyroscope never calibrated
+        ("stamp_hops", "i8"),  # of the prior of the time stamp
+        ("temperature", "f8"),  # C, of the newest reading
+        ("raw_rate", "f8", (3,)),  # rad/s, what a block of parameters would correct
+        ("raw_force", "f8", (3,)),  # m/s^2
+        ("rate", "f8", (3,)),  # rad/s, corrected, of all IMUs together, tube's frame
+        ("force", "f8", (3,)),  # m/s^2
+        ("unaligned", "f8", (MAX_IMUS, 3)),  # m/s^2, corrected, in the frame of each IMU
+        ("down_offset", "f8"),  # rad, of the aiding handed down
+        ("down_systematic", "f8"),  # rad^2
+        ("down_torsion", "f8"),  # rad^2
+    ],
+    align=True,
+)
+
+SETTINGS: Final = np.dtype(
+    [
+        ("drive_angle", "f8"),  # rad, joint to the drive head, while this is the top tube
+        ("drive_var", "f8"),  # rad^2
+        ("lower_angle", "f8"),  # rad, joint to the tube below
+        ("lower_var", "f8"),
+        ("unseen_var", "f8"),  # rad^2, what may turn unseen while a joint is made up
+        ("stiffness", "f8"),  # N m/rad
+        ("aiding_old_after", "f8"),  # s
+        ("scheme", "i8"),
+        ("state_every", "i8"),  # cycles
+        ("torsion_gate", "i8"),  # 1: aiding under torque is not used
+        ("joints", "i8"),  # 0 marks, 1 solved, 2 both
+        ("stamp_walk", "f8"),  # s/sqrt(s), of one joint's clock
+        ("rate_range", "f8"),  # rad/s
+        ("force_range", "f8"),  # m/s^2
+        ("repeats_together", "i8"),  # 0: not looked at
+        ("repeats_alone", "i8"),
+    ],
+    align=True,
+)
+
+# what one cycle brings, float64; of every IMU a row
+WX, WY, WZ, FX, FY, FZ, TEMPERATURE, SATURATED = range(8)
+READING: Final = 8
+START, END, JOINED, HOPS, CLOCK_VAR, SYNCHRONISED = range(6)
+MOMENT: Final = 6
+
+
+def new_node(config: Array) -> Array:
+    """Node that knows nothing yet, one record of dtype ``NODE``."""
+    made = np.zeros(1, NODE)
+    made["filter"] = new_state(config)
+    made["mount"] = new_mount()
+    forget_session(made)
+    made["guard"]["before_steps"] = np.nan
+    return made
+
+
+def forget_session(nodes: Array) -> None:
+    """Make every node forget what belongs to one session of its processor: readings, counts, what it had to say."""
+    guard = nodes["guard"]
+    for sensor in ("rates", "forces"):
+        guard["readings"][sensor]["last"] = np.nan
+        guard["readings"][sensor]["counts"] = 0
+    guard["readings"]["clipped"] = 0
+    guard["aidings"]["at"] = np.nan
+    guard["aidings"]["left"] = 0.0
+    guard["aidings"]["seen"] = 0
+    guard["rate"] = guard["sane_rate"] = guard["aiding_var"] = 0.0
+    guard["rate_at"] = -np.inf
+    guard["jumped"] = guard["untimely"] = guard["agreed"] = 0
+    nodes["twist"]["heard_at"] = -np.inf
+    nodes["twist"]["torque"] = 0.0
+    nodes["twist"]["holding"] = 0
+    nodes["joints"]["hops"] = -1
+    nodes["joints"]["solved"] = 0
+    nodes["events"]["told"] = nodes["events"]["said"] = 0
+    for name in ("cycles", "overruns", "status", "noticed", "rejecting", "slow_cycles", "stamp_hops"):
+        nodes[name] = 0
+    nodes["temperature"] = 25.0

@@ -1,0 +1,186 @@
+"""What makes a filter start anew in part: every write to the covariance from outside the filter's own mathematics.
+
+A reset keeps no cross term of what it sets: they are stale. Each is named by its reason; nothing else in the firmware
+writes the covariance.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+from node.kernels.error_model import isolate
+from node.kernels.jit import kernel
+from node.kernels.layout import STATES, UNKNOWN_YAW_VAR, Err
+from node.kernels.modes import STATIC_BIAS
+
+TX, TY, PSI = int(Err.TILT_X), int(Err.TILT_Y), int(Err.YAW)
+BX, BZ, S, D = int(Err.BIAS_X), int(Err.BIAS_Z), int(Err.SCALE), int(Err.STAMP)
+UNKNOWN_TILT_VAR = 1.0  # rad^2
+
+
+@kernel
+def copy_covariance(state: Any) -> None:
+    """Show the filter's covariance as the present one."""
+    for i in range(STATES):
+        for j in range(STATES):
+            state.now_P[i, j] = state.P[i, j]
+
+
+@kernel
+def open_yaw(state: Any, var: float) -> None:
+    """The yaw may have moved by a further ``var`` (rad^2), of which the rest knows nothing; cross terms stay true."""
+    state.P[PSI, PSI] += var
+
+
+@kernel
+def lose_yaw(state: Any) -> None:
+    """Nothing is known of the yaw, now and at the filter's epoch."""
+    isolate(state.P, PSI, UNKNOWN_YAW_VAR)
+    isolate(state.now_P, PSI, UNKNOWN_YAW_VAR)
+
+
+@kernel
+def lose_yaw_ahead(state: Any) -> None:
+    """Nothing is known of the yaw from the filter's epoch on; what is said of the present stays until the cycle."""
+    isolate(state.P, PSI, UNKNOWN_YAW_VAR)
+
+
+@kernel
+def settle_yaw(state: Any, aiding_var: float) -> None:
+    """A yaw that proved itself: at rest the reference is one measurement (``aiding_var``, rad^2), however often used."""
+    var = max(state.P[PSI, PSI], aiding_var)
+    isolate(state.P, PSI, var)
+    state.now_P[PSI, PSI] = max(state.now_P[PSI, PSI], var)
+
+
+@kernel
+def open_biases(state: Any, config: Any) -> None:
+    """A gyroscope that may be another one: each bias has at least its prior, the scale no cross terms."""
+    for k in range(3):
+        prior = config.bias_std[k] ** 2 + state.static_bias_var[k]
+        isolate(state.P, BX + k, max(prior, state.P[BX + k, BX + k]))
+    isolate(state.P, S, state.P[S, S])
+
+
+@kernel
+def take_mismatch(state: Any, bias_var: float, scale_var: float) -> None:
+    """The gyroscope's bias or scale took a step: their variances are opened, and the yaw starts again."""
+    isolate(state.P, PSI, UNKNOWN_YAW_VAR)
+    isolate(state.P, BZ, bias_var)
+    isolate(state.P, S, scale_var)
+    isolate(state.now_P, PSI, UNKNOWN_YAW_VAR)
+
+
+@kernel
+def lose_tilt(state: Any) -> None:
+    """Nothing is known of how the tube leans: an old tilt would be explained as a gyroscope's bias."""
+    isolate(state.P, TX, UNKNOWN_TILT_VAR)
+    isolate(state.P, TY, UNKNOWN_TILT_VAR)
+
+
+@kernel
+def set_stamp_prior(state: Any, var: float) -> None:
+    """The time stamp of an aiding is off by so much (s^2) before the first was used."""
+    isolate(state.P, D, var)
+
+
+@kernel
+def doubt_bias(state: Any, k: int, var: float) -> None:
+    """The mean of the cluster's gyroscopes is another one: bias ``k`` is in doubt by a further ``var`` ((rad/s)^2)."""
+    state.P[BX + k, BX + k] += var
+
+
+@kernel
+def forget_bias(state: Any, config: Any) -> None:
+    """Learn the static bias again, as after a first start: what was learnt was that of other parameters."""
+    for k in range(3):
+        state.static_bias[k] = 0.0
+        state.static_bias_var[k] = 0.0
+        state.bias[k] = 0.0
+        state.bias_sum[k] = 0.0
+        isolate(state.P, BX + k, config.boot_bias_std**2)
+    state.scale = 0.0
+    state.bias_count = 0
+    state.mode = STATIC_BIAS
+    isolate(state.P, S, config.scale_std**2)
+
+
+@kernel
+def resume(state: Any) -> None:
+    """Make a saved filter ready for its first cycle after an outage of unknown length.
+
+    The constants (bias, scale, offset) are kept. The yaw is kept as the best guess; if the string was turning when
+    the state was saved nothing is known of it, so its variance says so and the first aiding decides.
+    """
+    was_turning = state.still_cycles == 0
+    state.cycles = 0
+    state.consumed = 0
+    state.pending = 0
+    state.still_cycles = 0
+    state.rejected = 0
+    state.bias_count = 0
+    for k in range(3):
+        state.bias_sum[k] = 0.0
+    state.yaw = state.now_yaw
+    if was_turning:
+        state.last_sequence = -1
+        isolate(state.P, PSI, UNKNOWN_YAW_VAR)
+    copy_covariance(state)
+
+
+@kernel
+def begin_epoch(state: Any) -> None:
+    """After a jump of the clock: earlier times and increments are void, and how far the string turned is unknown."""
+    resume(state)
+    state.yaw_known = 0
+    state.last_sequence = -1
+    state.last_aided = -math.inf
+    state.stopped_at = math.nan
+    isolate(state.P, PSI, UNKNOWN_YAW_VAR)
+    copy_covariance(state)
+
+
+@kernel
+def start_over(state: Any, config: Any) -> None:
+    """Invalid covariance: the filter knows nothing but its constant bias and its mode. Source: ``layout.new_state``."""
+    for i in range(STATES):
+        for j in range(STATES):
+            state.P[i, j] = 0.0
+    state.P[TX, TX] = state.P[TY, TY] = UNKNOWN_TILT_VAR
+    state.P[PSI, PSI] = (math.pi / math.sqrt(3.0)) ** 2
+    for k in range(3):
+        state.P[BX + k, BX + k] = config.boot_bias_std**2
+    state.P[S, S] = config.scale_std**2
+    state.P[D, D] = config.stamp_std**2
+    copy_covariance(state)
+    state.epoch = 0.0
+    state.now = 0.0
+    state.yaw = 0
+    state.now_yaw = 0
+    state.yaw_known = 0
+    state.scale = 0.0
+    state.stamp = 0.0
+    state.now_rate = 0.0
+    for k in range(3):
+        state.down[k] = 0.0
+        state.now_down[k] = 0.0
+        state.bias[k] = 0.0
+        state.bias_sum[k] = 0.0
+    state.down[2] = 1.0
+    state.reference_hops = -1
+    state.reference_offset = 0.0
+    state.systematic_var = 0.0
+    state.last_sequence = -1
+    state.last_aided = -math.inf
+    state.innovation = 0.0
+    state.innovation_var = 0.0
+    state.rejected = 0
+    state.pending = 0
+    state.cycles = 0
+    state.consumed = 0
+    state.still_cycles = 0
+    state.stopped_at = math.nan
+    state.surveyed = 1
+    state.rate_exceeded = 0
+    state.bias_count = 0

@@ -1,0 +1,277 @@
+"""One node, compiled whole: what it does with a cycle's reading and with an aiding, over its one record.
+
+A step is: admit the times, correct the readings, judge them, keep the time stamp's prior, level coarsely, run the
+filter's cycle, judge what it made of it, and tell. The loop in the middle is that of the arithmetic chosen; what stands
+before and after it serves every one, so each is a function of its own. Nothing here allocates, waits or raises.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import Any, Final
+
+from node.kernels.alignment import to_tube
+from node.kernels.angles import from_binary, wrap
+from node.kernels.calibration import calibrate
+from node.kernels.coarse_level import level_coarsely
+from node.kernels.cycle import run_cycle
+from node.kernels.events import NONE, Code, tell
+from node.kernels.guard import admits, gate_aiding, guard_reading, judge_cycle
+from node.kernels.jit import kernel
+from node.kernels.layout import CLOCK_SLACK, DEG, Array, Scheme, Status
+from node.kernels.make_up import follow_joints
+from node.kernels.record import CLOCK_VAR, END, FX, HOPS, JOINED, SATURATED, START, SYNCHRONISED, TEMPERATURE, WX
+from node.kernels.relay import offer_aiding
+from node.kernels.resets import set_stamp_prior, start_over
+from node.kernels.sensor_watch import largest
+from node.kernels.twist import gate_twist, holds_survey, reaching_var, twist_var
+
+STILL_CYCLES: Final = 4  # after which a node takes itself for standing
+LARGEST_OFFSET: Final = 6.0 * DEG  # rad/s, of a gyroscope never calibrated; the slow alignment turn is faster
+LEAST_STAMP: Final = 1e-4  # s, of a time stamp, whatever the clock says
+SAY_EVENTS, SAY_SURVEY, SAY_ESTIMATE, SAY_STATE, ADMITTED = 1, 2, 4, 8, 16
+USED, ONWARD = 1, 2  # of an aiding: it is for the filter, and it goes down
+FORWARD, FILTER_FAULT = int(Scheme.FORWARD), int(Status.FILTER_FAULT)
+AIDED, SURVEY_READY = int(Status.AIDED), int(Status.SURVEY_READY)
+TOLD_FIRST, TOLD_LAST = 16, 26  # codes of ``STATUS_TOLD``
+STATUS_TOLD: Final = (
+    int(Status.STOPPED),
+    int(Status.STARTED),
+    int(Status.JOINT_OPENED),
+    int(Status.JOINT_CLOSED),
+    int(Status.BIAS_KNOWN),
+    int(Status.REFERENCE_CHANGED),
+    int(Status.YAW_RESET),
+    int(Status.RATE_EXCEEDED),
+    int(Status.RATE_RECOVERED),
+    int(Status.BAD_SAMPLE),
+    FILTER_FAULT,
+)
+AIDING_REJECTED = int(Code.AIDING_REJECTED)
+
+
+@kernel
+def node_step(nodes: Array, configs: Array, settings: Array, parameters: Array, readings: Array, moment: Array) -> int:
+    """One cycle of one node with one IMU and the float64 loop; returns what there is to say.
+
+    Parameters
+    ----------
+    nodes, configs, settings : one-element arrays of dtype ``NODE``, ``CONFIG`` and ``SETTINGS``
+    parameters : of dtype ``PARAMETERS``: the block in use, then the own correction of each IMU
+    readings : (imus, 8) rates (rad/s), forces (m/s^2), temperature (C), whether a sample was at the range
+    moment : (6,) start and end (s, own clock), joined, hops, variance of the clock (s^2), synchronised
+    """
+    node, config, crew = nodes[0], configs[0], settings[0]
+    if not admits(node, moment[START], moment[END]):
+        return say_events(node)
+    correct_reading(node, parameters, readings, 0)
+    for k in range(3):
+        node.rate[k], node.force[k] = readings[0, WX + k], readings[0, FX + k]
+    correct_one(node, parameters, 0, node.temperature, node.rate, node.force)
+    waits = before_loop(node, config, crew, moment, 1 if readings[0, SATURATED] != 0.0 else 0)
+    joined = 1 if moment[JOINED] != 0.0 else 0
+    status = run_cycle(node.filter, config, node.rate, node.force, moment[START], moment[END], joined)
+    after_loop(node, config, moment, status, waits)
+    return conclude(node, crew)
+
+
+@kernel
+def admit(nodes: Array, moment: Array) -> bool:
+    """Whether the times of a cycle are such that it can be run."""
+    return bool(admits(nodes[0], moment[START], moment[END]))
+
+
+@kernel
+def correct(nodes: Array, parameters: Array, readings: Array) -> None:
+    """Correct the reading of a node's one IMU into its record; see ``node_step``."""
+    node = nodes[0]
+    correct_reading(node, parameters, readings, 0)
+    for k in range(3):
+        node.rate[k], node.force[k] = readings[0, WX + k], readings[0, FX + k]
+    correct_one(node, parameters, 0, node.temperature, node.rate, node.force)
+
+
+@kernel
+def prepare(nodes: Array, configs: Array, settings: Array, moment: Array, saturated: int) -> int:
+    """What comes before the loop, of a reading that lies corrected in the record; whether the survey waits."""
+    return int(before_loop(nodes[0], configs[0], settings[0], moment, saturated))
+
+
+@kernel
+def judge(nodes: Array, configs: Array, moment: Array, status: int, waits: int) -> None:
+    """What comes after a loop that returned ``status``; ``waits`` is the answer of ``prepare``."""
+    after_loop(nodes[0], configs[0], moment, status, waits)
+
+
+@kernel
+def finish(nodes: Array, settings: Array) -> int:
+    """The end of a step: tell what the cycle found; returns what there is to say."""
+    return int(conclude(nodes[0], settings[0]))
+
+
+@kernel
+def correct_reading(node: Any, parameters: Array, readings: Array, imu: int) -> None:
+    """Apply an IMU's own correction in place, and keep the raw reading that a block of parameters would correct."""
+    own = parameters[1 + imu]
+    node.temperature = readings[imu, TEMPERATURE]
+    if own.identity != 1:
+        calibrate(own, node.temperature, readings[imu, WX : WX + 3], readings[imu, FX : FX + 3])
+    for k in range(3):
+        node.raw_rate[k], node.raw_force[k] = readings[imu, WX + k], readings[imu, FX + k]
+
+
+@kernel
+def correct_one(node: Any, parameters: Array, imu: int, temperature: float, rate: Array, force: Array) -> None:
+    """Correct the rate and force of one IMU by the block in use, and turn them into the tube's frame."""
+    calibrate(parameters[0], temperature, rate, force)
+    for k in range(3):
+        node.unaligned[imu, k] = force[k]
+    axis = node.mount.axis[imu]
+    to_tube(axis, rate)
+    to_tube(axis, force)
+
+
+@kernel
+def before_loop(node: Any, config: Any, settings: Any, moment: Array, saturated: int) -> int:
+    """Judge the readings, follow the clock, level coarsely, count; 1 if the survey of this stop has to wait."""
+    state = node.filter
+    start, end = moment[START], moment[END]
+    guard_reading(node, config, settings, saturated, end)
+    follow_clock(node, config, settings, moment)
+    level_coarsely(state, config, node.rate, node.force)
+    node.slow_cycles = node.slow_cycles + 1 if largest(node.rate) < LARGEST_OFFSET else 0
+    if node.cycles > 0 and start - state.now > 0.5 * (end - start):
+        node.overruns += 1
+    waits = 1 if state.surveyed == 0 and holds_survey(node, settings, end) else 0
+    if waits == 1:
+        state.surveyed = 1
+    return waits
+
+
+@kernel
+def after_loop(node: Any, config: Any, moment: Array, status: int, waits: int) -> None:
+    """Take what the loop made of the cycle."""
+    if waits == 1:
+        node.filter.surveyed = 0
+    node.status = status | node.noticed
+    node.noticed = 0
+    node.cycles += 1
+    if node.status & FILTER_FAULT:
+        start_over(node.filter, config)
+    judge_cycle(node, config, node.status, moment[END])
+
+
+@kernel
+def conclude(node: Any, settings: Any) -> int:
+    """Tell what the cycle found, as events; returns what there is to say."""
+    state, status = node.filter, node.status
+    if status & ~AIDED:
+        tell_status(node)
+    if state.rejected > 0 and node.rejecting == 0:
+        sigmas = abs(state.innovation) / math.sqrt(state.innovation_var)
+        tell(node, AIDING_REJECTED, sigmas, NONE, NONE, NONE)
+    node.rejecting = 1 if state.rejected > 0 else 0
+    says = say_events(node) | ADMITTED
+    if status & SURVEY_READY:
+        says |= SAY_SURVEY
+    if settings.scheme != FORWARD and state.yaw_known == 1:
+        says |= SAY_ESTIMATE
+    if status & ~AIDED or node.cycles % settings.state_every == 0:
+        says |= SAY_STATE
+    return says
+
+
+@kernel
+def tell_status(node: Any) -> None:
+    """An event for every status bit that has one."""
+    yaw_deg = from_binary(node.filter.now_yaw) / DEG
+    for k in range(TOLD_LAST - TOLD_FIRST + 1):
+        if node.status & STATUS_TOLD[k]:
+            tell(node, TOLD_FIRST + k, yaw_deg, NONE, NONE, NONE)
+
+
+@kernel
+def say_events(node: Any) -> int:
+    """Whether there are events that nobody has taken yet, as a bit."""
+    return SAY_EVENTS if node.events.told != node.events.said else 0
+
+
+@kernel
+def follow_clock(node: Any, config: Any, settings: Any, moment: Array) -> None:
+    """Let the prior of the time stamp be what the clock says of itself, and its wander that of the hops.
+
+    The configuration is left alone while it is about right: another one costs the integer loop a conversion.
+    """
+    if moment[SYNCHRONISED] == 0.0 or config.stamp_std == 0.0:
+        return
+    std = min(max(math.sqrt(moment[CLOCK_VAR]), LEAST_STAMP), CLOCK_SLACK)
+    hops = max(int(moment[HOPS]), 1)
+    ratio = std / config.stamp_std
+    if hops == node.stamp_hops and 0.8 < ratio < 1.25:
+        return
+    node.stamp_hops = hops
+    config.stamp_std = std
+    config.stamp_walk = settings.stamp_walk * math.sqrt(hops)
+    if node.filter.last_aided == -math.inf:
+        set_stamp_prior(node.filter, std * std)
+
+
+@kernel
+def node_aiding(nodes: Array, configs: Array, settings: Array, aiding: Array) -> int:
+    """Take one aiding into a node with the float64 loop; returns whether it was used and whether it goes down.
+
+    What goes down is the aiding itself with the ``down_*`` of the record in the place of its own.
+
+    Parameters
+    ----------
+    nodes, configs, settings : one-element arrays of dtype ``NODE``, ``CONFIG`` and ``SETTINGS``
+    aiding : (11,) see ``take_aiding``
+    """
+    node = nodes[0]
+    gates = take_aiding(nodes, configs, settings, aiding)
+    if gates & USED:
+        yaw, yaw_var, valid_at = aiding[0], aiding[1], aiding[5]
+        sequence, hops = int(aiding[6]), int(aiding[7])
+        systematic = node.down_systematic + twist_var(node.twist)
+        node.noticed |= offer_aiding(
+            node.filter, configs[0], yaw, yaw_var, systematic, node.down_offset, valid_at, sequence, hops
+        )
+    if gates & ONWARD:
+        hand_down(nodes, settings)
+    return int(gates)
+
+
+@kernel
+def take_aiding(nodes: Array, configs: Array, settings: Array, aiding: Array) -> int:
+    """Gate an aiding, and leave this node's offset and systematic variance in its record; ``USED`` and ``ONWARD``.
+
+    Parameters
+    ----------
+    aiding : (11,) yaw, its variance, systematic variance, offset, rate (rad, rad/s), time of validity (s, own clock),
+        sequence, hops, torque (N m), torsion variance (rad^2), under torque
+    """
+    node, crew = nodes[0], settings[0]
+    yaw, yaw_var, rate, valid_at = aiding[0], aiding[1], aiding[4], aiding[5]
+    sequence, hops, torque, under_torque = int(aiding[6]), int(aiding[7]), aiding[8], int(aiding[10])
+    offset = wrap(aiding[3] + (crew.drive_angle if hops == 0 else 0.0))
+    systematic = aiding[2] + (crew.drive_var if hops == 0 else 0.0)
+    reaching = reaching_var(aiding[9], torque, crew.stiffness)
+    known = twist_var(node.twist)
+    offset, systematic = follow_joints(
+        node, crew, yaw, yaw_var, rate, sequence, hops, under_torque, offset, systematic, known, reaching
+    )
+    node.down_offset, node.down_systematic, node.down_torsion = offset, systematic, reaching
+    used = 0
+    if gate_aiding(node, configs[0], yaw + offset, yaw_var, rate, valid_at) and gate_twist(
+        node, crew, yaw_var, torque, reaching, under_torque, valid_at
+    ):
+        used = USED
+    return used | (ONWARD if crew.scheme == FORWARD else 0)
+
+
+@kernel
+def hand_down(nodes: Array, settings: Array) -> None:
+    """Add the joint below to what the record hands down."""
+    node, crew = nodes[0], settings[0]
+    node.down_offset = wrap(node.down_offset + crew.lower_angle)
+    node.down_systematic += crew.lower_var

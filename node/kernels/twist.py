@@ -1,0 +1,81 @@
+"""Twist of the string between the drive head and one node, as the aiding reports it.
+
+The twist of the tubes passed adds up, for the torque is one and the same: ``sigma = |T| sum L / (G J)``, and its square
+is handed down. It is constant while the torque is, so no filter may average it away. Between two torques the yaw turns
+against the drive by what the one and the other may be wrong: the filter's yaw is opened by that, its cross terms stay
+true.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import Any, Final
+
+from node.kernels.events import NONE, Code, tell
+from node.kernels.jit import kernel
+from node.kernels.resets import open_yaw
+
+UNKNOWN_VAR: Final = 10.0  # rad^2, of a twist of which nothing is known but for whole turns
+STRING_UNDER_TORQUE, STRING_RELEASED = int(Code.STRING_UNDER_TORQUE), int(Code.STRING_RELEASED)
+
+
+@kernel
+def twist_var(twist: Any) -> float:
+    """Variance (rad^2) of the twist in the last aiding used; ``twist`` is a record of dtype ``TWIST``."""
+    return float(twist.std * twist.std) if twist.known == 1 else 0.0
+
+
+@kernel
+def reaching_var(torsion_var: float, torque: float, stiffness: float) -> float:
+    """Variance (rad^2) of the twist between the drive head and the lower end of a tube (N m, N m/rad)."""
+    std = math.sqrt(torsion_var) + torque / stiffness
+    return float(min(std * std, UNKNOWN_VAR))
+
+
+@kernel
+def gate_twist(
+    node: Any, settings: Any, yaw_var: float, torque: float, reaching: float, under_torque: int, valid_local: float
+) -> bool:
+    """Whether an aiding is for the filter; opens the filter's yaw where the twist has changed.
+
+    Parameters
+    ----------
+    yaw_var : rad^2, of the aiding
+    torque, under_torque : N m, and 1 while the drive holds the string, as it says
+    reaching : rad^2, ``reaching_var``
+    valid_local : s, own clock
+    """
+    twist, state = node.twist, node.filter
+    twist.heard_at, twist.torque, twist.holding = valid_local, torque, under_torque
+    if under_torque == 1 and settings.torsion_gate == 1:
+        twist.wound = 1
+        return False
+    std = math.sqrt(reaching)
+    before = twist.std if twist.known == 1 else std  # after a start anything may have been
+    held = twist.held == 1 or twist.known == 0
+    change = 0.0
+    if under_torque == 1 and held:
+        change = std - before
+        if twist.known == 1 and change * change <= yaw_var:
+            return True  # a change waits until it has grown: a rest is not to be used again and again
+    elif under_torque == 1 or held or twist.wound == 1:
+        change = math.sqrt(std * std + before * before)
+        if torque != 0.0 and twist.known == 1:
+            code = STRING_UNDER_TORQUE if under_torque == 1 else STRING_RELEASED
+            tell(node, code, torque, math.degrees(std), NONE, NONE)
+    if change != 0.0 and state.yaw_known == 1:
+        open_yaw(state, change * change)
+        state.last_sequence = -1
+    twist.known, twist.std, twist.held, twist.wound = 1, std, under_torque, 0
+    return True
+
+
+@kernel
+def holds_survey(node: Any, settings: Any, now: float) -> bool:
+    """Whether at ``now`` (s, own clock) the survey waits: the yaw that counts is that of a released string.
+
+    A drive that is no longer reported is not waited for: the survey goes by what the node itself knows.
+    """
+    twist = node.twist
+    told = now - twist.heard_at <= settings.aiding_old_after
+    return bool(twist.holding == 1 and told and node.filter.still_cycles > 0)
