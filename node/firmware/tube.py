@@ -21,7 +21,7 @@ from node.kernels.calibration import USUAL
 from node.kernels.cycle import run_cycle as float_cycle
 from node.kernels.layout import DEG, Array, Scheme
 from node.kernels.modes import STATIC_BIAS
-from node.kernels.record import MOMENT, READING
+from node.kernels.record import AIDING, MOMENT, READING
 from node.kernels.resets import forget_bias, lose_tilt
 from node.kernels.step import (
     ADMITTED,
@@ -99,7 +99,7 @@ class Tube:
         self._loop = kernel_of(settings.kernel)
         own = [ParameterBlock(settings.tube, 0, imu.gyroscope, imu.accelerometer) for imu in settings.imus]
         self._corrections = np.concatenate([record_of(block) for block in (own[0], *own)])
-        self._readings, self._moment, self._aiding = np.zeros((count, READING)), np.zeros(MOMENT), np.zeros(11)
+        self._readings, self._moment, self._aiding = np.zeros((count, READING)), np.zeros(MOMENT), np.zeros(AIDING)
         self.parameters = parameters or ParameterBlock(settings.tube, 0)
         self.use(self.parameters)
 

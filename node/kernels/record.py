@@ -148,6 +148,7 @@ WX, WY, WZ, FX, FY, FZ, TEMPERATURE, SATURATED = range(8)
 READING: Final = 8
 START, END, JOINED, HOPS, CLOCK_VAR, SYNCHRONISED = range(6)
 MOMENT: Final = 6
+AIDING: Final = 11  # numbers of one, see ``node.kernels.step.take_aiding``
 
 
 def new_node(config: Array) -> Array:

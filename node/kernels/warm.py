@@ -8,12 +8,28 @@ import numpy as np
 
 from node.kernels.alignment import OFFSET, SWEEP, add_to_sweep, fit_circle, new_mount, take_extremes, to_tube
 from node.kernels.angles import from_binary, wrap
-from node.kernels.calibration import USUAL, calibrate, identity_parameters
+from node.kernels.calibration import USUAL, identity_parameters
 from node.kernels.cluster import follow_offsets, fuse
 from node.kernels.cycle import run_cycle
+from node.kernels.guard import is_heard
 from node.kernels.layout import PERIOD, default_config, new_state
+from node.kernels.record import AIDING, END, FX, MOMENT, READING, SETTINGS, new_node
 from node.kernels.relay import offer_aiding
+from node.kernels.resets import doubt_bias, forget_bias, lose_tilt, resume
 from node.kernels.static_average import STATIC, add_static, has_moved
+from node.kernels.step import (
+    admit,
+    correct,
+    finish,
+    hand_down,
+    judge,
+    node_aiding,
+    node_step,
+    prepare,
+    say_events,
+    take_aiding,
+)
+from node.kernels.twist import twist_var
 
 
 def warm_loop(run_cycle: Callable[..., int], offer_aiding: Callable[..., int]) -> None:
@@ -30,7 +46,6 @@ def warm_loop(run_cycle: Callable[..., int], offer_aiding: Callable[..., int]) -
 def warm_up() -> None:
     """Run what the node needs with the default kernel."""
     rate, force = np.zeros(3), np.array([0.0, 0.0, -9.81])
-    calibrate(identity_parameters()[0], USUAL, rate, force)
     average = np.zeros(1, STATIC)
     add_static(average[0], rate, force, USUAL, 1)
     has_moved(average[0], 3.0)
@@ -42,4 +57,31 @@ def warm_up() -> None:
     fuse(np.ones((2, 6)), np.ones(2), np.zeros(6))
     follow_offsets(np.ones((2, 3)), rate, 1, new_mount()[0]["rate_offset"])
     warm_loop(run_cycle, offer_aiding)
+    warm_step()
     wrap(0.0)
+
+
+def warm_step() -> None:
+    """Run the step and an aiding, as a whole and in its parts."""
+    configs, settings = default_config(), np.zeros(1, SETTINGS)
+    settings["state_every"] = settings["stiffness"] = 1
+    parameters = np.concatenate([identity_parameters(), identity_parameters()])
+    nodes, readings, moment = new_node(configs), np.zeros((1, READING)), np.zeros(MOMENT)
+    readings[0, FX + 2], moment[END] = -9.81, PERIOD
+    node_step(nodes, configs, settings, parameters, readings, moment)
+    node_aiding(nodes, configs, settings, np.zeros(AIDING))
+    moment += PERIOD
+    admit(nodes, moment)
+    correct(nodes, parameters, readings)
+    judge(nodes, configs, moment, 0, prepare(nodes, configs, settings, moment, 0))
+    finish(nodes, settings)
+    take_aiding(nodes, configs, settings, np.zeros(AIDING))
+    hand_down(nodes, settings)
+    node = nodes[0]
+    twist_var(node["twist"])
+    is_heard(node)
+    say_events(node)
+    forget_bias(node["filter"], configs[0])
+    lose_tilt(node["filter"])
+    doubt_bias(node["filter"], 0, 0.0)
+    resume(node["filter"])

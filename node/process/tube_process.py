@@ -176,7 +176,9 @@ class TubeProcess(Process):
         self.tube.node["overruns"] += 1
         if now - self._overrun_told >= OVERRUN_EVERY:
             self._overrun_told = now
-            self._send_event(Severity.WARNING, "overrun", {"missed": missed, "overruns": int(self.tube.node["overruns"])})
+            self._send_event(
+                Severity.WARNING, "overrun", {"missed": missed, "overruns": int(self.tube.node["overruns"])}
+            )
 
     def close(self) -> None:
         """Save the newest state and release the sensors."""

@@ -10,11 +10,11 @@ import pytest
 COUNT_COMPILATIONS = """
 from node.kernels.warm import warm_up
 from node.kernels.cycle import run_cycle
-from node.kernels.calibration import calibrate
 from node.kernels.relay import offer_aiding
 from node.kernels.static_average import add_static, has_moved
+from node.kernels.step import node_aiding, node_step
 warm_up()
-for function in (run_cycle, offer_aiding, calibrate, add_static, has_moved):
+for function in (node_step, node_aiding, run_cycle, offer_aiding, add_static, has_moved):
     print(sum(function.stats.cache_misses.values()), sum(function.stats.cache_hits.values()))
 """
 COUNT_ALLOCATIONS = """
@@ -58,6 +58,47 @@ print(allocations(1), allocations(1000))
 """
 
 
+COUNT_OF_STEPS = """
+import numpy as np
+from numba import njit
+from numba.core.runtime import _nrt_python, rtsys
+from node.kernels.calibration import identity_parameters
+from node.kernels.layout import default_config
+from node.kernels.record import AIDING, MOMENT, READING, SETTINGS, new_node
+from node.kernels.step import node_aiding, node_step
+
+_nrt_python.memsys_enable_stats()
+
+@njit
+def drive(nodes, configs, settings, parameters, readings, moment, aiding, cycles):
+    said = 0
+    for k in range(cycles):
+        moment[0], moment[1] = moment[1], moment[1] + 0.5
+        readings[0, 2] = 1.2 if k % 300 > 200 else 1e-4 * (k % 7)
+        readings[0, 3], readings[0, 5] = 1e-3 * (k % 5), -9.8 - 1e-3 * (k % 3)
+        said |= node_step(nodes, configs, settings, parameters, readings, moment)
+        aiding[5], aiding[6] = moment[1] - 0.1, k
+        said |= node_aiding(nodes, configs, settings, aiding)
+    return said
+
+def allocations(cycles):
+    configs, settings = default_config(), np.zeros(1, SETTINGS)
+    settings["state_every"], settings["stiffness"], settings["aiding_old_after"] = 2, np.inf, 3.0
+    settings["rate_range"], settings["force_range"] = 9.0, 80.0
+    parameters = np.concatenate([identity_parameters(), identity_parameters()])
+    parameters["identity"][0] = 0
+    moment, aiding = np.zeros(MOMENT), np.zeros(AIDING)
+    moment[1], moment[2], moment[5], aiding[1] = 1000.0, 1.0, 1.0, 1e-6
+    before = rtsys.get_allocation_stats().alloc
+    nodes, readings = new_node(configs), np.zeros((1, READING))
+    drive(nodes, configs, settings, parameters, readings, moment, aiding, cycles)
+    return rtsys.get_allocation_stats().alloc - before
+
+allocations(1)
+print(allocations(1), allocations(2000))
+"""
+
+
 def run(program: str, **environment: str) -> list[list[int]]:
     done = subprocess.run(
         [sys.executable, "-c", program], env=os.environ | environment, capture_output=True, text=True, check=True
@@ -89,4 +130,10 @@ def test_the_cache_follows_the_sources() -> None:
 )
 def test_a_cycle_allocates_nothing(cycle: str, relay: str) -> None:
     ((once, often),) = run(COUNT_ALLOCATIONS, CYCLE=cycle, RELAY=relay)
+    assert once == often
+
+
+@pytest.mark.slow
+def test_a_step_and_an_aiding_allocate_nothing() -> None:
+    ((once, often),) = run(COUNT_OF_STEPS)
     assert once == often
