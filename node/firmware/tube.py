@@ -149,7 +149,18 @@ class Tube:
             says, said = self._run_in_parts(reading, context)
         if says in (0, ADMITTED) and not self._recorder.running:
             return said
-        return said + list(self._say(says, reading, context))
+        return said + list(self.say(says, reading.start, reading.end, context))
+
+    @property
+    def is_plain(self) -> bool:
+        """Whether a cycle is one call of ``node_step`` and nothing else: one IMU, the float64 loop, no order obeyed."""
+        plain = self._loop is None and self._fusion is None
+        return plain and self._aligner.idle and not self._recorder.running
+
+    @property
+    def records(self) -> tuple[Array, Array]:
+        """What ``node_step`` takes of the settings and of the parameters; read it, the tube writes it."""
+        return self._crew, self._corrections
 
     def boot_event(self, rig_now: float) -> Event:
         """Report that the node started, and whether with its saved yaw."""
@@ -281,21 +292,21 @@ class Tube:
             pending += self._fusion.cluster.drain_events()
         return int(finish(self.nodes, self._crew)), list(self.reporter.pending_events(pending, context))
 
-    def _say(self, says: int, reading: ImuReading, context: RigContext) -> Iterator[Said]:
-        """What the step has to say, in order."""
+    def say(self, says: int, start: float, end: float, context: RigContext) -> Iterator[Said]:
+        """What the step has to say of the cycle from ``start`` to ``end`` (s, own clock), in order."""
         reporter = self.reporter
         if says & SAY_EVENTS:
             yield from reporter.pending_events(take_events(self.node["events"]), context)
         if says & ADMITTED and self._recorder.running:
-            yield from self._record(reading, context)
+            yield from self._record(start, end, context)
         if says & SAY_SURVEY:
             samples = int(self.config["survey_samples"])
             imus = self._fusion.cluster.survey(samples) if self._fusion is not None else ()
-            yield reporter.survey(reading.end, context, imus)
+            yield reporter.survey(end, context, imus)
         if says & SAY_ESTIMATE:
             yield self._of_estimate(reporter.estimate(context))
         if says & SAY_STATE:
-            yield reporter.report(reading.end, context, self._block)
+            yield reporter.report(end, context, self._block)
 
     def _of_estimate(self, aiding: Aiding) -> Aiding:
         """The node's own yaw as aiding, with the twist that it was aided under."""
@@ -324,12 +335,12 @@ class Tube:
         self._aligner.drop(reason)
         realign(self.state, before, self._axes)
 
-    def _record(self, reading: ImuReading, context: RigContext) -> Iterator[StaticRecord | Event]:
+    def _record(self, start: float, end: float, context: RigContext) -> Iterator[StaticRecord | Event]:
         recorder, raw = self._recorder, self.raw
         temperature = raw.temperature if math.isfinite(raw.temperature) else USUAL
-        recorder.append_reading(raw.rate, raw.force, temperature, reading.start, standing=self.standing)
-        if recorder.is_due(reading.end):
-            record = recorder.finish(self.settings.tube, reading.end, context.rig_now, self._next_sequence)
+        recorder.append_reading(raw.rate, raw.force, temperature, start, standing=self.standing)
+        if recorder.is_due(end):
+            record = recorder.finish(self.settings.tube, end, context.rig_now, self._next_sequence)
             yield record or self.reporter.event("static_record_empty", Severity.ERROR, context.rig_now, {})
 
 

@@ -148,7 +148,9 @@ WX, WY, WZ, FX, FY, FZ, TEMPERATURE, SATURATED = range(8)
 READING: Final = 8
 START, END, JOINED, HOPS, CLOCK_VAR, SYNCHRONISED = range(6)
 MOMENT: Final = 6
-AIDING: Final = 11  # numbers of one, see ``node.kernels.step.take_aiding``
+# an aiding, float64; see ``node.kernels.step.take_aiding``
+A_YAW, A_YAW_VAR, A_SYSTEMATIC, A_OFFSET, A_RATE, A_VALID, A_SEQUENCE, A_HOPS, A_TORQUE, A_TORSION, A_HELD = range(11)
+AIDING: Final = 11
 
 
 def new_node(config: Array) -> Array:

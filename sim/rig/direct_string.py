@@ -11,6 +11,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from typing import NamedTuple
 
 import numpy as np
 import numpy.typing as npt
@@ -19,8 +20,22 @@ from node.firmware.encoder import EncoderNode, EncoderSample
 from node.firmware.inputs import ImuReading, RigContext
 from node.firmware.reporter import VAR_FLOOR
 from node.firmware.tube import Tube
+from node.kernels.calibration import USUAL
 from node.kernels.layout import PERIOD, Err, Scheme, default_config
-from node.kernels.record import new_node
+from node.kernels.record import (
+    CLOCK_VAR,
+    END,
+    HOPS,
+    JOINED,
+    MOMENT,
+    READING,
+    START,
+    SYNCHRONISED,
+    TEMPERATURE,
+    new_node,
+)
+from node.kernels.step import ADMITTED
+from node.kernels.string import string_aiding, string_step
 from sim.errors import ScenarioError
 from sim.rig.plain_encoder import PlainEncoder
 from sim.world.imu_errors import gauss_markov
@@ -75,6 +90,16 @@ class StringRun:
         return self.var + self.systematic_var
 
 
+class Tables(NamedTuple):
+    """Of all tubes, tube 1 first: settings, corrections, readings (cycles, tubes, 1, 8), times, what each says."""
+
+    crews: Array
+    corrections: Array
+    readings: Array
+    moments: Array
+    says: Array
+
+
 class DirectString:
     """One string of one world.
 
@@ -93,13 +118,13 @@ class DirectString:
     """
 
     def __init__(
-        self, world: World, *, state_every: int = NEVER, spoil: Spoil = lambda _tube, _cycle, sample: sample
+        self, world: World, *, state_every: int = NEVER, spoil: Spoil | None = None
     ) -> None:
         self.world, self._file = world, world.scenario.file
         if self._file.medium.link != "off":
             raise ScenarioError('medium.link: expected "off" for a string without frames')
         self._spoil = spoil
-        count = world.scenario.tubes
+        count, self._imus = world.scenario.tubes, self._file.node.imus
         self._configs = self._tuned_configs(count)
         # the records of all tubes in one array, so that a cycle is read off in a few operations
         self.nodes = np.concatenate([new_node(self._configs[k : k + 1]) for k in range(count)])
@@ -111,9 +136,16 @@ class DirectString:
         self._lost = self._losses()
         self._clocks = self._clock_errors()
         self._phases = {tube: world.phase(tube) for tube in self.tubes}
+        self._phase_of = np.array([self._phases[tube] for tube in self.tubes])
+        clocks = self._file.clocks
+        stated = clocks.joint_std_ms if clocks.stated_std_ms is None else clocks.stated_std_ms
+        self._clock_var = (1e-3 * stated) ** 2 * np.arange(1, count + 1)  # s^2, by hops
         self._adds = [phase for phase in world.phases if phase.kind == "add"]
+        self._tables = self._stack_tables()
         self.clock_shifts: dict[int, float] = {}
         self._mount_var = math.radians(self._file.joints.mount_std_deg) ** 2
+        forward = all(tube.settings.scheme is Scheme.FORWARD for tube in self.tubes.values())
+        self._hands_on = forward and self._file.node.kernel == "float64" and self._imus == 1
         self._own: dict[int, Aiding | None] = {}  # what each node said in its cycle, by the schemes of estimates
         self.run = self._empty_run()
 
@@ -132,8 +164,7 @@ class DirectString:
             locked = self._file.encoder.phase == "locked"
             if not locked:
                 self._relay(cycle, measured, string, end)
-            said = {tube: self._run_cycle(cycle, tube, string) for tube in string}
-            self._keep(cycle, string, said)
+            self._keep(cycle, string, self._run_cycles(cycle, string, end))
             if locked:  # cycles end with the encoder's, and what it measures then arrives after them
                 self._relay(cycle, measured, string, end)
             yield cycle
@@ -178,22 +209,73 @@ class DirectString:
         """Whether the joint below the head is open, and was for ``since`` s."""
         return any(phase.start + since < t < phase.joint_closed for phase in self._adds)
 
+    def _stack_tables(self) -> Tables:
+        """What the compiled string takes beside the nodes' own records."""
+        world, count = self.world, len(self.tubes)
+        if self._imus > 1:
+            return Tables(*np.zeros((5, 0)))
+        readings = np.zeros((world.cycles, count, 1, READING))
+        readings[..., TEMPERATURE] = USUAL
+        for tube in self.tubes:
+            readings[:, tube - 1, 0, :TEMPERATURE] = world.imu_samples(tube)
+        crews, corrections = zip(*(self.tubes[tube].records for tube in self.tubes), strict=True)
+        return Tables(
+            np.concatenate(crews), np.stack(corrections), readings, np.zeros((count, MOMENT)), np.zeros(count, np.int64)
+        )
+
+    def _run_cycles(self, cycle: int, string: Sequence[int], end: float) -> Mapping[int, Sequence[Message]]:
+        """A cycle of every tube: all that are plain in one call, the others one by one."""
+        plain = self._spoil is None and self._imus == 1
+        together = [tube for tube in string if plain and self.tubes[tube].is_plain]
+        said = self._step_together(cycle, together, string, end) if together else {}
+        if len(together) < len(string):
+            said |= {tube: self._run_cycle(cycle, tube, string) for tube in string if tube not in together}
+            said = {tube: said[tube] for tube in string if tube in said}
+        return said
+
+    def _step_together(
+        self, cycle: int, together: Sequence[int], string: Sequence[int], end: float
+    ) -> dict[int, Sequence[Message]]:
+        tables, n = self._tables, len(string)
+        mask = np.zeros(n, np.bool_)
+        mask[np.array(together) - 1] = True
+        moments = tables.moments[:n]
+        shifts = np.array([self.clock_shifts.get(tube, 0.0) for tube in range(1, n + 1)]) if self.clock_shifts else 0.0
+        moments[:, START] = self.world.cycle_end(cycle - 1) + self._phase_of[:n] + shifts
+        moments[:, END] = end + self._phase_of[:n] + shifts
+        moments[:, JOINED] = 1.0
+        if self._adds:
+            moments[:, JOINED] = [self._is_joined(tube, n, end + self._phases[tube]) for tube in range(1, n + 1)]
+        moments[:, HOPS] = np.arange(n, 0, -1)
+        moments[:, CLOCK_VAR] = self._clock_var[n - 1 :: -1]
+        moments[:, SYNCHRONISED] = 1.0
+        crews, corrections, readings = tables.crews[:n], tables.corrections, tables.readings[cycle]
+        string_step(self.nodes[:n], self._configs[:n], crews, corrections, readings, moments, mask, tables.says)
+        said: dict[int, Sequence[Message]] = {}
+        for place in np.flatnonzero(mask & (tables.says[:n] & ~ADMITTED != 0)).tolist()[::-1]:
+            tube = place + 1
+            begin, until = moments[place, START : END + 1].tolist()
+            around = self._context(tube, n, end + self._phases[tube])
+            said[tube] = list(self.tubes[tube].say(int(tables.says[place]), begin, until, around))
+        return said
+
     def _run_cycle(self, cycle: int, tube: int, string: Sequence[int]) -> Sequence[Message]:
         phase = self._phases[tube]
         begin, end = self.world.cycle_end(cycle - 1) + phase, self.world.cycle_end(cycle) + phase
         shift = self.clock_shifts.get(tube, 0.0)
-        wx, wy, wz, fx, fy, fz = self._spoil(tube, cycle, self.world.imu_sample(tube, cycle))
+        sample = self.world.imu_sample(tube, cycle)
+        wx, wy, wz, fx, fy, fz = sample if self._spoil is None else self._spoil(tube, cycle, sample)
         reading = ImuReading(begin + shift, end + shift, (wx, wy, wz), (fx, fy, fz))
         return self.tubes[tube].on_cycle(reading, self._context(tube, string[0], end))
 
     def _context(self, tube: int, top: int, end: float) -> RigContext:
         """What the link would tell: the new tube's joint is open at once, that below it once it is missed."""
-        growing = self._is_open(end)
-        unjoined = growing and (tube == top or (tube == top - 1 and self._is_open(end, SILENT_AFTER)))
         hops = top - tube + 1
-        clocks = self._file.clocks
-        stated = clocks.joint_std_ms if clocks.stated_std_ms is None else clocks.stated_std_ms
-        return RigContext(not unjoined, hops, end, (1e-3 * stated) ** 2 * hops, True)
+        return RigContext(self._is_joined(tube, top, end), hops, end, float(self._clock_var[hops - 1]), True)
+
+    def _is_joined(self, tube: int, top: int, end: float) -> bool:
+        growing = self._is_open(end)
+        return not (growing and (tube == top or (tube == top - 1 and self._is_open(end, SILENT_AFTER))))
 
     def _measure(self, cycle: int, end: float) -> Aiding:
         count, edge_at, rising, torque, earlier = self.world.encoder_sample(end)
@@ -208,6 +290,9 @@ class DirectString:
         """Down the string: ``forward`` hands on what came, the others what each node said in its cycle."""
         aiding: Aiding | None = measured if self.passes[cycle] and not self._is_open(end) else None
         medium = self._file.medium
+        if aiding is not None and self._hands_on:
+            self._hand_on(cycle, aiding, string)
+            return
         for hop, tube in enumerate(string):
             firmware = self.tubes[tube]
             scheme = firmware.settings.scheme
@@ -218,6 +303,26 @@ class DirectString:
                 error = float(self._clocks[cycle, hop]) + self.clock_shifts.get(tube, 0.0)
                 passed = firmware.on_aiding(aiding, aiding.valid_at + late + error)
             aiding = passed if scheme is Scheme.FORWARD else self._own.get(tube)
+
+    def _hand_on(self, cycle: int, aiding: Aiding, string: Sequence[int]) -> None:
+        """Hand an aiding down a string whose scheme is ``forward``, as far as it is not lost."""
+        tables, medium, hops = self._tables, self._file.medium, len(string)
+        lost = np.flatnonzero(self._lost[cycle, :hops])
+        reach = int(lost[0]) if len(lost) else hops
+        valid = np.full(hops, aiding.valid_at)
+        if medium.dated_by == "arrival":
+            valid += 1e-3 * medium.delay_ms + medium.latency * np.arange(1, hops + 1)
+        error = self._clocks[cycle, :hops]
+        if self.clock_shifts:
+            error = error + np.array([self.clock_shifts.get(tube, 0.0) for tube in string])
+        taken = np.array(
+            [
+                *(aiding.yaw, aiding.yaw_var, aiding.systematic_var, aiding.offset, aiding.rate, 0.0),
+                *(aiding.sequence, aiding.hops, aiding.torque, aiding.torsion_var, aiding.under_torque),
+            ]
+        )
+        places = np.array(string) - 1
+        string_aiding(self.nodes, self._configs, tables.crews, places, reach, valid + error, taken)
 
     def _empty_run(self) -> StringRun:
         world, tubes = self.world, self.world.scenario.tubes
@@ -240,8 +345,8 @@ class DirectString:
         run.var[row] = np.maximum(states["now_P"][:, Err.YAW, Err.YAW], VAR_FLOOR)
         run.systematic_var[row] = states["systematic_var"] + self._mount_var
         run.gyro_bias[row] = states["static_bias"][:, 2] + states["bias"][:, 2]
+        self._own = dict.fromkeys(string)
         for tube, messages in said.items():
-            self._own[tube] = None
             for message in messages:
                 if isinstance(message, Aiding):
                     self._own[tube] = message

@@ -146,4 +146,8 @@ class Motion:
 
     def top(self, t: float) -> int:
         """Number of the tube that the drive head holds at ``t``; 1 before the first joint is closed."""
-        return max(self._at_start + int(np.searchsorted(self.make_ups, t, side="right")), 1)
+        return int(self.tops(np.array([t]))[0])
+
+    def tops(self, t: Array) -> npt.NDArray[np.intp]:
+        """``top`` at the times ``t`` (n,)."""
+        return np.asarray(np.maximum(self._at_start + np.searchsorted(self.make_ups, t, side="right"), 1))

@@ -83,7 +83,7 @@ class World:
         self.end = self.motion.end
         self.faults: tuple[KillNode, ...] = scenario.faults
         self._noises = file.node.imu_noise or (1.0,) * file.node.imus
-        self._samples: dict[int, list[list[Any]]] = {}
+        self._samples: dict[tuple[int, int], Array] = {}
         edge_std = math.radians(file.encoder.edge_std_deg)
         free_at = (self._made_up - FREE_BEFORE).tolist() if file.joints.head_turn_deg else []
         free_by = self._free_turns.tolist() if file.joints.head_turn_deg else []
@@ -114,10 +114,8 @@ class World:
 
         Of several IMUs a list of such lists.
         """
-        if tube not in self._samples:
-            one, *others = [self._all_samples(tube, imu).tolist() for imu in range(len(self._noises))]
-            self._samples[tube] = [list(rows) for rows in zip(one, *others, strict=True)] if others else one
-        return self._samples[tube][cycle]
+        one, *others = [self.imu_samples(tube, imu)[cycle].tolist() for imu in range(len(self._noises))]
+        return [one, *others] if others else one
 
     def encoder_sample(self, t: float) -> tuple[int, float, int, float | None, tuple[float, ...]]:
         """Count, rig time of its last edge, 1 (the string turns one way, so every edge rises), torque, earlier edges.
@@ -184,8 +182,8 @@ class World:
         Where joints are solved it is the mark of the time when the tube was on top, and what each solution left.
         """
         if self.scenario.file.node.joints == "marks":
-            by_top = {top: self._marks_error(tube, top) for top in range(tube, self.scenario.tubes + 1)}
-            rigid = np.array([by_top[max(self.motion.top(at), tube)] for at in t.tolist()])
+            errors = np.array([self._marks_error(tube, top) for top in range(tube, self.scenario.tubes + 1)])
+            rigid = errors[np.maximum(self.motion.tops(t), tube) - tube]
         else:
             made_up = max(self.scenario.file.rig.tubes_at_start, tube)
             rigid = self._marks_error(tube, made_up) - self.unseen(tube, t)
@@ -256,8 +254,11 @@ class World:
         trapped = section.trapped_fraction * np.abs(self._random(Stream.TORSION, 0).standard_normal(len(lengths)))
         return StringTorsion(section, self.motion, self.scenario.tube_length, lengths, trapped)
 
-    def _all_samples(self, tube: int, imu: int) -> Array:
-        return self.readings(tube, self.ends + self.phase(tube), PERIOD, imu)
+    def imu_samples(self, tube: int, imu: int = 0) -> Array:
+        """Samples (cycles, 6) of the whole schedule, see ``imu_sample``."""
+        if (tube, imu) not in self._samples:
+            self._samples[tube, imu] = self.readings(tube, self.ends + self.phase(tube), PERIOD, imu)
+        return self._samples[tube, imu]
 
     def readings(self, tube: int, ends: Array, period: float, imu: int = 0) -> Array:
         """Readings (n, 6) of the means over ``period`` (s) that end at the rig times ``ends`` (n,), one after another.
