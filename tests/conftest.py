@@ -20,6 +20,9 @@ if PROFILE == "borechain":
     # ran what before would change the examples
     providers._get_local_constants = providers.Constants
 
+if "PYTEST_XDIST_WORKER" in os.environ:
+    os.environ.setdefault("BORECHAIN_CORES", "1")  # every worker is a core; a pool in each would start twice as many
+
 MARKER_OF = {"processes": "process", "test_installation.py": "install"}  # first part of the path below tests/
 
 

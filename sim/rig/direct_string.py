@@ -97,7 +97,7 @@ class Tables(NamedTuple):
     corrections: Array
     readings: Array
     moments: Array
-    says: Array
+    says: npt.NDArray[np.int64]
 
 
 class DirectString:
@@ -117,9 +117,7 @@ class DirectString:
         When the scenario has its link on.
     """
 
-    def __init__(
-        self, world: World, *, state_every: int = NEVER, spoil: Spoil | None = None
-    ) -> None:
+    def __init__(self, world: World, *, state_every: int = NEVER, spoil: Spoil | None = None) -> None:
         self.world, self._file = world, world.scenario.file
         if self._file.medium.link != "off":
             raise ScenarioError('medium.link: expected "off" for a string without frames')
@@ -213,7 +211,8 @@ class DirectString:
         """What the compiled string takes beside the nodes' own records."""
         world, count = self.world, len(self.tubes)
         if self._imus > 1:
-            return Tables(*np.zeros((5, 0)))
+            none = np.zeros(0)
+            return Tables(none, none, none, none, np.zeros(0, np.int64))
         readings = np.zeros((world.cycles, count, 1, READING))
         readings[..., TEMPERATURE] = USUAL
         for tube in self.tubes:

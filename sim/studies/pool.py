@@ -9,9 +9,12 @@ from contextlib import contextmanager
 from functools import partial
 from typing import Protocol, TypeVar
 
+from sim.errors import RigError
+
 Job = TypeVar("Job")
 Found = TypeVar("Found")
 Step = Callable[[], None]
+CORES = "BORECHAIN_CORES"
 FEW = 2  # jobs at a time, that this process does itself
 
 
@@ -28,10 +31,11 @@ def over_cores(most: int, step: Step) -> Iterator[RunAll]:
 
     A process takes seconds to start, so a study keeps one pool for all its batches, and `FEW` need none.
     """
-    if most <= FEW:
+    processes = min(cores(), most)
+    if most <= FEW or processes == 1:
         yield partial(_here, step)
         return
-    with multiprocessing.get_context("spawn").Pool(min(os.cpu_count() or 1, most)) as pool:
+    with multiprocessing.get_context("spawn").Pool(processes) as pool:
 
         def run_all(work: Callable[[Job], Found], jobs: Iterable[Job]) -> list[Found]:
             results = []
@@ -41,6 +45,22 @@ def over_cores(most: int, step: Step) -> Iterator[RunAll]:
             return results
 
         yield run_all
+
+
+def cores() -> int:
+    """Processes that a study may use: all cores, or as many as ``$BORECHAIN_CORES`` says.
+
+    Raises
+    ------
+    RigError
+        When that is no number of processes.
+    """
+    given = os.environ.get(CORES, "")
+    if not given:
+        return os.cpu_count() or 1
+    if not given.isdecimal() or int(given) < 1:
+        raise RigError(f"{CORES}: expected a number of processes from 1 on, got {given!r:.40}")
+    return int(given)
 
 
 def _here(step: Step, work: Callable[[Job], Found], jobs: Iterable[Job]) -> list[Found]:

@@ -187,7 +187,7 @@ class World:
         else:
             made_up = max(self.scenario.file.rig.tubes_at_start, tube)
             rigid = self._marks_error(tube, made_up) - self.unseen(tube, t)
-        return rigid if self.torsion is None else rigid + self.torsion.twist(tube, t)[0]
+        return np.asarray(rigid if self.torsion is None else rigid + self.torsion.twist(tube, t)[0])
 
     def _marks_error(self, tube: int, top: int) -> float:
         """What the marks from the head to a tube are wrong by while ``top`` is the top tube, rad."""

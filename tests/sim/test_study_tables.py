@@ -12,11 +12,11 @@ from click.testing import CliRunner, Result
 
 from borechain.cli.calibrate.calibrate import calibrate
 from borechain.cli.experiment.experiment import experiment
-from sim.errors import TableError
+from sim.errors import RigError, TableError
 from sim.instruments.instrument import Instrument
 from sim.instruments.table import INSTRUMENTS
 from sim.named import by_name
-from sim.studies.pool import over_cores, seeded
+from sim.studies.pool import CORES, cores, over_cores, seeded
 from sim.studies.study import Option, Study, Table
 from sim.studies.table import STUDIES
 
@@ -171,10 +171,20 @@ def times_seed(job: tuple[int, int]) -> int:
     return job[0] * job[1]
 
 
-@pytest.mark.parametrize("seeds", [2, 3])
-def test_the_pool_keeps_the_order_of_its_seeds_and_tells_of_each(seeds: int) -> None:
+@pytest.mark.parametrize(("seeds", "cores"), [(2, "2"), (3, "2"), (3, "1")])
+def test_the_pool_keeps_the_order_of_its_seeds_and_tells_of_each(
+    seeds: int, cores: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv(CORES, cores)
     stepped: list[None] = []
     with over_cores(seeds, lambda: stepped.append(None)) as run_all:
         assert run_all(times_seed, seeded(10, seeds)) == [10 * seed for seed in range(1, seeds + 1)]
         assert len(stepped) == seeds
         assert run_all(times_seed, seeded(7, 1)) == [7]
+
+
+@pytest.mark.parametrize("given", ["0", "two", "-1", "1.5"])
+def test_a_number_of_cores_that_is_none_is_one_line(given: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv(CORES, given)
+    with pytest.raises(RigError, match=f"{CORES}: expected a number of processes from 1 on, got '{given}'"):
+        cores()
