@@ -36,6 +36,7 @@ class Disc:
         turned_by: Sequence[float] = (),
     ) -> None:
         self._motion = motion
+        self._times: dict[int, float] = {}  # s, of the last edges, by their count
         self._jumps = tuple(zip(turned_at, turned_by, strict=True))
         self._quantum = math.tau / counts_per_turn
         limit = 0.4 * self._quantum  # lines do not change places
@@ -58,7 +59,11 @@ class Disc:
         count = math.floor(angle / self._quantum + 0.5)
         if self._place(count) > angle:
             count -= 1
-        last, *earlier = (self._time_of(self._place(count - k)) for k in range(EDGES))
+        wanted = range(count, count - EDGES, -1)
+        # at rest they are those of before; more are not kept, for the head never turns back
+        known = self._times
+        self._times = {edge: known[edge] if edge in known else self._time_of(self._place(edge)) for edge in wanted}
+        last, *earlier = self._times.values()
         return count, min(last, t), tuple(earlier)
 
     def _time_of(self, angle: float) -> float:

@@ -7,7 +7,9 @@ angles in rad.
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 import numpy.typing as npt
@@ -29,7 +31,7 @@ class Phase:
     joint_closed: float = 0.0  # of an ``add``
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True)
 class Trapezoid:
     """Turning by ``angle`` (rad) at up to ``rate`` (rad/s) with ramps of ``acceleration`` (rad/s^2)."""
 
@@ -37,12 +39,12 @@ class Trapezoid:
     rate: float
     acceleration: float
 
-    @property
+    @cached_property
     def ramp(self) -> float:
         """Duration of a ramp, s; a turn too short for the full rate is all ramp."""
         return float(min(self.rate / self.acceleration, np.sqrt(self.angle / self.acceleration)))
 
-    @property
+    @cached_property
     def duration(self) -> float:
         """Duration of the whole, s."""
         return 2.0 * self.ramp + (self.angle - self.acceleration * self.ramp**2) / (self.acceleration * self.ramp)
@@ -64,10 +66,10 @@ class Trapezoid:
         a, r, d = self.acceleration, self.ramp, self.duration
         ramp_angle = 0.5 * a * r * r
         if angle <= ramp_angle:
-            return float(np.sqrt(2.0 * max(angle, 0.0) / a))
+            return math.sqrt(2.0 * max(angle, 0.0) / a)
         if angle <= self.angle - ramp_angle:
             return float(r + (angle - ramp_angle) / (a * r))
-        return float(d - np.sqrt(2.0 * max(self.angle - angle, 0.0) / a))
+        return d - math.sqrt(2.0 * max(self.angle - angle, 0.0) / a)
 
 
 class Motion:
@@ -141,7 +143,7 @@ class Motion:
         turned = angle - self._first_angle
         if turned <= 0.0:
             return self.begin
-        k = min(int(np.ceil(turned / self._turn.angle - 1e-12)) - 1, len(self._starts) - 1)
+        k = min(math.ceil(turned / self._turn.angle - 1e-12) - 1, len(self._starts) - 1)
         return float(self._starts[k]) + self._turn.time_of(turned - k * self._turn.angle)
 
     def top(self, t: float) -> int:
