@@ -12,8 +12,10 @@ from node.kernels.calibration import USUAL, calibrate, identity_parameters
 from node.kernels.cluster import follow_offsets, fuse
 from node.kernels.cycle import run_cycle
 from node.kernels.layout import PERIOD, default_config, new_state
+from node.kernels.record import END, FZ, JOINED, MOMENT, READING, SETTINGS, START, new_node
 from node.kernels.relay import offer_aiding
 from node.kernels.static_average import STATIC, add_static, has_moved
+from node.kernels.step import node_aiding, node_step
 
 
 def warm_loop(run_cycle: Callable[..., int], offer_aiding: Callable[..., int]) -> None:
@@ -25,6 +27,19 @@ def warm_loop(run_cycle: Callable[..., int], offer_aiding: Callable[..., int]) -
         run_cycle(state[0], config[0], rate, force, k * PERIOD, (k + 1) * PERIOD, 1)
         offer_aiding(state[0], config[0], 0.0, 1e-6, 0.0, 0.0, 0.0, 1, 0)
     from_binary(state[0]["now_yaw"])
+
+
+def warm_step(step: Callable[..., int], aiding: Callable[..., int]) -> None:
+    """Run two steps and two aidings of a node that is thrown away."""
+    config = default_config()
+    nodes, settings, parameters = new_node(config), np.zeros(1, SETTINGS), np.concatenate([identity_parameters()] * 2)
+    settings["state_every"] = 1
+    readings, moment, heard = np.zeros((1, READING)), np.zeros(MOMENT), np.zeros(11)
+    readings[0, FZ], moment[JOINED] = -9.81, 1.0
+    for k in range(2):
+        moment[START], moment[END] = k * PERIOD, (k + 1) * PERIOD
+        step(nodes, config, settings, parameters, readings, moment)
+        aiding(nodes, config, settings, heard)
 
 
 def warm_up() -> None:
@@ -42,4 +57,5 @@ def warm_up() -> None:
     fuse(np.ones((2, 6)), np.ones(2), np.zeros(6))
     follow_offsets(np.ones((2, 3)), rate, 1, new_mount()[0]["rate_offset"])
     warm_loop(run_cycle, offer_aiding)
+    warm_step(node_step, node_aiding)
     wrap(0.0)

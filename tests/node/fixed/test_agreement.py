@@ -11,13 +11,21 @@ from node.firmware.kernel_choice import kernel_of
 from node.firmware.settings import TubeSettings
 from node.firmware.tube import Tube
 from node.kernels.cycle import run_cycle
-from node.kernels.fixed.border import COVARIANCE, learn_config, learn_state, show_aiding, show_covariance, show_cycle
+from node.kernels.fixed.border import (
+    COVARIANCE,
+    config_in_integers,
+    show_aiding,
+    show_covariance,
+    show_cycle,
+    state_in_integers,
+)
 from node.kernels.fixed.layout import FIXED_STATE
 from node.kernels.fixed.node import FixedNode
-from node.kernels.layout import DEG, PERIOD, STATE, Array, Status, default_config, new_state
+from node.kernels.layout import DEG, PERIOD, STATE, Status, default_config, new_state
 from node.kernels.record import new_node
-from node.kernels.resets import forget_bias
 from node.kernels.relay import offer_aiding
+from node.kernels.resets import forget_bias
+from node.kernels.step import node_aiding, node_step
 from sim.studies.fixed_point.run import AIDING_VAR, LIMITS, compare, inputs, rows_of
 from telemetry.messages import Aiding, NodeState
 
@@ -64,7 +72,8 @@ def test_every_field_of_the_record_is_shown() -> None:
 
 def test_what_is_shown_is_read_back_the_same() -> None:
     _, shadow, fixed = shown(1500, 4)
-    again = learn_state(shadow, G, fixed.overflows)[0]
+    again = state_in_integers(shadow, G)[0]
+    again["overflows"] += fixed.overflows
     for name in set(FIXED_STATE.names or ()) - {"ph", "rest", "gain", "gain_q", "decay"}:
         a, b = np.asarray(fixed.state[name], np.int64), np.asarray(again[name], np.int64)
         if name.startswith("pending_"):
@@ -77,13 +86,13 @@ def test_what_is_shown_is_read_back_the_same() -> None:
 
 
 def test_the_configuration_fits() -> None:
-    _, beyond = learn_config(default_config()[0])
+    _, beyond = config_in_integers(default_config()[0])
     assert beyond == 0
     wild = default_config()
     wild["boot_bias_std"] = 1e3
     wild["bias_std"] = 1e3
-    assert learn_config(wild[0])[1] > 0
-    assert learn_state(new_state(wild)[0], G, 0)[0]["overflows"] == 6  # three biases, in P and now_P
+    assert config_in_integers(wild[0])[1] > 0
+    assert state_in_integers(new_state(wild)[0], G)[0]["overflows"] == 6  # three biases, in P and now_P
 
 
 def test_a_reading_beyond_the_range_is_held_and_counted() -> None:
@@ -147,7 +156,7 @@ def test_a_node_says_the_same_on_either_kernel(forget: bool) -> None:
 
 def test_float64_is_the_default_and_untouched() -> None:
     assert TubeSettings(1).kernel == "float64"
-    assert kernel_of("float64") is None
+    assert kernel_of("float64") == (run_cycle, offer_aiding, node_step, node_aiding)
 
 
 def test_an_unknown_kernel_is_refused() -> None:
