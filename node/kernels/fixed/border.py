@@ -43,10 +43,10 @@ TURN: Final = 2.0 * math.pi
 @kernel
 def to_fixed(record: Any, value: float, q: int, limit: int) -> int:
     """``value`` in Q``q``, held within -limit..limit and then counted."""
-    scaled = math.floor(value * 2.0**q + 0.5)
+    scaled = np.floor(value * 2.0**q + 0.5)  # a float: beyond 64 bits an integer would be of either sign
     if not abs(scaled) <= limit:
         record.overflows += 1
-        return -limit if scaled < 0 else limit
+        return -limit if scaled < 0.0 else limit
     return int(scaled)
 
 
