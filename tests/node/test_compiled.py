@@ -13,8 +13,9 @@ from node.kernels.cycle import run_cycle
 from node.kernels.calibration import calibrate
 from node.kernels.relay import offer_aiding
 from node.kernels.static_average import add_static, has_moved
+from node.kernels.step import node_aiding, node_step
 warm_up()
-for function in (run_cycle, offer_aiding, calibrate, add_static, has_moved):
+for function in (run_cycle, offer_aiding, calibrate, add_static, has_moved, node_step, node_aiding):
     print(sum(function.stats.cache_misses.values()), sum(function.stats.cache_hits.values()))
 """
 COUNT_ALLOCATIONS = """
@@ -56,6 +57,50 @@ def allocations(cycles):
 allocations(1)
 print(allocations(1), allocations(1000))
 """
+STEP_ALLOCATIONS = """
+import os
+import numpy as np
+from numba import njit
+from numba.core.runtime import _nrt_python, rtsys
+from node.kernels.calibration import identity_parameters
+from node.kernels.fixed.beside import new_integers
+from node.kernels.fixed.step import fixed_aiding, fixed_step
+from node.kernels.layout import default_config
+from node.kernels.record import MOMENT, READING, SETTINGS, new_node
+from node.kernels.step import node_aiding, node_step
+
+_nrt_python.memsys_enable_stats()
+
+@njit
+def drive(nodes, configs, settings, parameters, readings, moment, aiding, cycles):
+    for k in range(cycles):
+        moment[0], moment[1] = 1000.0 + k * 0.5, 1000.5 + k * 0.5
+        node_step(nodes, configs, settings, parameters, readings, moment)
+        aiding[5], aiding[6] = moment[0] + 0.4, k
+        node_aiding(nodes, configs, settings, aiding)
+
+@njit
+def drive_fixed(nodes, configs, settings, parameters, readings, moment, aiding, integers, cycles):
+    for k in range(cycles):
+        moment[0], moment[1] = 1000.0 + k * 0.5, 1000.5 + k * 0.5
+        fixed_step(nodes, configs, settings, parameters, readings, moment, integers)
+        aiding[5], aiding[6] = moment[0] + 0.4, k
+        fixed_aiding(nodes, configs, settings, aiding, integers)
+
+def allocations(cycles):
+    configs = default_config()
+    nodes, settings, parameters = new_node(configs), np.zeros(1, SETTINGS), np.concatenate([identity_parameters()] * 2)
+    settings["state_every"] = 1
+    readings, moment, aiding = np.zeros((1, READING)), np.ones(MOMENT), np.zeros(11)
+    readings[0, 2], readings[0, 5] = 1.2, -9.8
+    own, integers = (drive_fixed, (new_integers(),)) if os.environ["KERNEL"] == "fixed" else (drive, ())
+    before = rtsys.get_allocation_stats().alloc
+    own(nodes, configs, settings, parameters, readings, moment, aiding, *integers, cycles)
+    return rtsys.get_allocation_stats().alloc - before
+
+allocations(1)
+print(allocations(1), allocations(1000))
+"""
 
 
 def run(program: str, **environment: str) -> list[list[int]]:
@@ -89,4 +134,11 @@ def test_the_cache_follows_the_sources() -> None:
 )
 def test_a_cycle_allocates_nothing(cycle: str, relay: str) -> None:
     ((once, often),) = run(COUNT_ALLOCATIONS, CYCLE=cycle, RELAY=relay)
+    assert once == often
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("kernel", ["float64", "fixed"])
+def test_a_step_allocates_nothing(kernel: str) -> None:
+    ((once, often),) = run(STEP_ALLOCATIONS, KERNEL=kernel)
     assert once == often
