@@ -1,8 +1,8 @@
 """The border of the integer loop: configuration, state, readings and aiding between SI floats and Q formats.
 
-This is the one module of the folder that knows floats. It runs beside the loop, never inside it: readings once a
+Here alone a float becomes an integer and an integer a float, beside the loop and never inside it: readings once a
 cycle, configuration and state when somebody changed them. What does not fit is held at the end of its range and
-counted in ``overflows``.
+counted in ``overflows``. Nothing allocates: integers go into records that are given.
 """
 
 from __future__ import annotations
