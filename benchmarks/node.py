@@ -204,8 +204,8 @@ class FixedStretch(Stretch):
         from node.kernels.fixed import border, layout
 
         gravity = float(like.config[0]["gravity"])
-        self.config, _ = border.learn_config(like.config[0])
-        self.begin = border.learn_state(like.begin[0], gravity, 0)
+        self.config, _ = border.config_in_integers(like.config[0])
+        self.begin = border.state_in_integers(like.begin[0], gravity)
         self.state, self.passes = self.begin.copy(), like.passes
         self.outputs = np.zeros(len(like.inputs), FIXED_OUTPUT)
         self.inputs = np.zeros(len(like.inputs), FIXED_INPUT)

@@ -8,10 +8,12 @@ from __future__ import annotations
 from borechain import warm
 from node.firmware.kernel_choice import kernel_of
 from node.firmware.settings import KERNELS
-from node.kernels.warm import warm_loop
+from node.kernels.warm import warm_loop, warm_step
 
 for kernel in KERNELS:
-    if (loop := kernel_of(kernel)) is not None:
-        warm_loop(*loop)
+    loop = kernel_of(kernel)
+    warm_loop(loop.run_cycle, loop.offer_aiding)
+    if loop.step is not None and loop.aiding is not None:
+        warm_step(loop.step, loop.aiding)
 
 __all__ = ["warm"]

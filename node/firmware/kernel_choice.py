@@ -1,4 +1,4 @@
-"""The loop that a node runs, by the name of its kernel."""
+"""What a node runs, by the name of its kernel."""
 
 from __future__ import annotations
 
@@ -6,22 +6,28 @@ from collections.abc import Callable
 from typing import NamedTuple
 
 from node.firmware.settings import Kernel
+from node.kernels.cycle import run_cycle
+from node.kernels.relay import offer_aiding
+from node.kernels.step import node_aiding, node_step
 
 
 class Loop(NamedTuple):
-    """The cycle and the intake of aiding of a kernel, with the signatures of ``node.kernels``."""
+    """The cycle and the intake of aiding of a kernel, and the step of a node that holds both compiled in.
+
+    The signatures are those of ``node.kernels.cycle``, ``relay`` and ``step``. A kernel without a step of its own runs
+    in parts, from Python.
+    """
 
     run_cycle: Callable[..., int]
     offer_aiding: Callable[..., int]
+    step: Callable[..., int] | None = None
+    aiding: Callable[..., int] | None = None
 
 
-def kernel_of(kernel: Kernel) -> Loop | None:
-    """The loop of the kernel chosen; None is that of float64, which the step holds compiled in.
-
-    All but the default are loaded only when used.
-    """
+def kernel_of(kernel: Kernel) -> Loop:
+    """What a node with the kernel chosen runs; all but the default are loaded only when used."""
     if kernel == "float64":
-        return None
+        return Loop(run_cycle, offer_aiding, node_step, node_aiding)
     if kernel == "published":
         from node.kernels.published import cycle as published
 
@@ -29,4 +35,4 @@ def kernel_of(kernel: Kernel) -> Loop | None:
     from node.kernels.fixed.node import FixedNode
 
     fixed = FixedNode()
-    return Loop(fixed.run_cycle, fixed.offer_aiding)
+    return Loop(fixed.run_cycle, fixed.offer_aiding, fixed.step, fixed.aiding)

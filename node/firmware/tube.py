@@ -18,7 +18,6 @@ from node.firmware.reporter import Reporter
 from node.firmware.settings import TubeSettings, crew_record
 from node.firmware.static_record import StaticRecorder
 from node.kernels.calibration import USUAL
-from node.kernels.cycle import run_cycle as float_cycle
 from node.kernels.layout import DEG, Array, Scheme
 from node.kernels.modes import STATIC_BIAS
 from node.kernels.record import AIDING, MOMENT, READING
@@ -37,8 +36,8 @@ from node.kernels.step import (
     finish,
     hand_down,
     judge,
-    node_aiding,
     node_step,
+    own_systematic,
     prepare,
     say_events,
     take_aiding,
@@ -113,8 +112,8 @@ class Tube:
             *(a.yaw, a.yaw_var, a.systematic_var, a.offset, a.rate, valid_local, a.sequence, a.hops),
             *(a.torque, a.torsion_var, a.under_torque),
         )
-        if self._loop is None:
-            gates = node_aiding(self.nodes, self.configs, self._crew, taken)
+        if self._loop.aiding is not None:
+            gates = self._loop.aiding(self.nodes, self.configs, self._crew, taken)
         else:
             gates = self._offer(a, valid_local, taken)
         if not gates & ONWARD:
@@ -140,8 +139,8 @@ class Tube:
         self._moment[:] = moment
         rows = self._readings
         rows[0] = (*reading.rate, *reading.force, reading.temperature, reading.saturated)
-        if self._loop is None and self._fusion is None and self._aligner.idle:
-            says = node_step(self.nodes, self.configs, self._crew, self._corrections, rows, self._moment)
+        if self._loop.step is not None and self._fusion is None and self._aligner.idle:
+            says = self._loop.step(self.nodes, self.configs, self._crew, self._corrections, rows, self._moment)
             said: list[Said] = []
         else:
             for k in range(1, len(rows)):
@@ -154,7 +153,7 @@ class Tube:
     @property
     def is_plain(self) -> bool:
         """Whether a cycle is one call of ``node_step`` and nothing else: one IMU, the float64 loop, no order obeyed."""
-        plain = self._loop is None and self._fusion is None
+        plain = self._loop.step is node_step and self._fusion is None
         return plain and self._aligner.idle and not self._recorder.running
 
     @property
@@ -249,16 +248,15 @@ class Tube:
         return self.reporter.flags(context, now)
 
     def _offer(self, aiding: Aiding, valid_local: float, taken: Array) -> int:
-        """``node_aiding`` with another loop than that of float64."""
+        """``node_aiding`` with a loop that has no step of its own."""
         node, gates = self.node, int(take_aiding(self.nodes, self.configs, self._crew, taken))
-        if gates & USED and self._loop is not None:
-            systematic_var = float(node["down_systematic"]) + twist_var(node["twist"])
+        if gates & USED:
             node["noticed"] |= self._loop.offer_aiding(
                 self.state,
                 self.config,
                 aiding.yaw,
                 aiding.yaw_var,
-                systematic_var,
+                own_systematic(node),
                 float(node["down_offset"]),
                 valid_local,
                 aiding.sequence,
@@ -269,7 +267,7 @@ class Tube:
         return gates
 
     def _run_in_parts(self, reading: ImuReading, context: RigContext) -> tuple[int, list[Said]]:
-        """``node_step`` with another loop, several IMUs or an alignment under way; what it says, and what is said."""
+        """A step with a loop that has none, several IMUs or an alignment under way; what it says, and what is said."""
         node, moment = self.node, self._moment
         if not admit(self.nodes, moment):
             return int(say_events(node)), []
@@ -280,9 +278,8 @@ class Tube:
             self._fusion.fuse(self._corrections, self._readings)
             saturated = 0
         waits = prepare(self.nodes, self.configs, self._crew, moment, saturated)
-        run_cycle = self._loop.run_cycle if self._loop is not None else float_cycle
         args = (node["rate"], node["force"], reading.start, reading.end, int(context.joined))
-        status = run_cycle(self.state, self.config, *args)
+        status = self._loop.run_cycle(self.state, self.config, *args)
         judge(self.nodes, self.configs, moment, int(status), waits)
         self._follow_alignment(reading)
         if self._fusion is not None and self.quiet:

@@ -30,6 +30,7 @@ STILL_CYCLES: Final = 4  # after which a node takes itself for standing
 LARGEST_OFFSET: Final = 6.0 * DEG  # rad/s, of a gyroscope never calibrated; the slow alignment turn is faster
 LEAST_STAMP: Final = 1e-4  # s, of a time stamp, whatever the clock says
 SAY_EVENTS, SAY_SURVEY, SAY_ESTIMATE, SAY_STATE, ADMITTED = 1, 2, 4, 8, 16
+REFUSED: Final = -1  # the times of a cycle are such that it cannot be run
 USED, ONWARD = 1, 2  # of an aiding: it is for the filter, and it goes down
 FORWARD, FILTER_FAULT = int(Scheme.FORWARD), int(Status.FILTER_FAULT)
 AIDED, SURVEY_READY = int(Status.AIDED), int(Status.SURVEY_READY)
@@ -61,18 +62,29 @@ def node_step(nodes: Array, configs: Array, settings: Array, parameters: Array, 
     readings : (imus, 8) rates (rad/s), forces (m/s^2), temperature (C), whether a sample was at the range
     moment : (6,) start and end (s, own clock), joined, hops, variance of the clock (s^2), synchronised
     """
-    node, config, crew = nodes[0], configs[0], settings[0]
-    if not admits(node, moment[START], moment[END]):
-        return say_events(node)
-    correct_reading(node, parameters, readings, 0)
-    for k in range(3):
-        node.rate[k], node.force[k] = readings[0, WX + k], readings[0, FX + k]
-    correct_one(node, parameters, 0, node.temperature, node.rate, node.force)
-    waits = before_loop(node, config, crew, moment, 1 if readings[0, SATURATED] != 0.0 else 0)
+    waits = enter(nodes, configs, settings, parameters, readings, moment)
+    if waits == REFUSED:
+        return say_events(nodes[0])
+    node = nodes[0]
     joined = 1 if moment[JOINED] != 0.0 else 0
-    status = run_cycle(node.filter, config, node.rate, node.force, moment[START], moment[END], joined)
-    after_loop(node, config, moment, status, waits)
-    return conclude(node, crew)
+    status = run_cycle(node.filter, configs[0], node.rate, node.force, moment[START], moment[END], joined)
+    return leave(nodes, configs, settings, moment, status, waits)
+
+
+@kernel
+def enter(nodes: Array, configs: Array, settings: Array, parameters: Array, readings: Array, moment: Array) -> int:
+    """All of a step before its loop: what ``prepare`` answers, or ``REFUSED`` where the times are none."""
+    if not admit(nodes, moment):
+        return REFUSED
+    correct(nodes, parameters, readings)
+    return int(prepare(nodes, configs, settings, moment, 1 if readings[0, SATURATED] != 0.0 else 0))
+
+
+@kernel
+def leave(nodes: Array, configs: Array, settings: Array, moment: Array, status: int, waits: int) -> int:
+    """All of a step after its loop, which returned ``status``; returns what there is to say."""
+    judge(nodes, configs, moment, status, waits)
+    return int(finish(nodes, settings))
 
 
 @kernel
@@ -232,9 +244,8 @@ def node_aiding(nodes: Array, configs: Array, settings: Array, aiding: Array) ->
     if gates & USED:
         yaw, yaw_var, valid_at = aiding[0], aiding[1], aiding[5]
         sequence, hops = int(aiding[6]), int(aiding[7])
-        systematic = node.down_systematic + twist_var(node.twist)
         node.noticed |= offer_aiding(
-            node.filter, configs[0], yaw, yaw_var, systematic, node.down_offset, valid_at, sequence, hops
+            node.filter, configs[0], yaw, yaw_var, own_systematic(node), node.down_offset, valid_at, sequence, hops
         )
     if gates & ONWARD:
         hand_down(nodes, settings)
@@ -267,6 +278,12 @@ def take_aiding(nodes: Array, configs: Array, settings: Array, aiding: Array) ->
     ):
         used = USED
     return used | (ONWARD if crew.scheme == FORWARD else 0)
+
+
+@kernel
+def own_systematic(node: Any) -> float:
+    """Systematic variance (rad^2) of the aiding taken last, with this node's twist."""
+    return float(node.down_systematic + twist_var(node.twist))
 
 
 @kernel

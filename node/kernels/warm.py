@@ -13,7 +13,7 @@ from node.kernels.cluster import follow_offsets, fuse
 from node.kernels.cycle import run_cycle
 from node.kernels.guard import is_heard
 from node.kernels.layout import PERIOD, default_config, new_state
-from node.kernels.record import AIDING, END, FX, MOMENT, READING, SETTINGS, new_node
+from node.kernels.record import AIDING, END, FZ, JOINED, MOMENT, READING, SETTINGS, START, new_node
 from node.kernels.relay import offer_aiding
 from node.kernels.resets import doubt_bias, forget_bias, lose_tilt, resume
 from node.kernels.static_average import STATIC, add_static, has_moved
@@ -43,6 +43,19 @@ def warm_loop(run_cycle: Callable[..., int], offer_aiding: Callable[..., int]) -
     from_binary(state[0]["now_yaw"])
 
 
+def warm_step(step: Callable[..., int], aiding: Callable[..., int]) -> None:
+    """Run two steps and two aidings of a node that is thrown away."""
+    config = default_config()
+    nodes, settings, parameters = new_node(config), np.zeros(1, SETTINGS), np.concatenate([identity_parameters()] * 2)
+    settings["state_every"] = 1
+    readings, moment, heard = np.zeros((1, READING)), np.zeros(MOMENT), np.zeros(AIDING)
+    readings[0, FZ], moment[JOINED] = -9.81, 1.0
+    for k in range(2):
+        moment[START], moment[END] = k * PERIOD, (k + 1) * PERIOD
+        step(nodes, config, settings, parameters, readings, moment)
+        aiding(nodes, config, settings, heard)
+
+
 def warm_up() -> None:
     """Run what the node needs with the default kernel."""
     rate, force = np.zeros(3), np.array([0.0, 0.0, -9.81])
@@ -57,20 +70,18 @@ def warm_up() -> None:
     fuse(np.ones((2, 6)), np.ones(2), np.zeros(6))
     follow_offsets(np.ones((2, 3)), rate, 1, new_mount()[0]["rate_offset"])
     warm_loop(run_cycle, offer_aiding)
-    warm_step()
+    warm_step(node_step, node_aiding)
+    warm_parts()
     wrap(0.0)
 
 
-def warm_step() -> None:
-    """Run the step and an aiding, as a whole and in its parts."""
+def warm_parts() -> None:
+    """Run what other loops than the default call between the parts of a step."""
     configs, settings = default_config(), np.zeros(1, SETTINGS)
     settings["state_every"] = settings["stiffness"] = 1
-    parameters = np.concatenate([identity_parameters(), identity_parameters()])
+    parameters = np.concatenate([identity_parameters()] * 2)
     nodes, readings, moment = new_node(configs), np.zeros((1, READING)), np.zeros(MOMENT)
-    readings[0, FX + 2], moment[END] = -9.81, PERIOD
-    node_step(nodes, configs, settings, parameters, readings, moment)
-    node_aiding(nodes, configs, settings, np.zeros(AIDING))
-    moment += PERIOD
+    readings[0, FZ], moment[END] = -9.81, PERIOD
     admit(nodes, moment)
     correct(nodes, parameters, readings)
     judge(nodes, configs, moment, 0, prepare(nodes, configs, settings, moment, 0))

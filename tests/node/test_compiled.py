@@ -56,46 +56,55 @@ def allocations(cycles):
 allocations(1)
 print(allocations(1), allocations(1000))
 """
-
-
-COUNT_OF_STEPS = """
+STEP_ALLOCATIONS = """
+import os
 import numpy as np
 from numba import njit
 from numba.core.runtime import _nrt_python, rtsys
 from node.kernels.calibration import identity_parameters
+from node.kernels.fixed.beside import new_integers
+from node.kernels.fixed.step import fixed_aiding, fixed_step
 from node.kernels.layout import default_config
-from node.kernels.record import AIDING, MOMENT, READING, SETTINGS, new_node
+from node.kernels.record import MOMENT, READING, SETTINGS, new_node
 from node.kernels.step import node_aiding, node_step
 
 _nrt_python.memsys_enable_stats()
 
 @njit
 def drive(nodes, configs, settings, parameters, readings, moment, aiding, cycles):
-    said = 0
     for k in range(cycles):
-        moment[0], moment[1] = moment[1], moment[1] + 0.5
+        moment[0], moment[1] = 1000.0 + k * 0.5, 1000.5 + k * 0.5
         readings[0, 2] = 1.2 if k % 300 > 200 else 1e-4 * (k % 7)
         readings[0, 3], readings[0, 5] = 1e-3 * (k % 5), -9.8 - 1e-3 * (k % 3)
-        said |= node_step(nodes, configs, settings, parameters, readings, moment)
-        aiding[5], aiding[6] = moment[1] - 0.1, k
-        said |= node_aiding(nodes, configs, settings, aiding)
-    return said
+        node_step(nodes, configs, settings, parameters, readings, moment)
+        aiding[5], aiding[6] = moment[0] + 0.4, k
+        node_aiding(nodes, configs, settings, aiding)
+
+@njit
+def drive_fixed(nodes, configs, settings, parameters, readings, moment, aiding, integers, cycles):
+    for k in range(cycles):
+        moment[0], moment[1] = 1000.0 + k * 0.5, 1000.5 + k * 0.5
+        readings[0, 2] = 1.2 if k % 300 > 200 else 1e-4 * (k % 7)
+        readings[0, 3], readings[0, 5] = 1e-3 * (k % 5), -9.8 - 1e-3 * (k % 3)
+        fixed_step(nodes, configs, settings, parameters, readings, moment, integers)
+        aiding[5], aiding[6] = moment[0] + 0.4, k
+        fixed_aiding(nodes, configs, settings, aiding, integers)
 
 def allocations(cycles):
-    configs, settings = default_config(), np.zeros(1, SETTINGS)
+    configs = default_config()
+    nodes, settings, parameters = new_node(configs), np.zeros(1, SETTINGS), np.concatenate([identity_parameters()] * 2)
     settings["state_every"], settings["stiffness"], settings["aiding_old_after"] = 2, np.inf, 3.0
     settings["rate_range"], settings["force_range"] = 9.0, 80.0
-    parameters = np.concatenate([identity_parameters(), identity_parameters()])
     parameters["identity"][0] = 0
-    moment, aiding = np.zeros(MOMENT), np.zeros(AIDING)
-    moment[1], moment[2], moment[5], aiding[1] = 1000.0, 1.0, 1.0, 1e-6
+    readings, moment, aiding = np.zeros((1, READING)), np.ones(MOMENT), np.zeros(11)
+    aiding[1] = 1e-6
+    own, integers = (drive_fixed, (new_integers(),)) if os.environ["KERNEL"] == "fixed" else (drive, ())
     before = rtsys.get_allocation_stats().alloc
-    nodes, readings = new_node(configs), np.zeros((1, READING))
-    drive(nodes, configs, settings, parameters, readings, moment, aiding, cycles)
+    own(nodes, configs, settings, parameters, readings, moment, aiding, *integers, cycles)
     return rtsys.get_allocation_stats().alloc - before
 
 allocations(1)
-print(allocations(1), allocations(2000))
+print(allocations(1), allocations(1000))
 """
 
 
@@ -134,6 +143,7 @@ def test_a_cycle_allocates_nothing(cycle: str, relay: str) -> None:
 
 
 @pytest.mark.slow
-def test_a_step_and_an_aiding_allocate_nothing() -> None:
-    ((once, often),) = run(COUNT_OF_STEPS)
+@pytest.mark.parametrize("kernel", ["float64", "fixed"])
+def test_a_step_allocates_nothing(kernel: str) -> None:
+    ((once, often),) = run(STEP_ALLOCATIONS, KERNEL=kernel)
     assert once == often

@@ -135,10 +135,12 @@ def test_every_kernel_can_be_chosen_and_is_warmed_before_the_first_fork() -> Non
     assert set(PRELOAD) == set(KERNELS)
     program = (
         "import borechain.warm_all\n"
-        "from node.kernels import cycle\n"
-        "from node.kernels.fixed import cycle as fixed\n"
+        "from node.kernels import cycle, step\n"
+        "from node.kernels.fixed import beside, step as fixed\n"
         "from node.kernels.published import cycle as published\n"
-        "print(all(k.run_cycle.signatures for k in (cycle, fixed, published)))\n"
+        "steps = (step.node_step, step.node_aiding, fixed.fixed_step, fixed.fixed_aiding)\n"
+        "loops = (cycle.run_cycle, beside.fixed_cycle, published.run_cycle)\n"
+        "print(all(k.signatures for k in steps + loops))\n"
     )
     done = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, check=True)
     assert done.stdout == "True\n"

@@ -1,8 +1,8 @@
 """The border of the integer loop: configuration, state, readings and aiding between SI floats and Q formats.
 
-This is the one module of the folder that knows floats. It runs beside the loop, never inside it: readings once a
+Here alone a float becomes an integer and an integer a float, beside the loop and never inside it: readings once a
 cycle, configuration and state when somebody changed them. What does not fit is held at the end of its range and
-counted in ``overflows``.
+counted in ``overflows``. Nothing allocates: integers go into records that are given.
 """
 
 from __future__ import annotations
@@ -13,6 +13,7 @@ from typing import Any, Final
 import numpy as np
 
 from node.kernels.fixed.layout import (
+    ANGLE_Q,
     CEILING,
     FASTEST,
     FIXED_CONFIG,
@@ -31,45 +32,9 @@ from node.kernels.jit import kernel
 from node.kernels.layout import Array, Err
 
 LARGEST: Final = 1 << 61
-SAME: Final = (
-    "yaw_known",
-    "reference_hops",
-    "last_sequence",
-    "rejected",
-    "pending",
-    "pending_sequence",
-    "cycles",
-    "consumed",
-    "ring_quiet",
-    "mode",
-    "still_cycles",
-    "surveyed",
-    "rate_exceeded",
-    "bias_count",
-)
-FORMATS: Final = {
-    "static_bias": RATE_Q,
-    "bias": RATE_Q,
-    "scale": RATE_Q,
-    "stamp": RATE_Q,
-    "now_rate": RATE_Q,
-    "ring_rate": RATE_Q,
-    "bias_sum": RATE_Q,
-    "down": VECTOR_Q,
-    "now_down": VECTOR_Q,
-    "static_bias_var": VAR_Q + 2 * UNIT,
-    "systematic_var": VAR_Q,
-    "innovation_var": VAR_Q,
-    "pending_var": VAR_Q,
-    "innovation": 40,
-    "epoch": TIME_Q,
-    "now": TIME_Q,
-    "pending_at": TIME_Q,
-    "ring_start": TIME_Q,
-    "ring_end": TIME_Q,
-}
-ANGLES: Final = ("reference_offset", "pending_yaw")  # rad beside binary angles
-TIMES: Final = ("last_aided", "stopped_at")  # -inf and nan beside NEVER
+LIMIT: Final = 2.0**61  # the same, which a float holds exactly
+HIGHEST: Final = float(CEILING)
+LOG2_E: Final = math.log2(math.e)
 UNITS: Final = np.array([0] * int(Err.BIAS_X) + [UNIT] * (len(Err) - int(Err.BIAS_X)))
 COVARIANCE: Final = np.exp2(VAR_Q + UNITS[:, None] + UNITS[None, :])
 TURN: Final = 2.0 * math.pi
@@ -78,10 +43,10 @@ TURN: Final = 2.0 * math.pi
 @kernel
 def to_fixed(record: Any, value: float, q: int, limit: int) -> int:
     """``value`` in Q``q``, held within -limit..limit and then counted."""
-    scaled = math.floor(value * 2.0**q + 0.5)
+    scaled = np.floor(value * 2.0**q + 0.5)  # a float: beyond 64 bits an integer would be of either sign
     if not abs(scaled) <= limit:
         record.overflows += 1
-        return -limit if scaled < 0 else limit
+        return -limit if scaled < 0.0 else limit
     return int(scaled)
 
 
@@ -110,7 +75,7 @@ def show_cycle(fixed: Any, state: Any, gravity: float) -> None:
     state.epoch, state.now = fixed.epoch * time, fixed.now * time
     state.yaw, state.now_yaw, state.yaw_known = fixed.yaw, fixed.now_yaw, fixed.yaw_known
     state.scale, state.stamp, state.now_rate = fixed.scale * rate, fixed.stamp * rate, fixed.now_rate * rate
-    state.innovation, state.innovation_var = fixed.innovation * 2.0**-40, fixed.innovation_var * 2.0**-VAR_Q
+    state.innovation, state.innovation_var = fixed.innovation * 2.0**-ANGLE_Q, fixed.innovation_var * 2.0**-VAR_Q
     state.rejected, state.cycles, state.consumed = fixed.rejected, fixed.cycles, fixed.consumed
     state.mode, state.still_cycles, state.surveyed = fixed.mode, fixed.still_cycles, fixed.surveyed
     state.rate_exceeded, state.bias_count = fixed.rate_exceeded, fixed.bias_count
@@ -151,72 +116,197 @@ def show_aiding(fixed: Any, state: Any) -> None:
         state.pending_sequence[k] = fixed.pending_sequence[k]
 
 
-def learn_state(state: Any, gravity: float, overflows: int) -> Array:
-    """Integers of a whole float64 ``state`` (a record of dtype ``STATE``), one record of dtype ``FIXED_STATE``."""
+@kernel
+def held(record: Any, value: float) -> int:
+    """Nearest integer of ``value``, ties to even, held within its range and then counted; NaN is 0 and counted."""
+    nearest = np.rint(value)
+    if abs(nearest) <= LIMIT:
+        return int(nearest)
+    record.overflows += 1
+    if nearest > LIMIT:
+        return LARGEST
+    return -LARGEST if nearest < -LIMIT else 0
+
+
+@kernel
+def hold_vector(record: Any, made: Array, given: Array, scale: float) -> None:
+    """Integers ``made`` (n,) of ``given`` (n,) times ``scale``, a power of two."""
+    for k in range(made.shape[0]):
+        made[k] = held(record, given[k] * scale)
+
+
+@kernel
+def hold_forces(record: Any, made: Array, given: Array, gravity: float) -> None:
+    """Forces ``made`` (3, g, Q26) of ``given`` (3, m/s^2)."""
+    for k in range(3):
+        made[k] = held(record, given[k] / gravity * 2.0**FORCE_Q)
+
+
+@kernel
+def whole_yaw(angle: float) -> int:
+    """Binary angle of ``angle`` (rad) of any size; 0 of one that is none."""
+    if not math.isfinite(angle):
+        return 0
+    return math.floor(angle % TURN / TURN * 4294967296.0 + 0.5) & 0xFFFFFFFF
+
+
+@kernel
+def time_or_never(record: Any, time: float) -> int:
+    """A time (s) in Q28, ``NEVER`` of one that is not finite."""
+    return held(record, time * 2.0**TIME_Q) if math.isfinite(time) else NEVER
+
+
+@kernel
+def room(variance: float) -> float:
+    """Factor of a row and a column by which ``variance`` (Q56) comes down to its ceiling; 1 where it is not above."""
+    return math.sqrt(HIGHEST / variance) if variance > HIGHEST else 1.0
+
+
+@kernel
+def hold_covariance(record: Any, made: Array, given: Array, scale: Array) -> None:
+    """A covariance whose variances are held at their ceiling, by scaling rows and columns: it stays positive.
+
+    Parameters
+    ----------
+    made, given : (8, 8) in Q56 and in SI units
+    scale : (8, 8) the value of 1
+    """
+    for i in range(made.shape[0]):
+        row = room(given[i, i] * scale[i, i])
+        if row < 1.0:
+            record.overflows += 1
+        for j in range(made.shape[1]):
+            made[i, j] = held(record, given[i, j] * scale[i, j] * row * room(given[j, j] * scale[j, j]))
+
+
+@kernel
+def learn_state(fixed: Any, state: Any, gravity: float) -> None:
+    """Fill the integers ``fixed`` from a whole float64 ``state``; what does not fit adds to ``fixed.overflows``.
+
+    Parameters
+    ----------
+    fixed, state : records of dtype ``FIXED_STATE`` and ``STATE``
+    gravity : m/s^2
+    """
+    learn_filter(fixed, state)
+    learn_aiding(fixed, state)
+    learn_ring(fixed, state, gravity)
+    learn_modes(fixed, state)
+    hold_forces(fixed, fixed.survey_force, state.survey_force, gravity)
+    for i in range(3):
+        for j in range(3):
+            share = state.survey_force_cov[i, j] / (gravity * gravity)
+            fixed.survey_force_cov[i, j] = held(fixed, share * 4.0**FORCE_Q)
+    fixed.gain_q = 0
+    for k in range(fixed.gain.shape[0]):
+        fixed.ph[k] = fixed.rest[k] = fixed.gain[k] = 0
+    for k in range(3):
+        fixed.decay[k] = 0
+
+
+@kernel
+def learn_filter(fixed: Any, state: Any) -> None:
+    """Read the filter, at its own epoch and predicted to now."""
+    rate, vector = 2.0**RATE_Q, 2.0**VECTOR_Q
+    fixed.epoch, fixed.now = held(fixed, state.epoch * 2.0**TIME_Q), held(fixed, state.now * 2.0**TIME_Q)
+    fixed.yaw, fixed.now_yaw, fixed.yaw_known = state.yaw, state.now_yaw, state.yaw_known
+    hold_vector(fixed, fixed.down, state.down, vector)
+    hold_vector(fixed, fixed.now_down, state.now_down, vector)
+    hold_vector(fixed, fixed.static_bias, state.static_bias, rate)
+    hold_vector(fixed, fixed.static_bias_var, state.static_bias_var, 2.0 ** (VAR_Q + 2 * UNIT))
+    hold_vector(fixed, fixed.bias, state.bias, rate)
+    fixed.scale, fixed.stamp = held(fixed, state.scale * rate), held(fixed, state.stamp * rate)
+    fixed.now_rate = held(fixed, state.now_rate * rate)
+    hold_covariance(fixed, fixed.P, state.P, COVARIANCE)
+    hold_covariance(fixed, fixed.now_P, state.now_P, COVARIANCE)
+
+
+@kernel
+def learn_aiding(fixed: Any, state: Any) -> None:
+    """Read the reference, its age and the queue of measurements."""
+    fixed.reference_hops, fixed.reference_offset = state.reference_hops, whole_yaw(state.reference_offset)
+    fixed.systematic_var = held(fixed, state.systematic_var * 2.0**VAR_Q)
+    fixed.last_sequence, fixed.last_aided = state.last_sequence, time_or_never(fixed, state.last_aided)
+    fixed.innovation = held(fixed, state.innovation * 2.0**ANGLE_Q)
+    fixed.innovation_var = held(fixed, state.innovation_var * 2.0**VAR_Q)
+    fixed.rejected, fixed.pending = state.rejected, state.pending
+    hold_vector(fixed, fixed.pending_at, state.pending_at, 2.0**TIME_Q)
+    hold_vector(fixed, fixed.pending_var, state.pending_var, 2.0**VAR_Q)
+    for k in range(fixed.pending_at.shape[0]):
+        fixed.pending_yaw[k] = whole_yaw(state.pending_yaw[k])
+        fixed.pending_sequence[k] = state.pending_sequence[k]
+
+
+@kernel
+def learn_ring(fixed: Any, state: Any, gravity: float) -> None:
+    """Read the increments of the last cycles."""
+    fixed.cycles, fixed.consumed = state.cycles, state.consumed
+    hold_vector(fixed, fixed.ring_start, state.ring_start, 2.0**TIME_Q)
+    hold_vector(fixed, fixed.ring_end, state.ring_end, 2.0**TIME_Q)
+    for k in range(fixed.ring_quiet.shape[0]):
+        hold_vector(fixed, fixed.ring_rate[k], state.ring_rate[k], 2.0**RATE_Q)
+        hold_forces(fixed, fixed.ring_force[k], state.ring_force[k], gravity)
+        fixed.ring_quiet[k] = state.ring_quiet[k]
+
+
+@kernel
+def learn_modes(fixed: Any, state: Any) -> None:
+    """Read the state machine and the averages that it keeps."""
+    fixed.mode, fixed.still_cycles, fixed.surveyed = state.mode, state.still_cycles, state.surveyed
+    fixed.stopped_at = time_or_never(fixed, state.stopped_at)
+    fixed.rate_exceeded, fixed.bias_count = state.rate_exceeded, state.bias_count
+    hold_vector(fixed, fixed.bias_sum, state.bias_sum, 2.0**RATE_Q)
+
+
+@kernel
+def learn_config(fixed: Any, config: Any, counter: Any) -> None:
+    """Fill the integers ``fixed`` from a configuration; what does not fit adds to ``counter.overflows``.
+
+    Parameters
+    ----------
+    fixed, config : records of dtype ``FIXED_CONFIG`` and ``CONFIG``
+    counter : record of dtype ``FIXED_STATE``
+    """
+    one, unit2 = 2.0**VAR_Q, 4.0**UNIT
+    for k in range(3):
+        noise, bias, tau = squared(config.gyro_noise[k]), squared(config.bias_std[k]), config.bias_tau[k]
+        walk = noise * squared(config.attitude_factor)
+        fixed.walk[k] = held(counter, walk * one)
+        fixed.rate_walk[k] = held(counter, walk * unit2 * one)
+        fixed.noise_var[k] = held(counter, noise * one)
+        fixed.bias_var[k] = held(counter, bias * unit2 * one)
+        fixed.bias_drive[k] = held(counter, bias * squared(config.bias_factor) * unit2 * one)
+        fixed.bias_area[k] = held(counter, (noise + 2.0 * bias * tau) * unit2 * one)
+        fixed.bias_decay[k] = held(counter, LOG2_E / tau * 2.0**42)
+    fixed.still_walk_var = held(counter, squared(config.still_walk) * one)
+    fixed.stamp_on = 1 if config.stamp_std > 0.0 else 0
+    fixed.stamp_var = held(counter, squared(config.stamp_std) * unit2 * one)
+    fixed.stamp_walk_var = held(counter, squared(config.stamp_walk) * unit2 * one)
+    fixed.aiding_floor_var = held(counter, config.aiding_floor_var * one)
+    fixed.force_var = held(counter, squared(config.force_std / config.gravity) * one)
+    fixed.gate_inverse = int(np.rint(2.0**LEVEL_Q / squared(max(config.gate, 1.0))))
+    fixed.rate_limit = held(counter, config.rate_limit * 2.0**RATE_Q)
+    fixed.still_rate = held(counter, config.still_rate * 2.0**RATE_Q)
+    fixed.reject_limit, fixed.lag_cycles = config.reject_limit, config.lag_cycles
+    fixed.survey_samples, fixed.settle_cycles = config.survey_samples, config.settle_cycles
+    fixed.static_cycles = config.static_cycles
+
+
+@kernel
+def squared(value: float) -> float:
+    """Value times itself."""
+    return value * value
+
+
+def state_in_integers(state: Any, gravity: float) -> Array:
+    """One record of dtype ``FIXED_STATE``, made of a float64 ``state`` with ``gravity`` (m/s^2)."""
     made = np.zeros(1, FIXED_STATE)
-    record = made[0]
-    record["overflows"] = overflows
-    for name in SAME:
-        record[name] = state[name]
-    record["yaw"], record["now_yaw"] = state["yaw"], state["now_yaw"]
-    for name, q in FORMATS.items():
-        record[name] = held(record, state[name] * 2.0**q)
-    for name in ANGLES:
-        record[name] = np.floor(np.mod(state[name], TURN) / TURN * 2.0**32 + 0.5).astype(np.int64) & 0xFFFFFFFF
-    for name in TIMES:
-        record[name] = held(record, state[name] * 2.0**TIME_Q) if math.isfinite(state[name]) else NEVER
-    for name in ("ring_force", "survey_force"):
-        record[name] = held(record, state[name] / gravity * 2.0**FORCE_Q)
-    record["survey_force_cov"] = held(record, state["survey_force_cov"] / gravity**2 * 4.0**FORCE_Q)
-    for name in ("P", "now_P"):
-        record[name] = held_covariance(record, state[name] * COVARIANCE)
+    learn_state(made[0], state, gravity)
     return made
 
 
-def held(record: Any, value: Any) -> Any:
-    """Nearest integers of ``value``, held within their range and then counted."""
-    kept = np.clip(np.nan_to_num(np.rint(value)), -LARGEST, LARGEST)
-    record["overflows"] += int(np.count_nonzero(kept != np.rint(value)))
-    return np.asarray(kept).astype(np.int64)
-
-
-def held_covariance(record: Any, value: Array) -> Array:
-    """A covariance whose variances are held at their ceiling, by scaling rows and columns: it stays positive."""
-    with np.errstate(divide="ignore", invalid="ignore"):
-        factor = np.where(np.diag(value) > CEILING, np.sqrt(CEILING / np.diag(value)), 1.0)
-    record["overflows"] += int(np.count_nonzero(factor < 1.0))
-    fixed: Array = held(record, value * factor[:, None] * factor[None, :])
-    return fixed
-
-
-def learn_config(config: Any) -> tuple[Array, int]:
-    """Integers of a configuration (a record of dtype ``CONFIG``) and how many of them did not fit."""
-    made, count = np.zeros(1, FIXED_CONFIG), np.zeros(1, FIXED_STATE)
-    record, counter = made[0], count[0]
-    noise = config["gyro_noise"] ** 2
-    walk = noise * config["attitude_factor"] ** 2
-    bias = config["bias_std"] ** 2
-    unit2 = 4.0**UNIT
-    variances = {
-        "walk": walk,
-        "rate_walk": walk * unit2,
-        "noise_var": noise,
-        "bias_var": bias * unit2,
-        "bias_drive": bias * config["bias_factor"] ** 2 * unit2,
-        "bias_area": (noise + 2.0 * bias * config["bias_tau"]) * unit2,
-        "still_walk_var": config["still_walk"] ** 2,
-        "stamp_var": config["stamp_std"] ** 2 * unit2,
-        "stamp_walk_var": config["stamp_walk"] ** 2 * unit2,
-        "aiding_floor_var": config["aiding_floor_var"],
-        "force_var": (config["force_std"] / config["gravity"]) ** 2,
-    }
-    for name, value in variances.items():
-        record[name] = held(counter, np.asarray(value) * 2.0**VAR_Q)
-    record["bias_decay"] = held(counter, math.log2(math.e) / config["bias_tau"] * 2.0**42)
-    record["stamp_on"] = int(config["stamp_std"] > 0.0)
-    record["gate_inverse"] = min(round(2.0**LEVEL_Q / max(config["gate"], 1.0) ** 2), 1 << LEVEL_Q)
-    for name in ("rate_limit", "still_rate"):
-        record[name] = held(counter, config[name] * 2.0**RATE_Q)
-    for name in ("reject_limit", "lag_cycles", "survey_samples", "settle_cycles", "static_cycles"):
-        record[name] = config[name]
-    return made, int(counter["overflows"])
+def config_in_integers(config: Any) -> tuple[Array, int]:
+    """One record of dtype ``FIXED_CONFIG``, made of a configuration, and how many of its numbers did not fit."""
+    made, counter = np.zeros(1, FIXED_CONFIG), np.zeros(1, FIXED_STATE)
+    learn_config(made[0], config, counter[0])
+    return made, int(counter[0]["overflows"])

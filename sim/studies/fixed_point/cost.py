@@ -10,7 +10,7 @@ import numpy as np
 from node.kernels import cycle, relay
 from node.kernels.fixed import cycle as fixed_cycle
 from node.kernels.fixed import relay as fixed_relay
-from node.kernels.fixed.border import learn_config, learn_state
+from node.kernels.fixed.border import config_in_integers, state_in_integers
 from node.kernels.fixed.layout import FORCE_Q, RATE_Q, TIME_Q, VAR_Q
 from node.kernels.jit import kernel
 from node.kernels.layout import DEG, PERIOD, Array, default_config, new_state
@@ -47,8 +47,8 @@ def measure(cycles: int = 20_000, rounds: int = 7) -> list[dict[str, Any]]:
     random = np.random.default_rng(1)
     config, force = default_config(), np.array([0.0, 0.0, -GRAVITY])
     state = new_state(config)
-    fixed_config, _ = learn_config(config[0])
-    fixed_state = learn_state(state[0], GRAVITY, 0)
+    fixed_config, _ = config_in_integers(config[0])
+    fixed_state = state_in_integers(state[0], GRAVITY)
     fixed_force = np.array([0, 0, -1 << FORCE_Q])
     first, rows = 0, []
     for case, spin, n in (("", 0.0, WARM), ("turning", 71.0 * DEG, cycles), ("rest", 0.0, cycles)):

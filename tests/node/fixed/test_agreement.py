@@ -11,13 +11,24 @@ from node.firmware.kernel_choice import kernel_of
 from node.firmware.settings import TubeSettings
 from node.firmware.tube import Tube
 from node.kernels.cycle import run_cycle
-from node.kernels.fixed.border import COVARIANCE, learn_config, learn_state, show_aiding, show_covariance, show_cycle
-from node.kernels.fixed.layout import FIXED_STATE
+from node.kernels.fixed.border import (
+    COVARIANCE,
+    LARGEST,
+    config_in_integers,
+    held,
+    show_aiding,
+    show_covariance,
+    show_cycle,
+    state_in_integers,
+    to_fixed,
+)
+from node.kernels.fixed.layout import CEILING, FIXED_STATE, VAR_Q
 from node.kernels.fixed.node import FixedNode
 from node.kernels.layout import DEG, PERIOD, STATE, Status, default_config, new_state
 from node.kernels.record import new_node
 from node.kernels.relay import offer_aiding
 from node.kernels.resets import forget_bias
+from node.kernels.step import node_aiding, node_step
 from sim.studies.fixed_point.run import AIDING_VAR, LIMITS, compare, inputs, rows_of
 from telemetry.messages import Aiding, NodeState
 
@@ -64,7 +75,8 @@ def test_every_field_of_the_record_is_shown() -> None:
 
 def test_what_is_shown_is_read_back_the_same() -> None:
     _, shadow, fixed = shown(1500, 4)
-    again = learn_state(shadow, G, fixed.overflows)[0]
+    again = state_in_integers(shadow, G)[0]
+    again["overflows"] += fixed.overflows
     for name in set(FIXED_STATE.names or ()) - {"ph", "rest", "gain", "gain_q", "decay"}:
         a, b = np.asarray(fixed.state[name], np.int64), np.asarray(again[name], np.int64)
         if name.startswith("pending_"):
@@ -77,13 +89,13 @@ def test_what_is_shown_is_read_back_the_same() -> None:
 
 
 def test_the_configuration_fits() -> None:
-    _, beyond = learn_config(default_config()[0])
+    _, beyond = config_in_integers(default_config()[0])
     assert beyond == 0
     wild = default_config()
     wild["boot_bias_std"] = 1e3
     wild["bias_std"] = 1e3
-    assert learn_config(wild[0])[1] > 0
-    assert learn_state(new_state(wild)[0], G, 0)[0]["overflows"] == 6  # three biases, in P and now_P
+    assert config_in_integers(wild[0])[1] > 0
+    assert state_in_integers(new_state(wild)[0], G)[0]["overflows"] == 6  # three biases, in P and now_P
 
 
 def test_a_reading_beyond_the_range_is_held_and_counted() -> None:
@@ -95,6 +107,46 @@ def test_a_reading_beyond_the_range_is_held_and_counted() -> None:
     nothing = np.array([0.0, np.nan, 0.0])
     assert fixed.run_cycle(state, config, nothing, np.zeros(3), PERIOD, 2 * PERIOD, 1) == Status.BAD_SAMPLE
     assert state.tobytes() == before
+
+
+@pytest.mark.parametrize(
+    ("value", "sign"), [(13.0, 1), (-13.0, -1), (1e9, 1), (-1e300, -1), (np.inf, 1), (-np.inf, -1)]
+)
+def test_whatever_lies_beyond_the_range_is_held_at_its_end(value: float, sign: int) -> None:
+    record = np.zeros(1, FIXED_STATE)[0]
+    assert to_fixed(record, value, VAR_Q, CEILING) == sign * CEILING
+    assert record["overflows"] == 1
+
+
+@pytest.mark.parametrize(
+    ("value", "nearest", "beyond"),
+    [
+        (0.5, 0, 0),
+        (1.5, 2, 0),
+        (-2.5, -2, 0),
+        (2.0**61, LARGEST, 0),
+        (2.0**62, LARGEST, 1),
+        (-np.inf, -LARGEST, 1),
+        (np.nan, 0, 1),
+    ],
+)
+def test_what_is_learnt_is_the_nearest_integer(value: float, nearest: int, beyond: int) -> None:
+    record = np.zeros(1, FIXED_STATE)[0]
+    assert (held(record, value), record["overflows"]) == (nearest, beyond)
+
+
+def test_what_nobody_changed_is_not_read_back() -> None:
+    config, state, fixed = default_config()[0], new_state(default_config())[0], FixedNode()
+    rate, force = np.zeros(3), np.array([0.0, 0.0, -G])
+    fixed.run_cycle(state, config, rate, force, 0.0, PERIOD, 1)
+    fixed.state["gain_q"] = 77  # which no float64 field holds: reading back forgets it
+    fixed.run_cycle(state, config, np.array([np.nan, 0.0, 0.0]), force, PERIOD, 2.0 * PERIOD, 1)
+    fixed.offer_aiding(state, config, 1.0, 1e-9, 0.0, 0.0, PERIOD, 1, 0)
+    assert fixed.state["gain_q"] == 77
+    assert state["scale"] == 0.0
+    state["scale"] = -0.0  # another byte, though the same number
+    fixed.offer_aiding(state, config, 1.0, 1e-9, 0.0, 0.0, PERIOD, 2, 0)
+    assert fixed.state["gain_q"] == 0
 
 
 @pytest.mark.parametrize("hours", [0.01, 2.0, 500.0])
@@ -134,6 +186,32 @@ def reports(kernel: str, *, forget: bool) -> list[NodeState]:
 
 
 @pytest.mark.slow
+@pytest.mark.parametrize("kernel", ["float64", "fixed"])
+def test_the_compiled_step_does_what_the_step_in_parts_does(kernel: str) -> None:
+    whole, parts = tube(kernel), tube(kernel)
+    parts._loop = parts._loop._replace(step=None, aiding=None)
+    for k, given in enumerate(inputs(1300, 8)):
+        around = RigContext(True, 1 + k // 900, given.end, 1e-8 * (1 + k // 500), True)
+        rate = given.rate if k % 211 else (np.nan, 0.0, 0.0)
+        reading = ImuReading(given.start, given.end, rate, given.force)
+        said = [repr(node.on_cycle(reading, around)) for node in (whole, parts)]
+        assert said[0] == said[1]
+        if given.aiding is not None:
+            yaw, at, sequence = given.aiding
+            aiding = Aiding(yaw + 0.2 * (k // 700), AIDING_VAR, 0.0, 0.0, rate[2], at, sequence, k // 600)
+            assert whole.on_aiding(aiding, at) == parts.on_aiding(aiding, at)
+        for node in (whole, parts):
+            if k in (500, 800):
+                forget_bias(node.state, node.config)
+            if k % 300 == 100:
+                node.take_survey()
+            if k == 650:
+                node.config["still_walk"] *= 2.0
+        assert whole.nodes.tobytes() == parts.nodes.tobytes()
+        assert whole.configs.tobytes() == parts.configs.tobytes()
+
+
+@pytest.mark.slow
 @pytest.mark.parametrize("forget", [False, True])
 def test_a_node_says_the_same_on_either_kernel(forget: bool) -> None:
     floats, integers = reports("float64", forget=forget), reports("fixed", forget=forget)
@@ -147,7 +225,7 @@ def test_a_node_says_the_same_on_either_kernel(forget: bool) -> None:
 
 def test_float64_is_the_default_and_untouched() -> None:
     assert TubeSettings(1).kernel == "float64"
-    assert kernel_of("float64") is None
+    assert kernel_of("float64") == (run_cycle, offer_aiding, node_step, node_aiding)
 
 
 def test_an_unknown_kernel_is_refused() -> None:

@@ -9,7 +9,7 @@ import pytest
 
 import node.kernels.fixed
 
-OUTSIDE = {"__init__", "border", "node"}  # the border, where floats become integers
+OUTSIDE = {"__init__", "beside", "border", "node", "step"}  # the border, where floats become integers, and beyond
 INSPECTOR = """
 import importlib, re, sys
 from pathlib import Path

@@ -276,5 +276,4 @@ def test_six_states_are_estimated_and_the_other_two_stay_as_they_began() -> None
 
 
 def test_it_is_chosen_by_the_settings() -> None:
-    assert kernel_of("published") == (published.run_cycle, published.offer_aiding)
-    assert kernel_of("float64") is None
+    assert kernel_of("published") == (published.run_cycle, published.offer_aiding, None, None)
