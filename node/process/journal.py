@@ -1,11 +1,11 @@
 """Saved state on disk: a ring of slots written in turn, each with its checksum and its number in the sequence.
 
-A save goes to the slot after the newest good one, so a cut at any instant spares all others, and every slot is written as
-often as any other, over all lives of the node. A slot is written in place, its own sectors and no others, and read back;
-one that does not take what is written is passed over.
+A save goes to the slot after the newest good one, so a cut at any instant spares all others, and every slot is written
+as often as any other, over all lives of the node. A slot is written in place, its own sectors and no others, and read
+back; one that does not take what is written is passed over.
 
 Why 32: a save takes three sectors of 4 KiB, and flash endures 1e4 to 1e5 erasures of a sector. Some 300 saves a day at
-rest are 9 a slot: 3 to 29 years; 1800 on a day of drilling are 56: half a year to 5 years. Two slots and a save every
+rest are 9 a slot: 3 to 30 years; 1800 on a day of drilling are 56: half a year to 5 years. Two slots and a save every
 10 s were 4320 a slot: 2 to 23 days. A ring takes 384 KiB.
 """
 

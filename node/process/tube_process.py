@@ -119,7 +119,8 @@ class TubeProcess(Process):
         self._now = 0.0
         self._announced = False
         self._blocks = BlockUpdater(self.tube, store, key, self._send_event, self._save)
-        if saved is None or self._fallback or self._saver.due:  # otherwise the disk knows all: two cuts in a row cost nothing
+        # what a start goes on with is on the disk, with its rest: power that comes and goes costs nothing
+        if saved is None or self._fallback or self._saver.due:
             self._save()
 
     @property
@@ -177,7 +178,8 @@ class TubeProcess(Process):
         self.tube.node["overruns"] += 1
         if now - self._overrun_told >= OVERRUN_EVERY:
             self._overrun_told = now
-            self._send_event(Severity.WARNING, "overrun", {"missed": missed, "overruns": int(self.tube.node["overruns"])})
+            overruns = int(self.tube.node["overruns"])
+            self._send_event(Severity.WARNING, "overrun", {"missed": missed, "overruns": overruns})
             self._save_if_due()
 
     def close(self) -> None:
