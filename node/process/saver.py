@@ -1,8 +1,9 @@
 """When a node saves: at every event, when a saved rest ends, and slowly otherwise.
 
-What must not be lost makes an event, a survey or a reply, and each is on the disk before its frame leaves: a number
-that was sent is never given to another message. What changes without an event is worth little after a cut: a yaw at rest
-stands still, a yaw while turning is void, and the bias that wanders is another one after a quarter of a minute.
+What must not be lost makes an event, a survey or a reply, and each is on the disk before its frame leaves: a
+number that was sent is never given to another message. What changes without an event is worth little after a cut: a
+yaw at rest stands still, a yaw while turning is void, and the bias that wanders is another one after a quarter of a
+minute.
 """
 
 from __future__ import annotations
