@@ -48,7 +48,7 @@ def lose_yaw_ahead(state: Any) -> None:
 
 @kernel
 def settle_yaw(state: Any, aiding_var: float) -> None:
-    """A yaw that proved itself: at rest the reference is one measurement (``aiding_var``, rad^2), however often used."""
+    """A yaw that proved itself: at rest the reference is one measurement (``aiding_var``, rad^2) however often used."""
     var = max(state.P[PSI, PSI], aiding_var)
     isolate(state.P, PSI, var)
     state.now_P[PSI, PSI] = max(state.now_P[PSI, PSI], var)

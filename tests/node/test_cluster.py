@@ -19,7 +19,7 @@ from node.firmware.imu_settings import ImuSettings
 from node.firmware.inputs import ImuReading, RigContext
 from node.firmware.settings import Kernel, TubeSettings
 from node.firmware.tube import Tube
-from node.kernels.alignment import MAX_IMUS, new_mount
+from node.kernels.alignment import MAX_IMUS
 from node.kernels.cluster import fuse
 from node.kernels.layout import DEG, PERIOD, Err, default_config
 from node.kernels.record import new_node

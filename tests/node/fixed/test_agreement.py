@@ -14,10 +14,10 @@ from node.kernels.cycle import run_cycle
 from node.kernels.fixed.border import COVARIANCE, learn_config, learn_state, show_aiding, show_covariance, show_cycle
 from node.kernels.fixed.layout import FIXED_STATE
 from node.kernels.fixed.node import FixedNode
-from node.kernels.layout import DEG, PERIOD, STATE, Array, Status, default_config, new_state
+from node.kernels.layout import DEG, PERIOD, STATE, Status, default_config, new_state
 from node.kernels.record import new_node
-from node.kernels.resets import forget_bias
 from node.kernels.relay import offer_aiding
+from node.kernels.resets import forget_bias
 from sim.studies.fixed_point.run import AIDING_VAR, LIMITS, compare, inputs, rows_of
 from telemetry.messages import Aiding, NodeState
 

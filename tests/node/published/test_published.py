@@ -11,12 +11,11 @@ from node.firmware.inputs import ImuReading, RigContext
 from node.firmware.kernel_choice import kernel_of
 from node.firmware.settings import TubeSettings
 from node.firmware.tube import Tube
-from node.kernels import cycle as default
 from node.kernels.error_model import BX, PSI, TX, TY
 from node.kernels.layout import DEG, PERIOD, STATES, Array, Err, Status, default_config, new_state
-from node.kernels.record import new_node
 from node.kernels.published import cycle as published
 from node.kernels.published.euler import error_rates, euler_rates, geometry_of, point_down, propagate, tilt_of
+from node.kernels.record import new_node
 from telemetry.messages import Aiding, Event, NodeFlag, NodeState
 
 G = 9.81
