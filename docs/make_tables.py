@@ -1,4 +1,4 @@
-"""Write the tables of ``wire.md`` and ``keys.md`` that are made from the code: ``python docs/make_tables.py``.
+"""Write the tables of the pages that are made from the code: ``python docs/make_tables.py``.
 
 A table stands between ``<!-- NAME -->`` and ``<!-- end NAME -->``; what is around it is written by hand.
 """
@@ -11,7 +11,9 @@ from collections.abc import Iterable
 from pathlib import Path
 
 DOCS = Path(__file__).parent
-sys.path.insert(0, str(DOCS.parent))
+sys.path[:0] = [str(DOCS.parent), str(DOCS)]
+
+import node_tables  # noqa: E402
 
 from groundstation.service.answers import Fields  # noqa: E402
 from groundstation.service.paths import FIXED, MEMBERS  # noqa: E402
@@ -112,9 +114,31 @@ def answer(fields: Fields) -> str:
     return table(("field", "type", "meaning"), [(f"`{name}`", kind, meaning) for name, kind, meaning in rows])
 
 
+def node_record() -> str:
+    """The node's record as a map, one table for each part."""
+    head = ("byte", "field", "type", "unit", "meaning")
+    return "\n".join(f"### {title}\n\n{table(head, rows)}" for title, rows in node_tables.record_parts())
+
+
+def events() -> str:
+    """Events of the node's step."""
+    return table(("code", "event", "severity", "arguments", "meaning"), node_tables.event_rows())
+
+
+def outage() -> str:
+    """What turns unseen in an outage."""
+    return table(("outage", "may have turned unseen, deg (1 sigma)"), node_tables.outage_rows())
+
+
+def worth() -> str:
+    """How long a saved yaw is worth something."""
+    return table(("sigma of the saved yaw, deg", "worth it for, h"), node_tables.worth_rows())
+
+
 PARTS = {
     "wire.md": {"kinds": kinds, "messages": messages},
     "keys.md": {"keys": key_table, "commands": tube_commands, "actions": actions, "answers": answers},
+    "firmware.md": {"record": node_record, "events": events, "outage": outage, "worth": worth},
 }
 
 

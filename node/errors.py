@@ -4,7 +4,7 @@
 
     NodeError
     ├── ConfigurationError(InputError, ValueError)    a setting outside its range: correct the file or the flag named
-    ├── SavedStateError(ValueError)              both slots of a saved state are unreadable: the node starts afresh
+    ├── SavedStateError(ValueError)              no slot of a saved state is good: the node starts afresh
     └── SensorError(OSError)                  a sensor is absent or answers nonsense: tried again every cycle
 """
 

@@ -23,10 +23,11 @@ NAMES_OF_FAULTS: Final = {fault: fault.name.lower() for fault in Fault}
 
 @dataclass(frozen=True, slots=True)
 class Told:
-    """One line of the table: name of the event, its severity, and its arguments with how each is made of its number."""
+    """One line of the table: the event's name, severity and meaning, and how each argument is made of its number."""
 
     name: str
     severity: Severity
+    meaning: str
     arguments: tuple[tuple[str, Callable[[float], Scalar]], ...] = ()
 
 
@@ -45,33 +46,89 @@ MISMATCH: Final = (("mismatch_dps", float), ("spin_dps", float))
 JOINT: Final = (("angle_deg", float), ("sigma_deg", float), ("marks_deg", float), ("turned", bool))
 TWISTED: Final = (("torque_nm", float), ("twist_sigma_deg", float))
 EVENT_TABLE: Final[dict[Code, Told]] = {
-    Code.BAD_SAMPLE: Told("bad_sample", Severity.ERROR),
-    Code.GYRO_SATURATED: Told("gyro_saturated", Severity.ERROR),
-    Code.GYRO_STUCK: Told("gyro_stuck", Severity.ERROR),
-    Code.GYRO_STEP: Told("gyro_step", Severity.ERROR, MISMATCH),
-    Code.GYRO_SCALE: Told("gyro_scale", Severity.ERROR, MISMATCH),
-    Code.FORCE_SATURATED: Told("force_saturated", Severity.ERROR),
-    Code.FORCE_STUCK: Told("force_stuck", Severity.ERROR),
-    Code.SENSOR_RECOVERED: Told("sensor_recovered", Severity.WARNING, (("after", fault_name), ("cycles", int))),
-    Code.CLOCK_JUMPED: Told("clock_jumped", Severity.ERROR, (("by_s", float),)),
-    Code.AIDING_UNTIMELY: Told("aiding_untimely", Severity.ERROR),
-    Code.STRING_UNDER_TORQUE: Told("string_under_torque", Severity.INFO, TWISTED),
-    Code.STRING_RELEASED: Told("string_released", Severity.INFO, TWISTED),
-    Code.JOINT_SOLVED: Told("joint_solved", Severity.INFO, JOINT),
-    Code.JOINT_CONTRADICTS_MARKS: Told("joint_contradicts_marks", Severity.WARNING, JOINT),
-    Code.JOINT_NOT_SOLVED: Told("joint_not_solved", Severity.WARNING, (("reason", joint_reason), ("hops", int))),
-    Code.STOPPED: Told("stopped", Severity.INFO, YAW),
-    Code.STARTED: Told("started", Severity.INFO, YAW),
-    Code.JOINT_OPENED: Told("joint_opened", Severity.INFO, YAW),
-    Code.JOINT_CLOSED: Told("joint_closed", Severity.INFO, YAW),
-    Code.BIAS_KNOWN: Told("bias_known", Severity.INFO, YAW),
-    Code.REFERENCE_CHANGED: Told("reference_changed", Severity.INFO, YAW),
-    Code.YAW_RESET: Told("yaw_reset", Severity.WARNING, YAW),
-    Code.RATE_EXCEEDED: Told("rate_exceeded", Severity.ERROR, YAW),
-    Code.RATE_RECOVERED: Told("rate_recovered", Severity.WARNING, YAW),
-    Code.UNREADABLE: Told("bad_sample", Severity.ERROR, YAW),
-    Code.FILTER_FAULT: Told("filter_fault", Severity.ERROR, YAW),
-    Code.AIDING_REJECTED: Told("aiding_rejected", Severity.WARNING, (("sigmas", float),)),
+    Code.BAD_SAMPLE: Told("bad_sample", Severity.ERROR, "a reading was not finite; neither sensor is used"),
+    Code.GYRO_SATURATED: Told(
+        "gyro_saturated", Severity.ERROR, "the gyroscope was at its range; the encoder's rate stands for its own"
+    ),
+    Code.GYRO_STUCK: Told(
+        "gyro_stuck", Severity.ERROR, "the gyroscope repeats itself bit for bit; the encoder's rate stands for its own"
+    ),
+    Code.GYRO_STEP: Told(
+        "gyro_step", Severity.ERROR, "the gyroscope's bias took a step; the constant bias takes it", MISMATCH
+    ),
+    Code.GYRO_SCALE: Told(
+        "gyro_scale", Severity.ERROR, "the gyroscope's scale changed; its variance is opened", MISMATCH
+    ),
+    Code.FORCE_SATURATED: Told(
+        "force_saturated", Severity.ERROR, "the accelerometer was at its range; no levelling and no survey by it"
+    ),
+    Code.FORCE_STUCK: Told(
+        "force_stuck", Severity.ERROR, "the accelerometer repeats itself bit for bit; no levelling and no survey by it"
+    ),
+    Code.SENSOR_RECOVERED: Told(
+        "sensor_recovered",
+        Severity.WARNING,
+        "a flagged sensor has proved itself and is used again",
+        (("after", fault_name), ("cycles", int)),
+    ),
+    Code.CLOCK_JUMPED: Told(
+        "clock_jumped",
+        Severity.ERROR,
+        "the node's clock jumped; what was timed before is dropped and the yaw is unknown",
+        (("by_s", float),),
+    ),
+    Code.AIDING_UNTIMELY: Told(
+        "aiding_untimely", Severity.ERROR, "an aiding's time is invalid or in the future; it is not used"
+    ),
+    Code.STRING_UNDER_TORQUE: Told(
+        "string_under_torque", Severity.INFO, "the string came under torque, which may turn this tube", TWISTED
+    ),
+    Code.STRING_RELEASED: Told(
+        "string_released", Severity.INFO, "the drive let the string go; what twist may be trapped is told", TWISTED
+    ),
+    Code.JOINT_SOLVED: Told(
+        "joint_solved", Severity.INFO, "the yaw below a new joint is that of the string that stood still", JOINT
+    ),
+    Code.JOINT_CONTRADICTS_MARKS: Told(
+        "joint_contradicts_marks",
+        Severity.WARNING,
+        "the solved joint and its scribe marks differ by more than 4 sigmas; read the marks again",
+        JOINT,
+    ),
+    Code.JOINT_NOT_SOLVED: Told(
+        "joint_not_solved",
+        Severity.WARNING,
+        "a new joint was not solved; its marks are used",
+        (("reason", joint_reason), ("hops", int)),
+    ),
+    Code.STOPPED: Told("stopped", Severity.INFO, "the string came to rest", YAW),
+    Code.STARTED: Told("started", Severity.INFO, "the string turns", YAW),
+    Code.JOINT_OPENED: Told("joint_opened", Severity.INFO, "the tube above is gone; the node holds its yaw", YAW),
+    Code.JOINT_CLOSED: Told("joint_closed", Severity.INFO, "a tube is above again", YAW),
+    Code.BIAS_KNOWN: Told("bias_known", Severity.INFO, "the gyroscope's constant bias is learnt", YAW),
+    Code.REFERENCE_CHANGED: Told(
+        "reference_changed", Severity.INFO, "the aiding comes over other joints than before", YAW
+    ),
+    Code.YAW_RESET: Told(
+        "yaw_reset", Severity.WARNING, "five aidings in a row contradicted the yaw; it starts anew from the aiding", YAW
+    ),
+    Code.RATE_EXCEEDED: Told(
+        "rate_exceeded", Severity.ERROR, "the string turns too fast to be followed; the yaw is unknown", YAW
+    ),
+    Code.RATE_RECOVERED: Told("rate_recovered", Severity.WARNING, "the string is slow enough again", YAW),
+    Code.UNREADABLE: Told("bad_sample", Severity.ERROR, "the filter was given a reading that is not finite", YAW),
+    Code.FILTER_FAULT: Told(
+        "filter_fault",
+        Severity.ERROR,
+        "the filter's covariance was invalid; it starts over with its constant bias",
+        YAW,
+    ),
+    Code.AIDING_REJECTED: Told(
+        "aiding_rejected",
+        Severity.WARNING,
+        "an aiding is farther from the yaw than its gate allows",
+        (("sigmas", float),),
+    ),
 }
 
 

@@ -1,9 +1,16 @@
-"""What a node keeps over a loss of power, as bytes: its record and a blob of the telemetry."""
+"""What a node keeps over a loss of power, as bytes: its record and a blob of the telemetry.
+
+Layout of a slot: header, checksum, record, blob. The header names the layout of the record by the version of
+``node.kernels.record`` and a checksum of what its fields are, so that neither a forgotten version nor a changed meaning
+is taken for the present one.
+"""
 
 from __future__ import annotations
 
 import struct
 import zlib
+from dataclasses import dataclass
+from typing import Any, Final
 
 import numpy as np
 
@@ -12,20 +19,60 @@ from node.kernels.layout import Array
 from node.kernels.record import NODE, NODE_LAYOUT, forget_session
 from node.kernels.resets import resume as resume_filter
 
-HEADER = struct.Struct("<4sHHQII")  # magic, layout, reserved, generation, state bytes, blob bytes
-CHECKSUM = struct.Struct("<I")  # crc32 of header and body, between the two
-MAGIC = b"BCSS"
+# magic, version and format, checksum of the fields, generation, bytes of state and blob, when it was saved (s)
+HEADER: Final = struct.Struct("<4sHHIQIId")
+CHECKSUM: Final = struct.Struct("<I")  # crc32 of header and body, between the two
+MAGIC: Final = b"BCSS"
+FORMAT: Final = 1  # of the header; 0 had the version alone, in the same place
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Saved:
+    """One slot.
+
+    Attributes
+    ----------
+    nodes : the node's record, one-element array of dtype ``NODE``
+    blob : of the telemetry
+    generation : number in the sequence of saves
+    saved_at : s, the node's own clock, end of the newest cycle in the record; no clock runs while the power is off
+    """
+
+    nodes: Array
+    blob: bytes
+    generation: int
+    saved_at: float
+
+
+def description(dtype: np.dtype[Any]) -> str:
+    """All that fixes the bytes of a record: names, places, types and shapes of its fields, and its size."""
+    if dtype.subdtype is not None:
+        base, shape = dtype.subdtype
+        return f"{description(base)}{list(shape)}"
+    if dtype.fields is None:
+        return dtype.str
+    fields = (f"{name}@{dtype.fields[name][1]}:{description(dtype.fields[name][0])}" for name in dtype.names or ())
+    return f"{{{','.join(fields)}}}{dtype.itemsize}"
+
+
+FIELDS: Final = zlib.crc32(description(NODE).encode())
+
+
+def layout_name(version: int = NODE_LAYOUT, fields: int = FIELDS) -> str:
+    """Name of a layout: version, and checksum of what the fields are."""
+    return f"{version}-{fields:08x}"
 
 
 def pack(state: Array, blob: bytes, generation: int) -> bytes:
-    """Bytes of one slot: header, checksum, record, blob."""
-    head = HEADER.pack(MAGIC, NODE_LAYOUT, 0, generation, NODE.itemsize, len(blob))
+    """Bytes of one slot."""
+    saved_at = float(state[0]["filter"]["now"])
+    head = HEADER.pack(MAGIC, NODE_LAYOUT, FORMAT, FIELDS, generation, NODE.itemsize, len(blob), saved_at)
     body = state.tobytes() + blob
     return head + CHECKSUM.pack(zlib.crc32(body, zlib.crc32(head))) + body
 
 
-def unpack(data: bytes) -> tuple[Array, bytes, int]:
-    """State, blob and generation of one slot.
+def unpack(data: bytes) -> Saved:
+    """Contents of one slot; what stands behind them, left by a longer save, is not looked at.
 
     Raises
     ------
@@ -35,16 +82,18 @@ def unpack(data: bytes) -> tuple[Array, bytes, int]:
     begin = HEADER.size + CHECKSUM.size
     if len(data) < begin:
         raise SavedStateError(f"saved state: expected at least {begin} bytes, got {len(data)}")
-    magic, layout, _, generation, state_size, blob_size = HEADER.unpack_from(data)
-    if magic != MAGIC or layout != NODE_LAYOUT or state_size != NODE.itemsize:
-        raise SavedStateError(
-            f"saved state: expected layout {NODE_LAYOUT} of {NODE.itemsize} bytes, got {layout} of {state_size}"
-        )
+    magic, version, form, fields, generation, state_size, blob_size, saved_at = HEADER.unpack_from(data)
+    if magic != MAGIC:
+        raise SavedStateError(f"saved state: expected {MAGIC!r} first, got {magic!r}")
+    if (version, form, fields) != (NODE_LAYOUT, FORMAT, FIELDS):
+        got = f"{version} without a checksum of its fields" if form == 0 else layout_name(version, fields)
+        raise SavedStateError(f"saved state: expected layout {layout_name()}, got {got}")
     (crc,) = CHECKSUM.unpack_from(data, HEADER.size)
     body = data[begin : begin + state_size + blob_size]
-    if len(body) != state_size + blob_size or zlib.crc32(body, zlib.crc32(data[: HEADER.size])) != crc:
+    is_whole = state_size == NODE.itemsize and len(body) == state_size + blob_size
+    if not is_whole or zlib.crc32(body, zlib.crc32(data[: HEADER.size])) != crc:
         raise SavedStateError("saved state: checksum does not fit, the slot is torn or damaged")
-    return np.frombuffer(bytearray(body[:state_size]), NODE), body[state_size:], generation
+    return Saved(np.frombuffer(bytearray(body[:state_size]), NODE), body[state_size:], generation, saved_at)
 
 
 def resume(nodes: Array) -> bool:

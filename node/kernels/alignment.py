@@ -26,11 +26,11 @@ LIMIT, STEP = 8.0, 0.1  # sigmas, range and step of the integrals over the law o
 
 MOUNT: Final = np.dtype(
     [
-        ("method", "i8"),  # of the alignment in use
+        ("method", "i8"),  # of the alignment in use: 0 none, 1 circle, 2 extremes
         ("aligning", "i8"),  # 1 while one is under way
-        ("axis", "f8", (MAX_IMUS, 3)),  # unit vector of the tube's axis, frame of each IMU
+        ("axis", "f8", (MAX_IMUS, 3)),  # unit vector, of the tube's axis, frame of each IMU
         ("std", "f8", (MAX_IMUS, 2)),  # rad, of pitch and roll
-        ("rate_offset", "f8", (MAX_IMUS, 3)),  # rad/s at rest, of each gyroscope against the mean of the cluster
+        ("rate_offset", "f8", (MAX_IMUS, 3)),  # rad/s, at rest, of each gyroscope against the mean of the cluster
         ("rate_samples", "i8"),  # cycles of which that is the mean
     ],
     align=True,

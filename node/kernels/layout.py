@@ -67,59 +67,59 @@ class Scheme(enum.IntEnum):
 STATE: Final = np.dtype(
     [
         # the filter, at its own epoch (at most RING cycles behind now)
-        ("epoch", "f8"),  # s, node's clock
-        ("yaw", "u4"),  # binary angle, 2^32 is one turn
-        ("yaw_known", "i8"),
-        ("down", "f8", (3,)),  # unit vector of gravity, body frame
+        ("epoch", "f8"),  # s, node's clock, up to which the filter has run
+        ("yaw", "u4"),  # 2^-32 turn, binary angle
+        ("yaw_known", "i8"),  # 1 after the first aiding, until something makes the yaw unknown
+        ("down", "f8", (3,)),  # unit vector, of gravity, body frame
         ("static_bias", "f8", (3,)),  # rad/s, constant part, from standing still
-        ("static_bias_var", "f8", (3,)),
+        ("static_bias_var", "f8", (3,)),  # (rad/s)^2, of it; 0: never learnt
         ("bias", "f8", (3,)),  # rad/s, Gauss-Markov part
-        ("scale", "f8"),
-        ("stamp", "f8"),  # s
-        ("P", "f8", (STATES, STATES)),
+        ("scale", "f8"),  # scale error of the z gyroscope
+        ("stamp", "f8"),  # s, true time of validity of the aiding minus the node's idea of it
+        ("P", "f8", (STATES, STATES)),  # covariance of the error states (``Err``)
         # the same, predicted to the end of the newest cycle
-        ("now", "f8"),
-        ("now_yaw", "u4"),
-        ("now_down", "f8", (3,)),
-        ("now_rate", "f8"),
-        ("now_P", "f8", (STATES, STATES)),
+        ("now", "f8"),  # s, node's clock, end of the newest cycle
+        ("now_yaw", "u4"),  # 2^-32 turn, predicted to that end
+        ("now_down", "f8", (3,)),  # unit vector, of gravity, likewise
+        ("now_rate", "f8"),  # rad/s, about the axis, likewise
+        ("now_P", "f8", (STATES, STATES)),  # covariance, likewise
         # aiding: reference in use and measurements waiting for their epoch
-        ("reference_hops", "i8"),
-        ("reference_offset", "f8"),
-        ("systematic_var", "f8"),
-        ("last_sequence", "i8"),
+        ("reference_hops", "i8"),  # joints between the encoder and this node; -1: no reference yet
+        ("reference_offset", "f8"),  # rad, of the joints, in the aiding in use
+        ("systematic_var", "f8"),  # rad^2, of the constant errors in it
+        ("last_sequence", "i8"),  # number of the last aiding taken; -1: none
         ("last_aided", "f8"),  # s, node's clock, time of validity of the last measurement used
-        ("innovation", "f8"),
-        ("innovation_var", "f8"),
-        ("rejected", "i8"),  # in a row
-        ("pending", "i8"),
-        ("pending_at", "f8", (PENDING,)),
-        ("pending_yaw", "f8", (PENDING,)),
-        ("pending_var", "f8", (PENDING,)),
-        ("pending_sequence", "i8", (PENDING,)),
+        ("innovation", "f8"),  # rad, of the last aiding
+        ("innovation_var", "f8"),  # rad^2, of it
+        ("rejected", "i8"),  # aidings rejected in a row
+        ("pending", "i8"),  # aidings that wait for their epoch
+        ("pending_at", "f8", (PENDING,)),  # s, node's clock, their times of validity
+        ("pending_yaw", "f8", (PENDING,)),  # rad, their yaws with the offset
+        ("pending_var", "f8", (PENDING,)),  # rad^2, of each
+        ("pending_sequence", "i8", (PENDING,)),  # number of each
         # the increments of the last RING cycles
-        ("cycles", "i8"),  # written so far
+        ("cycles", "i8"),  # cycles written to the rings so far
         ("consumed", "i8"),  # cycles the filter has passed completely
-        ("ring_start", "f8", (RING,)),
-        ("ring_end", "f8", (RING,)),
-        ("ring_rate", "f8", (RING, 3)),
-        ("ring_force", "f8", (RING, 3)),
-        ("ring_quiet", "i8", (RING,)),
+        ("ring_start", "f8", (RING,)),  # s, node's clock, begin of each of the last cycles
+        ("ring_end", "f8", (RING,)),  # s, node's clock, end of each
+        ("ring_rate", "f8", (RING, 3)),  # rad/s, mean over each
+        ("ring_force", "f8", (RING, 3)),  # m/s^2, mean over each
+        ("ring_quiet", "i8", (RING,)),  # 1 where the node was at rest
         # modes
-        ("mode", "i8"),
-        ("still_cycles", "i8"),
-        ("stopped_at", "f8"),
-        ("surveyed", "i8"),  # this stop already has its measurement
-        ("rate_exceeded", "i8"),
-        ("bias_count", "i8"),
-        ("bias_sum", "f8", (3,)),
+        ("mode", "i8"),  # 1 static bias, 3 tracking, 4 still, 5 survey, 6 held
+        ("still_cycles", "i8"),  # cycles at rest in a row
+        ("stopped_at", "f8"),  # s, node's clock, begin of this rest; NaN: none yet
+        ("surveyed", "i8"),  # 1 when this stop already has its measurement
+        ("rate_exceeded", "i8"),  # 1 while too fast for the yaw to be followed
+        ("bias_count", "i8"),  # cycles of rest in the sums below
+        ("bias_sum", "f8", (3,)),  # rad/s, sum of the rates of these cycles
         # the last survey
-        ("survey_force", "f8", (3,)),
-        ("survey_force_cov", "f8", (3, 3)),
+        ("survey_force", "f8", (3,)),  # m/s^2, mean of the last survey
+        ("survey_force_cov", "f8", (3, 3)),  # (m/s^2)^2, of that mean
         # work space of the updates
-        ("h", "f8", (STATES,)),
-        ("ph", "f8", (STATES,)),
-        ("gain", "f8", (STATES,)),
+        ("h", "f8", (STATES,)),  # work space of the updates
+        ("ph", "f8", (STATES,)),  # work space of the updates
+        ("gain", "f8", (STATES,)),  # work space of the updates
     ],
     align=True,
 )

@@ -21,102 +21,128 @@ UNSAID: Final = -1  # of a place that nothing was written to
 
 TRUST: Final = np.dtype(
     [
-        ("fault", "i8"),  # ``Fault``; 0 is none
-        ("proving", "i8"),  # its readings are used again and have yet to agree with the aiding
-        ("sane", "i8"),  # cycles in a row
-        ("cycles", "i8"),  # since it was flagged
+        ("fault", "i8"),  # ``Fault``; 0: none
+        ("proving", "i8"),  # 1: its readings are used again and have yet to agree with the aiding
+        ("sane", "i8"),  # cycles in a row with sane readings
+        ("cycles", "i8"),  # cycles since it was flagged
     ],
     align=True,
 )
-REPEATS: Final = np.dtype([("last", "f8", (3,)), ("counts", "i8", (3,))], align=True)  # NaN before the first reading
-READINGS: Final = np.dtype([("rates", REPEATS), ("forces", REPEATS), ("clipped", "i8")], align=True)
+REPEATS: Final = np.dtype(
+    [
+        ("last", "f8", (3,)),  # newest reading; NaN: none yet
+        ("counts", "i8", (3,)),  # repeats of it in a row, bit for bit
+    ],
+    align=True,
+)
+READINGS: Final = np.dtype(
+    [
+        ("rates", REPEATS),  # rad/s, of the gyroscope
+        ("forces", REPEATS),  # m/s^2, of the accelerometer
+        ("clipped", "i8"),  # cycles in a row with a force near the range
+    ],
+    align=True,
+)
 AIDINGS: Final = np.dtype(
     [
-        ("left", "f8"),  # rad, of the last innovation, not corrected
-        ("at", "f8"),  # s, of it; NaN: none yet
+        ("left", "f8"),  # rad, part of the last innovation that was not corrected
+        ("at", "f8"),  # s, own clock, of it; NaN: none yet
         ("seen", "i8"),  # mismatches in a row
-        ("mismatch", "f8", (DISAGREEMENTS + 1,)),  # rad/s
+        ("mismatch", "f8", (DISAGREEMENTS + 1,)),  # rad/s, true minus measured, of the last aidings
         ("spin", "f8", (DISAGREEMENTS + 1,)),  # rad/s, true, at the same time
     ],
     align=True,
 )
 MISMATCH: Final = np.dtype(
     [
-        ("fault", "i8"),  # 0: there is none
+        ("fault", "i8"),  # ``Fault``; 0: there is none
         ("rate", "f8"),  # rad/s, true minus measured
         ("spin", "f8"),  # rad/s, true
-        ("steady", "i8"),  # the last two aidings show the same
+        ("steady", "i8"),  # 1: the last two aidings show the same
     ],
     align=True,
 )
 GUARD: Final = np.dtype(
     [
-        ("readings", READINGS),
-        ("aidings", AIDINGS),
-        ("gyro", TRUST),
-        ("force", TRUST),
-        ("agreed", "i8"),  # aidings in a row, of a gyroscope that proves itself
+        ("readings", READINGS),  # the newest readings, to see repeats
+        ("aidings", AIDINGS),  # mismatches between gyroscope and aiding
+        ("gyro", TRUST),  # trust in the gyroscope
+        ("force", TRUST),  # trust in the accelerometer
+        ("agreed", "i8"),  # aidings in a row that agree with a gyroscope that proves itself
         ("rate", "f8"),  # rad/s, that the encoder told last
-        ("rate_at", "f8"),  # s, own clock
+        ("rate_at", "f8"),  # s, own clock, of that aiding
         ("aiding_var", "f8"),  # rad^2, of that aiding
         ("sane_rate", "f8"),  # rad/s about the axis, the gyroscope's last sane one
         ("found", MISMATCH),  # work space
-        ("step", MISMATCH),  # that the constant bias has taken
+        ("step", MISMATCH),  # mismatch that the constant bias has taken
         ("before_steps", "f8"),  # rad/s, the constant bias before the first step; NaN: it took none
-        ("first_step", "f8"),  # rad/s, size of that
-        ("jumped", "i8"),  # the clock, in the cycle before
-        ("untimely", "i8"),  # the aiding before
+        ("first_step", "f8"),  # rad/s, size of that step
+        ("jumped", "i8"),  # 1: the clock jumped in the cycle before
+        ("untimely", "i8"),  # 1: the aiding before was untimely
     ],
     align=True,
 )
 TWIST: Final = np.dtype(
     [
-        ("known", "i8"),  # an aiding has been used
+        ("known", "i8"),  # 1: an aiding has been used
         ("std", "f8"),  # rad, of the twist in it
-        ("held", "i8"),  # it was under torque
-        ("wound", "i8"),  # since then the string was under torque
+        ("held", "i8"),  # 1: it was under torque
+        ("wound", "i8"),  # 1: since then the string was under torque
         ("torque", "f8"),  # N m, in the last aiding heard
-        ("holding", "i8"),  # the drive held the string then
-        ("heard_at", "f8"),  # s, own clock
+        ("holding", "i8"),  # 1: the drive held the string then
+        ("heard_at", "f8"),  # s, own clock, of the last aiding heard
     ],
     align=True,
 )
 JOINTS: Final = np.dtype(
     [
-        ("hops", "i8"),  # of the aiding used last; -1: none yet
+        ("hops", "i8"),  # joints above, in the aiding used last; -1: none yet
         ("marks", "f8"),  # rad, offset of the marks in it
-        ("solved", "i8"),  # ``offset`` and ``var`` stand in the place of the marks'
-        ("offset", "f8"),  # rad
-        ("var", "f8"),  # rad^2
+        ("solved", "i8"),  # 1: ``offset`` and ``var`` stand in the place of the marks'
+        ("offset", "f8"),  # rad, of the joints as solved
+        ("var", "f8"),  # rad^2, of it
     ],
     align=True,
 )
-EVENT: Final = np.dtype([("code", "i8"), ("numbers", "f8", (NUMBERS,))], align=True)
-EVENTS: Final = np.dtype([("told", "i8"), ("said", "i8"), ("ring", EVENT, (EVENTS_KEPT,))], align=True)
+EVENT: Final = np.dtype(
+    [
+        ("code", "i8"),  # ``Code``
+        ("numbers", "f8", (NUMBERS,)),  # its arguments; NaN: none
+    ],
+    align=True,
+)
+EVENTS: Final = np.dtype(
+    [
+        ("told", "i8"),  # events put in since the start
+        ("said", "i8"),  # events taken out
+        ("ring", EVENT, (EVENTS_KEPT,)),  # the newest; where it is full the oldest is lost
+    ],
+    align=True,
+)
 NODE: Final = np.dtype(
     [
-        ("filter", STATE),
-        ("mount", MOUNT),
-        ("guard", GUARD),
-        ("twist", TWIST),
-        ("joints", JOINTS),
-        ("events", EVENTS),
-        ("cycles", "i8"),  # since the start
+        ("filter", STATE),  # the filter
+        ("mount", MOUNT),  # how its IMUs sit in the tube
+        ("guard", GUARD),  # trust in the sensors
+        ("twist", TWIST),  # torque in the string
+        ("joints", JOINTS),  # joints above
+        ("events", EVENTS),  # what it has yet to say
+        ("cycles", "i8"),  # cycles since the start
         ("overruns", "i8"),  # cycles that came too late
-        ("status", "i8"),  # of the newest cycle
+        ("status", "i8"),  # status bits of the newest cycle (``Status``)
         ("noticed", "i8"),  # status bits found between two cycles
-        ("rejecting", "i8"),  # aidings were rejected in the cycle before
-        ("slow_cycles", "i8"),  # in a row, not faster than the offset of a gyroscope never calibrated
-        ("stamp_hops", "i8"),  # of the prior of the time stamp
+        ("rejecting", "i8"),  # 1: aidings were rejected in the cycle before
+        ("slow_cycles", "i8"),  # cycles in a row not faster than the offset of a gyroscope never calibrated
+        ("stamp_hops", "i8"),  # joints of which the time stamp's prior is
         ("temperature", "f8"),  # C, of the newest reading
         ("raw_rate", "f8", (3,)),  # rad/s, what a block of parameters would correct
-        ("raw_force", "f8", (3,)),  # m/s^2
+        ("raw_force", "f8", (3,)),  # m/s^2, likewise
         ("rate", "f8", (3,)),  # rad/s, corrected, of all IMUs together, tube's frame
-        ("force", "f8", (3,)),  # m/s^2
+        ("force", "f8", (3,)),  # m/s^2, likewise
         ("unaligned", "f8", (MAX_IMUS, 3)),  # m/s^2, corrected, in the frame of each IMU
         ("down_offset", "f8"),  # rad, of the aiding handed down
-        ("down_systematic", "f8"),  # rad^2
-        ("down_torsion", "f8"),  # rad^2
+        ("down_systematic", "f8"),  # rad^2, of its constant errors
+        ("down_torsion", "f8"),  # rad^2, of its twist
     ],
     align=True,
 )

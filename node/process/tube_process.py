@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from node.errors import ConfigurationError, SavedStateError
+from node.errors import ConfigurationError
 from node.firmware.inputs import ImuReading, RigContext
 from node.firmware.saved_state import resume
 from node.firmware.settings import TubeSettings
@@ -25,7 +25,7 @@ from node.process.block_updater import BlockUpdater, load_parameters
 from node.process.command_handlers import CommandHandlers
 from node.process.counter import BootCounter
 from node.process.drivers.source import NOTHING, ImuSource, SafeImu
-from node.process.journal import Journal
+from node.process.saver import Saver
 from telemetry.application.endpoint import Endpoint
 from telemetry.errors import EncodeError
 from telemetry.messages import (
@@ -43,7 +43,6 @@ from telemetry.messages import (
 from telemetry.runtime.process import Process
 from telemetry.runtime.timing import CycleTiming, Stage
 
-SAVE_EVERY = 19  # cycles, 10 s
 SYNCHRONISED_STD = 0.05  # s, what the time-stamp state of the filter can take
 MAX_CLOCK_STD = 3600.0
 OVERRUN_EVERY = 60.0  # s between two events about overruns, so that a board too slow is not slowed further
@@ -86,10 +85,10 @@ class TubeProcess(Process):
         self._sources = imus
         self._imus = [SafeImu(imu, self._send_event, k if len(imus) > 1 else 0) for k, imu in enumerate(imus, 1)]
         self.config = default_config() if config is None else config
-        self._journal = Journal(folder)
+        self._saver = Saver(folder)
         # apart from the saved state: a node that lost its state must not look like an earlier boot
         self.boots = BootCounter(folder).boots
-        saved, fault = self._load()
+        saved = self._saver.load()
         self.nodes, telemetry = saved if saved else (new_node(self.config), None)
         self._cut = resume(self.nodes) if saved else False
         store = BlockStore(folder)
@@ -117,12 +116,12 @@ class TubeProcess(Process):
             parameters=parameters,
         )
         self._commands = CommandHandlers(self.tube, timing)
-        self._cycles = 0
         self._now = 0.0
-        self._fault = fault
         self._announced = False
         self._blocks = BlockUpdater(self.tube, store, key, self._send_event, self._save)
-        self._save()
+        # what a start goes on with is on the disk, with its rest: power that comes and goes costs nothing
+        if saved is None or self._fallback or self._saver.due:
+            self._save()
 
     @property
     def state(self) -> Array:
@@ -141,6 +140,7 @@ class TubeProcess(Process):
                 self._save()
             elif isinstance(message, BlockSegment):
                 self.endpoint.send_status(self._blocks.on_segment(message, now))
+        self._save_if_due()
 
     def on_cycle(self, data: Any, now: float) -> None:
         """The IMU delivered a cycle: ``data`` is start (s), three rates (rad/s), three forces (m/s^2), raw.
@@ -160,15 +160,17 @@ class TubeProcess(Process):
             self._announce(context.rig_now, now)
         said = self.tube.on_cycle(reading, context)
         self._lap(Stage.FILTER)
-        urgent = [self._send(message, now) for message in said]
+        for message in said:
+            self._send(message, now)
         if self._blocks.trying and (status := self._blocks.on_cycle(self.tube.raw)) is not None:
             self.endpoint.send_status(status)
-        self._cycles += 1
         if self._timing is None:  # an own clock advances time between the cycles
             self.endpoint.advance(now)
         self._lap(Stage.REPORT)
-        if any(urgent) or self._cycles % SAVE_EVERY == 0:
-            self._save()
+        if self._announced:
+            self._saver.report(self._send_event)
+        self._saver.count_cycle(self.nodes)
+        if self._save_if_due():
             self._lap(Stage.SAVE)
 
     def on_overrun(self, missed: int, now: float) -> None:
@@ -176,9 +178,9 @@ class TubeProcess(Process):
         self.tube.node["overruns"] += 1
         if now - self._overrun_told >= OVERRUN_EVERY:
             self._overrun_told = now
-            self._send_event(
-                Severity.WARNING, "overrun", {"missed": missed, "overruns": int(self.tube.node["overruns"])}
-            )
+            overruns = int(self.tube.node["overruns"])
+            self._send_event(Severity.WARNING, "overrun", {"missed": missed, "overruns": overruns})
+            self._save_if_due()
 
     def close(self) -> None:
         """Save the newest state and release the sensors."""
@@ -211,29 +213,28 @@ class TubeProcess(Process):
             synchronised=clock.synchronised and var < SYNCHRONISED_STD**2,
         )
 
-    def _send(self, said: Aiding | SurveyMeasurement | StaticRecord | Event | NodeState, now: float) -> bool:
-        """Hand a message to the telemetry; returns whether it must be saved before it may be lost."""
+    def _send(self, said: Aiding | SurveyMeasurement | StaticRecord | Event | NodeState, now: float) -> None:
+        """Hand a message to the telemetry; what the ground station must not lose is saved before its frame leaves."""
         try:
             if isinstance(said, NodeState):
                 self.endpoint.send_state(said, now)
             elif isinstance(said, Aiding):
                 self.endpoint.send_aiding(said, now)
             else:
+                self._saver.due = True
                 self.endpoint.submit(said, now)
-                return True
         except EncodeError:
             # the filter reports numbers out of range itself; the cycle goes on
             self.endpoint.counters["unsayable"] += 1
-        return False
 
     def _announce(self, rig_now: float, now: float) -> None:
         """Report the start once rig time is known, and what was found on the disk."""
         if self._announced:
             return
         self._announced = True
-        self.endpoint.submit(self.tube.boot_event(rig_now), now)
-        if self._fault:
-            self._send_event(Severity.ERROR, "saved_state_lost", {"detail": self._fault[:200]})
+        self._send(self.tube.boot_event(rig_now), now)
+        if self._saver.fault:
+            self._send_event(Severity.ERROR, "saved_state_lost", {"detail": self._saver.fault[:200]})
         if self._cut:
             self._send_event(Severity.WARNING, "alignment_refused", {"reason": "the power was cut"})
         if self._fallback:
@@ -242,21 +243,21 @@ class TubeProcess(Process):
             self._send_event(Severity.ERROR, "parameters_fallback", detail | {"hash": in_use.sha256().hex()})
 
     def _send_event(self, severity: Severity, code: str, arguments: dict[str, Scalar]) -> None:
-        """Keep an event of the process, and save so that a cut does not lose it."""
+        """Keep an event of the process; it is saved before its frame leaves."""
         rig_now = self.endpoint.clock.rig_from_local(self._now)
         self.endpoint.submit(
             Event(self.settings.tube, self.endpoint.new_sequence(), rig_now, severity, code, arguments), self._now
         )
-        self._save()
-
-    def _load(self) -> tuple[tuple[Array, bytes] | None, str]:
-        try:
-            return self._journal.load(), ""
-        except SavedStateError as error:
-            return None, str(error)
+        self._saver.due = True
 
     def _save(self) -> None:
-        self._journal.save(self.nodes, self.endpoint.export_state())
+        self._saver.save(self.nodes, self.endpoint.export_state())
+
+    def _save_if_due(self) -> bool:
+        if self._saver.due:
+            self._save()
+            return True
+        return False
 
 
 def reading_of(data: Any, now: float) -> ImuReading:

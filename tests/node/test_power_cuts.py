@@ -2,19 +2,24 @@
 
 import errno
 import os
+import shutil
+import struct
+import zlib
+from collections import Counter
+from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
 import pytest
 
 from node.errors import SavedStateError
-from node.firmware.saved_state import pack
+from node.firmware.saved_state import FIELDS, layout_name, pack
 from node.firmware.settings import TubeSettings
 from node.kernels.layout import PERIOD, default_config
 from node.kernels.record import NODE_LAYOUT, new_node
 from node.process import journal as journal_module
 from node.process.counter import BootCounter
-from node.process.journal import Journal
+from node.process.journal import SLOTS, Journal
 from node.process.tube_process import TubeProcess
 
 CUTS = 1000
@@ -29,30 +34,44 @@ class PowerCutError(Exception):
 class Disk:
     """``os`` of a machine whose cache is lost with the power: what was not forced may be there, or in part, or not."""
 
-    O_WRONLY, O_CREAT, O_TRUNC, O_RDONLY = os.O_WRONLY, os.O_CREAT, os.O_TRUNC, os.O_RDONLY
+    O_RDWR, O_CREAT, O_RDONLY, POSIX_FADV_DONTNEED = os.O_RDWR, os.O_CREAT, os.O_RDONLY, os.POSIX_FADV_DONTNEED
 
     def __init__(self, folder: Path, random: np.random.Generator) -> None:
         self._folder, self._random = folder, random
         self.forced: dict[str, bytes] = {p.name: p.read_bytes() for p in folder.iterdir()}
         self.names = set(self.forced)
-        self._cached: dict[str, bytes] = {}
+        self._cached: dict[str, bytearray] = {}
         self._open: dict[int, str] = {}
+        self._at: dict[int, int] = {}
         self.left: float = np.inf
         self.spent = 0
+
+    @property
+    def written(self) -> set[str]:
+        return set(self._cached)
 
     def open(self, path: Path, flags: int, mode: int = 0o777) -> int:
         self._spend(BOUNDARY)
         descriptor = os.open(path, flags, mode)
-        self._open[descriptor] = "" if path == self._folder else path.name
-        if flags & os.O_TRUNC:
-            self._cached[path.name] = b""
+        name = "" if path == self._folder else path.name
+        self._open[descriptor], self._at[descriptor] = name, 0
+        if name:
+            self._cached[name] = bytearray(self.forced.get(name, b""))
         return descriptor
+
+    def posix_fallocate(self, descriptor: int, begin: int, length: int) -> None:
+        os.posix_fallocate(descriptor, begin, length)
+        cached = self._cached[self._open[descriptor]]
+        cached.extend(bytes(max(begin + length - len(cached), 0)))
+        self._spend(BOUNDARY)
 
     def write(self, descriptor: int, data: memoryview) -> int:
         length = min(len(data), int(self._random.integers(1, 2 * len(data) + 1)))  # a call may write less
         allowed = min(length, int(min(self.left, 2**40)))
         os.write(descriptor, data[:allowed])
-        self._cached[self._open[descriptor]] += bytes(data[:allowed])
+        at = self._at[descriptor]
+        self._cached[self._open[descriptor]][at : at + allowed] = data[:allowed]
+        self._at[descriptor] = at + allowed
         self._spend(length)
         return length
 
@@ -60,10 +79,17 @@ class Disk:
         self._spend(BOUNDARY)
         name = self._open[descriptor]
         if name:
-            self.forced[name] = self._cached.pop(name)
+            self.forced[name] = bytes(self._cached.pop(name))
         else:
             self.names = {p.name for p in self._folder.iterdir()}
         self._spend(BOUNDARY)
+
+    def posix_fadvise(self, descriptor: int, begin: int, length: int, advice: int) -> None:
+        os.posix_fadvise(descriptor, begin, length, advice)
+
+    def pread(self, descriptor: int, length: int, at: int) -> bytes:
+        self._spend(BOUNDARY)
+        return os.pread(descriptor, length, at)
 
     def close(self, descriptor: int) -> None:
         os.close(descriptor)
@@ -72,7 +98,7 @@ class Disk:
     def after_cut(self) -> None:
         """Leave in the folder what a disk may hold."""
         for name, cached in self._cached.items():
-            self._leave(name, cached)
+            self._leave(name, bytes(cached))
         for path in self._folder.iterdir():
             if path.name not in self.names and self._random.random() < 0.5:
                 path.unlink()
@@ -105,25 +131,33 @@ def found(folder: Path) -> tuple[int, bytes] | None:
     return None if loaded is None else (int(loaded[0][0]["filter"]["now_yaw"]), loaded[1])
 
 
+def fill(folder: Path, newest: int, earlier: int, random: np.random.Generator) -> tuple[int, bytes]:
+    """Leave a ring whose newest save is in slot ``newest``, with ``earlier`` slots before it; what the newest holds."""
+    folder.mkdir()
+    for age in range(earlier, -1, -1):
+        generation, blob = 1000 - age, random.bytes(int(random.integers(0, 3000)))
+        (folder / f"slot-{(newest - age) % SLOTS}").write_bytes(pack(marked(generation), blob, generation))
+    return generation, blob
+
+
 @pytest.mark.slow
 def test_a_cut_at_any_instant_leaves_the_old_or_the_new_node(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     random = np.random.default_rng(20261121)
-    new, old = 0, 0
+    new, old, cuts = 0, 0, Counter[int]()
     for cut in range(CUTS):
         folder = tmp_path / str(cut)
-        journal = Journal(folder)
-        before = None
-        for k in range(int(random.integers(1, 6))):
-            before = (k + 1, random.bytes(int(random.integers(0, 3000))))
-            journal.save(marked(before[0]), before[1])
+        place = cut % SLOTS
+        before = fill(folder, place, SLOTS - 1 if cut % 10 == 0 else int(random.integers(0, 5)), random)
         for life in range(int(random.integers(1, 4))):
             wanted = (100 + life, random.bytes(int(random.integers(0, 3000))))
             disk = Disk(folder, random)
-            total = len(pack(marked(0), wanted[1], 0)) + 3 * BOUNDARY
+            total = len(pack(marked(0), wanted[1], 0)) + 5 * BOUNDARY
             disk.left = float(random.integers(0, total + BOUNDARY))
             survivor = Journal(folder)
-            assert found(folder) == before
-            survivor.load()
+            loaded = survivor.load()
+            assert loaded is not None
+            assert (int(loaded[0][0]["filter"]["now_yaw"]), loaded[1]) == before
+            target = (place + 1) % SLOTS
             with monkeypatch.context() as patch:
                 patch.setattr(journal_module, "os", disk)
                 try:
@@ -131,13 +165,20 @@ def test_a_cut_at_any_instant_leaves_the_old_or_the_new_node(tmp_path: Path, mon
                     done = True
                 except PowerCutError:
                     done = False
+                    cuts[target] += 1
+            assert disk.written <= {f"slot-{target}"}, "every other slot is spared"
             disk.after_cut()
             after = found(folder)
             assert after in (before, wanted)
             assert after == wanted or not done, "what was saved is not lost"
             new, old = new + (after == wanted), old + (after == before)
+            place = target if after == wanted else place
             before = after
+        shutil.rmtree(folder)
     assert min(new, old) > CUTS / 10
+    assert cuts.total() >= CUTS
+    assert set(cuts) == set(range(SLOTS))
+    assert min(cuts.values()) > CUTS / SLOTS / 2
 
 
 def test_the_first_state_ever_is_on_the_disk_with_its_name(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -186,10 +227,36 @@ def other_version(slot: bytes) -> bytes:
     return slot[:4] + (NODE_LAYOUT + 1).to_bytes(2, "little") + slot[6:]
 
 
+def other_fields(slot: bytes) -> bytes:
+    return slot[:8] + (FIELDS ^ 1).to_bytes(4, "little") + slot[12:]
+
+
+def before_checksums(version: int) -> Callable[[bytes], bytes]:
+    """The header of before, with the version alone: magic, version, 0, generation, bytes of state and blob."""
+
+    def slot_of(slot: bytes) -> bytes:
+        state, blob = bytes(4096), b"blob"
+        head = struct.pack("<4sHHQII", b"BCSS", version, 0, 7, len(state), len(blob))
+        return head + zlib.crc32(state + blob, zlib.crc32(head)).to_bytes(4, "little") + state + blob
+
+    return slot_of
+
+
+NOT_TOLD = "without a checksum of its fields"
+
+
 @pytest.mark.parametrize(
-    "spoil", [other_version, lambda slot: slot[:-9], lambda slot: b"", lambda slot: b"\xff" * 9999]
+    ("spoil", "reason"),
+    [
+        (other_version, f"expected layout {layout_name()}, got {layout_name(NODE_LAYOUT + 1)}"),
+        (other_fields, f"expected layout {layout_name()}, got {layout_name(fields=FIELDS ^ 1)}"),
+        *((before_checksums(v), f"expected layout {layout_name()}, got {v} {NOT_TOLD}") for v in (1, 2, 3)),
+        (lambda slot: slot[:-9], "checksum does not fit"),
+        (lambda slot: b"", "expected at least"),
+        (lambda slot: b"\xff" * 9999, "expected b'BCSS'"),
+    ],
 )
-def test_a_state_that_cannot_be_read_is_an_event_and_a_safe_start(tmp_path: Path, spoil) -> None:
+def test_a_state_that_cannot_be_read_is_an_event_and_a_safe_start(tmp_path: Path, spoil, reason: str) -> None:
     random = np.random.default_rng(1)
 
     def cycles(process: TubeProcess, count: int, now: float) -> float:
@@ -212,4 +279,5 @@ def test_a_state_that_cannot_be_read_is_an_event_and_a_safe_start(tmp_path: Path
     again._announce(5.0, 5.0)
     assert [code for code, _ in told] == ["saved_state_lost"]
     assert "saved state" in str(told[0][1])
+    assert reason in str(told[0][1])
     cycles(again, 3, 2000.0)

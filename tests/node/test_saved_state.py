@@ -1,4 +1,4 @@
-"""Saved state over power cuts: two slots, checksums, and what a node knows when it wakes."""
+"""Saved state over power cuts: a ring of slots, checksums, and what a node knows when it wakes."""
 
 import math
 from pathlib import Path
@@ -9,7 +9,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from node.errors import SavedStateError
-from node.firmware.saved_state import pack, resume, unpack
+from node.firmware.saved_state import description, layout_name, pack, resume, unpack
 from node.kernels.layout import DEG, Err, default_config
 from node.kernels.record import new_node
 from node.process.counter import BootCounter
@@ -25,9 +25,44 @@ def state(yaw: int) -> np.ndarray:
 
 @given(st.binary(max_size=300), st.integers(0, 2**60))
 def test_a_slot_gives_back_what_was_packed(blob: bytes, generation: int) -> None:
-    got, got_blob, got_generation = unpack(pack(state(7), blob, generation))
-    assert got.tobytes() == state(7).tobytes()
-    assert (got_blob, got_generation) == (blob, generation)
+    got = unpack(pack(state(7), blob, generation))
+    assert got.nodes.tobytes() == state(7).tobytes()
+    assert (got.blob, got.generation) == (blob, generation)
+
+
+@given(st.binary(max_size=300))
+def test_what_a_longer_save_left_behind_a_slot_is_not_looked_at(rest: bytes) -> None:
+    got = unpack(pack(state(7), b"blob", 3) + rest)
+    assert (got.nodes.tobytes(), got.blob) == (state(7).tobytes(), b"blob")
+
+
+def test_a_slot_says_when_it_was_saved() -> None:
+    made = state(7)
+    made["filter"]["now"] = 1234.5
+    assert unpack(pack(made, b"", 1)).saved_at == 1234.5
+
+
+def test_every_layout_of_the_record_has_its_version() -> None:
+    assert layout_name() == "3-bcf4a10c", (
+        "the fields of the node's record are others than before: count NODE_LAYOUT up and put the new name here"
+    )
+
+
+@pytest.mark.parametrize(
+    "other",
+    [
+        [("a", "f8"), ("c", "i8")],
+        [("b", "i8"), ("a", "f8")],
+        [("a", "f8"), ("b", "u8")],
+        [("a", "f8", (1,)), ("b", "i8")],
+        [("a", "f8"), ("b", [("x", "i8")])],
+    ],
+)
+def test_a_description_tells_layouts_of_one_size_apart(other: list[tuple[str, str]]) -> None:
+    one = np.dtype([("a", "f8"), ("b", "i8")], align=True)
+    assert np.dtype(other).itemsize == one.itemsize
+    assert description(one) == "{a@0:<f8,b@8:<i8}16"
+    assert description(np.dtype(other)) != description(one)
 
 
 @given(st.data())
@@ -47,31 +82,31 @@ def test_any_torn_slot_is_seen(data: st.DataObject) -> None:
 
 
 def test_the_newest_good_slot_wins_wherever_the_writing_was_cut(tmp_path: Path) -> None:
-    journal = Journal(tmp_path)
+    journal = Journal(tmp_path, 2)
     assert journal.load() is None
     journal.save(state(1), b"one")
     journal.save(state(2), b"two")
     slots = [(tmp_path / f"slot-{k}").read_bytes() for k in (0, 1)]
     third = pack(state(3), b"three", 3)
     for cut in range(0, len(third), 97):
-        (tmp_path / "slot-1").write_bytes(third[:cut])  # the third save goes over the first
-        found = Journal(tmp_path).load()
+        (tmp_path / "slot-0").write_bytes(third[:cut])  # the third save goes over the first
+        found = Journal(tmp_path, 2).load()
         assert found is not None
         assert found[1] == b"two"
-    (tmp_path / "slot-1").write_bytes(third)
-    found = Journal(tmp_path).load()
+    (tmp_path / "slot-0").write_bytes(third)
+    found = Journal(tmp_path, 2).load()
     assert found is not None
     assert (int(found[0][0]["filter"]["now_yaw"]), found[1]) == (3, b"three")
-    assert slots[0] == (tmp_path / "slot-0").read_bytes()
+    assert slots[1] == (tmp_path / "slot-1").read_bytes()
 
 
-def test_two_damaged_slots_are_an_error_that_names_them(tmp_path: Path) -> None:
+def test_damaged_slots_are_an_error_that_names_them(tmp_path: Path) -> None:
     journal = Journal(tmp_path)
     journal.save(state(1), b"")
     journal.save(state(2), b"")
     for k in (0, 1):
         (tmp_path / f"slot-{k}").write_bytes(b"damaged")
-    with pytest.raises(SavedStateError, match="slot-0"):
+    with pytest.raises(SavedStateError, match="slot-0, slot-1"):
         Journal(tmp_path).load()
 
 

@@ -1,18 +1,24 @@
 """A tube's process over its lives: what it saves, what it forgets, and that nothing it says can end it."""
 
+import errno
 import math
 from pathlib import Path
 
+import msgpack
+import numpy as np
 import pytest
 
 from node.firmware.settings import Joint, TubeSettings
 from node.kernels.layout import PERIOD
+from node.process.journal import Journal
+from node.process.saver import SAVE_EVERY
 from node.process.tube_process import TubeProcess
 from telemetry.application.clock import ClockFilter
 from telemetry.messages import Aiding, Side
 from telemetry.schema import VARIANCE
 
 REST = (0.0, 0.0, 0.0, 0.0, 0.3, -9.8)
+TURN = 0.5  # rad/s
 
 
 def cycles(process: TubeProcess, count: int, start: float = 1000.0) -> float:
@@ -68,3 +74,110 @@ def test_an_aiding_that_grew_beyond_what_can_be_said_is_not_handed_on(tmp_path: 
         assert process.endpoint.counters["unsayable"] == unsayable
     cycles(process, 3, now)
     assert process.state[0]["yaw_known"]
+
+
+def noisy(process: TubeProcess, count: int, start: float = 1000.0, rate: float = 0.0) -> float:
+    """Cycles of a sensor with noise, which does not look stuck, at a rate (rad/s) about the axis."""
+    random, now = np.random.default_rng(int(start)), start
+    moved = np.array([0.0, 0.0, rate, *REST[3:]])
+    for _ in range(count):
+        now += PERIOD
+        noise = random.normal(0.0, 1e-4, 6)
+        process.on_cycle([now - PERIOD, *(noise + moved)], now)
+        process.take_frames(now)
+    return now
+
+
+@pytest.fixture
+def saves(monkeypatch: pytest.MonkeyPatch) -> list[int]:
+    """Whether the node was still, of every save."""
+    made: list[int] = []
+    plain = Journal.save
+
+    def save(self: Journal, state, blob: bytes) -> None:
+        made.append(int(state[0]["filter"]["still_cycles"]) > 0)
+        plain(self, state, blob)
+
+    monkeypatch.setattr(Journal, "save", save)
+    return made
+
+
+def test_at_rest_a_node_saves_every_five_minutes(tmp_path: Path, saves: list[int]) -> None:
+    process = TubeProcess(TubeSettings(3), tmp_path)
+    now = noisy(process, 200)
+    saves.clear()
+    noisy(process, 5 * SAVE_EVERY, now)
+    assert abs(SAVE_EVERY * PERIOD - 300.0) < 1.0
+    assert saves == [True] * 5
+
+
+def test_no_save_shows_a_rest_that_is_over(tmp_path: Path, saves: list[int]) -> None:
+    process = TubeProcess(TubeSettings(3), tmp_path)
+    now = noisy(process, 200)
+    for _ in range(3):
+        now = noisy(process, 1, now, TURN)
+        assert not saves[-1], "in the first cycle of the turn"
+        saves.clear()
+        now = noisy(process, 40, now, TURN)
+        assert saves == [], "a turn is saved once"
+        now = noisy(process, 60, now)
+        assert saves[-1]
+
+
+def test_what_is_sent_is_on_the_disk(tmp_path: Path) -> None:
+    process = TubeProcess(TubeSettings(3), tmp_path)
+    process.endpoint.clock = ClockFilter(is_root=True)
+    now, numbers = 1000.0, set()
+    for k in range(400):
+        now = noisy(process, 1, now, TURN if 150 < k < 200 or k == 300 else 0.0)
+        loaded = Journal(tmp_path).load()
+        assert loaded is not None
+        saved, sent = msgpack.unpackb(loaded[1]), msgpack.unpackb(process.endpoint.export_state())
+        assert saved[:3] == sent[:3], "next number, what waits for its receipt, answers"
+        numbers.add(saved[0])
+    assert len(numbers) > 5
+
+
+def test_power_that_comes_and_goes_spares_the_yaw_of_a_node_at_rest(tmp_path: Path, saves: list[int]) -> None:
+    process = TubeProcess(TubeSettings(3), tmp_path)
+    process.endpoint.clock = ClockFilter(is_root=True)
+    now = noisy(process, 200)
+    process._on_aiding(Aiding(1.0, 1e-9, 0.0, 0.0, 0.0, now, 1, 1), now)
+    noisy(process, SAVE_EVERY, now)
+    sigma = float(process.state[0]["P"][2, 2]) ** 0.5
+    assert sigma < 0.01
+    saves.clear()
+    for _ in range(3):
+        again = TubeProcess(TubeSettings(3), tmp_path)
+        assert again.state[0]["yaw_known"] == 1
+        assert float(again.state[0]["P"][2, 2]) ** 0.5 < 0.01
+    assert saves == [], "a start that learns nothing writes nothing"
+
+
+def test_a_node_runs_on_where_the_disk_refuses_and_says_so_once(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    process = TubeProcess(TubeSettings(3), tmp_path)
+    process.endpoint.clock = ClockFilter(is_root=True)
+    told: list[str] = []
+    plain = process._send_event
+
+    def tell(severity, code, arguments) -> None:
+        told.append(code)
+        plain(severity, code, arguments)
+
+    monkeypatch.setattr(process, "_send_event", tell)
+    now = noisy(process, 30)
+    with monkeypatch.context() as patch:
+
+        def refuse(*_: object) -> None:
+            raise OSError(errno.EIO, "worn out")
+
+        patch.setattr(Journal, "_write", refuse)
+        now = noisy(process, 120, now)
+        assert process.state[0]["static_bias_var"].any(), "it learnt its bias, an event that it could not save"
+        assert told == ["state_not_saved"]
+    now = noisy(process, 30, now, TURN)
+    process._saver._journal.worn |= {7}
+    noisy(process, 3, now, TURN)
+    assert told == ["state_not_saved", "saved_slot_worn"]

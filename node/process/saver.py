@@ -1,0 +1,88 @@
+"""When a node saves: at every event, when a saved rest ends, and slowly otherwise.
+
+What must not be lost makes an event, a survey or a reply, and each is on the disk before its frame leaves: a
+number that was sent is never given to another message. What changes without an event is worth little after a cut: a
+yaw at rest stands still, a yaw while turning is void, and the bias that wanders is another one after a quarter of a
+minute.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+from typing import Final
+
+from node.errors import SavedStateError
+from node.kernels.layout import Array
+from node.process.journal import SLOTS, Journal
+from telemetry.messages import Scalar, Severity
+
+SAVE_EVERY: Final = 570  # cycles without any other save, 300 s
+
+Say = Callable[[Severity, str, dict[str, Scalar]], None]
+
+
+class Saver:
+    """Saved state of one node in ``folder``.
+
+    Attributes
+    ----------
+    fault : why nothing was loaded although there was something, or empty
+    due : what must not be lost waits for the end of this cycle or frame
+    """
+
+    def __init__(self, folder: Path) -> None:
+        self._journal = Journal(folder)
+        self._cycles = 0  # since the last save
+        self._saved_still = False
+        self._refused = ""  # why the last save failed
+        self._told_refused = False
+        self._told_worn = 0
+        self.fault = ""
+        self.due = False
+
+    def load(self) -> tuple[Array, bytes] | None:
+        """Record and telemetry blob of the newest good slot, or None where there is none."""
+        try:
+            saved = self._journal.load()
+        except SavedStateError as error:
+            self.fault = str(error)
+            return None
+        self._saved_still = saved is not None and is_still(saved[0])
+        return saved
+
+    def save(self, nodes: Array, blob: bytes) -> None:
+        """Save now. A disk that refuses does not end the node: it runs on and reports it (``report``)."""
+        self.due, self._cycles = False, 0
+        try:
+            self._journal.save(nodes, blob)
+        except OSError as error:
+            self._refused = str(error)
+        else:
+            self._refused, self._told_refused = "", False
+            self._saved_still = is_still(nodes)
+
+    def count_cycle(self, nodes: Array) -> None:
+        """A cycle ended: save if the last save was long ago, or shows a rest that is over.
+
+        A node that wakes believes a saved rest, so the newest slot must not show one while the string turns.
+        """
+        self._cycles += 1
+        if self._cycles >= SAVE_EVERY or (self._saved_still and not is_still(nodes)):
+            self.due = True
+
+    def report(self, say: Say) -> None:
+        """Say once what the disk refused."""
+        worn = self._journal.worn
+        if len(worn) > self._told_worn:
+            slots = ", ".join(map(str, sorted(worn)))
+            say(Severity.WARNING, "saved_slot_worn", {"slots": slots, "left": SLOTS - len(worn)})
+        self._told_worn = max(self._told_worn, len(worn))
+        if self._refused and not self._told_refused:
+            self._told_refused = True
+            say(Severity.ERROR, "state_not_saved", {"detail": self._refused[:200]})
+
+
+def is_still(nodes: Array) -> bool:
+    """Whether a node that wakes with this record keeps its yaw."""
+    return int(nodes[0]["filter"]["still_cycles"]) > 0
