@@ -3,12 +3,15 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from typing import Any, Final
 
+from node.firmware.alignment import NAMES_OF_METHODS
 from node.firmware.pending_event import PendingEvent
+from node.kernels.aligner import FASTEST, LARGEST_OFFSET, MOST_LEAN, PATIENCE, Reason
 from node.kernels.events import Code, Fault
+from node.kernels.layout import DEG
 from node.kernels.make_up import MOVING, STARTED_ANEW, UNKNOWN
 from node.kernels.record import EVENTS_KEPT
 from telemetry.messages import Scalar, Severity
@@ -23,11 +26,15 @@ NAMES_OF_FAULTS: Final = {fault: fault.name.lower() for fault in Fault}
 
 @dataclass(frozen=True, slots=True)
 class Told:
-    """One line of the table: name of the event, its severity, and its arguments with how each is made of its number."""
+    """One line of the table: name of the event, its severity, and its arguments with how each is made of its number.
+
+    Where an argument is made of several numbers, ``words`` makes all of them.
+    """
 
     name: str
     severity: Severity
     arguments: tuple[tuple[str, Callable[[float], Scalar]], ...] = ()
+    words: Callable[[Sequence[float]], dict[str, Scalar]] | None = None
 
 
 def fault_name(number: float) -> str:
@@ -40,10 +47,60 @@ def joint_reason(number: float) -> str:
     return JOINT_REASONS[int(number)]
 
 
+def method_name(number: float) -> str:
+    """Name of a method of alignment."""
+    return NAMES_OF_METHODS[int(number)]
+
+
+def alignment_refused(numbers: Sequence[float]) -> dict[str, Scalar]:
+    """Why an alignment ended without an offset: reason, turns, IMU (0: all), and two numbers of the reason."""
+    number, turns, imu, a, b = numbers[:5]
+    text = alignment_reason(number, turns, a, b)
+    return {"reason": f"IMU {int(imu)}: {text}" if imu else text, "turns": turns}
+
+
+def alignment_dropped(numbers: Sequence[float]) -> dict[str, Scalar]:
+    """Why the offset in use was forgotten."""
+    return {"reason": alignment_reason(numbers[0], 0.0, math.nan, math.nan)}
+
+
+def alignment_reason(number: float, turns: float, a: float, b: float) -> str:
+    """Text of a reason; ``a`` and ``b`` are its numbers, angles in degrees."""
+    return {
+        Reason.CYCLES_LOST: "cycles were lost",
+        Reason.SENSOR_FAULTY: "a sensor is faulty",
+        Reason.TOO_FAST: f"too fast: {a:.3g} deg/s, expected at most {FASTEST / DEG:g}",
+        Reason.TURNED_BACK: "the string turned back",
+        Reason.NEVER_TURNED: f"timed out: the string stood still for {PATIENCE:g} s",
+        Reason.TOO_FEW_TURNS: f"too few turns: the string stood still after {turns:.2f} of {a:g}",
+        Reason.TOO_LONG: f"timed out after {turns:.2f} of {a:g} turns",
+        Reason.NO_CIRCLE: "the turn determines no circle",
+        Reason.SHAKES: f"the string shakes: {a:.3g} deg, expected at most {b:.3g}",
+        Reason.LITTLE_LEAN: f"too little lean: {a:.3g} deg, expected at least {b:.3g}",
+        Reason.MUCH_LEAN: f"too much lean: {a:.3g} deg, expected at most {MOST_LEAN / DEG:g}",
+        Reason.LARGE_OFFSET: f"offset of {a:.3g} deg, expected at most {LARGEST_OFFSET / DEG:g}",
+        Reason.ORDERED: "ordered",
+        Reason.OTHER_ACCELEROMETER: "another block for the accelerometer",
+        Reason.OTHER_GYROSCOPE: "another block for the gyroscope",
+    }[Reason(int(number))]
+
+
 YAW: Final = (("yaw_deg", float),)
 MISMATCH: Final = (("mismatch_dps", float), ("spin_dps", float))
 JOINT: Final = (("angle_deg", float), ("sigma_deg", float), ("marks_deg", float), ("turned", bool))
 TWISTED: Final = (("torque_nm", float), ("twist_sigma_deg", float))
+MOUNTED: Final = (
+    ("imu", int),
+    ("method", method_name),
+    ("turns", float),
+    ("pitch_deg", float),
+    ("roll_deg", float),
+    ("pitch_std_deg", float),
+    ("roll_std_deg", float),
+    ("lean_deg", float),
+    ("noise_deg", float),
+    ("samples", int),
+)
 EVENT_TABLE: Final[dict[Code, Told]] = {
     Code.BAD_SAMPLE: Told("bad_sample", Severity.ERROR),
     Code.GYRO_SATURATED: Told("gyro_saturated", Severity.ERROR),
@@ -72,6 +129,11 @@ EVENT_TABLE: Final[dict[Code, Told]] = {
     Code.UNREADABLE: Told("bad_sample", Severity.ERROR, YAW),
     Code.FILTER_FAULT: Told("filter_fault", Severity.ERROR, YAW),
     Code.AIDING_REJECTED: Told("aiding_rejected", Severity.WARNING, (("sigmas", float),)),
+    Code.ALIGNMENT_BEGUN: Told("alignment_begun", Severity.INFO, (("method", method_name), ("turns", float))),
+    Code.ALIGNMENT_TURNING: Told("alignment_turning", Severity.INFO, (("rate_dps", float),)),
+    Code.ALIGNED: Told("aligned", Severity.INFO, MOUNTED),
+    Code.ALIGNMENT_REFUSED: Told("alignment_refused", Severity.WARNING, words=alignment_refused),
+    Code.ALIGNMENT_DROPPED: Told("alignment_dropped", Severity.WARNING, words=alignment_dropped),
 }
 
 
@@ -82,5 +144,11 @@ def take_events(events: Any) -> Iterator[PendingEvent]:
     for number in range(max(said, told - EVENTS_KEPT), told):
         event = events["ring"][number % EVENTS_KEPT]
         line = EVENT_TABLE[Code(int(event["code"]))]
-        values = zip(line.arguments, event["numbers"].tolist(), strict=False)
-        yield line.name, line.severity, {name: made(value) for (name, made), value in values if not math.isnan(value)}
+        numbers = event["numbers"].tolist()
+        yield line.name, line.severity, line.words(numbers) if line.words else arguments_of(line, numbers)
+
+
+def arguments_of(line: Told, numbers: Sequence[float]) -> dict[str, Scalar]:
+    """Arguments of an event, each made of its number; without those whose number is none."""
+    values = zip(line.arguments, numbers, strict=False)
+    return {name: made(value) for (name, made), value in values if not math.isnan(value)}

@@ -8,7 +8,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from node.firmware.alignment import FASTEST, Aligner, alignment_in_use, realign
+from node.firmware.alignment import alignment_in_use, order_alignment
 from node.firmware.block_trial import record_of, recorrect
 from node.firmware.event_table import take_events
 from node.firmware.imu_fusion import ImuFusion
@@ -17,8 +17,10 @@ from node.firmware.kernel_choice import kernel_of
 from node.firmware.reporter import Reporter
 from node.firmware.settings import TubeSettings, crew_record
 from node.firmware.static_record import StaticRecorder
+from node.kernels.aligner import FASTEST, Reason, drop_alignment, refuse_alignment
 from node.kernels.calibration import USUAL
 from node.kernels.cycle import run_cycle as float_cycle
+from node.kernels.events import NONE
 from node.kernels.layout import DEG, Array, Scheme
 from node.kernels.modes import STATIC_BIAS
 from node.kernels.record import MOMENT, READING
@@ -92,9 +94,6 @@ class Tube:
         self.reporter = Reporter(settings, nodes, configs, next_sequence, restored=restored)
         self._recorder = StaticRecorder()
         count = len(settings.imus)
-        noise = float(self.config["force_std"] / self.config["gravity"])
-        self._aligner = Aligner(self._mount, settings.imus, noise)
-        self._axes = self._mount["axis"][:count]
         self._fusion = ImuFusion(settings, self._crew, nodes, configs) if count > 1 else None
         self._loop = kernel_of(settings.kernel)
         own = [ParameterBlock(settings.tube, 0, imu.gyroscope, imu.accelerometer) for imu in settings.imus]
@@ -140,7 +139,7 @@ class Tube:
         self._moment[:] = moment
         rows = self._readings
         rows[0] = (*reading.rate, *reading.force, reading.temperature, reading.saturated)
-        if self._loop is None and self._fusion is None and self._aligner.idle:
+        if self._loop is None and self._fusion is None:
             says = node_step(self.nodes, self.configs, self._crew, self._corrections, rows, self._moment)
             said: list[Said] = []
         else:
@@ -175,7 +174,7 @@ class Tube:
     def align(self, method: object, turns: object) -> str:
         """Find the tube's axis in the coming slow turns, or drop the offset in use; returns why not, or nothing."""
         if method == "none":
-            self._drop_alignment("ordered")
+            drop_alignment(self.node, self._crew[0], int(Reason.ORDERED))
             return ""
         if self.state["mode"] == STATIC_BIAS:
             return "the static bias is not known yet"
@@ -183,20 +182,20 @@ class Tube:
             return "a sensor is faulty"
         if abs(rate := float(self.state["now_rate"])) > FASTEST:
             return f"too fast: {abs(rate) / DEG:.3g} deg/s, expected at most {FASTEST / DEG:g}"
-        return self._aligner.start(method, turns)
+        return order_alignment(self.node, method, turns)
 
     @property
     def alignment(self) -> dict[str, Value]:
         """The alignment in use: method and angles (rad) of each IMU."""
-        return alignment_in_use(self._mount, len(self._axes))
+        return alignment_in_use(self._mount, len(self.settings.imus))
 
     def prepare(self, block: ParameterBlock) -> None:
         """Forget what was learnt under the present block and would be wrong under ``block``."""
         if block.accelerometer != self.parameters.accelerometer:
-            self._drop_alignment("another block for the accelerometer")
+            drop_alignment(self.node, self._crew[0], int(Reason.OTHER_ACCELEROMETER))
         if block.gyroscope != self.parameters.gyroscope:
-            if self._aligner.running:
-                self._aligner.stop("another block for the gyroscope")
+            if self.node["aligner"]["method"]:
+                refuse_alignment(self.node, int(Reason.OTHER_GYROSCOPE), 0, NONE, NONE)
             forget_bias(self.state, self.config)
         if block.accelerometer != self.parameters.accelerometer:
             lose_tilt(self.state)
@@ -258,7 +257,7 @@ class Tube:
         return gates
 
     def _run_in_parts(self, reading: ImuReading, context: RigContext) -> tuple[int, list[Said]]:
-        """``node_step`` with another loop, several IMUs or an alignment under way; what it says, and what is said."""
+        """``node_step`` with another loop or several IMUs; what it says, and what is said."""
         node, moment = self.node, self._moment
         if not admit(self.nodes, moment):
             return int(say_events(node)), []
@@ -273,13 +272,14 @@ class Tube:
         args = (node["rate"], node["force"], reading.start, reading.end, int(context.joined))
         status = run_cycle(self.state, self.config, *args)
         judge(self.nodes, self.configs, moment, int(status), waits)
-        self._follow_alignment(reading)
-        if self._fusion is not None and self.quiet:
-            self._fusion.cluster.learn_offsets(self._fusion.rates)
-        pending = [*take_events(node["events"]), *self._aligner.drain_events()]
+        healthy = self._fusion is None or bool(self._fusion.cluster.used.all())
+        pending = list(take_events(node["events"]))
         if self._fusion is not None:
             pending += self._fusion.cluster.drain_events()
-        return int(finish(self.nodes, self._crew)), list(self.reporter.pending_events(pending, context))
+        says = int(finish(self.nodes, self._crew, moment, int(healthy)))
+        if self._fusion is not None and self.quiet:
+            self._fusion.cluster.learn_offsets(self._fusion.rates)
+        return says, list(self.reporter.pending_events(pending, context))
 
     def _say(self, says: int, reading: ImuReading, context: RigContext) -> Iterator[Said]:
         """What the step has to say, in order."""
@@ -304,25 +304,6 @@ class Tube:
         joints = max(aiding.systematic_var - var, 0.0)
         torque, holding = float(twist["torque"]), bool(twist["holding"])
         return replace(aiding, systematic_var=joints, torque=torque, torsion_var=var, under_torque=holding)
-
-    def _follow_alignment(self, reading: ImuReading) -> None:
-        if not self._aligner.running:
-            return
-        before = self._axes.copy()
-        used = np.full(len(before), not self.reporter.sensor_flags)
-        if self._fusion is not None:
-            used &= self._fusion.cluster.used
-        rate = float(self.state["now_rate"])
-        aided = reading.end - float(self.state["last_aided"]) <= self.settings.aiding_old_after
-        yaw = self.yaw if aided else math.nan
-        unaligned = self.node["unaligned"][: len(before)]
-        if self._aligner.on_turn_sample(unaligned, rate, yaw, reading.start, reading.end, used):
-            realign(self.state, before, self._axes)
-
-    def _drop_alignment(self, reason: str) -> None:
-        before = self._axes.copy()
-        self._aligner.drop(reason)
-        realign(self.state, before, self._axes)
 
     def _record(self, reading: ImuReading, context: RigContext) -> Iterator[StaticRecord | Event]:
         recorder, raw = self._recorder, self.raw

@@ -91,6 +91,19 @@ def to_tube(axis: Array, vector: Array) -> None:
 
 
 @kernel
+def clear_sweep(sweep: Any) -> None:
+    """Begin anew; the extremes begin with the first sample."""
+    sweep.samples = 0
+    sweep.sum_angle, sweep.sum_angle_squares = 0.0, 0.0
+    sweep.sum_spin, sweep.sum_angle_spin = 0.0j, 0.0j
+    for i in range(3):
+        sweep.sum[i] = 0.0
+        sweep.sum_back[i], sweep.sum_angle_back[i] = 0.0j, 0.0j
+        for j in range(3):
+            sweep.sum_products[i, j] = 0.0
+
+
+@kernel
 def add_to_sweep(sweep: Any, force: Array, angle: float) -> None:
     """Take one mean specific force (3, m/s^2, IMU's frame), ``angle`` (rad) the turn so far in the middle of its cycle.
 

@@ -10,12 +10,12 @@ from typing import Final
 
 import numpy as np
 
-from node.kernels.alignment import MAX_IMUS, MOUNT, new_mount
+from node.kernels.alignment import MAX_IMUS, MOUNT, OFFSET, SWEEP, new_mount
 from node.kernels.layout import STATE, Array, new_state
 
-NODE_LAYOUT: Final = 3  # of the saved record; 1 and 2 held the filter alone
+NODE_LAYOUT: Final = 4  # of the saved record; 1 and 2 held the filter alone, 3 no alignment under way
 EVENTS_KEPT: Final = 32  # that wait to be said
-NUMBERS: Final = 4  # of one event
+NUMBERS: Final = 10  # of one event
 DISAGREEMENTS: Final = 3  # aidings in a row, until a mismatch is a fault
 UNSAID: Final = -1  # of a place that nothing was written to
 
@@ -91,6 +91,26 @@ JOINTS: Final = np.dtype(
     ],
     align=True,
 )
+ALIGNER: Final = np.dtype(
+    [
+        ("method", "i8"),  # of the alignment under way; 0: none is
+        ("wanted", "f8"),  # turns
+        ("angle", "f8"),  # rad, turned so far
+        ("yaw", "f8"),  # rad, the filter's, of the last cycle; NaN while it was not aided
+        ("sense", "f8"),  # of the turn, 1 or -1; 0 before it began
+        ("ordered_at", "f8"),  # s, own clock, of the first cycle after the order; NaN before it
+        ("last_end", "f8"),  # s, of the last cycle
+        ("steady", "i8"),  # cycles of turning in a row
+        ("slow", "i8"),  # cycles in a row, too slow
+        ("sweeps", SWEEP, (MAX_IMUS,)),
+        ("offsets", OFFSET, (MAX_IMUS,)),
+        ("force", "f8", (3,)),  # work space
+        ("sums", "f8", (2, 3)),
+        ("rotations", "f8", (2, 3, 3)),
+        ("turn", "f8", (3, 3)),
+    ],
+    align=True,
+)
 EVENT: Final = np.dtype([("code", "i8"), ("numbers", "f8", (NUMBERS,))], align=True)
 EVENTS: Final = np.dtype([("told", "i8"), ("said", "i8"), ("ring", EVENT, (EVENTS_KEPT,))], align=True)
 NODE: Final = np.dtype(
@@ -100,6 +120,7 @@ NODE: Final = np.dtype(
         ("guard", GUARD),
         ("twist", TWIST),
         ("joints", JOINTS),
+        ("aligner", ALIGNER),
         ("events", EVENTS),
         ("cycles", "i8"),  # since the start
         ("overruns", "i8"),  # cycles that came too late
@@ -139,6 +160,10 @@ SETTINGS: Final = np.dtype(
         ("force_range", "f8"),  # m/s^2
         ("repeats_together", "i8"),  # 0: not looked at
         ("repeats_alone", "i8"),
+        ("imus", "i8"),
+        ("place", "f8", (MAX_IMUS, 2)),  # m, of each IMU across the tube's axis
+        ("noise", "f8", (MAX_IMUS,)),  # standard deviation of each, in that of the configuration
+        ("tilt_noise", "f8"),  # rad, of one sample of a force at rest, as a tilt, for a noise of 1
     ],
     align=True,
 )
@@ -178,6 +203,7 @@ def forget_session(nodes: Array) -> None:
     nodes["twist"]["holding"] = 0
     nodes["joints"]["hops"] = -1
     nodes["joints"]["solved"] = 0
+    nodes["aligner"] = np.zeros(1, ALIGNER)
     nodes["events"]["told"] = nodes["events"]["said"] = 0
     for name in ("cycles", "overruns", "status", "noticed", "rejecting", "slow_cycles", "stamp_hops"):
         nodes[name] = 0

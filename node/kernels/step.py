@@ -10,6 +10,7 @@ from __future__ import annotations
 import math
 from typing import Any, Final
 
+from node.kernels.aligner import follow_alignment
 from node.kernels.alignment import to_tube
 from node.kernels.angles import from_binary, wrap
 from node.kernels.calibration import calibrate
@@ -72,6 +73,7 @@ def node_step(nodes: Array, configs: Array, settings: Array, parameters: Array, 
     joined = 1 if moment[JOINED] != 0.0 else 0
     status = run_cycle(node.filter, config, node.rate, node.force, moment[START], moment[END], joined)
     after_loop(node, config, moment, status, waits)
+    follow_alignment(node, crew, moment[START], moment[END], 1)
     return conclude(node, crew)
 
 
@@ -104,8 +106,12 @@ def judge(nodes: Array, configs: Array, moment: Array, status: int, waits: int) 
 
 
 @kernel
-def finish(nodes: Array, settings: Array) -> int:
-    """The end of a step: tell what the cycle found; returns what there is to say."""
+def finish(nodes: Array, settings: Array, moment: Array, healthy: int) -> int:
+    """The end of a step: follow an alignment, tell what the cycle found; returns what there is to say.
+
+    ``healthy`` is 0 while an IMU is left out.
+    """
+    follow_alignment(nodes[0], settings[0], moment[START], moment[END], healthy)
     return int(conclude(nodes[0], settings[0]))
 
 
