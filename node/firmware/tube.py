@@ -16,9 +16,8 @@ from node.firmware.inputs import ImuReading, RigContext
 from node.firmware.kernel_choice import kernel_of
 from node.firmware.reporter import Reporter
 from node.firmware.settings import TubeSettings, crew_record
-from node.firmware.static_record import StaticRecorder
+from node.firmware.static_record import begin_record, static_record
 from node.kernels.aligner import FASTEST, Reason, drop_alignment, refuse_alignment
-from node.kernels.calibration import USUAL
 from node.kernels.cycle import run_cycle as float_cycle
 from node.kernels.events import NONE
 from node.kernels.layout import DEG, Array, Scheme
@@ -30,14 +29,16 @@ from node.kernels.step import (
     ONWARD,
     SAY_ESTIMATE,
     SAY_EVENTS,
+    SAY_RECORD,
     SAY_STATE,
     SAY_SURVEY,
-    STILL_CYCLES,
     USED,
     admit,
     correct,
     finish,
     hand_down,
+    is_quiet,
+    is_standing,
     judge,
     node_aiding,
     node_step,
@@ -92,7 +93,6 @@ class Tube:
         self._next_sequence = next_sequence
         self._restored = restored
         self.reporter = Reporter(settings, nodes, configs, next_sequence, restored=restored)
-        self._recorder = StaticRecorder()
         count = len(settings.imus)
         self._fusion = ImuFusion(settings, self._crew, nodes, configs) if count > 1 else None
         self._loop = kernel_of(settings.kernel)
@@ -146,7 +146,7 @@ class Tube:
             for k in range(1, len(rows)):
                 rows[k] = _row_of(reading.others[k - 1]) if k <= len(reading.others) else math.nan
             says, said = self._run_in_parts(reading, context)
-        if says in (0, ADMITTED) and not self._recorder.running:
+        if says in (0, ADMITTED):
             return said
         return said + list(self._say(says, reading, context))
 
@@ -169,7 +169,7 @@ class Tube:
 
     def start_record(self, seconds: object, command: int) -> str:
         """Average raw readings for ``seconds`` from the next cycle on; returns why not, or nothing."""
-        return self._recorder.start(seconds, command, standing=self.standing)
+        return begin_record(self.node["recording"], seconds, command, standing=self.standing)
 
     def align(self, method: object, turns: object) -> str:
         """Find the tube's axis in the coming slow turns, or drop the offset in use; returns why not, or nothing."""
@@ -210,12 +210,12 @@ class Tube:
     @property
     def quiet(self) -> bool:
         """Whether the node stands still by the block and the bias in use."""
-        return int(self.state["still_cycles"]) >= STILL_CYCLES
+        return bool(is_quiet(self.node))
 
     @property
     def standing(self) -> bool:
         """Whether the node may be at rest: quiet, or slow and without a bias, whose offset may look like a rate."""
-        return self.quiet or (self.state["mode"] == STATIC_BIAS and int(self.node["slow_cycles"]) >= STILL_CYCLES)
+        return bool(is_standing(self.node))
 
     @property
     def yaw(self) -> float:
@@ -286,8 +286,11 @@ class Tube:
         reporter = self.reporter
         if says & SAY_EVENTS:
             yield from reporter.pending_events(take_events(self.node["events"]), context)
-        if says & ADMITTED and self._recorder.running:
-            yield from self._record(reading, context)
+        if says & SAY_RECORD:
+            record = static_record(
+                self.node["recording"], self.settings.tube, reading.end, context.rig_now, self._next_sequence
+            )
+            yield record or reporter.event("static_record_empty", Severity.ERROR, context.rig_now, {})
         if says & SAY_SURVEY:
             samples = int(self.config["survey_samples"])
             imus = self._fusion.cluster.survey(samples) if self._fusion is not None else ()
@@ -304,14 +307,6 @@ class Tube:
         joints = max(aiding.systematic_var - var, 0.0)
         torque, holding = float(twist["torque"]), bool(twist["holding"])
         return replace(aiding, systematic_var=joints, torque=torque, torsion_var=var, under_torque=holding)
-
-    def _record(self, reading: ImuReading, context: RigContext) -> Iterator[StaticRecord | Event]:
-        recorder, raw = self._recorder, self.raw
-        temperature = raw.temperature if math.isfinite(raw.temperature) else USUAL
-        recorder.append_reading(raw.rate, raw.force, temperature, reading.start, standing=self.standing)
-        if recorder.is_due(reading.end):
-            record = recorder.finish(self.settings.tube, reading.end, context.rig_now, self._next_sequence)
-            yield record or self.reporter.event("static_record_empty", Severity.ERROR, context.rig_now, {})
 
 
 def _row_of(reading: ImuReading) -> tuple[float, ...]:

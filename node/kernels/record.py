@@ -12,8 +12,9 @@ import numpy as np
 
 from node.kernels.alignment import MAX_IMUS, MOUNT, OFFSET, SWEEP, new_mount
 from node.kernels.layout import STATE, Array, new_state
+from node.kernels.static_average import STATIC
 
-NODE_LAYOUT: Final = 4  # of the saved record; 1 and 2 held the filter alone, 3 no alignment under way
+NODE_LAYOUT: Final = 4  # of the saved record; 1 and 2 held the filter alone, 3 no alignment and no recording under way
 EVENTS_KEPT: Final = 32  # that wait to be said
 NUMBERS: Final = 10  # of one event
 DISAGREEMENTS: Final = 3  # aidings in a row, until a mismatch is a fault
@@ -111,6 +112,16 @@ ALIGNER: Final = np.dtype(
     ],
     align=True,
 )
+RECORDING: Final = np.dtype(
+    [
+        ("running", "i8"),
+        ("command", "i8"),  # number of the order
+        ("seconds", "f8"),
+        ("begun", "f8"),  # s, own clock; NaN before the first cycle
+        ("sums", STATIC),
+    ],
+    align=True,
+)
 EVENT: Final = np.dtype([("code", "i8"), ("numbers", "f8", (NUMBERS,))], align=True)
 EVENTS: Final = np.dtype([("told", "i8"), ("said", "i8"), ("ring", EVENT, (EVENTS_KEPT,))], align=True)
 NODE: Final = np.dtype(
@@ -121,6 +132,7 @@ NODE: Final = np.dtype(
         ("twist", TWIST),
         ("joints", JOINTS),
         ("aligner", ALIGNER),
+        ("recording", RECORDING),
         ("events", EVENTS),
         ("cycles", "i8"),  # since the start
         ("overruns", "i8"),  # cycles that came too late
@@ -204,6 +216,7 @@ def forget_session(nodes: Array) -> None:
     nodes["joints"]["hops"] = -1
     nodes["joints"]["solved"] = 0
     nodes["aligner"] = np.zeros(1, ALIGNER)
+    nodes["recording"] = np.zeros(1, RECORDING)
     nodes["events"]["told"] = nodes["events"]["said"] = 0
     for name in ("cycles", "overruns", "status", "noticed", "rejecting", "slow_cycles", "stamp_hops"):
         nodes[name] = 0

@@ -21,16 +21,18 @@ from node.kernels.guard import admits, gate_aiding, guard_reading, judge_cycle
 from node.kernels.jit import kernel
 from node.kernels.layout import CLOCK_SLACK, DEG, Array, Scheme, Status
 from node.kernels.make_up import follow_joints
+from node.kernels.modes import STATIC_BIAS
 from node.kernels.record import CLOCK_VAR, END, FX, HOPS, JOINED, SATURATED, START, SYNCHRONISED, TEMPERATURE, WX
 from node.kernels.relay import offer_aiding
 from node.kernels.resets import set_stamp_prior, start_over
 from node.kernels.sensor_watch import largest
+from node.kernels.static_average import follow_recording
 from node.kernels.twist import gate_twist, holds_survey, reaching_var, twist_var
 
 STILL_CYCLES: Final = 4  # after which a node takes itself for standing
 LARGEST_OFFSET: Final = 6.0 * DEG  # rad/s, of a gyroscope never calibrated; the slow alignment turn is faster
 LEAST_STAMP: Final = 1e-4  # s, of a time stamp, whatever the clock says
-SAY_EVENTS, SAY_SURVEY, SAY_ESTIMATE, SAY_STATE, ADMITTED = 1, 2, 4, 8, 16
+SAY_EVENTS, SAY_SURVEY, SAY_ESTIMATE, SAY_STATE, SAY_RECORD, ADMITTED = 1, 2, 4, 8, 16, 32
 USED, ONWARD = 1, 2  # of an aiding: it is for the filter, and it goes down
 FORWARD, FILTER_FAULT = int(Scheme.FORWARD), int(Status.FILTER_FAULT)
 AIDED, SURVEY_READY = int(Status.AIDED), int(Status.SURVEY_READY)
@@ -74,7 +76,7 @@ def node_step(nodes: Array, configs: Array, settings: Array, parameters: Array, 
     status = run_cycle(node.filter, config, node.rate, node.force, moment[START], moment[END], joined)
     after_loop(node, config, moment, status, waits)
     follow_alignment(node, crew, moment[START], moment[END], 1)
-    return conclude(node, crew)
+    return conclude(node, crew, moment)
 
 
 @kernel
@@ -112,7 +114,7 @@ def finish(nodes: Array, settings: Array, moment: Array, healthy: int) -> int:
     ``healthy`` is 0 while an IMU is left out.
     """
     follow_alignment(nodes[0], settings[0], moment[START], moment[END], healthy)
-    return int(conclude(nodes[0], settings[0]))
+    return int(conclude(nodes[0], settings[0], moment))
 
 
 @kernel
@@ -168,8 +170,8 @@ def after_loop(node: Any, config: Any, moment: Array, status: int, waits: int) -
 
 
 @kernel
-def conclude(node: Any, settings: Any) -> int:
-    """Tell what the cycle found, as events; returns what there is to say."""
+def conclude(node: Any, settings: Any, moment: Array) -> int:
+    """Tell what the cycle found, as events, and record it; returns what there is to say."""
     state, status = node.filter, node.status
     if status & ~AIDED:
         tell_status(node)
@@ -178,6 +180,8 @@ def conclude(node: Any, settings: Any) -> int:
         tell(node, AIDING_REJECTED, sigmas, NONE, NONE, NONE)
     node.rejecting = 1 if state.rejected > 0 else 0
     says = say_events(node) | ADMITTED
+    if follow_recording(node, moment[START], moment[END], 1 if is_standing(node) else 0):
+        says |= SAY_RECORD
     if status & SURVEY_READY:
         says |= SAY_SURVEY
     if settings.scheme != FORWARD and state.yaw_known == 1:
@@ -185,6 +189,18 @@ def conclude(node: Any, settings: Any) -> int:
     if status & ~AIDED or node.cycles % settings.state_every == 0:
         says |= SAY_STATE
     return says
+
+
+@kernel
+def is_quiet(node: Any) -> bool:
+    """Whether the node stands still by the block and the bias in use."""
+    return bool(node.filter.still_cycles >= STILL_CYCLES)
+
+
+@kernel
+def is_standing(node: Any) -> bool:
+    """Whether the node may be at rest: quiet, or slow and without a bias, whose offset may look like a rate."""
+    return bool(is_quiet(node) or (node.filter.mode == STATIC_BIAS and node.slow_cycles >= STILL_CYCLES))
 
 
 @kernel
