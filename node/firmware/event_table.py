@@ -42,6 +42,11 @@ def fault_name(number: float) -> str:
     return NAMES_OF_FAULTS[Fault(int(number))]
 
 
+def exclusion(number: float) -> str:
+    """Why an IMU was left out: its fault, or none and the others disagree with it."""
+    return fault_name(number) if number else "disagrees"
+
+
 def joint_reason(number: float) -> str:
     """Why a joint was not solved."""
     return JOINT_REASONS[int(number)]
@@ -134,6 +139,8 @@ EVENT_TABLE: Final[dict[Code, Told]] = {
     Code.ALIGNED: Told("aligned", Severity.INFO, MOUNTED),
     Code.ALIGNMENT_REFUSED: Told("alignment_refused", Severity.WARNING, words=alignment_refused),
     Code.ALIGNMENT_DROPPED: Told("alignment_dropped", Severity.WARNING, words=alignment_dropped),
+    Code.IMU_EXCLUDED: Told("imu_excluded", Severity.ERROR, (("imu", int), ("reason", exclusion))),
+    Code.IMU_BACK: Told("imu_back", Severity.WARNING, (("imu", int),)),
 }
 
 

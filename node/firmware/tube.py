@@ -11,21 +11,21 @@ import numpy as np
 from node.firmware.alignment import alignment_in_use, order_alignment
 from node.firmware.block_trial import record_of, recorrect
 from node.firmware.event_table import take_events
-from node.firmware.imu_fusion import ImuFusion
 from node.firmware.inputs import ImuReading, RigContext
-from node.firmware.kernel_choice import kernel_of
+from node.firmware.kernel_choice import Loop, kernel_of
 from node.firmware.reporter import Reporter
 from node.firmware.settings import TubeSettings, crew_record
 from node.firmware.static_record import begin_record, static_record
 from node.kernels.aligner import FASTEST, Reason, drop_alignment, refuse_alignment
-from node.kernels.cycle import run_cycle as float_cycle
+from node.kernels.cluster import begin_cluster
 from node.kernels.events import NONE
 from node.kernels.layout import DEG, Array, Scheme
 from node.kernels.modes import STATIC_BIAS
-from node.kernels.record import MOMENT, READING
+from node.kernels.record import END, JOINED, MOMENT, READING, START
 from node.kernels.resets import forget_bias, lose_tilt
 from node.kernels.step import (
     ADMITTED,
+    NOT_ADMITTED,
     ONWARD,
     SAY_ESTIMATE,
     SAY_EVENTS,
@@ -33,16 +33,13 @@ from node.kernels.step import (
     SAY_STATE,
     SAY_SURVEY,
     USED,
-    admit,
-    correct,
-    finish,
+    begin_step,
+    end_step,
     hand_down,
     is_quiet,
     is_standing,
-    judge,
     node_aiding,
     node_step,
-    prepare,
     say_events,
     take_aiding,
 )
@@ -94,7 +91,8 @@ class Tube:
         self._restored = restored
         self.reporter = Reporter(settings, nodes, configs, next_sequence, restored=restored)
         count = len(settings.imus)
-        self._fusion = ImuFusion(settings, self._crew, nodes, configs) if count > 1 else None
+        if count > 1:
+            begin_cluster(self.node, self.config, self._crew[0])
         self._loop = kernel_of(settings.kernel)
         own = [ParameterBlock(settings.tube, 0, imu.gyroscope, imu.accelerometer) for imu in settings.imus]
         self._corrections = np.concatenate([record_of(block) for block in (own[0], *own)])
@@ -139,16 +137,13 @@ class Tube:
         self._moment[:] = moment
         rows = self._readings
         rows[0] = (*reading.rate, *reading.force, reading.temperature, reading.saturated)
-        if self._loop is None and self._fusion is None:
+        for k in range(1, len(rows)):
+            rows[k] = _row_of(reading.others[k - 1]) if k <= len(reading.others) else math.nan
+        if self._loop is None:
             says = node_step(self.nodes, self.configs, self._crew, self._corrections, rows, self._moment)
-            said: list[Said] = []
         else:
-            for k in range(1, len(rows)):
-                rows[k] = _row_of(reading.others[k - 1]) if k <= len(reading.others) else math.nan
-            says, said = self._run_in_parts(reading, context)
-        if says in (0, ADMITTED):
-            return said
-        return said + list(self._say(says, reading, context))
+            says = self._run_in_parts(self._loop)
+        return [] if says in (0, ADMITTED) else list(self._say(says, reading, context))
 
     def boot_event(self, rig_now: float) -> Event:
         """Report that the node started, and whether with its saved yaw."""
@@ -256,30 +251,15 @@ class Tube:
             hand_down(self.nodes, self._crew)
         return gates
 
-    def _run_in_parts(self, reading: ImuReading, context: RigContext) -> tuple[int, list[Said]]:
-        """``node_step`` with another loop or several IMUs; what it says, and what is said."""
+    def _run_in_parts(self, loop: Loop) -> int:
+        """``node_step`` with another loop."""
         node, moment = self.node, self._moment
-        if not admit(self.nodes, moment):
-            return int(say_events(node)), []
-        saturated = int(reading.saturated)
-        if self._fusion is None:
-            correct(self.nodes, self._corrections, self._readings)
-        else:
-            self._fusion.fuse(self._corrections, self._readings)
-            saturated = 0
-        waits = prepare(self.nodes, self.configs, self._crew, moment, saturated)
-        run_cycle = self._loop.run_cycle if self._loop is not None else float_cycle
-        args = (node["rate"], node["force"], reading.start, reading.end, int(context.joined))
-        status = run_cycle(self.state, self.config, *args)
-        judge(self.nodes, self.configs, moment, int(status), waits)
-        healthy = self._fusion is None or bool(self._fusion.cluster.used.all())
-        pending = list(take_events(node["events"]))
-        if self._fusion is not None:
-            pending += self._fusion.cluster.drain_events()
-        says = int(finish(self.nodes, self._crew, moment, int(healthy)))
-        if self._fusion is not None and self.quiet:
-            self._fusion.cluster.learn_offsets(self._fusion.rates)
-        return says, list(self.reporter.pending_events(pending, context))
+        waits = begin_step(self.nodes, self.configs, self._crew, self._corrections, self._readings, moment)
+        if waits == NOT_ADMITTED:
+            return int(say_events(node))
+        times = float(moment[START]), float(moment[END]), int(moment[JOINED])
+        status = loop.run_cycle(self.state, self.config, node["rate"], node["force"], *times)
+        return int(end_step(self.nodes, self.configs, self._crew, moment, int(status), waits))
 
     def _say(self, says: int, reading: ImuReading, context: RigContext) -> Iterator[Said]:
         """What the step has to say, in order."""
@@ -292,9 +272,7 @@ class Tube:
             )
             yield record or reporter.event("static_record_empty", Severity.ERROR, context.rig_now, {})
         if says & SAY_SURVEY:
-            samples = int(self.config["survey_samples"])
-            imus = self._fusion.cluster.survey(samples) if self._fusion is not None else ()
-            yield reporter.survey(reading.end, context, imus)
+            yield reporter.survey(reading.end, context)
         if says & SAY_ESTIMATE:
             yield self._of_estimate(reporter.estimate(context))
         if says & SAY_STATE:

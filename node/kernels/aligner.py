@@ -12,6 +12,7 @@ from typing import Any, Final
 
 from node.kernels.alignment import CIRCLE, add_to_sweep, clear_sweep, fit_circle, take_extremes, to_tube
 from node.kernels.angles import from_binary, wrap
+from node.kernels.cluster import all_used
 from node.kernels.events import NONE, Code, tell, tell_more
 from node.kernels.jit import kernel
 from node.kernels.layout import DEG, PERIOD, RING, Array
@@ -104,10 +105,10 @@ def drop_alignment(node: Any, settings: Any, reason: int) -> None:
 
 
 @kernel
-def follow_alignment(node: Any, settings: Any, start: float, end: float, healthy: int) -> None:
+def follow_alignment(node: Any, settings: Any, start: float, end: float) -> None:
     """Follow one cycle of the alignment under way, ``start`` to ``end`` (s, own clock), after the filter's.
 
-    The forces are those of ``node.unaligned``; ``healthy`` is 0 while an IMU is left out.
+    The forces are those of ``node.unaligned``.
     """
     aligner, state, guard = node.aligner, node.filter, node.guard
     if aligner.method == 0:
@@ -121,7 +122,7 @@ def follow_alignment(node: Any, settings: Any, start: float, end: float, healthy
     aligner.last_end, aligner.yaw = end, yaw
     if not -PERIOD < gap < LARGEST_GAP:
         refuse_alignment(node, CYCLES_LOST, 0, NONE, NONE)
-    elif healthy == 0 or guard.gyro.fault != 0 or guard.force.fault != 0:
+    elif guard.gyro.fault != 0 or guard.force.fault != 0 or not all_used(node, settings):
         refuse_alignment(node, SENSOR_FAULTY, 0, NONE, NONE)
     elif abs(rate) > FASTEST:
         refuse_alignment(node, TOO_FAST, 0, abs(rate) / DEG, NONE)

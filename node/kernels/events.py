@@ -60,6 +60,8 @@ class Code(enum.IntEnum):
     ALIGNED = 30
     ALIGNMENT_REFUSED = 31
     ALIGNMENT_DROPPED = 32
+    IMU_EXCLUDED = 33
+    IMU_BACK = 34
 
 
 @kernel

@@ -11,10 +11,10 @@ from typing import Final
 import numpy as np
 
 from node.kernels.alignment import MAX_IMUS, MOUNT, OFFSET, SWEEP, new_mount
-from node.kernels.layout import STATE, Array, new_state
+from node.kernels.layout import RING, STATE, Array, new_state
 from node.kernels.static_average import STATIC
 
-NODE_LAYOUT: Final = 4  # of the saved record; 1 and 2 held the filter alone, 3 no alignment and no recording under way
+NODE_LAYOUT: Final = 4  # of the saved record; 1 and 2 held the filter alone, 3 no cluster, alignment and recording
 EVENTS_KEPT: Final = 32  # that wait to be said
 NUMBERS: Final = 10  # of one event
 DISAGREEMENTS: Final = 3  # aidings in a row, until a mismatch is a fault
@@ -112,6 +112,35 @@ ALIGNER: Final = np.dtype(
     ],
     align=True,
 )
+CLUSTER: Final = np.dtype(
+    [
+        ("used", "i8", (MAX_IMUS,)),  # in the fused reading, 1 or 0
+        ("apart", "i8", (MAX_IMUS,)),  # cycles in a row, sane and away from the others
+        ("well", "i8", (MAX_IMUS,)),  # cycles in a row, sane and among them
+        ("faults", "i8", (MAX_IMUS,)),  # ``Fault`` of the newest cycle
+        ("watches", READINGS, (MAX_IMUS,)),
+        ("expected", "f8", (3,)),  # rad/s, before the IMUs were apart
+        ("cycles", "i8"),  # written so far
+        ("ring_force", "f8", (MAX_IMUS, RING, 3)),  # m/s^2, corrected, tube's frame
+        ("ring_used", "u1", (MAX_IMUS, RING)),
+        ("rates", "f8", (MAX_IMUS, 3)),  # rad/s, corrected, tube's frame, of the newest cycle
+        ("readings", "f8", (MAX_IMUS, 6)),  # the same without the offsets of the gyroscopes, and the forces, m/s^2
+        ("weights", "f8", (MAX_IMUS,)),  # inverse variances of those in use, 0 of the others
+        # the last survey
+        ("survey_used", "i8", (MAX_IMUS,)),
+        ("survey_force", "f8", (MAX_IMUS, 3)),
+        ("survey_force_cov", "f8", (MAX_IMUS, 3, 3)),
+        # work space
+        ("agrees", "i8", (MAX_IMUS,)),
+        ("chosen", "i8", (MAX_IMUS,)),
+        ("ordered", "f8", (MAX_IMUS,)),
+        ("expects", "f8", (6,)),
+        ("middle", "f8", (6,)),
+        ("limits", "f8", (6,)),
+        ("fused", "f8", (6,)),
+    ],
+    align=True,
+)
 RECORDING: Final = np.dtype(
     [
         ("running", "i8"),
@@ -131,6 +160,7 @@ NODE: Final = np.dtype(
         ("guard", GUARD),
         ("twist", TWIST),
         ("joints", JOINTS),
+        ("cluster", CLUSTER),
         ("aligner", ALIGNER),
         ("recording", RECORDING),
         ("events", EVENTS),
@@ -175,6 +205,10 @@ SETTINGS: Final = np.dtype(
         ("imus", "i8"),
         ("place", "f8", (MAX_IMUS, 2)),  # m, of each IMU across the tube's axis
         ("noise", "f8", (MAX_IMUS,)),  # standard deviation of each, in that of the configuration
+        ("weight", "f8", (MAX_IMUS,)),  # its inverse variance
+        ("plain_gyro_noise", "f8", (3,)),  # of the configuration, for a noise of 1
+        ("plain_bias_std", "f8", (3,)),
+        ("plain_force_std", "f8"),
         ("tilt_noise", "f8"),  # rad, of one sample of a force at rest, as a tilt, for a noise of 1
     ],
     align=True,
@@ -200,7 +234,10 @@ def new_node(config: Array) -> Array:
 def forget_session(nodes: Array) -> None:
     """Make every node forget what belongs to one session of its processor: readings, counts, what it had to say."""
     guard = nodes["guard"]
+    nodes["cluster"] = np.zeros(1, CLUSTER)
+    nodes["cluster"]["used"] = 1
     for sensor in ("rates", "forces"):
+        nodes["cluster"]["watches"][sensor]["last"] = np.nan
         guard["readings"][sensor]["last"] = np.nan
         guard["readings"][sensor]["counts"] = 0
     guard["readings"]["clipped"] = 0
