@@ -25,19 +25,19 @@ from node.kernels.record import END, JOINED, MOMENT, READING, START
 from node.kernels.resets import forget_bias, lose_tilt
 from node.kernels.step import (
     ADMITTED,
-    NOT_ADMITTED,
     ONWARD,
+    REFUSED,
     SAY_ESTIMATE,
     SAY_EVENTS,
     SAY_RECORD,
     SAY_STATE,
     SAY_SURVEY,
     USED,
-    begin_step,
-    end_step,
+    enter,
     hand_down,
     is_quiet,
     is_standing,
+    leave,
     node_aiding,
     node_step,
     say_events,
@@ -254,12 +254,12 @@ class Tube:
     def _run_in_parts(self, loop: Loop) -> int:
         """``node_step`` with another loop."""
         node, moment = self.node, self._moment
-        waits = begin_step(self.nodes, self.configs, self._crew, self._corrections, self._readings, moment)
-        if waits == NOT_ADMITTED:
+        waits = enter(self.nodes, self.configs, self._crew, self._corrections, self._readings, moment)
+        if waits == REFUSED:
             return int(say_events(node))
         times = float(moment[START]), float(moment[END]), int(moment[JOINED])
         status = loop.run_cycle(self.state, self.config, node["rate"], node["force"], *times)
-        return int(end_step(self.nodes, self.configs, self._crew, moment, int(status), waits))
+        return int(leave(self.nodes, self.configs, self._crew, moment, int(status), waits))
 
     def _say(self, says: int, reading: ImuReading, context: RigContext) -> Iterator[Said]:
         """What the step has to say, in order."""

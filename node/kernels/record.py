@@ -95,7 +95,7 @@ JOINTS: Final = np.dtype(
 ALIGNER: Final = np.dtype(
     [
         ("method", "i8"),  # of the alignment under way; 0: none is
-        ("wanted", "f8"),  # turns
+        ("wanted", "f8"),  # turns, ordered
         ("angle", "f8"),  # rad, turned so far
         ("yaw", "f8"),  # rad, the filter's, of the last cycle; NaN while it was not aided
         ("sense", "f8"),  # of the turn, 1 or -1; 0 before it began
@@ -103,12 +103,13 @@ ALIGNER: Final = np.dtype(
         ("last_end", "f8"),  # s, of the last cycle
         ("steady", "i8"),  # cycles of turning in a row
         ("slow", "i8"),  # cycles in a row, too slow
-        ("sweeps", SWEEP, (MAX_IMUS,)),
-        ("offsets", OFFSET, (MAX_IMUS,)),
-        ("force", "f8", (3,)),  # work space
-        ("sums", "f8", (2, 3)),
-        ("rotations", "f8", (2, 3, 3)),
-        ("turn", "f8", (3, 3)),
+        ("sweeps", SWEEP, (MAX_IMUS,)),  # sums over the turn
+        ("offsets", OFFSET, (MAX_IMUS,)),  # what came of them
+        # work space
+        ("force", "f8", (3,)),  # m/s^2, of one IMU, without the pull of the circle; or any vector
+        ("sums", "f8", (2, 3)),  # axes of all IMUs together, before and after
+        ("rotations", "f8", (2, 3, 3)),  # of each to z
+        ("turn", "f8", (3, 3)),  # from the first frame to the second
     ],
     align=True,
 )
@@ -118,36 +119,36 @@ CLUSTER: Final = np.dtype(
         ("apart", "i8", (MAX_IMUS,)),  # cycles in a row, sane and away from the others
         ("well", "i8", (MAX_IMUS,)),  # cycles in a row, sane and among them
         ("faults", "i8", (MAX_IMUS,)),  # ``Fault`` of the newest cycle
-        ("watches", READINGS, (MAX_IMUS,)),
+        ("watches", READINGS, (MAX_IMUS,)),  # what the raw readings of each show by themselves
         ("expected", "f8", (3,)),  # rad/s, before the IMUs were apart
-        ("cycles", "i8"),  # written so far
+        ("cycles", "i8"),  # cycles written so far
         ("ring_force", "f8", (MAX_IMUS, RING, 3)),  # m/s^2, corrected, tube's frame
-        ("ring_used", "u1", (MAX_IMUS, RING)),
+        ("ring_used", "u1", (MAX_IMUS, RING)),  # 1: it was in the fused reading
         ("rates", "f8", (MAX_IMUS, 3)),  # rad/s, corrected, tube's frame, of the newest cycle
         ("readings", "f8", (MAX_IMUS, 6)),  # the same without the offsets of the gyroscopes, and the forces, m/s^2
         ("weights", "f8", (MAX_IMUS,)),  # inverse variances of those in use, 0 of the others
         # the last survey
-        ("survey_used", "i8", (MAX_IMUS,)),
-        ("survey_force", "f8", (MAX_IMUS, 3)),
-        ("survey_force_cov", "f8", (MAX_IMUS, 3, 3)),
+        ("survey_used", "i8", (MAX_IMUS,)),  # 1: it was in use over the whole of it
+        ("survey_force", "f8", (MAX_IMUS, 3)),  # m/s^2, mean of each
+        ("survey_force_cov", "f8", (MAX_IMUS, 3, 3)),  # (m/s^2)^2, of that mean
         # work space
-        ("agrees", "i8", (MAX_IMUS,)),
-        ("chosen", "i8", (MAX_IMUS,)),
-        ("ordered", "f8", (MAX_IMUS,)),
-        ("expects", "f8", (6,)),
-        ("middle", "f8", (6,)),
-        ("limits", "f8", (6,)),
-        ("fused", "f8", (6,)),
+        ("agrees", "i8", (MAX_IMUS,)),  # 1: with the others in this cycle
+        ("chosen", "i8", (MAX_IMUS,)),  # 1: in use from this cycle on
+        ("ordered", "f8", (MAX_IMUS,)),  # readings of one axis by size
+        ("expects", "f8", (6,)),  # rad/s and m/s^2, what the node would read if nothing had changed
+        ("middle", "f8", (6,)),  # likewise, what the IMUs in use read
+        ("limits", "f8", (6,)),  # likewise, largest differences of IMUs that agree
+        ("fused", "f8", (6,)),  # likewise, mean of those in use
     ],
     align=True,
 )
 RECORDING: Final = np.dtype(
     [
-        ("running", "i8"),
+        ("running", "i8"),  # 1 while a record is being taken
         ("command", "i8"),  # number of the order
-        ("seconds", "f8"),
+        ("seconds", "f8"),  # s, wanted
         ("begun", "f8"),  # s, own clock; NaN before the first cycle
-        ("sums", STATIC),
+        ("sums", STATIC),  # of the raw readings
     ],
     align=True,
 )

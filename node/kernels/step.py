@@ -33,7 +33,7 @@ STILL_CYCLES: Final = 4  # after which a node takes itself for standing
 LARGEST_OFFSET: Final = 6.0 * DEG  # rad/s, of a gyroscope never calibrated; the slow alignment turn is faster
 LEAST_STAMP: Final = 1e-4  # s, of a time stamp, whatever the clock says
 SAY_EVENTS, SAY_SURVEY, SAY_ESTIMATE, SAY_STATE, SAY_RECORD, ADMITTED = 1, 2, 4, 8, 16, 32
-NOT_ADMITTED: Final = -1
+REFUSED: Final = -1  # the times of a cycle are such that it cannot be run
 USED, ONWARD = 1, 2  # of an aiding: it is for the filter, and it goes down
 FORWARD, FILTER_FAULT = int(Scheme.FORWARD), int(Status.FILTER_FAULT)
 AIDED, SURVEY_READY = int(Status.AIDED), int(Status.SURVEY_READY)
@@ -66,30 +66,30 @@ def node_step(nodes: Array, configs: Array, settings: Array, parameters: Array, 
     moment : (6,) start and end (s, own clock), joined, hops, variance of the clock (s^2), synchronised
     """
     node = nodes[0]
-    waits = begin_step(nodes, configs, settings, parameters, readings, moment)
-    if waits == NOT_ADMITTED:
+    waits = enter(nodes, configs, settings, parameters, readings, moment)
+    if waits == REFUSED:
         return say_events(node)
     joined = 1 if moment[JOINED] != 0.0 else 0
     status = run_cycle(node.filter, configs[0], node.rate, node.force, moment[START], moment[END], joined)
-    return end_step(nodes, configs, settings, moment, status, waits)
+    return leave(nodes, configs, settings, moment, status, waits)
 
 
 @kernel
-def begin_step(nodes: Array, configs: Array, settings: Array, parameters: Array, readings: Array, moment: Array) -> int:
+def enter(nodes: Array, configs: Array, settings: Array, parameters: Array, readings: Array, moment: Array) -> int:
     """What comes before the loop: its ``rate`` and ``force`` are left in the record; see ``node_step``.
 
-    Returns ``NOT_ADMITTED``, and the step ends here, or what ``end_step`` is to be told: whether the survey waits.
+    Returns ``REFUSED``, and the step ends here, or what ``leave`` is to be told: whether the survey waits.
     """
     node, config, crew = nodes[0], configs[0], settings[0]
     if not admits(node, moment[START], moment[END]):
-        return NOT_ADMITTED
+        return REFUSED
     saturated = take_readings(node, config, crew, parameters, readings)
     return before_loop(node, config, crew, moment, saturated)
 
 
 @kernel
-def end_step(nodes: Array, configs: Array, settings: Array, moment: Array, status: int, waits: int) -> int:
-    """What comes after a loop that returned ``status``; ``waits`` is the answer of ``begin_step``."""
+def leave(nodes: Array, configs: Array, settings: Array, moment: Array, status: int, waits: int) -> int:
+    """What comes after a loop that returned ``status``; ``waits`` is the answer of ``enter``."""
     node, config, crew = nodes[0], configs[0], settings[0]
     after_loop(node, config, moment, status, waits)
     follow_alignment(node, crew, moment[START], moment[END])
