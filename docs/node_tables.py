@@ -14,14 +14,14 @@ from typing import Any, Final
 import numpy as np
 
 from node.firmware.event_table import EVENT_TABLE
-from node.kernels import alignment, layout, record
+from node.kernels import alignment, layout, record, static_average
 from node.kernels.layout import DEG, default_config
 from node.kernels.record import NODE
 
 UNITS: Final = (
     *("rad", "rad^2", "rad/s", "(rad/s)^2", "2^-32 turn", "unit vector", "s", "m/s^2", "(m/s^2)^2", "N m", "C"),
 )
-MODULES: Final = (layout, alignment, record)
+MODULES: Final = (layout, alignment, static_average, record)
 PERIODS: Final = {"5 minutes": 300.0, "1 hour": 3600.0, "8 hours": 28800.0, "1 day": 86400.0, "30 days": 2592000.0}
 SIGMAS_DEG: Final = (0.01, 0.02, 0.05, 0.1)
 

@@ -3,12 +3,15 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from typing import Any, Final
 
+from node.firmware.alignment import NAMES_OF_METHODS
 from node.firmware.pending_event import PendingEvent
+from node.kernels.aligner import FASTEST, LARGEST_OFFSET, MOST_LEAN, PATIENCE, Reason
 from node.kernels.events import Code, Fault
+from node.kernels.layout import DEG
 from node.kernels.make_up import MOVING, STARTED_ANEW, UNKNOWN
 from node.kernels.record import EVENTS_KEPT
 from telemetry.messages import Scalar, Severity
@@ -23,12 +26,16 @@ NAMES_OF_FAULTS: Final = {fault: fault.name.lower() for fault in Fault}
 
 @dataclass(frozen=True, slots=True)
 class Told:
-    """One line of the table: the event's name, severity and meaning, and how each argument is made of its number."""
+    """One line of the table: the event's name, severity and meaning, and how each argument is made of its number.
+
+    Where an argument is made of several numbers, ``words`` makes all of them.
+    """
 
     name: str
     severity: Severity
     meaning: str
     arguments: tuple[tuple[str, Callable[[float], Scalar]], ...] = ()
+    words: Callable[[Sequence[float]], dict[str, Scalar]] | None = None
 
 
 def fault_name(number: float) -> str:
@@ -36,15 +43,70 @@ def fault_name(number: float) -> str:
     return NAMES_OF_FAULTS[Fault(int(number))]
 
 
+def exclusion(number: float) -> str:
+    """Why an IMU was left out: its fault, or none and the others disagree with it."""
+    return fault_name(number) if number else "disagrees"
+
+
 def joint_reason(number: float) -> str:
     """Why a joint was not solved."""
     return JOINT_REASONS[int(number)]
+
+
+def method_name(number: float) -> str:
+    """Name of a method of alignment."""
+    return NAMES_OF_METHODS[int(number)]
+
+
+def alignment_refused(numbers: Sequence[float]) -> dict[str, Scalar]:
+    """Why an alignment ended without an offset: reason, turns, IMU (0: all), and two numbers of the reason."""
+    number, turns, imu, a, b = numbers[:5]
+    text = alignment_reason(number, turns, a, b)
+    return {"reason": f"IMU {int(imu)}: {text}" if imu else text, "turns": turns}
+
+
+def alignment_dropped(numbers: Sequence[float]) -> dict[str, Scalar]:
+    """Why the offset in use was forgotten."""
+    return {"reason": alignment_reason(numbers[0], 0.0, math.nan, math.nan)}
+
+
+def alignment_reason(number: float, turns: float, a: float, b: float) -> str:
+    """Text of a reason; ``a`` and ``b`` are its numbers, angles in degrees."""
+    return {
+        Reason.CYCLES_LOST: "cycles were lost",
+        Reason.SENSOR_FAULTY: "a sensor is faulty",
+        Reason.TOO_FAST: f"too fast: {a:.3g} deg/s, expected at most {FASTEST / DEG:g}",
+        Reason.TURNED_BACK: "the string turned back",
+        Reason.NEVER_TURNED: f"timed out: the string stood still for {PATIENCE:g} s",
+        Reason.TOO_FEW_TURNS: f"too few turns: the string stood still after {turns:.2f} of {a:g}",
+        Reason.TOO_LONG: f"timed out after {turns:.2f} of {a:g} turns",
+        Reason.NO_CIRCLE: "the turn determines no circle",
+        Reason.SHAKES: f"the string shakes: {a:.3g} deg, expected at most {b:.3g}",
+        Reason.LITTLE_LEAN: f"too little lean: {a:.3g} deg, expected at least {b:.3g}",
+        Reason.MUCH_LEAN: f"too much lean: {a:.3g} deg, expected at most {MOST_LEAN / DEG:g}",
+        Reason.LARGE_OFFSET: f"offset of {a:.3g} deg, expected at most {LARGEST_OFFSET / DEG:g}",
+        Reason.ORDERED: "ordered",
+        Reason.OTHER_ACCELEROMETER: "another block for the accelerometer",
+        Reason.OTHER_GYROSCOPE: "another block for the gyroscope",
+    }[Reason(int(number))]
 
 
 YAW: Final = (("yaw_deg", float),)
 MISMATCH: Final = (("mismatch_dps", float), ("spin_dps", float))
 JOINT: Final = (("angle_deg", float), ("sigma_deg", float), ("marks_deg", float), ("turned", bool))
 TWISTED: Final = (("torque_nm", float), ("twist_sigma_deg", float))
+MOUNTED: Final = (
+    ("imu", int),
+    ("method", method_name),
+    ("turns", float),
+    ("pitch_deg", float),
+    ("roll_deg", float),
+    ("pitch_std_deg", float),
+    ("roll_std_deg", float),
+    ("lean_deg", float),
+    ("noise_deg", float),
+    ("samples", int),
+)
 EVENT_TABLE: Final[dict[Code, Told]] = {
     Code.BAD_SAMPLE: Told("bad_sample", Severity.ERROR, "a reading was not finite; neither sensor is used"),
     Code.GYRO_SATURATED: Told(
@@ -129,6 +191,35 @@ EVENT_TABLE: Final[dict[Code, Told]] = {
         "an aiding is farther from the yaw than its gate allows",
         (("sigmas", float),),
     ),
+    Code.ALIGNMENT_BEGUN: Told(
+        "alignment_begun",
+        Severity.INFO,
+        "an alignment was ordered; the node waits for the string to turn slowly",
+        (("method", method_name), ("turns", float)),
+    ),
+    Code.ALIGNMENT_TURNING: Told(
+        "alignment_turning",
+        Severity.INFO,
+        "the string turns steadily; the alignment takes it in",
+        (("rate_dps", float),),
+    ),
+    Code.ALIGNED: Told("aligned", Severity.INFO, "the mount of an IMU was found and is in use", MOUNTED),
+    Code.ALIGNMENT_REFUSED: Told(
+        "alignment_refused",
+        Severity.WARNING,
+        "the alignment ended without a mount; the one before stays in use",
+        words=alignment_refused,
+    ),
+    Code.ALIGNMENT_DROPPED: Told(
+        "alignment_dropped", Severity.WARNING, "the mounts in use were forgotten", words=alignment_dropped
+    ),
+    Code.IMU_EXCLUDED: Told(
+        "imu_excluded",
+        Severity.ERROR,
+        "an IMU of the cluster is left out of the fused reading",
+        (("imu", int), ("reason", exclusion)),
+    ),
+    Code.IMU_BACK: Told("imu_back", Severity.WARNING, "an IMU left out is used again", (("imu", int),)),
 }
 
 
@@ -139,5 +230,11 @@ def take_events(events: Any) -> Iterator[PendingEvent]:
     for number in range(max(said, told - EVENTS_KEPT), told):
         event = events["ring"][number % EVENTS_KEPT]
         line = EVENT_TABLE[Code(int(event["code"]))]
-        values = zip(line.arguments, event["numbers"].tolist(), strict=False)
-        yield line.name, line.severity, {name: made(value) for (name, made), value in values if not math.isnan(value)}
+        numbers = event["numbers"].tolist()
+        yield line.name, line.severity, line.words(numbers) if line.words else arguments_of(line, numbers)
+
+
+def arguments_of(line: Told, numbers: Sequence[float]) -> dict[str, Scalar]:
+    """Arguments of an event, each made of its number; without those whose number is none."""
+    values = zip(line.arguments, numbers, strict=False)
+    return {name: made(value) for (name, made), value in values if not math.isnan(value)}

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator
 
+import numpy as np
+
 from node.firmware.alignment import angles_of
 from node.firmware.inputs import RigContext
 from node.firmware.pending_event import PendingEvent
@@ -97,19 +99,15 @@ class Reporter:
         """One event, numbered."""
         return Event(self._settings.tube, self._next_sequence(), rig_now, severity, code, arguments)
 
-    def survey(self, end: float, context: RigContext, imus: tuple[ImuMean, ...]) -> SurveyMeasurement:
-        """Measurement of this station, which ended at ``end`` (s, own clock); without ``imus`` by the fused reading."""
+    def survey(self, end: float, context: RigContext) -> SurveyMeasurement:
+        """Measurement of this station, which ended at ``end`` (s, own clock); of a cluster without means the fused."""
         state = self._state
-        cov = state["survey_force_cov"]
-        rows = tuple((float(row[0]), float(row[1]), float(row[2])) for row in cov)
-        force = state["survey_force"]
-        mean = ImuMean((float(force[0]), float(force[1]), float(force[2])), (rows[0], rows[1], rows[2]))
         return SurveyMeasurement(
             tube=self._settings.tube,
             sequence=self._next_sequence(),
             station_at=context.rig_now,
             hops=context.hops,
-            imus=imus or (mean,),
+            imus=self._cluster_means() or (mean_of(state["survey_force"], state["survey_force_cov"]),),
             yaw=self.yaw,
             yaw_var=self.yaw_var,
             systematic_var=self.systematic_var,
@@ -117,6 +115,14 @@ class Reporter:
             settle_time=end - float(state["stopped_at"]),
             flags=self.flags(context, end),
         )
+
+    def _cluster_means(self) -> tuple[ImuMean, ...]:
+        """Those of the IMUs of a cluster that were in use over the whole of the last survey."""
+        count, cluster = len(self._settings.imus), self._node["cluster"]
+        if count == 1:
+            return ()
+        used = np.flatnonzero(cluster["survey_used"][:count])
+        return tuple(mean_of(cluster["survey_force"][k], cluster["survey_force_cov"][k]) for k in used)
 
     def estimate(self, context: RigContext) -> Aiding:
         """The node's own yaw as aiding for the tube below."""
@@ -164,3 +170,10 @@ class Reporter:
         if NodeFlag.SENSOR_FAULT in self.sensor_flags:
             return Mode.FAULT
         return Mode.ALIGNMENT if aligning else Mode(int(self._state["mode"]))
+
+
+def mean_of(force: Array, cov: Array) -> ImuMean:
+    """Mean force (3) of an IMU and its covariance (3, 3), as they are sent."""
+    fx, fy, fz = force.tolist()
+    (xx, xy, xz), (yx, yy, yz), (zx, zy, zz) = cov.tolist()
+    return ImuMean((fx, fy, fz), ((xx, xy, xz), (yx, yy, yz), (zx, zy, zz)))

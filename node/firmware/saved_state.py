@@ -1,8 +1,8 @@
 """What a node keeps over a loss of power, as bytes: its record and a blob of the telemetry.
 
-Layout of a slot: header, checksum, record, blob. The header names the layout of the record by the version of
-``node.kernels.record`` and a checksum of what its fields are, so that neither a forgotten version nor a changed meaning
-is taken for the present one.
+Layout of a slot: header, checksum, what of the record is kept, blob. The header names the layout of the record by the
+version of ``node.kernels.record`` and a checksum of what its fields are, so that neither a forgotten version nor a
+changed meaning is taken for the present one.
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ import numpy as np
 
 from node.errors import SavedStateError
 from node.kernels.layout import Array
-from node.kernels.record import NODE, NODE_LAYOUT, forget_session
+from node.kernels.record import KEPT, KEPT_SIZE, NODE, NODE_LAYOUT, forget_session
 from node.kernels.resets import resume as resume_filter
 
 # magic, version and format, checksum of the fields, generation, bytes of state and blob, when it was saved (s)
@@ -55,7 +55,7 @@ def description(dtype: np.dtype[Any]) -> str:
     return f"{{{','.join(fields)}}}{dtype.itemsize}"
 
 
-FIELDS: Final = zlib.crc32(description(NODE).encode())
+FIELDS: Final = zlib.crc32("".join(description(NODE[name]) for name in KEPT).encode())
 
 
 def layout_name(version: int = NODE_LAYOUT, fields: int = FIELDS) -> str:
@@ -66,8 +66,8 @@ def layout_name(version: int = NODE_LAYOUT, fields: int = FIELDS) -> str:
 def pack(state: Array, blob: bytes, generation: int) -> bytes:
     """Bytes of one slot."""
     saved_at = float(state[0]["filter"]["now"])
-    head = HEADER.pack(MAGIC, NODE_LAYOUT, FORMAT, FIELDS, generation, NODE.itemsize, len(blob), saved_at)
-    body = state.tobytes() + blob
+    head = HEADER.pack(MAGIC, NODE_LAYOUT, FORMAT, FIELDS, generation, KEPT_SIZE, len(blob), saved_at)
+    body = state.tobytes()[:KEPT_SIZE] + blob
     return head + CHECKSUM.pack(zlib.crc32(body, zlib.crc32(head))) + body
 
 
@@ -90,10 +90,11 @@ def unpack(data: bytes) -> Saved:
         raise SavedStateError(f"saved state: expected layout {layout_name()}, got {got}")
     (crc,) = CHECKSUM.unpack_from(data, HEADER.size)
     body = data[begin : begin + state_size + blob_size]
-    is_whole = state_size == NODE.itemsize and len(body) == state_size + blob_size
+    is_whole = state_size == KEPT_SIZE and len(body) == state_size + blob_size
     if not is_whole or zlib.crc32(body, zlib.crc32(data[: HEADER.size])) != crc:
         raise SavedStateError("saved state: checksum does not fit, the slot is torn or damaged")
-    return Saved(np.frombuffer(bytearray(body[:state_size]), NODE), body[state_size:], generation, saved_at)
+    record = bytearray(body[:state_size]) + bytearray(NODE.itemsize - KEPT_SIZE)
+    return Saved(np.frombuffer(record, NODE), body[state_size:], generation, saved_at)
 
 
 def resume(nodes: Array) -> bool:

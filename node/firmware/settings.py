@@ -106,6 +106,13 @@ def crew_record(settings: TubeSettings, configs: Array) -> Array:
     crew["stamp_walk"] = configs["stamp_walk"][0]
     for name in ("stiffness", "aiding_old_after"):
         crew[name] = getattr(settings, name)
+    count = len(settings.imus)
+    crew["imus"], crew["tilt_noise"] = count, configs["force_std"][0] / configs["gravity"][0]
+    crew["place"][:count] = [imu.offset for imu in settings.imus]
+    crew["noise"][:count] = [imu.noise for imu in settings.imus]
+    crew["weight"][:count] = np.array([imu.noise for imu in settings.imus]) ** -2.0
+    for name in ("gyro_noise", "bias_std", "force_std"):
+        crew[f"plain_{name}"] = configs[name][0]
     for name in ("rate_range", "force_range", "repeats_together", "repeats_alone"):
         crew[name] = getattr(limits, name)
     return made

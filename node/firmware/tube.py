@@ -8,37 +8,38 @@ from dataclasses import replace
 
 import numpy as np
 
-from node.firmware.alignment import FASTEST, Aligner, alignment_in_use, realign
+from node.firmware.alignment import alignment_in_use, order_alignment
 from node.firmware.block_trial import record_of, recorrect
 from node.firmware.event_table import take_events
-from node.firmware.imu_fusion import ImuFusion
 from node.firmware.inputs import ImuReading, RigContext
 from node.firmware.kernel_choice import kernel_of
 from node.firmware.reporter import Reporter
 from node.firmware.settings import TubeSettings, crew_record
-from node.firmware.static_record import StaticRecorder
-from node.kernels.calibration import USUAL
+from node.firmware.static_record import begin_record, static_record
+from node.kernels.aligner import FASTEST, Reason, drop_alignment, refuse_alignment
+from node.kernels.cluster import begin_cluster
+from node.kernels.events import NONE
 from node.kernels.layout import DEG, Array, Scheme
 from node.kernels.modes import STATIC_BIAS
-from node.kernels.record import AIDING, MOMENT, READING
+from node.kernels.record import AIDING, END, JOINED, MOMENT, READING, START
 from node.kernels.resets import forget_bias, lose_tilt
 from node.kernels.step import (
     ADMITTED,
     ONWARD,
+    REFUSED,
     SAY_ESTIMATE,
     SAY_EVENTS,
+    SAY_RECORD,
     SAY_STATE,
     SAY_SURVEY,
-    STILL_CYCLES,
     USED,
-    admit,
-    correct,
-    finish,
+    enter,
     hand_down,
-    judge,
+    is_quiet,
+    is_standing,
+    leave,
     node_step,
     own_systematic,
-    prepare,
     say_events,
     take_aiding,
 )
@@ -89,12 +90,9 @@ class Tube:
         self._next_sequence = next_sequence
         self._restored = restored
         self.reporter = Reporter(settings, nodes, configs, next_sequence, restored=restored)
-        self._recorder = StaticRecorder()
         count = len(settings.imus)
-        noise = float(self.config["force_std"] / self.config["gravity"])
-        self._aligner = Aligner(self._mount, settings.imus, noise)
-        self._axes = self._mount["axis"][:count]
-        self._fusion = ImuFusion(settings, self._crew, nodes, configs) if count > 1 else None
+        if count > 1:
+            begin_cluster(self.node, self.config, self._crew[0])
         self._loop = kernel_of(settings.kernel)
         own = [ParameterBlock(settings.tube, 0, imu.gyroscope, imu.accelerometer) for imu in settings.imus]
         self._corrections = np.concatenate([record_of(block) for block in (own[0], *own)])
@@ -139,22 +137,18 @@ class Tube:
         self._moment[:] = moment
         rows = self._readings
         rows[0] = (*reading.rate, *reading.force, reading.temperature, reading.saturated)
-        if self._loop.step is not None and self._fusion is None and self._aligner.idle:
+        for k in range(1, len(rows)):
+            rows[k] = _row_of(reading.others[k - 1]) if k <= len(reading.others) else math.nan
+        if self._loop.step is not None:
             says = self._loop.step(self.nodes, self.configs, self._crew, self._corrections, rows, self._moment)
-            said: list[Said] = []
         else:
-            for k in range(1, len(rows)):
-                rows[k] = _row_of(reading.others[k - 1]) if k <= len(reading.others) else math.nan
-            says, said = self._run_in_parts(reading, context)
-        if says in (0, ADMITTED) and not self._recorder.running:
-            return said
-        return said + list(self.say(says, reading.start, reading.end, context))
+            says = self._run_in_parts()
+        return [] if says in (0, ADMITTED) else list(self.say(says, reading.end, context))
 
     @property
-    def is_plain(self) -> bool:
-        """Whether a cycle is one call of ``node_step`` and nothing else: one IMU, the float64 loop, no order obeyed."""
-        plain = self._loop.step is node_step and self._fusion is None
-        return plain and self._aligner.idle and not self._recorder.running
+    def runs_together(self) -> bool:
+        """Whether the node may be one of many that ``node.kernels.string`` takes through a cycle: the float64 loop."""
+        return self._loop.step is node_step
 
     @property
     def records(self) -> tuple[Array, Array]:
@@ -180,12 +174,12 @@ class Tube:
 
     def start_record(self, seconds: object, command: int) -> str:
         """Average raw readings for ``seconds`` from the next cycle on; returns why not, or nothing."""
-        return self._recorder.start(seconds, command, standing=self.standing)
+        return begin_record(self.node["recording"], seconds, command, standing=self.standing)
 
     def align(self, method: object, turns: object) -> str:
         """Find the tube's axis in the coming slow turns, or drop the offset in use; returns why not, or nothing."""
         if method == "none":
-            self._drop_alignment("ordered")
+            drop_alignment(self.node, self._crew[0], int(Reason.ORDERED))
             return ""
         if self.state["mode"] == STATIC_BIAS:
             return "the static bias is not known yet"
@@ -193,20 +187,20 @@ class Tube:
             return "a sensor is faulty"
         if abs(rate := float(self.state["now_rate"])) > FASTEST:
             return f"too fast: {abs(rate) / DEG:.3g} deg/s, expected at most {FASTEST / DEG:g}"
-        return self._aligner.start(method, turns)
+        return order_alignment(self.node, method, turns)
 
     @property
     def alignment(self) -> dict[str, Value]:
         """The alignment in use: method and angles (rad) of each IMU."""
-        return alignment_in_use(self._mount, len(self._axes))
+        return alignment_in_use(self._mount, len(self.settings.imus))
 
     def prepare(self, block: ParameterBlock) -> None:
         """Forget what was learnt under the present block and would be wrong under ``block``."""
         if block.accelerometer != self.parameters.accelerometer:
-            self._drop_alignment("another block for the accelerometer")
+            drop_alignment(self.node, self._crew[0], int(Reason.OTHER_ACCELEROMETER))
         if block.gyroscope != self.parameters.gyroscope:
-            if self._aligner.running:
-                self._aligner.stop("another block for the gyroscope")
+            if self.node["aligner"]["method"]:
+                refuse_alignment(self.node, int(Reason.OTHER_GYROSCOPE), 0, NONE, NONE)
             forget_bias(self.state, self.config)
         if block.accelerometer != self.parameters.accelerometer:
             lose_tilt(self.state)
@@ -221,12 +215,12 @@ class Tube:
     @property
     def quiet(self) -> bool:
         """Whether the node stands still by the block and the bias in use."""
-        return int(self.state["still_cycles"]) >= STILL_CYCLES
+        return bool(is_quiet(self.node))
 
     @property
     def standing(self) -> bool:
         """Whether the node may be at rest: quiet, or slow and without a bias, whose offset may look like a rate."""
-        return self.quiet or (self.state["mode"] == STATIC_BIAS and int(self.node["slow_cycles"]) >= STILL_CYCLES)
+        return bool(is_standing(self.node))
 
     @property
     def yaw(self) -> float:
@@ -266,40 +260,28 @@ class Tube:
             hand_down(self.nodes, self._crew)
         return gates
 
-    def _run_in_parts(self, reading: ImuReading, context: RigContext) -> tuple[int, list[Said]]:
-        """A step with a loop that has none, several IMUs or an alignment under way; what it says, and what is said."""
+    def _run_in_parts(self) -> int:
+        """``node_step`` with a loop that has none of its own."""
         node, moment = self.node, self._moment
-        if not admit(self.nodes, moment):
-            return int(say_events(node)), []
-        saturated = int(reading.saturated)
-        if self._fusion is None:
-            correct(self.nodes, self._corrections, self._readings)
-        else:
-            self._fusion.fuse(self._corrections, self._readings)
-            saturated = 0
-        waits = prepare(self.nodes, self.configs, self._crew, moment, saturated)
-        args = (node["rate"], node["force"], reading.start, reading.end, int(context.joined))
-        status = self._loop.run_cycle(self.state, self.config, *args)
-        judge(self.nodes, self.configs, moment, int(status), waits)
-        self._follow_alignment(reading)
-        if self._fusion is not None and self.quiet:
-            self._fusion.cluster.learn_offsets(self._fusion.rates)
-        pending = [*take_events(node["events"]), *self._aligner.drain_events()]
-        if self._fusion is not None:
-            pending += self._fusion.cluster.drain_events()
-        return int(finish(self.nodes, self._crew)), list(self.reporter.pending_events(pending, context))
+        waits = enter(self.nodes, self.configs, self._crew, self._corrections, self._readings, moment)
+        if waits == REFUSED:
+            return int(say_events(node))
+        times = float(moment[START]), float(moment[END]), int(moment[JOINED])
+        status = self._loop.run_cycle(self.state, self.config, node["rate"], node["force"], *times)
+        return int(leave(self.nodes, self.configs, self._crew, moment, int(status), waits))
 
-    def say(self, says: int, start: float, end: float, context: RigContext) -> Iterator[Said]:
-        """What the step has to say of the cycle from ``start`` to ``end`` (s, own clock), in order."""
+    def say(self, says: int, end: float, context: RigContext) -> Iterator[Said]:
+        """What the step has to say of the cycle that ended at ``end`` (s, own clock), in order."""
         reporter = self.reporter
         if says & SAY_EVENTS:
             yield from reporter.pending_events(take_events(self.node["events"]), context)
-        if says & ADMITTED and self._recorder.running:
-            yield from self._record(start, end, context)
+        if says & SAY_RECORD:
+            record = static_record(
+                self.node["recording"], self.settings.tube, end, context.rig_now, self._next_sequence
+            )
+            yield record or reporter.event("static_record_empty", Severity.ERROR, context.rig_now, {})
         if says & SAY_SURVEY:
-            samples = int(self.config["survey_samples"])
-            imus = self._fusion.cluster.survey(samples) if self._fusion is not None else ()
-            yield reporter.survey(end, context, imus)
+            yield reporter.survey(end, context)
         if says & SAY_ESTIMATE:
             yield self._of_estimate(reporter.estimate(context))
         if says & SAY_STATE:
@@ -312,33 +294,6 @@ class Tube:
         joints = max(aiding.systematic_var - var, 0.0)
         torque, holding = float(twist["torque"]), bool(twist["holding"])
         return replace(aiding, systematic_var=joints, torque=torque, torsion_var=var, under_torque=holding)
-
-    def _follow_alignment(self, reading: ImuReading) -> None:
-        if not self._aligner.running:
-            return
-        before = self._axes.copy()
-        used = np.full(len(before), not self.reporter.sensor_flags)
-        if self._fusion is not None:
-            used &= self._fusion.cluster.used
-        rate = float(self.state["now_rate"])
-        aided = reading.end - float(self.state["last_aided"]) <= self.settings.aiding_old_after
-        yaw = self.yaw if aided else math.nan
-        unaligned = self.node["unaligned"][: len(before)]
-        if self._aligner.on_turn_sample(unaligned, rate, yaw, reading.start, reading.end, used):
-            realign(self.state, before, self._axes)
-
-    def _drop_alignment(self, reason: str) -> None:
-        before = self._axes.copy()
-        self._aligner.drop(reason)
-        realign(self.state, before, self._axes)
-
-    def _record(self, start: float, end: float, context: RigContext) -> Iterator[StaticRecord | Event]:
-        recorder, raw = self._recorder, self.raw
-        temperature = raw.temperature if math.isfinite(raw.temperature) else USUAL
-        recorder.append_reading(raw.rate, raw.force, temperature, start, standing=self.standing)
-        if recorder.is_due(end):
-            record = recorder.finish(self.settings.tube, end, context.rig_now, self._next_sequence)
-            yield record or self.reporter.event("static_record_empty", Severity.ERROR, context.rig_now, {})
 
 
 def _row_of(reading: ImuReading) -> tuple[float, ...]:

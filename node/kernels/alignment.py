@@ -37,31 +37,32 @@ MOUNT: Final = np.dtype(
 )
 SWEEP: Final = np.dtype(
     [
-        ("samples", "i8"),
-        ("sum", "f8", (3,)),  # of u
-        ("sum_products", "f8", (3, 3)),  # of u u^T
-        ("sum_angle", "f8"),  # rad, turned
-        ("sum_angle_squares", "f8"),
-        ("sum_spin", "c16"),  # of exp(i angle)
-        ("sum_angle_spin", "c16"),  # of angle exp(i angle)
-        ("sum_back", "c16", (3,)),  # of u exp(i angle)
-        ("sum_angle_back", "c16", (3,)),  # of angle u exp(i angle)
-        ("least", "f8", (2,)),  # of u_x and u_y
-        ("largest", "f8", (2,)),
-        ("u", "f8", (3,)),  # work space
-        ("across", "c16", (3,)),
+        ("samples", "i8"),  # cycles taken in
+        ("sum", "f8", (3,)),  # sum of u, gravity's direction
+        ("sum_products", "f8", (3, 3)),  # sum of u u^T
+        ("sum_angle", "f8"),  # rad, sum of the angles turned
+        ("sum_angle_squares", "f8"),  # rad^2, sum of their squares
+        ("sum_spin", "c16"),  # sum of exp(i angle)
+        ("sum_angle_spin", "c16"),  # sum of angle exp(i angle)
+        ("sum_back", "c16", (3,)),  # sum of u exp(i angle)
+        ("sum_angle_back", "c16", (3,)),  # sum of angle u exp(i angle)
+        ("least", "f8", (2,)),  # least u_x and u_y
+        ("largest", "f8", (2,)),  # largest u_x and u_y
+        # work space
+        ("u", "f8", (3,)),  # direction of gravity
+        ("across", "c16", (3,)),  # row that gives what of a vector lies across the axis
     ],
     align=True,
 )
 OFFSET: Final = np.dtype(
     [
-        ("axis", "f8", (3,)),  # unit vector, frame of the IMU
-        ("pitch", "f8"),  # rad
-        ("roll", "f8"),
-        ("pitch_std", "f8"),
-        ("roll_std", "f8"),
+        ("axis", "f8", (3,)),  # unit vector, of the tube's axis in the IMU's frame
+        ("pitch", "f8"),  # rad, of the offset
+        ("roll", "f8"),  # rad, likewise
+        ("pitch_std", "f8"),  # rad, standard error of the pitch
+        ("roll_std", "f8"),  # rad, likewise of the roll
         ("lean", "f8"),  # rad, of the axis against the vertical
-        ("lean_std", "f8"),
+        ("lean_std", "f8"),  # rad, standard error of that
         ("noise", "f8"),  # rad, of one sample
     ],
     align=True,
@@ -88,6 +89,19 @@ def to_tube(axis: Array, vector: Array) -> None:
     vector[0] -= axis[0] * pull
     vector[1] -= axis[1] * pull
     vector[2] = across + axis[2] * vector[2]
+
+
+@kernel
+def clear_sweep(sweep: Any) -> None:
+    """Begin anew; the extremes begin with the first sample."""
+    sweep.samples = 0
+    sweep.sum_angle, sweep.sum_angle_squares = 0.0, 0.0
+    sweep.sum_spin, sweep.sum_angle_spin = 0.0j, 0.0j
+    for i in range(3):
+        sweep.sum[i] = 0.0
+        sweep.sum_back[i], sweep.sum_angle_back[i] = 0.0j, 0.0j
+        for j in range(3):
+            sweep.sum_products[i, j] = 0.0
 
 
 @kernel

@@ -1,9 +1,23 @@
-"""Readings of several IMUs in one tube as one reading."""
+"""The cluster: several IMUs in one tube, fused by inverse variance into one reading.
+
+Every gyroscope has its own constant bias: what each reads at rest beside the mean of all is learnt and taken off, so
+that the fused rate, and the bias that the filter knows, stay the same whoever is left out.
+"""
 
 from __future__ import annotations
 
+import math
+from typing import Any, Final
+
+from node.kernels.calibration import USUAL
+from node.kernels.cluster_watch import choose_imus, compare_imus, tell_members, watch_imus
+from node.kernels.guard import is_heard
 from node.kernels.jit import kernel
-from node.kernels.layout import Array
+from node.kernels.layout import RING, Array
+from node.kernels.record import TEMPERATURE
+from node.kernels.resets import doubt_bias
+
+MEMORY: Final = 1000  # cycles at rest, of the running mean of an offset
 
 
 @kernel
@@ -12,8 +26,8 @@ def fuse(readings: Array, weights: Array, fused: Array) -> None:
 
     Parameters
     ----------
-    readings : (n, k), one row an IMU
-    weights : (n,) inverse variances; a reading of weight 0 may be anything, numbers or none
+    readings : (n, k or more), one row an IMU
+    weights : (n or more,) inverse variances; a reading of weight 0 may be anything, numbers or none
     """
     total = 0.0
     for j in range(fused.shape[0]):
@@ -36,3 +50,159 @@ def follow_offsets(rates: Array, fused: Array, samples: int, offsets: Array) -> 
     for i in range(rates.shape[0]):
         for j in range(3):
             offsets[i, j] += (rates[i, j] - fused[j] - offsets[i, j]) / samples
+
+
+@kernel
+def fuse_imus(node: Any, config: Any, settings: Any, readings: Array) -> None:
+    """Judge the IMUs in one cycle and leave their fused reading in the node, NaN if none is sane.
+
+    ``readings`` are raw, those of ``node.kernels.step.node_step``; corrected they lie in ``node.cluster``.
+    """
+    cluster = node.cluster
+    watch_imus(cluster, settings, readings)
+    expect_reading(node, config, settings.imus)
+    compare_imus(node, settings)
+    count = choose_imus(cluster, settings.imus)
+    if tell_members(node, settings.imus) and count > 0:
+        reweigh(node, config, settings)
+    slot = cluster.cycles % RING
+    for k in range(settings.imus):
+        cluster.used[k] = cluster.chosen[k]
+        cluster.weights[k] = settings.weight[k] if cluster.used[k] == 1 else 0.0
+        cluster.ring_used[k, slot] = cluster.used[k]
+        for i in range(3):
+            cluster.ring_force[k, slot, i] = cluster.readings[k, 3 + i]
+    cluster.cycles += 1
+    take_mean(cluster.readings, cluster.weights, count, cluster.fused, node.rate, node.force)
+    take_mean(readings, cluster.weights, count, cluster.fused, node.raw_rate, node.raw_force)
+    node.temperature = mean_temperature(readings, cluster.used, settings.imus, count)
+
+
+@kernel
+def take_mean(readings: Array, weights: Array, count: int, fused: Array, rate: Array, force: Array) -> None:
+    """Fused ``rate`` (3) and ``force`` (3) of the ``count`` IMUs in use; ``fused`` (6) is work space."""
+    if count > 0:
+        fuse(readings, weights, fused)
+    for i in range(3):
+        rate[i] = fused[i] if count > 0 else math.nan
+        force[i] = fused[3 + i] if count > 0 else math.nan
+
+
+@kernel
+def mean_temperature(readings: Array, used: Array, imus: int, count: int) -> float:
+    """Mean temperature (C) of the ``count`` IMUs in use."""
+    total = 0.0
+    for k in range(imus):
+        if used[k] == 1:
+            total += readings[k, TEMPERATURE]
+    return total / count if count > 0 else USUAL
+
+
+@kernel
+def expect_reading(node: Any, config: Any, imus: int) -> None:
+    """Rate (rad/s) and force (m/s^2) that the node would read in this cycle if nothing had changed: (6).
+
+    While IMUs are apart and no encoder is heard the rate before they were: what was fused since is not evidence
+    against one of them.
+    """
+    state, guard, cluster = node.filter, node.guard, node.cluster
+    heard = is_heard(node)
+    held = False
+    for k in range(imus):
+        held = held or (not heard and cluster.apart[k] != 0)
+    for i in range(3):
+        rate = state.static_bias[i] + state.bias[i]
+        if i == 2:
+            rate += guard.rate if heard else guard.sane_rate
+        if not held:
+            cluster.expected[i] = rate
+        cluster.expects[i] = cluster.expected[i]
+        cluster.expects[3 + i] = -config.gravity * state.now_down[i]
+
+
+@kernel
+def begin_cluster(node: Any, config: Any, settings: Any) -> None:
+    """Weigh the IMUs in use for the first time in a session."""
+    for k in range(settings.imus):
+        node.cluster.chosen[k] = node.cluster.used[k]
+    reweigh(node, config, settings)
+
+
+@kernel
+def reweigh(node: Any, config: Any, settings: Any) -> None:
+    """Noise of the configuration for the IMUs chosen, and the doubt in a bias that is now another mean.
+
+    var(b' - b) = sigma_b^2 sum (w'_i - w_i)^2 noise_i^2: every gyroscope wanders by itself.
+    """
+    cluster = node.cluster
+    before = after = share = 0.0
+    for k in range(settings.imus):
+        before += settings.weight[k] if cluster.used[k] == 1 else 0.0
+        after += settings.weight[k] if cluster.chosen[k] == 1 else 0.0
+    for k in range(settings.imus):
+        moved = settings.weight[k] / after if cluster.chosen[k] == 1 else 0.0
+        moved -= settings.weight[k] / before if cluster.used[k] == 1 else 0.0
+        share += (moved * settings.noise[k]) ** 2
+    factor = 1.0 / math.sqrt(after)
+    config.force_std = settings.plain_force_std * factor
+    for i in range(3):
+        config.gyro_noise[i] = settings.plain_gyro_noise[i] * factor
+        config.bias_std[i] = settings.plain_bias_std[i] * factor
+        doubt_bias(node.filter, i, share * settings.plain_bias_std[i] ** 2)
+
+
+@kernel
+def all_used(node: Any, settings: Any) -> bool:
+    """Whether no IMU is left out."""
+    count = 0
+    for k in range(settings.imus):
+        count += node.cluster.used[k]
+    return bool(count == settings.imus)
+
+
+@kernel
+def learn_offsets(node: Any, settings: Any) -> None:
+    """Take a cycle at rest, all IMUs in use, into the offsets of their gyroscopes."""
+    cluster, mount, imus = node.cluster, node.mount, settings.imus
+    if not all_used(node, settings):
+        return
+    mount.rate_samples = min(mount.rate_samples + 1, MEMORY)
+    mean = cluster.fused[:3]
+    fuse(cluster.rates, cluster.weights, mean)
+    follow_offsets(cluster.rates[:imus], mean, mount.rate_samples, mount.rate_offset)
+
+
+@kernel
+def survey_imus(node: Any, settings: Any, samples: int) -> None:
+    """Mean force of each IMU that was in use over the newest ``samples`` cycles, with the covariance of the mean.
+
+    C = sum (f - m)(f - m)^T / (n (n - 1)), as ``node.kernels.moving_average.average_force``.
+    """
+    cluster = node.cluster
+    for k in range(settings.imus):
+        used = 1
+        for n in range(samples):
+            if cluster.ring_used[k, (cluster.cycles - samples + n) % RING] == 0:
+                used = 0
+        cluster.survey_used[k] = used
+        if used == 1:
+            average(cluster, cluster.ring_force[k], samples, cluster.survey_force[k], cluster.survey_force_cov[k])
+
+
+@kernel
+def average(cluster: Any, forces: Array, samples: int, mean: Array, cov: Array) -> None:
+    """Mean (3) of the newest ``samples`` of a ring of ``forces`` (RING, 3) and its covariance (3, 3)."""
+    first = cluster.cycles - samples
+    for i in range(3):
+        mean[i] = 0.0
+        for n in range(samples):
+            mean[i] += forces[(first + n) % RING, i]
+        mean[i] /= samples
+    for i in range(3):
+        for j in range(i, 3):
+            total = 0.0
+            for n in range(samples):
+                slot = (first + n) % RING
+                total += (forces[slot, i] - mean[i]) * (forces[slot, j] - mean[j])
+            cov[i, j] = total / (samples * (samples - 1.0))
+            cov[j, i] = cov[i, j]

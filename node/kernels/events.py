@@ -55,11 +55,21 @@ class Code(enum.IntEnum):
     UNREADABLE = 25
     FILTER_FAULT = 26
     AIDING_REJECTED = 27
+    ALIGNMENT_BEGUN = 28
+    ALIGNMENT_TURNING = 29
+    ALIGNED = 30
+    ALIGNMENT_REFUSED = 31
+    ALIGNMENT_DROPPED = 32
+    IMU_EXCLUDED = 33
+    IMU_BACK = 34
 
 
 @kernel
 def tell(node: Any, code: int, a: float, b: float, c: float, d: float) -> None:
-    """Put an event with up to four numbers (NaN: none) into the ring; where it is full the oldest is lost."""
+    """Put an event with up to four numbers (NaN: none) into the ring; where it is full the oldest is lost.
+
+    Further numbers are those of ``tell_more``.
+    """
     events = node.events
     event = events.ring[events.told % EVENTS_KEPT]
     event.code = code
@@ -68,3 +78,13 @@ def tell(node: Any, code: int, a: float, b: float, c: float, d: float) -> None:
     event.numbers[2] = c
     event.numbers[3] = d
     events.told += 1
+
+
+@kernel
+def tell_more(node: Any, first: int, a: float, b: float, c: float) -> None:
+    """Give the event told last three numbers more, from place ``first`` on."""
+    events = node.events
+    numbers = events.ring[(events.told - 1) % EVENTS_KEPT].numbers
+    numbers[first] = a
+    numbers[first + 1] = b
+    numbers[first + 2] = c

@@ -10,12 +10,13 @@ from typing import Final
 
 import numpy as np
 
-from node.kernels.alignment import MAX_IMUS, MOUNT, new_mount
-from node.kernels.layout import STATE, Array, new_state
+from node.kernels.alignment import MAX_IMUS, MOUNT, OFFSET, SWEEP, new_mount
+from node.kernels.layout import RING, STATE, Array, new_state
+from node.kernels.static_average import STATIC
 
-NODE_LAYOUT: Final = 3  # of the saved record; 1 and 2 held the filter alone
+NODE_LAYOUT: Final = 4  # of the saved record; 1 and 2 held the filter alone, 3 what a start clears as well
 EVENTS_KEPT: Final = 32  # that wait to be said
-NUMBERS: Final = 4  # of one event
+NUMBERS: Final = 10  # of one event
 DISAGREEMENTS: Final = 3  # aidings in a row, until a mismatch is a fault
 UNSAID: Final = -1  # of a place that nothing was written to
 
@@ -119,6 +120,66 @@ EVENTS: Final = np.dtype(
     ],
     align=True,
 )
+ALIGNER: Final = np.dtype(
+    [
+        ("method", "i8"),  # of the alignment under way; 0: none is
+        ("wanted", "f8"),  # turns, ordered
+        ("angle", "f8"),  # rad, turned so far
+        ("yaw", "f8"),  # rad, the filter's, of the last cycle; NaN while it was not aided
+        ("sense", "f8"),  # of the turn, 1 or -1; 0 before it began
+        ("ordered_at", "f8"),  # s, own clock, of the first cycle after the order; NaN before it
+        ("last_end", "f8"),  # s, of the last cycle
+        ("steady", "i8"),  # cycles of turning in a row
+        ("slow", "i8"),  # cycles in a row, too slow
+        ("sweeps", SWEEP, (MAX_IMUS,)),  # sums over the turn
+        ("offsets", OFFSET, (MAX_IMUS,)),  # what came of them
+        # work space
+        ("force", "f8", (3,)),  # m/s^2, of one IMU, without the pull of the circle; or any vector
+        ("sums", "f8", (2, 3)),  # axes of all IMUs together, before and after
+        ("rotations", "f8", (2, 3, 3)),  # of each to z
+        ("turn", "f8", (3, 3)),  # from the first frame to the second
+    ],
+    align=True,
+)
+CLUSTER: Final = np.dtype(
+    [
+        ("used", "i8", (MAX_IMUS,)),  # in the fused reading, 1 or 0
+        ("apart", "i8", (MAX_IMUS,)),  # cycles in a row, sane and away from the others
+        ("well", "i8", (MAX_IMUS,)),  # cycles in a row, sane and among them
+        ("faults", "i8", (MAX_IMUS,)),  # ``Fault`` of the newest cycle
+        ("watches", READINGS, (MAX_IMUS,)),  # what the raw readings of each show by themselves
+        ("expected", "f8", (3,)),  # rad/s, before the IMUs were apart
+        ("cycles", "i8"),  # cycles written so far
+        ("ring_force", "f8", (MAX_IMUS, RING, 3)),  # m/s^2, corrected, tube's frame
+        ("ring_used", "u1", (MAX_IMUS, RING)),  # 1: it was in the fused reading
+        ("rates", "f8", (MAX_IMUS, 3)),  # rad/s, corrected, tube's frame, of the newest cycle
+        ("readings", "f8", (MAX_IMUS, 6)),  # the same without the offsets of the gyroscopes, and the forces, m/s^2
+        ("weights", "f8", (MAX_IMUS,)),  # inverse variances of those in use, 0 of the others
+        # the last survey
+        ("survey_used", "i8", (MAX_IMUS,)),  # 1: it was in use over the whole of it
+        ("survey_force", "f8", (MAX_IMUS, 3)),  # m/s^2, mean of each
+        ("survey_force_cov", "f8", (MAX_IMUS, 3, 3)),  # (m/s^2)^2, of that mean
+        # work space
+        ("agrees", "i8", (MAX_IMUS,)),  # 1: with the others in this cycle
+        ("chosen", "i8", (MAX_IMUS,)),  # 1: in use from this cycle on
+        ("ordered", "f8", (MAX_IMUS,)),  # readings of one axis by size
+        ("expects", "f8", (6,)),  # rad/s and m/s^2, what the node would read if nothing had changed
+        ("middle", "f8", (6,)),  # likewise, what the IMUs in use read
+        ("limits", "f8", (6,)),  # likewise, largest differences of IMUs that agree
+        ("fused", "f8", (6,)),  # likewise, mean of those in use
+    ],
+    align=True,
+)
+RECORDING: Final = np.dtype(
+    [
+        ("running", "i8"),  # 1 while a record is being taken
+        ("command", "i8"),  # number of the order
+        ("seconds", "f8"),  # s, wanted
+        ("begun", "f8"),  # s, own clock; NaN before the first cycle
+        ("sums", STATIC),  # of the raw readings
+    ],
+    align=True,
+)
 NODE: Final = np.dtype(
     [
         ("filter", STATE),  # the filter
@@ -126,7 +187,7 @@ NODE: Final = np.dtype(
         ("guard", GUARD),  # trust in the sensors
         ("twist", TWIST),  # torque in the string
         ("joints", JOINTS),  # joints above
-        ("events", EVENTS),  # what it has yet to say
+        # from here on what a start clears: it is not saved
         ("cycles", "i8"),  # cycles since the start
         ("overruns", "i8"),  # cycles that came too late
         ("status", "i8"),  # status bits of the newest cycle (``Status``)
@@ -143,6 +204,10 @@ NODE: Final = np.dtype(
         ("down_offset", "f8"),  # rad, of the aiding handed down
         ("down_systematic", "f8"),  # rad^2, of its constant errors
         ("down_torsion", "f8"),  # rad^2, of its twist
+        ("events", EVENTS),  # what it has yet to say
+        ("cluster", CLUSTER),  # IMUs of the tube beside each other
+        ("aligner", ALIGNER),  # an alignment under way
+        ("recording", RECORDING),  # a static record being taken
     ],
     align=True,
 )
@@ -165,9 +230,20 @@ SETTINGS: Final = np.dtype(
         ("force_range", "f8"),  # m/s^2
         ("repeats_together", "i8"),  # 0: not looked at
         ("repeats_alone", "i8"),
+        ("imus", "i8"),
+        ("place", "f8", (MAX_IMUS, 2)),  # m, of each IMU across the tube's axis
+        ("noise", "f8", (MAX_IMUS,)),  # standard deviation of each, in that of the configuration
+        ("weight", "f8", (MAX_IMUS,)),  # its inverse variance
+        ("plain_gyro_noise", "f8", (3,)),  # of the configuration, for a noise of 1
+        ("plain_bias_std", "f8", (3,)),
+        ("plain_force_std", "f8"),
+        ("tilt_noise", "f8"),  # rad, of one sample of a force at rest, as a tilt, for a noise of 1
     ],
     align=True,
 )
+
+KEPT: Final = ("filter", "mount", "guard", "twist", "joints")  # what a save holds; a start clears the rest
+KEPT_SIZE: Final = int(NODE.fields["cycles"][1]) if NODE.fields else 0  # bytes of it, from the first on
 
 # what one cycle brings, float64; of every IMU a row
 WX, WY, WZ, FX, FY, FZ, TEMPERATURE, SATURATED = range(8)
@@ -192,7 +268,10 @@ def new_node(config: Array) -> Array:
 def forget_session(nodes: Array) -> None:
     """Make every node forget what belongs to one session of its processor: readings, counts, what it had to say."""
     guard = nodes["guard"]
+    nodes["cluster"] = np.zeros(1, CLUSTER)
+    nodes["cluster"]["used"] = 1
     for sensor in ("rates", "forces"):
+        nodes["cluster"]["watches"][sensor]["last"] = np.nan
         guard["readings"][sensor]["last"] = np.nan
         guard["readings"][sensor]["counts"] = 0
     guard["readings"]["clipped"] = 0
@@ -207,6 +286,8 @@ def forget_session(nodes: Array) -> None:
     nodes["twist"]["holding"] = 0
     nodes["joints"]["hops"] = -1
     nodes["joints"]["solved"] = 0
+    nodes["aligner"] = np.zeros(1, ALIGNER)
+    nodes["recording"] = np.zeros(1, RECORDING)
     nodes["events"]["told"] = nodes["events"]["said"] = 0
     for name in ("cycles", "overruns", "status", "noticed", "rejecting", "slow_cycles", "stamp_hops"):
         nodes[name] = 0

@@ -7,19 +7,20 @@ from typing import Any, Final
 
 import numpy as np
 
+from node.kernels.calibration import USUAL
 from node.kernels.jit import kernel
 from node.kernels.layout import Array
 
 STATIC: Final = np.dtype(
     [
-        ("samples", "i8"),
+        ("samples", "i8"),  # cycles taken in
         ("mean", "f8", (6,)),  # rad/s, then m/s^2
         ("scatter", "f8", (6, 6)),  # sum of the products of deviations from the mean
-        ("last", "f8", (6,)),
+        ("last", "f8", (6,)),  # newest reading
         ("steps", "f8", (6,)),  # sum of the squared differences of neighbours
         ("temperature", "f8"),  # C, mean
-        ("moved", "i8"),
-        ("delta", "f8", (6,)),  # work space
+        ("moved", "i8"),  # 1: it was not at rest all the time
+        ("delta", "f8", (6,)),  # work space: what the newest differs from the mean by
     ],
     align=True,
 )
@@ -60,6 +61,35 @@ def add_static(record: Any, rate: Array, force: Array, temperature: float, stand
         for j in range(6):
             record.scatter[i, j] += weight * record.delta[i] * record.delta[j]
     return 1
+
+
+@kernel
+def begin_sums(record: Any) -> None:
+    """Begin anew."""
+    record.samples, record.temperature, record.moved = 0, 0.0, 0
+    for i in range(6):
+        record.mean[i], record.last[i], record.steps[i] = 0.0, 0.0, 0.0
+        for j in range(6):
+            record.scatter[i, j] = 0.0
+
+
+@kernel
+def follow_recording(node: Any, start: float, end: float, standing: int) -> bool:
+    """Take the cycle's raw reading (``start`` to ``end``, s, own clock) into the record being taken; whether it is due.
+
+    What is due is no longer running.
+    """
+    recording = node.recording
+    if recording.running == 0:
+        return False
+    if math.isnan(recording.begun):
+        recording.begun = start
+    temperature = node.temperature if math.isfinite(node.temperature) else USUAL
+    add_static(recording.sums, node.raw_rate, node.raw_force, temperature, standing)
+    if end - recording.begun < recording.seconds:
+        return False
+    recording.running = 0
+    return True
 
 
 @kernel

@@ -10,26 +10,29 @@ from __future__ import annotations
 import math
 from typing import Any, Final
 
-from node.kernels.alignment import to_tube
+from node.kernels.aligner import follow_alignment
 from node.kernels.angles import from_binary, wrap
-from node.kernels.calibration import calibrate
+from node.kernels.cluster import learn_offsets, survey_imus
 from node.kernels.coarse_level import level_coarsely
 from node.kernels.cycle import run_cycle
 from node.kernels.events import NONE, Code, tell
 from node.kernels.guard import admits, gate_aiding, guard_reading, judge_cycle
+from node.kernels.intake import take_readings
 from node.kernels.jit import kernel
 from node.kernels.layout import CLOCK_SLACK, DEG, Array, Scheme, Status
 from node.kernels.make_up import follow_joints
-from node.kernels.record import CLOCK_VAR, END, FX, HOPS, JOINED, SATURATED, START, SYNCHRONISED, TEMPERATURE, WX
+from node.kernels.modes import STATIC_BIAS
+from node.kernels.record import CLOCK_VAR, END, HOPS, JOINED, START, SYNCHRONISED
 from node.kernels.relay import offer_aiding
 from node.kernels.resets import set_stamp_prior, start_over
 from node.kernels.sensor_watch import largest
+from node.kernels.static_average import follow_recording
 from node.kernels.twist import gate_twist, holds_survey, reaching_var, twist_var
 
 STILL_CYCLES: Final = 4  # after which a node takes itself for standing
 LARGEST_OFFSET: Final = 6.0 * DEG  # rad/s, of a gyroscope never calibrated; the slow alignment turn is faster
 LEAST_STAMP: Final = 1e-4  # s, of a time stamp, whatever the clock says
-SAY_EVENTS, SAY_SURVEY, SAY_ESTIMATE, SAY_STATE, ADMITTED = 1, 2, 4, 8, 16
+SAY_EVENTS, SAY_SURVEY, SAY_ESTIMATE, SAY_STATE, SAY_RECORD, ADMITTED = 1, 2, 4, 8, 16, 32
 REFUSED: Final = -1  # the times of a cycle are such that it cannot be run
 USED, ONWARD = 1, 2  # of an aiding: it is for the filter, and it goes down
 FORWARD, FILTER_FAULT = int(Scheme.FORWARD), int(Status.FILTER_FAULT)
@@ -53,7 +56,7 @@ AIDING_REJECTED = int(Code.AIDING_REJECTED)
 
 @kernel
 def node_step(nodes: Array, configs: Array, settings: Array, parameters: Array, readings: Array, moment: Array) -> int:
-    """One cycle of one node with one IMU and the float64 loop; returns what there is to say.
+    """One cycle of one node with the float64 loop; returns what there is to say.
 
     Parameters
     ----------
@@ -62,10 +65,10 @@ def node_step(nodes: Array, configs: Array, settings: Array, parameters: Array, 
     readings : (imus, 8) rates (rad/s), forces (m/s^2), temperature (C), whether a sample was at the range
     moment : (6,) start and end (s, own clock), joined, hops, variance of the clock (s^2), synchronised
     """
+    node = nodes[0]
     waits = enter(nodes, configs, settings, parameters, readings, moment)
     if waits == REFUSED:
-        return say_events(nodes[0])
-    node = nodes[0]
+        return say_events(node)
     joined = 1 if moment[JOINED] != 0.0 else 0
     status = run_cycle(node.filter, configs[0], node.rate, node.force, moment[START], moment[END], joined)
     return leave(nodes, configs, settings, moment, status, waits)
@@ -73,74 +76,26 @@ def node_step(nodes: Array, configs: Array, settings: Array, parameters: Array, 
 
 @kernel
 def enter(nodes: Array, configs: Array, settings: Array, parameters: Array, readings: Array, moment: Array) -> int:
-    """All of a step before its loop: what ``prepare`` answers, or ``REFUSED`` where the times are none."""
-    if not admit(nodes, moment):
+    """What comes before the loop: its ``rate`` and ``force`` are left in the record; see ``node_step``.
+
+    Returns ``REFUSED``, and the step ends here, or what ``leave`` is to be told: whether the survey waits.
+    """
+    node, config, crew = nodes[0], configs[0], settings[0]
+    if not admits(node, moment[START], moment[END]):
         return REFUSED
-    correct(nodes, parameters, readings)
-    return int(prepare(nodes, configs, settings, moment, 1 if readings[0, SATURATED] != 0.0 else 0))
+    saturated = take_readings(node, config, crew, parameters, readings)
+    return before_loop(node, config, crew, moment, saturated)
 
 
 @kernel
 def leave(nodes: Array, configs: Array, settings: Array, moment: Array, status: int, waits: int) -> int:
-    """All of a step after its loop, which returned ``status``; returns what there is to say."""
-    judge(nodes, configs, moment, status, waits)
-    return int(finish(nodes, settings))
-
-
-@kernel
-def admit(nodes: Array, moment: Array) -> bool:
-    """Whether the times of a cycle are such that it can be run."""
-    return bool(admits(nodes[0], moment[START], moment[END]))
-
-
-@kernel
-def correct(nodes: Array, parameters: Array, readings: Array) -> None:
-    """Correct the reading of a node's one IMU into its record; see ``node_step``."""
-    node = nodes[0]
-    correct_reading(node, parameters, readings, 0)
-    for k in range(3):
-        node.rate[k], node.force[k] = readings[0, WX + k], readings[0, FX + k]
-    correct_one(node, parameters, 0, node.temperature, node.rate, node.force)
-
-
-@kernel
-def prepare(nodes: Array, configs: Array, settings: Array, moment: Array, saturated: int) -> int:
-    """What comes before the loop, of a reading that lies corrected in the record; whether the survey waits."""
-    return int(before_loop(nodes[0], configs[0], settings[0], moment, saturated))
-
-
-@kernel
-def judge(nodes: Array, configs: Array, moment: Array, status: int, waits: int) -> None:
-    """What comes after a loop that returned ``status``; ``waits`` is the answer of ``prepare``."""
-    after_loop(nodes[0], configs[0], moment, status, waits)
-
-
-@kernel
-def finish(nodes: Array, settings: Array) -> int:
-    """The end of a step: tell what the cycle found; returns what there is to say."""
-    return int(conclude(nodes[0], settings[0]))
-
-
-@kernel
-def correct_reading(node: Any, parameters: Array, readings: Array, imu: int) -> None:
-    """Apply an IMU's own correction in place, and keep the raw reading that a block of parameters would correct."""
-    own = parameters[1 + imu]
-    node.temperature = readings[imu, TEMPERATURE]
-    if own.identity != 1:
-        calibrate(own, node.temperature, readings[imu, WX : WX + 3], readings[imu, FX : FX + 3])
-    for k in range(3):
-        node.raw_rate[k], node.raw_force[k] = readings[imu, WX + k], readings[imu, FX + k]
-
-
-@kernel
-def correct_one(node: Any, parameters: Array, imu: int, temperature: float, rate: Array, force: Array) -> None:
-    """Correct the rate and force of one IMU by the block in use, and turn them into the tube's frame."""
-    calibrate(parameters[0], temperature, rate, force)
-    for k in range(3):
-        node.unaligned[imu, k] = force[k]
-    axis = node.mount.axis[imu]
-    to_tube(axis, rate)
-    to_tube(axis, force)
+    """What comes after a loop that returned ``status``; ``waits`` is the answer of ``enter``."""
+    node, config, crew = nodes[0], configs[0], settings[0]
+    after_loop(node, config, moment, status, waits)
+    follow_alignment(node, crew, moment[START], moment[END])
+    if crew.imus > 1 and is_quiet(node):
+        learn_offsets(node, crew)
+    return conclude(node, config, crew, moment)
 
 
 @kernel
@@ -174,8 +129,8 @@ def after_loop(node: Any, config: Any, moment: Array, status: int, waits: int) -
 
 
 @kernel
-def conclude(node: Any, settings: Any) -> int:
-    """Tell what the cycle found, as events; returns what there is to say."""
+def conclude(node: Any, config: Any, settings: Any, moment: Array) -> int:
+    """Tell what the cycle found, as events, and record it; returns what there is to say."""
     state, status = node.filter, node.status
     if status & ~AIDED:
         tell_status(node)
@@ -184,13 +139,29 @@ def conclude(node: Any, settings: Any) -> int:
         tell(node, AIDING_REJECTED, sigmas, NONE, NONE, NONE)
     node.rejecting = 1 if state.rejected > 0 else 0
     says = say_events(node) | ADMITTED
+    if follow_recording(node, moment[START], moment[END], 1 if is_standing(node) else 0):
+        says |= SAY_RECORD
     if status & SURVEY_READY:
         says |= SAY_SURVEY
+        if settings.imus > 1:
+            survey_imus(node, settings, config.survey_samples)
     if settings.scheme != FORWARD and state.yaw_known == 1:
         says |= SAY_ESTIMATE
     if status & ~AIDED or node.cycles % settings.state_every == 0:
         says |= SAY_STATE
     return says
+
+
+@kernel
+def is_quiet(node: Any) -> bool:
+    """Whether the node stands still by the block and the bias in use."""
+    return bool(node.filter.still_cycles >= STILL_CYCLES)
+
+
+@kernel
+def is_standing(node: Any) -> bool:
+    """Whether the node may be at rest: quiet, or slow and without a bias, whose offset may look like a rate."""
+    return bool(is_quiet(node) or (node.filter.mode == STATIC_BIAS and node.slow_cycles >= STILL_CYCLES))
 
 
 @kernel

@@ -11,24 +11,12 @@ from node.kernels.angles import from_binary, wrap
 from node.kernels.calibration import USUAL, identity_parameters
 from node.kernels.cluster import follow_offsets, fuse
 from node.kernels.cycle import run_cycle
-from node.kernels.guard import is_heard
 from node.kernels.layout import PERIOD, default_config, new_state
 from node.kernels.record import AIDING, END, FZ, JOINED, MOMENT, READING, SETTINGS, START, new_node
 from node.kernels.relay import offer_aiding
 from node.kernels.resets import doubt_bias, forget_bias, lose_tilt, resume
 from node.kernels.static_average import STATIC, add_static, has_moved
-from node.kernels.step import (
-    admit,
-    correct,
-    finish,
-    hand_down,
-    judge,
-    node_aiding,
-    node_step,
-    prepare,
-    say_events,
-    take_aiding,
-)
+from node.kernels.step import enter, hand_down, leave, node_aiding, node_step, own_systematic, say_events, take_aiding
 from node.kernels.twist import twist_var
 
 
@@ -47,7 +35,7 @@ def warm_step(step: Callable[..., int], aiding: Callable[..., int]) -> None:
     """Run two steps and two aidings of a node that is thrown away."""
     config = default_config()
     nodes, settings, parameters = new_node(config), np.zeros(1, SETTINGS), np.concatenate([identity_parameters()] * 2)
-    settings["state_every"] = 1
+    settings["state_every"] = settings["imus"] = 1
     readings, moment, heard = np.zeros((1, READING)), np.zeros(MOMENT), np.zeros(AIDING)
     readings[0, FZ], moment[JOINED] = -9.81, 1.0
     for k in range(2):
@@ -78,19 +66,17 @@ def warm_up() -> None:
 def warm_parts() -> None:
     """Run what other loops than the default call between the parts of a step."""
     configs, settings = default_config(), np.zeros(1, SETTINGS)
-    settings["state_every"] = settings["stiffness"] = 1
+    settings["state_every"] = settings["stiffness"] = settings["imus"] = 1
     parameters = np.concatenate([identity_parameters()] * 2)
     nodes, readings, moment = new_node(configs), np.zeros((1, READING)), np.zeros(MOMENT)
     readings[0, FZ], moment[END] = -9.81, PERIOD
-    admit(nodes, moment)
-    correct(nodes, parameters, readings)
-    judge(nodes, configs, moment, 0, prepare(nodes, configs, settings, moment, 0))
-    finish(nodes, settings)
+    waits = enter(nodes, configs, settings, parameters, readings, moment)
+    leave(nodes, configs, settings, moment, 0, waits)
     take_aiding(nodes, configs, settings, np.zeros(AIDING))
     hand_down(nodes, settings)
     node = nodes[0]
     twist_var(node["twist"])
-    is_heard(node)
+    own_systematic(node)
     say_events(node)
     forget_bias(node["filter"], configs[0])
     lose_tilt(node["filter"])

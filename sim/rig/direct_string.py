@@ -225,7 +225,7 @@ class DirectString:
     def _run_cycles(self, cycle: int, string: Sequence[int], end: float) -> Mapping[int, Sequence[Message]]:
         """A cycle of every tube: all that are plain in one call, the others one by one."""
         plain = self._spoil is None and self._imus == 1
-        together = [tube for tube in string if plain and self.tubes[tube].is_plain]
+        together = [tube for tube in string if plain and self.tubes[tube].runs_together]
         said = self._step_together(cycle, together, string, end) if together else {}
         if len(together) < len(string):
             said |= {tube: self._run_cycle(cycle, tube, string) for tube in string if tube not in together}
@@ -253,9 +253,8 @@ class DirectString:
         said: dict[int, Sequence[Message]] = {}
         for place in np.flatnonzero(mask & (tables.says[:n] & ~ADMITTED != 0)).tolist()[::-1]:
             tube = place + 1
-            begin, until = moments[place, START : END + 1].tolist()
             around = self._context(tube, n, end + self._phases[tube])
-            said[tube] = list(self.tubes[tube].say(int(tables.says[place]), begin, until, around))
+            said[tube] = list(self.tubes[tube].say(int(tables.says[place]), float(moments[place, END]), around))
         return said
 
     def _run_cycle(self, cycle: int, tube: int, string: Sequence[int]) -> Sequence[Message]:

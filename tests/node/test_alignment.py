@@ -8,11 +8,12 @@ import pytest
 
 from node.errors import ConfigurationError
 from node.firmware import static_record
-from node.firmware.alignment import FEWEST, METHODS, MOST, PATIENCE, rotation
+from node.firmware.alignment import FEWEST, METHODS, MOST, rotation
 from node.firmware.imu_settings import ImuSettings
 from node.firmware.inputs import ImuReading, RigContext
 from node.firmware.settings import Kernel, TubeSettings
 from node.firmware.tube import Tube
+from node.kernels.aligner import PATIENCE
 from node.kernels.layout import DEG, PERIOD, default_config
 from node.kernels.record import new_node
 from node.process.command_handlers import CommandHandlers
@@ -157,7 +158,7 @@ def test_the_sensor_off_the_axis_needs_its_place_to_be_known() -> None:
     errors = []
     for offset in ((0.0, 0.0), (radius, 0.0)):
         bored = Bored(tilt=(0.0, 0.0))
-        bored.tube._aligner._imus = (ImuSettings(offset),)
+        bored.tube._crew[0]["place"][0] = offset
         bored.ordered("circle", 5.0)
         for _ in range(math.ceil(5.1 * math.tau / rate / PERIOD) + 4):
             wx, wy, wz, fx, fy, fz = bored.reading(rate)

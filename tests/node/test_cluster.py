@@ -14,13 +14,13 @@ from hypothesis.extra.numpy import arrays
 from groundstation.survey.resolve import combine_imus
 from node.errors import ConfigurationError
 from node.firmware.alignment import rotation
-from node.firmware.cluster import DISAGREEING, HEALTHY
 from node.firmware.imu_settings import ImuSettings
 from node.firmware.inputs import ImuReading, RigContext
 from node.firmware.settings import Kernel, TubeSettings
 from node.firmware.tube import Tube
 from node.kernels.alignment import MAX_IMUS
 from node.kernels.cluster import fuse
+from node.kernels.cluster_watch import DISAGREEING, HEALTHY
 from node.kernels.layout import DEG, PERIOD, Err, default_config
 from node.kernels.record import new_node
 from node.process.drivers.replay import ReplayImu
@@ -356,8 +356,7 @@ def test_sources_of_a_board_are_fused_and_one_that_ends_is_told_by_its_number(tm
         if k < 25:
             np.testing.assert_allclose([*raw.rate, *raw.force], wanted, atol=1e-12)
     assert told == [("sensor_failed", 2)]
-    assert process.tube._fusion is not None
-    assert process.tube._fusion.cluster.used.tolist() == [True, False]
+    assert process.nodes[0]["cluster"]["used"][:2].tolist() == [1, 0]
     with pytest.raises(ConfigurationError, match="2 sources"):
         TubeProcess(settings, tmp_path / "other", imus=sources[:1])
 

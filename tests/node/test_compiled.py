@@ -94,6 +94,7 @@ def allocations(cycles):
     configs = default_config()
     nodes, settings, parameters = new_node(configs), np.zeros(1, SETTINGS), np.concatenate([identity_parameters()] * 2)
     settings["state_every"], settings["stiffness"], settings["aiding_old_after"] = 2, np.inf, 3.0
+    settings["imus"] = 1
     settings["rate_range"], settings["force_range"] = 9.0, 80.0
     parameters["identity"][0] = 0
     readings, moment, aiding = np.zeros((1, READING)), np.ones(MOMENT), np.zeros(11)

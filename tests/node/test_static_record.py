@@ -10,7 +10,6 @@ from hypothesis import strategies as st
 from node.firmware.inputs import ImuReading, RigContext
 from node.firmware.sensor_limits import SensorLimits
 from node.firmware.settings import TubeSettings
-from node.firmware.static_record import StaticRecorder
 from node.firmware.tube import Tube
 from node.kernels.layout import DEG, PERIOD, default_config
 from node.kernels.record import new_node
@@ -138,7 +137,7 @@ def test_a_gyroscope_never_calibrated_can_be_recorded_but_not_while_it_turns_slo
 
 @pytest.mark.parametrize("seconds", [None, True, "60", 4.9, 3601.0, math.nan, -1.0])
 def test_a_length_that_cannot_be_is_refused(seconds: object) -> None:
-    assert "seconds" in StaticRecorder().start(seconds, 1, standing=True)
+    assert "seconds" in Life().tube.start_record(seconds, 1)
 
 
 def test_a_new_accelerometer_model_is_levelled_anew_and_moves_no_bias() -> None:

@@ -1,0 +1,65 @@
+"""Readings on their way into the step: corrected, turned into the tube's frame, and of several IMUs made one."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from node.kernels.alignment import to_tube
+from node.kernels.calibration import calibrate
+from node.kernels.cluster import fuse_imus
+from node.kernels.jit import kernel
+from node.kernels.layout import Array
+from node.kernels.record import FX, SATURATED, TEMPERATURE, WX
+
+
+@kernel
+def take_readings(node: Any, config: Any, settings: Any, parameters: Array, readings: Array) -> int:
+    """Leave in the node what one IMU would have read; 1 if a sample of it was at the range. See ``node_step``.
+
+    A cluster looks at the range of each IMU by itself.
+    """
+    if settings.imus > 1:
+        take_cluster(node, config, settings, parameters, readings)
+        return 0
+    correct_reading(node, parameters, readings, 0)
+    for i in range(3):
+        node.rate[i], node.force[i] = readings[0, WX + i], readings[0, FX + i]
+    correct_one(node, parameters, 0, node.temperature, node.rate, node.force)
+    return 1 if readings[0, SATURATED] != 0.0 else 0
+
+
+@kernel
+def take_cluster(node: Any, config: Any, settings: Any, parameters: Array, readings: Array) -> None:
+    """Correct the readings of several IMUs, each by itself, and fuse them."""
+    cluster, offsets = node.cluster, node.mount.rate_offset
+    for k in range(settings.imus):
+        correct_reading(node, parameters, readings, k)
+        rate, force = cluster.rates[k], cluster.readings[k, 3:]
+        for i in range(3):
+            rate[i], force[i] = readings[k, WX + i], readings[k, FX + i]
+        correct_one(node, parameters, k, node.temperature, rate, force)
+        for i in range(3):
+            cluster.readings[k, i] = rate[i] - offsets[k, i]
+    fuse_imus(node, config, settings, readings)
+
+
+@kernel
+def correct_reading(node: Any, parameters: Array, readings: Array, imu: int) -> None:
+    """Apply an IMU's own correction in place, and keep the raw reading that a block of parameters would correct."""
+    own = parameters[1 + imu]
+    node.temperature = readings[imu, TEMPERATURE]
+    if own.identity != 1:
+        calibrate(own, node.temperature, readings[imu, WX : WX + 3], readings[imu, FX : FX + 3])
+    for k in range(3):
+        node.raw_rate[k], node.raw_force[k] = readings[imu, WX + k], readings[imu, FX + k]
+
+
+@kernel
+def correct_one(node: Any, parameters: Array, imu: int, temperature: float, rate: Array, force: Array) -> None:
+    """Correct the rate and force of one IMU by the block in use, and turn them into the tube's frame."""
+    calibrate(parameters[0], temperature, rate, force)
+    for k in range(3):
+        node.unaligned[imu, k] = force[k]
+    axis = node.mount.axis[imu]
+    to_tube(axis, rate)
+    to_tube(axis, force)
