@@ -13,7 +13,6 @@ from node.kernels.warm import warm_loop, warm_step
 for kernel in KERNELS:
     loop = kernel_of(kernel)
     warm_loop(loop.run_cycle, loop.offer_aiding)
-    if loop.step is not None and loop.aiding is not None:
-        warm_step(loop.step, loop.aiding)
+    warm_step(loop.step, loop.aiding)
 
 __all__ = ["warm"]

@@ -14,14 +14,13 @@ from node.kernels.step import node_aiding, node_step
 class Loop(NamedTuple):
     """The cycle and the intake of aiding of a kernel, and the step of a node that holds both compiled in.
 
-    The signatures are those of ``node.kernels.cycle``, ``relay`` and ``step``. A kernel without a step of its own runs
-    in parts, from Python.
+    The signatures are those of ``node.kernels.cycle``, ``relay`` and ``step``.
     """
 
     run_cycle: Callable[..., int]
     offer_aiding: Callable[..., int]
-    step: Callable[..., int] | None = None
-    aiding: Callable[..., int] | None = None
+    step: Callable[..., int]
+    aiding: Callable[..., int]
 
 
 def kernel_of(kernel: Kernel) -> Loop:
@@ -30,8 +29,9 @@ def kernel_of(kernel: Kernel) -> Loop:
         return Loop(run_cycle, offer_aiding, node_step, node_aiding)
     if kernel == "published":
         from node.kernels.published import cycle as published
+        from node.kernels.published.step import published_aiding, published_step
 
-        return Loop(published.run_cycle, published.offer_aiding)
+        return Loop(published.run_cycle, published.offer_aiding, published_step, published_aiding)
     from node.kernels.fixed.node import FixedNode
 
     fixed = FixedNode()

@@ -21,27 +21,19 @@ from node.kernels.cluster import begin_cluster
 from node.kernels.events import NONE
 from node.kernels.layout import DEG, Array, Scheme
 from node.kernels.modes import STATIC_BIAS
-from node.kernels.record import AIDING, END, JOINED, MOMENT, READING, START
+from node.kernels.record import AIDING, MOMENT, READING
 from node.kernels.resets import forget_bias, lose_tilt
 from node.kernels.step import (
     ADMITTED,
     ONWARD,
-    REFUSED,
     SAY_ESTIMATE,
     SAY_EVENTS,
     SAY_RECORD,
     SAY_STATE,
     SAY_SURVEY,
-    USED,
-    enter,
-    hand_down,
     is_quiet,
     is_standing,
-    leave,
     node_step,
-    own_systematic,
-    say_events,
-    take_aiding,
 )
 from node.kernels.twist import twist_var
 from telemetry.messages import (
@@ -110,11 +102,7 @@ class Tube:
             *(a.yaw, a.yaw_var, a.systematic_var, a.offset, a.rate, valid_local, a.sequence, a.hops),
             *(a.torque, a.torsion_var, a.under_torque),
         )
-        if self._loop.aiding is not None:
-            gates = self._loop.aiding(self.nodes, self.configs, self._crew, taken)
-        else:
-            gates = self._offer(a, valid_local, taken)
-        if not gates & ONWARD:
+        if not self._loop.aiding(self.nodes, self.configs, self._crew, taken) & ONWARD:
             return None
         node = self.node
         return Aiding(
@@ -139,10 +127,7 @@ class Tube:
         rows[0] = (*reading.rate, *reading.force, reading.temperature, reading.saturated)
         for k in range(1, len(rows)):
             rows[k] = _row_of(reading.others[k - 1]) if k <= len(reading.others) else math.nan
-        if self._loop.step is not None:
-            says = self._loop.step(self.nodes, self.configs, self._crew, self._corrections, rows, self._moment)
-        else:
-            says = self._run_in_parts()
+        says = self._loop.step(self.nodes, self.configs, self._crew, self._corrections, rows, self._moment)
         return [] if says in (0, ADMITTED) else list(self.say(says, reading.end, context))
 
     @property
@@ -240,35 +225,6 @@ class Tube:
     def flags(self, context: RigContext, now: float) -> NodeFlag:
         """What the node says of the trust in its own yaw at ``now`` (s, own clock)."""
         return self.reporter.flags(context, now)
-
-    def _offer(self, aiding: Aiding, valid_local: float, taken: Array) -> int:
-        """``node_aiding`` with a loop that has no step of its own."""
-        node, gates = self.node, int(take_aiding(self.nodes, self.configs, self._crew, taken))
-        if gates & USED:
-            node["noticed"] |= self._loop.offer_aiding(
-                self.state,
-                self.config,
-                aiding.yaw,
-                aiding.yaw_var,
-                own_systematic(node),
-                float(node["down_offset"]),
-                valid_local,
-                aiding.sequence,
-                aiding.hops,
-            )
-        if gates & ONWARD:
-            hand_down(self.nodes, self._crew)
-        return gates
-
-    def _run_in_parts(self) -> int:
-        """``node_step`` with a loop that has none of its own."""
-        node, moment = self.node, self._moment
-        waits = enter(self.nodes, self.configs, self._crew, self._corrections, self._readings, moment)
-        if waits == REFUSED:
-            return int(say_events(node))
-        times = float(moment[START]), float(moment[END]), int(moment[JOINED])
-        status = self._loop.run_cycle(self.state, self.config, node["rate"], node["force"], *times)
-        return int(leave(self.nodes, self.configs, self._crew, moment, int(status), waits))
 
     def say(self, says: int, end: float, context: RigContext) -> Iterator[Said]:
         """What the step has to say of the cycle that ended at ``end`` (s, own clock), in order."""

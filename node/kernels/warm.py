@@ -14,9 +14,9 @@ from node.kernels.cycle import run_cycle
 from node.kernels.layout import PERIOD, default_config, new_state
 from node.kernels.record import AIDING, END, FZ, JOINED, MOMENT, READING, SETTINGS, START, new_node
 from node.kernels.relay import offer_aiding
-from node.kernels.resets import doubt_bias, forget_bias, lose_tilt, resume
+from node.kernels.resets import forget_bias, lose_tilt, resume
 from node.kernels.static_average import STATIC, add_static, has_moved
-from node.kernels.step import enter, hand_down, leave, node_aiding, node_step, own_systematic, say_events, take_aiding
+from node.kernels.step import is_quiet, is_standing, node_aiding, node_step
 from node.kernels.twist import twist_var
 
 
@@ -59,26 +59,17 @@ def warm_up() -> None:
     follow_offsets(np.ones((2, 3)), rate, 1, new_mount()[0]["rate_offset"])
     warm_loop(run_cycle, offer_aiding)
     warm_step(node_step, node_aiding)
-    warm_parts()
+    warm_border()
     wrap(0.0)
 
 
-def warm_parts() -> None:
-    """Run what other loops than the default call between the parts of a step."""
-    configs, settings = default_config(), np.zeros(1, SETTINGS)
-    settings["state_every"] = settings["stiffness"] = settings["imus"] = 1
-    parameters = np.concatenate([identity_parameters()] * 2)
-    nodes, readings, moment = new_node(configs), np.zeros((1, READING)), np.zeros(MOMENT)
-    readings[0, FZ], moment[END] = -9.81, PERIOD
-    waits = enter(nodes, configs, settings, parameters, readings, moment)
-    leave(nodes, configs, settings, moment, 0, waits)
-    take_aiding(nodes, configs, settings, np.zeros(AIDING))
-    hand_down(nodes, settings)
+def warm_border() -> None:
+    """Run what is called from outside a step, between two."""
+    nodes, configs = new_node(default_config()), default_config()
     node = nodes[0]
+    is_quiet(node)
+    is_standing(node)
     twist_var(node["twist"])
-    own_systematic(node)
-    say_events(node)
     forget_bias(node["filter"], configs[0])
     lose_tilt(node["filter"])
-    doubt_bias(node["filter"], 0, 0.0)
     resume(node["filter"])

@@ -91,6 +91,8 @@ class Borehole:
         k, f, step = self._locate(md)
         t1, t2, bend = self._tangents[k], self._tangents[k + 1], self._bend[k][:, None]
         straight = bend < STRAIGHT
+        if straight.all():
+            return (1.0 - f[:, None]) * t1 + f[:, None] * t2, np.zeros_like(t1)
         sine = np.where(straight, 1.0, np.sin(bend))
         f, step = f[:, None], step[:, None]
         w1 = np.where(straight, 1.0 - f, np.sin((1.0 - f) * bend) / sine)

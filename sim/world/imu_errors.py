@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
+from node.kernels.jit import kernel
 from sim.world.scenario import AccelerometerSection, DriftSection, GyroSection
 
 Array = npt.NDArray[np.float64]
@@ -23,9 +24,16 @@ def gauss_markov(random: np.random.Generator, count: int, std: Array, tau: float
     phi = math.exp(-step / tau)
     draws = random.standard_normal((count, 3))
     draws[1:] *= math.sqrt(1.0 - phi * phi)
-    for k in range(1, count):
-        draws[k] += phi * draws[k - 1]
+    follow(draws, phi)
     return draws * std
+
+
+@kernel
+def follow(draws: Array, phi: float) -> None:
+    """Add to every row of ``draws`` (n, m) its part ``phi`` of the row before, in place."""
+    for k in range(1, draws.shape[0]):
+        for j in range(draws.shape[1]):
+            draws[k, j] += phi * draws[k - 1, j]
 
 
 @dataclass(frozen=True, slots=True)

@@ -16,6 +16,7 @@ from sim.world.borehole import Borehole
 from sim.world.motion import Motion
 
 Array = npt.NDArray[np.float64]
+Along = tuple[Array, Array, Array]  # tangent, its time derivative, acceleration
 Twist = Callable[[Array], tuple[Array, Array, Array]]
 GAUSS_X, GAUSS_W = np.polynomial.legendre.leggauss(8)
 
@@ -87,24 +88,33 @@ class TubeTruth:
 
     def attitude(self, t: Array) -> Array:
         """R_ned_from_body (n, 3, 3)."""
-        tangent = self._along(t)[0]
-        return np.asarray(lean_rotation(tangent) @ _turn(self.yaw(t)))
+        return self._attitude(t, self._along(t)[0])
 
     def rate(self, t: Array) -> Array:
         """Body rate (n, 3, rad/s)."""
-        tangent, dtangent, _ = self._along(t)
+        along = self._along(t)
+        return self._rate(t, along, self._attitude(t, along[0]))
+
+    def force(self, t: Array) -> Array:
+        """Specific force (n, 3, m/s^2): gravity, motion along the path and the circle around the axis."""
+        along = self._along(t)
+        return self._force(t, along, self._attitude(t, along[0]))
+
+    def _attitude(self, t: Array, tangent: Array) -> Array:
+        return np.asarray(lean_rotation(tangent) @ _turn(self.yaw(t)))
+
+    def _rate(self, t: Array, along: Along, attitude: Array) -> Array:
+        tangent, dtangent, _ = along
         turning = self.turned(t)[1]
         across = np.cross(tangent, dtangent)
-        body: Array = np.einsum("nji,nj->ni", self.attitude(t), across)
+        body: Array = np.einsum("nji,nj->ni", attitude, across)
         twist = (tangent[:, 0] * dtangent[:, 1] - tangent[:, 1] * dtangent[:, 0]) / (1.0 + tangent[:, 2])
         body[:, 2] = turning - twist
         return body
 
-    def force(self, t: Array) -> Array:
-        """Specific force (n, 3, m/s^2): gravity, motion along the path and the circle around the axis."""
-        acceleration = self._along(t)[2]
-        acceleration[:, 2] -= self._gravity
-        body: Array = np.einsum("nji,nj->ni", self.attitude(t), acceleration)
+    def _force(self, t: Array, along: Along, attitude: Array) -> Array:
+        acceleration = along[2] - np.array([0.0, 0.0, self._gravity])
+        body: Array = np.einsum("nji,nj->ni", attitude, acceleration)
         _, rate, angular = self.turned(t)
         body[:, 0] -= self._radius * rate**2
         body[:, 1] += self._radius * angular
@@ -115,14 +125,17 @@ class TubeTruth:
         half = 0.5 * period
         nodes = (ends[:, None] - half + half * GAUSS_X[None, :]).ravel()
         weights = 0.5 * GAUSS_W
-        rate = np.einsum("ngk,g->nk", self.rate(nodes).reshape(len(ends), -1, 3), weights)
-        force = np.einsum("ngk,g->nk", self.force(nodes).reshape(len(ends), -1, 3), weights)
+        along = self._along(nodes)
+        attitude = self._attitude(nodes, along[0])
+        rates, forces = self._rate(nodes, along, attitude), self._force(nodes, along, attitude)
+        rate = np.einsum("ngk,g->nk", rates.reshape(len(ends), -1, 3), weights)
+        force = np.einsum("ngk,g->nk", forces.reshape(len(ends), -1, 3), weights)
         spin = self.turned(nodes)[1].reshape(len(ends), -1) @ weights
         increment = self.turned(ends)[0] - self.turned(ends - period)[0]
         rate[:, 2] += increment / period - spin
         return rate, force
 
-    def _along(self, t: Array) -> tuple[Array, Array, Array]:
+    def _along(self, t: Array) -> Along:
         """Tangent, its time derivative and the acceleration of the tube, each (n, 3)."""
         bit, speed, thrust = self._motion.depth(t)
         inside = bit > self._below  # before, the tube waits upright at the collar

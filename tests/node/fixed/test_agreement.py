@@ -7,7 +7,7 @@ import pytest
 
 from node.errors import ConfigurationError
 from node.firmware.inputs import ImuReading, RigContext
-from node.firmware.kernel_choice import kernel_of
+from node.firmware.kernel_choice import Loop, kernel_of
 from node.firmware.settings import TubeSettings
 from node.firmware.tube import Tube
 from node.kernels.cycle import run_cycle
@@ -24,11 +24,23 @@ from node.kernels.fixed.border import (
 )
 from node.kernels.fixed.layout import CEILING, FIXED_STATE, VAR_Q
 from node.kernels.fixed.node import FixedNode
-from node.kernels.layout import DEG, PERIOD, STATE, Status, default_config, new_state
-from node.kernels.record import new_node
+from node.kernels.layout import DEG, PERIOD, STATE, Array, Status, default_config, new_state
+from node.kernels.record import END, JOINED, START, new_node
 from node.kernels.relay import offer_aiding
 from node.kernels.resets import forget_bias
-from node.kernels.step import node_aiding, node_step
+from node.kernels.step import (
+    ONWARD,
+    REFUSED,
+    USED,
+    enter,
+    hand_down,
+    leave,
+    node_aiding,
+    node_step,
+    own_systematic,
+    say_events,
+    take_aiding,
+)
 from sim.studies.fixed_point.run import AIDING_VAR, LIMITS, compare, inputs, rows_of
 from telemetry.messages import Aiding, NodeState
 
@@ -185,11 +197,35 @@ def reports(kernel: str, *, forget: bool) -> list[NodeState]:
     return said
 
 
+def in_parts(loop: Loop) -> Loop:
+    """The step and the aiding of a loop, called part by part from Python."""
+
+    def step(nodes: Array, configs: Array, settings: Array, parameters: Array, readings: Array, moment: Array) -> int:
+        waits, node = enter(nodes, configs, settings, parameters, readings, moment), nodes[0]
+        if waits == REFUSED:
+            return say_events(node)
+        times = float(moment[START]), float(moment[END]), int(moment[JOINED])
+        status = loop.run_cycle(node["filter"], configs[0], node["rate"], node["force"], *times)
+        return leave(nodes, configs, settings, moment, int(status), waits)
+
+    def aiding(nodes: Array, configs: Array, settings: Array, given: Array) -> int:
+        node, gates = nodes[0], take_aiding(nodes, configs, settings, given)
+        if gates & USED:
+            yaw, yaw_var, _, _, _, valid_at, sequence, hops, *_ = given.tolist()
+            about = own_systematic(node), float(node["down_offset"]), valid_at, int(sequence), int(hops)
+            node["noticed"] |= loop.offer_aiding(node["filter"], configs[0], yaw, yaw_var, *about)
+        if gates & ONWARD:
+            hand_down(nodes, settings)
+        return gates
+
+    return loop._replace(step=step, aiding=aiding)
+
+
 @pytest.mark.slow
-@pytest.mark.parametrize("kernel", ["float64", "fixed"])
+@pytest.mark.parametrize("kernel", ["float64", "fixed", "published"])
 def test_the_compiled_step_does_what_the_step_in_parts_does(kernel: str) -> None:
     whole, parts = tube(kernel), tube(kernel)
-    parts._loop = parts._loop._replace(step=None, aiding=None)
+    parts._loop = in_parts(parts._loop)
     for k, given in enumerate(inputs(1300, 8)):
         around = RigContext(True, 1 + k // 900, given.end, 1e-8 * (1 + k // 500), True)
         rate = given.rate if k % 211 else (np.nan, 0.0, 0.0)

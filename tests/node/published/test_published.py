@@ -15,6 +15,7 @@ from node.kernels.error_model import BX, PSI, TX, TY
 from node.kernels.layout import DEG, PERIOD, STATES, Array, Err, Status, default_config, new_state
 from node.kernels.published import cycle as published
 from node.kernels.published.euler import error_rates, euler_rates, geometry_of, point_down, propagate, tilt_of
+from node.kernels.published.step import published_aiding, published_step
 from node.kernels.record import new_node
 from telemetry.messages import Aiding, Event, NodeFlag, NodeState
 
@@ -276,4 +277,9 @@ def test_six_states_are_estimated_and_the_other_two_stay_as_they_began() -> None
 
 
 def test_it_is_chosen_by_the_settings() -> None:
-    assert kernel_of("published") == (published.run_cycle, published.offer_aiding, None, None)
+    assert kernel_of("published") == (
+        published.run_cycle,
+        published.offer_aiding,
+        published_step,
+        published_aiding,
+    )
