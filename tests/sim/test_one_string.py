@@ -6,9 +6,10 @@ from typing import Any
 import numpy as np
 import pytest
 
-from node.kernels.layout import PERIOD
+from node.kernels.layout import PERIOD, Scheme
 from sim.errors import ScenarioError
 from sim.rig.direct_string import DirectString, StringRun, aiding_passes
+from sim.studies.epochs import resting
 from sim.world.scenario import AidingSection, scenario_of
 from sim.world.world import World
 
@@ -141,3 +142,16 @@ def test_a_string_without_frames_needs_a_link_that_is_off_and_fields_that_exist(
         DirectString(World(scenario_of(tables(medium={"link": "on"})), 1))
     with pytest.raises(ScenarioError, match=r"node\.tuning\.colour"):
         DirectString(World(scenario_of(tables(node={"tuning": {"colour": 1.0}})), 1))
+
+
+@pytest.mark.parametrize("scheme", ["forward", "estimate"])
+def test_a_string_in_one_call_is_the_string_node_by_node(scheme: str) -> None:
+    """A sample that is spoilt by nothing has every node stepped by itself."""
+    wanted = dict(resting(3, Scheme[scheme.upper()], blocks=2, loss=0.2))
+    together = DirectString(World(scenario_of(wanted), 3)).drill()
+    apart = DirectString(World(scenario_of(wanted), 3), spoil=lambda _tube, _cycle, sample: sample).drill()
+    for name in ("yaw", "total_error", "var", "systematic_var", "gyro_bias"):
+        np.testing.assert_array_equal(getattr(together, name), getattr(apart, name))
+    assert together.events == apart.events
+    assert together.surveys == apart.surveys
+    assert len(together.surveys) == 6
