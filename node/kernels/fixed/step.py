@@ -21,7 +21,7 @@ def fixed_step(
     moment: Array,
     integers: Array,
 ) -> int:
-    """One cycle of one node with one IMU as ``node.kernels.step.node_step``; returns what there is to say.
+    """One cycle of one node as ``node.kernels.step.node_step``; returns what there is to say.
 
     Parameters
     ----------
