@@ -17,7 +17,6 @@ from telemetry.messages import Matrix3, Vector3
 
 FORMAT = 1
 POWERS = 3  # of T - T_ref beyond the constant
-HASH_SIZE = 32  # SHA-256
 SHORT_HASH = 8  # bytes of it in a node's state
 HEAD = struct.Struct("<4sHHI")  # magic, format, tube, version
 SENSOR = struct.Struct(f"<{(POWERS + 1) * 12 + 1}d")

@@ -347,4 +347,3 @@ SCHEMA: tuple[MessageSpec, ...] = (
     ),
 )
 SPEC_OF: dict[type[Any], MessageSpec] = {spec.message: spec for spec in SCHEMA}
-SPEC_OF_KIND: dict[Kind, MessageSpec] = {spec.kind: spec for spec in SCHEMA}

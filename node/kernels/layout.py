@@ -16,7 +16,6 @@ Array: TypeAlias = "np.ndarray[Any, np.dtype[Any]]"
 STATES: Final = 8
 RING: Final = 64
 PENDING: Final = 4
-LAYOUT_VERSION: Final = 2
 UNKNOWN_YAW_VAR: Final = 3.29  # rad^2, uniform over the turn
 CLOCK_SLACK: Final = 0.05  # s, by which an aiding may seem to be of the next cycle for the clock's error alone
 INVERTED: Final = -0.9848077530122081  # downward part of the axis at 170 deg of inclination

@@ -18,7 +18,6 @@ NODE_LAYOUT: Final = 4  # of the saved record; 1 and 2 held the filter alone, 3 
 EVENTS_KEPT: Final = 32  # that wait to be said
 NUMBERS: Final = 10  # of one event
 DISAGREEMENTS: Final = 3  # aidings in a row, until a mismatch is a fault
-UNSAID: Final = -1  # of a place that nothing was written to
 
 TRUST: Final = np.dtype(
     [

@@ -20,7 +20,6 @@ from telemetry.media.zenoh_bus import ZenohBus, open_client
 from telemetry.messages import address_name
 
 SUPERVISE_EVERY = 0.2  # wall s
-QUERY_TIMEOUT = 10.0  # wall s
 
 
 @dataclass(frozen=True, slots=True)

@@ -126,15 +126,6 @@ class ZenohBus:
         direct: Any = zenoh.handlers.Callback(lambda s: callback(str(s.key_expr), s.payload.to_bytes()), indirect=False)
         return Subscription(self._session.declare_subscriber(pattern, direct))
 
-    def queryable(self, pattern: str, handler: Callable[[Query], object]) -> None:
-        """Answer queries that intersect ``pattern`` with ``handler`` on a foreign thread."""
-
-        def answer(query: zenoh.Query) -> None:
-            with query:
-                handler(Query(query))
-
-        self._declared.append(self._session.declare_queryable(pattern, answer, complete=True))
-
     def queryable_kept(self, pattern: str, handler: Callable[[Query], object]) -> None:
         """Hand queries that intersect ``pattern`` to ``handler`` on a foreign thread; ``Query.finish`` ends each."""
         self._declared.append(self._session.declare_queryable(pattern, lambda q: handler(Query(q)), complete=True))
