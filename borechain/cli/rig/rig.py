@@ -155,7 +155,7 @@ def process_table(
 
     specs = {
         "medium": Spec(run_medium, (place("medium"), scenario, seed, speed, faults, True, True)),
-        "encoder": Spec(run_encoder, (place("encoder"), None, None, world.torque_settings())),
+        "encoder": Spec(run_encoder, (place("encoder"), None, None, world.torque_settings(), world.reach)),
         "base": Spec(run_ground, (place("ground"), ground_settings(world))),
     }
     for tube in range(1, world.scenario.tubes + 1):
