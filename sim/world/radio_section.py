@@ -47,7 +47,9 @@ class RadioSection(Section):
     attempts: int = Field(3, ge=1, le=20, description="of the radio at a packet, before the frame is lost")
     attempt_ms: NotNegative = Field(4.0, le=100.0, description="each of them after the first delays the frame by")
     fade_std_db: NotNegative = Field(0.0, le=20.0, description="of each joint's loss, constant, 1 sigma")
-    burst_every_s: Positive | None = Field(None, description="mean time from one burst of a joint to the next")
+    burst_every_s: Positive | None = Field(
+        None, description="mean time from the end of one burst of a joint to the next"
+    )
     burst_s: Positive = Field(1.0, description="mean length of a burst")
     burst_db: NotNegative = Field(10.0, le=100.0, description="lost at a joint during a burst")
     soil: tuple[LayerSection, ...] = Field((), description="from the top down; air above")

@@ -78,4 +78,4 @@ def packet_error_rate(margin_db: npt.ArrayLike, width: float = WIDTH) -> Array:
         For a width that is not above zero.
     """
     w = positive("width", width, "dB")
-    return np.asarray(0.5 * (1.0 - np.tanh(0.5 * np.asarray(margin_db, float) / w)))
+    return np.asarray(np.exp(-np.logaddexp(0.0, np.asarray(margin_db, float) / w)))

@@ -28,7 +28,7 @@ RESISTIVITY: Final = 1e-8 * np.array(  # ohm m, a row for each carbon content
         [19.6, 25.2, 33.3, 54.0],
     ]
 )
-CARBON: Final = Range(CARBON_PERCENT[0], CARBON_PERCENT[-1], 1.0, "% carbon")
+CARBON: Final = Range(CARBON_PERCENT[0], CARBON_PERCENT[-1], 1.0, "%")
 TEMPERATURE: Final = Range(TEMPERATURES[0], TEMPERATURES[-1], 1.0, "C")
 API_5L: Final = MappingProxyType(  # grade of line pipe to its largest carbon content, % by weight
     {
