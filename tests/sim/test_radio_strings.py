@@ -53,7 +53,7 @@ def drill(folder: Path, **radio: Any) -> Drilled:
         for tube in (1, 2):
             process = rig.stepper.processes[tube]
             assert isinstance(process, TubeProcess)
-            age = world.local_clock(tube, progress.rig_time) - float(process.tube.state["last_aided"][0])
+            age = world.local_clock(tube, progress.rig_time) - float(process.tube.state["last_aided"])
             drilled.oldest[tube] = max(drilled.oldest[tube], age)
 
     rig.run(watch)

@@ -39,7 +39,7 @@ def test_constants_are_those_of_free_space() -> None:
 
 
 def test_water_is_that_of_the_tables() -> None:
-    """Static 80.1 and a relaxation of 0.58e-10 s / 2 pi at 20 C; at 17.1 GHz, the peak there, the loss is half the span."""
+    """80.1 at rest and 0.58e-10 s / 2 pi at 20 C; at the relaxation, 17.1 GHz, the loss is half the span."""
     real, loss = water_permittivity(1.0, 20.0)
     assert real == pytest.approx(80.1, abs=0.1)
     assert loss == pytest.approx(0.0, abs=1e-7)
@@ -147,9 +147,7 @@ def test_packet_error_rate_is_logistic(over: float, width: float) -> None:
     assert packet_error_rate(over + 1.0, width) <= rate
 
 
-@pytest.mark.parametrize(
-    ("mode", "ghz"), [(TE11, 2.928), (TM01, 3.825), (TE21, 4.858)], ids=["TE11", "TM01", "TE21"]
-)
+@pytest.mark.parametrize(("mode", "ghz"), [(TE11, 2.928), (TM01, 3.825), (TE21, 4.858)], ids=["TE11", "TM01", "TE21"])
 def test_cut_offs_of_a_bore_of_three_centimetres(mode: Mode, ghz: float) -> None:
     assert cut_off(mode, 0.03) * 1e-9 == pytest.approx(ghz, abs=5e-4)
 
