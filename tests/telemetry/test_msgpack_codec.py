@@ -111,7 +111,7 @@ def test_a_state_is_said_as_before_there_was_what_it_does_not_use(state: NodeSta
     ("message", "version", "named"),
     [
         (Receipt(3, 4), 2, "receipt: expected version 1, got 2"),
-        (Receipt(3, 4), 4, "schema version 1 to 3, got 4"),
+        (Receipt(3, 4), 5, "schema version 1 to 4, got 5"),
         (Receipt(3, 4), 0, "schema version"),
         (Receipt(3, 4), True, "schema version"),
         (Aiding(1.0, 1e-8, 0.0, 0.0, 0.0, 1.0, 1, 0), 2, "torque"),

@@ -24,7 +24,8 @@ plot_option = click.option(
 def check_plot(plot: Path | None) -> None:
     """Refuse a plot that could not be made, before anything is computed."""
     check_suffix("--plot", plot, *PLOT_FORMATS)
-    check_installed("scipy", *(["matplotlib"] if plot is not None else []))
+    if plot is not None:
+        check_installed("scipy", "matplotlib")
 
 
 def tell(title: str, result: dict[str, Any], *, as_json: bool, plot: Path | None, figure: Callable[[], Figure]) -> None:

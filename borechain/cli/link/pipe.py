@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from borechain.cli.faults import InputFault, plain_faults
+from borechain.cli.faults import InputFault, needs, plain_faults
 from borechain.cli.link.output import check_plot, plot_option, tell
 from borechain.cli.options import json_option
 
@@ -24,6 +24,7 @@ if TYPE_CHECKING:
 @click.option("--budget-db", type=float, default=110.0, show_default=True, help="What may be lost on the way.")
 @plot_option
 @json_option
+@needs("scipy")
 @plain_faults
 def pipe(
     radius_cm: float,
