@@ -7,6 +7,9 @@ import pytest
 from click.testing import CliRunner, Result
 
 from borechain.cli.link.link import link
+from borechain.cli.rig.rig import rig
+
+SCENARIOS = Path(__file__).parents[1] / "scenarios"
 
 
 def ask(*words: str) -> Result:
@@ -64,6 +67,17 @@ def test_water_beyond_the_pores_warns_once_and_answers() -> None:
     assert len(json.loads(done.stdout)["links"]) == 3
     (line,) = done.stderr.splitlines()
     assert line.startswith("Warning: water: a soil of this density holds at most 44 % by volume")
+
+
+def test_a_scenario_in_a_ground_of_too_much_water_warns_in_a_line_before_it_is_drilled(tmp_path: Path) -> None:
+    text = (SCENARIOS / "wellbore-1-wet-clay.toml").read_text().replace("water = 0.40", "water = 0.80")
+    (tmp_path / "flooded.toml").write_text(text)
+    (tmp_path / "wellbore-1-path.csv").write_text((SCENARIOS / "wellbore-1-path.csv").read_text())
+    done = CliRunner().invoke(rig, [str(tmp_path / "flooded.toml"), "--inline", "--json", "--out", str(tmp_path)])
+    assert done.exit_code == 1
+    warned, refused = done.stderr.splitlines()
+    assert warned.startswith("Warning: water: a soil of this density holds at most 44 % by volume")
+    assert "expected a new or empty folder" in refused
 
 
 @pytest.mark.parametrize(

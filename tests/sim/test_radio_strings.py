@@ -127,4 +127,4 @@ def test_surveys_come_through_wet_clay_as_late_as_expected() -> None:
     distribution = expected(world, surveys)
     assert distribution.sum() == pytest.approx(1.0, abs=1e-6)
     assert times.min() > 0.0
-    assert largest_difference(times, distribution) < 0.67  # beyond which six draws fall once in a thousand
+    assert largest_difference(times, distribution) < 0.725  # beyond which six draws fall once in a thousand
