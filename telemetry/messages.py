@@ -8,10 +8,11 @@ encoder node's clock, unless the field says that they are a node's own clock.
 from __future__ import annotations
 
 import enum
+import math
 from dataclasses import dataclass, field
 from typing import TypeAlias
 
-SCHEMA_VERSION = 3  # the newest; a payload carries the earliest that can say it
+SCHEMA_VERSION = 4  # the newest; a payload carries the earliest that can say it
 ENCODER = 0
 MAX_TUBE = 250
 BASE = 251
@@ -157,6 +158,8 @@ class NodeState:
     parameters_version: int = 0  # of the block in use, 0 is the identity
     parameters_hash: bytes = bytes(8)  # first bytes of its SHA-256
     alignment: Vector3 = (0.0, 0.0, 0.0)  # rad: pitch, roll and their standard error, 0 if not aligned
+    upper_margin: float = math.inf  # dB, of the frames heard from above over the radio's threshold; inf: no radio
+    lower_margin: float = math.inf  # dB, the same from below
 
 
 @dataclass(frozen=True, slots=True)

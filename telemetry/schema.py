@@ -120,6 +120,11 @@ def _time(name: str, key: str, meaning: str) -> Field:
     return Field(name, ValueKind.NUMBER, meaning, "s", -1e12, 1e12, key=key, step=TIME_STEP)
 
 
+def _margin(name: str, key: str, where: str) -> Field:
+    meaning = f"of the frames from {where} over the radio's threshold; inf without a radio, or with nobody heard"
+    return Field(name, ValueKind.NUMBER, meaning, "dB", -200.0, math.inf, key=key, since=4, before=math.inf, step=0.5)
+
+
 TURN, VARIANCE, TORQUE, U32, U53 = math.tau, 100.0, 1e6, 2**32 - 1, 2**53
 ANGLE_STEP = TURN / 2**24  # rad
 TIME_STEP = 1e-5  # s
@@ -235,6 +240,8 @@ SCHEMA: tuple[MessageSpec, ...] = (
                 before=(0.0, 0.0, 0.0),
                 step=1e-6,
             ),
+            _margin("upper_margin", "um", "above"),
+            _margin("lower_margin", "lm", "below"),
         ),
     ),
     MessageSpec(

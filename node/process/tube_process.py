@@ -14,6 +14,7 @@ from node.errors import ConfigurationError
 from node.firmware.inputs import ImuReading, RigContext
 from node.firmware.saved_state import resume
 from node.firmware.settings import TubeSettings
+from node.firmware.silent_tubes import across
 from node.firmware.tube import Tube
 from node.kernels.alignment import new_mount
 from node.kernels.calibration import USUAL
@@ -104,6 +105,7 @@ class TubeProcess(Process):
             frozenset(Side),
             boot_count=self.boots,
             restored=telemetry,
+            reach=settings.reach,
         )
         restored = saved is not None
         next_sequence = self.endpoint.new_sequence
@@ -118,6 +120,7 @@ class TubeProcess(Process):
         self._commands = CommandHandlers(self.tube, timing)
         self._now = 0.0
         self._announced = False
+        self._skipped = 0  # silent tubes above, as they were last told of
         self._blocks = BlockUpdater(self.tube, store, key, self._send_event, self._save)
         # what a start goes on with is on the disk, with its rest: power that comes and goes costs nothing
         if saved is None or self._fallback or self._saver.due:
@@ -128,10 +131,10 @@ class TubeProcess(Process):
         """The filter of the node, one-element array of dtype ``STATE``."""
         return np.asarray(self.nodes["filter"])
 
-    def on_frame(self, side: Side, frame: bytes, now: float) -> None:
-        """A frame arrived at one end (``now``: s, own clock)."""
+    def on_frame(self, side: Side, frame: bytes, now: float, margin: float = math.inf) -> None:
+        """A frame arrived at one end (``now``: s, own clock), by radio with a ``margin`` (dB)."""
         self._now = now
-        for received in self.endpoint.receive(side, frame, now):
+        for received in self.endpoint.receive(side, frame, now, margin):
             message = received.message
             if isinstance(message, Aiding) and received.side is Side.UPPER:
                 self._on_aiding(message, now)
@@ -158,6 +161,7 @@ class TubeProcess(Process):
         context = self._context(now)
         if context.synchronised:
             self._announce(context.rig_now, now)
+            self._tell_of_silent_tubes()
         said = self.tube.on_cycle(reading, context)
         self._lap(Stage.FILTER)
         for message in said:
@@ -198,6 +202,10 @@ class TubeProcess(Process):
             return
         if self._timing is not None:
             self._timing.add_duration(Stage.AIDING, clock.rig_from_local(now) - aiding.valid_at)
+        silent = self.endpoint.skipped
+        if silent > len(self.settings.above):
+            return  # over joints that nobody told this node of
+        aiding = across(aiding, self.settings.above[:silent], self.settings.stiffness)
         onward = self.tube.on_aiding(aiding, clock.local_from_rig(aiding.valid_at))
         if onward is not None:
             self._send(onward, now)
@@ -217,7 +225,8 @@ class TubeProcess(Process):
         """Hand a message to the telemetry; what the ground station must not lose is saved before its frame leaves."""
         try:
             if isinstance(said, NodeState):
-                self.endpoint.send_state(said, now)
+                upper, lower = (self.endpoint.margin(side) for side in Side)
+                self.endpoint.send_state(replace(said, upper_margin=upper, lower_margin=lower), now)
             elif isinstance(said, Aiding):
                 self.endpoint.send_aiding(said, now)
             else:
@@ -241,6 +250,19 @@ class TubeProcess(Process):
             in_use = self.tube.parameters
             detail: dict[str, Scalar] = {"detail": self._fallback[:200], "in_use": in_use.version}
             self._send_event(Severity.ERROR, "parameters_fallback", detail | {"hash": in_use.sha256().hex()})
+
+    def _tell_of_silent_tubes(self) -> None:
+        """Report when the neighbour above is heard over the heads of silent tubes, and when these are back."""
+        silent = self.endpoint.skipped if self.endpoint.neighbours[Side.UPPER] is not None else self._skipped
+        if silent == self._skipped:
+            return
+        nearest = self.settings.tube + 1
+        if silent:
+            told: dict[str, Scalar] = {"tube": nearest, "tubes": silent}
+            self._send_event(Severity.WARNING, "tube_silent", told)
+        else:
+            self._send_event(Severity.INFO, "tube_heard_again", {"tube": nearest})
+        self._skipped = silent
 
     def _send_event(self, severity: Severity, code: str, arguments: dict[str, Scalar]) -> None:
         """Keep an event of the process; it is saved before its frame leaves."""

@@ -10,6 +10,7 @@ from __future__ import annotations
 import math
 from collections import Counter, OrderedDict
 from dataclasses import dataclass, replace
+from functools import partial
 
 import msgpack
 
@@ -21,6 +22,7 @@ from telemetry.messages import (
     BASE,
     ENCODER,
     HOPS_UNKNOWN,
+    MAX_TUBE,
     Aiding,
     BlockSegment,
     BlockStatus,
@@ -39,6 +41,7 @@ from telemetry.messages import (
 from telemetry.presentation.msgpack_codec import DOWNWARD, Envelope, Opened, decode_opened, encode, open_payload
 from telemetry.schema import Kind
 from telemetry.transport.hop import HopLink
+from telemetry.transport.nearest import Nearest
 
 HELLO_EVERY = 1.0  # s
 SYNC_BURST = 30  # exchanges at the quick pace after a start
@@ -103,6 +106,7 @@ class Endpoint:
     boot_count : starts so far, kept by the process
     is_clock_root : whether the own clock is rig time
     restored : bytes of ``export_state`` before the restart, or None
+    reach : tubes away that are heard; beyond 1 the nearest that speaks is the neighbour, whoever lies silent between
     """
 
     def __init__(
@@ -113,6 +117,7 @@ class Endpoint:
         boot_count: int,
         is_clock_root: bool = False,
         restored: bytes | None = None,
+        reach: int = 1,
     ) -> None:
         self.address = address
         self.boot_count = boot_count
@@ -121,7 +126,8 @@ class Endpoint:
         self.mode = Mode.BOOT
         self.neighbours: dict[Side, Neighbour | None] = dict.fromkeys(Side)
         self.hops = 0 if address == ENCODER else HOPS_UNKNOWN
-        self._links = {side: HopLink(address, boot_count) for side in sorted(sides)}
+        self._reach = reach
+        self._links = {side: HopLink(address, boot_count, self._nearest(side)) for side in sorted(sides)}
         toward_encoder = Side.LOWER if address == BASE else Side.UPPER
         self._sync_side = None if is_clock_root else toward_encoder
         self._next_sequence = 1
@@ -133,14 +139,17 @@ class Endpoint:
         if restored is not None:
             self._restore(restored)
 
-    def receive(self, side: Side, frame: bytes, now: float) -> list[Received]:
-        """Take a frame from one end; returns the messages for this process. Garbage is counted."""
+    def receive(self, side: Side, frame: bytes, now: float, margin: float = math.inf) -> list[Received]:
+        """Take a frame from one end, heard with a ``margin`` (dB); returns the messages for this process.
+
+        Garbage is counted.
+        """
         link = self._links.get(side)
         if link is None:
             self.counters["no_such_end"] += 1
             return []
         before = link.peer
-        payloads = link.receive(frame, now)
+        payloads = link.receive(frame, now, margin)
         if link.peer != before:
             self._hello_at = -math.inf
             if side is self._sync_side and before is not None and link.peer is not None and link.peer[0] != before[0]:
@@ -230,6 +239,17 @@ class Endpoint:
         del now
         self._links[Side.LOWER].send_reliable(encode(Receipt(tube, sequence)), Priority.COMMAND)
 
+    def margin(self, side: Side) -> float:
+        """What the neighbour at one end is heard with over the radio's threshold, dB; infinite without radio or it."""
+        return math.inf if self.neighbours[side] is None else self._links[side].margin
+
+    @property
+    def skipped(self) -> int:
+        """Silent tubes between this one and its upper neighbour."""
+        if self._reach == 1 or self.address in (BASE, ENCODER) or (above := self._links[Side.UPPER].peer) is None:
+            return 0
+        return int(min(self._distance(Side.UPPER, above[0]), self._reach)) - 1
+
     @property
     def outbox_size(self) -> int:
         """Surveys and events that the ground station has not receipted yet."""
@@ -282,8 +302,9 @@ class Endpoint:
         self.neighbours[side] = Neighbour(
             hello.tube, hello.boot_count, hello.hops, hello.mode, self._links[side].quality, now
         )
-        if side is Side.UPPER and hello.hops != HOPS_UNKNOWN and hello.hops + 1 != self.hops:
-            self.hops = hello.hops + 1
+        hops = hello.hops + 1 + (self.skipped if side is Side.UPPER else 0)
+        if side is Side.UPPER and hello.hops != HOPS_UNKNOWN and hops != self.hops:
+            self.hops = hops
             self._hello_at = -math.inf
 
     def _handle_upward(self, opened: Opened, payload: bytes) -> Message | None:
@@ -322,6 +343,25 @@ class Endpoint:
         hello = Hello(self.address, self.boot_count, self.hops, self.mode, 1.0)
         for link in self._links.values():
             link.send_best_effort(encode(replace(hello, link_quality=link.quality)), Kind.HELLO, Priority.HELLO)
+
+    def _nearest(self, side: Side) -> Nearest | None:
+        """Who is chosen at an end; base station and encoder are joined by a cable, where one alone is heard."""
+        cable = self.address == BASE or (self.address == ENCODER and side is Side.UPPER)
+        return None if self._reach == 1 or cable else Nearest(partial(self._distance, side))
+
+    def _distance(self, side: Side, other: int) -> float:
+        """Tubes from here to ``other``, which speaks at one end; infinite for one that cannot be there.
+
+        Tubes are numbered from the lowest up. Where the encoder is heard although tubes hang between, they are silent;
+        how many there are is known from before.
+        """
+        if self.address == ENCODER:
+            return float(MAX_TUBE + 1 - other) if 0 < other <= MAX_TUBE else math.inf
+        if side is Side.UPPER and other == ENCODER:
+            away = max(self.hops, 1) + 0.5  # a tube as near comes first: it was added between
+        else:
+            away = float(other - self.address if side is Side.UPPER else self.address - other)
+        return away if 0.0 < away < self._reach + 1.0 else math.inf
 
     def _sync_pace(self) -> float:
         return SYNC_QUICK if self.clock.exchanges < SYNC_BURST else SYNC_SLOW

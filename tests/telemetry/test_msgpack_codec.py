@@ -96,10 +96,14 @@ def test_aiding_of_an_old_node_is_read_as_that_of_a_rigid_string(aiding: Aiding)
 
 
 @given(MESSAGES[NodeState])
-def test_a_state_of_a_node_never_aligned_is_said_as_before_there_was_an_alignment(state: NodeState) -> None:
+def test_a_state_is_said_as_before_there_was_what_it_does_not_use(state: NodeState) -> None:
+    """Neither an alignment nor a radio costs a byte where there is none."""
     aligned = state.alignment != (0.0, 0.0, 0.0)
+    by_radio = min(state.upper_margin, state.lower_margin) < math.inf
     rows = msgpack.unpackb(encode(state))
-    assert (rows["v"], "al" in rows["b"]) == ((2, True) if aligned else (1, False))
+    assert rows["v"] == (4 if by_radio else 2 if aligned else 1)
+    assert ("al" in rows["b"]) == (aligned or by_radio)
+    assert ({"um", "lm"} <= set(rows["b"])) == by_radio
     assert decode(msgpack.packb(rows)) == state
 
 
@@ -107,7 +111,7 @@ def test_a_state_of_a_node_never_aligned_is_said_as_before_there_was_an_alignmen
     ("message", "version", "named"),
     [
         (Receipt(3, 4), 2, "receipt: expected version 1, got 2"),
-        (Receipt(3, 4), 4, "schema version 1 to 3, got 4"),
+        (Receipt(3, 4), 5, "schema version 1 to 4, got 5"),
         (Receipt(3, 4), 0, "schema version"),
         (Receipt(3, 4), True, "schema version"),
         (Aiding(1.0, 1e-8, 0.0, 0.0, 0.0, 1.0, 1, 0), 2, "torque"),
