@@ -91,7 +91,7 @@ class TubeProcess(Process):
         self.boots = BootCounter(folder).boots
         saved = self._saver.load()
         self.nodes, telemetry = saved if saved else (new_node(self.config), None)
-        self._cut = resume(self.nodes) if saved else False
+        self._cut = resume(self.nodes, self.config) if saved else False
         store = BlockStore(folder)
         parameters = load_parameters(store, settings.tube)
         self._fallback = "; ".join(store.faults)
