@@ -230,8 +230,7 @@ class TubeProcess(Process):
             elif isinstance(said, Aiding):
                 self.endpoint.send_aiding(said, now)
             else:
-                self._saver.due = True
-                self.endpoint.submit(said, now)
+                self._keep(said, now)
         except EncodeError:
             # the filter reports numbers out of range itself; the cycle goes on
             self.endpoint.counters["unsayable"] += 1
@@ -267,16 +266,22 @@ class TubeProcess(Process):
     def _send_event(self, severity: Severity, code: str, arguments: dict[str, Scalar]) -> None:
         """Keep an event of the process; it is saved before its frame leaves."""
         rig_now = self.endpoint.clock.rig_from_local(self._now)
-        self.endpoint.submit(
-            Event(self.settings.tube, self.endpoint.new_sequence(), rig_now, severity, code, arguments), self._now
-        )
+        event = Event(self.settings.tube, self.endpoint.new_sequence(), rig_now, severity, code, arguments)
+        self._keep(event, self._now)
+
+    def _keep(self, said: SurveyMeasurement | StaticRecord | Event, now: float) -> None:
+        """Submit what the ground station must not lose; its frame waits where the save must wait."""
         self._saver.due = True
+        if self._saver.spent:
+            self.endpoint.hold()
+        self.endpoint.submit(said, now)
 
     def _save(self) -> None:
         self._saver.save(self.nodes, self.endpoint.export_state())
+        self.endpoint.release(self._now)
 
     def _save_if_due(self) -> bool:
-        if self._saver.due:
+        if self._saver.due and not self._saver.spent:
             self._save()
             return True
         return False

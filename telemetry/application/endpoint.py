@@ -43,6 +43,7 @@ from telemetry.schema import Kind
 from telemetry.transport.hop import HopLink
 from telemetry.transport.nearest import Nearest
 
+STATE_LAYOUT = "endpoint-1"  # of what is saved; counted up when it changes
 HELLO_EVERY = 1.0  # s
 SYNC_BURST = 30  # exchanges at the quick pace after a start
 SYNC_QUICK = 1.0  # s
@@ -96,6 +97,15 @@ class Neighbour:
     last_heard: float
 
 
+def layout_of(saved: bytes) -> str:
+    """Name of the layout of what ``Endpoint.export_state`` gave; "unnamed" where there is none."""
+    try:
+        name = msgpack.unpackb(saved)[0]
+    except (ValueError, TypeError, LookupError, msgpack.UnpackException):
+        return "unnamed"
+    return name if isinstance(name, str) else "unnamed"
+
+
 class Endpoint:
     """Telemetry of one process.
 
@@ -105,7 +115,7 @@ class Endpoint:
     sides : ends that exist; the base has only its lower one
     boot_count : starts so far, kept by the process
     is_clock_root : whether the own clock is rig time
-    restored : bytes of ``export_state`` before the restart, or None
+    restored : bytes of ``export_state`` before the restart, of this layout (``layout_of``), or None
     reach : tubes away that are heard; beyond 1 the nearest that speaks is the neighbour, whoever lies silent between
     """
 
@@ -132,6 +142,7 @@ class Endpoint:
         self._sync_side = None if is_clock_root else toward_encoder
         self._next_sequence = 1
         self._outbox = Outbox()
+        self._holding = False
         self._answered: OrderedDict[int, bytes] = OrderedDict()
         self._commands = Outbox()
         self._hello_at = -math.inf
@@ -177,7 +188,7 @@ class Endpoint:
         if self._sync_side in self._links and now >= self._sync_at + self._sync_pace():
             self._sync_at = now
             self._links[self._sync_side].send_best_effort(encode(TimeRequest(now)), Kind.TIME_REQUEST, Priority.TIME)
-        self._send_due(self._outbox, Side.UPPER, now)
+        self._send_kept(now)
         self._send_due(self._commands, Side.LOWER, now)
 
     def take_frames(self, now: float) -> list[tuple[Side, Frame]]:
@@ -202,9 +213,19 @@ class Endpoint:
             self._links[Side.UPPER].send_best_effort(encode(state), (Kind.NODE_STATE, state.tube), Priority.STATE)
 
     def submit(self, message: Kept, now: float) -> None:
-        """Keep a message until the ground station has receipted it, and send it."""
+        """Keep a message until the ground station has receipted it, and send it unless messages are held back."""
         self._outbox.keep_payload(message.sequence, encode(message), now)
-        self._send_due(self._outbox, Side.UPPER, now)
+        self._send_kept(now)
+
+    def hold(self) -> None:
+        """Send no message that is kept before ``release``: what must be on the disk first is not yet."""
+        self._holding = True
+
+    def release(self, now: float) -> None:
+        """Send what was held back."""
+        if self._holding:
+            self._holding = False
+            self._send_kept(now)
 
     def new_sequence(self) -> int:
         """Number of the next survey or event."""
@@ -263,13 +284,12 @@ class Endpoint:
         return dict(total)
 
     def export_state(self) -> bytes:
-        """What must survive a restart: numbers, unreceipted messages, answered commands."""
-        return bytes(
-            msgpack.packb([self._next_sequence, self._outbox.contents(), list(self._answered.items()), self.hops])
-        )
+        """What must survive a restart: name of the layout, numbers, unreceipted messages, answered commands."""
+        kept = [self._next_sequence, self._outbox.contents(), list(self._answered.items()), self.hops]
+        return bytes(msgpack.packb([STATE_LAYOUT, *kept]))
 
     def _restore(self, saved: bytes) -> None:
-        self._next_sequence, parcels, answered, self.hops = msgpack.unpackb(saved)
+        _, self._next_sequence, parcels, answered, self.hops = msgpack.unpackb(saved)
         for sequence, payload in parcels:
             self._outbox.keep_payload(sequence, payload, -math.inf)
         self._answered.update((sequence, payload) for sequence, payload in answered)
@@ -365,6 +385,10 @@ class Endpoint:
 
     def _sync_pace(self) -> float:
         return SYNC_QUICK if self.clock.exchanges < SYNC_BURST else SYNC_SLOW
+
+    def _send_kept(self, now: float) -> None:
+        if not self._holding:
+            self._send_due(self._outbox, Side.UPPER, now)
 
     def _send_due(self, outbox: Outbox, side: Side, now: float) -> None:
         priority = Priority.COMMAND if side is Side.LOWER else Priority.SURVEY
