@@ -36,7 +36,7 @@ COMMANDS = {
         "wall",
         "Judge a wall: overlap, thickness, probability of a gap.",
     ),
-    "link": ("borechain.cli.link.link", "link", "Radio between tubes: through soil, inside the pipe."),
+    "link": ("borechain.cli.link.link", "link", "Between tubes: radio through soil and pipe, load of a CAN bus."),
     "bench": ("borechain.cli.bench.bench", "bench", "Measure speed side by side with other libraries."),
     "experiment": ("borechain.cli.experiment.experiment", "experiment", "Rerun a published experiment beside ours."),
 }

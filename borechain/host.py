@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import contextlib
 import queue
 import warnings
 from pathlib import Path
 
 import msgpack
 
+from sim.rig.transports import Transports
 from telemetry import keys
 from telemetry.media.zenoh_bus import open_client, open_router
 from telemetry.media.zenoh_port import CONNECT_TIMEOUT
@@ -15,11 +17,18 @@ from telemetry.runtime.hosting import Place, begin_process, on_termination, repo
 
 
 def run_medium(
-    place: Place, scenario: Path, seed: int, speed: float, faults: tuple[str, ...], router: bool, cued: bool = False
+    place: Place,
+    scenario: Path,
+    seed: int,
+    speed: float,
+    faults: tuple[str, ...],
+    router: bool,
+    cued: bool = False,
+    transports: Transports | None = None,
 ) -> None:
     """World, joints and clock; in a rig without an outside router its session is the router.
 
-    ``cued`` says that somebody plays the operator.
+    ``cued`` says that somebody plays the operator, ``transports`` which joints are not on zenoh.
     """
     from sim.rig.bus_stepper import BusStepper
     from sim.rig.scheduler import Progress, Scheduler
@@ -35,15 +44,16 @@ def run_medium(
         session = open_router(place.endpoint) if router else open_client(place.endpoint, timeout=CONNECT_TIMEOUT)
         with session as bus:
             wanted = bus.publisher(keys.WANTED.format(rig=place.rig))
-            stepper = BusStepper(bus, place.rig)
+            stepper = BusStepper(bus, place.rig, medium_of=(transports or Transports()).medium_of)
 
             def tell(progress: Progress) -> None:
                 wanted.put(pack_progress(progress))
 
             scheduler = Scheduler(world, stepper, tell, speed, cued=cued)
             on_termination(scheduler.stop)
-            if scheduler.run():
-                scheduler.linger()
+            with contextlib.closing(stepper):
+                if scheduler.run():
+                    scheduler.linger()
 
 
 def run_router(endpoint: str) -> None:

@@ -24,6 +24,7 @@ from sim.rig.scheduler import Progress, Scheduler
 from sim.world.world import World
 from telemetry.errors import BorechainError
 from telemetry.messages import BASE, ENCODER
+from telemetry.presentation.can_native import rounded_frame
 from telemetry.transport.authentication import new_key, read_key
 
 
@@ -36,9 +37,10 @@ class InlineRig:
     settings : of ``GroundConfig``, what the operator enters at the ground station
     rig : its name
     folder : new, of the whole run
+    native : the joints are on CAN's native profile, which rounds cyclic messages to the steps of their signals
     """
 
-    def __init__(self, world: World, settings: dict[str, Any], rig: str, folder: Path) -> None:
+    def __init__(self, world: World, settings: dict[str, Any], rig: str, folder: Path, *, native: bool = False) -> None:
         self.world = world
         key_file = new_key(folder / "rig.key")
         config = GroundConfig(rig=rig, folder=private_folder(folder, "ground"), key_file=key_file, **settings)
@@ -51,7 +53,7 @@ class InlineRig:
         for tube in range(1, world.scenario.tubes + 1):
             place, key = private_folder(folder, f"tube-{tube}"), read_key(key_file)
             builders[tube] = partial(TubeProcess, world.tube_settings(tube), place, key=key)
-        self.stepper = InProcessStepper(builders, self._act_on_cue)
+        self.stepper = InProcessStepper(builders, self._act_on_cue, rounded_frame if native else bytes)
 
     @property
     def ground(self) -> GroundProcess:

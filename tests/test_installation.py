@@ -175,6 +175,9 @@ JOBS = [  # words, the extra that the job needs or None, status and a word of it
     (("rig", "rig-3", "--endpoint", "nonsense", "--out", "never"), "ground", 1, "expected tcp/HOST:PORT"),
     (("query", "borechain/*/ground/status", "--timeout", "0.2", *NOWHERE), None, 1, "no router at"),
     (("bench", "survey", "--json"), None, 1, "are in the repository"),
+    (("link", "load", "--tubes", "10", "--json"), None, 0, "load_percent"),
+    (("link", "dbc"), None, 0, "BO_ "),
+    (("link", "dbc", "--check", RECORD), "can", 2, "expected a DBC file"),
 ]
 
 

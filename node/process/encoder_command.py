@@ -7,7 +7,15 @@ from pathlib import Path
 import click
 
 from telemetry.runtime.command_line import plain_faults
-from telemetry.runtime.options import above_option, below_option, clock_option, own_neighbours, place_options
+from telemetry.runtime.options import (
+    above_option,
+    below_option,
+    clock_option,
+    lower_option,
+    own_neighbours,
+    place_options,
+    upper_option,
+)
 
 
 @click.command()
@@ -28,6 +36,8 @@ from telemetry.runtime.options import above_option, below_option, clock_option, 
 @clock_option
 @above_option
 @below_option
+@upper_option
+@lower_option
 @place_options
 @plain_faults
 def encoder(
@@ -37,6 +47,8 @@ def encoder(
     clock: str,
     above: int | None,
     below: int | None,
+    upper: str | None,
+    lower: str | None,
     rig_name: str,
     endpoint: str,
     folder: Path,
@@ -47,14 +59,17 @@ def encoder(
     Examples:
       borechain encoder --folder state/encoder
       borechain encoder --clock own --counter replay:counter.csv --above base --below 2
+      borechain encoder --clock own --counter counter:/dev/encoder --above base --lower can:can0
     """
     from node.firmware.torque import TorqueSettings
     from node.process.drivers.choice import encoder_source
     from node.process.host import run_encoder
     from telemetry.messages import ENCODER, Side
-    from telemetry.runtime.hosting import OwnTime, Place
+    from telemetry.runtime.hosting import OwnTime, Place, chosen
 
-    neighbours = own_neighbours(clock, ENCODER, ("--counter", counter), {Side.UPPER: above, Side.LOWER: below})
+    media = {Side.UPPER: upper, Side.LOWER: lower}
+    neighbours = own_neighbours(clock, ENCODER, ("--counter", counter), {Side.UPPER: above, Side.LOWER: below}, media)
     own_time = None if neighbours is None else OwnTime(neighbours)
     torque = TorqueSettings(torque_nm, trapped_fraction)
-    run_encoder(Place(rig_name, endpoint, folder), encoder_source(counter) if counter else None, own_time, torque)
+    place = Place(rig_name, endpoint, folder, media=chosen(media))
+    run_encoder(place, encoder_source(counter) if counter else None, own_time, torque)

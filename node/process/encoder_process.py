@@ -12,6 +12,7 @@ from node.process.counter import BootCounter
 from node.process.drivers.source import EncoderSource, SafeEncoder
 from telemetry.application.endpoint import Endpoint
 from telemetry.messages import ENCODER, Command, Event, Reply, Scalar, Severity, Side
+from telemetry.runtime.joint_watch import JointFault
 from telemetry.runtime.process import Process
 from telemetry.runtime.timing import CycleTiming, Stage
 
@@ -72,6 +73,11 @@ class EncoderProcess(Process):
         if self._timing is None:  # an own clock advances time between the cycles
             self.endpoint.advance(now)
         self._lap(Stage.REPORT)
+
+    def on_joint_fault(self, fault: JointFault, now: float) -> None:
+        """Something went wrong at a joint: tell the crew."""
+        self._now = now
+        self._send_event(Severity.WARNING, "joint_fault", fault.arguments)
 
     def _lap(self, stage: Stage) -> None:
         if self._timing is not None:

@@ -15,8 +15,10 @@ from telemetry.runtime.options import (
     below_option,
     clock_option,
     key_option,
+    lower_option,
     own_neighbours,
     place_options,
+    upper_option,
 )
 
 FILE = click.Path(path_type=Path, dir_okay=False)
@@ -110,6 +112,8 @@ SCHEMES = ("forward", "estimate", "intersection")
 @clock_option
 @above_option
 @below_option
+@upper_option
+@lower_option
 @key_option
 @place_options
 @plain_faults
@@ -132,6 +136,8 @@ def node(
     clock: str,
     above: int | None,
     below: int | None,
+    upper: str | None,
+    lower: str | None,
     key_file: Path | None,
     rig_name: str,
     endpoint: str,
@@ -144,13 +150,14 @@ def node(
       borechain node --tube 1 --drive-joint-deg 12.5 --folder state/tube-1
       borechain node --tube 1 --imu mpu6500:1:0x68 --imu mpu6500:1:0x69
       borechain node --tube 1 --clock own --imu mpu6500:1 --above 2 --folder state/tube-1
+      borechain node --tube 2 --clock own --imu mpu6500:1 --upper can:can0 --lower can:can1
     """
     from node.firmware.settings import Joint, TubeSettings
     from node.kernels.layout import Scheme
     from node.process.drivers.choice import imu_source
     from node.process.host import run_node
     from telemetry.messages import Side
-    from telemetry.runtime.hosting import OwnTime, Place
+    from telemetry.runtime.hosting import OwnTime, Place, chosen
 
     if any(source.startswith("mpu6500") for source in sources):
         check_installed("smbus2")
@@ -167,6 +174,8 @@ def node(
         joints=joints,
         imus=cluster(len(sources), noises, offsets, gyroscopes, accelerometers),
     )
-    neighbours = own_neighbours(clock, tube, ("--imu", sources), {Side.UPPER: above, Side.LOWER: below})
+    media = {Side.UPPER: upper, Side.LOWER: lower}
+    neighbours = own_neighbours(clock, tube, ("--imu", sources), {Side.UPPER: above, Side.LOWER: below}, media)
     own_time = None if neighbours is None else OwnTime(neighbours)
-    run_node(Place(rig_name, endpoint, folder, key_file), settings, [imu_source(s) for s in sources], own_time)
+    place = Place(rig_name, endpoint, folder, key_file, chosen(media))
+    run_node(place, settings, [imu_source(s) for s in sources], own_time)

@@ -41,6 +41,7 @@ from telemetry.messages import (
     StaticRecord,
     SurveyMeasurement,
 )
+from telemetry.runtime.joint_watch import JointFault
 from telemetry.runtime.process import Process
 from telemetry.runtime.timing import CycleTiming, Stage
 
@@ -185,6 +186,12 @@ class TubeProcess(Process):
             overruns = int(self.tube.node["overruns"])
             self._send_event(Severity.WARNING, "overrun", {"missed": missed, "overruns": overruns})
             self._save_if_due()
+
+    def on_joint_fault(self, fault: JointFault, now: float) -> None:
+        """Something went wrong at a joint: tell the crew."""
+        self._now = now
+        self._send_event(Severity.WARNING, "joint_fault", fault.arguments)
+        self._save_if_due()
 
     def close(self) -> None:
         """Save the newest state and release the sensors."""

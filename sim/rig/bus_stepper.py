@@ -2,23 +2,57 @@
 
 from __future__ import annotations
 
+import contextlib
 import queue
 import time
 from collections import deque
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
+from functools import partial
 
 from sim.rig.stepper import Answer, FrameEvent
 from telemetry import keys
+from telemetry.media.port import STEPPER, Frame, Port, TubeEnd
+from telemetry.media.table import open_medium
 from telemetry.media.zenoh_bus import Publisher, ZenohBus
 from telemetry.messages import BASE, Side, address_name
 from telemetry.runtime.stepped import pack_step, unpack_done
 
+Arrival = tuple[str, int, int, bytes]  # what, address, side or whether it lives, payload
+MediumOf = Callable[[int, Side], str | None]
+
+
+class FarEnds:
+    """Ports that face those ends of one process that are not on the steps' zenoh session.
+
+    They are opened when the process comes and closed when it goes, so that nothing of a life before is left in them.
+    """
+
+    def __init__(self, rig: str, address: int, media: Mapping[Side, str]) -> None:
+        self._ends = {side: TubeEnd(rig, address, side, STEPPER).facing for side in media}
+        self._media = media
+        self._opened = contextlib.ExitStack()
+        self.ports: dict[Side, Port] = {}
+
+    def open(self, arrive: Callable[[Side, bytes], object]) -> None:
+        """Join the process's ends; ``arrive`` takes what they send, on foreign threads."""
+        self.close()
+        for side, end in self._ends.items():
+            port = self._opened.enter_context(open_medium(self._media[side])).open_port(end)
+            port.listen(partial(arrive, side))
+            self.ports[side] = port
+
+    def close(self) -> None:
+        """Leave them."""
+        self.ports.clear()
+        self._opened.close()
+
 
 class Seat:
-    """The stepper's view of one process."""
+    """The stepper's view of one process; ``media`` names those of its ends that are not on the bus."""
 
-    def __init__(self, bus: ZenohBus, rig: str, address: int) -> None:
+    def __init__(self, bus: ZenohBus, rig: str, address: int, media: Mapping[Side, str]) -> None:
         self.address = address
+        self.far = FarEnds(rig, address, media)
         self.alive = False
         self.step_number = 0
         self.tx: tuple[deque[bytes], deque[bytes]] = (deque(), deque())
@@ -28,6 +62,13 @@ class Seat:
             bus.publisher(keys.port_key(rig, address, Side.UPPER, "rx")),
             bus.publisher(keys.port_key(rig, address, Side.LOWER, "rx")),
         )
+
+    def put(self, side: Side, frame: bytes) -> None:
+        """Hand a frame to an end of the process."""
+        if side in self.far.ports:
+            self.far.ports[side].send(Frame(frame))
+        else:
+            self.rx[side].put(frame)
 
     def reset(self) -> None:
         """Forget what a dead process left half-said."""
@@ -45,14 +86,23 @@ class BusStepper:
     ----------
     bus, rig : where the keys are
     hang_limit : wall seconds after which a process that does not answer is taken for dead
+    medium_of : medium of an end, None where its frames travel on ``bus``
     """
 
-    def __init__(self, bus: ZenohBus, rig: str, *, hang_limit: float = 20.0) -> None:
+    def __init__(
+        self,
+        bus: ZenohBus,
+        rig: str,
+        *,
+        hang_limit: float = 20.0,
+        medium_of: MediumOf = lambda _address, _side: None,
+    ) -> None:
         self._bus = bus
+        self._medium_of = medium_of
         self._rig = rig
         self._hang_limit = hang_limit
         self._seats: dict[int, Seat] = {}
-        self._events: queue.SimpleQueue[tuple[str, int, int, bytes]] = queue.SimpleQueue()
+        self._events: queue.SimpleQueue[Arrival] = queue.SimpleQueue()
         self._cues: set[str] = set()  # that the operator has answered
         self._depth = bus.publisher(keys.DEPTH.format(rig=rig))
         self._addresses = {address_name(a): a for a in range(BASE + 1)}
@@ -85,7 +135,13 @@ class BusStepper:
         """Take a process out of the barrier."""
         if address in self._seats:
             self._seats[address].alive = False
+            self._seats[address].far.close()
             self._seats[address].reset()
+
+    def close(self) -> None:
+        """Leave every end."""
+        for seat in self._seats.values():
+            seat.far.close()
 
     def round(self, steps: Mapping[int, list[FrameEvent]]) -> dict[int, Answer]:
         """Give each process its events and wait until all have answered; those that died are missing."""
@@ -114,7 +170,7 @@ class BusStepper:
     def _send(self, seat: Seat, events: list[FrameEvent]) -> None:
         for event, frame in events:
             if event.kind <= Side.LOWER:
-                seat.rx[event.kind].put(frame)
+                seat.put(Side(event.kind), frame)
             elif frame:
                 self._depth.put(frame)
         seat.step_number += 1
@@ -151,9 +207,16 @@ class BusStepper:
     def _seat(self, address: int, *, alive: bool) -> None:
         seat = self._seats.get(address)
         if seat is None:
-            seat = self._seats[address] = Seat(self._bus, self._rig, address)
+            media = {side: medium for side in Side if (medium := self._medium_of(address, side)) is not None}
+            seat = self._seats[address] = Seat(self._bus, self._rig, address, media)
+        seat.far.close()
         seat.reset()
+        if alive:
+            seat.far.open(partial(self._on_frame, address))
         seat.alive = alive
+
+    def _on_frame(self, address: int, side: Side, frame: bytes) -> None:
+        self._events.put(("tx", address, int(side), frame))
 
     def _on_tx(self, key: str, payload: bytes) -> None:
         _, _, _, name, side, _ = key.split("/")

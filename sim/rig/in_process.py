@@ -25,9 +25,16 @@ class InProcessStepper:
     ----------
     builders : how to start the process of each address, as its computer would after its power came
     act_on_cue : plays the operator; False when he could not act yet
+    carry : what a medium makes of every frame
     """
 
-    def __init__(self, builders: Mapping[int, Build], act_on_cue: Callable[[str], bool] = lambda _cue: True) -> None:
+    def __init__(
+        self,
+        builders: Mapping[int, Build],
+        act_on_cue: Callable[[str], bool] = lambda _cue: True,
+        carry: Callable[[bytes], bytes] = bytes,
+    ) -> None:
+        self._carry = carry
         self._builders = builders
         self._act_on_cue = act_on_cue
         self.processes: dict[int, Process] = {}
@@ -61,7 +68,7 @@ class InProcessStepper:
     def round(self, steps: Mapping[int, list[FrameEvent]]) -> dict[int, Answer]:
         """Step each process in turn; within a round none depends on another."""
         return {
-            address: step(self.processes[address], steps[address])
+            address: step(self.processes[address], steps[address], self._carry)
             for address in sorted(steps)
             if address in self.processes
         }
@@ -72,8 +79,8 @@ class InProcessStepper:
         return self._builders[address]()
 
 
-def step(process: Process, events: list[FrameEvent]) -> Answer:
+def step(process: Process, events: list[FrameEvent], carry: Callable[[bytes], bytes] = bytes) -> Answer:
     """One step of one process: its events in order, and after each the frames that it sends."""
     frames: list[tuple[Sent, bytes]] = []
-    wake_at = run_step(process, events, lambda sent, frame: frames.append((sent, frame.payload)))
+    wake_at = run_step(process, events, lambda sent, frame: frames.append((sent, carry(frame.payload))))
     return Answer(frames, wake_at)

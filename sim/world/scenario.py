@@ -171,6 +171,9 @@ class MediumSection(Section):
     loss: Probability = Field(0.01, description="of a frame by cable; by radio its margin decides")
     duplicate: Probability = 0.001
     corrupt: Probability = Field(0.0, description="one bit of a frame's copy is flipped")
+    transports: tuple[Literal["zenoh", "can", "can-classic"], ...] = Field(
+        ("zenoh",), min_length=1, description="that carry the frames, from the joint above tube 1 on in turn"
+    )
 
     @property
     def latency(self) -> float:

@@ -150,6 +150,11 @@ class Endpoint:
         if restored is not None:
             self._restore(restored)
 
+    def limit_bundles(self, side: Side, limit: int) -> None:
+        """Let payloads share a frame at one end only up to ``limit`` bytes: a large frame holds an urgent one up."""
+        if side in self._links:
+            self._links[side].bundle_limit = limit
+
     def receive(self, side: Side, frame: bytes, now: float, margin: float = math.inf) -> list[Received]:
         """Take a frame from one end, heard with a ``margin`` (dB); returns the messages for this process.
 

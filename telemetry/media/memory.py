@@ -4,20 +4,19 @@ from __future__ import annotations
 
 import heapq
 import random
-from collections import Counter
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, field
 
 from telemetry.errors import MediumError
-from telemetry.media.port import MAX_FRAME, Frame, TubeEnd
-from telemetry.media.send_queue import SendQueue
+from telemetry.media.port import TubeEnd
+from telemetry.media.queued_port import QueuedPort
 
 Deliver = Callable[[bytes], object]
 
 
-@dataclass(slots=True)
-class MemoryPort:
+@dataclass
+class MemoryPort(QueuedPort):
     """One end, see ``port.Port``; ``other`` is the opposite one. Probabilities are of each frame sent from this end.
 
     A frame without delay is delivered as it is sent; one with a delay when ``advance`` of the other end says so.
@@ -32,43 +31,15 @@ class MemoryPort:
     is_open: bool = False  # electrically: an open joint carries nothing
     other: MemoryPort | None = None
     now: float = 0.0  # s
-    largest_payload: int = MAX_FRAME
     _deliver: Deliver | None = None
-    _closed: bool = False
     _arriving: list[tuple[float, int, bytes]] = field(default_factory=list)
     _arrivals: int = 0
     _random: random.Random = field(init=False)
-    _queue: SendQueue = field(init=False)
 
     def __post_init__(self) -> None:
         """Seed the faults."""
+        super().__init__("in memory")
         self._random = random.Random(self.seed)
-        self._queue = SendQueue(self.largest_payload)
-
-    @property
-    def is_up(self) -> bool:
-        """Whether somebody listens at the other end of a closed joint."""
-        other = self.other
-        if self._closed or other is None or other._deliver is None:
-            return False
-        return not (self.is_open or other.is_open)
-
-    @property
-    def counters(self) -> Counter[str]:
-        """Frames that did not leave, by reason."""
-        return self._queue.counters
-
-    def send(self, frame: Frame) -> bool:
-        """Send a frame: it arrives later, twice, damaged or not at all."""
-        accepted = self._queue.offer(frame)
-        self.flush()
-        return accepted
-
-    def flush(self) -> None:
-        """Send what waits."""
-        if self._closed:
-            raise MediumError("port in memory: it is closed")
-        self._queue.drain(lambda: self.is_up, self._transmit)
 
     def listen(self, deliver: Deliver) -> None:
         """Call ``deliver`` for every frame that arrives."""
@@ -83,6 +54,10 @@ class MemoryPort:
     def close(self) -> None:
         """Let the end go."""
         self._closed, self._deliver = True, None
+
+    def _is_heard(self) -> bool:
+        other = self.other
+        return other is not None and other._deliver is not None and not (self.is_open or other.is_open)
 
     def _transmit(self, payload: bytes) -> None:
         if self.other is None or self._random.random() < self.loss:

@@ -16,6 +16,7 @@ from typing import NamedTuple, Protocol
 from telemetry.messages import Side
 
 MAX_FRAME = 16384  # bytes, largest frame of the hop link
+STEPPER = 254  # in place of a neighbour's address: whoever hands a stepped process its frames
 
 
 class Priority(IntEnum):
@@ -75,6 +76,10 @@ class Port(Protocol):
     @property
     def largest_payload(self) -> int:
         """Bytes of the largest frame that is accepted."""
+
+    @property
+    def bundle_limit(self) -> int:
+        """Bytes of payloads that the link may put into one frame; 0: one payload a frame, each with its priority."""
 
     @property
     def is_up(self) -> bool:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Callable
+from collections.abc import Callable, Container
 
 from telemetry.media.port import Frame, Priority
 
@@ -23,8 +23,8 @@ class SendQueue:
     """
 
     def __init__(self, largest: int, limit: int = SEND_LIMIT) -> None:
-        self._largest = largest
-        self._limit = limit
+        self.largest = largest
+        self.limit = limit
         self._waiting: list[Frame] = []  # by age
         self.counters: Counter[str] = Counter()
 
@@ -33,24 +33,53 @@ class SendQueue:
 
     def offer(self, frame: Frame) -> bool:
         """Put a frame in; returns False for one that is too large."""
-        if len(frame.payload) > self._largest:
+        if len(frame.payload) > self.largest:
             self.counters["too_large"] += 1
             return False
-        if frame.topic is not None:
-            self._remove("replaced", [f for f in self._waiting if f.topic == frame.topic])
-        self._waiting.append(frame)
-        if len(self._waiting) > self._limit:
+        if not self._replace(frame):
+            self._waiting.append(frame)
+        if len(self._waiting) > self.limit:
             self._remove("dropped", [self._most_dispensable()])
         return True
 
     def drain(self, is_up: Callable[[], bool], put: Callable[[bytes], None]) -> None:
         """Hand frames to ``put`` while ``is_up``; a clock exchange that has to wait is forgotten."""
         while self._waiting and is_up():
-            frame = min(self._waiting, key=lambda f: f.priority)
-            self._waiting.remove(frame)
-            put(frame.payload)
+            frame = self.take()
+            if frame is not None:
+                put(frame.payload)
+        self.forget_outdated()
+
+    def take(self, held: Container[Priority] = ()) -> Frame | None:
+        """The next frame, of a priority that is not ``held`` back; None where there is none."""
+        able = [frame for frame in self._waiting if frame.priority not in held]
+        if not able:
+            return None
+        frame = min(able, key=lambda f: f.priority)
+        self._waiting.remove(frame)
+        return frame
+
+    def put_back(self, frame: Frame) -> None:
+        """Put a frame that was taken to its place before the others again."""
+        self._waiting.insert(0, frame)
+        if len(self._waiting) > self.limit:
+            self._remove("dropped", [self._most_dispensable()])
+
+    def forget_outdated(self) -> None:
+        """Forget clock exchanges: they had to wait."""
         if self._waiting:
             self._remove("outdated", [f for f in self._waiting if f.priority is Priority.TIME])
+
+    def _replace(self, frame: Frame) -> bool:
+        """Put a frame into the place of the one of its topic, so that of many topics none is always last."""
+        if frame.topic is None:
+            return False
+        for place, other in enumerate(self._waiting):
+            if other.topic == frame.topic:
+                self._waiting[place] = frame
+                self.counters["replaced"] += 1
+                return True
+        return False
 
     def _most_dispensable(self) -> Frame:
         best_effort = [frame for frame in self._waiting if frame.topic is not None]

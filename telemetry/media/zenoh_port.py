@@ -2,53 +2,26 @@
 
 from __future__ import annotations
 
-from collections import Counter
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 
 from telemetry import keys
-from telemetry.errors import MediumError
-from telemetry.media.port import MAX_FRAME, Frame, TubeEnd
-from telemetry.media.send_queue import SendQueue
+from telemetry.media.port import TubeEnd
+from telemetry.media.queued_port import QueuedPort
 from telemetry.media.zenoh_bus import Subscription, ZenohBus, open_client
 
 CONNECT_TIMEOUT = 30.0  # s
 
 
-class ZenohPort:
+class ZenohPort(QueuedPort):
     """One end of a joint on two keys, see ``port.Port``; it is up while anybody subscribes to ``send_key``."""
 
-    largest_payload = MAX_FRAME
-
     def __init__(self, bus: ZenohBus, send_key: str, receive_key: str) -> None:
+        super().__init__(send_key)
         self._bus = bus
-        self._send_key, self._receive_key = send_key, receive_key
+        self._receive_key = receive_key
         self._publisher = bus.publisher(send_key, encoding="application/octet-stream")
         self._subscription: Subscription | None = None
-        self._queue = SendQueue(self.largest_payload)
-        self._closed = False
-
-    @property
-    def is_up(self) -> bool:
-        """Whether the other end listens."""
-        return not self._closed and self._publisher.is_heard
-
-    @property
-    def counters(self) -> Counter[str]:
-        """Frames that did not leave, by reason."""
-        return self._queue.counters
-
-    def send(self, frame: Frame) -> bool:
-        """Send a frame now, or as soon as the other end is there."""
-        accepted = self._queue.offer(frame)
-        self.flush()
-        return accepted
-
-    def flush(self) -> None:
-        """Send what waits, if the other end is there."""
-        if self._closed:
-            raise MediumError(f"port {self._send_key}: it is closed")
-        self._queue.drain(lambda: self._publisher.is_heard, self._publisher.put)
 
     def listen(self, deliver: Callable[[bytes], object]) -> None:
         """Call ``deliver``, which only puts into a queue, on a foreign thread for every frame that arrives."""
@@ -62,6 +35,12 @@ class ZenohPort:
         self._publisher.close()
         if self._subscription is not None:
             self._subscription.close()
+
+    def _is_heard(self) -> bool:
+        return self._publisher.is_heard
+
+    def _transmit(self, payload: bytes) -> None:
+        self._publisher.put(payload)
 
 
 class ZenohMedium:

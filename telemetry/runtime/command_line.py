@@ -21,6 +21,7 @@ P = ParamSpec("P")
 R = TypeVar("R")
 
 EXTRA_OF = {
+    "cantools": "can",
     "matplotlib": "ground",
     "rich": "ground",
     "scipy": "ground",

@@ -10,15 +10,14 @@ import multiprocessing
 import signal
 import sys
 from collections.abc import Callable, Iterator, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import partial
 from pathlib import Path
 from typing import Any
 
 import setproctitle
 
-from telemetry.media.neighbours import neighbour_ports, stepped_ports
-from telemetry.media.table import open_medium
+from telemetry.media.neighbours import own_ports, stepped_ports, stepped_ports_on
 from telemetry.media.zenoh_bus import ZenohBus, open_client, use_few_threads
 from telemetry.media.zenoh_port import CONNECT_TIMEOUT, ZenohMedium
 from telemetry.messages import Side
@@ -41,14 +40,24 @@ class Place:
     endpoint: str
     folder: Path
     key_file: Path | None = None  # of the rig
+    media: Mapping[Side, str] = field(default_factory=dict)  # of each end, such as can:can0; zenoh at the endpoint else
+
+    def medium_of(self, side: Side) -> str:
+        """Medium of one end."""
+        return self.media.get(side, f"zenoh:{self.endpoint}")
 
 
 @dataclass(frozen=True, slots=True)
 class OwnTime:
     """Settings of a process with a clock of its own: its neighbours and its clock's offset."""
 
-    neighbours: Mapping[Side, int]  # address of the process at each end that is joined
+    neighbours: Mapping[Side, int | None]  # address of the process at each end that is joined, None: whoever is there
     offset: float = 0.0  # s, of its clock against the machine's
+
+
+def chosen(media: Mapping[Side, str | None]) -> dict[Side, str]:
+    """Media of the ends for which one was chosen."""
+    return {side: medium for side, medium in media.items() if medium is not None}
 
 
 def run_by_own_clock(
@@ -71,8 +80,11 @@ async def live_by_own_clock(
     """``run_by_own_clock`` on the running loop."""
     timing = CycleTiming()
     make_folder(place)
-    with contextlib.closing(build(timing)) as process, open_medium(f"zenoh:{place.endpoint}") as medium:
-        ports = neighbour_ports(medium, place.rig, address, own_time.neighbours)
+    media = {side: place.medium_of(side) for side in own_time.neighbours}
+    with (
+        contextlib.closing(build(timing)) as process,
+        own_ports(place.rig, address, own_time.neighbours, media) as ports,
+    ):
         loop = OwnClockLoop(process, ports, OwnClock(own_time.offset), timing, period, partial(complain, name))
 
         def write() -> None:
@@ -95,8 +107,10 @@ def run_stepped(name: str, place: Place, address: int, build: Callable[[], Proce
     with reporting(name):
         make_folder(place)
         process = build()
-        with joined(place) as bus:
-            client = StepClient(bus, place.rig, address, stepped_ports(ZenohMedium(bus), place.rig, address, Side))
+        with joined(place) as bus, stepped_ports_on(place.rig, address, place.media) as chosen:
+            rest = [side for side in Side if side not in place.media]
+            ports = chosen | stepped_ports(ZenohMedium(bus), place.rig, address, rest)
+            client = StepClient(bus, place.rig, address, ports)
             on_termination(client.stop)
             serve(process, client, partial(complain, name))
 

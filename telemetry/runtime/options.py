@@ -10,6 +10,8 @@ from typing import Any
 import click
 
 from telemetry import keys
+from telemetry.errors import MediumError
+from telemetry.media.table import check_medium
 from telemetry.messages import BASE, ENCODER, MAX_TUBE, Side, address_name
 from telemetry.runtime.command_line import InputFault
 
@@ -107,12 +109,32 @@ below_option = click.option(
 )
 
 
+def parse_medium(_context: click.Context, _parameter: click.Parameter, value: str | None) -> str | None:
+    """Medium of an end, looked at before anything is opened."""
+    if value is not None:
+        try:
+            check_medium(value)
+        except MediumError as error:
+            raise click.BadParameter(str(error)) from None
+    return value
+
+
+MEDIUM_HELP = "end, with --clock own: can:CHANNEL, can:CHANNEL,frames=classic or zenoh:ENDPOINT  [default: zenoh]"
+upper_option = click.option("--upper", callback=parse_medium, help=f"Medium of the upper {MEDIUM_HELP}")
+lower_option = click.option("--lower", callback=parse_medium, help=f"Medium of the lower {MEDIUM_HELP}")
+
+
 def own_neighbours(
-    clock: str, address: int, sensor: tuple[str, str | tuple[str, ...] | None], ends: dict[Side, int | None]
-) -> dict[Side, int] | None:
+    clock: str,
+    address: int,
+    sensor: tuple[str, str | tuple[str, ...] | None],
+    ends: dict[Side, int | None],
+    media: dict[Side, str | None],
+) -> dict[Side, int | None] | None:
     """Who is at the ends of a process with a clock of its own; None where a stepper drives it.
 
-    ``sensor`` is the option that names it and what was given.
+    ``sensor`` is the option that names it and what was given. An end on CAN needs no neighbour by name: whoever is at
+    the other end of the segment is it, and is None here.
 
     Raises
     ------
@@ -120,9 +142,12 @@ def own_neighbours(
         When the options do not fit each other.
     """
     joined = {side: neighbour for side, neighbour in ends.items() if neighbour is not None}
+    chosen = {side: medium for side, medium in media.items() if medium is not None}
     if clock == "stepper":
-        if joined:
-            raise InputFault("--above and --below: expected --clock own with them; otherwise the medium joins")
+        if joined or chosen:
+            raise InputFault(
+                "--above, --below, --upper and --lower: expected --clock own with them; otherwise the medium joins"
+            )
         return None
     option, given = sensor
     if not given:
@@ -130,4 +155,8 @@ def own_neighbours(
     if address in joined.values() or len(set(joined.values())) < len(joined):
         names = ", ".join(address_name(neighbour) for neighbour in joined.values())
         raise InputFault(f"--above, --below: expected two others than {address_name(address)} itself, got {names}")
-    return joined
+    for side, medium in chosen.items():
+        if side not in joined and not medium.startswith("can:"):
+            option, end = ("--above", "--upper") if side is Side.UPPER else ("--below", "--lower")
+            raise InputFault(f"{end} {medium}: expected {option} with it; only on CAN a neighbour is found")
+    return {side: joined.get(side) for side in ends if side in joined or side in chosen}

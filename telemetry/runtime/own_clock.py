@@ -19,6 +19,7 @@ from typing import Any
 from telemetry.media.port import Port
 from telemetry.messages import Side
 from telemetry.runtime.inbox import Mailbox
+from telemetry.runtime.joint_watch import JointWatch
 from telemetry.runtime.process import Process
 from telemetry.runtime.timing import CycleTiming, Stage
 
@@ -119,9 +120,11 @@ class OwnClockLoop:
         self._read_until = clock.now()
         self._schedule = Schedule(self._read_until, period)
         self._absence = AbsenceWatch(ports, self._read_until)
+        self._joints = JointWatch()
         self._synchronised = -math.inf  # deadline before which the clocks were synchronised
         self._unsent = 0
         for side, port in ports.items():
+            process.endpoint.limit_bundles(side, port.bundle_limit)
             port.listen(partial(self._on_frame, side))
 
     def call(self, act: Act) -> None:
@@ -231,6 +234,9 @@ class OwnClockLoop:
         self._process.on_timer(now)
         for port in self._ports.values():
             port.flush()
+        for fault in self._joints.find(self._ports, now):
+            self._report(fault.line)
+            self._process.on_joint_fault(fault, now)
         send(self._process, self._ports, now)
         self._timing.lap(Stage.SYNCHRONISE)
         self._synchronised = self._schedule.due

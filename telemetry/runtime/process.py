@@ -8,6 +8,7 @@ from typing import Any
 from telemetry.application.endpoint import Endpoint
 from telemetry.media.port import Frame
 from telemetry.messages import Side
+from telemetry.runtime.joint_watch import JointFault
 
 
 class Process:
@@ -31,6 +32,9 @@ class Process:
 
     def on_overrun(self, missed: int, now: float) -> None:
         """A cycle ended at ``now`` when ``missed`` later ones should have begun; only an own clock reports it."""
+
+    def on_joint_fault(self, fault: JointFault, now: float) -> None:
+        """Something went wrong at a joint, see ``joint_watch``; only an own clock reports it."""
 
     def on_depth(self, rig_time: float, md: float) -> None:
         """The rig measured the depth of the bit (m); most processes do not hear it."""

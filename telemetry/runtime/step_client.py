@@ -91,7 +91,8 @@ class StepEnd:
         sent: list[Sent] = []
 
         def send(what: Sent, frame: Frame) -> None:
-            if self._ports[what.side].send(frame):
+            # the stepper waits for every frame and in this order, so none may replace or overtake another
+            if self._ports[what.side].send(Frame(frame.payload)):
                 sent.append(what)
 
         wake_at = run_step(process, events, send)

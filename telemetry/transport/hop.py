@@ -55,6 +55,17 @@ class Entry(NamedTuple):
     topic: Hashable | None = None
 
 
+class Header(NamedTuple):
+    """What every frame begins with."""
+
+    sender: int
+    epoch: int
+    number: int
+    ack_epoch: int
+    ack: int
+    ack_mask: int
+
+
 class HopLink:
     """One end of one joint.
 
@@ -74,6 +85,7 @@ class HopLink:
         self.peer: tuple[int, int] | None = None  # address and boot count of the other end
         self.last_heard = -math.inf
         self.quality = 1.0
+        self.bundle_limit = MAX_FRAME  # bytes of payloads that share a frame; a single one may be larger
         self.counters: Counter[str] = Counter()
         self._peer_epoch = 0
         self._peer_count = 0
@@ -112,17 +124,17 @@ class HopLink:
 
         ``margin`` is what the radio heard it with over its threshold, dB.
         """
-        fields = self._parse(frame)
-        if fields is None:
+        parsed = parse_frame(frame)
+        if parsed is None:
             self.counters["bad_frames"] += 1
             return []
-        sender, epoch, count, ack_epoch, ack, ack_mask, entries = fields
+        (sender, epoch, number, ack_epoch, ack, ack_mask), entries = parsed
         if self._nearest is not None and not self._nearest.is_chosen(sender, now):
             self.counters["overheard"] += 1
             return []
         self.margin = margin
         self._on_peer(sender, epoch)
-        self._update_quality(count)
+        self._update_quality(number)
         self.last_heard = now
         self.counters["frames_received"] += 1
         if ack_epoch == self.epoch:
@@ -136,8 +148,9 @@ class HopLink:
         frames = []
         entries = self._due_entries(now)
         while entries or self._ack_due <= now:
-            frames.append(self._build(entries[:ENTRIES_PER_FRAME]))
-            entries = entries[ENTRIES_PER_FRAME:]
+            count = bundled(entries, self.bundle_limit)
+            frames.append(self._build(entries[:count]))
+            entries = entries[count:]
         return frames
 
     def next_wake(self, now: float) -> float:
@@ -156,19 +169,6 @@ class HopLink:
     def waiting(self) -> int:
         """Payloads queued or on their way."""
         return len(self._queue) + len(self._outstanding)
-
-    def _parse(self, frame: bytes) -> tuple[int, int, int, int, int, int, list[Any]] | None:
-        if not 5 < len(frame) <= MAX_FRAME or zlib.crc32(frame[4:]) != int.from_bytes(frame[:4], "little"):
-            return None
-        try:
-            version, *fields, entries = msgpack.unpackb(frame[4:], max_ext_len=0)
-        except (ValueError, TypeError, RecursionError, msgpack.UnpackException):
-            return None
-        if version != VERSION or len(fields) != 6 or not all(type(f) is int and f >= 0 for f in fields):
-            return None
-        if not isinstance(entries, list) or not all(_is_entry(entry) for entry in entries):
-            return None
-        return fields[0], fields[1], fields[2], fields[3], fields[4], fields[5], entries
 
     def _is_me(self, epoch: int) -> bool:
         """Whether the other end means this process and not the one before a restart, whose numbers it still uses."""
@@ -242,10 +242,31 @@ class HopLink:
         self._ack_due = math.inf
         self.counters["frames_sent"] += 1
         peer_epoch = max(self._peer_epoch, 0)
-        fields = [VERSION, self._address, self.epoch, self._frames, peer_epoch, self._received, self._received_mask]
-        body: bytes = msgpack.packb([*fields, [[entry.number, entry.payload] for entry in entries]])
+        header = Header(self._address, self.epoch, self._frames, peer_epoch, self._received, self._received_mask)
+        payload = pack_frame(header, [(entry.number, entry.payload) for entry in entries])
         priority = min((entry.priority for entry in entries), default=Priority.COMMAND)
-        return Frame(zlib.crc32(body).to_bytes(4, "little") + body, priority, common_topic(entries))
+        return Frame(payload, priority, common_topic(entries))
+
+
+def pack_frame(header: Header, entries: Iterable[tuple[int, bytes]]) -> bytes:
+    """Bytes of a frame."""
+    body: bytes = msgpack.packb([VERSION, *header, [list(entry) for entry in entries]])
+    return zlib.crc32(body).to_bytes(4, "little") + body
+
+
+def parse_frame(frame: bytes) -> tuple[Header, list[Any]] | None:
+    """Header and entries of a frame; None for anything else."""
+    if not 5 < len(frame) <= MAX_FRAME or zlib.crc32(frame[4:]) != int.from_bytes(frame[:4], "little"):
+        return None
+    try:
+        version, *fields, entries = msgpack.unpackb(frame[4:], max_ext_len=0)
+    except (ValueError, TypeError, RecursionError, msgpack.UnpackException):
+        return None
+    if version != VERSION or len(fields) != 6 or not all(type(f) is int and f >= 0 for f in fields):
+        return None
+    if not isinstance(entries, list) or not all(_is_entry(entry) for entry in entries):
+        return None
+    return Header(*fields), entries
 
 
 def common_topic(entries: Iterable[Entry]) -> Hashable | None:
@@ -254,6 +275,17 @@ def common_topic(entries: Iterable[Entry]) -> Hashable | None:
     if not topics:
         return ACKNOWLEDGEMENT
     return None if None in topics else topics
+
+
+def bundled(entries: Iterable[Entry], limit: int) -> int:
+    """How many of the first entries share a frame: at most ``limit`` bytes of payloads, but one in any case."""
+    count = total = 0
+    for entry in entries:
+        total += len(entry.payload)
+        if count == ENTRIES_PER_FRAME or (count > 0 and total > limit):
+            break
+        count += 1
+    return count
 
 
 def _is_entry(entry: object) -> bool:

@@ -25,8 +25,10 @@ from node.kernels.layout import PERIOD
 from node.process.encoder_command import encoder
 from node.process.tube_command import node
 from node.process.tube_process import TubeProcess
+from sim.can.hub import running_hub
 from sim.world.recording import record, turning_once, yaw_error
 from telemetry.application.endpoint import Endpoint
+from telemetry.media.can_timing import BitRates
 from telemetry.media.neighbours import neighbour_ports
 from telemetry.media.zenoh_bus import ZenohBus, open_router
 from telemetry.media.zenoh_port import ZenohMedium
@@ -173,6 +175,26 @@ def test_a_node_finds_its_yaw_keeps_it_over_a_kill_and_ends_when_asked(
         assert report["stages_ms"]["cycle"]["count"] == report["cycles"]
 
 
+@pytest.mark.parametrize("settings", ["frames=fd", "frames=classic", "profile=native", "frames=classic,profile=native"])
+def test_a_base_station_on_zenoh_hears_a_node_on_can_that_opens_no_session(
+    string: String, surface: Surface, settings: str
+) -> None:
+    with running_hub(BitRates(500_000.0, 2_000_000.0)) as hub:
+        joint = f"can:{hub.port}/joint,interface=borechain_loopback,{settings}"
+        counter, imu = (f"timed:{string.folder / name}.npy" for name in ("encoder", "tube-1"))
+        angle = f"--drive-joint-deg={math.degrees(string.world.tube_settings(1).drive_joint.angle)}"
+        string.start("encoder", "--counter", counter, "--above", "base", "--lower", joint)
+        nowhere = ("--endpoint", "tcp/127.0.0.1:1")
+        string.start("node", "--tube", "1", "--imu", imu, angle, "--upper", joint, *nowhere)
+        state = surface.first(NodeState, lambda s: not s.flags & UNFIT)
+        assert abs(yaw_error(string.world, 1, state.yaw, state.at)) < 0.02
+        assert state.hops == 1
+        string.end()
+    report = json.loads((string.folder / "node" / "timing.json").read_text())
+    assert list(report["ports"]) == ["upper"]
+    assert report["ports"]["upper"]["not_sent"].get("dropped", 0) == 0
+
+
 def until(bus: ZenohBus, path: str, fits: Callable[[Any], bool]) -> Any:
     """The first answer of the ground station that fits."""
     deadline = time.monotonic() + PATIENCE
@@ -230,6 +252,12 @@ def test_the_bench_measures_every_process(tmp_path: Path) -> None:
         (node, ("--tube", "1", "--clock", "own", "--imu", "timed:none.npy"), "got none.npy, which is not a file"),
         (node, ("--tube", "1", "--clock", "sundial"), "'sundial' is not one of 'stepper', 'own'"),
         (node, ("--tube", "1", "--above", "2"), "expected --clock own with them"),
+        (node, ("--tube", "1", "--upper", "can:can0"), "expected --clock own with them"),
+        (node, ("--tube", "1", "--clock", "own", "--imu", "mpu6500:1", "--upper", "tin:1"), "expected one of can,"),
+        (node, ("--tube", "1", "--clock", "own", "--imu", "mpu6500:1", "--lower", "zenoh:"), "expected --below with"),
+        (encoder, ("--clock", "own", "--counter", "counter:x", "--lower", "can:"), "expected a channel"),
+        (encoder, ("--clock", "own", "--counter", "counter:x", "--lower", "can:x,bitrate=0"), "expected bit/s, got 0"),
+        (encoder, ("--clock", "own", "--counter", "counter:x", "--lower", "can:x,speed=1"), "got speed=1"),
         (node, ("--tube", "1", "--clock", "own", "--above", "sky"), "expected encoder, base or a tube 1..250, got sky"),
         (node, ("--tube", "1", "--clock", "own", "--imu", "mpu6500:1", "--above", "1"), "others than 1 itself, got 1"),
         (encoder, ("--clock", "own", "--counter", "counter:x", "--above", "3", "--below", "3"), "got 3, 3"),

@@ -16,7 +16,7 @@ from rigs import REPOSITORY, command, ends, free_endpoint, run, running_rig, tit
 
 from groundstation.service.store import Store
 from telemetry.media.zenoh_bus import open_client
-from telemetry.messages import Event
+from telemetry.messages import Event, SurveyMeasurement
 
 GROUND = "borechain/*/ground"
 
@@ -87,6 +87,49 @@ def test_the_seed_alone_decides_the_result_whatever_the_load_and_the_engine(tmp_
     assert first["digest"] == second["digest"]
     assert first["stations"] == second["stations"]
     assert first["digest"] != other["digest"]
+
+
+@pytest.mark.parametrize("transport", ["can", "mixed"])
+def test_the_transport_of_the_joints_decides_nothing(tmp_path: Path, transport: str) -> None:
+    inline = drill(tmp_path / "inline", "--seed", "5", "--inline")
+    assert drill(tmp_path / transport, "--seed", "5", "--transport", transport)["digest"] == inline["digest"]
+
+
+def test_a_scenario_names_the_media_of_its_joints(tmp_path: Path) -> None:
+    for file in (REPOSITORY / "scenarios").glob("*.csv"):
+        (tmp_path / file.name).write_bytes(file.read_bytes())
+    scenario = tmp_path / "classic.toml"
+    text = (REPOSITORY / "scenarios" / "rig-3.toml").read_text()
+    scenario.write_text(text.replace("tubes = 3", "tubes = 1") + '\n[medium]\ntransports = ["can-classic"]\n')
+    with running_rig(tmp_path / "can", "--seed", "5", scenario=str(scenario)) as rig:
+        carried = rig.result()
+    with running_rig(tmp_path / "inline", "--seed", "5", "--inline", scenario=str(scenario)) as rig:
+        assert rig.result()["digest"] == carried["digest"]
+
+
+def test_the_native_profile_moves_the_result_by_next_to_nothing(tmp_path: Path) -> None:
+    exact = drill(tmp_path / "exact", "--seed", "5", "--inline")
+    native = drill(tmp_path / "native", "--seed", "5", "--inline", "--transport", "can-native")
+    assert native["digest"] != exact["digest"]
+    for ours, theirs in zip(native["stations"], exact["stations"], strict=True):
+        assert abs(math.remainder(ours["azimuth_deg"] - theirs["azimuth_deg"], 360.0)) < 0.02
+    yaws = []
+    for name in ("exact", "native"):
+        path = tmp_path / name / "run" / "state" / "ground" / "ground.sqlite"
+        with contextlib.closing(Store(f"sqlite:///{path}")) as store:
+            surveys = [stored.message for stored in store.messages() if isinstance(stored.message, SurveyMeasurement)]
+        yaws.append({(survey.tube, survey.sequence): survey.yaw for survey in surveys})
+    assert yaws[0].keys() == yaws[1].keys()
+    apart = [math.degrees(math.remainder(yaws[0][key] - yaws[1][key], math.tau)) for key in yaws[0]]
+    assert math.sqrt(sum(a * a for a in apart) / len(apart)) < 0.002
+
+
+@pytest.mark.parametrize("words", [("--inline", "--transport", "can"), ("--transport", "can-native")])
+def test_a_transport_that_this_way_of_running_has_not_is_refused(tmp_path: Path, words: tuple[str, ...]) -> None:
+    done = run("rig", "rig-3", "--out", str(tmp_path / "run"), *words)
+    assert (done.returncode, "Traceback" in done.stderr) == (2, False)
+    assert f"--transport {words[-1]}: expected" in done.stderr
+    assert not (tmp_path / "run").exists()
 
 
 def test_one_process_a_tube_and_none_after_an_interrupt(tmp_path: Path) -> None:

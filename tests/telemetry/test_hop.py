@@ -163,3 +163,14 @@ def test_a_frame_names_its_class_and_its_topic() -> None:
     assert sorted(peer.receive(mixed.payload, 1.0)) == [b"aiding", b"block"]
     (acknowledgement,) = peer.take_frames(1.0 + ACK_DELAY)
     assert (acknowledgement.priority, acknowledgement.topic) == (Priority.COMMAND, ACKNOWLEDGEMENT)
+
+
+@pytest.mark.parametrize(("limit", "shared"), [(0, [1] * 10), (700, [2] * 5), (16384, [8, 2])])
+def test_payloads_share_a_frame_up_to_the_limit_of_the_port(limit: int, shared: list[int]) -> None:
+    pair = Pair()
+    pair.run(1.0)
+    pair.links[0].bundle_limit = limit
+    for k in range(10):
+        pair.links[0].send_reliable(bytes([k]) * 310, Priority.BLOCK)
+    frames = pair.links[0].take_frames(pair.now)
+    assert [len(pair.links[1].receive(frame.payload, pair.now)) for frame in frames] == shared

@@ -8,13 +8,15 @@ import itertools
 import random
 import socket
 import time
-from collections.abc import AsyncIterator, Iterator
+from collections.abc import AsyncIterator, Callable, Iterator
+from contextlib import AbstractContextManager
 from pathlib import Path
 
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from sim.can.hub import running_hub
 from telemetry.errors import MediumError
 from telemetry.media.memory import joint
 from telemetry.media.port import Frame, Priority, TubeEnd
@@ -45,7 +47,27 @@ def zenoh_place() -> Iterator[str]:
         yield endpoint
 
 
-PLACES = {"memory": memory_place, "zenoh": zenoh_place}
+def can_place(settings: str) -> Callable[[], AbstractContextManager[str]]:
+    @contextlib.contextmanager
+    def place() -> Iterator[str]:
+        with running_hub() as hub:
+            yield f"{hub.port},interface=borechain_loopback,{settings}"
+
+    return place
+
+
+PLACES: dict[str, Callable[[], AbstractContextManager[str]]] = {
+    "can:classic": can_place("frames=classic"),
+    "can:fd": can_place("frames=fd"),
+    "can:native": can_place("profile=native"),
+    "memory": memory_place,
+    "zenoh": zenoh_place,
+}
+
+
+def medium_of(place: str) -> str:
+    """Name in the table of a place, which may say more behind it."""
+    return place.partition(":")[0]
 
 
 class End:
@@ -104,7 +126,7 @@ class Joint:
 @pytest.fixture(params=sorted(PLACES))
 async def tube_joint(request: pytest.FixtureRequest) -> AsyncIterator[Joint]:
     with PLACES[request.param]() as where:
-        joint = Joint(f"{request.param}:{where}")
+        joint = Joint(f"{medium_of(request.param)}:{where}")
         yield joint
         joint.close()
 
@@ -213,13 +235,13 @@ class TestBackToBack:
 
 
 def test_every_medium_of_the_table_is_tested() -> None:
-    assert set(PLACES) == set(MEDIA)
+    assert set(map(medium_of, PLACES)) == set(MEDIA)
 
 
 def test_an_unknown_medium_is_one_line_with_the_known_ones() -> None:
     with pytest.raises(MediumError) as caught:
         open_medium("can't:can0")
-    assert str(caught.value) == "medium: expected one of memory, zenoh, got can't"
+    assert str(caught.value) == "medium: expected one of can, memory, zenoh, got can't"
 
 
 def test_a_medium_is_added_by_a_module_and_a_line(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

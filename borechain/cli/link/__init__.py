@@ -1,1 +1,1 @@
-"""Links between tubes: what a radio hears through soil and pipe."""
+"""Links between tubes: what a radio hears through soil and pipe, and what a CAN bus carries."""

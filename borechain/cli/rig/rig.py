@@ -21,6 +21,7 @@ if TYPE_CHECKING:
     from sim.rig.launcher import Tick
     from sim.rig.processes import ProcessTable
     from sim.rig.scheduler import Progress
+    from sim.rig.transports import Transports
     from sim.world.world import World
     from telemetry.media.zenoh_bus import ZenohBus
 
@@ -34,7 +35,12 @@ PRELOAD = {"float64": "borechain.warm", "fixed": "borechain.warm_all", "publishe
 @seed_option
 @fault_option
 @click.option("--inline", is_flag=True, help="Run it all in this one process, without a bus: same result, less CPU.")
-@click.option("--transport", type=click.Choice(["zenoh"]), default="zenoh", show_default=True)
+@click.option(
+    "--transport",
+    type=click.Choice(["zenoh", "can", "can-classic", "mixed", "can-native"]),
+    help="Medium of the joints: mixed has the first three in turn, can-native rounds as the native profile does and "
+    "needs --inline  [default: as the scenario says]",
+)
 @click.option(
     "--rig", "rig_name", default=keys.DEFAULT_RIG, show_default=True, help="Name of the rig in key expressions."
 )
@@ -51,7 +57,7 @@ def rig(
     seed: int,
     faults: tuple[str, ...],
     inline: bool,
-    transport: str,
+    transport: str | None,
     rig_name: str,
     endpoint: str,
     out: Path | None,
@@ -63,8 +69,8 @@ def rig(
     Examples:
       borechain rig wellbore-1
       borechain rig wellbore-1 --speed 1 --fault kill-node:3@900
+      borechain rig rig-3 --transport can
     """
-    del transport
     from sim.rig.launcher import check_port_free, next_run_folder, prepare_folder
     from sim.rig.report import write_files
     from sim.world.scenario import load_scenario
@@ -74,6 +80,11 @@ def rig(
         world = World(load_scenario(scenario, faults), seed)
     if world.scenario.medium.link == "off":
         raise InputFault(f'{scenario}: medium.link: expected "on" for a rig; only studies run without a link')
+    if inline != (transport == "can-native") and transport is not None:
+        raise InputFault(
+            f"--transport {transport}: expected {'real processes' if inline else '--inline'} with it; "
+            "one process has no bus, and steps know no frames without ISO-TP"
+        )
     if not inline:
         check_port_free(endpoint)
     folder = out if out is not None else next_run_folder(Path("out") / scenario.stem)
@@ -82,10 +93,16 @@ def rig(
     try:
         with progress(world, quiet=as_json) as show:
             if inline:
-                ran = drill_inline(world, speed, rig_name, folder, show)
+                ran = drill_inline(world, speed, rig_name, folder, show, native=transport == "can-native")
             else:
-                table = process_table(world, scenario, seed, speed, faults, rig_name, endpoint, folder)
-                ran = drill_in_processes(world, table, rig_name, endpoint, show)
+                ran = drill_in_processes(
+                    world,
+                    rig_name,
+                    endpoint,
+                    show,
+                    transport,
+                    lambda t: process_table(world, scenario, seed, speed, faults, rig_name, endpoint, folder, t),
+                )
     except KeyboardInterrupt:
         raise EnvironmentFault(f"interrupted; every process was ended, what was stored is in {folder}") from None
     result = result_of(ran.answers, world)
@@ -107,23 +124,37 @@ class Ran:
 
 
 def drill_in_processes(
-    world: World, table: ProcessTable, rig_name: str, endpoint: str, show: Callable[[Tick | Progress], None]
+    world: World,
+    rig_name: str,
+    endpoint: str,
+    show: Callable[[Tick | Progress], None],
+    transport: str | None,
+    table_of: Callable[[Transports], ProcessTable],
 ) -> Ran:
-    """Drill with one real process a tube."""
+    """Drill with one real process a tube, beside a hub of CAN segments where a joint is on CAN."""
     from sim.rig.launcher import Launcher
+    from sim.rig.transports import carrying
 
-    launcher = Launcher(table, rig_name, endpoint, show, operator_of(world, rig_name))
-    answers = launcher.run(lambda bus: ask(bus, rig_name))
-    return Ran(answers, len(table.specs), sum(table.restarts.values()))
+    with carrying(transport, world.scenario.medium.transports) as transports:
+        table = table_of(transports)
+        launcher = Launcher(table, rig_name, endpoint, show, operator_of(world, rig_name))
+        answers = launcher.run(lambda bus: ask(bus, rig_name))
+        return Ran(answers, len(table.specs), sum(table.restarts.values()))
 
 
 def drill_inline(
-    world: World, speed: float, rig_name: str, folder: Path, show: Callable[[Tick | Progress], None]
+    world: World,
+    speed: float,
+    rig_name: str,
+    folder: Path,
+    show: Callable[[Tick | Progress], None],
+    *,
+    native: bool = False,
 ) -> Ran:
     """Drill with objects in this process."""
     from borechain.inline import InlineRig
 
-    rig = InlineRig(world, ground_settings(world), rig_name, folder)
+    rig = InlineRig(world, ground_settings(world), rig_name, folder, native=native)
     rig.run(show, speed)
     try:
         return Ran({path: rig.ask(path) for path in ASKED}, 1, 0)
@@ -140,6 +171,7 @@ def process_table(
     rig_name: str,
     endpoint: str,
     folder: Path,
+    transports: Transports,
 ) -> ProcessTable:
     """Every process of the rig, one line each."""
     from borechain.host import run_medium
@@ -147,21 +179,22 @@ def process_table(
     from node.process.host import run_encoder, run_node
     from sim.rig.launcher import private_folder
     from sim.rig.processes import ProcessTable, Spec
+    from telemetry.messages import BASE, ENCODER
     from telemetry.runtime.hosting import Place
     from telemetry.transport.authentication import new_key
 
     key_file = new_key(folder / "rig.key")
 
-    def place(name: str) -> Place:
-        return Place(rig_name, endpoint, private_folder(folder, name), key_file)
+    def place(name: str, address: int = BASE) -> Place:
+        return Place(rig_name, endpoint, private_folder(folder, name), key_file, transports.media_of(address))
 
     specs = {
-        "medium": Spec(run_medium, (place("medium"), scenario, seed, speed, faults, True, True)),
-        "encoder": Spec(run_encoder, (place("encoder"), None, None, world.torque_settings(), world.reach)),
+        "medium": Spec(run_medium, (place("medium"), scenario, seed, speed, faults, True, True, transports)),
+        "encoder": Spec(run_encoder, (place("encoder", ENCODER), None, None, world.torque_settings(), world.reach)),
         "base": Spec(run_ground, (place("ground"), ground_settings(world))),
     }
     for tube in range(1, world.scenario.tubes + 1):
-        specs[str(tube)] = Spec(run_node, (place(f"tube-{tube}"), world.tube_settings(tube)))
+        specs[str(tube)] = Spec(run_node, (place(f"tube-{tube}", tube), world.tube_settings(tube)))
     return ProcessTable(specs, [PRELOAD[world.scenario.file.node.kernel]])
 
 

@@ -1,0 +1,254 @@
+"""A hop over CAN beside a bare exchange of python-can, over the same simulated bus in one run; and the codecs' cost."""
+
+from __future__ import annotations
+
+import contextlib
+import multiprocessing
+import statistics
+import threading
+import time
+from collections.abc import Callable, Iterator
+from typing import Any
+
+import can
+import isotp
+
+from sim.can.hub import CanHub
+from telemetry.media.can_loopback import register
+from telemetry.media.can_loopback_protocol import INTERFACE
+from telemetry.media.isotp import Receiver, Sender
+from telemetry.media.port import STEPPER, Frame, Port, Priority, TubeEnd
+from telemetry.media.table import open_medium
+from telemetry.messages import Side
+from telemetry.presentation.can_load import AIDING, HEADER, steady
+from telemetry.presentation.can_signals import NATIVE
+from telemetry.presentation.msgpack_codec import encode
+from telemetry.schema import SPEC_OF
+from telemetry.transport.hop import pack_frame
+
+EXCHANGES, ROUNDS = 300, 5
+PATIENCE = 60.0
+NATIVE_AIDING = NATIVE[SPEC_OF[type(AIDING)].kind]
+context = multiprocessing.get_context("fork")  # before any thread is started
+
+
+def run() -> dict[str, Any]:
+    """Exchanges of one aiding there and back, s each; medians of rounds in turn.
+
+    Returns
+    -------
+    dict
+        ``ratios``: ours beside bare python-can (peer), ``slower`` says how many times; ``decode_us`` of every cyclic
+        message, and of ISO-TP ours beside can-isotp's.
+    """
+    register()
+    with served() as port, contextlib.ExitStack() as stack:
+        stack.enter_context(echoing(echo_bare, port))
+        for profile in ("native", "tunnel"):
+            stack.enter_context(echoing(echo_hop, *joint(port, profile)))
+        exchanges = {
+            "bare": stack.enter_context(bare(port)),
+            "native FD": stack.enter_context(hop(*joint(port, "native"))),
+            "tunnel FD": stack.enter_context(hop(*joint(port, "tunnel"))),
+        }
+        times: dict[str, list[float]] = {name: [] for name in exchanges}
+        for _ in range(ROUNDS):
+            for name, exchange in exchanges.items():
+                begun = time.perf_counter()
+                exchange(EXCHANGES)
+                times[name].append((time.perf_counter() - begun) / EXCHANGES)
+    medians = {name: statistics.median(values) for name, values in times.items()}
+    ratios = {name: beside(medians[name], medians["bare"]) for name in ("native FD", "tunnel FD")}
+    ratios["ISO-TP, 169 bytes, FD"] = beside(seconds_of(ours_isotp), seconds_of(their_isotp()))
+    return {"bench": "can", "ratios": ratios, "decode_us": decode_times()}
+
+
+def beside(ours: float, peer: float) -> dict[str, float]:
+    """A line of the result."""
+    return {"ours": ours, "peer": peer, "ratio": peer / ours, "slower": ours / peer}
+
+
+@contextlib.contextmanager
+def served() -> Iterator[int]:
+    """Hub of segments in a process of its own; its port."""
+    ours, theirs = context.Pipe()
+    process = context.Process(target=serve, args=(theirs,), daemon=True)
+    process.start()
+    try:
+        yield ours.recv()
+    finally:
+        process.kill()
+        process.join()
+
+
+def serve(pipe: Any) -> None:
+    """Be the hub."""
+    hub = CanHub()
+    pipe.send(hub.port)
+    hub.serve()
+
+
+@contextlib.contextmanager
+def echoing(target: Callable[..., None], *arguments: Any) -> Iterator[None]:
+    """The other end in a process of its own."""
+    ready = context.Event()
+    process = context.Process(target=target, args=(*arguments, ready), daemon=True)
+    process.start()
+    try:
+        if not ready.wait(PATIENCE):
+            raise RuntimeError("the other end did not start")
+        yield
+    finally:
+        process.kill()
+        process.join()
+
+
+@contextlib.contextmanager
+def bare(port: int) -> Iterator[Callable[[int], None]]:
+    """Exchanges by python-can alone, of a frame as long as an aiding's."""
+    data = bytes(NATIVE_AIDING.fd.layouts[0].length)
+    message = can.Message(arbitration_id=0x1234567, data=data, is_fd=True, bitrate_switch=True)
+    with can.Bus(f"{port}/bare", interface=INTERFACE, ignore_config=True) as bus:
+
+        def exchange(count: int) -> None:
+            for _ in range(count):
+                bus.send(message)
+                if bus.recv(PATIENCE) is None:
+                    raise RuntimeError("no answer")
+
+        exchange(10)
+        yield exchange
+
+
+def echo_bare(port: int, ready: Any) -> None:
+    """Send back what comes."""
+    register()
+    with can.Bus(f"{port}/bare", interface=INTERFACE, ignore_config=True) as bus:
+        ready.set()
+        while True:
+            arrived = bus.recv()
+            if arrived is not None:
+                bus.send(arrived)
+
+
+def joint(port: int, profile: str) -> tuple[str, str]:
+    """Medium and rig of the joint of a profile."""
+    return f"can:{port},interface={INTERFACE},profile={profile}", profile
+
+
+def ends(name: str) -> tuple[TubeEnd, TubeEnd]:
+    """Both ends of a joint without a budget."""
+    lower = TubeEnd(name, 1, Side.UPPER, STEPPER)
+    return lower.facing, lower
+
+
+def frame_of(number: int, sender: int) -> Frame:
+    """The aiding as the link hands it to its port."""
+    header = HEADER._replace(number=number, sender=sender)
+    return Frame(pack_frame(header, [(0, encode(AIDING))]), Priority.AIDING, "aiding")
+
+
+@contextlib.contextmanager
+def hop(where: str, name: str) -> Iterator[Callable[[int], None]]:
+    """Exchanges from port to port, both codecs included."""
+    with open_medium(where) as medium:
+        mine = medium.open_port(ends(name)[0])
+        pinger = Pinger(mine)
+        pinger.exchange(10)
+        yield pinger.exchange
+
+
+class Pinger:
+    """Sends the next one from the callback of the last, so that no other thread is in the way."""
+
+    def __init__(self, port: Port) -> None:
+        self._port, self._number, self._left = port, 0, 0
+        self._done = threading.Event()
+        port.listen(self._on_frame)
+
+    def exchange(self, count: int) -> None:
+        """There and back ``count`` times."""
+        self._left = count
+        self._done.clear()
+        self._send()
+        if not self._done.wait(PATIENCE):
+            raise RuntimeError("no answer")
+
+    def _send(self) -> None:
+        self._number += 1
+        self._port.send(frame_of(self._number, STEPPER))
+
+    def _on_frame(self, _frame: bytes) -> None:
+        self._left -= 1
+        if self._left > 0:
+            self._send()
+        else:
+            self._done.set()
+
+
+def echo_hop(where: str, name: str, ready: Any) -> None:
+    """Answer each frame with one."""
+    with open_medium(where) as medium:
+        port = medium.open_port(ends(name)[1])
+        numbers = iter(range(1, 1 << 30))
+        port.listen(lambda _frame: port.send(frame_of(next(numbers), 1)))
+        ready.set()
+        threading.Event().wait()
+
+
+def ours_isotp() -> None:
+    """169 bytes through our machines."""
+    sender, receiver = Sender(bytes(169), 64), Receiver(4096)
+    while not sender.is_done:
+        receiver.on_frame(sender.next_frame())
+        if receiver.flow is not None:
+            sender.on_flow(receiver.flow)
+            receiver.flow = None
+
+
+def their_isotp() -> Callable[[], None]:
+    """169 bytes through can-isotp's without its thread, in layers that stand already."""
+    queues: tuple[list[isotp.CanMessage], list[isotp.CanMessage]] = ([], [])
+
+    def layer(own: int) -> isotp.TransportLayerLogic:
+        address = isotp.Address(isotp.AddressingMode.Normal_29bits, rxid=1 + own, txid=2 - own)
+        return isotp.TransportLayerLogic(
+            lambda timeout: queues[own].pop(0) if queues[own] else None,
+            queues[1 - own].append,
+            address,
+            params={"tx_data_length": 64, "can_fd": True, "stmin": 0},
+        )
+
+    first, second = layer(0), layer(1)
+
+    def carry() -> None:
+        first.send(bytes(169))
+        while second.recv() is None:
+            first.process()
+            second.process()
+
+    return carry
+
+
+def seconds_of(act: Callable[[], None], count: int = 300) -> float:
+    """Median duration of ``act``, s."""
+    times = []
+    for _ in range(count):
+        begun = time.perf_counter()
+        act()
+        times.append(time.perf_counter() - begun)
+    return statistics.median(times)
+
+
+def decode_times() -> dict[str, float]:
+    """Median time (us) from the data of a frame to each cyclic message."""
+    found = {}
+    for traffic in steady(1):
+        native = NATIVE[SPEC_OF[type(traffic.message)].kind]
+        data = native.fd.pack(native.raws_of(traffic.message), 1)
+        found[native.name] = 1e6 * seconds_of(lambda n=native, d=data: n.message_of(n.fd.unpack(d)), 2000)  # type: ignore[misc]
+    return found
+
+
+if __name__ == "__main__":
+    print(run())

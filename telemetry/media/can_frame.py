@@ -1,0 +1,69 @@
+"""A CAN frame as Linux lays it out (``struct can_frame``, ``struct canfd_frame``), which the loopback bus carries too.
+
+Source: include/uapi/linux/can.h and can/error.h.
+"""
+
+from __future__ import annotations
+
+import struct
+from dataclasses import dataclass
+
+EXTENDED, REMOTE, ERROR = 0x80000000, 0x40000000, 0x20000000  # flags of can_id
+IDENTIFIER = 0x1FFFFFFF
+ERROR_CONTROLLER, ERROR_PROTOCOL, ERROR_ACK, ERROR_BUS_OFF = 0x04, 0x08, 0x20, 0x40  # classes of an error frame
+RX_OVERFLOW = 0x01  # data[1] of a controller error
+BIT_RATE_SWITCH, ERROR_PASSIVE = 0x01, 0x02  # flags of an FD frame
+OWN = 0x01  # in a reserved byte of the loopback bus: the receiver's own frame, now acknowledged
+CLASSIC = struct.Struct("<IBBBB8s")
+FD = struct.Struct("<IBBBB64s")
+EMPTY_ERROR = bytes(8)
+
+
+@dataclass(frozen=True, slots=True)
+class CanFrame:
+    """One frame; ``can_id`` has the flags of Linux in its highest three bits."""
+
+    can_id: int
+    data: bytes = b""
+    fd: bool = False
+    own: bool = False
+
+    @property
+    def is_error(self) -> bool:
+        """Whether the controller reports an error by it."""
+        return bool(self.can_id & ERROR)
+
+    @property
+    def rank(self) -> int:
+        """What arbitration compares, the smaller wins: an identifier of 11 bit before one of 29 with the same start."""
+        if self.can_id & EXTENDED:
+            return (self.can_id & IDENTIFIER) << 1 | 1
+        return (self.can_id & 0x7FF) << 19
+
+    def pack(self, count: int = 0) -> bytes:
+        """Bytes on the loopback bus; ``count`` numbers what one receiver gets, modulo 256."""
+        layout = FD if self.fd else CLASSIC
+        flags = BIT_RATE_SWITCH if self.fd else 0
+        return layout.pack(self.can_id, len(self.data), flags, OWN if self.own else 0, count & 0xFF, self.data)
+
+
+def unpack(datagram: bytes) -> tuple[CanFrame, int]:
+    """Frame and its number.
+
+    Raises
+    ------
+    ValueError
+        When the bytes are no frame.
+    """
+    fd = len(datagram) == FD.size
+    if not fd and len(datagram) != CLASSIC.size:
+        raise ValueError(f"CAN frame: expected {CLASSIC.size} or {FD.size} bytes, got {len(datagram)}")
+    can_id, length, _flags, reserved, count, data = (FD if fd else CLASSIC).unpack(datagram)
+    if length > len(data):
+        raise ValueError(f"CAN frame: expected a length of at most {len(data)}, got {length}")
+    return CanFrame(can_id, data[:length], fd, bool(reserved & OWN)), count
+
+
+def error_frame(error_class: int, detail: int = 0) -> CanFrame:
+    """What a controller reports to its own computer."""
+    return CanFrame(ERROR | error_class, bytes([0, detail, 0, 0, 0, 0, 0, 0]))

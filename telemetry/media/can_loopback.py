@@ -1,0 +1,176 @@
+"""python-can's interface ``borechain_loopback``: a controller on a CAN segment that a hub on this machine simulates.
+
+For machines without CAN hardware. The channel is ``PORT/SEGMENT``: the hub's UDP port on 127.0.0.1 and any name.
+python-can finds the class by its entry point, or where the package is not installed after ``register``.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import select
+import socket
+import time
+from typing import Any
+
+import can
+from can.interfaces import BACKENDS
+
+from telemetry.media.can_frame import (
+    ERROR,
+    ERROR_CONTROLLER,
+    EXTENDED,
+    IDENTIFIER,
+    REMOTE,
+    RX_OVERFLOW,
+    CanFrame,
+    error_frame,
+    unpack,
+)
+from telemetry.media.can_loopback_protocol import (
+    ATTACH,
+    ATTACHED,
+    DETACH,
+    FLAG_FD,
+    FLAG_OWN,
+    INTERFACE,
+    LARGEST_DATAGRAM,
+    RECEIVE_BUFFER,
+    RESTART,
+)
+
+ATTACH_LIMIT = 2.0  # s
+
+
+def register() -> None:
+    """Make the interface known to python-can by its name, installed or not."""
+    BACKENDS.setdefault(INTERFACE, (__name__, LoopbackBus.__name__))
+
+
+class LoopbackBus(can.BusABC):
+    """A controller; see ``can.BusABC``.
+
+    Parameters
+    ----------
+    channel : ``PORT/SEGMENT``
+    fd : whether it speaks CAN FD; one that does not destroys every FD frame on its segment
+    receive_own_messages : whether it hears its own frames once they are acknowledged
+    receive_buffer : bytes, asked of the system; a frame takes some 800
+
+    Raises
+    ------
+    can.CanInitializationError
+        When no hub answers, or the channel is none.
+    """
+
+    def __init__(
+        self,
+        channel: str,
+        *,
+        fd: bool = True,
+        receive_own_messages: bool = False,
+        receive_buffer: int = RECEIVE_BUFFER,
+        **kwargs: Any,
+    ) -> None:
+        port, _, segment = str(channel).partition("/")
+        if not port.isdecimal() or not segment:
+            raise can.CanInitializationError(f"{INTERFACE}: expected the channel PORT/SEGMENT, got {channel}")
+        self.channel_info = f"{INTERFACE} {channel}"
+        self.overruns = 0
+        self._count = 0
+        self._overrun_pending = False
+        self._socket = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
+        self._socket.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, receive_buffer)
+        self._socket.connect(("127.0.0.1", int(port)))
+        self._attach(segment, (FLAG_FD if fd else 0) | (FLAG_OWN if receive_own_messages else 0))
+        super().__init__(channel=channel, **kwargs)
+        self._can_protocol = can.CanProtocol.CAN_FD if fd else can.CanProtocol.CAN_20
+
+    def send(self, msg: can.Message, timeout: float | None = None) -> None:
+        """Hand a frame to the controller, which repeats it until it is acknowledged."""
+        del timeout
+        if msg.is_fd and self._can_protocol is not can.CanProtocol.CAN_FD:
+            raise can.CanOperationError(f"{self.channel_info}: an FD frame on a controller without FD")
+        frame = CanFrame(identifier_of(msg), bytes(msg.data), msg.is_fd)
+        try:
+            self._socket.send(frame.pack())
+        except OSError as error:
+            raise can.CanOperationError(f"{self.channel_info}: {error.strerror}", error.errno) from error
+
+    def restart(self) -> None:
+        """Take part again after bus-off."""
+        self._socket.send(RESTART)
+
+    def fileno(self) -> int:
+        """Descriptor that is readable when a frame waits."""
+        return self._socket.fileno()
+
+    def shutdown(self) -> None:
+        """Leave the segment."""
+        super().shutdown()
+        if self._socket.fileno() >= 0:
+            with contextlib.suppress(OSError):  # the hub left first
+                self._socket.send(DETACH)
+            self._socket.close()
+
+    def _attach(self, segment: str, flags: int) -> None:
+        try:
+            self._socket.settimeout(ATTACH_LIMIT)
+            self._socket.send(ATTACH + bytes([flags]) + segment.encode())
+            answered = self._socket.recv(LARGEST_DATAGRAM) == ATTACHED
+        except OSError:
+            answered = False
+        if not answered:
+            self._socket.close()
+            raise can.CanInitializationError(
+                f"{self.channel_info}: no hub answers on that UDP port: is the simulated bus running?"
+            )
+
+    def _recv_internal(self, timeout: float | None) -> tuple[can.Message | None, bool]:
+        if self._overrun_pending:
+            self._overrun_pending = False
+            return message_of(error_frame(ERROR_CONTROLLER, RX_OVERFLOW), self.channel_info), True
+        readable, _, _ = select.select([self._socket], [], [], timeout)
+        if not readable:
+            return None, False
+        try:
+            datagram = self._socket.recv(LARGEST_DATAGRAM)
+        except OSError as error:
+            raise can.CanOperationError(f"{self.channel_info}: {error.strerror}", error.errno) from error
+        if datagram == DETACH:
+            raise can.CanOperationError(f"{self.channel_info}: the hub was started anew")
+        try:
+            frame, count = unpack(datagram)
+        except ValueError:
+            return None, False
+        self._watch_count(count)
+        return message_of(frame, self.channel_info), False
+
+    def _watch_count(self, count: int) -> None:
+        """Notice frames that found no room in the receive buffer."""
+        missed = (count - self._count - 1) & 0xFF
+        self._count = count
+        if missed:
+            self.overruns += missed
+            self._overrun_pending = True
+
+
+def identifier_of(msg: can.Message) -> int:
+    """Identifier of a message with the flags of Linux."""
+    flags = (EXTENDED if msg.is_extended_id else 0) | (REMOTE if msg.is_remote_frame else 0)
+    return msg.arbitration_id | flags | (ERROR if msg.is_error_frame else 0)
+
+
+def message_of(frame: CanFrame, channel: str) -> can.Message:
+    """Frame as python-can hands it out."""
+    return can.Message(
+        timestamp=time.time(),
+        arbitration_id=frame.can_id & IDENTIFIER,
+        is_extended_id=bool(frame.can_id & EXTENDED),
+        is_remote_frame=bool(frame.can_id & REMOTE),
+        is_error_frame=frame.is_error,
+        is_fd=frame.fd,
+        bitrate_switch=frame.fd,
+        is_rx=not frame.own,
+        channel=channel,
+        data=frame.data,
+    )

@@ -1,0 +1,228 @@
+"""A port on a CAN joint: python-can's bus and a thread that listens to it, around ``can_exchange``.
+
+python-can raises errors of its own that are no ``OSError``; a bus that fails, or that the controller has left, is
+opened again with a growing pause, for ever: a joint that opens is an ordinary event of drilling.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import math
+import random
+import threading
+import time
+from collections import deque
+from collections.abc import Callable
+
+import can
+
+from telemetry.errors import MediumError
+from telemetry.media.can_exchange import CanExchange
+from telemetry.media.can_frame import ERROR_BUS_OFF, ERROR_CONTROLLER, RX_OVERFLOW
+from telemetry.media.can_log import CanLog
+from telemetry.media.can_profile import Profile
+from telemetry.media.can_timing import BitRates
+from telemetry.media.port import Frame
+from telemetry.media.queued_port import QueuedPort
+
+TICK = 0.05  # s, that the thread waits for a frame before it looks at the time
+ROOM_LIMIT = 0.02  # s, that a frame which must not be lost waits for room while the other end takes frames
+FIRST_PAUSE, LAST_PAUSE = 0.1, 5.0  # s, before a bus is opened again
+UNHEARD_LIMIT = 64  # payloads kept until ``listen``
+OpenBus = Callable[[], can.BusABC]
+
+
+class CanPort(QueuedPort):
+    """One end of a CAN joint, see ``port.Port``; it is up while its frames are acknowledged.
+
+    Parameters
+    ----------
+    name : of the port, for errors
+    open_bus : opens the controller, which must report own frames once they are acknowledged
+    address : of the process
+    largest : bytes of data in a frame, 8 or 64
+    limit : frames that may wait
+    profile, rates, is_stepped : see ``can_exchange.CanExchange``
+    log : takes every frame that crosses the joint
+
+    Raises
+    ------
+    MediumError
+        When the bus cannot be opened.
+    """
+
+    def __init__(
+        self,
+        name: str,
+        open_bus: OpenBus,
+        address: int,
+        largest: int,
+        limit: int,
+        profile: Profile | None = None,
+        rates: BitRates | None = None,
+        log: CanLog | None = None,
+        *,
+        is_stepped: bool = False,
+    ) -> None:
+        super().__init__(name, limit=limit)
+        self._open_bus = open_bus
+        self._is_fd = largest > 8
+        self._bus: can.BusABC | None = opened(open_bus, name)
+        nonce = random.getrandbits(32)
+        begun = time.monotonic()
+        self._exchange = CanExchange(address, largest, self._queue, nonce, begun, profile, rates, is_stepped=is_stepped)
+        self._log = log
+        self._room = threading.Condition()
+        self._deliver: Callable[[bytes], object] | None = None
+        self._unheard: deque[bytes] = deque(maxlen=UNHEARD_LIMIT)
+        self._pause, self._reopen_at = FIRST_PAUSE, math.inf
+        self._thread = threading.Thread(target=self._run, name=f"can {name}", daemon=True)
+        self._thread.start()
+
+    @property
+    def bundle_limit(self) -> int:
+        """One payload a frame: eight parts of a block in one would hold an aiding up for 0.5 s at 125 kbit/s."""
+        return 0
+
+    def send(self, frame: Frame) -> bool:
+        """Send a frame now, or as soon as the other end is there."""
+        with self._room:
+            self._check_open()
+            if frame.topic is None and self._exchange.is_up:
+                self._room.wait_for(self._has_room, ROOM_LIMIT)
+            accepted = self._queue.offer(frame)
+            self._pump()
+        return accepted
+
+    def flush(self) -> None:
+        """Send what waits, if the other end is there."""
+        with self._room:
+            self._check_open()
+            self._pump()
+
+    def listen(self, deliver: Callable[[bytes], object]) -> None:
+        """Call ``deliver``, which only puts into a queue, on the port's thread for every frame that arrives."""
+        with self._room:
+            while self._unheard:
+                deliver(self._unheard.popleft())
+            self._deliver = deliver
+
+    def close(self) -> None:
+        """Let the end go."""
+        with self._room:
+            if self._closed:
+                return
+            self._closed = True
+        self._thread.join()
+        if self._bus is not None:
+            self._bus.shutdown()
+        if self._log is not None:
+            self._log.close()
+
+    def _is_heard(self) -> bool:
+        with self._room:
+            return self._exchange.is_up
+
+    def _has_room(self) -> bool:
+        return len(self._queue) < self._queue.limit or not self._exchange.is_up
+
+    def _run(self) -> None:
+        while not self._closed:
+            if self._bus is None:
+                time.sleep(TICK)
+                self._reopen()
+                continue
+            try:
+                message = self._bus.recv(TICK)
+            except (can.CanError, OSError, ValueError):
+                self._lose_bus("bus_lost")
+                continue
+            with self._room:
+                self._on_message(message)
+                self._pump()
+
+    def _on_message(self, message: can.Message | None) -> None:
+        now = time.monotonic()
+        if message is None:
+            return
+        if self._log is not None:
+            self._log.write(message)
+        if message.is_error_frame:
+            self._on_error(message.arbitration_id, bytes(message.data))
+        elif not message.is_rx:
+            self._exchange.on_acknowledged(now)
+            self._pause = FIRST_PAUSE
+        elif not message.is_extended_id or message.is_remote_frame:
+            self.counters["unknown_identifier"] += 1
+        else:
+            payload = self._exchange.on_frame(message.arbitration_id, bytes(message.data), now)
+            if payload is not None:
+                (self._deliver or self._unheard.append)(payload)
+
+    def _on_error(self, error_class: int, data: bytes) -> None:
+        if error_class & ERROR_BUS_OFF:
+            self._lose_bus("bus_off")
+        elif error_class & ERROR_CONTROLLER and data[1:2] and data[1] & RX_OVERFLOW:
+            self.counters["receive_overruns"] += 1
+
+    def _pump(self) -> None:
+        """Hand the controller its next frame."""
+        now = time.monotonic()
+        self._exchange.advance(now)
+        if self._bus is None or self._closed:
+            return
+        frame = self._exchange.next_frame(now)
+        if frame is None:
+            if not self._exchange.is_up:
+                self._queue.forget_outdated()
+            return
+        self._room.notify_all()
+        message = can.Message(
+            arbitration_id=frame.identifier,
+            data=frame.data,
+            is_extended_id=True,
+            is_fd=self._is_fd,
+            bitrate_switch=self._is_fd,
+        )
+        try:
+            self._bus.send(message)
+        except (can.CanError, OSError):
+            self.counters["refused_by_controller"] += 1
+            self._exchange.on_refused()
+
+    def _lose_bus(self, reason: str) -> None:
+        self.counters[reason] += 1
+        self._exchange.on_refused()
+        if self._bus is not None:
+            with contextlib.suppress(can.CanError, OSError):
+                self._bus.shutdown()
+        self._bus = None
+        self._reopen_at = time.monotonic() + self._pause
+        self._pause = min(2.0 * self._pause, LAST_PAUSE)
+
+    def _reopen(self) -> None:
+        if time.monotonic() < self._reopen_at:
+            return
+        try:
+            bus = opened(self._open_bus, self._name)
+        except MediumError:
+            self._reopen_at = time.monotonic() + self._pause
+            self._pause = min(2.0 * self._pause, LAST_PAUSE)
+            return
+        with self._room:
+            self._bus = bus
+            self._pump()
+
+
+def opened(open_bus: OpenBus, name: str) -> can.BusABC:
+    """The bus, its errors as ours.
+
+    Raises
+    ------
+    MediumError
+        When it cannot be opened.
+    """
+    try:
+        return open_bus()
+    except (can.CanError, OSError, ValueError) as error:
+        raise MediumError(f"CAN port {name}: {error}") from error

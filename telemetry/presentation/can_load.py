@@ -1,0 +1,94 @@
+"""How much of its time a joint's bus is busy: by the number of tubes below it, the bit rates and the profile.
+
+Counted over the messages that are sent all the time, worst stuffing: aiding and node states each 1.9 Hz, hellos of both
+ends each second and their signs of life, a clock exchange each ten seconds. What ISO-TP's receiver answers counts too.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+from telemetry.media.can_exchange import PRESENCE_EVERY
+from telemetry.media.can_timing import CLASSIC_LARGEST, FD_LARGEST, BitRates
+from telemetry.media.isotp import frame_lengths
+from telemetry.messages import Aiding, Hello, Message, Mode, NodeFlag, NodeState, TimeReply, TimeRequest
+from telemetry.presentation.can_native import HEADER_EVERY
+from telemetry.presentation.can_signals import NATIVE
+from telemetry.presentation.msgpack_codec import encode
+from telemetry.schema import SPEC_OF
+from telemetry.transport.hop import Header, pack_frame
+
+CYCLE = 1.0 / 1.9  # s
+HELLO_PERIOD, SYNC_PERIOD = 1.0, 10.0  # s
+PRESENCE_BYTES = 8
+PROFILES = ("tunnel", "native")
+HEADER = Header(250, 7 << 24 | 1 << 8 | 250, 500_000, 6 << 24 | 249, 3000, 0)
+AIDING = Aiding(1.2345678, 2.5e-6, 1.5e-6, -0.123456, 1.2345678, 5000.123456, 3 << 32 | 9000, 24, 480.0, 1e-6, True)
+STATE = NodeState(
+    24, 5000.123456, 25, Mode.TRACKING, 1.2345678, 2.5e-6, 1.5e-6, (1e-3, -2e-3, 3e-3), 1e-3, 1e-4, 3e-6, 0.53, 1e-8,
+    NodeFlag.NONE, 9000, 0, 2, bytes(range(8)), (1e-3, 2e-3, 3e-4),
+)  # fmt: skip
+
+
+@dataclass(frozen=True, slots=True)
+class Traffic:
+    """A message that comes again and again."""
+
+    message: Message
+    rate: float  # 1/s
+
+
+def steady(tubes: int, cycle: float = CYCLE) -> list[Traffic]:
+    """What crosses the joint above ``tubes`` tubes while the string turns."""
+    return [
+        Traffic(AIDING, 1.0 / cycle),
+        Traffic(STATE, tubes / cycle),
+        Traffic(Hello(250, 7, 25, Mode.TRACKING, 0.99), 2.0 / HELLO_PERIOD),
+        Traffic(TimeRequest(5000.123456), 1.0 / SYNC_PERIOD),
+        Traffic(TimeReply(5000.1, 5000.2, 5000.3, 5000.4, 1.0000012, 1e-8), 1.0 / SYNC_PERIOD),
+    ]
+
+
+def frame_bytes(message: Message, profile: str, *, fd: bool) -> list[float]:
+    """Bytes of data in each CAN frame of a message, alone in its frame of the link."""
+    largest = FD_LARGEST if fd else CLASSIC_LARGEST
+    tunnel = frame_lengths(len(pack_frame(HEADER, [(0, encode(message))])), largest)
+    if profile == "tunnel":
+        return list(map(float, tunnel))
+    native = NATIVE[SPEC_OF[type(message)].kind]
+    return [float(layout.length) for layout in (native.fd if fd else native.classic).layouts]
+
+
+def duration(message: Message, profile: str, rates: BitRates, *, fd: bool) -> float:
+    """Bus time of a message, s; of the native profile with its share of the headers that go by ISO-TP."""
+    own = sum(rates.duration(int(length), fd=fd) for length in frame_bytes(message, profile, fd=fd))
+    if profile == "tunnel":
+        return own
+    header = frame_lengths(len(pack_frame(HEADER, [])), FD_LARGEST if fd else CLASSIC_LARGEST)
+    return own + sum(rates.duration(length, fd=fd) for length in header) / HEADER_EVERY
+
+
+def load(traffic: list[Traffic], profile: str, rates: BitRates, *, fd: bool) -> float:
+    """Share of its time that the bus is busy, signs of life included; over 1: it cannot carry that."""
+    messages = sum(t.rate * duration(t.message, profile, rates, fd=fd) for t in traffic)
+    return messages + presences(traffic, profile) * rates.duration(PRESENCE_BYTES, fd=fd)
+
+
+def presences(traffic: list[Traffic], profile: str) -> float:
+    """Signs of life each second of the upper end, which sends little itself; the states below tell of the lower one."""
+    states = sum(t.rate for t in traffic if isinstance(t.message, NodeState))
+    own = sum(t.rate for t in traffic if isinstance(t.message, Aiding)) + 1.0 / HELLO_PERIOD
+    return max(1.0 / PRESENCE_EVERY - own - (states if profile == "tunnel" else 0.0), 0.0)
+
+
+def load_table(
+    tubes: tuple[int, ...], bitrates: tuple[float, ...], data_ratio: float
+) -> Iterator[tuple[int, str, str, float, float]]:
+    """Tubes, profile, frames, nominal bit rate and load of every combination; FD's data run ``data_ratio`` as fast."""
+    for count in tubes:
+        for frames in ("classic", "fd"):
+            for profile in PROFILES:
+                for bitrate in bitrates:
+                    rates = BitRates(bitrate, data_ratio * bitrate)
+                    yield count, profile, frames, bitrate, load(steady(count), profile, rates, fd=frames == "fd")

@@ -1,0 +1,158 @@
+"""The native profile of CAN: cyclic messages leave the link's frame and travel as signals.
+
+What the link's header says beside them is known at the other end or told by the frames that carry something which must
+not be lost: these go by ISO-TP, and so does the header alone where it acknowledges something new. A message that no
+signal can express goes by ISO-TP as well, so nothing is lost by the profile but what rounding takes.
+"""
+
+from __future__ import annotations
+
+from telemetry.errors import DecodeError, EncodeError
+from telemetry.media.can_profile import NativePart, Split
+from telemetry.media.port import Priority
+from telemetry.messages import Message
+from telemetry.presentation.can_signals import COUNT, FD_PART, NATIVE, Form
+from telemetry.presentation.msgpack_codec import decode, encode
+from telemetry.schema import SPEC_OF, Kind
+from telemetry.transport.hop import Header, pack_frame, parse_frame
+
+PRIORITIES = {
+    Kind.TIME_REQUEST: Priority.TIME,
+    Kind.TIME_REPLY: Priority.TIME,
+    Kind.AIDING: Priority.AIDING,
+    Kind.HELLO: Priority.HELLO,
+    Kind.NODE_STATE: Priority.STATE,
+}
+HEADER_EVERY = 8  # frames
+BY_TYPE = {int(kind): native for kind, native in NATIVE.items()}
+HALF = (COUNT.largest + 1) // 2
+
+
+class NativeProfile:
+    """Both directions of one end, see ``telemetry.media.can_profile.Profile``."""
+
+    def __init__(self) -> None:
+        self._told: Header | None = None  # the newest header that went by ISO-TP
+        self._epoch: dict[int, int] = {}  # of each sender
+        self._count: dict[int, int] = {}  # of its frames so far
+        self._parts: dict[int, dict[int, bytes]] = {}  # by type: parts of the message that is coming in
+
+    def split(self, payload: bytes, *, fd: bool) -> Split:
+        """Parts of a frame of the link that is to be sent."""
+        parsed = parse_frame(payload)
+        if parsed is None:
+            return Split([], payload)
+        header, entries = parsed
+        parts: list[NativePart] = []
+        rest: list[tuple[int, bytes]] = []
+        for number, content in entries:
+            frames = native_parts(content, header.number, fd=fd) if number == 0 else None
+            if frames is None:
+                rest.append((number, content))
+            else:
+                parts += frames
+        if not rest and not self._is_news(header):
+            return Split(parts, None)
+        self._told = header
+        return Split(parts, pack_frame(header, rest))
+
+    def join(self, source: int, type_: int, part: int, data: bytes) -> bytes | None:
+        """Frame of the link that a part which arrived completes, or None while others are missing.
+
+        Raises
+        ------
+        DecodeError
+            When it is none of a known form, or its values are outside their ranges.
+        """
+        message = BY_TYPE.get(type_)
+        if message is None:
+            raise DecodeError("unknown_identifier")
+        if not data:
+            raise DecodeError("bad_length")
+        form = message.fd if part == FD_PART else message.classic
+        frames = [data] if part == FD_PART else self._collect(type_, part, data, len(form.layouts))
+        if frames is None:
+            return None
+        decoded = message.message_of(form.unpack(frames))
+        epoch = self._epoch.get(source)
+        if epoch is None:
+            raise DecodeError("unknown_sender")
+        newest = self._count.get(source, 0)
+        number = newest + (data[0] - newest + HALF & COUNT.largest) - HALF  # urgent frames come before older ones
+        self._count[source] = max(newest, number)
+        return pack_frame(Header(source, epoch, max(number, 1), 0, 0, 0), [(0, encode(decoded))])
+
+    def observe(self, payload: bytes) -> None:
+        """See a frame of the link that came by ISO-TP: who sends in which boot and session, and how many so far."""
+        parsed = parse_frame(payload)
+        if parsed is not None:
+            header = parsed[0]
+            if self._epoch.get(header.sender) != header.epoch:
+                self._epoch[header.sender], self._count[header.sender] = header.epoch, 0
+            self._count[header.sender] = max(self._count[header.sender], header.number)
+
+    def _is_news(self, header: Header) -> bool:
+        """Whether the other end has to see the header; now and then it has to anyway, since one may be lost."""
+        told = self._told
+        if told is None or header.number - told.number >= HEADER_EVERY:
+            return True
+        return header._replace(number=told.number) != told
+
+    def _collect(self, type_: int, part: int, data: bytes, needed: int) -> list[bytes] | None:
+        """All parts of a message in order once they are there; those of another count are forgotten."""
+        if part >= needed:
+            raise DecodeError("unknown_identifier")
+        parts = self._parts.setdefault(type_, {})
+        if any(other[0] != data[0] for other in parts.values()):
+            parts.clear()
+        parts[part] = data
+        if len(parts) < needed:
+            return None
+        del self._parts[type_]
+        return [parts[k] for k in range(needed)]
+
+
+def native_parts(payload: bytes, count: int, *, fd: bool) -> list[NativePart] | None:
+    """Frames of a cyclic message; None for one that only the tunnel carries."""
+    try:
+        message = decode(payload)
+        native = NATIVE.get(SPEC_OF[type(message)].kind)
+        if native is None:
+            return None
+        form: Form = native.fd if fd else native.classic
+        frames = form.pack(native.raws_of(message), count)
+    except (DecodeError, EncodeError):
+        return None
+    return [
+        NativePart(PRIORITIES[native.kind], int(native.kind), layout.part, data)
+        for layout, data in zip(form.layouts, frames, strict=True)
+    ]
+
+
+def rounded(message: Message) -> Message:
+    """What arrives of a message: itself, its values on the steps of their signals."""
+    native = NATIVE.get(SPEC_OF[type(message)].kind)
+    if native is None:
+        return message
+    return native.message_of(native.fd.unpack(native.fd.pack(native.raws_of(message), 0)))
+
+
+def rounded_frame(payload: bytes) -> bytes:
+    """A frame of the link whose cyclic messages are as they would arrive."""
+    parsed = parse_frame(payload)
+    if parsed is None:
+        return payload
+    header, entries = parsed
+    return pack_frame(header, [(number, _rounded_payload(content)) for number, content in entries])
+
+
+def _rounded_payload(payload: bytes) -> bytes:
+    try:
+        return encode(rounded(decode(payload)))
+    except (DecodeError, EncodeError):
+        return payload
+
+
+def open_profile() -> NativeProfile:
+    """Profile of one end."""
+    return NativeProfile()

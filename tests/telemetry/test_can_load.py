@@ -1,0 +1,131 @@
+"""The load table beside the bus itself, and a slow joint that thins node states out; all in simulated time."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import pytest
+
+from sim.can.wire import CanWire
+from telemetry.media.can_exchange import CanExchange
+from telemetry.media.can_frame import EXTENDED, IDENTIFIER, CanFrame
+from telemetry.media.can_timing import BitRates
+from telemetry.media.port import MAX_FRAME, Frame, Priority
+from telemetry.media.send_queue import SendQueue
+from telemetry.messages import Hello, NodeState, TimeReply, TimeRequest
+from telemetry.presentation.can_load import AIDING, CYCLE, HEADER, STATE, load, load_table, steady
+from telemetry.presentation.can_native import open_profile
+from telemetry.presentation.msgpack_codec import decode, encode
+from telemetry.transport.hop import Header, pack_frame, parse_frame
+
+RATES = BitRates(125_000.0, 500_000.0)
+
+
+class SimulatedJoint:
+    """Two ends on a paced wire; payloads go in as frames of a link, one message each."""
+
+    def __init__(self, profile: str, *, fd: bool, thins: bool = False) -> None:
+        self.wire, self.now, self.fd = CanWire(RATES), 0.0, fd
+        known = RATES if thins else None
+        self.ends = [
+            CanExchange(
+                address, 64 if fd else 8, SendQueue(MAX_FRAME), address, 0.0,
+                open_profile() if profile == "native" else None, known,
+            )
+            for address in (0, 1)
+        ]  # fmt: skip
+        for address in (0, 1):
+            self.wire.attach(address, fd=True, hears_itself=True)
+        self.heard: list[list[tuple[float, object]]] = [[], []]
+        self._number = [0, 0]
+
+    def send(self, end: int, message: object, priority: Priority, topic: object, *, kept: bool = False) -> None:
+        self._number[end] += 1
+        header: Header = HEADER._replace(sender=end, number=self._number[end])
+        number = self._number[end] if kept else 0
+        payload = pack_frame(header, [(number, encode(message))])  # type: ignore[arg-type]
+        self.ends[end].queue.offer(Frame(payload, priority, topic))
+
+    def run(self, until: float, tick: float = 2e-4) -> None:
+        while self.now < until:
+            for end in self.ends:
+                end.advance(self.now)
+                if (frame := end.next_frame(self.now)) is not None:
+                    data = CanFrame(EXTENDED | frame.identifier, frame.data, self.fd)
+                    self.wire.submit(end.address, data, self.now)
+            for to, frame_ in self.wire.advance(self.now):
+                self._deliver(int(str(to)), frame_)
+            self.now = min(max(self.wire.due(), self.now + 1e-6), self.now + tick)
+
+    def _deliver(self, to: int, frame: CanFrame) -> None:
+        if frame.is_error:
+            return
+        if frame.own:
+            self.ends[to].on_acknowledged(self.now)
+            return
+        payload = self.ends[to].on_frame(frame.can_id & IDENTIFIER, frame.data, self.now)
+        parsed = parse_frame(payload) if payload is not None else None
+        for _, content in parsed[1] if parsed is not None else []:
+            self.heard[to].append((self.now, decode(content)))
+
+
+PRIORITY = {Hello: Priority.HELLO, TimeRequest: Priority.TIME, TimeReply: Priority.TIME, NodeState: Priority.STATE}
+
+
+def drill(joint: SimulatedJoint, tubes: int, seconds: float) -> None:
+    """The traffic of the table: cycles, and within each every second what is not sent each cycle."""
+    joint.run(0.2)
+    joint.wire.busy = 0.0
+    begin, cycle = joint.now, 0
+    others = [t for t in steady(tubes) if t.message is not AIDING and t.message is not STATE]
+    sent = dict.fromkeys(range(len(others)), 0)
+    while joint.now < begin + seconds:
+        joint.send(0, replace(AIDING, sequence=cycle), Priority.AIDING, "aiding")
+        for tube in range(1, tubes + 1):
+            joint.send(1, replace(STATE, tube=tube, cycles=cycle), Priority.STATE, ("state", tube))
+        for number, traffic in enumerate(others):
+            while sent[number] < traffic.rate * (joint.now - begin):
+                sent[number] += 1
+                priority = PRIORITY[type(traffic.message)]
+                joint.send(sent[number] % 2, traffic.message, priority, (type(traffic.message), sent[number]))
+        cycle += 1
+        joint.run(begin + cycle * CYCLE)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(("profile", "fd", "tubes"), [
+    ("tunnel", True, 10), ("tunnel", True, 25), ("tunnel", False, 5), ("native", True, 25), ("native", False, 15),
+])  # fmt: skip
+def test_the_table_is_what_the_bus_carries(profile: str, fd: bool, tubes: int) -> None:
+    joint = SimulatedJoint(profile, fd=fd)
+    drill(joint, tubes, 20.0)
+    measured = joint.wire.busy / (joint.now - 0.2)
+    assert measured == pytest.approx(load(steady(tubes), profile, RATES, fd=fd), rel=0.05)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(("profile", "fd"), [("tunnel", False), ("tunnel", True), ("native", False)])
+def test_fifty_tubes_on_a_slow_joint_thin_themselves_and_lose_nothing_kept(profile: str, fd: bool) -> None:
+    joint = SimulatedJoint(profile, fd=fd, thins=True)
+    for k in range(12):
+        joint.send(1, replace(STATE, tube=200, cycles=k), Priority.SURVEY, None, kept=True)
+    drill(joint, 50, 30.0)
+    assert load(steady(50), profile, RATES, fd=fd) > 0.8
+    assert joint.wire.busy / (joint.now - 0.2) <= 0.6
+    states = [m for _, m in joint.heard[0] if isinstance(m, NodeState)]
+    assert [m.cycles for m in states if m.tube == 200] == list(range(12))
+    counts = [sum(m.tube == tube for m in states) for tube in range(1, 51)]
+    assert 2 * min(counts) + 2 >= max(counts) > 2  # none is heard less than half as often as another
+    aidings = [m.sequence for _, m in joint.heard[1] if hasattr(m, "sequence")]
+    assert len(aidings) >= 30.0 / CYCLE - 2
+    assert not {"dropped", "no_flow_control", "out_of_order"} & set(joint.ends[1].counters)
+
+
+def test_the_table_has_every_combination_and_falls_with_the_bit_rate() -> None:
+    rows = list(load_table((10, 50), (125e3, 1e6), 4.0))
+    assert len(rows) == 2 * 2 * 2 * 2
+    by_case = {row[:4]: row[4] for row in rows}
+    assert by_case[10, "tunnel", "classic", 125e3] == pytest.approx(8 * by_case[10, "tunnel", "classic", 1e6])
+    for frames in ("classic", "fd"):
+        assert by_case[50, "native", frames, 125e3] < by_case[50, "tunnel", frames, 125e3]
+    assert by_case[50, "tunnel", "classic", 125e3] > 1.0
