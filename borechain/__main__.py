@@ -38,6 +38,11 @@ COMMANDS = {
     ),
     "link": ("borechain.cli.link.link", "link", "Between tubes: radio through soil and pipe, load of a CAN bus."),
     "bench": ("borechain.cli.bench.bench", "bench", "Measure speed side by side with other libraries."),
+    "campaign": (
+        "borechain.cli.campaign.campaign",
+        "campaign",
+        "Run a scenario thousands of times and judge the filter.",
+    ),
     "experiment": ("borechain.cli.experiment.experiment", "experiment", "Rerun a published experiment beside ours."),
 }
 

@@ -79,6 +79,11 @@ def kernel(function: Function) -> Function:
     return cast("Function", njit(**OPTIONS)(function))
 
 
+def entry(function: Function) -> Function:
+    """Compile ``function`` as a kernel that others may call by its address, and need not hold a copy of."""
+    return cast("Function", njit(**{**OPTIONS, "no_cfunc_wrapper": False})(function))
+
+
 def shared_body(function: Function) -> Function:
     """Write ``function`` into every kernel that calls it: kernels that it is given are known there and cost nothing."""
     return cast("Function", njit(**OPTIONS, inline="always")(function))

@@ -19,7 +19,7 @@ from node.kernels.cycle import run_cycle
 from node.kernels.events import NONE, Code, tell
 from node.kernels.guard import admits, gate_aiding, guard_reading, judge_cycle
 from node.kernels.intake import take_readings
-from node.kernels.jit import constant, kernel, shared_body
+from node.kernels.jit import constant, entry, kernel, shared_body
 from node.kernels.layout import CLOCK_SLACK, DEG, Array, Scheme, Status
 from node.kernels.make_up import follow_joints
 from node.kernels.modes import STATIC_BIAS
@@ -71,7 +71,7 @@ STATUS_TOLD: Final = (
 AIDING_REJECTED = constant(Code.AIDING_REJECTED)
 
 
-@kernel
+@entry
 def node_step(nodes: Array, settings: Array, parameters: Array, readings: Array, moment: Array) -> int:
     """One cycle of one node with the float64 loop; returns what there is to say.
 
@@ -225,7 +225,7 @@ def follow_clock(node: Any, settings: Any, moment: Array) -> None:
         set_stamp_prior(node.filter, std * std)
 
 
-@kernel
+@entry
 def node_aiding(nodes: Array, settings: Array, aiding: Array) -> int:
     """Take one aiding into a node with the float64 loop; returns whether it was used and whether it goes down.
 

@@ -66,6 +66,19 @@ class Disc:
         last, *earlier = self._times.values()
         return count, min(last, t), tuple(earlier)
 
+    def counts(self, t: Array) -> npt.NDArray[np.int64]:
+        """Counts (n,) at rig times ``t`` (n,) s."""
+        angle = self.angles(t)
+        counts = np.floor(angle / self._quantum + 0.5).astype(np.int64)
+        return counts - (self._places(counts) > angle)
+
+    def times_of(self, counts: npt.NDArray[np.int64]) -> Array:
+        """Rig times (n,) s at which the edges that make ``counts`` (n,) passed, of a head that was never free."""
+        return self._motion.times_of_angles(self._places(counts))
+
+    def _places(self, counts: npt.NDArray[np.int64]) -> Array:
+        return np.asarray(counts * self._quantum + self._errors[counts % len(self._errors)])
+
     def _time_of(self, angle: float) -> float:
         """When the head was at ``angle`` first: inside a jump at its time, else when the string got so far."""
         free = 0.0

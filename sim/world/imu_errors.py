@@ -71,8 +71,7 @@ class ImuErrors:
     def gyro(self, random: np.random.Generator, rate: Array, force: Array, period: float) -> Array:
         """Readings (n, 3, rad/s) of the mean rates (n, 3), cycle after cycle of ``period`` (s)."""
         g = self.gyroscope
-        bias = np.radians(np.array(g.constant_bias_dps) + g.constant_bias_std_dps * random.standard_normal(3))
-        matrix = self._distortion(random)
+        bias, matrix = self.constants(random)
         white = np.radians(np.array(g.noise_dps_rthz)) / math.sqrt(period)
         wander = gauss_markov(random, len(rate), np.radians(np.array(g.bias_std_dps)), g.bias_tau_s, period)
         noise = white * random.standard_normal(rate.shape)
@@ -83,10 +82,21 @@ class ImuErrors:
         """Readings (n, 3, m/s^2) of the mean specific forces (n, 3); ``turning`` (n,) says when the bit shakes them."""
         a = self.accelerometer
         tilt = math.radians(1.0) * a.gravity_mps2
-        bias = a.bias_std_deg * tilt * random.standard_normal(3)
+        bias = self.force_bias(random)
         noise = a.noise_deg * tilt * random.standard_normal(force.shape)
         shaking = a.vibration_mps2 * turning[:, None] * random.standard_normal(force.shape)
         return np.asarray(force + bias + noise + shaking)
+
+    def constants(self, random: np.random.Generator) -> tuple[Array, Array]:
+        """Of the gyroscope: constant bias (3,) rad/s, and its reading by the true rates (3, 3)."""
+        g = self.gyroscope
+        bias = np.radians(np.array(g.constant_bias_dps) + g.constant_bias_std_dps * random.standard_normal(3))
+        return bias, self._distortion(random)
+
+    def force_bias(self, random: np.random.Generator) -> Array:
+        """Of the accelerometer (3,), m/s^2."""
+        a = self.accelerometer
+        return np.asarray(a.bias_std_deg * math.radians(1.0) * a.gravity_mps2 * random.standard_normal(3))
 
     def readings(self, random: np.random.Generator, rate: Array, force: Array, turning: Array, period: float) -> Array:
         """Both, one after the other from one stream, (n, 6)."""

@@ -7,6 +7,7 @@ angles in rad.
 
 from __future__ import annotations
 
+import copy
 import math
 from dataclasses import dataclass
 from functools import cached_property
@@ -71,6 +72,15 @@ class Trapezoid:
             return float(r + (angle - ramp_angle) / (a * r))
         return d - math.sqrt(2.0 * max(self.angle - angle, 0.0) / a)
 
+    def times_of(self, angles: Array) -> Array:
+        """``time_of`` of (n,) angles."""
+        a, r, d = self.acceleration, self.ramp, self.duration
+        ramp_angle = 0.5 * a * r * r
+        up = np.sqrt(2.0 * np.maximum(angles, 0.0) / a)
+        flat = r + (angles - ramp_angle) / (a * r)
+        down = d - np.sqrt(2.0 * np.maximum(self.angle - angles, 0.0) / a)
+        return np.where(angles <= ramp_angle, up, np.where(angles <= self.angle - ramp_angle, flat, down))
+
 
 class Motion:
     """Drive head and bit over the whole schedule.
@@ -126,6 +136,12 @@ class Motion:
         self._starts = np.array([phase.start for phase in phases if phase.kind == "drill"])
         self.make_ups = np.array([phase.joint_closed for phase in phases if phase.kind == "add"])
 
+    def starting_at(self, first_angle: float) -> Motion:
+        """The same motion of a head that starts at another angle (rad)."""
+        moved = copy.copy(self)
+        moved._first_angle = first_angle
+        return moved
+
     def drive(self, t: Array) -> tuple[Array, Array, Array]:
         """Angle (rad, unwrapped), rate and acceleration of the drive head at rig times ``t`` (n,)."""
         k = np.maximum(np.searchsorted(self._starts, t, side="right") - 1, 0)
@@ -145,6 +161,13 @@ class Motion:
             return self.begin
         k = min(math.ceil(turned / self._turn.angle - 1e-12) - 1, len(self._starts) - 1)
         return float(self._starts[k]) + self._turn.time_of(turned - k * self._turn.angle)
+
+    def times_of_angles(self, angles: Array) -> Array:
+        """``time_of_angle`` of (n,) angles."""
+        turned = angles - self._first_angle
+        k = np.clip(np.ceil(turned / self._turn.angle - 1e-12) - 1, 0, len(self._starts) - 1).astype(np.int64)
+        times = self._starts[k] + self._turn.times_of(np.maximum(turned - k * self._turn.angle, 0.0))
+        return np.where(turned <= 0.0, self.begin, times)
 
     def top(self, t: float) -> int:
         """Number of the tube that the drive head holds at ``t``; 1 before the first joint is closed."""

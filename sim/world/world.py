@@ -60,7 +60,7 @@ class World:
             math.radians(file.rotation.acceleration_dps2),
         )
         s = file.schedule
-        first_angle = float(self._random(Stream.DRIVE, 0).uniform(0.0, 2.0 * math.pi))
+        self.first_angle = float(self._random(Stream.DRIVE, 0).uniform(0.0, 2.0 * math.pi))
         self.begin = s.begin_s
         self.rack = None if file.calibration is None else Rack(file.calibration, self.begin)
         drilling = s.begin_s if self.rack is None else self.rack.end
@@ -73,7 +73,7 @@ class World:
             turn,
             scenario.tubes,
             scenario.tube_length,
-            first_angle,
+            self.first_angle,
             at_start=file.rig.tubes_at_start,
             blocks=s.blocks,
             advance=file.rotation.advance_m,
@@ -89,7 +89,7 @@ class World:
         free_at = (self._made_up - FREE_BEFORE).tolist() if file.joints.head_turn_deg else []
         free_by = self._free_turns.tolist() if file.joints.head_turn_deg else []
         disc_random = self._random(Stream.DISC, 0)
-        self._disc = Disc(self.motion, file.encoder.counts_per_turn, edge_std, disc_random, free_at, free_by)
+        self.disc = Disc(self.motion, file.encoder.counts_per_turn, edge_std, disc_random, free_at, free_by)
         self._check_faults()
         self.radio = self._radio_links()
 
@@ -124,7 +124,7 @@ class World:
 
         A rig of a rigid string, or one that is to ignore its torsion, has no torque (N m): None.
         """
-        count, edge_at, earlier = self._disc.sample(t, self._head_angles.get(t))
+        count, edge_at, earlier = self.disc.sample(t, self._head_angles.get(t))
         if t <= self.motion.begin:
             edge_at = self.begin
         if self.torsion is None or self.scenario.file.node.torsion == "ignore":
@@ -216,14 +216,14 @@ class World:
         Where joints are solved it is the mark of the time when the tube was on top, and what each solution left.
         """
         if self.scenario.file.node.joints == "marks":
-            errors = np.array([self._marks_error(tube, top) for top in range(tube, self.scenario.tubes + 1)])
+            errors = np.array([self.marks_error(tube, top) for top in range(tube, self.scenario.tubes + 1)])
             rigid = errors[np.maximum(self.motion.tops(t), tube) - tube]
         else:
             made_up = max(self.scenario.file.rig.tubes_at_start, tube)
-            rigid = self._marks_error(tube, made_up) - self.unseen(tube, t)
+            rigid = self.marks_error(tube, made_up) - self.unseen(tube, t)
         return np.asarray(rigid if self.torsion is None else rigid + self.torsion.twist(tube, t)[0])
 
-    def _marks_error(self, tube: int, top: int) -> float:
+    def marks_error(self, tube: int, top: int) -> float:
         """What the marks from the head to a tube are wrong by while ``top`` is the top tube, rad."""
         drive_error, lower_error = self._joint_errors
         above = sum(lower_error[k] for k in range(tube + 1, top + 1))
@@ -244,14 +244,19 @@ class World:
 
     def truth(self, tube: int) -> TubeTruth:
         """Perfect sensor of a tube."""
-        drive, _ = self._joint_angles
         a = self.scenario.file.accelerometer
         below = (tube - 1) * self.scenario.tube_length
-        # joints below the head are rigid: a tube keeps for ever the angle it had while it was the top one
-        joint = drive[tube] + self._mounts[tube]
+        joint = self.frame_angle(tube)
         twist = None if self.torsion is None else partial(self.torsion.twist, tube)
         slips = partial(self.unseen, tube) if self.scenario.file.joints.unseen_std_deg else None
         return TubeTruth(self.scenario.hole, self.motion, below, joint, a.radius_m, a.gravity_mps2, twist, slips)
+
+    def frame_angle(self, tube: int) -> float:
+        """Angle (rad) from the head to the IMU's frame of a tube.
+
+        Joints below the head are rigid: a tube keeps for ever the angle it had while it was the top one.
+        """
+        return self._joint_angles[0][tube] + self._mounts[tube]
 
     def unseen(self, tube: int, t: Array) -> Array:
         """What a tube has slipped (rad) by rig times (n,) since its own make-up, at the make-ups of those above."""
@@ -341,7 +346,7 @@ class World:
     @cached_property
     def _head_angles(self) -> dict[float, float]:
         """Angle of the head (rad) at the end of every cycle, by its rig time."""
-        return dict(zip(self.ends.tolist(), self._disc.angles(self.ends).tolist(), strict=True))
+        return dict(zip(self.ends.tolist(), self.disc.angles(self.ends).tolist(), strict=True))
 
     @cached_property
     def _phases(self) -> list[float]:

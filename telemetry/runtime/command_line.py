@@ -22,7 +22,9 @@ R = TypeVar("R")
 
 EXTRA_OF = {
     "cantools": "can",
+    "distributed": "campaign",
     "matplotlib": "ground",
+    "pyarrow": "campaign",
     "rich": "ground",
     "scipy": "ground",
     "smbus2": "board",

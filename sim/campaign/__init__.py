@@ -1,0 +1,1 @@
+"""Campaigns: thousands of runs of one scenario in a compiled loop, over all cores or a cluster, kept as Parquet."""
