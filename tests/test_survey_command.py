@@ -18,9 +18,9 @@ def run(*words: object) -> subprocess.CompletedProcess[str]:
     return subprocess.run(command, capture_output=True, text=True, check=False, timeout=120)
 
 
-def answer(*words: object) -> dict:
+def answer(*words: object, status: int = 0) -> dict:
     done = run(*words, "--json")
-    assert done.returncode == 0, done.stderr
+    assert done.returncode == status, done.stderr
     assert len(done.stdout.splitlines()) == 1
     return json.loads(done.stdout)
 
@@ -137,8 +137,13 @@ def test_unknown_instruments_depths_and_plots_are_refused(tmp_path: Path) -> Non
 
 @pytest.mark.slow
 def test_the_wall_names_its_gap_and_how_to_close_it(tmp_path: Path) -> None:
-    found = answer("wall", WALL, "--plot", tmp_path / "wall.png")
+    found = answer("wall", WALL, "--plot", tmp_path / "wall.png", status=3)
     assert len(found["joints"]) == 39
+    assert found["verdict"] == "not tight"
+    assert [(f["kind"], f["what"]) for f in found["findings"]] == [("thin", "K020-K021")]
+    assert found["probability_of_any"] == pytest.approx(1.0)
+    assert [(row["joint"], row["extra_column"]["closes"]) for row in found["extra_columns"]] == [("K020-K021", True)]
+    assert all(row["state"] == "surveyed to 30 m" for row in found["columns"])
     worst = found["worst"]
     assert worst["joint"] == "K020-K021"
     assert worst["thickness_m"] < 0.8
@@ -147,6 +152,7 @@ def test_the_wall_names_its_gap_and_how_to_close_it(tmp_path: Path) -> None:
     assert worst["extra_column"]["closes"] is True
     assert (tmp_path / "wall.png").read_bytes().startswith(b"\x89PNG")
     people = run("wall", WALL)
+    assert people.returncode == 3
     assert "worst joint K020-K021" in people.stdout
 
 
@@ -179,7 +185,8 @@ def test_a_wall_file_that_cannot_be_is_refused(tmp_path: Path, old: str, new: st
             "line 4: column K001: expected a depth beyond 0 m, got 0 m",
         ),
         ("wall-40-stations.csv", "K001,2.00,", "K099,2.00,", "line 4: column K099 is not among the heads"),
-        ("wall-40-stations.csv", "K001,2.00,0", "K001,2.00,95", "line 4: expected an inclination below 90 deg"),
+        ("wall-40-stations.csv", "K001,2.00,0", "K001,2.00,95", "column K001: at 2 m the hole runs more than 80 deg"),
+        ("wall-40-stations.csv", "K001,2.00,0", "K001,2.00,195", "line 4: expected an inclination of 0..180 deg"),
         ("wall-40-stations.csv", "K001,2.00,", "K001,nan,", "line 4: expected a finite md_m"),
         ("wall-40-heads.csv", "K002,0,", "K001,0,", "line 3: column K001 stands in line 2 already"),
         ("wall-40-heads.csv", "K002,0,", "K002,inf,", "line 3: expected finite north_m and east_m"),
@@ -193,6 +200,41 @@ def test_columns_that_cannot_be_are_refused_with_their_line(
     assert named in refused("wall", tmp_path / WALL.name)
 
 
+@pytest.mark.slow
+def test_a_wall_of_what_is_not_known_names_each_column_and_ends_with_status_three(tmp_path: Path) -> None:
+    """One column short, one missing from the surveys, one unsurveyed below 10 m, one not drilled."""
+    (tmp_path / "heads.csv").write_text(
+        "column,north_m,east_m,state\n"
+        + "".join(f"C{k},0,{0.75 * (k - 1)},{ {7: 'drilled', 9: 'not-drilled'}.get(k, '') }\n" for k in range(1, 11))
+    )
+    depth = {3: 15, 7: 10} | dict.fromkeys((1, 2, 4, 6, 8, 10), 20)
+    rows = [f"C{k},{md},0,0\n" for k, end in sorted(depth.items()) for md in range(0, end + 1, 5)]
+    (tmp_path / "stations.csv").write_text("column,md_m,inclination_deg,azimuth_deg\n" + "".join(rows))
+    wall = tmp_path / "wall.toml"
+    wall.write_text(
+        'radius_m = 0.6\nthickness_m = 0.8\nlength_m = 20\nheads = "heads.csv"\nstations = "stations.csv"\n'
+    )
+    found = answer("wall", wall, "--plot", tmp_path / "wall.png", status=3)
+    assert found["verdict"] == "not tight"
+    assert {(f["kind"], f["what"], f["to_m"]) for f in found["findings"] if f["kind"] in ("missing", "unsurveyed")} == {
+        ("missing", "C3", 20.0),
+        ("missing", "C5", 20.0),
+        ("unsurveyed", "C7", 20.0),
+        ("missing", "C9", 20.0),
+    }
+    assert found["probability_of_any"] == 1.0
+    assert {row["column"]: row["state"] for row in found["columns"] if int(row["column"][1:]) % 2} == {
+        "C1": "surveyed to 20 m",
+        "C3": "surveyed to 15 m",
+        "C5": "no record",
+        "C7": "surveyed to 10 m, drilled to 20 m",
+        "C9": "not drilled",
+    }
+    people = run("wall", wall)
+    assert people.returncode == 3
+    assert all(f"column C{k} " in people.stdout for k in (3, 5, 7, 9))
+
+
 def test_an_instrument_that_errs_only_down_is_a_singular_covariance(tmp_path: Path) -> None:
     (tmp_path / "tape.toml").write_text(
         '[tool]\nname = "tape"\ntitle = "t"\n'
@@ -200,6 +242,13 @@ def test_an_instrument_that_errs_only_down_is_a_singular_covariance(tmp_path: Pa
     )
     wall = changed(tmp_path, WALL.name, 'instrument = "relay"', f'instrument = "{tmp_path / "tape.toml"}"')
     assert "station 1, north and east: the covariance is singular" in refused("wall", wall)
+
+
+def test_what_a_wall_file_names_lies_beside_it(tmp_path: Path) -> None:
+    text = (ROOT / "groundstation" / "survey" / "tools" / "relay.toml").read_text()
+    (tmp_path / "mine.toml").write_text(text.replace('name = "relay"', 'name = "mine"'))
+    wall = changed(tmp_path, WALL.name, 'instrument = "relay"', 'instrument = "mine.toml"')
+    assert {row["instrument"] for row in answer("wall", wall, status=3)["columns"]} == {"mine"}
 
 
 def test_the_bench_lists_itself_and_refuses_others() -> None:
