@@ -81,6 +81,40 @@ def test_depths_between_stations_and_a_collar_that_is_left_out(tmp_path: Path) -
     assert found["at"][0]["tvd_m"] == pytest.approx(3.0)
 
 
+DEEP = "md_m,inclination_deg,azimuth_deg\n500,30,40\n530,32,44\n560,35,50\n"
+
+
+def test_a_file_that_begins_at_500_m_needs_its_beginning(tmp_path: Path) -> None:
+    record, tie = tmp_path / "s.csv", tmp_path / "tie.toml"
+    record.write_text(DEEP)
+    assert "the record begins at 500 m" in refused("survey", record)
+    tie.write_text(
+        "md_m = 500\ninclination_deg = 30\nazimuth_deg = 40\n"
+        "north_m = 90\neast_m = 75\ntvd_m = 470\nsigma_m = [1, 1, 2]\n"
+    )
+    found = answer("survey", record, "--tie-on", tie)
+    first, last = found["stations"][0], found["stations"][-1]
+    assert (first["md_m"], first["north_m"], first["tvd_m"]) == (500.0, 90.0, 470.0)
+    assert last["uncertainty"]["tvd_m"] >= 2.0
+    assert "expected --from-collar or --tie-on, got both" in refused("survey", record, "--tie-on", tie, "--from-collar")
+
+
+def test_every_number_of_an_answer_is_in_the_north_it_names(tmp_path: Path) -> None:
+    site = answer("survey", POTSDAM)
+    true = answer("survey", POTSDAM, "--north-of-site-deg", "10", "--origin", "100", "200", "35")
+    assert (site["north"], true["north"]) == ("site", "true")
+    a, b = site["stations"][-1], true["stations"][-1]
+    c, s = np.cos(np.radians(10.0)), np.sin(np.radians(10.0))
+    turn = np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]])
+    place = turn @ [a["north_m"], a["east_m"], a["tvd_m"]]
+    np.testing.assert_allclose([b["north_m"], b["east_m"], b["tvd_m"]], place, atol=1e-9)
+    assert b["azimuth_deg"] == pytest.approx(a["azimuth_deg"] + 10.0)
+    assert true["closure_azimuth_deg"] == pytest.approx(site["closure_azimuth_deg"] + 10.0)
+    covs = [np.array(row["uncertainty"]["covariance_m2"]) for row in (a, b)]
+    np.testing.assert_allclose(covs[1], turn @ covs[0] @ turn.T, rtol=1e-9, atol=1e-15)
+    assert (b["northing_m"], b["height_m"]) == pytest.approx((100.0 + b["north_m"], 35.0 - b["tvd_m"]))
+
+
 @pytest.mark.slow
 @pytest.mark.parametrize(
     ("content", "named"),

@@ -234,8 +234,7 @@ def _plan(axes: Axes, columns: Columns, found: Joints, bad: npt.NDArray[np.bool_
     corner = (float(middle[1] - half), float(middle[0] - half))
     axes.add_patch(Rectangle(corner, 2.0 * half, 2.0 * half, fc="none", ec=INK, lw=0.8))
     axes.autoscale_view()
-    notes = [*(["coloured: a joint not safe"] if touched else []), *(["dashed: missing"] if missing else [])]
-    note = f" ({'; '.join(notes)})" if notes else ""
+    note = " (dashed: missing)" if missing else (" (coloured: a joint not safe)" if touched else "")
     _frame(axes, f"Plan at {columns.depths[depth]:.1f} m{note}")
 
 
