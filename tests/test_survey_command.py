@@ -99,6 +99,16 @@ def test_a_file_that_begins_at_500_m_needs_its_beginning(tmp_path: Path) -> None
     assert "expected --from-collar or --tie-on, got both" in refused("survey", record, "--tie-on", tie, "--from-collar")
 
 
+def test_stations_are_read_from_standard_input() -> None:
+    command = [sys.executable, "-m", "borechain", "survey", "-", "--json"]
+    text = "MD (ft);Inc (deg);Azi (deg)\n0;0;0\n100;1,5;20\n"
+    done = subprocess.run(command, input=text, capture_output=True, text=True, check=False, timeout=120)
+    assert done.returncode == 0, done.stderr
+    found = json.loads(done.stdout)
+    assert found["read_as"].startswith("read as: MD ft, inclination deg, azimuth deg; separated by ';', decimal comma")
+    assert found["stations"][1]["md_m"] == pytest.approx(30.48)
+
+
 def test_every_number_of_an_answer_is_in_the_north_it_names(tmp_path: Path) -> None:
     site = answer("survey", POTSDAM)
     true = answer("survey", POTSDAM, "--north-of-site-deg", "10", "--origin", "100", "200", "35")
@@ -126,7 +136,10 @@ def test_every_number_of_an_answer_is_in_the_north_it_names(tmp_path: Path) -> N
             "md_m,inclination_deg,azimuth_deg\n0,0,0\n4,190,0\n",
             "line 3: expected an inclination of 0..180 deg, got 190",
         ),
-        ("md_m,inc,azi\n0,0,0\n4,1,0\n", "expected the columns md_m, a_cm, b_cm or md_m, inclination_deg, azimuth_deg"),
+        (
+            "md_m,tilt,heading\n0,0,0\n4,1,0\n",
+            "expected the columns md_m, a_cm, b_cm or md_m, inclination_deg, azimuth_deg",
+        ),
         ("md_m,a_mm,b_mm\n0,0,0\n2,1,0\n", "a_mm is in another unit, expected a_cm"),
         ("md_m,inclination_deg,azimuth_deg\n0,0,0\n", "expected at least two stations"),
         ("", "the file is empty"),

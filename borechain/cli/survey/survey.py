@@ -29,7 +29,7 @@ SOURCES_SHOWN = 12
 
 
 @click.command()
-@click.argument("file", type=click.Path(path_type=Path))
+@click.argument("file", type=click.Path(path_type=Path, allow_dash=True))
 @click.option(
     "--method",
     type=click.Choice(METHODS),
@@ -62,6 +62,7 @@ SOURCES_SHOWN = 12
     help="How lateral displacements become angles.",
 )
 @click.option("--from-collar", is_flag=True, help="Add a vertical station at 0 m, where FILE begins deeper.")
+@click.option("--md-unit", type=click.Choice(["m", "ft"]), help="Unit of a depth whose header does not say; m.")
 @click.option("--md", type=float, multiple=True, help="Also give the position at this depth, m. Repeatable.")
 @click.option(
     "--tie-on",
@@ -133,6 +134,7 @@ def survey(
     azimuth_error_deg: float | None,
     displacement_rule: str,
     from_collar: bool,
+    md_unit: str | None,
     md: tuple[float, ...],
     tie_on: Path | None,
     programme: Path | None,
@@ -154,7 +156,8 @@ def survey(
 ) -> None:
     """Compute trajectory and region of uncertainty of FILE.
 
-    FILE is a CSV of stations (md_m, inclination_deg, azimuth_deg) or of lateral displacements (md_m, a_cm, b_cm).
+    FILE is a table of stations (measured depth, inclination, azimuth, as most programs write them) or of lateral
+    displacements (md_m, a_cm, b_cm); - is standard input. The first line of the answer says how it was read.
 
     \b
     Examples:
@@ -163,17 +166,19 @@ def survey(
     """
     from groundstation.survey.analysis import analyse, with_azimuth_error
     from groundstation.survey.error_sources import Site
+    from groundstation.survey.field_files import read_any
     from groundstation.survey.instruments import load_tool
     from groundstation.survey.methods import Method
     from groundstation.survey.programme import read_programme, read_tie_on
-    from groundstation.survey.records import DisplacementRule, read_record, with_collar
+    from groundstation.survey.records import DisplacementRule, with_collar
 
     check_suffix("--out", out, ".csv")
     check_suffix("--plot", plot, *PLOT_FORMATS)
     check_suffix("--export-tool", export_tool, ".json")
     if plot is not None:
         check_installed("matplotlib")
-    record = read_record(file, DisplacementRule(displacement_rule))
+    understood = read_any(file, DisplacementRule(displacement_rule), md_unit)
+    record = understood.record
     if from_collar:
         record = with_collar(record)
     if from_collar and tie_on is not None:
@@ -196,6 +201,7 @@ def survey(
     rows = station_rows(found, sigma, origin)
     result = {
         "file": str(file),
+        "read_as": understood.line,
         "method": method,
         "instrument": named,
         "north": frame.answer,
@@ -342,6 +348,7 @@ def show(result: dict[str, Any]) -> None:
     from rich.table import Table
 
     paper = console(110)
+    paper.print(result["read_as"], markup=False)
     words = (result["method"], result["instrument"], f"{result['north']} north", f"{result['sigma']:g} sigma")
     table = Table(title=f"{result['file']}: {', '.join(words)}")
     names = ("#", "MD m", "incl deg", "azi deg", "north m", "east m", "TVD m", "DLS deg/30m")
