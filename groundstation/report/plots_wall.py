@@ -180,8 +180,9 @@ def _map(axes: Axes, columns: Columns, found: Joints, required: float, allowed: 
     axes.set_ylim(float(depths[-1]), float(depths[0]))
     step = -(-count // 16)
     axes.set_xticks(range(0, count, step), [joint_name(columns, found, k) for k in range(0, count, step)], rotation=90)
-    notes = ("; crossed: missing" if missing else "") + ("; hatched: not surveyed" if unsurveyed else "")
-    axes.set(ylabel="TVD (m)", title=f"All joints (ring: the worst{notes})")
+    notes = [*(["crossed: missing"] if missing else []), *(["hatched: not surveyed"] if unsurveyed else [])]
+    more = ";\n" + "; ".join(notes) if notes else ""
+    axes.set(ylabel="TVD (m)", title=f"All joints (ring: the worst{more})")
     bar = axes.figure.colorbar(picture, ax=axes, location="bottom", spacing="uniform", label=label, aspect=30, pad=0.02)
     bar.ax.set_xticks(bounds, [f"{b:.2g}" for b in bounds])
 

@@ -245,7 +245,7 @@ def show(result: dict[str, Any]) -> None:
     paper.print(f"[{colour}]{result['wall']}: {result['verdict']}[/]")
     for finding in result["findings"]:
         paper.print(f"  {finding['kind']}: {finding['text']}", markup=False)
-    table = Table(title=f"the {SHOWN} most doubtful of {len(result['joints'])} joints")
+    table = Table(title=f"the {min(SHOWN, len(result['joints']))} most doubtful of {len(result['joints'])} joints")
     for name in ("joint", "state", "depth m", "thickness m", "thinnest at m", "P(too thin)", "apart cm", "towards deg"):
         table.add_column(name, justify="right")
     thin = {row["joint"]: -math.inf if row["thickness_m"] is None else row["thickness_m"] for row in result["joints"]}
