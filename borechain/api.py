@@ -21,8 +21,9 @@ if TYPE_CHECKING:
     from groundstation.calibration.attitudes import Fit
     from groundstation.survey.analysis import Analysis
     from groundstation.survey.error_sources import Site
-    from groundstation.survey.wall import Joints
+    from groundstation.survey.joints import Joints
     from groundstation.survey.wall_file import Wall
+    from groundstation.survey.wall_verdict import Judgement
     from sim.world.scenario import Scenario
 
 __all__ = [
@@ -42,11 +43,12 @@ __all__ = [
 
 @dataclass(frozen=True, slots=True)
 class JudgedWall:
-    """A wall and its joints; ``worst`` is the index of the most doubtful joint and of its depth."""
+    """A wall, its joints and the verdict; ``worst`` is the index of the most doubtful joint and of its depth."""
 
     wall: Wall
     joints: Joints
     worst: tuple[int, int]
+    judgement: Judgement
 
 
 def scenarios() -> list[str]:
@@ -139,19 +141,19 @@ def survey(
 
 
 def wall(file: str | Path) -> JudgedWall:
-    """Every joint of a wall or grid: distance, thickness, probability of less than is required.
+    """Every joint of a wall or grid: distance, thickness, probability of less than is required; and the verdict.
 
     Raises
     ------
     SurveyError
         When the file or one that it names cannot be used.
     """
-    from groundstation.survey.wall import joints, worst
-    from groundstation.survey.wall_file import read_wall
+    from groundstation.survey.joints import worst
+    from groundstation.survey.wall_file import judge_wall, read_wall
 
     found = read_wall(Path(file))
-    judged = joints(found.columns, found.pairs, found.file.radius, found.file.thickness)
-    return JudgedWall(found, judged, worst(judged))
+    judgement = judge_wall(found)
+    return JudgedWall(found, judgement.joints, worst(judgement.joints), judgement)
 
 
 def calibrate_turntable(file: str | Path, reference: float) -> Fit:

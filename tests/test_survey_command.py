@@ -18,9 +18,9 @@ def run(*words: object) -> subprocess.CompletedProcess[str]:
     return subprocess.run(command, capture_output=True, text=True, check=False, timeout=120)
 
 
-def answer(*words: object) -> dict:
+def answer(*words: object, status: int = 0) -> dict:
     done = run(*words, "--json")
-    assert done.returncode == 0, done.stderr
+    assert done.returncode == status, done.stderr
     assert len(done.stdout.splitlines()) == 1
     return json.loads(done.stdout)
 
@@ -81,6 +81,50 @@ def test_depths_between_stations_and_a_collar_that_is_left_out(tmp_path: Path) -
     assert found["at"][0]["tvd_m"] == pytest.approx(3.0)
 
 
+DEEP = "md_m,inclination_deg,azimuth_deg\n500,30,40\n530,32,44\n560,35,50\n"
+
+
+def test_a_file_that_begins_at_500_m_needs_its_beginning(tmp_path: Path) -> None:
+    record, tie = tmp_path / "s.csv", tmp_path / "tie.toml"
+    record.write_text(DEEP)
+    assert "the record begins at 500 m" in refused("survey", record)
+    tie.write_text(
+        "md_m = 500\ninclination_deg = 30\nazimuth_deg = 40\n"
+        "north_m = 90\neast_m = 75\ntvd_m = 470\nsigma_m = [1, 1, 2]\n"
+    )
+    found = answer("survey", record, "--tie-on", tie)
+    first, last = found["stations"][0], found["stations"][-1]
+    assert (first["md_m"], first["north_m"], first["tvd_m"]) == (500.0, 90.0, 470.0)
+    assert last["uncertainty"]["tvd_m"] >= 2.0
+    assert "expected --from-collar or --tie-on, got both" in refused("survey", record, "--tie-on", tie, "--from-collar")
+
+
+def test_stations_are_read_from_standard_input() -> None:
+    command = [sys.executable, "-m", "borechain", "survey", "-", "--json"]
+    text = "MD (ft);Inc (deg);Azi (deg)\n0;0;0\n100;1,5;20\n"
+    done = subprocess.run(command, input=text, capture_output=True, text=True, check=False, timeout=120)
+    assert done.returncode == 0, done.stderr
+    found = json.loads(done.stdout)
+    assert found["read_as"].startswith("read as: MD ft, inclination deg, azimuth deg; separated by ';', decimal comma")
+    assert found["stations"][1]["md_m"] == pytest.approx(30.48)
+
+
+def test_every_number_of_an_answer_is_in_the_north_it_names(tmp_path: Path) -> None:
+    site = answer("survey", POTSDAM)
+    true = answer("survey", POTSDAM, "--north-of-site-deg", "10", "--origin", "100", "200", "35")
+    assert (site["north"], true["north"]) == ("site", "true")
+    a, b = site["stations"][-1], true["stations"][-1]
+    c, s = np.cos(np.radians(10.0)), np.sin(np.radians(10.0))
+    turn = np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]])
+    place = turn @ [a["north_m"], a["east_m"], a["tvd_m"]]
+    np.testing.assert_allclose([b["north_m"], b["east_m"], b["tvd_m"]], place, atol=1e-9)
+    assert b["azimuth_deg"] == pytest.approx(a["azimuth_deg"] + 10.0)
+    assert true["closure_azimuth_deg"] == pytest.approx(site["closure_azimuth_deg"] + 10.0)
+    covs = [np.array(row["uncertainty"]["covariance_m2"]) for row in (a, b)]
+    np.testing.assert_allclose(covs[1], turn @ covs[0] @ turn.T, rtol=1e-9, atol=1e-15)
+    assert (b["northing_m"], b["height_m"]) == pytest.approx((100.0 + b["north_m"], 35.0 - b["tvd_m"]))
+
+
 @pytest.mark.slow
 @pytest.mark.parametrize(
     ("content", "named"),
@@ -92,7 +136,10 @@ def test_depths_between_stations_and_a_collar_that_is_left_out(tmp_path: Path) -
             "md_m,inclination_deg,azimuth_deg\n0,0,0\n4,190,0\n",
             "line 3: expected an inclination of 0..180 deg, got 190",
         ),
-        ("md_m,inc,azi\n0,0,0\n4,1,0\n", "expected the columns md_m, a_cm, b_cm or md_m, inclination_deg, azimuth_deg"),
+        (
+            "md_m,tilt,heading\n0,0,0\n4,1,0\n",
+            "expected the columns md_m, a_cm, b_cm or md_m, inclination_deg, azimuth_deg",
+        ),
         ("md_m,a_mm,b_mm\n0,0,0\n2,1,0\n", "a_mm is in another unit, expected a_cm"),
         ("md_m,inclination_deg,azimuth_deg\n0,0,0\n", "expected at least two stations"),
         ("", "the file is empty"),
@@ -137,8 +184,13 @@ def test_unknown_instruments_depths_and_plots_are_refused(tmp_path: Path) -> Non
 
 @pytest.mark.slow
 def test_the_wall_names_its_gap_and_how_to_close_it(tmp_path: Path) -> None:
-    found = answer("wall", WALL, "--plot", tmp_path / "wall.png")
+    found = answer("wall", WALL, "--plot", tmp_path / "wall.png", status=3)
     assert len(found["joints"]) == 39
+    assert found["verdict"] == "not tight"
+    assert [(f["kind"], f["what"]) for f in found["findings"]] == [("thin", "K020-K021")]
+    assert found["probability_of_any"] == pytest.approx(1.0)
+    assert [(row["joint"], row["extra_column"]["closes"]) for row in found["extra_columns"]] == [("K020-K021", True)]
+    assert all(row["state"] == "surveyed to 30 m" for row in found["columns"])
     worst = found["worst"]
     assert worst["joint"] == "K020-K021"
     assert worst["thickness_m"] < 0.8
@@ -147,6 +199,7 @@ def test_the_wall_names_its_gap_and_how_to_close_it(tmp_path: Path) -> None:
     assert worst["extra_column"]["closes"] is True
     assert (tmp_path / "wall.png").read_bytes().startswith(b"\x89PNG")
     people = run("wall", WALL)
+    assert people.returncode == 3
     assert "worst joint K020-K021" in people.stdout
 
 
@@ -179,7 +232,8 @@ def test_a_wall_file_that_cannot_be_is_refused(tmp_path: Path, old: str, new: st
             "line 4: column K001: expected a depth beyond 0 m, got 0 m",
         ),
         ("wall-40-stations.csv", "K001,2.00,", "K099,2.00,", "line 4: column K099 is not among the heads"),
-        ("wall-40-stations.csv", "K001,2.00,0", "K001,2.00,95", "line 4: expected an inclination below 90 deg"),
+        ("wall-40-stations.csv", "K001,2.00,0", "K001,2.00,95", "column K001: at 2 m the hole runs more than 80 deg"),
+        ("wall-40-stations.csv", "K001,2.00,0", "K001,2.00,195", "line 4: expected an inclination of 0..180 deg"),
         ("wall-40-stations.csv", "K001,2.00,", "K001,nan,", "line 4: expected a finite md_m"),
         ("wall-40-heads.csv", "K002,0,", "K001,0,", "line 3: column K001 stands in line 2 already"),
         ("wall-40-heads.csv", "K002,0,", "K002,inf,", "line 3: expected finite north_m and east_m"),
@@ -193,6 +247,41 @@ def test_columns_that_cannot_be_are_refused_with_their_line(
     assert named in refused("wall", tmp_path / WALL.name)
 
 
+@pytest.mark.slow
+def test_a_wall_of_what_is_not_known_names_each_column_and_ends_with_status_three(tmp_path: Path) -> None:
+    """One column short, one missing from the surveys, one unsurveyed below 10 m, one not drilled."""
+    (tmp_path / "heads.csv").write_text(
+        "column,north_m,east_m,state\n"
+        + "".join(f"C{k},0,{0.75 * (k - 1)},{ {7: 'drilled', 9: 'not-drilled'}.get(k, '') }\n" for k in range(1, 11))
+    )
+    depth = {3: 15, 7: 10} | dict.fromkeys((1, 2, 4, 6, 8, 10), 20)
+    rows = [f"C{k},{md},0,0\n" for k, end in sorted(depth.items()) for md in range(0, end + 1, 5)]
+    (tmp_path / "stations.csv").write_text("column,md_m,inclination_deg,azimuth_deg\n" + "".join(rows))
+    wall = tmp_path / "wall.toml"
+    wall.write_text(
+        'radius_m = 0.6\nthickness_m = 0.8\nlength_m = 20\nheads = "heads.csv"\nstations = "stations.csv"\n'
+    )
+    found = answer("wall", wall, "--plot", tmp_path / "wall.png", status=3)
+    assert found["verdict"] == "not tight"
+    assert {(f["kind"], f["what"], f["to_m"]) for f in found["findings"] if f["kind"] in ("missing", "unsurveyed")} == {
+        ("missing", "C3", 20.0),
+        ("missing", "C5", 20.0),
+        ("unsurveyed", "C7", 20.0),
+        ("missing", "C9", 20.0),
+    }
+    assert found["probability_of_any"] == 1.0
+    assert {row["column"]: row["state"] for row in found["columns"] if int(row["column"][1:]) % 2} == {
+        "C1": "surveyed to 20 m",
+        "C3": "surveyed to 15 m",
+        "C5": "no record",
+        "C7": "surveyed to 10 m, drilled to 20 m",
+        "C9": "not drilled",
+    }
+    people = run("wall", wall)
+    assert people.returncode == 3
+    assert all(f"column C{k} " in people.stdout for k in (3, 5, 7, 9))
+
+
 def test_an_instrument_that_errs_only_down_is_a_singular_covariance(tmp_path: Path) -> None:
     (tmp_path / "tape.toml").write_text(
         '[tool]\nname = "tape"\ntitle = "t"\n'
@@ -200,6 +289,13 @@ def test_an_instrument_that_errs_only_down_is_a_singular_covariance(tmp_path: Pa
     )
     wall = changed(tmp_path, WALL.name, 'instrument = "relay"', f'instrument = "{tmp_path / "tape.toml"}"')
     assert "station 1, north and east: the covariance is singular" in refused("wall", wall)
+
+
+def test_what_a_wall_file_names_lies_beside_it(tmp_path: Path) -> None:
+    text = (ROOT / "groundstation" / "survey" / "tools" / "relay.toml").read_text()
+    (tmp_path / "mine.toml").write_text(text.replace('name = "relay"', 'name = "mine"'))
+    wall = changed(tmp_path, WALL.name, 'instrument = "relay"', 'instrument = "mine.toml"')
+    assert {row["instrument"] for row in answer("wall", wall, status=3)["columns"]} == {"mine"}
 
 
 def test_the_bench_lists_itself_and_refuses_others() -> None:

@@ -12,6 +12,7 @@ import numpy.typing as npt
 from groundstation.calibration.allan import AXES, AllanResult, FilterNoise, Reading
 from groundstation.calibration.allan_fit import Estimate
 from groundstation.calibration.attitudes import Fit
+from groundstation.calibration.coverage import COVERAGE
 from groundstation.calibration.mwd_model import ACCELEROMETER_AXES
 from groundstation.calibration.mwd_solve import Errors, MwdFit
 from groundstation.calibration.quality import QualityReport
@@ -62,6 +63,11 @@ def linear(title: str, fit: Fit, at: AttitudeErrors, matrix_unit: str, facts: Fa
             [(AXES[i], *(number(v, 3) for v in (*std[i], bias_std[i]))) for i in range(3)],
         ),
         Table(
+            f"Expanded uncertainty, {100.0 * COVERAGE:g} %: {number(fit.coverage_factor(), 3)} standard errors",
+            ("reading of", "from x", "from y", "from z", "bias"),
+            [(AXES[i], *(number(fit.coverage_factor() * v, 3) for v in (*std[i], bias_std[i]))) for i in range(3)],
+        ),
+        Table(
             f"Residuals and errors, {at.unit}",
             ("attitude", "residual x", "y", "z", "lever", "error before", "after"),
             list(zip(at.names, *residual, column(fit.levers), column(at.before), column(at.after), strict=True)),
@@ -69,6 +75,7 @@ def linear(title: str, fit: Fit, at: AttitudeErrors, matrix_unit: str, facts: Fa
     )
     ends = (
         ("Residual rms", f"{number(fit.residual_rms(), 4)} {at.unit}"),
+        ("Degrees of freedom", "of known covariances" if fit.degrees is None else f"{fit.degrees} for each axis"),
         ("Design", f"{len(at.names)} attitudes, rank {fit.rank} of 4, condition {number(fit.condition, 4)}"),
     )
     return Sheet(title, (*facts, *ends), tables, warnings if fit.levers[worst] > LONG_LEVER else ())

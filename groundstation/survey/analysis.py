@@ -3,14 +3,17 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 import numpy.typing as npt
 
+from groundstation.errors import SurveyError
 from groundstation.survey.error_model import Uncertainty, propagate
 from groundstation.survey.error_sources import Leg, Site, Survey
 from groundstation.survey.formulas import is_zero
+from groundstation.survey.frames import SAME_DEPTH, Frame, Norths, TieOn
 from groundstation.survey.instruments import Mode, Term, Tool
 from groundstation.survey.methods import Method, closure, dogleg_severity, positions, vertical_section
 from groundstation.survey.records import Record
@@ -27,42 +30,160 @@ RECORD_COLUMNS = {
 
 
 @dataclass(frozen=True, slots=True)
+class Region:
+    """Uncertainty of a survey in the answer's frame, that of its tie-on included."""
+
+    model: Uncertainty  # from true north, of what was surveyed
+    turn: Array  # (3, 3) from true north, east, down
+    tie_cov: Array  # (3, 3) m^2, in the answer's frame
+
+    @property
+    def cov(self) -> Array:
+        """Covariance (n, 3, 3) of every position, m^2."""
+        return self._turned(self.model.cov) + self.tie_cov
+
+    def at(self, md: float) -> Array:
+        """Covariance (3, 3) at any depth of the survey; errors as ``Uncertainty.at``."""
+        return self._turned(self.model.at(md)) + self.tie_cov
+
+    def by_source(self) -> dict[str, Array]:
+        """Covariance (n, 3, 3) by the name of its source; ``tie-on`` is what was there before."""
+        found = {name: self._turned(cov) for name, cov in self.model.by_source().items()}
+        if np.any(self.tie_cov):
+            found["tie-on"] = np.broadcast_to(self.tie_cov, self.model.cov.shape)
+        return found
+
+    def _turned(self, cov: Array) -> Array:
+        return np.asarray(self.turn @ cov @ self.turn.T)
+
+
+@dataclass(frozen=True, slots=True)
 class Analysis:
-    """Positions (n, 3) with what follows from them; m and rad, north east down."""
+    """Positions (n, 3) with what follows from them, all in one frame; m and rad, north east down."""
 
     record: Record
+    frame: Frame
+    azimuth: Array  # (n,) from the answer's north
     positions: Array
-    uncertainty: Uncertainty
+    uncertainty: Region
     dogleg_severity: Array  # (n - 1,) rad/m
     closure_distance: Array
     closure_azimuth: Array
     vertical_section: Array
 
 
-def analyse(record: Record, method: Method, tool: Tool, site: Site, section_azimuth: float = 0.0) -> Analysis:
+@dataclass(frozen=True, slots=True)
+class Stretch:
+    """Part of a survey that one tool took: measured depths from ``top`` on, to ``bottom`` where that is stated."""
+
+    tool: Tool
+    top: float
+    bottom: float | None = None
+
+
+def analyse(
+    record: Record,
+    method: Method,
+    tool: Tool | Sequence[Stretch],
+    site: Site,
+    section_azimuth: float = 0.0,
+    frame: Frame | None = None,
+    tie_on: TieOn | None = None,
+) -> Analysis:
     """Trajectory and uncertainty of a record.
 
-    Tools of the industry's magnetic model come with its allowance for the direction at the surface.
+    Tools of the industry's model come with its allowance for the direction at the surface; a survey that is tied on
+    below has none.
+
+    Parameters
+    ----------
+    tool : one for all, or what surveyed which part
+    site : its declination is that of magnetic north from true north
+    section_azimuth : in the answer's north, rad
+    frame : norths of the record and of the answer; the site's for both by default
+    tie_on : where the record begins, if not at its collar
 
     Raises
     ------
     SurveyError, ToolError
-        When the record is not a survey, or the tool cannot be used on it.
+        When the record is not a survey or begins nowhere, the tie-on contradicts it, parts leave a gap, or a tool
+        cannot be used on it.
     """
-    places = positions(method, record.md, record.inclination, record.azimuth)
+    frame = frame or Frame()
+    if tie_on is not None:
+        tie_on.check(float(record.md[0]), float(record.inclination[0]), float(record.azimuth[0]))
+        record = _tied(record, tie_on)
+    elif record.md[0] != 0.0:
+        raise SurveyError(
+            f"the record begins at {record.md[0]:g} m, so nothing says where that is; "
+            "expected the collar at 0 m first, --from-collar for a vertical one, or --tie-on"
+        )
+    azimuth = frame.to_true(record.azimuth)
+    start = np.zeros(3) if tie_on is None else _turn(-frame.norths.of(frame.record)) @ tie_on.position
+    places = start + positions(method, record.md, record.inclination, azimuth)
     extra = {name: record.columns[c] * f for c, (name, f) in RECORD_COLUMNS.items() if c in record.columns}
-    survey = Survey(record.md, record.inclination, record.azimuth, places[:, 2], extra)
-    found = propagate(survey, [Leg(tool)], site, slot_allowance=tool.slot_allowance)
-    distance, direction = closure(places)
+    survey = Survey(record.md, record.inclination, azimuth, places[:, 2], extra)
+    legs = [Leg(tool)] if isinstance(tool, Tool) else legs_of(tool, record.md)
+    found = propagate(survey, legs, site, slot_allowance=tie_on is None and legs[0].tool.slot_allowance)
+    turned = places @ frame.turn.T
+    distance, direction = closure(turned)
+    tie_cov = np.zeros((3, 3))
+    if tie_on is not None:
+        from_record = frame.turn @ _turn(-frame.norths.of(frame.record))
+        tie_cov = from_record @ tie_on.cov @ from_record.T
     return Analysis(
         record,
-        places,
-        found,
-        dogleg_severity(record.md, record.inclination, record.azimuth),
+        frame,
+        frame.azimuth(azimuth),
+        turned,
+        Region(found, frame.turn, tie_cov),
+        dogleg_severity(record.md, record.inclination, azimuth),
         distance,
         direction,
-        vertical_section(places, section_azimuth),
+        vertical_section(turned, section_azimuth),
     )
+
+
+def _turn(angle: float) -> Array:
+    """Matrix (3, 3) into axes whose north lies at ``angle`` (rad)."""
+    return Frame(answer="site", norths=Norths(site=angle)).turn
+
+
+def _tied(record: Record, tie_on: TieOn) -> Record:
+    """The record from its tie-on down; what else it holds there is that of its first station."""
+    keep = slice(1, None) if record.md[0] <= tie_on.md + SAME_DEPTH else slice(None)
+    parts = ((tie_on.md, record.md), (tie_on.inclination, record.inclination), (tie_on.azimuth, record.azimuth))
+    md, inclination, azimuth = (np.concatenate([[first], values[keep]]) for first, values in parts)
+    columns = {name: np.concatenate([values[:1], values[keep]]) for name, values in record.columns.items()}
+    if len(md) < 2:
+        raise SurveyError(f"tie-on: expected a station below {tie_on.md:g} m, got none")
+    return Record(md, inclination, azimuth, [0, *record.lines[keep]], columns)
+
+
+def legs_of(parts: Sequence[Stretch], md: Array) -> list[Leg]:
+    """Legs of a survey that several tools took; where two overlap, the later one counts.
+
+    Raises
+    ------
+    SurveyError
+        When parts leave stations without a tool, or one surveyed no station.
+    """
+    ordered = sorted(parts, key=lambda part: part.top)
+    owner = np.full(len(md), -1)
+    for k, part in enumerate(ordered):
+        owner[(md >= part.top) & (md <= (np.inf if part.bottom is None else part.bottom))] = k
+    owner[0] = owner[1]  # the first station is where the survey begins, not what it measured
+    lost = np.flatnonzero(owner[1:] < 0)
+    if len(lost):
+        raise SurveyError(
+            f"programme: the station at {md[lost[0] + 1]:g} m lies in no leg; expected legs without a gap"
+        )
+    firsts = [1, *(int(k) + 1 for k in np.flatnonzero(np.diff(owner[1:])) + 1)]
+    unused = sorted(set(range(len(ordered))) - set(owner.tolist()))
+    if unused:
+        part = ordered[unused[0]]
+        raise SurveyError(f"programme: the leg of {part.tool.name} from {part.top:g} m has no station of its own")
+    return [Leg(ordered[owner[first]].tool, first) for first in firsts]
 
 
 def with_azimuth_error(tool: Tool, azimuth_error: float) -> Tool:

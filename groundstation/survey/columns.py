@@ -8,6 +8,8 @@ Source: EN 12716 for the preset of that name; thesis chapter 1 for 0.27 deg. Fra
 from __future__ import annotations
 
 import math
+import re
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -42,17 +44,42 @@ PRESETS = {
 }
 
 
+NUMBER = r"(\d+(?:\.\d+)?)"
+METRES = {"mm": 1e-3, "cm": 1e-2, "m": 1.0}
+# parts of a tolerance: what it adds at the head (m) and a metre of length (m/m)
+PARTS: list[tuple[str, Callable[[tuple[str, ...]], tuple[float, float]]]] = [
+    (rf"{NUMBER} ?(mm|cm|m) at {NUMBER} ?m", lambda g: (0.0, float(g[0]) * METRES[g[1]] / float(g[2]))),
+    (rf"{NUMBER} ?(mm|cm|m)", lambda g: (float(g[0]) * METRES[g[1]], 0.0)),
+    (rf"1 ?: ?{NUMBER}", lambda g: (0.0, 1.0 / float(g[0]))),
+    (rf"{NUMBER} ?%", lambda g: (0.0, float(g[0]) / 100.0)),
+    (rf"{NUMBER} ?deg", lambda g: (0.0, math.tan(math.radians(float(g[0]))))),
+]
+
+
 def tolerance(name: str) -> Tolerance:
-    """Preset by its name.
+    """Preset by its name, or a sum of parts: ``50 mm + 1:200``, ``75 mm at 20 m``, ``1.5 %``, ``0.3 deg``.
 
     Raises
     ------
     SurveyError
-        Names the presets.
+        Names the presets and the forms.
     """
-    if name not in PRESETS:
-        raise SurveyError(f"tolerance: expected one of {', '.join(PRESETS)}, got {name!r}")
-    return PRESETS[name]
+    if name in PRESETS:
+        return PRESETS[name]
+    start = growth = 0.0
+    for part in name.split("+"):
+        for pattern, values in PARTS:
+            match = re.fullmatch(pattern, part.strip())
+            if match is not None and all(float(text) > 0.0 for text in match.groups() if text not in METRES):
+                more = values(match.groups())
+                start, growth = start + more[0], growth + more[1]
+                break
+        else:
+            raise SurveyError(
+                f"tolerance: expected one of {', '.join(PRESETS)}, or a sum like '50 mm + 1:200', '75 mm at 20 m', "
+                f"'1.5 %' or '0.3 deg', got {name!r}"
+            )
+    return Tolerance(name, start, growth)
 
 
 @dataclass(frozen=True, slots=True)

@@ -167,8 +167,3 @@ def closure(position: Array) -> tuple[Array, Array]:
 def vertical_section(position: Array, azimuth: float) -> Array:
     """Horizontal displacement (m) of positions (..., 3) along an azimuth (rad)."""
     return np.asarray(position[..., 0] * math.cos(azimuth) + position[..., 1] * math.sin(azimuth))
-
-
-def referred(azimuth: Array, north_of_site: float) -> Array:
-    """Azimuths from true or grid north in [0, 2 pi); ``north_of_site`` is that of the site frame's north (rad)."""
-    return np.asarray(bearing(azimuth + north_of_site))

@@ -53,7 +53,7 @@ def read_record(path: Path, rule: DisplacementRule = DisplacementRule.EXACT) -> 
     if set(DISPLACEMENTS) <= set(table):
         return _from_displacements(path, table, lines, rule)
     if set(STATIONS) <= set(table):
-        return _from_stations(path, table, lines)
+        return stations_of(path, table, lines)
     header = _cells(path, *_lines(path, DISPLACEMENTS)[0])
     raise SurveyError(
         f"{path}: expected the columns {', '.join(DISPLACEMENTS)} or {', '.join(STATIONS)}, got {', '.join(header)}"
@@ -70,7 +70,7 @@ def read_displacements(path: Path, rule: DisplacementRule = DisplacementRule.EXA
 def read_stations(path: Path) -> Record:
     """Record of stations; errors as ``read_record``."""
     table, lines = read_columns(path, STATIONS)
-    return _from_stations(path, table, lines)
+    return stations_of(path, table, lines)
 
 
 def with_collar(record: Record) -> Record:
@@ -187,7 +187,8 @@ def _check(path: Path, md: Array, lines: list[int]) -> None:
         )
 
 
-def _from_stations(path: Path, table: dict[str, Array], lines: list[int]) -> Record:
+def stations_of(path: Path, table: dict[str, Array], lines: list[int]) -> Record:
+    """Record of the columns ``STATIONS`` and what stands beside them; errors as ``read_record``."""
     for name in STATIONS:
         _finite(path, name, table[name], lines)
     md, inclination_deg, azimuth_deg = (table[name] for name in STATIONS)

@@ -1,16 +1,15 @@
-"""Walls and grids of columns: is there a gap? Thickness of every joint at every depth and its chance to be too thin.
+"""Joint of two columns: how thick it is, and its chance to be thinner than required.
 
-Two columns of radius r whose centres are d apart overlap in a lens; the joint is as thick as the lens is long across
-the line of the centres, t = 2 sqrt(r^2 - d^2/4), so it is thick enough as long as d <= 2 sqrt(r^2 - (t/2)^2). The
-centres are uncertain: d is the length of a Gaussian vector in the plane, and the probability of d beyond that limit is
-integrated along one axis of its covariance, with the tail of the other in closed form.
-Source: thesis chapter 1 for the geometry. Frame: north, east, down; m.
+Two columns of radii r1, r2 whose centres are d apart overlap in a lens. It is as thick as it is long across the line of
+the centres, so it is at least t thick as long as d <= sqrt(r1^2 - t^2/4) + sqrt(r2^2 - t^2/4). Centres and radii are
+uncertain: d is the length of a Gaussian vector in the plane, and the probability of d beyond that limit is integrated
+along one axis of its covariance, with the tail of the other in closed form; radii are integrated over beside it.
+Source: thesis chapter 1 for the geometry. Frame: the plane across the columns; m.
 """
 
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
 
 import numpy as np
 import numpy.typing as npt
@@ -20,14 +19,34 @@ from groundstation.errors import SurveyError
 Array = npt.NDArray[np.float64]
 NODES = 64  # of the quadrature
 REACH = 9.0  # standard deviations that the quadrature covers
-TOE = 0.05  # m, by which a column may be shorter than the depth asked for: its last leg goes on
 SMALLEST_STD = 1e-9  # m, stands for none in the quadrature
+RADIUS_REACH = 8.0  # standard deviations of the radii that are integrated over
+RADIUS_NODES = 16  # of each of three panels
+STEP_WIDTHS = 6.0  # standard deviations of the distance, on either side of where the joint is just thick enough
+SIDEWAYS = ((-math.sqrt(3.0), 1.0 / 6.0), (0.0, 2.0 / 3.0), (math.sqrt(3.0), 1.0 / 6.0))  # Gauss-Hermite
+SMALLEST_LIMIT = 1e-6  # m, stands for radii that never make the joint
 
 
-def thickness(distance: Array, radius: float) -> Array:
-    """Thickness (m) of a joint whose centres are ``distance`` apart; negative where they do not meet: the gap."""
-    half = radius**2 - 0.25 * distance**2
-    return np.where(half > 0.0, 2.0 * np.sqrt(np.maximum(half, 0.0)), 2.0 * radius - distance)
+def thickness(distance: Array, radius: Array | float, other: Array | float | None = None) -> Array:
+    """Thickness (m) of a joint whose centres are ``distance`` apart; negative where they do not meet: the gap.
+
+    ``other`` is the radius of the second column, that of the first by default. A column whose centre lies within the
+    chord of a larger one joins it over its whole diameter.
+    """
+    first, second = np.asarray(radius, float), np.asarray(radius if other is None else other, float)
+    apart = np.maximum(distance, 1e-12)
+    chord = 0.5 * (apart**2 + first**2 - second**2) / apart  # of the first centre from the line of the two cusps
+    half = np.maximum(first**2 - chord**2, 0.0)
+    joined = np.where(apart**2 <= np.abs(first**2 - second**2), 2.0 * np.minimum(first, second), 2.0 * np.sqrt(half))
+    return np.asarray(np.where(distance < first + second, joined, first + second - distance))
+
+
+def limits(radius: Array, other: Array, required: float) -> Array:
+    """Distance (m) at which the joint of two columns is just as thick as required; 0 where they never make such one."""
+    half = 0.25 * required**2
+    first, second = radius**2 - half, other**2 - half
+    found = np.sqrt(np.maximum(first, 0.0)) + np.sqrt(np.maximum(second, 0.0))
+    return np.where((first > 0.0) & (second > 0.0) & (radius > 0.0) & (other > 0.0), found, 0.0)
 
 
 def largest_distance(radius: float, required: float) -> float:
@@ -49,19 +68,21 @@ def margin(radius: float, required: float, spacing: float, length: float) -> tup
     return shift, math.atan2(shift, length)
 
 
-def probability_beyond(mean: Array, cov: Array, limit: float) -> Array:
-    """P(|x| > limit) of Gaussian vectors in the plane: ``mean`` (..., 2), ``cov`` (..., 2, 2).
+def probability_beyond(mean: Array, cov: Array, limit: Array | float) -> Array:
+    """P(|x| > limit) of Gaussian vectors in the plane: ``mean`` (..., 2), ``cov`` (..., 2, 2), ``limit`` (...).
 
     Keeps its relative accuracy for small probabilities: only tails are summed, no probability is taken from one.
     """
     from scipy.special import ndtr
 
+    limit = np.asarray(limit, float)
     values, vectors = np.linalg.eigh(cov)
     std = np.maximum(np.sqrt(np.maximum(values, 0.0)), SMALLEST_STD)
     centre = np.einsum("...ij,...i->...j", vectors, mean)
     # the outer axis (u) is the one along which the chord's end passes the fewest standard deviations of the other: at
     # most about one for each of its own, so that one set of nodes does whatever the shape and the direction
-    steep = np.abs(centre) / np.sqrt(np.maximum(limit**2 - centre**2, std[..., ::-1] ** 2)) * std / std[..., ::-1]
+    free = np.maximum(limit[..., None] ** 2 - centre**2, std[..., ::-1] ** 2)
+    steep = np.abs(centre) / np.sqrt(free) * std / std[..., ::-1]
     narrow = steep[..., 0] <= steep[..., 1]
     u, v = (np.where(narrow, centre[..., k], centre[..., 1 - k]) for k in (0, 1))
     su, sv = (np.where(narrow, std[..., k], std[..., 1 - k]) for k in (0, 1))
@@ -71,134 +92,75 @@ def probability_beyond(mean: Array, cov: Array, limit: float) -> Array:
     # x = limit sin(a) takes away the root at the ends of the circle
     a1, a2 = (np.arcsin(np.clip(x / limit, -1.0, 1.0)) for x in (low, np.maximum(low, high)))
     angle = 0.5 * (a2 - a1)[..., None] * nodes + 0.5 * (a2 + a1)[..., None]
-    x, chord = limit * np.sin(angle), limit * np.cos(angle)
+    x, chord = limit[..., None] * np.sin(angle), limit[..., None] * np.cos(angle)
     density = np.exp(-0.5 * ((x - u[..., None]) / su[..., None]) ** 2) / (su[..., None] * math.sqrt(math.tau))
     tails = ndtr((-chord - v[..., None]) / sv[..., None]) + ndtr((v[..., None] - chord) / sv[..., None])
     inside = np.sum(weights * density * tails * chord, axis=-1) * 0.5 * (a2 - a1)
     return np.asarray(np.clip(outside + inside, 0.0, 1.0))
 
 
-@dataclass(frozen=True, slots=True)
-class Columns:
-    """As-built columns at common depths: (columns, depths, ...)."""
+def probability_thin(mean: Array, cov: Array, radii: Array, radius_cov: Array, required: float) -> Array:
+    """P(joint thinner than required) with uncertain centres and radii.
 
-    names: list[str]
-    depths: Array  # (depths,) m, true vertical
-    centres: Array  # (columns, depths, 2) north, east; nan below the toe of a column
-    covs: Array  # (columns, depths, 2, 2)
-    designs: Array  # (columns, 2) of the heads
-
-
-def at_depths(positions: Array, tangents: Array, covs: Array, depths: Array) -> tuple[Array, Array]:
-    """Centres (w, z, 2) and covariances (w, z, 2, 2) at true vertical depths, of wells (w, n, 3) and (w, n, 3, 3).
-
-    Between stations the centre follows the cubic that has the stations' places and slopes; nan further than ``TOE``
-    above the first or below the last.
-    A depth error moves the centre by the slope of the hole: the covariance is that of the plane at a fixed depth.
+    Parameters
+    ----------
+    mean, cov : (n, 2) and (n, 2, 2), of the second centre against the first, m
+    radii : (n, 2) m
+    radius_cov : (n, 2, 2) m^2, of the two radii; they err independently of the centres
+    required : m
     """
-    tvd = positions[..., 2]
-    slope = tangents[..., :2] / tangents[..., 2:]
-    wells = np.arange(len(tvd))[:, None]
-    k = np.clip(np.sum(tvd[:, None, :] <= depths[None, :, None], axis=-1) - 1, 0, tvd.shape[1] - 2)
-    top, bottom = tvd[wells, k], tvd[wells, k + 1]
-    step = bottom - top
-    f = ((depths - top) / step)[..., None]
-    p0, p1 = positions[wells, k][..., :2], positions[wells, k + 1][..., :2]
-    m0, m1 = slope[wells, k] * step[..., None], slope[wells, k + 1] * step[..., None]
-    centre = p0 + f * (m0 + f * (3.0 * (p1 - p0) - 2.0 * m0 - m1 + f * (2.0 * (p0 - p1) + m0 + m1)))
-    lateral = np.concatenate([np.broadcast_to(np.eye(2), (*slope.shape[:2], 2, 2)), -slope[..., None]], axis=-1)
-    plane = lateral @ covs @ np.swapaxes(lateral, -1, -2)
-    g = f[..., None]
-    cov = (1.0 - g) * plane[wells, k] + g * plane[wells, k + 1]
-    beyond = (depths[None, :] > tvd[:, -1:] + TOE) | (depths[None, :] < tvd[:, :1] - TOE)
-    centre[beyond] = np.nan
-    return centre, cov
+    limit = np.maximum(limits(radii[:, 0], radii[:, 1], required), SMALLEST_LIMIT)
+    found = np.asarray(probability_beyond(mean, cov, limit))
+    uncertain = np.flatnonzero(np.trace(radius_cov, axis1=-2, axis2=-1) > 0.0)
+    if len(uncertain):
+        m, c, r, s = mean[uncertain], cov[uncertain], radii[uncertain], radius_cov[uncertain]
+        found[uncertain] = _over_radii(m, c, r, s, required)
+    return found
 
 
-@dataclass(frozen=True, slots=True)
-class Joints:
-    """Joints between neighbours: (joints, depths)."""
-
-    pairs: npt.NDArray[np.intp]  # (joints, 2)
-    distance: Array
-    thickness: Array
-    probability: Array  # of being thinner than required
-    offset: Array  # (joints, depths, 2) of the second centre from where it should be against the first
-
-
-def joints(columns: Columns, pairs: npt.NDArray[np.intp], radius: float, required: float) -> Joints:
-    """Judge every joint at every depth; columns err independently of each other."""
-    limit = largest_distance(radius, required)
-    a, b = pairs[:, 0], pairs[:, 1]
-    apart = columns.centres[b] - columns.centres[a]
-    cov = columns.covs[a] + columns.covs[b]
-    distance = np.hypot(apart[..., 0], apart[..., 1])
-    known = np.isfinite(distance)
-    probability = np.full(distance.shape, np.nan)
-    probability[known] = probability_beyond(apart[known], cov[known], limit)
-    offset = apart - (columns.designs[b] - columns.designs[a])[:, None, :]
-    return Joints(pairs, distance, thickness(distance, radius), probability, offset)
+def _over_radii(mean: Array, cov: Array, radii: Array, radius_cov: Array, required: float) -> Array:
+    """Integral over the radii: along the direction that changes the limit most, and three nodes across it."""
+    main, across = _directions(radii, radius_cov, required)
+    step, width = _step(mean, cov, radii, main, required)
+    low, high = np.full(len(mean), -RADIUS_REACH), np.full(len(mean), RADIUS_REACH)
+    inner = np.clip(step - STEP_WIDTHS * width, low, high), np.clip(step + STEP_WIDTHS * width, low, high)
+    nodes, weights = np.polynomial.legendre.leggauss(RADIUS_NODES)
+    total = np.zeros(len(mean))
+    for first, last in ((low, inner[0]), (*inner,), (inner[1], high)):
+        half, middle = 0.5 * (last - first), 0.5 * (last + first)
+        for node, weight in zip(nodes, weights, strict=True):
+            t = middle + half * node
+            density = weight * half * np.exp(-0.5 * t**2) / math.sqrt(math.tau)
+            for sideways, share in SIDEWAYS:
+                drawn = radii + t[:, None] * main + sideways * across
+                limit = np.maximum(limits(drawn[:, 0], drawn[:, 1], required), SMALLEST_LIMIT)
+                total += share * density * probability_beyond(mean, cov, limit)
+    return np.clip(total, 0.0, 1.0)
 
 
-def worst_depths(found: Joints) -> npt.NDArray[np.intp]:
-    """Depth (index) of every joint at which it most probably is too thin; of equals the thinnest."""
-    probability = np.where(np.isfinite(found.probability), found.probability, -1.0)
-    thin = np.where(np.isfinite(found.thickness), found.thickness, np.inf)
-    likeliest = probability >= np.max(probability, axis=1, keepdims=True) * (1.0 - 1e-9)
-    return np.asarray(np.argmin(np.where(likeliest, thin, np.inf), axis=1), np.intp)
+def _directions(radii: Array, radius_cov: Array, required: float) -> tuple[Array, Array]:
+    """One standard deviation (n, 2) of the radii along the steepest change of the limit, and what is left across it."""
+    half = 0.25 * required**2
+    gradient = radii / np.sqrt(np.maximum(radii**2 - half, 1e-6 * radii**2))
+    towards = np.einsum("nij,nj->ni", radius_cov, gradient)
+    size = np.sqrt(np.maximum(np.einsum("ni,ni->n", gradient, towards), 1e-300))
+    main = towards / size[:, None]
+    left = radius_cov - main[:, :, None] * main[:, None, :]
+    values, vectors = np.linalg.eigh(left)
+    return main, vectors[:, :, 1] * np.sqrt(np.maximum(values[:, 1:], 0.0))
 
 
-def worst(found: Joints) -> tuple[int, int]:
-    """Joint and depth (indices) that most probably is too thin; of equals the thinnest.
-
-    Raises
-    ------
-    SurveyError
-        When no joint is known at any depth.
-    """
-    if not np.any(np.isfinite(found.thickness)):
-        raise SurveyError("wall: expected two neighbours that reach a common depth, got none")
-    depths = worst_depths(found)
-    joints_ = np.arange(len(depths))
-    best = np.lexsort((found.thickness[joints_, depths], -found.probability[joints_, depths]))[0]
-    return int(best), int(depths[best])
-
-
-@dataclass(frozen=True, slots=True)
-class ExtraColumn:
-    """Where one more column would close a gap, and whether it would."""
-
-    north: float
-    east: float
-    from_depth: float
-    to_depth: float
-    closes: bool
-
-
-def extra_column(columns: Columns, found: Joints, joint: int, radius: float, required: float) -> ExtraColumn | None:
-    """A vertical column midway between two neighbours where their joint is too thin; None if it is so nowhere."""
-    thin = np.flatnonzero(found.thickness[joint] < required)
-    if not len(thin):
-        return None
-    a, b = found.pairs[joint]
-    middle = 0.5 * (columns.centres[a] + columns.centres[b])[thin]
-    north, east = 0.5 * (middle.min(axis=0) + middle.max(axis=0))
-    limit = largest_distance(radius, required)
-    both = np.concatenate([columns.centres[a][thin], columns.centres[b][thin]])
-    reach = float(np.max(np.hypot(both[:, 0] - north, both[:, 1] - east)))
-    depths = columns.depths[thin]
-    return ExtraColumn(float(north), float(east), float(depths[0]), float(depths[-1]), reach <= limit)
-
-
-def neighbours_in_line(count: int, *, closed: bool) -> npt.NDArray[np.intp]:
-    """Pairs (joints, 2) of a wall in its order; a closed one is a shaft."""
-    pairs = np.stack([np.arange(count - 1), np.arange(1, count)], axis=1)
-    return np.concatenate([pairs, [[count - 1, 0]]]) if closed and count > 2 else pairs
-
-
-def neighbours_in_grid(heads: Array, spacing: float) -> npt.NDArray[np.intp]:
-    """Pairs of columns whose heads are within 1.2 spacings of each other."""
-    from scipy.spatial import cKDTree
-
-    pairs = cKDTree(heads).query_pairs(1.2 * spacing, output_type="ndarray")
-    return np.asarray(pairs[np.lexsort((pairs[:, 1], pairs[:, 0]))], np.intp)
+def _step(mean: Array, cov: Array, radii: Array, main: Array, required: float) -> tuple[Array, Array]:
+    """Where along ``main`` (standard deviations) the joint is just thick enough, and how wide that change is."""
+    distance = np.hypot(mean[:, 0], mean[:, 1])
+    low, high = np.full(len(mean), -RADIUS_REACH), np.full(len(mean), RADIUS_REACH)
+    for _ in range(40):
+        t = 0.5 * (low + high)
+        drawn = radii + t[:, None] * main
+        thin = limits(drawn[:, 0], drawn[:, 1], required) < distance
+        low, high = np.where(thin, t, low), np.where(thin, high, t)
+    half = 0.25 * required**2
+    gradient = radii / np.sqrt(np.maximum(radii**2 - half, 1e-6 * radii**2))
+    change = np.maximum(np.einsum("ni,ni->n", gradient, main), 1e-12)
+    std = np.sqrt(np.maximum(np.linalg.eigvalsh(cov)[:, 1], SMALLEST_STD**2))
+    return 0.5 * (low + high), std / change

@@ -1,4 +1,7 @@
-"""A wall as files: what is required of it (TOML), where its columns stand and how they were surveyed (CSV)."""
+"""A wall as files: what is required of it (TOML), where its columns stand and how they were surveyed (CSV).
+
+Every file a wall file names lies beside it. What a column does not say of itself is that of the wall.
+"""
 
 from __future__ import annotations
 
@@ -12,28 +15,34 @@ import numpy as np
 import numpy.typing as npt
 
 from groundstation.errors import SurveyError
-from groundstation.survey.columns import Design, Tolerance, tolerance
-from groundstation.survey.ellipsoid import check_covariance
-from groundstation.survey.error_model import propagate
-from groundstation.survey.error_sources import Leg, Site, Survey
+from groundstation.survey.as_built import Columns
+from groundstation.survey.columns import Tolerance, tolerance
+from groundstation.survey.error_sources import Site
 from groundstation.survey.instruments import Tool, load_tool
-from groundstation.survey.methods import Method, positions, tangents
-from groundstation.survey.records import read_columns
-from groundstation.survey.wall import Columns, at_depths, largest_distance, neighbours_in_grid, neighbours_in_line
+from groundstation.survey.joints import Detour, neighbours_in_grid, neighbours_in_line
+from groundstation.survey.methods import Method
+from groundstation.survey.wall import largest_distance
+from groundstation.survey.wall_columns import Assumptions, BuiltWall, ColumnPlan, Layer, build
+from groundstation.survey.wall_tables import Defaults, Remedy, read_heads, read_holes
+from groundstation.survey.wall_verdict import Judgement, judge
 
-Array = npt.NDArray[np.float64]
 LAYOUTS = ("line", "shaft", "grid")
 NEEDED = ("radius_m", "thickness_m", "heads", "stations")
-KNOWN = {
-    "name": str, "radius_m": float, "thickness_m": float, "heads": str, "stations": str, "layout": str,
-    "spacing_m": float, "length_m": float, "tolerance": str, "instrument": str, "method": str, "depth_step_m": float,
-    "gravity_mps2": float,
+TEXTS = ("name", "heads", "stations", "layout", "tolerance", "instrument", "serial", "method")
+POSITIVE = ("radius_m", "thickness_m", "spacing_m", "length_m", "depth_step_m", "gravity_mps2", "allowed_probability")
+NOT_NEGATIVE = (
+    "radius_cv", "radius_correlation", "head_sigma_m", "unsurveyed_percent", "inclination_deg", "azimuth_deg",
+)  # fmt: skip
+MOST = {
+    "allowed_probability": 0.5, "radius_cv": 0.5, "radius_correlation": 1.0, "unsurveyed_percent": 100.0,
+    "inclination_deg": 180.0, "azimuth_deg": 360.0,
 }  # fmt: skip
+LAYER_KEYS = ("from_m", "radius_m", "radius_cv")
 
 
 @dataclass(frozen=True, slots=True)
 class WallFile:
-    """Requirements of a wall; m."""
+    """Requirements of a wall; m and rad."""
 
     path: Path
     name: str
@@ -42,29 +51,45 @@ class WallFile:
     layout: str
     spacing: float | None
     length: float | None
+    allowed: float  # probability
     tolerance: Tolerance
     tool: Tool
-    method: Method
-    depth_step: float
-    gravity: float
+    serial: str
+    head_std: float
+    inclination: float
+    azimuth: float
+    assumed: Assumptions
     heads: Path
     stations: Path
 
-    def design(self, name: str, head: tuple[float, float], depth: float) -> Design:
-        """Design axis of one column: vertical from its head."""
-        return Design(name, (*head, 0.0), length=self.length or depth, radius=self.radius, tolerance=self.tolerance)
+    @property
+    def defaults(self) -> Defaults:
+        """What columns take that do not say otherwise."""
+        return Defaults(
+            self.radius, self.length, self.inclination, self.azimuth, self.tolerance, self.tool, self.serial,
+            self.head_std, self.path.parent,
+        )  # fmt: skip
 
 
 @dataclass(frozen=True, slots=True)
 class Wall:
-    """A wall as surveyed: columns at common depths, pairs of neighbours, and the toes."""
+    """A wall as surveyed: its columns in planes, pairs of neighbours and the ways by remedial columns."""
 
     file: WallFile
-    columns: Columns
+    plans: list[ColumnPlan]
+    built: BuiltWall
     pairs: npt.NDArray[np.intp]
-    toes: Array  # (columns, 3) against the head, m
-    toe_covs: Array  # (columns, 3, 3)
-    toe_mds: Array  # (columns,)
+    detours: list[Detour]
+
+    @property
+    def columns(self) -> Columns:
+        """The columns in planes across them."""
+        return self.built.columns
+
+    @property
+    def grid_spacing(self) -> float | None:
+        """Spacing (m) of a grid, whose plane must be covered; None for a wall or a shaft."""
+        return self.file.spacing if self.file.layout == "grid" else None
 
 
 def read_wall_file(path: Path) -> WallFile:
@@ -82,26 +107,32 @@ def read_wall_file(path: Path) -> WallFile:
         raise SurveyError(f"{path}: {reason}; expected a wall file") from error
     except tomllib.TOMLDecodeError as error:
         raise SurveyError(f"{path}: not TOML: {error}") from error
+    layers = data.pop("layer", [])
+    known = (*TEXTS, *POSITIVE, *NOT_NEGATIVE)
     for key in data:
-        if key not in KNOWN:
-            raise SurveyError(f"{path}: {key}: unknown key; expected one of {', '.join(KNOWN)}")
+        if key not in known:
+            raise SurveyError(f"{path}: {key}: unknown key; expected one of {', '.join(known)} or tables [[layer]]")
     for key in NEEDED:
         if key not in data:
             raise SurveyError(f"{path}: {key} is missing")
     values: dict[str, Any] = {key: _value(path, key, value) for key, value in data.items()}
-    layout = values.get("layout", "line")
-    if layout not in LAYOUTS:
-        raise SurveyError(f"{path}: layout: expected one of {', '.join(LAYOUTS)}, got {layout!r}")
+    layout = _one_of(path, values, "layout", LAYOUTS, "line")
     if layout == "grid" and "spacing_m" not in values:
         raise SurveyError(f"{path}: spacing_m is missing; a grid needs it to know who is whose neighbour")
-    method = values.get("method", Method.BALANCED_TANGENTIAL.value)
-    if method not in [m.value for m in Method]:
-        raise SurveyError(f"{path}: method: expected one of {', '.join(m.value for m in Method)}, got {method!r}")
+    method = Method(_one_of(path, values, "method", tuple(m.value for m in Method), Method.BALANCED_TANGENTIAL.value))
     try:
         largest_distance(values["radius_m"], values["thickness_m"])
         allowed = tolerance(values.get("tolerance", "en-12716"))
     except SurveyError as error:
         raise SurveyError(f"{path}: {error}") from None
+    assumed = Assumptions(
+        method,
+        Site(gravity=values.get("gravity_mps2", 9.81)),
+        values.get("unsurveyed_percent", 1.0) / 100.0,
+        values.get("depth_step_m", 0.5),
+        _layers(path, layers, values.get("radius_cv", 0.0)),
+        values.get("radius_correlation", 1.0),
+    )
     return WallFile(
         path,
         values.get("name", path.stem),
@@ -110,133 +141,153 @@ def read_wall_file(path: Path) -> WallFile:
         layout,
         values.get("spacing_m"),
         values.get("length_m"),
+        values.get("allowed_probability", 0.01),
         allowed,
-        load_tool(values.get("instrument", "relay")),
-        Method(method),
-        values.get("depth_step_m", 0.5),
-        values.get("gravity_mps2", 9.81),
+        load_tool(beside(path, values.get("instrument", "relay"))),
+        values.get("serial", ""),
+        values.get("head_sigma_m", 0.0),
+        math.radians(values.get("inclination_deg", 0.0)),
+        math.radians(values.get("azimuth_deg", 0.0)),
+        assumed,
         path.parent / values["heads"],
         path.parent / values["stations"],
     )
 
 
+def beside(path: Path, instrument: str) -> str:
+    """An instrument by its name, or the file of that name beside ``path``."""
+    return str(path.parent / instrument) if instrument.endswith((".toml", ".json")) else instrument
+
+
+def _one_of(path: Path, values: dict[str, Any], key: str, names: tuple[str, ...], default: str) -> str:
+    name = str(values.get(key, default))
+    if name not in names:
+        raise SurveyError(f"{path}: {key}: expected one of {', '.join(names)}, got {name!r}")
+    return name
+
+
 def _value(path: Path, key: str, value: Any) -> Any:
-    if KNOWN[key] is str:
+    if key in TEXTS:
         if not isinstance(value, str):
             raise SurveyError(f"{path}: {key}: expected a text, got {value!r:.60}")
         return value
-    if isinstance(value, bool) or not isinstance(value, int | float) or not math.isfinite(value) or value <= 0.0:
-        raise SurveyError(f"{path}: {key}: expected a positive number, got {value!r:.60}")
+    usable = not isinstance(value, bool) and isinstance(value, int | float) and math.isfinite(value)
+    if not usable or value < 0.0 or (key in POSITIVE and value == 0.0):
+        sign = "positive" if key in POSITIVE else "non-negative"
+        raise SurveyError(f"{path}: {key}: expected a {sign} number, got {value!r:.60}")
+    if value > MOST.get(key, math.inf):
+        raise SurveyError(f"{path}: {key}: expected at most {MOST[key]:g}, got {value!r:.60}")
+    return float(value)
+
+
+def _layers(path: Path, tables: Any, radius_cv: float) -> tuple[Layer, ...]:
+    """Radii by depth; above the first layer the radius is that of the wall."""
+    layers = [Layer(-math.inf, None, radius_cv)]
+    if not isinstance(tables, list) or not all(isinstance(table, dict) for table in tables):
+        raise SurveyError(f"{path}: layer: expected tables [[layer]] with {', '.join(LAYER_KEYS)}")
+    for k, table in enumerate(tables, 1):
+        for key in table:
+            if key not in LAYER_KEYS:
+                raise SurveyError(f"{path}: layer {k}: {key}: unknown key; expected one of {', '.join(LAYER_KEYS)}")
+        if "from_m" not in table:
+            raise SurveyError(f"{path}: layer {k}: from_m is missing")
+        given = {key: _layer_value(path, k, key, value) for key, value in table.items()}
+        if given["from_m"] <= layers[-1].top:
+            raise SurveyError(
+                f"{path}: layer {k}: expected from_m beyond {layers[-1].top:g} m, got {given['from_m']:g} m"
+            )
+        layers.append(Layer(given["from_m"], given.get("radius_m"), given.get("radius_cv", radius_cv)))
+    return tuple(layers)
+
+
+def _layer_value(path: Path, k: int, key: str, value: Any) -> float:
+    usable = not isinstance(value, bool) and isinstance(value, int | float) and math.isfinite(value)
+    if not usable or (key != "from_m" and value < 0.0) or (key == "radius_m" and value == 0.0):
+        raise SurveyError(f"{path}: layer {k}: {key}: expected a positive number, got {value!r:.60}")
+    if key == "radius_cv" and value > MOST["radius_cv"]:
+        raise SurveyError(f"{path}: layer {k}: radius_cv: expected at most {MOST['radius_cv']:g}, got {value!r:.60}")
     return float(value)
 
 
 def read_wall(path: Path) -> Wall:
     """The whole wall; errors as ``read_wall_file``, of its CSV files with their line."""
     file = read_wall_file(path)
-    names, heads = _heads(file.heads)
-    groups = _stations(file.stations, names)
-    shape = (len(names), 3)
-    toes, toe_covs, toe_mds = np.zeros(shape), np.zeros((*shape, 3)), np.zeros(len(names))
-    placed = [(m, md, inc, azi, positions(file.method, md, inc, azi)) for m, md, inc, azi in groups]
-    deepest = max(float(np.max(places[:, -1, 2])) for *_, places in placed)
-    depths = np.append(np.arange(0.0, deepest - 1e-3, file.depth_step), deepest)
-    centres = np.full((len(names), len(depths), 2), np.nan)
-    covs = np.full((len(names), len(depths), 2, 2), np.nan)
-    site = Site(gravity=file.gravity)
-    for members, md, inclination, azimuth, places in placed:
-        survey = Survey(md, inclination, azimuth, places[..., 2])
-        cov = propagate(survey, [Leg(file.tool)], site, slot_allowance=file.tool.slot_allowance).cov
-        _check_covariances(file.stations, names, members, cov)
-        centre, plane = at_depths(places, tangents(inclination, azimuth), cov, depths)
-        centres[members], covs[members] = centre + heads[members, None, :], plane
-        toes[members], toe_covs[members], toe_mds[members] = places[:, -1], cov[:, -1], md[:, -1]
-    pairs = (
-        neighbours_in_grid(heads, file.spacing or 0.0)
-        if file.layout == "grid"
-        else neighbours_in_line(len(names), closed=file.layout == "shaft")
+    rows = read_heads(file.heads, file.defaults)
+    names = [row.name for row in rows]
+    holes = read_holes(file.stations, names)
+    length = file.length or max((float(hole.md[-1]) for hole in holes if len(hole.md)), default=0.0)
+    if not length and any(row.length is None for row in rows):
+        raise SurveyError(
+            f"{path}: length_m is missing; no column was surveyed, so nothing says how deep they are to go"
+        )
+    plans = [row.plan(length) for row in rows]
+    try:
+        built = build(plans, holes, file.assumed)
+    except SurveyError as error:
+        raise SurveyError(f"{path}: {error}") from None
+    pairs = _pairs(file, [row.remedy for row in rows], built)
+    detours = _detours(file.heads, names, [row.remedy for row in rows], pairs)
+    _check_design(file, built, pairs)
+    return Wall(file, plans, built, pairs, detours)
+
+
+def judge_wall(wall: Wall) -> Judgement:
+    """Judge a wall by what its file requires."""
+    return judge(
+        wall.columns,
+        wall.pairs,
+        wall.file.thickness,
+        allowed=wall.file.allowed,
+        grid_spacing=wall.grid_spacing,
+        detours=wall.detours,
     )
-    if not len(pairs):
-        raise SurveyError(f"{file.heads}: expected at least two columns next to each other, got {len(names)}")
-    return Wall(file, Columns(names, depths, centres, covs, heads), pairs, toes, toe_covs, toe_mds)
 
 
-def _heads(path: Path) -> tuple[list[str], Array]:
-    table, lines = read_columns(path, ("column", "north_m", "east_m"), texts=("column",))
-    names = [str(name) for name in table["column"]]
-    seen: dict[str, int] = {}
-    for line, name in zip(lines, names, strict=True):
-        if not name:
-            raise SurveyError(f"{path}: line {line}: expected the name of a column")
-        if name in seen:
-            raise SurveyError(f"{path}: line {line}: column {name} stands in line {seen[name]} already")
-        seen[name] = line
-    heads = np.stack([table["north_m"], table["east_m"]], axis=1)
-    wrong = np.flatnonzero(~np.isfinite(heads).all(axis=1))
-    if len(wrong):
-        raise SurveyError(f"{path}: line {lines[wrong[0]]}: expected finite north_m and east_m")
-    return names, heads
+def _pairs(file: WallFile, remedies: list[Remedy], built: BuiltWall) -> npt.NDArray[np.intp]:
+    """Neighbours among the columns of the design; remedial ones stand beside them."""
+    designed = np.array([k for k, remedy in enumerate(remedies) if not remedy.asked], np.intp)
+    heads = built.columns.designs[designed]
+    if file.layout == "grid":
+        found = neighbours_in_grid(heads, file.spacing or 0.0)
+    else:
+        found = neighbours_in_line(len(designed), closed=file.layout == "shaft")
+    if not len(found):
+        raise SurveyError(f"{file.heads}: expected at least two columns next to each other, got {len(designed)}")
+    return designed[found]
 
 
-Group = tuple[npt.NDArray[np.intp], Array, Array, Array]
-
-
-def _stations(path: Path, names: list[str]) -> list[Group]:
-    """Columns with as many stations each as one group: their indices, md, inclination and azimuth (w, n)."""
-    needed = ("column", "md_m", "inclination_deg", "azimuth_deg")
-    table, lines = read_columns(path, needed, texts=("column",))
-    if not lines:
-        raise SurveyError(f"{path}: expected stations, the file has none")
+def _detours(path: Path, names: list[str], remedies: list[Remedy], pairs: npt.NDArray[np.intp]) -> list[Detour]:
+    """Joints that a remedial column stands in for."""
+    found = []
     index = {name: k for k, name in enumerate(names)}
-    owner = np.array([index.get(str(name), -1) for name in table["column"]])
-    unknown = np.flatnonzero(owner < 0)
-    if len(unknown):
-        k = int(unknown[0])
-        raise SurveyError(f"{path}: line {lines[k]}: column {table['column'][k]} is not among the heads")
-    order = np.argsort(owner, kind="stable")
-    owner, md, inc, azi = owner[order], *(table[name][order] for name in needed[1:])
-    line = np.array(lines)[order]
-    _check_values(path, line, md, inc, azi)
-    counts = np.bincount(owner, minlength=len(names))
-    short = np.flatnonzero(counts < 2)
-    if len(short):
-        raise SurveyError(f"{path}: column {names[short[0]]}: expected at least two stations, got {counts[short[0]]}")
-    starts = np.concatenate([[0], np.cumsum(counts)[:-1]])
-    same = np.ones(len(md), bool)
-    same[starts] = False
-    back = np.flatnonzero(same[1:] & ~(np.diff(md) > 0.0)) + 1
-    if len(back):
-        k = int(back[0])
+    for extra, remedy in enumerate(remedies):
+        for name in remedy.named:
+            if name not in index:
+                raise SurveyError(f"{path}: column {names[extra]}: column {name} is not among the heads")
+        if remedy.between:
+            a, b = (index[name] for name in remedy.between)
+            joints = [j for j, pair in enumerate(pairs.tolist()) if set(pair) == {a, b}]
+            if not joints:
+                raise SurveyError(f"{path}: column {names[extra]}: {'/'.join(remedy.between)} is no joint of this wall")
+            found.append(Detour(joints[0], np.array([[a, extra], [extra, b]], np.intp)))
+        if remedy.replaces:
+            gone = index[remedy.replaces]
+            for j, (a, b) in enumerate(pairs.tolist()):
+                if gone in (a, b):
+                    pair = [extra, b] if a == gone else [a, extra]
+                    found.append(Detour(j, np.array([pair], np.intp)))
+    return found
+
+
+def _check_design(file: WallFile, built: BuiltWall, pairs: npt.NDArray[np.intp]) -> None:
+    """Refuse a wall none of whose joints could ever be thick enough, built exactly as designed."""
+    columns = built.columns
+    a, b = pairs[:, 0], pairs[:, 1]
+    apart = columns.planned[b] - columns.planned[a]
+    distance = np.hypot(apart[..., 0], apart[..., 1])
+    limit = largest_distance(float(np.max(columns.radii)), file.thickness)
+    if float(np.min(distance)) > limit:
         raise SurveyError(
-            f"{path}: line {line[k]}: column {names[owner[k]]}: "
-            f"expected a depth beyond {md[k - 1]:g} m, got {md[k]:g} m"
+            f"{file.path}: the design cannot be met anywhere: its nearest columns are {np.min(distance):.3f} m apart, "
+            f"a joint of {file.thickness:g} m needs {limit:.3f} m or less"
         )
-    off = np.flatnonzero(md[starts] != 0.0)
-    if len(off):
-        k = int(starts[off[0]])
-        raise SurveyError(
-            f"{path}: line {line[k]}: column {names[off[0]]}: expected the head at 0 m first, got {md[k]:g}"
-        )
-    groups = []
-    for count in np.unique(counts):
-        members = np.flatnonzero(counts == count)
-        rows = starts[members][:, None] + np.arange(count)
-        groups.append((members, md[rows], np.radians(inc[rows]), np.radians(azi[rows])))
-    return groups
-
-
-def _check_values(path: Path, line: Array, md: Array, inclination_deg: Array, azimuth_deg: Array) -> None:
-    for name, values, good in (
-        ("a finite md_m", md, np.isfinite(md)),
-        ("an inclination below 90 deg", inclination_deg, (inclination_deg >= 0.0) & (inclination_deg < 90.0)),
-        ("a finite azimuth_deg", azimuth_deg, np.isfinite(azimuth_deg)),
-    ):
-        wrong = np.flatnonzero(~good)
-        if len(wrong):
-            raise SurveyError(f"{path}: line {line[wrong[0]]}: expected {name}, got {values[wrong[0]]:g}")
-
-
-def _check_covariances(path: Path, names: list[str], members: npt.NDArray[np.intp], cov: Array) -> None:
-    smallest = np.linalg.eigvalsh(cov[:, 1:, :2, :2])[..., 0]
-    for well, station in np.argwhere(~(smallest > 0.0))[:1]:
-        where = f"{path}: column {names[members[well]]}, station {station + 1}, north and east"
-        check_covariance(cov[well, station + 1, :2, :2], where)

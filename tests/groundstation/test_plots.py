@@ -2,34 +2,30 @@
 
 import re
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import matplotlib
 import numpy as np
 import pytest
 from matplotlib.axes import Axes
+from matplotlib.colors import to_rgba
 from matplotlib.figure import Figure
 
 from groundstation.errors import SurveyError
 from groundstation.report import plots, plots_wall, style
 from groundstation.report.plots_wall import band_of_thickness, joint_name, ranking
+from groundstation.survey.as_built import Columns, State
 from groundstation.survey.columns import PRESETS, Design
 from groundstation.survey.error_model import propagate
 from groundstation.survey.error_sources import Leg, Site, Survey
 from groundstation.survey.fusion import POWERS, sequence_weights
 from groundstation.survey.instruments import load_tool
+from groundstation.survey.joints import Joints, extra_column, joints, neighbours_in_line, worst
 from groundstation.survey.methods import Method, positions
 from groundstation.survey.records import DisplacementRule, read_record
-from groundstation.survey.wall import (
-    Columns,
-    Joints,
-    extra_column,
-    joints,
-    neighbours_in_line,
-    probability_beyond,
-    thickness,
-    worst,
-)
+from groundstation.survey.wall import probability_beyond, thickness
 from sim.studies.coverage.figure import coverage_figure
 from sim.studies.region_of_uncertainty.figure import azimuth_error_figure, uncertainty_figure
 from sim.studies.weighting.figure import weighting_figure
@@ -110,26 +106,28 @@ def coverage_of() -> Figure:
     return coverage_figure(claimed, observed, 500, "Coverage of the regions")
 
 
-def made_wall(count: int = 12, lean: float = 0.35, spread: float = 0.02) -> tuple[Columns, Joints]:
-    """A wall to the east, 0.75 m apart; column 6 goes astray and column 3 ends at half depth."""
+def made_wall(
+    count: int = 12, lean: float = 0.35, spread: float = 0.02, short: int | None = None
+) -> tuple[Columns, Joints]:
+    """A wall to the east, 0.75 m apart; column 6 goes astray and ``short`` ends at 18 m."""
     depths = np.arange(0.0, 30.1, 0.5)
     rng = np.random.default_rng(7)
     heads = np.stack([np.zeros(count), 0.75 * np.arange(count)], axis=-1)
     leans = rng.normal(0.0, 0.05, (count, 2)) / 30.0
     leans[6] += np.array([0.1, lean]) / 30.0
     centres = heads[:, None] + leans[:, None] * depths[:, None]
-    centres[3, depths > 18.0] = np.nan
+    if short is not None:
+        centres[short, depths > 18.0] = np.nan
     covs = np.einsum("z,ij->zij", (0.003 + spread * depths / 30.0) ** 2, np.diag([1.0, 1.5]))
-    columns = Columns(
-        [f"P{k + 1:02d}" for k in range(count)], depths, centres, np.broadcast_to(covs, (count, *covs.shape)), heads
-    )
-    return columns, joints(columns, neighbours_in_line(count, closed=False), 0.6, 0.8)
+    names = [f"P{k + 1:02d}" for k in range(count)]
+    columns = Columns.surveyed(names, depths, centres, np.broadcast_to(covs, (count, *covs.shape)), heads, 0.6)
+    return columns, joints(columns, neighbours_in_line(count, closed=False), 0.8)
 
 
-def wall_of(shade: str = "probability", **wall: float) -> Figure:
+def wall_of(shade: str = "probability", **wall: Any) -> Figure:
     columns, found = made_wall(**wall)
-    extra = extra_column(columns, found, worst(found)[0], 0.6, 0.8)
-    return plots_wall.wall_figure(columns, found, 0.6, 0.8, extra, "Wall A", shade=shade)
+    extra = extra_column(columns, found, worst(found)[0], 0.8)
+    return plots_wall.wall_figure(columns, found, 0.8, extra, "Wall A", shade=shade)
 
 
 BUILDERS: dict[str, Callable[[Survey], Figure]] = {
@@ -141,6 +139,7 @@ BUILDERS: dict[str, Callable[[Survey], Figure]] = {
     "coverage": lambda _: coverage_of(),
     "wall": lambda _: wall_of(),
     "wall_thickness": lambda _: wall_of("thickness"),
+    "wall_short": lambda _: wall_of(short=3),
     "wall_good": lambda _: wall_of(lean=0.0, spread=0.008),
 }
 
@@ -340,10 +339,35 @@ def test_wall_figure_shows_the_worst_joint_its_columns_and_the_extra_one() -> No
     assert over_depth.lines[0].get_color() == style.WRONG
     ring = drawn(shades, "worst")[0]
     assert (ring.get_xdata()[0], ring.get_ydata()[0]) == (joint, columns.depths[depth])
-    assert len(drawn(plan, "column")) == 11  # the short one is not there at 30 m
+    assert len(drawn(plan, "column")) == 12
     assert len(drawn(zoom, "column")) == len(drawn(zoom, "ellipse")) >= 2
     assert len(drawn(zoom, "extra")) == 1
-    assert "hatched: not drilled" in shades.get_title("left")
+
+
+@pytest.mark.parametrize("shade", ["probability", "thickness"])
+def test_what_is_missing_is_red_in_every_panel(shade: str) -> None:
+    columns, found = made_wall(lean=0.0, spread=0.0, short=3)
+    joint, depth = worst(found)
+    assert (joint_name(columns, found, joint), columns.depths[depth]) == ("P03–P04", 18.5)
+    _, shades, plan, zoom = wall_of(shade, lean=0.0, spread=0.0, short=3).axes[:4]
+    assert "crossed: missing" in shades.get_title("left")
+    cells = drawn(shades, "missing")
+    assert [(cell.get_x(), cell.get_width()) for cell in cells] == [(1.5, 1.0), (2.5, 1.0)]
+    assert all(cell.get_facecolor() == to_rgba(style.WRONG) for cell in cells)
+    assert all(cell.get_y() + cell.get_height() == 30.0 for cell in cells)
+    assert len(drawn(plan, "missing")) == len(drawn(zoom, "missing")) == 1
+    assert "column missing" in zoom.get_title("left")
+
+
+def test_what_is_not_surveyed_is_hatched() -> None:
+    columns, _ = made_wall(lean=0.0, spread=0.0)
+    states = columns.states.copy()
+    states[5, columns.depths > 20.0] = State.UNSURVEYED
+    columns = replace(columns, states=states)
+    found = joints(columns, neighbours_in_line(12, closed=False), 0.8)
+    shades = plots_wall.wall_figure(columns, found, 0.8, None, "Wall A").axes[1]
+    assert len(drawn(shades, "unsurveyed")) == 2
+    assert "hatched: not surveyed" in shades.get_title("left")
 
 
 def test_a_good_wall_is_grey() -> None:
@@ -372,9 +396,9 @@ def test_band_of_thickness_holds_its_share_of_sampled_walls() -> None:
 def test_wall_figure_refuses_options_that_are_none() -> None:
     columns, found = made_wall()
     with pytest.raises(SurveyError, match="probability, thickness"):
-        plots_wall.wall_figure(columns, found, 0.6, 0.8, None, "x", shade="colour")
+        plots_wall.wall_figure(columns, found, 0.8, None, "x", shade="colour")
     with pytest.raises(SurveyError, match="allowed in"):
-        plots_wall.wall_figure(columns, found, 0.6, 0.8, None, "x", allowed=0.7)
+        plots_wall.wall_figure(columns, found, 0.8, None, "x", allowed=0.7)
 
 
 def test_survey_figure_refuses_arrays_that_do_not_fit() -> None:

@@ -26,9 +26,8 @@ UNITS = {  # SI of one unit of the file, and whose unit it is
     "g": (STANDARD_GRAVITY, "accelerometer"),
     "m/s2": (1.0, "accelerometer"),
 }
-temperature_option = click.option(
-    "--temperature-c", type=float, default=25.0, show_default=True, help="Temperature of the record."
-)
+NOMINAL_C = 25.0  # of a block without temperature terms, which no reading depends on
+temperature_option = click.option("--temperature-c", type=float, help="Temperature of the record, if it was measured.")
 
 
 @dataclass(frozen=True, slots=True)
@@ -61,7 +60,9 @@ class Linear:
 @full_scale_option
 @plain_faults
 @output_options
-def turntable(file: Path, day: str, reference: float, unit: str, temperature_c: float, full_scale: float) -> Outcome:
+def turntable(
+    file: Path, day: str, reference: float, unit: str, temperature_c: float | None, full_scale: float
+) -> Outcome:
     """Matrix and bias of a triad from a turn-table record: a row per axis turned, two columns per sensor axis.
 
     \b
@@ -106,7 +107,7 @@ def turntable(file: Path, day: str, reference: float, unit: str, temperature_c: 
 @full_scale_option
 @plain_faults
 @output_options
-def attitudes(file: Path, day: str, free_yaw: Path | None, temperature_c: float, full_scale: float) -> Outcome:
+def attitudes(file: Path, day: str, free_yaw: Path | None, temperature_c: float | None, full_scale: float) -> Outcome:
     """Matrix (m/s2 per g) and bias (m/s2) of an accelerometer from mean readings at preset pitch and roll.
 
     \b
@@ -144,13 +145,15 @@ def attitudes(file: Path, day: str, free_yaw: Path | None, temperature_c: float,
     return outcome(job, day, temperature_c, extra)
 
 
-def outcome(job: Linear, day: str, temperature_c: float, extra: dict[str, Any]) -> Outcome:
+def outcome(job: Linear, day: str, temperature_c: float | None, extra: dict[str, Any]) -> Outcome:
     """Block, JSON, sheet and figures of a matrix and a bias."""
     from groundstation.calibration.block import to_json
+    from groundstation.calibration.coverage import COVERAGE
     from groundstation.report.calibration_sheets import linear
 
     fit, at, calibration = job.fit, errors_of(job), block(job, day, temperature_c)
-    facts = [("Method", job.design), ("Temperature", f"{temperature_c:g} \N{DEGREE SIGN}C")]
+    warmth = "not stated" if temperature_c is None else f"{temperature_c:g} \N{DEGREE SIGN}C"
+    facts, factor = [("Method", job.design), ("Temperature", warmth)], fit.coverage_factor()
     if "yaw_deg" in extra:
         facts.append(("Yaw of the rig", f"{extra['yaw_deg']:.4f} deg, standard error {extra['yaw_std_deg']:.4f} deg"))
     sheet = linear(f"Calibration of {job.sensor}", fit, at, job.matrix_unit, facts)
@@ -161,6 +164,13 @@ def outcome(job: Linear, day: str, temperature_c: float, extra: dict[str, Any]) 
         "matrix": fit.matrix.tolist(),
         "bias": fit.bias.tolist(),
         "standard_errors": {"matrix": fit.matrix_std().tolist(), "bias": fit.bias_std().tolist()},
+        "degrees_of_freedom": fit.degrees,
+        "coverage": COVERAGE,
+        "coverage_factor": factor,
+        "expanded_uncertainty": {
+            "matrix": (factor * fit.matrix_std()).tolist(),
+            "bias": (factor * fit.bias_std()).tolist(),
+        },
         "residual_rms": fit.residual_rms(),
         "attitudes": [
             {"name": name, "residual": residual, "lever": lever}
@@ -200,7 +210,7 @@ def errors_of(job: Linear) -> AttitudeErrors:
     return AttitudeErrors(job.names, job.unit.replace("s2", "s\N{SUPERSCRIPT TWO}"), before, after)
 
 
-def block(job: Linear, day: str, temperature_c: float) -> Calibration:
+def block(job: Linear, day: str, temperature_c: float | None) -> Calibration:
     """The parameters in SI with their provenance, as a node takes them."""
     import numpy as np
 
@@ -223,6 +233,6 @@ def block(job: Linear, day: str, temperature_c: float) -> Calibration:
         bias=job.reading_si * fit.bias,
         matrix_slopes=none[0],
         bias_slopes=none[1],
-        reference=temperature_c,
+        reference=NOMINAL_C if temperature_c is None else temperature_c,
         provenance=provenance,
     )

@@ -20,14 +20,16 @@ from telemetry.runtime.command_line import check_installed
 
 if TYPE_CHECKING:
     from groundstation.survey.analysis import Analysis
+    from groundstation.survey.frames import Frame
     from groundstation.survey.instruments import Tool
 
+NORTHS = ("site", "true", "grid", "magnetic")
 METHODS = ("tangential", "balanced-tangential", "average-angle", "radius-of-curvature", "minimum-curvature")
 SOURCES_SHOWN = 12
 
 
 @click.command()
-@click.argument("file", type=click.Path(path_type=Path))
+@click.argument("file", type=click.Path(path_type=Path, allow_dash=True))
 @click.option(
     "--method",
     type=click.Choice(METHODS),
@@ -60,9 +62,42 @@ SOURCES_SHOWN = 12
     help="How lateral displacements become angles.",
 )
 @click.option("--from-collar", is_flag=True, help="Add a vertical station at 0 m, where FILE begins deeper.")
+@click.option("--md-unit", type=click.Choice(["m", "ft"]), help="Unit of a depth whose header does not say; m.")
 @click.option("--md", type=float, multiple=True, help="Also give the position at this depth, m. Repeatable.")
 @click.option(
-    "--north-of-site-deg", type=float, default=0.0, help="Azimuth of the site's north from true or grid north."
+    "--tie-on",
+    type=click.Path(path_type=Path),
+    metavar="FILE",
+    help="Where the survey begins, if not at its collar: depth, direction, position and their uncertainty, .toml.",
+)
+@click.option(
+    "--programme",
+    type=click.Path(path_type=Path),
+    metavar="FILE",
+    help="Which instrument surveyed which depths, .toml; in place of --instrument.",
+)
+@click.option(
+    "--north",
+    type=click.Choice(NORTHS),
+    default="site",
+    show_default=True,
+    help="North that the azimuths of FILE count from.",
+)
+@click.option(
+    "--answer-north",
+    type=click.Choice(NORTHS),
+    help="North of the whole answer; by default that of FILE, or true north with --north-of-site-deg.",
+)
+@click.option("--north-of-site-deg", type=float, help="Azimuth of the site's north from true north.")
+@click.option(
+    "--convergence-deg", type=float, default=0.0, show_default=True, help="Azimuth of grid north from true north."
+)
+@click.option(
+    "--origin",
+    type=float,
+    nargs=3,
+    metavar="NORTHING EASTING HEIGHT",
+    help="Site coordinates of the point where positions are zero, m; adds those of every station.",
 )
 @click.option(
     "--section-azimuth-deg", type=float, default=0.0, show_default=True, help="Azimuth of the vertical section."
@@ -77,7 +112,7 @@ SOURCES_SHOWN = 12
 )
 @click.option("--dip-deg", type=float, default=70.0, show_default=True, help="Dip of the magnetic field.")
 @click.option(
-    "--declination-deg", type=float, default=0.0, show_default=True, help="Magnetic declination from site north."
+    "--declination-deg", type=float, default=0.0, show_default=True, help="Azimuth of magnetic north from true north."
 )
 @click.option("--latitude-deg", type=float, default=52.0, show_default=True, help="Latitude, for gyroscopes.")
 @click.option("--out", type=click.Path(path_type=Path, dir_okay=False), help="Station table, a .csv file.")
@@ -99,8 +134,15 @@ def survey(
     azimuth_error_deg: float | None,
     displacement_rule: str,
     from_collar: bool,
+    md_unit: str | None,
     md: tuple[float, ...],
-    north_of_site_deg: float,
+    tie_on: Path | None,
+    programme: Path | None,
+    north: str,
+    answer_north: str | None,
+    north_of_site_deg: float | None,
+    convergence_deg: float,
+    origin: tuple[float, float, float] | None,
     section_azimuth_deg: float,
     gravity: float,
     field_nt: float,
@@ -114,7 +156,8 @@ def survey(
 ) -> None:
     """Compute trajectory and region of uncertainty of FILE.
 
-    FILE is a CSV of stations (md_m, inclination_deg, azimuth_deg) or of lateral displacements (md_m, a_cm, b_cm).
+    FILE is a table of stations (measured depth, inclination, azimuth, as most programs write them) or of lateral
+    displacements (md_m, a_cm, b_cm); - is standard input. The first line of the answer says how it was read.
 
     \b
     Examples:
@@ -123,31 +166,46 @@ def survey(
     """
     from groundstation.survey.analysis import analyse, with_azimuth_error
     from groundstation.survey.error_sources import Site
+    from groundstation.survey.field_files import read_any
     from groundstation.survey.instruments import load_tool
     from groundstation.survey.methods import Method
-    from groundstation.survey.records import DisplacementRule, read_record, with_collar
+    from groundstation.survey.programme import read_programme, read_tie_on
+    from groundstation.survey.records import DisplacementRule, with_collar
 
     check_suffix("--out", out, ".csv")
     check_suffix("--plot", plot, *PLOT_FORMATS)
     check_suffix("--export-tool", export_tool, ".json")
     if plot is not None:
         check_installed("matplotlib")
-    record = read_record(file, DisplacementRule(displacement_rule))
+    understood = read_any(file, DisplacementRule(displacement_rule), md_unit)
+    record = understood.record
     if from_collar:
         record = with_collar(record)
+    if from_collar and tie_on is not None:
+        raise InputFault("expected --from-collar or --tie-on, got both")
+    if programme is not None and (azimuth_error_deg is not None or export_tool is not None):
+        raise InputFault("--programme: expected neither --azimuth-error-deg nor --export-tool beside it")
     tool = load_tool(instrument)
     if azimuth_error_deg is not None:
         tool = with_azimuth_error(tool, math.radians(azimuth_error_deg))
+    legs = [] if programme is None else read_programme(programme)
+    named = ", ".join(f"{leg.tool.name} from {leg.top:g} m" for leg in legs) or tool.name
+    frame = frame_of(north, answer_north, north_of_site_deg, convergence_deg, declination_deg)
+    tied = None if tie_on is None else read_tie_on(tie_on)
     site = Site(gravity, field_nt, math.radians(dip_deg), math.radians(declination_deg), math.radians(latitude_deg))
-    outside = [depth for depth in md if not record.md[0] <= depth <= record.md[-1]]
+    found = analyse(record, Method(method), legs or tool, site, math.radians(section_azimuth_deg), frame, tied)
+    mds = found.record.md
+    outside = [depth for depth in md if not mds[0] <= depth <= mds[-1]]
     if outside:
-        raise InputFault(f"--md {outside[0]:g}: expected a depth of {record.md[0]:g}..{record.md[-1]:g} m")
-    found = analyse(record, Method(method), tool, site, math.radians(section_azimuth_deg))
-    rows = station_rows(found, sigma, north_of_site_deg)
+        raise InputFault(f"--md {outside[0]:g}: expected a depth of {mds[0]:g}..{mds[-1]:g} m")
+    rows = station_rows(found, sigma, origin)
     result = {
         "file": str(file),
+        "read_as": understood.line,
         "method": method,
-        "instrument": tool.name,
+        "instrument": named,
+        "north": frame.answer,
+        "origin_m": None if origin is None else list(origin),
         "sigma": sigma,
         "stations": rows,
         "at": [at_depth(found, depth, sigma) for depth in md],
@@ -158,7 +216,7 @@ def survey(
     if out is not None:
         write_whole(out, table_text(rows))
     if plot is not None:
-        draw(found, tool, sigma, str(file), plot)
+        draw(found, named, sigma, str(file), plot)
     if export_tool is not None:
         export(tool, export_tool)
     if as_json:
@@ -167,12 +225,23 @@ def survey(
         show(result)
 
 
-def station_rows(found: Analysis, sigma: float, north_of_site_deg: float) -> list[dict[str, Any]]:
-    """One object a station; uncertainty at ``sigma`` standard deviations."""
-    from groundstation.survey.methods import referred
+def frame_of(
+    north: str, answer: str | None, north_of_site_deg: float | None, convergence_deg: float, declination_deg: float
+) -> Frame:
+    """Norths of the record and of the answer."""
+    from groundstation.survey.frames import Frame, Norths
 
-    azimuths = referred(found.record.azimuth, math.radians(north_of_site_deg))
-    rows = []
+    angles = (math.radians(angle) for angle in (north_of_site_deg or 0.0, convergence_deg, declination_deg))
+    if answer is None:
+        answer = north if north_of_site_deg is None else "true"
+    return Frame(north, answer, Norths(*angles))
+
+
+def station_rows(
+    found: Analysis, sigma: float, origin: tuple[float, float, float] | None = None
+) -> list[dict[str, Any]]:
+    """One object a station; uncertainty at ``sigma`` standard deviations, site coordinates from ``origin``."""
+    covs, rows = found.uncertainty.cov, []
     for k, md in enumerate(found.record.md.tolist()):
         north, east, tvd = found.positions[k].tolist()
         severity = 0.0 if k == 0 else float(found.dogleg_severity[k - 1])
@@ -181,15 +250,20 @@ def station_rows(found: Analysis, sigma: float, north_of_site_deg: float) -> lis
                 "station": k,
                 "md_m": md,
                 "inclination_deg": math.degrees(found.record.inclination[k]),
-                "azimuth_deg": math.degrees(azimuths[k]),
+                "azimuth_deg": math.degrees(found.azimuth[k]),
                 "north_m": north,
                 "east_m": east,
                 "tvd_m": tvd,
                 "dogleg_severity_deg_per_30m": math.degrees(severity) * 30.0,
                 "closure_m": float(found.closure_distance[k]),
                 "vertical_section_m": float(found.vertical_section[k]),
-                "uncertainty": region(found.uncertainty.cov[k], sigma),
+                "uncertainty": region(covs[k], sigma),
             }
+            | (
+                {}
+                if origin is None
+                else {"northing_m": origin[0] + north, "easting_m": origin[1] + east, "height_m": origin[2] - tvd}
+            )
         )
     return rows
 
@@ -218,7 +292,7 @@ def at_depth(found: Analysis, md: float, sigma: float) -> dict[str, Any]:
     from groundstation.survey.methods import tangents
     from groundstation.survey.trajectory import Point, interpolate
 
-    directions = tangents(found.record.inclination, found.record.azimuth)
+    directions = tangents(found.record.inclination, found.azimuth)
     none, no_columns = np.zeros((3, 3)), np.zeros((3, 0))
     points = [
         Point(float(m), t, p, none, no_columns)
@@ -250,16 +324,15 @@ def table_text(rows: list[dict[str, Any]]) -> str:
     return text.getvalue()
 
 
-def draw(found: Analysis, tool: Tool, sigma: float, title: str, path: Path) -> None:
+def draw(found: Analysis, instrument: str, sigma: float, title: str, path: Path) -> None:
     """Plan view, sections and uncertainty."""
     from groundstation.report.plots import survey_figure
     from groundstation.report.style import save
     from groundstation.survey.ellipsoid import probability_of
 
     confidence = probability_of(sigma, 2)
-    figure = survey_figure(
-        found.record.md, found.positions, found.uncertainty.cov, confidence, f"{title}, {tool.name}, {sigma:g} sigma"
-    )
+    words = f"{title}, {instrument}, {found.frame.answer} north, {sigma:g} sigma"
+    figure = survey_figure(found.record.md, found.positions, found.uncertainty.cov, confidence, words)
     save(figure, path)
 
 
@@ -275,7 +348,9 @@ def show(result: dict[str, Any]) -> None:
     from rich.table import Table
 
     paper = console(110)
-    table = Table(title=f"{result['file']}: {result['method']}, {result['instrument']}, {result['sigma']:g} sigma")
+    paper.print(result["read_as"], markup=False)
+    words = (result["method"], result["instrument"], f"{result['north']} north", f"{result['sigma']:g} sigma")
+    table = Table(title=f"{result['file']}: {', '.join(words)}")
     names = ("#", "MD m", "incl deg", "azi deg", "north m", "east m", "TVD m", "DLS deg/30m")
     for name in (*names, "+-N cm", "+-E cm", "+-TVD cm"):
         table.add_column(name, justify="right")

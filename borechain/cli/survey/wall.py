@@ -1,4 +1,4 @@
-"""``borechain wall``: the joints of a wall or grid, and whether there is a gap."""
+"""``borechain wall``: the joints of a wall, a shaft or a grid, what is not known of it, and whether it is tight."""
 
 from __future__ import annotations
 
@@ -16,11 +16,12 @@ from borechain.cli.tables import console
 from telemetry.runtime.command_line import check_installed
 
 if TYPE_CHECKING:
-    from groundstation.survey.wall import ExtraColumn, Joints
+    from groundstation.survey.joints import ExtraColumn, Joints
     from groundstation.survey.wall_file import Wall
+    from groundstation.survey.wall_verdict import Judgement
 
 SHOWN = 10
-LIKELY = 0.01  # probability from which a joint is counted as doubtful
+NOT_TIGHT = 3  # exit status
 
 
 @click.command()
@@ -29,66 +30,125 @@ LIKELY = 0.01  # probability from which a joint is counted as doubtful
     "--plot", type=click.Path(path_type=Path, dir_okay=False), help="Thickness over depth as .svg, .png or .pdf."
 )
 @json_option
+@click.pass_context
 @plain_faults
-def wall(file: Path, plot: Path | None, as_json: bool) -> None:
-    """Judge every joint of the wall or grid in FILE: thickness, probability of a gap, where to add a column.
+def wall(context: click.Context, file: Path, plot: Path | None, as_json: bool) -> None:
+    """Judge the wall, shaft or grid in FILE: every joint, every void, what is missing or not surveyed, and the whole.
+
+    The exit status is 0 when it is tight and 3 when it is not, or not proven to be.
 
     \b
     Example:
       borechain wall scenarios/walls/wall-40.toml --plot wall.svg
     """
-    from groundstation.survey.wall import extra_column, joints, worst
-    from groundstation.survey.wall_file import read_wall
+    from groundstation.survey.joints import worst
+    from groundstation.survey.wall_file import judge_wall, read_wall
+    from groundstation.survey.wall_verdict import Verdict
 
     check_suffix("--plot", plot, *PLOT_FORMATS)
     check_installed("scipy", *(["matplotlib"] if plot is not None else []))
     found = read_wall(file)
-    judged = joints(found.columns, found.pairs, found.file.radius, found.file.thickness)
-    joint, depth = worst(judged)
-    extra = extra_column(found.columns, judged, joint, found.file.radius, found.file.thickness)
-    result = result_of(found, judged, joint, depth, extra)
+    judgement = judge_wall(found)
+    result = result_of(found, judgement)
     if plot is not None:
         from groundstation.report.plots_wall import wall_figure
         from groundstation.report.style import save
 
-        title = f"{found.file.name}: {len(judged.pairs)} joints"
-        save(wall_figure(found.columns, judged, found.file.radius, found.file.thickness, extra, title), plot)
+        joint, _ = worst(judgement.joints)
+        extra = dict(judgement.extras).get(joint)
+        title = f"{found.file.name}: {len(found.pairs)} joints, {judgement.verdict.value}"
+        save(wall_figure(found.built.columns, judgement.joints, found.file.thickness, extra, title), plot)
     if as_json:
         click.echo(json.dumps(result))
     else:
         show(result)
+    if judgement.verdict is not Verdict.TIGHT:
+        context.exit(NOT_TIGHT)
 
 
-def result_of(found: Wall, judged: Joints, joint: int, depth: int, extra: ExtraColumn | None) -> dict[str, Any]:
+def result_of(found: Wall, judgement: Judgement) -> dict[str, Any]:
     """The JSON object of the command."""
     import numpy as np
 
-    from groundstation.survey.wall import worst_depths
+    from groundstation.survey.joints import worst, worst_depths
 
-    thin = np.where(np.isfinite(judged.thickness), judged.thickness, np.inf)
-    doubtful_at = worst_depths(judged)
-    thinnest = np.argmin(thin, axis=1)
+    judged, extras = judgement.joints, dict(judgement.extras)
+    finite = np.where(np.isfinite(judged.thickness), judged.thickness, np.inf)
+    doubtful_at, thinnest = worst_depths(judged), np.argmin(finite, axis=1)
     rows = [joint_row(found, judged, j, int(doubtful_at[j]), int(thinnest[j])) for j in range(len(judged.pairs))]
-    proposal = None
-    if extra is not None:
-        proposal = {
-            "north_m": extra.north,
-            "east_m": extra.east,
-            "from_m": extra.from_depth,
-            "to_m": extra.to_depth,
-            "closes": extra.closes,
-        }
-    worst = joint_row(found, judged, joint, depth, int(thinnest[joint])) | {"extra_column": proposal}
+    joint, depth = worst(judged)
+    worst_row = joint_row(found, judged, joint, depth, int(thinnest[joint]))
     return {
         "wall": found.file.name,
-        "columns": [column_row(found, k) for k in range(len(found.columns.names))],
+        "verdict": judgement.verdict.value,
+        "findings": [
+            {
+                "kind": finding.kind.value,
+                "what": finding.what,
+                "from_m": finding.top,
+                "to_m": finding.bottom,
+                "probability": finding.probability,
+                "text": finding.text,
+            }
+            for finding in judgement.findings
+        ],
+        "probability_of_any": judgement.system.probability,
+        "probability_of_any_standard_error": judgement.system.standard_error,
+        "allowed_probability": found.file.allowed,
+        "columns": [column_row(found, k) for k in range(len(found.plans))],
         "required_thickness_m": found.file.thickness,
         "margin": allowance(found),
         "joints": rows,
-        "gaps": sum(row["thickness_m"] < found.file.thickness for row in rows),
-        "doubtful": sum(row["probability"] >= LIKELY for row in rows),
-        "worst": worst,
+        "gaps": sum(row["state"] == "missing" or row["thickness_m"] < found.file.thickness for row in rows),
+        "doubtful": sum(row["probability"] > found.file.allowed for row in rows),
+        "worst": worst_row | {"extra_column": proposal(found, extras.get(joint))},
+        "extra_columns": [rows[j] | {"extra_column": proposal(found, extra)} for j, extra in judgement.extras],
+        "largest_spacing": largest_spacing(found, judged),
+        "voids": [
+            {
+                "depth_m": hole.depth,
+                "columns": [found.built.columns.names[k] for k in hole.void.columns],
+                "area_m2": hole.void.area,
+                "radius_m": hole.void.radius,
+                "place_m": list(hole.void.place),
+            }
+            for hole in judgement.voids
+        ],
     }
+
+
+def proposal(found: Wall, extra: ExtraColumn | None) -> dict[str, Any] | None:
+    """A proposed column, placed where it is to begin; None where none is needed."""
+    import numpy as np
+
+    if extra is None:
+        return None
+    north, east, down = (np.array([extra.north, extra.east, extra.from_depth]) @ found.built.frame).tolist()
+    return {
+        "north_m": north,
+        "east_m": east,
+        "down_m": down,
+        "from_m": extra.from_depth,
+        "to_m": extra.to_depth,
+        "closes": extra.closes,
+    }
+
+
+def largest_spacing(found: Wall, judged: Joints) -> list[dict[str, Any]]:
+    """Widest joint at every depth; a missing column has no spacing, so its joints stand as null."""
+    import numpy as np
+
+    from groundstation.survey.as_built import State
+    from groundstation.survey.wall_verdict import joint_name
+
+    columns, rows = found.built.columns, []
+    for z, depth in enumerate(columns.depths.tolist()):
+        missing = np.flatnonzero(judged.states[:, z] == State.MISSING)
+        known = np.where(np.isfinite(judged.distance[:, z]), judged.distance[:, z], -np.inf)
+        joint = int(missing[0]) if len(missing) else int(np.argmax(known))
+        spacing = None if len(missing) or not np.isfinite(known[joint]) else float(known[joint])
+        rows.append({"depth_m": depth, "joint": joint_name(columns, judged.pairs[joint]), "spacing_m": spacing})
+    return rows
 
 
 def allowance(found: Wall) -> dict[str, float] | None:
@@ -97,78 +157,131 @@ def allowance(found: Wall) -> dict[str, float] | None:
 
     if found.file.spacing is None:
         return None
-    length = found.file.length or float(found.columns.depths[-1])
+    length = max(plan.design.length for plan in found.plans)
     shift, angle = margin(found.file.radius, found.file.thickness, found.file.spacing, length)
     return {"shift_cm": 100.0 * shift, "deviation_deg": math.degrees(angle)}
 
 
 def joint_row(found: Wall, judged: Joints, joint: int, depth: int, thinnest: int) -> dict[str, Any]:
-    """One joint at the depth where it is most probably too thin."""
-    a, b = judged.pairs[joint]
-    names = found.columns.names
-    north, east = judged.offset[joint, depth]
+    """One joint at the depth where it is most probably too thin; what is missing has no distance: null."""
+    from groundstation.survey.as_built import State
+    from groundstation.survey.wall_verdict import joint_name
+
+    columns = found.built.columns
+    north, east, _ = (judged.offset[joint, depth] @ found.built.frame[:2]).tolist()
+    states = judged.states[joint]
+    worst_state = State(int(max((s for s in states.tolist() if s != State.OUTSIDE), default=State.OUTSIDE)))
     return {
-        "joint": f"{names[a]}-{names[b]}",
-        "depth_m": float(found.columns.depths[depth]),
-        "distance_m": float(judged.distance[joint, depth]),
-        "thickness_m": float(judged.thickness[joint, thinnest]),
-        "thinnest_at_m": float(found.columns.depths[thinnest]),
+        "joint": joint_name(columns, judged.pairs[joint]),
+        "state": worst_state.name.lower(),
+        "depth_m": float(columns.depths[depth]),
+        "distance_m": number(judged.distance[joint, depth]),
+        "thickness_m": number(judged.thickness[joint, thinnest]),
+        "thinnest_at_m": float(columns.depths[thinnest]),
         "probability": float(judged.probability[joint, depth]),
-        "moved_apart_cm": 100.0 * math.hypot(north, east),
-        "direction_deg": math.degrees(math.atan2(east, north)) % 360.0,
+        "moved_apart_cm": number(100.0 * math.hypot(north, east)),
+        "direction_deg": number(math.degrees(math.atan2(east, north)) % 360.0),
     }
+
+
+def number(value: float) -> float | None:
+    """A number for JSON, which has no nan."""
+    return float(value) if math.isfinite(value) else None
 
 
 def column_row(found: Wall, k: int) -> dict[str, Any]:
-    """Deviation of one column at its toe."""
-    north, east, tvd = found.toes[k].tolist()
-    size = math.hypot(north, east)
-    limit = found.file.design(found.columns.names[k], (0.0, 0.0), tvd).tolerance.at(tvd)
-    return {
-        "column": found.columns.names[k],
-        "md_m": float(found.toe_mds[k]),
-        "deviation_cm": 100.0 * size,
-        "deviation_percent": 100.0 * size / tvd,
+    """State of one column, and its deviation from its design at its last survey."""
+    import numpy as np
+
+    from groundstation.survey.columns import deviation
+    from groundstation.survey.trajectory import Point
+
+    plan, built = found.plans[k], found.built
+    row: dict[str, Any] = {
+        "column": plan.design.name,
+        "state": state_of(found, k),
+        "design_length_m": plan.design.length,
+        "drilled_to_m": number(built.ends[k]),
+        "surveyed_to_m": number(built.surveyed[k]),
+        "md_m": number(built.surveyed[k]),
+        "instrument": plan.tool.name,
+        "serial": plan.serial,
+    }
+    if not built.surveyed[k] > 0.0:
+        missing = ("deviation_cm", "deviation_percent", "direction_deg", "sigma_cm", "used_percent")
+        return row | dict.fromkeys(missing)
+    head = np.array(plan.design.head)
+    cov = built.toe_covs[k] + plan.head_std**2 * np.diag([1.0, 1.0, 0.0])
+    point = Point(float(built.surveyed[k]), plan.design.axis, head + built.toes[k], cov, np.zeros((3, 0)))
+    found_ = deviation(point, plan.design)
+    north, east, _ = (found_.offset @ plan.design.across).tolist()
+    return row | {
+        "deviation_cm": 100.0 * found_.size,
+        "deviation_percent": 100.0 * found_.size / max(found_.along, 1e-9),
         "direction_deg": math.degrees(math.atan2(east, north)) % 360.0,
-        "sigma_cm": 100.0 * math.sqrt(0.5 * float(found.toe_covs[k, 0, 0] + found.toe_covs[k, 1, 1])),
-        "used_percent": 100.0 * size / limit,
+        "sigma_cm": 100.0 * math.sqrt(0.5 * float(np.trace(found_.cov))),
+        "used_percent": 100.0 * found_.ratio,
     }
 
 
+def state_of(found: Wall, k: int) -> str:
+    """State of a column in words: planned, not drilled, no record, drilled, surveyed; and to which depth."""
+    plan, built = found.plans[k], found.built
+    end, surveyed = float(built.ends[k]), float(built.surveyed[k])
+    if not math.isfinite(end):
+        return plan.status.value.replace("-", " ") or "no record"
+    if not surveyed > 0.0:
+        return f"drilled to {end:g} m, not surveyed"
+    drilled = "" if end <= surveyed + 1e-6 else f", drilled to {end:g} m"
+    return f"surveyed to {surveyed:g} m{drilled}"
+
+
 def show(result: dict[str, Any]) -> None:
-    """Worst joints and columns, for people."""
+    """Verdict, reasons, worst joints and columns, for people."""
     from rich.table import Table
 
     paper = console(100)
-    table = Table(title=f"{result['wall']}: the {SHOWN} most doubtful of {len(result['joints'])} joints")
-    for name in ("joint", "depth m", "thickness m", "thinnest at m", "P(too thin)", "apart cm", "towards deg"):
+    colour = "green" if result["verdict"] == "tight" else "bold red"
+    paper.print(f"[{colour}]{result['wall']}: {result['verdict']}[/]")
+    for finding in result["findings"]:
+        paper.print(f"  {finding['kind']}: {finding['text']}", markup=False)
+    table = Table(title=f"the {min(SHOWN, len(result['joints']))} most doubtful of {len(result['joints'])} joints")
+    for name in ("joint", "state", "depth m", "thickness m", "thinnest at m", "P(too thin)", "apart cm", "towards deg"):
         table.add_column(name, justify="right")
-    for row in sorted(result["joints"], key=lambda r: (-r["probability"], r["thickness_m"]))[:SHOWN]:
+    thin = {row["joint"]: -math.inf if row["thickness_m"] is None else row["thickness_m"] for row in result["joints"]}
+    for row in sorted(result["joints"], key=lambda r: (-r["probability"], thin[r["joint"]]))[:SHOWN]:
         table.add_row(
             row["joint"],
+            row["state"],
             f"{row['depth_m']:.2f}",
-            f"{row['thickness_m']:.3f}",
+            text(row["thickness_m"], 3),
             f"{row['thinnest_at_m']:.2f}",
             f"{row['probability']:.2e}",
-            f"{row['moved_apart_cm']:.1f}",
-            f"{row['direction_deg']:.0f}",
+            text(row["moved_apart_cm"], 1),
+            text(row["direction_deg"], 0),
         )
     paper.print(table)
     if result["margin"] is not None:
         m = result["margin"]
         paper.print(f"one column alone may be {m['shift_cm']:.1f} cm off at its toe, {m['deviation_deg']:.3f} deg")
-    over = [row for row in result["columns"] if row["used_percent"] >= 100.0]
+    over = [row for row in result["columns"] if row["used_percent"] is not None and row["used_percent"] >= 100.0]
     paper.print(
         f"required {result['required_thickness_m']:g} m: "
-        f"{result['gaps']} of {len(result['joints'])} joints are thinner, "
-        f"{result['doubtful']} are with a probability of {LIKELY:g} or more; "
+        f"{result['gaps']} of {len(result['joints'])} joints are thinner or open, "
+        f"{result['doubtful']} are so with a probability of more than {result['allowed_probability']:g}; "
         f"{len(over)} columns beyond their tolerance"
     )
-    worst, extra = result["worst"], result["worst"]["extra_column"]
-    paper.print(f"worst joint {worst['joint']} at {worst['depth_m']:g} m")
-    if extra is not None:
-        verdict = "closes it" if extra["closes"] else "does not close it alone"
+    paper.print(f"anything open or too thin: probability {result['probability_of_any']:.2g}")
+    paper.print(f"worst joint {result['worst']['joint']} at {result['worst']['depth_m']:g} m")
+    for row in result["extra_columns"]:
+        extra = row["extra_column"]
+        verdict = "closes" if extra["closes"] else "does not close"
         paper.print(
             f"a column at north {extra['north_m']:.2f} m, east {extra['east_m']:.2f} m "
-            f"from {extra['from_m']:g} to {extra['to_m']:g} m {verdict}"
+            f"from {extra['from_m']:g} to {extra['to_m']:g} m {verdict} {row['joint']}"
         )
+
+
+def text(value: float | None, digits: int) -> str:
+    """A number of a table, a dash where there is none."""
+    return "-" if value is None else f"{value:.{digits}f}"

@@ -16,7 +16,6 @@ from groundstation.survey.methods import (
     leg,
     positions,
     ratio_factor,
-    referred,
     sinc,
     tangents,
     vertical_section,
@@ -239,13 +238,6 @@ def test_vertical_section_is_the_part_of_the_closure_along_its_azimuth(
     distance, direction = closure(position)
     expected = distance * np.cos(direction - azimuth)
     np.testing.assert_allclose(vertical_section(position, azimuth), expected, atol=1e-11)
-
-
-@given(st.floats(-20.0, 20.0), st.floats(-7.0, 7.0))
-def test_a_referred_azimuth_is_the_sum_within_one_turn(azimuth: float, north: float) -> None:
-    got = float(referred(np.array([azimuth]), north)[0])
-    assert 0.0 <= got < math.tau
-    assert math.cos(got - azimuth - north) == pytest.approx(1.0)
 
 
 @given(ROWS, st.sampled_from(Method))

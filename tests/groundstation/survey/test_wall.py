@@ -11,21 +11,11 @@ from scipy.special import ndtr
 from scipy.stats import ncx2
 
 from groundstation.errors import SurveyError
+from groundstation.survey.as_built import Columns, at_depths
+from groundstation.survey.joints import extra_column, joints, neighbours_in_grid, neighbours_in_line, worst
 from groundstation.survey.methods import Method, positions, tangents
 from groundstation.survey.trajectory import Point, on_arc
-from groundstation.survey.wall import (
-    Columns,
-    at_depths,
-    extra_column,
-    joints,
-    largest_distance,
-    margin,
-    neighbours_in_grid,
-    neighbours_in_line,
-    probability_beyond,
-    thickness,
-    worst,
-)
+from groundstation.survey.wall import largest_distance, margin, probability_beyond, thickness
 
 DEG = math.pi / 180.0
 RADIUS, SPACING, REQUIRED, LENGTH = 0.60, 0.75, 0.80, 30.0
@@ -245,7 +235,8 @@ def test_centres_at_the_depths_of_stations_are_the_stations() -> None:
     generator = np.random.default_rng(10)
     root = generator.normal(0.0, 0.01, (1, 10, 3, 3))
     covs = root @ np.swapaxes(root, -1, -2)
-    centres, plane = at_depths(position, tangent, covs, position[0, :, 2])
+    centres, errors = at_depths(position, tangent, root, position[0, :, 2])
+    plane = errors @ np.swapaxes(errors, -1, -2)
     np.testing.assert_allclose(centres[0], position[0, :, :2], atol=1e-12)
     slope = tangent[0, :, :2] / tangent[0, :, 2:]
     for k in range(10):
@@ -268,7 +259,8 @@ def test_an_error_of_depth_moves_the_centre_by_the_slope_of_the_hole() -> None:
     md = np.array([[0.0, 5.0, 10.0]])
     position = positions(Method.MINIMUM_CURVATURE, md, inclination, azimuth)
     covs = np.broadcast_to(np.diag([1e-6, 4e-6, 9e-4]), (1, 3, 3, 3))
-    centres, plane = at_depths(position, tangents(inclination, azimuth), covs, np.array([2.0, 7.0]))
+    centres, errors = at_depths(position, tangents(inclination, azimuth), np.sqrt(covs), np.array([2.0, 7.0]))
+    plane = errors @ np.swapaxes(errors, -1, -2)
     np.testing.assert_allclose(centres[0], [[0.0, 2.0 * math.tan(tilt)], [0.0, 7.0 * math.tan(tilt)]], atol=1e-12)
     expected = np.diag([1e-6, 4e-6 + 9e-4 * math.tan(tilt) ** 2])
     np.testing.assert_allclose(plane[0], [expected, expected], atol=1e-15)
@@ -285,12 +277,12 @@ def wall(deviating_deg: float = 0.5, std_per_m: float = 3e-4, count: int = 5) ->
     var = (std_per_m * DEPTHS + 1e-4) ** 2
     covs = np.broadcast_to(var[:, None, None] * np.eye(2), (count, len(DEPTHS), 2, 2))
     names = [f"C{k + 1}" for k in range(count)]
-    return Columns(names, DEPTHS, centres, covs, designs), neighbours_in_line(count, closed=False)
+    return Columns.surveyed(names, DEPTHS, centres, covs, designs, RADIUS), neighbours_in_line(count, closed=False)
 
 
 def test_the_worst_joint_is_told_by_name_depth_and_direction() -> None:
     columns, pairs = wall()
-    found = joints(columns, pairs, RADIUS, REQUIRED)
+    found = joints(columns, pairs, REQUIRED)
     joint, depth = worst(found)
     assert [columns.names[k] for k in found.pairs[joint]] == ["C2", "C3"]
     assert columns.depths[depth] == 30.0
@@ -303,7 +295,7 @@ def test_the_worst_joint_is_told_by_name_depth_and_direction() -> None:
 
 def test_a_joint_opens_where_the_column_has_used_up_the_margin() -> None:
     columns, pairs = wall()
-    found = joints(columns, pairs, RADIUS, REQUIRED)
+    found = joints(columns, pairs, REQUIRED)
     opens = (LIMIT - SPACING) / math.tan(0.5 * DEG)
     np.testing.assert_array_equal(found.thickness[1] < REQUIRED, opens < DEPTHS)
     assert np.all(found.thickness[[0, 2, 3]] > REQUIRED)
@@ -313,7 +305,7 @@ def test_a_joint_opens_where_the_column_has_used_up_the_margin() -> None:
 
 def test_both_regions_of_uncertainty_count_towards_a_joint() -> None:
     columns, pairs = wall(0.0)
-    found = joints(columns, pairs, RADIUS, REQUIRED)
+    found = joints(columns, pairs, REQUIRED)
     std = math.sqrt(2.0) * (3e-4 * 30.0 + 1e-4)
     expected = float(ncx2.sf((LIMIT / std) ** 2, 2, (SPACING / std) ** 2))
     np.testing.assert_allclose(found.probability[:, -1], expected, rtol=1e-6)
@@ -323,38 +315,43 @@ def test_the_more_probable_gap_is_worse_than_the_thinner_joint() -> None:
     columns, pairs = wall(0.2)
     covs = columns.covs.copy()
     covs[0] = 0.2**2 * np.eye(2)
-    found = joints(Columns(columns.names, DEPTHS, columns.centres, covs, columns.designs), pairs, RADIUS, REQUIRED)
+    uncertain = Columns.surveyed(columns.names, DEPTHS, columns.centres, covs, columns.designs, RADIUS)
+    found = joints(uncertain, pairs, REQUIRED)
     assert worst(found)[0] == 0
     assert found.thickness[1, -1] < found.thickness[0, -1]
 
 
 def test_of_equally_probable_joints_the_thinnest_is_worst() -> None:
     columns, pairs = wall(0.05)
-    certain = Columns(columns.names, DEPTHS, columns.centres, np.zeros_like(columns.covs), columns.designs)
-    found = joints(certain, pairs, RADIUS, REQUIRED)
+    covs = np.zeros_like(columns.covs)
+    certain = Columns.surveyed(columns.names, DEPTHS, columns.centres, covs, columns.designs, RADIUS)
+    found = joints(certain, pairs, REQUIRED)
     np.testing.assert_array_equal(found.probability, 0.0)
     assert worst(found) == (1, len(DEPTHS) - 1)
 
 
-def test_a_joint_with_a_column_that_ends_is_judged_as_far_as_it_goes() -> None:
-    columns, pairs = wall(0.5)
+def test_below_the_end_of_a_column_its_joints_are_open() -> None:
+    columns, pairs = wall(0.0)
     centres = columns.centres.copy()
     centres[1, DEPTHS > 20.0] = np.nan
-    found = joints(Columns(columns.names, DEPTHS, centres, columns.covs, columns.designs), pairs, RADIUS, REQUIRED)
-    for values in (found.probability, found.thickness, found.distance):
-        np.testing.assert_array_equal(np.isnan(values[1]), DEPTHS > 20.0)
-        assert np.all(np.isfinite(values[2]))
+    short = Columns.surveyed(columns.names, DEPTHS, centres, columns.covs, columns.designs, RADIUS)
+    found = joints(short, pairs, REQUIRED)
+    for joint in (0, 1):
+        np.testing.assert_array_equal(np.isnan(found.thickness[joint]), DEPTHS > 20.0)
+        np.testing.assert_array_equal(found.probability[joint] == 1.0, DEPTHS > 20.0)
+    assert np.all(found.probability[2:] < 1e-9)
     joint, depth = worst(found)
-    assert (joint, DEPTHS[depth]) == (1, 20.0)
-    extra = extra_column(columns, found, 1, RADIUS, REQUIRED)
+    assert (joint, DEPTHS[depth]) == (0, 20.5)
+    extra = extra_column(short, found, 0, REQUIRED)
     assert extra is not None
-    assert extra.to_depth == 20.0
+    assert (extra.from_depth, extra.to_depth) == (20.5, 30.0)
+    assert (extra.north, extra.east, extra.closes) == (0.0, SPACING, True)
 
 
 def test_an_extra_column_in_the_middle_closes_the_gap() -> None:
     columns, pairs = wall()
-    found = joints(columns, pairs, RADIUS, REQUIRED)
-    extra = extra_column(columns, found, 1, RADIUS, REQUIRED)
+    found = joints(columns, pairs, REQUIRED)
+    extra = extra_column(columns, found, 1, REQUIRED)
     assert extra is not None
     assert extra.closes
     assert (extra.from_depth, extra.to_depth) == (17.0, 30.0)
@@ -368,14 +365,14 @@ def test_an_extra_column_in_the_middle_closes_the_gap() -> None:
 
 def test_a_gap_that_is_too_wide_is_not_closed_by_one_more_column() -> None:
     columns, pairs = wall(3.0)
-    extra = extra_column(columns, joints(columns, pairs, RADIUS, REQUIRED), 1, RADIUS, REQUIRED)
+    extra = extra_column(columns, joints(columns, pairs, REQUIRED), 1, REQUIRED)
     assert extra is not None
     assert not extra.closes
 
 
 def test_a_joint_that_is_thick_enough_needs_no_extra_column() -> None:
     columns, pairs = wall()
-    assert extra_column(columns, joints(columns, pairs, RADIUS, REQUIRED), 0, RADIUS, REQUIRED) is None
+    assert extra_column(columns, joints(columns, pairs, REQUIRED), 0, REQUIRED) is None
 
 
 @pytest.mark.parametrize(
