@@ -17,6 +17,7 @@ from groundstation.service.answers import (
 )
 from groundstation.service.orders import OrderState
 from groundstation.service.recalibration.progress import Phase, Stage
+from groundstation.survey.trust import Trust
 from telemetry.messages import Mode, NodeFlag, Severity
 
 RIG_TIME = number("rig_time_s", "rig time now", null=True)
@@ -56,6 +57,8 @@ STATUS: Fields = (
     integer("measurements", "surveys that belong to a station"),
     integer("unplaced_measurements", "surveys without a known depth"),
     integer("refused_measurements", "surveys with invalid numbers"),
+    integer("set_aside_measurements", "surveys of a faulty sensor, never fused"),
+    integer("untrusted_measurements", "surveys whose yaw is taken for unknown"),
     text("health", "", "good", "degraded"),
 )
 STRING: Fields = (
@@ -106,6 +109,7 @@ STATION: Fields = (
     *SIGMA_ANGLES,
     integer("measurements", "clusters measured here"),
     integer("dropped_measurements", "of them from before the hole moved"),
+    integer("untrusted_measurements", "of them with a yaw that is taken for unknown"),
     number("sigma_yaw_deg", "root mean square of those that count"),
     number("sigma_systematic_deg", "root mean square of those that count"),
     number("sigma_force_mps2", "root mean square of those that count, one axis"),
@@ -126,6 +130,7 @@ MEASUREMENT: Fields = (
     integer("samples", "in the mean"),
     number("settle_s", "between the stop and the end of the average"),
     FLAGS,
+    text("trust", "what the flags make of it", *(trust.name.lower() for trust in (Trust.FULL, Trust.UNKNOWN_YAW))),
     texts("quality", "checks that it failed"),
 )
 MEASUREMENTS: Fields = (RIG_TIME, rows("measurements", MEASUREMENT))

@@ -20,6 +20,7 @@ from groundstation.survey.fusion import Departure, Evidence, departure, judge_de
 from groundstation.survey.resolve import Direction, Quality, check, combine_imus, resolve
 from groundstation.survey.shared import SharedErrors
 from groundstation.survey.trajectory import Point, Trajectory
+from groundstation.survey.trust import UNKNOWN_YAW_VAR, Trust, trust_of, with_unknown_yaw
 from telemetry.messages import Event, NodeState, StaticRecord, SurveyMeasurement
 
 Array = npt.NDArray[np.float64]
@@ -37,11 +38,17 @@ class ResolvedStop:
     md: float
     direction: Direction
     quality: Quality
+    trust: Trust = Trust.FULL
 
     @property
     def at(self) -> float:
         """Rig time of the stop, s."""
         return self.measurement.station_at
+
+    @property
+    def yaw_var(self) -> float:
+        """Random variance of the yaw (rad^2) with which it is fused."""
+        return self.measurement.yaw_var + (UNKNOWN_YAW_VAR if self.trust is Trust.UNKNOWN_YAW else 0.0)
 
 
 @dataclass(slots=True)
@@ -81,9 +88,20 @@ class SurveyStation:
         self.drops = [drop for drop in self.drops if drop < place]
         self._departures = {k: d for k, d in self._departures.items() if k < place}
 
+    @property
+    def counting(self) -> list[ResolvedStop]:
+        """Clusters that count: of those since the hole moved the trusted ones, or all where none is."""
+        since = self.clusters[self.first :]
+        return [cluster for cluster in since if cluster.trust is Trust.FULL] or since
+
+    @property
+    def untrusted(self) -> int:
+        """Clusters measured here whose yaw is not believed."""
+        return sum(cluster.trust is not Trust.FULL for cluster in self.clusters)
+
     def readings(self) -> list[Direction]:
         """Directions of the clusters that count."""
-        return [cluster.direction for cluster in self.clusters[self.first :]]
+        return [cluster.direction for cluster in self.counting]
 
     def departure(self, place: int) -> Departure | None:
         """How far the cluster at ``place`` departed from those before; None for the first of its hole."""
@@ -122,6 +140,7 @@ class RigModel:
         self.events: deque[Event] = deque(maxlen=EVENTS_SHOWN)
         self.static_records: deque[StaticRecord] = deque(maxlen=STATIC_RECORDS_SHOWN)
         self.unplaced = 0
+        self.set_aside: list[SurveyMeasurement] = []  # of a faulty sensor, never fused
         self.refused = 0
         self.rig_now = math.nan
         self.shared = SharedErrors()
@@ -147,21 +166,25 @@ class RigModel:
         return None if bit is None or below is None else bit - below
 
     def on_survey(self, measurement: SurveyMeasurement, md: float | None) -> bool:
-        """Resolve and fuse a stored measurement; False when it belongs to no depth or is no survey."""
-        if md is None:
+        """Resolve and fuse a stored measurement; False when it belongs to no depth, is set aside or is no survey."""
+        trust = trust_of(measurement.flags)
+        if trust is Trust.SET_ASIDE:
+            self.set_aside.append(measurement)
+            return False
+        if md is None or trust is Trust.UNDATED:
             self.unplaced += 1
             return False
         forces = np.array([imu.force for imu in measurement.imus])
         covs = np.array([imu.force_cov for imu in measurement.imus])
         try:
-            direction = self._direction(measurement, *combine_imus(forces, covs))
+            direction = self._direction(measurement, trust, *combine_imus(forces, covs))
         except (SurveyError, np.linalg.LinAlgError):
             self.refused += 1
             return False
         noise = math.radians(ACCELEROMETER_NOISE_DEG) * self.config.gravity
         quality = check(forces, covs, self.config.gravity, measurement.samples, measurement.settle_time, noise)
         station = self._station_at(md)
-        station.add_stop(ResolvedStop(measurement, md, direction, quality))
+        station.add_stop(ResolvedStop(measurement, md, direction, quality, trust))
         self._judge_movement(measurement.station_at)
         self._recompute()
         return True
@@ -198,9 +221,11 @@ class RigModel:
         self.stations.sort(key=lambda known: known.md)
         return station
 
-    def _direction(self, m: SurveyMeasurement, force: Array, force_cov: Array) -> Direction:
+    def _direction(self, m: SurveyMeasurement, trust: Trust, force: Array, force_cov: Array) -> Direction:
         """Direction of a measurement with what it shares with others."""
         resolved = resolve(force, force_cov, m.yaw, m.yaw_var)
+        if trust is Trust.UNKNOWN_YAW:
+            resolved = with_unknown_yaw(resolved)
         return self.shared.reading(
             resolved,
             m.tube,
