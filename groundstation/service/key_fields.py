@@ -17,6 +17,7 @@ from groundstation.service.answers import (
 )
 from groundstation.service.orders import OrderState
 from groundstation.service.recalibration.progress import Phase, Stage
+from groundstation.service.rig_alarms import KINDS, Health, Level
 from groundstation.survey.trust import Trust
 from telemetry.messages import Mode, NodeFlag, Severity
 
@@ -59,7 +60,9 @@ STATUS: Fields = (
     integer("refused_measurements", "surveys with invalid numbers"),
     integer("set_aside_measurements", "surveys of a faulty sensor, never fused"),
     integer("untrusted_measurements", "surveys whose yaw is taken for unknown"),
-    text("health", "", "good", "degraded"),
+    text("health", "the worst of the rig's alarms, or that nobody can tell", *(h.name.lower() for h in Health)),
+    integer("epoch", "of rig time: starts of the encoder so far, 0 unknown"),
+    texts("alarms", "kinds that stand"),
 )
 STRING: Fields = (
     RIG_TIME,
@@ -242,6 +245,15 @@ ALARM: Fields = (
     number("threshold_cm", "passed"),
     number("cleared_at_s", "rig time", null=True),
 )
+RIG_ALARM: Fields = (
+    text("code", "kind of alarm, see [operating](operate.md#what-the-crew-is-told)", *(kind.code for kind in KINDS)),
+    text("level", "how much it matters", *(level.name.lower() for level in Level)),
+    text("subject", "what it is about"),
+    text("detail", "what is known of it"),
+    number("raised_at_s", "rig time", null=True),
+    number("cleared_at_s", "rig time; null while it stands", null=True),
+    integer("count", "times it was raised"),
+)
 ALARMS: Fields = (
     numbers("levels_percent", "of the tolerance"),
     rows("active", ALARM),
@@ -256,6 +268,8 @@ ALARMS: Fields = (
             numbers("neighbours_sigma", "of the stations beside it"),
         ),
     ),
+    rows("rig", RIG_ALARM),
+    rows("rig_cleared", RIG_ALARM),
 )
 SENSOR: Fields = (numbers("matrix", "row = sensor axis", 2), numbers("bias_mps2", "at the reference temperature"))
 RECALIBRATION: Fields = (

@@ -12,21 +12,26 @@ import numpy.typing as npt
 from groundstation.config import GroundConfig
 from groundstation.errors import SurveyError
 from groundstation.service.alarms import AlarmList
+from groundstation.service.depth import DepthLog
+from groundstation.service.numbers import Numbers
 from groundstation.service.orders import OrderBook
 from groundstation.service.recalibration.procedure import FieldProcedure
-from groundstation.service.tally import DepthLog, Tally
+from groundstation.service.rig_alarms import Health, RigAlarms
+from groundstation.service.stops import Stops
+from groundstation.service.tally import Tally
 from groundstation.survey.columns import Deviation, deviation, project
 from groundstation.survey.fusion import Departure, Evidence, departure, judge_departure, weighted
 from groundstation.survey.resolve import Direction, Quality, check, combine_imus, resolve
 from groundstation.survey.shared import SharedErrors
 from groundstation.survey.trajectory import Point, Trajectory
 from groundstation.survey.trust import UNKNOWN_YAW_VAR, Trust, trust_of, with_unknown_yaw
-from telemetry.messages import Event, NodeState, StaticRecord, SurveyMeasurement
+from telemetry.messages import EPOCH_UNKNOWN, Event, NodeState, StaticRecord, SurveyMeasurement
 
 Array = npt.NDArray[np.float64]
 EVENTS_SHOWN = 10_000
 STATIC_RECORDS_SHOWN = 1_000
 ACCELEROMETER_NOISE_DEG = 0.02  # one sample, for the check of motion
+ABOVE_COLLAR = 0.01  # m, of rounding; a node higher up is in no hole
 SAME_STOP = 15.0  # s, within which two surveys were taken at one stop
 
 
@@ -49,6 +54,14 @@ class ResolvedStop:
     def yaw_var(self) -> float:
         """Random variance of the yaw (rad^2) with which it is fused."""
         return self.measurement.yaw_var + (UNKNOWN_YAW_VAR if self.trust is Trust.UNKNOWN_YAW else 0.0)
+
+
+@dataclass(frozen=True, slots=True)
+class Waiting:
+    """A stored survey whose depth is not known, and the length (m) of string below its tube when it came."""
+
+    measurement: SurveyMeasurement
+    below: float | None
 
 
 @dataclass(slots=True)
@@ -134,15 +147,23 @@ class RigModel:
     def __init__(self, config: GroundConfig) -> None:
         self.config = config
         self.tally = Tally(config.tube_length)
-        self.depths = DepthLog()
+        self.depths = DepthLog(config.depth_rate, config.depth_gap)
+        self.stops = Stops(self.tally, config.survey_after)
+        self.numbers = Numbers()
+        self.rig_alarms = RigAlarms()
         self.nodes: dict[int, NodeState] = {}
         self.stations: list[SurveyStation] = []
         self.events: deque[Event] = deque(maxlen=EVENTS_SHOWN)
         self.static_records: deque[StaticRecord] = deque(maxlen=STATIC_RECORDS_SHOWN)
-        self.unplaced = 0
+        self.waiting: list[Waiting] = []  # surveys whose depth is not known yet
+        self.undated = 0  # surveys without rig time, which never have one
         self.set_aside: list[SurveyMeasurement] = []  # of a faulty sensor, never fused
         self.refused = 0
+        self.now = math.nan  # s, own clock
         self.rig_now = math.nan
+        self.epoch = EPOCH_UNKNOWN
+        self.depth_heard_at = -math.inf  # s, own clock
+        self._heard_at: dict[int, float] = {}  # s, own clock, of each tube's newest state
         self.shared = SharedErrors()
         self.moved: list[Moved] = []
         self.alarms = AlarmList()
@@ -151,43 +172,77 @@ class RigModel:
         self.recalibration = FieldProcedure(config.gravity)
         self.orders = OrderBook()
 
-    def on_state(self, state: NodeState) -> None:
-        """Handle a node's state, unless a newer one is known."""
+    def on_state(self, state: NodeState, now: float) -> None:
+        """Handle a node's state that came at ``now`` (s, own clock), unless a newer one of its epoch is known."""
         self.recalibration.on_state(state)
+        self._heard_at[state.tube] = now
         known = self.nodes.get(state.tube)
-        if known is None or state.at >= known.at:
+        if known is None or state.epoch != known.epoch or state.at >= known.at:
             self.nodes[state.tube] = state
             self.tally.on_hops(state.tube, state.hops)
 
-    def place(self, measurement: SurveyMeasurement) -> float | None:
-        """Measured depth (m) of the tube's node when it surveyed; None when the bit's depth then is not known."""
+    def string_below(self, measurement: SurveyMeasurement) -> float | None:
+        """Length (m) of string below a tube now that its survey has come; None for one that nobody can place."""
         self.tally.on_hops(measurement.tube, self._hops_if_unknown(measurement))
-        bit, below = self.depths.at(measurement.station_at), self.tally.length_below(measurement.tube)
-        return None if bit is None or below is None else bit - below
+        return self.tally.length_below(measurement.tube)
 
-    def on_survey(self, measurement: SurveyMeasurement, md: float | None) -> bool:
-        """Resolve and fuse a stored measurement; False when it belongs to no depth, is set aside or is no survey."""
+    def depth_of(self, measurement: SurveyMeasurement, below: float | None) -> float | None:
+        """Measured depth (m) of the tube's node when it surveyed; None where no depth brackets its time."""
+        if below is None or trust_of(measurement.flags) is Trust.UNDATED:
+            return None
+        bit = self.depths.at(measurement.epoch or self.epoch, measurement.station_at)
+        if bit is None or bit - below < -ABOVE_COLLAR:
+            return None
+        return max(bit - below, 0.0)
+
+    def placeable(self) -> list[tuple[Waiting, float]]:
+        """Surveys that waited for their depth and have it now; they wait no more."""
+        found = [(one, self.depth_of(one.measurement, one.below)) for one in self.waiting]
+        self.waiting = [one for one, md in found if md is None]
+        return [(one, md) for one, md in found if md is not None]
+
+    @property
+    def unplaced(self) -> int:
+        """Surveys without a known depth."""
+        return len(self.waiting) + self.undated
+
+    @property
+    def health(self) -> Health:
+        """The worst that is known, or that nothing is known."""
+        heard = [tube for tube in self.tally.tubes if not self.is_stale(tube)]
+        depth_is_heard = self.now - self.depth_heard_at <= self.config.stale_after
+        knows = math.isfinite(self.rig_now) and depth_is_heard and bool(heard)
+        return max(self.rig_alarms.health, Health.GOOD if knows else Health.UNKNOWN)
+
+    def on_survey(self, measurement: SurveyMeasurement, md: float | None, below: float | None = None) -> str:
+        """Resolve and fuse a stored measurement; returns the kind of alarm where it is not used as it is, or ''."""
         trust = trust_of(measurement.flags)
+        if trust is Trust.UNDATED:
+            self.undated += 1
+            return "survey_unplaced"
         if trust is Trust.SET_ASIDE:
             self.set_aside.append(measurement)
-            return False
-        if md is None or trust is Trust.UNDATED:
-            self.unplaced += 1
-            return False
-        forces = np.array([imu.force for imu in measurement.imus])
-        covs = np.array([imu.force_cov for imu in measurement.imus])
+            return "survey_set_aside"
+        if md is None:
+            self.waiting.append(Waiting(measurement, below))
+            return ""  # most wait for a moment; the watch tells of those that wait longer
         try:
-            direction = self._direction(measurement, trust, *combine_imus(forces, covs))
+            self._fuse(measurement, md, trust)
         except (SurveyError, np.linalg.LinAlgError):
             self.refused += 1
-            return False
+            return "survey_refused"
+        return "" if trust is Trust.FULL else "survey_untrusted"
+
+    def _fuse(self, measurement: SurveyMeasurement, md: float, trust: Trust) -> None:
+        forces = np.array([imu.force for imu in measurement.imus])
+        covs = np.array([imu.force_cov for imu in measurement.imus])
+        direction = self._direction(measurement, trust, *combine_imus(forces, covs))
         noise = math.radians(ACCELEROMETER_NOISE_DEG) * self.config.gravity
         quality = check(forces, covs, self.config.gravity, measurement.samples, measurement.settle_time, noise)
         station = self._station_at(md)
         station.add_stop(ResolvedStop(measurement, md, direction, quality, trust))
         self._judge_movement(measurement.station_at)
         self._recompute()
-        return True
 
     def on_event(self, event: Event) -> None:
         """Remember what happened."""
@@ -201,9 +256,8 @@ class RigModel:
         self.recalibration.on_static_record(record)
 
     def age(self, tube: int) -> float:
-        """Rig seconds since a node's newest state; infinite for one never heard."""
-        state = self.nodes.get(tube)
-        return math.inf if state is None else self.rig_now - state.at
+        """Seconds of the own clock since a node's newest state came; infinite for one never heard."""
+        return self.now - self._heard_at.get(tube, -math.inf)
 
     def is_stale(self, tube: int) -> bool:
         """Whether a node has been silent for too long."""

@@ -65,7 +65,9 @@ def status(k: RigModel, _p: Parameters) -> View:
         "refused_measurements": k.refused,
         "set_aside_measurements": len(k.set_aside),
         "untrusted_measurements": sum(s.untrusted for s in k.stations),
-        "health": "degraded" if stale or k.refused or k.unplaced or k.set_aside else "good",
+        "health": k.health.name.lower(),
+        "epoch": k.epoch,
+        "alarms": sorted({alarm.kind.code for alarm in k.rig_alarms}),
     }
 
 

@@ -40,6 +40,7 @@ EFFECTS: dict[NodeFlag, Trust] = {
     NodeFlag.RESTORED: Trust.FULL,  # an aiding has confirmed the saved yaw since
     NodeFlag.CLOCK_UNSYNCHRONISED: Trust.UNDATED,
     NodeFlag.BIAS_UNKNOWN: Trust.UNKNOWN_YAW,
+    NodeFlag.NOT_SAVED: Trust.FULL,  # of the node's disk, not of its yaw
     NodeFlag.SENSOR_FAULT: Trust.SET_ASIDE,  # the force may be one that stands for a faulty sensor's
 }
 TOGETHER: dict[NodeFlag, Trust] = {

@@ -18,6 +18,7 @@ from node.process.journal import SLOTS, Journal
 from telemetry.messages import Scalar, Severity
 
 SAVE_EVERY: Final = 570  # cycles without any other save, 300 s
+RETRY_EVERY: Final = 57  # cycles until a save that the disk refused is tried again, 30 s
 
 Say = Callable[[Severity, str, dict[str, Scalar]], None]
 
@@ -68,8 +69,14 @@ class Saver:
         A node that wakes believes a saved rest, so the newest slot must not show one while the string turns.
         """
         self._cycles += 1
-        if self._cycles >= SAVE_EVERY or (self._saved_still and not is_still(nodes)):
+        limit = RETRY_EVERY if self._refused else SAVE_EVERY
+        if self._cycles >= limit or (self._saved_still and not is_still(nodes)):
             self.due = True
+
+    @property
+    def is_refused(self) -> bool:
+        """Whether the disk refused the newest save."""
+        return bool(self._refused)
 
     def report(self, say: Say) -> None:
         """Say once what the disk refused."""

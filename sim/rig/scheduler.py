@@ -17,14 +17,14 @@ from collections.abc import Callable
 from dataclasses import dataclass, field
 from functools import partial
 
-import msgpack
-
 from sim.errors import RigError
 from sim.rig.link_channel import LinkChannel
 from sim.rig.stepper import Answer, FrameEvent, Stepper
 from sim.world.motion import Phase
 from sim.world.world import World
+from telemetry.application.depth_source import DepthSource
 from telemetry.messages import BASE, ENCODER, Side, address_name
+from telemetry.presentation.msgpack_codec import encode
 from telemetry.runtime.stepped import Due, DueEvent
 
 ATTACH_LIMIT = 60.0  # wall s
@@ -79,6 +79,7 @@ class Scheduler:
             world.seed, medium.latency, medium.jitter, medium.loss, medium.duplicate, medium.corrupt
         )
         self.progress = Progress("starting", world.begin, world.begin, world.end, [ENCODER, BASE])
+        self._depth = DepthSource()
         self._queue: list[Entry] = []
         self._count = 0
         self._cycle = 0
@@ -223,6 +224,13 @@ class Scheduler:
         self.progress.kill = []
         self._wake.pop(tube, None)
 
+    def _end_hung(self, hung: list[int]) -> None:
+        """Have the launcher end what did not answer: it has missed events, and would go on as if it had not."""
+        if hung:
+            self.progress.kill = hung
+            self._tell(self.progress)
+            self.progress.kill = []
+
     def _push(self, at: float, address: int, kind: Due | None, frame: bytes) -> None:
         self._count += 1
         rank = 9 if kind is None else int(kind)
@@ -250,6 +258,7 @@ class Scheduler:
             elif kind is not Due.TIMER or self._wake.get(address) == at:
                 self._add(steps, true_time, address, kind, at, None, frame)
         answers = self.stepper.round(steps)
+        self._end_hung(self.stepper.drain_hung())
         for address in sorted(answers):
             self._on_answer(address, answers[address], true_time)
 
@@ -271,8 +280,8 @@ class Scheduler:
         self, at: float, steps: dict[int, list[FrameEvent]], true_time: dict[tuple[int, float], float]
     ) -> None:
         if at >= self.world.motion.begin:  # in the rack there is no bit
-            depth = bytes(msgpack.packb([at, self.world.bit_depth(at)]))
-            self._add(steps, true_time, BASE, Due.DEPTH, at, None, depth)
+            depth = encode(self._depth.measure(at, max(self.world.bit_depth(at), 0.0)))
+            self._add(steps, true_time, BASE, Due.DEPTH, at, depth, b"")
         self._add(steps, true_time, BASE, Due.TIMER, at, None, b"")
         for address in self.stepper.alive():
             if address == BASE or address not in self.progress.wanted:

@@ -28,8 +28,8 @@ class Process:
     def on_overrun(self, missed: int, now: float) -> None:
         """A cycle ended at ``now`` when ``missed`` later ones should have begun; only an own clock reports it."""
 
-    def on_depth(self, rig_time: float, md: float) -> None:
-        """The rig measured the depth of the bit (m); most processes do not hear it."""
+    def on_depth(self, payload: bytes, now: float) -> None:
+        """The rig sent a reading of the depth of the bit, or somebody sent other bytes; most processes hear none."""
 
     def on_timer(self, now: float) -> None:
         """A timer named by ``next_wake`` is due: hello, time requests, repetition."""

@@ -14,7 +14,7 @@ import pytest
 
 from groundstation.errors import StoreError
 from groundstation.service.store import Store
-from telemetry.messages import Event, ImuMean, NodeFlag, Severity, SurveyMeasurement
+from telemetry.messages import Event, ImuMean, NodeFlag, Severity, Stand, SurveyMeasurement
 
 COV = ((1e-6, 0.0, 0.0), (0.0, 1e-6, 0.0), (0.0, 0.0, 1e-6))
 
@@ -57,12 +57,12 @@ def test_what_was_added_is_there_after_a_restart_once(tmp_path: Path) -> None:
     assert store.add_message(survey(1, 1), 2.0)
     assert not store.add_message(survey(1, 1), 2.0)
     assert store.add_message(Event(1, 2, 5.0, Severity.WARNING, "yaw_reset", {"yaw_deg": 3.0}), None)
-    store.add_depth(900.0, 2.0)
+    store.keep_stand(Stand(1, 900.0, 950.0, 2.0))
     store.close()
     with closing(Store(url(tmp_path))) as again:
         assert [(s.message.sequence, s.md) for s in again.messages()] == [(1, 2.0), (2, None)]
         assert not again.add_message(survey(1, 1), 2.0)
-        assert again.depths() == [(900.0, 2.0)]
+        assert again.stands() == [Stand(1, 900.0, 950.0, 2.0)]
         assert again.boots == store.boots + 1
 
 
@@ -146,8 +146,8 @@ def test_a_url_that_is_none_is_refused_without_telling_a_password(wrong: str) ->
 def test_a_disk_that_refuses_is_an_error_of_the_store(tmp_path: Path) -> None:
     with closing(Store(url(tmp_path))) as store:
         with closing(sqlite3.connect(tmp_path / "ground.sqlite")) as connection:
-            connection.execute("drop table depths")
-        for use in (lambda: store.add_depth(1.0, 2.0), store.depths):
+            connection.execute("drop table stands")
+        for use in (lambda: store.keep_stand(Stand(1, 1.0, 2.0, 2.0)), store.stands):
             with pytest.raises(StoreError, match=r"ground\.sqlite"):
                 use()
 
@@ -166,5 +166,5 @@ def test_another_schema_is_refused(tmp_path: Path) -> None:
     with sqlite3.connect(tmp_path / "ground.sqlite") as connection:
         connection.execute("update meta set value = '99' where name = 'schema'")
     connection.close()
-    with pytest.raises(StoreError, match="schema 1, got 99"):
+    with pytest.raises(StoreError, match="schema 2, got 99"):
         Store(url(tmp_path))

@@ -52,7 +52,7 @@ class Surface(Process):
     def on_frame(self, side: Side, frame: bytes, now: float) -> None:
         for received in self.endpoint.receive(side, frame, now):
             if isinstance(received.message, Event):
-                self.endpoint.acknowledge(received.message.tube, received.message.sequence, now)
+                self.endpoint.acknowledge(received.message)
             self.heard.put(received.message)
 
     def first(self, kind: type, fits: Callable[[Any], bool]) -> Any:
