@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections import Counter
 from collections.abc import Iterator
 from dataclasses import dataclass, field
 
@@ -43,16 +42,10 @@ class Numbers:
 
     def __init__(self) -> None:
         self._series: dict[int, dict[int, Series]] = {}
-        self._stored: Counter[int] = Counter()
 
     def add_number(self, tube: int, number: int) -> None:
         """A message is stored."""
         self._of(tube, number).add_number(number)
-        self._stored[tube] += 1
-
-    def stored(self, tube: int) -> int:
-        """Messages of a tube that are stored."""
-        return self._stored[tube]
 
     def on_told(self, tube: int, newest: int) -> bool:
         """A tube names the newest number it gave out; True when it has begun to count anew."""

@@ -201,7 +201,8 @@ class GroundProcess(Process):
             return
         model.depth_heard_at = now
         for stand in reading.stands:
-            if stand.epoch in (EPOCH_UNKNOWN, model.epoch) and stand.md <= model.tally.deepest:
+            is_present = stand.epoch in (EPOCH_UNKNOWN, model.epoch) and stand.ended_at <= reading.at
+            if is_present and stand.md <= model.tally.deepest:
                 self._on_stand(replace(stand, epoch=model.epoch))
         self._keep_stand(reading)
         self._place_waiting()

@@ -135,8 +135,10 @@ class Store:
         payload = encode(message)
         row = row_of(message, payload)
         with self._writing() as connection:
-            if connection.execute(sa.select(MESSAGES.c.id).where(_same(row))).first() is not None:
+            there = connection.execute(sa.select(MESSAGES.c.payload).where(_same(row))).first()
+            if there is not None and there.payload == payload:
                 return False
+            connection.execute(sa.delete(MESSAGES).where(_same(row)))  # of a row that is damaged
             kind = type(message).__name__
             connection.execute(sa.insert(MESSAGES).values(**row, kind=kind, md=md, below=below, payload=payload))
         return True

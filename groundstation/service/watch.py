@@ -7,6 +7,7 @@ from dataclasses import dataclass
 
 from groundstation.service.model import RigModel
 from groundstation.service.numbers import Range
+from telemetry.application.endpoint import SERIES_SHIFT
 from telemetry.messages import EPOCH_UNKNOWN, Event, NodeFlag, NodeState, SurveyMeasurement
 
 LOOK_EVERY = 0.5  # s, own clock
@@ -17,7 +18,6 @@ ASK_EVERY = 120.0  # s between two orders to send a range again
 ASKED_AT_MOST = 3
 REFUSALS = 3  # readings of the depth refused in a row until that is told
 SENSOR = NodeFlag.SENSOR_FAULT | NodeFlag.YAW_UNTRUSTED | NodeFlag.RATE_EXCEEDED
-RESTARTED = ("booted", "restored")
 OF_THE_DISK = ("saved_state_lost", "boot_counter_lost", "parameters_fallback")
 
 
@@ -73,8 +73,8 @@ class Watch:
     def on_event(self, event: Event) -> None:
         """Judge an event when it comes."""
         tube = f"tube {event.tube}" if event.tube else "encoder"
-        is_first = event.code == "booted" and self._model.numbers.stored(event.tube) <= 1
-        if event.code in RESTARTED and not is_first:
+        is_later_series = event.sequence >> SERIES_SHIFT > 0
+        if event.code == "restored" or (event.code == "booted" and is_later_series):
             self._alarms.alert("tube_restarted", tube, event.code)
         elif event.code in OF_THE_DISK:
             self._alarms.alert("tube_restarted", tube, f"{event.code}: {event.arguments.get('detail', '')}"[:200])

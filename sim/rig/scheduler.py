@@ -280,7 +280,8 @@ class Scheduler:
         self, at: float, steps: dict[int, list[FrameEvent]], true_time: dict[tuple[int, float], float]
     ) -> None:
         if at >= self.world.motion.begin:  # in the rack there is no bit
-            depth = encode(self._depth.measure(at, max(self.world.bit_depth(at), 0.0)))
+            rig_time = self.world.local_clock(ENCODER, at)
+            depth = encode(self._depth.measure(rig_time, max(self.world.bit_depth(at), 0.0)))
             self._add(steps, true_time, BASE, Due.DEPTH, at, depth, b"")
         self._add(steps, true_time, BASE, Due.TIMER, at, None, b"")
         for address in self.stepper.alive():

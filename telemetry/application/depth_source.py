@@ -27,8 +27,11 @@ class DepthSource:
 
     def measure(self, at: float, md: float, epoch: int = EPOCH_UNKNOWN) -> DepthReading:
         """Reading of the depth ``md`` (m) at rig time ``at`` (s); two alike one after the other are a stand."""
-        if self._last is not None and self._last[0] == epoch and self._last[2] == md and self._last[1] < at:
-            self._extend_stand(epoch, self._last[1], at, md)
+        if self._last is not None and self._last[0] == epoch:
+            if at < self._last[1]:
+                self._stands.clear()  # rig time counts anew, whether or not the source knows its epoch
+            elif self._last[2] == md:
+                self._extend_stand(epoch, self._last[1], at, md)
         self._last = (epoch, at, md)
         self._sequence += 1
         return DepthReading(self._sequence, at, md, tuple(self._stands), epoch)
