@@ -170,6 +170,17 @@ async def test_surveys_find_their_stations(rig: tuple[Rig, ZenohBus]) -> None:
     assert (await ask(bus, f"{GROUND}/status"))["measurements"] == 3
 
 
+@pytest.mark.parametrize("selector", ["**", "borechain/**", "borechain/rig-1/cmd/*", "borechain/rig-1/cmd/**", "*/*"])
+async def test_a_selector_that_covers_everything_orders_nothing_and_ends_nobody(
+    rig: tuple[Rig, ZenohBus], selector: str
+) -> None:
+    it, bus = rig
+    replies = await asyncio.to_thread(bus.get, selector, 10.0)
+    assert all(reply.error is None or "\n" not in reply.error for reply in replies)
+    assert (await ask(bus, f"{GROUND}/orders"))["orders"] == []
+    assert it.ground.endpoint.counters["failed_queries"] == 0
+
+
 async def test_a_range_answers_only_the_range(rig: tuple[Rig, ZenohBus]) -> None:
     _, bus = rig
     assert [p["md_m"] for p in (await ask(bus, f"{GROUND}/trajectory"))["points"]] == [0.0, 2.0, 4.0]

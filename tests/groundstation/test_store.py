@@ -152,6 +152,43 @@ def test_a_disk_that_refuses_is_an_error_of_the_store(tmp_path: Path) -> None:
                 use()
 
 
+def test_a_damaged_message_is_passed_over_counted_and_taken_again(tmp_path: Path) -> None:
+    with closing(Store(url(tmp_path))) as store:
+        store.add_message(survey(1, 1), 2.0)
+        store.add_message(survey(1, 2), 2.0)
+    with closing(sqlite3.connect(tmp_path / "ground.sqlite")) as connection:
+        connection.execute("update messages set payload = x'c1' where sequence = 1")
+        connection.commit()
+    with closing(Store(url(tmp_path))) as again:
+        assert [s.message.sequence for s in again.messages()] == [2]
+        assert again.damaged == 1
+        assert again.add_message(survey(1, 1), 2.0)
+        assert sorted(s.message.sequence for s in again.messages()) == [1, 2]
+
+
+def test_a_database_that_was_removed_takes_nothing_and_says_why(tmp_path: Path) -> None:
+    with closing(Store(url(tmp_path))) as store:
+        store.add_message(survey(1, 1), 2.0)
+        for file in tmp_path.glob("ground.sqlite*"):
+            file.unlink()
+        with pytest.raises(StoreError, match="removed"):
+            store.add_message(survey(1, 2), 2.0)
+        assert "removed" in store.refusal
+
+
+def test_a_database_that_cannot_be_written_is_read(tmp_path: Path) -> None:
+    with closing(Store(url(tmp_path))) as store:
+        store.add_message(survey(1, 1), 2.0)
+        with closing(sqlite3.connect(tmp_path / "ground.sqlite", isolation_level=None)) as holder:
+            holder.execute("begin immediate")  # nobody else can write
+            with pytest.raises(StoreError, match="locked"):
+                store.add_message(survey(1, 2), 2.0)
+            assert store.refusal
+            assert [s.message.sequence for s in store.messages()] == [1]
+        assert store.add_message(survey(1, 2), 2.0)
+        assert store.refusal == ""
+
+
 def test_the_order_of_the_string_is_kept(tmp_path: Path) -> None:
     with closing(Store(url(tmp_path))) as store:
         assert store.tally() == []
