@@ -32,6 +32,7 @@ EVENTS_SHOWN = 10_000
 STATIC_RECORDS_SHOWN = 1_000
 ACCELEROMETER_NOISE_DEG = 0.02  # one sample, for the check of motion
 ABOVE_COLLAR = 0.01  # m, of rounding; a node higher up is in no hole
+ALL_HEARD_WITHIN = 2.0  # s, of tubes that speak
 SAME_STOP = 15.0  # s, within which two surveys were taken at one stop
 
 
@@ -162,6 +163,7 @@ class RigModel:
         self.now = math.nan  # s, own clock
         self.rig_now = math.nan
         self.epoch = EPOCH_UNKNOWN
+        self._tally_known_at = math.inf  # s, own clock, from which on every tube that speaks has been heard
         self.depth_heard_at = -math.inf  # s, own clock
         self._heard_at: dict[int, float] = {}  # s, own clock, of each tube's newest state
         self.shared = SharedErrors()
@@ -179,15 +181,29 @@ class RigModel:
         known = self.nodes.get(state.tube)
         if known is None or state.epoch != known.epoch or state.at >= known.at:
             self.nodes[state.tube] = state
+            self._tally_known_at = min(self._tally_known_at, now + ALL_HEARD_WITHIN)
             self.tally.on_hops(state.tube, state.hops)
 
+    def restore_tally(self, tubes: list[int]) -> None:
+        """Go on with the tubes that were known before a restart."""
+        self.tally.restore(tubes)
+        if tubes:
+            self._tally_known_at = -math.inf
+
     def string_below(self, measurement: SurveyMeasurement) -> float | None:
-        """Length (m) of string below a tube now that its survey has come; None for one that nobody can place."""
+        """Length (m) of string below a tube; None while the tubes known are not those that reach the bit.
+
+        A ground station that has lost its database meets the tubes one after the other, the upper ones first.
+        """
         self.tally.on_hops(measurement.tube, self._hops_if_unknown(measurement))
+        bit = self.depths.latest
+        if bit is None or self.tally.misfit(bit, ()) or self.now < self._tally_known_at:
+            return None
         return self.tally.length_below(measurement.tube)
 
     def depth_of(self, measurement: SurveyMeasurement, below: float | None) -> float | None:
         """Measured depth (m) of the tube's node when it surveyed; None where no depth brackets its time."""
+        below = self.string_below(measurement) if below is None else below
         if below is None or trust_of(measurement.flags) is Trust.UNDATED:
             return None
         bit = self.depths.at(measurement.epoch or self.epoch, measurement.station_at)

@@ -77,7 +77,7 @@ class GroundProcess(Process):
         self._early: deque[DepthReading] = deque(maxlen=EARLY)
         self._kept_stand: Stand | None = None
         self.model.epoch = self.store.epoch()
-        self.model.tally.restore(self.store.tally())
+        self.model.restore_tally(self.store.tally())
         self._kept_tally = list(self.model.tally.tubes)
         for stand in self.store.stands():
             self._on_stand(stand)

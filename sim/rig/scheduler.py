@@ -27,7 +27,8 @@ from telemetry.messages import BASE, ENCODER, Side, address_name
 from telemetry.presentation.msgpack_codec import encode
 from telemetry.runtime.stepped import Due, DueEvent
 
-ATTACH_LIMIT = 60.0  # wall s
+ATTACH_LIMIT = 90.0  # wall s
+FROZEN_AFTER = 30.0  # wall s of it, after which a process that was there is ended
 TELL_EVERY = 0.5  # wall s
 CUE_LIMIT = 120.0  # wall s
 REBOOT_TIME = 5.0  # rig s that a process may be missing before the rig's time waits for it
@@ -86,6 +87,7 @@ class Scheduler:
         self._wake: dict[int, float] = {}
         self._string: tuple[int, ...] = ()
         self._open_top = False
+        self._attached: set[int] = set()  # that were there at any time
         self._missing_since: dict[int, float] = {}
         self._changes: deque[Change] = deque()
         self._stopping = False
@@ -204,10 +206,16 @@ class Scheduler:
         self._attach(tube)
 
     def _attach(self, address: int) -> None:
-        """Tell again and again that the process is wanted (who starts it may listen later) until it is there."""
-        for _ in range(int(ATTACH_LIMIT / TELL_EVERY)):
+        """Tell again and again that the process is wanted (who starts it may listen later) until it is there.
+
+        One that was there and does not come back by itself is perhaps frozen: the launcher is told to end it.
+        """
+        for turn in range(int(ATTACH_LIMIT / TELL_EVERY)):
+            if turn == int(FROZEN_AFTER / TELL_EVERY) and address in self._attached:
+                self._end_hung([address])
             self._tell(self.progress)
             if self._stopping or self.stepper.wait_for(address, alive=True, timeout=TELL_EVERY):
+                self._attached.add(address)
                 return
         raise RigError(f"process {address_name(address)} did not attach within {ATTACH_LIMIT:.0f} s")
 
