@@ -30,9 +30,10 @@ from telemetry.messages import BlockStatus, Command
 from telemetry.parameters import ParameterBlock
 
 START_SHIFT = 20  # orders of one start of the ground station, as a power of two
-OPEN_AT_MOST = 64  # orders that wait for a tube's answer
+OPEN_AT_MOST = 16  # orders that wait for the answer of one tube
 ANSWERED_WITHIN = 900.0  # s, own clock, after which an order that no tube has answered is withdrawn
 NO_KEY = "key_file: expected the key file of the rig, without it no node takes a block"
+UPLOAD = "upload_parameters"
 RECALIBRATION = "recalibration"  # who orders what the calibration in the field asks for
 
 
@@ -133,7 +134,7 @@ class Operator:
         """
         self._check_key()
         self._check_tube(block.tube)
-        order = self._new_order(find_command("upload_parameters"), block.tube, {"version": block.version}, by)
+        order = self._new_order(find_command(UPLOAD), block.tube, {"version": block.version}, by)
         self._start_upload(order, block)
         self._keep(order)
         return order
@@ -165,13 +166,14 @@ class Operator:
         order.advance(OrderState.DONE)
 
     def expire_orders(self, now: float) -> None:
-        """Withdraw what no tube has answered by ``now`` (s, own clock)."""
-        for order in list(self._orders):
-            if not order.answered and now > self._accepted_at.get(order.number, now) + ANSWERED_WITHIN:
+        """Withdraw what no tube has answered by ``now`` (s, own clock); the calibration in the field minds its own."""
+        for order in self._waiting():
+            if order.state is OrderState.SENT and now > self._accepted_at.get(order.number, now) + ANSWERED_WITHIN:
                 self.ended(order.number)
+                if self._uploads is not None and order.spec.name == UPLOAD and order.tube is not None:
+                    self._uploads.cancel(order.tube)
                 self._orders.fail(order.number, f"tube {order.tube} has not answered in {ANSWERED_WITHIN:.0f} s")
-        known = {order.number for order in self._orders if not order.answered}
-        self._accepted_at = {number: self._accepted_at.get(number, now) for number in known}
+        self._accepted_at = {o.number: self._accepted_at.get(o.number, now) for o in self._waiting()}
         self.publish_orders()
 
     def reply_of(self, order: Order) -> View:
@@ -227,7 +229,7 @@ class Operator:
     def _accept(self, spec: CommandSpec, tube: int | None, arguments: dict[str, Any], by: str) -> Order:
         if tube is not None:
             self._check_tube(tube)
-            self._check_room()
+            self._check_room(tube)
         order = self._new_order(spec, tube, arguments, by)
         if spec.by is ObeyedBy.GROUND:
             self._handlers[spec.name](order)
@@ -262,10 +264,13 @@ class Operator:
         if self._uploads is None:
             raise ConfigurationError(NO_KEY)
 
-    def _check_room(self) -> None:
-        waiting = sum(not order.answered for order in self._orders)
+    def _waiting(self) -> list[Order]:
+        return [order for order in self._orders if not order.answered and order.by != RECALIBRATION]
+
+    def _check_room(self, tube: int) -> None:
+        waiting = sum(order.tube == tube for order in self._waiting())
         if waiting >= OPEN_AT_MOST:
-            raise SelectorError(f"orders: expected at most {OPEN_AT_MOST} without an answer, there are {waiting}; wait")
+            raise SelectorError(f"tube {tube}: expected at most {OPEN_AT_MOST} orders without an answer, got {waiting}")
 
     def _check_tube(self, tube: int) -> None:
         known = self._model.tally.tubes + [t for t in sorted(self._model.nodes) if t not in self._model.tally.tubes]

@@ -8,6 +8,7 @@ from memory_rig import Rig
 
 from groundstation.config import GroundConfig
 from groundstation.errors import SelectorError
+from groundstation.service.operator import ANSWERED_WITHIN, OPEN_AT_MOST
 from groundstation.service.orders import KEPT, Order, OrderBook, OrderState
 from groundstation.service.process import GroundProcess
 from telemetry.application.commands import find_command
@@ -33,6 +34,20 @@ def test_an_order_to_a_silent_tube_holds_no_other_up_and_is_obeyed_once_it_is_ba
     rig.join(2, 1)
     rig.run(70.0, lambda: silent.answered)
     assert (silent.state, silent.detail) == (OrderState.DONE, "at the next settled cycle")
+
+
+def test_orders_to_a_silent_tube_are_bounded_and_withdrawn_in_the_end(rig: Rig) -> None:
+    rig.part(2, 1)
+    operator = rig.ground.operator
+    orders = [operator.command(1, "take_survey") for _ in range(OPEN_AT_MOST)]
+    with pytest.raises(SelectorError, match=f"tube 1: expected at most {OPEN_AT_MOST} orders without an answer"):
+        operator.command(1, "take_survey")
+    assert rig.order(2, "parameters").state is OrderState.DONE
+    operator.expire_orders(rig.ground.model.now + ANSWERED_WITHIN + 60.0)
+    assert {order.state for order in orders} == {OrderState.FAILED}
+    rig.join(2, 1)
+    rig.run(70.0)
+    assert {order.state for order in orders} == {OrderState.FAILED}
 
 
 def test_numbers_are_not_used_again_after_a_restart(rig: Rig) -> None:
