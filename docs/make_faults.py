@@ -16,8 +16,8 @@ from sim.gauntlet.kinds import KINDS, FaultKind  # noqa: E402
 SEEDS = 2
 PAGE = """# Faults
 
-Each kind of fault of `borechain gauntlet` by itself, {seeds} seeds a kind: what happens, how many of the three surveys of
-the schedule the ground station had at the end, and which alarms the crew saw meanwhile
+Each kind of fault of `borechain gauntlet` by itself, {seeds} seeds a kind: what happens, how many of the three surveys
+of the schedule the ground station had at the end, and which alarms the crew saw meanwhile
 ([what they mean](operate.md#what-the-crew-is-told)). A new tube is silent and does not know its yaw until it is screwed
 on, so `tube_silent` and `tube_sensor` come in every run and are left out here. Made by `python docs/make_faults.py`.
 
