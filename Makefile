@@ -7,7 +7,7 @@ STAMP := $(VENV)/.installed
 PYTEST := $(BIN)/python -m pytest --numprocesses auto --maxprocesses 8 --dist worksteal
 
 .DEFAULT_GOAL := rig
-.PHONY: help rig test quick check lint types contracts tests statistical explore lock study clean
+.PHONY: help rig test quick check lint types contracts kernels tests statistical explore lock study clean
 
 help:  ## list the targets
 	@awk -F ':.*## ' '/^[a-z]+:.*## / { printf "make %-12s %s\n", $$1, $$2 }' $(MAKEFILE_LIST)
@@ -15,7 +15,9 @@ help:  ## list the targets
 rig: $(STAMP)  ## set up and drill wellbore 1
 	$(BIN)/borechain rig scenarios/wellbore-1.toml --speed max --seed 1
 
-test: check tests  ## set up and run every check and every test, in parallel
+test: $(STAMP)  ## set up and run every check and every test, in parallel
+	$(MAKE) --jobs=2 --output-sync check kernels
+	$(MAKE) tests
 
 quick: check  ## lint, types, contracts and the fast tests: under 90 s
 	$(PYTEST) -m "not (slow or process or install or statistical)"
@@ -37,6 +39,9 @@ types: $(STAMP)  ## mypy, strict
 
 contracts: $(STAMP)  ## which package may import which
 	$(BIN)/lint-imports
+
+kernels: $(STAMP)  ## compile what the tests would compile, each worker for itself
+	$(BIN)/python -c "import borechain.warm_all"
 
 tests: $(STAMP)  ## every test but the statistical ones at full size
 	$(PYTEST) -m "not statistical"

@@ -20,6 +20,7 @@ from numba import njit
 
 from node.firmware.inputs import ImuReading, RigContext
 from node.firmware.tube import Tube
+from node.kernels.calibration import PARAMETERS
 from node.kernels.layout import default_config
 from node.kernels.record import AIDING, CLOCK_VAR, END, HOPS, JOINED, MOMENT, READING, START, SYNCHRONISED, new_node
 from node.kernels.string import string_aiding, string_step
@@ -64,21 +65,22 @@ class String:
 
     def __init__(self, world: World, kernel: str) -> None:
         tubes = world.scenario.tubes
-        self.configs = np.repeat(default_config(), tubes)
-        self.nodes = np.concatenate([new_node(self.configs[k : k + 1]) for k in range(tubes)])
+        config = default_config()
+        self.nodes = np.repeat(new_node(config), tubes)
+        self.corrections = np.zeros((tubes, 2), PARAMETERS)
         settings = [world.tube_settings(k + 1) for k in range(tubes)]
         self.tubes = [
             Tube(
                 replace(one, kernel=kernel, state_every=NEVER),
-                self.configs[k : k + 1],
+                config,
                 self.nodes[k : k + 1],
                 iter(range(NEVER)).__next__,
                 restored=False,
+                corrections=self.corrections[k],
             )
             for k, one in enumerate(settings)
         ]
-        crews, corrections = zip(*(tube.records for tube in self.tubes), strict=True)
-        self.crews, self.corrections = np.concatenate(crews), np.stack(corrections)
+        self.crews = np.concatenate([tube.crew for tube in self.tubes])
         self.places = np.arange(tubes)[::-1].copy()
 
 
@@ -114,12 +116,12 @@ def string_by_string(string: String, inputs: Inputs) -> Callable[[], None]:
     mask, says = np.ones(tubes, np.bool_), np.zeros(tubes, np.int64)
 
     def run() -> None:
-        nodes, configs, crews = string.nodes, string.configs, string.crews
+        nodes, crews = string.nodes, string.crews
         for k in range(len(inputs.aidings)):
             readings, moments = inputs.readings[k], inputs.moments[k]
-            string_step(nodes, configs, crews, string.corrections, readings, moments, mask, says)
+            string_step(nodes, crews, string.corrections, readings, moments, mask, says)
             valid = np.full(tubes, inputs.aidings[k, 5])
-            string_aiding(nodes, configs, crews, string.places, tubes, valid, inputs.aidings[k].copy())
+            string_aiding(nodes, crews, string.places, tubes, valid, inputs.aidings[k].copy())
 
     return run
 
@@ -127,7 +129,6 @@ def string_by_string(string: String, inputs: Inputs) -> Callable[[], None]:
 @njit
 def all_cycles(
     nodes: Any,
-    configs: Any,
     crews: Any,
     corrections: Any,
     readings: Any,
@@ -141,12 +142,12 @@ def all_cycles(
 ) -> None:
     """Every cycle of the string in one compiled loop."""
     for k in range(aidings.shape[0]):
-        string_step(nodes, configs, crews, corrections, readings[k], moments[k], mask, says)
+        string_step(nodes, crews, corrections, readings[k], moments[k], mask, says)
         for j in range(valid.shape[0]):
             valid[j] = aidings[k, 5]
         for j in range(work.shape[0]):
             work[j] = aidings[k, j]
-        string_aiding(nodes, configs, crews, places, places.shape[0], valid, work)
+        string_aiding(nodes, crews, places, places.shape[0], valid, work)
 
 
 def compiled(string: String, inputs: Inputs) -> Callable[[], None]:
@@ -155,7 +156,7 @@ def compiled(string: String, inputs: Inputs) -> Callable[[], None]:
     work = np.ones(tubes, np.bool_), np.zeros(tubes, np.int64), np.zeros(tubes), np.zeros(AIDING)
 
     def run() -> None:
-        tables = string.nodes, string.configs, string.crews, string.corrections
+        tables = string.nodes, string.crews, string.corrections
         all_cycles(*tables, inputs.readings, inputs.moments, inputs.aidings, string.places, *work)
 
     return run

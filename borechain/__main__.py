@@ -37,6 +37,7 @@ COMMANDS = {
         "wall",
         "Judge a wall: overlap, thickness, probability of a gap.",
     ),
+    "link": ("borechain.cli.link.link", "link", "Radio between tubes: through soil, inside the pipe."),
     "bench": ("borechain.cli.bench.bench", "bench", "Measure speed side by side with other libraries."),
     "experiment": ("borechain.cli.experiment.experiment", "experiment", "Rerun a published experiment beside ours."),
 }

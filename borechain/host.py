@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import queue
+import warnings
 from pathlib import Path
 
 import msgpack
@@ -24,10 +25,13 @@ def run_medium(
     from sim.rig.scheduler import Progress, Scheduler
     from sim.world.scenario import load_scenario
     from sim.world.world import World
+    from telemetry.radio.soil import PorosityWarning
 
     begin_process("medium")
     with reporting("medium"):
-        world = World(load_scenario(scenario, faults), seed)
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore", PorosityWarning)  # whoever started the rig was warned
+            world = World(load_scenario(scenario, faults), seed)
         session = open_router(place.endpoint) if router else open_client(place.endpoint, timeout=CONNECT_TIMEOUT)
         with session as bus:
             wanted = bus.publisher(keys.WANTED.format(rig=place.rig))

@@ -53,7 +53,9 @@ class InlineRig:
         config = GroundConfig(rig=rig, folder=private_folder(folder, "ground"), key_file=key_file, **settings)
         builders: dict[int, Build] = {
             BASE: partial(GroundProcess, config, lot),
-            ENCODER: partial(EncoderProcess, private_folder(folder, "encoder"), torque=world.torque_settings()),
+            ENCODER: partial(
+                EncoderProcess, private_folder(folder, "encoder"), torque=world.torque_settings(), reach=world.reach
+            ),
         }
         for tube in range(1, world.scenario.tubes + 1):
             place, key = private_folder(folder, f"tube-{tube}"), read_key(key_file)

@@ -10,9 +10,10 @@ import node.process.host
 import sim.rig.bus_stepper
 import sim.rig.scheduler
 import sim.world.world
-from node.kernels.warm import warm_up
+from node.kernels.warm import warm_encoder, warm_up
 
 warm_up()
+warm_encoder()
 # a collection in a child writes into every object that it looks at: 45 MB of shared pages would become its own
 gc.collect()
 gc.freeze()

@@ -8,11 +8,10 @@ from __future__ import annotations
 from borechain import warm
 from node.firmware.kernel_choice import kernel_of
 from node.firmware.settings import KERNELS
-from node.kernels.warm import warm_loop, warm_step
+from node.kernels.warm import warm_step
 
 for kernel in KERNELS:
     loop = kernel_of(kernel)
-    warm_loop(loop.run_cycle, loop.offer_aiding)
     warm_step(loop.step, loop.aiding)
 
 __all__ = ["warm"]

@@ -122,6 +122,11 @@ def node_record() -> str:
     return "\n".join(f"### {title}\n\n{table(head, rows)}" for title, rows in node_tables.record_parts())
 
 
+def encoder_record() -> str:
+    """The encoder node's record as a map."""
+    return table(("byte", "field", "type", "unit", "meaning"), node_tables.encoder_rows())
+
+
 def events() -> str:
     """Events of the node's step."""
     return table(("code", "event", "severity", "arguments", "meaning"), node_tables.event_rows())
@@ -154,7 +159,13 @@ PARTS = {
     "operate.md": {"rig alarms": rig_alarms, "trust": trust},
     "wire.md": {"kinds": kinds, "messages": messages},
     "keys.md": {"keys": key_table, "commands": tube_commands, "actions": actions, "answers": answers},
-    "firmware.md": {"record": node_record, "events": events, "outage": outage, "worth": worth},
+    "firmware.md": {
+        "record": node_record,
+        "encoder": encoder_record,
+        "events": events,
+        "outage": outage,
+        "worth": worth,
+    },
 }
 
 

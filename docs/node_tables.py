@@ -14,14 +14,29 @@ from typing import Any, Final
 import numpy as np
 
 from node.firmware.event_table import EVENT_TABLE
-from node.kernels import alignment, layout, record, static_average
+from node.kernels import alignment, encoder, layout, record, static_average
+from node.kernels.encoder import ENCODER
 from node.kernels.layout import DEG, default_config
 from node.kernels.record import NODE
 
 UNITS: Final = (
-    *("rad", "rad^2", "rad/s", "(rad/s)^2", "2^-32 turn", "unit vector", "s", "m/s^2", "(m/s^2)^2", "N m", "C"),
+    *(
+        "rad",
+        "rad^2",
+        "rad/s",
+        "(rad/s)^2",
+        "2^-32 turn",
+        "unit vector",
+        "s",
+        "m/s^2",
+        "(m/s^2)^2",
+        "N m",
+        "C",
+        "rad/s/sqrt(Hz)",
+    ),
+    *("s/sqrt(s)", "rad/sqrt(s)", "counts", "counts^2", "cycles", "sigmas"),
 )
-MODULES: Final = (layout, alignment, static_average, record)
+MODULES: Final = (layout, alignment, static_average, record, encoder)
 PERIODS: Final = {"5 minutes": 300.0, "1 hour": 3600.0, "8 hours": 28800.0, "1 day": 86400.0, "30 days": 2592000.0}
 SIGMAS_DEG: Final = (0.01, 0.02, 0.05, 0.1)
 
@@ -97,6 +112,11 @@ def record_parts() -> Iterator[tuple[str, list[tuple[str, ...]]]]:
         else:
             yield f"`{name}`: {meaning}, {kind.itemsize} bytes", list(rows_of(kind, offset))
     yield "Of the node itself", own
+
+
+def encoder_rows() -> Iterator[tuple[str, ...]]:
+    """Rows of the encoder node's record."""
+    yield from rows_of(ENCODER)
 
 
 def event_rows() -> Iterator[tuple[str, ...]]:

@@ -13,6 +13,7 @@
     ├── EncodeError(ValueError)       a message outside its declared range: nothing was sent
     ├── CommandError(ValueError)      an order outside the table of commands: nothing was sent
     ├── KeyFileError(ValueError)      the key of the rig is missing, open to others or none: correct the file
+    ├── RadioError(InputError, ValueError)    a frequency, a soil or a pipe outside a model: the message says its range
     └── CalibrationError(InputError, ValueError)    a record, a design or a file that gives no calibration
 """
 
@@ -53,6 +54,10 @@ class CommandError(TelemetryError, ValueError):
 
 class KeyFileError(TelemetryError, ValueError):
     """The file holds no key that may be used."""
+
+
+class RadioError(TelemetryError, InputError, ValueError):
+    """A value lies outside the model of a radio link; the message says its valid range."""
 
 
 class CalibrationError(TelemetryError, InputError, ValueError):

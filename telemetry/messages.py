@@ -10,6 +10,7 @@ that it counts from (``EPOCH_UNKNOWN`` where the sender is of an earlier schema)
 from __future__ import annotations
 
 import enum
+import math
 from dataclasses import dataclass, field
 from typing import TypeAlias
 
@@ -166,6 +167,8 @@ class NodeState:
     alignment: Vector3 = (0.0, 0.0, 0.0)  # rad: pitch, roll and their standard error, 0 if not aligned
     epoch: int = EPOCH_UNKNOWN
     numbered: int = 0  # newest number given to a survey, event or record; 0 if none, or not told
+    upper_margin: float = math.inf  # dB, of the frames heard from above over the radio's threshold; inf: no radio
+    lower_margin: float = math.inf  # dB, the same from below
 
 
 @dataclass(frozen=True, slots=True)

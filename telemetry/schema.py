@@ -123,6 +123,11 @@ def _time(name: str, key: str, meaning: str) -> Field:
     return Field(name, ValueKind.NUMBER, meaning, "s", -LARGEST_TIME, LARGEST_TIME, key=key, step=TIME_STEP)
 
 
+def _margin(name: str, key: str, where: str) -> Field:
+    meaning = f"of the frames from {where} over the radio's threshold; inf without a radio, or with nobody heard"
+    return Field(name, ValueKind.NUMBER, meaning, "dB", -200.0, math.inf, key=key, since=4, before=math.inf, step=0.5)
+
+
 TURN, VARIANCE, TORQUE, U32, U53 = math.tau, 100.0, 1e6, 2**32 - 1, 2**53
 ANGLE_STEP = TURN / 2**24  # rad
 TIME_STEP = 1e-5  # s
@@ -246,6 +251,8 @@ SCHEMA: tuple[MessageSpec, ...] = (
             ),
             EPOCH,
             _integer("numbered", "nn", 0, U53, "newest number given to what is kept, 0 if none", since=4, before=0),
+            _margin("upper_margin", "um", "above"),
+            _margin("lower_margin", "lm", "below"),
         ),
     ),
     MessageSpec(

@@ -80,7 +80,7 @@ def test_options_may_stand_in_a_file(tmp_path: Path) -> None:
     ("words", "offered"),
     [
         ("borechain ri", {"plain,rig"}),
-        ("borechain rig well", {"plain,wellbore-1", "file,well"}),
+        ("borechain rig well", {"plain,wellbore-1", "plain,wellbore-1-wet-clay", "file,well"}),
         ("borechain survey x.csv --method mini", {"plain,minimum-curvature"}),
     ],
 )

@@ -93,6 +93,8 @@ NODE: Fields = (
     FLAGS,
     integer("cycles", "since its start"),
     integer("overruns", "cycles that ended too late"),
+    number("upper_margin_db", "of the frames from above over the radio's threshold; null without a radio", null=True),
+    number("lower_margin_db", "the same from below", null=True),
     integer("parameters_version", "of the parameter block in use, 0 is the identity"),
     text("parameters_hash", "first 8 bytes of its SHA-256, hexadecimal"),
     group(

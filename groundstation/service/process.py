@@ -88,10 +88,10 @@ class GroundProcess(Process):
         for stored in self.store.messages():
             self._apply_stored(stored.message, stored.md, stored.below)
 
-    def on_frame(self, side: Side, frame: bytes, now: float) -> None:
+    def on_frame(self, side: Side, frame: bytes, now: float, margin: float = math.inf) -> None:
         """A frame arrived from the encoder."""
         self._send_pending(now)
-        for received in self.endpoint.receive(side, frame, now):
+        for received in self.endpoint.receive(side, frame, now, margin):
             self._on_message(received.message, now)
 
     def on_depth(self, payload: bytes, now: float) -> None:

@@ -104,6 +104,8 @@ def node(k: RigModel, tube: int) -> View:
         "flags": flag_names(s.flags),
         "cycles": s.cycles,
         "overruns": s.overruns,
+        "upper_margin_db": finite(s.upper_margin),
+        "lower_margin_db": finite(s.lower_margin),
         "parameters_version": s.parameters_version,
         "parameters_hash": s.parameters_hash.hex(),
         "alignment": alignment(s),

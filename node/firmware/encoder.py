@@ -1,26 +1,23 @@
-"""The encoder node: counts of the drive head become the measurement that every tube below relies on.
+"""The encoder node: samples of its counter go into the compiled step, aidings come out.
 
-While the head turns, the moment of the last edge is known: at that moment the angle is exact but for the edge's own
-jitter. A counter that does not time its edges is read in the middle of its count. At rest the angle is somewhere inside
-one count, a constant error, so the rest gives one measurement, repeated under one sequence number and never averaged
-(thesis 3.6 takes it as white). Where inside, the times of the last edges say, if they were taken
-(``node.firmware.edge_interpolation``).
+Where inside a count the head stopped the times of its last edges say, if they were taken
+(``node.firmware.edge_interpolation``); that is worked out once a stop, before the step that needs it.
 """
 
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
+
+import numpy as np
 
 from node.firmware.edge_interpolation import stopped_at
-from node.firmware.torque import TorqueSettings, TorqueWatch
+from node.firmware.torque import TorqueSettings, drive_record
+from node.kernels.encoder import BEYOND, BEYOND_VAR, EDGE_STD, QUANTUM, SAMPLE, encoder_step, new_encoder
+from node.kernels.record import A_RATE, A_TORQUE, A_VALID, A_YAW, A_YAW_VAR, AIDING
 from telemetry.messages import Aiding
 
-COUNTS_PER_TURN = 4096  # 1024 lines, decoded in quadrature
-QUANTUM = 2.0 * math.pi / COUNTS_PER_TURN
-EDGE_STD = math.radians(0.003)
 STOP_STD = 1.5 * EDGE_STD / QUANTUM  # counts; the form of a stop is not exactly a power of time
-FASTEST = 100.0  # rad/s, what two edges in a bouncing instant may seem
 
 
 @dataclass(frozen=True, slots=True)
@@ -36,70 +33,40 @@ class EncoderSample:
 
 
 class EncoderNode:
-    """Makes one aiding a cycle from the counter and the drive's torque."""
+    """Makes one aiding a cycle from the counter and the drive's torque.
+
+    Attributes
+    ----------
+    encoders : its record, one-element array of dtype ``ENCODER``
+    """
 
     def __init__(self, first_sequence: int = 0, torque: TorqueSettings | None = None) -> None:
-        self.sequence = first_sequence
-        self._torque = TorqueWatch(torque or TorqueSettings())
-        self._holding = False
-        self._edge_at: float | None = None
-        self._edge_angle = 0.0
-        self._resting = False
-        self._beyond: tuple[float, float] | None = None  # counts, counts^2: of the last edge, since the head stopped
+        settings = torque or TorqueSettings()
+        # before a restart the string may have been under the torque of drilling
+        self.encoders = new_encoder(first_sequence, settings.drilling)
+        self._drive = drive_record(settings)
+        self._sample, self._aiding = np.zeros(SAMPLE), np.zeros(AIDING)
 
     def on_cycle(self, sample: EncoderSample, now: float) -> Aiding:
-        """Measure at ``now`` (s, rig time): the last edge while turning, its place in the count at rest.
-
-        A drive that grips or releases the string makes a new measurement of a rest: what it is worth has changed.
-        """
-        turning = self._edge_at is not None and sample.edge_at > self._edge_at
-        torque = self._torque.on_cycle(sample.torque, turning=turning)
-        if torque.holding != self._holding:
-            self._holding = torque.holding
-            self._resting = False
-        if turning:
-            measured = self._turning(sample)
-        else:
-            self._remember(sample)
-            measured = self._at_rest(sample, now)
-        return replace(measured, torque=torque.size, under_torque=torque.holding)
-
-    def _turning(self, sample: EncoderSample) -> Aiding:
-        before_at, before_angle = self._edge_at, self._edge_angle
-        self._remember(sample)
-        elapsed = sample.edge_at - (before_at if before_at is not None else sample.edge_at)
-        self._resting, self._beyond = False, None
-        self.sequence += 1
-        rate = max(-FASTEST, min((self._edge_angle - before_angle) / elapsed, FASTEST))
-        if sample.timed:
-            return aiding(self._edge_angle, EDGE_STD**2, rate, sample.edge_at, self.sequence)
-        return aiding((sample.count + 0.5) * QUANTUM, QUANTUM**2 / 12.0, rate, sample.edge_at, self.sequence)
-
-    def _at_rest(self, sample: EncoderSample, now: float) -> Aiding:
-        if not self._resting:
-            self._resting = True
-            self.sequence += 1
-        if self._beyond is None:
-            self._beyond = stopped_at((sample.edge_at, *sample.earlier), STOP_STD)
-        beyond, var = self._beyond
-        angle = self._edge_angle + (beyond if sample.rising else -beyond) * QUANTUM
-        return aiding(angle, var * QUANTUM**2, 0.0, now, self.sequence)
-
-    def _remember(self, sample: EncoderSample) -> None:
-        self._edge_at = sample.edge_at
-        self._edge_angle = (sample.count + (0 if sample.rising else 1)) * QUANTUM
-
-
-def aiding(angle: float, var: float, rate: float, valid_at: float, sequence: int) -> Aiding:
-    """Aiding of the encoder itself: no joint passed, no systematic error."""
-    yaw = angle % (2.0 * math.pi)
-    return Aiding(
-        yaw=yaw if yaw < 2.0 * math.pi else 0.0,
-        yaw_var=var,
-        systematic_var=0.0,
-        offset=0.0,
-        rate=rate,
-        valid_at=valid_at,
-        sequence=sequence,
-        hops=0,
-    )
+        """Measure at ``now`` (s, rig time): the last edge while turning, its place in the count at rest."""
+        taken, aiding, encoder = self._sample, self._aiding, self.encoders[0]
+        torque = math.nan if sample.torque is None else sample.torque
+        taken[:BEYOND] = (
+            *(sample.count, sample.edge_at, sample.rising, sample.timed),
+            *(torque, sample.torque is not None, now),
+        )
+        if not encoder["placed"] and not sample.edge_at > encoder["edge_at"]:
+            taken[BEYOND : BEYOND_VAR + 1] = stopped_at((sample.edge_at, *sample.earlier), STOP_STD)
+        encoder_step(self.encoders, self._drive, taken, aiding)
+        return Aiding(
+            yaw=float(aiding[A_YAW]),
+            yaw_var=float(aiding[A_YAW_VAR]),
+            systematic_var=0.0,
+            offset=0.0,
+            rate=float(aiding[A_RATE]),
+            valid_at=float(aiding[A_VALID]),
+            sequence=int(encoder["sequence"]),
+            hops=0,
+            torque=float(aiding[A_TORQUE]),
+            under_torque=bool(encoder["holding"]),
+        )

@@ -33,15 +33,15 @@ class Reporter:
     Parameters
     ----------
     settings : what the crew entered
-    nodes, configs : the node's records, one-element arrays
+    nodes : the node's record, a one-element array
     next_sequence : source of the numbers of surveys and events
     restored : the state comes from a saved one
     """
 
     def __init__(
-        self, settings: TubeSettings, nodes: Array, configs: Array, next_sequence: Callable[[], int], *, restored: bool
+        self, settings: TubeSettings, nodes: Array, next_sequence: Callable[[], int], *, restored: bool
     ) -> None:
-        self._settings, self._node, self._config = settings, nodes[0], configs[0]
+        self._settings, self._node, self._config = settings, nodes[0], nodes[0]["config"]
         self._state = self._node["filter"]
         self._next_sequence = next_sequence
         self._restored = restored

@@ -97,13 +97,14 @@ def unpack(data: bytes) -> Saved:
     return Saved(np.frombuffer(record, NODE), body[state_size:], generation, saved_at)
 
 
-def resume(nodes: Array) -> bool:
+def resume(nodes: Array, configs: Array) -> bool:
     """Make a saved node ready for its first cycle after an outage of unknown length; whether it cut an alignment.
 
     What is learnt stays: constants, mounts, trust in the sensors, the twist. What belongs to the session goes, and
-    nobody knows what torque there was meanwhile.
+    nobody knows what torque there was meanwhile. The configuration in use is again the one given, ``configs`` (1).
     """
     forget_session(nodes)
+    nodes["config"] = configs
     node = nodes[0]
     resume_filter(node["filter"])
     node["twist"]["wound"] = 1

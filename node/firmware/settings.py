@@ -19,6 +19,7 @@ from telemetry.messages import MAX_TUBE
 Kernel: TypeAlias = Literal["float64", "fixed", "published"]
 KERNELS: Final = get_args(Kernel)
 TorsionRule: TypeAlias = Literal["gate", "variance"]
+MAX_REACH: Final = 8  # tubes away
 JointRule: TypeAlias = Literal["marks", "solved", "both"]
 
 
@@ -28,6 +29,14 @@ class Joint:
 
     angle: float = 0.0  # rad
     std: float = 0.0  # rad, constant error of the reading
+
+
+@dataclass(frozen=True, slots=True)
+class PassedTube:
+    """The joints of a tube above, for the time when it is silent and the one beyond it is heard."""
+
+    drive_joint: Joint = Joint()
+    lower_joint: Joint = Joint()
 
 
 @dataclass(frozen=True, slots=True)
@@ -48,6 +57,8 @@ class TubeSettings:
     joints: JointRule = "marks"  # source of the angle of a joint made up above
     unseen_std: float = 0.01 * DEG  # rad, what may turn unseen while a joint is made up
     imus: tuple[ImuSettings, ...] = (ImuSettings(),)  # of its cluster
+    reach: int = 1  # tubes away that its radio hears; beyond 1 tubes are numbered from the lowest up, without a gap
+    above: tuple[PassedTube, ...] = ()  # the next tubes above, nearest first; reach - 1 of them are used
 
     def __post_init__(self) -> None:
         """Refuse what cannot be.
@@ -59,6 +70,7 @@ class TubeSettings:
         """
         require(1 <= self.tube <= MAX_TUBE, f"tube: expected 1..{MAX_TUBE}, got {self.tube}")
         require(self.state_every >= 1, f"state_every: expected at least 1 cycle, got {self.state_every}")
+        require(1 <= self.reach <= MAX_REACH, f"reach: expected 1..{MAX_REACH} tubes, got {self.reach}")
         age = self.aiding_old_after
         require(math.isfinite(age) and age > 0.0, f"aiding_old_after: expected a time in s, got {age}")
         count = len(self.imus)

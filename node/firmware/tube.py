@@ -17,9 +17,10 @@ from node.firmware.reporter import Reporter
 from node.firmware.settings import TubeSettings, crew_record
 from node.firmware.static_record import begin_record, static_record
 from node.kernels.aligner import FASTEST, Reason, drop_alignment, refuse_alignment
+from node.kernels.calibration import PARAMETERS
 from node.kernels.cluster import begin_cluster
 from node.kernels.events import NONE
-from node.kernels.layout import DEG, Array, Scheme
+from node.kernels.layout import DEG, UNKNOWN_YAW_VAR, Array, Scheme
 from node.kernels.modes import STATIC_BIAS
 from node.kernels.record import AIDING, MOMENT, READING
 from node.kernels.resets import forget_bias, lose_tilt
@@ -41,12 +42,15 @@ from telemetry.messages import (
     Event,
     NodeFlag,
     NodeState,
+    Scalar,
     Severity,
     StaticRecord,
     SurveyMeasurement,
     Value,
 )
 from telemetry.parameters import SHORT_HASH, ParameterBlock
+
+LONGEST_WORTH = 1e9  # s, of a saved yaw: a string that is said never to turn unseen
 
 Said = Aiding | SurveyMeasurement | StaticRecord | Event | NodeState
 
@@ -57,10 +61,13 @@ class Tube:
     Parameters
     ----------
     settings : what the crew entered
-    configs, nodes : one-element arrays of dtype ``CONFIG`` and ``NODE``, owned by the caller
+    configs : one-element array of dtype ``CONFIG``, read once
+    nodes : one-element array of dtype ``NODE``, owned by the caller
     next_sequence : source of the numbers of surveys and events, kept across restarts by the caller
     restored : the record comes from a saved one
     parameters : block in use; None is the identity
+    corrections : (1 + IMUs,) of dtype ``PARAMETERS``, where the step reads the block in use and each IMU's own
+        correction, owned by the caller; None: by the node
     """
 
     def __init__(
@@ -72,22 +79,25 @@ class Tube:
         *,
         restored: bool,
         parameters: ParameterBlock | None = None,
+        corrections: Array | None = None,
     ) -> None:
         self.settings = settings
-        self.configs, self.nodes = configs, nodes
-        self.config, self.node = configs[0], nodes[0]
-        self.config["intersection"] = int(settings.scheme is Scheme.INTERSECTION)
+        nodes["config"] = configs
+        nodes["config"]["intersection"] = int(settings.scheme is Scheme.INTERSECTION)
+        self.nodes, self.node = nodes, nodes[0]
+        self.config = self.node["config"]
         self.state, self._mount = self.node["filter"], self.node["mount"]
         self._crew = crew_record(settings, configs)
         self._next_sequence = next_sequence
-        self._restored = restored
-        self.reporter = Reporter(settings, nodes, configs, next_sequence, restored=restored)
+        self.reporter = Reporter(settings, nodes, next_sequence, restored=restored)
+        self._restored, self._worth = restored, self._saved_yaw_worth()
         count = len(settings.imus)
         if count > 1:
-            begin_cluster(self.node, self.config, self._crew[0])
+            begin_cluster(self.node, self._crew[0])
         self._loop = kernel_of(settings.kernel)
         own = [ParameterBlock(settings.tube, 0, imu.gyroscope, imu.accelerometer) for imu in settings.imus]
-        self._corrections = np.concatenate([record_of(block) for block in (own[0], *own)])
+        self._corrections = np.zeros(1 + count, PARAMETERS) if corrections is None else corrections
+        self._corrections[:] = np.concatenate([record_of(block) for block in (own[0], *own)])
         self._readings, self._moment, self._aiding = np.zeros((count, READING)), np.zeros(MOMENT), np.zeros(AIDING)
         self.parameters = parameters or ParameterBlock(settings.tube, 0)
         self.use(self.parameters)
@@ -102,7 +112,7 @@ class Tube:
             *(a.yaw, a.yaw_var, a.systematic_var, a.offset, a.rate, valid_local, a.sequence, a.hops),
             *(a.torque, a.torsion_var, a.under_torque),
         )
-        if not self._loop.aiding(self.nodes, self.configs, self._crew, taken) & ONWARD:
+        if not self._loop.aiding(self.nodes, self._crew, taken) & ONWARD:
             return None
         node = self.node
         return Aiding(
@@ -127,7 +137,7 @@ class Tube:
         rows[0] = (*reading.rate, *reading.force, reading.temperature, reading.saturated)
         for k in range(1, len(rows)):
             rows[k] = _row_of(reading.others[k - 1]) if k <= len(reading.others) else math.nan
-        says = self._loop.step(self.nodes, self.configs, self._crew, self._corrections, rows, self._moment)
+        says = self._loop.step(self.nodes, self._crew, self._corrections, rows, self._moment)
         return [] if says in (0, ADMITTED) else list(self.say(says, reading.end, context))
 
     @property
@@ -136,15 +146,23 @@ class Tube:
         return self._loop.step is node_step
 
     @property
-    def records(self) -> tuple[Array, Array]:
-        """What ``node_step`` takes of the settings and of the parameters; read it, the tube writes it."""
-        return self._crew, self._corrections
+    def crew(self) -> Array:
+        """The settings as ``node_step`` takes them, one-element array of dtype ``SETTINGS``; they do not change."""
+        return self._crew
 
     def boot_event(self, rig_now: float) -> Event:
         """Report that the node started, and whether with its saved yaw."""
-        return self.reporter.event(
-            "restored" if self._restored else "booted", Severity.INFO, rig_now, {"yaw_deg": self.yaw / DEG}
-        )
+        arguments: dict[str, Scalar] = {"yaw_deg": self.yaw / DEG}
+        if not self._restored:
+            return self.reporter.event("booted", Severity.INFO, rig_now, arguments)
+        return self.reporter.event("restored", Severity.INFO, rig_now, arguments | {"worth_h": self._worth / 3600.0})
+
+    def _saved_yaw_worth(self) -> float:
+        """Outage (s) after which a string at rest may have turned unseen by the yaw's sigma; 0 of an unknown yaw."""
+        if not self.state["yaw_known"] or self.yaw_var >= UNKNOWN_YAW_VAR:
+            return 0.0
+        walk_var = float(self.config["still_walk"]) ** 2
+        return min(self.yaw_var / walk_var, LONGEST_WORTH) if walk_var > 0.0 else LONGEST_WORTH
 
     @property
     def raw(self) -> ImuReading:

@@ -17,14 +17,14 @@ import math
 from typing import Any, Final
 
 from node.kernels.events import Fault
-from node.kernels.jit import kernel
+from node.kernels.jit import constant, kernel
 from node.kernels.record import DISAGREEMENTS
 
 GROWTH: Final = 1.5  # sigmas from one aiding to the next, in one direction
 SMALLEST_STEP: Final = math.radians(0.03)  # rad/s
 STEADY: Final = 0.3  # of a mismatch, what two in a row may differ by to be one step
 SLOWEST_SCALE: Final = math.radians(5.0)  # rad/s, from where a mismatch may be one of scale
-GYRO_STEP, GYRO_SCALE = int(Fault.GYRO_STEP), int(Fault.GYRO_SCALE)
+GYRO_STEP, GYRO_SCALE = constant(Fault.GYRO_STEP), constant(Fault.GYRO_SCALE)
 
 
 @kernel

@@ -14,7 +14,7 @@ from node.kernels.alignment import CIRCLE, add_to_sweep, clear_sweep, fit_circle
 from node.kernels.angles import from_binary, wrap
 from node.kernels.cluster import all_used
 from node.kernels.events import NONE, Code, tell, tell_more
-from node.kernels.jit import kernel
+from node.kernels.jit import constant, kernel
 from node.kernels.layout import DEG, PERIOD, RING, Array
 
 SLOWEST, FASTEST = 2.0 * DEG, 15.0 * DEG  # rad/s, of the turn
@@ -50,13 +50,21 @@ class Reason(enum.IntEnum):
     OTHER_GYROSCOPE = 15
 
 
-CYCLES_LOST, SENSOR_FAULTY, TOO_FAST = int(Reason.CYCLES_LOST), int(Reason.SENSOR_FAULTY), int(Reason.TOO_FAST)
-TURNED_BACK, NEVER_TURNED = int(Reason.TURNED_BACK), int(Reason.NEVER_TURNED)
-TOO_FEW_TURNS, TOO_LONG, NO_CIRCLE = int(Reason.TOO_FEW_TURNS), int(Reason.TOO_LONG), int(Reason.NO_CIRCLE)
-SHAKES, LITTLE_LEAN, MUCH_LEAN = int(Reason.SHAKES), int(Reason.LITTLE_LEAN), int(Reason.MUCH_LEAN)
-LARGE_OFFSET = int(Reason.LARGE_OFFSET)
-BEGUN, TURNING, ALIGNED = int(Code.ALIGNMENT_BEGUN), int(Code.ALIGNMENT_TURNING), int(Code.ALIGNED)
-REFUSED, DROPPED = int(Code.ALIGNMENT_REFUSED), int(Code.ALIGNMENT_DROPPED)
+CYCLES_LOST, SENSOR_FAULTY, TOO_FAST = (
+    constant(Reason.CYCLES_LOST),
+    constant(Reason.SENSOR_FAULTY),
+    constant(Reason.TOO_FAST),
+)
+TURNED_BACK, NEVER_TURNED = constant(Reason.TURNED_BACK), constant(Reason.NEVER_TURNED)
+TOO_FEW_TURNS, TOO_LONG, NO_CIRCLE = (
+    constant(Reason.TOO_FEW_TURNS),
+    constant(Reason.TOO_LONG),
+    constant(Reason.NO_CIRCLE),
+)
+SHAKES, LITTLE_LEAN, MUCH_LEAN = constant(Reason.SHAKES), constant(Reason.LITTLE_LEAN), constant(Reason.MUCH_LEAN)
+LARGE_OFFSET = constant(Reason.LARGE_OFFSET)
+BEGUN, TURNING, ALIGNED = constant(Code.ALIGNMENT_BEGUN), constant(Code.ALIGNMENT_TURNING), constant(Code.ALIGNED)
+REFUSED, DROPPED = constant(Code.ALIGNMENT_REFUSED), constant(Code.ALIGNMENT_DROPPED)
 
 
 @kernel

@@ -53,18 +53,18 @@ def follow_offsets(rates: Array, fused: Array, samples: int, offsets: Array) -> 
 
 
 @kernel
-def fuse_imus(node: Any, config: Any, settings: Any, readings: Array) -> None:
+def fuse_imus(node: Any, settings: Any, readings: Array) -> None:
     """Judge the IMUs in one cycle and leave their fused reading in the node, NaN if none is sane.
 
     ``readings`` are raw, those of ``node.kernels.step.node_step``; corrected they lie in ``node.cluster``.
     """
     cluster = node.cluster
     watch_imus(cluster, settings, readings)
-    expect_reading(node, config, settings.imus)
+    expect_reading(node, settings.imus)
     compare_imus(node, settings)
     count = choose_imus(cluster, settings.imus)
     if tell_members(node, settings.imus) and count > 0:
-        reweigh(node, config, settings)
+        reweigh(node, settings)
     slot = cluster.cycles % RING
     for k in range(settings.imus):
         cluster.used[k] = cluster.chosen[k]
@@ -73,8 +73,9 @@ def fuse_imus(node: Any, config: Any, settings: Any, readings: Array) -> None:
         for i in range(3):
             cluster.ring_force[k, slot, i] = cluster.readings[k, 3 + i]
     cluster.cycles += 1
-    take_mean(cluster.readings, cluster.weights, count, cluster.fused, node.rate, node.force)
-    take_mean(readings, cluster.weights, count, cluster.fused, node.raw_rate, node.raw_force)
+    fused = cluster.fused[:]
+    take_mean(cluster.readings[:], cluster.weights, count, fused, node.rate, node.force)
+    take_mean(readings, cluster.weights, count, fused, node.raw_rate, node.raw_force)
     node.temperature = mean_temperature(readings, cluster.used, settings.imus, count)
 
 
@@ -99,7 +100,7 @@ def mean_temperature(readings: Array, used: Array, imus: int, count: int) -> flo
 
 
 @kernel
-def expect_reading(node: Any, config: Any, imus: int) -> None:
+def expect_reading(node: Any, imus: int) -> None:
     """Rate (rad/s) and force (m/s^2) that the node would read in this cycle if nothing had changed: (6).
 
     While IMUs are apart and no encoder is heard the rate before they were: what was fused since is not evidence
@@ -117,24 +118,24 @@ def expect_reading(node: Any, config: Any, imus: int) -> None:
         if not held:
             cluster.expected[i] = rate
         cluster.expects[i] = cluster.expected[i]
-        cluster.expects[3 + i] = -config.gravity * state.now_down[i]
+        cluster.expects[3 + i] = -node.config.gravity * state.now_down[i]
 
 
 @kernel
-def begin_cluster(node: Any, config: Any, settings: Any) -> None:
+def begin_cluster(node: Any, settings: Any) -> None:
     """Weigh the IMUs in use for the first time in a session."""
     for k in range(settings.imus):
         node.cluster.chosen[k] = node.cluster.used[k]
-    reweigh(node, config, settings)
+    reweigh(node, settings)
 
 
 @kernel
-def reweigh(node: Any, config: Any, settings: Any) -> None:
-    """Noise of the configuration for the IMUs chosen, and the doubt in a bias that is now another mean.
+def reweigh(node: Any, settings: Any) -> None:
+    """Noise of the configuration in use for the IMUs chosen, and the doubt in a bias that is now another mean.
 
     var(b' - b) = sigma_b^2 sum (w'_i - w_i)^2 noise_i^2: every gyroscope wanders by itself.
     """
-    cluster = node.cluster
+    cluster, config = node.cluster, node.config
     before = after = share = 0.0
     for k in range(settings.imus):
         before += settings.weight[k] if cluster.used[k] == 1 else 0.0
@@ -168,7 +169,7 @@ def learn_offsets(node: Any, settings: Any) -> None:
         return
     mount.rate_samples = min(mount.rate_samples + 1, MEMORY)
     mean = cluster.fused[:3]
-    fuse(cluster.rates, cluster.weights, mean)
+    fuse(cluster.rates[:], cluster.weights, mean)
     follow_offsets(cluster.rates[:imus], mean, mount.rate_samples, mount.rate_offset)
 
 

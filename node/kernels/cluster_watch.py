@@ -11,7 +11,7 @@ from typing import Any, Final
 import numpy as np
 
 from node.kernels.events import NONE, Code, tell
-from node.kernels.jit import kernel
+from node.kernels.jit import constant, kernel
 from node.kernels.layout import DEG, Array
 from node.kernels.record import FX, SATURATED, WX
 from node.kernels.sensor_watch import find_faults
@@ -23,7 +23,7 @@ RATE_APART, FORCE_APART = 0.5 * DEG, 0.3  # rad/s, m/s^2, between IMUs that agre
 SPIN_APART: Final = 0.02  # of the spin, on each axis: what scale and mount may be off by
 UNALIGNED_APART, UNALIGNED_SPIN = 1.0, 0.2  # the same of mounts never aligned; along the axis the spin counts as above
 CLEARLY: Final = 2.0  # times farther from what is expected: of two that disagree, the one to leave out
-IMU_EXCLUDED, IMU_BACK = int(Code.IMU_EXCLUDED), int(Code.IMU_BACK)
+IMU_EXCLUDED, IMU_BACK = constant(Code.IMU_EXCLUDED), constant(Code.IMU_BACK)
 INFINITE: Final = np.inf
 
 

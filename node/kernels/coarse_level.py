@@ -9,11 +9,11 @@ from __future__ import annotations
 import math
 from typing import Any, Final
 
-from node.kernels.jit import kernel
+from node.kernels.jit import constant, kernel
 from node.kernels.layout import DEG, Array, Err
 from node.kernels.sensor_watch import largest
 
-TX, TY = int(Err.TILT_X), int(Err.TILT_Y)
+TX, TY = constant(Err.TILT_X), constant(Err.TILT_Y)
 UNKNOWN_VAR: Final = 0.25  # rad^2 of tilt, above which nothing is known that a reading could spoil
 SLOWEST: Final = 6.0 * DEG  # rad/s, up to which a mean over a cycle is that of one attitude
 GRAVITY_ERROR: Final = 0.05  # of gravity, at rest

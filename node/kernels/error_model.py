@@ -8,11 +8,12 @@ from __future__ import annotations
 import math
 from typing import Any
 
-from node.kernels.jit import kernel
+from node.kernels.jit import constant, kernel
 from node.kernels.layout import STATES, Array, Err
 
-TX, TY, PSI = int(Err.TILT_X), int(Err.TILT_Y), int(Err.YAW)
-BX, BY, BZ, S, D = int(Err.BIAS_X), int(Err.BIAS_Y), int(Err.BIAS_Z), int(Err.SCALE), int(Err.STAMP)
+TX, TY, PSI = constant(Err.TILT_X), constant(Err.TILT_Y), constant(Err.YAW)
+BX, BY, BZ = constant(Err.BIAS_X), constant(Err.BIAS_Y), constant(Err.BIAS_Z)
+S, D = constant(Err.SCALE), constant(Err.STAMP)
 
 
 @kernel

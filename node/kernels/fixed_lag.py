@@ -11,16 +11,16 @@ from typing import Any
 
 from node.kernels.angles import advance_binary, from_binary, to_binary, wrap
 from node.kernels.error_model import isolate, propagate
-from node.kernels.jit import kernel
+from node.kernels.jit import constant, kernel
 from node.kernels.layout import CLOCK_SLACK, INVERTED, RING, STATES, UNKNOWN_YAW_VAR, Array, Err, Status
 from node.kernels.ring import drop_first_pending, stood_still
 from node.kernels.strapdown import rotate_down, yaw_rate
 from node.kernels.update import clear, feed_back, innovation_var, intersect, joseph, level, zero_rate
 
-PSI, BZ, D = int(Err.YAW), int(Err.BIAS_Z), int(Err.STAMP)
+PSI, BZ, D = constant(Err.YAW), constant(Err.BIAS_Z), constant(Err.STAMP)
 AIDED, REJECTED, YAW_RESET = int(Status.AIDED), int(Status.REJECTED), int(Status.YAW_RESET)
 LATE_DROPPED = int(Status.LATE_DROPPED)
-BX = int(Err.BIAS_X)
+BX = constant(Err.BIAS_X)
 
 
 @kernel

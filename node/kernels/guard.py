@@ -14,9 +14,10 @@ from typing import Any, Final
 from node.kernels.aiding_watch import STEADY, find_mismatch, forget
 from node.kernels.angles import from_binary, wrap
 from node.kernels.events import NONE, Code, Fault, tell
-from node.kernels.jit import kernel
-from node.kernels.layout import DEG, PERIOD, RING, Err, Status
+from node.kernels.jit import constant, kernel
+from node.kernels.layout import DEG, PERIOD, RING, Array, Err, Status
 from node.kernels.modes import STATIC_BIAS
+from node.kernels.record import A_RATE, A_VALID, A_YAW, A_YAW_VAR
 from node.kernels.resets import (
     begin_epoch,
     lose_tilt,
@@ -40,10 +41,10 @@ RATE_AGE: Final = 3.0  # s, of an encoder's rate that may stand for the gyroscop
 BACKWARD: Final = PERIOD  # s, that a cycle may begin before the end of the last; beyond it is a jump of the clock
 LONGEST_CYCLE: Final = 10.0 * PERIOD  # s
 FARTHEST: Final = RING * PERIOD  # s, that a cycle may begin after the end of the last
-PSI, BZ, S = int(Err.YAW), int(Err.BIAS_Z), int(Err.SCALE)
-BAD_SAMPLE, GYRO_STEP, GYRO_SCALE = int(Fault.BAD_SAMPLE), int(Fault.GYRO_STEP), int(Fault.GYRO_SCALE)
-AIDING_UNTIMELY, CLOCK_JUMPED = int(Code.AIDING_UNTIMELY), int(Code.CLOCK_JUMPED)
-SENSOR_RECOVERED = int(Code.SENSOR_RECOVERED)
+PSI, BZ, S = constant(Err.YAW), constant(Err.BIAS_Z), constant(Err.SCALE)
+BAD_SAMPLE, GYRO_STEP, GYRO_SCALE = constant(Fault.BAD_SAMPLE), constant(Fault.GYRO_STEP), constant(Fault.GYRO_SCALE)
+AIDING_UNTIMELY, CLOCK_JUMPED = constant(Code.AIDING_UNTIMELY), constant(Code.CLOCK_JUMPED)
+SENSOR_RECOVERED = constant(Code.SENSOR_RECOVERED)
 AIDED, REJECTED, YAW_RESET = int(Status.AIDED), int(Status.REJECTED), int(Status.YAW_RESET)
 REFERENCE_CHANGED = int(Status.REFERENCE_CHANGED)
 
@@ -61,33 +62,33 @@ def is_heard(node: Any) -> bool:
 
 
 @kernel
-def gate_aiding(node: Any, config: Any, yaw: float, yaw_var: float, rate: float, valid_local: float) -> bool:
-    """Whether an aiding is for the filter, valid at ``valid_local`` (s, own clock); ``yaw`` (rad) is this node's.
+def gate_aiding(node: Any, aiding: Array) -> bool:
+    """Whether an ``aiding`` of ``node.kernels.step.node_aiding`` is for the filter.
 
     One with an invalid time, or one far ahead, would wait for ever and hold up all others.
     """
-    state, guard = node.filter, node.guard
+    state, guard, valid_local = node.filter, node.guard, aiding[A_VALID]
     timely = math.isfinite(valid_local) and not (state.cycles > 0 and valid_local - state.now > LONGEST_CYCLE)
     if not timely and guard.untimely == 0:
         tell(node, AIDING_UNTIMELY, NONE, NONE, NONE, NONE)
     guard.untimely = 0 if timely else 1
     if not timely:
         return False
-    guard.rate, guard.rate_at, guard.aiding_var = rate, valid_local, yaw_var
-    if guard.gyro.fault != 0 or contradicts(node, config, yaw, valid_local):
+    guard.rate, guard.rate_at, guard.aiding_var = aiding[A_RATE], valid_local, aiding[A_YAW_VAR]
+    if guard.gyro.fault != 0 or contradicts(node, aiding[A_YAW] + node.down_offset, valid_local):
         state.last_sequence = -1  # a repetition at rest is to be judged again
     return True
 
 
 @kernel
-def contradicts(node: Any, config: Any, yaw: float, valid_local: float) -> bool:
+def contradicts(node: Any, yaw: float, valid_local: float) -> bool:
     """Whether a reference at rest (rad) is beyond the gate while the gyroscope says that the node turns."""
     state, guard = node.filter, node.guard
     if guard.rate != 0.0 or state.still_cycles > 0 or state.yaw_known == 0 or state.mode == STATIC_BIAS:
         return False
     then = from_binary(state.now_yaw) + state.now_rate * (valid_local - state.now)
     var = state.now_P[PSI, PSI] + guard.aiding_var
-    return bool(abs(wrap(yaw - then)) > config.gate * math.sqrt(var))
+    return bool(abs(wrap(yaw - then)) > node.config.gate * math.sqrt(var))
 
 
 @kernel
@@ -109,15 +110,15 @@ def admits(node: Any, start: float, end: float) -> bool:
 
 
 @kernel
-def guard_reading(node: Any, config: Any, settings: Any, saturated: int, at: float) -> None:
+def guard_reading(node: Any, settings: Any, saturated: int, at: float) -> None:
     """Judge the raw reading, and replace in ``node.rate`` and ``node.force`` what is not to be used."""
     state, guard, rate, force = node.filter, node.guard, node.rate, node.force
-    gyro, accelerometer = find_faults(guard.readings, settings, node.raw_rate, node.raw_force, saturated)
+    gyro, accelerometer = find_faults(guard.readings, settings, node.raw_rate[:], node.raw_force[:], saturated)
     known = abs(at - guard.rate_at) <= RATE_AGE
     measured = (rate[2] - state.static_bias[2] - state.bias[2]) / (1.0 + state.scale)
     if gyro == 0 and is_faulty(guard.gyro) and known and abs(measured - guard.rate) > CREDIBLE:
         gyro = guard.gyro.fault
-    follow_gyro(node, config, gyro)
+    follow_gyro(node, gyro)
     follow_force(node, accelerometer)
     if gyro != 0:
         for k in range(3):
@@ -127,12 +128,12 @@ def guard_reading(node: Any, config: Any, settings: Any, saturated: int, at: flo
         guard.sane_rate = measured
     if accelerometer != 0:
         for k in range(3):
-            force[k] = -config.gravity * state.now_down[k]
+            force[k] = -node.config.gravity * state.now_down[k]
     hold(node)
 
 
 @kernel
-def judge_cycle(node: Any, config: Any, status: int, at: float) -> None:
+def judge_cycle(node: Any, status: int, at: float) -> None:
     """See what the filter made of the cycle that ended at ``at`` (s, own clock)."""
     hold(node)
     state, guard = node.filter, node.guard
@@ -148,7 +149,7 @@ def judge_cycle(node: Any, config: Any, status: int, at: float) -> None:
     sigma = math.sqrt(max(state.innovation_var, 0.0))
     find_mismatch(guard.aidings, guard.found, state.innovation, sigma, state.now_rate, at, rejected, reset)
     if guard.found.fault != 0:
-        learn_mismatch(node, config)
+        learn_mismatch(node)
     elif guard.gyro.proving == 1:
         guard.agreed = 0 if rejected == 1 else guard.agreed + (1 if sigma < NARROW_STD else 0)
         if guard.agreed >= AGREEING:
@@ -156,7 +157,7 @@ def judge_cycle(node: Any, config: Any, status: int, at: float) -> None:
 
 
 @kernel
-def follow_gyro(node: Any, config: Any, fault: int) -> None:
+def follow_gyro(node: Any, fault: int) -> None:
     """Take one cycle's judgement of the gyroscope."""
     guard, trust = node.guard, node.guard.gyro
     if fault != 0:
@@ -175,7 +176,7 @@ def follow_gyro(node: Any, config: Any, fault: int) -> None:
             guard.agreed = 0
             forget(guard.aidings)
             lose_yaw_ahead(node.filter)
-            open_biases(node.filter, config)
+            open_biases(node.filter, node.config)
     if trust.fault != 0:
         trust.cycles += 1
 
@@ -218,9 +219,10 @@ def hold(node: Any) -> None:
 
 
 @kernel
-def learn_mismatch(node: Any, config: Any) -> None:
+def learn_mismatch(node: Any) -> None:
     """A lasting mismatch belongs to the sensor: its bias or its scale takes it, and the yaw starts again."""
-    state, guard, trust, found = node.filter, node.guard, node.guard.gyro, node.guard.found
+    state, config, guard = node.filter, node.config, node.guard
+    trust, found = guard.gyro, guard.found
     reconsider(node)
     prior = max(config.bias_std[2] ** 2 + state.static_bias_var[2], LEARNT_STD**2)
     scale_var = state.P[S, S]

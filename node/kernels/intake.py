@@ -13,23 +13,24 @@ from node.kernels.record import FX, SATURATED, TEMPERATURE, WX
 
 
 @kernel
-def take_readings(node: Any, config: Any, settings: Any, parameters: Array, readings: Array) -> int:
+def take_readings(node: Any, settings: Any, parameters: Array, readings: Array) -> int:
     """Leave in the node what one IMU would have read; 1 if a sample of it was at the range. See ``node_step``.
 
     A cluster looks at the range of each IMU by itself.
     """
     if settings.imus > 1:
-        take_cluster(node, config, settings, parameters, readings)
+        take_cluster(node, settings, parameters, readings)
         return 0
     correct_reading(node, parameters, readings, 0)
+    rate, force = node.rate[:], node.force[:]  # arrays, as those of a cluster: the kernels below are compiled once
     for i in range(3):
-        node.rate[i], node.force[i] = readings[0, WX + i], readings[0, FX + i]
-    correct_one(node, parameters, 0, node.temperature, node.rate, node.force)
+        rate[i], force[i] = readings[0, WX + i], readings[0, FX + i]
+    correct_one(node, parameters, 0, node.temperature, rate, force)
     return 1 if readings[0, SATURATED] != 0.0 else 0
 
 
 @kernel
-def take_cluster(node: Any, config: Any, settings: Any, parameters: Array, readings: Array) -> None:
+def take_cluster(node: Any, settings: Any, parameters: Array, readings: Array) -> None:
     """Correct the readings of several IMUs, each by itself, and fuse them."""
     cluster, offsets = node.cluster, node.mount.rate_offset
     for k in range(settings.imus):
@@ -40,7 +41,7 @@ def take_cluster(node: Any, config: Any, settings: Any, parameters: Array, readi
         correct_one(node, parameters, k, node.temperature, rate, force)
         for i in range(3):
             cluster.readings[k, i] = rate[i] - offsets[k, i]
-    fuse_imus(node, config, settings, readings)
+    fuse_imus(node, settings, readings)
 
 
 @kernel

@@ -16,12 +16,15 @@ import sys
 import tempfile
 from collections.abc import Callable
 from pathlib import Path
-from typing import Any, TypeVar, cast
+from typing import Any, Final, TypeVar, cast
 
 import numba
+import numpy as np
 from numba import config, njit
 
 Function = TypeVar("Function", bound=Callable[..., Any])
+# nobody calls kernels through C pointers: without that wrapper each compiles faster
+OPTIONS: Final[dict[str, Any]] = {"cache": True, "error_model": "numpy", "no_cfunc_wrapper": True}
 
 
 def source_digest() -> str:
@@ -73,4 +76,14 @@ if not os.environ.get("NUMBA_CACHE_DIR"):
 
 def kernel(function: Function) -> Function:
     """Compile ``function`` on its first call or load it from the cache."""
-    return cast("Function", njit(cache=True, error_model="numpy")(function))
+    return cast("Function", njit(**OPTIONS)(function))
+
+
+def shared_body(function: Function) -> Function:
+    """Write ``function`` into every kernel that calls it: kernels that it is given are known there and cost nothing."""
+    return cast("Function", njit(**OPTIONS, inline="always")(function))
+
+
+def constant(value: int) -> int:
+    """An integer that kernels give to each other: for every other plain ``int`` numba compiles the callee anew."""
+    return cast("int", np.int64(value))

@@ -125,28 +125,28 @@ STATE: Final = np.dtype(
 
 CONFIG: Final = np.dtype(
     [
-        ("gyro_noise", "f8", (3,)),  # rad/s/sqrt(Hz)
-        ("bias_std", "f8", (3,)),  # rad/s, Gauss-Markov
-        ("bias_tau", "f8", (3,)),  # s
-        ("boot_bias_std", "f8"),  # rad/s, before the node has stood still for long enough
+        ("gyro_noise", "f8", (3,)),  # rad/s/sqrt(Hz), white noise of the rates
+        ("bias_std", "f8", (3,)),  # rad/s, of the Gauss-Markov part of the biases
+        ("bias_tau", "f8", (3,)),  # s, time constant of that part
+        ("boot_bias_std", "f8"),  # rad/s, of a bias before the node has stood still for long enough
         ("attitude_factor", "f8"),  # A of thesis eq. 4.14
         ("bias_factor", "f8"),  # B of thesis eq. 4.15
-        ("scale_std", "f8"),  # prior; 0 switches the state off
-        ("stamp_std", "f8"),  # s, prior, until the clock tells its own; 0 switches the state off
+        ("scale_std", "f8"),  # prior of the scale error; 0 switches the state off
+        ("stamp_std", "f8"),  # s, prior of the time stamp, until the clock tells its own; 0 switches the state off
         ("stamp_walk", "f8"),  # s/sqrt(s), wander of the node's clock error
         ("still_walk", "f8"),  # rad/sqrt(s), what may turn unseen while still
-        ("aiding_floor_var", "f8"),  # rad^2 added to every aiding
-        ("force_std", "f8"),  # m/s^2, one sample
-        ("gravity", "f8"),  # m/s^2
-        ("gate", "f8"),  # sigmas
+        ("aiding_floor_var", "f8"),  # rad^2, added to every aiding
+        ("force_std", "f8"),  # m/s^2, of one sample
+        ("gravity", "f8"),  # m/s^2, of the site
+        ("gate", "f8"),  # sigmas, beyond which an aiding is rejected
         ("intersection", "i8"),  # 1 while the aiding's error may be correlated with the node's own in any way
         ("reject_limit", "i8"),  # rejected in a row before the yaw is reset
-        ("rate_limit", "f8"),  # rad/s
-        ("still_rate", "f8"),  # rad/s
+        ("rate_limit", "f8"),  # rad/s, from where the yaw cannot be followed
+        ("still_rate", "f8"),  # rad/s, up to which a node stands still
         ("lag_cycles", "i8"),  # the filter stays this far behind, to judge a cycle by its successor
-        ("survey_samples", "i8"),
-        ("settle_cycles", "i8"),
-        ("static_cycles", "i8"),
+        ("survey_samples", "i8"),  # cycles, of the average of a survey
+        ("settle_cycles", "i8"),  # cycles at rest, until it is taken
+        ("static_cycles", "i8"),  # cycles at rest, of the first bias
     ],
     align=True,
 )

@@ -14,127 +14,102 @@ from typing import Any, Final
 
 from node.kernels.angles import from_binary, wrap
 from node.kernels.events import NONE, Code, tell
-from node.kernels.jit import kernel
-from node.kernels.layout import DEG, Err
+from node.kernels.jit import constant, kernel
+from node.kernels.layout import DEG, Array, Err
+from node.kernels.record import A_HELD, A_HOPS, A_RATE, A_SEQUENCE, A_YAW, A_YAW_VAR
+from node.kernels.twist import twist_var
 
 MARKS, SOLVED, BOTH = 0, 1, 2  # source of the angles, ``settings.joints``
 SAME: Final = 1e-8  # rad, between two offsets of one string
 LARGEST_STD: Final = 1.0 * DEG  # of a saved yaw that can solve a joint
 CONTRADICTION: Final = 4.0  # sigmas between marks and solution
-STARTED_ANEW, UNKNOWN, MOVING = 1, 2, 3  # why the saved yaw cannot solve a joint
-PSI = int(Err.YAW)
-JOINT_SOLVED, JOINT_NOT_SOLVED = int(Code.JOINT_SOLVED), int(Code.JOINT_NOT_SOLVED)
-JOINT_CONTRADICTS_MARKS = int(Code.JOINT_CONTRADICTS_MARKS)
+STARTED_ANEW, UNKNOWN, MOVING = constant(1), constant(2), constant(3)  # why the saved yaw cannot solve a joint
+PSI = constant(Err.YAW)
+JOINT_SOLVED, JOINT_NOT_SOLVED = constant(Code.JOINT_SOLVED), constant(Code.JOINT_NOT_SOLVED)
+JOINT_CONTRADICTS_MARKS = constant(Code.JOINT_CONTRADICTS_MARKS)
 
 
 @kernel
-def follow_joints(
-    node: Any,
-    settings: Any,
-    yaw: float,
-    yaw_var: float,
-    rate: float,
-    sequence: int,
-    hops: int,
-    under_torque: int,
-    marks: float,
-    marks_var: float,
-    torsion_var: float,
-    reaching: float,
-) -> tuple[float, float]:
-    """Offset (rad) and systematic variance (rad^2) of this node, where the marks' are given.
+def follow_joints(node: Any, settings: Any, aiding: Array) -> None:
+    """Put the joints as solved in the place of those by their marks, in what the record hands down.
 
-    Of the node's present systematic variance ``torsion_var`` (rad^2) belongs to no joint; this aiding's part of it
-    is ``reaching``. The others are the aiding's own.
+    ``node.down_offset`` (rad) and ``node.down_systematic`` (rad^2) are given by the marks, of the ``aiding`` and of the
+    drive; the twist in the aiding is ``node.down_torsion`` (rad^2).
     """
     if settings.joints == MARKS:
-        return marks, marks_var
-    joints = node.joints
+        return
+    joints, hops, marks = node.joints, int(aiding[A_HOPS]), node.down_offset
     if joints.hops < 0:
-        resume_joint(node, hops, under_torque, marks, reaching)
+        resume_joint(node, aiding)
     elif hops != joints.hops or abs(wrap(marks - joints.marks)) > SAME:
-        make_up(
-            node,
-            settings,
-            yaw,
-            yaw_var,
-            rate,
-            sequence,
-            hops,
-            under_torque,
-            marks,
-            marks_var,
-            torsion_var,
-            reaching,
-        )
+        make_up(node, settings, aiding)
     joints.hops, joints.marks = hops, marks
-    if joints.solved == 0:
-        return marks, marks_var
-    return float(joints.offset), float(joints.var)
+    if joints.solved == 1:
+        node.down_offset, node.down_systematic = joints.offset, joints.var
 
 
 @kernel
-def resume_joint(node: Any, hops: int, under_torque: int, marks: float, reaching: float) -> None:
+def resume_joint(node: Any, aiding: Array) -> None:
     """After a start the earlier solution stands, if the string is still the same."""
-    state, joints = node.filter, node.joints
+    state, joints, hops = node.filter, node.joints, int(aiding[A_HOPS])
     if state.reference_hops >= 0 and state.reference_hops != hops:
         refuse_joint(node, STARTED_ANEW, hops)
-    elif state.reference_hops >= 0 and abs(wrap(state.reference_offset - marks)) > SAME:
+    elif state.reference_hops >= 0 and abs(wrap(state.reference_offset - node.down_offset)) > SAME:
         joints.solved = 1
         joints.offset = state.reference_offset
-        joints.var = max(state.systematic_var - (0.0 if under_torque == 1 else reaching), 0.0)
+        joints.var = max(state.systematic_var - (0.0 if aiding[A_HELD] != 0.0 else node.down_torsion), 0.0)
 
 
 @kernel
-def make_up(
-    node: Any,
-    settings: Any,
-    yaw: float,
-    yaw_var: float,
-    rate: float,
-    sequence: int,
-    hops: int,
-    under_torque: int,
-    marks: float,
-    marks_var: float,
-    torsion_var: float,
-    reaching: float,
-) -> None:
-    """The string above is another one: solve for its angle, or say why not."""
-    state, joints = node.filter, node.joints
-    P = state.now_P[PSI, PSI]
-    if state.yaw_known == 0 or P > LARGEST_STD**2:
+def make_up(node: Any, settings: Any, aiding: Array) -> None:
+    """The string above is another one: solve for its angle, or say why not.
+
+    Of the node's present systematic variance that of its twist belongs to no joint.
+    """
+    state, hops = node.filter, int(aiding[A_HOPS])
+    if state.yaw_known == 0 or state.now_P[PSI, PSI] > LARGEST_STD**2:
         refuse_joint(node, UNKNOWN, hops)
         return
-    if rate != 0.0 or under_torque == 1 or state.still_cycles == 0:
+    if aiding[A_RATE] != 0.0 or aiding[A_HELD] != 0.0 or state.still_cycles == 0:
         refuse_joint(node, MOVING, hops)
         return
     turned = state.stopped_at > state.last_aided
-    same = sequence == state.last_sequence and not turned
-    var = max(state.systematic_var - torsion_var, 0.0) + settings.unseen_var
+    same = int(aiding[A_SEQUENCE]) == state.last_sequence and not turned
+    var = max(state.systematic_var - twist_var(node.twist), 0.0) + settings.unseen_var
     if same:
         solved = float(state.reference_offset)
     else:
-        solved = wrap(from_binary(state.now_yaw) - yaw)
-        var += P + yaw_var
-    off = wrap(solved - marks)
-    contradicts = abs(off) > CONTRADICTION * math.sqrt(var + marks_var)
-    is_new = hops == 1 and joints.hops == 0
-    share = 1.0
-    if is_new and settings.joints == BOTH and not contradicts:
-        # the marks of two new joints are independent of all before; farther down the chain they bring nothing new
-        share = marks_var / (marks_var + var)
-    joints.solved = 1
-    joints.offset = solved if share == 1.0 else wrap(marks + share * off)
-    joints.var = share * var
+        solved = wrap(from_binary(state.now_yaw) - aiding[A_YAW])
+        var += state.now_P[PSI, PSI] + aiding[A_YAW_VAR]
+    off = wrap(solved - node.down_offset)
+    contradicts = abs(off) > CONTRADICTION * math.sqrt(var + node.down_systematic)
+    is_new = hops == 1 and node.joints.hops == 0
+    # the marks of two new joints are independent of all before; farther down the chain they bring nothing new
+    combines = is_new and settings.joints == BOTH and not contradicts
+    share = node.down_systematic / (node.down_systematic + var) if combines else 1.0
+    take_joint(node, solved if share == 1.0 else wrap(node.down_offset + share * off), share * var)
     if same and share == 1.0:  # the same reference, said by another neighbour
         state.reference_hops = hops
-        state.systematic_var = var + reaching
+        state.systematic_var = var + node.down_torsion
+    tell_joint(node, is_new, contradicts, turned)
+
+
+@kernel
+def take_joint(node: Any, offset: float, var: float) -> None:
+    """The joints above are solved: ``offset`` (rad) and its variance (rad^2)."""
+    joints = node.joints
+    joints.solved, joints.offset, joints.var = 1, offset, var
+
+
+@kernel
+def tell_joint(node: Any, is_new: bool, contradicts: bool, turned: bool) -> None:
+    """Tell of a joint just solved, if it ``is_new``, and if its marks contradict it; ``turned``: meanwhile."""
+    joints, marks = node.joints, node.down_offset / DEG
     angle, sigma = joints.offset / DEG, math.sqrt(joints.var) / DEG
     if is_new:
-        tell(node, JOINT_SOLVED, angle, sigma, marks / DEG, 1.0 if turned else 0.0)
+        tell(node, JOINT_SOLVED, angle, sigma, marks, 1.0 if turned else 0.0)
     if contradicts:
-        tell(node, JOINT_CONTRADICTS_MARKS, angle, sigma, marks / DEG, 1.0 if turned else 0.0)
+        tell(node, JOINT_CONTRADICTS_MARKS, angle, sigma, marks, 1.0 if turned else 0.0)
 
 
 @kernel

@@ -5,11 +5,11 @@ from __future__ import annotations
 from typing import Any
 
 from node.kernels.error_model import isolate
-from node.kernels.jit import kernel
+from node.kernels.jit import constant, kernel
 from node.kernels.layout import UNKNOWN_YAW_VAR, Array, Err, Status
 
-BX = int(Err.BIAS_X)
-PSI = int(Err.YAW)
+BX = constant(Err.BIAS_X)
+PSI = constant(Err.YAW)
 STATIC_BIAS, TRACKING, STILL, SURVEY, HELD = 1, 3, 4, 5, 6  # telemetry.messages.Mode, which kernels do not see
 STOPPED, STARTED, SURVEY_READY = int(Status.STOPPED), int(Status.STARTED), int(Status.SURVEY_READY)
 JOINT_OPENED, JOINT_CLOSED = int(Status.JOINT_OPENED), int(Status.JOINT_CLOSED)

@@ -11,7 +11,7 @@ from typing import Final
 import numpy as np
 
 from node.kernels.alignment import MAX_IMUS, MOUNT, OFFSET, SWEEP, new_mount
-from node.kernels.layout import RING, STATE, Array, new_state
+from node.kernels.layout import CONFIG, RING, STATE, Array, new_state
 from node.kernels.static_average import STATIC
 
 NODE_LAYOUT: Final = 4  # of the saved record; 1 and 2 held the filter alone, 3 what a start clears as well
@@ -207,6 +207,7 @@ NODE: Final = np.dtype(
         ("cluster", CLUSTER),  # IMUs of the tube beside each other
         ("aligner", ALIGNER),  # an alignment under way
         ("recording", RECORDING),  # a static record being taken
+        ("config", CONFIG),  # configuration in use: as given, with the noise of the IMUs and of the clock at present
     ],
     align=True,
 )
@@ -249,7 +250,7 @@ WX, WY, WZ, FX, FY, FZ, TEMPERATURE, SATURATED = range(8)
 READING: Final = 8
 START, END, JOINED, HOPS, CLOCK_VAR, SYNCHRONISED = range(6)
 MOMENT: Final = 6
-# an aiding, float64; see ``node.kernels.step.take_aiding``
+# an aiding, float64; see ``node.kernels.step.node_aiding``
 A_YAW, A_YAW_VAR, A_SYSTEMATIC, A_OFFSET, A_RATE, A_VALID, A_SEQUENCE, A_HOPS, A_TORQUE, A_TORSION, A_HELD = range(11)
 AIDING: Final = 11
 
@@ -259,6 +260,7 @@ def new_node(config: Array) -> Array:
     made = np.zeros(1, NODE)
     made["filter"] = new_state(config)
     made["mount"] = new_mount()
+    made["config"] = config
     forget_session(made)
     made["guard"]["before_steps"] = np.nan
     return made

@@ -11,11 +11,11 @@ from typing import Any
 
 from node.kernels.angles import wrap, wrap_positive
 from node.kernels.error_model import isolate
-from node.kernels.jit import kernel
+from node.kernels.jit import constant, kernel
 from node.kernels.layout import PENDING, Err, Status
 from node.kernels.ring import make_room
 
-PSI, D = int(Err.YAW), int(Err.STAMP)
+PSI, D = constant(Err.YAW), constant(Err.STAMP)
 REFERENCE_CHANGED = int(Status.REFERENCE_CHANGED)
 
 

@@ -10,12 +10,12 @@ import math
 from typing import Any
 
 from node.kernels.error_model import isolate
-from node.kernels.jit import kernel
+from node.kernels.jit import constant, kernel
 from node.kernels.layout import STATES, UNKNOWN_YAW_VAR, Err
 from node.kernels.modes import STATIC_BIAS
 
-TX, TY, PSI = int(Err.TILT_X), int(Err.TILT_Y), int(Err.YAW)
-BX, BZ, S, D = int(Err.BIAS_X), int(Err.BIAS_Z), int(Err.SCALE), int(Err.STAMP)
+TX, TY, PSI = constant(Err.TILT_X), constant(Err.TILT_Y), constant(Err.YAW)
+BX, BZ, S, D = constant(Err.BIAS_X), constant(Err.BIAS_Z), constant(Err.SCALE), constant(Err.STAMP)
 UNKNOWN_TILT_VAR = 1.0  # rad^2
 
 

@@ -15,13 +15,14 @@ import math
 from typing import Any, Final
 
 from node.kernels.events import Fault
-from node.kernels.jit import kernel
+from node.kernels.jit import constant, kernel
 from node.kernels.layout import Array
 
 NEAR_RANGE: Final = 0.999  # of the range, from where a reading counts as saturated
 FORCE_CYCLES: Final = 3  # in a row at the range: one knock is not a fault of the accelerometer
-BAD_SAMPLE, GYRO_SATURATED, GYRO_STUCK = int(Fault.BAD_SAMPLE), int(Fault.GYRO_SATURATED), int(Fault.GYRO_STUCK)
-FORCE_SATURATED, FORCE_STUCK = int(Fault.FORCE_SATURATED), int(Fault.FORCE_STUCK)
+BAD_SAMPLE = constant(Fault.BAD_SAMPLE)
+GYRO_SATURATED, GYRO_STUCK = constant(Fault.GYRO_SATURATED), constant(Fault.GYRO_STUCK)
+FORCE_SATURATED, FORCE_STUCK = constant(Fault.FORCE_SATURATED), constant(Fault.FORCE_STUCK)
 
 
 @kernel

@@ -8,6 +8,7 @@ before and after it serves every one, so each is a function of its own. Nothing 
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from typing import Any, Final
 
 from node.kernels.aligner import follow_alignment
@@ -18,11 +19,27 @@ from node.kernels.cycle import run_cycle
 from node.kernels.events import NONE, Code, tell
 from node.kernels.guard import admits, gate_aiding, guard_reading, judge_cycle
 from node.kernels.intake import take_readings
-from node.kernels.jit import kernel
+from node.kernels.jit import constant, kernel, shared_body
 from node.kernels.layout import CLOCK_SLACK, DEG, Array, Scheme, Status
 from node.kernels.make_up import follow_joints
 from node.kernels.modes import STATIC_BIAS
-from node.kernels.record import CLOCK_VAR, END, HOPS, JOINED, START, SYNCHRONISED
+from node.kernels.record import (
+    A_HOPS,
+    A_OFFSET,
+    A_SEQUENCE,
+    A_SYSTEMATIC,
+    A_TORQUE,
+    A_TORSION,
+    A_VALID,
+    A_YAW,
+    A_YAW_VAR,
+    CLOCK_VAR,
+    END,
+    HOPS,
+    JOINED,
+    START,
+    SYNCHRONISED,
+)
 from node.kernels.relay import offer_aiding
 from node.kernels.resets import set_stamp_prior, start_over
 from node.kernels.sensor_watch import largest
@@ -51,61 +68,69 @@ STATUS_TOLD: Final = (
     int(Status.BAD_SAMPLE),
     FILTER_FAULT,
 )
-AIDING_REJECTED = int(Code.AIDING_REJECTED)
+AIDING_REJECTED = constant(Code.AIDING_REJECTED)
 
 
 @kernel
-def node_step(nodes: Array, configs: Array, settings: Array, parameters: Array, readings: Array, moment: Array) -> int:
+def node_step(nodes: Array, settings: Array, parameters: Array, readings: Array, moment: Array) -> int:
     """One cycle of one node with the float64 loop; returns what there is to say.
 
     Parameters
     ----------
-    nodes, configs, settings : one-element arrays of dtype ``NODE``, ``CONFIG`` and ``SETTINGS``
+    nodes, settings : one-element arrays of dtype ``NODE`` and ``SETTINGS``
     parameters : of dtype ``PARAMETERS``: the block in use, then the own correction of each IMU
     readings : (imus, 8) rates (rad/s), forces (m/s^2), temperature (C), whether a sample was at the range
     moment : (6,) start and end (s, own clock), joined, hops, variance of the clock (s^2), synchronised
     """
+    return int(step_around(run_cycle, nodes, settings, parameters, readings, moment))
+
+
+@shared_body
+def step_around(
+    run_cycle: Callable[..., int], nodes: Array, settings: Array, parameters: Array, readings: Array, moment: Array
+) -> int:
+    """One cycle of one node around the loop ``run_cycle`` over its float64 record; see ``node_step``."""
     node = nodes[0]
-    waits = enter(nodes, configs, settings, parameters, readings, moment)
+    waits = enter(nodes, settings, parameters, readings, moment)
     if waits == REFUSED:
         return say_events(node)
     joined = 1 if moment[JOINED] != 0.0 else 0
-    status = run_cycle(node.filter, configs[0], node.rate, node.force, moment[START], moment[END], joined)
-    return leave(nodes, configs, settings, moment, status, waits)
+    status = run_cycle(node.filter, node.config, node.rate, node.force, moment[START], moment[END], joined)
+    return int(leave(nodes, settings, moment, status, waits))
 
 
 @kernel
-def enter(nodes: Array, configs: Array, settings: Array, parameters: Array, readings: Array, moment: Array) -> int:
+def enter(nodes: Array, settings: Array, parameters: Array, readings: Array, moment: Array) -> int:
     """What comes before the loop: its ``rate`` and ``force`` are left in the record; see ``node_step``.
 
     Returns ``REFUSED``, and the step ends here, or what ``leave`` is to be told: whether the survey waits.
     """
-    node, config, crew = nodes[0], configs[0], settings[0]
+    node, crew = nodes[0], settings[0]
     if not admits(node, moment[START], moment[END]):
         return REFUSED
-    saturated = take_readings(node, config, crew, parameters, readings)
-    return before_loop(node, config, crew, moment, saturated)
+    saturated = take_readings(node, crew, parameters, readings)
+    return before_loop(node, crew, moment, saturated)
 
 
 @kernel
-def leave(nodes: Array, configs: Array, settings: Array, moment: Array, status: int, waits: int) -> int:
+def leave(nodes: Array, settings: Array, moment: Array, status: int, waits: int) -> int:
     """What comes after a loop that returned ``status``; ``waits`` is the answer of ``enter``."""
-    node, config, crew = nodes[0], configs[0], settings[0]
-    after_loop(node, config, moment, status, waits)
+    node, crew = nodes[0], settings[0]
+    after_loop(node, moment, status, waits)
     follow_alignment(node, crew, moment[START], moment[END])
     if crew.imus > 1 and is_quiet(node):
         learn_offsets(node, crew)
-    return conclude(node, config, crew, moment)
+    return conclude(node, crew, moment)
 
 
 @kernel
-def before_loop(node: Any, config: Any, settings: Any, moment: Array, saturated: int) -> int:
+def before_loop(node: Any, settings: Any, moment: Array, saturated: int) -> int:
     """Judge the readings, follow the clock, level coarsely, count; 1 if the survey of this stop has to wait."""
     state = node.filter
     start, end = moment[START], moment[END]
-    guard_reading(node, config, settings, saturated, end)
-    follow_clock(node, config, settings, moment)
-    level_coarsely(state, config, node.rate, node.force)
+    guard_reading(node, settings, saturated, end)
+    follow_clock(node, settings, moment)
+    level_coarsely(state, node.config, node.rate, node.force)
     node.slow_cycles = node.slow_cycles + 1 if largest(node.rate) < LARGEST_OFFSET else 0
     if node.cycles > 0 and start - state.now > 0.5 * (end - start):
         node.overruns += 1
@@ -116,7 +141,7 @@ def before_loop(node: Any, config: Any, settings: Any, moment: Array, saturated:
 
 
 @kernel
-def after_loop(node: Any, config: Any, moment: Array, status: int, waits: int) -> None:
+def after_loop(node: Any, moment: Array, status: int, waits: int) -> None:
     """Take what the loop made of the cycle."""
     if waits == 1:
         node.filter.surveyed = 0
@@ -124,12 +149,12 @@ def after_loop(node: Any, config: Any, moment: Array, status: int, waits: int) -
     node.noticed = 0
     node.cycles += 1
     if node.status & FILTER_FAULT:
-        start_over(node.filter, config)
-    judge_cycle(node, config, node.status, moment[END])
+        start_over(node.filter, node.config)
+    judge_cycle(node, node.status, moment[END])
 
 
 @kernel
-def conclude(node: Any, config: Any, settings: Any, moment: Array) -> int:
+def conclude(node: Any, settings: Any, moment: Array) -> int:
     """Tell what the cycle found, as events, and record it; returns what there is to say."""
     state, status = node.filter, node.status
     if status & ~AIDED:
@@ -144,7 +169,7 @@ def conclude(node: Any, config: Any, settings: Any, moment: Array) -> int:
     if status & SURVEY_READY:
         says |= SAY_SURVEY
         if settings.imus > 1:
-            survey_imus(node, settings, config.survey_samples)
+            survey_imus(node, settings, node.config.survey_samples)
     if settings.scheme != FORWARD and state.yaw_known == 1:
         says |= SAY_ESTIMATE
     if status & ~AIDED or node.cycles % settings.state_every == 0:
@@ -180,11 +205,12 @@ def say_events(node: Any) -> int:
 
 
 @kernel
-def follow_clock(node: Any, config: Any, settings: Any, moment: Array) -> None:
+def follow_clock(node: Any, settings: Any, moment: Array) -> None:
     """Let the prior of the time stamp be what the clock says of itself, and its wander that of the hops.
 
-    The configuration is left alone while it is about right: another one costs the integer loop a conversion.
+    It is left alone while it is about right: another one costs the integer loop a conversion.
     """
+    config = node.config
     if moment[SYNCHRONISED] == 0.0 or config.stamp_std == 0.0:
         return
     std = min(max(math.sqrt(moment[CLOCK_VAR]), LEAST_STAMP), CLOCK_SLACK)
@@ -200,23 +226,36 @@ def follow_clock(node: Any, config: Any, settings: Any, moment: Array) -> None:
 
 
 @kernel
-def node_aiding(nodes: Array, configs: Array, settings: Array, aiding: Array) -> int:
+def node_aiding(nodes: Array, settings: Array, aiding: Array) -> int:
     """Take one aiding into a node with the float64 loop; returns whether it was used and whether it goes down.
 
     What goes down is the aiding itself with the ``down_*`` of the record in the place of its own.
 
     Parameters
     ----------
-    nodes, configs, settings : one-element arrays of dtype ``NODE``, ``CONFIG`` and ``SETTINGS``
-    aiding : (11,) see ``take_aiding``
+    nodes, settings : one-element arrays of dtype ``NODE`` and ``SETTINGS``
+    aiding : (11,) yaw, its variance, systematic variance, offset, rate (rad, rad/s), time of validity (s, own clock),
+        sequence, hops, torque (N m), torsion variance (rad^2), under torque
     """
+    return int(aiding_around(offer_aiding, nodes, settings, aiding))
+
+
+@shared_body
+def aiding_around(offer_aiding: Callable[..., int], nodes: Array, settings: Array, aiding: Array) -> int:
+    """Take one aiding into a node whose loop queues it by ``offer_aiding``; see ``node_aiding``."""
     node = nodes[0]
-    gates = take_aiding(nodes, configs, settings, aiding)
+    gates = take_aiding(nodes, settings, aiding)
     if gates & USED:
-        yaw, yaw_var, valid_at = aiding[0], aiding[1], aiding[5]
-        sequence, hops = int(aiding[6]), int(aiding[7])
         node.noticed |= offer_aiding(
-            node.filter, configs[0], yaw, yaw_var, own_systematic(node), node.down_offset, valid_at, sequence, hops
+            node.filter,
+            node.config,
+            aiding[A_YAW],
+            aiding[A_YAW_VAR],
+            own_systematic(node),
+            node.down_offset,
+            aiding[A_VALID],
+            int(aiding[A_SEQUENCE]),
+            int(aiding[A_HOPS]),
         )
     if gates & ONWARD:
         hand_down(nodes, settings)
@@ -224,31 +263,16 @@ def node_aiding(nodes: Array, configs: Array, settings: Array, aiding: Array) ->
 
 
 @kernel
-def take_aiding(nodes: Array, configs: Array, settings: Array, aiding: Array) -> int:
-    """Gate an aiding, and leave this node's offset and systematic variance in its record; ``USED`` and ``ONWARD``.
-
-    Parameters
-    ----------
-    aiding : (11,) yaw, its variance, systematic variance, offset, rate (rad, rad/s), time of validity (s, own clock),
-        sequence, hops, torque (N m), torsion variance (rad^2), under torque
-    """
+def take_aiding(nodes: Array, settings: Array, aiding: Array) -> int:
+    """Gate an aiding, and leave this node's offset and systematic variance in its record; ``USED`` and ``ONWARD``."""
     node, crew = nodes[0], settings[0]
-    yaw, yaw_var, rate, valid_at = aiding[0], aiding[1], aiding[4], aiding[5]
-    sequence, hops, torque, under_torque = int(aiding[6]), int(aiding[7]), aiding[8], int(aiding[10])
-    offset = wrap(aiding[3] + (crew.drive_angle if hops == 0 else 0.0))
-    systematic = aiding[2] + (crew.drive_var if hops == 0 else 0.0)
-    reaching = reaching_var(aiding[9], torque, crew.stiffness)
-    known = twist_var(node.twist)
-    offset, systematic = follow_joints(
-        node, crew, yaw, yaw_var, rate, sequence, hops, under_torque, offset, systematic, known, reaching
-    )
-    node.down_offset, node.down_systematic, node.down_torsion = offset, systematic, reaching
-    used = 0
-    if gate_aiding(node, configs[0], yaw + offset, yaw_var, rate, valid_at) and gate_twist(
-        node, crew, yaw_var, torque, reaching, under_torque, valid_at
-    ):
-        used = USED
-    return used | (ONWARD if crew.scheme == FORWARD else 0)
+    from_drive = aiding[A_HOPS] == 0.0
+    node.down_offset = wrap(aiding[A_OFFSET] + (crew.drive_angle if from_drive else 0.0))
+    node.down_systematic = aiding[A_SYSTEMATIC] + (crew.drive_var if from_drive else 0.0)
+    node.down_torsion = reaching_var(aiding[A_TORSION], aiding[A_TORQUE], crew.stiffness)
+    follow_joints(node, crew, aiding)
+    used = gate_aiding(node, aiding) and gate_twist(node, crew, aiding)
+    return (USED if used else 0) | (ONWARD if crew.scheme == FORWARD else 0)
 
 
 @kernel

@@ -14,7 +14,6 @@ from node.kernels.step import ONWARD, node_aiding, node_step
 @kernel
 def string_step(
     nodes: Array,
-    configs: Array,
     settings: Array,
     parameters: Array,
     readings: Array,
@@ -26,34 +25,32 @@ def string_step(
 
     Parameters
     ----------
-    nodes, configs, settings : (n,) of dtype ``NODE``, ``CONFIG`` and ``SETTINGS``
+    nodes, settings : (n,) of dtype ``NODE`` and ``SETTINGS``
     parameters, readings, moments : (n, ...) as ``node_step`` takes them
     """
     for k in range(nodes.shape[0]):
         says[k] = 0
         if mask[k]:
             one = slice(k, k + 1)
-            says[k] = node_step(nodes[one], configs[one], settings[one], parameters[k], readings[k], moments[k])
+            says[k] = node_step(nodes[one], settings[one], parameters[k], readings[k], moments[k])
 
 
 @kernel
-def string_aiding(
-    nodes: Array, configs: Array, settings: Array, string: Array, hops: int, valid_locals: Array, aiding: Array
-) -> None:
+def string_aiding(nodes: Array, settings: Array, string: Array, hops: int, valid_locals: Array, aiding: Array) -> None:
     """Hand an aiding down the first ``hops`` nodes of a string whose scheme is ``forward``.
 
     Parameters
     ----------
-    nodes, configs, settings : (n,) of dtype ``NODE``, ``CONFIG`` and ``SETTINGS``
+    nodes, settings : (n,) of dtype ``NODE`` and ``SETTINGS``
     string : (hops or more,) indices of the nodes, from the top down
     valid_locals : (hops or more,) time of validity by the clock of each node, s
-    aiding : (11,) as ``take_aiding`` takes it; it holds in the end what the last node hands down
+    aiding : (11,) as ``node_aiding`` takes it; it holds in the end what the last node hands down
     """
     for hop in range(hops):
         k = string[hop]
         one = slice(k, k + 1)
         aiding[A_VALID] = valid_locals[hop]
-        if not node_aiding(nodes[one], configs[one], settings[one], aiding) & ONWARD:
+        if not node_aiding(nodes[one], settings[one], aiding) & ONWARD:
             return
         node = nodes[k]
         aiding[A_OFFSET], aiding[A_SYSTEMATIC] = node.down_offset, node.down_systematic

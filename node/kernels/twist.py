@@ -12,11 +12,13 @@ import math
 from typing import Any, Final
 
 from node.kernels.events import NONE, Code, tell
-from node.kernels.jit import kernel
+from node.kernels.jit import constant, kernel
+from node.kernels.layout import Array
+from node.kernels.record import A_HELD, A_TORQUE, A_VALID, A_YAW_VAR
 from node.kernels.resets import open_yaw
 
 UNKNOWN_VAR: Final = 10.0  # rad^2, of a twist of which nothing is known but for whole turns
-STRING_UNDER_TORQUE, STRING_RELEASED = int(Code.STRING_UNDER_TORQUE), int(Code.STRING_RELEASED)
+STRING_UNDER_TORQUE, STRING_RELEASED = constant(Code.STRING_UNDER_TORQUE), constant(Code.STRING_RELEASED)
 
 
 @kernel
@@ -33,30 +35,24 @@ def reaching_var(torsion_var: float, torque: float, stiffness: float) -> float:
 
 
 @kernel
-def gate_twist(
-    node: Any, settings: Any, yaw_var: float, torque: float, reaching: float, under_torque: int, valid_local: float
-) -> bool:
-    """Whether an aiding is for the filter; opens the filter's yaw where the twist has changed.
+def gate_twist(node: Any, settings: Any, aiding: Array) -> bool:
+    """Whether an ``aiding`` is for the filter; opens the filter's yaw where the twist has changed.
 
-    Parameters
-    ----------
-    yaw_var : rad^2, of the aiding
-    torque, under_torque : N m, and 1 while the drive holds the string, as it says
-    reaching : rad^2, ``reaching_var``
-    valid_local : s, own clock
+    The twist that reaches this node with it is ``node.down_torsion``.
     """
     twist, state = node.twist, node.filter
-    twist.heard_at, twist.torque, twist.holding = valid_local, torque, under_torque
+    torque, under_torque = aiding[A_TORQUE], int(aiding[A_HELD])
+    twist.heard_at, twist.torque, twist.holding = aiding[A_VALID], torque, under_torque
     if under_torque == 1 and settings.torsion_gate == 1:
         twist.wound = 1
         return False
-    std = math.sqrt(reaching)
+    std = math.sqrt(node.down_torsion)
     before = twist.std if twist.known == 1 else std  # after a start anything may have been
     held = twist.held == 1 or twist.known == 0
     change = 0.0
     if under_torque == 1 and held:
         change = std - before
-        if twist.known == 1 and change * change <= yaw_var:
+        if twist.known == 1 and change * change <= aiding[A_YAW_VAR]:
             return True  # a change waits until it has grown: a rest is not to be used again and again
     elif under_torque == 1 or held or twist.wound == 1:
         change = math.sqrt(std * std + before * before)

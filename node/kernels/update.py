@@ -10,11 +10,11 @@ from __future__ import annotations
 from typing import Any
 
 from node.kernels.angles import advance_binary
-from node.kernels.jit import kernel
+from node.kernels.jit import constant, kernel
 from node.kernels.layout import STATES, Array, Err
 
-TX, TY, PSI = int(Err.TILT_X), int(Err.TILT_Y), int(Err.YAW)
-BX, S, D = int(Err.BIAS_X), int(Err.SCALE), int(Err.STAMP)
+TX, TY, PSI = constant(Err.TILT_X), constant(Err.TILT_Y), constant(Err.YAW)
+BX, S, D = constant(Err.BIAS_X), constant(Err.SCALE), constant(Err.STAMP)
 
 
 @kernel

@@ -26,6 +26,7 @@ class EncoderProcess(Process):
     source : the node's own counter; without one a cycle brings its sample
     torque : what the crew knows of the drive's torque; the default is a rigid string
     timing : durations of its cycles with an own clock; None where it is stepped
+    reach : tubes away that its radio hears, see ``TubeSettings``
 
     Raises
     ------
@@ -39,6 +40,7 @@ class EncoderProcess(Process):
         source: EncoderSource | None = None,
         torque: TorqueSettings | None = None,
         timing: CycleTiming | None = None,
+        reach: int = 1,
     ) -> None:
         self._timing = timing
         if source is not None:
@@ -46,15 +48,15 @@ class EncoderProcess(Process):
         self._source = SafeEncoder(source, self._send_event) if source is not None else None
         self._now = 0.0
         counter = BootCounter(folder)
-        self.endpoint = Endpoint(ENCODER, frozenset(Side), boot_count=counter.boots, is_clock_root=True)
+        self.endpoint = Endpoint(ENCODER, frozenset(Side), boot_count=counter.boots, is_clock_root=True, reach=reach)
         # sequence numbers of a later boot are all larger, so a tube never takes a new measurement for an old one
         self.encoder = EncoderNode(counter.boots << 32, torque)
         if counter.fault:
             self._send_event(Severity.ERROR, "boot_counter_lost", {"detail": counter.fault[:200]})
 
-    def on_frame(self, side: Side, frame: bytes, now: float) -> None:
+    def on_frame(self, side: Side, frame: bytes, now: float, margin: float = math.inf) -> None:
         """A frame arrived at one end; the encoder refuses commands."""
-        for received in self.endpoint.receive(side, frame, now):
+        for received in self.endpoint.receive(side, frame, now, margin):
             if isinstance(received.message, Command):
                 refusal = Reply(ENCODER, received.message.sequence, False, "the encoder node takes no commands")
                 self.endpoint.reply(refusal, now)

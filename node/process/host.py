@@ -37,11 +37,15 @@ def run_encoder(
     source: EncoderSource | None = None,
     own_time: OwnTime | None = None,
     torque: TorqueSettings | None = None,
+    reach: int = 1,
 ) -> None:
-    """Encoder node on the drive head; ``source`` is its own counter, ``torque`` that of the drive."""
+    """Encoder node on the drive head; ``source`` is its own counter, ``torque`` that of the drive.
+
+    ``reach`` is of its radio, in tubes.
+    """
 
     def build(timing: CycleTiming | None = None) -> EncoderProcess:
-        return EncoderProcess(place.folder, source, torque, timing)
+        return EncoderProcess(place.folder, source, torque, timing, reach)
 
     if own_time is None:
         run_stepped("encoder", place, ENCODER, build)

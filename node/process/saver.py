@@ -1,9 +1,10 @@
 """When a node saves: at every event, when a saved rest ends, and slowly otherwise.
 
 What must not be lost makes an event, a survey or a reply, and each is on the disk before its frame leaves: a
-number that was sent is never given to another message. What changes without an event is worth little after a cut: a
-yaw at rest stands still, a yaw while turning is void, and the bias that wanders is another one after a quarter of a
-minute.
+number that was sent is never given to another message. A node that has something to tell in every cycle would wear its
+flash: after ``AT_ONCE`` saves in a row there is one every ``SPACING`` cycles, and what is told waits for it. What
+changes without an event is worth little after a cut: a yaw at rest stands still, a yaw while turning is void, and the
+bias that wanders is another one after a quarter of a minute.
 """
 
 from __future__ import annotations
@@ -15,10 +16,14 @@ from typing import Final
 from node.errors import SavedStateError
 from node.kernels.layout import Array
 from node.process.journal import SLOTS, Journal
+from telemetry.application.saved_state import STATE_LAYOUT, layout_of
 from telemetry.messages import Scalar, Severity
 
 SAVE_EVERY: Final = 570  # cycles without any other save, 300 s
 RETRY_EVERY: Final = 57  # cycles until a save that the disk refused is tried again, 30 s
+
+AT_ONCE: Final = 32  # saves that may follow each other cycle by cycle; a busy station makes six
+SPACING: Final = 19  # cycles, 10 s, after which there may be one more
 
 Say = Callable[[Severity, str, dict[str, Scalar]], None]
 
@@ -35,6 +40,8 @@ class Saver:
     def __init__(self, folder: Path) -> None:
         self._journal = Journal(folder)
         self._cycles = 0  # since the last save
+        self._allowed = AT_ONCE  # saves that may still follow at once
+        self._spaced = 0  # cycles since the newest of these was allowed
         self._saved_still = False
         self._refused = ""  # why the last save failed
         self._told_refused = False
@@ -42,19 +49,27 @@ class Saver:
         self.fault = ""
         self.due = False
 
+    @property
+    def spent(self) -> bool:
+        """So many saves followed each other that the next one waits, for less than ``SPACING`` cycles."""
+        return self._allowed == 0
+
     def load(self) -> tuple[Array, bytes] | None:
-        """Record and telemetry blob of the newest good slot, or None where there is none."""
+        """Record and telemetry blob of the newest good slot, or None where there is none that can be read."""
         try:
             saved = self._journal.load()
         except SavedStateError as error:
             self.fault = str(error)
+            return None
+        if saved is not None and (layout := layout_of(saved[1])) != STATE_LAYOUT:
+            self.fault = f"saved state: expected telemetry of layout {STATE_LAYOUT}, got {layout}"
             return None
         self._saved_still = saved is not None and is_still(saved[0])
         return saved
 
     def save(self, nodes: Array, blob: bytes) -> None:
         """Save now. A disk that refuses does not end the node: it runs on and reports it (``report``)."""
-        self.due, self._cycles = False, 0
+        self.due, self._cycles, self._allowed = False, 0, max(self._allowed - 1, 0)
         try:
             self._journal.save(nodes, blob)
         except OSError as error:
@@ -69,8 +84,14 @@ class Saver:
         A node that wakes believes a saved rest, so the newest slot must not show one while the string turns.
         """
         self._cycles += 1
+        self._spaced += 1
+        if self._spaced >= SPACING:
+            self._spaced, self._allowed = 0, min(self._allowed + 1, AT_ONCE)
+        rest_is_over = self._saved_still and not is_still(nodes)
+        if rest_is_over:
+            self._allowed = max(self._allowed, 1)
         limit = RETRY_EVERY if self._refused else SAVE_EVERY
-        if self._cycles >= limit or (self._saved_still and not is_still(nodes)):
+        if self._cycles >= limit or rest_is_over:
             self.due = True
 
     @property

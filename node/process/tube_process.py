@@ -14,6 +14,7 @@ from node.errors import ConfigurationError
 from node.firmware.inputs import ImuReading, RigContext
 from node.firmware.saved_state import resume
 from node.firmware.settings import TubeSettings
+from node.firmware.silent_tubes import across
 from node.firmware.tube import Tube
 from node.kernels.alignment import new_mount
 from node.kernels.calibration import USUAL
@@ -100,7 +101,7 @@ class TubeProcess(Process):
         self._looked_at_drops = -math.inf
         saved = self._saver.load()
         self.nodes, telemetry = saved if saved else (new_node(self.config), None)
-        self._cut = resume(self.nodes) if saved else False
+        self._cut = resume(self.nodes, self.config) if saved else False
         store = BlockStore(folder)
         parameters = load_parameters(store, settings.tube)
         self._fallback = "; ".join(store.faults)
@@ -114,6 +115,7 @@ class TubeProcess(Process):
             frozenset(Side),
             boot_count=self.boots,
             restored=telemetry,
+            reach=settings.reach,
         )
         restored = saved is not None
         next_sequence = self.endpoint.new_sequence
@@ -128,6 +130,7 @@ class TubeProcess(Process):
         self._commands = CommandHandlers(self.tube, timing, self._resend)
         self._now = 0.0
         self._announced = False
+        self._skipped = 0  # silent tubes above, as they were last told of
         self._blocks = BlockUpdater(self.tube, store, key, self._send_event, self._save)
         # what a start goes on with is on the disk, with its rest: power that comes and goes costs nothing
         if saved is None or self._fallback or self._saver.due:
@@ -138,10 +141,10 @@ class TubeProcess(Process):
         """The filter of the node, one-element array of dtype ``STATE``."""
         return np.asarray(self.nodes["filter"])
 
-    def on_frame(self, side: Side, frame: bytes, now: float) -> None:
-        """A frame arrived at one end (``now``: s, own clock)."""
+    def on_frame(self, side: Side, frame: bytes, now: float, margin: float = math.inf) -> None:
+        """A frame arrived at one end (``now``: s, own clock), by radio with a ``margin`` (dB)."""
         self._now = now
-        for received in self.endpoint.receive(side, frame, now):
+        for received in self.endpoint.receive(side, frame, now, margin):
             message = received.message
             if isinstance(message, Aiding) and received.side is Side.UPPER:
                 self._on_aiding(message, now)
@@ -168,6 +171,7 @@ class TubeProcess(Process):
         context = self._context(now)
         if context.synchronised:
             self._announce(context.rig_now, now)
+            self._tell_of_silent_tubes()
         said = self.tube.on_cycle(reading, context)
         self._lap(Stage.FILTER)
         for message in said:
@@ -213,6 +217,10 @@ class TubeProcess(Process):
             return
         if self._timing is not None:
             self._timing.add_duration(Stage.AIDING, clock.rig_from_local(now) - aiding.valid_at)
+        silent = self.endpoint.skipped
+        if silent > len(self.settings.above):
+            return  # over joints that nobody told this node of
+        aiding = across(aiding, self.settings.above[:silent], self.settings.stiffness)
         onward = self.tube.on_aiding(aiding, clock.local_from_rig(aiding.valid_at))
         if onward is not None:
             self._send(replace(onward, epoch=aiding.epoch), now)
@@ -246,13 +254,17 @@ class TubeProcess(Process):
         """A state with what the process knows beside the firmware: epoch, numbers given out, trouble with the disk."""
         flags = state.flags | (NodeFlag.NOT_SAVED if self._saver.is_refused else NodeFlag.NONE)
         endpoint = self.endpoint
-        return replace(state, flags=flags, epoch=endpoint.clock.epoch, numbered=endpoint.newest_sequence)
+        upper, lower = (endpoint.margin(side) for side in Side)
+        known = replace(state, flags=flags, epoch=endpoint.clock.epoch, numbered=endpoint.newest_sequence)
+        return replace(known, upper_margin=upper, lower_margin=lower)
 
     def _keep(self, said: Kept, now: float) -> None:
         """Keep a message for the ground station; surveys and records stay in the log when it has them."""
         if not isinstance(said, Event):
             self._log.append_payload(said.sequence, encode(said))
         self._saver.due = True
+        if self._saver.spent:
+            self.endpoint.hold()
         self.endpoint.submit(said, now)
 
     def _resend(self, first: int, last: int) -> tuple[int, int]:
@@ -292,6 +304,19 @@ class TubeProcess(Process):
             detail: dict[str, Scalar] = {"detail": self._fallback[:200], "in_use": in_use.version}
             self._send_event(Severity.ERROR, "parameters_fallback", detail | {"hash": in_use.sha256().hex()})
 
+    def _tell_of_silent_tubes(self) -> None:
+        """Report when the neighbour above is heard over the heads of silent tubes, and when these are back."""
+        silent = self.endpoint.skipped if self.endpoint.neighbours[Side.UPPER] is not None else self._skipped
+        if silent == self._skipped:
+            return
+        nearest = self.settings.tube + 1
+        if silent:
+            told: dict[str, Scalar] = {"tube": nearest, "tubes": silent}
+            self._send_event(Severity.WARNING, "tube_silent", told)
+        else:
+            self._send_event(Severity.INFO, "tube_heard_again", {"tube": nearest})
+        self._skipped = silent
+
     def _send_event(self, severity: Severity, code: str, arguments: dict[str, Scalar]) -> None:
         """Keep an event of the process; it is saved before its frame leaves."""
         clock = self.endpoint.clock
@@ -300,9 +325,10 @@ class TubeProcess(Process):
 
     def _save(self) -> None:
         self._saver.save(self.nodes, self.endpoint.export_state())
+        self.endpoint.release(self._now)
 
     def _save_if_due(self) -> bool:
-        if self._saver.due:
+        if self._saver.due and not self._saver.spent:
             self._save()
             return True
         return False

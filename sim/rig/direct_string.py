@@ -20,7 +20,7 @@ from node.firmware.encoder import EncoderNode, EncoderSample
 from node.firmware.inputs import ImuReading, RigContext
 from node.firmware.reporter import VAR_FLOOR
 from node.firmware.tube import Tube
-from node.kernels.calibration import USUAL
+from node.kernels.calibration import PARAMETERS, USUAL
 from node.kernels.layout import PERIOD, Err, Scheme, default_config
 from node.kernels.record import (
     CLOCK_VAR,
@@ -91,10 +91,9 @@ class StringRun:
 
 
 class Tables(NamedTuple):
-    """Of all tubes, tube 1 first: settings, corrections, readings (cycles, tubes, 1, 8), times, what each says."""
+    """Of all tubes, tube 1 first: settings, readings (cycles, tubes, 1, 8), times, what each says."""
 
     crews: Array
-    corrections: Array
     readings: Array
     moments: Array
     says: npt.NDArray[np.int64]
@@ -123,10 +122,11 @@ class DirectString:
             raise ScenarioError('medium.link: expected "off" for a string without frames')
         self._spoil = spoil
         count, self._imus = world.scenario.tubes, self._file.node.imus
-        self._configs = self._tuned_configs(count)
+        config = self._tuned_config()
         # the records of all tubes in one array, so that a cycle is read off in a few operations
-        self.nodes = np.concatenate([new_node(self._configs[k : k + 1]) for k in range(count)])
-        self.tubes = {tube: self._fresh_tube(tube, state_every) for tube in range(1, count + 1)}
+        self.nodes = np.repeat(new_node(config), count)
+        self._corrections = np.zeros((count, 1 + self._imus), PARAMETERS)
+        self.tubes = {tube: self._fresh_tube(tube, config, state_every) for tube in range(1, count + 1)}
         self._encoder = EncoderNode(torque=world.torque_settings())
         sensor = self._file.encoder
         self._plain = None if sensor.edge_times else PlainEncoder(sensor.counts_per_turn)
@@ -167,19 +167,25 @@ class DirectString:
                 self._relay(cycle, measured, string, end)
             yield cycle
 
-    def _tuned_configs(self, count: int) -> Array:
+    def _tuned_config(self) -> Array:
         config = default_config()
         names = config.dtype.names or ()
         for name, value in self._file.node.tuning.items():
             if name not in names:
                 raise ScenarioError(f"node.tuning.{name}: expected one of {', '.join(names)}")
             config[0][name] = value
-        return np.repeat(config, count)
+        return config
 
-    def _fresh_tube(self, tube: int, state_every: int) -> Tube:
+    def _fresh_tube(self, tube: int, config: Array, state_every: int) -> Tube:
         settings = replace(self.world.tube_settings(tube), state_every=state_every)
-        own = slice(tube - 1, tube)
-        return Tube(settings, self._configs[own], self.nodes[own], iter(range(NEVER)).__next__, restored=False)
+        return Tube(
+            settings,
+            config,
+            self.nodes[tube - 1 : tube],
+            iter(range(NEVER)).__next__,
+            restored=False,
+            corrections=self._corrections[tube - 1],
+        )
 
     def _losses(self) -> Mask:
         """Whether an aiding is lost on the hop to a tube, (cycles, tubes)."""
@@ -212,15 +218,13 @@ class DirectString:
         world, count = self.world, len(self.tubes)
         if self._imus > 1:
             none = np.zeros(0)
-            return Tables(none, none, none, none, np.zeros(0, np.int64))
+            return Tables(none, none, none, np.zeros(0, np.int64))
         readings = np.zeros((world.cycles, count, 1, READING))
         readings[..., TEMPERATURE] = USUAL
         for tube in self.tubes:
             readings[:, tube - 1, 0, :TEMPERATURE] = world.imu_samples(tube)
-        crews, corrections = zip(*(self.tubes[tube].records for tube in self.tubes), strict=True)
-        return Tables(
-            np.concatenate(crews), np.stack(corrections), readings, np.zeros((count, MOMENT)), np.zeros(count, np.int64)
-        )
+        crews = np.concatenate([tube.crew for tube in self.tubes.values()])
+        return Tables(crews, readings, np.zeros((count, MOMENT)), np.zeros(count, np.int64))
 
     def _run_cycles(self, cycle: int, string: Sequence[int], end: float) -> Mapping[int, Sequence[Message]]:
         """A cycle of every tube: all that are plain in one call, the others one by one."""
@@ -248,8 +252,8 @@ class DirectString:
         moments[:, HOPS] = np.arange(n, 0, -1)
         moments[:, CLOCK_VAR] = self._clock_var[n - 1 :: -1]
         moments[:, SYNCHRONISED] = 1.0
-        crews, corrections, readings = tables.crews[:n], tables.corrections, tables.readings[cycle]
-        string_step(self.nodes[:n], self._configs[:n], crews, corrections, readings, moments, mask, tables.says)
+        crews, corrections, readings = tables.crews[:n], self._corrections, tables.readings[cycle]
+        string_step(self.nodes[:n], crews, corrections, readings, moments, mask, tables.says)
         said: dict[int, Sequence[Message]] = {}
         for place in np.flatnonzero(mask & (tables.says[:n] & ~ADMITTED != 0)).tolist()[::-1]:
             tube = place + 1
@@ -320,7 +324,7 @@ class DirectString:
             ]
         )
         places = np.array(string) - 1
-        string_aiding(self.nodes, self._configs, tables.crews, places, reach, valid + error, taken)
+        string_aiding(self.nodes, tables.crews, places, reach, valid + error, taken)
 
     def _empty_run(self) -> StringRun:
         world, tubes = self.world, self.world.scenario.tubes

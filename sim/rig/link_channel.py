@@ -38,7 +38,7 @@ class LinkChannel:
         """Delay (s) and bytes of each copy of the next frame leaving this port; none when it is lost."""
         drawn = self._streams.get((sender, side))
         if drawn is None:
-            drawn = self._streams[sender, side] = PortStream(self._seed, sender, side)
+            drawn = self._streams[sender, side] = PortStream(self._seed, Stream.LINK, sender, int(side))
         fate, wait, again = drawn.draw()
         if fate < self.loss or (sender, side) in self.severed:
             self.lost += 1
@@ -53,9 +53,9 @@ class LinkChannel:
 class PortStream:
     """Draws of one port, made in blocks."""
 
-    def __init__(self, seed: int, sender: int, side: Side) -> None:
-        self._random = stream(seed, Stream.LINK, sender, int(side))
-        self._damage = stream(seed, Stream.LINK, sender, int(side), DAMAGE)
+    def __init__(self, seed: int, purpose: Stream, *port: int) -> None:
+        self._random = stream(seed, purpose, *port)
+        self._damage = stream(seed, purpose, *port, DAMAGE)
         self._block: list[tuple[float, float, float]] = []
 
     def draw(self) -> tuple[float, float, float]:

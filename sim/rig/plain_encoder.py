@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 from typing import Final
 
-from node.firmware.encoder import aiding
 from telemetry.messages import Aiding
 
 LINES: Final = 1024  # of the encoder, counted once each. Source: thesis 4.2
@@ -32,4 +31,14 @@ class PlainEncoder:
         rate = moved * self._quantum / (now - self._at) if moved else 0.0
         self._sequence += int(moved != 0 or not self._resting)
         self._count, self._at, self._resting = count, now, not moved
-        return aiding((count + 0.5) * self._quantum, self._quantum**2 / 12.0, rate, now, self._sequence)
+        yaw = (count + 0.5) * self._quantum % math.tau
+        return Aiding(
+            yaw=yaw if yaw < math.tau else 0.0,
+            yaw_var=self._quantum**2 / 12.0,
+            systematic_var=0.0,
+            offset=0.0,
+            rate=rate,
+            valid_at=now,
+            sequence=self._sequence,
+            hops=0,
+        )

@@ -74,9 +74,9 @@ class Surface(Process):
         if not self.interrupted:
             await self._loop.run()
 
-    def on_frame(self, side: Side, frame: bytes, now: float) -> None:
+    def on_frame(self, side: Side, frame: bytes, now: float, margin: float = math.inf) -> None:
         """A frame arrived from the encoder."""
-        for received in self.endpoint.receive(side, frame, now):
+        for received in self.endpoint.receive(side, frame, now, margin):
             state = received.message
             if isinstance(state, NodeState) and state.tube in self.heard:
                 error = yaw_error(self._world, state.tube, state.yaw, state.at)

@@ -19,6 +19,7 @@ from functools import partial
 
 from sim.errors import RigError
 from sim.rig.link_channel import LinkChannel
+from sim.rig.radio_channel import RadioChannel
 from sim.rig.stepper import Answer, FrameEvent, Stepper
 from sim.world.motion import Phase
 from sim.world.world import World
@@ -32,7 +33,7 @@ FROZEN_AFTER = 30.0  # wall s of it, after which a process that was there is end
 TELL_EVERY = 0.5  # wall s
 CUE_LIMIT = 120.0  # wall s
 REBOOT_TIME = 5.0  # rig s that a process may be missing before the rig's time waits for it
-Entry = tuple[float, int, int, int, "Due | None", bytes]
+Entry = tuple[float, int, int, int, "Due | None", bytes, "float | None"]
 
 
 @dataclass(slots=True)
@@ -79,6 +80,11 @@ class Scheduler:
         self.channel = LinkChannel(
             world.seed, medium.latency, medium.jitter, medium.loss, medium.duplicate, medium.corrupt
         )
+        self._radio = None
+        if world.radio is not None:
+            self._radio = RadioChannel(
+                world.radio, world.seed, medium.latency, medium.jitter, medium.duplicate, medium.corrupt
+            )
         self.progress = Progress("starting", world.begin, world.begin, world.end, [ENCODER, BASE])
         self._depth = DepthSource()
         self._queue: list[Entry] = []
@@ -239,10 +245,10 @@ class Scheduler:
             self._tell(self.progress)
             self.progress.kill = []
 
-    def _push(self, at: float, address: int, kind: Due | None, frame: bytes) -> None:
+    def _push(self, at: float, address: int, kind: Due | None, frame: bytes, margin: float | None = None) -> None:
         self._count += 1
         rank = 9 if kind is None else int(kind)
-        heapq.heappush(self._queue, (at, address, rank, self._count, kind, frame))
+        heapq.heappush(self._queue, (at, address, rank, self._count, kind, frame, margin))
 
     def _pace(self, rig_time: float) -> None:
         if math.isinf(self._speed):
@@ -256,7 +262,7 @@ class Scheduler:
         steps: dict[int, list[FrameEvent]] = {}
         true_time: dict[tuple[int, float], float] = {}
         while self._queue and self._queue[0][0] < limit:
-            at, address, _, _, kind, frame = heapq.heappop(self._queue)
+            at, address, _, _, kind, frame, margin = heapq.heappop(self._queue)
             self.now = at
             if kind is None:
                 self._add_cycle(at, steps, true_time)
@@ -264,7 +270,7 @@ class Scheduler:
                 if address in self.stepper.alive():
                     self._add_sample(at, address, int.from_bytes(frame), steps, true_time)
             elif kind is not Due.TIMER or self._wake.get(address) == at:
-                self._add(steps, true_time, address, kind, at, None, frame)
+                self._add(steps, true_time, address, kind, at, margin, frame)
         answers = self.stepper.round(steps)
         self._end_hung(self.stepper.drain_hung())
         for address in sorted(answers):
@@ -336,6 +342,9 @@ class Scheduler:
     def _on_answer(self, address: int, answer: Answer, true_time: dict[tuple[int, float], float]) -> None:
         for sent, frame in answer.frames:
             at = true_time[address, sent.at]
+            if self._radio is not None and not is_cable(address, sent.side):
+                self._radiate(self._radio, address, sent.side, at, frame)
+                continue
             end = self._other_end(address, sent.side)
             for delay, arriving in self.channel.deliveries(address, sent.side, frame):
                 if end is not None:
@@ -344,6 +353,21 @@ class Scheduler:
         if math.isfinite(wake) and self._wake.get(address) != wake:
             self._push(wake, address, Due.TIMER, b"")
         self._wake[address] = wake
+
+    def _radiate(self, radio: RadioChannel, sender: int, side: Side, at: float, frame: bytes) -> None:
+        """Have every end hear a frame that its radio reaches, in a closed string up to the drive head."""
+        chain = (ENCODER, *self._string)
+        if sender not in chain:
+            return
+        place = chain.index(sender)
+        for away in range(1, radio.reach + 1):
+            other = place + (away if side is Side.LOWER else -away)
+            if not 0 <= other < len(chain) or (self._open_top and 0 in (place, other)):
+                return
+            joints = chain[min(place, other) + 1 : max(place, other) + 1]
+            facing = Side.UPPER if side is Side.LOWER else Side.LOWER
+            for delay, arriving, margin in radio.deliveries(sender, side, chain[other], joints, at, frame):
+                self._push(at + delay, chain[other], Due(int(facing)), arriving, margin)
 
     def _other_end(self, address: int, side: Side) -> tuple[int, Side] | None:
         """Which port a port looks into now; None at the bit, at the surface and at an open joint."""
@@ -360,6 +384,11 @@ class Scheduler:
         if self._string:
             ends.add((self._string[0], Side.UPPER))
         return ends
+
+
+def is_cable(address: int, side: Side) -> bool:
+    """Whether a port is of the cable between the base station and the drive head."""
+    return address == BASE or (address == ENCODER and side is Side.UPPER)
 
 
 @dataclass(frozen=True, slots=True)

@@ -111,6 +111,13 @@ ALIGNMENT_SHOWN: Columns = (
     ("interval", "95 %"),
     ("unit", "unit"),
 )
+SOIL_LINK = plain(
+    "case", "published", "ours", "low", "high", "difference", "holds", "stated_low", "stated_high", "unit"
+)
+SOIL_MAP = plain("texture", "sand", "clay", "water_percent", "distance_m", "received_dbm", "margin_db")
+SOIL_DELIVERY = plain("quantity", "expected", "ours", "unit")
+PIPE_LINK = plain("case", "published", "ours", "difference_percent", "unit")
+PIPE_GRADES = plain("grade", "carbon_percent", "temperature_c", "resistivity_1e_8_ohm_m", "te11_db_per_m", "reach_m")
 INGREDIENTS: Columns = (("mode", "mode"), *INTERVALS)
 INGREDIENTS_SHOWN: Columns = (
     ("case", "case"),

@@ -75,6 +75,41 @@ STUDIES = by_name(
             ),
         ),
         Study(
+            "soil-link",
+            "Radio through soil beside the published figures, and the delivery of surveys through wet clay.",
+            f"{MODULES}.soil_link",
+            (
+                Table("Received power over all textures", columns.SOIL_LINK, columns.SOIL_LINK),
+                Table("Feasibility", columns.SOIL_MAP, columns.SOIL_MAP, rows="map", suffix="-map"),
+                Table(
+                    "Delivery of {surveys} surveys, wellbore 1 in wet clay",
+                    columns.SOIL_DELIVERY,
+                    columns.SOIL_DELIVERY,
+                    rows="delivery",
+                    suffix="-delivery",
+                ),
+            ),
+            (Option("tubes", 10, 1, 10, help="Of wellbore 1 that are drilled in wet clay."),),
+            counts="parts",
+            full=("--tubes 10",),
+            short="--tubes 1",
+        ),
+        Study(
+            "pipe-link",
+            "Radio inside the pipe as a waveguide: modes, attenuation and reach beside the published figures.",
+            f"{MODULES}.pipe_link",
+            (
+                Table("Pipe of 3 cm radius", columns.PIPE_LINK, columns.PIPE_LINK),
+                Table(
+                    "Grades of API 5L at 5 GHz",
+                    columns.PIPE_GRADES,
+                    columns.PIPE_GRADES,
+                    rows="grades",
+                    suffix="-grades",
+                ),
+            ),
+        ),
+        Study(
             "weighting",
             "Weights of the readings of one station when the hole moves, the published reductions beside ours.",
             f"{MODULES}.weighting",

@@ -73,6 +73,8 @@ def _first(errors: Sequence[ErrorDetails], model: type[BaseModel]) -> str:
 def _keys(model: type[BaseModel], tables: Sequence[str]) -> list[str]:
     """Keys of a table inside ``model``."""
     for name in tables:
+        if name.isdecimal():
+            continue  # of one table among several of that name
         annotation = model.model_fields[name].annotation
         candidates: list[Any] = [annotation, *get_args(annotation)]
         model = next(c for c in candidates if isinstance(c, type) and issubclass(c, BaseModel))

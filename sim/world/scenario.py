@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Annotated, Any, Literal
 
 import numpy as np
-from pydantic import BaseModel, ConfigDict, Field
+from pydantic import Field
 
 from groundstation.calibration.attitudes import rank_of, true_vectors
 from node.kernels.alignment import MAX_IMUS
@@ -15,7 +15,11 @@ from sim.errors import ScenarioError
 from sim.faults import KillNode, parse_fault
 from sim.world.borehole import Borehole, read_displacements, read_stations
 from sim.world.parsing import read_toml, validate
+from sim.world.radio import check_radio
+from sim.world.radio_section import RadioSection
+from sim.world.section import Angle, NotNegative, Positive, Probability, Section, Triple
 from sim.world.shipped import find_scenario
+from telemetry.errors import RadioError
 from telemetry.messages import MAX_TUBE
 
 VERSION = 1  # of the format
@@ -23,17 +27,6 @@ MAX_RATE_DPS = 57.0 * 6.0  # 57 rev/min: half a turn a cycle is where one sample
 LEAST_LATENCY_MS = 0.5  # of a hop with a link
 SURVEY_AFTER = 22.0  # s at rest, for a survey
 RECORD_MARGIN = 8.0  # s at an attitude beside its record: the tubes settle and the order travels
-Positive = Annotated[float, Field(gt=0.0)]
-NotNegative = Annotated[float, Field(ge=0.0)]
-Probability = Annotated[float, Field(ge=0.0, le=0.9)]
-Angle = Annotated[float, Field(ge=-180.0, le=180.0)]
-Triple = tuple[NotNegative, NotNegative, NotNegative]
-
-
-class Section(BaseModel):
-    """Base of every table: frozen, unknown keys, infinities and NaN refused."""
-
-    model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False)
 
 
 class RigSection(Section):
@@ -175,7 +168,7 @@ class MediumSection(Section):
 
     latency_ms: NotNegative = Field(3.0, description="at least 0.5 where the link is on")
     jitter_ms: NotNegative = Field(0.3, description="mean of the exponential part")
-    loss: Probability = 0.01
+    loss: Probability = Field(0.01, description="of a frame by cable; by radio its margin decides")
     duplicate: Probability = 0.001
     corrupt: Probability = Field(0.0, description="one bit of a frame's copy is flipped")
 
@@ -271,6 +264,7 @@ class ScenarioFile(Section):
     encoder: EncoderSection = EncoderSection()
     clocks: ClockSection = ClockSection()
     medium: MediumSection = MediumSection()
+    radio: RadioSection | None = Field(None, description="between the tubes; a cable without this table")
     aiding: AidingSection = AidingSection()
     node: NodeSection = NodeSection()
     design: DesignSection = DesignSection()
@@ -321,6 +315,7 @@ def _checked(path: Path, file: ScenarioFile, faults: tuple[str, ...]) -> Scenari
     _check_motion(path, file)
     _check_link(path, file)
     _check_torsion(path, file)
+    _check_radio(path, file)
     if len(file.node.imu_noise) not in (0, file.node.imus):
         raise ScenarioError(
             f"{path}: node.imu_noise: expected {file.node.imus} factors, one for each of node.imus, "
@@ -413,6 +408,23 @@ def _check_torsion(path: Path, file: ScenarioFile) -> None:
             f"{path}: schedule.stop_s: expected at least {needed:g} s, the release of the torque and "
             f"{SURVEY_AFTER:g} s for a survey, got {schedule.stop_s:g}; stop longer"
         )
+
+
+def _check_radio(path: Path, file: ScenarioFile) -> None:
+    section = file.radio
+    if section is None:
+        return
+    if file.medium.link == "off":
+        raise ScenarioError(f'{path}: radio: expected medium.link = "on" with it, got off')
+    if section.mode == "pipe" and file.node.joints != "marks":
+        raise ScenarioError(
+            f"{path}: node.joints: expected marks with a radio in the pipe, got {file.node.joints}; "
+            "a tube that hears beyond a silent one knows the marks alone"
+        )
+    try:
+        check_radio(section, file.rig.tube_length_m)
+    except RadioError as error:
+        raise ScenarioError(f"{path}: radio: {error}") from error
 
 
 def _check_calibration(path: Path, section: CalibrationSection | None) -> None:

@@ -11,7 +11,7 @@ import numpy as np
 import numpy.typing as npt
 
 from node.firmware.imu_settings import ImuSettings
-from node.firmware.settings import Joint, TubeSettings
+from node.firmware.settings import Joint, PassedTube, TubeSettings
 from node.firmware.torque import TorqueSettings
 from node.kernels.layout import PERIOD, Scheme
 from sim.errors import ScenarioError
@@ -20,6 +20,7 @@ from sim.world.disc import Disc
 from sim.world.imu_errors import Drift, ImuErrors, single_samples
 from sim.world.motion import Motion, Phase, Trapezoid
 from sim.world.rack import Rack
+from sim.world.radio import RadioLinks
 from sim.world.scenario import Scenario
 from sim.world.streams import Stream, stream
 from sim.world.torsion import StringTorsion, stiffness
@@ -90,6 +91,7 @@ class World:
         disc_random = self._random(Stream.DISC, 0)
         self._disc = Disc(self.motion, file.encoder.counts_per_turn, edge_std, disc_random, free_at, free_by)
         self._check_faults()
+        self.radio = self._radio_links()
 
     @property
     def cycles(self) -> int:
@@ -145,13 +147,12 @@ class World:
 
     def tube_settings(self, tube: int) -> TubeSettings:
         """What the crew enters for a tube: the readings of its scribe marks and their stated errors."""
-        std = math.radians(self.scenario.file.joints.reading_std_deg)
-        drive, lower = self._joint_angles
-        drive_error, lower_error = self._joint_errors
+        joints = self._read_joints(tube)
+        passed = range(tube + 1, min(tube + self.reach - 1, self.scenario.tubes) + 1)
         return TubeSettings(
             tube=tube,
-            drive_joint=Joint(wrap(drive[tube] - self._turned_before(tube) + drive_error[tube]), std),
-            lower_joint=Joint(wrap(lower[tube] + lower_error[tube]), std),
+            drive_joint=joints.drive_joint,
+            lower_joint=joints.lower_joint,
             mount_std=math.radians(self.scenario.file.joints.mount_std_deg),
             scheme=Scheme[self.scenario.file.node.scheme.upper()],
             kernel=self.scenario.file.node.kernel,
@@ -159,6 +160,39 @@ class World:
             torsion="variance" if self.scenario.file.node.torsion == "variance" else "gate",
             joints=self.scenario.file.node.joints,
             imus=tuple(ImuSettings((self.scenario.file.accelerometer.radius_m, 0.0), noise) for noise in self._noises),
+            reach=self.reach,
+            above=tuple(self._read_joints(other) for other in passed),
+        )
+
+    @property
+    def reach(self) -> int:
+        """Tubes away that a node hears."""
+        return 1 if self.radio is None else self.radio.reach
+
+    def _read_joints(self, tube: int) -> PassedTube:
+        """What the crew reads from the scribe marks of a tube."""
+        std = math.radians(self.scenario.file.joints.reading_std_deg)
+        drive, lower = self._joint_angles
+        drive_error, lower_error = self._joint_errors
+        return PassedTube(
+            Joint(wrap(drive[tube] - self._turned_before(tube) + drive_error[tube]), std),
+            Joint(wrap(lower[tube] + lower_error[tube]), std),
+        )
+
+    def _radio_links(self) -> RadioLinks | None:
+        section = self.scenario.file.radio
+        if section is None:
+            return None
+        hole = self.scenario.hole
+        return RadioLinks(
+            section,
+            self.seed,
+            self.scenario.tubes,
+            self.scenario.tube_length,
+            self.begin,
+            self.end,
+            self.bit_depth,
+            lambda md: float(hole.position(md)[2]),
         )
 
     def torque_settings(self) -> TorqueSettings:
@@ -382,7 +416,8 @@ class World:
         for fault in self.faults:
             if self.begin + fault.after + fault.down < racked:
                 continue
-            on = next(phase.start for phase in self.phases if phase.kind == "add" and phase.tube == fault.tube)
+            added = (phase.start for phase in self.phases if phase.kind == "add" and phase.tube == fault.tube)
+            on = next(added, self.begin)  # a tube in the hole from the start is not added
             if not on < self.begin + fault.after < self.end - fault.down:
                 raise ScenarioError(
                     f"fault {fault}: expected a time between {on - self.begin:.0f} s, "

@@ -10,6 +10,7 @@ from __future__ import annotations
 import math
 from collections import Counter, OrderedDict
 from dataclasses import dataclass, replace
+from functools import partial
 
 from telemetry.application.clock import ClockFilter
 from telemetry.application.outbox import Outbox
@@ -40,6 +41,7 @@ from telemetry.presentation.content import content_of, content_of_message
 from telemetry.presentation.msgpack_codec import DOWNWARD, Envelope, Opened, decode_opened, encode, open_payload
 from telemetry.schema import Kind
 from telemetry.transport.hop import HopLink
+from telemetry.transport.nearest import Nearest
 
 HELLO_EVERY = 1.0  # s
 SYNC_BURST = 30  # exchanges at the quick pace after a start
@@ -108,6 +110,7 @@ class Endpoint:
     boot_count : starts so far, kept by the process
     is_clock_root : whether the own clock is rig time
     restored : bytes of ``export_state`` before the restart, or None; damaged ones are counted and not used
+    reach : tubes away that are heard; beyond 1 the nearest that speaks is the neighbour, whoever lies silent between
     """
 
     def __init__(
@@ -118,6 +121,7 @@ class Endpoint:
         boot_count: int,
         is_clock_root: bool = False,
         restored: bytes | None = None,
+        reach: int = 1,
     ) -> None:
         self.address = address
         self.boot_count = boot_count
@@ -126,12 +130,14 @@ class Endpoint:
         self.mode = Mode.BOOT
         self.neighbours: dict[Side, Neighbour | None] = dict.fromkeys(Side)
         self.hops = 0 if address == ENCODER else HOPS_UNKNOWN
-        self._links = {side: HopLink(address, boot_count) for side in sorted(sides)}
+        self._reach = reach
+        self._links = {side: HopLink(address, boot_count, self._nearest(side)) for side in sorted(sides)}
         toward_encoder = Side.LOWER if address == BASE else Side.UPPER
         self._sync_side = None if is_clock_root else toward_encoder
         # a process that lost its numbers begins another series, so that none is given to a second message
         self._next_sequence = (boot_count << SERIES_SHIFT) + 1 if boot_count > 1 and address != BASE else 1
         self._outbox = Outbox()
+        self._holding = False
         self._answered: OrderedDict[int, bytes] = OrderedDict()
         self._commands = Outbox()
         self._hello_at = -math.inf
@@ -142,14 +148,17 @@ class Endpoint:
             except DecodeError:
                 self.counters["bad_saved_state"] += 1
 
-    def receive(self, side: Side, frame: bytes, now: float) -> list[Received]:
-        """Take a frame from one end; returns the messages for this process. Garbage is counted."""
+    def receive(self, side: Side, frame: bytes, now: float, margin: float = math.inf) -> list[Received]:
+        """Take a frame from one end, heard with a ``margin`` (dB); returns the messages for this process.
+
+        Garbage is counted.
+        """
         link = self._links.get(side)
         if link is None:
             self.counters["no_such_end"] += 1
             return []
         before = link.peer
-        payloads = link.receive(frame, now)
+        payloads = link.receive(frame, now, margin)
         if link.peer != before:
             self._hello_at = -math.inf
             if side is self._sync_side and before is not None and link.peer is not None:
@@ -180,7 +189,7 @@ class Endpoint:
         if self._sync_side in self._links and now >= self._sync_at + self._sync_pace():
             self._sync_at = now
             self._links[self._sync_side].send_best_effort(encode(TimeRequest(now)), Kind.TIME_REQUEST, Priority.TIME)
-        self._send_due(self._outbox, Side.UPPER, now)
+        self._send_kept(now)
         self._send_due(self._commands, Side.LOWER, now)
 
     def take_frames(self, now: float) -> list[tuple[Side, Frame]]:
@@ -209,9 +218,19 @@ class Endpoint:
             self._links[Side.UPPER].send_best_effort(encode(state), (Kind.NODE_STATE, state.tube), Priority.STATE)
 
     def submit(self, message: Kept, now: float) -> None:
-        """Keep a message until the ground station has receipted it, and send it."""
+        """Keep a message until the ground station has receipted it, and send it unless messages are held back."""
         self._outbox.keep_payload(message.sequence, encode(message), now, needed=is_needed(message))
-        self._send_due(self._outbox, Side.UPPER, now)
+        self._send_kept(now)
+
+    def hold(self) -> None:
+        """Send no message that is kept before ``release``: what must be on the disk first is not yet."""
+        self._holding = True
+
+    def release(self, now: float) -> None:
+        """Send what was held back."""
+        if self._holding:
+            self._holding = False
+            self._send_kept(now)
 
     def submit_again(self, sequence: int, payload: bytes, now: float) -> None:
         """Send once more what was receipted before, because the ground station asks for it."""
@@ -258,6 +277,17 @@ class Endpoint:
         """Tell a tube that its message is stored, this one and no other of its number (base station)."""
         receipt = Receipt(message.tube, message.sequence, content_of_message(message))
         self._links[Side.LOWER].send_reliable(encode(receipt), Priority.COMMAND)
+
+    def margin(self, side: Side) -> float:
+        """What the neighbour at one end is heard with over the radio's threshold, dB; infinite without radio or it."""
+        return math.inf if self.neighbours[side] is None else self._links[side].margin
+
+    @property
+    def skipped(self) -> int:
+        """Silent tubes between this one and its upper neighbour."""
+        if self._reach == 1 or self.address in (BASE, ENCODER) or (above := self._links[Side.UPPER].peer) is None:
+            return 0
+        return int(min(self._distance(Side.UPPER, above[0]), self._reach)) - 1
 
     @property
     def outbox_size(self) -> int:
@@ -317,13 +347,14 @@ class Endpoint:
         self.neighbours[side] = Neighbour(
             hello.tube, hello.boot_count, hello.hops, hello.mode, self._links[side].quality, now
         )
-        if side is not Side.UPPER or hello.hops == HOPS_UNKNOWN or hello.hops + 1 == self.hops:
+        if side is not Side.UPPER or hello.hops == HOPS_UNKNOWN:
             return
-        if hello.hops >= MAX_TUBE:
+        hops = hello.hops + 1 + self.skipped
+        if hops > MAX_TUBE:
             self.counters["impossible_hops"] += 1
-            return
-        self.hops = hello.hops + 1
-        self._hello_at = -math.inf
+        elif hops != self.hops:
+            self.hops = hops
+            self._hello_at = -math.inf
 
     def _handle_upward(self, opened: Opened, payload: bytes) -> Message | None:
         if opened.envelope.kind is Kind.DEPTH_READING:
@@ -374,8 +405,31 @@ class Endpoint:
         for link in self._links.values():
             link.send_best_effort(encode(replace(hello, link_quality=link.quality)), Kind.HELLO, Priority.HELLO)
 
+    def _nearest(self, side: Side) -> Nearest | None:
+        """Who is chosen at an end; base station and encoder are joined by a cable, where one alone is heard."""
+        cable = self.address == BASE or (self.address == ENCODER and side is Side.UPPER)
+        return None if self._reach == 1 or cable else Nearest(partial(self._distance, side))
+
+    def _distance(self, side: Side, other: int) -> float:
+        """Tubes from here to ``other``, which speaks at one end; infinite for one that cannot be there.
+
+        Tubes are numbered from the lowest up. Where the encoder is heard although tubes hang between, they are silent;
+        how many there are is known from before.
+        """
+        if self.address == ENCODER:
+            return float(MAX_TUBE + 1 - other) if 0 < other <= MAX_TUBE else math.inf
+        if side is Side.UPPER and other == ENCODER:
+            away = max(self.hops, 1) + 0.5  # a tube as near comes first: it was added between
+        else:
+            away = float(other - self.address if side is Side.UPPER else self.address - other)
+        return away if 0.0 < away < self._reach + 1.0 else math.inf
+
     def _sync_pace(self) -> float:
         return SYNC_QUICK if self.clock.exchanges < SYNC_BURST else SYNC_SLOW
+
+    def _send_kept(self, now: float) -> None:
+        if not self._holding:
+            self._send_due(self._outbox, Side.UPPER, now)
 
     def _send_due(self, outbox: Outbox, side: Side, now: float) -> None:
         priority = Priority.COMMAND if side is Side.LOWER else Priority.SURVEY

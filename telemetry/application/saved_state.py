@@ -11,6 +11,17 @@ from telemetry.messages import HOPS_UNKNOWN, MAX_TUBE, Event, Message, Severity
 from telemetry.presentation.msgpack_codec import decode
 from telemetry.schema import U53
 
+STATE_LAYOUT = "endpoint-1"  # of what is saved; counted up when it changes
+
+
+def layout_of(saved: bytes) -> str:
+    """Name of the layout of what ``Endpoint.export_state`` gave; "unnamed" where there is none."""
+    try:
+        name = msgpack.unpackb(saved)[0]
+    except (ValueError, TypeError, LookupError, msgpack.UnpackException):
+        return "unnamed"
+    return name if isinstance(name, str) else "unnamed"
+
 
 @dataclass(frozen=True, slots=True)
 class SavedState:
@@ -26,7 +37,7 @@ def pack_state(
     next_sequence: int, parcels: list[list[int | bytes]], answered: list[tuple[int, bytes]], hops: int
 ) -> bytes:
     """Bytes of a state."""
-    return bytes(msgpack.packb([next_sequence, parcels, answered, hops]))
+    return bytes(msgpack.packb([STATE_LAYOUT, next_sequence, parcels, answered, hops]))
 
 
 def parse_state(saved: bytes) -> SavedState:
@@ -38,10 +49,12 @@ def parse_state(saved: bytes) -> SavedState:
         When they are no state, or hold a message that is none; the process then starts without one.
     """
     try:
-        next_sequence, parcels, answered, hops = msgpack.unpackb(saved, max_ext_len=0)
+        layout, next_sequence, parcels, answered, hops = msgpack.unpackb(saved, max_ext_len=0)
         kept, answers = [_parcel(row) for row in parcels], [_parcel(row) for row in answered]
     except (ValueError, TypeError, RecursionError, msgpack.UnpackException) as error:
         raise DecodeError(f"saved state: {error}") from error
+    if layout != STATE_LAYOUT:
+        raise DecodeError(f"saved state: expected layout {STATE_LAYOUT}, got {layout!r:.40}")
     if type(next_sequence) is not int or not 1 <= next_sequence <= U53:
         raise DecodeError(f"saved state: next number: expected 1..2^53, got {next_sequence!r:.40}")
     if type(hops) is not int or not HOPS_UNKNOWN <= hops <= MAX_TUBE:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from typing import Any
 
 from telemetry.application.endpoint import Endpoint
@@ -18,9 +19,12 @@ class Process:
 
     endpoint: Endpoint
 
-    def on_frame(self, side: Side, frame: bytes, now: float) -> None:
-        """A frame arrived at one end; the messages for this process are for a subclass to take."""
-        self.endpoint.receive(side, frame, now)
+    def on_frame(self, side: Side, frame: bytes, now: float, margin: float = math.inf) -> None:
+        """A frame arrived at one end; the messages for this process are for a subclass to take.
+
+        A radio tells the ``margin`` (dB) over its threshold with which it was heard.
+        """
+        self.endpoint.receive(side, frame, now, margin)
 
     def on_cycle(self, data: Any, now: float) -> None:
         """A cycle has ended with the sample ``data``; a process without a sensor ignores it."""

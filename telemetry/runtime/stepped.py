@@ -37,7 +37,7 @@ class DueEvent:
 
     kind: Due
     at: float
-    data: Any = None  # CYCLE: [start, *sample]; DEPTH: payload of the reading; frames travel on keys of their own
+    data: Any = None  # CYCLE: [start, *sample]; DEPTH: the reading's payload; of a frame by radio its margin, dB
 
 
 @dataclass(frozen=True, slots=True)
@@ -94,12 +94,17 @@ def dispatch(process: Process, event: DueEvent, frame: bytes) -> None:
     """Hand one event to the process."""
     match event.kind:
         case Due.UPPER_FRAME:
-            process.on_frame(Side.UPPER, frame, event.at)
+            process.on_frame(Side.UPPER, frame, event.at, *heard_with(event))
         case Due.LOWER_FRAME:
-            process.on_frame(Side.LOWER, frame, event.at)
+            process.on_frame(Side.LOWER, frame, event.at, *heard_with(event))
         case Due.CYCLE:
             process.on_cycle(event.data, event.at)
         case Due.DEPTH:
             process.on_depth(event.data, event.at)
         case Due.TIMER:
             process.on_timer(event.at)
+
+
+def heard_with(event: DueEvent) -> tuple[float, ...]:
+    """Margin (dB) of a frame that came by radio; nothing of one that came by cable."""
+    return () if event.data is None else (float(event.data),)

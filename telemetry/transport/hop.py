@@ -19,6 +19,7 @@ from typing import Any, NamedTuple
 import msgpack
 
 from telemetry.media.port import MAX_FRAME, Frame, Priority
+from telemetry.transport.nearest import Nearest
 
 VERSION = 1
 WINDOW = 64
@@ -61,9 +62,12 @@ class HopLink:
     ----------
     address : of this process
     boot_count : its starts so far, so that the other end can tell a restart from a long silence
+    nearest : chooses the other end, where frames of several are heard
     """
 
-    def __init__(self, address: int, boot_count: int) -> None:
+    def __init__(self, address: int, boot_count: int, nearest: Nearest | None = None) -> None:
+        self._nearest = nearest
+        self.margin = math.inf  # dB, of the newest frame; infinite where no radio brings it
         self._address = address
         self._boot_count = boot_count
         self._session = 0
@@ -103,13 +107,20 @@ class HopLink:
             self.counters["best_effort_dropped"] += 1
         self._best_effort[topic] = payload, priority
 
-    def receive(self, frame: bytes, now: float) -> list[bytes]:
-        """Payloads of a frame that were not delivered before; garbage is counted and gives none."""
+    def receive(self, frame: bytes, now: float, margin: float = math.inf) -> list[bytes]:
+        """Payloads of a frame that were not delivered before; garbage is counted and gives none.
+
+        ``margin`` is what the radio heard it with over its threshold, dB.
+        """
         fields = self._parse(frame)
         if fields is None:
             self.counters["bad_frames"] += 1
             return []
         sender, epoch, count, ack_epoch, ack, ack_mask, entries = fields
+        if self._nearest is not None and not self._nearest.is_chosen(sender, now):
+            self.counters["overheard"] += 1
+            return []
+        self.margin = margin
         self._on_peer(sender, epoch)
         self._update_quality(count)
         self.last_heard = now

@@ -142,7 +142,7 @@ def test_the_noise_falls_with_the_root_of_the_number(noises: tuple[float, ...], 
         found = np.sqrt(np.mean(deviations[1][sensor] ** 2) / np.mean(deviations[0][sensor] ** 2))
         assert found == pytest.approx(factor, rel=0.04)
     for name in ("gyro_noise", "bias_std", "force_std"):
-        np.testing.assert_allclose(together.config[0][name], factor * default_config()[0][name])
+        np.testing.assert_allclose(together.tube.config[name], factor * default_config()[0][name])
 
 
 @pytest.mark.parametrize("kernel", ["float64", "fixed"])
@@ -222,7 +222,7 @@ def test_the_bias_that_the_node_knows_stays_whoever_is_left_out() -> None:
     assert abs(float(clustered.tube.state["now_rate"]) - before) < 0.05 * DEG
     assert "started" not in [e.code for e in clustered.events]
     alone = default_config()[0]["gyro_noise"]
-    np.testing.assert_allclose(clustered.config[0]["gyro_noise"], alone)
+    np.testing.assert_allclose(clustered.tube.config["gyro_noise"], alone)
 
 
 def test_a_change_of_the_members_opens_the_bias() -> None:

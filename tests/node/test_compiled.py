@@ -9,12 +9,9 @@ import pytest
 
 COUNT_COMPILATIONS = """
 from node.kernels.warm import warm_up
-from node.kernels.cycle import run_cycle
-from node.kernels.relay import offer_aiding
-from node.kernels.static_average import add_static, has_moved
 from node.kernels.step import node_aiding, node_step
 warm_up()
-for function in (node_step, node_aiding, run_cycle, offer_aiding, add_static, has_moved):
+for function in (node_step, node_aiding):
     print(sum(function.stats.cache_misses.values()), sum(function.stats.cache_hits.values()))
 """
 COUNT_ALLOCATIONS = """
@@ -71,24 +68,24 @@ from node.kernels.step import node_aiding, node_step
 _nrt_python.memsys_enable_stats()
 
 @njit
-def drive(nodes, configs, settings, parameters, readings, moment, aiding, cycles):
+def drive(nodes, settings, parameters, readings, moment, aiding, cycles):
     for k in range(cycles):
         moment[0], moment[1] = 1000.0 + k * 0.5, 1000.5 + k * 0.5
         readings[0, 2] = 1.2 if k % 300 > 200 else 1e-4 * (k % 7)
         readings[0, 3], readings[0, 5] = 1e-3 * (k % 5), -9.8 - 1e-3 * (k % 3)
-        node_step(nodes, configs, settings, parameters, readings, moment)
+        node_step(nodes, settings, parameters, readings, moment)
         aiding[5], aiding[6] = moment[0] + 0.4, k
-        node_aiding(nodes, configs, settings, aiding)
+        node_aiding(nodes, settings, aiding)
 
 @njit
-def drive_fixed(nodes, configs, settings, parameters, readings, moment, aiding, integers, cycles):
+def drive_fixed(nodes, settings, parameters, readings, moment, aiding, integers, cycles):
     for k in range(cycles):
         moment[0], moment[1] = 1000.0 + k * 0.5, 1000.5 + k * 0.5
         readings[0, 2] = 1.2 if k % 300 > 200 else 1e-4 * (k % 7)
         readings[0, 3], readings[0, 5] = 1e-3 * (k % 5), -9.8 - 1e-3 * (k % 3)
-        fixed_step(nodes, configs, settings, parameters, readings, moment, integers)
+        fixed_step(nodes, settings, parameters, readings, moment, integers)
         aiding[5], aiding[6] = moment[0] + 0.4, k
-        fixed_aiding(nodes, configs, settings, aiding, integers)
+        fixed_aiding(nodes, settings, aiding, integers)
 
 def allocations(cycles):
     configs = default_config()
@@ -101,7 +98,7 @@ def allocations(cycles):
     aiding[1] = 1e-6
     own, integers = (drive_fixed, (new_integers(),)) if os.environ["KERNEL"] == "fixed" else (drive, ())
     before = rtsys.get_allocation_stats().alloc
-    own(nodes, configs, settings, parameters, readings, moment, aiding, *integers, cycles)
+    own(nodes, settings, parameters, readings, moment, aiding, *integers, cycles)
     return rtsys.get_allocation_stats().alloc - before
 
 allocations(1)

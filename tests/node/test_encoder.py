@@ -2,7 +2,8 @@ import math
 
 import pytest
 
-from node.firmware.encoder import EDGE_STD, QUANTUM, EncoderNode, EncoderSample
+from node.firmware.encoder import EncoderNode, EncoderSample
+from node.kernels.encoder import EDGE_STD, QUANTUM
 
 
 def test_a_turning_head_is_known_at_its_last_edge() -> None:

@@ -5,11 +5,11 @@ from dataclasses import replace
 
 import pytest
 
-from node.firmware.encoder import QUANTUM
 from node.firmware.inputs import ImuReading, RigContext
 from node.firmware.sensor_limits import SensorLimits
 from node.firmware.settings import Joint, JointRule, TubeSettings
 from node.firmware.tube import Tube
+from node.kernels.encoder import QUANTUM
 from node.kernels.layout import DEG, PERIOD, default_config
 from node.kernels.record import forget_session, new_node
 from telemetry.messages import Aiding, Event
@@ -143,7 +143,7 @@ def test_a_string_that_does_not_stand_solves_nothing(change: dict) -> None:
 
 def restarted(bench: Bench) -> Tube:
     forget_session(bench.tube.nodes)
-    return Tube(bench.settings, bench.tube.configs, bench.tube.nodes, iter(range(9)).__next__, restored=True)
+    return Tube(bench.settings, default_config(), bench.tube.nodes, iter(range(9)).__next__, restored=True)
 
 
 def test_the_solution_is_kept_over_a_restart_and_for_later_measurements() -> None:

@@ -27,9 +27,9 @@ def state(yaw: int) -> np.ndarray:
 def test_a_slot_gives_back_what_was_packed(blob: bytes, generation: int) -> None:
     got = unpack(pack(state(7), blob, generation))
     assert got.nodes.tobytes()[:KEPT_SIZE] == state(7).tobytes()[:KEPT_SIZE]
-    resume(got.nodes)
+    resume(got.nodes, default_config())
     wanted = state(7)
-    resume(wanted)
+    resume(wanted, default_config())
     assert got.nodes.tobytes() == wanted.tobytes(), "what is not saved a start makes anew"
     assert (got.blob, got.generation) == (blob, generation)
 
@@ -130,7 +130,7 @@ def test_a_node_that_turned_keeps_its_constants_and_doubts_its_yaw() -> None:
     saved = state(12345)
     saved[0]["filter"]["P"][Err.YAW, Err.YAW] = (0.01 * DEG) ** 2
     saved[0]["filter"]["still_cycles"] = 0
-    resume(saved)
+    resume(saved, default_config())
     assert int(saved[0]["filter"]["yaw"]) == 12345
     assert saved[0]["filter"]["P"][Err.YAW, Err.YAW] == pytest.approx(math.pi**2 / 3.0, rel=1e-3)
     np.testing.assert_array_equal(saved[0]["filter"]["static_bias"], [1e-4, 2e-4, 3e-4])
@@ -140,7 +140,7 @@ def test_a_node_that_stood_still_keeps_its_yaw_and_its_trust() -> None:
     saved = state(12345)
     saved[0]["filter"]["P"][Err.YAW, Err.YAW] = (0.01 * DEG) ** 2
     saved[0]["filter"]["still_cycles"] = 40
-    resume(saved)
+    resume(saved, default_config())
     assert saved[0]["filter"]["P"][Err.YAW, Err.YAW] == (0.01 * DEG) ** 2
 
 

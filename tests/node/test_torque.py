@@ -1,6 +1,7 @@
 """The drive's torque at the encoder node: when the string is held, when it is free, what may be left in it."""
 
 import math
+from typing import NamedTuple
 
 import pytest
 from hypothesis import given
@@ -8,12 +9,29 @@ from hypothesis import strategies as st
 
 from node.errors import ConfigurationError
 from node.firmware.encoder import EncoderNode, EncoderSample
-from node.firmware.torque import Torque, TorqueSettings, TorqueWatch
+from node.firmware.torque import TorqueSettings, drive_record
+from node.kernels.drive_torque import follow_torque
+from node.kernels.encoder import new_encoder
 from node.process.encoder_process import sample_of
 
 
-def watch(**settings: float) -> TorqueWatch:
-    return TorqueWatch(TorqueSettings(**settings))
+class Torque(NamedTuple):
+    size: float
+    holding: bool
+
+
+class Watch:
+    def __init__(self, settings: TorqueSettings) -> None:
+        self.encoders, self.drives = new_encoder(0, settings.drilling), drive_record(settings)
+
+    def on_cycle(self, measured: float | None, *, turning: bool) -> Torque:
+        reading, has_sensor = math.nan if measured is None else measured, measured is not None
+        follow_torque(self.encoders[0], self.drives[0], reading, has_sensor, turning)
+        return Torque(float(self.encoders["torque"][0]), bool(self.encoders["gripped"][0]))
+
+
+def watch(**settings: float) -> Watch:
+    return Watch(TorqueSettings(**settings))
 
 
 def test_a_string_is_free_after_four_cycles_within_the_dead_band() -> None:

@@ -9,9 +9,9 @@ import numpy as np
 import pytest
 
 from node.firmware.settings import Joint, TubeSettings
-from node.kernels.layout import PERIOD
+from node.kernels.layout import DEG, PERIOD
 from node.process.journal import Journal
-from node.process.saver import SAVE_EVERY
+from node.process.saver import AT_ONCE, SAVE_EVERY, SPACING
 from node.process.tube_process import TubeProcess
 from telemetry.application.clock import ClockFilter
 from telemetry.messages import Aiding, Side
@@ -124,6 +124,56 @@ def test_no_save_shows_a_rest_that_is_over(tmp_path: Path, saves: list[int]) -> 
         assert saves[-1]
 
 
+def test_events_without_end_do_not_wear_the_flash(tmp_path: Path, saves: list[int]) -> None:
+    process = TubeProcess(TubeSettings(3), tmp_path)
+    process.endpoint.clock = ClockFilter(is_root=True)
+    now = noisy(process, 200)
+    saves.clear()
+    storm = 20 * SPACING
+    for k in range(storm):  # the clock jumps in every other cycle, and each jump is an event
+        now += PERIOD
+        process.on_cycle([now - PERIOD if k % 2 else math.nan, *REST], now)
+        process.take_frames(now)
+    assert storm // 2 > len(saves) >= AT_ONCE + storm // SPACING - 1
+    assert len(saves) <= AT_ONCE + storm // SPACING + 1
+    told = process.endpoint.outbox_size
+    assert told > storm // 2, "every jump is kept"
+    noisy(process, SPACING, now)
+    loaded = Journal(tmp_path).load()
+    assert loaded is not None
+    assert len(msgpack.unpackb(loaded[1])[2]) == process.endpoint.outbox_size >= told, "the last one is not lost"
+
+
+def test_a_start_tells_what_its_yaw_is_worth(tmp_path: Path) -> None:
+    first = TubeProcess(TubeSettings(3), tmp_path)
+    first.endpoint.clock = ClockFilter(is_root=True)
+    now = noisy(first, 150)
+    for k in range(40):
+        first._on_aiding(Aiding(1.0, 1e-6, 0.0, 0.0, 0.0, now, 1 + k, 1), now)
+        now = noisy(first, 1, now)
+    first.close()
+    sigma = math.sqrt(first.tube.yaw_var)
+    woken = TubeProcess(TubeSettings(3), tmp_path)
+    hours = (sigma / (2e-4 * DEG)) ** 2 / 3600.0
+    assert woken.tube.boot_event(0.0).arguments["worth_h"] == pytest.approx(hours, rel=0.1)
+    assert hours > 0.01
+    noisy(woken, 60, now, TURN)
+    woken.close()
+    turned = TubeProcess(TubeSettings(3), tmp_path)
+    assert turned.tube.boot_event(0.0).arguments["worth_h"] == 0.0
+    assert "worth_h" not in TubeProcess(TubeSettings(3), tmp_path / "new").tube.boot_event(0.0).arguments
+
+
+def test_telemetry_of_another_layout_is_refused_by_name(tmp_path: Path) -> None:
+    first = TubeProcess(TubeSettings(3), tmp_path)
+    noisy(first, 120)
+    blob = msgpack.packb(msgpack.unpackb(first.endpoint.export_state())[1:])
+    Journal(tmp_path).save(first.nodes, blob)
+    again = TubeProcess(TubeSettings(3), tmp_path)
+    assert again._saver.fault == "saved state: expected telemetry of layout endpoint-1, got unnamed"
+    assert not again.state[0]["static_bias_var"].any()
+
+
 def test_what_is_sent_is_on_the_disk(tmp_path: Path) -> None:
     process = TubeProcess(TubeSettings(3), tmp_path)
     process.endpoint.clock = ClockFilter(is_root=True)
@@ -133,8 +183,8 @@ def test_what_is_sent_is_on_the_disk(tmp_path: Path) -> None:
         loaded = Journal(tmp_path).load()
         assert loaded is not None
         saved, sent = msgpack.unpackb(loaded[1]), msgpack.unpackb(process.endpoint.export_state())
-        assert saved[:3] == sent[:3], "next number, what waits for its receipt, answers"
-        numbers.add(saved[0])
+        assert saved[:4] == sent[:4], "layout, next number, what waits for its receipt, answers"
+        numbers.add(saved[1])
     assert len(numbers) > 5
 
 

@@ -49,8 +49,8 @@ class Surface(Process):
         self.endpoint = Endpoint(BASE, frozenset({Side.LOWER}), boot_count=1)
         self.heard: queue.SimpleQueue[Any] = queue.SimpleQueue()
 
-    def on_frame(self, side: Side, frame: bytes, now: float) -> None:
-        for received in self.endpoint.receive(side, frame, now):
+    def on_frame(self, side: Side, frame: bytes, now: float, margin: float = math.inf) -> None:
+        for received in self.endpoint.receive(side, frame, now, margin):
             if isinstance(received.message, Event):
                 self.endpoint.acknowledge(received.message)
             self.heard.put(received.message)

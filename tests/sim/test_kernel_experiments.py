@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 from borechain.cli.rig.rig import PRELOAD
-from node.firmware.encoder import COUNTS_PER_TURN
 from node.firmware.settings import KERNELS
+from node.kernels.encoder import COUNTS_PER_TURN
 from node.kernels.layout import PERIOD, Scheme
 from node.process.tube_command import node
 from sim.rig.plain_encoder import LINES, PlainEncoder
@@ -135,12 +135,12 @@ def test_every_kernel_can_be_chosen_and_is_warmed_before_the_first_fork() -> Non
     assert set(PRELOAD) == set(KERNELS)
     program = (
         "import borechain.warm_all\n"
-        "from node.kernels import cycle, step\n"
-        "from node.kernels.fixed import beside, step as fixed\n"
-        "from node.kernels.published import cycle as published\n"
-        "steps = (step.node_step, step.node_aiding, fixed.fixed_step, fixed.fixed_aiding)\n"
-        "loops = (cycle.run_cycle, beside.fixed_cycle, published.run_cycle)\n"
-        "print(all(k.signatures for k in steps + loops))\n"
+        "from node.kernels import step\n"
+        "from node.kernels.fixed import step as fixed\n"
+        "from node.kernels.published import step as published\n"
+        "steps = (step.node_step, fixed.fixed_step, published.published_step)\n"
+        "aidings = (step.node_aiding, fixed.fixed_aiding, published.published_aiding)\n"
+        "print(all(k.signatures for k in steps + aidings))\n"
     )
     done = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, check=True)
     assert done.stdout == "True\n"

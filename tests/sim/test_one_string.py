@@ -12,6 +12,7 @@ from sim.rig.direct_string import DirectString, StringRun, aiding_passes
 from sim.studies.epochs import resting
 from sim.world.scenario import AidingSection, scenario_of
 from sim.world.world import World
+from telemetry.parameters import ParameterBlock, SensorParameters
 
 pytestmark = pytest.mark.slow
 
@@ -71,6 +72,18 @@ def test_one_seed_gives_one_run() -> None:
     first, second, other = drilled(3), drilled(3), drilled(4)
     assert np.array_equal(first.total_error, second.total_error, equal_nan=True)
     assert not np.array_equal(first.total_error, other.total_error, equal_nan=True)
+
+
+def test_a_block_taken_in_the_middle_of_a_study_is_in_use_from_the_next_cycle_on() -> None:
+    string = DirectString(World(scenario_of(tables(gyroscope=IDEAL_GYRO)), 1))
+    block = ParameterBlock(1, 1, SensorParameters(bias=(0.0, 0.0, 0.01)))
+    for cycle in string.steps():
+        taken = string.nodes["raw_rate"][:, 2] - string.nodes["rate"][:, 2]
+        assert np.allclose(taken, [0.01 if cycle > 50 else 0.0, 0.0], atol=1e-12)
+        if cycle == 50:
+            string.tubes[1].use(block)
+        elif cycle > 60:
+            return
 
 
 def test_a_string_that_grows_is_powered_tube_by_tube() -> None:

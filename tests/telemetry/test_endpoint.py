@@ -107,6 +107,22 @@ class Chain:
         return [(m.tube, m.sequence) for m in self.got[BASE] if isinstance(m, SurveyMeasurement)]
 
 
+def test_what_is_held_back_leaves_when_it_is_released() -> None:
+    chain = Chain([2, 1])
+    chain.run(3.0)
+    node = chain.stations[1]
+    node.hold()
+    for k in range(3):
+        node.submit(Event(1, node.new_sequence(), 0.0, Severity.INFO, "stopped", {"yaw_deg": float(k)}), chain.local(1))
+    chain.run(20.0)
+    assert not [m for m in chain.got[BASE] if isinstance(m, Event)]
+    assert node.outbox_size == 3
+    node.release(chain.local(1))
+    chain.run(2.0)
+    assert [m.sequence for m in chain.got[BASE] if isinstance(m, Event)] == [1, 2, 3]
+    assert node.outbox_size == 0
+
+
 def test_neighbours_and_hops_are_found_without_configuration() -> None:
     chain = Chain([3, 2, 1])
     chain.run(10.0)

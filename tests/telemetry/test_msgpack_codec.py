@@ -100,11 +100,15 @@ def test_aiding_of_an_old_node_is_read_as_that_of_a_rigid_string(aiding: Aiding)
 
 
 @given(MESSAGES[NodeState])
-def test_a_state_of_a_node_never_aligned_is_said_as_before_there_was_an_alignment(state: NodeState) -> None:
+def test_a_state_is_said_as_before_there_was_what_it_does_not_use(state: NodeState) -> None:
+    """Neither an alignment nor a radio costs a byte where there is none."""
     state = dataclasses.replace(state, epoch=0, numbered=0)
     aligned = state.alignment != (0.0, 0.0, 0.0)
+    by_radio = min(state.upper_margin, state.lower_margin) < math.inf
     rows = msgpack.unpackb(encode(state))
-    assert (rows["v"], "al" in rows["b"]) == ((2, True) if aligned else (1, False))
+    assert rows["v"] == (4 if by_radio else 2 if aligned else 1)
+    assert ("al" in rows["b"]) == (aligned or by_radio)
+    assert ({"um", "lm"} <= set(rows["b"])) == by_radio
     assert decode(msgpack.packb(rows)) == state
 
 

@@ -7,6 +7,7 @@ from hypothesis import strategies as st
 
 from telemetry.application.endpoint import SERIES_SHIFT, Endpoint
 from telemetry.application.outbox import LIMIT, Outbox
+from telemetry.application.saved_state import STATE_LAYOUT
 from telemetry.errors import DecodeError
 from telemetry.messages import (
     BASE,
@@ -85,7 +86,10 @@ def test_whatever_hop_count_a_neighbour_names_the_endpoint_speaks_on(hops: int) 
 BAD = st.none() | st.booleans() | st.integers() | st.floats() | st.text() | st.binary() | st.lists(st.integers())
 
 
-@given(st.tuples(BAD, BAD, BAD, BAD) | st.tuples(st.just(5), st.lists(st.tuples(BAD, BAD)), st.just([]), st.integers()))
+@given(
+    st.tuples(BAD, BAD, BAD, BAD, BAD)
+    | st.tuples(st.just(STATE_LAYOUT), st.just(5), st.lists(st.tuples(BAD, BAD)), st.just([]), st.integers())
+)
 def test_a_state_that_is_none_is_not_believed(rows: tuple[object, ...]) -> None:
     try:
         saved = msgpack.packb(rows)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import ast
 import importlib.util
 import json
 from pathlib import Path
@@ -70,7 +71,7 @@ def bench(context: click.Context) -> None:
 def side_by_side(name: str) -> click.Command:
     """The command of one file of the folder."""
 
-    @click.command(name, help="Speed beside other libraries, measured in one run.")
+    @click.command(name, help=subject_of(FOLDER / f"{name}.py"))
     @json_option
     @plain_faults
     def command(as_json: bool) -> None:
@@ -91,6 +92,11 @@ def side_by_side(name: str) -> click.Command:
             show(result)
 
     return command
+
+
+def subject_of(file: Path) -> str:
+    """What a benchmark measures: the first line of its docstring."""
+    return (ast.get_docstring(ast.parse(file.read_text())) or "").partition("\n")[0]
 
 
 def show(result: dict[str, Any]) -> None:

@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from borechain.cli.faults import EnvironmentFault, InputFault, needs, plain_faults
+from borechain.cli.notices import warnings_in_lines
 from borechain.cli.options import fault_option, json_option, scenario_argument, seed_option, speed_option
 from borechain.cli.tables import console
 from telemetry import keys
@@ -70,7 +71,8 @@ def rig(
     from sim.world.scenario import load_scenario
     from sim.world.world import World
 
-    world = World(load_scenario(scenario, faults), seed)
+    with warnings_in_lines():
+        world = World(load_scenario(scenario, faults), seed)
     if world.scenario.medium.link == "off":
         raise InputFault(f'{scenario}: medium.link: expected "on" for a rig; only studies run without a link')
     if not inline:
@@ -165,7 +167,7 @@ def process_table(
 
     specs = {
         "medium": Spec(run_medium, (place("medium"), scenario, seed, speed, faults, True, True)),
-        "encoder": Spec(run_encoder, (place("encoder"), None, None, world.torque_settings())),
+        "encoder": Spec(run_encoder, (place("encoder"), None, None, world.torque_settings(), world.reach)),
         "base": Spec(run_ground, (place("ground"), ground_settings(world))),
     }
     for tube in range(1, world.scenario.tubes + 1):

@@ -9,10 +9,10 @@ from node.kernels.fixed.error_model import isolate
 from node.kernels.fixed.layout import ANGLE_Q, CEILING, LEVEL_Q, RATE_Q, UNIT, VAR_Q
 from node.kernels.fixed.trigonometry import TURN, difference, radians
 from node.kernels.fixed.update import UNITY, feed_back, innovation_var, joseph
-from node.kernels.jit import kernel
+from node.kernels.jit import constant, kernel
 from node.kernels.layout import Err, Status
 
-PSI, BZ, D = int(Err.YAW), int(Err.BIAS_Z), int(Err.STAMP)
+PSI, BZ, D = constant(Err.YAW), constant(Err.BIAS_Z), constant(Err.STAMP)
 AIDED, REJECTED, YAW_RESET = int(Status.AIDED), int(Status.REJECTED), int(Status.YAW_RESET)
 RATE_RIGHT: Final = RATE_Q + UNIT - LEVEL_Q  # from rad/s to rad a stamp unit in Q31
 SQUARE_RIGHT: Final = ANGLE_Q - VAR_Q // 2

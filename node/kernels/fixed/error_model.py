@@ -12,11 +12,12 @@ from typing import Any, Final
 from node.kernels.fixed.arithmetic import mul
 from node.kernels.fixed.layout import CEILING, STEP_Q, TIME_Q, UNIT
 from node.kernels.fixed.trigonometry import TURN, counts, exponential, sine_cosine
-from node.kernels.jit import kernel
+from node.kernels.jit import constant, kernel
 from node.kernels.layout import STATES, Array, Err
 
-TX, TY, PSI = int(Err.TILT_X), int(Err.TILT_Y), int(Err.YAW)
-BX, BY, BZ, S, D = int(Err.BIAS_X), int(Err.BIAS_Y), int(Err.BIAS_Z), int(Err.SCALE), int(Err.STAMP)
+TX, TY, PSI = constant(Err.TILT_X), constant(Err.TILT_Y), constant(Err.YAW)
+BX, BY, BZ = constant(Err.BIAS_X), constant(Err.BIAS_Y), constant(Err.BIAS_Z)
+S, D = constant(Err.SCALE), constant(Err.STAMP)
 STEP_RIGHT: Final = UNIT + TIME_Q - 31  # from s to rad a bias unit in Q31
 SCALE_RIGHT: Final = STEP_Q - 31 + UNIT  # from rad to rad a scale unit in Q31
 NOISE_LEFT: Final = 31 - TIME_Q  # of a variance a second times a time

@@ -23,11 +23,11 @@ from node.kernels.fixed.layout import (
 from node.kernels.fixed.strapdown import half_turn, rotate_down, yaw_rate
 from node.kernels.fixed.trigonometry import TURN, counts
 from node.kernels.fixed.update import level, zero_rate
-from node.kernels.jit import kernel
+from node.kernels.jit import constant, kernel
 from node.kernels.layout import CLOCK_SLACK, INVERTED, RING, STATES, Array, Err, Status
 from node.kernels.ring import drop_first_pending, stood_still
 
-PSI, BZ, D = int(Err.YAW), int(Err.BIAS_Z), int(Err.STAMP)
+PSI, BZ, D = constant(Err.YAW), constant(Err.BIAS_Z), constant(Err.STAMP)
 LATE_DROPPED = int(Status.LATE_DROPPED)
 UNITY_SCALE: Final = 1 << 30
 SCALE_RIGHT: Final = RATE_Q - 30

@@ -7,11 +7,11 @@ from typing import Any, Final
 from node.kernels.fixed.arithmetic import quotient, shift
 from node.kernels.fixed.error_model import isolate
 from node.kernels.fixed.layout import CEILING, RATE_Q, TIME_Q, UNKNOWN_VAR
-from node.kernels.jit import kernel
+from node.kernels.jit import constant, kernel
 from node.kernels.layout import Array, Err, Status
 from node.kernels.modes import STATIC_BIAS, TRACKING, UNBIASED_STILL_RATE
 
-BX, PSI = int(Err.BIAS_X), int(Err.YAW)
+BX, PSI = constant(Err.BIAS_X), constant(Err.YAW)
 STOPPED, STARTED, SURVEY_READY = int(Status.STOPPED), int(Status.STARTED), int(Status.SURVEY_READY)
 JOINT_OPENED, JOINT_CLOSED = int(Status.JOINT_OPENED), int(Status.JOINT_CLOSED)
 BIAS_KNOWN = int(Status.BIAS_KNOWN)

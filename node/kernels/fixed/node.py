@@ -28,15 +28,13 @@ class FixedNode:
         """The integers, one record of dtype ``FIXED_STATE``."""
         return self._integers[0]["state"]
 
-    def step(
-        self, nodes: Array, configs: Array, settings: Array, parameters: Array, readings: Array, moment: Array
-    ) -> int:
+    def step(self, nodes: Array, settings: Array, parameters: Array, readings: Array, moment: Array) -> int:
         """One cycle as ``node.kernels.step.node_step``."""
-        return fixed_step(nodes, configs, settings, parameters, readings, moment, self._integers)
+        return fixed_step(nodes, settings, parameters, readings, moment, self._integers)
 
-    def aiding(self, nodes: Array, configs: Array, settings: Array, aiding: Array) -> int:
+    def aiding(self, nodes: Array, settings: Array, aiding: Array) -> int:
         """One aiding as ``node.kernels.step.node_aiding``."""
-        return fixed_aiding(nodes, configs, settings, aiding, self._integers)
+        return fixed_aiding(nodes, settings, aiding, self._integers)
 
     def run_cycle(
         self, state: Any, config: Any, rate: Array, force: Array, start: float, end: float, joined: int

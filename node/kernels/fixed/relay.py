@@ -7,11 +7,11 @@ from typing import Any
 from node.kernels.fixed.error_model import isolate
 from node.kernels.fixed.layout import CEILING
 from node.kernels.fixed.trigonometry import TURN, difference
-from node.kernels.jit import kernel
+from node.kernels.jit import constant, kernel
 from node.kernels.layout import PENDING, Err, Status
 from node.kernels.ring import make_room
 
-PSI, D = int(Err.YAW), int(Err.STAMP)
+PSI, D = constant(Err.YAW), constant(Err.STAMP)
 REFERENCE_CHANGED = int(Status.REFERENCE_CHANGED)
 
 

@@ -12,11 +12,11 @@ from node.kernels.fixed.arithmetic import bits, clamp, mul, quotient, reciprocal
 from node.kernels.fixed.layout import ANGLE_Q, FORCE_Q, TIME_Q, VECTOR_Q
 from node.kernels.fixed.strapdown import normalise
 from node.kernels.fixed.trigonometry import TURN, counts
-from node.kernels.jit import kernel
+from node.kernels.jit import constant, kernel
 from node.kernels.layout import STATES, Array, Err
 
-TX, TY, PSI = int(Err.TILT_X), int(Err.TILT_Y), int(Err.YAW)
-BX, S, D = int(Err.BIAS_X), int(Err.SCALE), int(Err.STAMP)
+TX, TY, PSI = constant(Err.TILT_X), constant(Err.TILT_Y), constant(Err.YAW)
+BX, S, D = constant(Err.BIAS_X), constant(Err.SCALE), constant(Err.STAMP)
 UNITY: Final = 1 << 31
 LARGEST_TILT: Final = 4 << VECTOR_Q  # rad, of one correction
 LARGEST_RESIDUAL: Final = 4 << ANGLE_Q

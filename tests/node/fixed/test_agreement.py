@@ -200,20 +200,20 @@ def reports(kernel: str, *, forget: bool) -> list[NodeState]:
 def in_parts(loop: Loop) -> Loop:
     """The step and the aiding of a loop, called part by part from Python."""
 
-    def step(nodes: Array, configs: Array, settings: Array, parameters: Array, readings: Array, moment: Array) -> int:
-        waits, node = enter(nodes, configs, settings, parameters, readings, moment), nodes[0]
+    def step(nodes: Array, settings: Array, parameters: Array, readings: Array, moment: Array) -> int:
+        waits, node = enter(nodes, settings, parameters, readings, moment), nodes[0]
         if waits == REFUSED:
             return say_events(node)
         times = float(moment[START]), float(moment[END]), int(moment[JOINED])
-        status = loop.run_cycle(node["filter"], configs[0], node["rate"], node["force"], *times)
-        return leave(nodes, configs, settings, moment, int(status), waits)
+        status = loop.run_cycle(node["filter"], node["config"], node["rate"], node["force"], *times)
+        return leave(nodes, settings, moment, int(status), waits)
 
-    def aiding(nodes: Array, configs: Array, settings: Array, given: Array) -> int:
-        node, gates = nodes[0], take_aiding(nodes, configs, settings, given)
+    def aiding(nodes: Array, settings: Array, given: Array) -> int:
+        node, gates = nodes[0], take_aiding(nodes, settings, given)
         if gates & USED:
             yaw, yaw_var, _, _, _, valid_at, sequence, hops, *_ = given.tolist()
             about = own_systematic(node), float(node["down_offset"]), valid_at, int(sequence), int(hops)
-            node["noticed"] |= loop.offer_aiding(node["filter"], configs[0], yaw, yaw_var, *about)
+            node["noticed"] |= loop.offer_aiding(node["filter"], node["config"], yaw, yaw_var, *about)
         if gates & ONWARD:
             hand_down(nodes, settings)
         return gates
@@ -244,7 +244,6 @@ def test_the_compiled_step_does_what_the_step_in_parts_does(kernel: str) -> None
             if k == 650:
                 node.config["still_walk"] *= 2.0
         assert whole.nodes.tobytes() == parts.nodes.tobytes()
-        assert whole.configs.tobytes() == parts.configs.tobytes()
 
 
 @pytest.mark.slow

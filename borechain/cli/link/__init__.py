@@ -1,0 +1,1 @@
+"""Links between tubes: what a radio hears through soil and pipe."""

@@ -1,0 +1,34 @@
+"""Aiding that comes over the heads of silent tubes: what they would have added to it on its way down."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+from node.firmware.settings import Joint, PassedTube
+from node.kernels.angles import wrap
+from node.kernels.twist import reaching_var
+from telemetry.messages import Aiding
+
+
+def across(aiding: Aiding, silent: Sequence[PassedTube], stiffness: float) -> Aiding:
+    """The aiding as the lowest of the ``silent`` tubes would have handed it on.
+
+    A tube between adds its joints and its twist and changes nothing else (``node.kernels.relay``, scheme ``forward``),
+    so the tube below reaches the same yaw over it as through it.
+
+    Parameters
+    ----------
+    silent : the tubes between, lowest first
+    stiffness : N m/rad, of each
+    """
+    for tube in reversed(silent):
+        drive = tube.drive_joint if aiding.hops == 0 else Joint()
+        aiding = replace(
+            aiding,
+            offset=wrap(wrap(aiding.offset + drive.angle) + tube.lower_joint.angle),
+            systematic_var=aiding.systematic_var + drive.std**2 + tube.lower_joint.std**2,
+            torsion_var=float(reaching_var(aiding.torsion_var, aiding.torque, stiffness)),
+            hops=aiding.hops + 1,
+        )
+    return aiding

@@ -1,0 +1,1 @@
+"""Links through soil, from tube end to tube end."""
