@@ -12,6 +12,7 @@ from borechain import __version__
 
 COMMANDS = {
     "rig": ("borechain.cli.rig.rig", "rig", "Drill a scenario with one real process a tube."),
+    "gauntlet": ("borechain.cli.gauntlet.gauntlet", "gauntlet", "Drill under faults drawn from one integer."),
     "scenario": ("borechain.cli.scenario.scenario", "group", "List and show the scenarios of the program."),
     "node": ("node.process.tube_command", "node", "Run the node of one tube."),
     "encoder": ("node.process.encoder_command", "encoder", "Run the encoder node on the drive head."),

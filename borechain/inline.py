@@ -7,6 +7,7 @@ same, bit for bit, at a fraction of the CPU time; nobody can ask it while it run
 from __future__ import annotations
 
 import math
+import secrets
 from collections.abc import Callable
 from functools import partial
 from pathlib import Path
@@ -37,15 +38,25 @@ class InlineRig:
     settings : of ``GroundConfig``, what the operator enters at the ground station
     rig : its name
     folder : new, of the whole run
+    lot : of the starts of the ground station; a rig that is to repeat itself draws them from its seed
     native : the joints are on CAN's native profile, which rounds cyclic messages to the steps of their signals
     """
 
-    def __init__(self, world: World, settings: dict[str, Any], rig: str, folder: Path, *, native: bool = False) -> None:
+    def __init__(
+        self,
+        world: World,
+        settings: dict[str, Any],
+        rig: str,
+        folder: Path,
+        lot: Callable[[int], int] = secrets.randbelow,
+        *,
+        native: bool = False,
+    ) -> None:
         self.world = world
         key_file = new_key(folder / "rig.key")
         config = GroundConfig(rig=rig, folder=private_folder(folder, "ground"), key_file=key_file, **settings)
         builders: dict[int, Build] = {
-            BASE: partial(GroundProcess, config),
+            BASE: partial(GroundProcess, config, lot),
             ENCODER: partial(
                 EncoderProcess, private_folder(folder, "encoder"), torque=world.torque_settings(), reach=world.reach
             ),

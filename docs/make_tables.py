@@ -17,6 +17,8 @@ import node_tables  # noqa: E402
 
 from groundstation.service.answers import Fields  # noqa: E402
 from groundstation.service.paths import FIXED, MEMBERS  # noqa: E402
+from groundstation.service.rig_alarms import KINDS  # noqa: E402
+from groundstation.survey.trust import EFFECTS, TOGETHER  # noqa: E402
 from telemetry import keys  # noqa: E402
 from telemetry.application.arguments import shown_name, shown_range  # noqa: E402
 from telemetry.application.commands import COMMANDS, Argument, CommandSpec  # noqa: E402
@@ -140,7 +142,21 @@ def worth() -> str:
     return table(("sigma of the saved yaw, deg", "worth it for, h"), node_tables.worth_rows())
 
 
+def rig_alarms() -> str:
+    """Kinds of alarms of the rig itself."""
+    rows = [(f"`{kind.code}`", kind.level.name.lower(), kind.meaning) for kind in KINDS]
+    return table(("alarm", "level", "means"), rows)
+
+
+def trust() -> str:
+    """Effect of every flag of a survey."""
+    rows = [(f"`{flag.name}`".lower(), effect.name.lower()) for flag, effect in EFFECTS.items()]
+    together = [(" with ".join(f"`{f.name}`".lower() for f in flags), t.name.lower()) for flags, t in TOGETHER.items()]
+    return table(("flag", "trust"), [*rows, *together])
+
+
 PARTS = {
+    "operate.md": {"rig alarms": rig_alarms, "trust": trust},
     "wire.md": {"kinds": kinds, "messages": messages},
     "keys.md": {"keys": key_table, "commands": tube_commands, "actions": actions, "answers": answers},
     "firmware.md": {

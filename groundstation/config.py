@@ -36,7 +36,10 @@ class GroundConfig(BaseModel):
     column_radius: Positive = Field(0.6, description="m, of the finished column")
     tolerance: Literal["en-12716", "5-cm", "0.27-deg"] = Field("en-12716", description="preset of columns.PRESETS")
     station_tolerance: Positive = Field(0.05, description="m, within which two surveys are at the same station")
-    stale_after: Positive = Field(4.5, description="s of rig time without a state of a node")
+    stale_after: Positive = Field(4.5, description="s without a state of a node")
+    depth_rate: Positive = Field(0.2, description="m/s, the fastest that the bit is moved")
+    depth_gap: Positive = Field(5.0, description="s, between two depths that bracket the time of a survey")
+    survey_after: Positive = Field(60.0, description="s of a stop until every tube in the hole must have surveyed")
 
     @property
     def calibrations(self) -> Path:

@@ -7,6 +7,7 @@
     ├── ToolError(InputError, ValueError)      an instrument model that cannot be used: which file, term and formula
     ├── SelectorError(ValueError)              a query nobody can answer: the message lists the valid names
     ├── ConfigurationError(InputError, ValueError)    a setting that what was asked for needs: correct the option named
+    ├── LeaseError(OSError)                    another ground station works on the rig: end it, or name another rig
     └── StoreError(OSError)                    the database cannot be opened or written: nothing was acknowledged
 """
 
@@ -33,6 +34,10 @@ class SelectorError(GroundError, ValueError):
 
 class ConfigurationError(GroundError, InputError, ValueError):
     """A setting is missing or outside its range."""
+
+
+class LeaseError(GroundError, OSError):
+    """The rig has its ground station already."""
 
 
 class StoreError(GroundError, OSError):

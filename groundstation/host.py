@@ -8,9 +8,8 @@ from collections.abc import AsyncIterator, Callable
 from functools import partial
 from typing import Any
 
-import msgpack
-
 from groundstation.config import checked_config
+from groundstation.gateway.lease import take_lease
 from groundstation.gateway.zenoh import ZenohGateway
 from groundstation.service.process import GroundProcess
 from node.kernels.layout import PERIOD
@@ -43,6 +42,7 @@ def run_ground(place: Place, settings: dict[str, Any], *, own_clock: bool = Fals
         # settings, key and database are looked at before half a minute is spent on a router that may be absent
         config = checked_config(rig=place.rig, folder=place.folder, key_file=place.key_file, **settings)
         with contextlib.closing(GroundProcess(config)) as process, joined(place) as bus:
+            take_lease(bus, place.rig)
             run(serve_by_own_clock(process, bus) if own_clock else serve_on_stepper(process, bus))
 
 
@@ -63,7 +63,7 @@ async def serve_on_stepper(process: GroundProcess, bus: ZenohBus) -> None:
     rig = process.config.rig
     async with answering(process, bus) as answers:
         ports = stepped_ports(ZenohMedium(bus), rig, BASE, [Side.LOWER])
-        client = AsyncStepClient(bus, rig, BASE, ports, hears_depth=True)  # its token of life is last
+        client = AsyncStepClient(bus, rig, BASE, ports)  # its token of life is last
         end_with(answers, client.stop)
         await serve_stepped(process, client, partial(complain, NAME))
 
@@ -87,7 +87,5 @@ def end_with(answers: asyncio.Task[None], stop: Callable[[], None]) -> None:
 
 
 def hear_depth(loop: OwnClockLoop, _key: str, payload: bytes) -> None:
-    """Hand a depth of the rig to the process; anything else is no depth."""
-    with contextlib.suppress(ValueError, TypeError, msgpack.UnpackException):
-        rig_time, md = map(float, msgpack.unpackb(payload))
-        loop.call(lambda process, _now: process.on_depth(rig_time, md))
+    """Hand what came on the key of the depth to the process, whatever it is."""
+    loop.call(lambda process, now: process.on_depth(payload, now))

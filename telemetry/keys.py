@@ -32,16 +32,22 @@ CUE: Final = "borechain/{rig}/stepper/cue"
 DEPTH: Final = "borechain/{rig}/surface/depth"
 LIVELINESS: Final = "borechain/{rig}/@liveliness/{process}"
 GROUND: Final = "borechain/{rig}/ground/{path}"
+LEASE: Final = "borechain/{rig}/@lease/{holder}"
 COMMAND: Final = "borechain/{rig}/cmd/{name}"
 
 TABLE: Final[tuple[Key, ...]] = (
     Key(PORT, "publish", "hop-by-hop link: frames of one tube end; side upper or lower, direction tx or rx"),
-    Key(DEPTH, "publish", "measured depth of the bit from tally and block position (msgpack: rig time, metres)"),
+    Key(
+        DEPTH,
+        "publish",
+        "measured depth of the bit from tally and block position (message depth reading)",
+    ),
     Key(STEP, "publish", "stepper: hands one process its next step"),
     Key(DONE, "publish", "stepper: the process has finished the step"),
     Key(WANTED, "publish", "stepper: the processes that ought to be alive now"),
     Key(CUE, "publish", "stepper: the operator has done what the schedule had him do"),
     Key(LIVELINESS, "liveliness", "token of a living process"),
+    Key(LEASE, "liveliness", "token of the one ground station of the rig"),
     Key("borechain/{rig}/ground/status", "query, publish", "rig time, depth, counts, health"),
     Key("borechain/{rig}/ground/string", "query, publish", "tubes from top to bottom with depth and age"),
     Key("borechain/{rig}/ground/nodes/{tube}", "query, publish", "last state of one node, stale or not"),
@@ -52,7 +58,11 @@ TABLE: Final[tuple[Key, ...]] = (
     Key("borechain/{rig}/ground/trajectory", "query, publish", "positions with covariance; ?md=12.5, ?md=4..12"),
     Key("borechain/{rig}/ground/uncertainty", "query, publish", "region of uncertainty, its sources; ?confidence=0.9"),
     Key("borechain/{rig}/ground/column", "query, publish", "deviation from the design, projected to the target"),
-    Key("borechain/{rig}/ground/alarms", "query, publish", "tolerance alarms and stations where the hole moved"),
+    Key(
+        "borechain/{rig}/ground/alarms",
+        "query, publish",
+        "tolerance and rig alarms, stations where the hole moved",
+    ),
     Key("borechain/{rig}/ground/events", "query", "events of the nodes; ?tube=3"),
     Key("borechain/{rig}/ground/static_records", "query", "raw readings that nodes averaged at rest; ?tube=3"),
     Key("borechain/{rig}/ground/recalibration", "query, publish", "calibration in the field: progress and result"),

@@ -2,7 +2,9 @@
 
 Addresses are integers: ``ENCODER`` on the drive head, ``BASE`` the surface end, 1..``MAX_TUBE`` the tubes in
 the order of their first use (the first one drilled is the lowest). Times named ``*_at`` are seconds of rig time, the
-encoder node's clock, unless the field says that they are a node's own clock.
+encoder node's clock, unless the field says that they are a node's own clock. An encoder that starts again may count
+from another zero, so rig time is a pair: every message with such a time names the ``epoch``, the start of the encoder
+that it counts from (``EPOCH_UNKNOWN`` where the sender is of an earlier schema).
 """
 
 from __future__ import annotations
@@ -22,6 +24,8 @@ Matrix3: TypeAlias = tuple[Vector3, Vector3, Vector3]
 Scalar: TypeAlias = bool | int | float | str | None
 Value: TypeAlias = Scalar | tuple[float, ...]
 HOPS_UNKNOWN = -1
+EPOCH_UNKNOWN = 0
+CONTENT_SIZE = 16  # bytes of the hash that a receipt names
 SEGMENT_SIZE = 192  # bytes of a block in one message; eight such messages and their frame stay below 4 KiB
 MAX_SEGMENTS = 32
 
@@ -71,6 +75,7 @@ class NodeFlag(enum.IntFlag):
     CLOCK_UNSYNCHRONISED = 32
     BIAS_UNKNOWN = 64
     SENSOR_FAULT = 128  # a sensor is faulty, or has not yet proved itself again
+    NOT_SAVED = 256  # the node's disk refuses: a cut now loses what came since
 
 
 class UploadPhase(enum.IntEnum):
@@ -103,6 +108,7 @@ class Aiding:
     torque: float = 0.0  # N m >= 0, in the string: the drive's, or once released what may be trapped, 1 sigma
     torsion_var: float = 0.0  # rad^2, of the twist by it in the tubes passed, beside systematic_var
     under_torque: bool = False  # the drive holds the string twisted
+    epoch: int = EPOCH_UNKNOWN
 
 
 @dataclass(frozen=True, slots=True)
@@ -133,6 +139,7 @@ class TimeReply:
     rig_at: float  # s, rig time at replied_at, as the replier knows it
     rig_rate: float  # rig seconds per second of the replier's clock
     clock_var: float  # s^2, variance of rig_at
+    epoch: int = EPOCH_UNKNOWN  # of rig_at
 
 
 @dataclass(frozen=True, slots=True)
@@ -158,6 +165,8 @@ class NodeState:
     parameters_version: int = 0  # of the block in use, 0 is the identity
     parameters_hash: bytes = bytes(8)  # first bytes of its SHA-256
     alignment: Vector3 = (0.0, 0.0, 0.0)  # rad: pitch, roll and their standard error, 0 if not aligned
+    epoch: int = EPOCH_UNKNOWN
+    numbered: int = 0  # newest number given to a survey, event or record; 0 if none, or not told
     upper_margin: float = math.inf  # dB, of the frames heard from above over the radio's threshold; inf: no radio
     lower_margin: float = math.inf  # dB, the same from below
 
@@ -185,14 +194,16 @@ class SurveyMeasurement:
     samples: int
     settle_time: float  # s between the stop and the end of the average
     flags: NodeFlag
+    epoch: int = EPOCH_UNKNOWN
 
 
 @dataclass(frozen=True, slots=True)
 class Receipt:
-    """The ground station stored ``(tube, sequence)`` durably; the tube may forget it."""
+    """The ground station stored the message ``(tube, sequence)`` of this content; the tube may forget that one."""
 
     tube: int
     sequence: int
+    content: bytes = b""  # hash of the payload, ``telemetry.presentation.content``
 
 
 @dataclass(frozen=True, slots=True)
@@ -226,6 +237,7 @@ class Event:
     severity: Severity
     code: str
     arguments: dict[str, Scalar] = field(default_factory=dict)
+    epoch: int = EPOCH_UNKNOWN
 
 
 @dataclass(frozen=True, slots=True)
@@ -272,6 +284,31 @@ class StaticRecord:
     force_cov: Matrix3  # (m/s^2)^2, of one sample
     temperature: float  # C, mean
     moved: bool  # it was not at rest all the time
+    epoch: int = EPOCH_UNKNOWN
+
+
+@dataclass(frozen=True, slots=True)
+class Stand:
+    """The bit stood at one depth."""
+
+    epoch: int
+    begun_at: float  # s, rig time
+    ended_at: float  # s, rig time; of the last stand so far
+    md: float  # m
+
+
+@dataclass(frozen=True, slots=True)
+class DepthReading:
+    """Depth of the bit, from the rig to the ground station on a key of its own.
+
+    Every reading repeats the last stands of the bit, so a ground station that was off can place what came meanwhile.
+    """
+
+    sequence: int  # counted up by the source
+    at: float  # s, rig time
+    md: float  # m, of the bit
+    stands: tuple[Stand, ...]  # the oldest first
+    epoch: int = EPOCH_UNKNOWN  # a source that does not know it is taken to mean the present one
 
 
 Message: TypeAlias = (
@@ -288,5 +325,6 @@ Message: TypeAlias = (
     | BlockSegment
     | BlockStatus
     | StaticRecord
+    | DepthReading
 )
 Kept: TypeAlias = SurveyMeasurement | Event | StaticRecord  # by a tube until its receipt came

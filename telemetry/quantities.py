@@ -11,6 +11,7 @@ MAX_TEXT = 256  # characters
 MAX_ARGUMENTS = 32
 MAX_LIST = 16
 MAX_IMUS = 16
+MAX_STANDS = 16
 
 
 class ValueKind(enum.Enum):
@@ -28,6 +29,7 @@ class ValueKind(enum.Enum):
     VALUES = "names with scalars or lists of numbers"
     NUMBERS = "list of numbers"
     INTEGERS = "list of integers"
+    STANDS = "list of epoch, begin, end, depth"
 
 
 @dataclass(frozen=True, slots=True)

@@ -13,12 +13,14 @@ from typing import Any
 
 from telemetry.messages import (
     BASE,
+    CONTENT_SIZE,
     MAX_SEGMENTS,
     SEGMENT_SIZE,
     Aiding,
     BlockSegment,
     BlockStatus,
     Command,
+    DepthReading,
     Event,
     Hello,
     Mode,
@@ -52,6 +54,7 @@ class Kind(IntEnum):
     BLOCK_SEGMENT = 11
     BLOCK_STATUS = 12
     STATIC_RECORD = 13
+    DEPTH_READING = 14
 
 
 @dataclass(frozen=True, slots=True)
@@ -112,12 +115,12 @@ def _text(name: str, key: str, meaning: str) -> Field:
     return Field(name, ValueKind.TEXT, meaning, key=key)
 
 
-def _binary(name: str, key: str, low: int, high: int, meaning: str) -> Field:
-    return Field(name, ValueKind.BINARY, meaning, "bytes", low, high, key=key)
+def _binary(name: str, key: str, low: int, high: int, meaning: str, **more: Any) -> Field:
+    return Field(name, ValueKind.BINARY, meaning, "bytes", low, high, key=key, **more)
 
 
 def _time(name: str, key: str, meaning: str) -> Field:
-    return Field(name, ValueKind.NUMBER, meaning, "s", -1e12, 1e12, key=key, step=TIME_STEP)
+    return Field(name, ValueKind.NUMBER, meaning, "s", -LARGEST_TIME, LARGEST_TIME, key=key, step=TIME_STEP)
 
 
 def _margin(name: str, key: str, where: str) -> Field:
@@ -128,6 +131,9 @@ def _margin(name: str, key: str, where: str) -> Field:
 TURN, VARIANCE, TORQUE, U32, U53 = math.tau, 100.0, 1e6, 2**32 - 1, 2**53
 ANGLE_STEP = TURN / 2**24  # rad
 TIME_STEP = 1e-5  # s
+LARGEST_TIME = 1e12  # s
+MAX_EPOCH = U32
+DEEPEST = 1e5  # m
 VARIANCE_STEP = 0.5  # dB
 ADDRESS = _integer("tube", "t", 0, BASE, "whose it is: 0 encoder, 1..250 tube, 251 base station")
 ADDRESSEE = _integer("tube", "t", 0, BASE, "whom it is for")
@@ -139,6 +145,7 @@ YAW = _number("yaw", "y", "rad", 0.0, TURN, "yaw", step=ANGLE_STEP)
 YAW_VAR = _variance("yaw_var", "yv", "rad^2", VARIANCE, "random variance of the yaw")
 SYSTEMATIC = _variance("systematic_var", "sv", "rad^2", VARIANCE, "constant errors of joints; never averages away")
 FLAGS = _integer("flags", "f", 0, 0xFFFF, "trust in the own yaw, bits of the table below", enumeration=NodeFlag)
+EPOCH = _integer("epoch", "ep", 0, MAX_EPOCH, "of rig time: starts of the encoder so far, 0 unknown", since=4, before=0)
 MODE = _integer("mode", "m", 0, 7, "execution state", enumeration=Mode)
 DIGEST = _binary("digest", "d", 32, 32, "SHA-256 of the whole block")
 ARGUMENTS = Field("arguments", ValueKind.SCALARS, "by name", key="a")
@@ -174,6 +181,7 @@ SCHEMA: tuple[MessageSpec, ...] = (
             ),
             _variance("torsion_var", "tv", "rad^2", VARIANCE, "of the twist in the tubes passed", since=2, before=0.0),
             _boolean("under_torque", "u", "the drive holds the string twisted", since=2, before=False),
+            EPOCH,
         ),
     ),
     MessageSpec(
@@ -202,6 +210,7 @@ SCHEMA: tuple[MessageSpec, ...] = (
             _time("rig_at", "g", "rig time at replied_at"),
             _number("rig_rate", "k", "1", 0.5, 2.0, "rig seconds per second of the replier's clock", step=1e-9),
             _variance("clock_var", "v", "s^2", 1e9, "of rig_at"),
+            EPOCH,
         ),
     ),
     MessageSpec(
@@ -240,6 +249,8 @@ SCHEMA: tuple[MessageSpec, ...] = (
                 before=(0.0, 0.0, 0.0),
                 step=1e-6,
             ),
+            EPOCH,
+            _integer("numbered", "nn", 0, U53, "newest number given to what is kept, 0 if none", since=4, before=0),
             _margin("upper_margin", "um", "above"),
             _margin("lower_margin", "lm", "below"),
         ),
@@ -261,10 +272,21 @@ SCHEMA: tuple[MessageSpec, ...] = (
             _integer("samples", "n", 1, U32, "in the mean"),
             _number("settle_time", "st", "s", 0.0, 1e12, "between the stop and the end of the average", step=0.01),
             FLAGS,
+            EPOCH,
         ),
     ),
     MessageSpec(
-        Receipt, Kind.RECEIPT, DOWN, EACH_HOP, (ADDRESSEE, _integer("sequence", "s", 0, U53, "what is stored now"))
+        Receipt,
+        Kind.RECEIPT,
+        DOWN,
+        EACH_HOP,
+        (
+            ADDRESSEE,
+            _integer("sequence", "s", 0, U53, "what is stored now"),
+            _binary(
+                "content", "c", 0, CONTENT_SIZE, "BLAKE2b of its payload; a tube forgets no other", since=4, before=b""
+            ),
+        ),
     ),
     MessageSpec(
         Command,
@@ -298,6 +320,7 @@ SCHEMA: tuple[MessageSpec, ...] = (
             _integer("severity", "v", 0, 2, "0 information, 1 warning, 2 error", enumeration=Severity),
             _text("code", "c", "what happened"),
             ARGUMENTS,
+            EPOCH,
         ),
     ),
     MessageSpec(
@@ -350,6 +373,20 @@ SCHEMA: tuple[MessageSpec, ...] = (
             _covariance("force_cov", "fc", "(m/s^2)^2", "of one sample"),
             _number("temperature", "tc", "C", -273.15, 1000.0, "mean", step=0.01),
             _boolean("moved", "m", "it was not at rest all the time"),
+            EPOCH,
+        ),
+    ),
+    MessageSpec(
+        DepthReading,
+        Kind.DEPTH_READING,
+        "on its own key",
+        "overwritten: every reading repeats the last stands",
+        (
+            _integer("sequence", "s", 0, U53, "counted up by the source"),
+            _time("at", "at", "rig time"),
+            _number("md", "md", "m", 0.0, DEEPEST, "of the bit", step=1e-3),
+            Field("stands", ValueKind.STANDS, "last stands of the bit, oldest first", "m", 0.0, DEEPEST, key="st"),
+            EPOCH,
         ),
     ),
 )

@@ -27,7 +27,7 @@ def make_tables() -> ModuleType:
     return module
 
 
-@pytest.mark.parametrize("page", ["wire.md", "keys.md", "firmware.md"])
+@pytest.mark.parametrize("page", ["wire.md", "keys.md", "firmware.md", "operate.md"])
 def test_the_tables_of_a_page_are_made_from_the_code(make_tables: ModuleType, page: str) -> None:
     assert (DOCS / page).read_text() == make_tables.filled(page), "run python docs/make_tables.py"
 

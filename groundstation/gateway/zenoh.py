@@ -59,10 +59,18 @@ class ZenohGateway:
         try:
             while (arrived := await self._inbox.get()) is not None:
                 handle, query = arrived
-                handle(query)
+                self._handle(handle, query)
         finally:
             for task in self._awaited:
                 task.cancel()
+
+    def _handle(self, handle: Handler, query: Query) -> None:
+        """Answer one query; a fault of ours is counted and told to whoever asked, and the next one is answered."""
+        try:
+            handle(query)
+        except Exception as error:
+            self._process.endpoint.counters["failed_queries"] += 1
+            refuse(query, f"{query.selector_key}: the ground station failed: {type(error).__name__}")
 
     def close(self) -> None:
         """Answer nothing more; from the loop or a signal handler of it."""
@@ -114,6 +122,9 @@ class ZenohGateway:
         """Accept an order; its answer is awaited beside all other work."""
         if len(self._awaited) >= WAITING:
             refuse(query, BUSY)
+            return
+        if not keys.is_order(query.selector_key):
+            query.finish()  # a question that covers every key orders nothing
             return
         name = query.selector_key.rsplit("/", 1)[1]
         try:

@@ -10,6 +10,8 @@ import numpy as np
 from groundstation.errors import SelectorError, SurveyError
 from groundstation.service.alarms import Alarm
 from groundstation.service.model import RigModel
+from groundstation.service.rig_alarms import RigAlarm
+from groundstation.service.views import finite
 from groundstation.survey.columns import LEVELS, Deviation, deviation, dominant
 from groundstation.survey.ellipsoid import axes, coverage_radius, plan_ellipse
 from groundstation.survey.trajectory import Point
@@ -124,6 +126,21 @@ def alarms(k: RigModel, _p: dict[str, str]) -> View:
             }
             for moved in k.moved
         ],
+        "rig": [rig_alarm_view(alarm) for alarm in k.rig_alarms],
+        "rig_cleared": [rig_alarm_view(alarm) for alarm in k.rig_alarms.cleared],
+    }
+
+
+def rig_alarm_view(a: RigAlarm) -> View:
+    """One alarm of the rig itself."""
+    return {
+        "code": a.kind.code,
+        "level": a.kind.level.name.lower(),
+        "subject": a.subject,
+        "detail": a.detail,
+        "raised_at_s": finite(a.raised_at),
+        "cleared_at_s": None if a.cleared_at is None else finite(a.cleared_at),
+        "count": a.count,
     }
 
 

@@ -17,6 +17,8 @@ from groundstation.service.answers import (
 )
 from groundstation.service.orders import OrderState
 from groundstation.service.recalibration.progress import Phase, Stage
+from groundstation.service.rig_alarms import KINDS, Health, Level
+from groundstation.survey.trust import Trust
 from telemetry.messages import Mode, NodeFlag, Severity
 
 RIG_TIME = number("rig_time_s", "rig time now", null=True)
@@ -56,7 +58,11 @@ STATUS: Fields = (
     integer("measurements", "surveys that belong to a station"),
     integer("unplaced_measurements", "surveys without a known depth"),
     integer("refused_measurements", "surveys with invalid numbers"),
-    text("health", "", "good", "degraded"),
+    integer("set_aside_measurements", "surveys of a faulty sensor, never fused"),
+    integer("untrusted_measurements", "surveys whose yaw is taken for unknown"),
+    text("health", "the worst of the rig's alarms, or that nobody can tell", *(h.name.lower() for h in Health)),
+    integer("epoch", "of rig time: starts of the encoder so far, 0 unknown"),
+    texts("alarms", "kinds that stand"),
 )
 STRING: Fields = (
     RIG_TIME,
@@ -108,6 +114,7 @@ STATION: Fields = (
     *SIGMA_ANGLES,
     integer("measurements", "clusters measured here"),
     integer("dropped_measurements", "of them from before the hole moved"),
+    integer("untrusted_measurements", "of them with a yaw that is taken for unknown"),
     number("sigma_yaw_deg", "root mean square of those that count"),
     number("sigma_systematic_deg", "root mean square of those that count"),
     number("sigma_force_mps2", "root mean square of those that count, one axis"),
@@ -128,6 +135,7 @@ MEASUREMENT: Fields = (
     integer("samples", "in the mean"),
     number("settle_s", "between the stop and the end of the average"),
     FLAGS,
+    text("trust", "what the flags make of it", *(trust.name.lower() for trust in (Trust.FULL, Trust.UNKNOWN_YAW))),
     texts("quality", "checks that it failed"),
 )
 MEASUREMENTS: Fields = (RIG_TIME, rows("measurements", MEASUREMENT))
@@ -239,6 +247,15 @@ ALARM: Fields = (
     number("threshold_cm", "passed"),
     number("cleared_at_s", "rig time", null=True),
 )
+RIG_ALARM: Fields = (
+    text("code", "kind of alarm, see [operating](operate.md#what-the-crew-is-told)", *(kind.code for kind in KINDS)),
+    text("level", "how much it matters", *(level.name.lower() for level in Level)),
+    text("subject", "what it is about"),
+    text("detail", "what is known of it"),
+    number("raised_at_s", "rig time", null=True),
+    number("cleared_at_s", "rig time; null while it stands", null=True),
+    integer("count", "times it was raised"),
+)
 ALARMS: Fields = (
     numbers("levels_percent", "of the tolerance"),
     rows("active", ALARM),
@@ -253,6 +270,8 @@ ALARMS: Fields = (
             numbers("neighbours_sigma", "of the stations beside it"),
         ),
     ),
+    rows("rig", RIG_ALARM),
+    rows("rig_cleared", RIG_ALARM),
 )
 SENSOR: Fields = (numbers("matrix", "row = sensor axis", 2), numbers("bias_mps2", "at the reference temperature"))
 RECALIBRATION: Fields = (

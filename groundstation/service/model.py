@@ -12,20 +12,27 @@ import numpy.typing as npt
 from groundstation.config import GroundConfig
 from groundstation.errors import SurveyError
 from groundstation.service.alarms import AlarmList
+from groundstation.service.depth import DepthLog
+from groundstation.service.numbers import Numbers
 from groundstation.service.orders import OrderBook
 from groundstation.service.recalibration.procedure import FieldProcedure
-from groundstation.service.tally import DepthLog, Tally
+from groundstation.service.rig_alarms import Health, RigAlarms
+from groundstation.service.stops import Stops
+from groundstation.service.tally import Tally
 from groundstation.survey.columns import Deviation, deviation, project
 from groundstation.survey.fusion import Departure, Evidence, departure, judge_departure, weighted
 from groundstation.survey.resolve import Direction, Quality, check, combine_imus, resolve
 from groundstation.survey.shared import SharedErrors
 from groundstation.survey.trajectory import Point, Trajectory
-from telemetry.messages import Event, NodeState, StaticRecord, SurveyMeasurement
+from groundstation.survey.trust import UNKNOWN_YAW_VAR, Trust, trust_of, with_unknown_yaw
+from telemetry.messages import EPOCH_UNKNOWN, Event, NodeState, StaticRecord, SurveyMeasurement
 
 Array = npt.NDArray[np.float64]
 EVENTS_SHOWN = 10_000
 STATIC_RECORDS_SHOWN = 1_000
 ACCELEROMETER_NOISE_DEG = 0.02  # one sample, for the check of motion
+ABOVE_COLLAR = 0.01  # m, of rounding; a node higher up is in no hole
+ALL_HEARD_WITHIN = 2.0  # s, of tubes that speak
 SAME_STOP = 15.0  # s, within which two surveys were taken at one stop
 
 
@@ -37,11 +44,25 @@ class ResolvedStop:
     md: float
     direction: Direction
     quality: Quality
+    trust: Trust = Trust.FULL
 
     @property
     def at(self) -> float:
         """Rig time of the stop, s."""
         return self.measurement.station_at
+
+    @property
+    def yaw_var(self) -> float:
+        """Random variance of the yaw (rad^2) with which it is fused."""
+        return self.measurement.yaw_var + (UNKNOWN_YAW_VAR if self.trust is Trust.UNKNOWN_YAW else 0.0)
+
+
+@dataclass(frozen=True, slots=True)
+class Waiting:
+    """A stored survey whose depth is not known, and the length (m) of string below its tube when it came."""
+
+    measurement: SurveyMeasurement
+    below: float | None
 
 
 @dataclass(slots=True)
@@ -81,9 +102,20 @@ class SurveyStation:
         self.drops = [drop for drop in self.drops if drop < place]
         self._departures = {k: d for k, d in self._departures.items() if k < place}
 
+    @property
+    def counting(self) -> list[ResolvedStop]:
+        """Clusters that count: of those since the hole moved the trusted ones, or all where none is."""
+        since = self.clusters[self.first :]
+        return [cluster for cluster in since if cluster.trust is Trust.FULL] or since
+
+    @property
+    def untrusted(self) -> int:
+        """Clusters measured here whose yaw is not believed."""
+        return sum(cluster.trust is not Trust.FULL for cluster in self.clusters)
+
     def readings(self) -> list[Direction]:
         """Directions of the clusters that count."""
-        return [cluster.direction for cluster in self.clusters[self.first :]]
+        return [cluster.direction for cluster in self.counting]
 
     def departure(self, place: int) -> Departure | None:
         """How far the cluster at ``place`` departed from those before; None for the first of its hole."""
@@ -116,14 +148,24 @@ class RigModel:
     def __init__(self, config: GroundConfig) -> None:
         self.config = config
         self.tally = Tally(config.tube_length)
-        self.depths = DepthLog()
+        self.depths = DepthLog(config.depth_rate, config.depth_gap)
+        self.stops = Stops(self.tally, config.survey_after)
+        self.numbers = Numbers()
+        self.rig_alarms = RigAlarms()
         self.nodes: dict[int, NodeState] = {}
         self.stations: list[SurveyStation] = []
         self.events: deque[Event] = deque(maxlen=EVENTS_SHOWN)
         self.static_records: deque[StaticRecord] = deque(maxlen=STATIC_RECORDS_SHOWN)
-        self.unplaced = 0
+        self.waiting: list[Waiting] = []  # surveys whose depth is not known yet
+        self.undated = 0  # surveys without rig time, which never have one
+        self.set_aside: list[SurveyMeasurement] = []  # of a faulty sensor, never fused
         self.refused = 0
+        self.now = math.nan  # s, own clock
         self.rig_now = math.nan
+        self.epoch = EPOCH_UNKNOWN
+        self._tally_known_at = math.inf  # s, own clock, from which on every tube that speaks has been heard
+        self.depth_heard_at = -math.inf  # s, own clock
+        self._heard_at: dict[int, float] = {}  # s, own clock, of each tube's newest state
         self.shared = SharedErrors()
         self.moved: list[Moved] = []
         self.alarms = AlarmList()
@@ -132,39 +174,91 @@ class RigModel:
         self.recalibration = FieldProcedure(config.gravity)
         self.orders = OrderBook()
 
-    def on_state(self, state: NodeState) -> None:
-        """Handle a node's state, unless a newer one is known."""
+    def on_state(self, state: NodeState, now: float) -> None:
+        """Handle a node's state that came at ``now`` (s, own clock), unless a newer one of its epoch is known."""
         self.recalibration.on_state(state)
+        self._heard_at[state.tube] = now
         known = self.nodes.get(state.tube)
-        if known is None or state.at >= known.at:
+        if known is None or state.epoch != known.epoch or state.at >= known.at:
             self.nodes[state.tube] = state
+            self._tally_known_at = min(self._tally_known_at, now + ALL_HEARD_WITHIN)
             self.tally.on_hops(state.tube, state.hops)
 
-    def place(self, measurement: SurveyMeasurement) -> float | None:
-        """Measured depth (m) of the tube's node when it surveyed; None when the bit's depth then is not known."""
-        self.tally.on_hops(measurement.tube, self._hops_if_unknown(measurement))
-        bit, below = self.depths.at(measurement.station_at), self.tally.length_below(measurement.tube)
-        return None if bit is None or below is None else bit - below
+    def restore_tally(self, tubes: list[int]) -> None:
+        """Go on with the tubes that were known before a restart."""
+        self.tally.restore(tubes)
+        if tubes:
+            self._tally_known_at = -math.inf
 
-    def on_survey(self, measurement: SurveyMeasurement, md: float | None) -> bool:
-        """Resolve and fuse a stored measurement; False when it belongs to no depth or is no survey."""
+    def string_below(self, measurement: SurveyMeasurement) -> float | None:
+        """Length (m) of string below a tube; None while the tubes known are not those that reach the bit.
+
+        A ground station that has lost its database meets the tubes one after the other, the upper ones first.
+        """
+        self.tally.on_hops(measurement.tube, self._hops_if_unknown(measurement))
+        bit = self.depths.latest
+        if bit is None or self.tally.misfit(bit, ()) or self.now < self._tally_known_at:
+            return None
+        return self.tally.length_below(measurement.tube)
+
+    def depth_of(self, measurement: SurveyMeasurement, below: float | None) -> float | None:
+        """Measured depth (m) of the tube's node when it surveyed; None where no depth brackets its time."""
+        below = self.string_below(measurement) if below is None else below
+        if below is None or trust_of(measurement.flags) is Trust.UNDATED:
+            return None
+        bit = self.depths.at(measurement.epoch or self.epoch, measurement.station_at)
+        if bit is None or bit - below < -ABOVE_COLLAR:
+            return None
+        return max(bit - below, 0.0)
+
+    def placeable(self) -> list[tuple[Waiting, float]]:
+        """Surveys that waited for their depth and have it now; they wait no more."""
+        found = [(one, self.depth_of(one.measurement, one.below)) for one in self.waiting]
+        self.waiting = [one for one, md in found if md is None]
+        return [(one, md) for one, md in found if md is not None]
+
+    @property
+    def unplaced(self) -> int:
+        """Surveys without a known depth."""
+        return len(self.waiting) + self.undated
+
+    @property
+    def health(self) -> Health:
+        """The worst that is known, or that nothing is known."""
+        heard = [tube for tube in self.tally.tubes if not self.is_stale(tube)]
+        depth_is_heard = self.now - self.depth_heard_at <= self.config.stale_after
+        knows = math.isfinite(self.rig_now) and depth_is_heard and bool(heard)
+        return max(self.rig_alarms.health, Health.GOOD if knows else Health.UNKNOWN)
+
+    def on_survey(self, measurement: SurveyMeasurement, md: float | None, below: float | None = None) -> str:
+        """Resolve and fuse a stored measurement; returns the kind of alarm where it is not used as it is, or ''."""
+        trust = trust_of(measurement.flags)
+        if trust is Trust.UNDATED:
+            self.undated += 1
+            return "survey_unplaced"
+        if trust is Trust.SET_ASIDE:
+            self.set_aside.append(measurement)
+            return "survey_set_aside"
         if md is None:
-            self.unplaced += 1
-            return False
-        forces = np.array([imu.force for imu in measurement.imus])
-        covs = np.array([imu.force_cov for imu in measurement.imus])
+            self.waiting.append(Waiting(measurement, below))
+            return ""  # most wait for a moment; the watch tells of those that wait longer
         try:
-            direction = self._direction(measurement, *combine_imus(forces, covs))
+            self._fuse(measurement, md, trust)
         except (SurveyError, np.linalg.LinAlgError):
             self.refused += 1
-            return False
+            return "survey_refused"
+        return "" if trust is Trust.FULL else "survey_untrusted"
+
+    def _fuse(self, measurement: SurveyMeasurement, md: float, trust: Trust) -> None:
+        forces = np.array([imu.force for imu in measurement.imus])
+        covs = np.array([imu.force_cov for imu in measurement.imus])
+        direction = self._direction(measurement, trust, *combine_imus(forces, covs))
         noise = math.radians(ACCELEROMETER_NOISE_DEG) * self.config.gravity
         quality = check(forces, covs, self.config.gravity, measurement.samples, measurement.settle_time, noise)
         station = self._station_at(md)
-        station.add_stop(ResolvedStop(measurement, md, direction, quality))
+        station.add_stop(ResolvedStop(measurement, md, direction, quality, trust))
         self._judge_movement(measurement.station_at)
         self._recompute()
-        return True
 
     def on_event(self, event: Event) -> None:
         """Remember what happened."""
@@ -178,9 +272,8 @@ class RigModel:
         self.recalibration.on_static_record(record)
 
     def age(self, tube: int) -> float:
-        """Rig seconds since a node's newest state; infinite for one never heard."""
-        state = self.nodes.get(tube)
-        return math.inf if state is None else self.rig_now - state.at
+        """Seconds of the own clock since a node's newest state came; infinite for one never heard."""
+        return self.now - self._heard_at.get(tube, -math.inf)
 
     def is_stale(self, tube: int) -> bool:
         """Whether a node has been silent for too long."""
@@ -198,9 +291,11 @@ class RigModel:
         self.stations.sort(key=lambda known: known.md)
         return station
 
-    def _direction(self, m: SurveyMeasurement, force: Array, force_cov: Array) -> Direction:
+    def _direction(self, m: SurveyMeasurement, trust: Trust, force: Array, force_cov: Array) -> Direction:
         """Direction of a measurement with what it shares with others."""
         resolved = resolve(force, force_cov, m.yaw, m.yaw_var)
+        if trust is Trust.UNKNOWN_YAW:
+            resolved = with_unknown_yaw(resolved)
         return self.shared.reading(
             resolved,
             m.tube,

@@ -29,8 +29,11 @@ from telemetry.errors import CommandError
 from telemetry.messages import BlockStatus, Command
 from telemetry.parameters import ParameterBlock
 
-BOOT_SHIFT = 20  # orders of one start of the ground station, as a power of two
+START_SHIFT = 20  # orders of one start of the ground station, as a power of two
+OPEN_AT_MOST = 16  # orders that wait for the answer of one tube
+ANSWERED_WITHIN = 900.0  # s, own clock, after which an order that no tube has answered is withdrawn
 NO_KEY = "key_file: expected the key file of the rig, without it no node takes a block"
+UPLOAD = "upload_parameters"
 RECALIBRATION = "recalibration"  # who orders what the calibration in the field asks for
 
 
@@ -53,21 +56,26 @@ class Operator:
     config : of the ground station
     model, store : what it knows, and where it keeps it
     uploads : that are under way; None without a key of the rig
+    start : number of this start of the ground station, which no order of another start shares
     """
 
-    def __init__(self, config: GroundConfig, model: RigModel, store: Store, uploads: Uploads | None) -> None:
+    def __init__(
+        self, config: GroundConfig, model: RigModel, store: Store, uploads: Uploads | None, start: int
+    ) -> None:
         self._config = config
         self._model = model
         self._store = store
         self._uploads = uploads
         self._orders = model.orders
-        self._numbers = itertools.count((store.boots << BOOT_SHIFT) + 1)
+        self._numbers = itertools.count((start << START_SHIFT) + 1)
         self._pending: deque[Outgoing] = deque()
+        self._accepted_at: dict[int, float] = {}  # s, own clock, of the orders that have no answer yet
         self._recalibration = Recalibration(model.recalibration, store, config.calibrations, self._cancel_upload)
         self._handlers: dict[str, Callable[[Order], None]] = {
             spec.name: getattr(self, spec.name) for spec in COMMANDS if spec.by is ObeyedBy.GROUND
         }
         self.wake: Callable[[], None] = lambda: None  # called when something is to be sent
+        self.ended: Callable[[int], None] = lambda _number: None  # called with an order that is not to be sent any more
         self.changed: Callable[[list[str]], None] = lambda _paths: None  # called with the paths that changed
 
     def ask(self, path: str, parameters: Mapping[str, str] | None = None) -> View:
@@ -126,7 +134,7 @@ class Operator:
         """
         self._check_key()
         self._check_tube(block.tube)
-        order = self._new_order(find_command("upload_parameters"), block.tube, {"version": block.version}, by)
+        order = self._new_order(find_command(UPLOAD), block.tube, {"version": block.version}, by)
         self._start_upload(order, block)
         self._keep(order)
         return order
@@ -151,9 +159,27 @@ class Operator:
         order.advance(OrderState.DONE)
         self.changed(["recalibration"])
 
+    def accept_depth(self, order: Order) -> None:
+        """Believe the depth that comes from now on."""
+        self._model.depths.accept()
+        self._model.rig_alarms.clear("depth_refused", "depth")
+        order.advance(OrderState.DONE)
+
+    def expire_orders(self, now: float) -> None:
+        """Withdraw what no tube has answered by ``now`` (s, own clock); the calibration in the field minds its own."""
+        for order in self._waiting():
+            if order.state is OrderState.SENT and now > self._accepted_at.get(order.number, now) + ANSWERED_WITHIN:
+                self.ended(order.number)
+                if self._uploads is not None and order.spec.name == UPLOAD and order.tube is not None:
+                    self._uploads.cancel(order.tube)
+                self._orders.fail(order.number, f"tube {order.tube} has not answered in {ANSWERED_WITHIN:.0f} s")
+        self._accepted_at = {o.number: self._accepted_at.get(o.number, now) for o in self._waiting()}
+        self.publish_orders()
+
     def reply_of(self, order: Order) -> View:
         """Answer to whoever ordered: the order, or how far the calibration in the field has come."""
-        return self.ask(f"orders/{order.number}" if order.tube is not None else "recalibration")
+        is_recalibration = order.spec.name == "recalibrate"
+        return self.ask("recalibration" if is_recalibration else f"orders/{order.number}")
 
     def take_pending(self) -> list[Outgoing]:
         """What is to be sent now."""
@@ -203,6 +229,7 @@ class Operator:
     def _accept(self, spec: CommandSpec, tube: int | None, arguments: dict[str, Any], by: str) -> Order:
         if tube is not None:
             self._check_tube(tube)
+            self._check_room(tube)
         order = self._new_order(spec, tube, arguments, by)
         if spec.by is ObeyedBy.GROUND:
             self._handlers[spec.name](order)
@@ -236,6 +263,14 @@ class Operator:
     def _check_key(self) -> None:
         if self._uploads is None:
             raise ConfigurationError(NO_KEY)
+
+    def _waiting(self) -> list[Order]:
+        return [order for order in self._orders if not order.answered and order.by != RECALIBRATION]
+
+    def _check_room(self, tube: int) -> None:
+        waiting = sum(order.tube == tube for order in self._waiting())
+        if waiting >= OPEN_AT_MOST:
+            raise SelectorError(f"tube {tube}: expected at most {OPEN_AT_MOST} orders without an answer, got {waiting}")
 
     def _check_tube(self, tube: int) -> None:
         known = self._model.tally.tubes + [t for t in sorted(self._model.nodes) if t not in self._model.tally.tubes]

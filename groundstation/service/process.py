@@ -2,29 +2,45 @@
 
 from __future__ import annotations
 
+import contextlib
 import math
-from collections.abc import Callable
+import secrets
+from collections import deque
+from collections.abc import Callable, Iterator
+from dataclasses import replace
 
 from groundstation.config import GroundConfig
+from groundstation.errors import SelectorError, StoreError
 from groundstation.service.model import RigModel
 from groundstation.service.operator import BlockUpload, Operator, Outgoing
+from groundstation.service.orders import Order
 from groundstation.service.store import Store
 from groundstation.service.uploads import Uploads
+from groundstation.service.watch import Watch
 from telemetry.application.endpoint import Endpoint
+from telemetry.errors import DecodeError
 from telemetry.messages import (
     BASE,
+    EPOCH_UNKNOWN,
     BlockStatus,
+    DepthReading,
     Event,
     Kept,
     Message,
     NodeState,
     Reply,
     Side,
+    Stand,
     StaticRecord,
     SurveyMeasurement,
 )
+from telemetry.presentation.msgpack_codec import decode
 from telemetry.runtime.process import Process
 from telemetry.transport.authentication import read_key
+
+STARTS = 1 << 31  # numbers of a start by lot
+EARLY = 64  # readings of the depth that may come before rig time is known
+GROUND_STATION = "ground station"  # who orders that something be sent again
 
 Listener = Callable[[list[str]], None]  # takes the paths below ground/ that changed
 
@@ -37,6 +53,7 @@ class GroundProcess(Process):
     Parameters
     ----------
     config : validated settings
+    lot : number below its argument by lot; a simulated rig draws from its seed
 
     Raises
     ------
@@ -46,22 +63,30 @@ class GroundProcess(Process):
         When a key file is configured and holds no key.
     """
 
-    def __init__(self, config: GroundConfig) -> None:
+    def __init__(self, config: GroundConfig, lot: Callable[[int], int] = secrets.randbelow) -> None:
         self.config = config
         self._uploads = Uploads(read_key(config.key_file)) if config.key_file is not None else None
         self.store = Store(config.url)
+        # by lot, not counted: a database that was deleted or restored must not repeat a number that the string has seen
+        start = 1 + lot(STARTS)
         self.model = RigModel(config)
-        self.endpoint = Endpoint(BASE, frozenset({Side.LOWER}), boot_count=self.store.boots)
+        self.watch = Watch(self.model)
+        self.endpoint = Endpoint(BASE, frozenset({Side.LOWER}), boot_count=start)
         self.listeners: list[Listener] = []
         self._stale: set[int] = set()
-        self.model.tally.restore(self.store.tally())
+        self._early: deque[DepthReading] = deque(maxlen=EARLY)
+        self._kept_stand: Stand | None = None
+        self.model.epoch = self.store.epoch()
+        self.model.restore_tally(self.store.tally())
         self._kept_tally = list(self.model.tally.tubes)
-        for at, md in self.store.depths():
-            self.model.depths.restore(at, md)
-        self.operator = Operator(config, self.model, self.store, self._uploads)
+        for stand in self.store.stands():
+            self._on_stand(stand)
+        self.model.depths.restore(list(self.model.depths.stands))
+        self.operator = Operator(config, self.model, self.store, self._uploads, start)
         self.operator.changed = self._publish
+        self.operator.ended = self.endpoint.withdraw
         for stored in self.store.messages():
-            self._apply_stored(stored.message, stored.md)
+            self._apply_stored(stored.message, stored.md, stored.below)
 
     def on_frame(self, side: Side, frame: bytes, now: float, margin: float = math.inf) -> None:
         """A frame arrived from the encoder."""
@@ -69,24 +94,34 @@ class GroundProcess(Process):
         for received in self.endpoint.receive(side, frame, now, margin):
             self._on_message(received.message, now)
 
-    def on_depth(self, rig_time: float, md: float) -> None:
-        """The rig measured the depth of the bit; non-finite values are ignored."""
-        if not (math.isfinite(rig_time) and math.isfinite(md)):
+    def on_depth(self, payload: bytes, now: float) -> None:
+        """The rig measured the depth of the bit; bytes that are no reading are counted."""
+        try:
+            reading = decode(payload)
+        except DecodeError:
+            reading = None
+        if not isinstance(reading, DepthReading):
+            self.endpoint.counters["bad_depths"] += 1
+            self.model.rig_alarms.alert("bad_input", "depth", "bytes that are no reading of the depth")
             return
-        self.model.rig_now = rig_time
-        if self.model.depths.append_reading(rig_time, md):
-            self.store.add_depth(rig_time, md)
-        self._publish(["status", "string"])
+        self._advance_time(now)
+        if not self.endpoint.clock.synchronised:
+            self._early.append(reading)  # what bounds it is not known yet
+            return
+        self._on_reading(reading, now)
 
     def on_timer(self, now: float) -> None:
-        """Advance to ``now``: orders and uploads, hello, time requests, repetition, silent nodes."""
+        """Advance to ``now``: orders and uploads, hello, time requests, repetition, and what is wrong by now."""
+        self._advance_time(now)
         self._send_pending(now)
-        for outgoing in self.operator.due_requests(now):
-            self._send(outgoing, now)
+        with self._refusing_disk():
+            for outgoing in self.operator.due_requests(now):
+                self._send(outgoing, now)
         for segment in self._uploads.due_segments(now) if self._uploads is not None else ():
             self.endpoint.send_segment(segment)
         super().on_timer(now)
-        self._notice_silence(now)
+        if self.watch.is_due(now):
+            self._look(now)
 
     def next_wake(self, now: float) -> float:
         """Local time (s) of the next timer."""
@@ -109,30 +144,125 @@ class GroundProcess(Process):
         else:
             self.endpoint.command(outgoing, now)
 
-    def _notice_silence(self, now: float) -> None:
-        """Advance rig time, also where no depth comes any more, and publish who fell silent or came back."""
-        if self.endpoint.clock.synchronised:
-            self.model.rig_now = self.endpoint.clock.rig_from_local(now)
+    def _advance_time(self, now: float) -> None:
+        """Follow rig time and its epoch, also where nothing comes any more."""
+        model, clock = self.model, self.endpoint.clock
+        model.now = now
+        if not clock.synchronised:
+            return
+        model.rig_now = clock.rig_from_local(now)
+        if clock.epoch != model.epoch:
+            if model.epoch != EPOCH_UNKNOWN:
+                self.watch.on_epoch(clock.epoch)
+            model.epoch = clock.epoch
+            with self._refusing_disk():
+                self.store.keep_epoch(clock.epoch)
+        while self._early:
+            self._on_reading(self._early.popleft(), now)
+
+    def _look(self, now: float) -> None:
+        """Find what is wrong, ask again for what is missing, and publish who fell silent or came back."""
+        self._place_waiting()
+        self.watch.look(now)
+        alarms, refusal = self.model.rig_alarms, self.store.refusal
+        alarms.hold("disk", "database", refusal)
+        alarms.hold("database", "database", f"{self.store.damaged} messages" if self.store.damaged else "")
+        dropped = self.endpoint.dropped
+        alarms.hold("queue", "ground station", f"{dropped} dropped" if dropped else "")
+        for tube, (first, last) in self.watch.gaps_to_ask(now):
+            self._ask_again(tube, first, last)
+        self.operator.expire_orders(now)
         stale = {tube for tube in self.model.nodes if self.model.is_stale(tube)}
         changed, self._stale = sorted(stale ^ self._stale), stale
         if changed:
             self._publish([*(f"nodes/{tube}" for tube in changed), "status", "string"])
+        if alarms.drain_changed():
+            self._publish(["alarms", "status"])
+
+    def _ask_again(self, tube: int, first: int, last: int) -> None:
+        """Order a tube to send the surveys of a range of numbers again."""
+        try:
+            order = self.operator.command(tube, "resend", {"first": first, "last": last}, by=GROUND_STATION)
+        except SelectorError:
+            return  # the tube is not known yet; the gap stays
+        order.when_answered(lambda: self._on_resent(order))
+
+    def _on_resent(self, order: Order) -> None:
+        values = order.values
+        if order.done and order.tube is not None:
+            sent, complete_from = int(str(values.get("sent", 0))), int(str(values.get("complete_from", 0)))
+            self.watch.on_resent(order.tube, sent, complete_from, self.model.now)
+
+    def _on_reading(self, reading: DepthReading, now: float) -> None:
+        model = self.model
+        refused = model.depths.on_reading(reading, model.epoch, model.rig_now, model.tally.deepest)
+        self.watch.on_depth("" if refused == "repeated" else refused)
+        if refused:
+            return
+        model.depth_heard_at = now
+        for stand in reading.stands:
+            is_present = stand.epoch in (EPOCH_UNKNOWN, model.epoch) and stand.ended_at <= reading.at
+            if is_present and stand.md <= model.tally.deepest:
+                self._on_stand(replace(stand, epoch=model.epoch))
+        self._keep_stand(reading)
+        self._place_waiting()
+        self._publish(["status", "string"])
+
+    def _on_stand(self, stand: Stand) -> None:
+        """Remember a stand; one that follows another at a different depth is a stop."""
+        depths = self.model.depths
+        depths.add_stand(stand)
+        before = [known for known in depths.stands if known.epoch == stand.epoch and known.begun_at < stand.begun_at]
+        if before and before[-1].md < stand.md and stand in depths.stands:
+            self.model.stops.on_stand(stand)
+
+    def _keep_stand(self, reading: DepthReading) -> None:
+        """Store a stand when it begins and when it has ended."""
+        newest = self.model.depths.stands[-1] if self.model.depths.stands else None
+        kept = self._kept_stand
+        has_begun = newest is not None and (kept is None or newest.begun_at != kept.begun_at)
+        has_ended = newest is not None and reading.md != newest.md and newest != kept
+        if newest is not None and (has_begun or has_ended):
+            with self._refusing_disk():
+                for stand in self.model.depths.stands[-2:]:
+                    self.store.keep_stand(stand)
+                self._kept_stand = newest
+
+    def _place_waiting(self) -> None:
+        """Fuse the surveys whose depth is known by now."""
+        for one, md in self.model.placeable():
+            try:
+                self.store.place_message(one.measurement, md)
+            except StoreError:
+                self.model.waiting.append(one)
+            else:
+                self._publish(self._apply_stored(one.measurement, md, one.below))
 
     def _keep_tally(self) -> None:
         """Store a new order of the string before anything is placed by it."""
         if self.model.tally.tubes != self._kept_tally:
+            self.store.keep_tally(list(self.model.tally.tubes))
             self._kept_tally = list(self.model.tally.tubes)
-            self.store.keep_tally(self._kept_tally)
+
+    @contextlib.contextmanager
+    def _refusing_disk(self) -> Iterator[None]:
+        """Go on where the disk refuses: the store remembers why, and the next look tells it."""
+        with contextlib.suppress(StoreError):
+            yield
 
     def _on_message(self, message: Message, now: float) -> None:
+        self._advance_time(now)
         match message:
             case NodeState():
-                self.model.on_state(message)
-                self._keep_tally()
+                self.model.on_state(message, now)
+                self.watch.on_state(message)
+                with self._refusing_disk():
+                    self._keep_tally()
                 self._publish([f"nodes/{message.tube}"])
             case SurveyMeasurement() | Event() | StaticRecord():
-                self._on_kept(message)
-                self.endpoint.acknowledge(message.tube, message.sequence, now)
+                with self._refusing_disk():  # what is not stored is not acknowledged, and comes again
+                    self._on_kept(message)
+                    self.endpoint.acknowledge(message)
             case Reply():
                 self.model.orders.on_reply(message)
                 self.model.recalibration.on_reply(message, now)
@@ -141,14 +271,21 @@ class GroundProcess(Process):
         self.operator.publish_orders()
 
     def _on_kept(self, message: Kept) -> None:
-        """Place and store a message before it is acknowledged; one that was stored already changes nothing."""
-        md = self.model.place(message) if isinstance(message, SurveyMeasurement) else None
-        self._keep_tally()
-        if self.store.add_message(message, md):
-            self._publish(self._apply_stored(message, md))
+        """Store a message before it is acknowledged; one that was stored already changes nothing.
 
-    def _apply_stored(self, message: Kept, md: float | None) -> list[str]:
+        A survey gets its depth at the next reading or look, with all that came meanwhile and in their order: whether a
+        reading brackets its time already is a matter of a millisecond.
+        """
+        below = self.model.string_below(message) if isinstance(message, SurveyMeasurement) else None
+        self._keep_tally()
+        if self.store.add_message(message, None, below):
+            self._publish(self._apply_stored(message, None, below))
+            if isinstance(message, Event):
+                self.watch.on_event(message)
+
+    def _apply_stored(self, message: Kept, md: float | None, below: float | None) -> list[str]:
         """Add a stored message to the model; returns the paths that changed."""
+        self.model.numbers.add_number(message.tube, message.sequence)
         if isinstance(message, Event):
             self.model.on_event(message)
             return []
@@ -156,7 +293,8 @@ class GroundProcess(Process):
             self.model.on_static_record(message)
             return []
         before = list(self.model.alarms.alarms), len(self.model.moved)
-        self.model.on_survey(message, md)
+        self.model.stops.on_survey(message.epoch or self.model.epoch, message.station_at, message.tube)
+        self.watch.on_survey(message, self.model.on_survey(message, md, below))
         after = self.model.alarms.alarms, len(self.model.moved)
         return ["stations", "trajectory", "uncertainty", "column"] + (["alarms"] if before != after else [])
 

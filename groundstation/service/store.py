@@ -1,26 +1,34 @@
 """What the ground station keeps: surveys, static records and events, on the disk before they are acknowledged.
 
-A row is the message as it came (telemetry's payload) with the depth it was given. The same message twice is one row:
-identity is tube, sequence and content, so a tube that lost its memory and counts anew still gets its surveys stored.
+A row is the message as it came (telemetry's payload) with the depth it was given, which may come later, and the length
+of string below its tube. The same message twice is one row: identity is tube, sequence and content, so a tube that lost
+its memory and counts anew still gets its surveys stored.
+
+A disk that refuses leaves what is there readable: a database that cannot be written is opened all the same, a row that
+is damaged is passed over and counted, and a file that was deleted under the running program is noticed before the next
+commit, which would be lost with it.
 """
 
 from __future__ import annotations
 
 import contextlib
-import hashlib
+import math
+import sqlite3
 from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import sqlalchemy as sa
 
 from groundstation.errors import StoreError
 from telemetry.errors import DecodeError
-from telemetry.messages import Event, Kept, StaticRecord, SurveyMeasurement
+from telemetry.messages import Event, Kept, Stand, StaticRecord, SurveyMeasurement
 from telemetry.parameters import ParameterBlock, unpack_block
+from telemetry.presentation.content import content_of
 from telemetry.presentation.msgpack_codec import decode, encode
 
-SCHEMA = 1
+SCHEMA = 2
 SHOWN = 5  # tables named of a database that is not ours
 METADATA = sa.MetaData()
 META = sa.Table(
@@ -38,11 +46,17 @@ MESSAGES = sa.Table(
     sa.Column("content", sa.String(32), nullable=False),
     sa.Column("kind", sa.String(16), nullable=False),
     sa.Column("md", sa.Float),
+    sa.Column("below", sa.Float),
     sa.Column("payload", sa.LargeBinary, nullable=False),
     sa.UniqueConstraint("tube", "sequence", "content"),
 )
-DEPTHS = sa.Table(
-    "depths", METADATA, sa.Column("at", sa.Float, primary_key=True), sa.Column("md", sa.Float, nullable=False)
+STANDS = sa.Table(
+    "stands",
+    METADATA,
+    sa.Column("epoch", sa.BigInteger, primary_key=True, autoincrement=False),
+    sa.Column("begun_at", sa.Float, primary_key=True),
+    sa.Column("ended_at", sa.Float, nullable=False),
+    sa.Column("md", sa.Float, nullable=False),
 )
 STRING = sa.Table(
     "string",
@@ -66,10 +80,11 @@ RECALIBRATION = sa.Table(
 
 @dataclass(frozen=True, slots=True)
 class Stored:
-    """A message from the store and the depth (m) it was measured at, if known."""
+    """A message from the store, the depth (m) it was measured at and the string (m) below its tube, if known."""
 
     message: Kept
     md: float | None
+    below: float | None = None
 
 
 class Store:
@@ -78,6 +93,11 @@ class Store:
     Parameters
     ----------
     url : SQLAlchemy URL; SQLite runs in WAL mode with every commit forced to the disk
+
+    Attributes
+    ----------
+    refusal : why the database takes nothing, or empty
+    damaged : messages that could not be read
 
     Raises
     ------
@@ -89,21 +109,22 @@ class Store:
         self._engine = _engine_of(url)
         address = self._engine.url
         self._where = address.database or address.render_as_string(hide_password=True)
+        self._file = Path(address.database) if self._engine.dialect.name == "sqlite" and address.database else None
+        self.refusal = ""
+        self.damaged = 0
+        self.boots = 0
         try:
             with self._refusing("; choose a writable --folder or another database"):
-                if self._engine.dialect.name == "sqlite":
-                    Path(address.database or "").parent.mkdir(parents=True, exist_ok=True)
-                self._check_schema()
-                if self._engine.dialect.name == "sqlite":
-                    self._engine.dispose()  # the connection that only looked is not durable
-                    sa.event.listen(self._engine, "connect", _durable)
-                METADATA.create_all(self._engine)
-                self.boots = self._begin()
+                if self._file is not None:
+                    self._file.parent.mkdir(parents=True, exist_ok=True)
+                is_ours = self._check_schema()
+                self._begin(is_ours=is_ours)
         except StoreError:
             self.close()
             raise
+        self._inode = self._found_inode()
 
-    def add_message(self, message: Kept, md: float | None) -> bool:
+    def add_message(self, message: Kept, md: float | None, below: float | None = None) -> bool:
         """Store a message; durable on return. False when it was already there.
 
         Raises
@@ -112,41 +133,69 @@ class Store:
             When the disk refuses; nothing may be acknowledged then.
         """
         payload = encode(message)
-        content = hashlib.blake2b(payload, digest_size=16).hexdigest()
-        row = {"tube": message.tube, "sequence": message.sequence, "content": content}
-        with self._refusing(), self._engine.begin() as connection:
-            same = sa.and_(*(MESSAGES.c[name] == value for name, value in row.items()))
-            if connection.execute(sa.select(MESSAGES.c.id).where(same)).first() is not None:
+        row = row_of(message, payload)
+        with self._writing() as connection:
+            there = connection.execute(sa.select(MESSAGES.c.payload).where(_same(row))).first()
+            if there is not None and there.payload == payload:
                 return False
+            connection.execute(sa.delete(MESSAGES).where(_same(row)))  # of a row that is damaged
             kind = type(message).__name__
-            connection.execute(sa.insert(MESSAGES).values(**row, kind=kind, md=md, payload=payload))
+            connection.execute(sa.insert(MESSAGES).values(**row, kind=kind, md=md, below=below, payload=payload))
         return True
 
-    def add_depth(self, at: float, md: float) -> None:
-        """Store that the bit stood at ``md`` (m) from rig time ``at`` (s) on."""
-        with self._refusing(), self._engine.begin() as connection:
-            connection.execute(sa.delete(DEPTHS).where(DEPTHS.c.at == at))
-            connection.execute(sa.insert(DEPTHS).values(at=at, md=md))
+    def place_message(self, message: Kept, md: float) -> None:
+        """Store the depth (m) of a message that came before it was known."""
+        with self._writing() as connection:
+            same = _same(row_of(message, encode(message)))
+            connection.execute(sa.update(MESSAGES).where(same).values(md=md))
+
+    def keep_stand(self, stand: Stand) -> None:
+        """Store that the bit stood, in the place of what it overlaps."""
+        with self._writing() as connection:
+            overlaps = sa.and_(
+                STANDS.c.epoch == stand.epoch,
+                STANDS.c.begun_at <= stand.ended_at,
+                STANDS.c.ended_at >= stand.begun_at,
+                STANDS.c.md == stand.md,
+            )
+            connection.execute(sa.delete(STANDS).where(overlaps))
+            row = {"epoch": stand.epoch, "begun_at": stand.begun_at, "ended_at": stand.ended_at, "md": stand.md}
+            connection.execute(sa.insert(STANDS).values(**row))
 
     def messages(self) -> Iterator[Stored]:
-        """Everything stored, in the order of arrival."""
+        """Everything stored, in the order of arrival; what is damaged is passed over and counted."""
         with self._refusing(), self._engine.connect() as connection:
             for row in connection.execute(sa.select(MESSAGES).order_by(MESSAGES.c.id)):
                 try:
                     message = decode(row.payload)
-                except DecodeError as error:
-                    raise StoreError(f"database {self._where}: message {row.id}: {error}") from error
-                if isinstance(message, SurveyMeasurement | Event | StaticRecord):
-                    yield Stored(message, row.md)
+                except DecodeError:
+                    self.damaged += 1
+                    continue
+                if isinstance(message, SurveyMeasurement | Event | StaticRecord) and is_depth(row.md):
+                    yield Stored(message, row.md, row.below)
+                else:
+                    self.damaged += 1
 
-    def depths(self) -> list[tuple[float, float]]:
-        """Rig times (s) and depths (m) at which the bit came to stand."""
+    def stands(self) -> list[Stand]:
+        """Where the bit stood, in the order of time."""
+        order = sa.select(STANDS).order_by(STANDS.c.epoch, STANDS.c.begun_at)
         with self._refusing(), self._engine.connect() as connection:
-            return [(row.at, row.md) for row in connection.execute(sa.select(DEPTHS).order_by(DEPTHS.c.at))]
+            return [Stand(row.epoch, row.begun_at, row.ended_at, row.md) for row in connection.execute(order)]
+
+    def keep_epoch(self, epoch: int) -> None:
+        """Store the epoch of rig time."""
+        with self._writing() as connection:
+            connection.execute(sa.delete(META).where(META.c.name == "epoch"))
+            connection.execute(sa.insert(META).values(name="epoch", value=str(epoch)))
+
+    def epoch(self) -> int:
+        """Epoch of rig time that was known last, 0 for none."""
+        with self._refusing():
+            return int(self._meta().get("epoch", "0"))
 
     def keep_tally(self, tubes: list[int]) -> None:
         """Store which tubes hang in the string, top first."""
-        with self._refusing(), self._engine.begin() as connection:
+        with self._writing() as connection:
             connection.execute(sa.delete(STRING))
             connection.execute(sa.insert(STRING), [{"place": n, "tube": tube} for n, tube in enumerate(tubes, 1)])
 
@@ -158,7 +207,7 @@ class Store:
     def keep_block(self, block: ParameterBlock) -> None:
         """Store a parameter block before it is sent, so that what a tube uses can be named later."""
         digest = block.sha256().hex()
-        with self._refusing(), self._engine.begin() as connection:
+        with self._writing() as connection:
             connection.execute(sa.delete(BLOCKS).where(BLOCKS.c.sha256 == digest))
             connection.execute(sa.insert(BLOCKS).values(sha256=digest, content=block.canonical()))
 
@@ -173,7 +222,7 @@ class Store:
 
     def keep_progress(self, text: str) -> None:
         """Store how far the calibration in the field has come."""
-        with self._refusing(), self._engine.begin() as connection:
+        with self._writing() as connection:
             connection.execute(sa.delete(RECALIBRATION))
             connection.execute(sa.insert(RECALIBRATION).values(id=1, progress=text))
 
@@ -187,6 +236,27 @@ class Store:
         self._engine.dispose()
 
     @contextlib.contextmanager
+    def _writing(self) -> Iterator[sa.Connection]:
+        """A transaction, committed to a file that still has its name."""
+        try:
+            with self._refusing():
+                if self._found_inode() != self._inode:
+                    raise StoreError(f"database {self._where}: was removed or replaced while the ground station ran")
+                with self._engine.begin() as connection:
+                    yield connection
+        except StoreError as error:
+            self.refusal = str(error)
+            raise
+        self.refusal = ""
+
+    def _found_inode(self) -> int:
+        """Identity of the file that has the database's name; 0 where there is none, or no file."""
+        try:
+            return self._file.stat().st_ino if self._file is not None else 0
+        except OSError:
+            return 0
+
+    @contextlib.contextmanager
     def _refusing(self, remedy: str = "") -> Iterator[None]:
         """Name the database and the reason in whatever it refuses."""
         try:
@@ -197,8 +267,8 @@ class Store:
             reason = str(getattr(error, "orig", None) or getattr(error, "strerror", None) or error)
             raise StoreError(f"database {self._where}: {reason}{remedy}") from error
 
-    def _check_schema(self) -> None:
-        """Look without a change whether the database is new or one of ours."""
+    def _check_schema(self) -> bool:
+        """Look without a change whether the database is one of ours; False for a new one."""
         tables = sorted(sa.inspect(self._engine).get_table_names())
         if tables and META.name not in tables:
             raise StoreError(
@@ -208,20 +278,47 @@ class Store:
         found = self._meta() if tables else {}
         if found and found.get("schema") != str(SCHEMA):
             raise StoreError(f"database {self._where}: expected schema {SCHEMA}, got {found.get('schema')}")
+        return bool(found)
 
     def _meta(self) -> dict[str, str]:
         with self._engine.connect() as connection:
             return {row.name: row.value for row in connection.execute(sa.select(META))}
 
-    def _begin(self) -> int:
-        """Count this start."""
+    def _begin(self, *, is_ours: bool) -> None:
+        """Make ready for writing and count this start; a database of ours that refuses is read all the same."""
+        if self._engine.dialect.name == "sqlite":
+            self._engine.dispose()  # the connection that only looked is not durable
+            sa.event.listen(self._engine, "connect", _durable)
+        try:
+            with self._refusing():
+                METADATA.create_all(self._engine)
+                self._count_start()
+        except StoreError as error:
+            if not is_ours:
+                raise
+            self.refusal = str(error)
+
+    def _count_start(self) -> None:
         boots = int(self._meta().get("boots", "0")) + 1
+        rows = [{"name": "schema", "value": str(SCHEMA)}, {"name": "boots", "value": str(boots)}]
+        self.boots = boots
         with self._engine.begin() as connection:
-            connection.execute(sa.delete(META))
-            connection.execute(
-                sa.insert(META), [{"name": "schema", "value": str(SCHEMA)}, {"name": "boots", "value": str(boots)}]
-            )
-        return boots
+            connection.execute(sa.delete(META).where(META.c.name.in_(["schema", "boots"])))
+            connection.execute(sa.insert(META), rows)
+
+
+def row_of(message: Kept, payload: bytes) -> dict[str, Any]:
+    """Identity of a message."""
+    return {"tube": message.tube, "sequence": message.sequence, "content": content_of(payload).hex()}
+
+
+def is_depth(value: object) -> bool:
+    """Whether a stored depth is one, or not known yet."""
+    return value is None or (isinstance(value, float) and math.isfinite(value) and value >= 0.0)
+
+
+def _same(row: dict[str, Any]) -> sa.ColumnElement[bool]:
+    return sa.and_(*(MESSAGES.c[name] == value for name, value in row.items()))
 
 
 def _engine_of(url: str) -> sa.Engine:
@@ -236,7 +333,8 @@ def _engine_of(url: str) -> sa.Engine:
 
 def _durable(connection: sa.engine.interfaces.DBAPIConnection, _record: object) -> None:
     cursor = connection.cursor()
-    cursor.execute("PRAGMA journal_mode=WAL")
+    with contextlib.suppress(sqlite3.OperationalError):  # a file that cannot be written can be read
+        cursor.execute("PRAGMA journal_mode=WAL")
     cursor.execute("PRAGMA synchronous=FULL")
     cursor.execute("PRAGMA busy_timeout=5000")
     cursor.close()

@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
-from bisect import bisect_right
+import math
+from collections.abc import Collection
+
+FITS = 0.5  # of a tube's length by which depth and tally may differ
 
 
 class Tally:
@@ -44,47 +47,23 @@ class Tally:
         over = self.tubes[: self.tubes.index(tube)][::-1]
         return over[: hops - 1] if 1 <= hops <= len(over) + 1 else None
 
+    @property
+    def deepest(self) -> float:
+        """What the string and one tube more reach (m); infinite before any tube has reported."""
+        return (len(self.tubes) + 1) * self._tube_length if self.tubes else math.inf
+
+    def misfit(self, md: float, heard: Collection[int]) -> str:
+        """Why a depth of the bit does not fit the tubes, or nothing; ``heard`` are those that speak."""
+        reach = len(self.tubes) * self._tube_length
+        if self.tubes and md > reach + FITS * self._tube_length:
+            return f"the bit is at {md:.2f} m, {len(self.tubes)} tubes reach {reach:.2f} m"
+        hanging = len([tube for tube in self.tubes if tube in heard]) - 1
+        if hanging > 0 and md < (hanging - FITS) * self._tube_length:
+            return f"the bit is at {md:.2f} m, {hanging + 1} tubes speak, {hanging} of them below the collar"
+        return ""
+
     def length_below(self, tube: int) -> float | None:
         """Length (m) of string below a tube's node, which sits at the tube's lower end; None for an unknown tube."""
         if tube not in self.tubes:
             return None
         return (len(self.tubes) - 1 - self.tubes.index(tube)) * self._tube_length
-
-
-class DepthLog:
-    """Depth of the bit over rig time, kept where it changes."""
-
-    LIMIT = 100_000
-
-    def __init__(self) -> None:
-        self._at: list[float] = []
-        self._md: list[float] = []
-
-    def append_reading(self, at: float, md: float) -> bool:
-        """Add a reading; True when the bit has come to rest at a new depth."""
-        if self._at and at <= self._at[-1]:
-            return False
-        came_to_stand = len(self._md) >= 2 and md == self._md[-1] != self._md[-2]
-        if len(self._md) >= 2 and md == self._md[-1] == self._md[-2]:
-            self._at[-1] = at
-            return False
-        self._at.append(at)
-        self._md.append(md)
-        if len(self._at) > self.LIMIT:
-            del self._at[: self.LIMIT // 2], self._md[: self.LIMIT // 2]
-        return came_to_stand
-
-    def restore(self, at: float, md: float) -> None:
-        """Restore a stored depth, at rest from ``at`` on."""
-        self._at.append(at)
-        self._md.append(md)
-
-    def at(self, time: float) -> float | None:
-        """Depth (m) at rig time ``time`` (s); None before the first reading."""
-        k = bisect_right(self._at, time)
-        return self._md[k - 1] if k else None
-
-    @property
-    def latest(self) -> float | None:
-        """Newest depth, m."""
-        return self._md[-1] if self._md else None

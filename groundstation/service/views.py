@@ -63,7 +63,11 @@ def status(k: RigModel, _p: Parameters) -> View:
         "measurements": sum(s.count for s in k.stations),
         "unplaced_measurements": k.unplaced,
         "refused_measurements": k.refused,
-        "health": "degraded" if stale or k.refused else "good",
+        "set_aside_measurements": len(k.set_aside),
+        "untrusted_measurements": sum(s.untrusted for s in k.stations),
+        "health": k.health.name.lower(),
+        "epoch": k.epoch,
+        "alarms": sorted({alarm.kind.code for alarm in k.rig_alarms}),
     }
 
 
@@ -136,17 +140,19 @@ def station(k: RigModel, n: int) -> View:
         "sigma_azimuth_deg": math.degrees(sigma_azimuth),
         "measurements": s.count,
         "dropped_measurements": s.first,
+        "untrusted_measurements": s.untrusted,
     }
-    row |= typical_reading([c.measurement for c in s.clusters[s.first :]])
+    row |= typical_reading(s.counting)
     return row | position(point_of(k, s))
 
 
-def typical_reading(readings: list[SurveyMeasurement]) -> View:
+def typical_reading(readings: list[ResolvedStop]) -> View:
     """Root mean squares over the readings of a station; columns that ``borechain survey --instrument relay`` takes."""
-    force_vars = [force_var(m) for m in readings]
+    force_vars = [force_var(c.measurement) for c in readings]
+    systematic_vars = [c.measurement.systematic_var for c in readings]
     return {
-        "sigma_yaw_deg": math.degrees(math.sqrt(float(np.mean([m.yaw_var for m in readings])))),
-        "sigma_systematic_deg": math.degrees(math.sqrt(float(np.mean([m.systematic_var for m in readings])))),
+        "sigma_yaw_deg": math.degrees(math.sqrt(float(np.mean([c.yaw_var for c in readings])))),
+        "sigma_systematic_deg": math.degrees(math.sqrt(float(np.mean(systematic_vars)))),
         "sigma_force_mps2": math.sqrt(float(np.mean(force_vars))),
     }
 
@@ -200,6 +206,7 @@ def cluster(c: ResolvedStop, n: int) -> View:
         "samples": m.samples,
         "settle_s": m.settle_time,
         "flags": flag_names(m.flags),
+        "trust": c.trust.name.lower(),
         "quality": c.quality.name.lower().split("|") if c.quality and c.quality.name else [],
     }
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from node.kernels.calibration import USUAL
+from telemetry.messages import EPOCH_UNKNOWN
 
 
 @dataclass(frozen=True, slots=True)
@@ -29,3 +30,4 @@ class RigContext:
     rig_now: float  # s, rig time of the cycle's end
     clock_var: float  # s^2
     synchronised: bool
+    epoch: int = EPOCH_UNKNOWN  # of rig_now

@@ -50,7 +50,8 @@ class BlockStore:
     """Two-slot store in ``folder``; the newest good slot wins."""
 
     def __init__(self, folder: Path) -> None:
-        folder.mkdir(parents=True, exist_ok=True)
+        with contextlib.suppress(OSError):  # a block that is to be kept finds out
+            folder.mkdir(parents=True, exist_ok=True)
         self._slots = (folder / "parameters-0", folder / "parameters-1")
         self._upload = folder / "upload"
         self._generation = 0

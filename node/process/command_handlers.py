@@ -33,10 +33,12 @@ class CommandHandlers:
     ----------
     tube : firmware of the node
     timing : where the node's own clock keeps its measurements; None in a stepped process
+    resend : sends the surveys of a range of numbers again; returns how many, and from which number all are kept
     """
 
-    def __init__(self, tube: Tube, timing: CycleTiming | None) -> None:
+    def __init__(self, tube: Tube, timing: CycleTiming | None, resend: Callable[[int, int], tuple[int, int]]) -> None:
         self._tube = tube
+        self._resend = resend
         self._timing = timing
         self._handlers: dict[str, Callable[[Mapping[str, Any], int], Outcome]] = {
             name: getattr(self, name) for name in SPECS
@@ -67,6 +69,13 @@ class CommandHandlers:
         if refused := self._tube.start_record(seconds, sequence):
             return Outcome(False, refused)
         return Outcome(True, "recording", {"seconds": seconds})
+
+    def resend(self, arguments: Mapping[str, Any], _sequence: int) -> Outcome:
+        """Send surveys and static records of a range of numbers again."""
+        if arguments["last"] < arguments["first"]:
+            return Outcome(False, f"last: expected at least {arguments['first']}, got {arguments['last']}")
+        sent, complete_from = self._resend(arguments["first"], arguments["last"])
+        return Outcome(True, values={"sent": sent, "complete_from": complete_from})
 
     def parameters(self, _arguments: Mapping[str, Any], _sequence: int) -> Outcome:
         """Name the parameter block in use."""

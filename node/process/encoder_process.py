@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -51,6 +52,8 @@ class EncoderProcess(Process):
         self.endpoint = Endpoint(ENCODER, frozenset(Side), boot_count=counter.boots, is_clock_root=True, reach=reach)
         # sequence numbers of a later boot are all larger, so a tube never takes a new measurement for an old one
         self.encoder = EncoderNode(counter.boots << 32, torque)
+        if counter.fault:
+            self._send_event(Severity.ERROR, "boot_counter_lost", {"detail": counter.fault[:200]})
 
     def on_frame(self, side: Side, frame: bytes, now: float, margin: float = math.inf) -> None:
         """A frame arrived at one end; the encoder refuses commands."""
@@ -69,7 +72,8 @@ class EncoderProcess(Process):
         sample = self._source.read(now) if self._source is not None else sample_of(data)
         self._lap(Stage.READ)
         if sample is not None:
-            self.endpoint.send_aiding(self.encoder.on_cycle(sample, now), now)
+            measured = replace(self.encoder.on_cycle(sample, now), epoch=self.endpoint.clock.epoch)
+            self.endpoint.send_aiding(measured, now)
         if self._timing is None:  # an own clock advances time between the cycles
             self.endpoint.advance(now)
         self._lap(Stage.REPORT)
@@ -84,8 +88,8 @@ class EncoderProcess(Process):
             self._timing.lap(stage)
 
     def _send_event(self, severity: Severity, code: str, arguments: dict[str, Scalar]) -> None:
-        event = Event(ENCODER, self.endpoint.new_sequence(), self._now, severity, code, arguments)
-        self.endpoint.submit(event, self._now)
+        number, epoch = self.endpoint.new_sequence(), self.endpoint.clock.epoch
+        self.endpoint.submit(Event(ENCODER, number, self._now, severity, code, arguments, epoch), self._now)
 
 
 def sample_of(data: Any) -> EncoderSample | None:

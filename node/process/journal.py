@@ -11,6 +11,7 @@ rest are 9 a slot: 3 to 30 years; 1800 on a day of drilling are 56: half a year 
 
 from __future__ import annotations
 
+import contextlib
 import errno
 import os
 from collections.abc import Iterator
@@ -40,7 +41,8 @@ class Journal:
         self._there: set[int] = set()  # places whose file has its name on the disk
         self._has_looked = False
         self.worn: set[int] = set()
-        folder.mkdir(parents=True, exist_ok=True)
+        with contextlib.suppress(OSError):  # the first save says what is wrong with it
+            folder.mkdir(parents=True, exist_ok=True)
 
     def load(self) -> tuple[Array, bytes] | None:
         """State and telemetry blob of the newest good slot, or None on a first start.

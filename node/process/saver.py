@@ -16,10 +16,11 @@ from typing import Final
 from node.errors import SavedStateError
 from node.kernels.layout import Array
 from node.process.journal import SLOTS, Journal
-from telemetry.application.endpoint import STATE_LAYOUT, layout_of
+from telemetry.application.saved_state import STATE_LAYOUT, layout_of
 from telemetry.messages import Scalar, Severity
 
 SAVE_EVERY: Final = 570  # cycles without any other save, 300 s
+RETRY_EVERY: Final = 57  # cycles until a save that the disk refused is tried again, 30 s
 
 AT_ONCE: Final = 32  # saves that may follow each other cycle by cycle; a busy station makes six
 SPACING: Final = 19  # cycles, 10 s, after which there may be one more
@@ -89,8 +90,14 @@ class Saver:
         rest_is_over = self._saved_still and not is_still(nodes)
         if rest_is_over:
             self._allowed = max(self._allowed, 1)
-        if self._cycles >= SAVE_EVERY or rest_is_over:
+        limit = RETRY_EVERY if self._refused else SAVE_EVERY
+        if self._cycles >= limit or rest_is_over:
             self.due = True
+
+    @property
+    def is_refused(self) -> bool:
+        """Whether the disk refused the newest save."""
+        return bool(self._refused)
 
     def report(self, say: Say) -> None:
         """Say once what the disk refused."""

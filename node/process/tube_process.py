@@ -27,13 +27,17 @@ from node.process.command_handlers import CommandHandlers
 from node.process.counter import BootCounter
 from node.process.drivers.source import NOTHING, ImuSource, SafeImu
 from node.process.saver import Saver
-from telemetry.application.endpoint import Endpoint
+from node.process.survey_log import SurveyLog
+from telemetry.application.endpoint import REPORT_EVERY, Endpoint
 from telemetry.errors import EncodeError
 from telemetry.messages import (
+    EPOCH_UNKNOWN,
     Aiding,
     BlockSegment,
     Command,
     Event,
+    Kept,
+    NodeFlag,
     NodeState,
     Scalar,
     Severity,
@@ -41,12 +45,14 @@ from telemetry.messages import (
     StaticRecord,
     SurveyMeasurement,
 )
+from telemetry.presentation.msgpack_codec import encode
 from telemetry.runtime.joint_watch import JointFault
 from telemetry.runtime.process import Process
 from telemetry.runtime.timing import CycleTiming, Stage
 
 SYNCHRONISED_STD = 0.05  # s, what the time-stamp state of the filter can take
 MAX_CLOCK_STD = 3600.0
+RESENT_TOGETHER = 64  # surveys sent again at one order
 OVERRUN_EVERY = 60.0  # s between two events about overruns, so that a board too slow is not slowed further
 
 
@@ -89,7 +95,11 @@ class TubeProcess(Process):
         self.config = default_config() if config is None else config
         self._saver = Saver(folder)
         # apart from the saved state: a node that lost its state must not look like an earlier boot
-        self.boots = BootCounter(folder).boots
+        counter = BootCounter(folder)
+        self.boots, self._counter_fault = counter.boots, counter.fault
+        self._log = SurveyLog(folder)
+        self._dropped = 0
+        self._looked_at_drops = -math.inf
         saved = self._saver.load()
         self.nodes, telemetry = saved if saved else (new_node(self.config), None)
         self._cut = resume(self.nodes, self.config) if saved else False
@@ -118,7 +128,7 @@ class TubeProcess(Process):
             restored=restored,
             parameters=parameters,
         )
-        self._commands = CommandHandlers(self.tube, timing)
+        self._commands = CommandHandlers(self.tube, timing, self._resend)
         self._now = 0.0
         self._announced = False
         self._skipped = 0  # silent tubes above, as they were last told of
@@ -174,6 +184,7 @@ class TubeProcess(Process):
         self._lap(Stage.REPORT)
         if self._announced:
             self._saver.report(self._send_event)
+            self._report_drops(now)
         self._saver.count_cycle(self.nodes)
         if self._save_if_due():
             self._lap(Stage.SAVE)
@@ -207,6 +218,10 @@ class TubeProcess(Process):
         clock = self.endpoint.clock
         if not clock.synchronised:
             return
+        if aiding.epoch != clock.epoch and EPOCH_UNKNOWN not in (aiding.epoch, clock.epoch):
+            self.endpoint.counters["other_epoch"] += 1  # measured by a clock that this node does not know
+            self.endpoint.ask_time(now)
+            return
         if self._timing is not None:
             self._timing.add_duration(Stage.AIDING, clock.rig_from_local(now) - aiding.valid_at)
         silent = self.endpoint.skipped
@@ -215,7 +230,7 @@ class TubeProcess(Process):
         aiding = across(aiding, self.settings.above[:silent], self.settings.stiffness)
         onward = self.tube.on_aiding(aiding, clock.local_from_rig(aiding.valid_at))
         if onward is not None:
-            self._send(onward, now)
+            self._send(replace(onward, epoch=aiding.epoch), now)
 
     def _context(self, now: float) -> RigContext:
         clock = self.endpoint.clock
@@ -226,21 +241,56 @@ class TubeProcess(Process):
             rig_now=clock.rig_from_local(now),
             clock_var=var,
             synchronised=clock.synchronised and var < SYNCHRONISED_STD**2,
+            epoch=clock.epoch,
         )
 
     def _send(self, said: Aiding | SurveyMeasurement | StaticRecord | Event | NodeState, now: float) -> None:
         """Hand a message to the telemetry; what the ground station must not lose is saved before its frame leaves."""
         try:
             if isinstance(said, NodeState):
-                upper, lower = (self.endpoint.margin(side) for side in Side)
-                self.endpoint.send_state(replace(said, upper_margin=upper, lower_margin=lower), now)
+                self.endpoint.send_state(self._with_process_state(said), now)
             elif isinstance(said, Aiding):
                 self.endpoint.send_aiding(said, now)
             else:
-                self._keep(said, now)
+                self._keep(said if said.epoch else replace(said, epoch=self.endpoint.clock.epoch), now)
         except EncodeError:
             # the filter reports numbers out of range itself; the cycle goes on
             self.endpoint.counters["unsayable"] += 1
+
+    def _with_process_state(self, state: NodeState) -> NodeState:
+        """A state with what the process knows beside the firmware: epoch, numbers given out, trouble with the disk."""
+        flags = state.flags | (NodeFlag.NOT_SAVED if self._saver.is_refused else NodeFlag.NONE)
+        endpoint = self.endpoint
+        upper, lower = (endpoint.margin(side) for side in Side)
+        known = replace(state, flags=flags, epoch=endpoint.clock.epoch, numbered=endpoint.newest_sequence)
+        return replace(known, upper_margin=upper, lower_margin=lower)
+
+    def _keep(self, said: Kept, now: float) -> None:
+        """Keep a message for the ground station; surveys and records stay in the log when it has them."""
+        if not isinstance(said, Event):
+            self._log.append_payload(said.sequence, encode(said))
+        self._saver.due = True
+        if self._saver.spent:
+            self.endpoint.hold()
+        self.endpoint.submit(said, now)
+
+    def _resend(self, first: int, last: int) -> tuple[int, int]:
+        """Send the surveys and records of these numbers again; how many, and from which number all are kept."""
+        found = self._log.payloads(first, last)[:RESENT_TOGETHER]
+        for sequence, payload in found:
+            self.endpoint.submit_again(sequence, payload, self._now)
+        self._saver.due = self._saver.due or bool(found)
+        return len(found), self._log.complete_from
+
+    def _report_drops(self, now: float) -> None:
+        """Tell the ground station, at most once a minute, that a queue of this node was full."""
+        if now < self._looked_at_drops + REPORT_EVERY:
+            return
+        self._looked_at_drops = now
+        dropped, before = self.endpoint.dropped, self._dropped
+        if dropped > before:
+            self._dropped = dropped
+            self._send_event(Severity.ERROR, "queue_full", {"dropped": dropped - before, "since_start": dropped})
 
     def _announce(self, rig_now: float, now: float) -> None:
         """Report the start once rig time is known, and what was found on the disk."""
@@ -250,6 +300,10 @@ class TubeProcess(Process):
         self._send(self.tube.boot_event(rig_now), now)
         if self._saver.fault:
             self._send_event(Severity.ERROR, "saved_state_lost", {"detail": self._saver.fault[:200]})
+        if self._counter_fault:
+            self._send_event(Severity.ERROR, "boot_counter_lost", {"detail": self._counter_fault[:200]})
+        if self.endpoint.counters["bad_saved_state"]:
+            self._send_event(Severity.ERROR, "saved_state_lost", {"detail": "of the telemetry: not as it was written"})
         if self._cut:
             self._send_event(Severity.WARNING, "alignment_refused", {"reason": "the power was cut"})
         if self._fallback:
@@ -272,16 +326,9 @@ class TubeProcess(Process):
 
     def _send_event(self, severity: Severity, code: str, arguments: dict[str, Scalar]) -> None:
         """Keep an event of the process; it is saved before its frame leaves."""
-        rig_now = self.endpoint.clock.rig_from_local(self._now)
-        event = Event(self.settings.tube, self.endpoint.new_sequence(), rig_now, severity, code, arguments)
-        self._keep(event, self._now)
-
-    def _keep(self, said: SurveyMeasurement | StaticRecord | Event, now: float) -> None:
-        """Submit what the ground station must not lose; its frame waits where the save must wait."""
-        self._saver.due = True
-        if self._saver.spent:
-            self.endpoint.hold()
-        self.endpoint.submit(said, now)
+        clock = self.endpoint.clock
+        rig_now, number = clock.rig_from_local(self._now), self.endpoint.new_sequence()
+        self._keep(Event(self.settings.tube, number, rig_now, severity, code, arguments, clock.epoch), self._now)
 
     def _save(self) -> None:
         self._saver.save(self.nodes, self.endpoint.export_state())

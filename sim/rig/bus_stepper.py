@@ -15,7 +15,7 @@ from telemetry.media.port import STEPPER, Frame, Port, TubeEnd
 from telemetry.media.table import open_medium
 from telemetry.media.zenoh_bus import Publisher, ZenohBus
 from telemetry.messages import BASE, Side, address_name
-from telemetry.runtime.stepped import pack_step, unpack_done
+from telemetry.runtime.stepped import Due, pack_step, unpack_done
 
 Arrival = tuple[str, int, int, bytes]  # what, address, side or whether it lives, payload
 MediumOf = Callable[[int, Side], str | None]
@@ -103,6 +103,7 @@ class BusStepper:
         self._hang_limit = hang_limit
         self._seats: dict[int, Seat] = {}
         self._events: queue.SimpleQueue[Arrival] = queue.SimpleQueue()
+        self._hung: list[int] = []
         self._cues: set[str] = set()  # that the operator has answered
         self._depth = bus.publisher(keys.DEPTH.format(rig=rig))
         self._addresses = {address_name(a): a for a in range(BASE + 1)}
@@ -130,6 +131,11 @@ class BusStepper:
             if not self._pump(deadline - time.monotonic()):
                 return False
         return True
+
+    def drain_hung(self) -> list[int]:
+        """Addresses that did not answer a step and were dropped for it since the last call."""
+        hung, self._hung = self._hung, []
+        return hung
 
     def drop(self, address: int) -> None:
         """Take a process out of the barrier."""
@@ -162,8 +168,9 @@ class BusStepper:
                     answers[address] = answer
                     waiting.discard(address)
             if waiting and not self._pump(deadline - time.monotonic()):
-                for address in waiting:
+                for address in sorted(waiting):
                     self.drop(address)
+                    self._hung.append(address)
                 break
         return answers
 
@@ -171,8 +178,8 @@ class BusStepper:
         for event, frame in events:
             if event.kind <= Side.LOWER:
                 seat.put(Side(event.kind), frame)
-            elif frame:
-                self._depth.put(frame)
+            elif event.kind is Due.DEPTH:
+                self._depth.put(event.data)  # for whoever watches; the ground station has it in its step
         seat.step_number += 1
         seat.step.put(pack_step(seat.step_number, [event for event, _ in events]))
 

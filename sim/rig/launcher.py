@@ -6,7 +6,8 @@ import contextlib
 import queue
 import signal
 import socket
-from collections.abc import Callable, Iterator
+import time
+from collections.abc import Callable, Collection, Iterator
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -20,6 +21,7 @@ from telemetry.media.zenoh_bus import ZenohBus, open_client
 from telemetry.messages import address_name
 
 SUPERVISE_EVERY = 0.2  # wall s
+STALL_LIMIT = 300.0  # wall s without any progress of rig time, in which nobody is waited for
 
 
 @dataclass(frozen=True, slots=True)
@@ -95,6 +97,7 @@ class Launcher:
     rig, endpoint : where the keys are
     show : called with every tick
     act : plays the operator at a cue; False when the ground station did not answer and is to be asked again
+    stall_limit : wall s after which a rig that makes no progress is ended
     """
 
     def __init__(
@@ -104,7 +107,9 @@ class Launcher:
         endpoint: str,
         show: Callable[[Tick], None],
         act: Callable[[ZenohBus, str], bool] = lambda _bus, _cue: True,
+        stall_limit: float = STALL_LIMIT,
     ) -> None:
+        self._stall_limit = stall_limit
         self._table = table
         self._rig = rig
         self._endpoint = endpoint
@@ -138,6 +143,7 @@ class Launcher:
         wanted: tuple[str, ...] = ()
         acted = ""
         answer = bus.publisher(keys.CUE.format(rig=self._rig))
+        watchdog = Watchdog(self._stall_limit)
         while True:
             kill: tuple[str, ...] = ()
             try:
@@ -146,6 +152,7 @@ class Launcher:
                     raise KeyboardInterrupt
                 wanted, kill = tick.wanted, tick.kill
                 self._show(tick)
+                watchdog.on_tick(tick)
                 if tick.cue not in ("", acted) and self._act(bus, tick.cue):
                     acted = tick.cue
                     answer.put(acted.encode())
@@ -157,8 +164,49 @@ class Launcher:
             if medium is None or medium.exitcode is not None:
                 raise RigError("the medium process ended before the schedule did; its message stands above")
             self._table.reconcile(list(wanted), list(kill))
+            watchdog.check(self._table.running)
             if self._table.failures:
                 raise RigError(self._table.failures[0])
+
+
+class Watchdog:
+    """Ends a rig whose time stands still, and says what it waits for.
+
+    Parameters
+    ----------
+    limit : wall s
+    """
+
+    def __init__(self, limit: float) -> None:
+        self._limit = limit
+        self._moved_at = time.monotonic()
+        self._newest: Tick | None = None
+
+    def on_tick(self, tick: Tick) -> None:
+        """The medium has told how far it is; a cue that changes is progress too."""
+        before = self._newest
+        if before is None or (tick.rig_time, tick.cue, tick.wanted) != (before.rig_time, before.cue, before.wanted):
+            self._moved_at = time.monotonic()
+        self._newest = tick
+
+    def check(self, running: Collection[str]) -> None:
+        """Look whether the rig still moves.
+
+        Raises
+        ------
+        RigError
+            When it does not; it names what is waited for.
+        """
+        if time.monotonic() < self._moved_at + self._limit:
+            return
+        tick = self._newest
+        if tick is None:
+            raise RigError(f"the medium has said nothing for {self._limit:.0f} s")
+        absent = [name for name in tick.wanted if name not in running]
+        waits = f"cue {tick.cue}" if tick.cue else f"processes {', '.join(absent or tick.wanted)}"
+        raise RigError(
+            f"rig time stands at {tick.rig_time:.1f} s ({tick.phase}) for {self._limit:.0f} s; it waits for {waits}"
+        )
 
 
 @contextlib.contextmanager

@@ -12,7 +12,7 @@ DAMAGE = 1  # of a port's streams: which bit is flipped; apart from the fates, s
 class LinkChannel:
     """Copies of frames that arrive, each with its delay; every port has streams of its own.
 
-    ``severed`` holds the ports that carry nothing for now, a plain field to be switched by whoever tests.
+    ``severed`` holds the ports that carry nothing for now; it and the probabilities may be changed at any time.
 
     Parameters
     ----------
@@ -27,9 +27,9 @@ class LinkChannel:
         self._seed = seed
         self.latency = latency
         self._jitter = jitter
-        self._loss = loss
-        self._duplicate = duplicate
-        self._corrupt = corrupt
+        self.loss = loss
+        self.duplicate = duplicate
+        self.corrupt = corrupt
         self._streams: dict[tuple[int, Side], PortStream] = {}
         self.severed: set[tuple[int, Side]] = set()
         self.lost = 0
@@ -40,14 +40,14 @@ class LinkChannel:
         if drawn is None:
             drawn = self._streams[sender, side] = PortStream(self._seed, Stream.LINK, sender, int(side))
         fate, wait, again = drawn.draw()
-        if fate < self._loss or (sender, side) in self.severed:
+        if fate < self.loss or (sender, side) in self.severed:
             self.lost += 1
             return []
         first = self.latency + self._jitter * wait
         delays = [first]
-        if fate > 1.0 - self._duplicate:
+        if fate > 1.0 - self.duplicate:
             delays.append(first + self.latency + self._jitter * again)
-        return [(delay, drawn.damage(frame, self._corrupt)) for delay in delays]
+        return [(delay, drawn.damage(frame, self.corrupt)) for delay in delays]
 
 
 class PortStream:

@@ -25,4 +25,4 @@ class PlainBase(Process):
             message = received.message
             if isinstance(message, get_args(Kept)):
                 self.arrived.setdefault((message.tube, message.sequence), (message, now))
-                self.endpoint.acknowledge(message.tube, message.sequence, now)
+                self.endpoint.acknowledge(message)

@@ -12,7 +12,8 @@ from multiprocessing.context import ForkServerProcess
 from typing import Any
 
 STOP_SCHEDULE = ((signal.SIGTERM, 5.0), (signal.SIGKILL, 5.0))  # signal, wall seconds until the next
-RESTART_LIMIT = 5
+RESTART_LIMIT = 5  # deaths of a process that are answered with a new start within ...
+RESTART_WINDOW = 600.0  # ... this time, wall s
 ONE_THREAD = ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS")
 
 
@@ -37,6 +38,7 @@ class ProcessTable:
     running: dict[str, ForkServerProcess] = field(default_factory=dict)
     restarts: dict[str, int] = field(default_factory=dict)
     failures: list[str] = field(default_factory=list)
+    _deaths: dict[str, list[float]] = field(default_factory=dict)  # wall s, those of the window
 
     def __post_init__(self) -> None:
         """Prepare the fork server; it starts with the first process."""
@@ -57,6 +59,8 @@ class ProcessTable:
         """Start what is wanted and not running, kill what is to be killed, note what died by itself."""
         for name in kill:
             self.kill(name)
+            if name in wanted:
+                self._count_death(name, "did not answer")
         for name, process in list(self.running.items()):
             if process.exitcode is not None:
                 self._bury(name, process)
@@ -91,10 +95,16 @@ class ProcessTable:
 
     def _bury(self, name: str, process: ForkServerProcess) -> None:
         del self.running[name]
+        self._count_death(name, f"ended with status {process.exitcode}")
+
+    def _count_death(self, name: str, how: str) -> None:
+        now = time.monotonic()
         self.restarts[name] = self.restarts.get(name, 0) + 1
-        if self.restarts[name] > RESTART_LIMIT:
+        recent = [at for at in self._deaths.get(name, []) if at > now - RESTART_WINDOW]
+        self._deaths[name] = recent = [*recent, now]
+        if len(recent) > RESTART_LIMIT:
             self.failures.append(
-                f"process {name} ended {self.restarts[name]} times, last with status {process.exitcode}"
+                f"process {name} was started again {len(recent) - 1} times within {RESTART_WINDOW:.0f} s; last it {how}"
             )
 
 

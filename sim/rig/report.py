@@ -12,6 +12,7 @@ from typing import Any
 
 import numpy as np
 
+from sim.world.motion import Phase
 from sim.world.world import World
 
 STATION_KEYS = (
@@ -65,6 +66,24 @@ def yaw_errors(measurements: Sequence[dict[str, Any]], world: World) -> list[tup
         variance = math.radians(m["sigma_yaw_deg"]) ** 2 + math.radians(m["sigma_systematic_deg"]) ** 2
         rows.append((int(m["hops"]), random, total * total / variance))
     return rows
+
+
+def missing_surveys(measurements: Sequence[dict[str, Any]], world: World) -> list[dict[str, Any]]:
+    """Tube and depth of the bit of every survey that a stop of the schedule asks for and nobody has."""
+    taken = [(int(m["tube"]), float(m["station_at_s"])) for m in measurements]
+    missing = []
+    for stop, until in stops_of(world):
+        for tube in range(1, stop.tube + 1):
+            if not any(t == tube and stop.start <= at <= until for t, at in taken):
+                missing.append({"tube": tube, "bit_md_m": round(world.bit_depth(stop.end), 6)})
+    return missing
+
+
+def stops_of(world: World) -> list[tuple[Phase, float]]:
+    """Stops of the schedule, each with the rig time (s) until which the string stands."""
+    drills = [phase.start for phase in world.phases if phase.kind == "drill"]
+    stops = [phase for phase in world.phases if phase.kind == "stop"]
+    return [(stop, min((at for at in drills if at >= stop.end), default=world.end)) for stop in stops]
 
 
 def figures(stations: Sequence[dict[str, Any]], measurements: Sequence[dict[str, Any]], world: World) -> dict[str, Any]:

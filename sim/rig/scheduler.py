@@ -17,18 +17,19 @@ from collections.abc import Callable
 from dataclasses import dataclass, field
 from functools import partial
 
-import msgpack
-
 from sim.errors import RigError
 from sim.rig.link_channel import LinkChannel
 from sim.rig.radio_channel import RadioChannel
 from sim.rig.stepper import Answer, FrameEvent, Stepper
 from sim.world.motion import Phase
 from sim.world.world import World
+from telemetry.application.depth_source import DepthSource
 from telemetry.messages import BASE, ENCODER, Side, address_name
+from telemetry.presentation.msgpack_codec import encode
 from telemetry.runtime.stepped import Due, DueEvent
 
-ATTACH_LIMIT = 60.0  # wall s
+ATTACH_LIMIT = 90.0  # wall s
+FROZEN_AFTER = 30.0  # wall s of it, after which a process that was there is ended
 TELL_EVERY = 0.5  # wall s
 CUE_LIMIT = 120.0  # wall s
 REBOOT_TIME = 5.0  # rig s that a process may be missing before the rig's time waits for it
@@ -85,12 +86,14 @@ class Scheduler:
                 world.radio, world.seed, medium.latency, medium.jitter, medium.duplicate, medium.corrupt
             )
         self.progress = Progress("starting", world.begin, world.begin, world.end, [ENCODER, BASE])
+        self._depth = DepthSource()
         self._queue: list[Entry] = []
         self._count = 0
         self._cycle = 0
         self._wake: dict[int, float] = {}
         self._string: tuple[int, ...] = ()
         self._open_top = False
+        self._attached: set[int] = set()  # that were there at any time
         self._missing_since: dict[int, float] = {}
         self._changes: deque[Change] = deque()
         self._stopping = False
@@ -209,10 +212,16 @@ class Scheduler:
         self._attach(tube)
 
     def _attach(self, address: int) -> None:
-        """Tell again and again that the process is wanted (who starts it may listen later) until it is there."""
-        for _ in range(int(ATTACH_LIMIT / TELL_EVERY)):
+        """Tell again and again that the process is wanted (who starts it may listen later) until it is there.
+
+        One that was there and does not come back by itself is perhaps frozen: the launcher is told to end it.
+        """
+        for turn in range(int(ATTACH_LIMIT / TELL_EVERY)):
+            if turn == int(FROZEN_AFTER / TELL_EVERY) and address in self._attached:
+                self._end_hung([address])
             self._tell(self.progress)
             if self._stopping or self.stepper.wait_for(address, alive=True, timeout=TELL_EVERY):
+                self._attached.add(address)
                 return
         raise RigError(f"process {address_name(address)} did not attach within {ATTACH_LIMIT:.0f} s")
 
@@ -228,6 +237,13 @@ class Scheduler:
             raise RigError(f"fault kill-node:{tube}: nobody killed the node within {ATTACH_LIMIT:.0f} s")
         self.progress.kill = []
         self._wake.pop(tube, None)
+
+    def _end_hung(self, hung: list[int]) -> None:
+        """Have the launcher end what did not answer: it has missed events, and would go on as if it had not."""
+        if hung:
+            self.progress.kill = hung
+            self._tell(self.progress)
+            self.progress.kill = []
 
     def _push(self, at: float, address: int, kind: Due | None, frame: bytes, margin: float | None = None) -> None:
         self._count += 1
@@ -256,6 +272,7 @@ class Scheduler:
             elif kind is not Due.TIMER or self._wake.get(address) == at:
                 self._add(steps, true_time, address, kind, at, margin, frame)
         answers = self.stepper.round(steps)
+        self._end_hung(self.stepper.drain_hung())
         for address in sorted(answers):
             self._on_answer(address, answers[address], true_time)
 
@@ -277,8 +294,9 @@ class Scheduler:
         self, at: float, steps: dict[int, list[FrameEvent]], true_time: dict[tuple[int, float], float]
     ) -> None:
         if at >= self.world.motion.begin:  # in the rack there is no bit
-            depth = bytes(msgpack.packb([at, self.world.bit_depth(at)]))
-            self._add(steps, true_time, BASE, Due.DEPTH, at, None, depth)
+            rig_time = self.world.local_clock(ENCODER, at)
+            depth = encode(self._depth.measure(rig_time, max(self.world.bit_depth(at), 0.0)))
+            self._add(steps, true_time, BASE, Due.DEPTH, at, depth, b"")
         self._add(steps, true_time, BASE, Due.TIMER, at, None, b"")
         for address in self.stepper.alive():
             if address == BASE or address not in self.progress.wanted:

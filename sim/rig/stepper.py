@@ -31,6 +31,9 @@ class Stepper(Protocol):
     def wait_for_cue(self, name: str, timeout: float) -> bool:
         """Wait (wall seconds) until the operator has done what cue ``name`` asks; returns whether he did."""
 
+    def drain_hung(self) -> list[int]:
+        """Addresses that did not answer a step and were dropped for it since the last call."""
+
     def drop(self, address: int) -> None:
         """Step a process no more."""
 

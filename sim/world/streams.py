@@ -32,6 +32,8 @@ class Stream(IntEnum):
     RADIO = 22  # fate and delays of the frames from one port to another
     RADIO_FADE = 23  # constant loss of a joint
     RADIO_BURSTS = 24
+    GAUNTLET = 25  # 0: which kinds of faults, 1: when and what; number of the kind
+    LOTS = 26  # of starts that are numbered by lot
     WELLS = 2000  # a string in one of many wells, for the coverage of ellipses
     TURN_TABLE = 3001  # a gyroscope and its table
     ROBOT_ARM = 3002  # an accelerometer and its arm

@@ -13,7 +13,7 @@ from __future__ import annotations
 
 import math
 
-from telemetry.messages import TimeReply
+from telemetry.messages import EPOCH_UNKNOWN, TimeReply
 
 DRIFT_STD = 50e-6  # 1, between two crystals never compared before
 JITTER_STD = 0.4e-3  # s, of one exchange over one joint
@@ -29,10 +29,12 @@ class ClockFilter:
     Parameters
     ----------
     is_root : whether this process's clock is rig time
+    epoch : of the root: the start that its clock counts from
     """
 
-    def __init__(self, *, is_root: bool = False) -> None:
+    def __init__(self, *, is_root: bool = False, epoch: int = EPOCH_UNKNOWN) -> None:
         self.is_root = is_root
+        self._own_epoch = epoch if is_root else EPOCH_UNKNOWN
         self.exchanges = 0
         self._epoch = 0.0
         self._offset = 0.0
@@ -47,6 +49,11 @@ class ClockFilter:
     def synchronised(self) -> bool:
         """Whether rig time is known at all."""
         return self.is_root or self.exchanges > 0
+
+    @property
+    def epoch(self) -> int:
+        """Epoch of the rig time known now."""
+        return self._own_epoch if self.is_root else self._told.epoch
 
     @property
     def rig_rate(self) -> float:
@@ -74,6 +81,10 @@ class ClockFilter:
     def change_neighbour(self) -> None:
         """Compare anew from the next exchange on, with another crystal; what is known of rig time stays till then."""
         self._another = True
+
+    def suspect_neighbour(self) -> None:
+        """Believe the next exchange if it disagrees: the neighbour has started again, perhaps from zero."""
+        self._disagreed = RESET_AFTER - 1
 
     def exchange(self, reply: TimeReply, back: float) -> None:
         """Take the reply that came ``back`` at the local time (s) given."""

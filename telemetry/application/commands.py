@@ -16,6 +16,7 @@ from telemetry.errors import CommandError
 from telemetry.messages import MAX_TUBE, Scalar
 from telemetry.parameters import MAX_VERSION
 from telemetry.quantities import Quantity, ValueKind
+from telemetry.schema import U53
 
 SHORTEST_RECORD, LONGEST_RECORD = 5.0, 3600.0  # s
 FEWEST_TURNS, MOST_TURNS = 1.0, 20.0
@@ -107,6 +108,19 @@ COMMANDS: tuple[CommandSpec, ...] = (
         reply=(_result("version", INTEGER, "of the block in use, 0 is the identity", "1"), SHA256),
     ),
     CommandSpec(
+        "resend",
+        ObeyedBy.TUBE,
+        "sends the surveys and static records of these numbers again; the ground station orders it by itself for a gap",
+        (
+            _argument("first", INTEGER, "number", unit="1", low=1, high=U53, needed=True),
+            _argument("last", INTEGER, "number", unit="1", low=1, high=U53, needed=True),
+        ),
+        (
+            _result("sent", INTEGER, "messages found and sent", "1"),
+            _result("complete_from", INTEGER, "number from which on the tube has kept every survey", "1"),
+        ),
+    ),
+    CommandSpec(
         "align",
         ObeyedBy.TUBE,
         "finds the mount of its IMUs in the coming slow turns, or drops it ([operating](operate.md#alignment))",
@@ -149,6 +163,12 @@ COMMANDS: tuple[CommandSpec, ...] = (
             _result("version", INTEGER, "of the block in use", "1"),
             SHA256,
         ),
+    ),
+    CommandSpec(
+        "accept_depth",
+        ObeyedBy.GROUND,
+        "believes the depth that comes now, after it jumped and the crew has measured it again",
+        action="confirm",
     ),
     CommandSpec(
         "recalibrate",

@@ -1,6 +1,6 @@
 """One process of the string in conversation with its neighbours, and through them with the ground station.
 
-A station owns a link at each end. What is for one hop it handles itself (neighbours, time); what travels it passes
+An endpoint owns a link at each end. What is for one hop it handles itself (neighbours, time); what travels it passes
 on as the bytes that came; what is for it, it decodes and hands to its process. All of it is driven from outside by
 ``receive``, ``advance`` and ``take_frames``; there is no clock, thread or socket in here.
 """
@@ -12,10 +12,9 @@ from collections import Counter, OrderedDict
 from dataclasses import dataclass, replace
 from functools import partial
 
-import msgpack
-
 from telemetry.application.clock import ClockFilter
 from telemetry.application.outbox import Outbox
+from telemetry.application.saved_state import SavedState, is_needed, pack_state, parse_state
 from telemetry.errors import DecodeError
 from telemetry.media.port import Frame, Priority
 from telemetry.messages import (
@@ -38,17 +37,20 @@ from telemetry.messages import (
     TimeReply,
     TimeRequest,
 )
+from telemetry.presentation.content import content_of, content_of_message
 from telemetry.presentation.msgpack_codec import DOWNWARD, Envelope, Opened, decode_opened, encode, open_payload
 from telemetry.schema import Kind
 from telemetry.transport.hop import HopLink
 from telemetry.transport.nearest import Nearest
 
-STATE_LAYOUT = "endpoint-1"  # of what is saved; counted up when it changes
 HELLO_EVERY = 1.0  # s
 SYNC_BURST = 30  # exchanges at the quick pace after a start
 SYNC_QUICK = 1.0  # s
 SYNC_SLOW = 10.0  # s
 ANSWERS_KEPT = 64
+SERIES_SHIFT = 24  # of a sequence number: below it the count, above it the start at which the count began
+REPORT_EVERY = 60.0  # s between two looks at what queues dropped
+DROPS = ("reliable_dropped", "best_effort_dropped", "outbox_dropped")  # counters of what found no place in a queue
 ONE_HOP = (Kind.AIDING, Kind.HELLO, Kind.TIME_REQUEST, Kind.TIME_REPLY)
 RELIABLE = (
     Kind.SURVEY_MEASUREMENT,
@@ -74,6 +76,7 @@ PRIORITIES: dict[Kind, Priority] = {
     Kind.STATIC_RECORD: Priority.SURVEY,
     Kind.BLOCK_STATUS: Priority.SURVEY,
     Kind.BLOCK_SEGMENT: Priority.BLOCK,
+    Kind.DEPTH_READING: Priority.STATE,
 }
 
 
@@ -97,15 +100,6 @@ class Neighbour:
     last_heard: float
 
 
-def layout_of(saved: bytes) -> str:
-    """Name of the layout of what ``Endpoint.export_state`` gave; "unnamed" where there is none."""
-    try:
-        name = msgpack.unpackb(saved)[0]
-    except (ValueError, TypeError, LookupError, msgpack.UnpackException):
-        return "unnamed"
-    return name if isinstance(name, str) else "unnamed"
-
-
 class Endpoint:
     """Telemetry of one process.
 
@@ -115,7 +109,7 @@ class Endpoint:
     sides : ends that exist; the base has only its lower one
     boot_count : starts so far, kept by the process
     is_clock_root : whether the own clock is rig time
-    restored : bytes of ``export_state`` before the restart, of this layout (``layout_of``), or None
+    restored : bytes of ``export_state`` before the restart, or None; damaged ones are counted and not used
     reach : tubes away that are heard; beyond 1 the nearest that speaks is the neighbour, whoever lies silent between
     """
 
@@ -131,7 +125,7 @@ class Endpoint:
     ) -> None:
         self.address = address
         self.boot_count = boot_count
-        self.clock = ClockFilter(is_root=is_clock_root)
+        self.clock = ClockFilter(is_root=is_clock_root, epoch=boot_count)
         self.counters: Counter[str] = Counter()
         self.mode = Mode.BOOT
         self.neighbours: dict[Side, Neighbour | None] = dict.fromkeys(Side)
@@ -140,7 +134,8 @@ class Endpoint:
         self._links = {side: HopLink(address, boot_count, self._nearest(side)) for side in sorted(sides)}
         toward_encoder = Side.LOWER if address == BASE else Side.UPPER
         self._sync_side = None if is_clock_root else toward_encoder
-        self._next_sequence = 1
+        # a process that lost its numbers begins another series, so that none is given to a second message
+        self._next_sequence = (boot_count << SERIES_SHIFT) + 1 if boot_count > 1 and address != BASE else 1
         self._outbox = Outbox()
         self._holding = False
         self._answered: OrderedDict[int, bytes] = OrderedDict()
@@ -148,7 +143,10 @@ class Endpoint:
         self._hello_at = -math.inf
         self._sync_at = -math.inf
         if restored is not None:
-            self._restore(restored)
+            try:
+                self._restore(parse_state(restored))
+            except DecodeError:
+                self.counters["bad_saved_state"] += 1
 
     def limit_bundles(self, side: Side, limit: int) -> None:
         """Let payloads share a frame at one end only up to ``limit`` bytes: a large frame holds an urgent one up."""
@@ -168,8 +166,11 @@ class Endpoint:
         payloads = link.receive(frame, now, margin)
         if link.peer != before:
             self._hello_at = -math.inf
-            if side is self._sync_side and before is not None and link.peer is not None and link.peer[0] != before[0]:
-                self.clock.change_neighbour()
+            if side is self._sync_side and before is not None and link.peer is not None:
+                if link.peer[0] != before[0]:
+                    self.clock.change_neighbour()
+                else:
+                    self.clock.suspect_neighbour()
                 self._sync_at = -math.inf
         received = []
         for payload in payloads:
@@ -210,6 +211,10 @@ class Endpoint:
         if Side.LOWER in self._links:
             self._links[Side.LOWER].send_best_effort(encode(aiding), Kind.AIDING, Priority.AIDING)
 
+    def ask_time(self, now: float) -> None:
+        """Compare clocks again at the quick pace: the epoch of rig time is another one."""
+        self._sync_at = min(self._sync_at, now - SYNC_SLOW + SYNC_QUICK)
+
     def send_state(self, state: NodeState, now: float) -> None:
         """Send the node's account of itself up the string."""
         del now
@@ -219,7 +224,7 @@ class Endpoint:
 
     def submit(self, message: Kept, now: float) -> None:
         """Keep a message until the ground station has receipted it, and send it unless messages are held back."""
-        self._outbox.keep_payload(message.sequence, encode(message), now)
+        self._outbox.keep_payload(message.sequence, encode(message), now, needed=is_needed(message))
         self._send_kept(now)
 
     def hold(self) -> None:
@@ -232,6 +237,15 @@ class Endpoint:
             self._holding = False
             self._send_kept(now)
 
+    def submit_again(self, sequence: int, payload: bytes, now: float) -> None:
+        """Send once more what was receipted before, because the ground station asks for it."""
+        self._outbox.keep_payload(sequence, payload, now)
+
+    @property
+    def newest_sequence(self) -> int:
+        """Newest number given out, 0 before the first."""
+        return self._next_sequence - 1 if self._next_sequence & ((1 << SERIES_SHIFT) - 1) > 1 else 0
+
     def new_sequence(self) -> int:
         """Number of the next survey or event."""
         sequence = self._next_sequence
@@ -242,6 +256,10 @@ class Endpoint:
         """Send an order down the string until its reply comes (base station)."""
         self._commands.keep_payload(command.sequence, encode(command), now)
         self._send_due(self._commands, Side.LOWER, now)
+
+    def withdraw(self, sequence: int) -> None:
+        """Send an order no more (base station)."""
+        self._commands.settle(sequence)
 
     def reply(self, reply: Reply, now: float) -> None:
         """Answer a command; the answer is kept, so that a repeated command is answered and not obeyed again."""
@@ -260,10 +278,10 @@ class Endpoint:
         """Tell the ground station how an upload stands."""
         self._links[Side.UPPER].send_reliable(encode(status))
 
-    def acknowledge(self, tube: int, sequence: int, now: float) -> None:
-        """Tell a tube that its message is stored (base station)."""
-        del now
-        self._links[Side.LOWER].send_reliable(encode(Receipt(tube, sequence)), Priority.COMMAND)
+    def acknowledge(self, message: Kept) -> None:
+        """Tell a tube that its message is stored, this one and no other of its number (base station)."""
+        receipt = Receipt(message.tube, message.sequence, content_of_message(message))
+        self._links[Side.LOWER].send_reliable(encode(receipt), Priority.COMMAND)
 
     def margin(self, side: Side) -> float:
         """What the neighbour at one end is heard with over the radio's threshold, dB; infinite without radio or it."""
@@ -286,18 +304,24 @@ class Endpoint:
         total = Counter(self.counters)
         for link in self._links.values():
             total.update(link.counters)
+        total["outbox_dropped"] = self._outbox.dropped
         return dict(total)
 
-    def export_state(self) -> bytes:
-        """What must survive a restart: name of the layout, numbers, unreceipted messages, answered commands."""
-        kept = [self._next_sequence, self._outbox.contents(), list(self._answered.items()), self.hops]
-        return bytes(msgpack.packb([STATE_LAYOUT, *kept]))
+    @property
+    def dropped(self) -> int:
+        """What found no place in any queue since the start."""
+        counters = self.link_counters()
+        return sum(counters.get(name, 0) for name in DROPS)
 
-    def _restore(self, saved: bytes) -> None:
-        _, self._next_sequence, parcels, answered, self.hops = msgpack.unpackb(saved)
-        for sequence, payload in parcels:
-            self._outbox.keep_payload(sequence, payload, -math.inf)
-        self._answered.update((sequence, payload) for sequence, payload in answered)
+    def export_state(self) -> bytes:
+        """What must survive a restart: numbers, unreceipted messages, answered commands."""
+        return pack_state(self._next_sequence, self._outbox.contents(), list(self._answered.items()), self.hops)
+
+    def _restore(self, saved: SavedState) -> None:
+        self._next_sequence, self.hops = saved.next_sequence, saved.hops
+        for sequence, payload, needed in saved.parcels:
+            self._outbox.keep_payload(sequence, payload, -math.inf, needed=needed)
+        self._answered.update(saved.answered)
 
     def _handle(self, side: Side, payload: bytes, now: float) -> Message | None:
         opened = open_payload(payload)
@@ -315,7 +339,8 @@ class Endpoint:
             case TimeRequest() if self.clock.synchronised and side is not self._sync_side:
                 clock = self.clock
                 var = min(clock.variance(now), 1e9)
-                reply = TimeReply(message.asked_at, now, now, clock.rig_from_local(now), clock.rig_rate, var)
+                rig_now = clock.rig_from_local(now)
+                reply = TimeReply(message.asked_at, now, now, rig_now, clock.rig_rate, var, clock.epoch)
                 self._links[side].send_best_effort(encode(reply), Kind.TIME_REPLY, Priority.TIME)
             case TimeReply() if side is self._sync_side:
                 self.clock.exchange(message, now)
@@ -327,12 +352,18 @@ class Endpoint:
         self.neighbours[side] = Neighbour(
             hello.tube, hello.boot_count, hello.hops, hello.mode, self._links[side].quality, now
         )
-        hops = hello.hops + 1 + (self.skipped if side is Side.UPPER else 0)
-        if side is Side.UPPER and hello.hops != HOPS_UNKNOWN and hops != self.hops:
+        if side is not Side.UPPER or hello.hops == HOPS_UNKNOWN:
+            return
+        hops = hello.hops + 1 + self.skipped
+        if hops > MAX_TUBE:
+            self.counters["impossible_hops"] += 1
+        elif hops != self.hops:
             self.hops = hops
             self._hello_at = -math.inf
 
     def _handle_upward(self, opened: Opened, payload: bytes) -> Message | None:
+        if opened.envelope.kind is Kind.DEPTH_READING:
+            raise DecodeError("depth reading: expected on its own key")
         if self.address != BASE:
             self._pass(Side.UPPER, opened.envelope, payload)
             return None
@@ -347,12 +378,22 @@ class Endpoint:
             return None
         message = decode_opened(opened)
         if isinstance(message, Receipt):
-            self._outbox.settle(message.sequence)
+            self._settle(message)
             return None
         if isinstance(message, Command) and message.sequence in self._answered:
             self._links[Side.UPPER].send_reliable(self._answered[message.sequence])
             return None
         return message
+
+    def _settle(self, receipt: Receipt) -> None:
+        """Forget what the ground station stored; a receipt for other content is of another life, or forged."""
+        payload = self._outbox.payload(receipt.sequence)
+        if payload is None:
+            return
+        if content_of(payload) == receipt.content:
+            self._outbox.settle(receipt.sequence)
+        else:
+            self.counters["foreign_receipts"] += 1
 
     def _pass(self, side: Side, envelope: Envelope, payload: bytes) -> None:
         """Hand on the very bytes that came."""

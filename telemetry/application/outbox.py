@@ -8,6 +8,7 @@ from dataclasses import dataclass
 
 FIRST_RETRY = 10.0  # s
 LAST_RETRY = 60.0  # s
+LIMIT = 256  # payloads kept; of more the oldest that may be lost goes
 
 
 @dataclass(slots=True)
@@ -17,20 +18,35 @@ class Parcel:
     payload: bytes
     send_at: float
     wait: float = FIRST_RETRY
+    needed: bool = True  # never dropped for another
 
 
 class Outbox:
-    """Payloads by their end-to-end sequence number, in order."""
+    """Payloads by their end-to-end sequence number, in order; ``dropped`` counts those that found no place.
 
-    def __init__(self) -> None:
+    A survey is dropped only where surveys alone fill it, and then it is the oldest: the newest is where the bit is.
+    """
+
+    def __init__(self, limit: int = LIMIT) -> None:
         self._parcels: dict[int, Parcel] = {}
+        self._limit = limit
+        self.dropped = 0
 
     def __len__(self) -> int:
         return len(self._parcels)
 
-    def keep_payload(self, sequence: int, payload: bytes, now: float) -> None:
-        """Keep a payload; it is due at once."""
-        self._parcels[sequence] = Parcel(payload, now)
+    def keep_payload(self, sequence: int, payload: bytes, now: float, *, needed: bool = True) -> None:
+        """Keep a payload; it is due at once. What is not ``needed`` goes first where there is no place."""
+        self._parcels[sequence] = Parcel(payload, now, needed=needed)
+        if len(self._parcels) > self._limit:
+            oldest = next((n for n, parcel in self._parcels.items() if not parcel.needed), next(iter(self._parcels)))
+            del self._parcels[oldest]
+            self.dropped += 1
+
+    def payload(self, sequence: int) -> bytes | None:
+        """Payload kept under a number, None where there is none."""
+        parcel = self._parcels.get(sequence)
+        return None if parcel is None else parcel.payload
 
     def settle(self, sequence: int) -> bool:
         """Forget a payload that arrived; False when it was not kept."""

@@ -148,6 +148,11 @@ class ZenohBus:
         """Declare a liveliness token on ``key`` until the session or the process ends."""
         self._declared.append(self._session.liveliness().declare_token(key))
 
+    def tokens(self, pattern: str, timeout: float) -> list[str]:
+        """Keys of the liveliness tokens that are there now, asked for ``timeout`` wall seconds at most."""
+        replies = self._session.liveliness().get(pattern, timeout=timeout)
+        return sorted(str(reply.ok.key_expr) for reply in replies if reply.ok is not None)
+
     def liveliness_subscribe(self, pattern: str, callback: Callable[[str, bool], None]) -> None:
         """Call ``callback(key, alive)`` on a foreign thread for each token that comes, goes or is already there."""
         self._declared.append(

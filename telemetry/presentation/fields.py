@@ -7,13 +7,15 @@ from collections.abc import Callable
 from copy import copy
 from dataclasses import dataclass
 from functools import partial
+from itertools import pairwise
 from typing import Any
 
-from telemetry.messages import ImuMean
+from telemetry.messages import ImuMean, Stand
 from telemetry.quantities import (
     MAX_ARGUMENTS,
     MAX_IMUS,
     MAX_LIST,
+    MAX_STANDS,
     MAX_TEXT,
     Quantity,
     ValueKind,
@@ -23,7 +25,7 @@ from telemetry.quantities import (
     check_number,
     check_text,
 )
-from telemetry.schema import Field
+from telemetry.schema import LARGEST_TIME, MAX_EPOCH, Field
 
 MAX_BINARY = 256
 LARGEST_COVARIANCE, LARGEST_FORCE = 1e6, 1e3  # (m/s^2)^2 and the like, m/s^2
@@ -110,6 +112,22 @@ def pack_imus(imus: Any) -> list[Any]:
     return [[list(imu.force), pack_rows(imu.force_cov)] for imu in imus]
 
 
+def check_stands(q: Quantity, value: Any) -> tuple[Stand, ...]:
+    """Stands of the bit in the order of time, those of one epoch one after the other."""
+    if not isinstance(value, list | tuple) or len(value) > MAX_STANDS:
+        raise ValueError(f"{q.name}: expected at most {MAX_STANDS} stands, got {value!r:.40}")
+    stands = tuple(_stand(q, item) for item in value)
+    for before, after in pairwise(stands):
+        if before.epoch == after.epoch and after.begun_at < before.ended_at:
+            raise ValueError(f"{q.name}: expected stands one after the other, got {after.begun_at} in another")
+    return stands
+
+
+def pack_stands(stands: Any) -> list[Any]:
+    """Stands on the wire: epoch, begin, end and depth of each."""
+    return [[stand.epoch, stand.begun_at, stand.ended_at, stand.md] for stand in stands]
+
+
 CODECS: dict[ValueKind, tuple[Check, Callable[[Any], Any] | None]] = {
     ValueKind.NUMBER: (check_number, None),
     ValueKind.INTEGER: (check_integer, int),
@@ -121,6 +139,7 @@ CODECS: dict[ValueKind, tuple[Check, Callable[[Any], Any] | None]] = {
     ValueKind.IMUS: (check_imus, pack_imus),
     ValueKind.SCALARS: (check_scalars, None),
     ValueKind.VALUES: (check_values, None),
+    ValueKind.STANDS: (check_stands, pack_stands),
 }
 
 
@@ -149,6 +168,20 @@ def _imu(item: Any) -> ImuMean:
         raise ValueError(f"imus: expected a mean and a 3x3 covariance, got {item!r:.40}")
     first, second, third = _covariance("force_cov", item[1])
     return ImuMean(_vector("force", item[0], LARGEST_FORCE), (first, second, third))
+
+
+def _stand(q: Quantity, item: Any) -> Stand:
+    if isinstance(item, Stand):
+        item = pack_stands([item])[0]
+    if not isinstance(item, list) or len(item) != 4:
+        raise ValueError(f"{q.name}: expected epoch, begin, end and depth, got {item!r:.40}")
+    epoch, *numbers = item
+    if type(epoch) is not int or not 0 <= epoch <= MAX_EPOCH:
+        raise ValueError(f"{q.name}: expected an epoch of 0..{MAX_EPOCH}, got {epoch!r:.40}")
+    begun_at, ended_at, md = _vector(q.name, numbers, LARGEST_TIME)
+    if not (begun_at <= ended_at and q.low <= md <= q.high):
+        raise ValueError(f"{q.name}: expected begin, end and a depth of {q.low:g}..{q.high:g} m, got {item!r:.60}")
+    return Stand(epoch, begun_at, ended_at, md)
 
 
 def _check_names(q: Quantity, value: Any) -> None:

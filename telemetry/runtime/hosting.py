@@ -7,8 +7,12 @@ import contextlib
 import ctypes
 import json
 import multiprocessing
+import multiprocessing.connection
+import os
 import signal
 import sys
+import threading
+import time
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field
 from functools import partial
@@ -29,6 +33,7 @@ from telemetry.runtime.step_client import StepClient, serve
 from telemetry.runtime.timing import CycleTiming
 
 PR_SET_PDEATHSIG = 1
+ORPHAN_GRACE = 3.0  # wall s that a process has to end by itself when its launcher is gone
 TIMING_FILE = "timing.json"
 
 
@@ -167,6 +172,21 @@ def begin_process(name: str) -> None:
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     if sys.platform == "linux":
         ctypes.CDLL(None).prctl(PR_SET_PDEATHSIG, signal.SIGTERM)
+    threading.Thread(target=end_after_parent, name="parent", daemon=True).start()
+
+
+def end_after_parent() -> None:
+    """Wait until the launcher is gone, then end this process: asked first, and for good where it does not.
+
+    The kernel's signal at a parent's death is that of the fork server, which may outlive the launcher.
+    """
+    parent = multiprocessing.parent_process()
+    if parent is None:
+        return
+    multiprocessing.connection.wait([parent.sentinel])
+    os.kill(os.getpid(), signal.SIGTERM)
+    time.sleep(ORPHAN_GRACE)
+    os._exit(1)
 
 
 def on_termination(stop: Callable[[], None]) -> None:

@@ -36,8 +36,8 @@ class Process:
     def on_joint_fault(self, fault: JointFault, now: float) -> None:
         """Something went wrong at a joint, see ``joint_watch``; only an own clock reports it."""
 
-    def on_depth(self, rig_time: float, md: float) -> None:
-        """The rig measured the depth of the bit (m); most processes do not hear it."""
+    def on_depth(self, payload: bytes, now: float) -> None:
+        """The rig sent a reading of the depth of the bit, or somebody sent other bytes; most processes hear none."""
 
     def on_timer(self, now: float) -> None:
         """A timer named by ``next_wake`` is due: hello, time requests, repetition."""

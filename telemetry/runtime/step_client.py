@@ -20,8 +20,8 @@ from telemetry.runtime.process import Process
 from telemetry.runtime.stepped import Due, DueEvent, Sent, pack_done, run_step, unpack_step
 
 ABSENT_LIMIT = 60.0  # wall s without a first step until that is reported
-STEP, STOP = -1, -2  # channels beside those of events that carry bytes: frames and depths
-CHANNELS = (STEP, Due.UPPER_FRAME, Due.LOWER_FRAME, Due.DEPTH)
+STEP, STOP = -1, -2  # channels beside those of the frames
+CHANNELS = (STEP, Due.UPPER_FRAME, Due.LOWER_FRAME)
 Arrival = tuple[int, bytes]  # channel, payload
 Step = tuple[int, list[tuple[DueEvent, bytes]]]  # number, events and the bytes of each
 Report = Callable[[str], None]
@@ -60,7 +60,6 @@ class StepEnd:
     bus, rig, address : where the steps come from and who this is
     ports : the ends of the tube, on whatever medium carries frames
     arrive : takes arrivals on foreign threads
-    hears_depth : whether the rig's depth is for this process
     """
 
     def __init__(
@@ -70,8 +69,6 @@ class StepEnd:
         address: int,
         ports: Mapping[Side, Port],
         arrive: Callable[[Arrival], object],
-        *,
-        hears_depth: bool,
     ) -> None:
         name = address_name(address)
         self.absence = f"{name}: no step came in {ABSENT_LIMIT:.0f} s; is the medium of {rig} running?"
@@ -81,8 +78,6 @@ class StepEnd:
         for side, port in ports.items():
             port.listen(partial(_put_frame, arrive, int(side)))
         bus.subscribe(keys.STEP.format(rig=rig, process=name), lambda _key, step: arrive((STEP, step)))
-        if hears_depth:
-            bus.subscribe(keys.DEPTH.format(rig=rig), lambda _key, depth: arrive((Due.DEPTH, depth)))
         bus.liveliness_token(keys.LIVELINESS.format(rig=rig, process=name))
 
     def run(self, process: Process, step: Step) -> None:
@@ -102,11 +97,9 @@ class StepEnd:
 class StepClient(StepEnd):
     """Client of a process without a loop of its own: ``next_step`` blocks."""
 
-    def __init__(
-        self, bus: ZenohBus, rig: str, address: int, ports: Mapping[Side, Port], *, hears_depth: bool = False
-    ) -> None:
+    def __init__(self, bus: ZenohBus, rig: str, address: int, ports: Mapping[Side, Port]) -> None:
         self._arrived: queue.SimpleQueue[Arrival] = queue.SimpleQueue()
-        super().__init__(bus, rig, address, ports, self._arrived.put, hears_depth=hears_depth)
+        super().__init__(bus, rig, address, ports, self._arrived.put)
 
     def stop(self) -> None:
         """Make ``next_step`` return None; may be called from a signal handler or another thread."""
@@ -131,11 +124,9 @@ class StepClient(StepEnd):
 class AsyncStepClient(StepEnd):
     """Client of a process whose asyncio loop has other work too, such as operators' questions."""
 
-    def __init__(
-        self, bus: ZenohBus, rig: str, address: int, ports: Mapping[Side, Port], *, hears_depth: bool = False
-    ) -> None:
+    def __init__(self, bus: ZenohBus, rig: str, address: int, ports: Mapping[Side, Port]) -> None:
         self.inbox: Inbox[Arrival] = Inbox()
-        super().__init__(bus, rig, address, ports, self.inbox.put, hears_depth=hears_depth)
+        super().__init__(bus, rig, address, ports, self.inbox.put)
 
     def stop(self) -> None:
         """Make ``next_step`` return None; may be called from another thread."""

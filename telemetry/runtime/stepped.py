@@ -37,7 +37,7 @@ class DueEvent:
 
     kind: Due
     at: float
-    data: Any = None  # CYCLE: [start, *sample]; of a frame by radio its margin, dB; frames travel on keys of their own
+    data: Any = None  # CYCLE: [start, *sample]; DEPTH: the reading's payload; of a frame by radio its margin, dB
 
 
 @dataclass(frozen=True, slots=True)
@@ -100,8 +100,7 @@ def dispatch(process: Process, event: DueEvent, frame: bytes) -> None:
         case Due.CYCLE:
             process.on_cycle(event.data, event.at)
         case Due.DEPTH:
-            rig_time, md = msgpack.unpackb(frame)
-            process.on_depth(rig_time, md)
+            process.on_depth(event.data, event.at)
         case Due.TIMER:
             process.on_timer(event.at)
 

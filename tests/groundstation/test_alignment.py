@@ -103,7 +103,7 @@ def test_the_ground_station_weighs_all_imus_of_a_survey() -> None:
         for angle, v in zip((lean, lean + 4e-4 / G), variances, strict=True)
     )
     survey = SurveyMeasurement(1, 1, 1000.0, 1, imus, 0.0, 1e-9, 1e-9, 32, 20.0, NodeFlag.NONE)
-    assert model.on_survey(survey, 2.0)
+    assert model.on_survey(survey, 2.0) == ""
     row = stations(model, {})["stations"][0]
     assert row["inclination_deg"] * DEG == pytest.approx(lean + 1e-4 / G, abs=1e-9)
     assert row["sigma_force_mps2"] ** 2 == pytest.approx(0.75e-8)

@@ -58,7 +58,7 @@ def knowing(tmp_path: Path, measurements: list[Placed], tubes: int = 0, **settin
     model = RigModel(GroundConfig(folder=tmp_path, **settings))
     model.tally.restore(list(range(tubes, 0, -1)))
     for measurement, md in measurements:
-        assert model.on_survey(measurement, md)
+        assert model.on_survey(measurement, md) == ""
     return model
 
 
@@ -225,8 +225,8 @@ def test_a_measurement_that_is_none_is_counted_and_changes_nothing(tmp_path: Pat
     model = knowing(tmp_path, passes(2, lambda _stop, _station: 1.0), 2)
     before = result(model)
     bad = SurveyMeasurement(1, 9, 2000.0, 1, (ImuMean((0.0, 0.0, 0.0), COV),), 0.0, 1e-8, 1e-8, 32, 20.0, NodeFlag.NONE)
-    assert not model.on_survey(bad, 2.0)
-    assert not model.on_survey(survey(1, 10, 1, 1.0), None)
+    assert model.on_survey(bad, 2.0) == "survey_refused"
+    assert model.on_survey(survey(1, 10, 1, 1.0), None) == ""
     assert (model.refused, model.unplaced) == (1, 1)
     assert differing(result(model), before) == []
 

@@ -8,6 +8,7 @@ from memory_rig import Rig
 
 from groundstation.config import GroundConfig
 from groundstation.errors import SelectorError
+from groundstation.service.operator import ANSWERED_WITHIN, OPEN_AT_MOST
 from groundstation.service.orders import KEPT, Order, OrderBook, OrderState
 from groundstation.service.process import GroundProcess
 from telemetry.application.commands import find_command
@@ -35,12 +36,38 @@ def test_an_order_to_a_silent_tube_holds_no_other_up_and_is_obeyed_once_it_is_ba
     assert (silent.state, silent.detail) == (OrderState.DONE, "at the next settled cycle")
 
 
+def test_orders_to_a_silent_tube_are_bounded_and_withdrawn_in_the_end(rig: Rig) -> None:
+    rig.part(2, 1)
+    operator = rig.ground.operator
+    orders = [operator.command(1, "take_survey") for _ in range(OPEN_AT_MOST)]
+    with pytest.raises(SelectorError, match=f"tube 1: expected at most {OPEN_AT_MOST} orders without an answer"):
+        operator.command(1, "take_survey")
+    assert rig.order(2, "parameters").state is OrderState.DONE
+    operator.expire_orders(rig.ground.model.now + ANSWERED_WITHIN + 60.0)
+    assert {order.state for order in orders} == {OrderState.FAILED}
+    rig.join(2, 1)
+    rig.run(70.0)
+    assert {order.state for order in orders} == {OrderState.FAILED}
+
+
 def test_numbers_are_not_used_again_after_a_restart(rig: Rig) -> None:
     before = [rig.order(2, "parameters").number, rig.ground.operator.command(1, "take_survey").number]
     rig.start(BASE)
     rig.run(3.0)
     after = [rig.order(2, "parameters").number, rig.order(1, "parameters").number]
-    assert before[0] < before[1] < after[0] < after[1]
+    assert len({*before, *after}) == 4
+
+
+def test_numbers_are_not_used_again_by_a_fresh_database(rig: Rig) -> None:
+    before = {rig.order(2, "parameters").number for _ in range(3)}
+    rig.ground.store.close()
+    for file in (rig.folder / str(BASE)).glob("ground.sqlite*"):
+        file.unlink()
+    rig.processes[BASE] = rig.build(BASE)
+    rig.run(8.0)
+    order = rig.order(2, "take_survey")
+    assert order.number not in before
+    assert order.detail == "at the next settled cycle"  # obeyed, and not the kept answer to another order
 
 
 def test_an_upload_is_sent_acknowledged_and_done(rig: Rig) -> None:

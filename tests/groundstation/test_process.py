@@ -19,6 +19,7 @@ from schemas import check_answers
 from groundstation.config import GroundConfig
 from groundstation.host import answering
 from groundstation.service.process import GroundProcess
+from telemetry.application.depth_source import DepthSource
 from telemetry.application.endpoint import Endpoint
 from telemetry.media.zenoh_bus import ZenohBus, open_client, open_router
 from telemetry.messages import (
@@ -27,12 +28,14 @@ from telemetry.messages import (
     Mode,
     NodeFlag,
     NodeState,
+    Receipt,
     Reply,
     Severity,
     Side,
     StaticRecord,
     SurveyMeasurement,
 )
+from telemetry.presentation.msgpack_codec import encode
 
 VAR = (0.0034**2) / 32
 COV = ((VAR, 0.0, 0.0), (0.0, VAR, 0.0), (0.0, 0.0, VAR))
@@ -59,6 +62,9 @@ class Rig:
         self.ground = GroundProcess(GroundConfig(folder=folder))
         self.tube = Endpoint(1, frozenset(Side), boot_count=1, is_clock_root=True)
         self.now = 1000.0
+        self.source = DepthSource()
+
+    md = 0.0
 
     def run(self, duration: float) -> None:
         end = self.now + duration
@@ -74,9 +80,19 @@ class Rig:
             self.now += 0.5
 
     def depth(self, md: float) -> None:
+        """The bit is moved to a depth, and stands there from now on."""
+        self.now += 20.0 if md != self.md else 0.0
         for _ in range(3):
             self.now += 0.5
-            self.ground.on_depth(self.now, md)
+            self.read_depth(md)
+
+    def read_depth(self, md: float) -> None:
+        self.md = md
+        self.ground.on_depth(encode(self.source.measure(self.now, md)), self.now)
+
+    def alarms(self) -> set[str]:
+        """Kinds of alarms that an operator sees."""
+        return set(self.ground.operator.ask("status")["alarms"])
 
     def state(self, tube: int, hops: int) -> None:
         state = NodeState(
@@ -92,6 +108,7 @@ class Rig:
         message = SurveyMeasurement(tube, sequence, self.now, 1, imus, 0.0, 1e-8, 1e-8, 32, 20.0, NodeFlag.NONE)
         self.tube.submit(message, self.now)
         self.run(2.0)
+        self.read_depth(self.md)
 
 
 async def ask(bus: ZenohBus, selector: str) -> Any:
@@ -151,6 +168,17 @@ async def test_surveys_find_their_stations(rig: tuple[Rig, ZenohBus]) -> None:
     assert {m["tube"] for m in (await ask(bus, f"{GROUND}/stations/1/measurements"))["measurements"]} == {1, 2}
     assert [t["md_m"] for t in (await ask(bus, f"{GROUND}/string"))["tubes"]] == [2.0, 4.0]
     assert (await ask(bus, f"{GROUND}/status"))["measurements"] == 3
+
+
+@pytest.mark.parametrize("selector", ["**", "borechain/**", "borechain/rig-1/cmd/*", "borechain/rig-1/cmd/**", "*/*"])
+async def test_a_selector_that_covers_everything_orders_nothing_and_ends_nobody(
+    rig: tuple[Rig, ZenohBus], selector: str
+) -> None:
+    it, bus = rig
+    replies = await asyncio.to_thread(bus.get, selector, 10.0)
+    assert all(reply.error is None or "\n" not in reply.error for reply in replies)
+    assert (await ask(bus, f"{GROUND}/orders"))["orders"] == []
+    assert it.ground.endpoint.counters["failed_queries"] == 0
 
 
 async def test_a_range_answers_only_the_range(rig: tuple[Rig, ZenohBus]) -> None:
@@ -262,8 +290,9 @@ def test_a_survey_that_comes_before_any_state_after_a_restart_finds_its_station(
     first.depth(4.0)
     first.ground.store.close()
     again = start()
-    again.now = first.now
+    again.now, again.md = first.now, first.md
     again.run(3.0)
+    again.read_depth(4.0)
     again.survey(2, 1)
     assert [(s.md, s.count) for s in again.ground.model.stations] == [(2.0, 1)]
 
@@ -275,20 +304,24 @@ def test_a_covariance_that_is_none_is_kept_and_counted_now_and_after_a_restart(s
     rig.state(1, 1)
     rig.tube.submit(replace(MEASUREMENT, imus=(ImuMean((0.0, 0.0, -9.81), NO_COV),), station_at=rig.now), rig.now)
     rig.run(2.0)
+    rig.read_depth(2.0)
     assert rig.tube.outbox_size == 0
     assert (rig.ground.model.refused, rig.ground.model.stations) == (1, [])
     rig.ground.store.close()
     assert start().ground.model.refused == 1
 
 
-@pytest.mark.parametrize(("at", "md"), [(math.nan, 2.0), (2000.0, math.inf), (-math.inf, math.nan)])
-def test_a_depth_that_is_no_number_is_not_taken(start: Callable[[], Rig], at: float, md: float) -> None:
+@pytest.mark.parametrize(
+    "payload", [b"", b"\x93\x01", b"\xc1", encode(Receipt(1, 2)), msgpack.packb([1.0, 2.0]), b"x" * 9000]
+)
+def test_bytes_that_are_no_depth_are_counted_and_told(start: Callable[[], Rig], payload: bytes) -> None:
     rig = start()
+    rig.run(3.0)
     rig.depth(2.0)
-    before = rig.ground.model.rig_now
-    rig.ground.on_depth(at, md)
+    rig.ground.on_depth(payload, rig.now)
     assert rig.ground.model.depths.latest == 2.0
-    assert rig.ground.model.rig_now == before
+    assert rig.ground.endpoint.counters["bad_depths"] == 1
+    assert rig.alarms() >= {"bad_input"}
 
 
 def test_a_survey_from_before_the_restart_finds_its_depth(start: Callable[[], Rig]) -> None:
@@ -296,18 +329,20 @@ def test_a_survey_from_before_the_restart_finds_its_depth(start: Callable[[], Ri
     first.run(3.0)
     first.depth(2.0)
     first.depth(4.0)
-    when = first.now
+    when = first.now - 0.25
     first.depth(6.0)
     first.ground.store.close()
     again = start()
-    assert again.ground.model.depths.at(when) == 4.0
+    assert again.ground.model.depths.at(again.ground.model.epoch, when) == 4.0
 
 
 def test_a_survey_without_a_depth_is_kept_and_counted(start: Callable[[], Rig]) -> None:
     rig = start()
     rig.run(3.0)
     rig.survey(1, 1)
+    rig.run(6.0)
     assert rig.ground.model.unplaced == 1
+    assert "survey_unplaced" in rig.alarms()
     assert [s.md for s in rig.ground.store.messages()] == [None]
     assert rig.tube.outbox_size == 0
 
@@ -337,7 +372,10 @@ async def test_a_change_is_published_on_the_key_it_changes(rig: tuple[Rig, Zenoh
 @pytest.mark.parametrize(
     ("order", "named"),
     [
-        ("dance?tube=1", "take_survey|static_record|parameters|align|alignment|timing|upload_parameters"),
+        (
+            "dance?tube=1",
+            "take_survey|static_record|parameters|resend|align|alignment|timing|upload_parameters|accept_depth",
+        ),
         ("take_survey", "tube=N"),
         ("take_survey?tube=251", "1..250"),
         ("take_survey?tube=99", "tube 99: not in the string; expected one of 2, 1"),

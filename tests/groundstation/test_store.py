@@ -14,7 +14,7 @@ import pytest
 
 from groundstation.errors import StoreError
 from groundstation.service.store import Store
-from telemetry.messages import Event, ImuMean, NodeFlag, Severity, SurveyMeasurement
+from telemetry.messages import Event, ImuMean, NodeFlag, Severity, Stand, SurveyMeasurement
 
 COV = ((1e-6, 0.0, 0.0), (0.0, 1e-6, 0.0), (0.0, 0.0, 1e-6))
 
@@ -57,12 +57,12 @@ def test_what_was_added_is_there_after_a_restart_once(tmp_path: Path) -> None:
     assert store.add_message(survey(1, 1), 2.0)
     assert not store.add_message(survey(1, 1), 2.0)
     assert store.add_message(Event(1, 2, 5.0, Severity.WARNING, "yaw_reset", {"yaw_deg": 3.0}), None)
-    store.add_depth(900.0, 2.0)
+    store.keep_stand(Stand(1, 900.0, 950.0, 2.0))
     store.close()
     with closing(Store(url(tmp_path))) as again:
         assert [(s.message.sequence, s.md) for s in again.messages()] == [(1, 2.0), (2, None)]
         assert not again.add_message(survey(1, 1), 2.0)
-        assert again.depths() == [(900.0, 2.0)]
+        assert again.stands() == [Stand(1, 900.0, 950.0, 2.0)]
         assert again.boots == store.boots + 1
 
 
@@ -146,10 +146,47 @@ def test_a_url_that_is_none_is_refused_without_telling_a_password(wrong: str) ->
 def test_a_disk_that_refuses_is_an_error_of_the_store(tmp_path: Path) -> None:
     with closing(Store(url(tmp_path))) as store:
         with closing(sqlite3.connect(tmp_path / "ground.sqlite")) as connection:
-            connection.execute("drop table depths")
-        for use in (lambda: store.add_depth(1.0, 2.0), store.depths):
+            connection.execute("drop table stands")
+        for use in (lambda: store.keep_stand(Stand(1, 1.0, 2.0, 2.0)), store.stands):
             with pytest.raises(StoreError, match=r"ground\.sqlite"):
                 use()
+
+
+def test_a_damaged_message_is_passed_over_counted_and_taken_again(tmp_path: Path) -> None:
+    with closing(Store(url(tmp_path))) as store:
+        store.add_message(survey(1, 1), 2.0)
+        store.add_message(survey(1, 2), 2.0)
+    with closing(sqlite3.connect(tmp_path / "ground.sqlite")) as connection:
+        connection.execute("update messages set payload = x'c1' where sequence = 1")
+        connection.commit()
+    with closing(Store(url(tmp_path))) as again:
+        assert [s.message.sequence for s in again.messages()] == [2]
+        assert again.damaged == 1
+        assert again.add_message(survey(1, 1), 2.0)
+        assert sorted(s.message.sequence for s in again.messages()) == [1, 2]
+
+
+def test_a_database_that_was_removed_takes_nothing_and_says_why(tmp_path: Path) -> None:
+    with closing(Store(url(tmp_path))) as store:
+        store.add_message(survey(1, 1), 2.0)
+        for file in tmp_path.glob("ground.sqlite*"):
+            file.unlink()
+        with pytest.raises(StoreError, match="removed"):
+            store.add_message(survey(1, 2), 2.0)
+        assert "removed" in store.refusal
+
+
+def test_a_database_that_cannot_be_written_is_read(tmp_path: Path) -> None:
+    with closing(Store(url(tmp_path))) as store:
+        store.add_message(survey(1, 1), 2.0)
+        with closing(sqlite3.connect(tmp_path / "ground.sqlite", isolation_level=None)) as holder:
+            holder.execute("begin immediate")  # nobody else can write
+            with pytest.raises(StoreError, match="locked"):
+                store.add_message(survey(1, 2), 2.0)
+            assert store.refusal
+            assert [s.message.sequence for s in store.messages()] == [1]
+        assert store.add_message(survey(1, 2), 2.0)
+        assert store.refusal == ""
 
 
 def test_the_order_of_the_string_is_kept(tmp_path: Path) -> None:
@@ -166,5 +203,5 @@ def test_another_schema_is_refused(tmp_path: Path) -> None:
     with sqlite3.connect(tmp_path / "ground.sqlite") as connection:
         connection.execute("update meta set value = '99' where name = 'schema'")
     connection.close()
-    with pytest.raises(StoreError, match="schema 1, got 99"):
+    with pytest.raises(StoreError, match="schema 2, got 99"):
         Store(url(tmp_path))

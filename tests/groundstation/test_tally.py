@@ -1,4 +1,4 @@
-from groundstation.service.tally import DepthLog, Tally
+from groundstation.service.tally import Tally
 
 
 def test_a_tube_added_at_the_top_leaves_the_depths_of_the_others() -> None:
@@ -38,14 +38,3 @@ def test_a_restored_order_holds_until_reports_complete_another() -> None:
     assert order.tubes == [4, 3, 2, 1]
     order.on_hops(2, 3)
     assert order.tubes == [4, 3, 2, 1]
-
-
-def test_depth_is_that_of_the_time_asked_for() -> None:
-    log = DepthLog()
-    assert log.at(5.0) is None
-    readings = [(1.0, 0.0), (2.0, 0.5), (3.0, 1.0), (4.0, 1.0), (5.0, 1.0), (6.0, 1.5)]
-    stands = [log.append_reading(at, md) for at, md in readings]
-    assert stands == [False, False, False, True, False, False]
-    assert [log.at(t) for t in (0.5, 2.5, 4.5, 6.0)] == [None, 0.5, 1.0, 1.5]
-    assert log.latest == 1.5
-    assert log.append_reading(2.0, 9.0) is False

@@ -12,13 +12,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from node.errors import SavedStateError
 from node.firmware.saved_state import FIELDS, layout_name, pack
 from node.firmware.settings import TubeSettings
 from node.kernels.layout import PERIOD, default_config
 from node.kernels.record import NODE_LAYOUT, new_node
 from node.process import journal as journal_module
-from node.process.counter import BootCounter
+from node.process.counter import LOTS, BootCounter
 from node.process.journal import SLOTS, Journal
 from node.process.tube_process import TubeProcess
 
@@ -217,10 +216,21 @@ def test_a_cut_while_the_starts_are_counted_leaves_the_last_number(tmp_path: Pat
     assert BootCounter(tmp_path).boots == 2
 
 
-def test_a_count_of_starts_that_is_none_is_named(tmp_path: Path) -> None:
-    (tmp_path / "boots").write_text("many")
-    with pytest.raises(SavedStateError, match="boots"):
-        BootCounter(tmp_path)
+@pytest.mark.parametrize("count", ["many", "-1", "", "1e9", "9" * 30])
+def test_a_damaged_count_of_starts_gives_a_number_that_counting_never_reaches(tmp_path: Path, count: str) -> None:
+    (tmp_path / "boots").write_text(count)
+    first = BootCounter(tmp_path)
+    assert LOTS <= first.boots < 2 * LOTS
+    assert "boots" in first.fault
+    second = BootCounter(tmp_path)
+    assert (second.boots, second.fault) == (first.boots + 1, "")
+
+
+def test_a_folder_that_takes_nothing_gives_a_number_by_lot(tmp_path: Path) -> None:
+    (tmp_path / "folder").write_text("a file")
+    counter = BootCounter(tmp_path / "folder", lot=lambda _below: 7)
+    assert counter.boots == LOTS + 7
+    assert counter.fault
 
 
 def other_version(slot: bytes) -> bytes:

@@ -54,7 +54,7 @@ class Surface(Process):
     def on_frame(self, side: Side, frame: bytes, now: float, margin: float = math.inf) -> None:
         for received in self.endpoint.receive(side, frame, now, margin):
             if isinstance(received.message, Event):
-                self.endpoint.acknowledge(received.message.tube, received.message.sequence, now)
+                self.endpoint.acknowledge(received.message)
             self.heard.put(received.message)
 
     def first(self, kind: type, fits: Callable[[Any], bool]) -> Any:

@@ -4,8 +4,8 @@ from typing import Any
 
 from hypothesis import strategies as st
 
-from telemetry.messages import ImuMean
-from telemetry.quantities import MAX_IMUS, MAX_LIST, ValueKind
+from telemetry.messages import ImuMean, Stand
+from telemetry.quantities import MAX_IMUS, MAX_LIST, MAX_STANDS, ValueKind
 from telemetry.schema import SCHEMA, SPEC_OF, Field
 
 FINITE = st.floats(allow_nan=False, allow_infinity=False)
@@ -51,7 +51,15 @@ def values(field: Field) -> st.SearchStrategy[Any]:
         case ValueKind.VALUES:
             numbers = st.lists(FINITE, max_size=MAX_LIST).map(tuple)
             return st.dictionaries(NAMES, SCALAR | numbers, max_size=8)
+        case ValueKind.STANDS:
+            return st.lists(st.tuples(st.integers(0, 3), st.floats(field.low, field.high)), max_size=MAX_STANDS).map(
+                stands
+            )
     raise AssertionError(f"no values are drawn for a field of kind {field.kind}")
+
+
+def stands(rows: list[tuple[int, float]]) -> tuple[Stand, ...]:
+    return tuple(Stand(epoch, 10.0 * n, 10.0 * n + 5.0, md) for n, (epoch, md) in enumerate(rows))
 
 
 def messages(message: type) -> st.SearchStrategy[Any]:

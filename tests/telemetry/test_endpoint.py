@@ -97,7 +97,7 @@ class Chain:
         self.got[address].append(received.message)
         match received.message:
             case SurveyMeasurement() | Event() as kept:
-                station.acknowledge(kept.tube, kept.sequence, now)
+                station.acknowledge(kept)
             case Command() as command:
                 station.reply(Reply(address, command.sequence, True, command.name), now)
             case Aiding() as aiding:

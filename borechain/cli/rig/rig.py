@@ -25,6 +25,7 @@ if TYPE_CHECKING:
     from sim.world.world import World
     from telemetry.media.zenoh_bus import ZenohBus
 
+NAMED = 5  # surveys named that are missing
 ASKED = ("stations", "measurements", "column", "alarms", "recalibration")
 PRELOAD = {"float64": "borechain.warm", "fixed": "borechain.warm_all", "published": "borechain.warm_all"}  # by kernel
 
@@ -112,6 +113,15 @@ def rig(
         click.echo(json.dumps(result))
     else:
         show_result(result, folder)
+    if result["missing"]:
+        raise EnvironmentFault(lacking(result["missing"], result["measurements"], folder))
+
+
+def lacking(missing: list[dict[str, Any]], measured: int, folder: Path) -> str:
+    """Line about surveys that the stops of a run asked for and nobody has."""
+    named = ", ".join(f"tube {row['tube']} at {row['bit_md_m']:g} m of the bit" for row in missing[:NAMED])
+    more = f" and {len(missing) - NAMED} more" if len(missing) > NAMED else ""
+    return f"expected {measured + len(missing)} surveys, {len(missing)} are missing: {named}{more}; files in {folder}"
 
 
 @dataclass(frozen=True, slots=True)
@@ -242,7 +252,7 @@ def get_json(bus: ZenohBus, selector: str) -> Any:
 def result_of(answers: dict[str, Any], world: World) -> dict[str, Any]:
     """The JSON object of the command."""
     from sim.rig.calibration_report import calibration
-    from sim.rig.report import digest, figures, station_table
+    from sim.rig.report import digest, figures, missing_surveys, station_table
 
     stations = station_table(answers["stations"]["stations"], world)
     measurements = answers["measurements"]["measurements"]
@@ -251,7 +261,9 @@ def result_of(answers: dict[str, Any], world: World) -> dict[str, Any]:
         "figures": figures(stations, measurements, world),
         "measurements": len(measurements),
         "column": {key: answers["column"][key] for key in ("worst", "projection", "dominant")},
+        "missing": missing_surveys(measurements, world),
         "alarms": answers["alarms"]["active"],
+        "rig_alarms": answers["alarms"]["rig"],
         "rig_s": round(world.end - world.begin, 3),
         "digest": digest(stations),
     }
@@ -310,6 +322,8 @@ def show_result(result: dict[str, Any], folder: Path) -> None:
         shown = " ".join("-" if v is None else f"{v:.4f}" for v in values)
         paper.print(f"{name:22} {shown}")
     show_column(result)
+    for alarm in result["rig_alarms"]:
+        click.echo(f"alarm  {alarm['code']:15} {alarm['subject']}: {alarm['detail']}")
     if "calibration" in result:
         show_calibration(result["calibration"])
     processes = "one process" if result["processes"] == 1 else f"{result['processes']} processes"

@@ -1,0 +1,197 @@
+"""Where the bit was: a numbered stream of readings, bounded by rig time, by the string and by how fast a bit moves.
+
+A depth is known where readings bracket its time within ``gap``, or where the bit is known to have stood. What the
+stream may not say is refused, with the reason. The readings after a jump stay refused until they agree again with those
+before it, or until the crew has looked.
+"""
+
+from __future__ import annotations
+
+from bisect import bisect_right, insort
+from collections import Counter
+from dataclasses import dataclass, field
+
+from telemetry.messages import EPOCH_UNKNOWN, DepthReading, Stand
+
+LIMIT = 100_000  # readings kept of an epoch, those at rest in a stand count as two
+STANDS_KEPT = 10_000
+EPOCHS_KEPT = 8
+AHEAD, LATE = 2.0, 30.0  # s against rig time
+SLACK = 0.02  # m, of two readings
+RETURNED = 0.1  # m from the last reading before a jump, within which the depth is believed again
+
+
+@dataclass(slots=True)
+class Track:
+    """Readings of one epoch in the order of time; ``run[k]`` says that all between k - 1 and k were equal and close."""
+
+    gap: float
+    at: list[float] = field(default_factory=list)
+    md: list[float] = field(default_factory=list)
+    run: list[bool] = field(default_factory=list)
+
+    def append_reading(self, at: float, md: float) -> bool:
+        """Add a reading, later than all; True when the bit has come to rest at a new depth."""
+        rested = len(self.md) >= 2 and md == self.md[-1] == self.md[-2]
+        if rested and at - self.at[-1] <= self.gap and (self.run[-1] or self.at[-1] - self.at[-2] <= self.gap):
+            self.at[-1], self.run[-1] = at, True
+            return False
+        came_to_stand = len(self.md) >= 2 and md == self.md[-1] != self.md[-2]
+        self.at.append(at)
+        self.md.append(md)
+        self.run.append(False)
+        if len(self.at) > LIMIT:
+            del self.at[: LIMIT // 2], self.md[: LIMIT // 2], self.run[: LIMIT // 2]
+        return came_to_stand
+
+    def depth_at(self, time: float) -> float | None:
+        """Depth (m) between two readings that bracket ``time`` (s); None where none do."""
+        k = bisect_right(self.at, time)
+        if k == len(self.at):
+            return self.md[-1] if k and self.at[-1] == time else None
+        if k == 0 or not (self.run[k] or self.at[k] - self.at[k - 1] <= self.gap):
+            return None
+        if self.md[k] == self.md[k - 1]:
+            return self.md[k]
+        share = (time - self.at[k - 1]) / (self.at[k] - self.at[k - 1])
+        return self.md[k - 1] + share * (self.md[k] - self.md[k - 1])
+
+
+class DepthLog:
+    """Depth of the bit over rig time.
+
+    Parameters
+    ----------
+    rate : m/s, the fastest that a bit is moved
+    gap : s, between two readings that bracket a time
+
+    Attributes
+    ----------
+    refusals : readings refused, by reason
+    lost : numbers of the stream that never came
+    jumped : why readings are refused since a jump, or empty
+    """
+
+    def __init__(self, rate: float, gap: float) -> None:
+        self.refusals: Counter[str] = Counter()
+        self.lost = 0
+        self.jumped = ""
+        self.stands: list[Stand] = []  # in the order of epoch and begin
+        self._rate, self._gap = rate, gap
+        self._tracks: dict[int, Track] = {}
+        self._sequence: int | None = None
+        self._raw: tuple[int, float, float] | None = None  # epoch, time and depth of the last reading that came
+        self._trusted: tuple[int, float, float] | None = None  # of the last one that was taken
+        self._accepted = (-1, 0.0)  # epoch and time at which the crew accepted the depth
+
+    @property
+    def latest(self) -> float | None:
+        """Newest depth, m."""
+        return None if self._trusted is None else self._trusted[2]
+
+    def on_reading(self, reading: DepthReading, epoch: int, rig_now: float, deepest: float) -> str:
+        """Take a reading at ``rig_now`` (s) of ``epoch``; returns why it is refused, or nothing.
+
+        ``deepest`` (m) is what the string reaches.
+        """
+        reason = self._refusal(reading, epoch, rig_now, deepest)
+        if reason:
+            self.refusals[reason] += 1
+            return reason
+        self._trusted = (epoch, reading.at, reading.md)
+        self._track(epoch).append_reading(reading.at, reading.md)
+        return ""
+
+    def add_stand(self, stand: Stand) -> bool:
+        """Remember that the bit stood, or that it still does; whether it is a stand not known before."""
+        place = next((k for k in range(len(self.stands) - 1, -1, -1) if _same(self.stands[k], stand)), None)
+        if place is not None:
+            known = self.stands[place]
+            begun_at, ended_at = min(known.begun_at, stand.begun_at), max(known.ended_at, stand.ended_at)
+            self.stands[place] = Stand(stand.epoch, begun_at, ended_at, stand.md)
+            return False
+        if not all(self._agree(known, stand) for known in self.stands if known.epoch == stand.epoch):
+            self.refusals["a stand contradicts another"] += 1
+            return False
+        insort(self.stands, stand, key=lambda known: (known.epoch, known.begun_at))
+        del self.stands[:-STANDS_KEPT]
+        return True
+
+    def restore(self, stands: list[Stand]) -> None:
+        """Go on with what was stored."""
+        for stand in stands:
+            self.add_stand(stand)
+        if stands:
+            newest = stands[-1]
+            self._raw = self._trusted = (newest.epoch, newest.ended_at, newest.md)
+
+    def at(self, epoch: int, time: float) -> float | None:
+        """Depth (m) at rig time ``time`` (s); None where nothing brackets it."""
+        track = self._tracks.get(epoch)
+        found = None if track is None else track.depth_at(time)
+        if found is not None:
+            return found
+        k = bisect_right(self.stands, (epoch, time), key=lambda stand: (stand.epoch, stand.begun_at)) - 1
+        stand = self.stands[k] if k >= 0 else None
+        return stand.md if stand is not None and stand.epoch == epoch and time <= stand.ended_at else None
+
+    def accept(self) -> None:
+        """Believe the next reading, whatever came before."""
+        if self._raw is not None:
+            self._accepted = self._raw[:2]
+        self.jumped, self._raw = "", None
+
+    def _agree(self, one: Stand, other: Stand) -> bool:
+        """Whether the bit can have moved from one stand to the other in the time between them."""
+        first, second = sorted((one, other), key=lambda stand: stand.begun_at)
+        if second.begun_at < first.ended_at:
+            return False
+        if (first.epoch, first.ended_at) <= self._accepted <= (second.epoch, second.begun_at):
+            return True  # the crew has looked in between
+        return abs(second.md - first.md) <= self._rate * (second.begun_at - first.ended_at) + SLACK
+
+    def _refusal(self, reading: DepthReading, epoch: int, rig_now: float, deepest: float) -> str:
+        if reading.epoch not in (EPOCH_UNKNOWN, epoch):
+            return "of another epoch of rig time"
+        if reading.at > rig_now + AHEAD:
+            return "ahead of rig time"
+        if reading.at < rig_now - LATE:
+            return "behind rig time"
+        raw = self._raw
+        same_epoch = raw is not None and raw[0] == epoch
+        if raw is not None and same_epoch and reading.at <= raw[1]:
+            return "repeated"
+        self._count(reading.sequence)
+        if reading.md > deepest:
+            return "deeper than the string reaches"
+        self._raw = (epoch, reading.at, reading.md)
+        if raw is not None and same_epoch:
+            self._judge_jump(reading, raw)
+        return "after a jump" if self.jumped else ""
+
+    def _judge_jump(self, reading: DepthReading, raw: tuple[int, float, float]) -> None:
+        if not self.jumped:
+            if abs(reading.md - raw[2]) > self._rate * (reading.at - raw[1]) + SLACK:
+                self.jumped = f"from {raw[2]:.2f} m to {reading.md:.2f} m in {reading.at - raw[1]:.1f} s"
+        elif self._trusted is not None and abs(reading.md - self._trusted[2]) <= RETURNED:
+            self.jumped = ""
+
+    def _count(self, sequence: int) -> None:
+        if self._sequence is not None and sequence > self._sequence + 1:
+            self.lost += sequence - self._sequence - 1
+        self._sequence = sequence
+
+    def _track(self, epoch: int) -> Track:
+        if epoch not in self._tracks:
+            self._tracks[epoch] = Track(self._gap)
+            while len(self._tracks) > EPOCHS_KEPT:
+                del self._tracks[next(iter(self._tracks))]
+        return self._tracks[epoch]
+
+
+def _same(one: Stand, other: Stand) -> bool:
+    return (one.epoch, one.md) == (other.epoch, other.md) and _touch(one, other)
+
+
+def _touch(one: Stand, other: Stand) -> bool:
+    return one.begun_at <= other.ended_at and other.begun_at <= one.ended_at

@@ -1,0 +1,93 @@
+"""Where the string stopped to be surveyed, and which tubes have not answered. No I/O.
+
+A stop is a stand of the bit that began with the end of drilling and lasted long enough for a survey. Every tube in the
+hole owes one; a tube whose node is still above the collar does not.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass, field
+
+from groundstation.service.tally import Tally
+from telemetry.messages import Stand
+
+SHORTEST = 30.0  # s that a stand must last for its survey to be owed
+AROUND = 2.0  # s by which the times of a survey and of a stand may differ
+IN_THE_HOLE = 0.01  # m below the collar from which a node owes a survey
+STOPS_KEPT = 1000
+SURVEYS_KEPT = 100_000
+
+
+@dataclass(slots=True)
+class Stop:
+    """One stop: its stand, which tubes hung in the hole, and whether it was judged."""
+
+    stand: Stand
+    tubes: tuple[int, ...]
+    judged: bool = False
+    missing: set[int] = field(default_factory=set)
+
+
+class Stops:
+    """Stops in the order in which they were found.
+
+    Parameters
+    ----------
+    tally : which tubes hang in the string
+    due : s after which the survey of a stop is overdue
+    """
+
+    def __init__(self, tally: Tally, due: float) -> None:
+        self._tally = tally
+        self._due = due
+        self._stops: list[Stop] = []
+        self._surveys: dict[tuple[int, float, int], None] = {}  # epoch, time and tube
+
+    def __iter__(self) -> Iterator[Stop]:
+        return iter(self._stops)
+
+    def on_survey(self, epoch: int, at: float, tube: int) -> None:
+        """A survey has come, wherever it belongs."""
+        self._surveys[epoch, at, tube] = None
+        if len(self._surveys) > SURVEYS_KEPT:
+            del self._surveys[next(iter(self._surveys))]
+        for stop in self._stops:
+            if tube in stop.missing and belongs(stop.stand, epoch, at):
+                stop.missing.discard(tube)
+
+    def on_stand(self, stand: Stand) -> None:
+        """A stand has begun, or lasted longer; the tubes are those that hang when it is first heard of."""
+        known = next((stop for stop in reversed(self._stops) if _same(stop.stand, stand)), None)
+        if known is not None:
+            known.stand = stand
+            return
+        self._stops.append(Stop(stand, tuple(self._in_the_hole(stand.md))))
+        del self._stops[:-STOPS_KEPT]
+
+    def judge(self, epoch: int, rig_now: float) -> None:
+        """Find what is overdue at ``rig_now`` (s)."""
+        for stop in self._stops:
+            stand = stop.stand
+            lasted = stand.ended_at - stand.begun_at
+            is_due = stand.epoch != epoch or rig_now >= stand.begun_at + self._due
+            if stop.judged or lasted < SHORTEST or not is_due:
+                continue
+            stop.judged = True
+            answered = {tube for e, at, tube in self._surveys if belongs(stand, e, at)}
+            stop.missing = set(stop.tubes) - answered
+
+    def _in_the_hole(self, md: float) -> Iterator[int]:
+        for tube in self._tally.tubes:
+            below = self._tally.length_below(tube)
+            if below is not None and md - below > IN_THE_HOLE:
+                yield tube
+
+
+def belongs(stand: Stand, epoch: int, at: float) -> bool:
+    """Whether a survey was taken during a stand."""
+    return epoch == stand.epoch and stand.begun_at - AROUND <= at <= stand.ended_at + AROUND
+
+
+def _same(one: Stand, other: Stand) -> bool:
+    return (one.epoch, one.md) == (other.epoch, other.md) and one.begun_at <= other.ended_at >= one.ended_at

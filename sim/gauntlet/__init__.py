@@ -1,0 +1,1 @@
+"""Faults of a rig drawn from one integer."""

@@ -1,0 +1,184 @@
+"""The depth of the bit: what is believed of the stream, and when a depth is known."""
+
+import math
+from itertools import pairwise
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from groundstation.service.depth import DepthLog, Track
+from telemetry.application.depth_source import DepthSource
+from telemetry.errors import EncodeError
+from telemetry.messages import DepthReading, Stand
+from telemetry.presentation.msgpack_codec import decode, encode
+from telemetry.quantities import MAX_STANDS
+
+EPOCH, CYCLE = 3, 0.5
+
+
+class Bit:
+    """A bit that is drilled, its source and the ground station's log."""
+
+    def __init__(self) -> None:
+        self.source, self.log = DepthSource(), DepthLog(0.5, 5.0)
+        self.now, self.md = 1000.0, 0.0
+
+    def read(self, md: float, ahead: float = 0.0, *, heard: bool = True) -> str:
+        self.md = md
+        reading = self.source.measure(self.now + ahead, md)
+        return self.log.on_reading(reading, EPOCH, self.now, 1e3) if heard else "off"
+
+    def move_to(self, md: float, *, heard: bool = True) -> None:
+        while self.md != md:
+            self.now += CYCLE
+            self.read(min(self.md + 0.1, md) if md > self.md else max(self.md - 0.1, md), heard=heard)
+
+    def stand(self, duration: float, *, heard: bool = True) -> float:
+        begin = self.now
+        while self.now < begin + duration:
+            self.now += CYCLE
+            self.read(self.md, heard=heard)
+        return 0.5 * (begin + self.now)
+
+    def hear_stands(self) -> None:
+        self.now += CYCLE
+        reading = self.source.measure(self.now, self.md)
+        assert self.log.on_reading(reading, EPOCH, self.now, 1e3) == ""
+        for stand in reading.stands:
+            self.log.add_stand(Stand(EPOCH, stand.begun_at, stand.ended_at, stand.md))
+
+
+def test_depth_is_that_of_the_time_asked_for() -> None:
+    track = Track(gap=1.0)
+    readings = [(1.0, 0.0), (2.0, 0.5), (3.0, 1.0), (4.0, 1.0), (5.0, 1.0), (6.0, 1.5)]
+    assert [track.append_reading(at, md) for at, md in readings] == [False, False, False, True, False, False]
+    assert [track.depth_at(t) for t in (0.5, 2.5, 4.5, 6.0, 6.1)] == [None, 0.75, 1.0, 1.5, None]
+
+
+def test_a_depth_is_known_only_where_readings_bracket_its_time() -> None:
+    bit = Bit()
+    bit.move_to(2.0)
+    at = bit.stand(30.0)
+    assert bit.log.at(EPOCH, at) == 2.0
+    assert bit.log.at(EPOCH, bit.now + 0.1) is None
+    assert bit.log.at(EPOCH + 1, at) is None
+    bit.now += 100.0  # nothing comes
+    bit.read(2.0)
+    assert bit.log.at(EPOCH, bit.now - 50.0) is None
+
+
+def test_a_ground_station_that_was_off_across_a_stop_learns_where_the_bit_stood() -> None:
+    bit = Bit()
+    bit.move_to(2.0)
+    bit.stand(30.0)
+    bit.move_to(4.0, heard=False)
+    at = bit.stand(30.0, heard=False)
+    bit.move_to(5.0, heard=False)
+    bit.hear_stands()
+    assert bit.log.at(EPOCH, at) == 4.0
+
+
+def test_a_reading_from_the_future_is_refused_and_changes_nothing() -> None:
+    bit = Bit()
+    bit.move_to(2.0)
+    bit.stand(10.0)
+    assert bit.read(2.0, ahead=300.0) == "ahead of rig time"
+    at = bit.stand(10.0)
+    assert bit.log.at(EPOCH, at) == 2.0
+
+
+@pytest.mark.parametrize(
+    ("md", "ahead", "reason"), [(2000.0, 0.0, "deeper than the string reaches"), (2.0, -60.0, "behind rig time")]
+)
+def test_what_the_stream_may_not_say_is_refused(md: float, ahead: float, reason: str) -> None:
+    bit = Bit()
+    bit.move_to(2.0)
+    bit.now += CYCLE
+    assert bit.read(md, ahead) == reason
+    assert bit.log.latest == 2.0
+    assert bit.log.refusals[reason] == 1
+
+
+def test_a_reading_of_another_epoch_is_refused() -> None:
+    log = DepthLog(0.5, 5.0)
+    assert log.on_reading(DepthReading(1, 10.0, 1.0, (), EPOCH + 1), EPOCH, 10.0, math.inf) != ""
+    assert log.on_reading(DepthReading(2, 10.0, 1.0, (), EPOCH), EPOCH, 10.0, math.inf) == ""
+
+
+@pytest.mark.parametrize("by", [3.0, -1.5])
+def test_after_a_jump_nothing_is_believed_until_it_returns(by: float) -> None:
+    bit = Bit()
+    bit.move_to(2.0)
+    bit.stand(20.0)
+    bit.now += CYCLE
+    assert bit.read(2.0 + by) == "after a jump"
+    at = bit.stand(60.0)
+    assert bit.log.at(EPOCH, at) is None
+    assert bit.log.latest == 2.0
+    bit.now += CYCLE
+    bit.read(2.0)
+    assert bit.log.jumped == ""
+    bit.stand(5.0)
+    bit.hear_stands()
+    assert bit.log.at(EPOCH, at) is None  # the stand at the wrong depth, which the source repeats, is not believed
+
+
+def test_the_crew_may_accept_the_depth_after_a_jump() -> None:
+    bit = Bit()
+    bit.move_to(2.0)
+    bit.stand(20.0)
+    bit.now += CYCLE
+    bit.read(5.0)
+    bit.stand(20.0)
+    bit.log.accept()
+    at = bit.stand(20.0)
+    assert bit.log.at(EPOCH, at) == 5.0
+
+
+def test_numbers_that_never_came_are_counted() -> None:
+    bit = Bit()
+    bit.move_to(1.0)
+    bit.move_to(1.5, heard=False)
+    bit.move_to(2.0)
+    assert bit.log.lost == 5
+
+
+def test_a_repeated_reading_changes_nothing() -> None:
+    log = DepthLog(0.5, 5.0)
+    first = DepthReading(1, 10.0, 1.0, ())
+    assert log.on_reading(first, EPOCH, 10.0, math.inf) == ""
+    assert log.on_reading(first, EPOCH, 10.0, math.inf) == "repeated"
+
+
+@pytest.mark.parametrize("md", [-1e-9, -1.0, math.nan, math.inf, 1e6])
+def test_there_is_no_negative_depth_and_none_that_is_no_number(md: float) -> None:
+    with pytest.raises(EncodeError):
+        encode(DepthReading(1, 0.0, md, ()))
+
+
+@given(st.lists(st.tuples(st.sampled_from([0.0, 0.1, 0.2, -0.1]), st.integers(1, 3)), min_size=1, max_size=120))
+def test_whatever_the_bit_does_a_depth_that_is_known_is_the_right_one(moves: list[tuple[float, int]]) -> None:
+    bit = Bit()
+    truth = [(bit.now, 0.0)]
+    bit.read(0.0)
+    for step, cycles in moves:
+        for _ in range(cycles):
+            bit.now += CYCLE
+            bit.read(max(bit.md + step, 0.0))
+            truth.append((bit.now, bit.md))
+    bit.hear_stands()
+    for (t0, d0), (t1, d1) in pairwise(truth):
+        known = bit.log.at(EPOCH, 0.5 * (t0 + t1))
+        assert known is not None
+        assert min(d0, d1) - 1e-9 <= known <= max(d0, d1) + 1e-9
+
+
+def test_a_reading_with_all_its_stands_travels() -> None:
+    bit = Bit()
+    for n in range(1, MAX_STANDS + 5):
+        bit.move_to(0.2 * n)
+        bit.stand(2.0)
+    reading = bit.source.measure(bit.now + 1.0, bit.md)
+    assert len(reading.stands) == MAX_STANDS
+    assert decode(encode(reading)) == reading

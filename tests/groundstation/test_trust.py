@@ -1,0 +1,117 @@
+"""Every flag of a survey has its stated effect on the fusion, whatever the rest of the survey is."""
+
+import math
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
+
+from groundstation.config import GroundConfig
+from groundstation.service import views
+from groundstation.service.model import RigModel
+from groundstation.survey.fusion import Weighting
+from groundstation.survey.resolve import angles, resolve
+from groundstation.survey.trust import EFFECTS, UNKNOWN_YAW_VAR, Trust, trust_of, with_unknown_yaw
+from telemetry.messages import ImuMean, NodeFlag, SurveyMeasurement
+
+G, DEG, VAR = 9.81, math.pi / 180.0, (0.0034**2) / 32
+COV = ((VAR, 0.0, 0.0), (0.0, VAR, 0.0), (0.0, 0.0, VAR))
+MD = 4.0
+
+
+def survey(tube: int, yaw_error_deg: float = 0.0, flags: NodeFlag = NodeFlag.NONE) -> SurveyMeasurement:
+    """A tube in a hole that leans by 5 deg to the north; its yaw is off by an error that its variance does not show."""
+    lean = math.sin(5.0 * DEG)
+    imus = (ImuMean((G * lean, 0.0, -G * math.cos(5.0 * DEG)), COV),)
+    return SurveyMeasurement(
+        tube, 1, 100.0 * tube, 1, imus, yaw_error_deg * DEG % math.tau, (0.002 * DEG) ** 2, (0.01 * DEG) ** 2, 32, 20.0,
+        flags,
+    )  # fmt: skip
+
+
+def station_of(folder: Path, *surveys: SurveyMeasurement, **config: Any) -> dict[str, Any] | None:
+    """What an operator sees of the one station."""
+    model = RigModel(GroundConfig(folder=folder, **config))
+    for measurement in surveys:
+        model.on_survey(measurement, MD)
+    return views.stations(model, {})["stations"][0] if model.stations else None
+
+
+def test_every_flag_has_its_effect() -> None:
+    assert set(EFFECTS) == {flag for flag in NodeFlag if flag}
+
+
+@pytest.mark.parametrize("flag", [flag for flag, effect in EFFECTS.items() if effect is Trust.UNKNOWN_YAW])
+@pytest.mark.parametrize("scheme", list(Weighting))
+def test_a_survey_with_an_unknown_yaw_moves_no_trusted_one(tmp_path: Path, flag: NodeFlag, scheme: Weighting) -> None:
+    good, bad = survey(1), survey(2, 90.0, flag)
+    alone, both = (station_of(tmp_path, *each, weighting=scheme) for each in ([good], [good, bad]))
+    assert alone is not None
+    assert both is not None
+    assert both["untrusted_measurements"] == 1
+    assert both["azimuth_deg"] % 360.0 == pytest.approx(alone["azimuth_deg"] % 360.0, abs=1e-9)
+    assert both["sigma_azimuth_deg"] == pytest.approx(alone["sigma_azimuth_deg"])
+
+
+@pytest.mark.parametrize("flag", [flag for flag, effect in EFFECTS.items() if effect is Trust.UNKNOWN_YAW])
+def test_alone_it_has_the_uncertainty_of_an_unknown_yaw(tmp_path: Path, flag: NodeFlag) -> None:
+    seen = station_of(tmp_path, survey(1, 90.0, flag))
+    assert seen is not None
+    assert seen["sigma_azimuth_deg"] >= math.degrees(math.sqrt(UNKNOWN_YAW_VAR)) - 1e-6
+    assert seen["sigma_yaw_deg"] >= math.degrees(math.sqrt(UNKNOWN_YAW_VAR)) - 1e-6
+    assert seen["untrusted_measurements"] == seen["measurements"] == 1
+
+
+def test_a_trusted_survey_that_comes_later_takes_the_station_over(tmp_path: Path) -> None:
+    late = station_of(tmp_path, survey(2, 90.0, NodeFlag.YAW_UNTRUSTED), survey(1))
+    alone = station_of(tmp_path, survey(1))
+    assert late is not None
+    assert alone is not None
+    assert late["azimuth_deg"] % 360.0 == pytest.approx(alone["azimuth_deg"] % 360.0, abs=1e-9)
+
+
+def test_a_survey_of_a_faulty_sensor_is_set_aside(tmp_path: Path) -> None:
+    model = RigModel(GroundConfig(folder=tmp_path))
+    assert model.on_survey(survey(1, flags=NodeFlag.SENSOR_FAULT), MD) == "survey_set_aside"
+    assert model.stations == []
+    assert views.status(model, {})["set_aside_measurements"] == 1
+
+
+def test_a_survey_without_rig_time_has_no_depth(tmp_path: Path) -> None:
+    model = RigModel(GroundConfig(folder=tmp_path))
+    assert model.on_survey(survey(1, flags=NodeFlag.CLOCK_UNSYNCHRONISED), MD) == "survey_unplaced"
+    assert views.status(model, {})["unplaced_measurements"] == 1
+
+
+@pytest.mark.parametrize("flag", [flag for flag, effect in EFFECTS.items() if effect is Trust.FULL])
+def test_a_flag_that_the_variance_answers_for_changes_nothing(tmp_path: Path, flag: NodeFlag) -> None:
+    assert station_of(tmp_path, survey(1, flags=flag)) == station_of(tmp_path, survey(1))
+
+
+def test_a_restored_yaw_counts_once_an_aiding_has_confirmed_it() -> None:
+    assert trust_of(NodeFlag.RESTORED) is Trust.FULL
+    assert trust_of(NodeFlag.RESTORED | NodeFlag.AIDING_OLD) is Trust.UNKNOWN_YAW
+
+
+@given(st.integers(0, 0xFFFF), st.integers(0, 0xFFFF))
+def test_a_further_flag_never_gains_trust(one: int, other: int) -> None:
+    assert trust_of(NodeFlag(one | other)) >= max(trust_of(NodeFlag(one)), trust_of(NodeFlag(other)))
+
+
+@given(st.floats(0.0, 360.0), st.floats(0.01, 60.0))
+@settings(suppress_health_check=[HealthCheck.function_scoped_fixture])
+def test_whatever_the_yaw_is_the_truth_is_within_the_uncertainty(yaw_error_deg: float, inclination_deg: float) -> None:
+    force = np.array([G * math.sin(inclination_deg * DEG), 0.0, -G * math.cos(inclination_deg * DEG)])
+    true = resolve(force, np.array(COV), 0.0, 1e-8).direction
+    seen = with_unknown_yaw(resolve(force, np.array(COV), yaw_error_deg * DEG, 1e-8)).direction
+    off = seen.lean - true.lean
+    assert math.sqrt(off @ np.linalg.solve(seen.total_cov, off)) < 3.0
+    assert angles(seen.lean, seen.down)[0] == pytest.approx(inclination_deg * DEG, abs=1e-9)
+
+
+def test_an_unknown_flag_of_a_later_version_sets_aside(tmp_path: Path) -> None:
+    assert station_of(tmp_path, replace(survey(1), flags=NodeFlag(1 << 15))) is None

@@ -1,0 +1,85 @@
+"""Who starts processes takes them along; a frozen one is ended and told; a rig has one ground station."""
+
+import os
+import signal
+import subprocess
+from pathlib import Path
+from typing import Any
+
+import pytest
+from rigs import REPOSITORY, command, ends, free_endpoint, running_rig, titles_of_group
+
+from groundstation.errors import LeaseError
+from groundstation.gateway.lease import take_lease
+from sim.errors import RigError
+from sim.rig.launcher import Tick, Watchdog
+from sim.rig.processes import RESTART_LIMIT, ProcessTable
+from telemetry.media.zenoh_bus import open_client, open_router
+
+pytestmark = pytest.mark.process
+
+
+def test_a_launcher_that_is_killed_leaves_nothing_behind(tmp_path: Path) -> None:
+    expected = {"borechain medium", "borechain encoder", "borechain ground", "borechain node 1"}
+    with running_rig(tmp_path, "--speed", "20") as rig:
+        rig.until(lambda: expected <= set(titles_of_group(rig.process.pid).values()))
+        os.kill(rig.process.pid, signal.SIGKILL)
+        rig.process.wait()
+        assert ends(rig.process.pid)
+
+
+def test_a_node_that_is_frozen_is_ended_started_again_and_told(tmp_path: Path, ask: Any) -> None:
+    with running_rig(tmp_path, "--speed", "20") as rig:
+        rig.until(lambda: (ask(rig, "borechain/*/ground/status") or {}).get("measurements"))
+        os.kill(rig.pid_of("borechain node 1"), signal.SIGSTOP)
+        result = rig.result()
+    assert result["restarts"] >= 1
+    assert result["measurements"] == 6
+
+
+def test_a_second_ground_station_is_refused_by_name(tmp_path: Path) -> None:
+    endpoint = free_endpoint()
+    with open_router(endpoint), open_client(endpoint, timeout=20.0) as first:
+        take_lease(first, "rig-1")
+        words = command("ground", "--clock", "own", "--endpoint", endpoint, "--folder", str(tmp_path / "second"))
+        second = subprocess.run(words, cwd=REPOSITORY, capture_output=True, text=True, check=False, timeout=120.0)
+        assert second.returncode == 1
+        assert f"rig rig-1: process {os.getpid()} on " in second.stderr
+        assert len(second.stderr.strip().splitlines()) == 1
+        with open_client(endpoint, timeout=20.0) as other:
+            take_lease(other, "rig-2")
+
+
+def test_a_lease_ends_with_its_holder(monkeypatch: pytest.MonkeyPatch) -> None:
+    endpoint = free_endpoint()
+    with open_router(endpoint), open_client(endpoint, timeout=20.0) as second:
+        with open_client(endpoint, timeout=20.0) as first:
+            take_lease(first, "rig-1")
+            with monkeypatch.context() as hasty:
+                hasty.setattr("groundstation.gateway.lease.PATIENCE", 0.0)
+                with pytest.raises(LeaseError, match="rig rig-1"):
+                    take_lease(second, "rig-1")
+        take_lease(second, "rig-1")
+
+
+def test_a_rig_whose_time_stands_still_is_ended_with_what_it_waits_for() -> None:
+    watchdog = Watchdog(0.0)
+    watchdog.on_tick(Tick("drill tube 2", 1012.5, 1000.0, 2000.0, ("encoder", "base", "2"), (), False, ""))
+    with pytest.raises(RigError, match=r"stands at 1012.5 s \(drill tube 2\).* processes 2$"):
+        watchdog.check(["encoder", "base"])
+    patient = Watchdog(1e6)
+    patient.check([])
+
+
+def test_deaths_count_within_a_time_and_not_for_life(monkeypatch: pytest.MonkeyPatch) -> None:
+    now = 0.0
+    monkeypatch.setattr("sim.rig.processes.time.monotonic", lambda: now)
+    table = ProcessTable({}, [])
+    for _ in range(4 * RESTART_LIMIT):
+        now += 300.0
+        table._count_death("3", "ended with status 1")
+    assert table.failures == []
+    assert table.restarts["3"] == 4 * RESTART_LIMIT
+    for _ in range(RESTART_LIMIT + 1):
+        table._count_death("3", "ended with status 1")
+    assert "process 3" in table.failures[0]
