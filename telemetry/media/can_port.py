@@ -26,7 +26,7 @@ from telemetry.media.port import Frame
 from telemetry.media.queued_port import QueuedPort
 
 TICK = 0.05  # s, that the thread waits for a frame before it looks at the time
-ROOM_LIMIT = 0.02  # s, that a frame which must not be lost waits for room while the other end takes frames
+BUSY_LIMIT = 512  # frames that may wait while the other end takes them; fewer wait for one that is absent
 FIRST_PAUSE, LAST_PAUSE = 0.1, 5.0  # s, before a bus is opened again
 UNHEARD_LIMIT = 64  # payloads kept until ``listen``
 OpenBus = Callable[[], can.BusABC]
@@ -71,8 +71,8 @@ class CanPort(QueuedPort):
         nonce = random.getrandbits(32)
         begun = time.monotonic()
         self._exchange = CanExchange(address, largest, self._queue, nonce, begun, profile, rates, is_stepped=is_stepped)
-        self._log = log
-        self._room = threading.Condition()
+        self._log, self._limit = log, limit
+        self._lock = threading.RLock()
         self._deliver: Callable[[bytes], object] | None = None
         self._unheard: deque[bytes] = deque(maxlen=UNHEARD_LIMIT)
         self._pause, self._reopen_at = FIRST_PAUSE, math.inf
@@ -86,30 +86,29 @@ class CanPort(QueuedPort):
 
     def send(self, frame: Frame) -> bool:
         """Send a frame now, or as soon as the other end is there."""
-        with self._room:
+        with self._lock:
             self._check_open()
-            if frame.topic is None and self._exchange.is_up:
-                self._room.wait_for(self._has_room, ROOM_LIMIT)
+            self._queue.limit = max(BUSY_LIMIT, self._limit) if self._exchange.is_up else self._limit
             accepted = self._queue.offer(frame)
             self._pump()
         return accepted
 
     def flush(self) -> None:
         """Send what waits, if the other end is there."""
-        with self._room:
+        with self._lock:
             self._check_open()
             self._pump()
 
     def listen(self, deliver: Callable[[bytes], object]) -> None:
         """Call ``deliver``, which only puts into a queue, on the port's thread for every frame that arrives."""
-        with self._room:
+        with self._lock:
             while self._unheard:
                 deliver(self._unheard.popleft())
             self._deliver = deliver
 
     def close(self) -> None:
         """Let the end go."""
-        with self._room:
+        with self._lock:
             if self._closed:
                 return
             self._closed = True
@@ -120,11 +119,8 @@ class CanPort(QueuedPort):
             self._log.close()
 
     def _is_heard(self) -> bool:
-        with self._room:
+        with self._lock:
             return self._exchange.is_up
-
-    def _has_room(self) -> bool:
-        return len(self._queue) < self._queue.limit or not self._exchange.is_up
 
     def _run(self) -> None:
         while not self._closed:
@@ -137,7 +133,7 @@ class CanPort(QueuedPort):
             except (can.CanError, OSError, ValueError):
                 self._lose_bus("bus_lost")
                 continue
-            with self._room:
+            with self._lock:
                 self._on_message(message)
                 self._pump()
 
@@ -176,7 +172,6 @@ class CanPort(QueuedPort):
             if not self._exchange.is_up:
                 self._queue.forget_outdated()
             return
-        self._room.notify_all()
         message = can.Message(
             arbitration_id=frame.identifier,
             data=frame.data,
@@ -209,7 +204,7 @@ class CanPort(QueuedPort):
             self._reopen_at = time.monotonic() + self._pause
             self._pause = min(2.0 * self._pause, LAST_PAUSE)
             return
-        with self._room:
+        with self._lock:
             self._bus = bus
             self._pump()
 
