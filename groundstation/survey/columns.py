@@ -76,8 +76,8 @@ def tolerance(name: str) -> Tolerance:
                 break
         else:
             raise SurveyError(
-                f"tolerance: expected one of {', '.join(PRESETS)}, or a sum like '50 mm + 1:200', '75 mm at 20 m', "
-                f"'1.5 %' or '0.3 deg', got {name!r}"
+                "tolerance, by its name or as a sum like '50 mm + 1:200', '75 mm at 20 m', '1.5 %' or '0.3 deg': "
+                f"expected one of {', '.join(PRESETS)}, got {name!r}"
             )
     return Tolerance(name, start, growth)
 

@@ -53,6 +53,27 @@ def test_an_unknown_tolerance_is_refused_and_told_the_known_ones() -> None:
         tolerance("en-1")
 
 
+@pytest.mark.parametrize(
+    ("text", "start", "growth"),
+    [
+        ("1:200", 0.0, 0.005),
+        ("50 mm + 1:200", 0.05, 0.005),
+        ("75 mm at 20 m", 0.0, 0.075 / 20.0),
+        ("5 cm+1.5 %", 0.05, 0.015),
+        ("0.3 deg", 0.0, math.tan(math.radians(0.3))),
+    ],
+)
+def test_a_tolerance_of_a_project_is_a_sum_of_parts(text: str, start: float, growth: float) -> None:
+    found = tolerance(text)
+    assert (found.start, found.growth) == pytest.approx((start, growth))
+
+
+@pytest.mark.parametrize("text", ["1:0", "-5 cm", "50", "50 mm +", "", "0 deg"])
+def test_a_tolerance_that_nothing_meets_or_that_has_no_unit_is_refused(text: str) -> None:
+    with pytest.raises(SurveyError, match="tolerance"):
+        tolerance(text)
+
+
 def test_the_deviation_of_a_vertical_column_is_north_and_east() -> None:
     found = deviation(point_at([0.03, -0.04, 10.0]), Design())
     np.testing.assert_allclose(found.offset, [0.03, -0.04], atol=1e-15)

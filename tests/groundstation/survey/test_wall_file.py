@@ -203,7 +203,7 @@ def test_a_remedial_column_stands_in_for_one_that_is_not_there(tmp_path: Path) -
         ("column,north_m,east_m,state\nC1,0,0,planned\nC2,0,0.7,\n", holes(2), "", "C1: stated as planned, yet it has"),
         ("column,north_m,east_m,drilled_to_m\nC1,0,0,5\nC2,0,0.7,\n", holes(2), "", "drilled to 5 m, yet surveyed"),
         ("column,north_m,east_m,between\nC1,0,0,\nC2,0,0.7,\nR,0,1,C1/C9\n", holes(2), "", "C9 is not among the heads"),
-        ("column,north_m,east_m,tolerance\nC1,0,0,1:x\nC2,0,0.7,\n", holes(2), "", "column C1: tolerance: expected"),
+        ("column,north_m,east_m,tolerance\nC1,0,0,1:x\nC2,0,0.7,\n", holes(2), "", "line 2: column C1: tolerance, by"),
         (row_of(2), "", "", "length_m is missing; no column was surveyed"),
         (row_of(2), holes(2), "allowed_probability = 0.9", "allowed_probability: expected at most 0.5"),
         (row_of(2), holes(2), "[[layer]]\nradius_m = 0.5", "layer 1: from_m is missing"),
