@@ -7,15 +7,17 @@ Source: JCGM 100:2008 (GUM), annex G.3.
 from __future__ import annotations
 
 import math
+from functools import cache
 from statistics import NormalDist
 
 import numpy as np
 
 COVERAGE = 0.95  # of an expanded uncertainty
-NODES = 64
+NODES, WEIGHTS = np.polynomial.legendre.leggauss(64)
 LARGEST = 1e6  # standard errors
 
 
+@cache
 def coverage_factor(degrees: int | None, coverage: float = COVERAGE) -> float:
     """Half width of a two-sided interval in standard errors: Student's t, or normal where ``degrees`` is None.
 
@@ -36,7 +38,6 @@ def coverage_factor(degrees: int | None, coverage: float = COVERAGE) -> float:
 def within(t: float, degrees: int) -> float:
     """P(|T| < t) of Student's distribution: with tan(a) = T / sqrt(n) its density is that of cos(a)^(n - 1)."""
     edge = math.atan(t / math.sqrt(degrees))
-    nodes, weights = np.polynomial.legendre.leggauss(NODES)
-    angle = 0.5 * edge * (nodes + 1.0)
+    angle = 0.5 * edge * (NODES + 1.0)
     scale = math.exp(math.lgamma(0.5 * (degrees + 1)) - math.lgamma(0.5 * degrees)) / math.sqrt(math.pi)
-    return float(edge * scale * np.sum(weights * np.cos(angle) ** (degrees - 1)))
+    return float(edge * scale * np.sum(WEIGHTS * np.cos(angle) ** (degrees - 1)))

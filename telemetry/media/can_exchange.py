@@ -12,7 +12,7 @@ import math
 from collections import Counter, deque
 from typing import NamedTuple
 
-from telemetry.errors import DecodeError
+from telemetry.errors import TelemetryError
 from telemetry.media.can_identifier import FLOW_CONTROL, PART_MASK, PRESENCE, PRIORITIES, TUNNEL, Identifier
 from telemetry.media.can_profile import Profile, Split
 from telemetry.media.can_timing import CLASSIC_LARGEST, BitRates
@@ -282,7 +282,7 @@ class CanExchange:
             return None
         try:
             return self.profile.join(identifier.source, identifier.type, identifier.part, data)
-        except DecodeError as error:
+        except TelemetryError as error:  # of a message that is none, or that nobody could have written
             self.counters[f"refused: {error}" if " " in str(error) else str(error)] += 1
         return None
 
