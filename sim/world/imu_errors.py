@@ -96,7 +96,8 @@ class ImuErrors:
     def force_bias(self, random: np.random.Generator) -> Array:
         """Of the accelerometer (3,), m/s^2."""
         a = self.accelerometer
-        return np.asarray(a.bias_std_deg * math.radians(1.0) * a.gravity_mps2 * random.standard_normal(3))
+        tilt = math.radians(1.0) * a.gravity_mps2
+        return np.asarray(a.bias_std_deg * tilt * random.standard_normal(3))
 
     def readings(self, random: np.random.Generator, rate: Array, force: Array, turning: Array, period: float) -> Array:
         """Both, one after the other from one stream, (n, 6)."""

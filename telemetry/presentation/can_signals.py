@@ -30,9 +30,13 @@ AGE_BITS = 24
 ON_STEP = 0.05  # of a step, by which a value that was rounded before may miss it; times have 14 digits before theirs
 FD_PART = 31  # part of a message that is whole in one frame
 NARROWER = {
-    "cycles": 2**32 - 1,
-    "overruns": 2**16 - 1,
-    "gyro_bias": 1.0,
+    "cycles": 2**22 - 1,  # 25 days
+    "overruns": 2**8 - 1,
+    "gyro_bias": 0.125,
+    "innovation": 0.75,
+    "parameters_version": 2**12 - 1,
+    "epoch": 2**16 - 1,
+    "numbered": 2**28 - 1,
 }  # upper ends; beyond them the tunnel carries it
 RADIO_ALONE = ("upper_margin", "lower_margin")  # of a node state: no signals, since a wired joint has no radio
 CYCLIC = (Kind.AIDING, Kind.HELLO, Kind.TIME_REQUEST, Kind.TIME_REPLY, Kind.NODE_STATE)

@@ -17,7 +17,7 @@ from node.firmware.inputs import RigContext
 from node.firmware.settings import TubeSettings
 from node.kernels.layout import DEG, PERIOD
 from node.process.tube_process import TubeProcess
-from telemetry.messages import ImuMean, Mode, NodeFlag, SurveyMeasurement
+from telemetry.messages import ImuMean, Mode, NodeFlag, Stand, SurveyMeasurement
 
 G = 9.81
 PITCH = 0.6 * DEG
@@ -95,8 +95,7 @@ def test_two_imus_of_a_process_arrive_as_two_means(tmp_path: Path) -> None:
 
 def test_the_ground_station_weighs_all_imus_of_a_survey() -> None:
     model = RigModel(GroundConfig(folder=Path(), tube_length=2.0))
-    for at in (999.0, 1001.0):
-        model.depths.append_reading(at, 2.0)
+    assert model.depths.add_stand(Stand(model.epoch, 999.0, 1001.0, 2.0))
     lean, variances = 2.0 * DEG, (1e-8, 3e-8)
     imus = tuple(
         ImuMean((G * math.sin(angle), 0.0, -G * math.cos(angle)), ((v, 0.0, 0.0), (0.0, v, 0.0), (0.0, 0.0, v)))

@@ -84,7 +84,6 @@ def test_the_envelope_tells_the_route_without_the_body(message: Any) -> None:
 @given(MESSAGES[Aiding])
 def test_aiding_is_said_in_the_earliest_version_that_can(aiding: Aiding) -> None:
     aiding = dataclasses.replace(aiding, epoch=0)
-    aiding = dataclasses.replace(aiding, epoch=0)
     twisted = bool(aiding.torque or aiding.torsion_var or aiding.under_torque)
     rows = msgpack.unpackb(encode(aiding))
     assert rows["v"] == (2 if twisted else 1)
@@ -93,7 +92,7 @@ def test_aiding_is_said_in_the_earliest_version_that_can(aiding: Aiding) -> None
 
 @given(MESSAGES[Aiding])
 def test_aiding_of_an_old_node_is_read_as_that_of_a_rigid_string(aiding: Aiding) -> None:
-    rigid = dataclasses.replace(aiding, torque=0.0, torsion_var=0.0, under_torque=False)
+    rigid = dataclasses.replace(aiding, torque=0.0, torsion_var=0.0, under_torque=False, epoch=0)
     rows = msgpack.unpackb(encode(rigid))
     rows["b"] |= {"q": 5.0, "tv": 1.0, "u": True}  # keys that version 1 does not know
     assert decode(msgpack.packb(rows)) == rigid
