@@ -161,7 +161,7 @@ JOBS = [  # words, the extra that the job needs or None, status and a word of it
     (("survey", RECORD, "--json"), None, 0, "stations"),
     (("survey", RECORD), "ground", 0, "closure"),
     (("survey", RECORD, "--json", "--plot", "survey.svg"), "ground", 0, "stations"),
-    (("wall", str(ROOT / "scenarios" / "walls" / "wall-40.toml"), "--json"), "ground", 0, "joints"),
+    (("wall", str(ROOT / "scenarios" / "walls" / "wall-40.toml"), "--json"), "ground", 3, "joints"),
     (("calibrate", "turntable", TURN_TABLE, "--reference", "720", "--json"), None, 0, "matrix"),
     (
         ("calibrate", "turntable", TURN_TABLE, "--reference", "720", "--json", "--certificate", "a.pdf"),
