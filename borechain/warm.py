@@ -10,8 +10,10 @@ import node.process.host
 import sim.rig.bus_stepper
 import sim.rig.scheduler
 import sim.world.world
+from node.kernels.jit import leave_blas_out
 from node.kernels.warm import warm_encoder, warm_up
 
+leave_blas_out()
 warm_up()
 warm_encoder()
 # a collection in a child writes into every object that it looks at: 45 MB of shared pages would become its own

@@ -74,6 +74,22 @@ if not os.environ.get("NUMBA_CACHE_DIR"):
     use_cache()
 
 
+def leave_blas_out() -> None:
+    """Have numba load without a BLAS: for a process of ours, whose kernels multiply by themselves.
+
+    Numba imports ``scipy.linalg`` as it compiles or loads its first function, a quarter of a second of every start, and
+    holds that none is there where the import fails. Not for an interpreter that runs somebody else's code too.
+    """
+    name = "scipy.linalg"
+    if name in sys.modules:
+        return
+    sys.modules[name] = cast("Any", None)  # so an import of it fails
+    try:
+        import numba.np.arraymath  # noqa: F401  numba looks for the BLAS once, as it imports this
+    finally:
+        del sys.modules[name]
+
+
 def kernel(function: Function) -> Function:
     """Compile ``function`` on its first call or load it from the cache."""
     return cast("Function", njit(**OPTIONS)(function))

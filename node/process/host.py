@@ -6,6 +6,7 @@ from collections.abc import Sequence
 
 from node.firmware.settings import TubeSettings
 from node.firmware.torque import TorqueSettings
+from node.kernels.jit import leave_blas_out
 from node.kernels.layout import PERIOD
 from node.process.drivers.source import EncoderSource, ImuSource
 from node.process.encoder_process import EncoderProcess
@@ -20,6 +21,7 @@ def run_node(
     place: Place, settings: TubeSettings, imus: Sequence[ImuSource] = (), own_time: OwnTime | None = None
 ) -> None:
     """Node of one tube until a signal comes; ``imus`` are its own sensors."""
+    leave_blas_out()
     key = read_key(place.key_file) if place.key_file is not None else None
 
     def build(timing: CycleTiming | None = None) -> TubeProcess:
@@ -43,6 +45,7 @@ def run_encoder(
 
     ``reach`` is of its radio, in tubes.
     """
+    leave_blas_out()
 
     def build(timing: CycleTiming | None = None) -> EncoderProcess:
         return EncoderProcess(place.folder, source, torque, timing, reach)

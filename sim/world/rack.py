@@ -9,13 +9,16 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
 import numpy.typing as npt
-from scipy.spatial.transform import Rotation
 
 from sim.world.scenario import CalibrationSection
 from sim.world.truth import GAUSS_W, GAUSS_X
+
+if TYPE_CHECKING:
+    from scipy.spatial.transform import Rotation
 
 Array = npt.NDArray[np.float64]
 ANNOUNCE = 4.0  # s after the tubes came to rest, when the operator tells the attitude
@@ -62,6 +65,8 @@ class Rack:
 
     def truth(self, random: np.random.Generator, mount: float, gravity: float) -> RackTruth:
         """Perfect sensor of one tube, its IMU turned by ``mount`` (rad) about the axis against the tube's marks."""
+        from scipy.spatial.transform import Rotation  # two thirds of a second that only a scenario with a rack pays
+
         presets = np.radians(np.array(self.section.attitudes_deg))
         error = math.radians(self.section.attitude_std_deg) * random.standard_normal((len(presets), 3))
         # pitch counts up where gravity moves to +x, against the right-hand rule about y
@@ -90,6 +95,8 @@ class RackTruth:
 
     def attitude(self, t: Array) -> Rotation:
         """ned_from_body at rig times (n,)."""
+        from scipy.spatial.transform import Rotation
+
         place = np.clip(np.searchsorted(self._arrivals, t, side="right") - 1, 0, len(self._arrivals) - 1)
         leg = np.minimum(place, len(self._turns) - 1)
         share = np.take_along_axis(self._shares(t), leg[:, np.newaxis], axis=1)

@@ -87,17 +87,8 @@ class CanPort(QueuedPort):
     def send(self, frame: Frame) -> bool:
         """Send a frame now, or as soon as the other end is there."""
         with self._lock:
-            self._check_open()
             self._queue.limit = max(BUSY_LIMIT, self._limit) if self._exchange.is_up else self._limit
-            accepted = self._queue.offer(frame)
-            self._pump()
-        return accepted
-
-    def flush(self) -> None:
-        """Send what waits, if the other end is there."""
-        with self._lock:
-            self._check_open()
-            self._pump()
+            return super().send(frame)
 
     def listen(self, deliver: Callable[[bytes], object]) -> None:
         """Call ``deliver``, which only puts into a queue, on the port's thread for every frame that arrives."""
@@ -121,6 +112,10 @@ class CanPort(QueuedPort):
     def _is_heard(self) -> bool:
         with self._lock:
             return self._exchange.is_up
+
+    def _drain(self) -> None:
+        with self._lock:
+            self._pump()
 
     def _run(self) -> None:
         while not self._closed:

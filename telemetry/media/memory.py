@@ -59,6 +59,9 @@ class MemoryPort(QueuedPort):
         other = self.other
         return other is not None and other._deliver is not None and not (self.is_open or other.is_open)
 
+    def _drain(self) -> None:
+        self._queue.drain(self._is_heard, self._transmit)
+
     def _transmit(self, payload: bytes) -> None:
         if self.other is None or self._random.random() < self.loss:
             return

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from abc import ABC, abstractmethod
 from collections import Counter
 
 from telemetry.errors import MediumError
@@ -9,8 +10,8 @@ from telemetry.media.port import MAX_FRAME, Frame
 from telemetry.media.send_queue import SEND_LIMIT, SendQueue
 
 
-class QueuedPort:
-    """Base of a port, see ``port.Port``; a subclass says whether it is heard and puts a payload on its bus.
+class QueuedPort(ABC):
+    """Base of a port, see ``port.Port``; a subclass says whether it is heard and puts what waits on its bus.
 
     Parameters
     ----------
@@ -53,14 +54,16 @@ class QueuedPort:
     def flush(self) -> None:
         """Send what waits, if the other end is there."""
         self._check_open()
-        self._queue.drain(self._is_heard, self._transmit)
+        self._drain()
 
     def _check_open(self) -> None:
         if self._closed:
             raise MediumError(f"port {self._name}: it is closed")
 
+    @abstractmethod
     def _is_heard(self) -> bool:
-        raise NotImplementedError
+        """Whether somebody listens at the other end of an open port."""
 
-    def _transmit(self, payload: bytes) -> None:
-        raise NotImplementedError
+    @abstractmethod
+    def _drain(self) -> None:
+        """Put on the bus what the queue holds, if the other end is there."""

@@ -39,8 +39,8 @@ class ZenohPort(QueuedPort):
     def _is_heard(self) -> bool:
         return self._publisher.is_heard
 
-    def _transmit(self, payload: bytes) -> None:
-        self._publisher.put(payload)
+    def _drain(self) -> None:
+        self._queue.drain(self._is_heard, self._publisher.put)
 
 
 class ZenohMedium:

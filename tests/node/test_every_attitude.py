@@ -1,6 +1,5 @@
 """The whole cycle of a tube at every inclination and rotation: no number that is none, no jump, no variance below 0."""
 
-import itertools
 import math
 
 import numpy as np
@@ -22,28 +21,30 @@ G = 9.81
 INVERTED = 170.0 * DEG  # beyond, a cycle does not resolve the yaw: it is that of the aiding
 
 
-def attitude(inclination: float, azimuth: float, yaw: float) -> np.ndarray:
-    """R_ned_from_body: down turned by the inclination towards the azimuth, then the yaw about the axis."""
-    c, s = math.cos(inclination), math.sin(inclination)
+def attitudes(inclination: np.ndarray, azimuth: float, yaw: np.ndarray) -> np.ndarray:
+    """R_ned_from_body (n, 3, 3): down turned by the inclination towards the azimuth, then the yaw about the axis."""
+    c, s = np.cos(inclination)[:, None, None], np.sin(inclination)[:, None, None]
     kx, ky = -math.sin(azimuth), math.cos(azimuth)
     skew = np.array([[0.0, 0.0, ky], [0.0, 0.0, -kx], [-ky, kx, 0.0]])
-    lean = np.eye(3) + s * skew + (1.0 - c) * skew @ skew
-    turn = np.array([[math.cos(yaw), -math.sin(yaw), 0.0], [math.sin(yaw), math.cos(yaw), 0.0], [0.0, 0.0, 1.0]])
-    return lean @ turn
+    lean = np.eye(3) + s * skew + (1.0 - c) * (skew @ skew)
+    turn = np.zeros((len(yaw), 3, 3))
+    turn[:, 0, 0] = turn[:, 1, 1] = np.cos(yaw)
+    turn[:, 1, 0] = np.sin(yaw)
+    turn[:, 0, 1] = -turn[:, 1, 0]
+    turn[:, 2, 2] = 1.0
+    return np.asarray(lean @ turn)
 
 
 def reading(begin: tuple[float, float], end: tuple[float, float], azimuth: float) -> tuple[np.ndarray, np.ndarray]:
     """Mean rate and force of an IMU between two (inclination, yaw), from attitudes alone."""
-    attitudes = [
-        attitude(begin[0] + (end[0] - begin[0]) * k / SUBSTEPS, azimuth, begin[1] + (end[1] - begin[1]) * k / SUBSTEPS)
-        for k in range(SUBSTEPS + 1)
-    ]
-    rate, force = np.zeros(3), np.zeros(3)
-    for a, b in itertools.pairwise(attitudes):
-        step = a.T @ b
-        turned = 0.5 * np.array([step[2, 1] - step[1, 2], step[0, 2] - step[2, 0], step[1, 0] - step[0, 1]])
-        rate += turned * (math.asin(min(np.linalg.norm(turned), 1.0)) / max(float(np.linalg.norm(turned)), 1e-300))
-        force -= 0.5 * (a + b).T @ np.array([0.0, 0.0, G]) / SUBSTEPS
+    share = np.arange(SUBSTEPS + 1) / SUBSTEPS
+    held = attitudes(begin[0] + (end[0] - begin[0]) * share, azimuth, begin[1] + (end[1] - begin[1]) * share)
+    steps = held[:-1].transpose(0, 2, 1) @ held[1:]
+    skewed = 0.5 * (steps - steps.transpose(0, 2, 1))
+    turned = np.stack([skewed[:, 2, 1], skewed[:, 0, 2], skewed[:, 1, 0]], axis=1)
+    sine = np.linalg.norm(turned, axis=1)
+    rate = (np.arcsin(np.minimum(sine, 1.0)) / np.maximum(sine, 1e-300)) @ turned
+    force = -0.5 * G * (held[:-1] + held[1:])[:, 2].mean(axis=0)
     return rate / PERIOD, force
 
 
@@ -141,7 +142,7 @@ def test_every_inclination_and_rotation_is_stood_at() -> None:
                 walk.cycle(float(inclination), float(yaw))
             assert walk.jump < 0.01 * DEG
             assert walk.error() < 0.01 * DEG
-            down = attitude(float(inclination), 0.7, float(yaw)).T @ np.array([0.0, 0.0, 1.0])
+            down = attitudes(np.array([inclination]), 0.7, np.array([yaw]))[0, 2]
             np.testing.assert_allclose(walk.tube.state["now_down"], down, atol=1e-4)
 
 

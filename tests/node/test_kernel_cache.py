@@ -48,3 +48,11 @@ def test_a_temporary_folder_that_others_can_write_is_not_trusted(tmp_path: Path,
     offered = Path(start(tmp_path / "file", tmp_path).stdout.strip())
     offered.chmod(mode)
     assert Path(start(tmp_path / "file", tmp_path).stdout.strip()) != offered
+
+
+@pytest.mark.slow
+def test_processes_of_a_rig_load_no_linear_algebra() -> None:
+    program = "import borechain.warm, sys; print([name for name in sys.modules if name.count('.') and 'scipy' in name])"
+    done = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, check=True, timeout=250)
+    assert "linalg" not in done.stdout
+    assert "spatial" not in done.stdout
