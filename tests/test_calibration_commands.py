@@ -3,12 +3,11 @@
 import json
 import math
 import re
-import subprocess
-import sys
 from pathlib import Path
 
 import numpy as np
 import pytest
+from forked_commands import run
 
 pytestmark = pytest.mark.slow
 
@@ -19,17 +18,6 @@ VN100_ACCEL = DATA / "calibration_vn100_accel.csv"
 OVEN, ROOM, CONTROL = (BENCH / f"mwd-{name}.csv" for name in ("oven", "room", "control"))
 TRUTH = json.loads((BENCH / "truth.json").read_text())
 RATE = 65.0
-
-
-def run(*words: object) -> subprocess.CompletedProcess[str]:
-    return subprocess.run(
-        [sys.executable, "-m", "borechain", *map(str, words)],
-        capture_output=True,
-        text=True,
-        check=False,
-        timeout=120,
-        cwd=ROOT,
-    )
 
 
 def answer(*words: object) -> dict:

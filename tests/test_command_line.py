@@ -6,14 +6,9 @@ import sys
 from pathlib import Path
 
 import pytest
+from forked_commands import run
 
 from borechain.__main__ import COMMANDS
-
-
-def run(*words: str) -> subprocess.CompletedProcess[str]:
-    return subprocess.run(
-        [sys.executable, "-m", "borechain", *words], capture_output=True, text=True, check=False, timeout=60
-    )
 
 
 @pytest.mark.slow

@@ -7,15 +7,11 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from forked_commands import run
 
 ROOT = Path(__file__).parents[1]
 POTSDAM = ROOT / "scenarios" / "wellbore-1-path.csv"
 WALL = ROOT / "scenarios" / "walls" / "wall-40.toml"
-
-
-def run(*words: object) -> subprocess.CompletedProcess[str]:
-    command = [sys.executable, "-m", "borechain", *map(str, words)]
-    return subprocess.run(command, capture_output=True, text=True, check=False, timeout=120)
 
 
 def answer(*words: object, status: int = 0) -> dict:
