@@ -71,7 +71,7 @@ class Environment:
         return subprocess.run(
             [self.python, *program, *words],
             cwd=self.folder,
-            env=surroundings(self.folder),
+            env=surroundings(),
             capture_output=True,
             text=True,
             check=False,
@@ -83,10 +83,9 @@ class Environment:
         return next((self.python.parents[1] / "lib").glob("python*/site-packages"))
 
 
-def surroundings(folder: Path) -> dict[str, str]:
-    """Variables of a process that must not find the checkout; its kernels are compiled into ``folder``."""
-    kept = {name: value for name, value in os.environ.items() if not name.startswith(("PYTHON", "NUMBA", "COVERAGE"))}
-    return kept | {"XDG_CACHE_HOME": str(folder / "cache")}
+def surroundings() -> dict[str, str]:
+    """Variables of a process that must not find the checkout; compiled kernels are known by their sources alone."""
+    return {name: value for name, value in os.environ.items() if not name.startswith(("PYTHON", "COVERAGE"))}
 
 
 def pip(python: Path, *words: str | Path) -> subprocess.CompletedProcess[str]:
@@ -233,7 +232,7 @@ def test_a_board_runs_its_node_without_the_other_packages(board: Environment) ->
     with open_router(endpoint) as bus:
         bus.subscribe(port_key(DEFAULT_RIG, 1, Side.UPPER, "tx"), lambda _key, frame: frames.put(frame))
         command = [board.python, "-m", "node", "--tube", "1", *own]
-        with subprocess.Popen(command, cwd=board.folder, env=surroundings(board.folder)) as node:
+        with subprocess.Popen(command, cwd=board.folder, env=surroundings()) as node:
             assert frames.get(timeout=240)
             node.send_signal(signal.SIGTERM)
             assert node.wait(60) == 0

@@ -1,7 +1,8 @@
 """How kernels are compiled: once per version of their sources, then loaded from the cache.
 
-Numba stamps a cache entry with the file of the function alone, not with the files of the functions it calls, so an
-edited callee would go on running in its old form. The cache folder therefore carries a digest of all kernel sources.
+Numba knows a kept function by the place and the date of its file, and not by the functions it calls: a copy of the same
+sources would be compiled anew, and an edited callee would go on running in its old form. Ours are known by the digest
+of all kernel sources, wherever these lie: a checkout, its copy and the wheel made of it share what is compiled.
 
 Where that folder cannot be written, a temporary one is used and said so once; processes started from here inherit it.
 """
@@ -9,30 +10,39 @@ Where that folder cannot be written, a temporary one is used and said so once; p
 from __future__ import annotations
 
 import contextlib
+import functools
 import hashlib
 import os
 import stat
 import sys
 import tempfile
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any, Final, TypeVar, cast
 
 import numba
 import numpy as np
 from numba import config, njit
+from numba.core.caching import UserProvidedCacheLocator
 
 Function = TypeVar("Function", bound=Callable[..., Any])
 # nobody calls kernels through C pointers: without that wrapper each compiles faster
 OPTIONS: Final[dict[str, Any]] = {"cache": True, "error_model": "numpy", "no_cfunc_wrapper": True}
 
 
+@functools.cache
+def folder_digest(folder: Path) -> str:
+    """Digest of every source below ``folder``."""
+    digest = hashlib.sha256()
+    for source in sorted(folder.rglob("*.py")):
+        digest.update(str(source.relative_to(folder)).encode() + b"\0" + source.read_bytes())
+    return digest.hexdigest()
+
+
 def source_digest() -> str:
     """Digest of every kernel source of this package and of the compiler's version."""
-    digest = hashlib.sha256(numba.__version__.encode())
-    for source in sorted(Path(__file__).parent.rglob("*.py")):
-        digest.update(source.name.encode() + source.read_bytes())
-    return digest.hexdigest()[:16]
+    sources = numba.__version__ + folder_digest(Path(__file__).parent)
+    return hashlib.sha256(sources.encode()).hexdigest()[:16]
 
 
 def cache_folder() -> Path:
@@ -90,19 +100,56 @@ def leave_blas_out() -> None:
         del sys.modules[name]
 
 
+class SourceLocator(UserProvidedCacheLocator):
+    """Place of a kept function in the cache: by its module; kept as long as no source changes that it may be made of.
+
+    Those are the kernels of this package and the sources beside its own.
+    """
+
+    def __init__(self, function: Callable[..., Any], file: str) -> None:
+        super().__init__(function, file)  # type: ignore[no-untyped-call]
+        self._place = Path(vars(config)["CACHE_DIR"]) / function.__module__
+        self._stamp = source_digest() + folder_digest(Path(file).parent)
+
+    def get_cache_path(self) -> str:
+        """Folder of the functions of one module."""
+        return str(self._place)
+
+    def get_source_stamp(self) -> str:
+        """What a kept function was made of."""
+        return self._stamp
+
+
+@contextlib.contextmanager
+def known_by_its_sources() -> Iterator[None]:
+    """Have numba keep what is declared inside where ``SourceLocator`` says, and other people's where it did."""
+    before = vars(config)["CACHE_LOCATOR_CLASSES"]
+    vars(config)["CACHE_LOCATOR_CLASSES"] = f"{__name__}.{SourceLocator.__name__}"
+    try:
+        yield
+    finally:
+        vars(config)["CACHE_LOCATOR_CLASSES"] = before
+
+
+def compiled(function: Function, **options: Any) -> Function:
+    """Have ``function`` compiled with our options and these when it is first called."""
+    with known_by_its_sources():
+        return cast("Function", njit(**OPTIONS | options)(function))
+
+
 def kernel(function: Function) -> Function:
     """Compile ``function`` on its first call or load it from the cache."""
-    return cast("Function", njit(**OPTIONS)(function))
+    return compiled(function)
 
 
 def entry(function: Function) -> Function:
     """Compile ``function`` as a kernel that others may call by its address, and need not hold a copy of."""
-    return cast("Function", njit(**{**OPTIONS, "no_cfunc_wrapper": False})(function))
+    return compiled(function, no_cfunc_wrapper=False)
 
 
 def shared_body(function: Function) -> Function:
     """Write ``function`` into every kernel that calls it: kernels that it is given are known there and cost nothing."""
-    return cast("Function", njit(**OPTIONS, inline="always")(function))
+    return compiled(function, inline="always")
 
 
 def constant(value: int) -> int:

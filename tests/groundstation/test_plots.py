@@ -1,5 +1,6 @@
 """Figures: what is drawn, that it is drawn the same twice, and that a file is whole or not written."""
 
+import functools
 import re
 from collections.abc import Callable
 from dataclasses import replace
@@ -106,6 +107,7 @@ def coverage_of() -> Figure:
     return coverage_figure(claimed, observed, 500, "Coverage of the regions")
 
 
+@functools.cache
 def made_wall(
     count: int = 12, lean: float = 0.35, spread: float = 0.02, short: int | None = None
 ) -> tuple[Columns, Joints]:
@@ -151,7 +153,7 @@ def drawn(axes: Axes, gid: str) -> list:
 @pytest.mark.slow
 @pytest.mark.parametrize("name", BUILDERS)
 def test_a_figure_is_the_same_bytes_twice_and_has_no_date(name: str, bore: Survey, tmp_path: Path) -> None:
-    for suffix in (".png", ".svg"):
+    for suffix in (".png", ".svg") if name == "survey" else (".svg",):
         files = [tmp_path / f"{k}{suffix}" for k in range(2)]
         for file in files:
             style.save(BUILDERS[name](bore), file)

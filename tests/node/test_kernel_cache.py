@@ -7,6 +7,7 @@ from pathlib import Path
 
 import pytest
 
+ROOT = Path(__file__).parents[2]
 PROGRAM = (
     "import subprocess, sys; from numba import config; from node.kernels import jit; print(config.CACHE_DIR);"
     "subprocess.run([sys.executable, '-c', 'import node.kernels.jit'], check=True)"
@@ -48,6 +49,48 @@ def test_a_temporary_folder_that_others_can_write_is_not_trusted(tmp_path: Path,
     offered = Path(start(tmp_path / "file", tmp_path).stdout.strip())
     offered.chmod(mode)
     assert Path(start(tmp_path / "file", tmp_path).stdout.strip()) != offered
+
+
+def copied(folder: Path) -> Path:
+    """A copy of what a node is made of, written now."""
+    for package in ("node", "telemetry"):
+        for source in (ROOT / package).rglob("*.py"):
+            made = folder / source.relative_to(ROOT)
+            made.parent.mkdir(parents=True, exist_ok=True)
+            made.write_bytes(source.read_bytes())
+    return folder
+
+
+def digest_in(folder: Path) -> str:
+    program = "from node.kernels.jit import source_digest; print(source_digest())"
+    return subprocess.run(
+        [sys.executable, "-c", program], cwd=folder, capture_output=True, text=True, check=True
+    ).stdout
+
+
+@pytest.mark.slow
+def test_a_copy_of_the_sources_loads_what_was_compiled_of_them(tmp_path: Path) -> None:
+    from node.kernels.warm import warm_up
+
+    warm_up()
+    program = """
+import node, node.kernels.step as step
+from node.kernels.warm import warm_up
+warm_up()
+print(node.__file__)
+print([sum(function.stats.cache_misses.values()) for function in (step.node_step, step.node_aiding)])
+"""
+    run = [sys.executable, "-c", program]
+    done = subprocess.run(run, cwd=copied(tmp_path), capture_output=True, text=True, check=True, timeout=250)
+    assert done.stdout.splitlines() == [str(tmp_path / "node" / "__init__.py"), "[0, 0]"]
+
+
+def test_an_edited_kernel_is_another(tmp_path: Path) -> None:
+    digest = digest_in(copied(tmp_path))
+    assert digest == digest_in(ROOT)
+    with (tmp_path / "node" / "kernels" / "angles.py").open("a") as kernel:
+        kernel.write("# edited\n")
+    assert digest_in(tmp_path) != digest
 
 
 @pytest.mark.slow
