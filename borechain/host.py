@@ -44,7 +44,8 @@ def run_medium(
         session = open_router(place.endpoint) if router else open_client(place.endpoint, timeout=CONNECT_TIMEOUT)
         with session as bus:
             wanted = bus.publisher(keys.WANTED.format(rig=place.rig))
-            stepper = BusStepper(bus, place.rig, medium_of=(transports or Transports()).medium_of)
+            medium_of = (transports or Transports()).medium_of
+            stepper = BusStepper(bus, place.rig, medium_of=medium_of, steps=place.steps)
 
             def tell(progress: Progress) -> None:
                 wanted.put(pack_progress(progress))

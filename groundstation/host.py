@@ -17,7 +17,7 @@ from telemetry import keys
 from telemetry.media.neighbours import neighbour_ports, stepped_ports
 from telemetry.media.zenoh_bus import ZenohBus
 from telemetry.media.zenoh_port import ZenohMedium
-from telemetry.messages import BASE, ENCODER, Side
+from telemetry.messages import BASE, ENCODER, Side, address_name
 from telemetry.runtime.event_loop import run, stop_on_signals
 from telemetry.runtime.hosting import Place, begin_process, complain, joined, reporting
 from telemetry.runtime.own_clock import OwnClock, OwnClockLoop
@@ -43,7 +43,7 @@ def run_ground(place: Place, settings: dict[str, Any], *, own_clock: bool = Fals
         config = checked_config(rig=place.rig, folder=place.folder, key_file=place.key_file, **settings)
         with contextlib.closing(GroundProcess(config)) as process, joined(place) as bus:
             take_lease(bus, place.rig)
-            run(serve_by_own_clock(process, bus) if own_clock else serve_on_stepper(process, bus))
+            run(serve_by_own_clock(process, bus) if own_clock else serve_on_stepper(process, bus, place))
 
 
 async def serve_by_own_clock(process: GroundProcess, bus: ZenohBus) -> None:
@@ -58,14 +58,15 @@ async def serve_by_own_clock(process: GroundProcess, bus: ZenohBus) -> None:
         await loop.run()
 
 
-async def serve_on_stepper(process: GroundProcess, bus: ZenohBus) -> None:
+async def serve_on_stepper(process: GroundProcess, bus: ZenohBus, place: Place) -> None:
     """Run the ground station step by step until a signal ends it; between two steps operators are answered."""
     rig = process.config.rig
     async with answering(process, bus) as answers:
         ports = stepped_ports(ZenohMedium(bus), rig, BASE, [Side.LOWER])
-        client = AsyncStepClient(bus, rig, BASE, ports)  # its token of life is last
-        end_with(answers, client.stop)
-        await serve_stepped(process, client, partial(complain, NAME))
+        with place.step_stream(address_name(BASE)) as stream:
+            client = AsyncStepClient(bus, rig, BASE, ports, stream)  # its token of life is last
+            end_with(answers, client.stop)
+            await serve_stepped(process, client, partial(complain, NAME))
 
 
 @contextlib.asynccontextmanager

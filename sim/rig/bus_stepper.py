@@ -1,4 +1,7 @@
-"""The stepper's end of the stepped ports: hands steps to processes over the bus and gathers their answers."""
+"""The stepper's end of the stepped ports: hands steps to processes and gathers their answers.
+
+Frames travel on the bus or on CAN; steps and answers on keys of the bus or on streams of this machine.
+"""
 
 from __future__ import annotations
 
@@ -6,8 +9,9 @@ import contextlib
 import queue
 import time
 from collections import deque
-from collections.abc import Callable, Mapping
-from functools import partial
+from collections.abc import Callable, Iterable, Mapping
+from functools import cached_property, partial
+from pathlib import Path
 
 from sim.rig.stepper import Answer, FrameEvent
 from telemetry import keys
@@ -15,8 +19,10 @@ from telemetry.media.port import STEPPER, Frame, Port, TubeEnd
 from telemetry.media.table import open_medium
 from telemetry.media.zenoh_bus import Publisher, ZenohBus
 from telemetry.messages import BASE, Side, address_name
-from telemetry.runtime.stepped import Due, pack_step, unpack_done
+from telemetry.runtime.step_stream import StepListener, StepStream
+from telemetry.runtime.stepped import Due, DueEvent, pack_step, unpack_done
 
+FRAME_TICK = 0.05  # wall s
 Arrival = tuple[str, int, int, bytes]  # what, address, side or whether it lives, payload
 MediumOf = Callable[[int, Side], str | None]
 
@@ -52,16 +58,32 @@ class Seat:
 
     def __init__(self, bus: ZenohBus, rig: str, address: int, media: Mapping[Side, str]) -> None:
         self.address = address
+        self.has_token = False  # of its life, on the bus
         self.far = FarEnds(rig, address, media)
         self.alive = False
         self.step_number = 0
         self.tx: tuple[deque[bytes], deque[bytes]] = (deque(), deque())
         self.done: deque[bytes] = deque()
-        self.step = bus.publisher(keys.STEP.format(rig=rig, process=address_name(address)))
+        self.stream: StepStream | None = None
+        self._key = keys.STEP.format(rig=rig, process=address_name(address))
+        self._bus = bus
         self.rx: tuple[Publisher, Publisher] = (
             bus.publisher(keys.port_key(rig, address, Side.UPPER, "rx")),
             bus.publisher(keys.port_key(rig, address, Side.LOWER, "rx")),
         )
+
+    @cached_property
+    def _publisher(self) -> Publisher:
+        return self._bus.publisher(self._key)
+
+    def step(self, events: Iterable[DueEvent]) -> None:
+        """Hand the process a step."""
+        self.step_number += 1
+        payload = pack_step(self.step_number, events)
+        if self.stream is not None:
+            self.stream.send(payload)
+        else:
+            self._publisher.put(payload)
 
     def put(self, side: Side, frame: bytes) -> None:
         """Hand a frame to an end of the process."""
@@ -78,15 +100,17 @@ class Seat:
 
 
 class BusStepper:
-    """Steps processes over the bus, see ``sim.rig.stepper.Stepper``.
+    """Steps processes, see ``sim.rig.stepper.Stepper``.
 
-    A process that dies or hangs is dropped from the barrier at the end of a round.
+    One that hangs is dropped from the barrier at the end of a round, one that dies at once. Where steps go by stream a
+    process is there with its stream and its token: the token of a new life comes after every frame of the one before.
 
     Parameters
     ----------
     bus, rig : where the keys are
     hang_limit : wall seconds after which a process that does not answer is taken for dead
     medium_of : medium of an end, None where its frames travel on ``bus``
+    steps : socket to listen at for the streams of this machine; steps go by keys of the bus where there is none
     """
 
     def __init__(
@@ -96,6 +120,7 @@ class BusStepper:
         *,
         hang_limit: float = 20.0,
         medium_of: MediumOf = lambda _address, _side: None,
+        steps: Path | None = None,
     ) -> None:
         self._bus = bus
         self._medium_of = medium_of
@@ -107,9 +132,11 @@ class BusStepper:
         self._cues: set[str] = set()  # that the operator has answered
         self._depth = bus.publisher(keys.DEPTH.format(rig=rig))
         self._addresses = {address_name(a): a for a in range(BASE + 1)}
-        bus.subscribe(keys.PORT.format(rig=rig, tube="*", side="*", direction="tx"), self._on_tx)
-        bus.subscribe(keys.DONE.format(rig=rig, process="*"), self._on_done)
-        bus.subscribe(keys.CUE.format(rig=rig), lambda _key, name: self._events.put(("cue", 0, 0, name)))
+        self._listener = None if steps is None else StepListener(steps, self._on_stream, self._on_answer)
+        bus.subscribe_at_once(keys.PORT.format(rig=rig, tube="*", side="*", direction="tx"), self._on_tx)
+        if steps is None:
+            bus.subscribe(keys.DONE.format(rig=rig, process="*"), self._on_done)
+        bus.subscribe(keys.CUE.format(rig=rig), lambda _key, name: self._tell(("cue", 0, 0, name)))
         bus.liveliness_subscribe(keys.LIVELINESS.format(rig=rig, process="*"), self._on_token)
 
     def alive(self) -> list[int]:
@@ -148,6 +175,8 @@ class BusStepper:
         """Leave every end."""
         for seat in self._seats.values():
             seat.far.close()
+        if self._listener is not None:
+            self._listener.close()
 
     def round(self, steps: Mapping[int, list[FrameEvent]]) -> dict[int, Answer]:
         """Give each process its events and wait until all have answered; those that died are missing."""
@@ -180,8 +209,7 @@ class BusStepper:
                 seat.put(Side(event.kind), frame)
             elif event.kind is Due.DEPTH:
                 self._depth.put(event.data)  # for whoever watches; the ground station has it in its step
-        seat.step_number += 1
-        seat.step.put(pack_step(seat.step_number, [event for event, _ in events]))
+        seat.step(event for event, _ in events)
 
     def _answer(self, seat: Seat) -> Answer | None:
         while seat.done:
@@ -197,30 +225,70 @@ class BusStepper:
         return None
 
     def _pump(self, timeout: float) -> bool:
-        """Take one arrival from the bus's threads; False when none came in time."""
+        """Take what came from the bus's threads or on a stream; False when nothing did in time."""
+        is_for_frames = self._listener is None or any(seat.done for seat in self._seats.values())
         try:
-            what, address, side, payload = self._events.get(timeout=max(timeout, 0.0))
+            if self._listener is None or timeout <= 0.0:
+                arrival = self._events.get(timeout=max(timeout, 0.0))
+            elif is_for_frames:  # that have left with the answer, on the bus
+                arrival = self._events.get(timeout=min(timeout, FRAME_TICK))
+            else:
+                arrival = self._events.get_nowait()
         except queue.Empty:
-            return False
+            if self._listener is None or timeout <= 0.0:
+                return False
+            return self._listener.wait(0.0 if is_for_frames else timeout) or is_for_frames
+        self._take(*arrival)
+        return True
+
+    def _tell(self, arrival: Arrival) -> None:
+        """Take what nobody waits for, on a thread of the bus."""
+        self._events.put(arrival)
+        if self._listener is not None:
+            self._listener.wake()
+
+    def _take(self, what: str, address: int, side: int, payload: bytes) -> None:
         seat = self._seats.get(address)
         if what == "token":
-            self._seat(address, alive=bool(side))
+            self._seat_of(address).has_token = bool(side)
+            self._settle(address)
         elif what == "cue":
             self._cues.add(payload.decode(errors="replace"))
         elif seat is not None and seat.alive:
             (seat.done if what == "done" else seat.tx[side]).append(payload)
-        return True
 
-    def _seat(self, address: int, *, alive: bool) -> None:
+    def _seat_of(self, address: int) -> Seat:
         seat = self._seats.get(address)
         if seat is None:
             media = {side: medium for side in Side if (medium := self._medium_of(address, side)) is not None}
             seat = self._seats[address] = Seat(self._bus, self._rig, address, media)
+        return seat
+
+    def _settle(self, address: int) -> None:
+        """See whether a process is there now; nothing of a life before is left."""
+        seat = self._seats[address]
         seat.far.close()
         seat.reset()
+        alive = seat.has_token and (self._listener is None or seat.stream is not None)
         if alive:
             seat.far.open(partial(self._on_frame, address))
         seat.alive = alive
+
+    def _on_stream(self, name: str, stream: StepStream) -> None:
+        if name in self._addresses:
+            self._seat_of(self._addresses[name]).stream = stream
+            self._settle(self._addresses[name])
+
+    def _on_answer(self, name: str, payload: bytes | None) -> None:
+        if name not in self._addresses:
+            return
+        address = self._addresses[name]
+        if payload is not None:
+            self._take("done", address, 0, payload)
+            return
+        seat = self._seats[address]
+        seat.stream, seat.has_token = None, False
+        self._settle(address)
 
     def _on_frame(self, address: int, side: Side, frame: bytes) -> None:
         self._events.put(("tx", address, int(side), frame))
@@ -238,4 +306,4 @@ class BusStepper:
     def _on_token(self, key: str, alive: bool) -> None:
         name = key.rsplit("/", 1)[1]
         if name in self._addresses:
-            self._events.put(("token", self._addresses[name], int(alive), b""))
+            self._tell(("token", self._addresses[name], int(alive), b""))

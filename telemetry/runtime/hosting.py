@@ -24,12 +24,13 @@ import setproctitle
 from telemetry.media.neighbours import own_ports, stepped_ports, stepped_ports_on
 from telemetry.media.zenoh_bus import ZenohBus, open_client, use_few_threads
 from telemetry.media.zenoh_port import CONNECT_TIMEOUT, ZenohMedium
-from telemetry.messages import Side
+from telemetry.messages import Side, address_name
 from telemetry.runtime.command_line import EnvironmentFault, fault_of
 from telemetry.runtime.event_loop import run, stop_on_signals
 from telemetry.runtime.own_clock import OwnClock, OwnClockLoop
 from telemetry.runtime.process import Process
 from telemetry.runtime.step_client import StepClient, serve
+from telemetry.runtime.step_stream import StepStream, join_steps
 from telemetry.runtime.timing import CycleTiming
 
 PR_SET_PDEATHSIG = 1
@@ -46,6 +47,16 @@ class Place:
     folder: Path
     key_file: Path | None = None  # of the rig
     media: Mapping[Side, str] = field(default_factory=dict)  # of each end, such as can:can0; zenoh at the endpoint else
+    steps: Path | None = None  # socket of the stepper; its steps come by zenoh else
+
+    @contextlib.contextmanager
+    def step_stream(self, name: str) -> Iterator[StepStream | None]:
+        """Connection with the stepper, where it listens on this machine."""
+        if self.steps is None:
+            yield None
+            return
+        with contextlib.closing(join_steps(self.steps, name)) as stream:
+            yield stream
 
     def medium_of(self, side: Side) -> str:
         """Medium of one end."""
@@ -112,10 +123,14 @@ def run_stepped(name: str, place: Place, address: int, build: Callable[[], Proce
     with reporting(name):
         make_folder(place)
         process = build()
-        with joined(place) as bus, stepped_ports_on(place.rig, address, place.media) as chosen:
+        with (
+            joined(place) as bus,
+            stepped_ports_on(place.rig, address, place.media) as chosen,
+            place.step_stream(address_name(address)) as stream,
+        ):
             rest = [side for side in Side if side not in place.media]
             ports = chosen | stepped_ports(ZenohMedium(bus), place.rig, address, rest)
-            client = StepClient(bus, place.rig, address, ports)
+            client = StepClient(bus, place.rig, address, ports, stream)
             on_termination(client.stop)
             serve(process, client, partial(complain, name))
 

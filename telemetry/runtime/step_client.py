@@ -1,4 +1,6 @@
-"""A process's end of a stepper on the bus, for a plain loop (``serve``) or an asyncio loop (``serve_stepped``).
+"""A process's end of a stepper, for a plain loop (``serve``) or an asyncio loop (``serve_stepped``).
+
+Steps come and answers go by keys of the bus, or on a stream where the stepper is on the same machine.
 
 Frames wait until a step names them, so that neither the load of the machine nor the order of arrival has any
 influence on what the process does.
@@ -6,6 +8,7 @@ influence on what the process does.
 
 from __future__ import annotations
 
+import asyncio
 import queue
 from collections import Counter, deque
 from collections.abc import Callable, Mapping
@@ -17,6 +20,7 @@ from telemetry.media.zenoh_bus import ZenohBus
 from telemetry.messages import Side, address_name
 from telemetry.runtime.inbox import Inbox
 from telemetry.runtime.process import Process
+from telemetry.runtime.step_stream import StepStream
 from telemetry.runtime.stepped import Due, DueEvent, Sent, pack_done, run_step, unpack_step
 
 ABSENT_LIMIT = 60.0  # wall s without a first step until that is reported
@@ -33,6 +37,11 @@ class StepAssembler:
     def __init__(self) -> None:
         self._waiting: dict[int, deque[bytes]] = {channel: deque() for channel in CHANNELS}
         self._step: tuple[int, list[DueEvent]] | None = None
+
+    @property
+    def has_step(self) -> bool:
+        """Whether a step is here, with or without its frames."""
+        return self._step is not None or bool(self._waiting[STEP])
 
     def add(self, channel: int, payload: bytes) -> None:
         """Take what arrived on a channel."""
@@ -57,9 +66,10 @@ class StepEnd:
 
     Parameters
     ----------
-    bus, rig, address : where the steps come from and who this is
+    bus, rig, address : who this is, and where its token of life is
     ports : the ends of the tube, on whatever medium carries frames
     arrive : takes arrivals on foreign threads
+    stream : on which steps come and answers go; by keys of the bus where there is none
     """
 
     def __init__(
@@ -69,15 +79,20 @@ class StepEnd:
         address: int,
         ports: Mapping[Side, Port],
         arrive: Callable[[Arrival], object],
+        stream: StepStream | None,
     ) -> None:
         name = address_name(address)
         self.absence = f"{name}: no step came in {ABSENT_LIMIT:.0f} s; is the medium of {rig} running?"
         self.assembler = StepAssembler()
         self._ports = ports
-        self._done = bus.publisher(keys.DONE.format(rig=rig, process=name))
+        self._stream = stream
         for side, port in ports.items():
             port.listen(partial(_put_frame, arrive, int(side)))
-        bus.subscribe(keys.STEP.format(rig=rig, process=name), lambda _key, step: arrive((STEP, step)))
+        if stream is not None:
+            self._answer: Callable[[bytes], object] = stream.send
+        else:
+            self._answer = bus.publisher(keys.DONE.format(rig=rig, process=name)).put
+            bus.subscribe(keys.STEP.format(rig=rig, process=name), lambda _key, step: arrive((STEP, step)))
         bus.liveliness_token(keys.LIVELINESS.format(rig=rig, process=name))
 
     def run(self, process: Process, step: Step) -> None:
@@ -91,30 +106,48 @@ class StepEnd:
                 sent.append(what)
 
         wake_at = run_step(process, events, send)
-        self._done.put(pack_done(number, sent, wake_at))
+        self._answer(pack_done(number, sent, wake_at))
 
 
 class StepClient(StepEnd):
     """Client of a process without a loop of its own: ``next_step`` blocks."""
 
-    def __init__(self, bus: ZenohBus, rig: str, address: int, ports: Mapping[Side, Port]) -> None:
+    def __init__(
+        self,
+        bus: ZenohBus,
+        rig: str,
+        address: int,
+        ports: Mapping[Side, Port],
+        stream: StepStream | None = None,
+    ) -> None:
         self._arrived: queue.SimpleQueue[Arrival] = queue.SimpleQueue()
-        super().__init__(bus, rig, address, ports, self._arrived.put)
+        super().__init__(bus, rig, address, ports, self._arrived.put, stream)
 
     def stop(self) -> None:
         """Make ``next_step`` return None; may be called from a signal handler or another thread."""
         self._arrived.put((STOP, b""))
+        if self._stream is not None:
+            self._stream.shut()
 
     def next_step(self, timeout: float | None = None) -> Step | None:
         """Next step with the frame of each frame event, or None after ``stop``.
 
         Raises
         ------
-        queue.Empty
+        TimeoutError
             When nothing arrived for ``timeout`` wall seconds.
         """
         while (step := self.assembler.take_step()) is None:
-            channel, payload = self._arrived.get(timeout=timeout)
+            if self._stream is not None and not self.assembler.has_step:
+                received = self._stream.receive(timeout)
+                if received is not None:
+                    self.assembler.add(STEP, received)
+                    continue
+                timeout = None  # the stepper is gone: whoever started this process ends it
+            try:
+                channel, payload = self._arrived.get(timeout=timeout)
+            except queue.Empty:
+                raise TimeoutError from None
             if channel == STOP:
                 return None
             self.assembler.add(channel, payload)
@@ -124,13 +157,34 @@ class StepClient(StepEnd):
 class AsyncStepClient(StepEnd):
     """Client of a process whose asyncio loop has other work too, such as operators' questions."""
 
-    def __init__(self, bus: ZenohBus, rig: str, address: int, ports: Mapping[Side, Port]) -> None:
+    def __init__(
+        self,
+        bus: ZenohBus,
+        rig: str,
+        address: int,
+        ports: Mapping[Side, Port],
+        stream: StepStream | None = None,
+    ) -> None:
         self.inbox: Inbox[Arrival] = Inbox()
-        super().__init__(bus, rig, address, ports, self.inbox.put)
+        super().__init__(bus, rig, address, ports, self.inbox.put, stream)
+        if stream is not None:
+            asyncio.get_running_loop().add_reader(stream, self._read, stream)
 
     def stop(self) -> None:
         """Make ``next_step`` return None; may be called from another thread."""
         self.inbox.close()
+
+    def leave(self) -> None:
+        """Read nothing more."""
+        if self._stream is not None:
+            asyncio.get_running_loop().remove_reader(self._stream)
+
+    def _read(self, stream: StepStream) -> None:
+        payloads = stream.arrived()
+        if payloads is None:
+            self.leave()
+        for payload in payloads or ():
+            self.inbox.put((STEP, payload))
 
     async def next_step(self) -> Step | None:
         """Next step with the frame of each frame event, or None after ``stop``."""
@@ -152,7 +206,7 @@ def serve(process: Process, client: StepClient, report: Report = lambda line: No
     """
     try:
         step = client.next_step(ABSENT_LIMIT)
-    except queue.Empty:
+    except TimeoutError:
         report(client.absence)
         step = client.next_step()
     while step is not None:
@@ -168,11 +222,14 @@ async def serve_stepped(process: Process, client: AsyncStepClient, report: Repor
     MediumError
         When the bus is lost.
     """
-    await client.inbox.wait(ABSENT_LIMIT)
-    if not client.inbox and not client.inbox.is_closed:
-        report(client.absence)
-    while (step := await client.next_step()) is not None:
-        client.run(process, step)
+    try:
+        await client.inbox.wait(ABSENT_LIMIT)
+        if not client.inbox and not client.inbox.is_closed:
+            report(client.absence)
+        while (step := await client.next_step()) is not None:
+            client.run(process, step)
+    finally:
+        client.leave()
 
 
 def _put_frame(arrive: Callable[[Arrival], object], channel: int, frame: bytes) -> None:

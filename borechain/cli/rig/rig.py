@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 import json
+import tempfile
 import time
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -102,7 +104,7 @@ def rig(
                     endpoint,
                     show,
                     transport,
-                    lambda t: process_table(world, scenario, seed, speed, faults, rig_name, endpoint, folder, t),
+                    partial(process_table, world, scenario, seed, speed, faults, rig_name, endpoint, folder),
                 )
     except KeyboardInterrupt:
         raise EnvironmentFault(f"interrupted; every process was ended, what was stored is in {folder}") from None
@@ -139,14 +141,17 @@ def drill_in_processes(
     endpoint: str,
     show: Callable[[Tick | Progress], None],
     transport: str | None,
-    table_of: Callable[[Transports], ProcessTable],
+    table_of: Callable[[Transports, Path], ProcessTable],
 ) -> Ran:
     """Drill with one real process a tube, beside a hub of CAN segments where a joint is on CAN."""
     from sim.rig.launcher import Launcher
     from sim.rig.transports import carrying
 
-    with carrying(transport, world.scenario.medium.transports) as transports:
-        table = table_of(transports)
+    with (
+        carrying(transport, world.scenario.medium.transports) as transports,
+        tempfile.TemporaryDirectory(prefix="borechain-") as steps,  # a socket's path must be short
+    ):
+        table = table_of(transports, Path(steps) / "steps")
         launcher = Launcher(table, rig_name, endpoint, show, operator_of(world, rig_name))
         answers = launcher.run(lambda bus: ask(bus, rig_name))
         return Ran(answers, len(table.specs), sum(table.restarts.values()))
@@ -182,8 +187,9 @@ def process_table(
     endpoint: str,
     folder: Path,
     transports: Transports,
+    steps: Path,
 ) -> ProcessTable:
-    """Every process of the rig, one line each."""
+    """Every process of the rig, one line each; ``steps`` is the socket at which they meet their stepper."""
     from borechain.host import run_medium
     from groundstation.host import run_ground
     from node.process.host import run_encoder, run_node
@@ -196,7 +202,7 @@ def process_table(
     key_file = new_key(folder / "rig.key")
 
     def place(name: str, address: int = BASE) -> Place:
-        return Place(rig_name, endpoint, private_folder(folder, name), key_file, transports.media_of(address))
+        return Place(rig_name, endpoint, private_folder(folder, name), key_file, transports.media_of(address), steps)
 
     specs = {
         "medium": Spec(run_medium, (place("medium"), scenario, seed, speed, faults, True, True, transports)),
