@@ -7,6 +7,8 @@ import subprocess
 import sys
 from pathlib import Path
 
+import pytest
+
 ROOT = Path(__file__).parents[1]
 LINE = """
     CommandSpec(
@@ -48,6 +50,7 @@ print(make_tables.tube_commands())
 """
 
 
+@pytest.mark.slow
 def test_a_line_and_a_method_make_a_command(tmp_path: Path) -> None:
     for package in ("telemetry", "node", "groundstation", "docs"):
         shutil.copytree(ROOT / package, tmp_path / package, ignore=shutil.ignore_patterns("__pycache__", "results"))

@@ -28,6 +28,7 @@ def make_tables() -> ModuleType:
 
 
 @pytest.mark.parametrize("page", ["wire.md", "keys.md", "firmware.md", "operate.md"])
+@pytest.mark.slow
 def test_the_tables_of_a_page_are_made_from_the_code(make_tables: ModuleType, page: str) -> None:
     assert (DOCS / page).read_text() == make_tables.filled(page), "run python docs/make_tables.py"
 
@@ -51,6 +52,7 @@ def plain_fields(dtype: np.dtype, path: str = "") -> list[str]:
     return found
 
 
+@pytest.mark.slow
 def test_every_field_of_the_node_is_in_the_map(make_tables: ModuleType) -> None:
     found, part = [], ""
     for line in make_tables.node_record().splitlines():

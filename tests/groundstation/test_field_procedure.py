@@ -20,6 +20,8 @@ from node.kernels.layout import DEG
 from telemetry.messages import BASE, BlockSegment, Reply, StaticRecord
 from telemetry.parameters import ParameterBlock, SensorParameters
 
+pytestmark = pytest.mark.slow  # strings in memory, a second each
+
 MATRIX = np.array([[1.01, 0.004, -0.003], [0.002, 0.99, 0.005], [-0.001, 0.003, 1.005]])
 BIAS = np.array([0.05, -0.03, 0.08])
 PRESETS = [(0, 0), (0, 60), (0, 120), (0, 180), (0, -120), (0, -60), (60, 0), (-60, 0), (90, 0), (-90, 0)]

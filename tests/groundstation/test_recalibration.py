@@ -65,6 +65,7 @@ def test_a_block_arrives_through_loss_repetition_disorder_and_damage(tmp_path: P
     assert rig.tube(1).tube.parameters == block(2, bias=2e-3)
 
 
+@pytest.mark.slow
 def test_a_turning_node_waits_with_the_block_until_it_stands(rig: Rig) -> None:
     rig.rate[1] = np.array([0.0, 0.0, 1.2])
     order = rig.ground.operator.upload(block())
@@ -102,6 +103,7 @@ def test_a_node_killed_in_the_middle_keeps_its_block_and_resumes(rig: Rig) -> No
     assert rig.tube(1).tube.parameters == block(2, bias=2e-3)
 
 
+@pytest.mark.slow
 def test_a_ground_station_that_restarts_goes_on_where_the_node_is(rig: Rig) -> None:
     lose(rig, lambda s: s.index < 3)
     rig.ground.operator.upload(block())
@@ -174,6 +176,7 @@ def test_what_was_recorded_of_an_old_upload_changes_nothing(rig: Rig) -> None:
         (replace(block(), gyroscope=SensorParameters(bias=(float("nan"), 0.0, 0.0))), "finite"),
     ],
 )
+@pytest.mark.slow
 def test_a_block_that_fails_its_checks_leaves_the_one_before(rig: Rig, wrong: ParameterBlock, reason: str) -> None:
     rig.run(50.0)
     assert rig.upload(block(1, bias=1e-4)).phase is UploadPhase.APPLIED
@@ -248,6 +251,7 @@ def test_a_damaged_block_falls_back_and_says_so(rig: Rig) -> None:
     assert rig.upload(block(2, bias=2e-3)).phase is UploadPhase.APPLIED
 
 
+@pytest.mark.slow
 def test_a_static_record_is_taken_stored_and_still_known_after_a_restart(rig: Rig) -> None:
     order = rig.order(1, "static_record", seconds=20.0)
     assert (order.state, order.done, order.values) == (OrderState.ACKNOWLEDGED, True, {"seconds": 20.0})
@@ -278,6 +282,7 @@ ATTITUDES = 9.81 * np.array(
 )
 
 
+@pytest.mark.slow
 def test_an_accelerometer_is_calibrated_from_the_surface_end_to_end(rig: Rig) -> None:
     readings: list[StaticRecord] = []
     for attitude in ATTITUDES:

@@ -62,6 +62,7 @@ def turns(count: float, samples: int = 195) -> np.ndarray:
 
 
 @given(tilts, tilts, st.floats(0.1 * DEG, 50.0 * DEG), st.floats(1.0, 5.0), st.floats(0.0, math.tau), st.booleans())
+@pytest.mark.slow
 def test_without_noise_the_circle_is_exact_for_every_mount_and_lean(
     pitch: float, roll: float, lean: float, count: float, first: float, backward: bool
 ) -> None:

@@ -48,6 +48,7 @@ def by_numpy(sensor: SensorParameters, reading: tuple, temperature: float) -> np
 
 
 @given(sensors(), sensors(), READING, READING, st.floats(COLDEST, HOTTEST))
+@pytest.mark.slow
 def test_each_sensor_is_corrected_by_its_own_model(
     gyroscope: SensorParameters, accelerometer: SensorParameters, rate: tuple, force: tuple, temperature: float
 ) -> None:

@@ -109,6 +109,7 @@ finite = st.floats(-100.0, 100.0)
 
 
 @given(st.integers(1, MAX_IMUS), st.data())
+@pytest.mark.slow
 def test_the_fused_reading_is_the_mean_by_inverse_variance(count: int, data: st.DataObject) -> None:
     readings = data.draw(arrays(np.float64, (count, 6), elements=finite))
     weights = data.draw(arrays(np.float64, count, elements=st.one_of(st.just(0.0), st.floats(0.01, 100.0))))

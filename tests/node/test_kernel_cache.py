@@ -26,12 +26,14 @@ def start(cache: Path, temporary: Path) -> subprocess.CompletedProcess[str]:
     )
 
 
+@pytest.mark.slow
 def test_a_folder_that_can_be_written_is_used_without_a_word(tmp_path: Path) -> None:
     done = start(tmp_path / "cache", tmp_path)
     assert Path(done.stdout.strip()).parent == tmp_path / "cache" / "borechain"
     assert done.stderr == ""
 
 
+@pytest.mark.slow
 def test_another_is_used_and_named_once_for_all_processes(tmp_path: Path) -> None:
     (tmp_path / "file").touch()
     done = start(tmp_path / "file", tmp_path)
@@ -44,6 +46,7 @@ def test_another_is_used_and_named_once_for_all_processes(tmp_path: Path) -> Non
 
 
 @pytest.mark.parametrize("mode", [0o777, 0o750])
+@pytest.mark.slow
 def test_a_temporary_folder_that_others_can_write_is_not_trusted(tmp_path: Path, mode: int) -> None:
     (tmp_path / "file").touch()
     offered = Path(start(tmp_path / "file", tmp_path).stdout.strip())

@@ -96,6 +96,7 @@ def spread(writes: Counter[str], slots: int) -> float:
     return max(abs(count - mean) for count in writes.values()) / mean
 
 
+@pytest.mark.slow
 def test_a_hundred_thousand_saves_wear_all_slots_alike(tmp_path: Path, flash: Flash) -> None:
     random = np.random.default_rng(5)
     journal = Journal(tmp_path)

@@ -29,6 +29,7 @@ def summed(samples: np.ndarray) -> np.ndarray:
 
 
 @given(st.integers(2, 300), st.integers(0, 2**32 - 1), st.floats(-10.0, 10.0))
+@pytest.mark.slow
 def test_the_sums_are_mean_and_covariance(count: int, seed: int, offset: float) -> None:
     samples = offset + np.random.default_rng(seed).standard_normal((count, 6)) * NOISE
     record = summed(samples)

@@ -38,6 +38,7 @@ def body_rate(t: float, *motion: float) -> np.ndarray:
     a0=st.floats(0.0, 6.28),
     da=st.floats(-0.1, 0.1),
 )
+@pytest.mark.slow
 def test_any_motion_of_the_axis_is_followed(spin: float, i0: float, di: float, a0: float, da: float) -> None:
     motion = (spin, i0, di, a0, da)
     steps, dt = 500, 0.004

@@ -68,6 +68,7 @@ def test_fades_and_bursts_are_of_the_joint_and_the_seed() -> None:
 
 
 @given(st.floats(0.01, 0.99), st.integers(1, 5))
+@pytest.mark.slow
 def test_attempts_fail_with_the_power_of_the_error_rate(error_rate: float, attempts: int) -> None:
     fates = (np.arange(20_000) + 0.5) / 20_000
     share = np.mean([failures(fate, error_rate) >= attempts for fate in fates])

@@ -162,6 +162,7 @@ def test_refuses_what_cannot_be() -> None:
         robot_arm(np.random.default_rng(0), np.zeros(3), np.zeros(2), MATRIX, BIAS)
 
 
+@pytest.mark.slow
 def test_experiment_reaches_what_is_asked() -> None:
     steps: list[int] = []
     result = run(4, lambda: steps.append(1))

@@ -172,6 +172,7 @@ def times_seed(job: tuple[int, int]) -> int:
 
 
 @pytest.mark.parametrize(("seeds", "cores"), [(2, "2"), (3, "2"), (3, "1")])
+@pytest.mark.slow
 def test_the_pool_keeps_the_order_of_its_seeds_and_tells_of_each(
     seeds: int, cores: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:

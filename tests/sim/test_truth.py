@@ -98,6 +98,7 @@ def test_specific_force_at_a_stop_resolves_to_the_exact_direction(name: str) -> 
             assert abs(wrap(off)) * math.sin(inclination) < 1e-9
 
 
+@pytest.mark.slow
 def test_the_yaw_increment_of_a_cycle_is_exact() -> None:
     truth = perfect()
     ends = 1000.0 + PERIOD * np.arange(1.0, 400.0)

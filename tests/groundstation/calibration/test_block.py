@@ -69,6 +69,7 @@ def test_a_block_comes_back_from_its_text_to_the_last_bit() -> None:
 @given(
     bias=st.lists(NUMBER, min_size=3, max_size=3), reference=NUMBER, rms=st.floats(0.0, 1e9), design=st.text(min_size=1)
 )
+@pytest.mark.slow
 def test_any_block_comes_back(bias: list[float], reference: float, rms: float, design: str) -> None:
     provenance = replace(PROVENANCE, residual_rms=rms, design=f"x{design}")
     made = replace(BLOCK, bias=np.array(bias), reference=reference, provenance=provenance)

@@ -175,6 +175,7 @@ def test_a_tool_face_reference_turns_the_triad_onto_it() -> None:
     assert held.cost == plain.cost
 
 
+@pytest.mark.slow
 def test_standard_errors_are_what_repetition_scatters() -> None:
     tool, design = draw_tool(2), make_design(Heating.ROOM)
     fits = []

@@ -124,6 +124,7 @@ def test_readings_of_different_width_keep_their_columns_in_place() -> None:
         np.testing.assert_allclose(fused.shared, [[1e-3, 0.0, 1e-3], [0.0, 0.0, 0.0]], atol=1e-18)
 
 
+@pytest.mark.slow
 def test_the_fused_covariance_is_what_sampling_gives_when_some_errors_are_shared() -> None:
     generator = np.random.default_rng(3)
     columns = [np.array([[2e-3, 0.0], [1e-3, 0.0]]), np.array([[2e-3, 0.0], [1e-3, 0.0]])]

@@ -315,6 +315,7 @@ CELL = st.sampled_from(
 
 @settings(max_examples=300)
 @given(st.dictionaries(st.sampled_from(["name", "value", "unit", "mode", "depth", "north", "down", "x"]), CELL))
+@pytest.mark.slow
 def test_random_terms_are_an_instrument_or_refused(cells: dict[str, str]) -> None:
     row = "".join(f"{key} = {value}\n" for key, value in cells.items())
     message = refusal(lambda: parse_toml(f"{GOOD}[[term]]\n{row}", "x.toml"))

@@ -252,6 +252,7 @@ def test_appending_one_by_one_gives_the_whole_hole(rows: list[tuple[float, float
 
 
 @given(ROWS, st.floats(-7.0, 7.0), st.sampled_from(Method))
+@pytest.mark.slow
 def test_turning_a_hole_below_a_vertical_collar_turns_its_trajectory(
     rows: list[tuple[float, float, float]], angle: float, method: Method
 ) -> None:

@@ -296,6 +296,7 @@ ASCENDING = st.lists(
 
 @ON_DISK
 @given(ASCENDING)
+@pytest.mark.slow
 def test_every_good_survey_comes_back_to_the_last_bit(tmp_path: Path, rows: list[tuple[float, float, float]]) -> None:
     md = np.cumsum([row[0] for row in rows])
     lines = [f"{depth!r},{row[1]!r},{row[2]!r}" for depth, row in zip(md.tolist(), rows, strict=True)]

@@ -141,6 +141,7 @@ def test_the_constant_yaw_variance_of_a_reading_is_all_there_and_no_more(
         max_size=8,
     )
 )
+@pytest.mark.slow
 def test_the_kinds_add_up_to_the_whole(readings: list[tuple[int, list[int] | None, float, float, float]]) -> None:
     errors = SharedErrors()
     leans = [errors.reading(stop(), *reading) for reading in readings]

@@ -102,6 +102,7 @@ def test_a_drilled_column_without_any_survey_follows_its_design_and_is_named(tmp
     assert np.sqrt(wall.columns.covs[1, -1, 0, 0]) == pytest.approx(0.2, rel=0.01)
 
 
+@pytest.mark.slow
 def test_a_grid_with_good_joints_has_a_void_in_every_cell(tmp_path: Path) -> None:
     heads = "column,north_m,east_m\n" + "".join(
         f"C{3 * a + b + 1},{0.9 * a},{0.9 * b}\n" for a in range(3) for b in range(3)

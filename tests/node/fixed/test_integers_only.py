@@ -103,5 +103,6 @@ def test_the_loop_holds_no_float(tmp_path: Path) -> None:
     assert inspect(LOOP, tmp_path) == ""
 
 
+@pytest.mark.slow
 def test_one_half_would_be_found(tmp_path: Path) -> None:
     assert inspect(ONE_HALF, tmp_path).split("\n")[:3] == ["clean False", "leaky True", "divided True"]

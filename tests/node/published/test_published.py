@@ -83,6 +83,7 @@ def test_a_tilt_is_read_back_from_its_direction(phi: float, theta: float) -> Non
     assert tilt_of(down) == pytest.approx((phi, theta))
 
 
+@pytest.mark.slow
 def test_the_propagation_is_that_of_the_matrices() -> None:
     config, random = default_config()[0], np.random.default_rng(3)
     config["attitude_factor"], config["bias_factor"] = 2.0, 5.0
