@@ -51,7 +51,8 @@ class NativeProfile:
                 rest.append((number, content))
             else:
                 parts += frames
-        if not rest and not self._is_news(header):
+        # an acknowledgement alone is said again because the one before was not heard
+        if parts and not rest and not self._is_news(header):
             return Split(parts, None)
         self._told = header
         return Split(parts, pack_frame(header, rest))

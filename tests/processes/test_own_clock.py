@@ -175,7 +175,7 @@ def test_a_node_finds_its_yaw_keeps_it_over_a_kill_and_ends_when_asked(
         assert report["stages_ms"]["cycle"]["count"] == report["cycles"]
 
 
-@pytest.mark.parametrize("settings", ["frames=fd", "frames=classic"])
+@pytest.mark.parametrize("settings", ["frames=fd", "frames=classic,profile=native"])
 def test_a_base_station_on_zenoh_hears_a_node_on_can_that_opens_no_session(
     string: String, surface: Surface, settings: str
 ) -> None:

@@ -22,6 +22,10 @@ from telemetry.media.can_exchange import (
 from telemetry.media.can_identifier import FLOW_CONTROL, PRESENCE, TUNNEL, Identifier
 from telemetry.media.port import Frame, Priority
 from telemetry.media.send_queue import SEND_LIMIT, SendQueue
+from telemetry.messages import Hello, Mode
+from telemetry.presentation.can_native import open_profile
+from telemetry.presentation.msgpack_codec import encode
+from telemetry.transport.hop import HopLink
 
 STEP = 1e-3  # s, of a frame on the wire
 
@@ -40,6 +44,7 @@ class Wire:
         self.sent: list[tuple[float, Identifier]] = []
         self._waiting: dict[int, CanData] = {}
         self.is_open = False
+        self.is_lost = lambda: False  # of the next frame: arrives, and the other end can make nothing of it
 
     def step(self) -> bool:
         """Carry one frame; returns whether there was any."""
@@ -57,7 +62,7 @@ class Wire:
         self.sent.append((self.now, identifier))
         self.ends[number].on_acknowledged(self.now)
         for other in self.ends:
-            if other is not self.ends[number]:
+            if other is not self.ends[number] and not self.is_lost():
                 payload = other.on_frame(frame.identifier, frame.data, self.now)
                 if payload is not None:
                     self.heard[other.address].append(payload)
@@ -134,6 +139,32 @@ def test_what_must_not_be_lost_survives_a_joint_that_opens_in_its_middle() -> No
     wire.run(1.0)
     assert bytes(500) in wire.heard[1]
     assert len(upper.queue) == 0
+
+
+@pytest.mark.parametrize("largest", [8, 64])
+def test_links_on_the_native_profile_lose_nothing_over_a_wire_that_does(largest: int) -> None:
+    draw = random.Random(5)
+    ends = [CanExchange(address, largest, SendQueue(16384), address, 0.0, open_profile()) for address in (2, 1)]
+    links = {e.address: HopLink(e.address, 1) for e in ends}
+    wire, heard = Wire(*ends), {2: [], 1: []}
+    wire.is_lost = lambda: draw.random() < 0.02
+    told = {address: [bytes([address, k]) * 40 for k in range(60)] for address in links}
+    while wire.now < 120.0 and any(len(heard[3 - a]) < len(told[a]) for a in links):
+        for e in ends:
+            link = links[e.address]
+            link.bundle_limit = 0
+            if draw.random() < 0.02:
+                link.send_best_effort(encode(Hello(e.address, 1, 1, Mode.STILL, 1.0)), "hello", Priority.HELLO)
+            if draw.random() < 0.02 and (waiting := told[e.address][link.counters["told"] :]):
+                link.send_reliable(waiting[0])
+                link.counters["told"] += 1
+            for payload in wire.heard[e.address]:
+                heard[e.address] += [p for p in link.receive(payload, wire.now) if p in told[3 - e.address]]
+            wire.heard[e.address].clear()
+            for frame in link.take_frames(wire.now):
+                e.queue.offer(frame)
+        wire.step()
+    assert {a: sorted(heard[a]) for a in heard} == {a: sorted(told[3 - a]) for a in heard}
 
 
 def test_a_missing_answer_ends_a_transfer_and_the_next_one_goes_on() -> None:

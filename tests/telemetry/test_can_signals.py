@@ -208,6 +208,18 @@ def linked() -> tuple[HopLink, HopLink, NativeProfile, NativeProfile]:
     return upper, lower, *profiles
 
 
+def test_an_acknowledgement_that_was_lost_is_said_again() -> None:
+    upper, lower, ours, theirs = linked()
+    carry(upper, lower, ours, theirs, 1.1)
+    lower.send_reliable(b"survey")
+    assert carry(lower, upper, theirs, ours, 1.2) == [b"survey"]
+    assert [ours.split(frame.payload, fd=True).rest for frame in upper.take_frames(1.3)] != []  # nobody hears it
+    assert carry(lower, upper, theirs, ours, 1.4) == []
+    assert lower.waiting == 1
+    carry(upper, lower, ours, theirs, 1.5)
+    assert lower.waiting == 0
+
+
 def carry(
     sender: HopLink, receiver: HopLink, out: NativeProfile, into: NativeProfile, now: float, *, fd: bool = True
 ) -> list[bytes]:
