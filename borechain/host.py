@@ -5,6 +5,8 @@ from __future__ import annotations
 import contextlib
 import queue
 import warnings
+from collections.abc import Callable
+from functools import partial
 from pathlib import Path
 
 import msgpack
@@ -38,6 +40,7 @@ def run_medium(
 
     begin_process("medium")
     with reporting("medium"):
+        seal_depth = depth_sealer(place.keys)
         with warnings.catch_warnings():
             warnings.simplefilter("ignore", PorosityWarning)  # whoever started the rig was warned
             world = World(load_scenario(scenario, faults), seed)
@@ -50,11 +53,21 @@ def run_medium(
             def tell(progress: Progress) -> None:
                 wanted.put(pack_progress(progress))
 
-            scheduler = Scheduler(world, stepper, tell, speed, cued=cued)
+            scheduler = Scheduler(world, stepper, tell, speed, cued=cued, seal_depth=seal_depth)
             on_termination(scheduler.stop)
             with contextlib.closing(stepper):
                 if scheduler.run():
                     scheduler.linger()
+
+
+def depth_sealer(place: Path | None) -> Callable[[bytes], bytes]:
+    """What the source of the depth makes of its readings, with its keys from a file or folder, if there are any."""
+    if place is None:
+        return bytes
+    from telemetry.application.depth_seal import seal_depth
+    from telemetry.transport.key_ring import DEPTH_SOURCE, key_file, read_ring
+
+    return partial(seal_depth, read_ring(key_file(place, DEPTH_SOURCE), DEPTH_SOURCE))
 
 
 def run_router(endpoint: str) -> None:

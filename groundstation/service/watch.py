@@ -8,6 +8,7 @@ from dataclasses import dataclass
 from groundstation.service.model import RigModel
 from groundstation.service.numbers import Range
 from telemetry.application.endpoint import SERIES_SHIFT
+from telemetry.application.seal_watch import CODE, refusal_of
 from telemetry.messages import EPOCH_UNKNOWN, Event, NodeFlag, NodeState, SurveyMeasurement
 
 LOOK_EVERY = 0.5  # s, own clock
@@ -80,6 +81,8 @@ class Watch:
             self._alarms.alert("tube_restarted", tube, f"{event.code}: {event.arguments.get('detail', '')}"[:200])
         elif event.code == "queue_full":
             self._alarms.alert("tube_queue", tube, f"{event.arguments.get('dropped')} dropped")
+        elif event.code == CODE:
+            self._alarms.alert(CODE, tube, refusal_of(event.arguments))
 
     def on_survey(self, measurement: SurveyMeasurement, outcome: str) -> None:
         """Tell what a survey was not used for: ``outcome`` is a kind of alarm, or empty."""

@@ -17,7 +17,7 @@ from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field
 from functools import partial
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import setproctitle
 
@@ -32,6 +32,9 @@ from telemetry.runtime.process import Process
 from telemetry.runtime.step_client import StepClient, serve
 from telemetry.runtime.step_stream import StepStream, join_steps
 from telemetry.runtime.timing import CycleTiming
+
+if TYPE_CHECKING:
+    from telemetry.application.seals import Seals
 
 PR_SET_PDEATHSIG = 1
 ORPHAN_GRACE = 3.0  # wall s that a process has to end by itself when its launcher is gone
@@ -48,6 +51,7 @@ class Place:
     key_file: Path | None = None  # of the rig
     media: Mapping[Side, str] = field(default_factory=dict)  # of each end, such as can:can0; zenoh at the endpoint else
     steps: Path | None = None  # socket of the stepper; its steps come by zenoh else
+    keys: Path | None = None  # file or folder of the keys of this process; without it everybody is believed
 
     @contextlib.contextmanager
     def step_stream(self, name: str) -> Iterator[StepStream | None]:
@@ -171,6 +175,12 @@ def write_timing(folder: Path, report: dict[str, Any]) -> None:
     with contextlib.suppress(OSError):
         fresh.write_text(json.dumps(report) + "\n")
         fresh.replace(folder / TIMING_FILE)
+
+
+def warn_of_keys(name: str, seals: Seals | None) -> None:
+    """Say what is odd about the keys of a process; it goes on."""
+    for line in () if seals is None else seals.ring.warnings:
+        complain(name, line)
 
 
 def complain(name: str, line: str) -> None:

@@ -83,6 +83,14 @@ key_option = click.option(
     help="Key of the rig, 64 hex digits, readable by its owner alone. Without it no parameter block is sent or taken.",
 )
 
+keys_option = click.option(
+    "--keys",
+    "keys_place",
+    type=click.Path(path_type=Path, exists=True),
+    help="Keys that borechain pki made: the file of this process, or the folder that it lies in. With them everything "
+    "said is sealed and everything heard must be; parameter blocks need no --key-file then.",
+)
+
 
 def parse_neighbour(_context: click.Context, _parameter: click.Parameter, value: str | None) -> int | None:
     """Address of a neighbour by its name."""

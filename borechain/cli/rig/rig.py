@@ -18,6 +18,7 @@ from borechain.cli.notices import warnings_in_lines
 from borechain.cli.options import fault_option, json_option, scenario_argument, seed_option, speed_option
 from borechain.cli.tables import console
 from telemetry import keys
+from telemetry.runtime.options import keys_option
 
 if TYPE_CHECKING:
     from sim.rig.launcher import Tick
@@ -48,6 +49,7 @@ PRELOAD = {"float64": "borechain.warm", "fixed": "borechain.warm_all", "publishe
     "--rig", "rig_name", default=keys.DEFAULT_RIG, show_default=True, help="Name of the rig in key expressions."
 )
 @click.option("--endpoint", default=keys.DEFAULT_ENDPOINT, show_default=True, help="Where the rig's router listens.")
+@keys_option
 @click.option(
     "--out", type=click.Path(path_type=Path), help="New or empty folder for the run  [default: out/NAME/run-NNNN]"
 )
@@ -63,6 +65,7 @@ def rig(
     transport: str | None,
     rig_name: str,
     endpoint: str,
+    keys_place: Path | None,
     out: Path | None,
     as_json: bool,
 ) -> None:
@@ -73,6 +76,7 @@ def rig(
       borechain rig wellbore-1
       borechain rig wellbore-1 --speed 1 --fault kill-node:3@900
       borechain rig rig-3 --transport can
+      borechain rig rig-3 --keys stick
     """
     from sim.rig.launcher import check_port_free, next_run_folder, prepare_folder
     from sim.rig.report import write_files
@@ -96,7 +100,8 @@ def rig(
     try:
         with progress(world, quiet=as_json) as show:
             if inline:
-                ran = drill_inline(world, speed, rig_name, folder, show, native=transport == "can-native")
+                native = transport == "can-native"
+                ran = drill_inline(world, speed, rig_name, folder, show, native=native, keys=keys_place)
             else:
                 ran = drill_in_processes(
                     world,
@@ -104,7 +109,7 @@ def rig(
                     endpoint,
                     show,
                     transport,
-                    partial(process_table, world, scenario, seed, speed, faults, rig_name, endpoint, folder),
+                    partial(process_table, world, scenario, seed, speed, faults, rig_name, endpoint, folder, keys_place),
                 )
     except KeyboardInterrupt:
         raise EnvironmentFault(f"interrupted; every process was ended, what was stored is in {folder}") from None
@@ -165,11 +170,12 @@ def drill_inline(
     show: Callable[[Tick | Progress], None],
     *,
     native: bool = False,
+    keys: Path | None = None,
 ) -> Ran:
     """Drill with objects in this process."""
     from borechain.inline import InlineRig
 
-    rig = InlineRig(world, ground_settings(world), rig_name, folder, native=native)
+    rig = InlineRig(world, ground_settings(world), rig_name, folder, native=native, keys=keys)
     rig.run(show, speed)
     try:
         return Ran({path: rig.ask(path) for path in ASKED}, 1, 0)
@@ -186,6 +192,7 @@ def process_table(
     rig_name: str,
     endpoint: str,
     folder: Path,
+    keys_place: Path | None,
     transports: Transports,
     steps: Path,
 ) -> ProcessTable:
@@ -199,10 +206,11 @@ def process_table(
     from telemetry.runtime.hosting import Place
     from telemetry.transport.authentication import new_key
 
-    key_file = new_key(folder / "rig.key")
+    key_file = new_key(folder / "rig.key") if keys_place is None else None
 
     def place(name: str, address: int = BASE) -> Place:
-        return Place(rig_name, endpoint, private_folder(folder, name), key_file, transports.media_of(address), steps)
+        media = transports.media_of(address)
+        return Place(rig_name, endpoint, private_folder(folder, name), key_file, media, steps, keys_place)
 
     specs = {
         "medium": Spec(run_medium, (place("medium"), scenario, seed, speed, faults, True, True, transports)),
