@@ -7,7 +7,6 @@ answers for the rig. A key file goes to its process and nowhere else. Nothing he
 from __future__ import annotations
 
 import datetime
-import os
 import re
 import secrets
 import tomllib
@@ -16,6 +15,9 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
+from borechain.pki.access import ROLES
+from borechain.pki.certificates import ROUTER, make_authority, make_certificate
+from borechain.pki.private_files import write_private
 from telemetry.errors import KeyFileError
 from telemetry.messages import BASE, ENCODER, MAX_TUBE
 from telemetry.transport.key_ring import (
@@ -86,12 +88,15 @@ def init_rig(
         folder.chmod(0o700)
     except OSError as error:
         raise KeyFileError(f"folder {folder}: {error.strerror}") from error
+    make_authority(folder, rig, now)
+    for name in (ROUTER, *ROLES, *map(key_file_name, ALWAYS)):
+        make_certificate(folder, name, now)
     _write(folder, secret, ALWAYS)
     return secret
 
 
-def add_tube(folder: Path, tube: int) -> Path:
-    """Write the key file of a tube at its make-up; returns it.
+def add_tube(folder: Path, tube: int, now: datetime.datetime) -> Path:
+    """Write the key file of a tube at its make-up, and its certificate if it has none; returns the key file.
 
     Raises
     ------
@@ -104,6 +109,8 @@ def add_tube(folder: Path, tube: int) -> Path:
     if tube in secret.revoked:
         raise KeyFileError(f"tube {tube}: its keys were revoked; expected another number for another tube")
     write_private(_file_of(folder, tube), pack_ring(secret.ring(tube)))
+    if not (folder / f"{key_file_name(tube)}.key").exists():
+        make_certificate(folder, key_file_name(tube), now)
     return _file_of(folder, tube)
 
 
@@ -118,7 +125,8 @@ def revoke_tube(folder: Path, tube: int, now: datetime.datetime) -> RigSecret:
     secret = read_secret(folder)
     if not 1 <= tube <= MAX_TUBE:
         raise KeyFileError(f"tube: expected 1..{MAX_TUBE}, got {tube}")
-    _file_of(folder, tube).unlink(missing_ok=True)
+    for suffix in (SUFFIX, ".pem", ".key"):
+        (folder / f"{key_file_name(tube)}{suffix}").unlink(missing_ok=True)
     return _rotate(folder, replace(secret, revoked=secret.revoked | {tube}), now)
 
 
@@ -158,27 +166,6 @@ def tubes_of(folder: Path) -> list[int]:
     """Tubes that were given keys."""
     names = {_file_of(folder, tube).name: tube for tube in range(1, MAX_TUBE + 1)}
     return sorted(names[path.name] for path in folder.glob(f"*{SUFFIX}") if path.name in names)
-
-
-def write_private(path: Path, text: str) -> None:
-    """Write a file that its owner alone may read, whole or not at all.
-
-    Raises
-    ------
-    KeyFileError
-        When it cannot be written.
-    """
-    fresh = path.with_name(f".{path.name}.new")
-    try:
-        descriptor = os.open(fresh, os.O_WRONLY | os.O_CREAT | os.O_TRUNC, 0o600)
-        with os.fdopen(descriptor, "w", encoding="ascii") as file:
-            os.fchmod(file.fileno(), 0o600)
-            file.write(text)
-            file.flush()
-            os.fsync(file.fileno())
-        fresh.replace(path)
-    except OSError as error:
-        raise KeyFileError(f"key file {path}: {error.strerror}") from error
 
 
 def _rotate(folder: Path, secret: RigSecret, now: datetime.datetime) -> RigSecret:

@@ -53,7 +53,7 @@ def make_folder(folder: Path, tubes: int = 2) -> Path:
     """Keys of a rig."""
     init_rig(folder, "rig-1", NOW, random.Random(1).randbytes)
     for tube in range(1, tubes + 1):
-        add_tube(folder, tube)
+        add_tube(folder, tube, NOW)
     return folder
 
 

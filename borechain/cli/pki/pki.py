@@ -72,7 +72,7 @@ def tube(tube: int, folder: Path) -> None:
     from telemetry.errors import KeyFileError
 
     try:
-        path = add_tube(folder, tube)
+        path = add_tube(folder, tube, utc_now())
     except KeyFileError as error:
         raise InputFault(str(error)) from error
     click.echo(str(path))
