@@ -1,19 +1,25 @@
 """Who may do what at the router: zenoh's access control, by the common name of a client's certificate.
 
-What no rule allows is denied. A process writes its own port and nothing else, hears the ports of others, since the order of
-a string is found, and takes its steps where a stepper drives it. Everybody who has a certificate may be listed at once:
-a tube that comes later needs no restart of the router.
+What no rule allows is denied. A process writes its own port and nothing else, hears the ports of others, since the
+order of a string is found, and takes its steps where a stepper drives it. All tubes that there can be are listed at
+once, so one that comes later needs no restart of the router.
 """
 
 from __future__ import annotations
 
+import json
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Any
 
+from borechain.pki.private_files import write_file
 from telemetry import keys
+from telemetry.errors import KeyFileError
 from telemetry.messages import MAX_TUBE
 
+ROUTER = "router"
+ACCESS_FILE = "access.json"
 OPERATOR = "operator"  # reads what the ground station serves
 DRILLER = "driller"  # an operator who may order
 MEDIUM = "medium"  # the simulated world: it joins the ports of all
@@ -21,7 +27,8 @@ ROLES = (OPERATOR, DRILLER, MEDIUM)
 TOKEN = "borechain/{rig}/@liveliness/"
 LEASES = "borechain/{rig}/@lease/*"
 
-WRITES = ("writes", ("put", "delete"), ("declare_subscriber",))
+WRITES = ("writes", ("put", "delete"), ())
+IS_TOLD = ("is told", (), ("declare_subscriber",))  # who listens, which a port must know of its other end
 READS = ("reads", ("declare_subscriber",), ("put", "delete"))
 ASKS = ("asks", ("query",), ("reply", "declare_queryable"))
 ANSWERS = ("answers", ("declare_queryable", "reply"), ("query",))
@@ -42,17 +49,19 @@ def grants_of(rig: str, subject: str) -> list[Grant]:
     """Everything that the holder of a certificate may do; ``subject`` is its common name."""
     ground, command = keys.GROUND.format(rig=rig, path="**"), keys.COMMAND.format(rig=rig, name="**")
     depth, tokens = keys.DEPTH.format(rig=rig), TOKEN.format(rig=rig)
+    everything = (f"borechain/{rig}/**",)
+    told = Grant(IS_TOLD, everything)
     if subject == MEDIUM:
-        everything = (f"borechain/{rig}/**",)
-        return [Grant(way, everything) for way in (WRITES, READS, ASKS)] + [Grant(WATCHES, (f"{tokens}*",))]
+        return [told] + [Grant(way, everything) for way in (WRITES, READS, ASKS)] + [Grant(WATCHES, (f"{tokens}*",))]
     if subject in (OPERATOR, DRILLER):
         asked = (ground, command) if subject == DRILLER else (ground,)
         return [Grant(READS, (ground,)), Grant(ASKS, asked), Grant(WATCHES, (f"{tokens}*",))]
     if subject == "depth":
-        return [Grant(WRITES, (depth,))]
+        return [told, Grant(WRITES, (depth,))]
     own = subject.removeprefix("tube-")
     ports = f"borechain/{rig}/port"
     grants = [
+        told,
         Grant(WRITES, (f"{ports}/{own}/*/tx", keys.DONE.format(rig=rig, process=own))),
         Grant(READS, (f"{ports}/*/*/tx", f"{ports}/{own}/*/rx", keys.STEP.format(rig=rig, process=own))),
         Grant(LIVES, (f"{tokens}{own}",)),
@@ -75,7 +84,7 @@ def subjects(revoked: Iterable[int] = ()) -> list[str]:
 
 
 def access_control(rig: str, names: Sequence[str]) -> dict[str, Any]:
-    """zenoh's ``access_control`` for the holders of certificates with these names."""
+    """The value of zenoh's ``access_control`` for the holders of certificates with these names."""
     rules, policies = [], []
     for name in names:
         ids = []
@@ -101,3 +110,33 @@ def access_control(rig: str, names: Sequence[str]) -> dict[str, Any]:
         "subjects": [{"id": name, "cert_common_names": [name]} for name in names],
         "policies": policies,
     }
+
+
+def write_access(folder: Path, rig: str, revoked: Iterable[int]) -> None:
+    """Write what a router of the rig lets whom do, as a part of its configuration.
+
+    Raises
+    ------
+    KeyFileError
+        When it cannot be written.
+    """
+    settings = {"access_control": access_control(rig, subjects(revoked))}
+    write_file(folder / ACCESS_FILE, json.dumps(settings, indent=1) + "\n")
+
+
+def read_access(folder: Path) -> dict[str, Any]:
+    """What a router of the rig lets whom do.
+
+    Raises
+    ------
+    KeyFileError
+        When the folder does not say it.
+    """
+    path = folder / ACCESS_FILE
+    try:
+        found = json.loads(path.read_text())["access_control"]
+    except (OSError, ValueError, LookupError, TypeError):
+        found = None
+    if not isinstance(found, dict):
+        raise KeyFileError(f"{path}: expected the access control that borechain pki writes, got none")
+    return found

@@ -1,7 +1,7 @@
 """Certificates of a rig: an authority of its own, and one certificate for each process and role.
 
-They name who connects, for the router's access control, and let nobody else read. They end after 30 years: nothing ends in
-the middle of a hole. Whom the rig no longer believes the router no longer lets in (``access``).
+They name who connects, for the router's access control, and let nobody else read. They end after 30 years: nothing
+ends in the middle of a hole. Whom the rig no longer believes the router gives no rights any more (``access``).
 """
 
 from __future__ import annotations
@@ -14,6 +14,7 @@ from cryptography.hazmat.primitives import hashes, serialization
 from cryptography.hazmat.primitives.asymmetric.ec import SECP256R1, EllipticCurvePrivateKey, generate_private_key
 from cryptography.x509.oid import ExtendedKeyUsageOID, NameOID
 
+from borechain.pki.access import ROUTER
 from borechain.pki.private_files import read_private_key, write_file, write_private
 from telemetry.errors import KeyFileError
 from telemetry.media.credentials import CA_FILE
@@ -21,7 +22,6 @@ from telemetry.media.credentials import CA_FILE
 CA_KEY = "ca.key"
 VALID = datetime.timedelta(days=30 * 365)
 EARLIER = datetime.timedelta(days=1)  # for a board whose clock is late
-ROUTER = "router"
 
 
 def make_authority(folder: Path, rig: str, now: datetime.datetime) -> None:

@@ -15,18 +15,17 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
-from borechain.pki.access import ROLES
-from borechain.pki.certificates import ROUTER, make_authority, make_certificate
+from borechain.pki.access import ROLES, ROUTER, write_access
+from borechain.pki.certificates import make_authority, make_certificate
 from borechain.pki.private_files import write_private
 from telemetry.errors import KeyFileError
+from telemetry.media.credentials import DEPTH_SOURCE, file_name
 from telemetry.messages import BASE, ENCODER, MAX_TUBE
 from telemetry.transport.key_ring import (
-    DEPTH_SOURCE,
     MOST_GENERATION,
     SUFFIX,
     Generation,
     KeyRing,
-    key_file_name,
     keys_of,
     pack_ring,
     read_private,
@@ -89,7 +88,7 @@ def init_rig(
     except OSError as error:
         raise KeyFileError(f"folder {folder}: {error.strerror}") from error
     make_authority(folder, rig, now)
-    for name in (ROUTER, *ROLES, *map(key_file_name, ALWAYS)):
+    for name in (ROUTER, *ROLES, *map(file_name, ALWAYS)):
         make_certificate(folder, name, now)
     _write(folder, secret, ALWAYS)
     return secret
@@ -109,8 +108,8 @@ def add_tube(folder: Path, tube: int, now: datetime.datetime) -> Path:
     if tube in secret.revoked:
         raise KeyFileError(f"tube {tube}: its keys were revoked; expected another number for another tube")
     write_private(_file_of(folder, tube), pack_ring(secret.ring(tube)))
-    if not (folder / f"{key_file_name(tube)}.key").exists():
-        make_certificate(folder, key_file_name(tube), now)
+    if not (folder / f"{file_name(tube)}.key").exists():
+        make_certificate(folder, file_name(tube), now)
     return _file_of(folder, tube)
 
 
@@ -126,7 +125,7 @@ def revoke_tube(folder: Path, tube: int, now: datetime.datetime) -> RigSecret:
     if not 1 <= tube <= MAX_TUBE:
         raise KeyFileError(f"tube: expected 1..{MAX_TUBE}, got {tube}")
     for suffix in (SUFFIX, ".pem", ".key"):
-        (folder / f"{key_file_name(tube)}{suffix}").unlink(missing_ok=True)
+        (folder / f"{file_name(tube)}{suffix}").unlink(missing_ok=True)
     return _rotate(folder, replace(secret, revoked=secret.revoked | {tube}), now)
 
 
@@ -183,6 +182,7 @@ def _write(folder: Path, secret: RigSecret, addresses: Iterable[int]) -> None:
     """The secret last: until it is written the files of before the change can be made again."""
     for address in addresses:
         write_private(_file_of(folder, address), pack_ring(secret.ring(address)))
+    write_access(folder, secret.rig, secret.revoked)
     write_private(folder / SECRET_FILE, _pack_secret(secret))
 
 
@@ -204,4 +204,4 @@ def _generation_of(row: dict[str, Any]) -> SecretGeneration:
 
 
 def _file_of(folder: Path, address: int) -> Path:
-    return folder / f"{key_file_name(address)}{SUFFIX}"
+    return folder / f"{file_name(address)}{SUFFIX}"

@@ -5,7 +5,8 @@ from __future__ import annotations
 from collections.abc import Callable
 
 from telemetry.application.end_seal import UP, Pair, close_payload, open_sealed
-from telemetry.transport.key_ring import DEPTH_SOURCE, KeyRing
+from telemetry.media.credentials import DEPTH_SOURCE
+from telemetry.transport.key_ring import KeyRing
 
 NOBODY = Pair(0, 0)  # one direction has no session
 

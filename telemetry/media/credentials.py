@@ -7,8 +7,10 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from telemetry.errors import MediumError
+from telemetry.messages import BASE, ENCODER, address_name
 
 CA_FILE = "ca.pem"
+DEPTH_SOURCE = 252  # in place of an address: what measures the depth of the bit
 TLS = "tls/"
 OVER_A_NETWORK = ("tcp", "udp", "quic", "ws")
 
@@ -20,6 +22,28 @@ class Credentials:
     authority: Path
     certificate: Path
     key: Path
+
+
+def file_name(address: int) -> str:
+    """Name of the files of a process without their suffix, and the common name of its certificate."""
+    if address == DEPTH_SOURCE:
+        return "depth"
+    return address_name(address) if address in (BASE, ENCODER) else f"tube-{address}"
+
+
+def credentials_for(endpoint: str, place: Path | None, name: str) -> Credentials | None:
+    """Credentials that an endpoint asks for, from a folder of keys; None for one without TLS.
+
+    Raises
+    ------
+    MediumError
+        When there is no such folder, or a file is missing.
+    """
+    if not endpoint.startswith(TLS):
+        return None
+    if place is None:
+        raise MediumError(f"endpoint {endpoint}: expected --keys with it, where the certificates lie")
+    return credentials_of(place, name)
 
 
 def credentials_of(place: Path, name: str) -> Credentials:

@@ -21,9 +21,11 @@ from typing import TYPE_CHECKING, Any
 
 import setproctitle
 
+from telemetry.errors import MediumError
+from telemetry.media.credentials import TLS, credentials_for, file_name
 from telemetry.media.neighbours import own_ports, stepped_ports, stepped_ports_on
 from telemetry.media.zenoh_bus import ZenohBus, open_client, use_few_threads
-from telemetry.media.zenoh_port import CONNECT_TIMEOUT, ZenohMedium
+from telemetry.media.zenoh_port import CONNECT_TIMEOUT, WITH_KEYS, ZenohMedium
 from telemetry.messages import Side, address_name
 from telemetry.runtime.command_line import EnvironmentFault, fault_of
 from telemetry.runtime.event_loop import run, stop_on_signals
@@ -39,6 +41,7 @@ if TYPE_CHECKING:
 PR_SET_PDEATHSIG = 1
 ORPHAN_GRACE = 3.0  # wall s that a process has to end by itself when its launcher is gone
 TIMING_FILE = "timing.json"
+ZENOH = "zenoh:"
 
 
 @dataclass(frozen=True, slots=True)
@@ -62,9 +65,15 @@ class Place:
         with contextlib.closing(join_steps(self.steps, name)) as stream:
             yield stream
 
-    def medium_of(self, side: Side) -> str:
-        """Medium of one end."""
-        return self.media.get(side, f"zenoh:{self.endpoint}")
+    def medium_of(self, side: Side, address: int) -> str:
+        """Medium of one end of a process; over TLS with the certificate of its name."""
+        medium = self.media.get(side, f"{ZENOH}{self.endpoint}")
+        if not medium.startswith(ZENOH + TLS):
+            return medium
+        if self.keys is None:
+            raise MediumError(f"{medium}: expected --keys with it, where the certificates lie")
+        folder = self.keys if self.keys.is_dir() else self.keys.parent
+        return f"{medium}{WITH_KEYS}{folder / file_name(address)}"
 
 
 @dataclass(frozen=True, slots=True)
@@ -100,7 +109,7 @@ async def live_by_own_clock(
     """``run_by_own_clock`` on the running loop."""
     timing = CycleTiming()
     make_folder(place)
-    media = {side: place.medium_of(side) for side in own_time.neighbours}
+    media = {side: place.medium_of(side, address) for side in own_time.neighbours}
     with (
         contextlib.closing(build(timing)) as process,
         own_ports(place.rig, address, own_time.neighbours, media) as ports,
@@ -128,7 +137,7 @@ def run_stepped(name: str, place: Place, address: int, build: Callable[[], Proce
         make_folder(place)
         process = build()
         with (
-            joined(place) as bus,
+            joined(place, file_name(address)) as bus,
             stepped_ports_on(place.rig, address, place.media) as chosen,
             place.step_stream(address_name(address)) as stream,
         ):
@@ -140,8 +149,10 @@ def run_stepped(name: str, place: Place, address: int, build: Callable[[], Proce
 
 
 @contextlib.contextmanager
-def joined(place: Place) -> Iterator[ZenohBus]:
+def joined(place: Place, name: str) -> Iterator[ZenohBus]:
     """Session of a process at its rig; a folder that cannot be made is reported before waiting for a router.
+
+    ``name`` is that of its certificate.
 
     Raises
     ------
@@ -151,7 +162,8 @@ def joined(place: Place) -> Iterator[ZenohBus]:
         When no router answers.
     """
     make_folder(place)
-    with open_client(place.endpoint, timeout=CONNECT_TIMEOUT) as bus:
+    credentials = credentials_for(place.endpoint, place.keys, name)
+    with open_client(place.endpoint, CONNECT_TIMEOUT, credentials) as bus:
         yield bus
 
 

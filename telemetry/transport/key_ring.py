@@ -30,11 +30,11 @@ from pathlib import Path
 from typing import Any
 
 from telemetry.errors import KeyFileError
-from telemetry.messages import BASE, ENCODER, address_name
+from telemetry.media.credentials import DEPTH_SOURCE, file_name
+from telemetry.messages import BASE, ENCODER
 from telemetry.transport.seal import SEAL_KEY_SIZE, SealKey
 
 FORMAT = 1
-DEPTH_SOURCE = 252  # in place of an address: what measures the depth of the bit
 ADDRESSES = range(BASE + 1)
 BLOCK_KEY_SIZE = 32
 MOST_GENERATION = 255
@@ -133,22 +133,15 @@ def keys_of(secret: Secret, address: int, revoked: Iterable[int] = ()) -> dict[t
     return keys
 
 
-def key_file_name(address: int) -> str:
-    """Name of the key file of a process without its suffix."""
-    if address == DEPTH_SOURCE:
-        return "depth"
-    return address_name(address) if address in (BASE, ENCODER) else f"tube-{address}"
-
-
 def key_file(place: Path, address: int) -> Path:
     """Key file of a process: the file itself, or the one with its name in a folder."""
-    return place / f"{key_file_name(address)}{SUFFIX}" if place.is_dir() else place
+    return place / f"{file_name(address)}{SUFFIX}" if place.is_dir() else place
 
 
 def pack_ring(ring: KeyRing) -> str:
     """Text of a key file."""
     lines = [
-        f"# keys of {key_file_name(ring.address)} of the rig {ring.rig}; whoever has them speaks for it",
+        f"# keys of {file_name(ring.address)} of the rig {ring.rig}; whoever has them speaks for it",
         f"format = {FORMAT}",
         f'rig = "{ring.rig}"',
         f"address = {ring.address}",
@@ -178,7 +171,7 @@ def read_ring(path: Path, address: int, now: datetime.datetime | None = None) ->
     except (KeyError, TypeError, ValueError, AttributeError):
         raise KeyFileError(f"key file {path}: expected keys as borechain pki writes them, got something else") from None
     if ring.address != address:
-        expected, got = key_file_name(address), key_file_name(ring.address)
+        expected, got = file_name(address), file_name(ring.address)
         raise KeyFileError(f"key file {path}: expected keys of {expected}, got those of {got}")
     return _in_use(ring, path, now or datetime.datetime.now(datetime.UTC))
 

@@ -19,12 +19,13 @@ from telemetry.application.end_seal import OVERHEAD as END_OVERHEAD
 from telemetry.application.measurement_seal import MeasurementSeal
 from telemetry.application.seal_watch import SealWatch
 from telemetry.application.seals import Keys, Seals
+from telemetry.media.credentials import DEPTH_SOURCE
 from telemetry.messages import BASE, ENCODER, DepthReading, Event, Severity, Side
 from telemetry.presentation.msgpack_codec import encode
 from telemetry.schema import Kind
 from telemetry.transport.hop import MAX_FRAME
 from telemetry.transport.joint_seal import HEAD, JointSeal
-from telemetry.transport.key_ring import DEPTH_SOURCE, Generation, KeyRing, key_file, read_ring
+from telemetry.transport.key_ring import Generation, KeyRing, key_file, read_ring
 from telemetry.transport.seal import TAG_SIZE, WINDOW, ReplayWindow, SealKey
 
 

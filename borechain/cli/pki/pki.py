@@ -9,6 +9,7 @@ import click
 
 from borechain.cli.faults import plain_faults
 from telemetry import keys
+from telemetry.messages import MAX_TUBE
 from telemetry.runtime.command_line import InputFault
 
 folder_option = click.option(
@@ -37,19 +38,26 @@ def pki() -> None:
 @pki.command()
 @folder_option
 @click.option("--rig", "rig_name", default=keys.DEFAULT_RIG, show_default=True, help="Name of the rig.")
+@click.option("--tubes", type=click.IntRange(0, MAX_TUBE), default=0, help="Also make the keys of tubes 1 to so many.")
+@click.option("--if-new", is_flag=True, help="Do nothing where the folder holds keys already.")
 @plain_faults
-def init(folder: Path, rig_name: str) -> None:
-    """Make the folder of a rig: its secret, and keys of base, encoder and depth source.
+def init(folder: Path, rig_name: str, tubes: int, if_new: bool) -> None:
+    """Make the folder of a rig: its secret, and keys and certificates of all that every rig has.
 
     \b
     Example:
       borechain pki init --folder stick --rig rig-1
     """
-    from borechain.pki.rig_keys import init_rig
+    from borechain.pki.rig_keys import SECRET_FILE, add_tube, init_rig
     from telemetry.errors import KeyFileError
 
+    if if_new and (folder / SECRET_FILE).exists():
+        click.echo(f"{folder}: holds keys already")
+        return
     try:
         init_rig(folder, rig_name, utc_now())
+        for number in range(1, tubes + 1):
+            add_tube(folder, number, utc_now())
     except KeyFileError as error:
         raise InputFault(str(error)) from error
     click.echo(

@@ -18,7 +18,7 @@ from borechain.cli.notices import warnings_in_lines
 from borechain.cli.options import fault_option, json_option, scenario_argument, seed_option, speed_option
 from borechain.cli.tables import console
 from telemetry import keys
-from telemetry.runtime.options import keys_option
+from telemetry.runtime.options import endpoint_option, insecure_option, keys_option
 
 if TYPE_CHECKING:
     from sim.rig.launcher import Tick
@@ -48,7 +48,8 @@ PRELOAD = {"float64": "borechain.warm", "fixed": "borechain.warm_all", "publishe
 @click.option(
     "--rig", "rig_name", default=keys.DEFAULT_RIG, show_default=True, help="Name of the rig in key expressions."
 )
-@click.option("--endpoint", default=keys.DEFAULT_ENDPOINT, show_default=True, help="Where the rig's router listens.")
+@insecure_option
+@endpoint_option("Where the rig's router listens.")
 @keys_option
 @click.option(
     "--out", type=click.Path(path_type=Path), help="New or empty folder for the run  [default: out/NAME/run-NNNN]"
@@ -109,7 +110,10 @@ def rig(
                     endpoint,
                     show,
                     transport,
-                    partial(process_table, world, scenario, seed, speed, faults, rig_name, endpoint, folder, keys_place),
+                    partial(
+                        process_table, world, scenario, seed, speed, faults, rig_name, endpoint, folder, keys_place
+                    ),
+                    keys_place,
                 )
     except KeyboardInterrupt:
         raise EnvironmentFault(f"interrupted; every process was ended, what was stored is in {folder}") from None
@@ -147,17 +151,21 @@ def drill_in_processes(
     show: Callable[[Tick | Progress], None],
     transport: str | None,
     table_of: Callable[[Transports, Path], ProcessTable],
+    keys_place: Path | None = None,
 ) -> Ran:
     """Drill with one real process a tube, beside a hub of CAN segments where a joint is on CAN."""
+    from borechain.pki.access import MEDIUM
     from sim.rig.launcher import Launcher
     from sim.rig.transports import carrying
+    from telemetry.media.credentials import credentials_for
 
     with (
         carrying(transport, world.scenario.medium.transports) as transports,
         tempfile.TemporaryDirectory(prefix="borechain-") as steps,  # a socket's path must be short
     ):
         table = table_of(transports, Path(steps) / "steps")
-        launcher = Launcher(table, rig_name, endpoint, show, operator_of(world, rig_name))
+        credentials = credentials_for(endpoint, keys_place, MEDIUM)
+        launcher = Launcher(table, rig_name, endpoint, show, operator_of(world, rig_name), credentials=credentials)
         answers = launcher.run(lambda bus: ask(bus, rig_name))
         return Ran(answers, len(table.specs), sum(table.restarts.values()))
 
