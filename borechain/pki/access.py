@@ -47,15 +47,17 @@ class Grant:
 
 def grants_of(rig: str, subject: str) -> list[Grant]:
     """Everything that the holder of a certificate may do; ``subject`` is its common name."""
-    ground, command = keys.GROUND.format(rig=rig, path="**"), keys.COMMAND.format(rig=rig, name="**")
+    ground = keys.GROUND.format(rig=rig, path="**")
+    # who asks need not know the name of the rig: the authority, and so the router, is that of one rig
+    ground_of_any, command_of_any = keys.GROUND.format(rig="*", path="**"), keys.COMMAND.format(rig="*", name="**")
     depth, tokens = keys.DEPTH.format(rig=rig), TOKEN.format(rig=rig)
     everything = (f"borechain/{rig}/**",)
     told = Grant(IS_TOLD, everything)
     if subject == MEDIUM:
         return [told] + [Grant(way, everything) for way in (WRITES, READS, ASKS)] + [Grant(WATCHES, (f"{tokens}*",))]
     if subject in (OPERATOR, DRILLER):
-        asked = (ground, command) if subject == DRILLER else (ground,)
-        return [Grant(READS, (ground,)), Grant(ASKS, asked), Grant(WATCHES, (f"{tokens}*",))]
+        asked = (ground_of_any, command_of_any) if subject == DRILLER else (ground_of_any,)
+        return [Grant(READS, (ground_of_any,)), Grant(ASKS, asked), Grant(WATCHES, (f"{tokens}*",))]
     if subject == "depth":
         return [told, Grant(WRITES, (depth,))]
     own = subject.removeprefix("tube-")
@@ -70,7 +72,7 @@ def grants_of(rig: str, subject: str) -> list[Grant]:
         grants += [
             Grant(WRITES, (ground,)),
             Grant(READS, (depth,)),
-            Grant(ANSWERS, (ground, command)),
+            Grant(ANSWERS, (ground_of_any, command_of_any)),
             Grant(LIVES, (LEASES.format(rig=rig),)),
             Grant(WATCHES, (LEASES.format(rig=rig),)),
         ]

@@ -48,7 +48,8 @@ def buses(folder: Path, endpoint: str) -> Iterator[dict[str, ZenohBus]]:
         }
 
         def answer(query: Query) -> None:
-            query.reply(query.selector_key, b"answered")
+            key = query.selector_key.replace("/*/", f"/{RIG}/")
+            query.reply(key if "*" not in key else STATUS, b"answered")
             query.finish()
 
         for path in ("ground/**", "cmd/**"):
@@ -117,7 +118,9 @@ def test_the_depth_comes_from_its_source_alone(buses: dict[str, ZenohBus]) -> No
 
 def test_an_operator_asks_and_does_not_order_a_driller_does_both(buses: dict[str, ZenohBus]) -> None:
     assert answers(buses["operator"], STATUS) == [b"answered"]
-    assert answers(buses["operator"], ORDER) == []
+    assert answers(buses["operator"], "borechain/*/ground/trajectory?md=4..12") == [b"answered"]
+    assert answers(buses["operator"], ORDER) == answers(buses["operator"], "borechain/*/cmd/take_survey?tube=1") == []
+    assert answers(buses["operator"], "borechain/**") == []
     assert answers(buses["driller"], STATUS) == [b"answered"]
     assert answers(buses["driller"], ORDER) == [b"answered"]
     assert answers(buses["tube-1"], STATUS) == answers(buses["tube-1"], ORDER) == []
