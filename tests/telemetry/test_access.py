@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import contextlib
 import queue
+import textwrap
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -13,11 +14,13 @@ from sealed_string import make_folder
 
 from borechain.pki.access import read_access
 from telemetry import keys
+from telemetry.application.seals import seals_of
 from telemetry.errors import MediumError
 from telemetry.keys import port_key
 from telemetry.media.credentials import Credentials, credentials_of
 from telemetry.media.zenoh_bus import Publisher, Query, ZenohBus, open_client, open_router
-from telemetry.messages import BASE, Side
+from telemetry.messages import BASE, DepthReading, Side
+from telemetry.presentation.msgpack_codec import decode
 
 pytestmark = pytest.mark.slow
 RIG = "rig-1"
@@ -129,6 +132,22 @@ def test_an_operator_asks_and_does_not_order_a_driller_does_both(buses: dict[str
 def test_an_operator_hears_the_ground_station_and_no_port(buses: dict[str, ZenohBus]) -> None:
     port = port_key(RIG, BASE, Side.LOWER, "tx")
     assert heard(buses["base"], buses["operator"], port, STATUS) == [STATUS]
+
+
+def test_a_source_of_the_depth_as_the_page_writes_it_is_believed(
+    buses: dict[str, ZenohBus], endpoint: str, folder: Path
+) -> None:
+    page = (Path(__file__).parents[2] / "docs" / "deploy.md").read_text()
+    lines = page.partition("    from pathlib import Path\n")[2].partition("\n\n## ")[0]
+    program = textwrap.dedent(f"    from pathlib import Path\n{lines}")
+    arrived: queue.SimpleQueue[bytes] = queue.SimpleQueue()
+    buses["base"].subscribe(keys.DEPTH.format(rig=RIG), lambda _key, payload: arrived.put(payload))
+    exec(program.replace("tls/surface:7447", endpoint).replace("/etc/borechain", str(folder)), {})
+    seals = seals_of(folder, BASE, [Side.LOWER])
+    assert seals is not None
+    reading = decode(seals.depth_content(arrived.get(timeout=WAIT)) or b"")
+    assert isinstance(reading, DepthReading)
+    assert (reading.at, reading.md) == (12.5, 3.2)
 
 
 def test_a_client_without_a_certificate_of_the_rig_gets_nowhere(endpoint: str, folder: Path, tmp_path: Path) -> None:
