@@ -13,7 +13,8 @@ from borechain.pki.rig_keys import add_tube, init_rig, rotate_keys
 from sim.rig.scheduler import Progress
 from sim.world.scenario import load_scenario
 from sim.world.world import World
-from telemetry.messages import BASE, ENCODER, SurveyMeasurement
+from telemetry.messages import BASE, ENCODER, DepthReading, Side, SurveyMeasurement
+from telemetry.presentation.msgpack_codec import encode
 
 
 def make_keys(folder: Path) -> Path:
@@ -41,7 +42,7 @@ def test_a_rig_over_tls_survives_the_power_cut_of_a_node(tmp_path: Path) -> None
     assert not any(secret in held for secret in secrets if len(secret) >= 32)
 
 
-def test_keys_change_in_the_middle_of_a_hole_and_no_survey_is_lost(tmp_path: Path) -> None:
+def test_keys_change_in_the_middle_of_a_hole_and_forgers_come_and_no_survey_is_lost(tmp_path: Path) -> None:
     keys = make_keys(tmp_path / "stick")
     world = World(load_scenario(REPOSITORY / "scenarios" / "rig-3.toml", ()), 1)
     middle = 0.5 * (world.begin + world.end)
@@ -51,6 +52,14 @@ def test_keys_change_in_the_middle_of_a_hole_and_no_survey_is_lost(tmp_path: Pat
         if not changed and progress.rig_time > middle:
             changed.append(progress.rig_time)
             rotate_keys(keys, datetime.datetime.now(datetime.UTC))
+        if len(changed) == 1 and progress.rig_time > middle + 20.0:
+            changed.append(progress.rig_time)
+            for address in (BASE, ENCODER, 2):
+                now = world.local_clock(address, progress.rig_time)
+                for frame in (b"\x01" * 60, b"\x00" * 60):
+                    rig.stepper.processes[address].on_frame(Side.LOWER, frame, now)
+            now = world.local_clock(BASE, progress.rig_time)
+            rig.stepper.processes[BASE].on_depth(encode(DepthReading(10**9, progress.rig_time, 0.0, ())), now)
 
     rig = InlineRig(world, ground_settings(world), "rig-1", tmp_path, keys=keys)
     try:
@@ -61,9 +70,12 @@ def test_keys_change_in_the_middle_of_a_hole_and_no_survey_is_lost(tmp_path: Pat
         newest = {a: processes[a].endpoint.seals.ring.newest for a in (BASE, ENCODER, 1, 2, 3)}  # type: ignore[union-attr]
     finally:
         rig.close()
-    assert changed
+    assert len(changed) == 2
     assert set(newest.values()) == {2}
     assert result["missing"] == []
     assert result["measurements"] == 6
     assert sum(isinstance(message, SurveyMeasurement) for message in stored) == 6
-    assert seal_alarms(result["rig_alarms"]) == []
+    told = {row["subject"]: str(row["detail"]) for row in seal_alarms(result["rig_alarms"])}
+    assert told.keys() == {"ground station", "encoder", "tube 2"}
+    assert told["ground station"].startswith("3 refused")
+    assert told["encoder"].startswith("2 refused")
