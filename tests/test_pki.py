@@ -124,6 +124,8 @@ def test_keys_of_another_process_or_of_nobody_are_refused(folder: Path) -> None:
         seals_of(folder / "tube-1.keys", 2, Side)
     with pytest.raises(KeyFileError, match=r"tube-9\.keys: No such file"):
         seals_of(folder, 9, Side)
+    with pytest.raises(KeyFileError, match="expected keys of rig-2, got those of rig-1"):
+        seals_of(folder, 1, Side, rig="rig-2")
     with pytest.raises(KeyFileError, match="a reach of 2"):
         seals_of(folder, 1, Side, reach=2)
     assert seals_of(None, 1, Side) is None

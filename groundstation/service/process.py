@@ -76,7 +76,7 @@ class GroundProcess(Process):
         if config.keys is not None:
             from telemetry.application.seals import seals_of  # without keys no cryptography is loaded
 
-            seals = seals_of(config.keys, BASE, [Side.LOWER])
+            seals = seals_of(config.keys, BASE, [Side.LOWER], rig=config.rig)
         self._uploads = uploads_of(config, seals)
         self.store = Store(config.url)
         # by lot, not counted: a database that was deleted or restored must not repeat a number that the string has seen

@@ -22,13 +22,13 @@ if TYPE_CHECKING:
     from telemetry.application.seals import Seals
 
 
-def seals_at(place: Path | None, address: int, reach: int) -> Seals | None:
+def seals_at(place: Path | None, address: int, reach: int, rig: str | None = None) -> Seals | None:
     """Seals of a process with an end on either side; without keys no cryptography is loaded."""
     if place is None:
         return None
     from telemetry.application.seals import seals_of
 
-    return seals_of(place, address, Side, reach)
+    return seals_of(place, address, Side, reach, rig)
 
 
 def run_node(
@@ -37,7 +37,7 @@ def run_node(
     """Node of one tube until a signal comes; ``imus`` are its own sensors."""
     leave_blas_out()
     key = read_key(place.key_file) if place.key_file is not None else None
-    seals = seals_at(place.keys, settings.tube, settings.reach)
+    seals = seals_at(place.keys, settings.tube, settings.reach, place.rig)
 
     def build(timing: CycleTiming | None = None) -> TubeProcess:
         return TubeProcess(settings, place.folder, key=key, imus=imus, timing=timing, seals=seals)
@@ -62,7 +62,7 @@ def run_encoder(
     ``reach`` is of its radio, in tubes.
     """
     leave_blas_out()
-    seals = seals_at(place.keys, ENCODER, reach)
+    seals = seals_at(place.keys, ENCODER, reach, place.rig)
 
     def build(timing: CycleTiming | None = None) -> EncoderProcess:
         return EncoderProcess(place.folder, source, torque, timing, reach, seals)

@@ -220,16 +220,22 @@ class Seals:
         return {name: count for name, count in self.counters().items() if name not in NO_FAILURES}
 
 
-def seals_of(place: Path | None, address: int, sides: Iterable[Side], reach: int = 1) -> Seals | None:
+def seals_of(
+    place: Path | None, address: int, sides: Iterable[Side], reach: int = 1, rig: str | None = None
+) -> Seals | None:
     """Seals of a process whose keys lie in a file, or in a folder in a file of its name; None without a place.
 
     Raises
     ------
     KeyFileError
-        When there are no keys that may be used, or a radio hears more than the next tube: a frame is sealed for one.
+        When there are no keys that may be used, or those of another rig than ``rig``, or a radio hears more than the
+        next tube: a frame is sealed for one.
     """
     if place is None:
         return None
     if reach > 1:
         raise KeyFileError(f"--keys: expected joints of which each hears its neighbour alone, got a reach of {reach}")
-    return Seals(Keys(key_file(place, address), address), address, sides)
+    keys = Keys(key_file(place, address), address)
+    if rig is not None and keys.ring.rig != rig:
+        raise KeyFileError(f"key file {key_file(place, address)}: expected keys of {rig}, got those of {keys.ring.rig}")
+    return Seals(keys, address, sides)

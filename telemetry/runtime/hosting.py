@@ -27,7 +27,7 @@ from telemetry.media.neighbours import own_ports, stepped_ports, stepped_ports_o
 from telemetry.media.zenoh_bus import ZenohBus, open_client, use_few_threads
 from telemetry.media.zenoh_port import CONNECT_TIMEOUT, WITH_KEYS, ZenohMedium
 from telemetry.messages import Side, address_name
-from telemetry.runtime.command_line import EnvironmentFault, fault_of
+from telemetry.runtime.command_line import EnvironmentFault, InputFault, fault_of
 from telemetry.runtime.event_loop import run, stop_on_signals
 from telemetry.runtime.own_clock import OwnClock, OwnClockLoop
 from telemetry.runtime.process import Process
@@ -55,6 +55,13 @@ class Place:
     media: Mapping[Side, str] = field(default_factory=dict)  # of each end, such as can:can0; zenoh at the endpoint else
     steps: Path | None = None  # socket of the stepper; its steps come by zenoh else
     keys: Path | None = None  # file or folder of the keys of this process; without it everybody is believed
+
+    def __post_init__(self) -> None:
+        """Refuse two kinds of keys at once."""
+        if self.key_file is not None and self.keys is not None:
+            raise InputFault(
+                "--key-file and --keys: expected one of them; --keys holds the key of parameter blocks too"
+            )
 
     @contextlib.contextmanager
     def step_stream(self, name: str) -> Iterator[StepStream | None]:
