@@ -139,13 +139,18 @@ def test_a_clock_that_is_wrong_warns_and_stops_nobody(folder: Path) -> None:
     assert read_ring(folder / "tube-1.keys", 1, NOW).warnings == ()
 
 
-def test_both_generations_are_valid_for_a_day_and_the_newest_for_ever(folder: Path) -> None:
+def test_the_keys_of_before_are_warned_of_after_a_day_and_end_when_the_crew_says_so(folder: Path) -> None:
     rotate_keys(folder, NOW)
     path, day = folder / "tube-1.keys", datetime.timedelta(days=1)
-    numbers = [[g.number for g in read_ring(path, 1, NOW + k * day / 2).generations] for k in (0, 1, 3, 10_000)]
-    assert numbers == [[1, 2], [1, 2], [2], [2]]
+    rings = [read_ring(path, 1, NOW + k * day / 2) for k in (0, 1, 3, 10_000)]
+    assert [[g.number for g in ring.generations] for ring in rings] == [[1, 2]] * 4
+    assert [len(ring.warnings) for ring in rings] == [0, 0, 1, 1]
+    assert "generation 1 was valid until 2026-05-05 06:00 UTC" in rings[2].warnings[0]
     rotate_keys(folder, NOW)
     assert [g.number for g in read_ring(path, 1, NOW).generations] == [2, 3]
+    assert run(folder, "retire").output == f"generation 3 alone is in every file of {folder}\n"
+    assert [g.number for g in read_ring(path, 1, NOW + 9 * day).generations] == [3]
+    assert read_ring(path, 1, NOW + 9 * day).warnings == ()
 
 
 def test_a_key_file_that_changes_badly_while_its_process_runs_is_told_and_not_used(folder: Path) -> None:

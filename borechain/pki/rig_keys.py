@@ -140,6 +140,20 @@ def rotate_keys(folder: Path, now: datetime.datetime) -> RigSecret:
     return _rotate(folder, read_secret(folder), now)
 
 
+def retire_keys(folder: Path) -> RigSecret:
+    """Leave the keys of before the newest out of every file: all that matter have new ones.
+
+    Raises
+    ------
+    KeyFileError
+        When the folder holds no rig's keys.
+    """
+    secret = read_secret(folder)
+    retired = replace(secret, generations=secret.generations[-1:])
+    _write(folder, retired, [*ALWAYS, *tubes_of(folder)])
+    return retired
+
+
 def read_secret(folder: Path) -> RigSecret:
     """The secret of a rig's folder.
 

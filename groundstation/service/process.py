@@ -189,7 +189,9 @@ class GroundProcess(Process):
         dropped = self.endpoint.dropped
         alarms.hold("queue", "ground station", f"{dropped} dropped" if dropped else "")
         self._seal_watch.look(now)
-        alarms.hold("key_file", "ground station", self.endpoint.seals.fault if self.endpoint.seals is not None else "")
+        alarms.hold(
+            "key_file", "ground station", self.endpoint.seals.trouble if self.endpoint.seals is not None else ""
+        )
         for tube, (first, last) in self.watch.gaps_to_ask(now):
             self._ask_again(tube, first, last)
         self.operator.expire_orders(now)

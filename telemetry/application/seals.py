@@ -177,9 +177,9 @@ class Seals:
         return self._keys.ring
 
     @property
-    def fault(self) -> str:
-        """Why the key file as it is now is not used, or empty."""
-        return self._keys.fault
+    def trouble(self) -> str:
+        """Why the key file as it is now is not used, or what is odd about the keys in use; or empty."""
+        return self._keys.fault or "; ".join(self._keys.ring.warnings)
 
     def frames_of(self, side: Side, frames: Iterable[Frame], now: float) -> list[Frame]:
         """Sealed frames of a link, and before them the call or answer that is due at ``now`` (s).

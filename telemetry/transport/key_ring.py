@@ -13,8 +13,8 @@ depth        readings of the depth                       the source of the depth
 block        segments of a parameter block               the tube, the base
 ===========  ==========================================  ===================================
 
-A key file holds the newest generation and the one before it until that is retired. A process that runs goes on with
-both, whatever the clock says: nothing ends in the middle of a hole.
+A key file holds the newest generation and the one before it. That one is valid for a day; then it is warned of and
+still used, until the crew ends it: nothing ends in the middle of a hole because of a clock.
 """
 
 from __future__ import annotations
@@ -156,7 +156,7 @@ def pack_ring(ring: KeyRing) -> str:
 
 
 def read_ring(path: Path, address: int, now: datetime.datetime | None = None) -> KeyRing:
-    """Keys of the process ``address`` from their file; a generation retired before ``now`` (UTC) is left out.
+    """Keys of the process ``address`` from their file; what is odd about it at ``now`` (UTC) is a warning.
 
     Raises
     ------
@@ -173,7 +173,7 @@ def read_ring(path: Path, address: int, now: datetime.datetime | None = None) ->
     if ring.address != address:
         expected, got = file_name(address), file_name(ring.address)
         raise KeyFileError(f"key file {path}: expected keys of {expected}, got those of {got}")
-    return _in_use(ring, path, now or datetime.datetime.now(datetime.UTC))
+    return _warned(ring, path, now or datetime.datetime.now(datetime.UTC))
 
 
 def read_private(path: Path) -> str:
@@ -224,15 +224,14 @@ def _generation_of(row: dict[str, Any]) -> Generation:
     return Generation(number, keys, made_at, retires_at)
 
 
-def _in_use(ring: KeyRing, path: Path, now: datetime.datetime) -> KeyRing:
-    """The ring without retired generations, and what is odd about it: a board without a clock still drills."""
-    generations = tuple(
-        g for g in ring.generations if g.number == ring.newest or g.retires_at is None or g.retires_at > now
-    )
-    warnings = tuple(
-        f"key file {path}: generation {g.number} was made at {g.made_at:%Y-%m-%d %H:%M} UTC, which is in the future; "
-        "expected a clock that is set; the keys are used"
-        for g in generations
-        if g.made_at > now + AHEAD_WARNED
-    )
-    return KeyRing(ring.rig, ring.address, generations, ring.revoked, warnings)
+def _warned(ring: KeyRing, path: Path, now: datetime.datetime) -> KeyRing:
+    """The ring with what is odd about it; a board without a clock drills all the same."""
+    warnings = []
+    for g in ring.generations:
+        if g.made_at > now + AHEAD_WARNED:
+            when = f"was made at {g.made_at:%Y-%m-%d %H:%M} UTC, which is in the future"
+            warnings.append(f"key file {path}: generation {g.number} {when}; expected a clock that is set")
+        if g.retires_at is not None and g.retires_at <= now and g.number != ring.newest:
+            since = f"was valid until {g.retires_at:%Y-%m-%d %H:%M} UTC"
+            warnings.append(f"key file {path}: generation {g.number} {since}; borechain pki retire ends it")
+    return KeyRing(ring.rig, ring.address, ring.generations, ring.revoked, tuple(warnings))

@@ -84,6 +84,7 @@ def test_what_is_honest_arrives_under_seals_and_nothing_is_counted(folder: Path)
     assert string.endpoints[1].hops == 2
 
 
+@pytest.mark.slow
 def test_restarts_of_everybody_cost_no_survey_and_count_as_no_attack(folder: Path) -> None:
     string = SealedString(folder)
     string.settle()
@@ -150,6 +151,7 @@ def forgeries(folder: Path, count: int) -> int:
     return believed
 
 
+@pytest.mark.slow
 def test_no_random_tag_is_believed(folder: Path) -> None:
     assert forgeries(folder, 2_000) == 0
 
@@ -160,6 +162,7 @@ def test_no_random_tag_of_a_million_is_believed(folder: Path) -> None:
     assert forgeries(folder, 1_000_000) == 0
 
 
+@pytest.mark.slow
 @given(st.lists(st.integers(0, 300), max_size=400))
 def test_a_window_admits_each_number_once_and_none_far_behind(numbers: list[int]) -> None:
     window, admitted, largest = ReplayWindow(), set(), -1
@@ -215,6 +218,7 @@ def test_a_stolen_tube_speaks_for_no_other(folder: Path) -> None:
     assert string.counts()["seal_end_spliced"] == 1
 
 
+@pytest.mark.slow
 def test_a_revoked_tube_is_believed_nothing(tmp_path: Path) -> None:
     from borechain.pki.rig_keys import revoke_tube
 
@@ -235,6 +239,7 @@ def test_a_revoked_tube_is_believed_nothing(tmp_path: Path) -> None:
     assert string.counts()["seal_wrong_tag"] > 0
 
 
+@pytest.mark.slow
 def test_keys_rotated_on_a_string_that_works_cost_no_message(tmp_path: Path) -> None:
     """Base and encoder get the new keys at once, tube 2 later, tube 1 not at all."""
     from borechain.pki.rig_keys import rotate_keys

@@ -32,6 +32,7 @@ def pki() -> None:
       borechain pki tube 7
       borechain pki revoke 7
       borechain pki rotate
+      borechain pki retire
     """
 
 
@@ -94,7 +95,7 @@ def revoke(tube: int, folder: Path) -> None:
     """Have TUBE believed nothing, and make new keys for all others.
 
     Take the new files to the base, the encoder and every tube that can be reached; a tube that has not got its file yet
-    goes on with its old keys for a day, and longer where a hole is being drilled.
+    goes on with its old keys, and lets TUBE speak where it is its neighbour.
 
     \b
     Example:
@@ -114,7 +115,7 @@ def revoke(tube: int, folder: Path) -> None:
 @folder_option
 @plain_faults
 def rotate(folder: Path) -> None:
-    """Make new keys for everybody; those of before are valid for a day.
+    """Make new keys for everybody; those of before are valid for a day, and warned of after that.
 
     \b
     Example:
@@ -132,6 +133,26 @@ def rotate(folder: Path) -> None:
     click.echo(
         f"generation {newest.number} is in every file of {folder}; generation {before.number} is valid until {until}"
     )
+
+
+@pki.command()
+@folder_option
+@plain_faults
+def retire(folder: Path) -> None:
+    """End the keys of before the last change: everybody who matters has the new ones.
+
+    \b
+    Example:
+      borechain pki retire --folder stick
+    """
+    from borechain.pki.rig_keys import retire_keys
+    from telemetry.errors import KeyFileError
+
+    try:
+        secret = retire_keys(folder)
+    except KeyFileError as error:
+        raise InputFault(str(error)) from error
+    click.echo(f"generation {secret.generations[-1].number} alone is in every file of {folder}")
 
 
 def utc_now() -> datetime.datetime:
