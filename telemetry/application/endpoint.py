@@ -411,8 +411,11 @@ class Endpoint:
             self._pass(Side.UPPER, opened.envelope, payload)
             return None
         message = self._heard(opened, payload, now)
-        if isinstance(message, Reply) and not self._commands.settle(message.sequence):
-            return None
+        if isinstance(message, Reply):
+            order = self._commands.payload(message.sequence)
+            if order is None or peek(order).target != message.tube:
+                return None  # answered already, or by somebody who was not asked
+            self._commands.settle(message.sequence)
         return message
 
     def _handle_downward(self, opened: Opened, payload: bytes, now: float) -> Message | None:

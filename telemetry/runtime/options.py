@@ -62,6 +62,12 @@ def parse_endpoint(context: click.Context, _parameter: click.Parameter, value: s
     return value
 
 
+def secure_endpoint(context: click.Context, _parameter: click.Parameter, value: str) -> str:
+    """An address that is looked at more closely before it is used."""
+    check_secure(context, value)
+    return value
+
+
 def check_secure(context: click.Context, endpoint: str) -> None:
     """Refuse an endpoint on a network without TLS.
 

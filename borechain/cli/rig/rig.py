@@ -18,7 +18,7 @@ from borechain.cli.notices import warnings_in_lines
 from borechain.cli.options import fault_option, json_option, scenario_argument, seed_option, speed_option
 from borechain.cli.tables import console
 from telemetry import keys
-from telemetry.runtime.options import endpoint_option, insecure_option, keys_option
+from telemetry.runtime.options import insecure_option, keys_option, secure_endpoint
 
 if TYPE_CHECKING:
     from sim.rig.launcher import Tick
@@ -49,7 +49,13 @@ PRELOAD = {"float64": "borechain.warm", "fixed": "borechain.warm_all", "publishe
     "--rig", "rig_name", default=keys.DEFAULT_RIG, show_default=True, help="Name of the rig in key expressions."
 )
 @insecure_option
-@endpoint_option("Where the rig's router listens.")
+@click.option(
+    "--endpoint",
+    default=keys.DEFAULT_ENDPOINT,
+    show_default=True,
+    callback=secure_endpoint,
+    help="Where the rig's router listens.",
+)
 @keys_option
 @click.option(
     "--out", type=click.Path(path_type=Path), help="New or empty folder for the run  [default: out/NAME/run-NNNN]"
