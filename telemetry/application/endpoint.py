@@ -17,7 +17,7 @@ from telemetry.application.clock import ClockFilter
 from telemetry.application.outbox import Outbox
 from telemetry.application.saved_state import SavedState, is_needed, pack_state, parse_state
 from telemetry.errors import DecodeError
-from telemetry.media.port import Frame, Priority
+from telemetry.media.port import MAX_FRAME, Frame, Priority
 from telemetry.messages import (
     BASE,
     ENCODER,
@@ -62,6 +62,7 @@ SYNC_QUICK = 1.0  # s
 SYNC_SLOW = 10.0  # s
 ANSWERS_KEPT = 64
 SERIES_SHIFT = 24  # of a sequence number: below it the count, above it the start at which the count began
+SEALED_BUNDLE = MAX_FRAME - 1024  # bytes of payloads in a frame: what a medium carries holds the frame's seal too
 REPORT_EVERY = 60.0  # s between two looks at what queues dropped
 DROPS = ("reliable_dropped", "best_effort_dropped", "outbox_dropped")  # counters of what found no place in a queue
 ONE_HOP = (Kind.AIDING, Kind.HELLO, Kind.TIME_REQUEST, Kind.TIME_REPLY)
@@ -149,6 +150,8 @@ class Endpoint:
         self.hops = 0 if address == ENCODER else HOPS_UNKNOWN
         self._reach = reach
         self._links = {side: HopLink(address, boot_count, self._nearest(side)) for side in sorted(sides)}
+        for side in sides:
+            self.limit_bundles(side, MAX_FRAME)
         toward_encoder = Side.LOWER if address == BASE else Side.UPPER
         self._sync_side = None if is_clock_root else toward_encoder
         # a process that lost its numbers begins another series, so that none is given to a second message
@@ -170,7 +173,7 @@ class Endpoint:
     def limit_bundles(self, side: Side, limit: int) -> None:
         """Let payloads share a frame at one end only up to ``limit`` bytes: a large frame holds an urgent one up."""
         if side in self._links:
-            self._links[side].bundle_limit = limit
+            self._links[side].bundle_limit = limit if self.seals is None else min(limit, SEALED_BUNDLE)
 
     def receive(self, side: Side, frame: bytes, now: float, margin: float = math.inf) -> list[Received]:
         """Take a frame from one end, heard with a ``margin`` (dB); returns the messages for this process.
