@@ -34,6 +34,13 @@ WEIGHTINGS = ("bayes", "equal", "linear", "quadratic", "cubic", "adaptive")
     help="Limit of the deviation from the design axis.",
 )
 @click.option(
+    "--steering-deg-per-m",
+    type=POSITIVE,
+    default=0.5,
+    show_default=True,
+    help="The most by which this rig bends a hole back; until where a correction still helps follows from it.",
+)
+@click.option(
     "--weighting",
     type=click.Choice(WEIGHTINGS),
     default=WEIGHTINGS[0],
@@ -67,6 +74,7 @@ def ground(
     design_azimuth_deg: float,
     column_radius_m: float,
     tolerance: str,
+    steering_deg_per_m: float,
     weighting: str,
     accelerometer_bias_std_deg: float,
     mount_std_deg: float,
@@ -93,6 +101,7 @@ def ground(
         "design_azimuth_deg": design_azimuth_deg,
         "column_radius": column_radius_m,
         "tolerance": tolerance,
+        "steering_deg_per_m": steering_deg_per_m,
         "weighting": weighting,
         "accelerometer_bias_std_deg": accelerometer_bias_std_deg,
         "mount_std_deg": mount_std_deg,

@@ -49,6 +49,11 @@ TABLE: Final[tuple[Key, ...]] = (
     Key(LIVELINESS, "liveliness", "token of a living process"),
     Key(LEASE, "liveliness", "token of the one ground station of the rig"),
     Key("borechain/{rig}/ground/status", "query, publish", "rig time, depth, counts, health"),
+    Key(
+        "borechain/{rig}/ground/verdict",
+        "query, publish",
+        "on target, watch, steer, out or don't know; how far off, which way, until where it can be corrected",
+    ),
     Key("borechain/{rig}/ground/string", "query, publish", "tubes from top to bottom with depth and age"),
     Key("borechain/{rig}/ground/nodes/{tube}", "query, publish", "last state of one node, stale or not"),
     Key("borechain/{rig}/ground/stations", "query, publish", "all stations, fused"),

@@ -28,6 +28,7 @@ ORDER_TIMEOUT = 30.0  # wall s, for which who ordered is kept waiting
 BUSY = f"the ground station has {WAITING} questions to answer; ask again later"
 COMMON_PARAMETERS = ("accept",)
 ENCODINGS = {"json": JSON, "msgpack": MSGPACK}
+BEATS = ("verdict",)  # paths that are published without end, and only where somebody listens
 WHO = "zenoh"  # ordered, where the order does not say
 
 Handler = Callable[[Query], None]
@@ -88,10 +89,10 @@ class ZenohGateway:
     def _publish(self, changed: list[str]) -> None:
         """Put the present value of each path."""
         for path in changed:
-            view = pack(find(self._process.model, path).show(self._process.model, {}), "json")
             if path not in self._publishers:
                 self._publishers[path] = self._bus.publisher(self._key(path), JSON, droppable=True)
-            self._publishers[path].put(view)
+            if path not in BEATS or self._publishers[path].is_heard:
+                self._publishers[path].put(pack(find(self._process.model, path).show(self._process.model, {}), "json"))
 
     def _answer(self, query: Query) -> None:
         try:

@@ -18,6 +18,7 @@ from groundstation.service.answers import (
 from groundstation.service.orders import OrderState
 from groundstation.service.recalibration.progress import Phase, Stage
 from groundstation.service.rig_alarms import KINDS, Health, Level
+from groundstation.service.verdict import WINDS, Doubt, Word
 from groundstation.survey.trust import Trust
 from telemetry.messages import Mode, NodeFlag, Severity
 
@@ -63,6 +64,43 @@ STATUS: Fields = (
     text("health", "the worst of the rig's alarms, or that nobody can tell", *(h.name.lower() for h in Health)),
     integer("epoch", "of rig time: starts of the encoder so far, 0 unknown"),
     texts("alarms", "kinds that stand"),
+)
+SOME_WORDS = tuple(word.value for word in Word)
+VERDICT: Fields = (
+    text("rig", "name"),
+    RIG_TIME,
+    number("good_for_s", "after its arrival; who has heard no later verdict by then knows nothing"),
+    text("verdict", "what the crew needs to know first", *SOME_WORDS),
+    text("by_surveys", "what the surveys alone say, fresh or not", *SOME_WORDS),
+    text("line", "all of it in a line"),
+    texts("why", "what it rests on, or why nobody knows"),
+    texts("doubts", "why nobody knows, as words", *(doubt.value for doubt in Doubt)),
+    number("bit_md_m", "measured depth of the bit", null=True),
+    number("target_m", "length of the design axis"),
+    text("what", "which deviation decided", "deviation", "projection", null=True),
+    group(
+        "off",
+        (
+            MD,
+            number("deviation_cm", "from the design axis"),
+            number("sigma_cm", "standard deviation of it"),
+            number("limit_cm", "tolerance there"),
+            number("used_percent", "of the tolerance; null where none is allowed", null=True),
+            number("azimuth_deg", "towards which the hole is off"),
+            text("wind", "the same as a word", *WINDS),
+        ),
+        null=True,
+    ),
+    group(
+        "steer",
+        (
+            number("azimuth_deg", "towards which to steer"),
+            text("wind", "the same as a word", *WINDS),
+            number("before_md_m", "last depth from which a correction still helps", null=True),
+            number("left_m", "of drilling until there", null=True),
+        ),
+        null=True,
+    ),
 )
 STRING: Fields = (
     RIG_TIME,

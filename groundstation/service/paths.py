@@ -7,7 +7,7 @@ from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 
 from groundstation.errors import SelectorError
-from groundstation.service import column_views, key_fields, order_views, views
+from groundstation.service import column_views, key_fields, order_views, verdict_views, views
 from groundstation.service.answers import Fields
 from groundstation.service.model import RigModel
 from groundstation.service.views import Parameters, View
@@ -44,6 +44,7 @@ class Member:
 
 FIXED: dict[str, Path] = {
     "status": Path(views.status, key_fields.STATUS),
+    "verdict": Path(verdict_views.verdict, key_fields.VERDICT),
     "string": Path(views.string, key_fields.STRING),
     "stations": Path(views.stations, key_fields.STATIONS, ("md",)),
     "measurements": Path(views.measurements, key_fields.MEASUREMENTS, ("station", "tube")),

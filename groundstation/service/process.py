@@ -46,6 +46,7 @@ if TYPE_CHECKING:
     from telemetry.application.seals import Seals
 
 STARTS = 1 << 31  # numbers of a start by lot
+HEARTBEAT = 1.0  # s, own clock, between two verdicts
 EARLY = 64  # readings of the depth that may come before rig time is known
 GROUND_STATION = "ground station"  # who orders that something be sent again
 
@@ -89,6 +90,7 @@ class GroundProcess(Process):
         self._stale: set[int] = set()
         self._early: deque[DepthReading] = deque(maxlen=EARLY)
         self._kept_stand: Stand | None = None
+        self._beat_at = -math.inf
         self.model.epoch = self.store.epoch()
         self.model.restore_tally(self.store.tally())
         self._kept_tally = list(self.model.tally.tubes)
@@ -199,8 +201,12 @@ class GroundProcess(Process):
         changed, self._stale = sorted(stale ^ self._stale), stale
         if changed:
             self._publish([*(f"nodes/{tube}" for tube in changed), "status", "string"])
-        if alarms.drain_changed():
+        changed_alarms = alarms.drain_changed()
+        if changed_alarms:
             self._publish(["alarms", "status"])
+        if changed_alarms or now >= self._beat_at + HEARTBEAT:
+            self._beat_at = now
+            self._publish(["verdict"])
 
     def _on_refused(self, _severity: Severity, code: str, arguments: dict[str, Scalar]) -> None:
         """Frames or messages came under seals that are not to be believed."""

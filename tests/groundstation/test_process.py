@@ -4,7 +4,6 @@ import asyncio
 import contextlib
 import itertools
 import json
-import math
 import socket
 from collections.abc import AsyncIterator, Callable, Iterator
 from concurrent.futures import ThreadPoolExecutor, as_completed
@@ -14,31 +13,23 @@ from typing import Any
 
 import msgpack
 import pytest
+from hand_fed import COV, VAR, Rig
 from schemas import check_answers
 
-from groundstation.config import GroundConfig
 from groundstation.host import answering
-from groundstation.service.process import GroundProcess
-from telemetry.application.depth_source import DepthSource
-from telemetry.application.endpoint import Endpoint
 from telemetry.media.zenoh_bus import ZenohBus, open_client, open_router
 from telemetry.messages import (
     Event,
     ImuMean,
-    Mode,
     NodeFlag,
-    NodeState,
     Receipt,
     Reply,
     Severity,
-    Side,
     StaticRecord,
     SurveyMeasurement,
 )
 from telemetry.presentation.msgpack_codec import encode
 
-VAR = (0.0034**2) / 32
-COV = ((VAR, 0.0, 0.0), (0.0, VAR, 0.0), (0.0, 0.0, VAR))
 NO_COV = ((VAR, 5.0, 0.0), (5.0, VAR, 0.0), (0.0, 0.0, VAR))
 MEASUREMENT = SurveyMeasurement(
     1, 1, 0.0, 1, (ImuMean((0.0, 0.0, -9.81), COV),), 0.0, 1e-8, 1e-8, 32, 20.0, NodeFlag.NONE
@@ -53,62 +44,6 @@ def buses() -> Iterator[tuple[ZenohBus, ZenohBus]]:
         endpoint = f"tcp/127.0.0.1:{probe.getsockname()[1]}"
     with open_router(endpoint) as server, open_client(endpoint, timeout=10.0) as operator:
         yield server, operator
-
-
-class Rig:
-    """A ground station and the station of tube 1, joined directly by hand: frames in, frames out."""
-
-    def __init__(self, folder: Path) -> None:
-        self.ground = GroundProcess(GroundConfig(folder=folder))
-        self.tube = Endpoint(1, frozenset(Side), boot_count=1, is_clock_root=True)
-        self.now = 1000.0
-        self.source = DepthSource()
-
-    md = 0.0
-
-    def run(self, duration: float) -> None:
-        end = self.now + duration
-        while self.now < end:
-            self.tube.advance(self.now)
-            self.ground.on_timer(self.now)
-            for _ in range(3):
-                for _, frame in self.ground.take_frames(self.now):
-                    self.tube.receive(Side.UPPER, frame.payload, self.now)
-                for side, frame in self.tube.take_frames(self.now):
-                    if side is Side.UPPER:
-                        self.ground.on_frame(Side.LOWER, frame.payload, self.now)
-            self.now += 0.5
-
-    def depth(self, md: float) -> None:
-        """The bit is moved to a depth, and stands there from now on."""
-        self.now += 20.0 if md != self.md else 0.0
-        for _ in range(3):
-            self.now += 0.5
-            self.read_depth(md)
-
-    def read_depth(self, md: float) -> None:
-        self.md = md
-        self.ground.on_depth(encode(self.source.measure(self.now, md)), self.now)
-
-    def alarms(self) -> set[str]:
-        """Kinds of alarms that an operator sees."""
-        return set(self.ground.operator.ask("status")["alarms"])
-
-    def state(self, tube: int, hops: int) -> None:
-        state = NodeState(
-            tube, self.now, hops, Mode.TRACKING, 1.0, 1e-6, 1e-6, (0.0, 0.0, 0.0), 0.0, 0.0, 1e-6, 0.1, 1e-8,
-            NodeFlag.NONE, 5, 0,
-        )  # fmt: skip
-        self.tube.send_state(state, self.now)
-        self.run(1.0)
-
-    def survey(self, tube: int, sequence: int, inclination_deg: float = 2.0) -> None:
-        lean = math.radians(inclination_deg)
-        imus = (ImuMean((9.81 * math.sin(lean), 0.0, -9.81 * math.cos(lean)), COV),)
-        message = SurveyMeasurement(tube, sequence, self.now, 1, imus, 0.0, 1e-8, 1e-8, 32, 20.0, NodeFlag.NONE)
-        self.tube.submit(message, self.now)
-        self.run(2.0)
-        self.read_depth(self.md)
 
 
 async def ask(bus: ZenohBus, selector: str) -> Any:

@@ -1,0 +1,86 @@
+"""What the key of the verdict holds: every number with as many digits as its uncertainty is worth."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+from groundstation.service.doubts import known_of
+from groundstation.service.model import RigModel
+from groundstation.service.rounding import rounded, rounded_std
+from groundstation.service.verdict import Verdict, Word, direction, judge, wind
+from groundstation.survey.columns import Deviation
+
+View = dict[str, Any]
+CM = 100.0
+FINEST_CM = 0.1  # cm, of a line for a screen
+PHRASES = {
+    Word.ON_TARGET: "ON TARGET",
+    Word.WATCH: "WATCH",
+    Word.STEER: "STEER",
+    Word.OUT: "OUT",
+    Word.DONT_KNOW: "DON'T KNOW",
+}
+
+
+def verdict(k: RigModel, _p: dict[str, str]) -> View:
+    """The verdict of this moment."""
+    known = known_of(k)
+    found = judge(known)
+    return {
+        "rig": k.config.rig,
+        "rig_time_s": k.rig_now if math.isfinite(k.rig_now) else None,
+        "good_for_s": k.config.stale_after,
+        "verdict": found.word.value,
+        "by_surveys": found.by_surveys.value,
+        "line": line(found),
+        "why": list(found.why),
+        "doubts": [doubt.value for doubt in found.doubts],
+        "bit_md_m": known.bit,
+        "target_m": known.target,
+        "what": found.what or None,
+        "off": None if found.about is None else off(found.about),
+        "steer": None if found.about is None or found.act_before is None else steer(found.about, found),
+    }
+
+
+def off(d: Deviation) -> View:
+    """How far off, where, and in which direction."""
+    return {
+        "md_m": round(d.md, 2),
+        "deviation_cm": rounded(CM * d.size, CM * d.std),
+        "sigma_cm": rounded_std(CM * d.std),
+        "limit_cm": round(CM * d.limit, 1),
+        "used_percent": round(100.0 * d.ratio) if math.isfinite(d.ratio) else None,
+        "azimuth_deg": round(math.degrees(direction(d))) % 360,
+        "wind": wind(direction(d)),
+    }
+
+
+def steer(d: Deviation, found: Verdict) -> View:
+    """Where to, and until when."""
+    back = direction(d) + math.pi
+    return {
+        "azimuth_deg": round(math.degrees(back)) % 360,
+        "wind": wind(back),
+        "before_md_m": None if found.act_before is None else round(found.act_before, 1),
+        "left_m": None if found.left is None else round(found.left, 1),
+    }
+
+
+def line(found: Verdict) -> str:
+    """The verdict as one line for a screen."""
+    phrase, d = PHRASES[found.word], found.about
+    if found.word is Word.DONT_KNOW:
+        return f"{phrase}: {found.why[0]}"
+    if d is None:
+        return phrase
+    spread = max(rounded_std(CM * d.std), FINEST_CM)
+    size = rounded(CM * d.size, spread)
+    is_end = found.what == "projection"
+    where = "ends" if is_end else f"at {d.md:.1f} m"
+    said = f"{phrase}: {where} {size:.1f} +- {spread:.1f} cm at {round(math.degrees(direction(d))) % 360} deg"
+    said += f" {wind(direction(d))}; limit {CM * d.limit:.0f} ({100.0 * d.ratio:.0f} %)"
+    if found.act_before is None or found.left is None or found.word is Word.OUT:
+        return said
+    return f"{said}; act " + (f"before {found.act_before:.1f} m" if found.left > 0.0 else "at once")
