@@ -7,6 +7,7 @@ What was raised stays on record with the time and depth of the survey that raise
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, replace
 
 from groundstation.survey.columns import LEVELS, Deviation
@@ -25,6 +26,7 @@ class Alarm:
     size: float  # m
     std: float  # m
     limit: float  # m, the threshold is level times this
+    direction: float  # rad, azimuth of the deviation
     cleared_at: float | None = None
 
 
@@ -45,7 +47,9 @@ class AlarmList:
         for level in LEVELS:
             standing = next((a for a in self.active if (a.kind, a.level) == (kind, level)), None)
             if standing is None and deviation.ratio >= level:
-                self.alarms.append(Alarm(kind, level, at, deviation.md, deviation.size, deviation.std, deviation.limit))
+                direction = math.atan2(deviation.offset[1], deviation.offset[0]) % math.tau
+                new = Alarm(kind, level, at, deviation.md, deviation.size, deviation.std, deviation.limit, direction)
+                self.alarms.append(new)
                 changed = True
             elif standing is not None and deviation.ratio < level - CLEARED_BELOW:
                 self.alarms[self.alarms.index(standing)] = replace(standing, cleared_at=at)

@@ -8,11 +8,8 @@ from typing import Any
 import numpy as np
 
 from groundstation.errors import SelectorError, SurveyError
-from groundstation.service.alarms import Alarm
 from groundstation.service.model import RigModel
-from groundstation.service.rig_alarms import RigAlarm
-from groundstation.service.views import finite
-from groundstation.survey.columns import LEVELS, Deviation, deviation, dominant
+from groundstation.survey.columns import Deviation, deviation, dominant
 from groundstation.survey.ellipsoid import axes, coverage_radius, plan_ellipse
 from groundstation.survey.trajectory import Point
 
@@ -107,52 +104,4 @@ def deviation_view(d: Deviation) -> View:
         "limit_cm": 100.0 * d.limit,
         "used_percent": 100.0 * d.ratio,
         "level_percent": round(100.0 * d.level),
-    }
-
-
-def alarms(k: RigModel, _p: dict[str, str]) -> View:
-    """Alarms that stand, those that were cleared, and stations at which the hole moved."""
-    return {
-        "levels_percent": [round(100.0 * level) for level in LEVELS],
-        "active": [alarm_view(alarm) for alarm in k.alarms.active],
-        "cleared": [alarm_view(alarm) for alarm in k.alarms.alarms if alarm.cleared_at is not None],
-        "moved": [
-            {
-                "md_m": round(moved.md, 6),
-                "at_s": moved.at,
-                "dropped_measurements": moved.dropped,
-                "departure_sigma": moved.evidence.own,
-                "neighbours_sigma": list(moved.evidence.neighbours),
-            }
-            for moved in k.moved
-        ],
-        "rig": [rig_alarm_view(alarm) for alarm in k.rig_alarms],
-        "rig_cleared": [rig_alarm_view(alarm) for alarm in k.rig_alarms.cleared],
-    }
-
-
-def rig_alarm_view(a: RigAlarm) -> View:
-    """One alarm of the rig itself."""
-    return {
-        "code": a.kind.code,
-        "level": a.kind.level.name.lower(),
-        "subject": a.subject,
-        "detail": a.detail,
-        "raised_at_s": finite(a.raised_at),
-        "cleared_at_s": None if a.cleared_at is None else finite(a.cleared_at),
-        "count": a.count,
-    }
-
-
-def alarm_view(a: Alarm) -> View:
-    """One alarm with the threshold it passed."""
-    return {
-        "kind": a.kind,
-        "level_percent": round(100.0 * a.level),
-        "raised_at_s": a.raised_at,
-        "md_m": round(a.md, 6),
-        "deviation_cm": 100.0 * a.size,
-        "sigma_cm": 100.0 * a.std,
-        "threshold_cm": 100.0 * a.level * a.limit,
-        "cleared_at_s": a.cleared_at,
     }

@@ -15,6 +15,7 @@ from groundstation.service.answers import (
     texts,
     truth,
 )
+from groundstation.service.crew_alarms import State
 from groundstation.service.orders import OrderState
 from groundstation.service.recalibration.progress import Phase, Stage
 from groundstation.service.rig_alarms import KINDS, Health, Level
@@ -294,7 +295,33 @@ RIG_ALARM: Fields = (
     number("cleared_at_s", "rig time; null while it stands", null=True),
     integer("count", "times it was raised"),
 )
+CREW_ALARM: Fields = (
+    integer("number", "of the alarm, never used twice"),
+    text("state", "", *State),
+    text("code", "kind: of the rig's, or deviation, projection", *(k.code for k in KINDS), "deviation", "projection"),
+    text("level", "how much it matters", *(level.name.lower() for level in Level)),
+    text("subject", "what it is about"),
+    text("detail", "what is known of it"),
+    text("threshold", "that was passed"),
+    number("md_m", "measured depth, where it is at one", null=True),
+    number("azimuth_deg", "towards which the hole is off", null=True),
+    text("wind", "the same as a word", *WINDS, null=True),
+    number("since_s", "rig time at which it was raised", null=True),
+    text("since_utc", "the same in UTC", null=True),
+    integer("times", "that it was raised"),
+    integer("count", "times that its cause was noticed"),
+    text("acknowledged_by", "who", null=True),
+    text("acknowledged_utc", "when", null=True),
+    text("shelved_by", "who", null=True),
+    text("shelved_until_utc", "when it is back", null=True),
+    number("cleared_at_s", "rig time at which its cause was gone", null=True),
+)
 ALARMS: Fields = (
+    rows("open", CREW_ALARM),
+    rows("closed", CREW_ALARM),
+    integer("raised_last_hour", "alarms, ten at most in a good run"),
+    truth("flood", "more than ten were raised within ten minutes, and not yet fewer than five"),
+    integer("left_out", "conditions for which there was no room among the open ones, milder than those"),
     numbers("levels_percent", "of the tolerance"),
     rows("active", ALARM),
     rows("cleared", ALARM),

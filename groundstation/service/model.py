@@ -12,6 +12,7 @@ import numpy.typing as npt
 from groundstation.config import GroundConfig
 from groundstation.errors import SurveyError
 from groundstation.service.alarms import AlarmList
+from groundstation.service.crew_alarms import CrewAlarms
 from groundstation.service.depth import DepthLog
 from groundstation.service.numbers import Numbers
 from groundstation.service.orders import OrderBook
@@ -152,6 +153,7 @@ class RigModel:
         self.stops = Stops(self.tally, config.survey_after)
         self.numbers = Numbers()
         self.rig_alarms = RigAlarms()
+        self.crew_alarms = CrewAlarms()
         self.nodes: dict[int, NodeState] = {}
         self.stations: list[SurveyStation] = []
         self.events: deque[Event] = deque(maxlen=EVENTS_SHOWN)

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import datetime
 import itertools
+import time
 from collections import deque
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
@@ -33,6 +34,7 @@ START_SHIFT = 20  # orders of one start of the ground station, as a power of two
 OPEN_AT_MOST = 16  # orders that wait for the answer of one tube
 ANSWERED_WITHIN = 900.0  # s, own clock, after which an order that no tube has answered is withdrawn
 NO_KEY = "key_file: expected the key file of the rig, without it no node takes a block"
+NOBODY = "somebody"  # who orders without a name
 UPLOAD = "upload_parameters"
 RECALIBRATION = "recalibration"  # who orders what the calibration in the field asks for
 
@@ -164,6 +166,22 @@ class Operator:
         self._model.depths.accept()
         self._model.rig_alarms.clear("depth_refused", "depth")
         order.advance(OrderState.DONE)
+
+    def alarm(self, order: Order) -> None:
+        """Acknowledge an alarm, shelve it or take it back; kept on the disk before the order is done."""
+        alarms, utc = self._model.crew_alarms, time.time()
+        number, by = int(order.arguments["number"]), order.by or NOBODY
+        match order.spec.action:
+            case "acknowledge":
+                changed = alarms.acknowledged(number, by, utc)
+            case "shelve":
+                changed = alarms.shelved(number, by, utc + 60.0 * float(order.arguments["minutes"]))
+            case _:
+                changed = alarms.unshelved(number)
+        self._store.keep_alarms([changed])
+        alarms.put(changed)
+        order.advance(OrderState.DONE)
+        self.changed(["alarms"])
 
     def expire_orders(self, now: float) -> None:
         """Withdraw what no tube has answered by ``now`` (s, own clock); the calibration in the field minds its own."""

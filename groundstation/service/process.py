@@ -5,6 +5,7 @@ from __future__ import annotations
 import contextlib
 import math
 import secrets
+import time
 from collections import deque
 from collections.abc import Callable, Iterator
 from dataclasses import replace
@@ -12,6 +13,8 @@ from typing import TYPE_CHECKING
 
 from groundstation.config import GroundConfig
 from groundstation.errors import SelectorError, StoreError
+from groundstation.service.conditions import conditions_of
+from groundstation.service.crew_alarms import Times
 from groundstation.service.model import RigModel
 from groundstation.service.operator import BlockUpload, Operator, Outgoing
 from groundstation.service.orders import Order
@@ -102,6 +105,7 @@ class GroundProcess(Process):
         self.operator.ended = self.endpoint.withdraw
         for stored in self.store.messages():
             self._apply_stored(stored.message, stored.md, stored.below)
+        self.model.crew_alarms.restore(self.store.alarms(), conditions_of(self.model))
 
     def on_frame(self, side: Side, frame: bytes, now: float, margin: float = math.inf) -> None:
         """A frame arrived from the encoder."""
@@ -201,16 +205,26 @@ class GroundProcess(Process):
         changed, self._stale = sorted(stale ^ self._stale), stale
         if changed:
             self._publish([*(f"nodes/{tube}" for tube in changed), "status", "string"])
-        changed_alarms = alarms.drain_changed()
-        if changed_alarms:
-            self._publish(["alarms", "status"])
-        if changed_alarms or now >= self._beat_at + HEARTBEAT:
+        self._tell_crew(now)
+        if alarms.drain_changed():
+            self._publish(["alarms", "status", "verdict"])
+            self._beat_at = now
+        if now >= self._beat_at + HEARTBEAT:
             self._beat_at = now
             self._publish(["verdict"])
 
     def _on_refused(self, _severity: Severity, code: str, arguments: dict[str, Scalar]) -> None:
         """Frames or messages came under seals that are not to be believed."""
         self.model.rig_alarms.alert(code, "ground station", refusal_of(arguments))
+
+    def _tell_crew(self, now: float) -> None:
+        """Follow what is wrong with the alarms that the crew works with, and keep them."""
+        alarms = self.model.crew_alarms
+        alarms.update(conditions_of(self.model), Times(now, self.model.rig_now, time.time()))
+        if changed := alarms.drain_changed():
+            with self._refusing_disk():
+                self.store.keep_alarms(changed)
+            self._publish(["alarms"])
 
     def _ask_again(self, tube: int, first: int, last: int) -> None:
         """Order a tube to send the surveys of a range of numbers again."""

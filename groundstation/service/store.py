@@ -14,7 +14,7 @@ from __future__ import annotations
 import contextlib
 import math
 import sqlite3
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -22,13 +22,17 @@ from typing import Any
 import sqlalchemy as sa
 
 from groundstation.errors import StoreError
+from groundstation.service.alarm_record import DamagedAlarmError, alarm_of_text, alarm_to_text
+from groundstation.service.crew_alarms import CrewAlarm
 from telemetry.errors import DecodeError
 from telemetry.messages import Event, Kept, Stand, StaticRecord, SurveyMeasurement
 from telemetry.parameters import ParameterBlock, unpack_block
 from telemetry.presentation.content import content_of
 from telemetry.presentation.msgpack_codec import decode, encode
 
-SCHEMA = 2
+SCHEMA = 3
+READABLE = (2, 3)  # schemas; what a later one has more is made when it is opened
+ALARMS_KEPT = 1000
 SHOWN = 5  # tables named of a database that is not ours
 METADATA = sa.MetaData()
 META = sa.Table(
@@ -75,6 +79,14 @@ RECALIBRATION = sa.Table(
     METADATA,
     sa.Column("id", sa.Integer, primary_key=True, autoincrement=False),
     sa.Column("progress", sa.Text, nullable=False),
+)
+
+
+ALARMS = sa.Table(
+    "alarms",
+    METADATA,
+    sa.Column("number", sa.Integer, primary_key=True, autoincrement=False),
+    sa.Column("content", sa.Text, nullable=False),
 )
 
 
@@ -231,6 +243,35 @@ class Store:
         with self._refusing(), self._engine.connect() as connection:
             return connection.execute(sa.select(RECALIBRATION.c.progress)).scalar()
 
+    def keep_alarms(self, alarms: Iterable[CrewAlarm]) -> None:
+        """Store alarms as they are now; of all the newest are kept."""
+        texts = {alarm.number: alarm_to_text(alarm) for alarm in alarms}
+        if not texts:
+            return
+        with self._writing() as connection:
+            connection.execute(sa.delete(ALARMS).where(ALARMS.c.number.in_(list(texts))))
+            connection.execute(sa.insert(ALARMS), [{"number": n, "content": text} for n, text in texts.items()])
+            connection.execute(sa.delete(ALARMS).where(ALARMS.c.number <= max(texts) - ALARMS_KEPT))
+
+    def alarms(self) -> list[CrewAlarm]:
+        """Alarms of before, the oldest first; what is damaged is passed over and counted."""
+        if not self._has_alarms():
+            return []
+        with self._refusing(), self._engine.connect() as connection:
+            rows = connection.execute(sa.select(ALARMS).order_by(ALARMS.c.number)).all()
+        found = []
+        for row in rows:
+            try:
+                found.append(alarm_of_text(row.content))
+            except DamagedAlarmError:
+                self.damaged += 1
+        return found
+
+    def _has_alarms(self) -> bool:
+        """Whether there is a table of alarms; a database of before that cannot be written has none."""
+        with self._refusing():
+            return sa.inspect(self._engine).has_table(ALARMS.name)
+
     def close(self) -> None:
         """Close every connection."""
         self._engine.dispose()
@@ -276,8 +317,12 @@ class Store:
                 f"got tables {', '.join(tables[:SHOWN])}; choose another --folder or database"
             )
         found = self._meta() if tables else {}
-        if found and found.get("schema") != str(SCHEMA):
-            raise StoreError(f"database {self._where}: expected schema {SCHEMA}, got {found.get('schema')}")
+        if found and found.get("schema") not in [str(schema) for schema in READABLE]:
+            wanted = " or ".join(map(str, READABLE))
+            raise StoreError(
+                f"database {self._where}: expected schema {wanted}, got {found.get('schema')}; "
+                "one of a later version is read by that version"
+            )
         return bool(found)
 
     def _meta(self) -> dict[str, str]:

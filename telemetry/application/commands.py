@@ -20,6 +20,7 @@ from telemetry.schema import U53
 
 SHORTEST_RECORD, LONGEST_RECORD = 5.0, 3600.0  # s
 FEWEST_TURNS, MOST_TURNS = 1.0, 20.0
+SHELVED_AT_MOST = 720.0  # min, a shift
 STAGES = ("synchronise", "start", "aiding", "frame", "read", "filter", "report", "save", "send", "cycle")
 
 
@@ -87,6 +88,7 @@ VERSION = _argument(
     low=1,
     high=MAX_VERSION,
 )
+ALARM_NUMBER = _argument("number", INTEGER, "of the alarm", unit="1", low=1, high=U53, needed=True)
 FILE = "file of the folder `calibrations` without its `.json`, or `identity`"
 SHA256 = _result("sha256", TEXT, "hash of the parameter block in use")
 ONE_AN_IMU = "one an IMU"
@@ -170,6 +172,24 @@ COMMANDS: tuple[CommandSpec, ...] = (
         "believes the depth that comes now, after it jumped and the crew has measured it again",
         action="confirm",
     ),
+    CommandSpec(
+        "alarm",
+        ObeyedBy.GROUND,
+        "says that whoever orders it knows of the alarm; whoever does so later is told who was first",
+        (ALARM_NUMBER,),
+        action="acknowledge",
+    ),
+    CommandSpec(
+        "alarm",
+        ObeyedBy.GROUND,
+        "puts the alarm away for a time",
+        (
+            ALARM_NUMBER,
+            _argument("minutes", NUMBER, "until it is back", unit="min", low=1.0, high=SHELVED_AT_MOST, default=30.0),
+        ),
+        action="shelve",
+    ),
+    CommandSpec("alarm", ObeyedBy.GROUND, "takes a shelved alarm back", (ALARM_NUMBER,), action="unshelve"),
     CommandSpec(
         "recalibrate",
         ObeyedBy.GROUND,

@@ -14,7 +14,7 @@ from schemas import check_answers
 
 from groundstation.config import GroundConfig
 from groundstation.errors import SelectorError
-from groundstation.service import column_views
+from groundstation.service import alarm_views, column_views
 from groundstation.service.model import RigModel
 from groundstation.survey.ellipsoid import plan_ellipse
 from groundstation.survey.resolve import angles
@@ -286,7 +286,7 @@ def test_views_of_nothing_have_the_collar_alone(tmp_path: Path) -> None:
     assert [row["deviation_cm"] for row in column["stations"]] == [0.0]
     assert column["projection"] is None
     assert column["dominant"] is None
-    alarms = column_views.alarms(model, {})
+    alarms = alarm_views.alarms(model, {})
     assert (alarms["active"], alarms["cleared"], alarms["moved"]) == ([], [], [])
 
 
@@ -346,7 +346,7 @@ def test_a_column_along_its_inclined_design_deviates_by_its_vertical_start_alone
 
 def test_a_column_that_leaves_its_tolerance_raises_alarms_with_their_threshold(tmp_path: Path) -> None:
     model, _ = column_of(tmp_path, 1.0, 120.0, tolerance="5-cm")
-    view = column_views.alarms(model, {})
+    view = alarm_views.alarms(model, {})
     assert view["levels_percent"] == [50, 80, 100]
     deviations = {row["level_percent"]: row for row in view["active"] if row["kind"] == "deviation"}
     assert set(deviations) == {50, 80, 100}
@@ -365,7 +365,7 @@ def test_a_column_that_leaves_its_tolerance_raises_alarms_with_their_threshold(t
 def test_an_alarm_of_a_projection_is_cleared_when_the_hole_is_steered_back(tmp_path: Path) -> None:
     measurements = [(survey(1, stop, 1, 2.0), 2.0 * stop) for stop in range(1, 3)]
     measurements += [(survey(1, stop, 1, 0.0), 2.0 * stop) for stop in range(3, 6)]
-    view = column_views.alarms(knowing(tmp_path, measurements, 1), {})
+    view = alarm_views.alarms(knowing(tmp_path, measurements, 1), {})
     cleared = {row["level_percent"]: row for row in view["cleared"] if row["kind"] == "projection"}
     assert set(cleared) == {50, 80, 100}
     assert cleared[100]["cleared_at_s"] == pytest.approx(3 * BETWEEN_STOPS + 0.5)
@@ -375,7 +375,7 @@ def test_an_alarm_of_a_projection_is_cleared_when_the_hole_is_steered_back(tmp_p
 def test_the_alarms_tell_of_stations_that_moved(tmp_path: Path) -> None:
     model = knowing(tmp_path, moving(4, 4), 4)
     check_answers(model)
-    view = column_views.alarms(model, {})["moved"]
+    view = alarm_views.alarms(model, {})["moved"]
     assert len(view) == len(model.moved) > 0
     for row, moved in zip(view, model.moved, strict=True):
         assert row == {
