@@ -59,7 +59,11 @@ TABLE: Final[tuple[Key, ...]] = (
     Key("borechain/{rig}/ground/stations", "query, publish", "all stations, fused"),
     Key("borechain/{rig}/ground/stations/{n}", "query", "one station, fused"),
     Key("borechain/{rig}/ground/stations/{n}/measurements", "query", "every cluster measured at one station"),
-    Key("borechain/{rig}/ground/measurements", "query", "every cluster measurement; ?station=2..5, ?tube=3"),
+    Key(
+        "borechain/{rig}/ground/measurements",
+        "query, publish",
+        "every cluster measurement, new ones published; ?station=2..5, ?tube=3, ?since=17;limit=10",
+    ),
     Key("borechain/{rig}/ground/trajectory", "query, publish", "positions with covariance; ?md=12.5, ?md=4..12"),
     Key("borechain/{rig}/ground/uncertainty", "query, publish", "region of uncertainty, its sources; ?confidence=0.9"),
     Key("borechain/{rig}/ground/column", "query, publish", "deviation from the design, projected to the target"),
@@ -68,8 +72,15 @@ TABLE: Final[tuple[Key, ...]] = (
         "query, publish",
         "tolerance and rig alarms, stations where the hole moved",
     ),
-    Key("borechain/{rig}/ground/events", "query", "events of the nodes; ?tube=3"),
-    Key("borechain/{rig}/ground/static_records", "query", "raw readings that nodes averaged at rest; ?tube=3"),
+    Key(
+        "borechain/{rig}/ground/events", "query, publish", "events of the nodes, new ones published; ?tube=3, ?since=17"
+    ),
+    Key(
+        "borechain/{rig}/ground/static_records",
+        "query, publish",
+        "raw readings that nodes averaged at rest, new ones published; ?tube=3, ?since=17",
+    ),
+    Key("borechain/{rig}/ground/schema", "query", "JSON schema of every answer below ground/"),
     Key("borechain/{rig}/ground/recalibration", "query, publish", "calibration in the field: progress and result"),
     Key("borechain/{rig}/ground/orders", "query, publish", "the newest orders with their course and outcome"),
     Key("borechain/{rig}/ground/orders/{n}", "query, publish", "one order"),

@@ -51,6 +51,7 @@ class ZenohGateway:
         self._inbox: Inbox[tuple[Handler, Query]] = Inbox(WAITING)
         self._awaited: set[asyncio.Task[None]] = set()
         self._publishers: dict[str, Publisher] = {}
+        self._told = dict(process.model.seen)  # newest row of each stream that was published, or there before
         process.listeners.append(self._publish)
         bus.queryable_kept(self._key("**"), partial(self._arrive, self._answer))
         bus.queryable_kept(keys.COMMAND.format(rig=self._rig, name="*"), partial(self._arrive, self._take_order))
@@ -92,7 +93,15 @@ class ZenohGateway:
             if path not in self._publishers:
                 self._publishers[path] = self._bus.publisher(self._key(path), JSON, droppable=True)
             if path not in BEATS or self._publishers[path].is_heard:
-                self._publishers[path].put(pack(find(self._process.model, path).show(self._process.model, {}), "json"))
+                self._publishers[path].put(pack(self._news(path), "json"))
+
+    def _news(self, path: str) -> dict[str, Any]:
+        """Answer to publish: of a stream the rows that have come since the last one."""
+        model, found = self._process.model, find(self._process.model, path)
+        if not found.is_stream:
+            return found.show(model, {})
+        since, self._told[path] = self._told.get(path, 0), model.seen[path]
+        return found.show(model, {"since": str(since)})
 
     def _answer(self, query: Query) -> None:
         try:
@@ -108,6 +117,9 @@ class ZenohGateway:
     def _replies(self, query: Query) -> list[tuple[str, bytes]]:
         model = self._process.model
         found = {path: view for path, view in paths(model).items() if query.intersects(self._key(path))}
+        path = query.selector_key.partition("/ground/")[2]
+        if not found and path and "*" not in path:
+            find(model, path)  # which says what there is in its place
         if not found:
             raise SelectorError(
                 f"{query.selector_key}: no such key; expected below {self._key('')}: {', '.join(PATTERNS)}"

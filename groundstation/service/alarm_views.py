@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import datetime
 import math
 from typing import Any
 
@@ -11,7 +10,7 @@ from groundstation.service.crew_alarms import HOUR, CrewAlarm
 from groundstation.service.model import RigModel
 from groundstation.service.rig_alarms import RigAlarm
 from groundstation.service.verdict import wind
-from groundstation.service.views import finite
+from groundstation.service.views import finite, utc_text
 from groundstation.survey.columns import LEVELS
 
 View = dict[str, Any]
@@ -95,10 +94,3 @@ def crew_alarm_view(k: RigModel, a: CrewAlarm) -> View:
         "shelved_until_utc": utc_text(a.shelved_until),
         "cleared_at_s": None if a.cleared_at is None else finite(a.cleared_at),
     }
-
-
-def utc_text(utc: float) -> str | None:
-    """A time of people (s since 1970) as ISO 8601; None for none."""
-    if not math.isfinite(utc):
-        return None
-    return datetime.datetime.fromtimestamp(utc, datetime.UTC).isoformat(timespec="milliseconds")

@@ -24,6 +24,11 @@ from groundstation.survey.trust import Trust
 from telemetry.messages import Mode, NodeFlag, Severity
 
 RIG_TIME = number("rig_time_s", "rig time now", null=True)
+HEADER: Fields = (
+    integer("revision", "grows with everything that the ground station takes in; of two answers the smaller is older"),
+    text("utc", "when the ground station answered"),
+    RIG_TIME,
+)
 TUBE = integer("tube", "number of the tube")
 MD = number("md_m", "measured depth")
 FLAGS = texts("flags", "trust in the own yaw", *(str(flag.name).lower() for flag in NodeFlag if flag))
@@ -52,7 +57,6 @@ COVARIANCE = numbers("covariance_m2", "of north, east, down", 2)
 
 STATUS: Fields = (
     text("rig", "name"),
-    RIG_TIME,
     number("bit_md_m", "measured depth of the bit", null=True),
     integer("tubes", "in the string"),
     integers("stale_tubes", "tubes that have been silent for too long"),
@@ -69,7 +73,6 @@ STATUS: Fields = (
 SOME_WORDS = tuple(word.value for word in Word)
 VERDICT: Fields = (
     text("rig", "name"),
-    RIG_TIME,
     number("good_for_s", "after its arrival; who has heard no later verdict by then knows nothing"),
     text("verdict", "what the crew needs to know first", *SOME_WORDS),
     text("by_surveys", "what the surveys alone say, fresh or not", *SOME_WORDS),
@@ -104,7 +107,6 @@ VERDICT: Fields = (
     ),
 )
 STRING: Fields = (
-    RIG_TIME,
     rows(
         "tubes",
         (
@@ -159,8 +161,11 @@ STATION: Fields = (
     number("sigma_force_mps2", "root mean square of those that count, one axis"),
     *POSITION,
 )
-STATIONS: Fields = (RIG_TIME, rows("stations", STATION))
+STATIONS: Fields = (rows("stations", STATION),)
+SEQ = integer("seq", "place in the stream since the ground station started, for `since`")
+NEWEST = integer("newest", "`seq` of the newest row")
 MEASUREMENT: Fields = (
+    SEQ,
     integer("station", "number, from the collar down"),
     MD,
     TUBE,
@@ -177,17 +182,18 @@ MEASUREMENT: Fields = (
     text("trust", "what the flags make of it", *(trust.name.lower() for trust in (Trust.FULL, Trust.UNKNOWN_YAW))),
     texts("quality", "checks that it failed"),
 )
-MEASUREMENTS: Fields = (RIG_TIME, rows("measurements", MEASUREMENT))
-STATION_MEASUREMENTS: Fields = (RIG_TIME, integer("station", "number"), rows("measurements", MEASUREMENT))
+MEASUREMENTS: Fields = (NEWEST, rows("measurements", MEASUREMENT))
+STATION_MEASUREMENTS: Fields = (integer("station", "number"), rows("measurements", MEASUREMENT))
 TRAJECTORY: Fields = (
-    RIG_TIME,
     text("method", "how the stations are joined", "balanced-tangential"),
     rows("points", (MD, *ANGLES, *POSITION, COVARIANCE)),
 )
 EVENTS: Fields = (
+    NEWEST,
     rows(
         "events",
         (
+            SEQ,
             TUBE,
             integer("sequence", "the tube's number of it"),
             number("at_s", "rig time"),
@@ -198,9 +204,11 @@ EVENTS: Fields = (
     ),
 )
 STATIC_RECORDS: Fields = (
+    NEWEST,
     rows(
         "static_records",
         (
+            SEQ,
             TUBE,
             integer("sequence", "the tube's number of it"),
             integer("order", "number of the order that asked for it"),
@@ -340,7 +348,6 @@ ALARMS: Fields = (
 )
 SENSOR: Fields = (numbers("matrix", "row = sensor axis", 2), numbers("bias_mps2", "at the reference temperature"))
 RECALIBRATION: Fields = (
-    RIG_TIME,
     text("state", "", *Stage),
     text("proposal", "hash to confirm"),
     rows(
@@ -391,7 +398,7 @@ RECALIBRATION: Fields = (
 ORDER: Fields = (
     integer("order", "number, never used twice"),
     number("at_s", "rig time at which it was accepted", null=True),
-    text("utc", "the same in UTC"),
+    text("ordered_utc", "the same in UTC"),
     text("by", "who ordered"),
     integer("tube", "null for an order to the ground station", null=True),
     text("command", "name"),
@@ -402,4 +409,5 @@ ORDER: Fields = (
     text("detail", "why it was refused, or what happens now"),
     mapping("values", "of the reply, see the table of commands"),
 )
-ORDERS: Fields = (RIG_TIME, rows("orders", ORDER))
+ORDERS: Fields = (rows("orders", ORDER),)
+SCHEMA: Fields = (mapping("schemas", "JSON schema of the answer of each path, made from the code that answers"),)

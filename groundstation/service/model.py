@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections import deque
+from collections import Counter, deque
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -46,6 +46,7 @@ class ResolvedStop:
     direction: Direction
     quality: Quality
     trust: Trust = Trust.FULL
+    seq: int = 0  # place in the order in which surveys were placed
 
     @property
     def at(self) -> float:
@@ -158,6 +159,8 @@ class RigModel:
         self.stations: list[SurveyStation] = []
         self.events: deque[Event] = deque(maxlen=EVENTS_SHOWN)
         self.static_records: deque[StaticRecord] = deque(maxlen=STATIC_RECORDS_SHOWN)
+        self.seen = Counter[str]()  # rows of each stream since the start
+        self.revision = 0  # grows with everything that comes in
         self.waiting: list[Waiting] = []  # surveys whose depth is not known yet
         self.undated = 0  # surveys without rig time, which never have one
         self.set_aside: list[SurveyMeasurement] = []  # of a faulty sensor, never fused
@@ -258,17 +261,20 @@ class RigModel:
         noise = math.radians(ACCELEROMETER_NOISE_DEG) * self.config.gravity
         quality = check(forces, covs, self.config.gravity, measurement.samples, measurement.settle_time, noise)
         station = self._station_at(md)
-        station.add_stop(ResolvedStop(measurement, md, direction, quality, trust))
+        self.seen["measurements"] += 1
+        station.add_stop(ResolvedStop(measurement, md, direction, quality, trust, self.seen["measurements"]))
         self._judge_movement(measurement.station_at)
         self._recompute()
 
     def on_event(self, event: Event) -> None:
         """Remember what happened."""
+        self.seen["events"] += 1
         self.events.append(event)
         self.orders.on_event(event)
 
     def on_static_record(self, record: StaticRecord) -> None:
         """Remember an average at rest."""
+        self.seen["static_records"] += 1
         self.static_records.append(record)
         self.orders.on_static_record(record)
         self.recalibration.on_static_record(record)

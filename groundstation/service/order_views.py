@@ -15,7 +15,7 @@ View = dict[str, Any]
 
 def orders(k: RigModel, _p: dict[str, str]) -> View:
     """The newest orders, the oldest of them first."""
-    return {"rig_time_s": k.rig_now if math.isfinite(k.rig_now) else None, "orders": [order_view(o) for o in k.orders]}
+    return {"orders": [order_view(o) for o in k.orders]}
 
 
 def order(k: RigModel, number: int) -> View:
@@ -31,7 +31,7 @@ def order_view(order: Order) -> View:
     return {
         "order": order.number,
         "at_s": order.at if math.isfinite(order.at) else None,
-        "utc": order.utc,
+        "ordered_utc": order.utc,
         "by": order.by,
         "tube": order.tube,
         "command": order.spec.name,

@@ -3,16 +3,19 @@
 from __future__ import annotations
 
 import re
+import time
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 
 from groundstation.errors import SelectorError
 from groundstation.service import alarm_views, column_views, key_fields, order_views, verdict_views, views
-from groundstation.service.answers import Fields
+from groundstation.service.answers import Fields, object_schema
 from groundstation.service.model import RigModel
-from groundstation.service.views import Parameters, View
+from groundstation.service.streams import STREAMED
+from groundstation.service.views import Parameters, View, finite, utc_text
 
 LONGEST_NUMBER = 18  # digits
+SHOWN = 30  # numbers that a refusal names
 _NUMBER = re.compile(r"\{[a-z]+\}")
 
 
@@ -24,9 +27,28 @@ def _station_numbers(k: RigModel) -> range:
 class Path:
     """One answerable path below ``ground/``: what it shows, its fields, and which parameters it takes."""
 
-    show: Callable[[RigModel, Parameters], View]
-    fields: Fields
+    view: Callable[[RigModel, Parameters], View]
+    own: Fields
     parameters: tuple[str, ...] = ()
+
+    def show(self, k: RigModel, p: Parameters) -> View:
+        """The whole answer: what every answer has, and the view."""
+        return header(k) | self.view(k, p)
+
+    @property
+    def fields(self) -> Fields:
+        """Fields of the whole answer."""
+        return (*key_fields.HEADER, *self.own)
+
+    @property
+    def is_stream(self) -> bool:
+        """Whether its rows are numbered in the order of their coming; only new ones are published."""
+        return STREAMED[0] in self.parameters
+
+
+def header(k: RigModel) -> View:
+    """What every answer begins with."""
+    return {"revision": k.revision, "utc": utc_text(time.time()), "rig_time_s": finite(k.rig_now)}
 
 
 @dataclass(frozen=True, slots=True)
@@ -34,12 +56,17 @@ class Member:
     """Paths of one pattern, one a member: the numbers that there are, and what the path of one shows."""
 
     numbers: Callable[[RigModel], Iterable[int]]
-    show: Callable[[RigModel, int], View]
-    fields: Fields
+    view: Callable[[RigModel, int], View]
+    own: Fields
+
+    @property
+    def fields(self) -> Fields:
+        """Fields of the answer of one member."""
+        return (*key_fields.HEADER, *self.own)
 
     def path(self, number: int) -> Path:
         """The path of one member."""
-        return Path(lambda k, _p: self.show(k, number), self.fields)
+        return Path(lambda k, _p: self.view(k, number), self.own)
 
 
 FIXED: dict[str, Path] = {
@@ -47,15 +74,16 @@ FIXED: dict[str, Path] = {
     "verdict": Path(verdict_views.verdict, key_fields.VERDICT),
     "string": Path(views.string, key_fields.STRING),
     "stations": Path(views.stations, key_fields.STATIONS, ("md",)),
-    "measurements": Path(views.measurements, key_fields.MEASUREMENTS, ("station", "tube")),
+    "measurements": Path(views.measurements, key_fields.MEASUREMENTS, ("station", "tube", *STREAMED)),
     "trajectory": Path(views.trajectory, key_fields.TRAJECTORY, ("md",)),
-    "events": Path(views.events, key_fields.EVENTS, ("tube",)),
-    "static_records": Path(views.static_records, key_fields.STATIC_RECORDS, ("tube",)),
+    "events": Path(views.events, key_fields.EVENTS, ("tube", *STREAMED)),
+    "static_records": Path(views.static_records, key_fields.STATIC_RECORDS, ("tube", *STREAMED)),
     "uncertainty": Path(column_views.uncertainty, key_fields.UNCERTAINTY, ("confidence",)),
     "column": Path(column_views.column, key_fields.COLUMN),
     "alarms": Path(alarm_views.alarms, key_fields.ALARMS),
     "recalibration": Path(views.recalibration, key_fields.RECALIBRATION),
     "orders": Path(order_views.orders, key_fields.ORDERS),
+    "schema": Path(lambda _k, _p: {"schemas": schemas()}, key_fields.SCHEMA),
 }
 MEMBERS: dict[str, Member] = {
     "nodes/{tube}": Member(lambda k: sorted(k.nodes), views.node, key_fields.NODE),
@@ -78,9 +106,18 @@ def find(k: RigModel, path: str) -> Path:
         return FIXED[path]
     pattern, number = _parted(path)
     member = MEMBERS.get(pattern)
-    if member is None or number not in member.numbers(k):
+    if member is None:
         raise SelectorError(f"{path}: no such path; expected one of {', '.join(PATTERNS)}")
+    numbers = list(member.numbers(k))
+    if number not in numbers:
+        there_are = ", ".join(map(str, numbers[-SHOWN:])) or "none yet"
+        raise SelectorError(f"{path}: no such number; of {pattern} there are {there_are}")
     return member.path(number)
+
+
+def schemas() -> dict[str, View]:
+    """JSON schema of the answer of every path."""
+    return {pattern: object_schema(path.fields) for pattern, path in (FIXED | MEMBERS).items()}
 
 
 def paths(k: RigModel) -> dict[str, Path]:

@@ -173,6 +173,7 @@ class GroundProcess(Process):
         """Follow rig time and its epoch, also where nothing comes any more."""
         model, clock = self.model, self.endpoint.clock
         model.now = now
+        model.revision += 1
         if not clock.synchronised:
             return
         model.rig_now = clock.rig_from_local(now)
@@ -335,15 +336,17 @@ class GroundProcess(Process):
         self.model.numbers.add_number(message.tube, message.sequence)
         if isinstance(message, Event):
             self.model.on_event(message)
-            return []
+            return ["events"]
         if isinstance(message, StaticRecord):
             self.model.on_static_record(message)
-            return []
+            return ["static_records"]
         before = list(self.model.alarms.alarms), len(self.model.moved)
         self.model.stops.on_survey(message.epoch or self.model.epoch, message.station_at, message.tube)
         self.watch.on_survey(message, self.model.on_survey(message, md, below))
         after = self.model.alarms.alarms, len(self.model.moved)
-        return ["stations", "trajectory", "uncertainty", "column"] + (["alarms"] if before != after else [])
+        return ["measurements", "stations", "trajectory", "uncertainty", "column"] + (
+            ["alarms"] if before != after else []
+        )
 
     def _publish(self, changed: list[str]) -> None:
         for listener in self.listeners:

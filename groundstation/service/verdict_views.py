@@ -29,7 +29,6 @@ def verdict(k: RigModel, _p: dict[str, str]) -> View:
     found = judge(known)
     return {
         "rig": k.config.rig,
-        "rig_time_s": k.rig_now if math.isfinite(k.rig_now) else None,
         "good_for_s": k.config.stale_after,
         "verdict": found.word.value,
         "by_surveys": found.by_surveys.value,

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import datetime
 import math
 from dataclasses import dataclass
 from typing import Any
@@ -10,6 +11,7 @@ import numpy as np
 
 from groundstation.errors import SelectorError, SurveyError
 from groundstation.service.model import ResolvedStop, RigModel, SurveyStation
+from groundstation.service.streams import STREAMED, window
 from groundstation.survey.resolve import angle_stds, angles
 from groundstation.survey.trajectory import Point, interpolate
 from telemetry.messages import Event, NodeFlag, NodeState, StaticRecord, SurveyMeasurement
@@ -55,7 +57,6 @@ def status(k: RigModel, _p: Parameters) -> View:
     stale = [tube for tube in k.tally.tubes if k.is_stale(tube)]
     return {
         "rig": k.config.rig,
-        "rig_time_s": finite(k.rig_now),
         "bit_md_m": k.depths.latest,
         "tubes": len(k.tally.tubes),
         "stale_tubes": stale,
@@ -79,7 +80,7 @@ def string(k: RigModel, _p: Parameters) -> View:
         below = k.tally.length_below(tube)
         md = None if bit is None or below is None else round(bit - below, 6)
         rows.append({"tube": tube, "md_m": md, "age_s": finite(k.age(tube)), "stale": k.is_stale(tube)})
-    return {"rig_time_s": finite(k.rig_now), "tubes": rows}
+    return {"tubes": rows}
 
 
 def node(k: RigModel, tube: int) -> View:
@@ -122,7 +123,7 @@ def stations(k: RigModel, p: Parameters) -> View:
     """All stations, fused; ``md`` selects."""
     wanted = Range.parse("md", p["md"]) if "md" in p else None
     rows = [station(k, n) for n, s in enumerate(k.stations, 1) if wanted is None or wanted.holds(s.md)]
-    return {"rig_time_s": finite(k.rig_now), "stations": rows}
+    return {"stations": rows}
 
 
 def station(k: RigModel, n: int) -> View:
@@ -165,7 +166,7 @@ def force_var(reading: SurveyMeasurement) -> float:
 
 
 def measurements(k: RigModel, p: Parameters) -> View:
-    """Every cluster; ``station`` and ``tube`` select."""
+    """Every cluster; ``station`` and ``tube`` select, ``since`` and ``limit`` give them as they came."""
     by_station = Range.parse("station", p["station"]) if "station" in p else None
     by_tube = Range.parse("tube", p["tube"]) if "tube" in p else None
     rows = [
@@ -174,13 +175,14 @@ def measurements(k: RigModel, p: Parameters) -> View:
         for c in s.clusters
         if (by_station is None or by_station.holds(n)) and (by_tube is None or by_tube.holds(c.measurement.tube))
     ]
-    return {"rig_time_s": finite(k.rig_now), "measurements": rows}
+    newest = k.seen["measurements"]
+    return {"newest": newest, "measurements": window(rows, newest, p) if streamed(p) else rows}
 
 
 def station_measurements(k: RigModel, n: int) -> View:
     """Every cluster of one station."""
     rows = [cluster(c, n) for c in k.stations[n - 1].clusters]
-    return {"rig_time_s": finite(k.rig_now), "station": n, "measurements": rows}
+    return {"station": n, "measurements": rows}
 
 
 def cluster(c: ResolvedStop, n: int) -> View:
@@ -189,6 +191,7 @@ def cluster(c: ResolvedStop, n: int) -> View:
     inclination, azimuth = angles(c.direction.lean, c.direction.down)
     sigma_inclination, sigma_azimuth = angle_stds(c.direction.lean, c.direction.down, c.direction.total_cov)
     return {
+        "seq": c.seq,
         "station": n,
         "md_m": round(c.md, 6),
         "tube": m.tube,
@@ -223,18 +226,22 @@ def trajectory(k: RigModel, p: Parameters) -> View:
                 raise SelectorError(f"parameter md: {error}") from error
         else:
             points = [point for point in points if wanted.holds(point.md)]
-    return {"rig_time_s": finite(k.rig_now), "method": "balanced-tangential", "points": [point_view(q) for q in points]}
+    return {"method": "balanced-tangential", "points": [point_view(q) for q in points]}
 
 
 def events(k: RigModel, p: Parameters) -> View:
     """What happened; ``tube`` selects."""
     wanted = Range.parse("tube", p["tube"]) if "tube" in p else None
-    return {"events": [event(e) for e in k.events if wanted is None or wanted.holds(e.tube)]}
+    newest = k.seen["events"]
+    first = newest - len(k.events) + 1
+    rows = [event(e, n) for n, e in enumerate(k.events, first) if wanted is None or wanted.holds(e.tube)]
+    return {"newest": newest, "events": window(rows, newest, p)}
 
 
-def event(e: Event) -> View:
+def event(e: Event, seq: int) -> View:
     """One event."""
     return {
+        "seq": seq,
         "tube": e.tube,
         "sequence": e.sequence,
         "at_s": e.at,
@@ -247,17 +254,23 @@ def event(e: Event) -> View:
 def static_records(k: RigModel, p: Parameters) -> View:
     """Raw readings averaged at rest; ``tube`` selects."""
     wanted = Range.parse("tube", p["tube"]) if "tube" in p else None
-    return {"static_records": [static_record(r) for r in k.static_records if wanted is None or wanted.holds(r.tube)]}
+    newest = k.seen["static_records"]
+    first = newest - len(k.static_records) + 1
+    rows = [
+        static_record(r, n) for n, r in enumerate(k.static_records, first) if wanted is None or wanted.holds(r.tube)
+    ]
+    return {"newest": newest, "static_records": window(rows, newest, p)}
 
 
 def recalibration(k: RigModel, _p: Parameters) -> View:
     """Calibration in the field: how far, and what it found."""
-    return {"rig_time_s": finite(k.rig_now)} | k.recalibration.view()
+    return k.recalibration.view()
 
 
-def static_record(r: StaticRecord) -> View:
+def static_record(r: StaticRecord, seq: int) -> View:
     """One static record; the covariances are those of one sample."""
     return {
+        "seq": seq,
         "tube": r.tube,
         "sequence": r.sequence,
         "order": r.command,
@@ -308,6 +321,18 @@ def flag_names(flags: NodeFlag) -> list[str]:
     return [flag.name.lower() for flag in NodeFlag if flag and flag in flags and flag.name]
 
 
+def streamed(p: Parameters) -> bool:
+    """Whether rows are asked for in the order of their coming."""
+    return any(name in p for name in STREAMED)
+
+
 def finite(value: float) -> float | None:
     """JSON has no infinity and no nan."""
     return value if math.isfinite(value) else None
+
+
+def utc_text(utc: float) -> str | None:
+    """A time of people (s since 1970) as ISO 8601; None for none."""
+    if not math.isfinite(utc):
+        return None
+    return datetime.datetime.fromtimestamp(utc, datetime.UTC).isoformat(timespec="milliseconds")

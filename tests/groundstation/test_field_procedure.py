@@ -38,7 +38,7 @@ class Field(Rig):
 
     def command(self, action: str, **parameters: str) -> dict[str, Any]:
         self.ground.operator.order("recalibrate", {"action": action} | parameters)
-        check_answer(self.ground.operator.ask("recalibration"), key_fields.RECALIBRATION)
+        check_answer(self.ground.operator.ask("recalibration"), (*key_fields.HEADER, *key_fields.RECALIBRATION))
         return self.view()
 
     def view(self) -> dict[str, Any]:
@@ -83,7 +83,7 @@ def rig(tmp_path: Path) -> Field:
 
 def check(rig: Field) -> None:
     """Every tube uses its new block, says so, and reads gravity where it lies."""
-    check_answer(rig.ground.operator.ask("recalibration"), key_fields.RECALIBRATION)
+    check_answer(rig.ground.operator.ask("recalibration"), (*key_fields.HEADER, *key_fields.RECALIBRATION))
     for row in rig.view()["tubes"]:
         process = rig.tube(row["tube"])
         assert row["phase"] == "done", row

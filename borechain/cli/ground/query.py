@@ -52,6 +52,7 @@ def query(
       borechain query 'borechain/*/ground/trajectory?md=4..12'
       borechain query 'borechain/rig-1/cmd/take_survey?tube=3'
     """
+    from borechain.client import who_is_there
     from telemetry.media.credentials import credentials_for
     from telemetry.media.zenoh_bus import open_client
 
@@ -59,13 +60,14 @@ def query(
     patience = timeout or (ORDER_PATIENCE if keys.is_order(selector) else PATIENCE)
     with open_client(endpoint, timeout or PATIENCE, credentials_for(endpoint, keys_place, role)) as bus:
         replies = bus.get(selector, patience)
+        there = "" if replies else who_is_there(bus)
     answers = [reply for reply in replies if reply.error is None]
     if not answers and any(reply.error != TIMEOUT for reply in replies):
         raise InputFault(next(reply.error or "refused" for reply in replies if reply.error != TIMEOUT))
     if not answers and replies:
         raise EnvironmentFault(f"{selector}: no answer within {patience:g} s; a longer --timeout may help")
     if not answers:
-        raise EnvironmentFault(f"{selector}: nobody at {endpoint} answers it; is a ground station running? {known()}")
+        raise EnvironmentFault(f"{selector}: nobody at {endpoint} answers it; {there}. {known()}")
     show({reply.key: value_of(reply.payload) for reply in answers}, as_json=as_json)
 
 

@@ -1,0 +1,36 @@
+"""Answers that are streams: rows in the order in which they came, numbered, asked for from a number on."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from typing import Any
+
+from groundstation.errors import SelectorError
+
+Row = dict[str, Any]
+Parameters = dict[str, str]
+STREAMED = ("since", "limit")  # parameters of every stream
+MOST = 10_000  # rows of one answer
+
+
+def window(rows: Iterable[Row], newest: int, p: Parameters) -> list[Row]:
+    """Rows after the number ``since``, at most ``limit`` of them, by their ``seq``.
+
+    Raises
+    ------
+    SelectorError
+        When a parameter is no number of this stream: after a restart the numbers begin anew.
+    """
+    since, limit = _whole("since", p, 0, newest), _whole("limit", p, MOST, MOST)
+    after = sorted((row for row in rows if row["seq"] > since), key=lambda row: int(row["seq"]))
+    return after[:limit]
+
+
+def _whole(name: str, p: Parameters, default: int, most: int) -> int:
+    text = p.get(name)
+    if text is None:
+        return default
+    if not text.isdecimal() or len(text) > 18 or int(text) > most:
+        why = "; numbers begin anew when the ground station starts" if name == "since" else ""
+        raise SelectorError(f"parameter {name}: expected a whole number up to {most}{why}, got {text!r:.40}")
+    return int(text)

@@ -1,0 +1,71 @@
+"""A ground station that is fed by hand, answering on a real router from a thread of its own."""
+
+from __future__ import annotations
+
+import asyncio
+import contextlib
+import socket
+import threading
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+
+from hand_fed import Rig
+
+from groundstation.gateway.lease import take_lease
+from groundstation.host import answering
+from telemetry.media.zenoh_bus import open_router
+from telemetry.messages import Event, Severity
+
+
+@dataclass(frozen=True)
+class Served:
+    """What is served and where."""
+
+    rig: Rig
+    endpoint: str
+    loop: asyncio.AbstractEventLoop
+
+    def do(self, act: Callable[[Rig], None]) -> None:
+        """Have something done to the rig on the thread of its ground station."""
+
+        async def acting() -> None:
+            act(self.rig)
+
+        asyncio.run_coroutine_threadsafe(acting(), self.loop).result(60.0)
+
+    def happen(self) -> None:
+        """One event more."""
+
+        def submit(rig: Rig) -> None:
+            number = 500 + rig.ground.model.seen["events"]
+            rig.tube.submit(Event(1, number, rig.now, Severity.INFO, "stopped"), rig.now)
+            rig.run(2.0)
+
+        self.do(submit)
+
+
+@contextlib.contextmanager
+def serving(rig: Rig) -> Iterator[Served]:
+    """Serve a rig until the context ends."""
+    with socket.socket() as probe:
+        probe.bind(("127.0.0.1", 0))
+        endpoint = f"tcp/127.0.0.1:{probe.getsockname()[1]}"
+    loop, ready, end = asyncio.new_event_loop(), threading.Event(), asyncio.Event()
+
+    async def serve() -> None:
+        with open_router(endpoint) as bus:
+            take_lease(bus, "rig-1")
+            async with answering(rig.ground, bus):
+                ready.set()
+                await end.wait()
+
+    thread = threading.Thread(target=loop.run_until_complete, args=(serve(),))
+    thread.start()
+    try:
+        assert ready.wait(30.0)
+        yield Served(rig, endpoint, loop)
+    finally:
+        loop.call_soon_threadsafe(end.set)
+        thread.join(30.0)
+        loop.close()
+        rig.ground.close()

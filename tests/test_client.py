@@ -1,0 +1,119 @@
+"""The client on a real bus: typed answers, streams without gaps or doubles, errors in a line, and the example."""
+
+import dataclasses
+import subprocess
+import sys
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+from hand_fed import Rig
+from served import Served, serving
+
+from borechain.client import (
+    Alarm,
+    AnswerError,
+    Ground,
+    NoAnswerError,
+    Off,
+    Order,
+    RefusedError,
+    Station,
+    Steer,
+    Verdict,
+    connect,
+    live_rigs,
+    shaped,
+)
+from groundstation.service import key_fields
+from telemetry.media.zenoh_bus import open_client
+
+pytestmark = pytest.mark.slow
+
+
+@pytest.fixture(scope="module")
+def served(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Served]:
+    rig = Rig(tmp_path_factory.mktemp("ground"), target=20.0)
+    rig.run(5.0)
+    for stop, inclination_deg in ((1, 0.3), (2, 0.3), (3, 2.2)):
+        rig.drill(stop, inclination_deg)
+    with serving(rig) as served:
+        yield served
+
+
+@pytest.fixture
+def ground(served: Served) -> Iterator[Ground]:
+    with connect(served.endpoint, timeout=10.0) as ground:
+        yield ground
+
+
+@pytest.mark.parametrize(
+    ("shape", "answer"),
+    [
+        (Verdict, (*key_fields.HEADER, *key_fields.VERDICT)),
+        (Alarm, key_fields.CREW_ALARM),
+        (Station, key_fields.STATION),
+        (Order, key_fields.ORDER),
+    ],
+)
+def test_every_type_has_only_fields_that_its_key_promises(shape: type, answer: key_fields.Fields) -> None:
+    promised = {field.name: field for field in answer}
+    assert {field.name for field in dataclasses.fields(shape)} <= promised.keys()
+    for name, part in (("off", Off), ("steer", Steer)):
+        if shape is Verdict:
+            assert [field.name for field in dataclasses.fields(part)] == [f.name for f in promised[name].fields]
+
+
+def test_answers_have_their_types(ground: Ground) -> None:
+    verdict = ground.verdict()
+    assert verdict.by_surveys == "steer"
+    assert verdict.off is not None
+    assert verdict.off.wind == "N"
+    assert [station.md_m for station in ground.stations()] == [2.0, 4.0, 6.0]
+    assert "projection" in {alarm.code for alarm in ground.alarms()}
+
+
+def test_a_stream_gives_each_row_once_from_the_first_on_and_goes_on(ground: Ground, served: Served) -> None:
+    served.happen()
+    served.happen()
+    rows = ground.stream("events", timeout=20.0)
+    seen = [next(rows)["seq"], next(rows)["seq"]]
+    served.happen()
+    served.happen()
+    seen += [next(rows)["seq"], next(rows)["seq"]]
+    assert seen == [1, 2, 3, 4]
+    assert [row["seq"] for row in ground.stream("events", since=2, timeout=0.1)] == [3, 4]
+
+
+def test_an_order_has_its_outcome_and_a_wrong_one_is_refused(ground: Ground) -> None:
+    number = next(alarm.number for alarm in ground.alarms() if alarm.code == "projection")
+    done = ground.order("alarm", "anna", action="acknowledge", number=number)
+    assert (done.state, done.done, done.by) == ("done", True, "anna")
+    with pytest.raises(RefusedError, match="anna has acknowledged it"):
+        ground.order("alarm", "bert", action="acknowledge", number=number)
+    with pytest.raises(RefusedError, match="no stream; expected one of events"):
+        next(ground.stream("status"))
+
+
+def test_another_rig_is_told_which_live(served: Served) -> None:
+    with open_client(served.endpoint, timeout=10.0) as bus:
+        assert live_rigs(bus) == ["rig-1"]
+        with pytest.raises(NoAnswerError, match="rigs with a ground station: rig-1"):
+            Ground(bus, "rig-7").verdict()
+
+
+def test_an_answer_of_an_older_ground_station_is_named() -> None:
+    with pytest.raises(AnswerError, match="Steer: the answer lacks wind, before_md_m, left_m"):
+        shaped(Steer, {"azimuth_deg": 1.0})
+
+
+def test_the_example_runs(served: Served) -> None:
+    example = Path(__file__).parents[1] / "examples" / "follow_a_rig.py"
+    done = subprocess.run(
+        [sys.executable, str(example), served.endpoint, "rig-1", "0.2"], capture_output=True, text=True, check=False
+    )
+    assert done.returncode == 0, done.stderr
+    lines = done.stdout.splitlines()
+    assert lines[1].startswith("tube 1 at 2.0 m: 0.30 deg")
+    assert len([line for line in lines if line.startswith("tube 1 at")]) == 3
+    assert any(line.startswith("alarm ") and "projection" in line for line in lines)
