@@ -26,6 +26,7 @@ COMMANDS = {
     "pki": ("borechain.cli.pki.pki", "pki", "Make, revoke and change the keys of a rig."),
     "query": ("borechain.cli.ground.query", "query", "Ask a running ground station."),
     "watch": ("borechain.cli.ground.query", "watch", "Follow what a running ground station publishes."),
+    "crew": ("borechain.cli.ground.crew", "crew", "Show a running rig to its crew, on a screen of 80 x 24."),
     "calibrate": (
         "borechain.cli.calibrate.calibrate",
         "calibrate",

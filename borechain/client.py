@@ -238,7 +238,7 @@ class Ground:
                 return dict(json.loads(reply.payload))
         refusals = [reply.error for reply in replies if reply.error not in (None, TIMEOUT)]
         if refusals:
-            raise RefusedError(str(refusals[0]))
+            raise RefusedError(str(refusals[0]).removeprefix(f"{key}: "))
         raise NoAnswerError(f"{selector}: no answer within {patience:g} s; {who_is_there(self._bus)}")
 
 

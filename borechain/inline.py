@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 import secrets
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -99,9 +99,14 @@ class InlineRig:
 
         Scheduler(self.world, self.stepper, follow, speed, cued=True, seal_depth=self._seal_depth).run()
 
-    def ask(self, path: str) -> dict[str, Any]:
+    @property
+    def is_begun(self) -> bool:
+        """Whether the ground station runs and can be asked."""
+        return BASE in self.stepper.processes
+
+    def ask(self, path: str, parameters: Mapping[str, str] | None = None) -> dict[str, Any]:
         """What the ground station shows on ``path``, see docs/keys.md."""
-        return self.ground.operator.ask(path)
+        return self.ground.operator.ask(path, parameters)
 
     def command(self, name: str, parameters: dict[str, str]) -> dict[str, Any]:
         """Have the ground station obey an operator's command."""

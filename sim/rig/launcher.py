@@ -101,6 +101,7 @@ class Launcher:
     act : plays the operator at a cue; False when the ground station did not answer and is to be asked again
     stall_limit : wall s after which a rig that makes no progress is ended
     credentials : what the launcher shows to a router over TLS
+    begun : called with the bus as soon as its endpoint can be joined
     """
 
     def __init__(
@@ -112,8 +113,10 @@ class Launcher:
         act: Callable[[ZenohBus, str], bool] = lambda _bus, _cue: True,
         stall_limit: float = STALL_LIMIT,
         credentials: Credentials | None = None,
+        begun: Callable[[ZenohBus], None] = lambda _bus: None,
     ) -> None:
         self._credentials = credentials
+        self._begun = begun
         self._stall_limit = stall_limit
         self._table = table
         self._rig = rig
@@ -135,6 +138,7 @@ class Launcher:
         try:
             self._table.start("medium")
             with open_client(self._endpoint, CONNECT_TIMEOUT, self._credentials) as bus:
+                self._begun(bus)
                 bus.subscribe(
                     keys.WANTED.format(rig=self._rig), lambda _key, payload: self._ticks.put(Tick.parse(payload))
                 )

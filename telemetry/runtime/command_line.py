@@ -24,11 +24,13 @@ EXTRA_OF = {
     "cantools": "can",
     "distributed": "campaign",
     "matplotlib": "ground",
+    "mcap": "ground",
     "pyarrow": "campaign",
     "rich": "ground",
     "scipy": "ground",
     "smbus2": "board",
     "sqlalchemy": "ground",
+    "textual": "ground",
     "typst": "ground",
 }  # by the module it brings
 

@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 import json
+import sys
 import tempfile
 import time
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import partial
+from importlib.util import find_spec
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -17,6 +19,7 @@ from borechain.cli.faults import EnvironmentFault, InputFault, needs, plain_faul
 from borechain.cli.notices import warnings_in_lines
 from borechain.cli.options import fault_option, json_option, scenario_argument, seed_option, speed_option
 from borechain.cli.tables import console
+from borechain.crew.log import RunLog
 from telemetry import keys
 from telemetry.runtime.options import insecure_option, keys_option, secure_endpoint
 
@@ -60,6 +63,12 @@ PRELOAD = {"float64": "borechain.warm", "fixed": "borechain.warm_all", "publishe
 @click.option(
     "--out", type=click.Path(path_type=Path), help="New or empty folder for the run  [default: out/NAME/run-NNNN]"
 )
+@click.option(
+    "--view",
+    type=click.Choice(["crew", "bar", "log"]),
+    help="What is shown meanwhile: the crew's screen, a bar, or a line for whatever happens  "
+    "[default: crew on a terminal, bar there with --inline, log into a file]",
+)
 @json_option
 @needs("rich", "scipy", "sqlalchemy")
 @plain_faults
@@ -74,6 +83,7 @@ def rig(
     endpoint: str,
     keys_place: Path | None,
     out: Path | None,
+    view: str | None,
     as_json: bool,
 ) -> None:
     """Drill SCENARIO tube by tube with one real process a tube, and show what the ground station makes of it.
@@ -101,20 +111,28 @@ def rig(
         )
     if not inline:
         check_port_free(endpoint)
+    view = chosen_view(view, inline=inline, quiet=as_json, on_terminal=sys.stdout.isatty())
+    if view == "crew":
+        from borechain.cli.rig.on_screen import drill_on_screen
+
+        drill_on_screen(sys.argv[1:], rig_name, endpoint)
+        return
     folder = out if out is not None else next_run_folder(Path("out") / scenario.stem)
     prepare_folder(folder)
     started = time.monotonic()
+    log = RunLog(say) if view == "log" else None
     try:
-        with progress(world, quiet=as_json) as show:
+        with progress(world, quiet=view != "bar") as show:
             if inline:
                 native = transport == "can-native"
-                ran = drill_inline(world, speed, rig_name, folder, show, native=native, keys=keys_place)
+                ran = drill_inline(world, speed, rig_name, folder, show, log, native=native, keys=keys_place)
             else:
                 ran = drill_in_processes(
                     world,
                     rig_name,
                     endpoint,
                     show,
+                    log,
                     transport,
                     partial(
                         process_table, world, scenario, seed, speed, faults, rig_name, endpoint, folder, keys_place
@@ -132,6 +150,31 @@ def rig(
         show_result(result, folder)
     if result["missing"]:
         raise EnvironmentFault(lacking(result["missing"], result["measurements"], folder))
+
+
+def chosen_view(view: str | None, *, inline: bool, quiet: bool, on_terminal: bool) -> str:
+    """What is shown while a rig drills; nothing with ``quiet``.
+
+    Raises
+    ------
+    InputFault
+        When the crew's screen is asked for where nothing can be asked.
+    """
+    if quiet:
+        return ""
+    if view == "crew" and inline:
+        raise InputFault("--view crew: expected a rig of processes with it; nothing can be asked with --inline")
+    if view is not None:
+        return view
+    if not on_terminal:
+        return "log"
+    return "bar" if inline or find_spec("textual") is None else "crew"
+
+
+def say(line: str) -> None:
+    """Write a line at once, for whoever follows a file."""
+    click.echo(line)
+    sys.stdout.flush()
 
 
 def lacking(missing: list[dict[str, Any]], measured: int, folder: Path) -> str:
@@ -155,11 +198,13 @@ def drill_in_processes(
     rig_name: str,
     endpoint: str,
     show: Callable[[Tick | Progress], None],
+    log: RunLog | None,
     transport: str | None,
     table_of: Callable[[Transports, Path], ProcessTable],
     keys_place: Path | None = None,
 ) -> Ran:
     """Drill with one real process a tube, beside a hub of CAN segments where a joint is on CAN."""
+    from borechain.client import Ground
     from borechain.pki.access import MEDIUM
     from sim.rig.launcher import Launcher
     from sim.rig.transports import carrying
@@ -171,7 +216,18 @@ def drill_in_processes(
     ):
         table = table_of(transports, Path(steps) / "steps")
         credentials = credentials_for(endpoint, keys_place, MEDIUM)
-        launcher = Launcher(table, rig_name, endpoint, show, operator_of(world, rig_name), credentials=credentials)
+
+        def follow(tick: Tick) -> None:
+            show(tick)
+            if log is not None:
+                log.on_tick(tick, table.restarts)
+
+        def begin(bus: ZenohBus) -> None:
+            if log is not None:
+                log.follow(Ground(bus, rig_name), endpoint, rig_name)
+
+        operator = operator_of(world, rig_name)
+        launcher = Launcher(table, rig_name, endpoint, follow, operator, credentials=credentials, begun=begin)
         answers = launcher.run(lambda bus: ask(bus, rig_name))
         return Ran(answers, len(table.specs), sum(table.restarts.values()))
 
@@ -182,6 +238,7 @@ def drill_inline(
     rig_name: str,
     folder: Path,
     show: Callable[[Tick | Progress], None],
+    log: RunLog | None = None,
     *,
     native: bool = False,
     keys: Path | None = None,
@@ -190,7 +247,13 @@ def drill_inline(
     from borechain.inline import InlineRig
 
     rig = InlineRig(world, ground_settings(world), rig_name, folder, native=native, keys=keys)
-    rig.run(show, speed)
+
+    def follow(progress: Progress) -> None:
+        show(progress)
+        if log is not None and log.on_tick(progress, {}) and rig.is_begun:
+            log.poll(rig.ask)
+
+    rig.run(follow, speed)
     try:
         return Ran({path: rig.ask(path) for path in ASKED}, 1, 0)
     finally:

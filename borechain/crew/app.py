@@ -1,0 +1,188 @@
+"""The crew's screen: shows what the picture holds, takes keys, and has orders carried out beside everything else."""
+
+from __future__ import annotations
+
+import queue
+import time
+from collections.abc import Callable
+from typing import Any, ClassVar, Protocol
+
+from textual.app import App, ComposeResult
+from textual.binding import Binding, BindingType
+from textual.containers import Horizontal
+from textual.widgets import Static
+
+from borechain.client import ClientError
+from borechain.crew import panels
+from borechain.crew.picture import PATHS, Picture, View
+from telemetry.errors import BorechainError
+
+REFRESH = 0.25  # s
+ALARM_ROWS, ACTION_ROWS = 5, 2
+SHELVED_FOR = 30  # min
+
+
+class Source(Protocol):
+    """What the screen needs of a ground station."""
+
+    def ask(self, path: str, **parameters: object) -> View:
+        """Answer of a path."""
+
+    def follow(self, path: str, call: Callable[[str, View], object]) -> None:
+        """Have every answer that is published handed to ``call``, on any thread."""
+
+    def order(self, name: str, by: str, **parameters: object) -> Any:
+        """Order something and wait for the outcome."""
+
+
+class CrewApp(App[None]):
+    """One rig on a screen of 80 x 24.
+
+    Parameters
+    ----------
+    source : the ground station
+    rig : its name
+    by : who orders
+    clock : s; what is shown is aged by it
+    ended : whether there is nothing more to show, and the screen is to close
+    """
+
+    CSS = """
+    Screen { overflow: hidden; }
+    Static { height: auto; width: auto; }
+    #verdict { height: 3; margin-bottom: 1; }
+    #middle { height: 11; }
+    #plan { width: 23; } #strip { width: 27; padding-left: 1; } #string { width: 30; padding-left: 1; }
+    #alarms { height: 5; } #actions { height: 2; }
+    """
+    BINDINGS: ClassVar[list[BindingType]] = [
+        Binding("a", "acknowledge", "acknowledge"),
+        Binding("s", "shelve", "shelve"),
+        Binding("t", "take_survey", "take survey"),
+        Binding("d", "accept_depth", "accept depth"),
+        Binding("down", "choose(1)", "next alarm"),
+        Binding("up", "choose(-1)", "previous alarm"),
+        Binding("q", "quit", "quit"),
+    ]
+    HELP = "[a]cknowledge [s]helve 30 min [t]ake survey accept [d]epth up/down alarm [q]uit"
+
+    def __init__(
+        self,
+        source: Source,
+        rig: str,
+        by: str,
+        clock: Callable[[], float] = time.monotonic,
+        ended: Callable[[], bool] = lambda: False,
+    ) -> None:
+        super().__init__()
+        self._ended = ended
+        self.picture = Picture(rig)
+        self._source = source
+        self._by = by
+        self._clock = clock
+        self._arrived: queue.SimpleQueue[tuple[str, View]] = queue.SimpleQueue()
+        self._chosen = 0
+
+    def compose(self) -> ComposeResult:
+        """The parts of the screen, from the top down."""
+        yield Static(id="header")
+        yield Static(id="verdict")
+        with Horizontal(id="middle"):
+            yield Static(id="plan")
+            yield Static(id="strip")
+            yield Static(id="string")
+        yield Static(id="alarms")
+        yield Static(id="actions")
+        yield Static(panels.fitted(self.HELP, panels.QUIET), id="help")
+
+    def on_mount(self) -> None:
+        """Follow the ground station from now on."""
+        self._source.follow("**", lambda path, view: self._arrived.put((path, view)))
+        self.run_worker(self._ask_all, thread=True)
+        self.set_interval(REFRESH, self.paint)
+        self.paint()
+
+    def paint(self) -> None:
+        """Take what has arrived and show everything as it is now."""
+        now = self._clock()
+        while not self._arrived.empty():
+            path, view = self._arrived.get()
+            self.picture.on_answer(path, view, now)
+        if not self.query("#help"):
+            return  # the screen is being taken down
+        if self._ended():
+            self.exit()
+        picture = self.picture
+        for name, text in (
+            ("header", panels.header(picture, now)),
+            ("verdict", panels.verdict(picture, now)),
+            ("plan", panels.plan(picture)),
+            ("strip", panels.strip(picture)),
+            ("string", panels.string(picture)),
+            ("alarms", panels.alarms(picture, self._chosen, ALARM_ROWS)),
+            ("actions", panels.actions(picture, ACTION_ROWS)),
+        ):
+            self.query_one(f"#{name}", Static).update(text)
+
+    def action_choose(self, step: int) -> None:
+        """Choose another alarm."""
+        self._chosen = max(0, min(self._chosen + step, len(self.picture.alarms) - 1))
+        self.paint()
+
+    def action_acknowledge(self) -> None:
+        """Acknowledge the chosen alarm."""
+        self._order_about_alarm("acknowledge")
+
+    def action_shelve(self) -> None:
+        """Put the chosen alarm away."""
+        self._order_about_alarm("shelve", minutes=SHELVED_FOR)
+
+    def action_take_survey(self) -> None:
+        """Have the tube at the bit survey again."""
+        if self.picture.lowest is None:
+            self._tell("take survey: no tube is known yet")
+        else:
+            self._order("take_survey", f"take survey of tube {self.picture.lowest}", tube=self.picture.lowest)
+
+    def action_accept_depth(self) -> None:
+        """Believe the depth that comes now; the crew has measured it."""
+        self._order("accept_depth", "accept depth", action="confirm")
+
+    def _order_about_alarm(self, action: str, **more: object) -> None:
+        alarms = self.picture.alarms
+        if not alarms:
+            self._tell(f"{action}: no alarm is open")
+            return
+        number = alarms[min(self._chosen, len(alarms) - 1)]["number"]
+        self._order("alarm", f"{action} alarm {number}", action=action, number=number, **more)
+
+    def _order(self, name: str, shown: str, **parameters: object) -> None:
+        """Order on a thread, and show its course."""
+        self._tell(f"{shown}: sent")
+
+        def carry_out() -> None:
+            try:
+                order = self._source.order(name, self._by, **parameters)
+                detail = f": {order.detail}" if order.detail else ""
+                outcome = f"{shown}: {order.state}{detail}"
+            except BorechainError as error:
+                outcome = f"{shown}: {error}"
+            self.call_from_thread(self._tell, outcome)
+
+        self.run_worker(carry_out, thread=True)
+
+    def _tell(self, line: str) -> None:
+        self.picture.done.append(line)
+        self.paint()
+
+    def _ask_all(self) -> None:
+        """What is not published by itself at once, asked for at the beginning; nobody there is no fault."""
+        for path in (*PATHS, *(f"nodes/{row['tube']}" for row in self._ask("string").get("tubes", []))):
+            if view := self._ask(path):
+                self._arrived.put((path, view))
+
+    def _ask(self, path: str) -> View:
+        try:
+            return self._source.ask(path)
+        except ClientError:
+            return {}

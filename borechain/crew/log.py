@@ -1,0 +1,114 @@
+"""The log of a rig whose output is redirected: a line a phase, survey, verdict, alarm and restart."""
+
+from __future__ import annotations
+
+import datetime
+from collections.abc import Callable, Mapping
+from typing import TYPE_CHECKING, Any, Protocol
+
+if TYPE_CHECKING:
+    from borechain.client import Ground
+
+View = dict[str, Any]
+FOLLOWED = ("measurements", "alarms", "verdict")
+
+
+class Told(Protocol):
+    """What a medium tells while it drills."""
+
+    @property
+    def phase(self) -> str:
+        """What the rig does."""
+
+    @property
+    def rig_time(self) -> float:
+        """Rig time, s."""
+
+    @property
+    def begin(self) -> float:
+        """Rig time of the first phase, s."""
+
+    @property
+    def end(self) -> float:
+        """Rig time of the end, s."""
+
+
+class RunLog:
+    """Turns what happens into lines.
+
+    Parameters
+    ----------
+    write : takes one line; called from any thread
+    """
+
+    def __init__(self, write: Callable[[str], object]) -> None:
+        self._write = write
+        self._phase = ""
+        self._elapsed = 0.0
+        self._alarms: dict[int, tuple[str, str]] = {}  # state and level of each that was told
+        self._word = ""
+        self._restarts: dict[str, int] = {}
+        self.newest = 0  # survey that was told
+
+    def on_open(self, endpoint: str, rig: str) -> None:
+        """The endpoint of the rig can be joined."""
+        self._line("open", f"{endpoint}: borechain crew --endpoint {endpoint} --rig {rig}")
+
+    def on_tick(self, tick: Told, restarts: Mapping[str, int]) -> bool:
+        """Take the rig's progress and how often each process was started again; whether a phase began."""
+        self._elapsed = tick.rig_time - tick.begin
+        for name, count in restarts.items():
+            if count > self._restarts.get(name, 0):
+                self._line("restart", f"process {name}, {count} so far")
+        self._restarts = dict(restarts)
+        if tick.phase == self._phase:
+            return False
+        self._phase = tick.phase
+        self._line("phase", f"{tick.phase}, at {self._elapsed:.0f} of {tick.end - tick.begin:.0f} s")
+        return True
+
+    def on_answer(self, path: str, view: View) -> None:
+        """Take an answer of the ground station."""
+        match path:
+            case "measurements":
+                for row in view["measurements"]:
+                    self._tell_survey(row)
+            case "alarms":
+                for alarm in (*view["open"], *view["closed"]):
+                    self._tell_alarm(alarm)
+            case "verdict" if view["verdict"] != self._word:
+                self._word = view["verdict"]
+                self._line("verdict", view["line"])
+
+    def follow(self, ground: Ground, endpoint: str, rig: str) -> None:
+        """Log what a ground station publishes."""
+        self.on_open(endpoint, rig)
+        for path in FOLLOWED:
+            ground.follow(path, self.on_answer)
+
+    def poll(self, ask: Callable[[str, dict[str, str]], View]) -> None:
+        """Log what a ground station in this process knows that was not told yet."""
+        for path in FOLLOWED:
+            self.on_answer(path, ask(path, {"since": str(self.newest)} if path == "measurements" else {}))
+
+    def _tell_survey(self, row: View) -> None:
+        if row["seq"] <= self.newest:
+            return
+        self.newest = row["seq"]
+        lean = f"{row['inclination_deg']:.2f} deg to {row['azimuth_deg']:.0f} deg"
+        trust = "" if row["trust"] == "full" else f", {row['trust'].replace('_', ' ')}"
+        self._line("survey", f"tube {row['tube']} at {row['md_m']:.2f} m: {lean}{trust}")
+
+    def _tell_alarm(self, alarm: View) -> None:
+        now = alarm["state"], alarm["level"]
+        if self._alarms.get(alarm["number"]) == now:
+            return
+        self._alarms[alarm["number"]] = now
+        way = "" if alarm["wind"] is None else f" to {alarm['azimuth_deg']:g} deg {alarm['wind']}"
+        where = "" if alarm["md_m"] is None else f" at {alarm['md_m']:.1f} m"
+        what = f"{alarm['code']} {alarm['subject']}{where}{way}: {alarm['detail']}"
+        self._line("alarm", f"{alarm['number']} {alarm['state']}, {alarm['level']}, {what}")
+
+    def _line(self, kind: str, text: str) -> None:
+        utc = datetime.datetime.now(datetime.UTC).strftime("%Y-%m-%dT%H:%M:%SZ")
+        self._write(f"{utc} {self._elapsed:8.1f} s {kind:8} {text}")

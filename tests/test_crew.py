@@ -1,0 +1,177 @@
+"""The crew's screen: its parts as text, and its tasks in textual's own driver on a real ground station."""
+
+import asyncio
+import html
+import re
+import time
+from collections.abc import Callable, Iterator
+from typing import Any
+
+import pytest
+from hand_fed import Rig
+from served import Served, serving
+
+from borechain.client import connect
+from borechain.crew import panels
+from borechain.crew.app import CrewApp
+from borechain.crew.picture import Picture
+
+SIZE = (80, 24)
+PATIENCE = 60.0  # s
+
+
+class Clock:
+    """Time of a screen, moved on by hand."""
+
+    now = 1000.0
+
+    def __call__(self) -> float:
+        return self.now
+
+
+@pytest.fixture(scope="module")
+def served(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Served]:
+    """A hole of 20 m that is on target after three stops."""
+    rig = Rig(tmp_path_factory.mktemp("ground"), target=20.0)
+    rig.run(5.0)
+    for stop in range(1, 4):
+        rig.drill(stop, 0.3)
+    with serving(rig) as served:
+        yield served
+
+
+def shown(app: CrewApp) -> list[str]:
+    """The lines on the screen as somebody reads them, cut where the screen is."""
+    rows: dict[float, str] = {}
+    for y, text in re.findall(r'<text[^>]* y="([0-9.]+)"[^>]*clip-path[^>]*>(.*?)</text>', app.export_screenshot()):
+        rows[float(y)] = rows.get(float(y), "") + html.unescape(text).replace("\xa0", " ")
+    return [rows[y] for y in sorted(rows)]
+
+
+async def until(app: CrewApp, served: Served, probe: Callable[[str], bool]) -> str:
+    """The screen once it shows something; the answers come over a real bus."""
+    deadline = time.monotonic() + PATIENCE
+    while True:
+        app.paint()
+        text = "\n".join(shown(app))
+        if probe(text):
+            return text
+        assert time.monotonic() < deadline, text
+        await asyncio.to_thread(served.do, lambda _rig: None)
+
+
+def drift(rig: Rig) -> None:
+    rig.drill(4, 1.0)
+    rig.drill(5, 1.9)
+
+
+async def test_from_the_alarm_to_the_right_answers_with_one_key(served: Served) -> None:
+    """Which hole, how deep, which way, what to do: on the screen with the alarm; one key acknowledges it."""
+    with connect(served.endpoint, timeout=10.0) as ground:
+        app = CrewApp(ground, "rig-1", "anna", Clock())
+        async with app.run_test(size=SIZE) as pilot:
+            text = await until(app, served, lambda text: "ON TARGET" in text and "MD 6.0/20.0 m" in text)
+            assert "go on" in text
+            await asyncio.to_thread(served.do, drift)
+            text = await until(
+                app, served, lambda text: "STEER" in text and "raised projection" in text and "MD 10.0" in text
+            )
+            lines = text.splitlines()
+            assert len(lines) <= SIZE[1]
+            assert lines[0].rstrip() == "HOLE rig-1 * live 0.0s  MD 10.0/20.0 m  tubes 5  health good  alarms 1"
+            told = "STEER: ends 43.1 +- 0.1 cm at 0 deg N; limit 45 (96 %); act before 13.1 m"
+            assert lines[1].strip() == told
+            assert lines[2].strip() == "steer to 180 deg S before 13.1 m, 3.1 m are left"
+            assert ">  1 raised projection 20.0 m 0 deg N: 43.1 +- 0.1 cm over 80 % of 45 cm" in text
+            await pilot.press("a")
+            text = await until(
+                app, served, lambda text: "acknowledge alarm 1: done" in text and "1 ack anna proj" in text
+            )
+            await pilot.press("a")
+            await until(app, served, lambda text: "alarm 1: anna has acknowledged it" in text)
+
+
+async def test_a_ground_station_that_is_frozen_is_dont_know_and_not_green(served: Served) -> None:
+    clock = Clock()
+    with connect(served.endpoint, timeout=10.0) as ground:
+        app = CrewApp(ground, "rig-1", "anna", clock)
+        async with app.run_test(size=SIZE):
+            await until(app, served, lambda text: "* live 0.0s" in text and "DON'T KNOW" not in text)
+            clock.now += 4.0
+            await until(app, served, lambda text: "* live 4.0s" in text and "DON'T KNOW" not in text)
+            clock.now += 1.0
+            text = await until(app, served, lambda text: "DON'T KNOW: no verdict from the ground" in text)
+            assert "NOT LIVE" in text.splitlines()[0]
+            assert "do not count on it" in text
+
+
+async def test_without_a_ground_station_the_screen_says_so(served: Served) -> None:
+    with connect(served.endpoint, "rig-7", timeout=10.0) as ground:
+        app = CrewApp(ground, "rig-7", "anna", Clock())
+        async with app.run_test(size=SIZE) as pilot:
+            text = "\n".join(shown(app))
+            assert "DON'T KNOW: no ground station has been heard yet" in text
+            await pilot.press("t", "a")
+            assert "acknowledge: no alarm is open" in "\n".join(shown(app))
+
+
+def picture(**answers: Any) -> Picture:
+    found = Picture("rig-1")
+    for path, view in answers.items():
+        found.on_answer(path, view, 0.0)
+    return found
+
+
+def alarm(number: int, **more: Any) -> dict[str, Any]:
+    row = {
+        "number": number, "state": "raised", "code": "clock", "level": "bad", "subject": f"tube {number}",
+        "detail": "its rig time is ahead", "threshold": "", "md_m": None, "wind": None, "azimuth_deg": None,
+        "acknowledged_by": None,
+    }  # fmt: skip
+    return row | more
+
+
+def test_the_chosen_alarm_is_in_sight_however_many_there_are() -> None:
+    many = picture(
+        alarms={"revision": 1, "utc": "", "open": [alarm(n) for n in range(40)], "flood": True, "left_out": 9}
+    )
+    for chosen in (0, 3, 17, 39):
+        lines = panels.alarms(many, chosen, 5).plain.splitlines()
+        assert len(lines) == 5
+        assert lines[0].startswith("ALARMS 40 open  FLOOD, 9 more")
+        assert [line for line in lines if line.startswith(">")] == [lines[1 + min(chosen, 3)]]
+        assert f">{chosen:3d} raised clock tube {chosen}" in "\n".join(lines)
+
+
+def test_a_long_string_shows_the_tubes_that_are_not_well() -> None:
+    tubes = [{"tube": n, "md_m": None, "age_s": 0.5, "stale": n in (3, 40)} for n in range(50, 0, -1)]
+    lines = panels.string(picture(string={"revision": 1, "utc": "", "tubes": tubes})).plain.splitlines()
+    assert len(lines) <= panels.PLAN_HEIGHT
+    assert lines[0].endswith("(50)")
+    assert [int(line.split()[0]) for line in lines[1:3]] == [40, 3]
+
+
+def test_every_line_fits_the_screen() -> None:
+    long = picture(
+        alarms={"revision": 1, "utc": "", "open": [alarm(1, detail="x" * 300, wind="NNE", azimuth_deg=22, md_m=12.0)]},
+        verdict={
+            "revision": 1, "utc": "", "verdict": "out", "by_surveys": "out", "line": "x" * 200, "why": ["y" * 200],
+            "off": None, "steer": None, "good_for_s": 4.5, "target_m": 20.0,
+        },
+        orders={"revision": 1, "utc": "", "orders": []},
+    )  # fmt: skip
+    for part in (
+        panels.header(long, 0.0),
+        panels.verdict(long, 0.0),
+        panels.alarms(long, 0, 5),
+        panels.actions(long, 2),
+    ):
+        assert max(map(len, part.plain.splitlines())) <= panels.WIDTH
+
+
+def test_an_older_answer_does_not_replace_a_newer_one() -> None:
+    found = picture(status={"revision": 7, "utc": "2026-01-01T00:00:02+00:00", "tubes": 2})
+    found.on_answer("status", {"revision": 5, "utc": "2026-01-01T00:00:01+00:00", "tubes": 1}, 1.0)
+    assert found.status["tubes"] == 2
+    found.on_answer("status", {"revision": 1, "utc": "2026-01-01T00:00:09+00:00", "tubes": 3}, 2.0)  # after a restart
+    assert found.status["tubes"] == 3
