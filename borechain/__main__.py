@@ -27,6 +27,8 @@ COMMANDS = {
     "query": ("borechain.cli.ground.query", "query", "Ask a running ground station."),
     "watch": ("borechain.cli.ground.query", "watch", "Follow what a running ground station publishes."),
     "crew": ("borechain.cli.ground.crew", "crew", "Show a running rig to its crew, on a screen of 80 x 24."),
+    "record": ("borechain.cli.ground.record", "record", "Record what a rig takes in and says into a file (MCAP)."),
+    "replay": ("borechain.cli.ground.record", "replay", "Give a recording to a ground station again."),
     "calibrate": (
         "borechain.cli.calibrate.calibrate",
         "calibrate",

@@ -80,6 +80,11 @@ TABLE: Final[tuple[Key, ...]] = (
         "query, publish",
         "raw readings that nodes averaged at rest, new ones published; ?tube=3, ?since=17",
     ),
+    Key(
+        "borechain/{rig}/ground/intake",
+        "publish",
+        "everything that the ground station takes in, where somebody listens: for recordings (msgpack)",
+    ),
     Key("borechain/{rig}/ground/schema", "query", "JSON schema of every answer below ground/"),
     Key("borechain/{rig}/ground/recalibration", "query, publish", "calibration in the field: progress and result"),
     Key("borechain/{rig}/ground/orders", "query, publish", "the newest orders with their course and outcome"),

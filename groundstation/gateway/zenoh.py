@@ -14,6 +14,7 @@ from typing import Any
 import msgpack
 
 from groundstation.errors import GroundError, SelectorError
+from groundstation.service.intake import BEGIN, Intake, pack_intake
 from groundstation.service.orders import Order
 from groundstation.service.paths import PATTERNS, Path, find, paths
 from groundstation.service.process import GroundProcess
@@ -29,6 +30,7 @@ BUSY = f"the ground station has {WAITING} questions to answer; ask again later"
 COMMON_PARAMETERS = ("accept",)
 ENCODINGS = {"json": JSON, "msgpack": MSGPACK}
 BEATS = ("verdict",)  # paths that are published without end, and only where somebody listens
+PRIVATE = ("folder", "key_file", "database_url")  # settings that are nobody's business
 WHO = "zenoh"  # ordered, where the order does not say
 
 Handler = Callable[[Query], None]
@@ -51,6 +53,8 @@ class ZenohGateway:
         self._inbox: Inbox[tuple[Handler, Query]] = Inbox(WAITING)
         self._awaited: set[asyncio.Task[None]] = set()
         self._publishers: dict[str, Publisher] = {}
+        self._intake = bus.publisher(self._key("intake"), MSGPACK, droppable=True)
+        self._taped = 0  # newest event of the intake that was published, 0 while nobody listens
         self._told = dict(process.model.seen)  # newest row of each stream that was published, or there before
         process.listeners.append(self._publish)
         bus.queryable_kept(self._key("**"), partial(self._arrive, self._answer))
@@ -88,12 +92,27 @@ class ZenohGateway:
         return keys.GROUND.format(rig=self._rig, path=path)
 
     def _publish(self, changed: list[str]) -> None:
-        """Put the present value of each path."""
+        """Put the present value of each path, and before it what it came from."""
+        self._publish_intake()
         for path in changed:
             if path not in self._publishers:
                 self._publishers[path] = self._bus.publisher(self._key(path), JSON, droppable=True)
             if path not in BEATS or self._publishers[path].is_heard:
                 self._publishers[path].put(pack(self._news(path), "json"))
+
+    def _publish_intake(self) -> None:
+        """Put what was taken in since the last time; whoever began to listen gets all that is kept first."""
+        tape, process = self._process.tape, self._process
+        if not self._intake.is_heard:
+            self._taped = 0
+            return
+        if self._taped == 0:
+            settings = process.config.model_dump(mode="json", exclude=set(PRIVATE))
+            begin = Intake(0, BEGIN, 0.0, 0.0, 0, {"settings": settings, "start": process.start_number})
+            self._intake.put(pack_intake(begin))
+        for event in tape.after(self._taped):
+            self._intake.put(pack_intake(event))
+        self._taped = tape.newest
 
     def _news(self, path: str) -> dict[str, Any]:
         """Answer to publish: of a stream the rows that have come since the last one."""

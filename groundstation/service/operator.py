@@ -78,6 +78,9 @@ class Operator:
         }
         self.wake: Callable[[], None] = lambda: None  # called when something is to be sent
         self.ended: Callable[[int], None] = lambda _number: None  # called with an order that is not to be sent any more
+        self.accepted: Callable[[str, Mapping[str, str], str], None] = lambda _name, _parameters, _by: (
+            None
+        )  # and obeyed
         self.changed: Callable[[list[str]], None] = lambda _paths: None  # called with the paths that changed
 
     def ask(self, path: str, parameters: Mapping[str, str] | None = None) -> View:
@@ -106,7 +109,10 @@ class Operator:
             arguments = parse_parameters(spec, parameters)
         except CommandError as error:
             raise SelectorError(str(error)) from error
-        return self._accept(spec, tube, arguments, by)
+        order = self._accept(spec, tube, arguments, by)
+        if spec.by is ObeyedBy.GROUND:
+            self.accepted(name, parameters, by)
+        return order
 
     def command(self, tube: int, name: str, arguments: Mapping[str, Any] | None = None, by: str = "operator") -> Order:
         """Accept an order for a tube with arguments in SI.

@@ -7,14 +7,15 @@ import math
 import secrets
 import time
 from collections import deque
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import replace
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Protocol
 
 from groundstation.config import GroundConfig
 from groundstation.errors import SelectorError, StoreError
 from groundstation.service.conditions import conditions_of
 from groundstation.service.crew_alarms import Times
+from groundstation.service.intake import DEPTH, MESSAGE, ORDER, TIMER, Tape
 from groundstation.service.model import RigModel
 from groundstation.service.operator import BlockUpload, Operator, Outgoing
 from groundstation.service.orders import Order
@@ -53,6 +54,22 @@ HEARTBEAT = 1.0  # s, own clock, between two verdicts
 EARLY = 64  # readings of the depth that may come before rig time is known
 GROUND_STATION = "ground station"  # who orders that something be sent again
 
+
+class RigClock(Protocol):
+    """What tells rig time: the clock of the link, or a recording."""
+
+    @property
+    def synchronised(self) -> bool:
+        """Whether rig time is known."""
+
+    @property
+    def epoch(self) -> int:
+        """Epoch of rig time."""
+
+    def rig_from_local(self, local: float) -> float:
+        """Rig time (s) at a time of the own clock (s)."""
+
+
 Listener = Callable[[list[str]], None]  # takes the paths below ground/ that changed
 
 
@@ -89,6 +106,9 @@ class GroundProcess(Process):
         self.watch = Watch(self.model)
         self.endpoint = Endpoint(BASE, frozenset({Side.LOWER}), boot_count=start, seals=seals)
         self._seal_watch = SealWatch(self.endpoint, self._on_refused)
+        self.clock: RigClock = self.endpoint.clock
+        self.tape = Tape()
+        self.start_number = start
         self.listeners: list[Listener] = []
         self._stale: set[int] = set()
         self._early: deque[DepthReading] = deque(maxlen=EARLY)
@@ -103,6 +123,7 @@ class GroundProcess(Process):
         self.operator = Operator(config, self.model, self.store, self._uploads, start)
         self.operator.changed = self._publish
         self.operator.ended = self.endpoint.withdraw
+        self.operator.accepted = self._note_order
         for stored in self.store.messages():
             self._apply_stored(stored.message, stored.md, stored.below)
         self.model.crew_alarms.restore(self.store.alarms(), conditions_of(self.model))
@@ -111,7 +132,7 @@ class GroundProcess(Process):
         """A frame arrived from the encoder."""
         self._send_pending(now)
         for received in self.endpoint.receive(side, frame, now, margin):
-            self._on_message(received.message, now)
+            self.on_message(received.message, now)
 
     def on_depth(self, payload: bytes, now: float) -> None:
         """The rig measured the depth of the bit; bytes that are no reading are counted."""
@@ -119,6 +140,7 @@ class GroundProcess(Process):
         content = payload if seals is None else seals.depth_content(payload)
         if content is None:
             return
+        self._note(DEPTH, now, content)
         try:
             reading = decode(content)
         except DecodeError:
@@ -130,13 +152,15 @@ class GroundProcess(Process):
         if seals is not None and not seals.is_next_depth(reading.sequence):
             return
         self._advance_time(now)
-        if not self.endpoint.clock.synchronised:
+        if not self.clock.synchronised:
             self._early.append(reading)  # what bounds it is not known yet
             return
         self._on_reading(reading, now)
 
     def on_timer(self, now: float) -> None:
         """Advance to ``now``: orders and uploads, hello, time requests, repetition, and what is wrong by now."""
+        if self.watch.is_due(now) or self._early:
+            self._note(TIMER, now)
         self._advance_time(now)
         self._send_pending(now)
         with self._refusing_disk():
@@ -159,6 +183,15 @@ class GroundProcess(Process):
         """Close the database."""
         self.store.close()
 
+    def _note(self, kind: str, now: float, content: object = None) -> None:
+        """Put an event on the tape, with the rig time at which it came."""
+        clock = self.clock
+        rig_now = clock.rig_from_local(now) if clock.synchronised else math.nan
+        self.tape.add(kind, now, rig_now, clock.epoch, content)
+
+    def _note_order(self, name: str, parameters: Mapping[str, str], by: str) -> None:
+        self._note(ORDER, self.model.now, [name, dict(parameters), by])
+
     def _send_pending(self, now: float) -> None:
         for outgoing in self.operator.take_pending():
             self._send(outgoing, now)
@@ -171,7 +204,7 @@ class GroundProcess(Process):
 
     def _advance_time(self, now: float) -> None:
         """Follow rig time and its epoch, also where nothing comes any more."""
-        model, clock = self.model, self.endpoint.clock
+        model, clock = self.model, self.clock
         model.now = now
         model.revision += 1
         if not clock.synchronised:
@@ -298,7 +331,9 @@ class GroundProcess(Process):
         with contextlib.suppress(StoreError):
             yield
 
-    def _on_message(self, message: Message, now: float) -> None:
+    def on_message(self, message: Message, now: float) -> None:
+        """A message has come, from the string or from a recording."""
+        self._note(MESSAGE, now, message)
         self._advance_time(now)
         match message:
             case NodeState():

@@ -1,16 +1,25 @@
-"""``borechain rig`` into a file: a line for whatever happens, and who may join from the beginning on."""
+"""``borechain rig`` into a file: a line for whatever happens; recorded meanwhile, a replay gives the same digest."""
 
 import re
+import signal
+import subprocess
 from pathlib import Path
 
-from rigs import free_endpoint, run
+from rigs import command, free_endpoint, run
 
 LINE = re.compile(r"\d{4}-\d\d-\d\dT\d\d:\d\d:\d\dZ +\d+\.\d s (\w+) +(.+)")
 
 
-def test_a_run_into_a_file_is_a_line_a_phase_survey_verdict_and_restart(tmp_path: Path) -> None:
-    endpoint = free_endpoint()
+def test_a_run_is_logged_a_line_for_whatever_happens_and_its_recording_gives_the_same_stations(tmp_path: Path) -> None:
+    endpoint, recording = free_endpoint(), tmp_path / "run.mcap"
+    words = command("record", str(recording), "--endpoint", endpoint)
+    recorder = subprocess.Popen(words, stderr=subprocess.PIPE, text=True)
     done = run("rig", "rig-3", "--endpoint", endpoint, "--out", str(tmp_path / "run"), "--fault", "kill-node:1@70+20")
+    recorder.send_signal(signal.SIGINT)
+    try:
+        _, said = recorder.communicate(timeout=60.0)
+    finally:
+        recorder.kill()
     assert done.returncode == 0, done.stderr
     lines = [match.groups() for match in map(LINE.fullmatch, done.stdout.splitlines()) if match]
     kinds = [kind for kind, _ in lines]
@@ -26,4 +35,9 @@ def test_a_run_into_a_file_is_a_line_a_phase_survey_verdict_and_restart(tmp_path
     assert verdicts[0] == "DON'T KNOW: no station has been surveyed yet"
     assert verdicts[-1].startswith("ON TARGET: ends ")
     assert "alarm" in kinds
-    assert "digest " in done.stdout
+    assert recorder.returncode == 0, said
+    assert "not whole" not in said
+    again = run("replay", str(recording))
+    assert again.returncode == 0, again.stderr
+    digest = next(line for line in done.stdout.splitlines() if line.startswith("digest "))
+    assert again.stdout.splitlines()[-1] == digest
