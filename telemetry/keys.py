@@ -32,6 +32,7 @@ CUE: Final = "borechain/{rig}/stepper/cue"
 DEPTH: Final = "borechain/{rig}/surface/depth"
 LIVELINESS: Final = "borechain/{rig}/@liveliness/{process}"
 GROUND: Final = "borechain/{rig}/ground/{path}"
+INTAKE: Final = "borechain/{rig}/intake"
 LEASE: Final = "borechain/{rig}/@lease/{holder}"
 COMMAND: Final = "borechain/{rig}/cmd/{name}"
 
@@ -81,9 +82,9 @@ TABLE: Final[tuple[Key, ...]] = (
         "raw readings that nodes averaged at rest, new ones published; ?tube=3, ?since=17",
     ),
     Key(
-        "borechain/{rig}/ground/intake",
-        "publish",
-        "everything that the ground station takes in, where somebody listens: for recordings (msgpack)",
+        INTAKE,
+        "query, publish",
+        "everything that the ground station takes in, where somebody listens: for recordings (msgpack); ?since=17",
     ),
     Key("borechain/{rig}/ground/schema", "query", "JSON schema of every answer below ground/"),
     Key("borechain/{rig}/ground/recalibration", "query, publish", "calibration in the field: progress and result"),

@@ -23,7 +23,6 @@ NAME = "borechain"
 CHUNK_SIZE = 8192  # bytes; larger ones lose more where a recording is cut
 MAGIC = b"\x89MCAP0\r\n"
 LARGEST_RECORD = 1 << 26  # bytes
-INTAKE = "intake"
 NUMBER = re.compile(r"(?<=/)[0-9]+(?=/|$)")
 
 

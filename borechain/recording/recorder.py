@@ -9,12 +9,15 @@ import time
 from dataclasses import dataclass
 from pathlib import Path
 
-from borechain.recording.files import INTAKE, RecordingWriter, Sample
+import msgpack
+
+from borechain.recording.files import RecordingWriter, Sample
 from groundstation.service.intake import BEGIN, IntakeError, unpack_intake
 from groundstation.service.paths import schemas
 from telemetry import keys
 from telemetry.media.zenoh_bus import ZenohBus
 
+ANSWERED_WITHIN = 5.0  # wall s
 WAITING = 100_000  # samples that may wait to be written; more are dropped and counted
 
 
@@ -46,21 +49,24 @@ class Recorder:
 
     def __init__(self, bus: ZenohBus, rig: str, path: Path) -> None:
         self.course = Course()
+        self._bus = bus
         self._arrived: queue.Queue[Sample | None] = queue.Queue(WAITING)
         shown = {pattern: json.dumps(schema).encode() for pattern, schema in schemas().items()}
         self._writer = RecordingWriter(path, rig, shown)
-        self._intake = keys.GROUND.format(rig=rig, path=INTAKE)
-        for key in (keys.GROUND.format(rig=rig, path="**"), keys.DEPTH.format(rig=rig)):
+        self._intake = keys.INTAKE.format(rig=rig)
+        for key in (keys.GROUND.format(rig=rig, path="**"), keys.DEPTH.format(rig=rig), self._intake):
             bus.subscribe(key, self._arrive)
 
     def run(self) -> Course:
         """Write until ``stop``; returns how it went."""
-        with self._writer as writer:
+        with self._writer:
             while (sample := self._arrived.get()) is not None:
-                writer.write(sample)
-                self.course.samples += 1
                 if sample.key == self._intake:
-                    self._count(sample.payload)
+                    self._take_intake(sample)
+                else:
+                    self._write(sample)
+            if self.course.newest:
+                self._ask_for_more()
         return self.course
 
     def stop(self) -> None:
@@ -74,14 +80,45 @@ class Recorder:
         except queue.Full:
             self.course.dropped += 1
 
-    def _count(self, payload: bytes) -> None:
-        """Notice events of the intake that did not come; what was told before is told once more to a new listener."""
-        try:
-            event = unpack_intake(payload)
-        except IntakeError:
+    def _write(self, sample: Sample) -> None:
+        self._writer.write(sample)
+        self.course.samples += 1
+
+    def _take_intake(self, sample: Sample) -> None:
+        """Write an event once, in its order; what did not reach us before it is asked for."""
+        number = number_of(sample.payload)
+        if number > self.course.newest + 1:
+            self._ask_for_more()
+        self._keep(number, sample)
+
+    def _keep(self, number: int, sample: Sample) -> None:
+        """Write an event that is new, and count what is missing before it; 0 are the settings."""
+        course = self.course
+        if number and number <= course.newest:
             return
-        if event.kind == BEGIN or event.number <= self.course.newest:
-            return
-        self.course.first = self.course.first or event.number
-        self.course.missing += event.number - self.course.newest - 1 if self.course.newest else 0
-        self.course.newest = event.number
+        if number:
+            course.missing += number - course.newest - 1 if course.newest else 0
+            course.first, course.newest = course.first or number, number
+        self._write(sample)
+
+    def _ask_for_more(self) -> None:
+        """Write what the ground station keeps of the events after the newest one, for as long as there are any."""
+        while rows := self._events_after(self.course.newest):
+            for payload in rows:
+                self._keep(number_of(payload), Sample(self._intake, time.time_ns(), payload))
+
+    def _events_after(self, number: int) -> list[bytes]:
+        for reply in self._bus.get(f"{self._intake}?since={number}", ANSWERED_WITHIN):
+            if reply.error is None:
+                rows = msgpack.unpackb(reply.payload)
+                return [row for row in rows if isinstance(row, bytes)] if isinstance(rows, list) else []
+        return []
+
+
+def number_of(payload: bytes) -> int:
+    """Number of an event; 0 of what is none, and of the settings."""
+    try:
+        event = unpack_intake(payload)
+    except IntakeError:
+        return 0
+    return 0 if event.kind == BEGIN else event.number

@@ -7,11 +7,12 @@ from collections.abc import Iterable
 from dataclasses import dataclass
 from pathlib import Path
 
-from borechain.recording.files import INTAKE, Recording, RecordingError
+from borechain.recording.files import Recording, RecordingError
 from groundstation.config import checked_config
 from groundstation.errors import GroundError
 from groundstation.service.intake import BEGIN, DEPTH, MESSAGE, ORDER, Intake, IntakeError, unpack_intake
 from groundstation.service.process import GroundProcess
+from telemetry import keys
 from telemetry.errors import BorechainError
 
 REPEATED_ORDERS = ("accept_depth", "alarm")  # of the ground station itself, which need no key of the rig
@@ -52,13 +53,12 @@ def replay_file(recording: Recording, folder: Path) -> Replayed:
     RecordingError
         When the recording has no intake, or is of another version.
     """
-    events = (unpack_intake(sample.payload) for sample in recording.samples() if sample.key.endswith(f"/{INTAKE}"))
+    samples = recording.samples()
+    events = (unpack_intake(one.payload) for one in samples if one.key == keys.INTAKE.format(rig=recording.rig))
     try:
         first = next(events, None)
         if first is None or first.kind != BEGIN:
-            raise RecordingError(
-                f"{recording.path}: expected what a ground station took in ({INTAKE}), the recording has none"
-            )
+            raise RecordingError(f"{recording.path}: expected what a ground station took in, the recording has none")
         return replay(first, events, folder, recording.rig)
     except IntakeError as error:
         raise RecordingError(f"{recording.path}: {error}") from error

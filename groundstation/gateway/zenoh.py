@@ -16,7 +16,7 @@ import msgpack
 from groundstation.errors import GroundError, SelectorError
 from groundstation.service.intake import BEGIN, Intake, pack_intake
 from groundstation.service.orders import Order
-from groundstation.service.paths import PATTERNS, Path, find, paths
+from groundstation.service.paths import LONGEST_NUMBER, PATTERNS, Path, find, paths
 from groundstation.service.process import GroundProcess
 from groundstation.service.views import Parameters
 from telemetry import keys
@@ -30,6 +30,7 @@ BUSY = f"the ground station has {WAITING} questions to answer; ask again later"
 COMMON_PARAMETERS = ("accept",)
 ENCODINGS = {"json": JSON, "msgpack": MSGPACK}
 BEATS = ("verdict",)  # paths that are published without end, and only where somebody listens
+INTAKE_AT_ONCE = 500  # events of one answer
 PRIVATE = ("folder", "key_file", "database_url")  # settings that are nobody's business
 WHO = "zenoh"  # ordered, where the order does not say
 
@@ -53,11 +54,12 @@ class ZenohGateway:
         self._inbox: Inbox[tuple[Handler, Query]] = Inbox(WAITING)
         self._awaited: set[asyncio.Task[None]] = set()
         self._publishers: dict[str, Publisher] = {}
-        self._intake = bus.publisher(self._key("intake"), MSGPACK, droppable=True)
+        self._intake = bus.publisher(keys.INTAKE.format(rig=self._rig), MSGPACK, droppable=True)
         self._taped = 0  # newest event of the intake that was published, 0 while nobody listens
         self._told = dict(process.model.seen)  # newest row of each stream that was published, or there before
         process.listeners.append(self._publish)
         bus.queryable_kept(self._key("**"), partial(self._arrive, self._answer))
+        bus.queryable_kept(keys.INTAKE.format(rig=self._rig), partial(self._arrive, self._answer_intake))
         bus.queryable_kept(keys.COMMAND.format(rig=self._rig, name="*"), partial(self._arrive, self._take_order))
 
     async def serve(self) -> None:
@@ -113,6 +115,16 @@ class ZenohGateway:
         for event in tape.after(self._taped):
             self._intake.put(pack_intake(event))
         self._taped = tape.newest
+
+    def _answer_intake(self, query: Query) -> None:
+        """Give whoever records what did not reach it: the events after number ``since`` that are kept."""
+        since = query.parameters.get("since", "0")
+        if not since.isdecimal() or len(since) > LONGEST_NUMBER:
+            refuse(query, f"parameter since: expected a whole number, got {since!r:.40}")
+            return
+        events = list(self._process.tape.after(min(int(since), self._process.tape.newest)))[:INTAKE_AT_ONCE]
+        query.reply(query.selector_key, bytes(msgpack.packb([pack_intake(event) for event in events])), MSGPACK)
+        query.finish()
 
     def _news(self, path: str) -> dict[str, Any]:
         """Answer to publish: of a stream the rows that have come since the last one."""

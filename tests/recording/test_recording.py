@@ -29,6 +29,7 @@ from sim.world.world import World
 pytestmark = pytest.mark.slow
 
 KEY = "borechain/rig-1/ground/"
+INTAKE = "borechain/rig-1/intake"
 TABLES: dict[str, Any] = {
     "rig": {"tubes": 2, "tube_length_m": 2.0},
     "path": {"straight": {"inclination_deg": 3.0, "azimuth_deg": 40.0}},
@@ -51,7 +52,7 @@ def write(path: Path, ground: GroundProcess) -> None:
     """A recording of all that is on the tape, and of some answers."""
     with RecordingWriter(path, "rig-1", shown()) as writer:
         for k, event in enumerate([begin_of(ground), *ground.tape.events]):
-            writer.write(Sample(f"{KEY}intake", 1_000 + k, pack_intake(event)))
+            writer.write(Sample(INTAKE, 1_000 + k, pack_intake(event)))
         for path_of in ("status", "verdict", "nodes/1", "stations/1"):
             writer.write(Sample(KEY + path_of, 9_000, json.dumps(ground.operator.ask(path_of)).encode()))
 
@@ -95,7 +96,7 @@ def test_mcaps_own_reader_finds_the_schemas(drilled: tuple[Path, GroundProcess])
     for schema in summary.schemas.values():
         assert json.loads(schema.data)["additionalProperties"] is False
     assert len(summary.chunk_indexes) > 3
-    assert {c.topic for c in summary.channels.values()} >= {f"{KEY}intake", f"{KEY}nodes/1"}
+    assert {c.topic for c in summary.channels.values()} >= {INTAKE, f"{KEY}nodes/1"}
 
 
 def test_a_recording_that_is_cut_anywhere_is_read_to_the_cut(
@@ -123,7 +124,7 @@ def test_no_more_than_two_chunks_are_lost_by_a_cut(drilled: tuple[Path, GroundPr
     with RecordingWriter(path, "rig-1", shown()) as writer:
         for event in ground.tape.events:
             payload = pack_intake(event)
-            writer.write(Sample(f"{KEY}intake", 1, payload))
+            writer.write(Sample(INTAKE, 1, payload))
             written += len(payload) + 64
             if event.number % 97 == 0:
                 found = sum(len(sample.payload) + 64 for sample in Recording(path).samples())
@@ -208,7 +209,7 @@ def test_another_version_or_another_program_is_refused_by_name(
     writer.start()
     if metadata is not None:
         writer.add_metadata(NAME, metadata)
-    channel = writer.register_channel(f"{KEY}intake", "msgpack", 0)
+    channel = writer.register_channel(INTAKE, "msgpack", 0)
     writer.add_message(channel, 1, b"", 1)
     writer.finish()  # type: ignore[no-untyped-call]
     with pytest.raises(RecordingError, match=expected):
