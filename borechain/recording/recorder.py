@@ -103,7 +103,9 @@ class Recorder:
 
     def _ask_for_more(self) -> None:
         """Write what the ground station keeps of the events after the newest one, for as long as there are any."""
-        while rows := self._events_after(self.course.newest):
+        before = -1
+        while self.course.newest > before and (rows := self._events_after(self.course.newest)):
+            before = self.course.newest
             for payload in rows:
                 self._keep(number_of(payload), Sample(self._intake, time.time_ns(), payload))
 
