@@ -61,6 +61,12 @@ WEIGHTINGS = ("bayes", "equal", "linear", "quadratic", "cubic", "adaptive")
     show_default=True,
     help="Standard error of an IMU's mounting about its tube's axis.",
 )
+@click.option(
+    "--wall",
+    type=click.Path(path_type=Path, dir_okay=False),
+    help="Wall file of which this hole is a column: its joints are judged while it is drilled.",
+)
+@click.option("--hole", default="", help="Name of this hole in the wall file.")
 @clock_option
 @key_option
 @keys_option
@@ -78,6 +84,8 @@ def ground(
     weighting: str,
     accelerometer_bias_std_deg: float,
     mount_std_deg: float,
+    wall: Path | None,
+    hole: str,
     clock: str,
     key_file: Path | None,
     keys_place: Path | None,
@@ -105,5 +113,7 @@ def ground(
         "weighting": weighting,
         "accelerometer_bias_std_deg": accelerometer_bias_std_deg,
         "mount_std_deg": mount_std_deg,
+        "wall": wall,
+        "hole": hole,
     }
     run_ground(Place(rig_name, endpoint, folder, key_file, keys=keys_place), settings, own_clock=clock == "own")

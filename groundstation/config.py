@@ -37,6 +37,8 @@ class GroundConfig(BaseModel):
     column_radius: Positive = Field(0.6, description="m, of the finished column")
     tolerance: Literal["en-12716", "5-cm", "0.27-deg"] = Field("en-12716", description="preset of columns.PRESETS")
     steering_deg_per_m: Positive = Field(0.5, description="the most by which the rig bends a hole back")
+    wall: Path | None = Field(None, description="wall file of which this hole is a column")
+    hole: str = Field("", description="name of this hole in the wall file")
     station_tolerance: Positive = Field(0.05, description="m, within which two surveys are at the same station")
     stale_after: Positive = Field(4.5, description="s without a state of a node")
     depth_rate: Positive = Field(0.2, description="m/s, the fastest that the bit is moved")

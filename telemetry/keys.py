@@ -69,6 +69,11 @@ TABLE: Final[tuple[Key, ...]] = (
     Key("borechain/{rig}/ground/uncertainty", "query, publish", "region of uncertainty, its sources; ?confidence=0.9"),
     Key("borechain/{rig}/ground/column", "query, publish", "deviation from the design, projected to the target"),
     Key(
+        "borechain/{rig}/ground/wall",
+        "query, publish",
+        "joints of this hole with its neighbours: thickness, probability of an opening, extra columns",
+    ),
+    Key(
         "borechain/{rig}/ground/alarms",
         "query, publish",
         "tolerance and rig alarms, stations where the hole moved",

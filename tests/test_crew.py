@@ -96,6 +96,7 @@ async def test_a_ground_station_that_is_frozen_is_dont_know_and_not_green(served
     with connect(served.endpoint, timeout=10.0) as ground:
         app = CrewApp(ground, "rig-1", "anna", clock)
         async with app.run_test(size=SIZE):
+            await app.workers.wait_for_complete()  # every answer of the beginning has arrived
             await until(app, served, lambda text: "* live 0.0s" in text and "DON'T KNOW" not in text)
             clock.now += 4.0
             await until(app, served, lambda text: "* live 4.0s" in text and "DON'T KNOW" not in text)
@@ -146,9 +147,22 @@ def test_the_chosen_alarm_is_in_sight_however_many_there_are() -> None:
 def test_a_long_string_shows_the_tubes_that_are_not_well() -> None:
     tubes = [{"tube": n, "md_m": None, "age_s": 0.5, "stale": n in (3, 40)} for n in range(50, 0, -1)]
     lines = panels.string(picture(string={"revision": 1, "utc": "", "tubes": tubes})).plain.splitlines()
-    assert len(lines) <= panels.PLAN_HEIGHT
+    assert len(lines) == panels.PLAN_HEIGHT
     assert lines[0].endswith("(50)")
     assert [int(line.split()[0]) for line in lines[1:3]] == [40, 3]
+
+
+def test_the_joints_of_a_wall_stand_below_the_string_the_worst_first() -> None:
+    joint = {"joint": "H3-H2", "thickness_m": 0.784, "probability_where_surveyed": 0.97}
+    joints = [joint | {"joint": "H3-H4", "thickness_m": 0.91, "probability_where_surveyed": 2e-7}, joint]
+    wall = {"problem": None, "required_thickness_m": 0.8, "allowed_probability": 0.01, "joints": joints}
+    tubes = [{"tube": n, "md_m": None, "age_s": 0.5, "stale": False} for n in range(20, 0, -1)]
+    found = picture(
+        string={"revision": 1, "utc": "", "tubes": tubes}, wall={"revision": 1, "utc": "", "wall": wall}
+    )  # fmt: skip
+    lines = panels.string(found).plain.splitlines()
+    assert len(lines) == panels.PLAN_HEIGHT
+    assert lines[-2:] == ["H3-H2 78 cm P(thin) 1", "H3-H4 91 cm P(thin) 2e-07"]
 
 
 def test_every_line_fits_the_screen() -> None:

@@ -12,7 +12,7 @@ from borechain.crew.picture import GRAVE, SERIOUS, Picture
 View = dict[str, Any]
 WIDTH = 80
 PLAN_WIDTH, PLAN_HEIGHT = 23, 11
-STRIP_WIDTH = 26
+STRIP_WIDTH, STRING_WIDTH = 26, 29
 STYLES = {
     "on_target": "bold black on green",
     "watch": "bold black on yellow",
@@ -119,14 +119,40 @@ def strip_row(row: View, mark: str) -> Text:
 
 
 def string(picture: Picture) -> Text:
-    """A row a tube from the top down, grey where nothing is wrong; of a long string the tubes that are not well."""
+    """A row a tube from the top down, grey where nothing is wrong; of a long string the tubes that are not well.
+
+    Below it the joints with the neighbours, where the hole is a column of a wall.
+    """
+    below = wall(picture)
+    room = PLAN_HEIGHT - 1 - len(below)
     lines = [Text("tube yaw deg sigma age mode", "bold")]
     nodes = picture.nodes
-    if len(nodes) > PLAN_HEIGHT - 1:
+    if len(nodes) > room:
         wrong = [node for node in nodes if node.get("stale") or node.get("flags")]
-        nodes = [*wrong, *(node for node in nodes if node not in wrong)][: PLAN_HEIGHT - 2]
+        nodes = [*wrong, *(node for node in nodes if node not in wrong)][:room]
         lines[0] = Text(f"tube yaw deg sigma age ({len(picture.nodes)})", "bold")
-    return Text("\n").join([*lines, *(tube_row(node) for node in nodes)])
+    return Text("\n").join([*lines, *(tube_row(node) for node in nodes), *below])
+
+
+def wall(picture: Picture) -> list[Text]:
+    """The joints with the neighbours, the worst first, two at most; none where there is no wall."""
+    found = picture.answers.get("wall", {}).get("wall")
+    if found is None:
+        return []
+    if found["problem"] is not None:
+        return [Text(f"wall: {found['problem']}"[:STRING_WIDTH], "yellow")]
+    joints = sorted(found["joints"], key=lambda joint: -(joint["probability_where_surveyed"] or 0.0))[:2]
+    return [joint_row(joint, found) for joint in joints]
+
+
+def joint_row(joint: View, found: View) -> Text:
+    """One joint: how thick, and how probably too thin where it is surveyed."""
+    chance, thickness = joint["probability_where_surveyed"], joint["thickness_m"]
+    if chance is None or thickness is None:
+        return Text(f"{joint['joint']} not surveyed yet"[:STRING_WIDTH], QUIET)
+    style = "bold red" if thickness < found["required_thickness_m"] else ""
+    style = style or ("yellow" if chance > found["allowed_probability"] else QUIET)
+    return Text(f"{joint['joint']} {100.0 * thickness:.0f} cm P(thin) {chance:.1g}"[:STRING_WIDTH], style)
 
 
 def tube_row(node: View) -> Text:

@@ -31,7 +31,7 @@ COMMON_PARAMETERS = ("accept",)
 ENCODINGS = {"json": JSON, "msgpack": MSGPACK}
 BEATS = ("verdict",)  # paths that are published without end, and only where somebody listens
 INTAKE_AT_ONCE = 500  # events of one answer
-PRIVATE = ("folder", "key_file", "keys", "database_url")  # settings that are nobody's business
+PRIVATE = ("folder", "key_file", "keys", "database_url", "wall", "hole")  # settings that are nobody's business
 WHO = "zenoh"  # ordered, where the order does not say
 
 Handler = Callable[[Query], None]

@@ -20,6 +20,7 @@ from groundstation.service.orders import OrderState
 from groundstation.service.recalibration.progress import Phase, Stage
 from groundstation.service.rig_alarms import KINDS, Health, Level
 from groundstation.service.verdict import WINDS, Doubt, Word
+from groundstation.survey.as_built import State as ColumnState
 from groundstation.survey.trust import Trust
 from telemetry.messages import Mode, NodeFlag, Severity
 
@@ -410,4 +411,54 @@ ORDER: Fields = (
     mapping("values", "of the reply, see the table of commands"),
 )
 ORDERS: Fields = (rows("orders", ORDER),)
+WALL: Fields = (
+    group(
+        "wall",
+        (
+            text("name", "of the wall"),
+            text("hole", "that is drilled here"),
+            number("required_thickness_m", "of a joint"),
+            number("allowed_probability", "of anything too thin"),
+            text("verdict", "on these joints", "tight", "not_proven", "not_tight", null=True),
+            text("problem", "why they cannot be judged", null=True),
+            texts("findings", "what is open or doubtful"),
+            rows(
+                "holes",
+                (
+                    text("hole", "name; the first is the one that is drilled, the others are its neighbours"),
+                    number("north_m", "of its head"),
+                    number("east_m", "of its head"),
+                    number("length_m", "of its design"),
+                    number("drilled_to_m", "depth of its end", null=True),
+                    number("surveyed_to_m", "depth of its last survey", null=True),
+                ),
+            ),
+            rows(
+                "joints",
+                (
+                    text("joint", "names of the two"),
+                    text("state", "the worst along it", *(state.name.lower() for state in ColumnState)),
+                    number("surveyed_percent", "of its depths, those at which both are surveyed"),
+                    number("probability", "of being too thin, the largest; 1 where a hole is missing"),
+                    number("depth_m", "where that is"),
+                    number("probability_where_surveyed", "the largest where both are surveyed", null=True),
+                    number("thickness_m", "the least, as surveyed", null=True),
+                    number("thinnest_at_m", "where that is"),
+                ),
+            ),
+            rows(
+                "extra_columns",
+                (
+                    text("joint", "that would be closed"),
+                    number("north_m", "of its head"),
+                    number("east_m", "of its head"),
+                    number("from_m", "where the joint is open"),
+                    number("to_m", "where the joint is open"),
+                    truth("closes", "whether one column is enough"),
+                ),
+            ),
+        ),
+        null=True,
+    ),
+)
 SCHEMA: Fields = (mapping("schemas", "JSON schema of the answer of each path, made from the code that answers"),)

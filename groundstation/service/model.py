@@ -14,6 +14,7 @@ from groundstation.errors import SurveyError
 from groundstation.service.alarms import AlarmList
 from groundstation.service.crew_alarms import CrewAlarms
 from groundstation.service.depth import DepthLog
+from groundstation.service.live_wall import LiveWall
 from groundstation.service.numbers import Numbers
 from groundstation.service.orders import OrderBook
 from groundstation.service.recalibration.procedure import FieldProcedure
@@ -178,6 +179,7 @@ class RigModel:
         self.projection: Deviation | None = None
         self.recalibration = FieldProcedure(config.gravity)
         self.orders = OrderBook()
+        self.wall = None if config.wall is None else LiveWall(config.wall, config.hole)
 
     def on_state(self, state: NodeState, now: float) -> None:
         """Handle a node's state that came at ``now`` (s, own clock), unless a newer one of its epoch is known."""

@@ -8,7 +8,7 @@ from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 
 from groundstation.errors import SelectorError
-from groundstation.service import alarm_views, column_views, key_fields, order_views, verdict_views, views
+from groundstation.service import alarm_views, column_views, key_fields, order_views, verdict_views, views, wall_views
 from groundstation.service.answers import Fields, object_schema
 from groundstation.service.model import RigModel
 from groundstation.service.streams import STREAMED
@@ -80,6 +80,7 @@ FIXED: dict[str, Path] = {
     "static_records": Path(views.static_records, key_fields.STATIC_RECORDS, ("tube", *STREAMED)),
     "uncertainty": Path(column_views.uncertainty, key_fields.UNCERTAINTY, ("confidence",)),
     "column": Path(column_views.column, key_fields.COLUMN),
+    "wall": Path(wall_views.wall, key_fields.WALL),
     "alarms": Path(alarm_views.alarms, key_fields.ALARMS),
     "recalibration": Path(views.recalibration, key_fields.RECALIBRATION),
     "orders": Path(order_views.orders, key_fields.ORDERS),

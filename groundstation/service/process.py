@@ -51,6 +51,7 @@ if TYPE_CHECKING:
 
 STARTS = 1 << 31  # numbers of a start by lot
 HEARTBEAT = 1.0  # s, own clock, between two verdicts
+CHANGED_BY_SURVEY = ("measurements", "stations", "trajectory", "uncertainty", "column")
 EARLY = 64  # readings of the depth that may come before rig time is known
 GROUND_STATION = "ground station"  # who orders that something be sent again
 
@@ -114,6 +115,8 @@ class GroundProcess(Process):
         self._early: deque[DepthReading] = deque(maxlen=EARLY)
         self._kept_stand: Stand | None = None
         self._beat_at = -math.inf
+        self._plane = -1  # of the wall, that the bit has passed last
+        self._wall_paths = ["wall"] if self.model.wall is not None else []
         self.model.epoch = self.store.epoch()
         self.model.restore_tally(self.store.tally())
         self._kept_tally = list(self.model.tally.tubes)
@@ -288,6 +291,9 @@ class GroundProcess(Process):
         self._keep_stand(reading)
         self._place_waiting()
         self._publish(["status", "string"])
+        if self.model.wall is not None and (plane := self.model.wall.plane_of(reading.md)) != self._plane:
+            self._plane = plane
+            self._publish(["wall"])
 
     def _on_stand(self, stand: Stand) -> None:
         """Remember a stand; one that follows another at a different depth is a stop."""
@@ -379,9 +385,7 @@ class GroundProcess(Process):
         self.model.stops.on_survey(message.epoch or self.model.epoch, message.station_at, message.tube)
         self.watch.on_survey(message, self.model.on_survey(message, md, below))
         after = self.model.alarms.alarms, len(self.model.moved)
-        return ["measurements", "stations", "trajectory", "uncertainty", "column"] + (
-            ["alarms"] if before != after else []
-        )
+        return [*CHANGED_BY_SURVEY, *self._wall_paths] + (["alarms"] if before != after else [])
 
     def _publish(self, changed: list[str]) -> None:
         for listener in self.listeners:

@@ -22,7 +22,7 @@ from groundstation.survey.instruments import Tool, load_tool
 from groundstation.survey.joints import Detour, neighbours_in_grid, neighbours_in_line
 from groundstation.survey.methods import Method
 from groundstation.survey.wall import largest_distance
-from groundstation.survey.wall_columns import Assumptions, BuiltWall, ColumnPlan, Layer, build
+from groundstation.survey.wall_columns import Assumptions, BuiltWall, ColumnPlan, Hole, Layer, build
 from groundstation.survey.wall_tables import Defaults, Remedy, read_heads, read_holes
 from groundstation.survey.wall_verdict import Judgement, judge
 
@@ -80,6 +80,7 @@ class Wall:
     built: BuiltWall
     pairs: npt.NDArray[np.intp]
     detours: list[Detour]
+    holes: list[Hole]
 
     @property
     def columns(self) -> Columns:
@@ -228,7 +229,7 @@ def read_wall(path: Path) -> Wall:
     pairs = _pairs(file, [row.remedy for row in rows], built)
     detours = _detours(file.heads, names, [row.remedy for row in rows], pairs)
     _check_design(file, built, pairs)
-    return Wall(file, plans, built, pairs, detours)
+    return Wall(file, plans, built, pairs, detours, holes)
 
 
 def judge_wall(wall: Wall) -> Judgement:
