@@ -173,6 +173,8 @@ JOBS = [  # words, the extra that the job needs or None, status and a word of it
     (("ground", "--key-file", "missing.key", *NOWHERE), "ground", 1, "missing.key"),
     (("rig", "rig-3", "--endpoint", "nonsense", "--out", "never"), "ground", 1, "expected tcp/HOST:PORT"),
     (("query", "borechain/*/ground/status", "--timeout", "0.2", *NOWHERE), None, 1, "no router at"),
+    (("crew", *NOWHERE), "ground", 1, "no router at"),
+    (("replay", "missing.mcap"), "ground", 2, "missing.mcap"),
     (("campaign", "rig-3", "--runs", "1", "--json"), "campaign", 0, "honesty"),
     (("bench", "survey", "--json"), None, 1, "are in the repository"),
     (("link", "load", "--tubes", "10", "--json"), None, 0, "load_percent"),

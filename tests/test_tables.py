@@ -17,14 +17,30 @@ from node.kernels.record import NODE
 DOCS = Path(__file__).parents[1] / "docs"
 
 
-@pytest.fixture(scope="module")
-def make_tables() -> ModuleType:
-    spec = importlib.util.spec_from_file_location("make_tables", DOCS / "make_tables.py")
+def script(name: str) -> ModuleType:
+    spec = importlib.util.spec_from_file_location(name, DOCS / f"{name}.py")
     assert spec is not None
     assert spec.loader is not None
     module = importlib.util.module_from_spec(spec)
     spec.loader.exec_module(module)
     return module
+
+
+@pytest.fixture(scope="module")
+def make_tables() -> ModuleType:
+    return script("make_tables")
+
+
+def test_the_asyncapi_document_is_made_from_the_code_and_leads_nowhere_outside() -> None:
+    made = script("make_asyncapi")
+    assert (DOCS / "asyncapi.json").read_text() == made.text(), "run python docs/make_asyncapi.py"
+    document = made.document()
+    for channel in document["channels"].values():
+        name = channel["messages"]["answer"]["$ref"].rpartition("/")[2]
+        assert document["components"]["messages"][name]["payload"]["type"] == "object"
+    heard = {operation["channel"]["$ref"].rpartition("/")[2] for operation in document["operations"].values()}
+    assert heard >= {"verdict", "alarms", "events", "nodes_tube", "wall"}
+    assert "schema" not in heard
 
 
 @pytest.mark.parametrize("page", ["wire.md", "keys.md", "firmware.md", "operate.md"])

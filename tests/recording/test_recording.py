@@ -14,6 +14,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from mcap.reader import make_reader
 from mcap.writer import Writer
+from schemas import check_answers
 
 from borechain.cli.ground.record import replay as replay_command
 from borechain.cli.rig.rig import ground_settings
@@ -23,6 +24,7 @@ from borechain.recording.replay import replay_file
 from groundstation.service.intake import BEGIN, Intake, IntakeError, pack_intake, unpack_intake
 from groundstation.service.paths import schemas
 from groundstation.service.process import GroundProcess
+from sim.rig.scheduler import Progress
 from sim.world.scenario import scenario_of
 from sim.world.world import World
 
@@ -68,7 +70,16 @@ def drilled(tmp_path_factory: pytest.TempPathFactory) -> Iterator[tuple[Path, Gr
     folder = tmp_path_factory.mktemp("run")
     world = World(scenario_of(TABLES), 5)
     rig = InlineRig(world, ground_settings(world), "rig-1", folder)
-    rig.run()
+    seen: list[str] = []
+
+    def check(progress: Progress) -> None:
+        """Every answer has the fields of its key in every phase of the run, from the first one on."""
+        if rig.is_begun and progress.phase not in seen:
+            seen.append(progress.phase)
+            check_answers(rig.ground.model)
+
+    rig.run(check)
+    assert len(seen) > 5
     write(folder / "run.mcap", rig.ground)
     yield folder / "run.mcap", rig.ground
     rig.close()
