@@ -16,6 +16,8 @@ from borechain.crew import panels
 from borechain.crew.app import CrewApp
 from borechain.crew.picture import Picture
 
+pytestmark = pytest.mark.slow
+
 SIZE = (80, 24)
 PATIENCE = 60.0  # s
 

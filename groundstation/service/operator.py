@@ -34,7 +34,7 @@ START_SHIFT = 20  # orders of one start of the ground station, as a power of two
 OPEN_AT_MOST = 16  # orders that wait for the answer of one tube
 ANSWERED_WITHIN = 900.0  # s, own clock, after which an order that no tube has answered is withdrawn
 NO_KEY = "key_file: expected the key file of the rig, without it no node takes a block"
-NOBODY = "somebody"  # who orders without a name
+LONGEST_NAME = 64  # characters, of who orders
 UPLOAD = "upload_parameters"
 RECALIBRATION = "recalibration"  # who orders what the calibration in the field asks for
 
@@ -103,6 +103,7 @@ class Operator:
         CalibrationError, ConfigurationError, StoreError
             When the ground station cannot obey; nothing is sent.
         """
+        check_name(by)
         try:
             spec = find_command(name, parameters.get("action", ""))
             tube = None if spec.action else parse_tube(spec, parameters)
@@ -176,7 +177,7 @@ class Operator:
     def alarm(self, order: Order) -> None:
         """Acknowledge an alarm, shelve it or take it back; kept on the disk before the order is done."""
         alarms, utc = self._model.crew_alarms, time.time()
-        number, by = int(order.arguments["number"]), order.by or NOBODY
+        number, by = int(order.arguments["number"]), order.by
         match order.spec.action:
             case "acknowledge":
                 changed = alarms.acknowledged(number, by, utc)
@@ -301,6 +302,18 @@ class Operator:
         if tube not in known:
             expected = f"expected one of {', '.join(map(str, known))}" if known else "no tube has reported yet"
             raise SelectorError(f"tube {tube}: not in the string; {expected}")
+
+
+def check_name(by: str) -> None:
+    """Refuse a name that no screen could show.
+
+    Raises
+    ------
+    SelectorError
+        When it is empty, too long or not printable.
+    """
+    if not by.isprintable() or not 1 <= len(by.strip()) <= LONGEST_NAME:
+        raise SelectorError(f"by: expected a name of 1 to {LONGEST_NAME} printable characters, got {by!r:.40}")
 
 
 def _arguments(request: Request) -> dict[str, Any]:

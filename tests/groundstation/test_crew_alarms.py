@@ -185,6 +185,7 @@ def test_a_new_bad_alarm_finds_room_beside_those_that_are_only_latched(it: Clock
     assert CLOCK in [alarm.condition for alarm in it.alarms]
 
 
+@pytest.mark.slow
 @given(
     looks=st.lists(
         st.sets(st.tuples(st.integers(0, 60), st.sampled_from(list(Level))), max_size=60), min_size=1, max_size=8
@@ -284,6 +285,14 @@ def test_orders_change_an_alarm_and_a_restart_does_not(rig: Rig, tmp_path: Path)
         assert after[code] == before[code]
     assert after["deviation"]["shelved_by"] == "bert"
     again.ground.close()
+
+
+@pytest.mark.parametrize("by", ["", " ", "x" * 65, "an\x1b[2Jna", "a\nb"])
+def test_a_name_that_no_screen_could_show_orders_nothing(rig: Rig, by: str) -> None:
+    number = opened(rig)["projection"]["number"]
+    with pytest.raises(SelectorError, match="by: expected a name of 1 to 64 printable characters"):
+        order(rig, number, "acknowledge", by)
+    assert opened(rig)["projection"]["state"] == "raised"
 
 
 def test_an_order_that_cannot_be_kept_is_refused_and_changes_nothing(rig: Rig, tmp_path: Path) -> None:

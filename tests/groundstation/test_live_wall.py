@@ -15,6 +15,8 @@ from groundstation.errors import SurveyError
 from groundstation.service.model import RigModel
 from groundstation.service.wall_views import stations_of
 
+pytestmark = pytest.mark.slow
+
 STOPS = 4  # of 2 m
 WALL = """
 name = "three holes"
