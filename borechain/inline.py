@@ -26,6 +26,7 @@ from sim.world.world import World
 from telemetry.errors import BorechainError
 from telemetry.messages import BASE, ENCODER
 from telemetry.presentation.can_native import rounded_frame
+from telemetry.runtime.disk import MACHINE, Disk
 from telemetry.transport.authentication import new_key, read_key
 
 
@@ -40,6 +41,7 @@ class InlineRig:
     folder : new, of the whole run
     lot : of the starts of the ground station; a rig that is to repeat itself draws them from its seed
     native : the joints are on CAN's native profile, which rounds cyclic messages to the steps of their signals
+    disk_of : disk of the process of an address
     """
 
     def __init__(
@@ -51,19 +53,24 @@ class InlineRig:
         lot: Callable[[int], int] = secrets.randbelow,
         *,
         native: bool = False,
+        disk_of: Callable[[int], Disk] = lambda _address: MACHINE,
     ) -> None:
         self.world = world
         key_file = new_key(folder / "rig.key")
         config = GroundConfig(rig=rig, folder=private_folder(folder, "ground"), key_file=key_file, **settings)
         builders: dict[int, Build] = {
-            BASE: partial(GroundProcess, config, lot),
+            BASE: partial(GroundProcess, config, lot, disk_of(BASE)),
             ENCODER: partial(
-                EncoderProcess, private_folder(folder, "encoder"), torque=world.torque_settings(), reach=world.reach
+                EncoderProcess,
+                private_folder(folder, "encoder"),
+                torque=world.torque_settings(),
+                reach=world.reach,
+                disk=disk_of(ENCODER),
             ),
         }
         for tube in range(1, world.scenario.tubes + 1):
             place, key = private_folder(folder, f"tube-{tube}"), read_key(key_file)
-            builders[tube] = partial(TubeProcess, world.tube_settings(tube), place, key=key)
+            builders[tube] = partial(TubeProcess, world.tube_settings(tube), place, key=key, disk=disk_of(tube))
         self.stepper = InProcessStepper(builders, self._act_on_cue, rounded_frame if native else bytes)
 
     @property

@@ -35,6 +35,7 @@ from telemetry.messages import (
     SurveyMeasurement,
 )
 from telemetry.presentation.msgpack_codec import decode
+from telemetry.runtime.disk import MACHINE, Disk
 from telemetry.runtime.process import Process
 from telemetry.transport.authentication import read_key
 
@@ -54,6 +55,7 @@ class GroundProcess(Process):
     ----------
     config : validated settings
     lot : number below its argument by lot; a simulated rig draws from its seed
+    disk : that holds the database
 
     Raises
     ------
@@ -63,10 +65,12 @@ class GroundProcess(Process):
         When a key file is configured and holds no key.
     """
 
-    def __init__(self, config: GroundConfig, lot: Callable[[int], int] = secrets.randbelow) -> None:
+    def __init__(
+        self, config: GroundConfig, lot: Callable[[int], int] = secrets.randbelow, disk: Disk = MACHINE
+    ) -> None:
         self.config = config
         self._uploads = Uploads(read_key(config.key_file)) if config.key_file is not None else None
-        self.store = Store(config.url)
+        self.store = Store(config.url, disk)
         # by lot, not counted: a database that was deleted or restored must not repeat a number that the string has seen
         start = 1 + lot(STARTS)
         self.model = RigModel(config)

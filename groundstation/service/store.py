@@ -16,6 +16,7 @@ import math
 import sqlite3
 from collections.abc import Iterator
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -27,6 +28,7 @@ from telemetry.messages import Event, Kept, Stand, StaticRecord, SurveyMeasureme
 from telemetry.parameters import ParameterBlock, unpack_block
 from telemetry.presentation.content import content_of
 from telemetry.presentation.msgpack_codec import decode, encode
+from telemetry.runtime.disk import MACHINE, Disk
 
 SCHEMA = 2
 SHOWN = 5  # tables named of a database that is not ours
@@ -93,6 +95,7 @@ class Store:
     Parameters
     ----------
     url : SQLAlchemy URL; SQLite runs in WAL mode with every commit forced to the disk
+    disk : that holds a database which is a file
 
     Attributes
     ----------
@@ -105,8 +108,9 @@ class Store:
         When the database cannot be opened, is no database, or belongs to another version.
     """
 
-    def __init__(self, url: str) -> None:
-        self._engine = _engine_of(url)
+    def __init__(self, url: str, disk: Disk = MACHINE) -> None:
+        self._disk = disk
+        self._engine = _engine_of(url, disk)
         address = self._engine.url
         self._where = address.database or address.render_as_string(hide_password=True)
         self._file = Path(address.database) if self._engine.dialect.name == "sqlite" and address.database else None
@@ -116,7 +120,7 @@ class Store:
         try:
             with self._refusing("; choose a writable --folder or another database"):
                 if self._file is not None:
-                    self._file.parent.mkdir(parents=True, exist_ok=True)
+                    disk.make_folder(self._file.parent)
                 is_ours = self._check_schema()
                 self._begin(is_ours=is_ours)
         except StoreError:
@@ -251,10 +255,7 @@ class Store:
 
     def _found_inode(self) -> int:
         """Identity of the file that has the database's name; 0 where there is none, or no file."""
-        try:
-            return self._file.stat().st_ino if self._file is not None else 0
-        except OSError:
-            return 0
+        return self._disk.identity(self._file) if self._file is not None else 0
 
     @contextlib.contextmanager
     def _refusing(self, remedy: str = "") -> Iterator[None]:
@@ -321,10 +322,13 @@ def _same(row: dict[str, Any]) -> sa.ColumnElement[bool]:
     return sa.and_(*(MESSAGES.c[name] == value for name, value in row.items()))
 
 
-def _engine_of(url: str) -> sa.Engine:
-    """Engine of a URL; a refusal does not repeat the URL, which may hold a password."""
+def _engine_of(url: str, disk: Disk) -> sa.Engine:
+    """Engine of a URL, a file by ``disk``; a refusal does not repeat the URL, which may hold a password."""
     try:
-        return sa.create_engine(url)
+        address = sa.make_url(url)
+        if address.get_backend_name() == "sqlite" and address.database and not address.query:
+            return sa.create_engine(address, creator=partial(disk.connect, Path(address.database)))
+        return sa.create_engine(address)
     except (sa.exc.SQLAlchemyError, ImportError) as error:
         raise StoreError(
             f"database URL: expected one such as sqlite:///FILE whose driver is installed: {error}"

@@ -46,6 +46,7 @@ from telemetry.messages import (
     SurveyMeasurement,
 )
 from telemetry.presentation.msgpack_codec import encode
+from telemetry.runtime.disk import MACHINE, Disk
 from telemetry.runtime.joint_watch import JointFault
 from telemetry.runtime.process import Process
 from telemetry.runtime.timing import CycleTiming, Stage
@@ -67,6 +68,7 @@ class TubeProcess(Process):
     key : of the rig; without one the node takes no parameter block
     imus : the node's own sensors, as many as the settings have; without any a cycle brings its reading
     timing : durations of its cycles with an own clock; None where it is stepped
+    disk : that holds the folder
 
     Raises
     ------
@@ -82,6 +84,7 @@ class TubeProcess(Process):
         key: bytes | None = None,
         imus: Sequence[ImuSource] = (),
         timing: CycleTiming | None = None,
+        disk: Disk = MACHINE,
     ) -> None:
         self.settings = settings
         self._timing = timing
@@ -93,17 +96,17 @@ class TubeProcess(Process):
         self._sources = imus
         self._imus = [SafeImu(imu, self._send_event, k if len(imus) > 1 else 0) for k, imu in enumerate(imus, 1)]
         self.config = default_config() if config is None else config
-        self._saver = Saver(folder)
+        self._saver = Saver(folder, disk)
         # apart from the saved state: a node that lost its state must not look like an earlier boot
-        counter = BootCounter(folder)
+        counter = BootCounter(folder, disk=disk)
         self.boots, self._counter_fault = counter.boots, counter.fault
-        self._log = SurveyLog(folder)
+        self._log = SurveyLog(folder, disk)
         self._dropped = 0
         self._looked_at_drops = -math.inf
         saved = self._saver.load()
         self.nodes, telemetry = saved if saved else (new_node(self.config), None)
         self._cut = resume(self.nodes, self.config) if saved else False
-        store = BlockStore(folder)
+        store = BlockStore(folder, disk)
         parameters = load_parameters(store, settings.tube)
         self._fallback = "; ".join(store.faults)
         if self._fallback:
