@@ -213,12 +213,22 @@ class GroundProcess(Process):
         self._publish(["status", "string"])
 
     def _on_stand(self, stand: Stand) -> None:
-        """Remember a stand; one that follows another at a different depth is a stop."""
+        """Remember a stand; one that follows another at a smaller depth is a stop.
+
+        One that follows another at the same depth goes on with its stop: nothing is known of the time in between.
+        """
         depths = self.model.depths
         depths.add_stand(stand)
-        before = [known for known in depths.stands if known.epoch == stand.epoch and known.begun_at < stand.begun_at]
-        if before and before[-1].md < stand.md and stand in depths.stands:
-            self.model.stops.on_stand(stand)
+        before = [known for known in depths.stands if (known.epoch, known.begun_at) < (stand.epoch, stand.begun_at)]
+        whole = stand
+        while before and (before[-1].epoch, before[-1].md) == (stand.epoch, stand.md):
+            whole = replace(stand, begun_at=before.pop().begun_at)
+        if not before or stand not in depths.stands:
+            return
+        if before[-1].md < stand.md:
+            self.model.stops.on_stand(whole)
+        elif before[-1].md == stand.md:
+            self.model.stops.on_later_stand(before[-1], whole)
 
     def _keep_stand(self, reading: DepthReading) -> None:
         """Store a stand when it begins and when it has ended."""
@@ -292,6 +302,7 @@ class GroundProcess(Process):
         self.model.numbers.add_number(message.tube, message.sequence)
         if isinstance(message, Event):
             self.model.on_event(message)
+            self.watch.on_known_event(message)
             return []
         if isinstance(message, StaticRecord):
             self.model.on_static_record(message)

@@ -11,10 +11,10 @@ import errno
 import os
 import sqlite3
 from dataclasses import dataclass, field
+from fnmatch import fnmatch
 from pathlib import Path
 
 import numpy as np
-
 
 SECTOR = 512  # bytes that are written as one
 FULL = 2  # value of SQLite's ``synchronous`` from which on a commit is forced
@@ -38,12 +38,12 @@ class File:
 class NameChange:
     """A name that was given to a file, or taken from one (None), and is not forced yet; two of a rename are one."""
 
-    names: tuple[tuple[Path, File | None], ...]
+    names: tuple[tuple[str, File | None], ...]
 
 
 @dataclass(slots=True)
 class FaultyDisk:
-    """Disk of one process; see ``telemetry.runtime.disk.Disk``.
+    """Disk of one process, with one folder; see ``telemetry.runtime.disk.Disk``.
 
     Attributes
     ----------
@@ -54,9 +54,9 @@ class FaultyDisk:
     random: np.random.Generator
     refusal: int = 0
     writes_left: int = -1
-    files: dict[Path, File] = field(default_factory=dict)
+    files: dict[str, File] = field(default_factory=dict)
     backups: list[bytes] = field(default_factory=list)  # images of the database, the newest last
-    _kept_names: dict[Path, File] = field(default_factory=dict)
+    _kept_names: dict[str, File] = field(default_factory=dict)
     _changes: list[NameChange] = field(default_factory=list)
     _numbers: int = 0
     _open: MemoryDatabase | None = None
@@ -91,43 +91,38 @@ class FaultyDisk:
     def force_names(self, folder: Path) -> None:
         """Force every name of a folder."""
         self._spend(folder)
-        rest = []
         for change in self._changes:
-            if any(path.parent == folder for path, _ in change.names):
-                self._apply(change)
-            else:
-                rest.append(change)
-        self._changes = rest
+            self._apply(change)
+        self._changes = []
 
     def rename(self, old: Path, new: Path) -> None:
         """Rename in one step."""
         self._spend(new)
         file = self._found(old)
-        del self.files[old]
-        self.files[new] = file
-        self._changes.append(NameChange(((old, None), (new, file))))
+        del self.files[old.name]
+        self.files[new.name] = file
+        self._changes.append(NameChange(((old.name, None), (new.name, file))))
 
     def remove(self, path: Path) -> None:
         """Remove a file."""
         self._spend(path)
         self._found(path)
-        del self.files[path]
-        self._changes.append(NameChange(((path, None),)))
+        del self.files[path.name]
+        self._changes.append(NameChange(((path.name, None),)))
 
     def make_folder(self, folder: Path) -> None:
-        """Nothing: every folder is there."""
-        self._spend(folder)
+        """Nothing: every folder is there, and a disk that refuses does not mind."""
 
     def identity(self, path: Path) -> int:
         """Number of the file that has this name; 0 where there is none."""
-        return self.files[path].number if path in self.files else 0
+        return self.files[path.name].number if path.name in self.files else 0
 
     def connect(self, path: Path) -> sqlite3.Connection:
         """Open a database; one at a time, as each has its own image of the file."""
         if self._open is not None:
             raise sqlite3.OperationalError("expected one connection at a time, got a second")
         connection = sqlite3.connect(":memory:", check_same_thread=False, factory=MemoryDatabase)
-        connection.begin_on(self, path)
+        connection.begin_on(self, path.name)
         self._open = connection
         return connection
 
@@ -146,32 +141,33 @@ class FaultyDisk:
                 file.seen = bytearray(self._torn(file))
                 file.kept = bytes(file.seen)
 
-    def replace(self, path: Path, data: bytes | None) -> None:
+    def replace(self, name: str, data: bytes | None) -> None:
         """Whoever has the disk in his hands gives a file these bytes, or removes it."""
         if data is None:
-            self.files.pop(path, None)
-            self._kept_names.pop(path, None)
+            self.files.pop(name, None)
+            self._kept_names.pop(name, None)
         else:
-            self.files[path] = self._kept_names[path] = self._new(data)
+            self.files[name] = self._kept_names[name] = self._new(data)
 
-    def names(self, pattern: str) -> list[Path]:
-        """Files whose name fits a pattern."""
-        return sorted(path for path in self.files if path.match(pattern))
+    def held(self, *patterns: str) -> dict[str, bytes]:
+        """Bytes of the files whose names fit one of the patterns."""
+        names = sorted(name for name in self.files if any(fnmatch(name, pattern) for pattern in patterns))
+        return {name: bytes(self.files[name].seen) for name in names}
 
     def copied(self, random: np.random.Generator) -> FaultyDisk:
         """The same disk after a cut, with draws of its own."""
         disk = FaultyDisk(random)
-        for path, file in self._kept_names.items():
-            disk.replace(path, file.kept)
+        for name, file in self._kept_names.items():
+            disk.replace(name, file.kept)
         return disk
 
-    def keep_image(self, path: Path, image: bytes) -> None:
+    def keep_image(self, name: str, image: bytes) -> None:
         """A commit of the database that is on the disk."""
-        if self.files[path].kept:
-            self.backups = [*self.backups[1 - KEPT_BACKUPS :], self.files[path].kept]
-        self.files[path].seen[:] = image
-        self.files[path].kept = image
-        self._kept_names[path] = self.files[path]
+        if self.files[name].kept:
+            self.backups = [*self.backups[1 - KEPT_BACKUPS :], self.files[name].kept]
+        self.files[name].seen[:] = image
+        self.files[name].kept = image
+        self._kept_names[name] = self.files[name]
 
     def closed(self) -> None:
         """The database was closed."""
@@ -186,15 +182,15 @@ class FaultyDisk:
             )
 
     def _found(self, path: Path) -> File:
-        if path not in self.files:
+        if path.name not in self.files:
             raise FileNotFoundError(errno.ENOENT, os.strerror(errno.ENOENT), str(path))
-        return self.files[path]
+        return self.files[path.name]
 
     def _made(self, path: Path) -> File:
-        if path not in self.files:
-            self.files[path] = self._new(b"")
-            self._changes.append(NameChange(((path, self.files[path]),)))
-        return self.files[path]
+        if path.name not in self.files:
+            self.files[path.name] = self._new(b"")
+            self._changes.append(NameChange(((path.name, self.files[path.name]),)))
+        return self.files[path.name]
 
     def _new(self, data: bytes) -> File:
         self._numbers += 1
@@ -212,11 +208,11 @@ class FaultyDisk:
         return self.writes_left < 0
 
     def _apply(self, change: NameChange) -> None:
-        for path, file in change.names:
+        for name, file in change.names:
             if file is None:
-                self._kept_names.pop(path, None)
+                self._kept_names.pop(name, None)
             else:
-                self._kept_names[path] = file
+                self._kept_names[name] = file
 
     def _torn(self, file: File) -> bytes:
         """Each sector as it was or as it is; of what was added a first part."""
@@ -235,17 +231,17 @@ class MemoryDatabase(sqlite3.Connection):
     """SQLite in memory on a faulty disk; what it commits is kept where SQLite would force it."""
 
     _disk: FaultyDisk | None = None
-    _path: Path
+    _name: str
 
-    def begin_on(self, disk: FaultyDisk, path: Path) -> None:
+    def begin_on(self, disk: FaultyDisk, name: str) -> None:
         """Take the image that the disk has of the file."""
-        self._disk, self._path = disk, path
-        image = bytes(disk.files[path].seen) if path in disk.files else b""
+        self._disk, self._name = disk, name
+        image = bytes(disk.files[name].seen) if name in disk.files else b""
         if image:
             self.deserialize(image)
-        elif path not in disk.files:
+        elif name not in disk.files:
             disk.refuse_database()
-            disk.replace(path, b"")
+            disk.replace(name, b"")
 
     def abandon(self) -> None:
         """The power is gone: nothing more of this connection reaches the disk."""
@@ -259,12 +255,12 @@ class MemoryDatabase(sqlite3.Connection):
             if disk.writes_left >= 0:
                 self._commit_in_the_cut(disk)
         super().commit()
-        if disk is not None and self._path in disk.files:
+        if disk is not None and self._name in disk.files:
             image = self.serialize()
             if int(self.execute("PRAGMA synchronous").fetchone()[0]) >= FULL:
-                disk.keep_image(self._path, image)
+                disk.keep_image(self._name, image)
             else:
-                disk.files[self._path].seen[:] = image
+                disk.files[self._name].seen[:] = image
 
     def close(self) -> None:
         """Close."""
@@ -276,5 +272,3 @@ class MemoryDatabase(sqlite3.Connection):
         disk.writes_left -= 1
         if disk.writes_left < 0:
             raise PowerCutError
-
-

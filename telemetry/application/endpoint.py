@@ -299,6 +299,11 @@ class Endpoint:
         """Surveys and events that the ground station has not receipted yet."""
         return len(self._outbox)
 
+    @property
+    def waiting(self) -> int:
+        """Payloads queued or on their way in both links."""
+        return sum(link.waiting for link in self._links.values())
+
     def link_counters(self) -> dict[str, int]:
         """Counts of all that went wrong or was dropped, of both ends."""
         total = Counter(self.counters)
