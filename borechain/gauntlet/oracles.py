@@ -2,9 +2,13 @@
 
 from __future__ import annotations
 
+import contextlib
 import math
+import sqlite3
 from collections.abc import Iterator
 from typing import Any
+
+import msgpack
 
 from borechain.gauntlet.rig import GauntletRig
 from groundstation.service.model import RigModel
@@ -12,8 +16,10 @@ from sim.gauntlet.fault import TUBES
 from sim.gauntlet.world import TUBE_LENGTH, FaultyWorld
 from sim.rig.report import wrap_deg
 from telemetry.application.outbox import LIMIT
-from telemetry.messages import BASE, NodeFlag
-from telemetry.transport.hop import BEST_EFFORT_LIMIT, QUEUE_LIMIT, WINDOW
+from telemetry.messages import BASE, NodeFlag, Receipt, Side
+from telemetry.presentation.msgpack_codec import decode
+from telemetry.schema import Kind
+from telemetry.transport.hop import BEST_EFFORT_LIMIT, QUEUE_LIMIT, WINDOW, parse_frame
 
 DEPTH_TOLERANCE = 0.05  # m
 SIGMAS = 5.0  # of a direction in the plane; 3 are exceeded by one good survey in ninety
@@ -24,21 +30,64 @@ TOLD = frozenset(
         *("disk", "depth_silent", "depth_refused"),
     }
 )
+RECEIPT = msgpack.packb({"k": int(Kind.RECEIPT)})[1:]  # in every frame with a receipt
 UNKNOWN_DEG = 20.0  # of an azimuth whose yaws are all unknown, at least
 
 
 class Observer:
-    """Looks at a rig while it runs: nothing stale is shown fresh, no queue grows without bound."""
+    """Looks at a rig while it runs.
+
+    Nothing stale is shown fresh, no queue grows without bound, no number of a start is used twice, and what the ground
+    station receipts is on its disk.
+    """
 
     def __init__(self, rig: GauntletRig) -> None:
         self._rig = rig
+        self._starts: dict[int, tuple[object, set[int]]] = {}  # process that is known, and numbers of all, by address
+        self._kept: tuple[bytes, set[tuple[int, int, str]]] = (b"", set())
         self.found: list[str] = []
+        rig.channel.listeners.append(self.on_frame)
 
     def look(self) -> None:
-        """Look now; each thing is told once."""
-        for text in (*self._freshness(), *queues(self._rig)):
-            if text not in self.found:
-                self.found.append(text)
+        """Look now."""
+        for text in (*self._freshness(), *queues(self._rig), *self._repeated_starts()):
+            self._tell(text)
+
+    def on_frame(self, sender: int, side: Side, frame: bytes) -> None:
+        """A frame leaves a port: a receipt of the ground station must be true now."""
+        if sender != BASE or RECEIPT not in frame or (parsed := parse_frame(frame)) is None:
+            return
+        for _, payload in parsed[1]:
+            message = decode(payload)
+            if isinstance(message, Receipt):
+                known = (message.tube, message.sequence, message.content.hex())
+                if known not in self._stored():
+                    self._tell(f"tube {known[0]}: message {known[1]} is receipted and not on the disk")
+
+    def _tell(self, text: str) -> None:
+        if text not in self.found:
+            self.found.append(text)
+
+    def _stored(self) -> set[tuple[int, int, str]]:
+        """Tube, number and content of what the database would hold after a cut."""
+        image = self._rig.disk(BASE).kept("ground.sqlite")
+        if image is not self._kept[0]:
+            with contextlib.closing(sqlite3.connect(":memory:")) as connection:
+                connection.deserialize(image)
+                rows = connection.execute("SELECT tube, sequence, content FROM messages")
+                self._kept = (image, set(rows))
+        return self._kept[1]
+
+    def _repeated_starts(self) -> Iterator[str]:
+        for address, process in self._rig.stepper.processes.items():
+            known, numbers = self._starts.setdefault(address, (None, set()))
+            if process is known:
+                continue
+            number = process.endpoint.boot_count
+            if number in numbers and not self._rig.disk(address).handled:
+                yield f"process {address}: two starts have the number {number}"
+            numbers.add(number)
+            self._starts[address] = (process, numbers)
 
     def _freshness(self) -> Iterator[str]:
         rig = self._rig

@@ -154,9 +154,9 @@ class DepthLog:
         self._doubtful.clear()
 
     def _suspect(self, one: Stand, other: Stand) -> None:
-        """Take a contradiction that reaches into the present for a jump: nobody heard the bit in between."""
+        """Take a contradiction for a jump that nobody heard: what came since may be as wrong as the later stand."""
         first, second = sorted((one, other), key=lambda stand: stand.begun_at)
-        if self._raw is not None and (second.epoch, second.ended_at) >= self._raw[:2] and not self.jumped:
+        if not self.jumped:
             self.jumped = f"from {first.md:.2f} m to {second.md:.2f} m between two stands"
             self._trusted = (first.epoch, first.ended_at, first.md)
 

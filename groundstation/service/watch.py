@@ -21,6 +21,7 @@ SETTLED_AFTER = 10.0  # s after a start in which a tube may still find its yaw
 TOGETHER = 30.0  # s
 REFUSALS = 3  # readings of the depth refused in a row until that is told
 SENSOR = NodeFlag.SENSOR_FAULT | NodeFlag.YAW_UNTRUSTED | NodeFlag.RATE_EXCEEDED
+AGAINST_THE_ENCODER = ("yaw_reset", "gyro_step", "gyro_scale")
 OF_THE_DISK = ("saved_state_lost", "boot_counter_lost", "parameters_fallback")
 
 
@@ -50,7 +51,7 @@ class Watch:
         self._refused_in_a_row = 0
         self._contradictions = 0
         self._gaps: dict[int, Gap] = {}
-        self._resets: dict[int, Event] = {}  # newest change of the yaw by the encoder, by tube
+        self._contradicted: dict[int, Event] = {}  # newest contradiction of gyroscope and encoder, by tube
         self._started: dict[tuple[int, int], float] = {}  # s, rig time of the newest start, by tube and epoch
         self._told_unplaced: set[int] = set()  # tubes
 
@@ -91,8 +92,8 @@ class Watch:
         """Judge an event that has come, or was stored before a restart of the ground station."""
         if event.code in ("booted", "restored"):
             self._started[event.tube, event.epoch] = event.at
-        elif event.code == "yaw_reset":
-            self._on_yaw_reset(event)
+        elif event.code in AGAINST_THE_ENCODER:
+            self._on_contradiction(event)
 
     def on_survey(self, measurement: SurveyMeasurement, outcome: str) -> None:
         """Tell what a survey was not used for: ``outcome`` is a kind of alarm, or empty."""
@@ -139,12 +140,15 @@ class Watch:
             gap.complete_from = complete_from
             gap.asked_at, gap.asked = now - ASK_EVERY + GAP_AFTER, gap.asked if sent else ASKED_AT_MOST
 
-    def _on_yaw_reset(self, event: Event) -> None:
+    def _on_contradiction(self, event: Event) -> None:
         """Tubes that contradict the encoder together, not all of them freshly started, speak against the encoder."""
-        self._resets[event.tube] = event
-        together = [e for e in self._resets.values() if e.epoch == event.epoch and abs(e.at - event.at) <= TOGETHER]
+        self._contradicted[event.tube] = event
+        together = [
+            e for e in self._contradicted.values() if e.epoch == event.epoch and abs(e.at - event.at) <= TOGETHER
+        ]
         heard = [tube for tube in self._model.tally.tubes if not self._model.is_stale(tube)]
-        if len(together) >= min(2, len(heard)) and any(self._was_settled(e) for e in together):
+        enough = min(2, len(heard)) if event.code == "yaw_reset" else 2  # alone, a gyroscope is wrong sooner
+        if len(together) >= enough and any(self._was_settled(e) for e in together):
             tubes = ", ".join(str(tube) for tube in sorted(e.tube for e in together))
             self._alarms.alert("reference", "encoder", f"tubes {tubes} at {event.at:.0f} s")
 

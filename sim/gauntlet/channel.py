@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections import deque
+from collections.abc import Callable
 
 import numpy as np
 
@@ -24,6 +25,7 @@ class FaultyChannel(LinkChannel):
     reordering : s within which frames come in any order
     burst : probability that a frame begins a burst, in which the next 20 are lost
     overheard : the newest frames of each port
+    listeners : are called with sender, side and bytes of every frame
     """
 
     def __init__(self, seed: int, latency: float, jitter: float, loss: float, duplicate: float) -> None:
@@ -33,6 +35,7 @@ class FaultyChannel(LinkChannel):
         self.reordering = 0.0
         self.burst = 0.0
         self.overheard: dict[Port, deque[bytes]] = {}
+        self.listeners: list[Callable[[int, Side, bytes], None]] = []
         self._seed_of_faults = seed
         self._draws: dict[Port, np.random.Generator] = {}
         self._left_of_burst: dict[Port, int] = {}
@@ -41,6 +44,8 @@ class FaultyChannel(LinkChannel):
         """Delay (s) and bytes of each copy of the next frame leaving this port; none when it is lost."""
         port = (sender, side)
         self.overheard.setdefault(port, deque(maxlen=OVERHEARD)).append(frame)
+        for listener in self.listeners:
+            listener(sender, side, frame)
         found = super().deliveries(sender, side, frame)
         if not (self.port_loss or self.port_delay or self.reordering or self.burst):
             return found

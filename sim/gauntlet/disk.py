@@ -56,6 +56,7 @@ class FaultyDisk:
     writes_left: int = -1
     files: dict[str, File] = field(default_factory=dict)
     backups: list[bytes] = field(default_factory=list)  # images of the database, the newest last
+    handled: bool = False  # somebody but the process has changed a file
     _kept_names: dict[str, File] = field(default_factory=dict)
     _changes: list[NameChange] = field(default_factory=list)
     _numbers: int = 0
@@ -143,6 +144,7 @@ class FaultyDisk:
 
     def replace(self, name: str, data: bytes | None) -> None:
         """Whoever has the disk in his hands gives a file these bytes, or removes it."""
+        self.handled = True
         if data is None:
             self.files.pop(name, None)
             self._kept_names.pop(name, None)
@@ -159,7 +161,16 @@ class FaultyDisk:
         disk = FaultyDisk(random)
         for name, file in self._kept_names.items():
             disk.replace(name, file.kept)
+        disk.handled = False
         return disk
+
+    def make_empty(self, name: str) -> None:
+        """Make a file whose name is kept."""
+        self.files[name] = self._kept_names[name] = self._new(b"")
+
+    def kept(self, name: str) -> bytes:
+        """Bytes of a file that would be left after a cut; none where it would not be there."""
+        return self._kept_names[name].kept if name in self._kept_names else b""
 
     def keep_image(self, name: str, image: bytes) -> None:
         """A commit of the database that is on the disk."""
@@ -241,7 +252,7 @@ class MemoryDatabase(sqlite3.Connection):
             self.deserialize(image)
         elif name not in disk.files:
             disk.refuse_database()
-            disk.replace(name, b"")
+            disk.make_empty(name)
 
     def abandon(self) -> None:
         """The power is gone: nothing more of this connection reaches the disk."""
