@@ -41,8 +41,11 @@ class Observer:
     station receipts is on its disk.
     """
 
-    def __init__(self, rig: GauntletRig) -> None:
+    def __init__(self, rig: GauntletRig, since: float = math.inf) -> None:
         self._rig = rig
+        self._since = since  # s, rig time of the truth at which the first fault begins
+        self._known: set[tuple[str, str, int]] = set()
+        self.told: dict[str, float] = {}  # s after the first fault at which an alarm was first seen
         self._starts: dict[int, tuple[object, set[int]]] = {}  # process that is known, and numbers of all, by address
         self._kept: tuple[bytes, set[tuple[int, int, str]]] = (b"", set())
         self.found: list[str] = []
@@ -50,6 +53,7 @@ class Observer:
 
     def look(self) -> None:
         """Look now."""
+        self._see_alarms()
         for text in (*self._freshness(), *queues(self._rig), *self._repeated_starts()):
             self._tell(text)
 
@@ -63,6 +67,17 @@ class Observer:
                 known = (message.tube, message.sequence, message.content.hex())
                 if known not in self._stored():
                     self._tell(f"tube {known[0]}: message {known[1]} is receipted and not on the disk")
+
+    def _see_alarms(self) -> None:
+        """Note which alarms are raised, or counted up, after the first fault."""
+        if self._rig.ground is None:
+            return
+        for alarm in self._rig.ground.model.rig_alarms:
+            row = (alarm.kind.code, alarm.subject, alarm.count)
+            if row not in self._known:
+                self._known.add(row)
+                if self._rig.now >= self._since:
+                    self.told.setdefault(alarm.kind.code, self._rig.now - self._since)
 
     def _tell(self, text: str) -> None:
         if text not in self.found:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import gc
 import itertools
 import math
 import tempfile
@@ -45,7 +46,7 @@ class Plan(NamedTuple):
 
 
 PLANS = {
-    "minute": Plan(MINUTE, RESTED, 4.0, {"tube_length": TUBE_LENGTH, "survey_after": 38.0}),
+    "minute": Plan(MINUTE, RESTED, 6.0, {"tube_length": TUBE_LENGTH, "survey_after": 38.0}),
     "drilled-in": Plan(DRILLED_IN, 0.0, 15.0, {"tube_length": TUBE_LENGTH}),
 }
 
@@ -181,9 +182,11 @@ def new_rig(plan: str, seed: int, folder: Path) -> GauntletRig:
 
 
 def make_ready(plan: str, seeds: Iterable[int]) -> None:
-    """Work out the worlds of these seeds, so that a seed's time is its own."""
+    """Work out the worlds of these seeds, so that a seed's time is its own, and keep the collector from them."""
     for number in sorted({seed % WORLDS for seed in seeds}):
         started(plan, number)
+    gc.collect()
+    gc.freeze()
 
 
 @cache

@@ -174,20 +174,21 @@ class RigModel:
         self.recalibration = FieldProcedure(config.gravity)
         self.orders = OrderBook()
 
-    def on_state(self, state: NodeState, now: float) -> None:
+    def on_state(self, state: NodeState, now: float) -> bool:
         """Handle a node's state that came at ``now`` (s, own clock), unless a newer one of its epoch is known.
 
-        One that has come before is no sign of life: somebody may have recorded it.
+        One that has come before is no sign of life, somebody may have recorded it: False.
         """
         known = self.nodes.get(state.tube)
         if known is not None and is_repeated(state, known):
-            return
+            return False
         self.recalibration.on_state(state)
         self._heard_at[state.tube] = now
         if known is None or state.epoch != known.epoch or state.at >= known.at:
             self.nodes[state.tube] = state
             self._tally_known_at = min(self._tally_known_at, now + ALL_HEARD_WITHIN)
             self.tally.on_hops(state.tube, state.hops)
+        return True
 
     def restore_tally(self, tubes: list[int]) -> None:
         """Go on with the tubes that were known before a restart."""

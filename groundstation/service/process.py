@@ -207,7 +207,7 @@ class GroundProcess(Process):
         for stand in reading.stands:
             is_present = stand.epoch in (EPOCH_UNKNOWN, model.epoch) and stand.ended_at <= reading.at
             if is_present and stand.md <= model.tally.deepest:
-                self._on_stand(replace(stand, epoch=model.epoch))
+                self._on_stand(stand if stand.epoch == model.epoch else replace(stand, epoch=model.epoch))
         self._keep_stand(reading)
         self._place_waiting()
         self._publish(["status", "string"])
@@ -267,8 +267,7 @@ class GroundProcess(Process):
     def _on_message(self, message: Message, now: float) -> None:
         self._advance_time(now)
         match message:
-            case NodeState():
-                self.model.on_state(message, now)
+            case NodeState() if self.model.on_state(message, now):
                 self.watch.on_state(message)
                 with self._refusing_disk():
                     self._keep_tally()

@@ -16,7 +16,6 @@ import math
 import sqlite3
 from collections.abc import Iterator
 from dataclasses import dataclass
-from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -52,6 +51,9 @@ MESSAGES = sa.Table(
     sa.Column("payload", sa.LargeBinary, nullable=False),
     sa.UniqueConstraint("tube", "sequence", "content"),
 )
+SAME = sa.and_(*(MESSAGES.c[name] == sa.bindparam(f"its_{name}") for name in ("tube", "sequence", "content")))
+FIND, DROP, ADD = sa.select(MESSAGES.c.payload).where(SAME), sa.delete(MESSAGES).where(SAME), sa.insert(MESSAGES)
+PLACE = sa.update(MESSAGES).where(SAME).values(md=sa.bindparam("depth"))
 STANDS = sa.Table(
     "stands",
     METADATA,
@@ -139,19 +141,20 @@ class Store:
         payload = encode(message)
         row = row_of(message, payload)
         with self._writing() as connection:
-            there = connection.execute(sa.select(MESSAGES.c.payload).where(_same(row))).first()
+            same = {f"its_{name}": value for name, value in row.items()}
+            there = connection.execute(FIND, same).first()
             if there is not None and there.payload == payload:
                 return False
-            connection.execute(sa.delete(MESSAGES).where(_same(row)))  # of a row that is damaged
+            connection.execute(DROP, same)  # of a row that is damaged
             kind = type(message).__name__
-            connection.execute(sa.insert(MESSAGES).values(**row, kind=kind, md=md, below=below, payload=payload))
+            connection.execute(ADD, {**row, "kind": kind, "md": md, "below": below, "payload": payload})
         return True
 
     def place_message(self, message: Kept, md: float) -> None:
         """Store the depth (m) of a message that came before it was known."""
         with self._writing() as connection:
-            same = _same(row_of(message, encode(message)))
-            connection.execute(sa.update(MESSAGES).where(same).values(md=md))
+            row = row_of(message, encode(message))
+            connection.execute(PLACE, {"depth": md, **{f"its_{name}": value for name, value in row.items()}})
 
     def keep_stand(self, stand: Stand) -> None:
         """Store that the bit stood, in the place of what it overlaps."""
@@ -318,16 +321,13 @@ def is_depth(value: object) -> bool:
     return value is None or (isinstance(value, float) and math.isfinite(value) and value >= 0.0)
 
 
-def _same(row: dict[str, Any]) -> sa.ColumnElement[bool]:
-    return sa.and_(*(MESSAGES.c[name] == value for name, value in row.items()))
-
-
 def _engine_of(url: str, disk: Disk) -> sa.Engine:
     """Engine of a URL, a file by ``disk``; a refusal does not repeat the URL, which may hold a password."""
     try:
         address = sa.make_url(url)
         if address.get_backend_name() == "sqlite" and address.database and not address.query:
-            return sa.create_engine(address, creator=partial(disk.connect, Path(address.database)))
+            file = Path(address.database)
+            return sa.create_engine(address, creator=lambda _record=None: disk.connect(file))
         return sa.create_engine(address)
     except (sa.exc.SQLAlchemyError, ImportError) as error:
         raise StoreError(

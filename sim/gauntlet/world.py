@@ -17,8 +17,8 @@ COMMON: dict[str, Any] = {
 }
 # a string of two tubes rests, drills a part of a length and is surveyed
 MINUTE = COMMON | {
-    "schedule": {"add_s": 112.0, "stop_s": 32.0, "finish_s": 24.0, "blocks": 1},
-    "rotation": {"turns": 2.0, "advance_m": 0.8},
+    "schedule": {"add_s": 110.0, "stop_s": 30.0, "finish_s": 22.0, "blocks": 1},
+    "rotation": {"turns": 1.5, "advance_m": 0.8},
 }
 # the tubes are drilled in one after the other
 DRILLED_IN = COMMON | {
