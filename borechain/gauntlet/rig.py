@@ -183,10 +183,12 @@ def new_rig(plan: str, seed: int, folder: Path) -> GauntletRig:
 
 def make_ready(plan: str, seeds: Iterable[int]) -> None:
     """Work out the worlds of these seeds, so that a seed's time is its own, and keep the collector from them."""
+    known = started.cache_info().currsize
     for number in sorted({seed % WORLDS for seed in seeds}):
         started(plan, number)
-    gc.collect()
-    gc.freeze()
+    if started.cache_info().currsize > known:
+        gc.collect()
+        gc.freeze()
 
 
 @cache

@@ -7,6 +7,7 @@ import gc
 import hashlib
 import shutil
 import tempfile
+import time
 import traceback
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
@@ -14,14 +15,14 @@ from pathlib import Path
 from typing import Any
 
 from borechain.gauntlet.oracles import Observer, violations
-from borechain.gauntlet.rig import PLANS, GauntletRig, new_rig
+from borechain.gauntlet.rig import PLANS, GauntletRig, make_ready, new_rig
 from sim.gauntlet.kinds import KINDS
 from sim.gauntlet.plan import drawn_kinds, steps_of
 from sim.rig.report import digest
 
 ALL = tuple(kind.name for kind in KINDS)
 USUAL = "minute"
-COLLECT_EVERY = 200_000  # objects
+COLLECT_EVERY = 50_000  # objects
 
 
 @dataclass(slots=True)
@@ -38,11 +39,14 @@ class Outcome:
     told: dict[str, float] = field(default_factory=dict)  # s after the first fault, by alarm
     measurements: int = 0
     schedule: list[str] = field(default_factory=list)
+    cpu_s: float = field(default=0.0, compare=False)
 
 
 def run_seed(seed: int, allowed: Sequence[str] = ALL, kinds: Sequence[str] | None = None, plan: str = USUAL) -> Outcome:
     """Drill under the faults of a seed and judge; ``kinds`` overrules what the seed switches on."""
     outcome = Outcome(seed, tuple(drawn_kinds(seed, allowed) if kinds is None else kinds), plan)
+    make_ready(plan, [seed])
+    began = time.process_time()
     folder = Path(tempfile.mkdtemp(prefix="gauntlet-"))
     try:
         with _rare_collection():
@@ -54,7 +58,14 @@ def run_seed(seed: int, allowed: Sequence[str] = ALL, kinds: Sequence[str] | Non
         outcome.violations.append(f"died: {type(error).__name__}: {error} ({Path(place.filename).name}:{place.lineno})")
     finally:
         shutil.rmtree(folder, ignore_errors=True)
+    outcome.cpu_s = time.process_time() - began
     return outcome
+
+
+def judged(job: tuple[int, Sequence[str], Sequence[str] | None, str]) -> Outcome:
+    """Outcome of one seed, shrunk where it fails: seed, kinds to draw from, kinds to switch on instead, plan."""
+    outcome = run_seed(*job)
+    return shrink(outcome) if outcome.violations else outcome
 
 
 def shrink(outcome: Outcome) -> Outcome:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import time
 from typing import TYPE_CHECKING, Any
 
 import click
@@ -12,6 +11,9 @@ from borechain.cli.faults import EnvironmentFault, InputFault, needs, plain_faul
 
 if TYPE_CHECKING:
     from borechain.gauntlet.run import Outcome
+
+WORTH_A_PROCESS = 50  # seeds, for which a process more is started
+BATCH = 200  # seeds shown at a time
 
 
 @click.command()
@@ -48,9 +50,9 @@ def gauntlet(
       borechain gauntlet --seeds 100
       borechain gauntlet --seed 17 --exactly node-cut,loss
     """
-    from borechain.gauntlet.rig import make_ready
-    from borechain.gauntlet.run import ALL, run_seed, shrink
+    from borechain.gauntlet.run import ALL, judged
     from sim.gauntlet.kinds import KINDS
+    from sim.studies.pool import over_cores
 
     if listed:
         for kind in KINDS:
@@ -58,15 +60,13 @@ def gauntlet(
         return
     allowed, kinds = _names(faults, "--faults", ALL), _names(exactly, "--exactly", ()) or None
     numbers = [seed] if seed is not None else list(range(first, first + seeds))
-    make_ready(plan, numbers)
-    began, failed = time.process_time(), 0
-    for number in numbers:
-        outcome = run_seed(number, allowed, kinds, plan)
-        if outcome.violations:
-            failed += 1
-            outcome = shrink(outcome)
-        _show(outcome, as_json=as_json)
-    cpu_s = time.process_time() - began
+    failed, cpu_s = 0, 0.0
+    with over_cores(len(numbers) // WORTH_A_PROCESS, lambda: None) as run_all:
+        for batch in (numbers[k : k + BATCH] for k in range(0, len(numbers), BATCH)):
+            for outcome in run_all(judged, [(number, allowed, kinds, plan) for number in batch]):
+                failed += bool(outcome.violations)
+                cpu_s += outcome.cpu_s
+                _show(outcome, as_json=as_json)
     _show_figures(len(numbers), failed, cpu_s, as_json=as_json)
     if failed:
         raise EnvironmentFault(f"{failed} of {len(numbers)} seeds failed; each is named above with what repeats it")
