@@ -30,6 +30,7 @@ TOLD = frozenset(
         *("disk", "depth_silent", "depth_refused"),
     }
 )
+DEPTH = frozenset({"depth_refused", "depth_contradicts"})  # alarms while which no depth since a gap is sure
 RECEIPT = msgpack.packb({"k": int(Kind.RECEIPT)})[1:]  # in every frame with a receipt
 UNKNOWN_DEG = 20.0  # of an azimuth whose yaws are all unknown, at least
 
@@ -125,7 +126,7 @@ def violations(rig: GauntletRig) -> list[str]:
     rows = rig.inline.ask("measurements")["measurements"]
     return [
         *_each_once(rows),
-        *_depths(rows, rig.world),
+        *(() if standing & DEPTH else _depths(rows, rig.world)),
         *(_directions(rig) if "reference" not in standing else ()),
         *_flags(rig.inline.ground.model),
         *_missing(rows, rig.world, standing | (told & {"depth_refused"})),

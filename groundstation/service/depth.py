@@ -8,6 +8,7 @@ contradict each other neither is believed.
 
 from __future__ import annotations
 
+import math
 from bisect import bisect_right, insort
 from collections import Counter, deque
 from dataclasses import dataclass, field, replace
@@ -114,7 +115,8 @@ class DepthLog:
             begun_at, ended_at = min(known.begun_at, stand.begun_at), max(known.ended_at, stand.ended_at)
             self.stands[place] = Stand(stand.epoch, begun_at, ended_at, stand.md)
             return False
-        if any(_overlap(doubtful, stand) for doubtful in self._doubtful):
+        since = self._trusted[:2] if self.jumped and self._trusted is not None else (math.inf, 0.0)
+        if (stand.epoch, stand.ended_at) > since or any(_overlap(doubtful, stand) for doubtful in self._doubtful):
             self.refusals["a stand of a doubtful time"] += 1
             return False
         against = [known for known in self.stands if known.epoch == stand.epoch and not self._agree(known, stand)]
