@@ -144,16 +144,28 @@ class GauntletRig:
     def drill(self, steps: Iterable[Step], observe: Callable[[], None] = lambda: None) -> None:
         """Drill to the end, doing each step at its time and having everything observed from time to time."""
         for step in steps:
-            self._advance(step.at, observe)
+            self.advance(step.at, observe)
             step.act(self)
-        self._advance(math.inf, observe)
+        self.advance(math.inf, observe)
+
+    def repair(self) -> None:
+        """Everything has power and a disk that takes, and the crew has looked at the depth."""
+        self.world.depth_hidden, self.world.depth_error = False, 0.0
+        self.world.forget()
+        for address in EVERYBODY:
+            self._disks[address].refusal, self._disks[address].writes_left = 0, -1
+            self.thaw(address)
+            self.start(address)
+        if self.ground is not None and self.ground.model.depths.jumped:
+            self.inline.command("accept_depth", {"action": "confirm"})
 
     def close(self) -> None:
         """Close the database."""
         if self.ground is not None:
             self.ground.store.close()
 
-    def _advance(self, to: float, observe: Callable[[], None]) -> None:
+    def advance(self, to: float, observe: Callable[[], None] = lambda: None) -> None:
+        """Let rig time pass to ``to`` (s), having everything observed from time to time."""
         while self._look_at <= min(to, self.world.end):
             self.scheduler.advance(self._look_at)
             self._look_at += LOOK_EVERY

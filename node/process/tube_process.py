@@ -265,8 +265,8 @@ class TubeProcess(Process):
         flags = state.flags | (NodeFlag.NOT_SAVED if self._saver.is_refused else NodeFlag.NONE)
         endpoint = self.endpoint
         upper, lower = (endpoint.margin(side) for side in Side)
-        known = replace(state, flags=flags, epoch=endpoint.clock.epoch, numbered=endpoint.newest_sequence)
-        return replace(known, upper_margin=upper, lower_margin=lower)
+        known = replace(state, flags=flags, hops=endpoint.told_hops, epoch=endpoint.clock.epoch)
+        return replace(known, numbered=endpoint.newest_sequence, upper_margin=upper, lower_margin=lower)
 
     def _keep(self, said: Kept, now: float) -> None:
         """Keep a message for the ground station; surveys and records stay in the log when it has them."""

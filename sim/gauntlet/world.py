@@ -63,6 +63,11 @@ class FaultyWorld(World):
         world._heal()
         return world
 
+    def forget(self) -> None:
+        """Drop what was worked out for times that will not come again."""
+        self._depths.clear()
+        self._counted.clear()
+
     def _heal(self) -> None:
         self.zero = 0.0
         self.jumps: dict[int, float] = {}

@@ -130,6 +130,7 @@ class Endpoint:
         self.mode = Mode.BOOT
         self.neighbours: dict[Side, Neighbour | None] = dict.fromkeys(Side)
         self.hops = 0 if address == ENCODER else HOPS_UNKNOWN
+        self._hops_are_told = address == ENCODER
         self._reach = reach
         self._links = {side: HopLink(address, boot_count, self._nearest(side)) for side in sorted(sides)}
         toward_encoder = Side.LOWER if address == BASE else Side.UPPER
@@ -240,6 +241,11 @@ class Endpoint:
     def submit_again(self, sequence: int, payload: bytes, now: float) -> None:
         """Send once more what was receipted before, because the ground station asks for it."""
         self._outbox.keep_payload(sequence, payload, now)
+
+    @property
+    def told_hops(self) -> int:
+        """Distance from the encoder as a neighbour told it since the start; a saved one may be of another string."""
+        return self.hops if self._hops_are_told else HOPS_UNKNOWN
 
     @property
     def newest_sequence(self) -> int:
@@ -362,7 +368,9 @@ class Endpoint:
         hops = hello.hops + 1 + self.skipped
         if hops > MAX_TUBE:
             self.counters["impossible_hops"] += 1
-        elif hops != self.hops:
+            return
+        self._hops_are_told = True
+        if hops != self.hops:
             self.hops = hops
             self._hello_at = -math.inf
 

@@ -12,7 +12,7 @@ from sim.gauntlet.kinds import KINDS
 from sim.gauntlet.plan import drawn_kinds, steps_of
 from sim.world.streams import stream
 
-COMBINED, CHUNK = 100, 20  # seeds in all, and of one test; `make study` runs thousands
+COMBINED, CHUNK = 60, 20  # seeds in all, and of one test; `make study` runs thousands
 
 
 def test_every_kind_has_a_name_of_its_own_and_draws_steps_in_its_time() -> None:
@@ -38,7 +38,7 @@ def test_seeds_switch_on_different_mixtures_and_always_something() -> None:
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("seed", [1, 2])
+@pytest.mark.parametrize("seed", [1])
 def test_seeds_hold_and_repeat_bit_for_bit(seed: int) -> None:
     first, second = run_seed(seed), run_seed(seed)
     assert first.violations == []
@@ -55,7 +55,7 @@ def test_combined_seeds_hold(first: int) -> None:
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("seed", [2, 9])
+@pytest.mark.parametrize("seed", [2])
 def test_seeds_of_a_string_that_is_drilled_in_hold(seed: int) -> None:
     assert run_seed(seed, plan="drilled-in").violations == []
 

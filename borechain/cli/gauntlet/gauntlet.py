@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from dataclasses import asdict
 from typing import TYPE_CHECKING, Any
 
 import click
@@ -30,6 +31,7 @@ BATCH = 200  # seeds shown at a time
     show_default=True,
     help="A string that drills for a minute, or one that is drilled in tube by tube.",
 )
+@click.option("--soak", "hours", type=click.FloatRange(1.0), help="Instead, hours of rig time of one rig under faults.")
 @click.option("--json", "as_json", is_flag=True, help="Print one JSON object a seed, and one of the whole.")
 @needs("scipy", "sqlalchemy")
 @plain_faults
@@ -40,6 +42,7 @@ def gauntlet(
     faults: str | None,
     exactly: str | None,
     listed: bool,
+    hours: float | None,
     plan: str,
     as_json: bool,
 ) -> None:
@@ -49,6 +52,7 @@ def gauntlet(
     Examples:
       borechain gauntlet --seeds 100
       borechain gauntlet --seed 17 --exactly node-cut,loss
+      borechain gauntlet --soak 24
     """
     from borechain.gauntlet.run import ALL, judged
     from sim.gauntlet.kinds import KINDS
@@ -57,6 +61,9 @@ def gauntlet(
     if listed:
         for kind in KINDS:
             click.echo(f"{kind.name:20} {kind.meaning}")
+        return
+    if hours is not None:
+        _soak(hours, first, as_json=as_json)
         return
     allowed, kinds = _names(faults, "--faults", ALL), _names(exactly, "--exactly", ()) or None
     numbers = [seed] if seed is not None else list(range(first, first + seeds))
@@ -105,6 +112,24 @@ def _show(outcome: Outcome, *, as_json: bool) -> None:
             click.echo(f"  {line}")
         plan = f" --plan {outcome.plan}" if outcome.plan != USUAL else ""
         click.echo(f"  borechain gauntlet --seed {outcome.seed} --exactly {','.join(outcome.kinds)}{plan}")
+
+
+def _soak(hours: float, seed: int, *, as_json: bool) -> None:
+    """Show what a long run needs, a line now and then."""
+    from borechain.gauntlet.soak import soak
+
+    found: tuple[str, ...] = ()
+    for sample in soak(hours, seed):
+        found = sample.violations
+        if as_json:
+            click.echo(json.dumps(asdict(sample)))
+        else:
+            click.echo(
+                f"{sample.hours:7.1f} h {sample.memory_mib:7.1f} MiB {sample.handles:4d} handles "
+                f"{sample.database_kib:8.1f} KiB {sample.surveys:5d} surveys {len(found):3d} wrong"
+            )
+    if found:
+        raise EnvironmentFault(f"after {hours:g} h: {'; '.join(found)}")
 
 
 def _show_figures(seeds: int, failed: int, cpu_s: float, *, as_json: bool) -> None:
