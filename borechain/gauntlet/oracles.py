@@ -45,7 +45,7 @@ class Observer:
     def __init__(self, rig: GauntletRig, since: float = math.inf) -> None:
         self._rig = rig
         self._since = since  # s, rig time of the truth at which the first fault begins
-        self._known: set[tuple[str, str, int]] = set()
+        self.seen: set[tuple[str, str, int]] = set()  # code, subject and count of every alarm so far
         self.told: dict[str, float] = {}  # s after the first fault at which an alarm was first seen
         self._starts: dict[int, tuple[object, set[int]]] = {}  # process that is known, and numbers of all, by address
         self._kept: tuple[bytes, set[tuple[int, int, str]]] = (b"", set())
@@ -75,8 +75,8 @@ class Observer:
             return
         for alarm in self._rig.ground.model.rig_alarms:
             row = (alarm.kind.code, alarm.subject, alarm.count)
-            if row not in self._known:
-                self._known.add(row)
+            if row not in self.seen:
+                self.seen.add(row)
                 if self._rig.now >= self._since:
                     self.told.setdefault(alarm.kind.code, self._rig.now - self._since)
 
