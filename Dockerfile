@@ -11,7 +11,7 @@ COPY scenarios scenarios
 # the sources go once they are installed, so that nothing is imported or compiled from here instead
 RUN python -m pip install --no-cache-dir --no-build-isolation --no-deps . \
  && rm -rf /source/* \
- && useradd --create-home operator && mkdir /state && chown operator /state
+ && useradd --create-home operator && mkdir /state /keys && chown operator /state /keys
 USER operator
 WORKDIR /home/operator
 # half a minute of compiling that no container then spends at its start

@@ -23,6 +23,7 @@ COMMANDS = {
         "router",
         "Run the zenoh router of a rig whose processes are started one by one.",
     ),
+    "pki": ("borechain.cli.pki.pki", "pki", "Make, revoke and change the keys of a rig."),
     "query": ("borechain.cli.ground.query", "query", "Ask a running ground station."),
     "watch": ("borechain.cli.ground.query", "watch", "Follow what a running ground station publishes."),
     "calibrate": (

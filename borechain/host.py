@@ -5,12 +5,17 @@ from __future__ import annotations
 import contextlib
 import queue
 import warnings
+from collections.abc import Callable
+from functools import partial
 from pathlib import Path
+from typing import Any
 
 import msgpack
 
+from borechain.pki.access import MEDIUM, ROUTER, read_access
 from sim.rig.transports import Transports
 from telemetry import keys
+from telemetry.media.credentials import Credentials, credentials_for
 from telemetry.media.zenoh_bus import open_client, open_router
 from telemetry.media.zenoh_port import CONNECT_TIMEOUT
 from telemetry.runtime.hosting import Place, begin_process, on_termination, reporting
@@ -38,10 +43,15 @@ def run_medium(
 
     begin_process("medium")
     with reporting("medium"):
+        seal_depth = depth_sealer(place.keys)
         with warnings.catch_warnings():
             warnings.simplefilter("ignore", PorosityWarning)  # whoever started the rig was warned
             world = World(load_scenario(scenario, faults), seed)
-        session = open_router(place.endpoint) if router else open_client(place.endpoint, timeout=CONNECT_TIMEOUT)
+        if router:
+            session = open_router(place.endpoint, *guard_of(place.endpoint, place.keys))
+        else:
+            credentials = credentials_for(place.endpoint, place.keys, MEDIUM)
+            session = open_client(place.endpoint, CONNECT_TIMEOUT, credentials)
         with session as bus:
             wanted = bus.publisher(keys.WANTED.format(rig=place.rig))
             medium_of = (transports or Transports()).medium_of
@@ -50,18 +60,35 @@ def run_medium(
             def tell(progress: Progress) -> None:
                 wanted.put(pack_progress(progress))
 
-            scheduler = Scheduler(world, stepper, tell, speed, cued=cued)
+            scheduler = Scheduler(world, stepper, tell, speed, cued=cued, seal_depth=seal_depth)
             on_termination(scheduler.stop)
             with contextlib.closing(stepper):
                 if scheduler.run():
                     scheduler.linger()
 
 
-def run_router(endpoint: str) -> None:
+def depth_sealer(place: Path | None) -> Callable[[bytes], bytes]:
+    """What the source of the depth makes of its readings, with its keys from a file or folder, if there are any."""
+    if place is None:
+        return bytes
+    from telemetry.application.depth_seal import seal_depth
+    from telemetry.media.credentials import DEPTH_SOURCE
+    from telemetry.transport.key_ring import key_file, read_ring
+
+    return partial(seal_depth, read_ring(key_file(place, DEPTH_SOURCE), DEPTH_SOURCE))
+
+
+def guard_of(endpoint: str, place: Path | None) -> tuple[Credentials | None, dict[str, Any] | None]:
+    """What a router shows over TLS and whom it lets do what; nothing of both without TLS."""
+    credentials = credentials_for(endpoint, place, ROUTER)
+    return credentials, None if credentials is None else read_access(credentials.authority.parent)
+
+
+def run_router(endpoint: str, keys_place: Path | None = None) -> None:
     """Be the router that the processes of a rig meet at, until a signal comes."""
     stopped: queue.SimpleQueue[None] = queue.SimpleQueue()
     begin_process("router")
-    with open_router(endpoint):
+    with open_router(endpoint, *guard_of(endpoint, keys_place)):
         on_termination(lambda: stopped.put(None))
         stopped.get()
 

@@ -13,9 +13,11 @@ from functools import partial
 from pathlib import Path
 from typing import Any
 
+from borechain.host import depth_sealer
 from groundstation.config import GroundConfig
 from groundstation.service.process import GroundProcess
 from node.process.encoder_process import EncoderProcess
+from node.process.host import seals_at
 from node.process.tube_process import TubeProcess
 from sim.errors import RigError
 from sim.rig.in_process import Build, InProcessStepper
@@ -42,6 +44,7 @@ class InlineRig:
     lot : of the starts of the ground station; a rig that is to repeat itself draws them from its seed
     native : the joints are on CAN's native profile, which rounds cyclic messages to the steps of their signals
     disk_of : disk of the process of an address
+    keys : folder of the rig's keys; without it everybody is believed
     """
 
     def __init__(
@@ -54,23 +57,28 @@ class InlineRig:
         *,
         native: bool = False,
         disk_of: Callable[[int], Disk] = lambda _address: MACHINE,
+        keys: Path | None = None,
     ) -> None:
         self.world = world
-        key_file = new_key(folder / "rig.key")
-        config = GroundConfig(rig=rig, folder=private_folder(folder, "ground"), key_file=key_file, **settings)
+        key_file = new_key(folder / "rig.key") if keys is None else None
+        config = GroundConfig(
+            rig=rig, folder=private_folder(folder, "ground"), key_file=key_file, keys=keys, **settings
+        )
         builders: dict[int, Build] = {
             BASE: partial(GroundProcess, config, lot, disk_of(BASE)),
-            ENCODER: partial(
-                EncoderProcess,
+            ENCODER: lambda: EncoderProcess(
                 private_folder(folder, "encoder"),
                 torque=world.torque_settings(),
                 reach=world.reach,
+                seals=seals_at(keys, ENCODER, world.reach),
                 disk=disk_of(ENCODER),
             ),
         }
+        self._seal_depth = depth_sealer(keys)
+        block_key = None if key_file is None else read_key(key_file)
         for tube in range(1, world.scenario.tubes + 1):
-            place, key = private_folder(folder, f"tube-{tube}"), read_key(key_file)
-            builders[tube] = partial(TubeProcess, world.tube_settings(tube), place, key=key, disk=disk_of(tube))
+            place = private_folder(folder, f"tube-{tube}")
+            builders[tube] = partial(self._build_tube, tube, place, block_key, keys, disk_of(tube))
         self.stepper = InProcessStepper(builders, self._act_on_cue, rounded_frame if native else bytes)
 
     @property
@@ -94,7 +102,7 @@ class InlineRig:
             self.stepper.follow(progress)
             show(progress)
 
-        Scheduler(self.world, self.stepper, follow, speed, cued=True).run()
+        Scheduler(self.world, self.stepper, follow, speed, cued=True, seal_depth=self._seal_depth).run()
 
     def ask(self, path: str) -> dict[str, Any]:
         """What the ground station shows on ``path``, see docs/keys.md."""
@@ -111,6 +119,10 @@ class InlineRig:
     def close(self) -> None:
         """Close the ground station's database."""
         self.ground.store.close()
+
+    def _build_tube(self, tube: int, folder: Path, key: bytes | None, keys: Path | None, disk: Disk) -> TubeProcess:
+        seals = seals_at(keys, tube, self.world.reach)
+        return TubeProcess(self.world.tube_settings(tube), folder, key=key, disk=disk, seals=seals)
 
     def _act_on_cue(self, cue: str) -> bool:
         rack = self.world.rack

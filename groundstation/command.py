@@ -7,7 +7,7 @@ from pathlib import Path
 import click
 
 from telemetry.runtime.command_line import needs, plain_faults
-from telemetry.runtime.options import clock_option, key_option, place_options
+from telemetry.runtime.options import clock_option, key_option, keys_option, place_options
 
 TOLERANCES = ("en-12716", "5-cm", "0.27-deg")
 POSITIVE = click.FloatRange(0.0, min_open=True)
@@ -56,6 +56,7 @@ WEIGHTINGS = ("bayes", "equal", "linear", "quadratic", "cubic", "adaptive")
 )
 @clock_option
 @key_option
+@keys_option
 @place_options
 @needs("scipy", "sqlalchemy")
 @plain_faults
@@ -71,6 +72,7 @@ def ground(
     mount_std_deg: float,
     clock: str,
     key_file: Path | None,
+    keys_place: Path | None,
     rig_name: str,
     endpoint: str,
     folder: Path,
@@ -95,4 +97,4 @@ def ground(
         "accelerometer_bias_std_deg": accelerometer_bias_std_deg,
         "mount_std_deg": mount_std_deg,
     }
-    run_ground(Place(rig_name, endpoint, folder, key_file), settings, own_clock=clock == "own")
+    run_ground(Place(rig_name, endpoint, folder, key_file, keys=keys_place), settings, own_clock=clock == "own")

@@ -25,6 +25,7 @@ class GroundConfig(BaseModel):
     folder: Path
     database_url: str | None = Field(None, description="SQLAlchemy URL; SQLite in the folder if absent")
     key_file: Path | None = Field(None, description="key of the rig; without one no parameter block is uploaded")
+    keys: Path | None = Field(None, description="keys of the base, file or folder; without them everybody is believed")
     tube_length: Positive = Field(2.0, description="m, of every tube of the tally")
     gravity: Positive = Field(9.81, description="m/s^2, of the site")
     accelerometer_bias_std_deg: float = Field(0.002, ge=0.0, description="left after calibration, as a tilt")

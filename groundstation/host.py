@@ -14,12 +14,13 @@ from groundstation.gateway.zenoh import ZenohGateway
 from groundstation.service.process import GroundProcess
 from node.kernels.layout import PERIOD
 from telemetry import keys
+from telemetry.media.credentials import file_name
 from telemetry.media.neighbours import neighbour_ports, stepped_ports
 from telemetry.media.zenoh_bus import ZenohBus
 from telemetry.media.zenoh_port import ZenohMedium
 from telemetry.messages import BASE, ENCODER, Side, address_name
 from telemetry.runtime.event_loop import run, stop_on_signals
-from telemetry.runtime.hosting import Place, begin_process, complain, joined, reporting
+from telemetry.runtime.hosting import Place, begin_process, complain, joined, reporting, warn_of_keys
 from telemetry.runtime.own_clock import OwnClock, OwnClockLoop
 from telemetry.runtime.step_client import AsyncStepClient, serve_stepped
 from telemetry.runtime.timing import CycleTiming
@@ -40,8 +41,10 @@ def run_ground(place: Place, settings: dict[str, Any], *, own_clock: bool = Fals
     begin_process(NAME)
     with reporting(NAME):
         # settings, key and database are looked at before half a minute is spent on a router that may be absent
-        config = checked_config(rig=place.rig, folder=place.folder, key_file=place.key_file, **settings)
-        with contextlib.closing(GroundProcess(config)) as process, joined(place) as bus:
+        given = {"rig": place.rig, "folder": place.folder, "key_file": place.key_file, "keys": place.keys}
+        config = checked_config(**given, **settings)
+        with contextlib.closing(GroundProcess(config)) as process, joined(place, file_name(BASE)) as bus:
+            warn_of_keys(NAME, process.endpoint.seals)
             take_lease(bus, place.rig)
             run(serve_by_own_clock(process, bus) if own_clock else serve_on_stepper(process, bus, place))
 

@@ -14,7 +14,7 @@ import math
 from dataclasses import dataclass, field
 from typing import TypeAlias
 
-SCHEMA_VERSION = 4  # the newest; a payload carries the earliest that can say it
+SCHEMA_VERSION = 5  # the newest; a payload carries the earliest that can say it
 ENCODER = 0
 MAX_TUBE = 250
 BASE = 251
@@ -109,6 +109,7 @@ class Aiding:
     torsion_var: float = 0.0  # rad^2, of the twist by it in the tubes passed, beside systematic_var
     under_torque: bool = False  # the drive holds the string twisted
     epoch: int = EPOCH_UNKNOWN
+    seal: bytes = b""  # of the measurement, under a key of the rig; empty without keys
 
 
 @dataclass(frozen=True, slots=True)
@@ -311,6 +312,13 @@ class DepthReading:
     epoch: int = EPOCH_UNKNOWN  # a source that does not know it is taken to mean the present one
 
 
+@dataclass(frozen=True, slots=True)
+class SessionOffer:
+    """The base offers a session to a tube whose seals it does not know; the numbers are in its own seal."""
+
+    tube: int  # addressee
+
+
 Message: TypeAlias = (
     Aiding
     | Hello
@@ -326,5 +334,6 @@ Message: TypeAlias = (
     | BlockStatus
     | StaticRecord
     | DepthReading
+    | SessionOffer
 )
 Kept: TypeAlias = SurveyMeasurement | Event | StaticRecord  # by a tube until its receipt came

@@ -28,6 +28,7 @@ from telemetry.messages import (
     NodeState,
     Receipt,
     Reply,
+    SessionOffer,
     Severity,
     StaticRecord,
     SurveyMeasurement,
@@ -55,6 +56,7 @@ class Kind(IntEnum):
     BLOCK_STATUS = 12
     STATIC_RECORD = 13
     DEPTH_READING = 14
+    SESSION_OFFER = 15
 
 
 @dataclass(frozen=True, slots=True)
@@ -182,6 +184,9 @@ SCHEMA: tuple[MessageSpec, ...] = (
             _variance("torsion_var", "tv", "rad^2", VARIANCE, "of the twist in the tubes passed", since=2, before=0.0),
             _boolean("under_torque", "u", "the drive holds the string twisted", since=2, before=False),
             EPOCH,
+            _binary(
+                "seal", "m", 0, 9, "of the measurement: generation of the key, tag; empty: none", since=5, before=b""
+            ),
         ),
     ),
     MessageSpec(
@@ -389,5 +394,6 @@ SCHEMA: tuple[MessageSpec, ...] = (
             EPOCH,
         ),
     ),
+    MessageSpec(SessionOffer, Kind.SESSION_OFFER, DOWN, "offered again until it is taken", (ADDRESSEE,)),
 )
 SPEC_OF: dict[type[Any], MessageSpec] = {spec.message: spec for spec in SCHEMA}

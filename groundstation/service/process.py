@@ -8,6 +8,7 @@ import secrets
 from collections import deque
 from collections.abc import Callable, Iterator
 from dataclasses import replace
+from typing import TYPE_CHECKING
 
 from groundstation.config import GroundConfig
 from groundstation.errors import SelectorError, StoreError
@@ -18,6 +19,7 @@ from groundstation.service.store import Store
 from groundstation.service.uploads import Uploads
 from groundstation.service.watch import Watch
 from telemetry.application.endpoint import Endpoint
+from telemetry.application.seal_watch import SealWatch, refusal_of
 from telemetry.errors import DecodeError
 from telemetry.messages import (
     BASE,
@@ -29,6 +31,8 @@ from telemetry.messages import (
     Message,
     NodeState,
     Reply,
+    Scalar,
+    Severity,
     Side,
     Stand,
     StaticRecord,
@@ -38,6 +42,9 @@ from telemetry.presentation.msgpack_codec import decode
 from telemetry.runtime.disk import MACHINE, Disk
 from telemetry.runtime.process import Process
 from telemetry.transport.authentication import read_key
+
+if TYPE_CHECKING:
+    from telemetry.application.seals import Seals
 
 STARTS = 1 << 31  # numbers of a start by lot
 EARLY = 64  # readings of the depth that may come before rig time is known
@@ -69,13 +76,19 @@ class GroundProcess(Process):
         self, config: GroundConfig, lot: Callable[[int], int] = secrets.randbelow, disk: Disk = MACHINE
     ) -> None:
         self.config = config
-        self._uploads = Uploads(read_key(config.key_file)) if config.key_file is not None else None
+        seals = None
+        if config.keys is not None:
+            from telemetry.application.seals import seals_of  # without keys no cryptography is loaded
+
+            seals = seals_of(config.keys, BASE, [Side.LOWER], rig=config.rig)
+        self._uploads = uploads_of(config, seals)
         self.store = Store(config.url, disk)
         # by lot, not counted: a database that was deleted or restored must not repeat a number that the string has seen
         start = 1 + lot(STARTS)
         self.model = RigModel(config)
         self.watch = Watch(self.model)
-        self.endpoint = Endpoint(BASE, frozenset({Side.LOWER}), boot_count=start)
+        self.endpoint = Endpoint(BASE, frozenset({Side.LOWER}), boot_count=start, seals=seals)
+        self._seal_watch = SealWatch(self.endpoint, self._on_refused)
         self.listeners: list[Listener] = []
         self._stale: set[int] = set()
         self._early: deque[DepthReading] = deque(maxlen=EARLY)
@@ -100,13 +113,19 @@ class GroundProcess(Process):
 
     def on_depth(self, payload: bytes, now: float) -> None:
         """The rig measured the depth of the bit; bytes that are no reading are counted."""
+        seals = self.endpoint.seals
+        content = payload if seals is None else seals.depth_content(payload)
+        if content is None:
+            return
         try:
-            reading = decode(payload)
+            reading = decode(content)
         except DecodeError:
             reading = None
         if not isinstance(reading, DepthReading):
             self.endpoint.counters["bad_depths"] += 1
             self.model.rig_alarms.alert("bad_input", "depth", "bytes that are no reading of the depth")
+            return
+        if seals is not None and not seals.is_next_depth(reading.sequence):
             return
         self._advance_time(now)
         if not self.endpoint.clock.synchronised:
@@ -173,6 +192,10 @@ class GroundProcess(Process):
         alarms.hold("database", "database", f"{self.store.damaged} messages" if self.store.damaged else "")
         dropped = self.endpoint.dropped
         alarms.hold("queue", "ground station", f"{dropped} dropped" if dropped else "")
+        self._seal_watch.look(now)
+        alarms.hold(
+            "key_file", "ground station", self.endpoint.seals.trouble if self.endpoint.seals is not None else ""
+        )
         for tube, (first, last) in self.watch.gaps_to_ask(now):
             self._ask_again(tube, first, last)
         self.operator.expire_orders(now)
@@ -182,6 +205,10 @@ class GroundProcess(Process):
             self._publish([*(f"nodes/{tube}" for tube in changed), "status", "string"])
         if alarms.drain_changed():
             self._publish(["alarms", "status"])
+
+    def _on_refused(self, _severity: Severity, code: str, arguments: dict[str, Scalar]) -> None:
+        """Frames or messages came under seals that are not to be believed."""
+        self.model.rig_alarms.alert(code, "ground station", refusal_of(arguments))
 
     def _ask_again(self, tube: int, first: int, last: int) -> None:
         """Order a tube to send the surveys of a range of numbers again."""
@@ -315,3 +342,13 @@ class GroundProcess(Process):
     def _publish(self, changed: list[str]) -> None:
         for listener in self.listeners:
             listener(changed)
+
+
+def uploads_of(config: GroundConfig, seals: Seals | None) -> Uploads | None:
+    """Uploads under the keys of each tube, or under the one key of the rig; None without any."""
+    if seals is not None:
+        return Uploads(seals.block_key_of)
+    if config.key_file is None:
+        return None
+    key = read_key(config.key_file)
+    return Uploads(lambda _tube: key)

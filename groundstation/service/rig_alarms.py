@@ -72,6 +72,8 @@ KINDS: tuple[AlarmKind, ...] = (
     AlarmKind("database", BAD, "messages in the database are damaged; they are asked for again"),
     AlarmKind("queue", DEGRADED, "a queue of the ground station was full and dropped something"),
     AlarmKind("bad_input", NOTICE, "bytes came that are no message of ours; they were dropped"),
+    AlarmKind("seal_refused", NOTICE, "frames or messages were forged or repeated; they had no effect"),
+    AlarmKind("key_file", DEGRADED, "the key file was changed and cannot be used, or holds keys that should be ended"),
 )
 KIND_OF = {kind.code: kind for kind in KINDS}
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 
 from telemetry.messages import BlockSegment, BlockStatus
 from telemetry.parameters import ParameterBlock
@@ -14,16 +15,22 @@ class Uploads:
 
     Parameters
     ----------
-    key : of the rig
+    key_of : gives the key of a tube's blocks; None for a tube that is to be sent none
     """
 
-    def __init__(self, key: bytes) -> None:
-        self._key = key
+    def __init__(self, key_of: Callable[[int], bytes | None]) -> None:
+        self._key_of = key_of
         self._running: dict[int, Upload] = {}
 
     def start(self, block: ParameterBlock, number: int, now: float) -> int | None:
-        """Begin upload ``number`` at ``now`` (s); returns the number of the one to the same tube that ended by it."""
-        segments = split(block.canonical(), block.tube, number, block.version, self._key)
+        """Begin upload ``number`` at ``now`` (s); returns the number of the one to the same tube that ended by it.
+
+        To a tube whose keys were revoked nothing is sent.
+        """
+        key = self._key_of(block.tube)
+        if key is None:
+            return self.cancel(block.tube)
+        segments = split(block.canonical(), block.tube, number, block.version, key)
         ended = self.cancel(block.tube)
         self._running[block.tube] = Upload(segments, now)
         return ended

@@ -9,6 +9,7 @@ from groundstation.service.depth import CONTRADICTION
 from groundstation.service.model import RigModel
 from groundstation.service.numbers import Range
 from telemetry.application.endpoint import SERIES_SHIFT
+from telemetry.application.seal_watch import CODE, refusal_of
 from telemetry.messages import EPOCH_UNKNOWN, Event, NodeFlag, NodeState, SurveyMeasurement
 
 LOOK_EVERY = 0.5  # s, own clock
@@ -87,6 +88,8 @@ class Watch:
             self._alarms.alert("tube_restarted", tube, f"{event.code}: {event.arguments.get('detail', '')}"[:200])
         elif event.code == "queue_full":
             self._alarms.alert("tube_queue", tube, f"{event.arguments.get('dropped')} dropped")
+        elif event.code == CODE:
+            self._alarms.alert(CODE, tube, refusal_of(event.arguments))
 
     def on_known_event(self, event: Event) -> None:
         """Judge an event that has come, or was stored before a restart of the ground station."""

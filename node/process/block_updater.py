@@ -28,16 +28,18 @@ class BlockUpdater:
     ----------
     tube : the firmware that uses the block
     store : where blocks are kept
-    key : of the rig; without one no block is taken
+    keys : gives those of which one must fit a segment; without any no block is taken
     say : makes an event
     save : saves the node's state; it is called before a block goes to the disk
     """
 
-    def __init__(self, tube: Tube, store: BlockStore, key: bytes | None, say: Say, save: Callable[[], None]) -> None:
+    def __init__(
+        self, tube: Tube, store: BlockStore, keys: Callable[[], list[bytes]], say: Say, save: Callable[[], None]
+    ) -> None:
         self.counters: Counter[str] = Counter()
         self._tube = tube
         self._store = store
-        self._key = key
+        self._keys = keys
         self._say = say
         self._save = save
         self._sequence = 0
@@ -91,9 +93,10 @@ class BlockUpdater:
         return assembly if assembly is not None and assembly.version > self._tube.parameters.version else None
 
     def _distrust(self, segment: BlockSegment) -> str:
-        if self._key is None:
+        keys = self._keys()
+        if not keys:
             return "the node has no key of the rig"
-        if segment.index >= segment.count or not is_authentic(segment, self._key):
+        if segment.index >= segment.count or not any(is_authentic(segment, key) for key in keys):
             return f"segment {segment.index}: the tag is not of the node's key"
         return ""
 

@@ -11,6 +11,7 @@ from telemetry.runtime.options import (
     above_option,
     below_option,
     clock_option,
+    keys_option,
     lower_option,
     own_neighbours,
     place_options,
@@ -38,6 +39,7 @@ from telemetry.runtime.options import (
 @below_option
 @upper_option
 @lower_option
+@keys_option
 @place_options
 @plain_faults
 def encoder(
@@ -49,6 +51,7 @@ def encoder(
     below: int | None,
     upper: str | None,
     lower: str | None,
+    keys_place: Path | None,
     rig_name: str,
     endpoint: str,
     folder: Path,
@@ -71,5 +74,5 @@ def encoder(
     neighbours = own_neighbours(clock, ENCODER, ("--counter", counter), {Side.UPPER: above, Side.LOWER: below}, media)
     own_time = None if neighbours is None else OwnTime(neighbours)
     torque = TorqueSettings(torque_nm, trapped_fraction)
-    place = Place(rig_name, endpoint, folder, media=chosen(media))
+    place = Place(rig_name, endpoint, folder, media=chosen(media), keys=keys_place)
     run_encoder(place, encoder_source(counter) if counter else None, own_time, torque)

@@ -5,18 +5,22 @@ from __future__ import annotations
 import math
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from node.firmware.encoder import EncoderNode, EncoderSample
 from node.firmware.torque import TorqueSettings
 from node.process.counter import BootCounter
 from node.process.drivers.source import EncoderSource, SafeEncoder
 from telemetry.application.endpoint import Endpoint
+from telemetry.application.seal_watch import SealWatch
 from telemetry.messages import ENCODER, Command, Event, Reply, Scalar, Severity, Side
 from telemetry.runtime.disk import MACHINE, Disk
 from telemetry.runtime.joint_watch import JointFault
 from telemetry.runtime.process import Process
 from telemetry.runtime.timing import CycleTiming, Stage
+
+if TYPE_CHECKING:
+    from telemetry.application.seals import Seals
 
 
 class EncoderProcess(Process):
@@ -30,6 +34,7 @@ class EncoderProcess(Process):
     timing : durations of its cycles with an own clock; None where it is stepped
     reach : tubes away that its radio hears, see ``TubeSettings``
     disk : that holds the folder
+    seals : what it says and believes under keys; None: everybody is believed
 
     Raises
     ------
@@ -45,6 +50,7 @@ class EncoderProcess(Process):
         timing: CycleTiming | None = None,
         reach: int = 1,
         disk: Disk = MACHINE,
+        seals: Seals | None = None,
     ) -> None:
         self._timing = timing
         if source is not None:
@@ -52,7 +58,10 @@ class EncoderProcess(Process):
         self._source = SafeEncoder(source, self._send_event) if source is not None else None
         self._now = 0.0
         counter = BootCounter(folder, disk=disk)
-        self.endpoint = Endpoint(ENCODER, frozenset(Side), boot_count=counter.boots, is_clock_root=True, reach=reach)
+        self.endpoint = Endpoint(
+            ENCODER, frozenset(Side), boot_count=counter.boots, is_clock_root=True, reach=reach, seals=seals
+        )
+        self._seal_watch = SealWatch(self.endpoint, self._send_event)
         # sequence numbers of a later boot are all larger, so a tube never takes a new measurement for an old one
         self.encoder = EncoderNode(counter.boots << 32, torque)
         if counter.fault:
@@ -79,6 +88,7 @@ class EncoderProcess(Process):
             self.endpoint.send_aiding(measured, now)
         if self._timing is None:  # an own clock advances time between the cycles
             self.endpoint.advance(now)
+        self._seal_watch.look(now)
         self._lap(Stage.REPORT)
 
     def on_joint_fault(self, fault: JointFault, now: float) -> None:

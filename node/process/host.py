@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING
 
 from node.firmware.settings import TubeSettings
 from node.firmware.torque import TorqueSettings
@@ -11,10 +13,22 @@ from node.kernels.layout import PERIOD
 from node.process.drivers.source import EncoderSource, ImuSource
 from node.process.encoder_process import EncoderProcess
 from node.process.tube_process import TubeProcess
-from telemetry.messages import ENCODER
-from telemetry.runtime.hosting import OwnTime, Place, run_by_own_clock, run_stepped
+from telemetry.messages import ENCODER, Side
+from telemetry.runtime.hosting import OwnTime, Place, run_by_own_clock, run_stepped, warn_of_keys
 from telemetry.runtime.timing import CycleTiming
 from telemetry.transport.authentication import read_key
+
+if TYPE_CHECKING:
+    from telemetry.application.seals import Seals
+
+
+def seals_at(place: Path | None, address: int, reach: int, rig: str | None = None) -> Seals | None:
+    """Seals of a process with an end on either side; without keys no cryptography is loaded."""
+    if place is None:
+        return None
+    from telemetry.application.seals import seals_of
+
+    return seals_of(place, address, Side, reach, rig)
 
 
 def run_node(
@@ -23,11 +37,13 @@ def run_node(
     """Node of one tube until a signal comes; ``imus`` are its own sensors."""
     leave_blas_out()
     key = read_key(place.key_file) if place.key_file is not None else None
+    seals = seals_at(place.keys, settings.tube, settings.reach, place.rig)
 
     def build(timing: CycleTiming | None = None) -> TubeProcess:
-        return TubeProcess(settings, place.folder, key=key, imus=imus, timing=timing)
+        return TubeProcess(settings, place.folder, key=key, imus=imus, timing=timing, seals=seals)
 
     name = f"node {settings.tube}"
+    warn_of_keys(name, seals)
     if own_time is None:
         run_stepped(name, place, settings.tube, build)
     else:
@@ -46,10 +62,12 @@ def run_encoder(
     ``reach`` is of its radio, in tubes.
     """
     leave_blas_out()
+    seals = seals_at(place.keys, ENCODER, reach, place.rig)
 
     def build(timing: CycleTiming | None = None) -> EncoderProcess:
-        return EncoderProcess(place.folder, source, torque, timing, reach)
+        return EncoderProcess(place.folder, source, torque, timing, reach, seals)
 
+    warn_of_keys("encoder", seals)
     if own_time is None:
         run_stepped("encoder", place, ENCODER, build)
     else:

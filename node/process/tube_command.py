@@ -15,6 +15,7 @@ from telemetry.runtime.options import (
     below_option,
     clock_option,
     key_option,
+    keys_option,
     lower_option,
     own_neighbours,
     place_options,
@@ -115,6 +116,7 @@ SCHEMES = ("forward", "estimate", "intersection")
 @upper_option
 @lower_option
 @key_option
+@keys_option
 @place_options
 @plain_faults
 def node(
@@ -139,6 +141,7 @@ def node(
     upper: str | None,
     lower: str | None,
     key_file: Path | None,
+    keys_place: Path | None,
     rig_name: str,
     endpoint: str,
     folder: Path,
@@ -177,5 +180,5 @@ def node(
     media = {Side.UPPER: upper, Side.LOWER: lower}
     neighbours = own_neighbours(clock, tube, ("--imu", sources), {Side.UPPER: above, Side.LOWER: below}, media)
     own_time = None if neighbours is None else OwnTime(neighbours)
-    place = Place(rig_name, endpoint, folder, key_file, chosen(media))
+    place = Place(rig_name, endpoint, folder, key_file, chosen(media), keys=keys_place)
     run_node(place, settings, [imu_source(s) for s in sources], own_time)

@@ -6,7 +6,7 @@ import math
 from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -18,7 +18,7 @@ from node.firmware.silent_tubes import across
 from node.firmware.tube import Tube
 from node.kernels.alignment import new_mount
 from node.kernels.calibration import USUAL
-from node.kernels.layout import PERIOD, Array, default_config
+from node.kernels.layout import PERIOD, Array, Scheme, default_config
 from node.kernels.record import new_node
 from node.kernels.resets import forget_bias, lose_tilt
 from node.process.block_store import BlockStore
@@ -29,6 +29,7 @@ from node.process.drivers.source import NOTHING, ImuSource, SafeImu
 from node.process.saver import Saver
 from node.process.survey_log import SurveyLog
 from telemetry.application.endpoint import REPORT_EVERY, Endpoint
+from telemetry.application.seal_watch import SealWatch
 from telemetry.errors import EncodeError
 from telemetry.messages import (
     EPOCH_UNKNOWN,
@@ -51,6 +52,9 @@ from telemetry.runtime.joint_watch import JointFault
 from telemetry.runtime.process import Process
 from telemetry.runtime.timing import CycleTiming, Stage
 
+if TYPE_CHECKING:
+    from telemetry.application.seals import Seals
+
 SYNCHRONISED_STD = 0.05  # s, what the time-stamp state of the filter can take
 MAX_CLOCK_STD = 3600.0
 RESENT_TOGETHER = 64  # surveys sent again at one order
@@ -65,10 +69,11 @@ class TubeProcess(Process):
     settings : what the crew entered
     folder : where the state is saved
     config : one record of dtype ``CONFIG``; the default is that of an MPU6500-class node
-    key : of the rig; without one the node takes no parameter block
+    key : of the rig; without one, and without seals, the node takes no parameter block
     imus : the node's own sensors, as many as the settings have; without any a cycle brings its reading
     timing : durations of its cycles with an own clock; None where it is stepped
     disk : that holds the folder
+    seals : what it says and believes under keys; None: everybody is believed
 
     Raises
     ------
@@ -85,12 +90,15 @@ class TubeProcess(Process):
         imus: Sequence[ImuSource] = (),
         timing: CycleTiming | None = None,
         disk: Disk = MACHINE,
+        seals: Seals | None = None,
     ) -> None:
         self.settings = settings
         self._timing = timing
         self._overrun_told = -math.inf
         if len(imus) not in (0, len(settings.imus)):
             raise ConfigurationError(f"imus: expected {len(settings.imus)} sources, got {len(imus)}")
+        if seals is not None and settings.scheme is not Scheme.FORWARD:
+            raise ConfigurationError(f"scheme: expected forward with keys, got {settings.scheme.name.lower()}")
         for imu in imus:
             imu.start()
         self._sources = imus
@@ -120,7 +128,9 @@ class TubeProcess(Process):
             boot_count=self.boots,
             restored=telemetry,
             reach=settings.reach,
+            seals=seals,
         )
+        self._seal_watch = SealWatch(self.endpoint, self._send_event)
         restored = saved is not None
         next_sequence = self.endpoint.new_sequence
         self.tube = Tube(
@@ -135,7 +145,9 @@ class TubeProcess(Process):
         self._now = 0.0
         self._announced = False
         self._skipped = 0  # silent tubes above, as they were last told of
-        self._blocks = BlockUpdater(self.tube, store, key, self._send_event, self._save)
+        own_keys = [] if key is None else [key]
+        block_keys = (lambda: own_keys) if seals is None else (lambda: seals.block_keys)
+        self._blocks = BlockUpdater(self.tube, store, block_keys, self._send_event, self._save)
         # what a start goes on with is on the disk, with its rest: power that comes and goes costs nothing
         if saved is None or self._fallback or self._saver.due:
             self._save()
@@ -188,6 +200,7 @@ class TubeProcess(Process):
         if self._announced:
             self._saver.report(self._send_event)
             self._report_drops(now)
+            self._seal_watch.look(now)
         self._saver.count_cycle(self.nodes)
         if self._save_if_due():
             self._lap(Stage.SAVE)
@@ -233,7 +246,7 @@ class TubeProcess(Process):
         aiding = across(aiding, self.settings.above[:silent], self.settings.stiffness)
         onward = self.tube.on_aiding(aiding, clock.local_from_rig(aiding.valid_at))
         if onward is not None:
-            self._send(replace(onward, epoch=aiding.epoch), now)
+            self._send(replace(onward, epoch=aiding.epoch, seal=aiding.seal), now)
 
     def _context(self, now: float) -> RigContext:
         clock = self.endpoint.clock

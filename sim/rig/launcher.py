@@ -17,7 +17,9 @@ import msgpack
 from sim.errors import RigError
 from sim.rig.processes import ProcessTable
 from telemetry import keys
+from telemetry.media.credentials import Credentials
 from telemetry.media.zenoh_bus import ZenohBus, open_client
+from telemetry.media.zenoh_port import CONNECT_TIMEOUT
 from telemetry.messages import address_name
 
 SUPERVISE_EVERY = 0.2  # wall s
@@ -55,8 +57,8 @@ def check_port_free(endpoint: str) -> None:
     """
     protocol, _, address = endpoint.partition("/")
     host, _, port = address.rpartition(":")
-    if protocol != "tcp" or not port.isdigit():
-        raise RigError(f"endpoint: expected tcp/HOST:PORT, got {endpoint}")
+    if protocol not in ("tcp", "tls") or not port.isdigit():
+        raise RigError(f"endpoint: expected tcp/HOST:PORT or tls/HOST:PORT, got {endpoint}")
     with socket.socket() as probe:
         probe.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
         try:
@@ -98,6 +100,7 @@ class Launcher:
     show : called with every tick
     act : plays the operator at a cue; False when the ground station did not answer and is to be asked again
     stall_limit : wall s after which a rig that makes no progress is ended
+    credentials : what the launcher shows to a router over TLS
     """
 
     def __init__(
@@ -108,7 +111,9 @@ class Launcher:
         show: Callable[[Tick], None],
         act: Callable[[ZenohBus, str], bool] = lambda _bus, _cue: True,
         stall_limit: float = STALL_LIMIT,
+        credentials: Credentials | None = None,
     ) -> None:
+        self._credentials = credentials
         self._stall_limit = stall_limit
         self._table = table
         self._rig = rig
@@ -129,7 +134,7 @@ class Launcher:
         """
         try:
             self._table.start("medium")
-            with open_client(self._endpoint, timeout=30.0) as bus:
+            with open_client(self._endpoint, CONNECT_TIMEOUT, self._credentials) as bus:
                 bus.subscribe(
                     keys.WANTED.format(rig=self._rig), lambda _key, payload: self._ticks.put(Tick.parse(payload))
                 )

@@ -61,6 +61,7 @@ class Scheduler:
     tell : called with the progress whenever what is wanted changes, and once a cycle
     speed : rig seconds per wall second, infinite for as fast as possible
     cued : somebody plays the operator and is waited for, so that what he does falls on the same rig time in every run
+    seal_depth : what the source of the depth makes of a reading's payload
     """
 
     def __init__(
@@ -71,6 +72,7 @@ class Scheduler:
         speed: float = math.inf,
         *,
         cued: bool = False,
+        seal_depth: Callable[[bytes], bytes] = bytes,
     ) -> None:
         self.world = world
         self.stepper = stepper
@@ -88,6 +90,7 @@ class Scheduler:
             )
         self.progress = Progress("starting", world.begin, world.begin, world.end, [ENCODER, BASE])
         self._depth = DepthSource()
+        self._seal_depth = seal_depth
         self._queue: list[Entry] = []
         self._count = 0
         self._cycle = 0
@@ -302,7 +305,7 @@ class Scheduler:
         if at >= self.world.motion.begin:  # in the rack there is no bit
             rig_time = self.world.local_clock(ENCODER, at)
             depth = encode(self._depth.measure(rig_time, max(self.world.bit_depth(at), 0.0)))
-            self._add(steps, true_time, BASE, Due.DEPTH, at, depth, b"")
+            self._add(steps, true_time, BASE, Due.DEPTH, at, self._seal_depth(depth), b"")
         self._add(steps, true_time, BASE, Due.TIMER, at, None, b"")
         for address in self.stepper.alive():
             if address == BASE or address not in self.progress.wanted:

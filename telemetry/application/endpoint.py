@@ -8,15 +8,16 @@ on as the bytes that came; what is for it, it decodes and hands to its process. 
 from __future__ import annotations
 
 import math
-from collections import Counter, OrderedDict
+from collections import Counter, OrderedDict, deque
 from dataclasses import dataclass, replace
 from functools import partial
+from typing import TYPE_CHECKING
 
 from telemetry.application.clock import ClockFilter
 from telemetry.application.outbox import Outbox
 from telemetry.application.saved_state import SavedState, is_needed, pack_state, parse_state
 from telemetry.errors import DecodeError
-from telemetry.media.port import Frame, Priority
+from telemetry.media.port import MAX_FRAME, Frame, Priority
 from telemetry.messages import (
     BASE,
     ENCODER,
@@ -33,15 +34,27 @@ from telemetry.messages import (
     NodeState,
     Receipt,
     Reply,
+    SessionOffer,
     Side,
     TimeReply,
     TimeRequest,
 )
 from telemetry.presentation.content import content_of, content_of_message
-from telemetry.presentation.msgpack_codec import DOWNWARD, Envelope, Opened, decode_opened, encode, open_payload
+from telemetry.presentation.msgpack_codec import (
+    DOWNWARD,
+    Envelope,
+    Opened,
+    decode_opened,
+    encode,
+    open_payload,
+    peek,
+)
 from telemetry.schema import Kind
 from telemetry.transport.hop import HopLink
 from telemetry.transport.nearest import Nearest
+
+if TYPE_CHECKING:
+    from telemetry.application.seals import Seals
 
 HELLO_EVERY = 1.0  # s
 SYNC_BURST = 30  # exchanges at the quick pace after a start
@@ -49,6 +62,7 @@ SYNC_QUICK = 1.0  # s
 SYNC_SLOW = 10.0  # s
 ANSWERS_KEPT = 64
 SERIES_SHIFT = 24  # of a sequence number: below it the count, above it the start at which the count began
+SEALED_BUNDLE = MAX_FRAME - 1024  # bytes of payloads in a frame: what a medium carries holds the frame's seal too
 REPORT_EVERY = 60.0  # s between two looks at what queues dropped
 DROPS = ("reliable_dropped", "best_effort_dropped", "outbox_dropped")  # counters of what found no place in a queue
 ONE_HOP = (Kind.AIDING, Kind.HELLO, Kind.TIME_REQUEST, Kind.TIME_REPLY)
@@ -77,6 +91,7 @@ PRIORITIES: dict[Kind, Priority] = {
     Kind.BLOCK_STATUS: Priority.SURVEY,
     Kind.BLOCK_SEGMENT: Priority.BLOCK,
     Kind.DEPTH_READING: Priority.STATE,
+    Kind.SESSION_OFFER: Priority.COMMAND,
 }
 
 
@@ -111,6 +126,7 @@ class Endpoint:
     is_clock_root : whether the own clock is rig time
     restored : bytes of ``export_state`` before the restart, or None; damaged ones are counted and not used
     reach : tubes away that are heard; beyond 1 the nearest that speaks is the neighbour, whoever lies silent between
+    seals : what is said and heard under keys; None: everybody is believed
     """
 
     def __init__(
@@ -122,8 +138,10 @@ class Endpoint:
         is_clock_root: bool = False,
         restored: bytes | None = None,
         reach: int = 1,
+        seals: Seals | None = None,
     ) -> None:
         self.address = address
+        self.seals = seals
         self.boot_count = boot_count
         self.clock = ClockFilter(is_root=is_clock_root, epoch=boot_count)
         self.counters: Counter[str] = Counter()
@@ -133,6 +151,8 @@ class Endpoint:
         self._hops_are_told = address == ENCODER
         self._reach = reach
         self._links = {side: HopLink(address, boot_count, self._nearest(side)) for side in sorted(sides)}
+        for side in sides:
+            self.limit_bundles(side, MAX_FRAME)
         toward_encoder = Side.LOWER if address == BASE else Side.UPPER
         self._sync_side = None if is_clock_root else toward_encoder
         # a process that lost its numbers begins another series, so that none is given to a second message
@@ -140,6 +160,8 @@ class Endpoint:
         self._outbox = Outbox()
         self._holding = False
         self._answered: OrderedDict[int, bytes] = OrderedDict()
+        self._answered_here: deque[int] = deque()  # numbers of the session with the base
+        self._too_old = 0  # number of an order from which on down none of the session is obeyed
         self._commands = Outbox()
         self._hello_at = -math.inf
         self._sync_at = -math.inf
@@ -152,7 +174,7 @@ class Endpoint:
     def limit_bundles(self, side: Side, limit: int) -> None:
         """Let payloads share a frame at one end only up to ``limit`` bytes: a large frame holds an urgent one up."""
         if side in self._links:
-            self._links[side].bundle_limit = limit
+            self._links[side].bundle_limit = limit if self.seals is None else min(limit, SEALED_BUNDLE)
 
     def receive(self, side: Side, frame: bytes, now: float, margin: float = math.inf) -> list[Received]:
         """Take a frame from one end, heard with a ``margin`` (dB); returns the messages for this process.
@@ -163,6 +185,11 @@ class Endpoint:
         if link is None:
             self.counters["no_such_end"] += 1
             return []
+        if self.seals is not None:
+            opened = self.seals.joints[side].open(frame, now)
+            if opened is None:
+                return []
+            frame = opened
         before = link.peer
         payloads = link.receive(frame, now, margin)
         if link.peer != before:
@@ -189,6 +216,9 @@ class Endpoint:
         for side, link in self._links.items():
             if self.neighbours[side] is not None and not link.is_up(now):
                 self.neighbours[side] = None
+        if self.seals is not None:
+            self.seals.advance(now)
+            self._send_offers()
         if now >= self._hello_at + HELLO_EVERY:
             self._hello_at = now
             self._send_hello()
@@ -200,15 +230,25 @@ class Endpoint:
 
     def take_frames(self, now: float) -> list[tuple[Side, Frame]]:
         """Frames to put on the wire now."""
-        return [(side, frame) for side, link in self._links.items() for frame in link.take_frames(now)]
+        seals = self.seals
+        if seals is None:
+            return [(side, frame) for side, link in self._links.items() for frame in link.take_frames(now)]
+        return [
+            (side, frame)
+            for side, link in self._links.items()
+            for frame in seals.frames_of(side, link.take_frames(now), now)
+        ]
 
     def next_wake(self, now: float) -> float:
         """Local time (s) at which ``advance`` and ``take_frames`` have work that no frame brings."""
-        return min((link.next_wake(now) for link in self._links.values()), default=math.inf)
+        wake = min((link.next_wake(now) for link in self._links.values()), default=math.inf)
+        return wake if self.seals is None else min(wake, self.seals.next_wake())
 
     def send_aiding(self, aiding: Aiding, now: float) -> None:
-        """Hand the reference to the tube below; the newest replaces one that still waits."""
+        """Hand the reference to the tube below; the newest replaces one that still waits. The encoder seals it."""
         del now
+        if self.seals is not None and self.address == ENCODER:
+            aiding = self.seals.measurement.close(aiding)
         if Side.LOWER in self._links:
             self._links[Side.LOWER].send_best_effort(encode(aiding), Kind.AIDING, Priority.AIDING)
 
@@ -221,7 +261,8 @@ class Endpoint:
         del now
         self.mode = state.mode
         if Side.UPPER in self._links:
-            self._links[Side.UPPER].send_best_effort(encode(state), (Kind.NODE_STATE, state.tube), Priority.STATE)
+            payload = self._sealed(encode(state))
+            self._links[Side.UPPER].send_best_effort(payload, (Kind.NODE_STATE, state.tube), Priority.STATE)
 
     def submit(self, message: Kept, now: float) -> None:
         """Keep a message until the ground station has receipted it, and send it unless messages are held back."""
@@ -274,20 +315,23 @@ class Endpoint:
         self._answered[reply.sequence] = payload
         while len(self._answered) > ANSWERS_KEPT:
             self._answered.popitem(last=False)
-        self._links[Side.UPPER].send_reliable(payload)
+        self._answered_here.append(reply.sequence)
+        if len(self._answered_here) > ANSWERS_KEPT:
+            self._too_old = max(self._too_old, self._answered_here.popleft())
+        self._links[Side.UPPER].send_reliable(self._sealed(payload))
 
     def send_segment(self, segment: BlockSegment) -> None:
         """Send a part of a parameter block down; what is lost with a relay the upload repeats (base station)."""
-        self._links[Side.LOWER].send_reliable(encode(segment), Priority.BLOCK)
+        self._send_down(encode(segment), segment.tube, Priority.BLOCK)
 
     def send_status(self, status: BlockStatus) -> None:
         """Tell the ground station how an upload stands."""
-        self._links[Side.UPPER].send_reliable(encode(status))
+        self._links[Side.UPPER].send_reliable(self._sealed(encode(status)))
 
     def acknowledge(self, message: Kept) -> None:
         """Tell a tube that its message is stored, this one and no other of its number (base station)."""
         receipt = Receipt(message.tube, message.sequence, content_of_message(message))
-        self._links[Side.LOWER].send_reliable(encode(receipt), Priority.COMMAND)
+        self._send_down(encode(receipt), receipt.tube, Priority.COMMAND)
 
     def margin(self, side: Side) -> float:
         """What the neighbour at one end is heard with over the radio's threshold, dB; infinite without radio or it."""
@@ -313,6 +357,8 @@ class Endpoint:
     def link_counters(self) -> dict[str, int]:
         """Counts of all that went wrong or was dropped, of both ends."""
         total = Counter(self.counters)
+        if self.seals is not None:
+            total.update(self.seals.counters())
         for link in self._links.values():
             total.update(link.counters)
         total["outbox_dropped"] = self._outbox.dropped
@@ -335,13 +381,13 @@ class Endpoint:
         self._answered.update(saved.answered)
 
     def _handle(self, side: Side, payload: bytes, now: float) -> Message | None:
-        opened = open_payload(payload)
+        opened = open_payload(payload if self.seals is None else self.seals.content(payload))
         kind = opened.envelope.kind
         if kind in ONE_HOP:
             return self._handle_one_hop(side, decode_opened(opened), now)
         if kind in DOWNWARD:
-            return self._handle_downward(opened, payload)
-        return self._handle_upward(opened, payload)
+            return self._handle_downward(opened, payload, now)
+        return self._handle_upward(opened, payload, now)
 
     def _handle_one_hop(self, side: Side, message: Message, now: float) -> Message | None:
         match message:
@@ -355,7 +401,7 @@ class Endpoint:
                 self._links[side].send_best_effort(encode(reply), Kind.TIME_REPLY, Priority.TIME)
             case TimeReply() if side is self._sync_side:
                 self.clock.exchange(message, now)
-            case Aiding() if side is Side.UPPER:
+            case Aiding() if side is Side.UPPER and self._is_measured(message, now):
                 return message
         return None
 
@@ -374,29 +420,89 @@ class Endpoint:
             self.hops = hops
             self._hello_at = -math.inf
 
-    def _handle_upward(self, opened: Opened, payload: bytes) -> Message | None:
+    def _handle_upward(self, opened: Opened, payload: bytes, now: float) -> Message | None:
         if opened.envelope.kind is Kind.DEPTH_READING:
             raise DecodeError("depth reading: expected on its own key")
         if self.address != BASE:
             self._pass(Side.UPPER, opened.envelope, payload)
             return None
-        message = decode_opened(opened)
-        if isinstance(message, Reply) and not self._commands.settle(message.sequence):
-            return None
+        message = self._heard(opened, payload, now)
+        if isinstance(message, Reply):
+            order = self._commands.payload(message.sequence)
+            if order is None or peek(order).target != message.tube:
+                return None  # answered already, or by somebody who was not asked
+            self._commands.settle(message.sequence)
         return message
 
-    def _handle_downward(self, opened: Opened, payload: bytes) -> Message | None:
+    def _handle_downward(self, opened: Opened, payload: bytes, now: float) -> Message | None:
         if opened.envelope.target != self.address:
             self._pass(Side.LOWER, opened.envelope, payload)
             return None
-        message = decode_opened(opened)
+        message = self._told(opened, payload, now)
         if isinstance(message, Receipt):
             self._settle(message)
             return None
         if isinstance(message, Command) and message.sequence in self._answered:
-            self._links[Side.UPPER].send_reliable(self._answered[message.sequence])
+            self._links[Side.UPPER].send_reliable(self._sealed(self._answered[message.sequence]))
             return None
         return message
+
+    def _heard(self, opened: Opened, payload: bytes, now: float) -> Message | None:
+        """Message of a tube to the base, None where its seal is not to be believed."""
+        seals = self.seals
+        if seals is None:
+            return decode_opened(opened)
+        tube = opened.envelope.origin
+        heard = seals.hear(payload, tube, now)
+        self._send_offers()
+        if not heard.is_believed:
+            return None
+        if heard.begins_session:
+            self._commands.make_due(now)
+        message = decode_opened(opened)
+        return message if seals.is_of(message, tube) else None
+
+    def _told(self, opened: Opened, payload: bytes, now: float) -> Message | None:
+        """Message of the base to this tube, None where its seal is not to be believed or it was for the seals alone."""
+        seals = self.seals
+        if seals is None:
+            message = decode_opened(opened)
+            return None if isinstance(message, SessionOffer) else message
+        if not seals.is_told(payload, now, is_offer=opened.envelope.kind is Kind.SESSION_OFFER):
+            return None
+        message = decode_opened(opened)
+        if not seals.is_of(message, self.address):
+            return None
+        if isinstance(message, SessionOffer):
+            self._answered_here.clear()
+            self._too_old = 0
+            self._outbox.make_due(now)  # what was sent without a session was not believed
+            self._send_kept(now)
+            return None
+        is_command = isinstance(message, Command) and message.sequence not in self._answered
+        return None if is_command and not seals.is_order_new(opened.envelope.sequence, self._too_old) else message
+
+    def _is_measured(self, aiding: Aiding, now: float) -> bool:
+        """Whether the encoder measured what an aiding says; without keys everybody is believed."""
+        if self.seals is None or not self.clock.synchronised:
+            return True  # what comes before rig time is known is not used
+        return self.seals.measurement.admits(aiding, self.clock.epoch, self.clock.rig_from_local(now))
+
+    def _sealed(self, payload: bytes) -> bytes:
+        """Payload for the base, sealed where there are keys."""
+        return payload if self.seals is None else self.seals.close_up(payload)
+
+    def _send_down(self, payload: bytes, tube: int, priority: Priority) -> None:
+        """Send what must arrive to a tube; without a session under keys it waits for its repetition."""
+        sealed = payload if self.seals is None else self.seals.close_down(payload, tube)
+        if sealed is not None:
+            self._links[Side.LOWER].send_reliable(sealed, priority)
+
+    def _send_offers(self) -> None:
+        """Offer sessions to tubes whose seals the base does not know."""
+        if self.seals is not None and Side.LOWER in self._links:
+            for tube, payload in self.seals.due_offers():
+                self._links[Side.LOWER].send_best_effort(payload, (Kind.SESSION_OFFER, tube), Priority.COMMAND)
 
     def _settle(self, receipt: Receipt) -> None:
         """Forget what the ground station stored; a receipt for other content is of another life, or forged."""
@@ -450,7 +556,9 @@ class Endpoint:
             self._send_due(self._outbox, Side.UPPER, now)
 
     def _send_due(self, outbox: Outbox, side: Side, now: float) -> None:
-        priority = Priority.COMMAND if side is Side.LOWER else Priority.SURVEY
-        if side in self._links:
+        if side is Side.UPPER and side in self._links:
             for payload in outbox.due_payloads(now):
-                self._links[side].send_reliable(payload, priority)
+                self._links[side].send_reliable(self._sealed(payload), Priority.SURVEY)
+        elif side in self._links:
+            for payload in outbox.due_payloads(now):
+                self._send_down(payload, peek(payload).target, Priority.COMMAND)

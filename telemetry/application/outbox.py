@@ -60,6 +60,11 @@ class Outbox:
                 parcel.wait = min(2.0 * parcel.wait, LAST_RETRY)
                 yield parcel.payload
 
+    def make_due(self, now: float) -> None:
+        """Have everything sent again now: whoever has it to take can, from now on."""
+        for parcel in self._parcels.values():
+            parcel.send_at = now
+
     def next_due(self) -> float:
         """When something is due, infinite if nothing is kept."""
         return min((parcel.send_at for parcel in self._parcels.values()), default=math.inf)

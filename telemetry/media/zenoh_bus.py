@@ -15,6 +15,7 @@ from typing import Any
 import zenoh
 
 from telemetry.errors import MediumError
+from telemetry.media.credentials import Credentials
 
 MSGPACK = "application/msgpack"
 JSON = "application/json"
@@ -176,15 +177,23 @@ def use_few_threads() -> None:
 
 
 @contextmanager
-def open_router(endpoint: str) -> Iterator[ZenohBus]:
+def open_router(
+    endpoint: str, credentials: Credentials | None = None, access: dict[str, Any] | None = None
+) -> Iterator[ZenohBus]:
     """Session in router mode that listens on ``endpoint`` and serves the others; no router program is needed.
+
+    With ``credentials`` it asks every client for its certificate; ``access`` is zenoh's access control.
 
     Raises
     ------
     MediumError
         When the endpoint cannot be listened on.
     """
-    settings = {"listen/endpoints": [endpoint], "listen/exit_on_failure": True}
+    settings: dict[str, Any] = {"listen/endpoints": [endpoint], "listen/exit_on_failure": True}
+    if credentials is not None:
+        settings |= tls_of_router(credentials)
+    if access is not None:
+        settings["access_control"] = access
     try:
         session = zenoh.open(_config("router", settings))
     except zenoh.ZError as error:
@@ -193,7 +202,7 @@ def open_router(endpoint: str) -> Iterator[ZenohBus]:
 
 
 @contextmanager
-def open_client(endpoint: str, timeout: float) -> Iterator[ZenohBus]:
+def open_client(endpoint: str, timeout: float, credentials: Credentials | None = None) -> Iterator[ZenohBus]:
     """Session that joins the router at ``endpoint``, tried for ``timeout`` wall seconds.
 
     Raises
@@ -201,18 +210,43 @@ def open_client(endpoint: str, timeout: float) -> Iterator[ZenohBus]:
     MediumError
         When no router answers there.
     """
-    settings = {
+    settings: dict[str, Any] = {
         "listen/endpoints": [],
         "connect/endpoints": [endpoint],
         "connect/timeout_ms": int(timeout * 1000),
         "connect/exit_on_failure": True,
         "connect/retry": {"period_init_ms": 50, "period_max_ms": 500, "period_increase_factor": 1.5},
     }
+    if credentials is not None:
+        settings |= tls_of_client(credentials)
     try:
         session = zenoh.open(_config("client", settings))
     except zenoh.ZError as error:
         raise MediumError(f"no router at {endpoint} within {timeout:g} s: is the rig running there?") from error
     yield from _held(session)
+
+
+def tls_of_router(credentials: Credentials) -> dict[str, Any]:
+    """Settings of a router that lets in whom the rig's authority knows."""
+    link = {
+        "root_ca_certificate": str(credentials.authority),
+        "listen_certificate": str(credentials.certificate),
+        "listen_private_key": str(credentials.key),
+        "enable_mtls": True,
+    }
+    return {"transport/link/tls": link}
+
+
+def tls_of_client(credentials: Credentials) -> dict[str, Any]:
+    """Settings of a client; the router proves that it is the rig's by the use of its certificate, not by its host."""
+    link = {
+        "root_ca_certificate": str(credentials.authority),
+        "connect_certificate": str(credentials.certificate),
+        "connect_private_key": str(credentials.key),
+        "enable_mtls": True,
+        "verify_name_on_connect": False,
+    }
+    return {"transport/link/tls": link}
 
 
 def undeclare(declared: Any) -> None:

@@ -4,13 +4,16 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
+from pathlib import Path
 
 from telemetry import keys
+from telemetry.media.credentials import credentials_for
 from telemetry.media.port import TubeEnd
 from telemetry.media.queued_port import QueuedPort
 from telemetry.media.zenoh_bus import Subscription, ZenohBus, open_client
 
 CONNECT_TIMEOUT = 30.0  # s
+WITH_KEYS = ",keys="
 
 
 class ZenohPort(QueuedPort):
@@ -60,12 +63,14 @@ class ZenohMedium:
 
 @contextmanager
 def open_medium(where: str) -> Iterator[ZenohMedium]:
-    """Session with the router at the endpoint ``where``.
+    """Session with the router at the endpoint ``where``; over TLS ``,keys=FOLDER/NAME`` says who this is.
 
     Raises
     ------
     MediumError
         When no router answers there.
     """
-    with open_client(where or keys.DEFAULT_ENDPOINT, CONNECT_TIMEOUT) as bus:
+    endpoint, _, stem = where.partition(WITH_KEYS)
+    credentials = credentials_for(endpoint, Path(stem).parent if stem else None, Path(stem).name)
+    with open_client(endpoint or keys.DEFAULT_ENDPOINT, CONNECT_TIMEOUT, credentials) as bus:
         yield ZenohMedium(bus)

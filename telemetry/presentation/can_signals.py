@@ -38,7 +38,8 @@ NARROWER = {
     "epoch": 2**16 - 1,
     "numbered": 2**28 - 1,
 }  # upper ends; beyond them the tunnel carries it
-RADIO_ALONE = ("upper_margin", "lower_margin")  # of a node state: no signals, since a wired joint has no radio
+# no signals: a wired joint has no radio, and what is sealed goes as it is, by ISO-TP
+UNSAID = {"upper_margin": "where there is no radio", "lower_margin": "where there is no radio", "seal": "as signals"}
 CYCLIC = (Kind.AIDING, Kind.HELLO, Kind.TIME_REQUEST, Kind.TIME_REPLY, Kind.NODE_STATE)
 # of an aiding, the encoder's measurement goes on unchanged and each relay writes the path anew
 PATH = ("systematic_var", "offset", "hops", "torsion_var")
@@ -202,9 +203,9 @@ class NativeMessage:
         self.kind = spec.kind
         self.message = spec.message
         self.name = spec.message.__name__
-        fields = [field for field in spec.fields if field.name not in RADIO_ALONE]
+        fields = [field for field in spec.fields if field.name not in UNSAID]
         self._fields = [(codec_of(field), signals_of(field)) for field in fields]
-        self._unsaid = [(field.name, field.before) for field in spec.fields if field.name in RADIO_ALONE]
+        self._unsaid = [(field.name, field.before) for field in spec.fields if field.name in UNSAID]
         self._values = attrgetter(*(field.name for field in fields))
         self._is_single = len(fields) == 1
         self._plan = self._make_plan()
@@ -224,7 +225,7 @@ class NativeMessage:
         raws: list[int] = []
         for name, before in self._unsaid:
             if getattr(message, name) != before:
-                raise EncodeError(f"{self.name}: {name}: expected none where there is no radio")
+                raise EncodeError(f"{self.name}: {name}: expected none {UNSAID[name]}")
         try:
             given = (values,) if self._is_single else values
             checks = [codec.check(value) for (codec, _), value in zip(self._fields, given, strict=True)]

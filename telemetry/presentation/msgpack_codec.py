@@ -20,7 +20,7 @@ from telemetry.schema import SCHEMA, U53, Kind, MessageSpec
 MAX_PAYLOAD = 4096
 NO_TARGET = 255
 HIGHEST_ADDRESS = 255
-DOWNWARD = (Kind.RECEIPT, Kind.COMMAND, Kind.BLOCK_SEGMENT)
+DOWNWARD = (Kind.RECEIPT, Kind.COMMAND, Kind.BLOCK_SEGMENT, Kind.SESSION_OFFER)
 
 
 class Envelope(NamedTuple):

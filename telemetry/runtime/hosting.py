@@ -17,15 +17,17 @@ from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field
 from functools import partial
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import setproctitle
 
+from telemetry.errors import MediumError
+from telemetry.media.credentials import TLS, credentials_for, file_name
 from telemetry.media.neighbours import own_ports, stepped_ports, stepped_ports_on
 from telemetry.media.zenoh_bus import ZenohBus, open_client, use_few_threads
-from telemetry.media.zenoh_port import CONNECT_TIMEOUT, ZenohMedium
+from telemetry.media.zenoh_port import CONNECT_TIMEOUT, WITH_KEYS, ZenohMedium
 from telemetry.messages import Side, address_name
-from telemetry.runtime.command_line import EnvironmentFault, fault_of
+from telemetry.runtime.command_line import EnvironmentFault, InputFault, fault_of
 from telemetry.runtime.event_loop import run, stop_on_signals
 from telemetry.runtime.own_clock import OwnClock, OwnClockLoop
 from telemetry.runtime.process import Process
@@ -33,9 +35,13 @@ from telemetry.runtime.step_client import StepClient, serve
 from telemetry.runtime.step_stream import StepStream, join_steps
 from telemetry.runtime.timing import CycleTiming
 
+if TYPE_CHECKING:
+    from telemetry.application.seals import Seals
+
 PR_SET_PDEATHSIG = 1
 ORPHAN_GRACE = 3.0  # wall s that a process has to end by itself when its launcher is gone
 TIMING_FILE = "timing.json"
+ZENOH = "zenoh:"
 
 
 @dataclass(frozen=True, slots=True)
@@ -48,6 +54,14 @@ class Place:
     key_file: Path | None = None  # of the rig
     media: Mapping[Side, str] = field(default_factory=dict)  # of each end, such as can:can0; zenoh at the endpoint else
     steps: Path | None = None  # socket of the stepper; its steps come by zenoh else
+    keys: Path | None = None  # file or folder of the keys of this process; without it everybody is believed
+
+    def __post_init__(self) -> None:
+        """Refuse two kinds of keys at once."""
+        if self.key_file is not None and self.keys is not None:
+            raise InputFault(
+                "--key-file and --keys: expected one of them; --keys holds the key of parameter blocks too"
+            )
 
     @contextlib.contextmanager
     def step_stream(self, name: str) -> Iterator[StepStream | None]:
@@ -58,9 +72,15 @@ class Place:
         with contextlib.closing(join_steps(self.steps, name)) as stream:
             yield stream
 
-    def medium_of(self, side: Side) -> str:
-        """Medium of one end."""
-        return self.media.get(side, f"zenoh:{self.endpoint}")
+    def medium_of(self, side: Side, address: int) -> str:
+        """Medium of one end of a process; over TLS with the certificate of its name."""
+        medium = self.media.get(side, f"{ZENOH}{self.endpoint}")
+        if not medium.startswith(ZENOH + TLS):
+            return medium
+        if self.keys is None:
+            raise MediumError(f"{medium}: expected --keys with it, where the certificates lie")
+        folder = self.keys if self.keys.is_dir() else self.keys.parent
+        return f"{medium}{WITH_KEYS}{folder / file_name(address)}"
 
 
 @dataclass(frozen=True, slots=True)
@@ -96,7 +116,7 @@ async def live_by_own_clock(
     """``run_by_own_clock`` on the running loop."""
     timing = CycleTiming()
     make_folder(place)
-    media = {side: place.medium_of(side) for side in own_time.neighbours}
+    media = {side: place.medium_of(side, address) for side in own_time.neighbours}
     with (
         contextlib.closing(build(timing)) as process,
         own_ports(place.rig, address, own_time.neighbours, media) as ports,
@@ -124,7 +144,7 @@ def run_stepped(name: str, place: Place, address: int, build: Callable[[], Proce
         make_folder(place)
         process = build()
         with (
-            joined(place) as bus,
+            joined(place, file_name(address)) as bus,
             stepped_ports_on(place.rig, address, place.media) as chosen,
             place.step_stream(address_name(address)) as stream,
         ):
@@ -136,8 +156,10 @@ def run_stepped(name: str, place: Place, address: int, build: Callable[[], Proce
 
 
 @contextlib.contextmanager
-def joined(place: Place) -> Iterator[ZenohBus]:
+def joined(place: Place, name: str) -> Iterator[ZenohBus]:
     """Session of a process at its rig; a folder that cannot be made is reported before waiting for a router.
+
+    ``name`` is that of its certificate.
 
     Raises
     ------
@@ -147,7 +169,8 @@ def joined(place: Place) -> Iterator[ZenohBus]:
         When no router answers.
     """
     make_folder(place)
-    with open_client(place.endpoint, timeout=CONNECT_TIMEOUT) as bus:
+    credentials = credentials_for(place.endpoint, place.keys, name)
+    with open_client(place.endpoint, CONNECT_TIMEOUT, credentials) as bus:
         yield bus
 
 
@@ -171,6 +194,12 @@ def write_timing(folder: Path, report: dict[str, Any]) -> None:
     with contextlib.suppress(OSError):
         fresh.write_text(json.dumps(report) + "\n")
         fresh.replace(folder / TIMING_FILE)
+
+
+def warn_of_keys(name: str, seals: Seals | None) -> None:
+    """Say what is odd about the keys of a process; it goes on."""
+    for line in () if seals is None else seals.ring.warnings:
+        complain(name, line)
 
 
 def complain(name: str, line: str) -> None:

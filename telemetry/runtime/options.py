@@ -11,9 +11,12 @@ import click
 
 from telemetry import keys
 from telemetry.errors import MediumError
+from telemetry.media.credentials import needs_tls
 from telemetry.media.table import check_medium
 from telemetry.messages import BASE, ENCODER, MAX_TUBE, Side, address_name
 from telemetry.runtime.command_line import InputFault
+
+INSECURE = "borechain.insecure"  # in the context of a command
 
 
 def read_config(context: click.Context, _parameter: click.Parameter, path: Path | None) -> None:
@@ -34,13 +37,49 @@ def read_config(context: click.Context, _parameter: click.Parameter, path: Path 
     context.default_map = {known[f"--{name}"]: value for name, value in values.items()}
 
 
-def parse_endpoint(_context: click.Context, _parameter: click.Parameter, value: str) -> str:
-    """An address as zenoh writes it."""
+def remember_insecure(context: click.Context, _parameter: click.Parameter, value: bool) -> None:
+    """Let ``parse_endpoint`` know."""
+    context.meta[INSECURE] = value
+
+
+insecure_option = click.option(
+    "--insecure",
+    is_flag=True,
+    is_eager=True,
+    expose_value=False,
+    callback=remember_insecure,
+    help="Allow an endpoint on a network without TLS: anybody there may read, and without --keys is believed.",
+)
+
+
+def parse_endpoint(context: click.Context, _parameter: click.Parameter, value: str) -> str:
+    """An address as zenoh writes it, of this machine or with TLS unless the user wants it otherwise."""
     protocol, _, place = value.partition("/")
     host, _, port = place.rpartition(":")
     if not (protocol.isalpha() and host and port.isdecimal()):
         raise click.BadParameter(f"expected tcp/HOST:PORT, got {value}")
+    check_secure(context, value)
     return value
+
+
+def secure_endpoint(context: click.Context, _parameter: click.Parameter, value: str) -> str:
+    """An address that is looked at more closely before it is used."""
+    check_secure(context, value)
+    return value
+
+
+def check_secure(context: click.Context, endpoint: str) -> None:
+    """Refuse an endpoint on a network without TLS.
+
+    Raises
+    ------
+    click.BadParameter
+        Unless the command was given ``--insecure``.
+    """
+    if needs_tls(endpoint) and not context.meta.get(INSECURE, False):
+        raise click.BadParameter(
+            f"expected tls/HOST:PORT, or an address of this machine alone, got {endpoint}; --insecure allows it"
+        )
 
 
 def endpoint_option(text: str) -> Callable[[Callable[..., Any]], Callable[..., Any]]:
@@ -61,6 +100,7 @@ def place_options(command: Callable[..., Any]) -> Callable[..., Any]:
             expose_value=False,
             help="TOML file with options of this command, by their names without the leading dashes.",
         ),
+        insecure_option,
         click.option(
             "--rig", "rig_name", default=keys.DEFAULT_RIG, show_default=True, help="Name of the rig in key expressions."
         ),
@@ -81,6 +121,14 @@ key_option = click.option(
     "--key-file",
     type=click.Path(path_type=Path, dir_okay=False),
     help="Key of the rig, 64 hex digits, readable by its owner alone. Without it no parameter block is sent or taken.",
+)
+
+keys_option = click.option(
+    "--keys",
+    "keys_place",
+    type=click.Path(path_type=Path, exists=True),
+    help="Keys that borechain pki made: the file of this process, or the folder that it lies in. With them everything "
+    "said is sealed and everything heard must be; parameter blocks need no --key-file then.",
 )
 
 
@@ -109,13 +157,16 @@ below_option = click.option(
 )
 
 
-def parse_medium(_context: click.Context, _parameter: click.Parameter, value: str | None) -> str | None:
+def parse_medium(context: click.Context, _parameter: click.Parameter, value: str | None) -> str | None:
     """Medium of an end, looked at before anything is opened."""
     if value is not None:
         try:
             check_medium(value)
         except MediumError as error:
             raise click.BadParameter(str(error)) from None
+        name, _, where = value.partition(":")
+        if name == "zenoh":
+            check_secure(context, where)
     return value
 
 

@@ -14,16 +14,17 @@ from rigs import PATIENCE, REPOSITORY, command, free_endpoint
 
 from sim.world.scenario import load_scenario
 from sim.world.world import World
+from telemetry.media.credentials import credentials_of
 from telemetry.media.zenoh_bus import ZenohBus, open_client
 
 SERVICES: dict[str, dict[str, Any]] = yaml.safe_load((REPOSITORY / "docker-compose.yml").read_text())["services"]
 
 
-def local(words: list[str], endpoint: str, folder: Path) -> list[str]:
-    """A service's command line with this machine's address and folder, at forty times real time."""
-    address = endpoint.removeprefix("tcp/")
+def local(words: list[str], endpoint: str, folder: Path, keys: Path) -> list[str]:
+    """A service's command line with this machine's address and folders, at forty times real time."""
+    address = endpoint.removeprefix("tls/")
     swapped = [w.replace("router:7447", address).replace("0.0.0.0:7447", address) for w in words]
-    swapped = [str(folder) if w == "/state" else w for w in swapped]
+    swapped = [{"/state": str(folder), "/keys": str(keys)}.get(w, w) for w in swapped]
     if "--speed" in swapped:
         swapped[swapped.index("--speed") + 1] = "40"
     return command(*swapped)
@@ -31,11 +32,14 @@ def local(words: list[str], endpoint: str, folder: Path) -> list[str]:
 
 @contextlib.contextmanager
 def services(folder: Path) -> Iterator[tuple[dict[str, subprocess.Popen[str]], str]]:
-    endpoint = free_endpoint()
+    endpoint = free_endpoint().replace("tcp/", "tls/")
     running: dict[str, subprocess.Popen[str]] = {}
     try:
         for name, service in SERVICES.items():
-            words = local([str(word) for word in service["command"]], endpoint, folder / name)
+            words = local([str(word) for word in service["command"]], endpoint, folder / name, folder / "keys")
+            if name == "keys":  # the others wait until it has ended well
+                assert subprocess.run(words, cwd=REPOSITORY, check=False).returncode == 0
+                continue
             running[name] = subprocess.Popen(words, cwd=REPOSITORY, stderr=subprocess.PIPE, text=True)
         yield running, endpoint
     finally:
@@ -44,13 +48,18 @@ def services(folder: Path) -> Iterator[tuple[dict[str, subprocess.Popen[str]], s
             process.communicate()
 
 
+def operator(endpoint: str, keys: Path) -> contextlib.AbstractContextManager[ZenohBus]:
+    """Session of somebody who may look."""
+    return open_client(endpoint, PATIENCE, credentials_of(keys, "operator"))
+
+
 def ask(bus: ZenohBus, path: str) -> Any:
     replies = [r for r in bus.get(f"borechain/*/ground/{path}", 10.0) if r.error is None]
     return json.loads(replies[0].payload) if replies else {}
 
 
 def test_the_services_drill_two_tubes_together_and_end_when_asked(tmp_path: Path) -> None:
-    with services(tmp_path) as (running, endpoint), open_client(endpoint, timeout=PATIENCE) as bus:
+    with services(tmp_path) as (running, endpoint), operator(endpoint, tmp_path / "keys") as bus:
         while ask(bus, "status").get("measurements") != 3:
             ended = {name: p.communicate()[1] for name, p in running.items() if p.poll() is not None}
             assert not ended
@@ -80,6 +89,6 @@ def test_the_joint_readings_are_those_of_the_scenario() -> None:
             assert float(given) == pytest.approx(math.degrees(angle), abs=1e-3)
 
 
-def test_the_compose_file_has_a_router_encoder_medium_two_nodes_and_ground() -> None:
-    assert {name.split("-")[0] for name in SERVICES} == {"router", "encoder", "medium", "node", "ground"}
-    assert len(SERVICES) == 6
+def test_the_compose_file_has_keys_a_router_encoder_medium_two_nodes_and_ground() -> None:
+    assert {name.split("-")[0] for name in SERVICES} == {"keys", "router", "encoder", "medium", "node", "ground"}
+    assert len(SERVICES) == 7

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import datetime
 import json
 import math
 import queue
@@ -20,6 +21,8 @@ import pytest
 from click.testing import CliRunner
 from rigs import PATIENCE, REPOSITORY, command, free_endpoint, run
 
+from borechain.pki.access import read_access
+from borechain.pki.rig_keys import add_tube, init_rig
 from groundstation.service.store import Store
 from node.kernels.layout import PERIOD
 from node.process.encoder_command import encoder
@@ -28,9 +31,11 @@ from node.process.tube_process import TubeProcess
 from sim.can.hub import running_hub
 from sim.world.recording import record, turning_once, yaw_error
 from telemetry.application.endpoint import Endpoint
+from telemetry.application.seals import Seals, seals_of
 from telemetry.media.can_timing import BitRates
+from telemetry.media.credentials import credentials_of
 from telemetry.media.neighbours import neighbour_ports
-from telemetry.media.zenoh_bus import ZenohBus, open_router
+from telemetry.media.zenoh_bus import ZenohBus, open_client, open_router
 from telemetry.media.zenoh_port import ZenohMedium
 from telemetry.messages import BASE, ENCODER, Command, Event, NodeFlag, NodeState, Reply, Side
 from telemetry.runtime import event_loop
@@ -47,8 +52,8 @@ class Surface(Process):
 
     loop: OwnClockLoop
 
-    def __init__(self) -> None:
-        self.endpoint = Endpoint(BASE, frozenset({Side.LOWER}), boot_count=1)
+    def __init__(self, seals: Seals | None = None) -> None:
+        self.endpoint = Endpoint(BASE, frozenset({Side.LOWER}), boot_count=1, seals=seals)
         self.heard: queue.SimpleQueue[Any] = queue.SimpleQueue()
 
     def on_frame(self, side: Side, frame: bytes, now: float, margin: float = math.inf) -> None:
@@ -122,11 +127,17 @@ def string(tmp_path: Path, router: tuple[str, ZenohBus]) -> Iterator[String]:
 
 @pytest.fixture
 def surface(router: tuple[str, ZenohBus]) -> Iterator[Surface]:
-    surface = Surface()
+    with living(Surface(), router[1]) as surface:
+        yield surface
+
+
+@contextlib.contextmanager
+def living(surface: Surface, bus: ZenohBus) -> Iterator[Surface]:
+    """The base station on a bus, in a thread of its own."""
     running: queue.SimpleQueue[OwnClockLoop] = queue.SimpleQueue()
 
     async def live() -> None:
-        ports = neighbour_ports(ZenohMedium(router[1]), RIG, BASE, {Side.LOWER: ENCODER})
+        ports = neighbour_ports(ZenohMedium(bus), RIG, BASE, {Side.LOWER: ENCODER})
         loop = OwnClockLoop(surface, ports, OwnClock(), CycleTiming(), PERIOD)
         running.put(loop)
         await loop.run()
@@ -193,6 +204,36 @@ def test_a_base_station_on_zenoh_hears_a_node_on_can_that_opens_no_session(
     report = json.loads((string.folder / "node" / "timing.json").read_text())
     assert list(report["ports"]) == ["upper"]
     assert report["ports"]["upper"]["not_sent"].get("dropped", 0) == 0
+
+
+def test_a_sealed_string_on_can_is_heard_over_tls(tmp_path: Path) -> None:
+    """On the native profile a sealed frame goes by ISO-TP; a base without keys would hear nobody."""
+    keys, endpoint = tmp_path / "stick", free_endpoint().replace("tcp/", "tls/")
+    now = datetime.datetime.now(datetime.UTC)
+    init_rig(keys, RIG, now)
+    add_tube(keys, 1, now)
+    string = String(tmp_path, endpoint)
+    with (
+        open_router(endpoint, credentials_of(keys, "router"), read_access(keys)),
+        open_client(endpoint, PATIENCE, credentials_of(keys, "base")) as bus,
+        living(Surface(seals_of(keys, BASE, [Side.LOWER])), bus) as surface,
+        running_hub(BitRates(500_000.0, 2_000_000.0)) as hub,
+        contextlib.ExitStack() as stack,
+    ):
+        stack.callback(lambda: [string.kill(name) for name in list(string.running)])
+        joint = f"can:{hub.port}/joint,interface=borechain_loopback,frames=fd,profile=native"
+        counter, imu = (f"timed:{string.folder / name}.npy" for name in ("encoder", "tube-1"))
+        angle = f"--drive-joint-deg={math.degrees(string.world.tube_settings(1).drive_joint.angle)}"
+        under = ("--keys", str(keys))
+        string.start("encoder", "--counter", counter, "--above", "base", "--lower", joint, *under)
+        string.start("node", "--tube", "1", "--imu", imu, angle, "--upper", joint, *under)
+        state = surface.first(NodeState, lambda s: not s.flags & UNFIT)
+        assert abs(yaw_error(string.world, 1, state.yaw, state.at)) < 0.02
+        surface.loop.call(lambda process, at: process.endpoint.command(Command(1, 5, "timing"), at))
+        assert surface.first(Reply, lambda r: r.sequence == 5).done
+        assert surface.endpoint.seals is not None
+        assert surface.endpoint.seals.failures() == {}
+        string.end()
 
 
 def until(bus: ZenohBus, path: str, fits: Callable[[Any], bool]) -> Any:

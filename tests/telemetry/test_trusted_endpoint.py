@@ -14,10 +14,12 @@ from telemetry.messages import (
     ENCODER,
     HOPS_UNKNOWN,
     MAX_TUBE,
+    Command,
     Event,
     Hello,
     Mode,
     Receipt,
+    Reply,
     Severity,
     Side,
 )
@@ -139,3 +141,17 @@ def test_a_depth_on_a_joint_is_no_message(tube: Endpoint) -> None:
     assert tube.counters["bad_payloads"] == 1
     with pytest.raises(DecodeError):
         decode(b"")
+
+
+def test_only_who_was_asked_answers_an_order() -> None:
+    base = Endpoint(BASE, frozenset({Side.LOWER}), boot_count=1)
+    link = HopLink(ENCODER, 1)
+    link.send_best_effort(encode(Hello(ENCODER, 1, 0, Mode.BOOT, 1.0)), "hello")
+    base.command(Command(3, 9, "take_survey"), 100.0)
+    heard: list[object] = []
+    for reply in (None, Reply(2, 9, False, "stolen"), Reply(3, 9, True, ""), Reply(3, 9, True, "again")):
+        if reply is not None:
+            link.send_best_effort(encode(reply), reply.detail)
+        for frame in link.take_frames(100.0):
+            heard += [received.message for received in base.receive(Side.LOWER, frame.payload, 100.0)]
+    assert heard == [Reply(3, 9, True, "")]

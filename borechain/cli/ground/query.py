@@ -6,23 +6,34 @@ import json
 import queue
 import sys
 import time
+from pathlib import Path
 from typing import Any
 
 import click
 
 from borechain.cli.faults import EnvironmentFault, InputFault, plain_faults
 from telemetry import keys
-from telemetry.runtime.options import endpoint_option
+from telemetry.runtime.options import endpoint_option, insecure_option, keys_option
 
 SILENCE = 5.0  # wall s without a sample before ``watch`` says so
 PATIENCE, ORDER_PATIENCE = 5.0, 40.0  # s; the ground station itself waits 30 s for a tube
 TIMEOUT = "Timeout"  # zenoh's text for an answer that did not come
 rig_option = endpoint_option("Router of the rig.")
+role_option = click.option(
+    "--role",
+    type=click.Choice(["operator", "driller"]),
+    default="operator",
+    show_default=True,
+    help="Whose certificate of the folder --keys to show over TLS; only a driller may order.",
+)
 
 
 @click.command()
 @click.argument("selector")
+@insecure_option
 @rig_option
+@keys_option
+@role_option
 @click.option(
     "--timeout",
     type=click.FloatRange(0.1, 600.0),
@@ -30,7 +41,9 @@ rig_option = endpoint_option("Router of the rig.")
 )
 @click.option("--json", "as_json", is_flag=True, help="One JSON object on one line.")
 @plain_faults
-def query(selector: str, endpoint: str, timeout: float | None, as_json: bool) -> None:
+def query(
+    selector: str, endpoint: str, keys_place: Path | None, role: str, timeout: float | None, as_json: bool
+) -> None:
     """Ask a running ground station for SELECTOR and print its answer.
 
     \b
@@ -39,11 +52,12 @@ def query(selector: str, endpoint: str, timeout: float | None, as_json: bool) ->
       borechain query 'borechain/*/ground/trajectory?md=4..12'
       borechain query 'borechain/rig-1/cmd/take_survey?tube=3'
     """
+    from telemetry.media.credentials import credentials_for
     from telemetry.media.zenoh_bus import open_client
 
     check_selector(selector)
     patience = timeout or (ORDER_PATIENCE if keys.is_order(selector) else PATIENCE)
-    with open_client(endpoint, timeout=timeout or PATIENCE) as bus:
+    with open_client(endpoint, timeout or PATIENCE, credentials_for(endpoint, keys_place, role)) as bus:
         replies = bus.get(selector, patience)
     answers = [reply for reply in replies if reply.error is None]
     if not answers and any(reply.error != TIMEOUT for reply in replies):
@@ -57,11 +71,16 @@ def query(selector: str, endpoint: str, timeout: float | None, as_json: bool) ->
 
 @click.command()
 @click.argument("selector")
+@insecure_option
 @rig_option
+@keys_option
+@role_option
 @click.option("--count", type=click.IntRange(1), help="Stop after so many lines.")
 @click.option("--timeout", type=click.FloatRange(0.1), help="Give up after so many seconds without a line.")
 @plain_faults
-def watch(selector: str, endpoint: str, count: int | None, timeout: float | None) -> None:
+def watch(
+    selector: str, endpoint: str, keys_place: Path | None, role: str, count: int | None, timeout: float | None
+) -> None:
     """Print what is published on SELECTOR, one JSON object a line, until Ctrl-C.
 
     A binary value is shown decoded where it is msgpack, else as {"hex": ...}.
@@ -71,11 +90,12 @@ def watch(selector: str, endpoint: str, count: int | None, timeout: float | None
       borechain watch 'borechain/*/ground/nodes/*'
       borechain watch 'borechain/rig-1/ground/status' --count 1 --timeout 10
     """
+    from telemetry.media.credentials import credentials_for
     from telemetry.media.zenoh_bus import open_client
 
     check_selector(selector)
     arrived: queue.SimpleQueue[tuple[str, bytes]] = queue.SimpleQueue()
-    with open_client(endpoint, timeout=5.0) as bus:
+    with open_client(endpoint, PATIENCE, credentials_for(endpoint, keys_place, role)) as bus:
         bus.subscribe(selector, lambda key, payload: arrived.put((key, payload)))
         seen = 0
         while count is None or seen < count:

@@ -8,7 +8,7 @@ import click
 
 from borechain.cli.faults import needs, plain_faults
 from borechain.cli.options import fault_option, scenario_argument, seed_option, speed_option
-from telemetry.runtime.options import place_options
+from telemetry.runtime.options import keys_option, place_options
 
 
 @click.command()
@@ -17,6 +17,7 @@ from telemetry.runtime.options import place_options
 @speed_option
 @fault_option
 @click.option("--router/--no-router", default=False, help="Be the router of this rig, instead of joining one.")
+@keys_option
 @place_options
 @needs("scipy")
 @plain_faults
@@ -26,6 +27,7 @@ def medium(
     speed: float,
     faults: tuple[str, ...],
     router: bool,
+    keys_place: Path | None,
     rig_name: str,
     endpoint: str,
     folder: Path,
@@ -39,4 +41,4 @@ def medium(
     from borechain.host import run_medium
     from telemetry.runtime.hosting import Place
 
-    run_medium(Place(rig_name, endpoint, folder), scenario, seed, speed, faults, router)
+    run_medium(Place(rig_name, endpoint, folder, keys=keys_place), scenario, seed, speed, faults, router)

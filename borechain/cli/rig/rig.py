@@ -18,6 +18,7 @@ from borechain.cli.notices import warnings_in_lines
 from borechain.cli.options import fault_option, json_option, scenario_argument, seed_option, speed_option
 from borechain.cli.tables import console
 from telemetry import keys
+from telemetry.runtime.options import insecure_option, keys_option, secure_endpoint
 
 if TYPE_CHECKING:
     from sim.rig.launcher import Tick
@@ -47,7 +48,15 @@ PRELOAD = {"float64": "borechain.warm", "fixed": "borechain.warm_all", "publishe
 @click.option(
     "--rig", "rig_name", default=keys.DEFAULT_RIG, show_default=True, help="Name of the rig in key expressions."
 )
-@click.option("--endpoint", default=keys.DEFAULT_ENDPOINT, show_default=True, help="Where the rig's router listens.")
+@insecure_option
+@click.option(
+    "--endpoint",
+    default=keys.DEFAULT_ENDPOINT,
+    show_default=True,
+    callback=secure_endpoint,
+    help="Where the rig's router listens.",
+)
+@keys_option
 @click.option(
     "--out", type=click.Path(path_type=Path), help="New or empty folder for the run  [default: out/NAME/run-NNNN]"
 )
@@ -63,6 +72,7 @@ def rig(
     transport: str | None,
     rig_name: str,
     endpoint: str,
+    keys_place: Path | None,
     out: Path | None,
     as_json: bool,
 ) -> None:
@@ -73,6 +83,7 @@ def rig(
       borechain rig wellbore-1
       borechain rig wellbore-1 --speed 1 --fault kill-node:3@900
       borechain rig rig-3 --transport can
+      borechain rig rig-3 --keys stick
     """
     from sim.rig.launcher import check_port_free, next_run_folder, prepare_folder
     from sim.rig.report import write_files
@@ -96,7 +107,8 @@ def rig(
     try:
         with progress(world, quiet=as_json) as show:
             if inline:
-                ran = drill_inline(world, speed, rig_name, folder, show, native=transport == "can-native")
+                native = transport == "can-native"
+                ran = drill_inline(world, speed, rig_name, folder, show, native=native, keys=keys_place)
             else:
                 ran = drill_in_processes(
                     world,
@@ -104,7 +116,10 @@ def rig(
                     endpoint,
                     show,
                     transport,
-                    partial(process_table, world, scenario, seed, speed, faults, rig_name, endpoint, folder),
+                    partial(
+                        process_table, world, scenario, seed, speed, faults, rig_name, endpoint, folder, keys_place
+                    ),
+                    keys_place,
                 )
     except KeyboardInterrupt:
         raise EnvironmentFault(f"interrupted; every process was ended, what was stored is in {folder}") from None
@@ -142,17 +157,21 @@ def drill_in_processes(
     show: Callable[[Tick | Progress], None],
     transport: str | None,
     table_of: Callable[[Transports, Path], ProcessTable],
+    keys_place: Path | None = None,
 ) -> Ran:
     """Drill with one real process a tube, beside a hub of CAN segments where a joint is on CAN."""
+    from borechain.pki.access import MEDIUM
     from sim.rig.launcher import Launcher
     from sim.rig.transports import carrying
+    from telemetry.media.credentials import credentials_for
 
     with (
         carrying(transport, world.scenario.medium.transports) as transports,
         tempfile.TemporaryDirectory(prefix="borechain-") as steps,  # a socket's path must be short
     ):
         table = table_of(transports, Path(steps) / "steps")
-        launcher = Launcher(table, rig_name, endpoint, show, operator_of(world, rig_name))
+        credentials = credentials_for(endpoint, keys_place, MEDIUM)
+        launcher = Launcher(table, rig_name, endpoint, show, operator_of(world, rig_name), credentials=credentials)
         answers = launcher.run(lambda bus: ask(bus, rig_name))
         return Ran(answers, len(table.specs), sum(table.restarts.values()))
 
@@ -165,11 +184,12 @@ def drill_inline(
     show: Callable[[Tick | Progress], None],
     *,
     native: bool = False,
+    keys: Path | None = None,
 ) -> Ran:
     """Drill with objects in this process."""
     from borechain.inline import InlineRig
 
-    rig = InlineRig(world, ground_settings(world), rig_name, folder, native=native)
+    rig = InlineRig(world, ground_settings(world), rig_name, folder, native=native, keys=keys)
     rig.run(show, speed)
     try:
         return Ran({path: rig.ask(path) for path in ASKED}, 1, 0)
@@ -186,6 +206,7 @@ def process_table(
     rig_name: str,
     endpoint: str,
     folder: Path,
+    keys_place: Path | None,
     transports: Transports,
     steps: Path,
 ) -> ProcessTable:
@@ -199,10 +220,11 @@ def process_table(
     from telemetry.runtime.hosting import Place
     from telemetry.transport.authentication import new_key
 
-    key_file = new_key(folder / "rig.key")
+    key_file = new_key(folder / "rig.key") if keys_place is None else None
 
     def place(name: str, address: int = BASE) -> Place:
-        return Place(rig_name, endpoint, private_folder(folder, name), key_file, transports.media_of(address), steps)
+        media = transports.media_of(address)
+        return Place(rig_name, endpoint, private_folder(folder, name), key_file, media, steps, keys_place)
 
     specs = {
         "medium": Spec(run_medium, (place("medium"), scenario, seed, speed, faults, True, True, transports)),

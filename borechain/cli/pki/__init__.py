@@ -1,0 +1,1 @@
+"""Commands that make keys and certificates."""

@@ -1,0 +1,160 @@
+"""``borechain pki``: keys of a rig, from a folder that fits on a stick."""
+
+from __future__ import annotations
+
+import datetime
+from pathlib import Path
+
+import click
+
+from borechain.cli.faults import plain_faults
+from telemetry import keys
+from telemetry.messages import MAX_TUBE
+from telemetry.runtime.command_line import InputFault
+
+folder_option = click.option(
+    "--folder",
+    type=click.Path(path_type=Path, file_okay=False),
+    default=Path("stick"),
+    show_default=True,
+    help="Folder of the rig's keys; it belongs on a stick in the pocket of who answers for the rig.",
+)
+tube_argument = click.argument("tube", type=int)
+
+
+@click.group()
+def pki() -> None:
+    """Make, revoke and change the keys by which a rig knows its own.
+
+    \b
+    Examples:
+      borechain pki init --rig rig-1
+      borechain pki tube 7
+      borechain pki revoke 7
+      borechain pki rotate
+      borechain pki retire
+    """
+
+
+@pki.command()
+@folder_option
+@click.option("--rig", "rig_name", default=keys.DEFAULT_RIG, show_default=True, help="Name of the rig.")
+@click.option("--tubes", type=click.IntRange(0, MAX_TUBE), default=0, help="Also make the keys of tubes 1 to so many.")
+@click.option("--if-new", is_flag=True, help="Do nothing where the folder holds keys already.")
+@plain_faults
+def init(folder: Path, rig_name: str, tubes: int, if_new: bool) -> None:
+    """Make the folder of a rig: its secret, and keys and certificates of all that every rig has.
+
+    \b
+    Example:
+      borechain pki init --folder stick --rig rig-1
+    """
+    from borechain.pki.rig_keys import SECRET_FILE, add_tube, init_rig
+    from telemetry.errors import KeyFileError
+
+    if if_new and (folder / SECRET_FILE).exists():
+        click.echo(f"{folder}: holds keys already")
+        return
+    try:
+        init_rig(folder, rig_name, utc_now())
+        for number in range(1, tubes + 1):
+            add_tube(folder, number, utc_now())
+    except KeyFileError as error:
+        raise InputFault(str(error)) from error
+    click.echo(
+        f"{folder}: keys of the rig {rig_name}; rig.secret stays here, each .keys file goes to its process alone"
+    )
+
+
+@pki.command()
+@tube_argument
+@folder_option
+@plain_faults
+def tube(tube: int, folder: Path) -> None:
+    """Write the key file of TUBE, which goes to that tube at its make-up.
+
+    \b
+    Example:
+      borechain pki tube 7 --folder stick
+    """
+    from borechain.pki.rig_keys import add_tube
+    from telemetry.errors import KeyFileError
+
+    try:
+        path = add_tube(folder, tube, utc_now())
+    except KeyFileError as error:
+        raise InputFault(str(error)) from error
+    click.echo(str(path))
+
+
+@pki.command()
+@tube_argument
+@folder_option
+@plain_faults
+def revoke(tube: int, folder: Path) -> None:
+    """Have TUBE believed nothing, and make new keys for all others.
+
+    Take the new files to the base, the encoder and every tube that can be reached; a tube that has not got its file yet
+    goes on with its old keys, and lets TUBE speak where it is its neighbour.
+
+    \b
+    Example:
+      borechain pki revoke 7 --folder stick
+    """
+    from borechain.pki.rig_keys import revoke_tube
+    from telemetry.errors import KeyFileError
+
+    try:
+        secret = revoke_tube(folder, tube, utc_now())
+    except KeyFileError as error:
+        raise InputFault(str(error)) from error
+    click.echo(f"tube {tube} is revoked; generation {secret.generations[-1].number} is in every other file of {folder}")
+
+
+@pki.command()
+@folder_option
+@plain_faults
+def rotate(folder: Path) -> None:
+    """Make new keys for everybody; those of before are valid for a day, and warned of after that.
+
+    \b
+    Example:
+      borechain pki rotate --folder stick
+    """
+    from borechain.pki.rig_keys import rotate_keys
+    from telemetry.errors import KeyFileError
+
+    try:
+        secret = rotate_keys(folder, utc_now())
+    except KeyFileError as error:
+        raise InputFault(str(error)) from error
+    before, newest = secret.generations
+    until = f"{before.retires_at:%Y-%m-%d %H:%M} UTC" if before.retires_at is not None else "it is retired"
+    click.echo(
+        f"generation {newest.number} is in every file of {folder}; generation {before.number} is valid until {until}"
+    )
+
+
+@pki.command()
+@folder_option
+@plain_faults
+def retire(folder: Path) -> None:
+    """End the keys of before the last change: everybody who matters has the new ones.
+
+    \b
+    Example:
+      borechain pki retire --folder stick
+    """
+    from borechain.pki.rig_keys import retire_keys
+    from telemetry.errors import KeyFileError
+
+    try:
+        secret = retire_keys(folder)
+    except KeyFileError as error:
+        raise InputFault(str(error)) from error
+    click.echo(f"generation {secret.generations[-1].number} alone is in every file of {folder}")
+
+
+def utc_now() -> datetime.datetime:
+    """Now, to the second."""
+    return datetime.datetime.now(datetime.UTC).replace(microsecond=0)

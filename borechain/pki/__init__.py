@@ -1,0 +1,1 @@
+"""Keys and certificates of a rig, made from a folder that fits on a stick."""

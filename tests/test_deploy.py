@@ -1,0 +1,81 @@
+"""What the page about boards says is what the commands take."""
+
+from __future__ import annotations
+
+import configparser
+import re
+import shlex
+import shutil
+import subprocess
+from pathlib import Path
+
+import click
+import pytest
+
+from borechain.__main__ import cli
+
+ROOT = Path(__file__).parents[1]
+PAGE = (ROOT / "docs" / "deploy.md").read_text()
+UNITS = sorted((ROOT / "deploy" / "systemd").glob("*.service"))
+PROGRAM = "/opt/borechain/bin/borechain"
+
+
+def config_of(name: str) -> str:
+    """The lines that the page gives for a configuration file."""
+    after = PAGE.partition(f"`/etc/borechain/{name}`")[2]
+    block = re.search(r"\n\n((?:    .+\n)+)", after)
+    assert block
+    return re.sub(r"^    ", "", block[1], flags=re.MULTILINE)
+
+
+def started(unit: Path) -> list[str]:
+    """Words of the command that a unit starts."""
+    parser = configparser.ConfigParser(interpolation=None, strict=False)
+    parser.optionxform = str  # type: ignore[assignment, method-assign]
+    parser.read_string(unit.read_text())
+    return shlex.split(parser["Service"]["ExecStart"].replace("%i", "7"))
+
+
+@pytest.mark.parametrize("unit", [unit for unit in UNITS if "can@" not in unit.name], ids=lambda unit: unit.stem)
+def test_a_unit_starts_a_command_with_options_that_it_has(unit: Path, tmp_path: Path) -> None:
+    program, name, *words = started(unit)
+    assert program == PROGRAM
+    for word in words:
+        if word.startswith("/etc/borechain/"):
+            config = Path(word).name
+            (tmp_path / config).write_text(config_of(config) if config.endswith(".toml") else "")
+    words = [word.replace("/etc/borechain", str(tmp_path)) for word in words]
+    command = cli.get_command(click.Context(cli), name)
+    assert command is not None
+    context = command.make_context(name, words)
+    assert context.params["keys_place"].exists()
+
+
+def test_every_unit_is_named_on_the_page_and_runs_as_no_root() -> None:
+    assert len(UNITS) == 5
+    for unit in UNITS:
+        assert unit.stem.rstrip("@") in PAGE
+        if "can@" not in unit.name:
+            assert "\nUser=borechain\n" in unit.read_text()
+
+
+@pytest.mark.skipif(shutil.which("systemd-analyze") is None, reason="no systemd-analyze here")
+@pytest.mark.parametrize("unit", UNITS, ids=lambda unit: unit.stem)
+def test_systemd_finds_no_fault_in_a_unit(unit: Path, tmp_path: Path) -> None:
+    copy = tmp_path / unit.name.replace("@", "@7")
+    copy.write_text(unit.read_text().replace(PROGRAM, "/bin/true").replace("/usr/sbin/ip", "/bin/true"))
+    done = subprocess.run(
+        ["systemd-analyze", "verify", "--man=no", str(copy)], capture_output=True, text=True, check=False, timeout=60
+    )
+    faults = [line for line in done.stderr.splitlines() if unit.name.partition("@")[0] in line]
+    assert faults == []
+
+
+def test_what_a_deployed_process_is_given_is_made_by_the_keys_command(tmp_path: Path) -> None:
+    from sealed_string import make_folder
+
+    folder = make_folder(tmp_path / "stick", 7)
+    table = PAGE.partition("| file | goes to |")[2].partition("\n\n")[0]
+    named = set(re.findall(r"`([a-z0-9-]+\.[a-z]+)`", table))
+    assert len(named) > 15
+    assert [name for name in sorted(named) if not (folder / name).exists()] == []
