@@ -7,7 +7,7 @@ STAMP := $(VENV)/.installed
 PYTEST := $(BIN)/python -m pytest --numprocesses auto --maxprocesses 8 --dist worksteal
 
 .DEFAULT_GOAL := rig
-.PHONY: help rig test quick check lint types contracts kernels tests statistical explore lock study clean
+.PHONY: help rig test quick check lint types contracts kernels tests statistical explore lock study soak clean
 
 help:  ## list the targets
 	@awk -F ':.*## ' '/^[a-z]+:.*## / { printf "make %-12s %s\n", $$1, $$2 }' $(MAKEFILE_LIST)
@@ -55,6 +55,12 @@ explore: $(STAMP)  ## the properties with examples that no run before has seen
 study: $(STAMP) statistical  ## every study of the table, with many seeds; their tables are committed in docs/results
 	$(BIN)/borechain experiment all --out docs/results
 	$(BIN)/borechain bench realtime --nodes 50 --seconds 120 --out docs/results
+	$(BIN)/borechain gauntlet --seeds 20000
+	$(BIN)/python docs/make_faults.py
+
+soak: $(STAMP)  ## 100 000 seeds of the gauntlet, and a week of a rig under faults
+	$(BIN)/borechain gauntlet --seeds 100000 --from 100000
+	$(BIN)/borechain gauntlet --soak 168 --json
 
 lock:  ## pin the dependencies again, without addresses (needs pip-tools)
 	pip-compile --quiet --upgrade --generate-hashes --all-extras --allow-unsafe --strip-extras --no-annotate \

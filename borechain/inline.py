@@ -28,6 +28,7 @@ from sim.world.world import World
 from telemetry.errors import BorechainError
 from telemetry.messages import BASE, ENCODER
 from telemetry.presentation.can_native import rounded_frame
+from telemetry.runtime.disk import MACHINE, Disk
 from telemetry.transport.authentication import new_key, read_key
 
 
@@ -42,6 +43,7 @@ class InlineRig:
     folder : new, of the whole run
     lot : of the starts of the ground station; a rig that is to repeat itself draws them from its seed
     native : the joints are on CAN's native profile, which rounds cyclic messages to the steps of their signals
+    disk_of : disk of the process of an address
     keys : folder of the rig's keys; without it everybody is believed
     """
 
@@ -54,6 +56,7 @@ class InlineRig:
         lot: Callable[[int], int] = secrets.randbelow,
         *,
         native: bool = False,
+        disk_of: Callable[[int], Disk] = lambda _address: MACHINE,
         keys: Path | None = None,
     ) -> None:
         self.world = world
@@ -62,18 +65,20 @@ class InlineRig:
             rig=rig, folder=private_folder(folder, "ground"), key_file=key_file, keys=keys, **settings
         )
         builders: dict[int, Build] = {
-            BASE: partial(GroundProcess, config, lot),
+            BASE: partial(GroundProcess, config, lot, disk_of(BASE)),
             ENCODER: lambda: EncoderProcess(
                 private_folder(folder, "encoder"),
                 torque=world.torque_settings(),
                 reach=world.reach,
                 seals=seals_at(keys, ENCODER, world.reach),
+                disk=disk_of(ENCODER),
             ),
         }
         self._seal_depth = depth_sealer(keys)
         block_key = None if key_file is None else read_key(key_file)
         for tube in range(1, world.scenario.tubes + 1):
-            builders[tube] = partial(self._build_tube, tube, private_folder(folder, f"tube-{tube}"), block_key, keys)
+            place = private_folder(folder, f"tube-{tube}")
+            builders[tube] = partial(self._build_tube, tube, place, block_key, keys, disk_of(tube))
         self.stepper = InProcessStepper(builders, self._act_on_cue, rounded_frame if native else bytes)
 
     @property
@@ -120,9 +125,9 @@ class InlineRig:
         """Close the ground station's database."""
         self.ground.store.close()
 
-    def _build_tube(self, tube: int, folder: Path, key: bytes | None, keys: Path | None) -> TubeProcess:
+    def _build_tube(self, tube: int, folder: Path, key: bytes | None, keys: Path | None, disk: Disk) -> TubeProcess:
         seals = seals_at(keys, tube, self.world.reach)
-        return TubeProcess(self.world.tube_settings(tube), folder, key=key, seals=seals)
+        return TubeProcess(self.world.tube_settings(tube), folder, key=key, disk=disk, seals=seals)
 
     def _act_on_cue(self, cue: str) -> bool:
         rack = self.world.rack

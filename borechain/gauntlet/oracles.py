@@ -1,60 +1,171 @@
-"""What must hold after every run, whatever the faults were."""
+"""What must hold while a rig runs and at its end, whatever the faults were."""
 
 from __future__ import annotations
 
+import contextlib
 import math
+import sqlite3
 from collections.abc import Iterator
 from typing import Any
 
-from borechain.inline import InlineRig
+import msgpack
+
+from borechain.gauntlet.rig import GauntletRig
+from groundstation.service.model import RigModel
+from sim.gauntlet.fault import TUBES
 from sim.gauntlet.world import TUBE_LENGTH, FaultyWorld
 from sim.rig.report import wrap_deg
 from telemetry.application.outbox import LIMIT
-from telemetry.messages import BASE
+from telemetry.messages import BASE, NodeFlag, Receipt, Side
+from telemetry.presentation.msgpack_codec import decode
+from telemetry.schema import Kind
+from telemetry.transport.hop import BEST_EFFORT_LIMIT, QUEUE_LIMIT, WINDOW, parse_frame
 
 DEPTH_TOLERANCE = 0.05  # m
 SIGMAS = 5.0  # of a direction in the plane; 3 are exceeded by one good survey in ninety
-TOLD = frozenset({"survey_missing", "numbers_lost", "numbers_missing", "survey_set_aside", "survey_unplaced", "disk"})
+LATE = 2.0  # s that the ground station may take to notice a silence
+TOLD = frozenset(
+    {
+        *("survey_missing", "numbers_lost", "numbers_missing", "survey_set_aside", "survey_unplaced"),
+        *("disk", "depth_silent", "depth_refused"),
+    }
+)
+DEPTH = frozenset({"depth_refused", "depth_contradicts"})  # alarms while which no depth since a gap is sure
+RECEIPT = msgpack.packb({"k": int(Kind.RECEIPT)})[1:]  # in every frame with a receipt
+UNKNOWN_DEG = 20.0  # of an azimuth whose yaws are all unknown, at least
 
 
-def violations(rig: InlineRig, world: FaultyWorld) -> list[str]:
-    """Every oracle that does not hold, in words."""
-    shown = rig.ask("alarms")
-    told = {row["code"] for row in shown["rig"] + shown["rig_cleared"]}
+class Observer:
+    """Looks at a rig while it runs.
+
+    Nothing stale is shown fresh, no queue grows without bound, no number of a start is used twice, and what the ground
+    station receipts is on its disk.
+    """
+
+    def __init__(self, rig: GauntletRig, since: float = math.inf) -> None:
+        self._rig = rig
+        self._since = since  # s, rig time of the truth at which the first fault begins
+        self.seen: set[tuple[str, str, int]] = set()  # code, subject and count of every alarm so far
+        self.told: dict[str, float] = {}  # s after the first fault at which an alarm was first seen
+        self._starts: dict[int, tuple[object, set[int]]] = {}  # process that is known, and numbers of all, by address
+        self._kept: tuple[bytes, set[tuple[int, int, str]]] = (b"", set())
+        self.found: list[str] = []
+        rig.channel.listeners.append(self.on_frame)
+
+    def look(self) -> None:
+        """Look now."""
+        self._see_alarms()
+        for text in (*self._freshness(), *queues(self._rig), *self._repeated_starts()):
+            self._tell(text)
+
+    def on_frame(self, sender: int, side: Side, frame: bytes) -> None:
+        """A frame leaves a port: a receipt of the ground station must be true now."""
+        if sender != BASE or RECEIPT not in frame or (parsed := parse_frame(frame)) is None:
+            return
+        for _, payload in parsed[1]:
+            message = decode(payload)
+            if isinstance(message, Receipt):
+                known = (message.tube, message.sequence, message.content.hex())
+                if known not in self._stored():
+                    self._tell(f"tube {known[0]}: message {known[1]} is receipted and not on the disk")
+
+    def _see_alarms(self) -> None:
+        """Note which alarms are raised, or counted up, after the first fault."""
+        if self._rig.ground is None:
+            return
+        for alarm in self._rig.ground.model.rig_alarms:
+            row = (alarm.kind.code, alarm.subject, alarm.count)
+            if row not in self.seen:
+                self.seen.add(row)
+                if self._rig.now >= self._since:
+                    self.told.setdefault(alarm.kind.code, self._rig.now - self._since)
+
+    def _tell(self, text: str) -> None:
+        if text not in self.found:
+            self.found.append(text)
+
+    def _stored(self) -> set[tuple[int, int, str]]:
+        """Tube, number and content of what the database would hold after a cut."""
+        image = self._rig.disk(BASE).kept("ground.sqlite")
+        if image is not self._kept[0]:
+            with contextlib.closing(sqlite3.connect(":memory:")) as connection:
+                connection.deserialize(image)
+                rows = connection.execute("SELECT tube, sequence, content FROM messages")
+                self._kept = (image, set(rows))
+        return self._kept[1]
+
+    def _repeated_starts(self) -> Iterator[str]:
+        for address, process in self._rig.stepper.processes.items():
+            known, numbers = self._starts.setdefault(address, (None, set()))
+            if process is known:
+                continue
+            number = process.endpoint.boot_count
+            if number in numbers and not self._rig.disk(address).handled:
+                yield f"process {address}: two starts have the number {number}"
+            numbers.add(number)
+            self._starts[address] = (process, numbers)
+
+    def _freshness(self) -> Iterator[str]:
+        rig = self._rig
+        if rig.ground is None or rig.stepper.is_frozen(BASE):
+            return
+        model = rig.ground.model
+        for tube in TUBES:
+            silent_for = rig.now - rig.off.get(tube, math.inf)
+            if model.age(tube) < 0.0:
+                yield f"tube {tube} was heard in the future"
+            if tube in model.nodes and silent_for > model.config.stale_after + LATE and not model.is_stale(tube):
+                yield f"tube {tube} without power is shown fresh"
+
+
+def violations(rig: GauntletRig) -> list[str]:
+    """Every oracle that does not hold at the end, in words."""
+    shown = rig.inline.ask("alarms")
     standing = {row["code"] for row in shown["rig"]}
-    rows = rig.ask("measurements")["measurements"]
+    told = standing | {row["code"] for row in shown["rig_cleared"]}
+    rows = rig.inline.ask("measurements")["measurements"]
     return [
         *_each_once(rows),
-        *_depths(rows),
-        *_directions(rig, world),
-        *_missing(rows, world, standing),
-        *_health(rig.ask("status")["health"], standing),
-        *_queues(rig),
-        *([] if told or len(rows) == len(_expected(world)) else ["surveys are missing and no alarm was raised"]),
+        *(() if standing & DEPTH else _depths(rows, rig.world)),
+        *(_directions(rig) if "reference" not in standing else ()),
+        *_flags(rig.inline.ground.model),
+        *_missing(rows, rig.world, standing | (told & {"depth_refused"})),
+        *_health(rig.inline.ask("status")["health"], standing),
+        *queues(rig),
     ]
 
 
+def queues(rig: GauntletRig) -> Iterator[str]:
+    """Queues that are longer than their limits."""
+    for address, process in rig.stepper.processes.items():
+        endpoint = process.endpoint
+        if endpoint.outbox_size > LIMIT:
+            yield f"process {address}: {endpoint.outbox_size} messages wait"
+        if endpoint.waiting > 2 * (QUEUE_LIMIT + WINDOW + BEST_EFFORT_LIMIT):
+            yield f"process {address}: {endpoint.waiting} payloads wait in its links"
+
+
 def _each_once(rows: list[dict[str, Any]]) -> Iterator[str]:
-    seen: set[tuple[int, int]] = set()
+    seen: set[tuple[int, int, float]] = set()
     for row in rows:
-        key = (row["tube"], row["sequence"])
+        key = (row["tube"], row["sequence"], row["station_at_s"])
         if key in seen:
             yield f"tube {row['tube']}: survey {row['sequence']} counts twice"
         seen.add(key)
 
 
-def _depths(rows: list[dict[str, Any]]) -> Iterator[str]:
-    """A survey is taken at rest, so at whole tubes: tube k at the stops s = k, k+1, ... at s - k + 1 lengths."""
+def _depths(rows: list[dict[str, Any]], world: FaultyWorld) -> Iterator[str]:
+    """A survey is taken at rest, so where a tube was during a rest of the schedule."""
+    allowed = _rests(world)
     for row in rows:
-        lengths = row["md_m"] / TUBE_LENGTH
-        off = abs(lengths - round(lengths)) * TUBE_LENGTH
-        if off > DEPTH_TOLERANCE or not 1 <= round(lengths) <= 3 - row["tube"]:
-            yield f"tube {row['tube']}: survey {row['sequence']} is placed at {row['md_m']:.3f} m"
+        md, tube = row["md_m"], row["tube"]
+        if not any(tube == known and abs(md - at) <= DEPTH_TOLERANCE for known, at in allowed):
+            yield f"tube {tube}: survey {row['sequence']} is placed at {md:.3f} m"
 
 
-def _directions(rig: InlineRig, world: FaultyWorld) -> Iterator[str]:
-    for station in rig.ask("stations")["stations"]:
-        truth = world.truth_station(station["md_m"])
+def _directions(rig: GauntletRig) -> Iterator[str]:
+    for station in rig.inline.ask("stations")["stations"]:
+        truth = rig.world.truth_station(station["md_m"])
         inclination = math.radians(truth["inclination_deg"])
         along = math.radians(station["inclination_deg"] - truth["inclination_deg"])
         across = math.radians(wrap_deg(station["azimuth_deg"] - truth["azimuth_deg"])) * math.sin(inclination)
@@ -65,26 +176,48 @@ def _directions(rig: InlineRig, world: FaultyWorld) -> Iterator[str]:
             yield f"station at {station['md_m']:.2f} m is {size:.1f} sigmas from the truth"
 
 
+def _flags(model: RigModel) -> Iterator[str]:
+    """Flags have their effects: a faulty sensor's survey is not fused, and an unknown yaw gives no azimuth."""
+    for station in model.stations:
+        for cluster in station.clusters:
+            if NodeFlag.SENSOR_FAULT in cluster.measurement.flags:
+                yield f"tube {cluster.measurement.tube}: a survey of a faulty sensor is fused"
+        yaws = [cluster.yaw_var for cluster in station.counting]
+        flagged = [NodeFlag.YAW_UNTRUSTED in cluster.measurement.flags for cluster in station.counting]
+        if flagged and all(flagged) and min(yaws) < math.radians(UNKNOWN_DEG) ** 2:
+            yield f"station at {station.md:.2f} m: untrusted yaws have a sigma of {math.sqrt(min(yaws)):.4f} rad"
+        if any(flagged) and not all(flagged):
+            yield f"station at {station.md:.2f} m: an untrusted survey counts beside a trusted one"
+
+
 def _missing(rows: list[dict[str, Any]], world: FaultyWorld, standing: set[str]) -> Iterator[str]:
-    have = [(row["tube"], round(row["md_m"] / TUBE_LENGTH)) for row in rows]
-    lacking = [each for each in _expected(world) if each not in have]
+    lacking = [
+        f"tube {tube} at {md:.2f} m"
+        for tube, md in _expected(world)
+        if not any(row["tube"] == tube and abs(row["md_m"] - md) <= DEPTH_TOLERANCE for row in rows)
+    ]
     if lacking and not standing & TOLD:
-        yield f"no survey of {lacking} (tube, station), and no alarm of it stands"
+        yield f"no survey of {', '.join(lacking)}, and no alarm of it stands"
 
 
-def _expected(world: FaultyWorld) -> list[tuple[int, int]]:
-    stops = range(1, world.scenario.tubes + 1)
-    return [(tube, stop - tube + 1) for stop in stops for tube in range(1, stop + 1)]
+def _rests(world: FaultyWorld) -> list[tuple[int, float]]:
+    """Tube and its depth (m) in every rest of the schedule."""
+    depths = [(phase.tube, world.true_depth(phase.end)) for phase in world.phases if phase.kind in ("stop", "finish")]
+    depths += [(phase.tube, world.true_depth(phase.start)) for phase in world.phases if phase.kind == "hold"]
+    return _nodes(depths)
+
+
+def _expected(world: FaultyWorld) -> list[tuple[int, float]]:
+    """Tube and depth (m) of every survey that the stops of the schedule owe."""
+    stops = [(phase.tube, world.true_depth(phase.end)) for phase in world.phases if phase.kind == "stop"]
+    return _nodes(stops)
+
+
+def _nodes(rests: list[tuple[int, float]]) -> list[tuple[int, float]]:
+    """Tube and its depth (m) for every tube of each rest, of which the top tube and the depth of the bit are given."""
+    return [(tube, md - TUBE_LENGTH * (tube - 1)) for top, md in rests for tube in range(1, top + 1)]
 
 
 def _health(health: str, standing: set[str]) -> Iterator[str]:
     if health == "good" and standing & TOLD:
         yield f"health is good while {sorted(standing & TOLD)} stand"
-
-
-def _queues(rig: InlineRig) -> Iterator[str]:
-    for address, process in rig.stepper.processes.items():
-        if process.endpoint.outbox_size > LIMIT:
-            yield f"process {address}: {process.endpoint.outbox_size} messages wait"
-    if BASE not in rig.stepper.processes:
-        yield "the ground station is not there at the end"

@@ -2,20 +2,24 @@
 
 A depth is known where readings bracket its time within ``gap``, or where the bit is known to have stood. What the
 stream may not say is refused, with the reason. The readings after a jump stay refused until they agree again with those
-before it, or until the crew has looked.
+before it, or until the crew has looked; so do the stands that the stream repeats of that time. Of two stands that
+contradict each other neither is believed.
 """
 
 from __future__ import annotations
 
+import math
 from bisect import bisect_right, insort
-from collections import Counter
-from dataclasses import dataclass, field
+from collections import Counter, deque
+from dataclasses import dataclass, field, replace
 
 from telemetry.messages import EPOCH_UNKNOWN, DepthReading, Stand
 
 LIMIT = 100_000  # readings kept of an epoch, those at rest in a stand count as two
 STANDS_KEPT = 10_000
 EPOCHS_KEPT = 8
+DOUBTS_KEPT = 100
+CONTRADICTION = "a stand contradicts another"
 AHEAD, LATE = 2.0, 30.0  # s against rig time
 SLACK = 0.02  # m, of two readings
 RETURNED = 0.1  # m from the last reading before a jump, within which the depth is believed again
@@ -83,6 +87,7 @@ class DepthLog:
         self._raw: tuple[int, float, float] | None = None  # epoch, time and depth of the last reading that came
         self._trusted: tuple[int, float, float] | None = None  # of the last one that was taken
         self._accepted = (-1, 0.0)  # epoch and time at which the crew accepted the depth
+        self._doubtful: deque[Stand] = deque(maxlen=DOUBTS_KEPT)  # times of which no stand is believed
 
     @property
     def latest(self) -> float | None:
@@ -110,8 +115,16 @@ class DepthLog:
             begun_at, ended_at = min(known.begun_at, stand.begun_at), max(known.ended_at, stand.ended_at)
             self.stands[place] = Stand(stand.epoch, begun_at, ended_at, stand.md)
             return False
-        if not all(self._agree(known, stand) for known in self.stands if known.epoch == stand.epoch):
-            self.refusals["a stand contradicts another"] += 1
+        since = self._trusted[:2] if self.jumped and self._trusted is not None else (math.inf, 0.0)
+        if (stand.epoch, stand.ended_at) > since or any(_overlap(doubtful, stand) for doubtful in self._doubtful):
+            self.refusals["a stand of a doubtful time"] += 1
+            return False
+        against = [known for known in self.stands if known.epoch == stand.epoch and not self._agree(known, stand)]
+        if against:
+            self.refusals[CONTRADICTION] += 1
+            for doubtful in (*against, stand):
+                self._doubt(doubtful)
+            self._suspect(max(against, key=lambda known: known.begun_at), stand)
             return False
         insort(self.stands, stand, key=lambda known: (known.epoch, known.begun_at))
         del self.stands[:-STANDS_KEPT]
@@ -140,6 +153,19 @@ class DepthLog:
         if self._raw is not None:
             self._accepted = self._raw[:2]
         self.jumped, self._raw = "", None
+        self._doubtful.clear()
+
+    def _suspect(self, one: Stand, other: Stand) -> None:
+        """Take a contradiction for a jump that nobody heard: what came since may be as wrong as the later stand."""
+        first, second = sorted((one, other), key=lambda stand: stand.begun_at)
+        if not self.jumped:
+            self.jumped = f"from {first.md:.2f} m to {second.md:.2f} m between two stands"
+            self._trusted = (first.epoch, first.ended_at, first.md)
+
+    def _doubt(self, time: Stand) -> None:
+        """Believe no stand of a time, also where one was believed before."""
+        self._doubtful.append(time)
+        self.stands = [known for known in self.stands if not _overlap(time, known)]
 
     def _agree(self, one: Stand, other: Stand) -> bool:
         """Whether the bit can have moved from one stand to the other in the time between them."""
@@ -173,8 +199,13 @@ class DepthLog:
         if not self.jumped:
             if abs(reading.md - raw[2]) > self._rate * (reading.at - raw[1]) + SLACK:
                 self.jumped = f"from {raw[2]:.2f} m to {reading.md:.2f} m in {reading.at - raw[1]:.1f} s"
+                self._doubt(Stand(raw[0], raw[1], reading.at, raw[2]))
         elif self._trusted is not None and abs(reading.md - self._trusted[2]) <= RETURNED:
             self.jumped = ""
+        elif self._doubtful and self._doubtful[-1].epoch == raw[0]:
+            self._doubtful[-1] = replace(self._doubtful[-1], ended_at=reading.at)
+        else:
+            self._doubt(Stand(raw[0], raw[1], reading.at, raw[2]))
 
     def _count(self, sequence: int) -> None:
         if self._sequence is not None and sequence > self._sequence + 1:
@@ -191,6 +222,11 @@ class DepthLog:
 
 def _same(one: Stand, other: Stand) -> bool:
     return (one.epoch, one.md) == (other.epoch, other.md) and _touch(one, other)
+
+
+def _overlap(one: Stand, other: Stand) -> bool:
+    """Whether two times have more than an instant in common."""
+    return one.epoch == other.epoch and one.begun_at < other.ended_at and other.begun_at < one.ended_at
 
 
 def _touch(one: Stand, other: Stand) -> bool:

@@ -181,15 +181,21 @@ class RigModel:
         self.orders = OrderBook()
         self.wall = None if config.wall is None else LiveWall(config.wall, config.hole)
 
-    def on_state(self, state: NodeState, now: float) -> None:
-        """Handle a node's state that came at ``now`` (s, own clock), unless a newer one of its epoch is known."""
+    def on_state(self, state: NodeState, now: float) -> bool:
+        """Handle a node's state that came at ``now`` (s, own clock), unless a newer one of its epoch is known.
+
+        One that has come before is no sign of life, somebody may have recorded it: False.
+        """
+        known = self.nodes.get(state.tube)
+        if known is not None and is_repeated(state, known):
+            return False
         self.recalibration.on_state(state)
         self._heard_at[state.tube] = now
-        known = self.nodes.get(state.tube)
         if known is None or state.epoch != known.epoch or state.at >= known.at:
             self.nodes[state.tube] = state
             self._tally_known_at = min(self._tally_known_at, now + ALL_HEARD_WITHIN)
             self.tally.on_hops(state.tube, state.hops)
+        return True
 
     def restore_tally(self, tubes: list[int]) -> None:
         """Go on with the tubes that were known before a restart."""
@@ -373,3 +379,8 @@ class RigModel:
         self.projection = project(self.trajectory[-1], direction, self.config.design)
         self.alarms.judge_deviation("deviation", worst, at)
         self.alarms.judge_deviation("projection", self.projection, at)
+
+
+def is_repeated(state: NodeState, known: NodeState) -> bool:
+    """Whether a state is the newest known or one before it; a clock or a count of cycles may go back, not both."""
+    return state.epoch == known.epoch and state.at <= known.at and state.cycles <= known.cycles

@@ -43,6 +43,7 @@ from telemetry.messages import (
     SurveyMeasurement,
 )
 from telemetry.presentation.msgpack_codec import decode
+from telemetry.runtime.disk import MACHINE, Disk
 from telemetry.runtime.process import Process
 from telemetry.transport.authentication import read_key
 
@@ -83,6 +84,7 @@ class GroundProcess(Process):
     ----------
     config : validated settings
     lot : number below its argument by lot; a simulated rig draws from its seed
+    disk : that holds the database
 
     Raises
     ------
@@ -92,7 +94,9 @@ class GroundProcess(Process):
         When a key file is configured and holds no key.
     """
 
-    def __init__(self, config: GroundConfig, lot: Callable[[int], int] = secrets.randbelow) -> None:
+    def __init__(
+        self, config: GroundConfig, lot: Callable[[int], int] = secrets.randbelow, disk: Disk = MACHINE
+    ) -> None:
         self.config = config
         seals = None
         if config.keys is not None:
@@ -100,7 +104,7 @@ class GroundProcess(Process):
 
             seals = seals_of(config.keys, BASE, [Side.LOWER], rig=config.rig)
         self._uploads = uploads_of(config, seals)
-        self.store = Store(config.url)
+        self.store = Store(config.url, disk)
         # by lot, not counted: a database that was deleted or restored must not repeat a number that the string has seen
         start = 1 + lot(STARTS)
         self.model = RigModel(config)
@@ -287,7 +291,7 @@ class GroundProcess(Process):
         for stand in reading.stands:
             is_present = stand.epoch in (EPOCH_UNKNOWN, model.epoch) and stand.ended_at <= reading.at
             if is_present and stand.md <= model.tally.deepest:
-                self._on_stand(replace(stand, epoch=model.epoch))
+                self._on_stand(stand if stand.epoch == model.epoch else replace(stand, epoch=model.epoch))
         self._keep_stand(reading)
         self._place_waiting()
         self._publish(["status", "string"])
@@ -296,12 +300,22 @@ class GroundProcess(Process):
             self._publish(["wall"])
 
     def _on_stand(self, stand: Stand) -> None:
-        """Remember a stand; one that follows another at a different depth is a stop."""
+        """Remember a stand; one that follows another at a smaller depth is a stop.
+
+        One that follows another at the same depth goes on with its stop: nothing is known of the time in between.
+        """
         depths = self.model.depths
         depths.add_stand(stand)
-        before = [known for known in depths.stands if known.epoch == stand.epoch and known.begun_at < stand.begun_at]
-        if before and before[-1].md < stand.md and stand in depths.stands:
-            self.model.stops.on_stand(stand)
+        before = [known for known in depths.stands if (known.epoch, known.begun_at) < (stand.epoch, stand.begun_at)]
+        whole = stand
+        while before and (before[-1].epoch, before[-1].md) == (stand.epoch, stand.md):
+            whole = replace(stand, begun_at=before.pop().begun_at)
+        if not before or stand not in depths.stands:
+            return
+        if before[-1].md < stand.md:
+            self.model.stops.on_stand(whole)
+        elif before[-1].md == stand.md:
+            self.model.stops.on_later_stand(before[-1], whole)
 
     def _keep_stand(self, reading: DepthReading) -> None:
         """Store a stand when it begins and when it has ended."""
@@ -342,8 +356,7 @@ class GroundProcess(Process):
         self._note(MESSAGE, now, message)
         self._advance_time(now)
         match message:
-            case NodeState():
-                self.model.on_state(message, now)
+            case NodeState() if self.model.on_state(message, now):
                 self.watch.on_state(message)
                 with self._refusing_disk():
                     self._keep_tally()
@@ -377,6 +390,7 @@ class GroundProcess(Process):
         self.model.numbers.add_number(message.tube, message.sequence)
         if isinstance(message, Event):
             self.model.on_event(message)
+            self.watch.on_known_event(message)
             return ["events"]
         if isinstance(message, StaticRecord):
             self.model.on_static_record(message)

@@ -60,6 +60,11 @@ KINDS: tuple[AlarmKind, ...] = (
     AlarmKind("tube_queue", NOTICE, "a queue of a tube was full and dropped something"),
     AlarmKind("clock", BAD, "a tube's rig time is ahead of the ground station's, or of another epoch"),
     AlarmKind("epoch", NOTICE, "the encoder has started again: rig time counts anew"),
+    AlarmKind(
+        "reference",
+        BAD,
+        "several gyroscopes contradict the encoder at one time: it may have slipped; check the azimuths",
+    ),
     AlarmKind("depth_refused", BAD, "readings of the depth are refused"),
     AlarmKind("depth_silent", BAD, "no depth comes any more"),
     AlarmKind("depth_contradicts", BAD, "the depth does not fit the tubes in the hole"),

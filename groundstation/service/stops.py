@@ -6,6 +6,7 @@ hole owes one; a tube whose node is still above the collar does not.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator
 from dataclasses import dataclass, field
 
@@ -27,6 +28,23 @@ class Stop:
     tubes: tuple[int, ...]
     judged: bool = False
     missing: set[int] = field(default_factory=set)
+    later: list[Stand] = field(default_factory=list)  # in which it went on, in later epochs of rig time
+
+    @property
+    def lasted(self) -> float:
+        """Duration as far as it is known, s."""
+        return sum(stand.ended_at - stand.begun_at for stand in (self.stand, *self.later))
+
+    def has(self, epoch: int, at: float) -> bool:
+        """Whether a survey was taken during the stop."""
+        return any(belongs(stand, epoch, at) for stand in (self.stand, *self.later))
+
+    def age(self, epoch: int, rig_now: float) -> float:
+        """Seconds from its begin to ``rig_now`` (s) of an epoch, fewer where rig time began anew; infinite after it."""
+        newest = (self.stand, *self.later)[-1]
+        if newest.epoch != epoch:
+            return math.inf
+        return self.lasted + rig_now - newest.ended_at
 
 
 class Stops:
@@ -53,28 +71,34 @@ class Stops:
         if len(self._surveys) > SURVEYS_KEPT:
             del self._surveys[next(iter(self._surveys))]
         for stop in self._stops:
-            if tube in stop.missing and belongs(stop.stand, epoch, at):
+            if tube in stop.missing and stop.has(epoch, at):
                 stop.missing.discard(tube)
 
     def on_stand(self, stand: Stand) -> None:
-        """A stand has begun, or lasted longer; the tubes are those that hang when it is first heard of."""
+        """A stand has begun, or lasted longer; the tubes are those that are known to hang while it lasts."""
         known = next((stop for stop in reversed(self._stops) if _same(stop.stand, stand)), None)
+        tubes = tuple(self._in_the_hole(stand.md))
         if known is not None:
             known.stand = stand
+            if not known.judged:
+                known.tubes = tuple(dict.fromkeys((*known.tubes, *tubes)))
             return
-        self._stops.append(Stop(stand, tuple(self._in_the_hole(stand.md))))
+        self._stops.append(Stop(stand, tubes))
         del self._stops[:-STOPS_KEPT]
+
+    def on_later_stand(self, before: Stand, stand: Stand) -> None:
+        """The stop that ``before`` belongs to goes on in ``stand``, of a later epoch."""
+        known = next((stop for stop in reversed(self._stops) if before in (stop.stand, *stop.later)), None)
+        if known is not None:
+            known.later = [one for one in known.later if one.epoch != stand.epoch] + [stand]
 
     def judge(self, epoch: int, rig_now: float) -> None:
         """Find what is overdue at ``rig_now`` (s)."""
         for stop in self._stops:
-            stand = stop.stand
-            lasted = stand.ended_at - stand.begun_at
-            is_due = stand.epoch != epoch or rig_now >= stand.begun_at + self._due
-            if stop.judged or lasted < SHORTEST or not is_due:
+            if stop.judged or stop.lasted < SHORTEST or stop.age(epoch, rig_now) < self._due:
                 continue
             stop.judged = True
-            answered = {tube for e, at, tube in self._surveys if belongs(stand, e, at)}
+            answered = {tube for e, at, tube in self._surveys if stop.has(e, at)}
             stop.missing = set(stop.tubes) - answered
 
     def _in_the_hole(self, md: float) -> Iterator[int]:

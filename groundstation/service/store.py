@@ -29,6 +29,7 @@ from telemetry.messages import Event, Kept, Stand, StaticRecord, SurveyMeasureme
 from telemetry.parameters import ParameterBlock, unpack_block
 from telemetry.presentation.content import content_of
 from telemetry.presentation.msgpack_codec import decode, encode
+from telemetry.runtime.disk import MACHINE, Disk
 
 SCHEMA = 3
 READABLE = (2, 3)  # schemas; what a later one has more is made when it is opened
@@ -54,6 +55,9 @@ MESSAGES = sa.Table(
     sa.Column("payload", sa.LargeBinary, nullable=False),
     sa.UniqueConstraint("tube", "sequence", "content"),
 )
+SAME = sa.and_(*(MESSAGES.c[name] == sa.bindparam(f"its_{name}") for name in ("tube", "sequence", "content")))
+FIND, DROP, ADD = sa.select(MESSAGES.c.payload).where(SAME), sa.delete(MESSAGES).where(SAME), sa.insert(MESSAGES)
+PLACE = sa.update(MESSAGES).where(SAME).values(md=sa.bindparam("depth"))
 STANDS = sa.Table(
     "stands",
     METADATA,
@@ -105,6 +109,7 @@ class Store:
     Parameters
     ----------
     url : SQLAlchemy URL; SQLite runs in WAL mode with every commit forced to the disk
+    disk : that holds a database which is a file
 
     Attributes
     ----------
@@ -117,8 +122,9 @@ class Store:
         When the database cannot be opened, is no database, or belongs to another version.
     """
 
-    def __init__(self, url: str) -> None:
-        self._engine = _engine_of(url)
+    def __init__(self, url: str, disk: Disk = MACHINE) -> None:
+        self._disk = disk
+        self._engine = _engine_of(url, disk)
         address = self._engine.url
         self._where = address.database or address.render_as_string(hide_password=True)
         self._file = Path(address.database) if self._engine.dialect.name == "sqlite" and address.database else None
@@ -128,7 +134,7 @@ class Store:
         try:
             with self._refusing("; choose a writable --folder or another database"):
                 if self._file is not None:
-                    self._file.parent.mkdir(parents=True, exist_ok=True)
+                    disk.make_folder(self._file.parent)
                 is_ours = self._check_schema()
                 self._begin(is_ours=is_ours)
         except StoreError:
@@ -147,19 +153,20 @@ class Store:
         payload = encode(message)
         row = row_of(message, payload)
         with self._writing() as connection:
-            there = connection.execute(sa.select(MESSAGES.c.payload).where(_same(row))).first()
+            same = {f"its_{name}": value for name, value in row.items()}
+            there = connection.execute(FIND, same).first()
             if there is not None and there.payload == payload:
                 return False
-            connection.execute(sa.delete(MESSAGES).where(_same(row)))  # of a row that is damaged
+            connection.execute(DROP, same)  # of a row that is damaged
             kind = type(message).__name__
-            connection.execute(sa.insert(MESSAGES).values(**row, kind=kind, md=md, below=below, payload=payload))
+            connection.execute(ADD, {**row, "kind": kind, "md": md, "below": below, "payload": payload})
         return True
 
     def place_message(self, message: Kept, md: float) -> None:
         """Store the depth (m) of a message that came before it was known."""
         with self._writing() as connection:
-            same = _same(row_of(message, encode(message)))
-            connection.execute(sa.update(MESSAGES).where(same).values(md=md))
+            row = row_of(message, encode(message))
+            connection.execute(PLACE, {"depth": md, **{f"its_{name}": value for name, value in row.items()}})
 
     def keep_stand(self, stand: Stand) -> None:
         """Store that the bit stood, in the place of what it overlaps."""
@@ -292,10 +299,7 @@ class Store:
 
     def _found_inode(self) -> int:
         """Identity of the file that has the database's name; 0 where there is none, or no file."""
-        try:
-            return self._file.stat().st_ino if self._file is not None else 0
-        except OSError:
-            return 0
+        return self._disk.identity(self._file) if self._file is not None else 0
 
     @contextlib.contextmanager
     def _refusing(self, remedy: str = "") -> Iterator[None]:
@@ -362,14 +366,14 @@ def is_depth(value: object) -> bool:
     return value is None or (isinstance(value, float) and math.isfinite(value) and value >= 0.0)
 
 
-def _same(row: dict[str, Any]) -> sa.ColumnElement[bool]:
-    return sa.and_(*(MESSAGES.c[name] == value for name, value in row.items()))
-
-
-def _engine_of(url: str) -> sa.Engine:
-    """Engine of a URL; a refusal does not repeat the URL, which may hold a password."""
+def _engine_of(url: str, disk: Disk) -> sa.Engine:
+    """Engine of a URL, a file by ``disk``; a refusal does not repeat the URL, which may hold a password."""
     try:
-        return sa.create_engine(url)
+        address = sa.make_url(url)
+        if address.get_backend_name() == "sqlite" and address.database and not address.query:
+            file = Path(address.database)
+            return sa.create_engine(address, creator=lambda _record=None: disk.connect(file))
+        return sa.create_engine(address)
     except (sa.exc.SQLAlchemyError, ImportError) as error:
         raise StoreError(
             f"database URL: expected one such as sqlite:///FILE whose driver is installed: {error}"

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 
+from groundstation.service.depth import CONTRADICTION
 from groundstation.service.model import RigModel
 from groundstation.service.numbers import Range
 from telemetry.application.endpoint import SERIES_SHIFT
@@ -17,8 +18,11 @@ PLACED_WITHIN = 5.0  # s of rig time after which a survey without a depth is tol
 GAP_AFTER = 30.0  # s that a number may be on its way
 ASK_EVERY = 120.0  # s between two orders to send a range again
 ASKED_AT_MOST = 3
+SETTLED_AFTER = 10.0  # s after a start in which a tube may still find its yaw
+TOGETHER = 30.0  # s
 REFUSALS = 3  # readings of the depth refused in a row until that is told
 SENSOR = NodeFlag.SENSOR_FAULT | NodeFlag.YAW_UNTRUSTED | NodeFlag.RATE_EXCEEDED
+AGAINST_THE_ENCODER = ("yaw_reset", "gyro_step", "gyro_scale")
 OF_THE_DISK = ("saved_state_lost", "boot_counter_lost", "parameters_fallback")
 
 
@@ -46,7 +50,10 @@ class Watch:
         self._alarms = model.rig_alarms
         self._looked_at = -math.inf
         self._refused_in_a_row = 0
+        self._contradictions = 0
         self._gaps: dict[int, Gap] = {}
+        self._contradicted: dict[int, Event] = {}  # newest contradiction of gyroscope and encoder, by tube
+        self._started: dict[tuple[int, int], float] = {}  # s, rig time of the newest start, by tube and epoch
         self._told_unplaced: set[int] = set()  # tubes
 
     def is_due(self, now: float) -> bool:
@@ -84,6 +91,13 @@ class Watch:
         elif event.code == CODE:
             self._alarms.alert(CODE, tube, refusal_of(event.arguments))
 
+    def on_known_event(self, event: Event) -> None:
+        """Judge an event that has come, or was stored before a restart of the ground station."""
+        if event.code in ("booted", "restored"):
+            self._started[event.tube, event.epoch] = event.at
+        elif event.code in AGAINST_THE_ENCODER:
+            self._on_contradiction(event)
+
     def on_survey(self, measurement: SurveyMeasurement, outcome: str) -> None:
         """Tell what a survey was not used for: ``outcome`` is a kind of alarm, or empty."""
         if outcome:
@@ -103,6 +117,10 @@ class Watch:
             self._alarms.hold("depth_refused", "depth", f"it jumped {jumped}; see the command accept_depth")
         elif self._refused_in_a_row >= REFUSALS or not refused:
             self._alarms.hold("depth_refused", "depth", refused)
+        contradictions = self._model.depths.refusals[CONTRADICTION]
+        if contradictions > self._contradictions:
+            self._contradictions = contradictions
+            self._alarms.alert("depth_refused", "stands", "stands of the bit contradict each other")
 
     def gaps_to_ask(self, now: float) -> list[tuple[int, Range]]:
         """Tubes and ranges that are to be asked for at ``now`` (s, own clock)."""
@@ -124,6 +142,23 @@ class Watch:
         if gap is not None:
             gap.complete_from = complete_from
             gap.asked_at, gap.asked = now - ASK_EVERY + GAP_AFTER, gap.asked if sent else ASKED_AT_MOST
+
+    def _on_contradiction(self, event: Event) -> None:
+        """Tubes that contradict the encoder together, not all of them freshly started, speak against the encoder."""
+        self._contradicted[event.tube] = event
+        together = [
+            e for e in self._contradicted.values() if e.epoch == event.epoch and abs(e.at - event.at) <= TOGETHER
+        ]
+        heard = [tube for tube in self._model.tally.tubes if not self._model.is_stale(tube)]
+        enough = min(2, len(heard)) if event.code == "yaw_reset" else 2  # alone, a gyroscope is wrong sooner
+        if len(together) >= enough and any(self._was_settled(e) for e in together):
+            tubes = ", ".join(str(tube) for tube in sorted(e.tube for e in together))
+            self._alarms.alert("reference", "encoder", f"tubes {tubes} at {event.at:.0f} s")
+
+    def _was_settled(self, event: Event) -> bool:
+        """Whether a tube had found its yaw before, since its start."""
+        started = self._started.get((event.tube, event.epoch), -math.inf)
+        return event.epoch != EPOCH_UNKNOWN and event.at >= started + SETTLED_AFTER
 
     def _gap_of(self, tube: int, now: float) -> Gap | None:
         numbers, known = self._model.numbers.gap(tube), self._gaps.get(tube)

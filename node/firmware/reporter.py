@@ -25,6 +25,7 @@ from telemetry.messages import (
 )
 
 VAR_FLOOR = (0.001 * DEG) ** 2
+VAR_CEILING = 100.0  # rad^2, the largest that a message says; a yaw of that variance is any yaw
 
 
 class Reporter:
@@ -64,7 +65,7 @@ class Reporter:
     @property
     def yaw_var(self) -> float:
         """Random variance of ``yaw``, rad^2."""
-        return max(float(self._state["now_P"][Err.YAW, Err.YAW]), VAR_FLOOR)
+        return min(max(float(self._state["now_P"][Err.YAW, Err.YAW]), VAR_FLOOR), VAR_CEILING)
 
     @property
     def systematic_var(self) -> float:

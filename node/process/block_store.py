@@ -8,13 +8,13 @@ from __future__ import annotations
 
 import contextlib
 import hashlib
-import os
 import struct
 from collections.abc import Callable
 from pathlib import Path
 
 from telemetry.errors import DecodeError
 from telemetry.parameters import BLOCK_SIZE, ParameterBlock, unpack_block
+from telemetry.runtime.disk import MACHINE, Disk, replace_file
 
 HEADER = struct.Struct("<4sQ")  # magic, generation; then SHA-256 of all else, then the block
 MAGIC = b"BCPS"
@@ -49,9 +49,10 @@ def unpack_slot(data: bytes) -> tuple[ParameterBlock, int]:
 class BlockStore:
     """Two-slot store in ``folder``; the newest good slot wins."""
 
-    def __init__(self, folder: Path) -> None:
+    def __init__(self, folder: Path, disk: Disk = MACHINE) -> None:
+        self._disk = disk
         with contextlib.suppress(OSError):  # a block that is to be kept finds out
-            folder.mkdir(parents=True, exist_ok=True)
+            disk.make_folder(folder)
         self._slots = (folder / "parameters-0", folder / "parameters-1")
         self._upload = folder / "upload"
         self._generation = 0
@@ -63,7 +64,7 @@ class BlockStore:
         self.faults = []
         for slot in self._slots:
             try:
-                block, generation = unpack_slot(slot.read_bytes())
+                block, generation = unpack_slot(self._disk.read(slot))
                 found.append((generation, slot, block))
             except FileNotFoundError:
                 continue
@@ -88,11 +89,11 @@ class BlockStore:
         generation = self._generation + 1
         slot, data = self._slots[generation % 2], pack_slot(block, generation)
         try:
-            replace(slot, data)
+            replace_file(self._disk, slot, data)
         except OSError:
             with contextlib.suppress(OSError):
-                if slot.read_bytes() == data:  # in place but perhaps not on the disk: it must not win later
-                    slot.unlink()
+                if self._disk.read(slot) == data:  # in place but perhaps not on the disk: it must not win later
+                    self._disk.remove(slot)
             raise
         self._generation = generation
 
@@ -104,12 +105,12 @@ class BlockStore:
         OSError
             When the disk refuses; what was kept before is untouched.
         """
-        replace(self._upload, hashlib.sha256(data).digest() + data)
+        replace_file(self._disk, self._upload, hashlib.sha256(data).digest() + data)
 
     def upload(self) -> bytes | None:
         """Segments kept before the restart; None when there are none or they are damaged."""
         try:
-            whole = self._upload.read_bytes()
+            whole = self._disk.read(self._upload)
         except OSError:
             return None
         return whole[32:] if hashlib.sha256(whole[32:]).digest() == whole[:32] else None
@@ -117,19 +118,4 @@ class BlockStore:
     def drop_upload(self) -> None:
         """Forget the segments."""
         with contextlib.suppress(OSError):
-            self._upload.unlink()
-
-
-def replace(path: Path, data: bytes) -> None:
-    """Replace a file in one step, forced to the disk with its name."""
-    fresh = path.with_name(f"{path.name}.new")
-    with fresh.open("wb") as file:
-        file.write(data)
-        file.flush()
-        os.fsync(file.fileno())
-    fresh.replace(path)
-    folder = os.open(path.parent, os.O_RDONLY)
-    try:
-        os.fsync(folder)
-    finally:
-        os.close(folder)
+            self._disk.remove(self._upload)

@@ -6,12 +6,11 @@ that counting never reaches, so that no neighbour takes it for a start that it h
 
 from __future__ import annotations
 
-import os
 import secrets
 from collections.abc import Callable
 from pathlib import Path
 
-from node.process.journal import sync_folder
+from telemetry.runtime.disk import MACHINE, Disk, replace_file
 
 LOTS = 1 << 20  # numbers in LOTS..2 LOTS - 1 are by lot; an encoder's, shifted, still fit a sequence number
 
@@ -23,6 +22,7 @@ class BootCounter:
     ----------
     folder : where it is kept
     lot : number below its argument by lot, for a start that cannot be counted
+    disk : that holds the folder
 
     Attributes
     ----------
@@ -30,19 +30,19 @@ class BootCounter:
     fault : why it is by lot, or empty
     """
 
-    def __init__(self, folder: Path, lot: Callable[[int], int] = secrets.randbelow) -> None:
+    def __init__(self, folder: Path, lot: Callable[[int], int] = secrets.randbelow, disk: Disk = MACHINE) -> None:
         self.fault = ""
         try:
-            self.boots = read_count(folder / "boots") + 1
+            self.boots = read_count(disk, folder / "boots") + 1
         except (ValueError, OSError) as error:
             self.fault, self.boots = f"boots: {error}", LOTS + lot(LOTS)
         try:
-            write_count(folder, self.boots)
+            write_count(disk, folder, self.boots)
         except OSError as error:
             self.fault, self.boots = f"boots: {error.strerror or error}", LOTS + lot(LOTS)
 
 
-def read_count(path: Path) -> int:
+def read_count(disk: Disk, path: Path) -> int:
     """Starts so far; 0 where none was counted.
 
     Raises
@@ -51,7 +51,7 @@ def read_count(path: Path) -> int:
         When the file holds no such number or cannot be read.
     """
     try:
-        count = int(path.read_text())
+        count = int(disk.read(path))
     except FileNotFoundError:
         return 0
     if not 0 <= count < 2 * LOTS - 1:
@@ -59,13 +59,7 @@ def read_count(path: Path) -> int:
     return count
 
 
-def write_count(folder: Path, count: int) -> None:
+def write_count(disk: Disk, folder: Path, count: int) -> None:
     """Replace the number in one step, forced to the disk with its name."""
-    folder.mkdir(parents=True, exist_ok=True)
-    fresh = folder / "boots.new"
-    with fresh.open("w") as file:
-        file.write(f"{count}\n")
-        file.flush()
-        os.fsync(file.fileno())
-    fresh.replace(folder / "boots")
-    sync_folder(folder)
+    disk.make_folder(folder)
+    replace_file(disk, folder / "boots", f"{count}\n".encode())

@@ -14,6 +14,7 @@ from node.process.drivers.source import EncoderSource, SafeEncoder
 from telemetry.application.endpoint import Endpoint
 from telemetry.application.seal_watch import SealWatch
 from telemetry.messages import ENCODER, Command, Event, Reply, Scalar, Severity, Side
+from telemetry.runtime.disk import MACHINE, Disk
 from telemetry.runtime.joint_watch import JointFault
 from telemetry.runtime.process import Process
 from telemetry.runtime.timing import CycleTiming, Stage
@@ -32,6 +33,7 @@ class EncoderProcess(Process):
     torque : what the crew knows of the drive's torque; the default is a rigid string
     timing : durations of its cycles with an own clock; None where it is stepped
     reach : tubes away that its radio hears, see ``TubeSettings``
+    disk : that holds the folder
     seals : what it says and believes under keys; None: everybody is believed
 
     Raises
@@ -47,6 +49,7 @@ class EncoderProcess(Process):
         torque: TorqueSettings | None = None,
         timing: CycleTiming | None = None,
         reach: int = 1,
+        disk: Disk = MACHINE,
         seals: Seals | None = None,
     ) -> None:
         self._timing = timing
@@ -54,7 +57,7 @@ class EncoderProcess(Process):
             source.start()
         self._source = SafeEncoder(source, self._send_event) if source is not None else None
         self._now = 0.0
-        counter = BootCounter(folder)
+        counter = BootCounter(folder, disk=disk)
         self.endpoint = Endpoint(
             ENCODER, frozenset(Side), boot_count=counter.boots, is_clock_root=True, reach=reach, seals=seals
         )

@@ -65,7 +65,7 @@ def run_encoder(
     seals = seals_at(place.keys, ENCODER, reach, place.rig)
 
     def build(timing: CycleTiming | None = None) -> EncoderProcess:
-        return EncoderProcess(place.folder, source, torque, timing, reach, seals)
+        return EncoderProcess(place.folder, source, torque, timing, reach, seals=seals)
 
     warn_of_keys("encoder", seals)
     if own_time is None:

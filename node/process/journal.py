@@ -13,7 +13,6 @@ from __future__ import annotations
 
 import contextlib
 import errno
-import os
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Final
@@ -21,9 +20,9 @@ from typing import Final
 from node.errors import SavedStateError
 from node.firmware.saved_state import Saved, pack, unpack
 from node.kernels.layout import Array
+from telemetry.runtime.disk import MACHINE, Disk
 
 SLOTS: Final = 32
-CHUNK: Final = 1 << 16  # bytes of one read
 
 
 class Journal:
@@ -34,7 +33,8 @@ class Journal:
     worn : places of the slots that did not take what was written, since this start; they are passed over
     """
 
-    def __init__(self, folder: Path, slots: int = SLOTS) -> None:
+    def __init__(self, folder: Path, slots: int = SLOTS, disk: Disk = MACHINE) -> None:
+        self._disk = disk
         self._slots = [folder / f"slot-{place}" for place in range(slots)]
         self._newest: int | None = None  # place of the newest good slot
         self._generation = 0
@@ -42,7 +42,7 @@ class Journal:
         self._has_looked = False
         self.worn: set[int] = set()
         with contextlib.suppress(OSError):  # the first save says what is wrong with it
-            folder.mkdir(parents=True, exist_ok=True)
+            disk.make_folder(folder)
 
     def load(self) -> tuple[Array, bytes] | None:
         """State and telemetry blob of the newest good slot, or None on a first start.
@@ -57,7 +57,7 @@ class Journal:
         self._newest, self._has_looked = None, True
         for place, slot in enumerate(self._slots):
             try:
-                found = unpack(read_slot(slot))
+                found = unpack(self._disk.read(slot))
             except FileNotFoundError:
                 continue
             except (SavedStateError, OSError) as error:
@@ -115,38 +115,12 @@ class Journal:
                 yield place
 
     def _write(self, place: int, data: bytes) -> None:
-        slot = self._slots[place]
-        descriptor = os.open(slot, os.O_RDWR | os.O_CREAT, 0o600)
-        try:
-            os.posix_fallocate(descriptor, 0, len(data))  # a full disk is known before anything is written over
-            rest = memoryview(data)
-            while rest:
-                rest = rest[os.write(descriptor, rest) :]
-            os.fsync(descriptor)
-            os.posix_fadvise(descriptor, 0, 0, os.POSIX_FADV_DONTNEED)  # so that the disk is read, not its cache
-            if os.pread(descriptor, len(data), 0) != data:
-                raise OSError(errno.EIO, "saved state: expected to read what was written, got other bytes", str(slot))
-        finally:
-            os.close(descriptor)
+        slot, disk = self._slots[place], self._disk
+        disk.reserve(slot, len(data))  # a full disk is known before anything is written over
+        disk.write(slot, data)
+        disk.force(slot)
+        if disk.read(slot, 0, len(data)) != data:
+            raise OSError(errno.EIO, "saved state: expected to read what was written, got other bytes", str(slot))
         if place not in self._there:
-            sync_folder(slot.parent)
+            disk.force_names(slot.parent)
             self._there.add(place)
-
-
-def read_slot(slot: Path) -> bytes:
-    """All bytes of a slot."""
-    descriptor = os.open(slot, os.O_RDONLY)
-    try:
-        parts = list(iter(lambda: os.read(descriptor, CHUNK), b""))
-    finally:
-        os.close(descriptor)
-    return b"".join(parts)
-
-
-def sync_folder(folder: Path) -> None:
-    """Force the names in ``folder`` to the disk: a new file is not kept by forcing its bytes alone."""
-    descriptor = os.open(folder, os.O_RDONLY)
-    try:
-        os.fsync(descriptor)
-    finally:
-        os.close(descriptor)

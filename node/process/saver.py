@@ -18,6 +18,7 @@ from node.kernels.layout import Array
 from node.process.journal import SLOTS, Journal
 from telemetry.application.saved_state import STATE_LAYOUT, layout_of
 from telemetry.messages import Scalar, Severity
+from telemetry.runtime.disk import MACHINE, Disk
 
 SAVE_EVERY: Final = 570  # cycles without any other save, 300 s
 RETRY_EVERY: Final = 57  # cycles until a save that the disk refused is tried again, 30 s
@@ -37,8 +38,8 @@ class Saver:
     due : what must not be lost waits for the end of this cycle or frame
     """
 
-    def __init__(self, folder: Path) -> None:
-        self._journal = Journal(folder)
+    def __init__(self, folder: Path, disk: Disk = MACHINE) -> None:
+        self._journal = Journal(folder, disk=disk)
         self._cycles = 0  # since the last save
         self._allowed = AT_ONCE  # saves that may still follow at once
         self._spaced = 0  # cycles since the newest of these was allowed

@@ -8,11 +8,12 @@ all later places have been. Losing the log loses nothing but this second chance.
 from __future__ import annotations
 
 import contextlib
-import os
 import struct
 import zlib
 from pathlib import Path
 from typing import Final
+
+from telemetry.runtime.disk import MACHINE, Disk
 
 PLACES: Final = 256
 PLACE_SIZE: Final = 4608  # bytes: the largest payload and its header
@@ -24,7 +25,8 @@ AFTER_CRC: Final = 8  # bytes of the header that the checksum does not cover
 class SurveyLog:
     """Log in ``folder``; a disk that refuses is counted in ``refused`` and ends nothing."""
 
-    def __init__(self, folder: Path) -> None:
+    def __init__(self, folder: Path, disk: Disk = MACHINE) -> None:
+        self._disk = disk
         self._path = folder / "surveys"
         self._held: dict[int, int] = {}  # place by sequence number, the oldest first
         self._payloads_lost = False
@@ -38,12 +40,8 @@ class SurveyLog:
         body = struct.pack("<QH", sequence, len(payload)) + payload
         record = MAGIC + zlib.crc32(body).to_bytes(4, "little") + body
         try:
-            descriptor = os.open(self._path, os.O_RDWR | os.O_CREAT, 0o600)
-            try:
-                os.pwrite(descriptor, record.ljust(PLACE_SIZE, b"\0"), place * PLACE_SIZE)
-                os.fsync(descriptor)
-            finally:
-                os.close(descriptor)
+            self._disk.write(self._path, record.ljust(PLACE_SIZE, b"\0"), place * PLACE_SIZE)
+            self._disk.force(self._path)
         except OSError:
             self.refused += 1
             return
@@ -57,7 +55,9 @@ class SurveyLog:
         found = []
         for sequence in sorted(number for number in self._held if first <= number <= last):
             with contextlib.suppress(OSError):
-                if (read := read_place(self._path, self._held[sequence])) is not None and read[0] == sequence:
+                if (read := read_place(self._disk, self._path, self._held[sequence])) is not None and read[
+                    0
+                ] == sequence:
                     found.append(read)
         return found
 
@@ -76,8 +76,9 @@ class SurveyLog:
     def _look(self) -> None:
         """Find what the places hold, damaged ones being free; number order is the order of age."""
         found = {}
-        for place in range(min(PLACES, -(-self._path.stat().st_size // PLACE_SIZE))):
-            if (read := read_place(self._path, place)) is not None:
+        size = len(self._disk.read(self._path))
+        for place in range(min(PLACES, -(-size // PLACE_SIZE))):
+            if (read := read_place(self._disk, self._path, place)) is not None:
                 found[read[0]] = place
             else:
                 self._payloads_lost = True
@@ -85,13 +86,9 @@ class SurveyLog:
         self._payloads_lost = self._payloads_lost or len(self._held) == PLACES
 
 
-def read_place(path: Path, place: int) -> tuple[int, bytes] | None:
+def read_place(disk: Disk, path: Path, place: int) -> tuple[int, bytes] | None:
     """Number and payload in a place, None where it is empty, torn or damaged."""
-    descriptor = os.open(path, os.O_RDONLY)
-    try:
-        record = os.pread(descriptor, PLACE_SIZE, place * PLACE_SIZE)
-    finally:
-        os.close(descriptor)
+    record = disk.read(path, place * PLACE_SIZE, PLACE_SIZE)
     if len(record) < HEADER.size:
         return None
     magic, crc, sequence, size = HEADER.unpack_from(record)

@@ -47,6 +47,7 @@ from telemetry.messages import (
     SurveyMeasurement,
 )
 from telemetry.presentation.msgpack_codec import encode
+from telemetry.runtime.disk import MACHINE, Disk
 from telemetry.runtime.joint_watch import JointFault
 from telemetry.runtime.process import Process
 from telemetry.runtime.timing import CycleTiming, Stage
@@ -71,6 +72,7 @@ class TubeProcess(Process):
     key : of the rig; without one, and without seals, the node takes no parameter block
     imus : the node's own sensors, as many as the settings have; without any a cycle brings its reading
     timing : durations of its cycles with an own clock; None where it is stepped
+    disk : that holds the folder
     seals : what it says and believes under keys; None: everybody is believed
 
     Raises
@@ -87,6 +89,7 @@ class TubeProcess(Process):
         key: bytes | None = None,
         imus: Sequence[ImuSource] = (),
         timing: CycleTiming | None = None,
+        disk: Disk = MACHINE,
         seals: Seals | None = None,
     ) -> None:
         self.settings = settings
@@ -101,17 +104,17 @@ class TubeProcess(Process):
         self._sources = imus
         self._imus = [SafeImu(imu, self._send_event, k if len(imus) > 1 else 0) for k, imu in enumerate(imus, 1)]
         self.config = default_config() if config is None else config
-        self._saver = Saver(folder)
+        self._saver = Saver(folder, disk)
         # apart from the saved state: a node that lost its state must not look like an earlier boot
-        counter = BootCounter(folder)
+        counter = BootCounter(folder, disk=disk)
         self.boots, self._counter_fault = counter.boots, counter.fault
-        self._log = SurveyLog(folder)
+        self._log = SurveyLog(folder, disk)
         self._dropped = 0
         self._looked_at_drops = -math.inf
         saved = self._saver.load()
         self.nodes, telemetry = saved if saved else (new_node(self.config), None)
         self._cut = resume(self.nodes, self.config) if saved else False
-        store = BlockStore(folder)
+        store = BlockStore(folder, disk)
         parameters = load_parameters(store, settings.tube)
         self._fallback = "; ".join(store.faults)
         if self._fallback:
@@ -275,8 +278,8 @@ class TubeProcess(Process):
         flags = state.flags | (NodeFlag.NOT_SAVED if self._saver.is_refused else NodeFlag.NONE)
         endpoint = self.endpoint
         upper, lower = (endpoint.margin(side) for side in Side)
-        known = replace(state, flags=flags, epoch=endpoint.clock.epoch, numbered=endpoint.newest_sequence)
-        return replace(known, upper_margin=upper, lower_margin=lower)
+        known = replace(state, flags=flags, hops=endpoint.told_hops, epoch=endpoint.clock.epoch)
+        return replace(known, numbered=endpoint.newest_sequence, upper_margin=upper, lower_margin=lower)
 
     def _keep(self, said: Kept, now: float) -> None:
         """Keep a message for the ground station; surveys and records stay in the log when it has them."""

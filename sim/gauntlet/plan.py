@@ -4,24 +4,35 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from sim.gauntlet.kinds import KIND_OF, KINDS, Step
+from sim.gauntlet.fault import Step
+from sim.gauntlet.kinds import KINDS
 from sim.world.streams import Stream, stream
 
+ALONE = frozenset(kind.name for kind in KINDS if kind.alone)
 TOGETHER = 3.0  # kinds switched on in a seed, on the average
 
 
 def drawn_kinds(seed: int, allowed: Sequence[str]) -> tuple[str, ...]:
     """Names of the kinds that a seed switches on, at least one of those allowed."""
     share = min(TOGETHER / len(allowed), 1.0)
-    switches = {kind.name: stream(seed, Stream.GAUNTLET, 0, n).random() for n, kind in enumerate(KINDS)}
+    switches = dict(
+        zip((kind.name for kind in KINDS), stream(seed, Stream.GAUNTLET, 0).random(len(KINDS)), strict=True)
+    )
     on = tuple(name for name in switches if name in allowed and switches[name] < share)
-    return on or (min(allowed, key=lambda name: switches[name]),)
+    on = on or (min(allowed, key=lambda name: switches[name]),)
+    alone = [name for name in on if name in ALONE]
+    return (alone[0],) if alone else on
 
 
-def steps_of(seed: int, kinds: Sequence[str], begin: float, end: float) -> list[Step]:
-    """Steps of the faults of these kinds between two rig times (s), in order of time."""
-    steps: list[Step] = []
-    for number, kind in enumerate(KINDS):
-        if kind.name in kinds:
-            steps += KIND_OF[kind.name].draw(stream(seed, Stream.GAUNTLET, 1, number), begin, end)
-    return sorted(steps, key=lambda step: step.at)
+def steps_of(seed: int, kinds: Sequence[str], begin: float, end: float) -> list[tuple[str, Step]]:
+    """Steps of the faults of these kinds, in order of time, each with the name of its kind.
+
+    No fault begins before ``begin`` (s, rig time), and each is over so long before ``end`` that all can be well again.
+    """
+    steps = [
+        (kind.name, step)
+        for number, kind in enumerate(KINDS)
+        if kind.name in kinds
+        for step in kind.draw(stream(seed, Stream.GAUNTLET, 1, number), begin, end - kind.recovery)
+    ]
+    return sorted(steps, key=lambda one: one[1].at)

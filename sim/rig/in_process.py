@@ -35,7 +35,7 @@ class InProcessStepper:
         carry: Callable[[bytes], bytes] = bytes,
     ) -> None:
         self._carry = carry
-        self._builders = builders
+        self.builders = dict(builders)
         self._act_on_cue = act_on_cue
         self.processes: dict[int, Process] = {}
 
@@ -78,9 +78,9 @@ class InProcessStepper:
         }
 
     def _build(self, address: int) -> Process:
-        if address not in self._builders:
+        if address not in self.builders:
             raise RigError(f"process {address_name(address)}: this rig has no such process")
-        return self._builders[address]()
+        return self.builders[address]()
 
 
 def step(process: Process, events: list[FrameEvent], carry: Callable[[bytes], bytes] = bytes) -> Answer:

@@ -17,6 +17,7 @@ from collections.abc import Callable
 from dataclasses import dataclass, field
 from functools import partial
 
+from node.kernels.layout import PERIOD
 from sim.errors import RigError
 from sim.rig.link_channel import LinkChannel
 from sim.rig.radio_channel import RadioChannel
@@ -129,10 +130,15 @@ class Scheduler:
         self._tell(self.progress)
         return finished
 
-    def begin(self) -> None:
-        """Have the first processes started and everything that will change put in order of time."""
-        self._changes = deque(self._all_changes())
-        self._push(self.world.cycle_end(0), -1, None, b"")
+    def begin(self, at: float | None = None) -> None:
+        """Have the first processes started and everything that will change put in order of time.
+
+        A rig that has drilled before goes on ``at`` a rig time (s), what the schedule did until then being done.
+        """
+        since = self.world.begin if at is None else at
+        self._changes = deque(change for change in self._all_changes() if change.at >= since)
+        self._cycle = math.ceil((since - self.world.begin) / PERIOD - 1e-9)
+        self._push(self.world.cycle_end(self._cycle), -1, None, b"")
         self._attach(ENCODER)
         self._attach(BASE)
         if self.world.rack is None:

@@ -32,7 +32,7 @@ class Stream(IntEnum):
     RADIO = 22  # fate and delays of the frames from one port to another
     RADIO_FADE = 23  # constant loss of a joint
     RADIO_BURSTS = 24
-    GAUNTLET = 25  # 0: which kinds of faults, 1: when and what; number of the kind
+    GAUNTLET = 25  # 0: which kinds of faults, 1: when and what, 2: ports, 3: strangers, 4: disks, 5: disks before
     LOTS = 26  # of starts that are numbered by lot
     WELLS = 2000  # a string in one of many wells, for the coverage of ellipses
     TURN_TABLE = 3001  # a gyroscope and its table

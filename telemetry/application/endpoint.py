@@ -148,6 +148,7 @@ class Endpoint:
         self.mode = Mode.BOOT
         self.neighbours: dict[Side, Neighbour | None] = dict.fromkeys(Side)
         self.hops = 0 if address == ENCODER else HOPS_UNKNOWN
+        self._hops_are_told = address == ENCODER
         self._reach = reach
         self._links = {side: HopLink(address, boot_count, self._nearest(side)) for side in sorted(sides)}
         for side in sides:
@@ -283,6 +284,11 @@ class Endpoint:
         self._outbox.keep_payload(sequence, payload, now)
 
     @property
+    def told_hops(self) -> int:
+        """Distance from the encoder as a neighbour told it since the start; a saved one may be of another string."""
+        return self.hops if self._hops_are_told else HOPS_UNKNOWN
+
+    @property
     def newest_sequence(self) -> int:
         """Newest number given out, 0 before the first."""
         return self._next_sequence - 1 if self._next_sequence & ((1 << SERIES_SHIFT) - 1) > 1 else 0
@@ -342,6 +348,11 @@ class Endpoint:
     def outbox_size(self) -> int:
         """Surveys and events that the ground station has not receipted yet."""
         return len(self._outbox)
+
+    @property
+    def waiting(self) -> int:
+        """Payloads queued or on their way in both links."""
+        return sum(link.waiting for link in self._links.values())
 
     def link_counters(self) -> dict[str, int]:
         """Counts of all that went wrong or was dropped, of both ends."""
@@ -403,7 +414,9 @@ class Endpoint:
         hops = hello.hops + 1 + self.skipped
         if hops > MAX_TUBE:
             self.counters["impossible_hops"] += 1
-        elif hops != self.hops:
+            return
+        self._hops_are_told = True
+        if hops != self.hops:
             self.hops = hops
             self._hello_at = -math.inf
 

@@ -124,6 +124,39 @@ def test_after_a_jump_nothing_is_believed_until_it_returns(by: float) -> None:
     assert bit.log.at(EPOCH, at) is None  # the stand at the wrong depth, which the source repeats, is not believed
 
 
+def test_a_stand_of_the_time_of_a_jump_is_not_believed_when_the_depth_has_returned() -> None:
+    """The bit goes on to its stop while the depth is off, and the source repeats the wrong stand for ever."""
+    bit = Bit()
+    bit.move_to(2.0)
+    bit.now += CYCLE
+    assert bit.read(3.0) == "after a jump"
+    at = bit.stand(30.0)
+    bit.now += CYCLE
+    assert bit.read(2.0) == ""
+    assert bit.stand(10.0) > at
+    bit.hear_stands()
+    assert [stand.md for stand in bit.log.stands] == [2.0]
+    assert bit.log.at(EPOCH, at) is None
+
+
+def test_two_stands_that_contradict_each_other_are_both_doubtful_and_the_present_is_a_jump() -> None:
+    """A ground station that was off while the depth went wrong sees only stands between which no bit can move."""
+    bit = Bit()
+    bit.move_to(2.0, heard=False)
+    right = bit.stand(20.0, heard=False)
+    bit.now += CYCLE
+    bit.read(0.5, heard=False)
+    wrong = bit.stand(20.0, heard=False)
+    bit.hear_stands()
+    assert bit.log.jumped != ""
+    assert bit.stand(10.0)
+    assert bit.log.at(EPOCH, right) is bit.log.at(EPOCH, wrong) is None
+    bit.now += CYCLE
+    bit.read(2.0)
+    assert bit.log.jumped == ""
+    assert bit.log.at(EPOCH, bit.stand(10.0)) == 2.0
+
+
 def test_the_crew_may_accept_the_depth_after_a_jump() -> None:
     bit = Bit()
     bit.move_to(2.0)

@@ -18,7 +18,7 @@ from groundstation.service import alarm_views, column_views
 from groundstation.service.model import RigModel
 from groundstation.survey.ellipsoid import plan_ellipse
 from groundstation.survey.resolve import angles
-from telemetry.messages import ImuMean, NodeFlag, SurveyMeasurement
+from telemetry.messages import ImuMean, Mode, NodeFlag, NodeState, SurveyMeasurement
 
 G = 9.81
 DEG = math.pi / 180.0
@@ -385,3 +385,22 @@ def test_the_alarms_tell_of_stations_that_moved(tmp_path: Path) -> None:
             "departure_sigma": moved.evidence.own,
             "neighbours_sigma": list(moved.evidence.neighbours),
         }
+
+
+def node_state(tube: int, at: float, cycles: int) -> NodeState:
+    return NodeState(
+        tube, at, 1, Mode.STILL, 0.0, VAR, 0.0, (0.0, 0.0, 0.0), 0.0, 0.0, VAR, 0.5, 1e-8, NodeFlag.NONE, cycles, 0
+    )
+
+
+def test_a_state_that_was_recorded_is_no_sign_of_life(tmp_path: Path) -> None:
+    model = RigModel(GroundConfig(folder=tmp_path))
+    old = node_state(1, at=100.0, cycles=50)
+    for now, state in ((0.0, old), (1.0, node_state(1, at=101.0, cycles=52))):
+        model.now = now
+        model.on_state(state, now)
+    model.now = 60.0
+    model.on_state(old, 60.0)
+    assert model.is_stale(1)
+    model.on_state(node_state(1, at=160.0, cycles=1), 60.0)  # a tube that has started again counts its cycles anew
+    assert not model.is_stale(1)

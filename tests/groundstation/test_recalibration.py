@@ -22,6 +22,7 @@ from node.process.block_store import BlockStore
 from node.process.tube_process import TubeProcess
 from telemetry.messages import BASE, ENCODER, BlockSegment, StaticRecord, UploadPhase
 from telemetry.parameters import ParameterBlock, SensorParameters
+from telemetry.runtime import disk as disk_room
 from telemetry.transport.authentication import new_key, read_key
 
 MATRIX = np.array([[1.01, 0.004, -0.003], [0.002, 0.99, 0.005], [-0.001, 0.003, 1.005]])
@@ -208,10 +209,7 @@ def test_a_power_cut_at_any_step_of_the_change_leaves_one_block_whole(rig: Rig) 
     rig.run(70.0)
     home, cuts = rig.folder / "1", []
     process = rig.tube(1)
-    import node.process.block_store as store_room
-    import node.process.journal as journal_room
-
-    plain_fsync = store_room.os.fsync
+    plain_fsync = disk_room.os.fsync
 
     def fsync(descriptor: int) -> None:
         cuts.append(rig.folder / f"cut-{len(cuts)}")
@@ -220,7 +218,7 @@ def test_a_power_cut_at_any_step_of_the_change_leaves_one_block_whole(rig: Rig) 
 
     order = rig.ground.operator.upload(block(2, bias=2e-3))
     with pytest.MonkeyPatch.context() as patched:
-        patched.setattr(journal_room.os, "fsync", fsync)
+        patched.setattr(disk_room.os, "fsync", fsync)
         rig.run(60.0, lambda: order.ended)
     assert process.tube.parameters.version == 2
     versions = []

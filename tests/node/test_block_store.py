@@ -1,7 +1,6 @@
 """Parameter blocks on disk under power cuts and a disk that refuses."""
 
 import errno
-import os
 from pathlib import Path
 from typing import Any
 
@@ -12,6 +11,7 @@ from hypothesis import strategies as st
 from node.process.block_store import SLOT_SIZE, BlockStore, pack_slot, unpack_slot
 from telemetry.errors import DecodeError
 from telemetry.parameters import ParameterBlock, SensorParameters
+from telemetry.runtime.disk import MachineDisk
 
 
 def block(version: int) -> ParameterBlock:
@@ -77,39 +77,24 @@ def test_a_slot_torn_at_any_byte_falls_back_to_the_one_before(folder: Path) -> N
         assert faults[0].startswith("parameters-0")
 
 
-STEPS = ("open", "write", "fsync", "replace", "fsync folder")
+STEPS = ("write", "half of the write", "force", "rename", "force_names")
 
 
 def break_step(monkeypatch: pytest.MonkeyPatch, step: str) -> None:
     """Make one step of the writing fail as a full or dying disk would."""
-    plain_open, plain_fsync = Path.open, os.fsync
-    calls = {"fsync": 0}
+    plain_write = MachineDisk.write
 
     def fail(*_: Any) -> Any:
         raise OSError(errno.ENOSPC, "No space left on device")
 
-    def opened(path: Path, mode: str = "r", *rest: Any, **more: Any) -> Any:
-        file = plain_open(path, mode, *rest, **more)
-        if mode == "wb":
-            if step == "open":
-                file.close()
-                fail()
-            if step == "write":
-                file.write(b"half of it")
-                file.close()
-                fail()
-        return file
+    def write_half(disk: MachineDisk, path: Path, data: bytes, offset: int = 0) -> None:
+        plain_write(disk, path, data[: len(data) // 2], offset)
+        fail()
 
-    def fsync(descriptor: int) -> None:
-        calls["fsync"] += 1
-        if calls["fsync"] == {"fsync": 1, "fsync folder": 2}.get(step):
-            fail()
-        plain_fsync(descriptor)
-
-    monkeypatch.setattr(Path, "open", opened)
-    monkeypatch.setattr(os, "fsync", fsync)
-    if step == "replace":
-        monkeypatch.setattr(Path, "replace", fail)
+    if step == "half of the write":
+        monkeypatch.setattr(MachineDisk, "write", write_half)
+    else:
+        monkeypatch.setattr(MachineDisk, step, fail)
 
 
 @pytest.mark.parametrize("step", STEPS)

@@ -16,10 +16,10 @@ from node.firmware.saved_state import FIELDS, layout_name, pack
 from node.firmware.settings import TubeSettings
 from node.kernels.layout import PERIOD, default_config
 from node.kernels.record import NODE_LAYOUT, new_node
-from node.process import journal as journal_module
 from node.process.counter import LOTS, BootCounter
 from node.process.journal import SLOTS, Journal
 from node.process.tube_process import TubeProcess
+from telemetry.runtime import disk as disk_module
 
 CUTS = 1000
 SECTOR = 512
@@ -41,7 +41,6 @@ class Disk:
         self.names = set(self.forced)
         self._cached: dict[str, bytearray] = {}
         self._open: dict[int, str] = {}
-        self._at: dict[int, int] = {}
         self.left: float = np.inf
         self.spent = 0
 
@@ -53,9 +52,9 @@ class Disk:
         self._spend(BOUNDARY)
         descriptor = os.open(path, flags, mode)
         name = "" if path == self._folder else path.name
-        self._open[descriptor], self._at[descriptor] = name, 0
-        if name:
-            self._cached[name] = bytearray(self.forced.get(name, b""))
+        self._open[descriptor] = name
+        if name and flags & os.O_RDWR:
+            self._cached.setdefault(name, bytearray(self.forced.get(name, b"")))
         return descriptor
 
     def posix_fallocate(self, descriptor: int, begin: int, length: int) -> None:
@@ -64,13 +63,11 @@ class Disk:
         cached.extend(bytes(max(begin + length - len(cached), 0)))
         self._spend(BOUNDARY)
 
-    def write(self, descriptor: int, data: memoryview) -> int:
+    def pwrite(self, descriptor: int, data: memoryview, at: int) -> int:
         length = min(len(data), int(self._random.integers(1, 2 * len(data) + 1)))  # a call may write less
         allowed = min(length, int(min(self.left, 2**40)))
-        os.write(descriptor, data[:allowed])
-        at = self._at[descriptor]
+        os.pwrite(descriptor, data[:allowed], at)
         self._cached[self._open[descriptor]][at : at + allowed] = data[:allowed]
-        self._at[descriptor] = at + allowed
         self._spend(length)
         return length
 
@@ -150,7 +147,7 @@ def test_a_cut_at_any_instant_leaves_the_old_or_the_new_node(tmp_path: Path, mon
         for life in range(int(random.integers(1, 4))):
             wanted = (100 + life, random.bytes(int(random.integers(0, 3000))))
             disk = Disk(folder, random)
-            total = len(pack(marked(0), wanted[1], 0)) + 5 * BOUNDARY
+            total = len(pack(marked(0), wanted[1], 0)) + 8 * BOUNDARY
             disk.left = float(random.integers(0, total + BOUNDARY))
             survivor = Journal(folder)
             loaded = survivor.load()
@@ -158,7 +155,7 @@ def test_a_cut_at_any_instant_leaves_the_old_or_the_new_node(tmp_path: Path, mon
             assert (int(loaded[0][0]["filter"]["now_yaw"]), loaded[1]) == before
             target = (place + 1) % SLOTS
             with monkeypatch.context() as patch:
-                patch.setattr(journal_module, "os", disk)
+                patch.setattr(disk_module, "os", disk)
                 try:
                     survivor.save(marked(wanted[0]), wanted[1])
                     done = True
@@ -186,7 +183,7 @@ def test_the_first_state_ever_is_on_the_disk_with_its_name(tmp_path: Path, monke
         journal = Journal(folder)
         disk = Disk(folder, np.random.default_rng(cut))
         with monkeypatch.context() as patch:
-            patch.setattr(journal_module, "os", disk)
+            patch.setattr(disk_module, "os", disk)
             journal.save(marked(7), b"first")
         disk.after_cut()
         assert found(folder) == (7, b"first")
@@ -202,7 +199,7 @@ def test_a_disk_that_is_full_spares_the_state_before(
     def refuse(*_: object) -> int:
         raise OSError(error, os.strerror(error))
 
-    monkeypatch.setattr(journal_module.os, "write", refuse)
+    monkeypatch.setattr(disk_module.os, "pwrite", refuse)
     with pytest.raises(OSError, match=os.strerror(error)):
         journal.save(marked(2), b"two")
     monkeypatch.undo()

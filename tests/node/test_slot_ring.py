@@ -13,6 +13,7 @@ from node.kernels.layout import default_config
 from node.kernels.record import new_node
 from node.process import journal as journal_module
 from node.process.journal import SLOTS, Journal
+from telemetry.runtime import disk as disk_module
 
 SAVES = 100_000
 LIFE = 997  # saves between two starts
@@ -44,7 +45,7 @@ class Flash:
 
     def posix_fallocate(self, descriptor: int, begin: int, length: int) -> None: ...
 
-    def write(self, descriptor: int, data: memoryview) -> int:
+    def pwrite(self, descriptor: int, data: memoryview, at: int) -> int:
         name = self._open
         self.writes[name] += 1
         if fault := self.worn.get(name, 0):
@@ -77,7 +78,7 @@ def unpacked(data: bytes) -> Saved:
 def flash(monkeypatch: pytest.MonkeyPatch) -> Flash:
     """A disk that holds nothing but the number of each save."""
     made = Flash()
-    monkeypatch.setattr(journal_module, "os", made)
+    monkeypatch.setattr(disk_module, "os", made)
     monkeypatch.setattr(journal_module, "pack", lambda state, blob, generation: generation.to_bytes(NUMBER, "little"))
     monkeypatch.setattr(journal_module, "unpack", unpacked)
     return made

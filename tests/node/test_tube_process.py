@@ -9,12 +9,12 @@ import numpy as np
 import pytest
 
 from node.firmware.settings import Joint, TubeSettings
-from node.kernels.layout import DEG, PERIOD
+from node.kernels.layout import DEG, PERIOD, Err
 from node.process.journal import Journal
 from node.process.saver import AT_ONCE, SAVE_EVERY, SPACING
 from node.process.tube_process import TubeProcess
 from telemetry.application.clock import ClockFilter
-from telemetry.messages import Aiding, Side
+from telemetry.messages import HOPS_UNKNOWN, Aiding, Side
 from telemetry.schema import VARIANCE
 
 REST = (0.0, 0.0, 0.0, 0.0, 0.3, -9.8)
@@ -231,3 +231,21 @@ def test_a_node_runs_on_where_the_disk_refuses_and_says_so_once(
     process._saver._journal.worn |= {7}
     noisy(process, 3, now, TURN)
     assert told == ["state_not_saved", "saved_slot_worn"]
+
+
+def test_a_place_in_the_string_that_was_saved_is_not_told_as_known(tmp_path: Path) -> None:
+    """Two tubes that were given each other's saved state must not turn the ground station's order round."""
+    first = TubeProcess(TubeSettings(3), tmp_path)
+    first.endpoint.hops = 2
+    first.close()
+    again = TubeProcess(TubeSettings(3), tmp_path)
+    assert again.endpoint.hops == 2
+    assert again.endpoint.told_hops == HOPS_UNKNOWN
+
+
+def test_a_yaw_of_any_variance_can_be_said(tmp_path: Path) -> None:
+    process = TubeProcess(TubeSettings(3, state_every=1), tmp_path)
+    process.nodes[0]["filter"]["now_P"][Err.YAW, Err.YAW] = 470.0
+    process.nodes[0]["filter"]["P"][Err.YAW, Err.YAW] = 470.0
+    cycles(process, 3)
+    assert process.endpoint.counters["unsayable"] == 0

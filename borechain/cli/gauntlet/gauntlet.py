@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-import time
+from dataclasses import asdict
 from typing import TYPE_CHECKING, Any
 
 import click
@@ -13,6 +13,9 @@ from borechain.cli.faults import EnvironmentFault, InputFault, needs, plain_faul
 if TYPE_CHECKING:
     from borechain.gauntlet.run import Outcome
 
+WORTH_A_PROCESS = 50  # seeds, for which a process more is started
+BATCH = 200  # seeds shown at a time
+
 
 @click.command()
 @click.option("--seeds", type=click.IntRange(1), default=20, show_default=True, help="How many seeds to run.")
@@ -21,37 +24,57 @@ if TYPE_CHECKING:
 @click.option("--faults", help="Kinds of faults to draw from, as a,b,c  [default: all].")
 @click.option("--exactly", help="Kinds of faults to switch on, whatever the seed says, as a,b,c.")
 @click.option("--list", "listed", is_flag=True, help="List the kinds of faults.")
-@click.option("--json", "as_json", is_flag=True, help="Print one JSON object a seed.")
+@click.option(
+    "--plan",
+    type=click.Choice(["minute", "drilled-in"]),
+    default="minute",
+    show_default=True,
+    help="A string that drills for a minute, or one that is drilled in tube by tube.",
+)
+@click.option("--soak", "hours", type=click.FloatRange(1.0), help="Instead, hours of rig time of one rig under faults.")
+@click.option("--json", "as_json", is_flag=True, help="Print one JSON object a seed, and one of the whole.")
 @needs("scipy", "sqlalchemy")
 @plain_faults
 def gauntlet(
-    seeds: int, first: int, seed: int | None, faults: str | None, exactly: str | None, listed: bool, as_json: bool
+    seeds: int,
+    first: int,
+    seed: int | None,
+    faults: str | None,
+    exactly: str | None,
+    listed: bool,
+    hours: float | None,
+    plan: str,
+    as_json: bool,
 ) -> None:
-    """Drill a rig of two tubes in this process under faults that each seed draws, and judge what the crew sees.
+    """Drill with a string of two tubes in this process under faults that each seed draws; judge what the crew sees.
 
     \b
     Examples:
       borechain gauntlet --seeds 100
       borechain gauntlet --seed 17 --exactly node-cut,loss
+      borechain gauntlet --soak 24
     """
-    from borechain.gauntlet.run import ALL, run_seed, shrink
+    from borechain.gauntlet.run import ALL, judged
     from sim.gauntlet.kinds import KINDS
+    from sim.studies.pool import over_cores
 
     if listed:
         for kind in KINDS:
             click.echo(f"{kind.name:20} {kind.meaning}")
         return
+    if hours is not None:
+        _soak(hours, first, as_json=as_json)
+        return
     allowed, kinds = _names(faults, "--faults", ALL), _names(exactly, "--exactly", ()) or None
-    began, failed = time.monotonic(), 0
-    numbers = [seed] if seed is not None else range(first, first + seeds)
-    for number in numbers:
-        outcome = run_seed(number, allowed, kinds)
-        if outcome.violations:
-            failed += 1
-            outcome = shrink(number, outcome.kinds)
-        _show(outcome, as_json=as_json)
-    if not as_json:
-        click.echo(f"{len(numbers)} seeds, {failed} failed, {time.monotonic() - began:.1f} s")
+    numbers = [seed] if seed is not None else list(range(first, first + seeds))
+    failed, cpu_s = 0, 0.0
+    with over_cores(len(numbers) // WORTH_A_PROCESS, lambda: None) as run_all:
+        for batch in (numbers[k : k + BATCH] for k in range(0, len(numbers), BATCH)):
+            for outcome in run_all(judged, [(number, allowed, kinds, plan) for number in batch]):
+                failed += bool(outcome.violations)
+                cpu_s += outcome.cpu_s
+                _show(outcome, as_json=as_json)
+    _show_figures(len(numbers), failed, cpu_s, as_json=as_json)
     if failed:
         raise EnvironmentFault(f"{failed} of {len(numbers)} seeds failed; each is named above with what repeats it")
 
@@ -69,16 +92,56 @@ def _names(text: str | None, option: str, default: tuple[str, ...]) -> tuple[str
 
 
 def _show(outcome: Outcome, *, as_json: bool) -> None:
+    from borechain.gauntlet.run import USUAL
+
     row: dict[str, Any] = {
         "seed": outcome.seed,
         "faults": list(outcome.kinds),
         "violations": outcome.violations,
         "alarms": outcome.alarms,
+        "cleared": outcome.cleared,
         "measurements": outcome.measurements,
+        "schedule": outcome.schedule,
         "digest": outcome.digest,
     }
     if as_json:
         click.echo(json.dumps(row))
     elif outcome.violations:
         click.echo(f"seed {outcome.seed} failed: {'; '.join(outcome.violations)}")
-        click.echo(f"  borechain gauntlet --seed {outcome.seed} --exactly {','.join(outcome.kinds)}")
+        for line in outcome.schedule:
+            click.echo(f"  {line}")
+        plan = f" --plan {outcome.plan}" if outcome.plan != USUAL else ""
+        click.echo(f"  borechain gauntlet --seed {outcome.seed} --exactly {','.join(outcome.kinds)}{plan}")
+
+
+def _soak(hours: float, seed: int, *, as_json: bool) -> None:
+    """Show what a long run needs, a line now and then."""
+    from borechain.gauntlet.soak import soak
+
+    found: tuple[str, ...] = ()
+    for sample in soak(hours, seed):
+        found = sample.violations
+        if as_json:
+            click.echo(json.dumps(asdict(sample)))
+        else:
+            click.echo(
+                f"{sample.hours:7.1f} h {sample.memory_mib:7.1f} MiB {sample.handles:4d} handles "
+                f"{sample.database_kib:8.1f} KiB {sample.surveys:5d} surveys {len(found):3d} wrong"
+            )
+    if found:
+        raise EnvironmentFault(f"after {hours:g} h: {'; '.join(found)}")
+
+
+def _show_figures(seeds: int, failed: int, cpu_s: float, *, as_json: bool) -> None:
+    """How many seeds ran and failed, and how many a minute of one core."""
+    a_minute = 60.0 * seeds / cpu_s
+    if as_json:
+        figures = {
+            "seeds": seeds,
+            "failed": failed,
+            "cpu_s": round(cpu_s, 2),
+            "runs_per_cpu_minute": round(a_minute, 1),
+        }
+        click.echo(json.dumps(figures))
+    else:
+        click.echo(f"{seeds} seeds, {failed} failed, {a_minute:.0f} a minute of one core")

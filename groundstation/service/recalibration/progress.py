@@ -94,7 +94,7 @@ class Progress:
 
     def to_json(self) -> str:
         """Text for the database."""
-        return json.dumps(asdict(self), sort_keys=True)
+        return IDLE_TEXT if self == IDLE else json.dumps(asdict(self), sort_keys=True)
 
     @classmethod
     def from_json(cls, text: str) -> Progress:
@@ -163,3 +163,7 @@ def found_view(found: Found) -> View:
 def sensor_view(sensor: SensorParameters) -> View:
     """Matrix and bias at the reference temperature."""
     return {"matrix": [list(row) for row in sensor.matrix], "bias_mps2": list(sensor.bias)}
+
+
+IDLE = Progress()
+IDLE_TEXT = json.dumps(asdict(IDLE), sort_keys=True)  # asked for at every timer of a rig that calibrates nothing

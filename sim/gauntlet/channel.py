@@ -1,0 +1,71 @@
+"""The joints of a rig under faults: each port may lose, delay and reorder frames by itself, and is overheard."""
+
+from __future__ import annotations
+
+from collections import deque
+from collections.abc import Callable
+
+import numpy as np
+
+from sim.rig.link_channel import LinkChannel
+from sim.world.streams import Stream, stream
+from telemetry.messages import Side
+
+OVERHEARD = 64  # frames of a port that a hostile neighbour has recorded
+Port = tuple[int, Side]
+
+
+class FaultyChannel(LinkChannel):
+    """A channel whose faults can be changed at any time.
+
+    Attributes
+    ----------
+    port_loss : probability of a frame that leaves a port, beside that of all
+    port_delay : s by which what leaves a port is late
+    reordering : s within which frames come in any order
+    burst : probability that a frame begins a burst, in which the next 20 are lost
+    overheard : the newest frames of each port
+    listeners : are called with sender, side and bytes of every frame
+    """
+
+    def __init__(self, seed: int, latency: float, jitter: float, loss: float, duplicate: float) -> None:
+        super().__init__(seed, latency, jitter, loss, duplicate)
+        self.port_loss: dict[Port, float] = {}
+        self.port_delay: dict[Port, float] = {}
+        self.reordering = 0.0
+        self.burst = 0.0
+        self.overheard: dict[Port, deque[bytes]] = {}
+        self.listeners: list[Callable[[int, Side, bytes], None]] = []
+        self._seed_of_faults = seed
+        self._draws: dict[Port, np.random.Generator] = {}
+        self._left_of_burst: dict[Port, int] = {}
+
+    def deliveries(self, sender: int, side: Side, frame: bytes) -> list[tuple[float, bytes]]:
+        """Delay (s) and bytes of each copy of the next frame leaving this port; none when it is lost."""
+        port = (sender, side)
+        self.overheard.setdefault(port, deque(maxlen=OVERHEARD)).append(frame)
+        for listener in self.listeners:
+            listener(sender, side, frame)
+        found = super().deliveries(sender, side, frame)
+        if not (self.port_loss or self.port_delay or self.reordering or self.burst):
+            return found
+        fate, wait, begins = self._draw(port)
+        if self._is_in_burst(port, begins) or fate < self.port_loss.get(port, 0.0):
+            self.lost += 1
+            return []
+        late = self.port_delay.get(port, 0.0) + wait * self.reordering
+        return [(delay + late, arriving) for delay, arriving in found]
+
+    def _draw(self, port: Port) -> tuple[float, float, float]:
+        random = self._draws.get(port)
+        if random is None:
+            random = self._draws[port] = stream(self._seed_of_faults, Stream.GAUNTLET, 2, port[0], int(port[1]))
+        fate, wait, begins = random.random(3).tolist()
+        return fate, wait, begins
+
+    def _is_in_burst(self, port: Port, begins: float) -> bool:
+        left = self._left_of_burst.get(port, 0)
+        if left == 0 and begins < self.burst:
+            left = 20
+        self._left_of_burst[port] = max(left - 1, 0)
+        return left > 0

@@ -1,0 +1,188 @@
+"""Faults of power, processors and disks."""
+
+from __future__ import annotations
+
+import errno
+from collections.abc import Callable, Iterable
+
+import numpy as np
+
+from sim.gauntlet.fault import EVERYBODY, TUBES, Draw, Faulty, Step, drawn_tube, during, own_stream
+from telemetry.messages import BASE, ENCODER
+
+Handle = Callable[[Faulty, int, np.random.Generator], None]
+REFUSALS = (errno.ENOSPC, errno.EROFS)
+
+
+def nothing(rig: Faulty, address: int, random: np.random.Generator) -> None:
+    """The disk stays as the cut left it."""
+
+
+def power_cut(addresses: Iterable[int], before_start: Handle = nothing) -> Draw:
+    """A process loses its power for a while; something may happen to its disk meanwhile."""
+    choice = tuple(addresses)
+
+    def draw(random: np.random.Generator, begin: float, end: float) -> list[Step]:
+        address = int(random.choice(choice))
+        off, on = during(random, begin, end, 1.0, 30.0)
+        drawn = own_stream(random)
+
+        def start(rig: Faulty) -> None:
+            before_start(rig, address, drawn)
+            rig.start(address)
+
+        return [Step(off, lambda rig: rig.cut(address)), Step(on, start)]
+
+    return draw
+
+
+def cut_all(random: np.random.Generator, begin: float, end: float) -> list[Step]:
+    """Everything loses its power at once, and comes back one after the other."""
+    off, on = during(random, begin, end, 2.0, 20.0)
+    steps = [Step(off, lambda rig, a=address: rig.cut(a)) for address in EVERYBODY]  # type: ignore[misc]
+    for address in EVERYBODY:
+        at = on - float(random.uniform(0.0, min(3.0, on - off)))
+        steps.append(Step(at, lambda rig, a=address: rig.start(a)))  # type: ignore[misc]
+    return steps
+
+
+def cut_while_saving(random: np.random.Generator, begin: float, end: float) -> list[Step]:
+    """The power of a process goes in the middle of what it writes next."""
+    address = int(random.choice((BASE, *TUBES)))
+    armed, on = during(random, begin, end, 5.0, 30.0)
+    changes = int(random.integers(12))
+
+    def start(rig: Faulty) -> None:
+        rig.disk(address).writes_left = -1
+        rig.start(address)
+
+    return [Step(armed, lambda rig: setattr(rig.disk(address), "writes_left", changes)), Step(on, start)]
+
+
+def cut_again_and_again(random: np.random.Generator, begin: float, end: float) -> list[Step]:
+    """The power of a node comes and goes."""
+    address = int(random.choice((BASE, ENCODER, *TUBES)))
+    steps = []
+    for _ in range(4):
+        off, on = during(random, begin, end, 1.0, 5.0)
+        steps += [Step(off, lambda rig: rig.cut(address)), Step(on, lambda rig: rig.start(address))]
+    return steps
+
+
+def encoder_from_zero(random: np.random.Generator, begin: float, end: float) -> list[Step]:
+    """The encoder starts again and counts its time from zero."""
+    off, on = during(random, begin, end, 1.0, 10.0)
+
+    def start(rig: Faulty) -> None:
+        rig.world.zero = off
+        rig.start(ENCODER)
+
+    return [Step(off, lambda rig: rig.cut(ENCODER)), Step(on, start)]
+
+
+def delete(*patterns: str) -> Handle:
+    """Files are removed."""
+
+    def act(rig: Faulty, address: int, _random: np.random.Generator) -> None:
+        disk = rig.disk(address)
+        for name in disk.held(*patterns):
+            disk.replace(name, None)
+
+    return act
+
+
+def damage(pattern: str) -> Handle:
+    """The second half of files is other bytes."""
+
+    def act(rig: Faulty, address: int, _random: np.random.Generator) -> None:
+        disk = rig.disk(address)
+        for name, data in disk.held(pattern).items():
+            disk.replace(name, data[: len(data) // 2] + b"\xa5" * (len(data) - len(data) // 2))
+
+    return act
+
+
+def rot(rig: Faulty, address: int, random: np.random.Generator) -> None:
+    """Single bytes of what a process keeps change."""
+    disk = rig.disk(address)
+    for name, data in disk.held("*").items():
+        rotten = bytearray(data)
+        for place in random.integers(len(data), size=3) if data else ():
+            rotten[place] ^= 1 << int(random.integers(8))
+        disk.replace(name, bytes(rotten))
+
+
+def restore_backup(rig: Faulty, address: int, random: np.random.Generator) -> None:
+    """The database of some commits ago is put in its place."""
+    disk = rig.disk(address)
+    if disk.backups:
+        backup = disk.backups[int(random.integers(len(disk.backups)))]
+        disk.replace("ground.sqlite", backup)
+
+
+def refused_disk(*addresses: int) -> Draw:
+    """A disk is full, or takes nothing, for a while; the process may start again meanwhile."""
+
+    def draw(random: np.random.Generator, begin: float, end: float) -> list[Step]:
+        address, refusal = int(random.choice(addresses)), int(random.choice(REFUSALS))
+        wrong, right = during(random, begin, end, 5.0, 60.0)
+        steps = [
+            Step(wrong, lambda rig: setattr(rig.disk(address), "refusal", refusal)),
+            Step(right, lambda rig: setattr(rig.disk(address), "refusal", 0)),
+        ]
+        if random.random() < 0.5:
+            off, on = during(random, wrong, right, 1.0, 10.0) if right > wrong + 1.0 else (wrong, right)
+            steps += [Step(off, lambda rig: rig.cut(address)), Step(on, lambda rig: rig.start(address))]
+        return steps
+
+    return draw
+
+
+def swap_folders(random: np.random.Generator, begin: float, end: float) -> list[Step]:
+    """Two tubes get each other's saved state."""
+    off, on = during(random, begin, end, 2.0, 10.0)
+
+    def swap(rig: Faulty) -> None:
+        found = {tube: rig.disk(tube).held("*") for tube in TUBES}
+        for tube, other in (TUBES, TUBES[::-1]):
+            delete("*")(rig, tube, random)
+            for name, data in found[other].items():
+                rig.disk(tube).replace(name, data)
+            rig.start(tube)
+
+    return [*(Step(off, lambda rig, t=tube: rig.cut(t)) for tube in TUBES), Step(on, swap)]  # type: ignore[misc]
+
+
+def same_number(random: np.random.Generator, begin: float, end: float) -> list[Step]:
+    """For a while a tube's place is taken by another one with the number of its neighbour."""
+    off, on = during(random, begin, end, 5.0, 20.0)
+    tube, number = (1, 2) if random.random() < 0.5 else (2, 1)
+
+    def change(rig: Faulty) -> None:
+        rig.cut(tube)
+        rig.start(tube, number)
+
+    def change_back(rig: Faulty) -> None:
+        rig.cut(tube)
+        rig.start(tube)
+
+    return [Step(off, change), Step(on, change_back)]
+
+
+def frozen(random: np.random.Generator, begin: float, end: float) -> list[Step]:
+    """A process stands still for up to 30 s, and then goes on."""
+    address = int(random.choice(EVERYBODY))
+    still, on = during(random, begin, end, 1.0, 30.0)
+    return [Step(still, lambda rig: rig.freeze(address)), Step(on, lambda rig: rig.thaw(address))]
+
+
+def ground_off_across_stop(random: np.random.Generator, begin: float, end: float) -> list[Step]:
+    """The ground station is off from before a stop until after the survey."""
+    del begin
+    drawn = float(random.uniform(22.0, 34.0))
+    return [Step(end - drawn, lambda rig: rig.cut(BASE)), Step(end, lambda rig: rig.start(BASE))]
+
+
+def drawn_process(random: np.random.Generator) -> int:
+    """A tube, or the ground station."""
+    return BASE if random.random() < 0.3 else drawn_tube(random)

@@ -1,0 +1,121 @@
+"""Faults of what is measured: the nodes' sensors, the encoder, the depth of the bit."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+
+from sim.gauntlet.fault import Draw, Faulty, Step, drawn_tube, during, lasting
+from sim.gauntlet.world import Reading
+from telemetry.messages import ENCODER, DepthReading
+from telemetry.presentation.msgpack_codec import encode
+
+COUNTS = 4096  # of a turn
+
+
+def sensor(spoil: Callable[[Reading], Reading]) -> Draw:
+    """Readings of a tube are spoiled for a while."""
+
+    def draw(random: np.random.Generator, begin: float, end: float) -> list[Step]:
+        tube = drawn_tube(random)
+        return lasting(
+            3.0,
+            60.0,
+            lambda rig: rig.world.spoilers.update({tube: spoil}),
+            lambda rig: rig.world.spoilers.pop(tube, None) and None,
+        )(random, begin, end)
+
+    return draw
+
+
+def gyro_stuck(reading: Reading) -> Reading:
+    """It repeats itself."""
+    return [0.1, 0.1, 0.1, *reading[3:]]
+
+
+def gyro_saturated(reading: Reading) -> Reading:
+    """It is at its range."""
+    return [*reading[:2], 8.7266, *reading[3:]]
+
+
+def gyro_saturated_below(reading: Reading) -> Reading:
+    """It is at the other end of its range."""
+    return [*reading[:2], -8.7266, *reading[3:]]
+
+
+def gyro_step(reading: Reading) -> Reading:
+    """Its bias is another one, by 3 deg/s."""
+    return [*reading[:2], reading[2] + 0.052, *reading[3:]]
+
+
+def gyro_scale(reading: Reading) -> Reading:
+    """It shows a tenth too much."""
+    return [*reading[:2], reading[2] * 1.1, *reading[3:]]
+
+
+def force_stuck(reading: Reading) -> Reading:
+    """It repeats itself."""
+    return [*reading[:3], 1.0, 2.0, -9.0, *reading[6:]]
+
+
+def force_saturated(reading: Reading) -> Reading:
+    """It is at its range."""
+    return [*reading[:3], -78.5, *reading[4:]]
+
+
+def not_finite(reading: Reading) -> Reading:
+    """Its readings are no numbers."""
+    return [float("nan"), *reading[1:]]
+
+
+def encoder_slips(random: np.random.Generator, begin: float, end: float) -> list[Step]:
+    """The encoder loses its grip, for the rest of the run."""
+    at = float(random.uniform(begin, end))
+    by = int(random.uniform(0.05, 0.45) * COUNTS) * (1 if random.random() < 0.5 else -1)
+    return [Step(at, lambda rig: setattr(rig.world, "slipped", rig.world.slipped + by))]
+
+
+def encoder_dead(random: np.random.Generator, begin: float, end: float) -> list[Step]:
+    """The encoder counts no more for a while."""
+
+    def stop(rig: Faulty) -> None:
+        rig.world.stuck_at = rig.now
+
+    return lasting(5.0, 60.0, stop, lambda rig: setattr(rig.world, "stuck_at", None))(random, begin, end)
+
+
+def depth_off(metres: float) -> Draw:
+    """The depth is wrong for a while."""
+    return lasting(
+        2.0,
+        60.0,
+        lambda rig: setattr(rig.world, "depth_error", metres),
+        lambda rig: setattr(rig.world, "depth_error", 0.0),
+    )
+
+
+def depth_lost(random: np.random.Generator, begin: float, end: float) -> list[Step]:
+    """No depth is measured for a while, or never again."""
+    at, until = during(random, begin, end, 3.0, 60.0)
+    steps = [Step(at, lambda rig: setattr(rig.world, "depth_hidden", True))]
+    if random.random() < 0.7:
+        steps.append(Step(until, lambda rig: setattr(rig.world, "depth_hidden", False)))
+    return steps
+
+
+def depth_backwards(random: np.random.Generator, begin: float, end: float) -> list[Step]:
+    """The depth runs backwards by 0.6 m/s, and is then right again."""
+    at, until = during(random, begin, end, 3.0, 8.0)
+    steps: list[Step] = []
+    t, error = at, 0.0
+    while t < until:
+        steps.append(Step(t, lambda rig, e=error: setattr(rig.world, "depth_error", e)))  # type: ignore[misc]
+        t, error = t + 0.5, error - 0.3
+    return [*steps, Step(until, lambda rig: setattr(rig.world, "depth_error", 0.0))]
+
+
+def depth_ahead(rig: Faulty, random: np.random.Generator) -> None:
+    """A depth comes from the future."""
+    at = rig.world.local_clock(ENCODER, rig.now) + float(random.uniform(10.0, 1e4))
+    rig.send_depth(encode(DepthReading(int(random.integers(1, 10**6)), at, float(random.uniform(0.0, 10.0)), ())))

@@ -1,0 +1,55 @@
+"""Which surveys a stop owes, however its stands were heard of."""
+
+import pytest
+
+from groundstation.service.stops import Stops
+from groundstation.service.tally import Tally
+from telemetry.messages import Stand
+
+DUE = 60.0
+FIRST, LATER = Stand(2, 1000.0, 1025.0, 4.0), Stand(3, 5.0, 40.0, 4.0)
+
+
+@pytest.fixture
+def tally() -> Tally:
+    known = Tally(2.0)
+    known.on_hops(2, 1)
+    known.on_hops(1, 2)
+    return known
+
+
+def missing(stops: Stops) -> set[int]:
+    return {tube for stop in stops if stop.judged for tube in stop.missing}
+
+
+def test_a_stop_goes_on_over_a_start_of_the_encoder(tally: Tally) -> None:
+    stops = Stops(tally, DUE)
+    stops.on_stand(FIRST)
+    stops.on_survey(2, 1020.0, 1)
+    stops.on_later_stand(FIRST, LATER)
+    stops.judge(3, 30.0)
+    assert missing(stops) == set()  # 25 s before and 25 s after the start are less than what is due
+    stops.judge(3, 41.0)
+    assert missing(stops) == {2}
+    stops.on_survey(3, 39.0, 2)
+    assert missing(stops) == set()
+
+
+def test_a_stop_that_was_too_short_before_and_after_owes_nothing(tally: Tally) -> None:
+    stops = Stops(tally, DUE)
+    stops.on_stand(Stand(2, 1000.0, 1010.0, 4.0))
+    stops.on_later_stand(Stand(2, 1000.0, 1010.0, 4.0), Stand(3, 5.0, 20.0, 4.0))
+    stops.judge(4, 1000.0)
+    assert missing(stops) == set()
+
+
+def test_tubes_that_are_met_during_a_stop_owe_its_survey() -> None:
+    """A ground station that lost its database hears of the stand first, and of the tubes a second later."""
+    tally = Tally(2.0)
+    stops = Stops(tally, DUE)
+    stops.on_stand(Stand(2, 1000.0, 1010.0, 4.0))
+    tally.on_hops(2, 1)
+    tally.on_hops(1, 2)
+    stops.on_stand(Stand(2, 1000.0, 1065.0, 4.0))
+    stops.judge(2, 1065.0)
+    assert missing(stops) == {1, 2}
