@@ -24,10 +24,12 @@ import json
 import queue
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, fields
+from pathlib import Path
 from typing import Any, TypeVar
 
 from telemetry import keys
 from telemetry.errors import BorechainError
+from telemetry.media.credentials import credentials_for
 from telemetry.media.zenoh_bus import ZenohBus, open_client
 
 PATIENCE, ORDER_PATIENCE = 5.0, 40.0  # wall s; the ground station itself waits 30 s for a tube
@@ -244,16 +246,23 @@ class Ground:
 
 @contextlib.contextmanager
 def connect(
-    endpoint: str = keys.DEFAULT_ENDPOINT, rig: str = keys.DEFAULT_RIG, timeout: float = PATIENCE
+    endpoint: str = keys.DEFAULT_ENDPOINT,
+    rig: str = keys.DEFAULT_RIG,
+    timeout: float = PATIENCE,
+    *,
+    keys_place: Path | None = None,
+    role: str = "operator",
 ) -> Iterator[Ground]:
     """The ground station of a rig whose router is at ``endpoint``, tried for ``timeout`` wall seconds.
+
+    Over TLS the certificate of ``role`` is shown, which lies in the folder ``keys_place``; only a driller may order.
 
     Raises
     ------
     MediumError
-        When no router answers there.
+        When no router answers there, or there is no such certificate.
     """
-    with open_client(endpoint, timeout=timeout) as bus:
+    with open_client(endpoint, timeout, credentials_for(endpoint, keys_place, role)) as bus:
         yield Ground(bus, rig)
 
 

@@ -50,14 +50,17 @@ def grants_of(rig: str, subject: str) -> list[Grant]:
     ground = keys.GROUND.format(rig=rig, path="**")
     # who asks need not know the name of the rig: the authority, and so the router, is that of one rig
     ground_of_any, command_of_any = keys.GROUND.format(rig="*", path="**"), keys.COMMAND.format(rig="*", name="**")
+    intake = keys.INTAKE.format(rig=rig)  # what the ground station takes in, for a recording
+    intake_of_any = keys.INTAKE.format(rig="*")
     depth, tokens = keys.DEPTH.format(rig=rig), TOKEN.format(rig=rig)
     everything = (f"borechain/{rig}/**",)
     told = Grant(IS_TOLD, everything)
     if subject == MEDIUM:
         return [told] + [Grant(way, everything) for way in (WRITES, READS, ASKS)] + [Grant(WATCHES, (f"{tokens}*",))]
     if subject in (OPERATOR, DRILLER):
-        asked = (ground_of_any, command_of_any) if subject == DRILLER else (ground_of_any,)
-        return [Grant(READS, (ground_of_any,)), Grant(ASKS, asked), Grant(WATCHES, (f"{tokens}*",))]
+        read = (ground_of_any, intake_of_any)
+        asked = (*read, command_of_any) if subject == DRILLER else read
+        return [Grant(READS, (*read, depth)), Grant(ASKS, asked), Grant(WATCHES, (f"{tokens}*", LEASES.format(rig="*")))]
     if subject == "depth":
         return [told, Grant(WRITES, (depth,))]
     own = subject.removeprefix("tube-")
@@ -70,9 +73,9 @@ def grants_of(rig: str, subject: str) -> list[Grant]:
     ]
     if subject == "base":
         grants += [
-            Grant(WRITES, (ground,)),
+            Grant(WRITES, (ground, intake)),
             Grant(READS, (depth,)),
-            Grant(ANSWERS, (ground_of_any, command_of_any)),
+            Grant(ANSWERS, (ground_of_any, command_of_any, intake_of_any)),
             Grant(LIVES, (LEASES.format(rig=rig),)),
             Grant(WATCHES, (LEASES.format(rig=rig),)),
         ]

@@ -12,6 +12,7 @@ import pytest
 from rigs import free_endpoint
 from sealed_string import make_folder
 
+from borechain.client import connect, live_rigs
 from borechain.pki.access import read_access
 from telemetry import keys
 from telemetry.application.seals import seals_of
@@ -55,7 +56,7 @@ def buses(folder: Path, endpoint: str) -> Iterator[dict[str, ZenohBus]]:
             query.reply(key if "*" not in key else STATUS, b"answered")
             query.finish()
 
-        for path in ("ground/**", "cmd/**"):
+        for path in ("ground/**", "cmd/**", "intake"):
             sessions["base"].queryable_kept(f"borechain/{RIG}/{path}", answer)
         yield sessions
 
@@ -130,8 +131,22 @@ def test_an_operator_asks_and_does_not_order_a_driller_does_both(buses: dict[str
 
 
 def test_an_operator_hears_the_ground_station_and_no_port(buses: dict[str, ZenohBus]) -> None:
-    port = port_key(RIG, BASE, Side.LOWER, "tx")
+    port, intake = port_key(RIG, BASE, Side.LOWER, "tx"), keys.INTAKE.format(rig=RIG)
     assert heard(buses["base"], buses["operator"], port, STATUS) == [STATUS]
+    assert heard(buses["base"], buses["operator"], port, intake) == [intake]
+    assert answers(buses["operator"], intake) == [b"answered"]
+    assert answers(buses["tube-1"], intake) == []
+
+
+def test_a_client_shows_its_certificate(folder: Path, endpoint: str, buses: dict[str, ZenohBus]) -> None:
+    buses["base"].liveliness_token(keys.LEASE.format(rig=RIG, holder="base"))
+    with connect(endpoint, RIG, WAIT, keys_place=folder) as ground:
+        assert live_rigs(ground._bus) == [RIG]
+        assert answers(ground._bus, ORDER) == []
+    with connect(endpoint, RIG, WAIT, keys_place=folder, role="driller") as ground:
+        assert answers(ground._bus, ORDER) == [b"answered"]
+    with pytest.raises(MediumError, match="expected --keys with it"), connect(endpoint, RIG):
+        pass
 
 
 def test_a_source_of_the_depth_as_the_page_writes_it_is_believed(

@@ -14,8 +14,10 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from borechain.cli.faults import EnvironmentFault, needs, plain_faults
+from borechain.cli.ground.query import rig_option, role_option
 from telemetry import keys
-from telemetry.runtime.options import endpoint_option
+from telemetry.media.credentials import Credentials, credentials_for
+from telemetry.runtime.options import insecure_option, keys_option
 
 if TYPE_CHECKING:
     from borechain.recording.recorder import Course
@@ -27,7 +29,10 @@ ONE_TRY = 2.0  # wall s to join a router that may not be there yet
 @click.command()
 @click.argument("file", type=click.Path(path_type=Path, dir_okay=False))
 @click.option("--rig", "rig_name", default=keys.DEFAULT_RIG, show_default=True, help="Name of the rig.")
-@endpoint_option("Router of the rig.")
+@insecure_option
+@rig_option
+@keys_option
+@role_option
 @click.option(
     "--wait",
     type=click.FloatRange(0.0),
@@ -37,7 +42,7 @@ ONE_TRY = 2.0  # wall s to join a router that may not be there yet
 )
 @needs("mcap", "sqlalchemy")
 @plain_faults
-def record(file: Path, rig_name: str, endpoint: str, wait: float) -> None:
+def record(file: Path, rig_name: str, endpoint: str, keys_place: Path | None, role: str, wait: float) -> None:
     """Record a rig into FILE (MCAP) until Ctrl-C: every answer with its schema, and what the ground station takes in.
 
     \b
@@ -45,7 +50,7 @@ def record(file: Path, rig_name: str, endpoint: str, wait: float) -> None:
       borechain record shift.mcap
       borechain replay shift.mcap
     """
-    course = recorded(file, rig_name, endpoint, wait)
+    course = recorded(file, rig_name, endpoint, wait, credentials_for(endpoint, keys_place, role))
     click.echo(f"{course.samples} samples, {course.newest} events taken in by the ground station", err=True)
     if not course.is_whole:
         first = f"begins at event {course.first}" if course.first else "holds no event of the ground station"
@@ -53,7 +58,7 @@ def record(file: Path, rig_name: str, endpoint: str, wait: float) -> None:
         click.echo(f"not whole: the recording {first}{lost}; a replay knows what it has", err=True)
 
 
-def recorded(file: Path, rig_name: str, endpoint: str, wait: float) -> Course:
+def recorded(file: Path, rig_name: str, endpoint: str, wait: float, credentials: Credentials | None = None) -> Course:
     """Record until a signal comes, from when the router is there, which may be within ``wait`` wall seconds.
 
     Raises
@@ -64,7 +69,7 @@ def recorded(file: Path, rig_name: str, endpoint: str, wait: float) -> Course:
     from borechain.recording.recorder import Recorder
 
     with contextlib.ExitStack() as stack:
-        recorder = Recorder(stack.enter_context(patient_client(endpoint, wait)), rig_name, file)
+        recorder = Recorder(stack.enter_context(patient_client(endpoint, wait, credentials)), rig_name, file)
         for number in (signal.SIGINT, signal.SIGTERM):
             signal.signal(number, lambda *_signal: recorder.stop())
         click.echo(f"recording {rig_name} at {endpoint} into {file}, Ctrl-C ends it", err=True)
@@ -72,7 +77,7 @@ def recorded(file: Path, rig_name: str, endpoint: str, wait: float) -> Course:
 
 
 @contextlib.contextmanager
-def patient_client(endpoint: str, wait: float) -> Iterator[ZenohBus]:
+def patient_client(endpoint: str, wait: float, credentials: Credentials | None) -> Iterator[ZenohBus]:
     """Session at a router, tried in short tries; a single long one would miss how soon it is there."""
     from telemetry.errors import MediumError
     from telemetry.media.zenoh_bus import open_client
@@ -82,7 +87,7 @@ def patient_client(endpoint: str, wait: float) -> Iterator[ZenohBus]:
         bus = None
         while bus is None:
             try:
-                bus = stack.enter_context(open_client(endpoint, timeout=min(ONE_TRY, max(wait, 0.1))))
+                bus = stack.enter_context(open_client(endpoint, min(ONE_TRY, max(wait, 0.1)), credentials))
             except MediumError:
                 if time.monotonic() >= deadline:
                     raise

@@ -8,6 +8,7 @@ import subprocess
 import sys
 import tempfile
 from collections.abc import Iterator, Sequence
+from pathlib import Path
 from typing import IO
 
 import click
@@ -21,7 +22,7 @@ ONE_TRY = 2.0  # wall s to join the rig's endpoint before looking whether the ri
 ENDS_WITHIN = 30.0  # wall s after Ctrl-C
 
 
-def drill_on_screen(arguments: Sequence[str], rig_name: str, endpoint: str) -> None:
+def drill_on_screen(arguments: Sequence[str], rig_name: str, endpoint: str, keys_place: Path | None) -> None:
     """Drill with the arguments of this command and show it to the crew; at the end print what the rig printed.
 
     Leaving the screen ends the rig, as Ctrl-C does.
@@ -33,7 +34,7 @@ def drill_on_screen(arguments: Sequence[str], rig_name: str, endpoint: str) -> N
     """
     with tempfile.TemporaryFile("w+") as written, rig_process(arguments, written) as process:
         click.echo(f"starting; the screen of the crew opens when {endpoint} can be joined, Ctrl-C ends it")
-        with joined(process, endpoint, rig_name) as ground:
+        with joined(process, endpoint, rig_name, keys_place) as ground:
             if ground is not None:
                 show(ground, rig_name, process)
         if process.poll() is None:
@@ -46,13 +47,17 @@ def drill_on_screen(arguments: Sequence[str], rig_name: str, endpoint: str) -> N
 
 
 @contextlib.contextmanager
-def joined(process: subprocess.Popen[str], endpoint: str, rig_name: str) -> Iterator[Ground | None]:
+def joined(
+    process: subprocess.Popen[str], endpoint: str, rig_name: str, keys_place: Path | None
+) -> Iterator[Ground | None]:
     """The ground station of a rig that is starting; None for one that has ended before it could be joined."""
     with contextlib.ExitStack() as stack:
         ground = None
         while ground is None and process.poll() is None:
             with contextlib.suppress(MediumError):
-                ground = stack.enter_context(connect(endpoint, rig_name, timeout=ONE_TRY))
+                ground = stack.enter_context(
+                    connect(endpoint, rig_name, ONE_TRY, keys_place=keys_place, role="driller")
+                )
         yield ground
 
 

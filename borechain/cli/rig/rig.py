@@ -115,7 +115,7 @@ def rig(
     if view == "crew":
         from borechain.cli.rig.on_screen import drill_on_screen
 
-        drill_on_screen(sys.argv[1:], rig_name, endpoint)
+        drill_on_screen(sys.argv[1:], rig_name, endpoint, keys_place)
         return
     folder = out if out is not None else next_run_folder(Path("out") / scenario.stem)
     prepare_folder(folder)
