@@ -116,7 +116,7 @@ class DepthLog:
             self.stands[place] = Stand(stand.epoch, begun_at, ended_at, stand.md)
             return False
         since = self._trusted[:2] if self.jumped and self._trusted is not None else (math.inf, 0.0)
-        if (stand.epoch, stand.ended_at) > since or any(_overlap(doubtful, stand) for doubtful in self._doubtful):
+        if (stand.epoch, stand.ended_at) > since or self._is_of_a_doubtful_time(stand):
             self.refusals["a stand of a doubtful time"] += 1
             return False
         against = [known for known in self.stands if known.epoch == stand.epoch and not self._agree(known, stand)]
@@ -153,7 +153,12 @@ class DepthLog:
         if self._raw is not None:
             self._accepted = self._raw[:2]
         self.jumped, self._raw = "", None
-        self._doubtful.clear()
+
+    def _is_of_a_doubtful_time(self, stand: Stand) -> bool:
+        """Whether no stand of its time is believed; one in which the crew has looked is, whatever came before."""
+        looked = (stand.epoch, stand.begun_at) <= self._accepted < (stand.epoch, stand.ended_at)
+        doubtful = (d for d in self._doubtful if not (looked and (d.epoch, d.ended_at) <= self._accepted))
+        return any(_overlap(time, stand) for time in doubtful)
 
     def _suspect(self, one: Stand, other: Stand) -> None:
         """Take a contradiction for a jump that nobody heard: what came since may be as wrong as the later stand."""
@@ -172,8 +177,8 @@ class DepthLog:
         first, second = sorted((one, other), key=lambda stand: stand.begun_at)
         if second.begun_at < first.ended_at:
             return False
-        if (first.epoch, first.ended_at) <= self._accepted <= (second.epoch, second.begun_at):
-            return True  # the crew has looked in between
+        if (first.epoch, first.ended_at) <= self._accepted <= (second.epoch, second.ended_at):
+            return True  # the crew has looked since the first ended
         return abs(second.md - first.md) <= self._rate * (second.begun_at - first.ended_at) + SLACK
 
     def _refusal(self, reading: DepthReading, epoch: int, rig_now: float, deepest: float) -> str:

@@ -157,6 +157,20 @@ def test_two_stands_that_contradict_each_other_are_both_doubtful_and_the_present
     assert bit.log.at(EPOCH, bit.stand(10.0)) == 2.0
 
 
+def test_of_a_jump_that_the_crew_looked_at_the_stands_that_go_on_are_believed_and_no_others() -> None:
+    log = DepthLog(0.5, 5.0)
+    before = Stand(EPOCH, 1000.0, 1010.0, 6.0)
+    assert log.add_stand(before)
+    for at, md in ((1009.5, 6.0), (1010.0, 6.0), (1010.5, 2.5), (1011.0, 2.5)):
+        log.on_reading(DepthReading(int(2 * at), at, md, ()), EPOCH, at, 1e3)
+    log.accept()
+    assert not log.add_stand(Stand(EPOCH, 1010.5, 1011.0, 2.5))
+    assert log.stands == [before]
+    assert log.refusals["a stand contradicts another"] == 0
+    assert log.add_stand(Stand(EPOCH, 1010.5, 1020.0, 2.5))
+    assert log.refusals["a stand contradicts another"] == 0
+
+
 def test_the_crew_may_accept_the_depth_after_a_jump() -> None:
     bit = Bit()
     bit.move_to(2.0)
