@@ -60,7 +60,11 @@ def grants_of(rig: str, subject: str) -> list[Grant]:
     if subject in (OPERATOR, DRILLER):
         read = (ground_of_any, intake_of_any)
         asked = (*read, command_of_any) if subject == DRILLER else read
-        return [Grant(READS, (*read, depth)), Grant(ASKS, asked), Grant(WATCHES, (f"{tokens}*", LEASES.format(rig="*")))]
+        return [
+            Grant(READS, (*read, depth)),
+            Grant(ASKS, asked),
+            Grant(WATCHES, (f"{tokens}*", LEASES.format(rig="*"))),
+        ]
     if subject == "depth":
         return [told, Grant(WRITES, (depth,))]
     own = subject.removeprefix("tube-")
