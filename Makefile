@@ -41,7 +41,7 @@ contracts: $(STAMP)  ## which package may import which
 	$(BIN)/lint-imports
 
 kernels: $(STAMP)  ## compile what the tests would compile, each worker for itself
-	$(BIN)/python -c "import borechain.warm_all"
+	$(BIN)/python tests/tools/compile_kernels.py
 
 tests: $(STAMP)  ## every test but the statistical ones at full size
 	$(PYTEST) -m "not statistical"
