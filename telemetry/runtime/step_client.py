@@ -10,6 +10,8 @@ from __future__ import annotations
 
 import asyncio
 import queue
+import threading
+import time
 from collections import Counter, deque
 from collections.abc import Callable, Mapping
 from functools import partial
@@ -24,6 +26,7 @@ from telemetry.runtime.step_stream import StepStream
 from telemetry.runtime.stepped import Due, DueEvent, Sent, pack_done, run_step, unpack_step
 
 ABSENT_LIMIT = 60.0  # wall s without a first step until that is reported
+UP_LIMIT, UP_TICK = 5.0, 0.001  # wall s that the other end of a port may take to be there, and between two looks
 STEP, STOP = -1, -2  # channels beside those of the frames
 CHANNELS = (STEP, Due.UPPER_FRAME, Due.LOWER_FRAME)
 Arrival = tuple[int, bytes]  # channel, payload
@@ -86,6 +89,7 @@ class StepEnd:
         self.assembler = StepAssembler()
         self._ports = ports
         self._stream = stream
+        self._unheard = set(ports)  # ends that have sent nothing yet
         for side, port in ports.items():
             port.listen(partial(_put_frame, arrive, int(side)))
         if stream is not None:
@@ -101,6 +105,9 @@ class StepEnd:
         sent: list[Sent] = []
 
         def send(what: Sent, frame: Frame) -> None:
+            if what.side in self._unheard:
+                self._unheard.discard(what.side)
+                wait_until_up(self._ports[what.side])
             # the stepper waits for every frame and in this order, so none may replace or overtake another
             if self._ports[what.side].send(Frame(frame.payload)):
                 sent.append(what)
@@ -194,6 +201,17 @@ class AsyncStepClient(StepEnd):
                 return None
             self.assembler.add(*arrival)
         return step
+
+
+def wait_until_up(port: Port) -> None:
+    """Wait for the other end of a port that sends for the first time.
+
+    A step on a stream may be here before the bus has told that the stepper listens there; what is sent before that
+    waits in the port, and the stepper for it.
+    """
+    deadline, tick = time.monotonic() + UP_LIMIT, threading.Event()
+    while not port.is_up and time.monotonic() < deadline:
+        tick.wait(UP_TICK)
 
 
 def serve(process: Process, client: StepClient, report: Report = lambda line: None) -> None:
