@@ -102,15 +102,15 @@ class Tube:
         self.parameters = parameters or ParameterBlock(settings.tube, 0)
         self.use(self.parameters)
 
-    def on_aiding(self, aiding: Aiding, valid_local: float) -> Aiding | None:
+    def on_aiding(self, aiding: Aiding, valid_local: float, clock_var: float = 0.0) -> Aiding | None:
         """Take the reference from the upper end, valid at ``valid_local`` (s, own clock); returns what goes down.
 
-        ``forward`` hands the encoder's measurement on unchanged, at once; the others wait for the cycle.
+        ``clock_var`` (s^2) is that of the clock by which its time was found. ``forward`` hands the encoder's measurement on unchanged, at once; the others wait for the cycle.
         """
         a, taken = aiding, self._aiding
         taken[:] = (
             *(a.yaw, a.yaw_var, a.systematic_var, a.offset, a.rate, valid_local, a.sequence, a.hops),
-            *(a.torque, a.torsion_var, a.under_torque),
+            *(a.torque, a.torsion_var, a.under_torque, clock_var),
         )
         if not self._loop.aiding(self.nodes, self._crew, taken) & ONWARD:
             return None

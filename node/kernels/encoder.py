@@ -69,7 +69,7 @@ def encoder_step(encoders: Array, drives: Array, sample: Array, aiding: Array) -
     sample : (9,) count, time of its last edge (s), 1 if it rose, 1 if that time is the edge's own, torque (N m) and 1
         if there is a sensor for it, the present (s, rig time); what a head that stops went beyond its last edge and the
         variance of that (counts), read in the first cycle of a rest
-    aiding : (11,) as ``node.kernels.step.node_aiding`` takes it
+    aiding : (12,) as ``node.kernels.step.node_aiding`` takes it
     """
     encoder, drive = encoders[0], drives[0]
     turning = sample[EDGE_AT] > encoder.edge_at

@@ -15,9 +15,9 @@ from node.kernels.aiding_watch import STEADY, find_mismatch, forget
 from node.kernels.angles import from_binary, wrap
 from node.kernels.events import NONE, Code, Fault, tell
 from node.kernels.jit import constant, kernel
-from node.kernels.layout import DEG, PERIOD, RING, Array, Err, Status
+from node.kernels.layout import CLOCK_SLACK, DEG, PERIOD, RING, Array, Err, Status
 from node.kernels.modes import STATIC_BIAS
-from node.kernels.record import A_RATE, A_VALID, A_YAW, A_YAW_VAR
+from node.kernels.record import A_CLOCK_VAR, A_RATE, A_VALID, A_YAW, A_YAW_VAR
 from node.kernels.resets import (
     begin_epoch,
     lose_tilt,
@@ -41,6 +41,7 @@ RATE_AGE: Final = 3.0  # s, of an encoder's rate that may stand for the gyroscop
 BACKWARD: Final = PERIOD  # s, that a cycle may begin before the end of the last; beyond it is a jump of the clock
 LONGEST_CYCLE: Final = 10.0 * PERIOD  # s
 FARTHEST: Final = RING * PERIOD  # s, that a cycle may begin after the end of the last
+FAR_OFF: Final = 4.0  # sigmas, that a clock may be wrong by
 PSI, BZ, S = constant(Err.YAW), constant(Err.BIAS_Z), constant(Err.SCALE)
 BAD_SAMPLE, GYRO_STEP, GYRO_SCALE = constant(Fault.BAD_SAMPLE), constant(Fault.GYRO_STEP), constant(Fault.GYRO_SCALE)
 AIDING_UNTIMELY, CLOCK_JUMPED = constant(Code.AIDING_UNTIMELY), constant(Code.CLOCK_JUMPED)
@@ -65,7 +66,8 @@ def is_heard(node: Any) -> bool:
 def gate_aiding(node: Any, aiding: Array) -> bool:
     """Whether an ``aiding`` of ``node.kernels.step.node_aiding`` is for the filter.
 
-    One with an invalid time, or one far ahead, would wait for ever and hold up all others.
+    One with an invalid time, or one far ahead, would wait for ever and hold up all others. One that a poor clock
+    cannot place in a turning is of another angle than the node's, by as much in the next and the next.
     """
     state, guard, valid_local = node.filter, node.guard, aiding[A_VALID]
     timely = math.isfinite(valid_local) and not (state.cycles > 0 and valid_local - state.now > LONGEST_CYCLE)
@@ -75,9 +77,20 @@ def gate_aiding(node: Any, aiding: Array) -> bool:
     if not timely:
         return False
     guard.rate, guard.rate_at, guard.aiding_var = aiding[A_RATE], valid_local, aiding[A_YAW_VAR]
+    if not is_placed(state, aiding):
+        return False
     if guard.gyro.fault != 0 or contradicts(node, aiding[A_YAW] + node.down_offset, valid_local):
         state.last_sequence = -1  # a repetition at rest is to be judged again
     return True
+
+
+@kernel
+def is_placed(state: Any, aiding: Array) -> bool:
+    """Whether the clock is good enough for the time stamp's state, or the string rests for as long as it may be off."""
+    if aiding[A_CLOCK_VAR] <= CLOCK_SLACK**2:
+        return True
+    rested = state.still_cycles * PERIOD
+    return bool(aiding[A_RATE] == 0.0 and rested * rested > FAR_OFF * FAR_OFF * aiding[A_CLOCK_VAR])
 
 
 @kernel

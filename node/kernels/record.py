@@ -251,8 +251,9 @@ READING: Final = 8
 START, END, JOINED, HOPS, CLOCK_VAR, SYNCHRONISED = range(6)
 MOMENT: Final = 6
 # an aiding, float64; see ``node.kernels.step.node_aiding``
-A_YAW, A_YAW_VAR, A_SYSTEMATIC, A_OFFSET, A_RATE, A_VALID, A_SEQUENCE, A_HOPS, A_TORQUE, A_TORSION, A_HELD = range(11)
-AIDING: Final = 11
+A_YAW, A_YAW_VAR, A_SYSTEMATIC, A_OFFSET, A_RATE, A_VALID, A_SEQUENCE, A_HOPS, A_TORQUE, A_TORSION = range(10)
+A_HELD, A_CLOCK_VAR = range(10, 12)
+AIDING: Final = 12
 
 
 def new_node(config: Array) -> Array:

@@ -86,6 +86,12 @@ def set_stamp_prior(state: Any, var: float) -> None:
 
 
 @kernel
+def doubt_stamp(state: Any, var: float) -> None:
+    """The clock has moved by so much (s^2) since the time stamp's error was learnt."""
+    state.P[D, D] += var
+
+
+@kernel
 def doubt_bias(state: Any, k: int, var: float) -> None:
     """The mean of the cluster's gyroscopes is another one: bias ``k`` is in doubt by a further ``var`` ((rad/s)^2)."""
     state.P[BX + k, BX + k] += var

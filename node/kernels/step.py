@@ -41,7 +41,7 @@ from node.kernels.record import (
     SYNCHRONISED,
 )
 from node.kernels.relay import offer_aiding
-from node.kernels.resets import set_stamp_prior, start_over
+from node.kernels.resets import doubt_stamp, set_stamp_prior, start_over
 from node.kernels.sensor_watch import largest
 from node.kernels.static_average import follow_recording
 from node.kernels.twist import gate_twist, holds_survey, reaching_var, twist_var
@@ -49,6 +49,7 @@ from node.kernels.twist import gate_twist, holds_survey, reaching_var, twist_var
 STILL_CYCLES: Final = 4  # after which a node takes itself for standing
 LARGEST_OFFSET: Final = 6.0 * DEG  # rad/s, of a gyroscope never calibrated; the slow alignment turn is faster
 LEAST_STAMP: Final = 1e-4  # s, of a time stamp, whatever the clock says
+LARGE_MOVE: Final = 3e-3  # s, of a clock, beyond what the wander of the time stamp covers
 SAY_EVENTS, SAY_SURVEY, SAY_ESTIMATE, SAY_STATE, SAY_RECORD, ADMITTED = 1, 2, 4, 8, 16, 32
 REFUSED: Final = -1  # the times of a cycle are such that it cannot be run
 USED, ONWARD = 1, 2  # of an aiding: it is for the filter, and it goes down
@@ -208,7 +209,9 @@ def say_events(node: Any) -> int:
 def follow_clock(node: Any, settings: Any, moment: Array) -> None:
     """Let the prior of the time stamp be what the clock says of itself, and its wander that of the hops.
 
-    It is left alone while it is about right: another one costs the integer loop a conversion.
+    It is left alone while it is about right: another one costs the integer loop a conversion. A clock that knows much
+    better was put right by a step, whose variance is the difference of the two (a Kalman update's); one that knows
+    much worse has wandered by as much, or follows another neighbour.
     """
     config = node.config
     if moment[SYNCHRONISED] == 0.0 or config.stamp_std == 0.0:
@@ -218,11 +221,14 @@ def follow_clock(node: Any, settings: Any, moment: Array) -> None:
     ratio = std / config.stamp_std
     if hops == node.stamp_hops and 0.8 < ratio < 1.25:
         return
+    moved = abs(config.stamp_std * config.stamp_std - std * std)
     node.stamp_hops = hops
     config.stamp_std = std
     config.stamp_walk = settings.stamp_walk * math.sqrt(hops)
     if node.filter.last_aided == -math.inf:
         set_stamp_prior(node.filter, std * std)
+    elif moved > LARGE_MOVE * LARGE_MOVE:
+        doubt_stamp(node.filter, moved)
 
 
 @entry
@@ -234,8 +240,8 @@ def node_aiding(nodes: Array, settings: Array, aiding: Array) -> int:
     Parameters
     ----------
     nodes, settings : one-element arrays of dtype ``NODE`` and ``SETTINGS``
-    aiding : (11,) yaw, its variance, systematic variance, offset, rate (rad, rad/s), time of validity (s, own clock),
-        sequence, hops, torque (N m), torsion variance (rad^2), under torque
+    aiding : (12,) yaw, its variance, systematic variance, offset, rate (rad, rad/s), time of validity (s, own clock),
+        sequence, hops, torque (N m), torsion variance (rad^2), under torque, variance of the clock (s^2)
     """
     return int(aiding_around(offer_aiding, nodes, settings, aiding))
 

@@ -44,7 +44,7 @@ def string_aiding(nodes: Array, settings: Array, string: Array, hops: int, valid
     nodes, settings : (n,) of dtype ``NODE`` and ``SETTINGS``
     string : (hops or more,) indices of the nodes, from the top down
     valid_locals : (hops or more,) time of validity by the clock of each node, s
-    aiding : (11,) as ``node_aiding`` takes it; it holds in the end what the last node hands down
+    aiding : (12,) as ``node_aiding`` takes it; it holds in the end what the last node hands down
     """
     for hop in range(hops):
         k = string[hop]

@@ -244,7 +244,7 @@ class TubeProcess(Process):
         if silent > len(self.settings.above):
             return  # over joints that nobody told this node of
         aiding = across(aiding, self.settings.above[:silent], self.settings.stiffness)
-        onward = self.tube.on_aiding(aiding, clock.local_from_rig(aiding.valid_at))
+        onward = self.tube.on_aiding(aiding, clock.local_from_rig(aiding.valid_at), clock.variance(now))
         if onward is not None:
             self._send(replace(onward, epoch=aiding.epoch, seal=aiding.seal), now)
 

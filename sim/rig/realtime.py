@@ -16,7 +16,7 @@ from typing import Any
 from node.kernels.layout import PERIOD
 from sim.errors import RigError
 from sim.rig.processes import ProcessTable
-from sim.world.recording import turns_at, yaw_error
+from sim.world.recording import fastest_at, yaw_error
 from sim.world.world import World
 from telemetry.application.endpoint import Endpoint
 from telemetry.media.neighbours import neighbour_ports
@@ -32,24 +32,26 @@ from telemetry.runtime.timing import CycleTiming
 
 TICKS = os.sysconf("SC_CLK_TCK")  # a second, of the CPU time in /proc
 COME_LIMIT = 60.0  # s, until every node was heard
+PHASES = ("rest", "turning")
 KIB, MIB = 1024.0, 1024.0**2
 
 
 @dataclass(slots=True)
 class Heard:
-    """What the surface has heard of one node's yaw, rad."""
+    """What the surface has heard of one node's yaw: pairs of its error and the variance it stated, rad and rad^2."""
 
     states: int = 0
     known: bool = False
-    resting: list[float] = field(default_factory=list)
-    turning: list[float] = field(default_factory=list)
+    resting: list[tuple[float, float]] = field(default_factory=list)
+    turning: list[tuple[float, float]] = field(default_factory=list)
 
-    def on_state(self, state: NodeState, error: float, *, turns: bool) -> None:
-        """Take a state and the error of its yaw."""
+    def on_state(self, state: NodeState, error: float, rate: float) -> None:
+        """Take a state, the error of its yaw (rad) and the rate of the string (rad/s) by which a wrong clock errs."""
         self.states += 1
         self.known = not state.flags & NodeFlag.YAW_UNTRUSTED
         if self.known:
-            (self.turning if turns else self.resting).append(error)
+            stated = state.yaw_var + rate * rate * state.clock_var
+            (self.turning if rate > 0.0 else self.resting).append((error, stated))
 
 
 class Surface(Process):
@@ -80,7 +82,7 @@ class Surface(Process):
             state = received.message
             if isinstance(state, NodeState) and state.tube in self.heard:
                 error = yaw_error(self._world, state.tube, state.yaw, state.at)
-                self.heard[state.tube].on_state(state, error, turns=turns_at(self._world, state.at))
+                self.heard[state.tube].on_state(state, error, fastest_at(self._world, state.at))
 
     def on_cycle(self, data: Any, now: float) -> None:
         """See that every process lives, until the time is over."""
@@ -167,14 +169,17 @@ def row(name: str, tube: int, tubes: int, report: dict[str, Any], first: float) 
 
 
 def yaw_figures(heard: Heard | None) -> dict[str, Any]:
-    """Whether the yaw is known at last, and its rms error (deg); nothing of the encoder."""
+    """Whether the yaw is known at last, its rms error (deg) and how that compares with what the node stated of it.
+
+    Nothing of the encoder.
+    """
     if heard is None:
-        return {"yaw_known": None, "yaw_rest_deg": None, "yaw_turning_deg": None}
-    return {
-        "yaw_known": heard.known,
-        "yaw_rest_deg": rms_deg(heard.resting),
-        "yaw_turning_deg": rms_deg(heard.turning),
-    }
+        return dict.fromkeys(("yaw_known", *(f"yaw_{when}_{what}" for when in PHASES for what in ("deg", "nees"))))
+    figures: dict[str, Any] = {"yaw_known": heard.known}
+    for when in PHASES:
+        pairs = heard.resting if when == "rest" else heard.turning
+        figures |= {f"yaw_{when}_deg": rms_deg(pairs), f"yaw_{when}_nees": nees(pairs)}
+    return figures
 
 
 def worst(rows: list[dict[str, Any]]) -> dict[str, Any]:
@@ -192,9 +197,14 @@ def total(rows: list[dict[str, Any]]) -> dict[str, Any]:
     return {key: sum(r[key] for r in rows) for key in ("cycles", "overruns", "cpu_percent", "private_mb", "pss_mb")}
 
 
-def rms_deg(errors: list[float]) -> float | None:
-    """Root mean square, deg; None of none."""
-    return math.degrees(math.sqrt(sum(e * e for e in errors) / len(errors))) if errors else None
+def rms_deg(pairs: list[tuple[float, float]]) -> float | None:
+    """Root mean square of the errors, deg; None of none."""
+    return math.degrees(math.sqrt(sum(e * e for e, _ in pairs) / len(pairs))) if pairs else None
+
+
+def nees(pairs: list[tuple[float, float]]) -> float | None:
+    """Mean of the squared errors over the variances stated of them; None of none."""
+    return sum(e * e / stated for e, stated in pairs) / len(pairs) if pairs else None
 
 
 def pids(table: ProcessTable) -> dict[str, int]:

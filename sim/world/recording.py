@@ -67,9 +67,9 @@ def turning_once(
     )
 
 
-def turns_at(world: World, at: float) -> bool:
-    """Whether the string turned at the rig time ``at`` (s) or within the two cycles before it."""
-    return bool(np.any(world.motion.drive(np.linspace(at - 2.0 * PERIOD, at, 3))[1] > 0.0))
+def fastest_at(world: World, at: float) -> float:
+    """Fastest rate of the drive (rad/s) at the rig time ``at`` (s) and within the two cycles before it."""
+    return float(np.abs(world.motion.drive(np.linspace(at - 2.0 * PERIOD, at, 3))[1]).max())
 
 
 def yaw_error(world: World, tube: int, yaw: float, at: float) -> float:

@@ -6,12 +6,15 @@ the neighbour's filtered rig time instead would cascade the filters: each takes 
 drift and overshoots, so that errors grow with the hops instead of adding up.
 
 An exchange asked at t1, received t2, replied t3, back t4 measures ((t2 - t1) + (t3 - t4)) / 2, wrong by half the
-difference of its two delays.
+difference of its two delays. That half is at most half of what the round trip took beyond the shortest one. Where even the
+shortest was long (a machine that does many things has just started fifty nodes), it may have waited one way only: until
+three of late have taken as long and found the same, all of it beyond a plausible round trip counts as a wait.
 """
 
 from __future__ import annotations
 
 import math
+from collections import deque
 
 from telemetry.messages import EPOCH_UNKNOWN, TimeReply
 
@@ -19,6 +22,8 @@ DRIFT_STD = 50e-6  # 1, between two crystals never compared before
 JITTER_STD = 0.4e-3  # s, of one exchange over one joint
 OFFSET_WALK = 2e-6  # s/sqrt(s)
 DRIFT_WALK = 1e-9  # 1/sqrt(s)
+PLAUSIBLE_ROUND_TRIP = 0.02  # s, of a joint whose ends both wait; a longer one must be seen more than once
+AGREEING, OF_LATE = 3, 8  # exchanges: so often, of so many
 GATE = 6.0  # sigmas
 RESET_AFTER = 3  # exchanges that disagree in a row
 
@@ -43,6 +48,7 @@ class ClockFilter:
         self._told = TimeReply(0.0, 0.0, 0.0, 0.0, 1.0, 0.0)
         self._disagreed = 0
         self._least_round_trip = math.inf
+        self._of_late: deque[tuple[float, float]] = deque(maxlen=OF_LATE)  # s: round trip, measured
         self._another = False
 
     @property
@@ -91,16 +97,25 @@ class ClockFilter:
         round_trip = (back - reply.asked_at) - (reply.replied_at - reply.received_at)
         if self.is_root or round_trip < 0.0:
             return
-        self._least_round_trip = min(self._least_round_trip, round_trip)
         measured = 0.5 * ((reply.received_at - reply.asked_at) + (reply.replied_at - back))
-        excess = 0.5 * (round_trip - self._least_round_trip)
-        var = JITTER_STD**2 + excess * excess
+        self._least_round_trip = min(self._least_round_trip, round_trip)
+        self._of_late.append((round_trip, measured))
+        wait = 0.5 * (round_trip - self._least_round_trip) + self._doubt()
+        var = JITTER_STD**2 + wait * wait
         middle = 0.5 * (reply.asked_at + back)
         if self.exchanges == 0 or self._another:
             self._start(middle, measured, var)
         elif not self._update(middle, measured, var):
             return
         self._told = reply
+
+    def _doubt(self) -> float:
+        """How far (s) the shortest round trip itself may be off, for it may have waited one way only."""
+        beyond = 0.5 * max(self._least_round_trip - PLAUSIBLE_ROUND_TRIP, 0.0)
+        if beyond == 0.0 or len(self._of_late) < AGREEING:
+            return beyond
+        round_trips, found = zip(*sorted(self._of_late)[:AGREEING], strict=True)
+        return min(beyond, 0.5 * (round_trips[-1] - round_trips[0]) + max(found) - min(found))
 
     def _start(self, local: float, offset: float, var: float) -> None:
         self._epoch, self._offset, self._drift = local, offset, 0.0

@@ -11,7 +11,7 @@ from node.firmware.inputs import ImuReading, RigContext
 from node.firmware.sensor_limits import SensorLimits
 from node.firmware.settings import Joint, TubeSettings
 from node.firmware.tube import Tube
-from node.kernels.layout import PERIOD, Scheme, default_config
+from node.kernels.layout import PERIOD, Err, Scheme, default_config
 from node.kernels.record import new_node
 from telemetry.messages import Aiding, Event, Mode, NodeFlag, NodeState, SurveyMeasurement
 
@@ -34,21 +34,23 @@ class Life:
         self.now = 1000.0
         self.angle = 1.0
         self.sequence = 5
+        self.clock_var = 1e-8  # s^2
         self.said: list[object] = []
 
-    def cycles(self, count: int, rate: float = 0.0) -> list[object]:
+    def cycles(self, count: int, rate: float = 0.0, *, aided: bool = True) -> list[object]:
         said: list[object] = []
         for _ in range(count):
             self.now += PERIOD
             self.angle += rate * PERIOD
             self.sequence += rate != 0.0
-            around = RigContext(True, 1, self.now, 1e-8, True)
+            around = RigContext(True, 1, self.now, self.clock_var, True)
             reading = ImuReading(self.now - PERIOD, self.now, (0.0, 0.0, rate), (0.0, 0.3, -9.8))
             said.extend(self.tube.on_cycle(reading, around))
             aiding = replace(
                 AIDING, yaw=self.angle % (2 * math.pi), rate=rate, valid_at=self.now, sequence=self.sequence
             )
-            self.tube.on_aiding(aiding, self.now)
+            if aided:
+                self.tube.on_aiding(aiding, self.now)
         self.said.extend(said)
         return said
 
@@ -68,6 +70,36 @@ def test_the_drive_joint_counts_at_the_top_alone() -> None:
     assert onward is not None
     assert onward.offset == pytest.approx(0.1 + LOWER.angle)
     assert onward.systematic_var == pytest.approx(1e-6 + LOWER.std**2)
+
+
+@pytest.mark.parametrize(("clock_std", "rate", "used"), [(0.04, 1.0, True), (0.1, 1.0, False), (0.1, 0.0, True)])
+def test_an_aiding_that_a_poor_clock_cannot_place_in_a_turning_goes_on_unused(
+    clock_std: float, rate: float, used: bool
+) -> None:
+    life = Life(tube())
+    life.cycles(40)
+    life.cycles(6, rate)
+    before = int(life.tube.state["pending"])
+    aiding = replace(AIDING, yaw=life.angle, rate=rate, valid_at=life.now, sequence=900)
+    assert life.tube.on_aiding(aiding, life.now, clock_std**2) is not None
+    assert int(life.tube.state["pending"]) == before + used
+
+
+def test_a_clock_put_right_in_mid_turn_reopens_the_time_stamp() -> None:
+    life = Life(tube())
+    life.clock_var = 0.04**2
+    life.cycles(40)
+    life.cycles(20, 1.0)
+    life.cycles(5, 1.0, aided=False)
+    learnt = stamp_var(life)
+    assert learnt < 0.01**2
+    life.clock_var = 0.01**2
+    life.cycles(1, 1.0, aided=False)
+    assert stamp_var(life) > 0.03**2
+
+
+def stamp_var(life: Life) -> float:
+    return float(life.tube.state["P"][Err.STAMP, Err.STAMP])
 
 
 def test_estimate_says_its_own_yaw_and_variance_each_cycle() -> None:

@@ -62,6 +62,35 @@ def test_errors_add_up_down_the_chain_and_do_not_grow_beyond() -> None:
     assert normalised.max() < 1.5
 
 
+def test_a_clock_that_is_wrong_because_frames_waited_says_so() -> None:
+    """The first exchanges on a busy machine, where each way waits 0.3 s in the mean and much longer now and then."""
+    random, offset = np.random.default_rng(5), 17.0
+    normalised = []
+    for _ in range(500):
+        node, at = ClockFilter(), 1000.0
+        for there, back in random.exponential(0.3, (12, 2)):
+            asked, at = at, at + there + LATENCY
+            node.exchange(TimeReply(asked - offset, at, at, at, 1.0, 0.0), at + LATENCY + back - offset)
+            error = node.rig_from_local(at - offset) - at
+            normalised.append(error / math.sqrt(node.variance(at - offset)))
+            at += 1.0
+    beyond = np.abs(normalised) > 3.0
+    assert beyond.mean() < 0.01
+    assert np.mean(np.square(normalised)[~beyond]) < 1.0
+
+
+def test_a_joint_that_is_slow_but_steady_is_believed_from_the_third_exchange_on() -> None:
+    node, latency = ClockFilter(), 0.2
+    stated = []
+    for asked in (1000.0, 1001.0, 1002.0):
+        at = asked + latency
+        node.exchange(TimeReply(asked, at, at, at, 1.0, 0.0), at + latency)
+        stated.append(math.sqrt(node.variance(asked)))
+    assert stated[0] == pytest.approx(0.19, abs=1e-3)
+    assert stated[1] > 0.1
+    assert stated[2] < 1e-3
+
+
 def test_another_neighbour_is_compared_anew_and_rig_time_goes_on() -> None:
     clocks = Clocks(1)
     clocks.run(120.0)

@@ -36,7 +36,9 @@ COLUMNS: Columns = (
     ("pss_mb", "PSS, MB"),
     ("yaw_known", "yaw known"),
     ("yaw_rest_deg", "yaw error at rest, rms, deg"),
-    ("yaw_turning_deg", "turning"),
+    ("yaw_rest_nees", "its NEES"),
+    ("yaw_turning_deg", "yaw error turning, rms, deg"),
+    ("yaw_turning_nees", "its NEES"),
 )
 
 
