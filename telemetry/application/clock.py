@@ -6,9 +6,9 @@ the neighbour's filtered rig time instead would cascade the filters: each takes 
 drift and overshoots, so that errors grow with the hops instead of adding up.
 
 An exchange asked at t1, received t2, replied t3, back t4 measures ((t2 - t1) + (t3 - t4)) / 2, wrong by half the
-difference of its two delays. That half is at most half of what the round trip took beyond the shortest one. Where even the
-shortest was long (a machine that does many things has just started fifty nodes), it may have waited one way only: until
-three of late have taken as long and found the same, all of it beyond a plausible round trip counts as a wait.
+difference of its two delays. That half is at most half of what the round trip took beyond the shortest one. Where even
+the shortest was long (a machine that does many things has just started fifty nodes), it may have waited one way only:
+until three of late have taken as long and found the same, all of it beyond a plausible round trip counts as a wait.
 """
 
 from __future__ import annotations
@@ -114,8 +114,9 @@ class ClockFilter:
         beyond = 0.5 * max(self._least_round_trip - PLAUSIBLE_ROUND_TRIP, 0.0)
         if beyond == 0.0 or len(self._of_late) < AGREEING:
             return beyond
-        round_trips, found = zip(*sorted(self._of_late)[:AGREEING], strict=True)
-        return min(beyond, 0.5 * (round_trips[-1] - round_trips[0]) + max(found) - min(found))
+        shortest = sorted(self._of_late)[:AGREEING]
+        found = [measured for _, measured in shortest]
+        return min(beyond, 0.5 * (shortest[-1][0] - shortest[0][0]) + max(found) - min(found))
 
     def _start(self, local: float, offset: float, var: float) -> None:
         self._epoch, self._offset, self._drift = local, offset, 0.0
