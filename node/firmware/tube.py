@@ -105,7 +105,7 @@ class Tube:
     def on_aiding(self, aiding: Aiding, valid_local: float, clock_var: float = 0.0) -> Aiding | None:
         """Take the reference from the upper end, valid at ``valid_local`` (s, own clock); returns what goes down.
 
-        ``clock_var`` (s^2) is that of the clock by which its time was found. ``forward`` hands the encoder's measurement
+        ``clock_var`` (s^2): of the clock by which its time was found. ``forward`` hands the encoder's measurement
         on unchanged, at once; the others wait for the cycle.
         """
         a, taken = aiding, self._aiding
