@@ -20,6 +20,7 @@ from numba import njit
 
 from node.firmware.inputs import ImuReading, RigContext
 from node.firmware.tube import Tube
+from node.kernels.address import firmware
 from node.kernels.calibration import PARAMETERS
 from node.kernels.layout import default_config
 from node.kernels.record import AIDING, CLOCK_VAR, END, HOPS, JOINED, MOMENT, READING, START, SYNCHRONISED, new_node
@@ -36,7 +37,7 @@ NEVER = 10**9  # cycles
 
 
 class Inputs(NamedTuple):
-    """What the nodes take in, cycle by cycle: (cycles, tubes, 1, 8), (cycles, tubes, 6) and (cycles, 11)."""
+    """What the nodes take in, cycle by cycle: (cycles, tubes, 1, 8), (cycles, tubes, 6) and (cycles, 12)."""
 
     readings: Any
     moments: Any
@@ -114,20 +115,23 @@ def string_by_string(string: String, inputs: Inputs) -> Callable[[], None]:
     """A cycle of the whole string in one call from Python, as a study calls it."""
     tubes = len(string.tubes)
     mask, says = np.ones(tubes, np.bool_), np.zeros(tubes, np.int64)
+    step, aid = firmware()
 
     def run() -> None:
         nodes, crews = string.nodes, string.crews
         for k in range(len(inputs.aidings)):
             readings, moments = inputs.readings[k], inputs.moments[k]
-            string_step(nodes, crews, string.corrections, readings, moments, mask, says)
+            string_step(step, nodes, crews, string.corrections, readings, moments, mask, says)
             valid = np.full(tubes, inputs.aidings[k, 5])
-            string_aiding(nodes, crews, string.places, tubes, valid, inputs.aidings[k].copy())
+            string_aiding(aid, nodes, crews, string.places, tubes, valid, inputs.aidings[k].copy())
 
     return run
 
 
 @njit
 def all_cycles(
+    step: Any,
+    aid: Any,
     nodes: Any,
     crews: Any,
     corrections: Any,
@@ -142,12 +146,12 @@ def all_cycles(
 ) -> None:
     """Every cycle of the string in one compiled loop."""
     for k in range(aidings.shape[0]):
-        string_step(nodes, crews, corrections, readings[k], moments[k], mask, says)
+        string_step(step, nodes, crews, corrections, readings[k], moments[k], mask, says)
         for j in range(valid.shape[0]):
             valid[j] = aidings[k, 5]
         for j in range(work.shape[0]):
             work[j] = aidings[k, j]
-        string_aiding(nodes, crews, places, places.shape[0], valid, work)
+        string_aiding(aid, nodes, crews, places, places.shape[0], valid, work)
 
 
 def compiled(string: String, inputs: Inputs) -> Callable[[], None]:
@@ -157,7 +161,7 @@ def compiled(string: String, inputs: Inputs) -> Callable[[], None]:
 
     def run() -> None:
         tables = string.nodes, string.crews, string.corrections
-        all_cycles(*tables, inputs.readings, inputs.moments, inputs.aidings, string.places, *work)
+        all_cycles(*firmware(), *tables, inputs.readings, inputs.moments, inputs.aidings, string.places, *work)
 
     return run
 

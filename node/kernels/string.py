@@ -1,18 +1,21 @@
 """A string of nodes in one call: a cycle of each, and an aiding from hop to hop, for whoever simulates thousands.
 
-What a node does is ``node.kernels.step``; nothing is added but the loop over them.
+What a node does is ``node.kernels.step``, called by its address; nothing is added but the loop over them.
 """
 
 from __future__ import annotations
 
+from typing import Any
+
 from node.kernels.jit import kernel
 from node.kernels.layout import Array
 from node.kernels.record import A_HOPS, A_OFFSET, A_SYSTEMATIC, A_TORSION, A_VALID
-from node.kernels.step import ONWARD, node_aiding, node_step
+from node.kernels.step import ONWARD
 
 
 @kernel
 def string_step(
+    step: Any,
     nodes: Array,
     settings: Array,
     parameters: Array,
@@ -25,6 +28,7 @@ def string_step(
 
     Parameters
     ----------
+    step : ``node_step`` of ``node.kernels.address.firmware``
     nodes, settings : (n,) of dtype ``NODE`` and ``SETTINGS``
     parameters, readings, moments : (n, ...) as ``node_step`` takes them
     """
@@ -32,15 +36,18 @@ def string_step(
         says[k] = 0
         if mask[k]:
             one = slice(k, k + 1)
-            says[k] = node_step(nodes[one], settings[one], parameters[k], readings[k], moments[k])
+            says[k] = step(nodes[one], settings[one], parameters[k], readings[k], moments[k])
 
 
 @kernel
-def string_aiding(nodes: Array, settings: Array, string: Array, hops: int, valid_locals: Array, aiding: Array) -> None:
+def string_aiding(
+    aid: Any, nodes: Array, settings: Array, string: Array, hops: int, valid_locals: Array, aiding: Array
+) -> None:
     """Hand an aiding down the first ``hops`` nodes of a string whose scheme is ``forward``.
 
     Parameters
     ----------
+    aid : ``node_aiding`` of ``node.kernels.address.firmware``
     nodes, settings : (n,) of dtype ``NODE`` and ``SETTINGS``
     string : (hops or more,) indices of the nodes, from the top down
     valid_locals : (hops or more,) time of validity by the clock of each node, s
@@ -50,7 +57,7 @@ def string_aiding(nodes: Array, settings: Array, string: Array, hops: int, valid
         k = string[hop]
         one = slice(k, k + 1)
         aiding[A_VALID] = valid_locals[hop]
-        if not node_aiding(nodes[one], settings[one], aiding) & ONWARD:
+        if not aid(nodes[one], settings[one], aiding) & ONWARD:
             return
         node = nodes[k]
         aiding[A_OFFSET], aiding[A_SYSTEMATIC] = node.down_offset, node.down_systematic

@@ -16,11 +16,11 @@ import numpy as np
 import numpy.typing as npt
 
 from node.firmware.block_trial import record_of
+from node.kernels.address import firmware
 from node.kernels.layout import Array
 from sim.campaign.course import Course, course_of
 from sim.campaign.draws import Draws, draws_of, fresh_nodes, noise_of
 from sim.campaign.drill import CODES, STATE_OF, SURVEY, drill, new_work
-from sim.campaign.firmware import call_with_firmware
 from sim.rig.direct_string import wrapped
 from sim.world.scenario import Scenario
 from sim.world.world import World
@@ -109,10 +109,24 @@ class Campaign:
         surveys = np.zeros(MOST_SURVEYS * count * len(self.course.epochs), SURVEY)
         epochs = np.zeros((len(self.course.epochs), count), STATE_OF)
         key = np.array([seed & 0xFFFFFFFF, seed >> 32], np.uint64)
-        work = (self._work, self._wander, self._hops)
         counts = np.zeros((count, CODES), np.int64)
-        made = call_with_firmware(
-            drill, nodes, crews, self._corrections, self.course, self._noise, draws, key, *work, surveys, epochs, counts
+        step, aid = firmware()
+        made = drill(
+            step,
+            aid,
+            nodes,
+            crews,
+            self._corrections,
+            self.course,
+            self._noise,
+            draws,
+            key,
+            self._work,
+            self._wander,
+            self._hops,
+            surveys,
+            epochs,
+            counts,
         )
         return self._surveys(seed, draws, surveys[:made]), self._epochs(seed, draws, epochs)
 

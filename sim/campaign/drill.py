@@ -103,7 +103,7 @@ def drill(
 
     Parameters
     ----------
-    step, aid : ``node_step`` and ``node_aiding``, see ``sim.campaign.firmware``
+    step, aid : ``node_step`` and ``node_aiding``, see ``node.kernels.address``
     nodes, crews : (tubes,) of dtype ``NODE``, as new, and ``SETTINGS``
     corrections : (tubes, 2) of dtype ``PARAMETERS``
     course, noise, draws : ``sim.campaign.course.Course``, ``sim.campaign.draws.Noise`` and ``Draws``

@@ -37,7 +37,7 @@ def replay(
 
     Parameters
     ----------
-    step, aid : ``node_step`` and ``node_aiding``, see ``sim.campaign.firmware``
+    step, aid : ``node_step`` and ``node_aiding``, see ``node.kernels.address``
     nodes, crews : (tubes,) of dtype ``NODE``, as they were at first, and ``SETTINGS``
     corrections : (tubes, 2) of dtype ``PARAMETERS``
     given : (n,) of dtype ``GIVEN``

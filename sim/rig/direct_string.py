@@ -20,6 +20,7 @@ from node.firmware.encoder import EncoderNode, EncoderSample
 from node.firmware.inputs import ImuReading, RigContext
 from node.firmware.reporter import VAR_FLOOR
 from node.firmware.tube import Tube
+from node.kernels.address import firmware
 from node.kernels.calibration import PARAMETERS, USUAL
 from node.kernels.layout import PERIOD, Err, Scheme, default_config
 from node.kernels.record import (
@@ -121,6 +122,7 @@ class DirectString:
         if self._file.medium.link != "off":
             raise ScenarioError('medium.link: expected "off" for a string without frames')
         self._spoil = spoil
+        self._step, self._aid = firmware()
         count, self._imus = world.scenario.tubes, self._file.node.imus
         config = self._tuned_config()
         # the records of all tubes in one array, so that a cycle is read off in a few operations
@@ -253,7 +255,7 @@ class DirectString:
         moments[:, CLOCK_VAR] = self._clock_var[n - 1 :: -1]
         moments[:, SYNCHRONISED] = 1.0
         crews, corrections, readings = tables.crews[:n], self._corrections, tables.readings[cycle]
-        string_step(self.nodes[:n], crews, corrections, readings, moments, mask, tables.says)
+        string_step(self._step, self.nodes[:n], crews, corrections, readings, moments, mask, tables.says)
         said: dict[int, Sequence[Message]] = {}
         for place in np.flatnonzero(mask & (tables.says[:n] & ~ADMITTED != 0)).tolist()[::-1]:
             tube = place + 1
@@ -320,11 +322,11 @@ class DirectString:
         taken = np.array(
             [
                 *(aiding.yaw, aiding.yaw_var, aiding.systematic_var, aiding.offset, aiding.rate, 0.0),
-                *(aiding.sequence, aiding.hops, aiding.torque, aiding.torsion_var, aiding.under_torque),
+                *(aiding.sequence, aiding.hops, aiding.torque, aiding.torsion_var, aiding.under_torque, 0.0),
             ]
         )
         places = np.array(string) - 1
-        string_aiding(self.nodes, tables.crews, places, reach, valid + error, taken)
+        string_aiding(self._aid, self.nodes, tables.crews, places, reach, valid + error, taken)
 
     def _empty_run(self) -> StringRun:
         world, tubes = self.world, self.world.scenario.tubes

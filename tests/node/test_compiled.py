@@ -61,7 +61,7 @@ from node.kernels.calibration import identity_parameters
 from node.kernels.fixed.beside import new_integers
 from node.kernels.fixed.step import fixed_aiding, fixed_step
 from node.kernels.layout import default_config
-from node.kernels.record import MOMENT, READING, SETTINGS, new_node
+from node.kernels.record import AIDING, MOMENT, READING, SETTINGS, new_node
 from node.kernels.step import node_aiding, node_step
 
 _nrt_python.memsys_enable_stats()
@@ -93,7 +93,7 @@ def allocations(cycles):
     settings["imus"] = 1
     settings["rate_range"], settings["force_range"] = 9.0, 80.0
     parameters["identity"][0] = 0
-    readings, moment, aiding = np.zeros((1, READING)), np.ones(MOMENT), np.zeros(11)
+    readings, moment, aiding = np.zeros((1, READING)), np.ones(MOMENT), np.zeros(AIDING)
     aiding[1] = 1e-6
     own, integers = (drive_fixed, (new_integers(),)) if os.environ["KERNEL"] == "fixed" else (drive, ())
     before = rtsys.get_allocation_stats().alloc

@@ -14,12 +14,12 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from node.firmware.tube import Tube
+from node.kernels.address import firmware
 from node.kernels.record import AIDING, MOMENT, READING
 from sim.campaign import engine
 from sim.campaign.chunk import RUNS, Campaign, run_chunk, scenario_digest
 from sim.campaign.draws import draws_of, noise_of
 from sim.campaign.drill import draw_cycle, new_work
-from sim.campaign.firmware import call_with_firmware
 from sim.campaign.replay import CYCLE, GIVEN, HEARD, replay
 from sim.campaign.run import run_campaign
 from sim.campaign.store import MANIFEST, Folder
@@ -72,7 +72,7 @@ def test_what_a_rig_gives_its_nodes_gives_the_same_nodes_here_bit_for_bit() -> N
     again = before.copy()
     taken = (np.array(heard.readings), np.array(heard.moments), np.array(heard.aidings))
     tables = (np.concatenate(crews), np.stack(corrections))
-    assert call_with_firmware(replay, again, *tables, rows, *taken) == 0
+    assert replay(*firmware(), again, *tables, rows, *taken) == 0
     assert same_bits(again, string.nodes)
     assert not same_bits(again, before)
 

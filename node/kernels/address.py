@@ -1,0 +1,49 @@
+"""The compiled firmware in the hands of other kernels: by its address.
+
+A kernel that named ``node_step`` would hold a copy of it, which takes a minute to compile; one that is given its
+address calls the very code that a rig runs.
+"""
+
+from __future__ import annotations
+
+import functools
+from typing import Any, cast
+
+import numba
+import numpy as np
+from numba.core.types import WrapperAddressProtocol
+
+from node.kernels.calibration import identity_parameters
+from node.kernels.layout import default_config
+from node.kernels.record import AIDING, MOMENT, READING, SETTINGS, new_node
+from node.kernels.step import node_aiding, node_step
+
+
+class ByAddress(WrapperAddressProtocol):
+    """An ``entry`` compiled for the types of ``arguments``, as a value that a kernel takes and calls."""
+
+    def __init__(self, function: Any, *arguments: Any) -> None:
+        kinds = tuple(map(numba.typeof, arguments))
+        function.compile(kinds)
+        compiled = function.overloads[kinds]
+        self._signature = compiled.signature
+        self._address = compiled.library.get_pointer_to_function(compiled.fndesc.llvm_cfunc_wrapper_name)
+
+    def __wrapper_address__(self) -> int:
+        """Where the code is."""
+        return cast("int", self._address)
+
+    def signature(self) -> Any:
+        """What it takes and returns, as numba says it."""
+        return self._signature
+
+
+@functools.cache
+def firmware() -> tuple[ByAddress, ByAddress]:
+    """``node_step`` and ``node_aiding``."""
+    nodes, crews = new_node(default_config()), np.zeros(1, SETTINGS)
+    corrections = np.concatenate([identity_parameters()] * 2)
+    return (
+        ByAddress(node_step, nodes, crews, corrections, np.zeros((1, READING)), np.zeros(MOMENT)),
+        ByAddress(node_aiding, nodes, crews, np.zeros(AIDING)),
+    )
