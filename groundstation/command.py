@@ -6,6 +6,7 @@ from pathlib import Path
 
 import click
 
+from groundstation.page_options import page_options, page_settings
 from telemetry.runtime.command_line import needs, plain_faults
 from telemetry.runtime.options import clock_option, key_option, keys_option, place_options
 
@@ -67,6 +68,7 @@ WEIGHTINGS = ("bayes", "equal", "linear", "quadratic", "cubic", "adaptive")
     help="Wall file of which this hole is a column: its joints are judged while it is drilled.",
 )
 @click.option("--hole", default="", help="Name of this hole in the wall file.")
+@page_options
 @clock_option
 @key_option
 @keys_option
@@ -86,6 +88,9 @@ def ground(
     mount_std_deg: float,
     wall: Path | None,
     hole: str,
+    page: str | None,
+    page_tls: tuple[Path, Path] | None,
+    page_passwords: Path | None,
     clock: str,
     key_file: Path | None,
     keys_place: Path | None,
@@ -96,8 +101,9 @@ def ground(
     """Run the ground station of one rig.
 
     \b
-    Example:
+    Examples:
       borechain ground --folder state/ground --tube-length-m 2
+      borechain ground --page 127.0.0.1:8080 --page-passwords passwords
     """
     from groundstation.host import run_ground
     from telemetry.runtime.hosting import Place
@@ -116,4 +122,9 @@ def ground(
         "wall": wall,
         "hole": hole,
     }
-    run_ground(Place(rig_name, endpoint, folder, key_file, keys=keys_place), settings, own_clock=clock == "own")
+    run_ground(
+        Place(rig_name, endpoint, folder, key_file, keys=keys_place),
+        settings,
+        own_clock=clock == "own",
+        page=page_settings(page, page_tls, page_passwords),
+    )

@@ -8,6 +8,7 @@
     ├── SelectorError(ValueError)              a query nobody can answer: the message lists the valid names
     ├── ConfigurationError(InputError, ValueError)    a setting that what was asked for needs: correct the option named
     ├── LeaseError(OSError)                    another ground station works on the rig: end it, or name another rig
+    ├── PageError(OSError)                     the page cannot be served: choose another address
     └── StoreError(OSError)                    the database cannot be opened or written: nothing was acknowledged
 """
 
@@ -38,6 +39,10 @@ class ConfigurationError(GroundError, InputError, ValueError):
 
 class LeaseError(GroundError, OSError):
     """The rig has its ground station already."""
+
+
+class PageError(GroundError, OSError):
+    """The page cannot be served."""
 
 
 class StoreError(GroundError, OSError):

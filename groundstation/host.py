@@ -4,12 +4,13 @@ from __future__ import annotations
 
 import asyncio
 import contextlib
-from collections.abc import AsyncIterator, Callable
+from collections.abc import AsyncIterator, Callable, Iterator
 from functools import partial
 from typing import Any
 
 from groundstation.config import checked_config
 from groundstation.gateway.lease import take_lease
+from groundstation.gateway.page.settings import PageSettings, listen
 from groundstation.gateway.zenoh import ZenohGateway
 from groundstation.service.process import GroundProcess
 from node.kernels.layout import PERIOD
@@ -26,33 +27,49 @@ from telemetry.runtime.step_client import AsyncStepClient, serve_stepped
 from telemetry.runtime.timing import CycleTiming
 
 NAME = "ground"
+ServePage = Callable[[GroundProcess], contextlib.AbstractAsyncContextManager[None]]
+Doors = Callable[[], contextlib.AbstractAsyncContextManager["asyncio.Task[None]"]]
 
 
-def run_ground(place: Place, settings: dict[str, Any], *, own_clock: bool = False) -> None:
+def run_ground(
+    place: Place, settings: dict[str, Any], *, own_clock: bool = False, page: PageSettings | None = None
+) -> None:
     """Ground station: a stepper or its own clock drives its link, operators come in at any time.
 
-    ``settings`` are those of ``GroundConfig``.
+    ``settings`` are those of ``GroundConfig``; ``page`` says where a page is served, if one is.
 
     Raises
     ------
     ConfigurationError
         When a setting is outside its range; nothing was opened.
+    PageError
+        When the page's port is taken.
     """
     begin_process(NAME)
     with reporting(NAME):
         # settings, key and database are looked at before half a minute is spent on a router that may be absent
         given = {"rig": place.rig, "folder": place.folder, "key_file": place.key_file, "keys": place.keys}
         config = checked_config(**given, **settings)
-        with contextlib.closing(GroundProcess(config)) as process, joined(place, file_name(BASE)) as bus:
+        with (
+            contextlib.closing(GroundProcess(config)) as process,
+            page_of(page) as serve_page,
+            joined(place, file_name(BASE)) as bus,
+        ):
             warn_of_keys(NAME, process.endpoint.seals)
             take_lease(bus, place.rig)
-            run(serve_by_own_clock(process, bus) if own_clock else serve_on_stepper(process, bus, place))
+            doors = partial(answering, process, bus, serve_page)
+            run(serve_by_own_clock(process, bus, doors) if own_clock else serve_on_stepper(process, bus, place, doors))
 
 
-async def serve_by_own_clock(process: GroundProcess, bus: ZenohBus) -> None:
+def no_page(_process: GroundProcess) -> contextlib.AbstractAsyncContextManager[None]:
+    """Serve no page."""
+    return contextlib.nullcontext()
+
+
+async def serve_by_own_clock(process: GroundProcess, bus: ZenohBus, doors: Doors) -> None:
     """Run the ground station by its own clock, below it the encoder, until a signal ends it."""
     rig = process.config.rig
-    async with answering(process, bus) as answers:
+    async with doors() as answers:
         ports = neighbour_ports(ZenohMedium(bus), rig, BASE, {Side.LOWER: ENCODER})
         loop = OwnClockLoop(process, ports, OwnClock(), CycleTiming(), PERIOD, partial(complain, NAME))
         process.operator.wake = lambda: loop.call(lambda woken, now: woken.on_timer(now))
@@ -61,10 +78,10 @@ async def serve_by_own_clock(process: GroundProcess, bus: ZenohBus) -> None:
         await loop.run()
 
 
-async def serve_on_stepper(process: GroundProcess, bus: ZenohBus, place: Place) -> None:
+async def serve_on_stepper(process: GroundProcess, bus: ZenohBus, place: Place, doors: Doors) -> None:
     """Run the ground station step by step until a signal ends it; between two steps operators are answered."""
     rig = process.config.rig
-    async with answering(process, bus) as answers:
+    async with doors() as answers:
         ports = stepped_ports(ZenohMedium(bus), rig, BASE, [Side.LOWER])
         with place.step_stream(address_name(BASE)) as stream:
             client = AsyncStepClient(bus, rig, BASE, ports, stream)  # its token of life is last
@@ -73,15 +90,31 @@ async def serve_on_stepper(process: GroundProcess, bus: ZenohBus, place: Place) 
 
 
 @contextlib.asynccontextmanager
-async def answering(process: GroundProcess, bus: ZenohBus) -> AsyncIterator[asyncio.Task[None]]:
-    """Have operators on ``bus`` answered while the context lasts; yields the task that does it."""
+async def answering(
+    process: GroundProcess, bus: ZenohBus, serve_page: ServePage = no_page
+) -> AsyncIterator[asyncio.Task[None]]:
+    """Have operators on ``bus`` and on the page answered while the context lasts; yields the task of the bus."""
     gateway = ZenohGateway(bus, process)
     task = asyncio.create_task(gateway.serve())
     try:
-        yield task
+        async with serve_page(process):
+            yield task
     finally:
         gateway.close()
         await task
+
+
+@contextlib.contextmanager
+def page_of(page: PageSettings | None) -> Iterator[ServePage]:
+    """What serves a page: it listens at once, so that a port that is taken is told before anything is waited for."""
+    if page is None:
+        yield no_page
+        return
+    from groundstation.gateway.page.server import serving_page  # without a page no web server is loaded
+
+    with listen(page) as listening:
+        complain(NAME, f"page {page.url}")
+        yield lambda process: serving_page(process, page, listening)
 
 
 def end_with(answers: asyncio.Task[None], stop: Callable[[], None]) -> None:

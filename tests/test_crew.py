@@ -172,7 +172,7 @@ def test_every_line_fits_the_screen() -> None:
         alarms={"revision": 1, "utc": "", "open": [alarm(1, detail="x" * 300, wind="NNE", azimuth_deg=22, md_m=12.0)]},
         verdict={
             "revision": 1, "utc": "", "verdict": "out", "by_surveys": "out", "line": "x" * 200, "why": ["y" * 200],
-            "off": None, "steer": None, "good_for_s": 4.5, "target_m": 20.0,
+            "todo": "z" * 200, "off": None, "steer": None, "good_for_s": 4.5, "target_m": 20.0,
         },
         orders={"revision": 1, "utc": "", "orders": []},
     )  # fmt: skip

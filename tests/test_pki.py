@@ -15,6 +15,7 @@ from sealed_string import NOW, make_folder
 from borechain.cli.pki.pki import pki
 from borechain.pki.access import read_access
 from borechain.pki.rig_keys import add_tube, init_rig, read_secret, revoke_tube, rotate_keys, tubes_of
+from groundstation.gateway.page.passwords import is_right, read_passwords
 from telemetry.application.seals import Keys, seals_of
 from telemetry.errors import KeyFileError
 from telemetry.media.credentials import DEPTH_SOURCE, credentials_for, credentials_of, file_name, needs_tls
@@ -245,3 +246,18 @@ def test_credentials_are_named_by_what_is_missing(folder: Path) -> None:
     assert credentials_of(folder / "tube-1.keys", file_name(1)).key == folder / "tube-1.key"
     with pytest.raises(OSError, match=r"tube-9\.pem, which borechain pki makes"):
         credentials_of(folder, "tube-9")
+
+
+def test_a_password_of_the_page_is_kept_as_its_hash_for_its_owner_alone(tmp_path: Path) -> None:
+    file = tmp_path / "passwords"
+    for role, word in (("driller", "a long enough word"), ("operator", "another long word")):
+        done = CliRunner().invoke(pki, ["password", role, "--file", str(file)], input=f"{word}\n")
+        assert done.exit_code == 0, done.output
+        assert word not in done.output
+    assert stat.S_IMODE(file.stat().st_mode) == 0o600
+    found = read_passwords(file)
+    assert sorted(found) == ["driller", "operator"]
+    assert is_right("a long enough word", found["driller"])
+    short = CliRunner().invoke(pki, ["password", "driller", "--file", str(file)], input="short\n")
+    assert (short.exit_code, "expected 8 to 256 characters, got 5" in short.output) == (2, True)
+    assert read_passwords(file) == found

@@ -39,30 +39,10 @@ def verdict(picture: Picture, now: float) -> Text:
     """Three lines: the word and the numbers, what to do, why."""
     found = picture.verdict(now)
     style = STYLES[found["verdict"]]
-    lines = [found["line"], todo(found), "; ".join(found["why"])]
+    lines = [found["line"], found["todo"], "; ".join(found["why"])]
     if found["verdict"] == "dont_know" and found["by_surveys"] != "dont_know":
         lines[1] = f"the surveys alone said {found['by_surveys'].replace('_', ' ')}; do not count on it"
     return Text("\n").join(fitted(f" {line}", style) for line in lines)
-
-
-def todo(found: View) -> str:
-    """What to do, in a line."""
-    steer = found.get("steer")
-    match found["verdict"]:
-        case "on_target":
-            return "go on"
-        case "watch" | "steer" if steer is not None:
-            verb = "steer" if found["verdict"] == "steer" else "if it grows, steer"
-            if steer["left_m"] is not None and steer["left_m"] <= 0.0:
-                return f"{verb} to {steer['azimuth_deg']:g} deg {steer['wind']} at once"
-            left = "" if steer["left_m"] is None else f", {steer['left_m']:.1f} m are left"
-            return f"{verb} to {steer['azimuth_deg']:g} deg {steer['wind']} before {steer['before_md_m']:.1f} m{left}"
-        case "watch":
-            return "go on, and look at the next survey"
-        case "out":
-            return "stop; the column is out of its tolerance, or will be whatever is done: ask the engineer"
-        case _:
-            return "do not drill on by this screen until the cause is mended"
 
 
 def plan(picture: Picture) -> Text:

@@ -15,7 +15,15 @@ FRESH_WITHOUT_WORD = 4.5  # s, until a ground station has said how long its verd
 PATHS = ("status", "verdict", "string", "column", "wall", "alarms", "orders")  # asked for at the beginning
 NODES = "nodes/"
 MILD, SERIOUS, GRAVE = "notice", "degraded", "bad"
-UNKNOWN_VERDICT: View = {"verdict": "dont_know", "by_surveys": "dont_know", "why": [], "off": None, "steer": None}
+KEEP_OUT = "do not drill on by this screen until the cause is mended"
+UNKNOWN_VERDICT: View = {
+    "verdict": "dont_know",
+    "by_surveys": "dont_know",
+    "todo": KEEP_OUT,
+    "why": [],
+    "off": None,
+    "steer": None,
+}
 
 
 @dataclass(slots=True)
@@ -51,7 +59,7 @@ class Picture:
         if old <= float(found.get("good_for_s", FRESH_WITHOUT_WORD)):
             return found
         silent = f"no verdict from the ground station for {old:.0f} s"
-        return found | {"verdict": "dont_know", "line": f"DON'T KNOW: {silent}", "why": [silent]}
+        return found | {"verdict": "dont_know", "line": f"DON'T KNOW: {silent}", "todo": KEEP_OUT, "why": [silent]}
 
     def is_live(self, now: float) -> bool:
         """Whether what is shown can be counted on to be of now."""

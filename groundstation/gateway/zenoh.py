@@ -16,9 +16,8 @@ import msgpack
 from groundstation.errors import GroundError, SelectorError
 from groundstation.service.intake import BEGIN, Intake, pack_intake
 from groundstation.service.orders import Order
-from groundstation.service.paths import LONGEST_NUMBER, PATTERNS, Path, find, paths
+from groundstation.service.paths import LONGEST_NUMBER, PATTERNS, check_parameters, find, paths
 from groundstation.service.process import GroundProcess
-from groundstation.service.views import Parameters
 from telemetry import keys
 from telemetry.errors import TelemetryError
 from telemetry.media.zenoh_bus import JSON, MSGPACK, Publisher, Query, ZenohBus
@@ -159,7 +158,7 @@ class ZenohGateway:
         if accept not in ENCODINGS:
             raise SelectorError(f"parameter accept: expected json or msgpack, got {accept!r}")
         parameters = {name: value for name, value in query.parameters.items() if name not in COMMON_PARAMETERS}
-        check_parameters(found, parameters)
+        check_parameters(found.values(), parameters, COMMON_PARAMETERS)
         return [(self._key(path), pack(view.show(model, parameters), accept)) for path, view in found.items()]
 
     def _take_order(self, query: Query) -> None:
@@ -203,20 +202,6 @@ def refuse(query: Query, reason: str) -> None:
     """End a query with what is wrong with it."""
     query.reply_error(reason)
     query.finish()
-
-
-def check_parameters(found: dict[str, Path], parameters: Parameters) -> None:
-    """Refuse a parameter that none of the paths asked for takes.
-
-    Raises
-    ------
-    SelectorError
-        Naming those that are taken.
-    """
-    known = sorted({name for view in found.values() for name in view.parameters} | set(COMMON_PARAMETERS))
-    for name in parameters:
-        if name not in known:
-            raise SelectorError(f"parameter {name}: expected one of {', '.join(known)}")
 
 
 def pack(view: dict[str, Any], accept: str) -> bytes:

@@ -78,6 +78,7 @@ VERDICT: Fields = (
     text("verdict", "what the crew needs to know first", *SOME_WORDS),
     text("by_surveys", "what the surveys alone say, fresh or not", *SOME_WORDS),
     text("line", "all of it in a line"),
+    text("todo", "what to do, in a line"),
     texts("why", "what it rests on, or why nobody knows"),
     texts("doubts", "why nobody knows, as words", *(doubt.value for doubt in Doubt)),
     number("bit_md_m", "measured depth of the bit", null=True),

@@ -116,6 +116,20 @@ def find(k: RigModel, path: str) -> Path:
     return member.path(number)
 
 
+def check_parameters(found: Iterable[Path], parameters: Parameters, common: tuple[str, ...] = ()) -> None:
+    """Refuse a parameter that none of the paths asked for takes; ``common`` are those of every path.
+
+    Raises
+    ------
+    SelectorError
+        Naming those that are taken.
+    """
+    known = sorted({name for path in found for name in path.parameters} | set(common))
+    for name in parameters:
+        if name not in known:
+            raise SelectorError(f"parameter {name}: expected {'one of ' + ', '.join(known) if known else 'none'}")
+
+
 def schemas() -> dict[str, View]:
     """JSON schema of the answer of every path."""
     return {pattern: object_schema(path.fields) for pattern, path in (FIXED | MEMBERS).items()}

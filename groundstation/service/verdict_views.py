@@ -27,19 +27,21 @@ def verdict(k: RigModel, _p: dict[str, str]) -> View:
     """The verdict of this moment."""
     known = known_of(k)
     found = judge(known)
+    way = None if found.about is None or found.act_before is None else steer(found.about, found)
     return {
         "rig": k.config.rig,
         "good_for_s": k.config.stale_after,
         "verdict": found.word.value,
         "by_surveys": found.by_surveys.value,
         "line": line(found),
+        "todo": todo(found.word, way),
         "why": list(found.why),
         "doubts": [doubt.value for doubt in found.doubts],
         "bit_md_m": known.bit,
         "target_m": known.target,
         "what": found.what or None,
         "off": None if found.about is None else off(found.about),
-        "steer": None if found.about is None or found.act_before is None else steer(found.about, found),
+        "steer": way,
     }
 
 
@@ -83,3 +85,23 @@ def line(found: Verdict) -> str:
     if found.act_before is None or found.left is None or found.word is Word.OUT:
         return said
     return f"{said}; act " + (f"before {found.act_before:.1f} m" if found.left > 0.0 else "at once")
+
+
+def todo(word: Word, way: View | None) -> str:
+    """What to do, in a line for a screen."""
+    match word:
+        case Word.ON_TARGET:
+            return "go on"
+        case Word.WATCH | Word.STEER if way is not None:
+            verb = "steer" if word is Word.STEER else "if it grows, steer"
+            where = f"{verb} to {way['azimuth_deg']:g} deg {way['wind']}"
+            if way["left_m"] is not None and way["left_m"] <= 0.0:
+                return f"{where} at once"
+            left = "" if way["left_m"] is None else f", {way['left_m']:.1f} m are left"
+            return f"{where} before {way['before_md_m']:.1f} m{left}"
+        case Word.WATCH | Word.STEER:
+            return "go on, and look at the next survey"
+        case Word.OUT:
+            return "stop; the column is out of its tolerance, or will be whatever is done: ask the engineer"
+        case Word.DONT_KNOW:
+            return "do not drill on by this screen until the cause is mended"

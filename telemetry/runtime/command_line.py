@@ -30,8 +30,10 @@ EXTRA_OF = {
     "scipy": "ground",
     "smbus2": "board",
     "sqlalchemy": "ground",
+    "starlette": "ground",
     "textual": "ground",
     "typst": "ground",
+    "uvicorn": "ground",
 }  # by the module it brings
 
 

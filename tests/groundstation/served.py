@@ -12,7 +12,8 @@ from dataclasses import dataclass
 from hand_fed import Rig
 
 from groundstation.gateway.lease import take_lease
-from groundstation.host import answering
+from groundstation.gateway.page.settings import PageSettings
+from groundstation.host import answering, page_of
 from telemetry.media.zenoh_bus import open_router
 from telemetry.messages import Event, Severity
 
@@ -45,17 +46,17 @@ class Served:
 
 
 @contextlib.contextmanager
-def serving(rig: Rig) -> Iterator[Served]:
-    """Serve a rig until the context ends."""
+def serving(rig: Rig, page: PageSettings | None = None) -> Iterator[Served]:
+    """Serve a rig until the context ends, with a page where one is given."""
     with socket.socket() as probe:
         probe.bind(("127.0.0.1", 0))
         endpoint = f"tcp/127.0.0.1:{probe.getsockname()[1]}"
     loop, ready, end = asyncio.new_event_loop(), threading.Event(), asyncio.Event()
 
     async def serve() -> None:
-        with open_router(endpoint) as bus:
+        with open_router(endpoint) as bus, page_of(page) as serve_page:
             take_lease(bus, "rig-1")
-            async with answering(rig.ground, bus):
+            async with answering(rig.ground, bus, serve_page):
                 ready.set()
                 await end.wait()
 

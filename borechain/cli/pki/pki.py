@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import datetime
+import sys
 from pathlib import Path
 
 import click
@@ -33,6 +34,7 @@ def pki() -> None:
       borechain pki revoke 7
       borechain pki rotate
       borechain pki retire
+      borechain pki password driller --file passwords
     """
 
 
@@ -153,6 +155,43 @@ def retire(folder: Path) -> None:
     except KeyFileError as error:
         raise InputFault(str(error)) from error
     click.echo(f"generation {secret.generations[-1].number} alone is in every file of {folder}")
+
+
+@pki.command()
+@click.argument("role", type=click.Choice(["operator", "driller"]))
+@click.option(
+    "--file",
+    "path",
+    type=click.Path(path_type=Path, dir_okay=False),
+    default=Path("passwords"),
+    show_default=True,
+    help="Where the hashes are kept, for --page-passwords.",
+)
+@plain_faults
+def password(role: str, path: Path) -> None:
+    """Set the password of ROLE on the page: an operator reads, a driller orders. It is asked for, or read from a pipe.
+
+    \b
+    Example:
+      borechain pki password driller --file passwords
+    """
+    from borechain.pki.private_files import write_private
+    from groundstation.gateway.page.passwords import hash_of, read_passwords, text_of
+
+    known = read_passwords(path) if path.exists() else {}
+    text = click.prompt("Password", hide_input=True, confirmation_prompt=True) if stdin_is_terminal() else read_line()
+    write_private(path, text_of(known | {role: hash_of(text)}))
+    click.echo(f"{path}: password of {role}; borechain ground --page-passwords {path} takes it at its next start")
+
+
+def stdin_is_terminal() -> bool:
+    """Whether somebody can be asked."""
+    return sys.stdin.isatty()
+
+
+def read_line() -> str:
+    """The password on standard input, without its line end."""
+    return sys.stdin.readline().rstrip("\r\n")
 
 
 def utc_now() -> datetime.datetime:

@@ -7,7 +7,7 @@ import sys
 import tempfile
 import time
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
 from importlib.util import find_spec
 from pathlib import Path
@@ -20,10 +20,12 @@ from borechain.cli.notices import warnings_in_lines
 from borechain.cli.options import fault_option, json_option, scenario_argument, seed_option, speed_option
 from borechain.cli.tables import console
 from borechain.crew.log import RunLog
+from groundstation.page_options import page_options, page_settings
 from telemetry import keys
 from telemetry.runtime.options import insecure_option, keys_option, secure_endpoint
 
 if TYPE_CHECKING:
+    from groundstation.gateway.page.settings import PageSettings
     from sim.rig.launcher import Tick
     from sim.rig.processes import ProcessTable
     from sim.rig.scheduler import Progress
@@ -67,8 +69,9 @@ PRELOAD = {"float64": "borechain.warm", "fixed": "borechain.warm_all", "publishe
     "--view",
     type=click.Choice(["crew", "bar", "log"]),
     help="What is shown meanwhile: the crew's screen, a bar, or a line for whatever happens  "
-    "[default: crew on a terminal, bar there with --inline, log into a file]",
+    "[default: crew on a terminal, bar there with --inline, log into a file and with --page]",
 )
+@page_options
 @json_option
 @needs("rich", "scipy", "sqlalchemy")
 @plain_faults
@@ -84,6 +87,9 @@ def rig(
     keys_place: Path | None,
     out: Path | None,
     view: str | None,
+    page: str | None,
+    page_tls: tuple[Path, Path] | None,
+    page_passwords: Path | None,
     as_json: bool,
 ) -> None:
     """Drill SCENARIO tube by tube with one real process a tube, and show what the ground station makes of it.
@@ -94,6 +100,7 @@ def rig(
       borechain rig wellbore-1 --speed 1 --fault kill-node:3@900
       borechain rig rig-3 --transport can
       borechain rig rig-3 --keys stick
+      borechain rig wellbore-1 --speed 5 --page 127.0.0.1:8080
     """
     from sim.rig.launcher import check_port_free, next_run_folder, prepare_folder
     from sim.rig.report import write_files
@@ -109,9 +116,13 @@ def rig(
             f"--transport {transport}: expected {'real processes' if inline else '--inline'} with it; "
             "one process has no bus, and steps know no frames without ISO-TP"
         )
+    served = page_settings(page, page_tls, page_passwords)
+    if served is not None:
+        check_page(served, inline=inline)
     if not inline:
         check_port_free(endpoint)
-    view = chosen_view(view, inline=inline, quiet=as_json, on_terminal=sys.stdout.isatty())
+    on_terminal = sys.stdout.isatty() and served is None  # whoever opens the page looks at no second screen
+    view = chosen_view(view, inline=inline, quiet=as_json, on_terminal=on_terminal)
     if view == "crew":
         from borechain.cli.rig.on_screen import drill_on_screen
 
@@ -119,6 +130,8 @@ def rig(
         return
     folder = out if out is not None else next_run_folder(Path("out") / scenario.stem)
     prepare_folder(folder)
+    if served is not None:
+        served = orderable(served)
     started = time.monotonic()
     log = RunLog(say) if view == "log" else None
     try:
@@ -135,7 +148,17 @@ def rig(
                     log,
                     transport,
                     partial(
-                        process_table, world, scenario, seed, speed, faults, rig_name, endpoint, folder, keys_place
+                        process_table,
+                        world,
+                        scenario,
+                        seed,
+                        speed,
+                        faults,
+                        rig_name,
+                        endpoint,
+                        folder,
+                        keys_place,
+                        served,
                     ),
                     keys_place,
                 )
@@ -150,6 +173,34 @@ def rig(
         show_result(result, folder)
     if result["missing"]:
         raise EnvironmentFault(lacking(result["missing"], result["measurements"], folder))
+
+
+def check_page(page: PageSettings, *, inline: bool) -> None:
+    """Refuse a page that cannot be served before anything is made.
+
+    Raises
+    ------
+    InputFault
+        With ``--inline``, where nobody can ask.
+    PageError
+        When its port is taken.
+    """
+    from groundstation.gateway.page.settings import listen
+
+    if inline:
+        raise InputFault("--page: expected a rig of processes with it; nothing can be asked with --inline")
+    listen(page).close()
+
+
+def orderable(page: PageSettings) -> PageSettings:
+    """The page of a simulated rig, on which somebody may order: without passwords with one by lot, which is told."""
+    if page.passwords:
+        return page
+    from groundstation.gateway.page.passwords import DRILLER, drawn_password, hash_of
+
+    password = drawn_password()
+    click.echo(f"page {page.url}; sign in as {DRILLER} with the password {password}", err=True)
+    return replace(page, passwords={DRILLER: hash_of(password)})
 
 
 def chosen_view(view: str | None, *, inline: bool, quiet: bool, on_terminal: bool) -> str:
@@ -270,6 +321,7 @@ def process_table(
     endpoint: str,
     folder: Path,
     keys_place: Path | None,
+    page: PageSettings | None,
     transports: Transports,
     steps: Path,
 ) -> ProcessTable:
@@ -292,7 +344,7 @@ def process_table(
     specs = {
         "medium": Spec(run_medium, (place("medium"), scenario, seed, speed, faults, True, True, transports)),
         "encoder": Spec(run_encoder, (place("encoder", ENCODER), None, None, world.torque_settings(), world.reach)),
-        "base": Spec(run_ground, (place("ground"), ground_settings(world))),
+        "base": Spec(partial(run_ground, page=page), (place("ground"), ground_settings(world))),
     }
     for tube in range(1, world.scenario.tubes + 1):
         specs[str(tube)] = Spec(run_node, (place(f"tube-{tube}", tube), world.tube_settings(tube)))

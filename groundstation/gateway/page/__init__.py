@@ -1,0 +1,1 @@
+"""The page: the ground station's answers and orders over HTTP, and the screen that shows them in a browser."""

@@ -1,0 +1,166 @@
+"""The OpenAPI document of the page's addresses, made from the code that answers and obeys."""
+
+from __future__ import annotations
+
+import math
+import re
+from typing import Any
+
+from groundstation.gateway.page.passwords import ROLES
+from groundstation.service.answers import object_schema
+from groundstation.service.key_fields import HEADER, ORDER
+from groundstation.service.paths import FIXED, MEMBERS, Member, Path
+from telemetry.application.arguments import shown_name
+from telemetry.application.commands import COMMANDS, CommandSpec
+from telemetry.quantities import ValueKind
+
+View = dict[str, Any]
+JSON_TYPES = {ValueKind.NUMBER: "number", ValueKind.INTEGER: "integer", ValueKind.BOOLEAN: "boolean"}
+REFUSED = {"type": "object", "properties": {"error": {"type": "string"}}, "required": ["error"]}
+SIGN_IN = {
+    "type": "object",
+    "properties": {
+        "role": {"type": "string", "enum": list(ROLES)},
+        "name": {"type": "string", "description": "who orders, for the record"},
+        "password": {"type": "string"},
+    },
+    "required": ["role", "name", "password"],
+}
+SESSION = {
+    "type": "object",
+    "properties": {
+        "role": {"type": ["string", "null"]},
+        "name": {"type": ["string", "null"]},
+        "csrf": {"type": ["string", "null"], "description": "to be repeated as x-csrf-token"},
+        "reads": {"type": "boolean"},
+        "orders": {"type": "boolean"},
+        "roles": {"type": "array", "items": {"type": "string"}, "description": "that have a password"},
+    },
+    "required": ["role", "name", "csrf", "reads", "orders", "roles"],
+}
+
+
+def document(version: str) -> View:
+    """The whole document."""
+    answers = {f"/api/{pattern}": {"get": asked(pattern, path)} for pattern, path in (FIXED | MEMBERS).items()}
+    orders = {f"/api/cmd/{name}": {"post": ordered(name)} for name in dict.fromkeys(spec.name for spec in COMMANDS)}
+    return {
+        "openapi": "3.1.0",
+        "info": {
+            "title": "borechain ground station",
+            "version": version,
+            "description": "The keys of one rig over HTTP. Reading needs no session on loopback; ordering needs one of "
+            "the role driller, and its csrf value in the header x-csrf-token.",
+        },
+        "paths": answers | orders | session_paths() | stream_path(),
+        "components": {"securitySchemes": {"session": {"type": "apiKey", "in": "cookie", "name": "borechain"}}},
+    }
+
+
+def asked(pattern: str, path: Path | Member) -> View:
+    """One answer."""
+    inside = [
+        {"name": name, "in": "path", "required": True, "schema": {"type": "integer"}}
+        for name in re.findall(r"\{([a-z]+)\}", pattern)
+    ]
+    query = path.parameters if isinstance(path, Path) else ()
+    return {
+        "operationId": "ask_" + re.sub(r"[^a-z_]+", "_", pattern).strip("_"),
+        "parameters": inside + [{"name": name, "in": "query", "schema": {"type": "string"}} for name in query],
+        "responses": {"200": content_of("the answer", object_schema(path.fields))} | refusals(400, 401, 404),
+    }
+
+
+def ordered(name: str) -> View:
+    """One command, with all its actions."""
+    specs = [spec for spec in COMMANDS if spec.name == name]
+    schemas = [arguments_of(spec) for spec in specs]
+    body = schemas[0] if len(schemas) == 1 else {"oneOf": schemas}
+    order = object_schema((*HEADER, *ORDER))
+    return {
+        "operationId": f"order_{name}",
+        "description": "; ".join(f"{spec.action}: {spec.meaning}" if spec.action else spec.meaning for spec in specs),
+        "security": [{"session": []}],
+        "parameters": [
+            {
+                "name": "wait",
+                "in": "query",
+                "schema": {"type": "string", "enum": ["true"]},
+                "description": "for the tube",
+            },
+            {"name": "x-csrf-token", "in": "header", "required": True, "schema": {"type": "string"}},
+        ],
+        "requestBody": {"required": True, "content": {"application/json": {"schema": body}}},
+        "responses": {
+            "200": content_of("the order, answered", order),
+            "202": content_of("the order; its course is /api/orders/{n}", order),
+        }
+        | refusals(400, 401, 403, 408, 413, 415),
+    }
+
+
+def arguments_of(spec: CommandSpec) -> View:
+    """JSON schema of the body of one command."""
+    properties: View = {}
+    if spec.action:
+        properties["action"] = {"const": spec.action}
+    else:
+        properties["tube"] = {"type": "integer", "description": "number of the tube"}
+    for argument in spec.arguments:
+        q = argument.quantity
+        turn = math.degrees(1.0) if q.unit == "rad" else 1.0
+        limits = {"minimum": q.low * turn, "maximum": q.high * turn} if q.kind in JSON_TYPES else {}
+        properties[shown_name(q)] = {
+            "type": JSON_TYPES.get(q.kind, "string"),
+            "description": q.meaning,
+            **{name: value for name, value in limits.items() if math.isfinite(value)},
+            **({"enum": list(q.choices)} if q.choices else {}),
+        }
+    needed = ["action" if spec.action else "tube"]
+    needed += [shown_name(argument.quantity) for argument in spec.arguments if argument.needed]
+    return {"type": "object", "properties": properties, "required": needed, "additionalProperties": False}
+
+
+def session_paths() -> View:
+    """Who is signed in."""
+    shown = {"200": content_of("who is signed in", SESSION)}
+    body = {"required": True, "content": {"application/json": {"schema": SIGN_IN}}}
+    return {
+        "/api/session": {
+            "get": {"operationId": "session", "responses": shown},
+            "post": {
+                "operationId": "sign_in",
+                "requestBody": body,
+                "responses": shown | refusals(400, 401, 403, 408, 413, 415, 429),
+            },
+            "delete": {
+                "operationId": "sign_out",
+                "security": [{"session": []}],
+                "responses": shown | refusals(401, 403),
+            },
+        }
+    }
+
+
+def stream_path() -> View:
+    """The stream."""
+    text = {"text/event-stream": {"schema": {"type": "string"}}}
+    told = "hello once, then answer with {path, answer}: everything at first, and then what changes"
+    return {
+        "/api/stream": {
+            "get": {
+                "operationId": "follow",
+                "responses": {"200": {"description": told, "content": text}} | refusals(401, 503),
+            }
+        }
+    }
+
+
+def content_of(description: str, schema: View) -> View:
+    """A response in JSON."""
+    return {"description": description, "content": {"application/json": {"schema": schema}}}
+
+
+def refusals(*statuses: int) -> View:
+    """Responses that say in a line what is wrong."""
+    return {str(status): content_of("refused, and why", REFUSED) for status in statuses}

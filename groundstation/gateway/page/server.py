@@ -1,0 +1,95 @@
+"""Serves the page on the loop of the ground station, and ends connections that only hold a place."""
+
+from __future__ import annotations
+
+import asyncio
+import contextlib
+import logging
+import socket
+from collections.abc import AsyncIterator, Iterator
+
+import uvicorn
+
+from groundstation.gateway.page.application import application
+from groundstation.gateway.page.hub import Hub
+from groundstation.gateway.page.settings import PageSettings
+from groundstation.service.process import GroundProcess
+
+CONNECTIONS = 200  # at a time; who comes later is told to come again
+IDLE_S = 10.0  # for which a connection may have no request, or be closing
+SWEEP_S = 1.0
+LARGEST_HEAD = 16_384  # bytes of a request before its body
+LAST_WORDS_S = 1  # for answers under way when the ground station ends
+
+
+class Server(uvicorn.Server):
+    """uvicorn without signals of its own: the ground station's end ends it."""
+
+    @contextlib.contextmanager
+    def capture_signals(self) -> Iterator[None]:
+        """Leave the signals to the ground station."""
+        yield
+
+
+class Sweeper:
+    """Ends connections that have no request under way for some time, and those that close without end.
+
+    Whoever holds every place would otherwise keep the crew out: a connection that never asks, asks a letter a minute,
+    or takes no answer.
+    """
+
+    def __init__(self, server: uvicorn.Server) -> None:
+        self._server = server
+        self._found: dict[object, tuple[object, float]] = {}
+
+    async def run(self) -> None:
+        """Sweep until cancelled."""
+        while True:
+            await asyncio.sleep(SWEEP_S)
+            self.sweep(asyncio.get_running_loop().time())
+
+    def sweep(self, now: float) -> None:
+        """Look at every connection at ``now`` (s)."""
+        found: dict[object, tuple[object, float]] = {}
+        for connection in list(self._server.server_state.connections):
+            transport, cycle = connection.transport, getattr(connection, "cycle", None)
+            if cycle is not None and not cycle.response_complete and not transport.is_closing():
+                continue
+            before, since = self._found.get(connection, (cycle, now))
+            found[connection] = (cycle, since if before is cycle else now)
+            if now - found[connection][1] >= IDLE_S:
+                transport.abort()
+        self._found = found
+
+
+@contextlib.asynccontextmanager
+async def serving_page(process: GroundProcess, page: PageSettings, listening: socket.socket) -> AsyncIterator[None]:
+    """Have the page served on a listening socket while the context lasts."""
+    hub = Hub(process)
+    config = uvicorn.Config(
+        application(process, page, hub),
+        http="h11",
+        ws="none",
+        lifespan="off",
+        log_config=None,
+        access_log=False,
+        server_header=False,
+        proxy_headers=False,
+        limit_concurrency=CONNECTIONS,
+        h11_max_incomplete_event_size=LARGEST_HEAD,
+        timeout_graceful_shutdown=LAST_WORDS_S,
+        ssl_certfile=page.certificate,
+        ssl_keyfile=page.key,
+    )
+    quiet = logging.getLogger("uvicorn.error")  # what it would write is answered, or nobody's business
+    quiet.addHandler(logging.NullHandler())
+    quiet.propagate = False
+    server = Server(config)
+    tasks = [asyncio.create_task(server.serve([listening])), asyncio.create_task(Sweeper(server).run())]
+    try:
+        yield
+    finally:
+        hub.close()
+        server.should_exit = True
+        tasks[1].cancel()
+        await asyncio.gather(*tasks, return_exceptions=True)

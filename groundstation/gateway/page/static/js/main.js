@@ -1,0 +1,69 @@
+// The page: takes what the stream brings, shows it four times a second, and connects the buttons.
+
+import { byId, write } from "./dom.js";
+import { showAlarms, showOrders, showString, showTubes, showWall } from "./lists.js";
+import { Picture } from "./picture.js";
+import { drawPlan } from "./plan.js";
+import { connectSession, order, readSession } from "./session.js";
+import { follow } from "./stream.js";
+import { drawStrip } from "./strip.js";
+import { connectTheme } from "./theme.js";
+import { showFacts, showVerdict } from "./verdict.js";
+
+const REFRESH_MS = 250;
+const SHELVED_MIN = 30;
+
+const picture = new Picture();
+const changed = new Set();
+let hello = {};
+let stringAt = 0;
+
+const moment = () => ({ steady: performance.now(), wall: Date.now() });
+
+function onHeard(kind, content) {
+  if (kind === "hello") {
+    if (hello.build && hello.build !== content.build) location.reload(); // the program is another than this page's
+    if (hello.start !== content.start) picture.forget();
+    hello = content;
+    return;
+  }
+  picture.onAnswer(content.path, content.answer, moment());
+  if (content.path === "string" || content.path.startsWith("nodes/")) stringAt = performance.now();
+  changed.add(content.path.replace(/^nodes\/.*/, "string"));
+  if (content.path === "verdict") paint();
+}
+
+function paint() {
+  const now = moment();
+  showVerdict(picture, now);
+  showFacts(picture, now, hello.hole || hello.rig);
+  const { column, uncertainty, status, wall, alarms, orders } = picture.answers;
+  const isNew = (...paths) => paths.some((path) => changed.has(path));
+  if (column && isNew("column", "uncertainty")) drawPlan(byId("plan"), column, uncertainty);
+  if (column && isNew("column", "status")) drawStrip(byId("strip"), column, status?.bit_md_m);
+  if (isNew("wall")) showWall(wall?.wall);
+  if (isNew("alarms")) showAlarms(alarms, orderAboutAlarm);
+  if (isNew("orders")) showOrders(orders);
+  if (isNew("string")) showTubes(picture);
+  changed.clear();
+  showString(picture, (performance.now() - stringAt) / 1000);
+}
+
+const tell = (line) => write(byId("message"), line);
+
+function orderAboutAlarm(action, number) {
+  order("alarm", { action, number, ...(action === "shelve" ? { minutes: SHELVED_MIN } : {}) }, tell);
+}
+
+byId("survey").addEventListener("click", () => order("take_survey", { tube: Number(byId("tube").value) }, tell));
+byId("depth").addEventListener("click", () => order("accept_depth", { action: "confirm" }, tell));
+byId("tube").addEventListener("change", (event) => { event.target.dataset.chosen = event.target.value; });
+byId("print").addEventListener("click", () => window.print());
+connectTheme(byId("theme"));
+
+const stream = follow(onHeard, () => {});
+connectSession(() => stream.reopen());
+readSession();
+setInterval(paint, REFRESH_MS);
+document.addEventListener("visibilitychange", paint);
+paint();

@@ -1,0 +1,32 @@
+// The verdict and the line of facts: the largest thing on the page.
+
+import { byId, shown, write } from "./dom.js";
+
+const WORDS = { on_target: "ON TARGET", watch: "WATCH", steer: "STEER", out: "OUT", dont_know: "DON'T KNOW" };
+
+/** Show the verdict of this moment. */
+export function showVerdict(picture, now) {
+  const found = picture.verdict(now);
+  const section = byId("verdict");
+  if (section.className !== found.verdict) section.className = found.verdict;
+  const word = WORDS[found.verdict] ?? WORDS.dont_know;
+  write(byId("word"), word);
+  write(byId("told"), found.line.replace(/^[^:]*: /, ""));
+  const doubt = found.verdict === "dont_know" && found.by_surveys !== "dont_know";
+  write(byId("todo"), doubt ? `the surveys alone said ${WORDS[found.by_surveys]}; do not count on it` : found.todo);
+  write(byId("why"), found.why.join("; "));
+  document.title = `${word} ${picture.answers.status?.rig ?? ""}`;
+}
+
+/** Show which hole, how fresh, how deep, what stands. */
+export function showFacts(picture, now, hole) {
+  const { status, verdict, alarms } = picture.answers;
+  const live = picture.isLive(now);
+  document.body.classList.toggle("old", !live);
+  write(byId("hole"), hole || status?.rig || "borechain");
+  write(byId("printed"), status ? `as of ${status.utc.slice(0, 19).replace("T", " ")} UTC` : "");
+  const fresh = live ? `live ${picture.age(now).toFixed(1)} s` : "NOT LIVE";
+  const depth = `MD ${shown(status?.bit_md_m)}/${shown(verdict?.target_m)} m`;
+  const health = status ? `health ${status.health}` : "";
+  write(byId("facts"), [fresh, depth, `tubes ${status?.tubes ?? "–"}`, health, `alarms ${alarms?.open.length ?? "–"}`].join(" · "));
+}

@@ -1,0 +1,332 @@
+"""The page's addresses on a real ground station: the keys over HTTP, orders by role, and what is refused."""
+
+import contextlib
+import json
+import re
+import select
+import socket
+import time
+from collections.abc import Iterator
+from itertools import pairwise
+from pathlib import Path
+
+import jsonschema
+import pytest
+from hand_fed import Rig
+from hypothesis import given
+from hypothesis import strategies as st
+from page_client import PASSWORD, PATIENCE, PageClient
+from served import Served, serving
+
+from groundstation.errors import ConfigurationError, PageError
+from groundstation.gateway.page.application import FILES
+from groundstation.gateway.page.openapi import document
+from groundstation.gateway.page.passwords import drawn_password, hash_of, is_right, read_passwords, text_of
+from groundstation.gateway.page.server import CONNECTIONS
+from groundstation.gateway.page.sessions import LONGEST_HOLD_S, SESSIONS, VALID_S, Sessions, WrongPasswords, is_from
+from groundstation.gateway.page.settings import PageSettings, listen, parse_address
+from groundstation.service.paths import PATTERNS
+from telemetry.application.commands import COMMANDS
+from telemetry.errors import KeyFileError
+
+pytestmark = pytest.mark.slow
+OPERATOR_PASSWORD = "another long word"
+
+
+def free_port() -> int:
+    with socket.socket() as probe:
+        probe.bind(("127.0.0.1", 0))
+        return int(probe.getsockname()[1])
+
+
+@pytest.fixture(scope="module")
+def passwords() -> dict[str, str]:
+    return {"driller": hash_of(PASSWORD), "operator": hash_of(OPERATOR_PASSWORD)}
+
+
+@pytest.fixture(scope="module")
+def served(tmp_path_factory: pytest.TempPathFactory, passwords: dict[str, str]) -> Iterator[tuple[Served, int]]:
+    """A hole of 20 m whose end is out of half its tolerance, with one alarm."""
+    rig = Rig(tmp_path_factory.mktemp("ground"), target=20.0)
+    rig.run(5.0)
+    for stop, inclination_deg in ((1, 0.3), (2, 0.3), (3, 2.2)):
+        rig.drill(stop, inclination_deg)
+    port = free_port()
+    with serving(rig, PageSettings("127.0.0.1", port, passwords=passwords)) as served:
+        yield served, port
+
+
+@pytest.fixture
+def page(served: tuple[Served, int]) -> PageClient:
+    return PageClient(served[1])
+
+
+def test_every_key_is_answered_over_http_by_the_schema_of_the_bus(page: PageClient) -> None:
+    described = page.get("/api/openapi.json").content
+    schemas = page.get("/api/schema").content["schemas"]
+    numbers = {"nodes/{tube}": "1", "stations/{n}": "2", "stations/{n}/measurements": "2"}
+    assert page.sign_in().status == 200
+    order = page.post("/api/cmd/accept_depth", {"action": "confirm"}).content["order"]
+    for pattern in PATTERNS:
+        number = numbers.get(pattern, str(order))
+        answer = page.get("/api/" + re.sub(r"\{[a-z]+\}", number, pattern))
+        assert answer.status == 200, (pattern, answer.content)
+        jsonschema.validate(answer.content, schemas[pattern])
+        operation = described["paths"][f"/api/{pattern}"]["get"]
+        assert operation["responses"]["200"]["content"]["application/json"]["schema"] == schemas[pattern]
+
+
+def test_parameters_are_those_of_the_keys(page: PageClient) -> None:
+    assert [row["md_m"] for row in page.get("/api/stations?md=3..5").content["stations"]] == [4.0]
+    refused = page.get("/api/stations?depth=3")
+    assert (refused.status, refused.content["error"]) == (400, "parameter depth: expected one of md")
+    assert "expected a number or a range" in page.get("/api/stations?md=deep").content["error"]
+    unknown = page.get("/api/stations/99")
+    assert (unknown.status, unknown.content["error"].endswith("there are 1, 2, 3")) == (404, True)
+    assert "no such path; expected one of status, verdict" in page.get("/api/nonsense").content["error"]
+    assert page.get("/nonsense").status == 404
+    assert page.post("/api/status", {}).status == 405
+
+
+def test_the_document_describes_every_command_with_its_ranges() -> None:
+    paths = document("1")["paths"]
+    for spec in COMMANDS:
+        schema = paths[f"/api/cmd/{spec.name}"]["post"]["requestBody"]["content"]["application/json"]["schema"]
+        schemas = schema.get("oneOf", [schema])
+        (own,) = [one for one in schemas if one["properties"].get("action", {}).get("const", "") == spec.action]
+        assert len(own["properties"]) == len(spec.arguments) + 1
+    for operations in paths.values():
+        for operation in operations.values():
+            for response in operation["responses"].values():
+                for content in response["content"].values():
+                    jsonschema.Draft202012Validator.check_schema(content["schema"])
+    names = [operation["operationId"] for operations in paths.values() for operation in operations.values()]
+    assert len(names) == len(set(names))
+
+
+def test_reading_is_open_here_and_ordering_is_not(page: PageClient) -> None:
+    assert page.get("/api/session").content | {"csrf": None} == {
+        "role": None, "name": None, "csrf": None, "reads": True, "orders": False, "roles": ["driller", "operator"],
+    }  # fmt: skip
+    refused = page.post("/api/cmd/take_survey", {"tube": 1})
+    assert (refused.status, refused.content["error"]) == (401, "sign in to order: reading alone needs no role here")
+    assert page.sign_in("operator", OPERATOR_PASSWORD).status == 200
+    refused = page.post("/api/cmd/take_survey", {"tube": 1})
+    assert (refused.status, "the role operator reads" in refused.content["error"]) == (403, True)
+
+
+def test_a_driller_orders_and_the_course_is_on_the_key(page: PageClient) -> None:
+    signed = page.sign_in()
+    assert re.fullmatch(r"borechain=[\w-]{43}; HttpOnly; Path=/; SameSite=strict", signed.headers["set-cookie"])
+    alarm = page.get("/api/alarms").content["open"][0]
+    done = page.post("/api/cmd/alarm?wait=true", {"action": "acknowledge", "number": alarm["number"], "by": "eve"})
+    assert (done.status, done.content["state"], done.content["by"]) == (200, "done", "anna")
+    assert page.get("/api/alarms").content["open"][0]["acknowledged_by"] == "anna"
+    sent = page.post("/api/cmd/take_survey", {"tube": 1})
+    assert (sent.status, sent.content["state"]) == (202, "sent")
+    assert page.get(f"/api/orders/{sent.content['order']}").content["command"] == "take_survey"
+    refused = page.post("/api/cmd/take_survey", {"tube": 99})
+    assert (refused.status, refused.content["error"]) == (400, "tube 99: not in the string; expected one of 3, 2, 1")
+    assert page.post("/api/cmd/take_survey", {"tube": [1]}).content["error"] == "tube: expected a text or a number"
+    assert page.ask("DELETE", "/api/session").content["role"] is None
+    assert page.post("/api/cmd/take_survey", {"tube": 1}).status == 401
+
+
+def test_an_order_of_another_page_is_refused(page: PageClient) -> None:
+    assert page.sign_in().status == 200
+    own = f"http://127.0.0.1:{page.port}"
+    order = ("/api/cmd/accept_depth", {"action": "confirm"})
+    assert page.post(*order, origin=own).status == 200
+    assert page.post(*order, origin="http://evil.example").status == 403
+    assert page.post(*order, **{"sec-fetch-site": "cross-site"}).status == 403
+    assert page.post(*order, **{"x-csrf-token": "guessed"}).status == 403
+    assert page.post(*order, **{"content-type": "text/plain"}).status == 415
+    assert page.get("/api/status", host="evil.example").status == 400  # a name that was led to this address
+    assert page.post("/api/session", {}, origin="http://evil.example").status == 403
+
+
+def test_a_wrong_password_is_told_counted_and_slow(served: tuple[Served, int], page: PageClient) -> None:
+    counters = served[0].rig.ground.endpoint.counters
+    before = counters["wrong_passwords"]
+    wrong = page.sign_in(password="not the password")
+    assert (wrong.status, wrong.content["error"]) == (
+        401, "wrong password or role; the next try is looked at in 1 s",
+    )  # fmt: skip
+    assert counters["wrong_passwords"] == before + 1
+    soon = page.sign_in()
+    assert (soon.status, soon.content["error"]) == (429, "too soon after a wrong password; wait 1 s")
+    assert soon.headers["retry-after"] == "1"
+    deadline = time.monotonic() + PATIENCE
+    while page.sign_in().status == 429:
+        assert time.monotonic() < deadline
+    assert page.get("/api/session").content["orders"]
+
+
+@given(st.lists(st.tuples(st.sampled_from("abc"), st.floats(0.0, 60.0)), max_size=40))
+def test_each_wrong_password_in_a_row_holds_twice_as_long(tries: list[tuple[str, float]]) -> None:
+    wrong, now = WrongPasswords(), 1000.0
+    held: dict[str, list[float]] = {}
+    for address, wait in tries:
+        now += wait
+        if wrong.hold_of(address, now) == 0.0:
+            row, hold = wrong.add(address, now)
+            held.setdefault(address, []).append(hold)
+            assert row == len(held[address])
+            assert wrong.hold_of(address, now) == pytest.approx(hold)
+    for holds in held.values():
+        assert all(later == min(2.0 * earlier, LONGEST_HOLD_S) for earlier, later in pairwise(holds))
+    assert wrong.total == sum(map(len, held.values()))
+
+
+def test_sessions_end_after_a_shift_and_are_bounded() -> None:
+    sessions = Sessions()
+    first = sessions.begin("driller", "anna", 0.0)
+    assert sessions.find(first.token, VALID_S - 1.0) == first
+    assert sessions.find(first.token, VALID_S) is None
+    assert sessions.find(None, 0.0) is None
+    made = [sessions.begin("driller", "anna", 0.0) for _ in range(SESSIONS + 1)]
+    assert sessions.find(made[0].token, 0.0) is None
+    assert sessions.find(made[1].token, 0.0) == made[1]
+    assert is_from(made[1], made[1].csrf)
+    assert not is_from(made[1], made[2].csrf)
+    assert not is_from(made[1], None)
+
+
+def test_passwords_are_kept_as_hashes_in_a_private_file(tmp_path: Path, passwords: dict[str, str]) -> None:
+    drawn = drawn_password()
+    assert re.fullmatch(r"([a-z2-9]{4}-){3}[a-z2-9]{4}", drawn)
+    assert not is_right(drawn, passwords["driller"])
+    assert is_right(PASSWORD, passwords["driller"])
+    file = tmp_path / "passwords"
+    file.touch(0o600)
+    file.write_text(text_of(passwords))
+    assert read_passwords(file) == passwords
+    assert PASSWORD not in file.read_text()
+    file.write_text("driller plain\n")
+    with pytest.raises(ConfigurationError, match="line 1: expected what borechain pki password wrote"):
+        read_passwords(file)
+    file.chmod(0o644)
+    with pytest.raises(KeyFileError):
+        read_passwords(file)
+    with pytest.raises(ConfigurationError, match="8 to 256 characters, got 5"):
+        hash_of("short")
+
+
+def test_bodies_that_are_too_long_or_no_object_are_refused_in_a_line(page: PageClient) -> None:
+    page.sign_in()
+    assert page.post("/api/session", b"x" * 100_000).status == 413
+    for body in (b"", b"[]", b"{", b"[" * 10_000, b"\xff\xfe"):
+        refused = page.post("/api/session", body)
+        assert (refused.status, refused.content["error"]) == (400, "expected an object in JSON"), body
+    assert "role: expected a text" in page.post("/api/session", {"role": 7}).content["error"]
+    unprintable = {"role": "driller", "name": "an\nna", "password": PASSWORD}
+    assert "name: expected a name of" in page.post("/api/session", unprintable).content["error"]
+
+
+def test_every_answer_keeps_other_pages_out(page: PageClient) -> None:
+    for address in ("/", "/api/status", "/api/nonsense", "/static/js/main.js"):
+        headers = page.get(address).headers
+        assert "default-src 'none'" in headers["content-security-policy"]
+        assert headers["x-content-type-options"] == "nosniff"
+        assert headers["cache-control"] in ("no-store", "no-cache")
+        assert "server" not in headers
+
+
+def events_of(data: bytes) -> list[tuple[str, dict[str, object]]]:
+    found = re.findall(r"event: (\w+)\ndata: (.+)\n\n", data.decode())
+    return [(kind, json.loads(content)) for kind, content in found]
+
+
+@contextlib.contextmanager
+def stream(port: int) -> Iterator[socket.socket]:
+    with socket.create_connection(("127.0.0.1", port), PATIENCE) as connection:
+        connection.sendall(b"GET /api/stream HTTP/1.1\r\nHost: 127.0.0.1\r\n\r\n")
+        yield connection
+
+
+def read_until(connection: socket.socket, wanted: bytes) -> bytes:
+    data = b""
+    while wanted not in data:
+        part = connection.recv(65_536)
+        assert part, data
+        data += part
+    return data
+
+
+def test_a_stream_begins_with_the_whole_picture_and_goes_on_with_what_changes(served: tuple[Served, int]) -> None:
+    with stream(served[1]) as connection:
+        served[0].do(lambda rig: rig.run(1.0))
+        data = read_until(connection, b'"path":"verdict"')
+        kinds = events_of(data)
+        assert kinds[0][0] == "hello"
+        paths = {str(content["path"]) for kind, content in kinds if kind == "answer"}
+        assert {"status", "string", "column", "alarms", "orders", "nodes/1", "nodes/3"} <= paths
+        served[0].do(lambda rig: rig.tell(1, 3))
+        served[0].do(lambda rig: rig.run(1.0))
+        assert b'"mode"' in read_until(connection, b'"path":"nodes/1"')
+
+
+def test_a_slow_reader_and_two_hundred_connections_do_not_stop_the_ground_station(served: tuple[Served, int]) -> None:
+    """The crew's own connection is kept open meanwhile; who comes too late is told so, and is let in afterwards."""
+    page = PageClient(served[1])
+    with stream(served[1]) as slow, contextlib.ExitStack() as held:
+        read_until(slow, b"event: hello")
+        for _ in range(CONNECTIONS):
+            held.enter_context(socket.create_connection(("127.0.0.1", served[1]), PATIENCE))
+        assert page.get("/api/status").status == 503
+        served[0].do(lambda rig: [rig.run(1.0) for _ in range(5)] and None)
+        assert served[0].rig.ask("verdict")["bit_md_m"] == 6.0
+    deadline = time.monotonic() + PATIENCE
+    while page.get("/api/status").status != 200:
+        assert time.monotonic() < deadline
+
+
+def test_a_connection_that_never_asks_is_ended(served: tuple[Served, int]) -> None:
+    with socket.create_connection(("127.0.0.1", served[1]), PATIENCE) as idle:
+        idle.sendall(b"GET / HTTP/1.1\r\nHost: 127")
+        readable, _, _ = select.select([idle], [], [], PATIENCE)
+        assert readable
+        with contextlib.suppress(ConnectionResetError):
+            assert idle.recv(1) == b""
+
+
+def test_a_port_that_is_taken_is_told_with_the_remedy() -> None:
+    with socket.socket() as other:
+        other.bind(("127.0.0.1", 0))
+        other.listen()
+        taken = PageSettings("127.0.0.1", other.getsockname()[1])
+        with pytest.raises(PageError, match=r"Address already in use; choose another with --page 127\.0\.0\.1:PORT"):
+            listen(taken)
+
+
+@pytest.mark.parametrize("wrong", ["", "8080", "127.0.0.1:", "127.0.0.1:0", "127.0.0.1:99999", "127.0.0.1:http"])
+def test_an_address_that_is_none_is_refused(wrong: str) -> None:
+    with pytest.raises(ConfigurationError, match="page: expected HOST:PORT"):
+        parse_address(wrong)
+
+
+def test_addresses_know_whether_they_are_of_this_machine_alone() -> None:
+    assert parse_address("[::1]:8080") == ("::1", 8080)
+    assert PageSettings("::1", 8080).url == "http://[::1]:8080"
+    assert [PageSettings(host, 80).is_local for host in ("127.0.0.1", "localhost", "::1", "0.0.0.0", "10.0.0.7")] == [
+        True, True, True, False, False,
+    ]  # fmt: skip
+
+
+def test_over_a_network_reading_needs_a_session_too(tmp_path: Path, passwords: dict[str, str]) -> None:
+    rig, port = Rig(tmp_path, target=20.0), free_port()
+    with serving(rig, PageSettings("0.0.0.0", port, passwords=passwords)):
+        page = PageClient(port)
+        for address in ("/api/status", "/api/stream"):
+            assert page.get(address).status == 401
+        assert page.get("/").status == 200
+        assert page.sign_in("operator", OPERATOR_PASSWORD).status == 200
+        assert page.get("/api/status").status == 200
+
+
+def test_the_files_of_the_page_are_small_and_name_no_other_host() -> None:
+    files = [path for path in FILES.rglob("*") if path.is_file()]
+    assert sum(path.stat().st_size for path in files) < 700_000
+    for path in files:
+        hosts = re.findall(r"(?:https?:)?//[a-z0-9.-]+\.[a-z]{2,}", path.read_text())
+        assert set(hosts) <= {"http://www.w3.org"}, path
