@@ -9,7 +9,7 @@ WORKERS ?= $(shell cores=$$(getconf _NPROCESSORS_ONLN); echo $$((cores + (cores 
 PYTEST := $(BIN)/python -m pytest --numprocesses $(WORKERS) --maxprocesses 8 --dist worksteal
 
 .DEFAULT_GOAL := rig
-.PHONY: help rig test quick check lint types contracts kernels tests statistical explore lock study soak clean
+.PHONY: help rig test quick check lint types contracts kernels browser tests statistical explore lock study soak clean
 
 help:  ## list the targets
 	@awk -F ':.*## ' '/^[a-z]+:.*## / { printf "make %-12s %s\n", $$1, $$2 }' $(MAKEFILE_LIST)
@@ -18,7 +18,7 @@ rig: $(STAMP)  ## set up and drill wellbore 1
 	$(BIN)/borechain rig scenarios/wellbore-1.toml --speed max --seed 1
 
 test: $(STAMP)  ## set up and run every check and every test, in parallel
-	$(MAKE) --jobs=2 --output-sync check kernels
+	$(MAKE) --jobs=3 --output-sync check kernels browser
 	$(MAKE) tests
 
 quick: check  ## lint, types, contracts and the fast tests: under 90 s
@@ -44,6 +44,9 @@ contracts: $(STAMP)  ## which package may import which
 
 kernels: $(STAMP)  ## compile what the tests would compile, each worker for itself
 	$(BIN)/python tests/tools/compile_kernels.py
+
+browser: $(STAMP)  ## install the browser of the page's tests (chromium), where there is none
+	$(BIN)/python tests/tools/install_browser.py
 
 tests: $(STAMP)  ## every test but the statistical ones at full size
 	$(PYTEST) -m "not statistical"

@@ -1,0 +1,91 @@
+"""How the page looks: accessible in both themes, readable on a telephone and on paper, light enough for fifty tubes."""
+
+from collections.abc import Callable, Iterator
+from importlib.resources import files
+
+import pytest
+from beating import Beating, beating
+from playwright.sync_api import Page, expect
+
+pytestmark = pytest.mark.slow
+AXE = files("axe_playwright_python").joinpath("axe.min.js").read_text()
+FINDINGS = "axe.run().then((found) => found.violations.map((v) => `${v.impact} ${v.id}: ${v.nodes[0].html}`))"
+NEXT_CHANGE = """new Promise((done) => new MutationObserver(done).observe(
+    document.getElementById("tubes"), { subtree: true, childList: true, characterData: true }))"""
+Open = Callable[..., Page]
+
+
+@pytest.fixture(scope="module")
+def rig(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Beating]:
+    with beating(tmp_path_factory.mktemp("ground"), (0.3, 0.3, 0.3, 1.0, 1.9)) as rig:
+        yield rig
+
+
+def ready(page: Page) -> Page:
+    expect(page.locator("#word")).to_have_text("STEER")
+    expect(page.locator("#alarm-list li")).to_have_count(1)
+    return page
+
+
+def width_beyond(page: Page) -> int:
+    return int(page.evaluate("document.documentElement.scrollWidth - document.documentElement.clientWidth"))
+
+
+def test_both_themes_and_the_dialog_have_no_finding_of_axe(rig: Beating, watched: Open) -> None:
+    page = ready(watched(rig.url, color_scheme="dark"))
+    found = {}
+    page.evaluate(AXE)
+    for theme in ("dark", "sunlight"):
+        assert page.evaluate("document.documentElement.dataset.theme") == theme
+        found[theme] = page.evaluate(FINDINGS)
+        page.click("#theme")
+    page.click("#sign")
+    found["dialog"] = page.evaluate(FINDINGS)
+    assert found == {"dark": [], "sunlight": [], "dialog": []}
+
+
+def test_a_theme_is_kept_and_the_one_of_the_machine_is_the_first(rig: Beating, watched: Open) -> None:
+    page = ready(watched(rig.url, color_scheme="light"))
+    assert page.evaluate("document.documentElement.dataset.theme") == "sunlight"
+    page.click("#theme")
+    page.reload()
+    ready(page)
+    assert page.evaluate("document.documentElement.dataset.theme") == "dark"
+
+
+def test_on_a_telephone_nothing_is_cut_and_gloves_find_every_button(rig: Beating, watched: Open) -> None:
+    page = ready(watched(rig.url, viewport={"width": 360, "height": 740}, has_touch=True))
+    assert width_beyond(page) == 0
+    sizes = page.eval_on_selector_all(
+        "button, select, input",
+        "found => found.map(e => e.getBoundingClientRect()).filter(r => r.width).map(r => Math.min(r.width, r.height))",
+    )
+    assert len(sizes) >= 8
+    assert min(sizes) >= 44
+    tops = "['alarm-list', 'plan'].map((name) => document.getElementById(name).getBoundingClientRect().top)"
+    alarms, plan = page.evaluate(tops)
+    assert alarms < plan  # the alarms come before the drawings
+
+
+def test_on_paper_there_are_the_facts_and_no_buttons(rig: Beating, watched: Open) -> None:
+    page = ready(watched(rig.url))
+    page.emulate_media(media="print")
+    for shown in ("#word", "#told", "#todo", "#plan svg", "#strip svg", "#tubes", "#alarm-list .what", "#printed"):
+        expect(page.locator(shown)).to_be_visible()
+    for hidden in ("#theme", "#sign", "#survey", "#alarm-list .acknowledge"):
+        expect(page.locator(hidden)).to_be_hidden()
+    assert page.evaluate("getComputedStyle(document.getElementById('verdict')).backgroundColor") == "rgb(255, 255, 255)"
+    assert len(page.pdf(format="A4")) > 10_000
+
+
+def test_fifty_tubes_keep_their_rows_and_their_place(rig: Beating, watched: Open) -> None:
+    """A row is written to, not made anew: what is chosen or scrolled stays where it is."""
+    page = ready(watched(rig.url))
+    rig.do(lambda hand: hand.speak(50))
+    expect(page.locator("#tubes tr")).to_have_count(50)
+    page.evaluate("window.first = document.querySelector('#tubes tr')")
+    page.evaluate("document.querySelector('.string .scroll').scrollTop = 300")
+    page.evaluate(NEXT_CHANGE)
+    assert page.evaluate("window.first === document.querySelector('#tubes tr')")
+    assert page.evaluate("document.querySelector('.string .scroll').scrollTop") == 300
+    assert width_beyond(page) == 0
