@@ -12,6 +12,7 @@ from borechain import __version__
 
 COMMANDS = {
     "rig": ("borechain.cli.rig.rig", "rig", "Drill a scenario with one real process a tube."),
+    "demo": ("borechain.cli.rig.demo", "demo", "Drill a hole with its page in a browser, for a first look."),
     "gauntlet": ("borechain.cli.gauntlet.gauntlet", "gauntlet", "Drill under faults drawn from one integer."),
     "scenario": ("borechain.cli.scenario.scenario", "group", "List and show the scenarios of the program."),
     "node": ("node.process.tube_command", "node", "Run the node of one tube."),

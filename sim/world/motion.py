@@ -95,6 +95,7 @@ class Motion:
         block begins with the first tube
     blocks : number of them; as many as it takes to add every tube if absent
     advance : m of the bit in one block; a tube's length if absent
+    depth_at_start : m of the bit; that of all tubes at the start if absent
     """
 
     def __init__(
@@ -112,11 +113,12 @@ class Motion:
         at_start: int = 0,
         blocks: int | None = None,
         advance: float | None = None,
+        depth_at_start: float | None = None,
     ) -> None:
         self.begin = begin
         self._turn = turn
         self._advance = tube_length if advance is None else advance
-        self._depth_at_start = at_start * tube_length
+        self._depth_at_start = at_start * tube_length if depth_at_start is None else depth_at_start
         self._first_angle = first_angle
         self._at_start = at_start
         first = max(at_start, 1)

@@ -35,6 +35,9 @@ class RigSection(Section):
     tubes: int = Field(ge=1, le=MAX_TUBE, description="tubes of the string at the end")
     tube_length_m: Positive = Field(le=50.0, description="length of every tube")
     tubes_at_start: int = Field(0, ge=0, description="of them in the hole at the start; the others are added on top")
+    depth_at_start_m: NotNegative | None = Field(
+        None, description="of the bit; that of all tubes if absent, less where the top one still sticks out"
+    )
 
 
 class StraightSection(Section):
@@ -350,6 +353,12 @@ def _check_motion(path: Path, file: ScenarioFile) -> None:
         raise ScenarioError(
             f"{path}: rig.tubes_at_start: expected at most tubes = {file.rig.tubes}, got {file.rig.tubes_at_start}"
         )
+    hanging = file.rig.tube_length_m * file.rig.tubes_at_start
+    if _depth_at_start(file.rig) > hanging:
+        raise ScenarioError(
+            f"{path}: rig.depth_at_start_m: expected at most the {hanging:g} m that the tubes at the start reach, "
+            f"got {file.rig.depth_at_start_m:g}"
+        )
     if _blocks(file) < file.rig.tubes - max(file.rig.tubes_at_start, 1) + 1:
         raise ScenarioError(
             f"{path}: schedule.blocks: expected at least one for each tube that is added, got {schedule.blocks}"
@@ -368,7 +377,13 @@ def _blocks(file: ScenarioFile) -> int:
 def _depth(file: ScenarioFile) -> float:
     """Depth (m) of the bit at the end."""
     rig, advance = file.rig, file.rotation.advance_m
-    return rig.tube_length_m * rig.tubes_at_start + _blocks(file) * (rig.tube_length_m if advance is None else advance)
+    return _depth_at_start(rig) + _blocks(file) * (rig.tube_length_m if advance is None else advance)
+
+
+def _depth_at_start(rig: RigSection) -> float:
+    """Depth (m) of the bit at the start."""
+    hanging = rig.tube_length_m * rig.tubes_at_start
+    return hanging if rig.depth_at_start_m is None else rig.depth_at_start_m
 
 
 def _check_link(path: Path, file: ScenarioFile) -> None:

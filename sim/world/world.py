@@ -77,6 +77,7 @@ class World:
             at_start=file.rig.tubes_at_start,
             blocks=s.blocks,
             advance=file.rotation.advance_m,
+            depth_at_start=file.rig.depth_at_start_m,
         )
         self._made_up = self.motion.make_ups if file.rig.tubes_at_start else self.motion.make_ups[1:]
         self.torsion = self._string_torsion()

@@ -9,9 +9,14 @@ import pytest
 from install_browser import find_browser
 from playwright.sync_api import Browser, BrowserContext, Page, expect, sync_playwright
 
-FLAGS = (
-    "--headless --no-sandbox --disable-gpu --disable-background-networking --disable-component-update --disable-sync"
-).split()
+FLAGS = [
+    "--headless",
+    "--no-sandbox",
+    "--disable-gpu",
+    "--disable-background-networking",
+    "--disable-component-update",
+    "--disable-sync",
+]
 PATIENCE_MS = 30_000.0
 DESK = {"width": 1280, "height": 900}
 expect.set_options(timeout=PATIENCE_MS)

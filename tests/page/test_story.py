@@ -117,7 +117,8 @@ def test_an_answer_that_waited_on_its_way_is_as_old_as_it_is(tmp_path: Path, wat
               const said = (second, arrived) => picture.onAnswer("verdict",
                 { verdict: "on_target", by_surveys: "on_target", good_for_s: 4.5, why: [], revision: second,
                   utc: new Date(start + 1000 * second).toISOString() }, { steady: 0, wall: start + 1000 * arrived });
-              const shown = (steady, wall) => picture.verdict({ steady: 1000 * steady, wall: start + 1000 * wall }).verdict;
+              const shown = (steady, wall) =>
+                picture.verdict({ steady: 1000 * steady, wall: start + 1000 * wall }).verdict;
               const found = [];
               said(0, 100); found.push(shown(0, 100));          // the clocks differ by 100 s: fresh
               found.push(shown(4, 104), shown(5, 105));          // aged by both clocks

@@ -141,6 +141,7 @@ def test_a_mark_that_lags_a_free_head_is_the_worlds_own_error() -> None:
         ({"medium": {"link": "on"}, "node": {"tuning": {"scale_std": 0.0}}}, "node.tuning"),
         ({"medium": {"link": "on"}, "encoder": {"edge_times": False}}, "encoder.edge_times"),
         ({"rig": {"tubes": 2, "tubes_at_start": 3}}, "rig.tubes_at_start"),
+        ({"rig": {"tubes": 4, "tubes_at_start": 2, "depth_at_start_m": 2.5}}, "rig.depth_at_start_m"),
         ({"rig": {"tubes": 4, "tubes_at_start": 1}, "schedule": {"blocks": 2}}, "schedule.blocks"),
         ({"path": {"straight": None}}, "exactly one of"),
     ],

@@ -1,4 +1,4 @@
-"""Find the browser of the page's tests, or install Debian's chromium: part of `make test`, beside other preparations."""
+"""Find the browser of the page's tests, or install chromium: part of `make test`, beside the other preparations."""
 
 from __future__ import annotations
 

@@ -1,0 +1,79 @@
+"""``borechain demo``: a rig that drills, with its page, for a first look."""
+
+from __future__ import annotations
+
+import itertools
+import tempfile
+from functools import partial
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import click
+
+from borechain.cli.faults import needs, plain_faults
+from borechain.cli.options import parse_speed
+from borechain.cli.rig.rig import drill_in_processes, orderable, process_table
+from groundstation.page_options import DEFAULT, page_settings
+from telemetry import keys
+from telemetry.runtime.options import insecure_option, secure_endpoint
+
+if TYPE_CHECKING:
+    from groundstation.gateway.page.settings import PageSettings
+
+SCENARIO = Path("demo")
+
+
+@click.command()
+@insecure_option
+@click.option("--page", metavar="HOST:PORT", default=DEFAULT, show_default=True, help="Where the page is served.")
+@click.option(
+    "--speed", default="10", show_default=True, callback=parse_speed, metavar="max|X", help="X times real time."
+)
+@click.option(
+    "--endpoint",
+    default=keys.DEFAULT_ENDPOINT,
+    show_default=True,
+    callback=secure_endpoint,
+    help="Where the rig's router listens.",
+)
+@click.option("--rounds", type=click.IntRange(1), help="Holes to drill before it ends  [default: until Ctrl-C]")
+@needs("rich", "scipy", "sqlalchemy", "starlette", "uvicorn")
+@plain_faults
+def demo(page: str, speed: float, endpoint: str, rounds: int | None) -> None:
+    """Drill a hole with fifteen real processes and show it on a page, again and again until Ctrl-C.
+
+    Ten tubes are in the hole already; what it leaves goes when it ends.
+
+    \b
+    Examples:
+      borechain demo
+      borechain demo --speed 2 --page 127.0.0.1:8090
+    """
+    from groundstation.gateway.page.settings import listen
+    from sim.rig.launcher import check_port_free
+
+    settings = page_settings(page, None, None)
+    if settings is None:
+        return
+    listen(settings).close()
+    check_port_free(endpoint)
+    served = orderable(settings)
+    click.echo(f"open {served.url} in a browser; Ctrl-C ends the demonstration")
+    try:
+        for seed in itertools.count(1) if rounds is None else range(1, rounds + 1):
+            with tempfile.TemporaryDirectory(prefix="borechain-demo-") as folder:
+                drill(seed, speed, endpoint, served, Path(folder))
+    except KeyboardInterrupt:
+        click.echo("ended")
+
+
+def drill(seed: int, speed: float, endpoint: str, page: PageSettings, folder: Path) -> None:
+    """One hole."""
+    from sim.world.scenario import load_scenario
+    from sim.world.shipped import find_scenario
+    from sim.world.world import World
+
+    path = find_scenario(SCENARIO)
+    world = World(load_scenario(path, ()), seed)
+    table = partial(process_table, world, path, seed, speed, (), keys.DEFAULT_RIG, endpoint, folder, None, page)
+    drill_in_processes(world, keys.DEFAULT_RIG, endpoint, lambda _tick: None, None, None, table)
