@@ -67,7 +67,16 @@ TABLE: Final[tuple[Key, ...]] = (
     ),
     Key("borechain/{rig}/ground/trajectory", "query, publish", "positions with covariance; ?md=12.5, ?md=4..12"),
     Key("borechain/{rig}/ground/uncertainty", "query, publish", "region of uncertainty, its sources; ?confidence=0.9"),
-    Key("borechain/{rig}/ground/column", "query, publish", "deviation from the design, projected to the target"),
+    Key(
+        "borechain/{rig}/ground/column",
+        "query, publish",
+        "deviation from the design, projected to the target; ?moment=3",
+    ),
+    Key(
+        "borechain/{rig}/ground/history",
+        "query, publish",
+        "what was known of the column at the end of every stop, thinned; ?points=200",
+    ),
     Key(
         "borechain/{rig}/ground/wall",
         "query, publish",

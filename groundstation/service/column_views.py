@@ -8,13 +8,19 @@ from typing import Any
 import numpy as np
 
 from groundstation.errors import SelectorError, SurveyError
+from groundstation.service.history import Moment
 from groundstation.service.model import RigModel
+from groundstation.service.thinning import FEWEST, largest_triangles
 from groundstation.survey.columns import Deviation, deviation, dominant
 from groundstation.survey.ellipsoid import axes, coverage_radius, plan_ellipse
 from groundstation.survey.trajectory import Point
 
 View = dict[str, Any]
 CONFIDENCE = 0.95
+POINTS, MOST_POINTS = 200, 1000  # of the history
+LONGEST_NUMBER = 18  # digits
+SHOWN = 30  # numbers that a refusal names
+CM = 100.0
 
 
 def uncertainty(k: RigModel, p: dict[str, str]) -> View:
@@ -63,12 +69,15 @@ def _stds(cov: Any) -> View:
     return {"sigma_north_m": north, "sigma_east_m": east, "sigma_tvd_m": tvd}
 
 
-def column(k: RigModel, _p: dict[str, str]) -> View:
-    """Deviation from the design axis at every station, projected to the target, and which angle dominates."""
+def column(k: RigModel, p: dict[str, str]) -> View:
+    """Deviation from the design axis at every station, projected to the target, and which angle dominates.
+
+    ``moment`` gives what was known at the end of an earlier stop.
+    """
     design = k.config.design
-    rows = [deviation(point, design) for point in k.trajectory]
-    leaning = [station for station in k.stations if station.md > 0.0]
-    found = dominant(k.fused(leaning[-1]), k.trajectory[-1].md) if leaning else None
+    moment = _moment(k, p["moment"]) if "moment" in p else None
+    rows = [deviation(point, design) for point in k.trajectory] if moment is None else moment.rows
+    end = k.projection if moment is None else moment.projection
     return {
         "design": {
             "inclination_deg": k.config.design_inclination_deg,
@@ -79,15 +88,56 @@ def column(k: RigModel, _p: dict[str, str]) -> View:
         },
         "stations": [deviation_view(row) for row in rows],
         "worst": deviation_view(max(rows, key=lambda row: row.ratio)),
-        "projection": None if k.projection is None else deviation_view(k.projection),
-        "dominant": None
-        if found is None
-        else {
-            "angle": found.name,
-            "by_inclination_m": found.by_inclination,
-            "by_azimuth_m": found.by_azimuth,
-        },
+        "projection": None if end is None else deviation_view(end),
+        "dominant": None if moment is not None else _dominant(k),
     }
+
+
+def history(k: RigModel, p: dict[str, str]) -> View:
+    """What was known at the end of every stop, thinned to ``points`` of them."""
+    moments = k.history.moments
+    points = _points(p.get("points"))
+    if len(moments) > points:
+        used = np.array([moment.about.ratio for moment in moments])
+        moments = [moments[place] for place in largest_triangles(np.arange(len(used), dtype=float), used, points)]
+    return {"moments": [moment_view(moment) for moment in moments]}
+
+
+def moment_view(moment: Moment) -> View:
+    """One moment of the history."""
+    about = moment.about
+    return {
+        "moment": moment.number,
+        "at_s": moment.at,
+        "md_m": round(moment.deepest, 6),
+        "deviation_cm": CM * about.size,
+        "limit_cm": CM * about.limit,
+        "used_percent": 100.0 * about.ratio,
+    }
+
+
+def _moment(k: RigModel, text: str) -> Moment:
+    found = k.history.find(int(text)) if text.isdecimal() and len(text) <= LONGEST_NUMBER else None
+    if found is None:
+        there_are = ", ".join(str(moment.number) for moment in k.history.moments[-SHOWN:]) or "none yet"
+        raise SelectorError(f"parameter moment: expected one of the history, got {text!r:.40}; there are {there_are}")
+    return found
+
+
+def _points(text: str | None) -> int:
+    if text is None:
+        return POINTS
+    if not text.isdecimal() or len(text) > LONGEST_NUMBER or not FEWEST <= int(text) <= MOST_POINTS:
+        raise SelectorError(f"parameter points: expected a whole number {FEWEST}..{MOST_POINTS}, got {text!r:.40}")
+    return int(text)
+
+
+def _dominant(k: RigModel) -> View | None:
+    leaning = [station for station in k.stations if station.md > 0.0]
+    if not leaning:
+        return None
+    found = dominant(k.fused(leaning[-1]), k.trajectory[-1].md)
+    return {"angle": found.name, "by_inclination_m": found.by_inclination, "by_azimuth_m": found.by_azimuth}
 
 
 def deviation_view(d: Deviation) -> View:

@@ -286,6 +286,19 @@ COLUMN: Fields = (
         null=True,
     ),
 )
+HISTORY: Fields = (
+    rows(
+        "moments",
+        (
+            integer("moment", "number, for `column?moment=`"),
+            number("at_s", "rig time of its newest survey"),
+            number("md_m", "measured depth of its newest station"),
+            number("deviation_cm", "of the end, or before that is known of the worst station"),
+            number("limit_cm", "tolerance there"),
+            number("used_percent", "of the tolerance"),
+        ),
+    ),
+)
 ALARM: Fields = (
     text("kind", "", "deviation", "projection"),
     number("level_percent", "of the tolerance"),

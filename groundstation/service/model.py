@@ -14,6 +14,7 @@ from groundstation.errors import SurveyError
 from groundstation.service.alarms import AlarmList
 from groundstation.service.crew_alarms import CrewAlarms
 from groundstation.service.depth import DepthLog
+from groundstation.service.history import SAME_STOP, History
 from groundstation.service.live_wall import LiveWall
 from groundstation.service.numbers import Numbers
 from groundstation.service.orders import OrderBook
@@ -35,7 +36,6 @@ STATIC_RECORDS_SHOWN = 1_000
 ACCELEROMETER_NOISE_DEG = 0.02  # one sample, for the check of motion
 ABOVE_COLLAR = 0.01  # m, of rounding; a node higher up is in no hole
 ALL_HEARD_WITHIN = 2.0  # s, of tubes that speak
-SAME_STOP = 15.0  # s, within which two surveys were taken at one stop
 
 
 @dataclass(frozen=True, slots=True)
@@ -177,6 +177,7 @@ class RigModel:
         self.alarms = AlarmList()
         self.trajectory: list[Point] = Trajectory().points
         self.projection: Deviation | None = None
+        self.history = History()
         self.recalibration = FieldProcedure(config.gravity)
         self.orders = OrderBook()
         self.wall = None if config.wall is None else LiveWall(config.wall, config.hole)
@@ -268,6 +269,11 @@ class RigModel:
         direction = self._direction(measurement, trust, *combine_imus(forces, covs))
         noise = math.radians(ACCELEROMETER_NOISE_DEG) * self.config.gravity
         quality = check(forces, covs, self.config.gravity, measurement.samples, measurement.settle_time, noise)
+        epoch, at = measurement.epoch or self.epoch, measurement.station_at
+        if self.history.begins_stop(epoch, at):
+            rows = [deviation(point, self.config.design) for point in self.trajectory]
+            self.history.add(rows, self.projection)
+        self.history.on_survey(epoch, at)
         station = self._station_at(md)
         self.seen["measurements"] += 1
         station.add_stop(ResolvedStop(measurement, md, direction, quality, trust, self.seen["measurements"]))

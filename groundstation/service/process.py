@@ -395,11 +395,13 @@ class GroundProcess(Process):
         if isinstance(message, StaticRecord):
             self.model.on_static_record(message)
             return ["static_records"]
+        moments = self.model.history.count
         before = list(self.model.alarms.alarms), len(self.model.moved)
         self.model.stops.on_survey(message.epoch or self.model.epoch, message.station_at, message.tube)
         self.watch.on_survey(message, self.model.on_survey(message, md, below))
         after = self.model.alarms.alarms, len(self.model.moved)
-        return [*CHANGED_BY_SURVEY, *self._wall_paths] + (["alarms"] if before != after else [])
+        more = (["alarms"] if before != after else []) + (["history"] if moments != self.model.history.count else [])
+        return [*CHANGED_BY_SURVEY, *self._wall_paths, *more]
 
     def _publish(self, changed: list[str]) -> None:
         for listener in self.listeners:

@@ -40,6 +40,16 @@ def test_a_hole_from_its_first_tube_to_steer_and_what_the_crew_does(tmp_path: Pa
         expect(page.locator("#plan svg")).to_have_attribute("aria-label", re.compile("ends 9.9 cm off at 0 degrees"))
         for stop, inclination_deg in enumerate(LEANING, 4):
             drill(rig, stop, inclination_deg)
+        # what was known earlier, and back to now
+        expect(page.locator("#course svg")).to_have_attribute("aria-label", re.compile("after each of 4 stops"))
+        page.locator("#moment").focus()
+        page.keyboard.press("Home")
+        page.keyboard.press("ArrowRight")
+        page.keyboard.press("ArrowRight")
+        expect(page.locator("#then")).to_contain_text("6.0 m: 22 % of the tolerance; the verdict is of now")
+        expect(page.locator("#plan svg")).to_have_attribute("aria-label", re.compile("ends 9.9 cm off"))
+        page.click("#live")
+        expect(page.locator("#plan svg")).to_have_attribute("aria-label", re.compile("ends 43.1 cm off"))
         # the task: which hole, how far off, how deep, which way, what to do, until when; read from what is shown
         expect(page.locator("#word")).to_have_text("STEER")
         expect(page.locator("#hole")).to_have_text("rig-1")

@@ -16,7 +16,7 @@ from typing import Any
 from groundstation.errors import SelectorError
 from groundstation.service.process import HEARTBEAT, GroundProcess
 
-PATHS = ("status", "verdict", "string", "column", "uncertainty", "wall", "alarms", "orders")
+PATHS = ("status", "verdict", "string", "column", "history", "uncertainty", "wall", "alarms", "orders")
 NODES, VERDICT = "nodes/", "verdict"
 BEATS_MISSED = 2  # after which a ground station that is asked is not taken for live
 GATHER_S = 0.1  # for which changes are gathered into one packet

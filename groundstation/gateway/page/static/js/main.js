@@ -1,6 +1,7 @@
 // The page: takes what the stream brings, shows it four times a second, and connects the buttons.
 
 import { byId, write } from "./dom.js";
+import { History } from "./history.js";
 import { showAlarms, showOrders, showString, showTubes, showWall } from "./lists.js";
 import { Picture } from "./picture.js";
 import { drawPlan } from "./plan.js";
@@ -17,6 +18,11 @@ const picture = new Picture();
 const changed = new Set();
 let hello = {};
 let stringAt = 0;
+let earlier = null; // the column of a moment of the history
+const history = new History((column) => {
+  earlier = column;
+  drawColumn();
+});
 
 const moment = () => ({ steady: performance.now(), wall: Date.now() });
 
@@ -37,16 +43,28 @@ function paint() {
   const now = moment();
   showVerdict(picture, now);
   showFacts(picture, now, hello.hole || hello.rig);
-  const { column, uncertainty, status, wall, alarms, orders } = picture.answers;
+  const { status, wall, alarms, orders } = picture.answers;
   const isNew = (...paths) => paths.some((path) => changed.has(path));
-  if (column && isNew("column", "uncertainty")) drawPlan(byId("plan"), column, uncertainty);
-  if (column && isNew("column", "status")) drawStrip(byId("strip"), column, status?.bit_md_m);
+  if (isNew("history")) history.take(picture.answers.history.moments);
+  if (isNew("column", "uncertainty", "status")) drawColumn();
   if (isNew("wall")) showWall(wall?.wall);
   if (isNew("alarms")) showAlarms(alarms, orderAboutAlarm);
   if (isNew("orders")) showOrders(orders);
   if (isNew("string")) showTubes(picture);
   changed.clear();
   showString(picture, (performance.now() - stringAt) / 1000);
+}
+
+/** Draw the column of now, or of the moment that the history shows. */
+function drawColumn() {
+  const { column, uncertainty, status } = picture.answers;
+  if (earlier) {
+    drawPlan(byId("plan"), earlier);
+    drawStrip(byId("strip"), earlier);
+  } else if (column) {
+    drawPlan(byId("plan"), column, uncertainty);
+    drawStrip(byId("strip"), column, status?.bit_md_m);
+  }
 }
 
 const tell = (line) => write(byId("message"), line);

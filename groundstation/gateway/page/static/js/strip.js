@@ -4,6 +4,7 @@ import { shape } from "./dom.js";
 
 const [WIDTH, HEIGHT] = [260, 300];
 const [LEFT, RIGHT, TOP, LOW] = [34, 12, 22, 18]; // margins
+const NAME = 50; // room for the name of the axis
 const TICKS = [1, 2, 5, 10, 20, 50, 100, 200];
 
 /** Draw into `place` the deviation at every station and at the target. */
@@ -50,7 +51,7 @@ function grid(deepest, widest, x, y) {
     parts.push(shape("text", { x: LEFT - 5, y: y(m) + 4, "text-anchor": "end" }, String(m)));
   }
   for (let cm = across; cm <= widest; cm += across) {
-    parts.push(shape("text", { x: x(cm), y: TOP - 4, "text-anchor": "middle" }, String(cm)));
+    if (x(cm) < WIDTH - NAME) parts.push(shape("text", { x: x(cm), y: TOP - 4, "text-anchor": "middle" }, String(cm)));
   }
   return parts;
 }
