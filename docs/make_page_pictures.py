@@ -31,8 +31,8 @@ BEAT_S = 0.2  # s between two moments of the rig
 PASSWORD = "for a picture"
 FLAGS = ["--headless", "--no-sandbox", "--disable-gpu", "--disable-background-networking"]
 PICTURES: dict[str, dict[str, Any]] = {
-    "dark": {"viewport": {"width": 1280, "height": 960}, "color_scheme": "dark"},
-    "sunlight": {"viewport": {"width": 1280, "height": 960}, "color_scheme": "light"},
+    "dark": {"viewport": {"width": 1280, "height": 1060}, "color_scheme": "dark"},
+    "sunlight": {"viewport": {"width": 1280, "height": 1060}, "color_scheme": "light"},
     "telephone": {"viewport": {"width": 360, "height": 900}, "color_scheme": "dark"},
 }
 
@@ -82,6 +82,7 @@ def take_pictures(url: str) -> None:
                 page.click("#sign-now")
                 page.click("#survey")
                 expect(page.locator("#orders li")).to_have_count(2, timeout=60_000)
+            page.evaluate("scrollTo(0, 0)")
             page.screenshot(path=DOCS / f"page-{name}.png", full_page=name == "telephone")
             page.close()
 

@@ -2,7 +2,7 @@
 
 import { byId, shape, write } from "./dom.js";
 
-const [WIDTH, HEIGHT, LEFT, EDGE] = [600, 90, 34, 6];
+const [NARROWEST, HEIGHT, LEFT, EDGE] = [240, 90, 34, 6];
 const FULLEST = 120; // percent, at least
 
 /** The slider of the history; `show` takes the column of a moment, or null for the present one. */
@@ -50,18 +50,19 @@ export class History {
 
   draw() {
     this.tell();
+    const width = Math.max(byId("course").clientWidth, NARROWEST); // letters are as large as elsewhere
     const used = this.moments.map((moment) => moment.used_percent);
     const most = Math.max(FULLEST, ...used);
-    const x = (place) => LEFT + (place / Math.max(used.length - 1, 1)) * (WIDTH - LEFT - EDGE);
+    const x = (place) => LEFT + (place / Math.max(used.length - 1, 1)) * (width - LEFT - EDGE);
     const y = (percent) => HEIGHT - EDGE - (percent / most) * (HEIGHT - 2 * EDGE);
     const parts = [50, 80, 100].flatMap((level) => [
-      shape("line", { x1: LEFT, x2: WIDTH - EDGE, y1: y(level), y2: y(level), class: `limit ${level < 100 ? "part" : "full"}` }),
+      shape("line", { x1: LEFT, x2: width - EDGE, y1: y(level), y2: y(level), class: `limit ${level < 100 ? "part" : "full"}` }),
       shape("text", { x: LEFT - 4, y: y(level) + 4, "text-anchor": "end", class: "quiet" }, String(level)),
     ]);
     parts.push(shape("polyline", { points: used.map((percent, place) => `${x(place)},${y(percent)}`).join(" "), class: "path" }));
     const place = this.chosen ? this.moments.indexOf(this.chosen) : -1;
     if (place >= 0) parts.push(shape("circle", { cx: x(place), cy: y(used[place]), r: 5, class: "dot" }));
     const label = `Of the tolerance used after each of ${used.length} stops, percent`;
-    byId("course").replaceChildren(shape("svg", { viewBox: `0 0 ${WIDTH} ${HEIGHT}`, role: "img", "aria-label": label }, ...parts));
+    byId("course").replaceChildren(shape("svg", { viewBox: `0 0 ${width} ${HEIGHT}`, role: "img", "aria-label": label }, ...parts));
   }
 }
