@@ -150,7 +150,8 @@ def test_a_wheel_holds_its_data_and_its_types(wheel: Path) -> None:
         names = set(content.namelist())
     assert {f"{package}/py.typed" for package in OURS} <= names
     assert {f"sim/{path.relative_to(ROOT)}" for path in (ROOT / "scenarios").rglob("*.*")} <= names
-    assert {str(path.relative_to(ROOT)) for path in (ROOT / "groundstation").rglob("*.to*ml")} <= names
+    data = [*(ROOT / "groundstation").rglob("*.to*ml"), *(ROOT / "groundstation" / "gateway").rglob("static/**/*.*")]
+    assert {str(path.relative_to(ROOT)) for path in data} <= names
 
 
 JOBS = [  # words, the extra that the job needs or None, status and a word of its output where it is there
@@ -172,6 +173,8 @@ JOBS = [  # words, the extra that the job needs or None, status and a word of it
     (("medium", "rig-3", "--speed", "0"), None, 2, "expected max or a factor"),
     (("ground", "--key-file", "missing.key", *NOWHERE), "ground", 1, "missing.key"),
     (("rig", "rig-3", "--endpoint", "nonsense", "--out", "never"), "ground", 1, "expected tcp/HOST:PORT"),
+    (("ground", "--page", "0.0.0.0:8080", *NOWHERE), "ground", 2, "--insecure allows it"),
+    (("demo", "--page", "nonsense"), "ground", 2, "page: expected HOST:PORT"),
     (("query", "borechain/*/ground/status", "--timeout", "0.2", *NOWHERE), None, 1, "no router at"),
     (("crew", *NOWHERE), "ground", 1, "no router at"),
     (("replay", "missing.mcap"), "ground", 2, "missing.mcap"),

@@ -77,7 +77,7 @@ def line(found: Verdict) -> str:
     if d is None:
         return phrase
     spread = max(rounded_std(CM * d.std), FINEST_CM)
-    size = rounded(CM * d.size, spread)
+    size = rounded(CM * d.size, spread) if spread >= 1.0 else CM * d.size  # rounded once, as it is written
     is_end = found.what == "projection"
     where = "ends" if is_end else f"at {d.md:.1f} m"
     said = f"{phrase}: {where} {size:.1f} +- {spread:.1f} cm at {round(math.degrees(direction(d))) % 360} deg"
