@@ -59,7 +59,7 @@ def page_settings(page: str | None, tls: tuple[Path, Path] | None, passwords: Pa
         return None
     check_installed("starlette", "uvicorn")
     from groundstation.gateway.page.passwords import read_passwords
-    from groundstation.gateway.page.settings import PageSettings, parse_address
+    from groundstation.gateway.page.settings import PageSettings, check_certificate, parse_address
 
     host, port = parse_address(page)
     is_insecure = click.get_current_context().meta.get(INSECURE, False)
@@ -68,4 +68,6 @@ def page_settings(page: str | None, tls: tuple[Path, Path] | None, passwords: Pa
             f"page: expected --page-tls with it, or an address of this machine alone, got {page}; --insecure allows it"
         )
     certificate, key = tls or (None, None)
+    if certificate is not None and key is not None:
+        check_certificate(certificate, key)
     return PageSettings(host, port, certificate, key, {} if passwords is None else read_passwords(passwords))

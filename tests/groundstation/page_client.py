@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import http.client
 import json
+import ssl
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -30,9 +31,13 @@ class PageClient:
 
     port: int
     headers: dict[str, str] = field(default_factory=dict)
+    context: ssl.SSLContext | None = None  # over HTTPS
 
     def ask(self, method: str, address: str, body: object = None, **headers: str) -> Answer:
-        connection = http.client.HTTPConnection("127.0.0.1", self.port, timeout=PATIENCE)
+        if self.context is None:
+            connection = http.client.HTTPConnection("127.0.0.1", self.port, timeout=PATIENCE)
+        else:
+            connection = http.client.HTTPSConnection("127.0.0.1", self.port, timeout=PATIENCE, context=self.context)
         try:
             sent = {"content-type": "application/json"} | self.headers | headers
             payload = body if isinstance(body, bytes | None) else json.dumps(body).encode()

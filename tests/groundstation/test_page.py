@@ -5,6 +5,7 @@ import json
 import re
 import select
 import socket
+import ssl
 import time
 from collections.abc import Iterator
 from itertools import pairwise
@@ -16,6 +17,7 @@ from hand_fed import Rig
 from hypothesis import given
 from hypothesis import strategies as st
 from page_client import PASSWORD, PATIENCE, PageClient
+from sealed_string import make_folder
 from served import Served, serving
 
 from groundstation.errors import ConfigurationError, PageError
@@ -24,7 +26,7 @@ from groundstation.gateway.page.openapi import document
 from groundstation.gateway.page.passwords import drawn_password, hash_of, is_right, read_passwords, text_of
 from groundstation.gateway.page.server import CONNECTIONS
 from groundstation.gateway.page.sessions import LONGEST_HOLD_S, SESSIONS, VALID_S, Sessions, WrongPasswords, is_from
-from groundstation.gateway.page.settings import PageSettings, listen, parse_address
+from groundstation.gateway.page.settings import PageSettings, check_certificate, listen, parse_address
 from groundstation.service.paths import PATTERNS
 from telemetry.application.commands import COMMANDS
 from telemetry.errors import KeyFileError
@@ -322,6 +324,24 @@ def test_over_a_network_reading_needs_a_session_too(tmp_path: Path, passwords: d
         assert page.get("/").status == 200
         assert page.sign_in("operator", OPERATOR_PASSWORD).status == 200
         assert page.get("/api/status").status == 200
+
+
+def test_over_https_the_cookie_goes_nowhere_else(tmp_path: Path, passwords: dict[str, str]) -> None:
+    stick, port = make_folder(tmp_path / "stick"), free_port()
+    certificate, key = stick / "router.pem", stick / "router.key"
+    check_certificate(certificate, key)
+    with pytest.raises(ConfigurationError, match="page-tls: expected a certificate and its key"):
+        check_certificate(key, certificate)
+    context = ssl.create_default_context(cafile=stick / "ca.pem")
+    context.check_hostname = False
+    page = PageSettings("127.0.0.1", port, certificate, key, passwords)
+    assert page.url == f"https://127.0.0.1:{port}"
+    with serving(Rig(tmp_path / "ground", target=20.0), page):
+        client = PageClient(port, context=context)
+        answer = client.sign_in()
+        assert "; Secure" in answer.headers["set-cookie"]
+        assert answer.headers["strict-transport-security"].startswith("max-age=")
+        assert client.get("/api/session").content["orders"]
 
 
 def test_the_files_of_the_page_are_small_and_name_no_other_host() -> None:

@@ -140,6 +140,16 @@ def test_an_answer_that_waited_on_its_way_is_as_old_as_it_is(tmp_path: Path, wat
         assert judged == ["on_target", "on_target", "dont_know", "dont_know", "dont_know"]
 
 
+def test_over_a_network_the_page_asks_for_a_role_before_it_shows_anything(tmp_path: Path, watched: Open) -> None:
+    with beating(tmp_path, STRAIGHT, host="0.0.0.0") as rig:
+        page = watched(rig.url)
+        expect(page.locator("#sign-in")).to_be_visible()
+        expect(page.locator("#tubes tr")).to_have_count(0)
+        sign_in(page)
+        expect(page.locator("#word")).to_have_text("ON TARGET")
+        expect(page.locator("#tubes tr")).to_have_count(3)
+
+
 def test_everything_can_be_done_by_keyboard(tmp_path: Path, watched: Open) -> None:
     with beating(tmp_path, (*STRAIGHT, *LEANING)) as rig:
         page = watched(rig.url, color_scheme="light")

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import socket
+import ssl
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -55,6 +56,23 @@ def parse_address(text: str) -> tuple[str, int]:
     if not host or not port.isdecimal() or not 0 < int(port) < 1 << 16:
         raise ConfigurationError(f"page: expected HOST:PORT such as 127.0.0.1:8080, got {text!r:.60}")
     return host, int(port)
+
+
+def check_certificate(certificate: Path, key: Path) -> None:
+    """Refuse files with which no HTTPS can be served.
+
+    Raises
+    ------
+    ConfigurationError
+        When they are no certificate and its key.
+    """
+    try:
+        ssl.SSLContext(ssl.PROTOCOL_TLS_SERVER).load_cert_chain(certificate, key)
+    except (OSError, ssl.SSLError) as error:
+        reason = getattr(error, "reason", None) or error.strerror or "no PEM"
+        raise ConfigurationError(
+            f"page-tls: expected a certificate and its key in PEM, got {certificate} and {key}: {reason}"
+        ) from error
 
 
 def listen(page: PageSettings) -> socket.socket:

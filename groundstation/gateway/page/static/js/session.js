@@ -5,10 +5,11 @@ import { byId, element, write } from "./dom.js";
 let session = { orders: false, roles: [], csrf: null };
 let then = null; // what is to be done once somebody has signed in
 
-/** Ask who is signed in. */
+/** Ask who is signed in; where not even reading is open, ask for a role at once. */
 export async function readSession() {
-  take(await asked("GET", "/api/session"));
-  return session;
+  const answer = await asked("GET", "/api/session");
+  take(answer);
+  if (answer.status === 200 && !session.reads) openDialog();
 }
 
 /** Order something; an outcome or a refusal goes to `told`. */
