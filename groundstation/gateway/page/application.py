@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import hashlib
+import math
 from collections.abc import Awaitable, Callable
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
@@ -92,7 +93,7 @@ async def refused(_request: Request, error: Exception) -> Response:
     """What is wrong with a request, in a line."""
     if not isinstance(error, RequestError):
         raise error
-    headers = {"retry-after": f"{error.retry_after:.0f}"} if error.retry_after else {}
+    headers = {"retry-after": str(math.ceil(error.retry_after))} if error.retry_after else {}
     if error.status in (408, 413):
         headers["connection"] = "close"
     return JSONResponse({"error": error.line}, error.status, headers)
