@@ -75,10 +75,10 @@ def free_port() -> int:
 
 
 @contextlib.contextmanager
-def beating(folder: Path, stops: tuple[float, ...] = (), host: str = "127.0.0.1") -> Iterator[Beating]:
+def beating(folder: Path, stops: tuple[float, ...] = (), host: str = "127.0.0.1", **settings: Any) -> Iterator[Beating]:
     """A hole of 20 m after stops with these inclinations (deg), whose page listens on ``host``."""
     page = PageSettings(host, free_port(), passwords={"driller": hash_of(PASSWORD)})
-    rig = Rig(folder, target=20.0)
+    rig = Rig(folder, target=20.0, **settings)
     rig.run(5.0)
     for stop, inclination_deg in enumerate(stops, 1):
         rig.drill(stop, inclination_deg)

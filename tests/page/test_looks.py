@@ -2,6 +2,7 @@
 
 from collections.abc import Callable, Iterator
 from importlib.resources import files
+from pathlib import Path
 
 import pytest
 from beating import Beating, beating
@@ -76,6 +77,23 @@ def test_on_paper_there_are_the_facts_and_no_buttons(rig: Beating, watched: Open
         expect(page.locator(hidden)).to_be_hidden()
     assert page.evaluate("getComputedStyle(document.getElementById('verdict')).backgroundColor") == "rgb(255, 255, 255)"
     assert len(page.pdf(format="A4")) > 10_000
+
+
+def test_the_joints_with_the_neighbours_stand_there_the_worst_first(tmp_path: Path, watched: Open) -> None:
+    (tmp_path / "wall.toml").write_text(
+        'name = "three holes"\nradius_m = 0.60\nthickness_m = 0.80\nlength_m = 20.0\n'
+        'heads = "heads.csv"\nstations = "stations.csv"\n'
+    )
+    (tmp_path / "heads.csv").write_text("column,north_m,east_m\nH1,0,0\nH2,0.75,0\nH3,1.5,0\n")
+    drilled = "".join(f"{hole},{md},0,0\n" for hole in ("H1", "H3") for md in (0, 10, 20))
+    (tmp_path / "stations.csv").write_text(f"column,md_m,inclination_deg,azimuth_deg\n{drilled}")
+    with beating(tmp_path / "ground", (2.0, 3.0, 3.0), wall=tmp_path / "wall.toml", hole="H2") as leaning:
+        page = watched(leaning.url)
+        expect(page.locator("#hole")).to_have_text("H2")
+        expect(page.locator("#wall-title")).to_have_text("Wall three holes, hole H2")
+        expect(page.locator("#joints tr")).to_have_count(2)
+        expect(page.locator("#joints tr").first).to_have_class("grave")
+        expect(page.locator("#joints tr").first).to_contain_text("too thin")
 
 
 def test_fifty_tubes_keep_their_rows_and_their_place(rig: Beating, watched: Open) -> None:
