@@ -1,4 +1,4 @@
-"""One browser a worker; whatever it opens is watched: it asks no other host, and nothing in it fails."""
+"""One browser a module; whatever it opens is watched: it asks no other host, and nothing in it fails."""
 
 from __future__ import annotations
 
@@ -22,9 +22,9 @@ DESK = {"width": 1280, "height": 900}
 expect.set_options(timeout=PATIENCE_MS)
 
 
-@pytest.fixture(scope="session")
+@pytest.fixture(scope="module")
 def browser() -> Iterator[Browser]:
-    """Debian's chromium."""
+    """Debian's chromium; no longer than a module, since its driver runs a loop beside which no other test has one."""
     path = find_browser()
     assert path is not None, "no browser: run make browser"
     with sync_playwright() as driver, driver.chromium.launch(executable_path=path, args=FLAGS) as browser:
