@@ -111,10 +111,10 @@ class Observer:
             return
         model = rig.ground.model
         for tube in TUBES:
-            silent_for = rig.now - rig.off.get(tube, math.inf)
             if model.age(tube) < 0.0:
                 yield f"tube {tube} was heard in the future"
-            if tube in model.nodes and silent_for > model.config.stale_after + LATE and not model.is_stale(tube):
+            is_off = rig.silent_for(tube) > model.config.stale_after + LATE
+            if tube in model.nodes and is_off and not model.is_stale(tube):
                 yield f"tube {tube} without power is shown fresh"
 
 

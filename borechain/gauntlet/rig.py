@@ -77,6 +77,8 @@ class GauntletRig:
         self._builders = dict(self.stepper.builders)
         self._folder, self._seed, self._strangers = folder, seed, itertools.count()
         self.off: dict[int, float] = {}  # since when (s), by address
+        self._numbers = {address: address for address in disks}  # that the processes in their places give themselves
+        self._spoke_until: dict[int, float] = {}  # s, by number
         self._look_at = world.begin
         self.scheduler = Scheduler(world, self.stepper, self.stepper.follow)
         medium = world.scenario.medium
@@ -103,7 +105,13 @@ class GauntletRig:
             self.ground.store.close()
         self.stepper.drop(address)
         self.scheduler.progress.wanted.remove(address)
-        self.off[address] = self.now
+        self.off[address] = self._spoke_until[self._numbers[address]] = self.now
+
+    def silent_for(self, tube: int) -> float:
+        """Seconds for which no process of this number has had power; 0 while one has."""
+        if any(number == tube and address not in self.off for address, number in self._numbers.items()):
+            return 0.0
+        return self.now - self._spoke_until.get(tube, math.inf)
 
     def start(self, address: int, tube: int | None = None) -> None:
         """Power on, where it was cut."""
@@ -174,6 +182,7 @@ class GauntletRig:
 
     def _take_place(self, address: int, tube: int | None) -> None:
         """Put another tube with a blank disk in a place, or the one that belongs there."""
+        self._numbers[address] = address if tube is None else tube
         if tube is None:
             self._disks[address], self.stepper.builders[address] = self._settled[address], self._builders[address]
             return

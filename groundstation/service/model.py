@@ -28,7 +28,7 @@ from groundstation.survey.resolve import Direction, Quality, check, combine_imus
 from groundstation.survey.shared import SharedErrors
 from groundstation.survey.trajectory import Point, Trajectory
 from groundstation.survey.trust import UNKNOWN_YAW_VAR, Trust, trust_of, with_unknown_yaw
-from telemetry.messages import EPOCH_UNKNOWN, Event, NodeState, StaticRecord, SurveyMeasurement
+from telemetry.messages import EPOCH_UNKNOWN, Event, NodeFlag, NodeState, StaticRecord, SurveyMeasurement
 
 Array = npt.NDArray[np.float64]
 EVENTS_SHOWN = 10_000
@@ -185,13 +185,15 @@ class RigModel:
     def on_state(self, state: NodeState, now: float) -> bool:
         """Handle a node's state that came at ``now`` (s, own clock), unless a newer one of its epoch is known.
 
-        One that has come before is no sign of life, somebody may have recorded it: False.
+        One that has come before is no sign of life, somebody may have recorded it: False. Nor is one that was on its
+        way for long; it tells that the node spoke then, which is all that a ground station knows after its start.
         """
         known = self.nodes.get(state.tube)
         if known is not None and is_repeated(state, known):
             return False
         self.recalibration.on_state(state)
-        self._heard_at[state.tube] = now
+        spoke_at = now - self._time_on_its_way(state)
+        self._heard_at[state.tube] = max(self._heard_at.get(state.tube, -math.inf), spoke_at)
         if known is None or state.epoch != known.epoch or state.at >= known.at:
             self.nodes[state.tube] = state
             self._tally_known_at = min(self._tally_known_at, now + ALL_HEARD_WITHIN)
@@ -300,6 +302,11 @@ class RigModel:
     def is_stale(self, tube: int) -> bool:
         """Whether a node has been silent for too long."""
         return not self.age(tube) <= self.config.stale_after
+
+    def _time_on_its_way(self, state: NodeState) -> float:
+        """Seconds for which a state has been on its way; 0 where its time cannot be compared with the rig time here."""
+        is_dated = state.epoch == self.epoch != EPOCH_UNKNOWN and NodeFlag.CLOCK_UNSYNCHRONISED not in state.flags
+        return max(self.rig_now - state.at, 0.0) if is_dated and math.isfinite(self.rig_now) else 0.0
 
     def _hops_if_unknown(self, measurement: SurveyMeasurement) -> int:
         return measurement.hops if measurement.tube not in self.tally.tubes else -1

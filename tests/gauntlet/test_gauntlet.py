@@ -55,6 +55,18 @@ def test_combined_seeds_hold(first: int) -> None:
 
 
 @pytest.mark.slow
+@pytest.mark.parametrize(
+    ("seed", "kinds"),
+    [
+        (20205, ("node-cut", "database-deleted", "splice")),  # a recorded state kept a dead tube fresh
+        (20063, ("bytes-rot", "same-number")),  # a stranger spoke for a tube without power
+    ],
+)
+def test_seeds_that_failed_once_hold(seed: int, kinds: tuple[str, ...]) -> None:
+    assert run_seed(seed, kinds=kinds).violations == []
+
+
+@pytest.mark.slow
 @pytest.mark.parametrize("seed", [2])
 def test_seeds_of_a_string_that_is_drilled_in_hold(seed: int) -> None:
     assert run_seed(seed, plan="drilled-in").violations == []

@@ -3,6 +3,7 @@
 import math
 import random
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -18,7 +19,7 @@ from groundstation.service import alarm_views, column_views
 from groundstation.service.model import RigModel
 from groundstation.survey.ellipsoid import plan_ellipse
 from groundstation.survey.resolve import angles
-from telemetry.messages import ImuMean, Mode, NodeFlag, NodeState, SurveyMeasurement
+from telemetry.messages import EPOCH_UNKNOWN, ImuMean, Mode, NodeFlag, NodeState, SurveyMeasurement
 
 G = 9.81
 DEG = math.pi / 180.0
@@ -404,3 +405,22 @@ def test_a_state_that_was_recorded_is_no_sign_of_life(tmp_path: Path) -> None:
     assert model.is_stale(1)
     model.on_state(node_state(1, at=160.0, cycles=1), 60.0)  # a tube that has started again counts its cycles anew
     assert not model.is_stale(1)
+
+
+@given(st.floats(0.0, 100.0))
+def test_a_recorded_state_shows_no_tube_fresh_to_a_ground_station_that_has_just_started(late: float) -> None:
+    model = RigModel(GroundConfig(folder=Path("unused")))
+    model.now, model.rig_now, model.epoch = 5.0, 1000.0 + late, 1
+    model.on_state(replace(node_state(1, at=1000.0, cycles=50), epoch=1), 5.0)
+    assert model.age(1) == pytest.approx(late)
+
+
+@pytest.mark.parametrize(
+    "undated",
+    [{"epoch": 2}, {"epoch": EPOCH_UNKNOWN}, {"epoch": 1, "flags": NodeFlag.CLOCK_UNSYNCHRONISED}],
+)
+def test_silence_is_judged_by_arrival_where_the_times_of_two_clocks_are_not_comparable(undated: dict[str, Any]) -> None:
+    model = RigModel(GroundConfig(folder=Path("unused")))
+    model.now, model.rig_now, model.epoch = 5.0, 1100.0, 1
+    model.on_state(replace(node_state(1, at=1000.0, cycles=50), **undated), 5.0)
+    assert model.age(1) == 0.0
