@@ -60,19 +60,14 @@ class InlineRig:
         keys: Path | None = None,
     ) -> None:
         self.world = world
+        self._has_encoder_run = False
         key_file = new_key(folder / "rig.key") if keys is None else None
         config = GroundConfig(
             rig=rig, folder=private_folder(folder, "ground"), key_file=key_file, keys=keys, **settings
         )
         builders: dict[int, Build] = {
             BASE: partial(GroundProcess, config, lot, disk_of(BASE)),
-            ENCODER: lambda: EncoderProcess(
-                private_folder(folder, "encoder"),
-                torque=world.torque_settings(),
-                reach=world.reach,
-                seals=seals_at(keys, ENCODER, world.reach),
-                disk=disk_of(ENCODER),
-            ),
+            ENCODER: lambda: self._build_encoder(private_folder(folder, "encoder"), keys, disk_of(ENCODER), lot),
         }
         self._seal_depth = depth_sealer(keys)
         block_key = None if key_file is None else read_key(key_file)
@@ -80,6 +75,18 @@ class InlineRig:
             place = private_folder(folder, f"tube-{tube}")
             builders[tube] = partial(self._build_tube, tube, place, block_key, keys, disk_of(tube))
         self.stepper = InProcessStepper(builders, self._act_on_cue, rounded_frame if native else bytes)
+
+    def _build_encoder(self, folder: Path, keys: Path | None, disk: Disk, lot: Callable[[int], int]) -> EncoderProcess:
+        is_new, self._has_encoder_run = not self._has_encoder_run, True
+        return EncoderProcess(
+            folder,
+            torque=self.world.torque_settings(),
+            reach=self.world.reach,
+            seals=seals_at(keys, ENCODER, self.world.reach),
+            disk=disk,
+            is_new=is_new,
+            lot=lot,
+        )
 
     @property
     def ground(self) -> GroundProcess:

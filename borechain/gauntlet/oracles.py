@@ -31,6 +31,7 @@ TOLD = frozenset(
     }
 )
 DEPTH = frozenset({"depth_refused", "depth_contradicts"})  # alarms while which no depth since a gap is sure
+YAW = frozenset({"reference", "joint"})  # alarms while which no yaw of an encoder that failed is sure
 RECEIPT = msgpack.packb({"k": int(Kind.RECEIPT)})[1:]  # in every frame with a receipt
 UNKNOWN_DEG = 20.0  # of an azimuth whose yaws are all unknown, at least
 
@@ -127,7 +128,7 @@ def violations(rig: GauntletRig) -> list[str]:
     return [
         *_each_once(rows),
         *(() if standing & DEPTH else _depths(rows, rig.world)),
-        *(_directions(rig) if "reference" not in standing else ()),
+        *(() if standing & YAW and rig.world.misled else _directions(rig)),
         *_flags(rig.inline.ground.model),
         *_missing(rows, rig.world, standing | (told & {"depth_refused"})),
         *_health(rig.inline.ask("status")["health"], standing),

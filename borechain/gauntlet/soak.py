@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import gc
 import math
 import resource
 import shutil
@@ -35,6 +36,8 @@ class Sample:
 
     hours: float
     memory_mib: float  # of this process
+    objects: int  # of Python, in this process
+    disks_mib: float  # what the disks in memory hold, until each ring and log is full
     handles: int  # open files of this process
     database_kib: float
     surveys: int
@@ -85,9 +88,12 @@ def _sample(rig: GauntletRig, observer: Observer) -> Sample:
     used = resource.getrusage(resource.RUSAGE_SELF)
     pages = int(Path("/proc/self/statm").read_text().split()[1])
     model = rig.ground.model if rig.ground is not None else None
+    gc.collect()
     return Sample(
         hours=(rig.now - rig.world.begin) / 3600.0,
         memory_mib=pages * resource.getpagesize() / 2**20,
+        objects=len(gc.get_objects()),
+        disks_mib=sum(rig.disk(address).size for address in EVERYBODY) / 2**20,
         handles=len(list(Path("/proc/self/fd").iterdir())),
         database_kib=len(rig.disk(BASE).kept("ground.sqlite")) / 1024.0,
         surveys=0 if model is None else sum(station.count for station in model.stations),

@@ -130,6 +130,13 @@ class DepthLog:
         del self.stands[:-STANDS_KEPT]
         return True
 
+    def is_of_before(self, stand: Stand, epoch: int) -> bool:
+        """Whether a stand without an epoch is known from one before ``epoch``: the encoder's clock may run on."""
+        if stand.epoch != EPOCH_UNKNOWN:
+            return False
+        before = (known for known in self.stands if known.epoch != epoch and stand.ended_at <= known.ended_at)
+        return any(_same(replace(stand, epoch=known.epoch), known) for known in before)
+
     def restore(self, stands: list[Stand]) -> None:
         """Go on with what was stored."""
         for stand in stands:

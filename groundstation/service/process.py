@@ -290,7 +290,8 @@ class GroundProcess(Process):
         model.depth_heard_at = now
         for stand in reading.stands:
             is_present = stand.epoch in (EPOCH_UNKNOWN, model.epoch) and stand.ended_at <= reading.at
-            if is_present and stand.md <= model.tally.deepest:
+            is_news = is_present and not model.depths.is_of_before(stand, model.epoch)
+            if is_news and stand.md <= model.tally.deepest:
                 self._on_stand(stand if stand.epoch == model.epoch else replace(stand, epoch=model.epoch))
         self._keep_stand(reading)
         self._place_waiting()

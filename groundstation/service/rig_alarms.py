@@ -65,6 +65,12 @@ KINDS: tuple[AlarmKind, ...] = (
         BAD,
         "several gyroscopes contradict the encoder at one time: it may have slipped; check the azimuths",
     ),
+    AlarmKind(
+        "joint",
+        BAD,
+        "the yaws of two neighbours have parted: the joint between them turned, or one was told a wrong yaw; "
+        "check the azimuths below and above",
+    ),
     AlarmKind("depth_refused", BAD, "readings of the depth are refused"),
     AlarmKind("depth_silent", BAD, "no depth comes any more"),
     AlarmKind("depth_contradicts", BAD, "the depth does not fit the tubes in the hole"),

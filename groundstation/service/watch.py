@@ -8,9 +8,12 @@ from dataclasses import dataclass
 from groundstation.service.depth import CONTRADICTION
 from groundstation.service.model import RigModel
 from groundstation.service.numbers import Range
+from groundstation.service.witnesses import Witnesses
+from groundstation.survey.joint_angles import JointAngles, RestingYaw
+from groundstation.survey.trust import Trust, trust_of
 from telemetry.application.endpoint import SERIES_SHIFT
 from telemetry.application.seal_watch import CODE, refusal_of
-from telemetry.messages import EPOCH_UNKNOWN, Event, NodeFlag, NodeState, SurveyMeasurement
+from telemetry.messages import EPOCH_UNKNOWN, Event, Mode, NodeFlag, NodeState, SurveyMeasurement
 
 LOOK_EVERY = 0.5  # s, own clock
 AHEAD = 0.5  # s by which a node's rig time may be ahead of the ground station's
@@ -18,11 +21,9 @@ PLACED_WITHIN = 5.0  # s of rig time after which a survey without a depth is tol
 GAP_AFTER = 30.0  # s that a number may be on its way
 ASK_EVERY = 120.0  # s between two orders to send a range again
 ASKED_AT_MOST = 3
-SETTLED_AFTER = 10.0  # s after a start in which a tube may still find its yaw
-TOGETHER = 30.0  # s
 REFUSALS = 3  # readings of the depth refused in a row until that is told
 SENSOR = NodeFlag.SENSOR_FAULT | NodeFlag.YAW_UNTRUSTED | NodeFlag.RATE_EXCEEDED
-AGAINST_THE_ENCODER = ("yaw_reset", "gyro_step", "gyro_scale")
+AT_REST = (Mode.STILL, Mode.SURVEY)
 OF_THE_DISK = ("saved_state_lost", "boot_counter_lost", "parameters_fallback")
 
 
@@ -52,8 +53,8 @@ class Watch:
         self._refused_in_a_row = 0
         self._contradictions = 0
         self._gaps: dict[int, Gap] = {}
-        self._contradicted: dict[int, Event] = {}  # newest contradiction of gyroscope and encoder, by tube
-        self._started: dict[tuple[int, int], float] = {}  # s, rig time of the newest start, by tube and epoch
+        self._witnesses = Witnesses()
+        self._joints = JointAngles()
         self._told_unplaced: set[int] = set()  # tubes
 
     def is_due(self, now: float) -> bool:
@@ -75,6 +76,7 @@ class Watch:
         hold("tube_sensor", tube, ", ".join(str(flag.name).lower() for flag in SENSOR & state.flags))
         hold("tube_disk", tube, "its disk refuses" if NodeFlag.NOT_SAVED in state.flags else "")
         hold("clock", tube, self._clock_fault(state))
+        self._look_at_joint(state)
         if self._model.numbers.on_told(state.tube, state.numbered):
             self._alarms.alert("tube_counts_anew", tube, f"newest number {state.numbered}")
 
@@ -93,10 +95,10 @@ class Watch:
 
     def on_known_event(self, event: Event) -> None:
         """Judge an event that has come, or was stored before a restart of the ground station."""
-        if event.code in ("booted", "restored"):
-            self._started[event.tube, event.epoch] = event.at
-        elif event.code in AGAINST_THE_ENCODER:
-            self._on_contradiction(event)
+        tubes = self._model.tally.tubes
+        heard = [tube for tube in tubes if not self._model.is_stale(tube)] or tubes  # none: the events are stored ones
+        if against := self._witnesses.on_event(event, heard):
+            self._alarms.alert("reference", "encoder", against)
 
     def on_survey(self, measurement: SurveyMeasurement, outcome: str) -> None:
         """Tell what a survey was not used for: ``outcome`` is a kind of alarm, or empty."""
@@ -143,22 +145,15 @@ class Watch:
             gap.complete_from = complete_from
             gap.asked_at, gap.asked = now - ASK_EVERY + GAP_AFTER, gap.asked if sent else ASKED_AT_MOST
 
-    def _on_contradiction(self, event: Event) -> None:
-        """Tubes that contradict the encoder together, not all of them freshly started, speak against the encoder."""
-        self._contradicted[event.tube] = event
-        together = [
-            e for e in self._contradicted.values() if e.epoch == event.epoch and abs(e.at - event.at) <= TOGETHER
-        ]
-        heard = [tube for tube in self._model.tally.tubes if not self._model.is_stale(tube)]
-        enough = min(2, len(heard)) if event.code == "yaw_reset" else 2  # alone, a gyroscope is wrong sooner
-        if len(together) >= enough and any(self._was_settled(e) for e in together):
-            tubes = ", ".join(str(tube) for tube in sorted(e.tube for e in together))
-            self._alarms.alert("reference", "encoder", f"tubes {tubes} at {event.at:.0f} s")
-
-    def _was_settled(self, event: Event) -> bool:
-        """Whether a tube had found its yaw before, since its start."""
-        started = self._started.get((event.tube, event.epoch), -math.inf)
-        return event.epoch != EPOCH_UNKNOWN and event.at >= started + SETTLED_AFTER
+    def _look_at_joint(self, state: NodeState) -> None:
+        """Tell where the yaws of two neighbours part."""
+        if state.mode not in AT_REST or trust_of(state.flags) is not Trust.FULL:
+            self._joints.on_motion(state.tube)
+            return
+        yaw = RestingYaw(state.tube, state.at, state.yaw, state.yaw_var)
+        if change := self._joints.on_yaw(self._model.tally.tubes, yaw):
+            what = f"the yaws part by {math.degrees(change.by):.1f} deg at {state.at:.0f} s"
+            self._alarms.alert("joint", f"joint of tubes {change.upper} and {change.lower}", what)
 
     def _gap_of(self, tube: int, now: float) -> Gap | None:
         numbers, known = self._model.numbers.gap(tube), self._gaps.get(tube)

@@ -23,6 +23,7 @@ class BootCounter:
     folder : where it is kept
     lot : number below its argument by lot, for a start that cannot be counted
     disk : that holds the folder
+    is_new : a folder without a count is a new one, whose starts count from 1; otherwise the count may have been lost
 
     Attributes
     ----------
@@ -30,10 +31,19 @@ class BootCounter:
     fault : why it is by lot, or empty
     """
 
-    def __init__(self, folder: Path, lot: Callable[[int], int] = secrets.randbelow, disk: Disk = MACHINE) -> None:
+    def __init__(
+        self,
+        folder: Path,
+        lot: Callable[[int], int] = secrets.randbelow,
+        disk: Disk = MACHINE,
+        *,
+        is_new: bool = True,
+    ) -> None:
         self.fault = ""
         try:
             self.boots = read_count(disk, folder / "boots") + 1
+            if self.boots == 1 and not is_new:
+                self.boots = LOTS + lot(LOTS)
         except (ValueError, OSError) as error:
             self.fault, self.boots = f"boots: {error}", LOTS + lot(LOTS)
         try:

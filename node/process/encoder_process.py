@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import math
+import secrets
+from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -35,6 +37,9 @@ class EncoderProcess(Process):
     reach : tubes away that its radio hears, see ``TubeSettings``
     disk : that holds the folder
     seals : what it says and believes under keys; None: everybody is believed
+    is_new : nobody has heard this encoder before. Otherwise a start that cannot be counted is numbered by lot: an epoch
+        that came before would mix the depths of two times
+    lot : number below its argument by lot
 
     Raises
     ------
@@ -51,13 +56,16 @@ class EncoderProcess(Process):
         reach: int = 1,
         disk: Disk = MACHINE,
         seals: Seals | None = None,
+        *,
+        is_new: bool = True,
+        lot: Callable[[int], int] = secrets.randbelow,
     ) -> None:
         self._timing = timing
         if source is not None:
             source.start()
         self._source = SafeEncoder(source, self._send_event) if source is not None else None
         self._now = 0.0
-        counter = BootCounter(folder, disk=disk)
+        counter = BootCounter(folder, lot, disk, is_new=is_new)
         self.endpoint = Endpoint(
             ENCODER, frozenset(Side), boot_count=counter.boots, is_clock_root=True, reach=reach, seals=seals
         )

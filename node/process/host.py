@@ -65,7 +65,8 @@ def run_encoder(
     seals = seals_at(place.keys, ENCODER, reach, place.rig)
 
     def build(timing: CycleTiming | None = None) -> EncoderProcess:
-        return EncoderProcess(place.folder, source, torque, timing, reach, seals=seals)
+        # on a board nobody can tell a new folder from one that was lost
+        return EncoderProcess(place.folder, source, torque, timing, reach, seals=seals, is_new=own_time is None)
 
     warn_of_keys("encoder", seals)
     if own_time is None:

@@ -164,6 +164,12 @@ class FaultyDisk:
         disk.handled = False
         return disk
 
+    @property
+    def size(self) -> int:
+        """Bytes that are held: of every file what is read and what is kept, and the backups."""
+        files = {id(file): file for file in (*self.files.values(), *self._kept_names.values())}
+        return sum(len(file.seen) + len(file.kept) for file in files.values()) + sum(map(len, self.backups))
+
     def make_empty(self, name: str) -> None:
         """Make a file whose name is kept."""
         self.files[name] = self._kept_names[name] = self._new(b"")

@@ -41,6 +41,7 @@ class FaultyWorld(World):
     drifts : since when (s) and by how much a second, by address
     spoilers : what becomes of a tube's readings, by tube
     slipped : counts by which the encoder is off
+    misled : the encoder has slipped or stopped at any time
     stuck_at : rig time (s) from which on the encoder counts no more, None where it does
     depth_error : m
     depth_hidden : no depth is measured
@@ -74,6 +75,7 @@ class FaultyWorld(World):
         self.drifts: dict[int, tuple[float, float]] = {}
         self.spoilers: dict[int, Callable[[Reading], Reading]] = {}
         self.slipped = 0
+        self.misled = False
         self.stuck_at: float | None = None
         self.depth_error = 0.0
         self.depth_hidden = False
@@ -99,6 +101,7 @@ class FaultyWorld(World):
         """Sample of the counter, its times on the encoder's clock."""
         if self.stuck_at is not None:
             t = self.stuck_at
+        self.misled |= self.stuck_at is not None or self.slipped != 0
         if t not in self._counted:
             self._counted[t] = super().encoder_sample(t)
         count, edge_at, rising, torque, earlier = self._counted[t]

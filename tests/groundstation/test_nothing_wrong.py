@@ -1,6 +1,8 @@
 """Faults on a whole string that is drilled: what the crew sees is right, or it is flagged."""
 
+import math
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -8,6 +10,7 @@ import pytest
 
 from borechain.inline import InlineRig
 from groundstation.service.process import GroundProcess
+from node.process.counter import LOTS
 from node.process.tube_process import TubeProcess
 from sim.rig.report import missing_surveys
 from sim.rig.scheduler import Scheduler
@@ -129,6 +132,30 @@ def test_an_encoder_that_starts_again_from_zero_misplaces_nothing(rig: Drilled, 
     assert set(rig.surveys()) <= set(EVERY)
     assert rig.surveys() == EVERY or rig.codes() & {"survey_missing", "survey_unplaced", "survey_untrusted"}
     assert "epoch" in rig.codes()
+
+
+def test_an_encoder_that_lost_its_count_uses_no_epoch_again_and_no_stop_of_before_misses_a_survey(rig: Drilled) -> None:
+    rig.drill(rig.drills[1] - 5.0)
+    rig.cut(ENCODER)
+    (rig.place("encoder") / "boots").unlink()
+    rig.start(ENCODER)
+    rig.finish()
+    assert rig.inline.ask("status")["epoch"] >= LOTS
+    assert rig.surveys() == EVERY
+    assert "survey_missing" not in rig.codes()  # the stands of before are told again, by a clock that ran on
+
+
+def test_the_joint_at_which_a_tube_changes_the_measurement_is_named(rig: Drilled) -> None:
+    """Tube 2 is honest about itself and lies to those below."""
+    rig.drill(rig.drills[1] + 5.0)
+    liar = rig.stepper.processes[2].endpoint
+    plain = liar.send_aiding
+    liar.send_aiding = lambda aiding, now: plain(replace(aiding, yaw=(aiding.yaw + 0.3) % math.tau), now)  # type: ignore[method-assign]
+    rig.finish()
+    told = [row for row in rig.inline.ask("alarms")["rig"] if row["code"] == "joint"]
+    assert [row["subject"] for row in told] == ["joint of tubes 2 and 1"]
+    assert "17.2 deg" in told[0]["detail"]
+    assert rig.health() == "bad"
 
 
 def test_a_ground_station_that_is_off_across_a_stop_places_its_surveys(rig: Drilled) -> None:

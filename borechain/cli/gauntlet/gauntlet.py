@@ -125,7 +125,8 @@ def _soak(hours: float, seed: int, *, as_json: bool) -> None:
             click.echo(json.dumps(asdict(sample)))
         else:
             click.echo(
-                f"{sample.hours:7.1f} h {sample.memory_mib:7.1f} MiB {sample.handles:4d} handles "
+                f"{sample.hours:7.1f} h {sample.memory_mib:7.1f} MiB, {sample.disks_mib:5.1f} of it disks "
+                f"{sample.objects:7d} objects {sample.handles:4d} handles "
                 f"{sample.database_kib:8.1f} KiB {sample.surveys:5d} surveys {len(found):3d} wrong"
             )
     if found:

@@ -1,0 +1,81 @@
+"""Who contradicts the encoder: a gyroscope alone may be wrong, several at one time say that the encoder is. No I/O.
+
+A tube is a witness of a time if it ran through it: one that started then, or stood still, took the yaw that it was
+given and has nothing to say. So a contradiction counts against the encoder when all who could have seen it agree.
+"""
+
+from __future__ import annotations
+
+import math
+from collections import deque
+from collections.abc import Collection
+
+from telemetry.messages import EPOCH_UNKNOWN, Event
+
+AGAINST_THE_ENCODER = ("yaw_reset", "gyro_step", "gyro_scale")
+STARTS = ("booted", "restored")
+CYCLE = 10.0 / 19.0  # s, of a node
+SETTLED_AFTER = 10.0  # s after a start in which a tube may still find its yaw
+TOGETHER = 30.0  # s
+ENOUGH = 2  # tubes
+STARTS_KEPT = 1000
+
+
+class Witnesses:
+    """What the tubes' events say of the encoder."""
+
+    def __init__(self) -> None:
+        self._contradicted: dict[int, Event] = {}  # newest contradiction, by tube
+        self._starts: deque[Event] = deque(maxlen=STARTS_KEPT)
+        self._blind_until: dict[tuple[int, int], float] = {}  # s, rig time, by tube and epoch
+        self._told: tuple[Event, ...] = ()
+
+    def on_event(self, event: Event, heard: Collection[int]) -> str:
+        """Handle an event while these tubes are heard; says who contradicts the encoder where that is new, or ''."""
+        place = event.tube, event.epoch
+        if event.code in STARTS:
+            self._starts.append(event)
+            self._blind_until[place] = event.at
+        elif event.code == "overrun":
+            self._blind_until[place] = event.at + CYCLE * int(str(event.arguments.get("missed", 0)))
+        elif event.code in AGAINST_THE_ENCODER:
+            self._contradicted[event.tube] = event
+        else:
+            return ""
+        while len(self._blind_until) > STARTS_KEPT:
+            del self._blind_until[next(iter(self._blind_until))]
+        found = next((one for one in self._contradicted.values() if self._speaks_against_the_encoder(one, heard)), None)
+        if found is None or (told := self._together(found)) == self._told:
+            return ""
+        self._told = told
+        return f"tubes {', '.join(str(tube) for tube in sorted(e.tube for e in told))} at {found.at:.0f} s"
+
+    def _speaks_against_the_encoder(self, event: Event, heard: Collection[int]) -> bool:
+        together = self._together(event)
+        tubes = {e.tube for e in together}
+        if tubes >= set(heard) and any(self._start_before(e)[0] == "restored" for e in together):
+            return True  # every yaw that was saved or known says another thing
+        others = [tube for tube in heard if tube not in tubes and self._has_watched(tube, event)]
+        enough = min(ENOUGH, len(tubes) + len(others))
+        if any(e.code != "yaw_reset" for e in together):
+            enough = ENOUGH  # alone, a gyroscope is wrong sooner
+        return len(together) >= enough and any(self._was_settled(e) for e in together)
+
+    def _together(self, event: Event) -> tuple[Event, ...]:
+        every = self._contradicted.values()
+        return tuple(e for e in every if e.epoch == event.epoch and abs(e.at - event.at) <= TOGETHER)
+
+    def _was_settled(self, event: Event) -> bool:
+        """Whether a tube had found its yaw before, since its start."""
+        return event.epoch != EPOCH_UNKNOWN and event.at >= self._start_before(event)[1] + SETTLED_AFTER
+
+    def _start_before(self, event: Event) -> tuple[str, float]:
+        """Kind and time of the start that an event followed, by its number: two tubes may have the same name."""
+        known = (s for s in self._starts if (s.tube, s.epoch) == (event.tube, event.epoch))
+        before = [start for start in known if start.sequence <= event.sequence]
+        start = max(before, key=lambda start: (start.sequence, start.at), default=None)
+        return ("", -math.inf) if start is None else (start.code, start.at)
+
+    def _has_watched(self, tube: int, event: Event) -> bool:
+        """Whether a tube ran all the time before an event in which it could have seen the same."""
+        return self._blind_until.get((tube, event.epoch), -math.inf) < event.at - TOGETHER

@@ -1,0 +1,69 @@
+"""Which contradictions of gyroscope and encoder speak against the encoder."""
+
+from itertools import permutations
+
+import pytest
+
+from groundstation.service.witnesses import Witnesses
+from telemetry.messages import Event, Scalar, Severity
+
+
+def event(tube: int, at: float, code: str, number: int = 10, **arguments: Scalar) -> Event:
+    return Event(tube, number, at, Severity.WARNING, code, arguments, 1)
+
+
+BOTH_STARTED = [event(1, 0.0, "restored", 1), event(2, 0.0, "restored", 1)]
+
+
+def told(events: list[Event], heard: tuple[int, ...] = (1, 2)) -> list[str]:
+    witnesses = Witnesses()
+    return [said for one in events if (said := witnesses.on_event(one, heard))]
+
+
+def test_two_settled_tubes_that_contradict_the_encoder_are_told_once() -> None:
+    assert told([*BOTH_STARTED, event(1, 100.0, "yaw_reset"), event(2, 101.0, "yaw_reset")]) == ["tubes 1, 2 at 100 s"]
+
+
+@pytest.mark.parametrize("code", ["yaw_reset", "gyro_step", "gyro_scale"])
+def test_a_gyroscope_that_stands_alone_against_the_encoder_and_another_tube_is_wrong_itself(code: str) -> None:
+    assert told([*BOTH_STARTED, event(1, 100.0, code)]) == []
+
+
+@pytest.mark.parametrize(
+    "blind",
+    [
+        event(2, 80.0, "booted", 9),
+        event(2, 99.0, "restored", 9),
+        event(2, 103.0, "restored", 9),
+        event(2, 60.0, "overrun", 9, missed=100),
+    ],
+    ids=str,
+)
+def test_a_tube_that_has_not_watched_is_no_witness_for_the_encoder_in_whatever_order_they_say_so(blind: Event) -> None:
+    for events in permutations([blind, event(1, 100.0, "yaw_reset")]):
+        assert told([*BOTH_STARTED, *events]) == ["tubes 1 at 100 s"]
+
+
+def test_a_scale_that_changed_is_the_gyroscopes_own_even_where_nobody_else_has_watched() -> None:
+    assert told([*BOTH_STARTED, event(2, 99.0, "restored", 9), event(1, 100.0, "gyro_scale")]) == []
+
+
+def test_tubes_that_find_their_first_yaw_contradict_nothing() -> None:
+    assert told([event(1, 0.0, "booted", 1), event(1, 1.0, "yaw_reset")], heard=(1,)) == []
+
+
+def test_every_saved_yaw_that_says_another_thing_than_the_encoder_is_told() -> None:
+    resets = [event(1, 2.0, "yaw_reset"), event(2, 2.5, "yaw_reset")]
+    assert told([*BOTH_STARTED, *resets]) == ["tubes 1, 2 at 2 s"]
+
+
+def test_a_stranger_of_the_same_number_takes_no_witness_away() -> None:
+    stranger = event(1, 95.0, "booted", 1)
+    known = [event(1, 0.0, "restored", 5), event(2, 96.0, "restored", 5)]
+    assert told([*known, stranger, event(1, 100.0, "yaw_reset", 8)]) == ["tubes 1 at 100 s"]
+    assert told([*known, stranger, event(1, 100.0, "yaw_reset", 3)]) == []
+
+
+def test_contradictions_of_two_epochs_or_of_two_times_are_not_added_up() -> None:
+    late = event(2, 200.0, "yaw_reset")
+    assert told([*BOTH_STARTED, event(1, 100.0, "yaw_reset"), late]) == []
