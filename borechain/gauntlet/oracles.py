@@ -31,7 +31,7 @@ TOLD = frozenset(
     }
 )
 DEPTH = frozenset({"depth_refused", "depth_contradicts"})  # alarms while which no depth since a gap is sure
-YAW = frozenset({"reference", "joint"})  # alarms while which no yaw of an encoder that failed is sure
+YAW = frozenset({"reference", "joint"})  # alarms while which no yaw is sure, where the encoder has failed
 RECEIPT = msgpack.packb({"k": int(Kind.RECEIPT)})[1:]  # in every frame with a receipt
 UNKNOWN_DEG = 20.0  # of an azimuth whose yaws are all unknown, at least
 

@@ -15,7 +15,7 @@ from groundstation.service.process import GroundProcess
 from telemetry import keys
 from telemetry.errors import BorechainError
 
-REPEATED_ORDERS = ("accept_depth", "alarm")  # of the ground station itself, which need no key of the rig
+REPEATED_ORDERS = ("accept_depth", "accept_joints", "alarm")  # of the ground station, which need no key of the rig
 
 
 @dataclass(slots=True)

@@ -24,6 +24,7 @@ from groundstation.service.stops import Stops
 from groundstation.service.tally import Tally
 from groundstation.survey.columns import Deviation, deviation, project
 from groundstation.survey.fusion import Departure, Evidence, departure, judge_departure, weighted
+from groundstation.survey.joint_angles import JointAngles
 from groundstation.survey.resolve import Direction, Quality, check, combine_imus, resolve
 from groundstation.survey.shared import SharedErrors
 from groundstation.survey.trajectory import Point, Trajectory
@@ -154,6 +155,7 @@ class RigModel:
         self.depths = DepthLog(config.depth_rate, config.depth_gap)
         self.stops = Stops(self.tally, config.survey_after)
         self.numbers = Numbers()
+        self.joints = JointAngles()
         self.rig_alarms = RigAlarms()
         self.crew_alarms = CrewAlarms()
         self.nodes: dict[int, NodeState] = {}

@@ -24,6 +24,7 @@ from groundstation.service.recalibration.procedure import Request
 from groundstation.service.store import Store
 from groundstation.service.uploads import Uploads
 from groundstation.service.views import View
+from groundstation.service.watch import subject_of
 from telemetry.application.arguments import check_arguments, parse_parameters, parse_tube
 from telemetry.application.commands import COMMANDS, CommandSpec, ObeyedBy, find_command
 from telemetry.errors import CommandError
@@ -172,6 +173,12 @@ class Operator:
         """Believe the depth that comes from now on."""
         self._model.depths.accept()
         self._model.rig_alarms.clear("depth_refused", "depth")
+        order.advance(OrderState.DONE)
+
+    def accept_joints(self, order: Order) -> None:
+        """Take the angles at which the joints stand for right."""
+        for pair in self._model.joints.accept():
+            self._model.rig_alarms.clear("joint", subject_of(pair))
         order.advance(OrderState.DONE)
 
     def alarm(self, order: Order) -> None:

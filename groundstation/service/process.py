@@ -124,6 +124,8 @@ class GroundProcess(Process):
         self.model.epoch = self.store.epoch()
         self.model.restore_tally(self.store.tally())
         self._kept_tally = list(self.model.tally.tubes)
+        self._kept_joints = self.store.joints()
+        self.model.joints.known.update(self._kept_joints)
         for stand in self.store.stands():
             self._on_stand(stand)
         self.model.depths.restore(list(self.model.depths.stands))
@@ -346,6 +348,12 @@ class GroundProcess(Process):
             self.store.keep_tally(list(self.model.tally.tubes))
             self._kept_tally = list(self.model.tally.tubes)
 
+    def _keep_joints(self) -> None:
+        """Store the angle of a joint when it is known first."""
+        if self.model.joints.known != self._kept_joints:
+            self.store.keep_joints(self.model.joints.known)
+            self._kept_joints = dict(self.model.joints.known)
+
     @contextlib.contextmanager
     def _refusing_disk(self) -> Iterator[None]:
         """Go on where the disk refuses: the store remembers why, and the next look tells it."""
@@ -361,6 +369,7 @@ class GroundProcess(Process):
                 self.watch.on_state(message)
                 with self._refusing_disk():
                     self._keep_tally()
+                    self._keep_joints()
                 self._publish([f"nodes/{message.tube}"])
             case SurveyMeasurement() | Event() | StaticRecord():
                 with self._refusing_disk():  # what is not stored is not acknowledged, and comes again

@@ -14,7 +14,7 @@ from __future__ import annotations
 import contextlib
 import math
 import sqlite3
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -24,6 +24,7 @@ import sqlalchemy as sa
 from groundstation.errors import StoreError
 from groundstation.service.alarm_record import DamagedAlarmError, alarm_of_text, alarm_to_text
 from groundstation.service.crew_alarms import CrewAlarm
+from groundstation.survey.joint_angles import Joint, Pair
 from telemetry.errors import DecodeError
 from telemetry.messages import Event, Kept, Stand, StaticRecord, SurveyMeasurement
 from telemetry.parameters import ParameterBlock, unpack_block
@@ -86,6 +87,14 @@ RECALIBRATION = sa.Table(
 )
 
 
+JOINTS = sa.Table(
+    "joints",
+    METADATA,
+    sa.Column("upper", sa.Integer, primary_key=True, autoincrement=False),
+    sa.Column("lower", sa.Integer, primary_key=True, autoincrement=False),
+    sa.Column("angle", sa.Float, nullable=False),
+    sa.Column("var", sa.Float, nullable=False),
+)
 ALARMS = sa.Table(
     "alarms",
     METADATA,
@@ -207,6 +216,24 @@ class Store:
             connection.execute(sa.delete(META).where(META.c.name == "epoch"))
             connection.execute(sa.insert(META).values(name="epoch", value=str(epoch)))
 
+    def keep_joints(self, joints: Mapping[Pair, Joint]) -> None:
+        """Store the angles of the joints, in the place of those stored before."""
+        rows = [
+            {"upper": upper, "lower": lower, "angle": joint.angle, "var": joint.var}
+            for (upper, lower), joint in joints.items()
+        ]
+        with self._writing() as connection:
+            connection.execute(sa.delete(JOINTS))
+            if rows:
+                connection.execute(sa.insert(JOINTS), rows)
+
+    def joints(self) -> dict[Pair, Joint]:
+        """Angles of the joints."""
+        if not self._has(JOINTS):
+            return {}
+        with self._refusing(), self._engine.connect() as connection:
+            return {(row.upper, row.lower): Joint(row.angle, row.var) for row in connection.execute(sa.select(JOINTS))}
+
     def epoch(self) -> int:
         """Epoch of rig time that was known last, 0 for none."""
         with self._refusing():
@@ -262,7 +289,7 @@ class Store:
 
     def alarms(self) -> list[CrewAlarm]:
         """Alarms of before, the oldest first; what is damaged is passed over and counted."""
-        if not self._has_alarms():
+        if not self._has(ALARMS):
             return []
         with self._refusing(), self._engine.connect() as connection:
             rows = connection.execute(sa.select(ALARMS).order_by(ALARMS.c.number)).all()
@@ -274,10 +301,10 @@ class Store:
                 self.damaged += 1
         return found
 
-    def _has_alarms(self) -> bool:
-        """Whether there is a table of alarms; a database of before that cannot be written has none."""
+    def _has(self, table: sa.Table) -> bool:
+        """Whether there is a table; a database of before that cannot be written lacks the later ones."""
         with self._refusing():
-            return sa.inspect(self._engine).has_table(ALARMS.name)
+            return sa.inspect(self._engine).has_table(table.name)
 
     def close(self) -> None:
         """Close every connection."""

@@ -9,7 +9,7 @@ from groundstation.service.depth import CONTRADICTION
 from groundstation.service.model import RigModel
 from groundstation.service.numbers import Range
 from groundstation.service.witnesses import Witnesses
-from groundstation.survey.joint_angles import JointAngles, RestingYaw
+from groundstation.survey.joint_angles import Pair, RestingYaw
 from groundstation.survey.trust import Trust, trust_of
 from telemetry.application.endpoint import SERIES_SHIFT
 from telemetry.application.seal_watch import CODE, refusal_of
@@ -54,7 +54,6 @@ class Watch:
         self._contradictions = 0
         self._gaps: dict[int, Gap] = {}
         self._witnesses = Witnesses()
-        self._joints = JointAngles()
         self._told_unplaced: set[int] = set()  # tubes
 
     def is_due(self, now: float) -> bool:
@@ -148,12 +147,12 @@ class Watch:
     def _look_at_joint(self, state: NodeState) -> None:
         """Tell where the yaws of two neighbours part."""
         if state.mode not in AT_REST or trust_of(state.flags) is not Trust.FULL:
-            self._joints.on_motion(state.tube)
+            self._model.joints.on_motion(state.tube)
             return
         yaw = RestingYaw(state.tube, state.at, state.yaw, state.yaw_var)
-        if change := self._joints.on_yaw(self._model.tally.tubes, yaw):
+        if change := self._model.joints.on_yaw(self._model.tally.tubes, yaw):
             what = f"the yaws part by {math.degrees(change.by):.1f} deg at {state.at:.0f} s"
-            self._alarms.alert("joint", f"joint of tubes {change.upper} and {change.lower}", what)
+            self._alarms.alert("joint", subject_of(change.pair), f"{what}; see the command accept_joints")
 
     def _gap_of(self, tube: int, now: float) -> Gap | None:
         numbers, known = self._model.numbers.gap(tube), self._gaps.get(tube)
@@ -220,3 +219,8 @@ class Watch:
                 missing = ", ".join(map(str, sorted(stop.missing)))
                 subject = f"stop at {stop.stand.md:.2f} m, {stop.stand.epoch}/{stop.stand.begun_at:.0f} s"
                 self._alarms.hold("survey_missing", subject, f"tubes {missing}" if missing else "")
+
+
+def subject_of(pair: Pair) -> str:
+    """What an alarm of a joint is about."""
+    return f"joint of tubes {pair[0]} and {pair[1]}"

@@ -35,28 +35,36 @@ class RestingYaw:
 
 @dataclass(frozen=True, slots=True)
 class JointChange:
-    """The joint below ``upper`` stands at another angle than before, by ``by`` (rad, in (-pi, pi])."""
+    """A joint stands at another angle than the known one, by ``by`` (rad, in [-pi, pi))."""
 
-    upper: int
-    lower: int
+    pair: Pair
     by: float
 
 
-@dataclass(slots=True)
+@dataclass(frozen=True, slots=True)
 class Joint:
-    """Angle (rad) and variance (rad^2) that were known first, and how often in a row another was seen since."""
+    """Angle (rad) at which a joint was known first, and its variance (rad^2)."""
 
     angle: float
     var: float
-    departed: int = 0
+
+
+Pair = tuple[int, int]  # upper and lower tube
 
 
 class JointAngles:
-    """Angles of every joint since the ground station's start."""
+    """Angles of every joint.
+
+    Attributes
+    ----------
+    known : joints by upper and lower tube, enough to go on with after a restart
+    """
 
     def __init__(self) -> None:
-        self._joints: dict[tuple[int, int], Joint] = {}
+        self.known: dict[Pair, Joint] = {}
         self._resting: dict[int, RestingYaw] = {}
+        self._differing: dict[Pair, int] = {}  # readings in a row that differ from what is known
+        self._departed: set[Pair] = set()
 
     def on_motion(self, tube: int) -> None:
         """A tube moves, or does not know its yaw."""
@@ -65,7 +73,7 @@ class JointAngles:
     def on_yaw(self, string: Sequence[int], yaw: RestingYaw) -> JointChange | None:
         """Compare the newest yaw of a resting tube with that of the tube above it.
 
-        A change is told once, from then on the new angle is the known one.
+        A change is told once until it is accepted: an angle that returns may be that of two yaws, wrong alike.
 
         Parameters
         ----------
@@ -74,23 +82,31 @@ class JointAngles:
         """
         self._resting[yaw.tube] = yaw
         neighbours = list(pairwise(string))
-        self._joints = {pair: joint for pair, joint in self._joints.items() if pair in neighbours}
-        upper = next((upper for upper, lower in neighbours if lower == yaw.tube), None)
-        above = None if upper is None else self._resting.get(upper)
+        for pair in [pair for pair in self.known if pair not in neighbours]:
+            self._forget(pair)
+        above = next((self._resting.get(upper) for upper, lower in neighbours if lower == yaw.tube), None)
         if above is None or abs(above.at - yaw.at) > APART:
             return None
-        by = self._compare_joint((above.tube, yaw.tube), float(wrap(yaw.yaw - above.yaw)), above.var + yaw.var)
-        return JointChange(above.tube, yaw.tube, by) if by else None
+        return self._compare((above.tube, yaw.tube), Joint(float(wrap(yaw.yaw - above.yaw)), above.var + yaw.var))
 
-    def _compare_joint(self, pair: tuple[int, int], angle: float, var: float) -> float:
-        """By how much (rad) a joint has changed, once that is sure; 0 while it is as it was."""
-        known = self._joints.setdefault(pair, Joint(angle, var))
-        by = float(wrap(angle - known.angle))
-        if abs(by) <= SIGMAS * math.sqrt(var + known.var) + SLACK:
-            known.departed = 0
-            return 0.0
-        known.departed += 1
-        if known.departed < AGREEING:
-            return 0.0
-        self._joints[pair] = Joint(angle, var)
-        return by
+    def accept(self) -> list[Pair]:
+        """Forget the angles of the joints that differ, whose next reading is the known one; returns these joints."""
+        departed = sorted(self._departed)
+        for pair in departed:
+            self._forget(pair)
+        return departed
+
+    def _compare(self, pair: Pair, seen: Joint) -> JointChange | None:
+        known = self.known.setdefault(pair, seen)
+        by = float(wrap(seen.angle - known.angle))
+        departs = abs(by) > SIGMAS * math.sqrt(seen.var + known.var) + SLACK
+        self._differing[pair] = self._differing.get(pair, 0) + 1 if departs else 0
+        if self._differing[pair] < AGREEING or pair in self._departed:
+            return None
+        self._departed.add(pair)
+        return JointChange(pair, by)
+
+    def _forget(self, pair: Pair) -> None:
+        self.known.pop(pair, None)
+        self._differing.pop(pair, None)
+        self._departed.discard(pair)

@@ -68,8 +68,7 @@ KINDS: tuple[FaultKind, ...] = (
     FaultKind("force-saturated", "an accelerometer is at its range", readings.sensor(readings.force_saturated)),
     FaultKind("not-finite", "a sensor gives readings that are no numbers", readings.sensor(readings.not_finite)),
     FaultKind("encoder-dead", "the encoder counts no more for a while", readings.encoder_dead),
-    # alone: a tube that starts afresh after the slip has no other yaw to compare with
-    FaultKind("encoder-slips", "the encoder loses its grip once", readings.encoder_slips, alone=True),
+    FaultKind("encoder-slips", "the encoder loses its grip once", readings.encoder_slips),
     FaultKind("depth-lost", "no depth is measured", readings.depth_lost),
     FaultKind("depth-jumps-up", "the depth is 1.5 m too small", readings.depth_off(-1.5)),
     FaultKind("depth-jumps-down", "the depth is 0.8 m too large", readings.depth_off(0.8)),

@@ -173,6 +173,12 @@ COMMANDS: tuple[CommandSpec, ...] = (
         action="confirm",
     ),
     CommandSpec(
+        "accept_joints",
+        ObeyedBy.GROUND,
+        "takes the angles of the joints as they are for right, after a joint was made up anew or its yaws were checked",
+        action="confirm",
+    ),
+    CommandSpec(
         "alarm",
         ObeyedBy.GROUND,
         "says that whoever orders it knows of the alarm; whoever does so later is told who was first",

@@ -39,8 +39,26 @@ def test_the_joint_below_the_tube_that_lies_is_named_once(
     assert told(log, offsets, [head] * 3) == []
     lied = [offset + lie if k >= place else offset for k, offset in enumerate(offsets)]
     (change,) = told(log, lied, [head] * (AGREEING + 3), since=100.0)
-    assert (change.upper, change.lower) == (STRING[place - 1], STRING[place])
+    assert change.pair == (STRING[place - 1], STRING[place])
     assert wrap(change.by - lie) == pytest.approx(0.0, abs=1e-9)
+
+
+def test_a_change_is_told_once_until_the_crew_accepts_the_angle() -> None:
+    log, lied = JointAngles(), (0.0, 1.0, 2.5, 3.5)
+    assert told(log, (0.0, 1.0, 2.0, 3.0), [0.0] * 3) == []
+    assert [change.pair for change in told(log, lied, [0.0] * 5, since=10.0)] == [(3, 2)]
+    assert told(log, (0.0, 1.0, 2.0, 3.0), [0.0] * 5, since=20.0) == []
+    assert told(log, lied, [0.0] * 5, since=30.0) == []
+    assert log.accept() == [(3, 2)]
+    assert told(log, lied, [0.0] * 5, since=40.0) == []
+
+
+def test_angles_that_were_kept_are_those_of_before() -> None:
+    log, later = JointAngles(), JointAngles()
+    assert told(log, (0.0, 1.0, 2.0, 3.0), [0.0] * 3) == []
+    later.known.update(log.known)
+    (change,) = told(later, (0.0, 1.0, 2.5, 3.5), [0.0] * 5, since=10.0)
+    assert change.pair == (3, 2)
 
 
 def test_two_readings_that_part_are_a_tube_that_has_not_settled() -> None:
