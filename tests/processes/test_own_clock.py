@@ -37,7 +37,7 @@ from telemetry.media.credentials import credentials_of
 from telemetry.media.neighbours import neighbour_ports
 from telemetry.media.zenoh_bus import ZenohBus, open_client, open_router
 from telemetry.media.zenoh_port import ZenohMedium
-from telemetry.messages import BASE, ENCODER, Command, Event, NodeFlag, NodeState, Reply, Side
+from telemetry.messages import BASE, ENCODER, EPOCH_UNKNOWN, Command, Event, NodeFlag, NodeState, Reply, Side
 from telemetry.runtime import event_loop
 from telemetry.runtime.own_clock import OwnClock, OwnClockLoop
 from telemetry.runtime.process import Process
@@ -150,7 +150,7 @@ def living(surface: Surface, bus: ZenohBus) -> Iterator[Surface]:
     thread.join()
 
 
-def test_a_node_finds_its_yaw_keeps_it_over_a_kill_and_ends_when_asked(
+def test_a_node_finds_its_yaw_keeps_it_over_kills_of_both_and_ends_when_asked(
     string: String, surface: Surface, tmp_path: Path
 ) -> None:
     string.start_encoder()
@@ -174,6 +174,11 @@ def test_a_node_finds_its_yaw_keeps_it_over_a_kill_and_ends_when_asked(
     assert event.tube == 1
     state = surface.first(NodeState, lambda s: s.flags & NodeFlag.RESTORED and not s.flags & UNFIT)
     assert abs(yaw_error(string.world, 1, state.yaw, state.at)) < 0.02
+
+    string.kill("encoder")
+    string.start_encoder()
+    again = surface.first(NodeState, lambda s: s.epoch not in (EPOCH_UNKNOWN, state.epoch) and not s.flags & UNFIT)
+    assert abs(yaw_error(string.world, 1, again.yaw, again.at)) < 0.02
 
     string.running["node"].send_signal(signal.SIGUSR1)
     while not (tmp_path / "node" / "timing.json").exists():

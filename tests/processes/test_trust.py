@@ -1,13 +1,14 @@
 """Who starts processes takes them along; a frozen one is ended and told; a rig has one ground station."""
 
 import os
+import resource
 import signal
 import subprocess
 from pathlib import Path
 from typing import Any
 
 import pytest
-from rigs import REPOSITORY, command, ends, free_endpoint, running_rig, titles_of_group
+from rigs import REPOSITORY, Rig, command, ends, free_endpoint, running_rig, titles_of_group
 
 from groundstation.errors import LeaseError
 from groundstation.gateway.lease import take_lease
@@ -34,6 +35,25 @@ def test_a_node_that_is_frozen_is_ended_started_again_and_told(tmp_path: Path, a
         os.kill(rig.pid_of("borechain node 1"), signal.SIGSTOP)
         result = rig.result()
     assert result["restarts"] >= 1
+    assert result["measurements"] == 6
+
+
+def test_a_ground_station_on_a_full_disk_stays_readable_says_so_and_loses_no_survey(tmp_path: Path, ask: Any) -> None:
+    """A quota of the system stands for the full disk: the file can be written to and takes no byte more."""
+
+    def is_told(rig: Rig) -> bool:
+        return "disk" in {row["code"] for row in ask(rig, "borechain/*/ground/alarms")["rig"]}
+
+    with running_rig(tmp_path, "--speed", "20") as rig:
+        rig.until(lambda: (ask(rig, "borechain/*/ground/status") or {}).get("measurements"))
+        ground = rig.pid_of("borechain ground")
+        before = resource.prlimit(ground, resource.RLIMIT_FSIZE, (0, resource.RLIM_INFINITY))
+        rig.until(lambda: is_told(rig))
+        assert ask(rig, "borechain/*/ground/stations")["stations"]
+        resource.prlimit(ground, resource.RLIMIT_FSIZE, before)
+        rig.until(lambda: not is_told(rig))
+        result = rig.result()
+    assert result["restarts"] == 0
     assert result["measurements"] == 6
 
 
