@@ -5,7 +5,7 @@ from __future__ import annotations
 import contextlib
 import math
 import sqlite3
-from collections.abc import Iterator
+from collections.abc import Collection, Iterator
 from typing import Any
 
 import msgpack
@@ -52,6 +52,7 @@ class Observer:
         self._kept: tuple[bytes, set[tuple[int, int, str]]] = (b"", set())
         self.found: list[str] = []
         rig.channel.listeners.append(self.on_frame)
+        rig.before_cut.append(self._see_alarms)  # what the crew has seen does not go with the power
 
     def look(self) -> None:
         """Look now."""
@@ -119,16 +120,21 @@ class Observer:
                 yield f"tube {tube} without power is shown fresh"
 
 
-def violations(rig: GauntletRig) -> list[str]:
-    """Every oracle that does not hold at the end, in words."""
+def violations(rig: GauntletRig, seen: Collection[str] = ()) -> list[str]:
+    """Every oracle that does not hold at the end, in words; ``seen`` are the alarms that the crew saw meanwhile.
+
+    Events are not sent again, so an alarm that rests on them is lost with a database that somebody deletes or replaces
+    under a crew that has seen it.
+    """
     shown = rig.inline.ask("alarms")
     standing = {row["code"] for row in shown["rig"]}
+    warned = standing | (set(seen) if rig.disk(BASE).handled else set())
     told = standing | {row["code"] for row in shown["rig_cleared"]}
     rows = rig.inline.ask("measurements")["measurements"]
     return [
         *_each_once(rows),
         *(() if standing & DEPTH else _depths(rows, rig.world)),
-        *(() if standing & YAW and rig.world.misled else _directions(rig)),
+        *(() if warned & YAW and rig.world.misled else _directions(rig)),
         *_flags(rig.inline.ground.model),
         *_missing(rows, rig.world, standing | (told & {"depth_refused"})),
         *_health(rig.inline.ask("status")["health"], standing),

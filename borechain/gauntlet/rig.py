@@ -77,6 +77,7 @@ class GauntletRig:
         self._builders = dict(self.stepper.builders)
         self._folder, self._seed, self._strangers = folder, seed, itertools.count()
         self.off: dict[int, float] = {}  # since when (s), by address
+        self.before_cut: list[Callable[[], None]] = []
         self._numbers = {address: address for address in disks}  # that the processes in their places give themselves
         self._spoke_until: dict[int, float] = {}  # s, by number
         self._look_at = world.begin
@@ -100,6 +101,8 @@ class GauntletRig:
         """Power off; nothing where it is off already."""
         if address not in self.scheduler.progress.wanted:
             return
+        for listener in self.before_cut:
+            listener()
         self._disks[address].cut()
         if address == BASE and self.ground is not None:
             self.ground.store.close()

@@ -95,7 +95,7 @@ def _run(rig: GauntletRig, outcome: Outcome) -> None:
     outcome.alarms = sorted({code for code, _, _, standing in rows if standing})
     outcome.cleared = sorted({code for code, _, _, standing in rows if not standing})
     outcome.measurements = len(rig.inline.ask("measurements")["measurements"])
-    outcome.violations = [*observer.found, *violations(rig)]
+    outcome.violations = [*observer.found, *violations(rig, observer.told)]
 
 
 @contextlib.contextmanager

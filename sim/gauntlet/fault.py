@@ -71,15 +71,13 @@ Draw = Callable[[np.random.Generator, float, float], list[Step]]
 class FaultKind:
     """One kind: what happens in words, its steps between two rig times (s), and within what time (s) all is well again.
 
-    Well is what the crew is told of all that was lost, and what can be repaired is. A kind that is ``alone`` comes with
-    no other.
+    Well is what the crew is told of all that was lost, and what can be repaired is.
     """
 
     name: str
     meaning: str
     draw: Draw
     recovery: float = 24.0
-    alone: bool = False
 
 
 def during(

@@ -46,8 +46,7 @@ KINDS: tuple[FaultKind, ...] = (
         power.power_cut([BASE], power.restore_backup),
         LOST_DATABASE,
     ),
-    # alone: a node whose clock jumps while it turns and hears no encoder is off by what it would have turned
-    FaultKind("clock-jumps", "the clock of a process jumps ahead by up to 20 s", joints.clock_jumps, alone=True),
+    FaultKind("clock-jumps", "the clock of a process jumps ahead by up to 20 s", joints.clock_jumps),
     FaultKind("clock-drifts", "the clock of a process runs up to 0.1 % fast or slow", joints.clock_drifts),
     FaultKind("loss", "30 % of the frames are lost", joints.frames(loss=0.3)),
     FaultKind("bursts", "20 frames in a row are lost, now and then", joints.frames(burst=0.02)),

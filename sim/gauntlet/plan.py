@@ -8,7 +8,6 @@ from sim.gauntlet.fault import Step
 from sim.gauntlet.kinds import KINDS
 from sim.world.streams import Stream, stream
 
-ALONE = frozenset(kind.name for kind in KINDS if kind.alone)
 TOGETHER = 3.0  # kinds switched on in a seed, on the average
 
 
@@ -19,9 +18,7 @@ def drawn_kinds(seed: int, allowed: Sequence[str]) -> tuple[str, ...]:
         zip((kind.name for kind in KINDS), stream(seed, Stream.GAUNTLET, 0).random(len(KINDS)), strict=True)
     )
     on = tuple(name for name in switches if name in allowed and switches[name] < share)
-    on = on or (min(allowed, key=lambda name: switches[name]),)
-    alone = [name for name in on if name in ALONE]
-    return (alone[0],) if alone else on
+    return on or (min(allowed, key=lambda name: switches[name]),)
 
 
 def steps_of(seed: int, kinds: Sequence[str], begin: float, end: float) -> list[tuple[str, Step]]:

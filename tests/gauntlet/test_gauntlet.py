@@ -60,6 +60,8 @@ def test_combined_seeds_hold(first: int) -> None:
     [
         (20205, ("node-cut", "database-deleted", "splice")),  # a recorded state kept a dead tube fresh
         (20063, ("bytes-rot", "same-number")),  # a stranger spoke for a tube without power
+        (50000, ("encoder-slips", "frozen")),  # the one that saw it stood alone
+        (50001, ("encoder-slips", "cut-while-saving")),  # the yaws of two neighbours parted at rest
     ],
 )
 def test_seeds_that_failed_once_hold(seed: int, kinds: tuple[str, ...]) -> None:
