@@ -80,6 +80,15 @@ class FaultyWorld(World):
         self.depth_error = 0.0
         self.depth_hidden = False
 
+    def drift(self, address: int, t: float, rate: float) -> None:
+        """Have the clock of a process run fast from rig time ``t`` (s) of the truth on, by ``rate`` s a second.
+
+        What it has gained by a drift of before it keeps: a clock does not run backwards.
+        """
+        since, before = self.drifts.get(address, (t, 0.0))
+        self.jumps[address] = self.jumps.get(address, 0.0) + before * max(t - since, 0.0)
+        self.drifts[address] = (t, rate)
+
     def local_clock(self, address: int, t: float) -> float:
         """What the clock of a process shows at rig time ``t`` (s) of the truth."""
         shown = t - self.zero if address == ENCODER else super().local_clock(address, t)

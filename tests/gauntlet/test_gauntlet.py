@@ -1,16 +1,21 @@
 """The gauntlet itself: it repeats, it finds what is planted, and its table is whole."""
 
 import json
+from functools import cache
 
 import numpy as np
 import pytest
 from click.testing import CliRunner
+from hypothesis import given
+from hypothesis import strategies as st
 
 from borechain.cli.gauntlet.gauntlet import gauntlet
 from borechain.gauntlet.run import ALL, USUAL, judged, run_seed
 from sim.gauntlet.kinds import KINDS
 from sim.gauntlet.plan import drawn_kinds, steps_of
+from sim.gauntlet.world import MINUTE, FaultyWorld
 from sim.world.streams import stream
+from telemetry.messages import BASE, ENCODER
 
 COMBINED, CHUNK = 60, 20  # seeds in all, and of one test; `make study` runs thousands
 
@@ -35,6 +40,27 @@ def test_seeds_switch_on_different_mixtures_and_always_something() -> None:
     assert len(mixtures) > 150
     assert all(mixtures)
     assert 1.5 < np.mean([len(kinds) for kinds in mixtures]) < 5.0
+
+
+@given(
+    st.sampled_from((BASE, ENCODER, 1)),
+    st.lists(st.tuples(st.floats(0.1, 1e5), st.floats(-1e-3, 1e-3)), min_size=1, max_size=6),
+)
+def test_a_clock_whose_drift_changes_never_runs_backwards(address: int, drifts: list[tuple[float, float]]) -> None:
+    world = a_world().healthy()
+    t = before = 0.0
+    shown = world.local_clock(address, t)
+    for lasting, rate in drifts:
+        t += lasting
+        world.drift(address, t, rate)
+        assert world.local_clock(address, t) - shown == pytest.approx(t - before, rel=2e-3)
+        before, shown = t, world.local_clock(address, t)
+        assert world.true_time(address, shown) == pytest.approx(t, abs=1e-6)
+
+
+@cache
+def a_world() -> FaultyWorld:
+    return FaultyWorld.of_tables(MINUTE, 1)
 
 
 @pytest.mark.slow
