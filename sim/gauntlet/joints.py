@@ -78,4 +78,4 @@ def clock_drifts(random: np.random.Generator, begin: float, end: float) -> list[
     """The clock of a process begins to run up to 0.1 % fast or slow."""
     address, rate = int(random.choice(EVERYBODY)), float(random.uniform(-1e-3, 1e-3))
     at, _ = during(random, begin, end, 1.0, 1.0)
-    return [Step(at, lambda rig: rig.world.drift(address, rig.now, rate))]
+    return [Step(at, lambda rig: rig.world.let_drift(address, rig.now, rate))]

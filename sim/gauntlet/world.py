@@ -80,7 +80,7 @@ class FaultyWorld(World):
         self.depth_error = 0.0
         self.depth_hidden = False
 
-    def drift(self, address: int, t: float, rate: float) -> None:
+    def let_drift(self, address: int, t: float, rate: float) -> None:
         """Have the clock of a process run fast from rig time ``t`` (s) of the truth on, by ``rate`` s a second.
 
         What it has gained by a drift of before it keeps: a clock does not run backwards.

@@ -52,7 +52,7 @@ def test_a_clock_whose_drift_changes_never_runs_backwards(address: int, drifts: 
     shown = world.local_clock(address, t)
     for lasting, rate in drifts:
         t += lasting
-        world.drift(address, t, rate)
+        world.let_drift(address, t, rate)
         assert world.local_clock(address, t) - shown == pytest.approx(t - before, rel=2e-3)
         before, shown = t, world.local_clock(address, t)
         assert world.true_time(address, shown) == pytest.approx(t, abs=1e-6)
