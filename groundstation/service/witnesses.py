@@ -77,5 +77,5 @@ class Witnesses:
         return ("", -math.inf) if start is None else (start.code, start.at)
 
     def _has_watched(self, tube: int, event: Event) -> bool:
-        """Whether a tube ran all the time before an event in which it could have seen the same."""
-        return self._blind_until.get((tube, event.epoch), -math.inf) < event.at - TOGETHER
+        """Whether a tube had settled, or had long gone on, before an event, so that it could have seen the same."""
+        return self._blind_until.get((tube, event.epoch), -math.inf) < event.at - SETTLED_AFTER

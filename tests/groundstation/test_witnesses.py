@@ -32,7 +32,7 @@ def test_a_gyroscope_that_stands_alone_against_the_encoder_and_another_tube_is_w
 @pytest.mark.parametrize(
     "blind",
     [
-        event(2, 80.0, "booted", 9),
+        event(2, 91.0, "booted", 9),
         event(2, 99.0, "restored", 9),
         event(2, 103.0, "restored", 9),
         event(2, 60.0, "overrun", 9, missed=100),
@@ -42,6 +42,10 @@ def test_a_gyroscope_that_stands_alone_against_the_encoder_and_another_tube_is_w
 def test_a_tube_that_has_not_watched_is_no_witness_for_the_encoder_in_whatever_order_they_say_so(blind: Event) -> None:
     for events in permutations([blind, event(1, 100.0, "yaw_reset")]):
         assert told([*BOTH_STARTED, *events]) == ["tubes 1 at 100 s"]
+
+
+def test_a_tube_that_has_settled_since_its_start_is_a_witness() -> None:
+    assert told([*BOTH_STARTED, event(2, 89.0, "restored", 9), event(1, 100.0, "yaw_reset")]) == []
 
 
 def test_a_scale_that_changed_is_the_gyroscopes_own_even_where_nobody_else_has_watched() -> None:
