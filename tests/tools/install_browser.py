@@ -35,7 +35,7 @@ def main() -> None:
     settings = {**os.environ, "DEBIAN_FRONTEND": "noninteractive"}
     for words in (["update"], ["install", "--yes", "--no-install-recommends", "chromium", "fonts-dejavu-core"]):
         done = subprocess.run(
-            [*before, apt, "--quiet=2", *words],
+            [*before, apt, "--quiet=2", "-o", "DPkg::Lock::Timeout=120", *words],
             env=settings,
             stdin=subprocess.DEVNULL,
             capture_output=True,
