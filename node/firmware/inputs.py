@@ -17,7 +17,9 @@ class ImuReading:
     rate: tuple[float, float, float]  # rad/s
     force: tuple[float, float, float]  # m/s^2
     temperature: float = USUAL  # C
-    saturated: bool = False  # a sample within the cycle was at the gyroscope's range, as the driver saw it
+    saturated: int = (
+        0  # bits of what was at its range within the cycle, as the driver saw it: 1 gyroscope, 2 accelerometer
+    )
     others: tuple[ImuReading, ...] = ()  # of the further IMUs of a cluster, in the same cycle
 
 

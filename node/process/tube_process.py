@@ -373,12 +373,17 @@ def reading_of(data: Any, now: float) -> ImuReading:
 
 
 def imu_reading(items: Any, start: float, end: float) -> ImuReading:
-    """Reading of one IMU from ``start`` to ``end`` (s, own clock): three rates, three forces, perhaps a temperature."""
+    """Reading of one IMU from ``start`` to ``end`` (s, own clock): three rates, three forces.
+
+    Perhaps a temperature follows, and bits of what was at its range within the cycle.
+    """
     try:
         numbers = [float(item) for item in items]
     except (TypeError, ValueError, OverflowError):
         numbers = []
-    if not 6 <= len(numbers) <= 7:
+    if not 6 <= len(numbers) <= 8:
         return ImuReading(start, end, NOTHING, NOTHING)
     wx, wy, wz, fx, fy, fz, *rest = numbers
-    return ImuReading(start, end, (wx, wy, wz), (fx, fy, fz), rest[0] if rest else USUAL)
+    clipped = int(rest[1]) if len(rest) > 1 and math.isfinite(rest[1]) else 0
+    temperature = rest[0] if rest else USUAL
+    return ImuReading(start, end, (wx, wy, wz), (fx, fy, fz), temperature, clipped)

@@ -109,6 +109,7 @@ def refuse_others(scenario: Scenario) -> None:
         "torsion": file.torsion is not None,
         "calibration": file.calibration is not None,
         "drift": file.drift is not None,
+        "rough": file.rough is not None,
         "faults": bool(scenario.faults),
         "joints.unseen_std_deg": file.joints.unseen_std_deg > 0.0,
         "joints.head_turn_deg": file.joints.head_turn_deg > 0.0,

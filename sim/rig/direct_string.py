@@ -30,6 +30,7 @@ from node.kernels.record import (
     JOINED,
     MOMENT,
     READING,
+    SATURATED,
     START,
     SYNCHRONISED,
     TEMPERATURE,
@@ -40,6 +41,7 @@ from node.kernels.string import string_aiding, string_step
 from sim.errors import ScenarioError
 from sim.rig.plain_encoder import PlainEncoder
 from sim.world.imu_errors import gauss_markov
+from sim.world.rough_imu import GYRO_CLIPPED
 from sim.world.scenario import AidingSection
 from sim.world.streams import Stream, stream
 from sim.world.world import World
@@ -225,6 +227,10 @@ class DirectString:
         readings[..., TEMPERATURE] = USUAL
         for tube in self.tubes:
             readings[:, tube - 1, 0, :TEMPERATURE] = world.imu_samples(tube)
+            if world.scenario.file.rough is not None:
+                found = world.rough_cycles(tube)
+                readings[:, tube - 1, 0, TEMPERATURE] = found.temperature
+                readings[:, tube - 1, 0, SATURATED] = found.clipped & GYRO_CLIPPED
         crews = np.concatenate([tube.crew for tube in self.tubes.values()])
         return Tables(crews, readings, np.zeros((count, MOMENT)), np.zeros(count, np.int64))
 
@@ -268,8 +274,8 @@ class DirectString:
         begin, end = self.world.cycle_end(cycle - 1) + phase, self.world.cycle_end(cycle) + phase
         shift = self.clock_shifts.get(tube, 0.0)
         sample = self.world.imu_sample(tube, cycle)
-        wx, wy, wz, fx, fy, fz = sample if self._spoil is None else self._spoil(tube, cycle, sample)
-        reading = ImuReading(begin + shift, end + shift, (wx, wy, wz), (fx, fy, fz))
+        wx, wy, wz, fx, fy, fz, *more = sample if self._spoil is None else self._spoil(tube, cycle, sample)
+        reading = ImuReading(begin + shift, end + shift, (wx, wy, wz), (fx, fy, fz), *more)
         return self.tubes[tube].on_cycle(reading, self._context(tube, string[0], end))
 
     def _context(self, tube: int, top: int, end: float) -> RigContext:

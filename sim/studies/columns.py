@@ -145,3 +145,18 @@ FIXED_POINT_NEES: Columns = (
     ("nees_turning", "turning"),
     ("nees_total", "with joints"),
 )
+FIELD: Columns = (
+    ("case", "disturbance"),
+    ("yaw_rms_turning_deg", "yaw rms turning, deg"),
+    ("yaw_rms_rest_deg", "at rest, deg"),
+    ("nees_turning", "NEES turning"),
+    ("nees_rest", "at rest"),
+    ("unflagged_percent", "unflagged beyond 3 sigma, %"),
+    ("told_percent", "told of, %"),
+    ("gyro_step", "gyro_step a run"),
+    ("gyro_scale", "gyro_scale"),
+    ("other_faults", "others"),
+    ("surveys_percent", "surveys, %"),
+    ("azimuth_rms_deg", "azimuth rms, deg"),
+    ("reached", "reached"),
+)

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from sim.named import by_name
 from sim.studies import columns
+from sim.studies.field.cases import ALL, KEYS
 from sim.studies.study import MODULES, Option, Study, Table
 
 SEEDS = Option("seeds", 40, 2, 10_000)
@@ -170,6 +171,16 @@ STUDIES = by_name(
             (SEEDS,),
             full=("--seeds 240",),
             short="--seeds 2",
+        ),
+        Study(
+            "field",
+            "What a node makes of a field's world, disturbance by disturbance: honesty, flags, false faults, surveys.",
+            f"{MODULES}.field",
+            (Table("Field, {seeds} seeds", columns.FIELD, columns.FIELD),),
+            (Option("disturbance", ALL, choices=KEYS), Option("seeds", 20, 2, 10_000)),
+            drawn=False,
+            full=("--seeds 20",),
+            short="--seeds 2 --disturbance random-phase",
         ),
         Study(
             "alignment",

@@ -18,6 +18,7 @@ from sim.errors import ScenarioError
 
 Array = npt.NDArray[np.float64]
 STRAIGHT = 1e-12  # rad, below which an arc is a line
+SPIRAL_STATIONS = 61
 LARGEST_TURN = math.radians(90.0)  # between two stations; beyond, the path turns back
 
 
@@ -59,6 +60,12 @@ class Borehole:
     def straight(cls, inclination: float, azimuth: float = 0.0, length: float = 1000.0) -> Borehole:
         """A hole of ``length`` (m) in one direction (rad)."""
         return cls(np.array([0.0, length]), np.full(2, inclination), np.full(2, azimuth))
+
+    @classmethod
+    def spiral(cls, inclination: float, azimuth: float, turn: float, length: float) -> Borehole:
+        """A hole of ``length`` (m) and one ``inclination`` whose azimuth goes on by ``turn`` (rad) evenly."""
+        md = np.linspace(0.0, length, SPIRAL_STATIONS)
+        return cls(md, np.full(len(md), inclination), azimuth + turn * md / length)
 
     def _check(self, inclination: Array, azimuth: Array, where: str) -> None:
         if len(self.md) < 2:

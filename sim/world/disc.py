@@ -24,6 +24,10 @@ class Disc:
     edge_std : rad, error of a line's place, constant for every line
     random : stream of the places
     turned_at, turned_by : (k,) s and rad >= 0, jumps of the head while it is free of the string
+
+    Attributes
+    ----------
+    errors : (counts_per_turn,) rad, of each line's place
     """
 
     def __init__(
@@ -40,7 +44,7 @@ class Disc:
         self._jumps = tuple(zip(turned_at, turned_by, strict=True))
         self._quantum = math.tau / counts_per_turn
         limit = 0.4 * self._quantum  # lines do not change places
-        self._errors = np.clip(edge_std * random.standard_normal(counts_per_turn), -limit, limit)
+        self.errors: Array = np.clip(edge_std * random.standard_normal(counts_per_turn), -limit, limit)
 
     def angles(self, t: Array) -> Array:
         """Of the head (n,) rad, unwrapped, at rig times ``t`` (n,) s, its free turns included."""
@@ -77,7 +81,7 @@ class Disc:
         return self._motion.times_of_angles(self._places(counts))
 
     def _places(self, counts: npt.NDArray[np.int64]) -> Array:
-        return np.asarray(counts * self._quantum + self._errors[counts % len(self._errors)])
+        return np.asarray(counts * self._quantum + self.errors[counts % len(self.errors)])
 
     def _time_of(self, angle: float) -> float:
         """When the head was at ``angle`` first: inside a jump at its time, else when the string got so far."""
@@ -93,4 +97,4 @@ class Disc:
 
     def _place(self, count: int) -> float:
         """Angle (rad) at which the edge that makes ``count`` passes."""
-        return count * self._quantum + float(self._errors[count % len(self._errors)])
+        return count * self._quantum + float(self.errors[count % len(self.errors)])

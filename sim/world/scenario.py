@@ -17,6 +17,7 @@ from sim.world.borehole import Borehole, read_displacements, read_stations
 from sim.world.parsing import read_toml, validate
 from sim.world.radio import check_radio
 from sim.world.radio_section import RadioSection
+from sim.world.rough_section import RoughSection
 from sim.world.section import Angle, NotNegative, Positive, Probability, Section, Triple
 from sim.world.shipped import find_scenario
 from telemetry.errors import RadioError
@@ -47,12 +48,21 @@ class StraightSection(Section):
     azimuth_deg: Angle = 0.0
 
 
+class SpiralSection(Section):
+    """A hole of one inclination whose azimuth turns evenly over its length."""
+
+    inclination_deg: float = Field(0.0, ge=0.0, le=90.0)
+    azimuth_deg: Angle = 0.0
+    turn_deg: Angle = Field(0.0, description="of the azimuth, from the collar to the last bit's depth")
+
+
 class PathSection(Section):
-    """The hole; exactly one of the three, files relative to the scenario."""
+    """The hole; exactly one of the four, files relative to the scenario."""
 
     displacements: str | None = Field(None, description="CSV md_m,a_cm,b_cm: lateral displacement over one interval")
     stations: str | None = Field(None, description="CSV md_m,inclination_deg,azimuth_deg")
     straight: StraightSection | None = Field(None, description="a hole in one direction, as long as it takes")
+    spiral: SpiralSection | None = Field(None, description="a hole whose azimuth turns, as long as it takes")
 
 
 class ScheduleSection(Section):
@@ -276,6 +286,7 @@ class ScenarioFile(Section):
     design: DesignSection = DesignSection()
     drift: DriftSection | None = None
     calibration: CalibrationSection | None = None
+    rough: RoughSection | None = Field(None, description="what a field does to the string; without this table nothing")
     faults: tuple[str, ...] = ()
 
 
@@ -322,6 +333,7 @@ def _checked(path: Path, file: ScenarioFile, faults: tuple[str, ...]) -> Scenari
     _check_link(path, file)
     _check_torsion(path, file)
     _check_radio(path, file)
+    _check_rough(path, file)
     if len(file.node.imu_noise) not in (0, file.node.imus):
         raise ScenarioError(
             f"{path}: node.imu_noise: expected {file.node.imus} factors, one for each of node.imus, "
@@ -445,6 +457,31 @@ def _check_radio(path: Path, file: ScenarioFile) -> None:
         raise ScenarioError(f"{path}: radio: {error}") from error
 
 
+def _check_rough(path: Path, file: ScenarioFile) -> None:
+    """What the grid of a rough world does not hold is refused beside it."""
+    if file.rough is None:
+        return
+    vibration = file.rough.vibration
+    lowest, highest = vibration.lowest_hz, vibration.highest_hz
+    shaken = vibration.turning_g or vibration.resting_g or vibration.torsional_dps
+    if shaken and not lowest < highest <= 0.5 * file.rough.samples_hz:
+        raise ScenarioError(
+            f"{path}: rough.vibration: expected lowest_hz below highest_hz and this at most half of samples_hz = "
+            f"{file.rough.samples_hz:g}, got {lowest:g} and {highest:g}"
+        )
+    usual = {
+        "calibration": file.calibration is None,
+        "joints.head_turn_deg": file.joints.head_turn_deg == 0.0,
+        "encoder.edge_times": file.encoder.edge_times,
+        "gyroscope.instantaneous": not file.gyroscope.instantaneous,
+    }
+    for key, holds in usual.items():
+        if not holds:
+            raise ScenarioError(
+                f"{path}: {key}: expected no such setting beside the table rough; leave out one of them"
+            )
+
+
 def _check_calibration(path: Path, section: CalibrationSection | None) -> None:
     if section is None:
         return
@@ -464,9 +501,17 @@ def _check_calibration(path: Path, section: CalibrationSection | None) -> None:
 
 def _hole(path: Path, section: PathSection, length: float) -> Borehole:
     files = [name for name in (section.displacements, section.stations) if name is not None]
-    given = len(files) + (section.straight is not None)
+    given = len(files) + (section.straight is not None) + (section.spiral is not None)
     if given != 1:
-        raise ScenarioError(f"{path}: path: expected exactly one of displacements, stations and straight, got {given}")
+        raise ScenarioError(
+            f"{path}: path: expected exactly one of displacements, stations, straight and spiral, got {given}"
+        )
+    if section.spiral is not None:
+        spiral = section.spiral
+        inclination, azimuth, turn = (
+            math.radians(angle) for angle in (spiral.inclination_deg, spiral.azimuth_deg, spiral.turn_deg)
+        )
+        return Borehole.spiral(inclination, azimuth, turn, max(length, 1.0))
     if section.straight is not None:
         straight = section.straight
         end = max(length, 1.0)

@@ -34,6 +34,13 @@ class Stream(IntEnum):
     RADIO_BURSTS = 24
     GAUNTLET = 25  # 0: which kinds of faults, 1: when and what, 2: ports, 3: strangers, 4: disks, 5: disks before
     LOTS = 26  # of starts that are numbered by lot
+    ROUGH_STOPS = 40  # how far a string runs on into its play
+    ROUGH_ENCODER = 41  # where a disc is off its centre
+    ROUGH_OUTLIERS = 42  # of the encoder, by the time of the reading
+    ROUGH_VIBRATION = 43  # tube, IMU; 0: about the axis, 1: of the forces
+    ROUGH_FRAMES = 44  # phase of a FIFO
+    ROUGH_JITTER = 45  # of an IMU's time stamps
+    ROUGH_PULL = 46  # of the force on a gyroscope's axes
     WELLS = 2000  # a string in one of many wells, for the coverage of ellipses
     TURN_TABLE = 3001  # a gyroscope and its table
     ROBOT_ARM = 3002  # an accelerometer and its arm

@@ -21,6 +21,10 @@ from sim.world.imu_errors import Drift, ImuErrors, single_samples
 from sim.world.motion import Motion, Phase, Trapezoid
 from sim.world.rack import Rack
 from sim.world.radio import RadioLinks
+from sim.world.rough_imu import GYRO_CLIPPED, Cycles
+from sim.world.rough_run import RoughRun
+from sim.world.rough_section import RoughSection
+from sim.world.rough_truth import RoughTruth
 from sim.world.scenario import Scenario
 from sim.world.streams import Stream, stream
 from sim.world.torsion import StringTorsion, stiffness
@@ -86,6 +90,8 @@ class World:
         self.faults: tuple[KillNode, ...] = scenario.faults
         self._noises = file.node.imu_noise or (1.0,) * file.node.imus
         self._samples: dict[tuple[int, int], Array] = {}
+        self._rough_cycles: dict[tuple[int, int], Cycles] = {}
+        self._rough_truths: dict[int, RoughTruth] = {}
         edge_std = math.radians(file.encoder.edge_std_deg)
         free_at = (self._made_up - FREE_BEFORE).tolist() if file.joints.head_turn_deg else []
         free_by = self._free_turns.tolist() if file.joints.head_turn_deg else []
@@ -115,22 +121,34 @@ class World:
     def imu_sample(self, tube: int, cycle: int) -> list[Any]:
         """Three mean rates (rad/s) and three mean specific forces (m/s^2) of one cycle, errors and all.
 
-        Of several IMUs a list of such lists.
+        In a rough world temperature (C) and bits of what was clipped follow. Of several IMUs a list of such lists.
         """
-        one, *others = [self.imu_samples(tube, imu)[cycle].tolist() for imu in range(len(self._noises))]
+        one, *others = [self._imu_sample(tube, cycle, imu) for imu in range(len(self._noises))]
         return [one, *others] if others else one
+
+    def _imu_sample(self, tube: int, cycle: int, imu: int) -> list[Any]:
+        sample: list[Any] = self.imu_samples(tube, imu)[cycle].tolist()
+        if self.scenario.file.rough is None:
+            return sample
+        found = self.rough_cycles(tube, imu)
+        return [*sample, float(found.temperature[cycle]), int(found.clipped[cycle]) & GYRO_CLIPPED]
 
     def encoder_sample(self, t: float) -> tuple[int, float, int, float | None, tuple[float, ...]]:
         """Count, rig time of its last edge, 1 (the string turns one way, so every edge rises), torque, earlier edges.
 
-        A rig of a rigid string, or one that is to ignore its torsion, has no torque (N m): None.
+        A rig of a rigid string, or one that is to ignore its torsion, has no torque (N m): None. In a rough world an
+        edge may fall.
         """
-        count, edge_at, earlier = self.disc.sample(t, self._head_angles.get(t))
+        rising = 1
+        if self.scenario.file.rough is not None:
+            count, edge_at, rising, earlier = self.rough_run.disc.sample(t)
+        else:
+            count, edge_at, earlier = self.disc.sample(t, self._head_angles.get(t))
         if t <= self.motion.begin:
             edge_at = self.begin
         if self.torsion is None or self.scenario.file.node.torsion == "ignore":
-            return count, edge_at, 1, None, earlier
-        return count, edge_at, 1, float(self.torsion.torque(np.array([t]))[0]), earlier
+            return count, edge_at, rising, None, earlier
+        return count, edge_at, rising, float(self.torsion.torque(np.array([t]))[0]), earlier
 
     def bit_depth(self, t: float) -> float:
         """Measured depth of the bit, m."""
@@ -175,10 +193,17 @@ class World:
         std = math.radians(self.scenario.file.joints.reading_std_deg)
         drive, lower = self._joint_angles
         drive_error, lower_error = self._joint_errors
+        misread = self._misread(tube)
         return PassedTube(
-            Joint(wrap(drive[tube] - self._turned_before(tube) + drive_error[tube]), std),
+            Joint(wrap(drive[tube] - self._turned_before(tube) + drive_error[tube] + misread), std),
             Joint(wrap(lower[tube] + lower_error[tube]), std),
         )
+
+    def _misread(self, tube: int) -> float:
+        """Blunder (rad) in the mark between the head and a tube: of the first that is added, or that is there."""
+        rough, rig = self.scenario.file.rough, self.scenario.file.rig
+        first = min(max(rig.tubes_at_start, 1) + 1, rig.tubes)
+        return math.radians(rough.string.wrong_mark_deg) if rough is not None and tube == first else 0.0
 
     def _radio_links(self) -> RadioLinks | None:
         section = self.scenario.file.radio
@@ -250,7 +275,37 @@ class World:
         joint = self.frame_angle(tube)
         twist = None if self.torsion is None else partial(self.torsion.twist, tube)
         slips = partial(self.unseen, tube) if self.scenario.file.joints.unseen_std_deg else None
-        return TubeTruth(self.scenario.hole, self.motion, below, joint, a.radius_m, a.gravity_mps2, twist, slips)
+        hole, motion = self.scenario.hole, self.motion
+        if self.scenario.file.rough is None:
+            return TubeTruth(hole, motion, below, joint, a.radius_m, a.gravity_mps2, twist, slips)
+        return self._rough_truth(tube, joint, a.radius_m, a.gravity_mps2, slips)
+
+    def rough_cycles(self, tube: int, imu: int = 0) -> Cycles:
+        """Readings of a tube in a rough world, cycle by cycle, with temperature and what was clipped."""
+        rough = self.rough_run
+        if (tube, imu) not in self._rough_cycles:
+            file, ends = self.scenario.file, self.ends + self.phase(tube)
+            rate, force = rough.perfect(self.truth(tube), self.imu_frame(tube, imu))
+            bias = np.zeros((len(ends), 3))
+            bias[:, 2] = self._bias_step(ends)
+            if (drift := self.drift(tube, imu)) is not None:
+                bias, force = bias + drift.rate, force @ drift.matrix.T + drift.bias
+            errors = ImuErrors(file.gyroscope, file.accelerometer).times(self._noises[imu])
+            self._rough_cycles[tube, imu] = rough.imu(errors, tube, imu).cycles(rate, force, ends, bias)
+        return self._rough_cycles[tube, imu]
+
+    @cached_property
+    def rough_run(self) -> RoughRun:
+        """What the table ``rough`` makes of this run."""
+        section = self.scenario.file.rough or RoughSection()
+        return RoughRun(section, self.motion, self.begin, self.seed, self.disc.errors)
+
+    def _rough_truth(self, tube: int, *given: Any) -> RoughTruth:
+        if tube not in self._rough_truths:
+            twist = None if self.torsion is None else partial(self.torsion.twist, tube)
+            below = (tube - 1) * self.scenario.tube_length
+            self._rough_truths[tube] = self.rough_run.truth(tube, self.scenario.hole, below, twist, *given)
+        return self._rough_truths[tube]
 
     def frame_angle(self, tube: int) -> float:
         """Angle (rad) from the head to the IMU's frame of a tube.
@@ -296,6 +351,8 @@ class World:
 
     def imu_samples(self, tube: int, imu: int = 0) -> Array:
         """Samples (cycles, 6) of the whole schedule, see ``imu_sample``."""
+        if self.scenario.file.rough is not None:
+            return self.rough_cycles(tube, imu).readings
         if (tube, imu) not in self._samples:
             self._samples[tube, imu] = self.readings(tube, self.ends + self.phase(tube), PERIOD, imu)
         return self._samples[tube, imu]

@@ -68,8 +68,12 @@ def refusal(scenario: Path, *faults: str) -> str:
         ("[rig]", "[torsion]\ntrapped_fraction = 0.6\n[rig]", "torsion.trapped_fraction"),
         ("[rig]", "[torsion]\ncolour = 1\n[rig]", "torsion.colour: unknown key; expected one of outer_diameter_m"),
         ("tubes = 3", "tubes = 11", "drill fewer tubes"),
-        (DISPLACEMENTS, "", "exactly one of displacements, stations and straight, got 0"),
-        (DISPLACEMENTS, f"{DISPLACEMENTS}\n{STATIONS}", "exactly one of displacements, stations and straight, got 2"),
+        (DISPLACEMENTS, "", "exactly one of displacements, stations, straight and spiral, got 0"),
+        (
+            DISPLACEMENTS,
+            f"{DISPLACEMENTS}\n{STATIONS}",
+            "exactly one of displacements, stations, straight and spiral, got 2",
+        ),
         ("[rig]", "[rig", "not TOML"),
     ],
 )

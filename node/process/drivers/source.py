@@ -25,7 +25,7 @@ class ImuSample:
     rate: Vector3  # rad/s
     force: Vector3  # m/s^2
     temperature: float = USUAL  # C
-    saturated: bool = False  # a reading within the cycle was at the gyroscope's range
+    saturated: int = 0  # bits of what was at its range within the cycle: 1 gyroscope, 2 accelerometer
 
 
 class ImuSource(Protocol):

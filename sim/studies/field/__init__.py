@@ -1,0 +1,1 @@
+"""What a node makes of a field's world, disturbance by disturbance."""

@@ -1,0 +1,171 @@
+"""What a node makes of a field's world: honesty, flags, false faults and surveys, disturbance by disturbance.
+
+A cycle is told of while the node carries a flag, and in the ten before one: so long a doubt may take. NEES is over the
+cycles that are not told of; ``unflagged`` is the share of all cycles in which the yaw is off by more than three of the
+sigmas stated and that are not told of. Faults of sensors are false wherever the world has none.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from groundstation.survey.resolve import angles, resolve
+from node.kernels.angles import wrap
+from sim.rig.direct_string import DirectString, StringRun
+from sim.studies.field.cases import ALL, BLOCKS, CASES, Case
+from sim.studies.pool import Step, over_cores, seeded
+from sim.studies.scenarios import Tables
+from sim.world.scenario import scenario_of
+from sim.world.world import World
+from telemetry.messages import NodeFlag
+
+Array = npt.NDArray[np.float64]
+Mask = npt.NDArray[np.bool_]
+RUN_IN = 20.0  # s of turning, and of the first rest, before the yaw is judged
+SETTLE = 5.0  # s of a rest likewise
+WITHIN = 10  # cycles in which a doubt must have been told
+SIGMAS = 3.0
+DOUBTS = (
+    NodeFlag.YAW_UNTRUSTED
+    | NodeFlag.INNOVATION_REJECTED
+    | NodeFlag.RATE_EXCEEDED
+    | NodeFlag.SENSOR_FAULT
+    | NodeFlag.BIAS_UNKNOWN
+)
+FAULTS = ("gyro_saturated", "gyro_stuck", "gyro_step", "gyro_scale", "force_saturated", "force_stuck", "bad_sample")
+NEES, UNFLAGGED, FALSE = 1.5, 0.01, 0.02  # to reach
+
+
+@dataclass(frozen=True, slots=True)
+class FieldRun:
+    """One seed: (cycles,) of the lowest tube."""
+
+    error: Array  # rad, with all constant errors
+    var: Array  # rad^2, likewise
+    told: Mask
+    turning: Mask  # cycles that are judged as turning
+    resting: Mask
+    faults: dict[str, int]
+    surveys: int
+    azimuth_error: Array  # (surveys,) rad
+
+
+def steps(disturbance: str, seeds: int) -> int:
+    """Runs of all seeds."""
+    return seeds * len(chosen_cases(disturbance))
+
+
+def chosen_cases(disturbance: str) -> list[Case]:
+    """The row of one disturbance, or all."""
+    return [case for case in CASES if disturbance in (ALL, case.key)]
+
+
+def run(disturbance: str, seeds: int, step: Step) -> dict[str, Any]:
+    """One row a disturbance; ``step`` is called after each run."""
+    cases = []
+    with over_cores(seeds, step) as run_all:
+        for case in chosen_cases(disturbance):
+            cases.append(row(case, run_all(run_seed, seeded(case.setup, seeds))))
+    return {"experiment": "field", "seeds": seeds, "cases": cases}
+
+
+def run_seed(job: tuple[Tables, int]) -> FieldRun:
+    """One seed of one disturbance, for a pool of processes."""
+    tables, seed = job
+    world = World(scenario_of(dict(tables)), seed)
+    return judge(world, DirectString(world, state_every=1).drill())
+
+
+def judge(world: World, run: StringRun) -> FieldRun:
+    """The lowest tube against the truth."""
+    states = {cycle: state for cycle, state in run.states if state.tube == 1}
+    flagged = np.array([bool(states[k].flags & DOUBTS) if k in states else True for k in range(world.cycles)])
+    told = np.array([bool(np.any(flagged[k : k + WITHIN + 1])) for k in range(world.cycles)])
+    faults = dict.fromkeys(FAULTS, 0)
+    for _, event in run.events:
+        if event.code in faults and event.tube == 1:
+            faults[event.code] += 1
+    surveys = [survey.measurement for survey in run.surveys if survey.tube == 1]
+    azimuth = world.scenario.hole.direction
+    errors = []
+    for survey in surveys:
+        mean = survey.imus[0]
+        direction = resolve(np.array(mean.force), np.array(mean.force_cov), survey.yaw, survey.yaw_var).direction
+        truth = azimuth(world.bit_depth(survey.station_at))[1]
+        errors.append(wrap(angles(direction.lean, direction.down)[1] - truth))
+    error, var = run.total_error[:, 0], run.total_var[:, 0]
+    turning, resting = judged(world)
+    return FieldRun(error, var, told, turning, resting, faults, len(surveys), np.array(errors))
+
+
+def judged(world: World) -> tuple[Mask, Mask]:
+    """Cycles in which the string turns or rests, its first seconds of either left out."""
+    turning, resting = np.zeros((2, world.cycles), np.bool_)
+    for phase in world.phases:
+        if phase.kind == "drill":
+            turning |= (world.ends > phase.start + RUN_IN) & (world.ends <= phase.end)
+        elif phase.kind == "stop":
+            resting |= (world.ends > phase.start + SETTLE) & (world.ends <= phase.end)
+    return turning, resting
+
+
+def row(case: Case, runs: Sequence[FieldRun]) -> dict[str, Any]:
+    """Figures of one disturbance."""
+    nees_turning, nees_rest = nees(runs, "turning"), nees(runs, "resting")
+    lies = [(r.error**2 > SIGMAS**2 * r.var) & ~r.told for r in runs]
+    unflagged = float(np.mean([np.mean(lie[r.turning | r.resting]) for lie, r in zip(lies, runs, strict=True)]))
+    faults = {code: float(np.mean([r.faults[code] for r in runs])) for code in FAULTS}
+    surveys = float(np.mean([r.surveys for r in runs])) / BLOCKS
+    others = sum(faults.values()) - faults["gyro_step"] - faults["gyro_scale"]
+    worst = max(value for value in (nees_turning, nees_rest, 0.0) if math.isfinite(value))
+    false = max(faults["gyro_step"], faults["gyro_scale"], others)
+    return {
+        "case": case.name,
+        "yaw_rms_turning_deg": rms_deg(runs, "turning"),
+        "yaw_rms_rest_deg": rms_deg(runs, "resting"),
+        "nees_turning": nees_turning,
+        "nees_rest": nees_rest,
+        "unflagged_percent": 100.0 * unflagged,
+        "told_percent": 100.0 * float(np.mean([r.told[r.turning | r.resting].mean() for r in runs])),
+        "gyro_step": faults["gyro_step"],
+        "gyro_scale": faults["gyro_scale"],
+        "other_faults": others,
+        "surveys_percent": 100.0 * surveys,
+        "azimuth_rms_deg": math.degrees(math.sqrt(float(np.mean(np.concatenate([r.azimuth_error for r in runs]) ** 2))))
+        if surveys
+        else math.nan,
+        "reached": worst <= NEES and unflagged <= UNFLAGGED and false <= FALSE and surveys >= 1.0,
+        "unseen": case.unseen,
+    }
+
+
+def rms_deg(runs: Sequence[FieldRun], when: str) -> float:
+    """Root mean square of the yaw's error, deg; no more than half a turn."""
+    squares = [r.error[getattr(r, when)] ** 2 for r in runs]
+    return math.degrees(math.sqrt(float(np.nanmean(np.concatenate(squares)))))
+
+
+def nees(runs: Sequence[FieldRun], when: str) -> float:
+    """Mean of error^2 / variance over the cycles that are not told of; NaN where all are."""
+    chosen = [getattr(r, when) & ~r.told for r in runs]
+    found = np.concatenate([r.error[c] ** 2 / r.var[c] for r, c in zip(runs, chosen, strict=True)])
+    return float(np.mean(found)) if len(found) else math.nan
+
+
+def verdicts(result: dict[str, Any]) -> list[str]:
+    """How many rows are reached, and which are not."""
+    missed = [r["case"] for r in result["cases"] if not r["reached"]]
+    unseen = [r["case"] for r in result["cases"] if not r["reached"] and r["unseen"]]
+    reached = len(result["cases"]) - len(missed)
+    lines = [
+        f"{reached} of {len(result['cases'])} rows reach NEES {NEES:g}, {100.0 * UNFLAGGED:g} % unflagged, "
+        f"{FALSE:g} false faults a run and every survey"
+    ]
+    lines += [f"not reached: {name}" for name in missed if name not in unseen]
+    return lines + [f"not for one node to see: {name}" for name in unseen]
