@@ -208,6 +208,11 @@ class RigModel:
         if tubes:
             self._tally_known_at = -math.inf
 
+    @property
+    def knows_tubes(self) -> bool:
+        """Whether every tube that speaks has been heard, or is known from before the start."""
+        return self.now >= self._tally_known_at
+
     def string_below(self, measurement: SurveyMeasurement) -> float | None:
         """Length (m) of string below a tube; None while the tubes known are not those that reach the bit.
 
@@ -215,7 +220,7 @@ class RigModel:
         """
         self.tally.on_hops(measurement.tube, self._hops_if_unknown(measurement))
         bit = self.depths.latest
-        if bit is None or self.tally.misfit(bit, ()) or self.now < self._tally_known_at:
+        if bit is None or self.tally.misfit(bit, ()) or not self.knows_tubes:
             return None
         return self.tally.length_below(measurement.tube)
 

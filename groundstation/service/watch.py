@@ -197,7 +197,8 @@ class Watch:
         self._alarms.hold("depth_silent", "depth", "no reading comes" if silent else "")
         heard = [tube for tube in model.tally.tubes if not model.is_stale(tube)]
         bit = model.depths.latest
-        misfit = model.tally.misfit(bit, heard) if bit is not None and was_heard and not silent else ""
+        comparable = was_heard and not silent and model.knows_tubes
+        misfit = model.tally.misfit(bit, heard) if bit is not None and comparable else ""
         self._alarms.hold("depth_contradicts", "depth", misfit)
 
     def _look_at_surveys(self) -> None:

@@ -319,3 +319,20 @@ def test_a_database_of_before_the_alarms_is_read_and_keeps_them_from_now_on(rig:
     store = Store(url)
     assert len(list(store.messages())) == 2
     store.close()
+
+
+def test_a_depth_is_compared_with_the_tubes_once_all_that_speak_have_been_heard(tmp_path: Path) -> None:
+    whole, short = Rig(tmp_path / "whole"), Rig(tmp_path / "short")
+    for rig in (whole, short):
+        rig.depth(10.0)
+    for met in ((5, 4), (3, 2), (1,)):
+        for tube in met:
+            whole.tell(tube, 6 - tube)
+        whole.run(0.5)
+        whole.read_depth(10.0)
+        assert "depth_contradicts" not in whole.alarms()
+    for _ in range(4):
+        short.tell(5, 1)
+        short.run(1.0)
+        short.read_depth(10.0)
+    assert "depth_contradicts" in short.alarms()
