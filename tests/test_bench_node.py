@@ -168,6 +168,7 @@ def test_a_missing_peer_is_one_line(monkeypatch: pytest.MonkeyPatch, peer: str) 
 
 
 @needs_compiler
+@pytest.mark.statistical
 def test_every_pair_is_measured(node: ModuleType, monkeypatch: pytest.MonkeyPatch) -> None:
     pytest.importorskip("filterpy")
     pytest.importorskip("imufusion")

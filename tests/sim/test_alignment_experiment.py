@@ -52,6 +52,7 @@ def test_the_integer_kernel_finds_the_same_mount() -> None:
     assert integers.inclination_error == pytest.approx(floats.inclination_error, abs=1e-6)
 
 
+@pytest.mark.statistical
 def test_the_command_keeps_its_table_and_figure_and_is_the_same_twice(tmp_path: Path) -> None:
     told = []
     for folder in (tmp_path / "one", tmp_path / "two"):

@@ -17,7 +17,7 @@ pytestmark = pytest.mark.slow
 SEEDS = 24
 
 
-@pytest.fixture(scope="module", params=[2, pytest.param(4, marks=pytest.mark.statistical)])
+@pytest.fixture(scope="module", params=[pytest.param(hops, marks=pytest.mark.statistical) for hops in (2, 4)])
 def result(request: pytest.FixtureRequest) -> dict:
     return run(request.param, SEEDS, lambda: None)
 

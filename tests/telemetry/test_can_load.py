@@ -104,7 +104,10 @@ def test_the_table_is_what_the_bus_carries(profile: str, fd: bool, tubes: int) -
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize(("profile", "fd"), [("tunnel", False), ("tunnel", True), ("native", False)])
+@pytest.mark.parametrize(
+    ("profile", "fd"),
+    [pytest.param("tunnel", False, marks=pytest.mark.statistical), ("tunnel", True), ("native", False)],
+)
 def test_fifty_tubes_on_a_slow_joint_thin_themselves_and_lose_nothing_kept(profile: str, fd: bool) -> None:
     joint = SimulatedJoint(profile, fd=fd, thins=True)
     for k in range(12):
