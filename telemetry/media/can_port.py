@@ -181,14 +181,15 @@ class CanPort(QueuedPort):
             self._exchange.on_refused()
 
     def _lose_bus(self, reason: str) -> None:
-        self.counters[reason] += 1
-        self._exchange.on_refused()
-        if self._bus is not None:
+        with self._lock:  # who sends meanwhile must not hand a frame to a bus that will never acknowledge it
+            lost, self._bus = self._bus, None
+            self.counters[reason] += 1
+            self._exchange.on_refused()
+            self._reopen_at = time.monotonic() + self._pause
+            self._pause = min(2.0 * self._pause, LAST_PAUSE)
+        if lost is not None:
             with contextlib.suppress(can.CanError, OSError):
-                self._bus.shutdown()
-        self._bus = None
-        self._reopen_at = time.monotonic() + self._pause
-        self._pause = min(2.0 * self._pause, LAST_PAUSE)
+                lost.shutdown()
 
     def _reopen(self) -> None:
         if time.monotonic() < self._reopen_at:
