@@ -11,7 +11,8 @@ from typing import Any, cast
 
 import numba
 import numpy as np
-from numba.core.types import WrapperAddressProtocol
+from numba.core.types import FunctionType, WrapperAddressProtocol
+from numba.extending import typeof_impl
 
 from node.kernels.calibration import identity_parameters
 from node.kernels.layout import default_config
@@ -27,6 +28,7 @@ class ByAddress(WrapperAddressProtocol):
         function.compile(kinds)
         compiled = function.overloads[kinds]
         self._signature = compiled.signature
+        self.kind = FunctionType(compiled.signature)
         self._address = compiled.library.get_pointer_to_function(compiled.fndesc.llvm_cfunc_wrapper_name)
 
     def __wrapper_address__(self) -> int:
@@ -36,6 +38,12 @@ class ByAddress(WrapperAddressProtocol):
     def signature(self) -> Any:
         """What it takes and returns, as numba says it."""
         return self._signature
+
+
+@typeof_impl.register(ByAddress)
+def _kind_of(value: ByAddress, _: Any) -> FunctionType:
+    """Its type, made once: numba would make it anew in every call, which takes longer than the call."""
+    return value.kind
 
 
 @functools.cache
