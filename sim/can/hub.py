@@ -23,6 +23,7 @@ from telemetry.media.can_loopback_protocol import (
     DETACH,
     FLAG_FD,
     FLAG_OWN,
+    HERE,
     LARGEST_DATAGRAM,
     RECEIVE_BUFFER,
     RESTART,
@@ -128,7 +129,7 @@ class CanHub:
             self._detach(address)
         elif datagram == RESTART:
             self.wires[segment].restart(address)
-        else:
+        elif datagram != HERE:
             with contextlib.suppress(ValueError):
                 frame, _ = unpack(datagram)
                 now = time.monotonic()

@@ -32,6 +32,7 @@ from telemetry.media.can_loopback_protocol import (
     DETACH,
     FLAG_FD,
     FLAG_OWN,
+    HERE,
     INTERFACE,
     LARGEST_DATAGRAM,
     RECEIVE_BUFFER,
@@ -39,6 +40,7 @@ from telemetry.media.can_loopback_protocol import (
 )
 
 ATTACH_LIMIT = 2.0  # s
+ASK_EVERY = 0.5  # s of silence, after which a controller makes sure that its hub is still there
 
 
 def register() -> None:
@@ -78,6 +80,7 @@ class LoopbackBus(can.BusABC):
         self.overruns = 0
         self._count = 0
         self._overrun_pending = False
+        self._ask_at = 0.0
         self._socket = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
         self._socket.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, receive_buffer)
         self._socket.connect(("127.0.0.1", int(port)))
@@ -131,7 +134,9 @@ class LoopbackBus(can.BusABC):
             return message_of(error_frame(ERROR_CONTROLLER, RX_OVERFLOW), self.channel_info), True
         readable, _, _ = select.select([self._socket], [], [], timeout)
         if not readable:
+            self._make_sure_of_hub()
             return None, False
+        self._ask_at = time.monotonic() + ASK_EVERY
         try:
             datagram = self._socket.recv(LARGEST_DATAGRAM)
         except OSError as error:
@@ -144,6 +149,16 @@ class LoopbackBus(can.BusABC):
             return None, False
         self._watch_count(count)
         return message_of(frame, self.channel_info), False
+
+    def _make_sure_of_hub(self) -> None:
+        """Say that this controller is here: a hub that has gone, maybe with a frame of ours, shows by an error."""
+        now = time.monotonic()
+        if now >= self._ask_at:
+            self._ask_at = now + ASK_EVERY
+            try:
+                self._socket.send(HERE)
+            except OSError as error:
+                raise can.CanOperationError(f"{self.channel_info}: {error.strerror}", error.errno) from error
 
     def _watch_count(self, count: int) -> None:
         """Notice frames that found no room in the receive buffer."""

@@ -98,6 +98,25 @@ def test_a_bus_that_goes_away_and_comes_back_stops_nobody(stack: contextlib.Exit
             end.close()
 
 
+def test_a_bus_that_goes_away_with_a_frame_stops_nobody(stack: contextlib.ExitStack) -> None:
+    """Nothing tells either end of it: the frame was taken, and nobody acknowledges it any more."""
+    hub = CanHub()
+    serving = threading.Thread(target=hub.serve)
+    serving.start()
+    ends = Ends(stack, hub.port)
+    until(lambda: ends.upper.is_up and ends.lower.is_up)
+    hub.stop()
+    serving.join()
+    ends.upper.send(Frame(b"lost", Priority.AIDING, "aiding"))
+    until(lambda: not ends.upper.is_up and not ends.lower.is_up)
+    hub.close()
+    ends.upper.send(Frame(b"kept", Priority.AIDING, "aiding"))
+    with running_hub(port=hub.port):
+        until(lambda: ends.heard[1] == [b"kept"])
+        for end in ends.ports:
+            end.close()
+
+
 def test_a_neighbour_without_fd_throws_the_controller_off_and_nobody_raises(
     stack: contextlib.ExitStack, hub: CanHub
 ) -> None:
