@@ -24,6 +24,7 @@ from sim.rig.in_process import Build, InProcessStepper
 from sim.rig.launcher import private_folder
 from sim.rig.operator import Operator
 from sim.rig.scheduler import Progress, Scheduler
+from sim.rig.stepper import Acted
 from sim.world.world import World
 from telemetry.errors import BorechainError
 from telemetry.messages import BASE, ENCODER
@@ -136,6 +137,6 @@ class InlineRig:
         seals = seals_at(keys, tube, self.world.reach)
         return TubeProcess(self.world.tube_settings(tube), folder, key=key, disk=disk, seals=seals)
 
-    def _act_on_cue(self, cue: str) -> bool:
+    def _act_on_cue(self, cue: str) -> Acted:
         rack = self.world.rack
-        return rack is None or Operator(rack, self.world.scenario.tubes).act_on_cue(self, cue)
+        return Acted.DONE if rack is None else Operator(rack, self.world.scenario.tubes).act_on_cue(self, cue)

@@ -13,7 +13,7 @@ from collections.abc import Callable, Iterable, Mapping
 from functools import cached_property, partial
 from pathlib import Path
 
-from sim.rig.stepper import Answer, FrameEvent
+from sim.rig.stepper import Acted, Answer, FrameEvent
 from telemetry import keys
 from telemetry.media.port import STEPPER, Frame, Port, TubeEnd
 from telemetry.media.table import open_medium
@@ -129,7 +129,7 @@ class BusStepper:
         self._seats: dict[int, Seat] = {}
         self._events: queue.SimpleQueue[Arrival] = queue.SimpleQueue()
         self._hung: list[int] = []
-        self._cues: set[str] = set()  # that the operator has answered
+        self._cues: dict[str, Acted] = {}  # that the operator has answered
         self._depth = bus.publisher(keys.DEPTH.format(rig=rig))
         self._addresses = {address_name(a): a for a in range(BASE + 1)}
         self._listener = None if steps is None else StepListener(steps, self._on_stream, self._on_answer)
@@ -151,13 +151,13 @@ class BusStepper:
                 return False
         return True
 
-    def wait_for_cue(self, name: str, timeout: float) -> bool:
-        """Wait (wall seconds) until the operator has done what cue ``name`` asks; returns whether he did."""
+    def wait_for_cue(self, name: str, timeout: float) -> Acted:
+        """See ``stepper.Stepper``."""
         deadline = time.monotonic() + timeout
         while name not in self._cues:
             if not self._pump(deadline - time.monotonic()):
-                return False
-        return True
+                return Acted.NO_ANSWER
+        return self._cues.pop(name)
 
     def drain_hung(self) -> list[int]:
         """Addresses that did not answer a step and were dropped for it since the last call."""
@@ -253,7 +253,8 @@ class BusStepper:
             self._seat_of(address).has_token = bool(side)
             self._settle(address)
         elif what == "cue":
-            self._cues.add(payload.decode(errors="replace"))
+            acted, _, name = payload.decode(errors="replace").partition(" ")
+            self._cues[name] = Acted(acted)
         elif seat is not None and seat.alive:
             (seat.done if what == "done" else seat.tx[side]).append(payload)
 

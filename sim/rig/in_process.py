@@ -10,7 +10,7 @@ from collections.abc import Callable, Mapping
 
 from sim.errors import RigError
 from sim.rig.scheduler import Progress
-from sim.rig.stepper import Answer, FrameEvent
+from sim.rig.stepper import Acted, Answer, FrameEvent
 from telemetry.messages import address_name
 from telemetry.runtime.process import Process
 from telemetry.runtime.stepped import Sent, run_step
@@ -24,14 +24,14 @@ class InProcessStepper:
     Parameters
     ----------
     builders : how to start the process of each address, as its computer would after its power came
-    act_on_cue : plays the operator; False when he could not act yet
+    act_on_cue : plays the operator
     carry : what a medium makes of every frame
     """
 
     def __init__(
         self,
         builders: Mapping[int, Build],
-        act_on_cue: Callable[[str], bool] = lambda _cue: True,
+        act_on_cue: Callable[[str], Acted] = lambda _cue: Acted.DONE,
         carry: Callable[[bytes], bytes] = bytes,
     ) -> None:
         self._carry = carry
@@ -56,7 +56,7 @@ class InProcessStepper:
         del timeout
         return (address in self.processes) == alive
 
-    def wait_for_cue(self, name: str, timeout: float) -> bool:
+    def wait_for_cue(self, name: str, timeout: float) -> Acted:
         """Have the operator act at once."""
         del timeout
         return self._act_on_cue(name)

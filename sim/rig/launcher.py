@@ -16,6 +16,7 @@ import msgpack
 
 from sim.errors import RigError
 from sim.rig.processes import ProcessTable
+from sim.rig.stepper import Acted
 from telemetry import keys
 from telemetry.media.credentials import Credentials
 from telemetry.media.zenoh_bus import ZenohBus, open_client
@@ -98,7 +99,7 @@ class Launcher:
     table : processes of the rig
     rig, endpoint : where the keys are
     show : called with every tick
-    act : plays the operator at a cue; False when the ground station did not answer and is to be asked again
+    act : plays the operator at a cue
     stall_limit : wall s after which a rig that makes no progress is ended
     credentials : what the launcher shows to a router over TLS
     begun : called with the bus as soon as its endpoint can be joined
@@ -110,7 +111,7 @@ class Launcher:
         rig: str,
         endpoint: str,
         show: Callable[[Tick], None],
-        act: Callable[[ZenohBus, str], bool] = lambda _bus, _cue: True,
+        act: Callable[[ZenohBus, str], Acted] = lambda _bus, _cue: Acted.DONE,
         stall_limit: float = STALL_LIMIT,
         credentials: Credentials | None = None,
         begun: Callable[[ZenohBus], None] = lambda _bus: None,
@@ -150,7 +151,7 @@ class Launcher:
 
     def _supervise(self, bus: ZenohBus) -> None:
         wanted: tuple[str, ...] = ()
-        acted = ""
+        answered = ""
         answer = bus.publisher(keys.CUE.format(rig=self._rig))
         watchdog = Watchdog(self._stall_limit)
         while True:
@@ -162,9 +163,11 @@ class Launcher:
                 wanted, kill = tick.wanted, tick.kill
                 self._show(tick)
                 watchdog.on_tick(tick)
-                if tick.cue not in ("", acted) and self._act(bus, tick.cue):
-                    acted = tick.cue
-                    answer.put(acted.encode())
+                if not tick.cue:
+                    answered = ""
+                elif tick.cue != answered and (acted := self._act(bus, tick.cue)) is not Acted.NO_ANSWER:
+                    answered = tick.cue
+                    answer.put(f"{acted} {answered}".encode())
                 if tick.finished:
                     return
             except queue.Empty:

@@ -6,6 +6,7 @@ import json
 from typing import Any, Protocol
 
 from sim.errors import RigError
+from sim.rig.stepper import Acted
 from sim.world.rack import Rack
 from telemetry import keys
 from telemetry.media.zenoh_bus import ZenohBus
@@ -72,17 +73,18 @@ class Operator:
             self._commands[f"attitude {number}"] = entered | {"pitch_deg": f"{pitch:g}", "roll_deg": f"{roll:g}"}
         self._commands["solve"] = {"action": "solve"}
 
-    def act_on_cue(self, doors: Doors, cue: str) -> bool:
-        """Do what ``cue`` names; False when the ground station did not answer.
+    def act_on_cue(self, doors: Doors, cue: str) -> Acted:
+        """Do what ``cue`` names; too early as long as the ground station does not know the time of the rig.
 
         Raises
         ------
         RigError
             When the ground station refuses.
         """
-        if cue != "confirm":
-            return doors.command(COMMAND, self._commands[cue]) is not None
         shown = doors.ask("recalibration")
         if shown is None:
-            return False
-        return doors.command(COMMAND, {"action": "confirm", "proposal": str(shown["proposal"])}) is not None
+            return Acted.NO_ANSWER
+        if shown["rig_time_s"] is None:
+            return Acted.LATER
+        order = self._commands.get(cue) or {"action": "confirm", "proposal": str(shown["proposal"])}
+        return Acted.NO_ANSWER if doors.command(COMMAND, order) is None else Acted.DONE

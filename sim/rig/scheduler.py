@@ -7,6 +7,7 @@ answered. The load of the machine and the pace change nothing but the wall time.
 
 from __future__ import annotations
 
+import bisect
 import contextlib
 import heapq
 import math
@@ -21,7 +22,7 @@ from node.kernels.layout import PERIOD
 from sim.errors import RigError
 from sim.rig.link_channel import LinkChannel
 from sim.rig.radio_channel import RadioChannel
-from sim.rig.stepper import Answer, FrameEvent, Stepper
+from sim.rig.stepper import Acted, Answer, FrameEvent, Stepper
 from sim.world.motion import Phase
 from sim.world.world import World
 from telemetry.application.depth_source import DepthSource
@@ -33,6 +34,7 @@ ATTACH_LIMIT = 90.0  # wall s
 FROZEN_AFTER = 30.0  # wall s of it, after which a process that was there is ended
 TELL_EVERY = 0.5  # wall s
 CUE_LIMIT = 120.0  # wall s
+CUE_AGAIN = 2.0  # rig s, until an operator who was too early tries again
 REBOOT_TIME = 5.0  # rig s that a process may be missing before the rig's time waits for it
 Entry = tuple[float, int, int, int, "Due | None", bytes, "float | None"]
 
@@ -204,7 +206,11 @@ class Scheduler:
         self.progress.cue = name
         for _ in range(int(CUE_LIMIT / TELL_EVERY)):
             self._tell(self.progress)
-            if self._stopping or self.stepper.wait_for_cue(name, TELL_EVERY):
+            acted = Acted.DONE if self._stopping else self.stepper.wait_for_cue(name, TELL_EVERY)
+            if acted is Acted.LATER:
+                again = Change(self._queue[0][0] + CUE_AGAIN, partial(self._cue, name))
+                bisect.insort(self._changes, again, key=lambda change: change.at)
+            if acted is not Acted.NO_ANSWER:
                 break
         else:
             raise RigError(f"operator: did nothing for {CUE_LIMIT:.0f} s when asked to {name}")

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import enum
 from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Protocol
@@ -9,6 +10,14 @@ from typing import Protocol
 from telemetry.runtime.stepped import DueEvent, Sent
 
 FrameEvent = tuple[DueEvent, bytes]  # an event and its frame, empty where it has none
+
+
+class Acted(enum.StrEnum):
+    """What came of a cue to the operator."""
+
+    DONE = "done"
+    LATER = "later"  # the ground station does not know the time of the rig yet, which has to go on until it does
+    NO_ANSWER = "no answer"  # of the ground station or the operator: to be asked again
 
 
 @dataclass(frozen=True, slots=True)
@@ -28,8 +37,8 @@ class Stepper(Protocol):
     def wait_for(self, address: int, *, alive: bool, timeout: float) -> bool:
         """Wait (wall seconds) until a process has come or gone; returns whether it did."""
 
-    def wait_for_cue(self, name: str, timeout: float) -> bool:
-        """Wait (wall seconds) until the operator has done what cue ``name`` asks; returns whether he did."""
+    def wait_for_cue(self, name: str, timeout: float) -> Acted:
+        """Wait (wall seconds) until the operator has done what cue ``name`` asks, or says that it is too early."""
 
     def drain_hung(self) -> list[int]:
         """Addresses that did not answer a step and were dropped for it since the last call."""

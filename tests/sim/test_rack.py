@@ -6,13 +6,16 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from borechain.inline import InlineRig
 from groundstation.calibration.attitudes import true_vectors
 from node.kernels.layout import PERIOD
 from sim.errors import ScenarioError
+from sim.rig.scheduler import Progress, Scheduler
 from sim.world.imu_errors import Drift
 from sim.world.rack import Rack
 from sim.world.scenario import CalibrationSection, DriftSection, Scenario, load_scenario
 from sim.world.world import World
+from telemetry.messages import BASE
 
 SCENARIOS = Path(__file__).parents[2] / "scenarios"
 FIELD = SCENARIOS / "field-calibration.toml"
@@ -142,3 +145,26 @@ def test_a_section_that_cannot_be_is_named(tmp_path: Path, old: str, new: str, n
 def test_a_section_without_presets_is_none() -> None:
     with pytest.raises(ValueError, match="attitudes_deg"):
         CalibrationSection()  # type: ignore[call-arg]
+
+
+def test_an_operator_waits_for_a_ground_station_that_does_not_know_the_time_yet(tmp_path: Path) -> None:
+    world = World(load_scenario(FIELD), 1)
+    rig = InlineRig(world, {}, "rig-1", tmp_path)
+    cues: list[str] = []
+
+    def follow(progress: Progress) -> None:
+        rig.stepper.follow(progress)
+        if progress.cue:
+            cues.append(progress.cue)
+            if cues == ["begin", "attitude 1", "attitude 2"]:
+                rig.close()
+                rig.stepper.drop(BASE)
+                rig.stepper.follow(progress)
+
+    scheduler = Scheduler(world, rig.stepper, follow, cued=True)
+    scheduler.begin()
+    scheduler.advance(until=lambda: "attitude 3" in cues)
+    assert cues.count("attitude 1") == 1
+    assert cues.count("attitude 2") > 1
+    assert len(rig.ask("recalibration")["attitudes"]) == 3
+    rig.close()

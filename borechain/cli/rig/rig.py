@@ -29,6 +29,7 @@ if TYPE_CHECKING:
     from sim.rig.launcher import Tick
     from sim.rig.processes import ProcessTable
     from sim.rig.scheduler import Progress
+    from sim.rig.stepper import Acted
     from sim.rig.transports import Transports
     from sim.world.world import World
     from telemetry.media.zenoh_bus import ZenohBus
@@ -351,12 +352,13 @@ def process_table(
     return ProcessTable(specs, [PRELOAD[world.scenario.file.node.kernel]])
 
 
-def operator_of(world: World, rig_name: str) -> Callable[[ZenohBus, str], bool]:
+def operator_of(world: World, rig_name: str) -> Callable[[ZenohBus, str], Acted]:
     """Who steps the calibration in the field, where the scenario has one."""
     from sim.rig.operator import BusDoors, Operator
+    from sim.rig.stepper import Acted
 
     if world.rack is None:
-        return lambda _bus, _cue: True
+        return lambda _bus, _cue: Acted.DONE
     operator = Operator(world.rack, world.scenario.tubes)
     return lambda bus, cue: operator.act_on_cue(BusDoors(bus, rig_name), cue)
 
