@@ -6,10 +6,12 @@ STAMP := $(VENV)/.installed
 # two workers a core, for a third of a worker's time goes by waiting for processes; one that has nothing left takes
 # tests from another
 WORKERS ?= $(shell echo $$((2 * $$(getconf _NPROCESSORS_ONLN))))
+# a test run starts hundreds of processes; where the environment forbids bytecode each would compile what it imports
+unexport PYTHONDONTWRITEBYTECODE
 PYTEST := $(BIN)/python -m pytest --numprocesses $(WORKERS) --maxprocesses 8 --dist worksteal
 
 .DEFAULT_GOAL := rig
-.PHONY: help rig test quick check lint types contracts kernels browser tests statistical explore lock study soak clean
+.PHONY: help rig test quick check lint types contracts kernels bytecode browser tests statistical explore lock study soak clean
 
 help:  ## list the targets
 	@awk -F ':.*## ' '/^[a-z]+:.*## / { printf "make %-12s %s\n", $$1, $$2 }' $(MAKEFILE_LIST)
@@ -18,7 +20,7 @@ rig: $(STAMP)  ## set up and drill wellbore 1
 	$(BIN)/borechain rig scenarios/wellbore-1.toml --speed max --seed 1
 
 test: $(STAMP)  ## set up and run every check and every test, in parallel
-	$(MAKE) --jobs=3 --output-sync check kernels browser
+	$(MAKE) --jobs=3 --output-sync check kernels bytecode browser
 	$(MAKE) tests
 
 quick: check  ## lint, types, contracts and the fast tests: under 90 s
@@ -44,6 +46,9 @@ contracts: $(STAMP)  ## which package may import which
 
 kernels: $(STAMP)  ## compile what the tests would compile, each worker for itself
 	$(BIN)/python tests/tools/compile_kernels.py
+
+bytecode: $(STAMP)  ## compile what the tests import, asserts rewritten, each worker for itself
+	$(BIN)/python -m pytest --collect-only --quiet --quiet > /dev/null || true  # the tests tell
 
 browser: $(STAMP)  ## install the browser of the page's tests (chromium), where there is none
 	$(BIN)/python tests/tools/install_browser.py
