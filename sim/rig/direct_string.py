@@ -11,7 +11,6 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from typing import NamedTuple
 
 import numpy as np
 import numpy.typing as npt
@@ -21,25 +20,15 @@ from node.firmware.inputs import ImuReading, RigContext
 from node.firmware.reporter import VAR_FLOOR
 from node.firmware.tube import Tube
 from node.kernels.address import firmware
+from node.kernels.angles import from_binary
 from node.kernels.calibration import PARAMETERS, USUAL
 from node.kernels.layout import PERIOD, Err, Scheme, default_config
-from node.kernels.record import (
-    CLOCK_VAR,
-    END,
-    HOPS,
-    JOINED,
-    MOMENT,
-    READING,
-    SATURATED,
-    START,
-    SYNCHRONISED,
-    TEMPERATURE,
-    new_node,
-)
+from node.kernels.record import A_VALID, END, READING, SATURATED, TEMPERATURE, new_node
 from node.kernels.step import ADMITTED
-from node.kernels.string import string_aiding, string_step
 from sim.errors import ScenarioError
+from sim.rig.encoder_course import is_plain, measured_of
 from sim.rig.plain_encoder import PlainEncoder
+from sim.rig.string_course import Kept, StringCourse, hand_down, new_desk, run_string
 from sim.world.imu_errors import gauss_markov
 from sim.world.rough_imu import GYRO_CLIPPED
 from sim.world.scenario import AidingSection
@@ -53,7 +42,6 @@ Sample = list[float]  # three rates (rad/s), three forces (m/s^2)
 Spoil = Callable[[int, int, Sample], Sample]
 SILENT_AFTER = 3.5  # s, until a node takes the neighbour above for gone
 NEVER = 10**9  # cycles
-TURN_OF_BINARY = math.tau / 2.0**32
 
 
 @dataclass(frozen=True, slots=True)
@@ -93,15 +81,6 @@ class StringRun:
         return self.var + self.systematic_var
 
 
-class Tables(NamedTuple):
-    """Of all tubes, tube 1 first: settings, readings (cycles, tubes, 1, 8), times, what each says."""
-
-    crews: Array
-    readings: Array
-    moments: Array
-    says: npt.NDArray[np.int64]
-
-
 class DirectString:
     """One string of one world.
 
@@ -138,38 +117,56 @@ class DirectString:
         self._lost = self._losses()
         self._clocks = self._clock_errors()
         self._phases = {tube: world.phase(tube) for tube in self.tubes}
-        self._phase_of = np.array([self._phases[tube] for tube in self.tubes])
         clocks = self._file.clocks
         stated = clocks.joint_std_ms if clocks.stated_std_ms is None else clocks.stated_std_ms
         self._clock_var = (1e-3 * stated) ** 2 * np.arange(1, count + 1)  # s^2, by hops
         self._adds = [phase for phase in world.phases if phase.kind == "add"]
-        self._tables = self._stack_tables()
+        self._crews = np.concatenate([tube.crew for tube in self.tubes.values()])
         self.clock_shifts: dict[int, float] = {}
         self._mount_var = math.radians(self._file.joints.mount_std_deg) ** 2
+        plain = spoil is None and self._imus == 1
+        self._runs_together = plain and all(tube.runs_together for tube in self.tubes.values())
         forward = all(tube.settings.scheme is Scheme.FORWARD for tube in self.tubes.values())
-        self._hands_on = forward and self._file.node.kernel == "float64" and self._imus == 1
+        self._hands_on = self._runs_together and forward
+        at_once = self._hands_on and is_plain(world)
+        self._measured = [] if at_once else self._measure()
         self._own: dict[int, Aiding | None] = {}  # what each node said in its cycle, by the schemes of estimates
         self.run = self._empty_run()
+        self._kept = Kept(self.run.yaw, self.run.var, self.run.systematic_var, self.run.gyro_bias)
+        self._desk = new_desk(count)
+        self._course: StringCourse | None = None
+        if self._runs_together:
+            vectors = measured_of(world) if at_once else np.array([aiding_vector(said) for said in self._measured])
+            self._course = self._course_of(vectors)
 
     def drill(self) -> StringRun:
         """Every cycle of the schedule; returns what the nodes knew."""
-        for _ in self.steps():
-            pass
+        cycle = 0
+        while cycle < self.world.cycles:
+            cycle = self._advance(cycle, self.world.cycles)
         return self.run
 
     def steps(self) -> Iterator[int]:
         """Cycle by cycle, each yielded when it is done, so that a study may act between two."""
         for cycle in range(self.world.cycles):
-            end = self.world.cycle_end(cycle)
-            string = self._string_at(end)
-            measured = self._measure(cycle, end)
-            locked = self._file.encoder.phase == "locked"
-            if not locked:
-                self._relay(cycle, measured, string, end)
-            self._keep(cycle, string, self._run_cycles(cycle, string, end))
-            if locked:  # cycles end with the encoder's, and what it measures then arrives after them
-                self._relay(cycle, measured, string, end)
+            self._advance(cycle, cycle + 1)
             yield cycle
+
+    def _advance(self, first: int, last: int) -> int:
+        """Run the cycle ``first``, and those after it while nobody has anything to say; returns which is next."""
+        if self._hands_on:
+            return self._run_together(first, last)
+        string = self._string_at(self.world.cycle_end(first))
+        locked = self._file.encoder.phase == "locked"
+        if not locked:
+            self._relay(first, string)
+        if self._runs_together:
+            self._run_together(first, first + 1)
+        else:
+            self._run_one_by_one(first, string)
+        if locked:  # cycles end with the encoder's, and what it measures then arrives after them
+            self._relay(first, string)
+        return first + 1
 
     def _tuned_config(self) -> Array:
         config = default_config()
@@ -217,13 +214,41 @@ class DirectString:
         """Whether the joint below the head is open, and was for ``since`` s."""
         return any(phase.start + since < t < phase.joint_closed for phase in self._adds)
 
-    def _stack_tables(self) -> Tables:
-        """What the compiled string takes beside the nodes' own records."""
-        world, count = self.world, len(self.tubes)
-        if self._imus > 1:
-            none = np.zeros(0)
-            return Tables(none, none, none, np.zeros(0, np.int64))
-        readings = np.zeros((world.cycles, count, 1, READING))
+    def _course_of(self, measured: Array) -> StringCourse:
+        """What comes to the nodes, whatever they do; where they do not hand on what comes, no aiding.
+
+        ``measured`` is what the encoder measures in every cycle (cycles, AIDING).
+        """
+        world, tubes = self.world, list(self.tubes)
+        phases = np.array([self._phases[tube] for tube in tubes])
+        ends = np.array([world.cycle_end(cycle) for cycle in range(-1, world.cycles)])
+        powered = np.array([len(self._string_at(end)) for end in ends[1:]])
+        at = ends[1:, None] + phases
+        place = np.arange(len(tubes))
+        opened, missed = self._are_open(at), self._are_open(at, SILENT_AFTER)
+        top = powered[:, None] - 1
+        joined = ~(opened & ((place == top) | ((place == top - 1) & missed)))
+        lost = self._lost | (place >= powered[:, None])
+        first_lost = np.where(lost.any(axis=1), lost.argmax(axis=1), len(tubes))
+        is_sent = self.passes & ~self._are_open(ends[1:]) & self._hands_on
+        return StringCourse(
+            begins=ends[:-1],
+            ends=ends[1:],
+            phases=phases,
+            powered=powered,
+            joined=joined.astype(np.float64),
+            clock_var=self._clock_var,
+            readings=self._readings(),
+            measured=measured,
+            arrivals=self._arrivals(measured[:, A_VALID]),
+            reach=np.where(is_sent, first_lost, 0),
+            locked=self._file.encoder.phase == "locked",
+        )
+
+    def _readings(self) -> Array:
+        """Of one IMU a tube, (cycles, tubes, 1, READING)."""
+        world = self.world
+        readings = np.zeros((world.cycles, len(self.tubes), 1, READING))
         readings[..., TEMPERATURE] = USUAL
         for tube in self.tubes:
             readings[:, tube - 1, 0, :TEMPERATURE] = world.imu_samples(tube)
@@ -231,43 +256,59 @@ class DirectString:
                 found = world.rough_cycles(tube)
                 readings[:, tube - 1, 0, TEMPERATURE] = found.temperature
                 readings[:, tube - 1, 0, SATURATED] = found.clipped & GYRO_CLIPPED
-        crews = np.concatenate([tube.crew for tube in self.tubes.values()])
-        return Tables(crews, readings, np.zeros((count, MOMENT)), np.zeros(count, np.int64))
+        return readings
 
-    def _run_cycles(self, cycle: int, string: Sequence[int], end: float) -> Mapping[int, Sequence[Message]]:
-        """A cycle of every tube: all that are plain in one call, the others one by one."""
-        plain = self._spoil is None and self._imus == 1
-        together = [tube for tube in string if plain and self.tubes[tube].runs_together]
-        said = self._step_together(cycle, together, string, end) if together else {}
-        if len(together) < len(string):
-            said |= {tube: self._run_cycle(cycle, tube, string) for tube in string if tube not in together}
-            said = {tube: said[tube] for tube in string if tube in said}
-        return said
+    def _arrivals(self, measured_at: Array) -> Array:
+        """When a node so many hops below takes what was measured at (cycles,) to be valid, (cycles, hops), s."""
+        medium, hops = self._file.medium, len(self.tubes)
+        valid = np.repeat(measured_at[:, None], hops, axis=1)
+        if medium.dated_by == "arrival":
+            valid += 1e-3 * medium.delay_ms + medium.latency * np.arange(1, hops + 1)
+        return np.asarray(valid + self._clocks)
 
-    def _step_together(
-        self, cycle: int, together: Sequence[int], string: Sequence[int], end: float
-    ) -> dict[int, Sequence[Message]]:
-        tables, n = self._tables, len(string)
-        mask = np.zeros(n, np.bool_)
-        mask[np.array(together) - 1] = True
-        moments = tables.moments[:n]
-        shifts = np.array([self.clock_shifts.get(tube, 0.0) for tube in range(1, n + 1)]) if self.clock_shifts else 0.0
-        moments[:, START] = self.world.cycle_end(cycle - 1) + self._phase_of[:n] + shifts
-        moments[:, END] = end + self._phase_of[:n] + shifts
-        moments[:, JOINED] = 1.0
-        if self._adds:
-            moments[:, JOINED] = [self._is_joined(tube, n, end + self._phases[tube]) for tube in range(1, n + 1)]
-        moments[:, HOPS] = np.arange(n, 0, -1)
-        moments[:, CLOCK_VAR] = self._clock_var[n - 1 :: -1]
-        moments[:, SYNCHRONISED] = 1.0
-        crews, corrections, readings = tables.crews[:n], self._corrections, tables.readings[cycle]
-        string_step(self._step, self.nodes[:n], crews, corrections, readings, moments, mask, tables.says)
+    def _are_open(self, t: Array, since: float = 0.0) -> Mask:
+        """Whether the joint below the head is open at ``t`` (s), and was for ``since`` s."""
+        found = np.zeros(t.shape, np.bool_)
+        for phase in self._adds:
+            found |= (phase.start + since < t) & (t < phase.joint_closed)
+        return found
+
+    def _run_together(self, first: int, last: int) -> int:
+        """Take all nodes through cycles in one call, until one has something to say; returns which cycle is next."""
+        course, desk = self._course, self._desk
+        if course is None:
+            raise ScenarioError("string: expected nodes that run together")
+        shifts = np.array([self.clock_shifts.get(tube, 0.0) for tube in self.tubes])
+        nodes, crews = self.nodes, self._crews
+        corrections = self._corrections
+        reached = run_string(
+            self._step, self._aid, nodes, crews, corrections, course, shifts, desk, self._kept, first, last
+        )
+        self._judge(first, reached)
+        cycle = reached - 1
+        n, end = int(course.powered[cycle]), float(course.ends[cycle])
+        telling = np.flatnonzero(desk.says[:n] & ~ADMITTED).tolist()[::-1]
         said: dict[int, Sequence[Message]] = {}
-        for place in np.flatnonzero(mask & (tables.says[:n] & ~ADMITTED != 0)).tolist()[::-1]:
-            tube = place + 1
-            around = self._context(tube, n, end + self._phases[tube])
-            said[tube] = list(self.tubes[tube].say(int(tables.says[place]), float(moments[place, END]), around))
-        return said
+        for place in telling:
+            around = self._context(place + 1, n, end + self._phases[place + 1])
+            said[place + 1] = list(
+                self.tubes[place + 1].say(int(desk.says[place]), float(desk.moments[place, END]), around)
+            )
+        self._take(cycle, range(n, 0, -1), said)
+        if telling and course.locked:
+            hand_down(self._aid, nodes, crews, course, shifts, desk, cycle)
+        return reached
+
+    def _run_one_by_one(self, cycle: int, string: Sequence[int]) -> None:
+        said = {tube: self._run_cycle(cycle, tube, string) for tube in string}
+        for tube in string:
+            state = self.nodes[tube - 1]["filter"]
+            self.run.yaw[cycle, tube - 1] = from_binary(state["now_yaw"])
+            self.run.var[cycle, tube - 1] = state["now_P"][Err.YAW, Err.YAW]
+            self.run.systematic_var[cycle, tube - 1] = state["systematic_var"]
+            self.run.gyro_bias[cycle, tube - 1] = state["static_bias"][2] + state["bias"][2]
+        self._judge(cycle, cycle + 1)
+        self._take(cycle, string, said)
 
     def _run_cycle(self, cycle: int, tube: int, string: Sequence[int]) -> Sequence[Message]:
         phase = self._phases[tube]
@@ -287,22 +328,26 @@ class DirectString:
         growing = self._is_open(end)
         return not (growing and (tube == top or (tube == top - 1 and self._is_open(end, SILENT_AFTER))))
 
-    def _measure(self, cycle: int, end: float) -> Aiding:
-        count, edge_at, rising, torque, earlier = self.world.encoder_sample(end)
-        if self._plain is not None:
-            head = float(self.world.motion.drive(np.array([end]))[0][0])
-            measured = self._plain.on_cycle(head, end)
-        else:
-            measured = self._encoder.on_cycle(EncoderSample(count, edge_at, bool(rising), torque, earlier=earlier), end)
-        return replace(measured, sequence=cycle) if self._file.aiding.renumbered else measured
+    def _measure(self) -> list[Aiding]:
+        """What the encoder measures in every cycle."""
+        found = []
+        for cycle in range(self.world.cycles):
+            end = self.world.cycle_end(cycle)
+            count, edge_at, rising, torque, earlier = self.world.encoder_sample(end)
+            if self._plain is not None:
+                head = float(self.world.motion.drive(np.array([end]))[0][0])
+                measured = self._plain.on_cycle(head, end)
+            else:
+                sample = EncoderSample(count, edge_at, bool(rising), torque, earlier=earlier)
+                measured = self._encoder.on_cycle(sample, end)
+            found.append(replace(measured, sequence=cycle) if self._file.aiding.renumbered else measured)
+        return found
 
-    def _relay(self, cycle: int, measured: Aiding, string: Sequence[int], end: float) -> None:
+    def _relay(self, cycle: int, string: Sequence[int]) -> None:
         """Down the string: ``forward`` hands on what came, the others what each node said in its cycle."""
-        aiding: Aiding | None = measured if self.passes[cycle] and not self._is_open(end) else None
+        end = self.world.cycle_end(cycle)
+        aiding: Aiding | None = self._measured[cycle] if self.passes[cycle] and not self._is_open(end) else None
         medium = self._file.medium
-        if aiding is not None and self._hands_on:
-            self._hand_on(cycle, aiding, string)
-            return
         for hop, tube in enumerate(string):
             firmware = self.tubes[tube]
             scheme = firmware.settings.scheme
@@ -313,26 +358,6 @@ class DirectString:
                 error = float(self._clocks[cycle, hop]) + self.clock_shifts.get(tube, 0.0)
                 passed = firmware.on_aiding(aiding, aiding.valid_at + late + error)
             aiding = passed if scheme is Scheme.FORWARD else self._own.get(tube)
-
-    def _hand_on(self, cycle: int, aiding: Aiding, string: Sequence[int]) -> None:
-        """Hand an aiding down a string whose scheme is ``forward``, as far as it is not lost."""
-        tables, medium, hops = self._tables, self._file.medium, len(string)
-        lost = np.flatnonzero(self._lost[cycle, :hops])
-        reach = int(lost[0]) if len(lost) else hops
-        valid = np.full(hops, aiding.valid_at)
-        if medium.dated_by == "arrival":
-            valid += 1e-3 * medium.delay_ms + medium.latency * np.arange(1, hops + 1)
-        error = self._clocks[cycle, :hops]
-        if self.clock_shifts:
-            error = error + np.array([self.clock_shifts.get(tube, 0.0) for tube in string])
-        taken = np.array(
-            [
-                *(aiding.yaw, aiding.yaw_var, aiding.systematic_var, aiding.offset, aiding.rate, 0.0),
-                *(aiding.sequence, aiding.hops, aiding.torque, aiding.torsion_var, aiding.under_torque, 0.0),
-            ]
-        )
-        places = np.array(string) - 1
-        string_aiding(self._aid, self.nodes, tables.crews, places, reach, valid + error, taken)
 
     def _empty_run(self) -> StringRun:
         world, tubes = self.world, self.world.scenario.tubes
@@ -345,16 +370,18 @@ class DirectString:
         turning = world.motion.drive(world.ends)[1] > 0.0
         return StringRun(world.ends, turning, yaw, total, systematic, var, systematic_var, bias)
 
-    def _keep(self, cycle: int, string: Sequence[int], said: Mapping[int, Sequence[Message]]) -> None:
-        """Read off every record of the string, then take what the nodes had to say."""
-        run, states = self.run, self.nodes["filter"][: len(string)]
-        row = np.s_[cycle, : len(string)]
-        run.yaw[row] = states["now_yaw"] * TURN_OF_BINARY
-        run.total_error[row] = wrapped(run.yaw[row] - self._truth[row])
-        run.systematic_error[row] = self._systematic[row]
-        run.var[row] = np.maximum(states["now_P"][:, Err.YAW, Err.YAW], VAR_FLOOR)
-        run.systematic_var[row] = states["systematic_var"] + self._mount_var
-        run.gyro_bias[row] = states["static_bias"][:, 2] + states["bias"][:, 2]
+    def _judge(self, first: int, last: int) -> None:
+        """Set what the nodes knew in the cycles ``first``..``last`` - 1 beside the truth."""
+        run, rows = self.run, np.s_[first:last]
+        unknown = np.isnan(run.yaw[rows])
+        run.total_error[rows] = wrapped(run.yaw[rows] - self._truth[rows])
+        run.systematic_error[rows] = np.where(unknown, math.nan, self._systematic[rows])
+        run.var[rows] = np.maximum(run.var[rows], VAR_FLOOR)
+        run.systematic_var[rows] += self._mount_var
+
+    def _take(self, cycle: int, string: Sequence[int], said: Mapping[int, Sequence[Message]]) -> None:
+        """Take what the nodes had to say."""
+        run = self.run
         self._own = dict.fromkeys(string)
         for tube, messages in said.items():
             for message in messages:
@@ -366,6 +393,13 @@ class DirectString:
                     run.events.append((cycle, message))
                 elif isinstance(message, NodeState):
                     run.states.append((cycle, message))
+
+
+def aiding_vector(aiding: Aiding) -> tuple[float, ...]:
+    """What the encoder measured as ``node_aiding`` takes it, (AIDING,)."""
+    a = aiding
+    above = (a.yaw, a.yaw_var, a.systematic_var, a.offset, a.rate, a.valid_at, a.sequence, a.hops)
+    return (*above, a.torque, a.torsion_var, a.under_torque, 0.0)
 
 
 def aiding_passes(section: AidingSection, t: Array, seed: int) -> Mask:

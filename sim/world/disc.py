@@ -46,6 +46,11 @@ class Disc:
         limit = 0.4 * self._quantum  # lines do not change places
         self.errors: Array = np.clip(edge_std * random.standard_normal(counts_per_turn), -limit, limit)
 
+    @property
+    def is_freed(self) -> bool:
+        """Whether the head turns by itself at times."""
+        return bool(self._jumps)
+
     def angles(self, t: Array) -> Array:
         """Of the head (n,) rad, unwrapped, at rig times ``t`` (n,) s, its free turns included."""
         angle = self._motion.drive(t)[0]

@@ -148,7 +148,10 @@ class World:
             edge_at = self.begin
         if self.torsion is None or self.scenario.file.node.torsion == "ignore":
             return count, edge_at, rising, None, earlier
-        return count, edge_at, rising, float(self.torsion.torque(np.array([t]))[0]), earlier
+        torque = self._torques.get(t)
+        if torque is None:
+            torque = float(self.torsion.torque(np.array([t]))[0])
+        return count, edge_at, rising, torque, earlier
 
     def bit_depth(self, t: float) -> float:
         """Measured depth of the bit, m."""
@@ -400,6 +403,13 @@ class World:
     def _bias_step(self, ends: Array) -> Array:
         turns_from = next(phase.start for phase in self.phases if phase.kind == "drill")
         return np.asarray(math.radians(self.scenario.file.gyroscope.bias_step_dps) * (ends > turns_from))
+
+    @cached_property
+    def _torques(self) -> dict[float, float]:
+        """Torque of the drive (N m) at the end of every cycle of the encoder, all worked out at once."""
+        if self.torsion is None:
+            return {}
+        return dict(zip(self.ends.tolist(), self.torsion.torque(self.ends).tolist(), strict=True))
 
     @cached_property
     def _head_angles(self) -> dict[float, float]:
