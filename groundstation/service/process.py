@@ -372,9 +372,12 @@ class GroundProcess(Process):
                     self._keep_joints()
                 self._publish([f"nodes/{message.tube}"])
             case SurveyMeasurement() | Event() | StaticRecord():
-                with self._refusing_disk():  # what is not stored is not acknowledged, and comes again
+                try:
                     self._on_kept(message)
                     self.endpoint.acknowledge(message)
+                except StoreError:  # what is not stored is not acknowledged, and comes again
+                    if isinstance(message, Event):
+                        self.watch.on_known_event(message)
             case Reply():
                 self.model.orders.on_reply(message)
                 self.model.recalibration.on_reply(message, now)

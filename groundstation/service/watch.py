@@ -93,7 +93,10 @@ class Watch:
             self._alarms.alert(CODE, tube, refusal_of(event.arguments))
 
     def on_known_event(self, event: Event) -> None:
-        """Judge an event that has come, or was stored before a restart of the ground station."""
+        """Judge an event that has come, or was stored before a restart of the ground station.
+
+        One that the disk refuses is judged each time it comes: its warning must not wait for room on a disk.
+        """
         tubes = self._model.tally.tubes
         heard = [tube for tube in tubes if not self._model.is_stale(tube)] or tubes  # none: the events are stored ones
         if against := self._witnesses.on_event(event, heard):
