@@ -19,8 +19,9 @@ from node.firmware.block_trial import record_of
 from node.kernels.address import firmware
 from node.kernels.layout import Array
 from sim.campaign.course import Course, course_of
-from sim.campaign.draws import Draws, draws_of, fresh_nodes, noise_of
-from sim.campaign.drill import CODES, STATE_OF, SURVEY, drill, new_work
+from sim.campaign.draws import Draws, draws_of, fresh_nodes, noise_of, tubes_of
+from sim.campaign.drill import CODES, STATE_OF, SURVEY, drill
+from sim.campaign.sensors import new_work
 from sim.rig.direct_string import wrapped
 from sim.world.scenario import Scenario
 from sim.world.world import World
@@ -88,7 +89,7 @@ class Campaign:
         self._depth = World(scenario, 1).motion.depth(self.course.ends)[0]
         count = scenario.tubes
         self._corrections = np.stack([np.concatenate([record_of(ParameterBlock(k + 1, 0))] * 2) for k in range(count)])
-        self._work, self._wander, self._hops = new_work(), np.zeros((count, 3)), np.zeros((3, count))
+        self._work = new_work()
 
     @property
     def node_cycles(self) -> int:
@@ -119,11 +120,10 @@ class Campaign:
             self._corrections,
             self.course,
             self._noise,
+            tubes_of(world, draws.frame),
             draws,
             key,
             self._work,
-            self._wander,
-            self._hops,
             surveys,
             epochs,
             counts,

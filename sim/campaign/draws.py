@@ -13,8 +13,9 @@ import numpy as np
 import numpy.typing as npt
 
 from node.firmware.settings import crew_record
-from node.kernels.layout import PERIOD, default_config
+from node.kernels.layout import PERIOD, Array, default_config
 from node.kernels.record import new_node
+from sim.campaign.sensors import NOISE, TUBE
 from sim.rig.direct_string import NEVER, aiding_passes
 from sim.rig.encoder_course import measured_of
 from sim.world.imu_errors import ImuErrors
@@ -22,78 +23,61 @@ from sim.world.scenario import ScenarioFile
 from sim.world.streams import Stream, stream
 from sim.world.world import World
 
-Array = npt.NDArray[np.float64]
-
-
-class Noise(NamedTuple):
-    """Standard deviations of what is drawn in every cycle; the same for all runs."""
-
-    rate: Array  # (3,) rad/s, white, of a cycle's mean
-    wander: Array  # (3,) rad/s, of the Gauss-Markov part
-    wander_phi: float  # what is left of it after a cycle
-    force: float  # m/s^2, of a cycle's mean
-    shaking: float  # m/s^2, likewise, while the bit shakes the string
-    step: float  # rad/s, resolution of the gyroscope; 0: none
-    limit: float  # rad/s, its range
-    clock: float  # s, wander of rig time across each joint
-    clock_phi: float
-    loss: float  # of an aiding on one hop
-    late: float  # s, by which the aiding is dated beside its validity, once
-    late_by_hop: float  # s, likewise, each hop
-
 
 class Draws(NamedTuple):
     """The constants of one run, tube 1 first."""
 
     frame: Array  # (tubes,) rad, of the IMU's frame with the head at 0
-    spread: Array  # (tubes, 3, 3) reading of the gyroscope by the true rates
-    pull: float  # rad/s by m/s^2, of the force on each axis of the gyroscope
-    rate_bias: Array  # (tubes, 3) rad/s
-    force_bias: Array  # (tubes, 3) m/s^2
-    clock: Array  # (tubes,) s, error of rig time across each joint from the head down
     clock_var: Array  # (tubes,) s^2, stated, by hops
     systematic: Array  # (tubes, tubes + 1) rad, error of the marks by tube and the top tube
     measured: Array  # (cycles, AIDING) what the encoder said
     heard: npt.NDArray[np.bool_]  # (cycles,) and whether it was heard
 
 
-def noise_of(file: ScenarioFile) -> Noise:
-    """What is drawn in every cycle of a scenario."""
+def noise_of(file: ScenarioFile) -> Array:
+    """What is drawn in every cycle of a scenario, (1,) of dtype ``NOISE``; the same for all runs."""
     g, a, medium, clocks = file.gyroscope, file.accelerometer, file.medium, file.clocks
-    tilt = math.radians(1.0) * a.gravity_mps2
-    arrival = medium.dated_by == "arrival"
-    return Noise(
-        rate=np.radians(np.array(g.noise_dps_rthz)) / math.sqrt(PERIOD),
-        wander=np.radians(np.array(g.bias_std_dps)),
-        wander_phi=math.exp(-PERIOD / g.bias_tau_s),
-        force=a.noise_deg * tilt,
-        shaking=a.vibration_mps2,
-        step=math.radians(g.resolution_dps),
-        limit=math.radians(g.range_dps),
-        clock=1e-3 * clocks.wander_std_ms,
-        clock_phi=math.exp(-PERIOD / clocks.wander_tau_s),
-        loss=medium.loss,
-        late=1e-3 * medium.delay_ms if arrival else 0.0,
-        late_by_hop=medium.latency if arrival else 0.0,
-    )
+    noise = np.zeros(1, NOISE)
+    noise["rate"] = np.radians(np.array(g.noise_dps_rthz)) / math.sqrt(PERIOD)
+    noise["wander"] = np.radians(np.array(g.bias_std_dps))
+    noise["wander_phi"] = phi = math.exp(-PERIOD / g.bias_tau_s)
+    noise["wander_fresh"] = math.sqrt(1.0 - phi**2)
+    noise["force"] = a.noise_deg * (math.radians(1.0) * a.gravity_mps2)
+    noise["shaking"] = a.vibration_mps2
+    noise["pull"] = math.radians(g.g_sensitivity_dps_per_g) / a.gravity_mps2
+    noise["step"] = math.radians(g.resolution_dps)
+    noise["limit"] = math.radians(g.range_dps)
+    noise["clock"] = 1e-3 * clocks.wander_std_ms
+    noise["clock_phi"] = phi = math.exp(-PERIOD / clocks.wander_tau_s)
+    noise["clock_fresh"] = math.sqrt(1.0 - phi**2)
+    noise["loss"] = medium.loss
+    if medium.dated_by == "arrival":
+        noise["late"], noise["late_by_hop"] = 1e-3 * medium.delay_ms, medium.latency
+    return noise
+
+
+def tubes_of(world: World, frame: Array) -> Array:
+    """Sensors and hops of a world's tubes, (tubes,) of dtype ``TUBE``; ``frame`` (tubes,) rad, of their IMUs."""
+    file, seed = world.scenario.file, world.seed
+    tubes = np.zeros(len(frame), TUBE)
+    errors = ImuErrors(file.gyroscope, file.accelerometer)
+    for number, tube in enumerate(tubes, 1):
+        tube["cos"], tube["sin"] = math.cos(frame[number - 1]), math.sin(frame[number - 1])
+        tube["rate_bias"], tube["spread"] = errors.constants(stream(seed, Stream.GYRO, number))
+        tube["force_bias"] = errors.force_bias(stream(seed, Stream.ACCELEROMETER, number))
+    drawn = stream(seed, Stream.AIDING_CLOCKS).standard_normal(len(frame))
+    tubes["hop_clock"] = 1e-3 * file.clocks.joint_std_ms * drawn
+    return tubes
 
 
 def draws_of(world: World) -> Draws:
     """The constants of the run of a world's seed."""
     file, count, seed = world.scenario.file, world.scenario.tubes, world.seed
     tubes = range(1, count + 1)
-    errors = ImuErrors(file.gyroscope, file.accelerometer)
-    sensors = [errors.constants(stream(seed, Stream.GYRO, tube)) for tube in tubes]
-    force_bias = [errors.force_bias(stream(seed, Stream.ACCELEROMETER, tube)) for tube in tubes]
     clocks = file.clocks
     stated = clocks.joint_std_ms if clocks.stated_std_ms is None else clocks.stated_std_ms
     return Draws(
         frame=world.first_angle + np.array([world.frame_angle(tube) for tube in tubes]),
-        spread=np.stack([spread for _, spread in sensors]),
-        pull=math.radians(file.gyroscope.g_sensitivity_dps_per_g) / file.accelerometer.gravity_mps2,
-        rate_bias=np.stack([bias for bias, _ in sensors]),
-        force_bias=np.stack(force_bias),
-        clock=1e-3 * clocks.joint_std_ms * stream(seed, Stream.AIDING_CLOCKS).standard_normal(count),
         clock_var=(1e-3 * stated) ** 2 * np.arange(1.0, count + 1.0),
         systematic=np.array([[world.marks_error(tube, max(top, tube)) for top in range(count + 1)] for tube in tubes]),
         measured=measured_of(world),

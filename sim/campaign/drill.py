@@ -6,13 +6,12 @@ What a node does is ``node.kernels.step``, as in a rig; what the world does to i
 from __future__ import annotations
 
 import math
-from typing import Any, Final, NamedTuple
+from typing import Any, Final
 
 import numpy as np
 
 from node.kernels.angles import from_binary
-from node.kernels.calibration import USUAL
-from node.kernels.jit import kernel
+from node.kernels.jit import kernel, shared_body
 from node.kernels.layout import PERIOD, Array, Err
 from node.kernels.record import (
     A_HOPS,
@@ -20,24 +19,16 @@ from node.kernels.record import (
     A_SYSTEMATIC,
     A_TORSION,
     A_VALID,
-    AIDING,
     CLOCK_VAR,
     END,
     HOPS,
     JOINED,
-    MOMENT,
-    READING,
-    SATURATED,
     START,
     SYNCHRONISED,
-    TEMPERATURE,
 )
 from node.kernels.step import ONWARD, SAY_EVENTS, SAY_SURVEY
-from sim.campaign.philox import normals, uniforms
+from sim.campaign.sensors import draw, read_sensors
 
-DRAWN: Final = 12  # numbers a node and cycle: rates, their wander, forces, clock and loss of one hop, one to spare
-GAUSSIAN: Final = 10
-CLOCK, LOSS = 9, 10
 YAW = int(Err.YAW)
 CODES: Final = 64  # of events that are counted
 VAR_FLOOR: Final = (math.radians(0.001)) ** 2  # of a yaw as a node states it
@@ -62,25 +53,6 @@ STATE_OF: Final = np.dtype(
 )
 
 
-class Work(NamedTuple):
-    """Work space of a cycle; what goes into the firmware is arrays by themselves, as everywhere."""
-
-    counter: Array  # (4,) uint64, see ``sim.campaign.philox``
-    words: Array  # (4,) uint64
-    drawn: Array  # (DRAWN,)
-    rate: Array  # (3,) rad/s, true
-    force: Array  # (3,) m/s^2, true
-    reading: Array  # (1, READING)
-    moment: Array  # (MOMENT,)
-    aiding: Array  # (AIDING,)
-
-
-def new_work() -> Work:
-    """Work space."""
-    vectors = (np.zeros(DRAWN), np.zeros(3), np.zeros(3), np.zeros((1, READING)), np.zeros(MOMENT), np.zeros(AIDING))
-    return Work(np.zeros(4, np.uint64), np.zeros(4, np.uint64), *vectors)
-
-
 @kernel
 def drill(
     step: Any,
@@ -89,12 +61,11 @@ def drill(
     crews: Array,
     corrections: Array,
     course: Any,
-    noise: Any,
+    noise: Array,
+    tubes: Array,
     draws: Any,
     key: Array,
     work: Any,
-    wander: Array,
-    hops: Array,
     surveys: Array,
     epochs: Array,
     counts: Array,
@@ -106,90 +77,52 @@ def drill(
     step, aid : ``node_step`` and ``node_aiding``, see ``node.kernels.address``
     nodes, crews : (tubes,) of dtype ``NODE``, as new, and ``SETTINGS``
     corrections : (tubes, 2) of dtype ``PARAMETERS``
-    course, noise, draws : ``sim.campaign.course.Course``, ``sim.campaign.draws.Noise`` and ``Draws``
+    course, draws : ``sim.campaign.course.Course`` and ``sim.campaign.draws.Draws``
+    noise, tubes : (1,) and (tubes,) of dtype ``sim.campaign.sensors.NOISE`` and ``TUBE``
     key : (2,) of the run, see ``sim.campaign.philox``
-    work : ``Work``
-    wander : (tubes, 3) rad/s, work space
-    hops : (3, tubes) work space: wander (s) of each hop's clock, its error in this cycle, whether it loses the aiding
+    work : ``sim.campaign.sensors.Work``
     surveys : (most,) of dtype ``SURVEY``
     epochs : (epochs, tubes) of dtype ``STATE_OF``
     counts : (tubes, CODES) of events by code
     """
     made, epoch = 0, 0
+    rate, force, circle, shaken, powered = course.rate, course.force, course.circle, course.shaken, course.powered
+    reading, moment, clock_var = work.reading, work.moment, draws.clock_var
     for cycle in range(course.ends.shape[0]):
-        tubes = course.powered[cycle]
+        top = powered[cycle]
         heard = course.heard[cycle] and draws.heard[cycle]
-        for k in range(tubes):
-            draw_cycle(course, noise, draws, key, work, wander, hops, cycle, k)
-            set_moment(course, draws, work.moment, cycle, k)
+        for k in range(top):
+            tube, is_first = tubes[k], cycle == 0 or powered[cycle - 1] <= k
+            draw(work.counter, key, work.words, work.drawn, cycle, k)
+            above = tubes[k - 1].hop_error if k > 0 else 0.0
+            read_sensors(noise[0], tube, is_first, above, rate, force, circle, shaken, work.drawn, reading, cycle, k)
+            set_moment(course, clock_var, moment, cycle, k)
             one = slice(k, k + 1)
-            says = step(nodes[one], crews[one], corrections[k], work.reading, work.moment)
+            says = step(nodes[one], crews[one], corrections[k], reading, moment)
             if says & SAY_SURVEY:
                 if made < surveys.shape[0]:
-                    keep_survey(surveys[made], nodes[k], crews[k], cycle, k, tubes)
+                    keep_survey(surveys[made], nodes[k], crews[k], cycle, k, top)
                 made += 1
             if says & SAY_EVENTS:
                 count_events(nodes[k], counts[k])
         if heard:
-            hand_down(aid, nodes, crews, noise, draws, work.aiding, hops, cycle, tubes)
+            hand_down(aid, nodes, crews, noise[0], tubes, draws.measured[cycle], work.aiding, top)
         if epoch < course.epochs.shape[0] and course.epochs[epoch] == cycle:
-            for k in range(tubes):
+            for k in range(top):
                 keep_state(epochs[epoch, k], nodes[k].filter)
             epoch += 1
     return made
 
 
-@kernel
-def draw_cycle(
-    course: Any, noise: Any, draws: Any, key: Array, work: Any, wander: Array, hops: Array, cycle: int, k: int
-) -> None:
-    """What the sensors of a tube read in a cycle, and what hop ``k`` from the head does to its aiding."""
-    counter, drawn = work.counter, work.drawn
-    counter[0], counter[1], counter[2] = np.uint64(cycle), np.uint64(k), np.uint64(0)
-    uniforms(counter, key, work.words, drawn)
-    normals(drawn[:GAUSSIAN])
-    first = cycle == 0 or course.powered[cycle - 1] <= k
-    c, s = math.cos(draws.frame[k]), math.sin(draws.frame[k])
-    rate, force, reading = work.rate, work.force, work.reading[0]
-    turn_back(course.rate[cycle, k], c, s, rate)
-    turn_back(course.force[cycle, k], c, s, force)
-    force[0] += course.circle[cycle, 0]
-    force[1] += course.circle[cycle, 1]
-    shaken = math.sqrt(noise.force**2 + (noise.shaking * course.shaken[cycle]) ** 2)
-    fresh = 1.0 if first else math.sqrt(1.0 - noise.wander_phi**2)
-    for i in range(3):
-        wander[k, i] = (0.0 if first else noise.wander_phi * wander[k, i]) + fresh * noise.wander[i] * drawn[3 + i]
-        read = draws.rate_bias[k, i] + wander[k, i] + noise.rate[i] * drawn[i] + draws.pull * force[i]
-        for j in range(3):
-            read += draws.spread[k, i, j] * rate[j]
-        if noise.step > 0.0:
-            read = np.round(read / noise.step) * noise.step
-        reading[i] = min(max(read, -noise.limit), noise.limit)
-        reading[3 + i] = force[i] + draws.force_bias[k, i] + shaken * drawn[6 + i]
-    reading[TEMPERATURE], reading[SATURATED] = USUAL, 0.0
-    fresh = 1.0 if first else math.sqrt(1.0 - noise.clock_phi**2)
-    hops[0, k] = (0.0 if first else noise.clock_phi * hops[0, k]) + fresh * noise.clock * drawn[CLOCK]
-    hops[1, k] = draws.clock[k] + hops[0, k] + (hops[1, k - 1] if k > 0 else 0.0)
-    hops[2, k] = 1.0 if drawn[LOSS] < noise.loss else 0.0
-
-
-@kernel
-def turn_back(vector: Array, c: float, s: float, turned: Array) -> None:
-    """R_z^T ``vector`` (3,) of an angle with cosine ``c`` and sine ``s``."""
-    turned[0] = c * vector[0] + s * vector[1]
-    turned[1] = c * vector[1] - s * vector[0]
-    turned[2] = vector[2]
-
-
-@kernel
-def set_moment(course: Any, draws: Any, moment: Array, cycle: int, k: int) -> None:
+@shared_body
+def set_moment(course: Any, clock_var: Array, moment: Array, cycle: int, k: int) -> None:
     """Times of a tube's cycle, and what its link would tell it."""
     below = course.powered[cycle] - 1 - k  # hops from the head, less one
     moment[START] = course.begin + cycle * PERIOD
     moment[END] = course.ends[cycle]
     moment[JOINED] = course.joined[cycle, k]
     moment[HOPS] = below + 1
-    moment[CLOCK_VAR] = draws.clock_var[below]
+    moment[CLOCK_VAR] = clock_var[below]
     moment[SYNCHRONISED] = 1.0
 
 
@@ -199,21 +132,20 @@ def hand_down(
     nodes: Array,
     crews: Array,
     noise: Any,
-    draws: Any,
+    tubes: Array,
+    measured: Array,
     aiding: Array,
-    hops: Array,
-    cycle: int,
-    tubes: int,
+    top: int,
 ) -> None:
-    """Hand what the encoder measured down the string, until a hop loses it."""
-    aiding[:] = draws.measured[cycle]
+    """Hand what the encoder ``measured`` (AIDING,) down the ``top`` tubes of the string, until a hop loses it."""
+    aiding[:] = measured
     valid = aiding[A_VALID] + noise.late
-    for hop in range(tubes):
-        if hops[2, hop] != 0.0:
+    for hop in range(top):
+        if tubes[hop].hop_loses:
             return
-        k = tubes - 1 - hop
+        k = top - 1 - hop
         one = slice(k, k + 1)
-        aiding[A_VALID] = valid + noise.late_by_hop * (hop + 1) + hops[1, hop]
+        aiding[A_VALID] = valid + noise.late_by_hop * (hop + 1) + tubes[hop].hop_error
         if not aid(nodes[one], crews[one], aiding) & ONWARD:
             return
         node = nodes[k]

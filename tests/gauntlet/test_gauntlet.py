@@ -86,7 +86,10 @@ def test_combined_seeds_hold(first: int) -> None:
     [
         (20205, ("node-cut", "database-deleted", "splice")),  # a recorded state kept a dead tube fresh
         (20063, ("bytes-rot", "same-number")),  # a stranger spoke for a tube without power
-        (30271, ("ground-disk-refuses", "encoder-slips")),  # what said that the encoder slipped found no room on the disk
+        (
+            30271,
+            ("ground-disk-refuses", "encoder-slips"),
+        ),  # a slip that found no room on the disk
         (50000, ("encoder-slips", "frozen")),  # the one that saw it stood alone
         (50001, ("encoder-slips", "cut-while-saving")),  # the yaws of two neighbours parted at rest
     ],

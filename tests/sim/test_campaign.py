@@ -18,10 +18,10 @@ from node.kernels.address import firmware
 from node.kernels.record import AIDING, MOMENT, READING
 from sim.campaign import engine
 from sim.campaign.chunk import RUNS, Campaign, run_chunk, scenario_digest
-from sim.campaign.draws import draws_of, noise_of
-from sim.campaign.drill import draw_cycle, new_work
+from sim.campaign.draws import draws_of, noise_of, tubes_of
 from sim.campaign.replay import CYCLE, GIVEN, HEARD, replay
 from sim.campaign.run import run_campaign
+from sim.campaign.sensors import new_work, read_sensors
 from sim.campaign.store import MANIFEST, Folder
 from sim.campaign.summary import OverRuns, Sum, honesty
 from sim.errors import RigError, ScenarioError
@@ -49,12 +49,13 @@ def scenario(**changed: dict[str, Any]) -> Scenario:
 def test_without_noise_every_sensor_reads_what_it_reads_in_the_world_of_a_rig() -> None:
     quiet = scenario(gyroscope=QUIET_GYRO | {"misalignment_std_deg": 0.3}, accelerometer=QUIET_FORCE)
     world, made = World(quiet, 5), Campaign(quiet)
-    draws, noise, work = draws_of(world), noise_of(quiet.file), new_work()
-    wander, hops = np.zeros((3, 3)), np.zeros((3, 3))
+    noise, work, course = noise_of(quiet.file)[0], new_work(), made.course
+    tubes = tubes_of(world, draws_of(world).frame)
+    felt = course.rate, course.force, course.circle, course.shaken
     for tube in (1, 2, 3):
         samples = world.imu_samples(tube)
         for cycle in np.flatnonzero(made.course.powered >= tube)[::7].tolist():
-            draw_cycle(made.course, noise, draws, np.zeros(2, np.uint64), work, wander, hops, int(cycle), tube - 1)
+            read_sensors(noise, tubes[tube - 1], False, 0.0, *felt, work.drawn, work.reading, int(cycle), tube - 1)
             assert np.allclose(work.reading[0, :6], samples[cycle], rtol=0.0, atol=2e-9), (tube, cycle)
 
 
