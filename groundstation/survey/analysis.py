@@ -10,12 +10,13 @@ import numpy as np
 import numpy.typing as npt
 
 from groundstation.errors import SurveyError
-from groundstation.survey.error_model import Uncertainty, propagate
+from groundstation.survey.compiled_model import locate
+from groundstation.survey.error_model import Uncertainty
 from groundstation.survey.error_sources import Leg, Site, Survey
 from groundstation.survey.formulas import is_zero
 from groundstation.survey.frames import SAME_DEPTH, Frame, Norths, TieOn
 from groundstation.survey.instruments import Mode, Term, Tool
-from groundstation.survey.methods import Method, closure, dogleg_severity, positions, vertical_section
+from groundstation.survey.methods import Method, closure, dogleg_severity, vertical_section
 from groundstation.survey.records import Record
 
 Array = npt.NDArray[np.float64]
@@ -48,13 +49,18 @@ class Region:
 
     def by_source(self) -> dict[str, Array]:
         """Covariance (n, 3, 3) by the name of its source; ``tie-on`` is what was there before."""
-        found = {name: self._turned(cov) for name, cov in self.model.by_source().items()}
+        parts = self.model.by_source()
+        found = dict(zip(parts, self._turned(np.stack(list(parts.values()))), strict=True)) if self._turns else parts
         if np.any(self.tie_cov):
-            found["tie-on"] = np.broadcast_to(self.tie_cov, self.model.cov.shape)
+            found = found | {"tie-on": np.broadcast_to(self.tie_cov, self.model.cov.shape)}
         return found
 
+    @property
+    def _turns(self) -> bool:
+        return not np.array_equal(self.turn, np.eye(3))
+
     def _turned(self, cov: Array) -> Array:
-        return np.asarray(self.turn @ cov @ self.turn.T)
+        return np.asarray(self.turn @ cov @ self.turn.T) if self._turns else cov
 
 
 @dataclass(frozen=True, slots=True)
@@ -120,11 +126,11 @@ def analyse(
         )
     azimuth = frame.to_true(record.azimuth)
     start = np.zeros(3) if tie_on is None else _turn(-frame.norths.of(frame.record)) @ tie_on.position
-    places = start + positions(method, record.md, record.inclination, azimuth)
     extra = {name: record.columns[c] * f for c, (name, f) in RECORD_COLUMNS.items() if c in record.columns}
-    survey = Survey(record.md, record.inclination, azimuth, places[:, 2], extra)
+    survey = Survey(record.md, record.inclination, azimuth, record.md, extra)
     legs = [Leg(tool)] if isinstance(tool, Tool) else legs_of(tool, record.md)
-    found = propagate(survey, legs, site, slot_allowance=tie_on is None and legs[0].tool.slot_allowance)
+    allowance = tie_on is None and legs[0].tool.slot_allowance
+    places, found = locate(method, survey, legs, site, start, slot_allowance=allowance)
     turned = places @ frame.turn.T
     distance, direction = closure(turned)
     tie_cov = np.zeros((3, 3))

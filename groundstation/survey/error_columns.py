@@ -21,7 +21,7 @@ Array = npt.NDArray[np.float64]
 
 @dataclass(frozen=True, slots=True)
 class ErrorColumns:
-    """One source: ``effects`` (..., n, 3, m), m = 1 but for a random one, which errs anew at every station."""
+    """One source: ``effects`` (..., n, 3, m), m = 1 but for what errs anew at every station or in every section."""
 
     name: str
     mode: Mode
@@ -43,7 +43,10 @@ def error_columns(survey: Survey, legs: tuple[Leg, ...], site: Site) -> list[Err
     found = []
     for source in sources_of(legs):
         work.evaluate(source)
-        effects = _random(work, source.axes) if source.random else _constant(work.sums())
+        if source.random:
+            effects = _random(work, source.axes)
+        else:
+            effects = np.concatenate([_constant(sums) for sums in work.sums()], axis=-1)
         found.append(ErrorColumns(source.name, source.rows[0][2].mode, effects))
     return found
 

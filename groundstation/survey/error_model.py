@@ -5,7 +5,7 @@ azimuth, and these on the two legs that meet there (balanced tangential Jacobian
 
     e_ik  = sigma_i (d dr_k/dp_k + d dr_k+1/dp_k) dp_k/deps_i        e*_iK = sigma_i (d dr_K/dp_K) dp_K/deps_i
     random:            C_K = sum_{k<K} e_k e_k^T + e*_K e*_K^T
-    systematic in a leg of the survey, in the well, in all wells:
+    systematic in a section of a gyro survey, in a leg of the survey, in the well, in all wells:
                        C_K = (sum_{k<K} e_k + e*_K) (sum_{k<K} e_k + e*_K)^T      over the stations it is shared by
 
 A leg here is a part of the hole that one tool surveyed. Arrays are (..., n): leading axes are wells. Frame: north,
@@ -15,7 +15,7 @@ east, down. Source: thesis 2.3 and eqs. I.1-I.12; Definition of the ISCWSA error
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -37,6 +37,7 @@ from groundstation.survey.error_sources import (
     station_values,
 )
 from groundstation.survey.formulas import ARRAY, is_zero
+from groundstation.survey.gyro_modes import mode_weights, sections_of
 from groundstation.survey.instruments import Mode, Term, Tool
 
 Array = npt.NDArray[np.float64]
@@ -52,12 +53,16 @@ class Propagation:
     def __init__(self, survey: Survey, legs: Sequence[Leg], site: Site, geometry: Geometry) -> None:
         self._geometry = g = geometry
         self._legs = legs
+        self._inclination = survey.inclination
         values = station_values(survey, site)
         self._weights = []
         for leg in legs:
             function = compiled(tuple(term.formulas for term in leg.tool.terms), tuple(leg.tool.parameters))
             with np.errstate(all="ignore"):
-                self._weights.append(function(ARRAY, inputs_of(leg.tool, site, values)))
+                weights = function(ARRAY, inputs_of(leg.tool, site, values))
+            for t, found in mode_weights(leg, survey, site).items():
+                weights[9 * t : 9 * t + len(found)] = found
+            self._weights.append(weights)
         self.inner = np.empty((3, *g.upper.shape))
         self.last = np.empty((3, *g.upper.shape))
         self._work = np.empty(g.upper.shape)
@@ -70,7 +75,7 @@ class Propagation:
         ToolError
             When a weight has no value at a station: the formula divides by zero there and no singular one is given.
         """
-        self._axes = source.axes
+        self._axes, self._source = source.axes, source
         if len(self._legs) == 1:
             self._row(*source.rows[0])
             return
@@ -83,12 +88,18 @@ class Propagation:
             last[..., begin:end] += self.last[..., begin:end]
         self.inner[...], self.last[...] = inner, last
 
-    def sums(self) -> Array:
-        """Effect (axes, ..., n - 1) on every position of the source, if it stays the same; ``inner`` is used up."""
+    def sums(self) -> Iterator[Array]:
+        """Effects (axes, ..., n - 1) on every position of the source, if it stays the same: one for every section.
+
+        ``inner`` and ``last`` are used up.
+        """
         inner, last = self.inner[: self._axes], self.last[: self._axes]
-        np.cumsum(inner, axis=-1, out=inner)
-        last[..., 1:] += inner[..., :-1]
-        return last
+        if self._source.renewed:
+            section = sections_of(self._source.rows[0][2], self._inclination)
+            for number in range(int(np.max(section)) + 1):
+                yield _summed(inner * (section == number), last * (section == number))
+        else:
+            yield _summed(inner, last)
 
     def _row(self, number: int, t: int, term: Term) -> None:
         g, flat = self._geometry, self._weights[number][9 * t : 9 * t + 9]
@@ -138,6 +149,13 @@ class Propagation:
                 out[c] = np.where(g.vertical, weight * term.sigma, out[c])
 
 
+def _summed(inner: Array, last: Array) -> Array:
+    """Effect of what stays the same: of all stations before with both legs, and of the last; both are used up."""
+    np.cumsum(inner, axis=-1, out=inner)
+    last[..., 1:] += inner[..., :-1]
+    return last
+
+
 PAIRS = ((0, 0), (0, 1), (1, 1), (0, 2), (1, 2), (2, 2))  # the first three are those of the plane
 
 
@@ -156,7 +174,8 @@ class Sums:
             self._add(self._before, work.inner[: source.axes])
             self._add(self._own, work.last[: source.axes])
         else:
-            self._add(self._own, work.sums())
+            for effect in work.sums():
+                self._add(self._own, effect)
 
     def add_to(self, out: Array) -> None:
         """Add the covariance of all that was taken to ``out`` (..., n, 3, 3)."""
@@ -182,16 +201,19 @@ class Uncertainty:
     survey: Survey
     legs: tuple[Leg, ...]
     site: Site
-    geometry: Geometry
+    slot_allowance: bool
     cov: Array  # (..., n, 3, 3) m^2
+    quick_parts: Callable[[Uncertainty], dict[str, Array]] | None = None  # a faster way to ``by_source``
 
     def by_source(self) -> dict[str, Array]:
         """Covariance (..., n, 3, 3) by the name of its source; from the second station on they add up to ``cov``."""
-        work = Propagation(self.survey, self.legs, self.site, self.geometry)
+        if self.quick_parts is not None:
+            return self.quick_parts(self)
+        work = self._propagation()
         found: dict[str, Array] = {}
         for source in sources_of(self.legs):
             out = found.setdefault(source.name, np.zeros_like(self.cov))
-            sums = Sums(self.geometry.upper.shape)
+            sums = Sums(work.last.shape[1:])
             sums.add_source(work, source)
             sums.add_to(out)
         return found
@@ -213,9 +235,13 @@ class Uncertainty:
         blend = (1.0 - f) ** 2 * self.cov[k] + f**2 * self.cov[k + 1] + f * (1.0 - f) * (across + across.T)
         return np.asarray(blend)
 
+    def _propagation(self) -> Propagation:
+        geometry = Geometry(self.survey, slot_allowance=self.slot_allowance)
+        return Propagation(self.survey, self.legs, self.site, geometry)
+
     def _between(self, k: int) -> Array:
         """Covariance (3, 3) of the position of station k with that of the next."""
-        work = Propagation(self.survey, self.legs, self.site, self.geometry)
+        work = self._propagation()
         across = np.zeros((3, 3))
         for source in sources_of(self.legs):
             work.evaluate(source)
@@ -224,8 +250,8 @@ class Uncertainty:
                 own = np.outer(work.last[:axes, k - 1], work.inner[:axes, k - 1])
                 across[:axes, :axes] += before @ before.T + own
             else:
-                sums = work.sums()
-                across[: source.axes, : source.axes] += np.outer(sums[:, k - 1], sums[:, k])
+                for sums in work.sums():
+                    across[: source.axes, : source.axes] += np.outer(sums[:, k - 1], sums[:, k])
         return across
 
 
@@ -237,11 +263,7 @@ def propagate(survey: Survey, legs: Sequence[Leg], site: Site, *, slot_allowance
     SurveyError, ToolError
         When legs and survey do not fit, or a tool is used outside the inclinations it is made for.
     """
-    firsts = [leg.first for leg in legs]
-    if not legs or firsts[0] != 1 or sorted(set(firsts)) != firsts or firsts[-1] >= survey.md.shape[-1]:
-        raise SurveyError(f"legs: expected to begin at station 1 and at growing stations of the survey, got {firsts}")
-    for leg, end in zip(legs, [*firsts[1:], survey.md.shape[-1]], strict=True):
-        _check_range(leg, survey, end)
+    check_legs(survey, legs)
     g = Geometry(survey, slot_allowance=slot_allowance)
     work = Propagation(survey, legs, site, g)
     sums = Sums(g.upper.shape)
@@ -251,12 +273,23 @@ def propagate(survey: Survey, legs: Sequence[Leg], site: Site, *, slot_allowance
     cov = np.zeros((*survey.md.shape, 3, 3))
     sums.add_to(cov)
     cov[..., 0, :, :] = surface_covariance(survey.md, survey.inclination, survey.azimuth, legs[0].tool)
-    return Uncertainty(survey, tuple(legs), site, g, cov)
+    return Uncertainty(survey, tuple(legs), site, slot_allowance, cov)
 
 
-def _check_range(leg: Leg, survey: Survey, end: int) -> None:
-    inclination = survey.inclination[..., leg.first : end]
-    check_inclination(leg.tool, float(np.min(inclination)), float(np.max(inclination)))
+def check_legs(survey: Survey, legs: Sequence[Leg]) -> None:
+    """Refuse legs that do not fit the survey.
+
+    Raises
+    ------
+    SurveyError, ToolError
+        Names the stations, or the tool and the inclination that it is not made for.
+    """
+    firsts = [leg.first for leg in legs]
+    if not legs or firsts[0] != 1 or sorted(set(firsts)) != firsts or firsts[-1] >= survey.md.shape[-1]:
+        raise SurveyError(f"legs: expected to begin at station 1 and at growing stations of the survey, got {firsts}")
+    for leg, end in zip(legs, [*firsts[1:], survey.md.shape[-1]], strict=True):
+        inclination = survey.inclination[..., leg.first : end]
+        check_inclination(leg.tool, float(np.min(inclination)), float(np.max(inclination)))
 
 
 def check_inclination(tool: Tool, least: float, most: float) -> None:

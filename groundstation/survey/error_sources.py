@@ -78,6 +78,7 @@ def inputs_of(tool: Tool, site: Site, values: Mapping[str, Any]) -> list[Any]:
         "Dip": site.dip,
         "Latitude": site.latitude,
         "EarthRate": EARTH_RATE,
+        "Previous": 0.0,
         **values,
     }
     return [known[name] for name in VARIABLES] + list(tool.parameters.values())
@@ -130,6 +131,7 @@ class Source:
         self.rows = rows
         self.name = rows[0][2].name
         self.random = rows[0][2].mode is Mode.RANDOM
+        self.renewed = rows[0][2].mode is Mode.SECTION and rows[0][2].by_mode
         # what turns the azimuth alone moves nothing down
         flat = all(is_zero(t.weights[0]) and is_zero(t.weights[1]) and t.position is None for _, _, t in rows)
         self.axes = 2 if flat and all(is_zero((t.singular or ZERO)[2]) for _, _, t in rows) else 3
@@ -152,7 +154,8 @@ def merged_sources(legs: tuple[Leg, ...]) -> list[Source]:
     found: dict[Any, list[Source]] = {}
     for k, source in enumerate(sources_of(legs)):
         number, _, term = source.rows[0]
-        alike = (number, source.random, term.weights, term.singular, term.position, term.unit)
+        formula = (term.formulas, term.singular is None, term.position is None, term.unit, term.window, term.kept)
+        alike = (number, source.random, source.renewed, formula)
         found.setdefault(alike if len(source.rows) == 1 else k, []).append(source)
     out = []
     for group in found.values():

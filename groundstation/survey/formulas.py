@@ -23,7 +23,7 @@ from groundstation.errors import ToolError
 VARIABLES = (
     "MD", "MDPrev", "TVD", "Inc", "IncPrev", "Az", "AzPrev", "AzT", "AzTPrev", "AzM", "AzMPrev",
     "GField", "BField", "Dip", "Latitude", "EarthRate", "Time", "TimePrev",
-    "SigmaYaw", "SigmaSystematic", "SigmaForce", "Readings",
+    "SigmaYaw", "SigmaSystematic", "SigmaForce", "Readings", "Previous",
 )  # fmt: skip
 CONSTANTS = {"pi": math.pi, "rad": math.pi / 180.0}
 FUNCTIONS = {"sin": 1, "cos": 1, "tan": 1, "sqrt": 1, "sqr": 1, "abs": 1, "max": 2, "min": 2, "step": 1}
@@ -46,7 +46,8 @@ Compiled = Callable[[Any, Sequence[Any]], list[Any]]
 class _Writer:
     """Collects assignments; equal parts share one."""
 
-    def __init__(self, names: dict[str, str]) -> None:
+    def __init__(self, names: dict[str, str], parameters: Sequence[str]) -> None:
+        self._parameters = parameters
         self.lines: list[str] = []
         self.used: set[str] = set()
         self._names = names
@@ -72,9 +73,12 @@ class _Writer:
     def _name(self, name: str) -> str:
         if name.lower() in CONSTANTS:
             return _token(CONSTANTS[name.lower()])
-        known = self._names.get(name.lower())
+        known = self._names.get(plain(name))
         if known is None:
-            raise ToolError(f"unknown name {name}; expected one of {', '.join(VARIABLES)} or a parameter of the tool")
+            own = ", ".join(self._parameters) or "it has none"
+            raise ToolError(
+                f"unknown name {name}; expected one of {', '.join(VARIABLES)} or a parameter of the tool ({own})"
+            )
         self.used.add(known)
         return known
 
@@ -144,6 +148,11 @@ def _number(token: str) -> float | None:
         return None
 
 
+def plain(name: str) -> str:
+    """A name as formulas compare it: published files write gxy_running_speed and GXYRunningSpeed."""
+    return name.lower().replace("_", "")
+
+
 def parse(text: str) -> ast.expr:
     """Tree of one formula.
 
@@ -188,8 +197,8 @@ def translate(formulas: Iterable[str], parameters: Sequence[str] = ()) -> Progra
     ToolError
         With the formula that cannot be translated.
     """
-    names = {name.lower(): f"v{k}" for k, name in enumerate([*VARIABLES, *parameters])}
-    writer = _Writer(names)
+    names = {plain(name): f"v{k}" for k, name in enumerate([*VARIABLES, *parameters])}
+    writer = _Writer(names, parameters)
     results = []
     for text in formulas:
         try:

@@ -3,13 +3,15 @@
 A tool is a TOML file in ``tools/`` (or the user's own); ``iscwsa_json`` reads and writes the industry's JSON schema.
 A term acts on depth, inclination and azimuth through formulas; where the hole is vertical and an azimuth formula has
 no value, ``singular`` states its effect on north, east and down per metre of leg; ``position`` terms act on the
-position of a station directly. Source: ISCWSA error model definition; thesis Appendix I.
+position of a station directly. Terms of gyros that initialise and then run act in a range of inclinations and may keep
+their value beyond it (``gyro_modes``). Source: ISCWSA error model definition; SPE 90408; thesis Appendix I.
 """
 
 from __future__ import annotations
 
 import math
 import tomllib
+from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from enum import Enum
 from importlib import resources
@@ -17,17 +19,21 @@ from pathlib import Path
 from typing import Any
 
 from groundstation.errors import ToolError
-from groundstation.survey.formulas import CONSTANTS, FUNCTIONS, VARIABLES, compile_formulas
+from groundstation.survey.formulas import CONSTANTS, FUNCTIONS, VARIABLES, compile_formulas, is_zero, plain
 
 Triple = tuple[str, str, str]
 LARGEST = 1e300
 ZERO: Triple = ("0", "0", "0")
+Window = tuple[float, float]
+EVERYWHERE: Window = (-math.inf, math.inf)
+PREVIOUS = "previous"  # the azimuth weight of the station before, of drift and random walk
 
 
 class Mode(Enum):
     """How far an error stays the same."""
 
     RANDOM = "random"  # another one at every station
+    SECTION = "section"  # the same from one initialisation of a gyro to the next, within a leg
     SYSTEMATIC = "systematic"  # the same within a leg
     WELL = "well"  # the same within a well
     GLOBAL = "global"  # the same in all wells
@@ -38,7 +44,7 @@ UNITS = {
     "deg": math.radians(1.0), "deg.nT": math.radians(1.0), "deg/nT": math.radians(1.0),
     "deg/s": math.radians(1.0), "deg/rts": math.radians(1.0), "mm": 1e-3,
     # the industry's gyro formulas count in hours, and so does the variable EarthRate
-    "deg/hr": math.radians(1.0), "deg/rthr": math.radians(1.0),
+    "deg/hr": math.radians(1.0), "deg/rthr": math.radians(1.0), "deg/sqr(hr)": math.radians(1.0),
 }  # fmt: skip
 
 
@@ -53,6 +59,13 @@ class Term:
     weights: Triple = ZERO  # of depth (m), inclination and azimuth (rad)
     singular: Triple | None = None  # north, east, down per metre of leg where the hole is vertical
     position: Triple | None = None  # north, east, down of the station itself
+    window: Window = EVERYWHERE  # acts at inclinations above the first and up to the second, rad
+    kept: bool = False  # beyond the window it keeps the value that it had there
+
+    @property
+    def by_mode(self) -> bool:
+        """Whether it depends on the stations before: a gyro that initialises, drifts or walks."""
+        return self.window != EVERYWHERE or self.kept or PREVIOUS in " ".join(self.weights).lower()
 
     @property
     def sigma(self) -> float:
@@ -71,7 +84,7 @@ class Tool:
 
     name: str
     title: str
-    terms: tuple[Term, ...]
+    terms: tuple[Term, ...] = field(hash=False)  # long, and equality looks at them
     parameters: dict[str, float] = field(default_factory=dict, hash=False)
     source: str = ""
     revision: str = ""
@@ -93,6 +106,10 @@ class Tool:
                 )
             if not math.isfinite(term.value):
                 raise ToolError(f"{self.name}: term {term.name}: expected a finite value, got {term.value}")
+            if term.by_mode and not (is_zero(term.weights[0]) and term.position is None):
+                raise ToolError(f"{self.name}: term {term.name}: a gyro's ranges and recurrences are of angles alone")
+            if not term.window[0] <= term.window[1]:
+                raise ToolError(f"{self.name}: term {term.name}: expected above_deg at most up_to_deg")
             try:
                 compile_formulas(term.formulas, tuple(self.parameters))
             except ToolError as error:
@@ -113,8 +130,10 @@ def shipped() -> list[str]:
     return sorted(entry.name.removesuffix(".toml") for entry in folder.iterdir() if entry.name.endswith(".toml"))
 
 
-def load_tool(name_or_file: str) -> Tool:
-    """Tool by its name, or of a TOML or ISCWSA JSON file.
+def load_tool(name_or_file: str, parameters: Mapping[str, float] | None = None) -> Tool:
+    """Tool by its name, of the OWSG set by its name there, or of a TOML or ISCWSA JSON file.
+
+    ``parameters`` are those that it leaves out, or in place of its own.
 
     Raises
     ------
@@ -123,11 +142,17 @@ def load_tool(name_or_file: str) -> Tool:
     """
     if name_or_file in shipped():
         text = (resources.files("groundstation.survey") / "tools" / f"{name_or_file}.toml").read_text("utf-8")
-        return parse_toml(text, name_or_file)
+        return parse_toml(text, name_or_file, parameters)
     path = Path(name_or_file)
     if path.suffix not in (".toml", ".json"):
+        from groundstation.survey.owsg import owsg_tool
+
+        found = owsg_tool(name_or_file, parameters)
+        if found is not None:
+            return found
         raise ToolError(
-            f"{name_or_file}: no such instrument; expected one of {', '.join(shipped())}, or a .toml or .json file"
+            f"{name_or_file}: no such instrument; expected one of {', '.join(shipped())}, one of the OWSG set such as "
+            "MWD+IFR1+SAG+MS or GYRO-NS-CT (borechain survey --tools), or a .toml or .json file"
         )
     try:
         text = path.read_text("utf-8")
@@ -137,11 +162,11 @@ def load_tool(name_or_file: str) -> Tool:
     if path.suffix == ".json":
         from groundstation.survey.iscwsa_json import parse_json
 
-        return parse_json(text, str(path))
-    return parse_toml(text, str(path))
+        return parse_json(text, str(path), parameters)
+    return parse_toml(text, str(path), parameters)
 
 
-def parse_toml(text: str, where: str) -> Tool:
+def parse_toml(text: str, where: str, replaced: Mapping[str, float] | None = None) -> Tool:
     """Tool of TOML text; errors as ``load_tool``, beginning with ``where``."""
     try:
         data = tomllib.loads(text)
@@ -159,7 +184,8 @@ def parse_toml(text: str, where: str) -> Tool:
     given = data.get("parameters", {})
     if not isinstance(given, dict) or not isinstance(data["term"], list):
         raise ToolError(f"{where}: term or parameters: expected a table [parameters] and terms [[term]]")
-    parameters = {name: number(where, f"parameters.{name}", value) for name, value in given.items()}
+    own = {name: number(where, f"parameters.{name}", value) for name, value in given.items()}
+    parameters = with_parameters(own, replaced or {})
     check_parameters(where, parameters)
     limit = math.radians(number(where, "tool.inclination_max_deg", head.get("inclination_max_deg", 180.0)))
     terms = tuple(_term(where, k, row) for k, row in enumerate(data["term"], 1))
@@ -179,25 +205,31 @@ def parse_toml(text: str, where: str) -> Tool:
         raise ToolError(f"{where}: {error}") from None
 
 
+def with_parameters(own: dict[str, float], given: Mapping[str, float]) -> dict[str, float]:
+    """Parameters of a file with what was given in their place or beside them."""
+    names = {plain(name) for name in given}
+    return {name: value for name, value in own.items() if plain(name) not in names} | dict(given)
+
+
 def check_parameters(where: str, parameters: dict[str, float]) -> None:
-    """Refuse names that formulas would not find or would find twice; they are read without regard to case.
+    """Refuse names that formulas would not find or would find twice; case and underscores do not count.
 
     Raises
     ------
     ToolError
         Names file and parameter.
     """
-    taken = {name.lower() for name in (*VARIABLES, *CONSTANTS, *FUNCTIONS)}
+    taken = {plain(name) for name in (*VARIABLES, *CONSTANTS, *FUNCTIONS)}
     for name in parameters:
-        if name.lower() in taken:
-            whose = "a variable" if name.lower() in {v.lower() for v in VARIABLES} else "something else"
+        if plain(name) in taken:
+            whose = "a variable" if plain(name) in {plain(v) for v in VARIABLES} else "something else"
             raise ToolError(f"{where}: parameters.{name}: the name is that of {whose}; choose another")
-        taken.add(name.lower())
+        taken.add(plain(name))
 
 
 TERM_KEYS = {
     "name", "value", "unit", "mode", "depth", "inclination", "azimuth", "singular_north", "singular_east",
-    "singular_down", "north", "east", "down",
+    "singular_down", "north", "east", "down", "above_deg", "up_to_deg", "kept",
 }  # fmt: skip
 
 
@@ -212,7 +244,13 @@ def _term(where: str, k: int, row: Any) -> Term:
         _triple(row, ("depth", "inclination", "azimuth")) or ZERO,
         _triple(row, ("singular_north", "singular_east", "singular_down")),
         _triple(row, ("north", "east", "down")),
+        (_angle(where, str(name), row, "above_deg", -math.inf), _angle(where, str(name), row, "up_to_deg", math.inf)),
+        row.get("kept", False) is True,
     )
+
+
+def _angle(where: str, name: str, row: dict[str, Any], key: str, default: float) -> float:
+    return math.radians(number(where, f"term {name}: {key}", row[key])) if key in row else default
 
 
 def _triple(row: dict[str, Any], names: tuple[str, str, str]) -> Triple | None:

@@ -55,6 +55,9 @@ class RunningUncertainty:
         *,
         slot_allowance: bool = False,
     ) -> None:
+        modes = [term.name for term in tool.terms if term.by_mode]
+        if modes:
+            raise ToolError(f"{tool.name}: term {modes[0]} depends on the stations before; expected a whole survey")
         # constant sources first, so that both kinds are slices
         terms = sorted(tool.terms, key=lambda term: term.mode is Mode.RANDOM)
         self._tool = tool.with_terms(tuple(terms))

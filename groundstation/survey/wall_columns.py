@@ -213,7 +213,7 @@ def _key(source: ErrorColumns, plan: ColumnPlan) -> str | None:
     """Name under which columns share a source; None where it is a column's own."""
     if source.mode is Mode.GLOBAL:
         return source.name
-    if source.mode is Mode.RANDOM or not plan.serial:
+    if source.mode in (Mode.RANDOM, Mode.SECTION) or not plan.serial:
         return None
     return f"{plan.serial}/{source.name}"
 

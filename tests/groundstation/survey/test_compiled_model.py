@@ -1,16 +1,20 @@
 """The compiled loop against the arrays: the same numbers, the same refusals."""
 
 import math
+from pathlib import Path
 
 import numpy as np
 import pytest
 
 from groundstation.errors import SurveyError, ToolError
-from groundstation.survey.compiled_model import CompiledModel, write_model
+from groundstation.survey.analysis import analyse
+from groundstation.survey.compiled_model import COMPILED_FROM, CompiledModel, write_model
 from groundstation.survey.error_model import propagate
 from groundstation.survey.error_sources import Leg, Site, Survey
+from groundstation.survey.frames import Frame, Norths
 from groundstation.survey.instruments import Mode, Term, Tool, load_tool, shipped
 from groundstation.survey.methods import Method, positions
+from groundstation.survey.records import Record
 
 SITE = Site(9.80665, 50_300.0, math.radians(68.0), math.radians(2.0), math.radians(55.0))
 
@@ -44,6 +48,31 @@ def test_a_compiled_tool_gives_what_the_arrays_give(name: str) -> None:
             assert np.max(np.abs(cov - wanted) / scale) < 1e-11
 
 
+GYRO_MODELS = sorted((Path(__file__).parents[2] / "data" / "survey").glob("spe90408-model-4.toml"))
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", ["relay", *map(str, GYRO_MODELS)], ids=lambda name: Path(name).stem)
+def test_every_compiled_source_is_that_of_the_arrays(name: str) -> None:
+    tool = load_tool(name)
+    model, whole = CompiledModel(tool, by_source=True), CompiledModel(tool)
+    md, inclination, azimuth = wells(7)[-1]
+    inclination = np.abs(np.radians(40.0) * np.sin(np.linspace(0.0, 7.0, len(md)))) * (
+        inclination > 0.0
+    )  # passes gates
+    places = positions(Method.RADIUS_OF_CURVATURE, md, inclination, azimuth)
+    record = {"SigmaYaw": np.linspace(0.001, 0.01, len(md)), "Time": np.linspace(0.0, 9000.0, len(md))}
+    survey = Survey(md, inclination, azimuth, places[:, 2], record)
+    wanted = propagate(survey, [Leg(tool)], SITE, slot_allowance=True)
+    cov, parts = model.covariance(survey, SITE, slot_allowance=True)
+    scale = np.trace(wanted.cov, axis1=1, axis2=2)[:, None, None] + 1e-30
+    assert list(parts) == [term.name for term in tool.terms]
+    for source, expected in wanted.by_source().items():
+        assert np.max(np.abs(parts[source] - expected)[1:] / scale[1:]) < 1e-11, source
+    for found in (cov, whole.covariance(survey, SITE, slot_allowance=True)[0]):
+        assert np.max(np.abs(found - wanted.cov) / scale) < 1e-11
+
+
 def test_the_written_loop_is_cached_by_its_text() -> None:
     tool = load_tool("stim300")
     assert write_model(tool) == write_model(load_tool("stim300"))
@@ -53,12 +82,24 @@ def test_the_written_loop_is_cached_by_its_text() -> None:
 def test_what_cannot_be_is_refused() -> None:
     model = CompiledModel(load_tool("stim300"))
     md, zero = np.array([0.0, 10.0, 20.0]), np.zeros(3)
-    with pytest.raises(SurveyError, match="balanced-tangential or minimum-curvature"):
-        model.run(Method.TANGENTIAL, md, zero, zero, SITE)
     with pytest.raises(SurveyError, match="expected a depth beyond 10 m"):
         model.run(Method.MINIMUM_CURVATURE, np.array([0.0, 10.0, 10.0]), zero, zero, SITE)
     with pytest.raises(SurveyError, match="station 1: the hole turns straight back"):
         model.run(Method.MINIMUM_CURVATURE, md, np.array([0.0, math.pi, math.pi]), zero, SITE)
     endless = Tool("t", "t", (Term("A", 1.0, "deg", Mode.SYSTEMATIC, ("0", "1 / Sin(Inc)", "0")),))
-    with pytest.raises(ToolError, match="no value at station 1"):
+    with pytest.raises(ToolError, match="term A: its weight has no value"):
         CompiledModel(endless).run(Method.MINIMUM_CURVATURE, md, zero, zero, SITE)
+
+
+@pytest.mark.slow
+def test_a_long_survey_is_compiled_and_a_short_one_of_it_is_the_same() -> None:
+    md = np.linspace(0.0, 400.0, COMPILED_FROM)
+    record = Record(md, np.linspace(0.0, 0.4, len(md)), np.linspace(0.5, 1.0, len(md)), list(range(len(md))), {})
+    short = Record(*(x[:-1] for x in (md, record.inclination, record.azimuth)), record.lines[:-1], {})
+    tool, method, frame = load_tool("relay"), Method.MINIMUM_CURVATURE, Frame("site", "true", Norths(site=0.2))
+    compiled, arrays = (analyse(r, method, tool, SITE, frame=frame).uncertainty for r in (record, short))
+    assert compiled.model.quick_parts is not None
+    assert arrays.model.quick_parts is None
+    np.testing.assert_allclose(compiled.cov[:-2], arrays.cov[:-1], rtol=1e-9, atol=1e-15)
+    for name, cov in arrays.by_source().items():
+        np.testing.assert_allclose(compiled.by_source()[name][1:-2], cov[1:-1], rtol=1e-9, atol=1e-15)
