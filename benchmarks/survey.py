@@ -130,13 +130,13 @@ def run() -> dict[str, Any]:
         return propagate(Survey(md, inclination, azimuth, places[:, 2]), [Leg(tool)], site, slot_allowance=True)
 
     def peer() -> Any:
-        survey = welleng.survey.Survey(
+        survey: Any = welleng.survey.Survey(
             md, inclination_deg, azimuth_deg, header=header, error_model="ISCWSA MWD Rev5.11"
         )
         return survey.err.errors.cov_NEVs
 
     def peer_by_source() -> Any:
-        survey = welleng.survey.Survey(
+        survey: Any = welleng.survey.Survey(
             md, inclination_deg, azimuth_deg, header=header, error_model="ISCWSA MWD Rev5.11"
         )
         errors = survey.err.errors

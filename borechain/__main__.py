@@ -37,6 +37,7 @@ COMMANDS = {
     ),
     "allan": ("borechain.cli.calibrate.allan", "allan", "Noise of a sensor from a static record."),
     "survey": ("borechain.cli.survey.survey", "survey", "Trajectory and region of uncertainty of a record."),
+    "clearance": ("borechain.cli.survey.clearance", "clearance", "How far two holes keep from each other."),
     "wall": (
         "borechain.cli.survey.wall",
         "wall",

@@ -80,6 +80,43 @@ def test_depths_between_stations_and_a_collar_that_is_left_out(tmp_path: Path) -
 DEEP = "md_m,inclination_deg,azimuth_deg\n500,30,40\n530,32,44\n560,35,50\n"
 
 
+def test_a_tool_of_the_owsg_set_and_its_sources_at_every_station(tmp_path: Path) -> None:
+    file = tmp_path / "sources.csv"
+    well = ROOT / "tests" / "data" / "survey" / "iscwsa_well_3.csv"
+    words = (well, "--method", "minimum-curvature", "--instrument", "CB_Film_GSS", "--latitude-deg", -40)
+    assert "unknown name GZRunningSpeed" in refused("survey", *words)
+    assert "expected NAME=VALUE with a number, got 'GZ'" in refused("survey", *words, "--parameter", "GZ")
+    shallow = tmp_path / "shallow.csv"
+    shallow.write_text("".join(line + "\n" for line in well.read_text().splitlines()[:60]))
+    found = answer(
+        "survey", shallow, *words[1:], "--parameter", "GZRunningSpeed=1800", "--by-source", file, "--sigma", 2
+    )
+    rows = [line.split(",") for line in file.read_text().splitlines()]
+    assert rows[0][:4] == ["md_m", "source", "nn_m2", "ee_m2"]
+    last = found["stations"][-1]
+    total = sum(float(row[2]) for row in rows[1:] if float(row[0]) == last["md_m"])
+    assert total == pytest.approx(last["uncertainty"]["covariance_m2"][0][0])
+    hla = np.array(last["uncertainty"]["covariance_hla_m2"])
+    assert np.trace(hla) == pytest.approx(np.trace(last["uncertainty"]["covariance_m2"]))
+    # due north at 50 deg: lateral is east, highside and along share north and down
+    assert hla[1, 1] == pytest.approx(last["uncertainty"]["covariance_m2"][1][1])
+    assert last["uncertainty"]["lateral_m"] == pytest.approx(2.0 * np.sqrt(hla[1, 1]))
+    assert "MWD+IFR1+SAG+MS" in run("survey", "--tools").stdout
+
+
+def test_two_holes_that_come_near_end_with_status_three(tmp_path: Path) -> None:
+    one, other = tmp_path / "one.csv", tmp_path / "other.csv"
+    one.write_text("MD (m),Inc,Azi\n0,0,0\n15,2,90\n30,2,90\n")
+    other.write_text("MD (m),Inc,Azi\n0,0,0\n15,0,0\n30,0,0\n")
+    words = ("clearance", one, other, "--offset-head", 0, 1.4, 0, "--radius-m", 0.1, "--offset-radius-m", 0.1)
+    far = answer(*words, "--sigma-ahead-m", 0.02, "--margin-m", 0.0)
+    near = answer(*words, status=3)
+    assert (far["clear"], near["clear"]) == (True, False)
+    assert near["least"]["md_m"] == 30.0
+    assert near["least"]["distance_m"] == pytest.approx(0.616, abs=0.01)
+    assert "TOO NEAR: least factor" in run(*words).stdout
+
+
 def test_a_file_that_begins_at_500_m_needs_its_beginning(tmp_path: Path) -> None:
     record, tie = tmp_path / "s.csv", tmp_path / "tie.toml"
     record.write_text(DEEP)

@@ -77,6 +77,15 @@ def axes(cov: Array, sigma: float = 1.0) -> tuple[Array, Array]:
     return sigma * np.sqrt(np.maximum(values[::-1], 0.0)), vectors[:, ::-1].T.copy()
 
 
+def hole_axes(inclination: float, azimuth: float) -> Array:
+    """Highside, lateral (to the right of it) and along the hole: unit vectors (3, 3), one a row.
+
+    Where the hole is vertical the highside is the direction of its azimuth, as in the industry's models.
+    """
+    si, ci, sa, ca = math.sin(inclination), math.cos(inclination), math.sin(azimuth), math.cos(azimuth)
+    return np.array([[ci * ca, ci * sa, -si], [-sa, ca, 0.0], [si * ca, si * sa, ci]])
+
+
 def outline(cov: Array, sigma: float, points: int = 73) -> Array:
     """Closed outline (points, 2) of the ellipse of a covariance (2, 2)."""
     values, vectors = np.linalg.eigh(cov)

@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-import csv
 import datetime
-import io
 import json
 import math
 from pathlib import Path
@@ -15,6 +13,7 @@ import click
 from borechain.cli.faults import InputFault, plain_faults
 from borechain.cli.files import PLOT_FORMATS, check_suffix, write_whole
 from borechain.cli.options import json_option
+from borechain.cli.survey.answer import at_depth, source_text, sources, station_rows, table_text
 from borechain.cli.tables import console
 from telemetry.runtime.command_line import check_installed
 
@@ -26,6 +25,34 @@ if TYPE_CHECKING:
 NORTHS = ("site", "true", "grid", "magnetic")
 METHODS = ("tangential", "balanced-tangential", "average-angle", "radius-of-curvature", "minimum-curvature")
 SOURCES_SHOWN = 12
+
+
+def list_tools(context: click.Context, _option: click.Parameter, value: bool) -> None:
+    """Names of the error models, one a line."""
+    if not value:
+        return
+    from groundstation.survey.instruments import load_tool, shipped
+    from groundstation.survey.owsg import owsg_names
+
+    for name in shipped():
+        click.echo(f"{name:28} {load_tool(name).title}")
+    for name, title in owsg_names().items():
+        click.echo(f"{name:28} OWSG: {title}")
+    context.exit()
+
+
+def parameters_of(words: tuple[str, ...]) -> dict[str, float]:
+    """Constants of an error model as given: ``NAME=VALUE``."""
+    found = {}
+    for word in words:
+        name, sign, text = word.partition("=")
+        try:
+            found[name.strip()] = float(text)
+        except ValueError:
+            sign = ""
+        if not sign or not name.strip().isidentifier() or not math.isfinite(found[name.strip()]):
+            raise InputFault(f"--parameter: expected NAME=VALUE with a number, got {word!r}")
+    return found
 
 
 @click.command()
@@ -42,7 +69,16 @@ SOURCES_SHOWN = 12
     default="relay",
     show_default=True,
     metavar="NAME|FILE",
-    help="Error model: the name of one that comes with the program, or a TOML or JSON file.",
+    help="Error model: one that comes with the program, one of the OWSG set, or a TOML or JSON file.",
+)
+@click.option(
+    "--parameter",
+    multiple=True,
+    metavar="NAME=VALUE",
+    help="A constant that the error model leaves out, or in place of its own, such as GXYRunningSpeed=1800.",
+)
+@click.option(
+    "--tools", is_flag=True, is_eager=True, expose_value=False, callback=list_tools, help="List error models."
 )
 @click.option(
     "--sigma",
@@ -117,6 +153,11 @@ SOURCES_SHOWN = 12
 @click.option("--latitude-deg", type=float, default=52.0, show_default=True, help="Latitude, for gyroscopes.")
 @click.option("--out", type=click.Path(path_type=Path, dir_okay=False), help="Station table, a .csv file.")
 @click.option(
+    "--by-source",
+    type=click.Path(path_type=Path, dir_okay=False),
+    help="Covariance of every source at every station at one sigma, a .csv file.",
+)
+@click.option(
     "--plot",
     type=click.Path(path_type=Path, dir_okay=False),
     help="Plan, sections and uncertainty as .svg, .png or .pdf.",
@@ -130,6 +171,7 @@ def survey(
     file: Path,
     method: str,
     instrument: str,
+    parameter: tuple[str, ...],
     sigma: float,
     azimuth_error_deg: float | None,
     displacement_rule: str,
@@ -150,6 +192,7 @@ def survey(
     declination_deg: float,
     latitude_deg: float,
     out: Path | None,
+    by_source: Path | None,
     plot: Path | None,
     export_tool: Path | None,
     as_json: bool,
@@ -173,6 +216,7 @@ def survey(
     from groundstation.survey.records import DisplacementRule, with_collar
 
     check_suffix("--out", out, ".csv")
+    check_suffix("--by-source", by_source, ".csv")
     check_suffix("--plot", plot, *PLOT_FORMATS)
     check_suffix("--export-tool", export_tool, ".json")
     if plot is not None:
@@ -185,7 +229,7 @@ def survey(
         raise InputFault("expected --from-collar or --tie-on, got both")
     if programme is not None and (azimuth_error_deg is not None or export_tool is not None):
         raise InputFault("--programme: expected neither --azimuth-error-deg nor --export-tool beside it")
-    tool = load_tool(instrument)
+    tool = load_tool(instrument, parameters_of(parameter))
     if azimuth_error_deg is not None:
         tool = with_azimuth_error(tool, math.radians(azimuth_error_deg))
     legs = [] if programme is None else read_programme(programme)
@@ -215,6 +259,8 @@ def survey(
     }
     if out is not None:
         write_whole(out, table_text(rows))
+    if by_source is not None:
+        write_whole(by_source, source_text(found))
     if plot is not None:
         draw(found, named, sigma, str(file), plot)
     if export_tool is not None:
@@ -235,93 +281,6 @@ def frame_of(
     if answer is None:
         answer = north if north_of_site_deg is None else "true"
     return Frame(north, answer, Norths(*angles))
-
-
-def station_rows(
-    found: Analysis, sigma: float, origin: tuple[float, float, float] | None = None
-) -> list[dict[str, Any]]:
-    """One object a station; uncertainty at ``sigma`` standard deviations, site coordinates from ``origin``."""
-    covs, rows = found.uncertainty.cov, []
-    for k, md in enumerate(found.record.md.tolist()):
-        north, east, tvd = found.positions[k].tolist()
-        severity = 0.0 if k == 0 else float(found.dogleg_severity[k - 1])
-        rows.append(
-            {
-                "station": k,
-                "md_m": md,
-                "inclination_deg": math.degrees(found.record.inclination[k]),
-                "azimuth_deg": math.degrees(found.azimuth[k]),
-                "north_m": north,
-                "east_m": east,
-                "tvd_m": tvd,
-                "dogleg_severity_deg_per_30m": math.degrees(severity) * 30.0,
-                "closure_m": float(found.closure_distance[k]),
-                "vertical_section_m": float(found.vertical_section[k]),
-                "uncertainty": region(covs[k], sigma),
-            }
-            | (
-                {}
-                if origin is None
-                else {"northing_m": origin[0] + north, "easting_m": origin[1] + east, "height_m": origin[2] - tvd}
-            )
-        )
-    return rows
-
-
-def region(cov: Any, sigma: float) -> dict[str, Any]:
-    """Region of uncertainty: half-widths at ``sigma`` standard deviations, and the covariance (1 sigma)."""
-    from groundstation.survey.ellipsoid import plan_ellipse
-
-    ellipse = plan_ellipse(cov, sigma)
-    half = [sigma * math.sqrt(max(float(cov[i, i]), 0.0)) for i in range(3)]
-    return {
-        "north_m": half[0],
-        "east_m": half[1],
-        "tvd_m": half[2],
-        "major_m": ellipse.major,
-        "minor_m": ellipse.minor,
-        "azimuth_deg": math.degrees(ellipse.azimuth),
-        "covariance_m2": cov.tolist(),
-    }
-
-
-def at_depth(found: Analysis, md: float, sigma: float) -> dict[str, Any]:
-    """Position on the arc and its uncertainty at any depth."""
-    import numpy as np
-
-    from groundstation.survey.methods import tangents
-    from groundstation.survey.trajectory import Point, interpolate
-
-    directions = tangents(found.record.inclination, found.azimuth)
-    none, no_columns = np.zeros((3, 3)), np.zeros((3, 0))
-    points = [
-        Point(float(m), t, p, none, no_columns)
-        for m, t, p in zip(found.record.md, directions, found.positions, strict=True)
-    ]
-    point = interpolate(points, md)
-    north, east, tvd = point.position.tolist()
-    place = {"md_m": md, "north_m": north, "east_m": east, "tvd_m": tvd}
-    return place | {"uncertainty": region(found.uncertainty.at(md), sigma)}
-
-
-def sources(found: Analysis, sigma: float) -> list[dict[str, Any]]:
-    """Contribution of every source at the last station, largest first."""
-    rows = []
-    for name, cov in found.uncertainty.by_source().items():
-        north, east, tvd = (sigma * math.sqrt(max(float(cov[-1, i, i]), 0.0)) for i in range(3))
-        rows.append({"source": name, "north_m": north, "east_m": east, "tvd_m": tvd})
-    return sorted(rows, key=lambda row: -math.hypot(row["north_m"], row["east_m"], row["tvd_m"]))
-
-
-def table_text(rows: list[dict[str, Any]]) -> str:
-    """Station table, a .csv file."""
-    text = io.StringIO()
-    writer = csv.writer(text, lineterminator="\n")
-    plain = [key for key in rows[0] if key != "uncertainty"]
-    half = ("north_m", "east_m", "tvd_m")
-    writer.writerow([*plain, *(f"uncertainty_{key}" for key in half)])
-    writer.writerows([[*(row[key] for key in plain), *(row["uncertainty"][key] for key in half)] for row in rows])
-    return text.getvalue()
 
 
 def draw(found: Analysis, instrument: str, sigma: float, title: str, path: Path) -> None:

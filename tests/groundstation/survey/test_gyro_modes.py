@@ -139,7 +139,7 @@ def test_the_set_has_its_tools_by_name_and_says_what_it_lacks() -> None:
         assert load_tool(name, given).name == name
     with pytest.raises(ToolError, match=r"^CB_Film_GSS: .*unknown name GZRunningSpeed"):
         load_tool("CB_Film_GSS")
-    with pytest.raises(ToolError, match="no such instrument; expected one of gyro-continuous, .* OWSG set"):
+    with pytest.raises(ToolError, match=r"no such instrument; expected one of gyro-continuous, .* OWSG set"):
         load_tool("MWD+NOTHING")
 
 
@@ -168,8 +168,6 @@ def test_a_gyro_bias_is_what_the_earths_rotation_makes_of_it() -> None:
     ],
 )
 def test_ranges_that_cannot_be_are_refused_by_their_term(term: str, named: str) -> None:
-    text = (
-        f'[tool]\nname = "t"\ntitle = "t"\n[[term]]\nname = "A"\nvalue = 1\nunit = "deg"\nmode = "systematic"\n{term}\n'
-    )
+    head = '[tool]\nname = "t"\ntitle = "t"\n[[term]]\nname = "A"\nvalue = 1\nunit = "deg"\nmode = "systematic"\n'
     with pytest.raises(ToolError, match=f"^f.toml: .*term A: .*{named}"):
-        parse_toml(text, "f.toml")
+        parse_toml(head + term, "f.toml")

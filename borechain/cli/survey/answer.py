@@ -1,0 +1,123 @@
+"""What ``borechain survey`` answers: rows of stations, regions of uncertainty in both axes, sources."""
+
+from __future__ import annotations
+
+import csv
+import io
+import math
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from groundstation.survey.analysis import Analysis
+
+
+def station_rows(
+    found: Analysis, sigma: float, origin: tuple[float, float, float] | None = None
+) -> list[dict[str, Any]]:
+    """One object a station; uncertainty at ``sigma`` standard deviations, site coordinates from ``origin``."""
+    covs, rows = found.uncertainty.cov, []
+    for k, md in enumerate(found.record.md.tolist()):
+        north, east, tvd = found.positions[k].tolist()
+        severity = 0.0 if k == 0 else float(found.dogleg_severity[k - 1])
+        rows.append(
+            {
+                "station": k,
+                "md_m": md,
+                "inclination_deg": math.degrees(found.record.inclination[k]),
+                "azimuth_deg": math.degrees(found.azimuth[k]),
+                "north_m": north,
+                "east_m": east,
+                "tvd_m": tvd,
+                "dogleg_severity_deg_per_30m": math.degrees(severity) * 30.0,
+                "closure_m": float(found.closure_distance[k]),
+                "vertical_section_m": float(found.vertical_section[k]),
+                "uncertainty": region(covs[k], sigma)
+                | highside(covs[k], sigma, found.record.inclination[k], found.azimuth[k]),
+            }
+            | (
+                {}
+                if origin is None
+                else {"northing_m": origin[0] + north, "easting_m": origin[1] + east, "height_m": origin[2] - tvd}
+            )
+        )
+    return rows
+
+
+def region(cov: Any, sigma: float) -> dict[str, Any]:
+    """Region of uncertainty: half-widths at ``sigma`` standard deviations, and the covariance (1 sigma)."""
+    from groundstation.survey.ellipsoid import plan_ellipse
+
+    ellipse = plan_ellipse(cov, sigma)
+    half = [sigma * math.sqrt(max(float(cov[i, i]), 0.0)) for i in range(3)]
+    return {
+        "north_m": half[0],
+        "east_m": half[1],
+        "tvd_m": half[2],
+        "major_m": ellipse.major,
+        "minor_m": ellipse.minor,
+        "azimuth_deg": math.degrees(ellipse.azimuth),
+        "covariance_m2": cov.tolist(),
+    }
+
+
+def highside(cov: Any, sigma: float, inclination: float, azimuth: float) -> dict[str, Any]:
+    """The same in the axes of the hole: highside, to the right of it, along."""
+    from groundstation.survey.ellipsoid import hole_axes
+
+    axes = hole_axes(inclination, azimuth)
+    turned = axes @ cov @ axes.T
+    names = ("highside_m", "lateral_m", "along_m")
+    half = {name: sigma * math.sqrt(max(float(turned[i, i]), 0.0)) for i, name in enumerate(names)}
+    return half | {"covariance_hla_m2": turned.tolist()}
+
+
+def at_depth(found: Analysis, md: float, sigma: float) -> dict[str, Any]:
+    """Position on the arc and its uncertainty at any depth."""
+    import numpy as np
+
+    from groundstation.survey.methods import tangents
+    from groundstation.survey.trajectory import Point, interpolate
+
+    directions = tangents(found.record.inclination, found.azimuth)
+    none, no_columns = np.zeros((3, 3)), np.zeros((3, 0))
+    points = [
+        Point(float(m), t, p, none, no_columns)
+        for m, t, p in zip(found.record.md, directions, found.positions, strict=True)
+    ]
+    point = interpolate(points, md)
+    north, east, tvd = point.position.tolist()
+    place = {"md_m": md, "north_m": north, "east_m": east, "tvd_m": tvd}
+    return place | {"uncertainty": region(found.uncertainty.at(md), sigma)}
+
+
+def sources(found: Analysis, sigma: float) -> list[dict[str, Any]]:
+    """Contribution of every source at the last station, largest first."""
+    rows = []
+    for name, cov in found.uncertainty.by_source().items():
+        north, east, tvd = (sigma * math.sqrt(max(float(cov[-1, i, i]), 0.0)) for i in range(3))
+        rows.append({"source": name, "north_m": north, "east_m": east, "tvd_m": tvd})
+    return sorted(rows, key=lambda row: -math.hypot(row["north_m"], row["east_m"], row["tvd_m"]))
+
+
+def source_text(found: Analysis) -> str:
+    """Covariance of every source at every station, a .csv file as the industry's workbooks print it."""
+    text = io.StringIO()
+    writer = csv.writer(text, lineterminator="\n")
+    writer.writerow(["md_m", "source", *(f"{name}_m2" for name in ("nn", "ee", "vv", "ne", "nv", "ev"))])
+    places = ((0, 0), (1, 1), (2, 2), (0, 1), (0, 2), (1, 2))
+    parts = found.uncertainty.by_source()
+    for k, md in enumerate(found.record.md.tolist()):
+        for name, cov in parts.items():
+            writer.writerow([md, name, *(float(cov[(k, *place)]) for place in places)])
+    return text.getvalue()
+
+
+def table_text(rows: list[dict[str, Any]]) -> str:
+    """Station table, a .csv file."""
+    text = io.StringIO()
+    writer = csv.writer(text, lineterminator="\n")
+    plain = [key for key in rows[0] if key != "uncertainty"]
+    half = ("north_m", "east_m", "tvd_m")
+    writer.writerow([*plain, *(f"uncertainty_{key}" for key in half)])
+    writer.writerows([[*(row[key] for key in plain), *(row["uncertainty"][key] for key in half)] for row in rows])
+    return text.getvalue()
