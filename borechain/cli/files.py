@@ -21,8 +21,8 @@ def check_suffix(option: str, path: Path | None, *suffixes: str) -> None:
         raise InputFault(f"{option} {path}: expected a name that ends in {', '.join(suffixes)}")
 
 
-def write_whole(path: Path, text: str) -> None:
-    """Write a text file, its folder included.
+def write_whole(path: Path, content: str | bytes) -> None:
+    """Write a file, its folder included.
 
     Raises
     ------
@@ -32,7 +32,7 @@ def write_whole(path: Path, text: str) -> None:
     fresh = path.with_name(f"{path.name}.new")
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
-        fresh.write_text(text)
+        fresh.write_bytes(content.encode() if isinstance(content, str) else content)
         fresh.replace(path)
     except OSError as error:
         fresh.unlink(missing_ok=True)

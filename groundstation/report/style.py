@@ -7,6 +7,7 @@ a marker each. Figures are built without pyplot and hold no date: the same numbe
 
 from __future__ import annotations
 
+import io
 import os
 import secrets
 from collections.abc import Iterable, Sequence
@@ -86,6 +87,14 @@ def save(figure: Figure, path: Path) -> None:
         raise SurveyError(f"{path}: {error.strerror or error}; expected a folder that can be written to") from error
     finally:
         part.unlink(missing_ok=True)
+
+
+def svg_of(figure: Figure) -> str:
+    """Text of a figure, for a document."""
+    text = io.BytesIO()
+    with matplotlib.rc_context(STYLE):
+        figure.savefig(text, format="svg", metadata=METADATA[".svg"])
+    return text.getvalue().decode()
 
 
 def new_figure(height: float, title: str) -> Figure:

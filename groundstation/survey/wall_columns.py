@@ -48,6 +48,7 @@ class ColumnPlan:
     status: Status = Status.UNSTATED
     drilled: float | None = None  # m, measured depth of its end
     head_std: float = 0.0  # m, north and east, of setting out
+    calibration: str = ""  # certificate of the instrument
 
 
 @dataclass(frozen=True, slots=True)
@@ -150,6 +151,17 @@ def build(plans: Sequence[ColumnPlan], holes: Sequence[Hole], assumed: Assumptio
     surveyed_md = np.array([way.surveyed_md if way else np.nan for way in ways])
     end_md = np.array([way.end_md if way else np.nan for way in ways])
     return BuiltWall(columns, frame, surveyed_md, end_md, toes, toe_covs)
+
+
+def state_words(plan: ColumnPlan, built: BuiltWall, k: int) -> str:
+    """State of column ``k``: planned, not drilled, no record, drilled, surveyed; and to which depth."""
+    end, surveyed = float(built.ends[k]), float(built.surveyed[k])
+    if not math.isfinite(end):
+        return plan.status.value.replace("-", " ") or "no record"
+    if not surveyed > 0.0:
+        return f"drilled to {end:g} m, not surveyed"
+    drilled = "" if end <= surveyed + 1e-6 else f", drilled to {end:g} m"
+    return f"surveyed to {surveyed:g} m{drilled}"
 
 
 def _way(plan: ColumnPlan, hole: Hole) -> Way | None:

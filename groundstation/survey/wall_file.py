@@ -18,6 +18,7 @@ from groundstation.errors import SurveyError
 from groundstation.survey.as_built import Columns
 from groundstation.survey.columns import Tolerance, tolerance
 from groundstation.survey.error_sources import Site
+from groundstation.survey.frames import NORTHS
 from groundstation.survey.instruments import Tool, load_tool
 from groundstation.survey.joints import Detour, neighbours_in_grid, neighbours_in_line
 from groundstation.survey.methods import Method
@@ -28,7 +29,9 @@ from groundstation.survey.wall_verdict import Judgement, judge
 
 LAYOUTS = ("line", "shaft", "grid")
 NEEDED = ("radius_m", "thickness_m", "heads", "stations")
-TEXTS = ("name", "heads", "stations", "layout", "tolerance", "instrument", "serial", "method")
+SIGNED = ("project", "client", "calibration", "north")  # of the report alone
+TEXTS = ("name", "heads", "stations", "layout", "tolerance", "instrument", "serial", "method", *SIGNED)
+ORIGIN = ("northing_m", "easting_m", "height_m")
 POSITIVE = ("radius_m", "thickness_m", "spacing_m", "length_m", "depth_step_m", "gravity_mps2", "allowed_probability")
 NOT_NEGATIVE = (
     "radius_cv", "radius_correlation", "head_sigma_m", "unsurveyed_percent", "inclination_deg", "azimuth_deg",
@@ -61,13 +64,18 @@ class WallFile:
     assumed: Assumptions
     heads: Path
     stations: Path
+    project: str = ""
+    client: str = ""
+    calibration: str = ""  # certificate of the instrument
+    north: str = "site"  # to which azimuths and coordinates belong
+    origin: tuple[float, float, float] | None = None  # m, northing, easting and height of the wall's zero
 
     @property
     def defaults(self) -> Defaults:
         """What columns take that do not say otherwise."""
         return Defaults(
             self.radius, self.length, self.inclination, self.azimuth, self.tolerance, self.tool, self.serial,
-            self.head_std, self.path.parent,
+            self.head_std, self.path.parent, self.calibration,
         )  # fmt: skip
 
 
@@ -109,7 +117,7 @@ def read_wall_file(path: Path) -> WallFile:
     except tomllib.TOMLDecodeError as error:
         raise SurveyError(f"{path}: not TOML: {error}") from error
     layers = data.pop("layer", [])
-    known = (*TEXTS, *POSITIVE, *NOT_NEGATIVE)
+    known = (*TEXTS, *POSITIVE, *NOT_NEGATIVE, *ORIGIN)
     for key in data:
         if key not in known:
             raise SurveyError(f"{path}: {key}: unknown key; expected one of {', '.join(known)} or tables [[layer]]")
@@ -152,7 +160,22 @@ def read_wall_file(path: Path) -> WallFile:
         assumed,
         path.parent / values["heads"],
         path.parent / values["stations"],
+        values.get("project", ""),
+        values.get("client", ""),
+        values.get("calibration", ""),
+        _one_of(path, values, "north", NORTHS, "site"),
+        _origin(path, values),
     )
+
+
+def _origin(path: Path, values: dict[str, Any]) -> tuple[float, float, float] | None:
+    """Site coordinates of the wall's zero, all three or none."""
+    stated = [key for key in ORIGIN if key in values]
+    if not stated:
+        return None
+    if len(stated) < len(ORIGIN):
+        raise SurveyError(f"{path}: expected {', '.join(ORIGIN)} together, got {', '.join(stated)}")
+    return float(values["northing_m"]), float(values["easting_m"]), float(values["height_m"])
 
 
 def beside(path: Path, instrument: str) -> str:
@@ -173,6 +196,8 @@ def _value(path: Path, key: str, value: Any) -> Any:
             raise SurveyError(f"{path}: {key}: expected a text, got {value!r:.60}")
         return value
     usable = not isinstance(value, bool) and isinstance(value, int | float) and math.isfinite(value)
+    if usable and key in ORIGIN:
+        return float(value)
     if not usable or value < 0.0 or (key in POSITIVE and value == 0.0):
         sign = "positive" if key in POSITIVE else "non-negative"
         raise SurveyError(f"{path}: {key}: expected a {sign} number, got {value!r:.60}")

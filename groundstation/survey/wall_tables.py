@@ -21,7 +21,7 @@ from groundstation.survey.wall_columns import ColumnPlan, Hole, Status
 
 Array = npt.NDArray[np.float64]
 NUMBERS = ("down_m", "inclination_deg", "azimuth_deg", "length_m", "radius_m", "drilled_to_m", "head_sigma_m")
-WORDS = ("state", "instrument", "serial", "tolerance", "between", "replaces")
+WORDS = ("state", "instrument", "serial", "calibration", "tolerance", "between", "replaces")
 
 
 @dataclass(frozen=True, slots=True)
@@ -37,6 +37,7 @@ class Defaults:
     serial: str
     head_std: float
     folder: Path  # of instrument files
+    calibration: str = ""
 
 
 @dataclass(frozen=True, slots=True)
@@ -122,7 +123,7 @@ def _head(
     tool = _tool(cells.get("instrument", ""), defaults, tools)
     plan = ColumnPlan(
         design, tool, cells.get("serial") or defaults.serial, status, values.get("drilled_to_m"),
-        values.get("head_sigma_m", defaults.head_std),
+        values.get("head_sigma_m", defaults.head_std), cells.get("calibration") or defaults.calibration,
     )  # fmt: skip
     return HeadRow(name, plan, values.get("length_m", defaults.length), _remedy(where, cells))
 

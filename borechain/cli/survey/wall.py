@@ -2,15 +2,18 @@
 
 from __future__ import annotations
 
+import hashlib
 import json
 import math
+from datetime import UTC, date, datetime
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import click
 
-from borechain.cli.faults import plain_faults
-from borechain.cli.files import PLOT_FORMATS, check_suffix
+from borechain import __version__
+from borechain.cli.faults import InputFault, plain_faults
+from borechain.cli.files import PLOT_FORMATS, check_suffix, write_whole
 from borechain.cli.options import json_option
 from borechain.cli.tables import console
 from telemetry.runtime.command_line import check_installed
@@ -29,24 +32,45 @@ NOT_TIGHT = 3  # exit status
 @click.option(
     "--plot", type=click.Path(path_type=Path, dir_okay=False), help="Thickness over depth as .svg, .png or .pdf."
 )
+@click.option("--report", type=click.Path(path_type=Path, dir_okay=False), help="Report to be signed, a .pdf file.")
+@click.option(
+    "--column",
+    metavar="NAME",
+    help="Column that --report is about; without it, the whole wall.",
+)
+@click.option("--date", type=click.DateTime(["%Y-%m-%d"]), help="Day of the report.  [default: today, UTC]")
 @json_option
 @click.pass_context
 @plain_faults
-def wall(context: click.Context, file: Path, plot: Path | None, as_json: bool) -> None:
+def wall(
+    context: click.Context,
+    file: Path,
+    plot: Path | None,
+    report: Path | None,
+    column: str | None,
+    date: datetime | None,
+    as_json: bool,
+) -> None:
     """Judge the wall, shaft or grid in FILE: every joint, every void, what is missing or not surveyed, and the whole.
 
     The exit status is 0 when it is tight and 3 when it is not, or not proven to be.
 
     \b
-    Example:
+    Examples:
       borechain wall scenarios/walls/wall-40.toml --plot wall.svg
+      borechain wall scenarios/walls/wall-40.toml --report wall.pdf
+      borechain wall scenarios/walls/wall-40.toml --report K021.pdf --column K021
     """
     from groundstation.survey.joints import worst
     from groundstation.survey.wall_file import judge_wall, read_wall
     from groundstation.survey.wall_verdict import Verdict
 
     check_suffix("--plot", plot, *PLOT_FORMATS)
-    check_installed("scipy", *(["matplotlib"] if plot is not None else []))
+    check_suffix("--report", report, ".pdf")
+    if report is None and (column is not None or date is not None):
+        raise InputFault("--column and --date: expected --report FILE.pdf beside them")
+    drawn = plot is not None or report is not None
+    check_installed("scipy", *(["matplotlib"] if drawn else []), *(["typst"] if report is not None else []))
     found = read_wall(file)
     judgement = judge_wall(found)
     result = result_of(found, judgement)
@@ -58,12 +82,33 @@ def wall(context: click.Context, file: Path, plot: Path | None, as_json: bool) -
         extra = dict(judgement.extras).get(joint)
         title = f"{found.file.name}: {len(found.pairs)} joints, {judgement.verdict.value}"
         save(wall_figure(found.built.columns, judgement.joints, found.file.thickness, extra, title), plot)
+    if report is not None:
+        write_report(found, judgement, column, (date or datetime.now(UTC)).date(), report)
     if as_json:
         click.echo(json.dumps(result))
     else:
         show(result)
     if judgement.verdict is not Verdict.TIGHT:
         context.exit(NOT_TIGHT)
+
+
+def write_report(found: Wall, judgement: Judgement, column: str | None, day: date, path: Path) -> None:
+    """Report of the wall, or of one of its columns."""
+    from groundstation.report.column_report import column_report
+    from groundstation.report.document import Origin, report_pdf
+    from groundstation.report.wall_report import column_records, site_of, wall_report
+
+    inputs = [found.file.path, found.file.heads, found.file.stations]
+    digests = [(f"SHA-256 of {p.name}", hashlib.sha256(p.read_bytes()).hexdigest()) for p in inputs]
+    origin = Origin(day, __version__, digests)
+    if column is None:
+        document = wall_report(found, judgement, origin)
+    else:
+        records = {record.design.name: record for record in column_records(found, judgement)}
+        if column not in records:
+            raise InputFault(f"--column: expected one of {', '.join(records)}, got {column}")
+        document = column_report(records[column], site_of(found), origin)
+    write_whole(path, report_pdf(document))
 
 
 def result_of(found: Wall, judgement: Judgement) -> dict[str, Any]:
@@ -195,11 +240,12 @@ def column_row(found: Wall, k: int) -> dict[str, Any]:
 
     from groundstation.survey.columns import deviation
     from groundstation.survey.trajectory import Point
+    from groundstation.survey.wall_columns import state_words
 
     plan, built = found.plans[k], found.built
     row: dict[str, Any] = {
         "column": plan.design.name,
-        "state": state_of(found, k),
+        "state": state_words(plan, built, k),
         "design_length_m": plan.design.length,
         "drilled_to_m": number(built.ends[k]),
         "surveyed_to_m": number(built.surveyed[k]),
@@ -222,18 +268,6 @@ def column_row(found: Wall, k: int) -> dict[str, Any]:
         "sigma_cm": 100.0 * math.sqrt(0.5 * float(np.trace(found_.cov))),
         "used_percent": 100.0 * found_.ratio,
     }
-
-
-def state_of(found: Wall, k: int) -> str:
-    """State of a column in words: planned, not drilled, no record, drilled, surveyed; and to which depth."""
-    plan, built = found.plans[k], found.built
-    end, surveyed = float(built.ends[k]), float(built.surveyed[k])
-    if not math.isfinite(end):
-        return plan.status.value.replace("-", " ") or "no record"
-    if not surveyed > 0.0:
-        return f"drilled to {end:g} m, not surveyed"
-    drilled = "" if end <= surveyed + 1e-6 else f", drilled to {end:g} m"
-    return f"surveyed to {surveyed:g} m{drilled}"
 
 
 def show(result: dict[str, Any]) -> None:

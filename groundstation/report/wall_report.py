@@ -1,0 +1,184 @@
+"""Report of a wall, a shaft or a grid: verdict and reasons, columns, joints, remedies, instruments, picture."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from groundstation.report.column_report import ColumnRecord, Site, clause
+from groundstation.report.document import Document, Origin, Section
+from groundstation.report.plots_wall import wall_figure
+from groundstation.report.style import svg_of
+from groundstation.survey.as_built import State
+from groundstation.survey.error_columns import covariance, error_columns
+from groundstation.survey.error_sources import Leg, Survey
+from groundstation.survey.joints import worst, worst_depths
+from groundstation.survey.methods import positions
+from groundstation.survey.wall_columns import state_words
+from groundstation.survey.wall_file import Wall
+from groundstation.survey.wall_verdict import Judgement, Verdict, joint_name
+
+WORDS = {
+    Verdict.TIGHT: "tight",
+    Verdict.NOT_PROVEN: "not proven to be tight",
+    Verdict.NOT_TIGHT: "NOT TIGHT",
+}
+
+
+def site_of(wall: Wall) -> Site:
+    """What the wall's file says of the place."""
+    return Site(wall.file.project, wall.file.client, wall.file.north, wall.file.origin)
+
+
+def column_records(wall: Wall, judgement: Judgement) -> list[ColumnRecord]:
+    """Every column of a wall with what was found about it."""
+    return [_record(wall, judgement, k) for k in range(len(wall.plans))]
+
+
+def _record(wall: Wall, judgement: Judgement, k: int) -> ColumnRecord:
+    plan, hole, built = wall.plans[k], wall.holes[k], wall.built
+    name, count = plan.design.name, len(hole.md)
+    places, covs = np.zeros((count, 3)), np.zeros((count, 3, 3))
+    if count > 1:
+        places = positions(wall.file.assumed.method, hole.md, hole.inclination, hole.azimuth)
+        survey = Survey(hole.md, hole.inclination, hole.azimuth, places[:, 2])
+        covs = covariance(error_columns(survey, (Leg(plan.tool),), wall.file.assumed.site))
+    covs = covs + plan.head_std**2 * np.diag([1.0, 1.0, 0.0])
+    actions = [f.text[0].upper() + f.text[1:] + "." for f in judgement.findings if name in f.what.split("-")]
+    actions += remedies(wall, judgement, k)
+    return ColumnRecord(
+        plan.design, state_words(plan, built, k), plan.tool, plan.serial, plan.calibration, plan.head_std, hole.md,
+        hole.inclination, hole.azimuth, np.array(plan.design.head) + places, covs,
+        float(built.surveyed[k]) if built.surveyed[k] > 0.0 else math.nan,
+        float(built.ends[k]) if math.isfinite(built.ends[k]) else math.nan, actions,
+    )  # fmt: skip
+
+
+def remedies(wall: Wall, judgement: Judgement, of: int | None = None) -> list[str]:
+    """The columns that would close open joints, in words and in the site's frame; one that closes several stands once.
+
+    ``of`` : a column, whose joints alone count
+    """
+    places: dict[tuple[str, float, float, bool], list[str]] = {}
+    for joint, extra in judgement.extras:
+        pair = judgement.joints.pairs[joint]
+        if of is not None and of not in pair:
+            continue
+        north, east, _ = (np.array([extra.north, extra.east, extra.from_depth]) @ wall.built.frame).tolist()
+        place = f"north {north + 0.0:.3f} m, east {east + 0.0:.3f} m"
+        if wall.file.origin is not None:
+            place += f" (N {wall.file.origin[0] + north:.3f} m, E {wall.file.origin[1] + east:.3f} m)"
+        key = (place, extra.from_depth, extra.to_depth, extra.closes)
+        places.setdefault(key, []).append(joint_name(wall.columns, pair))
+    return [
+        f"A column at {place} from {top:g} to {bottom:g} m {'closes' if closes else 'alone does not close'} "
+        f"joint{'s' if len(names) > 1 else ''} {' and '.join(names)}."
+        for (place, top, bottom, closes), names in places.items()
+    ]
+
+
+def wall_report(wall: Wall, judgement: Judgement, origin: Origin) -> Document:
+    """Report of a wall."""
+    file, site, records = wall.file, site_of(wall), column_records(wall, judgement)
+    whole = judgement.system
+    radii = sorted({plan.design.radius for plan in wall.plans})
+    facts = [
+        *site.facts(),
+        ("Columns and joints", f"{len(wall.plans)} columns, {len(wall.pairs)} joints, {file.layout}"),
+        ("Radius of a column", f"{' and '.join(f'{r:g}' for r in radii)} m{_scatter(wall)}"),
+        ("Required thickness of a joint", f"{file.thickness:g} m"),
+        ("Tolerance", clause(file.tolerance)),
+        (
+            "P(anything open or too thin)",
+            f"{whole.probability:.2g} (standard error {whole.standard_error:.1g}), allowed {file.allowed:g}",
+        ),
+    ]
+    joint, _ = worst(judgement.joints)
+    title = f"{len(wall.pairs)} joints: {WORDS[judgement.verdict].lower()}"
+    extra = dict(judgement.extras).get(joint)
+    picture = wall_figure(wall.built.columns, judgement.joints, file.thickness, extra, title)
+    sections = [
+        Section("Reasons", [f.text[0].upper() + f.text[1:] + "." for f in judgement.findings] or ["None."]),
+        Section("What is to be done", remedies(wall, judgement) or ["Nothing."]),
+        _columns_section(records),
+        _joints_section(wall, judgement),
+        _instruments_section(records),
+        Section("Joints over depth, plan, and the worst joint", figure=svg_of(picture), new_page=True),
+    ]
+    good = judgement.verdict is Verdict.TIGHT
+    verdict = f"The wall is {WORDS[judgement.verdict]}"
+    return Document("Wall report", file.name, site.project or "as built", verdict, good, facts, sections, origin)
+
+
+def _scatter(wall: Wall) -> str:
+    cv = sorted({layer.radius_cv for layer in wall.file.assumed.layers})
+    if cv == [0.0]:
+        return ", taken as known exactly"
+    return f", coefficient of variation {' to '.join(f'{value:g}' for value in cv)}"
+
+
+def _columns_section(records: list[ColumnRecord]) -> Section:
+    columns = (
+        "column",
+        "north m",
+        "east m",
+        "length m",
+        "surveyed m",
+        "dev. mm",
+        "sigma mm",
+        "allowed mm",
+        "used",
+        "at m",
+    )
+    rows, marked = [], []
+    for k, record in enumerate(records):
+        found = record.deviations() if math.isfinite(record.surveyed_md) else []
+        head = (f"{record.design.head[0]:.3f}", f"{record.design.head[1]:.3f}", f"{record.design.length:g}")
+        if not found:
+            marked.append(k)
+            rows.append((record.design.name, *head, record.state, *("–",) * 5))
+            continue
+        d = max(found, key=lambda d: (d.ratio if math.isfinite(d.ratio) else 0.0, d.md))
+        if d.ratio >= 1.0 or min(record.drilled_md, record.surveyed_md) < record.design.length - 0.05:
+            marked.append(k)
+        numbers = (f"{1e3 * d.size:.1f}", f"{1e3 * d.std:.1f}", f"{1e3 * d.limit:.1f}", f"{d.ratio:.0%}", f"{d.md:g}")
+        rows.append((record.design.name, *head, f"{record.surveyed_md:g}", *numbers))
+    words = (
+        "Each column at the depth where it uses most of its tolerance; marked: beyond it, or not known to its toe.",
+    )
+    return Section("Columns: set out, and as built", words, columns=columns, rows=rows, marked=marked, new_page=True)
+
+
+def _joints_section(wall: Wall, judgement: Judgement) -> Section:
+    judged, required = judgement.joints, wall.file.thickness
+    doubtful = worst_depths(judged)
+    thin = np.argmin(np.where(np.isfinite(judged.thickness), judged.thickness, np.inf), axis=1)
+    rows, marked = [], []
+    for j, pair in enumerate(judged.pairs):
+        thickness, chance = float(judged.thickness[j, thin[j]]), float(judged.probability[j, doubtful[j]])
+        state = max((s for s in judged.states[j].tolist() if s != State.OUTSIDE), default=State.OUTSIDE)
+        if not thickness >= required or chance > wall.file.allowed or state != State.SURVEYED:
+            marked.append(j)
+        shown = f"{thickness:.3f}" if math.isfinite(thickness) else "open"
+        depths = f"{wall.columns.depths[thin[j]]:g}", f"{wall.columns.depths[doubtful[j]]:g}"
+        name = joint_name(wall.columns, pair)
+        rows.append((name, State(int(state)).name.lower(), shown, depths[0], f"{chance:.2g}", depths[1]))
+    columns = ("joint", "known as", "thinnest m", "at m", "P(too thin)", "at m")
+    words = (
+        f"Required: {required:g} m; marked: thinner, open, not known, or P(too thin) above {wall.file.allowed:g}.",
+    )
+    return Section("Joints", words, columns=columns, rows=rows, marked=marked)
+
+
+def _instruments_section(records: list[ColumnRecord]) -> Section:
+    groups: dict[tuple[str, str, str], list[str]] = {}
+    for record in (record for record in records if math.isfinite(record.surveyed_md)):
+        key = (record.tool.name, record.serial or "not stated", record.calibration or "not stated")
+        groups.setdefault(key, []).append(record.design.name)
+    rows = [(*key, _names(names)) for key, names in groups.items()]
+    return Section("Instruments", columns=("error model", "serial", "calibration", "columns"), rows=rows)
+
+
+def _names(names: list[str]) -> str:
+    return f"{names[0]} to {names[-1]} ({len(names)})" if len(names) > 3 else ", ".join(names)
