@@ -14,6 +14,7 @@ import numpy.typing as npt
 
 from groundstation.calibration.coverage import COVERAGE, coverage_factor
 from groundstation.calibration.errors import CalibrationError
+from groundstation.calibration.jig import Combined, Jig, combine, settings_of
 from groundstation.survey.resolve import is_covariance
 
 Array = npt.NDArray[np.float64]
@@ -63,6 +64,7 @@ class Fit:
     yaw: float = 0.0
     yaw_std: float = 0.0
     degrees: int | None = None  # of freedom of each axis; None where the readings' covariances were known
+    combined: Combined | None = None  # of b, then the columns of M, where the jig's errors were stated
 
     def coverage_factor(self, coverage: float = COVERAGE) -> float:
         """Standard errors on either side of a parameter within which it lies with a probability of ``coverage``.
@@ -73,11 +75,19 @@ class Fit:
 
     def bias_std(self) -> Array:
         """Standard errors (3,) of the bias."""
-        return np.sqrt(np.diag(self.cov)[:3])
+        return np.sqrt(np.diag(self.cov)[:3]) if self.combined is None else self.combined.std[0]
 
     def matrix_std(self) -> Array:
         """Standard errors (3, 3) of the matrix."""
-        return np.sqrt(np.diag(self.cov)[3:]).reshape(3, 3)
+        return np.sqrt(np.diag(self.cov)[3:]).reshape(3, 3) if self.combined is None else self.combined.std[1:].T
+
+    def bias_expanded(self) -> Array:
+        """Half widths (3,) of the intervals of the bias that hold 95 %."""
+        return self.coverage_factor() * self.bias_std() if self.combined is None else self.combined.expanded[0]
+
+    def matrix_expanded(self) -> Array:
+        """Half widths (3, 3) of the intervals of the matrix that hold 95 %."""
+        return self.coverage_factor() * self.matrix_std() if self.combined is None else self.combined.expanded[1:].T
 
     def residual_rms(self) -> float:
         """Root mean square of the residuals, in the unit of the readings."""
@@ -89,7 +99,13 @@ def true_vectors(pitch: Array, roll: Array) -> Array:
     return np.stack([np.sin(pitch), np.cos(pitch) * np.sin(roll), np.cos(pitch) * np.cos(roll)], axis=-1)
 
 
-def fit(truth: Array, readings: Array, covs: Array | None = None) -> Fit:
+def fit(
+    truth: Array,
+    readings: Array,
+    covs: Array | None = None,
+    jig: Jig | None = None,
+    settings: npt.NDArray[np.intp] | None = None,
+) -> Fit:
     """Bias and matrix from any set of attitudes.
 
     Parameters
@@ -97,6 +113,8 @@ def fit(truth: Array, readings: Array, covs: Array | None = None) -> Fit:
     truth : (n, 3) true rate or specific force
     readings : (n, 3)
     covs : (n, 3, 3) of the readings; None weighs all alike and takes the noise of each axis from its residuals
+    jig : its errors, common to readings of one setting; with ``covs`` it is not asked for
+    settings : (n,) number of the setting of each reading; those of one attitude by default
 
     Raises
     ------
@@ -113,8 +131,13 @@ def fit(truth: Array, readings: Array, covs: Array | None = None) -> Fit:
     solved = least_squares(basis, scale, readings, covs)
     # Coefficients come as [b, columns of M], x wants the rows of M.
     order = np.concatenate([np.arange(3), 3 + np.arange(9).reshape(3, 3).T.ravel()])
+    matrix = solved.coefficients[1:].T.copy()
+    combined = None
+    if jig is not None and covs is None:
+        settings = settings_of(truth) if settings is None else settings
+        combined = combine(basis, solved.residuals, truth, matrix, settings, jig)
     return Fit(
-        matrix=solved.coefficients[1:].T.copy(),
+        matrix=matrix,
         bias=solved.coefficients[0],
         cov=solved.cov[np.ix_(order, order)],
         residuals=solved.residuals,
@@ -122,6 +145,7 @@ def fit(truth: Array, readings: Array, covs: Array | None = None) -> Fit:
         rank=solved.rank,
         levers=solved.levers,
         degrees=len(truth) - 4 if covs is None else None,
+        combined=combined,
     )
 
 

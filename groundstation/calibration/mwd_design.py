@@ -12,6 +12,7 @@ import numpy as np
 import numpy.typing as npt
 
 from groundstation.calibration.errors import CalibrationError
+from groundstation.calibration.jig import Jig
 from groundstation.calibration.mwd_cost import Geometry, Problem, layout
 from groundstation.calibration.mwd_model import volts_of
 from groundstation.calibration.mwd_record import Record
@@ -35,6 +36,41 @@ def covariance(problem: Problem, x: Array, free: Array) -> Array | None:
         return None
     scaled = free @ (axes / unit[:, None])
     return np.asarray(scaled @ (scaled / values).T)
+
+
+def with_jig(problem: Problem, x: Array, unit_cov: Array, jig: Jig) -> tuple[Array, float]:
+    """Covariance (k, k) of the parameters by the jig's errors, and the variance of the noise beside them.
+
+    The error of a tilt is common to all readings at it, so the noise is what is left within the tilts. About the tool's
+    axis itself a lean of the jig turns with the tool faces, so there it counts as another error at each of them.
+    """
+    jacobian = problem.residual_jacobian(x).reshape(len(problem.angle), 4, -1)
+    on_axis = problem.on_axis()
+    tilts, setting = np.unique(np.round(problem.angle[~on_axis], 6), return_inverse=True)
+    tilted, upright = jacobian[~on_axis, 1], jacobian[on_axis, 1:3].reshape(-1, jacobian.shape[2])
+    together = np.zeros((len(tilts), tilted.shape[1]))
+    np.add.at(together, setting.ravel(), tilted)
+    each = jig.common**2 + jig.random**2
+    normal = jig.common**2 * together.T @ together + jig.random**2 * tilted.T @ tilted + each * upright.T @ upright
+    return np.asarray(unit_cov @ normal @ unit_cov), _noise_within(problem, x, jacobian, setting.ravel(), jig)
+
+
+def _noise_within(problem: Problem, x: Array, jacobian: Array, setting: npt.NDArray[np.intp], jig: Jig) -> float:
+    """Variance of the noise from what neither the parameters nor a common error of each tilt explain.
+
+    Sizes do not see the jig; angles off the axis do so as their tilts do, if nothing else turns them.
+    """
+    tilted = np.flatnonzero(~problem.on_axis())
+    common = np.zeros((len(jacobian), 4, setting.max(initial=-1) + 1))
+    common[tilted, 1, setting] = 1.0
+    used = np.zeros((len(jacobian), 4), dtype=bool)
+    used[:, 0] = True
+    used[tilted, 1] = jig.random == 0.0
+    axes, values, _ = np.linalg.svd(np.concatenate([jacobian, common], axis=2)[used], full_matrices=False)
+    axes = axes[:, values > RANK**0.5 * values[0]]
+    residuals = problem.residuals(x).reshape(len(jacobian), 4)[used]
+    left = residuals - axes @ (axes.T @ residuals)
+    return float(left @ left / max(len(residuals) - axes.shape[1], 1))
 
 
 def refuse_open(record: Record, problem: Problem, free: Array) -> None:

@@ -16,8 +16,9 @@ import numpy as np
 import numpy.typing as npt
 
 from groundstation.calibration.errors import CalibrationError
+from groundstation.calibration.jig import Jig
 from groundstation.calibration.mwd_cost import Problem
-from groundstation.calibration.mwd_design import POOR_LEVERAGE, covariance, predict, refuse_open
+from groundstation.calibration.mwd_design import POOR_LEVERAGE, covariance, predict, refuse_open, with_jig
 from groundstation.calibration.mwd_model import LOCAL, Triad, names, tool_face, turned, vectors
 from groundstation.calibration.mwd_newton import hold, minimise
 from groundstation.calibration.mwd_record import (
@@ -75,15 +76,18 @@ def solve_accelerometers(
     *,
     tool_face_reference: Array | None = None,
     volts_per_g: float = ACCELEROMETER_VOLTS_PER_G,
+    jig: Jig | None = None,
 ) -> MwdFit:
     """Coefficients of the accelerometers from voltages (n, 3), temperatures (n,) C and the jig's tilts (n,) rad.
+
+    ``jig`` : errors of the tilts, common to all tool faces of one; without it the residuals alone are noise.
 
     Raises
     ------
     CalibrationError
         When a reading cannot be, the design leaves a parameter open, or the search does not end.
     """
-    fit = solve(accelerometer_record(volts, temperature, tilt, volts_per_g), parameters)
+    fit = solve(accelerometer_record(volts, temperature, tilt, volts_per_g), parameters, jig)
     if tool_face_reference is None:
         return fit
     if tool_face_reference.shape != tilt.shape or not np.all(np.isfinite(tool_face_reference)):
@@ -116,8 +120,8 @@ def solve_magnetometers(
     return solve(magnetometer_record(volts, temperature, gravity, size, dip, volts_per_microtesla), parameters)
 
 
-def solve(record: Record, parameters: int) -> MwdFit:
-    """Minimise the cost of a record and judge the result."""
+def solve(record: Record, parameters: int, jig: Jig | None = None) -> MwdFit:
+    """Minimise the cost of a record and judge the result; ``jig`` : errors of its reference angles."""
     check(record, parameters)
     problem, free = record.problem(parameters), hold(parameters, record.axes)
     refuse_open(record, problem, free)
@@ -126,8 +130,11 @@ def solve(record: Record, parameters: int) -> MwdFit:
     cost, unit_cov = problem.value(x), covariance(problem, x, free)
     if unit_cov is None:
         raise CalibrationError("the solution leaves a coefficient open though the design should not")
-    noise = float(np.sqrt(cost / (2 * len(record.volts) + int(problem.on_axis().sum()) - free.shape[1])))
-    size_leverage, angle_leverage = predict(record, x, unit_cov)
+    by_jig, noise = np.zeros_like(unit_cov), cost / _degrees(problem, free)
+    if jig is not None:
+        by_jig, noise = with_jig(problem, x, unit_cov, jig)
+    cov = noise * unit_cov + by_jig
+    leverage, (size_std, angle_std) = max(predict(record, x, unit_cov)), predict(record, x, cov)
     triad = record.triad(x)
     return MwdFit(
         triad,
@@ -135,14 +142,19 @@ def solve(record: Record, parameters: int) -> MwdFit:
         iterations,
         cost,
         _named(triad, parameters),
-        _named(record.triad(noise * np.sqrt(np.diag(unit_cov)), base=0.0), parameters),
+        _named(record.triad(np.sqrt(np.diag(cov)), base=0.0), parameters),
         _errors(problem, np.zeros_like(x), record.unit),
         _errors(problem, x, record.unit),
-        noise * size_leverage * record.unit,
-        noise * angle_leverage,
+        size_std * record.unit,
+        angle_std,
         (float(record.temperature.min()), float(record.temperature.max())),
-        tuple(_warnings(record, parameters, max(size_leverage, angle_leverage))),
+        tuple(_warnings(record, parameters, leverage)),
     )
+
+
+def _degrees(problem: Problem, free: Array) -> int:
+    """Of freedom: a reading has a size and one angle, on the axis two."""
+    return 2 * len(problem.angle) + int(problem.on_axis().sum()) - int(free.shape[1])
 
 
 def _refuse_outlier(problem: Problem, x: Array) -> None:

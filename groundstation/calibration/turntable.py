@@ -15,6 +15,7 @@ from telemetry.calibration import check_invertible
 from telemetry.errors import CalibrationError
 
 Array = npt.NDArray[np.float64]
+SETTINGS = np.tile(np.arange(3), 2)  # of ``as_observations``: an axis is set up once and turned both ways
 
 
 @dataclass(frozen=True, slots=True)

@@ -44,6 +44,7 @@ class TriadErrors:
 def linear(title: str, fit: Fit, at: AttitudeErrors, matrix_unit: str, facts: Facts) -> Sheet:
     """Matrix and bias of G = M w + b; bias and residuals are in the unit of the readings."""
     std, bias_std = fit.matrix_std(), fit.bias_std()
+    wide, bias_wide = fit.matrix_expanded(), fit.bias_expanded()
     cells = column(fit.residuals.ravel())
     residual = [cells[k::3] for k in range(3)]
     worst = int(np.argmax(fit.levers))
@@ -63,9 +64,9 @@ def linear(title: str, fit: Fit, at: AttitudeErrors, matrix_unit: str, facts: Fa
             [(AXES[i], *(number(v, 3) for v in (*std[i], bias_std[i]))) for i in range(3)],
         ),
         Table(
-            f"Expanded uncertainty, {100.0 * COVERAGE:g} %: {number(fit.coverage_factor(), 3)} standard errors",
+            f"Expanded uncertainty, {100.0 * COVERAGE:g} %: {widening(fit)}",
             ("reading of", "from x", "from y", "from z", "bias"),
-            [(AXES[i], *(number(fit.coverage_factor() * v, 3) for v in (*std[i], bias_std[i]))) for i in range(3)],
+            [(AXES[i], *(number(v, 3) for v in (*wide[i], bias_wide[i]))) for i in range(3)],
         ),
         Table(
             f"Residuals and errors, {at.unit}",
@@ -79,6 +80,13 @@ def linear(title: str, fit: Fit, at: AttitudeErrors, matrix_unit: str, facts: Fa
         ("Design", f"{len(at.names)} attitudes, rank {fit.rank} of 4, condition {number(fit.condition, 4)}"),
     )
     return Sheet(title, (*facts, *ends), tables, warnings if fit.levers[worst] > LONG_LEVER else ())
+
+
+def widening(fit: Fit) -> str:
+    """How the expanded uncertainty follows from the standard errors."""
+    if fit.combined is not None:
+        return "noise and jig together"
+    return f"{number(fit.coverage_factor(), 3)} standard errors"
 
 
 def triad(title: str, fit: MwdFit, facts: Facts) -> Sheet:

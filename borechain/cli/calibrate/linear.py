@@ -11,11 +11,12 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from borechain.cli.calibrate.output import Outcome, file_argument, full_scale_option, located, output_options
-from borechain.cli.faults import plain_faults
+from borechain.cli.faults import InputFault, plain_faults
 
 if TYPE_CHECKING:
     from groundstation.calibration.attitudes import Fit
     from groundstation.calibration.block import Calibration
+    from groundstation.calibration.jig import Jig
     from groundstation.calibration.temperature import Array
     from groundstation.report.calibration_sheets import AttitudeErrors
 
@@ -26,8 +27,22 @@ UNITS = {  # SI of one unit of the file, and whose unit it is
     "g": (STANDARD_GRAVITY, "accelerometer"),
     "m/s2": (1.0, "accelerometer"),
 }
+jig_option = click.option(
+    "--jig-deg",
+    type=click.FloatRange(0.0),
+    nargs=2,
+    metavar="COMMON RANDOM",
+    help="Standard deviations of the attitudes: common to all readings of one setting, and of each reading.",
+)
 NOMINAL_C = 25.0  # of a block without temperature terms, which no reading depends on
 temperature_option = click.option("--temperature-c", type=float, help="Temperature of the record, if it was measured.")
+
+
+def jig_of(jig_deg: tuple[float, float] | None) -> Jig | None:
+    """Errors of a jig as an option gives them."""
+    from groundstation.calibration.jig import Jig
+
+    return None if jig_deg is None else Jig(*(math.radians(value) for value in jig_deg))
 
 
 @dataclass(frozen=True, slots=True)
@@ -56,12 +71,19 @@ class Linear:
     help="True rate or specific force of the first column of each pair, in the unit of FILE.",
 )
 @click.option("--unit", type=click.Choice(list(UNITS)), default="deg/s", show_default=True, help="Unit of FILE.")
+@jig_option
 @temperature_option
 @full_scale_option
 @plain_faults
 @output_options
 def turntable(
-    file: Path, day: str, reference: float, unit: str, temperature_c: float | None, full_scale: float
+    file: Path,
+    day: str,
+    reference: float,
+    unit: str,
+    jig_deg: tuple[float, float] | None,
+    temperature_c: float | None,
+    full_scale: float,
 ) -> Outcome:
     """Matrix and bias of a triad from a turn-table record: a row per axis turned, two columns per sensor axis.
 
@@ -72,13 +94,14 @@ def turntable(
     """
     from groundstation.calibration.attitudes import fit
     from groundstation.calibration.records import read_turn_table
-    from groundstation.calibration.turntable import align, as_observations
+    from groundstation.calibration.turntable import SETTINGS, align, as_observations
 
     record = read_turn_table(file, reference, limit=full_scale)
     truth, readings = as_observations(record.positive, record.negative, reference)
     with located(file):
         aligned = align(record.positive, record.negative, reference)
-        errors = fit(truth, readings)  # the same matrix and bias, with their standard errors
+        # the same matrix and bias, with their standard errors; an axis is one setting, whichever way it is turned
+        errors = fit(truth, readings, jig=jig_of(jig_deg), settings=SETTINGS)
     job = Linear(
         fit=replace(errors, matrix=aligned.matrix, bias=aligned.bias),
         names=[f"{sign}{axis}" for sign in "+-" for axis in "xyz"],
@@ -103,11 +126,19 @@ def turntable(
     metavar="REFERENCE",
     help="Solve for the fixture's yaw too; REFERENCE holds the known matrix: a file of --out, or TOML with `matrix`.",
 )
+@jig_option
 @temperature_option
 @full_scale_option
 @plain_faults
 @output_options
-def attitudes(file: Path, day: str, free_yaw: Path | None, temperature_c: float | None, full_scale: float) -> Outcome:
+def attitudes(
+    file: Path,
+    day: str,
+    free_yaw: Path | None,
+    jig_deg: tuple[float, float] | None,
+    temperature_c: float | None,
+    full_scale: float,
+) -> Outcome:
     """Matrix (m/s2 per g) and bias (m/s2) of an accelerometer from mean readings at preset pitch and roll.
 
     \b
@@ -121,9 +152,15 @@ def attitudes(file: Path, day: str, free_yaw: Path | None, temperature_c: float 
 
     record = read_attitudes(file, limit=full_scale)
     truth = true_vectors(record.pitch, record.roll)
+    if free_yaw is not None and jig_deg is not None:
+        raise InputFault("expected --free-yaw or --jig-deg, got both")
     like = None if free_yaw is None else read_matrix(free_yaw, STANDARD_GRAVITY)
     with located(file):
-        found = fit(truth, record.readings) if like is None else fit_free_yaw(truth, record.readings, like)
+        found = (
+            fit(truth, record.readings, jig=jig_of(jig_deg))
+            if like is None
+            else fit_free_yaw(truth, record.readings, like)
+        )
     job = Linear(
         fit=found,
         names=record.names,
@@ -153,7 +190,8 @@ def outcome(job: Linear, day: str, temperature_c: float | None, extra: dict[str,
 
     fit, at, calibration = job.fit, errors_of(job), block(job, day, temperature_c)
     warmth = "not stated" if temperature_c is None else f"{temperature_c:g} \N{DEGREE SIGN}C"
-    facts, factor = [("Method", job.design), ("Temperature", warmth)], fit.coverage_factor()
+    facts = [("Method", job.design), ("Temperature", warmth)]
+    factor = fit.coverage_factor() if fit.combined is None else None
     if "yaw_deg" in extra:
         facts.append(("Yaw of the rig", f"{extra['yaw_deg']:.4f} deg, standard error {extra['yaw_std_deg']:.4f} deg"))
     sheet = linear(f"Calibration of {job.sensor}", fit, at, job.matrix_unit, facts)
@@ -168,8 +206,8 @@ def outcome(job: Linear, day: str, temperature_c: float | None, extra: dict[str,
         "coverage": COVERAGE,
         "coverage_factor": factor,
         "expanded_uncertainty": {
-            "matrix": (factor * fit.matrix_std()).tolist(),
-            "bias": (factor * fit.bias_std()).tolist(),
+            "matrix": fit.matrix_expanded().tolist(),
+            "bias": fit.bias_expanded().tolist(),
         },
         "residual_rms": fit.residual_rms(),
         "attitudes": [

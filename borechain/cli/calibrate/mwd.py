@@ -10,10 +10,12 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
+from borechain.cli.calibrate.linear import jig_of, jig_option
 from borechain.cli.calibrate.output import Outcome, file_argument, full_scale_option, output_options
 from borechain.cli.faults import InputFault, plain_faults
 
 if TYPE_CHECKING:
+    from groundstation.calibration.jig import Jig
     from groundstation.calibration.mwd_block import TriadCalibration
     from groundstation.calibration.mwd_files import MwdRecord
     from groundstation.calibration.mwd_model import Triad
@@ -38,10 +40,18 @@ accelerometers_option = click.option(
 @file_argument
 @parameters_option
 @click.option("--tool-face", is_flag=True, help="Align the solution with the jig's tool faces; otherwise m_AB = m_BA.")
+@jig_option
 @full_scale_option
 @plain_faults
 @output_options
-def mwd(file: Path, day: str, parameters: str, tool_face: bool, full_scale: float) -> Outcome:
+def mwd(
+    file: Path,
+    day: str,
+    parameters: str,
+    tool_face: bool,
+    jig_deg: tuple[float, float] | None,
+    full_scale: float,
+) -> Outcome:
     """Coefficients of the accelerometers of an MWD tool from voltages at the tilts of a jig.
 
     \b
@@ -52,7 +62,7 @@ def mwd(file: Path, day: str, parameters: str, tool_face: bool, full_scale: floa
     from groundstation.calibration.mwd_files import read_mwd
 
     record = read_mwd(file, full_scale)
-    fit = solve_gravity(record, int(parameters), tool_face=tool_face)
+    fit = solve_gravity(record, int(parameters), tool_face=tool_face, jig=jig_of(jig_deg))
     return outcome(record, fit, day, errors_of_gravity(record, fit), {"reference": "1 g and the jig's tilt"})
 
 
@@ -170,7 +180,7 @@ def qc(file: Path, day: str, accelerometers: Path | None, magnetometers: Path | 
     return Outcome(result, json.dumps(result, indent=1) + "\n", None, record.sha256, sheet, panels)
 
 
-def solve_gravity(record: MwdRecord, parameters: int, *, tool_face: bool = False) -> MwdFit:
+def solve_gravity(record: MwdRecord, parameters: int, *, tool_face: bool = False, jig: Jig | None = None) -> MwdFit:
     """Fit of the accelerometers; a refusal carries the file and the line."""
     from groundstation.calibration.errors import CalibrationError
     from groundstation.calibration.mwd_solve import solve_accelerometers
@@ -178,7 +188,7 @@ def solve_gravity(record: MwdRecord, parameters: int, *, tool_face: bool = False
     reference = record.tool_face if tool_face else None
     try:
         return solve_accelerometers(
-            record.gravity_volts, record.temperature, record.tilt, parameters, tool_face_reference=reference
+            record.gravity_volts, record.temperature, record.tilt, parameters, tool_face_reference=reference, jig=jig
         )
     except CalibrationError as error:
         raise record.located(error) from error
