@@ -21,6 +21,7 @@ if TYPE_CHECKING:
     from groundstation.survey.analysis import Analysis
     from groundstation.survey.frames import Frame
     from groundstation.survey.instruments import Tool
+    from groundstation.survey.records import Record
 
 NORTHS = ("site", "true", "grid", "magnetic")
 METHODS = ("tangential", "balanced-tangential", "average-angle", "radius-of-curvature", "minimum-curvature")
@@ -264,7 +265,7 @@ def survey(
     if plot is not None:
         draw(found, named, sigma, str(file), plot)
     if export_tool is not None:
-        export(tool, export_tool)
+        export(tool, record, export_tool)
     if as_json:
         click.echo(json.dumps(result))
     else:
@@ -295,11 +296,13 @@ def draw(found: Analysis, instrument: str, sigma: float, title: str, path: Path)
     save(figure, path)
 
 
-def export(tool: Tool, path: Path) -> None:
-    """Instrument as ISCWSA JSON."""
+def export(tool: Tool, record: Record, path: Path) -> None:
+    """Instrument as ISCWSA JSON; one that asks for columns of a record, as a gyro with those of this one."""
+    from groundstation.survey.gyro_export import as_gyro, needs_record
     from groundstation.survey.iscwsa_json import to_json
 
-    write_whole(path, to_json(tool, datetime.datetime.now(datetime.UTC).date()))
+    written = as_gyro(tool, record) if needs_record(tool) else tool
+    write_whole(path, to_json(written, datetime.datetime.now(datetime.UTC).date()))
 
 
 def show(result: dict[str, Any]) -> None:

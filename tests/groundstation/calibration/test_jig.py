@@ -48,6 +48,7 @@ def held(name: str, axes: int) -> tuple[np.ndarray, np.ndarray]:
 
 
 @pytest.mark.statistical
+@pytest.mark.timeout(900)
 @pytest.mark.parametrize("name", DESIGNS)
 def test_intervals_hold_95_percent_of_4000_axes(name: str) -> None:
     inside, blind = held(name, 4000)
@@ -100,6 +101,9 @@ def test_a_jig_that_cannot_be_is_refused(values: tuple[float, float]) -> None:
         Jig(*values)
 
 
+SHOWN = 60  # runs solved without the jig too
+
+
 def mwd_runs(runs: int) -> tuple[dict[str, float], dict[str, float], dict[str, float]]:
     """Share of the z terms of an MWD tool in their intervals, and their scatter over both standard errors."""
     tool, nominal, lean = draw_tool(2), make_design(Heating.ROOM), 2e-4
@@ -113,10 +117,11 @@ def mwd_runs(runs: int) -> tuple[dict[str, float], dict[str, float], dict[str, f
         stood = dataclasses.replace(nominal, tilt=nominal.tilt + lean_of[setting])
         record = measure(tool, stood, seed, jig_std=0.0)
         readings = (record.gravity_volts, record.temperature, nominal.tilt, 12)
-        found, plain = solve_accelerometers(*readings, jig=Jig(lean, 0.0)), solve_accelerometers(*readings)
+        found = solve_accelerometers(*readings, jig=Jig(lean, 0.0))
         off.append([found.coefficients[name] - truth[name] for name in names])
         stated.append([found.standard_errors[name] for name in names])
-        blind.append([plain.standard_errors[name] for name in names])
+        if seed < SHOWN:
+            blind.append(list(map(solve_accelerometers(*readings).standard_errors.__getitem__, names)))
     errors, mine, theirs = map(np.array, (off, stated, blind))
     inside = np.mean(np.abs(errors) <= coverage_factor(100) * mine, axis=0)
     scatter = np.std(errors, axis=0, ddof=1)
@@ -127,6 +132,7 @@ def mwd_runs(runs: int) -> tuple[dict[str, float], dict[str, float], dict[str, f
 
 
 @pytest.mark.statistical
+@pytest.mark.timeout(1200)
 def test_the_z_terms_of_4000_mwd_tools_lie_in_their_intervals() -> None:
     inside, _, _ = mwd_runs(4000)
     assert all(0.93 < share < 0.97 for share in inside.values()), inside
@@ -134,7 +140,7 @@ def test_the_z_terms_of_4000_mwd_tools_lie_in_their_intervals() -> None:
 
 @pytest.mark.slow
 def test_the_z_terms_of_an_mwd_tool_scatter_as_stated() -> None:
-    _, stated, blind = mwd_runs(60)
+    _, stated, blind = mwd_runs(SHOWN)
     assert all(0.75 < ratio < 1.3 for ratio in stated.values()), stated
     assert blind["B_C0"] > 2.3  # what it was without the jig
     assert blind["SF_C0"] > 1.6
