@@ -6,6 +6,7 @@ import contextlib
 import queue
 import warnings
 from collections.abc import Callable
+from contextlib import AbstractContextManager
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -16,7 +17,7 @@ from borechain.pki.access import MEDIUM, ROUTER, read_access
 from sim.rig.transports import Transports
 from telemetry import keys
 from telemetry.media.credentials import Credentials, credentials_for
-from telemetry.media.zenoh_bus import open_client, open_router
+from telemetry.media.zenoh_bus import ZenohBus, open_client, open_router
 from telemetry.media.zenoh_port import CONNECT_TIMEOUT
 from telemetry.runtime.hosting import Place, begin_process, on_termination, reporting
 
@@ -48,7 +49,7 @@ def run_medium(
             warnings.simplefilter("ignore", PorosityWarning)  # whoever started the rig was warned
             world = World(load_scenario(scenario, faults), seed)
         if router:
-            session = open_router(place.endpoint, *guard_of(place.endpoint, place.keys))
+            session = opened_router(place.endpoint, place.keys)
         else:
             credentials = credentials_for(place.endpoint, place.keys, MEDIUM)
             session = open_client(place.endpoint, CONNECT_TIMEOUT, credentials)
@@ -88,9 +89,20 @@ def run_router(endpoint: str, keys_place: Path | None = None) -> None:
     """Be the router that the processes of a rig meet at, until a signal comes."""
     stopped: queue.SimpleQueue[None] = queue.SimpleQueue()
     begin_process("router")
-    with open_router(endpoint, *guard_of(endpoint, keys_place)):
+    with opened_router(endpoint, keys_place):
         on_termination(lambda: stopped.put(None))
         stopped.get()
+
+
+def opened_router(endpoint: str, keys_place: Path | None = None) -> AbstractContextManager[ZenohBus]:
+    """Session at which the processes of a rig meet, over TLS guarded by its keys.
+
+    Raises
+    ------
+    MediumError, KeyFileError
+        When the endpoint cannot be listened on, or there are no keys for it.
+    """
+    return open_router(endpoint, *guard_of(endpoint, keys_place))
 
 
 def pack_progress(progress: object) -> bytes:

@@ -80,9 +80,8 @@ class RunLog:
                 self._word = view["verdict"]
                 self._line("verdict", view["line"])
 
-    def follow(self, ground: Ground, endpoint: str, rig: str) -> None:
+    def follow(self, ground: Ground) -> None:
         """Log what a ground station publishes."""
-        self.on_open(endpoint, rig)
         for path in FOLLOWED:
             ground.follow(path, self.on_answer)
 

@@ -18,9 +18,7 @@ from sim.errors import RigError
 from sim.rig.processes import ProcessTable
 from sim.rig.stepper import Acted
 from telemetry import keys
-from telemetry.media.credentials import Credentials
-from telemetry.media.zenoh_bus import ZenohBus, open_client
-from telemetry.media.zenoh_port import CONNECT_TIMEOUT
+from telemetry.media.zenoh_bus import ZenohBus
 from telemetry.messages import address_name
 
 SUPERVISE_EVERY = 0.2  # wall s
@@ -97,31 +95,26 @@ class Launcher:
     Parameters
     ----------
     table : processes of the rig
-    rig, endpoint : where the keys are
+    bus : router that they meet at; it is open before the first of them starts
+    rig : name in key expressions
     show : called with every tick
     act : plays the operator at a cue
     stall_limit : wall s after which a rig that makes no progress is ended
-    credentials : what the launcher shows to a router over TLS
-    begun : called with the bus as soon as its endpoint can be joined
     """
 
     def __init__(
         self,
         table: ProcessTable,
+        bus: ZenohBus,
         rig: str,
-        endpoint: str,
         show: Callable[[Tick], None],
         act: Callable[[ZenohBus, str], Acted] = lambda _bus, _cue: Acted.DONE,
         stall_limit: float = STALL_LIMIT,
-        credentials: Credentials | None = None,
-        begun: Callable[[ZenohBus], None] = lambda _bus: None,
     ) -> None:
-        self._credentials = credentials
-        self._begun = begun
+        self._bus = bus
         self._stall_limit = stall_limit
         self._table = table
         self._rig = rig
-        self._endpoint = endpoint
         self._show = show
         self._act = act
         self._ticks: queue.SimpleQueue[Tick | None] = queue.SimpleQueue()
@@ -136,16 +129,13 @@ class Launcher:
         KeyboardInterrupt
             On Ctrl-C; every process has ended by then.
         """
+        bus = self._bus
         try:
+            bus.subscribe(keys.WANTED.format(rig=self._rig), lambda _key, payload: self._ticks.put(Tick.parse(payload)))
             self._table.start("medium")
-            with open_client(self._endpoint, CONNECT_TIMEOUT, self._credentials) as bus:
-                self._begun(bus)
-                bus.subscribe(
-                    keys.WANTED.format(rig=self._rig), lambda _key, payload: self._ticks.put(Tick.parse(payload))
-                )
-                with interrupts_into(self._ticks):
-                    self._supervise(bus)
-                return ask(bus)
+            with interrupts_into(self._ticks):
+                self._supervise(bus)
+            return ask(bus)
         finally:
             self._table.stop()
 

@@ -12,13 +12,14 @@ import click
 
 from borechain.cli.faults import needs, plain_faults
 from borechain.cli.options import parse_speed
-from borechain.cli.rig.rig import drill_in_processes, orderable, process_table
+from borechain.cli.rig.rig import Job, drill_in_processes, orderable, process_table, world_of
 from groundstation.page_options import DEFAULT, page_settings
 from telemetry import keys
 from telemetry.runtime.options import insecure_option, secure_endpoint
 
 if TYPE_CHECKING:
     from groundstation.gateway.page.settings import PageSettings
+    from telemetry.media.zenoh_bus import ZenohBus
 
 SCENARIO = Path("demo")
 
@@ -49,8 +50,10 @@ def demo(page: str, speed: float, endpoint: str, rounds: int | None) -> None:
       borechain demo
       borechain demo --speed 2 --page 127.0.0.1:8090
     """
+    from borechain.host import opened_router
     from groundstation.gateway.page.settings import listen
     from sim.rig.launcher import check_port_free
+    from sim.world.shipped import find_scenario
 
     settings = page_settings(page, None, None)
     if settings is None:
@@ -60,20 +63,15 @@ def demo(page: str, speed: float, endpoint: str, rounds: int | None) -> None:
     served = orderable(settings)
     click.echo(f"open {served.url} in a browser; Ctrl-C ends the demonstration")
     try:
-        for seed in itertools.count(1) if rounds is None else range(1, rounds + 1):
-            with tempfile.TemporaryDirectory(prefix="borechain-demo-") as folder:
-                drill(seed, speed, endpoint, served, Path(folder))
+        with opened_router(endpoint) as bus:
+            for seed in itertools.count(1) if rounds is None else range(1, rounds + 1):
+                with tempfile.TemporaryDirectory(prefix="borechain-demo-") as folder:
+                    drill(Job(find_scenario(SCENARIO), seed, speed, endpoint=endpoint), bus, served, Path(folder))
     except KeyboardInterrupt:
         click.echo("ended")
 
 
-def drill(seed: int, speed: float, endpoint: str, page: PageSettings, folder: Path) -> None:
+def drill(job: Job, bus: ZenohBus, page: PageSettings, folder: Path) -> None:
     """One hole."""
-    from sim.world.scenario import load_scenario
-    from sim.world.shipped import find_scenario
-    from sim.world.world import World
-
-    path = find_scenario(SCENARIO)
-    world = World(load_scenario(path, ()), seed)
-    table = partial(process_table, world, path, seed, speed, (), keys.DEFAULT_RIG, endpoint, folder, None, page)
-    drill_in_processes(world, keys.DEFAULT_RIG, endpoint, lambda _tick: None, None, None, table)
+    world = world_of(job)
+    drill_in_processes(world, job, bus, lambda _tick: None, None, partial(process_table, world, job, folder, page))

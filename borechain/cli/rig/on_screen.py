@@ -13,7 +13,7 @@ from typing import IO
 
 import click
 
-from borechain.cli.faults import EnvironmentFault
+from borechain.cli.faults import EnvironmentFault, InputFault
 from borechain.cli.ground.crew import user
 from borechain.client import Ground, connect
 from telemetry.errors import MediumError
@@ -29,8 +29,8 @@ def drill_on_screen(arguments: Sequence[str], rig_name: str, endpoint: str, keys
 
     Raises
     ------
-    EnvironmentFault
-        When the rig fails; its own line has been printed.
+    InputFault, EnvironmentFault
+        When the rig refuses its scenario, or fails; its own line has been printed.
     """
     with tempfile.TemporaryFile("w+") as written, rig_process(arguments, written) as process:
         click.echo(f"starting; the screen of the crew opens when {endpoint} can be joined, Ctrl-C ends it")
@@ -43,7 +43,8 @@ def drill_on_screen(arguments: Sequence[str], rig_name: str, endpoint: str, keys
         written.seek(0)
         click.echo(written.read(), nl=False)
         if process.returncode:
-            raise EnvironmentFault(f"the rig ended with status {process.returncode}; its message stands above")
+            fault = InputFault if process.returncode == InputFault.exit_code else EnvironmentFault
+            raise fault(f"the rig ended with status {process.returncode}; its message stands above")
 
 
 @contextlib.contextmanager

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import json
 import sys
 import tempfile
@@ -103,15 +104,9 @@ def rig(
       borechain rig rig-3 --keys stick
       borechain rig wellbore-1 --speed 5 --page 127.0.0.1:8080
     """
-    from sim.rig.launcher import check_port_free, next_run_folder, prepare_folder
-    from sim.rig.report import write_files
-    from sim.world.scenario import load_scenario
-    from sim.world.world import World
+    from borechain.host import opened_router
+    from sim.rig.launcher import check_port_free
 
-    with warnings_in_lines():
-        world = World(load_scenario(scenario, faults), seed)
-    if world.scenario.medium.link == "off":
-        raise InputFault(f'{scenario}: medium.link: expected "on" for a rig; only studies run without a link')
     if inline != (transport == "can-native") and transport is not None:
         raise InputFault(
             f"--transport {transport}: expected {'real processes' if inline else '--inline'} with it; "
@@ -129,51 +124,83 @@ def rig(
 
         drill_on_screen(sys.argv[1:], rig_name, endpoint, keys_place)
         return
-    folder = out if out is not None else next_run_folder(Path("out") / scenario.stem)
-    prepare_folder(folder)
-    if served is not None:
-        served = orderable(served)
-    started = time.monotonic()
-    log = RunLog(say) if view == "log" else None
-    try:
-        with progress(world, quiet=view != "bar") as show:
-            if inline:
-                native = transport == "can-native"
-                ran = drill_inline(world, speed, rig_name, folder, show, log, native=native, keys=keys_place)
-            else:
-                ran = drill_in_processes(
-                    world,
-                    rig_name,
-                    endpoint,
-                    show,
-                    log,
-                    transport,
-                    partial(
-                        process_table,
-                        world,
-                        scenario,
-                        seed,
-                        speed,
-                        faults,
-                        rig_name,
-                        endpoint,
-                        folder,
-                        keys_place,
-                        served,
-                    ),
-                    keys_place,
-                )
-    except KeyboardInterrupt:
-        raise EnvironmentFault(f"interrupted; every process was ended, what was stored is in {folder}") from None
-    result = result_of(ran.answers, world)
-    result |= {"processes": ran.processes, "wall_s": round(time.monotonic() - started, 3), "restarts": ran.restarts}
-    write_files(folder, result)
+    job = Job(scenario, seed, speed, faults, transport, rig_name, endpoint, keys_place)
+    # whoever wants to join can do so while the scenario is read and the kernels are loaded
+    with contextlib.nullcontext() if inline else opened_router(endpoint, keys_place) as bus:
+        log = RunLog(say) if view == "log" else None
+        if log is not None and bus is not None:
+            log.on_open(endpoint, rig_name)
+        result, folder = drill(job, bus, out, served, log, quiet=view != "bar")
     if as_json:
         click.echo(json.dumps(result))
     else:
         show_result(result, folder)
     if result["missing"]:
         raise EnvironmentFault(lacking(result["missing"], result["measurements"], folder))
+
+
+@dataclass(frozen=True, slots=True)
+class Job:
+    """What is to be drilled, how, and where its keys are."""
+
+    scenario: Path
+    seed: int
+    speed: float
+    faults: tuple[str, ...] = ()
+    transport: str | None = None
+    rig_name: str = keys.DEFAULT_RIG
+    endpoint: str = keys.DEFAULT_ENDPOINT
+    keys_place: Path | None = None
+
+
+def drill(
+    job: Job, bus: ZenohBus | None, out: Path | None, page: PageSettings | None, log: RunLog | None, *, quiet: bool
+) -> tuple[dict[str, Any], Path]:
+    """Drill with processes that meet at ``bus``, or without it in this process; result and folder.
+
+    Raises
+    ------
+    InputFault, ScenarioError
+        When the scenario cannot be drilled; nothing was written.
+    EnvironmentFault, RigError
+        When the folder cannot be used, a process fails, or on Ctrl-C.
+    """
+    from sim.rig.launcher import next_run_folder, prepare_folder
+    from sim.rig.report import write_files
+
+    started = time.monotonic()
+    world = world_of(job)
+    folder = out if out is not None else next_run_folder(Path("out") / job.scenario.stem)
+    prepare_folder(folder)
+    if page is not None:
+        page = orderable(page)
+    try:
+        with progress(world, quiet=quiet) as show:
+            if bus is None:
+                native = job.transport == "can-native"
+                ran = drill_inline(
+                    world, job.speed, job.rig_name, folder, show, log, native=native, keys=job.keys_place
+                )
+            else:
+                ran = drill_in_processes(world, job, bus, show, log, partial(process_table, world, job, folder, page))
+    except KeyboardInterrupt:
+        raise EnvironmentFault(f"interrupted; every process was ended, what was stored is in {folder}") from None
+    result = result_of(ran.answers, world)
+    result |= {"processes": ran.processes, "wall_s": round(time.monotonic() - started, 3), "restarts": ran.restarts}
+    write_files(folder, result)
+    return result, folder
+
+
+def world_of(job: Job) -> World:
+    """World of a job, with what is odd about its scenario told in lines; errors as ``drill``."""
+    from sim.world.scenario import load_scenario
+    from sim.world.world import World
+
+    with warnings_in_lines():
+        world = World(load_scenario(job.scenario, job.faults), job.seed)
+    if world.scenario.medium.link == "off":
+        raise InputFault(f'{job.scenario}: medium.link: expected "on" for a rig; only studies run without a link')
+    return world
 
 
 def check_page(page: PageSettings, *, inline: bool) -> None:
@@ -247,40 +274,32 @@ class Ran:
 
 def drill_in_processes(
     world: World,
-    rig_name: str,
-    endpoint: str,
+    job: Job,
+    bus: ZenohBus,
     show: Callable[[Tick | Progress], None],
     log: RunLog | None,
-    transport: str | None,
     table_of: Callable[[Transports, Path], ProcessTable],
-    keys_place: Path | None = None,
 ) -> Ran:
     """Drill with one real process a tube, beside a hub of CAN segments where a joint is on CAN."""
     from borechain.client import Ground
-    from borechain.pki.access import MEDIUM
     from sim.rig.launcher import Launcher
     from sim.rig.transports import carrying
-    from telemetry.media.credentials import credentials_for
 
     with (
-        carrying(transport, world.scenario.medium.transports) as transports,
+        carrying(job.transport, world.scenario.medium.transports) as transports,
         tempfile.TemporaryDirectory(prefix="borechain-") as steps,  # a socket's path must be short
     ):
         table = table_of(transports, Path(steps) / "steps")
-        credentials = credentials_for(endpoint, keys_place, MEDIUM)
 
         def follow(tick: Tick) -> None:
             show(tick)
             if log is not None:
                 log.on_tick(tick, table.restarts)
 
-        def begin(bus: ZenohBus) -> None:
-            if log is not None:
-                log.follow(Ground(bus, rig_name), endpoint, rig_name)
-
-        operator = operator_of(world, rig_name)
-        launcher = Launcher(table, rig_name, endpoint, follow, operator, credentials=credentials, begun=begin)
-        answers = launcher.run(lambda bus: ask(bus, rig_name))
+        if log is not None:
+            log.follow(Ground(bus, job.rig_name))
+        launcher = Launcher(table, bus, job.rig_name, follow, operator_of(world, job.rig_name))
+        answers = launcher.run(lambda bus: ask(bus, job.rig_name))
         return Ran(answers, len(table.specs), sum(table.restarts.values()))
 
 
@@ -313,18 +332,7 @@ def drill_inline(
 
 
 def process_table(
-    world: World,
-    scenario: Path,
-    seed: int,
-    speed: float,
-    faults: tuple[str, ...],
-    rig_name: str,
-    endpoint: str,
-    folder: Path,
-    keys_place: Path | None,
-    page: PageSettings | None,
-    transports: Transports,
-    steps: Path,
+    world: World, job: Job, folder: Path, page: PageSettings | None, transports: Transports, steps: Path
 ) -> ProcessTable:
     """Every process of the rig, one line each; ``steps`` is the socket at which they meet their stepper."""
     from borechain.host import run_medium
@@ -336,14 +344,17 @@ def process_table(
     from telemetry.runtime.hosting import Place
     from telemetry.transport.authentication import new_key
 
-    key_file = new_key(folder / "rig.key") if keys_place is None else None
+    key_file = new_key(folder / "rig.key") if job.keys_place is None else None
 
     def place(name: str, address: int = BASE) -> Place:
         media = transports.media_of(address)
-        return Place(rig_name, endpoint, private_folder(folder, name), key_file, media, steps, keys_place)
+        home = private_folder(folder, name)
+        return Place(job.rig_name, job.endpoint, home, key_file, media, steps, job.keys_place)
 
     specs = {
-        "medium": Spec(run_medium, (place("medium"), scenario, seed, speed, faults, True, True, transports)),
+        "medium": Spec(
+            run_medium, (place("medium"), job.scenario, job.seed, job.speed, job.faults, False, True, transports)
+        ),
         "encoder": Spec(run_encoder, (place("encoder", ENCODER), None, None, world.torque_settings(), world.reach)),
         "base": Spec(partial(run_ground, page=page), (place("ground"), ground_settings(world))),
     }
@@ -485,7 +496,7 @@ def show_column(result: dict[str, Any]) -> None:
         d = result["column"][name]
         if d is not None:
             click.echo(
-                f"column {name:15} {d['deviation_cm']:.1f} +- {d['sigma_cm']:.2f} cm "
+                f"column {name:15} {d['deviation_cm']:.1f} ± {d['sigma_cm']:.2f} cm "
                 f"towards {d['direction_deg']:.0f} deg at {d['md_m']:.1f} m, {d['used_percent']:.0f} % of the tolerance"
             )
     for alarm in result["alarms"]:
