@@ -78,6 +78,8 @@ KINDS: tuple[AlarmKind, ...] = (
     AlarmKind("database", BAD, "messages in the database are damaged; they are asked for again"),
     AlarmKind("queue", DEGRADED, "a queue of the ground station was full and dropped something"),
     AlarmKind("bad_input", NOTICE, "bytes came that are no message of ours; they were dropped"),
+    AlarmKind("wrong_password", NOTICE, "somebody has tried a wrong password on the page; the detail says how often"),
+    AlarmKind("page_restarted", NOTICE, "the page's web server has failed and was started again"),
     AlarmKind("seal_refused", NOTICE, "frames or messages were forged or repeated; they had no effect"),
     AlarmKind("key_file", DEGRADED, "the key file was changed and cannot be used, or holds keys that should be ended"),
 )

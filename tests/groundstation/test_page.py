@@ -1,5 +1,6 @@
 """The page's addresses on a real ground station: the keys over HTTP, orders by role, and what is refused."""
 
+import asyncio
 import contextlib
 import json
 import re
@@ -24,7 +25,7 @@ from groundstation.errors import ConfigurationError, PageError
 from groundstation.gateway.page.application import FILES
 from groundstation.gateway.page.openapi import document
 from groundstation.gateway.page.passwords import drawn_password, hash_of, is_right, read_passwords, text_of
-from groundstation.gateway.page.server import CONNECTIONS
+from groundstation.gateway.page.server import CONNECTIONS, SERVER_TASK
 from groundstation.gateway.page.sessions import LONGEST_HOLD_S, SESSIONS, VALID_S, Sessions, WrongPasswords, is_from
 from groundstation.gateway.page.settings import PageSettings, check_certificate, listen, parse_address
 from groundstation.service.paths import PATTERNS
@@ -165,6 +166,9 @@ def test_a_wrong_password_is_told_counted_and_slow(served: tuple[Served, int], p
     assert b"retry-after: 1\r\n" in data
     assert b"too soon after a wrong password; wait 1 s" in data
     assert counters["wrong_passwords"] == before + 1
+    (told,) = [row for row in page.get("/api/alarms").content["rig"] if row["code"] == "wrong_password"]
+    assert (told["level"], told["count"]) == ("notice", before + 1)
+    assert told["detail"] == f"{before + 1} since the ground station started, the last from 127.0.0.1"
     deadline = time.monotonic() + PATIENCE
     while page.sign_in().status == 429:
         assert time.monotonic() < deadline
@@ -297,6 +301,37 @@ def test_a_connection_that_never_asks_is_ended(served: tuple[Served, int]) -> No
         assert readable
         with contextlib.suppress(ConnectionResetError):
             assert idle.recv(1) == b""
+
+
+def test_a_web_server_that_fails_is_told_and_follows_anew(tmp_path: Path) -> None:
+    port = free_port()
+    with serving(Rig(tmp_path), PageSettings("127.0.0.1", port)) as served:
+        page = PageClient(port)
+        assert page.get("/alive").status == 200
+        with stream(port) as reader:
+            read_until(reader, b"event: hello")
+            served.do(lambda _rig: end_server())
+            with contextlib.suppress(ConnectionResetError):
+                while reader.recv(65_536):
+                    pass
+        deadline = time.monotonic() + PATIENCE
+        while not answers(port):
+            assert time.monotonic() < deadline
+        (told,) = page.get("/api/alarms").content["rig"]
+        assert (told["code"], told["count"], told["detail"]) == ("page_restarted", 1, "it was ended")
+
+
+def end_server() -> None:
+    """Have the web server fail; on its own loop."""
+    (serving,) = [task for task in asyncio.all_tasks() if task.get_name() == SERVER_TASK]
+    serving.cancel()
+
+
+def answers(port: int) -> bool:
+    try:
+        return bool(PageClient(port).get("/alive").status == 200)
+    except OSError:
+        return False
 
 
 def test_a_port_that_is_taken_is_told_with_the_remedy() -> None:

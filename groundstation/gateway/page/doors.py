@@ -158,6 +158,8 @@ class Doors:
             return
         row, hold = self._wrong.add(address, time.monotonic())
         self._process.endpoint.counters["wrong_passwords"] += 1
+        told = f"{self._wrong.total} since the ground station started, the last from {address}"
+        self._process.model.rig_alarms.alert("wrong_password", "page", told)
         times = "" if row == 1 else f", {row} in a row"
         raise RequestError(401, f"wrong password or role{times}; the next try is looked at in {hold:.0f} s")
 

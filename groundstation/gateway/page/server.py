@@ -1,4 +1,4 @@
-"""Serves the page on the loop of the ground station, and ends connections that only hold a place."""
+"""Serves the page on the loop of the ground station, again after a failure; ends connections that only hold a place."""
 
 from __future__ import annotations
 
@@ -20,6 +20,8 @@ IDLE_S = 10.0  # for which a connection may have no request, or be closing
 SWEEP_S = 1.0
 LARGEST_HEAD = 16_384  # bytes of a request before its body
 LAST_WORDS_S = 1  # for answers under way when the ground station ends
+AGAIN_S = 0.5  # between the failure of a server and the next one
+SERVER_TASK = "page server"
 
 
 class Server(uvicorn.Server):
@@ -62,6 +64,52 @@ class Sweeper:
         self._found = found
 
 
+class Keeper:
+    """Keeps a web server on a listening socket: one that fails is told to the crew, and another one follows.
+
+    Parameters
+    ----------
+    process : whose page
+    config : of each server
+    listening : socket of all of them
+    """
+
+    def __init__(self, process: GroundProcess, config: uvicorn.Config, listening: socket.socket) -> None:
+        self._process, self._config, self._listening = process, config, listening
+        self._server = Server(config)
+        self._ending = False
+
+    async def run(self) -> None:
+        """Serve until ``end``."""
+        while not self._ending:
+            self._server = Server(self._config)
+            serving = asyncio.create_task(self._server.serve([self._listening.dup()]), name=SERVER_TASK)
+            sweeping = asyncio.create_task(Sweeper(self._server).run())
+            await asyncio.wait([serving])
+            sweeping.cancel()
+            if not self._ending:
+                self._tell(serving)
+                close_all(self._server)
+                await asyncio.sleep(AGAIN_S)
+
+    def end(self) -> None:
+        """Serve nothing more."""
+        self._ending = self._server.should_exit = True
+
+    def _tell(self, serving: asyncio.Task[None]) -> None:
+        error = None if serving.cancelled() else serving.exception()
+        why = "it was ended" if error is None else f"{type(error).__name__}: {error}"
+        self._process.model.rig_alarms.alert("page_restarted", "page", why[:200])
+
+
+def close_all(server: uvicorn.Server) -> None:
+    """Free the place of a server that has failed: browsers come again by themselves."""
+    for listener in server.servers if hasattr(server, "servers") else ():
+        listener.close()
+    for connection in list(server.server_state.connections):
+        connection.transport.abort()
+
+
 @contextlib.asynccontextmanager
 async def serving_page(process: GroundProcess, page: PageSettings, listening: socket.socket) -> AsyncIterator[None]:
     """Have the page served on a listening socket while the context lasts."""
@@ -84,12 +132,11 @@ async def serving_page(process: GroundProcess, page: PageSettings, listening: so
     quiet = logging.getLogger("uvicorn.error")  # what it would write is answered, or nobody's business
     quiet.addHandler(logging.NullHandler())
     quiet.propagate = False
-    server = Server(config)
-    tasks = [asyncio.create_task(server.serve([listening])), asyncio.create_task(Sweeper(server).run())]
+    keeper = Keeper(process, config, listening)
+    keeping = asyncio.create_task(keeper.run())
     try:
         yield
     finally:
         hub.close()
-        server.should_exit = True
-        tasks[1].cancel()
-        await asyncio.gather(*tasks, return_exceptions=True)
+        keeper.end()
+        await asyncio.gather(keeping, return_exceptions=True)
