@@ -81,10 +81,10 @@ async def test_from_the_alarm_to_the_right_answers_with_one_key(served: Served) 
             lines = text.splitlines()
             assert len(lines) <= SIZE[1]
             assert lines[0].rstrip() == "HOLE rig-1 * live 0.0s  MD 10.0/20.0 m  tubes 5  health good  alarms 1"
-            told = "STEER: ends 43.1 +- 0.1 cm at 0 deg N; limit 45 (96 %); act before 13.1 m"
+            told = "STEER: ends 43.1 ± 0.1 cm at 0 deg N; limit 45 (96 %); act before 13.1 m"
             assert lines[1].strip() == told
             assert lines[2].strip() == "steer to 180 deg S before 13.1 m, 3.1 m are left"
-            assert ">  1 raised projection 20.0 m 0 deg N: 43.1 +- 0.1 cm over 80 % of 45 cm" in text
+            assert ">  1 raised projection 20.0 m 0 deg N: 43.1 ± 0.1 cm over 80 % of 45 cm" in text
             await pilot.press("a")
             text = await until(
                 app, served, lambda text: "acknowledge alarm 1: done" in text and "1 ack anna proj" in text

@@ -80,7 +80,7 @@ def judge(known: Known) -> Verdict:
         doubts.insert(0, (Doubt.NO_SURVEY, "no station has been surveyed yet"))
     elif verdict.word is not Word.OUT and (spread := SURELY * known.projection.std) >= known.projection.limit:
         limit = f"{100.0 * known.projection.limit:.0f} cm"
-        doubts.append((Doubt.UNCERTAIN, f"the end is known to +-{100.0 * spread:.0f} cm, the limit is {limit}"))
+        doubts.append((Doubt.UNCERTAIN, f"the end is known to ±{100.0 * spread:.0f} cm, the limit is {limit}"))
     if not doubts:
         return verdict
     return replace(
@@ -143,4 +143,4 @@ def direction(deviation: Deviation) -> float:
 
 
 def _cm(deviation: Deviation) -> str:
-    return f"{100.0 * deviation.size:.1f} +- {100.0 * deviation.std:.1f} cm"
+    return f"{100.0 * deviation.size:.1f} ± {100.0 * deviation.std:.1f} cm"

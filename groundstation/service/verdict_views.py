@@ -80,7 +80,7 @@ def line(found: Verdict) -> str:
     size = rounded(CM * d.size, spread) if spread >= 1.0 else CM * d.size  # rounded once, as it is written
     is_end = found.what == "projection"
     where = "ends" if is_end else f"at {d.md:.1f} m"
-    said = f"{phrase}: {where} {size:.1f} +- {spread:.1f} cm at {round(math.degrees(direction(d))) % 360} deg"
+    said = f"{phrase}: {where} {size:.1f} ± {spread:.1f} cm at {round(math.degrees(direction(d))) % 360} deg"
     said += f" {wind(direction(d))}; limit {CM * d.limit:.0f} ({100.0 * d.ratio:.0f} %)"
     if found.act_before is None or found.left is None or found.word is Word.OUT:
         return said

@@ -51,7 +51,7 @@ def test_each_level_of_the_tolerance_has_its_word(worst: float, end: float, word
 
 def test_the_line_of_a_hole_that_is_to_be_steered() -> None:
     facts = known(0.9733)
-    assert line(judge(facts)) == "STEER: ends 43.8 +- 0.2 cm at 253 deg WSW; limit 45 (97 %); act before 13.0 m"
+    assert line(judge(facts)) == "STEER: ends 43.8 ± 0.2 cm at 253 deg WSW; limit 45 (97 %); act before 13.0 m"
 
 
 def test_a_hole_that_cannot_be_brought_back_is_out_before_it_is_outside() -> None:

@@ -54,11 +54,11 @@ def test_a_hole_from_its_first_tube_to_steer_and_what_the_crew_does(tmp_path: Pa
         expect(page.locator("#word")).to_have_text("STEER")
         expect(page.locator("#hole")).to_have_text("rig-1")
         expect(page.locator("#facts")).to_contain_text("MD 10.0/20.0 m · tubes 5 · health good · alarms 1")
-        told = "ends 43.1 +- 0.1 cm at 0 deg N; limit 45 (96 %); act before 13.1 m"
+        told = "ends 43.1 ± 0.1 cm at 0 deg N; limit 45 (96 %); act before 13.1 m"
         expect(page.locator("#told")).to_have_text(told)
         expect(page.locator("#todo")).to_have_text("steer to 180 deg S before 13.1 m, 3.1 m are left")
         alarm = page.locator("#alarm-list li")
-        expect(alarm.locator(".what")).to_contain_text("1 projection at 20.0 m at 0° N: 43.1 +- 0.1 cm")
+        expect(alarm.locator(".what")).to_contain_text("1 projection at 20.0 m at 0° N: 43.1 ± 0.1 cm")
         # one action, which asks for the role once
         page.click("text=Acknowledge")
         sign_in(page, "not the password")
