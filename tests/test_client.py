@@ -1,4 +1,4 @@
-"""The client on a real bus: typed answers, streams without gaps or doubles, errors in a line, and the example."""
+"""The client on a real bus: typed answers, streams without gaps or doubles, errors in a line, and the examples."""
 
 import dataclasses
 import subprocess
@@ -6,8 +6,10 @@ import sys
 from collections.abc import Iterator
 from pathlib import Path
 
+import playwright
 import pytest
 from hand_fed import Rig
+from page_client import free_port
 from served import Served, serving
 
 from borechain.client import (
@@ -25,10 +27,13 @@ from borechain.client import (
     live_rigs,
     shaped,
 )
+from groundstation.gateway.page.settings import PageSettings
 from groundstation.service import key_fields
 from telemetry.media.zenoh_bus import open_client
 
 pytestmark = pytest.mark.slow
+EXAMPLES = Path(__file__).parents[1] / "examples"
+NODE = Path(playwright.__file__).parent / "driver" / "node"  # the Node.js that comes with the browser's driver
 
 
 @pytest.fixture(scope="module")
@@ -37,7 +42,7 @@ def served(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Served]:
     rig.run(5.0)
     for stop, inclination_deg in ((1, 0.3), (2, 0.3), (3, 2.2)):
         rig.drill(stop, inclination_deg)
-    with serving(rig) as served:
+    with serving(rig, PageSettings("127.0.0.1", free_port())) as served:
         yield served
 
 
@@ -107,13 +112,29 @@ def test_an_answer_of_an_older_ground_station_is_named() -> None:
         shaped(Steer, {"azimuth_deg": 1.0})
 
 
-def test_the_example_runs(served: Served) -> None:
-    example = Path(__file__).parents[1] / "examples" / "follow_a_rig.py"
-    done = subprocess.run(
-        [sys.executable, str(example), served.endpoint, "rig-1", "0.2"], capture_output=True, text=True, check=False
-    )
+def lines_of(*words: str | Path) -> list[str]:
+    """What an example prints."""
+    done = subprocess.run([*map(str, words)], capture_output=True, text=True, check=False)
     assert done.returncode == 0, done.stderr
-    lines = done.stdout.splitlines()
+    return done.stdout.splitlines()
+
+
+def test_the_example_in_python_runs(served: Served) -> None:
+    lines = lines_of(sys.executable, EXAMPLES / "follow_a_rig.py", served.endpoint, "rig-1", "0.2")
     assert lines[1].startswith("tube 1 at 2.0 m: 0.30 deg")
     assert len([line for line in lines if line.startswith("tube 1 at")]) == 3
     assert any(line.startswith("alarm ") and "projection" in line for line in lines)
+
+
+def test_the_example_in_javascript_runs_in_node(served: Served) -> None:
+    assert served.page is not None
+    lines = lines_of(NODE, EXAMPLES / "follow_a_rig.mjs", served.page.url, "1")
+    assert [line for line in lines if line.startswith("tube 1 at")] == [
+        "tube 1 at 2.0 m: 0.30 deg", "tube 1 at 4.0 m: 0.30 deg", "tube 1 at 6.0 m: 2.20 deg",
+    ]  # fmt: skip
+    assert served.rig.ask("verdict")["line"] in lines
+    assert any(line.startswith("alarm ") and "projection" in line for line in lines)
+    nobody = subprocess.run(
+        [NODE, EXAMPLES / "follow_a_rig.mjs", f"http://127.0.0.1:{free_port()}"], capture_output=True, check=False
+    )
+    assert nobody.returncode == 1

@@ -25,6 +25,7 @@ class Served:
     rig: Rig
     endpoint: str
     loop: asyncio.AbstractEventLoop
+    page: PageSettings | None = None
 
     def do(self, act: Callable[[Rig], None]) -> None:
         """Have something done to the rig on the thread of its ground station."""
@@ -64,7 +65,7 @@ def serving(rig: Rig, page: PageSettings | None = None) -> Iterator[Served]:
     thread.start()
     try:
         assert ready.wait(30.0)
-        yield Served(rig, endpoint, loop)
+        yield Served(rig, endpoint, loop, page)
     finally:
         loop.call_soon_threadsafe(end.set)
         thread.join(30.0)

@@ -17,7 +17,7 @@ import pytest
 from hand_fed import Rig
 from hypothesis import given
 from hypothesis import strategies as st
-from page_client import PASSWORD, PATIENCE, PageClient
+from page_client import PASSWORD, PATIENCE, PageClient, free_port
 from sealed_string import make_folder
 from served import Served, serving
 
@@ -34,12 +34,6 @@ from telemetry.errors import KeyFileError
 
 pytestmark = pytest.mark.slow
 OPERATOR_PASSWORD = "another long word"
-
-
-def free_port() -> int:
-    with socket.socket() as probe:
-        probe.bind(("127.0.0.1", 0))
-        return int(probe.getsockname()[1])
 
 
 @pytest.fixture(scope="module")

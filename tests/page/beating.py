@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import contextlib
-import socket
 import threading
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
@@ -11,7 +10,7 @@ from pathlib import Path
 from typing import Any
 
 from hand_fed import Rig
-from page_client import PASSWORD
+from page_client import PASSWORD, free_port
 from served import Served, serving
 
 from groundstation.gateway.page.passwords import hash_of
@@ -66,12 +65,6 @@ class Beating:
         while not self._stopped.wait(BEAT_S):
             if self._beats.is_set():
                 self.do(lambda rig: rig.speak(len(rig.ground.model.tally.tubes)))  # a second of rig time
-
-
-def free_port() -> int:
-    with socket.socket() as probe:
-        probe.bind(("127.0.0.1", 0))
-        return int(probe.getsockname()[1])
 
 
 @contextlib.contextmanager

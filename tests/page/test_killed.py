@@ -8,17 +8,12 @@ from collections.abc import Callable
 from pathlib import Path
 
 import pytest
+from page_client import free_port
 from playwright.sync_api import Page, expect
 from rigs import running_rig
 
 pytestmark = pytest.mark.process
 Open = Callable[..., Page]
-
-
-def free_port() -> int:
-    with socket.socket() as probe:
-        probe.bind(("127.0.0.1", 0))
-        return int(probe.getsockname()[1])
 
 
 def test_a_browser_sees_the_string_grow_and_outlives_its_ground_station(tmp_path: Path, watched: Open) -> None:
