@@ -50,7 +50,7 @@ kernels: $(STAMP)  ## compile what the tests would compile, each worker for itse
 bytecode: $(STAMP)  ## compile what the tests import, asserts rewritten, each worker for itself
 	$(BIN)/python -m pytest --collect-only --quiet --quiet > /dev/null || true  # the tests tell
 
-browser: $(STAMP)  ## install the browser of the page's tests (chromium), where there is none
+browser: $(STAMP)  ## install what the tests need of Debian (chromium, postgresql), where it is not there
 	$(BIN)/python tests/tools/install_browser.py
 
 tests: $(STAMP)  ## every test but the statistical ones at full size

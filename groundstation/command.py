@@ -68,6 +68,12 @@ WEIGHTINGS = ("bayes", "equal", "linear", "quadratic", "cubic", "adaptive")
     help="Wall file of which this hole is a column: its joints are judged while it is drilled.",
 )
 @click.option("--hole", default="", help="Name of this hole in the wall file.")
+@click.option(
+    "--database",
+    metavar="URL",
+    help="Where surveys and alarms are kept, such as postgresql://USER@HOST/NAME; its password comes from PGPASSWORD or "
+    "~/.pgpass  [default: SQLite in the folder]",
+)
 @page_options
 @clock_option
 @key_option
@@ -88,6 +94,7 @@ def ground(
     mount_std_deg: float,
     wall: Path | None,
     hole: str,
+    database: str | None,
     page: str | None,
     page_tls: tuple[Path, Path] | None,
     page_passwords: Path | None,
@@ -121,6 +128,7 @@ def ground(
         "mount_std_deg": mount_std_deg,
         "wall": wall,
         "hole": hole,
+        "database_url": database,
     }
     run_ground(
         Place(rig_name, endpoint, folder, key_file, keys=keys_place),

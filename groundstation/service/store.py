@@ -400,6 +400,8 @@ def _engine_of(url: str, disk: Disk) -> sa.Engine:
         if address.get_backend_name() == "sqlite" and address.database and not address.query:
             file = Path(address.database)
             return sa.create_engine(address, creator=lambda _record=None: disk.connect(file))
+        if address.drivername == "postgresql":
+            address = address.set(drivername="postgresql+psycopg")
         return sa.create_engine(address)
     except (sa.exc.SQLAlchemyError, ImportError) as error:
         raise StoreError(

@@ -1,4 +1,4 @@
-"""Find the browser of the page's tests, or install chromium: part of `make test`, beside the other preparations."""
+"""Install the browser and the database server of the tests where there are none: part of `make test`."""
 
 from __future__ import annotations
 
@@ -7,8 +7,10 @@ import shutil
 import subprocess
 import sys
 
+from postgres import find_program
+
 NAMES = ("chromium", "chromium-browser", "google-chrome")
-REMEDY = "install chromium with the system's package manager, then run this again"
+REMEDY = "install chromium and postgresql with the system's package manager, then run this again"
 
 
 def find_browser() -> str | None:
@@ -25,15 +27,24 @@ def as_root() -> list[str] | None:
     return [str(sudo), "-n"] if may else None
 
 
+def lacking() -> list[str]:
+    """Debian's packages of what is not there."""
+    browser = [] if find_browser() else ["chromium", "fonts-dejavu-core"]
+    server = [] if find_program("initdb") else ["postgresql"]
+    return browser + server
+
+
 def main() -> None:
-    """Install a browser where there is none."""
-    if find_browser():
+    """Install what is lacking."""
+    wanted = lacking()
+    if not wanted:
         return
+    refusal = f"expected {', '.join(wanted)} for the tests"
     before, apt = as_root(), shutil.which("apt-get")
     if before is None or apt is None:
-        sys.exit(f"no browser for the tests of the page: {REMEDY}")
+        sys.exit(f"{refusal}: {REMEDY}")
     settings = {**os.environ, "DEBIAN_FRONTEND": "noninteractive"}
-    for words in (["update"], ["install", "--yes", "--no-install-recommends", "chromium", "fonts-dejavu-core"]):
+    for words in (["update"], ["install", "--yes", "--no-install-recommends", *wanted]):
         done = subprocess.run(
             [*before, apt, "--quiet=2", "-o", "DPkg::Lock::Timeout=120", *words],
             env=settings,
@@ -44,9 +55,9 @@ def main() -> None:
         )
         if done.returncode:
             last = (done.stderr.strip().splitlines() or ["no reason"])[-1]
-            sys.exit(f"no browser for the tests of the page: apt-get {words[0]}: {last}; {REMEDY}")
-    if not find_browser():
-        sys.exit(f"no browser for the tests of the page: {REMEDY}")
+            sys.exit(f"{refusal}: apt-get {words[0]}: {last}; {REMEDY}")
+    if lacking():
+        sys.exit(f"{refusal}: {REMEDY}")
 
 
 if __name__ == "__main__":

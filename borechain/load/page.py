@@ -1,0 +1,149 @@
+"""A ground station under the load of a shift: tubes that speak, browsers and terminals that look, questions."""
+
+from __future__ import annotations
+
+import itertools
+import json
+import time
+from dataclasses import dataclass
+from functools import partial
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from borechain.client import Ground, NoAnswerError
+from borechain.load.crowd import DRILLING_S, ROUND_S, TUBE_LENGTH, Crowd, living
+from borechain.load.readers import follow_keys, follow_page
+from groundstation.gateway.page.settings import PageSettings
+from groundstation.host import run_ground
+from sim.errors import RigError
+from sim.rig.processes import ProcessTable, Spec
+from sim.rig.realtime import cpu_seconds, footprint, pids
+from telemetry.media.zenoh_bus import open_router
+from telemetry.runtime.hosting import Place
+
+RIG = "load"
+GROUND = "base"
+ASKED = ("verdict", "string", "stations", "trajectory", "column", "alarms", "nodes/1", "uncertainty")
+ASK_EVERY_S = 0.05
+SETTLED_S = 5.0  # after all have been heard, until it is measured
+HEARD_WITHIN_S = 60.0
+LEFT_WITHIN_S = 30.0
+DRILLED_M = 8.0  # at most in a run, however long
+FASTEST = 0.1  # m/s, of the bit
+SPARE_M = 20.0  # of the design below all tubes
+ROUNDING = 2
+
+
+@dataclass(frozen=True, slots=True)
+class Load:
+    """What the ground station is to bear."""
+
+    tubes: int = 50
+    browsers: int = 3
+    terminals: int = 2
+    seconds: float = 60.0
+
+
+def measure(load: Load, endpoint: str, page: PageSettings, folder: Path) -> dict[str, Any]:
+    """Bear a load, and say what the ground station needed for it and how late news and answers were.
+
+    Raises
+    ------
+    RigError
+        When the ground station does not hear the string, or does not last.
+    """
+    settings = {"tube_length": TUBE_LENGTH, "target": TUBE_LENGTH * load.tubes + SPARE_M}
+    serve = partial(run_ground, own_clock=True, page=page)
+    specs = {GROUND: Spec(serve, (Place(RIG, endpoint, folder / "ground"), settings))}
+    table = ProcessTable(specs, ["borechain.warm"])
+    try:
+        table.warm()
+        with open_router(endpoint) as bus:
+            crowd = Crowd(load.tubes, bus, RIG, min(DRILLED_M * ROUND_S / DRILLING_S / load.seconds, FASTEST))
+            with living(crowd, bus, RIG):
+                table.start(GROUND)
+                ground = Ground(bus, RIG)
+                wait_for_all(ground, load.tubes)
+                until = time.monotonic() + SETTLED_S + load.seconds
+                readers = readers_of(load, endpoint, page, until, folder)
+                specs |= readers
+                for name in readers:
+                    table.start(name)
+                answers, cost = bear(ground, table, until)
+                for name in readers:
+                    table.running[name].join(LEFT_WITHIN_S)
+                return cost | {
+                    "browser_late_ms": figures(late(folder, "browser")),
+                    "terminal_late_ms": figures(late(folder, "terminal")),
+                    "answer_ms": figures(answers),
+                    "surveys": crowd.surveys,
+                    "stations": len(ground.stations()),
+                }
+    finally:
+        table.stop()
+
+
+def wait_for_all(ground: Ground, tubes: int) -> None:
+    """Wait until the ground station knows every tube."""
+    deadline = time.monotonic() + HEARD_WITHIN_S
+    while time.monotonic() < deadline:
+        try:
+            if len(ground.ask("string")["tubes"]) == tubes:
+                return
+        except NoAnswerError:
+            pass
+        time.sleep(ASK_EVERY_S)
+    raise RigError(f"the ground station has not heard {tubes} tubes within {HEARD_WITHIN_S:.0f} s")
+
+
+def readers_of(load: Load, endpoint: str, page: PageSettings, until: float, folder: Path) -> dict[str, Spec]:
+    """Processes of those who look."""
+    browsers = {
+        f"browser {n}": Spec(follow_page, (page.host, page.port, until, folder / f"browser-{n}.json"))
+        for n in range(load.browsers)
+    }
+    terminals = {
+        f"terminal {n}": Spec(follow_keys, (endpoint, RIG, until, folder / f"terminal-{n}.json"))
+        for n in range(load.terminals)
+    }
+    return browsers | terminals
+
+
+def bear(ground: Ground, table: ProcessTable, until: float) -> tuple[list[float], dict[str, float]]:
+    """Ask until a time (s, monotonic): how long each answer took (s), and what the ground station needed meanwhile."""
+    time.sleep(SETTLED_S)
+    pid = pids(table)[GROUND]
+    begun, cpu, before = time.monotonic(), cpu_seconds(pid), footprint(pid)["private_mb"]
+    taken = []
+    for path in itertools.cycle(ASKED):
+        asked = time.monotonic()
+        if asked >= until:
+            break
+        ground.ask(path)
+        taken.append(time.monotonic() - asked)
+        time.sleep(ASK_EVERY_S)
+    after = footprint(pid)["private_mb"]
+    cost = {
+        "cpu_percent": round(100.0 * (cpu_seconds(pid) - cpu) / (time.monotonic() - begun), ROUNDING),
+        "private_mb_before": round(before, ROUNDING),
+        "private_mb_after": round(after, ROUNDING),
+    }
+    return taken, cost
+
+
+def late(folder: Path, who: str) -> list[float]:
+    """What every reader of a kind has written, s."""
+    found: list[float] = []
+    for path in sorted(folder.glob(f"{who}-*.json")):
+        found += json.loads(path.read_text())
+    return found
+
+
+def figures(seconds: list[float]) -> dict[str, float | None]:
+    """How many, and the median, 99th percentile and largest in ms."""
+    if not seconds:
+        return {"count": 0, "p50": None, "p99": None, "max": None}
+    p50, p99 = (round(1e3 * float(value), ROUNDING) for value in np.percentile(seconds, (50.0, 99.0)))
+    return {"count": len(seconds), "p50": p50, "p99": p99, "max": round(1e3 * max(seconds), ROUNDING)}
