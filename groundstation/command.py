@@ -71,7 +71,7 @@ WEIGHTINGS = ("bayes", "equal", "linear", "quadratic", "cubic", "adaptive")
 @click.option(
     "--database",
     metavar="URL",
-    help="Where surveys and alarms are kept, such as postgresql://USER@HOST/NAME; its password comes from PGPASSWORD or "
+    help="Where surveys and alarms are kept, such as postgresql://USER@HOST/NAME; the password from PGPASSWORD or "
     "~/.pgpass  [default: SQLite in the folder]",
 )
 @page_options

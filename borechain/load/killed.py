@@ -44,7 +44,9 @@ class Outcome:
         return self.lost == self.doubled == 0
 
 
-def kill_again_and_again(times: int, endpoint: str, folder: Path, database: str | None = None, seed: int = 1) -> Outcome:
+def kill_again_and_again(
+    times: int, endpoint: str, folder: Path, database: str | None = None, seed: int = 1
+) -> Outcome:
     """Kill a ground station ``times`` times at moments by lot, and count what its database keeps at the end.
 
     ``database`` is the URL of an empty one; SQLite in ``folder`` without it.

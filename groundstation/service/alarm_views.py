@@ -26,8 +26,8 @@ def alarms(k: RigModel, _p: dict[str, str]) -> View:
         "flood": crew.in_flood,
         "left_out": crew.left_out,
         "levels_percent": [round(100.0 * level) for level in LEVELS],
-        "active": [alarm_view(alarm) for alarm in k.alarms.active],
-        "cleared": [alarm_view(alarm) for alarm in k.alarms.alarms if alarm.cleared_at is not None],
+        "active": [alarm_view(alarm) for alarm in k.hole.alarms.active],
+        "cleared": [alarm_view(alarm) for alarm in k.hole.alarms.alarms if alarm.cleared_at is not None],
         "moved": [
             {
                 "md_m": round(moved.md, 6),
@@ -36,7 +36,7 @@ def alarms(k: RigModel, _p: dict[str, str]) -> View:
                 "departure_sigma": moved.evidence.own,
                 "neighbours_sigma": list(moved.evidence.neighbours),
             }
-            for moved in k.moved
+            for moved in k.hole.moved
         ],
         "rig": [rig_alarm_view(alarm) for alarm in k.rig_alarms],
         "rig_cleared": [rig_alarm_view(alarm) for alarm in k.rig_alarms.cleared],

@@ -11,7 +11,7 @@ from groundstation.errors import SelectorError, SurveyError
 from groundstation.service.history import Moment
 from groundstation.service.model import RigModel
 from groundstation.service.thinning import FEWEST, largest_triangles
-from groundstation.survey.columns import Deviation, deviation, dominant
+from groundstation.survey.columns import Deviation, dominant
 from groundstation.survey.ellipsoid import axes, coverage_radius, plan_ellipse
 from groundstation.survey.trajectory import Point
 
@@ -31,7 +31,7 @@ def uncertainty(k: RigModel, p: dict[str, str]) -> View:
         "confidence": confidence,
         "sigma_plane": plane,
         "sigma_space": space,
-        "stations": [_region(k, point, plane, space) for point in k.trajectory],
+        "stations": [_region(k, point, plane, space) for point in k.hole.trajectory],
     }
 
 
@@ -76,8 +76,8 @@ def column(k: RigModel, p: dict[str, str]) -> View:
     """
     design = k.config.design
     moment = _moment(k, p["moment"]) if "moment" in p else None
-    rows = [deviation(point, design) for point in k.trajectory] if moment is None else moment.rows
-    end = k.projection if moment is None else moment.projection
+    rows = k.hole.deviations if moment is None else moment.rows
+    end = k.hole.projection if moment is None else moment.projection
     return {
         "design": {
             "inclination_deg": k.config.design_inclination_deg,
@@ -95,7 +95,7 @@ def column(k: RigModel, p: dict[str, str]) -> View:
 
 def history(k: RigModel, p: dict[str, str]) -> View:
     """What was known at the end of every stop, thinned to ``points`` of them."""
-    moments = k.history.moments
+    moments = k.hole.history.moments
     points = _points(p.get("points"))
     if len(moments) > points:
         used = np.array([moment.about.ratio for moment in moments])
@@ -117,9 +117,9 @@ def moment_view(moment: Moment) -> View:
 
 
 def _moment(k: RigModel, text: str) -> Moment:
-    found = k.history.find(int(text)) if text.isdecimal() and len(text) <= LONGEST_NUMBER else None
+    found = k.hole.history.find(int(text)) if text.isdecimal() and len(text) <= LONGEST_NUMBER else None
     if found is None:
-        there_are = ", ".join(str(moment.number) for moment in k.history.moments[-SHOWN:]) or "none yet"
+        there_are = ", ".join(str(moment.number) for moment in k.hole.history.moments[-SHOWN:]) or "none yet"
         raise SelectorError(f"parameter moment: expected one of the history, got {text!r:.40}; there are {there_are}")
     return found
 
@@ -136,7 +136,7 @@ def _dominant(k: RigModel) -> View | None:
     leaning = [station for station in k.stations if station.md > 0.0]
     if not leaning:
         return None
-    found = dominant(k.fused(leaning[-1]), k.trajectory[-1].md)
+    found = dominant(k.fused(leaning[-1]), k.hole.trajectory[-1].md)
     return {"angle": found.name, "by_inclination_m": found.by_inclination, "by_azimuth_m": found.by_azimuth}
 
 

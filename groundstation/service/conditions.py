@@ -28,7 +28,7 @@ def _of_the_rig(k: RigModel) -> Iterator[Condition]:
 
 def _of_the_column(k: RigModel) -> Iterator[Condition]:
     highest: dict[str, Alarm] = {}
-    for alarm in k.alarms.active:
+    for alarm in k.hole.alarms.active:
         if alarm.kind not in highest or alarm.level > highest[alarm.kind].level:
             highest[alarm.kind] = alarm
     for kind, alarm in highest.items():

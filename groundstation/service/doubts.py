@@ -7,7 +7,6 @@ from collections.abc import Iterator
 
 from groundstation.service.model import RigModel
 from groundstation.service.verdict import Doubt, Known
-from groundstation.survey.columns import deviation
 from groundstation.survey.trust import Trust
 
 BEHIND = 1.5  # tubes by which the deepest survey may be behind the bit
@@ -22,13 +21,13 @@ ALARMS = {
 def known_of(k: RigModel) -> Known:
     """What the model knows of the way of the hole."""
     design = k.config.design
-    surveyed = [deviation(point, design) for point in k.trajectory[1:]]
+    surveyed = k.hole.deviations[1:]
     return Known(
         target=design.length,
         curvature=math.radians(k.config.steering_deg_per_m),
         bit=k.depths.latest,
         worst=max(surveyed, key=lambda d: d.ratio, default=None),
-        projection=k.projection if surveyed else None,
+        projection=k.hole.projection if surveyed else None,
         doubts=tuple(_doubts(k)),
     )
 

@@ -334,13 +334,22 @@ class GroundProcess(Process):
 
     def _place_waiting(self) -> None:
         """Fuse the surveys whose depth is known by now."""
-        for one, md in self.model.placeable():
-            try:
-                self.store.place_message(one.measurement, md)
-            except StoreError:
-                self.model.waiting.append(one)
-            else:
-                self._publish(self._apply_stored(one.measurement, md, one.below))
+        placeable = self.model.placeable()
+        if not placeable:
+            return
+        try:
+            self.store.place_messages((one.measurement, md) for one, md in placeable)
+        except StoreError:
+            self.model.waiting += [one for one, _ in placeable]
+            return
+        hole = self.model.hole
+        before = list(hole.alarms.alarms), len(hole.moved), hole.history.count
+        changed = {path for one, md in placeable for path in self._apply_stored(one.measurement, md, one.below)}
+        if before[:2] != (hole.alarms.alarms, len(hole.moved)):
+            changed.add("alarms")
+        if before[2] != hole.history.count:
+            changed.add("history")
+        self._publish(sorted(changed))
 
     def _keep_tally(self) -> None:
         """Store a new order of the string before anything is placed by it."""
@@ -408,13 +417,9 @@ class GroundProcess(Process):
         if isinstance(message, StaticRecord):
             self.model.on_static_record(message)
             return ["static_records"]
-        moments = self.model.history.count
-        before = list(self.model.alarms.alarms), len(self.model.moved)
         self.model.stops.on_survey(message.epoch or self.model.epoch, message.station_at, message.tube)
         self.watch.on_survey(message, self.model.on_survey(message, md, below))
-        after = self.model.alarms.alarms, len(self.model.moved)
-        more = (["alarms"] if before != after else []) + (["history"] if moments != self.model.history.count else [])
-        return [*CHANGED_BY_SURVEY, *self._wall_paths, *more]
+        return [*CHANGED_BY_SURVEY, *self._wall_paths]
 
     def _publish(self, changed: list[str]) -> None:
         for listener in self.listeners:

@@ -171,11 +171,14 @@ class Store:
             connection.execute(ADD, {**row, "kind": kind, "md": md, "below": below, "payload": payload})
         return True
 
-    def place_message(self, message: Kept, md: float) -> None:
-        """Store the depth (m) of a message that came before it was known."""
-        with self._writing() as connection:
+    def place_messages(self, placed: Iterable[tuple[Kept, float]]) -> None:
+        """Store the depths (m) of messages that came before they were known: of all, or of none."""
+        rows = []
+        for message, md in placed:
             row = row_of(message, encode(message))
-            connection.execute(PLACE, {"depth": md, **{f"its_{name}": value for name, value in row.items()}})
+            rows.append({"depth": md, **{f"its_{name}": value for name, value in row.items()}})
+        with self._writing() as connection:
+            connection.execute(PLACE, rows)
 
     def keep_stand(self, stand: Stand) -> None:
         """Store that the bit stood, in the place of what it overlaps."""

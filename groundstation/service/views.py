@@ -10,7 +10,8 @@ from typing import Any
 import numpy as np
 
 from groundstation.errors import SelectorError, SurveyError
-from groundstation.service.model import ResolvedStop, RigModel, SurveyStation
+from groundstation.service.hole import ResolvedStop, SurveyStation
+from groundstation.service.model import RigModel
 from groundstation.service.streams import STREAMED, window
 from groundstation.survey.resolve import angle_stds, angles
 from groundstation.survey.trajectory import Point, interpolate
@@ -216,7 +217,7 @@ def cluster(c: ResolvedStop, n: int) -> View:
 
 def trajectory(k: RigModel, p: Parameters) -> View:
     """Positions with covariance: at the stations, in a range of depth, or interpolated at one depth."""
-    points = k.trajectory
+    points = k.hole.trajectory
     if "md" in p:
         wanted = Range.parse("md", p["md"])
         if wanted.single:
@@ -313,7 +314,7 @@ def position(point: Point) -> View:
 
 def point_of(k: RigModel, s: SurveyStation) -> Point:
     """The trajectory's point at a station; the collar for one at its depth."""
-    return next((point for point in k.trajectory if point.md == s.md), k.trajectory[0])
+    return next((point for point in k.hole.trajectory if point.md == s.md), k.hole.trajectory[0])
 
 
 def flag_names(flags: NodeFlag) -> list[str]:

@@ -64,13 +64,11 @@ class SharedErrors:
 
     def by_kind(self, columns: Array) -> dict[str, Array]:
         """Covariance (k, k) of something linear in the readings, by kind of shared error; ``columns`` (k, s)."""
-        found: dict[str, Array] = {}
+        places: dict[str, list[int]] = {}
         for name, index in self._columns.items():
             if index < columns.shape[1]:
-                column = columns[:, index]
-                kind = KINDS[str(name[0])]
-                found[kind] = found.get(kind, np.zeros((len(column), len(column)))) + np.outer(column, column)
-        return found
+                places.setdefault(KINDS[str(name[0])], []).append(index)
+        return {kind: columns[:, at] @ columns[:, at].T for kind, at in places.items()}
 
     @staticmethod
     def _chain(tube: int, above: Sequence[int] | None) -> list[Name]:

@@ -1,6 +1,7 @@
 """What the ground station makes of surveys, without any bus: stations, holes that moved, columns, alarms, views."""
 
 import math
+import pickle
 import random
 from collections.abc import Callable
 from dataclasses import replace
@@ -73,8 +74,8 @@ def test_readings_of_a_hole_that_stays_all_count(tmp_path: Path) -> None:
     assert [(s.md, s.count, s.first) for s in model.stations] == [
         (2.0, 5, 0), (4.0, 4, 0), (6.0, 3, 0), (8.0, 2, 0), (10.0, 1, 0),
     ]  # fmt: skip
-    assert model.moved == []
-    assert [p.md for p in model.trajectory] == [0.0, 2.0, 4.0, 6.0, 8.0, 10.0]
+    assert model.hole.moved == []
+    assert [p.md for p in model.hole.trajectory] == [0.0, 2.0, 4.0, 6.0, 8.0, 10.0]
 
 
 def moving(stops: int, at_stop: int) -> list[Placed]:
@@ -97,14 +98,14 @@ def test_a_hole_that_moved_drops_what_was_read_before(tmp_path: Path, order: str
     for station, known in enumerate(model.stations):
         assert inclination_deg(model, station) == pytest.approx(2.0, abs=1e-6), known.md
         assert known.first == known.count - 1
-    assert sorted(moved.md for moved in model.moved) == [2.0 * n for n in range(1, stops)]
-    assert sorted(moved.dropped for moved in model.moved) == list(range(1, stops))
+    assert sorted(moved.md for moved in model.hole.moved) == [2.0 * n for n in range(1, stops)]
+    assert sorted(moved.dropped for moved in model.hole.moved) == list(range(1, stops))
 
 
 def test_the_evidence_of_a_movement_is_kept(tmp_path: Path) -> None:
     model = knowing(tmp_path, moving(4, 4), 4)
-    assert model.moved
-    for moved in model.moved:
+    assert model.hole.moved
+    for moved in model.hole.moved:
         assert moved.evidence.moved
         assert moved.evidence.own > 10.0
         assert 1 <= len(moved.evidence.neighbours) <= 2
@@ -118,30 +119,30 @@ def test_readings_after_a_movement_count_together(tmp_path: Path) -> None:
     assert (first.count, first.first) == (6, 4)
     assert len(first.readings()) == 2
     assert inclination_deg(model, 0) == pytest.approx(2.0, abs=1e-6)
-    assert {moved.at // BETWEEN_STOPS for moved in model.moved} == {5}
+    assert {moved.at // BETWEEN_STOPS for moved in model.hole.moved} == {5}
 
 
 @pytest.mark.parametrize("outlier", [1, 2, 3, 4])
 def test_an_outlier_at_one_station_drops_nothing(tmp_path: Path, outlier: int) -> None:
     measurements = passes(5, lambda stop, station: 2.0 if (stop, station) == (5, outlier) else 1.0)
     model = knowing(tmp_path, measurements, 5)
-    assert model.moved == []
+    assert model.hole.moved == []
     assert all(known.first == 0 for known in model.stations)
     assert 1.0 < inclination_deg(model, outlier - 1) < 2.0
 
 
 def test_stations_that_changed_to_different_sides_did_not_move(tmp_path: Path) -> None:
     measurements = passes(5, lambda stop, station: 1.0 if stop < 5 else (2.0 if station % 2 else 0.2))
-    assert knowing(tmp_path, measurements, 5).moved == []
+    assert knowing(tmp_path, measurements, 5).hole.moved == []
 
 
 def test_a_neighbour_that_changed_at_another_stop_is_no_evidence(tmp_path: Path) -> None:
     placed = [(1, 1, 2.0, 1.0), (2, 1, 4.0, 1.0), (2, 2, 4.0, 2.0), (1, 3, 2.0, 2.0)]
     measurements = [(survey(tube, stop, 3 - tube, inclination), md) for tube, stop, md, inclination in placed]
-    assert knowing(tmp_path, measurements, 2).moved == []
+    assert knowing(tmp_path, measurements, 2).hole.moved == []
     measurements.append((survey(2, 3, 1, 2.0), 4.0))
     measurements[2] = (survey(2, 2, 1, 1.0), 4.0)
-    assert sorted(moved.md for moved in knowing(tmp_path, measurements, 2).moved) == [2.0, 4.0]
+    assert sorted(moved.md for moved in knowing(tmp_path, measurements, 2).hole.moved) == [2.0, 4.0]
 
 
 def result(model: RigModel) -> dict[str, Any]:
@@ -151,10 +152,10 @@ def result(model: RigModel) -> dict[str, Any]:
     ]
     fused = [model.fused(s) for s in model.stations]
     directions = [np.concatenate([f.lean, [f.down], f.cov.ravel(), f.total_cov.ravel()]) for f in fused]
-    points = [np.concatenate([[p.md], p.position, p.cov.ravel()]) for p in model.trajectory]
-    assert model.projection is not None
-    projection = [np.concatenate([model.projection.offset, model.projection.cov.ravel()])]
-    moved = sorted((m.md, m.at, m.dropped) for m in model.moved)
+    points = [np.concatenate([[p.md], p.position, p.cov.ravel()]) for p in model.hole.trajectory]
+    assert model.hole.projection is not None
+    projection = [np.concatenate([model.hole.projection.offset, model.hole.projection.cov.ravel()])]
+    moved = sorted((m.md, m.at, m.dropped) for m in model.hole.moved)
     return {
         "stations": stations, "directions": directions, "points": points, "projection": projection, "moved": moved,
     }  # fmt: skip
@@ -195,23 +196,36 @@ def halves(moved_from: int) -> list[Placed]:
 
 def test_stations_between_others_do_not_hide_that_the_hole_moved(tmp_path: Path) -> None:
     model = knowing(tmp_path, halves(moved_from=5), 3)
-    assert sorted(moved.md for moved in model.moved) == [2.0, 3.0, 4.0, 5.0, 6.0, 7.0]
+    assert sorted(moved.md for moved in model.hole.moved) == [2.0, 3.0, 4.0, 5.0, 6.0, 7.0]
     assert [inclination_deg(model, n) for n in range(6)] == pytest.approx([2.0] * 6, abs=1e-6)
 
 
 def test_a_station_that_was_met_later_changes_no_earlier_decision(tmp_path: Path) -> None:
     between = (survey(1, 9, 1, 1.0), 3.0)
     in_order, early = (knowing(tmp_path, m, 4) for m in ([*moving(4, 4), between], [between, *moving(4, 4)]))
-    assert sorted(moved.md for moved in in_order.moved) == [2.0, 4.0, 6.0]
+    assert sorted(moved.md for moved in in_order.hole.moved) == [2.0, 4.0, 6.0]
     assert differing(result(early), result(in_order)) == []
 
 
 def test_a_late_survey_clears_no_alarm_before_it_was_raised(tmp_path: Path) -> None:
-    late = (survey(1, 1, 1, 2.0, azimuth_deg=180.0), 2.0)
-    model = knowing(tmp_path, [(survey(1, 2, 1, 2.0), 4.0), late], 1, tolerance="5-cm")
-    assert any(alarm.cleared_at is not None for alarm in model.alarms.alarms)
-    for alarm in model.alarms.alarms:
+    model = knowing(tmp_path, [(survey(1, 2, 1, 2.0), 4.0)], 1, tolerance="5-cm")
+    assert model.hole.alarms.active
+    assert model.on_survey(survey(1, 1, 1, 2.0, azimuth_deg=180.0), 2.0) == ""
+    assert any(alarm.cleared_at is not None for alarm in model.hole.alarms.alarms)
+    for alarm in model.hole.alarms.alarms:
         assert alarm.cleared_at is None or alarm.cleared_at >= alarm.raised_at
+
+
+def test_it_does_not_matter_whether_somebody_looks_between_two_surveys(tmp_path: Path) -> None:
+    """What follows from the surveys of a stop is worked out once; looked at after each it is the same, bit for bit."""
+    measurements = moving(5, 5)
+    looked_at = knowing(tmp_path, [], 5)
+    for measurement, md in measurements:
+        looked_at.on_survey(measurement, md)
+        assert looked_at.hole.trajectory[-1].md == looked_at.stations[-1].md
+    together = knowing(tmp_path, measurements, 5)
+    assert pickle.dumps(result(looked_at)) == pickle.dumps(result(together))
+    assert [moment.rows[-1].md for moment in together.hole.history.moments] == [2.0, 4.0, 6.0, 8.0]
 
 
 def test_surveys_of_one_stop_that_come_late_change_nothing(tmp_path: Path) -> None:
@@ -251,7 +265,7 @@ def test_uncertainty_is_told_at_a_confidence_with_its_sources(tmp_path: Path) ->
     assert view["sigma_plane"] == pytest.approx(2.4477, abs=1e-4)
     assert view["sigma_space"] == pytest.approx(2.7955, abs=1e-4)
     assert [row["md_m"] for row in view["stations"]] == [0.0, 2.0, 4.0, 6.0, 8.0]
-    for row, point in zip(view["stations"], model.trajectory, strict=True):
+    for row, point in zip(view["stations"], model.hole.trajectory, strict=True):
         ellipse, sources = plan_ellipse(point.cov, view["sigma_plane"]), row["sources"]
         assert row["plan_ellipse"]["major_m"] == pytest.approx(ellipse.major)
         assert row["plan_ellipse"]["minor_m"] == pytest.approx(ellipse.minor)
@@ -270,7 +284,7 @@ def test_another_confidence_scales_the_regions(tmp_path: Path) -> None:
     half = column_views.uncertainty(model, {"confidence": "0.5"})
     assert half["confidence"] == 0.5
     assert half["sigma_plane"] == pytest.approx(math.sqrt(2.0 * math.log(2.0)))
-    major, wanted = half["stations"][-1]["plan_ellipse"]["major_m"], model.trajectory[-1].cov
+    major, wanted = half["stations"][-1]["plan_ellipse"]["major_m"], model.hole.trajectory[-1].cov
     assert major == pytest.approx(half["sigma_plane"] * math.sqrt(np.linalg.eigvalsh(wanted[:2, :2])[-1]))
 
 
@@ -303,7 +317,7 @@ def test_a_column_is_told_in_centimetres_percent_and_degrees(tmp_path: Path) -> 
     assert view["design"] == {
         "inclination_deg": 0.0, "azimuth_deg": 0.0, "target_m": 30.0, "radius_m": 0.6, "tolerance": "en-12716",
     }  # fmt: skip
-    toe, point = view["stations"][-1], model.trajectory[-1]
+    toe, point = view["stations"][-1], model.hole.trajectory[-1]
     lateral = 9.0 * math.sin(DEG)  # the first leg starts vertical
     assert toe["md_m"] == 10.0
     assert toe["deviation_cm"] == pytest.approx(100.0 * lateral, rel=1e-6)
@@ -377,8 +391,8 @@ def test_the_alarms_tell_of_stations_that_moved(tmp_path: Path) -> None:
     model = knowing(tmp_path, moving(4, 4), 4)
     check_answers(model)
     view = alarm_views.alarms(model, {})["moved"]
-    assert len(view) == len(model.moved) > 0
-    for row, moved in zip(view, model.moved, strict=True):
+    assert len(view) == len(model.hole.moved) > 0
+    for row, moved in zip(view, model.hole.moved, strict=True):
         assert row == {
             "md_m": moved.md,
             "at_s": moved.at,

@@ -1,0 +1,276 @@
+"""The hole as it was surveyed: stations, what moved, trajectory, deviations and their alarms. No I/O.
+
+Surveys come many at a time, one of every tube at a stop. What follows from all of them is worked out once, when
+somebody asks for it: fifty tubes would keep the ground station busy for the length of the stop otherwise.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from groundstation.config import GroundConfig
+from groundstation.service.alarms import AlarmList
+from groundstation.service.history import SAME_STOP, History
+from groundstation.survey.columns import Deviation, deviation, project
+from groundstation.survey.fusion import Departure, Evidence, Weighting, departure, judge_departure, weighted
+from groundstation.survey.resolve import Direction, Quality
+from groundstation.survey.trajectory import Point, Trajectory
+from groundstation.survey.trust import UNKNOWN_YAW_VAR, Trust
+from telemetry.messages import SurveyMeasurement
+
+
+@dataclass(frozen=True, slots=True)
+class ResolvedStop:
+    """One resolved survey measurement."""
+
+    measurement: SurveyMeasurement
+    md: float
+    direction: Direction
+    quality: Quality
+    trust: Trust = Trust.FULL
+    seq: int = 0  # place in the order in which surveys were placed
+
+    @property
+    def at(self) -> float:
+        """Rig time of the stop, s."""
+        return self.measurement.station_at
+
+    @property
+    def yaw_var(self) -> float:
+        """Random variance of the yaw (rad^2) with which it is fused."""
+        return self.measurement.yaw_var + (UNKNOWN_YAW_VAR if self.trust is Trust.UNKNOWN_YAW else 0.0)
+
+
+@dataclass(slots=True)
+class SurveyStation:
+    """One depth of the hole and every cluster measured there, oldest first.
+
+    ``drops`` are the places of clusters that found another hole than those before them.
+    """
+
+    md: float
+    clusters: list[ResolvedStop] = field(default_factory=list)
+    drops: list[int] = field(default_factory=list)
+    _departures: dict[int, Departure] = field(default_factory=dict)
+    _fused: tuple[tuple[int, ...], Direction] | None = None  # with what it was made of
+
+    @property
+    def count(self) -> int:
+        """Clusters measured here."""
+        return len(self.clusters)
+
+    @property
+    def first(self) -> int:
+        """Place of the first cluster that counts."""
+        return self.first_before(self.count)
+
+    def first_before(self, place: int) -> int:
+        """Place of the first cluster that counted when the one at ``place`` came."""
+        return max((drop for drop in self.drops if drop < place), default=0)
+
+    def add_stop(self, cluster: ResolvedStop) -> None:
+        """Add a cluster in the order of time; what was judged of later ones is forgotten."""
+        self.clusters.append(cluster)
+        self.clusters.sort(key=lambda known: (known.at, known.measurement.tube))
+        self.forget(self.clusters.index(cluster))
+
+    def forget(self, place: int) -> None:
+        """Forget decisions from ``place`` on."""
+        self.drops = [drop for drop in self.drops if drop < place]
+        self._departures = {k: d for k, d in self._departures.items() if k < place}
+
+    @property
+    def counting(self) -> list[ResolvedStop]:
+        """Clusters that count: of those since the hole moved the trusted ones, or all where none is."""
+        since = self.clusters[self.first :]
+        return [cluster for cluster in since if cluster.trust is Trust.FULL] or since
+
+    @property
+    def untrusted(self) -> int:
+        """Clusters measured here whose yaw is not believed."""
+        return sum(cluster.trust is not Trust.FULL for cluster in self.clusters)
+
+    def readings(self) -> list[Direction]:
+        """Directions of the clusters that count."""
+        return [cluster.direction for cluster in self.counting]
+
+    def fused(self, weighting: Weighting) -> Direction:
+        """Direction from the clusters that count; worked out anew where one has come or does not count any more."""
+        made_of = (self.count, *self.drops)
+        if self._fused is None or self._fused[0] != made_of:
+            self._fused = made_of, weighted(self.readings(), weighting)
+        return self._fused[1]
+
+    def departure(self, place: int) -> Departure | None:
+        """How far the cluster at ``place`` departed from those before; None for the first of its hole."""
+        first = self.first_before(place)
+        if first == place:
+            return None
+        if place not in self._departures:
+            self._departures[place] = departure([c.direction for c in self.clusters[first : place + 1]])
+        return self._departures[place]
+
+
+@dataclass(frozen=True, slots=True)
+class Moved:
+    """The decision that the hole moved at a station, with its evidence."""
+
+    md: float
+    at: float  # s
+    dropped: int  # earlier clusters that no longer count
+    evidence: Evidence
+
+
+class Hole:
+    """Every survey of a hole that was placed, and what follows from them.
+
+    Parameters
+    ----------
+    config : design, tolerance and weighting
+    """
+
+    def __init__(self, config: GroundConfig) -> None:
+        self._config = config
+        self._stations: list[SurveyStation] = []
+        self._moved: list[Moved] = []
+        self._alarms = AlarmList()
+        self._history = History()
+        self._trajectory = Trajectory().points
+        self._deviations = self._deviations_of(self._trajectory)
+        self._projection: Deviation | None = None
+        self._unsettled_since = math.inf  # s, rig time of the oldest survey from which nothing follows yet
+
+    def add_stop(self, stop: ResolvedStop, epoch: int) -> None:
+        """Take a survey with rig time of an epoch.
+
+        Raises
+        ------
+        numpy.linalg.LinAlgError
+            When it cannot be weighed; it was not taken.
+        """
+        np.linalg.inv(stop.direction.total_cov)
+        if self._history.begins_stop(epoch, stop.at):
+            self.settle()
+            self._history.add(self._deviations, self._projection)
+        self._history.on_survey(epoch, stop.at)
+        self._station_at(stop.md).add_stop(stop)
+        self._unsettled_since = min(self._unsettled_since, stop.at)
+
+    @property
+    def stations(self) -> list[SurveyStation]:
+        """Stations from the collar down."""
+        self.settle()
+        return self._stations
+
+    @property
+    def moved(self) -> list[Moved]:
+        """Where the hole moved."""
+        self.settle()
+        return self._moved
+
+    @property
+    def alarms(self) -> AlarmList:
+        """Levels of the tolerance that were reached."""
+        self.settle()
+        return self._alarms
+
+    @property
+    def history(self) -> History:
+        """What was known at the end of every stop."""
+        return self._history
+
+    @property
+    def trajectory(self) -> list[Point]:
+        """Points from the collar down."""
+        self.settle()
+        return self._trajectory
+
+    @property
+    def deviations(self) -> list[Deviation]:
+        """Deviation from the design axis at every point of the trajectory."""
+        self.settle()
+        return self._deviations
+
+    @property
+    def projection(self) -> Deviation | None:
+        """Deviation at the target, if the hole goes on straight; None before the first station."""
+        self.settle()
+        return self._projection
+
+    def settle(self) -> None:
+        """Work out what follows from the surveys that have come since the last time."""
+        since, self._unsettled_since = self._unsettled_since, math.inf
+        if since < math.inf:
+            self._judge_movement(since)
+            self._work_out()
+
+    def _work_out(self) -> None:
+        trajectory = Trajectory()
+        direction = None
+        for station in self._stations:
+            if station.md > 0.0:
+                direction = station.fused(self._config.weighting)
+                trajectory.append(station.md, direction)
+        self._trajectory = trajectory.points
+        self._deviations = self._deviations_of(self._trajectory)
+        if direction is None:
+            return
+        at = max(cluster.at for station in self._stations for cluster in station.clusters)
+        worst = max(self._deviations[1:], key=lambda d: d.ratio)
+        self._projection = project(self._trajectory[-1], direction, self._config.design)
+        self._alarms.judge_deviation("deviation", worst, at)
+        self._alarms.judge_deviation("projection", self._projection, at)
+
+    def _deviations_of(self, points: list[Point]) -> list[Deviation]:
+        return [deviation(point, self._config.design) for point in points]
+
+    def _station_at(self, md: float) -> SurveyStation:
+        for station in self._stations:
+            if abs(station.md - md) <= self._config.station_tolerance:
+                return station
+        station = SurveyStation(md)
+        self._stations.append(station)
+        self._stations.sort(key=lambda known: known.md)
+        return station
+
+    def _judge_movement(self, since: float) -> None:
+        """Drop earlier clusters where the hole moved, at every stop from the one at rig time ``since`` (s) on.
+
+        Each stop is judged as a whole, so the order in which its surveys arrive changes nothing.
+        """
+        stops = [stop for stop in self._stops() if stop[-1][0] >= since]
+        begin = stops[0][0][0]
+        self._moved = [moved for moved in self._moved if moved.at < begin]
+        for stop in stops:
+            for _, number, place in stop:
+                self._stations[number].drops = [d for d in self._stations[number].drops if d != place]
+        for stop in stops:
+            self._judge_stop(stop)
+
+    def _stops(self) -> list[list[tuple[float, int, int]]]:
+        """Clusters as (time, station, place) in the order of time, parted where the string was not read for a while."""
+        every = sorted((c.at, n, place) for n, s in enumerate(self._stations) for place, c in enumerate(s.clusters))
+        stops: list[list[tuple[float, int, int]]] = []
+        for cluster in every:
+            if not stops or cluster[0] - stops[-1][-1][0] >= SAME_STOP:
+                stops.append([])
+            stops[-1].append(cluster)
+        return stops
+
+    def _judge_stop(self, stop: list[tuple[float, int, int]]) -> None:
+        """Neighbours are the nearest stations above and below that were read at the same stop."""
+        by_depth = sorted(stop, key=lambda cluster: cluster[1:])
+        seen = [self._stations[number].departure(place) for _, number, place in by_depth]
+        for k, (at, number, place) in enumerate(by_depth):
+            own = seen[k]
+            if own is None:
+                continue
+            around = [d for d in (*seen[max(k - 1, 0) : k], *seen[k + 1 : k + 2]) if d is not None]
+            evidence = judge_departure(own, around)
+            if evidence.moved:
+                station = self._stations[number]
+                self._moved.append(Moved(station.md, at, place - station.first_before(place), evidence))
+                station.drops.append(place)
