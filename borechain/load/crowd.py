@@ -37,9 +37,9 @@ from telemetry.runtime.timing import CycleTiming
 
 TUBE_LENGTH = 2.0  # m
 ABOVE = 10.0  # m, of the bit at the start above the depth that all tubes reach
-ROUND_S = 20.0  # of drilling and standing
-DRILLING_S = 8.0  # of a round
-SURVEYED_AFTER_S = 8.0  # of standing
+ROUND_S = 120.0  # of drilling and standing, about that of a published bore
+DRILLING_S = 80.0  # of a round
+SURVEYED_AFTER_S = 22.0  # of standing
 SURVEY_VAR = (0.0034**2) / 32.0  # (m/s^2)^2, of a mean over 32 cycles
 LEAN = math.radians(0.3)
 

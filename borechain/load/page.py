@@ -43,7 +43,7 @@ class Load:
     tubes: int = 50
     browsers: int = 3
     terminals: int = 2
-    seconds: float = 60.0
+    seconds: float = 150.0
 
 
 def measure(load: Load, endpoint: str, page: PageSettings, folder: Path) -> dict[str, Any]:

@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 import ast
+import importlib
 import importlib.util
 import json
 from pathlib import Path
-from typing import Any
+from typing import Any, cast
 
 import click
 
@@ -15,11 +16,12 @@ from borechain.cli.options import json_option
 from borechain.cli.tables import console
 
 FOLDER = Path(__file__).parents[3] / "benchmarks"
+OWN = {"realtime": "realtime", "page": "load", "killed": "load"}  # and the module of each
 
 
 def benches() -> list[str]:
-    """Names of the benchmarks: those of the repository, and the one of the package."""
-    return sorted([*(path.stem for path in FOLDER.glob("*.py")), "realtime"])
+    """Names of the benchmarks: those of the repository, and those of the package."""
+    return sorted([*(path.stem for path in FOLDER.glob("*.py")), *OWN])
 
 
 class Benches(click.Group):
@@ -39,14 +41,13 @@ class Benches(click.Group):
             When there is none of that name.
         """
         del ctx
-        if cmd_name != "realtime" and not FOLDER.is_dir():
+        if cmd_name not in OWN and not FOLDER.is_dir():
             raise EnvironmentFault(f"bench {cmd_name}: the benchmarks beside other libraries are in the repository")
         if cmd_name not in benches():
             raise InputFault(f"expected one of {', '.join(benches())}, got {cmd_name!r}")
-        if cmd_name == "realtime":
-            from borechain.cli.bench.realtime import realtime
-
-            return realtime
+        if cmd_name in OWN:
+            module = importlib.import_module(f"borechain.cli.bench.{OWN[cmd_name]}")
+            return cast("click.Command", getattr(module, cmd_name))
         return side_by_side(cmd_name)
 
 
@@ -61,6 +62,8 @@ def bench(context: click.Context) -> None:
     Examples:
       borechain bench survey
       borechain bench realtime --nodes 50 --seconds 120
+      borechain bench page
+      borechain bench killed --times 200
     """
     if context.invoked_subcommand is None:
         click.echo("\n".join(benches()))

@@ -1,0 +1,109 @@
+"""``borechain bench page`` and ``killed``: a real ground station under load, and one that is killed again and again."""
+
+from __future__ import annotations
+
+import json
+import tempfile
+from pathlib import Path
+from typing import Any
+
+import click
+
+from borechain.cli.faults import EnvironmentFault, needs, plain_faults
+from borechain.cli.options import json_option, seed_option
+from telemetry import keys
+
+endpoint_option = click.option(
+    "--endpoint", default=keys.DEFAULT_ENDPOINT, show_default=True, help="Where its router listens."
+)
+
+
+@click.command()
+@click.option("--tubes", type=click.IntRange(1, 250), default=50, show_default=True, help="That tell their state.")
+@click.option("--browsers", type=click.IntRange(0, 60), default=3, show_default=True, help="That follow the page.")
+@click.option("--terminals", type=click.IntRange(0, 60), default=2, show_default=True, help="That follow the keys.")
+@click.option(
+    "--seconds", type=click.FloatRange(5.0, 86400.0), default=150.0, show_default=True, help="Of the measurement."
+)
+@click.option(
+    "--page", "address", metavar="HOST:PORT", default="127.0.0.1:8080", show_default=True, help="Of the page."
+)
+@endpoint_option
+@json_option
+@needs("rich", "scipy", "sqlalchemy", "starlette", "uvicorn")
+@plain_faults
+def page(tubes: int, browsers: int, terminals: int, seconds: float, address: str, endpoint: str, as_json: bool) -> None:
+    """Have a ground station with its page bear a shift: tubes at 1.9 Hz that drill and survey, readers, questions.
+
+    \b
+    Example:
+      borechain bench page --tubes 50 --browsers 3 --terminals 2
+    """
+    from borechain.load.page import Load, measure
+    from groundstation.gateway.page.settings import PageSettings, listen, parse_address
+    from sim.rig.launcher import check_port_free
+
+    served = PageSettings(*parse_address(address))
+    listen(served).close()
+    check_port_free(endpoint)
+    load = Load(tubes, browsers, terminals, seconds)
+    with tempfile.TemporaryDirectory(prefix="borechain-") as folder:
+        result: dict[str, Any] = {"bench": "page", "tubes": tubes, "seconds": seconds}
+        result |= measure(load, endpoint, served, Path(folder))
+    if as_json:
+        click.echo(json.dumps(result))
+        return
+    memory = f"{result['private_mb_before']:.1f} MB before, {result['private_mb_after']:.1f} MB after"
+    click.echo(f"ground station: {result['cpu_percent']:.1f} % of a core, {memory}")
+    for name, what in (("browser", "news on the page"), ("terminal", "news on the keys")):
+        click.echo(line(f"{what}, {name}", result[f"{name}_late_ms"]))
+    click.echo(line("answers to questions", result["answer_ms"]))
+    click.echo(f"{result['stations']} stations of {result['surveys']} surveys")
+
+
+def line(what: str, figures: dict[str, Any]) -> str:
+    """Figures for people."""
+    if not figures["count"]:
+        return f"{what}: none"
+    return (
+        f"{what}: median {figures['p50']:.1f} ms, 99 % within {figures['p99']:.1f} ms, "
+        f"all within {figures['max']:.1f} ms, of {figures['count']}"
+    )
+
+
+@click.command()
+@click.option("--times", type=click.IntRange(1, 10_000), default=200, show_default=True, help="It is killed.")
+@click.option(
+    "--database", metavar="URL", help="Of an empty database, such as postgresql://USER@HOST/NAME  [default: SQLite]"
+)
+@endpoint_option
+@json_option
+@seed_option
+@needs("rich", "scipy", "sqlalchemy")
+@plain_faults
+def killed(times: int, database: str | None, endpoint: str, as_json: bool, seed: int) -> None:
+    """Kill a ground station at moments by lot while it takes events, and look whether what it receipted is kept.
+
+    Exit status 1 when anything was lost or doubled.
+
+    \b
+    Example:
+      borechain bench killed --times 200
+    """
+    from borechain.load.killed import kill_again_and_again
+    from borechain.load.page import figures
+    from sim.rig.launcher import check_port_free
+
+    check_port_free(endpoint)
+    with tempfile.TemporaryDirectory(prefix="borechain-") as folder:
+        outcome = kill_again_and_again(times, endpoint, Path(folder), database, seed)
+    back = figures(outcome.back_s[1:])
+    result = {"bench": "killed", "times": times, "handed": outcome.handed}
+    result |= {"lost": outcome.lost, "doubled": outcome.doubled, "back_ms": back}
+    if as_json:
+        click.echo(json.dumps(result))
+    else:
+        click.echo(f"{outcome.handed} events, {outcome.lost} lost, {outcome.doubled} doubled")
+        click.echo(line("killed until the next receipt", back))
+    if not outcome.is_whole:
+        raise EnvironmentFault(f"{outcome.lost} receipted events were lost, {outcome.doubled} are kept twice")
