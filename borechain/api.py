@@ -96,13 +96,13 @@ def drill(scenario: Scenario, seed: int = 1, folder: Path | None = None) -> dict
 
 
 def _drill(scenario: Scenario, seed: int, folder: Path) -> dict[str, Any]:
-    from borechain.cli.rig.rig import drill_inline, result_of
+    from borechain.cli.rig.rig import Job, drill_inline, result_of
     from sim.rig.launcher import prepare_folder
     from sim.world.world import World
 
     world = World(scenario, seed)
     prepare_folder(folder)
-    ran = drill_inline(world, math.inf, keys.DEFAULT_RIG, folder, lambda _progress: None)
+    ran = drill_inline(world, Job(Path("scenario"), seed, math.inf), folder, lambda _progress: None)
     return result_of(ran.answers, world)
 
 

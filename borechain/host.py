@@ -31,10 +31,12 @@ def run_medium(
     router: bool,
     cued: bool = False,
     transports: Transports | None = None,
+    hole: str = "",
 ) -> None:
     """World, joints and clock; in a rig without an outside router its session is the router.
 
-    ``cued`` says that somebody plays the operator, ``transports`` which joints are not on zenoh.
+    ``cued`` says that somebody plays the operator, ``transports`` which joints are not on zenoh, ``hole`` which one of
+    the scenario's site is drilled.
     """
     from sim.rig.bus_stepper import BusStepper
     from sim.rig.scheduler import Progress, Scheduler
@@ -47,7 +49,8 @@ def run_medium(
         seal_depth = depth_sealer(place.keys)
         with warnings.catch_warnings():
             warnings.simplefilter("ignore", PorosityWarning)  # whoever started the rig was warned
-            world = World(load_scenario(scenario, faults), seed)
+            found = load_scenario(scenario, faults)
+            world = World(found.drilling(hole) if hole else found, seed)
         if router:
             session = opened_router(place.endpoint, place.keys)
         else:

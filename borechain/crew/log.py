@@ -10,7 +10,7 @@ if TYPE_CHECKING:
     from borechain.client import Ground
 
 View = dict[str, Any]
-FOLLOWED = ("measurements", "alarms", "verdict")
+FOLLOWED = ("measurements", "alarms", "verdict", "wall")
 
 
 class Told(Protocol):
@@ -47,12 +47,20 @@ class RunLog:
         self._elapsed = 0.0
         self._alarms: dict[int, tuple[str, str]] = {}  # state and level of each that was told
         self._word = ""
+        self._joints: dict[str, str] = {}  # of a wall, as each was told
         self._restarts: dict[str, int] = {}
         self.newest = 0  # survey that was told
 
     def on_open(self, endpoint: str, rig: str) -> None:
         """The endpoint of the rig can be joined."""
         self._line("open", f"{endpoint}: borechain crew --endpoint {endpoint} --rig {rig}")
+
+    def on_hole(self, name: str) -> None:
+        """Another hole of the site is begun, by a ground station that knows nothing yet."""
+        self.newest, self._word, self._phase = 0, "", ""
+        self._alarms.clear()
+        self._joints.clear()
+        self._line("hole", name)
 
     def on_tick(self, tick: Told, restarts: Mapping[str, int]) -> bool:
         """Take the rig's progress and how often each process was started again; whether a phase began."""
@@ -76,6 +84,9 @@ class RunLog:
             case "alarms":
                 for alarm in (*view["open"], *view["closed"]):
                     self._tell_alarm(alarm)
+            case "wall" if view["wall"] is not None:
+                for row in view["wall"]["joints"]:
+                    self._tell_joint(row)
             case "verdict" if view["verdict"] != self._word:
                 self._word = view["verdict"]
                 self._line("verdict", view["line"])
@@ -107,6 +118,15 @@ class RunLog:
         where = "" if alarm["md_m"] is None else f" at {alarm['md_m']:.1f} m"
         what = f"{alarm['code']} {alarm['subject']}{where}{way}: {alarm['detail']}"
         self._line("alarm", f"{alarm['number']} {alarm['state']}, {alarm['level']}, {what}")
+
+    def _tell_joint(self, joint: View) -> None:
+        found = joint["probability_where_surveyed"]
+        told = (
+            f"P(opening) {found:.2g}, {joint['surveyed_percent']} % surveyed" if found is not None else "not surveyed"
+        )
+        if self._joints.get(joint["joint"]) != told:
+            self._joints[joint["joint"]] = told
+            self._line("joint", f"{joint['joint']} {joint['state']}: {told}")
 
     def _line(self, kind: str, text: str) -> None:
         utc = datetime.datetime.now(datetime.UTC).strftime("%Y-%m-%dT%H:%M:%SZ")

@@ -20,6 +20,7 @@ from sim.world.radio_section import RadioSection
 from sim.world.rough_section import RoughSection
 from sim.world.section import Angle, NotNegative, Positive, Probability, Section, Triple
 from sim.world.shipped import find_scenario
+from sim.world.site_section import SiteSection
 from telemetry.errors import RadioError
 from telemetry.messages import MAX_TUBE
 
@@ -286,6 +287,9 @@ class ScenarioFile(Section):
     design: DesignSection = DesignSection()
     drift: DriftSection | None = None
     calibration: CalibrationSection | None = None
+    site: SiteSection | None = Field(
+        None, description="a wall whose holes are drilled one after the other, each straight in place of the path"
+    )
     rough: RoughSection | None = Field(None, description="what a field does to the string; without this table nothing")
     faults: tuple[str, ...] = ()
 
@@ -300,6 +304,20 @@ class Scenario:
         self.tubes = file.rig.tubes
         self.tube_length = file.rig.tube_length_m
         self.medium = file.medium
+
+    def drilling(self, name: str) -> Scenario:
+        """The same with a hole of its site.
+
+        Raises
+        ------
+        ScenarioError
+            When the site has none of that name.
+        """
+        holes = {} if self.file.site is None else {hole.name: hole for hole in self.file.site.holes}
+        if name not in holes:
+            raise ScenarioError(f"hole {name}: expected one of {', '.join(holes) or 'none, the scenario has no site'}")
+        lean = math.radians(holes[name].inclination_deg), math.radians(holes[name].azimuth_deg)
+        return Scenario(self.file, Borehole.straight(*lean, max(_depth(self.file), 1.0)), self.faults)
 
 
 def scenario_of(tables: dict[str, Any], faults: tuple[str, ...] = ()) -> Scenario:

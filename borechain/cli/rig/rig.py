@@ -36,7 +36,7 @@ if TYPE_CHECKING:
     from telemetry.media.zenoh_bus import ZenohBus
 
 NAMED = 5  # surveys named that are missing
-ASKED = ("stations", "measurements", "column", "alarms", "recalibration")
+ASKED = ("stations", "measurements", "column", "alarms", "recalibration", "wall")
 PRELOAD = {"float64": "borechain.warm", "fixed": "borechain.warm_all", "published": "borechain.warm_all"}  # by kernel
 
 
@@ -103,7 +103,10 @@ def rig(
       borechain rig rig-3 --transport can
       borechain rig rig-3 --keys stick
       borechain rig wellbore-1 --speed 5 --page 127.0.0.1:8080
+      borechain rig three-holes --inline --view log
     """
+    from borechain.cli.rig.site import drill_site, has_site
+    from borechain.client import Ground
     from borechain.host import opened_router
     from sim.rig.launcher import check_port_free
 
@@ -130,7 +133,9 @@ def rig(
         log = RunLog(say) if view == "log" else None
         if log is not None and bus is not None:
             log.on_open(endpoint, rig_name)
-        result, folder = drill(job, bus, out, served, log, quiet=view != "bar")
+            log.follow(Ground(bus, rig_name))
+        run = drill_site if has_site(job) else drill
+        result, folder = run(job, bus, out, served, log, quiet=view != "bar")
     if as_json:
         click.echo(json.dumps(result))
     else:
@@ -151,6 +156,8 @@ class Job:
     rig_name: str = keys.DEFAULT_RIG
     endpoint: str = keys.DEFAULT_ENDPOINT
     keys_place: Path | None = None
+    wall: Path | None = None  # wall file of which the hole is a column
+    hole: str = ""  # of the scenario's site
 
 
 def drill(
@@ -178,9 +185,7 @@ def drill(
         with progress(world, quiet=quiet) as show:
             if bus is None:
                 native = job.transport == "can-native"
-                ran = drill_inline(
-                    world, job.speed, job.rig_name, folder, show, log, native=native, keys=job.keys_place
-                )
+                ran = drill_inline(world, job, folder, show, log, native=native)
             else:
                 ran = drill_in_processes(world, job, bus, show, log, partial(process_table, world, job, folder, page))
     except KeyboardInterrupt:
@@ -197,7 +202,8 @@ def world_of(job: Job) -> World:
     from sim.world.world import World
 
     with warnings_in_lines():
-        world = World(load_scenario(job.scenario, job.faults), job.seed)
+        scenario = load_scenario(job.scenario, job.faults)
+        world = World(scenario.drilling(job.hole) if job.hole else scenario, job.seed)
     if world.scenario.medium.link == "off":
         raise InputFault(f'{job.scenario}: medium.link: expected "on" for a rig; only studies run without a link')
     return world
@@ -281,7 +287,6 @@ def drill_in_processes(
     table_of: Callable[[Transports, Path], ProcessTable],
 ) -> Ran:
     """Drill with one real process a tube, beside a hub of CAN segments where a joint is on CAN."""
-    from borechain.client import Ground
     from sim.rig.launcher import Launcher
     from sim.rig.transports import carrying
 
@@ -296,8 +301,6 @@ def drill_in_processes(
             if log is not None:
                 log.on_tick(tick, table.restarts)
 
-        if log is not None:
-            log.follow(Ground(bus, job.rig_name))
         launcher = Launcher(table, bus, job.rig_name, follow, operator_of(world, job.rig_name))
         answers = launcher.run(lambda bus: ask(bus, job.rig_name))
         return Ran(answers, len(table.specs), sum(table.restarts.values()))
@@ -305,26 +308,24 @@ def drill_in_processes(
 
 def drill_inline(
     world: World,
-    speed: float,
-    rig_name: str,
+    job: Job,
     folder: Path,
     show: Callable[[Tick | Progress], None],
     log: RunLog | None = None,
     *,
     native: bool = False,
-    keys: Path | None = None,
 ) -> Ran:
     """Drill with objects in this process."""
     from borechain.inline import InlineRig
 
-    rig = InlineRig(world, ground_settings(world), rig_name, folder, native=native, keys=keys)
+    rig = InlineRig(world, settings_of(world, job), job.rig_name, folder, native=native, keys=job.keys_place)
 
     def follow(progress: Progress) -> None:
         show(progress)
         if log is not None and log.on_tick(progress, {}) and rig.is_begun:
             log.poll(rig.ask)
 
-    rig.run(follow, speed)
+    rig.run(follow, job.speed)
     try:
         return Ran({path: rig.ask(path) for path in ASKED}, 1, 0)
     finally:
@@ -353,10 +354,11 @@ def process_table(
 
     specs = {
         "medium": Spec(
-            run_medium, (place("medium"), job.scenario, job.seed, job.speed, job.faults, False, True, transports)
+            run_medium,
+            (place("medium"), job.scenario, job.seed, job.speed, job.faults, False, True, transports, job.hole),
         ),
         "encoder": Spec(run_encoder, (place("encoder", ENCODER), None, None, world.torque_settings(), world.reach)),
-        "base": Spec(partial(run_ground, page=page), (place("ground"), ground_settings(world))),
+        "base": Spec(partial(run_ground, page=page), (place("ground"), settings_of(world, job))),
     }
     for tube in range(1, world.scenario.tubes + 1):
         specs[str(tube)] = Spec(run_node, (place(f"tube-{tube}", tube), world.tube_settings(tube)))
@@ -372,6 +374,11 @@ def operator_of(world: World, rig_name: str) -> Callable[[ZenohBus, str], Acted]
         return lambda _bus, _cue: Acted.DONE
     operator = Operator(world.rack, world.scenario.tubes)
     return lambda bus, cue: operator.act_on_cue(BusDoors(bus, rig_name), cue)
+
+
+def settings_of(world: World, job: Job) -> dict[str, Any]:
+    """Settings of the ground station, with the wall of which the hole is a column."""
+    return ground_settings(world) | ({"wall": job.wall, "hole": job.hole} if job.wall is not None else {})
 
 
 def ground_settings(world: World) -> dict[str, Any]:
@@ -423,6 +430,8 @@ def result_of(answers: dict[str, Any], world: World) -> dict[str, Any]:
         "rig_s": round(world.end - world.begin, 3),
         "digest": digest(stations),
     }
+    if "wall" in answers:
+        result["wall"] = answers["wall"]["wall"]
     if world.rack is not None:
         result["calibration"] = calibration(answers["recalibration"], measurements, world)
     return result
