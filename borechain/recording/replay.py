@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable
+from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -36,49 +36,70 @@ class TapeClock:
         return self.rig_now
 
 
-@dataclass(slots=True)
 class Replayed:
-    """A ground station after a replay, how many events it was given, and how many of them were missing."""
+    """A ground station of the same settings that is given the intake of another one; close it after use.
 
-    ground: GroundProcess
-    events: int = 0
-    missing: int = 0
+    Parameters
+    ----------
+    begin : first event of an intake
+    folder : new, of its database
+    rig : name of the rig
+
+    Attributes
+    ----------
+    events, missing : that it was given, and that were lost before they were recorded
+    """
+
+    def __init__(self, begin: Intake, folder: Path, rig: str) -> None:
+        settings = {name: value for name, value in begin.content["settings"].items() if name != "rig"}
+        config = checked_config(rig=rig, folder=folder, **settings)
+        self.ground = GroundProcess(config, lambda _below: int(begin.content["start"]) - 1)
+        self.events = self.missing = 0
+        self._clock = TapeClock()
+        self._last = 0
+        self.ground.clock = self._clock
+
+    def give(self, event: Intake) -> None:
+        """Have an event happen; one told twice counts once."""
+        if event.kind == BEGIN or event.number <= self._last:
+            return
+        self.missing += event.number - self._last - 1
+        self.events, self._last = self.events + 1, event.number
+        self._clock.rig_now, self._clock.epoch = event.rig_now, event.epoch
+        take(self.ground, event)
+        self.ground.take_frames(event.now)  # to nobody
 
 
-def replay_file(recording: Recording, folder: Path) -> Replayed:
-    """Give a new ground station in ``folder`` the intake of a recording; close it after use.
+def open_replay(recording: Recording, folder: Path) -> tuple[Replayed, Iterator[Intake]]:
+    """A ground station for the intake of a recording, and the events that it is to be given.
 
     Raises
     ------
     RecordingError
-        When the recording has no intake, or is of another version.
+        When the recording has no intake, or is of another version; what is wrong with an event is told at it.
     """
-    samples = recording.samples()
-    events = (unpack_intake(one.payload) for one in samples if one.key == keys.INTAKE.format(rig=recording.rig))
+    events = intake_of(recording)
+    first = next(events, None)
+    if first is None or first.kind != BEGIN:
+        raise RecordingError(f"{recording.path}: expected what a ground station took in, the recording has none")
+    return Replayed(first, folder, recording.rig), events
+
+
+def intake_of(recording: Recording) -> Iterator[Intake]:
+    """Events of a recording; errors as ``open_replay``."""
     try:
-        first = next(events, None)
-        if first is None or first.kind != BEGIN:
-            raise RecordingError(f"{recording.path}: expected what a ground station took in, the recording has none")
-        return replay(first, events, folder, recording.rig)
+        for sample in recording.samples():
+            if sample.key == keys.INTAKE.format(rig=recording.rig):
+                yield unpack_intake(sample.payload)
     except IntakeError as error:
         raise RecordingError(f"{recording.path}: {error}") from error
 
 
-def replay(begin: Intake, events: Iterable[Intake], folder: Path, rig: str) -> Replayed:
-    """Give a new ground station of the same settings every event; one told twice counts once."""
-    settings = {name: value for name, value in begin.content["settings"].items() if name != "rig"}
-    config = checked_config(rig=rig, folder=folder, **settings)
-    replayed = Replayed(GroundProcess(config, lambda _below: int(begin.content["start"]) - 1))
-    ground, clock, last = replayed.ground, TapeClock(), 0
-    ground.clock = clock
+def replay_file(recording: Recording, folder: Path) -> Replayed:
+    """Give a new ground station in ``folder`` the whole intake of a recording; errors as ``open_replay``."""
+    replayed, events = open_replay(recording, folder)
     for event in events:
-        if event.kind == BEGIN or event.number <= last:
-            continue
-        replayed.missing += event.number - last - 1
-        replayed.events, last = replayed.events + 1, event.number
-        clock.rig_now, clock.epoch = event.rig_now, event.epoch
-        take(ground, event)
-        ground.take_frames(event.now)  # to nobody
+        replayed.give(event)
     return replayed
 
 

@@ -117,6 +117,20 @@ def find(k: RigModel, path: str) -> Path:
     return member.path(number)
 
 
+def fields_of(path: str) -> Fields:
+    """Fields of the answer of a path, whether it has one now or not.
+
+    Raises
+    ------
+    SelectorError
+        When there is no such path.
+    """
+    known = FIXED.get(path) or MEMBERS.get(_parted(path)[0])
+    if known is None:
+        raise SelectorError(f"{path}: no such path; expected one of {', '.join(PATTERNS)}")
+    return known.fields
+
+
 def check_parameters(found: Iterable[Path], parameters: Parameters, common: tuple[str, ...] = ()) -> None:
     """Refuse a parameter that none of the paths asked for takes; ``common`` are those of every path.
 

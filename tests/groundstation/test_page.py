@@ -2,6 +2,7 @@
 
 import asyncio
 import contextlib
+import csv
 import json
 import re
 import select
@@ -34,6 +35,7 @@ from telemetry.errors import KeyFileError
 
 pytestmark = pytest.mark.slow
 OPERATOR_PASSWORD = "another long word"
+HOUR = 3600.0  # s
 
 
 @pytest.fixture(scope="module")
@@ -83,6 +85,32 @@ def test_parameters_are_those_of_the_keys(page: PageClient) -> None:
     assert "no such path; expected one of status, verdict" in page.get("/api/nonsense").content["error"]
     assert page.get("/nonsense").status == 404
     assert page.post("/api/status", {}).status == 405
+
+
+def test_an_answer_with_rows_is_had_as_a_table(page: PageClient) -> None:
+    stations = page.get("/api/stations?md=3..7").content["stations"]
+    table = page.get("/api/tables/stations.csv?md=3..7")
+    assert table.headers["content-type"] == "text/csv; charset=utf-8"
+    assert table.headers["content-disposition"] == 'attachment; filename="rig-1-stations.csv"'
+    rows = list(csv.DictReader(table.body.decode().splitlines()))
+    assert [{name: float(value) for name, value in row.items()} for row in rows] == stations
+    surveys = list(csv.DictReader(page.get("/api/tables/measurements.csv").body.decode().splitlines()))
+    assert [row["tube"] for row in surveys] == ["1", "1", "1"]
+    assert {"flags", "trust", "yaw_deg"} <= surveys[0].keys()
+    nested = list(csv.DictReader(page.get("/api/tables/uncertainty.csv").body.decode().splitlines()))
+    assert float(nested[-1]["plan_ellipse.major_m"]) > 0.0
+    assert "no table" in page.get("/api/tables/status.csv").content["error"]
+    assert page.get("/api/tables/nonsense.csv").status == 404
+    assert page.get("/api/tables/stations.csv?depth=3").status == 400
+
+
+def test_a_page_that_was_open_for_a_day_is_asked_for_its_role_again() -> None:
+    """Sessions are looked up by the time of now, which a test gives: twelve hours are a shift, a day is two."""
+    sessions = Sessions()
+    session = sessions.begin("driller", "anna", 0.0)
+    assert sessions.find(session.token, 8 * HOUR) == session
+    assert sessions.find(session.token, 24 * HOUR) is None
+    assert sessions.begin("driller", "anna", 24 * HOUR).token != session.token
 
 
 def test_the_document_describes_every_command_with_its_ranges() -> None:

@@ -6,6 +6,7 @@ from pathlib import Path
 
 import pytest
 from beating import Beating, beating
+from page_client import PASSWORD
 from playwright.sync_api import Page, expect
 
 pytestmark = pytest.mark.slow
@@ -42,7 +43,13 @@ def test_both_themes_and_the_dialog_have_no_finding_of_axe(rig: Beating, watched
         page.click("#theme")
     page.click("#sign")
     found["dialog"] = page.evaluate(FINDINGS)
-    assert found == {"dark": [], "sunlight": [], "dialog": []}
+    page.fill("#who", "anna")
+    page.fill("#password", PASSWORD)
+    page.click("#sign-now")
+    expect(page.locator("#sign")).to_have_text("Sign out anna")
+    found["session"] = page.evaluate(FINDINGS)
+    page.click("#sign")
+    assert found == {"dark": [], "sunlight": [], "dialog": [], "session": []}
 
 
 def test_a_theme_is_kept_and_the_one_of_the_machine_is_the_first(rig: Beating, watched: Open) -> None:
@@ -94,6 +101,8 @@ def test_the_joints_with_the_neighbours_stand_there_the_worst_first(tmp_path: Pa
         expect(page.locator("#joints tr")).to_have_count(2)
         expect(page.locator("#joints tr").first).to_have_class("grave")
         expect(page.locator("#joints tr").first).to_contain_text("too thin")
+        page.evaluate(AXE)
+        assert page.evaluate(FINDINGS) == []
 
 
 def test_fifty_tubes_keep_their_rows_and_their_place(rig: Beating, watched: Open) -> None:

@@ -11,12 +11,29 @@ from playwright.sync_api import Page, expect
 
 pytestmark = pytest.mark.slow
 Open = Callable[..., Page]
+COUNT_ROWS = """window.counts = [];
+    new MutationObserver(() => window.counts.push(document.querySelectorAll("#tubes tr").length))
+    .observe(document.getElementById("tubes"), { childList: true })"""
 STRAIGHT, LEANING = (0.3, 0.3, 0.3), (1.0, 1.9)  # deg
 SURVEYED_AGAIN = re.compile(r"take survey tube 1: done · anna")
 
 
 def drill(rig: Beating, stop: int, inclination_deg: float) -> None:
     rig.do(lambda hand: hand.drill(stop, inclination_deg))
+
+
+def test_the_string_grows_from_one_tube_to_ten(tmp_path: Path, watched: Open) -> None:
+    with beating(tmp_path) as rig:
+        page = watched(rig.url)
+        page.evaluate(COUNT_ROWS)
+        for stop in range(1, 11):
+            drill(rig, stop, 0.3)
+            expect(page.locator("#tubes tr")).to_have_count(stop)
+            expect(page.locator("#tubes tr").first).to_contain_text(str(stop))
+        expect(page.locator("#facts")).to_contain_text("MD 20.0/20.0 m · tubes 10")
+        expect(page.locator("#word")).to_have_text("ON TARGET")
+        assert page.evaluate("window.counts") == sorted(page.evaluate("window.counts"))  # no row went on the way
+        assert page.evaluate("document.querySelectorAll('#tubes .grave').length") == 0
 
 
 def sign_in(page: Page, password: str = PASSWORD) -> None:
@@ -57,18 +74,19 @@ def test_a_hole_from_its_first_tube_to_steer_and_what_the_crew_does(tmp_path: Pa
         told = "ends 43.1 ± 0.1 cm at 0 deg N; limit 45 (96 %); act before 13.1 m"
         expect(page.locator("#told")).to_have_text(told)
         expect(page.locator("#todo")).to_have_text("steer to 180 deg S before 13.1 m, 3.1 m are left")
-        alarm = page.locator("#alarm-list li")
+        alarm = page.locator("#alarm-list li", has_text="projection")
         expect(alarm.locator(".what")).to_contain_text("1 projection at 20.0 m at 0° N: 43.1 ± 0.1 cm")
         # one action, which asks for the role once
-        page.click("text=Acknowledge")
+        alarm.locator("text=Acknowledge").click()
         sign_in(page, "not the password")
         expect(page.locator("#sign-error")).to_contain_text("wrong password or role; the next try is looked at in 1 s")
         sign_in_when_it_is_looked_at(page)
         expect(alarm.locator(".more")).to_contain_text("acknowledged by anna")
         expect(page.locator("#orders")).to_contain_text("alarm acknowledge 1: done · anna")
-        page.click("text=Shelve 30 min")
+        expect(page.locator("#alarm-list")).to_contain_text("wrong password, page: 1 since the ground station started")
+        alarm.locator("text=Shelve 30 min").click()
         expect(alarm.locator(".more")).to_contain_text("shelved by anna until")
-        page.click("text=Take back")
+        alarm.locator("text=Take back").click()
         expect(alarm.locator(".more")).to_contain_text("acknowledged by anna")
         # a survey by the button, its course and its outcome
         page.select_option("#tube", "1")

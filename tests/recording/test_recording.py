@@ -15,13 +15,14 @@ from hypothesis import strategies as st
 from mcap.reader import make_reader
 from mcap.writer import Writer
 from schemas import check_answers
+from tapes import INTAKE, KEY, shown, write
 
 from borechain.cli.ground.record import replay as replay_command
 from borechain.cli.rig.rig import ground_settings
 from borechain.inline import InlineRig
 from borechain.recording.files import NAME, Recording, RecordingError, RecordingWriter, Sample
 from borechain.recording.replay import replay_file
-from groundstation.service.intake import BEGIN, Intake, IntakeError, pack_intake, unpack_intake
+from groundstation.service.intake import IntakeError, pack_intake, unpack_intake
 from groundstation.service.paths import schemas
 from groundstation.service.process import GroundProcess
 from sim.rig.scheduler import Progress
@@ -30,8 +31,6 @@ from sim.world.world import World
 
 pytestmark = pytest.mark.slow
 
-KEY = "borechain/rig-1/ground/"
-INTAKE = "borechain/rig-1/intake"
 TABLES: dict[str, Any] = {
     "rig": {"tubes": 2, "tube_length_m": 2.0},
     "path": {"straight": {"inclination_deg": 3.0, "azimuth_deg": 40.0}},
@@ -39,24 +38,6 @@ TABLES: dict[str, Any] = {
     "rotation": {"turns": 5.0},
 }
 COMPARED = ("stations", "measurements", "trajectory", "uncertainty", "column", "events", "string", "verdict")
-
-
-def shown() -> dict[str, bytes]:
-    return {pattern: json.dumps(schema).encode() for pattern, schema in schemas().items()}
-
-
-def begin_of(ground: GroundProcess) -> Intake:
-    settings = ground.config.model_dump(mode="json", exclude={"folder", "key_file", "database_url"})
-    return Intake(0, BEGIN, 0.0, 0.0, 0, {"settings": settings, "start": ground.start_number})
-
-
-def write(path: Path, ground: GroundProcess) -> None:
-    """A recording of all that is on the tape, and of some answers."""
-    with RecordingWriter(path, "rig-1", shown()) as writer:
-        for k, event in enumerate([begin_of(ground), *ground.tape.events]):
-            writer.write(Sample(INTAKE, 1_000 + k, pack_intake(event)))
-        for path_of in ("status", "verdict", "nodes/1", "stations/1"):
-            writer.write(Sample(KEY + path_of, 9_000, json.dumps(ground.operator.ask(path_of)).encode()))
 
 
 def answers(ground: GroundProcess) -> dict[str, Any]:

@@ -7,13 +7,16 @@ import queue
 import sys
 import time
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import click
 
 from borechain.cli.faults import EnvironmentFault, InputFault, plain_faults
 from telemetry import keys
 from telemetry.runtime.options import endpoint_option, insecure_option, keys_option
+
+if TYPE_CHECKING:
+    from telemetry.media.zenoh_bus import Reply
 
 SILENCE = 5.0  # wall s without a sample before ``watch`` says so
 PATIENCE, ORDER_PATIENCE = 5.0, 40.0  # s; the ground station itself waits 30 s for a tube
@@ -40,9 +43,16 @@ role_option = click.option(
     help="Seconds to wait for the router, and then for the answer  [default: 5; 40 for an order]",
 )
 @click.option("--json", "as_json", is_flag=True, help="One JSON object on one line.")
+@click.option("--csv", "as_csv", is_flag=True, help="The rows of one answer, such as stations, as CSV.")
 @plain_faults
 def query(
-    selector: str, endpoint: str, keys_place: Path | None, role: str, timeout: float | None, as_json: bool
+    selector: str,
+    endpoint: str,
+    keys_place: Path | None,
+    role: str,
+    timeout: float | None,
+    as_json: bool,
+    as_csv: bool,
 ) -> None:
     """Ask a running ground station for SELECTOR and print its answer.
 
@@ -50,6 +60,7 @@ def query(
     Examples:
       borechain query 'borechain/*/ground/trajectory'
       borechain query 'borechain/*/ground/trajectory?md=4..12'
+      borechain query 'borechain/rig-1/ground/stations' --csv > stations.csv
       borechain query 'borechain/rig-1/cmd/take_survey?tube=3'
     """
     from borechain.client import who_is_there
@@ -68,7 +79,34 @@ def query(
         raise EnvironmentFault(f"{selector}: no answer within {patience:g} s; a longer --timeout may help")
     if not answers:
         raise EnvironmentFault(f"{selector}: nobody at {endpoint} answers it; {there}. {known()}")
+    if as_csv:
+        click.echo(csv_of(answers), nl=False)
+        return
     show({reply.key: value_of(reply.payload) for reply in answers}, as_json=as_json)
+
+
+def csv_of(answers: list[Reply]) -> str:
+    """The rows of one answer as CSV.
+
+    Raises
+    ------
+    InputFault
+        When there are several answers, or the one has no rows.
+    """
+    from telemetry.runtime.command_line import check_installed
+
+    check_installed("scipy")
+    from groundstation.errors import SelectorError
+    from groundstation.service.csv_tables import table_of
+    from groundstation.service.paths import fields_of
+
+    if len(answers) != 1:
+        raise InputFault(f"--csv: expected one answer, got {len(answers)}: {', '.join(one.key for one in answers[:5])}")
+    path = answers[0].key.partition("/ground/")[2]
+    try:
+        return table_of(path, fields_of(path), json.loads(answers[0].payload))
+    except SelectorError as error:
+        raise InputFault(f"--csv: {error}") from error
 
 
 @click.command()

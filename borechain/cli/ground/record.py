@@ -8,6 +8,7 @@ import signal
 import tempfile
 import time
 from collections.abc import Iterator
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -15,6 +16,8 @@ import click
 
 from borechain.cli.faults import EnvironmentFault, needs, plain_faults
 from borechain.cli.ground.query import rig_option, role_option
+from borechain.cli.options import parse_speed
+from groundstation.page_options import page_settings
 from telemetry import keys
 from telemetry.media.credentials import Credentials, credentials_for
 from telemetry.runtime.options import insecure_option, keys_option
@@ -101,23 +104,39 @@ def patient_client(endpoint: str, wait: float, credentials: Credentials | None) 
     type=click.Path(path_type=Path, file_okay=False),
     help="New folder for the database of the replay, to keep it  [default: none is kept]",
 )
+@click.option("--page", metavar="HOST:PORT", help="Show it on the page there, until Ctrl-C.")
+@click.option(
+    "--speed",
+    default="60",
+    show_default=True,
+    callback=parse_speed,
+    metavar="max|X",
+    help="With --page, times real time.",
+)
 @click.option("--json", "as_json", is_flag=True, help="One JSON object on one line.")
 @needs("mcap", "scipy", "sqlalchemy")
 @plain_faults
-def replay(file: Path, folder: Path | None, as_json: bool) -> None:
+def replay(file: Path, folder: Path | None, page: str | None, speed: float, as_json: bool) -> None:
     """Give what a ground station took in (FILE of ``borechain record``) to a new one, and show what it knows then.
 
     \b
     Examples:
       borechain replay shift.mcap
       borechain replay shift.mcap --json
+      borechain replay shift.mcap --page 127.0.0.1:8080 --speed 60
     """
     from borechain.recording.files import Recording
 
     recording = Recording(file)
     if folder is not None and folder.exists() and any(folder.iterdir()):
         raise EnvironmentFault(f"folder {folder}: expected a new or empty one, it holds something")
+    shown = page_settings(page, None, None)
     with tempfile.TemporaryDirectory(prefix="borechain-") as place:
+        if shown is not None:
+            from borechain.recording.show import show_recording
+
+            show_recording(recording, folder or Path(place), replace(shown, replay=file.name), speed)
+            return
         result = replayed(recording, folder or Path(place))
     if as_json:
         click.echo(json.dumps(result))

@@ -79,6 +79,7 @@ def application(process: GroundProcess, page: PageSettings, hub: Hub) -> Starlet
             Route("/api/session", doors.sign_out, methods=["DELETE"]),
             Route("/api/stream", Stream(doors.stream)),
             Route("/api/cmd/{name}", doors.order, methods=["POST"]),
+            Route("/api/tables/{path:path}.csv", doors.table),
             Route("/api/{path:path}", doors.answer),
         ],
         middleware=[

@@ -18,6 +18,7 @@ from groundstation.gateway.page.hub import Hub, event
 from groundstation.gateway.page.passwords import DRILLER, LONGEST, is_right
 from groundstation.gateway.page.sessions import Session, Sessions, WrongPasswords, is_from
 from groundstation.gateway.page.settings import PageSettings
+from groundstation.service.csv_tables import table_of
 from groundstation.service.operator import check_name
 from groundstation.service.orders import Order
 from groundstation.service.paths import check_parameters, find
@@ -62,6 +63,20 @@ class Doors:
             return JSONResponse(found.show(self._process.model, parameters))
         except SelectorError as error:
             raise RequestError(400 if is_known(self._process, path) else 404, str(error)) from error
+
+    async def table(self, request: Request) -> Response:
+        """``GET /api/tables/PATH.csv``: the list of an answer as a file of CSV."""
+        self._check_reader(request)
+        path, model = request.path_params["path"], self._process.model
+        parameters = dict(request.query_params)
+        try:
+            found = find(model, path)
+            check_parameters([found], parameters)
+            text = table_of(path, found.fields, found.show(model, parameters))
+        except SelectorError as error:
+            raise RequestError(400 if is_known(self._process, path) else 404, str(error)) from error
+        name = f"{self._process.config.rig}-{path.replace('/', '-')}.csv"
+        return Response(text, media_type="text/csv", headers={"content-disposition": f'attachment; filename="{name}"'})
 
     async def order(self, request: Request) -> Response:
         """``POST /api/cmd/NAME``: order something; ``?wait=true`` answers when the tube has."""
@@ -132,8 +147,9 @@ class Doors:
             self._hub.leave(reader)
 
     def _hello(self) -> dict[str, Any]:
-        config = self._process.config
-        return {"rig": config.rig, "hole": config.hole, "start": self._process.start_number, "build": self._build}
+        config, start = self._process.config, self._process.start_number
+        names = {"rig": config.rig, "hole": config.hole, "replay": self._page.replay}
+        return names | {"start": start, "build": self._build}
 
     def _shown(self, session: Session | None) -> dict[str, Any]:
         return {

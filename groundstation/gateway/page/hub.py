@@ -63,10 +63,12 @@ class Hub:
     Parameters
     ----------
     process : whose answers; the hub lives on the loop that drives it
+    is_replay : its verdict is of then, whenever it is asked for
     """
 
-    def __init__(self, process: GroundProcess) -> None:
+    def __init__(self, process: GroundProcess, *, is_replay: bool = False) -> None:
         self._process = process
+        self._is_replay = is_replay
         self._readers: set[Reader] = set()
         self._rendered: dict[str, bytes] = {}
         self._beat_at = -math.inf  # s, monotonic, of the newest verdict
@@ -78,7 +80,7 @@ class Hub:
 
     def join(self) -> Reader:
         """A reader that is given the whole picture first; a verdict only if it is of this moment."""
-        is_live = time.monotonic() <= self._beat_at + BEATS_MISSED * HEARTBEAT
+        is_live = self._is_replay or time.monotonic() <= self._beat_at + BEATS_MISSED * HEARTBEAT
         paths = PATHS if is_live else tuple(path for path in PATHS if path != VERDICT)
         reader = Reader((*paths, *(f"{NODES}{tube}" for tube in sorted(self._process.model.nodes))))
         self._readers.add(reader)

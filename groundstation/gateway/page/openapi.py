@@ -17,6 +17,7 @@ from telemetry.quantities import ValueKind
 View = dict[str, Any]
 JSON_TYPES = {ValueKind.NUMBER: "number", ValueKind.INTEGER: "integer", ValueKind.BOOLEAN: "boolean"}
 REFUSED = {"type": "object", "properties": {"error": {"type": "string"}}, "required": ["error"]}
+TABLES = ("stations", "measurements")  # that the page has buttons for; others are had alike
 SIGN_IN = {
     "type": "object",
     "properties": {
@@ -52,7 +53,7 @@ def document(version: str) -> View:
             "description": "The keys of one rig over HTTP. Reading needs no session on loopback; ordering needs one of "
             "the role driller, and its csrf value in the header x-csrf-token.",
         },
-        "paths": answers | orders | session_paths() | stream_path(),
+        "paths": answers | tables() | orders | session_paths() | stream_path(),
         "components": {"securitySchemes": {"session": {"type": "apiKey", "in": "cookie", "name": "borechain"}}},
     }
 
@@ -68,6 +69,21 @@ def asked(pattern: str, path: Path | Member) -> View:
         "operationId": "ask_" + re.sub(r"[^a-z_]+", "_", pattern).strip("_"),
         "parameters": inside + [{"name": name, "in": "query", "schema": {"type": "string"}} for name in query],
         "responses": {"200": content_of("the answer", object_schema(path.fields))} | refusals(400, 401, 404),
+    }
+
+
+def tables() -> View:
+    """Answers with a list of rows as files of CSV."""
+    text = {"text/csv": {"schema": {"type": "string"}}}
+    return {
+        f"/api/tables/{name}.csv": {
+            "get": {
+                "operationId": f"table_{name}",
+                "responses": {"200": {"description": "the rows of the answer, with a header", "content": text}}
+                | refusals(400, 401),
+            }
+        }
+        for name in TABLES
     }
 
 

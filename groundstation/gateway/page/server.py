@@ -113,7 +113,7 @@ def close_all(server: uvicorn.Server) -> None:
 @contextlib.asynccontextmanager
 async def serving_page(process: GroundProcess, page: PageSettings, listening: socket.socket) -> AsyncIterator[None]:
     """Have the page served on a listening socket while the context lasts."""
-    hub = Hub(process)
+    hub = Hub(process, is_replay=bool(page.replay))
     config = uvicorn.Config(
         application(process, page, hub),
         http="h11",

@@ -16,13 +16,17 @@ BACKLOG = 64  # connections that wait to be accepted
 
 @dataclass(frozen=True, slots=True)
 class PageSettings:
-    """Address of the page, its certificate and key for TLS, and the hash of the password of each role."""
+    """Address of the page, its certificate and key for TLS, and the hash of the password of each role.
+
+    ``replay`` names the recording that is shown in place of a rig that lives.
+    """
 
     host: str
     port: int
     certificate: Path | None = None
     key: Path | None = None
     passwords: Mapping[str, str] = field(default_factory=dict)
+    replay: str = ""
 
     @property
     def is_local(self) -> bool:

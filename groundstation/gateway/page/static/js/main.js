@@ -41,8 +41,8 @@ function onHeard(kind, content) {
 
 function paint() {
   const now = moment();
-  showVerdict(picture, now);
-  showFacts(picture, now, hello.hole || hello.rig);
+  showVerdict(picture, now, hello);
+  showFacts(picture, now, hello);
   const { status, wall, alarms, orders } = picture.answers;
   const isNew = (...paths) => paths.some((path) => changed.has(path));
   if (isNew("history")) history.take(picture.answers.history.moments);

@@ -4,13 +4,14 @@ import { byId, shown, write } from "./dom.js";
 
 const WORDS = { on_target: "ON TARGET", watch: "WATCH", steer: "STEER", out: "OUT", dont_know: "DON'T KNOW" };
 
-/** Show the verdict of this moment. */
-export function showVerdict(picture, now) {
-  const found = picture.verdict(now);
+/** Show the verdict of this moment; that of a replay never has a colour on which somebody might count. */
+export function showVerdict(picture, now, { replay }) {
+  const found = (replay && picture.answers.verdict) || picture.verdict(now);
   const section = byId("verdict");
-  if (section.className !== found.verdict) section.className = found.verdict;
+  const colour = replay ? "dont_know" : found.verdict;
+  if (section.className !== colour) section.className = colour;
   const word = WORDS[found.verdict] ?? WORDS.dont_know;
-  write(byId("word"), word);
+  write(byId("word"), replay ? `Then: ${word}` : word);
   write(byId("told"), found.line.replace(/^[^:]*: /, ""));
   const doubt = found.verdict === "dont_know" && found.by_surveys !== "dont_know";
   write(byId("todo"), doubt ? `the surveys alone said ${WORDS[found.by_surveys]}; do not count on it` : found.todo);
@@ -19,13 +20,14 @@ export function showVerdict(picture, now) {
 }
 
 /** Show which hole, how fresh, how deep, what stands. */
-export function showFacts(picture, now, hole) {
+export function showFacts(picture, now, { hole, rig, replay }) {
   const { status, verdict, alarms } = picture.answers;
-  const live = picture.isLive(now);
+  const live = Boolean(replay) || picture.isLive(now);
   document.body.classList.toggle("old", !live);
-  write(byId("hole"), hole || status?.rig || "borechain");
+  write(byId("hole"), hole || rig || status?.rig || "borechain");
+  write(byId("replay"), replay ? `REPLAY of ${replay}: what was known then; no rig is shown live` : "");
   write(byId("printed"), status ? `as of ${status.utc.slice(0, 19).replace("T", " ")} UTC` : "");
-  const fresh = live ? `live ${picture.age(now).toFixed(1)} s` : "NOT LIVE";
+  const fresh = replay ? "REPLAY" : live ? `live ${picture.age(now).toFixed(1)} s` : "NOT LIVE";
   const depth = `MD ${shown(status?.bit_md_m)}/${shown(verdict?.target_m)} m`;
   const health = status ? `health ${status.health}` : "";
   write(byId("facts"), [fresh, depth, `tubes ${status?.tubes ?? "–"}`, health, `alarms ${alarms?.open.length ?? "–"}`].join(" · "));

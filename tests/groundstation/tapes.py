@@ -1,0 +1,32 @@
+"""Recordings of ground stations that are fed by hand."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+from borechain.recording.files import RecordingWriter, Sample
+from groundstation.service.intake import BEGIN, Intake, pack_intake
+from groundstation.service.paths import schemas
+from groundstation.service.process import GroundProcess
+
+KEY = "borechain/rig-1/ground/"
+INTAKE = "borechain/rig-1/intake"
+
+
+def shown() -> dict[str, bytes]:
+    return {pattern: json.dumps(schema).encode() for pattern, schema in schemas().items()}
+
+
+def begin_of(ground: GroundProcess) -> Intake:
+    settings = ground.config.model_dump(mode="json", exclude={"folder", "key_file", "database_url"})
+    return Intake(0, BEGIN, 0.0, 0.0, 0, {"settings": settings, "start": ground.start_number})
+
+
+def write(path: Path, ground: GroundProcess) -> None:
+    """A recording of all that is on the tape, and of some answers."""
+    with RecordingWriter(path, "rig-1", shown()) as writer:
+        for k, event in enumerate([begin_of(ground), *ground.tape.events]):
+            writer.write(Sample(INTAKE, 1_000 + k, pack_intake(event)))
+        for path_of in ("status", "verdict", "nodes/1", "stations/1"):
+            writer.write(Sample(KEY + path_of, 9_000, json.dumps(ground.operator.ask(path_of)).encode()))
