@@ -26,7 +26,7 @@ from groundstation.service.intake import IntakeError, pack_intake, unpack_intake
 from groundstation.service.paths import schemas
 from groundstation.service.process import GroundProcess
 from sim.rig.scheduler import Progress
-from sim.world.scenario import scenario_of
+from sim.world.scenario import load_scenario, scenario_of
 from sim.world.world import World
 
 pytestmark = pytest.mark.slow
@@ -77,6 +77,25 @@ def test_a_replay_of_a_whole_run_knows_the_same_bit_for_bit(
     assert len(ground.operator.ask("stations")["stations"]) == 2
     assert json.dumps(answers(again.ground)) == json.dumps(answers(ground))
     again.ground.close()
+
+
+def test_a_good_run_raises_no_alarm(drilled: tuple[Path, GroundProcess]) -> None:
+    alarms = drilled[1].operator.ask("alarms")
+    assert (alarms["raised_last_hour"], alarms["flood"], alarms["open"], alarms["closed"]) == (0, False, [], [])
+
+
+@pytest.mark.statistical
+def test_all_of_wellbore_1_raises_ten_alarms_at_most(tmp_path: Path) -> None:
+    """It lasts 33 minutes and leaves its tolerance, which is told level by level."""
+    world = World(load_scenario(Path("wellbore-1")), 1)
+    rig = InlineRig(world, ground_settings(world), "rig-1", tmp_path)
+    most = []
+    rig.run(lambda _progress: most.append(rig.ask("alarms")["raised_last_hour"]) if rig.is_begun else None)
+    found = rig.ask("alarms")
+    assert world.end - world.begin < 3600.0
+    assert max(most) <= 10
+    assert {alarm["code"] for alarm in (*found["open"], *found["closed"])} == {"deviation", "projection"}
+    rig.close()
 
 
 def test_mcaps_own_reader_finds_the_schemas(drilled: tuple[Path, GroundProcess]) -> None:
