@@ -8,6 +8,7 @@ from groundstation.service.alarms import Alarm
 from groundstation.service.crew_alarms import Condition
 from groundstation.service.model import RigModel
 from groundstation.service.rig_alarms import Level
+from groundstation.service.verdict_views import FINEST_CM
 from groundstation.survey.columns import LEVELS
 
 LEVEL_OF = dict(zip(LEVELS, (Level.NOTICE, Level.DEGRADED, Level.BAD), strict=True))
@@ -32,7 +33,7 @@ def _of_the_column(k: RigModel) -> Iterator[Condition]:
         if alarm.kind not in highest or alarm.level > highest[alarm.kind].level:
             highest[alarm.kind] = alarm
     for kind, alarm in highest.items():
-        detail = f"{100.0 * alarm.size:.1f} ± {100.0 * alarm.std:.1f} cm"
+        detail = f"{100.0 * alarm.size:.1f} ± {max(100.0 * alarm.std, FINEST_CM):.1f} cm"
         threshold = f"{100.0 * alarm.level:.0f} % of {100.0 * alarm.limit:.0f} cm"
         yield Condition(kind, "column", LEVEL_OF[alarm.level], detail, alarm.md, alarm.direction, threshold)
 

@@ -138,8 +138,9 @@ class Hole:
         self._moved: list[Moved] = []
         self._alarms = AlarmList()
         self._history = History()
-        self._trajectory = Trajectory().points
-        self._deviations = self._deviations_of(self._trajectory)
+        self._trajectory = Trajectory()
+        self._drawn: list[tuple[float, Direction]] = []  # stations of the trajectory, m and direction
+        self._deviations = [self._deviation_of(self._trajectory.points[0])]
         self._projection: Deviation | None = None
         self._unsettled_since = math.inf  # s, rig time of the oldest survey from which nothing follows yet
 
@@ -186,7 +187,7 @@ class Hole:
     def trajectory(self) -> list[Point]:
         """Points from the collar down."""
         self.settle()
-        return self._trajectory
+        return self._trajectory.points
 
     @property
     def deviations(self) -> list[Deviation]:
@@ -208,24 +209,27 @@ class Hole:
             self._work_out()
 
     def _work_out(self) -> None:
-        trajectory = Trajectory()
-        direction = None
-        for station in self._stations:
-            if station.md > 0.0:
-                direction = station.fused(self._config.weighting)
-                trajectory.append(station.md, direction)
-        self._trajectory = trajectory.points
-        self._deviations = self._deviations_of(self._trajectory)
-        if direction is None:
+        self._draw([(one.md, one.fused(self._config.weighting)) for one in self._stations if one.md > 0.0])
+        if not self._drawn:
             return
         at = max(cluster.at for station in self._stations for cluster in station.clusters)
         worst = max(self._deviations[1:], key=lambda d: d.ratio)
-        self._projection = project(self._trajectory[-1], direction, self._config.design)
+        self._projection = project(self._trajectory.points[-1], self._drawn[-1][1], self._config.design)
         self._alarms.judge_deviation("deviation", worst, at)
         self._alarms.judge_deviation("projection", self._projection, at)
 
-    def _deviations_of(self, points: list[Point]) -> list[Deviation]:
-        return [deviation(point, self._config.design) for point in points]
+    def _draw(self, stations: list[tuple[float, Direction]]) -> None:
+        """Trajectory through stations (m, direction); where none has changed the new ones are added to it."""
+        known = zip(stations, self._drawn, strict=False)
+        if len(stations) < len(self._drawn) or any(new[1] is not old[1] for new, old in known):
+            self._trajectory, self._drawn = Trajectory(), []
+            self._deviations = [self._deviation_of(self._trajectory.points[0])]
+        for md, direction in stations[len(self._drawn) :]:
+            self._deviations.append(self._deviation_of(self._trajectory.append(md, direction)))
+            self._drawn.append((md, direction))
+
+    def _deviation_of(self, point: Point) -> Deviation:
+        return deviation(point, self._config.design)
 
     def _station_at(self, md: float) -> SurveyStation:
         for station in self._stations:
