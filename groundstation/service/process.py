@@ -19,7 +19,7 @@ from groundstation.service.intake import DEPTH, MESSAGE, ORDER, TIMER, Tape
 from groundstation.service.model import RigModel
 from groundstation.service.operator import BlockUpload, Operator, Outgoing
 from groundstation.service.orders import Order
-from groundstation.service.store import Store
+from groundstation.service.store import Store, Stored
 from groundstation.service.uploads import Uploads
 from groundstation.service.watch import Watch
 from telemetry.application.endpoint import Endpoint
@@ -116,6 +116,7 @@ class GroundProcess(Process):
         self.start_number = start
         self.listeners: list[Listener] = []
         self._stale: set[int] = set()
+        self._arrived: list[Stored] = []  # since the last transaction
         self._early: deque[DepthReading] = deque(maxlen=EARLY)
         self._kept_stand: Stand | None = None
         self._beat_at = -math.inf
@@ -143,8 +144,13 @@ class GroundProcess(Process):
         for received in self.endpoint.receive(side, frame, now, margin):
             self.on_message(received.message, now)
 
+    def before_frames(self) -> None:
+        """Receipts leave for what came since the last time, once it is stored."""
+        self._keep_arrived()
+
     def on_depth(self, payload: bytes, now: float) -> None:
         """The rig measured the depth of the bit; bytes that are no reading are counted."""
+        self._keep_arrived()
         seals = self.endpoint.seals
         content = payload if seals is None else seals.depth_content(payload)
         if content is None:
@@ -168,6 +174,7 @@ class GroundProcess(Process):
 
     def on_timer(self, now: float) -> None:
         """Advance to ``now``: orders and uploads, hello, time requests, repetition, and what is wrong by now."""
+        self._keep_arrived()
         if self.watch.is_due(now) or self._early:
             self._note(TIMER, now)
         self._advance_time(now)
@@ -381,12 +388,8 @@ class GroundProcess(Process):
                     self._keep_joints()
                 self._publish([f"nodes/{message.tube}"])
             case SurveyMeasurement() | Event() | StaticRecord():
-                try:
-                    self._on_kept(message)
-                    self.endpoint.acknowledge(message)
-                except StoreError:  # what is not stored is not acknowledged, and comes again
-                    if isinstance(message, Event):
-                        self.watch.on_known_event(message)
+                below = self.model.string_below(message) if isinstance(message, SurveyMeasurement) else None
+                self._arrived.append(Stored(message, None, below))
             case Reply():
                 self.model.orders.on_reply(message)
                 self.model.recalibration.on_reply(message, now)
@@ -394,18 +397,36 @@ class GroundProcess(Process):
                 self.operator.on_block_status(message)
         self.operator.publish_orders()
 
-    def _on_kept(self, message: Kept) -> None:
-        """Store a message before it is acknowledged; one that was stored already changes nothing.
+    def _keep_arrived(self) -> None:
+        """Store what came together, in one transaction, before any of it is acknowledged.
 
-        A survey gets its depth at the next reading or look, with all that came meanwhile and in their order: whether a
-        reading brackets its time already is a matter of a millisecond.
+        What was stored already changes nothing; what is not stored is not acknowledged, and comes again. A survey gets
+        its depth at the next reading or look, with all that came meanwhile and in their order: whether a reading
+        brackets its time already is a matter of a millisecond.
         """
-        below = self.model.string_below(message) if isinstance(message, SurveyMeasurement) else None
+        arrived, self._arrived = self._arrived, []
+        if not arrived:
+            return
+        try:
+            are_new = self._store_arrived(arrived)
+        except StoreError:
+            for one in arrived:
+                if isinstance(one.message, Event):
+                    self.watch.on_known_event(one.message)
+            return
+        changed: dict[str, None] = {}
+        for one, is_new in zip(arrived, are_new, strict=True):
+            if is_new:
+                changed |= dict.fromkeys(self._apply_stored(one.message, None, one.below))
+                if isinstance(one.message, Event):
+                    self.watch.on_event(one.message)
+            self.endpoint.acknowledge(one.message)
+        self._publish(list(changed))
+
+    def _store_arrived(self, arrived: list[Stored]) -> list[bool]:
+        """Put messages on the disk, with the order of the string that places them; which of them are new."""
         self._keep_tally()
-        if self.store.add_message(message, None, below):
-            self._publish(self._apply_stored(message, None, below))
-            if isinstance(message, Event):
-                self.watch.on_event(message)
+        return self.store.add_messages(arrived)
 
     def _apply_stored(self, message: Kept, md: float | None, below: float | None) -> list[str]:
         """Add a stored message to the model; returns the paths that changed."""

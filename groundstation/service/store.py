@@ -14,7 +14,7 @@ from __future__ import annotations
 import contextlib
 import math
 import sqlite3
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -152,23 +152,31 @@ class Store:
         self._inode = self._found_inode()
 
     def add_message(self, message: Kept, md: float | None, below: float | None = None) -> bool:
-        """Store a message; durable on return. False when it was already there.
+        """Store one message, see ``add_messages``."""
+        return self.add_messages([Stored(message, md, below)])[0]
+
+    def add_messages(self, arrived: Sequence[Stored]) -> list[bool]:
+        """Store messages, all or none; durable on return. False for each that was already there.
 
         Raises
         ------
         StoreError
             When the disk refuses; nothing may be acknowledged then.
         """
-        payload = encode(message)
-        row = row_of(message, payload)
         with self._writing() as connection:
-            same = {f"its_{name}": value for name, value in row.items()}
-            there = connection.execute(FIND, same).first()
-            if there is not None and there.payload == payload:
-                return False
-            connection.execute(DROP, same)  # of a row that is damaged
-            kind = type(message).__name__
-            connection.execute(ADD, {**row, "kind": kind, "md": md, "below": below, "payload": payload})
+            return [self._add(connection, one) for one in arrived]
+
+    @staticmethod
+    def _add(connection: sa.Connection, one: Stored) -> bool:
+        payload = encode(one.message)
+        row = row_of(one.message, payload)
+        same = {f"its_{name}": value for name, value in row.items()}
+        there = connection.execute(FIND, same).first()
+        if there is not None and there.payload == payload:
+            return False
+        connection.execute(DROP, same)  # of a row that is damaged
+        kind = type(one.message).__name__
+        connection.execute(ADD, {**row, "kind": kind, "md": one.md, "below": one.below, "payload": payload})
         return True
 
     def place_messages(self, placed: Iterable[tuple[Kept, float]]) -> None:

@@ -43,8 +43,12 @@ class Process:
         """A timer named by ``next_wake`` is due: hello, time requests, repetition."""
         self.endpoint.advance(now)
 
+    def before_frames(self) -> None:
+        """Frames are about to be taken: what must be on a disk before they leave is to be put there."""
+
     def take_frames(self, now: float) -> list[tuple[Side, Frame]]:
         """Frames to send now."""
+        self.before_frames()
         return self.endpoint.take_frames(now)
 
     def next_wake(self, now: float) -> float:

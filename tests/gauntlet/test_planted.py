@@ -14,6 +14,7 @@ from groundstation.errors import StoreError
 from groundstation.service import model as model_module
 from groundstation.service import store as store_module
 from groundstation.service.process import GroundProcess
+from groundstation.service.store import Stored
 from groundstation.survey.trust import Trust
 from node.firmware.settings import TubeSettings
 from node.process import counter as counter_module
@@ -28,7 +29,6 @@ from telemetry.messages import (
     ENCODER,
     Command,
     Hello,
-    Kept,
     Mode,
     Receipt,
     Reply,
@@ -76,25 +76,26 @@ def flags_ignored(patch: pytest.MonkeyPatch) -> None:
 
 
 def receipt_before_the_store(patch: pytest.MonkeyPatch) -> None:
-    plain = GroundProcess._on_kept
+    plain = GroundProcess._store_arrived
 
-    def on_kept(process: GroundProcess, message: Kept) -> None:
-        process.endpoint.acknowledge(message)
-        plain(process, message)
+    def store_arrived(process: GroundProcess, arrived: list[Stored]) -> list[bool]:
+        for one in arrived:
+            process.endpoint.acknowledge(one.message)
+        return plain(process, arrived)
 
-    patch.setattr(GroundProcess, "_on_kept", on_kept)
+    patch.setattr(GroundProcess, "_store_arrived", store_arrived)
 
 
 def refused_and_receipted(patch: pytest.MonkeyPatch) -> None:
-    plain = GroundProcess._on_kept
+    plain = GroundProcess._store_arrived
 
-    def on_kept(process: GroundProcess, message: Kept) -> None:
+    def store_arrived(process: GroundProcess, arrived: list[Stored]) -> list[bool]:
         try:
-            plain(process, message)
+            return plain(process, arrived)
         except StoreError:
-            return
+            return [False] * len(arrived)
 
-    patch.setattr(GroundProcess, "_on_kept", on_kept)
+    patch.setattr(GroundProcess, "_store_arrived", store_arrived)
 
 
 def synchronous_below_full(patch: pytest.MonkeyPatch) -> None:
