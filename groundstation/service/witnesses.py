@@ -1,7 +1,8 @@
 """Who contradicts the encoder: a gyroscope alone may be wrong, several at one time say that the encoder is. No I/O.
 
 A tube is a witness of a time if it ran through it: one that started then, or stood still, took the yaw that it was
-given and has nothing to say. So a contradiction counts against the encoder when all who could have seen it agree.
+given, and one whose gyroscope gave nothing took the rate of the encoder: none of them has anything to say. So a
+contradiction counts against the encoder when all who could have seen it agree.
 """
 
 from __future__ import annotations
@@ -14,11 +15,14 @@ from telemetry.messages import EPOCH_UNKNOWN, Event
 
 AGAINST_THE_ENCODER = ("yaw_reset", "gyro_step", "gyro_scale")
 STARTS = ("booted", "restored")
+BLIND = ("bad_sample", "gyro_saturated", "gyro_stuck")  # the gyroscope gives nothing, until the sensor has recovered
 CYCLE = 10.0 / 19.0  # s, of a node
 SETTLED_AFTER = 10.0  # s after a start in which a tube may still find its yaw
 TOGETHER = 30.0  # s
 ENOUGH = 2  # tubes
 STARTS_KEPT = 1000
+OFF_BEFORE = 30.0  # s before a start in which a tube may have been without power
+BLIND_KEPT = 20  # times of a tube and epoch
 
 
 class Witnesses:
@@ -27,7 +31,7 @@ class Witnesses:
     def __init__(self) -> None:
         self._contradicted: dict[int, Event] = {}  # newest contradiction, by tube
         self._starts: deque[Event] = deque(maxlen=STARTS_KEPT)
-        self._blind_until: dict[tuple[int, int], float] = {}  # s, rig time, by tube and epoch
+        self._blind: dict[tuple[int, int], deque[tuple[float, float]]] = {}  # s, rig time, by tube and epoch
         self._told: tuple[Event, ...] = ()
 
     def on_event(self, event: Event, heard: Collection[int]) -> str:
@@ -35,15 +39,18 @@ class Witnesses:
         place = event.tube, event.epoch
         if event.code in STARTS:
             self._starts.append(event)
-            self._blind_until[place] = event.at
+            self._add_blind(place, event.at - OFF_BEFORE, event.at)
         elif event.code == "overrun":
-            self._blind_until[place] = event.at + CYCLE * int(str(event.arguments.get("missed", 0)))
+            self._add_blind(place, event.at, event.at + CYCLE * int(str(event.arguments.get("missed", 0))))
+        elif event.code in BLIND:
+            self._add_blind(place, event.at, math.inf)
+            return ""  # what it tells next says whether that is over by now
+        elif event.code == "sensor_recovered" and event.arguments.get("after") in BLIND:
+            self._end_blind(place, event.at)
         elif event.code in AGAINST_THE_ENCODER:
             self._contradicted[event.tube] = event
-        else:
-            return ""
-        while len(self._blind_until) > STARTS_KEPT:
-            del self._blind_until[next(iter(self._blind_until))]
+        while len(self._blind) > STARTS_KEPT:
+            del self._blind[next(iter(self._blind))]
         found = next((one for one in self._contradicted.values() if self._speaks_against_the_encoder(one, heard)), None)
         if found is None or (told := self._together(found)) == self._told:
             return ""
@@ -76,6 +83,18 @@ class Witnesses:
         start = max(before, key=lambda start: (start.sequence, start.at), default=None)
         return ("", -math.inf) if start is None else (start.code, start.at)
 
+    def _add_blind(self, place: tuple[int, int], since: float, until: float) -> None:
+        self._blind.setdefault(place, deque(maxlen=BLIND_KEPT)).append((since, until))
+
+    def _end_blind(self, place: tuple[int, int], at: float) -> None:
+        """The gyroscope gives something again: the newest time without one that had begun has an end."""
+        times = self._blind.get(place, deque())
+        for number in reversed(range(len(times))):
+            if times[number][0] <= at and times[number][1] == math.inf:
+                times[number] = times[number][0], at
+                return
+
     def _has_watched(self, tube: int, event: Event) -> bool:
-        """Whether a tube had settled, or had long gone on, before an event, so that it could have seen the same."""
-        return self._blind_until.get((tube, event.epoch), -math.inf) < event.at - SETTLED_AFTER
+        """Whether a tube ran, had settled and had a gyroscope at the time of an event: it could have seen the same."""
+        times = self._blind.get((tube, event.epoch), ())
+        return not any(since <= event.at <= until + SETTLED_AFTER for since, until in times)

@@ -90,6 +90,7 @@ def test_combined_seeds_hold(first: int) -> None:
             30271,
             ("ground-disk-refuses", "encoder-slips"),
         ),  # a slip that found no room on the disk
+        (40291, ("not-finite", "encoder-slips")),  # the one that saw it stood beside one without a gyroscope
         (50000, ("encoder-slips", "frozen")),  # the one that saw it stood alone
         (50001, ("encoder-slips", "cut-while-saving")),  # the yaws of two neighbours parted at rest
     ],

@@ -36,16 +36,33 @@ def test_a_gyroscope_that_stands_alone_against_the_encoder_and_another_tube_is_w
         event(2, 99.0, "restored", 9),
         event(2, 103.0, "restored", 9),
         event(2, 60.0, "overrun", 9, missed=100),
+        event(2, 60.0, "bad_sample", 9),
+        event(2, 99.0, "gyro_stuck", 9),
     ],
     ids=str,
 )
 def test_a_tube_that_has_not_watched_is_no_witness_for_the_encoder_in_whatever_order_they_say_so(blind: Event) -> None:
     for events in permutations([blind, event(1, 100.0, "yaw_reset")]):
-        assert told([*BOTH_STARTED, *events]) == ["tubes 1 at 100 s"]
+        assert told([*BOTH_STARTED, *events, event(2, 140.0, "stopped", 12)]) == ["tubes 1 at 100 s"]
 
 
 def test_a_tube_that_has_settled_since_its_start_is_a_witness() -> None:
     assert told([*BOTH_STARTED, event(2, 89.0, "restored", 9), event(1, 100.0, "yaw_reset")]) == []
+
+
+@pytest.mark.parametrize(
+    "later",
+    [
+        [event(2, 150.0, "restored", 11)],
+        [event(2, 150.0, "bad_sample", 11)],
+        [event(2, 60.0, "bad_sample", 8), event(2, 70.0, "sensor_recovered", 9, after="bad_sample")],
+    ],
+    ids=["starts later", "is blind later", "saw again before"],
+)
+def test_a_tube_that_was_blind_at_another_time_is_a_witness(later: list[Event]) -> None:
+    against = event(1, 100.0, "yaw_reset")
+    for events in ([*later, against], [against, *later]):
+        assert told([*BOTH_STARTED, *events]) == []
 
 
 def test_a_scale_that_changed_is_the_gyroscopes_own_even_where_nobody_else_has_watched() -> None:
