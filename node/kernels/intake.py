@@ -14,7 +14,7 @@ from node.kernels.record import FX, SATURATED, TEMPERATURE, WX
 
 @kernel
 def take_readings(node: Any, settings: Any, parameters: Array, readings: Array) -> int:
-    """Leave in the node what one IMU would have read; 1 if a sample of it was at the range. See ``node_step``.
+    """Leave in the node what one IMU would have read; bits of what of it was at the range. See ``node_step``.
 
     A cluster looks at the range of each IMU by itself.
     """
@@ -26,7 +26,7 @@ def take_readings(node: Any, settings: Any, parameters: Array, readings: Array) 
     for i in range(3):
         rate[i], force[i] = readings[0, WX + i], readings[0, FX + i]
     correct_one(node, parameters, 0, node.temperature, rate, force)
-    return 1 if readings[0, SATURATED] != 0.0 else 0
+    return int(readings[0, SATURATED])
 
 
 @kernel

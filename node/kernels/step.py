@@ -16,6 +16,7 @@ from node.kernels.angles import from_binary, wrap
 from node.kernels.cluster import learn_offsets, survey_imus
 from node.kernels.coarse_level import level_coarsely
 from node.kernels.cycle import run_cycle
+from node.kernels.doubts import noise_var, unexplained_var
 from node.kernels.events import NONE, Code, tell
 from node.kernels.guard import admits, gate_aiding, guard_reading, judge_cycle
 from node.kernels.intake import take_readings
@@ -42,6 +43,7 @@ from node.kernels.record import (
 )
 from node.kernels.relay import offer_aiding
 from node.kernels.resets import doubt_stamp, set_stamp_prior, start_over
+from node.kernels.rest_watch import watch_rest
 from node.kernels.sensor_watch import largest
 from node.kernels.static_average import follow_recording
 from node.kernels.twist import gate_twist, holds_survey, reaching_var, twist_var
@@ -130,6 +132,7 @@ def before_loop(node: Any, settings: Any, moment: Array, saturated: int) -> int:
     state = node.filter
     start, end = moment[START], moment[END]
     guard_reading(node, settings, saturated, end)
+    watch_rest(node, settings, end)
     follow_clock(node, settings, moment)
     level_coarsely(state, node.config, node.rate, node.force)
     node.slow_cycles = node.slow_cycles + 1 if largest(node.rate) < LARGEST_OFFSET else 0
@@ -256,7 +259,7 @@ def aiding_around(offer_aiding: Callable[..., int], nodes: Array, settings: Arra
             node.filter,
             node.config,
             aiding[A_YAW],
-            aiding[A_YAW_VAR],
+            aiding[A_YAW_VAR] + noise_var(node),
             own_systematic(node),
             node.down_offset,
             aiding[A_VALID],
@@ -283,8 +286,8 @@ def take_aiding(nodes: Array, settings: Array, aiding: Array) -> int:
 
 @kernel
 def own_systematic(node: Any) -> float:
-    """Systematic variance (rad^2) of the aiding taken last, with this node's twist."""
-    return float(node.down_systematic + twist_var(node.twist))
+    """Systematic variance (rad^2) of the aiding taken last, with this node's twist and what it cannot explain."""
+    return float(node.down_systematic + twist_var(node.twist) + unexplained_var(node))
 
 
 @kernel

@@ -189,7 +189,8 @@ class Mpu6500:
         frames = np.array(list(struct.iter_unpack(">7h", data)), dtype=np.float64)
         force = frames[:, :3].mean(axis=0) * self._force_lsb
         rate = frames[:, 4:].mean(axis=0) * self._rate_lsb
-        saturated = bool(np.any((frames[:, 4:] >= 32767.0) | (frames[:, 4:] <= -32768.0)))
+        at_range = (frames >= 32767.0) | (frames <= -32768.0)
+        saturated = int(np.any(at_range[:, 4:])) | 2 * int(np.any(at_range[:, :3]))
         return ImuSample(
             (float(rate[0]), float(rate[1]), float(rate[2])),
             (float(force[0]), float(force[1]), float(force[2])),
