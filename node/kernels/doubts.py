@@ -6,7 +6,8 @@ between two samples. No filter averages it away, for it is not white: what the i
 or in common with the one before, is systematic variance of the yaw. The variance of an aiding has it up to a limit
 only: a gain that falls as innovations grow would let the yaw go. A *jump* is a reset after aidings that all
 contradicted the yaw: either the string slipped or the encoder did, and the node cannot know which. What it jumped by
-stays systematic until it jumps back.
+stays systematic until it jumps back. A sensor whose window is not the cycle's is dated by its driver, which is a little
+off for as long as its crystal is.
 """
 
 from __future__ import annotations
@@ -28,6 +29,7 @@ MOST: Final = 9.0  # variances, that one innovation counts for: outliers and fau
 SETTLED: Final = 3.0  # sigmas, within which two jumps cancel each other
 LARGEST_MISFIT: Final = (5.0 * DEG) ** 2  # rad^2
 LARGEST_NOISE: Final = (0.1 * DEG) ** 2  # rad^2, of it in the variance of an aiding
+WINDOW_STD: Final = 2.5e-4  # s, of the end of a window that a driver dates
 AIDING_DOUBTED = constant(Code.AIDING_DOUBTED)
 
 
@@ -46,8 +48,17 @@ def noise_var(node: Any) -> float:
 
 @kernel
 def unexplained_var(node: Any) -> float:
-    """Variance (rad^2) of the yaw that no filter averages away: of the misfit and of the jump."""
-    return float(misfit_var(node) + node.guard.jump * node.guard.jump)
+    """Variance (rad^2) of the yaw that no filter averages away: of the misfit, of the jump, of a late window."""
+    return float(misfit_var(node) + node.guard.jump * node.guard.jump + window_var(node))
+
+
+@kernel
+def window_var(node: Any) -> float:
+    """Variance (rad^2) of the yaw while the head turns, for a driver that dates the window of its readings."""
+    late = node.cluster.delayed[0].late
+    if late == 0.0 or not math.isfinite(late):
+        return 0.0
+    return float((node.guard.rate * WINDOW_STD) ** 2)
 
 
 @kernel

@@ -151,6 +151,15 @@ ALIGNER: Final = np.dtype(
     ],
     align=True,
 )
+DELAYED: Final = np.dtype(
+    [
+        ("late", "f8"),  # s, by which the window before ended before its cycle; NaN: there was none
+        ("rate", "f8", (3,)),  # rad/s, of that window
+        ("change", "f8", (3,)),  # rad/s, of it since the one before
+        ("missing", "f8", (3,)),  # rad, turn of its cycle that the sensor had yet to show
+    ],
+    align=True,
+)
 CLUSTER: Final = np.dtype(
     [
         ("used", "i8", (MAX_IMUS,)),  # in the fused reading, 1 or 0
@@ -158,6 +167,7 @@ CLUSTER: Final = np.dtype(
         ("well", "i8", (MAX_IMUS,)),  # cycles in a row, sane and among them
         ("faults", "i8", (MAX_IMUS,)),  # ``Fault`` of the newest cycle
         ("watches", READINGS, (MAX_IMUS,)),  # what the raw readings of each show by themselves
+        ("delayed", DELAYED, (MAX_IMUS,)),  # windows of each that are not the cycles'
         ("expected", "f8", (3,)),  # rad/s, before the IMUs were apart
         ("cycles", "i8"),  # cycles written so far
         ("ring_force", "f8", (MAX_IMUS, RING, 3)),  # m/s^2, corrected, tube's frame
@@ -257,8 +267,8 @@ KEPT: Final = ("filter", "mount", "guard", "twist", "joints")  # what a save hol
 KEPT_SIZE: Final = int(NODE.fields["cycles"][1]) if NODE.fields else 0  # bytes of it, from the first on
 
 # what one cycle brings, float64; of every IMU a row
-WX, WY, WZ, FX, FY, FZ, TEMPERATURE, SATURATED = range(8)
-READING: Final = 8
+WX, WY, WZ, FX, FY, FZ, TEMPERATURE, SATURATED, LATE = range(9)
+READING: Final = 9
 START, END, JOINED, HOPS, CLOCK_VAR, SYNCHRONISED = range(6)
 MOMENT: Final = 6
 # an aiding, float64; see ``node.kernels.step.node_aiding``
@@ -283,6 +293,7 @@ def forget_session(nodes: Array) -> None:
     guard = nodes["guard"]
     nodes["cluster"] = np.zeros(1, CLUSTER)
     nodes["cluster"]["used"] = 1
+    nodes["cluster"]["delayed"]["late"] = np.nan
     for sensor in ("rates", "forces"):
         nodes["cluster"]["watches"][sensor]["last"] = np.nan
         guard["readings"][sensor]["last"] = np.nan

@@ -82,7 +82,8 @@ def node_step(nodes: Array, settings: Array, parameters: Array, readings: Array,
     ----------
     nodes, settings : one-element arrays of dtype ``NODE`` and ``SETTINGS``
     parameters : of dtype ``PARAMETERS``: the block in use, then the own correction of each IMU
-    readings : (imus, 8) rates (rad/s), forces (m/s^2), temperature (C), whether a sample was at the range
+    readings : (imus, 9) rates (rad/s), forces (m/s^2), temperature (C), bits of what was at the range, and by how much
+        (s) the window that they are of ended before the cycle
     moment : (6,) start and end (s, own clock), joined, hops, variance of the clock (s^2), synchronised
     """
     return int(step_around(run_cycle, nodes, settings, parameters, readings, moment))
@@ -111,7 +112,7 @@ def enter(nodes: Array, settings: Array, parameters: Array, readings: Array, mom
     node, crew = nodes[0], settings[0]
     if not admits(node, moment[START], moment[END]):
         return REFUSED
-    saturated = take_readings(node, crew, parameters, readings)
+    saturated = take_readings(node, crew, parameters, readings, moment[END] - moment[START])
     return before_loop(node, crew, moment, saturated)
 
 

@@ -23,7 +23,7 @@ from node.kernels.address import firmware
 from node.kernels.angles import from_binary
 from node.kernels.calibration import PARAMETERS, USUAL
 from node.kernels.layout import PERIOD, Err, Scheme, default_config
-from node.kernels.record import A_VALID, END, READING, SATURATED, TEMPERATURE, new_node
+from node.kernels.record import A_VALID, END, LATE, READING, SATURATED, TEMPERATURE, new_node
 from node.kernels.step import ADMITTED
 from sim.errors import ScenarioError
 from sim.rig.encoder_course import is_plain, measured_of
@@ -255,6 +255,7 @@ class DirectString:
                 found = world.rough_cycles(tube)
                 readings[:, tube - 1, 0, TEMPERATURE] = found.temperature
                 readings[:, tube - 1, 0, SATURATED] = found.clipped
+                readings[:, tube - 1, 0, LATE] = found.late
         return readings
 
     def _arrivals(self, measured_at: Array) -> Array:
