@@ -183,8 +183,10 @@ static int64_t take_pending(State *state, const Config *config, int64_t cycle, d
         if (held >= state->epoch) {
             advance(state, config, cycle, held);
             yaw -= spin(state, cycle, held, at) * (at - held);
-            var += interpolation_var(state, cycle, at);
-            status |= aid(state, config, yaw, var, spin(state, cycle, held, held), at);
+            double spread = interpolation_var(state, cycle, at);
+            status |= aid(state, config, yaw, var + spread, spin(state, cycle, held, held), at);
+            if (spread > COARSE * var)
+                state->last_sequence = -1;
         } else {
             status |= aid_late(state, config, yaw, var, at);
         }

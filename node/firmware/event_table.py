@@ -220,6 +220,18 @@ EVENT_TABLE: Final[dict[Code, Told]] = {
         (("imu", int), ("reason", exclusion)),
     ),
     Code.IMU_BACK: Told("imu_back", Severity.WARNING, "an IMU left out is used again", (("imu", int),)),
+    Code.BIAS_MOVED: Told(
+        "bias_moved",
+        Severity.WARNING,
+        "at rest the gyroscope's bias was another one than the one in use, and is learnt again",
+        (("moved_dps", float),),
+    ),
+    Code.AIDING_DOUBTED: Told(
+        "aiding_doubted",
+        Severity.WARNING,
+        "gyroscope and aiding differ by more than their noise, again and again; the yaw's variance says so",
+        (("times", float), ("sigma_deg", float)),
+    ),
 }
 
 

@@ -17,9 +17,8 @@ class ImuReading:
     rate: tuple[float, float, float]  # rad/s
     force: tuple[float, float, float]  # m/s^2
     temperature: float = USUAL  # C
-    saturated: int = (
-        0  # bits of what was at its range within the cycle, as the driver saw it: 1 gyroscope, 2 accelerometer
-    )
+    saturated: int = 0  # bits of what was at its range within the cycle, as the driver saw it: 1 gyroscope, 2 force
+    late: float = 0.0  # s, by which the window that was measured ended before the cycle
     others: tuple[ImuReading, ...] = ()  # of the further IMUs of a cluster, in the same cycle
 
 

@@ -135,7 +135,7 @@ class Tube:
         moment = (reading.start, reading.end, context.joined, context.hops, context.clock_var, context.synchronised)
         self._moment[:] = moment
         rows = self._readings
-        rows[0] = (*reading.rate, *reading.force, reading.temperature, reading.saturated)
+        rows[0] = _row_of(reading)
         for k in range(1, len(rows)):
             rows[k] = _row_of(reading.others[k - 1]) if k <= len(reading.others) else math.nan
         says = self._loop.step(self.nodes, self._crew, self._corrections, rows, self._moment)
@@ -272,4 +272,4 @@ class Tube:
 
 
 def _row_of(reading: ImuReading) -> tuple[float, ...]:
-    return (*reading.rate, *reading.force, reading.temperature, reading.saturated)
+    return (*reading.rate, *reading.force, reading.temperature, reading.saturated, reading.late)

@@ -3,12 +3,15 @@
 ========== ======================================================================= =================
 fault      evidence                                                                flagged after
 ========== ======================================================================= =================
-step       innovations beyond the gate that grow, while the readings look sane     3 aidings in a row
-scale      the same, in proportion to the rate                                     3 aidings in a row
+step       innovations beyond the gate that grow alike, while readings look sane   3 aidings in a row
+small step the same, by less than 0.15 deg/s                                       5 aidings in a row
+scale      innovations beyond the gate that grow in proportion to the rate         3 aidings in a row
 ========== ======================================================================= =================
 
-A wrong aiding makes one large innovation that then stays; a wrong gyroscope makes it grow with every cycle. That is
-how the two are distinguished. A string that unwinds below a standing drive head looks like a step.
+A wrong aiding makes one large innovation that then stays; a wrong gyroscope makes it grow with every cycle, and alike.
+That is how the two are distinguished: what a ripple of the drive, a disc off its centre or a sensor that leans leaves
+between two aidings comes and goes, and is a misfit (``node.kernels.doubts``). A small step is looked at for longer, for
+a part of a swing looks like one. A string that unwinds below a standing drive head looks like a step.
 """
 
 from __future__ import annotations
@@ -18,11 +21,13 @@ from typing import Any, Final
 
 from node.kernels.events import Fault
 from node.kernels.jit import constant, kernel
-from node.kernels.record import DISAGREEMENTS
+from node.kernels.record import DISAGREEMENTS, MOST_DISAGREEMENTS
 
 GROWTH: Final = 1.5  # sigmas from one aiding to the next, in one direction
 SMALLEST_STEP: Final = math.radians(0.03)  # rad/s
-STEADY: Final = 0.3  # of a mismatch, what two in a row may differ by to be one step
+SMALL_STEP: Final = math.radians(0.15)  # rad/s, up to which a step is looked at for longer
+STEADY: Final = 0.3  # of the mean mismatch, by which those of one step may differ from it
+GROSS: Final = math.radians(5.0)  # rad/s, from where a mismatch is a fault however it changes
 SLOWEST_SCALE: Final = math.radians(5.0)  # rad/s, from where a mismatch may be one of scale
 GYRO_STEP, GYRO_SCALE = constant(Fault.GYRO_STEP), constant(Fault.GYRO_SCALE)
 
@@ -46,7 +51,7 @@ def find_mismatch(
     watch, found : records of dtype ``AIDINGS`` and ``MISMATCH``; no fault in ``found``: they show nothing
     rejected, reset : 1 when the filter rejected the aiding, and when it took its yaw from it
     """
-    found.fault = 0
+    found.fault = found.refuted = 0
     grown = innovation - watch.left
     if grown > math.pi:
         grown -= 2.0 * math.pi
@@ -60,22 +65,55 @@ def find_mismatch(
         return
     mismatch = grown / elapsed if elapsed > 0.0 else 0.0
     if abs(grown) <= GROWTH * sigma or abs(mismatch) < SMALLEST_STEP:
-        watch.seen = 0
+        watch.seen, found.refuted = 0, 1
         return
     if watch.seen > 0 and watch.mismatch[watch.seen - 1] * mismatch < 0.0:
-        watch.seen = 0
+        watch.seen, found.refuted = 0, 1
     watch.mismatch[watch.seen] = mismatch
     watch.spin[watch.seen] = spin + mismatch
     watch.seen += 1
     if watch.seen < DISAGREEMENTS:
         return
-    before = watch.mismatch[watch.seen - 2]
-    steady = abs(mismatch - before) <= STEADY * abs(mismatch)
-    found.fault = GYRO_SCALE if is_proportional(watch) else GYRO_STEP
-    found.rate = 0.5 * (mismatch + before) if steady else mismatch
+    mean = recent_mismatch(watch)
+    steady, proportional = is_steady(watch, mean), is_proportional(watch)
+    gross = abs(mismatch) >= GROSS
+    wanted = MOST_DISAGREEMENTS if abs(mean) < SMALL_STEP else DISAGREEMENTS
+    if not (proportional or gross or (steady and watch.seen >= wanted)):
+        found.refuted = 0 if steady else 1
+        if watch.seen == MOST_DISAGREEMENTS or not steady:
+            drop_oldest(watch)
+        return
+    found.fault = GYRO_SCALE if proportional else GYRO_STEP
+    found.rate = mean if steady else mismatch
     found.spin = spin + mismatch
     found.steady = 1 if steady else 0
     watch.seen = 0
+
+
+@kernel
+def drop_oldest(watch: Any) -> None:
+    """Wait for one mismatch more."""
+    for i in range(watch.seen - 1):
+        watch.mismatch[i], watch.spin[i] = watch.mismatch[i + 1], watch.spin[i + 1]
+    watch.seen -= 1
+
+
+@kernel
+def recent_mismatch(watch: Any) -> float:
+    """Mean of the mismatches seen (rad/s) but the oldest, within which a step may have come."""
+    total = 0.0
+    for i in range(1, watch.seen):
+        total += watch.mismatch[i]
+    return float(total / (watch.seen - 1))
+
+
+@kernel
+def is_steady(watch: Any, mean: float) -> bool:
+    """Whether every mismatch seen but the oldest is near their ``mean`` (rad/s)."""
+    apart = 0.0
+    for i in range(1, watch.seen):
+        apart = max(apart, abs(watch.mismatch[i] - mean))
+    return bool(apart <= STEADY * abs(mean))
 
 
 @kernel

@@ -31,7 +31,7 @@ INFINITE: Final = np.inf
 def watch_imus(cluster: Any, settings: Any, readings: Array) -> None:
     """Find the fault of each IMU in this cycle, 0 for none; ``readings`` as ``node.kernels.step.node_step``."""
     for k in range(settings.imus):
-        saturated = 1 if readings[k, SATURATED] != 0.0 else 0
+        saturated = int(readings[k, SATURATED])
         rate, force = readings[k, WX : WX + 3], readings[k, FX : FX + 3]
         gyro, accelerometer = find_faults(cluster.watches[k], settings, rate, force, saturated)
         cluster.faults[k] = gyro if gyro != 0 else accelerometer

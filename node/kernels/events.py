@@ -62,6 +62,8 @@ class Code(enum.IntEnum):
     ALIGNMENT_DROPPED = 32
     IMU_EXCLUDED = 33
     IMU_BACK = 34
+    BIAS_MOVED = 35
+    AIDING_DOUBTED = 36
 
 
 @kernel

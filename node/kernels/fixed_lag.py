@@ -7,7 +7,7 @@ copy of itself to the present. Staying behind also tells from the next cycle whe
 
 from __future__ import annotations
 
-from typing import Any
+from typing import Any, Final
 
 from node.kernels.angles import advance_binary, from_binary, to_binary, wrap
 from node.kernels.error_model import isolate, propagate
@@ -21,6 +21,7 @@ PSI, BZ, D = constant(Err.YAW), constant(Err.BIAS_Z), constant(Err.STAMP)
 AIDED, REJECTED, YAW_RESET = int(Status.AIDED), int(Status.REJECTED), int(Status.YAW_RESET)
 LATE_DROPPED = int(Status.LATE_DROPPED)
 BX = constant(Err.BIAS_X)
+COARSE: Final = 25  # times its own variance, from where an aiding is worth less for its time than for itself
 
 
 @kernel
@@ -175,8 +176,10 @@ def take_pending(state: Any, config: Any, cycle: int, until: float) -> int:
         if held >= state.epoch:
             advance(state, config, cycle, held)
             yaw -= spin(state, cycle, held, at) * (at - held)
-            var += interpolation_var(state, cycle, at)
-            status |= aid(state, config, yaw, var, spin(state, cycle, held, held), at)
+            spread, own = interpolation_var(state, cycle, at), var
+            status |= aid(state, config, yaw, var + spread, spin(state, cycle, held, held), at)
+            if spread > COARSE * own:
+                state.last_sequence = -1  # a repetition at rest is better timed
         else:
             status |= aid_late(state, config, yaw, var, at)
         drop_first_pending(state)

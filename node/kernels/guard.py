@@ -13,6 +13,7 @@ from typing import Any, Final
 
 from node.kernels.aiding_watch import STEADY, find_mismatch, forget
 from node.kernels.angles import from_binary, wrap
+from node.kernels.doubts import explain_jump, follow_jump, follow_misfit, misfit_var
 from node.kernels.events import NONE, Code, Fault, tell
 from node.kernels.jit import constant, kernel
 from node.kernels.layout import CLOCK_SLACK, DEG, PERIOD, RING, Array, Err, Status
@@ -36,6 +37,7 @@ NARROW_STD: Final = 1.0 * DEG  # of an innovation that can show agreement
 LEARNT_STD: Final = 0.05 * DEG  # rad/s, error of a bias that was read from a mismatch
 LARGEST_STEP: Final = 10.0 * DEG  # rad/s, that a bias may take; a gyroscope farther off is not listened to
 CREDIBLE: Final = 0.5 * LARGEST_STEP  # rad/s, from the encoder's rate, of a gyroscope that may be listened to again
+LARGEST_DRIFT: Final = 1.0 * DEG  # rad/s, of a bias since the last rest; more is a fault, or a motion
 LARGEST_SCALE: Final = 0.1  # 1, that is looked for
 RATE_AGE: Final = 3.0  # s, of an encoder's rate that may stand for the gyroscope
 BACKWARD: Final = PERIOD  # s, that a cycle may begin before the end of the last; beyond it is a jump of the clock
@@ -157,16 +159,56 @@ def judge_cycle(node: Any, status: int, at: float) -> None:
         return
     rejected = 1 if status & REJECTED else 0
     reset = 1 if status & YAW_RESET else 0
-    if rejected == 0 and (status & AIDED == 0 or reset == 1):
+    if is_settling(node) or is_handled(node):
+        forget(guard.aidings)
         return
-    sigma = math.sqrt(max(state.innovation_var, 0.0))
+    if rejected == 0 and (status & AIDED == 0 or reset == 1):
+        guard.jump = guard.jump if reset == 0 else 0.0  # a yaw that was unknown has nothing to be contradicted
+        return
+    sigma = math.sqrt(max(state.innovation_var, 0.0) + misfit_var(node))
     find_mismatch(guard.aidings, guard.found, state.innovation, sigma, state.now_rate, at, rejected, reset)
+    if guard.gyro.fault == 0:
+        follow_doubts(node, rejected, reset)
     if guard.found.fault != 0:
         learn_mismatch(node)
     elif guard.gyro.proving == 1:
         guard.agreed = 0 if rejected == 1 else guard.agreed + (1 if sigma < NARROW_STD else 0)
         if guard.agreed >= AGREEING:
             recover_gyro(node)
+
+
+@kernel
+def follow_doubts(node: Any, rejected: int, reset: int) -> None:
+    """What an aiding shows that was used, or rejected but not for a step, is a misfit; a reset is a jump."""
+    guard = node.guard
+    if rejected == 0:
+        guard.last_jump = 0.0
+    if rejected == 0 or guard.found.refuted == 1:
+        follow_misfit(node)
+    if reset == 1:
+        follow_jump(node)
+
+
+@kernel
+def is_settling(node: Any) -> bool:
+    """Whether the head rests and the node by its bias has not yet, by little: the rest will show which is wrong.
+
+    A node that stood still in this rest and does not any more is another matter: its gyroscope took a step.
+    """
+    guard, state = node.guard, node.filter
+    if guard.rest_cycles == 0 or state.still_cycles > 0 or abs(state.now_rate) > LARGEST_DRIFT:
+        return False
+    return not state.stopped_at > state.now - (guard.rest_cycles + 1) * PERIOD
+
+
+@kernel
+def is_handled(node: Any) -> bool:
+    """Whether the tube is tilted while the head rests: it hangs on no string, and the encoder tells nothing of it."""
+    guard, state = node.guard, node.filter
+    across = 0.0
+    for k in range(2):
+        across = max(across, abs(node.rate[k] - state.static_bias[k] - state.bias[k]))
+    return bool(guard.rest_cycles > 0 and across > LARGEST_DRIFT)
 
 
 @kernel
@@ -237,6 +279,7 @@ def learn_mismatch(node: Any) -> None:
     state, config, guard = node.filter, node.config, node.guard
     trust, found = guard.gyro, guard.found
     reconsider(node)
+    explain_jump(node)
     prior = max(config.bias_std[2] ** 2 + state.static_bias_var[2], LEARNT_STD**2)
     scale_var = state.P[S, S]
     learnable = found.steady == 1 and abs(found.rate) <= LARGEST_STEP

@@ -7,41 +7,53 @@ from typing import Any
 from node.kernels.alignment import to_tube
 from node.kernels.calibration import calibrate
 from node.kernels.cluster import fuse_imus
+from node.kernels.delay import make_up_delay
 from node.kernels.jit import kernel
 from node.kernels.layout import Array
-from node.kernels.record import FX, SATURATED, TEMPERATURE, WX
+from node.kernels.record import FX, LATE, SATURATED, TEMPERATURE, WX
+from node.kernels.resets import open_yaw
 
 
 @kernel
-def take_readings(node: Any, settings: Any, parameters: Array, readings: Array) -> int:
-    """Leave in the node what one IMU would have read; 1 if a sample of it was at the range. See ``node_step``.
+def take_readings(node: Any, settings: Any, parameters: Array, readings: Array, length: float) -> int:
+    """Leave in the node what one IMU would have read; bits of what of it was at the range. See ``node_step``.
 
-    A cluster looks at the range of each IMU by itself.
+    A cluster looks at the range of each IMU by itself. The cycle took ``length`` (s).
     """
     if settings.imus > 1:
-        take_cluster(node, settings, parameters, readings)
+        take_cluster(node, settings, parameters, readings, length)
         return 0
     correct_reading(node, parameters, readings, 0)
     rate, force = node.rate[:], node.force[:]  # arrays, as those of a cluster: the kernels below are compiled once
     for i in range(3):
         rate[i], force[i] = readings[0, WX + i], readings[0, FX + i]
     correct_one(node, parameters, 0, node.temperature, rate, force)
-    return 1 if readings[0, SATURATED] != 0.0 else 0
+    doubt_turn(node, make_up_delay(node.cluster.delayed[0], readings[0, LATE], rate, length))
+    return int(readings[0, SATURATED])
 
 
 @kernel
-def take_cluster(node: Any, settings: Any, parameters: Array, readings: Array) -> None:
+def take_cluster(node: Any, settings: Any, parameters: Array, readings: Array, length: float) -> None:
     """Correct the readings of several IMUs, each by itself, and fuse them."""
-    cluster, offsets = node.cluster, node.mount.rate_offset
+    cluster, offsets, doubt = node.cluster, node.mount.rate_offset, 0.0
     for k in range(settings.imus):
         correct_reading(node, parameters, readings, k)
         rate, force = cluster.rates[k], cluster.readings[k, 3:]
         for i in range(3):
             rate[i], force[i] = readings[k, WX + i], readings[k, FX + i]
         correct_one(node, parameters, k, node.temperature, rate, force)
+        doubt = max(doubt, make_up_delay(node.cluster.delayed[k], readings[k, LATE], rate, length))
         for i in range(3):
             cluster.readings[k, i] = rate[i] - offsets[k, i]
+    doubt_turn(node, doubt)
     fuse_imus(node, settings, readings)
+
+
+@kernel
+def doubt_turn(node: Any, var: float) -> None:
+    """What the windows of the sensors leave open of the yaw (rad^2)."""
+    if var > 0.0:
+        open_yaw(node.filter, var)
 
 
 @kernel

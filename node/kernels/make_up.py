@@ -37,6 +37,7 @@ def follow_joints(node: Any, settings: Any, aiding: Array) -> None:
     drive; the twist in the aiding is ``node.down_torsion`` (rad^2).
     """
     if settings.joints == MARKS:
+        check_marks(node, settings, aiding)
         return
     joints, hops, marks = node.joints, int(aiding[A_HOPS]), node.down_offset
     if joints.hops < 0:
@@ -46,6 +47,28 @@ def follow_joints(node: Any, settings: Any, aiding: Array) -> None:
     joints.hops, joints.marks = hops, marks
     if joints.solved == 1:
         node.down_offset, node.down_systematic = joints.offset, joints.var
+
+
+@kernel
+def check_marks(node: Any, settings: Any, aiding: Array) -> None:
+    """The marks of a new joint stand, and what the saved yaw contradicts them by is part of their variance."""
+    joints, hops, marks = node.joints, int(aiding[A_HOPS]), node.down_offset
+    if joints.hops >= 0 and (hops != joints.hops or abs(wrap(marks - joints.marks)) > SAME):
+        state, known = node.filter, node.joints.var
+        joints.var = 0.0
+        sure = state.yaw_known == 1 and state.now_P[PSI, PSI] <= LARGEST_STD**2 and state.still_cycles > 0
+        if sure and aiding[A_RATE] == 0.0 and aiding[A_HELD] == 0.0:
+            solved = wrap(from_binary(state.now_yaw) - aiding[A_YAW])
+            own = max(state.systematic_var - twist_var(node.twist) - known, 0.0) + settings.unseen_var
+            off = wrap(solved - marks)
+            var = own + node.down_systematic + state.now_P[PSI, PSI] + aiding[A_YAW_VAR]
+            if off * off > CONTRADICTION * CONTRADICTION * var:
+                joints.var = off * off
+                angle, sigma = solved / DEG, math.sqrt(var) / DEG
+                turned = 1.0 if state.stopped_at > state.last_aided else 0.0
+                tell(node, JOINT_CONTRADICTS_MARKS, angle, sigma, marks / DEG, turned)
+    joints.hops, joints.marks = hops, marks
+    node.down_systematic += joints.var
 
 
 @kernel

@@ -14,10 +14,11 @@ from node.kernels.alignment import MAX_IMUS, MOUNT, OFFSET, SWEEP, new_mount
 from node.kernels.layout import CONFIG, RING, STATE, Array, new_state
 from node.kernels.static_average import STATIC
 
-NODE_LAYOUT: Final = 4  # of the saved record; 1 and 2 held the filter alone, 3 what a start clears as well
+NODE_LAYOUT: Final = 5  # of the saved record; 1 and 2 held the filter alone, 3 what a start clears as well, 4 no doubts
 EVENTS_KEPT: Final = 32  # that wait to be said
 NUMBERS: Final = 10  # of one event
 DISAGREEMENTS: Final = 3  # aidings in a row, until a mismatch is a fault
+MOST_DISAGREEMENTS: Final = 5  # likewise, until a small one is
 
 TRUST: Final = np.dtype(
     [
@@ -48,8 +49,8 @@ AIDINGS: Final = np.dtype(
         ("left", "f8"),  # rad, part of the last innovation that was not corrected
         ("at", "f8"),  # s, own clock, of it; NaN: none yet
         ("seen", "i8"),  # mismatches in a row
-        ("mismatch", "f8", (DISAGREEMENTS + 1,)),  # rad/s, true minus measured, of the last aidings
-        ("spin", "f8", (DISAGREEMENTS + 1,)),  # rad/s, true, at the same time
+        ("mismatch", "f8", (MOST_DISAGREEMENTS,)),  # rad/s, true minus measured, of the last aidings
+        ("spin", "f8", (MOST_DISAGREEMENTS,)),  # rad/s, true, at the same time
     ],
     align=True,
 )
@@ -58,7 +59,8 @@ MISMATCH: Final = np.dtype(
         ("fault", "i8"),  # ``Fault``; 0: there is none
         ("rate", "f8"),  # rad/s, true minus measured
         ("spin", "f8"),  # rad/s, true
-        ("steady", "i8"),  # 1: the last two aidings show the same
+        ("steady", "i8"),  # 1: the aidings show the same
+        ("refuted", "i8"),  # 1: the aiding was rejected, and not for a step of the gyroscope
     ],
     align=True,
 )
@@ -79,6 +81,15 @@ GUARD: Final = np.dtype(
         ("first_step", "f8"),  # rad/s, size of that step
         ("jumped", "i8"),  # 1: the clock jumped in the cycle before
         ("untimely", "i8"),  # 1: the aiding before was untimely
+        ("rest_cycles", "i8"),  # cycles in a row in which the encoder reports a head at rest
+        ("doubted", "i8"),  # 1: innovations are larger than their variance explains
+        ("misfit", "f8"),  # mean of their squares over their variances
+        ("excess", "f8"),  # rad^2, mean of their squares beyond their variances
+        ("before", "f8"),  # rad, the innovation before
+        ("likeness", "f8"),  # mean of the products of neighbours over their variances
+        ("shared", "f8"),  # rad^2, mean of the products of neighbours
+        ("jump", "f8"),  # rad, by which resets that nothing explains have moved the yaw
+        ("last_jump", "f8"),  # rad, of it by the reset since the last aiding that agreed
     ],
     align=True,
 )
@@ -140,6 +151,15 @@ ALIGNER: Final = np.dtype(
     ],
     align=True,
 )
+DELAYED: Final = np.dtype(
+    [
+        ("late", "f8"),  # s, by which the window before ended before its cycle; NaN: there was none
+        ("rate", "f8", (3,)),  # rad/s, of that window
+        ("change", "f8", (3,)),  # rad/s, of it since the one before
+        ("missing", "f8", (3,)),  # rad, turn of its cycle that the sensor had yet to show
+    ],
+    align=True,
+)
 CLUSTER: Final = np.dtype(
     [
         ("used", "i8", (MAX_IMUS,)),  # in the fused reading, 1 or 0
@@ -147,6 +167,7 @@ CLUSTER: Final = np.dtype(
         ("well", "i8", (MAX_IMUS,)),  # cycles in a row, sane and among them
         ("faults", "i8", (MAX_IMUS,)),  # ``Fault`` of the newest cycle
         ("watches", READINGS, (MAX_IMUS,)),  # what the raw readings of each show by themselves
+        ("delayed", DELAYED, (MAX_IMUS,)),  # windows of each that are not the cycles'
         ("expected", "f8", (3,)),  # rad/s, before the IMUs were apart
         ("cycles", "i8"),  # cycles written so far
         ("ring_force", "f8", (MAX_IMUS, RING, 3)),  # m/s^2, corrected, tube's frame
@@ -246,8 +267,8 @@ KEPT: Final = ("filter", "mount", "guard", "twist", "joints")  # what a save hol
 KEPT_SIZE: Final = int(NODE.fields["cycles"][1]) if NODE.fields else 0  # bytes of it, from the first on
 
 # what one cycle brings, float64; of every IMU a row
-WX, WY, WZ, FX, FY, FZ, TEMPERATURE, SATURATED = range(8)
-READING: Final = 8
+WX, WY, WZ, FX, FY, FZ, TEMPERATURE, SATURATED, LATE = range(9)
+READING: Final = 9
 START, END, JOINED, HOPS, CLOCK_VAR, SYNCHRONISED = range(6)
 MOMENT: Final = 6
 # an aiding, float64; see ``node.kernels.step.node_aiding``
@@ -272,6 +293,7 @@ def forget_session(nodes: Array) -> None:
     guard = nodes["guard"]
     nodes["cluster"] = np.zeros(1, CLUSTER)
     nodes["cluster"]["used"] = 1
+    nodes["cluster"]["delayed"]["late"] = np.nan
     for sensor in ("rates", "forces"):
         nodes["cluster"]["watches"][sensor]["last"] = np.nan
         guard["readings"][sensor]["last"] = np.nan
@@ -282,7 +304,7 @@ def forget_session(nodes: Array) -> None:
     guard["aidings"]["seen"] = 0
     guard["rate"] = guard["sane_rate"] = guard["aiding_var"] = 0.0
     guard["rate_at"] = -np.inf
-    guard["jumped"] = guard["untimely"] = guard["agreed"] = 0
+    guard["jumped"] = guard["untimely"] = guard["agreed"] = guard["rest_cycles"] = 0
     nodes["twist"]["heard_at"] = -np.inf
     nodes["twist"]["torque"] = 0.0
     nodes["twist"]["holding"] = 0

@@ -98,6 +98,15 @@ def doubt_bias(state: Any, k: int, var: float) -> None:
 
 
 @kernel
+def move_bias(state: Any, k: int, rate: float, var: float, wander_var: float) -> None:
+    """The constant bias ``k`` is another one (rad/s, its variance and that of what it may wander, (rad/s)^2)."""
+    state.static_bias[k] = rate
+    state.static_bias_var[k] = var
+    state.bias[k] = 0.0
+    isolate(state.P, BX + k, var + wander_var)
+
+
+@kernel
 def forget_bias(state: Any, config: Any) -> None:
     """Learn the static bias again, as after a first start: what was learnt was that of other parameters."""
     for k in range(3):

@@ -50,7 +50,7 @@ def find_faults(watch: Any, settings: Any, rate: Array, force: Array, saturated:
     ----------
     watch : record of dtype ``READINGS``
     settings : record of dtype ``SETTINGS``
-    saturated : 1 when a sample within the cycle was at the gyroscope's range, as the driver saw it
+    saturated : bits of what was at its range within the cycle, as the driver saw it: 1 gyroscope, 2 accelerometer
     """
     for k in range(3):
         if not (math.isfinite(rate[k]) and math.isfinite(force[k])):
@@ -58,10 +58,10 @@ def find_faults(watch: Any, settings: Any, rate: Array, force: Array, saturated:
     together, alone = settings.repeats_together, settings.repeats_alone
     still_rate = is_stuck(watch.rates, rate, together, alone)
     still_force = is_stuck(watch.forces, force, together, alone)
-    clipped = largest(force) >= NEAR_RANGE * settings.force_range
+    clipped = saturated & 2 != 0 or largest(force) >= NEAR_RANGE * settings.force_range
     watch.clipped = watch.clipped + 1 if clipped else 0
     gyro = accelerometer = 0
-    if saturated != 0 or largest(rate) >= NEAR_RANGE * settings.rate_range:
+    if saturated & 1 != 0 or largest(rate) >= NEAR_RANGE * settings.rate_range:
         gyro = GYRO_SATURATED
     elif still_rate:
         gyro = GYRO_STUCK

@@ -16,6 +16,7 @@ from node.kernels.angles import from_binary, wrap
 from node.kernels.cluster import learn_offsets, survey_imus
 from node.kernels.coarse_level import level_coarsely
 from node.kernels.cycle import run_cycle
+from node.kernels.doubts import noise_var, unexplained_var
 from node.kernels.events import NONE, Code, tell
 from node.kernels.guard import admits, gate_aiding, guard_reading, judge_cycle
 from node.kernels.intake import take_readings
@@ -42,6 +43,7 @@ from node.kernels.record import (
 )
 from node.kernels.relay import offer_aiding
 from node.kernels.resets import doubt_stamp, set_stamp_prior, start_over
+from node.kernels.rest_watch import watch_rest
 from node.kernels.sensor_watch import largest
 from node.kernels.static_average import follow_recording
 from node.kernels.twist import gate_twist, holds_survey, reaching_var, twist_var
@@ -80,7 +82,8 @@ def node_step(nodes: Array, settings: Array, parameters: Array, readings: Array,
     ----------
     nodes, settings : one-element arrays of dtype ``NODE`` and ``SETTINGS``
     parameters : of dtype ``PARAMETERS``: the block in use, then the own correction of each IMU
-    readings : (imus, 8) rates (rad/s), forces (m/s^2), temperature (C), whether a sample was at the range
+    readings : (imus, 9) rates (rad/s), forces (m/s^2), temperature (C), bits of what was at the range, and by how much
+        (s) the window that they are of ended before the cycle
     moment : (6,) start and end (s, own clock), joined, hops, variance of the clock (s^2), synchronised
     """
     return int(step_around(run_cycle, nodes, settings, parameters, readings, moment))
@@ -109,7 +112,7 @@ def enter(nodes: Array, settings: Array, parameters: Array, readings: Array, mom
     node, crew = nodes[0], settings[0]
     if not admits(node, moment[START], moment[END]):
         return REFUSED
-    saturated = take_readings(node, crew, parameters, readings)
+    saturated = take_readings(node, crew, parameters, readings, moment[END] - moment[START])
     return before_loop(node, crew, moment, saturated)
 
 
@@ -130,6 +133,7 @@ def before_loop(node: Any, settings: Any, moment: Array, saturated: int) -> int:
     state = node.filter
     start, end = moment[START], moment[END]
     guard_reading(node, settings, saturated, end)
+    watch_rest(node, settings, end)
     follow_clock(node, settings, moment)
     level_coarsely(state, node.config, node.rate, node.force)
     node.slow_cycles = node.slow_cycles + 1 if largest(node.rate) < LARGEST_OFFSET else 0
@@ -256,7 +260,7 @@ def aiding_around(offer_aiding: Callable[..., int], nodes: Array, settings: Arra
             node.filter,
             node.config,
             aiding[A_YAW],
-            aiding[A_YAW_VAR],
+            aiding[A_YAW_VAR] + noise_var(node),
             own_systematic(node),
             node.down_offset,
             aiding[A_VALID],
@@ -283,8 +287,8 @@ def take_aiding(nodes: Array, settings: Array, aiding: Array) -> int:
 
 @kernel
 def own_systematic(node: Any) -> float:
-    """Systematic variance (rad^2) of the aiding taken last, with this node's twist."""
-    return float(node.down_systematic + twist_var(node.twist))
+    """Systematic variance (rad^2) of the aiding taken last, with this node's twist and what it cannot explain."""
+    return float(node.down_systematic + twist_var(node.twist) + unexplained_var(node))
 
 
 @kernel

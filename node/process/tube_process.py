@@ -181,7 +181,9 @@ class TubeProcess(Process):
         reading = reading_of(data, now)
         if self._imus:
             start, samples = reading.start, [imu.read(reading.start, now) for imu in self._imus]
-            first, *others = [ImuReading(start, now, s.rate, s.force, s.temperature, s.saturated) for s in samples]
+            first, *others = [
+                ImuReading(start, now, s.rate, s.force, s.temperature, s.saturated, s.late) for s in samples
+            ]
             reading = replace(first, others=tuple(others))
         self._lap(Stage.READ)
         context = self._context(now)
@@ -375,13 +377,13 @@ def reading_of(data: Any, now: float) -> ImuReading:
 def imu_reading(items: Any, start: float, end: float) -> ImuReading:
     """Reading of one IMU from ``start`` to ``end`` (s, own clock): three rates, three forces.
 
-    Perhaps a temperature follows, and bits of what was at its range within the cycle.
+    Perhaps a temperature follows, bits of what was at its range within the cycle, and by how much its window was late.
     """
     try:
         numbers = [float(item) for item in items]
     except (TypeError, ValueError, OverflowError):
         numbers = []
-    if not 6 <= len(numbers) <= 8:
+    if not 6 <= len(numbers) <= 9:
         return ImuReading(start, end, NOTHING, NOTHING)
     wx, wy, wz, fx, fy, fz, *rest = numbers
     clipped = int(rest[1]) if len(rest) > 1 and math.isfinite(rest[1]) else 0

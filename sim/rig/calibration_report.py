@@ -17,12 +17,12 @@ from sim.world.world import World
 def calibration(view: dict[str, Any], measurements: Sequence[dict[str, Any]], world: World) -> dict[str, Any]:
     """Part ``calibration`` of a rig's result; ``view`` is the ground station's ``recalibration``.
 
-    ``after`` is the inclination error of every survey of the drilling; ``before`` that of the same surveys, each mean
+    ``after`` is the inclination error of every survey below the collar; ``before`` that of the same surveys, each mean
     force led back to the reading, G = M f + b, and corrected by the block that the tube had before.
     """
     tubes = {row["tube"]: row for row in view["tubes"]}
     before, after = [], []
-    for m in measurements:
+    for m in (m for m in measurements if m["md_m"] > 0.0):
         truth = world.truth_station(m["md_m"])["inclination_deg"]
         after.append(m["inclination_deg"] - truth)
         before.append(_inclination_before(tubes.get(m["tube"]), m) - truth)

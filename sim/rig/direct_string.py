@@ -23,14 +23,13 @@ from node.kernels.address import firmware
 from node.kernels.angles import from_binary
 from node.kernels.calibration import PARAMETERS, USUAL
 from node.kernels.layout import PERIOD, Err, Scheme, default_config
-from node.kernels.record import A_VALID, END, READING, SATURATED, TEMPERATURE, new_node
+from node.kernels.record import A_VALID, END, LATE, READING, SATURATED, TEMPERATURE, new_node
 from node.kernels.step import ADMITTED
 from sim.errors import ScenarioError
 from sim.rig.encoder_course import is_plain, measured_of
 from sim.rig.plain_encoder import PlainEncoder
 from sim.rig.string_course import Kept, StringCourse, hand_down, new_desk, run_string
 from sim.world.imu_errors import gauss_markov
-from sim.world.rough_imu import GYRO_CLIPPED
 from sim.world.scenario import AidingSection
 from sim.world.streams import Stream, stream
 from sim.world.world import World
@@ -255,7 +254,8 @@ class DirectString:
             if world.scenario.file.rough is not None:
                 found = world.rough_cycles(tube)
                 readings[:, tube - 1, 0, TEMPERATURE] = found.temperature
-                readings[:, tube - 1, 0, SATURATED] = found.clipped & GYRO_CLIPPED
+                readings[:, tube - 1, 0, SATURATED] = found.clipped
+                readings[:, tube - 1, 0, LATE] = found.late
         return readings
 
     def _arrivals(self, measured_at: Array) -> Array:

@@ -15,6 +15,7 @@ import numpy.typing as npt
 
 from node.kernels.calibration import USUAL
 from node.kernels.layout import PERIOD
+from node.process.drivers.frame_clock import FrameClock
 from sim.world.imu_errors import ImuErrors
 from sim.world.rough_section import RoughSection, RoughSensorSection, RoughVibrationSection
 from sim.world.streams import Stream, stream
@@ -29,11 +30,12 @@ FRAME_STEPS = 32768.0  # of a range
 
 @dataclass(frozen=True, slots=True)
 class Cycles:
-    """Readings of one IMU: (cycles, 6) rad/s and m/s^2, (cycles,) C and bits."""
+    """Readings of one IMU: (cycles, 6) rad/s and m/s^2, (cycles,) C, bits, and s that their windows were late by."""
 
     readings: Array
     temperature: Array
     clipped: Flags
+    late: Array
 
 
 def band_noise(random: np.random.Generator, count: int, rate: float, lowest: float, highest: float) -> Array:
@@ -94,12 +96,12 @@ class RoughImu:
         slow = slow + math.radians(sensor.warm_up_dps) * self._warmth(times)[:, None]
         if sensor.frames_hz > 0.0:
             measured = self._frames(rate, force, times, slow)
-            mean, flags = self._means(measured, times, ends)
+            mean, flags, late = self._means(measured, times, ends)
         else:
             mean = self._exact(rate, force, ends, slow)
-            flags = np.zeros(len(ends), np.int64)
+            flags, late = np.zeros(len(ends), np.int64), np.zeros(len(ends))
         flags |= self._by_cycle(hidden, ends)
-        return Cycles(mean, USUAL + sensor.warm_up_c * self._warmth(ends), flags)
+        return Cycles(mean, USUAL + sensor.warm_up_c * self._warmth(ends), flags, late + sensor.delay)
 
     def _warmth(self, t: Array) -> Array:
         """How far (0..1) the sensor has warmed up by rig times ``t``."""
@@ -180,14 +182,22 @@ class RoughImu:
         at = np.interp(stamps, self._t, integral)
         return np.asarray(np.diff(at) / np.diff(stamps))
 
-    def _means(self, frames: Array, times: Array, ends: Array) -> tuple[Array, Flags]:
-        """Mean of the frames that each read finds, and bits of the cycles of which one stood at the range."""
+    def _means(self, frames: Array, times: Array, ends: Array) -> tuple[Array, Flags, Array]:
+        """Mean of the frames that each read finds, bits of the cycles of which one stood at the range, and lateness.
+
+        The last is what a driver makes of the frames it counts.
+        """
         cuts = np.searchsorted(times, self._stamps(ends))
         sums = np.concatenate([np.zeros((1, 6)), np.cumsum(frames, axis=0)])
         mean = (sums[cuts[1:]] - sums[cuts[:-1]]) / np.maximum(np.diff(cuts), 1)[:, None]
         limit = AT_RANGE * math.radians(self._errors.gyroscope.range_dps)
         high = np.concatenate([[0], np.cumsum(np.any(np.abs(frames[:, :3]) >= limit, axis=1))])
-        return mean, np.asarray(GYRO_CLIPPED * (high[cuts[1:]] > high[cuts[:-1]]), np.int64)
+        clipped = np.asarray(GYRO_CLIPPED * (high[cuts[1:]] > high[cuts[:-1]]), np.int64)
+        clock, late = FrameClock(self._section.sensor.frames_hz), np.zeros(len(ends))
+        for k, (end, found) in enumerate(zip(ends.tolist(), np.diff(cuts).tolist(), strict=True)):
+            clock.on_read(end, found)
+            late[k] = end - clock.end
+        return mean, clipped, late
 
     def _by_cycle(self, cut: Flags, ends: Array) -> Flags:
         """Bits of the samples of every cycle together."""

@@ -5,6 +5,7 @@ docs/field.md names the source of each figure. Without the table the world is th
 
 from __future__ import annotations
 
+import math
 from typing import Literal
 
 from pydantic import Field
@@ -60,7 +61,7 @@ class RoughVibrationSection(Section):
 
 
 class RoughSensorSection(Section):
-    """Front end of every IMU: samples, filter, FIFO, clock."""
+    """Front end of every IMU: samples, filter, FIFO, clock. A node knows its filter, as a driver does."""
 
     frames_hz: NotNegative = Field(0.0, le=1000.0, description="of the FIFO; 0: the exact mean of every cycle")
     low_pass_hz: NotNegative = Field(0.0, description="of two poles, before the frames; 0: none")
@@ -72,6 +73,11 @@ class RoughSensorSection(Section):
     warm_up_dps: float = Field(0.0, ge=-10.0, le=10.0, description="drift of each gyroscope until it is warm")
     warm_up_s: Positive = Field(120.0, description="time constant of that")
     warm_up_c: NotNegative = Field(0.0, le=100.0, description="by which the sensor warms meanwhile")
+
+    @property
+    def delay(self) -> float:
+        """Delay (s) of slow changes by the filter: of a Butterworth's two poles 1 / (sqrt(2) pi f)."""
+        return 0.0 if self.low_pass_hz == 0.0 else 1.0 / (math.sqrt(2.0) * math.pi * self.low_pass_hz)
 
 
 class RoughSection(Section):

@@ -21,7 +21,7 @@ from sim.world.imu_errors import Drift, ImuErrors, single_samples
 from sim.world.motion import Motion, Phase, Trapezoid
 from sim.world.rack import Rack
 from sim.world.radio import RadioLinks
-from sim.world.rough_imu import GYRO_CLIPPED, Cycles
+from sim.world.rough_imu import Cycles
 from sim.world.rough_run import RoughRun
 from sim.world.rough_section import RoughSection
 from sim.world.rough_truth import RoughTruth
@@ -121,7 +121,8 @@ class World:
     def imu_sample(self, tube: int, cycle: int) -> list[Any]:
         """Three mean rates (rad/s) and three mean specific forces (m/s^2) of one cycle, errors and all.
 
-        In a rough world temperature (C) and bits of what was clipped follow. Of several IMUs a list of such lists.
+        In a rough world temperature (C), bits of what was clipped and the lateness of the window (s) follow. Of several
+        IMUs a list of such lists.
         """
         one, *others = [self._imu_sample(tube, cycle, imu) for imu in range(len(self._noises))]
         return [one, *others] if others else one
@@ -131,7 +132,7 @@ class World:
         if self.scenario.file.rough is None:
             return sample
         found = self.rough_cycles(tube, imu)
-        return [*sample, float(found.temperature[cycle]), int(found.clipped[cycle]) & GYRO_CLIPPED]
+        return [*sample, float(found.temperature[cycle]), int(found.clipped[cycle]), float(found.late[cycle])]
 
     def encoder_sample(self, t: float) -> tuple[int, float, int, float | None, tuple[float, ...]]:
         """Count, rig time of its last edge, 1 (the string turns one way, so every edge rises), torque, earlier edges.

@@ -136,7 +136,22 @@ CASES: dict[Code, Callable[[], Bench]] = {
     Code.ALIGNMENT_DROPPED: lambda: dropped(aligned(120)),
     Code.IMU_EXCLUDED: lambda: known(TWO).cycles(8, spoil=held),
     Code.IMU_BACK: lambda: known(TWO).cycles(8, spoil=held).cycles(40),
+    Code.BIAS_MOVED: lambda: known().cycles(20, FAST).cycles(20, spoil=warmed),
+    Code.AIDING_DOUBTED: lambda: wobbling(known()),
 }
+
+
+def warmed(w: Numbers, f: Numbers) -> tuple[Numbers, Numbers]:
+    x, y, z = w
+    return (x + 0.3 * DEG, y + 0.3 * DEG, z + 0.3 * DEG), f
+
+
+def wobbling(bench: Bench) -> Bench:
+    """A gyroscope whose rate swings once in ten cycles, as one that leans does."""
+    for k in range(80):
+        off = 0.1 * DEG * math.sin(math.tau * k / 10.0)
+        bench.cycles(1, FAST, lambda w, f, off=off: ((w[0], w[1], w[2] + off), f))  # type: ignore[misc]
+    return bench
 
 
 def scaled(bench: Bench) -> Bench:

@@ -86,11 +86,17 @@ def test_surveys_of_a_string_with_trapped_torque_are_honest(hops: int, rule: str
 
 
 @pytest.mark.parametrize(("hops", "seeds"), [(10, 6), pytest.param(50, 2, marks=pytest.mark.statistical)])
-def test_a_rig_that_ignores_torsion_is_caught_overconfident(hops: int, seeds: int) -> None:
-    """The negative control: the unwinding string is taken for a faulty gyroscope, and what is trapped is not stated."""
+def test_a_rig_that_ignores_torsion_says_that_it_cannot_explain_what_it_sees(hops: int, seeds: int) -> None:
+    """The string winds up and unwinds, nobody tells the node of torque: it flags that, and its variance has it."""
     found = twisted_runs(hops, "ignore", seeds)
-    assert nees(found, 1) > 4.0
-    assert any(event.code in ("gyro_step", "aiding_rejected") for _, event in found[0].events)
+    assert nees(found, 1) < 1.7
+    for run in found:
+        told = {event.code for _, event in run.events if event.tube == 1}
+        assert told & {"gyro_step", "aiding_rejected"}
+        assert "yaw_reset" in told
+    ignored = max(math.sqrt(float(survey.measurement.systematic_var)) for run in found for survey in run.surveys)
+    gated = max(math.sqrt(float(s.measurement.systematic_var)) for s in twisted(1, hops, "gate").drill().surveys)
+    assert ignored > 4.0 * gated
 
 
 def test_a_gated_node_dead_reckons_the_twist_and_a_varied_one_states_it() -> None:

@@ -1,26 +1,78 @@
-"""The study of a field's world: what a row says of a node."""
+"""A node in the field's world: honest under what it cannot explain, and as before where nothing is to be explained."""
+
+from functools import cache
 
 import numpy as np
 import pytest
 
-from sim.rig.direct_string import DirectString
+from sim.rig.direct_string import DirectString, StringRun
 from sim.studies.field.cases import BLOCKS, CASES
-from sim.studies.field.run import chosen_cases, judge, row
+from sim.studies.field.run import FieldRun, chosen_cases, judge, row
 from sim.world.scenario import scenario_of
 from sim.world.world import World
+
+
+@cache
+def drilled(key: str) -> tuple[World, StringRun, FieldRun]:
+    (case,) = chosen_cases(key)
+    world = World(scenario_of(dict(case.setup)), 1)
+    run = DirectString(world, state_every=1).drill()
+    return world, run, judge(world, run)
+
+
+def codes(run: StringRun) -> list[str]:
+    return [event.code for _, event in run.events if event.tube == 1]
 
 
 def test_keys_are_unique() -> None:
     assert len({case.key for case in CASES}) == len(CASES)
 
 
-def test_a_row_says_what_it_saw() -> None:
-    (case,) = chosen_cases("random-phase")
-    world = World(scenario_of(dict(case.setup)), 1)
-    run = DirectString(world, state_every=1).drill()
-    found = judge(world, run)
+def test_where_nothing_is_to_be_explained_nothing_is_added() -> None:
+    _, run, found = drilled("random-phase")
+    assert not run.systematic_var[found.turning | found.resting, 0].any()
+    assert not {"bias_moved", "aiding_doubted", "gyro_step", "gyro_scale"} & set(codes(run))
     assert found.surveys == BLOCKS
-    made = row(case, [found, found])
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("key", ["warm-up-0.2", "warm-up-1"])
+def test_a_sensor_that_warms_up_makes_every_survey(key: str) -> None:
+    _, run, found = drilled(key)
+    assert "bias_moved" in codes(run)
+    assert found.surveys == BLOCKS
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(("key", "off_deg"), [("mark-5", 5.0), ("mark-180", 180.0)])
+def test_a_mark_that_contradicts_the_saved_yaw_is_told_and_counted(key: str, off_deg: float) -> None:
+    _, run, found = drilled(key)
+    assert "joint_contradicts_marks" in codes(run)
+    after = found.resting & (np.abs(found.error) > np.radians(0.5 * off_deg))
+    assert after.any()
+    assert np.all(found.error[after] ** 2 < 4.0 * found.var[after])
+
+
+@pytest.mark.slow
+def test_a_jump_of_the_encoder_stays_in_doubt_until_it_comes_back() -> None:
+    _, run, found = drilled("jump")
+    assert "yaw_reset" in codes(run)
+    assert np.degrees(np.abs(found.error[-1])) == pytest.approx(1.0, abs=0.1)
+    assert found.error[-1] ** 2 < 4.0 * found.var[-1]
+    _, _, indexed = drilled("jump-index")
+    assert np.degrees(np.sqrt(indexed.var[-1])) < 0.05
+
+
+@pytest.mark.slow
+def test_a_disc_off_its_centre_is_no_fault_of_the_gyroscope() -> None:
+    _, run, _ = drilled("eccentric-0.02")
+    assert not {"gyro_step", "gyro_scale"} & set(codes(run))
+
+
+def test_a_row_says_what_it_saw() -> None:
+    world, run, found = drilled("random-phase")
+    (case,) = chosen_cases("random-phase")
+    made = row(case, [found, judge(world, run)])
     assert made["surveys_percent"] == 100.0
     assert made["gyro_step"] == made["gyro_scale"] == made["other_faults"] == 0.0
     rms = float(np.degrees(np.sqrt(np.mean(found.error[found.resting] ** 2))))

@@ -23,6 +23,7 @@ from node.kernels.fixed.layout import (
 from node.kernels.fixed.strapdown import half_turn, rotate_down, yaw_rate
 from node.kernels.fixed.trigonometry import TURN, counts
 from node.kernels.fixed.update import level, zero_rate
+from node.kernels.fixed_lag import COARSE
 from node.kernels.jit import constant, kernel
 from node.kernels.layout import CLOCK_SLACK, INVERTED, RING, STATES, Array, Err, Status
 from node.kernels.ring import drop_first_pending, stood_still
@@ -172,8 +173,10 @@ def take_pending(state: Any, config: Any, cycle: int, until: int) -> int:
             advance(state, config, cycle, held)
             beyond = min(at - held, LONGEST_STEP)
             yaw = (yaw - counts(mul(spin(state, cycle, held, at), beyond), STEP_Q)) & TURN
-            var += interpolation_var(state, cycle, at)
-            status |= aid(state, config, yaw, var, spin(state, cycle, held, held), at)
+            spread, own = interpolation_var(state, cycle, at), int(var)
+            status |= aid(state, config, yaw, var + spread, spin(state, cycle, held, held), at)
+            if spread > COARSE * own:
+                state.last_sequence = -1
         else:
             status |= aid_late(state, config, yaw, var, at)
         drop_first_pending(state)

@@ -6,6 +6,7 @@ from typing import Final
 
 import numpy as np
 
+from node.kernels.doubts import noise_var
 from node.kernels.fixed.beside import CONFIG_WORDS, STATE_WORDS, fixed_cycle, fixed_offer
 from node.kernels.jit import kernel
 from node.kernels.layout import Array
@@ -61,7 +62,7 @@ def fixed_aiding(nodes: Array, settings: Array, aiding: Array, integers: Array) 
             words[FILTER_AT : FILTER_AT + STATE_WORDS],
             words[CONFIG_AT : CONFIG_AT + CONFIG_WORDS],
             aiding[A_YAW],
-            aiding[A_YAW_VAR],
+            aiding[A_YAW_VAR] + noise_var(node),
             own_systematic(node),
             node.down_offset,
             aiding[A_VALID],

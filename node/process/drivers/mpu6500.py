@@ -1,8 +1,9 @@
 """InvenSense MPU-6500 over I2C: six axes and temperature through the FIFO, averaged over the cycle.
 
 Sampled at 50 Hz behind the sensor's own low-pass of 20 Hz, a cycle is 26 frames of 14 bytes, well inside the FIFO's
-512. The mean of the frames is the mean rate of the cycle. Source: InvenSense, MPU-6500 register map and descriptions,
-revision 2.1 (registers, WHO_AM_I = 0x70, temperature) and product specification, revision 1.3 (sensitivities).
+512. The mean of the frames is that of their own window, which ends half a frame after the newest, earlier by the delay
+of the low-pass; the sample says so. Source: InvenSense, MPU-6500 register map and descriptions,
+revision 2.1 (registers, WHO_AM_I = 0x70, temperature, delays) and product specification, revision 1.3 (sensitivities).
 """
 
 from __future__ import annotations
@@ -12,11 +13,13 @@ import math
 import struct
 import time
 from collections.abc import Callable
+from dataclasses import replace
 from typing import Any, Final, Protocol, cast
 
 import numpy as np
 
 from node.errors import SensorError
+from node.process.drivers.frame_clock import FrameClock
 from node.process.drivers.source import ImuSample
 
 SMPLRT_DIV, CONFIG, GYRO_CONFIG, ACCEL_CONFIG, ACCEL_CONFIG_2 = 0x19, 0x1A, 0x1B, 0x1C, 0x1D
@@ -28,6 +31,7 @@ ADDRESS: Final = 0x68  # 0x69 with AD0 high
 RATE_RANGES: Final = {250: 0, 500: 1, 1000: 2, 2000: 3}  # deg/s: FS_SEL
 FORCE_RANGES: Final = {2: 0, 4: 1, 8: 2, 16: 3}  # g: ACCEL_FS_SEL
 LOW_PASS: Final = {184: 1, 92: 2, 41: 3, 20: 4, 10: 5, 5: 6}  # Hz: DLPF_CFG
+DELAYS: Final = {184: 2.9e-3, 92: 3.9e-3, 41: 5.9e-3, 20: 9.9e-3, 10: 17.85e-3, 5: 33.48e-3}  # s, of the gyroscope
 FRAME: Final = 14  # bytes: force, temperature, rate, in the order of the registers
 BURST: Final = 28  # bytes of a read; SMBus allows 32
 CAPACITY: Final = 512
@@ -111,7 +115,8 @@ class Mpu6500:
         self._divider = round(1000 / sample_rate) - 1
         self.sample_rate = 1000.0 / (self._divider + 1)  # Hz
         self._rate_select, self._force_select = RATE_RANGES[rate_range], FORCE_RANGES[force_range]
-        self._low_pass = LOW_PASS[low_pass]
+        self._low_pass, self._delay = LOW_PASS[low_pass], DELAYS[low_pass]
+        self._frames = FrameClock(self.sample_rate)
         self._rate_lsb = math.radians(rate_range) / 32768.0
         self._force_lsb = force_range * G / 32768.0
         self._bus: Bus | None = None
@@ -137,6 +142,7 @@ class Mpu6500:
                 raise SensorError(f"mpu6500: register 0x{register:02x}: expected 0x{value:02x}, got 0x{found:02x}")
         self._empty()
         self._fresh = True
+        self._frames.begin()
 
     def read(self, begin: float, end: float) -> ImuSample:
         """Mean of the frames since the last read, which must be about those of a cycle from ``begin`` to ``end``."""
@@ -153,9 +159,11 @@ class Mpu6500:
             self._empty()
             raise SensorError(f"mpu6500: expected about {expected:.0f} frames in the FIFO, got {frames}")
         sample = self._mean(self._drain(frames * FRAME))
+        self._frames.on_read(end, frames)
         if overflown:
             self._empty()
-        return sample
+            self._frames.begin()
+        return replace(sample, late=end - self._frames.end + self._delay)
 
     def close(self) -> None:
         """Release the bus."""
@@ -189,7 +197,8 @@ class Mpu6500:
         frames = np.array(list(struct.iter_unpack(">7h", data)), dtype=np.float64)
         force = frames[:, :3].mean(axis=0) * self._force_lsb
         rate = frames[:, 4:].mean(axis=0) * self._rate_lsb
-        saturated = bool(np.any((frames[:, 4:] >= 32767.0) | (frames[:, 4:] <= -32768.0)))
+        at_range = (frames >= 32767.0) | (frames <= -32768.0)
+        saturated = int(np.any(at_range[:, 4:])) | 2 * int(np.any(at_range[:, :3]))
         return ImuSample(
             (float(rate[0]), float(rate[1]), float(rate[2])),
             (float(force[0]), float(force[1]), float(force[2])),

@@ -26,6 +26,7 @@ class ImuSample:
     force: Vector3  # m/s^2
     temperature: float = USUAL  # C
     saturated: int = 0  # bits of what was at its range within the cycle: 1 gyroscope, 2 accelerometer
+    late: float = 0.0  # s, by which the window that was measured ended before the cycle
 
 
 class ImuSource(Protocol):

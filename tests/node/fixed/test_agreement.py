@@ -11,6 +11,7 @@ from node.firmware.kernel_choice import Loop, kernel_of
 from node.firmware.settings import TubeSettings
 from node.firmware.tube import Tube
 from node.kernels.cycle import run_cycle
+from node.kernels.doubts import noise_var
 from node.kernels.fixed.border import (
     COVARIANCE,
     LARGEST,
@@ -213,6 +214,7 @@ def in_parts(loop: Loop) -> Loop:
         if gates & USED:
             yaw, yaw_var, _, _, _, valid_at, sequence, hops, *_ = given.tolist()
             about = own_systematic(node), float(node["down_offset"]), valid_at, int(sequence), int(hops)
+            yaw_var += noise_var(node)
             node["noticed"] |= loop.offer_aiding(node["filter"], node["config"], yaw, yaw_var, *about)
         if gates & ONWARD:
             hand_down(nodes, settings)

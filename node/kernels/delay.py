@@ -1,0 +1,40 @@
+"""A reading whose window is not the cycle's: the sensor's filter delays, and its frames end when its crystal says.
+
+A window that ends ``late`` before its cycle lacks the turn of that time, and has that of the window before too much.
+The missing turn is late (w + w' (window + late) / 2), from the mean w of the window and its change w' since the one
+before; what is taken for missing now is what is too much in the next cycle, so no error of it stays. Where the rate
+bends it is wrong by up to late w'' T^2 / 2 until then, and a string that has come to rest is not asked again.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+from node.kernels.jit import kernel
+from node.kernels.layout import Array
+
+
+@kernel
+def make_up_delay(memory: Any, late: float, rate: Array, length: float) -> float:
+    """Turn the mean rate (3, rad/s) of a window that ends ``late`` (s) into that of its cycle, of ``length`` (s).
+
+    Returns the variance (rad^2) of the turn about z that is taken for missing. ``memory`` is a record of dtype
+    ``DELAYED``; after a reading that was none it begins anew.
+    """
+    known = math.isfinite(memory.late)
+    exact = late == 0.0 and not (known and memory.late != 0.0)
+    window = length - late + (memory.late if known else late)
+    bend = 0.0
+    for k in range(3):
+        measured = rate[k]
+        change = measured - memory.rate[k] if known else 0.0
+        ahead = min(max(0.5 * change * (window + late) / length, -abs(measured)), abs(measured))  # not back through 0
+        missing = late * (measured + ahead)
+        if known and not exact:
+            rate[k] = (measured * window + missing - memory.missing[k]) / length
+        bend = change - memory.change[k]
+        memory.rate[k], memory.missing[k], memory.change[k] = measured, missing, change
+    finite = math.isfinite(rate[0] + rate[1] + rate[2])
+    memory.late = late if finite else math.nan
+    return float((0.5 * late * bend) ** 2) if finite and known else 0.0

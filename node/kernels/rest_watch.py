@@ -1,0 +1,150 @@
+"""Is the node at rest, whatever its bias? The spread of its readings and the aiding say so, and the bias follows.
+
+A bias that was learnt at the start is not that of a sensor which has warmed up since. While the encoder reports a head
+at rest and the gyroscope's readings scatter as noise does, their mean is the bias: where it is beyond five sigmas of
+the one in use it takes its place, and the node stands still again. A tube that is tilted steadily under a resting head
+reads a steady rate too, but its gravity turns with it. How far the bias moved is from then on the standard deviation of
+what it may do until the next stop; every rest without a move halves that.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import Any, Final
+
+from node.kernels.events import NONE, Code, tell
+from node.kernels.jit import constant, kernel
+from node.kernels.layout import DEG, RING
+from node.kernels.modes import STATIC_BIAS, TRACKING, UNBIASED_STILL_RATE
+from node.kernels.resets import move_bias, open_yaw
+
+CYCLES: Final = 8  # whose mean and spread are looked at
+SETTLING: Final = 2  # cycles of a rest before those
+LOUDEST: Final = 4.0  # spread of a rest, in variances of the noise
+MOVED: Final = 5.0  # sigmas of a bias in use
+LARGEST: Final = 6.0 * DEG  # rad/s, of a bias; the slow alignment turn is faster
+RATE_AGE: Final = 3.0  # s, of the encoder's word
+CALMER: Final = 0.5  # of the spread of a bias that has moved, at every rest without a move
+BIAS_MOVED = constant(Code.BIAS_MOVED)
+
+
+@kernel
+def watch_rest(node: Any, settings: Any, at: float) -> None:
+    """Look at the rest that the encoder reports, every ``CYCLES`` cycles; ``at`` (s, own clock) is now."""
+    state, guard = node.filter, node.guard
+    told = guard.rate == 0.0 and abs(at - guard.rate_at) <= RATE_AGE
+    guard.rest_cycles = guard.rest_cycles + 1 if told and guard.gyro.fault == 0 else 0
+    since = guard.rest_cycles - SETTLING
+    if since < CYCLES or since % CYCLES != 0 or state.cycles < CYCLES or not is_calm(state, node.config):
+        return
+    if has_moved(state, node.config):
+        if not is_tilting(state, node.config):
+            take_bias(node, settings, since)
+    elif since == CYCLES:
+        calm_down(node, settings)
+
+
+@kernel
+def mean_rate(state: Any, k: int) -> float:
+    """Mean (rad/s) of the last cycles about axis ``k``."""
+    total = 0.0
+    for n in range(CYCLES):
+        total += state.ring_rate[(state.cycles - 1 - n) % RING, k]
+    return total / CYCLES
+
+
+@kernel
+def is_calm(state: Any, config: Any) -> bool:
+    """Whether the last cycles scatter as noise does: s^2 <= 4 N^2 / T about each axis."""
+    newest = (state.cycles - 1) % RING
+    period = state.ring_end[newest] - state.ring_start[newest]
+    for k in range(3):
+        mean, total = mean_rate(state, k), 0.0
+        for n in range(CYCLES):
+            total += (state.ring_rate[(state.cycles - 1 - n) % RING, k] - mean) ** 2
+        if total > LOUDEST * (CYCLES - 1) * config.gyro_noise[k] ** 2 / period:
+            return False
+    return True
+
+
+@kernel
+def mean_down(state: Any, k: int, first: int) -> float:
+    """Part ``k`` of the direction of gravity: mean of half of the last cycles, from the ``first``-newest back."""
+    total = 0.0
+    for n in range(CYCLES // 2):
+        total -= state.ring_force[(state.cycles - 1 - first - n) % RING, k]
+    return total / (CYCLES // 2)
+
+
+@kernel
+def is_tilting(state: Any, config: Any) -> bool:
+    """Whether gravity turns as the rates beyond the bias in use say: u' = u x w, at least half of it."""
+    newest = (state.cycles - 1) % RING
+    apart = (CYCLES // 2) * (state.ring_end[newest] - state.ring_start[newest])
+    seen = told = 0.0
+    for k in range(3):
+        i, j = (k + 1) % 3, (k + 2) % 3
+        turning_i = mean_rate(state, i) - state.static_bias[i] - state.bias[i]
+        turning_j = mean_rate(state, j) - state.static_bias[j] - state.bias[j]
+        turned = apart * (mean_down(state, i, 0) * turning_j - mean_down(state, j, 0) * turning_i)
+        seen += turned * (mean_down(state, k, 0) - mean_down(state, k, CYCLES // 2))
+        told += turned * turned
+    return bool(seen > 0.5 * told)
+
+
+@kernel
+def has_moved(state: Any, config: Any) -> bool:
+    """Whether the mean of the last cycles is beyond the bias in use; before there is one, beyond what counts as rest.
+
+    A node that does not stand still by its bias needs no more evidence.
+    """
+    newest = (state.cycles - 1) % RING
+    length = CYCLES * (state.ring_end[newest] - state.ring_start[newest])
+    moved = bool(state.mode != STATIC_BIAS and state.still_cycles == 0)
+    for k in range(3):
+        mean = mean_rate(state, k)
+        if abs(mean) > LARGEST:
+            return False
+        if state.mode == STATIC_BIAS:
+            moved = moved or bool(abs(mean) > UNBIASED_STILL_RATE)
+            continue
+        var = state.static_bias_var[k] + config.bias_std[k] ** 2 + config.gyro_noise[k] ** 2 / length
+        off = mean - state.static_bias[k] - state.bias[k]
+        moved = moved or bool(off * off > MOVED * MOVED * var)
+    return moved
+
+
+@kernel
+def take_bias(node: Any, settings: Any, since: int) -> None:
+    """Let the means of the last cycles be the bias; what the old one turned the yaw by since is in doubt."""
+    state, config, guard = node.filter, node.config, node.guard
+    newest = (state.cycles - 1) % RING
+    period = state.ring_end[newest] - state.ring_start[newest]
+    known = state.mode != STATIC_BIAS
+    moved_z = 0.0
+    for k in range(3):
+        mean = mean_rate(state, k)
+        off = mean - state.static_bias[k] - state.bias[k]
+        var = config.gyro_noise[k] ** 2 / (CYCLES * period) + config.bias_std[k] ** 2
+        if known and settings.imus == 1:
+            config.bias_std[k] = max(config.bias_std[k], abs(off))
+        move_bias(state, k, mean, var, config.bias_std[k] ** 2)
+        moved_z = off
+    if known:
+        open_yaw(state, (moved_z * since * period) ** 2)
+    else:
+        state.mode = TRACKING
+    state.last_sequence = -1  # the rest is to be judged again
+    state.rejected = 0
+    guard.before_steps = math.nan
+    guard.step.fault = 0
+    tell(node, BIAS_MOVED, moved_z / DEG, NONE, NONE, NONE)
+
+
+@kernel
+def calm_down(node: Any, settings: Any) -> None:
+    """A rest without a move: the bias wanders as little as it is stated to, sooner or later."""
+    if settings.imus > 1:
+        return
+    for k in range(3):
+        node.config.bias_std[k] = max(settings.plain_bias_std[k], CALMER * node.config.bias_std[k])
