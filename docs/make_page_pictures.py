@@ -75,6 +75,8 @@ def take_pictures(url: str) -> None:
             page = browser.new_page(**options)
             page.goto(url)
             expect(page.locator("#word")).to_have_text("STEER", timeout=60_000)
+            expect(page.locator("#tubes tr")).to_have_count(13, timeout=60_000)
+            expect(page.locator("#course path, #course polyline").first).to_be_attached(timeout=60_000)
             if name == "dark":
                 page.click("#alarm-list .acknowledge >> nth=0")
                 page.fill("#who", "anna")
@@ -83,7 +85,7 @@ def take_pictures(url: str) -> None:
                 page.click("#survey")
                 expect(page.locator("#orders li")).to_have_count(2, timeout=60_000)
             page.evaluate("scrollTo(0, 0)")
-            page.screenshot(path=DOCS / f"page-{name}.png", full_page=name == "telephone")
+            page.screenshot(path=DOCS / f"page-{name}.png", full_page=True)
             page.close()
 
 

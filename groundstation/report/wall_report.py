@@ -6,7 +6,8 @@ import math
 
 import numpy as np
 
-from groundstation.report.column_report import ColumnRecord, Site, clause
+from groundstation.errors import SurveyError
+from groundstation.report.column_report import ColumnRecord, Site, clause, column_report
 from groundstation.report.document import Document, Origin, Section
 from groundstation.report.plots_wall import wall_figure
 from groundstation.report.style import svg_of
@@ -76,6 +77,22 @@ def remedies(wall: Wall, judgement: Judgement, of: int | None = None) -> list[st
         f"joint{'s' if len(names) > 1 else ''} {' and '.join(names)}."
         for (place, top, bottom, closes), names in places.items()
     ]
+
+
+def report_on(wall: Wall, judgement: Judgement, column: str | None, origin: Origin) -> Document:
+    """Report of the whole wall, or of one ``column`` of it.
+
+    Raises
+    ------
+    SurveyError
+        When it has no such column.
+    """
+    if column is None:
+        return wall_report(wall, judgement, origin)
+    records = {record.design.name: record for record in column_records(wall, judgement)}
+    if column not in records:
+        raise SurveyError(f"column: expected one of {', '.join(records)}, got {column!r:.40}")
+    return column_report(records[column], site_of(wall), origin)
 
 
 def wall_report(wall: Wall, judgement: Judgement, origin: Origin) -> Document:

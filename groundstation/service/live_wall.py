@@ -37,6 +37,10 @@ class LiveWall:
     path : wall file
     hole : name of the column that is drilled
 
+    Attributes
+    ----------
+    inputs : name and SHA-256 of each file of the wall, as they were read
+
     Raises
     ------
     SurveyError
@@ -49,6 +53,7 @@ class LiveWall:
         if hole not in names:
             raise SurveyError(f"{path}: column {hole!r:.40} is not among the heads; expected one of {', '.join(names)}")
         self.hole = hole
+        self.inputs = whole.file.digests()
         own = names.index(hole)
         around = sorted({int(k) for pair in whole.pairs for k in pair if own in pair} - {own})
         if not around:

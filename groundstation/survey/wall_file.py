@@ -5,6 +5,7 @@ Every file a wall file names lies beside it. What a column does not say of itsel
 
 from __future__ import annotations
 
+import hashlib
 import math
 import tomllib
 from dataclasses import dataclass
@@ -69,6 +70,11 @@ class WallFile:
     calibration: str = ""  # certificate of the instrument
     north: str = "site"  # to which azimuths and coordinates belong
     origin: tuple[float, float, float] | None = None  # m, northing, easting and height of the wall's zero
+
+    def digests(self) -> list[tuple[str, str]]:
+        """Name and SHA-256 of each file as it is now."""
+        inputs = (self.path, self.heads, self.stations)
+        return [(path.name, hashlib.sha256(path.read_bytes()).hexdigest()) for path in inputs]
 
     @property
     def defaults(self) -> Defaults:

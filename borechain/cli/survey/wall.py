@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import hashlib
 import json
 import math
 from datetime import UTC, date, datetime
@@ -94,21 +93,11 @@ def wall(
 
 def write_report(found: Wall, judgement: Judgement, column: str | None, day: date, path: Path) -> None:
     """Report of the wall, or of one of its columns."""
-    from groundstation.report.column_report import column_report
     from groundstation.report.document import Origin, report_pdf
-    from groundstation.report.wall_report import column_records, site_of, wall_report
+    from groundstation.report.wall_report import report_on
 
-    inputs = [found.file.path, found.file.heads, found.file.stations]
-    digests = [(f"SHA-256 of {p.name}", hashlib.sha256(p.read_bytes()).hexdigest()) for p in inputs]
-    origin = Origin(day, __version__, digests)
-    if column is None:
-        document = wall_report(found, judgement, origin)
-    else:
-        records = {record.design.name: record for record in column_records(found, judgement)}
-        if column not in records:
-            raise InputFault(f"--column: expected one of {', '.join(records)}, got {column}")
-        document = column_report(records[column], site_of(found), origin)
-    write_whole(path, report_pdf(document))
+    digests = [(f"SHA-256 of {name}", digest) for name, digest in found.file.digests()]
+    write_whole(path, report_pdf(report_on(found, judgement, column, Origin(day, __version__, digests))))
 
 
 def result_of(found: Wall, judgement: Judgement) -> dict[str, Any]:

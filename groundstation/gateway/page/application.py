@@ -51,7 +51,7 @@ class Files(StaticFiles):
 
 def application(process: GroundProcess, page: PageSettings, hub: Hub) -> Starlette:
     """Everything that the page's address serves."""
-    doors = Doors(process, page, hub, build())
+    doors = Doors(process, page, hub, build(), program_version())
 
     async def described(_request: Request) -> Response:
         return JSONResponse(document(program_version()))
@@ -80,6 +80,7 @@ def application(process: GroundProcess, page: PageSettings, hub: Hub) -> Starlet
             Route("/api/stream", Stream(doors.stream)),
             Route("/api/cmd/{name}", doors.order, methods=["POST"]),
             Route("/api/tables/{path:path}.csv", doors.table),
+            Route("/api/reports/{subject}.pdf", doors.report),
             Route("/api/{path:path}", doors.answer),
         ],
         middleware=[

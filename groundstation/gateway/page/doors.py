@@ -16,6 +16,7 @@ from groundstation.errors import GroundError, SelectorError
 from groundstation.gateway.page.guard import RequestError, check_origin, json_body, text_of
 from groundstation.gateway.page.hub import Hub, event
 from groundstation.gateway.page.passwords import DRILLER, LONGEST, is_right
+from groundstation.gateway.page.reports import Reporter
 from groundstation.gateway.page.sessions import Session, Sessions, WrongPasswords, is_from
 from groundstation.gateway.page.settings import PageSettings
 from groundstation.service.csv_tables import table_of
@@ -44,12 +45,14 @@ class Doors:
     page : who may order, and whether everybody may read
     hub : where its answers are followed
     build : name of what is served, by which a page that is older than the program knows it
+    version : of the program
     """
 
-    def __init__(self, process: GroundProcess, page: PageSettings, hub: Hub, build: str) -> None:
+    def __init__(self, process: GroundProcess, page: PageSettings, hub: Hub, build: str, version: str) -> None:
         self._process, self._page, self._hub, self._build = process, page, hub, build
         self._sessions = Sessions()
         self._wrong = WrongPasswords()
+        self._reporter = Reporter(process.model, version)
         self._one_at_a_time = asyncio.Lock()  # hashes cost memory and a core
 
     async def answer(self, request: Request) -> Response:
@@ -76,7 +79,13 @@ class Doors:
         except SelectorError as error:
             raise RequestError(400 if is_known(self._process, path) else 404, str(error)) from error
         name = f"{self._process.config.rig}-{path.replace('/', '-')}.csv"
-        return Response(text, media_type="text/csv", headers={"content-disposition": f'attachment; filename="{name}"'})
+        return Response(text, media_type="text/csv", headers=saved_as(name))
+
+    async def report(self, request: Request) -> Response:
+        """``GET /api/reports/wall.pdf`` and ``hole.pdf``: a report to be signed."""
+        self._check_reader(request)
+        name, made = await self._reporter.pdf(request.path_params["subject"])
+        return Response(made, media_type="application/pdf", headers=saved_as(name))
 
     async def order(self, request: Request) -> Response:
         """``POST /api/cmd/NAME``: order something; ``?wait=true`` answers when the tube has."""
@@ -250,3 +259,8 @@ def is_known(process: GroundProcess, path: str) -> bool:
     except SelectorError:
         return False
     return True
+
+
+def saved_as(name: str) -> dict[str, str]:
+    """Headers of an answer that a browser saves as a file of this name."""
+    return {"content-disposition": f'attachment; filename="{name}"'}

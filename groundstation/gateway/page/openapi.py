@@ -7,6 +7,7 @@ import re
 from typing import Any
 
 from groundstation.gateway.page.passwords import ROLES
+from groundstation.gateway.page.reports import SUBJECTS
 from groundstation.service.answers import object_schema
 from groundstation.service.key_fields import HEADER, ORDER
 from groundstation.service.paths import FIXED, MEMBERS, Member, Path
@@ -53,7 +54,7 @@ def document(version: str) -> View:
             "description": "The keys of one rig over HTTP. Reading needs no session on loopback; ordering needs one of "
             "the role driller, and its csrf value in the header x-csrf-token.",
         },
-        "paths": answers | tables() | orders | session_paths() | stream_path(),
+        "paths": answers | tables() | reports() | orders | session_paths() | stream_path(),
         "components": {"securitySchemes": {"session": {"type": "apiKey", "in": "cookie", "name": "borechain"}}},
     }
 
@@ -84,6 +85,21 @@ def tables() -> View:
             }
         }
         for name in TABLES
+    }
+
+
+def reports() -> View:
+    """Reports to be signed as PDF."""
+    pdf = {"application/pdf": {"schema": {"type": "string", "format": "binary"}}}
+    return {
+        f"/api/reports/{subject}.pdf": {
+            "get": {
+                "operationId": f"report_{subject}",
+                "responses": {"200": {"description": f"what is known of the {subject} now", "content": pdf}}
+                | refusals(401, 404, 409, 501, 503),
+            }
+        }
+        for subject in SUBJECTS
     }
 
 

@@ -1,0 +1,72 @@
+"""Reports from the page: the PDF of the wall and of the hole from what is known now, and what is refused."""
+
+import asyncio
+from pathlib import Path
+
+import pytest
+from hand_fed import Rig
+from page_client import PageClient, free_port
+from served import serving
+
+from groundstation.gateway.page.guard import RequestError
+from groundstation.gateway.page.reports import Reporter
+from groundstation.gateway.page.settings import PageSettings
+
+pytestmark = pytest.mark.slow
+WALL = """
+name = "three holes"
+radius_m = 0.60
+thickness_m = 0.80
+length_m = 8.0
+heads = "heads.csv"
+stations = "s.csv"
+"""
+
+
+@pytest.fixture
+def rig(tmp_path: Path) -> Rig:
+    """The middle hole of three, two stops deep."""
+    (tmp_path / "wall.toml").write_text(WALL)
+    (tmp_path / "heads.csv").write_text("column,north_m,east_m\nH1,0,0\nH2,0.75,0\nH3,1.5,0\n")
+    rows = "".join(f"{hole},{md},0,0\n" for hole in ("H1", "H3") for md in (0, 4, 8))
+    (tmp_path / "s.csv").write_text(f"column,md_m,inclination_deg,azimuth_deg\n{rows}")
+    rig = Rig(tmp_path / "ground", target=8.0, wall=tmp_path / "wall.toml", hole="H2")
+    rig.run(5.0)
+    return rig
+
+
+def test_wall_and_hole_come_as_pdf_and_another_is_refused_meanwhile(rig: Rig) -> None:
+    for stop in (1, 2):
+        rig.drill(stop, 0.3)
+    port = free_port()
+    with serving(rig, PageSettings("127.0.0.1", port)):
+        page = PageClient(port)
+        for subject in ("wall", "hole"):
+            answer = page.get(f"/api/reports/{subject}.pdf")
+            assert (answer.status, answer.headers["content-type"]) == (200, "application/pdf")
+            assert answer.headers["content-disposition"] == f'attachment; filename="H2-{subject}.pdf"'
+            assert answer.body.startswith(b"%PDF")
+        unknown = page.get("/api/reports/string.pdf")
+        assert (unknown.status, unknown.content["error"]) == (404, "report: expected wall or hole, got 'string'")
+    rig.ground.close()
+
+
+def test_a_second_report_waits_for_the_first(rig: Rig) -> None:
+    rig.drill(1, 0.3)
+    reporter = Reporter(rig.ground.model, "0")
+
+    async def both() -> list[object]:
+        return await asyncio.gather(reporter.pdf("hole"), reporter.pdf("wall"), return_exceptions=True)
+
+    made, refused = asyncio.run(both())
+    assert isinstance(made, tuple)
+    assert isinstance(refused, RequestError)
+    assert (refused.status, refused.line) == (503, "another report is being made")
+    rig.ground.close()
+
+
+def test_a_rig_without_a_wall_says_how_it_gets_one(tmp_path: Path) -> None:
+    rig = Rig(tmp_path, target=8.0)
+    with pytest.raises(RequestError, match="no wall; see --wall and --hole"):
+        asyncio.run(Reporter(rig.ground.model, "0").pdf("wall"))
+    rig.ground.close()
