@@ -140,7 +140,7 @@ def test_all_is_every_extra_of_an_installation(wheel: Path) -> None:
     asked = [Requirement(text) for text in requirements(wheel)]
     parts = {
         extra: {r.name for r in asked if r.marker is not None and r.marker.evaluate({"extra": extra})}
-        for extra in ("all", "board", "campaign", "can", "ground")
+        for extra in ("all", "board", "campaign", "can", "ground", "postgresql")
     }
     assert parts.pop("all") == set().union(*parts.values())
 

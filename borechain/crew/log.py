@@ -43,6 +43,7 @@ class RunLog:
 
     def __init__(self, write: Callable[[str], object]) -> None:
         self._write = write
+        self._is_joined = False
         self._phase = ""
         self._elapsed = 0.0
         self._alarms: dict[int, tuple[str, str]] = {}  # state and level of each that was told
@@ -51,9 +52,14 @@ class RunLog:
         self._restarts: dict[str, int] = {}
         self.newest = 0  # survey that was told
 
-    def on_open(self, endpoint: str, rig: str) -> None:
-        """The endpoint of the rig can be joined."""
+    def join(self, endpoint: str, rig: str, ground: Ground) -> None:
+        """Tell once that the endpoint of a rig can be joined, and log what its ground stations publish from now on."""
+        if self._is_joined:
+            return
+        self._is_joined = True
         self._line("open", f"{endpoint}: borechain crew --endpoint {endpoint} --rig {rig}")
+        for path in FOLLOWED:
+            ground.follow(path, self.on_answer)
 
     def on_hole(self, name: str) -> None:
         """Another hole of the site is begun, by a ground station that knows nothing yet."""
@@ -90,11 +96,6 @@ class RunLog:
             case "verdict" if view["verdict"] != self._word:
                 self._word = view["verdict"]
                 self._line("verdict", view["line"])
-
-    def follow(self, ground: Ground) -> None:
-        """Log what a ground station publishes."""
-        for path in FOLLOWED:
-            ground.follow(path, self.on_answer)
 
     def poll(self, ask: Callable[[str, dict[str, str]], View]) -> None:
         """Log what a ground station in this process knows that was not told yet."""

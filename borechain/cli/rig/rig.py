@@ -106,7 +106,6 @@ def rig(
       borechain rig three-holes --inline --view log
     """
     from borechain.cli.rig.site import drill_site, has_site
-    from borechain.client import Ground
     from borechain.host import opened_router
     from sim.rig.launcher import check_port_free
 
@@ -131,9 +130,6 @@ def rig(
     # whoever wants to join can do so while the scenario is read and the kernels are loaded
     with contextlib.nullcontext() if inline else opened_router(endpoint, keys_place) as bus:
         log = RunLog(say) if view == "log" else None
-        if log is not None and bus is not None:
-            log.on_open(endpoint, rig_name)
-            log.follow(Ground(bus, rig_name))
         run = drill_site if has_site(job) else drill
         result, folder = run(job, bus, out, served, log, quiet=view != "bar")
     if as_json:
@@ -172,6 +168,7 @@ def drill(
     EnvironmentFault, RigError
         When the folder cannot be used, a process fails, or on Ctrl-C.
     """
+    from borechain.client import Ground
     from sim.rig.launcher import next_run_folder, prepare_folder
     from sim.rig.report import write_files
 
@@ -179,6 +176,8 @@ def drill(
     world = world_of(job)
     folder = out if out is not None else next_run_folder(Path("out") / job.scenario.stem)
     prepare_folder(folder)
+    if log is not None and bus is not None:  # nothing is refused any more
+        log.join(job.endpoint, job.rig_name, Ground(bus, job.rig_name))
     if page is not None:
         page = orderable(page)
     try:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import csv
+import warnings
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -25,10 +26,12 @@ def has_site(job: Job) -> bool:
 
 
 def scenario_of(job: Job) -> Scenario:
-    """Scenario of a job."""
+    """Scenario of a job; what is odd about it is told when a hole of it is drilled."""
     from sim.world.scenario import load_scenario
 
-    return load_scenario(job.scenario, job.faults)
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")
+        return load_scenario(job.scenario, job.faults)
 
 
 def drill_site(
