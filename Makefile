@@ -24,7 +24,7 @@ test: $(STAMP)  ## set up and run every check and every test, in parallel
 	$(MAKE) tests
 
 quick: check  ## lint, types, contracts and the fast tests: under 90 s
-	$(PYTEST) -m "not (slow or process or install or statistical)"
+	$(PYTEST) --numprocesses $$(getconf _NPROCESSORS_ONLN) -m "not (slow or process or install or statistical)"
 
 $(STAMP): requirements.lock pyproject.toml
 	$(PYTHON) -m venv $(VENV)

@@ -248,6 +248,7 @@ def test_credentials_are_named_by_what_is_missing(folder: Path) -> None:
         credentials_of(folder, "tube-9")
 
 
+@pytest.mark.slow
 def test_a_password_of_the_page_is_kept_as_its_hash_for_its_owner_alone(tmp_path: Path) -> None:
     file = tmp_path / "passwords"
     for role, word in (("driller", "a long enough word"), ("operator", "another long word")):

@@ -45,6 +45,7 @@ class Bored(Rig):
         return self.order(1, "align", **arguments)
 
 
+@pytest.mark.slow
 def test_an_alignment_is_ordered_followed_and_shown_at_the_surface(tmp_path: Path) -> None:
     rig = Bored(tmp_path, [2, 1])
     rig.run(12.0)

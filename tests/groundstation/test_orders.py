@@ -111,6 +111,7 @@ def test_what_a_calibration_asks_for_are_orders_too(rig: Rig) -> None:
     assert (asked.spec.name, asked.tube, asked.state) == ("parameters", 1, OrderState.DONE)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("tube", "name", "arguments", "named"),
     [

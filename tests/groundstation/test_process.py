@@ -131,6 +131,7 @@ async def test_wildcards_get_every_key_they_name(rig: tuple[Rig, ZenohBus]) -> N
     assert {r.key.rsplit("/", 1)[1] for r in await asyncio.to_thread(bus.get, f"{GROUND}/nodes/*", 10.0)} == {"1", "2"}
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("selector", "named"),
     [
@@ -305,6 +306,7 @@ async def test_a_change_is_published_on_the_key_it_changes(rig: tuple[Rig, Zenoh
     assert seen[-1]["stations"][0]["measurements"] == 3
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("order", "named"),
     [

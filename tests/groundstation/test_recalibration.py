@@ -55,6 +55,7 @@ def test_a_block_is_uploaded_applied_at_rest_and_told(rig: Rig) -> None:
     assert rig.tube(1).tube.parameters == block()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("seed", range(3))
 def test_a_block_arrives_through_loss_repetition_disorder_and_damage(tmp_path: Path, seed: int) -> None:
     rig = Rig(tmp_path, [3, 2, 1], seed, loss=0.3, duplicate=0.3, corrupt=0.05, jitter_ms=50.0)

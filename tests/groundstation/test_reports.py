@@ -68,6 +68,7 @@ def section(document: Document, title: str) -> Section:
     return next(s for s in document.sections if s.title.startswith(title))
 
 
+@pytest.mark.slow
 def test_the_report_of_a_wall_says_what_is_wrong_and_what_to_do(judged: tuple[Wall, Judgement]) -> None:
     wall, judgement = judged
     document = wall_report(wall, judgement, origin_of(wall))
@@ -103,6 +104,7 @@ def record(judged: tuple[Wall, Judgement], name: str) -> ColumnRecord:
     return next(r for r in column_records(*judged) if r.design.name == name)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("name", "verdict"),
     [

@@ -81,6 +81,7 @@ def test_what_is_not_there_is_refused_with_what_is(rig: Rig, path: str, expected
     assert str(caught.value).startswith(expected)
 
 
+@pytest.mark.slow
 def test_every_answer_has_its_schema_on_the_key_of_schemas_and_begins_with_the_same(rig: Rig) -> None:
     schemas = rig.ask("schema")["schemas"]
     assert set(schemas) >= {"status", "verdict", "alarms", "stations/{n}", *STREAMS}

@@ -54,6 +54,7 @@ def test_a_steady_rate_stays_what_it_is(rate: float, late: float) -> None:
     assert max(found.doubts) < 1e-12
 
 
+@pytest.mark.slow
 @given(st.lists(LATE, min_size=12, max_size=12), RATES)
 def test_a_ramp_is_followed_to_the_end_of_every_cycle(late: list[float], more: float) -> None:
     found = Late(late, [-1.0, 12 * PERIOD], [1.3, 1.3 + more])  # not through zero, beyond which nothing is carried

@@ -88,6 +88,7 @@ print([sum(function.stats.cache_misses.values()) for function in (step.node_step
     assert done.stdout.splitlines() == [str(tmp_path / "node" / "__init__.py"), "[0, 0]"]
 
 
+@pytest.mark.slow
 def test_an_edited_kernel_is_another(tmp_path: Path) -> None:
     digest = digest_in(copied(tmp_path))
     assert digest == digest_in(ROOT)

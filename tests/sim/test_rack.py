@@ -147,6 +147,7 @@ def test_a_section_without_presets_is_none() -> None:
         CalibrationSection()  # type: ignore[call-arg]
 
 
+@pytest.mark.slow
 def test_an_operator_waits_for_a_ground_station_that_does_not_know_the_time_yet(tmp_path: Path) -> None:
     world = World(load_scenario(FIELD), 1)
     rig = InlineRig(world, {}, "rig-1", tmp_path)

@@ -57,6 +57,7 @@ SPINNING = (1020.0 + TURN.ramp, 1020.0 + TURN.duration - TURN.ramp)  # smooth: b
 UNWINDING = (1020.0 + TURN.duration, 1020.0 + TURN.duration + 3.0)  # the drive stands
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("string", "span"), [(perfect, SPINNING), (twisted, SPINNING), (twisted, UNWINDING)])
 def test_rates_integrated_give_the_attitude_back(string: Callable[[], TubeTruth], span: tuple[float, float]) -> None:
     """A sixth-order Magnus integrator on the rates of one tube's drilling, against the attitude itself."""

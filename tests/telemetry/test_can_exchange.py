@@ -141,6 +141,7 @@ def test_what_must_not_be_lost_survives_a_joint_that_opens_in_its_middle() -> No
     assert len(upper.queue) == 0
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("largest", [8, 64])
 def test_links_on_the_native_profile_lose_nothing_over_a_wire_that_does(largest: int) -> None:
     draw = random.Random(5)

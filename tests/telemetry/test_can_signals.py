@@ -51,6 +51,7 @@ def expressible(message: Any) -> list[int]:
         raise
 
 
+@pytest.mark.slow
 @given(cyclic())
 def test_a_message_arrives_within_a_step_and_a_relay_changes_nothing(message: Any) -> None:
     native, raws = native_of(message), expressible(message)

@@ -41,6 +41,7 @@ def texts(quantity: Quantity) -> st.SearchStrategy[str]:
     return st.sampled_from(quantity.choices) if quantity.choices else st.text(max_size=MAX_TEXT)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("spec", COMMANDS, ids=lambda spec: f"{spec.name} {spec.action}".strip())
 @given(data=st.data())
 def test_whatever_the_table_allows_is_read_checked_and_sent(spec: CommandSpec, data: st.DataObject) -> None:

@@ -161,6 +161,7 @@ WRONG = st.one_of(
 )
 
 
+@pytest.mark.slow
 @given(ANY, st.data())
 def test_a_wrong_value_in_the_right_shape_is_refused_or_within_range(message: Any, data: st.DataObject) -> None:
     rows = msgpack.unpackb(encode(message))

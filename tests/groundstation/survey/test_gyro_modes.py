@@ -130,6 +130,7 @@ def test_a_hybrid_of_the_set_is_the_publishers_up_to_its_gate_and_its_drift_beyo
         assert np.max(error[1:last]) < 1e-3, name
 
 
+@pytest.mark.slow
 def test_the_set_has_its_tools_by_name_and_says_what_it_lacks() -> None:
     names = owsg_names()
     assert {"MWD+IFR1+SAG+MS", "MWD+SRGM+AX", "MWD+IFR2+AX+SAG", "GYRO-MWD", "INC-ONLY", "EMS+HRGM+AX"} <= set(names)

@@ -104,6 +104,7 @@ def test_published_models_give_the_regions_their_publisher_computes(path: Path) 
         np.testing.assert_allclose(cov[1:] / scale, expected / scale, rtol=0.0, atol=1e-3, err_msg=name)
 
 
+@pytest.mark.slow
 def test_all_published_models_are_read_and_two_need_a_parameter() -> None:
     for path in FILES:
         given = {"GZRunningSpeed": 1800.0} if name_of(path) in NEEDING else None

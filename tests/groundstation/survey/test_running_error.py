@@ -144,6 +144,7 @@ BAD = [
 ]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("station", BAD)
 @pytest.mark.parametrize("before", [0, 1, 2])
 def test_a_refused_station_leaves_everything_as_it_was(station: tuple[float, float, float, float], before: int) -> None:

@@ -51,6 +51,7 @@ def line(count: int, spacing: float) -> np.ndarray:
     return np.stack([np.zeros(count), spacing * np.arange(count)], axis=1)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("cv", [0.03, 0.05, 0.10, 0.15])
 @pytest.mark.parametrize("correlation", [0.0, 0.6, 1.0])
 def test_uncertain_radii_make_a_joint_as_doubtful_as_drawn_columns(cv: float, correlation: float) -> None:
@@ -70,6 +71,7 @@ def test_uncertain_radii_make_a_joint_as_doubtful_as_drawn_columns(cv: float, co
     assert found == pytest.approx(drawn, rel=0.03, abs=4.0 * math.sqrt(drawn / DRAWS))
 
 
+@pytest.mark.slow
 def test_a_coefficient_of_variation_of_ten_percent_makes_a_good_joint_a_bad_one() -> None:
     chances = []
     for cv in (0.0, 0.03, 0.05, 0.10, 0.15):
