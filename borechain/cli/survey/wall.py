@@ -96,6 +96,9 @@ def write_report(found: Wall, judgement: Judgement, column: str | None, day: dat
     from groundstation.report.document import Origin, report_pdf
     from groundstation.report.wall_report import report_on
 
+    names = [plan.design.name for plan in found.plans]
+    if column is not None and column not in names:
+        raise InputFault(f"--column: expected one of {', '.join(names)}, got {column}")
     digests = [(f"SHA-256 of {name}", digest) for name, digest in found.file.digests()]
     write_whole(path, report_pdf(report_on(found, judgement, column, Origin(day, __version__, digests))))
 
