@@ -16,7 +16,7 @@ import msgpack
 from groundstation.errors import GroundError, SelectorError
 from groundstation.service.intake import BEGIN, Intake, pack_intake
 from groundstation.service.orders import Order
-from groundstation.service.paths import LONGEST_NUMBER, PATTERNS, check_parameters, find, paths
+from groundstation.service.paths import FIXED, LONGEST_NUMBER, PATTERNS, check_parameters, find, paths
 from groundstation.service.process import GroundProcess
 from telemetry import keys
 from telemetry.errors import TelemetryError
@@ -47,12 +47,14 @@ class ZenohGateway:
 
     def __init__(self, bus: ZenohBus, process: GroundProcess) -> None:
         self._bus = bus
+        self._loop = asyncio.get_running_loop()
         self._rig = process.config.rig
         self._process = process
         self._operator = process.operator
         self._inbox: Inbox[tuple[Handler, Query]] = Inbox(WAITING)
         self._awaited: set[asyncio.Task[None]] = set()
         self._publishers: dict[str, Publisher] = {}
+        self._late: dict[str, None] = {}  # paths of the hole that are to be put
         self._intake = bus.publisher(keys.INTAKE.format(rig=self._rig), MSGPACK, droppable=True)
         self._taped = 0  # newest event of the intake that was published, 0 while nobody listens
         self._told = dict(process.model.seen)  # newest row of each stream that was published, or there before
@@ -80,7 +82,9 @@ class ZenohGateway:
             refuse(query, f"{query.selector_key}: the ground station failed: {type(error).__name__}")
 
     def close(self) -> None:
-        """Answer nothing more; from the loop or a signal handler of it."""
+        """Publish what is left and answer nothing more; from the loop or a signal handler of it."""
+        while self._late:
+            self._publish_next()
         self._process.listeners.remove(self._publish)
         self._inbox.close()
 
@@ -93,13 +97,36 @@ class ZenohGateway:
         return keys.GROUND.format(rig=self._rig, path=path)
 
     def _publish(self, changed: list[str]) -> None:
-        """Put the present value of each path, and before it what it came from."""
+        """Put the present value of each path, and before it what it came from.
+
+        What shows the whole hole is put one path a turn of the loop: who asks meanwhile waits for one of them at most.
+        """
         self._publish_intake()
+        late = dict.fromkeys(path for path in changed if path in FIXED and FIXED[path].is_of_the_hole)
         for path in changed:
-            if path not in self._publishers:
-                self._publishers[path] = self._bus.publisher(self._key(path), JSON, droppable=True)
-            if path not in BEATS or self._publishers[path].is_heard:
-                self._publishers[path].put(pack(self._news(path), "json"))
+            if path not in late:
+                self._put(path)
+        if late and not self._late:
+            self._loop.call_soon(self._publish_in_turn)
+        self._late |= late
+
+    def _publish_in_turn(self) -> None:
+        if len(self._late) > 1:
+            self._loop.call_soon(self._publish_in_turn)
+        if self._late:
+            self._publish_next()
+
+    def _publish_next(self) -> None:
+        """Put the value of the path that has waited longest."""
+        path = next(iter(self._late))
+        del self._late[path]
+        self._put(path)
+
+    def _put(self, path: str) -> None:
+        if path not in self._publishers:
+            self._publishers[path] = self._bus.publisher(self._key(path), JSON, droppable=True)
+        if path not in BEATS or self._publishers[path].is_heard:
+            self._publishers[path].put(pack(self._news(path), "json"))
 
     def _publish_intake(self) -> None:
         """Put what was taken in since the last time; whoever began to listen gets all that is kept first."""

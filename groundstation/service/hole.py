@@ -143,6 +143,7 @@ class Hole:
         self._deviations = [self._deviation_of(self._trajectory.points[0])]
         self._projection: Deviation | None = None
         self._unsettled_since = math.inf  # s, rig time of the oldest survey from which nothing follows yet
+        self.version = 0  # grows with every survey
 
     def add_stop(self, stop: ResolvedStop, epoch: int) -> None:
         """Take a survey with rig time of an epoch.
@@ -153,6 +154,7 @@ class Hole:
             When it cannot be weighed; it was not taken.
         """
         np.linalg.inv(stop.direction.total_cov)
+        self.version += 1
         if self._history.begins_stop(epoch, stop.at):
             self.settle()
             self._history.add(self._deviations, self._projection)

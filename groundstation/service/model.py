@@ -4,7 +4,9 @@ from __future__ import annotations
 
 import math
 from collections import Counter, deque
+from collections.abc import Callable
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -28,6 +30,7 @@ from groundstation.survey.trust import Trust, trust_of, with_unknown_yaw
 from telemetry.messages import EPOCH_UNKNOWN, Event, NodeFlag, NodeState, StaticRecord, SurveyMeasurement
 
 Array = npt.NDArray[np.float64]
+View = dict[str, Any]
 EVENTS_SHOWN = 10_000
 STATIC_RECORDS_SHOWN = 1_000
 ACCELEROMETER_NOISE_DEG = 0.02  # one sample, for the check of motion
@@ -79,6 +82,7 @@ class RigModel:
         self.hole = Hole(config)
         self.recalibration = FieldProcedure(config.gravity)
         self.orders = OrderBook()
+        self._shown: dict[Callable[..., View], tuple[int, View]] = {}
         self.wall = None if config.wall is None else LiveWall(config.wall, config.hole)
 
     @property
@@ -227,6 +231,13 @@ class RigModel:
             math.radians(self.config.mount_std_deg) ** 2,
             math.radians(self.config.accelerometer_bias_std_deg) * self.config.gravity,
         )
+
+    def last_shown(self, view: Callable[[RigModel, dict[str, str]], View]) -> View:
+        """What a view of the hole shows; worked out anew where a survey has come since."""
+        version = self.hole.version
+        if self._shown.get(view, (-1,))[0] != version:
+            self._shown[view] = version, view(self, {})
+        return self._shown[view][1]
 
     def fused(self, station: SurveyStation) -> Direction:
         """Direction of a station from the clusters that count."""

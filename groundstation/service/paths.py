@@ -25,15 +25,20 @@ def _station_numbers(k: RigModel) -> range:
 
 @dataclass(frozen=True, slots=True)
 class Path:
-    """One answerable path below ``ground/``: what it shows, its fields, and which parameters it takes."""
+    """One answerable path below ``ground/``: what it shows, its fields, and which parameters it takes.
+
+    One that shows the hole alone changes with a survey only, and is asked for far more often.
+    """
 
     view: Callable[[RigModel, Parameters], View]
     own: Fields
     parameters: tuple[str, ...] = ()
+    is_of_the_hole: bool = False
 
     def show(self, k: RigModel, p: Parameters) -> View:
-        """The whole answer: what every answer has, and the view."""
-        return header(k) | self.view(k, p)
+        """The whole answer: what every answer has, and the view; whoever takes it changes nothing in it."""
+        shown = k.last_shown(self.view) if self.is_of_the_hole and not p else self.view(k, p)
+        return header(k) | shown
 
     @property
     def fields(self) -> Fields:
@@ -73,13 +78,13 @@ FIXED: dict[str, Path] = {
     "status": Path(views.status, key_fields.STATUS),
     "verdict": Path(verdict_views.verdict, key_fields.VERDICT),
     "string": Path(views.string, key_fields.STRING),
-    "stations": Path(views.stations, key_fields.STATIONS, ("md",)),
+    "stations": Path(views.stations, key_fields.STATIONS, ("md",), is_of_the_hole=True),
     "measurements": Path(views.measurements, key_fields.MEASUREMENTS, ("station", "tube", *STREAMED)),
-    "trajectory": Path(views.trajectory, key_fields.TRAJECTORY, ("md",)),
+    "trajectory": Path(views.trajectory, key_fields.TRAJECTORY, ("md",), is_of_the_hole=True),
     "events": Path(views.events, key_fields.EVENTS, ("tube", *STREAMED)),
     "static_records": Path(views.static_records, key_fields.STATIC_RECORDS, ("tube", *STREAMED)),
-    "uncertainty": Path(column_views.uncertainty, key_fields.UNCERTAINTY, ("confidence",)),
-    "column": Path(column_views.column, key_fields.COLUMN, ("moment",)),
+    "uncertainty": Path(column_views.uncertainty, key_fields.UNCERTAINTY, ("confidence",), is_of_the_hole=True),
+    "column": Path(column_views.column, key_fields.COLUMN, ("moment",), is_of_the_hole=True),
     "history": Path(column_views.history, key_fields.HISTORY, ("points",)),
     "wall": Path(wall_views.wall, key_fields.WALL),
     "alarms": Path(alarm_views.alarms, key_fields.ALARMS),

@@ -9,6 +9,7 @@ themselves.
 from __future__ import annotations
 
 import math
+from bisect import bisect_left
 from collections.abc import Sequence
 from itertools import pairwise
 
@@ -27,6 +28,7 @@ class SharedErrors:
 
     def __init__(self) -> None:
         self._columns: dict[Name, int] = {}
+        self._places: dict[str, list[int]] = {}  # of the columns of each kind, in the order of their coming
 
     def __len__(self) -> int:
         return len(self._columns)
@@ -56,7 +58,7 @@ class SharedErrors:
         each = math.sqrt((systematic_var - mount_var) / len(chain))
         columns.extend((joint, each * resolved.by_yaw) for joint in chain)
         columns.extend((("bias", tube, axis), force_bias_std * resolved.by_force[:, axis]) for axis in range(3))
-        indices = [self._columns.setdefault(name, len(self._columns)) for name, _ in columns]
+        indices = [self._place_of(name) for name, _ in columns]
         shared = np.zeros((2, len(self._columns)))
         for index, (_, column) in zip(indices, columns, strict=True):
             shared[:, index] = column
@@ -64,11 +66,16 @@ class SharedErrors:
 
     def by_kind(self, columns: Array) -> dict[str, Array]:
         """Covariance (k, k) of something linear in the readings, by kind of shared error; ``columns`` (k, s)."""
-        places: dict[str, list[int]] = {}
-        for name, index in self._columns.items():
-            if index < columns.shape[1]:
-                places.setdefault(KINDS[str(name[0])], []).append(index)
-        return {kind: columns[:, at] @ columns[:, at].T for kind, at in places.items()}
+        width = columns.shape[1]
+        parts = {kind: columns[:, at[: bisect_left(at, width)]] for kind, at in self._places.items() if at[0] < width}
+        return {kind: part @ part.T for kind, part in parts.items()}
+
+    def _place_of(self, name: Name) -> int:
+        """Place of an error's column, the next one where it is met for the first time."""
+        if name not in self._columns:
+            self._columns[name] = len(self._columns)
+            self._places.setdefault(KINDS[str(name[0])], []).append(self._columns[name])
+        return self._columns[name]
 
     @staticmethod
     def _chain(tube: int, above: Sequence[int] | None) -> list[Name]:
