@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import itertools
 import json
+import math
 import time
 from dataclasses import dataclass
 from functools import partial
@@ -31,7 +32,7 @@ SETTLED_S = 5.0  # after all have been heard, until it is measured
 HEARD_WITHIN_S = 60.0
 LEFT_WITHIN_S = 30.0
 DRILLED_M = 8.0  # at most in a run, however long
-FASTEST = 0.1  # m/s, of the bit
+WEIGH_EVERY_S = 30.0
 SPARE_M = 20.0  # of the design below all tubes
 ROUNDING = 2
 
@@ -61,7 +62,7 @@ def measure(load: Load, endpoint: str, page: PageSettings, folder: Path) -> dict
     try:
         table.warm()
         with open_router(endpoint) as bus:
-            crowd = Crowd(load.tubes, bus, RIG, min(DRILLED_M * ROUND_S / DRILLING_S / load.seconds, FASTEST))
+            crowd = Crowd(load.tubes, bus, RIG, speed_of(load.seconds))
             with living(crowd, bus, RIG):
                 table.start(GROUND)
                 ground = Ground(bus, RIG)
@@ -83,6 +84,16 @@ def measure(load: Load, endpoint: str, page: PageSettings, folder: Path) -> dict
                 }
     finally:
         table.stop()
+
+
+def speed_of(seconds: float) -> float:
+    """Speed of the bit (m/s) at which every round drills the same whole part of a tube.
+
+    So the nodes of later rounds pass the stations of earlier ones, as in a real hole, and the stations stay as many as
+    the depth has room for.
+    """
+    rounds = math.ceil(seconds / ROUND_S)
+    return TUBE_LENGTH / math.ceil(rounds * TUBE_LENGTH / DRILLED_M) / DRILLING_S
 
 
 def wait_for_all(ground: Ground, tubes: int) -> None:
@@ -111,26 +122,24 @@ def readers_of(load: Load, endpoint: str, page: PageSettings, until: float, fold
     return browsers | terminals
 
 
-def bear(ground: Ground, table: ProcessTable, until: float) -> tuple[list[float], dict[str, float]]:
+def bear(ground: Ground, table: ProcessTable, until: float) -> tuple[list[float], dict[str, Any]]:
     """Ask until a time (s, monotonic): how long each answer took (s), and what the ground station needed meanwhile."""
     time.sleep(SETTLED_S)
     pid = pids(table)[GROUND]
-    begun, cpu, before = time.monotonic(), cpu_seconds(pid), footprint(pid)["private_mb"]
-    taken = []
+    begun, cpu = time.monotonic(), cpu_seconds(pid)
+    taken: list[float] = []
+    weighed: list[tuple[float, float]] = []  # s, MB
     for path in itertools.cycle(ASKED):
         asked = time.monotonic()
+        if asked >= begun + WEIGH_EVERY_S * len(weighed) or asked >= until:
+            weighed.append((round(asked - begun, ROUNDING), round(footprint(pid)["private_mb"], ROUNDING)))
         if asked >= until:
             break
         ground.ask(path)
         taken.append(time.monotonic() - asked)
         time.sleep(ASK_EVERY_S)
-    after = footprint(pid)["private_mb"]
-    cost = {
-        "cpu_percent": round(100.0 * (cpu_seconds(pid) - cpu) / (time.monotonic() - begun), ROUNDING),
-        "private_mb_before": round(before, ROUNDING),
-        "private_mb_after": round(after, ROUNDING),
-    }
-    return taken, cost
+    cpu_percent = 100.0 * (cpu_seconds(pid) - cpu) / (time.monotonic() - begun)
+    return taken, {"cpu_percent": round(cpu_percent, ROUNDING), "memory_s_mb": weighed}
 
 
 def late(folder: Path, who: str) -> list[float]:

@@ -9,25 +9,38 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 
+import numpy as np
+import numpy.typing as npt
+
 from groundstation.survey.columns import Deviation
 
+Array = npt.NDArray[np.float64]
 KEPT = 512  # moments; of more every second of the older half goes
 SAME_STOP = 15.0  # s, within which two surveys were taken at one stop
 
 
 @dataclass(frozen=True, slots=True)
 class Moment:
-    """What was known at one time: deviations at the stations from the collar down, and at the target."""
+    """What was known at one time: deviations at the stations from the collar down, and at the target.
+
+    The deviations are kept as one array, a row a station: as objects those of a day would need a hundred megabytes.
+    """
 
     number: int
     at: float  # s, rig time of the newest survey
-    rows: tuple[Deviation, ...]
+    table: Array  # (n, 9): measured depth, along, offset (2), covariance (4), limit
     projection: Deviation | None
+
+    @property
+    def rows(self) -> list[Deviation]:
+        """Deviations from the collar down."""
+        values = zip(*(self.table[:, k].tolist() for k in (0, 1, -1)), self.table, strict=True)
+        return [Deviation(md, along, row[2:4], row[4:8].reshape(2, 2), limit) for md, along, limit, row in values]
 
     @property
     def deepest(self) -> float:
         """Measured depth of the newest station, m."""
-        return self.rows[-1].md
+        return float(self.table[-1, 0])
 
     @property
     def about(self) -> Deviation:
@@ -53,7 +66,8 @@ class History:
     def add(self, rows: Sequence[Deviation], projection: Deviation | None) -> None:
         """Keep what is known at the end of a stop."""
         self.count += 1
-        self.moments.append(Moment(self.count, self._newest[1], tuple(rows), projection))
+        table = np.array([(d.md, d.along, *d.offset, *d.cov.ravel(), d.limit) for d in rows])
+        self.moments.append(Moment(self.count, self._newest[1], table, projection))
         if len(self.moments) > KEPT:
             half = KEPT // 2
             self.moments = self.moments[:half:2] + self.moments[half:]

@@ -16,7 +16,7 @@ from borechain.cli.options import json_option
 from borechain.cli.tables import console
 
 FOLDER = Path(__file__).parents[3] / "benchmarks"
-OWN = {"realtime": "realtime", "page": "load", "killed": "load"}  # and the module of each
+OWN = {"realtime": "realtime", "page": "load", "day": "load", "killed": "load"}  # and the module of each
 
 
 def benches() -> list[str]:
@@ -63,6 +63,7 @@ def bench(context: click.Context) -> None:
       borechain bench survey
       borechain bench realtime --nodes 50 --seconds 120
       borechain bench page
+      borechain bench day --hours 24
       borechain bench killed --times 200
     """
     if context.invoked_subcommand is None:

@@ -1,11 +1,11 @@
-"""``borechain bench page`` and ``killed``: a real ground station under load, and one that is killed again and again."""
+"""``borechain bench page``, ``day`` and ``killed``: a ground station under load, of a long past, killed again."""
 
 from __future__ import annotations
 
 import json
 import tempfile
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import click
 
@@ -13,8 +13,15 @@ from borechain.cli.faults import EnvironmentFault, needs, plain_faults
 from borechain.cli.options import json_option, seed_option
 from telemetry import keys
 
+if TYPE_CHECKING:
+    from groundstation.gateway.page.settings import PageSettings
+
 endpoint_option = click.option(
     "--endpoint", default=keys.DEFAULT_ENDPOINT, show_default=True, help="Where its router listens."
+)
+
+page_option = click.option(
+    "--page", "address", metavar="HOST:PORT", default="127.0.0.1:8080", show_default=True, help="Of the page."
 )
 
 
@@ -25,9 +32,7 @@ endpoint_option = click.option(
 @click.option(
     "--seconds", type=click.FloatRange(5.0, 86400.0), default=150.0, show_default=True, help="Of the measurement."
 )
-@click.option(
-    "--page", "address", metavar="HOST:PORT", default="127.0.0.1:8080", show_default=True, help="Of the page."
-)
+@page_option
 @endpoint_option
 @json_option
 @needs("rich", "scipy", "sqlalchemy", "starlette", "uvicorn")
@@ -40,12 +45,8 @@ def page(tubes: int, browsers: int, terminals: int, seconds: float, address: str
       borechain bench page --tubes 50 --browsers 3 --terminals 2
     """
     from borechain.load.page import Load, measure
-    from groundstation.gateway.page.settings import PageSettings, listen, parse_address
-    from sim.rig.launcher import check_port_free
 
-    served = PageSettings(*parse_address(address))
-    listen(served).close()
-    check_port_free(endpoint)
+    served = free_page(address, endpoint)
     load = Load(tubes, browsers, terminals, seconds)
     with tempfile.TemporaryDirectory(prefix="borechain-") as folder:
         result: dict[str, Any] = {"bench": "page", "tubes": tubes, "seconds": seconds}
@@ -53,12 +54,57 @@ def page(tubes: int, browsers: int, terminals: int, seconds: float, address: str
     if as_json:
         click.echo(json.dumps(result))
         return
-    memory = f"{result['private_mb_before']:.1f} MB before, {result['private_mb_after']:.1f} MB after"
+    begin, *_, end = result["memory_s_mb"]
+    middle = result["memory_s_mb"][len(result["memory_s_mb"]) // 2]
+    memory = f"{begin[1]:.1f} MB at first, {middle[1]:.1f} MB after {middle[0]:.0f} s, {end[1]:.1f} MB at the end"
     click.echo(f"ground station: {result['cpu_percent']:.1f} % of a core, {memory}")
     for name, what in (("browser", "news on the page"), ("terminal", "news on the keys")):
         click.echo(line(f"{what}, {name}", result[f"{name}_late_ms"]))
     click.echo(line("answers to questions", result["answer_ms"]))
     click.echo(f"{result['stations']} stations of {result['surveys']} surveys")
+
+
+def free_page(address: str, endpoint: str) -> PageSettings:
+    """Where a page is to be, once nobody else is found there or at the endpoint; a plain error otherwise."""
+    from groundstation.gateway.page.settings import PageSettings, listen, parse_address
+    from sim.rig.launcher import check_port_free
+
+    served = PageSettings(*parse_address(address))
+    listen(served).close()
+    check_port_free(endpoint)
+    return served
+
+
+@click.command()
+@click.option("--hours", type=click.FloatRange(0.1, 168.0), default=24.0, show_default=True, help="Of drilling.")
+@click.option("--tubes", type=click.IntRange(1, 250), default=50, show_default=True, help="That survey at every stop.")
+@page_option
+@endpoint_option
+@json_option
+@needs("rich", "scipy", "sqlalchemy", "starlette", "uvicorn")
+@plain_faults
+def day(hours: float, tubes: int, address: str, endpoint: str, as_json: bool) -> None:
+    """Start a ground station upon the surveys of hours of drilling, and open its history on the page.
+
+    \b
+    Example:
+      borechain bench day --hours 24
+    """
+    from borechain.load.day import measure_day
+
+    served = free_page(address, endpoint)
+    with tempfile.TemporaryDirectory(prefix="borechain-") as folder:
+        result: dict[str, Any] = {"bench": "day", "hours": hours, "tubes": tubes}
+        result |= measure_day(hours, tubes, endpoint, served, Path(folder))
+    if as_json:
+        click.echo(json.dumps(result))
+        return
+    start = f"answers {result['started_s']:.1f} s after its start"
+    click.echo(f"{result['surveys']} surveys at {result['stations']} stations: {start}")
+    again = f"asked again {result['history_ms']:.0f} ms"
+    click.echo(f"page opened: {result['picture_ms']:.0f} ms until the history has come; {again}")
+    click.echo(line("an earlier moment", result["moment_ms"]))
+    click.echo(f"memory: {result['private_mb']:.0f} MB")
 
 
 def line(what: str, figures: dict[str, Any]) -> str:
