@@ -6,7 +6,9 @@ somebody asks for it: fifty tubes would keep the ground station busy for the len
 
 from __future__ import annotations
 
+import itertools
 import math
+from bisect import bisect_left, insort
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -15,7 +17,15 @@ from groundstation.config import GroundConfig
 from groundstation.service.alarms import AlarmList
 from groundstation.service.history import SAME_STOP, History
 from groundstation.survey.columns import Deviation, deviation, project
-from groundstation.survey.fusion import Departure, Evidence, Weighting, departure, judge_departure, weighted
+from groundstation.survey.fusion import (
+    Departure,
+    Evidence,
+    GrowingBayes,
+    Weighting,
+    departure_from,
+    judge_departure,
+    weighted,
+)
 from groundstation.survey.resolve import Direction, Quality
 from groundstation.survey.trajectory import Point, Trajectory
 from groundstation.survey.trust import UNKNOWN_YAW_VAR, Trust
@@ -56,6 +66,8 @@ class SurveyStation:
     drops: list[int] = field(default_factory=list)
     _departures: dict[int, Departure] = field(default_factory=dict)
     _fused: tuple[tuple[int, ...], Direction] | None = None  # with what it was made of
+    _counted: GrowingBayes = field(default_factory=GrowingBayes)
+    _earlier: GrowingBayes = field(default_factory=GrowingBayes)
 
     @property
     def count(self) -> int:
@@ -101,7 +113,9 @@ class SurveyStation:
         """Direction from the clusters that count; worked out anew where one has come or does not count any more."""
         made_of = (self.count, *self.drops)
         if self._fused is None or self._fused[0] != made_of:
-            self._fused = made_of, weighted(self.readings(), weighting)
+            readings = self.readings()
+            is_sum = weighting is Weighting.BAYES
+            self._fused = made_of, self._counted.of(readings) if is_sum else weighted(readings, weighting)
         return self._fused[1]
 
     def departure(self, place: int) -> Departure | None:
@@ -110,7 +124,8 @@ class SurveyStation:
         if first == place:
             return None
         if place not in self._departures:
-            self._departures[place] = departure([c.direction for c in self.clusters[first : place + 1]])
+            earlier = self._earlier.of([c.direction for c in self.clusters[first:place]])
+            self._departures[place] = departure_from(earlier, self.clusters[place].direction)
         return self._departures[place]
 
 
@@ -134,6 +149,7 @@ class Hole:
 
     def __init__(self, config: GroundConfig) -> None:
         self._config = config
+        self._design = config.design
         self._stations: list[SurveyStation] = []
         self._moved: list[Moved] = []
         self._alarms = AlarmList()
@@ -143,6 +159,7 @@ class Hole:
         self._deviations = [self._deviation_of(self._trajectory.points[0])]
         self._projection: Deviation | None = None
         self._unsettled_since = math.inf  # s, rig time of the oldest survey from which nothing follows yet
+        self._newest_at = -math.inf  # s, rig time of the newest survey
         self.version = 0  # grows with every survey
 
     def add_stop(self, stop: ResolvedStop, epoch: int) -> None:
@@ -161,6 +178,7 @@ class Hole:
         self._history.on_survey(epoch, stop.at)
         self._station_at(stop.md).add_stop(stop)
         self._unsettled_since = min(self._unsettled_since, stop.at)
+        self._newest_at = max(self._newest_at, stop.at)
 
     @property
     def stations(self) -> list[SurveyStation]:
@@ -214,11 +232,10 @@ class Hole:
         self._draw([(one.md, one.fused(self._config.weighting)) for one in self._stations if one.md > 0.0])
         if not self._drawn:
             return
-        at = max(cluster.at for station in self._stations for cluster in station.clusters)
         worst = max(self._deviations[1:], key=lambda d: d.ratio)
-        self._projection = project(self._trajectory.points[-1], self._drawn[-1][1], self._config.design)
-        self._alarms.judge_deviation("deviation", worst, at)
-        self._alarms.judge_deviation("projection", self._projection, at)
+        self._projection = project(self._trajectory.points[-1], self._drawn[-1][1], self._design)
+        self._alarms.judge_deviation("deviation", worst, self._newest_at)
+        self._alarms.judge_deviation("projection", self._projection, self._newest_at)
 
     def _draw(self, stations: list[tuple[float, Direction]]) -> None:
         """Trajectory through stations (m, direction); where none has changed the new ones are added to it."""
@@ -231,15 +248,17 @@ class Hole:
             self._drawn.append((md, direction))
 
     def _deviation_of(self, point: Point) -> Deviation:
-        return deviation(point, self._config.design)
+        return deviation(point, self._design)
 
     def _station_at(self, md: float) -> SurveyStation:
-        for station in self._stations:
+        first = bisect_left(self._stations, md - 2.0 * self._config.station_tolerance, key=lambda known: known.md)
+        for station in itertools.islice(self._stations, first, None):
             if abs(station.md - md) <= self._config.station_tolerance:
                 return station
+            if station.md > md:
+                break
         station = SurveyStation(md)
-        self._stations.append(station)
-        self._stations.sort(key=lambda known: known.md)
+        insort(self._stations, station, key=lambda known: known.md)
         return station
 
     def _judge_movement(self, since: float) -> None:
@@ -247,7 +266,7 @@ class Hole:
 
         Each stop is judged as a whole, so the order in which its surveys arrive changes nothing.
         """
-        stops = [stop for stop in self._stops() if stop[-1][0] >= since]
+        stops = self._stops(since)
         begin = stops[0][0][0]
         self._moved = [moved for moved in self._moved if moved.at < begin]
         for stop in stops:
@@ -256,15 +275,31 @@ class Hole:
         for stop in stops:
             self._judge_stop(stop)
 
-    def _stops(self) -> list[list[tuple[float, int, int]]]:
-        """Clusters as (time, station, place) in the order of time, parted where the string was not read for a while."""
-        every = sorted((c.at, n, place) for n, s in enumerate(self._stations) for place, c in enumerate(s.clusters))
+    def _stops(self, since: float) -> list[list[tuple[float, int, int]]]:
+        """Stops that lasted to rig time ``since`` (s) or came later: clusters as (time, station, place) in their order.
+
+        They are parted where the string was not read for a while.
+        """
+        begin, recent = since, self._clusters_after(since - SAME_STOP)
+        while recent and recent[0][0] < begin:
+            begin = recent[0][0]
+            recent = self._clusters_after(begin - SAME_STOP)
         stops: list[list[tuple[float, int, int]]] = []
-        for cluster in every:
+        for cluster in recent:
             if not stops or cluster[0] - stops[-1][-1][0] >= SAME_STOP:
                 stops.append([])
             stops[-1].append(cluster)
         return stops
+
+    def _clusters_after(self, time: float) -> list[tuple[float, int, int]]:
+        """Clusters read later than a rig time (s) as (time, station, place), in their order."""
+        found = []
+        for number, station in enumerate(self._stations):
+            for place in range(station.count - 1, -1, -1):
+                if station.clusters[place].at <= time:
+                    break
+                found.append((station.clusters[place].at, number, place))
+        return sorted(found)
 
     def _judge_stop(self, stop: list[tuple[float, int, int]]) -> None:
         """Neighbours are the nearest stations above and below that were read at the same stop."""

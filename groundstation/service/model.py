@@ -181,9 +181,12 @@ class RigModel:
     def _fuse(self, measurement: SurveyMeasurement, md: float, trust: Trust) -> None:
         forces = np.array([imu.force for imu in measurement.imus])
         covs = np.array([imu.force_cov for imu in measurement.imus])
-        direction = self._direction(measurement, trust, *combine_imus(forces, covs))
+        combined = combine_imus(forces, covs)
+        direction = self._direction(measurement, trust, *combined)
         noise = math.radians(ACCELEROMETER_NOISE_DEG) * self.config.gravity
-        quality = check(forces, covs, self.config.gravity, measurement.samples, measurement.settle_time, noise)
+        quality = check(
+            forces, covs, combined, self.config.gravity, measurement.samples, measurement.settle_time, noise
+        )
         epoch = measurement.epoch or self.epoch
         number = self.seen["measurements"] + 1
         self.hole.add_stop(ResolvedStop(measurement, md, direction, quality, trust, number), epoch)

@@ -11,6 +11,7 @@ import math
 import re
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 import numpy.typing as npt
@@ -82,7 +83,7 @@ def tolerance(name: str) -> Tolerance:
     return Tolerance(name, start, growth)
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True)  # with a dictionary, for what is worked out once
 class Design:
     """Axis of a column and what it is to become."""
 
@@ -94,13 +95,13 @@ class Design:
     radius: float = 0.6  # m, of the finished column
     tolerance: Tolerance = PRESETS["en-12716"]
 
-    @property
+    @cached_property
     def axis(self) -> Array:
         """Unit vector (3,) down the axis."""
         s = math.sin(self.inclination)
         return np.array([s * math.cos(self.azimuth), s * math.sin(self.azimuth), math.cos(self.inclination)])
 
-    @property
+    @cached_property
     def across(self) -> Array:
         """Two unit vectors (2, 3) across the axis; for a vertical one they are north and east."""
         c = math.cos(self.inclination)

@@ -68,6 +68,24 @@ class StationFusion:
         return Direction(lean, vertical(lean, self._down), gain @ self._random @ gain, gain @ self._shared)
 
 
+class GrowingBayes:
+    """Recursive Bayes of readings that mostly grow at their end: what those before came to is used again."""
+
+    def __init__(self) -> None:
+        self._fusion = StationFusion()
+        self._taken: list[Direction] = []
+
+    def of(self, readings: Sequence[Direction]) -> Direction:
+        """The same as ``bayes``, bit for bit; worked out from the beginning where an earlier reading is another one."""
+        known = zip(self._taken, readings, strict=False)
+        if len(readings) < len(self._taken) or any(old is not new for old, new in known):
+            self._fusion, self._taken = StationFusion(), []
+        for reading in readings[len(self._taken) :]:
+            self._fusion.add_reading(reading)
+            self._taken.append(reading)
+        return self._fusion.fused()
+
+
 def vertical(lean: Array, sense: float) -> float:
     """Vertical part of a unit vector with the horizontal part ``lean``, downward where ``sense`` is positive."""
     return math.copysign(math.sqrt(1.0 - min(float(lean @ lean), 1.0)), sense)
@@ -111,13 +129,15 @@ def adapted(readings: Sequence[Direction]) -> Weighting:
 
 
 def departure(readings: Sequence[Direction]) -> tuple[Array, float]:
-    """How far the newest reading is from the earlier ones: vector (2,) and size in standard deviations; 0 for a first.
+    """How far the newest reading is from those before: vector (2,) and size in standard deviations; 0 for a first."""
+    return departure_from(bayes(readings[:-1]), readings[-1]) if len(readings) > 1 else (np.zeros(2), 0.0)
+
+
+def departure_from(earlier: Direction, newest: Direction) -> tuple[Array, float]:
+    """How far a reading is from what earlier ones came to: vector (2,) and size in standard deviations.
 
     The covariance of the difference knows what the two have in common: an error of the same mount cancels.
     """
-    if len(readings) < 2:
-        return np.zeros(2), 0.0
-    newest, earlier = readings[-1], bayes(readings[:-1])
     difference = newest.lean - earlier.lean
     apart = added(newest.shared, -earlier.shared)
     cov = newest.cov + earlier.cov + apart @ apart.T

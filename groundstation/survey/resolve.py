@@ -141,10 +141,18 @@ def combine_imus(forces: Array, covs: Array) -> tuple[Array, Array]:
     return mean, cov
 
 
-def check(forces: Array, covs: Array, gravity: float, samples: int, settle_time: float, sample_std: float) -> Quality:
-    """Quality of a stop; ``sample_std`` (m/s^2) is the sensor's own noise in one sample."""
+def check(
+    forces: Array,
+    covs: Array,
+    combined: tuple[Array, Array],
+    gravity: float,
+    samples: int,
+    settle_time: float,
+    sample_std: float,
+) -> Quality:
+    """Quality of a stop with what its IMUs come to; ``sample_std`` (m/s^2) is the sensor's own noise in one sample."""
     quality = Quality.GOOD
-    mean, cov = combine_imus(forces, covs)
+    mean, cov = combined
     if abs(float(np.linalg.norm(mean)) - gravity) > GRAVITY_TOLERANCE * gravity:
         quality |= Quality.GRAVITY
     if float(np.max(np.diagonal(covs, axis1=1, axis2=2))) * samples > (3.0 * sample_std) ** 2:

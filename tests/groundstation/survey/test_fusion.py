@@ -11,6 +11,7 @@ from hypothesis import strategies as st
 from groundstation.survey.fusion import (
     DEPARTED,
     QUADRATIC_TO,
+    GrowingBayes,
     StationFusion,
     Weighting,
     adapted,
@@ -77,6 +78,20 @@ def test_fusion_takes_any_order_and_never_averages_the_shared_error(
 
 
 @settings(max_examples=50)
+@given(st.lists(st.tuples(st.booleans(), st.integers(1, 6)), min_size=1, max_size=12))
+def test_readings_that_grow_come_to_what_all_of_them_come_to_bit_for_bit(course: list[tuple[bool, int]]) -> None:
+    """One more reading each time, or one that came late and belongs among those known."""
+    growing, readings = GrowingBayes(), list[Direction]()
+    for number, (is_late, columns) in enumerate(course, 1):
+        shared = 1e-3 * np.ones((2, columns)) * number
+        reading = near_vertical(1e-3 * number, -2e-3 * number, np.diag([1e-6, 2e-6 * number]), shared)
+        readings.insert(len(readings) // 2 if is_late else len(readings), reading)
+        mine, all_at_once = growing.of(readings), bayes(readings)
+        np.testing.assert_array_equal(mine.lean, all_at_once.lean)
+        np.testing.assert_array_equal(mine.cov, all_at_once.cov)
+        np.testing.assert_array_equal(mine.shared, all_at_once.shared)
+
+
 @given(
     st.lists(
         st.tuples(st.floats(-0.3, 0.3), st.floats(-0.3, 0.3), st.floats(1e-5, 1e-2), st.floats(1e-5, 1e-2)),

@@ -167,12 +167,16 @@ def test_a_direction_without_uncertainty_across_the_lean_is_no_survey() -> None:
 
 def test_quality_names_what_is_wrong() -> None:
     good, cov = force_at_rest(2.0 * DEG, 1.0, 0.0)[None, :], (np.eye(3) * (0.0034**2 / 32))[None, :, :]
-    assert check(good, cov, G, 32, 19.0, 0.0034) == Quality.GOOD
-    assert check(good * 1.01, cov, G, 32, 19.0, 0.0034) == Quality.GRAVITY
-    assert check(good, cov * 20.0, G, 32, 19.0, 0.0034) == Quality.MOTION
-    assert check(good, cov, G, 32, 3.0, 0.0034) == Quality.SETTLE
+
+    def judged(forces: np.ndarray, covs: np.ndarray, settle_time: float) -> Quality:
+        return check(forces, covs, combine_imus(forces, covs), G, 32, settle_time, 0.0034)
+
+    assert judged(good, cov, 19.0) == Quality.GOOD
+    assert judged(good * 1.01, cov, 19.0) == Quality.GRAVITY
+    assert judged(good, cov * 20.0, 19.0) == Quality.MOTION
+    assert judged(good, cov, 3.0) == Quality.SETTLE
     two = np.concatenate([good, good + np.array([0.02, 0.0, 0.0])])
-    assert Quality.SPREAD in check(two, np.concatenate([cov, cov]), G, 32, 19.0, 0.0034)
+    assert Quality.SPREAD in judged(two, np.concatenate([cov, cov]), 19.0)
 
 
 def test_imus_of_a_cluster_weigh_by_their_inverse_variance() -> None:
