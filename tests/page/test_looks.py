@@ -1,5 +1,6 @@
 """How the page looks: accessible in both themes, readable on a telephone and on paper, light enough for fifty tubes."""
 
+import re
 from collections.abc import Callable, Iterator
 from importlib.resources import files
 from pathlib import Path
@@ -25,7 +26,7 @@ def rig(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Beating]:
 
 def ready(page: Page) -> Page:
     expect(page.locator("#word")).to_have_text("STEER")
-    expect(page.locator("#alarm-list li")).to_have_count(1)
+    expect(page.locator("#alarm-list li").first).to_be_visible()
     return page
 
 
@@ -103,6 +104,35 @@ def test_the_joints_with_the_neighbours_stand_there_the_worst_first(tmp_path: Pa
         expect(page.locator("#joints tr").first).to_contain_text("too thin")
         page.evaluate(AXE)
         assert page.evaluate(FINDINGS) == []
+
+
+def test_the_hole_is_turned_in_three_dimensions_by_pointer_and_keyboard(rig: Beating, watched: Open) -> None:
+    """What draws it comes when it is wanted, and tells from where one looks."""
+    asked: list[str] = []
+    page = ready(watched(rig.url))
+    page.on("request", lambda request: asked.append(request.url))
+    drawing = page.locator("#plan svg")
+    expect(drawing).to_have_attribute("aria-label", re.compile("^Plan: ends"))
+    page.click("#space")
+    expect(drawing).to_have_attribute("aria-label", "3-D: towards 30 degrees, 20 degrees from above")
+    assert [url.rpartition("/")[2] for url in asked if url.endswith(".js")] == ["space.js"]
+    page.focus("#turn")
+    page.keyboard.press("ArrowRight")
+    expect(drawing).to_have_attribute("aria-label", "3-D: towards 31 degrees, 20 degrees from above")
+    box = drawing.bounding_box()
+    assert box is not None
+    middle = box["x"] + box["width"] / 2.0, box["y"] + box["height"] / 2.0
+    page.mouse.move(*middle)
+    page.mouse.down()
+    page.mouse.move(middle[0] - 10.0, middle[1] + 200.0)
+    page.mouse.up()
+    expect(drawing).to_have_attribute("aria-label", "3-D: towards 38 degrees, 90 degrees from above")
+    page.evaluate(AXE)
+    assert page.evaluate(FINDINGS) == []
+    page.set_viewport_size({"width": 360, "height": 740})
+    assert width_beyond(page) == 0
+    page.click("#space")
+    expect(drawing).to_have_attribute("aria-label", re.compile("^Plan: ends"))
 
 
 def test_fifty_tubes_keep_their_rows_and_their_place(rig: Beating, watched: Open) -> None:

@@ -19,6 +19,8 @@ const changed = new Set();
 let hello = {};
 let stringAt = 0;
 let earlier = null; // the column of a moment of the history
+let space = null; // what draws it in 3-D, once it is wanted
+let drawHole = drawPlan;
 const history = new History((column) => {
   earlier = column;
   drawColumn();
@@ -59,12 +61,24 @@ function paint() {
 function drawColumn() {
   const { column, uncertainty, status } = picture.answers;
   if (earlier) {
-    drawPlan(byId("plan"), earlier);
+    drawHole(byId("plan"), earlier);
     drawStrip(byId("strip"), earlier);
   } else if (column) {
-    drawPlan(byId("plan"), column, uncertainty);
+    drawHole(byId("plan"), column, uncertainty);
     drawStrip(byId("strip"), column, status?.bit_md_m);
   }
+}
+
+/** Show the hole in 3-D, or from above again. */
+async function turnPlan() {
+  const module = await import("./space.js");
+  if (!space) module.connectSpace(byId("plan"), drawColumn);
+  space = module;
+  const isTurned = drawHole === drawPlan;
+  drawHole = isTurned ? space.drawSpace : drawPlan;
+  byId("space").setAttribute("aria-pressed", String(isTurned));
+  byId("turning").hidden = !isTurned;
+  drawColumn();
 }
 
 const tell = (line) => write(byId("message"), line);
@@ -76,6 +90,7 @@ function orderAboutAlarm(action, number) {
 byId("survey").addEventListener("click", () => order("take_survey", { tube: Number(byId("tube").value) }, tell));
 byId("depth").addEventListener("click", () => order("accept_depth", { action: "confirm" }, tell));
 byId("tube").addEventListener("change", (event) => { event.target.dataset.chosen = event.target.value; });
+byId("space").addEventListener("click", turnPlan);
 byId("print").addEventListener("click", () => window.print());
 connectTheme(byId("theme"));
 

@@ -1,0 +1,123 @@
+"""A ground station that starts upon what a string has told it in hours of drilling, and is asked for all of it."""
+
+from __future__ import annotations
+
+import contextlib
+import json
+import socket
+import time
+import urllib.request
+from dataclasses import replace
+from functools import partial
+from pathlib import Path
+from typing import Any
+
+from borechain.client import Ground, NoAnswerError
+from borechain.load.crowd import DRILLING_S, ROUND_S, SURVEYED_AFTER_S, TUBE_LENGTH, survey_of
+from borechain.load.page import ASK_EVERY_S, GROUND, HEARD_WITHIN_S, RIG, ROUNDING, figures
+from borechain.load.readers import CONNECT_S, lines
+from groundstation.config import checked_config
+from groundstation.gateway.page.settings import PageSettings
+from groundstation.host import run_ground
+from groundstation.service.store import Store, Stored
+from sim.errors import RigError
+from sim.rig.processes import ProcessTable, Spec
+from sim.rig.realtime import footprint, pids
+from telemetry.media.zenoh_bus import open_router
+from telemetry.messages import Stand
+from telemetry.runtime.hosting import Place
+
+EPOCH = 1
+BEGUN_AT = 1000.0  # s, of rig time
+ADVANCES = 32  # of the bit in all; between two of them the string is surveyed again where it stands
+ADVANCE = 0.25  # m, so that tubes pass the stations of those below them
+MOMENTS = 100  # that are looked at
+
+
+def measure_day(hours: float, tubes: int, endpoint: str, page: PageSettings, folder: Path) -> dict[str, Any]:
+    """Let a ground station start upon hours of surveys, and say how long it and whoever opens its page wait.
+
+    Raises
+    ------
+    RigError
+        When the ground station does not answer within a minute.
+    """
+    place = Place(RIG, endpoint, folder)
+    settings: dict[str, Any] = {"tube_length": TUBE_LENGTH, "target": TUBE_LENGTH * (tubes + ADVANCES * ADVANCE)}
+    surveys = write_day(checked_config(rig=RIG, folder=place.folder, **settings).url, hours, tubes)
+    table = ProcessTable({GROUND: Spec(partial(run_ground, own_clock=True, page=page), (place, settings))}, [])
+    try:
+        table.warm()
+        with open_router(endpoint) as bus:
+            begun = time.monotonic()
+            table.start(GROUND)
+            ground = Ground(bus, RIG)
+            moments = wait_for_history(ground)
+            started_s = time.monotonic() - begun
+            picture_s = first_picture(page)
+            looked = [asked(page, f"column?moment={number}") for number in moments[:: max(len(moments) // MOMENTS, 1)]]
+            return {
+                "surveys": surveys,
+                "stations": len(ground.stations()),
+                "moments": len(moments),
+                "started_s": round(started_s, ROUNDING),
+                "picture_ms": round(1e3 * picture_s, ROUNDING),
+                "history_ms": round(1e3 * asked(page, "history"), ROUNDING),
+                "moment_ms": figures(looked),
+                "private_mb": round(footprint(pids(table)[GROUND])["private_mb"], ROUNDING),
+            }
+    finally:
+        table.stop()
+
+
+def write_day(url: str, hours: float, tubes: int) -> int:
+    """Fill a database with a survey of every tube at every stop of some hours; returns how many there are."""
+    stops = max(int(3600.0 * hours / ROUND_S), 1)
+    surveys = 0
+    with contextlib.closing(Store(url)) as store:
+        store.keep_epoch(EPOCH)
+        store.keep_tally(list(range(tubes, 0, -1)))
+        for stop in range(stops):
+            md = TUBE_LENGTH * tubes + ADVANCE * (stop * ADVANCES // stops)
+            stands_at = BEGUN_AT + ROUND_S * stop + DRILLING_S
+            store.keep_stand(Stand(EPOCH, stands_at, stands_at + ROUND_S - DRILLING_S, md))
+            at = stands_at + SURVEYED_AFTER_S
+            read = [(replace(survey_of(tube, stop + 1, at), epoch=EPOCH), TUBE_LENGTH * tube) for tube in up_to(tubes)]
+            store.add_messages([Stored(survey, md - below, below) for survey, below in read])
+            surveys += tubes
+    return surveys
+
+
+def up_to(tubes: int) -> range:
+    """Numbers of the tubes, the lowest first."""
+    return range(1, tubes + 1)
+
+
+def wait_for_history(ground: Ground) -> list[int]:
+    """Numbers of the moments, as soon as the ground station answers."""
+    deadline = time.monotonic() + HEARD_WITHIN_S
+    while time.monotonic() < deadline:
+        try:
+            return [int(moment["moment"]) for moment in ground.ask("history", points=1000)["moments"]]
+        except NoAnswerError:
+            time.sleep(ASK_EVERY_S)
+    raise RigError(f"the ground station has not answered within {HEARD_WITHIN_S:.0f} s")
+
+
+def first_picture(page: PageSettings) -> float:
+    """Seconds from the connection of a browser until the history has come."""
+    begun = time.monotonic()
+    with contextlib.closing(socket.create_connection((page.host, page.port), CONNECT_S)) as connection:
+        connection.sendall(f"GET /api/stream HTTP/1.1\r\nHost: {page.host}\r\n\r\n".encode())
+        for line in lines(connection, begun + CONNECT_S):
+            if line.startswith(b"data: ") and json.loads(line[6:]).get("path") == "history":
+                return time.monotonic() - begun
+    raise RigError(f"the page has not shown its history within {CONNECT_S:.0f} s")
+
+
+def asked(page: PageSettings, path: str) -> float:
+    """Seconds for which the page keeps whoever asks it for a path waiting."""
+    begun = time.monotonic()
+    with urllib.request.urlopen(f"{page.url}/api/{path}", timeout=CONNECT_S) as answer:
+        answer.read()
+    return time.monotonic() - begun
