@@ -243,9 +243,10 @@ class Hole:
         if len(stations) < len(self._drawn) or any(new[1] is not old[1] for new, old in known):
             self._trajectory, self._drawn = Trajectory(), []
             self._deviations = [self._deviation_of(self._trajectory.points[0])]
-        for md, direction in stations[len(self._drawn) :]:
-            self._deviations.append(self._deviation_of(self._trajectory.append(md, direction)))
-            self._drawn.append((md, direction))
+        added = stations[len(self._drawn) :]
+        self._trajectory.extend(added)
+        self._deviations += [self._deviation_of(point) for point in self._trajectory.points[-len(added) :] if added]
+        self._drawn += added
 
     def _deviation_of(self, point: Point) -> Deviation:
         return deviation(point, self._design)

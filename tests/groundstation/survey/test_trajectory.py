@@ -58,9 +58,11 @@ def test_appending_gives_what_the_whole_hole_gives_at_once(
     for count, (md, lean) in enumerate(zip(mds, leans, strict=True), 1):
         point = trajectory.append(float(md), lean)
         again = Trajectory(method)
-        for earlier_md, earlier in zip(mds[:count], leans[:count], strict=True):
-            again.append(float(earlier_md), earlier)
-        np.testing.assert_array_equal(point.position, again.points[-1].position)
+        again.extend(list(zip(mds[:count].tolist(), leans[:count], strict=True)))
+        for one, other in zip(trajectory.points, again.points, strict=True):
+            np.testing.assert_array_equal(one.position, other.position)
+            np.testing.assert_array_equal(one.cov, other.cov)
+            np.testing.assert_array_equal(one.shared, other.shared)
         random, shared = parts_at_once(mds[:count], leans[:count])
         np.testing.assert_allclose(point.cov, random + shared @ shared.T, rtol=1e-9, atol=1e-18)
         np.testing.assert_allclose(point.shared, shared[:, : point.shared.shape[1]], rtol=1e-9, atol=1e-15)
