@@ -11,14 +11,10 @@ import click
 
 from borechain.cli.faults import EnvironmentFault, needs, plain_faults
 from borechain.cli.options import json_option, seed_option
-from telemetry import keys
+from telemetry.runtime.options import endpoint_option
 
 if TYPE_CHECKING:
     from groundstation.gateway.page.settings import PageSettings
-
-endpoint_option = click.option(
-    "--endpoint", default=keys.DEFAULT_ENDPOINT, show_default=True, help="Where its router listens."
-)
 
 page_option = click.option(
     "--page", "address", metavar="HOST:PORT", default="127.0.0.1:8080", show_default=True, help="Of the page."
@@ -33,7 +29,7 @@ page_option = click.option(
     "--seconds", type=click.FloatRange(5.0, 86400.0), default=150.0, show_default=True, help="Of the measurement."
 )
 @page_option
-@endpoint_option
+@endpoint_option("Where its router listens.")
 @json_option
 @needs("rich", "scipy", "sqlalchemy", "starlette", "uvicorn")
 @plain_faults
@@ -79,7 +75,7 @@ def free_page(address: str, endpoint: str) -> PageSettings:
 @click.option("--hours", type=click.FloatRange(0.1, 168.0), default=24.0, show_default=True, help="Of drilling.")
 @click.option("--tubes", type=click.IntRange(1, 250), default=50, show_default=True, help="That survey at every stop.")
 @page_option
-@endpoint_option
+@endpoint_option("Where its router listens.")
 @json_option
 @needs("rich", "scipy", "sqlalchemy", "starlette", "uvicorn")
 @plain_faults
@@ -122,7 +118,7 @@ def line(what: str, figures: dict[str, Any]) -> str:
 @click.option(
     "--database", metavar="URL", help="Of an empty database, such as postgresql://USER@HOST/NAME  [default: SQLite]"
 )
-@endpoint_option
+@endpoint_option("Where its router listens.")
 @json_option
 @seed_option
 @needs("rich", "scipy", "sqlalchemy")
