@@ -1,12 +1,9 @@
 """What the errors of a jig do to a calibration: known in size, common to all readings of one setting, and not noise.
 
 A jig that is off by a small turn d shows the sensor d x f more than the truth f, so its readings M (d x f). The
-residuals hold noise and jig together: their variance T is at least what the jig alone leaves in them, t, and given the
-residuals is distributed as RSS / chi^2 above that (Student's distribution where there is no jig). A parameter's
-variance is (T - t) a + b, a of the noise and b of the jig; the interval is that of the mixture over T. Few residuals
-cannot tell noise from jig: the weight ((T - t) / T)^-0.7 towards little noise keeps the intervals at 93 to 97 % where
-the two are alike, and at 98 % on five degrees of freedom where nearly all is the jig's.
-Source: JCGM 100:2008 (GUM), 4.3 and annex G; Gelman et al., Bayesian Data Analysis, 3.2, for T.
+residuals hold noise and jig together: what the jig leaves in them is taken from their variance, and the intervals are
+those that hold at whatever noise is left (``intervals``).
+Source: JCGM 100:2008 (GUM), 4.3 and annex G.
 """
 
 from __future__ import annotations
@@ -19,13 +16,10 @@ import numpy.typing as npt
 
 from groundstation.calibration.coverage import COVERAGE
 from groundstation.calibration.errors import CalibrationError
+from groundstation.calibration.intervals import Spread, interval
 
 Array = npt.NDArray[np.float64]
-POINTS = 500  # of the distribution of the noise
-LEAST = 1e-10  # of chi^2, below which the noise is not followed
-NEAR = 0.7  # towards little noise
-STEPS = np.linspace(0.0, 8.0, 4001)  # standard deviations
-INSIDE = np.array([math.erf(step / math.sqrt(2.0)) for step in STEPS])
+UNREACHED = 1e-9  # of the jig's variance of all readings, below which it does not reach a direction
 
 
 @dataclass(frozen=True, slots=True)
@@ -77,49 +71,36 @@ def combine(
     n, k = basis.shape
     gain = np.linalg.pinv(basis)
     shown = reading_errors(truth, matrix, settings, jig)
-    least = np.einsum("mn,nimi->i", np.eye(n) - basis @ gain, shown) / (n - k)
+    spreads = spreads_of(basis, shown)
     squares = np.sum(residuals**2, axis=0)
-    by_noise = np.repeat(np.diag(gain @ gain.T)[:, None], 3, axis=1)
-    by_jig = np.einsum("am,mini,an->ai", gain, shown, gain)
-    std = np.sqrt(by_noise * np.maximum(squares / (n - k) - least, 0.0) + by_jig)
-    return Combined(std, half_widths(by_noise, by_jig, squares, least, n - k, coverage))
+    std, expanded = np.empty((k, 3)), np.empty((k, 3))
+    left = np.eye(n) - basis @ gain
+    least = np.einsum("mn,nimi->i", left, shown) / (n - k)
+    for row, axis in np.ndindex(k, 3):
+        spread = spreads[row][axis]
+        noise = max(float(squares[axis]) / (n - k) - float(least[axis]), 0.0)
+        std[row, axis] = math.sqrt(spread.by_noise * noise + spread.by_jig)
+        expanded[row, axis] = interval(spread, coverage).half_width(squares[axis])
+    return Combined(std, expanded)
 
 
-def half_widths(by_noise: Array, by_jig: Array, squares: Array, least: Array, degrees: int, coverage: float) -> Array:
-    """Half widths (k, 3) of intervals that hold a parameter with a probability, the noise of each axis (3,) unknown.
-
-    Parameters
-    ----------
-    by_noise, by_jig : (k, 3) variance for a noise of one, and by the jig
-    squares, least : (3,) sum of squares of the residuals of an axis, and variance that the jig leaves in them
-    """
-    out = np.empty_like(by_noise)
-    for axis in range(by_noise.shape[1]):
-        scale = max(float(squares[axis]), float(least[axis]), 1e-300)
-        noise = np.exp(np.linspace(math.log(1e-9 * scale), math.log(scale / LEAST), POINTS))
-        whole = noise + least[axis]
-        chi2 = squares[axis] / whole
-        with np.errstate(divide="ignore"):
-            share = np.exp(
-                (1.0 - NEAR) * np.log(noise / whole) + 0.5 * (degrees * np.log(chi2 / degrees) - chi2 + degrees)
-            )
-        share /= np.sum(share)
-        for row in range(len(by_noise)):
-            sizes = np.sqrt(noise * by_noise[row, axis] + by_jig[row, axis])
-            out[row, axis] = _held(sizes, share, coverage)
-    return out
-
-
-def _held(sizes: Array, share: Array, coverage: float) -> float:
-    """Width within which a mixture of normals of standard deviations ``sizes`` lies with a probability."""
-    low, high = 0.0, 10.0 * float(np.max(sizes))
-    if high == 0.0:
-        return 0.0
-    while high - low > 1e-6 * high:
-        middle = 0.5 * (low + high)
-        within = float(share @ np.interp(middle / np.maximum(sizes, 1e-300), STEPS, INSIDE))
-        low, high = (middle, high) if within < coverage else (low, middle)
-    return 0.5 * (low + high)
+def spreads_of(basis: Array, shown: Array) -> list[list[Spread]]:
+    """What noise and jig do to coefficients (k, 3) of a basis (n, k); ``shown`` (n, 3, n, 3) of the readings."""
+    n, k = basis.shape
+    gain = np.linalg.pinv(basis)
+    left = np.eye(n) - basis @ gain
+    spreads: list[list[Spread]] = [[] for _ in range(k)]
+    for axis in range(3):
+        cov = shown[:, axis, :, axis]
+        whole = float(np.trace(cov))
+        values, directions = np.linalg.eigh(left @ cov @ left)
+        reached = values > max(UNREACHED * whole, 1e-300)
+        for row in range(k):
+            by_noise, by_jig = float(gain[row] @ gain[row]), float(gain[row] @ cov @ gain[row])
+            by_jig = by_jig if by_jig > UNREACHED**2 * by_noise * whole else 0.0
+            common = gain[row] @ cov @ directions[:, reached]
+            spreads[row].append(Spread(by_noise, by_jig, values[reached], common, n - k))
+    return spreads
 
 
 def settings_of(truth: Array) -> npt.NDArray[np.intp]:
