@@ -64,6 +64,7 @@ class LiveWall:
             whole,
             plans=[whole.plans[k] for k in self._members],
             holes=[whole.holes[k] for k in self._members],
+            drilled_on=[whole.drilled_on[k] for k in self._members],
             pairs=pairs,
             detours=[],
         )

@@ -9,6 +9,7 @@ import hashlib
 import math
 import tomllib
 from dataclasses import dataclass
+from datetime import date
 from pathlib import Path
 from typing import Any
 
@@ -95,6 +96,7 @@ class Wall:
     pairs: npt.NDArray[np.intp]
     detours: list[Detour]
     holes: list[Hole]
+    drilled_on: list[date | None]  # of every column
 
     @property
     def columns(self) -> Columns:
@@ -260,7 +262,7 @@ def read_wall(path: Path) -> Wall:
     pairs = _pairs(file, [row.remedy for row in rows], built)
     detours = _detours(file.heads, names, [row.remedy for row in rows], pairs)
     _check_design(file, built, pairs)
-    return Wall(file, plans, built, pairs, detours, holes)
+    return Wall(file, plans, built, pairs, detours, holes, [row.drilled_on for row in rows])
 
 
 def judge_wall(wall: Wall) -> Judgement:

@@ -22,11 +22,11 @@ import numpy.typing as npt
 
 from groundstation.survey.as_built import Columns, State
 from groundstation.survey.joints import Detour, Joints
-from groundstation.survey.voids import power_centre
+from groundstation.survey.void_chance import VOID_DEPTHS, near_triple, void_open, void_point
 from groundstation.survey.wall import limits
+from groundstation.survey.wall_errors import Errors, Point, add_radius, design_point
 
 Array = npt.NDArray[np.float64]
-Point = tuple[Array, float]  # shift in standard deviations, and about how likely it is to be passed
 SAMPLES = 8192
 FEWEST = 1024
 BUDGET = 2e8  # joints times depths times samples
@@ -34,9 +34,6 @@ BATCH = 512
 SURE = 1.0 - 1e-6  # probability of one joint beyond which the whole is not asked
 NEGLIGIBLE = 1e-9  # probability of a joint below which it is not sampled but added
 SEED = 20_260_101  # the same wall gives the same probability
-VOID_DEPTHS = 6  # of a layer, among which the likeliest point of a void is looked for
-ACROSS = 0.05  # of a triangle, by which the point between three columns may lie beyond its side
-FURTHEST = 6.0  # standard deviations of a design point that is still drawn from
 
 
 @dataclass(frozen=True, slots=True)
@@ -46,54 +43,6 @@ class SystemProbability:
     probability: float
     standard_error: float
     certain: bool  # a column is missing where one is required
-
-
-@dataclass(frozen=True, slots=True)
-class _Errors:
-    """Where each standard normal number acts. Columns of ``Columns.own`` and radii by column and layer."""
-
-    columns: Columns
-    shared: int
-    own: int
-    layers: int
-
-    @classmethod
-    def of(cls, columns: Columns) -> _Errors:
-        return cls(columns, columns.shared.shape[-1], columns.own.shape[-1], int(columns.depth_layers().max()) + 1)
-
-    @property
-    def size(self) -> int:
-        return self.shared + len(self.columns.names) * (self.own + self.layers) + self.layers
-
-    def own_slice(self, column: int) -> slice:
-        begin = self.shared + column * self.own
-        return slice(begin, begin + self.own)
-
-    def radius_index(self, column: int, layer: int) -> int:
-        return self.shared + len(self.columns.names) * self.own + column * self.layers + layer
-
-    def common_index(self, layer: int) -> int:
-        return self.shared + len(self.columns.names) * (self.own + self.layers) + layer
-
-    def centres(self, x: Array, column: int) -> Array:
-        """Centres (samples, depths, 2) of one column."""
-        c = self.columns
-        moved = x[:, : self.shared] @ _flat(c.shared[column]) + x[:, self.own_slice(column)] @ _flat(c.own[column])
-        return np.asarray(c.centres[column] + moved.reshape(len(x), len(c.depths), 2))
-
-    def radii(self, x: Array, column: int) -> Array:
-        """Radii (samples, depths) of one column."""
-        c, layer = self.columns, self.columns.depth_layers()
-        rho = c.radius_correlation
-        common = x[:, [self.common_index(int(k)) for k in layer]]
-        alone = x[:, [self.radius_index(column, int(k)) for k in layer]]
-        drawn = math.sqrt(rho) * common + math.sqrt(1.0 - rho) * alone
-        return np.asarray(np.maximum(c.radii[column] + c.radius_stds[column] * drawn, 0.0))
-
-
-def _flat(errors: Array) -> Array:
-    """Errors (depths, 2, k) as a matrix (k, 2 depths)."""
-    return np.ascontiguousarray(errors.reshape(errors.shape[0] * errors.shape[1], errors.shape[2]).T)
 
 
 def system_probability(
@@ -121,7 +70,7 @@ def system_probability(
     kept = np.flatnonzero(peak >= NEGLIGIBLE)
     neglected = float(peak[peak < NEGLIGIBLE].sum())
     asked = _Asked.among(columns, found, kept, np.zeros((0, 3), np.intp) if triples is None else triples, detours)
-    errors = _Errors.of(asked.columns)
+    errors = Errors.of(asked.columns)
     points = _design_points(errors, asked, required)
     if not points:
         return SystemProbability(min(neglected, 1.0), 0.0, certain=False)
@@ -165,7 +114,7 @@ class _Asked:
     ) -> _Asked:
         pairs = found.pairs[kept]
         ways = [[d.pairs.tolist() for d in detours if d.joint == joint] for joint in kept.tolist()]
-        nearby = [_near(columns, triple) for triple in triples]
+        nearby = [near_triple(columns, triple) for triple in triples]
         legs = [leg for some in ways for way in some for leg in way]
         used = np.unique([k for group in (*pairs.tolist(), *triples.tolist(), *nearby, *legs) for k in group])
         used = used.astype(np.intp)
@@ -181,7 +130,7 @@ class _Asked:
         )
 
 
-def _design_points(errors: _Errors, asked: _Asked, required: float) -> list[Point]:
+def _design_points(errors: Errors, asked: _Asked, required: float) -> list[Point]:
     """Design points of every joint and every void, one a layer: between layers the radii err on their own."""
     points = []
     layer = errors.columns.depth_layers()
@@ -194,13 +143,13 @@ def _design_points(errors: _Errors, asked: _Asked, required: float) -> list[Poin
                 points.append(_joint_point(errors, pair, int(depths[at]), required))
         some = depths[np.unique(np.linspace(0, len(depths) - 1, VOID_DEPTHS).astype(np.intp))]
         for triple, near in zip(asked.triples, asked.nearby, strict=True):
-            point = _void_point(errors, triple, near, some)
+            point = void_point(errors, triple, near, some)
             if point is not None and point[1] > 0.0:
                 points.append(point)
     return points
 
 
-def _joint_point(errors: _Errors, pair: npt.NDArray[np.intp], depth: int, required: float) -> Point:
+def _joint_point(errors: Errors, pair: npt.NDArray[np.intp], depth: int, required: float) -> Point:
     """Most likely point at which a joint is just too thin, and about how likely it is."""
     c = errors.columns
     a, b = (int(k) for k in pair)
@@ -213,101 +162,15 @@ def _joint_point(errors: _Errors, pair: npt.NDArray[np.intp], depth: int, requir
     normal[errors.own_slice(a)] += unit @ c.own[a, depth]
     for k in (a, b):
         r = float(c.radii[k, depth])
-        _add_radius(errors, normal, k, depth, r / math.sqrt(max(r**2 - 0.25 * required**2, 1e-6 * r**2)))
+        add_radius(errors, normal, k, depth, r / math.sqrt(max(r**2 - 0.25 * required**2, 1e-6 * r**2)))
     limit = float(limits(c.radii[a, depth : depth + 1], c.radii[b, depth : depth + 1], required)[0])
-    return _design_point(normal, limit - distance)
-
-
-def _void_point(
-    errors: _Errors, triple: npt.NDArray[np.intp], near: list[int], depths: npt.NDArray[np.intp]
-) -> Point | None:
-    """The same for the point between three columns, at the likeliest of some ``depths``."""
-    c = errors.columns
-    centres, radii = np.swapaxes(c.centres[triple][:, depths], 0, 1), c.radii[triple][:, depths].T
-    middle = power_centre(centres, radii)
-    weights = _barycentric(middle, centres)
-    points = [
-        _void_point_at(errors, triple, near, int(depth), middle[k], weights[k])
-        for k, depth in enumerate(depths)
-        if np.all(weights[k] > -ACROSS)
-    ]
-    return max(points, key=lambda point: point[1], default=None)
-
-
-def _void_point_at(
-    errors: _Errors, triple: npt.NDArray[np.intp], near: list[int], depth: int, middle: Array, weights: Array
-) -> Point:
-    """Nearest x at which the middle of three columns is clear of them and of every other that covers it.
-
-    With the barycentric weights w of the middle, its distance from the three grows by the sum of w times what each of
-    them moves away; the others have to move away by themselves.
-    """
-    c = errors.columns
-    rows, rests = [np.zeros(errors.size)], []
-    for column, weight in zip(triple.tolist(), weights.tolist(), strict=True):
-        rows[0] += weight * _away(errors, column, depth, middle)
-    rests.append(_depth_in(c, int(triple[0]), depth, middle))
-    for column in near:
-        rest = _depth_in(c, column, depth, middle)
-        if rest > 0.0:
-            rows.append(_away(errors, column, depth, middle))
-            rests.append(rest)
-    wanted = np.maximum(rests, 0.0)
-    shift = -np.linalg.pinv(np.array(rows), rcond=1e-9) @ wanted
-    if np.any(-np.array(rows) @ shift < 0.5 * wanted):  # columns that cannot move
-        shift = np.zeros(errors.size)
-        return shift, 0.0
-    size = float(np.linalg.norm(shift))
-    return shift * min(1.0, FURTHEST / max(size, 1e-12)), 0.5 * math.erfc(size / math.sqrt(2.0))
-
-
-def _away(errors: _Errors, column: int, depth: int, middle: Array) -> Array:
-    """How much more a column covers a point for one standard deviation of each number: it comes nearer, or is wider."""
-    c = errors.columns
-    away = middle - c.centres[column, depth]
-    unit = away / max(float(np.hypot(*away)), 1e-9)
-    out = np.zeros(errors.size)
-    out[: errors.shared] = unit @ c.shared[column, depth]
-    out[errors.own_slice(column)] = unit @ c.own[column, depth]
-    _add_radius(errors, out, column, depth, 1.0)
-    return out
-
-
-def _depth_in(columns: Columns, column: int, depth: int, point: Array) -> float:
-    """How deep (m) a point lies in a column; negative outside."""
-    away = point - columns.centres[column, depth]
-    return float(columns.radii[column, depth] - np.hypot(away[0], away[1]))
-
-
-def _add_radius(errors: _Errors, normal: Array, column: int, depth: int, slope: float) -> None:
-    """What the radius of a column adds to a normal: ``slope`` (m/m)."""
-    c, layer = errors.columns, int(errors.columns.depth_layers()[depth])
-    change, rho = slope * float(c.radius_stds[column, depth]), c.radius_correlation
-    normal[errors.common_index(layer)] += change * math.sqrt(rho)
-    normal[errors.radius_index(column, layer)] += change * math.sqrt(1.0 - rho)
-
-
-def _barycentric(point: Array, three: Array) -> Array:
-    """Weights (n, 3) of points (n, 2) in triangles (n, 3, 2); nan in flat ones."""
-    u, v, w = three[:, 1] - three[:, 0], three[:, 2] - three[:, 0], point - three[:, 0]
-    with np.errstate(divide="ignore", invalid="ignore"):
-        det = u[:, 0] * v[:, 1] - u[:, 1] * v[:, 0]
-        second = (w[:, 0] * v[:, 1] - w[:, 1] * v[:, 0]) / det
-        third = (u[:, 0] * w[:, 1] - u[:, 1] * w[:, 0]) / det
-    return np.stack([1.0 - second - third, second, third], axis=-1)
-
-
-def _design_point(normal: Array, rest: float) -> Point:
-    """Point beta u of a half-space ``rest`` + normal x < 0, and Phi(-beta)."""
-    size = max(float(np.linalg.norm(normal)), 1e-12)
-    beta = min(max(rest / size, 0.0), FURTHEST)
-    return -beta / size * normal, 0.5 * math.erfc(beta / math.sqrt(2.0))
+    return design_point(normal, limit - distance)
 
 
 class _Judge:
     """Judges samples by the exact geometry."""
 
-    def __init__(self, errors: _Errors, asked: _Asked, required: float) -> None:
+    def __init__(self, errors: Errors, asked: _Asked, required: float) -> None:
         self._errors, self._asked, self._required = errors, asked, required
         self.cost = len(asked.pairs) + sum(2 + len(near) for near in asked.nearby) + len(asked.columns.names)
 
@@ -325,7 +188,7 @@ class _Judge:
                     thin &= np.any([self._thin(centres, radii, leg) for leg in way], axis=0)
             found |= np.any(thin & here, axis=1)
         for triple, near in zip(self._asked.triples.tolist(), self._asked.nearby, strict=True):
-            found |= _void_open(centres, radii, triple, near)
+            found |= np.any(void_open(dict(enumerate(centres)), dict(enumerate(radii)), triple, near), axis=1)
         return found
 
     def _thin(self, centres: list[Array], radii: list[Array], pair: list[int]) -> npt.NDArray[np.bool_]:
@@ -336,39 +199,3 @@ class _Judge:
             thick = np.hypot(apart[..., 0], apart[..., 1]) <= limits(radii[a], radii[b], self._required)
         stands = np.all(self._errors.columns.states[pair] <= State.UNSURVEYED, axis=0)
         return np.asarray(~(thick & stands))
-
-
-def _near(columns: Columns, triple: npt.NDArray[np.intp]) -> list[int]:
-    """Columns beside three that may cover the point between them."""
-    apart = np.hypot(*np.moveaxis(columns.designs - columns.designs[triple].mean(axis=0), -1, 0))
-    reach = 2.0 * float(np.max(columns.radii)) + float(np.max(apart[triple]))
-    return [k for k in np.flatnonzero(apart < reach).tolist() if k not in triple.tolist()]
-
-
-def _void_open(centres: list[Array], radii: list[Array], triple: list[int], near: list[int]) -> npt.NDArray[np.bool_]:
-    """Whether the point between three columns lies outside all discs and among the three (n,)."""
-    three = np.stack([centres[k] for k in triple], axis=-2)
-    round_ = np.stack([radii[k] for k in triple], axis=-1)
-    shape = three.shape[:2]
-    middle = power_centre(three.reshape(-1, 3, 2), round_.reshape(-1, 3)).reshape(*shape, 2)
-    with np.errstate(invalid="ignore"):
-        away = middle - three[..., 0, :]
-        free = (np.sum(away**2, axis=-1) > round_[..., 0] ** 2) & _within(middle, three)
-        for k in near:
-            if not np.any(free):
-                break
-            away = middle - centres[k]
-            free &= np.sum(away**2, axis=-1) >= radii[k] ** 2
-    return np.asarray(np.any(free, axis=1))
-
-
-def _within(point: Array, three: Array) -> npt.NDArray[np.bool_]:
-    """Whether points (..., 2) lie in triangles (..., 3, 2), their edges included."""
-    sides = []
-    for k in range(3):
-        p, q = three[..., k, :], three[..., (k + 1) % 3, :]
-        edge, to = q - p, point - p
-        sides.append(edge[..., 0] * to[..., 1] - edge[..., 1] * to[..., 0])
-    signs = np.stack(sides, axis=-1)
-    slack = 1e-12 + 1e-9 * np.max(np.abs(signs), axis=-1, keepdims=True)
-    return np.asarray(np.all(signs >= -slack, axis=-1) | np.all(signs <= slack, axis=-1))

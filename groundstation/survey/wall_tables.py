@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, replace
+from datetime import date
 from itertools import pairwise
 from pathlib import Path
 
@@ -21,7 +22,7 @@ from groundstation.survey.wall_columns import ColumnPlan, Hole, Status
 
 Array = npt.NDArray[np.float64]
 NUMBERS = ("down_m", "inclination_deg", "azimuth_deg", "length_m", "radius_m", "drilled_to_m", "head_sigma_m")
-WORDS = ("state", "instrument", "serial", "calibration", "tolerance", "between", "replaces")
+WORDS = ("state", "instrument", "serial", "calibration", "tolerance", "between", "replaces", "drilled_on")
 
 
 @dataclass(frozen=True, slots=True)
@@ -66,6 +67,7 @@ class HeadRow:
     plan_without_length: ColumnPlan
     length: float | None
     remedy: Remedy
+    drilled_on: date | None = None
 
     def plan(self, length: float) -> ColumnPlan:
         """The plan, ``length`` (m) where the row has none."""
@@ -125,7 +127,17 @@ def _head(
         design, tool, cells.get("serial") or defaults.serial, status, values.get("drilled_to_m"),
         values.get("head_sigma_m", defaults.head_std), cells.get("calibration") or defaults.calibration,
     )  # fmt: skip
-    return HeadRow(name, plan, values.get("length_m", defaults.length), _remedy(where, cells))
+    day = _day(where, cells.get("drilled_on", ""))
+    if day is not None and status in (Status.PLANNED, Status.NOT_DRILLED):
+        raise SurveyError(f"{where}: drilled_on: stated as {status.value}, yet drilled on {day}")
+    return HeadRow(name, plan, values.get("length_m", defaults.length), _remedy(where, cells), day)
+
+
+def _day(where: str, text: str) -> date | None:
+    try:
+        return date.fromisoformat(text) if text else None
+    except ValueError:
+        raise SurveyError(f"{where}: drilled_on: expected a day as 2026-11-20, got {text!r}") from None
 
 
 def _number(where: str, key: str, text: str) -> float:

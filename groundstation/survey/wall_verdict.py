@@ -23,6 +23,7 @@ from groundstation.survey.joints import (
     joints,
     with_detours,
 )
+from groundstation.survey.void_chance import VoidChance, void_chance
 from groundstation.survey.voids import Void, triples_of, voids
 from groundstation.survey.wall_system import SystemProbability, system_probability
 
@@ -83,6 +84,7 @@ class Judgement:
     voids: list[VoidFinding]
     system: SystemProbability
     extras: list[tuple[int, ExtraColumn]]  # (joint, column) for every joint that is open
+    void_chance: VoidChance | None = None  # of a grid
 
 
 def judge(
@@ -105,15 +107,17 @@ def judge(
     """
     found = with_detours(columns, joints(columns, pairs, required), detours, required)
     holes: list[VoidFinding] = []
-    triples = None
+    triples = chance = None
     if grid_spacing is not None:
         triples = triples_of(columns.designs, DIAGONAL * grid_spacing)
         holes = _voids(columns)
+        chance = void_chance(columns, triples)
     whole = system_probability(columns, found, required, triples, detours)
     findings = [
         *_column_findings(columns),
         *_joint_findings(columns, found, required, allowed),
         *_void_findings(columns, holes),
+        *_likely_voids(columns, holes, chance, allowed),
         *_crossing_findings(columns, pairs),
     ]
     if whole.probability > allowed and not findings:
@@ -121,7 +125,7 @@ def judge(
         findings.append(Finding(Kind.SYSTEM, "wall", *_ends(columns.depths), text, whole.probability))
     proposals = [(j, extra_column(columns, found, j, required)) for j in range(len(pairs))]
     extras = [(j, extra) for j, extra in proposals if extra is not None]
-    return Judgement(_verdict(findings), findings, found, holes, whole, extras)
+    return Judgement(_verdict(findings), findings, found, holes, whole, extras, chance)
 
 
 def _verdict(findings: list[Finding]) -> Verdict:
@@ -203,6 +207,29 @@ def _void_findings(columns: Columns, holes: list[VoidFinding]) -> list[Finding]:
             f"({largest.void.place[0]:.3f}, {largest.void.place[1]:.3f}) m"
         )
         out.append(Finding(Kind.VOID, name, top, bottom, text))
+    return out
+
+
+def _likely_voids(
+    columns: Columns, holes: list[VoidFinding], chance: VoidChance | None, allowed: float
+) -> list[Finding]:
+    """Where there is no void as surveyed, yet one is more likely than allowed."""
+    if chance is None:
+        return []
+    known = np.isin(columns.depths, [hole.depth for hole in holes]) | np.any(columns.states == State.MISSING, axis=0)
+    out = []
+    for first, last in stretches((chance.probability > allowed) & ~known):
+        worst = first + int(np.argmax(chance.probability[first : last + 1]))
+        three = chance.columns[worst]
+        if three is None:
+            continue
+        name, most = "-".join(columns.names[k] for k in three), float(chance.probability[worst])
+        top, bottom = float(columns.depths[first]), float(columns.depths[last])
+        text = (
+            f"a void has a probability of {most:.2g} at {columns.depths[worst]:g} m, most of all between {name} at "
+            f"({chance.places[worst][0]:.3f}, {chance.places[worst][1]:.3f}) m"
+        )
+        out.append(Finding(Kind.DOUBTFUL, name, top, bottom, text, most))
     return out
 
 

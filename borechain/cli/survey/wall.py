@@ -141,17 +141,44 @@ def result_of(found: Wall, judgement: Judgement) -> dict[str, Any]:
         "worst": worst_row | {"extra_column": proposal(found, extras.get(joint))},
         "extra_columns": [rows[j] | {"extra_column": proposal(found, extra)} for j, extra in judgement.extras],
         "largest_spacing": largest_spacing(found, judged),
-        "voids": [
-            {
-                "depth_m": hole.depth,
-                "columns": [found.built.columns.names[k] for k in hole.void.columns],
-                "area_m2": hole.void.area,
-                "radius_m": hole.void.radius,
-                "place_m": list(hole.void.place),
-            }
-            for hole in judgement.voids
-        ],
+        "closing": closing(found),
+        "voids": void_rows(found, judgement),
+        "void_probability": void_probability(found, judgement),
     }
+
+
+def void_rows(found: Wall, judgement: Judgement) -> list[dict[str, Any]]:
+    """Every void as surveyed, one at each depth."""
+    return [
+        {
+            "depth_m": hole.depth,
+            "columns": [found.built.columns.names[k] for k in hole.void.columns],
+            "area_m2": hole.void.area,
+            "radius_m": hole.void.radius,
+            "place_m": list(hole.void.place),
+        }
+        for hole in judgement.voids
+    ]
+
+
+def void_probability(found: Wall, judgement: Judgement) -> list[dict[str, Any]]:
+    """Area and probability of voids at every depth of a grid, and where one is likeliest."""
+    chance, columns, rows = judgement.void_chance, found.built.columns, []
+    if chance is None:
+        return []
+    for z, depth in enumerate(columns.depths.tolist()):
+        three = chance.columns[z]
+        rows.append(
+            {
+                "depth_m": depth,
+                "area_m2": sum(hole.void.area for hole in judgement.voids if hole.depth == depth),
+                "probability": float(chance.probability[z]),
+                "standard_error": float(chance.standard_error[z]),
+                "columns": [] if three is None else [columns.names[k] for k in three],
+                "place_m": None if three is None else chance.places[z].tolist(),
+            }
+        )
+    return rows
 
 
 def proposal(found: Wall, extra: ExtraColumn | None) -> dict[str, Any] | None:
@@ -185,6 +212,23 @@ def largest_spacing(found: Wall, judged: Joints) -> list[dict[str, Any]]:
         joint = int(missing[0]) if len(missing) else int(np.argmax(known))
         spacing = None if len(missing) or not np.isfinite(known[joint]) else float(known[joint])
         rows.append({"depth_m": depth, "joint": joint_name(columns, judged.pairs[joint]), "spacing_m": spacing})
+    return rows
+
+
+def closing(found: Wall) -> list[dict[str, Any]]:
+    """How it closed, day by day; nothing where no day of drilling is stated."""
+    from groundstation.survey.closing import stages
+    from groundstation.survey.wall_verdict import joint_name
+
+    columns, rows = found.built.columns, []
+    for stage in stages(columns, found.pairs, found.file.thickness, found.drilled_on, found.detours):
+        row: dict[str, Any] = {"day": stage.day.isoformat(), "drilled": stage.drilled}
+        row |= {"closed_percent": 100.0 * stage.closed, "open_joints": stage.open_joints, "largest_spacing": None}
+        if stage.widest is not None:
+            joint, depth, spacing = stage.widest
+            name, at = joint_name(columns, found.pairs[joint]), float(columns.depths[depth])
+            row["largest_spacing"] = {"joint": name, "depth_m": at, "spacing_m": spacing}
+        rows.append(row)
     return rows
 
 
@@ -297,6 +341,10 @@ def show(result: dict[str, Any]) -> None:
         f"{result['doubtful']} are so with a probability of more than {result['allowed_probability']:g}; "
         f"{len(over)} columns beyond their tolerance"
     )
+    for row in result["closing"][-SHOWN:]:
+        widest = row["largest_spacing"]
+        spacing = "" if widest is None else f", widest {widest['spacing_m']:.3f} m ({widest['joint']})"
+        paper.print(f"{row['day']}: {row['closed_percent']:.1f} % closed, {row['open_joints']} joints open{spacing}")
     paper.print(f"anything open or too thin: probability {result['probability_of_any']:.2g}")
     paper.print(f"worst joint {result['worst']['joint']} at {result['worst']['depth_m']:g} m")
     for row in result["extra_columns"]:

@@ -1,0 +1,217 @@
+"""Probability of a void between the columns of a grid, at every depth.
+
+A void's deepest point lies where the power lines of three columns meet, so every three neighbours are asked whether
+that point lies between them and outside of all columns. Samples are drawn around the likeliest points at which it does
+and weighted back, as in ``wall_system``; a depth at which a column is missing is open for certain. m.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+
+from groundstation.survey.as_built import Columns, State
+from groundstation.survey.voids import power_centre
+from groundstation.survey.wall_errors import FURTHEST, Errors, Point, add_radius
+
+Array = npt.NDArray[np.float64]
+VOID_DEPTHS = 6  # of a layer, among which the likeliest point of a void is looked for
+ACROSS = 0.05  # of a triangle, by which the point between three columns may lie beyond its side
+NEGLIGIBLE = 1e-9  # probability of a void between three columns below which they are not drawn
+SAMPLES = 8192
+FEWEST = 1024
+BUDGET = 1e8  # columns around voids times depths times samples
+BATCH = 512
+SEED = 20_260_102  # the same grid gives the same probability
+
+
+@dataclass(frozen=True, slots=True)
+class VoidChance:
+    """Probability of any void at every depth (depths,), its standard error, and the likeliest three columns."""
+
+    probability: Array
+    standard_error: Array
+    columns: list[tuple[int, int, int] | None]  # None where nothing is likely
+    places: Array  # (depths, 2) of the deepest point between them as surveyed; nan where there are none
+
+
+def void_chance(columns: Columns, triples: npt.NDArray[np.intp], samples: int = SAMPLES) -> VoidChance:
+    """P(any void) at every depth; ``triples`` (t, 3) are the columns between which one may open."""
+    errors = Errors.of(columns)
+    layer = columns.depth_layers()
+    points: list[Point] = []
+    kept: list[tuple[list[int], list[int]]] = []
+    for triple in triples:
+        near = near_triple(columns, triple)
+        found = [
+            void_point(
+                errors, triple, near, depths[np.unique(np.linspace(0, len(depths) - 1, VOID_DEPTHS).astype(int))]
+            )
+            for depths in (np.flatnonzero(layer == k) for k in range(errors.layers))
+            if len(depths)
+        ]
+        likely = [point for point in found if point is not None and point[1] > NEGLIGIBLE]
+        points += likely
+        if likely or np.any(_as_surveyed(columns, triple.tolist(), near)):
+            kept.append((triple.tolist(), near))
+    depths_count = len(columns.depths)
+    total, square, each = np.zeros(depths_count), np.zeros(depths_count), np.zeros((len(kept), depths_count))
+    if not points:  # nothing moves: what is open is so for certain
+        for n, (three, near) in enumerate(kept):
+            each[n] = _as_surveyed(columns, three, near)
+        total = np.max(each, axis=0, initial=0.0)
+        return _answer(columns, total, np.zeros(depths_count), each, [three for three, _ in kept])
+    shifts, share = np.array([shift for shift, _ in points]), np.array([chance for _, chance in points])
+    share /= share.sum()
+    cost = sum(2 + len(near) for _, near in kept) + len(columns.names)
+    samples = int(np.clip(BUDGET / (cost * depths_count), FEWEST, samples))
+    rng = np.random.default_rng(SEED)
+    for begin in range(0, samples, BATCH):
+        count = min(BATCH, samples - begin)
+        x = rng.standard_normal((count, errors.size)) + shifts[rng.choice(len(share), count, p=share)]
+        weight = 1.0 / (np.exp(x @ shifts.T - 0.5 * np.sum(shifts**2, axis=1)) @ share)
+        used = sorted({k for three, near in kept for k in (*three, *near)})
+        centres = {k: errors.centres(x, k) for k in used}
+        radii = {k: errors.radii(x, k) for k in used}
+        any_open = np.zeros((count, depths_count), bool)
+        for n, (three, near) in enumerate(kept):
+            opened = void_open(centres, radii, three, near)
+            each[n] += weight @ opened
+            any_open |= opened
+        total, square = total + weight @ any_open, square + weight**2 @ any_open
+    mean = total / samples
+    error = np.sqrt(np.maximum(square / samples - mean**2, 0.0) / samples)
+    return _answer(columns, mean, error, each, [three for three, _ in kept])
+
+
+def _answer(columns: Columns, probability: Array, error: Array, each: Array, kept: list[list[int]]) -> VoidChance:
+    missing = np.any(columns.states == State.MISSING, axis=0)
+    likeliest: list[tuple[int, int, int] | None] = [None] * len(columns.depths)
+    places = np.full((len(columns.depths), 2), np.nan)
+    for z in range(len(columns.depths)):
+        n = int(np.argmax(each[:, z])) if len(each) else 0
+        if len(each) and each[n, z] > 0.0:
+            a, b, c = kept[n]
+            likeliest[z] = (a, b, c)
+            places[z] = power_centre(columns.centres[[a, b, c], z][None], columns.radii[[a, b, c], z][None])[0]
+    sure = np.where(missing, 1.0, np.clip(probability, 0.0, 1.0))
+    return VoidChance(sure, np.where(missing, 0.0, error), likeliest, places)
+
+
+def _as_surveyed(columns: Columns, three: list[int], near: list[int]) -> npt.NDArray[np.bool_]:
+    """Whether there is a void between three columns as surveyed: (depths,)."""
+    used = (*three, *near)
+    centres, radii = {k: columns.centres[k][None] for k in used}, {k: columns.radii[k][None] for k in used}
+    return np.asarray(void_open(centres, radii, three, near)[0])
+
+
+def void_point(
+    errors: Errors, triple: npt.NDArray[np.intp], near: list[int], depths: npt.NDArray[np.intp]
+) -> Point | None:
+    """The same for the point between three columns, at the likeliest of some ``depths``."""
+    c = errors.columns
+    centres, radii = np.swapaxes(c.centres[triple][:, depths], 0, 1), c.radii[triple][:, depths].T
+    middle = power_centre(centres, radii)
+    weights = _barycentric(middle, centres)
+    points = [
+        _void_point_at(errors, triple, near, int(depth), middle[k], weights[k])
+        for k, depth in enumerate(depths)
+        if np.all(weights[k] > -ACROSS)
+    ]
+    return max(points, key=lambda point: point[1], default=None)
+
+
+def _void_point_at(
+    errors: Errors, triple: npt.NDArray[np.intp], near: list[int], depth: int, middle: Array, weights: Array
+) -> Point:
+    """Nearest x at which the middle of three columns is clear of them and of every other that covers it.
+
+    With the barycentric weights w of the middle, its distance from the three grows by the sum of w times what each of
+    them moves away; the others have to move away by themselves.
+    """
+    c = errors.columns
+    rows, rests = [np.zeros(errors.size)], []
+    for column, weight in zip(triple.tolist(), weights.tolist(), strict=True):
+        rows[0] += weight * _away(errors, column, depth, middle)
+    rests.append(_depth_in(c, int(triple[0]), depth, middle))
+    for column in near:
+        rest = _depth_in(c, column, depth, middle)
+        if rest > 0.0:
+            rows.append(_away(errors, column, depth, middle))
+            rests.append(rest)
+    wanted = np.maximum(rests, 0.0)
+    shift = -np.linalg.pinv(np.array(rows), rcond=1e-9) @ wanted
+    if np.any(-np.array(rows) @ shift < 0.5 * wanted):  # columns that cannot move
+        shift = np.zeros(errors.size)
+        return shift, 0.0
+    size = float(np.linalg.norm(shift))
+    return shift * min(1.0, FURTHEST / max(size, 1e-12)), 0.5 * math.erfc(size / math.sqrt(2.0))
+
+
+def _away(errors: Errors, column: int, depth: int, middle: Array) -> Array:
+    """How much more a column covers a point for one standard deviation of each number: it comes nearer, or is wider."""
+    c = errors.columns
+    away = middle - c.centres[column, depth]
+    unit = away / max(float(np.hypot(*away)), 1e-9)
+    out = np.zeros(errors.size)
+    out[: errors.shared] = unit @ c.shared[column, depth]
+    out[errors.own_slice(column)] = unit @ c.own[column, depth]
+    add_radius(errors, out, column, depth, 1.0)
+    return out
+
+
+def _depth_in(columns: Columns, column: int, depth: int, point: Array) -> float:
+    """How deep (m) a point lies in a column; negative outside."""
+    away = point - columns.centres[column, depth]
+    return float(columns.radii[column, depth] - np.hypot(away[0], away[1]))
+
+
+def _barycentric(point: Array, three: Array) -> Array:
+    """Weights (n, 3) of points (n, 2) in triangles (n, 3, 2); nan in flat ones."""
+    u, v, w = three[:, 1] - three[:, 0], three[:, 2] - three[:, 0], point - three[:, 0]
+    with np.errstate(divide="ignore", invalid="ignore"):
+        det = u[:, 0] * v[:, 1] - u[:, 1] * v[:, 0]
+        second = (w[:, 0] * v[:, 1] - w[:, 1] * v[:, 0]) / det
+        third = (u[:, 0] * w[:, 1] - u[:, 1] * w[:, 0]) / det
+    return np.stack([1.0 - second - third, second, third], axis=-1)
+
+
+def near_triple(columns: Columns, triple: npt.NDArray[np.intp]) -> list[int]:
+    """Columns beside three that may cover the point between them."""
+    apart = np.hypot(*np.moveaxis(columns.designs - columns.designs[triple].mean(axis=0), -1, 0))
+    reach = 2.0 * float(np.max(columns.radii)) + float(np.max(apart[triple]))
+    return [k for k in np.flatnonzero(apart < reach).tolist() if k not in triple.tolist()]
+
+
+def void_open(
+    centres: dict[int, Array], radii: dict[int, Array], triple: list[int], near: list[int]
+) -> npt.NDArray[np.bool_]:
+    """Whether the point between three columns lies outside all discs and among the three: (n, depths)."""
+    three = np.stack([centres[k] for k in triple], axis=-2)
+    round_ = np.stack([radii[k] for k in triple], axis=-1)
+    shape = three.shape[:2]
+    middle = power_centre(three.reshape(-1, 3, 2), round_.reshape(-1, 3)).reshape(*shape, 2)
+    with np.errstate(invalid="ignore"):
+        away = middle - three[..., 0, :]
+        free = (np.sum(away**2, axis=-1) > round_[..., 0] ** 2) & _within(middle, three)
+        for k in near:
+            if not np.any(free):
+                break
+            away = middle - centres[k]
+            free &= np.sum(away**2, axis=-1) >= radii[k] ** 2
+    return np.asarray(free)
+
+
+def _within(point: Array, three: Array) -> npt.NDArray[np.bool_]:
+    """Whether points (..., 2) lie in triangles (..., 3, 2), their edges included."""
+    sides = []
+    for k in range(3):
+        p, q = three[..., k, :], three[..., (k + 1) % 3, :]
+        edge, to = q - p, point - p
+        sides.append(edge[..., 0] * to[..., 1] - edge[..., 1] * to[..., 0])
+    signs = np.stack(sides, axis=-1)
+    slack = 1e-12 + 1e-9 * np.max(np.abs(signs), axis=-1, keepdims=True)
+    return np.asarray(np.all(signs >= -slack, axis=-1) | np.all(signs <= slack, axis=-1))
