@@ -35,6 +35,8 @@ class Site:
     project: str = ""
     client: str = ""
     north: str = "site"
+    depth_reference: str = "collar"
+    height_datum: str = ""
     zero: tuple[float, float, float] | None = None
 
     def facts(self) -> list[tuple[str, str]]:
@@ -47,6 +49,8 @@ class Site:
             ("Project", self.project or "not stated"),
             ("Client", self.client or "not stated"),
             ("Azimuths and coordinates", f"{self.north} north"),
+            ("Depths count from", self.depth_reference.replace("-", " ")),
+            ("Height datum", self.height_datum or "not stated"),
             ("Site coordinates", zero),
         ]
 

@@ -28,7 +28,8 @@ WORDS = {
 
 def site_of(wall: Wall) -> Site:
     """What the wall's file says of the place."""
-    return Site(wall.file.project, wall.file.client, wall.file.north, wall.file.origin)
+    file = wall.file
+    return Site(file.project, file.client, file.north, file.depth_reference, file.height_datum, file.origin)
 
 
 def column_records(wall: Wall, judgement: Judgement) -> list[ColumnRecord]:

@@ -1,4 +1,4 @@
-"""Norths, and what a survey is tied to.
+"""Norths, what depths count from, and what a survey is tied to.
 
 Azimuths count from one of four norths: that of the site's own axes, true, grid or magnetic north. Error models are
 evaluated against true north; a whole answer (azimuths, positions, covariances, closure, section) is then turned into
@@ -17,6 +17,7 @@ from groundstation.errors import SurveyError
 
 Array = npt.NDArray[np.float64]
 NORTHS = ("site", "true", "grid", "magnetic")
+DEPTHS_FROM = ("collar", "ground-level", "rotary-table", "kelly-bushing", "drill-floor", "mean-sea-level")
 SAME_ANGLE = math.radians(0.01)  # between a tie-on and the first station at its depth
 SAME_DEPTH = 1e-6  # m
 
@@ -45,11 +46,13 @@ class Norths:
 
 @dataclass(frozen=True, slots=True)
 class Frame:
-    """The north of a record and that of the answer."""
+    """The north of a record and that of the answer; what depths count from, and which datum heights."""
 
     record: str = "site"
     answer: str = "site"
     norths: Norths = field(default_factory=Norths)
+    depth_reference: str = DEPTHS_FROM[0]  # of measured and true vertical depths
+    height_datum: str = ""  # of site coordinates, "" where not stated
 
     def to_true(self, azimuth: Array) -> Array:
         """Azimuths of the record, from true north."""

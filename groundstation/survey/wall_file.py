@@ -20,7 +20,7 @@ from groundstation.errors import SurveyError
 from groundstation.survey.as_built import Columns
 from groundstation.survey.columns import Tolerance, tolerance
 from groundstation.survey.error_sources import Site
-from groundstation.survey.frames import NORTHS
+from groundstation.survey.frames import DEPTHS_FROM, NORTHS
 from groundstation.survey.instruments import Tool, load_tool
 from groundstation.survey.joints import Detour, neighbours_in_grid, neighbours_in_line
 from groundstation.survey.methods import Method
@@ -31,7 +31,7 @@ from groundstation.survey.wall_verdict import Judgement, judge
 
 LAYOUTS = ("line", "shaft", "grid")
 NEEDED = ("radius_m", "thickness_m", "heads", "stations")
-SIGNED = ("project", "client", "calibration", "north")  # of the report alone
+SIGNED = ("project", "client", "calibration", "north", "depth_reference", "height_datum")  # of the report alone
 TEXTS = ("name", "heads", "stations", "layout", "tolerance", "instrument", "serial", "method", *SIGNED)
 ORIGIN = ("northing_m", "easting_m", "height_m")
 POSITIVE = ("radius_m", "thickness_m", "spacing_m", "length_m", "depth_step_m", "gravity_mps2", "allowed_probability")
@@ -70,6 +70,8 @@ class WallFile:
     client: str = ""
     calibration: str = ""  # certificate of the instrument
     north: str = "site"  # to which azimuths and coordinates belong
+    depth_reference: str = DEPTHS_FROM[0]
+    height_datum: str = ""
     origin: tuple[float, float, float] | None = None  # m, northing, easting and height of the wall's zero
 
     def digests(self) -> list[tuple[str, str]]:
@@ -172,6 +174,8 @@ def read_wall_file(path: Path) -> WallFile:
         values.get("client", ""),
         values.get("calibration", ""),
         _one_of(path, values, "north", NORTHS, "site"),
+        _one_of(path, values, "depth_reference", DEPTHS_FROM, DEPTHS_FROM[0]),
+        values.get("height_datum", ""),
         _origin(path, values),
     )
 

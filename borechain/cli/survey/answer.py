@@ -9,6 +9,9 @@ from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from groundstation.survey.analysis import Analysis
+    from groundstation.survey.frames import Frame
+
+FRAME = ("north", "depth_reference", "height_datum")  # of every row of a table
 
 
 def station_rows(
@@ -103,21 +106,30 @@ def source_text(found: Analysis) -> str:
     """Covariance of every source at every station, a .csv file as the industry's workbooks print it."""
     text = io.StringIO()
     writer = csv.writer(text, lineterminator="\n")
-    writer.writerow(["md_m", "source", *(f"{name}_m2" for name in ("nn", "ee", "vv", "ne", "nv", "ev"))])
+    axes = ("nn", "ee", "vv", "ne", "nv", "ev")
+    writer.writerow(["md_m", "source", *(f"{name}_m2" for name in axes), *FRAME])
     places = ((0, 0), (1, 1), (2, 2), (0, 1), (0, 2), (1, 2))
-    parts = found.uncertainty.by_source()
+    parts, named = found.uncertainty.by_source(), frame_words(found.frame)
     for k, md in enumerate(found.record.md.tolist()):
         for name, cov in parts.items():
-            writer.writerow([md, name, *(float(cov[(k, *place)]) for place in places)])
+            writer.writerow([md, name, *(float(cov[(k, *place)]) for place in places), *named])
     return text.getvalue()
 
 
-def table_text(rows: list[dict[str, Any]]) -> str:
-    """Station table, a .csv file."""
+def frame_words(frame: Frame) -> list[str]:
+    """North, depth reference and height datum, as every row of a table names them."""
+    return [frame.answer, frame.depth_reference, frame.height_datum]
+
+
+def table_text(rows: list[dict[str, Any]], frame: Frame) -> str:
+    """Station table, a .csv file; every row names its frame."""
     text = io.StringIO()
     writer = csv.writer(text, lineterminator="\n")
     plain = [key for key in rows[0] if key != "uncertainty"]
     half = ("north_m", "east_m", "tvd_m")
-    writer.writerow([*plain, *(f"uncertainty_{key}" for key in half)])
-    writer.writerows([[*(row[key] for key in plain), *(row["uncertainty"][key] for key in half)] for row in rows])
+    writer.writerow([*plain, *(f"uncertainty_{key}" for key in half), *FRAME])
+    named = frame_words(frame)
+    writer.writerows(
+        [[*(row[key] for key in plain), *(row["uncertainty"][key] for key in half), *named] for row in rows]
+    )
     return text.getvalue()

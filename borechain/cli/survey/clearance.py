@@ -126,14 +126,19 @@ def _result(hole: Hole, found: Clearance) -> dict[str, Any]:
     values = [column.tolist() for column in columns.values()]
     stations = [dict(zip(columns, row, strict=True)) for row in zip(*values, strict=True)]
     least = min(stations, key=lambda row: min(row["factor"], row["independent_factor"]))
-    return {"clear": min(least["factor"], least["independent_factor"]) > 1.0, "least": least, "stations": stations}
+    frame = {"north": "true", "depth_reference": "head of the reference hole"}
+    return frame | {
+        "clear": min(least["factor"], least["independent_factor"]) > 1.0,
+        "least": least,
+        "stations": stations,
+    }
 
 
 def _show(result: dict[str, Any], title: str) -> None:
     from rich.table import Table
 
     paper = console(100)
-    table = Table(title=f"Clearance of {title}")
+    table = Table(title=f"Clearance of {title}, true north, depths from their heads")
     for name in ("MD m", "offset MD m", "distance m", "sigma m", "factor", "as if nothing is shared"):
         table.add_column(name, justify="right")
     for row in result["stations"]:

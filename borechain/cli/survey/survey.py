@@ -5,6 +5,7 @@ from __future__ import annotations
 import datetime
 import json
 import math
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -24,6 +25,7 @@ if TYPE_CHECKING:
     from groundstation.survey.records import Record
 
 NORTHS = ("site", "true", "grid", "magnetic")
+DEPTHS_FROM = ("collar", "ground-level", "rotary-table", "kelly-bushing", "drill-floor", "mean-sea-level")
 METHODS = ("tangential", "balanced-tangential", "average-angle", "radius-of-curvature", "minimum-curvature")
 SOURCES_SHOWN = 12
 
@@ -134,8 +136,16 @@ def parameters_of(words: tuple[str, ...]) -> dict[str, float]:
     type=float,
     nargs=3,
     metavar="NORTHING EASTING HEIGHT",
-    help="Site coordinates of the point where positions are zero, m; adds those of every station.",
+    help="Site coordinates of the point where positions and depths are zero, m; adds those of every station.",
 )
+@click.option(
+    "--depth-reference",
+    type=click.Choice(DEPTHS_FROM),
+    default="collar",
+    show_default=True,
+    help="What measured and vertical depths count from; every output names it.",
+)
+@click.option("--height-datum", metavar="NAME", help="Datum of the height of --origin, as it is to be named.")
 @click.option(
     "--section-azimuth-deg", type=float, default=0.0, show_default=True, help="Azimuth of the vertical section."
 )
@@ -186,6 +196,8 @@ def survey(
     north_of_site_deg: float | None,
     convergence_deg: float,
     origin: tuple[float, float, float] | None,
+    depth_reference: str,
+    height_datum: str | None,
     section_azimuth_deg: float,
     gravity: float,
     field_nt: float,
@@ -222,20 +234,21 @@ def survey(
     check_suffix("--export-tool", export_tool, ".json")
     if plot is not None:
         check_installed("matplotlib")
+    check_together(from_collar, tie_on, programme, origin, height_datum, azimuth_error_deg, export_tool)
     understood = read_any(file, DisplacementRule(displacement_rule), md_unit)
     record = understood.record
     if from_collar:
         record = with_collar(record)
-    if from_collar and tie_on is not None:
-        raise InputFault("expected --from-collar or --tie-on, got both")
-    if programme is not None and (azimuth_error_deg is not None or export_tool is not None):
-        raise InputFault("--programme: expected neither --azimuth-error-deg nor --export-tool beside it")
     tool = load_tool(instrument, parameters_of(parameter))
     if azimuth_error_deg is not None:
         tool = with_azimuth_error(tool, math.radians(azimuth_error_deg))
     legs = [] if programme is None else read_programme(programme)
     named = ", ".join(f"{leg.tool.name} from {leg.top:g} m" for leg in legs) or tool.name
-    frame = frame_of(north, answer_north, north_of_site_deg, convergence_deg, declination_deg)
+    frame = replace(
+        frame_of(north, answer_north, north_of_site_deg, convergence_deg, declination_deg),
+        depth_reference=depth_reference,
+        height_datum=height_datum or "",
+    )
     tied = None if tie_on is None else read_tie_on(tie_on)
     site = Site(gravity, field_nt, math.radians(dip_deg), math.radians(declination_deg), math.radians(latitude_deg))
     found = analyse(record, Method(method), legs or tool, site, math.radians(section_azimuth_deg), frame, tied)
@@ -250,6 +263,8 @@ def survey(
         "method": method,
         "instrument": named,
         "north": frame.answer,
+        "depth_reference": frame.depth_reference,
+        "height_datum": frame.height_datum or None,
         "origin_m": None if origin is None else list(origin),
         "sigma": sigma,
         "stations": rows,
@@ -259,7 +274,7 @@ def survey(
         "sources": sources(found, sigma),
     }
     if out is not None:
-        write_whole(out, table_text(rows))
+        write_whole(out, table_text(rows, found.frame))
     if by_source is not None:
         write_whole(by_source, source_text(found))
     if plot is not None:
@@ -270,6 +285,24 @@ def survey(
         click.echo(json.dumps(result))
     else:
         show(result)
+
+
+def check_together(
+    from_collar: bool,
+    tie_on: Path | None,
+    programme: Path | None,
+    origin: tuple[float, float, float] | None,
+    height_datum: str | None,
+    azimuth_error_deg: float | None,
+    export_tool: Path | None,
+) -> None:
+    """Refuse options that contradict each other."""
+    if from_collar and tie_on is not None:
+        raise InputFault("expected --from-collar or --tie-on, got both")
+    if height_datum is not None and origin is None:
+        raise InputFault("--height-datum: expected --origin beside it")
+    if programme is not None and (azimuth_error_deg is not None or export_tool is not None):
+        raise InputFault("--programme: expected neither --azimuth-error-deg nor --export-tool beside it")
 
 
 def frame_of(
@@ -291,7 +324,9 @@ def draw(found: Analysis, instrument: str, sigma: float, title: str, path: Path)
     from groundstation.survey.ellipsoid import probability_of
 
     confidence = probability_of(sigma, 2)
-    words = f"{title}, {instrument}, {found.frame.answer} north, {sigma:g} sigma"
+    words = (
+        f"{title}, {instrument}, {found.frame.answer} north, depth from {found.frame.depth_reference}, {sigma:g} sigma"
+    )
     figure = survey_figure(found.record.md, found.positions, found.uncertainty.cov, confidence, words)
     save(figure, path)
 
@@ -311,7 +346,14 @@ def show(result: dict[str, Any]) -> None:
 
     paper = console(110)
     paper.print(result["read_as"], markup=False)
-    words = (result["method"], result["instrument"], f"{result['north']} north", f"{result['sigma']:g} sigma")
+    words = (
+        result["method"],
+        result["instrument"],
+        f"{result['north']} north",
+        f"depth from {result['depth_reference']}",
+        *([f"height above {result['height_datum']}"] if result["height_datum"] else []),
+        f"{result['sigma']:g} sigma",
+    )
     table = Table(title=f"{result['file']}: {', '.join(words)}")
     names = ("#", "MD m", "incl deg", "azi deg", "north m", "east m", "TVD m", "DLS deg/30m")
     for name in (*names, "+-N cm", "+-E cm", "+-TVD cm"):

@@ -118,6 +118,9 @@ def result_of(found: Wall, judgement: Judgement) -> dict[str, Any]:
     return {
         "wall": found.file.name,
         "verdict": judgement.verdict.value,
+        "north": found.file.north,
+        "depth_reference": found.file.depth_reference,
+        "height_datum": found.file.height_datum or None,
         "findings": [
             {
                 "kind": finding.kind.value,
@@ -312,7 +315,8 @@ def show(result: dict[str, Any]) -> None:
 
     paper = console(100)
     colour = "green" if result["verdict"] == "tight" else "bold red"
-    paper.print(f"[{colour}]{result['wall']}: {result['verdict']}[/]")
+    frame = f"{result['north']} north, depth from {result['depth_reference']}"
+    paper.print(f"[{colour}]{result['wall']}: {result['verdict']}[/] ({frame})")
     for finding in result["findings"]:
         paper.print(f"  {finding['kind']}: {finding['text']}", markup=False)
     table = Table(title=f"the {min(SHOWN, len(result['joints']))} most doubtful of {len(result['joints'])} joints")
