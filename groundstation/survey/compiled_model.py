@@ -25,11 +25,12 @@ from groundstation.survey.compiled_source import CURVED, GIVEN, STRAIGHT, loop_s
 from groundstation.survey.error_model import Uncertainty, check_legs, propagate, surface_covariance
 from groundstation.survey.error_sources import RECORD, SECONDS_A_METRE, Leg, Site, Survey
 from groundstation.survey.gyro_modes import TURNS, mode_weights, sections_of
-from groundstation.survey.instruments import Tool
+from groundstation.survey.instruments import Tool, load_tool
 from groundstation.survey.methods import Method, check_stations, positions
 
 Array = npt.NDArray[np.float64]
 COMPILED_FROM = 100  # stations
+COMPILED_BEFORE = ("relay", "mwd-rev5.1")  # by ``make kernels``
 
 
 class CompiledModel:
@@ -118,6 +119,15 @@ class CompiledModel:
 @lru_cache(maxsize=32)
 def _model(tool: Tool, *, by_source: bool) -> CompiledModel:
     return CompiledModel(tool, by_source=by_source)
+
+
+def warm(names: Sequence[str] = COMPILED_BEFORE) -> None:
+    """Compile instruments into the cache, totals and sources, so that nobody's first survey waits for it."""
+    md, zero = np.arange(3.0), np.zeros(3)
+    for name in names:
+        for by_source in (False, True):
+            tool = load_tool(name)
+            CompiledModel(tool, by_source=by_source).run(Method.BALANCED_TANGENTIAL, md, zero, zero, Site())
 
 
 def locate(
