@@ -1,6 +1,7 @@
 """Positions and their covariance: printed steps, circles, one station at a time, sampling."""
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -8,7 +9,11 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from groundstation.errors import SurveyError
+from groundstation.survey.analysis import analyse
+from groundstation.survey.error_sources import Site
+from groundstation.survey.instruments import Mode, Term, load_tool
 from groundstation.survey.methods import Method
+from groundstation.survey.records import Record
 from groundstation.survey.resolve import Direction
 from groundstation.survey.trajectory import Trajectory, interpolate
 
@@ -183,3 +188,28 @@ def test_covariance_of_the_position_is_what_sampling_gives() -> None:
         toes.append(sampled.points[-1].position)
     expected = np.cov(np.array(toes).T)
     np.testing.assert_allclose(claimed.points[-1].cov, expected, rtol=0.06, atol=0.03 * float(np.trace(expected)))
+
+
+def test_the_stations_of_the_service_and_the_record_of_the_command_have_one_region() -> None:
+    """Stations appended one by one, as the service does, against the model of the command, where both say the same."""
+    md = np.array([0.0, 4.0, 9.0, 15.0, 22.0])
+    inclination, azimuth = np.radians([0.0, 3.0, 5.0, 8.0, 9.0]), np.radians([0.0, 40.0, 55.0, 60.0, 48.0])
+    sizes = {"I": 2e-3, "A": 7e-3, "YAW": 0.02, "LEAN": 1e-3}
+    terms = (
+        Term("I", sizes["I"], "rad", Mode.RANDOM, ("0", "1", "0")),
+        Term("A", sizes["A"], "rad", Mode.RANDOM, ("0", "0", "1")),
+        Term("YAW", sizes["YAW"], "rad", Mode.SYSTEMATIC, ("0", "0", "1")),
+        Term("LEAN", sizes["LEAN"], "rad", Mode.SYSTEMATIC, ("0", "1", "0")),
+    )
+    tool = replace(load_tool("relay"), terms=terms)
+    record = Record(md, inclination, azimuth, list(range(len(md))), {})
+    whole = analyse(record, Method.BALANCED_TANGENTIAL, tool, Site())
+    trajectory = Trajectory()
+    for depth, i, a in zip(md[1:].tolist(), inclination[1:].tolist(), azimuth[1:].tolist(), strict=True):
+        ci, si, ca, sa = math.cos(i), math.sin(i), math.cos(a), math.sin(a)
+        by_inclination, by_azimuth = np.array([ci * ca, ci * sa]), np.array([-si * sa, si * ca])
+        random = np.stack([sizes["I"] * by_inclination, sizes["A"] * by_azimuth], axis=1)
+        shared = np.stack([sizes["YAW"] * by_azimuth, sizes["LEAN"] * by_inclination], axis=1)
+        trajectory.append(depth, Direction(np.array([si * ca, si * sa]), ci, random @ random.T, shared))
+    np.testing.assert_allclose([p.position for p in trajectory.points], whole.positions, atol=1e-12)
+    np.testing.assert_allclose([p.cov for p in trajectory.points], whole.uncertainty.cov, rtol=1e-9, atol=1e-15)
