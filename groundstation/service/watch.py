@@ -55,6 +55,7 @@ class Watch:
         self._gaps: dict[int, Gap] = {}
         self._witnesses = Witnesses()
         self._told_unplaced: set[int] = set()  # tubes
+        self._depth_due = math.inf  # s, own clock, since when tubes are known and a depth may be expected
 
     def is_due(self, now: float) -> bool:
         """Whether to look again at ``now`` (s, own clock)."""
@@ -196,8 +197,11 @@ class Watch:
     def _look_at_depth(self, now: float) -> None:
         model = self._model
         was_heard = math.isfinite(model.depth_heard_at)
-        silent = was_heard and now > model.depth_heard_at + model.config.stale_after
-        self._alarms.hold("depth_silent", "depth", "no reading comes" if silent else "")
+        if model.tally.tubes:
+            self._depth_due = min(self._depth_due, now)
+        silent = now > max(model.depth_heard_at, self._depth_due) + model.config.stale_after
+        why = "no reading comes" if was_heard else "not heard since the ground station started"
+        self._alarms.hold("depth_silent", "depth", why if silent else "")
         heard = [tube for tube in model.tally.tubes if not model.is_stale(tube)]
         bit = model.depths.latest
         comparable = was_heard and not silent and model.knows_tubes

@@ -260,6 +260,22 @@ def test_bytes_that_are_no_depth_are_counted_and_told(start: Callable[[], Rig], 
     assert rig.alarms() >= {"bad_input"}
 
 
+def test_a_depth_that_never_comes_after_a_restart_is_told(start: Callable[[], Rig]) -> None:
+    first = start()
+    first.speak(1)
+    first.depth(2.0)
+    first.ground.store.close()
+    again = start()
+    again.now, again.md = first.now, first.md
+    again.run(4.0)
+    assert "depth_silent" not in again.alarms()
+    again.run(2.0)
+    assert "depth_silent" in again.alarms()
+    again.read_depth(2.0)
+    again.run(1.0)
+    assert "depth_silent" not in again.alarms()
+
+
 def test_a_survey_from_before_the_restart_finds_its_depth(start: Callable[[], Rig]) -> None:
     first = start()
     first.run(3.0)
