@@ -1,7 +1,7 @@
 """Whether anything on the rig could have shown that the encoder was wrong.
 
-That the encoder slipped shows only against a gyroscope that ran through it. Where three faults or more leave none, a slip
-is a turn of the string to everything that measures, and no alarm can be asked for.
+That the encoder slipped shows only against a gyroscope that ran through it. Where three faults or more leave none, a
+slip is a turn of the string to everything that measures, and no alarm can be asked for.
 """
 
 from __future__ import annotations
