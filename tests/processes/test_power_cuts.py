@@ -17,7 +17,7 @@ pytestmark = pytest.mark.process
 
 WELLBORE = Path("scenarios/wellbore-1.toml")
 GROUND_KILLS, OTHER_KILLS, DOWN = 20, 2, 6.0
-LEFT_ALONE = 20.0  # s of each life
+LEFT_ALONE = 8.0  # s at least, between two kills of one process
 
 
 def drilled(folder: Path, faults: list[KillNode], *arguments: str, scenario: str) -> dict[str, Any]:
@@ -49,7 +49,7 @@ def kills(world: World) -> list[KillNode]:
     found = []
     for address, since in ({BASE: world.begin, ENCODER: world.begin} | added).items():
         count = GROUND_KILLS if address == BASE else OTHER_KILLS
-        edges = np.linspace(since + 90.0, world.end - 120.0, count + 1) - world.begin
+        edges = np.linspace(since + 20.0, world.end - 60.0, count + 1) - world.begin
         for first, last in itertools.pairwise(edges.tolist()):
             found.append(KillNode(address, round(float(random.uniform(first, last - DOWN - LEFT_ALONE)), 3), DOWN))
     return found
