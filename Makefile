@@ -72,12 +72,12 @@ study: $(STAMP) statistical  ## every study of the table, with many seeds; their
 	$(BIN)/borechain gauntlet --seeds 20000
 	$(BIN)/python docs/make_faults.py
 
-soak: $(STAMP)  ## 100 000 seeds of the gauntlet, a week (SOAK=168) of a rig under faults, an hour of processes
+soak: $(STAMP)  ## 100 000 seeds of the gauntlet, SOAK hours of a rig under faults, an hour of processes
 	$(BIN)/borechain gauntlet --seeds 100000 --from 100000
 	$(BIN)/borechain gauntlet --soak $(SOAK) --out docs/results
 	$(BIN)/borechain bench realtime --nodes 10 --seconds 3600
 
-seeds: $(STAMP)  ## fresh seeds of the gauntlet: FROM=50000 SEEDS=20000
+seeds: $(STAMP)  ## fresh seeds of the gauntlet, SEEDS of them FROM one on
 	$(BIN)/borechain gauntlet --seeds $(SEEDS) --from $(FROM)
 
 lock:  ## pin the dependencies again, without addresses (needs pip-tools)
