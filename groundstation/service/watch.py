@@ -92,6 +92,10 @@ class Watch:
             self._alarms.alert("tube_queue", tube, f"{event.arguments.get('dropped')} dropped")
         elif event.code == CODE:
             self._alarms.alert(CODE, tube, refusal_of(event.arguments))
+        elif event.code == "joint_contradicts_marks":
+            angle, marks = (_number(event, name) for name in ("angle_deg", "marks_deg"))
+            what = f"its angle by the yaws is {angle:.1f} deg, by its marks {marks:.1f} deg"
+            self._alarms.alert("joint", f"joint above {tube}", f"{what}; see the command accept_joints")
 
     def on_known_event(self, event: Event) -> None:
         """Judge an event that has come, or was stored before a restart of the ground station.
@@ -227,6 +231,12 @@ class Watch:
                 missing = ", ".join(map(str, sorted(stop.missing)))
                 subject = f"stop at {stop.stand.md:.2f} m, {stop.stand.epoch}/{stop.stand.begun_at:.0f} s"
                 self._alarms.hold("survey_missing", subject, f"tubes {missing}" if missing else "")
+
+
+def _number(event: Event, name: str) -> float:
+    """An argument of an event; NaN where it is none, for somebody may have made the event up."""
+    value = event.arguments.get(name)
+    return float(value) if isinstance(value, int | float) else math.nan
 
 
 def subject_of(pair: Pair) -> str:
