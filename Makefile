@@ -3,6 +3,10 @@ PYTHON ?= python3
 VENV ?= .venv
 BIN := $(VENV)/bin
 STAMP := $(VENV)/.installed
+# sizes of `make soak` (h of rig time) and `make seeds`
+SOAK ?= 168
+FROM ?= 50000
+SEEDS ?= 20000
 # two workers a core, for a third of a worker's time goes by waiting for processes; one that has nothing left takes
 # tests from another
 WORKERS ?= $(shell echo $$((2 * $$(getconf _NPROCESSORS_ONLN))))
@@ -11,7 +15,7 @@ unexport PYTHONDONTWRITEBYTECODE
 PYTEST := $(BIN)/python -m pytest --numprocesses $(WORKERS) --maxprocesses 8 --dist worksteal
 
 .DEFAULT_GOAL := rig
-.PHONY: help rig test quick check lint types contracts kernels bytecode browser tests statistical explore lock study soak clean
+.PHONY: help rig test quick check lint types contracts kernels bytecode browser tests statistical explore lock study soak seeds clean
 
 help:  ## list the targets
 	@awk -F ':.*## ' '/^[a-z]+:.*## / { printf "make %-12s %s\n", $$1, $$2 }' $(MAKEFILE_LIST)
@@ -68,9 +72,13 @@ study: $(STAMP) statistical  ## every study of the table, with many seeds; their
 	$(BIN)/borechain gauntlet --seeds 20000
 	$(BIN)/python docs/make_faults.py
 
-soak: $(STAMP)  ## 100 000 seeds of the gauntlet, and a week of a rig under faults
+soak: $(STAMP)  ## 100 000 seeds of the gauntlet, SOAK hours of a rig under faults, an hour of processes
 	$(BIN)/borechain gauntlet --seeds 100000 --from 100000
-	$(BIN)/borechain gauntlet --soak 168 --json
+	$(BIN)/borechain gauntlet --soak $(SOAK) --out docs/results
+	$(BIN)/borechain bench realtime --nodes 10 --seconds 3600
+
+seeds: $(STAMP)  ## fresh seeds of the gauntlet, SEEDS of them FROM one on
+	$(BIN)/borechain gauntlet --seeds $(SEEDS) --from $(FROM)
 
 lock:  ## pin the dependencies again, without addresses (needs pip-tools)
 	pip-compile --quiet --upgrade --generate-hashes --all-extras --allow-unsafe --strip-extras --no-annotate \

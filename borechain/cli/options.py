@@ -26,7 +26,8 @@ class ScenarioPath(click.Path):
 
 scenario_argument = click.argument("scenario", type=ScenarioPath())
 FAULT_HELP = (
-    "Fault to inject: kill-node:3@600 kills the node of tube 3 after 600 s, kill-node:3@600+20 for 20 s. Repeatable."
+    "Fault to inject: kill-node:3@600 kills the node of tube 3 after 600 s, kill-node:3@600+20 for 20 s; "
+    "encoder or base in place of the number kills the encoder or the ground station. Repeatable."
 )
 
 

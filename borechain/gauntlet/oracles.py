@@ -31,7 +31,7 @@ TOLD = frozenset(
     }
 )
 DEPTH = frozenset({"depth_refused", "depth_contradicts"})  # alarms while which no depth since a gap is sure
-YAW = frozenset({"reference", "joint"})  # alarms while which no yaw is sure, where the encoder has failed
+YAW = frozenset({"reference", "joint"})  # alarms while which no yaw is sure, where encoder or sensors have failed
 RECEIPT = msgpack.packb({"k": int(Kind.RECEIPT)})[1:]  # in every frame with a receipt
 UNKNOWN_DEG = 20.0  # of an azimuth whose yaws are all unknown, at least
 
@@ -120,11 +120,12 @@ class Observer:
                 yield f"tube {tube} without power is shown fresh"
 
 
-def violations(rig: GauntletRig, seen: Collection[str] = ()) -> list[str]:
+def violations(rig: GauntletRig, seen: Collection[str] = (), *, encoder_can_be_judged: bool = True) -> list[str]:
     """Every oracle that does not hold at the end, in words; ``seen`` are the alarms that the crew saw meanwhile.
 
-    Events are not sent again, so an alarm that rests on them is lost with a database that somebody deletes or replaces
-    under a crew that has seen it.
+    Where the encoder cannot be judged, its failure showing in nothing that measures, directions are not. Events are
+    not sent again, so an alarm that rests on them is lost with a database that somebody deletes or replaces under a
+    crew that has seen it.
     """
     shown = rig.inline.ask("alarms")
     standing = {row["code"] for row in shown["rig"]}
@@ -134,12 +135,17 @@ def violations(rig: GauntletRig, seen: Collection[str] = ()) -> list[str]:
     return [
         *_each_once(rows),
         *(() if standing & DEPTH else _depths(rows, rig.world)),
-        *(() if warned & YAW and rig.world.misled else _directions(rig)),
+        *(() if _is_told(rig.world, warned) or not encoder_can_be_judged else _directions(rig)),
         *_flags(rig.inline.ground.model),
         *_missing(rows, rig.world, standing | (told & {"depth_refused"})),
         *_health(rig.inline.ask("status")["health"], standing),
         *queues(rig),
     ]
+
+
+def _is_told(world: FaultyWorld, warned: set[str]) -> bool:
+    """Whether the crew knows that a yaw is wrong, and one may be: an alarm without a cause excuses nothing."""
+    return bool(warned & YAW and (world.misled or (world.spoiled and "joint" in warned)))
 
 
 def queues(rig: GauntletRig) -> Iterator[str]:

@@ -78,6 +78,7 @@ class GauntletRig:
         self._folder, self._seed, self._strangers = folder, seed, itertools.count()
         self.off: dict[int, float] = {}  # since when (s), by address
         self.before_cut: list[Callable[[], None]] = []
+        self.after_step: list[Callable[[], None]] = []
         self._numbers = {address: address for address in disks}  # that the processes in their places give themselves
         self._spoke_until: dict[int, float] = {}  # s, by number
         self._look_at = world.begin
@@ -157,6 +158,8 @@ class GauntletRig:
         for step in steps:
             self.advance(step.at, observe)
             step.act(self)
+            for listener in self.after_step:
+                listener()
         self.advance(math.inf, observe)
 
     def repair(self) -> None:

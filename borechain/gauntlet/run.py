@@ -16,6 +16,7 @@ from typing import Any
 
 from borechain.gauntlet.oracles import Observer, violations
 from borechain.gauntlet.rig import PLANS, GauntletRig, make_ready, new_rig
+from borechain.gauntlet.sight import Sight
 from sim.gauntlet.kinds import KINDS
 from sim.gauntlet.plan import drawn_kinds, steps_of
 from sim.rig.report import digest
@@ -23,6 +24,7 @@ from sim.rig.report import digest
 ALL = tuple(kind.name for kind in KINDS)
 USUAL = "minute"
 COLLECT_EVERY = 50_000  # objects
+FEW = 2  # kinds of faults that may never mislead the crew without a word, whatever can be seen
 
 
 @dataclass(slots=True)
@@ -84,7 +86,7 @@ def _run(rig: GauntletRig, outcome: Outcome) -> None:
     begin = world.begin + chosen.rested
     steps = steps_of(outcome.seed, outcome.kinds, begin + chosen.after_begin, world.end)
     outcome.schedule = [f"{step.at - begin:.1f} s {name}" for name, step in steps]
-    observer = Observer(rig, steps[0][1].at)
+    observer, sight = Observer(rig, steps[0][1].at), Sight(rig)
     rig.drill([step for _, step in steps], observer.look)
     outcome.told = observer.told
     if rig.ground is None:
@@ -95,7 +97,8 @@ def _run(rig: GauntletRig, outcome: Outcome) -> None:
     outcome.alarms = sorted({code for code, _, _, standing in rows if standing})
     outcome.cleared = sorted({code for code, _, _, standing in rows if not standing})
     outcome.measurements = len(rig.inline.ask("measurements")["measurements"])
-    outcome.violations = [*observer.found, *violations(rig, observer.told)]
+    judged_by = len(outcome.kinds) <= FEW or sight.has_seen
+    outcome.violations = [*observer.found, *violations(rig, observer.told, encoder_can_be_judged=judged_by)]
 
 
 @contextlib.contextmanager

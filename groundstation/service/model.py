@@ -97,7 +97,7 @@ class RigModel:
         way for long; it tells that the node spoke then, which is all that a ground station knows after its start.
         """
         known = self.nodes.get(state.tube)
-        if known is not None and is_repeated(state, known):
+        if known is not None and (is_repeated(state, known) or self._is_of_before(state, known)):
             return False
         self.recalibration.on_state(state)
         spoke_at = now - self._time_on_its_way(state)
@@ -107,6 +107,11 @@ class RigModel:
             self._tally_known_at = min(self._tally_known_at, now + ALL_HEARD_WITHIN)
             self.tally.on_hops(state.tube, state.hops)
         return True
+
+    def _is_of_before(self, state: NodeState, known: NodeState) -> bool:
+        """Whether a state leaves its tube's epoch for one that the encoder is not in: somebody has recorded it."""
+        possible = (known.epoch, self.epoch, EPOCH_UNKNOWN)
+        return self.epoch != EPOCH_UNKNOWN and state.epoch not in possible
 
     def restore_tally(self, tubes: list[int]) -> None:
         """Go on with the tubes that were known before a restart."""

@@ -24,7 +24,6 @@ from groundstation.service.recalibration.procedure import Request
 from groundstation.service.store import Store
 from groundstation.service.uploads import Uploads
 from groundstation.service.views import View
-from groundstation.service.watch import subject_of
 from telemetry.application.arguments import check_arguments, parse_parameters, parse_tube
 from telemetry.application.commands import COMMANDS, CommandSpec, ObeyedBy, find_command
 from telemetry.errors import CommandError
@@ -177,8 +176,10 @@ class Operator:
 
     def accept_joints(self, order: Order) -> None:
         """Take the angles at which the joints stand for right."""
-        for pair in self._model.joints.accept():
-            self._model.rig_alarms.clear("joint", subject_of(pair))
+        self._model.joints.accept()
+        for alarm in list(self._model.rig_alarms):
+            if alarm.kind.code == "joint":
+                self._model.rig_alarms.clear("joint", alarm.subject)
         order.advance(OrderState.DONE)
 
     def alarm(self, order: Order) -> None:

@@ -39,6 +39,10 @@ class Stop:
         """Whether a survey was taken during the stop."""
         return any(belongs(stand, epoch, at) for stand in (self.stand, *self.later))
 
+    def covers(self, stand: Stand) -> bool:
+        """Whether a stand is a part of the stop."""
+        return any(_covers(whole, stand) for whole in (self.stand, *self.later))
+
     def age(self, epoch: int, rig_now: float) -> float:
         """Seconds from its begin to ``rig_now`` (s) of an epoch, fewer where rig time began anew; infinite after it."""
         newest = (self.stand, *self.later)[-1]
@@ -88,7 +92,7 @@ class Stops:
 
     def on_later_stand(self, before: Stand, stand: Stand) -> None:
         """The stop that ``before`` belongs to goes on in ``stand``, of a later epoch."""
-        known = next((stop for stop in reversed(self._stops) if before in (stop.stand, *stop.later)), None)
+        known = next((stop for stop in reversed(self._stops) if stop.covers(before)), None)
         if known is not None:
             known.later = [one for one in known.later if one.epoch != stand.epoch] + [stand]
 
@@ -111,6 +115,11 @@ class Stops:
 def belongs(stand: Stand, epoch: int, at: float) -> bool:
     """Whether a survey was taken during a stand."""
     return epoch == stand.epoch and stand.begun_at - AROUND <= at <= stand.ended_at + AROUND
+
+
+def _covers(whole: Stand, stand: Stand) -> bool:
+    is_within = whole.begun_at <= stand.begun_at and stand.ended_at <= whole.ended_at
+    return (whole.epoch, whole.md) == (stand.epoch, stand.md) and is_within
 
 
 def _same(one: Stand, other: Stand) -> bool:

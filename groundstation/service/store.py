@@ -101,6 +101,7 @@ ALARMS = sa.Table(
     sa.Column("number", sa.Integer, primary_key=True, autoincrement=False),
     sa.Column("content", sa.Text, nullable=False),
 )
+DROP_ALARM, ADD_ALARM = sa.delete(ALARMS).where(ALARMS.c.number == sa.bindparam("its_number")), sa.insert(ALARMS)
 
 
 @dataclass(frozen=True, slots=True)
@@ -144,8 +145,7 @@ class Store:
             with self._refusing("; choose a writable --folder or another database"):
                 if self._file is not None:
                     disk.make_folder(self._file.parent)
-                is_ours = self._check_schema()
-                self._begin(is_ours=is_ours)
+                self._begin(self._check_schema())
         except StoreError:
             self.close()
             raise
@@ -294,9 +294,10 @@ class Store:
         if not texts:
             return
         with self._writing() as connection:
-            connection.execute(sa.delete(ALARMS).where(ALARMS.c.number.in_(list(texts))))
-            connection.execute(sa.insert(ALARMS), [{"number": n, "content": text} for n, text in texts.items()])
-            connection.execute(sa.delete(ALARMS).where(ALARMS.c.number <= max(texts) - ALARMS_KEPT))
+            connection.execute(DROP_ALARM, [{"its_number": number} for number in texts])
+            connection.execute(ADD_ALARM, [{"number": n, "content": text} for n, text in texts.items()])
+            if max(texts) > ALARMS_KEPT:
+                connection.execute(sa.delete(ALARMS).where(ALARMS.c.number <= max(texts) - ALARMS_KEPT))
 
     def alarms(self) -> list[CrewAlarm]:
         """Alarms of before, the oldest first; what is damaged is passed over and counted."""
@@ -350,8 +351,8 @@ class Store:
             reason = str(getattr(error, "orig", None) or getattr(error, "strerror", None) or error)
             raise StoreError(f"database {self._where}: {reason}{remedy}") from error
 
-    def _check_schema(self) -> bool:
-        """Look without a change whether the database is one of ours; False for a new one."""
+    def _check_schema(self) -> list[str]:
+        """Look without a change whether the database is one of ours; its tables, none of a new one."""
         tables = sorted(sa.inspect(self._engine).get_table_names())
         if tables and META.name not in tables:
             raise StoreError(
@@ -365,23 +366,24 @@ class Store:
                 f"database {self._where}: expected schema {wanted}, got {found.get('schema')}; "
                 "one of a later version is read by that version"
             )
-        return bool(found)
+        return tables if found else []
 
     def _meta(self) -> dict[str, str]:
         with self._engine.connect() as connection:
             return {row.name: row.value for row in connection.execute(sa.select(META))}
 
-    def _begin(self, *, is_ours: bool) -> None:
+    def _begin(self, tables: list[str]) -> None:
         """Make ready for writing and count this start; a database of ours that refuses is read all the same."""
         if self._engine.dialect.name == "sqlite":
             self._engine.dispose()  # the connection that only looked is not durable
             sa.event.listen(self._engine, "connect", _durable)
         try:
             with self._refusing():
-                METADATA.create_all(self._engine)
+                if lacking := [table for table in METADATA.sorted_tables if table.name not in tables]:
+                    METADATA.create_all(self._engine, lacking)
                 self._count_start()
         except StoreError as error:
-            if not is_ours:
+            if not tables:
                 raise
             self.refusal = str(error)
 

@@ -55,6 +55,7 @@ class Watch:
         self._gaps: dict[int, Gap] = {}
         self._witnesses = Witnesses()
         self._told_unplaced: set[int] = set()  # tubes
+        self._depth_due = math.inf  # s, own clock, since when tubes are known and a depth may be expected
 
     def is_due(self, now: float) -> bool:
         """Whether to look again at ``now`` (s, own clock)."""
@@ -91,6 +92,10 @@ class Watch:
             self._alarms.alert("tube_queue", tube, f"{event.arguments.get('dropped')} dropped")
         elif event.code == CODE:
             self._alarms.alert(CODE, tube, refusal_of(event.arguments))
+        elif event.code == "joint_contradicts_marks":
+            angle, marks = (_number(event, name) for name in ("angle_deg", "marks_deg"))
+            what = f"its angle by the yaws is {angle:.1f} deg, by its marks {marks:.1f} deg"
+            self._alarms.alert("joint", f"joint above {tube}", f"{what}; see the command accept_joints")
 
     def on_known_event(self, event: Event) -> None:
         """Judge an event that has come, or was stored before a restart of the ground station.
@@ -196,8 +201,11 @@ class Watch:
     def _look_at_depth(self, now: float) -> None:
         model = self._model
         was_heard = math.isfinite(model.depth_heard_at)
-        silent = was_heard and now > model.depth_heard_at + model.config.stale_after
-        self._alarms.hold("depth_silent", "depth", "no reading comes" if silent else "")
+        if model.tally.tubes:
+            self._depth_due = min(self._depth_due, now)
+        silent = now > max(model.depth_heard_at, self._depth_due) + model.config.stale_after
+        why = "no reading comes" if was_heard else "not heard since the ground station started"
+        self._alarms.hold("depth_silent", "depth", why if silent else "")
         heard = [tube for tube in model.tally.tubes if not model.is_stale(tube)]
         bit = model.depths.latest
         comparable = was_heard and not silent and model.knows_tubes
@@ -223,6 +231,12 @@ class Watch:
                 missing = ", ".join(map(str, sorted(stop.missing)))
                 subject = f"stop at {stop.stand.md:.2f} m, {stop.stand.epoch}/{stop.stand.begun_at:.0f} s"
                 self._alarms.hold("survey_missing", subject, f"tubes {missing}" if missing else "")
+
+
+def _number(event: Event, name: str) -> float:
+    """An argument of an event; NaN where it is none, for somebody may have made the event up."""
+    value = event.arguments.get(name)
+    return float(value) if isinstance(value, int | float) else math.nan
 
 
 def subject_of(pair: Pair) -> str:

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import math
 from enum import IntEnum
-from functools import reduce
+from functools import cache, reduce
 from operator import or_
 
 import numpy as np
@@ -50,6 +50,7 @@ TOGETHER: dict[NodeFlag, Trust] = {
 STRANGE = Trust.SET_ASIDE  # of a flag that this version does not know
 
 
+@cache
 def trust_of(flags: NodeFlag) -> Trust:
     """Trust in a survey with these flags."""
     strange = int(flags) & ~int(reduce(or_, EFFECTS))

@@ -64,6 +64,9 @@ def force_saturated(reading: Reading) -> Reading:
     return [*reading[:3], -78.5, *reading[4:]]
 
 
+OF_FORCE = (force_stuck, force_saturated)  # that leave a tube its gyroscope
+
+
 def not_finite(reading: Reading) -> Reading:
     """Its readings are no numbers."""
     return [float("nan"), *reading[1:]]

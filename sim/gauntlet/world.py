@@ -42,6 +42,7 @@ class FaultyWorld(World):
     spoilers : what becomes of a tube's readings, by tube
     slipped : counts by which the encoder is off
     misled : the encoder has slipped or stopped at any time
+    spoiled : the readings of any tube have been spoiled at any time
     stuck_at : rig time (s) from which on the encoder counts no more, None where it does
     depth_error : m
     depth_hidden : no depth is measured
@@ -75,7 +76,7 @@ class FaultyWorld(World):
         self.drifts: dict[int, tuple[float, float]] = {}
         self.spoilers: dict[int, Callable[[Reading], Reading]] = {}
         self.slipped = 0
-        self.misled = False
+        self.misled = self.spoiled = False
         self.stuck_at: float | None = None
         self.depth_error = 0.0
         self.depth_hidden = False
@@ -120,7 +121,10 @@ class FaultyWorld(World):
     def imu_sample(self, tube: int, cycle: int) -> Reading:
         """Reading of a tube, spoiled where its sensor fails."""
         reading = super().imu_sample(tube, cycle)
-        return self.spoilers[tube](reading) if tube in self.spoilers else reading
+        if tube not in self.spoilers:
+            return reading
+        self.spoiled = True
+        return self.spoilers[tube](reading)
 
     def bit_depth(self, t: float) -> float:
         """Depth of the bit as the rig measures it, m."""

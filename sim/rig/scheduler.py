@@ -176,8 +176,8 @@ class Scheduler:
                 changes += [Change(cue.at, partial(self._cue, cue.name)) for cue in rack.cues()]
         for fault in self.world.faults:
             at = self.world.begin + fault.after
-            changes.append(Change(at, partial(self._cut_power, fault.tube)))
-            changes.append(Change(at + fault.down, partial(self._want, fault.tube)))
+            changes.append(Change(at, partial(self._cut_power, fault.address)))
+            changes.append(Change(at + fault.down, partial(self._want, fault.address)))
         # at one time the rack is left before the first tube is added
         return sorted(changes, key=lambda change: (change.at, change.apply != self._leave_rack))
 
@@ -220,11 +220,11 @@ class Scheduler:
         self._string = (tube, *self._string)
         self._open_top = False
 
-    def _want(self, tube: int) -> None:
-        if tube not in self.progress.wanted:
-            self.progress.wanted.append(tube)
+    def _want(self, address: int) -> None:
+        if address not in self.progress.wanted:
+            self.progress.wanted.append(address)
         self._tell(self.progress)
-        self._attach(tube)
+        self._attach(address)
 
     def _attach(self, address: int) -> None:
         """Tell again and again that the process is wanted (who starts it may listen later) until it is there.
@@ -240,18 +240,19 @@ class Scheduler:
                 return
         raise RigError(f"process {address_name(address)} did not attach within {ATTACH_LIMIT:.0f} s")
 
-    def _cut_power(self, tube: int) -> None:
-        """Have the launcher cut a node's power; the rig's time goes on when it is gone."""
-        self.progress.wanted.remove(tube)
-        self.progress.kill = [tube]
+    def _cut_power(self, address: int) -> None:
+        """Have the launcher cut the power of a process; the rig's time goes on when it is gone."""
+        self.progress.wanted.remove(address)
+        self.progress.kill = [address]
         for _ in range(int(ATTACH_LIMIT / TELL_EVERY)):
             self._tell(self.progress)
-            if self._stopping or self.stepper.wait_for(tube, alive=False, timeout=TELL_EVERY):
+            if self._stopping or self.stepper.wait_for(address, alive=False, timeout=TELL_EVERY):
                 break
         else:
-            raise RigError(f"fault kill-node:{tube}: nobody killed the node within {ATTACH_LIMIT:.0f} s")
+            name = address_name(address)
+            raise RigError(f"fault kill-node:{name}: nobody killed the process within {ATTACH_LIMIT:.0f} s")
         self.progress.kill = []
-        self._wake.pop(tube, None)
+        self._wake.pop(address, None)
 
     def _end_hung(self, hung: list[int]) -> None:
         """Have the launcher end what did not answer: it has missed events, and would go on as if it had not."""

@@ -490,16 +490,16 @@ class World:
         for fault in self.faults:
             if self.begin + fault.after + fault.down < racked:
                 continue
-            added = (phase.start for phase in self.phases if phase.kind == "add" and phase.tube == fault.tube)
+            added = (phase.start for phase in self.phases if phase.kind == "add" and phase.tube == fault.address)
             on = next(added, self.begin)  # a tube in the hole from the start is not added
             if not on < self.begin + fault.after < self.end - fault.down:
                 raise ScenarioError(
                     f"fault {fault}: expected a time between {on - self.begin:.0f} s, "
                     f"when the tube is added, and {self.end - fault.down - self.begin:.0f} s"
                 )
-        in_order = sorted(self.faults, key=lambda fault: (fault.tube, fault.after))
+        in_order = sorted(self.faults, key=lambda fault: (fault.address, fault.after))
         for first, second in pairwise(in_order):
-            if first.tube == second.tube and second.after <= first.after + first.down:
+            if first.address == second.address and second.after <= first.after + first.down:
                 raise ScenarioError(
                     f"fault {second}: expected a time after {first.after + first.down:g} s, "
                     f"for the node is down until then by {first}"

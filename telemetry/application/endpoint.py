@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import math
 from collections import Counter, OrderedDict, deque
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import partial
 from typing import TYPE_CHECKING
 
@@ -525,9 +525,9 @@ class Endpoint:
             link.send_best_effort(payload, (envelope.kind, envelope.origin), PRIORITIES[envelope.kind])
 
     def _send_hello(self) -> None:
-        hello = Hello(self.address, self.boot_count, self.hops, self.mode, 1.0)
         for link in self._links.values():
-            link.send_best_effort(encode(replace(hello, link_quality=link.quality)), Kind.HELLO, Priority.HELLO)
+            hello = Hello(self.address, self.boot_count, self.hops, self.mode, link.quality)
+            link.send_best_effort(encode(hello), Kind.HELLO, Priority.HELLO)
 
     def _nearest(self, side: Side) -> Nearest | None:
         """Who is chosen at an end; base station and encoder are joined by a cable, where one alone is heard."""

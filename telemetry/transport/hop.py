@@ -145,7 +145,9 @@ class HopLink:
 
     def take_frames(self, now: float) -> list[Frame]:
         """Frames that are due now."""
-        frames = []
+        frames: list[Frame] = []
+        if not (self._best_effort or self._queue or self._outstanding or self._ack_due <= now):
+            return frames  # as nearly always: it is asked after every event
         entries = self._due_entries(now)
         while entries or self._ack_due <= now:
             count = bundled(entries, self.bundle_limit)

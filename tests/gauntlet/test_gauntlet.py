@@ -93,6 +93,9 @@ def test_combined_seeds_hold(first: int) -> None:
         (40291, ("not-finite", "encoder-slips")),  # the one that saw it stood beside one without a gyroscope
         (50000, ("encoder-slips", "frozen")),  # the one that saw it stood alone
         (50001, ("encoder-slips", "cut-while-saving")),  # the yaws of two neighbours parted at rest
+        (72, ("same-number", "encoder-slips")),  # a joint that was solved anew took the slip, against its marks
+        (51416, ("cut-again-and-again", "node-memory-lost", "splice")),  # a recorded state of an epoch before the last
+        (51633, ("surveys-lost", "gyro-step")),  # a gyroscope that turned its tube while nobody corrected it
     ],
 )
 def test_seeds_that_failed_once_hold(seed: int, kinds: tuple[str, ...]) -> None:

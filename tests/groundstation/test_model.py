@@ -421,6 +421,21 @@ def test_a_state_that_was_recorded_is_no_sign_of_life(tmp_path: Path) -> None:
     assert not model.is_stale(1)
 
 
+def test_a_state_of_an_epoch_that_the_encoder_has_left_is_no_sign_of_life(tmp_path: Path) -> None:
+    model = RigModel(GroundConfig(folder=tmp_path))
+    old = replace(node_state(1, at=100.0, cycles=50), epoch=2)
+    model.now = model.epoch = 2
+    model.on_state(old, 2.0)
+    model.now, model.epoch = 3.0, 3
+    model.on_state(replace(node_state(1, at=1.0, cycles=52), epoch=3), 3.0)
+    model.now, model.epoch = 60.0, 4
+    assert not model.on_state(replace(old, at=101.0, cycles=51), 60.0)
+    assert model.is_stale(1)
+    model.epoch = 2  # the encoder has its old count again, and its tubes with it
+    assert model.on_state(replace(old, at=160.0, cycles=150), 60.0)
+    assert not model.is_stale(1)
+
+
 @given(st.floats(0.0, 100.0))
 def test_a_recorded_state_shows_no_tube_fresh_to_a_ground_station_that_has_just_started(late: float) -> None:
     model = RigModel(GroundConfig(folder=Path("unused")))

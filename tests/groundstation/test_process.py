@@ -260,6 +260,38 @@ def test_bytes_that_are_no_depth_are_counted_and_told(start: Callable[[], Rig], 
     assert rig.alarms() >= {"bad_input"}
 
 
+@pytest.mark.parametrize("arguments", [{"angle_deg": -101.8, "marks_deg": -174.9}, {}])
+def test_a_joint_that_contradicts_its_marks_is_an_alarm_until_the_crew_has_looked(
+    start: Callable[[], Rig], arguments: dict[str, float]
+) -> None:
+    rig = start()
+    rig.speak(1)
+    event = Event(1, 7, rig.now, Severity.WARNING, "joint_contradicts_marks", dict(arguments))
+    rig.tube.submit(event, rig.now)
+    rig.run(2.0)
+    (told,) = [row for row in rig.ask("alarms")["rig"] if row["code"] == "joint"]
+    assert told["subject"] == "joint above tube 1"
+    rig.ground.operator.order("accept_joints", {"action": "confirm"})
+    rig.run(1.0)
+    assert "joint" not in rig.alarms()
+
+
+def test_a_depth_that_never_comes_after_a_restart_is_told(start: Callable[[], Rig]) -> None:
+    first = start()
+    first.speak(1)
+    first.depth(2.0)
+    first.ground.store.close()
+    again = start()
+    again.now, again.md = first.now, first.md
+    again.run(4.0)
+    assert "depth_silent" not in again.alarms()
+    again.run(2.0)
+    assert "depth_silent" in again.alarms()
+    again.read_depth(2.0)
+    again.run(1.0)
+    assert "depth_silent" not in again.alarms()
+
+
 def test_a_survey_from_before_the_restart_finds_its_depth(start: Callable[[], Rig]) -> None:
     first = start()
     first.run(3.0)

@@ -35,6 +35,15 @@ def test_a_stop_goes_on_over_a_start_of_the_encoder(tally: Tally) -> None:
     assert missing(stops) == set()
 
 
+def test_a_stop_whose_last_stand_is_a_part_of_it_goes_on_too(tally: Tally) -> None:
+    """Where readings were refused for a while, a stop is made of stands that touch."""
+    stops = Stops(tally, DUE)
+    stops.on_stand(FIRST)
+    stops.on_later_stand(Stand(2, 1020.0, 1025.0, 4.0), LATER)
+    stops.judge(3, 41.0)
+    assert missing(stops) == {1, 2}
+
+
 def test_a_stop_that_was_too_short_before_and_after_owes_nothing(tally: Tally) -> None:
     stops = Stops(tally, DUE)
     stops.on_stand(Stand(2, 1000.0, 1010.0, 4.0))

@@ -87,9 +87,9 @@ class Rig:
                 idle.get(timeout=0.05)
         raise AssertionError("gave up waiting")
 
-    def result(self) -> dict[str, Any]:
+    def result(self, patience: float = PATIENCE) -> dict[str, Any]:
         """The JSON object the rig ends with."""
-        output, errors = self.process.communicate(timeout=PATIENCE)
+        output, errors = self.process.communicate(timeout=patience)
         assert self.process.returncode == 0, errors
         return dict(json.loads(output.splitlines()[-1]))
 

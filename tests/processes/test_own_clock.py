@@ -276,6 +276,32 @@ def test_an_order_to_a_silent_tube_holds_up_nobody(string: String, router: tuple
     silent.join()
 
 
+@pytest.mark.parametrize("frozen", [6.0, pytest.param(30.0, marks=pytest.mark.statistical)])
+def test_the_crew_is_told_of_a_frozen_node_and_of_an_encoder_that_starts_again(
+    string: String, router: tuple[str, ZenohBus], frozen: float
+) -> None:
+    bus = router[1]
+    string.start("ground")
+    string.start_encoder()
+    string.start_node()
+    until(bus, "nodes/1", lambda node: not node["stale"])
+    string.running["node"].send_signal(signal.SIGSTOP)
+    silent = until(bus, "nodes/1", lambda node: node["age_s"] > frozen)
+    assert silent["stale"]
+    until(bus, "alarms", lambda answer: "tube_silent" in codes(answer))
+    string.running["node"].send_signal(signal.SIGCONT)
+    until(bus, "alarms", lambda answer: "tube_silent" not in codes(answer))
+    string.kill("encoder")
+    string.start_encoder()
+    until(bus, "alarms", lambda answer: "epoch" in codes(answer))
+    until(bus, "nodes/1", lambda node: not node["stale"] and node["age_s"] >= 0.0)
+    string.end()
+
+
+def codes(alarms: dict[str, Any]) -> set[str]:
+    return {row["code"] for row in alarms["rig"]}
+
+
 def test_the_bench_measures_every_process(tmp_path: Path) -> None:
     done = run("bench", "realtime", "--nodes", "2", "--seconds", "4", "--endpoint", free_endpoint(),
                "--out", str(tmp_path), "--json")  # fmt: skip

@@ -5,6 +5,7 @@ import pytest
 from sim.errors import ScenarioError
 from sim.faults import KillNode, parse_fault
 from sim.world.scenario import load_scenario
+from telemetry.messages import BASE, ENCODER
 
 SCENARIOS = Path(__file__).parents[2] / "scenarios"
 
@@ -25,10 +26,16 @@ def test_every_key_is_documented_or_says_it_all() -> None:
 
 @pytest.mark.parametrize(
     ("text", "expected"),
-    [("kill-node:3@600", KillNode(3, 600.0, 10.0)), ("kill-node:12@0.5+20.25", KillNode(12, 0.5, 20.25))],
+    [
+        ("kill-node:3@600", KillNode(3, 600.0, 10.0)),
+        ("kill-node:12@0.5+20.25", KillNode(12, 0.5, 20.25)),
+        ("kill-node:encoder@600", KillNode(ENCODER, 600.0, 10.0)),
+        ("kill-node:base@600+40", KillNode(BASE, 600.0, 40.0)),
+    ],
 )
 def test_faults_are_read(text: str, expected: KillNode) -> None:
-    assert parse_fault(text, 20) == expected
+    fault = parse_fault(text, 20)
+    assert fault == expected == parse_fault(str(fault), 20)
 
 
 @pytest.mark.parametrize("text", ["", "kill-node:0@5", "kill-node:21@5", "kill-node:3", "kill-node:3@-5", "burn:3@5"])

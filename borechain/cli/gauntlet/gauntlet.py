@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 from dataclasses import asdict
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import click
@@ -11,10 +12,17 @@ import click
 from borechain.cli.faults import EnvironmentFault, InputFault, needs, plain_faults
 
 if TYPE_CHECKING:
+    from collections.abc import Sequence
+
     from borechain.gauntlet.run import Outcome
+    from borechain.gauntlet.soak import Sample
 
 WORTH_A_PROCESS = 50  # seeds, for which a process more is started
 BATCH = 200  # seeds shown at a time
+COLUMNS = tuple(
+    (name, name)
+    for name in ("hours", "memory_mib", "disks_mib", "objects", "handles", "database_kib", "surveys", "wrong", "cpu_s")
+)
 
 
 @click.command()
@@ -32,6 +40,9 @@ BATCH = 200  # seeds shown at a time
     help="A string that drills for a minute, or one that is drilled in tube by tube.",
 )
 @click.option("--soak", "hours", type=click.FloatRange(1.0), help="Instead, hours of rig time of one rig under faults.")
+@click.option(
+    "--out", type=click.Path(path_type=Path, file_okay=False), help="Folder for soak.csv and soak.svg; with --soak."
+)
 @click.option("--json", "as_json", is_flag=True, help="Print one JSON object a seed, and one of the whole.")
 @needs("scipy", "sqlalchemy")
 @plain_faults
@@ -44,6 +55,7 @@ def gauntlet(
     listed: bool,
     hours: float | None,
     plan: str,
+    out: Path | None,
     as_json: bool,
 ) -> None:
     """Drill with a string of two tubes in this process under faults that each seed draws; judge what the crew sees.
@@ -63,8 +75,10 @@ def gauntlet(
             click.echo(f"{kind.name:20} {kind.meaning}")
         return
     if hours is not None:
-        _soak(hours, first, as_json=as_json)
+        _soak(hours, first, out, as_json=as_json)
         return
+    if out is not None:
+        raise InputFault("--out: expected --soak with it")
     allowed, kinds = _names(faults, "--faults", ALL), _names(exactly, "--exactly", ()) or None
     numbers = [seed] if seed is not None else list(range(first, first + seeds))
     failed, cpu_s = 0, 0.0
@@ -114,13 +128,15 @@ def _show(outcome: Outcome, *, as_json: bool) -> None:
         click.echo(f"  borechain gauntlet --seed {outcome.seed} --exactly {','.join(outcome.kinds)}{plan}")
 
 
-def _soak(hours: float, seed: int, *, as_json: bool) -> None:
-    """Show what a long run needs, a line now and then."""
+def _soak(hours: float, seed: int, out: Path | None, *, as_json: bool) -> None:
+    """Show what a long run needs, a line now and then, and keep it."""
     from borechain.gauntlet.soak import soak
 
     found: tuple[str, ...] = ()
+    samples = []
     for sample in soak(hours, seed):
         found = sample.violations
+        samples.append(sample)
         if as_json:
             click.echo(json.dumps(asdict(sample)))
         else:
@@ -129,8 +145,21 @@ def _soak(hours: float, seed: int, *, as_json: bool) -> None:
                 f"{sample.objects:7d} objects {sample.handles:4d} handles "
                 f"{sample.database_kib:8.1f} KiB {sample.surveys:5d} surveys {len(found):3d} wrong"
             )
+    if out is not None:
+        _keep(samples, out)
     if found:
         raise EnvironmentFault(f"after {hours:g} h: {'; '.join(found)}")
+
+
+def _keep(samples: Sequence[Sample], out: Path) -> None:
+    """Table and picture of a soak."""
+    from borechain.cli.tables import write_table
+    from borechain.gauntlet.soak_figure import soak_figure
+    from groundstation.report.style import save
+
+    out.mkdir(parents=True, exist_ok=True)
+    write_table(out / "soak.csv", [asdict(sample) | {"wrong": len(sample.violations)} for sample in samples], COLUMNS)
+    save(soak_figure(samples), out / "soak.svg")
 
 
 def _show_figures(seeds: int, failed: int, cpu_s: float, *, as_json: bool) -> None:

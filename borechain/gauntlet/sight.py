@@ -1,0 +1,60 @@
+"""Whether anything on the rig could have shown that the encoder was wrong.
+
+That the encoder slipped shows only against a gyroscope that ran through it. Where three faults or more leave none, a
+slip is a turn of the string to everything that measures, and no alarm can be asked for.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+from borechain.gauntlet.rig import GauntletRig
+from node.process.tube_process import TubeProcess
+from sim.gauntlet import readings
+from sim.gauntlet.fault import TUBES
+from telemetry.messages import Mode
+
+AROUND = 10.0  # s before and after an instant that a tube must have watched to speak of it
+
+
+class Sight:
+    """Notes after each step of a fault which tubes have a gyroscope, and whether the encoder went wrong."""
+
+    def __init__(self, rig: GauntletRig) -> None:
+        self._rig = rig
+        self._log: list[tuple[float, frozenset[int]]] = [(rig.now, frozenset(TUBES))]  # s, tubes that see from then on
+        self._encoder = self._shown()
+        self._wrong_at: list[float] = []
+        rig.after_step.append(self.note)
+
+    def note(self) -> None:
+        """Look at the rig now."""
+        self._log.append((self._rig.now, frozenset(tube for tube in TUBES if self._sees(tube))))
+        if self._shown() != self._encoder:
+            self._encoder = self._shown()
+            self._wrong_at.append(self._rig.now)
+
+    @property
+    def has_seen(self) -> bool:
+        """Whether a tube watched any of the instants at which the encoder went wrong; True where it never did."""
+        return not self._wrong_at or any(self._watched(at) for at in self._wrong_at)
+
+    def _watched(self, at: float) -> bool:
+        return bool(frozenset(TUBES).intersection(*self._seeing(at - AROUND, at + AROUND)))
+
+    def _seeing(self, begin: float, end: float) -> Iterator[frozenset[int]]:
+        """Tubes that saw, of every part of a time (s)."""
+        ends = [since for since, _ in self._log[1:]] + [self._rig.now]
+        for (since, tubes), until in zip(self._log, ends, strict=True):
+            if since < end and until > begin:
+                yield tubes
+
+    def _sees(self, tube: int) -> bool:
+        process = self._rig.stepper.processes.get(tube)
+        if not isinstance(process, TubeProcess) or self._rig.stepper.is_frozen(tube):
+            return False
+        has_gyroscope = self._rig.world.spoilers.get(tube) in (None, *readings.OF_FORCE)
+        return has_gyroscope and process.tube.state["mode"] != Mode.STATIC_BIAS
+
+    def _shown(self) -> tuple[int, float | None]:
+        return self._rig.world.slipped, self._rig.world.stuck_at
