@@ -15,7 +15,7 @@ unexport PYTHONDONTWRITEBYTECODE
 PYTEST := $(BIN)/python -m pytest --numprocesses $(WORKERS) --maxprocesses 8 --dist worksteal
 
 .DEFAULT_GOAL := rig
-.PHONY: help rig test quick check lint types contracts kernels bytecode browser tests statistical explore lock study soak seeds clean
+.PHONY: help rig test quick check lint types contracts kernels bytecode browser tests statistical truth explore lock study soak seeds clean
 
 help:  ## list the targets
 	@awk -F ':.*## ' '/^[a-z]+:.*## / { printf "make %-12s %s\n", $$1, $$2 }' $(MAKEFILE_LIST)
@@ -62,6 +62,9 @@ tests: $(STAMP)  ## every test but the statistical ones at full size
 
 statistical: $(STAMP)  ## the statistical tests at full size; part of `make study`
 	$(PYTEST) -m statistical
+
+truth: $(STAMP)  ## the table of the field by a second world, beside the study's
+	PYTHONPATH=tests/truth $(BIN)/python tests/truth/second_table.py 20
 
 explore: $(STAMP)  ## the properties with examples that no run before has seen
 	HYPOTHESIS_PROFILE=explore $(BIN)/python -m pytest -m hypothesis

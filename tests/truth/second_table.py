@@ -1,0 +1,182 @@
+"""The table of the field's disturbances by a second world, beside that of the study: `make truth`.
+
+A cycle is told of if the node carries a doubt in it or in one of the ten after it.
+"""
+
+from __future__ import annotations
+
+import csv
+import itertools
+import math
+import sys
+from collections.abc import Sequence
+from concurrent.futures import ProcessPoolExecutor
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+import numpy.typing as npt
+from second_world import BEGIN, BLOCKS, DRILL, HOLD, PERIOD, STOP, Cycles, Disturbance, SecondWorld
+
+from node.firmware.inputs import ImuReading, RigContext
+from node.firmware.settings import Joint, TubeSettings
+from node.firmware.tube import Tube
+from node.kernels.layout import default_config
+from node.kernels.record import new_node
+from telemetry.messages import Aiding, Event, NodeFlag, NodeState, SurveyMeasurement
+
+Array = npt.NDArray[np.float64]
+STUDY = Path(__file__).parents[2] / "docs" / "results" / "field.csv"
+MPU, PULL = {"frames_hz": 50.0, "low_pass_hz": 20.0}, {"pull_dps_per_g": 0.1}
+ROWS: dict[str, Disturbance] = {
+    "clean, cycles locked": Disturbance(locked=True),
+    "clean, random phase": Disturbance(),
+    "MPU-6500: frames of 50 Hz behind 20 Hz, crystal 1 % off": Disturbance(crystal=0.01, **MPU),
+    "ripple of 30 %, 4 s": Disturbance(ripple=0.3),
+    "stick-slip": Disturbance(stick_slip=True),
+    "vibration 4 g while turning": Disturbance(turning_g=4.0, **MPU, **PULL),
+    "vibration 8 g while turning": Disturbance(turning_g=8.0, **MPU, **PULL),
+    "torsional vibration 20 deg/s": Disturbance(torsional_dps=20.0),
+    "vibration 0.05 g at rest": Disturbance(resting_g=0.05, **MPU),
+    "g-sensitivity 0.1 deg/s/g at 30 deg": Disturbance(inclination_deg=30.0, **PULL),
+    "misalignment 0.05 deg at 88 deg": Disturbance(inclination_deg=88.0, lean_deg=0.05),
+    "clean, 88 deg": Disturbance(inclination_deg=88.0),
+    "time stamps jitter by 5 ms": Disturbance(jitter_ms=5.0),
+    "warm-up drift 0.2 deg/s": Disturbance(warm_up_dps=0.2, warm_up_c=10.0),
+    "warm-up drift 1 deg/s": Disturbance(warm_up_dps=1.0, warm_up_c=20.0),
+    "encoder eccentric by 0.02 deg": Disturbance(eccentricity_deg=0.02),
+    "encoder eccentric by 0.05 deg": Disturbance(eccentricity_deg=0.05),
+    "backlash 0.1 deg": Disturbance(backlash_deg=0.1),
+    "backlash 0.5 deg": Disturbance(backlash_deg=0.5),
+    "head stops dead at 10 deg/s": Disturbance(dead_stop_dps=10.0),
+    "head turns back by 5 deg": Disturbance(turns_back_deg=5.0),
+    "unwinds 0.5 deg at rest": Disturbance(twist_deg=0.5, hold_s=5.0, unwind_s=20.0),
+    "untold twist of 2 deg": Disturbance(twist_deg=2.0),
+    "30 deg, through 20 deg of azimuth": Disturbance(inclination_deg=30.0, azimuth_turn_deg=10.0),
+    "outliers 20 %": Disturbance(outliers=0.2),
+    "mark misread by 5 deg": Disturbance(wrong_mark_deg=5.0),
+    "mark misread by 180 deg": Disturbance(wrong_mark_deg=180.0),
+    "first mark misread by 5 deg": Disturbance(wrong_mark_deg=5.0),
+    "encoder jumps by 1 deg": Disturbance(jump_deg=1.0),
+    "the same, with an index": Disturbance(jump_deg=1.0, index=True),
+    "belt slip of 1e-3": Disturbance(belt_slip=1e-3),
+    "encoder counts backwards": Disturbance(reversed=True),
+    "accelerometer bias 1 mg": Disturbance(force_bias_g=1e-3),
+}
+TRUE_FAULTS = {name: ("force_saturated",) for name in ROWS if name.startswith("vibration") and "turning" in name}
+DOUBTS = NodeFlag.YAW_UNTRUSTED | NodeFlag.INNOVATION_REJECTED | NodeFlag.RATE_EXCEEDED | NodeFlag.SENSOR_FAULT
+DOUBTS |= NodeFlag.BIAS_UNKNOWN
+FAULTS = ("gyro_saturated", "gyro_stuck", "gyro_step", "gyro_scale", "force_saturated", "force_stuck", "bad_sample")
+CLOCK_STD, LATENCY, MARK_STD = 2e-4, 3e-3, math.radians(0.05)
+OPENED, CLOSED = BEGIN + HOLD + DRILL + STOP, BEGIN + HOLD + DRILL + STOP + 5.0  # the joint of a tube that is added
+
+
+@dataclass(frozen=True, slots=True)
+class Seen:
+    """One seed: (cycles,) of the lowest tube."""
+
+    error: Array  # rad
+    var: Array  # rad^2
+    told: npt.NDArray[np.bool_]
+    turning: npt.NDArray[np.bool_]
+    resting: npt.NDArray[np.bool_]
+    faults: tuple[str, ...]
+    surveys: int
+
+
+def drill(name: str, seed: int) -> Seen:
+    """Take the nodes of one row through the world of one seed."""
+    what = ROWS[name]
+    world = SecondWorld(what, seed)
+    random, phase = world.random, 0.0 if what.locked else float(world.random.uniform(0.0, PERIOD))
+    joint, second, misread = *random.uniform(-3.0, 3.0, 2).tolist(), math.radians(what.wrong_mark_deg)
+    grows = name.startswith("mark")
+    marks = MARK_STD * random.standard_normal(3) if grows else np.zeros(3)
+    std = MARK_STD if grows else 0.0
+    drives = [joint + float(marks[0]) + (0.0 if grows else misread), second + float(marks[1]) + misread]
+    lower = Joint(joint - second + float(marks[2]), std)
+    lowest = TubeSettings(1, Joint(drives[0], std), state_every=1)
+    upper = TubeSettings(2, Joint(drives[1], std), lower, state_every=1)
+    tubes = [_tube(lowest)] + ([_tube(upper)] if grows else [])
+    sensors = [world.sensor(joint, phase)] + ([world.sensor(second, phase)] if grows else [])
+    clocks = CLOCK_STD * random.standard_normal(2)
+    said, count = world.encoder(), len(world.ends)
+    yaw, var, flagged = np.full(count, math.nan), np.full(count, math.nan), np.ones(count, np.bool_)
+    faults, surveys = [], 0
+
+    def relay(k: int) -> None:
+        now, aiding = float(world.ends[k]), said[k]
+        if grows and OPENED < now < CLOSED:
+            return
+        passed: Aiding | None = aiding
+        for tube in tubes[::-1] if now > OPENED else tubes[:1]:
+            if passed is not None:
+                passed = tube.on_aiding(passed, passed.valid_at + float(clocks[tube.settings.tube - 1]))
+
+    for k in range(count):
+        end = float(world.ends[k]) + phase
+        if phase > LATENCY:
+            relay(k)
+        for tube, sensor in zip(tubes, sensors, strict=True):
+            if tube.settings.tube == 2 and end < OPENED:
+                continue
+            joined = not (grows and OPENED < end < CLOSED)
+            hops = len(tubes) - tube.settings.tube + 1 if end > OPENED else 1
+            context = RigContext(joined, hops, end, CLOCK_STD**2 * hops, synchronised=True)
+            for message in tube.on_cycle(_reading(sensor, k, end), context):
+                if tube.settings.tube == 2:
+                    continue
+                if isinstance(message, NodeState):
+                    flagged[k] = bool(message.flags & DOUBTS)
+                elif isinstance(message, Event) and message.code in FAULTS:
+                    faults.append(message.code)
+                surveys += isinstance(message, SurveyMeasurement)
+        yaw[k], var[k] = tubes[0].yaw, tubes[0].yaw_var + tubes[0].systematic_var
+        if phase <= LATENCY:
+            relay(k)
+    ends = world.ends + phase
+    error = np.mod(yaw - joint - world.yaw(ends) + math.pi, math.tau) - math.pi
+    told = np.array([flagged[k : k + 11].any() for k in range(count)])
+    turning, resting = world.is_turning(ends, 20.0), world.is_resting(ends, 5.0)
+    return Seen(error, var, told, turning, resting, tuple(faults), surveys)
+
+
+def figures(name: str, seen: Sequence[Seen]) -> list[float]:
+    """Of the seeds of one row: NEES turning and at rest, unflagged (%), false faults a run, surveys (%)."""
+    chosen = [[getattr(s, when) & ~s.told for s in seen] for when in ("turning", "resting")]
+    nees = [np.concatenate([(s.error**2 / s.var)[c] for s, c in zip(seen, cs, strict=True)]) for cs in chosen]
+    lies = [np.mean(((s.error**2 > 9.0 * s.var) & ~s.told)[s.turning | s.resting]) for s in seen]
+    false = [sum(code not in TRUE_FAULTS.get(name, ()) for code in s.faults) for s in seen]
+    share = np.mean([s.surveys for s in seen]) / BLOCKS
+    means = [float(np.mean(n)) if len(n) else math.nan for n in nees]
+    return [*means, 100.0 * float(np.mean(lies)), float(np.mean(false)), 100.0 * float(share)]
+
+
+def main(seeds: int) -> None:
+    """Print both tables beside each other."""
+    with STUDY.open() as file:
+        study = {row["case"]: row for row in csv.DictReader(file)}
+    print(f"{'':56s}   NEES turning            rest     unflagged %    false faults       surveys %")
+    print(f"{seeds} seeds of the second world, then the study{'':16s}" + 5 * "  second   study")
+    with ProcessPoolExecutor() as pool:
+        for name in ROWS:
+            ours = figures(name, list(pool.map(drill, itertools.repeat(name), range(1, seeds + 1))))
+            theirs = [float(study[name][key]) for key in ("nees_turning", "nees_rest", "unflagged_percent")]
+            theirs.append(sum(float(study[name][key]) for key in ("gyro_step", "gyro_scale", "other_faults")))
+            theirs.append(float(study[name]["surveys_percent"]))
+            pairs = zip(ours, theirs, strict=True)
+            print(f"{name:56s}" + "".join(f"{a:8.3g}{b:8.3g}" for a, b in pairs), flush=True)
+
+
+def _tube(settings: TubeSettings) -> Tube:
+    return Tube(settings, default_config(), new_node(default_config()), itertools.count().__next__, restored=False)
+
+
+def _reading(sensor: Cycles, k: int, end: float) -> ImuReading:
+    (wx, wy, wz), (fx, fy, fz) = sensor.rate[k].tolist(), sensor.force[k].tolist()
+    heat, clipped, late = float(sensor.temperature[k]), int(sensor.clipped[k]), float(sensor.late[k])
+    return ImuReading(end - PERIOD, end, (wx, wy, wz), (fx, fy, fz), heat, clipped, late)
+
+
+if __name__ == "__main__":
+    main(int(sys.argv[1]) if len(sys.argv) > 1 else 20)
