@@ -71,6 +71,12 @@ KINDS: tuple[AlarmKind, ...] = (
         "the yaws of two neighbours have parted: the joint between them turned, or one was told a wrong yaw; "
         "check the azimuths below and above",
     ),
+    AlarmKind(
+        "belt",
+        BAD,
+        "all gyroscopes show the encoder to turn less, or more, by the same part: its belt slips, or it has "
+        "other counts than its settings say; check the azimuths",
+    ),
     AlarmKind("depth_refused", BAD, "readings of the depth are refused"),
     AlarmKind("depth_silent", BAD, "no depth comes any more"),
     AlarmKind("depth_contradicts", BAD, "the depth does not fit the tubes in the hole"),

@@ -10,6 +10,7 @@ from groundstation.service.model import RigModel
 from groundstation.service.numbers import Range
 from groundstation.service.witnesses import Witnesses
 from groundstation.survey.joint_angles import Pair, RestingYaw
+from groundstation.survey.shared_scale import shared_scale
 from groundstation.survey.trust import Trust, trust_of
 from telemetry.application.endpoint import SERIES_SHIFT
 from telemetry.application.seal_watch import CODE, refusal_of
@@ -66,6 +67,7 @@ class Watch:
         self._looked_at = now
         self._alarms.advance(now, self._model.rig_now)
         self._look_at_nodes()
+        self._look_at_belt()
         self._look_at_depth(now)
         self._look_at_surveys()
         self._look_at_stops()
@@ -197,6 +199,16 @@ class Watch:
         for tube in model.tally.tubes:
             silent = "silent" if math.isfinite(model.age(tube)) else "not heard since the ground station started"
             self._alarms.hold("tube_silent", f"tube {tube}", silent if model.is_stale(tube) else "")
+
+    def _look_at_belt(self) -> None:
+        nodes = self._model.nodes
+        shared = shared_scale([nodes[tube].scale_factor for tube in self._model.tally.tubes if tube in nodes])
+        if shared is None:
+            self._alarms.hold("belt", "encoder", "")
+            return
+        sense = "less" if shared.by > 0.0 else "more"
+        what = f"it turns {100.0 * abs(shared.by):.2f} % {sense} than {shared.nodes} gyroscopes say"
+        self._alarms.hold("belt", "encoder", what)
 
     def _look_at_depth(self, now: float) -> None:
         model = self._model

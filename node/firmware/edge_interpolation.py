@@ -7,7 +7,8 @@ A head that slows down as ``counts to go = c (time to go)^p`` passes the edge k 
 with x in 0..1 what it went beyond the last edge. A brake of constant torque has p = 2, a drive that eases out p = 3 or
 1.5; g is the first order of friction that grows with the rate. For every x and p the times are linear in T, b and g, so
 their weighted sum of squares, with T, b and g integrated out, is the likelihood of x. Stops like none of these are
-recognised by their residuals, and the place in the count stays unknown.
+recognised by their residuals, and those of a head that stops dead by a g that outweighs b: to the edges it was still
+turning. The place in the count then stays unknown.
 Source: least squares with flat priors, integrated in closed form (any text on linear models); see decision 0016.
 """
 
@@ -23,6 +24,7 @@ POWERS = np.array([1.5, 2.0, 3.0])
 STEPS = 32
 PLACES = (np.arange(STEPS) + 0.5) / STEPS
 WORST = 2.5  # sum of squares by degree of freedom; beyond, the stop is of another kind
+ABRUPT = 1.7  # share of g in the time to the oldest edge over that of b; beyond, the head did not slow down to rest
 UNKNOWN = (0.5, 1.0 / 12.0)
 FARTHEST, BOUNCE = 1e12, 1e-7  # s, of a time, and between two edges
 
@@ -56,6 +58,9 @@ def stopped_at(times: tuple[float, ...], edge_std: float) -> tuple[float, float]
     likely = -0.5 * square - np.log(late).sum(axis=-1) - 0.5 * information
     likely[slopes[..., 1] <= 0.0] = -np.inf
     if not np.min(square) < WORST * (len(t) - 3) or not np.isfinite(np.max(likely)):
+        return UNKNOWN
+    best = np.unravel_index(np.argmax(likely), likely.shape)
+    if slopes[best][2] * y[best][-1] > ABRUPT * slopes[best][1]:
         return UNKNOWN
     weight = np.exp(likely - np.max(likely)).sum(axis=0)
     weight /= weight.sum()

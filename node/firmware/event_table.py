@@ -232,6 +232,12 @@ EVENT_TABLE: Final[dict[Code, Told]] = {
         "gyroscope and aiding differ by more than their noise, again and again; the yaw's variance says so",
         (("times", float), ("sigma_deg", float)),
     ),
+    Code.ENCODER_REVERSED: Told(
+        "encoder_reversed",
+        Severity.ERROR,
+        "the encoder counts against the gyroscope, as fast; while the head turns its aidings are not used",
+        (("encoder_dps", float), ("spin_dps", float)),
+    ),
 }
 
 

@@ -42,8 +42,8 @@ def misfit_var(node: Any) -> float:
 
 @kernel
 def noise_var(node: Any) -> float:
-    """Variance (rad^2) of an aiding by the misfit."""
-    return float(min(misfit_var(node), LARGEST_NOISE))
+    """Variance (rad^2) of an aiding by the misfit; of a head at rest none, for what misfits is the turning."""
+    return float(min(misfit_var(node), LARGEST_NOISE)) if node.guard.rate != 0.0 else 0.0
 
 
 @kernel
@@ -89,12 +89,16 @@ def follow_misfit(node: Any) -> None:
 
 @kernel
 def follow_jump(node: Any) -> None:
-    """The yaw was taken from an aiding that contradicted it: it jumped by the innovation, unless it came back."""
-    state, guard = node.filter, node.guard
+    """The yaw was taken from an aiding that contradicted it: it jumped by the innovation, unless it came back.
+
+    The systematic variance says so at once; from the next aiding on it is that of the aiding.
+    """
+    state, guard, before = node.filter, node.guard, node.guard.jump
     guard.last_jump = state.innovation
     guard.jump = wrap(guard.jump + state.innovation)
     if guard.jump * guard.jump < SETTLED * SETTLED * state.innovation_var:
         guard.jump = 0.0
+    state.systematic_var = max(state.systematic_var + guard.jump * guard.jump - before * before, 0.0)
 
 
 @kernel

@@ -64,6 +64,7 @@ class Code(enum.IntEnum):
     IMU_BACK = 34
     BIAS_MOVED = 35
     AIDING_DOUBTED = 36
+    ENCODER_REVERSED = 37
 
 
 @kernel

@@ -39,6 +39,7 @@ LARGEST_STEP: Final = 10.0 * DEG  # rad/s, that a bias may take; a gyroscope far
 CREDIBLE: Final = 0.5 * LARGEST_STEP  # rad/s, from the encoder's rate, of a gyroscope that may be listened to again
 LARGEST_DRIFT: Final = 1.0 * DEG  # rad/s, of a bias since the last rest; more is a fault, or a motion
 LARGEST_SCALE: Final = 0.1  # 1, that is looked for
+SLOWEST_REVERSED: Final = 5.0 * DEG  # rad/s, from where encoder and gyroscope are seen to turn against each other
 RATE_AGE: Final = 3.0  # s, of an encoder's rate that may stand for the gyroscope
 BACKWARD: Final = PERIOD  # s, that a cycle may begin before the end of the last; beyond it is a jump of the clock
 LONGEST_CYCLE: Final = 10.0 * PERIOD  # s
@@ -46,6 +47,7 @@ FARTHEST: Final = RING * PERIOD  # s, that a cycle may begin after the end of th
 FAR_OFF: Final = 4.0  # sigmas, that a clock may be wrong by
 PSI, BZ, S = constant(Err.YAW), constant(Err.BIAS_Z), constant(Err.SCALE)
 BAD_SAMPLE, GYRO_STEP, GYRO_SCALE = constant(Fault.BAD_SAMPLE), constant(Fault.GYRO_STEP), constant(Fault.GYRO_SCALE)
+ENCODER_REVERSED = constant(Code.ENCODER_REVERSED)
 AIDING_UNTIMELY, CLOCK_JUMPED = constant(Code.AIDING_UNTIMELY), constant(Code.CLOCK_JUMPED)
 SENSOR_RECOVERED = constant(Code.SENSOR_RECOVERED)
 AIDED, REJECTED, YAW_RESET = int(Status.AIDED), int(Status.REJECTED), int(Status.YAW_RESET)
@@ -78,12 +80,36 @@ def gate_aiding(node: Any, aiding: Array) -> bool:
     guard.untimely = 0 if timely else 1
     if not timely:
         return False
+    if aiding[A_RATE] == 0.0 and guard.rate != 0.0:  # what the turning left unexplained, a rest shows
+        open_misfit(node)
     guard.rate, guard.rate_at, guard.aiding_var = aiding[A_RATE], valid_local, aiding[A_YAW_VAR]
-    if not is_placed(state, aiding):
+    if is_reversed(node) or not is_placed(state, aiding):
         return False
     if guard.gyro.fault != 0 or contradicts(node, aiding[A_YAW] + node.down_offset, valid_local):
         state.last_sequence = -1  # a repetition at rest is to be judged again
     return True
+
+
+@kernel
+def open_misfit(node: Any) -> None:
+    """What innovations showed beyond their variance is of the yaw too."""
+    var = misfit_var(node)
+    if var > 0.0:
+        open_yaw(node.filter, var)
+
+
+@kernel
+def is_reversed(node: Any) -> bool:
+    """Whether the encoder counts backwards, which is told once: as fast as the gyroscope turns, the other way."""
+    state, guard = node.filter, node.guard
+    slowest = min(abs(guard.rate), abs(state.now_rate))
+    if slowest < SLOWEST_REVERSED or is_faulty(guard.gyro):
+        return False
+    against = bool(guard.rate * state.now_rate < 0.0 and abs(guard.rate + state.now_rate) < 0.5 * slowest)
+    if against and guard.reversed == 0:
+        tell(node, ENCODER_REVERSED, guard.rate / DEG, state.now_rate / DEG, NONE, NONE)
+    guard.reversed = 1 if against else 0
+    return against
 
 
 @kernel
@@ -155,6 +181,9 @@ def judge_cycle(node: Any, status: int, at: float) -> None:
     if state.mode == STATIC_BIAS:
         guard.before_steps = math.nan  # the constant bias is measured again
     if state.mode == STATIC_BIAS or status & REFERENCE_CHANGED or is_faulty(guard.gyro):
+        forget(guard.aidings)
+        return
+    if guard.reversed == 1 and guard.rate != 0.0:
         forget(guard.aidings)
         return
     rejected = 1 if status & REJECTED else 0

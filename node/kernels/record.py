@@ -14,11 +14,12 @@ from node.kernels.alignment import MAX_IMUS, MOUNT, OFFSET, SWEEP, new_mount
 from node.kernels.layout import CONFIG, RING, STATE, Array, new_state
 from node.kernels.static_average import STATIC
 
-NODE_LAYOUT: Final = 5  # of the saved record; 1 and 2 held the filter alone, 3 what a start clears as well, 4 no doubts
+# of the saved record; 1 and 2 held the filter alone, 3 what a start clears as well, 4 no doubts, 5 fewer mismatches
+NODE_LAYOUT: Final = 6
 EVENTS_KEPT: Final = 32  # that wait to be said
 NUMBERS: Final = 10  # of one event
 DISAGREEMENTS: Final = 3  # aidings in a row, until a mismatch is a fault
-MOST_DISAGREEMENTS: Final = 5  # likewise, until a small one is
+MOST_DISAGREEMENTS: Final = 6  # likewise, until a small one is
 
 TRUST: Final = np.dtype(
     [
@@ -81,6 +82,7 @@ GUARD: Final = np.dtype(
         ("first_step", "f8"),  # rad/s, size of that step
         ("jumped", "i8"),  # 1: the clock jumped in the cycle before
         ("untimely", "i8"),  # 1: the aiding before was untimely
+        ("reversed", "i8"),  # 1: the encoder counts against the gyroscope
         ("rest_cycles", "i8"),  # cycles in a row in which the encoder reports a head at rest
         ("doubted", "i8"),  # 1: innovations are larger than their variance explains
         ("misfit", "f8"),  # mean of their squares over their variances

@@ -94,9 +94,10 @@ def is_tilting(state: Any, config: Any) -> bool:
 
 @kernel
 def has_moved(state: Any, config: Any) -> bool:
-    """Whether the mean of the last cycles is beyond the bias in use; before there is one, beyond what counts as rest.
+    """Whether the mean of the last cycles is beyond the constant bias; before there is one, beyond what counts as rest.
 
-    A node that does not stand still by its bias needs no more evidence.
+    What the filter has put into the part that wanders does not count: it would forget it. A node that does not stand
+    still by its bias needs no more evidence.
     """
     newest = (state.cycles - 1) % RING
     length = CYCLES * (state.ring_end[newest] - state.ring_start[newest])
@@ -109,7 +110,7 @@ def has_moved(state: Any, config: Any) -> bool:
             moved = moved or bool(abs(mean) > UNBIASED_STILL_RATE)
             continue
         var = state.static_bias_var[k] + config.bias_std[k] ** 2 + config.gyro_noise[k] ** 2 / length
-        off = mean - state.static_bias[k] - state.bias[k]
+        off = mean - state.static_bias[k]
         moved = moved or bool(off * off > MOVED * MOVED * var)
     return moved
 
@@ -124,10 +125,11 @@ def take_bias(node: Any, settings: Any, since: int) -> None:
     moved_z = 0.0
     for k in range(3):
         mean = mean_rate(state, k)
-        off = mean - state.static_bias[k] - state.bias[k]
+        moved = mean - state.static_bias[k]
+        off = moved - state.bias[k]
         var = config.gyro_noise[k] ** 2 / (CYCLES * period) + config.bias_std[k] ** 2
         if known and settings.imus == 1:
-            config.bias_std[k] = max(config.bias_std[k], abs(off))
+            config.bias_std[k] = max(config.bias_std[k], abs(moved))
         move_bias(state, k, mean, var, config.bias_std[k] ** 2)
         moved_z = off
     if known:

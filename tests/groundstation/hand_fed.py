@@ -60,9 +60,9 @@ class Rig:
         self.tell(tube, hops)
         self.run(1.0)
 
-    def tell(self, tube: int, hops: int) -> None:
+    def tell(self, tube: int, hops: int, scale: float = 0.0) -> None:
         state = NodeState(
-            tube, self.now, hops, Mode.TRACKING, 1.0, 1e-6, 1e-6, (0.0, 0.0, 0.0), 0.0, 0.0, 1e-6, 0.1, 1e-8,
+            tube, self.now, hops, Mode.TRACKING, 1.0, 1e-6, 1e-6, (0.0, 0.0, 0.0), scale, 0.0, 1e-6, 0.1, 1e-8,
             NodeFlag.NONE, 5, 0,
         )  # fmt: skip
         self.tube.send_state(state, self.now)

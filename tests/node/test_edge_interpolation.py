@@ -35,6 +35,11 @@ def dead_stop(rate: float, counts: np.ndarray) -> np.ndarray:
     return np.asarray(counts / rate)
 
 
+def cut(rate: float, counts: np.ndarray) -> np.ndarray:
+    """The same of a head that is braked and stops dead at ``rate`` counts/s."""
+    return np.asarray((np.sqrt(rate**2 + 4.0 * BRAKE * np.maximum(counts, 0.0)) - rate) / (2.0 * BRAKE))
+
+
 def errors(to_go, parameter: float) -> tuple[np.ndarray, np.ndarray]:  # type: ignore[no-untyped-def]
     """Error (counts) and what it is by its own variance, over the seeds."""
     random = np.random.default_rng(7)
@@ -66,6 +71,12 @@ def test_a_hard_stop_is_not_believed_far(to_go, parameter: float) -> None:  # ty
     error, normalised = errors(to_go, parameter)
     assert np.mean(normalised) < 2.5
     assert np.sqrt(np.mean(error**2)) < 1.2 * math.sqrt(1.0 / 12.0)
+
+
+def test_a_head_that_stops_dead_leaves_the_place_unknown() -> None:
+    error, normalised = errors(cut, math.radians(10.0) / QUANTUM)
+    assert np.mean(normalised) == pytest.approx(1.0, abs=4.0 * math.sqrt(0.8 / SEEDS))
+    assert np.sqrt(np.mean(error**2)) == pytest.approx(math.sqrt(1.0 / 12.0), rel=0.1)
 
 
 RAGGED = st.lists(st.floats(1e-9, 1e9) | st.floats(0.01, 1.0), min_size=FEWEST, max_size=EDGES)

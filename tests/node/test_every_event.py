@@ -138,6 +138,7 @@ CASES: dict[Code, Callable[[], Bench]] = {
     Code.IMU_BACK: lambda: known(TWO).cycles(8, spoil=held).cycles(40),
     Code.BIAS_MOVED: lambda: known().cycles(20, FAST).cycles(20, spoil=warmed),
     Code.AIDING_DOUBTED: lambda: wobbling(known()),
+    Code.ENCODER_REVERSED: lambda: known().cycles(4, FAST, aided=False).aid(rate=-FAST).cycles(1, aided=False),
 }
 
 

@@ -238,6 +238,15 @@ def test_a_bias_that_grows_the_innovation_is_a_step_and_one_with_the_rate_a_scal
     assert last is Fault.GYRO_SCALE
 
 
+def test_a_part_of_a_swing_of_once_a_turn_is_no_step() -> None:
+    watched = Watched()
+    watched.takes(0.0, 1.24, 0.0, rejected=False)
+    innovation = 0.0
+    for k in range(40):
+        innovation += 2e-3 * math.cos(math.tau * k / 10.0)
+        assert watched.takes(innovation, 1.24, 0.5 * (k + 1)) is Fault.NONE
+
+
 def test_a_growth_over_half_a_turn_is_that_of_the_shorter_way() -> None:
     watched = Watched()
     watched.takes(math.pi - 0.005, 1.0, 0.5)

@@ -122,7 +122,7 @@ def row(case: Case, runs: Sequence[FieldRun]) -> dict[str, Any]:
     unflagged = float(np.mean([np.mean(lie[r.turning | r.resting]) for lie, r in zip(lies, runs, strict=True)]))
     faults = {code: float(np.mean([r.faults[code] for r in runs])) for code in FAULTS if code not in case.true_faults}
     surveys = float(np.mean([r.surveys for r in runs])) / BLOCKS
-    others = sum(faults.values()) - faults["gyro_step"] - faults["gyro_scale"]
+    others = sum(count for code, count in faults.items() if code not in ("gyro_step", "gyro_scale"))
     worst = max(value for value in (nees_turning, nees_rest, 0.0) if math.isfinite(value))
     false = max(faults["gyro_step"], faults["gyro_scale"], others)
     return {
