@@ -4,7 +4,7 @@
 fault      evidence                                                                flagged after
 ========== ======================================================================= =================
 step       innovations beyond the gate that grow alike, while readings look sane   3 aidings in a row
-small step the same, by less than 0.15 deg/s, or 0.3 deg/s of a string that turns  6 aidings in a row
+small step the same, by less than 0.15 deg/s, or 0.3 deg/s at 60 deg/s or more    6 aidings in a row
 scale      innovations beyond the gate that grow in proportion to the rate         3 aidings in a row
 ========== ======================================================================= =================
 
@@ -27,8 +27,8 @@ from node.kernels.record import DISAGREEMENTS, MOST_DISAGREEMENTS
 GROWTH: Final = 1.5  # sigmas from one aiding to the next, in one direction
 SMALLEST_STEP: Final = math.radians(0.03)  # rad/s
 SMALL_STEP: Final = math.radians(0.15)  # rad/s, up to which a step is looked at for longer
-SMALL_SWING: Final = math.radians(0.3)  # rad/s, likewise, where the string turns
-SLOWEST_SWING: Final = math.radians(10.0)  # rad/s, from where it does
+SMALL_SWING: Final = math.radians(0.3)  # rad/s, likewise, where the string turns at full speed
+SLOWEST_SWING: Final = math.radians(60.0)  # rad/s, from where it does: the slower, the smaller are its swings
 STEADY: Final = 0.3  # of the mean mismatch, by which those of one step may differ from it
 GROSS: Final = math.radians(5.0)  # rad/s, from where a mismatch is a fault however it changes
 SLOWEST_SCALE: Final = math.radians(5.0)  # rad/s, from where a mismatch may be one of scale
@@ -80,7 +80,8 @@ def find_mismatch(
     mean = recent_mismatch(watch)
     steady, proportional = is_steady(watch, mean), is_proportional(watch)
     gross = abs(mismatch) >= GROSS
-    smallest = SMALL_SWING if abs(watch.spin[0]) >= SLOWEST_SWING else SMALL_STEP
+    slowest = min(abs(watch.spin[0]), abs(spin))
+    smallest = SMALL_SWING if slowest >= SLOWEST_SWING else SMALL_STEP
     wanted = DISAGREEMENTS if abs(mean) >= smallest else MOST_DISAGREEMENTS
     if not (proportional or gross or (steady and watch.seen >= wanted)):
         found.refuted = 0 if steady else 1
