@@ -112,6 +112,8 @@ def wall_report(wall: Wall, judgement: Judgement, origin: Origin) -> Document:
         Section("What is to be done", remedies(wall, judgement) or ["Nothing."]),
         _columns_section(records),
         _joints_section(wall, judgement),
+        *_voids_sections(wall, judgement),
+        *_closing_sections(wall),
         _instruments_section(records),
         Section("Joints over depth, plan, and the worst joint", figure=svg_of(picture), new_page=True),
     ]
@@ -178,6 +180,48 @@ def _joints_section(wall: Wall, judgement: Judgement) -> Section:
         f"Required: {required:g} m; marked: thinner, open, not known, or P(too thin) above {wall.file.allowed:g}.",
     )
     return Section("Joints", words, columns=columns, rows=rows, marked=marked)
+
+
+def _voids_sections(wall: Wall, judgement: Judgement) -> list[Section]:
+    """Voids of a grid: every depth that has one, or where one is likelier than allowed, and the likeliest."""
+    chance, columns = judgement.void_chance, wall.columns
+    if chance is None:
+        return []
+    allowed, likeliest = wall.file.allowed, int(np.argmax(chance.probability))
+    rows, marked = [], []
+    for z, depth in enumerate(columns.depths.tolist()):
+        area = sum(hole.void.area for hole in judgement.voids if hole.depth == depth)
+        is_bad = bool(area > 0.0 or chance.probability[z] > allowed)
+        if not is_bad and z != likeliest:
+            continue
+        if is_bad:
+            marked.append(len(rows))
+        three = chance.columns[z]
+        between = "–" if three is None else ", ".join(columns.names[k] for k in three)
+        rows.append((f"{depth:g}", f"{1e4 * area:.0f}", f"{chance.probability[z]:.2g}", between))
+    words = (
+        f"Depths with a void as surveyed, or with P(void) above {allowed:g}, marked; and the depth of the largest.",
+    )
+    heads = ("depth m", "area cm\u00b2", "P(void)", "likeliest between")
+    return [Section("Voids between the columns", words, columns=heads, rows=rows, marked=marked)]
+
+
+def _closing_sections(wall: Wall) -> list[Section]:
+    """How it closed, a row a day of drilling."""
+    rows = []
+    for stage in wall.stages:
+        spacing = ("–", "–", "–")
+        if stage.widest is not None:
+            joint, depth, width = stage.widest
+            name = joint_name(wall.columns, wall.pairs[joint])
+            spacing = (f"{width:.3f}", name, f"{wall.columns.depths[depth]:g}")
+        drilled, closed = _names(stage.drilled), f"{100.0 * stage.closed:.1f}"
+        rows.append((stage.day.isoformat(), drilled, closed, str(stage.open_joints), *spacing))
+    heads = ("day", "drilled", "closed %", "open joints", "widest m", "joint", "at m")
+    words = (
+        "Share of all joints and depths that are as thick as required, and the widest spacing of columns that stand.",
+    )
+    return [Section("How it closed", words, columns=heads, rows=rows)] if rows else []
 
 
 def _instruments_section(records: list[ColumnRecord]) -> Section:

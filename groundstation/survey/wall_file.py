@@ -18,6 +18,7 @@ import numpy.typing as npt
 
 from groundstation.errors import SurveyError
 from groundstation.survey.as_built import Columns
+from groundstation.survey.closing import Stage, stages
 from groundstation.survey.columns import Tolerance, tolerance
 from groundstation.survey.error_sources import Site
 from groundstation.survey.frames import DEPTHS_FROM, NORTHS
@@ -104,6 +105,11 @@ class Wall:
     def columns(self) -> Columns:
         """The columns in planes across them."""
         return self.built.columns
+
+    @property
+    def stages(self) -> list[Stage]:
+        """How it closed, day by day; none where no day of drilling is stated."""
+        return stages(self.columns, self.pairs, self.file.thickness, self.drilled_on, self.detours)
 
     @property
     def grid_spacing(self) -> float | None:

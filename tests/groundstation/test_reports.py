@@ -123,6 +123,32 @@ def test_a_column_is_called_good_only_where_it_is_known_to_its_toe(
     assert document.good == (name == "P01")
 
 
+def test_the_report_of_a_grid_tells_its_voids_and_how_it_closed(tmp_path: Path) -> None:
+    """Columns of 0.6 m in a square of 0.9 m leave a hole of 3.6 cm in its middle, wherever they are drilled true."""
+    heads, stations = ["column,north_m,east_m,drilled_on"], ["column,md_m,inclination_deg,azimuth_deg"]
+    for day, (name, north, east) in enumerate((("A", 0.0, 0.0), ("B", 0.0, 0.9), ("C", 0.9, 0.0), ("D", 0.9, 0.9)), 16):
+        heads.append(f"{name},{north},{east},2026-11-{day}")
+        stations += [f"{name},{md},0,0" for md in (0, 2, 4)]
+    (tmp_path / "heads.csv").write_text("\n".join(heads) + "\n")
+    (tmp_path / "stations.csv").write_text("\n".join(stations) + "\n")
+    (tmp_path / "wall.toml").write_text(
+        'radius_m = 0.6\nthickness_m = 0.5\nspacing_m = 0.9\nlength_m = 4\ndepth_step_m = 2\nlayout = "grid"\n'
+        'heads = "heads.csv"\nstations = "stations.csv"\n'
+    )
+    wall = read_wall(tmp_path / "wall.toml")
+    document = wall_report(wall, judge_wall(wall), origin_of(wall))
+    voids = section(document, "Voids between the columns")
+    assert [row[0] for row in voids.rows] == ["0", "2", "4"]
+    assert len(voids.marked) == 3
+    assert all(float(row[1]) > 0.0 and float(row[2]) > 0.5 for row in voids.rows)
+    closed = section(document, "How it closed")
+    assert [row[:2] for row in closed.rows] == [(f"2026-11-{16 + k}", name) for k, name in enumerate("ABCD")]
+    assert [row[4] for row in closed.rows] == ["–", "0.900", "0.900", "0.900"]
+    shares = [float(row[2]) for row in closed.rows]
+    assert shares == sorted(shares)
+    assert (shares[0], shares[-1], closed.rows[-1][3]) == (0.0, 100.0, "0")
+
+
 def test_the_report_of_a_column_gives_every_station_in_site_coordinates(judged: tuple[Wall, Judgement]) -> None:
     document = column_report(record(judged, LEANING), site_of(judged[0]), origin_of(judged[0]))
     built = section(document, "As built")

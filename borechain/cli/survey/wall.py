@@ -220,11 +220,10 @@ def largest_spacing(found: Wall, judged: Joints) -> list[dict[str, Any]]:
 
 def closing(found: Wall) -> list[dict[str, Any]]:
     """How it closed, day by day; nothing where no day of drilling is stated."""
-    from groundstation.survey.closing import stages
     from groundstation.survey.wall_verdict import joint_name
 
     columns, rows = found.built.columns, []
-    for stage in stages(columns, found.pairs, found.file.thickness, found.drilled_on, found.detours):
+    for stage in found.stages:
         row: dict[str, Any] = {"day": stage.day.isoformat(), "drilled": stage.drilled}
         row |= {"closed_percent": 100.0 * stage.closed, "open_joints": stage.open_joints, "largest_spacing": None}
         if stage.widest is not None:

@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 from groundstation.errors import SurveyError
-from groundstation.survey.closing import Stage, stages
+from groundstation.survey.closing import Stage
 from groundstation.survey.wall_file import read_wall
 
 PIPES, ACROSS = 12, 2.4  # of a ring of freeze pipes; m, its diameter
@@ -28,7 +28,7 @@ def ring(folder: Path, days: list[str], *, outward_deg: float = 0.0, more: str =
         'stations = "stations.csv"\ninstrument = "gyro-continuous"\n'
     )
     wall = read_wall(folder / "ring.toml")
-    return stages(wall.columns, wall.pairs, wall.file.thickness, wall.drilled_on, wall.detours)
+    return wall.stages
 
 
 def test_a_ring_closes_with_its_last_pipe(tmp_path: Path) -> None:
