@@ -204,11 +204,13 @@ def test_an_operator_who_does_not_read_stops_nobody(tmp_path: Path) -> None:
         rig.pid_of("borechain node 1")
         watching = command("watch", f"{GROUND}/**", "--endpoint", rig.endpoint)
         with subprocess.Popen(watching, stdout=subprocess.PIPE, text=True) as watcher:
-            assert watcher.stdout is not None
-            assert watcher.stdout.readline().startswith("{")
-            os.kill(watcher.pid, signal.SIGSTOP)
-            result = rig.result()
-            watcher.kill()
+            try:
+                assert watcher.stdout is not None
+                assert watcher.stdout.readline().startswith("{")
+                os.kill(watcher.pid, signal.SIGSTOP)
+                result = rig.result()
+            finally:
+                watcher.kill()
     assert result["measurements"] == 6
     assert result["restarts"] == 0
 

@@ -4,7 +4,11 @@ from __future__ import annotations
 
 import asyncio
 import contextlib
+import os
+import signal
 import socket
+import subprocess
+import sys
 import threading
 import time
 from collections.abc import Callable, Iterator
@@ -342,3 +346,27 @@ async def until(probe: Callable[[], bool]) -> None:
             await asyncio.sleep(0.005)
 
     await asyncio.wait_for(poll(), PATIENCE)
+
+
+@pytest.mark.slow
+def test_a_router_goes_although_an_end_lives_and_reads_nothing() -> None:
+    """Its line is full, so that no farewell passes."""
+    with socket.socket() as probe:
+        probe.bind(("127.0.0.1", 0))
+        endpoint = f"tcp/127.0.0.1:{probe.getsockname()[1]}"
+    watching = [sys.executable, "-m", "borechain", "watch", "full/**", "--endpoint", endpoint]
+    with open_router(endpoint) as bus, subprocess.Popen(watching, stdout=subprocess.PIPE) as watcher:
+        try:
+            publisher = bus.publisher("full/line", JSON, droppable=True)
+            while not publisher.is_heard:
+                assert watcher.poll() is None
+                bus.tokens("full/*", 0.05)
+            publisher.put(b"{}")
+            assert watcher.stdout is not None
+            assert watcher.stdout.readline()
+            os.kill(watcher.pid, signal.SIGSTOP)
+            for _ in range(400):
+                publisher.put(b"1" * 100_000)
+            bus.close()
+        finally:
+            watcher.kill()
