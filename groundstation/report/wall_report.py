@@ -188,7 +188,8 @@ def _voids_sections(wall: Wall, judgement: Judgement) -> list[Section]:
     if chance is None:
         return []
     allowed, likeliest = wall.file.allowed, int(np.argmax(chance.probability))
-    rows, marked = [], []
+    rows: list[tuple[str, ...]] = []
+    marked: list[int] = []
     for z, depth in enumerate(columns.depths.tolist()):
         area = sum(hole.void.area for hole in judgement.voids if hole.depth == depth)
         is_bad = bool(area > 0.0 or chance.probability[z] > allowed)
