@@ -11,12 +11,10 @@ import math
 from bisect import bisect_left, insort
 from dataclasses import dataclass, field
 
-import numpy as np
-
 from groundstation.config import GroundConfig
 from groundstation.service.alarms import AlarmList
 from groundstation.service.history import SAME_STOP, History
-from groundstation.survey.columns import Deviation, deviation, project
+from groundstation.survey.columns import Deviation, deviations, project
 from groundstation.survey.fusion import (
     Departure,
     Evidence,
@@ -54,6 +52,11 @@ class ResolvedStop:
         return self.measurement.yaw_var + (UNKNOWN_YAW_VAR if self.trust is Trust.UNKNOWN_YAW else 0.0)
 
 
+def _in_time(cluster: ResolvedStop) -> tuple[float, int]:
+    """What the clusters of a station are ordered by."""
+    return cluster.at, cluster.measurement.tube
+
+
 @dataclass(slots=True)
 class SurveyStation:
     """One depth of the hole and every cluster measured there, oldest first.
@@ -67,7 +70,7 @@ class SurveyStation:
     _departures: dict[int, Departure] = field(default_factory=dict)
     _fused: tuple[tuple[int, ...], Direction] | None = None  # with what it was made of
     _counted: GrowingBayes = field(default_factory=GrowingBayes)
-    _earlier: GrowingBayes = field(default_factory=GrowingBayes)
+    _with_untrusted: GrowingBayes | None = None
 
     @property
     def count(self) -> int:
@@ -85,9 +88,11 @@ class SurveyStation:
 
     def add_stop(self, cluster: ResolvedStop) -> None:
         """Add a cluster in the order of time; what was judged of later ones is forgotten."""
-        self.clusters.append(cluster)
-        self.clusters.sort(key=lambda known: (known.at, known.measurement.tube))
-        self.forget(self.clusters.index(cluster))
+        place = self.count
+        while place and _in_time(self.clusters[place - 1]) > _in_time(cluster):
+            place -= 1
+        self.clusters.insert(place, cluster)
+        self.forget(place)
 
     def forget(self, place: int) -> None:
         """Forget decisions from ``place`` on."""
@@ -118,13 +123,21 @@ class SurveyStation:
             self._fused = made_of, self._counted.of(readings) if is_sum else weighted(readings, weighting)
         return self._fused[1]
 
+    def _sum_of_all(self) -> GrowingBayes:
+        """Sum of the clusters since the hole moved, whether they are believed or not."""
+        if not self.untrusted:
+            return self._counted  # of which it is a part: what comes next is added to it
+        if self._with_untrusted is None:
+            self._with_untrusted = GrowingBayes()
+        return self._with_untrusted
+
     def departure(self, place: int) -> Departure | None:
         """How far the cluster at ``place`` departed from those before; None for the first of its hole."""
         first = self.first_before(place)
         if first == place:
             return None
         if place not in self._departures:
-            earlier = self._earlier.of([c.direction for c in self.clusters[first:place]])
+            earlier = self._sum_of_all().of([c.direction for c in self.clusters[first:place]])
             self._departures[place] = departure_from(earlier, self.clusters[place].direction)
         return self._departures[place]
 
@@ -156,7 +169,7 @@ class Hole:
         self._history = History()
         self._trajectory = Trajectory()
         self._drawn: list[tuple[float, Direction]] = []  # stations of the trajectory, m and direction
-        self._deviations = [self._deviation_of(self._trajectory.points[0])]
+        self._deviations = deviations(self._trajectory.points, self._design)
         self._projection: Deviation | None = None
         self._unsettled_since = math.inf  # s, rig time of the oldest survey from which nothing follows yet
         self._newest_at = -math.inf  # s, rig time of the newest survey
@@ -170,7 +183,7 @@ class Hole:
         numpy.linalg.LinAlgError
             When it cannot be weighed; it was not taken.
         """
-        np.linalg.inv(stop.direction.total_cov)
+        _ = stop.direction.information
         self.version += 1
         if self._history.begins_stop(epoch, stop.at):
             self.settle()
@@ -239,17 +252,13 @@ class Hole:
 
     def _draw(self, stations: list[tuple[float, Direction]]) -> None:
         """Trajectory through stations (m, direction); where none has changed the new ones are added to it."""
-        known = zip(stations, self._drawn, strict=False)
-        if len(stations) < len(self._drawn) or any(new[1] is not old[1] for new, old in known):
-            self._trajectory, self._drawn = Trajectory(), []
-            self._deviations = [self._deviation_of(self._trajectory.points[0])]
+        same = zip(stations, self._drawn, strict=False)
+        if len(stations) < len(self._drawn) or any(new[1] is not old[1] for new, old in same):
+            self._trajectory, self._drawn, self._deviations = Trajectory(), [], []
         added = stations[len(self._drawn) :]
         self._trajectory.extend(added)
-        self._deviations += [self._deviation_of(point) for point in self._trajectory.points[-len(added) :] if added]
         self._drawn += added
-
-    def _deviation_of(self, point: Point) -> Deviation:
-        return deviation(point, self._design)
+        self._deviations += deviations(self._trajectory.points[len(self._deviations) :], self._design)
 
     def _station_at(self, md: float) -> SurveyStation:
         first = bisect_left(self._stations, md - 2.0 * self._config.station_tolerance, key=lambda known: known.md)

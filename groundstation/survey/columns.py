@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -147,14 +147,20 @@ class Deviation:
         return max((level for level in LEVELS if self.ratio >= level), default=0.0)
 
 
+def deviations(points: Sequence[Point], design: Design) -> list[Deviation]:
+    """Deviation of every point of a trajectory."""
+    offsets = np.array([point.position for point in points]).reshape(-1, 3) - np.array(design.head)
+    # number by number: in a product of matrices the last bits of one point depend on how many others there are
+    along, first, second = ((offsets * unit).sum(axis=1) for unit in (design.axis, *design.across))
+    across = np.stack([first, second], axis=1)
+    covs = design.across @ np.array([point.cov for point in points]).reshape(-1, 3, 3) @ design.across.T
+    rows = zip(points, along.tolist(), across, covs, strict=True)
+    return [Deviation(p.md, way, offset, cov, design.tolerance.at(max(way, 0.0))) for p, way, offset, cov in rows]
+
+
 def deviation(point: Point, design: Design) -> Deviation:
-    """Deviation of one point of a trajectory."""
-    offset = point.position - np.array(design.head)
-    along = float(offset @ design.axis)
-    across = design.across
-    return Deviation(
-        point.md, along, across @ offset, across @ point.cov @ across.T, design.tolerance.at(max(along, 0.0))
-    )
+    """Deviation of one point."""
+    return deviations([point], design)[0]
 
 
 def project(point: Point, direction: Direction, design: Design) -> Deviation:

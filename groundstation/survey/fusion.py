@@ -53,7 +53,7 @@ class StationFusion:
 
     def add_reading(self, reading: Direction) -> None:
         """Take one more cluster; it weighs by all it does not know, shared errors included."""
-        information = np.linalg.inv(reading.total_cov)
+        information = reading.information
         self._information = self._information + information
         self._weighted = self._weighted + information @ reading.lean
         self._random = self._random + information @ reading.cov @ information

@@ -20,6 +20,8 @@ Array = npt.NDArray[np.float64]
 GRAVITY_TOLERANCE = 0.005  # of g, |f| of a stop that was no stop
 ASYMMETRY = 1e-9  # of the largest entry, rounding in the covariance of a node
 CONDITION = 1e14  # beyond it the inverse of a covariance is noise
+PLAINLY = 1e-10  # of the trace to the power k, the determinant (k, k) of a matrix that needs no closer look
+A_FEW = 64  # numbers, up to which they are looked at one by one
 SHORTEST_SETTLE = 16.0  # s, of the 32-point moving average
 
 
@@ -50,7 +52,19 @@ class Direction:
     @property
     def total_cov(self) -> Array:
         """Covariance (2, 2) with the shared errors in it."""
-        return np.asarray(self.cov + self.shared @ self.shared.T)
+        shared = self.shared
+        return np.asarray(self.cov + shared @ shared.T)
+
+    @property
+    def information(self) -> Array:
+        """Inverse (2, 2) of ``total_cov``.
+
+        Raises
+        ------
+        numpy.linalg.LinAlgError
+            When there is none.
+        """
+        return np.asarray(np.linalg.inv(self.total_cov))
 
 
 @dataclass(frozen=True, slots=True)
@@ -60,11 +74,6 @@ class Resolved:
     direction: Direction
     by_force: Array  # (2, 3) change of the lean for one m/s^2 on each body axis
     by_yaw: Array  # (2,) change of the lean for one rad of yaw
-
-    def sharing(self, shared: Array) -> Direction:
-        """The direction with its share (2, s) in the errors of others."""
-        d = self.direction
-        return Direction(d.lean, d.down, d.cov, shared)
 
 
 def resolve(force: Array, force_cov: Array, yaw: float, yaw_var: float) -> Resolved:
@@ -80,16 +89,16 @@ def resolve(force: Array, force_cov: Array, yaw: float, yaw_var: float) -> Resol
     SurveyError
         When the force vanishes or is not finite, or nothing is uncertain in some direction of the lean.
     """
-    size = float(np.linalg.norm(force))
+    size = math.sqrt(force.dot(force))
     if not math.isfinite(size) or size < 1e-3 or not math.isfinite(yaw):
         raise SurveyError(f"resolve: expected a finite specific force and yaw, got |f| = {size} m/s^2, yaw = {yaw} rad")
     c, s = math.cos(yaw), math.sin(yaw)
     turn = np.array([[c, -s, 0.0], [s, c, 0.0]])
     unit = force / size
     lean = turn @ unit
-    by_force = (turn - np.outer(lean, unit)) / size
+    by_force = (turn - lean[:, None] * unit) / size
     by_yaw = np.array([-lean[1], lean[0]])
-    cov = by_force @ force_cov @ by_force.T + yaw_var * np.outer(by_yaw, by_yaw)
+    cov = by_force @ force_cov @ by_force.T + yaw_var * (by_yaw[:, None] * by_yaw)
     if not is_covariance(cov):
         raise SurveyError(f"resolve: expected a positive definite covariance of the lean, got {cov.tolist()}")
     return Resolved(Direction(lean, float(-unit[2]), cov, np.zeros((2, 0))), by_force, by_yaw)
@@ -97,12 +106,34 @@ def resolve(force: Array, force_cov: Array, yaw: float, yaw_var: float) -> Resol
 
 def is_covariance(covs: Array) -> bool:
     """Whether every matrix of (..., k, k) is finite, symmetric, positive definite and safely invertible."""
+    if covs.size <= A_FEW and all(_is_plainly_one(cov) for cov in covs.reshape(-1, *covs.shape[-2:]).tolist()):
+        return True
     if not np.all(np.isfinite(covs)):
         return False
     asymmetry = np.max(np.abs(covs - np.swapaxes(covs, -1, -2)), axis=(-2, -1))
     values = np.linalg.eigvalsh(covs)
     symmetric = np.all(asymmetry <= ASYMMETRY * np.max(np.abs(covs), axis=(-2, -1)))
     return bool(symmetric and np.all(values[..., 0] * CONDITION > values[..., -1]))
+
+
+def _is_plainly_one(cov: list[list[float]]) -> bool:
+    """Whether a matrix (k, k), k to 3, is far from being none: a few products in place of eigenvalues.
+
+    The smallest eigenvalue is at least the determinant over the trace to the power k - 1.
+    """
+    k = len(cov)
+    if k > len(cov[-1]) or not 1 < k <= 3:
+        return False
+    size = max(abs(value) for row in cov for value in row)
+    if any(not abs(cov[i][j] - cov[j][i]) <= ASYMMETRY * size for i in range(k) for j in range(i)):
+        return False
+    minor = cov[0][0] * cov[1][1] - cov[1][0] * cov[1][0]
+    det, trace = minor, cov[0][0] + cov[1][1]
+    if k == 3:
+        (_, _, _), (b, _, _), (c, e, f) = cov
+        det = f * minor - e * (cov[0][0] * e - b * c) + c * (b * e - cov[1][1] * c)
+        trace += f
+    return cov[0][0] > 0.0 and minor > 0.0 and det > PLAINLY * trace**k
 
 
 def angles(lean: Array, down: float) -> tuple[float, float]:
@@ -153,13 +184,14 @@ def check(
     """Quality of a stop with what its IMUs come to; ``sample_std`` (m/s^2) is the sensor's own noise in one sample."""
     quality = Quality.GOOD
     mean, cov = combined
-    if abs(float(np.linalg.norm(mean)) - gravity) > GRAVITY_TOLERANCE * gravity:
+    largest_var = max(max(imu[0][0], imu[1][1], imu[2][2]) for imu in covs.tolist())
+    if abs(math.sqrt(mean.dot(mean)) - gravity) > GRAVITY_TOLERANCE * gravity:
         quality |= Quality.GRAVITY
-    if float(np.max(np.diagonal(covs, axis1=1, axis2=2))) * samples > (3.0 * sample_std) ** 2:
+    if largest_var * samples > (3.0 * sample_std) ** 2:
         quality |= Quality.MOTION
     if settle_time < SHORTEST_SETTLE:
         quality |= Quality.SETTLE
-    spread = forces - mean
-    if float(np.max(spread**2)) > 16.0 * float(np.max(np.diagonal(covs, axis1=1, axis2=2)) + np.max(np.diag(cov))):
+    spread = np.abs(forces - mean).max()
+    if spread**2 > 16.0 * (largest_var + cov.diagonal().max()):
         quality |= Quality.SPREAD
     return quality

@@ -19,8 +19,52 @@ import numpy.typing as npt
 from groundstation.survey.resolve import Direction, Resolved
 
 Array = npt.NDArray[np.float64]
+Places = npt.NDArray[np.intp]
 Name = tuple[str | int, ...]
+AXES = 3  # of an accelerometer
+CAUSES = 2 + AXES  # of the columns of a reading: mount, joint, and each axis
 KINDS = {"mount": "mounts", "joint": "joints", "drive": "joints", "string": "joints", "bias": "accelerometer_bias"}
+
+
+class Reading(Direction):
+    """Direction of one tube's stop. Its columns are made when they are asked for, out of what all of them come from.
+
+    The mount, each joint and the three axes of the accelerometer: that is five columns, of which that of a joint stands
+    at the place of every joint above. Fifty tubes share 250 errors, and a ground station keeps every reading.
+    """
+
+    __slots__ = ("_causes", "_information", "_places", "_width")
+    _causes: Array
+    _information: Array | None
+    _places: Places
+    _width: int
+
+    def __init__(self, bare: Direction, causes: Array, places: Places, width: int) -> None:
+        """``causes`` (2, 5); ``places`` of the mount, the joints and the axes, among the ``width`` errors known."""
+        for name in ("lean", "down", "cov"):
+            object.__setattr__(self, name, getattr(bare, name))
+        object.__setattr__(self, "_causes", causes)
+        object.__setattr__(self, "_places", places)
+        object.__setattr__(self, "_width", width)
+        object.__setattr__(self, "_information", None)
+
+    @property
+    def shared(self) -> Array:
+        """Columns (2, s), made anew."""
+        columns = np.zeros((2, self._width))
+        columns[:, self._places[0]] = self._causes[:, 0]
+        columns[:, self._places[1:-AXES]] = self._causes[:, 1:2]
+        columns[:, self._places[-AXES:]] = self._causes[:, -AXES:]
+        return columns
+
+    @property
+    def information(self) -> Array:
+        """Inverse (2, 2) of ``total_cov``, worked out once."""
+        known = self._information
+        if known is None:
+            known = super().information
+            object.__setattr__(self, "_information", known)
+        return known
 
 
 class SharedErrors:
@@ -29,6 +73,8 @@ class SharedErrors:
     def __init__(self) -> None:
         self._columns: dict[Name, int] = {}
         self._places: dict[str, list[int]] = {}  # of the columns of each kind, in the order of their coming
+
+        self._known: dict[tuple[Name, ...], Places] = {}
 
     def __len__(self) -> int:
         return len(self._columns)
@@ -41,7 +87,7 @@ class SharedErrors:
         systematic_var: float,
         mount_var: float,
         force_bias_std: float,
-    ) -> Direction:
+    ) -> Reading:
         """Direction of a reading with its columns.
 
         Parameters
@@ -54,15 +100,13 @@ class SharedErrors:
         """
         mount_var = min(mount_var, systematic_var)
         chain = self._chain(tube, above)
-        columns: list[tuple[Name, Array]] = [(("mount", tube), math.sqrt(mount_var) * resolved.by_yaw)]
+        places = self._places_of((("mount", tube), *chain, *(("bias", tube, axis) for axis in range(3))))
         each = math.sqrt((systematic_var - mount_var) / len(chain))
-        columns.extend((joint, each * resolved.by_yaw) for joint in chain)
-        columns.extend((("bias", tube, axis), force_bias_std * resolved.by_force[:, axis]) for axis in range(3))
-        indices = [self._place_of(name) for name, _ in columns]
-        shared = np.zeros((2, len(self._columns)))
-        for index, (_, column) in zip(indices, columns, strict=True):
-            shared[:, index] = column
-        return resolved.sharing(shared)
+        causes = np.empty((2, CAUSES))
+        causes[:, 0] = math.sqrt(mount_var) * resolved.by_yaw
+        causes[:, 1] = each * resolved.by_yaw
+        causes[:, 2:] = force_bias_std * resolved.by_force
+        return Reading(resolved.direction, causes, places, len(self._columns))
 
     def by_kind(self, columns: Array) -> dict[str, Array]:
         """Covariance (k, k) of something linear in the readings, by kind of shared error; ``columns`` (k, s)."""
@@ -70,12 +114,15 @@ class SharedErrors:
         parts = {kind: columns[:, at[: bisect_left(at, width)]] for kind, at in self._places.items() if at[0] < width}
         return {kind: part @ part.T for kind, part in parts.items()}
 
-    def _place_of(self, name: Name) -> int:
-        """Place of an error's column, the next one where it is met for the first time."""
-        if name not in self._columns:
-            self._columns[name] = len(self._columns)
-            self._places.setdefault(KINDS[str(name[0])], []).append(self._columns[name])
-        return self._columns[name]
+    def _places_of(self, names: tuple[Name, ...]) -> Places:
+        """Places of errors' columns, the next ones where they are met for the first time; kept once for all."""
+        if names not in self._known:
+            for name in names:
+                if name not in self._columns:
+                    self._columns[name] = len(self._columns)
+                    self._places.setdefault(KINDS[str(name[0])], []).append(self._columns[name])
+            self._known[names] = np.array([self._columns[name] for name in names], np.intp)
+        return self._known[names]
 
     @staticmethod
     def _chain(tube: int, above: Sequence[int] | None) -> list[Name]:

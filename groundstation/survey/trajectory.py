@@ -35,15 +35,18 @@ class Point:
     shared: Array  # (3, s) m, change for one standard deviation of every shared error
 
 
-def tangent_of(direction: Direction) -> Array:
-    """Downhole unit vector (3,)."""
-    return np.array([direction.lean[0], direction.lean[1], direction.down])
+def tangents_of(directions: Sequence[Direction]) -> Array:
+    """Downhole unit vectors (n, 3)."""
+    return np.array([(*direction.lean.tolist(), direction.down) for direction in directions])
 
 
-def tangent_jacobian(direction: Direction) -> Array:
-    """D tangent / d lean (3, 2); the vertical part follows from the unit length."""
-    down = math.copysign(max(abs(direction.down), 1e-6), direction.down)
-    return np.array([[1.0, 0.0], [0.0, 1.0], [-direction.lean[0] / down, -direction.lean[1] / down]])
+def tangent_jacobians(tangents: Array) -> Array:
+    """D tangent / d lean (n, 3, 2); the vertical part follows from the unit length."""
+    down = np.copysign(np.maximum(np.abs(tangents[:, 2]), 1e-6), tangents[:, 2])
+    jacobians = np.zeros((len(tangents), 3, 2))
+    jacobians[:, 0, 0] = jacobians[:, 1, 1] = 1.0
+    jacobians[:, 2] = -tangents[:, :2] / down[:, None]
+    return jacobians
 
 
 class Trajectory:
@@ -61,12 +64,13 @@ class Trajectory:
     ) -> None:
         self._method = method
         first = collar or Direction(np.zeros(2), 1.0, np.zeros((2, 2)), np.zeros((2, 0)))
-        jacobian = tangent_jacobian(first)
+        tangents = tangents_of([first])
+        jacobian = tangent_jacobians(tangents)[0]
         self._last_cov, self._last_shared = jacobian @ first.cov @ jacobian.T, jacobian @ first.shared  # of the tangent
         self._length = 0.0
         self._interior = np.zeros((3, 3))
         self._interior_shared = np.zeros((3, 0))
-        self.points = [Point(start_md, tangent_of(first), np.zeros(3), np.zeros((3, 3)), np.zeros((3, 0)))]
+        self.points = [Point(start_md, tangents[0], np.zeros(3), np.zeros((3, 3)), np.zeros((3, 0)))]
 
     def append(self, md: float, direction: Direction) -> Point:
         """Add the station at ``md`` (m).
@@ -95,34 +99,29 @@ class Trajectory:
         for n, length in enumerate(lengths.tolist()):
             if not 0.0 < length < math.inf:
                 raise SurveyError(f"trajectory: expected a depth beyond {[before.md, *mds][n]:g} m, got {mds[n]:g} m")
-        tangents = np.array([before.tangent, *map(tangent_of, directions)])
+        tangents = np.concatenate([before.tangent[None], tangents_of(directions)])
         legs = self._legs(lengths, [before.md, *mds], tangents, directions)
-        positions = np.add.accumulate([before.position, *legs])[1:]
-        jacobians = np.array([tangent_jacobian(direction) for direction in directions])
+        positions = np.add.accumulate([before.position, *legs])
+        jacobians = tangent_jacobians(tangents[1:])
         covs = jacobians @ np.array([direction.cov for direction in directions]) @ jacobians.transpose(0, 2, 1)
-        known_width = max(self._interior_shared.shape[1], self._last_shared.shape[1])
-        widths = np.maximum.accumulate([known_width, *(d.shared.shape[1] for d in directions)])
-        # each with its own columns: a product with more of them would have other last bits
-        moved = [jacobian @ direction.shared for jacobian, direction in zip(jacobians, directions, strict=True)]
-        shared = np.array([widened(columns, int(widths[-1])) for columns in moved])
-        weights = 0.5 * (np.array([self._length, *lengths[:-1]]) + lengths)
-        # a station counts among the inner ones as soon as another follows it: the last known one first
-        inner_covs = np.concatenate([self._last_cov[None], covs])
-        inner_shared = np.concatenate([widened(self._last_shared, int(widths[-1]))[None], shared])
-        steps = (weights**2)[:, None, None] * inner_covs[:-1]
-        interior = np.add.accumulate([self._interior, *steps])[1:]
-        steps = weights[:, None, None] * inner_shared[:-1]
-        interior_shared = np.add.accumulate([widened(self._interior_shared, int(widths[-1])), *steps])[1:]
-        ends = 0.5 * lengths
-        known = interior_shared + ends[:, None, None] * shared
-        alone = interior + (ends**2)[:, None, None] * covs
-        for n, (md, _) in enumerate(stations):
-            columns = known[n, :, : widths[n + 1]].copy()  # together in memory, so that the product has the same bits
-            cov = alone[n] + columns @ columns.T
-            self.points.append(Point(md, tangents[n + 1], positions[n], cov, columns))
-        self._length = float(lengths[-1])
-        self._interior, self._interior_shared = interior[-1], interior_shared[-1]
-        self._last_cov, self._last_shared = covs[-1], shared[-1]
+        for n, (md, direction) in enumerate(stations, 1):
+            cov, shared = self._follow(float(lengths[n - 1]), covs[n - 1], jacobians[n - 1] @ direction.shared)
+            self.points.append(Point(md, tangents[n], positions[n], cov, shared))
+
+    def _follow(self, length: float, cov: Array, shared: Array) -> tuple[Array, Array]:
+        """Covariance (3, 3) and shared columns (3, s) of the position at the end of a leg (m), from its tangent's.
+
+        The station before it counts among the inner ones from now on.
+        """
+        weight, end = 0.5 * (self._length + length), 0.5 * length
+        self._interior = self._interior + weight**2 * self._last_cov
+        if shared.shape[1] > self._interior_shared.shape[1]:
+            self._interior_shared = widened(self._interior_shared, shared.shape[1])
+        self._interior_shared[:, : self._last_shared.shape[1]] += weight * self._last_shared
+        self._length, self._last_cov, self._last_shared = length, cov.copy(), shared
+        columns = self._interior_shared.copy()
+        columns[:, : shared.shape[1]] += end * shared
+        return self._interior + end**2 * cov + columns @ columns.T, columns
 
     def _legs(self, lengths: Array, mds: Sequence[float], tangents: Array, directions: Sequence[Direction]) -> Array:
         """Displacements (n, 3) from station to station."""

@@ -1,6 +1,7 @@
 """Direction of a stop from its specific force and yaw, against known answers and against sampling."""
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -101,7 +102,7 @@ def test_covariance_of_the_lean_is_what_sampling_gives() -> None:
     inclination, azimuth, yaw = 3.0 * DEG, 70.0 * DEG, 200.0 * DEG
     force, force_std, yaw_std, joint_std = force_at_rest(inclination, azimuth, yaw), 3e-3, 0.3 * DEG, 0.2 * DEG
     resolved = resolve(force, np.eye(3) * force_std**2, yaw, yaw_std**2)
-    claimed = resolved.sharing(joint_std * resolved.by_yaw[:, None])
+    claimed = replace(resolved.direction, shared=joint_std * resolved.by_yaw[:, None])
     samples = np.array(
         [
             direction_of(
@@ -121,7 +122,7 @@ def test_a_direction_keeps_its_random_part_apart_from_what_it_shares() -> None:
     resolved = resolve(force_at_rest(0.1, 1.0, 2.0), np.eye(3) * 1e-6, 2.0, 1e-6)
     assert resolved.direction.shared.shape == (2, 0)
     shared = np.array([[1e-3, 0.0], [0.0, 2e-3]])
-    lean = resolved.sharing(shared)
+    lean = replace(resolved.direction, shared=shared)
     np.testing.assert_array_equal(lean.cov, resolved.direction.cov)
     np.testing.assert_allclose(lean.total_cov - lean.cov, np.diag([1e-6, 4e-6]), atol=1e-18)
 
