@@ -79,7 +79,7 @@ WEIGHTINGS = ("bayes", "equal", "linear", "quadratic", "cubic", "adaptive")
 @key_option
 @keys_option
 @place_options
-@needs("scipy", "sqlalchemy")
+@needs("orjson", "scipy", "sqlalchemy")
 @plain_faults
 def ground(
     tube_length_m: float,

@@ -6,12 +6,12 @@ The bus's own threads only put queries into a bounded inbox; everything else hap
 from __future__ import annotations
 
 import asyncio
-import json
 from collections.abc import Callable
 from functools import partial
 from typing import Any
 
 import msgpack
+import orjson
 
 from groundstation.errors import GroundError, SelectorError
 from groundstation.service.intake import BEGIN, Intake, pack_intake
@@ -233,4 +233,4 @@ def refuse(query: Query, reason: str) -> None:
 
 def pack(view: dict[str, Any], accept: str) -> bytes:
     """A view on the wire."""
-    return bytes(msgpack.packb(view)) if accept == "msgpack" else json.dumps(view).encode()
+    return bytes(msgpack.packb(view)) if accept == "msgpack" else orjson.dumps(view)

@@ -6,15 +6,17 @@ import math
 from typing import Any
 
 import numpy as np
+import numpy.typing as npt
 
 from groundstation.errors import SelectorError, SurveyError
 from groundstation.service.history import Moment
 from groundstation.service.model import RigModel
 from groundstation.service.thinning import FEWEST, largest_triangles
 from groundstation.survey.columns import Deviation, dominant
-from groundstation.survey.ellipsoid import axes, coverage_radius, plan_ellipse
+from groundstation.survey.ellipsoid import Ellipse, axes, coverage_radius, plan_ellipses
 from groundstation.survey.trajectory import Point
 
+Array = npt.NDArray[np.float64]
 View = dict[str, Any]
 CONFIDENCE = 0.95
 POINTS, MOST_POINTS = 200, 1000  # of the history
@@ -27,12 +29,23 @@ def uncertainty(k: RigModel, p: dict[str, str]) -> View:
     """Ellipse in plan and ellipsoid of every station at a confidence, and what they are made of."""
     confidence = _confidence(p.get("confidence"))
     plane, space = coverage_radius(confidence, 2), coverage_radius(confidence, 3)
+    points = k.hole.trajectory
+    kinds, members = k.shared.kinds()
+    covs = np.array([point.cov for point in points])
+    random, shared = parted(points, members)
+    rows = zip(points, plan_ellipses(covs, plane), *axes(covs, space), random, shared, strict=True)
     return {
         "confidence": confidence,
         "sigma_plane": plane,
         "sigma_space": space,
-        "stations": [_region(k, point, plane, space) for point in k.hole.trajectory],
+        "stations": [_region(kinds, *row) for row in rows],
     }
+
+
+def parted(points: list[Point], members: Array) -> tuple[Array, Array]:
+    """Variances (n, 3) that are random, and (n, kinds, 3) of each kind of shared error; ``members`` (s, kinds)."""
+    shared = np.array([members[: point.shared.shape[1]].T @ (point.shared**2).T for point in points])
+    return np.array([point.cov.diagonal() for point in points]) - shared.sum(axis=1), shared
 
 
 def _confidence(text: str | None) -> float:
@@ -44,11 +57,10 @@ def _confidence(text: str | None) -> float:
     return confidence
 
 
-def _region(k: RigModel, point: Point, plane: float, space: float) -> View:
-    ellipse = plan_ellipse(point.cov, plane)
-    sizes, directions = axes(point.cov, space)
-    kinds = k.shared.by_kind(point.shared)
-    random = point.cov - sum(kinds.values(), start=np.zeros((3, 3)))
+def _region(
+    kinds: list[str], point: Point, ellipse: Ellipse, sizes: Array, directions: Array, random: Array, shared: Array
+) -> View:
+    sources = zip(kinds, shared, strict=True)
     return {
         "md_m": round(point.md, 6),
         "covariance_m2": point.cov.tolist(),
@@ -58,14 +70,14 @@ def _region(k: RigModel, point: Point, plane: float, space: float) -> View:
             "azimuth_deg": math.degrees(ellipse.azimuth),
         },
         "ellipsoid": [
-            {"semi_axis_m": float(s), "direction": d.tolist()} for s, d in zip(sizes, directions, strict=True)
+            {"semi_axis_m": s, "direction": d} for s, d in zip(sizes.tolist(), directions.tolist(), strict=True)
         ],
-        "sources": {name: _stds(cov) for name, cov in (("random", random), *sorted(kinds.items()))},
+        "sources": {name: _stds(variances) for name, variances in (("random", random), *sources)},
     }
 
 
-def _stds(cov: Any) -> View:
-    north, east, tvd = (math.sqrt(max(float(v), 0.0)) for v in np.diag(cov))
+def _stds(variances: Array) -> View:
+    north, east, tvd = (math.sqrt(max(variance, 0.0)) for variance in variances.tolist())
     return {"sigma_north_m": north, "sigma_east_m": east, "sigma_tvd_m": tvd}
 
 

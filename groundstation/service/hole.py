@@ -9,7 +9,9 @@ from __future__ import annotations
 import itertools
 import math
 from bisect import bisect_left, insort
+from collections.abc import Callable
 from dataclasses import dataclass, field
+from typing import Any
 
 from groundstation.config import GroundConfig
 from groundstation.service.alarms import AlarmList
@@ -69,6 +71,7 @@ class SurveyStation:
     drops: list[int] = field(default_factory=list)
     _departures: dict[int, Departure] = field(default_factory=dict)
     _fused: tuple[tuple[int, ...], Direction] | None = None  # with what it was made of
+    _shown: tuple[tuple[int, ...], dict[str, Any]] | None = None
     _counted: GrowingBayes = field(default_factory=GrowingBayes)
     _with_untrusted: GrowingBayes | None = None
 
@@ -114,9 +117,21 @@ class SurveyStation:
         """Directions of the clusters that count."""
         return [cluster.direction for cluster in self.counting]
 
+    @property
+    def _made_of(self) -> tuple[int, ...]:
+        """What changes with every cluster that comes or does not count any more."""
+        return self.count, *self.drops
+
+    def shown(self, show: Callable[[SurveyStation], dict[str, Any]]) -> dict[str, Any]:
+        """What one view shows of the clusters that count; made anew where another has come."""
+        made_of = self._made_of
+        if self._shown is None or self._shown[0] != made_of:
+            self._shown = made_of, show(self)
+        return self._shown[1]
+
     def fused(self, weighting: Weighting) -> Direction:
-        """Direction from the clusters that count; worked out anew where one has come or does not count any more."""
-        made_of = (self.count, *self.drops)
+        """Direction from the clusters that count; worked out anew where another has come."""
+        made_of = self._made_of
         if self._fused is None or self._fused[0] != made_of:
             readings = self.readings()
             is_sum = weighting is Weighting.BAYES
@@ -170,6 +185,7 @@ class Hole:
         self._trajectory = Trajectory()
         self._drawn: list[tuple[float, Direction]] = []  # stations of the trajectory, m and direction
         self._deviations = deviations(self._trajectory.points, self._design)
+        self._point_at: dict[float, Point] = {}  # of every station below the collar, by its depth
         self._projection: Deviation | None = None
         self._unsettled_since = math.inf  # s, rig time of the oldest survey from which nothing follows yet
         self._newest_at = -math.inf  # s, rig time of the newest survey
@@ -222,6 +238,11 @@ class Hole:
         self.settle()
         return self._trajectory.points
 
+    def point_of(self, station: SurveyStation) -> Point:
+        """Point of the trajectory at a station; the collar for one at its depth."""
+        self.settle()
+        return self._point_at.get(station.md, self._trajectory.points[0])
+
     @property
     def deviations(self) -> list[Deviation]:
         """Deviation from the design axis at every point of the trajectory."""
@@ -258,6 +279,7 @@ class Hole:
         added = stations[len(self._drawn) :]
         self._trajectory.extend(added)
         self._drawn += added
+        self._point_at = {point.md: point for point in self._trajectory.points[1:]}
         self._deviations += deviations(self._trajectory.points[len(self._deviations) :], self._design)
 
     def _station_at(self, md: float) -> SurveyStation:

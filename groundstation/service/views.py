@@ -5,6 +5,7 @@ from __future__ import annotations
 import datetime
 import math
 from dataclasses import dataclass
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -13,6 +14,7 @@ from groundstation.errors import SelectorError, SurveyError
 from groundstation.service.hole import ResolvedStop, SurveyStation
 from groundstation.service.model import RigModel
 from groundstation.service.streams import STREAMED, window
+from groundstation.survey.fusion import Weighting
 from groundstation.survey.resolve import angle_stds, angles
 from groundstation.survey.trajectory import Point, interpolate
 from telemetry.messages import Event, NodeFlag, NodeState, StaticRecord, SurveyMeasurement
@@ -130,12 +132,16 @@ def stations(k: RigModel, p: Parameters) -> View:
 def station(k: RigModel, n: int) -> View:
     """One station, fused; ``n`` from 1."""
     s = k.stations[n - 1]
-    fused = k.fused(s)
+    row = {"station": n, "md_m": round(s.md, 6)} | s.shown(partial(direction_view, k.config.weighting))
+    return row | position(k.hole.point_of(s))
+
+
+def direction_view(weighting: Weighting, s: SurveyStation) -> View:
+    """Direction of a station and what it is made of."""
+    fused = s.fused(weighting)
     inclination, azimuth = angles(fused.lean, fused.down)
     sigma_inclination, sigma_azimuth = angle_stds(fused.lean, fused.down, fused.total_cov)
-    row: View = {
-        "station": n,
-        "md_m": round(s.md, 6),
+    return {
         "inclination_deg": math.degrees(inclination),
         "azimuth_deg": math.degrees(azimuth),
         "sigma_inclination_deg": math.degrees(sigma_inclination),
@@ -143,9 +149,7 @@ def station(k: RigModel, n: int) -> View:
         "measurements": s.count,
         "dropped_measurements": s.first,
         "untrusted_measurements": s.untrusted,
-    }
-    row |= typical_reading(s.counting)
-    return row | position(point_of(k, s))
+    } | typical_reading(s.counting)
 
 
 def typical_reading(readings: list[ResolvedStop]) -> View:
@@ -161,7 +165,7 @@ def typical_reading(readings: list[ResolvedStop]) -> View:
 
 def force_var(reading: SurveyMeasurement) -> float:
     """Variance (m/s^2)^2 of the mean force of a cluster on one axis: its IMUs weigh by their own."""
-    variances = [float(np.trace(np.array(imu.force_cov)) / 3.0) for imu in reading.imus]
+    variances = [sum(imu.force_cov[axis][axis] for axis in range(3)) / 3.0 for imu in reading.imus]
     first = variances[0]
     return first / sum(first / variance for variance in variances) if min(variances) > 0.0 else 0.0
 
@@ -300,21 +304,16 @@ def point_view(point: Point) -> View:
 
 def position(point: Point) -> View:
     """Position and its standard deviations."""
-    north, east, tvd = (float(x) for x in point.position)
-    sigma = np.sqrt(np.maximum(np.diag(point.cov), 0.0))
+    north, east, tvd = point.position.tolist()
+    sigma = [math.sqrt(max(var, 0.0)) for var in point.cov.diagonal().tolist()]
     return {
         "north_m": north,
         "east_m": east,
         "tvd_m": tvd,
-        "sigma_north_m": float(sigma[0]),
-        "sigma_east_m": float(sigma[1]),
-        "sigma_tvd_m": float(sigma[2]),
+        "sigma_north_m": sigma[0],
+        "sigma_east_m": sigma[1],
+        "sigma_tvd_m": sigma[2],
     }
-
-
-def point_of(k: RigModel, s: SurveyStation) -> Point:
-    """The trajectory's point at a station; the collar for one at its depth."""
-    return next((point for point in k.hole.trajectory if point.md == s.md), k.hole.trajectory[0])
 
 
 def flag_names(flags: NodeFlag) -> list[str]:

@@ -65,16 +65,21 @@ def probability_of(sigma: float, dimensions: int) -> float:
 
 def plan_ellipse(cov: Array, sigma: float = 1.0) -> Ellipse:
     """Ellipse in plan of a covariance (3, 3) or (2, 2), ``sigma`` standard deviations large."""
-    values, vectors = np.linalg.eigh(cov[:2, :2])
-    axis = vectors[:, 1]
-    azimuth = math.atan2(axis[1], axis[0]) % math.pi
-    return Ellipse(sigma * math.sqrt(max(values[1], 0.0)), sigma * math.sqrt(max(values[0], 0.0)), azimuth)
+    return plan_ellipses(cov[None], sigma)[0]
+
+
+def plan_ellipses(covs: Array, sigma: float = 1.0) -> list[Ellipse]:
+    """The same of many covariances (n, 3, 3) or (n, 2, 2)."""
+    values, vectors = np.linalg.eigh(covs[:, :2, :2])
+    semi = sigma * np.sqrt(np.maximum(values, 0.0))
+    azimuths = np.arctan2(vectors[:, 1, 1], vectors[:, 0, 1]) % math.pi
+    return [Ellipse(*row) for row in np.column_stack([semi[:, ::-1], azimuths]).tolist()]
 
 
 def axes(cov: Array, sigma: float = 1.0) -> tuple[Array, Array]:
-    """Semi-axes (3,) of an ellipsoid, largest first, and their directions (3, 3), one a row."""
+    """Semi-axes (..., 3) of ellipsoids, largest first, and their directions (..., 3, 3), one a row."""
     values, vectors = np.linalg.eigh(cov)
-    return sigma * np.sqrt(np.maximum(values[::-1], 0.0)), vectors[:, ::-1].T.copy()
+    return sigma * np.sqrt(np.maximum(values[..., ::-1], 0.0)), np.swapaxes(vectors[..., ::-1], -1, -2).copy()
 
 
 def hole_axes(inclination: float, azimuth: float) -> Array:

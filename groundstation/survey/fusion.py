@@ -75,10 +75,9 @@ class GrowingBayes:
         self._fusion = StationFusion()
         self._taken: list[Direction] = []
 
-    def of(self, readings: Sequence[Direction]) -> Direction:
+    def of(self, readings: list[Direction]) -> Direction:
         """The same as ``bayes``, bit for bit; worked out from the beginning where an earlier reading is another one."""
-        known = zip(self._taken, readings, strict=False)
-        if len(readings) < len(self._taken) or any(old is not new for old, new in known):
+        if readings[: len(self._taken)] != self._taken:
             self._fusion, self._taken = StationFusion(), []
         for reading in readings[len(self._taken) :]:
             self._fusion.add_reading(reading)

@@ -35,7 +35,7 @@ class Quality(IntFlag):
     SPREAD = 8  # the IMUs of the cluster disagree
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, eq=False)
 class Direction:
     """Direction of a tube in the north-east plane.
 

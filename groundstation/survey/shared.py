@@ -9,7 +9,6 @@ themselves.
 from __future__ import annotations
 
 import math
-from bisect import bisect_left
 from collections.abc import Sequence
 from itertools import pairwise
 
@@ -108,11 +107,13 @@ class SharedErrors:
         causes[:, 2:] = force_bias_std * resolved.by_force
         return Reading(resolved.direction, causes, places, len(self._columns))
 
-    def by_kind(self, columns: Array) -> dict[str, Array]:
-        """Covariance (k, k) of something linear in the readings, by kind of shared error; ``columns`` (k, s)."""
-        width = columns.shape[1]
-        parts = {kind: columns[:, at[: bisect_left(at, width)]] for kind, at in self._places.items() if at[0] < width}
-        return {kind: part @ part.T for kind, part in parts.items()}
+    def kinds(self) -> tuple[list[str], Array]:
+        """Names of the kinds of error met so far, and which column is of which: ones in (s, kinds)."""
+        names = sorted(self._places)
+        members = np.zeros((len(self._columns), len(names)))
+        for number, name in enumerate(names):
+            members[self._places[name], number] = 1.0
+        return names, members
 
     def _places_of(self, names: tuple[Name, ...]) -> Places:
         """Places of errors' columns, the next ones where they are met for the first time; kept once for all."""

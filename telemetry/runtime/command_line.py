@@ -25,6 +25,7 @@ EXTRA_OF = {
     "distributed": "campaign",
     "matplotlib": "ground",
     "mcap": "ground",
+    "orjson": "ground",
     "pyarrow": "campaign",
     "rich": "ground",
     "scipy": "ground",

@@ -31,7 +31,7 @@ page_option = click.option(
 @page_option
 @endpoint_option("Where its router listens.")
 @json_option
-@needs("rich", "scipy", "sqlalchemy", "starlette", "uvicorn")
+@needs("orjson", "rich", "scipy", "sqlalchemy", "starlette", "uvicorn")
 @plain_faults
 def page(tubes: int, browsers: int, terminals: int, seconds: float, address: str, endpoint: str, as_json: bool) -> None:
     """Have a ground station with its page bear a shift: tubes at 1.9 Hz that drill and survey, readers, questions.
@@ -77,7 +77,7 @@ def free_page(address: str, endpoint: str) -> PageSettings:
 @page_option
 @endpoint_option("Where its router listens.")
 @json_option
-@needs("rich", "scipy", "sqlalchemy", "starlette", "uvicorn")
+@needs("orjson", "rich", "scipy", "sqlalchemy", "starlette", "uvicorn")
 @plain_faults
 def day(hours: float, tubes: int, address: str, endpoint: str, as_json: bool) -> None:
     """Start a ground station upon the surveys of hours of drilling, and open its history on the page.
@@ -121,7 +121,7 @@ def line(what: str, figures: dict[str, Any]) -> str:
 @endpoint_option("Where its router listens.")
 @json_option
 @seed_option
-@needs("rich", "scipy", "sqlalchemy")
+@needs("orjson", "rich", "scipy", "sqlalchemy")
 @plain_faults
 def killed(times: int, database: str | None, endpoint: str, as_json: bool, seed: int) -> None:
     """Kill a ground station at moments by lot while it takes events, and look whether what it receipted is kept.

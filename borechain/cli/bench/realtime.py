@@ -55,7 +55,7 @@ COLUMNS: Columns = (
 @click.option("--out", type=click.Path(path_type=Path, file_okay=False), help="Folder for realtime.csv.")
 @json_option
 @seed_option
-@needs("scipy", "sqlalchemy")
+@needs("orjson", "scipy", "sqlalchemy")
 @plain_faults
 def realtime(nodes: int, seconds: float, endpoint: str, out: Path | None, as_json: bool, seed: int) -> None:
     """Run a string of real node processes on their own clocks and measure it: overruns, jitter, memory, yaw.

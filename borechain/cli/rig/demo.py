@@ -38,7 +38,7 @@ SCENARIO = Path("demo")
     help="Where the rig's router listens.",
 )
 @click.option("--rounds", type=click.IntRange(1), help="Holes to drill before it ends  [default: until Ctrl-C]")
-@needs("rich", "scipy", "sqlalchemy", "starlette", "uvicorn")
+@needs("orjson", "rich", "scipy", "sqlalchemy", "starlette", "uvicorn")
 @plain_faults
 def demo(page: str, speed: float, endpoint: str, rounds: int | None) -> None:
     """Drill a hole with fifteen real processes and show it on a page, again and again until Ctrl-C.

@@ -75,7 +75,7 @@ PRELOAD = {"float64": "borechain.warm", "fixed": "borechain.warm_all", "publishe
 )
 @page_options
 @json_option
-@needs("rich", "scipy", "sqlalchemy")
+@needs("orjson", "rich", "scipy", "sqlalchemy")
 @plain_faults
 def rig(
     scenario: Path,

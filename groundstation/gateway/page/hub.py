@@ -7,11 +7,12 @@ by the number of paths, however slowly it reads.
 from __future__ import annotations
 
 import asyncio
-import json
 import math
 import time
 from collections.abc import Iterable
 from typing import Any
+
+import orjson
 
 from groundstation.errors import SelectorError
 from groundstation.service.process import HEARTBEAT, GroundProcess
@@ -121,4 +122,4 @@ class Hub:
 
 def event(kind: str, content: dict[str, Any]) -> bytes:
     """One server-sent event."""
-    return f"event: {kind}\ndata: {json.dumps(content, separators=(',', ':'))}\n\n".encode()
+    return b"event: %s\ndata: %s\n\n" % (kind.encode(), orjson.dumps(content))

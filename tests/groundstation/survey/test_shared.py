@@ -41,6 +41,12 @@ def yaw_only(errors: SharedErrors, tube: int, above: list[int] | None, joints: f
     return errors.reading(stop(), tube, above, (joints + mount) / size**2, mount / size**2, 0.0)
 
 
+def by_kind(errors: SharedErrors, shared: np.ndarray) -> dict[str, np.ndarray]:
+    """Covariance of what has these columns, by the kind of error."""
+    names, members = errors.kinds()
+    return {name: (shared * of[: shared.shape[1]]) @ shared.T for name, of in zip(names, members.T, strict=True)}
+
+
 def test_joints_are_shared_by_the_tubes_below_them() -> None:
     errors = SharedErrors()
     bottom = yaw_only(errors, 3, [2, 1], joints=3.0, mount=1.0)
@@ -147,7 +153,7 @@ def test_the_kinds_add_up_to_the_whole(readings: list[tuple[int, list[int] | Non
     leans = [errors.reading(stop(), *reading) for reading in readings]
     fused = bayes(leans)
     for shared in (leans[0].shared, leans[-1].shared, fused.shared):
-        kinds = errors.by_kind(shared)
+        kinds = by_kind(errors, shared)
         assert set(kinds) <= {"mounts", "joints", "accelerometer_bias"}
         whole = shared @ shared.T
         np.testing.assert_allclose(sum(kinds.values()), whole, atol=1e-12 * float(np.trace(whole)))
@@ -156,7 +162,7 @@ def test_the_kinds_add_up_to_the_whole(readings: list[tuple[int, list[int] | Non
 def test_each_kind_holds_what_is_of_its_kind() -> None:
     errors, resolved = SharedErrors(), stop()
     yaw = np.outer(resolved.by_yaw, resolved.by_yaw)
-    kinds = errors.by_kind(errors.reading(resolved, 1, [2, 3], 5e-4, 2e-4, 1e-3).shared)
+    kinds = by_kind(errors, errors.reading(resolved, 1, [2, 3], 5e-4, 2e-4, 1e-3).shared)
     np.testing.assert_allclose(kinds["mounts"], 2e-4 * yaw, rtol=1e-9)
     np.testing.assert_allclose(kinds["joints"], 3e-4 * yaw, rtol=1e-9)
     np.testing.assert_allclose(kinds["accelerometer_bias"], 1e-6 * resolved.by_force @ resolved.by_force.T, rtol=1e-9)
