@@ -36,8 +36,14 @@ class Stop:
         return sum(stand.ended_at - stand.begun_at for stand in (self.stand, *self.later))
 
     def has(self, epoch: int, at: float) -> bool:
-        """Whether a survey was taken during the stop."""
-        return any(belongs(stand, epoch, at) for stand in (self.stand, *self.later))
+        """Whether a survey was taken during the stop.
+
+        Where it went on in a later epoch, the earlier one had no other end: what is of it and later is of the stop,
+        also where nobody heard a depth till then.
+        """
+        *ended, last = self.stand, *self.later
+        went_on = any(stand.epoch == epoch and stand.begun_at - AROUND <= at for stand in ended)
+        return went_on or belongs(last, epoch, at)
 
     def covers(self, stand: Stand) -> bool:
         """Whether a stand is a part of the stop."""

@@ -62,11 +62,13 @@ class Witnesses:
         tubes = {e.tube for e in together}
         if tubes >= set(heard) and any(self._start_before(e)[0] == "restored" for e in together):
             return True  # every yaw that was saved or known says another thing
+        # one that has just started contradicts what it saved: the string may have turned while it was off
+        settled = [e for e in together if self._was_settled(e)]
         others = [tube for tube in heard if tube not in tubes and self._has_watched(tube, event)]
-        enough = min(ENOUGH, len(tubes) + len(others))
-        if any(e.code != "yaw_reset" for e in together):
+        enough = min(ENOUGH, len(settled) + len(others))
+        if any(e.code != "yaw_reset" for e in settled):
             enough = ENOUGH  # alone, a gyroscope is wrong sooner
-        return len(together) >= enough and any(self._was_settled(e) for e in together)
+        return len(settled) >= max(enough, 1)
 
     def _together(self, event: Event) -> tuple[Event, ...]:
         every = self._contradicted.values()

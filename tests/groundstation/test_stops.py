@@ -35,6 +35,25 @@ def test_a_stop_goes_on_over_a_start_of_the_encoder(tally: Tally) -> None:
     assert missing(stops) == set()
 
 
+def test_a_survey_of_an_epoch_that_ended_at_the_stop_belongs_to_it_whenever_a_depth_was_heard_last(
+    tally: Tally,
+) -> None:
+    """A ground station without power hears no depth; its tubes survey by the time of the encoder's last start."""
+    stops = Stops(tally, DUE)
+    stops.on_stand(FIRST)
+    for tube in (1, 2):
+        stops.on_survey(2, 1200.0, tube)
+    stops.on_survey(3, 100.0, 1)
+    stops.on_later_stand(FIRST, LATER)
+    stops.judge(3, 41.0)
+    assert missing(stops) == set()
+    alone = Stops(tally, DUE)
+    alone.on_stand(Stand(2, 1000.0, 1040.0, 4.0))
+    alone.on_survey(2, 1200.0, 1)
+    alone.judge(2, 1300.0)
+    assert missing(alone) == {1, 2}
+
+
 def test_a_stop_whose_last_stand_is_a_part_of_it_goes_on_too(tally: Tally) -> None:
     """Where readings were refused for a while, a stop is made of stands that touch."""
     stops = Stops(tally, DUE)

@@ -46,6 +46,14 @@ def test_a_tube_that_has_not_watched_is_no_witness_for_the_encoder_in_whatever_o
         assert told([*BOTH_STARTED, *events, event(2, 140.0, "stopped", 12)]) == ["tubes 1 at 100 s"]
 
 
+def test_what_a_tube_says_that_has_just_started_helps_nobody_against_one_that_watched() -> None:
+    """The string may have turned while it was off; of three the one that says nothing has seen no slip."""
+    events = [*BOTH_STARTED, event(3, 0.0, "restored", 1)]
+    events += [event(2, 89.0, "restored", 9), event(2, 91.0, "yaw_reset"), event(1, 110.0, "yaw_reset")]
+    assert told(events, (1, 2, 3)) == []
+    assert told([*events, event(3, 111.0, "yaw_reset")], (1, 2, 3)) == ["tubes 1, 2, 3 at 91 s"]
+
+
 def test_a_tube_that_has_settled_since_its_start_is_a_witness() -> None:
     assert told([*BOTH_STARTED, event(2, 89.0, "restored", 9), event(1, 100.0, "yaw_reset")]) == []
 
