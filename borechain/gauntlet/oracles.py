@@ -137,7 +137,7 @@ def violations(rig: GauntletRig, seen: Collection[str] = (), *, encoder_can_be_j
         *(() if standing & DEPTH else _depths(rows, rig.world)),
         *(() if _is_told(rig.world, warned) or not encoder_can_be_judged else _directions(rig)),
         *_flags(rig.inline.ground.model),
-        *_missing(rows, rig.world, standing | (told & {"depth_refused"})),
+        *_missing(rows, rig, standing | (told & {"depth_refused"})),
         *_health(rig.inline.ask("status")["health"], standing),
         *queues(rig),
     ]
@@ -203,10 +203,10 @@ def _flags(model: RigModel) -> Iterator[str]:
             yield f"station at {station.md:.2f} m: an untrusted survey counts beside a trusted one"
 
 
-def _missing(rows: list[dict[str, Any]], world: FaultyWorld, standing: set[str]) -> Iterator[str]:
+def _missing(rows: list[dict[str, Any]], rig: GauntletRig, standing: set[str]) -> Iterator[str]:
     lacking = [
         f"tube {tube} at {md:.2f} m"
-        for tube, md in _expected(world)
+        for tube, md in _expected(rig)
         if not any(row["tube"] == tube and abs(row["md_m"] - md) <= DEPTH_TOLERANCE for row in rows)
     ]
     if lacking and not standing & TOLD:
@@ -220,10 +220,16 @@ def _rests(world: FaultyWorld) -> list[tuple[int, float]]:
     return _nodes(depths)
 
 
-def _expected(world: FaultyWorld) -> list[tuple[int, float]]:
-    """Tube and depth (m) of every survey that the stops of the schedule owe."""
-    stops = [(phase.tube, world.true_depth(phase.end)) for phase in world.phases if phase.kind == "stop"]
-    return _nodes(stops)
+def _expected(rig: GauntletRig) -> list[tuple[int, float]]:
+    """Tube and depth (m) of every survey that the stops of the schedule owe, but of one that is not due yet.
+
+    A ground station that was off while the encoder started again does not know how long the bit has stood: it counts
+    what it has heard, and tells the crew later.
+    """
+    stops = [(phase.tube, rig.world.true_depth(phase.end)) for phase in rig.world.phases if phase.kind == "stop"]
+    model = rig.inline.ground.model
+    waits = [one.stand.md for one in model.stops if not one.judged and one.later]
+    return _nodes([stop for stop in stops if not any(abs(stop[1] - md) <= DEPTH_TOLERANCE for md in waits)])
 
 
 def _nodes(rests: list[tuple[int, float]]) -> list[tuple[int, float]]:
