@@ -8,6 +8,7 @@ and weighted back, as in ``wall_system``; a depth at which a column is missing i
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -73,9 +74,7 @@ def void_chance(columns: Columns, triples: npt.NDArray[np.intp], samples: int = 
         count = min(BATCH, samples - begin)
         x = rng.standard_normal((count, errors.size)) + shifts[rng.choice(len(share), count, p=share)]
         weight = 1.0 / (np.exp(x @ shifts.T - 0.5 * np.sum(shifts**2, axis=1)) @ share)
-        used = sorted({k for three, near in kept for k in (*three, *near)})
-        centres = {k: errors.centres(x, k) for k in used}
-        radii = {k: errors.radii(x, k) for k in used}
+        centres, radii = errors.drawn(x)
         any_open = np.zeros((count, depths_count), bool)
         for n, (three, near) in enumerate(kept):
             opened = void_open(centres, radii, three, near)
@@ -103,9 +102,7 @@ def _answer(columns: Columns, probability: Array, error: Array, each: Array, kep
 
 def _as_surveyed(columns: Columns, three: list[int], near: list[int]) -> npt.NDArray[np.bool_]:
     """Whether there is a void between three columns as surveyed: (depths,)."""
-    used = (*three, *near)
-    centres, radii = {k: columns.centres[k][None] for k in used}, {k: columns.radii[k][None] for k in used}
-    return np.asarray(void_open(centres, radii, three, near)[0])
+    return np.asarray(void_open(columns.centres[:, None], columns.radii[:, None], three, near)[0])
 
 
 def void_point(
@@ -186,32 +183,13 @@ def near_triple(columns: Columns, triple: npt.NDArray[np.intp]) -> list[int]:
     return [k for k in np.flatnonzero(apart < reach).tolist() if k not in triple.tolist()]
 
 
-def void_open(
-    centres: dict[int, Array], radii: dict[int, Array], triple: list[int], near: list[int]
-) -> npt.NDArray[np.bool_]:
-    """Whether the point between three columns lies outside all discs and among the three: (n, depths)."""
-    three = np.stack([centres[k] for k in triple], axis=-2)
-    round_ = np.stack([radii[k] for k in triple], axis=-1)
-    shape = three.shape[:2]
-    middle = power_centre(three.reshape(-1, 3, 2), round_.reshape(-1, 3)).reshape(*shape, 2)
-    with np.errstate(invalid="ignore"):
-        away = middle - three[..., 0, :]
-        free = (np.sum(away**2, axis=-1) > round_[..., 0] ** 2) & _within(middle, three)
-        for k in near:
-            if not np.any(free):
-                break
-            away = middle - centres[k]
-            free &= np.sum(away**2, axis=-1) >= radii[k] ** 2
-    return np.asarray(free)
+def void_open(centres: Array, radii: Array, triple: Sequence[int], near: Sequence[int]) -> npt.NDArray[np.bool_]:
+    """Whether the plane is open between three columns: (n, depths).
 
+    Of centres (columns, n, depths, 2) and radii (columns, n, depths), m.
+    """
+    from groundstation.survey.kernels.voids import mark_open  # the compiler is loaded where there is a grid
 
-def _within(point: Array, three: Array) -> npt.NDArray[np.bool_]:
-    """Whether points (..., 2) lie in triangles (..., 3, 2), their edges included."""
-    sides = []
-    for k in range(3):
-        p, q = three[..., k, :], three[..., (k + 1) % 3, :]
-        edge, to = q - p, point - p
-        sides.append(edge[..., 0] * to[..., 1] - edge[..., 1] * to[..., 0])
-    signs = np.stack(sides, axis=-1)
-    slack = 1e-12 + 1e-9 * np.max(np.abs(signs), axis=-1, keepdims=True)
-    return np.asarray(np.all(signs >= -slack, axis=-1) | np.all(signs <= slack, axis=-1))
+    found = np.zeros(radii.shape[1:], bool)
+    mark_open(centres, radii, np.asarray(triple, np.intp), np.asarray(near, np.intp), found)
+    return found

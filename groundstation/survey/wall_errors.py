@@ -50,6 +50,15 @@ class Errors:
         """Number of what all radii in a layer share."""
         return self.shared + len(self.columns.names) * (self.own + self.layers) + layer
 
+    def drawn(self, x: Array) -> tuple[Array, Array]:
+        """Centres (columns, samples, depths, 2) and radii (columns, samples, depths) of all columns."""
+        c = self.columns
+        shape = (len(c.names), len(x), len(c.depths))
+        centres, radii = np.empty((*shape, 2)), np.empty(shape)
+        for k in range(len(c.names)):
+            centres[k], radii[k] = self.centres(x, k), self.radii(x, k)
+        return centres, radii
+
     def centres(self, x: Array, column: int) -> Array:
         """Centres (samples, depths, 2) of one column."""
         c = self.columns

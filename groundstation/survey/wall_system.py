@@ -176,9 +176,7 @@ class _Judge:
 
     def any_open(self, x: Array) -> npt.NDArray[np.bool_]:
         """Whether anything is open in each sample (n,)."""
-        count = range(len(self._asked.columns.names))
-        centres = [self._errors.centres(x, k) for k in count]
-        radii = [self._errors.radii(x, k) for k in count]
+        centres, radii = self._errors.drawn(x)
         found = np.zeros(len(x), bool)
         judged = np.isfinite(self._asked.probability)
         for pair, ways, here in zip(self._asked.pairs.tolist(), self._asked.ways, judged, strict=True):
@@ -188,10 +186,10 @@ class _Judge:
                     thin &= np.any([self._thin(centres, radii, leg) for leg in way], axis=0)
             found |= np.any(thin & here, axis=1)
         for triple, near in zip(self._asked.triples.tolist(), self._asked.nearby, strict=True):
-            found |= np.any(void_open(dict(enumerate(centres)), dict(enumerate(radii)), triple, near), axis=1)
+            found |= np.any(void_open(centres, radii, triple, near), axis=1)
         return found
 
-    def _thin(self, centres: list[Array], radii: list[Array], pair: list[int]) -> npt.NDArray[np.bool_]:
+    def _thin(self, centres: Array, radii: Array, pair: list[int]) -> npt.NDArray[np.bool_]:
         """Whether a joint is too thin or not there: (samples, depths)."""
         a, b = pair
         apart = centres[b] - centres[a]

@@ -5,11 +5,13 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 from walls_by_sampling import uncovered
 
 from groundstation.survey.as_built import Columns, State
-from groundstation.survey.void_chance import void_chance
-from groundstation.survey.voids import triples_of
+from groundstation.survey.void_chance import void_chance, void_open
+from groundstation.survey.voids import power_centre, triples_of
 from groundstation.survey.wall_verdict import Kind, Verdict, judge
 
 RADIUS, SPACING = 0.6, 0.81
@@ -76,3 +78,19 @@ def test_a_void_that_is_only_likely_is_named_with_its_depth() -> None:
     assert found.verdict is Verdict.NOT_PROVEN
     assert found.void_chance is not None
     assert found.void_chance.probability[1] == doubtful[0].probability
+
+
+@given(st.integers(0, 2**32 - 1))
+def test_the_plane_is_open_where_no_disc_holds_the_point_of_equal_power(seed: int) -> None:
+    rng = np.random.default_rng(seed)
+    places, radii = rng.uniform(-1.0, 1.0, (5, 4, 3, 2)), rng.uniform(0.2, 0.9, (5, 4, 3))
+    places[3][rng.random((4, 3)) < 0.3] = math.nan  # what is not there covers nothing
+    found = void_open(places + np.array([5e5, 6e6]), radii, (0, 1, 2), (3, 4))
+    for s, z in np.ndindex(4, 3):
+        point = power_centre(places[None, :3, s, z], radii[None, :3, s, z])[0]
+        powers = np.sum((places[:, s, z] - point) ** 2, axis=-1) - radii[:, s, z] ** 2
+        (ax, ay), (bx, by), (cx, cy) = places[:3, s, z] - point
+        turns = np.array([ax * by - ay * bx, bx * cy - by * cx, cx * ay - cy * ax])
+        if np.nanmin(np.abs([*powers, *turns])) > 1e-6:  # what the digits of site coordinates tell apart
+            among = np.all(turns > 0.0) or np.all(turns < 0.0)
+            assert found[s, z] == (among and powers[0] > 0.0 and not np.any(powers[3:] < 0.0))
