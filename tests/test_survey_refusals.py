@@ -3,6 +3,7 @@
 import csv
 import json
 from pathlib import Path
+from typing import Any
 
 import pytest
 from forked_commands import run
@@ -27,6 +28,8 @@ STRAIGHT = "".join(f"{name},{md},0,0\n" for name in "ABC" for md in (0, 5, 10))
         ("MD,Inc,Azi\n0 m,0,0\n100 ft,1,20\n", "", "", "line 2: MD = '0 m' has a unit of its own"),
         (DEEP, "--tie-on", TIE, "33 and 40 deg at 500 m contradict the first station, 30 and 40 deg"),
         (OK, "--programme", GAP, "the station at 500 m lies in no leg; expected legs without a gap"),
+        (OK, "--answer-depth-reference", "ground-level", "asked from the ground-level; expected the height"),
+        (OK, "--depth-reference-height-m", "5", "given from the collar, so its height is 0; got 5 m"),
         (OK, "--instrument", ROLL, "formula 'Sin(Roll)': unknown name Roll; expected one of MD, MDPrev, TVD, Inc,"),
     ],
 )
@@ -35,7 +38,8 @@ def test_a_survey_that_contradicts_itself_is_refused_in_one_line(
 ) -> None:
     (tmp_path / "s.csv").write_text(record)
     (tmp_path / "other.toml").write_text(other)
-    done = run("survey", tmp_path / "s.csv", *([option, tmp_path / "other.toml"] if option else []))
+    word = other if "depth-reference" in option else tmp_path / "other.toml"
+    done = run("survey", tmp_path / "s.csv", *([option, word] if option else []))
     assert (done.returncode, done.stdout) == (2, "")
     assert len(done.stderr.strip().splitlines()) == 1
     assert named in done.stderr
@@ -57,6 +61,8 @@ def wall(folder: Path, heads: str, stations: str, more: str = "") -> Path:
     [
         (HEADS + "A,0,2.1\n", STRAIGHT, "", "line 5: column A stands in line 2 already"),
         (HEADS.replace("0.7", "1.6").replace("1.4", "3.2"), STRAIGHT, "", "the design cannot be met anywhere"),
+        (HEADS, STRAIGHT, 'answer_depth_reference = "ground-level"', "column A: depth reference: depths are read from"),
+        (HEADS, STRAIGHT, "depth_reference_height_m = 1.2", "column A: depth reference: depths are read and given"),
         (HEADS, STRAIGHT, 'tolerance = "0 mm"', "tolerance, by its name"),
         ("column,north_m,east_m,radius_m\nA,0,0,-1\nB,0,0.7,\n", STRAIGHT, "", "column A: radius_m: expected a number"),
     ],
@@ -117,7 +123,56 @@ def test_every_output_names_its_north_and_what_depths_count_from(tmp_path: Path)
     for path in (table, sources):
         with path.open() as file:
             assert all({key: row[key] for key in named} == named for row in csv.DictReader(file))
-    people = run(*words, *heights).stdout
+    people = " ".join(run(*words, *heights).stdout.split())  # a title may take two lines
     assert "grid north, depth from rotary-table, height above DHHN2016" in people
     refused = run(*words, "--height-datum", "DHHN2016")
     assert (refused.returncode, "expected --origin beside it" in refused.stderr) == (2, True)
+
+
+@pytest.mark.slow
+def test_depths_from_the_rotary_table_are_brought_to_the_ground(tmp_path: Path) -> None:
+    record, ground = tmp_path / "s.csv", tmp_path / "g.csv"
+    record.write_text("MD (m),Inc,Azi\n0,0,0\n6.5,0,0\n100,2,40\n200,5,41\n")
+    ground.write_text("MD (m),Inc,Azi\n6.5,0,0\n100,2,40\n200,5,41\n")
+    references = ("--depth-reference", "rotary-table", "--answer-depth-reference", "ground-level")
+    moved = (*references, "--depth-reference-height-m", 6.5, "--md", 50, "--json")
+    whole, brought, begun = (
+        json.loads(run("survey", *words).stdout)
+        for words in ((record, "--md", 56.5, "--json"), (record, *moved), (ground, *moved))
+    )
+    for read, answered in zip(whole["stations"], brought["stations"], strict=True):
+        assert answered["md_m"] == pytest.approx(read["md_m"] - 6.5)
+        assert answered["tvd_m"] == pytest.approx(read["tvd_m"] - 6.5)
+        assert answered["north_m"] == read["north_m"]
+        assert answered["uncertainty"] == read["uncertainty"]
+    assert brought["at"][0]["tvd_m"] == pytest.approx(whole["at"][0]["tvd_m"] - 6.5)
+    assert brought["at"][0]["uncertainty"] == whole["at"][0]["uncertainty"]
+    assert brought["depth_reference"] == "ground-level"
+    assert brought["read_from"] == {"depth_reference": "rotary-table", "height_m": 6.5}
+    assert begun["stations"][0]["md_m"] == begun["stations"][0]["tvd_m"] == 0.0
+    for one, other in zip(begun["stations"], brought["stations"][1:], strict=True):
+        assert [one[key] for key in ("md_m", "north_m", "tvd_m")] == pytest.approx(
+            [other[key] for key in ("md_m", "north_m", "tvd_m")]
+        )
+
+
+@pytest.mark.slow
+def test_columns_read_from_a_rotary_table_are_judged_from_their_heads(tmp_path: Path) -> None:
+    def judged(heads: str, stations: str, more: str) -> dict[str, Any]:
+        return json.loads(run("wall", wall(tmp_path, heads, stations, more), "--json").stdout)
+
+    straight = judged(HEADS, STRAIGHT, "")
+    references = 'depth_reference = "rotary-table"\nanswer_depth_reference = "ground-level"\n'
+    read = "".join(f"{name},{md},0,0\n" for name in "AB" for md in (0, 6.2, 11.2))
+    own = HEADS.replace("m\n", "m,depth_reference_height_m\n").replace("0\n", "0,\n").replace("7\n", "7,\n")
+    lifted = judged(
+        own.replace("1.4\n", "1.4,2\n"),
+        read + "C,2,0,0\nC,7,0,0\nC,12,0,0\n",
+        references + "depth_reference_height_m = 1.2",
+    )
+    assert (straight["verdict"], lifted["verdict"]) == ("tight", "tight")
+    assert lifted["joints"] == straight["joints"]
+    assert lifted["columns"] == straight["columns"]
+    short = judged(HEADS, STRAIGHT, references + "depth_reference_height_m = 1.2")  # 10 m of string reach 8.8 m
+    assert short["verdict"] == "not tight"
+    assert {row["surveyed_to_m"] for row in short["columns"]} == {8.8}

@@ -29,7 +29,11 @@ WORDS = {
 def site_of(wall: Wall) -> Site:
     """What the wall's file says of the place."""
     file = wall.file
-    return Site(file.project, file.client, file.north, file.depth_reference, file.height_datum, file.origin)
+    depths = file.depth_reference
+    if file.depths_read_from != depths:
+        height = "by column" if file.reference_height is None else f"{file.reference_height:g} m above it"
+        depths = f"{depths} (stations were read from the {file.depths_read_from}, {height})"
+    return Site(file.project, file.client, file.north, depths, file.height_datum, file.origin)
 
 
 def column_records(wall: Wall, judgement: Judgement) -> list[ColumnRecord]:

@@ -77,6 +77,15 @@ class Analysis:
     closure_azimuth: Array
     vertical_section: Array
 
+    @property
+    def md(self) -> Array:
+        """Measured depths (n,) as the answer counts them."""
+        return self.frame.depths.to_answer(self.record.md)
+
+    def covariance_at(self, md: float) -> Array:
+        """Covariance (3, 3, m^2) at any depth of the answer; errors as ``Uncertainty.at``."""
+        return self.uncertainty.at(self.frame.depths.to_record(md))
+
 
 @dataclass(frozen=True, slots=True)
 class Stretch:
@@ -106,7 +115,7 @@ def analyse(
     tool : one for all, or what surveyed which part
     site : its declination is that of magnetic north from true north
     section_azimuth : in the answer's north, rad
-    frame : norths of the record and of the answer; the site's for both by default
+    frame : norths and depth references of the record and of the answer; the site's and the collar by default
     tie_on : where the record begins, if not at its collar
 
     Raises
@@ -116,22 +125,26 @@ def analyse(
         cannot be used on it.
     """
     frame = frame or Frame()
+    height = frame.depths.height
+    at_zero = abs(float(record.md[0]) - height) <= SAME_DEPTH  # of the answer's depths
     if tie_on is not None:
         tie_on.check(float(record.md[0]), float(record.inclination[0]), float(record.azimuth[0]))
         record = _tied(record, tie_on)
-    elif record.md[0] != 0.0:
+    elif record.md[0] != 0.0 and not at_zero:
         raise SurveyError(
             f"the record begins at {record.md[0]:g} m, so nothing says where that is; "
             "expected the collar at 0 m first, --from-collar for a vertical one, or --tie-on"
         )
     azimuth = frame.to_true(record.azimuth)
-    start = np.zeros(3) if tie_on is None else _turn(-frame.norths.of(frame.record)) @ tie_on.position
+    start = np.array([0.0, 0.0, height if at_zero else 0.0])
+    if tie_on is not None:
+        start = _turn(-frame.norths.of(frame.record)) @ tie_on.position
     extra = {name: record.columns[c] * f for c, (name, f) in RECORD_COLUMNS.items() if c in record.columns}
     survey = Survey(record.md, record.inclination, azimuth, record.md, extra)
     legs = [Leg(tool)] if isinstance(tool, Tool) else legs_of(tool, record.md)
     allowance = tie_on is None and legs[0].tool.slot_allowance
     places, found = locate(method, survey, legs, site, start, slot_allowance=allowance)
-    turned = places @ frame.turn.T
+    turned = (places - np.array([0.0, 0.0, height])) @ frame.turn.T
     distance, direction = closure(turned)
     tie_cov = np.zeros((3, 3))
     if tie_on is not None:

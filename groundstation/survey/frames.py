@@ -14,10 +14,10 @@ import numpy as np
 import numpy.typing as npt
 
 from groundstation.errors import SurveyError
+from groundstation.survey.depth_reference import DepthReference
 
 Array = npt.NDArray[np.float64]
 NORTHS = ("site", "true", "grid", "magnetic")
-DEPTHS_FROM = ("collar", "ground-level", "rotary-table", "kelly-bushing", "drill-floor", "mean-sea-level")
 SAME_ANGLE = math.radians(0.01)  # between a tie-on and the first station at its depth
 SAME_DEPTH = 1e-6  # m
 
@@ -46,12 +46,12 @@ class Norths:
 
 @dataclass(frozen=True, slots=True)
 class Frame:
-    """The north of a record and that of the answer; what depths count from, and which datum heights."""
+    """North and depth reference of a record and those of the answer, and the datum of heights."""
 
     record: str = "site"
     answer: str = "site"
     norths: Norths = field(default_factory=Norths)
-    depth_reference: str = DEPTHS_FROM[0]  # of measured and true vertical depths
+    depths: DepthReference = field(default_factory=DepthReference)  # measured and true vertical ones
     height_datum: str = ""  # of site coordinates, "" where not stated
 
     def to_true(self, azimuth: Array) -> Array:
@@ -72,7 +72,7 @@ class Frame:
 
 @dataclass(frozen=True, slots=True)
 class TieOn:
-    """Where a survey begins that does not begin at its collar; in the north of the record."""
+    """Where a survey begins that does not begin at its collar; north and depths as the record counts them."""
 
     md: float
     inclination: float

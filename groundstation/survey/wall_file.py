@@ -20,8 +20,9 @@ from groundstation.errors import SurveyError
 from groundstation.survey.as_built import Columns
 from groundstation.survey.closing import Stage, stages
 from groundstation.survey.columns import Tolerance, tolerance
+from groundstation.survey.depth_reference import DEPTHS_FROM
 from groundstation.survey.error_sources import Site
-from groundstation.survey.frames import DEPTHS_FROM, NORTHS
+from groundstation.survey.frames import NORTHS
 from groundstation.survey.instruments import Tool, load_tool
 from groundstation.survey.joints import Detour, neighbours_in_grid, neighbours_in_line
 from groundstation.survey.methods import Method
@@ -32,8 +33,10 @@ from groundstation.survey.wall_verdict import Judgement, judge
 
 LAYOUTS = ("line", "shaft", "grid")
 NEEDED = ("radius_m", "thickness_m", "heads", "stations")
-SIGNED = ("project", "client", "calibration", "north", "depth_reference", "height_datum")  # of the report alone
-TEXTS = ("name", "heads", "stations", "layout", "tolerance", "instrument", "serial", "method", *SIGNED)
+SIGNED = ("project", "client", "calibration", "north", "height_datum")  # of the report alone
+DEPTHS = ("depth_reference", "answer_depth_reference")
+TEXTS = ("name", "heads", "stations", "layout", "tolerance", "instrument", "serial", "method", *SIGNED, *DEPTHS)
+REFERENCE_HEIGHT = "depth_reference_height_m"
 ORIGIN = ("northing_m", "easting_m", "height_m")
 POSITIVE = ("radius_m", "thickness_m", "spacing_m", "length_m", "depth_step_m", "gravity_mps2", "allowed_probability")
 NOT_NEGATIVE = (
@@ -71,7 +74,9 @@ class WallFile:
     client: str = ""
     calibration: str = ""  # certificate of the instrument
     north: str = "site"  # to which azimuths and coordinates belong
-    depth_reference: str = DEPTHS_FROM[0]
+    depths_read_from: str = DEPTHS_FROM[0]  # of stations and drilled depths
+    depth_reference: str = DEPTHS_FROM[0]  # of all answers: the heads' own
+    reference_height: float | None = None  # m, of the former above the latter
     height_datum: str = ""
     origin: tuple[float, float, float] | None = None  # m, northing, easting and height of the wall's zero
 
@@ -86,6 +91,7 @@ class WallFile:
         return Defaults(
             self.radius, self.length, self.inclination, self.azimuth, self.tolerance, self.tool, self.serial,
             self.head_std, self.path.parent, self.calibration,
+            (self.depths_read_from, self.depth_reference, self.reference_height),
         )  # fmt: skip
 
 
@@ -133,7 +139,7 @@ def read_wall_file(path: Path) -> WallFile:
     except tomllib.TOMLDecodeError as error:
         raise SurveyError(f"{path}: not TOML: {error}") from error
     layers = data.pop("layer", [])
-    known = (*TEXTS, *POSITIVE, *NOT_NEGATIVE, *ORIGIN)
+    known = (*TEXTS, *POSITIVE, *NOT_NEGATIVE, *ORIGIN, REFERENCE_HEIGHT)
     for key in data:
         if key not in known:
             raise SurveyError(f"{path}: {key}: unknown key; expected one of {', '.join(known)} or tables [[layer]]")
@@ -158,6 +164,7 @@ def read_wall_file(path: Path) -> WallFile:
         _layers(path, layers, values.get("radius_cv", 0.0)),
         values.get("radius_correlation", 1.0),
     )
+    read_from = _one_of(path, values, "depth_reference", DEPTHS_FROM, DEPTHS_FROM[0])
     return WallFile(
         path,
         values.get("name", path.stem),
@@ -180,7 +187,9 @@ def read_wall_file(path: Path) -> WallFile:
         values.get("client", ""),
         values.get("calibration", ""),
         _one_of(path, values, "north", NORTHS, "site"),
-        _one_of(path, values, "depth_reference", DEPTHS_FROM, DEPTHS_FROM[0]),
+        read_from,
+        _one_of(path, values, "answer_depth_reference", DEPTHS_FROM, read_from),
+        values.get(REFERENCE_HEIGHT),
         values.get("height_datum", ""),
         _origin(path, values),
     )
@@ -214,7 +223,7 @@ def _value(path: Path, key: str, value: Any) -> Any:
             raise SurveyError(f"{path}: {key}: expected a text, got {value!r:.60}")
         return value
     usable = not isinstance(value, bool) and isinstance(value, int | float) and math.isfinite(value)
-    if usable and key in ORIGIN:
+    if usable and key in (*ORIGIN, REFERENCE_HEIGHT):
         return float(value)
     if not usable or value < 0.0 or (key in POSITIVE and value == 0.0):
         sign = "positive" if key in POSITIVE else "non-negative"
@@ -258,7 +267,7 @@ def read_wall(path: Path) -> Wall:
     file = read_wall_file(path)
     rows = read_heads(file.heads, file.defaults)
     names = [row.name for row in rows]
-    holes = read_holes(file.stations, names)
+    holes = read_holes(file.stations, names, [row.depths.height for row in rows])
     length = file.length or max((float(hole.md[-1]) for hole in holes if len(hole.md)), default=0.0)
     if not length and any(row.length is None for row in rows):
         raise SurveyError(

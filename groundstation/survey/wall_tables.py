@@ -6,7 +6,7 @@ Every refusal names file, line, column, what was expected and what came.
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from datetime import date
 from itertools import pairwise
 from pathlib import Path
@@ -16,12 +16,18 @@ import numpy.typing as npt
 
 from groundstation.errors import SurveyError
 from groundstation.survey.columns import Design, Tolerance, tolerance
+from groundstation.survey.depth_reference import DEPTHS_FROM, DepthReference, depth_reference
+from groundstation.survey.frames import SAME_DEPTH
 from groundstation.survey.instruments import Tool, load_tool
 from groundstation.survey.records import read_columns
 from groundstation.survey.wall_columns import ColumnPlan, Hole, Status
 
 Array = npt.NDArray[np.float64]
-NUMBERS = ("down_m", "inclination_deg", "azimuth_deg", "length_m", "radius_m", "drilled_to_m", "head_sigma_m")
+NUMBERS = (
+    "down_m", "inclination_deg", "azimuth_deg", "length_m", "radius_m", "drilled_to_m", "head_sigma_m",
+    "depth_reference_height_m",
+)  # fmt: skip
+SIGNED = ("down_m", "azimuth_deg", "depth_reference_height_m")  # may be negative
 WORDS = ("state", "instrument", "serial", "calibration", "tolerance", "between", "replaces", "drilled_on")
 
 
@@ -39,6 +45,8 @@ class Defaults:
     head_std: float
     folder: Path  # of instrument files
     calibration: str = ""
+    # what stations and drilled depths count from, what the heads do, and the height of the one above the other, if any
+    depths: tuple[str, str, float | None] = (DEPTHS_FROM[0], DEPTHS_FROM[0], None)
 
 
 @dataclass(frozen=True, slots=True)
@@ -68,6 +76,7 @@ class HeadRow:
     length: float | None
     remedy: Remedy
     drilled_on: date | None = None
+    depths: DepthReference = field(default_factory=DepthReference)
 
     def plan(self, length: float) -> ColumnPlan:
         """The plan, ``length`` (m) where the row has none."""
@@ -111,6 +120,8 @@ def _head(
     status = _status(where, cells.get("state", ""))
     try:
         allowed = tolerance(cells["tolerance"]) if cells.get("tolerance") else defaults.tolerance
+        read_from, answer, height = defaults.depths
+        depths = depth_reference(read_from, answer, values.get("depth_reference_height_m", height))
     except SurveyError as error:
         raise SurveyError(f"{where}: {error}") from None
     design = Design(
@@ -123,14 +134,17 @@ def _head(
         allowed,
     )
     tool = _tool(cells.get("instrument", ""), defaults, tools)
+    drilled = depths.to_answer(values["drilled_to_m"]) if "drilled_to_m" in values else None
+    if drilled is not None and drilled < 0.0:
+        raise SurveyError(f"{where}: drilled_to_m: {values['drilled_to_m']:g} m lies above the head")
     plan = ColumnPlan(
-        design, tool, cells.get("serial") or defaults.serial, status, values.get("drilled_to_m"),
+        design, tool, cells.get("serial") or defaults.serial, status, drilled,
         values.get("head_sigma_m", defaults.head_std), cells.get("calibration") or defaults.calibration,
     )  # fmt: skip
     day = _day(where, cells.get("drilled_on", ""))
     if day is not None and status in (Status.PLANNED, Status.NOT_DRILLED):
         raise SurveyError(f"{where}: drilled_on: stated as {status.value}, yet drilled on {day}")
-    return HeadRow(name, plan, values.get("length_m", defaults.length), _remedy(where, cells), day)
+    return HeadRow(name, plan, values.get("length_m", defaults.length), _remedy(where, cells), day, depths)
 
 
 def _day(where: str, text: str) -> date | None:
@@ -145,7 +159,7 @@ def _number(where: str, key: str, text: str) -> float:
         value = float(text)
     except ValueError:
         value = math.nan
-    low = -math.inf if key in ("down_m", "azimuth_deg") else 0.0
+    low = -math.inf if key in SIGNED else 0.0
     if not math.isfinite(value) or value < low or (key in ("length_m", "radius_m") and value == 0.0):
         raise SurveyError(
             f"{where}: {key}: expected a number{'' if low < 0.0 else ' that is not negative'}, got {text!r}"
@@ -177,8 +191,11 @@ def _remedy(where: str, cells: dict[str, str]) -> Remedy:
     return Remedy(between, cells.get("replaces", ""))
 
 
-def read_holes(path: Path, names: list[str]) -> list[Hole]:
+def read_holes(path: Path, names: list[str], heights: list[float]) -> list[Hole]:
     """Stations of every column in the order of ``names``; none of one that was not surveyed.
+
+    Depths of a column are brought to its head by ``heights`` (m), how far what they count from lies above it. A station
+    at 0 m there tells the direction at the head, for between the two the string is straight.
 
     Raises
     ------
@@ -202,6 +219,9 @@ def read_holes(path: Path, names: list[str]) -> list[Hole]:
     if len(single):
         raise SurveyError(f"{path}: column {names[single[0]]}: expected at least two stations, got 1")
     starts = np.concatenate([[0], np.cumsum(counts)])
+    lift = np.array(heights)[owner]
+    at_reference = (np.arange(len(md)) == starts[owner]) & (md == 0.0) & (lift > 0.0)
+    md = np.where(at_reference | (np.abs(md - lift) < SAME_DEPTH), 0.0, md - lift)
     _check_depths(path, names, owner, line, md, starts[:-1][counts > 0])
     parts = [slice(a, b) for a, b in pairwise(starts)]
     return [Hole(md[part], np.radians(inc[part]), np.radians(azi[part])) for part in parts]
@@ -228,7 +248,8 @@ def _check_depths(
     if len(off):
         k = int(off[0])
         raise SurveyError(
-            f"{path}: line {line[k]}: column {names[owner[k]]}: expected the head at 0 m first, got {md[k]:g}"
+            f"{path}: line {line[k]}: column {names[owner[k]]}: "
+            f"expected the head first, got a station {md[k]:g} m below it"
         )
 
 

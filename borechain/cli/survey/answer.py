@@ -19,7 +19,7 @@ def station_rows(
 ) -> list[dict[str, Any]]:
     """One object a station; uncertainty at ``sigma`` standard deviations, site coordinates from ``origin``."""
     covs, rows = found.uncertainty.cov, []
-    for k, md in enumerate(found.record.md.tolist()):
+    for k, md in enumerate(found.md.tolist()):
         north, east, tvd = found.positions[k].tolist()
         severity = 0.0 if k == 0 else float(found.dogleg_severity[k - 1])
         rows.append(
@@ -84,13 +84,12 @@ def at_depth(found: Analysis, md: float, sigma: float) -> dict[str, Any]:
     directions = tangents(found.record.inclination, found.azimuth)
     none, no_columns = np.zeros((3, 3)), np.zeros((3, 0))
     points = [
-        Point(float(m), t, p, none, no_columns)
-        for m, t, p in zip(found.record.md, directions, found.positions, strict=True)
+        Point(float(m), t, p, none, no_columns) for m, t, p in zip(found.md, directions, found.positions, strict=True)
     ]
     point = interpolate(points, md)
     north, east, tvd = point.position.tolist()
     place = {"md_m": md, "north_m": north, "east_m": east, "tvd_m": tvd}
-    return place | {"uncertainty": region(found.uncertainty.at(md), sigma)}
+    return place | {"uncertainty": region(found.covariance_at(md), sigma)}
 
 
 def sources(found: Analysis, sigma: float) -> list[dict[str, Any]]:
@@ -110,7 +109,7 @@ def source_text(found: Analysis) -> str:
     writer.writerow(["md_m", "source", *(f"{name}_m2" for name in axes), *FRAME])
     places = ((0, 0), (1, 1), (2, 2), (0, 1), (0, 2), (1, 2))
     parts, named = found.uncertainty.by_source(), frame_words(found.frame)
-    for k, md in enumerate(found.record.md.tolist()):
+    for k, md in enumerate(found.md.tolist()):
         for name, cov in parts.items():
             writer.writerow([md, name, *(float(cov[(k, *place)]) for place in places), *named])
     return text.getvalue()
@@ -118,7 +117,7 @@ def source_text(found: Analysis) -> str:
 
 def frame_words(frame: Frame) -> list[str]:
     """North, depth reference and height datum, as every row of a table names them."""
-    return [frame.answer, frame.depth_reference, frame.height_datum]
+    return [frame.answer, frame.depths.answer, frame.height_datum]
 
 
 def table_text(rows: list[dict[str, Any]], frame: Frame) -> str:

@@ -20,12 +20,15 @@ from telemetry.runtime.command_line import check_installed
 
 if TYPE_CHECKING:
     from groundstation.survey.analysis import Analysis
+    from groundstation.survey.depth_reference import DepthReference
     from groundstation.survey.frames import Frame
     from groundstation.survey.instruments import Tool
     from groundstation.survey.records import Record
 
 NORTHS = ("site", "true", "grid", "magnetic")
-DEPTHS_FROM = ("collar", "ground-level", "rotary-table", "kelly-bushing", "drill-floor", "mean-sea-level")
+DEPTHS_FROM = (
+    "collar", "ground-level", "rotary-table", "kelly-bushing", "drill-floor", "mean-sea-level", "height-datum",
+)  # fmt: skip
 METHODS = ("tangential", "balanced-tangential", "average-angle", "radius-of-curvature", "minimum-curvature")
 SOURCES_SHOWN = 12
 
@@ -143,9 +146,17 @@ def parameters_of(words: tuple[str, ...]) -> dict[str, float]:
     type=click.Choice(DEPTHS_FROM),
     default="collar",
     show_default=True,
-    help="What measured and vertical depths count from; every output names it.",
+    help="What the depths of FILE, --tie-on and --programme count from.",
 )
-@click.option("--height-datum", metavar="NAME", help="Datum of the height of --origin, as it is to be named.")
+@click.option(
+    "--answer-depth-reference",
+    type=click.Choice(DEPTHS_FROM),
+    help="What depths of the answer, --md and --origin count from; by default that of FILE. Every output names it.",
+)
+@click.option(
+    "--depth-reference-height-m", type=float, help="Height of --depth-reference above --answer-depth-reference."
+)
+@click.option("--height-datum", metavar="NAME", help="Datum of heights, as it is to be named.")
 @click.option(
     "--section-azimuth-deg", type=float, default=0.0, show_default=True, help="Azimuth of the vertical section."
 )
@@ -197,6 +208,8 @@ def survey(
     convergence_deg: float,
     origin: tuple[float, float, float] | None,
     depth_reference: str,
+    answer_depth_reference: str | None,
+    depth_reference_height_m: float | None,
     height_datum: str | None,
     section_azimuth_deg: float,
     gravity: float,
@@ -234,7 +247,7 @@ def survey(
     check_suffix("--export-tool", export_tool, ".json")
     if plot is not None:
         check_installed("matplotlib")
-    check_together(from_collar, tie_on, programme, origin, height_datum, azimuth_error_deg, export_tool)
+    check_together(from_collar, tie_on, programme, azimuth_error_deg, export_tool)
     understood = read_any(file, DisplacementRule(displacement_rule), md_unit)
     record = understood.record
     if from_collar:
@@ -246,13 +259,13 @@ def survey(
     named = ", ".join(f"{leg.tool.name} from {leg.top:g} m" for leg in legs) or tool.name
     frame = replace(
         frame_of(north, answer_north, north_of_site_deg, convergence_deg, declination_deg),
-        depth_reference=depth_reference,
+        depths=depths_of(depth_reference, answer_depth_reference, depth_reference_height_m, height_datum, origin),
         height_datum=height_datum or "",
     )
     tied = None if tie_on is None else read_tie_on(tie_on)
     site = Site(gravity, field_nt, math.radians(dip_deg), math.radians(declination_deg), math.radians(latitude_deg))
     found = analyse(record, Method(method), legs or tool, site, math.radians(section_azimuth_deg), frame, tied)
-    mds = found.record.md
+    mds = found.md
     outside = [depth for depth in md if not mds[0] <= depth <= mds[-1]]
     if outside:
         raise InputFault(f"--md {outside[0]:g}: expected a depth of {mds[0]:g}..{mds[-1]:g} m")
@@ -263,7 +276,8 @@ def survey(
         "method": method,
         "instrument": named,
         "north": frame.answer,
-        "depth_reference": frame.depth_reference,
+        "depth_reference": frame.depths.answer,
+        "read_from": {"depth_reference": frame.depths.record, "height_m": frame.depths.height},
         "height_datum": frame.height_datum or None,
         "origin_m": None if origin is None else list(origin),
         "sigma": sigma,
@@ -291,16 +305,12 @@ def check_together(
     from_collar: bool,
     tie_on: Path | None,
     programme: Path | None,
-    origin: tuple[float, float, float] | None,
-    height_datum: str | None,
     azimuth_error_deg: float | None,
     export_tool: Path | None,
 ) -> None:
     """Refuse options that contradict each other."""
     if from_collar and tie_on is not None:
         raise InputFault("expected --from-collar or --tie-on, got both")
-    if height_datum is not None and origin is None:
-        raise InputFault("--height-datum: expected --origin beside it")
     if programme is not None and (azimuth_error_deg is not None or export_tool is not None):
         raise InputFault("--programme: expected neither --azimuth-error-deg nor --export-tool beside it")
 
@@ -317,6 +327,27 @@ def frame_of(
     return Frame(north, answer, Norths(*angles))
 
 
+def depths_of(
+    record: str,
+    answer: str | None,
+    height: float | None,
+    height_datum: str | None,
+    origin: tuple[float, float, float] | None,
+) -> DepthReference:
+    """Depth references of the record and of the answer."""
+    from groundstation.survey.depth_reference import depth_reference
+
+    found = depth_reference(record, answer, height)
+    from_datum = "height-datum" in (found.record, found.answer)
+    if from_datum and height_datum is None:
+        raise InputFault("--depth-reference height-datum: expected --height-datum NAME beside it")
+    if height_datum is not None and origin is None and not from_datum:
+        raise InputFault("--height-datum: expected --origin beside it")
+    if found.answer == "height-datum" and origin is not None and origin[2] != 0.0:
+        raise InputFault(f"--origin: depths count from {height_datum}, so its height is 0; got {origin[2]:g} m")
+    return found
+
+
 def draw(found: Analysis, instrument: str, sigma: float, title: str, path: Path) -> None:
     """Plan view, sections and uncertainty."""
     from groundstation.report.plots import survey_figure
@@ -325,9 +356,9 @@ def draw(found: Analysis, instrument: str, sigma: float, title: str, path: Path)
 
     confidence = probability_of(sigma, 2)
     words = (
-        f"{title}, {instrument}, {found.frame.answer} north, depth from {found.frame.depth_reference}, {sigma:g} sigma"
+        f"{title}, {instrument}, {found.frame.answer} north, depth from {found.frame.depths.answer}, {sigma:g} sigma"
     )
-    figure = survey_figure(found.record.md, found.positions, found.uncertainty.cov, confidence, words)
+    figure = survey_figure(found.md, found.positions, found.uncertainty.cov, confidence, words)
     save(figure, path)
 
 
@@ -340,6 +371,13 @@ def export(tool: Tool, record: Record, path: Path) -> None:
     write_whole(path, to_json(written, datetime.datetime.now(datetime.UTC).date()))
 
 
+def brought_words(result: dict[str, Any]) -> str:
+    """Where the depths were read from, if from another reference than that of the answer."""
+    read = result["read_from"]
+    same = read["depth_reference"] == result["depth_reference"]
+    return "" if same else f" (read from {read['depth_reference']}, {read['height_m']:g} m above it)"
+
+
 def show(result: dict[str, Any]) -> None:
     """Tables for people."""
     from rich.table import Table
@@ -350,7 +388,7 @@ def show(result: dict[str, Any]) -> None:
         result["method"],
         result["instrument"],
         f"{result['north']} north",
-        f"depth from {result['depth_reference']}",
+        f"depth from {result['depth_reference']}{brought_words(result)}",
         *([f"height above {result['height_datum']}"] if result["height_datum"] else []),
         f"{result['sigma']:g} sigma",
     )

@@ -120,6 +120,7 @@ def result_of(found: Wall, judgement: Judgement) -> dict[str, Any]:
         "verdict": judgement.verdict.value,
         "north": found.file.north,
         "depth_reference": found.file.depth_reference,
+        "read_from": {"depth_reference": found.file.depths_read_from, "height_m": found.file.reference_height},
         "height_datum": found.file.height_datum or None,
         "findings": [
             {
