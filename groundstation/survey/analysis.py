@@ -41,7 +41,8 @@ class Region:
     @property
     def cov(self) -> Array:
         """Covariance (n, 3, 3) of every position, m^2."""
-        return self._turned(self.model.cov) + self.tie_cov
+        turned = self._turned(self.model.cov)
+        return turned + self.tie_cov if np.any(self.tie_cov) else turned
 
     def at(self, md: float) -> Array:
         """Covariance (3, 3) at any depth of the survey; errors as ``Uncertainty.at``."""
@@ -144,7 +145,7 @@ def analyse(
     legs = [Leg(tool)] if isinstance(tool, Tool) else legs_of(tool, record.md)
     allowance = tie_on is None and legs[0].tool.slot_allowance
     places, found = locate(method, survey, legs, site, start, slot_allowance=allowance)
-    turned = (places - np.array([0.0, 0.0, height])) @ frame.turn.T
+    turned = frame.turned(places)
     distance, direction = closure(turned)
     tie_cov = np.zeros((3, 3))
     if tie_on is not None:

@@ -27,6 +27,7 @@ from groundstation.survey.error_sources import RECORD, SECONDS_A_METRE, Leg, Sit
 from groundstation.survey.gyro_modes import TURNS, mode_weights, sections_of
 from groundstation.survey.instruments import Tool, load_tool
 from groundstation.survey.methods import Method, check_stations, positions
+from groundstation.survey.running_error import RunningUncertainty
 
 Array = npt.NDArray[np.float64]
 COMPILED_FROM = 100  # stations
@@ -135,9 +136,10 @@ def locate(
 ) -> tuple[Array, Uncertainty]:
     """Positions (n, 3) of one well from ``start`` (3,) on, and their covariances with those of every source.
 
-    Compiled where one tool took it all and there are ``COMPILED_FROM`` stations: below that the compiler, which takes
-    seconds once a tool and machine, costs more than it saves, and the arrays of ``error_model`` are fast enough. The
-    survey's own TVD is not looked at.
+    Where one tool took it all and there are ``COMPILED_FROM`` stations: compiled. Below that the compiler, which takes
+    seconds once a tool and machine, costs more than it saves: station by station, by the running sums of which the
+    ground station's trajectory is made. Of several tools, or one that knows its stations before: the arrays of
+    ``error_model``. The survey's own TVD is not looked at.
 
     Raises
     ------
@@ -155,10 +157,38 @@ def locate(
     places = start + positions(method, survey.md, survey.inclination, survey.azimuth)
     survey = replace(survey, tvd=places[:, 2])
     if not quick:
-        return places, propagate(survey, legs, site, slot_allowance=slot_allowance)
+        return places, _uncompiled(survey, legs, site, slot_allowance=slot_allowance)
     check_legs(survey, legs)
     cov, _ = _model(legs[0].tool, by_source=False).covariance(survey, site, slot_allowance=slot_allowance)
     return places, Uncertainty(survey, tuple(legs), site, slot_allowance, cov, compiled_parts)
+
+
+def _uncompiled(survey: Survey, legs: Sequence[Leg], site: Site, *, slot_allowance: bool) -> Uncertainty:
+    """Uncertainty of a survey of one well; errors as ``error_model.propagate``."""
+    check_legs(survey, legs)
+    tool = legs[0].tool
+    if len(legs) > 1 or any(term.by_mode for term in tool.terms):
+        return propagate(survey, legs, site, slot_allowance=slot_allowance)
+    try:
+        cov = _appended(survey, tool, site, slot_allowance=slot_allowance)
+    except ToolError:
+        propagate(survey, legs, site, slot_allowance=slot_allowance)  # names the term
+        raise
+    return Uncertainty(survey, tuple(legs), site, slot_allowance, cov)
+
+
+def _appended(survey: Survey, tool: Tool, site: Site, *, slot_allowance: bool) -> Array:
+    """Covariances (n, 3, 3) of one well, one station appended after the other."""
+    rows = np.stack([survey.md, survey.inclination, survey.azimuth, survey.tvd], axis=1).tolist()
+    record = {name: values.tolist() for name, values in survey.record.items()}
+    time = record["Time"][0] if "Time" in record else None
+    running = RunningUncertainty(tool, site, *rows[0][:3], slot_allowance=slot_allowance, time=time)
+    first = surface_covariance(survey.md, survey.inclination, survey.azimuth, tool)
+    later = []
+    for k, (md, inclination, azimuth, tvd) in enumerate(rows[1:], 1):
+        here = {name: values[k] for name, values in record.items()}
+        later.append(running.append(md, inclination, azimuth, tvd, here))
+    return np.stack([first, *later])
 
 
 def compiled_parts(found: Uncertainty) -> dict[str, Array]:

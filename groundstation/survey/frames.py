@@ -65,6 +65,11 @@ class Frame:
         c, s = math.cos(angle), math.sin(angle)
         return np.array([[c, s, 0.0], [-s, c, 0.0], [0.0, 0.0, 1.0]])
 
+    def turned(self, places: Array) -> Array:
+        """Positions (n, 3) from true north with the record's depths, as the answer has them."""
+        found = places if self.norths.of(self.answer) == 0.0 else places @ self.turn.T
+        return found - np.array([0.0, 0.0, self.depths.height]) if self.depths.height else found
+
     def azimuth(self, true: Array) -> Array:
         """Azimuths from true north, in the answer's, [0, 2 pi)."""
         return np.asarray(np.mod(true - self.norths.of(self.answer), math.tau))

@@ -1,7 +1,7 @@
 """Region of uncertainty of a survey that grows: one station appended at the same cost however many there are.
 
-The same sums as in ``error_model``, kept: of every constant source the effect of the stations that lie behind, and of
-all random ones together their covariance. When a station is appended, the one before gains its second leg.
+The same sums as in ``error_model``, kept (``running_sums``). When a station is appended, the one before gains its
+second leg.
 """
 
 from __future__ import annotations
@@ -26,6 +26,7 @@ from groundstation.survey.error_sources import (
 )
 from groundstation.survey.formulas import SCALAR, VARIABLES
 from groundstation.survey.instruments import Mode, Tool
+from groundstation.survey.running_sums import RunningSums
 
 Array = npt.NDArray[np.float64]
 STATION_VARIABLES = (
@@ -43,6 +44,7 @@ class RunningUncertainty:
     tool, site : instrument and place
     md, inclination, azimuth : first station, m and rad; its direction is known, its depth is read
     slot_allowance : as in ``error_model.Geometry``
+    time : of the first station, s; by default as a survey without times has it
     """
 
     def __init__(
@@ -54,6 +56,7 @@ class RunningUncertainty:
         azimuth: float,
         *,
         slot_allowance: bool = False,
+        time: float | None = None,
     ) -> None:
         modes = [term.name for term in tool.terms if term.by_mode]
         if modes:
@@ -70,11 +73,10 @@ class RunningUncertainty:
         self._allowance = slot_allowance
         self._place = (md, inclination, azimuth)
         self._tangent = _tangent(inclination, azimuth)
-        self._time = SECONDS_A_METRE * md
+        self._time = SECONDS_A_METRE * md if time is None else time
         self._half = 0.0  # of the last leg, as it counts for the last station
         self._last: tuple[Array, Array, Array, Array] | None = None  # of the last station, see _evaluate
-        self._sums = np.zeros((self._constant, 3))
-        self._random = np.zeros((3, 3))
+        self._sums = RunningSums()
 
     def append(
         self,
@@ -115,16 +117,17 @@ class RunningUncertainty:
         if self._last is not None:
             old_depth, old_turn, old_shift, old_along = self._last
             effect = (self._half + half) * old_turn + old_depth * (old_along - along) + old_shift
-            self._sums += effect[: self._constant]
-            random = effect[self._constant :]
-            self._random += random.T @ random
+            self._sums.pass_station(*self._parted(effect))
         own = length if first and self._allowance else half
         star = own * turn + depth * along + shift
-        constant = self._sums + star[: self._constant]
-        random = star[self._constant :]
         self._last, self._half = (depth, turn, shift, along), own
         self._place, self._tangent, self._time = (md, inclination, azimuth), tangent, time
-        return np.asarray(self._random + random.T @ random + constant.T @ constant)
+        return self._sums.at_end(*self._parted(star))[0]
+
+    def _parted(self, effect: Array) -> tuple[Array, Array]:
+        """Effects (3, s) of the constant sources and covariance (3, 3) of the random ones, of effects (t, 3)."""
+        random = effect[self._constant :]
+        return effect[: self._constant].T, random.T @ random
 
     def _lost(self, weights: Array, inclination: float) -> bool:
         """Whether a weight that counts here has no value; where the hole is vertical singular ones may stand for it."""

@@ -2,7 +2,7 @@
 
 A station enters two legs, so its weight in the position is half their summed length, and half the last leg for the last
 station (the Jacobian of the balanced tangential method, used for every method as the industry's error model does).
-Random and shared parts are kept by two running sums: appending costs the same however many stations there are.
+Its errors are kept by running sums: appending costs the same however many stations there are.
 Source: thesis 2.1-2.3 and eqs. I.1-I.12. Frame: north, east, down.
 """
 
@@ -19,7 +19,8 @@ import numpy.typing as npt
 from groundstation.errors import SurveyError
 from groundstation.survey.methods import OPPOSITE, Method, dogleg, leg, ratio_factor
 from groundstation.survey.resolve import Direction, angles
-from groundstation.survey.shared import added, widened
+from groundstation.survey.running_sums import RunningSums
+from groundstation.survey.shared import added
 
 Array = npt.NDArray[np.float64]
 
@@ -68,8 +69,7 @@ class Trajectory:
         jacobian = tangent_jacobians(tangents)[0]
         self._last_cov, self._last_shared = jacobian @ first.cov @ jacobian.T, jacobian @ first.shared  # of the tangent
         self._length = 0.0
-        self._interior = np.zeros((3, 3))
-        self._interior_shared = np.zeros((3, 0))
+        self._sums = RunningSums()
         self.points = [Point(start_md, tangents[0], np.zeros(3), np.zeros((3, 3)), np.zeros((3, 0)))]
 
     def append(self, md: float, direction: Direction) -> Point:
@@ -114,14 +114,9 @@ class Trajectory:
         The station before it counts among the inner ones from now on.
         """
         weight, end = 0.5 * (self._length + length), 0.5 * length
-        self._interior = self._interior + weight**2 * self._last_cov
-        if shared.shape[1] > self._interior_shared.shape[1]:
-            self._interior_shared = widened(self._interior_shared, shared.shape[1])
-        self._interior_shared[:, : self._last_shared.shape[1]] += weight * self._last_shared
+        self._sums.pass_station(weight * self._last_shared, weight**2 * self._last_cov)
         self._length, self._last_cov, self._last_shared = length, cov.copy(), shared
-        columns = self._interior_shared.copy()
-        columns[:, : shared.shape[1]] += end * shared
-        return self._interior + end**2 * cov + columns @ columns.T, columns
+        return self._sums.at_end(end * shared, end**2 * cov)
 
     def _legs(self, lengths: Array, mds: Sequence[float], tangents: Array, directions: Sequence[Direction]) -> Array:
         """Displacements (n, 3) from station to station."""
