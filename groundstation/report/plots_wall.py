@@ -129,8 +129,9 @@ def _thickness(
     """Thickness over depth; the band of the worst one only, for bands on bands say nothing."""
     for rank, joint in enumerate(which):
         colour = (WRONG if rank == 0 else ALARMS[0]) if bad[joint] else (INK if rank == 0 else GREY)
+        label = joint_name(columns, found, int(joint)) + _missing_words(columns, found, int(joint))
         axes.plot(found.thickness[joint], columns.depths, color=colour, ls=LINES[rank], lw=1.8 if rank == 0 else 1.3,
-                  label=joint_name(columns, found, int(joint)))  # fmt: skip
+                  label=label)  # fmt: skip
         if rank == 0:
             a, b = found.pairs[joint]
             low, high = (
@@ -143,6 +144,12 @@ def _thickness(
     axes.set(xlabel="Thickness of the joint (m)", ylabel="TVD (m)", title="Worst joints")
     axes.set_ylim(float(columns.depths[-1]), float(columns.depths[0]))
     axes.legend(loc="upper center", bbox_to_anchor=(0.5, -0.16), ncols=2)
+
+
+def _missing_words(columns: Columns, found: Joints, joint: int) -> str:
+    """Where a joint is not there, which has no thickness to draw."""
+    missing = np.flatnonzero(found.states[joint] == State.MISSING)
+    return f", missing from {columns.depths[missing[0]]:g} m" if len(missing) else ""
 
 
 def _map(axes: Axes, columns: Columns, found: Joints, required: float, allowed: float, shade: str) -> None:

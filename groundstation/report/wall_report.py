@@ -114,11 +114,11 @@ def wall_report(wall: Wall, judgement: Judgement, origin: Origin) -> Document:
     sections = [
         Section("Reasons", [f.text[0].upper() + f.text[1:] + "." for f in judgement.findings] or ["None."]),
         Section("What is to be done", remedies(wall, judgement) or ["Nothing."]),
+        _instruments_section(records),
         _columns_section(records),
         _joints_section(wall, judgement),
         *_voids_sections(wall, judgement),
         *_closing_sections(wall),
-        _instruments_section(records),
         Section("Joints over depth, plan, and the worst joint", figure=svg_of(picture), new_page=True),
     ]
     good = judgement.verdict is Verdict.TIGHT
@@ -220,7 +220,7 @@ def _closing_sections(wall: Wall) -> list[Section]:
             joint, depth, width = stage.widest
             name = joint_name(wall.columns, wall.pairs[joint])
             spacing = (f"{width:.3f}", name, f"{wall.columns.depths[depth]:g}")
-        drilled, closed = _names(stage.drilled), f"{100.0 * stage.closed:.1f}"
+        drilled, closed = _names(stage.drilled, wall.columns.names), f"{100.0 * stage.closed:.1f}"
         rows.append((stage.day.isoformat(), drilled, closed, str(stage.open_joints), *spacing))
     heads = ("day", "drilled", "closed %", "open joints", "widest m", "joint", "at m")
     words = (
@@ -234,9 +234,18 @@ def _instruments_section(records: list[ColumnRecord]) -> Section:
     for record in (record for record in records if math.isfinite(record.surveyed_md)):
         key = (record.tool.name, record.serial or "not stated", record.calibration or "not stated")
         groups.setdefault(key, []).append(record.design.name)
-    rows = [(*key, _names(names)) for key, names in groups.items()]
+    order = [record.design.name for record in records]
+    rows = [(*key, _names(names, order)) for key, names in groups.items()]
     return Section("Instruments", columns=("error model", "serial", "calibration", "columns"), rows=rows)
 
 
-def _names(names: list[str]) -> str:
-    return f"{names[0]} to {names[-1]} ({len(names)})" if len(names) > 3 else ", ".join(names)
+def _names(names: list[str], order: list[str]) -> str:
+    """Some columns by name, those that stand next to each other as from the first to the last."""
+    runs: list[list[str]] = []
+    for k, name in enumerate(order):
+        if name in names:
+            if k and runs and runs[-1][-1] == order[k - 1]:
+                runs[-1].append(name)
+            else:
+                runs.append([name])
+    return ", ".join(f"{run[0]} to {run[-1]}" if len(run) > 2 else ", ".join(run) for run in runs)

@@ -58,7 +58,7 @@ class Region:
 
     @property
     def _turns(self) -> bool:
-        return not np.array_equal(self.turn, np.eye(3))
+        return bool(self.turn[0, 0] != 1.0 or self.turn[0, 1] != 0.0)  # about the vertical
 
     def _turned(self, cov: Array) -> Array:
         return np.asarray(self.turn @ cov @ self.turn.T) if self._turns else cov

@@ -22,12 +22,12 @@ import numpy.typing as npt
 
 from groundstation.errors import SurveyError, ToolError
 from groundstation.survey.compiled_source import CURVED, GIVEN, STRAIGHT, loop_sources, write_model
-from groundstation.survey.error_model import Uncertainty, check_legs, propagate, surface_covariance
-from groundstation.survey.error_sources import RECORD, SECONDS_A_METRE, Leg, Site, Survey
+from groundstation.survey.error_model import Propagation, Uncertainty, check_legs, propagate, surface_covariance
+from groundstation.survey.error_sources import RECORD, SECONDS_A_METRE, Geometry, Leg, Site, Survey, merged_sources
 from groundstation.survey.gyro_modes import TURNS, mode_weights, sections_of
 from groundstation.survey.instruments import Tool, load_tool
 from groundstation.survey.methods import Method, check_stations, positions
-from groundstation.survey.running_error import RunningUncertainty
+from groundstation.survey.running_sums import RunningSums
 
 Array = npt.NDArray[np.float64]
 COMPILED_FROM = 100  # stations
@@ -138,8 +138,8 @@ def locate(
 
     Where one tool took it all and there are ``COMPILED_FROM`` stations: compiled. Below that the compiler, which takes
     seconds once a tool and machine, costs more than it saves: station by station, by the running sums of which the
-    ground station's trajectory is made. Of several tools, or one that knows its stations before: the arrays of
-    ``error_model``. The survey's own TVD is not looked at.
+    ground station's trajectory is made. Of gyros that err anew in every section: the arrays of ``error_model``. The
+    survey's own TVD is not looked at.
 
     Raises
     ------
@@ -166,29 +166,25 @@ def locate(
 def _uncompiled(survey: Survey, legs: Sequence[Leg], site: Site, *, slot_allowance: bool) -> Uncertainty:
     """Uncertainty of a survey of one well; errors as ``error_model.propagate``."""
     check_legs(survey, legs)
-    tool = legs[0].tool
-    if len(legs) > 1 or any(term.by_mode for term in tool.terms):
+    sources = merged_sources(tuple(legs))
+    if any(source.renewed for source in sources):
         return propagate(survey, legs, site, slot_allowance=slot_allowance)
-    try:
-        cov = _appended(survey, tool, site, slot_allowance=slot_allowance)
-    except ToolError:
-        propagate(survey, legs, site, slot_allowance=slot_allowance)  # names the term
-        raise
+    work = Propagation(survey, legs, site, Geometry(survey, slot_allowance=slot_allowance))
+    inner, last = np.zeros((2, len(survey.md) - 1, 3, len(sources)))
+    with np.errstate(invalid="ignore", over="ignore"):  # what has no value is refused by what comes of it
+        for s, source in enumerate(sources):
+            work.evaluate(source)
+            inner[:, : source.axes, s] = work.inner[: source.axes].T
+            last[:, : source.axes, s] = work.last[: source.axes].T
+    random = np.array([source.random for source in sources])
+    passed, ended = ((e[..., ~random], e[..., random] @ e[..., random].swapaxes(1, 2)) for e in (inner, last))
+    sums = RunningSums()
+    cov = np.empty((len(survey.md), 3, 3))
+    cov[0] = surface_covariance(survey.md, survey.inclination, survey.azimuth, legs[0].tool)
+    for k in range(len(survey.md) - 1):
+        cov[k + 1] = sums.at_end(ended[0][k], ended[1][k])[0]
+        sums.pass_station(passed[0][k], passed[1][k])
     return Uncertainty(survey, tuple(legs), site, slot_allowance, cov)
-
-
-def _appended(survey: Survey, tool: Tool, site: Site, *, slot_allowance: bool) -> Array:
-    """Covariances (n, 3, 3) of one well, one station appended after the other."""
-    rows = np.stack([survey.md, survey.inclination, survey.azimuth, survey.tvd], axis=1).tolist()
-    record = {name: values.tolist() for name, values in survey.record.items()}
-    time = record["Time"][0] if "Time" in record else None
-    running = RunningUncertainty(tool, site, *rows[0][:3], slot_allowance=slot_allowance, time=time)
-    first = surface_covariance(survey.md, survey.inclination, survey.azimuth, tool)
-    later = []
-    for k, (md, inclination, azimuth, tvd) in enumerate(rows[1:], 1):
-        here = {name: values[k] for name, values in record.items()}
-        later.append(running.append(md, inclination, azimuth, tvd, here))
-    return np.stack([first, *later])
 
 
 def compiled_parts(found: Uncertainty) -> dict[str, Array]:

@@ -311,11 +311,8 @@ def check_inclination(tool: Tool, least: float, most: float) -> None:
 
 def surface_covariance(md: Array, inclination: Array, azimuth: Array, tool: Tool) -> Array:
     """Covariance (..., 3, 3) of the first station of (..., n): its own depth reading, if it is at the datum."""
-    cov = np.zeros((*md.shape[:-1], 3, 3))
+    readings = [term for term in tool.terms if term.mode is Mode.RANDOM and term.weights[0] == "1"]
+    variance = np.where(md[..., 0] == 0.0, sum(term.sigma**2 for term in readings), 0.0)
     sine, cosine = np.sin(inclination[..., 0]), np.cos(inclination[..., 0])
     along = np.stack([sine * np.cos(azimuth[..., 0]), sine * np.sin(azimuth[..., 0]), cosine], axis=-1)
-    at_datum = (md[..., 0] == 0.0)[..., None, None]
-    for term in tool.terms:
-        if term.mode is Mode.RANDOM and term.weights[0] == "1":
-            cov = cov + at_datum * term.sigma**2 * along[..., :, None] * along[..., None, :]
-    return cov
+    return np.asarray(variance[..., None, None] * along[..., :, None] * along[..., None, :])

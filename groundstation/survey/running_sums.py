@@ -14,7 +14,7 @@ from __future__ import annotations
 import numpy as np
 import numpy.typing as npt
 
-from groundstation.survey.shared import widened
+from groundstation.survey.shared import added
 
 Array = npt.NDArray[np.float64]
 
@@ -28,13 +28,9 @@ class RunningSums:
 
     def pass_station(self, shared: Array, random: Array) -> None:
         """Count a station with both of its legs: effects (3, s) of shared errors, covariance (3, 3) of its own."""
-        self._random = self._random + random
-        if shared.shape[1] > self._shared.shape[1]:
-            self._shared = widened(self._shared, shared.shape[1])
-        self._shared[:, : shared.shape[1]] += shared
+        self._shared, self._random = added(self._shared, shared), self._random + random
 
     def at_end(self, shared: Array, random: Array) -> tuple[Array, Array]:
         """Covariance (3, 3) and shared columns (3, s) of the position whose station counts with its upper leg."""
-        columns = widened(self._shared, max(shared.shape[1], self._shared.shape[1])).copy()
-        columns[:, : shared.shape[1]] += shared
+        columns = added(self._shared, shared)
         return self._random + random + columns @ columns.T, columns
