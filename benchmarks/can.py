@@ -21,7 +21,7 @@ from telemetry.media.port import STEPPER, Frame, Port, Priority, TubeEnd
 from telemetry.media.table import open_medium
 from telemetry.messages import Side
 from telemetry.presentation.can_load import AIDING, HEADER, steady
-from telemetry.presentation.can_signals import NATIVE
+from telemetry.presentation.can_messages import NATIVE
 from telemetry.presentation.msgpack_codec import encode
 from telemetry.schema import SPEC_OF
 from telemetry.transport.hop import pack_frame

@@ -10,8 +10,10 @@ from typing import Any
 
 from telemetry.media.can_frame import EXTENDED
 from telemetry.media.can_identifier import Identifier
+from telemetry.presentation.can_forms import Layout
+from telemetry.presentation.can_messages import NATIVE, NativeMessage
 from telemetry.presentation.can_native import PRIORITIES
-from telemetry.presentation.can_signals import COUNT, NATIVE, Layout, NativeMessage, Scale, Signal
+from telemetry.presentation.can_signals import COUNT, Scale, Signal
 from telemetry.schema import SPEC_OF
 
 IDENTIFIER_MASK = 0x1FE0001F  # priority, type and part; not the sender and the addressee

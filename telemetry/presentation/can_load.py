@@ -13,8 +13,8 @@ from telemetry.media.can_exchange import PRESENCE_EVERY
 from telemetry.media.can_timing import CLASSIC_LARGEST, FD_LARGEST, BitRates
 from telemetry.media.isotp import frame_lengths
 from telemetry.messages import Aiding, Hello, Message, Mode, NodeFlag, NodeState, TimeReply, TimeRequest
+from telemetry.presentation.can_messages import NATIVE
 from telemetry.presentation.can_native import HEADER_EVERY
-from telemetry.presentation.can_signals import NATIVE
 from telemetry.presentation.msgpack_codec import encode
 from telemetry.schema import SPEC_OF
 from telemetry.transport.hop import Header, pack_frame

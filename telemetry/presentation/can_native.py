@@ -11,8 +11,10 @@ from telemetry.errors import DecodeError, EncodeError
 from telemetry.media.can_profile import NativePart, Split
 from telemetry.media.port import Priority
 from telemetry.messages import Message
-from telemetry.presentation.can_signals import COUNT, FD_PART, NATIVE, Form
-from telemetry.presentation.msgpack_codec import decode, encode
+from telemetry.presentation.can_forms import FD_PART, Form
+from telemetry.presentation.can_messages import NATIVE
+from telemetry.presentation.can_signals import COUNT
+from telemetry.presentation.msgpack_codec import CODEC_OF, open_payload, values_of_opened
 from telemetry.schema import SPEC_OF, Kind
 from telemetry.transport.hop import Header, pack_frame, parse_frame
 
@@ -74,14 +76,14 @@ class NativeProfile:
         frames = [data] if part == FD_PART else self._collect(type_, part, data, len(form.layouts))
         if frames is None:
             return None
-        decoded = message.message_of(form.unpack(frames))
+        values = message.values_of(form.unpack(frames))
         epoch = self._epoch.get(source)
         if epoch is None:
             raise DecodeError("unknown_sender")
         newest = self._count.get(source, 0)
         number = newest + (data[0] - newest + HALF & COUNT.largest) - HALF  # urgent frames come before older ones
         self._count[source] = max(newest, number)
-        return pack_frame(Header(source, epoch, max(number, 1), 0, 0, 0), [(0, encode(decoded))])
+        return pack_frame(Header(source, epoch, max(number, 1), 0, 0, 0), [(0, CODEC_OF[type_].pack(values))])
 
     def observe(self, payload: bytes) -> None:
         """See a frame of the link that came by ISO-TP: who sends in which boot and session, and how many so far."""
@@ -116,12 +118,12 @@ class NativeProfile:
 def native_parts(payload: bytes, count: int, *, fd: bool) -> list[NativePart] | None:
     """Frames of a cyclic message; None for one that only the tunnel carries."""
     try:
-        message = decode(payload)
-        native = NATIVE.get(SPEC_OF[type(message)].kind)
+        opened = open_payload(payload)
+        native = NATIVE.get(opened.envelope.kind)
         if native is None:
             return None
         form: Form = native.fd if fd else native.classic
-        frames = form.pack(native.raws_of(message), count)
+        frames = form.pack(native.raws_of_values(values_of_opened(opened)), count)
     except (DecodeError, EncodeError):
         return None
     return [
@@ -135,7 +137,7 @@ def rounded(message: Message) -> Message:
     native = NATIVE.get(SPEC_OF[type(message)].kind)
     if native is None:
         return message
-    return native.message_of(native.fd.unpack(native.fd.pack(native.raws_of(message), 0)))
+    return native.message_of(native.raws_of(message))
 
 
 def rounded_frame(payload: bytes) -> bytes:
@@ -149,7 +151,11 @@ def rounded_frame(payload: bytes) -> bytes:
 
 def _rounded_payload(payload: bytes) -> bytes:
     try:
-        return encode(rounded(decode(payload)))
+        opened = open_payload(payload)
+        native = NATIVE.get(opened.envelope.kind)
+        if native is None:
+            return payload
+        return CODEC_OF[native.kind].pack(native.values_of(native.raws_of_values(values_of_opened(opened))))
     except (DecodeError, EncodeError):
         return payload
 

@@ -31,6 +31,7 @@ MAX_BINARY = 256
 LARGEST_COVARIANCE, LARGEST_FORCE = 1e6, 1e3  # (m/s^2)^2 and the like, m/s^2
 
 Check = Callable[[Quantity, Any], Any]
+QUICK: dict[ValueKind, type[Any]] = {ValueKind.NUMBER: float, ValueKind.INTEGER: int}
 
 
 @dataclass(frozen=True, slots=True)
@@ -52,14 +53,34 @@ class FieldCodec:
 def codec_of(field: Field) -> FieldCodec:
     """Codec of one line of the schema."""
     check, pack = CODECS[field.kind]
+    checked: Callable[[Any], Any] = partial(check, field)
     if field.enumeration is not None:
-        check = enumerated(field.enumeration)
-    return FieldCodec(field.name, field.key, partial(check, field), pack, field.since, field.before)
+        checked = enumerated(field, field.enumeration)
+    elif field.kind in QUICK:
+        checked = quick(field, QUICK[field.kind], checked)
+    return FieldCodec(field.name, field.key, checked, pack, field.since, field.before)
 
 
-def enumerated(enumeration: Callable[[int], Any]) -> Check:
+def quick(q: Quantity, kind: type[Any], check: Callable[[Any], Any]) -> Callable[[Any], Any]:
+    """Check of a number that asks ``check`` only where it is not as nearly always: of its type and in its range."""
+    low, high = q.low, q.high
+
+    def checked(value: Any) -> Any:
+        return value if type(value) is kind and low <= value <= high else check(value)
+
+    return checked
+
+
+def enumerated(q: Quantity, enumeration: Callable[[int], Any]) -> Callable[[Any], Any]:
     """Check of an integer that stands for a member or for flags."""
-    return lambda q, value: enumeration(check_integer(q, value))
+    members: dict[int, Any] = {}
+
+    def checked(value: Any) -> Any:
+        if type(value) is not int or (member := members.get(value)) is None:
+            member = members[int(value)] = enumeration(check_integer(q, value))
+        return member
+
+    return checked
 
 
 def check_vector(q: Quantity, value: Any) -> tuple[float, float, float]:
@@ -130,7 +151,7 @@ def pack_stands(stands: Any) -> list[Any]:
 
 CODECS: dict[ValueKind, tuple[Check, Callable[[Any], Any] | None]] = {
     ValueKind.NUMBER: (check_number, None),
-    ValueKind.INTEGER: (check_integer, int),
+    ValueKind.INTEGER: (check_integer, None),
     ValueKind.BOOLEAN: (check_boolean, None),
     ValueKind.TEXT: (check_text, None),
     ValueKind.BINARY: (check_binary, None),
@@ -146,9 +167,15 @@ CODECS: dict[ValueKind, tuple[Check, Callable[[Any], Any] | None]] = {
 def _vector(name: str, value: Any, limit: float) -> tuple[float, float, float]:
     if not isinstance(value, list | tuple) or len(value) != 3:
         raise ValueError(f"{name}: expected three numbers, got {value!r:.40}")
+    x, y, z = value
+    if (
+        type(x) is type(y) is type(z) is float
+        and -limit <= x <= limit
+        and -limit <= y <= limit
+        and -limit <= z <= limit
+    ):
+        return x, y, z
     for item in value:
-        if type(item) is float and -limit <= item <= limit:
-            continue
         if isinstance(item, bool) or not isinstance(item, int | float) or not -limit <= item <= limit:
             raise ValueError(f"{name}: expected numbers within +-{limit:g}, got {item!r:.40}")
     return float(value[0]), float(value[1]), float(value[2])

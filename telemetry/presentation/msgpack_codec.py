@@ -47,20 +47,33 @@ class MessageCodec:
         self.message = spec.message
         self.newest = spec.newest
         self.fields = tuple(codec_of(field) for field in spec.fields)
-        self.later = tuple(field for field in self.fields if field.since > 1)
         self.goes_down = spec.kind in DOWNWARD
         names = [field.name for field in self.fields]
         self.values: Callable[[Any], Any] = attrgetter(*names) if len(names) > 1 else lambda m: (getattr(m, names[0]),)
-        self.origin = attrgetter("tube") if "tube" in names else lambda _message: NO_TARGET
-        self.sequence = attrgetter("sequence") if "sequence" in names else lambda _message: 0
+        self._later = [(place, f.since, f.before) for place, f in enumerate(self.fields) if f.since > 1]
+        self._packed = [(place, f.pack) for place, f in enumerate(self.fields) if f.pack is not None]
+        sinces = [field.since for field in self.fields]
+        if sinces != sorted(sinces):
+            raise ValueError(f"{spec.message.__name__}: expected fields of later schema versions after all others")
+        keys = [[field.key for field in self.fields if field.since <= version] for version in range(self.newest + 1)]
+        self._keys = keys  # of each version
+        self._origin = names.index("tube") if "tube" in names else None
+        self._sequence = names.index("sequence") if "sequence" in names else None
 
-    def version_of(self, message: Message) -> int:
-        """Earliest schema version that can express it."""
+    def pack(self, values: list[Any]) -> bytes:
+        """Payload of the values of all fields, which are checked, in the earliest schema version that has them."""
         version = 1
-        for field in self.later:
-            if field.since > version and getattr(message, field.name) != field.before:
-                version = field.since
-        return version
+        for place, since, before in self._later:
+            if since > version and values[place] != before:
+                version = since
+        origin = NO_TARGET if self._origin is None else values[self._origin]
+        sequence = 0 if self._sequence is None else values[self._sequence]
+        for place, pack in self._packed:
+            values[place] = pack(values[place])
+        body = dict(zip(self._keys[version], values, strict=False))
+        target = origin if self.goes_down else BASE
+        rows = {"v": version, "k": int(self.kind), "o": origin, "t": target, "s": sequence, "b": body}
+        return bytes(msgpack.packb(rows))
 
 
 CODECS: dict[type[Any], MessageCodec] = {spec.message: MessageCodec(spec) for spec in SCHEMA}
@@ -76,19 +89,11 @@ def encode(message: Message) -> bytes:
         When a field is outside its range.
     """
     codec = CODECS[type(message)]
-    version = codec.version_of(message)
     try:
-        body = {
-            field.key: field.pack(field.check(value)) if field.pack is not None else field.check(value)
-            for field, value in zip(codec.fields, codec.values(message), strict=True)
-            if field.since <= version
-        }
+        values = [field.check(value) for field, value in zip(codec.fields, codec.values(message), strict=True)]
     except ValueError as error:
         raise EncodeError(f"{type(message).__name__}: {error}") from error
-    origin = codec.origin(message)
-    target = origin if codec.goes_down else BASE
-    rows = {"v": version, "k": int(codec.kind), "o": origin, "t": target, "s": codec.sequence(message), "b": body}
-    return bytes(msgpack.packb(rows))
+    return codec.pack(values)
 
 
 def decode(payload: bytes) -> Message:
@@ -122,17 +127,42 @@ def decode_opened(opened: Opened) -> Message:
     DecodeError
         When a field is missing or outside its range.
     """
-    codec = CODEC_OF[opened.envelope.kind]
-    body, version = opened.rows.get("b"), opened.rows["v"]
-    if not isinstance(body, dict):
-        raise DecodeError(f"{codec.message.__name__}: expected a map of fields, got {body!r:.40}")
-    get = body.get
+    codec, version = CODEC_OF[opened.envelope.kind], opened.rows["v"]
+    get = body_of(opened).get
     try:
         values = [field.check(get(field.key)) if field.since <= version else field.default() for field in codec.fields]
     except ValueError as error:
         raise DecodeError(f"{codec.message.__name__}: {error}") from error
     decoded: Message = codec.message(*values)
     return decoded
+
+
+def values_of_opened(opened: Opened) -> list[Any]:
+    """Values of all fields of an opened payload, unchecked: None where one is missing.
+
+    Raises
+    ------
+    DecodeError
+        When there are no fields at all.
+    """
+    version, get = opened.rows["v"], body_of(opened).get
+    fields = CODEC_OF[opened.envelope.kind].fields
+    return [get(field.key) if field.since <= version else field.default() for field in fields]
+
+
+def body_of(opened: Opened) -> dict[str, Any]:
+    """Fields of an opened payload by their keys, unchecked.
+
+    Raises
+    ------
+    DecodeError
+        When there are no fields at all.
+    """
+    body = opened.rows.get("b")
+    if not isinstance(body, dict):
+        name = CODEC_OF[opened.envelope.kind].message.__name__
+        raise DecodeError(f"{name}: expected a map of fields, got {body!r:.40}")
+    return body
 
 
 def peek(payload: bytes) -> Envelope:

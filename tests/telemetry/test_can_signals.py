@@ -16,6 +16,8 @@ from messages_of_schema import MESSAGES
 from telemetry.errors import DecodeError, EncodeError
 from telemetry.messages import Aiding, Command, Hello, Mode, NodeState, TimeReply, TimeRequest
 from telemetry.presentation.can_dbc import IDENTIFIER_MASK, dbc_text, differences, identifier_of, layouts
+from telemetry.presentation.can_forms import FD_PART
+from telemetry.presentation.can_messages import NATIVE, UNSAID, NativeMessage
 from telemetry.presentation.can_native import (
     HEADER_EVERY,
     NativeProfile,
@@ -23,7 +25,7 @@ from telemetry.presentation.can_native import (
     rounded,
     rounded_frame,
 )
-from telemetry.presentation.can_signals import FD_PART, NATIVE, UNSAID, NativeMessage, Scale
+from telemetry.presentation.can_signals import Scale
 from telemetry.presentation.msgpack_codec import encode
 from telemetry.schema import Kind
 from telemetry.transport.hop import HopLink, parse_frame
