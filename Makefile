@@ -15,10 +15,10 @@ unexport PYTHONDONTWRITEBYTECODE
 PYTEST := $(BIN)/python -m pytest --numprocesses $(WORKERS) --maxprocesses 8 --dist worksteal
 
 .DEFAULT_GOAL := rig
-.PHONY: help rig test quick check lint types contracts kernels bytecode browser tests statistical truth explore lock study soak seeds clean
+.PHONY: help rig test quick check lint types contracts kernels bytecode browser tests statistical truth explore lock study soak seeds clean test-socketcan test-compose
 
 help:  ## list the targets
-	@awk -F ':.*## ' '/^[a-z]+:.*## / { printf "make %-12s %s\n", $$1, $$2 }' $(MAKEFILE_LIST)
+	@awk -F ':.*## ' '/^[a-z-]+:.*## / { printf "make %-15s %s\n", $$1, $$2 }' $(MAKEFILE_LIST)
 
 rig: $(STAMP)  ## set up and drill wellbore 1
 	$(BIN)/borechain rig scenarios/wellbore-1.toml --speed max --seed 1
@@ -82,6 +82,12 @@ soak: $(STAMP)  ## 100 000 seeds of the gauntlet, SOAK hours of a rig under faul
 
 seeds: $(STAMP)  ## fresh seeds of the gauntlet, SEEDS of them FROM one on
 	$(BIN)/borechain gauntlet --seeds $(SEEDS) --from $(FROM)
+
+test-socketcan: $(STAMP)  ## joints on the kernel's own CAN, in a User-Mode Linux; says why where there is none
+	$(BIN)/python tests/tools/socketcan.py
+
+test-compose: $(STAMP)  ## docker-compose.yml in containers until two tubes are surveyed; says why where that cannot be
+	$(BIN)/python tests/tools/compose.py $(COLD)
 
 lock:  ## pin the dependencies again, without addresses (needs pip-tools)
 	pip-compile --quiet --upgrade --generate-hashes --all-extras --allow-unsafe --strip-extras --no-annotate \

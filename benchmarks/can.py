@@ -14,13 +14,13 @@ import can
 import isotp
 
 from sim.can.hub import CanHub
+from telemetry.application.can_load import AIDING, HEADER, steady
 from telemetry.media.can_loopback import register
 from telemetry.media.can_loopback_protocol import INTERFACE
 from telemetry.media.isotp import Receiver, Sender
 from telemetry.media.port import STEPPER, Frame, Port, Priority, TubeEnd
 from telemetry.media.table import open_medium
 from telemetry.messages import Side
-from telemetry.presentation.can_load import AIDING, HEADER, steady
 from telemetry.presentation.can_messages import NATIVE
 from telemetry.presentation.msgpack_codec import encode
 from telemetry.schema import SPEC_OF

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import datetime
 import json
+import statistics
 import tempfile
 import time
 from collections.abc import Callable
@@ -12,7 +13,9 @@ from pathlib import Path
 from typing import Any
 
 from borechain.pki.rig_keys import add_tube, init_rig
+from telemetry.application.can_load import HEADER, steady
 from telemetry.application.depth_seal import open_depth, seal_depth
+from telemetry.application.end_seal import content_of_sealed, is_sealed
 from telemetry.application.seals import Seals, seals_of
 from telemetry.media.credentials import DEPTH_SOURCE
 from telemetry.messages import (
@@ -35,6 +38,8 @@ from telemetry.messages import (
     SurveyMeasurement,
 )
 from telemetry.presentation.msgpack_codec import decode, encode
+from telemetry.transport.hop import pack_frame, parse_frame
+from telemetry.transport.joint_seal import JointSeal
 from telemetry.transport.key_ring import key_file, read_ring
 
 ROUNDS, TIMES = 40, 200
@@ -57,14 +62,15 @@ def run() -> dict[str, Any]:
     Returns
     -------
     dict
-        ``ratios``: seconds of sealing and judging (ours) and of encoding and decoding (peer) for each kind.
+        ``ratios``: seconds of sealing and judging (ours) and of encoding and decoding (peer) for each kind;
+        ``decode_verify_us``: median time from a sealed frame of the link to its message, both seals judged.
     """
     with tempfile.TemporaryDirectory(prefix="borechain-") as place:
         folder, now = Path(place) / "stick", datetime.datetime.now(datetime.UTC)
         init_rig(folder, "rig-1", now)
         add_tube(folder, 1, now)
-        found = measured(folder)
-    return {"bench": "seals", "ratios": found}
+        found, verified = measured(folder), verify_times(folder)
+    return {"bench": "seals", "ratios": found, "decode_verify_us": verified}
 
 
 def measured(folder: Path) -> dict[str, dict[str, float]]:
@@ -116,16 +122,60 @@ def meet(base: Seals, tube: Seals) -> None:
 
 def frames(base: Seals, encoder: Seals) -> dict[str, float]:
     """Times of a frame over one joint; each is sealed anew, since none is believed twice."""
-    one, other = base.joints[Side.LOWER], encoder.joints[Side.UPPER]
+    one, other = joined(base.joints[Side.LOWER], encoder.joints[Side.UPPER])
+    payload = bytes(300)
+    made = best(lambda: one.close(payload))
+    both_ways = best(lambda: other.open(one.close(payload) or b"", 4.0))
+    return {"ours": both_ways, "peer": made, "ratio": made / both_ways}
+
+
+def joined(one: JointSeal, other: JointSeal) -> tuple[JointSeal, JointSeal]:
+    """Both ends of a joint once they have proven themselves."""
     for now in range(4):
         for frame in one.own_frames(float(now)):
             other.open(frame, float(now))
         for frame in other.own_frames(float(now)):
             one.open(frame, float(now))
-    payload = bytes(300)
-    made = best(lambda: one.close(payload))
-    both_ways = best(lambda: other.open(one.close(payload) or b"", 4.0))
-    return {"ours": both_ways, "peer": made, "ratio": made / both_ways}
+    return one, other
+
+
+def verify_times(folder: Path) -> dict[str, float]:
+    """Median time (us) of each cyclic message at whoever believes it: tube 1, of its state the base."""
+    found = {}
+    base, tube = opened(folder, BASE, [Side.LOWER]), opened(folder, 1, Side)
+    encoder = opened(folder, ENCODER, Side)
+    meet(base, tube)
+    above, below = joined(encoder.joints[Side.LOWER], tube.joints[Side.UPPER])
+    for traffic in steady(1):
+        times = []
+        for number in range(TIMES * 5):
+            message, payload = traffic.message, b""
+            if isinstance(message, Aiding):
+                message = encoder.measurement.close(replace(message, sequence=number, valid_at=100.0, epoch=1))
+            payload = encode(message)
+            if isinstance(message, NodeState):
+                payload = tube.close_up(encode(replace(message, tube=1)))
+            frame = above.close(pack_frame(HEADER, [(0, payload)])) or b""
+            begun = time.perf_counter()
+            heard = verified(below.open(frame, 4.0) or b"", tube, base)
+            times.append(time.perf_counter() - begun)
+            if heard != decode(content_of_sealed(payload)):
+                raise RuntimeError(f"expected {message}, got {heard}")
+        found[type(traffic.message).__name__] = 1e6 * statistics.median(times)
+    return found
+
+
+def verified(frame: bytes, tube: Seals, base: Seals) -> Message | None:
+    """Message of an opened frame of the link; None where its own seal does not fit."""
+    parsed = parse_frame(frame)
+    if parsed is None:
+        return None
+    payload: bytes = parsed[1][0][1]
+    if is_sealed(payload):
+        return decode(content_of_sealed(payload)) if base.hear(payload, 1, 4.0).is_believed else None
+    message = decode(payload)
+    is_believed = not isinstance(message, Aiding) or tube.measurement.admits(message, 1, 100.0)
+    return message if is_believed else None
 
 
 def both(make: Callable[[], object], judge: Callable[[], object], message: Message) -> dict[str, float]:

@@ -15,7 +15,7 @@ RESULTS = ROOT / "docs" / "results"
 
 def targets() -> dict[str, str]:
     """Targets of the Makefile with their texts."""
-    lines = re.findall(r"^([a-z]+):([^=\n]*)$", (ROOT / "Makefile").read_text(), re.MULTILINE)
+    lines = re.findall(r"^([a-z-]+):([^=\n]*)$", (ROOT / "Makefile").read_text(), re.MULTILINE)
     return {name: rest.partition("## ")[2].strip() for name, rest in lines}
 
 

@@ -2,18 +2,23 @@
 
 from __future__ import annotations
 
+import datetime
 from dataclasses import replace
+from pathlib import Path
 
 import pytest
 
+from borechain.pki.rig_keys import add_tube, init_rig
 from sim.can.wire import CanWire
+from telemetry.application.can_load import AIDING, CYCLE, HEADER, STATE, load, load_table, steady
+from telemetry.application.end_seal import content_of_sealed
+from telemetry.application.seals import Seals, seals_of
 from telemetry.media.can_exchange import CanExchange
 from telemetry.media.can_frame import EXTENDED, IDENTIFIER, CanFrame
 from telemetry.media.can_timing import BitRates
 from telemetry.media.port import MAX_FRAME, Frame, Priority
 from telemetry.media.send_queue import SendQueue
-from telemetry.messages import Hello, NodeState, TimeReply, TimeRequest
-from telemetry.presentation.can_load import AIDING, CYCLE, HEADER, STATE, load, load_table, steady
+from telemetry.messages import Aiding, Hello, NodeState, Side, TimeReply, TimeRequest
 from telemetry.presentation.can_native import open_profile
 from telemetry.presentation.msgpack_codec import decode, encode
 from telemetry.transport.hop import Header, pack_frame, parse_frame
@@ -24,7 +29,7 @@ RATES = BitRates(125_000.0, 500_000.0)
 class SimulatedJoint:
     """Two ends on a paced wire; payloads go in as frames of a link, one message each."""
 
-    def __init__(self, profile: str, *, fd: bool, thins: bool = False) -> None:
+    def __init__(self, profile: str, *, fd: bool, thins: bool = False, keys: Path | None = None) -> None:
         self.wire, self.now, self.fd = CanWire(RATES), 0.0, fd
         known = RATES if thins else None
         self.ends = [
@@ -37,14 +42,28 @@ class SimulatedJoint:
         for address in (0, 1):
             self.wire.attach(address, fd=True, hears_itself=True)
         self.heard: list[list[tuple[float, object]]] = [[], []]
-        self._number = [0, 0]
+        self._number = [HEADER.number, HEADER.number]  # of a string that has drilled for days, as in the table
+        self.seals = None if keys is None else met(keys)
 
     def send(self, end: int, message: object, priority: Priority, topic: object, *, kept: bool = False) -> None:
         self._number[end] += 1
         header: Header = HEADER._replace(sender=end, number=self._number[end])
         number = self._number[end] if kept else 0
-        payload = pack_frame(header, [(number, encode(message))])  # type: ignore[arg-type]
-        self.ends[end].queue.offer(Frame(payload, priority, topic))
+        if self.seals is not None and isinstance(message, Aiding):
+            message = self.seals[end].measurement.close(message)
+        content = encode(message)  # type: ignore[arg-type]
+        if self.seals is not None and isinstance(message, NodeState):
+            content = self.seals[end].close_up(content)
+        self.ends[end].queue.offer(Frame(self._sealed(end, pack_frame(header, [(number, content)])), priority, topic))
+
+    def _sealed(self, end: int, payload: bytes) -> bytes:
+        if self.seals is None:
+            return payload
+        (sealed,) = self.seals[end].frames_of(SIDES[end], [Frame(payload)], self.now)
+        return sealed.payload
+
+    def _opened(self, end: int, payload: bytes) -> bytes | None:
+        return payload if self.seals is None else self.seals[end].joints[SIDES[end]].open(payload, self.now)
 
     def run(self, until: float, tick: float = 2e-4) -> None:
         while self.now < until:
@@ -64,9 +83,35 @@ class SimulatedJoint:
             self.ends[to].on_acknowledged(self.now)
             return
         payload = self.ends[to].on_frame(frame.can_id & IDENTIFIER, frame.data, self.now)
-        parsed = parse_frame(payload) if payload is not None else None
+        opened = self._opened(to, payload) if payload is not None else None
+        parsed = parse_frame(opened) if opened is not None else None
         for _, content in parsed[1] if parsed is not None else []:
-            self.heard[to].append((self.now, decode(content)))
+            self.heard[to].append((self.now, decode(content_of_sealed(content))))
+
+
+SIDES = (Side.LOWER, Side.UPPER)  # of the joint, of the encoder above and the tube below
+
+
+def met(keys: Path) -> list[Seals]:
+    """Seals of both ends, which know each other's sessions at time 0."""
+    seals = []
+    for address in (0, 1):
+        made = seals_of(keys, address, Side)
+        assert made is not None
+        seals.append(made)
+    for _ in range(4):
+        for end in (0, 1):
+            for frame in seals[end].joints[SIDES[end]].own_frames(0.0):
+                seals[1 - end].joints[SIDES[1 - end]].open(frame, 0.0)
+    return seals
+
+
+@pytest.fixture(scope="module")
+def keys(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    folder, now = tmp_path_factory.mktemp("stick") / "stick", datetime.datetime.now(datetime.UTC)
+    init_rig(folder, "rig-1", now)
+    add_tube(folder, 1, now)
+    return folder
 
 
 PRIORITY = {Hello: Priority.HELLO, TimeRequest: Priority.TIME, TimeReply: Priority.TIME, NodeState: Priority.STATE}
@@ -80,9 +125,9 @@ def drill(joint: SimulatedJoint, tubes: int, seconds: float) -> None:
     others = [t for t in steady(tubes) if t.message is not AIDING and t.message is not STATE]
     sent = dict.fromkeys(range(len(others)), 0)
     while joint.now < begin + seconds:
-        joint.send(0, replace(AIDING, sequence=cycle), Priority.AIDING, "aiding")
+        joint.send(0, replace(AIDING, sequence=AIDING.sequence + cycle), Priority.AIDING, "aiding")
         for tube in range(1, tubes + 1):
-            joint.send(1, replace(STATE, tube=tube, cycles=cycle), Priority.STATE, ("state", tube))
+            joint.send(1, replace(STATE, tube=tube, cycles=STATE.cycles + cycle), Priority.STATE, ("state", tube))
         for number, traffic in enumerate(others):
             while sent[number] < traffic.rate * (joint.now - begin):
                 sent[number] += 1
@@ -101,6 +146,23 @@ def test_the_table_is_what_the_bus_carries(profile: str, fd: bool, tubes: int) -
     drill(joint, tubes, 20.0)
     measured = joint.wire.busy / (joint.now - 0.2)
     assert measured == pytest.approx(load(steady(tubes), profile, RATES, fd=fd), rel=0.05)
+
+
+@pytest.mark.slow
+def test_the_table_is_what_the_bus_carries_under_keys(keys: Path) -> None:
+    joint = SimulatedJoint("native", fd=True, keys=keys)
+    drill(joint, 10, 10.0)
+    measured = joint.wire.busy / (joint.now - 0.2)
+    assert measured == pytest.approx(load(steady(10), "native", RATES, fd=True, sealed=True), rel=0.05)
+
+
+@pytest.mark.slow
+def test_fifty_tubes_on_a_slow_joint_thin_themselves_under_keys(keys: Path) -> None:
+    joint = SimulatedJoint("native", fd=True, thins=True, keys=keys)
+    drill(joint, 50, 10.0)
+    assert load(steady(50), "native", RATES, fd=True, sealed=True) > 0.8
+    assert joint.wire.busy / (joint.now - 0.2) <= 0.6
+    assert len([m for _, m in joint.heard[1] if isinstance(m, Aiding)]) >= 10.0 / CYCLE - 2
 
 
 @pytest.mark.slow

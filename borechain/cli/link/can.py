@@ -32,27 +32,29 @@ from telemetry.runtime.command_line import check_installed
     show_default=True,
     help="Bit rate of CAN FD's data as a multiple of the nominal one.",
 )
+@click.option("--sealed", is_flag=True, help="Under keys: every frame has a seal, and goes by ISO-TP.")
 @json_option
 @plain_faults
-def load(tubes: tuple[int, ...], bitrate: tuple[float, ...], data_ratio: float, as_json: bool) -> None:
+def load(tubes: tuple[int, ...], bitrate: tuple[float, ...], data_ratio: float, sealed: bool, as_json: bool) -> None:
     """Load of the top joint's CAN bus in per cent, worst bit stuffing; over 60 % node states are thinned out.
 
     \b
-    Example:
+    Examples:
       borechain link load --tubes 50 --bitrate 125000
+      borechain link load --tubes 50 --bitrate 125000 --sealed
     """
-    from telemetry.presentation.can_load import load_table
+    from telemetry.application.can_load import load_table
 
     rows: list[dict[str, Any]] = [
         {"tubes": count, "profile": profile, "frames": frames, "bitrate": int(rate), "load_percent": 100.0 * busy}
-        for count, profile, frames, rate, busy in load_table(tubes, bitrate, data_ratio)
+        for count, profile, frames, rate, busy in load_table(tubes, bitrate, data_ratio, sealed=sealed)
     ]
     if as_json:
         click.echo(json.dumps({"load": rows}))
         return
     check_installed("rich")
     columns = [("tubes", "tubes"), ("profile", "profile"), ("frames", "frames"), ("bitrate", "bit/s")]
-    show_table("load of the top joint", rows, (*columns, ("load_percent", "load, %")))
+    show_table("load of the top joint" + (", sealed" if sealed else ""), rows, (*columns, ("load_percent", "load, %")))
 
 
 @click.command()

@@ -2,13 +2,16 @@
 
 Counted over the messages that are sent all the time, worst stuffing: aiding and node states each 1.9 Hz, hellos of both
 ends each second and their signs of life, a clock exchange each ten seconds. What ISO-TP's receiver answers counts too.
+Under keys every frame of the link has a seal, states and the measurement one of their own, and signals carry nothing.
 """
 
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
+from telemetry.application.end_seal import OVERHEAD as END_SEAL
+from telemetry.application.measurement_seal import SEAL_SIZE
 from telemetry.media.can_exchange import PRESENCE_EVERY
 from telemetry.media.can_timing import CLASSIC_LARGEST, FD_LARGEST, BitRates
 from telemetry.media.isotp import frame_lengths
@@ -18,6 +21,7 @@ from telemetry.presentation.can_native import HEADER_EVERY
 from telemetry.presentation.msgpack_codec import encode
 from telemetry.schema import SPEC_OF
 from telemetry.transport.hop import Header, pack_frame
+from telemetry.transport.joint_seal import OVERHEAD as JOINT_SEAL
 
 CYCLE = 1.0 / 1.9  # s
 HELLO_PERIOD, SYNC_PERIOD = 1.0, 10.0  # s
@@ -50,28 +54,36 @@ def steady(tubes: int, cycle: float = CYCLE) -> list[Traffic]:
     ]
 
 
-def frame_bytes(message: Message, profile: str, *, fd: bool) -> list[float]:
+def link_bytes(message: Message, *, sealed: bool) -> int:
+    """Bytes of a frame of the link that carries a message and nothing else."""
+    if not sealed:
+        return len(pack_frame(HEADER, [(0, encode(message))]))
+    if isinstance(message, Aiding):
+        message = replace(message, seal=bytes(SEAL_SIZE))
+    own = bytes(END_SEAL) if isinstance(message, NodeState) else b""
+    return JOINT_SEAL + len(pack_frame(HEADER, [(0, own + encode(message))]))
+
+
+def frame_bytes(message: Message, profile: str, *, fd: bool, sealed: bool = False) -> list[int]:
     """Bytes of data in each CAN frame of a message, alone in its frame of the link."""
-    largest = FD_LARGEST if fd else CLASSIC_LARGEST
-    tunnel = frame_lengths(len(pack_frame(HEADER, [(0, encode(message))])), largest)
-    if profile == "tunnel":
-        return list(map(float, tunnel))
+    if sealed or profile == "tunnel":
+        return frame_lengths(link_bytes(message, sealed=sealed), FD_LARGEST if fd else CLASSIC_LARGEST)
     native = NATIVE[SPEC_OF[type(message)].kind]
-    return [float(layout.length) for layout in (native.fd if fd else native.classic).layouts]
+    return [layout.length for layout in (native.fd if fd else native.classic).layouts]
 
 
-def duration(message: Message, profile: str, rates: BitRates, *, fd: bool) -> float:
+def duration(message: Message, profile: str, rates: BitRates, *, fd: bool, sealed: bool = False) -> float:
     """Bus time of a message, s; of the native profile with its share of the headers that go by ISO-TP."""
-    own = sum(rates.duration(int(length), fd=fd) for length in frame_bytes(message, profile, fd=fd))
-    if profile == "tunnel":
+    own = sum(rates.duration(length, fd=fd) for length in frame_bytes(message, profile, fd=fd, sealed=sealed))
+    if sealed or profile == "tunnel":
         return own
     header = frame_lengths(len(pack_frame(HEADER, [])), FD_LARGEST if fd else CLASSIC_LARGEST)
     return own + sum(rates.duration(length, fd=fd) for length in header) / HEADER_EVERY
 
 
-def load(traffic: list[Traffic], profile: str, rates: BitRates, *, fd: bool) -> float:
+def load(traffic: list[Traffic], profile: str, rates: BitRates, *, fd: bool, sealed: bool = False) -> float:
     """Share of its time that the bus is busy, signs of life included; over 1: it cannot carry that."""
-    messages = sum(t.rate * duration(t.message, profile, rates, fd=fd) for t in traffic)
+    messages = sum(t.rate * duration(t.message, profile, rates, fd=fd, sealed=sealed) for t in traffic)
     return messages + presences(traffic, profile) * rates.duration(PRESENCE_BYTES, fd=fd)
 
 
@@ -83,7 +95,7 @@ def presences(traffic: list[Traffic], profile: str) -> float:
 
 
 def load_table(
-    tubes: tuple[int, ...], bitrates: tuple[float, ...], data_ratio: float
+    tubes: tuple[int, ...], bitrates: tuple[float, ...], data_ratio: float, *, sealed: bool = False
 ) -> Iterator[tuple[int, str, str, float, float]]:
     """Tubes, profile, frames, nominal bit rate and load of every combination; FD's data run ``data_ratio`` as fast."""
     for count in tubes:
@@ -91,4 +103,5 @@ def load_table(
             for profile in PROFILES:
                 for bitrate in bitrates:
                     rates = BitRates(bitrate, data_ratio * bitrate)
-                    yield count, profile, frames, bitrate, load(steady(count), profile, rates, fd=frames == "fd")
+                    busy = load(steady(count), profile, rates, fd=frames == "fd", sealed=sealed)
+                    yield count, profile, frames, bitrate, busy
