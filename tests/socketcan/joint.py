@@ -22,7 +22,7 @@ from telemetry.media.table import open_medium
 from telemetry.messages import ENCODER, Aiding, Event, Severity, Side
 from telemetry.presentation.can_native import rounded
 
-PATIENCE = 30.0  # s
+PATIENCE = 60.0  # s
 SETTINGS = ("frames=fd", "frames=classic", "frames=fd,profile=native", "frames=classic,profile=native")
 
 
@@ -59,12 +59,14 @@ class Joint:
         self.tube = Talker(stack, lower, 1, Side.UPPER, ENCODER)
         self._number = 0
 
-    def until(self, holds: Callable[[], object]) -> None:
+    def until(self, what: str, holds: Callable[[], object]) -> None:
         """Let both talk until something holds."""
         deadline, tick = time.monotonic() + PATIENCE, threading.Event()
         while not holds():
             if time.monotonic() >= deadline:
-                raise SystemExit(f"waited {PATIENCE:g} s: {self.encoder.port.counters}, {self.tube.port.counters}")
+                raise SystemExit(
+                    f"waited {PATIENCE:g} s for {what}: {self.encoder.port.counters}, {self.tube.port.counters}"
+                )
             self.encoder.turn()
             self.tube.turn()
             tick.wait(0.002)
@@ -73,13 +75,13 @@ class Joint:
         """An aiding goes down; an event goes up and is acknowledged."""
         self._number += 1
         encoder, tube = self.encoder, self.tube
-        self.until(lambda: tube.endpoint.neighbours[Side.UPPER] and tube.endpoint.clock.synchronised)
+        self.until("the clock", lambda: tube.endpoint.neighbours[Side.UPPER] and tube.endpoint.clock.synchronised)
         sent = rounded(Aiding(1.0, 1e-6, 0.0, 0.0, 0.1, 100.0 + self._number, self._number, 0, epoch=1))
         encoder.endpoint.send_aiding(sent, time.monotonic())
         event = Event(1, tube.endpoint.new_sequence(), 5.0, Severity.INFO, "booted", {"number": self._number})
         tube.endpoint.submit(event, time.monotonic())
-        self.until(lambda: sent in tube.heard)
-        self.until(lambda: tube.endpoint.waiting == 0)
+        self.until("the aiding", lambda: sent in tube.heard)
+        self.until("the acknowledgement", lambda: tube.endpoint.waiting == 0)
 
 
 def inject(name: str, error_class: int, detail: int = 0) -> None:
@@ -102,14 +104,14 @@ def main(names: list[str]) -> None:
         joint.talks()
         counters = joint.tube.port.counters
         inject(names[0], ERROR_BUS_OFF)
-        joint.until(lambda: counters["bus_off"] == 1)
+        joint.until("bus-off", lambda: counters["bus_off"] == 1)
         joint.talks()
         print("bus-off: counted, opened again, talks", flush=True)
         inject(names[0], ERROR_CONTROLLER, RX_OVERFLOW)
-        joint.until(lambda: counters["receive_overruns"] == 1)
+        joint.until("an overrun", lambda: counters["receive_overruns"] == 1)
         print("receive overrun: counted", flush=True)
         subprocess.run(["ip", "link", "set", names[1], "down"], check=True)
-        joint.until(lambda: not joint.tube.port.is_up)
+        joint.until("the end", lambda: not joint.tube.port.is_up)
         subprocess.run(["ip", "link", "set", names[1], "up"], check=True)
         joint.talks()
         print("interface down and up: talks", flush=True)

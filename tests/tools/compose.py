@@ -74,7 +74,7 @@ class Compose:
         environment = ["--env", f"PYTHONPATH={REPOSITORY}"]
         if self._cold:
             environment += ["--env", "NUMBA_CACHE_DIR=/state/compiled"]
-        how = [] if wait else ["--detach"]
+        how = [] if wait else ["--detach", "--restart", str(self._services[name].get("restart", "no"))]
         words = [str(word) for word in self._services[name]["command"]]
         if "--speed" in words:
             words[words.index("--speed") + 1] = SPEED
@@ -101,11 +101,6 @@ class Compose:
             return json.loads(found.stdout)
         return {}
 
-    def ended(self) -> list[str]:
-        """Services that run no more."""
-        running = podman("ps", "--format", "{{.Names}}").stdout.split()
-        return [name for name in self.names if name not in running and not name.endswith("-keys")]
-
     def logs(self, name: str) -> str:
         """What a service said."""
         done = podman("logs", name)
@@ -126,17 +121,16 @@ def composed(*, cold: bool) -> Iterator[Compose]:
 
 
 def surveyed(compose: Compose) -> bool:
-    """Wait until both tubes are surveyed; False where a service ends or the time is over."""
+    """Wait until both tubes are surveyed; False where the time is over. A service that ends starts again, as the file says."""
     deadline = time.monotonic() + LIMIT
     while time.monotonic() < deadline:
         answer = compose.ask("stations")
         stations = answer.get("stations", []) if isinstance(answer, dict) else []
         if [station["measurements"] for station in stations] == WANTED:
             return True
-        for name in compose.ended():
-            print(f"{name} ended: {compose.logs(name)[-2000:]}")
-            return False
         time.sleep(2.0)
+    for name in compose.names:
+        print(f"{name}: {compose.logs(name)[-500:]}")
     return False
 
 

@@ -18,7 +18,7 @@ from pathlib import Path
 
 REPOSITORY = Path(__file__).parents[2]
 ROOM = REPOSITORY / "tests" / "socketcan"
-LIMIT = 120.0  # s
+LIMIT = 300.0  # s
 QUIET = ("con=null", "con0=null,fd:1", "quiet", "loglevel=0")
 
 
