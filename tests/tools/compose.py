@@ -121,7 +121,7 @@ def composed(*, cold: bool) -> Iterator[Compose]:
 
 
 def surveyed(compose: Compose) -> bool:
-    """Wait until both tubes are surveyed; False where the time is over. A service that ends starts again, as the file says."""
+    """Wait until both tubes are surveyed; False where the time is over. A service that ends starts again."""
     deadline = time.monotonic() + LIMIT
     while time.monotonic() < deadline:
         answer = compose.ask("stations")
