@@ -77,10 +77,18 @@ class Joint:
         encoder, tube = self.encoder, self.tube
         self.until("the clock", lambda: tube.endpoint.neighbours[Side.UPPER] and tube.endpoint.clock.synchronised)
         sent = rounded(Aiding(1.0, 1e-6, 0.0, 0.0, 0.1, 100.0 + self._number, self._number, 0, epoch=1))
-        encoder.endpoint.send_aiding(sent, time.monotonic())
         event = Event(1, tube.endpoint.new_sequence(), 5.0, Severity.INFO, "booted", {"number": self._number})
         tube.endpoint.submit(event, time.monotonic())
-        self.until("the aiding", lambda: sent in tube.heard)
+        sent_at = -1.0
+
+        def is_heard() -> bool:  # what may be lost is sent again, as an encoder does
+            nonlocal sent_at
+            if (now := time.monotonic()) > sent_at + 0.5:
+                sent_at = now
+                encoder.endpoint.send_aiding(sent, now)
+            return sent in tube.heard
+
+        self.until("the aiding", is_heard)
         self.until("the acknowledgement", lambda: tube.endpoint.waiting == 0)
 
 
