@@ -7,15 +7,15 @@ STAMP := $(VENV)/.installed
 SOAK ?= 168
 FROM ?= 50000
 SEEDS ?= 20000
-# two workers a core, for a third of a worker's time goes by waiting for processes; one that has nothing left takes
-# tests from another
-WORKERS ?= $(shell echo $$((2 * $$(getconf _NPROCESSORS_ONLN))))
+# three workers on two cores, for a third of a worker's time goes by waiting for processes, and each collects every test;
+# one that has nothing left takes tests from another
+WORKERS ?= $(shell echo $$((3 * $$(getconf _NPROCESSORS_ONLN) / 2)))
 # a test run starts hundreds of processes; where the environment forbids bytecode each would compile what it imports
 unexport PYTHONDONTWRITEBYTECODE
 PYTEST := $(BIN)/python -m pytest --numprocesses $(WORKERS) --maxprocesses 8 --dist worksteal
 
 .DEFAULT_GOAL := rig
-.PHONY: help rig test quick check lint types contracts kernels bytecode browser tests statistical truth explore lock study soak seeds clean test-socketcan test-compose
+.PHONY: help rig test quick check lint types contracts kernels bytecode browser fast tests statistical truth explore lock study soak seeds clean test-socketcan test-compose
 
 help:  ## list the targets
 	@awk -F ':.*## ' '/^[a-z-]+:.*## / { printf "make %-15s %s\n", $$1, $$2 }' $(MAKEFILE_LIST)
@@ -23,17 +23,18 @@ help:  ## list the targets
 rig: $(STAMP)  ## set up and drill wellbore 1
 	$(BIN)/borechain rig scenarios/wellbore-1.toml --speed max --seed 1
 
-test: $(STAMP)  ## set up and run every check and every test, in parallel
-	$(MAKE) --jobs=3 --output-sync check kernels bytecode browser
+test:  ## set up and run every check and every test, in parallel
+	$(MAKE) --jobs=4 --output-sync browser kernels bytecode check
 	$(MAKE) tests
 
-quick: check  ## lint, types, contracts and the fast tests: under 90 s
-	$(PYTEST) --numprocesses $$(getconf _NPROCESSORS_ONLN) -m "not (slow or process or install or statistical)"
+quick: $(STAMP)  ## lint, types, contracts and the fast tests: under 90 s
+	$(MAKE) --jobs=4 check fast
 
+# the lock is complete, so nothing is left to resolve; what is imported is compiled then, and the rest never
 $(STAMP): requirements.lock pyproject.toml
 	$(PYTHON) -m venv $(VENV)
-	$(BIN)/python -m pip install --quiet --require-hashes --requirement requirements.lock
-	$(BIN)/python -m pip install --quiet --no-build-isolation --no-deps --editable .
+	$(BIN)/python -m pip install --quiet --no-compile --no-deps --require-hashes --requirement requirements.lock
+	$(BIN)/python -m pip install --quiet --no-compile --no-build-isolation --no-deps --editable .
 	touch $@
 
 check: lint types contracts  ## lint, types and import contracts
@@ -54,14 +55,18 @@ kernels: $(STAMP)  ## compile what the tests would compile, each worker for itse
 bytecode: $(STAMP)  ## compile what the tests import, asserts rewritten, each worker for itself
 	$(BIN)/python -m pytest --collect-only --quiet --quiet > /dev/null || true  # the tests tell
 
-browser: $(STAMP)  ## install what the tests need of Debian (chromium, postgresql), where it is not there
-	$(BIN)/python tests/tools/install_browser.py
+browser:  ## install what the tests need of Debian (chromium, postgresql), where it is not there
+	$(PYTHON) tests/tools/install_browser.py
+
+fast: $(STAMP)  ## the fast tests; part of `make quick`
+	$(PYTEST) --numprocesses $$(getconf _NPROCESSORS_ONLN) -m "not (slow or process or install or statistical)"
 
 tests: $(STAMP)  ## every test but the statistical ones at full size
 	$(PYTEST) -m "not statistical"
 
-statistical: $(STAMP)  ## the statistical tests at full size; part of `make study`
+statistical: $(STAMP)  ## the statistical tests at full size, properties with more examples; part of `make study`
 	$(PYTEST) -m statistical
+	HYPOTHESIS_PROFILE=study $(PYTEST) -m "hypothesis and not statistical"
 
 truth: $(STAMP)  ## the table of the field by a second world, beside the study's
 	PYTHONPATH=tests/truth $(BIN)/python tests/truth/second_table.py 20

@@ -6,6 +6,7 @@ What a field means stands once, in the comment behind it in the code: ``# UNIT, 
 from __future__ import annotations
 
 import ast
+import functools
 import math
 from collections.abc import Iterator
 from pathlib import Path
@@ -41,6 +42,7 @@ PERIODS: Final = {"5 minutes": 300.0, "1 hour": 3600.0, "8 hours": 28800.0, "1 d
 SIGMAS_DEG: Final = (0.01, 0.02, 0.05, 0.1)
 
 
+@functools.cache
 def comments_of(source: str) -> dict[str, dict[str, str]]:
     """Comments behind the fields of every record type of a module: by name of the type and of the field."""
     lines, found = source.splitlines(), {}

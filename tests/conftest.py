@@ -11,12 +11,13 @@ from hypothesis import settings
 from hypothesis.internal.conjecture import providers
 
 # the first example of a property compiles the kernel, which no deadline of an example can foresee; the same commit
-# gives the same examples everywhere, and new ones are looked for by `make explore`
-settings.register_profile("borechain", deadline=None, derandomize=True)
+# gives the same examples everywhere, more of them in `make study`, and new ones are looked for by `make explore`
+settings.register_profile("borechain", deadline=None, derandomize=True, max_examples=40)
+settings.register_profile("study", deadline=None, derandomize=True, max_examples=500)
 settings.register_profile("explore", deadline=None, print_blob=True)
 PROFILE = os.environ.get("HYPOTHESIS_PROFILE", "borechain")
 settings.load_profile(PROFILE)
-if PROFILE == "borechain":
+if PROFILE != "explore":
     # numbers that stand in our modules are tried as examples, of those modules that happen to be imported: which worker
     # ran what before would change the examples
     providers._get_local_constants = providers.Constants

@@ -21,6 +21,7 @@ from dataclasses import dataclass
 from importlib import metadata
 from pathlib import Path
 
+import forked_commands
 import pytest
 from packaging.requirements import Requirement
 from rigs import free_endpoint
@@ -155,7 +156,6 @@ def test_a_wheel_holds_its_data_and_its_types(wheel: Path) -> None:
 
 
 JOBS = [  # words, the extra that the job needs or None, status and a word of its output where it is there
-    (("--version",), None, 0, "version"),
     (("scenario", "list", "--json"), None, 0, "wellbore-1"),
     (("scenario", "show", "wellbore-1"), None, 0, "[rig]"),
     (("survey", RECORD, "--json"), None, 0, "stations"),
@@ -194,8 +194,27 @@ def test_every_command_helps_and_does_its_job_or_names_the_extra_it_needs(
     helped = environment.run("-c", WALK, program=())
     assert helped.returncode == 0, helped.stderr
     assert int(helped.stdout) > 30
+    started = environment.run("--version")
+    assert (started.returncode, "version" in started.stdout) == (0, True), started.stderr
+    with forked_commands.start(environment.python, cwd=environment.folder, env=surroundings()) as forker:
+        check_jobs(environment, forker, extra)
+    assert not (environment.folder / "never").exists()
+    assert (environment.folder / "run").exists() == (extra == "ground")
+    if extra == "ground":
+        assert "Usage: python -m groundstation" in environment.run("--help", program=("-m", "groundstation")).stdout
+    else:
+        assert NEEDS.fullmatch(environment.run(program=("-m", "groundstation")).stderr)
+    overwritten = environment.site / "node" / "__init__.py"
+    overwritten.write_text('"""Somebody else\'s, installed over ours."""\n')
+    refused = environment.run("router")
+    assert (refused.returncode, len(refused.stderr.splitlines())) == (1, 1)
+    assert str(overwritten) in refused.stderr
+
+
+def check_jobs(environment: Environment, forker: subprocess.Popen[str], extra: str) -> None:
+    """Every command does its job there, or names the extra that it needs."""
     for words, needed, status, expected in JOBS:
-        done = environment.run(*words)
+        done = forked_commands.run(*words, cwd=environment.folder, forker=forker)
         assert "Traceback" not in done.stderr, done.stderr
         if needed in (None, extra):
             assert (done.returncode, expected in done.stdout + done.stderr) == (status, True), (words, done.stderr)
@@ -204,20 +223,13 @@ def test_every_command_helps_and_does_its_job_or_names_the_extra_it_needs(
             assert refused is not None, (words, done.stderr)
             assert refused.groups() == (needed, needed), words
             assert (done.returncode, done.stdout) == (1, "")
-    assert not (environment.folder / "never").exists()
-    drilled = environment.run("rig", "rig-3", "--inline", "--json", "--out", "run")
-    assert (environment.folder / "run").exists() == (extra == "ground")
+    drilled = forked_commands.run(
+        "rig", "rig-3", "--inline", "--json", "--out", "run", cwd=environment.folder, forker=forker
+    )
     if extra == "ground":
         assert [station["md_m"] for station in json.loads(drilled.stdout)["stations"]] == [2.0, 4.0, 6.0]
-        assert "Usage: python -m groundstation" in environment.run("--help", program=("-m", "groundstation")).stdout
     else:
         assert NEEDS.fullmatch(drilled.stderr)
-        assert NEEDS.fullmatch(environment.run(program=("-m", "groundstation")).stderr)
-    overwritten = environment.site / "node" / "__init__.py"
-    overwritten.write_text('"""Somebody else\'s, installed over ours."""\n')
-    refused = environment.run("router")
-    assert (refused.returncode, len(refused.stderr.splitlines())) == (1, 1)
-    assert str(overwritten) in refused.stderr
 
 
 @pytest.fixture

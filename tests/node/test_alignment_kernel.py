@@ -112,8 +112,8 @@ def test_an_arc_has_no_middle(share: float) -> None:
 
 @pytest.mark.slow
 @pytest.mark.parametrize("method", METHODS)
-@pytest.mark.parametrize("lean", [0.3, 2.0, 10.0])
-@pytest.mark.parametrize("count", [1, 2, 4])
+@pytest.mark.parametrize("lean", [0.3, 10.0, pytest.param(2.0, marks=pytest.mark.statistical)])
+@pytest.mark.parametrize("count", [1, 4, pytest.param(2, marks=pytest.mark.statistical)])
 def test_the_standard_errors_are_those_of_many_turns(method: str, lean: float, count: int) -> None:
     """150 turns, two axes each: the ratio of variances has a standard error of sqrt(2 / 300) = 0.08."""
     random = np.random.default_rng(7)

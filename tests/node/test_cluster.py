@@ -125,8 +125,14 @@ def test_the_fused_reading_is_the_mean_by_inverse_variance(count: int, data: st.
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize(("noises", "factor"), [((1.0, 1.0), math.sqrt(0.5)), ((1.0, 2.0), math.sqrt(0.8)),
-                                                ((1.0, 1.0, 1.0, 1.0), 0.5)])  # fmt: skip
+@pytest.mark.parametrize(
+    ("noises", "factor"),
+    [
+        pytest.param((1.0, 1.0), math.sqrt(0.5), marks=pytest.mark.statistical),
+        ((1.0, 2.0), math.sqrt(0.8)),
+        ((1.0, 1.0, 1.0, 1.0), 0.5),
+    ],
+)
 def test_the_noise_falls_with_the_root_of_the_number(noises: tuple[float, ...], factor: float) -> None:
     """4000 cycles of three axes: the deviation of a standard deviation is 0.65 %."""
     alone, together = (Clustered(n, biases=np.zeros((4, 3))).cycles(130) for n in ((1.0,), noises))

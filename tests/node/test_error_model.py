@@ -4,7 +4,7 @@ import math
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from node.kernels.error_model import propagate
@@ -66,7 +66,6 @@ def test_angle_random_walk_alone_grows_as_the_root_of_time() -> None:
     assert math.sqrt(P[Err.YAW, Err.YAW]) == pytest.approx(config[0]["gyro_noise"][2] * math.sqrt(100.0))
 
 
-@settings(max_examples=60)
 @given(st.integers(0, 10_000), st.floats(-6.0, 6.0), st.floats(1e-3, 5.0))
 def test_covariance_stays_symmetric_and_positive(seed: int, wz: float, dt: float) -> None:
     P = random_covariance(seed)
@@ -75,7 +74,6 @@ def test_covariance_stays_symmetric_and_positive(seed: int, wz: float, dt: float
     assert np.linalg.eigvalsh(P).min() > -1e-9 * np.trace(P)
 
 
-@settings(max_examples=60)
 @given(st.integers(0, 10_000), st.floats(1e-6, 1e3))
 def test_joseph_form_is_the_textbook_update(seed: int, r_var: float) -> None:
     P = random_covariance(seed)

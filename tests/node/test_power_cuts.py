@@ -21,7 +21,7 @@ from node.process.journal import SLOTS, Journal
 from node.process.tube_process import TubeProcess
 from telemetry.runtime import disk as disk_module
 
-CUTS = 1000
+CUTS = (250, 1000)  # in `make test` and in `make study`
 SECTOR = 512
 BOUNDARY = 1500  # weight of the instant between two calls, against 1 of a byte
 
@@ -137,10 +137,13 @@ def fill(folder: Path, newest: int, earlier: int, random: np.random.Generator) -
 
 
 @pytest.mark.slow
-def test_a_cut_at_any_instant_leaves_the_old_or_the_new_node(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+@pytest.mark.parametrize("many", [CUTS[0], pytest.param(CUTS[1], marks=pytest.mark.statistical)])
+def test_a_cut_at_any_instant_leaves_the_old_or_the_new_node(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, many: int
+) -> None:
     random = np.random.default_rng(20261121)
     new, old, cuts = 0, 0, Counter[int]()
-    for cut in range(CUTS):
+    for cut in range(many):
         folder = tmp_path / str(cut)
         place = cut % SLOTS
         before = fill(folder, place, SLOTS - 1 if cut % 10 == 0 else int(random.integers(0, 5)), random)
@@ -171,10 +174,10 @@ def test_a_cut_at_any_instant_leaves_the_old_or_the_new_node(tmp_path: Path, mon
             place = target if after == wanted else place
             before = after
         shutil.rmtree(folder)
-    assert min(new, old) > CUTS / 10
-    assert cuts.total() >= CUTS
+    assert min(new, old) > many / 10
+    assert cuts.total() >= many
     assert set(cuts) == set(range(SLOTS))
-    assert min(cuts.values()) > CUTS / SLOTS / 2
+    assert min(cuts.values()) > many / SLOTS / 2
 
 
 def test_the_first_state_ever_is_on_the_disk_with_its_name(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

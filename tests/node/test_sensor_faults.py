@@ -92,7 +92,7 @@ def test_a_healthy_sensor_raises_no_alarm(healthy: StringOfOne) -> None:
 @pytest.mark.slow
 @pytest.mark.parametrize("place", PLACES)
 @pytest.mark.parametrize("kind", KINDS)
-@pytest.mark.parametrize("seed", [1, 2])
+@pytest.mark.parametrize("seed", [1, pytest.param(2, marks=pytest.mark.statistical)])
 def test_a_faulty_gyroscope_is_flagged_and_recovered_from(
     kind: str, place: str, seed: int, healthy: StringOfOne
 ) -> None:

@@ -10,7 +10,8 @@ from typing import Any
 
 import numpy as np
 import pytest
-from rigs import REPOSITORY, ends, free_endpoint, run, running_rig
+from forked_commands import run
+from rigs import REPOSITORY, ends, free_endpoint, running_rig
 
 from groundstation.calibration.block import read
 from groundstation.calibration.field import inclination

@@ -12,6 +12,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+from forked_commands import run as run_forked
 from rigs import REPOSITORY, command, ends, free_endpoint, run, running_rig, titles_of_group
 
 from groundstation.service.store import Store
@@ -26,8 +27,24 @@ def drill(folder: Path, *arguments: str) -> dict[str, Any]:
         return rig.result()
 
 
-def test_three_tubes_give_three_stations_near_the_truth_and_leave_nothing_running(tmp_path: Path) -> None:
-    with running_rig(tmp_path, "--seed", "3") as rig:
+def drill_inline(folder: Path, *arguments: str, scenario: Path | str = "rig-3") -> dict[str, Any]:
+    """A rig in one process, which connects to nobody and starts nothing."""
+    done = run_forked("rig", scenario, "--inline", "--json", "--out", folder / "run", *arguments, timeout=240.0)
+    assert done.returncode == 0, done.stderr
+    return dict(json.loads(done.stdout.splitlines()[-1]))
+
+
+@pytest.fixture(scope="module")
+def inline(tmp_path_factory: pytest.TempPathFactory) -> tuple[dict[str, Any], Path]:
+    """Result of the rig in one process with seed 5, and the folder of its run."""
+    folder = tmp_path_factory.mktemp("inline")
+    return drill_inline(folder, "--seed", "5"), folder / "run"
+
+
+def test_three_tubes_give_three_stations_near_the_truth_and_leave_nothing_running(
+    tmp_path: Path, inline: tuple[dict[str, Any], Path]
+) -> None:
+    with running_rig(tmp_path, "--seed", "5") as rig:
         result = rig.result()
         assert ends(rig.process.pid)
     assert [s["measurements"] for s in result["stations"]] == [3, 2, 1]
@@ -39,6 +56,8 @@ def test_three_tubes_give_three_stations_near_the_truth_and_leave_nothing_runnin
     with (rig.out / "stations.csv").open() as file:
         assert [float(row["md_m"]) for row in csv.DictReader(file)] == [2.0, 4.0, 6.0]
     assert json.loads((rig.out / "result.json").read_text())["digest"] == result["digest"]
+    assert (inline[0]["processes"], inline[0]["stations"]) == (1, result["stations"])
+    assert inline[0]["digest"] == result["digest"]
 
 
 def test_two_imus_in_every_tube_make_surveys_of_less_noise(tmp_path: Path) -> None:
@@ -46,8 +65,7 @@ def test_two_imus_in_every_tube_make_surveys_of_less_noise(tmp_path: Path) -> No
         (tmp_path / file.name).write_bytes(file.read_bytes())
     scenario = tmp_path / "cluster.toml"
     scenario.write_text((REPOSITORY / "scenarios" / "rig-3.toml").read_text() + "\n[node]\nimus = 2\n")
-    with running_rig(tmp_path, "--seed", "3", "--inline", scenario=str(scenario)) as rig:
-        stations = rig.result()["stations"]
+    stations = drill_inline(tmp_path, "--seed", "3", scenario=scenario)["stations"]
     assert [s["measurements"] for s in stations] == [3, 2, 1]
     one = math.radians(0.02) * 9.81 / math.sqrt(32.0)  # of a mean, with one IMU
     for station in stations:
@@ -60,39 +78,38 @@ def test_a_string_that_twists_is_surveyed_released_and_goes_on_at_every_joint(tm
     text = (REPOSITORY / "scenarios" / "torsion-10.toml").read_text()
     scenario = tmp_path / "torsion-3.toml"
     scenario.write_text(text.replace("tubes = 10", "tubes = 3"))
-    with running_rig(tmp_path, "--seed", "1", "--inline", scenario=str(scenario)) as rig:
-        result = rig.result()
+    result = drill_inline(tmp_path, "--seed", "1", scenario=scenario)
     assert [s["measurements"] for s in result["stations"]] == [3, 2, 1]
     assert max(result["figures"]["yaw_rms_deg_by_hop"]) < 0.1  # 1.1 deg a tube under torque
-    with contextlib.closing(Store(f"sqlite:///{rig.out / 'state' / 'ground' / 'ground.sqlite'}")) as store:
+    with contextlib.closing(Store(f"sqlite:///{tmp_path / 'run' / 'state' / 'ground' / 'ground.sqlite'}")) as store:
         codes = [stored.message.code for stored in store.messages() if isinstance(stored.message, Event)]
     assert codes.count("joint_solved") == 2
     assert "string_released" in codes
     assert not {"gyro_step", "gyro_scale", "joint_contradicts_marks"} & set(codes)
 
 
-def test_the_seed_alone_decides_the_result_whatever_the_load_and_the_engine(tmp_path: Path) -> None:
-    first = drill(tmp_path / "a", "--seed", "5")
-    inline = drill(tmp_path / "inline", "--seed", "5", "--inline")
-    assert (inline["processes"], first["processes"]) == (1, 6)
-    assert inline["stations"] == first["stations"]
-    assert inline["digest"] == first["digest"]
+def test_the_seed_alone_decides_the_result_whatever_the_load_and_the_engine(
+    tmp_path: Path, inline: tuple[dict[str, Any], Path]
+) -> None:
+    """Without the load: the test above, by the same seed."""
     with contextlib.ExitStack() as stack:
         for _ in range(os.cpu_count() or 1):
             competitor = subprocess.Popen([sys.executable, "-c", "while True: pass"])
             stack.callback(competitor.wait)
             stack.callback(competitor.kill)
-        second = drill(tmp_path / "b", "--seed", "5")
-    other = drill(tmp_path / "c", "--seed", "6", "--inline")
-    assert first["digest"] == second["digest"]
-    assert first["stations"] == second["stations"]
-    assert first["digest"] != other["digest"]
+        pressed = drill(tmp_path / "pressed", "--seed", "5")
+    other = drill_inline(tmp_path / "other", "--seed", "6")
+    assert pressed["processes"] == 6
+    assert pressed["stations"] == inline[0]["stations"]
+    assert pressed["digest"] == inline[0]["digest"]
+    assert pressed["digest"] != other["digest"]
 
 
 @pytest.mark.parametrize("transport", [pytest.param("can", marks=pytest.mark.statistical), "mixed"])
-def test_the_transport_of_the_joints_decides_nothing(tmp_path: Path, transport: str) -> None:
-    inline = drill(tmp_path / "inline", "--seed", "5", "--inline")
-    assert drill(tmp_path / transport, "--seed", "5", "--transport", transport)["digest"] == inline["digest"]
+def test_the_transport_of_the_joints_decides_nothing(
+    tmp_path: Path, transport: str, inline: tuple[dict[str, Any], Path]
+) -> None:
+    assert drill(tmp_path / transport, "--seed", "5", "--transport", transport)["digest"] == inline[0]["digest"]
 
 
 def test_a_scenario_names_the_media_of_its_joints(tmp_path: Path) -> None:
@@ -103,19 +120,20 @@ def test_a_scenario_names_the_media_of_its_joints(tmp_path: Path) -> None:
     scenario.write_text(text.replace("tubes = 3", "tubes = 1") + '\n[medium]\ntransports = ["can-classic"]\n')
     with running_rig(tmp_path / "can", "--seed", "5", scenario=str(scenario)) as rig:
         carried = rig.result()
-    with running_rig(tmp_path / "inline", "--seed", "5", "--inline", scenario=str(scenario)) as rig:
-        assert rig.result()["digest"] == carried["digest"]
+    assert drill_inline(tmp_path / "inline", "--seed", "5", scenario=scenario)["digest"] == carried["digest"]
 
 
-def test_the_native_profile_moves_the_result_by_next_to_nothing(tmp_path: Path) -> None:
-    exact = drill(tmp_path / "exact", "--seed", "5", "--inline")
-    native = drill(tmp_path / "native", "--seed", "5", "--inline", "--transport", "can-native")
+def test_the_native_profile_moves_the_result_by_next_to_nothing(
+    tmp_path: Path, inline: tuple[dict[str, Any], Path]
+) -> None:
+    exact, folder = inline
+    native = drill_inline(tmp_path, "--seed", "5", "--transport", "can-native")
     assert native["digest"] != exact["digest"]
     for ours, theirs in zip(native["stations"], exact["stations"], strict=True):
         assert abs(math.remainder(ours["azimuth_deg"] - theirs["azimuth_deg"], 360.0)) < 0.02
     yaws = []
-    for name in ("exact", "native"):
-        path = tmp_path / name / "run" / "state" / "ground" / "ground.sqlite"
+    for drilled in (folder, tmp_path / "run"):
+        path = drilled / "state" / "ground" / "ground.sqlite"
         with contextlib.closing(Store(f"sqlite:///{path}")) as store:
             surveys = [stored.message for stored in store.messages() if isinstance(stored.message, SurveyMeasurement)]
         yaws.append({(survey.tube, survey.sequence): survey.yaw for survey in surveys})
@@ -126,7 +144,7 @@ def test_the_native_profile_moves_the_result_by_next_to_nothing(tmp_path: Path) 
 
 @pytest.mark.parametrize("words", [("--inline", "--transport", "can"), ("--transport", "can-native")])
 def test_a_transport_that_this_way_of_running_has_not_is_refused(tmp_path: Path, words: tuple[str, ...]) -> None:
-    done = run("rig", "rig-3", "--out", str(tmp_path / "run"), *words)
+    done = run_forked("rig", "rig-3", "--out", str(tmp_path / "run"), *words)
     assert (done.returncode, "Traceback" in done.stderr) == (2, False)
     assert f"--transport {words[-1]}: expected" in done.stderr
     assert not (tmp_path / "run").exists()
@@ -172,14 +190,14 @@ def test_operators_get_stations_while_the_rig_drills(tmp_path: Path, ask: Any) -
         assert column["worst"]["deviation_cm"] > 0.0
         assert column["projection"]["along_m"] == 6.0
         assert ask(rig, f"{GROUND}/alarms")["levels_percent"] == [50, 80, 100]
-        shown = run("query", f"{GROUND}/stations", "--endpoint", rig.endpoint, "--json")
+        shown = run_forked("query", f"{GROUND}/stations", "--endpoint", rig.endpoint, "--json")
         assert shown.returncode == 0
         assert len(json.loads(shown.stdout)["stations"]) >= 2
-        wrong = run("query", f"{GROUND}/trajektory", "--endpoint", rig.endpoint)
+        wrong = run_forked("query", f"{GROUND}/trajektory", "--endpoint", rig.endpoint)
         assert wrong.returncode == 2
         for name in ("trajectory", "stations", "nodes/{tube}"):
             assert name in wrong.stderr
-        refused = run("query", f"{GROUND}/trajectory?depth=3", "--endpoint", rig.endpoint)
+        refused = run_forked("query", f"{GROUND}/trajectory?depth=3", "--endpoint", rig.endpoint)
         assert refused.returncode == 2
         assert "md" in refused.stderr
         taken = run("query", "borechain/rig-1/cmd/take_survey?tube=1", "--endpoint", rig.endpoint, "--timeout", "40")
@@ -191,8 +209,7 @@ def test_a_column_that_leaves_its_tolerance_raises_alarms(scenario: Path, tmp_pa
     scenario.write_text(
         scenario.read_text() + '\n[design]\ninclination_deg = 10.0\nazimuth_deg = 90.0\ntolerance = "5-cm"\n'
     )
-    with running_rig(tmp_path, "--inline", scenario=str(scenario)) as rig:
-        result = rig.result()
+    result = drill_inline(tmp_path, scenario=scenario)
     assert {(a["kind"], a["level_percent"]) for a in result["alarms"]} == {
         (kind, level) for kind in ("deviation", "projection") for level in (50, 80, 100)
     }
@@ -272,7 +289,7 @@ def scenario(tmp_path: Path) -> Path:
 
 def refused(path: Path, *arguments: str) -> subprocess.CompletedProcess[str]:
     endpoint = () if "--endpoint" in arguments else ("--endpoint", free_endpoint())
-    done = run("rig", str(path), *endpoint, *arguments, cwd=path.parent)
+    done = run_forked("rig", str(path), *endpoint, *arguments, cwd=path.parent)
     assert done.stdout == ""
     assert "Traceback" not in done.stderr
     assert len(done.stderr.strip().splitlines()) == 1, done.stderr
@@ -349,6 +366,6 @@ def test_an_earlier_run_is_not_continued(scenario: Path, tmp_path: Path) -> None
 
 
 def test_asking_where_nobody_is_says_so() -> None:
-    done = run("query", f"{GROUND}/status", "--endpoint", "tcp/127.0.0.1:1", "--timeout", "0.5")
+    done = run_forked("query", f"{GROUND}/status", "--endpoint", "tcp/127.0.0.1:1", "--timeout", "0.5")
     assert done.returncode == 1
     assert "is the rig running" in done.stderr

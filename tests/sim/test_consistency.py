@@ -15,18 +15,23 @@ from sim.world.world import World
 
 pytestmark = pytest.mark.slow
 
-HOPS, SEEDS = (2, 5), 40  # a string of five runs in `make study`
+FEW, SEEDS = 24, 40  # strings of two hops in `make test`; in `make study` two and five hops
 
 
 def shorter(setup: Tables) -> Tables:
     return changed(setup, schedule={"blocks": 1})
 
 
-@pytest.fixture(scope="module", params=[HOPS[0], pytest.param(HOPS[1], marks=pytest.mark.statistical)])
+@pytest.fixture(
+    scope="module",
+    params=[(2, FEW), *(pytest.param((hops, SEEDS), marks=pytest.mark.statistical) for hops in (2, 5))],
+    ids=lambda asked: f"{asked[0]} hops, {asked[1]} seeds",
+)
 def result(request: pytest.FixtureRequest) -> dict:
+    hops, seeds = request.param
     stepped: list[None] = []
-    found = run(SEEDS, SEEDS, lambda: stepped.append(None), hops=request.param)
-    assert len(stepped) == 3 * SEEDS
+    found = run(seeds, seeds, lambda: stepped.append(None), hops=hops)
+    assert len(stepped) == 3 * seeds
     return found
 
 

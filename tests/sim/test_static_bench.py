@@ -163,10 +163,11 @@ def test_refuses_what_cannot_be() -> None:
 
 
 @pytest.mark.slow
-def test_experiment_reaches_what_is_asked() -> None:
+@pytest.mark.parametrize("records", [1, pytest.param(4, marks=pytest.mark.statistical)])
+def test_experiment_reaches_what_is_asked(records: int) -> None:
     steps: list[int] = []
-    result = run(4, lambda: steps.append(1))
-    assert len(steps) == result["records"] == 4
+    result = run(records, lambda: steps.append(1))
+    assert len(steps) == result["records"] == records
     assert [(c["axis"], c["quantity"]) for c in result["cases"][:2]] == [("x", "random_walk"), ("y", "random_walk")]
     assert len(result["cases"]) == 6
     for quantity, asked in (("random_walk", 0.77), ("bias_instability", 4.2)):

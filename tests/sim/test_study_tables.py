@@ -21,8 +21,8 @@ from sim.studies.study import Option, Study, Table
 from sim.studies.table import STUDIES
 
 RESULTS = Path(__file__).parents[2] / "docs" / "results"
-# ten seconds of CPU or more with two seeds; the modes share the code of two-nodes, the others have tests of their own
-LONG = {"update-modes", "single-updates", "fifty-nodes", "delay", "consistency", "outage"}
+# the longest with two seeds; the modes share the code of two-nodes, the others have tests of their own
+LONG = {"ingredients", "update-modes", "single-updates", "fifty-nodes", "delay", "consistency", "outage"}
 STUDY = """
     from groundstation.report.style import new_figure
 

@@ -46,8 +46,8 @@ def test_every_printed_region_stands_beside_ours() -> None:
         assert row["magnetic_deg"] == pytest.approx(wanted, abs=1e-4)
 
 
-def test_claimed_ellipses_hold_the_truth_as_often_as_they_say() -> None:
-    wells = 500
+@pytest.mark.parametrize("wells", [100, pytest.param(500, marks=pytest.mark.statistical)])
+def test_claimed_ellipses_hold_the_truth_as_often_as_they_say(wells: int) -> None:
     result = coverage.run(wells, 4, lambda: None)
     for row in result["cases"]:
         claimed = row["published"] / 100.0

@@ -5,7 +5,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from sim.world.motion import Motion, Trapezoid
@@ -78,7 +78,6 @@ def test_a_tube_that_is_not_there_yet_has_no_twist() -> None:
     assert kept[0] == pytest.approx(kept[1])  # until the next tube is drilled
 
 
-@settings(max_examples=60)
 @given(st.floats(999.0, 1140.0), st.integers(1, 6), st.floats(0.0, 60.0), st.floats(0.0, 1.0))
 def test_rates_and_accelerations_are_derivatives_at_any_time(
     t: float, tube: int, friction: float, swing: float

@@ -131,7 +131,6 @@ def test_an_accelerometer_off_the_axis_feels_the_circle() -> None:
     np.testing.assert_allclose(felt, [-0.05 * math.radians(71.0) ** 2, 0.0, 0.0], atol=1e-12)
 
 
-@settings(max_examples=50)
 @given(st.floats(0.0, 1.0))
 def test_the_time_of_an_angle_is_the_inverse_of_the_turning(part: float) -> None:
     angle = part * TURN.angle

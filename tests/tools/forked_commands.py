@@ -8,6 +8,7 @@ started them.
 from __future__ import annotations
 
 import atexit
+import contextlib
 import functools
 import importlib
 import json
@@ -23,13 +24,15 @@ from typing import Any
 LAZY = ("matplotlib.pyplot", "scipy.optimize", "scipy.stats", "scipy.signal", "scipy.spatial")  # inside commands
 
 
-def run(*words: object, timeout: float = 120.0, cwd: Path | None = None) -> subprocess.CompletedProcess[str]:
-    """Run ``borechain`` with ``words`` to its end."""
+def run(
+    *words: object, timeout: float = 120.0, cwd: Path | None = None, forker: Any = None
+) -> subprocess.CompletedProcess[str]:
+    """Run ``borechain`` with ``words`` to its end, forked from ``forker`` or from this worker's own."""
     with tempfile.TemporaryDirectory() as folder:
         out, err = Path(folder) / "out", Path(folder) / "err"
         said = [str(word) for word in words]
         order = {"words": said, "cwd": str(cwd or Path.cwd()), "out": str(out), "err": str(err)}
-        forker = server()
+        forker = forker or server()
         forker.stdin.write(json.dumps(order) + "\n")
         forker.stdin.flush()
         if not select.select([forker.stdout], [], [], timeout)[0]:
@@ -42,19 +45,23 @@ def run(*words: object, timeout: float = 120.0, cwd: Path | None = None) -> subp
 @functools.cache
 def server() -> Any:
     """The process that forks, one for each worker of the tests."""
-    started = subprocess.Popen([sys.executable, __file__], stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True)
+    started = start(sys.executable)
     atexit.register(started.__exit__, None, None, None)  # it ends with its input
     return started
+
+
+def start(python: str | Path, **options: Any) -> subprocess.Popen[str]:
+    """A process that forks commands of ``python``'s environment."""
+    return subprocess.Popen([python, __file__], stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True, **options)
 
 
 def serve() -> None:
     """Fork a child for every order that comes, wait for it and answer its exit status."""
     from borechain.__main__ import COMMANDS, main
 
-    for module, _, _ in COMMANDS.values():
-        importlib.import_module(module)
-    for module in LAZY:
-        importlib.import_module(module)
+    for module in (*(module for module, _, _ in COMMANDS.values()), *LAZY):
+        with contextlib.suppress(ModuleNotFoundError):  # where an extra is missing, its commands say so
+            importlib.import_module(module)
     for line in sys.stdin:
         order = json.loads(line)
         child = os.fork()

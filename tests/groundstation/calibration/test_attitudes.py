@@ -5,7 +5,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from hypothesis import assume, given, settings
+from hypothesis import assume, given
 from hypothesis import strategies as st
 
 from groundstation.calibration.attitudes import fit, fit_free_yaw, true_vectors
@@ -113,7 +113,6 @@ def test_the_balanced_design_is_the_turn_table() -> None:
     assert result.residual_rms() == pytest.approx(basic.residual_rms())
 
 
-@settings(max_examples=50)
 @given(
     angles=st.lists(st.tuples(st.floats(-90.0, 90.0), st.floats(-180.0, 180.0)), min_size=5, max_size=12),
     entries=st.lists(st.floats(-1.0, 1.0), min_size=12, max_size=12),
@@ -203,7 +202,6 @@ def test_the_print_agrees_in_its_xy_block_after_a_yaw_of_the_rig_but_for_its_mis
 
 
 @given(yaw=st.floats(-3.1, 3.1), hidden=st.sampled_from([None, (0, 0), (0, 1), (1, 0), (1, 1)]))
-@settings(max_examples=60)
 def test_a_rig_that_stands_turned_is_found(yaw: float, hidden: tuple[int, int] | None) -> None:
     readings = SCATTERED @ rotation(yaw).T @ MATRIX.T + BIAS
     like = MATRIX.copy()

@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from groundstation.calibration import block
@@ -65,7 +65,6 @@ def test_a_block_comes_back_from_its_text_to_the_last_bit() -> None:
     assert again.provenance.design == PROVENANCE.design
 
 
-@settings(max_examples=100)
 @given(
     bias=st.lists(NUMBER, min_size=3, max_size=3), reference=NUMBER, rms=st.floats(0.0, 1e9), design=st.text(min_size=1)
 )

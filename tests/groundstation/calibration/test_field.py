@@ -5,7 +5,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from groundstation.calibration.errors import CalibrationError
@@ -34,7 +34,6 @@ def rests(matrix: np.ndarray = NONE[0], bias: np.ndarray = NONE[1], std: float =
 small = st.floats(-0.05, 0.05)
 
 
-@settings(max_examples=60, deadline=None)
 @given(st.lists(small, min_size=9, max_size=9), st.lists(st.floats(-0.5, 0.5), min_size=3, max_size=3))
 def test_any_matrix_and_bias_come_back(off: list[float], offset: list[float]) -> None:
     matrix, bias = np.eye(3) + np.array(off).reshape(3, 3), np.array(offset)

@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from hypothesis import example, given, settings
+from hypothesis import example, given
 from hypothesis import strategies as st
 
 from groundstation.errors import ToolError
@@ -300,7 +300,6 @@ def test_a_number_is_finite_or_refused(value: Any) -> None:
         assert math.isfinite(value)
 
 
-@settings(max_examples=300)
 @given(st.text(alphabet='[]{}=."#\n\t tolermnavuidpsg0123456789', max_size=120) | st.text(max_size=80))
 def test_random_text_is_an_instrument_or_refused(text: str) -> None:
     for head in ("", HEAD, GOOD):
@@ -313,7 +312,6 @@ CELL = st.sampled_from(
 )
 
 
-@settings(max_examples=300)
 @given(st.dictionaries(st.sampled_from(["name", "value", "unit", "mode", "depth", "north", "down", "x"]), CELL))
 @pytest.mark.slow
 def test_random_terms_are_an_instrument_or_refused(cells: dict[str, str]) -> None:

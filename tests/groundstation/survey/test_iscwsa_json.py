@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from hypothesis import example, given, settings
+from hypothesis import example, given
 from hypothesis import strategies as st
 from jsonschema import Draft202012Validator
 from referencing import Registry, Resource
@@ -355,7 +355,6 @@ MODELS = st.fixed_dictionaries(
 
 
 @pytest.mark.slow
-@settings(max_examples=400)
 @given((MODELS | ANYTHING).map(json.dumps) | st.text(max_size=30))
 @example(text_of(row(), metadata=[1]))
 @example(text_of(row(), parameters=[1]))

@@ -34,7 +34,7 @@ POTSDAM = [
 ]
 GOOD = "md_m,inclination_deg,azimuth_deg\n0,0,0\n2,1,120\n4,2,121\n"
 MEASURED = "md_m,a_cm,b_cm\n0,0,0\n2,1,-1\n4,2,-1\n"
-ON_DISK = settings(suppress_health_check=[HealthCheck.function_scoped_fixture], max_examples=300)
+ON_DISK = settings(suppress_health_check=[HealthCheck.function_scoped_fixture])
 
 
 def file(folder: Path, text: str, name: str = "record.csv") -> Path:

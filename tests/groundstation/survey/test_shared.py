@@ -179,7 +179,7 @@ MDS = (2.0, 4.0, 6.0, 8.0)
 TRUE = [(4.0 * DEG, 20.0 * DEG), (8.0 * DEG, 80.0 * DEG), (12.0 * DEG, 150.0 * DEG), (9.0 * DEG, 230.0 * DEG)]
 JOINT_STD, MOUNT_STD, YAW_STD = 0.25 * DEG, 0.3 * DEG, 0.1 * DEG
 BIAS_STD, FORCE_STD = 8e-3, 5e-3  # m/s^2
-DRAWS = 4000
+DRAWS = (1000, 4000)  # in `make test` and in `make study`
 
 
 @dataclass
@@ -236,12 +236,12 @@ class Campaign:
     claims: np.ndarray  # (draws, 3, 3) m^2, what each string claims at the toe
 
 
-@pytest.fixture(scope="module")
-def campaign() -> Campaign:
+@pytest.fixture(scope="module", params=[DRAWS[0], pytest.param(DRAWS[1], marks=pytest.mark.statistical)])
+def campaign(request: pytest.FixtureRequest) -> Campaign:
     generator, names = np.random.default_rng(5), SharedErrors()
     claimed = surveyed(Drawn(None), names)
     true = np.array([point.position for point in claimed.points[1:]])
-    found = [surveyed(Drawn(generator), names) for _ in range(DRAWS)]
+    found = [surveyed(Drawn(generator), names) for _ in range(request.param)]
     errors = np.array([[point.position for point in trajectory.points[1:]] for trajectory in found]) - true
     return Campaign(claimed, errors, np.array([trajectory.points[-1].cov for trajectory in found]))
 
@@ -252,9 +252,10 @@ def test_the_claimed_covariance_of_a_position_is_that_of_drawn_strings(campaign:
     axes = 2 if station == 0 else 3  # the depth of a single station follows from its place in plan
     cov = campaign.claimed.points[station + 1].cov[:axes, :axes]
     whitened = np.linalg.solve(np.linalg.cholesky(cov), campaign.errors[:, station, :axes].T)
-    sample = whitened @ whitened.T / DRAWS
+    draws = len(campaign.errors)
+    sample = whitened @ whitened.T / draws
     # the variance of one number is uncertain by sqrt(2/n), a covariance of two by sqrt(1/n); five of these
-    limit = 5.0 / math.sqrt(DRAWS) * (np.ones((axes, axes)) + (math.sqrt(2.0) - 1.0) * np.eye(axes))
+    limit = 5.0 / math.sqrt(draws) * (np.ones((axes, axes)) + (math.sqrt(2.0) - 1.0) * np.eye(axes))
     assert np.all(np.abs(sample - np.eye(axes)) < limit), sample
 
 
@@ -270,4 +271,4 @@ def test_the_plan_ellipse_of_95_percent_covers_as_often_as_it_says(campaign: Cam
 def test_without_the_shared_errors_the_ellipse_would_cover_far_too_little(campaign: Campaign) -> None:
     point = campaign.claimed.points[-1]
     random = (point.cov - point.shared @ point.shared.T)[:2, :2]
-    assert inside_95(campaign.errors[:, -1, :2], np.broadcast_to(random, (DRAWS, 2, 2))) < 0.7
+    assert inside_95(campaign.errors[:, -1, :2], np.broadcast_to(random, campaign.claims[:, :2, :2].shape)) < 0.7

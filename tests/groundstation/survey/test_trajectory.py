@@ -170,7 +170,8 @@ def test_a_hole_that_turns_back_on_itself_has_no_arc() -> None:
 
 
 @pytest.mark.slow
-def test_covariance_of_the_position_is_what_sampling_gives() -> None:
+@pytest.mark.parametrize("draws", [4000, pytest.param(20_000, marks=pytest.mark.statistical)])
+def test_covariance_of_the_position_is_what_sampling_gives(draws: int) -> None:
     generator = np.random.default_rng(2)
     mds, azimuths = [2.0, 4.0, 7.0, 8.0], [0.3, 0.5, 1.0, 1.1]
     inclinations = [0.02, 0.05, 0.3, 0.4]
@@ -179,7 +180,7 @@ def test_covariance_of_the_position_is_what_sampling_gives() -> None:
     for md, inclination, azimuth in zip(mds, inclinations, azimuths, strict=True):
         claimed.append(md, turned(inclination, azimuth, std, [joint_std]))
     toes = []
-    for _ in range(20_000):
+    for _ in range(draws):
         joint = joint_std * generator.standard_normal()
         sampled = Trajectory()
         for md, inclination, azimuth in zip(mds, inclinations, azimuths, strict=True):

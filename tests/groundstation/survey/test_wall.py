@@ -2,6 +2,7 @@
 
 import math
 from itertools import pairwise
+from typing import Any
 
 import numpy as np
 import pytest
@@ -129,9 +130,14 @@ def test_unlike_in_its_directions_it_is_what_sampling_gives(
     assert beyond(np.array(mean), cov_of(std_a, std_b, angle), LIMIT) == pytest.approx(sampled, rel=0.2)
 
 
+def in_study(*values: float) -> list[Any]:
+    """The values between, which are tried in `make study`."""
+    return [pytest.param(value, marks=pytest.mark.statistical) for value in values]
+
+
 @pytest.mark.slow
-@pytest.mark.parametrize("ratio", [1.0, 2.0, 10.0, 100.0, 1000.0])
-@pytest.mark.parametrize("wide", [0.0009, 0.003, 0.01, 0.1, 1.0])
+@pytest.mark.parametrize("ratio", [1.0, 10.0, 1000.0, *in_study(2.0, 100.0)])
+@pytest.mark.parametrize("wide", [0.0009, 0.01, 1.0, *in_study(0.003, 0.1)])
 def test_whatever_the_shape_of_the_region_it_is_the_integral(ratio: float, wide: float) -> None:
     generator = np.random.default_rng(7)
     checked = 0

@@ -5,7 +5,7 @@ from fractions import Fraction
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from node.kernels.fixed.arithmetic import bits, clamp, inverse_root, mul, quotient, reciprocal, shift
@@ -83,7 +83,6 @@ def test_the_difference_of_binary_angles_wraps(a: int, step: int) -> None:
     assert difference((a + step) % TURN, a) == step
 
 
-@settings(max_examples=300)
 @given(st.floats(0.05, 1e7), st.floats(1e-6, 8.0))
 def test_exponential(tau: float, dt: float) -> None:
     rate, step = round(math.log2(math.e) / tau * 2**42), round(dt * 2**28)

@@ -4,7 +4,7 @@ import math
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from node.kernels import strapdown
@@ -24,7 +24,6 @@ def fixed_down(down: np.ndarray) -> np.ndarray:
 
 
 @pytest.mark.slow
-@settings(max_examples=200)
 @given(
     st.floats(0.0, math.pi),
     st.floats(-math.pi, math.pi),

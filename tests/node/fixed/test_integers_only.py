@@ -1,13 +1,19 @@
 """No float in the integer loop: the types and the compiled code of every function of it are read."""
 
 import os
+import re
 import subprocess
 import sys
 from pathlib import Path
+from typing import Any
 
+import numba
 import pytest
 
 import node.kernels.fixed
+from node.kernels.fixed.cycle import run_cycle
+from node.kernels.fixed.node import warm_up
+from node.kernels.fixed.relay import offer_aiding
 
 OUTSIDE = {"__init__", "beside", "border", "node", "step"}  # the border, where floats become integers, and beyond
 INSPECTOR = """
@@ -98,11 +104,46 @@ def inspect(program: str, cache: Path) -> str:
     ).stdout
 
 
+FLOAT = re.compile(r"\b(double|float|half|bfloat|x86_fp80|fp128)\b")
+
+
+def float_lines(function: Any, signature: Any) -> list[str]:
+    """Lines with a float in what was compiled and is run: the function and all it calls, without Python's wrapper."""
+    compiled = function.overloads[signature].library._get_module_for_linking()
+    bodies = [part for part in compiled.functions if not part.is_declaration and "cpython" not in part.name]
+    assert bodies
+    return [line.strip() for body in bodies for line in str(body).splitlines() if FLOAT.search(line)]
+
+
 @pytest.mark.slow
+@pytest.mark.parametrize("function", [run_cycle, offer_aiding], ids=["cycle", "aiding"])
+def test_the_loop_that_is_kept_holds_no_float(function: Any) -> None:
+    """The code every node runs, from the cache; the types of its variables are read in `make study`."""
+    warm_up()
+    kept = [signature for signature, *_ in function._cache._cache_file._load_index()]
+    assert kept
+    for signature in kept:
+        function.compile(signature)
+        assert float_lines(function, signature) == []
+
+
+@pytest.mark.parametrize(
+    ("leaky", "leaks"),
+    [(lambda x: (x >> 1) // 3, False), (lambda x: int((x >> 1) * 0.5), True), (lambda x: int(x / 2), True)],
+    ids=["clean", "a half", "a quotient"],
+)
+def test_a_float_would_be_found_in_what_is_kept(leaky: Any, leaks: bool) -> None:
+    function = numba.njit(error_model="numpy")(leaky)
+    function(12345)
+    (signature,) = function.overloads
+    assert bool(float_lines(function, signature)) is leaks
+
+
+@pytest.mark.statistical
 def test_the_loop_holds_no_float(tmp_path: Path) -> None:
     assert inspect(LOOP, tmp_path) == ""
 
 
-@pytest.mark.slow
+@pytest.mark.statistical
 def test_one_half_would_be_found(tmp_path: Path) -> None:
     assert inspect(ONE_HALF, tmp_path).split("\n")[:3] == ["clean False", "leaky True", "divided True"]
