@@ -15,13 +15,13 @@ import numpy as np
 
 from borechain.client import Ground, NoAnswerError
 from borechain.load.crowd import DRILLING_S, ROUND_S, TUBE_LENGTH, Crowd, living
-from borechain.load.readers import follow_keys, follow_page
+from borechain.load.readers import BARE, CONNECT_S, answer_nothing, follow_keys, follow_page
 from groundstation.gateway.page.settings import PageSettings
 from groundstation.host import run_ground
 from sim.errors import RigError
 from sim.rig.processes import ProcessTable, Spec
 from sim.rig.realtime import cpu_seconds, footprint, pids
-from telemetry.media.zenoh_bus import open_router
+from telemetry.media.zenoh_bus import ZenohBus, open_router
 from telemetry.runtime.hosting import Place
 
 RIG = "load"
@@ -72,15 +72,13 @@ def measure(load: Load, endpoint: str, page: PageSettings, folder: Path) -> dict
                 specs |= readers
                 for name in readers:
                     table.start(name)
-                answers, cost = bear(ground, table, until)
+                cost = bear(ground, bus, table, until)
                 for name in readers:
                     table.running[name].join(LEFT_WITHIN_S)
                 return cost | {
                     "browser_late_ms": figures(late(folder, "browser")),
                     "terminal_late_ms": figures(late(folder, "terminal")),
-                    "answer_ms": figures(answers),
                     "surveys": crowd.surveys,
-                    "stations": len(ground.stations()),
                 }
     finally:
         table.stop()
@@ -119,27 +117,49 @@ def readers_of(load: Load, endpoint: str, page: PageSettings, until: float, fold
         f"terminal {n}": Spec(follow_keys, (endpoint, RIG, until, folder / f"terminal-{n}.json"))
         for n in range(load.terminals)
     }
-    return browsers | terminals
+    return browsers | terminals | {"bare": Spec(answer_nothing, (endpoint, until))}
 
 
-def bear(ground: Ground, table: ProcessTable, until: float) -> tuple[list[float], dict[str, Any]]:
-    """Ask until a time (s, monotonic): how long each answer took (s), and what the ground station needed meanwhile."""
+def bear(ground: Ground, bus: ZenohBus, table: ProcessTable, until: float) -> dict[str, Any]:
+    """Ask until a time (s, monotonic): how long answers took, and what the ground station needed meanwhile.
+
+    In turn with it a process is asked that does nothing else: where the machine lets that one wait too, the ground
+    station is not to blame.
+    """
     time.sleep(SETTLED_S)
     pid = pids(table)[GROUND]
     begun, cpu = time.monotonic(), cpu_seconds(pid)
     taken: list[float] = []
+    bare: list[float] = []
     weighed: list[tuple[float, float]] = []  # s, MB
+    stations = unanswered = 0
     for path in itertools.cycle(ASKED):
         asked = time.monotonic()
         if asked >= begun + WEIGH_EVERY_S * len(weighed) or asked >= until:
             weighed.append((round(asked - begun, ROUNDING), round(footprint(pid)["private_mb"], ROUNDING)))
         if asked >= until:
             break
-        ground.ask(path)
+        asked = time.monotonic()
+        try:
+            answer = ground.ask(path)
+        except NoAnswerError:
+            unanswered += 1
+        else:
+            stations = len(answer["stations"]) if path == "stations" else stations
         taken.append(time.monotonic() - asked)
         time.sleep(ASK_EVERY_S)
+        asked = time.monotonic()
+        if bus.get(BARE, CONNECT_S):
+            bare.append(time.monotonic() - asked)
     cpu_percent = 100.0 * (cpu_seconds(pid) - cpu) / (time.monotonic() - begun)
-    return taken, {"cpu_percent": round(cpu_percent, ROUNDING), "memory_s_mb": weighed}
+    return {
+        "answer_ms": figures(taken),
+        "unanswered": unanswered,
+        "bare_ms": figures(bare),
+        "stations": stations,
+        "cpu_percent": round(cpu_percent, ROUNDING),
+        "memory_s_mb": weighed,
+    }
 
 
 def late(folder: Path, who: str) -> list[float]:

@@ -12,10 +12,11 @@ from pathlib import Path
 from typing import Any
 
 from borechain.client import Ground
-from telemetry.media.zenoh_bus import open_client
+from telemetry.media.zenoh_bus import Query, open_client
 from telemetry.runtime.hosting import begin_process
 
 NODES = "nodes/"
+BARE = "bench/bare"
 CONNECT_S = 30.0
 PART = 65_536  # bytes
 
@@ -44,6 +45,20 @@ def follow_keys(endpoint: str, rig: str, until: float, out: Path) -> None:
             with contextlib.suppress(queue.Empty):
                 late += lateness(*arrived.get(timeout=left))
     out.write_text(json.dumps(late))
+
+
+def answer_nothing(endpoint: str, until: float) -> None:
+    """Answer whoever asks for ``BARE`` at once till a time (s, monotonic): what bus and machine cost without work."""
+    begin_process("bare")
+    with open_client(endpoint, CONNECT_S) as bus:
+        bus.queryable_kept(BARE, answer_empty)
+        time.sleep(max(until - time.monotonic(), 0.0))
+
+
+def answer_empty(query: Query) -> None:
+    """End a query with an empty answer."""
+    query.reply(BARE, b"{}")
+    query.finish()
 
 
 def lateness(path: str, answer: dict[str, Any]) -> list[float]:

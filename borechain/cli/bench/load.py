@@ -56,7 +56,8 @@ def page(tubes: int, browsers: int, terminals: int, seconds: float, address: str
     click.echo(f"ground station: {result['cpu_percent']:.1f} % of a core, {memory}")
     for name, what in (("browser", "news on the page"), ("terminal", "news on the keys")):
         click.echo(line(f"{what}, {name}", result[f"{name}_late_ms"]))
-    click.echo(line("answers to questions", result["answer_ms"]))
+    click.echo(line(f"answers to questions, {result['unanswered']} without one", result["answer_ms"]))
+    click.echo(line("answers of a process that does nothing else", result["bare_ms"]))
     click.echo(f"{result['stations']} stations of {result['surveys']} surveys")
 
 
