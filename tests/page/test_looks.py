@@ -80,9 +80,9 @@ def test_on_paper_there_are_the_facts_and_no_buttons(rig: Beating, watched: Open
     page = ready(watched(rig.url))
     page.emulate_media(media="print")
     for shown in ("#word", "#told", "#todo", "#plan svg", "#strip svg", "#tubes", "#alarm-list .what", "#printed"):
-        expect(page.locator(shown)).to_be_visible()
+        expect(page.locator(shown).first).to_be_visible()  # the rig lives on: on a slow machine it has two alarms
     for hidden in ("#theme", "#sign", "#survey", "#alarm-list .acknowledge"):
-        expect(page.locator(hidden)).to_be_hidden()
+        expect(page.locator(hidden).locator("visible=true")).to_have_count(0)
     assert page.evaluate("getComputedStyle(document.getElementById('verdict')).backgroundColor") == "rgb(255, 255, 255)"
     assert len(page.pdf(format="A4")) > 10_000
 
