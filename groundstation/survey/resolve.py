@@ -122,7 +122,7 @@ def _is_plainly_one(cov: list[list[float]]) -> bool:
     The smallest eigenvalue is at least the determinant over the trace to the power k - 1.
     """
     k = len(cov)
-    if k > len(cov[-1]) or not 1 < k <= 3:
+    if not 1 < k <= 3:
         return False
     size = max(abs(value) for row in cov for value in row)
     if any(not abs(cov[i][j] - cov[j][i]) <= ASYMMETRY * size for i in range(k) for j in range(i)):
@@ -133,7 +133,8 @@ def _is_plainly_one(cov: list[list[float]]) -> bool:
         (_, _, _), (b, _, _), (c, e, f) = cov
         det = f * minor - e * (cov[0][0] * e - b * c) + c * (b * e - cov[1][1] * c)
         trace += f
-    return cov[0][0] > 0.0 and minor > 0.0 and det > PLAINLY * trace**k
+    # a product, for a power of numbers of a hostile message would raise where this is infinite
+    return cov[0][0] > 0.0 and minor > 0.0 and det > PLAINLY * math.prod([trace] * k)
 
 
 def angles(lean: Array, down: float) -> tuple[float, float]:

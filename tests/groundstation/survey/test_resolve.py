@@ -5,7 +5,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import example, given
 from hypothesis import strategies as st
 
 from groundstation.errors import SurveyError
@@ -159,6 +159,21 @@ def test_one_bad_covariance_among_good_ones_is_found() -> None:
     good = np.eye(3) * 1e-6
     assert is_covariance(np.array([good, good]))
     assert not is_covariance(np.array([good, -good]))
+
+
+@given(
+    st.integers(2, 3),
+    st.lists(st.floats(-3.0, 3.0), min_size=9, max_size=9),
+    st.floats(-160.0, 160.0),
+    st.floats(0.0, 1.0),
+)
+@example(3, [1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0], 150.0, 0.0)
+@example(3, [1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0], -8.0, 0.0)
+def test_a_matrix_alone_is_judged_as_among_many(k: int, entries: list[float], exponent: float, share: float) -> None:
+    """Few are looked at by their determinants, many by their eigenvalues; hostile sizes raise in neither."""
+    root = np.array(entries).reshape(3, 3)[:k, :k]
+    cov = (root @ root.T - 0.3 * share * np.eye(k) + 1e-12 * share * np.triu(root, 1)) * 10.0**exponent
+    assert is_covariance(cov) == is_covariance(np.repeat(cov[None], 100, axis=0))
 
 
 def test_a_direction_without_uncertainty_across_the_lean_is_no_survey() -> None:
