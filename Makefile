@@ -7,9 +7,8 @@ STAMP := $(VENV)/.installed
 SOAK ?= 168
 FROM ?= 50000
 SEEDS ?= 20000
-# three workers on two cores, for a third of a worker's time goes by waiting for processes, and each collects every test;
-# one that has nothing left takes tests from another
-WORKERS ?= $(shell echo $$((3 * $$(getconf _NPROCESSORS_ONLN) / 2)))
+# two workers a core, for half of a worker's time goes by waiting for processes: each begins with his part of those tests
+WORKERS ?= $(shell echo $$((2 * $$(getconf _NPROCESSORS_ONLN))))
 # a test run starts hundreds of processes; where the environment forbids bytecode each would compile what it imports
 unexport PYTHONDONTWRITEBYTECODE
 PYTEST := $(BIN)/python -m pytest --numprocesses $(WORKERS) --maxprocesses 8 --dist worksteal

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import shutil
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 
 import pytest
@@ -30,11 +31,42 @@ if os.access(MEMORY, os.W_OK) and shutil.disk_usage(MEMORY).free > ROOM:
     # a third of the time went by waiting for a disk to sync what nobody will read after a power cut
     os.environ.setdefault("PYTEST_DEBUG_TEMPROOT", str(MEMORY))
 
+WAITING = ("process", "install")  # markers of tests that wait for processes more than they compute
 MARKER_OF = {"processes": "process", "test_installation.py": "install"}  # first part of the path below tests/
 
 
-@pytest.hookimpl(tryfirst=True)  # before `-m` selects
-def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
+@pytest.hookimpl(wrapper=True, tryfirst=True)
+def pytest_collection_modifyitems(items: list[pytest.Item]) -> Iterator[None]:
+    """Mark the tests before `-m` selects, and deal what it has left among the workers."""
+    mark(items)
+    yield
+    items[:] = dealt(items, int(os.environ.get("PYTEST_XDIST_WORKER_COUNT", "1")))
+
+
+def dealt(items: Sequence[pytest.Item], workers: int) -> list[pytest.Item]:
+    """Tests in such an order that every worker begins with his part of those that wait.
+
+    xdist cuts the list into equal parts, a worker each, and whoever has done his takes from the end of another's. Where
+    the rigs of real processes stand last, two workers have nothing left and the third waits for one rig after another.
+    """
+    modules: dict[Path, list[pytest.Item]] = {}
+    for item in items:
+        modules.setdefault(item.path, []).append(item)
+    waiting = {
+        path: any(item.get_closest_marker(name) for item in own for name in WAITING) for path, own in modules.items()
+    }
+    first = sorted((own for path, own in modules.items() if waiting[path]), key=len, reverse=True)
+    others = [item for path, own in modules.items() if not waiting[path] for item in own]
+    order: list[pytest.Item] = []
+    for worker in range(workers):
+        share = [item for own in first[worker::workers] for item in own]
+        room = max((len(items) - len(order)) // (workers - worker) - len(share), 0)
+        order += share + others[:room]
+        others = others[room:]
+    return order
+
+
+def mark(items: Sequence[pytest.Item]) -> None:
     """Mark the tests of a folder or file whose tests cost alike."""
     tests = Path(__file__).parent
     for item in items:
