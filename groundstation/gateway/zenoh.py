@@ -8,16 +8,17 @@ from __future__ import annotations
 import asyncio
 from collections.abc import Callable
 from functools import partial
-from typing import Any
 
 import msgpack
 import orjson
 
 from groundstation.errors import GroundError, SelectorError
 from groundstation.service.intake import BEGIN, Intake, pack_intake
+from groundstation.service.model import RigModel
 from groundstation.service.orders import Order
-from groundstation.service.paths import FIXED, LONGEST_NUMBER, PATTERNS, check_parameters, find, paths
+from groundstation.service.paths import FIXED, LONGEST_NUMBER, PATTERNS, Path, check_parameters, find, paths
 from groundstation.service.process import GroundProcess
+from groundstation.service.views import Parameters
 from telemetry import keys
 from telemetry.errors import TelemetryError
 from telemetry.media.zenoh_bus import JSON, MSGPACK, Publisher, Query, ZenohBus
@@ -126,7 +127,7 @@ class ZenohGateway:
         if path not in self._publishers:
             self._publishers[path] = self._bus.publisher(self._key(path), JSON, droppable=True)
         if path not in BEATS or self._publishers[path].is_heard:
-            self._publishers[path].put(pack(self._news(path), "json"))
+            self._publishers[path].put(self._news(path))
 
     def _publish_intake(self) -> None:
         """Put what was taken in since the last time; whoever began to listen gets all that is kept first."""
@@ -152,13 +153,13 @@ class ZenohGateway:
         query.reply(query.selector_key, bytes(msgpack.packb([pack_intake(event) for event in events])), MSGPACK)
         query.finish()
 
-    def _news(self, path: str) -> dict[str, Any]:
+    def _news(self, path: str) -> bytes:
         """Answer to publish: of a stream the rows that have come since the last one."""
         model, found = self._process.model, find(self._process.model, path)
         if not found.is_stream:
-            return found.show(model, {})
+            return found.json(model, {})
         since, self._told[path] = self._told.get(path, 0), model.seen[path]
-        return found.show(model, {"since": str(since)})
+        return found.json(model, {"since": str(since)})
 
     def _answer(self, query: Query) -> None:
         try:
@@ -173,7 +174,7 @@ class ZenohGateway:
 
     def _replies(self, query: Query) -> list[tuple[str, bytes]]:
         model = self._process.model
-        found = {path: view for path, view in paths(model).items() if query.intersects(self._key(path))}
+        found = {path: one for path, one in paths(model).items() if query.intersects(self._key(path))}
         path = query.selector_key.partition("/ground/")[2]
         if not found and path and "*" not in path:
             find(model, path)  # which says what there is in its place
@@ -186,7 +187,8 @@ class ZenohGateway:
             raise SelectorError(f"parameter accept: expected json or msgpack, got {accept!r}")
         parameters = {name: value for name, value in query.parameters.items() if name not in COMMON_PARAMETERS}
         check_parameters(found.values(), parameters, COMMON_PARAMETERS)
-        return [(self._key(path), pack(view.show(model, parameters), accept)) for path, view in found.items()]
+        pack = msgpack_of if accept == "msgpack" else Path.json
+        return [(self._key(path), pack(one, model, parameters)) for path, one in found.items()]
 
     def _take_order(self, query: Query) -> None:
         """Accept an order; its answer is awaited beside all other work."""
@@ -221,7 +223,7 @@ class ZenohGateway:
             )
         else:
             key = keys.COMMAND.format(rig=self._rig, name=name)
-            query.reply(key, pack(self._operator.reply_of(order), "json"))
+            query.reply(key, orjson.dumps(self._operator.reply_of(order)))
             query.finish()
 
 
@@ -231,6 +233,6 @@ def refuse(query: Query, reason: str) -> None:
     query.finish()
 
 
-def pack(view: dict[str, Any], accept: str) -> bytes:
-    """A view on the wire."""
-    return bytes(msgpack.packb(view)) if accept == "msgpack" else orjson.dumps(view)
+def msgpack_of(path: Path, model: RigModel, parameters: Parameters) -> bytes:
+    """The answer of a path in msgpack."""
+    return bytes(msgpack.packb(path.show(model, parameters)))

@@ -4,9 +4,8 @@ from __future__ import annotations
 
 import math
 from collections import Counter, deque
-from collections.abc import Callable
+from collections.abc import Callable, Hashable
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -30,7 +29,6 @@ from groundstation.survey.trust import Trust, trust_of, with_unknown_yaw
 from telemetry.messages import EPOCH_UNKNOWN, Event, NodeFlag, NodeState, StaticRecord, SurveyMeasurement
 
 Array = npt.NDArray[np.float64]
-View = dict[str, Any]
 EVENTS_SHOWN = 10_000
 STATIC_RECORDS_SHOWN = 1_000
 ACCELEROMETER_NOISE_DEG = 0.02  # one sample, for the check of motion
@@ -82,7 +80,7 @@ class RigModel:
         self.hole = Hole(config)
         self.recalibration = FieldProcedure(config.gravity)
         self.orders = OrderBook()
-        self._shown: dict[Callable[..., View], tuple[int, View]] = {}
+        self._shown: dict[Hashable, tuple[int, bytes]] = {}
         self.wall = None if config.wall is None else LiveWall(config.wall, config.hole)
 
     @property
@@ -240,11 +238,14 @@ class RigModel:
             math.radians(self.config.accelerometer_bias_std_deg) * self.config.gravity,
         )
 
-    def last_shown(self, view: Callable[[RigModel, dict[str, str]], View]) -> View:
-        """What a view of the hole shows; worked out anew where a survey has come since."""
+    def last_shown(self, view: Hashable, render: Callable[[], bytes]) -> bytes:
+        """What a view of the hole shows, as it is sent; rendered anew where a survey has come since.
+
+        As objects what is shown of a long hole would take ten times the room.
+        """
         version = self.hole.version
         if self._shown.get(view, (-1,))[0] != version:
-            self._shown[view] = version, view(self, {})
+            self._shown[view] = version, render()
         return self._shown[view][1]
 
     def fused(self, station: SurveyStation) -> Direction:

@@ -93,6 +93,16 @@ class Operator:
         """
         return find(self._model, path).show(self._model, dict(parameters or {}))
 
+    def ask_json(self, path: str) -> bytes:
+        """Answer of the path as JSON.
+
+        Raises
+        ------
+        SelectorError
+            When there is no such path.
+        """
+        return find(self._model, path).json(self._model, {})
+
     def order(self, name: str, parameters: Mapping[str, str], by: str = "operator") -> Order:
         """Accept an order as an operator writes it.
 

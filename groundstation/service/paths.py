@@ -7,6 +7,8 @@ import time
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 
+import orjson
+
 from groundstation.errors import SelectorError
 from groundstation.service import alarm_views, column_views, key_fields, order_views, verdict_views, views, wall_views
 from groundstation.service.answers import Fields, object_schema
@@ -36,9 +38,15 @@ class Path:
     is_of_the_hole: bool = False
 
     def show(self, k: RigModel, p: Parameters) -> View:
-        """The whole answer: what every answer has, and the view; whoever takes it changes nothing in it."""
-        shown = k.last_shown(self.view) if self.is_of_the_hole and not p else self.view(k, p)
-        return header(k) | shown
+        """The whole answer: what every answer has, and the view."""
+        return header(k) | self.view(k, p)
+
+    def json(self, k: RigModel, p: Parameters) -> bytes:
+        """The whole answer as JSON; of the hole the text of the last time, behind a header of now."""
+        if not self.is_of_the_hole or p:
+            return orjson.dumps(self.show(k, p))
+        text = k.last_shown(self.view, lambda: orjson.dumps(self.view(k, p)))
+        return orjson.dumps(header(k))[:-1] + b"," + text[1:]
 
     @property
     def fields(self) -> Fields:

@@ -15,6 +15,7 @@ from schemas import check_answers
 
 from groundstation.errors import SelectorError
 from groundstation.host import answering
+from groundstation.service.paths import paths
 from telemetry.media.zenoh_bus import open_client, open_router
 from telemetry.messages import Event, Severity
 
@@ -39,6 +40,20 @@ def happen(rig: Rig, number: int) -> None:
 
 def seqs(answer: dict[str, Any], path: str = "events") -> list[int]:
     return [row["seq"] for row in answer[path]]
+
+
+def test_what_is_sent_is_what_there_is_also_of_a_hole_that_has_grown(tmp_path: Path) -> None:
+    rig = Rig(tmp_path, target=20.0)
+    rig.run(5.0)
+    for stop in range(3):
+        if stop:
+            rig.drill(stop, 0.3)
+        for path in paths(rig.ground.model):
+            shown, sent = rig.ask(path), json.loads(rig.ground.operator.ask_json(path))
+            assert list(sent) == list(shown)
+            assert sent.pop("utc") >= shown.pop("utc")
+            assert sent == json.loads(json.dumps(shown)), path
+    rig.ground.close()
 
 
 @pytest.mark.parametrize("path", ["events", "measurements"])

@@ -8,7 +8,6 @@ import time
 from collections.abc import Awaitable, Callable
 from typing import Any
 
-import orjson
 from starlette.requests import Request
 from starlette.responses import JSONResponse, Response
 from starlette.types import Receive, Scope, Send
@@ -64,7 +63,7 @@ class Doors:
         try:
             found = find(self._process.model, path)
             check_parameters([found], parameters)
-            return Response(orjson.dumps(found.show(self._process.model, parameters)), media_type="application/json")
+            return Response(found.json(self._process.model, parameters), media_type="application/json")
         except SelectorError as error:
             raise RequestError(400 if is_known(self._process, path) else 404, str(error)) from error
 

@@ -113,10 +113,10 @@ class Hub:
     def _event(self, path: str) -> bytes:
         if path not in self._rendered:
             try:
-                answer = self._process.operator.ask(path)
+                answer = self._process.operator.ask_json(path)
             except SelectorError:
                 return b""
-            self._rendered[path] = event("answer", {"path": path, "answer": answer})
+            self._rendered[path] = event("answer", {"path": path, "answer": orjson.Fragment(answer)})
         return self._rendered[path]
 
 
