@@ -7,7 +7,7 @@ STAMP := $(VENV)/.installed
 SOAK ?= 168
 FROM ?= 50000
 SEEDS ?= 20000
-# two workers a core, for half of a worker's time goes by waiting for processes: each begins with his part of those tests
+# two workers a core: one begins with the tests that wait for processes, and the other computes meanwhile
 WORKERS ?= $(shell echo $$((2 * $$(getconf _NPROCESSORS_ONLN))))
 # a test run starts hundreds of processes; where the environment forbids bytecode each would compile what it imports
 unexport PYTHONDONTWRITEBYTECODE
