@@ -17,7 +17,7 @@ from sim.gauntlet.world import MINUTE, FaultyWorld
 from sim.world.streams import stream
 from telemetry.messages import BASE, ENCODER
 
-COMBINED, CHUNK = 24, 12  # seeds in all, and of one test; `make study` runs thousands
+COMBINED, CHUNK = 300, 20  # seeds in all, and of one test; `make study` runs thousands
 
 
 def test_every_kind_has_a_name_of_its_own_and_draws_steps_in_its_time() -> None:
