@@ -333,6 +333,7 @@ class Store:
                     yield connection
         except StoreError as error:
             self.refusal = str(error)
+            self._engine.dispose()  # a file that was opened while it could not be written stays so
             raise
         self.refusal = ""
 

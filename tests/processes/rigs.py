@@ -12,7 +12,7 @@ import socket
 import subprocess
 import sys
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -95,10 +95,12 @@ class Rig:
 
 
 @contextlib.contextmanager
-def running_rig(tmp_path: Path, *arguments: str, scenario: str = "scenarios/rig-3.toml") -> Iterator[Rig]:
+def running_rig(
+    tmp_path: Path, *arguments: str, scenario: str = "scenarios/rig-3.toml", before: Sequence[str] = ()
+) -> Iterator[Rig]:
     endpoint, out = free_endpoint(), tmp_path / "run"
     process = subprocess.Popen(
-        command("rig", scenario, "--json", "--endpoint", endpoint, "--out", str(out), *arguments),
+        [*before, *command("rig", scenario, "--json", "--endpoint", endpoint, "--out", str(out), *arguments)],
         cwd=REPOSITORY,
         stdout=subprocess.PIPE,
         stderr=subprocess.PIPE,
