@@ -21,6 +21,7 @@ SETTLED_AFTER = 10.0  # s after a start in which a tube may still find its yaw
 TOGETHER = 30.0  # s
 ENOUGH = 2  # tubes
 STARTS_KEPT = 1000
+EPOCHS_KEPT = 100
 OFF_BEFORE = 30.0  # s before a start in which a tube may have been without power
 BLIND_KEPT = 20  # times of a tube and epoch
 
@@ -33,10 +34,12 @@ class Witnesses:
         self._starts: deque[Event] = deque(maxlen=STARTS_KEPT)
         self._blind: dict[tuple[int, int], deque[tuple[float, float]]] = {}  # s, rig time, by tube and epoch
         self._told: tuple[Event, ...] = ()
+        self._spans: dict[int, tuple[float, float]] = {}  # s, first and last event of each epoch
 
     def on_event(self, event: Event, heard: Collection[int]) -> str:
         """Handle an event while these tubes are heard; says who contradicts the encoder where that is new, or ''."""
         place = event.tube, event.epoch
+        self._add_to_span(event)
         if event.code in STARTS:
             self._starts.append(event)
             self._add_blind(place, event.at - OFF_BEFORE, event.at)
@@ -71,8 +74,28 @@ class Witnesses:
         return len(settled) >= max(enough, 1)
 
     def _together(self, event: Event) -> tuple[Event, ...]:
-        every = self._contradicted.values()
-        return tuple(e for e in every if e.epoch == event.epoch and abs(e.at - event.at) <= TOGETHER)
+        return tuple(
+            e for e in self._contradicted.values() if self._apart(*sorted([e, event], key=_in_time)) <= TOGETHER
+        )
+
+    def _apart(self, earlier: Event, later: Event) -> float:
+        """Seconds between two events; where rig time began anew in between, those that are known to have gone by.
+
+        An encoder that slipped and then started again is contradicted by some before its start and by others after.
+        """
+        if earlier.epoch == later.epoch:
+            return later.at - earlier.at
+        between = any(earlier.epoch < known < later.epoch for known in self._spans)
+        if between or EPOCH_UNKNOWN in (earlier.epoch, later.epoch):
+            return math.inf
+        (_, last), (first, _) = (self._spans.get(one.epoch, (-math.inf, math.inf)) for one in (earlier, later))
+        return last - earlier.at + later.at - first
+
+    def _add_to_span(self, event: Event) -> None:
+        first, last = self._spans.get(event.epoch, (math.inf, -math.inf))
+        self._spans[event.epoch] = min(first, event.at), max(last, event.at)
+        while len(self._spans) > EPOCHS_KEPT:
+            del self._spans[min(self._spans)]
 
     def _was_settled(self, event: Event) -> bool:
         """Whether a tube had found its yaw before, since its start."""
@@ -100,3 +123,8 @@ class Witnesses:
         """Whether a tube ran, had settled and had a gyroscope at the time of an event: it could have seen the same."""
         times = self._blind.get((tube, event.epoch), ())
         return not any(since <= event.at <= until + SETTLED_AFTER for since, until in times)
+
+
+def _in_time(event: Event) -> tuple[int, float]:
+    """What events are ordered by: rig time of a later epoch is later."""
+    return event.epoch, event.at

@@ -8,8 +8,8 @@ from groundstation.service.witnesses import Witnesses
 from telemetry.messages import Event, Scalar, Severity
 
 
-def event(tube: int, at: float, code: str, number: int = 10, **arguments: Scalar) -> Event:
-    return Event(tube, number, at, Severity.WARNING, code, arguments, 1)
+def event(tube: int, at: float, code: str, number: int = 10, epoch: int = 1, **arguments: Scalar) -> Event:
+    return Event(tube, number, at, Severity.WARNING, code, arguments, epoch)
 
 
 BOTH_STARTED = [event(1, 0.0, "restored", 1), event(2, 0.0, "restored", 1)]
@@ -93,6 +93,24 @@ def test_a_stranger_of_the_same_number_takes_no_witness_away() -> None:
     assert told([*known, stranger, event(1, 100.0, "yaw_reset", 3)]) == []
 
 
-def test_contradictions_of_two_epochs_or_of_two_times_are_not_added_up() -> None:
+def test_contradictions_of_two_times_are_not_added_up() -> None:
     late = event(2, 200.0, "yaw_reset")
     assert told([*BOTH_STARTED, event(1, 100.0, "yaw_reset"), late]) == []
+
+
+@pytest.mark.parametrize(
+    ("between", "second", "said"),
+    [
+        ([], 510.0, ["tubes 1, 2 at 100 s"]),
+        ([], 540.0, []),
+        ([event(1, 125.0, "stopped", 11)], 515.0, []),
+        ([event(1, 900.0, "stopped", 11, epoch=2)], 510.0, []),
+    ],
+    ids=["at once", "long after the start", "long before the start", "an epoch between them"],
+)
+def test_contradictions_before_and_after_a_start_of_the_encoder_are_added_up(
+    between: list[Event], second: float, said: list[str]
+) -> None:
+    """Rig time of the third epoch begins at 500 s, of which the one before knows nothing."""
+    first = [*BOTH_STARTED, event(1, 100.0, "yaw_reset"), *between, event(1, 500.0, "stopped", 12, epoch=3)]
+    assert told([*first, event(2, second, "yaw_reset", epoch=3)]) == said
