@@ -82,7 +82,7 @@ study: $(STAMP) statistical  ## every study of the table, with many seeds; their
 soak: $(STAMP)  ## 100 000 seeds of the gauntlet, SOAK hours of a rig under faults, an hour of processes
 	$(BIN)/borechain gauntlet --seeds 100000 --from 100000
 	$(BIN)/borechain gauntlet --soak $(SOAK) --out docs/results
-	$(BIN)/borechain bench realtime --nodes 10 --seconds 3600
+	$(BIN)/borechain bench hour --out docs/results
 
 seeds: $(STAMP)  ## fresh seeds of the gauntlet, SEEDS of them FROM one on
 	$(BIN)/borechain gauntlet --seeds $(SEEDS) --from $(FROM)

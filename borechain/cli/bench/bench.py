@@ -16,7 +16,13 @@ from borechain.cli.options import json_option
 from borechain.cli.tables import console
 
 FOLDER = Path(__file__).parents[3] / "benchmarks"
-OWN = {"realtime": "realtime", "page": "load", "day": "load", "killed": "load"}  # and the module of each
+OWN = {
+    "realtime": "realtime",
+    "page": "load",
+    "day": "load",
+    "killed": "load",
+    "hour": "hour",
+}  # and the module of each
 
 
 def benches() -> list[str]:
@@ -65,6 +71,7 @@ def bench(context: click.Context) -> None:
       borechain bench page
       borechain bench day --hours 24
       borechain bench killed --times 200
+      borechain bench hour
     """
     if context.invoked_subcommand is None:
         click.echo("\n".join(benches()))
