@@ -99,8 +99,8 @@ class Observer:
     def _repeated_starts(self) -> Iterator[str]:
         for address, process in self._rig.stepper.processes.items():
             known, numbers = self._starts.setdefault(address, (None, set()))
-            if process is known:
-                continue
+            if process is known or process.endpoint.address != address:
+                continue  # another tube hangs in its place, with a count of its own
             number = process.endpoint.boot_count
             if number in numbers and not self._rig.disk(address).handled:
                 yield f"process {address}: two starts have the number {number}"
