@@ -16,7 +16,7 @@ from node.kernels.angles import from_binary, wrap
 from node.kernels.doubts import explain_jump, follow_jump, follow_misfit, misfit_var
 from node.kernels.events import NONE, Code, Fault, tell
 from node.kernels.jit import constant, kernel
-from node.kernels.layout import CLOCK_SLACK, DEG, PERIOD, RING, Array, Err, Status
+from node.kernels.layout import CLOCK_SLACK, DEG, PERIOD, Array, Err, Status
 from node.kernels.modes import STATIC_BIAS
 from node.kernels.record import A_CLOCK_VAR, A_RATE, A_VALID, A_YAW, A_YAW_VAR
 from node.kernels.resets import (
@@ -43,7 +43,7 @@ SLOWEST_REVERSED: Final = 5.0 * DEG  # rad/s, from where encoder and gyroscope a
 RATE_AGE: Final = 3.0  # s, of an encoder's rate that may stand for the gyroscope
 BACKWARD: Final = PERIOD  # s, that a cycle may begin before the end of the last; beyond it is a jump of the clock
 LONGEST_CYCLE: Final = 10.0 * PERIOD  # s
-FARTHEST: Final = RING * PERIOD  # s, that a cycle may begin after the end of the last
+FARTHEST: Final = LONGEST_CYCLE  # s, that a cycle may begin after the end of the last; no rate stands for more
 FAR_OFF: Final = 4.0  # sigmas, that a clock may be wrong by
 PSI, BZ, S = constant(Err.YAW), constant(Err.BIAS_Z), constant(Err.SCALE)
 BAD_SAMPLE, GYRO_STEP, GYRO_SCALE = constant(Fault.BAD_SAMPLE), constant(Fault.GYRO_STEP), constant(Fault.GYRO_SCALE)

@@ -178,7 +178,7 @@ def test_a_stuck_or_saturated_accelerometer_is_flagged_and_no_survey_made_of_it(
     assert np.all(np.abs(string.error[at:]) < 5.0 * string.std[at:])
 
 
-@pytest.mark.parametrize("jump", [-1000.0, -0.8, 200.0, 1e9])
+@pytest.mark.parametrize("jump", [-1000.0, -0.8, 16.0, 200.0, 1e9])
 def test_a_clock_that_jumps_is_told_and_the_yaw_taken_anew(jump: float, healthy: StringOfOne) -> None:
     string = StringOfOne(1)
     at = healthy.turning(1)
