@@ -32,6 +32,7 @@ Array = npt.NDArray[np.float64]
 COMPILED_FROM = 100  # stations
 COMPILED_BEFORE = ("relay", "mwd-rev5.1")  # by ``make kernels``
 HELD = 32  # models of a process
+DEFAULTS = np.array(list(RECORD.values()))[:, None]  # of what a record may leave out
 
 
 class CompiledModel:
@@ -187,8 +188,10 @@ def _record(survey: Survey) -> Array:
     """Time and further columns (r, n) of a record, their defaults where it has none."""
     out = np.empty((1 + len(RECORD), len(survey.md)))
     out[0] = survey.record.get("Time", SECONDS_A_METRE * survey.md)
-    for row, (name, default) in enumerate(RECORD.items(), 1):
-        out[row] = survey.record.get(name, default)
+    out[1:] = DEFAULTS
+    for row, name in enumerate(RECORD, 1):
+        if name in survey.record:
+            out[row] = survey.record[name]
     return out
 
 

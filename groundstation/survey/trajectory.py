@@ -127,7 +127,8 @@ class Trajectory:
         weights[1:] += ends[:-1]
         passed, shared, out = widened(self._passed, widths[-1]), np.empty_like(tangents[1:]), np.empty_like(covs)
         add_stations(weights, ends, tangents, of_tangents, passed, self._own, shared, out)
-        self._passed, self._length, self._last_cov, self._last_shared = passed, float(lengths[-1]), covs[-1], columns[-1]
+        self._passed, self._length = passed, float(lengths[-1])
+        self._last_cov, self._last_shared = covs[-1], columns[-1]
         points: list[tuple[Array, Array]] = []
         for width, same in itertools.groupby(widths[1:]):
             run = slice(len(points), len(points) + len(list(same)))
