@@ -161,11 +161,12 @@ def locate(
     SurveyError, ToolError
         As ``error_model.propagate``.
     """
-    tool, is_long = legs[0].tool, len(survey.md) >= COMPILED_FROM
-    if len(legs) > 1 or not (is_long or (tool, False) in _held):
+    is_long = len(survey.md) >= COMPILED_FROM
+    if len(legs) != 1 or not (is_long or (legs[0].tool, False) in _held):
         places = start + positions(method, survey.md, survey.inclination, survey.azimuth)
         return places, propagate(replace(survey, tvd=places[:, 2]), legs, site, slot_allowance=slot_allowance)
     check_legs(survey, legs)
+    tool = legs[0].tool
     model = _model(tool, by_source=False)
     if start.any():
         places = start + positions(method, survey.md, survey.inclination, survey.azimuth)
