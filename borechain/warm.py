@@ -10,12 +10,14 @@ import node.process.host
 import sim.rig.bus_stepper
 import sim.rig.scheduler
 import sim.world.world
+from groundstation.survey.kernels import position_errors
 from node.kernels.jit import leave_blas_out
 from node.kernels.warm import warm_encoder, warm_up
 
 leave_blas_out()
 warm_up()
 warm_encoder()
+position_errors.warm_up()
 # a collection in a child writes into every object that it looks at: 45 MB of shared pages would become its own
 gc.collect()
 gc.freeze()

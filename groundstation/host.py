@@ -50,6 +50,7 @@ def run_ground(
         # settings, key and database are looked at before half a minute is spent on a router that may be absent
         given = {"rig": place.rig, "folder": place.folder, "key_file": place.key_file, "keys": place.keys}
         config = checked_config(**given, **settings)
+        load_kernels()
         with (
             contextlib.closing(GroundProcess(config)) as process,
             page_of(page) as serve_page,
@@ -59,6 +60,15 @@ def run_ground(
             take_lease(bus, place.rig)
             doors = partial(answering, process, bus, serve_page)
             run(serve_by_own_clock(process, bus, doors) if own_clock else serve_on_stepper(process, bus, place, doors))
+
+
+def load_kernels() -> None:
+    """Compile what surveys are computed with, or load it, before it says that it lives: no question waits for that."""
+    from groundstation.survey.kernels.position_errors import warm_up
+    from node.kernels.jit import leave_blas_out
+
+    leave_blas_out()
+    warm_up()
 
 
 def no_page(_process: GroundProcess) -> contextlib.AbstractAsyncContextManager[None]:

@@ -42,7 +42,7 @@ class Region:
     def cov(self) -> Array:
         """Covariance (n, 3, 3) of every position, m^2."""
         turned = self._turned(self.model.cov)
-        return turned + self.tie_cov if np.any(self.tie_cov) else turned
+        return turned + self.tie_cov if self.tie_cov.any() else turned
 
     def at(self, md: float) -> Array:
         """Covariance (3, 3) at any depth of the survey; errors as ``Uncertainty.at``."""

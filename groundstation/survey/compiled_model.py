@@ -11,10 +11,10 @@ from __future__ import annotations
 
 import hashlib
 import importlib.util
+import math
 import sys
 from collections.abc import Callable, Sequence
 from dataclasses import replace
-from functools import lru_cache
 from typing import Any
 
 import numpy as np
@@ -22,16 +22,17 @@ import numpy.typing as npt
 
 from groundstation.errors import SurveyError, ToolError
 from groundstation.survey.compiled_source import CURVED, GIVEN, STRAIGHT, loop_sources, write_model
-from groundstation.survey.error_model import Propagation, Uncertainty, check_legs, propagate, surface_covariance
-from groundstation.survey.error_sources import RECORD, SECONDS_A_METRE, Geometry, Leg, Site, Survey, merged_sources
+from groundstation.survey.error_model import Uncertainty, check_legs, depth_variance, propagate
+from groundstation.survey.error_sources import RECORD, SECONDS_A_METRE, Leg, Site, Survey
 from groundstation.survey.gyro_modes import TURNS, mode_weights, sections_of
 from groundstation.survey.instruments import Tool, load_tool
 from groundstation.survey.methods import Method, check_stations, positions
-from groundstation.survey.running_sums import RunningSums
 
 Array = npt.NDArray[np.float64]
 COMPILED_FROM = 100  # stations
 COMPILED_BEFORE = ("relay", "mwd-rev5.1")  # by ``make kernels``
+HELD = 32  # models of a process
+DEFAULTS = np.array(list(RECORD.values()))[:, None]  # of what a record may leave out
 
 
 class CompiledModel:
@@ -49,6 +50,7 @@ class CompiledModel:
         self._in_modes = [source.rows[0] for source in self._sources if source.rows[0][2].by_mode]
         self._by_source = by_source
         self._parameters = np.array([*tool.parameters.values(), 0.0])
+        self._depth_variance = depth_variance(tool)
         self._function = _load(write_model(tool, by_source=by_source))
 
     def run(self, method: Method, md: Array, inclination: Array, azimuth: Array, site: Site) -> tuple[Array, Array]:
@@ -103,7 +105,10 @@ class CompiledModel:
         if status < 0:
             propagate(survey, [Leg(self.tool)], site, slot_allowance=slot_allowance)  # names the term
             raise ToolError(f"{self.tool.name}: a weight has no value at station {-status}; give singular weights")
-        cov[0] = surface_covariance(survey.md, survey.inclination, survey.azimuth, self.tool)
+        if survey.md[0] == 0.0:  # as ``surface_covariance``
+            sine, azimuth = math.sin(survey.inclination[0]), survey.azimuth[0]
+            along = np.array([sine * math.cos(azimuth), sine * math.sin(azimuth), math.cos(survey.inclination[0])])
+            cov[0] = self._depth_variance * along[:, None] * along
         return cov, {source.name: part for source, part in zip(self._sources, parts, strict=False)}
 
     def _modes(self, survey: Survey, site: Site) -> Array:
@@ -117,18 +122,29 @@ class CompiledModel:
         return out
 
 
-@lru_cache(maxsize=32)
+_held: dict[tuple[Tool, bool], CompiledModel] = {}
+
+
 def _model(tool: Tool, *, by_source: bool) -> CompiledModel:
-    return CompiledModel(tool, by_source=by_source)
+    """Model of a tool, held from its first use on."""
+    key = tool, by_source
+    if key not in _held:
+        if len(_held) == HELD:
+            del _held[next(iter(_held))]
+        _held[key] = CompiledModel(tool, by_source=by_source)
+    return _held[key]
 
 
 def warm(names: Sequence[str] = COMPILED_BEFORE) -> None:
-    """Compile instruments into the cache, totals and sources, so that nobody's first survey waits for it."""
+    """Compile instruments or load them from the cache, totals and sources, and hold them.
+
+    Nobody's first survey waits for them then, and short surveys by them run compiled too.
+    """
     md, zero = np.arange(3.0), np.zeros(3)
     for name in names:
         for by_source in (False, True):
-            tool = load_tool(name)
-            CompiledModel(tool, by_source=by_source).run(Method.BALANCED_TANGENTIAL, md, zero, zero, Site())
+            model = _model(load_tool(name), by_source=by_source)
+            model.run(Method.BALANCED_TANGENTIAL, md, zero, zero, Site())
 
 
 def locate(
@@ -136,55 +152,31 @@ def locate(
 ) -> tuple[Array, Uncertainty]:
     """Positions (n, 3) of one well from ``start`` (3,) on, and their covariances with those of every source.
 
-    Where one tool took it all and there are ``COMPILED_FROM`` stations: compiled. Below that the compiler, which takes
-    seconds once a tool and machine, costs more than it saves: station by station, by the running sums of which the
-    ground station's trajectory is made. Of gyros that err anew in every section: the arrays of ``error_model``. The
-    survey's own TVD is not looked at.
+    Compiled where one tool took it all, and its model is held or there are ``COMPILED_FROM`` stations: to compile takes
+    seconds once a tool and machine, and to load the compiler a quarter of one, a hundred short surveys. All others by
+    the arrays of ``error_model``. The survey's own TVD is not looked at.
 
     Raises
     ------
     SurveyError, ToolError
         As ``error_model.propagate``.
     """
-    quick = len(legs) == 1 and len(survey.md) >= COMPILED_FROM
-    if quick and not np.any(start):
-        check_legs(survey, legs)
-        places, cov, _ = _model(legs[0].tool, by_source=False).locate(
-            method, survey, site, slot_allowance=slot_allowance
-        )
+    is_long = len(survey.md) >= COMPILED_FROM
+    if len(legs) != 1 or not (is_long or (legs[0].tool, False) in _held):
+        places = start + positions(method, survey.md, survey.inclination, survey.azimuth)
+        return places, propagate(replace(survey, tvd=places[:, 2]), legs, site, slot_allowance=slot_allowance)
+    check_legs(survey, legs)
+    tool = legs[0].tool
+    model = _model(tool, by_source=False)
+    if start.any():
+        places = start + positions(method, survey.md, survey.inclination, survey.azimuth)
         survey = replace(survey, tvd=places[:, 2])
-        return places, Uncertainty(survey, tuple(legs), site, slot_allowance, cov, compiled_parts)
-    places = start + positions(method, survey.md, survey.inclination, survey.azimuth)
-    survey = replace(survey, tvd=places[:, 2])
-    if not quick:
-        return places, _uncompiled(survey, legs, site, slot_allowance=slot_allowance)
-    check_legs(survey, legs)
-    cov, _ = _model(legs[0].tool, by_source=False).covariance(survey, site, slot_allowance=slot_allowance)
-    return places, Uncertainty(survey, tuple(legs), site, slot_allowance, cov, compiled_parts)
-
-
-def _uncompiled(survey: Survey, legs: Sequence[Leg], site: Site, *, slot_allowance: bool) -> Uncertainty:
-    """Uncertainty of a survey of one well; errors as ``error_model.propagate``."""
-    check_legs(survey, legs)
-    sources = merged_sources(tuple(legs))
-    if any(source.renewed for source in sources):
-        return propagate(survey, legs, site, slot_allowance=slot_allowance)
-    work = Propagation(survey, legs, site, Geometry(survey, slot_allowance=slot_allowance))
-    inner, last = np.zeros((2, len(survey.md) - 1, 3, len(sources)))
-    with np.errstate(invalid="ignore", over="ignore"):  # what has no value is refused by what comes of it
-        for s, source in enumerate(sources):
-            work.evaluate(source)
-            inner[:, : source.axes, s] = work.inner[: source.axes].T
-            last[:, : source.axes, s] = work.last[: source.axes].T
-    random = np.array([source.random for source in sources])
-    passed, ended = ((e[..., ~random], e[..., random] @ e[..., random].swapaxes(1, 2)) for e in (inner, last))
-    sums = RunningSums()
-    cov = np.empty((len(survey.md), 3, 3))
-    cov[0] = surface_covariance(survey.md, survey.inclination, survey.azimuth, legs[0].tool)
-    for k in range(len(survey.md) - 1):
-        cov[k + 1] = sums.at_end(ended[0][k], ended[1][k])[0]
-        sums.pass_station(passed[0][k], passed[1][k])
-    return Uncertainty(survey, tuple(legs), site, slot_allowance, cov)
+        cov, _ = model.covariance(survey, site, slot_allowance=slot_allowance)
+    else:
+        places, cov, _ = model.locate(method, survey, site, slot_allowance=slot_allowance)
+        survey = replace(survey, tvd=places[:, 2])
+    parts = compiled_parts if is_long or (tool, True) in _held else None
+    return places, Uncertainty(survey, tuple(legs), site, slot_allowance, cov, parts)
 
 
 def compiled_parts(found: Uncertainty) -> dict[str, Array]:
@@ -197,8 +189,10 @@ def _record(survey: Survey) -> Array:
     """Time and further columns (r, n) of a record, their defaults where it has none."""
     out = np.empty((1 + len(RECORD), len(survey.md)))
     out[0] = survey.record.get("Time", SECONDS_A_METRE * survey.md)
-    for row, (name, default) in enumerate(RECORD.items(), 1):
-        out[row] = survey.record.get(name, default)
+    out[1:] = DEFAULTS
+    for row, name in enumerate(RECORD, 1):
+        if name in survey.record:
+            out[row] = survey.record[name]
     return out
 
 

@@ -6,6 +6,8 @@ Position, weights of all sources, their running sums and the covariance are loca
 
 from __future__ import annotations
 
+import re
+
 from groundstation.survey.error_sources import (
     EARTH_RATE,
     NO_WEIGHT,
@@ -28,6 +30,8 @@ STATION = {
     "Time": "record[0, k]", "TimePrev": "record[0, k - 1]", "Previous": "0.0",
     **{name: f"record[{row}, k]" for row, name in enumerate(RECORD, 1)},
 }  # fmt: skip
+PLACE = ("GField", "BField", "Dip", "Latitude", "EarthRate")  # the same at every station
+LOCAL = re.compile(r"\b[vt]\d+\b")
 HEAD = """
 import math
 
@@ -134,12 +138,31 @@ def write_model(tool: Tool, *, by_source: bool = False) -> str:
         states += state
         body += lines
         after += later
-    inputs = []
+    inputs, fixed = [], set()
     for k in program.inputs:
         known = k < len(VARIABLES)
         inputs.append(f"v{k} = " + (STATION[VARIABLES[k]] if known else f"parameters[{k - len(VARIABLES)}]"))
-    parts = [HEAD, _indented(1, states), STEP, _indented(2, [*inputs, *program.lines, *body]), TAIL]
+        if not known or VARIABLES[k] in PLACE:
+            fixed.add(f"v{k}")
+    once, each = _parted([*inputs, *program.lines], fixed)
+    parts = [HEAD, _indented(1, [*once, *states]), STEP, _indented(2, [*each, *body]), TAIL]
     return "\n".join([*parts, _indented(2, after), END])
+
+
+def _parted(lines: list[str], fixed: set[str]) -> tuple[list[str], list[str]]:
+    """Assignments that every station would repeat, and the others; ``fixed`` are inputs that stay the same.
+
+    The compiler moves sums out of the loop by itself, but no call of a tangent.
+    """
+    fixed, once, each = set(fixed), [], []
+    for line in lines:
+        name, _, text = line.partition(" = ")
+        if name in fixed or (name.startswith("t") and set(LOCAL.findall(text)) <= fixed):
+            fixed.add(name)
+            once.append(line)
+        else:
+            each.append(line)
+    return once, each
 
 
 def _source_code(

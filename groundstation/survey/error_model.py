@@ -289,7 +289,7 @@ def check_legs(survey: Survey, legs: Sequence[Leg]) -> None:
         raise SurveyError(f"legs: expected to begin at station 1 and at growing stations of the survey, got {firsts}")
     for leg, end in zip(legs, [*firsts[1:], survey.md.shape[-1]], strict=True):
         inclination = survey.inclination[..., leg.first : end]
-        check_inclination(leg.tool, float(np.min(inclination)), float(np.max(inclination)))
+        check_inclination(leg.tool, float(inclination.min()), float(inclination.max()))
 
 
 def check_inclination(tool: Tool, least: float, most: float) -> None:
@@ -311,8 +311,12 @@ def check_inclination(tool: Tool, least: float, most: float) -> None:
 
 def surface_covariance(md: Array, inclination: Array, azimuth: Array, tool: Tool) -> Array:
     """Covariance (..., 3, 3) of the first station of (..., n): its own depth reading, if it is at the datum."""
-    readings = [term for term in tool.terms if term.mode is Mode.RANDOM and term.weights[0] == "1"]
-    variance = np.where(md[..., 0] == 0.0, sum(term.sigma**2 for term in readings), 0.0)
+    variance = depth_variance(tool) * (md[..., 0] == 0.0)
     sine, cosine = np.sin(inclination[..., 0]), np.cos(inclination[..., 0])
     along = np.stack([sine * np.cos(azimuth[..., 0]), sine * np.sin(azimuth[..., 0]), cosine], axis=-1)
     return np.asarray(variance[..., None, None] * along[..., :, None] * along[..., None, :])
+
+
+def depth_variance(tool: Tool) -> float:
+    """Variance (m^2) of one reading of the depth by a tool."""
+    return sum(term.sigma**2 for term in tool.terms if term.mode is Mode.RANDOM and term.weights[0] == "1")

@@ -2,7 +2,7 @@
 
 The text is that of the ISCWSA tool files: numbers, names, + - * / ^, parentheses and the functions below, in any case.
 Every formula of a tool is parsed, checked against these lists and written into one straight-line function in which a
-common part is computed once; it runs on numbers (``math``) or on whole wells (``numpy``).
+common part is computed once; it runs on whole wells (``numpy``) or, written into a loop, compiled.
 """
 
 from __future__ import annotations
@@ -31,10 +31,6 @@ OPERATORS: dict[type[ast.operator], str] = {ast.Add: "+", ast.Sub: "-", ast.Mult
 ROOTS = {0.5: 1, 0.25: 2}  # exponents that are roots of roots
 LONGEST = 2000  # characters; an instrument's formula has a line
 
-SCALAR = SimpleNamespace(
-    sin=math.sin, cos=math.cos, tan=math.tan, sqrt=math.sqrt, abs=abs, max=max, min=min,
-    step=lambda x: 1.0 if x > 0.0 else 0.0,
-)  # fmt: skip
 ARRAY = SimpleNamespace(
     sin=np.sin, cos=np.cos, tan=np.tan, sqrt=np.sqrt, abs=np.abs, max=np.maximum, min=np.minimum,
     step=lambda x: np.where(x > 0.0, 1.0, 0.0),
@@ -213,8 +209,8 @@ def translate(formulas: Iterable[str], parameters: Sequence[str] = ()) -> Progra
 def compile_formulas(formulas: Iterable[str], parameters: Sequence[str] = ()) -> Compiled:
     """One function ``f(m, inputs)`` for many formulas.
 
-    ``m`` is ``SCALAR`` or ``ARRAY``; ``inputs`` are the values of ``VARIABLES`` and then of the ``parameters``; it
-    returns one value a formula (a plain float where the formula is constant).
+    ``m`` holds the functions, as ``ARRAY`` does; ``inputs`` are the values of ``VARIABLES`` and then of the
+    ``parameters``; it returns one value a formula (a plain float where the formula is constant).
 
     Raises
     ------

@@ -108,6 +108,8 @@ def check_stations(md: Array, inclination: Array, azimuth: Array, where: str = "
     if not md.shape[-1] == inclination.shape[-1] == azimuth.shape[-1]:
         sizes = f"{md.shape[-1]}, {inclination.shape[-1]} and {azimuth.shape[-1]}"
         raise SurveyError(f"{where}: expected as many depths as inclinations and azimuths, got {sizes}")
+    if _is_survey(md, inclination, azimuth):
+        return
     wrong: tuple[tuple[npt.NDArray[np.bool_], str, Array, float, str], ...] = (
         (~np.isfinite(md), "a finite measured depth", md, 1.0, "m"),
         (~((inclination >= 0.0) & (inclination <= math.pi)), "an inclination of 0..180 deg", inclination, 0.0, "deg"),
@@ -123,6 +125,18 @@ def check_stations(md: Array, inclination: Array, azimuth: Array, where: str = "
         at = tuple(back[0])
         before, after = float(md[at]), float(md[(*at[:-1], at[-1] + 1)])
         raise SurveyError(f"{where}: station {at[-1] + 1}: expected a depth beyond {before:g} m, got {after:g} m")
+
+
+def _is_survey(md: Array, inclination: Array, azimuth: Array) -> bool:
+    """Whether all is well: which station is not is looked for only where one is not."""
+    return bool(
+        inclination.size
+        and inclination.min() >= 0.0
+        and inclination.max() <= math.pi
+        and np.isfinite(azimuth).all()
+        and np.isfinite(md).all()
+        and (md[..., 1:] > md[..., :-1]).all()
+    )
 
 
 def positions(method: Method, md: Array, inclination: Array, azimuth: Array) -> Array:
@@ -153,15 +167,18 @@ def tangents(inclination: Array, azimuth: Array) -> Array:
 
 def dogleg_severity(md: Array, inclination: Array, azimuth: Array) -> Array:
     """Curvature (..., n - 1) of the legs, rad/m."""
-    i1, i2, a1, a2 = inclination[..., :-1], inclination[..., 1:], azimuth[..., :-1], azimuth[..., 1:]
-    bend: Array = dogleg(np, i1, a1, i2, a2)
-    return bend / np.diff(md, axis=-1)
+    sine = np.sin(inclination)  # once a station; otherwise as ``dogleg``
+    turn = sine[..., :-1] * sine[..., 1:] * np.sin(0.5 * (azimuth[..., 1:] - azimuth[..., :-1])) ** 2
+    half = np.sin(0.5 * (inclination[..., 1:] - inclination[..., :-1])) ** 2 + turn
+    return np.asarray(2.0 * np.arcsin(np.sqrt(half)) / (md[..., 1:] - md[..., :-1]))
 
 
 def closure(position: Array) -> tuple[Array, Array]:
     """Horizontal distance (m) and direction in [0, 2 pi) (rad) of positions (..., 3) from the collar."""
     distance = np.hypot(position[..., 0], position[..., 1])
-    return distance, np.asarray(bearing(np.arctan2(position[..., 1], position[..., 0])))
+    direction = np.arctan2(position[..., 1], position[..., 0])
+    turned = np.where(direction < 0.0, direction + math.tau, direction)
+    return distance, np.where(turned < math.tau, turned, 0.0)  # of a direction just short of zero
 
 
 def vertical_section(position: Array, azimuth: float) -> Array:

@@ -2,16 +2,17 @@
 
 A station enters two legs, so its weight in the position is half their summed length, and half the last leg for the last
 station (the Jacobian of the balanced tangential method, used for every method as the industry's error model does).
-Its errors are kept by running sums: appending costs the same however many stations there are.
+Its errors are kept by running sums in a compiled loop: appending costs the same however many stations there are. What
+stations share may become more columns as the hole grows; the columns of a point are those known when it was added.
 Source: thesis 2.1-2.3 and eqs. I.1-I.12. Frame: north, east, down.
 """
 
 from __future__ import annotations
 
+import itertools
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
-from itertools import pairwise
 
 import numpy as np
 import numpy.typing as npt
@@ -19,8 +20,7 @@ import numpy.typing as npt
 from groundstation.errors import SurveyError
 from groundstation.survey.methods import OPPOSITE, Method, dogleg, leg, ratio_factor
 from groundstation.survey.resolve import Direction, angles
-from groundstation.survey.running_sums import RunningSums
-from groundstation.survey.shared import added
+from groundstation.survey.shared import added, widened
 
 Array = npt.NDArray[np.float64]
 
@@ -69,7 +69,7 @@ class Trajectory:
         jacobian = tangent_jacobians(tangents)[0]
         self._last_cov, self._last_shared = jacobian @ first.cov @ jacobian.T, jacobian @ first.shared  # of the tangent
         self._length = 0.0
-        self._sums = RunningSums()
+        self._own, self._passed = np.zeros((3, 3)), np.zeros((3, 0))  # running sums, see the kernel
         self.points = [Point(start_md, tangents[0], np.zeros(3), np.zeros((3, 3)), np.zeros((3, 0)))]
 
     def append(self, md: float, direction: Direction) -> Point:
@@ -104,19 +104,37 @@ class Trajectory:
         positions = np.add.accumulate([before.position, *legs])
         jacobians = tangent_jacobians(tangents[1:])
         covs = jacobians @ np.array([direction.cov for direction in directions]) @ jacobians.transpose(0, 2, 1)
-        for n, (md, direction) in enumerate(stations, 1):
-            cov, shared = self._follow(float(lengths[n - 1]), covs[n - 1], jacobians[n - 1] @ direction.shared)
-            self.points.append(Point(md, tangents[n], positions[n], cov, shared))
+        columns = [jacobian @ direction.shared for jacobian, direction in zip(jacobians, directions, strict=True)]
+        for n, (cov, shared) in enumerate(self._follow(lengths, covs, columns), 1):
+            self.points.append(Point(mds[n - 1], tangents[n], positions[n], cov, shared))
 
-    def _follow(self, length: float, cov: Array, shared: Array) -> tuple[Array, Array]:
-        """Covariance (3, 3) and shared columns (3, s) of the position at the end of a leg (m), from its tangent's.
+    def _follow(self, lengths: Array, covs: Array, columns: list[Array]) -> list[tuple[Array, Array]]:
+        """Covariance (3, 3) and shared columns (3, s) of each position at the ends of legs (n,), m.
 
-        The station before it counts among the inner ones from now on.
+        From those of their tangents, (n, 3, 3) and (3, s) each.
         """
-        weight, end = 0.5 * (self._length + length), 0.5 * length
-        self._sums.pass_station(weight * self._last_shared, weight**2 * self._last_cov)
-        self._length, self._last_cov, self._last_shared = length, cov.copy(), shared
-        return self._sums.at_end(end * shared, end**2 * cov)
+        from groundstation.survey.kernels.position_errors import add_stations  # whoever only reads needs no compiler
+
+        known = max(self._last_shared.shape[1], self._passed.shape[1])
+        widths = list(itertools.accumulate((own.shape[1] for own in columns), max, initial=known))
+        tangents = np.zeros((len(columns) + 1, 3, widths[-1]))
+        for n, own in enumerate((self._last_shared, *columns)):
+            tangents[n, :, : own.shape[1]] = own
+        of_tangents = np.concatenate([self._last_cov[None], covs])
+        ends = 0.5 * lengths
+        weights = ends.copy()  # of the station before each, which has both its legs now
+        weights[0] += 0.5 * self._length
+        weights[1:] += ends[:-1]
+        passed, shared, out = widened(self._passed, widths[-1]), np.empty_like(tangents[1:]), np.empty_like(covs)
+        add_stations(weights, ends, tangents, of_tangents, passed, self._own, shared, out)
+        self._passed, self._length = passed, float(lengths[-1])
+        self._last_cov, self._last_shared = covs[-1], columns[-1]
+        points: list[tuple[Array, Array]] = []
+        for width, same in itertools.groupby(widths[1:]):
+            run = slice(len(points), len(points) + len(list(same)))
+            known_here = shared[run, :, :width]
+            points += zip(out[run] + known_here @ known_here.transpose(0, 2, 1), known_here, strict=True)
+        return points
 
     def _legs(self, lengths: Array, mds: Sequence[float], tangents: Array, directions: Sequence[Direction]) -> Array:
         """Displacements (n, 3) from station to station."""
@@ -147,7 +165,7 @@ def interpolate(points: list[Point], md: float) -> Point:
     """
     if not points[0].md <= md <= points[-1].md:
         raise SurveyError(f"trajectory: expected a depth of {points[0].md:g}..{points[-1].md:g} m, got {md:g} m")
-    for upper, lower in pairwise(points):
+    for upper, lower in itertools.pairwise(points):
         if md <= lower.md:
             return on_arc(upper, lower, (md - upper.md) / (lower.md - upper.md))
     return points[-1]

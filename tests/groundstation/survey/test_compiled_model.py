@@ -9,7 +9,7 @@ import pytest
 
 from groundstation.errors import SurveyError, ToolError
 from groundstation.survey.analysis import analyse
-from groundstation.survey.compiled_model import COMPILED_FROM, CompiledModel, write_model
+from groundstation.survey.compiled_model import COMPILED_FROM, CompiledModel, warm, write_model
 from groundstation.survey.error_model import propagate
 from groundstation.survey.error_sources import Leg, Site, Survey
 from groundstation.survey.frames import Frame, Norths
@@ -106,10 +106,21 @@ def test_a_long_survey_is_compiled_and_a_short_one_of_it_is_the_same() -> None:
     md = np.linspace(0.0, 400.0, COMPILED_FROM)
     record = Record(md, np.linspace(0.0, 0.4, len(md)), np.linspace(0.5, 1.0, len(md)), list(range(len(md))), {})
     short = Record(*(x[:-1] for x in (md, record.inclination, record.azimuth)), record.lines[:-1], {})
-    tool, method, frame = load_tool("relay"), Method.MINIMUM_CURVATURE, Frame("site", "true", Norths(site=0.2))
-    compiled, arrays = (analyse(r, method, tool, SITE, frame=frame).uncertainty for r in (record, short))
+    tool, method = replace(load_tool("relay"), name="held by this test alone"), Method.MINIMUM_CURVATURE
+    frame = Frame("site", "true", Norths(site=0.2))
+    arrays, compiled, held = (analyse(r, method, tool, SITE, frame=frame).uncertainty for r in (short, record, short))
     assert compiled.model.quick_parts is not None
     assert arrays.model.quick_parts is None
     np.testing.assert_allclose(compiled.cov[:-2], arrays.cov[:-1], rtol=1e-9, atol=1e-15)
+    np.testing.assert_array_equal(compiled.cov[:-2], held.cov[:-1])  # the same loop over the same stations
     for name, cov in arrays.by_source().items():
+        np.testing.assert_allclose(held.by_source()[name], cov, rtol=1e-9, atol=1e-15)
         np.testing.assert_allclose(compiled.by_source()[name][1:-2], cov[1:-1], rtol=1e-9, atol=1e-15)
+    assert analyse(short, method, tool, SITE).uncertainty.model.quick_parts is not None  # the long one asked for them
+
+
+@pytest.mark.slow
+def test_a_warmed_tool_serves_surveys_of_any_length() -> None:
+    warm(["relay"])
+    record = Record(np.array([0.0, 2.0, 4.0]), np.zeros(3), np.zeros(3), [0, 1, 2], {})
+    assert analyse(record, Method.BALANCED_TANGENTIAL, load_tool("relay"), SITE).uncertainty.model.quick_parts

@@ -12,6 +12,7 @@ from groundstation.errors import SurveyError
 from groundstation.survey.analysis import analyse
 from groundstation.survey.error_sources import Site
 from groundstation.survey.instruments import Mode, Term, load_tool
+from groundstation.survey.kernels.position_errors import add_stations, warm_up
 from groundstation.survey.methods import Method
 from groundstation.survey.records import Record
 from groundstation.survey.resolve import Direction
@@ -84,6 +85,15 @@ def parts_at_once(mds: np.ndarray, leans: list[Direction]) -> tuple[np.ndarray, 
         random = random + jacobian @ lean.cov @ jacobian.T
         shared[:, : lean.shared.shape[1]] += jacobian @ lean.shared
     return random, shared
+
+
+def test_what_is_warmed_is_what_a_trajectory_runs() -> None:
+    warm_up()
+    before = list(add_stations.signatures)
+    trajectory = Trajectory(collar=turned(0.1, 0.0, 1e-3, [1e-3]))
+    trajectory.append(2.0, turned(0.1, 0.0, 1e-3, []))
+    trajectory.extend([(md, turned(0.1, 0.2, 1e-3, [1e-3] * 4)) for md in (4.0, 6.0)])
+    assert add_stations.signatures == before
 
 
 def test_errors_that_stations_share_add_up_and_others_do_not() -> None:

@@ -1,0 +1,53 @@
+"""Errors of the positions of a hole, station by station: what stations share and what is each one's own.
+
+A station that another one follows counts with both of its legs from then on, the last one with its upper leg alone,
+
+    C_K = sum_{k<K} R_k + R*_K + (sum_{k<K} e_k + e*_K) (sum_{k<K} e_k + e*_K)^T
+
+so two running sums are all that is kept. The last product is the caller's: it is a matter of the BLAS. Source: thesis
+eqs. I.1-I.12. Frame: north, east, down; m.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+import numpy.typing as npt
+
+from node.kernels.jit import kernel
+
+Array = npt.NDArray[np.float64]
+
+
+@kernel
+def add_stations(
+    weights: Array, ends: Array, tangents: Array, covs: Array, passed: Array, own: Array, shared: Array, out: Array
+) -> None:
+    """Go on down a hole from the station where the sums end.
+
+    Parameters
+    ----------
+    weights, ends : (n,) m, half of both legs of the station before, half of the upper leg of each
+    tangents, covs : (n + 1, 3, s) and (n + 1, 3, 3), of every tangent from the station before on: its change for one
+        standard deviation of every shared error, and the covariance that is its own
+    passed, own : (3, s) and (3, 3), the running sums e and R; they go on with every station but the last
+    shared, out : (n, 3, s) m and (n, 3, 3) m^2, set: columns e + e* of every position and R + R*, its own covariance
+    """
+    for k in range(len(weights)):
+        weight, end = weights[k], ends[k]
+        for i in range(3):
+            for j in range(3):
+                own[i, j] += weight * weight * covs[k, i, j]
+        for i in range(3):
+            for s in range(passed.shape[1]):
+                passed[i, s] += weight * tangents[k, i, s]
+                shared[k, i, s] = passed[i, s] + end * tangents[k + 1, i, s]
+            for j in range(3):
+                out[k, i, j] = own[i, j] + end * end * covs[k + 1, i, j]
+
+
+def warm_up() -> None:
+    """Compile the loop or load it from the cache, so that nobody's first survey waits for it."""
+    add_stations(
+        np.ones(1), np.ones(1), np.zeros((2, 3, 1)), np.zeros((2, 3, 3)), np.zeros((3, 1)), np.zeros((3, 3)),
+        np.empty((1, 3, 1)), np.empty((1, 3, 3)),
+    )  # fmt: skip
