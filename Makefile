@@ -7,8 +7,8 @@ STAMP := $(VENV)/.installed
 SOAK ?= 168
 FROM ?= 50000
 SEEDS ?= 20000
-# two workers a core: one begins with the tests that wait for processes, and the other computes meanwhile
-WORKERS ?= $(shell echo $$((2 * $$(getconf _NPROCESSORS_ONLN))))
+# five workers on two cores: three begin with the tests that wait for processes, and the others compute meanwhile
+WORKERS ?= $(shell echo $$((5 * $$(getconf _NPROCESSORS_ONLN) / 2)))
 # a test run starts hundreds of processes; where the environment forbids bytecode each would compile what it imports
 unexport PYTHONDONTWRITEBYTECODE
 PYTEST := $(BIN)/python -m pytest --numprocesses $(WORKERS) --maxprocesses 8 --dist worksteal

@@ -87,13 +87,12 @@ class Observer:
             self.found.append(text)
 
     def _stored(self) -> set[tuple[int, int, str]]:
-        """Tube, number and content of what the database would hold after a cut."""
-        image = self._rig.disk(BASE).kept("ground.sqlite")
+        """Tube, number and content of what the database would hold after a cut, or held till somebody took it away."""
+        disk = self._rig.disk(BASE)
+        image = disk.kept("ground.sqlite")
         if image is not self._kept[0]:
-            with contextlib.closing(sqlite3.connect(":memory:")) as connection:
-                connection.deserialize(image)
-                rows = connection.execute("SELECT tube, sequence, content FROM messages")
-                self._kept = (image, set(rows))
+            taken = self._kept[1] if disk.handled else set()
+            self._kept = image, taken | (messages_of(image) if image else set())
         return self._kept[1]
 
     def _repeated_starts(self) -> Iterator[str]:
@@ -118,6 +117,13 @@ class Observer:
             is_off = rig.silent_for(tube) > model.config.stale_after + LATE
             if tube in model.nodes and is_off and not model.is_stale(tube):
                 yield f"tube {tube} without power is shown fresh"
+
+
+def messages_of(image: bytes) -> set[tuple[int, int, str]]:
+    """Tube, number and content of every message in the image of a database."""
+    with contextlib.closing(sqlite3.connect(":memory:")) as connection:
+        connection.deserialize(image)
+        return set(connection.execute("SELECT tube, sequence, content FROM messages"))
 
 
 def violations(rig: GauntletRig, seen: Collection[str] = (), *, encoder_can_be_judged: bool = True) -> list[str]:
