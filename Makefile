@@ -7,7 +7,7 @@ STAMP := $(VENV)/.installed
 SOAK ?= 168
 FROM ?= 50000
 SEEDS ?= 20000
-# five workers on two cores: three begin with the tests that wait for processes, and the others compute meanwhile
+# five workers on two cores, for most of a worker's time goes by waiting for processes: those tests come first
 WORKERS ?= $(shell echo $$((5 * $$(getconf _NPROCESSORS_ONLN) / 2)))
 # a test run starts hundreds of processes; where the environment forbids bytecode each would compile what it imports
 unexport PYTHONDONTWRITEBYTECODE

@@ -44,7 +44,7 @@ def pytest_collection_modifyitems(items: list[pytest.Item]) -> Iterator[None]:
 
 
 def dealt(items: Sequence[pytest.Item], workers: int) -> list[pytest.Item]:
-    """Tests in such an order that half of the workers begin with those that wait, and the others compute meanwhile.
+    """Tests in such an order that every worker begins with his part of those that wait.
 
     xdist cuts the list into equal parts, a worker each, and whoever has done his takes from the end of another's. Where
     the rigs of real processes stand last, two workers have nothing left and the third waits for one rig after another.
@@ -58,11 +58,10 @@ def dealt(items: Sequence[pytest.Item], workers: int) -> list[pytest.Item]:
     first = sorted((own for path, own in modules.items() if waiting[path]), key=len, reverse=True)
     others = [item for path, own in modules.items() if not waiting[path] for item in own]
     order: list[pytest.Item] = []
-    shares: list[list[pytest.Item]] = [[] for _ in range((workers + 1) // 2)]
+    shares: list[list[pytest.Item]] = [[] for _ in range(workers)]
     for own in first:
         min(shares, key=len).extend(own)
-    for worker in range(workers):
-        share = shares[worker] if worker < len(shares) else []
+    for worker, share in enumerate(shares):
         room = max((len(items) - len(order)) // (workers - worker) - len(share), 0)
         order += share + others[:room]
         others = others[room:]

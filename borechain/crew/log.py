@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import datetime
+import threading
 from collections.abc import Callable, Mapping
 from typing import TYPE_CHECKING, Any, Protocol
 
@@ -50,7 +51,8 @@ class RunLog:
         self._word = ""
         self._joints: dict[str, str] = {}  # of a wall, as each was told
         self._restarts: dict[str, int] = {}
-        self.newest = 0  # survey that was told
+        self._surveys: set[int] = set()  # that were told
+        self._lock = threading.Lock()  # what is published comes on a thread of the bus
 
     def join(self, endpoint: str, rig: str, ground: Ground) -> None:
         """Tell once that the endpoint of a rig can be joined, and log what its ground stations publish from now on."""
@@ -63,7 +65,8 @@ class RunLog:
 
     def on_hole(self, name: str) -> None:
         """Another hole of the site is begun, by a ground station that knows nothing yet."""
-        self.newest, self._word, self._phase = 0, "", ""
+        self._word = self._phase = ""
+        self._surveys.clear()
         self._alarms.clear()
         self._joints.clear()
         self._line("hole", name)
@@ -83,6 +86,19 @@ class RunLog:
 
     def on_answer(self, path: str, view: View) -> None:
         """Take an answer of the ground station."""
+        with self._lock:
+            self._tell(path, view)
+
+    def poll(self, ask: Callable[[str, dict[str, str]], View], since: int | None = None) -> None:
+        """Log what a ground station knows that was not told yet; of surveys those after ``since``, or after the newest.
+
+        Under load some of what it publishes may not come, so a rig asks for all of them (0) in the end.
+        """
+        begin = max(self._surveys, default=0) if since is None else since
+        for path in FOLLOWED:
+            self.on_answer(path, ask(path, {"since": str(begin)} if path == "measurements" else {}))
+
+    def _tell(self, path: str, view: View) -> None:
         match path:
             case "measurements":
                 for row in view["measurements"]:
@@ -97,15 +113,10 @@ class RunLog:
                 self._word = view["verdict"]
                 self._line("verdict", view["line"])
 
-    def poll(self, ask: Callable[[str, dict[str, str]], View]) -> None:
-        """Log what a ground station in this process knows that was not told yet."""
-        for path in FOLLOWED:
-            self.on_answer(path, ask(path, {"since": str(self.newest)} if path == "measurements" else {}))
-
     def _tell_survey(self, row: View) -> None:
-        if row["seq"] <= self.newest:
+        if row["seq"] in self._surveys:
             return
-        self.newest = row["seq"]
+        self._surveys.add(row["seq"])
         lean = f"{row['inclination_deg']:.2f} deg to {row['azimuth_deg']:.0f} deg"
         trust = "" if row["trust"] == "full" else f", {row['trust'].replace('_', ' ')}"
         self._line("survey", f"tube {row['tube']} at {row['md_m']:.2f} m: {lean}{trust}")

@@ -7,6 +7,8 @@ from pathlib import Path
 
 from rigs import command, free_endpoint, run
 
+from borechain.crew.log import RunLog
+
 LINE = re.compile(r"\d{4}-\d\d-\d\dT\d\d:\d\d:\d\dZ +\d+\.\d s (\w+) +(.+)")
 
 
@@ -41,3 +43,27 @@ def test_a_run_is_logged_a_line_for_whatever_happens_and_its_recording_gives_the
     assert again.returncode == 0, again.stderr
     digest = next(line for line in done.stdout.splitlines() if line.startswith("digest "))
     assert again.stdout.splitlines()[-1] == digest
+
+
+def test_a_survey_whose_news_was_lost_on_the_way_is_told_in_the_end_and_every_one_once() -> None:
+    rows = [
+        {"seq": n, "tube": 1, "md_m": 2.0 * n, "inclination_deg": 1.0, "azimuth_deg": 40.0, "trust": "full"}
+        for n in (1, 2, 3)
+    ]
+    answers = {
+        "measurements": {"measurements": rows},
+        "alarms": {"open": [], "closed": []},
+        "verdict": {"verdict": "on target", "line": "ON TARGET"},
+        "wall": {"wall": None},
+    }
+    lines: list[str] = []
+    log = RunLog(lines.append)
+    for row in rows[::2]:  # the second does not come
+        log.on_answer("measurements", {"measurements": [row]})
+    for _ in range(2):
+        log.poll(lambda path, _parameters: answers[path], since=0)
+    told = [match[2] for match in map(LINE.fullmatch, lines) if match]
+    assert [text.split(" deg")[0] for text in told] == [
+        *(f"tube 1 at {md:.2f} m: 1.00" for md in (2.0, 6.0, 4.0)),
+        "ON TARGET",
+    ]

@@ -7,7 +7,7 @@ import json
 import sys
 import tempfile
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from functools import partial
 from importlib.util import find_spec
@@ -301,7 +301,13 @@ def drill_in_processes(
                 log.on_tick(tick, table.restarts)
 
         launcher = Launcher(table, bus, job.rig_name, follow, operator_of(world, job.rig_name))
-        answers = launcher.run(lambda bus: ask(bus, job.rig_name))
+
+        def finish(bus: ZenohBus) -> dict[str, Any]:
+            if log is not None:
+                log.poll(lambda path, parameters: get_json(bus, selector_of(job.rig_name, path, parameters)), since=0)
+            return ask(bus, job.rig_name)
+
+        answers = launcher.run(finish)
         return Ran(answers, len(table.specs), sum(table.restarts.values()))
 
 
@@ -398,7 +404,13 @@ def ground_settings(world: World) -> dict[str, Any]:
 
 def ask(bus: ZenohBus, rig_name: str) -> dict[str, Any]:
     """Stations, trajectory and measurements as any operator would get them."""
-    return {path: get_json(bus, f"borechain/{rig_name}/ground/{path}") for path in ASKED}
+    return {path: get_json(bus, selector_of(rig_name, path)) for path in ASKED}
+
+
+def selector_of(rig_name: str, path: str, parameters: Mapping[str, str] | None = None) -> str:
+    """Selector of an answer of the ground station."""
+    asked = ";".join(f"{name}={value}" for name, value in (parameters or {}).items())
+    return f"borechain/{rig_name}/ground/{path}" + (f"?{asked}" if asked else "")
 
 
 def get_json(bus: ZenohBus, selector: str) -> Any:
