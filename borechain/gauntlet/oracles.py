@@ -50,6 +50,7 @@ class Observer:
         self.told: dict[str, float] = {}  # s after the first fault at which an alarm was first seen
         self._starts: dict[int, tuple[object, set[int]]] = {}  # process that is known, and numbers of all, by address
         self._kept: tuple[bytes, set[tuple[int, int, str]]] = (b"", set())
+        self._keeper: object = None  # the ground station's process that has written it
         self.found: list[str] = []
         rig.channel.listeners.append(self.on_frame)
         rig.before_cut.append(self._see_alarms)  # what the crew has seen does not go with the power
@@ -87,11 +88,15 @@ class Observer:
             self.found.append(text)
 
     def _stored(self) -> set[tuple[int, int, str]]:
-        """Tube, number and content of what the database would hold after a cut, or held till somebody took it away."""
-        disk = self._rig.disk(BASE)
+        """Tube, number and content of what the database would hold after a cut.
+
+        What somebody took away counts while the process lives that had it: its receipts may be on their way.
+        """
+        disk, keeper = self._rig.disk(BASE), self._rig.stepper.processes.get(BASE)
         image = disk.kept("ground.sqlite")
-        if image is not self._kept[0]:
-            taken = self._kept[1] if disk.handled else set()
+        if image is not self._kept[0] or keeper is not self._keeper:
+            taken = self._kept[1] if disk.handled and keeper is self._keeper else set()
+            self._keeper = keeper
             self._kept = image, taken | (messages_of(image) if image else set())
         return self._kept[1]
 
