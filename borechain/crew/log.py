@@ -52,6 +52,7 @@ class RunLog:
         self._joints: dict[str, str] = {}  # of a wall, as each was told
         self._restarts: dict[str, int] = {}
         self._surveys: set[int] = set()  # that were told
+        self._newest = 0  # of them
         self._lock = threading.Lock()  # what is published comes on a thread of the bus
 
     def join(self, endpoint: str, rig: str, ground: Ground) -> None:
@@ -67,6 +68,7 @@ class RunLog:
         """Another hole of the site is begun, by a ground station that knows nothing yet."""
         self._word = self._phase = ""
         self._surveys.clear()
+        self._newest = 0
         self._alarms.clear()
         self._joints.clear()
         self._line("hole", name)
@@ -94,7 +96,7 @@ class RunLog:
 
         Under load some of what it publishes may not come, so a rig asks for all of them (0) in the end.
         """
-        begin = max(self._surveys, default=0) if since is None else since
+        begin = self._newest if since is None else since
         for path in FOLLOWED:
             self.on_answer(path, ask(path, {"since": str(begin)} if path == "measurements" else {}))
 
@@ -117,6 +119,7 @@ class RunLog:
         if row["seq"] in self._surveys:
             return
         self._surveys.add(row["seq"])
+        self._newest = max(self._newest, row["seq"])
         lean = f"{row['inclination_deg']:.2f} deg to {row['azimuth_deg']:.0f} deg"
         trust = "" if row["trust"] == "full" else f", {row['trust'].replace('_', ' ')}"
         self._line("survey", f"tube {row['tube']} at {row['md_m']:.2f} m: {lean}{trust}")
