@@ -14,7 +14,7 @@ unexport PYTHONDONTWRITEBYTECODE
 PYTEST := $(BIN)/python -m pytest --numprocesses $(WORKERS) --maxprocesses 8 --dist worksteal
 
 .DEFAULT_GOAL := rig
-.PHONY: help rig test quick check lint types contracts kernels bytecode browser fast tests statistical truth explore lock study soak seeds clean test-socketcan test-compose
+.PHONY: help rig test quick check lint types contracts kernels kernels-of-strings other-kernels bytecode browser fast tests statistical truth explore lock study soak seeds clean test-socketcan test-compose
 
 help:  ## list the targets
 	@awk -F ':.*## ' '/^[a-z-]+:.*## / { printf "make %-15s %s\n", $$1, $$2 }' $(MAKEFILE_LIST)
@@ -23,7 +23,7 @@ rig: $(STAMP)  ## set up and drill wellbore 1
 	$(BIN)/borechain rig scenarios/wellbore-1.toml --speed max --seed 1
 
 test:  ## set up and run every check and every test, in parallel
-	$(MAKE) --jobs=4 --output-sync browser kernels bytecode check
+	$(MAKE) --jobs=6 --output-sync browser kernels bytecode check
 	$(MAKE) tests
 
 quick: $(STAMP)  ## lint, types, contracts and the fast tests: under 90 s
@@ -48,8 +48,13 @@ types: $(STAMP)  ## mypy, strict
 contracts: $(STAMP)  ## which package may import which
 	$(BIN)/lint-imports
 
-kernels: $(STAMP)  ## compile what the tests would compile, each worker for itself
-	$(BIN)/python tests/tools/compile_kernels.py
+kernels: kernels-of-strings other-kernels  ## compile what the tests would compile, each worker for itself
+
+kernels-of-strings: $(STAMP)
+	$(BIN)/python tests/tools/compile_kernels.py strings
+
+other-kernels: $(STAMP)
+	$(BIN)/python tests/tools/compile_kernels.py others
 
 bytecode: $(STAMP)  ## compile what the tests import, asserts rewritten, each worker for itself
 	$(BIN)/python -m pytest --collect-only --quiet --quiet > /dev/null || true  # the tests tell
