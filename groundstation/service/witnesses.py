@@ -49,7 +49,7 @@ class Witnesses:
             self._add_blind(place, event.at, math.inf)
             return ""  # what it tells next says whether that is over by now
         elif event.code == "sensor_recovered" and event.arguments.get("after") in BLIND:
-            self._end_blind(place, event.at)
+            self._end_blind(place, event)
         elif event.code in AGAINST_THE_ENCODER:
             self._contradicted[event.tube] = event
         while len(self._blind) > STARTS_KEPT:
@@ -111,13 +111,19 @@ class Witnesses:
     def _add_blind(self, place: tuple[int, int], since: float, until: float) -> None:
         self._blind.setdefault(place, deque(maxlen=BLIND_KEPT)).append((since, until))
 
-    def _end_blind(self, place: tuple[int, int], at: float) -> None:
-        """The gyroscope gives something again: the newest time without one that had begun has an end."""
+    def _end_blind(self, place: tuple[int, int], event: Event) -> None:
+        """The gyroscope gives something again: the newest time without one that had begun has an end.
+
+        Where its begin is not known, with a database that was lost, the event says how long it was.
+        """
         times = self._blind.get(place, deque())
         for number in reversed(range(len(times))):
-            if times[number][0] <= at and times[number][1] == math.inf:
-                times[number] = times[number][0], at
+            if times[number][0] <= event.at and times[number][1] == math.inf:
+                times[number] = times[number][0], event.at
                 return
+        cycles = event.arguments.get("cycles", 0)
+        if isinstance(cycles, (int, float)) and cycles > 0:
+            self._add_blind(place, event.at - CYCLE * cycles, event.at)
 
     def _has_watched(self, tube: int, event: Event) -> bool:
         """Whether a tube ran, had settled and had a gyroscope at the time of an event: it could have seen the same."""

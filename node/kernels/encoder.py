@@ -100,9 +100,13 @@ def measure_turning(encoder: Any, sample: Array, aiding: Array) -> None:
 
 @kernel
 def measure_rest(encoder: Any, sample: Array, aiding: Array) -> None:
-    """The place of the rest inside its count."""
+    """The place of the rest inside its count; a count that is another one without an edge is a new measurement.
+
+    A tube whose gyroscope saw nothing move looks again then, and doubts it.
+    """
+    before_angle = encoder.edge_angle
     take_edge(encoder, sample)
-    if encoder.resting == 0:
+    if encoder.resting == 0 or encoder.edge_angle != before_angle:
         encoder.resting = 1
         encoder.sequence += 1
     if encoder.placed == 0:

@@ -86,15 +86,14 @@ def test_combined_seeds_hold(first: int) -> None:
     [
         (20205, ("node-cut", "database-deleted", "splice")),  # a recorded state kept a dead tube fresh
         (20063, ("bytes-rot", "same-number")),  # a stranger spoke for a tube without power
-        (
-            30271,
-            ("ground-disk-refuses", "encoder-slips"),
-        ),  # a slip that found no room on the disk
+        (30271, ("ground-disk-refuses", "encoder-slips")),  # a slip that found no room on the disk
         (40291, ("not-finite", "encoder-slips")),  # the one that saw it stood beside one without a gyroscope
         (50000, ("encoder-slips", "frozen")),  # the one that saw it stood alone
         (50001, ("encoder-slips", "cut-while-saving")),  # the yaws of two neighbours parted at rest
         (72, ("same-number", "encoder-slips")),  # a joint that was solved anew took the slip, against its marks
         (51416, ("cut-again-and-again", "node-memory-lost", "splice")),  # a recorded state of an epoch before the last
+        (104026, ("cut-while-saving", "not-finite", "encoder-slips")),  # one rested, the other was blind
+        (102831, ("database-deleted", "gyro-saturated", "encoder-slips")),  # nobody knew any more that one was blind
         (51633, ("surveys-lost", "gyro-step")),  # a gyroscope that turned its tube while nobody corrected it
     ],
 )

@@ -1,5 +1,6 @@
 """Which contradictions of gyroscope and encoder speak against the encoder."""
 
+import math
 from itertools import permutations
 
 import pytest
@@ -44,6 +45,21 @@ def test_a_gyroscope_that_stands_alone_against_the_encoder_and_another_tube_is_w
 def test_a_tube_that_has_not_watched_is_no_witness_for_the_encoder_in_whatever_order_they_say_so(blind: Event) -> None:
     for events in permutations([blind, event(1, 100.0, "yaw_reset")]):
         assert told([*BOTH_STARTED, *events, event(2, 140.0, "stopped", 12)]) == ["tubes 1 at 100 s"]
+
+
+def test_a_time_without_a_gyroscope_is_known_by_its_end_where_its_begin_went_with_the_database() -> None:
+    recovered = event(2, 103.0, "sensor_recovered", 11, after="gyro_saturated", cycles=44)
+    for events in permutations([recovered, event(1, 100.0, "yaw_reset")]):
+        assert told([*BOTH_STARTED, *events]) == ["tubes 1 at 100 s"]
+    short = event(2, 60.0, "sensor_recovered", 11, after="gyro_saturated", cycles=44)
+    assert told([*BOTH_STARTED, short, event(1, 100.0, "yaw_reset")]) == []
+
+
+@pytest.mark.parametrize("cycles", ["many", -3, math.nan, math.inf, 1e300])
+def test_a_recovery_that_says_nothing_sensible_of_its_length_does_no_harm(cycles: Scalar) -> None:
+    recovered = event(2, 103.0, "sensor_recovered", 11, after="gyro_saturated", cycles=cycles)
+    said = told([*BOTH_STARTED, recovered, event(1, 100.0, "yaw_reset"), event(2, 101.0, "yaw_reset")])
+    assert said[-1] == "tubes 1, 2 at 100 s"
 
 
 def test_what_a_tube_says_that_has_just_started_helps_nobody_against_one_that_watched() -> None:

@@ -47,6 +47,16 @@ def test_a_rest_is_one_measurement_however_often_it_is_said() -> None:
     assert again.sequence == turning.sequence + 2
 
 
+def test_a_count_that_changes_without_an_edge_is_a_new_measurement_of_the_rest() -> None:
+    encoder = EncoderNode()
+    encoder.on_cycle(EncoderSample(0, 1000.0, True), 1000.5)
+    encoder.on_cycle(EncoderSample(430, 1000.9, True), 1001.0)
+    rest = encoder.on_cycle(EncoderSample(430, 1000.9, True), 1001.5)
+    miscounted = [encoder.on_cycle(EncoderSample(487, 1000.9, True), 1002.0 + k) for k in range(3)]
+    assert {m.sequence for m in miscounted} == {rest.sequence + 1}
+    assert miscounted[0].yaw - rest.yaw == pytest.approx(57 * QUANTUM)
+
+
 def test_numbers_of_a_later_life_are_larger() -> None:
     assert EncoderNode(2 << 32).on_cycle(EncoderSample(0, 1.0, True), 2.0).sequence > 1 << 33
 
