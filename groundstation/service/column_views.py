@@ -14,6 +14,7 @@ from groundstation.service.model import RigModel
 from groundstation.service.thinning import FEWEST, largest_triangles
 from groundstation.survey.columns import Deviation, dominant
 from groundstation.survey.ellipsoid import Ellipse, axes, coverage_radius, plan_ellipses
+from groundstation.survey.shared import KIND_NAMES
 from groundstation.survey.trajectory import Point
 
 Array = npt.NDArray[np.float64]
@@ -30,22 +31,16 @@ def uncertainty(k: RigModel, p: dict[str, str]) -> View:
     confidence = _confidence(p.get("confidence"))
     plane, space = coverage_radius(confidence, 2), coverage_radius(confidence, 3)
     points = k.hole.trajectory
-    kinds, members = k.shared.kinds()
     covs = np.array([point.cov for point in points])
-    random, shared = parted(points, members)
+    shared = np.array([point.shared for point in points])
+    random = np.diagonal(covs, axis1=1, axis2=2) - shared.sum(axis=1)
     rows = zip(points, plan_ellipses(covs, plane), *axes(covs, space), random, shared, strict=True)
     return {
         "confidence": confidence,
         "sigma_plane": plane,
         "sigma_space": space,
-        "stations": [_region(kinds, *row) for row in rows],
+        "stations": [_region(*row) for row in rows],
     }
-
-
-def parted(points: list[Point], members: Array) -> tuple[Array, Array]:
-    """Variances (n, 3) that are random, and (n, kinds, 3) of each kind of shared error; ``members`` (s, kinds)."""
-    shared = np.array([members[: point.shared.shape[1]].T @ (point.shared**2).T for point in points])
-    return np.array([point.cov.diagonal() for point in points]) - shared.sum(axis=1), shared
 
 
 def _confidence(text: str | None) -> float:
@@ -57,10 +52,8 @@ def _confidence(text: str | None) -> float:
     return confidence
 
 
-def _region(
-    kinds: list[str], point: Point, ellipse: Ellipse, sizes: Array, directions: Array, random: Array, shared: Array
-) -> View:
-    sources = zip(kinds, shared, strict=True)
+def _region(point: Point, ellipse: Ellipse, sizes: Array, directions: Array, random: Array, shared: Array) -> View:
+    sources = zip(KIND_NAMES, shared, strict=True)
     return {
         "md_m": round(point.md, 6),
         "covariance_m2": point.cov.tolist(),

@@ -27,6 +27,7 @@ from groundstation.survey.fusion import (
     weighted,
 )
 from groundstation.survey.resolve import Direction, Quality
+from groundstation.survey.shared import SharedErrors
 from groundstation.survey.trajectory import Point, Trajectory
 from groundstation.survey.trust import UNKNOWN_YAW_VAR, Trust
 from telemetry.messages import SurveyMeasurement
@@ -173,16 +174,18 @@ class Hole:
     Parameters
     ----------
     config : design, tolerance and weighting
+    shared : the errors that its readings share
     """
 
-    def __init__(self, config: GroundConfig) -> None:
+    def __init__(self, config: GroundConfig, shared: SharedErrors) -> None:
         self._config = config
+        self._shared = shared
         self._design = config.design
         self._stations: list[SurveyStation] = []
         self._moved: list[Moved] = []
         self._alarms = AlarmList()
         self._history = History()
-        self._trajectory = Trajectory()
+        self._trajectory = self._at_collar()
         self._drawn: list[tuple[float, Direction]] = []  # stations of the trajectory, m and direction
         self._deviations = deviations(self._trajectory.points, self._design)
         self._point_at: dict[float, Point] = {}  # of every station below the collar, by its depth
@@ -275,12 +278,16 @@ class Hole:
         """Trajectory through stations (m, direction); where none has changed the new ones are added to it."""
         same = zip(stations, self._drawn, strict=False)
         if len(stations) < len(self._drawn) or any(new[1] is not old[1] for new, old in same):
-            self._trajectory, self._drawn, self._deviations = Trajectory(), [], []
+            self._trajectory, self._drawn, self._deviations = self._at_collar(), [], []
         added = stations[len(self._drawn) :]
         self._trajectory.extend(added)
         self._drawn += added
         self._point_at = {point.md: point for point in self._trajectory.points[1:]}
         self._deviations += deviations(self._trajectory.points[len(self._deviations) :], self._design)
+
+    def _at_collar(self) -> Trajectory:
+        """A trajectory without stations; a point of it keeps the variances of its position by kind, (kinds, 3)."""
+        return Trajectory(keep=self._shared.variances)
 
     def _station_at(self, md: float) -> SurveyStation:
         first = bisect_left(self._stations, md - 2.0 * self._config.station_tolerance, key=lambda known: known.md)

@@ -77,7 +77,7 @@ class RigModel:
         self.depth_heard_at = -math.inf  # s, own clock
         self._heard_at: dict[int, float] = {}  # s, own clock, of each tube's newest state
         self.shared = SharedErrors()
-        self.hole = Hole(config)
+        self.hole = Hole(config, self.shared)
         self.recalibration = FieldProcedure(config.gravity)
         self.orders = OrderBook()
         self._shown: dict[Hashable, tuple[int, bytes]] = {}

@@ -18,7 +18,7 @@ import numpy as np
 import numpy.typing as npt
 
 from groundstation.survey.resolve import Direction
-from groundstation.survey.shared import added
+from groundstation.survey.shared import Fused, Packed, added
 
 Array = npt.NDArray[np.float64]
 # a departure in the plane is beyond this length as often (4.55 %) as one number is beyond two standard deviations
@@ -48,7 +48,7 @@ class StationFusion:
     _information: Array = field(default_factory=lambda: np.zeros((2, 2)))
     _weighted: Array = field(default_factory=lambda: np.zeros(2))
     _random: Array = field(default_factory=lambda: np.zeros((2, 2)))
-    _shared: Array = field(default_factory=lambda: np.zeros((2, 0)))
+    _shared: Packed = field(default_factory=lambda: Packed(np.zeros((2, 0))))
     _down: float = 0.0
 
     def add_reading(self, reading: Direction) -> None:
@@ -57,7 +57,7 @@ class StationFusion:
         self._information = self._information + information
         self._weighted = self._weighted + information @ reading.lean
         self._random = self._random + information @ reading.cov @ information
-        self._shared = added(self._shared, information @ reading.shared)
+        self._shared = Packed(added(self._shared.columns(), information @ reading.shared))
         self._down += reading.down
         self.count += 1
 
@@ -65,7 +65,7 @@ class StationFusion:
         """Mean, random covariance (2, 2) and shared columns (2, s)."""
         gain = np.asarray(np.linalg.inv(self._information), np.float64)
         lean = gain @ self._weighted
-        return Direction(lean, vertical(lean, self._down), gain @ self._random @ gain, gain @ self._shared)
+        return Fused(lean, vertical(lean, self._down), gain @ self._random @ gain, gain @ self._shared.columns())
 
 
 class GrowingBayes:

@@ -22,7 +22,9 @@ Places = npt.NDArray[np.intp]
 Name = tuple[str | int, ...]
 AXES = 3  # of an accelerometer
 CAUSES = 2 + AXES  # of the columns of a reading: mount, joint, and each axis
+MOST_OF_16_BITS = 1 << 16
 KINDS = {"mount": "mounts", "joint": "joints", "drive": "joints", "string": "joints", "bias": "accelerometer_bias"}
+KIND_NAMES = sorted(set(KINDS.values()))
 
 
 class Reading(Direction):
@@ -66,6 +68,40 @@ class Reading(Direction):
         return known
 
 
+class Packed:
+    """Columns (k, s) of which most are zero: a station knows those of the tubes that passed it, of a hundred tubes."""
+
+    __slots__ = ("_places", "_values", "_width")
+
+    def __init__(self, columns: Array) -> None:
+        places = np.flatnonzero(columns.any(axis=0))
+        self._places = places.astype(np.uint16 if columns.shape[1] <= MOST_OF_16_BITS else np.intp)
+        self._values = columns[:, places]
+        self._width = columns.shape[1]
+
+    def columns(self) -> Array:
+        """All of them (k, s), made anew."""
+        columns = np.zeros((len(self._values), self._width))
+        columns[:, self._places] = self._values
+        return columns
+
+
+class Fused(Direction):
+    """Direction from several readings; its columns are kept packed."""
+
+    __slots__ = ("_packed",)
+    _packed: Packed
+
+    def __init__(self, lean: Array, down: float, cov: Array, shared: Array) -> None:
+        for name, value in (("lean", lean), ("down", down), ("cov", cov), ("_packed", Packed(shared))):
+            object.__setattr__(self, name, value)
+
+    @property
+    def shared(self) -> Array:
+        """Columns (2, s), made anew."""
+        return self._packed.columns()
+
+
 class SharedErrors:
     """The columns, in the order in which they were met."""
 
@@ -107,13 +143,13 @@ class SharedErrors:
         causes[:, 2:] = force_bias_std * resolved.by_force
         return Reading(resolved.direction, causes, places, len(self._columns))
 
-    def kinds(self) -> tuple[list[str], Array]:
-        """Names of the kinds of error met so far, and which column is of which: ones in (s, kinds)."""
-        names = sorted(self._places)
-        members = np.zeros((len(self._columns), len(names)))
-        for number, name in enumerate(names):
-            members[self._places[name], number] = 1.0
-        return names, members
+    def variances(self, columns: Array) -> Array:
+        """Variances (n, kinds, k) of what has these columns (n, k, s), by kind in the order of ``KIND_NAMES``."""
+        members = np.zeros((columns.shape[-1], len(KIND_NAMES)))
+        for number, name in enumerate(KIND_NAMES):
+            places = np.array(self._places.get(name, ()), np.intp)
+            members[places[places < len(members)], number] = 1.0
+        return np.asarray(members.T @ np.swapaxes(columns**2, -1, -2))
 
     def _places_of(self, names: tuple[Name, ...]) -> Places:
         """Places of errors' columns, the next ones where they are met for the first time; kept once for all."""

@@ -11,7 +11,7 @@ from __future__ import annotations
 
 import itertools
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -23,6 +23,7 @@ from groundstation.survey.resolve import Direction, angles
 from groundstation.survey.shared import added, widened
 
 Array = npt.NDArray[np.float64]
+BLOCK = 64  # stations, whose columns are held at a time
 
 
 @dataclass(frozen=True, slots=True)
@@ -33,7 +34,7 @@ class Point:
     tangent: Array  # (3,)
     position: Array  # (3,) m, north east down
     cov: Array  # (3, 3) m^2, random and shared
-    shared: Array  # (3, s) m, change for one standard deviation of every shared error
+    shared: Array  # (3, s) m, change for one standard deviation of every shared error, or what is kept of that
 
 
 def tangents_of(directions: Sequence[Direction]) -> Array:
@@ -58,19 +59,26 @@ class Trajectory:
     method : of the legs
     collar : direction at the first depth, known: vertical by default
     start_md : m
+    keep : makes of the shared columns (n, 3, s) of n points what these keep of them, a row each: all by default, which
+        of a string of fifty tubes is 750 numbers a point
     """
 
     def __init__(
-        self, method: Method = Method.BALANCED_TANGENTIAL, collar: Direction | None = None, start_md: float = 0.0
+        self,
+        method: Method = Method.BALANCED_TANGENTIAL,
+        collar: Direction | None = None,
+        start_md: float = 0.0,
+        keep: Callable[[Array], Array] = np.asarray,
     ) -> None:
         self._method = method
+        self._keep = keep
         first = collar or Direction(np.zeros(2), 1.0, np.zeros((2, 2)), np.zeros((2, 0)))
         tangents = tangents_of([first])
         jacobian = tangent_jacobians(tangents)[0]
         self._last_cov, self._last_shared = jacobian @ first.cov @ jacobian.T, jacobian @ first.shared  # of the tangent
         self._length = 0.0
         self._own, self._passed = np.zeros((3, 3)), np.zeros((3, 0))  # running sums, see the kernel
-        self.points = [Point(start_md, tangents[0], np.zeros(3), np.zeros((3, 3)), np.zeros((3, 0)))]
+        self.points = [Point(start_md, tangents[0], np.zeros(3), np.zeros((3, 3)), keep(np.zeros((1, 3, 0)))[0])]
 
     def append(self, md: float, direction: Direction) -> Point:
         """Add the station at ``md`` (m).
@@ -102,14 +110,18 @@ class Trajectory:
         tangents = np.concatenate([before.tangent[None], tangents_of(directions)])
         legs = self._legs(lengths, [before.md, *mds], tangents, directions)
         positions = np.add.accumulate([before.position, *legs])
-        jacobians = tangent_jacobians(tangents[1:])
-        covs = jacobians @ np.array([direction.cov for direction in directions]) @ jacobians.transpose(0, 2, 1)
-        columns = [jacobian @ direction.shared for jacobian, direction in zip(jacobians, directions, strict=True)]
-        for n, (cov, shared) in enumerate(self._follow(lengths, covs, columns), 1):
-            self.points.append(Point(mds[n - 1], tangents[n], positions[n], cov, shared))
+        for first in range(0, len(mds), BLOCK):
+            block = slice(first, first + BLOCK)
+            jacobians = tangent_jacobians(tangents[1:][block])
+            own = np.array([direction.cov for direction in directions[block]])
+            covs = jacobians @ own @ jacobians.transpose(0, 2, 1)
+            columns = [jacobian @ one.shared for jacobian, one in zip(jacobians, directions[block], strict=True)]
+            rows = zip(mds[block], tangents[1:][block], positions[1:][block], strict=True)
+            for row, errors in zip(rows, self._follow(lengths[block], covs, columns), strict=True):
+                self.points.append(Point(*row, *errors))
 
     def _follow(self, lengths: Array, covs: Array, columns: list[Array]) -> list[tuple[Array, Array]]:
-        """Covariance (3, 3) and shared columns (3, s) of each position at the ends of legs (n,), m.
+        """Covariance (3, 3) of each position at the ends of legs (n,), m, and what is kept of its shared columns.
 
         From those of their tangents, (n, 3, 3) and (3, s) each.
         """
@@ -133,7 +145,7 @@ class Trajectory:
         for width, same in itertools.groupby(widths[1:]):
             run = slice(len(points), len(points) + len(list(same)))
             known_here = shared[run, :, :width]
-            points += zip(out[run] + known_here @ known_here.transpose(0, 2, 1), known_here, strict=True)
+            points += zip(out[run] + known_here @ known_here.transpose(0, 2, 1), self._keep(known_here), strict=True)
         return points
 
     def _legs(self, lengths: Array, mds: Sequence[float], tangents: Array, directions: Sequence[Direction]) -> Array:

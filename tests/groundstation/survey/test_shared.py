@@ -1,6 +1,7 @@
 """Errors that readings share, by name, and the covariance they claim against a string with drawn errors."""
 
 import math
+import tracemalloc
 from dataclasses import dataclass
 from itertools import pairwise
 
@@ -8,11 +9,12 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from hypothesis.extra.numpy import arrays
 
 from groundstation.survey.ellipsoid import coverage_radius
 from groundstation.survey.fusion import bayes
 from groundstation.survey.resolve import Direction, Resolved, resolve
-from groundstation.survey.shared import SharedErrors, added, widened
+from groundstation.survey.shared import KIND_NAMES, Fused, Packed, SharedErrors, added, widened
 from groundstation.survey.trajectory import Trajectory
 
 G = 9.81
@@ -42,9 +44,8 @@ def yaw_only(errors: SharedErrors, tube: int, above: list[int] | None, joints: f
 
 
 def by_kind(errors: SharedErrors, shared: np.ndarray) -> dict[str, np.ndarray]:
-    """Covariance of what has these columns, by the kind of error."""
-    names, members = errors.kinds()
-    return {name: (shared * of[: shared.shape[1]]) @ shared.T for name, of in zip(names, members.T, strict=True)}
+    """Variances of what has these columns, by the kind of error."""
+    return dict(zip(KIND_NAMES, errors.variances(shared[None])[0], strict=True))
 
 
 def test_joints_are_shared_by_the_tubes_below_them() -> None:
@@ -154,18 +155,41 @@ def test_the_kinds_add_up_to_the_whole(readings: list[tuple[int, list[int] | Non
     fused = bayes(leans)
     for shared in (leans[0].shared, leans[-1].shared, fused.shared):
         kinds = by_kind(errors, shared)
-        assert set(kinds) <= {"mounts", "joints", "accelerometer_bias"}
-        whole = shared @ shared.T
-        np.testing.assert_allclose(sum(kinds.values()), whole, atol=1e-12 * float(np.trace(whole)))
+        assert set(kinds) == {"mounts", "joints", "accelerometer_bias"}
+        whole = np.diagonal(shared @ shared.T)
+        np.testing.assert_allclose(sum(kinds.values()), whole, atol=1e-12 * float(whole.sum()))
 
 
 def test_each_kind_holds_what_is_of_its_kind() -> None:
     errors, resolved = SharedErrors(), stop()
-    yaw = np.outer(resolved.by_yaw, resolved.by_yaw)
+    yaw = resolved.by_yaw**2
     kinds = by_kind(errors, errors.reading(resolved, 1, [2, 3], 5e-4, 2e-4, 1e-3).shared)
     np.testing.assert_allclose(kinds["mounts"], 2e-4 * yaw, rtol=1e-9)
     np.testing.assert_allclose(kinds["joints"], 3e-4 * yaw, rtol=1e-9)
-    np.testing.assert_allclose(kinds["accelerometer_bias"], 1e-6 * resolved.by_force @ resolved.by_force.T, rtol=1e-9)
+    biases = 1e-6 * (resolved.by_force**2).sum(axis=1)
+    np.testing.assert_allclose(kinds["accelerometer_bias"], biases, rtol=1e-9)
+
+
+@given(
+    arrays(
+        np.float64,
+        st.tuples(st.integers(1, 3), st.integers(0, 40)),
+        elements=st.one_of(st.just(0.0), st.floats(-1.0, 1.0)),
+    )
+)
+def test_packed_columns_are_the_same_when_they_are_unpacked(columns: np.ndarray) -> None:
+    np.testing.assert_array_equal(Packed(columns).columns(), columns)
+
+
+def test_many_columns_of_which_few_are_known_take_little_room() -> None:
+    columns = np.zeros((2, 70_000))
+    columns[:, [3, 69_999]] = [[1.0, 2.0], [3.0, 4.0]]
+    np.testing.assert_array_equal(Fused(np.zeros(2), 1.0, np.eye(2), columns).shared, columns)
+    tracemalloc.start()
+    kept = [Packed(columns) for _ in range(100)]
+    held, _ = tracemalloc.get_traced_memory()
+    tracemalloc.stop()
+    assert held < len(kept) * 1000  # bytes; all of them would be a megabyte each
 
 
 def test_columns_met_later_are_zero_for_those_before() -> None:

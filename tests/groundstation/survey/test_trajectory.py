@@ -16,7 +16,7 @@ from groundstation.survey.kernels.position_errors import add_stations, warm_up
 from groundstation.survey.methods import Method
 from groundstation.survey.records import Record
 from groundstation.survey.resolve import Direction
-from groundstation.survey.trajectory import Trajectory, interpolate
+from groundstation.survey.trajectory import BLOCK, Trajectory, interpolate
 
 DEG = math.pi / 180.0
 
@@ -73,6 +73,32 @@ def test_appending_gives_what_the_whole_hole_gives_at_once(
         np.testing.assert_allclose(point.cov, random + shared @ shared.T, rtol=1e-9, atol=1e-18)
         np.testing.assert_allclose(point.shared, shared[:, : point.shared.shape[1]], rtol=1e-9, atol=1e-15)
         assert not np.any(shared[:, point.shared.shape[1] :])
+
+
+@pytest.mark.parametrize("method", Method)
+def test_a_long_hole_at_once_is_the_same_as_station_by_station(method: Method) -> None:
+    """Columns are held a block at a time; the borders of the blocks must not show."""
+    count = 2 * BLOCK + 3
+    mds = np.arange(1.0, count + 1.0).tolist()
+    leans = [turned(0.3 + 1e-3 * k, 0.01 * k, 1e-3, [1e-3] * (1 + k // 50)) for k in range(count)]
+    one, other = Trajectory(method), Trajectory(method)
+    for station in zip(mds, leans, strict=True):
+        one.append(*station)
+    other.extend(list(zip(mds, leans, strict=True)))
+    assert len(other.points) == count + 1
+    for appended, extended in zip(one.points, other.points, strict=True):
+        np.testing.assert_array_equal(appended.position, extended.position)
+        np.testing.assert_array_equal(appended.cov, extended.cov)
+        np.testing.assert_array_equal(appended.shared, extended.shared)
+
+
+def test_a_point_keeps_of_its_columns_what_the_trajectory_is_told() -> None:
+    whole, sums = Trajectory(), Trajectory(keep=lambda columns: (columns**2).sum(axis=-1))
+    for trajectory in (whole, sums):
+        trajectory.extend([(2.0 * k, turned(0.1, 0.2, 1e-3, [1e-3] * (1 + k // 2))) for k in range(1, 6)])
+    for all_of_it, summed in zip(whole.points, sums.points, strict=True):
+        np.testing.assert_array_equal(summed.cov, all_of_it.cov)
+        np.testing.assert_allclose(summed.shared, np.diagonal(all_of_it.shared @ all_of_it.shared.T))
 
 
 def parts_at_once(mds: np.ndarray, leans: list[Direction]) -> tuple[np.ndarray, np.ndarray]:
