@@ -74,14 +74,13 @@ class FaultyStepper(InProcessStepper):
         self._thawing.pop(address, None)
 
     def round(self, steps: Mapping[int, list[FrameEvent]]) -> dict[int, Answer]:
-        """Step each process that is there and does not stand still."""
+        """Step each process that is there and does not stand still; one that has just thawed may write before that."""
         answers = {}
         for address in sorted(steps):
-            events = self._events_of(address, steps[address])
-            if not events or address not in self.processes:
-                continue
             try:
-                answers[address] = step(self.processes[address], events)
+                events = self._events_of(address, steps[address])
+                if events and address in self.processes:
+                    answers[address] = step(self.processes[address], events)
             except PowerCutError:
                 self._on_cut(address)
         return answers

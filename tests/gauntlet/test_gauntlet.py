@@ -94,6 +94,7 @@ def test_combined_seeds_hold(first: int) -> None:
         (51416, ("cut-again-and-again", "node-memory-lost", "splice")),  # a recorded state of an epoch before the last
         (104026, ("cut-while-saving", "not-finite", "encoder-slips")),  # one rested, the other was blind
         (102831, ("database-deleted", "gyro-saturated", "encoder-slips")),  # nobody knew any more that one was blind
+        (107936, ("cut-while-saving", "frozen")),  # the power went while it saved what it had missed
         (51633, ("surveys-lost", "gyro-step")),  # a gyroscope that turned its tube while nobody corrected it
     ],
 )
