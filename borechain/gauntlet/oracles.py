@@ -225,10 +225,8 @@ def _missing(rows: list[dict[str, Any]], rig: GauntletRig, standing: set[str]) -
 
 
 def _rests(world: FaultyWorld) -> list[tuple[int, float]]:
-    """Tube and its depth (m) in every rest of the schedule."""
-    depths = [(phase.tube, world.true_depth(phase.end)) for phase in world.phases if phase.kind in ("stop", "finish")]
-    depths += [(phase.tube, world.true_depth(phase.start)) for phase in world.phases if phase.kind == "hold"]
-    return _nodes(depths)
+    """Tube and its depth (m) in every rest of the schedule; a string rests too while a tube is added."""
+    return _nodes([(phase.tube, world.true_depth(phase.start)) for phase in world.phases if phase.kind != "drill"])
 
 
 def _expected(rig: GauntletRig) -> list[tuple[int, float]]:

@@ -44,7 +44,11 @@ RATE_AGE: Final = 3.0  # s, of an encoder's rate that may stand for the gyroscop
 BACKWARD: Final = PERIOD  # s, that a cycle may begin before the end of the last; beyond it is a jump of the clock
 LONGEST_CYCLE: Final = 10.0 * PERIOD  # s
 FARTHEST: Final = LONGEST_CYCLE  # s, that a cycle may begin after the end of the last; no rate stands for more
+LONGEST_KNOCK: Final = 8  # cycles of an odd force; one that lasts has shown what it is by then, or is a tilt
+GRAVITY_ERROR: Final = 0.05  # of gravity, of a force at rest
+LEAST_TILT: Final = 3.0 * DEG  # at rest, that no gyroscope misses
 FAR_OFF: Final = 4.0  # sigmas, that a clock may be wrong by
+TX, TY = constant(Err.TILT_X), constant(Err.TILT_Y)
 PSI, BZ, S = constant(Err.YAW), constant(Err.BIAS_Z), constant(Err.SCALE)
 BAD_SAMPLE, GYRO_STEP, GYRO_SCALE = constant(Fault.BAD_SAMPLE), constant(Fault.GYRO_STEP), constant(Fault.GYRO_SCALE)
 ENCODER_REVERSED = constant(Code.ENCODER_REVERSED)
@@ -167,10 +171,48 @@ def guard_reading(node: Any, settings: Any, saturated: int, at: float) -> None:
         rate[2] += (guard.rate if known else guard.sane_rate) * (1.0 + state.scale)
     else:
         guard.sane_rate = measured
-    if accelerometer != 0:
+    if accelerometer != 0 or keeps_out(node):
         for k in range(3):
             force[k] = -node.config.gravity * state.now_down[k]
     hold(node)
+
+
+@kernel
+def keeps_out(node: Any) -> bool:
+    """Whether the force of a node at rest is not to be used: a knock, or a fault that shows later.
+
+    Levelled by two such cycles a filter that is sure of its tilt explains the rest by the gyroscope's biases. If it
+    stays and is no fault the tube was tilted and no gyroscope saw it: nothing is known of the tilt, until what was
+    kept out has left the filter's lag.
+    """
+    guard = node.guard
+    if not (is_odd(node) or LONGEST_KNOCK <= guard.odd < LONGEST_KNOCK + SANE_CYCLES):
+        guard.odd = 0
+        return False
+    guard.odd = min(guard.odd + 1, LONGEST_KNOCK + SANE_CYCLES)
+    if guard.odd < LONGEST_KNOCK:
+        node.filter.still_cycles = 0  # the average of a stop begins again
+        return True
+    if guard.odd < LONGEST_KNOCK + SANE_CYCLES:
+        lose_tilt(node.filter)
+        node.filter.surveyed = 0  # it leans otherwise
+    return False
+
+
+@kernel
+def is_odd(node: Any) -> bool:
+    """Whether a node at rest feels a force that is not gravity's, or from where the filter is sure it is not."""
+    state, force, gravity = node.filter, node.force, node.config.gravity
+    if state.still_cycles == 0 and node.guard.odd == 0:
+        return False
+    weight = math.sqrt(force[0] * force[0] + force[1] * force[1] + force[2] * force[2])
+    if abs(weight - gravity) > GRAVITY_ERROR * gravity:
+        return True
+    apart = 0.0
+    for k in range(3):
+        apart += (force[k] / weight + state.now_down[k]) ** 2
+    tilt_var = state.P[TX, TX] + state.P[TY, TY]
+    return bool(apart > LEAST_TILT * LEAST_TILT + FAR_OFF * FAR_OFF * tilt_var)
 
 
 @kernel

@@ -14,8 +14,8 @@ from node.kernels.alignment import MAX_IMUS, MOUNT, OFFSET, SWEEP, new_mount
 from node.kernels.layout import CONFIG, RING, STATE, Array, new_state
 from node.kernels.static_average import STATIC
 
-# of the saved record; 1 and 2 held the filter alone, 3 what a start clears as well, 4 no doubts, 5 fewer mismatches
-NODE_LAYOUT: Final = 6
+# of the saved record; 1 and 2 held the filter alone, 3 what a start clears as well, 4 no doubts, 5 fewer mismatches, 6 no odd forces
+NODE_LAYOUT: Final = 7
 EVENTS_KEPT: Final = 32  # that wait to be said
 NUMBERS: Final = 10  # of one event
 DISAGREEMENTS: Final = 3  # aidings in a row, until a mismatch is a fault
@@ -92,6 +92,7 @@ GUARD: Final = np.dtype(
         ("shared", "f8"),  # rad^2, mean of the products of neighbours
         ("jump", "f8"),  # rad, by which resets that nothing explains have moved the yaw
         ("last_jump", "f8"),  # rad, of it by the reset since the last aiding that agreed
+        ("odd", "i8"),  # cycles in a row whose force at rest is not that of gravity as the filter has it
     ],
     align=True,
 )

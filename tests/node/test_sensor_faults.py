@@ -178,6 +178,54 @@ def test_a_stuck_or_saturated_accelerometer_is_flagged_and_no_survey_made_of_it(
     assert np.all(np.abs(string.error[at:]) < 5.0 * string.std[at:])
 
 
+def knock(at: int, lasts: int, force: list[float]) -> Spoil:
+    def spoil(cycle: int, sample: Sample) -> Sample:
+        return [*sample[:3], *force] if at <= cycle < at + lasts else sample
+
+    return spoil
+
+
+@pytest.mark.parametrize("force", [[-78.5, 0.4, -9.8], [0.3, -0.4, -78.5], [1.0, 2.0, -9.0], [-9.81, 0.0, 0.0]], ids=str)
+@pytest.mark.parametrize("lasts", [1, 2, LASTS])
+def test_a_force_that_is_not_that_of_gravity_moves_nothing_at_rest(force: list[float], lasts: int) -> None:
+    """Two cycles of it took the tilt for 40 deg and the biases for 0.5 deg/s, before it counted as a fault."""
+    at = StringOfOne(1).resting(0, 0.5)
+    string = StringOfOne(1, knock(at, lasts, force), loss=0.0).advance(at)
+    before = string.tube.state.copy()
+    for _ in range(lasts):
+        string.advance(1)
+        moved = np.abs(string.tube.state["bias"] - before["bias"])
+        assert np.all(moved < 0.05 * DEG), moved / DEG
+        assert float(string.tube.state["now_down"] @ before["now_down"]) > math.cos(1.0 * DEG)
+    string.run()
+    assert np.all(np.abs(string.error[at:]) < 5.0 * string.std[at:])
+
+
+def test_a_stop_that_was_knocked_is_averaged_anew() -> None:
+    at = StringOfOne(1).resting(1, 0.2)
+    string = StringOfOne(1, knock(at, 1, [-78.5, 0.4, -9.8])).run()
+    rest = range(string.resting(1, 0.0), string.resting(1, 1.0))
+    (survey,) = [one.measurement for one in string.string.run.surveys if one.cycle in rest]
+    assert math.hypot(*survey.imus[0].force) == pytest.approx(9.80665, abs=0.01)
+    assert survey.imus[0].force_cov[0][0] < 1e-4
+
+
+def test_a_tilt_that_no_gyroscope_saw_is_believed_when_it_stays() -> None:
+    at, angle = StringOfOne(1).resting(0, 0.2), 20.0 * DEG
+    leant = [9.80665 * math.sin(angle), 0.0, -9.80665 * math.cos(angle)]
+    noise = np.random.default_rng(1)
+
+    def spoil(cycle: int, sample: Sample) -> Sample:
+        return [*sample[:3], *(leant + 0.003 * noise.standard_normal(3))] if cycle >= at else sample
+
+    string = StringOfOne(1, spoil).advance(at)
+    before = string.tube.state.copy()
+    string.advance(30)
+    state = string.tube.state
+    assert math.degrees(math.asin(-state["now_down"][0])) == pytest.approx(20.0, abs=0.1)
+    assert np.all(np.abs(state["bias"] - before["bias"]) < 0.05 * DEG)
+
+
 @pytest.mark.parametrize("jump", [-1000.0, -0.8, 16.0, 200.0, 1e9])
 def test_a_clock_that_jumps_is_told_and_the_yaw_taken_anew(jump: float, healthy: StringOfOne) -> None:
     string = StringOfOne(1)
