@@ -14,7 +14,8 @@ from node.kernels.alignment import MAX_IMUS, MOUNT, OFFSET, SWEEP, new_mount
 from node.kernels.layout import CONFIG, RING, STATE, Array, new_state
 from node.kernels.static_average import STATIC
 
-# of the saved record; 1 and 2 held the filter alone, 3 what a start clears as well, 4 no doubts, 5 fewer mismatches, 6 no odd forces
+# of the saved record; 1 and 2 held the filter alone, 3 what a start clears as well, 4 no doubts, 5 fewer mismatches,
+# 6 no odd forces
 NODE_LAYOUT: Final = 7
 EVENTS_KEPT: Final = 32  # that wait to be said
 NUMBERS: Final = 10  # of one event

@@ -185,7 +185,9 @@ def knock(at: int, lasts: int, force: list[float]) -> Spoil:
     return spoil
 
 
-@pytest.mark.parametrize("force", [[-78.5, 0.4, -9.8], [0.3, -0.4, -78.5], [1.0, 2.0, -9.0], [-9.81, 0.0, 0.0]], ids=str)
+@pytest.mark.parametrize(
+    "force", [[-78.5, 0.4, -9.8], [0.3, -0.4, -78.5], [1.0, 2.0, -9.0], [-9.81, 0.0, 0.0]], ids=str
+)
 @pytest.mark.parametrize("lasts", [1, 2, LASTS])
 def test_a_force_that_is_not_that_of_gravity_moves_nothing_at_rest(force: list[float], lasts: int) -> None:
     """Two cycles of it took the tilt for 40 deg and the biases for 0.5 deg/s, before it counted as a fault."""
