@@ -43,8 +43,9 @@ class Observer:
     station receipts is on its disk.
     """
 
-    def __init__(self, rig: GauntletRig, since: float = math.inf) -> None:
+    def __init__(self, rig: GauntletRig, since: float = math.inf, *, of_few: bool = True) -> None:
         self._rig = rig
+        self._of_few = of_few  # faults: then nothing is excused that nobody could see
         self._since = since  # s, rig time of the truth at which the first fault begins
         self.seen: set[tuple[str, str, int]] = set()  # code, subject and count of every alarm so far
         self.told: dict[str, float] = {}  # s after the first fault at which an alarm was first seen
@@ -120,7 +121,9 @@ class Observer:
             if model.age(tube) < 0.0:
                 yield f"tube {tube} was heard in the future"
             is_off = rig.silent_for(tube) > model.config.stale_after + LATE
-            if tube in model.nodes and is_off and not model.is_stale(tube):
+            if tube not in model.nodes or not (self._of_few or model.is_dated(model.nodes[tube])):
+                continue  # held up on its way, and of an epoch that this ground station has never heard
+            if is_off and not model.is_stale(tube):
                 yield f"tube {tube} without power is shown fresh"
 
 
@@ -131,10 +134,17 @@ def messages_of(image: bytes) -> set[tuple[int, int, str]]:
         return set(connection.execute("SELECT tube, sequence, content FROM messages"))
 
 
-def violations(rig: GauntletRig, seen: Collection[str] = (), *, encoder_can_be_judged: bool = True) -> list[str]:
+def violations(
+    rig: GauntletRig,
+    seen: Collection[str] = (),
+    *,
+    encoder_can_be_judged: bool = True,
+    depth_can_be_judged: bool = True,
+) -> list[str]:
     """Every oracle that does not hold at the end, in words; ``seen`` are the alarms that the crew saw meanwhile.
 
-    Where the encoder cannot be judged, its failure showing in nothing that measures, directions are not. Events are
+    Where the encoder cannot be judged, its failure showing in nothing that measures, directions are not; where the
+    depth cannot, neither is what it places and what it says is missing. Events are
     not sent again, so an alarm that rests on them is lost with a database that somebody deletes or replaces under a
     crew that has seen it.
     """
@@ -145,10 +155,10 @@ def violations(rig: GauntletRig, seen: Collection[str] = (), *, encoder_can_be_j
     rows = rig.inline.ask("measurements")["measurements"]
     return [
         *_each_once(rows),
-        *(() if standing & DEPTH else _depths(rows, rig.world)),
+        *(() if standing & DEPTH or not depth_can_be_judged else _depths(rows, rig.world)),
         *(() if _is_told(rig.world, warned) or not encoder_can_be_judged else _directions(rig)),
         *_flags(rig.inline.ground.model),
-        *_missing(rows, rig, standing | (told & {"depth_refused"})),
+        *(_missing(rows, rig, standing | (told & {"depth_refused"})) if depth_can_be_judged else ()),
         *_health(rig.inline.ask("status")["health"], standing),
         *queues(rig),
     ]

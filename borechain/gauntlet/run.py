@@ -86,7 +86,8 @@ def _run(rig: GauntletRig, outcome: Outcome) -> None:
     begin = world.begin + chosen.rested
     steps = steps_of(outcome.seed, outcome.kinds, begin + chosen.after_begin, world.end)
     outcome.schedule = [f"{step.at - begin:.1f} s {name}" for name, step in steps]
-    observer, sight = Observer(rig, steps[0][1].at), Sight(rig)
+    is_of_few = len(outcome.kinds) <= FEW
+    observer, sight = Observer(rig, steps[0][1].at, of_few=is_of_few), Sight(rig)
     rig.drill([step for _, step in steps], observer.look)
     outcome.told = observer.told
     if rig.ground is None:
@@ -97,8 +98,15 @@ def _run(rig: GauntletRig, outcome: Outcome) -> None:
     outcome.alarms = sorted({code for code, _, _, standing in rows if standing})
     outcome.cleared = sorted({code for code, _, _, standing in rows if not standing})
     outcome.measurements = len(rig.inline.ask("measurements")["measurements"])
-    judged_by = len(outcome.kinds) <= FEW or sight.has_seen
-    outcome.violations = [*observer.found, *violations(rig, observer.told, encoder_can_be_judged=judged_by)]
+    outcome.violations = [
+        *observer.found,
+        *violations(
+            rig,
+            observer.told,
+            encoder_can_be_judged=is_of_few or sight.has_seen,
+            depth_can_be_judged=is_of_few or not sight.has_believed_a_wrong_depth,
+        ),
+    ]
 
 
 @contextlib.contextmanager

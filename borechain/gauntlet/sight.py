@@ -1,7 +1,8 @@
-"""Whether anything on the rig could have shown that the encoder was wrong.
+"""Whether anything on the rig could have shown that the encoder, or the depth, was wrong.
 
 That the encoder slipped shows only against a gyroscope that ran through it. Where three faults or more leave none, a
-slip is a turn of the string to everything that measures, and no alarm can be asked for.
+slip is a turn of the string to everything that measures, and no alarm can be asked for. A depth that is wrong shows
+against one that was known before: not to a ground station that starts then upon a database that somebody took back.
 """
 
 from __future__ import annotations
@@ -12,7 +13,7 @@ from borechain.gauntlet.rig import GauntletRig
 from node.process.tube_process import TubeProcess
 from sim.gauntlet import readings
 from sim.gauntlet.fault import TUBES
-from telemetry.messages import Mode
+from telemetry.messages import BASE, Mode
 
 AROUND = 10.0  # s before and after an instant that a tube must have watched to speak of it
 
@@ -25,6 +26,8 @@ class Sight:
         self._log: list[tuple[float, frozenset[int]]] = [(rig.now, frozenset(TUBES))]  # s, tubes that see from then on
         self._encoder = self._shown()
         self._wrong_at: list[float] = []
+        self._had_ground, self._handled = True, 0  # times that the database was
+        self.has_believed_a_wrong_depth = False
         rig.after_step.append(self.note)
 
     def note(self) -> None:
@@ -33,6 +36,14 @@ class Sight:
         if self._shown() != self._encoder:
             self._encoder = self._shown()
             self._wrong_at.append(self._rig.now)
+        self._note_depth()
+
+    def _note_depth(self) -> None:
+        has_ground, handled = self._rig.ground is not None, self._rig.disk(BASE).handled
+        if has_ground and not self._had_ground:
+            self.has_believed_a_wrong_depth |= handled > self._handled and self._rig.world.depth_error != 0.0
+            self._handled = handled
+        self._had_ground = has_ground
 
     @property
     def has_seen(self) -> bool:

@@ -61,6 +61,18 @@ class Track:
         return self.md[k - 1] + share * (self.md[k] - self.md[k - 1])
 
 
+Instant = tuple[int, float]  # epoch, and s of rig time in it
+NEVER: Instant = (-1, 0.0)
+
+
+@dataclass(frozen=True, slots=True)
+class Doubt:
+    """What a later start has to know: what it may not believe, and what the crew has looked at."""
+
+    trusted: tuple[int, float, float] | None = None  # epoch, time and depth (m) of the last reading before a jump
+    accepted: Instant = NEVER  # at which the crew accepted the depth
+
+
 class DepthLog:
     """Depth of the bit over rig time.
 
@@ -86,7 +98,7 @@ class DepthLog:
         self._sequence: int | None = None
         self._raw: tuple[int, float, float] | None = None  # epoch, time and depth of the last reading that came
         self._trusted: tuple[int, float, float] | None = None  # of the last one that was taken
-        self._accepted = (-1, 0.0)  # epoch and time at which the crew accepted the depth
+        self._accepted = NEVER  # when the crew accepted the depth
         self._doubtful: deque[Stand] = deque(maxlen=DOUBTS_KEPT)  # times of which no stand is believed
 
     @property
@@ -137,11 +149,23 @@ class DepthLog:
         before = (known for known in self.stands if known.epoch != epoch and stand.ended_at <= known.ended_at)
         return any(_same(replace(stand, epoch=known.epoch), known) for known in before)
 
+    @property
+    def doubt(self) -> Doubt:
+        """What is to be kept beside the stands."""
+        return Doubt(self._trusted if self.jumped else None, self._accepted)
+
+    def recall(self, doubt: Doubt) -> None:
+        """Go on with what was kept, before any stand is believed."""
+        self._accepted = doubt.accepted
+        if doubt.trusted is not None:
+            self.jumped = f"from {doubt.trusted[2]:.2f} m, before the ground station's start"
+            self._raw = self._trusted = doubt.trusted
+
     def restore(self, stands: list[Stand]) -> None:
-        """Go on with what was stored."""
+        """Go on with the stands that were kept."""
         for stand in stands:
             self.add_stand(stand)
-        if stands:
+        if stands and not self.jumped:
             newest = stands[-1]
             self._raw = self._trusted = (newest.epoch, newest.ended_at, newest.md)
 

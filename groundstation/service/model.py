@@ -33,6 +33,7 @@ EVENTS_SHOWN = 10_000
 STATIC_RECORDS_SHOWN = 1_000
 ACCELEROMETER_NOISE_DEG = 0.02  # one sample, for the check of motion
 ABOVE_COLLAR = 0.01  # m, of rounding; a node higher up is in no hole
+EPOCHS_KEPT = 8
 ALL_HEARD_WITHIN = 2.0  # s, of tubes that speak
 
 
@@ -75,6 +76,7 @@ class RigModel:
         self.epoch = EPOCH_UNKNOWN
         self._tally_known_at = math.inf  # s, own clock, from which on every tube that speaks has been heard
         self.depth_heard_at = -math.inf  # s, own clock
+        self._begun_at: dict[int, float] = {}  # s, own clock, of rig time 0 of each epoch that was heard
         self._heard_at: dict[int, float] = {}  # s, own clock, of each tube's newest state
         self.shared = SharedErrors()
         self.hole = Hole(config, self.shared)
@@ -105,6 +107,17 @@ class RigModel:
             self._tally_known_at = min(self._tally_known_at, now + ALL_HEARD_WITHIN)
             self.tally.on_hops(state.tube, state.hops)
         return True
+
+    def on_rig_time(self, rig_now: float, epoch: int) -> None:
+        """Follow rig time (s) of an epoch; where it is heard first, states that came before have an age by it."""
+        self.rig_now, self.epoch = rig_now, epoch
+        begins = epoch not in self._begun_at
+        self._begun_at[epoch] = self.now - rig_now
+        while len(self._begun_at) > EPOCHS_KEPT:
+            del self._begun_at[next(iter(self._begun_at))]
+        if begins:
+            for tube, state in self.nodes.items():
+                self._heard_at[tube] = min(self._heard_at[tube], self.now - self._time_on_its_way(state))
 
     def _is_of_before(self, state: NodeState, known: NodeState) -> bool:
         """Whether a state leaves its tube's epoch for one that the encoder is not in: somebody has recorded it."""
@@ -216,10 +229,13 @@ class RigModel:
         """Whether a node has been silent for too long."""
         return not self.age(tube) <= self.config.stale_after
 
+    def is_dated(self, state: NodeState) -> bool:
+        """Whether the time of a state can be compared with the own clock: of an epoch heard since the start."""
+        return state.epoch in self._begun_at and NodeFlag.CLOCK_UNSYNCHRONISED not in state.flags
+
     def _time_on_its_way(self, state: NodeState) -> float:
-        """Seconds for which a state has been on its way; 0 where its time cannot be compared with the rig time here."""
-        is_dated = state.epoch == self.epoch != EPOCH_UNKNOWN and NodeFlag.CLOCK_UNSYNCHRONISED not in state.flags
-        return max(self.rig_now - state.at, 0.0) if is_dated and math.isfinite(self.rig_now) else 0.0
+        """Seconds for which a state has been on its way; 0 where its time cannot be compared with the own clock."""
+        return max(self.now - self._begun_at[state.epoch] - state.at, 0.0) if self.is_dated(state) else 0.0
 
     def _hops_if_unknown(self, measurement: SurveyMeasurement) -> int:
         return measurement.hops if measurement.tube not in self.tally.tubes else -1

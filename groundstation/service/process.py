@@ -127,6 +127,8 @@ class GroundProcess(Process):
         self._kept_tally = list(self.model.tally.tubes)
         self._kept_joints = self.store.joints()
         self.model.joints.known.update(self._kept_joints)
+        self._kept_doubt = self.store.depth_doubt()
+        self.model.depths.recall(self._kept_doubt)
         for stand in self.store.stands():
             self._on_stand(stand)
         self.model.depths.restore(list(self.model.depths.stands))
@@ -225,11 +227,11 @@ class GroundProcess(Process):
         model.revision += 1
         if not clock.synchronised:
             return
-        model.rig_now = clock.rig_from_local(now)
-        if clock.epoch != model.epoch:
-            if model.epoch != EPOCH_UNKNOWN:
+        is_new, before = clock.epoch != model.epoch, model.epoch
+        model.on_rig_time(clock.rig_from_local(now), clock.epoch)
+        if is_new:
+            if before != EPOCH_UNKNOWN:
                 self.watch.on_epoch(clock.epoch)
-            model.epoch = clock.epoch
             with self._refusing_disk():
                 self.store.keep_epoch(clock.epoch)
         while self._early:
@@ -237,6 +239,7 @@ class GroundProcess(Process):
 
     def _look(self, now: float) -> None:
         """Find what is wrong, ask again for what is missing, and publish who fell silent or came back."""
+        self._keep_depth_doubt()
         self._place_waiting()
         self.watch.look(now)
         alarms, refusal = self.model.rig_alarms, self.store.refusal
@@ -294,6 +297,7 @@ class GroundProcess(Process):
         model = self.model
         refused = model.depths.on_reading(reading, model.epoch, model.rig_now, model.tally.deepest)
         self.watch.on_depth("" if refused == "repeated" else refused)
+        self._keep_depth_doubt()
         if refused:
             return
         model.depth_heard_at = now
@@ -363,6 +367,14 @@ class GroundProcess(Process):
         if self.model.tally.tubes != self._kept_tally:
             self.store.keep_tally(list(self.model.tally.tubes))
             self._kept_tally = list(self.model.tally.tubes)
+
+    def _keep_depth_doubt(self) -> None:
+        """Store when depths begin to be refused after a jump, and when they no longer are."""
+        doubt = self.model.depths.doubt
+        if doubt != self._kept_doubt:
+            with self._refusing_disk():
+                self.store.keep_depth_doubt(doubt)
+                self._kept_doubt = doubt
 
     def _keep_joints(self) -> None:
         """Store the angle of a joint when it is known first."""

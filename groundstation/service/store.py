@@ -24,6 +24,7 @@ import sqlalchemy as sa
 from groundstation.errors import StoreError
 from groundstation.service.alarm_record import DamagedAlarmError, alarm_of_text, alarm_to_text
 from groundstation.service.crew_alarms import CrewAlarm
+from groundstation.service.depth import NEVER, Doubt, Instant
 from groundstation.survey.joint_angles import Joint, Pair
 from telemetry.errors import DecodeError
 from telemetry.messages import Event, Kept, Stand, StaticRecord, SurveyMeasurement
@@ -227,6 +228,29 @@ class Store:
             connection.execute(sa.delete(META).where(META.c.name == "epoch"))
             connection.execute(sa.insert(META).values(name="epoch", value=str(epoch)))
 
+    def keep_depth_doubt(self, doubt: Doubt) -> None:
+        """Store since when depths are refused, and when the crew accepted one."""
+        rows = [{"name": "depth_accepted", "value": _numbers(*doubt.accepted)}]
+        if doubt.trusted is not None:
+            rows.append({"name": "depth_trusted", "value": _numbers(*doubt.trusted)})
+        with self._writing() as connection:
+            connection.execute(sa.delete(META).where(META.c.name.in_(["depth_accepted", "depth_trusted"])))
+            connection.execute(sa.insert(META), rows)
+
+    def depth_doubt(self) -> Doubt:
+        """Since when depths have been refused, and when the crew accepted one."""
+        with self._refusing():
+            meta = self._meta()
+        trusted, accepted = meta.get("depth_trusted"), meta.get("depth_accepted")
+        try:
+            return Doubt(
+                None if trusted is None else _reading_of(trusted), NEVER if accepted is None else _instant_of(accepted)
+            )
+        except ValueError as error:
+            raise StoreError(
+                f"database {self._where}: expected numbers of the depth, got {trusted!r} and {accepted!r}"
+            ) from error
+
     def keep_joints(self, joints: Mapping[Pair, Joint]) -> None:
         """Store the angles of the joints, in the place of those stored before."""
         rows = [
@@ -395,6 +419,20 @@ class Store:
         with self._engine.begin() as connection:
             connection.execute(sa.delete(META).where(META.c.name.in_(["schema", "boots"])))
             connection.execute(sa.insert(META), rows)
+
+
+def _numbers(*values: float) -> str:
+    return " ".join(map(repr, values))
+
+
+def _reading_of(text: str) -> tuple[int, float, float]:
+    epoch, at, md = text.split()
+    return int(epoch), float(at), float(md)
+
+
+def _instant_of(text: str) -> Instant:
+    epoch, at = text.split()
+    return int(epoch), float(at)
 
 
 def row_of(message: Kept, payload: bytes) -> dict[str, Any]:

@@ -56,7 +56,7 @@ class FaultyDisk:
     writes_left: int = -1
     files: dict[str, File] = field(default_factory=dict)
     backups: list[bytes] = field(default_factory=list)  # images of the database, the newest last
-    handled: bool = False  # somebody but the process has changed a file
+    handled: int = 0  # times that somebody but the process has changed a file
     _kept_names: dict[str, File] = field(default_factory=dict)
     _changes: list[NameChange] = field(default_factory=list)
     _numbers: int = 0
@@ -144,7 +144,7 @@ class FaultyDisk:
 
     def replace(self, name: str, data: bytes | None) -> None:
         """Whoever has the disk in his hands gives a file these bytes, or removes it."""
-        self.handled = True
+        self.handled += 1
         if data is None:
             self.files.pop(name, None)
             self._kept_names.pop(name, None)
@@ -161,7 +161,7 @@ class FaultyDisk:
         disk = FaultyDisk(random)
         for name, file in self._kept_names.items():
             disk.replace(name, file.kept)
-        disk.handled = False
+        disk.handled = 0
         return disk
 
     @property

@@ -439,9 +439,34 @@ def test_a_state_of_an_epoch_that_the_encoder_has_left_is_no_sign_of_life(tmp_pa
 @given(st.floats(0.0, 100.0))
 def test_a_recorded_state_shows_no_tube_fresh_to_a_ground_station_that_has_just_started(late: float) -> None:
     model = RigModel(GroundConfig(folder=Path("unused")))
-    model.now, model.rig_now, model.epoch = 5.0, 1000.0 + late, 1
-    model.on_state(replace(node_state(1, at=1000.0, cycles=50), epoch=1), 5.0)
+    recorded = replace(node_state(1, at=1000.0, cycles=50), epoch=1)
+    model.now = 5.0
+    model.on_rig_time(1000.0 + late, 1)
+    model.on_state(recorded, 5.0)
     assert model.age(1) == pytest.approx(late)
+
+
+@given(st.floats(0.0, 100.0))
+def test_a_state_that_came_before_rig_time_was_known_is_as_old_as_it_says(late: float) -> None:
+    """Frames that waited in a process that stood still reach a ground station that has just started."""
+    model = RigModel(GroundConfig(folder=Path("unused")))
+    model.now = 5.0
+    model.on_state(replace(node_state(1, at=1000.0, cycles=50), epoch=1), 5.0)
+    assert model.age(1) == 0.0
+    model.on_rig_time(1000.0 + late, 1)
+    assert model.age(1) == pytest.approx(late)
+    model.now = 7.0
+    model.on_rig_time(1002.0 + late, 1)
+    assert model.age(1) == pytest.approx(late + 2.0)
+
+
+def test_a_state_of_an_epoch_that_has_passed_is_as_old_as_that_epoch_says() -> None:
+    model = RigModel(GroundConfig(folder=Path("unused")))
+    for now, rig_now, epoch in ((5.0, 1000.0, 2), (6.0, 1001.0, 2), (7.0, 0.0, 3), (40.0, 33.0, 3)):
+        model.now = now
+        model.on_rig_time(rig_now, epoch)
+    model.on_state(replace(node_state(1, at=1010.0, cycles=50), epoch=2), 40.0)
+    assert model.age(1) == pytest.approx(25.0)
 
 
 @pytest.mark.parametrize(
@@ -450,6 +475,7 @@ def test_a_recorded_state_shows_no_tube_fresh_to_a_ground_station_that_has_just_
 )
 def test_silence_is_judged_by_arrival_where_the_times_of_two_clocks_are_not_comparable(undated: dict[str, Any]) -> None:
     model = RigModel(GroundConfig(folder=Path("unused")))
-    model.now, model.rig_now, model.epoch = 5.0, 1100.0, 1
+    model.now = 5.0
+    model.on_rig_time(1100.0, 1)
     model.on_state(replace(node_state(1, at=1000.0, cycles=50), **undated), 5.0)
     assert model.age(1) == 0.0

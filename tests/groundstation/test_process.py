@@ -292,6 +292,41 @@ def test_a_depth_that_never_comes_after_a_restart_is_told(start: Callable[[], Ri
     assert "depth_silent" not in again.alarms()
 
 
+def test_a_depth_that_jumped_is_not_believed_by_a_later_start_until_somebody_has_looked(
+    start: Callable[[], Rig],
+) -> None:
+    """A stand of the refused time looked like news to a ground station that had forgotten why it refused it."""
+
+    def next_start(before: Rig) -> Rig:
+        before.ground.store.close()
+        rig = start()
+        rig.now, rig.md, rig.source = before.now, before.md, before.source
+        rig.speak(2)
+        return rig
+
+    rig = start()
+    rig.speak(2)
+    rig.depth(2.5)
+    rig.now += 0.5
+    rig.read_depth(3.9)
+    rig.run(1.0)
+    assert "depth_refused" in rig.alarms()
+    for _ in range(2):
+        rig = next_start(rig)
+        rig.depth(3.9)
+        rig.run(1.0)
+        assert rig.ground.model.depths.latest == 2.5
+        assert "depth_refused" in rig.alarms()
+    rig.ground.operator.order("accept_depth", {"action": "confirm"}, by="crew")
+    rig.run(1.0)
+    for _ in range(2):
+        rig.depth(3.9)
+        rig.run(1.0)
+        assert rig.ground.model.depths.latest == 3.9
+        assert "depth_refused" not in rig.alarms()
+        rig = next_start(rig)
+
+
 def test_a_survey_from_before_the_restart_finds_its_depth(start: Callable[[], Rig]) -> None:
     first = start()
     first.run(3.0)

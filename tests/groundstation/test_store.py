@@ -13,6 +13,7 @@ from pathlib import Path
 import pytest
 
 from groundstation.errors import StoreError
+from groundstation.service.depth import Doubt
 from groundstation.service.store import Store
 from telemetry.messages import Event, ImuMean, NodeFlag, Severity, Stand, SurveyMeasurement
 
@@ -205,3 +206,23 @@ def test_another_schema_is_refused(tmp_path: Path) -> None:
     connection.close()
     with pytest.raises(StoreError, match="schema 2 or 3, got 99; one of a later version is read by that version"):
         Store(url(tmp_path))
+
+
+def test_what_is_doubtful_of_the_depth_is_kept(tmp_path: Path) -> None:
+    url = f"sqlite:///{tmp_path / 'ground.sqlite'}"
+    for doubt in (Doubt(), Doubt((1, 1e9 + 0.1, 3.25)), Doubt((2, 0.1, 1 / 3), (1, 2.5)), Doubt(None, (2, 1 / 3))):
+        with closing(Store(url)) as store:
+            store.keep_depth_doubt(doubt)
+        with closing(Store(url)) as store:
+            assert store.depth_doubt() == doubt
+
+
+@pytest.mark.parametrize("text", ["", "1 2", "1 2 x", "a 2.0 3.0"])
+def test_a_doubt_that_cannot_be_read_from_the_database_is_one_plain_error(tmp_path: Path, text: str) -> None:
+    url = f"sqlite:///{tmp_path / 'ground.sqlite'}"
+    with closing(Store(url)) as store:
+        store.keep_depth_doubt(Doubt((1, 2.0, 3.0)))
+    with closing(sqlite3.connect(tmp_path / "ground.sqlite")) as database, database:
+        database.execute("update meta set value = ? where name = 'depth_trusted'", (text,))
+    with closing(Store(url)) as store, pytest.raises(StoreError, match="expected numbers of the depth"):
+        store.depth_doubt()
