@@ -23,7 +23,8 @@ ENOUGH = 2  # tubes
 STARTS_KEPT = 1000
 EPOCHS_KEPT = 100
 OFF_BEFORE = 30.0  # s before a start in which a tube may have been without power
-BLIND_KEPT = 20  # times of a tube and epoch
+TIMES_KEPT = 20  # of a tube and epoch
+Times = dict[tuple[int, int], deque[tuple[float, float]]]  # s, rig time, by tube and epoch
 
 
 class Witnesses:
@@ -32,7 +33,8 @@ class Witnesses:
     def __init__(self) -> None:
         self._contradicted: dict[int, Event] = {}  # newest contradiction, by tube
         self._starts: deque[Event] = deque(maxlen=STARTS_KEPT)
-        self._blind: dict[tuple[int, int], deque[tuple[float, float]]] = {}  # s, rig time, by tube and epoch
+        self._off: Times = {}
+        self._blind: Times = {}  # without a gyroscope
         self._told: tuple[Event, ...] = ()
         self._spans: dict[int, tuple[float, float]] = {}  # s, first and last event of each epoch
 
@@ -42,18 +44,16 @@ class Witnesses:
         self._add_to_span(event)
         if event.code in STARTS:
             self._starts.append(event)
-            self._add_blind(place, event.at - OFF_BEFORE, event.at)
+            _add_time(self._off, place, event.at - OFF_BEFORE, event.at)
         elif event.code == "overrun":
-            self._add_blind(place, event.at, event.at + CYCLE * int(str(event.arguments.get("missed", 0))))
+            _add_time(self._off, place, event.at, event.at + CYCLE * int(str(event.arguments.get("missed", 0))))
         elif event.code in BLIND:
-            self._add_blind(place, event.at, math.inf)
+            _add_time(self._blind, place, event.at, math.inf)
             return ""  # what it tells next says whether that is over by now
         elif event.code == "sensor_recovered" and event.arguments.get("after") in BLIND:
             self._end_blind(place, event)
         elif event.code in AGAINST_THE_ENCODER:
             self._contradicted[event.tube] = event
-        while len(self._blind) > STARTS_KEPT:
-            del self._blind[next(iter(self._blind))]
         found = next((one for one in self._contradicted.values() if self._speaks_against_the_encoder(one, heard)), None)
         if found is None or (told := self._together(found)) == self._told:
             return ""
@@ -63,7 +63,8 @@ class Witnesses:
     def _speaks_against_the_encoder(self, event: Event, heard: Collection[int]) -> bool:
         together = self._together(event)
         tubes = {e.tube for e in together}
-        if tubes >= set(heard) and any(self._start_before(e)[0] == "restored" for e in together):
+        seeing = [tube for tube in heard if tube in tubes or not self._was_without_gyroscope(tube, event)]
+        if tubes >= set(seeing) and any(self._start_before(e)[0] == "restored" for e in together):
             return True  # every yaw that was saved or known says another thing
         # one that has just started contradicts what it saved: the string may have turned while it was off
         settled = [e for e in together if self._was_settled(e)]
@@ -108,9 +109,6 @@ class Witnesses:
         start = max(before, key=lambda start: (start.sequence, start.at), default=None)
         return ("", -math.inf) if start is None else (start.code, start.at)
 
-    def _add_blind(self, place: tuple[int, int], since: float, until: float) -> None:
-        self._blind.setdefault(place, deque(maxlen=BLIND_KEPT)).append((since, until))
-
     def _end_blind(self, place: tuple[int, int], event: Event) -> None:
         """The gyroscope gives something again: the newest time without one that had begun has an end.
 
@@ -123,12 +121,26 @@ class Witnesses:
                 return
         cycles = event.arguments.get("cycles", 0)
         if isinstance(cycles, (int, float)) and cycles > 0:
-            self._add_blind(place, event.at - CYCLE * cycles, event.at)
+            _add_time(self._blind, place, event.at - CYCLE * cycles, event.at)
 
     def _has_watched(self, tube: int, event: Event) -> bool:
         """Whether a tube ran, had settled and had a gyroscope at the time of an event: it could have seen the same."""
-        times = self._blind.get((tube, event.epoch), ())
-        return not any(since <= event.at <= until + SETTLED_AFTER for since, until in times)
+        return not _is_in(self._off, tube, event) and not self._was_without_gyroscope(tube, event)
+
+    def _was_without_gyroscope(self, tube: int, event: Event) -> bool:
+        return _is_in(self._blind, tube, event)
+
+
+def _add_time(times: Times, place: tuple[int, int], since: float, until: float) -> None:
+    times.setdefault(place, deque(maxlen=TIMES_KEPT)).append((since, until))
+    while len(times) > STARTS_KEPT:
+        del times[next(iter(times))]
+
+
+def _is_in(times: Times, tube: int, event: Event) -> bool:
+    """Whether an event happened within a time of a tube, or before it had settled after that."""
+    own = times.get((tube, event.epoch), ())
+    return any(since <= event.at <= until + SETTLED_AFTER for since, until in own)
 
 
 def _in_time(event: Event) -> tuple[int, float]:

@@ -193,6 +193,8 @@ class TubeProcess(Process):
         said = self.tube.on_cycle(reading, context)
         self._lap(Stage.FILTER)
         for message in said:
+            if isinstance(message, Event) and message.code == "clock_jumped":
+                self.endpoint.clock.doubt(jump_of(message))
             self._send(message, now)
         if self._blocks.trying and (status := self._blocks.on_cycle(self.tube.raw)) is not None:
             self.endpoint.send_status(status)
@@ -357,6 +359,12 @@ class TubeProcess(Process):
             self._save()
             return True
         return False
+
+
+def jump_of(event: Event) -> float:
+    """By how much (s) the event says that the own clock jumped, at most what a clock may be doubted by."""
+    by = event.arguments.get("by_s", MAX_CLOCK_STD)
+    return min(abs(float(by)), MAX_CLOCK_STD) if isinstance(by, (int, float)) else MAX_CLOCK_STD
 
 
 def reading_of(data: Any, now: float) -> ImuReading:

@@ -92,6 +92,12 @@ class ClockFilter:
         """Believe the next exchange if it disagrees: the neighbour has started again, perhaps from zero."""
         self._disagreed = RESET_AFTER - 1
 
+    def doubt(self, seconds: float) -> None:
+        """The own clock may have jumped by so much (s): the next exchange is believed, and until then little."""
+        p00, p01, p11 = self._p
+        self._p = (p00 + seconds * seconds, p01, p11)
+        self._disagreed = RESET_AFTER - 1
+
     def exchange(self, reply: TimeReply, back: float) -> None:
         """Take the reply that came ``back`` at the local time (s) given."""
         round_trip = (back - reply.asked_at) - (reply.replied_at - reply.received_at)

@@ -95,6 +95,10 @@ def test_combined_seeds_hold(first: int) -> None:
         (104026, ("cut-while-saving", "not-finite", "encoder-slips")),  # one rested, the other was blind
         (102831, ("database-deleted", "gyro-saturated", "encoder-slips")),  # nobody knew any more that one was blind
         (107936, ("cut-while-saving", "frozen")),  # the power went while it saved what it had missed
+        (206677, ("gyro-saturated", "encoder-slips")),  # the one that saw it had just started, the other was blind
+        (206003, ("clock-jumps", "joint-severed")),  # an aiding of before a turning came to a clock that was ahead
+        (200389, ("frozen", "force-saturated")),  # a clipped force was levelled by before it counted as a fault
+        (201908, ("depth-jumps-down", "ground-off-across-stop", "depth-backwards")),  # why depths were refused
         (51633, ("surveys-lost", "gyro-step")),  # a gyroscope that turned its tube while nobody corrected it
     ],
 )

@@ -55,6 +55,14 @@ def test_a_time_without_a_gyroscope_is_known_by_its_end_where_its_begin_went_wit
     assert told([*BOTH_STARTED, short, event(1, 100.0, "yaw_reset")]) == []
 
 
+def test_a_tube_that_has_just_started_is_enough_where_the_other_has_no_gyroscope() -> None:
+    """What it saved says another thing, and nobody is left who could say that it is its own."""
+    blind, against = event(2, 7.5, "gyro_saturated", 9), event(1, 9.0, "yaw_reset")
+    for events in permutations([blind, against]):
+        assert told([*BOTH_STARTED, *events, event(2, 40.0, "stopped", 12)]) == ["tubes 1 at 9 s"]
+    assert told([*BOTH_STARTED, against, event(2, 40.0, "stopped", 12)]) == []
+
+
 @pytest.mark.parametrize("cycles", ["many", -3, math.nan, math.inf, 1e300])
 def test_a_recovery_that_says_nothing_sensible_of_its_length_does_no_harm(cycles: Scalar) -> None:
     recovered = event(2, 103.0, "sensor_recovered", 11, after="gyro_saturated", cycles=cycles)

@@ -121,3 +121,18 @@ def test_a_root_is_never_moved() -> None:
     root.exchange(TimeReply(0.0, 9.0, 9.0, 9.0, 1.0, 0.0), 1.0)
     assert root.rig_from_local(5.0) == 5.0
     assert root.variance(5.0) == 0.0
+
+
+@pytest.mark.parametrize("jump", [-40.0, -0.3, 0.02, 14.6])
+def test_a_clock_that_is_told_of_its_jump_says_so_and_believes_the_next_exchange(jump: float) -> None:
+    clocks = Clocks(3)
+    clocks.run(120.0)
+    node, t = clocks.filters[0], 1121.0
+    clocks.offset[0] += jump
+    local = clocks.local(0, t)
+    node.doubt(jump)
+    assert abs(node.rig_from_local(local) - t) < 1.1 * math.sqrt(node.variance(local))
+    clocks.ask(0, t)
+    local = clocks.local(0, t + 1.0)
+    assert abs(node.rig_from_local(local) - t - 1.0) < 5e-3
+    assert math.sqrt(node.variance(local)) < 5e-3
