@@ -13,7 +13,7 @@ from borechain.gauntlet.rig import GauntletRig
 from node.process.tube_process import TubeProcess
 from sim.gauntlet import readings
 from sim.gauntlet.fault import TUBES
-from telemetry.messages import BASE, Mode
+from telemetry.messages import BASE, ENCODER, Mode
 
 AROUND = 10.0  # s before and after an instant that a tube must have watched to speak of it
 
@@ -27,8 +27,11 @@ class Sight:
         self._encoder = self._shown()
         self._wrong_at: list[float] = []
         self._had_ground, self._handled = True, 0  # times that the database was
+        self._rested: set[int] = set()  # tubes that stood still when they had power last
+        self._nobody_could_know = False
         self.has_believed_a_wrong_depth = False
         rig.after_step.append(self.note)
+        rig.before_cut.append(self._note_rests)
 
     def note(self) -> None:
         """Look at the rig now."""
@@ -36,7 +39,16 @@ class Sight:
         if self._shown() != self._encoder:
             self._encoder = self._shown()
             self._wrong_at.append(self._rig.now)
+            is_dark = {ENCODER, *TUBES} <= self._rig.off.keys()
+            self._nobody_could_know |= is_dark and not self._rested
         self._note_depth()
+
+    def _note_rests(self) -> None:
+        for tube in TUBES:
+            process = self._rig.stepper.processes.get(tube)
+            if isinstance(process, TubeProcess):
+                is_quiet = bool(process.tube.state["still_cycles"] > 0)
+                self._rested = self._rested | {tube} if is_quiet else self._rested - {tube}
 
     def _note_depth(self) -> None:
         has_ground, handled = self._rig.ground is not None, self._rig.disk(BASE).handled
@@ -44,6 +56,14 @@ class Sight:
             self.has_believed_a_wrong_depth |= handled > self._handled and self._rig.world.depth_error != 0.0
             self._handled = handled
         self._had_ground = has_ground
+
+    @property
+    def nobody_could_know(self) -> bool:
+        """Whether the encoder went wrong while all were without power and had turned when they lost it.
+
+        That is a string that was turned in the dark: what was saved of the yaws is worth nothing.
+        """
+        return self._nobody_could_know
 
     @property
     def has_seen(self) -> bool:
@@ -61,8 +81,13 @@ class Sight:
                 yield tubes
 
     def _sees(self, tube: int) -> bool:
-        process = self._rig.stepper.processes.get(tube)
-        if not isinstance(process, TubeProcess) or self._rig.stepper.is_frozen(tube):
+        """Whether a tube has a gyroscope, and is told what the encoder counts."""
+        stepper = self._rig.stepper
+        process = stepper.processes.get(tube)
+        chain = (ENCODER, *(other for other in TUBES if other >= tube))  # tube 1 is the lowest
+        if not isinstance(process, TubeProcess) or any(stepper.is_frozen(one) for one in chain):
+            return False
+        if any(one not in stepper.processes for one in chain):
             return False
         has_gyroscope = self._rig.world.spoilers.get(tube) in (None, *readings.OF_FORCE)
         return has_gyroscope and process.tube.state["mode"] != Mode.STATIC_BIAS

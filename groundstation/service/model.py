@@ -34,6 +34,7 @@ STATIC_RECORDS_SHOWN = 1_000
 ACCELEROMETER_NOISE_DEG = 0.02  # one sample, for the check of motion
 ABOVE_COLLAR = 0.01  # m, of rounding; a node higher up is in no hole
 EPOCHS_KEPT = 8
+UNDATED_KEPT = 64  # states of a tube before it knows rig time
 ALL_HEARD_WITHIN = 2.0  # s, of tubes that speak
 
 
@@ -77,6 +78,7 @@ class RigModel:
         self._tally_known_at = math.inf  # s, own clock, from which on every tube that speaks has been heard
         self.depth_heard_at = -math.inf  # s, own clock
         self._begun_at: dict[int, float] = {}  # s, own clock, of rig time 0 of each epoch that was heard
+        self._newest: dict[int, dict[int, deque[tuple[float, int]]]] = {}  # times and cycles by tube and epoch
         self._heard_at: dict[int, float] = {}  # s, own clock, of each tube's newest state
         self.shared = SharedErrors()
         self.hole = Hole(config, self.shared)
@@ -97,7 +99,7 @@ class RigModel:
         way for long; it tells that the node spoke then, which is all that a ground station knows after its start.
         """
         known = self.nodes.get(state.tube)
-        if known is not None and (is_repeated(state, known) or self._is_of_before(state, known)):
+        if self._is_repeated(state) or (known is not None and self._is_of_before(state, known)):
             return False
         self.recalibration.on_state(state)
         spoke_at = now - self._time_on_its_way(state)
@@ -118,6 +120,27 @@ class RigModel:
         if begins:
             for tube, state in self.nodes.items():
                 self._heard_at[tube] = min(self._heard_at[tube], self.now - self._time_on_its_way(state))
+
+    def _is_repeated(self, state: NodeState) -> bool:
+        """Whether a state has come before, or a newer one of its epoch; a clock or a count may go back, not both.
+
+        Without an epoch there is no newer: a board that starts again counts from the beginning.
+        """
+        newest = self._newest.setdefault(state.tube, {})
+        known = newest.setdefault(state.epoch, deque(maxlen=UNDATED_KEPT))
+        while len(newest) > EPOCHS_KEPT:
+            del newest[next(iter(newest))]
+        now = state.at, state.cycles
+        if state.epoch == EPOCH_UNKNOWN:
+            is_known = now in known
+        else:
+            is_known = any(state.at <= at and state.cycles <= cycles for at, cycles in known)
+        if is_known:
+            return True
+        if state.epoch != EPOCH_UNKNOWN:
+            known.clear()
+        known.append(now)
+        return False
 
     def _is_of_before(self, state: NodeState, known: NodeState) -> bool:
         """Whether a state leaves its tube's epoch for one that the encoder is not in: somebody has recorded it."""
@@ -267,8 +290,3 @@ class RigModel:
     def fused(self, station: SurveyStation) -> Direction:
         """Direction of a station from the clusters that count."""
         return station.fused(self.config.weighting)
-
-
-def is_repeated(state: NodeState, known: NodeState) -> bool:
-    """Whether a state is the newest known or one before it; a clock or a count of cycles may go back, not both."""
-    return state.epoch == known.epoch and state.at <= known.at and state.cycles <= known.cycles

@@ -87,13 +87,11 @@ class Stops:
     def on_stand(self, stand: Stand) -> None:
         """A stand has begun, or lasted longer; the tubes are those that are known to hang while it lasts."""
         known = next((stop for stop in reversed(self._stops) if _same(stop.stand, stand)), None)
-        tubes = tuple(self._in_the_hole(stand.md))
         if known is not None:
             known.stand = stand
-            if not known.judged:
-                known.tubes = tuple(dict.fromkeys((*known.tubes, *tubes)))
+            self._add_tubes(known)
             return
-        self._stops.append(Stop(stand, tubes))
+        self._stops.append(Stop(stand, tuple(self._in_the_hole(stand.md))))
         del self._stops[:-STOPS_KEPT]
 
     def on_later_stand(self, before: Stand, stand: Stand) -> None:
@@ -101,6 +99,7 @@ class Stops:
         known = next((stop for stop in reversed(self._stops) if stop.covers(before)), None)
         if known is not None:
             known.later = [one for one in known.later if one.epoch != stand.epoch] + [stand]
+            self._add_tubes(known)
 
     def judge(self, epoch: int, rig_now: float) -> None:
         """Find what is overdue at ``rig_now`` (s)."""
@@ -110,6 +109,11 @@ class Stops:
             stop.judged = True
             answered = {tube for e, at, tube in self._surveys if stop.has(e, at)}
             stop.missing = set(stop.tubes) - answered
+
+    def _add_tubes(self, stop: Stop) -> None:
+        """A tube that is heard while the bit stands hung there before."""
+        if not stop.judged:
+            stop.tubes = tuple(dict.fromkeys((*stop.tubes, *self._in_the_hole(stop.stand.md))))
 
     def _in_the_hole(self, md: float) -> Iterator[int]:
         for tube in self._tally.tubes:

@@ -125,8 +125,9 @@ def forget_bias(state: Any, config: Any) -> None:
 def resume(state: Any) -> None:
     """Make a saved filter ready for its first cycle after an outage of unknown length.
 
-    The constants (bias, scale, offset) are kept. The yaw is kept as the best guess; if the string was turning when
-    the state was saved nothing is known of it, so its variance says so and the first aiding decides.
+    The constants (bias, scale, offset) are kept. The attitude is kept as the best guess; if the string was turning when
+    the state was saved nothing is known of it: the variance of the yaw says so and the first aiding decides, and the
+    tilt, whose direction turns with the body, is levelled anew.
     """
     was_turning = state.still_cycles == 0
     state.cycles = 0
@@ -141,6 +142,7 @@ def resume(state: Any) -> None:
     if was_turning:
         state.last_sequence = -1
         isolate(state.P, PSI, UNKNOWN_YAW_VAR)
+        lose_tilt(state)
     copy_covariance(state)
 
 

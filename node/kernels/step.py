@@ -56,7 +56,7 @@ SAY_EVENTS, SAY_SURVEY, SAY_ESTIMATE, SAY_STATE, SAY_RECORD, ADMITTED = 1, 2, 4,
 REFUSED: Final = -1  # the times of a cycle are such that it cannot be run
 USED, ONWARD = 1, 2  # of an aiding: it is for the filter, and it goes down
 FORWARD, FILTER_FAULT = int(Scheme.FORWARD), int(Status.FILTER_FAULT)
-AIDED, SURVEY_READY = int(Status.AIDED), int(Status.SURVEY_READY)
+AIDED, SURVEY_READY, STOPPED = int(Status.AIDED), int(Status.SURVEY_READY), int(Status.STOPPED)
 TOLD_FIRST, TOLD_LAST = 16, 26  # codes of ``STATUS_TOLD``
 STATUS_TOLD: Final = (
     int(Status.STOPPED),
@@ -151,6 +151,8 @@ def after_loop(node: Any, moment: Array, status: int, waits: int) -> None:
     if waits == 1:
         node.filter.surveyed = 0
     node.status = status | node.noticed
+    if node.guard.odd > 0:
+        node.status &= ~STOPPED  # the average of the stop begins again, the string has not come to rest
     node.noticed = 0
     node.cycles += 1
     if node.status & FILTER_FAULT:

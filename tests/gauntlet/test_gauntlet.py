@@ -99,6 +99,7 @@ def test_combined_seeds_hold(first: int) -> None:
         (206003, ("clock-jumps", "joint-severed")),  # an aiding of before a turning came to a clock that was ahead
         (200389, ("frozen", "force-saturated")),  # a clipped force was levelled by before it counted as a fault
         (201908, ("depth-jumps-down", "ground-off-across-stop", "depth-backwards")),  # why depths were refused
+        (207889, ("same-number", "replay", "splice")),  # the first word of a tube, recorded, opened the door for more
         (51633, ("surveys-lost", "gyro-step")),  # a gyroscope that turned its tube while nobody corrected it
     ],
 )

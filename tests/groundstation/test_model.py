@@ -421,6 +421,21 @@ def test_a_state_that_was_recorded_is_no_sign_of_life(tmp_path: Path) -> None:
     assert not model.is_stale(1)
 
 
+def test_a_recorded_state_without_an_epoch_opens_the_door_for_no_other(tmp_path: Path) -> None:
+    """The first word of a tube knows no rig time; after it those of before looked new."""
+    model = RigModel(GroundConfig(folder=tmp_path))
+    first, later = node_state(1, at=5.0, cycles=1), replace(node_state(1, at=100.0, cycles=50), epoch=2)
+    model.now = model.epoch = 2
+    assert model.on_state(first, 2.0)
+    assert model.on_state(later, 2.0)
+    model.now = 60.0
+    assert not model.on_state(first, 60.0)
+    assert not model.on_state(replace(later, at=99.0, cycles=48), 60.0)
+    assert model.is_stale(1)
+    assert model.on_state(node_state(1, at=4.9, cycles=1), 60.0)  # a board whose clock begins with its power
+    assert not model.is_stale(1)
+
+
 def test_a_state_of_an_epoch_that_the_encoder_has_left_is_no_sign_of_life(tmp_path: Path) -> None:
     model = RigModel(GroundConfig(folder=tmp_path))
     old = replace(node_state(1, at=100.0, cycles=50), epoch=2)

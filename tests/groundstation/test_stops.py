@@ -81,3 +81,16 @@ def test_tubes_that_are_met_during_a_stop_owe_its_survey() -> None:
     stops.on_stand(Stand(2, 1000.0, 1065.0, 4.0))
     stops.judge(2, 1065.0)
     assert missing(stops) == {1, 2}
+
+
+def test_a_tube_that_is_heard_first_after_a_start_of_the_encoder_owes_the_survey_of_the_stop_that_goes_on() -> None:
+    known = Tally(2.0)
+    known.on_hops(1, 1)
+    stops = Stops(known, DUE)
+    stops.on_stand(FIRST)
+    known.on_hops(2, 1)
+    known.on_hops(1, 2)
+    stops.on_later_stand(FIRST, LATER)
+    stops.on_survey(3, 39.0, 1)
+    stops.judge(3, 41.0)
+    assert missing(stops) == {2}

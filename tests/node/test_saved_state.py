@@ -126,13 +126,14 @@ def test_saving_goes_on_where_an_earlier_life_ended(tmp_path: Path) -> None:
     assert found[1] == b"second"
 
 
-def test_a_node_that_turned_keeps_its_constants_and_doubts_its_yaw() -> None:
+def test_a_node_that_turned_keeps_its_constants_and_doubts_its_attitude() -> None:
     saved = state(12345)
     saved[0]["filter"]["P"][Err.YAW, Err.YAW] = (0.01 * DEG) ** 2
     saved[0]["filter"]["still_cycles"] = 0
     resume(saved, default_config())
     assert int(saved[0]["filter"]["yaw"]) == 12345
     assert saved[0]["filter"]["P"][Err.YAW, Err.YAW] == pytest.approx(math.pi**2 / 3.0, rel=1e-3)
+    assert np.diagonal(saved[0]["filter"]["P"])[[Err.TILT_X, Err.TILT_Y]].tolist() == [1.0, 1.0]
     np.testing.assert_array_equal(saved[0]["filter"]["static_bias"], [1e-4, 2e-4, 3e-4])
 
 
