@@ -35,7 +35,7 @@ ACCELEROMETER_NOISE_DEG = 0.02  # one sample, for the check of motion
 ABOVE_COLLAR = 0.01  # m, of rounding; a node higher up is in no hole
 EPOCHS_KEPT = 8
 UNDATED_KEPT = 64  # states of a tube before it knows rig time
-ALL_HEARD_WITHIN = 2.0  # s, of tubes that speak
+ALL_HEARD_WITHIN = 2.0  # s after the last tube that was new, of tubes that speak
 
 
 @dataclass(frozen=True, slots=True)
@@ -75,7 +75,7 @@ class RigModel:
         self.now = math.nan  # s, own clock
         self.rig_now = math.nan
         self.epoch = EPOCH_UNKNOWN
-        self._tally_known_at = math.inf  # s, own clock, from which on every tube that speaks has been heard
+        self._tally_known_at = math.inf  # s, own clock, from which on every tube is taken to have been heard
         self.depth_heard_at = -math.inf  # s, own clock
         self._begun_at: dict[int, float] = {}  # s, own clock, of rig time 0 of each epoch that was heard
         self._newest: dict[int, dict[int, deque[tuple[float, int]]]] = {}  # times and cycles by tube and epoch
@@ -106,7 +106,8 @@ class RigModel:
         self._heard_at[state.tube] = max(self._heard_at.get(state.tube, -math.inf), spoke_at)
         if known is None or state.epoch != known.epoch or state.at >= known.at:
             self.nodes[state.tube] = state
-            self._tally_known_at = min(self._tally_known_at, now + ALL_HEARD_WITHIN)
+            if state.tube not in self.tally.tubes and now < self._tally_known_at:
+                self._tally_known_at = now + ALL_HEARD_WITHIN
             self.tally.on_hops(state.tube, state.hops)
         return True
 

@@ -421,6 +421,20 @@ def test_a_state_that_was_recorded_is_no_sign_of_life(tmp_path: Path) -> None:
     assert not model.is_stale(1)
 
 
+def test_tubes_that_start_one_after_the_other_are_all_waited_for(tmp_path: Path) -> None:
+    """A rig ten times as fast as real time starts its processes over many seconds of its own."""
+    model = RigModel(GroundConfig(folder=tmp_path))
+    model.now = 0.0
+    for tube in range(10, 0, -1):
+        model.now += 1.5
+        model.on_state(node_state(tube, at=model.now, cycles=1), model.now)
+        assert not model.knows_tubes
+    model.now += 2.0
+    assert model.knows_tubes
+    model.on_state(node_state(11, at=model.now, cycles=1), model.now)  # one that is added later
+    assert model.knows_tubes
+
+
 def test_a_recorded_state_without_an_epoch_opens_the_door_for_no_other(tmp_path: Path) -> None:
     """The first word of a tube knows no rig time; after it those of before looked new."""
     model = RigModel(GroundConfig(folder=tmp_path))
