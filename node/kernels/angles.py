@@ -3,14 +3,19 @@
 from __future__ import annotations
 
 import math
+from typing import Final
 
 from node.kernels.jit import kernel
+from node.kernels.quantity import angle as of_angle
+
+HALF_TURN: Final = of_angle(math.pi)
+WHOLE_TURN: Final = of_angle(2.0 * math.pi)
 
 
 @kernel
 def wrap(angle: float) -> float:
     """Angle (rad) in (-pi, pi]."""
-    return math.pi - (math.pi - angle) % (2.0 * math.pi)
+    return HALF_TURN - (HALF_TURN - angle) % WHOLE_TURN
 
 
 @kernel

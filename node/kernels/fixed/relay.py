@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from typing import Any
 
-from node.kernels.fixed.error_model import isolate
-from node.kernels.fixed.layout import CEILING
-from node.kernels.fixed.trigonometry import TURN, difference
+from node.kernels.error_model import isolate
+from node.kernels.fixed.layout import ANGLE_Q, CEILING
+from node.kernels.fixed.trigonometry import TURN, counts, difference
 from node.kernels.jit import constant, kernel
 from node.kernels.layout import PENDING, Err, Status
 from node.kernels.ring import make_room
@@ -56,6 +56,24 @@ def offer_aiding(
     state.last_sequence = sequence
     state.systematic_var = systematic_var
     return status
+
+
+@kernel
+def take_offer(
+    state: Any,
+    config: Any,
+    yaw: int,
+    yaw_var: int,
+    systematic_var: int,
+    offset: int,
+    valid_at: int,
+    sequence: int,
+    hops: int,
+) -> int:
+    """Queue one aiding as ``offer_aiding``, its angles in Q40 and its variances of any size."""
+    turned, along = counts(yaw, ANGLE_Q) & TURN, counts(offset, ANGLE_Q) & TURN
+    variances = (min(yaw_var, CEILING), min(systematic_var, CEILING))
+    return offer_aiding(state, config, turned, variances[0], variances[1], along, valid_at, sequence, hops)
 
 
 @kernel
