@@ -15,7 +15,7 @@ from numba.extending import overload
 
 from node.kernels.fixed.arithmetic import inverse_root, mul, quotient, shift
 from node.kernels.fixed.layout import ANGLE_Q, CEILING, RATE_Q, TIME_Q, VECTOR_Q
-from node.kernels.fixed.trigonometry import radians
+from node.kernels.fixed.trigonometry import TURN, counts, difference, radians
 from node.kernels.jit import kernel
 from node.kernels.layout import DEG, PERIOD, Array
 from node.kernels.quantity import NO_NUMBER
@@ -293,7 +293,13 @@ def lasting(like: float, cycles: int) -> float:
     return cycles * PERIOD
 
 
-@by_type(lambda a: radians(int(a)))
+@by_type(lambda angle: counts(angle, ANGLE_Q) & TURN)
+def kept_angle(angle: float) -> float:
+    """An angle as the filter keeps a measured yaw and the offset of joints: integers as a binary angle."""
+    return angle
+
+
+@by_type(lambda a: radians(difference(int(a), 0)))
 def offset_angle(a: float) -> float:
     """An offset of joints as an angle; the integers hold it as a binary angle."""
     return a

@@ -10,7 +10,6 @@ from __future__ import annotations
 import math
 from typing import Any
 
-from node.kernels.angles import to_binary
 from node.kernels.fixed.border import (
     COVARIANCE,
     LARGEST,
@@ -24,11 +23,11 @@ from node.kernels.fixed.border import (
     to_fixed,
 )
 from node.kernels.fixed.cycle import run_cycle
-from node.kernels.fixed.layout import CEILING, TIME_Q, VAR_Q
-from node.kernels.fixed.relay import offer_aiding
+from node.kernels.fixed.layout import ANGLE_Q, CEILING, TIME_Q, VAR_Q
 from node.kernels.fixed.words import differ, keep
 from node.kernels.jit import kernel
 from node.kernels.layout import Array, Status
+from node.kernels.relay import offer_aiding
 
 BAD_SAMPLE, SURVEY_READY = int(Status.BAD_SAMPLE), int(Status.SURVEY_READY)
 REFERENCE_CHANGED = int(Status.REFERENCE_CHANGED)
@@ -94,10 +93,10 @@ def fixed_offer(
     status = offer_aiding(
         fixed,
         own.node.config,
-        to_binary(yaw),
+        to_fixed(fixed, yaw, ANGLE_Q, LARGEST),
         to_fixed(fixed, yaw_var, VAR_Q, CEILING),
         to_fixed(fixed, systematic_var, VAR_Q, CEILING),
-        to_binary(offset),
+        to_fixed(fixed, offset, ANGLE_Q, LARGEST),
         to_fixed(fixed, valid_at, TIME_Q, LARGEST),
         sequence,
         hops,

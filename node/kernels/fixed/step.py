@@ -9,10 +9,10 @@ from __future__ import annotations
 from node.kernels.aligner import follow_alignment
 from node.kernels.fixed.cycle import run_cycle
 from node.kernels.fixed.node_words import learn_aiding, learn_inputs, learn_node, show_node
-from node.kernels.fixed.relay import take_offer
 from node.kernels.jit import kernel
 from node.kernels.layout import Array
 from node.kernels.record import END, START
+from node.kernels.relay import offer_aiding
 from node.kernels.static_average import follow_recording
 from node.kernels.step import ADMITTED, SAY_RECORD, aiding_around, is_standing, say_events, step_around
 
@@ -26,7 +26,7 @@ def integer_step(nodes: Array, settings: Array, parameters: Array, readings: Arr
 @kernel
 def integer_aiding(nodes: Array, settings: Array, aiding: Array) -> int:
     """One aiding as ``node.kernels.step.node_aiding``, all of it integers."""
-    return int(aiding_around(take_offer, nodes, settings, aiding))
+    return int(aiding_around(offer_aiding, nodes, settings, aiding))
 
 
 @kernel

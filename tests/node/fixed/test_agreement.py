@@ -28,7 +28,6 @@ from node.kernels.fixed.layout import CEILING, FIXED_STATE, VAR_Q
 from node.kernels.fixed.node import FixedNode
 from node.kernels.fixed.node_words import learn_aiding, learn_inputs, learn_node, show_node
 from node.kernels.fixed.record import new_integers
-from node.kernels.fixed.relay import take_offer
 from node.kernels.layout import DEG, PERIOD, STATE, Array, Status, default_config, new_state
 from node.kernels.record import END, JOINED, START, new_node
 from node.kernels.relay import offer_aiding
@@ -256,7 +255,7 @@ def integers_in_parts(loop: Loop) -> Loop:
         if gates & USED:
             yaw, yaw_var, _, _, _, valid_at, sequence, hops, *_ = taken
             about = own_systematic(node), int(node["down_offset"]), valid_at, sequence, hops
-            node["noticed"] |= take_offer(node["filter"], node["config"], yaw, yaw_var + noise_var(node), *about)
+            node["noticed"] |= offer_aiding(node["filter"], node["config"], yaw, yaw_var + noise_var(node), *about)
         if gates & ONWARD:
             hand_down(nodes, crews)
         show_node(shadows, settings, integers)
