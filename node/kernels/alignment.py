@@ -84,7 +84,7 @@ def to_tube(axis: Array, vector: Array) -> None:
 
     A rotation without a part about the axis: the yaw keeps the zero of the tube's marks. No alignment touches no bit.
     """
-    if axis[2] == ONE:
+    if axis[0] == 0 and axis[1] == 0:
         return
     across = times(vector[0], axis[0]) + times(vector[1], axis[1])
     pull = over(across, ONE + axis[2]) + vector[2]
