@@ -87,6 +87,30 @@ for function in (clean, leaky, divided):
 """
 
 
+FLOATS_ONLY = """
+import numba
+from node.kernels.angles import HALF_TURN, wrap
+from node.kernels.quantity import ConstantType
+
+def refuse(_):
+    raise TypeError("an integer")
+
+ConstantType.fixed = property(refuse, lambda *_: None)
+"""
+FLOAT_STEP = """
+from node.kernels.warm import warm_up
+warm_up()
+print("all floats")
+"""
+ALONE = """
+alone = numba.njit(lambda x: x if x > 0.0 else -HALF_TURN)
+try:
+    alone(1.0)
+except Exception as error:
+    print("an integer" in str(error))
+"""
+
+
 def inspect(program: str, cache: Path) -> str:
     """What ``program`` prints after the inspector, on functions compiled anew: those of a cache tell no types."""
     return subprocess.run(
@@ -136,6 +160,13 @@ def test_a_float_would_be_found_in_what_is_kept(leaky: Any, leaks: bool) -> None
 @pytest.mark.statistical
 def test_the_step_holds_no_float(tmp_path: Path) -> None:
     assert inspect(STEP, tmp_path) == ""
+
+
+@pytest.mark.statistical
+def test_no_constant_is_an_integer_in_the_float64_step(tmp_path: Path) -> None:
+    """A constant that meets nothing, as under a minus, numba would take for its integer."""
+    assert inspect(FLOATS_ONLY + FLOAT_STEP, tmp_path) == "all floats\n"
+    assert inspect(FLOATS_ONLY + ALONE, tmp_path) == "True\n"
 
 
 @pytest.mark.statistical
