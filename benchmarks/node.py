@@ -210,14 +210,13 @@ class FixedStretch(Stretch):
         self.outputs = np.zeros(len(like.inputs), FIXED_OUTPUT)
         self.inputs = np.zeros(len(like.inputs), FIXED_INPUT)
         formats = dict.fromkeys(("rate", "turn_rate"), layout.RATE_Q)
+        formats |= dict.fromkeys(("yaw", "offset"), layout.ANGLE_Q)
         formats |= dict.fromkeys(("start", "end", "valid_at"), layout.TIME_Q)
         formats |= dict.fromkeys(("yaw_var", "systematic_var"), layout.VAR_Q)
         for name in FIXED_INPUT.names or ():
             value = like.inputs[name]
             if name == "force":
                 value = np.rint(value / gravity * 2.0**layout.FORCE_Q)
-            elif name in {"yaw", "offset"}:
-                value = np.rint(value / (2.0 * math.pi) * 2.0**32).astype(np.int64) & 0xFFFFFFFF
             elif name in formats:
                 value = np.rint(value * 2.0 ** formats[name])
             self.inputs[name] = value
@@ -228,7 +227,7 @@ def fixed_runner() -> Runner | None:
     if importlib.util.find_spec("node.kernels.fixed") is None:
         return None
     from node.kernels.fixed.cycle import run_cycle
-    from node.kernels.fixed.relay import offer_aiding
+    from node.kernels.relay import offer_aiding
 
     runner: Runner = njit(error_model="numpy")(looped(run_cycle, offer_aiding))
     return runner

@@ -20,26 +20,29 @@ from __future__ import annotations
 import math
 from typing import Any, Final
 
+from node.kernels.angles import HALF_TURN, WHOLE_TURN
 from node.kernels.events import Fault
 from node.kernels.jit import constant, kernel
+from node.kernels.numbers import coarse, fraction, half, is_number, mean, product, speed, square, times
+from node.kernels.quantity import NONE, factor, rate
 from node.kernels.record import DISAGREEMENTS, MOST_DISAGREEMENTS
 
-GROWTH: Final = 1.5  # sigmas from one aiding to the next, in one direction
-SMALLEST_STEP: Final = math.radians(0.03)  # rad/s
-SMALL_STEP: Final = math.radians(0.15)  # rad/s, up to which a step is looked at for longer
-SMALL_SWING: Final = math.radians(0.3)  # rad/s, likewise, where the string turns at full speed
-SLOWEST_SWING: Final = math.radians(60.0)  # rad/s, from where it does: the slower, the smaller are its swings
-STEADY: Final = 0.3  # of the mean mismatch, by which those of one step may differ from it
-GROSS: Final = math.radians(5.0)  # rad/s, from where a mismatch is a fault however it changes
-SLOWEST_SCALE: Final = math.radians(5.0)  # rad/s, from where a mismatch may be one of scale
+GROWTH: Final = factor(1.5)  # sigmas from one aiding to the next, in one direction
+SMALLEST_STEP: Final = rate(math.radians(0.03))  # rad/s
+SMALL_STEP: Final = rate(math.radians(0.15))  # rad/s, up to which a step is looked at for longer
+SMALL_SWING: Final = rate(math.radians(0.3))  # rad/s, likewise, where the string turns at full speed
+SLOWEST_SWING: Final = rate(math.radians(60.0))  # rad/s, from where it does: the slower, the smaller are its swings
+STEADY: Final = factor(0.3)  # of the mean mismatch, by which those of one step may differ from it
+GROSS: Final = rate(math.radians(5.0))  # rad/s, from where a mismatch is a fault however it changes
+SLOWEST_SCALE: Final = rate(math.radians(5.0))  # rad/s, from where a mismatch may be one of scale
 GYRO_STEP, GYRO_SCALE = constant(Fault.GYRO_STEP), constant(Fault.GYRO_SCALE)
 
 
 @kernel
 def forget(watch: Any) -> None:
     """Begin again: the yaw was set, or the reference is another one. ``watch`` is a record of dtype ``AIDINGS``."""
-    watch.left = 0.0
-    watch.at = math.nan
+    watch.left = 0
+    watch.at = NONE
     watch.seen = 0
 
 
@@ -56,40 +59,40 @@ def find_mismatch(
     """
     found.fault = found.refuted = 0
     grown = innovation - watch.left
-    if grown > math.pi:
-        grown -= 2.0 * math.pi
-    elif grown < -math.pi:
-        grown += 2.0 * math.pi
-    elapsed = now - watch.at if math.isfinite(watch.at) else 0.0
-    watch.left = 0.0 if reset == 1 or rejected == 0 else innovation
+    if grown > HALF_TURN:
+        grown -= WHOLE_TURN
+    elif -grown > HALF_TURN:
+        grown += WHOLE_TURN
+    elapsed = now - watch.at if is_number(watch.at) else 0
+    watch.left = 0 if reset == 1 or rejected == 0 else innovation
     watch.at = now
     if rejected == 0:
         watch.seen = 0
         return
-    mismatch = grown / elapsed if elapsed > 0.0 else 0.0
-    if abs(grown) <= GROWTH * sigma or abs(mismatch) < SMALLEST_STEP:
+    mismatch = speed(grown, elapsed) if elapsed > 0 else 0
+    if abs(grown) <= times(sigma, GROWTH) or abs(mismatch) < SMALLEST_STEP:
         watch.seen, found.refuted = 0, 1
         return
-    if watch.seen > 0 and watch.mismatch[watch.seen - 1] * mismatch < 0.0:
+    if watch.seen > 0 and (watch.mismatch[watch.seen - 1] < 0) != (mismatch < 0):
         watch.seen, found.refuted = 0, 1
     watch.mismatch[watch.seen] = mismatch
     watch.spin[watch.seen] = spin + mismatch
     watch.seen += 1
     if watch.seen < DISAGREEMENTS:
         return
-    mean = recent_mismatch(watch)
-    steady, proportional = is_steady(watch, mean), is_proportional(watch)
+    usual = recent_mismatch(watch)
+    steady, proportional = is_steady(watch, usual), is_proportional(watch)
     gross = abs(mismatch) >= GROSS
     slowest = min(abs(watch.spin[0]), abs(spin))
-    smallest = SMALL_SWING if slowest >= SLOWEST_SWING else SMALL_STEP
-    wanted = DISAGREEMENTS if abs(mean) >= smallest else MOST_DISAGREEMENTS
+    large = abs(usual) >= SMALL_SWING if slowest >= SLOWEST_SWING else abs(usual) >= SMALL_STEP
+    wanted = DISAGREEMENTS if large else MOST_DISAGREEMENTS
     if not (proportional or gross or (steady and watch.seen >= wanted)):
         found.refuted = 0 if steady else 1
         if watch.seen == MOST_DISAGREEMENTS or not steady:
             drop_oldest(watch)
         return
     found.fault = GYRO_SCALE if proportional else GYRO_STEP
-    found.rate = mean if steady else mismatch
+    found.rate = usual if steady else mismatch
     found.spin = spin + mismatch
     found.steady = 1 if steady else 0
     watch.seen = 0
@@ -106,19 +109,19 @@ def drop_oldest(watch: Any) -> None:
 @kernel
 def recent_mismatch(watch: Any) -> float:
     """Mean of the mismatches seen (rad/s) but the oldest, within which a step may have come."""
-    total = 0.0
+    total: float = 0
     for i in range(1, watch.seen):
         total += watch.mismatch[i]
-    return float(total / (watch.seen - 1))
+    return mean(total, watch.seen - 1)
 
 
 @kernel
-def is_steady(watch: Any, mean: float) -> bool:
-    """Whether every mismatch seen but the oldest is near their ``mean`` (rad/s)."""
-    apart = 0.0
+def is_steady(watch: Any, usual: float) -> bool:
+    """Whether every mismatch seen but the oldest is near the ``usual`` one (rad/s)."""
+    apart: float = 0
     for i in range(1, watch.seen):
-        apart = max(apart, abs(watch.mismatch[i] - mean))
-    return bool(apart <= STEADY * abs(mean))
+        apart = max(apart, abs(watch.mismatch[i] - usual))
+    return bool(apart <= times(abs(usual), STEADY))
 
 
 @kernel
@@ -126,17 +129,20 @@ def is_proportional(watch: Any) -> bool:
     """Whether the mismatches m seen follow the spins w as m = k w clearly better than as m = constant (both rad/s)."""
     n, m, w = watch.seen, watch.mismatch, watch.spin
     slowest, highest, fastest = w[0], w[0], abs(w[0])
-    products, squares, total = 0.0, 0.0, 0.0
+    products: float = 0
+    squares: float = 0
+    along: float = 0
+    apart: float = 0
+    total: float = 0
     for i in range(n):
         slowest, highest, fastest = min(slowest, w[i]), max(highest, w[i]), max(fastest, abs(w[i]))
-        products += m[i] * w[i]
-        squares += w[i] * w[i]
+        products += product(coarse(m[i]), coarse(w[i]))
+        squares += square(coarse(w[i]))
         total += m[i]
-    if fastest < SLOWEST_SCALE or highest - slowest < STEADY * fastest:
+    if fastest < SLOWEST_SCALE or highest - slowest < times(fastest, STEADY):
         return False
-    k, mean = products / squares, total / n
-    along, apart = 0.0, 0.0
+    k, usual = fraction(products, squares), mean(total, n)
     for i in range(n):
-        along += (m[i] - k * w[i]) ** 2
-        apart += (m[i] - mean) ** 2
-    return bool(4.0 * along < apart)
+        along += square(coarse(m[i] - times(w[i], k)))
+        apart += square(coarse(m[i] - usual))
+    return bool(along < half(half(apart)))

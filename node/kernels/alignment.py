@@ -15,6 +15,8 @@ import numpy as np
 
 from node.kernels.jit import kernel
 from node.kernels.layout import Array
+from node.kernels.numbers import over, times
+from node.kernels.quantity import ONE
 
 MAX_IMUS: Final = 8  # of a cluster
 CIRCLE, EXTREMES = 1, 2  # estimators; 0 is no alignment
@@ -82,13 +84,13 @@ def to_tube(axis: Array, vector: Array) -> None:
 
     A rotation without a part about the axis: the yaw keeps the zero of the tube's marks. No alignment touches no bit.
     """
-    if axis[2] == 1.0:
+    if axis[0] == 0 and axis[1] == 0:
         return
-    across = axis[0] * vector[0] + axis[1] * vector[1]
-    pull = across / (1.0 + axis[2]) + vector[2]
-    vector[0] -= axis[0] * pull
-    vector[1] -= axis[1] * pull
-    vector[2] = across + axis[2] * vector[2]
+    across = times(vector[0], axis[0]) + times(vector[1], axis[1])
+    pull = over(across, ONE + axis[2]) + vector[2]
+    vector[0] -= times(pull, axis[0])
+    vector[1] -= times(pull, axis[1])
+    vector[2] = across + times(vector[2], axis[2])
 
 
 @kernel

@@ -3,21 +3,27 @@
 from __future__ import annotations
 
 import math
+from typing import Final
 
 from node.kernels.jit import kernel
+from node.kernels.numbers import number
+from node.kernels.quantity import angle as of_angle
+
+HALF_TURN: Final = of_angle(math.pi)
+WHOLE_TURN: Final = of_angle(2.0 * math.pi)
 
 
 @kernel
 def wrap(angle: float) -> float:
     """Angle (rad) in (-pi, pi]."""
-    return math.pi - (math.pi - angle) % (2.0 * math.pi)
+    return HALF_TURN - (HALF_TURN - angle) % WHOLE_TURN
 
 
 @kernel
 def wrap_positive(angle: float) -> float:
     """Angle (rad) in [0, 2 pi)."""
-    wrapped = angle % (2.0 * math.pi)
-    return wrapped if wrapped < 2.0 * math.pi else 0.0
+    wrapped = angle % WHOLE_TURN
+    return number(wrapped) if wrapped < WHOLE_TURN else 0
 
 
 @kernel

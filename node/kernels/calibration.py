@@ -2,18 +2,19 @@
 
 from __future__ import annotations
 
-import math
 from typing import Any, Final
 
 import numpy as np
 
 from node.kernels.jit import kernel
 from node.kernels.layout import Array
+from node.kernels.numbers import are_numbers, is_number, over, times
+from node.kernels.quantity import ONE, warmth
 
 TERMS: Final = 4  # of a polynomial in T - T_ref, the constant included
-COLDEST: Final = -20.0  # C; beyond the polynomials are not followed
-HOTTEST: Final = 85.0
-USUAL: Final = 25.0  # C, of a reading that carries no temperature
+COLDEST: Final = warmth(-20.0)  # C; beyond the polynomials are not followed
+HOTTEST: Final = warmth(85.0)
+USUAL: Final = warmth(25.0)  # C, of a reading that carries no temperature
 
 SENSOR: Final = [
     ("matrix", "f8", (TERMS, 3, 3)),  # 1, 1/K, 1/K^2, 1/K^3
@@ -40,7 +41,7 @@ def identity_parameters() -> Array:
 @kernel
 def polynomial(c0: float, c1: float, c2: float, c3: float, x: float) -> float:
     """c0 + c1 x + c2 x^2 + c3 x^3, by Horner's scheme."""
-    return ((c3 * x + c2) * x + c1) * x + c0
+    return times(times(times(c3, x) + c2, x) + c1, x) + c0
 
 
 @kernel
@@ -61,35 +62,36 @@ def correct(sensor: Any, temperature: float, reading: Array) -> None:
         reading[i] -= polynomial(b[0, i], b[1, i], b[2, i], b[3, i], x)
         for j in range(3):
             m[i, j] = polynomial(c[0, i, j], c[1, i, j], c[2, i, j], c[3, i, j], x)
-    a0 = m[1, 1] * m[2, 2] - m[1, 2] * m[2, 1]
-    a1 = m[1, 2] * m[2, 0] - m[1, 0] * m[2, 2]
-    a2 = m[1, 0] * m[2, 1] - m[1, 1] * m[2, 0]
-    scale = 1.0 / (m[0, 0] * a0 + m[0, 1] * a1 + m[0, 2] * a2)
+    a0 = times(m[1, 1], m[2, 2]) - times(m[1, 2], m[2, 1])
+    a1 = times(m[1, 2], m[2, 0]) - times(m[1, 0], m[2, 2])
+    a2 = times(m[1, 0], m[2, 1]) - times(m[1, 1], m[2, 0])
+    scale = over(ONE, times(m[0, 0], a0) + times(m[0, 1], a1) + times(m[0, 2], a2))
     g0, g1, g2 = reading[0], reading[1], reading[2]
-    reading[0] = scale * (
-        a0 * g0 + (m[0, 2] * m[2, 1] - m[0, 1] * m[2, 2]) * g1 + (m[0, 1] * m[1, 2] - m[0, 2] * m[1, 1]) * g2
-    )
-    reading[1] = scale * (
-        a1 * g0 + (m[0, 0] * m[2, 2] - m[0, 2] * m[2, 0]) * g1 + (m[0, 2] * m[1, 0] - m[0, 0] * m[1, 2]) * g2
-    )
-    reading[2] = scale * (
-        a2 * g0 + (m[0, 1] * m[2, 0] - m[0, 0] * m[2, 1]) * g1 + (m[0, 0] * m[1, 1] - m[0, 1] * m[1, 0]) * g2
-    )
+    b1 = times(m[0, 2], m[2, 1]) - times(m[0, 1], m[2, 2])
+    b2 = times(m[0, 0], m[2, 2]) - times(m[0, 2], m[2, 0])
+    b3 = times(m[0, 1], m[2, 0]) - times(m[0, 0], m[2, 1])
+    c1 = times(m[0, 1], m[1, 2]) - times(m[0, 2], m[1, 1])
+    c2 = times(m[0, 2], m[1, 0]) - times(m[0, 0], m[1, 2])
+    c3 = times(m[0, 0], m[1, 1]) - times(m[0, 1], m[1, 0])
+    reading[0] = times(times(g0, a0) + times(g1, b1) + times(g2, c1), scale)
+    reading[1] = times(times(g0, a1) + times(g1, b2) + times(g2, c2), scale)
+    reading[2] = times(times(g0, a2) + times(g1, b3) + times(g2, c3), scale)
 
 
 @kernel
 def calibrate(parameters: Any, temperature: float, rate: Array, force: Array) -> None:
     """Correct one cycle's raw ``rate`` (3, rad/s) and ``force`` (3, m/s^2) in place; the identity touches no bit.
 
+    A reading with a number that is none is left as it is.
+
     Parameters
     ----------
     parameters : record of dtype ``PARAMETERS``
     temperature : C; what is no number counts as ``USUAL``
     """
-    if parameters.identity == 1:
+    if parameters.identity == 1 or not are_numbers(rate, force):
         return
-    if not math.isfinite(temperature):
-        temperature = USUAL
-    temperature = min(max(temperature, COLDEST), HOTTEST)
-    correct(parameters.gyroscope, temperature, rate)
-    correct(parameters.accelerometer, temperature, force)
+    usual = temperature if is_number(temperature) else USUAL
+    kept = min(max(usual, COLDEST), HOTTEST)
+    correct(parameters.gyroscope, kept, rate)
+    correct(parameters.accelerometer, kept, force)

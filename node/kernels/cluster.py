@@ -6,7 +6,6 @@ that the fused rate, and the bias that the filter knows, stay the same whoever i
 
 from __future__ import annotations
 
-import math
 from typing import Any, Final
 
 from node.kernels.calibration import USUAL
@@ -14,6 +13,9 @@ from node.kernels.cluster_watch import choose_imus, compare_imus, tell_members, 
 from node.kernels.guard import is_heard
 from node.kernels.jit import kernel
 from node.kernels.layout import RING, Array
+from node.kernels.numbers import fraction, mean, noise_share, of_weighed, part_of, times, weighed, within
+from node.kernels.priors import set_noise
+from node.kernels.quantity import NONE
 from node.kernels.record import TEMPERATURE
 from node.kernels.resets import doubt_bias
 
@@ -29,16 +31,17 @@ def fuse(readings: Array, weights: Array, fused: Array) -> None:
     readings : (n, k or more), one row an IMU
     weights : (n or more,) inverse variances; a reading of weight 0 may be anything, numbers or none
     """
-    total = 0.0
-    for j in range(fused.shape[0]):
-        fused[j] = 0.0
+    total: float = 0
     for i in range(weights.shape[0]):
-        if weights[i] > 0.0:
-            total += weights[i]
-            for j in range(fused.shape[0]):
-                fused[j] += weights[i] * readings[i, j]
+        total += weights[i] if weights[i] > 0 else 0
     for j in range(fused.shape[0]):
-        fused[j] /= total
+        fused[j] = 0
+    for i in range(weights.shape[0]):
+        if weights[i] > 0:
+            for j in range(fused.shape[0]):
+                fused[j] += weighed(readings[i, j], weights[i], total)
+    for j in range(fused.shape[0]):
+        fused[j] = of_weighed(fused[j], total)
 
 
 @kernel
@@ -49,7 +52,7 @@ def follow_offsets(rates: Array, fused: Array, samples: int, offsets: Array) -> 
     """
     for i in range(rates.shape[0]):
         for j in range(3):
-            offsets[i, j] += (rates[i, j] - fused[j] - offsets[i, j]) / samples
+            offsets[i, j] += mean(rates[i, j] - fused[j] - offsets[i, j], samples)
 
 
 @kernel
@@ -68,7 +71,7 @@ def fuse_imus(node: Any, settings: Any, readings: Array) -> None:
     slot = cluster.cycles % RING
     for k in range(settings.imus):
         cluster.used[k] = cluster.chosen[k]
-        cluster.weights[k] = settings.weight[k] if cluster.used[k] == 1 else 0.0
+        cluster.weights[k] = settings.weight[k] if cluster.used[k] == 1 else 0
         cluster.ring_used[k, slot] = cluster.used[k]
         for i in range(3):
             cluster.ring_force[k, slot, i] = cluster.readings[k, 3 + i]
@@ -85,18 +88,18 @@ def take_mean(readings: Array, weights: Array, count: int, fused: Array, rate: A
     if count > 0:
         fuse(readings, weights, fused)
     for i in range(3):
-        rate[i] = fused[i] if count > 0 else math.nan
-        force[i] = fused[3 + i] if count > 0 else math.nan
+        rate[i] = fused[i] if count > 0 else NONE
+        force[i] = fused[3 + i] if count > 0 else NONE
 
 
 @kernel
 def mean_temperature(readings: Array, used: Array, imus: int, count: int) -> float:
     """Mean temperature (C) of the ``count`` IMUs in use."""
-    total = 0.0
+    total: float = 0
     for k in range(imus):
         if used[k] == 1:
             total += readings[k, TEMPERATURE]
-    return total / count if count > 0 else USUAL
+    return mean(total, count) if count > 0 else USUAL
 
 
 @kernel
@@ -118,7 +121,7 @@ def expect_reading(node: Any, imus: int) -> None:
         if not held:
             cluster.expected[i] = rate
         cluster.expects[i] = cluster.expected[i]
-        cluster.expects[3 + i] = -node.config.gravity * state.now_down[i]
+        cluster.expects[3 + i] = -times(node.config.gravity, state.now_down[i])
 
 
 @kernel
@@ -136,20 +139,19 @@ def reweigh(node: Any, settings: Any) -> None:
     var(b' - b) = sigma_b^2 sum (w'_i - w_i)^2 noise_i^2: every gyroscope wanders by itself.
     """
     cluster, config = node.cluster, node.config
-    before = after = share = 0.0
+    before: float = 0
+    after: float = 0
+    changed: float = 0
     for k in range(settings.imus):
-        before += settings.weight[k] if cluster.used[k] == 1 else 0.0
-        after += settings.weight[k] if cluster.chosen[k] == 1 else 0.0
+        before += settings.weight[k] if cluster.used[k] == 1 else 0
+        after += settings.weight[k] if cluster.chosen[k] == 1 else 0
     for k in range(settings.imus):
-        moved = settings.weight[k] / after if cluster.chosen[k] == 1 else 0.0
-        moved -= settings.weight[k] / before if cluster.used[k] == 1 else 0.0
-        share += (moved * settings.noise[k]) ** 2
-    factor = 1.0 / math.sqrt(after)
-    config.force_std = settings.plain_force_std * factor
+        moved = fraction(settings.weight[k], after) if cluster.chosen[k] == 1 else 0
+        moved -= fraction(settings.weight[k], before) if cluster.used[k] == 1 else 0
+        changed += noise_share(times(settings.noise[k], moved))
+    set_noise(config, settings, after)
     for i in range(3):
-        config.gyro_noise[i] = settings.plain_gyro_noise[i] * factor
-        config.bias_std[i] = settings.plain_bias_std[i] * factor
-        doubt_bias(node.filter, i, share * settings.plain_bias_std[i] ** 2)
+        doubt_bias(node.filter, i, part_of(changed, settings.plain_bias_std[i]))
 
 
 @kernel
@@ -168,9 +170,9 @@ def learn_offsets(node: Any, settings: Any) -> None:
     if not all_used(node, settings):
         return
     mount.rate_samples = min(mount.rate_samples + 1, MEMORY)
-    mean = cluster.fused[:3]
-    fuse(cluster.rates[:], cluster.weights, mean)
-    follow_offsets(cluster.rates[:imus], mean, mount.rate_samples, mount.rate_offset)
+    middle = cluster.fused[:3]
+    fuse(cluster.rates[:], cluster.weights, middle)
+    follow_offsets(cluster.rates[:imus], middle, mount.rate_samples, mount.rate_offset)
 
 
 @kernel
@@ -191,19 +193,19 @@ def survey_imus(node: Any, settings: Any, samples: int) -> None:
 
 
 @kernel
-def average(cluster: Any, forces: Array, samples: int, mean: Array, cov: Array) -> None:
+def average(cluster: Any, forces: Array, samples: int, middle: Array, cov: Array) -> None:
     """Mean (3) of the newest ``samples`` of a ring of ``forces`` (RING, 3) and its covariance (3, 3)."""
     first = cluster.cycles - samples
     for i in range(3):
-        mean[i] = 0.0
+        middle[i] = 0
         for n in range(samples):
-            mean[i] += forces[(first + n) % RING, i]
-        mean[i] /= samples
+            middle[i] += forces[(first + n) % RING, i]
+        middle[i] = mean(middle[i], samples)
     for i in range(3):
         for j in range(i, 3):
-            total = 0.0
+            total: float = 0
             for n in range(samples):
                 slot = (first + n) % RING
-                total += (forces[slot, i] - mean[i]) * (forces[slot, j] - mean[j])
-            cov[i, j] = total / (samples * (samples - 1.0))
+                total += within(forces[slot, i] - middle[i]) * within(forces[slot, j] - middle[j])
+            cov[i, j] = mean(total, samples * (samples - 1))
             cov[j, i] = cov[i, j]

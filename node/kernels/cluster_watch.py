@@ -6,25 +6,29 @@ have been well for some time.
 
 from __future__ import annotations
 
+import math
 from typing import Any, Final
 
-import numpy as np
-
-from node.kernels.events import NONE, Code, tell
+from node.kernels.events import Code, tell
 from node.kernels.jit import constant, kernel
 from node.kernels.layout import DEG, Array
+from node.kernels.numbers import half, number, ratio, times, told_count
+from node.kernels.quantity import NO_NUMBER, NONE, Constant, factor, force, rate
 from node.kernels.record import FX, SATURATED, WX
 from node.kernels.sensor_watch import find_faults
 
 DISAGREEING: Final = 4  # cycles in a row, until an IMU is left out
 HEALTHY: Final = 20  # cycles in a row, until it is back
 LEARNT: Final = 32  # cycles at rest, after which offsets show a disagreement
-RATE_APART, FORCE_APART = 0.5 * DEG, 0.3  # rad/s, m/s^2, between IMUs that agree
-SPIN_APART: Final = 0.02  # of the spin, on each axis: what scale and mount may be off by
-UNALIGNED_APART, UNALIGNED_SPIN = 1.0, 0.2  # the same of mounts never aligned; along the axis the spin counts as above
-CLEARLY: Final = 2.0  # times farther from what is expected: of two that disagree, the one to leave out
+RATE_APART, FORCE_APART = rate(0.5 * DEG), force(0.3)  # rad/s, m/s^2, between IMUs that agree
+SPIN_APART: Final = factor(0.02)  # of the spin, on each axis: what scale and mount may be off by
+UNALIGNED_APART, UNALIGNED_SPIN = (
+    force(1.0),
+    factor(0.2),
+)  # the same of mounts never aligned; along the axis the spin counts as above
+CLEARLY: Final = 2  # times farther from what is expected: of two that disagree, the one to leave out
 IMU_EXCLUDED, IMU_BACK = constant(Code.IMU_EXCLUDED), constant(Code.IMU_BACK)
-INFINITE: Final = np.inf
+INFINITE: Final = Constant(math.inf, NO_NUMBER)
 
 
 @kernel
@@ -32,8 +36,8 @@ def watch_imus(cluster: Any, settings: Any, readings: Array) -> None:
     """Find the fault of each IMU in this cycle, 0 for none; ``readings`` as ``node.kernels.step.node_step``."""
     for k in range(settings.imus):
         saturated = int(readings[k, SATURATED])
-        rate, force = readings[k, WX : WX + 3], readings[k, FX : FX + 3]
-        gyro, accelerometer = find_faults(cluster.watches[k], settings, rate, force, saturated)
+        turning, pull = readings[k, WX : WX + 3], readings[k, FX : FX + 3]
+        gyro, accelerometer = find_faults(cluster.watches[k], settings, turning, pull, saturated)
         cluster.faults[k] = gyro if gyro != 0 else accelerometer
 
 
@@ -62,9 +66,12 @@ def set_limits(limits: Array, mount: Any, spin: float) -> None:
     """Largest differences (6) of rate and force between IMUs that agree while they turn with ``spin`` (rad/s)."""
     aligned = mount.method != 0
     for i in range(3):
-        share = SPIN_APART if aligned or i == 2 else UNALIGNED_SPIN
-        limits[i] = RATE_APART + spin * share if mount.rate_samples >= LEARNT else INFINITE
-        limits[3 + i] = FORCE_APART if aligned else UNALIGNED_APART
+        turning = times(spin, SPIN_APART) if aligned or i == 2 else times(spin, UNALIGNED_SPIN)
+        limits[i] = RATE_APART + turning if mount.rate_samples >= LEARNT else INFINITE
+        if aligned:
+            limits[3 + i] = FORCE_APART
+        else:
+            limits[3 + i] = UNALIGNED_APART
 
 
 @kernel
@@ -109,8 +116,8 @@ def median(cluster: Any, imus: int, axis: int) -> float:
             place -= 1
         values[place] = value
         count += 1
-    half = count // 2
-    return float(values[half] if count % 2 == 1 else 0.5 * (values[half - 1] + values[half]))
+    middle = count // 2
+    return number(values[middle] if count % 2 == 1 else half(values[middle - 1] + values[middle]))
 
 
 @kernel
@@ -125,9 +132,9 @@ def is_near(one: Array, other: Array, limits: Array) -> bool:
 @kernel
 def distance(one: Array, other: Array, limits: Array) -> float:
     """Largest difference of two readings (6), in units of ``limits``."""
-    largest = 0.0
+    largest: float = 0
     for i in range(6):
-        largest = max(largest, abs(one[i] - other[i]) / limits[i])
+        largest = max(largest, ratio(abs(one[i] - other[i]), limits[i]))
     return largest
 
 
@@ -161,7 +168,8 @@ def tell_members(node: Any, imus: int) -> bool:
             continue
         changed = True
         if cluster.chosen[k] == 1:
-            tell(node, IMU_BACK, k + 1.0, NONE, NONE, NONE)
+            tell(node, IMU_BACK, told_count(node.temperature, k + 1), NONE, NONE, NONE)
         else:
-            tell(node, IMU_EXCLUDED, k + 1.0, float(cluster.faults[k]), NONE, NONE)
+            fault = told_count(node.temperature, cluster.faults[k])
+            tell(node, IMU_EXCLUDED, told_count(node.temperature, k + 1), fault, NONE, NONE)
     return changed

@@ -11,24 +11,27 @@ from typing import Any, Final
 
 from node.kernels.jit import constant, kernel
 from node.kernels.layout import DEG, Array, Err
+from node.kernels.numbers import fraction, length, times
+from node.kernels.quantity import factor, rate, variance
 from node.kernels.sensor_watch import largest
 
 TX, TY = constant(Err.TILT_X), constant(Err.TILT_Y)
-UNKNOWN_VAR: Final = 0.25  # rad^2 of tilt, above which nothing is known that a reading could spoil
-SLOWEST: Final = 6.0 * DEG  # rad/s, up to which a mean over a cycle is that of one attitude
-GRAVITY_ERROR: Final = 0.05  # of gravity, at rest
-COS_FAR_OFF: Final = math.cos(0.1)  # of rad, beyond which the linear levelling is not left to itself
+UNKNOWN_VAR: Final = variance(0.25)  # rad^2 of tilt, above which nothing is known that a reading could spoil
+SLOWEST: Final = rate(6.0 * DEG)  # rad/s, up to which a mean over a cycle is that of one attitude
+GRAVITY_ERROR: Final = factor(0.05)  # of gravity, at rest
+COS_FAR_OFF: Final = factor(math.cos(0.1))  # of rad, beyond which the linear levelling is not left to itself
 
 
 @kernel
-def level_coarsely(state: Any, config: Any, rate: Array, force: Array) -> None:
-    """Take the direction of a slow node's specific force (3, m/s^2) if its tilt is unknown; ``rate`` in rad/s."""
+def level_coarsely(state: Any, config: Any, turning: Array, force: Array) -> None:
+    """Take the direction of a slow node's specific force (3, m/s^2) if its tilt is unknown; ``turning`` in rad/s."""
     if min(state.P[TX, TX], state.P[TY, TY]) < UNKNOWN_VAR:
         return
-    weight = math.sqrt(force[0] * force[0] + force[1] * force[1] + force[2] * force[2])
-    if abs(weight - config.gravity) > GRAVITY_ERROR * config.gravity or largest(rate) > SLOWEST:
+    weight = length(force[0], force[1], force[2])
+    if abs(weight - config.gravity) > times(config.gravity, GRAVITY_ERROR) or largest(turning) > SLOWEST:
         return
     down = state.down
-    if -(force[0] * down[0] + force[1] * down[1] + force[2] * down[2]) < weight * COS_FAR_OFF:
+    along = times(force[0], down[0]) + times(force[1], down[1]) + times(force[2], down[2])
+    if -along < times(weight, COS_FAR_OFF):
         for k in range(3):
-            down[k] = -force[k] / weight
+            down[k] = -fraction(force[k], weight)

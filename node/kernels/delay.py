@@ -8,11 +8,12 @@ bends it is wrong by up to late w'' T^2 / 2 until then, and a string that has co
 
 from __future__ import annotations
 
-import math
 from typing import Any
 
 from node.kernels.jit import kernel
 from node.kernels.layout import Array
+from node.kernels.numbers import half, is_number, share, speed, square, turn
+from node.kernels.quantity import NONE
 
 
 @kernel
@@ -22,19 +23,22 @@ def make_up_delay(memory: Any, late: float, rate: Array, length: float) -> float
     Returns the variance (rad^2) of the turn about z that is taken for missing. ``memory`` is a record of dtype
     ``DELAYED``; after a reading that was none it begins anew.
     """
-    known = math.isfinite(memory.late)
-    exact = late == 0.0 and not (known and memory.late != 0.0)
+    if not (is_number(rate[0]) and is_number(rate[1]) and is_number(rate[2])):
+        memory.late = NONE
+        return 0
+    known = is_number(memory.late)
+    exact = late == 0 and not (known and memory.late != 0)
     window = length - late + (memory.late if known else late)
-    bend = 0.0
+    bend = 0
     for k in range(3):
         measured = rate[k]
-        change = measured - memory.rate[k] if known else 0.0
-        ahead = min(max(0.5 * change * (window + late) / length, -abs(measured)), abs(measured))  # not back through 0
-        missing = late * (measured + ahead)
+        change = measured - memory.rate[k] if known else 0
+        bent = share(half(change), window + late, length)
+        ahead = min(max(bent, -abs(measured)), abs(measured))  # not back through 0
+        missing = turn(measured + ahead, late)
         if known and not exact:
-            rate[k] = (measured * window + missing - memory.missing[k]) / length
+            rate[k] = speed(turn(measured, window) + missing - memory.missing[k], length)
         bend = change - memory.change[k]
         memory.rate[k], memory.missing[k], memory.change[k] = measured, missing, change
-    finite = math.isfinite(rate[0] + rate[1] + rate[2])
-    memory.late = late if finite else math.nan
-    return float((0.5 * late * bend) ** 2) if finite and known else 0.0
+    memory.late = late
+    return square(turn(bend, half(late))) if known else 0

@@ -12,24 +12,42 @@ off for as long as its crystal is.
 
 from __future__ import annotations
 
-import math
 from typing import Any, Final
 
 from node.kernels.angles import wrap
 from node.kernels.events import NONE, Code, tell
+from node.kernels.fixed.layout import ANGLE_Q, VECTOR_Q
 from node.kernels.jit import constant, kernel
 from node.kernels.layout import DEG
+from node.kernels.numbers import (
+    held,
+    is_number,
+    mean,
+    number,
+    product,
+    ratio,
+    root,
+    square,
+    times,
+    told,
+    told_degrees,
+    turn,
+)
+from node.kernels.quantity import factor, seconds, variance
 
-MEMORY: Final = 32.0  # aidings over which the misfit is averaged
-DOUBTED: Final = 2.0  # mean of innovation^2 / variance, from where it is a misfit; of honest noise once in 10^5 hours
-CLEARED: Final = 1.5  # likewise, below which it is none any more
-ALIKE: Final = 0.7  # mean of the products of neighbours over the variance, from where they hang together
-UNLIKE: Final = 0.3  # likewise, below which they do not any more
-MOST: Final = 9.0  # variances, that one innovation counts for: outliers and faults are for the gate
-SETTLED: Final = 3.0  # sigmas, within which two jumps cancel each other
-LARGEST_MISFIT: Final = (5.0 * DEG) ** 2  # rad^2
-LARGEST_NOISE: Final = (0.1 * DEG) ** 2  # rad^2, of it in the variance of an aiding
-WINDOW_STD: Final = 2.5e-4  # s, of the end of a window that a driver dates
+MEMORY: Final = 32  # aidings over which the misfit is averaged
+DOUBTED: Final = factor(
+    2.0
+)  # mean of innovation^2 / variance, from where it is a misfit; of honest noise once in 10^5 hours
+CLEARED: Final = factor(1.5)  # likewise, below which it is none any more
+ALIKE: Final = factor(0.7)  # mean of the products of neighbours over the variance, from where they hang together
+UNLIKE: Final = factor(0.3)  # likewise, below which they do not any more
+MOST: Final = 9  # variances, that one innovation counts for: outliers and faults are for the gate
+SETTLED: Final = 9  # variances, within which two jumps cancel each other
+LEAST: Final = factor(0.01)  # of a variance, that is left of it without the misfit
+LARGEST_MISFIT: Final = variance((5.0 * DEG) ** 2)  # rad^2
+LARGEST_NOISE: Final = variance((0.1 * DEG) ** 2)  # rad^2, of it in the variance of an aiding
+WINDOW_STD: Final = seconds(2.5e-4)  # s, of the end of a window that a driver dates
 AIDING_DOUBTED = constant(Code.AIDING_DOUBTED)
 
 
@@ -37,28 +55,28 @@ AIDING_DOUBTED = constant(Code.AIDING_DOUBTED)
 def misfit_var(node: Any) -> float:
     """Variance (rad^2) of the yaw by the misfit."""
     guard = node.guard
-    return float(min(max(guard.excess, guard.shared), LARGEST_MISFIT)) if guard.doubted == 1 else 0.0
+    return number(min(max(guard.excess, guard.shared), LARGEST_MISFIT)) if guard.doubted == 1 else 0
 
 
 @kernel
 def noise_var(node: Any) -> float:
     """Variance (rad^2) of an aiding by the misfit; of a head at rest none, for what misfits is the turning."""
-    return float(min(misfit_var(node), LARGEST_NOISE)) if node.guard.rate != 0.0 else 0.0
+    return min(misfit_var(node), LARGEST_NOISE) if node.guard.rate != 0 else 0
 
 
 @kernel
 def unexplained_var(node: Any) -> float:
     """Variance (rad^2) of the yaw that no filter averages away: of the misfit, of the jump, of a late window."""
-    return float(misfit_var(node) + node.guard.jump * node.guard.jump + window_var(node))
+    return held(misfit_var(node) + square(node.guard.jump) + window_var(node))
 
 
 @kernel
 def window_var(node: Any) -> float:
     """Variance (rad^2) of the yaw while the head turns, for a driver that dates the window of its readings."""
     late = node.cluster.delayed[0].late
-    if late == 0.0 or not math.isfinite(late):
-        return 0.0
-    return float((node.guard.rate * WINDOW_STD) ** 2)
+    if late == 0 or not is_number(late):
+        return 0
+    return square(turn(node.guard.rate, WINDOW_STD))
 
 
 @kernel
@@ -70,19 +88,20 @@ def follow_misfit(node: Any) -> None:
     """
     state, guard = node.filter, node.guard
     whole = state.innovation_var
-    if not whole > 0.0:
+    if not whole > 0:
         return
-    plain = max(whole - noise_var(node), 0.01 * whole)
-    square = min(state.innovation * state.innovation, MOST * whole)
-    guard.misfit += (square / plain - guard.misfit) / MEMORY
-    guard.excess = max(guard.excess + (square - plain - guard.excess) / MEMORY, 0.0)
-    product = max(min(state.innovation * guard.before, MOST * whole), -MOST * whole)
-    guard.likeness += (product / plain - guard.likeness) / MEMORY
-    guard.shared = max(guard.shared + (product - guard.shared) / MEMORY, 0.0)
+    plain = max(whole - noise_var(node), times(whole, LEAST))
+    own = min(square(state.innovation), MOST * whole)
+    guard.misfit += mean(ratio(own, plain) - guard.misfit, MEMORY)
+    guard.excess = max(guard.excess + mean(own - plain - guard.excess, MEMORY), 0)
+    common = max(min(product(state.innovation, guard.before), MOST * whole), -MOST * whole)
+    guard.likeness += mean(ratio(common, plain) - guard.likeness, MEMORY)
+    guard.shared = max(guard.shared + mean(common - guard.shared, MEMORY), 0)
     guard.before = state.innovation
     if guard.doubted == 0 and (guard.misfit > DOUBTED or guard.likeness > ALIKE):
         guard.doubted = 1
-        tell(node, AIDING_DOUBTED, guard.misfit, math.sqrt(misfit_var(node)) / DEG, NONE, NONE)
+        sigma = told_degrees(root(misfit_var(node)), ANGLE_Q)
+        tell(node, AIDING_DOUBTED, told(guard.misfit, VECTOR_Q), sigma, NONE, NONE)
     elif guard.doubted == 1 and guard.misfit < CLEARED and guard.likeness < UNLIKE:
         guard.doubted = 0
 
@@ -96,15 +115,15 @@ def follow_jump(node: Any) -> None:
     state, guard, before = node.filter, node.guard, node.guard.jump
     guard.last_jump = state.innovation
     guard.jump = wrap(guard.jump + state.innovation)
-    if guard.jump * guard.jump < SETTLED * SETTLED * state.innovation_var:
-        guard.jump = 0.0
-    state.systematic_var = max(state.systematic_var + guard.jump * guard.jump - before * before, 0.0)
+    if square(guard.jump) < SETTLED * state.innovation_var:
+        guard.jump = 0
+    state.systematic_var = held(max(state.systematic_var + square(guard.jump) - square(before), 0))
 
 
 @kernel
 def explain_jump(node: Any) -> None:
     """The last reset was the gyroscope's doing: what the yaw jumped by is no longer in doubt."""
     guard = node.guard
-    if guard.last_jump != 0.0:
-        guard.jump = wrap(guard.jump - guard.last_jump) if guard.jump != 0.0 else 0.0
-        guard.last_jump = 0.0
+    if guard.last_jump != 0:
+        guard.jump = wrap(guard.jump - guard.last_jump) if guard.jump != 0 else 0
+        guard.last_jump = 0

@@ -75,8 +75,11 @@ def symmetrise(P: Array) -> None:
 
 @kernel
 def isolate(P: Array, state: int, variance: float) -> None:
-    """Give one state the variance ``variance`` and no correlation with the others (a reset keeps no stale terms)."""
+    """Give one state the variance ``variance`` and no correlation with the others (a reset keeps no stale terms).
+
+    It computes nothing, so it serves the integers too.
+    """
     for j in range(STATES):
-        P[state, j] = 0.0
-        P[j, state] = 0.0
+        P[state, j] = 0
+        P[j, state] = 0
     P[state, state] = variance

@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 import enum
-import math
 from typing import Any
 
 from node.kernels.jit import kernel
+from node.kernels.quantity import NONE
 from node.kernels.record import EVENTS_KEPT
 
-NONE = math.nan  # of a number that an event does not have
+__all__ = ["NONE", "Code", "Fault", "tell", "tell_more"]
 
 
 class Fault(enum.IntEnum):
@@ -69,9 +69,9 @@ class Code(enum.IntEnum):
 
 @kernel
 def tell(node: Any, code: int, a: float, b: float, c: float, d: float) -> None:
-    """Put an event with up to four numbers (NaN: none) into the ring; where it is full the oldest is lost.
+    """Put an event with up to four numbers (``NONE``: none) into the ring; where it is full the oldest is lost.
 
-    Further numbers are those of ``tell_more``.
+    In integers the numbers are in Q24. Further numbers are those of ``tell_more``.
     """
     events = node.events
     event = events.ring[events.told % EVENTS_KEPT]

@@ -8,16 +8,38 @@ sane and several aidings in a row agree within a gate that is narrow again.
 
 from __future__ import annotations
 
-import math
 from typing import Any, Final
 
 from node.kernels.aiding_watch import STEADY, find_mismatch, forget
-from node.kernels.angles import from_binary, wrap
+from node.kernels.angles import wrap
 from node.kernels.doubts import explain_jump, follow_jump, follow_misfit, misfit_var
-from node.kernels.events import NONE, Code, Fault, tell
+from node.kernels.events import Code, Fault, tell
+from node.kernels.fixed.layout import ANGLE_Q, RATE_Q, TIME_Q
 from node.kernels.jit import constant, kernel
 from node.kernels.layout import CLOCK_SLACK, DEG, PERIOD, Array, Err, Status
 from node.kernels.modes import STATIC_BIAS
+from node.kernels.numbers import (
+    angle_of,
+    factor_of,
+    fraction,
+    half,
+    is_number,
+    lasting,
+    length,
+    root,
+    scale_square,
+    scaled,
+    square,
+    time_root,
+    times,
+    told,
+    told_count,
+    told_degrees,
+    turn,
+    unscaled,
+)
+from node.kernels.priors import bias_var, is_beyond_gate, scale_var
+from node.kernels.quantity import NONE, angle, factor, rate, rate_variance, seconds, variance
 from node.kernels.record import A_CLOCK_VAR, A_RATE, A_VALID, A_YAW, A_YAW_VAR
 from node.kernels.resets import (
     begin_epoch,
@@ -33,21 +55,32 @@ from node.kernels.sensor_watch import find_faults
 
 SANE_CYCLES: Final = 3  # in a row, until the readings are used again; more than the filter's lag
 AGREEING: Final = 4  # aidings in a row, until the node is trusted again
-NARROW_STD: Final = 1.0 * DEG  # of an innovation that can show agreement
-LEARNT_STD: Final = 0.05 * DEG  # rad/s, error of a bias that was read from a mismatch
-LARGEST_STEP: Final = 10.0 * DEG  # rad/s, that a bias may take; a gyroscope farther off is not listened to
-CREDIBLE: Final = 0.5 * LARGEST_STEP  # rad/s, from the encoder's rate, of a gyroscope that may be listened to again
-LARGEST_DRIFT: Final = 1.0 * DEG  # rad/s, of a bias since the last rest; more is a fault, or a motion
-LARGEST_SCALE: Final = 0.1  # 1, that is looked for
-SLOWEST_REVERSED: Final = 5.0 * DEG  # rad/s, from where encoder and gyroscope are seen to turn against each other
-RATE_AGE: Final = 3.0  # s, of an encoder's rate that may stand for the gyroscope
-BACKWARD: Final = PERIOD  # s, that a cycle may begin before the end of the last; beyond it is a jump of the clock
-LONGEST_CYCLE: Final = 10.0 * PERIOD  # s
+NARROW_STD: Final = angle(1.0 * DEG)  # of an innovation that can show agreement
+LEARNT_VAR: Final = rate_variance(
+    (0.05 * DEG) * (0.05 * DEG)
+)  # (rad/s)^2, error of a bias that was read from a mismatch
+LARGEST_STEP: Final = rate(10.0 * DEG)  # rad/s, that a bias may take; a gyroscope farther off is not listened to
+CREDIBLE: Final = rate(
+    0.5 * LARGEST_STEP
+)  # rad/s, from the encoder's rate, of a gyroscope that may be listened to again
+LARGEST_DRIFT: Final = rate(1.0 * DEG)  # rad/s, of a bias since the last rest; more is a fault, or a motion
+SLOWEST_SCALE: Final = rate(DEG)  # rad/s, from where a mismatch tells the size of a scale
+LARGEST_SCALE: Final = factor(0.1)  # 1, that is looked for
+UNSURE: Final = factor(0.1)  # of a step that was read, its error
+TAKEN_BACK: Final = factor(0.2)  # of a step, by which what cancels it may differ
+SLOWEST_REVERSED: Final = rate(5.0 * DEG)  # rad/s, from where encoder and gyroscope are seen to turn against each other
+RATE_AGE: Final = seconds(3.0)  # s, of an encoder's rate that may stand for the gyroscope
+BACKWARD: Final = seconds(
+    PERIOD
+)  # s, that a cycle may begin before the end of the last; beyond it is a jump of the clock
+LONGEST_CYCLE: Final = seconds(10.0 * PERIOD)  # s
 FARTHEST: Final = LONGEST_CYCLE  # s, that a cycle may begin after the end of the last; no rate stands for more
 LONGEST_KNOCK: Final = 8  # cycles of an odd force; one that lasts has shown what it is by then, or is a tilt
-GRAVITY_ERROR: Final = 0.05  # of gravity, of a force at rest
-LEAST_TILT: Final = 3.0 * DEG  # at rest, that no gyroscope misses
-FAR_OFF: Final = 4.0  # sigmas, that a clock may be wrong by
+GRAVITY_ERROR: Final = factor(0.05)  # of gravity, of a force at rest
+LEAST_TILT_VAR: Final = variance((3.0 * DEG) * (3.0 * DEG))  # rad^2, of a tilt at rest that no gyroscope misses
+SURE_VAR: Final = variance(0.01)  # rad^2, of the tilt, from where the filter is not sure of it
+FAR_OFF: Final = 4  # sigmas, that a clock or a tilt may be wrong by
+SLACK_VAR: Final = variance(CLOCK_SLACK * CLOCK_SLACK)  # s^2, of a clock that can place an aiding in a turn
 TX, TY = constant(Err.TILT_X), constant(Err.TILT_Y)
 PSI, BZ, S = constant(Err.YAW), constant(Err.BIAS_Z), constant(Err.SCALE)
 BAD_SAMPLE, GYRO_STEP, GYRO_SCALE = constant(Fault.BAD_SAMPLE), constant(Fault.GYRO_STEP), constant(Fault.GYRO_SCALE)
@@ -78,13 +111,13 @@ def gate_aiding(node: Any, aiding: Array) -> bool:
     cannot place in a turning is of another angle than the node's, by as much in the next and the next.
     """
     state, guard, valid_local = node.filter, node.guard, aiding[A_VALID]
-    timely = math.isfinite(valid_local) and not (state.cycles > 0 and valid_local - state.now > LONGEST_CYCLE)
+    timely = is_number(valid_local) and not (state.cycles > 0 and valid_local - state.now > LONGEST_CYCLE)
     if not timely and guard.untimely == 0:
         tell(node, AIDING_UNTIMELY, NONE, NONE, NONE, NONE)
     guard.untimely = 0 if timely else 1
     if not timely:
         return False
-    if aiding[A_RATE] == 0.0 and guard.rate != 0.0:  # what the turning left unexplained, a rest shows
+    if aiding[A_RATE] == 0 and guard.rate != 0:  # what the turning left unexplained, a rest shows
         open_misfit(node)
     guard.rate, guard.rate_at, guard.aiding_var = aiding[A_RATE], valid_local, aiding[A_YAW_VAR]
     if is_reversed(node) or not is_placed(state, aiding):
@@ -98,7 +131,7 @@ def gate_aiding(node: Any, aiding: Array) -> bool:
 def open_misfit(node: Any) -> None:
     """What innovations showed beyond their variance is of the yaw too."""
     var = misfit_var(node)
-    if var > 0.0:
+    if var > 0:
         open_yaw(node.filter, var)
 
 
@@ -109,9 +142,10 @@ def is_reversed(node: Any) -> bool:
     slowest = min(abs(guard.rate), abs(state.now_rate))
     if slowest < SLOWEST_REVERSED or is_faulty(guard.gyro):
         return False
-    against = bool(guard.rate * state.now_rate < 0.0 and abs(guard.rate + state.now_rate) < 0.5 * slowest)
+    against = bool((guard.rate < 0) != (state.now_rate < 0) and abs(guard.rate + state.now_rate) < half(slowest))
     if against and guard.reversed == 0:
-        tell(node, ENCODER_REVERSED, guard.rate / DEG, state.now_rate / DEG, NONE, NONE)
+        told, own = told_degrees(guard.rate, RATE_Q), told_degrees(state.now_rate, RATE_Q)
+        tell(node, ENCODER_REVERSED, told, own, NONE, NONE)
     guard.reversed = 1 if against else 0
     return against
 
@@ -119,34 +153,36 @@ def is_reversed(node: Any) -> bool:
 @kernel
 def is_placed(state: Any, aiding: Array) -> bool:
     """Whether the clock is good enough for the time stamp's state, or the string rests for as long as it may be off."""
-    if aiding[A_CLOCK_VAR] <= CLOCK_SLACK**2:
+    clock_var = aiding[A_CLOCK_VAR]
+    if clock_var <= SLACK_VAR:
         return True
-    rested = state.still_cycles * PERIOD
-    return bool(aiding[A_RATE] == 0.0 and rested * rested > FAR_OFF * FAR_OFF * aiding[A_CLOCK_VAR])
+    if aiding[A_RATE] != 0 or not is_number(clock_var):
+        return False
+    return bool(lasting(clock_var, state.still_cycles) > FAR_OFF * time_root(clock_var))
 
 
 @kernel
 def contradicts(node: Any, yaw: float, valid_local: float) -> bool:
     """Whether a reference at rest (rad) is beyond the gate while the gyroscope says that the node turns."""
     state, guard = node.filter, node.guard
-    if guard.rate != 0.0 or state.still_cycles > 0 or state.yaw_known == 0 or state.mode == STATIC_BIAS:
+    if guard.rate != 0 or state.still_cycles > 0 or state.yaw_known == 0 or state.mode == STATIC_BIAS:
         return False
-    then = from_binary(state.now_yaw) + state.now_rate * (valid_local - state.now)
-    var = state.now_P[PSI, PSI] + guard.aiding_var
-    return bool(abs(wrap(yaw - then)) > node.config.gate * math.sqrt(var))
+    then = angle_of(state.now_rate, state.now_yaw) + turn(state.now_rate, valid_local - state.now)
+    return is_beyond_gate(node.config, wrap(yaw - then), state.now_P[PSI, PSI] + guard.aiding_var)
 
 
 @kernel
 def admits(node: Any, start: float, end: float) -> bool:
     """Whether a cycle of these times (s, own clock) can be run; a clock that jumped begins a new epoch."""
     state, guard = node.filter, node.guard
-    plain = math.isfinite(start) and math.isfinite(end) and 0.0 < end - start <= LONGEST_CYCLE
-    ahead = start - state.now if state.cycles > 0 else 0.0
-    jumped = not plain or not -BACKWARD <= ahead <= FARTHEST
+    plain = is_number(start) and is_number(end) and 0 < end - start <= LONGEST_CYCLE
+    ahead = start - state.now if state.cycles > 0 else 0
+    jumped = not plain or -ahead > BACKWARD or ahead > FARTHEST
     if jumped and guard.jumped == 0:
-        tell(node, CLOCK_JUMPED, ahead if math.isfinite(ahead) else NONE, NONE, NONE, NONE)
-    if not jumped and ahead < 0.0:  # the increments overlap, and the turn that was counted once is in doubt
-        open_yaw(state, (state.now_rate * ahead) ** 2)
+        by = told(start - state.now, TIME_Q) if state.cycles > 0 else told_count(start, 0)
+        tell(node, CLOCK_JUMPED, by if is_number(start) else NONE, NONE, NONE, NONE)
+    if not jumped and ahead < 0:  # the increments overlap, and the turn that was counted once is in doubt
+        open_yaw(state, square(turn(state.now_rate, ahead)))
     guard.jumped = 1 if jumped else 0
     if jumped and plain:
         begin_epoch(state)
@@ -157,23 +193,23 @@ def admits(node: Any, start: float, end: float) -> bool:
 @kernel
 def guard_reading(node: Any, settings: Any, saturated: int, at: float) -> None:
     """Judge the raw reading, and replace in ``node.rate`` and ``node.force`` what is not to be used."""
-    state, guard, rate, force = node.filter, node.guard, node.rate, node.force
+    state, guard, turning, force = node.filter, node.guard, node.rate, node.force
     gyro, accelerometer = find_faults(guard.readings, settings, node.raw_rate[:], node.raw_force[:], saturated)
     known = abs(at - guard.rate_at) <= RATE_AGE
-    measured = (rate[2] - state.static_bias[2] - state.bias[2]) / (1.0 + state.scale)
+    measured = unscaled(turning[2] - state.static_bias[2] - state.bias[2], state.scale)
     if gyro == 0 and is_faulty(guard.gyro) and known and abs(measured - guard.rate) > CREDIBLE:
         gyro = guard.gyro.fault
     follow_gyro(node, gyro)
     follow_force(node, accelerometer)
     if gyro != 0:
         for k in range(3):
-            rate[k] = state.static_bias[k] + state.bias[k]
-        rate[2] += (guard.rate if known else guard.sane_rate) * (1.0 + state.scale)
+            turning[k] = state.static_bias[k] + state.bias[k]
+        turning[2] += scaled(guard.rate if known else guard.sane_rate, state.scale)
     else:
         guard.sane_rate = measured
     if accelerometer != 0 or keeps_out(node):
         for k in range(3):
-            force[k] = -node.config.gravity * state.now_down[k]
+            force[k] = -times(node.config.gravity, state.now_down[k])
     hold(node)
 
 
@@ -205,14 +241,16 @@ def is_odd(node: Any) -> bool:
     state, force, gravity = node.filter, node.force, node.config.gravity
     if state.still_cycles == 0 and node.guard.odd == 0:
         return False
-    weight = math.sqrt(force[0] * force[0] + force[1] * force[1] + force[2] * force[2])
-    if abs(weight - gravity) > GRAVITY_ERROR * gravity:
+    weight = length(force[0], force[1], force[2])
+    if abs(weight - gravity) > times(gravity, GRAVITY_ERROR):
         return True
-    apart = 0.0
-    for k in range(3):
-        apart += (force[k] / weight + state.now_down[k]) ** 2
     tilt_var = state.P[TX, TX] + state.P[TY, TY]
-    return bool(apart > LEAST_TILT * LEAST_TILT + FAR_OFF * FAR_OFF * tilt_var)
+    if tilt_var > SURE_VAR:
+        return False
+    down = state.now_down
+    x, y, z = fraction(force[0], weight), fraction(force[1], weight), fraction(force[2], weight)
+    apart = length(x + down[0], y + down[1], z + down[2])
+    return bool(apart > factor_of(root(tilt_var * FAR_OFF * FAR_OFF + LEAST_TILT_VAR), ANGLE_Q))
 
 
 @kernel
@@ -221,11 +259,11 @@ def judge_cycle(node: Any, status: int, at: float) -> None:
     hold(node)
     state, guard = node.filter, node.guard
     if state.mode == STATIC_BIAS:
-        guard.before_steps = math.nan  # the constant bias is measured again
+        guard.before_steps = NONE  # the constant bias is measured again
     if state.mode == STATIC_BIAS or status & REFERENCE_CHANGED or is_faulty(guard.gyro):
         forget(guard.aidings)
         return
-    if guard.reversed == 1 and guard.rate != 0.0:
+    if guard.reversed == 1 and guard.rate != 0:
         forget(guard.aidings)
         return
     rejected = 1 if status & REJECTED else 0
@@ -234,9 +272,9 @@ def judge_cycle(node: Any, status: int, at: float) -> None:
         forget(guard.aidings)
         return
     if rejected == 0 and (status & AIDED == 0 or reset == 1):
-        guard.jump = guard.jump if reset == 0 else 0.0  # a yaw that was unknown has nothing to be contradicted
+        guard.jump = guard.jump if reset == 0 else 0  # a yaw that was unknown has nothing to be contradicted
         return
-    sigma = math.sqrt(max(state.innovation_var, 0.0) + misfit_var(node))
+    sigma = root(max(state.innovation_var, 0) + misfit_var(node))
     find_mismatch(guard.aidings, guard.found, state.innovation, sigma, state.now_rate, at, rejected, reset)
     if guard.gyro.fault == 0:
         follow_doubts(node, rejected, reset)
@@ -253,7 +291,7 @@ def follow_doubts(node: Any, rejected: int, reset: int) -> None:
     """What an aiding shows that was used, or rejected but not for a step, is a misfit; a reset is a jump."""
     guard = node.guard
     if rejected == 0:
-        guard.last_jump = 0.0
+        guard.last_jump = 0
     if rejected == 0 or guard.found.refuted == 1:
         follow_misfit(node)
     if reset == 1:
@@ -269,14 +307,14 @@ def is_settling(node: Any) -> bool:
     guard, state = node.guard, node.filter
     if guard.rest_cycles == 0 or state.still_cycles > 0 or abs(state.now_rate) > LARGEST_DRIFT:
         return False
-    return not state.stopped_at > state.now - (guard.rest_cycles + 1) * PERIOD
+    return not state.stopped_at > state.now - lasting(state.now, guard.rest_cycles + 1)
 
 
 @kernel
 def is_handled(node: Any) -> bool:
     """Whether the tube is tilted while the head rests: it hangs on no string, and the encoder tells nothing of it."""
     guard, state = node.guard, node.filter
-    across = 0.0
+    across = 0
     for k in range(2):
         across = max(across, abs(node.rate[k] - state.static_bias[k] - state.bias[k]))
     return bool(guard.rest_cycles > 0 and across > LARGEST_DRIFT)
@@ -325,7 +363,7 @@ def follow_force(node: Any, fault: int) -> None:
             state.surveyed = 0
             state.still_cycles = 0  # the average of a stop begins again
             if trust.fault != BAD_SAMPLE:
-                tell(node, SENSOR_RECOVERED, float(trust.fault), float(trust.cycles), NONE, NONE)
+                tell_recovery(node, trust)
             trust.fault, trust.proving, trust.sane, trust.cycles = 0, 0, 0, 0
     if trust.fault != 0:
         trust.cycles += 1
@@ -339,7 +377,7 @@ def hold(node: Any) -> None:
         lose_yaw(state)
         state.bias_count = 0
         for k in range(3):
-            state.bias_sum[k] = 0.0
+            state.bias_sum[k] = 0
     if is_faulty(node.guard.force):
         state.surveyed = 1
 
@@ -351,25 +389,25 @@ def learn_mismatch(node: Any) -> None:
     trust, found = guard.gyro, guard.found
     reconsider(node)
     explain_jump(node)
-    prior = max(config.bias_std[2] ** 2 + state.static_bias_var[2], LEARNT_STD**2)
-    scale_var = state.P[S, S]
+    prior = max(bias_var(config, 2) + state.static_bias_var[2], LEARNT_VAR)
+    of_scale = state.P[S, S]
     learnable = found.steady == 1 and abs(found.rate) <= LARGEST_STEP
-    if found.fault == GYRO_SCALE and config.scale_std > 0.0:
-        change = -found.rate / found.spin if abs(found.spin) > DEG else LARGEST_SCALE
-        scale_var = max(scale_var, min(abs(change), LARGEST_SCALE) ** 2)
+    if found.fault == GYRO_SCALE and scale_var(config) > 0:
+        change = fraction(abs(found.rate), abs(found.spin)) if abs(found.spin) > SLOWEST_SCALE else LARGEST_SCALE
+        of_scale = max(of_scale, scale_square(min(change, LARGEST_SCALE)))
         learnable = True
         undo_steps(node)
     elif learnable:
-        if math.isnan(guard.before_steps):
+        if not is_number(guard.before_steps):
             guard.before_steps, guard.first_step = state.static_bias[2], abs(found.rate)
         state.static_bias[2] -= found.rate
-        prior += (0.1 * found.rate) ** 2
-    take_mismatch(state, prior, scale_var)
+        prior += square(times(found.rate, UNSURE))
+    take_mismatch(state, prior, of_scale)
     state.rejected = 0
     guard.step.fault = found.fault if found.fault == GYRO_STEP and learnable else 0
     guard.step.rate, guard.step.spin, guard.step.steady = found.rate, found.spin, found.steady
     if trust.fault != found.fault:
-        tell(node, found.fault, found.rate / DEG, found.spin / DEG, NONE, NONE)
+        tell(node, found.fault, told_degrees(found.rate, RATE_Q), told_degrees(found.spin, RATE_Q), NONE, NONE)
     if trust.fault == 0:
         trust.cycles = 0
     trust.fault, trust.proving, trust.sane = found.fault, 1 if learnable else 0, 0
@@ -380,9 +418,9 @@ def learn_mismatch(node: Any) -> None:
 def reconsider(node: Any) -> None:
     """What a change of speed takes back was no step but the scale; the constant bias gets back what it took."""
     found, before = node.guard.found, node.guard.step
-    if before.fault == 0 or abs(found.spin - before.spin) < 0.5 * abs(before.spin):
+    if before.fault == 0 or abs(found.spin - before.spin) < half(abs(before.spin)):
         return
-    if found.steady == 0 or abs(found.rate + before.rate) > 0.2 * abs(before.rate):
+    if found.steady == 0 or abs(found.rate + before.rate) > times(abs(before.rate), TAKEN_BACK):
         return
     node.filter.static_bias[2] += before.rate
     found.fault, found.rate, found.spin, found.steady = GYRO_SCALE, before.rate, before.spin, 1
@@ -392,12 +430,13 @@ def reconsider(node: Any) -> None:
 def undo_steps(node: Any) -> None:
     """Steps that cancelled each other were the scale that is learnt now: the constant bias is the earlier one."""
     state, guard = node.filter, node.guard
-    constant, guard.before_steps = guard.before_steps, math.nan
-    if math.isnan(constant):
+    earlier = guard.before_steps
+    guard.before_steps = NONE
+    if not is_number(earlier):
         return
-    if abs(state.static_bias[2] - constant) < STEADY * guard.first_step:
-        state.static_bias[2] = constant
-        state.bias[2] = 0.0
+    if abs(state.static_bias[2] - earlier) < times(guard.first_step, STEADY):
+        state.static_bias[2] = earlier
+        state.bias[2] = 0
 
 
 @kernel
@@ -406,7 +445,14 @@ def recover_gyro(node: Any) -> None:
     state, guard, trust = node.filter, node.guard, node.guard.gyro
     if trust.fault == GYRO_STEP:  # it lasts, and the Gauss-Markov part would forget it
         state.static_bias[2] += state.bias[2]
-        state.bias[2] = 0.0
+        state.bias[2] = 0
     settle_yaw(state, guard.aiding_var)
-    tell(node, SENSOR_RECOVERED, float(trust.fault), float(trust.cycles), NONE, NONE)
+    tell_recovery(node, trust)
     trust.fault, trust.proving, trust.sane, trust.cycles = 0, 0, 0, 0
+
+
+@kernel
+def tell_recovery(node: Any, trust: Any) -> None:
+    """Tell that a sensor has proved itself, of what fault and after how many cycles."""
+    after, cycles = told_count(node.guard.rate, trust.fault), told_count(node.guard.rate, trust.cycles)
+    tell(node, SENSOR_RECOVERED, after, cycles, NONE, NONE)

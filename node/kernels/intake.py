@@ -10,6 +10,7 @@ from node.kernels.cluster import fuse_imus
 from node.kernels.delay import make_up_delay
 from node.kernels.jit import kernel
 from node.kernels.layout import Array
+from node.kernels.numbers import are_numbers
 from node.kernels.record import FX, LATE, SATURATED, TEMPERATURE, WX
 from node.kernels.resets import open_yaw
 
@@ -35,7 +36,8 @@ def take_readings(node: Any, settings: Any, parameters: Array, readings: Array, 
 @kernel
 def take_cluster(node: Any, settings: Any, parameters: Array, readings: Array, length: float) -> None:
     """Correct the readings of several IMUs, each by itself, and fuse them."""
-    cluster, offsets, doubt = node.cluster, node.mount.rate_offset, 0.0
+    cluster, offsets = node.cluster, node.mount.rate_offset
+    doubt: float = 0
     for k in range(settings.imus):
         correct_reading(node, parameters, readings, k)
         rate, force = cluster.rates[k], cluster.readings[k, 3:]
@@ -52,7 +54,7 @@ def take_cluster(node: Any, settings: Any, parameters: Array, readings: Array, l
 @kernel
 def doubt_turn(node: Any, var: float) -> None:
     """What the windows of the sensors leave open of the yaw (rad^2)."""
-    if var > 0.0:
+    if var > 0:
         open_yaw(node.filter, var)
 
 
@@ -70,6 +72,8 @@ def correct_reading(node: Any, parameters: Array, readings: Array, imu: int) -> 
 @kernel
 def correct_one(node: Any, parameters: Array, imu: int, temperature: float, rate: Array, force: Array) -> None:
     """Correct the rate and force of one IMU by the block in use, and turn them into the tube's frame."""
+    if not are_numbers(rate, force):
+        return
     calibrate(parameters[0], temperature, rate, force)
     for k in range(3):
         node.unaligned[imu, k] = force[k]

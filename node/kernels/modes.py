@@ -2,13 +2,17 @@
 
 from __future__ import annotations
 
-from typing import Any
+from typing import Any, Final
 
 from node.kernels.error_model import isolate
 from node.kernels.jit import constant, kernel
 from node.kernels.layout import UNKNOWN_YAW_VAR, Array, Err, Status
+from node.kernels.numbers import held, mean
+from node.kernels.priors import bias_mean_var, bias_var
+from node.kernels.quantity import rate, variance
 
 BX = constant(Err.BIAS_X)
+UNKNOWN_VAR: Final = variance(UNKNOWN_YAW_VAR)  # rad^2
 PSI = constant(Err.YAW)
 STATIC_BIAS, TRACKING, STILL, SURVEY, HELD = 1, 3, 4, 5, 6  # telemetry.messages.Mode, which kernels do not see
 STOPPED, STARTED, SURVEY_READY = int(Status.STOPPED), int(Status.STARTED), int(Status.SURVEY_READY)
@@ -18,7 +22,7 @@ BIAS_KNOWN, RATE_EXCEEDED, RATE_RECOVERED = (
     int(Status.RATE_EXCEEDED),
     int(Status.RATE_RECOVERED),
 )
-UNBIASED_STILL_RATE = 0.0087  # rad/s, 0.5 deg/s: still, for a gyroscope whose bias is not known yet
+UNBIASED_STILL_RATE: Final = rate(0.0087)  # rad/s, 0.5 deg/s: still, for a gyroscope whose bias is not known yet
 
 
 @kernel
@@ -28,7 +32,7 @@ def is_quiet(state: Any, config: Any, rate: Array) -> int:
         limit = UNBIASED_STILL_RATE
         return 1 if abs(rate[0]) < limit and abs(rate[1]) < limit and abs(rate[2]) < limit else 0
     for k in range(3):
-        limit = config.still_rate if k == 2 else 2.0 * config.still_rate
+        limit = config.still_rate if k == 2 else 2 * config.still_rate
         if abs(rate[k] - state.static_bias[k] - state.bias[k]) > limit:
             return 0
     return 1
@@ -43,7 +47,7 @@ def learn_static_bias(state: Any, config: Any, rate: Array, dt: float, quiet: in
     if quiet == 0:
         state.bias_count = 0
         for k in range(3):
-            state.bias_sum[k] = 0.0
+            state.bias_sum[k] = 0
         return 0
     state.bias_count += 1
     for k in range(3):
@@ -52,11 +56,10 @@ def learn_static_bias(state: Any, config: Any, rate: Array, dt: float, quiet: in
         return 0
     total = state.bias_count * dt
     for k in range(3):
-        state.static_bias[k] = state.bias_sum[k] / state.bias_count
-        correlated = 2.0 * config.bias_std[k] ** 2 * config.bias_tau[k] / total
-        state.static_bias_var[k] = config.gyro_noise[k] ** 2 / total + correlated
-        state.bias[k] = 0.0
-        isolate(state.P, BX + k, config.bias_std[k] ** 2 + state.static_bias_var[k])
+        state.static_bias[k] = mean(state.bias_sum[k], state.bias_count)
+        state.static_bias_var[k] = bias_mean_var(config, k, total)
+        state.bias[k] = 0
+        isolate(state.P, BX + k, held(bias_var(config, k) + state.static_bias_var[k]))
     state.mode = TRACKING
     return BIAS_KNOWN
 
@@ -68,7 +71,7 @@ def guard_rate(state: Any, config: Any, rate_z: float) -> int:
         first = state.rate_exceeded == 0
         state.rate_exceeded = 1
         state.yaw_known = 0
-        isolate(state.P, PSI, UNKNOWN_YAW_VAR)
+        isolate(state.P, PSI, UNKNOWN_VAR)
         return RATE_EXCEEDED if first else 0
     if state.rate_exceeded == 1:
         state.rate_exceeded = 0
@@ -80,7 +83,7 @@ def guard_rate(state: Any, config: Any, rate_z: float) -> int:
 def step_modes(state: Any, config: Any, quiet: int, joined: int, end: float) -> int:
     """Move between tracking, still, survey and held at the end of a cycle (s, node's clock); returns status bits.
 
-    It computes nothing, so it serves the integers too; with ``SURVEY_READY`` the caller is to average the force.
+    With ``SURVEY_READY`` the caller is to average the force.
     """
     status = JOINT_CLOSED if state.mode == HELD and (joined == 1 or quiet == 0) else 0
     if quiet == 0:

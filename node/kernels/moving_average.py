@@ -6,6 +6,7 @@ from typing import Any
 
 from node.kernels.jit import kernel
 from node.kernels.layout import RING
+from node.kernels.numbers import mean, within
 
 
 @kernel
@@ -14,17 +15,17 @@ def average_force(state: Any, samples: int) -> None:
 
     C = sum (f - m)(f - m)^T / (n (n - 1)). Source: thesis 4.1 (32-point moving average).
     """
-    mean, cov = state.survey_force, state.survey_force_cov
+    middle, cov = state.survey_force, state.survey_force_cov
     for i in range(3):
-        mean[i] = 0.0
+        middle[i] = 0
         for k in range(samples):
-            mean[i] += state.ring_force[(state.cycles - 1 - k) % RING, i]
-        mean[i] /= samples
+            middle[i] += state.ring_force[(state.cycles - 1 - k) % RING, i]
+        middle[i] = mean(middle[i], samples)
     for i in range(3):
         for j in range(i, 3):
-            total = 0.0
+            total: float = 0
             for k in range(samples):
                 slot = (state.cycles - 1 - k) % RING
-                total += (state.ring_force[slot, i] - mean[i]) * (state.ring_force[slot, j] - mean[j])
-            cov[i, j] = total / (samples * (samples - 1.0))
+                total += within(state.ring_force[slot, i] - middle[i]) * within(state.ring_force[slot, j] - middle[j])
+            cov[i, j] = mean(total, samples * (samples - 1))
             cov[j, i] = cov[i, j]

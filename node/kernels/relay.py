@@ -7,14 +7,18 @@ treated as a consider parameter, so the filter's own variance is that of the yaw
 
 from __future__ import annotations
 
-from typing import Any
+from typing import Any, Final
 
 from node.kernels.angles import wrap, wrap_positive
 from node.kernels.error_model import isolate
 from node.kernels.jit import constant, kernel
 from node.kernels.layout import PENDING, Err, Status
+from node.kernels.numbers import held, kept_angle, offset_angle
+from node.kernels.priors import stamp_var
+from node.kernels.quantity import Constant, angle
 from node.kernels.ring import make_room
 
+SAME: Final = Constant(1e-9, angle(2e-9).fixed)  # rad, between two offsets of one string; a binary angle is coarser
 PSI, D = constant(Err.YAW), constant(Err.STAMP)
 REFERENCE_CHANGED = int(Status.REFERENCE_CHANGED)
 
@@ -38,7 +42,7 @@ def offer_aiding(
     it refreshes the age and nothing else.
     """
     status = 0
-    if hops != state.reference_hops or abs(wrap(offset - state.reference_offset)) > 1e-9:
+    if hops != state.reference_hops or abs(wrap(offset - offset_angle(state.reference_offset))) > SAME:
         status = change_reference(state, config, systematic_var, offset, hops)
     elif sequence == state.last_sequence:
         if state.pending == 0 and state.yaw_known == 1:
@@ -50,11 +54,11 @@ def offer_aiding(
         return status
     slot = make_room(state, valid_at)
     state.pending_at[slot] = valid_at
-    state.pending_yaw[slot] = wrap_positive(yaw + offset)
-    state.pending_var[slot] = yaw_var + config.aiding_floor_var
+    state.pending_yaw[slot] = kept_angle(wrap_positive(yaw + offset))
+    state.pending_var[slot] = held(yaw_var) + config.aiding_floor_var
     state.pending_sequence[slot] = sequence
     state.last_sequence = sequence
-    state.systematic_var = systematic_var
+    state.systematic_var = held(systematic_var)
     return status
 
 
@@ -62,14 +66,14 @@ def offer_aiding(
 def change_reference(state: Any, config: Any, systematic_var: float, offset: float, hops: int) -> int:
     """The chain above was made up anew: the yaw may step by the errors of the old and the new joints."""
     first = state.reference_hops < 0
-    step_var = state.systematic_var + systematic_var
+    step_var = state.systematic_var + held(systematic_var)
     state.reference_hops = hops
-    state.reference_offset = offset
-    state.systematic_var = systematic_var
+    state.reference_offset = kept_angle(offset)
+    state.systematic_var = held(systematic_var)
     state.pending = 0
     if first or state.yaw_known == 0:
         return 0
-    isolate(state.P, PSI, state.P[PSI, PSI] + step_var)
-    if config.stamp_std > 0.0:
-        isolate(state.P, D, state.P[D, D] + config.stamp_std**2)
+    isolate(state.P, PSI, held(state.P[PSI, PSI] + step_var))
+    if stamp_var(config) > 0:
+        isolate(state.P, D, held(state.P[D, D] + stamp_var(config)))
     return REFERENCE_CHANGED

@@ -7,16 +7,21 @@ writes the covariance.
 from __future__ import annotations
 
 import math
-from typing import Any
+from typing import Any, Final
 
 from node.kernels.error_model import isolate
 from node.kernels.jit import constant, kernel
 from node.kernels.layout import STATES, UNKNOWN_YAW_VAR, Err
 from node.kernels.modes import STATIC_BIAS
+from node.kernels.numbers import held
+from node.kernels.priors import bias_var, boot_bias_var, scale_var, stamp_var
+from node.kernels.quantity import LONG_AGO, NOT_YET, ONE, variance
 
 TX, TY, PSI = constant(Err.TILT_X), constant(Err.TILT_Y), constant(Err.YAW)
 BX, BZ, S, D = constant(Err.BIAS_X), constant(Err.BIAS_Z), constant(Err.SCALE), constant(Err.STAMP)
-UNKNOWN_TILT_VAR = 1.0  # rad^2
+UNKNOWN_TILT_VAR: Final = variance(1.0)  # rad^2
+UNKNOWN_VAR: Final = variance(UNKNOWN_YAW_VAR)  # rad^2
+UNIFORM_VAR: Final = variance((math.pi / math.sqrt(3.0)) ** 2)  # rad^2, of the whole turn
 
 
 @kernel
@@ -30,20 +35,20 @@ def copy_covariance(state: Any) -> None:
 @kernel
 def open_yaw(state: Any, var: float) -> None:
     """The yaw may have moved by a further ``var`` (rad^2), of which the rest knows nothing; cross terms stay true."""
-    state.P[PSI, PSI] += var
+    state.P[PSI, PSI] = held(state.P[PSI, PSI] + var)
 
 
 @kernel
 def lose_yaw(state: Any) -> None:
     """Nothing is known of the yaw, now and at the filter's epoch."""
-    isolate(state.P, PSI, UNKNOWN_YAW_VAR)
-    isolate(state.now_P, PSI, UNKNOWN_YAW_VAR)
+    isolate(state.P, PSI, UNKNOWN_VAR)
+    isolate(state.now_P, PSI, UNKNOWN_VAR)
 
 
 @kernel
 def lose_yaw_ahead(state: Any) -> None:
     """Nothing is known of the yaw from the filter's epoch on; what is said of the present stays until the cycle."""
-    isolate(state.P, PSI, UNKNOWN_YAW_VAR)
+    isolate(state.P, PSI, UNKNOWN_VAR)
 
 
 @kernel
@@ -58,18 +63,18 @@ def settle_yaw(state: Any, aiding_var: float) -> None:
 def open_biases(state: Any, config: Any) -> None:
     """A gyroscope that may be another one: each bias has at least its prior, the scale no cross terms."""
     for k in range(3):
-        prior = config.bias_std[k] ** 2 + state.static_bias_var[k]
+        prior = held(bias_var(config, k) + state.static_bias_var[k])
         isolate(state.P, BX + k, max(prior, state.P[BX + k, BX + k]))
     isolate(state.P, S, state.P[S, S])
 
 
 @kernel
-def take_mismatch(state: Any, bias_var: float, scale_var: float) -> None:
+def take_mismatch(state: Any, of_bias: float, of_scale: float) -> None:
     """The gyroscope's bias or scale took a step: their variances are opened, and the yaw starts again."""
-    isolate(state.P, PSI, UNKNOWN_YAW_VAR)
-    isolate(state.P, BZ, bias_var)
-    isolate(state.P, S, scale_var)
-    isolate(state.now_P, PSI, UNKNOWN_YAW_VAR)
+    isolate(state.P, PSI, UNKNOWN_VAR)
+    isolate(state.P, BZ, held(of_bias))
+    isolate(state.P, S, of_scale)
+    isolate(state.now_P, PSI, UNKNOWN_VAR)
 
 
 @kernel
@@ -88,13 +93,13 @@ def set_stamp_prior(state: Any, var: float) -> None:
 @kernel
 def doubt_stamp(state: Any, var: float) -> None:
     """The clock has moved by so much (s^2) since the time stamp's error was learnt."""
-    state.P[D, D] += var
+    state.P[D, D] = held(state.P[D, D] + var)
 
 
 @kernel
 def doubt_bias(state: Any, k: int, var: float) -> None:
     """The mean of the cluster's gyroscopes is another one: bias ``k`` is in doubt by a further ``var`` ((rad/s)^2)."""
-    state.P[BX + k, BX + k] += var
+    state.P[BX + k, BX + k] = held(state.P[BX + k, BX + k] + var)
 
 
 @kernel
@@ -102,23 +107,23 @@ def move_bias(state: Any, k: int, rate: float, var: float, wander_var: float) ->
     """The constant bias ``k`` is another one (rad/s, its variance and that of what it may wander, (rad/s)^2)."""
     state.static_bias[k] = rate
     state.static_bias_var[k] = var
-    state.bias[k] = 0.0
-    isolate(state.P, BX + k, var + wander_var)
+    state.bias[k] = 0
+    isolate(state.P, BX + k, held(var + wander_var))
 
 
 @kernel
 def forget_bias(state: Any, config: Any) -> None:
     """Learn the static bias again, as after a first start: what was learnt was that of other parameters."""
     for k in range(3):
-        state.static_bias[k] = 0.0
-        state.static_bias_var[k] = 0.0
-        state.bias[k] = 0.0
-        state.bias_sum[k] = 0.0
-        isolate(state.P, BX + k, config.boot_bias_std**2)
-    state.scale = 0.0
+        state.static_bias[k] = 0
+        state.static_bias_var[k] = 0
+        state.bias[k] = 0
+        state.bias_sum[k] = 0
+        isolate(state.P, BX + k, boot_bias_var(config))
+    state.scale = 0
     state.bias_count = 0
     state.mode = STATIC_BIAS
-    isolate(state.P, S, config.scale_std**2)
+    isolate(state.P, S, scale_var(config))
 
 
 @kernel
@@ -137,11 +142,11 @@ def resume(state: Any) -> None:
     state.rejected = 0
     state.bias_count = 0
     for k in range(3):
-        state.bias_sum[k] = 0.0
+        state.bias_sum[k] = 0
     state.yaw = state.now_yaw
     if was_turning:
         state.last_sequence = -1
-        isolate(state.P, PSI, UNKNOWN_YAW_VAR)
+        isolate(state.P, PSI, UNKNOWN_VAR)
         lose_tilt(state)
     copy_covariance(state)
 
@@ -152,9 +157,9 @@ def begin_epoch(state: Any) -> None:
     resume(state)
     state.yaw_known = 0
     state.last_sequence = -1
-    state.last_aided = -math.inf
-    state.stopped_at = math.nan
-    isolate(state.P, PSI, UNKNOWN_YAW_VAR)
+    state.last_aided = LONG_AGO
+    state.stopped_at = NOT_YET
+    isolate(state.P, PSI, UNKNOWN_VAR)
     copy_covariance(state)
 
 
@@ -163,41 +168,41 @@ def start_over(state: Any, config: Any) -> None:
     """Invalid covariance: the filter knows nothing but its constant bias and its mode. Source: ``layout.new_state``."""
     for i in range(STATES):
         for j in range(STATES):
-            state.P[i, j] = 0.0
+            state.P[i, j] = 0
     state.P[TX, TX] = state.P[TY, TY] = UNKNOWN_TILT_VAR
-    state.P[PSI, PSI] = (math.pi / math.sqrt(3.0)) ** 2
+    state.P[PSI, PSI] = UNIFORM_VAR
     for k in range(3):
-        state.P[BX + k, BX + k] = config.boot_bias_std**2
-    state.P[S, S] = config.scale_std**2
-    state.P[D, D] = config.stamp_std**2
+        state.P[BX + k, BX + k] = boot_bias_var(config)
+    state.P[S, S] = scale_var(config)
+    state.P[D, D] = stamp_var(config)
     copy_covariance(state)
-    state.epoch = 0.0
-    state.now = 0.0
+    state.epoch = 0
+    state.now = 0
     state.yaw = 0
     state.now_yaw = 0
     state.yaw_known = 0
-    state.scale = 0.0
-    state.stamp = 0.0
-    state.now_rate = 0.0
+    state.scale = 0
+    state.stamp = 0
+    state.now_rate = 0
     for k in range(3):
-        state.down[k] = 0.0
-        state.now_down[k] = 0.0
-        state.bias[k] = 0.0
-        state.bias_sum[k] = 0.0
-    state.down[2] = 1.0
+        state.down[k] = 0
+        state.now_down[k] = 0
+        state.bias[k] = 0
+        state.bias_sum[k] = 0
+    state.down[2] = ONE
     state.reference_hops = -1
-    state.reference_offset = 0.0
-    state.systematic_var = 0.0
+    state.reference_offset = 0
+    state.systematic_var = 0
     state.last_sequence = -1
-    state.last_aided = -math.inf
-    state.innovation = 0.0
-    state.innovation_var = 0.0
+    state.last_aided = LONG_AGO
+    state.innovation = 0
+    state.innovation_var = 0
     state.rejected = 0
     state.pending = 0
     state.cycles = 0
     state.consumed = 0
     state.still_cycles = 0
-    state.stopped_at = math.nan
+    state.stopped_at = NOT_YET
     state.surveyed = 1
     state.rate_exceeded = 0
     state.bias_count = 0

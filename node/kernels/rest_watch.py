@@ -9,22 +9,24 @@ what it may do until the next stop; every rest without a move halves that.
 
 from __future__ import annotations
 
-import math
 from typing import Any, Final
 
-from node.kernels.events import NONE, Code, tell
+from node.kernels.events import Code, tell
+from node.kernels.fixed.layout import ANGLE_Q, FORCE_Q, RATE_Q
 from node.kernels.jit import constant, kernel
 from node.kernels.layout import DEG, RING
 from node.kernels.modes import STATIC_BIAS, TRACKING, UNBIASED_STILL_RATE
+from node.kernels.numbers import factor_of, half, held, mean, root, square, times, told_degrees, turn
+from node.kernels.priors import bias_var, calm_bias, noise_over, widen_bias
+from node.kernels.quantity import NONE, rate, seconds
 from node.kernels.resets import move_bias, open_yaw
 
 CYCLES: Final = 8  # whose mean and spread are looked at
 SETTLING: Final = 2  # cycles of a rest before those
-LOUDEST: Final = 4.0  # spread of a rest, in variances of the noise
-MOVED: Final = 5.0  # sigmas of a bias in use
-LARGEST: Final = 6.0 * DEG  # rad/s, of a bias; the slow alignment turn is faster
-RATE_AGE: Final = 3.0  # s, of the encoder's word
-CALMER: Final = 0.5  # of the spread of a bias that has moved, at every rest without a move
+LOUDEST: Final = 4  # spread of a rest, in variances of the noise
+MOVED: Final = 5  # sigmas of a bias in use
+LARGEST: Final = rate(6.0 * DEG)  # rad/s, of a bias; the slow alignment turn is faster
+RATE_AGE: Final = seconds(3.0)  # s, of the encoder's word
 BIAS_MOVED = constant(Code.BIAS_MOVED)
 
 
@@ -32,7 +34,7 @@ BIAS_MOVED = constant(Code.BIAS_MOVED)
 def watch_rest(node: Any, settings: Any, at: float) -> None:
     """Look at the rest that the encoder reports, every ``CYCLES`` cycles; ``at`` (s, own clock) is now."""
     state, guard = node.filter, node.guard
-    told = guard.rate == 0.0 and abs(at - guard.rate_at) <= RATE_AGE
+    told = guard.rate == 0 and abs(at - guard.rate_at) <= RATE_AGE
     guard.rest_cycles = guard.rest_cycles + 1 if told and guard.gyro.fault == 0 else 0
     since = guard.rest_cycles - SETTLING
     if since < CYCLES or since % CYCLES != 0 or state.cycles < CYCLES or not is_calm(state, node.config):
@@ -47,10 +49,10 @@ def watch_rest(node: Any, settings: Any, at: float) -> None:
 @kernel
 def mean_rate(state: Any, k: int) -> float:
     """Mean (rad/s) of the last cycles about axis ``k``."""
-    total = 0.0
+    total: float = 0
     for n in range(CYCLES):
         total += state.ring_rate[(state.cycles - 1 - n) % RING, k]
-    return total / CYCLES
+    return mean(total, CYCLES)
 
 
 @kernel
@@ -59,21 +61,23 @@ def is_calm(state: Any, config: Any) -> bool:
     newest = (state.cycles - 1) % RING
     period = state.ring_end[newest] - state.ring_start[newest]
     for k in range(3):
-        mean, total = mean_rate(state, k), 0.0
+        total: float = 0
+        usual = mean_rate(state, k)
+        loudest = noise_over(config, k, LOUDEST * (CYCLES - 1), period)
         for n in range(CYCLES):
-            total += (state.ring_rate[(state.cycles - 1 - n) % RING, k] - mean) ** 2
-        if total > LOUDEST * (CYCLES - 1) * config.gyro_noise[k] ** 2 / period:
-            return False
+            total += square(state.ring_rate[(state.cycles - 1 - n) % RING, k] - usual)
+            if total > loudest:  # at once: of integers no larger sum would fit
+                return False
     return True
 
 
 @kernel
 def mean_down(state: Any, k: int, first: int) -> float:
     """Part ``k`` of the direction of gravity: mean of half of the last cycles, from the ``first``-newest back."""
-    total = 0.0
+    total: float = 0
     for n in range(CYCLES // 2):
         total -= state.ring_force[(state.cycles - 1 - first - n) % RING, k]
-    return total / (CYCLES // 2)
+    return factor_of(mean(total, CYCLES // 2), FORCE_Q)
 
 
 @kernel
@@ -81,15 +85,17 @@ def is_tilting(state: Any, config: Any) -> bool:
     """Whether gravity turns as the rates beyond the bias in use say: u' = u x w, at least half of it."""
     newest = (state.cycles - 1) % RING
     apart = (CYCLES // 2) * (state.ring_end[newest] - state.ring_start[newest])
-    seen = told = 0.0
+    seen: float = 0
+    told: float = 0
     for k in range(3):
         i, j = (k + 1) % 3, (k + 2) % 3
         turning_i = mean_rate(state, i) - state.static_bias[i] - state.bias[i]
         turning_j = mean_rate(state, j) - state.static_bias[j] - state.bias[j]
-        turned = apart * (mean_down(state, i, 0) * turning_j - mean_down(state, j, 0) * turning_i)
-        seen += turned * (mean_down(state, k, 0) - mean_down(state, k, CYCLES // 2))
-        told += turned * turned
-    return bool(seen > 0.5 * told)
+        moved = times(turning_j, mean_down(state, i, 0)) - times(turning_i, mean_down(state, j, 0))
+        turned = turn(moved, apart)
+        seen += times(turned, mean_down(state, k, 0) - mean_down(state, k, CYCLES // 2))
+        told += times(turned, factor_of(turned, ANGLE_Q))
+    return bool(seen > half(told))
 
 
 @kernel
@@ -103,15 +109,14 @@ def has_moved(state: Any, config: Any) -> bool:
     length = CYCLES * (state.ring_end[newest] - state.ring_start[newest])
     moved = bool(state.mode != STATIC_BIAS and state.still_cycles == 0)
     for k in range(3):
-        mean = mean_rate(state, k)
-        if abs(mean) > LARGEST:
+        usual = mean_rate(state, k)
+        if abs(usual) > LARGEST:
             return False
         if state.mode == STATIC_BIAS:
-            moved = moved or bool(abs(mean) > UNBIASED_STILL_RATE)
+            moved = moved or bool(abs(usual) > UNBIASED_STILL_RATE)
             continue
-        var = state.static_bias_var[k] + config.bias_std[k] ** 2 + config.gyro_noise[k] ** 2 / length
-        off = mean - state.static_bias[k]
-        moved = moved or bool(off * off > MOVED * MOVED * var)
+        var = state.static_bias_var[k] + bias_var(config, k) + noise_over(config, k, 1, length)
+        moved = moved or bool(abs(usual - state.static_bias[k]) > MOVED * root(var))
     return moved
 
 
@@ -122,25 +127,24 @@ def take_bias(node: Any, settings: Any, since: int) -> None:
     newest = (state.cycles - 1) % RING
     period = state.ring_end[newest] - state.ring_start[newest]
     known = state.mode != STATIC_BIAS
-    moved_z = 0.0
     for k in range(3):
-        mean = mean_rate(state, k)
-        moved = mean - state.static_bias[k]
+        usual = mean_rate(state, k)
+        moved = usual - state.static_bias[k]
         off = moved - state.bias[k]
-        var = config.gyro_noise[k] ** 2 / (CYCLES * period) + config.bias_std[k] ** 2
+        var = noise_over(config, k, 1, CYCLES * period) + bias_var(config, k)
         if known and settings.imus == 1:
-            config.bias_std[k] = max(config.bias_std[k], abs(moved))
-        move_bias(state, k, mean, var, config.bias_std[k] ** 2)
-        moved_z = off
+            widen_bias(config, k, abs(moved))
+        move_bias(state, k, usual, held(var), bias_var(config, k))
+    moved_z = off
     if known:
-        open_yaw(state, (moved_z * since * period) ** 2)
+        open_yaw(state, square(turn(moved_z * since, period)))
     else:
         state.mode = TRACKING
     state.last_sequence = -1  # the rest is to be judged again
     state.rejected = 0
-    guard.before_steps = math.nan
+    guard.before_steps = NONE
     guard.step.fault = 0
-    tell(node, BIAS_MOVED, moved_z / DEG, NONE, NONE, NONE)
+    tell(node, BIAS_MOVED, told_degrees(moved_z, RATE_Q), NONE, NONE, NONE)
 
 
 @kernel
@@ -149,4 +153,4 @@ def calm_down(node: Any, settings: Any) -> None:
     if settings.imus > 1:
         return
     for k in range(3):
-        node.config.bias_std[k] = max(settings.plain_bias_std[k], CALMER * node.config.bias_std[k])
+        calm_bias(node.config, k, settings.plain_bias_std[k])

@@ -11,14 +11,15 @@ stuck      three axes, or one, that repeat bit for bit                          
 
 from __future__ import annotations
 
-import math
 from typing import Any, Final
 
 from node.kernels.events import Fault
 from node.kernels.jit import constant, kernel
 from node.kernels.layout import Array
+from node.kernels.numbers import are_numbers, number, times
+from node.kernels.quantity import factor
 
-NEAR_RANGE: Final = 0.999  # of the range, from where a reading counts as saturated
+NEAR_RANGE: Final = factor(0.999)  # of the range, from where a reading counts as saturated
 FORCE_CYCLES: Final = 3  # in a row at the range: one knock is not a fault of the accelerometer
 BAD_SAMPLE = constant(Fault.BAD_SAMPLE)
 GYRO_SATURATED, GYRO_STUCK = constant(Fault.GYRO_SATURATED), constant(Fault.GYRO_STUCK)
@@ -28,7 +29,7 @@ FORCE_SATURATED, FORCE_STUCK = constant(Fault.FORCE_SATURATED), constant(Fault.F
 @kernel
 def largest(vector: Array) -> float:
     """Largest magnitude of three numbers."""
-    return float(max(abs(vector[0]), abs(vector[1]), abs(vector[2])))
+    return number(max(abs(vector[0]), abs(vector[1]), abs(vector[2])))
 
 
 @kernel
@@ -52,16 +53,15 @@ def find_faults(watch: Any, settings: Any, rate: Array, force: Array, saturated:
     settings : record of dtype ``SETTINGS``
     saturated : bits of what was at its range within the cycle, as the driver saw it: 1 gyroscope, 2 accelerometer
     """
-    for k in range(3):
-        if not (math.isfinite(rate[k]) and math.isfinite(force[k])):
-            return BAD_SAMPLE, BAD_SAMPLE
+    if not are_numbers(rate, force):
+        return BAD_SAMPLE, BAD_SAMPLE
     together, alone = settings.repeats_together, settings.repeats_alone
     still_rate = is_stuck(watch.rates, rate, together, alone)
     still_force = is_stuck(watch.forces, force, together, alone)
-    clipped = saturated & 2 != 0 or largest(force) >= NEAR_RANGE * settings.force_range
+    clipped = saturated & 2 != 0 or largest(force) >= times(settings.force_range, NEAR_RANGE)
     watch.clipped = watch.clipped + 1 if clipped else 0
     gyro = accelerometer = 0
-    if saturated & 1 != 0 or largest(rate) >= NEAR_RANGE * settings.rate_range:
+    if saturated & 1 != 0 or largest(rate) >= times(settings.rate_range, NEAR_RANGE):
         gyro = GYRO_SATURATED
     elif still_rate:
         gyro = GYRO_STUCK

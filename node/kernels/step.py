@@ -7,23 +7,37 @@ before and after it serves every one, so each is a function of its own. Nothing 
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable
 from typing import Any, Final
 
 from node.kernels.aligner import follow_alignment
-from node.kernels.angles import from_binary, wrap
+from node.kernels.angles import wrap
 from node.kernels.cluster import learn_offsets, survey_imus
 from node.kernels.coarse_level import level_coarsely
 from node.kernels.cycle import run_cycle
 from node.kernels.doubts import noise_var, unexplained_var
 from node.kernels.events import NONE, Code, tell
+from node.kernels.fixed.layout import ANGLE_Q, VECTOR_Q
 from node.kernels.guard import admits, gate_aiding, guard_reading, judge_cycle
 from node.kernels.intake import take_readings
 from node.kernels.jit import constant, entry, kernel, shared_body
 from node.kernels.layout import CLOCK_SLACK, DEG, Array, Scheme, Status
 from node.kernels.make_up import follow_joints
 from node.kernels.modes import STATIC_BIAS
+from node.kernels.numbers import (
+    angle_of,
+    by_record,
+    half,
+    held,
+    ratio,
+    root,
+    stamp_square,
+    time_root,
+    told,
+    told_degrees,
+)
+from node.kernels.priors import set_stamp
+from node.kernels.quantity import LONG_AGO, factor, rate, rate_variance, seconds
 from node.kernels.record import (
     A_HOPS,
     A_OFFSET,
@@ -49,9 +63,11 @@ from node.kernels.static_average import follow_recording
 from node.kernels.twist import gate_twist, holds_survey, reaching_var, twist_var
 
 STILL_CYCLES: Final = 4  # after which a node takes itself for standing
-LARGEST_OFFSET: Final = 6.0 * DEG  # rad/s, of a gyroscope never calibrated; the slow alignment turn is faster
-LEAST_STAMP: Final = 1e-4  # s, of a time stamp, whatever the clock says
-LARGE_MOVE: Final = 3e-3  # s, of a clock, beyond what the wander of the time stamp covers
+LARGEST_OFFSET: Final = rate(6.0 * DEG)  # rad/s, of a gyroscope never calibrated; the slow alignment turn is faster
+LEAST_STAMP: Final = seconds(1e-4)  # s, of a time stamp, whatever the clock says
+MOST_STAMP: Final = seconds(CLOCK_SLACK)
+NEAR, FAR = factor(0.8), factor(1.25)  # of a time stamp's prior that is left alone
+LARGE_MOVE_VAR: Final = rate_variance(3e-3 * 3e-3)  # s^2, of a clock, beyond what the wander of the time stamp covers
 SAY_EVENTS, SAY_SURVEY, SAY_ESTIMATE, SAY_STATE, SAY_RECORD, ADMITTED = 1, 2, 4, 8, 16, 32
 REFUSED: Final = -1  # the times of a cycle are such that it cannot be run
 USED, ONWARD = 1, 2  # of an aiding: it is for the filter, and it goes down
@@ -98,7 +114,7 @@ def step_around(
     waits = enter(nodes, settings, parameters, readings, moment)
     if waits == REFUSED:
         return say_events(node)
-    joined = 1 if moment[JOINED] != 0.0 else 0
+    joined = 1 if moment[JOINED] != 0 else 0
     status = run_cycle(node.filter, node.config, node.rate, node.force, moment[START], moment[END], joined)
     return int(leave(nodes, settings, moment, status, waits))
 
@@ -121,7 +137,7 @@ def leave(nodes: Array, settings: Array, moment: Array, status: int, waits: int)
     """What comes after a loop that returned ``status``; ``waits`` is the answer of ``enter``."""
     node, crew = nodes[0], settings[0]
     after_loop(node, moment, status, waits)
-    follow_alignment(node, crew, moment[START], moment[END])
+    align(node, crew, moment[START], moment[END])
     if crew.imus > 1 and is_quiet(node):
         learn_offsets(node, crew)
     return conclude(node, crew, moment)
@@ -137,7 +153,7 @@ def before_loop(node: Any, settings: Any, moment: Array, saturated: int) -> int:
     follow_clock(node, settings, moment)
     level_coarsely(state, node.config, node.rate, node.force)
     node.slow_cycles = node.slow_cycles + 1 if largest(node.rate) < LARGEST_OFFSET else 0
-    if node.cycles > 0 and start - state.now > 0.5 * (end - start):
+    if node.cycles > 0 and start - state.now > half(end - start):
         node.overruns += 1
     waits = 1 if state.surveyed == 0 and holds_survey(node, settings, end) else 0
     if waits == 1:
@@ -167,11 +183,11 @@ def conclude(node: Any, settings: Any, moment: Array) -> int:
     if status & ~AIDED:
         tell_status(node)
     if state.rejected > 0 and node.rejecting == 0:
-        sigmas = abs(state.innovation) / math.sqrt(state.innovation_var)
-        tell(node, AIDING_REJECTED, sigmas, NONE, NONE, NONE)
+        sigmas = ratio(abs(state.innovation), root(state.innovation_var))
+        tell(node, AIDING_REJECTED, told(sigmas, VECTOR_Q), NONE, NONE, NONE)
     node.rejecting = 1 if state.rejected > 0 else 0
     says = say_events(node) | ADMITTED
-    if follow_recording(node, moment[START], moment[END], 1 if is_standing(node) else 0):
+    if record(node, moment[START], moment[END], 1 if is_standing(node) else 0):
         says |= SAY_RECORD
     if status & SURVEY_READY:
         says |= SAY_SURVEY
@@ -199,7 +215,8 @@ def is_standing(node: Any) -> bool:
 @kernel
 def tell_status(node: Any) -> None:
     """An event for every status bit that has one."""
-    yaw_deg = from_binary(node.filter.now_yaw) / DEG
+    state = node.filter
+    yaw_deg = told_degrees(angle_of(state.now_rate, state.now_yaw), ANGLE_Q)
     for k in range(TOLD_LAST - TOLD_FIRST + 1):
         if node.status & STATUS_TOLD[k]:
             tell(node, TOLD_FIRST + k, yaw_deg, NONE, NONE, NONE)
@@ -220,21 +237,32 @@ def follow_clock(node: Any, settings: Any, moment: Array) -> None:
     much worse has wandered by as much, or follows another neighbour.
     """
     config = node.config
-    if moment[SYNCHRONISED] == 0.0 or config.stamp_std == 0.0:
+    if moment[SYNCHRONISED] == 0 or config.stamp_std == 0:
         return
-    std = min(max(math.sqrt(moment[CLOCK_VAR]), LEAST_STAMP), CLOCK_SLACK)
+    std = min(max(time_root(moment[CLOCK_VAR]), LEAST_STAMP), MOST_STAMP)
     hops = max(int(moment[HOPS]), 1)
-    ratio = std / config.stamp_std
-    if hops == node.stamp_hops and 0.8 < ratio < 1.25:
+    change = ratio(std, config.stamp_std)
+    if hops == node.stamp_hops and NEAR < change < FAR:
         return
-    moved = abs(config.stamp_std * config.stamp_std - std * std)
+    moved = abs(stamp_square(config.stamp_std) - stamp_square(std))
     node.stamp_hops = hops
-    config.stamp_std = std
-    config.stamp_walk = settings.stamp_walk * math.sqrt(hops)
-    if node.filter.last_aided == -math.inf:
-        set_stamp_prior(node.filter, std * std)
-    elif moved > LARGE_MOVE * LARGE_MOVE:
+    set_stamp(config, std, settings.stamp_walk, hops)
+    if node.filter.last_aided == LONG_AGO:
+        set_stamp_prior(node.filter, stamp_square(std))
+    elif moved > LARGE_MOVE_VAR:
         doubt_stamp(node.filter, moved)
+
+
+@by_record(lambda node, settings, start, end: None)
+def align(node: Any, settings: Any, start: float, end: float) -> None:
+    """Follow an alignment under way; that of the integers is followed by their float64 record."""
+    follow_alignment(node, settings, start, end)
+
+
+@by_record(lambda node, start, end, standing: False)
+def record(node: Any, start: float, end: float, standing: int) -> bool:
+    """Follow a static record; that of the integers is taken by their float64 record."""
+    return bool(follow_recording(node, start, end, standing))
 
 
 @entry
@@ -278,9 +306,9 @@ def aiding_around(offer_aiding: Callable[..., int], nodes: Array, settings: Arra
 def take_aiding(nodes: Array, settings: Array, aiding: Array) -> int:
     """Gate an aiding, and leave this node's offset and systematic variance in its record; ``USED`` and ``ONWARD``."""
     node, crew = nodes[0], settings[0]
-    from_drive = aiding[A_HOPS] == 0.0
-    node.down_offset = wrap(aiding[A_OFFSET] + (crew.drive_angle if from_drive else 0.0))
-    node.down_systematic = aiding[A_SYSTEMATIC] + (crew.drive_var if from_drive else 0.0)
+    from_drive = aiding[A_HOPS] == 0
+    node.down_offset = wrap(aiding[A_OFFSET] + (crew.drive_angle if from_drive else 0))
+    node.down_systematic = held(aiding[A_SYSTEMATIC] + (crew.drive_var if from_drive else 0))
     node.down_torsion = reaching_var(aiding[A_TORSION], aiding[A_TORQUE], crew.stiffness)
     follow_joints(node, crew, aiding)
     used = gate_aiding(node, aiding) and gate_twist(node, crew, aiding)
@@ -290,7 +318,7 @@ def take_aiding(nodes: Array, settings: Array, aiding: Array) -> int:
 @kernel
 def own_systematic(node: Any) -> float:
     """Systematic variance (rad^2) of the aiding taken last, with this node's twist and what it cannot explain."""
-    return float(node.down_systematic + twist_var(node.twist) + unexplained_var(node))
+    return held(node.down_systematic + twist_var(node.twist) + unexplained_var(node))
 
 
 @kernel
@@ -298,4 +326,4 @@ def hand_down(nodes: Array, settings: Array) -> None:
     """Add the joint below to what the record hands down."""
     node, crew = nodes[0], settings[0]
     node.down_offset = wrap(node.down_offset + crew.lower_angle)
-    node.down_systematic += crew.lower_var
+    node.down_systematic = held(node.down_systematic + crew.lower_var)

@@ -8,30 +8,32 @@ true.
 
 from __future__ import annotations
 
-import math
 from typing import Any, Final
 
 from node.kernels.events import NONE, Code, tell
+from node.kernels.fixed.layout import ANGLE_Q
 from node.kernels.jit import constant, kernel
 from node.kernels.layout import Array
+from node.kernels.numbers import TORQUE_Q, number, root, square, told, told_degrees, wound
+from node.kernels.quantity import variance
 from node.kernels.record import A_HELD, A_TORQUE, A_VALID, A_YAW_VAR
 from node.kernels.resets import open_yaw
 
-UNKNOWN_VAR: Final = 10.0  # rad^2, of a twist of which nothing is known but for whole turns
+UNKNOWN_VAR: Final = variance(10.0)  # rad^2, of a twist of which nothing is known but for whole turns
 STRING_UNDER_TORQUE, STRING_RELEASED = constant(Code.STRING_UNDER_TORQUE), constant(Code.STRING_RELEASED)
 
 
 @kernel
 def twist_var(twist: Any) -> float:
     """Variance (rad^2) of the twist in the last aiding used; ``twist`` is a record of dtype ``TWIST``."""
-    return float(twist.std * twist.std) if twist.known == 1 else 0.0
+    return square(twist.std) if twist.known == 1 else 0
 
 
 @kernel
 def reaching_var(torsion_var: float, torque: float, stiffness: float) -> float:
     """Variance (rad^2) of the twist between the drive head and the lower end of a tube (N m, N m/rad)."""
-    std = math.sqrt(torsion_var) + torque / stiffness
-    return float(min(std * std, UNKNOWN_VAR))
+    std = root(torsion_var) + wound(torque, stiffness)
+    return number(min(square(std), UNKNOWN_VAR))
 
 
 @kernel
@@ -46,21 +48,21 @@ def gate_twist(node: Any, settings: Any, aiding: Array) -> bool:
     if under_torque == 1 and settings.torsion_gate == 1:
         twist.wound = 1
         return False
-    std = math.sqrt(node.down_torsion)
+    std = root(node.down_torsion)
     before = twist.std if twist.known == 1 else std  # after a start anything may have been
     held = twist.held == 1 or twist.known == 0
-    change = 0.0
+    change: float = 0
     if under_torque == 1 and held:
         change = std - before
-        if twist.known == 1 and change * change <= aiding[A_YAW_VAR]:
+        if twist.known == 1 and square(change) <= aiding[A_YAW_VAR]:
             return True  # a change waits until it has grown: a rest is not to be used again and again
     elif under_torque == 1 or held or twist.wound == 1:
-        change = math.sqrt(std * std + before * before)
-        if torque != 0.0 and twist.known == 1:
+        change = root(square(std) + square(before))
+        if torque != 0 and twist.known == 1:
             code = STRING_UNDER_TORQUE if under_torque == 1 else STRING_RELEASED
-            tell(node, code, torque, math.degrees(std), NONE, NONE)
-    if change != 0.0 and state.yaw_known == 1:
-        open_yaw(state, change * change)
+            tell(node, code, told(torque, TORQUE_Q), told_degrees(std, ANGLE_Q), NONE, NONE)
+    if change != 0 and state.yaw_known == 1:
+        open_yaw(state, square(change))
         state.last_sequence = -1
     twist.known, twist.std, twist.held, twist.wound = 1, std, under_torque, 0
     return True

@@ -60,7 +60,7 @@ import numpy as np
 from numba import njit
 from numba.core.runtime import _nrt_python, rtsys
 from node.kernels.calibration import identity_parameters
-from node.kernels.fixed.beside import new_integers
+from node.kernels.fixed.record import new_integers
 from node.kernels.fixed.step import fixed_aiding, fixed_step
 from node.kernels.layout import default_config
 from node.kernels.record import AIDING, MOMENT, READING, SETTINGS, new_node

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from typing import Any, Final
 
+from node.kernels.error_model import isolate
 from node.kernels.fixed.arithmetic import mul, shift
-from node.kernels.fixed.error_model import isolate
 from node.kernels.fixed.layout import ANGLE_Q, CEILING, LEVEL_Q, RATE_Q, UNIT, VAR_Q
 from node.kernels.fixed.trigonometry import TURN, difference, radians
 from node.kernels.fixed.update import UNITY, feed_back, innovation_var, joseph

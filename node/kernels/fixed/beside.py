@@ -8,11 +8,8 @@ state, a survey asked for). Bytes are compared and not numbers, because some of 
 from __future__ import annotations
 
 import math
-from typing import Any, Final
+from typing import Any
 
-import numpy as np
-
-from node.kernels.angles import to_binary
 from node.kernels.fixed.border import (
     COVARIANCE,
     LARGEST,
@@ -26,34 +23,14 @@ from node.kernels.fixed.border import (
     to_fixed,
 )
 from node.kernels.fixed.cycle import run_cycle
-from node.kernels.fixed.layout import CEILING, FIXED_CONFIG, FIXED_STATE, TIME_Q, VAR_Q
-from node.kernels.fixed.relay import offer_aiding
+from node.kernels.fixed.layout import ANGLE_Q, CEILING, TIME_Q, VAR_Q
+from node.kernels.fixed.words import differ, keep
 from node.kernels.jit import kernel
-from node.kernels.layout import CONFIG, STATE, Array, Status
+from node.kernels.layout import Array, Status
+from node.kernels.relay import offer_aiding
 
-STATE_WORDS: Final = STATE.itemsize // 8
-CONFIG_WORDS: Final = CONFIG.itemsize // 8
 BAD_SAMPLE, SURVEY_READY = int(Status.BAD_SAMPLE), int(Status.SURVEY_READY)
 REFERENCE_CHANGED = int(Status.REFERENCE_CHANGED)
-
-INTEGERS: Final = np.dtype(
-    [
-        ("state", FIXED_STATE),
-        ("config", FIXED_CONFIG),
-        ("gravity", "f8"),  # m/s^2, of the configuration read last
-        ("met", "i8"),  # 1: a record has been read
-        ("shown", "i8", (STATE_WORDS,)),  # bytes of the float64 record as it was left
-        ("read", "i8", (CONFIG_WORDS,)),  # bytes of the configuration as it was read
-        ("rate", "i8", (3,)),  # rad/s, Q46, work space
-        ("force", "i8", (3,)),  # g, Q26, work space
-    ],
-    align=True,
-)
-
-
-def new_integers() -> Array:
-    """Integers of a node whose record nobody has read yet, one record of dtype ``INTEGERS``."""
-    return np.zeros(1, INTEGERS)
 
 
 @kernel
@@ -82,10 +59,10 @@ def fixed_cycle(
         if not (math.isfinite(rate[k]) and math.isfinite(force[k])):
             return BAD_SAMPLE
     learn(own, state, config, state_words, config_words)
-    fixed = own.state
+    fixed = own.node.filter
     take_reading(fixed, rate, force, own.gravity, own.rate, own.force)
     begin, until = to_fixed(fixed, start, TIME_Q, LARGEST), to_fixed(fixed, end, TIME_Q, LARGEST)
-    status = run_cycle(fixed, own.config, own.rate, own.force, begin, until, joined)
+    status = run_cycle(fixed, own.node.config, own.rate, own.force, begin, until, joined)
     show_cycle(fixed, state, own.gravity)
     show_covariance(fixed, state, COVARIANCE)
     show_aiding(fixed, state)
@@ -112,14 +89,14 @@ def fixed_offer(
 ) -> int:
     """Queue one aiding as ``node.kernels.relay.offer_aiding``, in the integers; records as ``fixed_cycle``."""
     learn(own, state, config, state_words, config_words)
-    fixed = own.state
+    fixed = own.node.filter
     status = offer_aiding(
         fixed,
-        own.config,
-        to_binary(yaw),
+        own.node.config,
+        to_fixed(fixed, yaw, ANGLE_Q, LARGEST),
         to_fixed(fixed, yaw_var, VAR_Q, CEILING),
         to_fixed(fixed, systematic_var, VAR_Q, CEILING),
-        to_binary(offset),
+        to_fixed(fixed, offset, ANGLE_Q, LARGEST),
         to_fixed(fixed, valid_at, TIME_Q, LARGEST),
         sequence,
         hops,
@@ -137,23 +114,8 @@ def learn(own: Any, state: Any, config: Any, state_words: Array, config_words: A
     if own.met == 0 or differ(own.read, config_words):
         keep(own.read, config_words)
         own.gravity = config.gravity
-        learn_config(own.config, config, own.state)
+        learn_config(own.node.config, config, own.node.filter)
+        own.shown_changes = 0
     if own.met == 0 or differ(own.shown, state_words):
-        learn_state(own.state, state, own.gravity)
+        learn_state(own.node.filter, state, own.gravity)
     own.met = 1
-
-
-@kernel
-def differ(kept: Array, words: Array) -> bool:
-    """Whether one of ``words`` (n,) is not as it was ``kept``; the loop has no exit, so that it is a fast one."""
-    found = 0
-    for k in range(kept.shape[0]):
-        found |= kept[k] ^ words[k]
-    return found != 0
-
-
-@kernel
-def keep(kept: Array, words: Array) -> None:
-    """Copy ``words`` (n,)."""
-    for k in range(kept.shape[0]):
-        kept[k] = words[k]

@@ -15,6 +15,7 @@ import numpy as np
 from node.kernels.fixed.layout import (
     ANGLE_Q,
     CEILING,
+    FACTOR_Q,
     FASTEST,
     FIXED_CONFIG,
     FIXED_STATE,
@@ -23,6 +24,7 @@ from node.kernels.fixed.layout import (
     NEVER,
     RATE_Q,
     STRONGEST,
+    TAU_Q,
     TIME_Q,
     UNIT,
     VAR_Q,
@@ -268,9 +270,17 @@ def learn_config(fixed: Any, config: Any, counter: Any) -> None:
     counter : record of dtype ``FIXED_STATE``
     """
     one, unit2 = 2.0**VAR_Q, 4.0**UNIT
+    fixed.changes = 0
+    fixed.attitude_var = held(counter, squared(config.attitude_factor) * 2.0**FACTOR_Q)
+    fixed.bias_factor_var = held(counter, squared(config.bias_factor) * 2.0**FACTOR_Q)
+    fixed.boot_bias_var = held(counter, squared(config.boot_bias_std) * unit2 * one)
+    fixed.scale_var = held(counter, squared(config.scale_std) * unit2 * one)
+    fixed.stamp_std, fixed.gravity = held(counter, config.stamp_std * 2.0**TIME_Q), 1 << FORCE_Q
     for k in range(3):
         noise, bias, tau = squared(config.gyro_noise[k]), squared(config.bias_std[k]), config.bias_tau[k]
         walk = noise * squared(config.attitude_factor)
+        fixed.rate_noise[k] = held(counter, noise * unit2 * one)
+        fixed.twice_tau[k] = held(counter, 2.0 * tau * 2.0**TAU_Q)
         fixed.walk[k] = held(counter, walk * one)
         fixed.rate_walk[k] = held(counter, walk * unit2 * one)
         fixed.noise_var[k] = held(counter, noise * one)

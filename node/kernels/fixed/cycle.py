@@ -5,11 +5,10 @@ from __future__ import annotations
 from typing import Any
 
 from node.kernels.fixed.fixed_lag import consume, predict_to_now
-from node.kernels.fixed.modes import guard_rate, is_quiet, learn_static_bias
-from node.kernels.fixed.moving_average import average_force
 from node.kernels.jit import kernel
 from node.kernels.layout import STATES, Array, Status
-from node.kernels.modes import STATIC_BIAS, SURVEY_READY, step_modes
+from node.kernels.modes import STATIC_BIAS, SURVEY_READY, guard_rate, is_quiet, learn_static_bias, step_modes
+from node.kernels.moving_average import average_force
 from node.kernels.ring import push
 
 FILTER_FAULT = int(Status.FILTER_FAULT)

@@ -126,12 +126,3 @@ def widen(state: Any, P: Array, i: int, variance: int) -> None:
         state.overflows += 1
         total = max(P[i, i], CEILING)
     P[i, i] = total
-
-
-@kernel
-def isolate(P: Array, state: int, variance: int) -> None:
-    """Give one state the variance ``variance`` (unit^2, Q56) and no correlation with the others."""
-    for j in range(STATES):
-        P[state, j] = 0
-        P[j, state] = 0
-    P[state, state] = variance

@@ -4,9 +4,10 @@ from __future__ import annotations
 
 from typing import Any, Final
 
+from node.kernels.error_model import isolate
 from node.kernels.fixed.aiding import RATE_RIGHT, aid
 from node.kernels.fixed.arithmetic import mul, quotient, shift
-from node.kernels.fixed.error_model import decays, isolate, propagate, widen
+from node.kernels.fixed.error_model import decays, propagate, widen
 from node.kernels.fixed.layout import (
     FAST,
     LONGEST_GAP,

@@ -19,6 +19,8 @@ FORCE_Q: Final = 26  # g
 ANGLE_Q: Final = 40  # rad, residuals and corrections; whole yaws are binary angles
 STEP_Q: Final = RATE_Q + TIME_Q - 31  # rad, a rate times a time
 VAR_Q: Final = 56  # unit^2
+FACTOR_Q: Final = 24  # of the squares of the factors A and B, at most 128
+TAU_Q: Final = 20  # s, of twice the time constant of a bias, at most 2048
 UNIT: Final = 6  # of biases, scale and stamp: 2^-6 rad/s, 2^-6, 2^-6 s; tilts and yaw count rad
 
 ONE_SECOND: Final = 1 << TIME_Q
@@ -97,6 +99,15 @@ FIXED_STATE: Final = np.dtype(
 
 FIXED_CONFIG: Final = np.dtype(
     [
+        ("changes", "i8"),  # how often it changed while the node ran
+        ("rate_noise", "i8", (3,)),  # N^2, unit^2 s, Q56
+        ("attitude_var", "i8"),  # A^2, Q24
+        ("bias_factor_var", "i8"),  # B^2, Q24
+        ("twice_tau", "i8", (3,)),  # s, Q20
+        ("boot_bias_var", "i8"),  # unit^2, Q56
+        ("scale_var", "i8"),  # unit^2, Q56
+        ("stamp_std", "i8"),  # s, Q28
+        ("gravity", "i8"),  # g, Q26
         ("walk", "i8", (3,)),  # (A N)^2, rad^2/s, Q56
         ("rate_walk", "i8", (3,)),  # (A N)^2, unit^2 s, Q56
         ("noise_var", "i8", (3,)),  # N^2, rad^2/s, Q56

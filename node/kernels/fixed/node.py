@@ -6,10 +6,11 @@ from typing import Any
 
 import numpy as np
 
-from node.kernels.fixed.beside import fixed_cycle, fixed_offer, new_integers
+from node.kernels.fixed.beside import fixed_cycle, fixed_offer
+from node.kernels.fixed.record import new_integers
 from node.kernels.fixed.step import fixed_aiding, fixed_step
 from node.kernels.layout import Array
-from node.kernels.warm import warm_loop
+from node.kernels.warm import warm_loop, warm_step
 
 
 class FixedNode:
@@ -26,7 +27,7 @@ class FixedNode:
     @property
     def state(self) -> Any:
         """The integers, one record of dtype ``FIXED_STATE``."""
-        return self._integers[0]["state"]
+        return self._integers[0]["node"]["filter"]
 
     def step(self, nodes: Array, settings: Array, parameters: Array, readings: Array, moment: Array) -> int:
         """One cycle as ``node.kernels.step.node_step``."""
@@ -66,6 +67,7 @@ def words_of(record: Any) -> Array:
 
 
 def warm_up() -> None:
-    """Compile the integer loop, or load it from the cache, on a state that is thrown away."""
+    """Compile the integer step and its loop, or load them from the cache, on a node that is thrown away."""
     node = FixedNode()
-    warm_loop(node.run_cycle, node.offer_aiding)
+    warm_step(node.step, node.aiding)
+    warm_loop(FixedNode().run_cycle, FixedNode().offer_aiding)

@@ -1,21 +1,32 @@
-"""One node with the integer loop, compiled whole: ``node.kernels.step`` with other arithmetic in its middle."""
+"""One node in integers, compiled whole: ``node.kernels.step`` over the record of integers, and what is beside it.
+
+``integer_step`` and ``integer_aiding`` hold no float. Around them the float64 record is read where somebody changed
+it, and shown: reports, the saved state, an alignment and a static record are taken from it.
+"""
 
 from __future__ import annotations
 
-from typing import Final
-
-import numpy as np
-
-from node.kernels.doubts import noise_var
-from node.kernels.fixed.beside import CONFIG_WORDS, STATE_WORDS, fixed_cycle, fixed_offer
+from node.kernels.aligner import follow_alignment
+from node.kernels.fixed.cycle import run_cycle
+from node.kernels.fixed.node_words import learn_aiding, learn_inputs, learn_node, show_node
 from node.kernels.jit import kernel
 from node.kernels.layout import Array
-from node.kernels.record import A_HOPS, A_SEQUENCE, A_VALID, A_YAW, A_YAW_VAR, END, JOINED, NODE, START
-from node.kernels.step import ONWARD, REFUSED, USED, enter, hand_down, leave, own_systematic, say_events, take_aiding
+from node.kernels.record import END, START
+from node.kernels.relay import offer_aiding
+from node.kernels.static_average import follow_recording
+from node.kernels.step import ADMITTED, SAY_RECORD, aiding_around, is_standing, say_events, step_around
 
-# where the filter and the configuration lie in the record, in words of 64 bits
-FILTER_AT: Final = NODE.fields["filter"][1] // 8 if NODE.fields else 0
-CONFIG_AT: Final = NODE.fields["config"][1] // 8 if NODE.fields else 0
+
+@kernel
+def integer_step(nodes: Array, settings: Array, parameters: Array, readings: Array, moment: Array) -> int:
+    """One cycle as ``node.kernels.step.node_step``, all of it integers (``node.kernels.fixed.record``)."""
+    return int(step_around(run_cycle, nodes, settings, parameters, readings, moment))
+
+
+@kernel
+def integer_aiding(nodes: Array, settings: Array, aiding: Array) -> int:
+    """One aiding as ``node.kernels.step.node_aiding``, all of it integers."""
+    return int(aiding_around(offer_aiding, nodes, settings, aiding))
 
 
 @kernel
@@ -29,46 +40,26 @@ def fixed_step(
     nodes, settings, parameters, readings, moment : as ``node_step``
     integers : one-element array of dtype ``INTEGERS``
     """
-    waits = enter(nodes, settings, parameters, readings, moment)
-    node = nodes[0]
-    if waits == REFUSED:
-        return say_events(node)
-    words = nodes.view(np.int64)
-    status = fixed_cycle(
-        integers[0],
-        node.filter,
-        node.config,
-        words[FILTER_AT : FILTER_AT + STATE_WORDS],
-        words[CONFIG_AT : CONFIG_AT + CONFIG_WORDS],
-        node.rate,
-        node.force,
-        moment[START],
-        moment[END],
-        1 if moment[JOINED] != 0.0 else 0,
-    )
-    return int(leave(nodes, settings, moment, status, waits))
+    own, node, crew = integers[0], nodes[0], settings[0]
+    learn_node(nodes, settings, integers)
+    learn_inputs(parameters, readings, moment, integers)
+    says = integer_step(integers["node"], integers["settings"], own.parameters, own.readings, own.moment)
+    show_node(nodes, settings, integers)
+    if says & ADMITTED == 0:
+        return says
+    if node.aligner.method != 0:
+        follow_alignment(node, crew, moment[START], moment[END])
+        says |= say_events(node)
+    if follow_recording(node, moment[START], moment[END], 1 if is_standing(node) else 0):
+        says |= SAY_RECORD
+    return says
 
 
 @kernel
 def fixed_aiding(nodes: Array, settings: Array, aiding: Array, integers: Array) -> int:
     """Take one aiding into a node as ``node.kernels.step.node_aiding``; ``integers`` as ``fixed_step``."""
-    node, words = nodes[0], nodes.view(np.int64)
-    gates = take_aiding(nodes, settings, aiding)
-    if gates & USED:
-        node.noticed |= fixed_offer(
-            integers[0],
-            node.filter,
-            node.config,
-            words[FILTER_AT : FILTER_AT + STATE_WORDS],
-            words[CONFIG_AT : CONFIG_AT + CONFIG_WORDS],
-            aiding[A_YAW],
-            aiding[A_YAW_VAR] + noise_var(node),
-            own_systematic(node),
-            node.down_offset,
-            aiding[A_VALID],
-            int(aiding[A_SEQUENCE]),
-            int(aiding[A_HOPS]),
-        )
-    if gates & ONWARD:
-        hand_down(nodes, settings)
-    return int(gates)
+    learn_node(nodes, settings, integers)
+    learn_aiding(aiding, integers)
+    gates = integer_aiding(integers["node"], integers["settings"], integers[0].aiding)
+    show_node(nodes, settings, integers)
+    return gates

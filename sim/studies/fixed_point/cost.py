@@ -9,9 +9,8 @@ import numpy as np
 
 from node.kernels import cycle, relay
 from node.kernels.fixed import cycle as fixed_cycle
-from node.kernels.fixed import relay as fixed_relay
 from node.kernels.fixed.border import config_in_integers, state_in_integers
-from node.kernels.fixed.layout import FORCE_Q, RATE_Q, TIME_Q, VAR_Q
+from node.kernels.fixed.layout import ANGLE_Q, FORCE_Q, RATE_Q, TIME_Q, VAR_Q
 from node.kernels.jit import kernel
 from node.kernels.layout import DEG, PERIOD, Array, default_config, new_state
 
@@ -19,6 +18,7 @@ AIDING_VAR = (0.003 * DEG) ** 2
 WARM = 400  # cycles before the clock is read
 STEP = round(PERIOD * 2.0**TIME_Q)
 QUARTER = STEP // 4
+FIXED_YAW = round(0.1 * 2.0**ANGLE_Q)
 FIXED_VAR = round(AIDING_VAR * 2.0**VAR_Q)
 GRAVITY = 9.81
 
@@ -39,7 +39,7 @@ def drive_fixed(state: Any, config: Any, rate: Array, force: Array, first: int) 
         start = (1000 << TIME_Q) + (first + k) * STEP
         fixed_cycle.run_cycle(state, config, rate[k], force, start, start + STEP, 1)
         at = start + STEP - QUARTER
-        fixed_relay.offer_aiding(state, config, 68356527, FIXED_VAR, 0, 0, at, first + k, 0)
+        relay.offer_aiding(state, config, FIXED_YAW, FIXED_VAR, 0, 0, at, first + k, 0)
 
 
 def measure(cycles: int = 20_000, rounds: int = 7) -> list[dict[str, Any]]:

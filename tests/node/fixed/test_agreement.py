@@ -23,8 +23,11 @@ from node.kernels.fixed.border import (
     state_in_integers,
     to_fixed,
 )
+from node.kernels.fixed.cycle import run_cycle as fixed_run_cycle
 from node.kernels.fixed.layout import CEILING, FIXED_STATE, VAR_Q
 from node.kernels.fixed.node import FixedNode
+from node.kernels.fixed.node_words import learn_aiding, learn_inputs, learn_node, show_node
+from node.kernels.fixed.record import new_integers
 from node.kernels.layout import DEG, PERIOD, STATE, Array, Status, default_config, new_state
 from node.kernels.record import END, JOINED, START, new_node
 from node.kernels.relay import offer_aiding
@@ -223,11 +226,49 @@ def in_parts(loop: Loop) -> Loop:
     return loop._replace(step=step, aiding=aiding)
 
 
+def integers_in_parts(loop: Loop) -> Loop:
+    """The step and the aiding of the integers, called part by part from Python over their own record."""
+    integers = new_integers()
+    nodes, crews, own = integers["node"], integers["settings"], integers[0]
+
+    def step(shadows: Array, settings: Array, parameters: Array, readings: Array, moment: Array) -> int:
+        learn_node(shadows, settings, integers)
+        learn_inputs(parameters, readings, moment, integers)
+        waits, node, times = (
+            enter(nodes, crews, own["parameters"], own["readings"], own["moment"]),
+            nodes[0],
+            own["moment"],
+        )
+        if waits == REFUSED:
+            says = say_events(node)
+        else:
+            reading = node["rate"], node["force"], int(times[START]), int(times[END]), int(times[JOINED])
+            status = fixed_run_cycle(node["filter"], node["config"], *reading)
+            says = leave(nodes, crews, times, int(status), waits)
+        show_node(shadows, settings, integers)
+        return int(says)
+
+    def aiding(shadows: Array, settings: Array, given: Array) -> int:
+        learn_node(shadows, settings, integers)
+        learn_aiding(given, integers)
+        node, taken, gates = nodes[0], own["aiding"].tolist(), take_aiding(nodes, crews, own["aiding"])
+        if gates & USED:
+            yaw, yaw_var, _, _, _, valid_at, sequence, hops, *_ = taken
+            about = own_systematic(node), int(node["down_offset"]), valid_at, sequence, hops
+            node["noticed"] |= offer_aiding(node["filter"], node["config"], yaw, yaw_var + noise_var(node), *about)
+        if gates & ONWARD:
+            hand_down(nodes, crews)
+        show_node(shadows, settings, integers)
+        return int(gates)
+
+    return loop._replace(step=step, aiding=aiding)
+
+
 @pytest.mark.slow
 @pytest.mark.parametrize("kernel", ["float64", "fixed", "published"])
 def test_the_compiled_step_does_what_the_step_in_parts_does(kernel: str) -> None:
     whole, parts = tube(kernel), tube(kernel)
-    parts._loop = in_parts(parts._loop)
+    parts._loop = (integers_in_parts if kernel == "fixed" else in_parts)(parts._loop)
     for k, given in enumerate(inputs(1300, 8)):
         around = RigContext(True, 1 + k // 900, given.end, 1e-8 * (1 + k // 500), True)
         rate = given.rate if k % 211 else (np.nan, 0.0, 0.0)

@@ -1,4 +1,4 @@
-"""No float in the integer loop: the types and the compiled code of every function of it are read."""
+"""No float in the integer step: the types and the compiled code of every function of it are read."""
 
 import os
 import re
@@ -10,19 +10,15 @@ from typing import Any
 import numba
 import pytest
 
-import node.kernels.fixed
-from node.kernels.fixed.cycle import run_cycle
 from node.kernels.fixed.node import warm_up
-from node.kernels.fixed.relay import offer_aiding
+from node.kernels.fixed.step import integer_aiding, integer_step
 
-OUTSIDE = {"__init__", "beside", "border", "node", "step"}  # the border, where floats become integers, and beyond
 INSPECTOR = """
-import importlib, re, sys
-from pathlib import Path
+import re, sys
 import numba
 from numba.core import types
 from numba.core.dispatcher import Dispatcher
-from node.kernels.jit import kernel
+from node.kernels.fixed.arithmetic import mul
 
 FLOAT = re.compile(r"\\b(double|float|half|bfloat|x86_fp80|fp128)\\b")
 
@@ -52,27 +48,29 @@ def floats_of(function):
                 found.append(line.strip())
     return found
 
-def functions(names):
-    for name in names:
-        module = importlib.import_module(f"node.kernels.fixed.{name}")
-        for function in vars(module).values():
-            if isinstance(function, Dispatcher):
-                yield function
+def functions():
+    modules = [module for name, module in sorted(sys.modules.items()) if name.startswith("node.kernels")]
+    found = [function for module in modules for function in vars(module).values() if isinstance(function, Dispatcher)]
+    return [function for function in dict.fromkeys(found) if function.overloads]
 """
-LOOP = """
-from node.kernels.fixed.node import warm_up
-from node.kernels.fixed.cycle import run_cycle
-warm_up()
-for function in dict.fromkeys(functions(sys.argv[1:])):
+STEP = """
+from node.kernels.fixed.record import new_integers
+from node.kernels.fixed.step import integer_aiding, integer_step
+
+integers = new_integers()
+nodes, crews, own = integers["node"], integers["settings"], integers[0]
+integer_step(nodes, crews, own["parameters"], own["readings"], own["moment"])
+integer_aiding(nodes, crews, own["aiding"])
+names = set()
+for function in functions():
     where = f"{function.__module__}.{function.__name__}"
-    shared = function.__module__ == "node.kernels.ring" or where == "node.kernels.modes.step_modes"
-    assert shared or function.__module__.startswith("node.kernels.fixed."), where + " is no integer function"
-    assert function.overloads, where + " was not compiled"
+    names.add(where)
     for found in floats_of(function):
         print(where, found)
+for part in "guard.judge_cycle cluster.fuse_imus calibration.correct make_up.make_up fixed.cycle.run_cycle".split():
+    assert "node.kernels." + part in names, part
 """
 ONE_HALF = """
-from node.kernels.fixed.arithmetic import mul
 kernel = numba.njit(error_model="numpy")
 @kernel
 def clean(x):
@@ -89,14 +87,34 @@ for function in (clean, leaky, divided):
 """
 
 
-def loop_modules() -> list[str]:
-    return sorted({path.stem for path in Path(node.kernels.fixed.__file__).parent.glob("*.py")} - OUTSIDE)
+FLOATS_ONLY = """
+import numba
+from node.kernels.angles import HALF_TURN, wrap
+from node.kernels.quantity import ConstantType
+
+def refuse(_):
+    raise TypeError("an integer")
+
+ConstantType.fixed = property(refuse, lambda *_: None)
+"""
+FLOAT_STEP = """
+from node.kernels.warm import warm_up
+warm_up()
+print("all floats")
+"""
+ALONE = """
+alone = numba.njit(lambda x: x if x > 0.0 else -HALF_TURN)
+try:
+    alone(1.0)
+except Exception as error:
+    print("an integer" in str(error))
+"""
 
 
 def inspect(program: str, cache: Path) -> str:
     """What ``program`` prints after the inspector, on functions compiled anew: those of a cache tell no types."""
     return subprocess.run(
-        [sys.executable, "-c", INSPECTOR + program, *loop_modules()],
+        [sys.executable, "-c", INSPECTOR + program],
         env=os.environ | {"NUMBA_CACHE_DIR": str(cache), "NUMBA_OPT": "0"},
         capture_output=True,
         text=True,
@@ -116,8 +134,8 @@ def float_lines(function: Any, signature: Any) -> list[str]:
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("function", [run_cycle, offer_aiding], ids=["cycle", "aiding"])
-def test_the_loop_that_is_kept_holds_no_float(function: Any) -> None:
+@pytest.mark.parametrize("function", [integer_step, integer_aiding], ids=["step", "aiding"])
+def test_the_step_that_is_kept_holds_no_float(function: Any) -> None:
     """The code every node runs, from the cache; the types of its variables are read in `make study`."""
     warm_up()
     kept = [signature for signature, *_ in function._cache._cache_file._load_index()]
@@ -140,8 +158,15 @@ def test_a_float_would_be_found_in_what_is_kept(leaky: Any, leaks: bool) -> None
 
 
 @pytest.mark.statistical
-def test_the_loop_holds_no_float(tmp_path: Path) -> None:
-    assert inspect(LOOP, tmp_path) == ""
+def test_the_step_holds_no_float(tmp_path: Path) -> None:
+    assert inspect(STEP, tmp_path) == ""
+
+
+@pytest.mark.statistical
+def test_no_constant_is_an_integer_in_the_float64_step(tmp_path: Path) -> None:
+    """A constant that meets nothing, as under a minus, numba would take for its integer."""
+    assert inspect(FLOATS_ONLY + FLOAT_STEP, tmp_path) == "all floats\n"
+    assert inspect(FLOATS_ONLY + ALONE, tmp_path) == "True\n"
 
 
 @pytest.mark.statistical

@@ -1,0 +1,134 @@
+"""The integers of a node beside its float64 record: they learn what somebody changed, and show what they are now.
+
+Bytes are compared and not numbers, because some of the numbers are NaN. Of the events the ring is shown where one was
+told; the cluster only where there is one.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import numpy as np
+
+from node.kernels.fixed.beside import learn
+from node.kernels.fixed.border import COVARIANCE, show_aiding, show_covariance, show_cycle, show_survey
+from node.kernels.fixed.layout import TIME_Q, UNIT, VAR_Q
+from node.kernels.fixed.record import (
+    AIDING_POWERS,
+    AIDING_SCALES,
+    AROUND_AT,
+    AROUND_POWERS,
+    AROUND_SCALES,
+    CLUSTER_AT,
+    CONFIG_AT,
+    CONFIG_WORDS,
+    END_AT,
+    FILTER_AT,
+    INSIDE,
+    MOMENT_POWERS,
+    MOMENT_SCALES,
+    PARAMETER_POWERS,
+    PARAMETER_SCALES,
+    PARAMETERS_INSIDE,
+    READING_POWERS,
+    READING_SCALES,
+    RING_AT,
+    SETTINGS_INSIDE,
+    SETTINGS_POWERS,
+    SETTINGS_SCALES,
+    SETTINGS_WORDS,
+    STATE_WORDS,
+)
+from node.kernels.fixed.words import differ, keep, learn_numbers, learn_words, show_words
+from node.kernels.jit import kernel
+from node.kernels.layout import Array
+
+
+@kernel
+def compared(imus: int) -> int:
+    """How many of the words around the filter are compared and shown at every call."""
+    return (END_AT if imus > 1 else RING_AT) - AROUND_AT
+
+
+@kernel
+def learn_node(nodes: Array, settings: Array, integers: Array) -> None:
+    """Read settings, configuration, filter and what stands around it where they are not what was shown last."""
+    own, words, inside = integers[0], nodes.view(np.int64), integers.view(np.int64)
+    met = own.met
+    learn(
+        own,
+        nodes[0].filter,
+        nodes[0].config,
+        words[FILTER_AT : FILTER_AT + STATE_WORDS],
+        words[CONFIG_AT : CONFIG_AT + CONFIG_WORDS],
+    )
+    crew = settings.view(np.int64)
+    if met == 0 or differ(own.read_settings, crew):
+        keep(own.read_settings, crew)
+        made = inside[SETTINGS_INSIDE : SETTINGS_INSIDE + SETTINGS_WORDS]
+        floats = settings.view(np.float64)
+        learn_words(own.node.filter, made, crew, floats, SETTINGS_SCALES, SETTINGS_POWERS, own.gravity)
+    around = words[AROUND_AT:END_AT]
+    if met == 0 or differ(own.shown_around, around[: compared(settings[0].imus)]):
+        last = (END_AT if met == 0 or settings[0].imus > 1 else CLUSTER_AT) - AROUND_AT
+        made, floats = inside[INSIDE : INSIDE + last], nodes.view(np.float64)[AROUND_AT : AROUND_AT + last]
+        learn_words(own.node.filter, made, around[:last], floats, AROUND_SCALES, AROUND_POWERS, own.gravity)
+
+
+@kernel
+def learn_inputs(parameters: Array, readings: Array, moment: Array, integers: Array) -> None:
+    """Read what one cycle brings, and the corrections where they are other ones."""
+    own, words = integers[0], parameters.view(np.int64)
+    counter, gravity = own.node.filter, own.gravity
+    if differ(own.read_parameters, words):
+        keep(own.read_parameters, words)
+        made = integers.view(np.int64)[PARAMETERS_INSIDE : PARAMETERS_INSIDE + words.shape[0]]
+        floats = parameters.view(np.float64)
+        learn_words(counter, made, words, floats, PARAMETER_SCALES, PARAMETER_POWERS, gravity)
+    for k in range(readings.shape[0]):
+        learn_numbers(counter, own.readings[k], readings[k], READING_SCALES, READING_POWERS, gravity)
+    learn_numbers(counter, own.moment, moment, MOMENT_SCALES, MOMENT_POWERS, gravity)
+
+
+@kernel
+def learn_aiding(aiding: Array, integers: Array) -> None:
+    """Read an aiding."""
+    own = integers[0]
+    learn_numbers(own.node.filter, own.aiding, aiding, AIDING_SCALES, AIDING_POWERS, own.gravity)
+
+
+@kernel
+def show_node(nodes: Array, settings: Array, integers: Array) -> None:
+    """Write what the integers are now into the float64 record, and keep its bytes."""
+    own, state, words = integers[0], nodes[0].filter, nodes.view(np.int64)
+    fixed, gravity = own.node.filter, own.gravity
+    show_cycle(fixed, state, gravity)
+    show_covariance(fixed, state, COVARIANCE)
+    show_aiding(fixed, state)
+    show_survey(fixed, state, gravity)
+    keep(own.shown, words[FILTER_AT : FILTER_AT + STATE_WORDS])
+    if own.node.config.changes != own.shown_changes:
+        show_config(own.node.config, nodes[0].config, gravity)
+        own.shown_changes = own.node.config.changes
+        keep(own.read, words[CONFIG_AT : CONFIG_AT + CONFIG_WORDS])
+    inside = integers.view(np.int64)[INSIDE : INSIDE + END_AT - AROUND_AT]
+    around, floats = words[AROUND_AT:END_AT], nodes.view(np.float64)[AROUND_AT:END_AT]
+    told, count = nodes[0].events.told, compared(settings[0].imus)
+    show_words(inside, around, floats, AROUND_SCALES, AROUND_POWERS, gravity, 0, count)
+    if told != nodes[0].events.told:
+        first, last = RING_AT - AROUND_AT, CLUSTER_AT - AROUND_AT
+        show_words(inside, around, floats, AROUND_SCALES, AROUND_POWERS, gravity, first, last)
+    keep(own.shown_around, around[:count])
+
+
+@kernel
+def show_config(fixed: Any, config: Any, gravity: float) -> None:
+    """Write what a node changes of its configuration into the float64 one."""
+    unit2 = 2.0 ** -(VAR_Q + 2 * UNIT)
+    config.force_std = math.sqrt(fixed.force_var * 2.0**-VAR_Q) * gravity
+    config.stamp_std = fixed.stamp_std * 2.0**-TIME_Q
+    config.stamp_walk = math.sqrt(fixed.stamp_walk_var * unit2)
+    for k in range(3):
+        config.gyro_noise[k] = math.sqrt(fixed.rate_noise[k] * unit2)
+        config.bias_std[k] = math.sqrt(fixed.bias_var[k] * unit2)

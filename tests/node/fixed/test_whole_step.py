@@ -1,0 +1,145 @@
+"""A node's whole step in integers and in floats, on the same readings and aidings: what it says, tells and does."""
+
+import math
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+import pytest
+
+from node.kernels.calibration import identity_parameters
+from node.kernels.cluster import begin_cluster
+from node.kernels.events import Code
+from node.kernels.fixed.node import FixedNode
+from node.kernels.layout import DEG, PERIOD, default_config
+from node.kernels.record import AIDING, EVENTS_KEPT, MOMENT, READING, SETTINGS, new_node
+from node.kernels.step import node_aiding, node_step
+from sim.studies.fixed_point.run import LIMITS
+
+CYCLES, BLOCK, TURNING = 3000, 400, 180
+SPIN = 71.0 * DEG
+FAULTS = ("bias", "stuck", "not a number", "range", "force stuck", "slip", "vibration")
+
+
+def node_of(imus: int, joints: int, random: np.random.Generator) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Records of a node of several IMUs with a block of parameters."""
+    configs, settings = default_config(), np.zeros(1, SETTINGS)
+    nodes, parameters = new_node(configs), np.concatenate([identity_parameters()] * (1 + imus))
+    crew = settings[0]
+    crew["state_every"], crew["imus"], crew["joints"], crew["torsion_gate"] = 2, imus, joints, 1
+    crew["stiffness"], crew["aiding_old_after"], crew["unseen_var"], crew["stamp_walk"] = 3e4, 3.0, 1e-8, 3e-6
+    crew["rate_range"], crew["force_range"], crew["repeats_together"], crew["repeats_alone"] = 8.7, 78.0, 4, 8
+    for name in ("gyro_noise", "bias_std", "force_std"):
+        crew[f"plain_{name}"] = configs[0][name]
+    crew["noise"][:] = 1.0
+    crew["noise"][:3] = 1.0, 1.5, 0.7
+    crew["weight"] = crew["noise"] ** -2.0
+    crew["drive_angle"], crew["drive_var"], crew["lower_angle"], crew["lower_var"] = 0.3, 1e-6, 1.0, 1e-6
+    parameters["identity"][0] = 0
+    for sensor, bias in (("gyroscope", 1e-3), ("accelerometer", 5e-3)):
+        parameters[0][sensor]["matrix"][:2] += random.normal(0.0, [[[1e-2]], [[1e-4]]], (2, 3, 3))
+        parameters[0][sensor]["bias"][:2] = random.normal(0.0, [[bias], [1e-2 * bias]], (2, 3))
+    if imus > 1:
+        begin_cluster(nodes[0], crew)
+    return nodes, settings, parameters
+
+
+@dataclass
+class Rig:
+    """What one node reads and hears: turns and rests, faults of its sensors, jumps of its clock, other joints."""
+
+    imus: int
+    random: np.random.Generator
+    yaw: float = 0.0
+    spin: float = 0.0
+    now: float = 1000.0
+    offset: float = 0.2
+    sequence: int = 0
+    hops: int = 1
+    faults: dict[tuple[str, int], int] = field(default_factory=dict)
+
+    def step(self, k: int) -> tuple[np.ndarray, np.ndarray]:
+        """Readings and moment of cycle ``k``."""
+        random = self.random
+        wanted = SPIN if k > BLOCK and k % BLOCK < TURNING else 0.0
+        self.spin += float(np.clip(wanted - self.spin, -0.2, 0.2))
+        self.yaw += self.spin * PERIOD
+        if random.random() < 0.003:
+            self.now += float(random.choice([PERIOD, 2.0 * PERIOD, -0.3, 40.0, -500.0]))
+        self.now += PERIOD
+        if random.random() < 0.004:
+            self.faults[str(random.choice(FAULTS)), int(random.integers(self.imus))] = k + int(random.integers(3, 150))
+        if k % 1000 == 990:
+            self.hops, self.offset = self.hops % 3 + 1, float(random.uniform(-3.0, 3.0))
+        rows = [self.reading(imu, k) for imu in range(self.imus)]
+        joined = 0.0 if k % 1000 > 970 and self.spin == 0.0 else 1.0
+        return np.array(rows), np.array([self.now - PERIOD, self.now, joined, self.hops, 1e-6 * (1 + k // 1000), 1.0])
+
+    def reading(self, imu: int, k: int) -> list[float]:
+        """What one IMU reads."""
+        lean, random = 0.3, self.random
+        rate = random.normal(0.0, 1.6e-4, 3) + 2e-4 * (imu + 1) + np.array([0.0, 0.0, 1.001 * self.spin])
+        down = [-math.sin(lean) * math.cos(self.yaw), math.sin(lean) * math.sin(self.yaw), math.cos(lean)]
+        pull = -9.81 * np.array(down) + random.normal(0.0, 3.4e-3, 3)
+        present = {fault for (fault, of), until in self.faults.items() if of == imu and until > k}
+        if "bias" in present:
+            rate[2] += 0.03
+        if "vibration" in present:
+            pull += random.normal(0.0, 2.0, 3)
+        if "stuck" in present:
+            rate[:] = 1e-3, 2e-3, 3e-3
+        if "force stuck" in present:
+            pull[:] = 1.0, 2.0, -9.0
+        if "range" in present:
+            rate[2] = 8.7
+        if "not a number" in present:
+            rate[1] = math.nan
+        return [*rate, *pull, 20.0 + 30.0 * math.sin(k / 500.0), 0.0, 0.01 if imu == 0 else 0.0]
+
+    def aiding(self, k: int) -> np.ndarray:
+        """The encoder's word after cycle ``k``."""
+        rests = self.spin == 0.0
+        self.sequence += 0 if rests and k % BLOCK != TURNING + 8 else 1
+        slip = 0.02 if any(fault == "slip" and until > k for (fault, _), until in self.faults.items()) else 0.0
+        yaw = (self.yaw - self.offset + slip + self.random.normal(0.0, 1e-4)) % math.tau
+        held, torque = float(not rests or k % BLOCK < TURNING + 30), 2000.0 if not rests else 20.0
+        at = self.now - float(self.random.uniform(0.0, 0.1))
+        said = (yaw, 2e-8, 1e-6, self.offset, self.spin, at, self.sequence, self.hops, torque, 1e-6, held, 1e-6)
+        return np.array(said)
+
+
+def events_since(nodes: np.ndarray, said: int) -> list[tuple[Any, ...]]:
+    """Codes and numbers of the events that nobody has taken yet."""
+    events = nodes[0]["events"]
+    ring = [events["ring"][k % EVENTS_KEPT] for k in range(said, int(events["told"]))]
+    events["said"] = events["told"]
+    return [(Code(int(event["code"])).name, *event["numbers"].tolist()) for event in ring]
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(("seed", "imus", "joints"), [(2, 3, 2), (3, 2, 0), (4, 1, 2), (5, 3, 1), (6, 1, 0), (7, 1, 1)])
+def test_a_node_does_the_same_in_integers(seed: int, imus: int, joints: int) -> None:
+    """Where no scale is learnt anew: the prior of one (0.1) is beyond the range of the integers (0.054, decision 11)."""
+    rig = Rig(imus, np.random.default_rng(seed))
+    floats, fixed = node_of(imus, joints, np.random.default_rng(seed)), FixedNode()
+    integers = tuple(part.copy() for part in floats)
+    seen: set[str] = set()
+    assert (rig.step(0)[0].shape, len(rig.step(0)[1]), len(rig.aiding(0))) == ((imus, READING), MOMENT, AIDING)
+    for k in range(CYCLES):
+        readings, moment = rig.step(k)
+        says = node_step(*floats, readings.copy(), moment), fixed.step(*integers, readings.copy(), moment)
+        assert says[0] == says[1], k
+        assert floats[0][0]["status"] == integers[0][0]["status"], k
+        told = [events_since(nodes, int(nodes[0]["events"]["said"])) for nodes in (floats[0], integers[0])]
+        assert [event[0] for event in told[0]] == [event[0] for event in told[1]], k
+        for (name, *one), (_, *other) in zip(*told, strict=True):
+            np.testing.assert_allclose(other, one, rtol=3e-3, atol=1e-3, err_msg=f"{k} {name}")
+            seen.add(name)
+        turned = int(floats[0][0]["filter"]["now_yaw"]) - int(integers[0][0]["filter"]["now_yaw"])
+        assert abs((turned + 2**31) % 2**32 - 2**31) * 360.0 / 2**32 < LIMITS["yaw_deg"], k
+        if rig.random.random() < 0.7 and k % 900 < 800:
+            aiding = rig.aiding(k)
+            gates = node_aiding(*floats[:2], aiding.copy()), fixed.aiding(*integers[:2], aiding.copy())
+            assert gates[0] == gates[1], k
+    assert len(seen) >= 10
+    assert "GYRO_SCALE" not in seen

@@ -1,0 +1,140 @@
+"""Quantities in two forms: every operation in integers is that of the floats over its whole range; none overflows."""
+
+import math
+from collections.abc import Callable
+from typing import Any
+
+import numba
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from node.kernels import numbers as n
+from node.kernels.angles import wrap, wrap_positive
+from node.kernels.fixed.layout import ANGLE_Q, FORCE_Q, NEVER, RATE_Q, TIME_Q, VAR_Q, VECTOR_Q
+from node.kernels.quantity import (
+    LONG_AGO,
+    NO_NUMBER,
+    NONE,
+    ONE,
+    Constant,
+    angle,
+    factor,
+    force,
+    rate,
+    rate_variance,
+    seconds,
+    variance,
+    warmth,
+)
+
+Q = {"time": TIME_Q, "rate": RATE_Q, "angle": ANGLE_Q, "force": FORCE_Q, "var": VAR_Q, "factor": VECTOR_Q}
+Q |= {"torque": n.TORQUE_Q, "stiffness": n.STIFFNESS_Q, "weight": n.WEIGHT_Q, "stamp": VAR_Q + 12, "told": n.TOLD_Q}
+
+
+def calling(operation: Callable[..., Any], arguments: int) -> Callable[..., Any]:
+    """A kernel that calls ``operation``, where numba takes it by the types of its arguments."""
+    own = numba.njit(operation) if operation.__name__ == "<lambda>" else operation
+    one, two, three = lambda a: own(a), lambda a, b: own(a, b), lambda a, b, c: own(a, b, c)  # noqa: PLW0108
+    return numba.njit(error_model="numpy")((one, two, three)[arguments - 1])
+
+
+# what is computed; of each argument what it is and from where to where; what comes out, and how far off it may be:
+# relative, and in counts
+CASES: dict[str, tuple[Callable[..., Any], list[tuple[str, float, float]], str, float, float]] = {
+    "times": (n.times, [("rate", -32, 32), ("factor", -2, 2)], "rate", 0.0, 2),
+    "times a variance": (n.times, [("var", 0, 12), ("factor", -2, 2)], "var", 0.0, 2),
+    "over": (n.over, [("rate", -32, 32), ("factor", 0.25, 2)], "rate", 2e-9, 4),
+    "ratio": (n.ratio, [("var", 0, 12), ("var", 1e-8, 12)], "factor", 3e-9, 20),
+    "fraction": (n.fraction, [("angle", 0, 4), ("angle", 3, 6)], "factor", 3e-9, 2),
+    "share": (
+        n.share,
+        [("rate", -32, 32), ("time", -0.6, 0.6), ("time", 0.3, 5)],
+        "rate",
+        1e-8,
+        2.0**25,
+    ),
+    "turn": (n.turn, [("rate", -32, 32), ("time", -4096, 4096)], "angle", 3e-7, 64),
+    "turn of a cycle": (n.turn, [("rate", -32, 32), ("time", -8, 8)], "angle", 0.0, 2),
+    "speed": (n.speed, [("angle", -4, 4), ("time", 1e-3, 6)], "rate", 3e-9, 40000),
+    "square": (n.square, [("angle", -4, 4)], "var", 0.0, 2.0**31),
+    "product": (n.product, [("angle", -4, 4), ("angle", -4, 4)], "var", 0.0, 2.0**31),
+    "root": (n.root, [("var", 0, 16)], "angle", 5e-9, 2),
+    "time_root": (n.time_root, [("var", 0, 16)], "time", 5e-9, 2),
+    "half": (n.half, [("angle", -100, 100)], "angle", 0.0, 1),
+    "length": (
+        n.length,
+        [("force", -32, 32), ("force", -32, 32), ("force", -32, 32)],
+        "force",
+        5e-9,
+        20,
+    ),
+    "scaled": (n.scaled, [("rate", -32, 32), ("rate", -0.5, 0.5)], "rate", 0.0, 600_000),
+    "unscaled": (n.unscaled, [("rate", -32, 32), ("rate", -0.5, 0.5)], "rate", 5e-9, 4),
+    "stamp_square": (n.stamp_square, [("time", 0, 0.05)], "stamp", 0.0, 2.0**38),
+    "scale_square": (n.scale_square, [("factor", 0, 0.05)], "stamp", 0.0, 2.0**35),
+    "wound": (n.wound, [("torque", 0, 1e6), ("stiffness", 1e3, 1e9)], "angle", 3e-9, 1100),
+    "degrees": (lambda a: n.told_degrees(a, ANGLE_Q), [("angle", -1000, 1000)], "told", 1e-8, 1),
+    "wrap": (wrap, [("angle", -1000, 1000)], "angle", 0.0, 400),
+    "wrap_positive": (wrap_positive, [("angle", -1000, 1000)], "angle", 0.0, 400),
+    "a binary angle": (lambda a: n.offset_angle(n.kept_angle(a)), [("angle", -3.1, 3.1)], "angle", 0.0, 2000),
+}
+KERNELS = {name: calling(case[0], len(case[1])) for name, case in CASES.items()}
+
+
+@pytest.mark.parametrize("name", CASES)
+@given(data=st.data())
+def test_integers_compute_what_floats_do(name: str, data: st.DataObject) -> None:
+    _, arguments, kind, relative, counts = CASES[name]
+    whole = [data.draw(st.integers(round(low * 2.0 ** Q[k]), round(high * 2.0 ** Q[k]))) for k, low, high in arguments]
+    exact = float(KERNELS[name](*(w * 2.0 ** -Q[k] for w, (k, *_) in zip(whole, arguments, strict=True))))
+    if kind == "angle" and "wrap" in name and min(abs(exact), math.pi - abs(exact), math.tau - abs(exact)) < 1e-6:
+        return  # on either side of the seam
+    found = KERNELS[name](*whole)
+    assert isinstance(found, int)
+    assert abs(found - exact * 2.0 ** Q[kind]) <= relative * abs(exact) * 2.0 ** Q[kind] + counts
+
+
+@given(st.integers(1 << 42, 1 << 61))
+def test_what_is_beyond_the_range_is_held(large: int) -> None:
+    assert KERNELS["square"](large) == KERNELS["square"](-large) == 16 << VAR_Q
+    assert KERNELS["product"](large, -large) == -16 << VAR_Q
+    assert KERNELS["fraction"](large, 1) == -KERNELS["fraction"](-large, 1) == 2 << VECTOR_Q
+    assert KERNELS["ratio"](large, 0) == -KERNELS["ratio"](-large, 0) == 1 << 61
+    assert KERNELS["root"](-large) == 0
+
+
+@numba.njit
+def meet(x: Any, found: Any) -> bool:
+    """What a constant is beside ``x``, in every way the firmware uses one."""
+    found[0], found[1], found[2] = ONE, x + ONE, max(x, ONE)
+    found[3] = ONE if x > ONE else x
+    found[4], found[5] = NONE, LONG_AGO
+    return bool(n.is_number(x) and not n.is_number(found[4]))
+
+
+def test_a_constant_takes_the_form_of_what_it_meets() -> None:
+    floats, integers = np.zeros(6), np.zeros(6, np.int64)
+    assert meet(0.5, floats)
+    assert meet(1 << 29, integers)
+    assert floats.tolist()[:4] == [1.0, 1.5, 1.0, 0.5]
+    assert (math.isnan(floats[4]), floats[5]) == (True, -math.inf)
+    assert integers.tolist() == [1 << 30, 3 << 29, 1 << 30, 1 << 29, NO_NUMBER, NEVER]
+
+
+@pytest.mark.parametrize(
+    ("constant", "q", "unit"),
+    [
+        (seconds(3.0), TIME_Q, 1.0),
+        (rate(-0.1), RATE_Q, 1.0),
+        (angle(math.pi), ANGLE_Q, 1.0),
+        (force(0.3), FORCE_Q, 9.80665),
+        (variance(10.0), VAR_Q, 1.0),
+        (rate_variance(1e-6), VAR_Q, 2.0**-12),
+        (factor(0.999), VECTOR_Q, 1.0),
+        (warmth(25.0), VECTOR_Q, 128.0),
+    ],
+)
+def test_a_constant_is_a_float_that_knows_its_integer(constant: Constant, q: int, unit: float) -> None:
+    assert constant.fixed == pytest.approx(float(constant) / unit * 2.0**q, abs=0.5)
