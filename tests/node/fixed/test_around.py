@@ -47,7 +47,8 @@ def turned_back(made: np.ndarray, kind: np.dtype[Any], path: str = "") -> np.nda
     shown = np.zeros(made.shape, kind)
     scales, powers = scales_of(np.tile(formats_of(kind, path), made.size))
     words = made.view(np.int64)
-    show_words(words, shown.view(np.int64), shown.view(float), scales, powers, G, 0, len(words))
+    counts = np.divide(1.0, scales, out=np.zeros(len(scales)), where=scales > 0.0)
+    show_words(words, ~words, shown.view(np.int64), shown.view(float), counts, powers, G)
     return shown
 
 
