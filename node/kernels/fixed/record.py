@@ -13,6 +13,8 @@ import numpy as np
 
 from node.kernels.alignment import MAX_IMUS
 from node.kernels.calibration import PARAMETERS
+from node.kernels.cluster import WEIGHT_Q
+from node.kernels.events import TOLD_Q
 from node.kernels.fixed.layout import (
     ANGLE_Q,
     FIXED_CONFIG,
@@ -24,9 +26,9 @@ from node.kernels.fixed.layout import (
     VECTOR_Q,
 )
 from node.kernels.layout import CONFIG, STATE, Array
-from node.kernels.numbers import STIFFNESS_Q, TOLD_Q, TORQUE_Q, WEIGHT_Q
 from node.kernels.quantity import WARMTH_Q
 from node.kernels.record import AIDING, MOMENT, NODE, READING, SETTINGS
+from node.kernels.twist import STIFFNESS_Q, TORQUE_Q
 
 G: Final = 1000  # of a format: a power of gravity, since forces are counted in g
 FORCE: Final = FORCE_Q + G
