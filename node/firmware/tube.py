@@ -19,9 +19,9 @@ from node.firmware.static_record import begin_record, static_record
 from node.kernels.aligner import FASTEST, Reason, drop_alignment, refuse_alignment
 from node.kernels.calibration import PARAMETERS
 from node.kernels.cluster import begin_cluster
-from node.kernels.events import NONE
 from node.kernels.layout import DEG, UNKNOWN_YAW_VAR, Array, Scheme
 from node.kernels.modes import STATIC_BIAS
+from node.kernels.quantity import NONE
 from node.kernels.record import AIDING, MOMENT, READING
 from node.kernels.resets import forget_bias, lose_tilt
 from node.kernels.step import (

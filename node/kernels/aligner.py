@@ -13,9 +13,10 @@ from typing import Any, Final
 from node.kernels.alignment import CIRCLE, add_to_sweep, clear_sweep, fit_circle, take_extremes, to_tube
 from node.kernels.angles import from_binary, wrap
 from node.kernels.cluster import all_used
-from node.kernels.events import NONE, Code, tell, tell_more
+from node.kernels.events import Code, tell, tell_more
 from node.kernels.jit import constant, kernel
 from node.kernels.layout import DEG, PERIOD, RING, Array
+from node.kernels.quantity import NONE
 
 SLOWEST, FASTEST = 2.0 * DEG, 15.0 * DEG  # rad/s, of the turn
 PATIENCE: Final = 120.0  # s, for the turn to begin

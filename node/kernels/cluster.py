@@ -10,16 +10,42 @@ from typing import Any, Final
 
 from node.kernels.calibration import USUAL
 from node.kernels.cluster_watch import choose_imus, compare_imus, tell_members, watch_imus
+from node.kernels.fixed.arithmetic import mul, quotient
 from node.kernels.guard import is_heard
 from node.kernels.jit import kernel
 from node.kernels.layout import RING, Array
-from node.kernels.numbers import fraction, mean, noise_share, of_weighed, part_of, times, weighed, within
+from node.kernels.numbers import by_type, fraction, mean, square, times, within
 from node.kernels.priors import set_noise
 from node.kernels.quantity import NONE
 from node.kernels.record import TEMPERATURE
 from node.kernels.resets import doubt_bias
 
+WEIGHT_Q: Final = 24  # of a weight and a noise, relative to the configuration's, in integers
 MEMORY: Final = 1000  # cycles at rest, of the running mean of an offset
+
+
+@by_type(lambda a, weight, total: times(a, quotient(weight, total)))
+def weighed(a: float, weight: float, total: float) -> float:
+    """A share of a weighted mean, that ``of_weighed`` makes of their sum; integers divide here."""
+    return weight * a
+
+
+@by_type(lambda a, total: a)
+def of_weighed(a: float, total: float) -> float:
+    """A sum of what was ``weighed``, as the mean."""
+    return a / total
+
+
+@by_type(lambda own: (own >> 4) * (own >> 4))
+def noise_share(own: float) -> float:
+    """A relative noise (Q24, at most 200) as a variance, Q40."""
+    return own * own
+
+
+@by_type(lambda part, std: mul(part, min(int(square(std)) >> 16, 1 << 31)) << 7)
+def part_of(part: float, std: float) -> float:
+    """The part (Q40) of the variance of a rate (rad/s, of at most 0.04 deg/s in integers)."""
+    return part * std**2
 
 
 @kernel

@@ -9,10 +9,10 @@ from __future__ import annotations
 import math
 from typing import Any, Final
 
-from node.kernels.events import Code, tell
+from node.kernels.events import Code, tell, told_count
 from node.kernels.jit import constant, kernel
 from node.kernels.layout import DEG, Array
-from node.kernels.numbers import half, number, ratio, times, told_count
+from node.kernels.numbers import half, number, ratio, times
 from node.kernels.quantity import NO_NUMBER, NONE, Constant, factor, force, rate
 from node.kernels.record import FX, SATURATED, WX
 from node.kernels.sensor_watch import find_faults

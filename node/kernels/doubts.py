@@ -15,25 +15,12 @@ from __future__ import annotations
 from typing import Any, Final
 
 from node.kernels.angles import wrap
-from node.kernels.events import NONE, Code, tell
+from node.kernels.events import Code, tell, told, told_degrees
 from node.kernels.fixed.layout import ANGLE_Q, VECTOR_Q
 from node.kernels.jit import constant, kernel
 from node.kernels.layout import DEG
-from node.kernels.numbers import (
-    held,
-    is_number,
-    mean,
-    number,
-    product,
-    ratio,
-    root,
-    square,
-    times,
-    told,
-    told_degrees,
-    turn,
-)
-from node.kernels.quantity import factor, seconds, variance
+from node.kernels.numbers import held, is_number, mean, number, product, ratio, root, square, times, turn
+from node.kernels.quantity import NONE, factor, seconds, variance
 
 MEMORY: Final = 32  # aidings over which the misfit is averaged
 DOUBTED: Final = factor(

@@ -3,13 +3,16 @@
 from __future__ import annotations
 
 import enum
-from typing import Any
+from typing import Any, Final
 
+from node.kernels.fixed.arithmetic import mul, shift
 from node.kernels.jit import kernel
-from node.kernels.quantity import NONE
+from node.kernels.layout import DEG
+from node.kernels.numbers import by_type
 from node.kernels.record import EVENTS_KEPT
 
-__all__ = ["NONE", "Code", "Fault", "tell", "tell_more"]
+TOLD_Q: Final = 24  # of the numbers of an event
+TO_DEGREES: Final = round(2.0**25 / DEG)
 
 
 class Fault(enum.IntEnum):
@@ -65,6 +68,24 @@ class Code(enum.IntEnum):
     BIAS_MOVED = 35
     AIDING_DOUBTED = 36
     ENCODER_REVERSED = 37
+
+
+@by_type(lambda like, count: count << TOLD_Q)
+def told_count(like: float, count: int) -> float:
+    """A count as a number of an event, in the form of ``like``."""
+    return float(count)
+
+
+@by_type(lambda a, q: shift(a, q - TOLD_Q))
+def told(a: float, q: int) -> float:
+    """A quantity in Q``q`` as a number of an event."""
+    return a
+
+
+@by_type(lambda a, q: shift(mul(a, TO_DEGREES), q - 6 - TOLD_Q))
+def told_degrees(a: float, q: int) -> float:
+    """An angle or rate in Q``q`` as a number of an event, deg or deg/s."""
+    return a / DEG
 
 
 @kernel

@@ -13,7 +13,7 @@ from typing import Any, Final
 from node.kernels.aiding_watch import STEADY, find_mismatch, forget
 from node.kernels.angles import wrap
 from node.kernels.doubts import explain_jump, follow_jump, follow_misfit, misfit_var
-from node.kernels.events import Code, Fault, tell
+from node.kernels.events import Code, Fault, tell, told, told_count, told_degrees
 from node.kernels.fixed.layout import ANGLE_Q, RATE_Q, TIME_Q
 from node.kernels.jit import constant, kernel
 from node.kernels.layout import CLOCK_SLACK, DEG, PERIOD, Array, Err, Status
@@ -32,9 +32,6 @@ from node.kernels.numbers import (
     square,
     time_root,
     times,
-    told,
-    told_count,
-    told_degrees,
     turn,
     unscaled,
 )

@@ -12,12 +12,12 @@ from __future__ import annotations
 from typing import Any, Final
 
 from node.kernels.angles import wrap
-from node.kernels.events import NONE, Code, tell
+from node.kernels.events import Code, tell, told_count, told_degrees
 from node.kernels.fixed.layout import ANGLE_Q
 from node.kernels.jit import constant, kernel
 from node.kernels.layout import DEG, Array, Err
-from node.kernels.numbers import angle_of, fraction, offset_angle, root, square, times, told_count, told_degrees
-from node.kernels.quantity import ONE, angle, variance
+from node.kernels.numbers import angle_of, fraction, offset_angle, root, square, times
+from node.kernels.quantity import NONE, ONE, angle, variance
 from node.kernels.record import A_HELD, A_HOPS, A_RATE, A_SEQUENCE, A_YAW, A_YAW_VAR
 from node.kernels.twist import twist_var
 

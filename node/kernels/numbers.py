@@ -17,25 +17,21 @@ from node.kernels.fixed.arithmetic import inverse_root, mul, quotient, shift
 from node.kernels.fixed.layout import ANGLE_Q, CEILING, RATE_Q, TIME_Q, VECTOR_Q
 from node.kernels.fixed.trigonometry import TURN, counts, difference, radians
 from node.kernels.jit import kernel
-from node.kernels.layout import DEG, PERIOD, Array
+from node.kernels.layout import PERIOD, Array
 from node.kernels.quantity import NO_NUMBER
 
 Function = TypeVar("Function", bound=Callable[..., Any])
 OPTIONS: Final[Any] = {"error_model": "numpy", "no_cfunc_wrapper": True}
-TOLD_Q: Final = 24  # of the numbers of an event
-WEIGHT_Q: Final = 24  # of an IMU's weight and noise, relative to the configuration's
-TORQUE_Q: Final = 20  # N m
-STIFFNESS_Q: Final = TORQUE_Q + 30 - ANGLE_Q  # N m/rad
 LARGEST: Final = 1 << 61
 TWO: Final = 1 << 31
 UNITY: Final = 1 << VECTOR_Q
 LARGEST_SQUARED: Final = 1 << 42  # 4 rad, or 3.6 deg/s
+FASTEST: Final = 1024 << RATE_Q
 LONGEST: Final = 1 << 40  # s, Q28, of a turn
 SHORTEST: Final = 1 << (TIME_Q - 10)  # s, 1 ms, of a quotient
 STAMP_CEILING: Final = CEILING >> 12
 SCALE_CEILING: Final = CEILING >> 8
 PERIOD_FIXED: Final = round(PERIOD * 2.0**TIME_Q)
-TO_DEGREES: Final = round(2.0**25 / DEG)
 
 
 def taken_where(holds: Callable[..., bool], integers: Callable[..., Any]) -> Callable[[Function], Function]:
@@ -96,15 +92,18 @@ def _fraction(a: int, b: int) -> int:
     return quotient(a, b)
 
 
+_fraction_of = kernel(_fraction)
+
+
 @by_type(_fraction)
 def fraction(a: float, b: float) -> float:
     """As ``ratio``, to multiply by: integers are held at 2."""
     return a / b
 
 
-@by_type(lambda a, part, whole: mul(a, quotient(part, whole)) << 1)
+@by_type(lambda a, part, whole: mul(a, _fraction_of(part, whole)) << 1)
 def share(a: float, part: float, whole: float) -> float:
-    """A quantity times a part of a whole, of one kind: at most twice the whole."""
+    """A quantity times a part of a whole, of one kind; integers hold the part at twice the whole."""
     return a * part / whole
 
 
@@ -120,9 +119,16 @@ def turn(w: float, dt: float) -> float:
     return w * dt
 
 
-@by_type(lambda turned, dt: quotient(turned, max(dt, SHORTEST)) << (RATE_Q - ANGLE_Q + TIME_Q - 30))
+def _speed(turned: int, dt: int) -> int:
+    time = max(dt, SHORTEST)
+    if abs(turned) >> (ANGLE_Q - TIME_Q + 10) >= time:
+        return FASTEST if turned > 0 else -FASTEST
+    return quotient(turned, time) << (RATE_Q - ANGLE_Q + TIME_Q - 30)
+
+
+@by_type(_speed)
 def speed(turned: float, dt: float) -> float:
-    """The rate of an angle over a time above 0; integers: of up to 4 rad in at least 1 ms."""
+    """The rate of an angle over a time above 0; integers: over at least 1 ms, held at 1024 rad/s."""
     return turned / dt
 
 
@@ -229,12 +235,6 @@ def factor_of(a: float, q: int) -> float:
     return a
 
 
-@by_type(lambda torque, stiffness: quotient(torque, max(stiffness, 1)))
-def wound(torque: float, stiffness: float) -> float:
-    """The angle by which a torque winds a tube."""
-    return torque / stiffness
-
-
 def _mean(total: int, count: int) -> int:
     return (total + (count >> 1)) // count
 
@@ -249,30 +249,6 @@ def mean(total: float, count: int) -> float:
 def half(a: float) -> float:
     """Half of it."""
     return 0.5 * a
-
-
-@by_type(lambda a, weight, total: times(a, quotient(weight, total)))
-def weighed(a: float, weight: float, total: float) -> float:
-    """A share of a weighted mean, that ``of_weighed`` makes of their sum; integers divide here."""
-    return weight * a
-
-
-@by_type(lambda a, total: a)
-def of_weighed(a: float, total: float) -> float:
-    """A sum of what was ``weighed``, as the mean."""
-    return a / total
-
-
-@by_type(lambda own: (own >> 4) * (own >> 4))
-def noise_share(own: float) -> float:
-    """A relative noise (Q24, at most 200) as a variance, Q40."""
-    return own * own
-
-
-@by_type(lambda part, std: mul(part, min(int(square(std)) >> 16, 1 << 31)) << 7)
-def part_of(part: float, std: float) -> float:
-    """The part (Q40) of the variance of a rate (rad/s, of at most 0.04 deg/s in integers)."""
-    return part * std**2
 
 
 @by_type(lambda a: max(min(a, 1 << 28), -(1 << 28)))
@@ -324,21 +300,3 @@ def are_numbers(rate: Array, force: Array) -> bool:
 def angle_of(like: float, binary: int) -> float:
     """Angle (rad) in [0, 2 pi) of a binary angle, in the form of ``like``."""
     return float(binary) * (2.0 * math.pi / 4294967296.0)
-
-
-@by_type(lambda like, count: count << TOLD_Q)
-def told_count(like: float, count: int) -> float:
-    """A count as a number of an event, in the form of ``like``."""
-    return float(count)
-
-
-@by_type(lambda a, q: shift(a, q - TOLD_Q))
-def told(a: float, q: int) -> float:
-    """A quantity in Q``q`` as a number of an event."""
-    return a
-
-
-@by_type(lambda a, q: shift(mul(a, TO_DEGREES), q - 6 - TOLD_Q))
-def told_degrees(a: float, q: int) -> float:
-    """An angle or rate in Q``q`` as a number of an event, deg or deg/s."""
-    return a / DEG

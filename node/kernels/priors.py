@@ -11,7 +11,14 @@ from typing import Any
 from node.kernels.fixed.arithmetic import mul, quotient, shift
 from node.kernels.fixed.layout import CEILING, FACTOR_Q, TAU_Q, TIME_Q, UNIT
 from node.kernels.jit import kernel
-from node.kernels.numbers import WEIGHT_Q, by_record, root, square, stamp_square
+from node.kernels.numbers import SHORTEST, by_record, root, square, stamp_square
+
+
+@kernel
+def over_time(area: int, time: int) -> int:
+    """A variance times seconds (Q56) by a time (s, Q28, at least 1 ms), held at the ceiling of variances."""
+    over = max(time, SHORTEST)
+    return CEILING if area >> 32 >= over else shift(quotient(area, over), 30 - TIME_Q)
 
 
 @by_record(lambda config, k: config.bias_var[k])
@@ -38,13 +45,13 @@ def stamp_var(config: Any) -> float:
     return float(config.stamp_std**2)
 
 
-@by_record(lambda config, k, count, time: shift(quotient(count * config.rate_noise[k], time), 30 - TIME_Q))
+@by_record(lambda config, k, count, time: over_time(count * min(config.rate_noise[k], CEILING >> 5), time))
 def noise_over(config: Any, k: int, count: int, time: float) -> float:
     """Variance of the mean rate ``k`` over a ``time``, ``count``-fold, (rad/s)^2."""
     return float(count * config.gyro_noise[k] ** 2 / time)
 
 
-@by_record(lambda config, k, time: shift(quotient(config.bias_area[k], max(time, 1)), 30 - TIME_Q))
+@by_record(lambda config, k, time: over_time(config.bias_area[k], time))
 def bias_mean_var(config: Any, k: int, time: float) -> float:
     """Variance of a bias that is the mean rate ``k`` over a ``time`` at rest: N^2 / T + 2 sigma_b^2 tau / T."""
     correlated = 2.0 * config.bias_std[k] ** 2 * config.bias_tau[k] / time
@@ -102,12 +109,18 @@ def calm_bias(config: Any, k: int, plain: float) -> None:
     config.bias_std[k] = max(plain, 0.5 * config.bias_std[k])
 
 
+@kernel
+def over_weight(var: int, weight: int) -> int:
+    """A variance by the weight (Q24) of the IMUs in use."""
+    return quotient(var >> 6, weight)
+
+
 def _set_noise(config: Any, settings: Any, weight: int) -> None:
-    config.force_var = shift(quotient(square_force(settings.plain_force_std), weight), 30 - WEIGHT_Q)
+    config.force_var = over_weight(square_force(settings.plain_force_std), weight)
     for k in range(3):
         plain = int(square(settings.plain_gyro_noise[k]))
-        set_gyro_noise(config, k, shift(quotient(plain, weight), 30 - WEIGHT_Q))
-        set_bias_var(config, k, shift(quotient(int(square(settings.plain_bias_std[k])), weight), 30 - WEIGHT_Q))
+        set_gyro_noise(config, k, over_weight(plain, weight))
+        set_bias_var(config, k, over_weight(int(square(settings.plain_bias_std[k])), weight))
 
 
 @by_record(_set_noise)

@@ -11,12 +11,12 @@ from __future__ import annotations
 
 from typing import Any, Final
 
-from node.kernels.events import Code, tell
+from node.kernels.events import Code, tell, told_degrees
 from node.kernels.fixed.layout import ANGLE_Q, FORCE_Q, RATE_Q
 from node.kernels.jit import constant, kernel
 from node.kernels.layout import DEG, RING
 from node.kernels.modes import STATIC_BIAS, TRACKING, UNBIASED_STILL_RATE
-from node.kernels.numbers import factor_of, half, held, mean, root, square, times, told_degrees, turn
+from node.kernels.numbers import factor_of, half, held, mean, root, square, times, turn
 from node.kernels.priors import bias_var, calm_bias, noise_over, widen_bias
 from node.kernels.quantity import NONE, rate, seconds
 from node.kernels.resets import move_bias, open_yaw

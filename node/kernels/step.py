@@ -16,7 +16,7 @@ from node.kernels.cluster import learn_offsets, survey_imus
 from node.kernels.coarse_level import level_coarsely
 from node.kernels.cycle import run_cycle
 from node.kernels.doubts import noise_var, unexplained_var
-from node.kernels.events import NONE, Code, tell
+from node.kernels.events import Code, tell, told, told_degrees
 from node.kernels.fixed.layout import ANGLE_Q, VECTOR_Q
 from node.kernels.guard import admits, gate_aiding, guard_reading, judge_cycle
 from node.kernels.intake import take_readings
@@ -24,20 +24,9 @@ from node.kernels.jit import constant, entry, kernel, shared_body
 from node.kernels.layout import CLOCK_SLACK, DEG, Array, Scheme, Status
 from node.kernels.make_up import follow_joints
 from node.kernels.modes import STATIC_BIAS
-from node.kernels.numbers import (
-    angle_of,
-    by_record,
-    half,
-    held,
-    ratio,
-    root,
-    stamp_square,
-    time_root,
-    told,
-    told_degrees,
-)
+from node.kernels.numbers import angle_of, by_record, half, held, ratio, root, stamp_square, time_root
 from node.kernels.priors import set_stamp
-from node.kernels.quantity import LONG_AGO, factor, rate, rate_variance, seconds
+from node.kernels.quantity import LONG_AGO, NONE, factor, rate, rate_variance, seconds
 from node.kernels.record import (
     A_HOPS,
     A_OFFSET,

@@ -10,17 +10,26 @@ from __future__ import annotations
 
 from typing import Any, Final
 
-from node.kernels.events import NONE, Code, tell
+from node.kernels.events import Code, tell, told, told_degrees
+from node.kernels.fixed.arithmetic import quotient
 from node.kernels.fixed.layout import ANGLE_Q
 from node.kernels.jit import constant, kernel
 from node.kernels.layout import Array
-from node.kernels.numbers import TORQUE_Q, number, root, square, told, told_degrees, wound
-from node.kernels.quantity import variance
+from node.kernels.numbers import by_type, number, root, square
+from node.kernels.quantity import NONE, variance
 from node.kernels.record import A_HELD, A_TORQUE, A_VALID, A_YAW_VAR
 from node.kernels.resets import open_yaw
 
+TORQUE_Q: Final = 20  # N m, in integers
+STIFFNESS_Q: Final = TORQUE_Q + 30 - ANGLE_Q  # N m/rad
 UNKNOWN_VAR: Final = variance(10.0)  # rad^2, of a twist of which nothing is known but for whole turns
 STRING_UNDER_TORQUE, STRING_RELEASED = constant(Code.STRING_UNDER_TORQUE), constant(Code.STRING_RELEASED)
+
+
+@by_type(lambda torque, stiffness: quotient(torque, max(stiffness, 1)))
+def wound(torque: float, stiffness: float) -> float:
+    """The angle by which a torque winds a tube."""
+    return torque / stiffness
 
 
 @kernel

@@ -12,6 +12,8 @@ from hypothesis import strategies as st
 
 from node.kernels import numbers as n
 from node.kernels.angles import wrap, wrap_positive
+from node.kernels.cluster import WEIGHT_Q
+from node.kernels.events import TOLD_Q, told_degrees
 from node.kernels.fixed.layout import ANGLE_Q, FORCE_Q, NEVER, RATE_Q, TIME_Q, VAR_Q, VECTOR_Q
 from node.kernels.quantity import (
     LONG_AGO,
@@ -28,9 +30,10 @@ from node.kernels.quantity import (
     variance,
     warmth,
 )
+from node.kernels.twist import STIFFNESS_Q, TORQUE_Q, wound
 
 Q = {"time": TIME_Q, "rate": RATE_Q, "angle": ANGLE_Q, "force": FORCE_Q, "var": VAR_Q, "factor": VECTOR_Q}
-Q |= {"torque": n.TORQUE_Q, "stiffness": n.STIFFNESS_Q, "weight": n.WEIGHT_Q, "stamp": VAR_Q + 12, "told": n.TOLD_Q}
+Q |= {"torque": TORQUE_Q, "stiffness": STIFFNESS_Q, "weight": WEIGHT_Q, "stamp": VAR_Q + 12, "told": TOLD_Q}
 
 
 def calling(operation: Callable[..., Any], arguments: int) -> Callable[..., Any]:
@@ -74,8 +77,8 @@ CASES: dict[str, tuple[Callable[..., Any], list[tuple[str, float, float]], str, 
     "unscaled": (n.unscaled, [("rate", -32, 32), ("rate", -0.5, 0.5)], "rate", 5e-9, 4),
     "stamp_square": (n.stamp_square, [("time", 0, 0.05)], "stamp", 0.0, 2.0**38),
     "scale_square": (n.scale_square, [("factor", 0, 0.05)], "stamp", 0.0, 2.0**35),
-    "wound": (n.wound, [("torque", 0, 1e6), ("stiffness", 1e3, 1e9)], "angle", 3e-9, 1100),
-    "degrees": (lambda a: n.told_degrees(a, ANGLE_Q), [("angle", -1000, 1000)], "told", 1e-8, 1),
+    "wound": (wound, [("torque", 0, 1e6), ("stiffness", 1e3, 1e9)], "angle", 3e-9, 1100),
+    "degrees": (lambda a: told_degrees(a, ANGLE_Q), [("angle", -1000, 1000)], "told", 1e-8, 1),
     "wrap": (wrap, [("angle", -1000, 1000)], "angle", 0.0, 400),
     "wrap_positive": (wrap_positive, [("angle", -1000, 1000)], "angle", 0.0, 400),
     "a binary angle": (lambda a: n.offset_angle(n.kept_angle(a)), [("angle", -3.1, 3.1)], "angle", 0.0, 2000),

@@ -11,7 +11,6 @@ import math
 from typing import Any
 
 from node.kernels.fixed.border import (
-    COVARIANCE,
     LARGEST,
     learn_config,
     learn_state,
@@ -64,7 +63,7 @@ def fixed_cycle(
     begin, until = to_fixed(fixed, start, TIME_Q, LARGEST), to_fixed(fixed, end, TIME_Q, LARGEST)
     status = run_cycle(fixed, own.node.config, own.rate, own.force, begin, until, joined)
     show_cycle(fixed, state, own.gravity)
-    show_covariance(fixed, state, COVARIANCE)
+    show_covariance(fixed, state)
     show_aiding(fixed, state)
     if status & SURVEY_READY:
         show_survey(fixed, state, own.gravity)
@@ -103,7 +102,7 @@ def fixed_offer(
     )
     show_aiding(fixed, state)
     if status & REFERENCE_CHANGED:
-        show_covariance(fixed, state, COVARIANCE)
+        show_covariance(fixed, state)
     keep(own.shown, state_words)
     return status
 

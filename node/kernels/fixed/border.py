@@ -31,7 +31,7 @@ from node.kernels.fixed.layout import (
     VECTOR_Q,
 )
 from node.kernels.jit import kernel
-from node.kernels.layout import Array, Err
+from node.kernels.layout import STATES, Array, Err
 
 LARGEST: Final = 1 << 61
 LIMIT: Final = 2.0**61  # the same, which a float holds exactly
@@ -39,6 +39,7 @@ HIGHEST: Final = float(CEILING)
 LOG2_E: Final = math.log2(math.e)
 UNITS: Final = np.array([0] * int(Err.BIAS_X) + [UNIT] * (len(Err) - int(Err.BIAS_X)))
 COVARIANCE: Final = np.exp2(VAR_Q + UNITS[:, None] + UNITS[None, :])
+COUNT: Final = 1.0 / COVARIANCE  # powers of two: nothing is lost
 TURN: Final = 2.0 * math.pi
 
 
@@ -85,12 +86,12 @@ def show_cycle(fixed: Any, state: Any, gravity: float) -> None:
 
 
 @kernel
-def show_covariance(fixed: Any, state: Any, scale: Array) -> None:
-    """Write the covariances into the float64 record; ``scale`` (8, 8) is the value of 1."""
-    for i in range(scale.shape[0]):
-        for j in range(scale.shape[1]):
-            state.P[i, j] = fixed.P[i, j] / scale[i, j]
-            state.now_P[i, j] = fixed.now_P[i, j] / scale[i, j]
+def show_covariance(fixed: Any, state: Any) -> None:
+    """Write the covariances into the float64 record."""
+    for i in range(STATES):
+        for j in range(STATES):
+            state.P[i, j] = fixed.P[i, j] * COUNT[i, j]
+            state.now_P[i, j] = fixed.now_P[i, j] * COUNT[i, j]
 
 
 @kernel

@@ -12,12 +12,13 @@ from typing import Any
 import numpy as np
 
 from node.kernels.fixed.beside import learn
-from node.kernels.fixed.border import COVARIANCE, show_aiding, show_covariance, show_cycle, show_survey
+from node.kernels.fixed.border import show_aiding, show_covariance, show_cycle, show_survey
 from node.kernels.fixed.layout import TIME_Q, UNIT, VAR_Q
 from node.kernels.fixed.record import (
     AIDING_POWERS,
     AIDING_SCALES,
     AROUND_AT,
+    AROUND_COUNTS,
     AROUND_POWERS,
     AROUND_SCALES,
     CLUSTER_AT,
@@ -74,6 +75,7 @@ def learn_node(nodes: Array, settings: Array, integers: Array) -> None:
         last = (END_AT if met == 0 or settings[0].imus > 1 else CLUSTER_AT) - AROUND_AT
         made, floats = inside[INSIDE : INSIDE + last], nodes.view(np.float64)[AROUND_AT : AROUND_AT + last]
         learn_words(own.node.filter, made, around[:last], floats, AROUND_SCALES, AROUND_POWERS, own.gravity)
+        keep(own.last, made)
 
 
 @kernel
@@ -99,14 +101,15 @@ def learn_aiding(aiding: Array, integers: Array) -> None:
 
 
 @kernel
-def show_node(nodes: Array, settings: Array, integers: Array) -> None:
-    """Write what the integers are now into the float64 record, and keep its bytes."""
+def show_node(nodes: Array, settings: Array, integers: Array, cycle: bool) -> None:
+    """Write what the integers are now, after a ``cycle`` or an aiding, into the float64 record, and keep its bytes."""
     own, state, words = integers[0], nodes[0].filter, nodes.view(np.int64)
     fixed, gravity = own.node.filter, own.gravity
-    show_cycle(fixed, state, gravity)
-    show_covariance(fixed, state, COVARIANCE)
+    if cycle:
+        show_cycle(fixed, state, gravity)
+        show_survey(fixed, state, gravity)
+    show_covariance(fixed, state)
     show_aiding(fixed, state)
-    show_survey(fixed, state, gravity)
     keep(own.shown, words[FILTER_AT : FILTER_AT + STATE_WORDS])
     if own.node.config.changes != own.shown_changes:
         show_config(own.node.config, nodes[0].config, gravity)
@@ -115,11 +118,18 @@ def show_node(nodes: Array, settings: Array, integers: Array) -> None:
     inside = integers.view(np.int64)[INSIDE : INSIDE + END_AT - AROUND_AT]
     around, floats = words[AROUND_AT:END_AT], nodes.view(np.float64)[AROUND_AT:END_AT]
     told, count = nodes[0].events.told, compared(settings[0].imus)
-    show_words(inside, around, floats, AROUND_SCALES, AROUND_POWERS, gravity, 0, count)
+    show_part(own, inside, around, floats, gravity, 0, count)
     if told != nodes[0].events.told:
-        first, last = RING_AT - AROUND_AT, CLUSTER_AT - AROUND_AT
-        show_words(inside, around, floats, AROUND_SCALES, AROUND_POWERS, gravity, first, last)
+        show_part(own, inside, around, floats, gravity, RING_AT - AROUND_AT, CLUSTER_AT - AROUND_AT)
     keep(own.shown_around, around[:count])
+
+
+@kernel
+def show_part(own: Any, inside: Array, around: Array, floats: Array, gravity: float, begin: int, end: int) -> None:
+    """Show words ``begin`` to ``end`` of what stands around the filter."""
+    part = slice(begin, end)
+    last, counts, powers = own.last[part], AROUND_COUNTS[part], AROUND_POWERS[part]
+    show_words(inside[part], last, around[part], floats[part], counts, powers, gravity)
 
 
 @kernel

@@ -13,6 +13,8 @@ import numpy as np
 
 from node.kernels.alignment import MAX_IMUS
 from node.kernels.calibration import PARAMETERS
+from node.kernels.cluster import WEIGHT_Q
+from node.kernels.events import TOLD_Q
 from node.kernels.fixed.layout import (
     ANGLE_Q,
     FIXED_CONFIG,
@@ -24,9 +26,9 @@ from node.kernels.fixed.layout import (
     VECTOR_Q,
 )
 from node.kernels.layout import CONFIG, STATE, Array
-from node.kernels.numbers import STIFFNESS_Q, TOLD_Q, TORQUE_Q, WEIGHT_Q
 from node.kernels.quantity import WARMTH_Q
 from node.kernels.record import AIDING, MOMENT, NODE, READING, SETTINGS
+from node.kernels.twist import STIFFNESS_Q, TORQUE_Q
 
 G: Final = 1000  # of a format: a power of gravity, since forces are counted in g
 FORCE: Final = FORCE_Q + G
@@ -179,6 +181,7 @@ SETTINGS_WORDS, PARAMETER_WORDS = SETTINGS.itemsize // 8, PARAMETERS.itemsize //
 AROUND_SCALES, AROUND_POWERS = scales_of(
     np.concatenate([formats_of(NODE.fields[name][0], f".{name}") for name in AROUND if NODE.fields])
 )
+AROUND_COUNTS = np.where(AROUND_SCALES == 0.0, 0.0, 1.0 / np.maximum(AROUND_SCALES, 1e-300))
 SETTINGS_SCALES, SETTINGS_POWERS = scales_of(formats_of(SETTINGS))
 PARAMETER_SCALES, PARAMETER_POWERS = scales_of(np.tile(formats_of(PARAMETERS), 1 + MAX_IMUS))
 READING_SCALES, READING_POWERS = scales_of(READING_FORMATS)
@@ -198,6 +201,7 @@ INTEGERS: Final = np.dtype(
         ("shown_changes", "i8"),  # changes of the configuration that were shown
         ("shown", "i8", (STATE_WORDS,)),  # bytes of the filter's float64 record as it was left
         ("shown_around", "i8", (END_AT - AROUND_AT,)),  # likewise of what stands around it
+        ("last", "i8", (END_AT - AROUND_AT,)),  # integers of it, as they were shown
         ("read", "i8", (CONFIG_WORDS,)),  # bytes of the configuration as it was read
         ("read_settings", "i8", (SETTINGS_WORDS,)),
         ("read_parameters", "i8", ((1 + MAX_IMUS) * PARAMETER_WORDS,)),

@@ -44,7 +44,7 @@ def fixed_step(
     learn_node(nodes, settings, integers)
     learn_inputs(parameters, readings, moment, integers)
     says = integer_step(integers["node"], integers["settings"], own.parameters, own.readings, own.moment)
-    show_node(nodes, settings, integers)
+    show_node(nodes, settings, integers, True)
     if says & ADMITTED == 0:
         return says
     if node.aligner.method != 0:
@@ -61,5 +61,5 @@ def fixed_aiding(nodes: Array, settings: Array, aiding: Array, integers: Array) 
     learn_node(nodes, settings, integers)
     learn_aiding(aiding, integers)
     gates = integer_aiding(integers["node"], integers["settings"], integers[0].aiding)
-    show_node(nodes, settings, integers)
+    show_node(nodes, settings, integers, False)
     return gates

@@ -30,11 +30,11 @@ def learnt(counter: Any, value: float, scale: float) -> int:
 
 
 @kernel
-def shown(value: int, scale: float) -> float:
-    """The float of an integer."""
+def shown(value: int, count: float) -> float:
+    """The float of an integer whose 1 is ``count``."""
     if value == NO_NUMBER:
         return math.nan
-    return -math.inf if value == NEVER else value / scale
+    return -math.inf if value == NEVER else value * count
 
 
 @kernel
@@ -66,14 +66,17 @@ def learn_numbers(counter: Any, made: Array, floats: Array, scales: Array, power
 
 @kernel
 def show_words(
-    integers: Array, words: Array, floats: Array, scales: Array, powers: Array, gravity: float, begin: int, end: int
+    integers: Array, last: Array, words: Array, floats: Array, counts: Array, powers: Array, gravity: float
 ) -> None:
-    """Words ``begin`` to ``end`` of the floats that ``integers`` (n,) stand for, as ``learn_words``."""
-    for k in range(begin, end):
-        if scales[k] == 0.0:
+    """Of words (n,) those whose ``integers`` are not as they were ``last``, as ``learn_words``; ``counts`` are of 1."""
+    for k in range(integers.shape[0]):
+        if integers[k] == last[k]:
+            continue
+        last[k] = integers[k]
+        if counts[k] == 0.0:
             words[k] = integers[k]
         else:
-            floats[k] = shown(integers[k], scales[k] / power_of(gravity, powers[k]))
+            floats[k] = shown(integers[k], counts[k] * power_of(gravity, powers[k]))
 
 
 @kernel

@@ -13,7 +13,6 @@ from node.firmware.tube import Tube
 from node.kernels.cycle import run_cycle
 from node.kernels.doubts import noise_var
 from node.kernels.fixed.border import (
-    COVARIANCE,
     LARGEST,
     config_in_integers,
     held,
@@ -100,7 +99,7 @@ def test_what_is_shown_is_read_back_the_same() -> None:
         largest = 2 ** max(0, int(np.abs(a).max(initial=0)).bit_length() - 52)
         assert np.abs(a - b).max(initial=0) <= largest, name
     show_cycle(again, shadow, G)
-    show_covariance(again, shadow, COVARIANCE)
+    show_covariance(again, shadow)
     show_aiding(again, shadow)
 
 
@@ -245,7 +244,7 @@ def integers_in_parts(loop: Loop) -> Loop:
             reading = node["rate"], node["force"], int(times[START]), int(times[END]), int(times[JOINED])
             status = fixed_run_cycle(node["filter"], node["config"], *reading)
             says = leave(nodes, crews, times, int(status), waits)
-        show_node(shadows, settings, integers)
+        show_node(shadows, settings, integers, True)
         return int(says)
 
     def aiding(shadows: Array, settings: Array, given: Array) -> int:
@@ -258,7 +257,7 @@ def integers_in_parts(loop: Loop) -> Loop:
             node["noticed"] |= offer_aiding(node["filter"], node["config"], yaw, yaw_var + noise_var(node), *about)
         if gates & ONWARD:
             hand_down(nodes, crews)
-        show_node(shadows, settings, integers)
+        show_node(shadows, settings, integers, False)
         return int(gates)
 
     return loop._replace(step=step, aiding=aiding)

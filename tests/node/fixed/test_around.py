@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 from node.kernels.aiding_watch import find_mismatch, forget
 from node.kernels.alignment import to_tube
 from node.kernels.calibration import COLDEST, HOTTEST, PARAMETERS, calibrate, identity_parameters
-from node.kernels.cluster import fuse
+from node.kernels.cluster import WEIGHT_Q, fuse
 from node.kernels.coarse_level import level_coarsely
 from node.kernels.delay import make_up_delay
 from node.kernels.fixed.border import config_in_integers, state_in_integers
@@ -19,7 +19,6 @@ from node.kernels.fixed.layout import ANGLE_Q, FORCE_Q, RATE_Q, TIME_Q, VAR_Q, V
 from node.kernels.fixed.record import FIXED_PARAMETERS, FORCE, formats_of, in_integers, scales_of
 from node.kernels.fixed.words import learn_numbers, learn_words, show_words
 from node.kernels.layout import DEG, PERIOD, default_config, new_state
-from node.kernels.numbers import WEIGHT_Q
 from node.kernels.quantity import NO_NUMBER, WARMTH_Q
 from node.kernels.record import AIDINGS, DELAYED, GUARD, MISMATCH, NODE
 
@@ -47,7 +46,8 @@ def turned_back(made: np.ndarray, kind: np.dtype[Any], path: str = "") -> np.nda
     shown = np.zeros(made.shape, kind)
     scales, powers = scales_of(np.tile(formats_of(kind, path), made.size))
     words = made.view(np.int64)
-    show_words(words, shown.view(np.int64), shown.view(float), scales, powers, G, 0, len(words))
+    counts = np.divide(1.0, scales, out=np.zeros(len(scales)), where=scales > 0.0)
+    show_words(words, ~words, shown.view(np.int64), shown.view(float), counts, powers, G)
     return shown
 
 

@@ -119,7 +119,7 @@ def events_since(nodes: np.ndarray, said: int) -> list[tuple[Any, ...]]:
 @pytest.mark.slow
 @pytest.mark.parametrize(("seed", "imus", "joints"), [(2, 3, 2), (3, 2, 0), (4, 1, 2), (5, 3, 1), (6, 1, 0), (7, 1, 1)])
 def test_a_node_does_the_same_in_integers(seed: int, imus: int, joints: int) -> None:
-    """Where no scale is learnt anew: the prior of one (0.1) is beyond the range of the integers (0.054, decision 11)."""
+    """Where no scale is learnt anew: the prior of one is 0.1, the range of the integers 0.054 (decision 11)."""
     rig = Rig(imus, np.random.default_rng(seed))
     floats, fixed = node_of(imus, joints, np.random.default_rng(seed)), FixedNode()
     integers = tuple(part.copy() for part in floats)
