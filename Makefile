@@ -17,7 +17,7 @@ PYTEST := $(BIN)/python -m pytest --numprocesses $(WORKERS) --maxprocesses 8 --d
 .PHONY: help rig test quick check lint types contracts kernels kernels-of-strings other-kernels bytecode browser fast tests statistical truth explore lock study soak seeds clean test-socketcan test-compose
 
 help:  ## list the targets
-	@awk -F ':.*## ' '/^[a-z-]+:.*## / { printf "make %-15s %s\n", $$1, $$2 }' $(MAKEFILE_LIST)
+	@awk -F ':.*## ' '/^[a-z-]+:.*## / { printf "make %-18s %s\n", $$1, $$2 }' $(MAKEFILE_LIST)
 
 rig: $(STAMP)  ## set up and drill wellbore 1
 	$(BIN)/borechain rig scenarios/wellbore-1.toml --speed max --seed 1
@@ -50,10 +50,10 @@ contracts: $(STAMP)  ## which package may import which
 
 kernels: kernels-of-strings other-kernels  ## compile what the tests would compile, each worker for itself
 
-kernels-of-strings: $(STAMP)
+kernels-of-strings: $(STAMP)  ## those of a node's usual kernel and of strings
 	$(BIN)/python tests/tools/compile_kernels.py strings
 
-other-kernels: $(STAMP)
+other-kernels: $(STAMP)  ## those of a node's other kernels and of surveys
 	$(BIN)/python tests/tools/compile_kernels.py others
 
 bytecode: $(STAMP)  ## compile what the tests import, asserts rewritten, each worker for itself

@@ -82,15 +82,19 @@ class Scales:
 
     def _weigh(self, hours: float) -> Iterator[Weight]:
         for name, pid in sorted(pids(self._table).items()):
-            kept = self._kept() if name == GROUND else (0.0, 0)
+            kept = self.kept() if name == GROUND else (0.0, 0)
             handles = len(list(Path(f"/proc/{pid}/fd").iterdir()))
             yield Weight(hours, name, footprint(pid)["private_mb"], handles, *kept)
 
-    def _kept(self) -> tuple[float, int]:
+    def kept(self) -> tuple[float, int]:
         """Size of the database in kB, and surveys in it."""
         if not self._database.exists():
             return 0.0, 0
         size = sum(file.stat().st_size for file in self._database.parent.glob(f"{self._database.name}*"))
         with contextlib.closing(sqlite3.connect(f"file:{self._database}?mode=ro", uri=True)) as connection:
+            # the file is there before the ground station has laid out its tables
+            (tables,) = connection.execute("select count(*) from sqlite_master where name = 'messages'").fetchone()
+            if not tables:
+                return size / 1e3, 0
             (surveys,) = connection.execute("select count(*) from messages where kind = 'SurveyMeasurement'").fetchone()
         return size / 1e3, int(surveys)

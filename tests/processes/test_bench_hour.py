@@ -2,14 +2,26 @@
 
 import csv
 import json
+import sqlite3
 from pathlib import Path
 
 import pytest
 from rigs import free_endpoint, run
 
-pytestmark = pytest.mark.process
+from borechain.load.hour import Scales
+from sim.rig.processes import ProcessTable
 
 
+def test_a_database_that_is_not_there_or_has_no_tables_yet_weighs_what_it_weighs(tmp_path: Path) -> None:
+    database = tmp_path / "ground.sqlite"
+    table = ProcessTable({}, [])
+    assert Scales(table, database, 1.0).kept() == (0.0, 0)
+    with sqlite3.connect(database) as connection:
+        connection.execute("pragma user_version = 1")
+    assert Scales(table, database, 1.0).kept() == (database.stat().st_size / 1e3, 0)
+
+
+@pytest.mark.process
 def test_every_process_is_weighed_while_it_drills_and_what_came_of_it_is_told(tmp_path: Path) -> None:
     words = ("--tubes", "2", "--seconds", "20", "--speed", "10", "--endpoint", free_endpoint())
     done = run("bench", "hour", *words, "--out", str(tmp_path / "new"), "--json")
