@@ -295,7 +295,7 @@ class GroundProcess(Process):
 
     def _on_reading(self, reading: DepthReading, now: float) -> None:
         model = self.model
-        refused = model.depths.on_reading(reading, model.epoch, model.rig_now, model.tally.deepest)
+        refused = model.depths.on_reading(reading, model.epoch, model.rig_now, now, model.tally.deepest)
         self.watch.on_depth("" if refused == "repeated" else refused)
         self._keep_depth_doubt()
         if refused:
