@@ -97,6 +97,7 @@ class DepthLog:
         self._tracks: dict[int, Track] = {}
         self._sequence: int | None = None
         self._raw: tuple[int, float, float] | None = None  # epoch, time and depth of the last reading that came
+        self._raw_made_at = math.nan  # s, own clock; NaN where it came before the ground station's start
         self._trusted: tuple[int, float, float] | None = None  # of the last one that was taken
         self._accepted = NEVER  # when the crew accepted the depth
         self._doubtful: deque[Stand] = deque(maxlen=DOUBTS_KEPT)  # times of which no stand is believed
@@ -106,12 +107,12 @@ class DepthLog:
         """Newest depth, m."""
         return None if self._trusted is None else self._trusted[2]
 
-    def on_reading(self, reading: DepthReading, epoch: int, rig_now: float, deepest: float) -> str:
-        """Take a reading at ``rig_now`` (s) of ``epoch``; returns why it is refused, or nothing.
+    def on_reading(self, reading: DepthReading, epoch: int, rig_now: float, now: float, deepest: float) -> str:
+        """Take a reading at ``rig_now`` (s) of ``epoch`` and ``now`` (s, own clock); returns why not, or nothing.
 
         ``deepest`` (m) is what the string reaches.
         """
-        reason = self._refusal(reading, epoch, rig_now, deepest)
+        reason = self._refusal(reading, epoch, rig_now, now, deepest)
         if reason:
             self.refusals[reason] += 1
             return reason
@@ -212,7 +213,7 @@ class DepthLog:
             return True  # the crew has looked since the first ended
         return abs(second.md - first.md) <= self._rate * (second.begun_at - first.ended_at) + SLACK
 
-    def _refusal(self, reading: DepthReading, epoch: int, rig_now: float, deepest: float) -> str:
+    def _refusal(self, reading: DepthReading, epoch: int, rig_now: float, now: float, deepest: float) -> str:
         if reading.epoch not in (EPOCH_UNKNOWN, epoch):
             return "of another epoch of rig time"
         if reading.at > rig_now + AHEAD:
@@ -226,15 +227,32 @@ class DepthLog:
         self._count(reading.sequence)
         if reading.md > deepest:
             return "deeper than the string reaches"
-        self._raw = (epoch, reading.at, reading.md)
+        made_at, before = now - (rig_now - reading.at), self._raw_made_at
+        self._raw, self._raw_made_at = (epoch, reading.at, reading.md), made_at
         if raw is not None and same_epoch:
             self._judge_jump(reading, raw)
+        elif raw is not None and not self.jumped:
+            self._judge_jump_between_epochs(reading, epoch, raw, made_at - before)
         return "after a jump" if self.jumped else ""
+
+    def _is_too_fast(self, reading: DepthReading, md: float, seconds: float) -> bool:
+        """Whether no bit moves so far in the ``seconds`` since it was at ``md`` (m); NaN seconds say nothing."""
+        if not abs(reading.md - md) > self._rate * seconds + SLACK:
+            return False
+        self.jumped = f"from {md:.2f} m to {reading.md:.2f} m in {seconds:.1f} s"
+        return True
+
+    def _judge_jump_between_epochs(
+        self, reading: DepthReading, epoch: int, raw: tuple[int, float, float], seconds: float
+    ) -> None:
+        """Rig time began anew between two readings: the own clock says how many ``seconds`` lie between them."""
+        if self._is_too_fast(reading, raw[2], max(seconds, 0.0)):
+            self._doubt(Stand(raw[0], raw[1], math.inf, raw[2]))
+            self._doubt(Stand(epoch, -math.inf, reading.at, raw[2]))
 
     def _judge_jump(self, reading: DepthReading, raw: tuple[int, float, float]) -> None:
         if not self.jumped:
-            if abs(reading.md - raw[2]) > self._rate * (reading.at - raw[1]) + SLACK:
-                self.jumped = f"from {raw[2]:.2f} m to {reading.md:.2f} m in {reading.at - raw[1]:.1f} s"
+            if self._is_too_fast(reading, raw[2], reading.at - raw[1]):
                 self._doubt(Stand(raw[0], raw[1], reading.at, raw[2]))
         elif self._trusted is not None and abs(reading.md - self._trusted[2]) <= RETURNED:
             self.jumped = ""

@@ -19,6 +19,7 @@ from groundstation.service.intake import DEPTH, MESSAGE, ORDER, TIMER, Tape
 from groundstation.service.model import RigModel
 from groundstation.service.operator import BlockUpload, Operator, Outgoing
 from groundstation.service.orders import Order
+from groundstation.service.stops import belongs
 from groundstation.service.store import Store, Stored
 from groundstation.service.uploads import Uploads
 from groundstation.service.watch import Watch
@@ -295,7 +296,7 @@ class GroundProcess(Process):
 
     def _on_reading(self, reading: DepthReading, now: float) -> None:
         model = self.model
-        refused = model.depths.on_reading(reading, model.epoch, model.rig_now, model.tally.deepest)
+        refused = model.depths.on_reading(reading, model.epoch, model.rig_now, now, model.tally.deepest)
         self.watch.on_depth("" if refused == "repeated" else refused)
         self._keep_depth_doubt()
         if refused:
@@ -324,12 +325,19 @@ class GroundProcess(Process):
         whole = stand
         while before and (before[-1].epoch, before[-1].md) == (stand.epoch, stand.md):
             whole = replace(stand, begun_at=before.pop().begun_at)
-        if not before or stand not in depths.stands:
+        if stand not in depths.stands:
             return
-        if before[-1].md < stand.md:
+        is_stop = before[-1].md < stand.md if before else self.model.stops.know(whole)
+        if is_stop:
             self.model.stops.on_stand(whole)
-        elif before[-1].md == stand.md:
+        elif before and before[-1].md == stand.md:
             self.model.stops.on_later_stand(before[-1], whole)
+
+    def _on_surveyed(self, epoch: int, at: float) -> None:
+        """The first stand that is known is a stop where a survey was taken in it: drilling ended before anyone heard."""
+        for first in self.model.depths.stands[:1]:
+            if belongs(first, epoch, at):
+                self.model.stops.on_stand(first)
 
     def _keep_stand(self, reading: DepthReading) -> None:
         """Store a stand when it begins and when it has ended."""
@@ -450,7 +458,10 @@ class GroundProcess(Process):
         if isinstance(message, StaticRecord):
             self.model.on_static_record(message)
             return ["static_records"]
-        self.model.stops.on_survey(message.epoch or self.model.epoch, message.station_at, message.tube)
+        epoch = message.epoch or self.model.epoch
+        self.model.stops.on_survey(epoch, message.station_at, message.tube)
+        if md is not None:
+            self._on_surveyed(epoch, message.station_at)
         self.watch.on_survey(message, self.model.on_survey(message, md, below))
         return [*CHANGED_BY_SURVEY, *self._wall_paths]
 

@@ -1,7 +1,8 @@
 """Where the string stopped to be surveyed, and which tubes have not answered. No I/O.
 
-A stop is a stand of the bit that began with the end of drilling and lasted long enough for a survey. Every tube in the
-hole owes one; a tube whose node is still above the collar does not.
+A stop is a stand of the bit that began with the end of drilling and lasted long enough for a survey; where nobody heard
+how a stand began, it is one if a tube took a survey in it. Every tube in the hole owes one; a tube whose node is still
+above the collar does not.
 """
 
 from __future__ import annotations
@@ -83,6 +84,10 @@ class Stops:
         for stop in self._stops:
             if tube in stop.missing and stop.has(epoch, at):
                 stop.missing.discard(tube)
+
+    def know(self, stand: Stand) -> bool:
+        """Whether a stand is that of a stop, or more of it."""
+        return any(_same(stop.stand, stand) for stop in self._stops)
 
     def on_stand(self, stand: Stand) -> None:
         """A stand has begun, or lasted longer; the tubes are those that are known to hang while it lasts."""

@@ -100,6 +100,8 @@ def test_combined_seeds_hold(first: int) -> None:
         (200389, ("frozen", "force-saturated")),  # a clipped force was levelled by before it counted as a fault
         (201908, ("depth-jumps-down", "ground-off-across-stop", "depth-backwards")),  # why depths were refused
         (207889, ("same-number", "replay", "splice")),  # the first word of a tube, recorded, opened the door for more
+        (213809, ("encoder-from-zero", "ground-cut", "bytes-rot", "database-deleted")),  # the first stand was a stop
+        (213984, ("encoder-from-zero", "ground-cut", "depth-jumps-up")),  # a jump from one epoch to the next
         (51633, ("surveys-lost", "gyro-step")),  # a gyroscope that turned its tube while nobody corrected it
     ],
 )

@@ -27,7 +27,7 @@ class Bit:
     def read(self, md: float, ahead: float = 0.0, *, heard: bool = True) -> str:
         self.md = md
         reading = self.source.measure(self.now + ahead, md)
-        return self.log.on_reading(reading, EPOCH, self.now, 1e3) if heard else "off"
+        return self.log.on_reading(reading, EPOCH, self.now, self.now, 1e3) if heard else "off"
 
     def move_to(self, md: float, *, heard: bool = True) -> None:
         while self.md != md:
@@ -44,7 +44,7 @@ class Bit:
     def hear_stands(self) -> None:
         self.now += CYCLE
         reading = self.source.measure(self.now, self.md)
-        assert self.log.on_reading(reading, EPOCH, self.now, 1e3) == ""
+        assert self.log.on_reading(reading, EPOCH, self.now, self.now, 1e3) == ""
         for stand in reading.stands:
             self.log.add_stand(Stand(EPOCH, stand.begun_at, stand.ended_at, stand.md))
 
@@ -102,8 +102,30 @@ def test_what_the_stream_may_not_say_is_refused(md: float, ahead: float, reason:
 
 def test_a_reading_of_another_epoch_is_refused() -> None:
     log = DepthLog(0.5, 5.0)
-    assert log.on_reading(DepthReading(1, 10.0, 1.0, (), EPOCH + 1), EPOCH, 10.0, math.inf) != ""
-    assert log.on_reading(DepthReading(2, 10.0, 1.0, (), EPOCH), EPOCH, 10.0, math.inf) == ""
+    assert log.on_reading(DepthReading(1, 10.0, 1.0, (), EPOCH + 1), EPOCH, 10.0, 10.0, math.inf) != ""
+    assert log.on_reading(DepthReading(2, 10.0, 1.0, (), EPOCH), EPOCH, 10.0, 10.0, math.inf) == ""
+
+
+@pytest.mark.parametrize(("by", "reason"), [(-0.3, ""), (1.5, "after a jump"), (-1.5, "after a jump")])
+def test_a_bit_that_moves_too_fast_from_one_epoch_to_the_next_has_jumped(by: float, reason: str) -> None:
+    """The own clock tells the time between the two readings, however late they came."""
+    log = DepthLog(0.5, 5.0)
+    late, own = 2.0, 500.0
+    assert log.on_reading(DepthReading(1, 1000.0, 3.0, (), EPOCH), EPOCH, 1000.0 + late, own + late, 1e3) == ""
+    first = DepthReading(2, 7.0, 3.0 + by, (), EPOCH + 1)
+    assert log.on_reading(first, EPOCH + 1, 7.0, own + 1.0, 1e3) == reason
+    stand = Stand(EPOCH + 1, 6.0, 8.0, 3.0 + by)
+    assert log.add_stand(stand) == (reason == "")
+    if reason:
+        assert log.jumped == f"from 3.00 m to {3.0 + by:.2f} m in 1.0 s"
+        log.accept()
+        assert log.on_reading(DepthReading(3, 9.0, 3.0 + by, (), EPOCH + 1), EPOCH + 1, 9.0, own + 3.0, 1e3) == ""
+
+
+def test_nothing_is_known_of_the_time_between_epochs_across_a_start() -> None:
+    log = DepthLog(0.5, 5.0)
+    log.restore([Stand(EPOCH, 900.0, 1000.0, 3.0)])
+    assert log.on_reading(DepthReading(2, 7.0, 30.0, (), EPOCH + 1), EPOCH + 1, 7.0, 500.0, 1e3) == ""
 
 
 @pytest.mark.parametrize("by", [3.0, -1.5])
@@ -162,7 +184,7 @@ def test_of_a_jump_that_the_crew_looked_at_the_stands_that_go_on_are_believed_an
     before = Stand(EPOCH, 1000.0, 1010.0, 6.0)
     assert log.add_stand(before)
     for at, md in ((1009.5, 6.0), (1010.0, 6.0), (1010.5, 2.5), (1011.0, 2.5)):
-        log.on_reading(DepthReading(int(2 * at), at, md, ()), EPOCH, at, 1e3)
+        log.on_reading(DepthReading(int(2 * at), at, md, ()), EPOCH, at, at, 1e3)
     log.accept()
     assert not log.add_stand(Stand(EPOCH, 1010.5, 1011.0, 2.5))
     assert log.stands == [before]
@@ -194,8 +216,8 @@ def test_numbers_that_never_came_are_counted() -> None:
 def test_a_repeated_reading_changes_nothing() -> None:
     log = DepthLog(0.5, 5.0)
     first = DepthReading(1, 10.0, 1.0, ())
-    assert log.on_reading(first, EPOCH, 10.0, math.inf) == ""
-    assert log.on_reading(first, EPOCH, 10.0, math.inf) == "repeated"
+    assert log.on_reading(first, EPOCH, 10.0, 10.0, math.inf) == ""
+    assert log.on_reading(first, EPOCH, 10.0, 10.0, math.inf) == "repeated"
 
 
 @pytest.mark.parametrize("md", [-1e-9, -1.0, math.nan, math.inf, 1e6])

@@ -229,6 +229,28 @@ def test_a_tube_that_loses_its_memory_leaves_no_station_silently(rig: Drilled) -
     assert rig.surveys() == EVERY or rig.codes() & {"survey_missing", "survey_untrusted"}
 
 
+def test_a_first_stand_in_which_a_tube_surveyed_is_a_stop_of_all(rig: Drilled) -> None:
+    """The ground station knows nothing from before the stop, and of the tubes one lost what it had measured."""
+    begin = rig.drills[1] + 5.0
+    rig.drill(begin)
+    rig.cut(BASE)
+    rig.cut(ENCODER)
+    empty(rig.place("ground"))
+    rig.drill(begin + 3.0)
+    rig.world.reboot(begin)
+    rig.start(ENCODER)
+    rig.drill(rig.stops[1] + 20.0)
+    rig.cut(2)
+    for slot in rig.place("tube-2").glob("slot-*"):
+        slot.unlink()
+    rig.start(2)
+    rig.start(BASE)
+    rig.finish()
+    assert (1, 2.0 * LENGTH) in rig.surveys()
+    assert (2, LENGTH) not in rig.surveys()
+    assert "survey_missing" in rig.codes()
+
+
 def test_a_node_whose_folder_takes_nothing_goes_on_and_says_so(rig: Drilled) -> None:
     rig.drill(rig.drills[1] - 20.0)
     rig.cut(1)
