@@ -334,7 +334,7 @@ class GroundProcess(Process):
             self.model.stops.on_later_stand(before[-1], whole)
 
     def _on_surveyed(self, epoch: int, at: float) -> None:
-        """The first stand that is known is a stop where a survey was taken in it: drilling ended before anyone heard."""
+        """The first stand that is known is a stop where a survey was taken in it: nobody heard how it began."""
         for first in self.model.depths.stands[:1]:
             if belongs(first, epoch, at):
                 self.model.stops.on_stand(first)
