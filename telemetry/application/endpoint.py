@@ -17,7 +17,7 @@ from telemetry.application.clock import ClockFilter
 from telemetry.application.outbox import Outbox
 from telemetry.application.saved_state import SavedState, is_needed, pack_state, parse_state
 from telemetry.errors import DecodeError
-from telemetry.media.port import MAX_FRAME, Frame, Priority
+from telemetry.media.port import Frame, Priority
 from telemetry.messages import (
     BASE,
     ENCODER,
@@ -50,19 +50,22 @@ from telemetry.presentation.msgpack_codec import (
     peek,
 )
 from telemetry.schema import Kind
-from telemetry.transport.hop import HopLink
+from telemetry.transport.hop import BUNDLE_LIMIT, HopLink
 from telemetry.transport.nearest import Nearest
 
 if TYPE_CHECKING:
     from telemetry.application.seals import Seals
 
 HELLO_EVERY = 1.0  # s
+HELLO_WAIT = 0.6  # s for which a hello waits for an aiding or a state to go with, once both ends know each other
 SYNC_BURST = 30  # exchanges at the quick pace after a start
 SYNC_QUICK = 1.0  # s
 SYNC_SLOW = 10.0  # s
 ANSWERS_KEPT = 64
 SERIES_SHIFT = 24  # of a sequence number: below it the count, above it the start at which the count began
-SEALED_BUNDLE = MAX_FRAME - 1024  # bytes of payloads in a frame: what a medium carries holds the frame's seal too
+STATE_WAIT = 1.15  # s for which a node's state waits for those of the nodes below, to go up with them
+HOP_WAIT = 0.005  # s, longer by a frame's way where fewer hops are left: after a loss the lowest goes first again
+WAITING_HOPS = 100
 REPORT_EVERY = 60.0  # s between two looks at what queues dropped
 DROPS = ("reliable_dropped", "best_effort_dropped", "outbox_dropped")  # counters of what found no place in a queue
 ONE_HOP = (Kind.AIDING, Kind.HELLO, Kind.TIME_REQUEST, Kind.TIME_REPLY)
@@ -151,8 +154,6 @@ class Endpoint:
         self._hops_are_told = address == ENCODER
         self._reach = reach
         self._links = {side: HopLink(address, boot_count, self._nearest(side)) for side in sorted(sides)}
-        for side in sides:
-            self.limit_bundles(side, MAX_FRAME)
         toward_encoder = Side.LOWER if address == BASE else Side.UPPER
         self._sync_side = None if is_clock_root else toward_encoder
         # a process that lost its numbers begins another series, so that none is given to a second message
@@ -174,7 +175,7 @@ class Endpoint:
     def limit_bundles(self, side: Side, limit: int) -> None:
         """Let payloads share a frame at one end only up to ``limit`` bytes: a large frame holds an urgent one up."""
         if side in self._links:
-            self._links[side].bundle_limit = limit if self.seals is None else min(limit, SEALED_BUNDLE)
+            self._links[side].bundle_limit = min(limit, BUNDLE_LIMIT)
 
     def receive(self, side: Side, frame: bytes, now: float, margin: float = math.inf) -> list[Received]:
         """Take a frame from one end, heard with a ``margin`` (dB); returns the messages for this process.
@@ -220,8 +221,9 @@ class Endpoint:
             self.seals.advance(now)
             self._send_offers()
         if now >= self._hello_at + HELLO_EVERY:
+            is_news = self._hello_at == -math.inf
             self._hello_at = now
-            self._send_hello()
+            self._send_hello(now if is_news else now + HELLO_WAIT)
         if self._sync_side in self._links and now >= self._sync_at + self._sync_pace():
             self._sync_at = now
             self._links[self._sync_side].send_best_effort(encode(TimeRequest(now)), Kind.TIME_REQUEST, Priority.TIME)
@@ -251,18 +253,21 @@ class Endpoint:
             aiding = self.seals.measurement.close(aiding)
         if Side.LOWER in self._links:
             self._links[Side.LOWER].send_best_effort(encode(aiding), Kind.AIDING, Priority.AIDING)
+            self._links[Side.LOWER].release()
 
     def ask_time(self, now: float) -> None:
         """Compare clocks again at the quick pace: the epoch of rig time is another one."""
         self._sync_at = min(self._sync_at, now - SYNC_SLOW + SYNC_QUICK)
 
     def send_state(self, state: NodeState, now: float) -> None:
-        """Send the node's account of itself up the string."""
-        del now
+        """Send the node's account of itself up the string, with those from below: the lowest node sets the pace."""
         self.mode = state.mode
-        if Side.UPPER in self._links:
+        if (link := self._links.get(Side.UPPER)) is not None:
+            below = self._links.get(Side.LOWER)
+            wait = STATE_WAIT + HOP_WAIT * max(WAITING_HOPS - self.hops, 0)
+            until = now + wait if below is not None and below.is_up(now) else now
             payload = self._sealed(encode(state))
-            self._links[Side.UPPER].send_best_effort(payload, (Kind.NODE_STATE, state.tube), Priority.STATE)
+            link.send_with_others(payload, (Kind.NODE_STATE, state.tube), Priority.STATE, until)
 
     def submit(self, message: Kept, now: float) -> None:
         """Keep a message until the ground station has receipted it, and send it unless messages are held back."""
@@ -523,11 +528,13 @@ class Endpoint:
             link.send_reliable(payload, PRIORITIES[envelope.kind])
         else:
             link.send_best_effort(payload, (envelope.kind, envelope.origin), PRIORITIES[envelope.kind])
+            if envelope.kind is Kind.NODE_STATE:
+                link.release()
 
-    def _send_hello(self) -> None:
+    def _send_hello(self, until: float) -> None:
         for link in self._links.values():
             hello = Hello(self.address, self.boot_count, self.hops, self.mode, link.quality)
-            link.send_best_effort(encode(hello), Kind.HELLO, Priority.HELLO)
+            link.send_with_others(encode(hello), Kind.HELLO, Priority.HELLO, until)
 
     def _nearest(self, side: Side) -> Nearest | None:
         """Who is chosen at an end; base station and encoder are joined by a cable, where one alone is heard."""

@@ -24,8 +24,9 @@ from telemetry.transport.nearest import Nearest
 VERSION = 1
 WINDOW = 64
 QUEUE_LIMIT = 512
-BEST_EFFORT_LIMIT = 64
-ENTRIES_PER_FRAME = 8
+BEST_EFFORT_LIMIT = 320  # a state of every tube that a string can have, and what neighbours say to each other
+ENTRY_BYTES = 13  # around a payload, at most
+BUNDLE_LIMIT = MAX_FRAME - 1024  # bytes of payloads that share a frame, with what is around each
 FIRST_TIMEOUT = 0.06  # s, one round trip and the wait of a lonely acknowledgement
 LAST_TIMEOUT = 2.0  # s
 ACK_DELAY = 0.02  # s
@@ -44,6 +45,14 @@ class Outstanding:
     priority: Priority
     send_at: float
     timeout: float = FIRST_TIMEOUT
+
+
+class Patient(NamedTuple):
+    """Best effort that waits for others to go with, until a time (s)."""
+
+    payload: bytes
+    priority: Priority
+    until: float
 
 
 class Entry(NamedTuple):
@@ -85,7 +94,7 @@ class HopLink:
         self.peer: tuple[int, int] | None = None  # address and boot count of the other end
         self.last_heard = -math.inf
         self.quality = 1.0
-        self.bundle_limit = MAX_FRAME  # bytes of payloads that share a frame; a single one may be larger
+        self.bundle_limit = BUNDLE_LIMIT  # bytes; a single payload may be larger
         self.counters: Counter[str] = Counter()
         self._peer_epoch = 0
         self._peer_count = 0
@@ -97,6 +106,8 @@ class HopLink:
         self._outstanding: OrderedDict[int, Outstanding] = OrderedDict()
         self._queue: OrderedDict[bytes, Priority] = OrderedDict()
         self._best_effort: OrderedDict[Hashable, tuple[bytes, Priority]] = OrderedDict()
+        self._patient: dict[Hashable, Patient] = {}
+        self._patient_until = math.inf
 
     def is_up(self, now: float) -> bool:
         """Whether the other end was heard lately."""
@@ -118,6 +129,20 @@ class HopLink:
             self._best_effort.popitem(last=False)
             self.counters["best_effort_dropped"] += 1
         self._best_effort[topic] = payload, priority
+
+    def send_with_others(self, payload: bytes, topic: Hashable, priority: Priority, until: float) -> None:
+        """Queue a best effort that goes with the next ``release``, and alone at ``until`` (s)."""
+        if (waiting := self._patient.pop(topic, None)) is not None:
+            until = min(until, waiting.until)
+        self._patient[topic] = Patient(payload, priority, until)
+        self._patient_until = min(self._patient_until, until)
+
+    def release(self, now: float = math.inf) -> None:
+        """Send what waited for others to go with, or what has waited until ``now`` (s)."""
+        for topic in [topic for topic, waiting in self._patient.items() if waiting.until <= now]:
+            waiting = self._patient.pop(topic)
+            self.send_best_effort(waiting.payload, topic, waiting.priority)
+        self._patient_until = min((waiting.until for waiting in self._patient.values()), default=math.inf)
 
     def receive(self, frame: bytes, now: float, margin: float = math.inf) -> list[bytes]:
         """Payloads of a frame that were not delivered before; garbage is counted and gives none.
@@ -146,6 +171,8 @@ class HopLink:
     def take_frames(self, now: float) -> list[Frame]:
         """Frames that are due now."""
         frames: list[Frame] = []
+        if self._patient_until <= now:
+            self.release(now)
         if not (self._best_effort or self._queue or self._outstanding or self._ack_due <= now):
             return frames  # as nearly always: it is asked after every event
         entries = self._due_entries(now)
@@ -157,9 +184,9 @@ class HopLink:
 
     def next_wake(self, now: float) -> float:
         """When ``take_frames`` has something to do without further input, infinite if never."""
-        wake = self._ack_due
-        if self.is_up(now):
-            wake = min((o.send_at for o in self._outstanding.values()), default=math.inf) if wake == math.inf else wake
+        wake = min(self._ack_due, self._patient_until)
+        if self._outstanding and self.is_up(now):
+            wake = min(wake, min(o.send_at for o in self._outstanding.values()))
         return wake
 
     @property
@@ -280,11 +307,11 @@ def common_topic(entries: Iterable[Entry]) -> Hashable | None:
 
 
 def bundled(entries: Iterable[Entry], limit: int) -> int:
-    """How many of the first entries share a frame: at most ``limit`` bytes of payloads, but one in any case."""
+    """How many of the first entries share a frame: at most ``limit`` bytes of them, but one in any case."""
     count = total = 0
     for entry in entries:
-        total += len(entry.payload)
-        if count == ENTRIES_PER_FRAME or (count > 0 and total > limit):
+        total += len(entry.payload) + ENTRY_BYTES
+        if count > 0 and total > limit:
             break
         count += 1
     return count

@@ -29,7 +29,7 @@ from telemetry.messages import (
 )
 from telemetry.presentation.msgpack_codec import MAX_PAYLOAD, decode, encode, peek
 from telemetry.schema import SCHEMA, Kind
-from telemetry.transport.hop import ENTRIES_PER_FRAME, MAX_FRAME
+from telemetry.transport.hop import BUNDLE_LIMIT, ENTRY_BYTES, MAX_FRAME
 
 ANY = st.one_of(*MESSAGES.values())
 OF_BEFORE = set(Kind) - {
@@ -202,7 +202,7 @@ def test_a_message_out_of_range_is_not_sent(message: Any) -> None:
         encode(message)
 
 
-def test_eight_segments_fit_one_frame_and_each_one_payload() -> None:
+def test_a_segment_fits_one_payload_and_a_frame_holds_a_bundle() -> None:
     worst = BlockSegment(250, 2**53, 2**32 - 1, bytes(32), 32, 31, b"x" * SEGMENT_SIZE, bytes(32))
     assert len(encode(worst)) <= MAX_PAYLOAD
-    assert ENTRIES_PER_FRAME * (len(encode(worst)) + 16) + 128 <= 4096 <= MAX_FRAME
+    assert MAX_PAYLOAD + ENTRY_BYTES <= BUNDLE_LIMIT <= MAX_FRAME - 128
