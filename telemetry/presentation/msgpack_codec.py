@@ -15,6 +15,7 @@ import msgpack
 from telemetry.errors import DecodeError, EncodeError
 from telemetry.messages import BASE, SCHEMA_VERSION, Message
 from telemetry.presentation.fields import MAX_BINARY, codec_of
+from telemetry.presentation.readers import Reader, reader_of
 from telemetry.schema import SCHEMA, U53, Kind, MessageSpec
 
 MAX_PAYLOAD = 4096
@@ -43,6 +44,8 @@ class MessageCodec:
     """One message on the wire, made from its line of the schema; what every message needs is looked up here once."""
 
     def __init__(self, spec: MessageSpec) -> None:
+        self._spec = spec
+        self._readers: dict[int, Reader] = {}  # by schema version, compiled when a payload of it comes
         self.kind = spec.kind
         self.message = spec.message
         self.newest = spec.newest
@@ -59,6 +62,13 @@ class MessageCodec:
         self._keys = keys  # of each version
         self._origin = names.index("tube") if "tube" in names else None
         self._sequence = names.index("sequence") if "sequence" in names else None
+
+    def reader(self, version: int) -> Reader:
+        """Function from the fields of a payload of a schema version to its message."""
+        reader = self._readers.get(version)
+        if reader is None:
+            reader = self._readers[version] = reader_of(self._spec, self.fields, version)
+        return reader
 
     def pack(self, values: list[Any]) -> bytes:
         """Payload of the values of all fields, which are checked, in the earliest schema version that has them."""
@@ -127,13 +137,11 @@ def decode_opened(opened: Opened) -> Message:
     DecodeError
         When a field is missing or outside its range.
     """
-    codec, version = CODEC_OF[opened.envelope.kind], opened.rows["v"]
-    get = body_of(opened).get
+    codec = CODEC_OF[opened.envelope.kind]
     try:
-        values = [field.check(get(field.key)) if field.since <= version else field.default() for field in codec.fields]
+        decoded: Message = codec.reader(opened.rows["v"])(body_of(opened))
     except ValueError as error:
         raise DecodeError(f"{codec.message.__name__}: {error}") from error
-    decoded: Message = codec.message(*values)
     return decoded
 
 
