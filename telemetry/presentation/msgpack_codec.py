@@ -24,19 +24,13 @@ HIGHEST_ADDRESS = 255
 DOWNWARD = (Kind.RECEIPT, Kind.COMMAND, Kind.BLOCK_SEGMENT, Kind.SESSION_OFFER)
 
 
-class Envelope(NamedTuple):
-    """What a relay needs to know of a payload."""
+class Opened(NamedTuple):
+    """A payload whose envelope has been read, which is all that a relay needs; its fields have not been read yet."""
 
     kind: Kind
     origin: int
     target: int
     sequence: int
-
-
-class Opened(NamedTuple):
-    """A payload whose envelope has been read, its fields not yet."""
-
-    envelope: Envelope
     rows: dict[str, Any]
 
 
@@ -126,7 +120,22 @@ def open_payload(payload: bytes) -> Opened:
         When the bytes have no envelope of this version.
     """
     rows = _unpack(payload)
-    return Opened(_envelope(rows), rows)
+    get = rows.get
+    version, kind, origin, target, sequence = get("v"), get("k"), get("o"), get("t"), get("s")
+    if type(version) is not int or not 1 <= version <= SCHEMA_VERSION:
+        raise DecodeError(f"payload: expected schema version 1 to {SCHEMA_VERSION}, got {version!r:.40}")
+    codec = CODEC_OF.get(kind) if type(kind) is int else None
+    if codec is None:
+        raise DecodeError(f"payload: unknown kind {kind!r:.40}")
+    if version > codec.newest:
+        raise DecodeError(f"payload: {codec.kind.name.lower()}: expected version {codec.newest}, got {version}")
+    if type(origin) is not int or not 0 <= origin <= HIGHEST_ADDRESS:
+        raise _wrong_route("o", HIGHEST_ADDRESS, origin)
+    if type(target) is not int or not 0 <= target <= HIGHEST_ADDRESS:
+        raise _wrong_route("t", HIGHEST_ADDRESS, target)
+    if type(sequence) is not int or not 0 <= sequence <= U53:
+        raise _wrong_route("s", U53, sequence)
+    return Opened(codec.kind, origin, target, sequence, rows)
 
 
 def decode_opened(opened: Opened) -> Message:
@@ -137,9 +146,10 @@ def decode_opened(opened: Opened) -> Message:
     DecodeError
         When a field is missing or outside its range.
     """
-    codec = CODEC_OF[opened.envelope.kind]
+    codec = CODEC_OF[opened.kind]
+    body = body_of(opened)
     try:
-        decoded: Message = codec.reader(opened.rows["v"])(body_of(opened))
+        decoded: Message = codec.reader(opened.rows["v"])(body)
     except ValueError as error:
         raise DecodeError(f"{codec.message.__name__}: {error}") from error
     return decoded
@@ -154,7 +164,7 @@ def values_of_opened(opened: Opened) -> list[Any]:
         When there are no fields at all.
     """
     version, get = opened.rows["v"], body_of(opened).get
-    fields = CODEC_OF[opened.envelope.kind].fields
+    fields = CODEC_OF[opened.kind].fields
     return [get(field.key) if field.since <= version else field.default() for field in fields]
 
 
@@ -168,20 +178,9 @@ def body_of(opened: Opened) -> dict[str, Any]:
     """
     body = opened.rows.get("b")
     if not isinstance(body, dict):
-        name = CODEC_OF[opened.envelope.kind].message.__name__
+        name = CODEC_OF[opened.kind].message.__name__
         raise DecodeError(f"{name}: expected a map of fields, got {body!r:.40}")
     return body
-
-
-def peek(payload: bytes) -> Envelope:
-    """Envelope of a payload, its body unread.
-
-    Raises
-    ------
-    DecodeError
-        When the bytes have no envelope of this version.
-    """
-    return open_payload(payload).envelope
 
 
 def _unpack(payload: bytes) -> dict[str, Any]:
@@ -196,22 +195,5 @@ def _unpack(payload: bytes) -> dict[str, Any]:
     return rows
 
 
-def _envelope(rows: dict[str, Any]) -> Envelope:
-    get = rows.get
-    version, kind = get("v"), get("k")
-    if type(version) is not int or not 1 <= version <= SCHEMA_VERSION:
-        raise DecodeError(f"payload: expected schema version 1 to {SCHEMA_VERSION}, got {version!r:.40}")
-    codec = CODEC_OF.get(kind) if type(kind) is int else None
-    if codec is None:
-        raise DecodeError(f"payload: unknown kind {kind!r:.40}")
-    if version > codec.newest:
-        raise DecodeError(f"payload: {codec.kind.name.lower()}: expected version {codec.newest}, got {version}")
-    origin = _route(rows, "o", HIGHEST_ADDRESS)
-    return Envelope(codec.kind, origin, _route(rows, "t", HIGHEST_ADDRESS), _route(rows, "s", U53))
-
-
-def _route(rows: dict[str, Any], key: str, high: int) -> int:
-    value = rows.get(key)
-    if type(value) is not int or not 0 <= value <= high:
-        raise DecodeError(f"payload: envelope field {key}: expected 0..{high}, got {value!r:.40}")
-    return value
+def _wrong_route(key: str, high: int, value: object) -> DecodeError:
+    return DecodeError(f"payload: envelope field {key}: expected 0..{high}, got {value!r:.40}")

@@ -54,6 +54,15 @@ def checking(field: Field, place: int) -> list[str]:
     """Lines that check the value of a field."""
     v = f"v{place}"
     check = f"{v} = check{place}({v})"
+    if field.kind is ValueKind.VECTOR:
+        within = " and ".join(f"{-field.high!r} <= {axis} <= {field.high!r}" for axis in "xyz")
+        return [
+            f"x, y, z = {v} if type({v}) is list and len({v}) == 3 else (None, None, None)",
+            f"if type(x) is type(y) is type(z) is float and {within}:",
+            f"    {v} = x, y, z",
+            "else:",
+            f"    {check}",
+        ]
     right = None if field.enumeration else RIGHT.get(field.kind)
     if right is None:
         return [check]
