@@ -6,16 +6,15 @@ the envelope alone and hands the very same bytes on.
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from operator import attrgetter
+from functools import cached_property
 from typing import Any, NamedTuple
 
 import msgpack
 
 from telemetry.errors import DecodeError, EncodeError
 from telemetry.messages import BASE, SCHEMA_VERSION, Message
+from telemetry.presentation.compiled import Lister, Reader, lister_of, reader_of
 from telemetry.presentation.fields import MAX_BINARY, codec_of
-from telemetry.presentation.readers import Reader, reader_of
 from telemetry.schema import SCHEMA, U53, Kind, MessageSpec
 
 MAX_PAYLOAD = 4096
@@ -46,7 +45,6 @@ class MessageCodec:
         self.fields = tuple(codec_of(field) for field in spec.fields)
         self.goes_down = spec.kind in DOWNWARD
         names = [field.name for field in self.fields]
-        self.values: Callable[[Any], Any] = attrgetter(*names) if len(names) > 1 else lambda m: (getattr(m, names[0]),)
         self._later = [(place, f.since, f.before) for place, f in enumerate(self.fields) if f.since > 1]
         self._packed = [(place, f.pack) for place, f in enumerate(self.fields) if f.pack is not None]
         sinces = [field.since for field in self.fields]
@@ -56,6 +54,11 @@ class MessageCodec:
         self._keys = keys  # of each version
         self._origin = names.index("tube") if "tube" in names else None
         self._sequence = names.index("sequence") if "sequence" in names else None
+
+    @cached_property
+    def values(self) -> Lister:
+        """Function from a message to the values of its fields, checked."""
+        return lister_of(self._spec, self.fields)
 
     def reader(self, version: int) -> Reader:
         """Function from the fields of a payload of a schema version to its message."""
@@ -94,7 +97,7 @@ def encode(message: Message) -> bytes:
     """
     codec = CODECS[type(message)]
     try:
-        values = [field.check(value) for field, value in zip(codec.fields, codec.values(message), strict=True)]
+        values = codec.values(message)
     except ValueError as error:
         raise EncodeError(f"{type(message).__name__}: {error}") from error
     return codec.pack(values)

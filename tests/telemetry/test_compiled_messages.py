@@ -11,15 +11,17 @@ from hypothesis import strategies as st
 from messages_of_schema import MESSAGES
 
 from telemetry.messages import DepthReading, SessionOffer
+from telemetry.presentation.compiled import lister_of, reader_of
 from telemetry.presentation.fields import codec_of
 from telemetry.presentation.msgpack_codec import decode, encode
-from telemetry.presentation.readers import reader_of
-from telemetry.schema import SCHEMA, SPEC_OF, MessageSpec
+from telemetry.schema import SCHEMA, SPEC_OF, Field, MessageSpec
 
 EDGES = [math.nan, math.inf, -math.inf, -0.0, 1e300, 2**63, -1, 0, 1, 2.0, True, None, "text", b"", b"12345678", [], {}]
 VECTORS = [
     [0.0, 0.0],
     [0.0, 1, 2.0],
+    [1, 0.0, 0.0],
+    [0.0, 0.0, 1],
     [0, True, 0.0],
     [0.0, math.nan, 0.0],
     [1e9, 0.0, 0.0],
@@ -38,16 +40,30 @@ def whole_body(message: Any) -> dict[str, Any]:
     return body
 
 
-def field_by_field(spec: MessageSpec, body: dict[str, Any], version: int) -> Any:
+def read_field_by_field(spec: MessageSpec, body: dict[str, Any], version: int) -> Any:
     """What a reader is to say, without one."""
     codecs = [codec_of(field) for field in spec.fields]
     return spec.message(*[c.check(body.get(c.key)) if c.since <= version else c.default() for c in codecs])
 
 
-def verdict(read: Any, *arguments: Any) -> str:
-    """The message with the type of every value, or why it is refused."""
+def list_field_by_field(message: Any) -> list[Any]:
+    """What a lister is to say, without one."""
+    return [codec.check(getattr(message, codec.name)) for codec in map(codec_of, SPEC_OF[type(message)].fields)]
+
+
+def odd_values(field: Field) -> list[Any]:
+    """What stands at and beyond the ends of a field's range, and what is of another kind."""
+    bounds = [field.low, field.high, math.nextafter(field.low, -math.inf), math.nextafter(field.high, math.inf)]
+    whole = [int(bound) + step for bound in bounds if math.isfinite(bound) for step in (-1, 0, 1)]
+    sizes = [bytes(size) for size in whole if 0 <= size < 1000]
+    axes = [[bound if axis == k else 0.0 for k in range(3)] for bound in bounds for axis in range(3)]
+    return [*EDGES, *bounds, *whole, *sizes, *VECTORS, *axes]
+
+
+def verdict(judge: Any, *arguments: Any) -> str:
+    """What is made of the arguments with the type of every value, or why they are refused."""
     try:
-        return repr(read(*arguments))
+        return repr(judge(*arguments))
     except ValueError as error:
         return f"refused: {error}"
 
@@ -69,19 +85,29 @@ def bodies(draw: st.DrawFn) -> tuple[MessageSpec, dict[str, Any], int]:
 def test_a_reader_says_what_the_checks_say_field_by_field(given_body: tuple[MessageSpec, dict[str, Any], int]) -> None:
     spec, body, version = given_body
     read = reader_of(spec, [codec_of(field) for field in spec.fields], version)
-    assert verdict(read, body) == verdict(field_by_field, spec, body, version)
+    assert verdict(read, body) == verdict(read_field_by_field, spec, body, version)
 
 
 @pytest.mark.parametrize("spec", SCHEMA, ids=lambda spec: spec.message.__name__)
-def test_every_edge_in_every_field_is_judged_as_its_check_does(spec: MessageSpec) -> None:
-    codecs = [codec_of(field) for field in spec.fields]
+def test_every_odd_value_that_comes_is_judged_as_its_check_does(spec: MessageSpec) -> None:
     body = whole_body(ONE_OF[spec.message])
-    read = reader_of(spec, codecs, spec.newest)
+    read = reader_of(spec, [codec_of(field) for field in spec.fields], spec.newest)
     for field in spec.fields:
-        bounds = [field.low, field.high, math.nextafter(field.low, -math.inf), math.nextafter(field.high, math.inf)]
-        for value in EDGES + VECTORS + bounds + [int(b) + d for b in bounds if math.isfinite(b) for d in (-1, 0, 1)]:
+        for value in odd_values(field):
             changed = body | {field.key: value}
-            assert verdict(read, changed) == verdict(field_by_field, spec, changed, spec.newest), (field.name, value)
+            expected = verdict(read_field_by_field, spec, changed, spec.newest)
+            assert verdict(read, changed) == expected, (field.name, value)
+
+
+@pytest.mark.parametrize("message", ONE_OF.values(), ids=lambda message: type(message).__name__)
+def test_every_odd_value_that_is_to_go_is_judged_as_its_check_does(message: Any) -> None:
+    spec = SPEC_OF[type(message)]
+    listed = lister_of(spec, [codec_of(field) for field in spec.fields])
+    for field in spec.fields:
+        for value in odd_values(field):
+            for sequence in [value, tuple(value)] if isinstance(value, list) else [value]:
+                changed = dataclasses.replace(message, **{field.name: sequence})
+                assert verdict(listed, changed) == verdict(list_field_by_field, changed), (field.name, sequence)
 
 
 @pytest.mark.parametrize("message", ONE_OF.values(), ids=lambda message: type(message).__name__)

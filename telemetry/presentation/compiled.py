@@ -1,8 +1,8 @@
-"""One function a message that checks its fields and builds it, compiled from the schema.
+"""Functions that check the fields of one kind of message, compiled from the schema: one reads a body, one a message.
 
-Every process decodes each message it believes. What a loop over the fields would look up each time is written out here:
-a value that is as the schema says takes a comparison, and anything else goes to its field's check, which converts it or
-refuses it by name. Fields are checked in the order of the schema, so the first wrong one is named.
+Every process checks what it says and what it believes. What a loop over the fields would look up each time is written
+out here: a value that is as the schema says takes a comparison, and anything else goes to its field's check, which
+converts it or refuses it by name. Fields are checked in the order of the schema, so the first wrong one is named.
 """
 
 from __future__ import annotations
@@ -16,6 +16,7 @@ from telemetry.quantities import ValueKind
 from telemetry.schema import Field, MessageSpec
 
 Reader = Callable[[dict[str, Any]], Any]  # message of its fields by their keys; raises ValueError
+Lister = Callable[[Any], list[Any]]  # values of the fields of a message; raises ValueError
 RIGHT = {
     ValueKind.NUMBER: "type({v}) is float and {low!r} <= {v} <= {high!r}",
     ValueKind.INTEGER: "type({v}) is int and {low!r} <= {v} <= {high!r}",
@@ -25,18 +26,17 @@ RIGHT = {
 
 
 def reader_of(spec: MessageSpec, codecs: Sequence[FieldCodec], version: int) -> Reader:
-    """Function from the fields of a payload of a schema version to its message; ``codecs`` are those of all fields.
+    """Function from the body of a payload of a schema version to its message; ``codecs`` are those of all fields.
 
     The first field that is missing or not as the schema says raises ValueError.
     """
     said = [k for k, codec in enumerate(codecs) if codec.since <= version]
-    space: dict[str, Any] = {"inf": math.inf, "Message": spec.message, "Writable": writable(spec.message)}
-    space |= {f"check{k}": codecs[k].check for k in said}
+    space: dict[str, Any] = {"Message": spec.message, "Writable": writable(spec.message)}
     space["keys"] = [codecs[k].key for k in said]
-    lines = ["try:", *(f"    v{k} = body[{codecs[k].key!r}]" for k in said)]
+    lines = ["try:", *(f"    v{k} = given[{codecs[k].key!r}]" for k in said)]
     # what is missing is None, which no check lets pass
-    lines += ["except KeyError:", f"    {' '.join(f'v{k},' for k in said)} = [body.get(key) for key in keys]"]
-    lines += [line for k in said for line in checking(spec.fields[k], k)]
+    lines += ["except KeyError:", f"    {' '.join(f'v{k},' for k in said)} = [given.get(key) for key in keys]"]
+    lines += [line for k in said for line in checking(spec.fields[k], k, "list")]
     for k in sorted(set(range(len(codecs))).difference(said)):
         before = codecs[k].before
         is_shared = codecs[k].default() is before  # a mutable one is copied for each message
@@ -44,20 +44,27 @@ def reader_of(spec: MessageSpec, codecs: Sequence[FieldCodec], version: int) -> 
         lines.append(f"v{k} = before{k}{'' if is_shared else '()'}")
     lines += ["message = Writable()", *(f"message.{codec.name} = v{k}" for k, codec in enumerate(codecs))]
     lines += ["message.__class__ = Message", "return message"]
-    source = "def read(body):\n" + "\n".join(f"    {line}" for line in lines)
-    exec(compile(source, f"<reader of {spec.message.__name__}>", "exec"), space)
-    reader: Reader = space["read"]
+    reader: Reader = compiled(lines, space, codecs)
     return reader
 
 
-def checking(field: Field, place: int) -> list[str]:
-    """Lines that check the value of a field."""
+def lister_of(spec: MessageSpec, codecs: Sequence[FieldCodec]) -> Lister:
+    """Function from a message to the values of its fields; the first one not as the schema says raises ValueError."""
+    lines = []
+    for k, field in enumerate(spec.fields):
+        lines += [f"v{k} = given.{field.name}", *checking(field, k, "tuple")]
+    lister: Lister = compiled([*lines, f"return [{', '.join(f'v{k}' for k in range(len(codecs)))}]"], {}, codecs)
+    return lister
+
+
+def checking(field: Field, place: int, sequence: str) -> list[str]:
+    """Lines that check the value of a field; ``sequence`` is the type that vectors come in."""
     v = f"v{place}"
     check = f"{v} = check{place}({v})"
     if field.kind is ValueKind.VECTOR:
         within = " and ".join(f"{-field.high!r} <= {axis} <= {field.high!r}" for axis in "xyz")
         return [
-            f"x, y, z = {v} if type({v}) is list and len({v}) == 3 else (None, None, None)",
+            f"x, y, z = {v} if type({v}) is {sequence} and len({v}) == 3 else (None, None, None)",
             f"if type(x) is type(y) is type(z) is float and {within}:",
             f"    {v} = x, y, z",
             "else:",
@@ -67,6 +74,15 @@ def checking(field: Field, place: int) -> list[str]:
     if right is None:
         return [check]
     return [f"if not ({right.format(v=v, low=field.low, high=field.high)}):", f"    {check}"]
+
+
+def compiled(lines: list[str], space: dict[str, Any], codecs: Sequence[FieldCodec]) -> Callable[[Any], Any]:
+    """Function of one argument ``given``; its lines may name what is in ``space`` and the checks of all fields."""
+    space |= {"inf": math.inf} | {f"check{k}": codec.check for k, codec in enumerate(codecs)}
+    source = "def function(given):\n" + "\n".join(f"    {line}" for line in lines)
+    exec(compile(source, "<compiled from the schema>", "exec"), space)
+    function: Callable[[Any], Any] = space["function"]
+    return function
 
 
 def writable(message: type[Any]) -> type[Any]:
