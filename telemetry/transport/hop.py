@@ -258,8 +258,10 @@ def pack_frame(header: Header, entries: Iterable[tuple[int, bytes]]) -> bytes:
 
 def parse_frame(frame: bytes) -> tuple[Header, list[Any]] | None:
     """Header and entries of a frame; None for anything else."""
+    if not 5 < len(frame) <= MAX_FRAME:
+        return None
     body = frame[4:]
-    if not 5 < len(frame) <= MAX_FRAME or zlib.crc32(body) != int.from_bytes(frame[:4], "little"):
+    if zlib.crc32(body) != int.from_bytes(frame[:4], "little"):
         return None
     try:
         version, sender, epoch, number, peer_epoch, ack, mask, entries = msgpack.unpackb(body, max_ext_len=0)
