@@ -160,9 +160,11 @@ def is_placed(state: Any, aiding: Array) -> bool:
 
 @kernel
 def contradicts(node: Any, yaw: float, valid_local: float) -> bool:
-    """Whether a reference at rest (rad) is beyond the gate while the gyroscope says that the node turns."""
+    """Whether a reference at rest (rad) is beyond the gate while the gyroscope turns, or of one that turned unaided."""
     state, guard = node.filter, node.guard
-    if guard.rate != 0 or state.still_cycles > 0 or state.yaw_known == 0 or state.mode == STATIC_BIAS:
+    if guard.rate != 0 or state.yaw_known == 0 or state.mode == STATIC_BIAS:
+        return False
+    if state.still_cycles > 0 and not state.stopped_at > state.last_aided:
         return False
     then = angle_of(state.now_rate, state.now_yaw) + turn(state.now_rate, valid_local - state.now)
     return is_beyond_gate(node.config, wrap(yaw - then), state.now_P[PSI, PSI] + guard.aiding_var)

@@ -67,8 +67,14 @@ class Sealed(NamedTuple):
     """A sealed payload whose tag fits."""
 
     content: bytes
-    pair: Pair
+    of_tube: int  # session number of the tube
+    of_base: int  # and of the base
     newest: int  # generation of the keys of who sealed it
+
+    @property
+    def pair(self) -> Pair:
+        """The session numbers."""
+        return Pair(self.of_tube, self.of_base)
 
 
 def content_of_sealed(payload: bytes) -> bytes:
@@ -97,9 +103,9 @@ def open_sealed(ring: KeyRing, purpose: str, way: bytes, payload: bytes, tube: i
     key = ring.seal_key(generation, purpose, tube if purpose == "end" else 0)
     content = payload[OVERHEAD:]
     tag = payload[HEAD.size : OVERHEAD]
-    if key is None or not key.fits(tag, way, bytes([tube]), payload[: HEAD.size], content):
+    if key is None or not key.fits(tag, way, tube.to_bytes(), payload[: HEAD.size], content):
         return None
-    return Sealed(content, Pair(of_tube, of_base), newest)
+    return Sealed(content, of_tube, of_base, newest)
 
 
 class TubeEnd:
@@ -201,7 +207,7 @@ class BaseEnd:
             self.counters["seal_end_wrong_tag" if is_sealed(payload) else "seal_end_unsealed"] += 1
             return Heard.NOTHING
         session = self._sessions.get(tube)
-        if session is not None and sealed.pair == session.pair:
+        if session is not None and session.pair == (sealed.of_tube, sealed.of_base):
             session.newest = sealed.newest
             return Heard.BELIEVED
         if self._is_proof(tube, sealed.pair):

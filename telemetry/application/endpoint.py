@@ -42,12 +42,10 @@ from telemetry.messages import (
 from telemetry.presentation.content import content_of, content_of_message
 from telemetry.presentation.msgpack_codec import (
     DOWNWARD,
-    Envelope,
     Opened,
     decode_opened,
     encode,
     open_payload,
-    peek,
 )
 from telemetry.schema import Kind
 from telemetry.transport.hop import BUNDLE_LIMIT, HopLink
@@ -387,7 +385,7 @@ class Endpoint:
 
     def _handle(self, side: Side, payload: bytes, now: float) -> Message | None:
         opened = open_payload(payload if self.seals is None else self.seals.content(payload))
-        kind = opened.envelope.kind
+        kind = opened.kind
         if kind in ONE_HOP:
             return self._handle_one_hop(side, decode_opened(opened), now)
         if kind in DOWNWARD:
@@ -426,22 +424,22 @@ class Endpoint:
             self._hello_at = -math.inf
 
     def _handle_upward(self, opened: Opened, payload: bytes, now: float) -> Message | None:
-        if opened.envelope.kind is Kind.DEPTH_READING:
+        if opened.kind is Kind.DEPTH_READING:
             raise DecodeError("depth reading: expected on its own key")
         if self.address != BASE:
-            self._pass(Side.UPPER, opened.envelope, payload)
+            self._pass(Side.UPPER, opened, payload)
             return None
         message = self._heard(opened, payload, now)
         if isinstance(message, Reply):
             order = self._commands.payload(message.sequence)
-            if order is None or peek(order).target != message.tube:
+            if order is None or open_payload(order).target != message.tube:
                 return None  # answered already, or by somebody who was not asked
             self._commands.settle(message.sequence)
         return message
 
     def _handle_downward(self, opened: Opened, payload: bytes, now: float) -> Message | None:
-        if opened.envelope.target != self.address:
-            self._pass(Side.LOWER, opened.envelope, payload)
+        if opened.target != self.address:
+            self._pass(Side.LOWER, opened, payload)
             return None
         message = self._told(opened, payload, now)
         if isinstance(message, Receipt):
@@ -457,7 +455,7 @@ class Endpoint:
         seals = self.seals
         if seals is None:
             return decode_opened(opened)
-        tube = opened.envelope.origin
+        tube = opened.origin
         heard = seals.hear(payload, tube, now)
         self._send_offers()
         if not heard.is_believed:
@@ -473,7 +471,7 @@ class Endpoint:
         if seals is None:
             message = decode_opened(opened)
             return None if isinstance(message, SessionOffer) else message
-        if not seals.is_told(payload, now, is_offer=opened.envelope.kind is Kind.SESSION_OFFER):
+        if not seals.is_told(payload, now, is_offer=opened.kind is Kind.SESSION_OFFER):
             return None
         message = decode_opened(opened)
         if not seals.is_of(message, self.address):
@@ -485,7 +483,7 @@ class Endpoint:
             self._send_kept(now)
             return None
         is_command = isinstance(message, Command) and message.sequence not in self._answered
-        return None if is_command and not seals.is_order_new(opened.envelope.sequence, self._too_old) else message
+        return None if is_command and not seals.is_order_new(opened.sequence, self._too_old) else message
 
     def _is_measured(self, aiding: Aiding, now: float) -> bool:
         """Whether the encoder measured what an aiding says; without keys everybody is believed."""
@@ -519,16 +517,16 @@ class Endpoint:
         else:
             self.counters["foreign_receipts"] += 1
 
-    def _pass(self, side: Side, envelope: Envelope, payload: bytes) -> None:
+    def _pass(self, side: Side, opened: Opened, payload: bytes) -> None:
         """Hand on the very bytes that came."""
         link = self._links.get(side)
         if link is None:
             self.counters["nowhere_to_go"] += 1
-        elif envelope.kind in RELIABLE:
-            link.send_reliable(payload, PRIORITIES[envelope.kind])
+        elif opened.kind in RELIABLE:
+            link.send_reliable(payload, PRIORITIES[opened.kind])
         else:
-            link.send_best_effort(payload, (envelope.kind, envelope.origin), PRIORITIES[envelope.kind])
-            if envelope.kind is Kind.NODE_STATE:
+            link.send_best_effort(payload, (opened.kind, opened.origin), PRIORITIES[opened.kind])
+            if opened.kind is Kind.NODE_STATE:
                 link.release()
 
     def _send_hello(self, until: float) -> None:
@@ -568,4 +566,4 @@ class Endpoint:
                 self._links[side].send_reliable(self._sealed(payload), Priority.SURVEY)
         elif side in self._links:
             for payload in outbox.due_payloads(now):
-                self._send_down(payload, peek(payload).target, Priority.COMMAND)
+                self._send_down(payload, open_payload(payload).target, Priority.COMMAND)

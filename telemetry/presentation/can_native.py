@@ -119,7 +119,7 @@ def native_parts(payload: bytes, count: int, *, fd: bool) -> list[NativePart] | 
     """Frames of a cyclic message; None for one that only the tunnel carries."""
     try:
         opened = open_payload(payload)
-        native = NATIVE.get(opened.envelope.kind)
+        native = NATIVE.get(opened.kind)
         if native is None:
             return None
         form: Form = native.fd if fd else native.classic
@@ -152,7 +152,7 @@ def rounded_frame(payload: bytes) -> bytes:
 def _rounded_payload(payload: bytes) -> bytes:
     try:
         opened = open_payload(payload)
-        native = NATIVE.get(opened.envelope.kind)
+        native = NATIVE.get(opened.kind)
         if native is None:
             return payload
         return CODEC_OF[native.kind].pack(native.values_of(native.raws_of_values(values_of_opened(opened))))

@@ -6,14 +6,14 @@ the envelope alone and hands the very same bytes on.
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from operator import attrgetter
+from functools import cached_property
 from typing import Any, NamedTuple
 
 import msgpack
 
 from telemetry.errors import DecodeError, EncodeError
 from telemetry.messages import BASE, SCHEMA_VERSION, Message
+from telemetry.presentation.compiled import Lister, Reader, lister_of, reader_of
 from telemetry.presentation.fields import MAX_BINARY, codec_of
 from telemetry.schema import SCHEMA, U53, Kind, MessageSpec
 
@@ -23,19 +23,13 @@ HIGHEST_ADDRESS = 255
 DOWNWARD = (Kind.RECEIPT, Kind.COMMAND, Kind.BLOCK_SEGMENT, Kind.SESSION_OFFER)
 
 
-class Envelope(NamedTuple):
-    """What a relay needs to know of a payload."""
+class Opened(NamedTuple):
+    """A payload whose envelope has been read, which is all that a relay needs; its fields have not been read yet."""
 
     kind: Kind
     origin: int
     target: int
     sequence: int
-
-
-class Opened(NamedTuple):
-    """A payload whose envelope has been read, its fields not yet."""
-
-    envelope: Envelope
     rows: dict[str, Any]
 
 
@@ -43,13 +37,14 @@ class MessageCodec:
     """One message on the wire, made from its line of the schema; what every message needs is looked up here once."""
 
     def __init__(self, spec: MessageSpec) -> None:
+        self._spec = spec
+        self._readers: dict[int, Reader] = {}  # by schema version, compiled when a payload of it comes
         self.kind = spec.kind
         self.message = spec.message
         self.newest = spec.newest
         self.fields = tuple(codec_of(field) for field in spec.fields)
         self.goes_down = spec.kind in DOWNWARD
         names = [field.name for field in self.fields]
-        self.values: Callable[[Any], Any] = attrgetter(*names) if len(names) > 1 else lambda m: (getattr(m, names[0]),)
         self._later = [(place, f.since, f.before) for place, f in enumerate(self.fields) if f.since > 1]
         self._packed = [(place, f.pack) for place, f in enumerate(self.fields) if f.pack is not None]
         sinces = [field.since for field in self.fields]
@@ -59,6 +54,18 @@ class MessageCodec:
         self._keys = keys  # of each version
         self._origin = names.index("tube") if "tube" in names else None
         self._sequence = names.index("sequence") if "sequence" in names else None
+
+    @cached_property
+    def values(self) -> Lister:
+        """Function from a message to the values of its fields, checked."""
+        return lister_of(self._spec, self.fields)
+
+    def reader(self, version: int) -> Reader:
+        """Function from the fields of a payload of a schema version to its message."""
+        reader = self._readers.get(version)
+        if reader is None:
+            reader = self._readers[version] = reader_of(self._spec, self.fields, version)
+        return reader
 
     def pack(self, values: list[Any]) -> bytes:
         """Payload of the values of all fields, which are checked, in the earliest schema version that has them."""
@@ -90,7 +97,7 @@ def encode(message: Message) -> bytes:
     """
     codec = CODECS[type(message)]
     try:
-        values = [field.check(value) for field, value in zip(codec.fields, codec.values(message), strict=True)]
+        values = codec.values(message)
     except ValueError as error:
         raise EncodeError(f"{type(message).__name__}: {error}") from error
     return codec.pack(values)
@@ -116,7 +123,22 @@ def open_payload(payload: bytes) -> Opened:
         When the bytes have no envelope of this version.
     """
     rows = _unpack(payload)
-    return Opened(_envelope(rows), rows)
+    get = rows.get
+    version, kind, origin, target, sequence = get("v"), get("k"), get("o"), get("t"), get("s")
+    if type(version) is not int or not 1 <= version <= SCHEMA_VERSION:
+        raise DecodeError(f"payload: expected schema version 1 to {SCHEMA_VERSION}, got {version!r:.40}")
+    codec = CODEC_OF.get(kind) if type(kind) is int else None
+    if codec is None:
+        raise DecodeError(f"payload: unknown kind {kind!r:.40}")
+    if version > codec.newest:
+        raise DecodeError(f"payload: {codec.kind.name.lower()}: expected version {codec.newest}, got {version}")
+    if type(origin) is not int or not 0 <= origin <= HIGHEST_ADDRESS:
+        raise _wrong_route("o", HIGHEST_ADDRESS, origin)
+    if type(target) is not int or not 0 <= target <= HIGHEST_ADDRESS:
+        raise _wrong_route("t", HIGHEST_ADDRESS, target)
+    if type(sequence) is not int or not 0 <= sequence <= U53:
+        raise _wrong_route("s", U53, sequence)
+    return Opened(codec.kind, origin, target, sequence, rows)
 
 
 def decode_opened(opened: Opened) -> Message:
@@ -127,13 +149,12 @@ def decode_opened(opened: Opened) -> Message:
     DecodeError
         When a field is missing or outside its range.
     """
-    codec, version = CODEC_OF[opened.envelope.kind], opened.rows["v"]
-    get = body_of(opened).get
+    codec = CODEC_OF[opened.kind]
+    body = body_of(opened)
     try:
-        values = [field.check(get(field.key)) if field.since <= version else field.default() for field in codec.fields]
+        decoded: Message = codec.reader(opened.rows["v"])(body)
     except ValueError as error:
         raise DecodeError(f"{codec.message.__name__}: {error}") from error
-    decoded: Message = codec.message(*values)
     return decoded
 
 
@@ -146,7 +167,7 @@ def values_of_opened(opened: Opened) -> list[Any]:
         When there are no fields at all.
     """
     version, get = opened.rows["v"], body_of(opened).get
-    fields = CODEC_OF[opened.envelope.kind].fields
+    fields = CODEC_OF[opened.kind].fields
     return [get(field.key) if field.since <= version else field.default() for field in fields]
 
 
@@ -160,20 +181,9 @@ def body_of(opened: Opened) -> dict[str, Any]:
     """
     body = opened.rows.get("b")
     if not isinstance(body, dict):
-        name = CODEC_OF[opened.envelope.kind].message.__name__
+        name = CODEC_OF[opened.kind].message.__name__
         raise DecodeError(f"{name}: expected a map of fields, got {body!r:.40}")
     return body
-
-
-def peek(payload: bytes) -> Envelope:
-    """Envelope of a payload, its body unread.
-
-    Raises
-    ------
-    DecodeError
-        When the bytes have no envelope of this version.
-    """
-    return open_payload(payload).envelope
 
 
 def _unpack(payload: bytes) -> dict[str, Any]:
@@ -188,22 +198,5 @@ def _unpack(payload: bytes) -> dict[str, Any]:
     return rows
 
 
-def _envelope(rows: dict[str, Any]) -> Envelope:
-    get = rows.get
-    version, kind = get("v"), get("k")
-    if type(version) is not int or not 1 <= version <= SCHEMA_VERSION:
-        raise DecodeError(f"payload: expected schema version 1 to {SCHEMA_VERSION}, got {version!r:.40}")
-    codec = CODEC_OF.get(kind) if type(kind) is int else None
-    if codec is None:
-        raise DecodeError(f"payload: unknown kind {kind!r:.40}")
-    if version > codec.newest:
-        raise DecodeError(f"payload: {codec.kind.name.lower()}: expected version {codec.newest}, got {version}")
-    origin = _route(rows, "o", HIGHEST_ADDRESS)
-    return Envelope(codec.kind, origin, _route(rows, "t", HIGHEST_ADDRESS), _route(rows, "s", U53))
-
-
-def _route(rows: dict[str, Any], key: str, high: int) -> int:
-    value = rows.get(key)
-    if type(value) is not int or not 0 <= value <= high:
-        raise DecodeError(f"payload: envelope field {key}: expected 0..{high}, got {value!r:.40}")
-    return value
+def _wrong_route(key: str, high: int, value: object) -> DecodeError:
+    return DecodeError(f"payload: envelope field {key}: expected 0..{high}, got {value!r:.40}")

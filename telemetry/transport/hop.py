@@ -285,17 +285,22 @@ def pack_frame(header: Header, entries: Iterable[tuple[int, bytes]]) -> bytes:
 
 def parse_frame(frame: bytes) -> tuple[Header, list[Any]] | None:
     """Header and entries of a frame; None for anything else."""
-    if not 5 < len(frame) <= MAX_FRAME or zlib.crc32(frame[4:]) != int.from_bytes(frame[:4], "little"):
+    if not 5 < len(frame) <= MAX_FRAME:
+        return None
+    body = frame[4:]
+    if zlib.crc32(body) != int.from_bytes(frame[:4], "little"):
         return None
     try:
-        version, *fields, entries = msgpack.unpackb(frame[4:], max_ext_len=0)
+        version, sender, epoch, number, peer_epoch, ack, mask, entries = msgpack.unpackb(body, max_ext_len=0)
     except (ValueError, TypeError, RecursionError, msgpack.UnpackException):
         return None
-    if version != VERSION or len(fields) != 6 or not all(type(f) is int and f >= 0 for f in fields):
+    are_integers = type(sender) is type(epoch) is type(number) is type(peer_epoch) is type(ack) is type(mask) is int
+    if version != VERSION or not are_integers or not isinstance(entries, list):
         return None
-    if not isinstance(entries, list) or not all(_is_entry(entry) for entry in entries):
+    header = Header(sender, epoch, number, peer_epoch, ack, mask)
+    if min(header) < 0 or not all(map(_is_entry, entries)):
         return None
-    return Header(*fields), entries
+    return header, entries
 
 
 def common_topic(entries: Iterable[Entry]) -> Hashable | None:

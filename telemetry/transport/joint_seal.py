@@ -140,7 +140,7 @@ class JointSeal:
 
     def _deliver(self, sender: int, session: int, newest: int, number: int, payload: bytes, now: float) -> bytes | None:
         partner = self.partner
-        if partner is None or (partner.address, partner.session) != (sender, session):
+        if partner is None or partner.address != sender or partner.session != session:
             partner = self.partner = Partner(sender, session, newest, now, now)
             self._claim, self._answer_due, self._confirm_due = None, False, True
         if not partner.window.admit(number):

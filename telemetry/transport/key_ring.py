@@ -100,7 +100,10 @@ class KeyRing:
         """Key of a generation, None where this process has none or the other one is revoked."""
         if purpose in ("end", "joint") and other in self.revoked:
             return None
-        return next((g.seal_key(purpose, other) for g in self.generations if g.number == generation), None)
+        for g in self.generations:
+            if g.number == generation:
+                return g.seal_key(purpose, other)
+        return None
 
     def block_key(self, tube: int, tubes_newest: int | None = None) -> bytes | None:
         """Key of the parameter blocks of a tube whose newest generation may be known; None for a revoked one."""

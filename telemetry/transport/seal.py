@@ -14,6 +14,7 @@ from cryptography.hazmat.primitives.cmac import CMAC
 SEAL_KEY_SIZE = 16  # bytes
 TAG_SIZE = 8  # bytes
 WINDOW = 64
+ALL_SEEN = (1 << WINDOW) - 1  # bits of a window
 
 
 class SealKey:
@@ -25,8 +26,7 @@ class SealKey:
     def tag(self, *parts: bytes) -> bytes:
         """Tag of the parts one after the other."""
         context = self._context.copy()
-        for part in parts:
-            context.update(part)
+        context.update(b"".join(parts))
         return context.finalize()[:TAG_SIZE]
 
     def fits(self, tag: bytes, *parts: bytes) -> bool:
@@ -45,7 +45,7 @@ class ReplayWindow:
         """Whether a number (>= 0) comes for the first time; it counts as come from then on."""
         ahead = number - self._largest
         if ahead > 0:
-            self._seen = (self._seen << ahead | 1) & ((1 << WINDOW) - 1) if ahead < WINDOW else 1
+            self._seen = (self._seen << ahead | 1) & ALL_SEEN if ahead < WINDOW else 1
             self._largest = number
             return True
         if -ahead >= WINDOW or self._seen >> -ahead & 1:

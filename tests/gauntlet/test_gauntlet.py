@@ -102,6 +102,7 @@ def test_combined_seeds_hold(first: int) -> None:
         (207889, ("same-number", "replay", "splice")),  # the first word of a tube, recorded, opened the door for more
         (213809, ("encoder-from-zero", "ground-cut", "bytes-rot", "database-deleted")),  # the first stand was a stop
         (213984, ("encoder-from-zero", "ground-cut", "depth-jumps-up")),  # a jump from one epoch to the next
+        (305006, ("bytes-rot", "bursts", "gyro-step")),  # the encoder repeated itself to a node that had turned
         (51633, ("surveys-lost", "gyro-step")),  # a gyroscope that turned its tube while nobody corrected it
     ],
 )

@@ -12,6 +12,7 @@ from node.firmware.sensor_limits import SensorLimits
 from node.firmware.settings import TubeSettings, crew_record
 from node.kernels.aiding_watch import find_mismatch, forget
 from node.kernels.events import Fault
+from node.kernels.guard import contradicts
 from node.kernels.layout import DEG, Err, default_config
 from node.kernels.record import AIDINGS, MISMATCH, new_node
 from node.kernels.sensor_watch import find_faults
@@ -329,3 +330,20 @@ def test_one_knock_is_no_fault_of_the_accelerometer() -> None:
 def test_limits_that_cannot_be_are_refused_by_name(change: dict) -> None:
     with pytest.raises(ConfigurationError, match=next(iter(change))):
         SensorLimits(**change)
+
+
+@pytest.mark.parametrize(
+    ("stopped_at", "off_deg", "judged"),
+    [(50.0, 14.0, True), (50.0, 0.05, False), (20.0, 14.0, False), (math.nan, 14.0, False)],
+)
+def test_a_reference_at_rest_is_judged_anew_by_a_node_that_turned_unaided(
+    stopped_at: float, off_deg: float, judged: bool
+) -> None:
+    """The encoder stood all the while and repeats itself; what turned the node is then in its yaw."""
+    nodes = new_node(default_config())
+    node = nodes.view(np.recarray)[0]
+    state = node.filter
+    state["yaw_known"], state["mode"], state["still_cycles"] = 1, int(Mode.STILL), 10
+    state["now"], state["last_aided"], state["stopped_at"] = 60.0, 30.0, stopped_at
+    state["now_P"][Err.YAW, Err.YAW] = (0.03 * DEG) ** 2
+    assert bool(contradicts.py_func(node, off_deg * DEG, 60.0)) == judged

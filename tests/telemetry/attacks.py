@@ -182,7 +182,7 @@ def heard(string: SealedString, kind: Kind) -> object:
     A part of a block, and what a tube says of it, may come as often as they like: both name the whole state.
     """
     victim = 1 if kind in DOWN else BASE
-    of_kind = [m for m in string.heard[victim] if open_payload(encode(m)).envelope.kind is kind]
+    of_kind = [m for m in string.heard[victim] if open_payload(encode(m)).kind is kind]
     repeatable = kind in (Kind.BLOCK_SEGMENT, Kind.BLOCK_STATUS)
     return list(dict.fromkeys(of_kind)) if repeatable else of_kind, string.endpoints[1].outbox_size
 

@@ -237,7 +237,7 @@ def messages_in(frame: bytes) -> Iterator[tuple[Kind, bytes]]:
     parsed = parse_frame(frame[HEAD.size : -TAG_SIZE]) if len(frame) > OVERHEAD else None
     for _, payload in parsed[1] if parsed else ():
         try:
-            yield open_payload(Seals.content(payload)).envelope.kind, payload
+            yield open_payload(Seals.content(payload)).kind, payload
         except DecodeError:
             continue
 

@@ -1,14 +1,25 @@
 """The link of one joint under every trouble a joint can have."""
 
 import math
+import zlib
 
+import msgpack
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from telemetry.media.memory import MemoryPort, joint
 from telemetry.media.port import Priority
-from telemetry.transport.hop import ACK_DELAY, ACKNOWLEDGEMENT, QUEUE_LIMIT, SILENCE, HopLink
+from telemetry.transport.hop import (
+    ACK_DELAY,
+    ACKNOWLEDGEMENT,
+    QUEUE_LIMIT,
+    SILENCE,
+    Header,
+    HopLink,
+    pack_frame,
+    parse_frame,
+)
 
 
 def arrived(port: MemoryPort, now: float) -> list[bytes]:
@@ -137,6 +148,30 @@ def test_garbage_is_counted_and_nothing_else(frame: bytes) -> None:
     assert link.receive(frame, 1.0) == []
     assert link.counters["bad_frames"] == 1
     assert link.peer is None
+
+
+ROWS: list[object] = [1, 3, 7, 20, 5, 4, 0, [[0, b"beat"], [2**53 - 1, b"kept"]]]  # version, header, entries
+NO_ROWS: list[object] = [{k: k for k in range(8)}, "8 letters", b"\1" * 8, 1, None, [], [*ROWS, 0], ROWS[:7], ROWS[1:]]
+NO_ROWS += [[2, *ROWS[1:]], [None, *ROWS[1:]]]
+WRONG_HEADER = [[*ROWS[:k], wrong, *ROWS[k + 1 :]] for k in range(1, 7) for wrong in (-1, 2.0, True, None, "3", [3])]
+ENTRIES: list[object] = [None, {}, 3, b"beat", [[0, b"beat"], [1]], [[0, "beat"]], [[True, b"beat"]]]
+ENTRIES += [[[-1, b"beat"]], [[2**53, b"beat"]], [[0, b"beat", 0]], [[0.0, b"beat"]], [3], [{0: b"beat"}]]
+
+
+def checked_frame(rows: object) -> bytes:
+    body = msgpack.packb(rows)
+    return zlib.crc32(body).to_bytes(4, "little") + body
+
+
+def test_a_frame_is_read_as_it_was_written() -> None:
+    header, entries = Header(3, 7, 20, 5, 4, 0), [(0, b"beat"), (2**53 - 1, b"kept")]
+    assert pack_frame(header, entries) == checked_frame(ROWS)
+    assert parse_frame(checked_frame(ROWS)) == (header, [list(entry) for entry in entries])
+
+
+@pytest.mark.parametrize("rows", [*NO_ROWS, *WRONG_HEADER, *([*ROWS[:7], entries] for entries in ENTRIES)], ids=repr)
+def test_a_frame_of_anything_else_is_none_though_its_checksum_fits(rows: object) -> None:
+    assert parse_frame(checked_frame(rows)) is None
 
 
 def test_quality_tells_the_loss() -> None:

@@ -1,6 +1,7 @@
 import dataclasses
 import json
 import math
+import re
 from pathlib import Path
 from typing import Any
 
@@ -27,7 +28,7 @@ from telemetry.messages import (
     TimeRequest,
     UploadPhase,
 )
-from telemetry.presentation.msgpack_codec import MAX_PAYLOAD, decode, encode, peek
+from telemetry.presentation.msgpack_codec import MAX_PAYLOAD, decode, encode, open_payload
 from telemetry.schema import SCHEMA, Kind
 from telemetry.transport.hop import BUNDLE_LIMIT, ENTRY_BYTES, MAX_FRAME
 
@@ -77,7 +78,7 @@ def test_decoding_gives_back_what_was_encoded(message: Any) -> None:
 
 @given(ANY)
 def test_the_envelope_tells_the_route_without_the_body(message: Any) -> None:
-    envelope = peek(encode(message))
+    envelope = open_payload(encode(message))
     if isinstance(message, Receipt | Command | BlockSegment | SessionOffer):
         assert envelope.target == message.tube
     else:
@@ -175,11 +176,24 @@ def test_a_wrong_value_in_the_right_shape_is_refused_or_within_range(message: An
 
 
 @pytest.mark.parametrize(
-    "change", [{"v": 5}, {"v": None}, {"k": 99}, {"k": True}, {"o": -1}, {"t": 1e9}, {"s": "x"}, {"b": 3}]
+    ("change", "named"),
+    [
+        ({"v": 5}, "payload: receipt: expected version 4, got 5"),
+        ({"v": None}, "payload: expected schema version 1 to 5, got None"),
+        ({"k": 99}, "payload: unknown kind 99"),
+        ({"k": True}, "payload: unknown kind True"),
+        ({"o": -1}, "payload: envelope field o: expected 0..255, got -1"),
+        ({"o": 256, "t": "x"}, "payload: envelope field o: expected 0..255, got 256"),
+        ({"t": 1e9}, "payload: envelope field t: expected 0..255, got 1000000000.0"),
+        ({"t": False}, "payload: envelope field t: expected 0..255, got False"),
+        ({"s": "x"}, f"payload: envelope field s: expected 0..{2**53}, got 'x'"),
+        ({"s": 2**53 + 1}, f"payload: envelope field s: expected 0..{2**53}, got {2**53 + 1}"),
+        ({"b": 3}, "Receipt: expected a map of fields, got 3"),
+    ],
 )
-def test_a_wrong_envelope_is_refused(change: dict[str, Any]) -> None:
+def test_a_wrong_envelope_is_refused_by_name(change: dict[str, Any], named: str) -> None:
     rows = msgpack.unpackb(encode(Receipt(3, 4))) | change
-    with pytest.raises(DecodeError):
+    with pytest.raises(DecodeError, match=f"^{re.escape(named)}$"):
         decode(msgpack.packb(rows))
 
 

@@ -1,0 +1,94 @@
+"""Functions that check the fields of one kind of message, compiled from the schema: one reads a body, one a message.
+
+Every process checks what it says and what it believes. What a loop over the fields would look up each time is written
+out here: a value that is as the schema says takes a comparison, and anything else goes to its field's check, which
+converts it or refuses it by name. Fields are checked in the order of the schema, so the first wrong one is named.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Sequence
+from typing import Any
+
+from telemetry.presentation.fields import FieldCodec
+from telemetry.quantities import ValueKind
+from telemetry.schema import Field, MessageSpec
+
+Reader = Callable[[dict[str, Any]], Any]  # message of its fields by their keys; raises ValueError
+Lister = Callable[[Any], list[Any]]  # values of the fields of a message; raises ValueError
+RIGHT = {
+    ValueKind.NUMBER: "type({v}) is float and {low!r} <= {v} <= {high!r}",
+    ValueKind.INTEGER: "type({v}) is int and {low!r} <= {v} <= {high!r}",
+    ValueKind.BOOLEAN: "{v} is True or {v} is False",
+    ValueKind.BINARY: "type({v}) is bytes and {low!r} <= len({v}) <= {high!r}",
+}  # what needs no check
+
+
+def reader_of(spec: MessageSpec, codecs: Sequence[FieldCodec], version: int) -> Reader:
+    """Function from the body of a payload of a schema version to its message; ``codecs`` are those of all fields.
+
+    The first field that is missing or not as the schema says raises ValueError.
+    """
+    said = [k for k, codec in enumerate(codecs) if codec.since <= version]
+    space: dict[str, Any] = {"Message": spec.message, "Writable": writable(spec.message)}
+    space["keys"] = [codecs[k].key for k in said]
+    lines = ["try:", *(f"    v{k} = given[{codecs[k].key!r}]" for k in said)]
+    # what is missing is None, which no check lets pass
+    lines += ["except KeyError:", f"    {' '.join(f'v{k},' for k in said)} = [given.get(key) for key in keys]"]
+    lines += [line for k in said for line in checking(spec.fields[k], k, "list")]
+    for k in sorted(set(range(len(codecs))).difference(said)):
+        before = codecs[k].before
+        is_shared = codecs[k].default() is before  # a mutable one is copied for each message
+        space[f"before{k}"] = before if is_shared else codecs[k].default
+        lines.append(f"v{k} = before{k}{'' if is_shared else '()'}")
+    lines += ["message = Writable()", *(f"message.{codec.name} = v{k}" for k, codec in enumerate(codecs))]
+    lines += ["message.__class__ = Message", "return message"]
+    reader: Reader = compiled(lines, space, codecs)
+    return reader
+
+
+def lister_of(spec: MessageSpec, codecs: Sequence[FieldCodec]) -> Lister:
+    """Function from a message to the values of its fields; the first one not as the schema says raises ValueError."""
+    lines = []
+    for k, field in enumerate(spec.fields):
+        lines += [f"v{k} = given.{field.name}", *checking(field, k, "tuple")]
+    lister: Lister = compiled([*lines, f"return [{', '.join(f'v{k}' for k in range(len(codecs)))}]"], {}, codecs)
+    return lister
+
+
+def checking(field: Field, place: int, sequence: str) -> list[str]:
+    """Lines that check the value of a field; ``sequence`` is the type that vectors come in."""
+    v = f"v{place}"
+    check = f"{v} = check{place}({v})"
+    if field.kind is ValueKind.VECTOR:
+        within = " and ".join(f"{-field.high!r} <= {axis} <= {field.high!r}" for axis in "xyz")
+        return [
+            f"x, y, z = {v} if type({v}) is {sequence} and len({v}) == 3 else (None, None, None)",
+            f"if type(x) is type(y) is type(z) is float and {within}:",
+            f"    {v} = x, y, z",
+            "else:",
+            f"    {check}",
+        ]
+    right = None if field.enumeration else RIGHT.get(field.kind)
+    if right is None:
+        return [check]
+    return [f"if not ({right.format(v=v, low=field.low, high=field.high)}):", f"    {check}"]
+
+
+def compiled(lines: list[str], space: dict[str, Any], codecs: Sequence[FieldCodec]) -> Callable[[Any], Any]:
+    """Function of one argument ``given``; its lines may name what is in ``space`` and the checks of all fields."""
+    space |= {"inf": math.inf} | {f"check{k}": codec.check for k, codec in enumerate(codecs)}
+    source = "def function(given):\n" + "\n".join(f"    {line}" for line in lines)
+    exec(compile(source, "<compiled from the schema>", "exec"), space)
+    function: Callable[[Any], Any] = space["function"]
+    return function
+
+
+def writable(message: type[Any]) -> type[Any]:
+    """Twin of a frozen message whose fields can be assigned.
+
+    An instance becomes the message by ``__class__``, which Python allows between classes of the same slots. A frozen
+    dataclass assigns each field by a call: for a state that takes six times as long.
+    """
+    return type(f"Writable{message.__name__}", (), {"__slots__": message.__slots__})
