@@ -6,6 +6,7 @@ from dataclasses import replace
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from sealed_string import state
 
 from telemetry.application.endpoint import PRIORITIES, Endpoint, Received
 from telemetry.media.memory import MemoryPort, joint
@@ -18,6 +19,7 @@ from telemetry.messages import (
     ImuMean,
     Message,
     NodeFlag,
+    NodeState,
     Reply,
     Severity,
     Side,
@@ -256,6 +258,51 @@ def test_a_relay_hands_on_the_very_bytes_that_came(monkeypatch: pytest.MonkeyPat
     chain.run(3.0)
     assert event in chain.got[BASE]
     assert len(encoded) == 1
+
+
+def speak(chain: Chain, periods: int, silent: int = 0) -> dict[int, int]:
+    """Let every tube but ``silent`` tell its state, ``periods`` times; frames that each has heard from below."""
+    heard = dict.fromkeys(chain.addresses, 0)
+    taken = Endpoint.receive
+
+    def counting(self: Endpoint, side: Side, frame: bytes, now: float, margin: float = math.inf) -> list[Received]:
+        heard[self.address] += side is Side.LOWER
+        return taken(self, side, frame, now, margin)
+
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(Endpoint, "receive", counting)
+        for k in range(periods):
+            for tube in chain.addresses[2:]:
+                if tube != silent:
+                    chain.stations[tube].send_state(state(k, tube), chain.local(tube))
+            chain.run(2.0 * TICK)
+    return heard
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("tubes", [4, 12])
+def test_states_go_up_in_one_frame_however_long_the_string_is(tubes: int) -> None:
+    chain = Chain(list(range(tubes, 0, -1)))
+    chain.run(tubes + 40.0)  # until clocks are compared at the slow pace
+    before, begun = len(chain.got[BASE]), chain.now
+    heard = speak(chain, 20)
+    cycles = (chain.now - begun) / TICK
+    assert [m.tube for m in chain.got[BASE][before:] if isinstance(m, NodeState)].count(tubes) >= 19
+    told = {m.tube for m in chain.got[BASE][before:] if isinstance(m, NodeState)}
+    assert told == set(range(1, tubes + 1))
+    for address in (ENCODER, *range(tubes, 1, -1)):
+        assert heard[address] < 1.1 * cycles  # with hellos, clocks and acknowledgements; each state alone: tubes / 2
+
+
+@pytest.mark.slow
+def test_states_above_a_node_that_says_nothing_of_itself_come_half_as_often() -> None:
+    """The newest of two leaves when the older has waited long enough."""
+    chain = Chain([4, 3, 2, 1])
+    chain.run(10.0)
+    before = len(chain.got[BASE])
+    speak(chain, 10, silent=1)
+    told = [m.tube for m in chain.got[BASE][before:] if isinstance(m, NodeState)]
+    assert {tube: told.count(tube) for tube in (1, 2, 3, 4)} == {1: 0, 2: 5, 3: 5, 4: 5}
 
 
 @pytest.mark.slow

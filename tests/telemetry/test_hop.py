@@ -9,10 +9,12 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from telemetry.media.memory import MemoryPort, joint
-from telemetry.media.port import Priority
+from telemetry.media.port import MAX_FRAME, Priority
 from telemetry.transport.hop import (
     ACK_DELAY,
     ACKNOWLEDGEMENT,
+    BEST_EFFORT_LIMIT,
+    BUNDLE_LIMIT,
     QUEUE_LIMIT,
     SILENCE,
     Header,
@@ -200,7 +202,7 @@ def test_a_frame_names_its_class_and_its_topic() -> None:
     assert (acknowledgement.priority, acknowledgement.topic) == (Priority.COMMAND, ACKNOWLEDGEMENT)
 
 
-@pytest.mark.parametrize(("limit", "shared"), [(0, [1] * 10), (700, [2] * 5), (16384, [8, 2])])
+@pytest.mark.parametrize(("limit", "shared"), [(0, [1] * 10), (700, [2] * 5), (BUNDLE_LIMIT, [10])])
 def test_payloads_share_a_frame_up_to_the_limit_of_the_port(limit: int, shared: list[int]) -> None:
     pair = Pair()
     pair.run(1.0)
@@ -209,3 +211,49 @@ def test_payloads_share_a_frame_up_to_the_limit_of_the_port(limit: int, shared: 
         pair.links[0].send_reliable(bytes([k]) * 310, Priority.BLOCK)
     frames = pair.links[0].take_frames(pair.now)
     assert [len(pair.links[1].receive(frame.payload, pair.now)) for frame in frames] == shared
+
+
+@given(st.lists(st.integers(0, 4096), min_size=1, max_size=400))
+def test_no_bundle_is_larger_than_a_frame_may_be(sizes: list[int]) -> None:
+    link = HopLink(1, 2**20)
+    for k, size in enumerate(sizes):
+        link.send_best_effort(bytes(size), k)
+    frames = link.take_frames(1.0)
+    assert all(len(frame.payload) <= MAX_FRAME for frame in frames)
+    shown = [parse_frame(frame.payload) for frame in frames]
+    assert [len(payload) for found in shown if found for _, payload in found[1]] == sizes[-BEST_EFFORT_LIMIT:]
+
+
+def test_what_may_wait_goes_with_the_next_that_lets_it_go() -> None:
+    link = HopLink(1, 1)
+    link.send_with_others(b"state", "state", Priority.STATE, until=3.0)
+    link.send_best_effort(b"time", "time", Priority.TIME)
+    (alone,) = link.take_frames(1.0)
+    assert entries_of(alone.payload) == [b"time"]
+    assert link.next_wake(1.0) == 3.0
+    link.send_best_effort(b"below", "below", Priority.STATE)
+    link.release()
+    (together,) = link.take_frames(1.5)
+    assert sorted(entries_of(together.payload)) == [b"below", b"state"]
+    assert link.next_wake(1.5) == math.inf
+
+
+def test_what_may_wait_goes_alone_in_time_however_often_it_is_replaced() -> None:
+    link = HopLink(1, 1)
+    link.send_with_others(b"hello", "hello", Priority.HELLO, until=2.0)
+    for at in (1.0, 1.5):
+        link.send_with_others(b"state at %.1f" % at, "state", Priority.STATE, until=at + 2.0)
+    assert link.take_frames(1.9) == []
+    (first,) = link.take_frames(2.0)
+    assert entries_of(first.payload) == [b"hello"]
+    assert link.next_wake(2.0) == 3.0
+    assert link.take_frames(2.9) == []
+    (second,) = link.take_frames(3.0)
+    assert entries_of(second.payload) == [b"state at 1.5"]
+
+
+def entries_of(frame: bytes) -> list[bytes]:
+    """Payloads of a frame."""
+    found = parse_frame(frame)
+    assert found is not None
+    return [payload for _, payload in found[1]]
