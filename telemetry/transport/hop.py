@@ -186,7 +186,7 @@ class HopLink:
         """When ``take_frames`` has something to do without further input, infinite if never."""
         wake = min(self._ack_due, self._patient_until)
         if self._outstanding and self.is_up(now):
-            wake = min(wake, min(o.send_at for o in self._outstanding.values()))
+            wake = min(wake, *(one.send_at for one in self._outstanding.values()))
         return wake
 
     @property
