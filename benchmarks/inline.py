@@ -1,30 +1,57 @@
-"""The rig in one process beside the rig of real processes: CPU of both in one run, and that the digests agree."""
+"""The rig in one process beside the rig of real processes, and what a tube more costs in either.
+
+Run it as ``borechain bench inline``. Wellbore 1 is drilled both ways, with equal digests. Strings of 3 to 100 tubes
+that hang complete are drilled a little and surveyed, in lockstep as fast as they can; what they cost is read while
+they drill, so that no start of a process is in it. ``ours_to_peer`` is beside ``at_most``, which is asked of it, and
+``at_least`` is asked of ``ratio``.
+"""
 
 from __future__ import annotations
 
 import contextlib
 import ctypes
 import json
+import math
 import os
 import resource
 import socket
 import subprocess
 import sys
 import tempfile
+import time
+from collections.abc import Callable, Mapping
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
+
+from borechain.cli.rig.rig import Job, drill_in_processes, process_table, settings_of, world_of
+from borechain.host import opened_router
+from borechain.inline import InlineRig
+from borechain.load.hour import scenario_text
+from sim.rig.in_process import InProcessStepper
+from sim.rig.launcher import Tick
+from sim.rig.processes import ProcessTable
+from sim.rig.realtime import cpu_seconds, footprint, pids
+from sim.rig.scheduler import Progress
+from sim.rig.stepper import Answer, FrameEvent
+from telemetry.messages import BASE, ENCODER
+from telemetry.runtime.stepped import Due
 
 PR_SET_CHILD_SUBREAPER = 36
 SCENARIO = Path(__file__).parents[1] / "scenarios" / "wellbore-1.toml"
+TUBES = (3, 10, 25, 50, 100)
+RIG_S = 180.0  # of a string
+RUN_IN = 20.0  # s of rig time before anything is read
+BEFORE_END = 10.0  # s
 
 
 def run() -> dict[str, Any]:
-    """Drill wellbore 1, seed 1, inline and with processes.
+    """Drill wellbore 1, seed 1, and the strings, inline and with processes.
 
     Returns
     -------
     dict
-        ``ratios``: CPU seconds inline (ours) and of all processes together (peer); ``digests`` of both.
+        ``ratios``: CPU seconds inline (ours) and of all processes together (peer), then what is asked of the strings;
+        ``digests`` of wellbore 1 both ways; ``strings``: by the number of tubes, see ``cost``.
 
     Raises
     ------
@@ -37,8 +64,151 @@ def run() -> dict[str, Any]:
     processes_s, processes = drilled("--endpoint", free_endpoint())
     if inline != processes:
         raise RuntimeError(f"digests differ: inline {inline}, processes {processes}")
-    ratio = {"ours": inline_s, "peer": processes_s, "ratio": processes_s / inline_s}
-    return {"bench": "inline", "ratios": {"wellbore-1, CPU": ratio}, "digests": [inline, processes]}
+    strings = {tubes: cost(tubes) for tubes in TUBES}
+    ten, hundred = strings[10], strings[100]
+    return {
+        "bench": "inline",
+        "ratios": {
+            "wellbore-1, CPU": beside(inline_s, processes_s),
+            "CPU of a node-cycle over processes, 100 tubes beside 10": beside(
+                hundred["cpu_s"], ten["cpu_s"], at_most=1.3
+            ),
+            "CPU of a node-cycle inline, 100 tubes beside 10": beside(hundred["inline_s"], ten["inline_s"]),
+            "100 tubes over processes, wall beside rig time": beside(hundred["wall_s"], 1.0, at_least=2.0),
+            "100 tubes inline, CPU beside rig time": beside(hundred["inline_wall_s"], 1.0, at_least=20.0),
+        },
+        "digests": [inline, processes],
+        "strings": strings,
+    }
+
+
+def beside(ours: float, peer: float, **asked: float) -> dict[str, float]:
+    """A row: how many times faster ours is, and what is asked of it."""
+    return {"ours": ours, "peer": peer, "ratio": peer / ours, "ours_to_peer": ours / peer, **asked}
+
+
+class Mark(NamedTuple):
+    """What was spent until a moment, s."""
+
+    rig: float
+    wall: float
+    cpu: float
+
+
+class Meter:
+    """Reads what a rig spends between its run-in and its end.
+
+    Parameters
+    ----------
+    spent : CPU seconds of all its processes so far
+    at_end : called once, when the last mark is read
+    """
+
+    def __init__(self, spent: Callable[[], float], at_end: Callable[[], None] = lambda: None) -> None:
+        self._spent, self._at_end = spent, at_end
+        self.marks: list[Mark] = []
+        self.told = 0
+        self.length = math.nan  # s of rig time
+
+    def follow(self, tick: Tick | Progress) -> None:
+        """The rig has told how far it is."""
+        self.told += 1
+        self.length = tick.end - tick.begin
+        due = (tick.begin + RUN_IN, tick.end - BEFORE_END, math.inf)[len(self.marks)]
+        if tick.rig_time >= due:
+            self.marks.append(Mark(tick.rig_time, time.perf_counter(), self._spent()))
+            if len(self.marks) == len(("run in", "before the end")):
+                self._at_end()
+
+    @property
+    def per_second(self) -> tuple[float, float]:
+        """CPU and wall seconds of a second of rig time."""
+        first, last = self.marks
+        rig = last.rig - first.rig
+        return (last.cpu - first.cpu) / rig, (last.wall - first.wall) / rig
+
+
+class Counting(InProcessStepper):
+    """Counts cycles of tubes, and what the same steps put on the bus between real processes."""
+
+    node_cycles = 0
+    puts = 0
+
+    def round(self, steps: Mapping[int, list[FrameEvent]]) -> dict[int, Answer]:
+        """Step each process in turn."""
+        answers = super().round(steps)
+        for address, events in steps.items():
+            kinds = [event.kind for event, _ in events]
+            self.node_cycles += kinds.count(Due.CYCLE) if address not in (BASE, ENCODER) else 0
+            self.puts += sum(kind in (Due.UPPER_FRAME, Due.LOWER_FRAME, Due.DEPTH) for kind in kinds)
+        self.puts += sum(len(answer.frames) for answer in answers.values())
+        return answers
+
+
+def cost(tubes: int) -> dict[str, float]:
+    """What a string costs.
+
+    Returns
+    -------
+    dict
+        ``cpu_s`` and ``inline_s`` of a node-cycle, over processes and inline; ``wall_s`` and ``inline_wall_s`` of a
+        second of rig time, the second of them CPU of one core; ``messages`` on the bus by node-cycle; ``memory_mb`` by
+        tube, of all processes together, and of it ``medium_mb``.
+    """
+    with tempfile.TemporaryDirectory(prefix="borechain-") as place:
+        scenario = Path(place, "string.toml")
+        scenario.write_text(scenario_text(tubes, RIG_S))
+        inline, stepper = drilled_inline(scenario, Path(place, "inline"))
+        meter, memory = drilled_by_processes(scenario, Path(place, "processes"))
+    cpu, wall = meter.per_second
+    inline_cpu, _ = inline.per_second
+    node_cycles = stepper.node_cycles / inline.length  # a second of rig time
+    return {
+        "cpu_s": cpu / node_cycles,
+        "inline_s": inline_cpu / node_cycles,
+        "wall_s": wall,
+        "inline_wall_s": inline_cpu,
+        "messages": (stepper.puts + inline.told) / stepper.node_cycles,
+        "memory_mb": sum(memory.values()) / tubes,
+        "medium_mb": memory["medium"] / tubes,
+    }
+
+
+def drilled_inline(scenario: Path, folder: Path) -> tuple[Meter, Counting]:
+    """Drill with objects in this process."""
+    folder.mkdir()
+    job = Job(scenario, 1, math.inf)
+    world = world_of(job)
+    rig = InlineRig(world, settings_of(world, job), job.rig_name, folder)
+    rig.stepper = counting = Counting(rig.stepper.builders)
+    meter = Meter(time.process_time)
+    rig.run(meter.follow)
+    rig.close()
+    return meter, counting
+
+
+def drilled_by_processes(scenario: Path, folder: Path) -> tuple[Meter, dict[str, float]]:
+    """Drill with a process a tube; memory of each (MB), what is shared by those who share it."""
+    folder.mkdir()
+    job = Job(scenario, 1, math.inf, endpoint=free_endpoint())
+    world = world_of(job)
+    tables: list[ProcessTable] = []
+    memory: dict[str, float] = {}
+
+    def table_of(*place: Any) -> ProcessTable:
+        tables.append(process_table(world, job, folder, None, *place))
+        return tables[0]
+
+    def spent() -> float:
+        return time.process_time() + sum(cpu_seconds(pid) for pid in pids(tables[0]).values())
+
+    def weigh() -> None:
+        memory.update({name: footprint(pid)["pss_mb"] for name, pid in pids(tables[0]).items()})
+
+    meter = Meter(spent, weigh)
+    with opened_router(job.endpoint) as bus:
+        drill_in_processes(world, job, bus, meter.follow, None, table_of)
+    return meter, memory
 
 
 def drilled(*options: str) -> tuple[float, str]:
