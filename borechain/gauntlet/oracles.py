@@ -193,7 +193,7 @@ def _depths(rows: list[dict[str, Any]], world: FaultyWorld) -> Iterator[str]:
     allowed = _rests(world)
     for row in rows:
         md, tube = row["md_m"], row["tube"]
-        if not any(tube == known and abs(md - at) <= DEPTH_TOLERANCE for known, at in allowed):
+        if not _is_among((tube, md), allowed):
             yield f"tube {tube}: survey {row['sequence']} is placed at {md:.3f} m"
 
 
@@ -228,7 +228,7 @@ def _missing(rows: list[dict[str, Any]], rig: GauntletRig, standing: set[str]) -
     lacking = [
         f"tube {tube} at {md:.2f} m"
         for tube, md in _expected(rig)
-        if not any(row["tube"] == tube and abs(row["md_m"] - md) <= DEPTH_TOLERANCE for row in rows)
+        if not _is_among((tube, md), [(row["tube"], row["md_m"]) for row in rows])
     ]
     if lacking and not standing & TOLD:
         yield f"no survey of {', '.join(lacking)}, and no alarm of it stands"
@@ -243,12 +243,22 @@ def _expected(rig: GauntletRig) -> list[tuple[int, float]]:
     """Tube and depth (m) of every survey that the stops of the schedule owe, but of one that is not due yet.
 
     A ground station that was off while the encoder started again does not know how long the bit has stood: it counts
-    what it has heard, and tells the crew later.
+    what it has heard, and tells the crew later. A survey taken after the newest reading of the depth is placed by the
+    next.
     """
     stops = [(phase.tube, rig.world.true_depth(phase.end)) for phase in rig.world.phases if phase.kind == "stop"]
     model = rig.inline.ground.model
     waits = [one.stand.md for one in model.stops if not one.judged and one.later]
-    return _nodes([stop for stop in stops if not any(abs(stop[1] - md) <= DEPTH_TOLERANCE for md in waits)])
+    owed = _nodes([stop for stop in stops if not any(abs(stop[1] - md) <= DEPTH_TOLERANCE for md in waits)])
+    heard = max((stand.ended_at for stand in model.depths.stands if stand.epoch == model.epoch), default=math.inf)
+    late = {one.measurement.tube for one in model.waiting if one.measurement.station_at > heard}
+    coming = [one for one in _nodes([(max(late, default=0), rig.world.true_depth(rig.world.end))]) if one[0] in late]
+    return [one for one in owed if not _is_among(one, coming)]
+
+
+def _is_among(one: tuple[int, float], others: list[tuple[int, float]]) -> bool:
+    """Whether a tube is at its depth (m) in a list of both."""
+    return any(one[0] == tube and abs(one[1] - md) <= DEPTH_TOLERANCE for tube, md in others)
 
 
 def _nodes(rests: list[tuple[int, float]]) -> list[tuple[int, float]]:

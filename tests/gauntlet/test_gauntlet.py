@@ -103,6 +103,7 @@ def test_combined_seeds_hold(first: int) -> None:
         (213809, ("encoder-from-zero", "ground-cut", "bytes-rot", "database-deleted")),  # the first stand was a stop
         (213984, ("encoder-from-zero", "ground-cut", "depth-jumps-up")),  # a jump from one epoch to the next
         (305006, ("bytes-rot", "bursts", "gyro-step")),  # the encoder repeated itself to a node that had turned
+        (321753, ("surveys-lost", "not-finite")),  # the survey came with the last word of the run
         (51633, ("surveys-lost", "gyro-step")),  # a gyroscope that turned its tube while nobody corrected it
     ],
 )
