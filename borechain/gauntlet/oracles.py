@@ -242,13 +242,14 @@ def _rests(world: FaultyWorld) -> list[tuple[int, float]]:
 def _expected(rig: GauntletRig) -> list[tuple[int, float]]:
     """Tube and depth (m) of every survey that the stops of the schedule owe, but of one that is not due yet.
 
-    A ground station that was off while the encoder started again does not know how long the bit has stood: it counts
-    what it has heard, and tells the crew later. A survey taken after the newest reading of the depth is placed by the
+    A ground station that was off while the encoder started again, or lost its database, does not know how long the bit
+    has stood: it counts what it has heard, and tells the crew later. A survey taken after the newest reading of the depth is placed by the
     next.
     """
     stops = [(phase.tube, rig.world.true_depth(phase.end)) for phase in rig.world.phases if phase.kind == "stop"]
     model = rig.inline.ground.model
-    waits = [one.stand.md for one in model.stops if not one.judged and one.later]
+    due = model.config.survey_after
+    waits = [one.stand.md for one in model.stops if not one.judged and one.age(model.epoch, model.rig_now) < due]
     owed = _nodes([stop for stop in stops if not any(abs(stop[1] - md) <= DEPTH_TOLERANCE for md in waits)])
     heard = max((stand.ended_at for stand in model.depths.stands if stand.epoch == model.epoch), default=math.inf)
     late = {one.measurement.tube for one in model.waiting if one.measurement.station_at > heard}

@@ -104,6 +104,8 @@ def test_combined_seeds_hold(first: int) -> None:
         (213984, ("encoder-from-zero", "ground-cut", "depth-jumps-up")),  # a jump from one epoch to the next
         (305006, ("bytes-rot", "bursts", "gyro-step")),  # the encoder repeated itself to a node that had turned
         (321753, ("surveys-lost", "not-finite")),  # the survey came with the last word of the run
+        # the ground station knows of the stop from its second half only
+        (322663, ("encoder-from-zero", "cut-again-and-again", "node-memory-rots", "database-deleted")),
         (51633, ("surveys-lost", "gyro-step")),  # a gyroscope that turned its tube while nobody corrected it
     ],
 )
