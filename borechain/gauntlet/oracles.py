@@ -243,8 +243,8 @@ def _expected(rig: GauntletRig) -> list[tuple[int, float]]:
     """Tube and depth (m) of every survey that the stops of the schedule owe, but of one that is not due yet.
 
     A ground station that was off while the encoder started again, or lost its database, does not know how long the bit
-    has stood: it counts what it has heard, and tells the crew later. A survey taken after the newest reading of the depth is placed by the
-    next.
+    has stood: it counts what it has heard, and tells the crew later. A survey taken after the newest reading of the
+    depth is placed by the next.
     """
     stops = [(phase.tube, rig.world.true_depth(phase.end)) for phase in rig.world.phases if phase.kind == "stop"]
     model = rig.inline.ground.model
