@@ -10,7 +10,7 @@ import enum
 import math
 from typing import Any, Final
 
-from node.kernels.alignment import CIRCLE, fit_circle, take_extremes, to_tube
+from node.kernels.alignment import CIRCLE, fit_circle, take_extremes
 from node.kernels.angles import wrap
 from node.kernels.circular import TURNS_Q, angle_of_turns, arcsine, reach, turns_of
 from node.kernels.cluster import WEIGHT_Q, all_used
@@ -18,10 +18,11 @@ from node.kernels.events import Code, tell, tell_more, told, told_count, told_de
 from node.kernels.fixed.arithmetic import mul, shift
 from node.kernels.fixed.layout import ANGLE_Q, FORCE_Q, RATE_Q, VECTOR_Q
 from node.kernels.jit import constant, kernel
-from node.kernels.layout import DEG, PERIOD, RING, Array
-from node.kernels.numbers import angle_of, by_type, half, is_number, length, over, times, turn
-from node.kernels.quantity import NONE, ONE, angle, factor, seconds
+from node.kernels.layout import DEG, PERIOD
+from node.kernels.numbers import angle_of, by_type, half, is_number, turn
+from node.kernels.quantity import NONE, angle, factor, seconds
 from node.kernels.quantity import rate as of_rate
+from node.kernels.realign import add_axes, realign
 from node.kernels.sweep import MOST_SAMPLES, add_to_sweep, clear_sweep
 
 SLOWEST, FASTEST = of_rate(2.0 * DEG), of_rate(15.0 * DEG)  # rad/s, of the turn
@@ -33,7 +34,7 @@ LARGEST_GAP: Final = seconds(5.0)  # between two cycles
 LARGEST_OVERLAP: Final = seconds(-PERIOD)
 LARGEST_STEP: Final = angle(3.0 * DEG)  # of the yaw in a cycle, beyond what the gyroscope turned
 LEAST_LEAN: Final = 20  # standard errors: with less the readings do not show that they turned with the tube
-MOST_LEAN: Final = angle(60.0 * DEG)  # beyond it gravity's circle is wide, its middle near the centre: it determines no axis
+MOST_LEAN: Final = angle(60.0 * DEG)  # beyond it the middle of gravity's circle is near the centre: it is no axis
 SHAKING: Final = 5  # times the noise of a sample at rest
 LARGEST_OFFSET: Final = 10.0 * DEG  # of a mount; a block of parameters can hold no larger one either
 FARTHEST: Final = factor(math.sin(LARGEST_OFFSET))  # of the axis from z
@@ -77,11 +78,7 @@ BEGUN, TURNING, ALIGNED = constant(Code.ALIGNMENT_BEGUN), constant(Code.ALIGNMEN
 REFUSED, DROPPED = constant(Code.ALIGNMENT_REFUSED), constant(Code.ALIGNMENT_DROPPED)
 
 
-def _longest(wanted: int) -> int:
-    return PATIENCE + (mul(min(wanted, 1 << 31), SLOWEST_TURN) << 14)
-
-
-@by_type(_longest)
+@by_type(lambda wanted: PATIENCE + (mul(min(wanted, 1 << 31), SLOWEST_TURN) << 14))
 def longest(wanted: float) -> float:
     """The time (s) within which so many turns are done."""
     return PATIENCE + wanted * math.tau / SLOWEST
@@ -265,64 +262,3 @@ def judge_offset(offset: Any, noise: float) -> tuple[int, float, float]:
     if size > FARTHEST:
         return LARGE_OFFSET, told_degrees(arcsine(size), ANGLE_Q), NONE
     return 0, NONE, NONE
-
-
-@kernel
-def add_axes(node: Any, settings: Any, which: int) -> None:
-    """Sum of the axes of all IMUs, before (``which`` 0) or after (1) they change: the axis of the fused reading."""
-    total = node.aligner.sums[which]
-    for i in range(3):
-        total[i] = 0
-        for k in range(settings.imus):
-            total[i] += node.mount.axis[k, i]
-
-
-@kernel
-def realign(node: Any, settings: Any) -> None:
-    """Turn what the filter holds in the tube's frame when the axes have changed since ``add_axes(.., 0)``.
-
-    R = R_after R_before^T. The covariance stays: turning it by so little changes it in the second order.
-    """
-    state, aligner = node.filter, node.aligner
-    add_axes(node, settings, 1)
-    before, after, rotation, work = aligner.sums[0], aligner.sums[1], aligner.turn, aligner.force
-    if before[0] == after[0] and before[1] == after[1] and before[2] == after[2]:
-        return
-    rotation_to_tube(before, work, aligner.rotations[0])
-    rotation_to_tube(after, work, aligner.rotations[1])
-    for i in range(3):
-        for j in range(3):
-            rotation[i, j] = 0
-            for k in range(3):
-                rotation[i, j] += times(aligner.rotations[1, i, k], aligner.rotations[0, j, k])
-    turn_vector(rotation, state.down, work)
-    turn_vector(rotation, state.now_down, work)
-    turn_vector(rotation, state.static_bias, work)
-    turn_vector(rotation, state.bias, work)
-    for slot in range(RING):
-        turn_vector(rotation, state.ring_rate[slot], work)
-        turn_vector(rotation, state.ring_force[slot], work)
-
-
-@kernel
-def rotation_to_tube(axis: Array, work: Array, rotation: Array) -> None:
-    """Matrix (3, 3) of ``to_tube`` into ``rotation``; ``axis`` (3) is made a unit vector, ``work`` is 3 numbers."""
-    size = length(axis[0], axis[1], axis[2])
-    for i in range(3):
-        axis[i] = over(axis[i], size)
-    for j in range(3):
-        for i in range(3):
-            work[i] = 0
-        work[j] = ONE
-        to_tube(axis, work)
-        for i in range(3):
-            rotation[i, j] = work[i]
-
-
-@kernel
-def turn_vector(rotation: Array, vector: Array, work: Array) -> None:
-    """Multiply ``vector`` (3) by ``rotation`` (3, 3), in place."""
-    for i in range(3):
-        work[i] = times(vector[0], rotation[i, 0]) + times(vector[1], rotation[i, 1]) + times(vector[2], rotation[i, 2])
-    for i in range(3):
-        vector[i] = work[i]

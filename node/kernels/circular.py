@@ -5,10 +5,10 @@ from __future__ import annotations
 import math
 from typing import Final
 
-from node.kernels.fixed.arithmetic import mul, shift
+from node.kernels.fixed.arithmetic import mul, root_of, shift
 from node.kernels.fixed.layout import ANGLE_Q, VECTOR_Q
 from node.kernels.fixed.trigonometry import counts, polar, sine_cosine
-from node.kernels.numbers import by_type, length, root
+from node.kernels.numbers import by_type, length
 
 UNITY: Final = 1 << VECTOR_Q
 TURNS_Q: Final = 24  # of a number of turns, in integers: at most 128
@@ -29,7 +29,7 @@ def spin_of(angle: float) -> tuple[float, float]:
 
 def _arcsine(sine: int) -> int:
     held = max(min(sine, UNITY), -UNITY)
-    return polar(root(UNITY * UNITY - held * held), held << 12)[0]
+    return polar(root_of(UNITY * UNITY - held * held), held << 12)[0]
 
 
 @by_type(_arcsine)

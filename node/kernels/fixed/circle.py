@@ -11,12 +11,11 @@ from typing import Any, Final
 
 from numba import types
 
-from node.kernels.fixed.arithmetic import bits, quotient, shift
+from node.kernels.fixed.arithmetic import bits, mean_of, quotient, root_of, shift
 from node.kernels.fixed.layout import ANGLE_Q, VECTOR_Q
 from node.kernels.fixed.trigonometry import polar
 from node.kernels.jit import kernel
 from node.kernels.layout import Array
-from node.kernels.numbers import mean, root, times
 from node.kernels.sweep import FREEDOMS, LEAST_WEIGHT, PRODUCT_Q, SQUARE_Q
 
 FIT_Q: Final = 38
@@ -71,7 +70,7 @@ def mixed(s: int, a: tuple[int, int], m: int, b: tuple[int, int]) -> tuple[int, 
 @kernel
 def mean_pair(total: Array, n: int, q: int) -> tuple[int, int]:
     """The mean (Q38) of a sum of complex numbers (2, Q``q``)."""
-    return shift(mean(total[0], n), q - FIT_Q), shift(mean(total[1], n), q - FIT_Q)
+    return shift(mean_of(total[0], n), q - FIT_Q), shift(mean_of(total[1], n), q - FIT_Q)
 
 
 @kernel
@@ -79,8 +78,8 @@ def look(axis: Array, across: Array) -> None:
     """As ``node.kernels.alignment.look_along``, Q30."""
     pull = quotient(1 << VECTOR_Q, (1 << VECTOR_Q) + axis[2])
     for k in range(2):
-        across[0, k] = -times(times(pull, axis[0]), axis[k])
-        across[1, k] = -times(times(pull, axis[1]), axis[k])
+        across[0, k] = -shift(shift(pull * axis[0], VECTOR_Q) * axis[k], VECTOR_Q)
+        across[1, k] = -shift(shift(pull * axis[1], VECTOR_Q) * axis[k], VECTOR_Q)
         across[2, k] = -axis[k]
     across[0, 0] += 1 << VECTOR_Q
     across[1, 1] += 1 << VECTOR_Q
@@ -93,7 +92,7 @@ def look_at_sums(sweep: Any, n: int, wide: int) -> tuple[tuple[int, int], tuple[
     total, back, angle_back = (0, 0), (0, 0), (0, 0)
     for i in range(3):
         row = (across[i, 0] << FINER, across[i, 1] << FINER)
-        u = mean(sweep.sum[i] << FINER, n)
+        u = mean_of(sweep.sum[i] << FINER, n)
         total = (total[0] + product(row[0], u), total[1] + product(row[1], u))
         own = turned(row, mean_pair(sweep.sum_back[i], n, PRODUCT_Q))
         back = (back[0] + own[0], back[1] + own[1])
@@ -101,7 +100,7 @@ def look_at_sums(sweep: Any, n: int, wide: int) -> tuple[tuple[int, int], tuple[
         angle_back = (angle_back[0] + own[0], angle_back[1] + own[1])
         for j in range(3):
             weight = turned_back(row, (across[j, 0] << FINER, across[j, 1] << FINER))[0]
-            squares += product(weight, shift(mean(sweep.sum_products[i, j], n), PRODUCT_Q - FIT_Q))
+            squares += product(weight, shift(mean_of(sweep.sum_products[i, j], n), PRODUCT_Q - FIT_Q))
     return total, back, angle_back, squares
 
 
@@ -111,13 +110,13 @@ def fit_in_integers(sweep: Any, offset: Any) -> int:
     n, axis = sweep.samples, offset.axis
     if 2 * n <= FREEDOMS or axis[2] < LEAST_RAISED:
         return 0
-    mean_square = mean(sweep.sum_angle_squares, n)
+    mean_square = mean_of(sweep.sum_angle_squares, n)
     wide = max((bits(mean_square) - SQUARE_Q + 1) >> 1, 0)
-    m, s = shift(mean(sweep.sum_angle, n), ANGLE_Q + wide - FIT_Q), shift(mean_square, SQUARE_Q + 2 * wide - FIT_Q)
+    m, s = shift(mean_of(sweep.sum_angle, n), ANGLE_Q + wide - FIT_Q), shift(mean_square, SQUARE_Q + 2 * wide - FIT_Q)
     determinant = s - product(m, m)
     if determinant < LEAST_SPREAD:
         return 0
-    spin = (mean(sweep.sum_spin[0] << FINER, n), mean(sweep.sum_spin[1] << FINER, n))
+    spin = (mean_of(sweep.sum_spin[0] << FINER, n), mean_of(sweep.sum_spin[1] << FINER, n))
     angle_spin = mean_pair(sweep.sum_angle_spin, n, ANGLE_Q + wide)
     first, second = mixed(s, spin, m, angle_spin), mixed(1 << FIT_Q, angle_spin, m, spin)  # det B^-1 v
     left_over = determinant - turned_back(spin, first)[0] - turned_back(angle_spin, second)[0]
@@ -139,8 +138,8 @@ def fit_in_integers(sweep: Any, offset: Any) -> int:
     drift = (part(drifted[0], determinant), part(drifted[1], determinant))
     explained = turned_back(middle, total)[0] + turned_back(radius, back)[0] + turned_back(drift, angle_back)[0]
     var = (min(max(squares - explained, 0), LARGEST) * n // (2 * n - FREEDOMS)) << (2 * 28 - FIT_Q)
-    offset.noise = root(var)
-    offset.lean_std = root(mean(quotient(var, weight >> FINER), n))
+    offset.noise = root_of(var)
+    offset.lean_std = root_of(mean_of(quotient(var, weight >> FINER), n))
     finish(sweep, offset, n, middle, (radius[0] + product(drift[0], m), radius[1] + product(drift[1], m)))
     return 1
 
@@ -150,7 +149,7 @@ def finish(sweep: Any, offset: Any, n: int, middle: tuple[int, int], radius: tup
     """Leave the lean, and the middle as a direction (Q30) in the work space of the sweep."""
     axis, across, along = offset.axis, sweep.across, 0
     for i in range(3):
-        along += product(axis[i] << FINER, mean(sweep.sum[i] << FINER, n))
+        along += product(axis[i] << FINER, mean_of(sweep.sum[i] << FINER, n))
     offset.lean = polar(abs(along), polar(*radius)[1])[0]
     for i in range(3):
         beside = product(middle[0], across[i, 0] << FINER) + product(middle[1], across[i, 1] << FINER)

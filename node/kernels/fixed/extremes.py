@@ -10,11 +10,10 @@ from typing import Final
 
 import numpy as np
 
-from node.kernels.fixed.arithmetic import mul, quotient, shift
-from node.kernels.fixed.layout import VECTOR_Q
+from node.kernels.fixed.arithmetic import mul, quotient, root_of, shift
+from node.kernels.fixed.layout import ANGLE_Q, VECTOR_Q
 from node.kernels.fixed.trigonometry import counts, exponential, sine_cosine
 from node.kernels.jit import kernel
-from node.kernels.numbers import root
 
 LIMIT, STEP = 8.0, 0.1  # sigmas, range and step of the integrals over the law of an extreme
 PHASES: Final = 4  # of the sampling against the extremes, over which their law is averaged
@@ -22,9 +21,9 @@ LEVEL_Q: Final = 24  # of a level, sigmas
 CELL_Q: Final = LEVEL_Q - 5  # of the table: 32 a sigma
 COUNT: Final = round(2.0 * LIMIT / STEP)
 LOWEST: Final = round(-LIMIT * 2.0**LEVEL_Q)
+LEVELS: Final = np.arange(-LIMIT, LIMIT + 0.05, 1.0 / 32.0)
 LOGS: Final = np.array(
-    [round(-math.log2(0.5 * math.erfc(-x / math.sqrt(2.0))) * 2.0**32) for x in np.arange(-LIMIT, LIMIT + 0.05, 1 / 32)],
-    np.int64,
+    [round(-math.log2(0.5 * math.erfc(-x / math.sqrt(2.0))) * 2.0**32) for x in LEVELS], np.int64
 )  # -log2 of the normal distribution, Q32
 NOTHING: Final = 32 << 32  # of a sum of them: the law is 0 in 31 bits
 LARGEST: Final = 1 << (LEVEL_Q + 20)  # ratio of radius and noise
@@ -68,6 +67,6 @@ def variance_in_integers(ratio: int, samples: int) -> int:
 
 def std_in_integers(lean: int, noise: int, samples: int) -> int:
     """As ``node.kernels.alignment.extreme_std``, rad in Q40."""
-    sine = sine_cosine(counts(lean, 40))[0]
+    sine = sine_cosine(counts(lean, ANGLE_Q))[0]
     ratio = min(quotient(sine << 4, max(noise, NEVER_BELOW)), LARGEST)
-    return mul(noise, shift(root(variance_in_integers(ratio, samples) << 17), 12)) << 3
+    return mul(noise, shift(root_of(variance_in_integers(ratio, samples) << 17), 12)) << 3

@@ -47,7 +47,6 @@ from node.kernels.fixed.words import differ, keep, learn_numbers, learn_words, s
 from node.kernels.jit import kernel
 from node.kernels.layout import Array
 
-
 ALIGNER: Final = (ALIGNER_AT - AROUND_AT, RECORDING_AT - AROUND_AT)  # words of what is ordered; the first says
 RECORDING: Final = (RECORDING_AT - AROUND_AT, END_AT - AROUND_AT)  # whether it is under way
 
