@@ -10,25 +10,35 @@ import enum
 import math
 from typing import Any, Final
 
-from node.kernels.alignment import CIRCLE, add_to_sweep, clear_sweep, fit_circle, take_extremes, to_tube
-from node.kernels.angles import from_binary, wrap
-from node.kernels.cluster import all_used
-from node.kernels.events import Code, tell, tell_more
+from node.kernels.alignment import CIRCLE, fit_circle, take_extremes
+from node.kernels.angles import wrap
+from node.kernels.circular import TURNS_Q, angle_of_turns, arcsine, reach, turns_of
+from node.kernels.cluster import WEIGHT_Q, all_used
+from node.kernels.events import Code, tell, tell_more, told, told_count, told_degrees
+from node.kernels.fixed.arithmetic import mul, shift
+from node.kernels.fixed.layout import ANGLE_Q, FORCE_Q, RATE_Q, VECTOR_Q
 from node.kernels.jit import constant, kernel
-from node.kernels.layout import DEG, PERIOD, RING, Array
-from node.kernels.quantity import NONE
+from node.kernels.layout import DEG, PERIOD
+from node.kernels.numbers import angle_of, by_type, half, is_number, turn
+from node.kernels.quantity import NONE, angle, factor, seconds
+from node.kernels.quantity import rate as of_rate
+from node.kernels.realign import add_axes, realign
+from node.kernels.sweep import MOST_SAMPLES, add_to_sweep, clear_sweep
 
-SLOWEST, FASTEST = 2.0 * DEG, 15.0 * DEG  # rad/s, of the turn
-PATIENCE: Final = 120.0  # s, for the turn to begin
+SLOWEST, FASTEST = of_rate(2.0 * DEG), of_rate(15.0 * DEG)  # rad/s, of the turn
+BACKWARD: Final = of_rate(-2.0 * DEG)
+PATIENCE: Final = seconds(120.0)  # for the turn to begin
 STEADY_CYCLES: Final = 3  # of turning, before the first that counts: those of the speeding up do not
 STOOD_CYCLES: Final = 4  # too slow in a row
-LARGEST_GAP: Final = 5.0  # s, between two cycles
-LARGEST_STEP: Final = 3.0 * DEG  # of the yaw in a cycle, beyond what the gyroscope turned
-LEAST_LEAN: Final = 20.0  # standard errors: with less the readings do not show that they turned with the tube
-MOST_LEAN: Final = 60.0 * DEG  # beyond it gravity's circle is wide, its middle near the centre: it determines no axis
-SHAKING: Final = 5.0  # times the noise of a sample at rest
+LARGEST_GAP: Final = seconds(5.0)  # between two cycles
+LARGEST_OVERLAP: Final = seconds(-PERIOD)
+LARGEST_STEP: Final = angle(3.0 * DEG)  # of the yaw in a cycle, beyond what the gyroscope turned
+LEAST_LEAN: Final = 20  # standard errors: with less the readings do not show that they turned with the tube
+MOST_LEAN: Final = angle(60.0 * DEG)  # beyond it the middle of gravity's circle is near the centre: it is no axis
+SHAKING: Final = 5  # times the noise of a sample at rest
 LARGEST_OFFSET: Final = 10.0 * DEG  # of a mount; a block of parameters can hold no larger one either
-TAU: Final = math.tau
+FARTHEST: Final = factor(math.sin(LARGEST_OFFSET))  # of the axis from z
+SLOWEST_TURN: Final = round(2.0 * math.pi / SLOWEST * 2.0 ** (28 - 7))  # s, Q21: 180
 
 
 class Reason(enum.IntEnum):
@@ -68,6 +78,29 @@ BEGUN, TURNING, ALIGNED = constant(Code.ALIGNMENT_BEGUN), constant(Code.ALIGNMEN
 REFUSED, DROPPED = constant(Code.ALIGNMENT_REFUSED), constant(Code.ALIGNMENT_DROPPED)
 
 
+@by_type(lambda wanted: PATIENCE + (mul(min(wanted, 1 << 31), SLOWEST_TURN) << 14))
+def longest(wanted: float) -> float:
+    """The time (s) within which so many turns are done."""
+    return PATIENCE + wanted * math.tau / SLOWEST
+
+
+def _inward(rate: int, place: int) -> int:
+    held = shift(rate, RATE_Q - VECTOR_Q)
+    return shift(shift(held * held, VECTOR_Q) * max(min(place, 1 << 31), -(1 << 31)), 2 * VECTOR_Q - FORCE_Q)
+
+
+@by_type(_inward)
+def inward(rate: float, place: float) -> float:
+    """Force (m/s^2) of a circle at ``place`` (m) from its middle; integers: of a turn that is slow enough."""
+    return rate * rate * place
+
+
+@by_type(lambda tilt, noise: mul(tilt, min(noise, 1 << 31)) << (31 - WEIGHT_Q))
+def tilt_of(tilt: float, noise: float) -> float:
+    """The noise of an IMU as a tilt, of the configuration's and its own share; integers: at most 128 of it."""
+    return tilt * noise
+
+
 @kernel
 def begin_alignment(node: Any, method: int, turns: float) -> None:
     """Wait for ``turns`` slow turns from the next cycle on, to be taken by ``method``."""
@@ -83,8 +116,8 @@ def begin_alignment(node: Any, method: int, turns: float) -> None:
 @kernel
 def refuse_alignment(node: Any, reason: int, imu: int, a: float, b: float) -> None:
     """End the alignment under way without an offset; ``a`` and ``b`` are numbers of the reason, ``imu`` 0 is all."""
-    turns = abs(node.aligner.angle) / TAU
-    tell(node, REFUSED, float(reason), turns, float(imu), a)
+    turned = node.aligner.angle
+    tell(node, REFUSED, told_count(turned, reason), turns_of(abs(turned)), told_count(turned, imu), a)
     tell_more(node, 4, b, NONE, NONE)
     end_alignment(node)
 
@@ -124,25 +157,26 @@ def follow_alignment(node: Any, settings: Any, start: float, end: float) -> None
         return
     # an aided yaw knows the turn best; unaided it wobbles with the mount
     aided = end - state.last_aided <= settings.aiding_old_after
-    yaw = from_binary(state.now_yaw) if aided else math.nan
-    if math.isnan(aligner.last_end):
+    yaw = angle_of(state.now_rate, state.now_yaw) if aided else NONE
+    if not is_number(aligner.last_end):
         aligner.ordered_at, aligner.last_end = start, start
+    known = is_number(yaw) and is_number(aligner.yaw)
     gap, turned, rate = start - aligner.last_end, wrap(yaw - aligner.yaw), state.now_rate
     aligner.last_end, aligner.yaw = end, yaw
-    if not -PERIOD < gap < LARGEST_GAP:
+    if not LARGEST_OVERLAP < gap < LARGEST_GAP:
         refuse_alignment(node, CYCLES_LOST, 0, NONE, NONE)
     elif guard.gyro.fault != 0 or guard.force.fault != 0 or not all_used(node, settings):
         refuse_alignment(node, SENSOR_FAULTY, 0, NONE, NONE)
     elif abs(rate) > FASTEST:
-        refuse_alignment(node, TOO_FAST, 0, abs(rate) / DEG, NONE)
-    elif aligner.sense == 0.0:
+        refuse_alignment(node, TOO_FAST, 0, told_degrees(abs(rate), RATE_Q), NONE)
+    elif aligner.sense == 0:
         await_turn(node, settings, rate, end)
-    elif rate * aligner.sense < -SLOWEST:
+    elif rate * aligner.sense < BACKWARD:
         refuse_alignment(node, TURNED_BACK, 0, NONE, NONE)
     else:
-        moved = rate * (max(gap, 0.0) + end - start)
-        followed = abs(wrap(turned - moved)) < LARGEST_STEP  # where the yaw is set again it jumps
-        follow_turn(node, settings, rate, turned if followed else moved, 0.5 * rate * (end - start))
+        moved = turn(rate, max(gap, 0) + end - start)
+        followed = known and abs(wrap(turned - moved)) < LARGEST_STEP  # where the yaw is set again it jumps
+        follow_turn(node, settings, rate, turned if followed else moved, turn(half(rate), end - start))
 
 
 @kernel
@@ -151,33 +185,34 @@ def await_turn(node: Any, settings: Any, rate: float, end: float) -> None:
     aligner = node.aligner
     aligner.steady = aligner.steady + 1 if abs(rate) >= SLOWEST else 0
     if aligner.steady >= STEADY_CYCLES:
-        aligner.sense = math.copysign(1.0, rate)
+        aligner.sense = 1 if rate > 0 else -1
         for k in range(settings.imus):
             clear_sweep(aligner.sweeps[k])
-        tell(node, TURNING, rate / DEG, NONE, NONE, NONE)
+        tell(node, TURNING, told_degrees(rate, RATE_Q), NONE, NONE, NONE)
     elif end - aligner.ordered_at > PATIENCE:
         refuse_alignment(node, NEVER_TURNED, 0, NONE, NONE)
 
 
 @kernel
-def follow_turn(node: Any, settings: Any, rate: float, turned: float, half: float) -> None:
-    """One cycle of the turn: ``turned`` (rad) since the last, ``half`` of it after the middle of the readings."""
+def follow_turn(node: Any, settings: Any, rate: float, turned: float, rest: float) -> None:
+    """One cycle of the turn: ``turned`` (rad) since the last, ``rest`` of it after the middle of the readings."""
     aligner, force = node.aligner, node.aligner.force
     aligner.slow = aligner.slow + 1 if abs(rate) < SLOWEST else 0
     if aligner.slow >= STOOD_CYCLES:
-        refuse_alignment(node, TOO_FEW_TURNS, 0, aligner.wanted, NONE)
+        refuse_alignment(node, TOO_FEW_TURNS, 0, told(aligner.wanted, TURNS_Q), NONE)
         return
-    if aligner.last_end - aligner.ordered_at > PATIENCE + aligner.wanted * TAU / SLOWEST:
-        refuse_alignment(node, TOO_LONG, 0, aligner.wanted, NONE)
+    late = aligner.last_end - aligner.ordered_at > longest(aligner.wanted)
+    if late or aligner.sweeps[0].samples >= MOST_SAMPLES:
+        refuse_alignment(node, TOO_LONG, 0, told(aligner.wanted, TURNS_Q), NONE)
         return
     aligner.angle += turned
     for k in range(settings.imus):
         for i in range(3):
             force[i] = node.unaligned[k, i]
         for i in range(2):
-            force[i] += rate * rate * settings.place[k, i]  # the circle around the axis pulls inwards
-        add_to_sweep(aligner.sweeps[k], force, aligner.angle - half)
-    if abs(aligner.angle) >= aligner.wanted * TAU:
+            force[i] += inward(rate, settings.place[k, i])  # the circle around the axis pulls inwards
+        add_to_sweep(aligner.sweeps[k], force, aligner.angle - rest)
+    if abs(aligner.angle) >= angle_of_turns(aligner.wanted):
         finish_alignment(node, settings)
 
 
@@ -192,7 +227,7 @@ def finish_alignment(node: Any, settings: Any) -> None:
         else:
             found = take_extremes(aligner.sweeps[k], offset)
         reason, a, b = (
-            judge_offset(offset, settings.tilt_noise * settings.noise[k]) if found else (NO_CIRCLE, NONE, NONE)
+            judge_offset(offset, tilt_of(settings.tilt_noise, settings.noise[k])) if found else (NO_CIRCLE, NONE, NONE)
         )
         if reason != 0:
             refuse_alignment(node, reason, k + 1 if settings.imus > 1 else 0, a, b)
@@ -203,9 +238,12 @@ def finish_alignment(node: Any, settings: Any) -> None:
         for i in range(3):
             mount.axis[k, i] = offset.axis[i]
         mount.std[k, 0], mount.std[k, 1] = offset.pitch_std, offset.roll_std
-        tell(node, ALIGNED, k + 1.0, float(aligner.method), abs(aligner.angle) / TAU, offset.pitch / DEG)
-        tell_more(node, 4, offset.roll / DEG, offset.pitch_std / DEG, offset.roll_std / DEG)
-        tell_more(node, 7, offset.lean / DEG, offset.noise / DEG, float(aligner.sweeps[k].samples))
+        turned, pitch, roll = aligner.angle, told_degrees(offset.pitch, ANGLE_Q), told_degrees(offset.roll, ANGLE_Q)
+        stds = told_degrees(offset.pitch_std, ANGLE_Q), told_degrees(offset.roll_std, ANGLE_Q)
+        lean, noise = told_degrees(offset.lean, ANGLE_Q), told_degrees(offset.noise, ANGLE_Q)
+        tell(node, ALIGNED, told_count(turned, k + 1), told_count(turned, aligner.method), turns_of(abs(turned)), pitch)
+        tell_more(node, 4, roll, stds[0], stds[1])
+        tell_more(node, 7, lean, noise, told_count(turned, aligner.sweeps[k].samples))
     mount.method = aligner.method
     end_alignment(node)
     realign(node, settings)
@@ -214,73 +252,13 @@ def finish_alignment(node: Any, settings: Any) -> None:
 @kernel
 def judge_offset(offset: Any, noise: float) -> tuple[int, float, float]:
     """Why an offset is none, 0 when it is one, and two numbers of the reason; ``noise`` (rad) of a sample at rest."""
-    size = math.hypot(offset.axis[0], offset.axis[1])
+    size = reach(offset.axis[0], offset.axis[1])
     if offset.noise > SHAKING * noise:
-        return SHAKES, offset.noise / DEG, SHAKING * noise / DEG
+        return SHAKES, told_degrees(offset.noise, ANGLE_Q), told_degrees(SHAKING * noise, ANGLE_Q)
     if offset.lean < LEAST_LEAN * offset.lean_std:
-        return LITTLE_LEAN, offset.lean / DEG, LEAST_LEAN * offset.lean_std / DEG
+        return LITTLE_LEAN, told_degrees(offset.lean, ANGLE_Q), told_degrees(LEAST_LEAN * offset.lean_std, ANGLE_Q)
     if offset.lean > MOST_LEAN:
-        return MUCH_LEAN, offset.lean / DEG, NONE
-    if size > math.sin(LARGEST_OFFSET):
-        return LARGE_OFFSET, math.asin(min(size, 1.0)) / DEG, NONE
+        return MUCH_LEAN, told_degrees(offset.lean, ANGLE_Q), NONE
+    if size > FARTHEST:
+        return LARGE_OFFSET, told_degrees(arcsine(size), ANGLE_Q), NONE
     return 0, NONE, NONE
-
-
-@kernel
-def add_axes(node: Any, settings: Any, which: int) -> None:
-    """Sum of the axes of all IMUs, before (``which`` 0) or after (1) they change: the axis of the fused reading."""
-    total = node.aligner.sums[which]
-    for i in range(3):
-        total[i] = 0.0
-        for k in range(settings.imus):
-            total[i] += node.mount.axis[k, i]
-
-
-@kernel
-def realign(node: Any, settings: Any) -> None:
-    """Turn what the filter holds in the tube's frame when the axes have changed since ``add_axes(.., 0)``.
-
-    R = R_after R_before^T. The covariance stays: turning it by so little changes it in the second order.
-    """
-    state, aligner = node.filter, node.aligner
-    add_axes(node, settings, 1)
-    before, after, turn, work = aligner.sums[0], aligner.sums[1], aligner.turn, aligner.force
-    if before[0] == after[0] and before[1] == after[1] and before[2] == after[2]:
-        return
-    rotation_to_tube(before, work, aligner.rotations[0])
-    rotation_to_tube(after, work, aligner.rotations[1])
-    for i in range(3):
-        for j in range(3):
-            turn[i, j] = 0.0
-            for k in range(3):
-                turn[i, j] += aligner.rotations[1, i, k] * aligner.rotations[0, j, k]
-    turn_vector(turn, state.down, work)
-    turn_vector(turn, state.now_down, work)
-    turn_vector(turn, state.static_bias, work)
-    turn_vector(turn, state.bias, work)
-    for slot in range(RING):
-        turn_vector(turn, state.ring_rate[slot], work)
-        turn_vector(turn, state.ring_force[slot], work)
-
-
-@kernel
-def rotation_to_tube(axis: Array, work: Array, rotation: Array) -> None:
-    """Matrix (3, 3) of ``to_tube`` into ``rotation``; ``axis`` (3) is made a unit vector, ``work`` is 3 numbers."""
-    size = math.sqrt(axis[0] * axis[0] + axis[1] * axis[1] + axis[2] * axis[2])
-    for i in range(3):
-        axis[i] /= size
-    for j in range(3):
-        for i in range(3):
-            work[i] = 1.0 if i == j else 0.0
-        to_tube(axis, work)
-        for i in range(3):
-            rotation[i, j] = work[i]
-
-
-@kernel
-def turn_vector(turn: Array, vector: Array, work: Array) -> None:
-    """Multiply ``vector`` (3) by ``turn`` (3, 3), in place."""
-    for i in range(3):
-        work[i] = turn[i, 0] * vector[0] + turn[i, 1] * vector[1] + turn[i, 2] * vector[2]
-    for i in range(3):
-        vector[i] = work[i]

@@ -13,18 +13,18 @@ from typing import Any, Final
 
 import numpy as np
 
+from node.kernels.circular import arcsine, arctangent
+from node.kernels.fixed.circle import fit_in_integers, holds_integer_sums
+from node.kernels.fixed.extremes import LIMIT, PHASES, STEP, std_in_integers
 from node.kernels.jit import kernel
 from node.kernels.layout import Array
-from node.kernels.numbers import over, times
+from node.kernels.numbers import by_type, fraction, half, length, mean, over, taken_where, times
 from node.kernels.quantity import ONE
+from node.kernels.sweep import FREEDOMS, LEAST_WEIGHT
 
 MAX_IMUS: Final = 8  # of a cluster
 CIRCLE, EXTREMES = 1, 2  # estimators; 0 is no alignment
-FREEDOMS: Final = 6  # of the circle: middle, radius and phase, and their drift
-LEAST_WEIGHT: Final = 0.2  # of that of as many samples without a turn: half a turn has less
 FITS: Final = 3  # of the circle, each in the frame that the last one found
-PHASES: Final = 4  # of the sampling against the extremes, over which their law is averaged
-LIMIT, STEP = 8.0, 0.1  # sigmas, range and step of the integrals over the law of an extreme
 
 MOUNT: Final = np.dtype(
     [
@@ -34,38 +34,6 @@ MOUNT: Final = np.dtype(
         ("std", "f8", (MAX_IMUS, 2)),  # rad, of pitch and roll
         ("rate_offset", "f8", (MAX_IMUS, 3)),  # rad/s, at rest, of each gyroscope against the mean of the cluster
         ("rate_samples", "i8"),  # cycles of which that is the mean
-    ],
-    align=True,
-)
-SWEEP: Final = np.dtype(
-    [
-        ("samples", "i8"),  # cycles taken in
-        ("sum", "f8", (3,)),  # sum of u, gravity's direction
-        ("sum_products", "f8", (3, 3)),  # sum of u u^T
-        ("sum_angle", "f8"),  # rad, sum of the angles turned
-        ("sum_angle_squares", "f8"),  # rad^2, sum of their squares
-        ("sum_spin", "c16"),  # sum of exp(i angle)
-        ("sum_angle_spin", "c16"),  # sum of angle exp(i angle)
-        ("sum_back", "c16", (3,)),  # sum of u exp(i angle)
-        ("sum_angle_back", "c16", (3,)),  # sum of angle u exp(i angle)
-        ("least", "f8", (2,)),  # least u_x and u_y
-        ("largest", "f8", (2,)),  # largest u_x and u_y
-        # work space
-        ("u", "f8", (3,)),  # direction of gravity
-        ("across", "c16", (3,)),  # row that gives what of a vector lies across the axis
-    ],
-    align=True,
-)
-OFFSET: Final = np.dtype(
-    [
-        ("axis", "f8", (3,)),  # unit vector, of the tube's axis in the IMU's frame
-        ("pitch", "f8"),  # rad, of the offset
-        ("roll", "f8"),  # rad, likewise
-        ("pitch_std", "f8"),  # rad, standard error of the pitch
-        ("roll_std", "f8"),  # rad, likewise of the roll
-        ("lean", "f8"),  # rad, of the axis against the vertical
-        ("lean_std", "f8"),  # rad, standard error of that
-        ("noise", "f8"),  # rad, of one sample
     ],
     align=True,
 )
@@ -94,61 +62,22 @@ def to_tube(axis: Array, vector: Array) -> None:
 
 
 @kernel
-def clear_sweep(sweep: Any) -> None:
-    """Begin anew; the extremes begin with the first sample."""
-    sweep.samples = 0
-    sweep.sum_angle, sweep.sum_angle_squares = 0.0, 0.0
-    sweep.sum_spin, sweep.sum_angle_spin = 0.0j, 0.0j
-    for i in range(3):
-        sweep.sum[i] = 0.0
-        sweep.sum_back[i], sweep.sum_angle_back[i] = 0.0j, 0.0j
-        for j in range(3):
-            sweep.sum_products[i, j] = 0.0
-
-
-@kernel
-def add_to_sweep(sweep: Any, force: Array, angle: float) -> None:
-    """Take one mean specific force (3, m/s^2, IMU's frame), ``angle`` (rad) the turn so far in the middle of its cycle.
-
-    With u = -f / |f|: sums of u, u u^T, and of the products of 1 and u with exp(i angle) and angle exp(i angle).
-    """
-    u = sweep.u
-    size = math.sqrt(force[0] * force[0] + force[1] * force[1] + force[2] * force[2])
-    spin = complex(math.cos(angle), math.sin(angle))
-    first = sweep.samples == 0
-    sweep.samples += 1
-    sweep.sum_angle += angle
-    sweep.sum_angle_squares += angle * angle
-    sweep.sum_spin += spin
-    sweep.sum_angle_spin += angle * spin
-    for i in range(3):
-        u[i] = -force[i] / size
-        sweep.sum[i] += u[i]
-        sweep.sum_back[i] += u[i] * spin
-        sweep.sum_angle_back[i] += angle * u[i] * spin
-    for i in range(3):
-        for j in range(3):
-            sweep.sum_products[i, j] += u[i] * u[j]
-    for i in range(2):
-        sweep.least[i] = u[i] if first else min(sweep.least[i], u[i])
-        sweep.largest[i] = u[i] if first else max(sweep.largest[i], u[i])
-
-
-@kernel
 def fit_circle(sweep: Any, offset: Any) -> int:
     """Least squares of the circle over ``sweep``, into ``offset``; 0 when the sums determine none.
 
     Seen along the axis it is a circle and askew an ellipse, so the fit is repeated in the frame that it found: all sums
     turn with the frame.
     """
-    offset.axis[0], offset.axis[1], offset.axis[2] = 0.0, 0.0, 1.0
+    offset.axis[0], offset.axis[1] = 0, 0
+    offset.axis[2] = ONE
     for _ in range(FITS):
         if fit_along(sweep, offset) == 0:
             return 0
+        place_axis(offset, sweep.u[0], sweep.u[1], sweep.u[2], offset.lean_std)
     return 1
 
 
-@kernel
+@taken_where(holds_integer_sums, fit_in_integers)
 def fit_along(sweep: Any, offset: Any) -> int:
     """Least squares of q = c + (r + k a) exp(-i a), q = x + i y across ``offset.axis``, a the angle; 0 without answer.
 
@@ -161,7 +90,7 @@ def fit_along(sweep: Any, offset: Any) -> int:
     determinant = n * sweep.sum_angle_squares - sweep.sum_angle**2
     if 2.0 * n <= FREEDOMS or determinant <= 0.0:
         return 0
-    spin, angle_spin = sweep.sum_spin, sweep.sum_angle_spin
+    spin, angle_spin = complex_of(sweep.sum_spin), complex_of(sweep.sum_angle_spin)
     first = (sweep.sum_angle_squares * spin - sweep.sum_angle * angle_spin) / determinant  # B^-1 v
     second = (n * angle_spin - sweep.sum_angle * spin) / determinant
     weight = n - (spin.conjugate() * first + angle_spin.conjugate() * second).real
@@ -171,12 +100,13 @@ def fit_along(sweep: Any, offset: Any) -> int:
     look_along(axis, across)
     total, back, angle_back, squares, along = 0.0j, 0.0j, 0.0j, 0.0, 0.0
     for i in range(3):
-        total += across[i] * sweep.sum[i]
-        back += across[i] * sweep.sum_back[i]
-        angle_back += across[i] * sweep.sum_angle_back[i]
+        row = complex_of(across[i])
+        total += row * sweep.sum[i]
+        back += row * complex_of(sweep.sum_back[i])
+        angle_back += row * complex_of(sweep.sum_angle_back[i])
         along += axis[i] * sweep.sum[i] / n
         for j in range(3):
-            squares += (across[i] * across[j].conjugate()).real * sweep.sum_products[i, j]
+            squares += (row * complex_of(across[j]).conjugate()).real * sweep.sum_products[i, j]
     middle = (total - first.conjugate() * back - second.conjugate() * angle_back) / weight
     left, angle_left = back - middle * spin, angle_back - middle * angle_spin
     radius = (sweep.sum_angle_squares * left - sweep.sum_angle * angle_left) / determinant
@@ -186,19 +116,26 @@ def fit_along(sweep: Any, offset: Any) -> int:
     offset.lean = math.atan2(abs(radius + drift * (sweep.sum_angle / n)), abs(along))
     offset.lean_std = offset.noise / math.sqrt(weight)
     for i in range(3):
-        sweep.u[i] = along * axis[i] + (middle * across[i].conjugate()).real
-    place_axis(offset, sweep.u[0], sweep.u[1], sweep.u[2], offset.lean_std)
+        sweep.u[i] = along * axis[i] + (middle * complex_of(across[i]).conjugate()).real
     return 1
 
 
 @kernel
+def complex_of(pair: Array) -> complex:
+    """The number of a real and an imaginary part (2)."""
+    return complex(pair[0], pair[1])
+
+
+@kernel
 def look_along(axis: Array, across: Array) -> None:
-    """Leave the row of ``to_tube`` that gives x + i y, what of a vector lies across ``axis``, in ``across`` (3)."""
+    """Leave the row of ``to_tube`` that gives x + i y, what of a vector lies across ``axis``, in ``across`` (3, 2)."""
     pull = 1.0 / (1.0 + axis[2])
-    both = complex(axis[0], axis[1])
-    across[0] = 1.0 - pull * axis[0] * both
-    across[1] = 1.0j - pull * axis[1] * both
-    across[2] = -both
+    for k in range(2):
+        across[0, k] = -(pull * axis[0] * axis[k])
+        across[1, k] = -(pull * axis[1] * axis[k])
+        across[2, k] = -axis[k]
+    across[0, 0] += 1.0
+    across[1, 1] += 1.0
 
 
 @kernel
@@ -209,23 +146,29 @@ def take_extremes(sweep: Any, offset: Any) -> int:
     """
     if fit_circle(sweep, offset) == 0:
         return 0
-    x = 0.5 * (sweep.largest[0] + sweep.least[0])
-    y = 0.5 * (sweep.largest[1] + sweep.least[1])
-    ratio = math.sin(offset.lean) / max(offset.noise, 1e-12)
-    std = offset.noise * math.sqrt(0.5 * extreme_var(ratio, sweep.samples))
-    place_axis(offset, x, y, sweep.sum[2] / sweep.samples, std)
+    x = half(sweep.largest[0] + sweep.least[0])
+    y = half(sweep.largest[1] + sweep.least[1])
+    std = extreme_std(offset.lean, offset.noise, sweep.samples)
+    place_axis(offset, x, y, mean(sweep.sum[2], sweep.samples), std)
     return 1
+
+
+@by_type(std_in_integers)
+def extreme_std(lean: float, noise: float, samples: int) -> float:
+    """Standard error (rad) of half the sum of the extremes of a circle of a ``lean``."""
+    ratio = math.sin(lean) / max(noise, 1e-12)
+    return noise * math.sqrt(0.5 * extreme_var(ratio, samples))
 
 
 @kernel
 def place_axis(offset: Any, x: float, y: float, z: float, std: float) -> None:
     """Axis, pitch and roll of a middle (x, y, z) of gravity's directions; ``std`` of x and of y."""
-    size = math.sqrt(x * x + y * y + z * z)
-    offset.axis[0], offset.axis[1], offset.axis[2] = x / size, y / size, z / size
-    offset.pitch = math.asin(min(max(offset.axis[0], -1.0), 1.0))
-    offset.roll = math.atan2(offset.axis[1], offset.axis[2])
-    offset.pitch_std = std / size
-    offset.roll_std = std / size
+    size = length(x, y, z)
+    offset.axis[0], offset.axis[1], offset.axis[2] = fraction(x, size), fraction(y, size), fraction(z, size)
+    offset.pitch = arcsine(offset.axis[0])
+    offset.roll = arctangent(offset.axis[1], offset.axis[2])
+    offset.pitch_std = over(std, size)
+    offset.roll_std = over(std, size)
 
 
 @kernel

@@ -13,7 +13,7 @@ from typing import Any, Final, TypeVar
 from numba import types
 from numba.extending import overload
 
-from node.kernels.fixed.arithmetic import inverse_root, mul, quotient, shift
+from node.kernels.fixed.arithmetic import mean_of, mul, quotient, root_of, shift
 from node.kernels.fixed.layout import ANGLE_Q, CEILING, RATE_Q, TIME_Q, VECTOR_Q
 from node.kernels.fixed.trigonometry import TURN, counts, difference, radians
 from node.kernels.jit import kernel
@@ -143,17 +143,7 @@ def square(a: float) -> float:
     return a * a
 
 
-def _root(a: int) -> int:
-    if a <= 0:
-        return 0
-    root, exponent = inverse_root(a)
-    return shift(mul(a << (-2 * exponent), root), 18 - exponent)
-
-
-_root_of = kernel(_root)
-
-
-@by_type(_root)
+@by_type(root_of)
 def root(a: float) -> float:
     """The angle or the rate of a variance."""
     return math.sqrt(a)
@@ -177,7 +167,7 @@ def coarse(a: float) -> float:
     return a
 
 
-@by_type(lambda a: shift(_root_of(a), 12))
+@by_type(lambda a: shift(root_of(a), 12))
 def time_root(a: float) -> float:
     """The time of a variance of a clock (s^2)."""
     return math.sqrt(a)
@@ -215,7 +205,7 @@ def unscaled(w: float, scale: float) -> float:
 
 def _length(x: int, y: int, z: int) -> int:
     a, b, c = x >> 3, y >> 3, z >> 3
-    return shift(_root_of(a * a + b * b + c * c), 9)
+    return shift(root_of(a * a + b * b + c * c), 9)
 
 
 @by_type(_length)
@@ -235,11 +225,7 @@ def factor_of(a: float, q: int) -> float:
     return a
 
 
-def _mean(total: int, count: int) -> int:
-    return (total + (count >> 1)) // count
-
-
-@by_type(_mean)
+@by_type(mean_of)
 def mean(total: float, count: int) -> float:
     """A sum by its count."""
     return total / count

@@ -10,9 +10,10 @@ from typing import Final
 
 import numpy as np
 
-from node.kernels.alignment import MAX_IMUS, MOUNT, OFFSET, SWEEP, new_mount
+from node.kernels.alignment import MAX_IMUS, MOUNT, new_mount
 from node.kernels.layout import CONFIG, RING, STATE, Array, new_state
 from node.kernels.static_average import STATIC
+from node.kernels.sweep import OFFSET, SWEEP
 
 # of the saved record; 1 and 2 held the filter alone, 3 what a start clears as well, 4 no doubts, 5 fewer mismatches,
 # 6 no odd forces

@@ -2,14 +2,21 @@
 
 from __future__ import annotations
 
-import math
 from typing import Any, Final
 
 import numpy as np
 
 from node.kernels.calibration import USUAL
+from node.kernels.fixed.arithmetic import bits, mul, shift
+from node.kernels.fixed.layout import FORCE_Q, RATE_Q, STRONGEST
 from node.kernels.jit import kernel
 from node.kernels.layout import Array
+from node.kernels.numbers import are_numbers, by_type, is_number, mean, number
+
+MEAN_Q: Final = RATE_Q  # of the means of rates and of forces: far finer than the noise of a reading
+RATE_PART, FORCE_PART = 25, 22  # Q of a product of deviations is the sum of its two
+FARTHEST: Final = 1 << (MEAN_Q + 4)  # from the mean that counts: 16 rad/s, 16 g
+MOST: Final = 1 << 59  # of a sum of products: 512 (rad/s)^2, 32768 g^2
 
 STATIC: Final = np.dtype(
     [
@@ -24,6 +31,36 @@ STATIC: Final = np.dtype(
     ],
     align=True,
 )
+
+
+@by_type(lambda f: max(min(f, STRONGEST), -STRONGEST) << (MEAN_Q - FORCE_Q))
+def fine(f: float) -> float:
+    """A force in the format of the means; integers are held at 32 g."""
+    return f
+
+
+@by_type(lambda d, n: d - mean(d, n))
+def without_one(d: float, n: int) -> float:
+    """The part (n - 1)/n of a deviation."""
+    return (n - 1.0) / n * d
+
+
+def _joint(a: int, b: int, q: int) -> int:
+    one, other = max(min(a, FARTHEST), -FARTHEST), max(min(b, FARTHEST), -FARTHEST)
+    spare = max(bits(abs(other)) - 31, 0)
+    return shift(mul(one, other >> spare), 2 * MEAN_Q - 31 - spare - q)
+
+
+@by_type(_joint)
+def joint(a: float, b: float, q: int) -> float:
+    """Product of two deviations; integers: in Q``q``, each held at 16 rad/s or 16 g."""
+    return a * b
+
+
+@by_type(lambda total, a: max(min(total + a, MOST), -MOST))
+def added(total: float, a: float) -> float:
+    """A sum and one product more; integers are held."""
+    return total + a
 
 
 @kernel
@@ -41,26 +78,33 @@ def add_static(record: Any, rate: Array, force: Array, temperature: float, stand
 
     Source: Welford, Technometrics 4 (1962) 419.
     """
-    for k in range(3):
-        if not (math.isfinite(rate[k]) and math.isfinite(force[k])):
-            return 0
+    if not are_numbers(rate, force):
+        return 0
     record.samples += 1
     n = record.samples
     if standing == 0:
         record.moved = 1
-    record.temperature += (temperature - record.temperature) / n
+    record.temperature += mean(temperature - record.temperature, n)
     for i in range(6):
-        x = rate[i] if i < 3 else force[i - 3]
+        x = rate[i] if i < 3 else fine(force[i - 3])
         if n > 1:
-            record.steps[i] += (x - record.last[i]) ** 2
+            step = x - record.last[i]
+            record.steps[i] = added(record.steps[i], joint(step, step, 2 * part_of(i)))
         record.last[i] = x
         record.delta[i] = x - record.mean[i]
-        record.mean[i] += record.delta[i] / n
-    weight = (n - 1.0) / n
+        record.mean[i] += mean(record.delta[i], n)
     for i in range(6):
+        rest = without_one(record.delta[i], n)
         for j in range(6):
-            record.scatter[i, j] += weight * record.delta[i] * record.delta[j]
+            product = joint(rest, record.delta[j], part_of(i) + part_of(j))
+            record.scatter[i, j] = added(record.scatter[i, j], product)
     return 1
+
+
+@kernel
+def part_of(i: int) -> int:
+    """What quantity ``i`` of a reading adds to the Q of a product of deviations."""
+    return RATE_PART if i < 3 else FORCE_PART
 
 
 @kernel
@@ -82,9 +126,9 @@ def follow_recording(node: Any, start: float, end: float, standing: int) -> bool
     recording = node.recording
     if recording.running == 0:
         return False
-    if math.isnan(recording.begun):
+    if not is_number(recording.begun):
         recording.begun = start
-    temperature = node.temperature if math.isfinite(node.temperature) else USUAL
+    temperature = number(node.temperature) if is_number(node.temperature) else USUAL
     add_static(recording.sums, node.raw_rate, node.raw_force, temperature, standing)
     if end - recording.begun < recording.seconds:
         return False

@@ -24,7 +24,7 @@ from node.kernels.jit import constant, entry, kernel, shared_body
 from node.kernels.layout import CLOCK_SLACK, DEG, Array, Scheme, Status
 from node.kernels.make_up import follow_joints
 from node.kernels.modes import STATIC_BIAS
-from node.kernels.numbers import angle_of, by_record, half, held, ratio, root, stamp_square, time_root
+from node.kernels.numbers import angle_of, half, held, ratio, root, stamp_square, time_root
 from node.kernels.priors import set_stamp
 from node.kernels.quantity import LONG_AGO, NONE, factor, rate, rate_variance, seconds
 from node.kernels.record import (
@@ -126,7 +126,7 @@ def leave(nodes: Array, settings: Array, moment: Array, status: int, waits: int)
     """What comes after a loop that returned ``status``; ``waits`` is the answer of ``enter``."""
     node, crew = nodes[0], settings[0]
     after_loop(node, moment, status, waits)
-    align(node, crew, moment[START], moment[END])
+    follow_alignment(node, crew, moment[START], moment[END])
     if crew.imus > 1 and is_quiet(node):
         learn_offsets(node, crew)
     return conclude(node, crew, moment)
@@ -176,7 +176,7 @@ def conclude(node: Any, settings: Any, moment: Array) -> int:
         tell(node, AIDING_REJECTED, told(sigmas, VECTOR_Q), NONE, NONE, NONE)
     node.rejecting = 1 if state.rejected > 0 else 0
     says = say_events(node) | ADMITTED
-    if record(node, moment[START], moment[END], 1 if is_standing(node) else 0):
+    if follow_recording(node, moment[START], moment[END], 1 if is_standing(node) else 0):
         says |= SAY_RECORD
     if status & SURVEY_READY:
         says |= SAY_SURVEY
@@ -240,18 +240,6 @@ def follow_clock(node: Any, settings: Any, moment: Array) -> None:
         set_stamp_prior(node.filter, stamp_square(std))
     elif moved > LARGE_MOVE_VAR:
         doubt_stamp(node.filter, moved)
-
-
-@by_record(lambda node, settings, start, end: None)
-def align(node: Any, settings: Any, start: float, end: float) -> None:
-    """Follow an alignment under way; that of the integers is followed by their float64 record."""
-    follow_alignment(node, settings, start, end)
-
-
-@by_record(lambda node, start, end, standing: False)
-def record(node: Any, start: float, end: float, standing: int) -> bool:
-    """Follow a static record; that of the integers is taken by their float64 record."""
-    return bool(follow_recording(node, start, end, standing))
 
 
 @entry

@@ -10,7 +10,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from node.kernels import circular as c
 from node.kernels import numbers as n
+from node.kernels.aligner import inward, longest, tilt_of
 from node.kernels.angles import wrap, wrap_positive
 from node.kernels.cluster import WEIGHT_Q
 from node.kernels.events import TOLD_Q, told_degrees
@@ -30,10 +32,14 @@ from node.kernels.quantity import (
     variance,
     warmth,
 )
+from node.kernels.static_average import FORCE_PART, MEAN_Q, RATE_PART, added, fine, joint, without_one
+from node.kernels.sweep import PRODUCT_Q, SQUARE_Q, angle_square, fine_product
 from node.kernels.twist import STIFFNESS_Q, TORQUE_Q, wound
 
 Q = {"time": TIME_Q, "rate": RATE_Q, "angle": ANGLE_Q, "force": FORCE_Q, "var": VAR_Q, "factor": VECTOR_Q}
 Q |= {"torque": TORQUE_Q, "stiffness": STIFFNESS_Q, "weight": WEIGHT_Q, "stamp": VAR_Q + 12, "told": TOLD_Q}
+Q |= {"turns": c.TURNS_Q, "squares": SQUARE_Q, "fine": PRODUCT_Q, "mean": MEAN_Q}
+Q |= {"joint": 2 * RATE_PART, "mixed": RATE_PART + FORCE_PART}
 
 
 def calling(operation: Callable[..., Any], arguments: int) -> Callable[..., Any]:
@@ -78,6 +84,30 @@ CASES: dict[str, tuple[Callable[..., Any], list[tuple[str, float, float]], str, 
     "stamp_square": (n.stamp_square, [("time", 0, 0.05)], "stamp", 0.0, 2.0**38),
     "scale_square": (n.scale_square, [("factor", 0, 0.05)], "stamp", 0.0, 2.0**35),
     "wound": (wound, [("torque", 0, 1e6), ("stiffness", 1e3, 1e9)], "angle", 3e-9, 1100),
+    "cosine": (lambda a: c.spin_of(a)[0], [("angle", -130, 130)], "factor", 0.0, 60),
+    "sine": (lambda a: c.spin_of(a)[1], [("angle", -130, 130)], "factor", 0.0, 60),
+    "arcsine": (c.arcsine, [("factor", -0.99, 0.99)], "angle", 0.0, 10000),
+    "arctangent": (c.arctangent, [("factor", -1, 1), ("factor", 0.01, 1)], "angle", 0.0, 4),
+    "arctangent behind": (c.arctangent, [("factor", 0.01, 1), ("factor", -1, 1)], "angle", 0.0, 4),
+    "reach": (c.reach, [("factor", -2, 2), ("factor", -2, 2)], "factor", 5e-9, 20),
+    "angle_of_turns": (c.angle_of_turns, [("turns", 0, 128)], "angle", 1e-9, 1),
+    "turns_of": (c.turns_of, [("angle", 0, 1000)], "turns", 1e-9, 1),
+    "longest": (longest, [("turns", 0, 128)], "time", 1e-6, 2),
+    "inward": (inward, [("rate", -0.262, 0.262), ("factor", -2, 2)], "force", 0.0, 4),
+    "tilt_of": (tilt_of, [("angle", 0, 1), ("weight", 0, 128)], "angle", 0.0, 200),
+    "angle_square": (angle_square, [("angle", -127, 127)], "squares", 1e-6, 4),
+    "fine_product": (fine_product, [("factor", -1, 1), ("factor", -1, 1)], "fine", 0.0, 1),
+    "joint": (lambda a, b: joint(a, b, 50), [("rate", -16, 16), ("rate", -16, 16)], "joint", 2e-9, 600),
+    "joint of rate and force": (
+        lambda a, b: joint(a, b, 47),
+        [("rate", -16, 16), ("mean", -16, 16)],
+        "mixed",
+        2e-9,
+        600,
+    ),
+    "added": (added, [("joint", -256, 256), ("joint", -256, 256)], "joint", 0.0, 0),
+    "fine force": (fine, [("force", -32, 32)], "mean", 0.0, 0),
+    "all but one": (lambda a: without_one(a, 7000), [("mean", -64, 64)], "mean", 0.0, 1),
     "degrees": (lambda a: told_degrees(a, ANGLE_Q), [("angle", -1000, 1000)], "told", 1e-8, 1),
     "wrap": (wrap, [("angle", -1000, 1000)], "angle", 0.0, 400),
     "wrap_positive": (wrap_positive, [("angle", -1000, 1000)], "angle", 0.0, 400),
@@ -101,11 +131,18 @@ def test_integers_compute_what_floats_do(name: str, data: st.DataObject) -> None
 
 @given(st.integers(1 << 42, 1 << 61))
 def test_what_is_beyond_the_range_is_held(large: int) -> None:
+    assert KERNELS["fine force"](large) == -KERNELS["fine force"](-large) == 32 << MEAN_Q
     assert KERNELS["square"](large) == KERNELS["square"](-large) == 16 << VAR_Q
     assert KERNELS["product"](large, -large) == -16 << VAR_Q
     assert KERNELS["fraction"](large, 1) == -KERNELS["fraction"](-large, 1) == 2 << VECTOR_Q
     assert KERNELS["ratio"](large, 0) == -KERNELS["ratio"](-large, 0) == 1 << 61
     assert KERNELS["root"](-large) == 0
+
+
+@given(st.integers(1 << 50, 1 << 61))
+def test_a_sum_of_products_is_held(large: int) -> None:
+    assert KERNELS["joint"](large, -large) == KERNELS["joint"](-large, 16 << RATE_Q) == -256 << 50
+    assert KERNELS["added"](1 << 59, large >> 3) == -KERNELS["added"](-1 << 59, -large >> 3) == 1 << 59
 
 
 @numba.njit

@@ -90,3 +90,18 @@ def inverse_root(value: int) -> tuple[int, int]:
         xyy = ((x >> 31) * ((y * y + HALF31 // 2) >> 30) + HALF31) >> 31
         y = (y * ((3 << 30) - xyy) + HALF31) >> 31
     return y, exponent
+
+
+@kernel
+def root_of(value: int) -> int:
+    """Root of a variance (Q56) in Q40, below 2^62; of one that is not above 0 it is 0."""
+    if value <= 0:
+        return 0
+    root, exponent = inverse_root(value)
+    return shift(mul(value << (-2 * exponent), root), 18 - exponent)
+
+
+@kernel
+def mean_of(total: int, count: int) -> int:
+    """A sum by its count, to the nearest."""
+    return (total + (count >> 1)) // count

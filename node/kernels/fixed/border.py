@@ -86,6 +86,15 @@ def show_cycle(fixed: Any, state: Any, gravity: float) -> None:
 
 
 @kernel
+def show_ring(fixed: Any, state: Any, gravity: float) -> None:
+    """Write the readings of all last cycles into the float64 record: they turned with the frame."""
+    for slot in range(fixed.ring_start.shape[0]):
+        for k in range(3):
+            state.ring_rate[slot, k] = fixed.ring_rate[slot, k] * 2.0**-RATE_Q
+            state.ring_force[slot, k] = fixed.ring_force[slot, k] * (2.0**-FORCE_Q * gravity)
+
+
+@kernel
 def show_covariance(fixed: Any, state: Any) -> None:
     """Write the covariances into the float64 record."""
     for i in range(STATES):

@@ -1,22 +1,23 @@
 """The integers of a node beside its float64 record: they learn what somebody changed, and show what they are now.
 
 Bytes are compared and not numbers, because some of the numbers are NaN. Of the events the ring is shown where one was
-told; the cluster only where there is one.
+told; the cluster only where there is one; an alignment and a static record only while they are under way.
 """
 
 from __future__ import annotations
 
 import math
-from typing import Any
+from typing import Any, Final
 
 import numpy as np
 
 from node.kernels.fixed.beside import learn
-from node.kernels.fixed.border import show_aiding, show_covariance, show_cycle, show_survey
+from node.kernels.fixed.border import show_aiding, show_covariance, show_cycle, show_ring, show_survey
 from node.kernels.fixed.layout import TIME_Q, UNIT, VAR_Q
 from node.kernels.fixed.record import (
     AIDING_POWERS,
     AIDING_SCALES,
+    ALIGNER_AT,
     AROUND_AT,
     AROUND_COUNTS,
     AROUND_POWERS,
@@ -34,6 +35,7 @@ from node.kernels.fixed.record import (
     PARAMETERS_INSIDE,
     READING_POWERS,
     READING_SCALES,
+    RECORDING_AT,
     RING_AT,
     SETTINGS_INSIDE,
     SETTINGS_POWERS,
@@ -45,11 +47,14 @@ from node.kernels.fixed.words import differ, keep, learn_numbers, learn_words, s
 from node.kernels.jit import kernel
 from node.kernels.layout import Array
 
+ALIGNER: Final = (ALIGNER_AT - AROUND_AT, RECORDING_AT - AROUND_AT)  # words of what is ordered; the first says
+RECORDING: Final = (RECORDING_AT - AROUND_AT, END_AT - AROUND_AT)  # whether it is under way
+
 
 @kernel
 def compared(imus: int) -> int:
     """How many of the words around the filter are compared and shown at every call."""
-    return (END_AT if imus > 1 else RING_AT) - AROUND_AT
+    return (ALIGNER_AT if imus > 1 else RING_AT) - AROUND_AT
 
 
 @kernel
@@ -70,12 +75,25 @@ def learn_node(nodes: Array, settings: Array, integers: Array) -> None:
         made = inside[SETTINGS_INSIDE : SETTINGS_INSIDE + SETTINGS_WORDS]
         floats = settings.view(np.float64)
         learn_words(own.node.filter, made, crew, floats, SETTINGS_SCALES, SETTINGS_POWERS, own.gravity)
-    around = words[AROUND_AT:END_AT]
+    last = (END_AT if met == 0 else ALIGNER_AT if settings[0].imus > 1 else CLUSTER_AT) - AROUND_AT
+    around, floats = words[AROUND_AT:END_AT], nodes.view(np.float64)[AROUND_AT:END_AT]
+    made = inside[INSIDE : INSIDE + END_AT - AROUND_AT]
     if met == 0 or differ(own.shown_around, around[: compared(settings[0].imus)]):
-        last = (END_AT if met == 0 or settings[0].imus > 1 else CLUSTER_AT) - AROUND_AT
-        made, floats = inside[INSIDE : INSIDE + last], nodes.view(np.float64)[AROUND_AT : AROUND_AT + last]
-        learn_words(own.node.filter, made, around[:last], floats, AROUND_SCALES, AROUND_POWERS, own.gravity)
-        keep(own.last, made)
+        learn_part(own, made, around, floats, 0, last)
+    for begin, end in (ALIGNER, RECORDING):
+        part = around[begin:end]
+        if (part[0] | made[begin]) != 0 and differ(own.shown_around[begin:end], part):
+            learn_part(own, made, around, floats, begin, end)
+
+
+@kernel
+def learn_part(own: Any, made: Array, around: Array, floats: Array, begin: int, end: int) -> None:
+    """Learn words ``begin`` to ``end`` of what stands around the filter."""
+    part = slice(begin, end)
+    scales, powers = AROUND_SCALES[part], AROUND_POWERS[part]
+    learn_words(own.node.filter, made[part], around[part], floats[part], scales, powers, own.gravity)
+    keep(own.last[part], made[part])
+    keep(own.shown_around[part], around[part])
 
 
 @kernel
@@ -108,6 +126,10 @@ def show_node(nodes: Array, settings: Array, integers: Array, cycle: bool) -> No
     if cycle:
         show_cycle(fixed, state, gravity)
         show_survey(fixed, state, gravity)
+    inside = integers.view(np.int64)[INSIDE : INSIDE + END_AT - AROUND_AT]
+    around, floats = words[AROUND_AT:END_AT], nodes.view(np.float64)[AROUND_AT:END_AT]
+    if around[ALIGNER[0]] != 0 and inside[ALIGNER[0]] == 0:
+        show_ring(fixed, state, gravity)
     show_covariance(fixed, state)
     show_aiding(fixed, state)
     keep(own.shown, words[FILTER_AT : FILTER_AT + STATE_WORDS])
@@ -115,10 +137,12 @@ def show_node(nodes: Array, settings: Array, integers: Array, cycle: bool) -> No
         show_config(own.node.config, nodes[0].config, gravity)
         own.shown_changes = own.node.config.changes
         keep(own.read, words[CONFIG_AT : CONFIG_AT + CONFIG_WORDS])
-    inside = integers.view(np.int64)[INSIDE : INSIDE + END_AT - AROUND_AT]
-    around, floats = words[AROUND_AT:END_AT], nodes.view(np.float64)[AROUND_AT:END_AT]
     told, count = nodes[0].events.told, compared(settings[0].imus)
     show_part(own, inside, around, floats, gravity, 0, count)
+    for begin, end in (ALIGNER, RECORDING):
+        if (around[begin] | inside[begin]) != 0:
+            show_part(own, inside, around, floats, gravity, begin, end)
+            keep(own.shown_around[begin:end], around[begin:end])
     if told != nodes[0].events.told:
         show_part(own, inside, around, floats, gravity, RING_AT - AROUND_AT, CLUSTER_AT - AROUND_AT)
     keep(own.shown_around, around[:count])

@@ -13,6 +13,7 @@ import numpy as np
 
 from node.kernels.alignment import MAX_IMUS
 from node.kernels.calibration import PARAMETERS
+from node.kernels.circular import TURNS_Q
 from node.kernels.cluster import WEIGHT_Q
 from node.kernels.events import TOLD_Q
 from node.kernels.fixed.layout import (
@@ -28,12 +29,16 @@ from node.kernels.fixed.layout import (
 from node.kernels.layout import CONFIG, STATE, Array
 from node.kernels.quantity import WARMTH_Q
 from node.kernels.record import AIDING, MOMENT, NODE, READING, SETTINGS
+from node.kernels.static_average import FORCE_PART, MEAN_Q, RATE_PART
+from node.kernels.sweep import PRODUCT_Q, SQUARE_Q
 from node.kernels.twist import STIFFNESS_Q, TORQUE_Q
 
 G: Final = 1000  # of a format: a power of gravity, since forces are counted in g
 FORCE: Final = FORCE_Q + G
 TERM: Final = np.array([0, 7, 14, 21])  # of polynomials in the temperature, which is counted in 128 C
 SIX: Final = np.array([RATE_Q] * 3 + [FORCE] * 3)
+MEANS: Final = np.array([MEAN_Q] * 3 + [MEAN_Q + G] * 3)
+PARTS: Final = np.array([RATE_PART] * 3 + [FORCE_PART + G] * 3)
 OWN_FORMATS: Final[dict[str, Any]] = {
     "mount.axis": VECTOR_Q,
     "mount.std": ANGLE_Q,
@@ -97,7 +102,7 @@ OWN_FORMATS: Final[dict[str, Any]] = {
     "stamp_walk": RATE_Q,
     "rate_range": RATE_Q,
     "force_range": FORCE,
-    "place": VECTOR_Q,
+    "place": VECTOR_Q + G,  # s^2/rad^2: of a square of a rate it makes a force
     "noise": WEIGHT_Q,
     "weight": WEIGHT_Q,
     "plain_gyro_noise": RATE_Q,
@@ -109,6 +114,42 @@ OWN_FORMATS: Final[dict[str, Any]] = {
     "accelerometer.bias": (FORCE + TERM)[:, None],
     "reference": WARMTH_Q,
     "m": VECTOR_Q,
+    "seconds": TIME_Q,
+    "begun": TIME_Q,
+    "sums.mean": MEANS,
+    "sums.last": MEANS,
+    "sums.delta": MEANS,
+    "sums.scatter": PARTS[:, None] + PARTS,
+    "sums.steps": 2 * PARTS,
+    "wanted": TURNS_Q,
+    "angle": ANGLE_Q,
+    "yaw": ANGLE_Q,
+    "sense": 0,
+    "ordered_at": TIME_Q,
+    "last_end": TIME_Q,
+    "sum": VECTOR_Q,
+    "sum_products": PRODUCT_Q,
+    "sum_angle": ANGLE_Q,
+    "sum_angle_squares": SQUARE_Q,
+    "sum_spin": VECTOR_Q,
+    "sum_angle_spin": ANGLE_Q,
+    "sum_back": PRODUCT_Q,
+    "sum_angle_back": ANGLE_Q,
+    "least": VECTOR_Q,
+    "largest": VECTOR_Q,
+    "u": VECTOR_Q,
+    "across": VECTOR_Q,
+    "offsets.axis": VECTOR_Q,
+    "pitch": ANGLE_Q,
+    "roll": ANGLE_Q,
+    "pitch_std": ANGLE_Q,
+    "roll_std": ANGLE_Q,
+    "lean": ANGLE_Q,
+    "lean_std": ANGLE_Q,
+    "offsets.noise": ANGLE_Q,
+    "aligner.sums": VECTOR_Q,
+    "rotations": VECTOR_Q,
+    "turn": VECTOR_Q,
 }
 READING_FORMATS: Final = np.array([RATE_Q] * 3 + [FORCE] * 3 + [WARMTH_Q, 0, TIME_Q])
 MOMENT_FORMATS: Final = np.array([TIME_Q, TIME_Q, 0, 0, VAR_Q, 0])
@@ -150,7 +191,7 @@ def scales_of(formats: Array) -> tuple[Array, Array]:
     return np.where(formats == COPIED, 0.0, np.exp2(formats - powers * G)), powers.astype(np.int64)
 
 
-AROUND: Final = [name for name in NODE.names or () if name not in ("filter", "aligner", "recording", "config")]
+AROUND: Final = [name for name in NODE.names or () if name not in ("filter", "config")]
 FIXED_NODE: Final = np.dtype(
     [
         ("filter", FIXED_STATE),
@@ -170,12 +211,8 @@ def place(kind: np.dtype[Any], name: str) -> int:
 
 
 FILTER_AT, CONFIG_AT = place(NODE, "filter"), place(NODE, "config")
-AROUND_AT, RING_AT, CLUSTER_AT, END_AT = (
-    place(NODE, "mount"),
-    place(NODE, "events") + 2,
-    place(NODE, "cluster"),
-    place(NODE, "aligner"),
-)
+AROUND_AT, RING_AT, CLUSTER_AT = place(NODE, "mount"), place(NODE, "events") + 2, place(NODE, "cluster")
+ALIGNER_AT, RECORDING_AT, END_AT = place(NODE, "aligner"), place(NODE, "recording"), place(NODE, "config")
 STATE_WORDS, CONFIG_WORDS = STATE.itemsize // 8, CONFIG.itemsize // 8
 SETTINGS_WORDS, PARAMETER_WORDS = SETTINGS.itemsize // 8, PARAMETERS.itemsize // 8
 AROUND_SCALES, AROUND_POWERS = scales_of(

@@ -1,20 +1,17 @@
 """One node in integers, compiled whole: ``node.kernels.step`` over the record of integers, and what is beside it.
 
 ``integer_step`` and ``integer_aiding`` hold no float. Around them the float64 record is read where somebody changed
-it, and shown: reports, the saved state, an alignment and a static record are taken from it.
+it, and shown: reports and the saved state are taken from it.
 """
 
 from __future__ import annotations
 
-from node.kernels.aligner import follow_alignment
 from node.kernels.fixed.cycle import run_cycle
 from node.kernels.fixed.node_words import learn_aiding, learn_inputs, learn_node, show_node
 from node.kernels.jit import kernel
 from node.kernels.layout import Array
-from node.kernels.record import END, START
 from node.kernels.relay import offer_aiding
-from node.kernels.static_average import follow_recording
-from node.kernels.step import ADMITTED, SAY_RECORD, aiding_around, is_standing, say_events, step_around
+from node.kernels.step import aiding_around, step_around
 
 
 @kernel
@@ -40,18 +37,11 @@ def fixed_step(
     nodes, settings, parameters, readings, moment : as ``node_step``
     integers : one-element array of dtype ``INTEGERS``
     """
-    own, node, crew = integers[0], nodes[0], settings[0]
+    own = integers[0]
     learn_node(nodes, settings, integers)
     learn_inputs(parameters, readings, moment, integers)
     says = integer_step(integers["node"], integers["settings"], own.parameters, own.readings, own.moment)
     show_node(nodes, settings, integers, True)
-    if says & ADMITTED == 0:
-        return says
-    if node.aligner.method != 0:
-        follow_alignment(node, crew, moment[START], moment[END])
-        says |= say_events(node)
-    if follow_recording(node, moment[START], moment[END], 1 if is_standing(node) else 0):
-        says |= SAY_RECORD
     return says
 
 

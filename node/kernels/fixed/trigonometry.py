@@ -1,4 +1,4 @@
-"""Sine, cosine and exponential by table and a short series; conversion between radians and binary angles."""
+"""Sine, cosine and exponential by table and a short series, angles by CORDIC; radians and binary angles."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from typing import Final
 
 import numpy as np
 
-from node.kernels.fixed.arithmetic import LOW31, mul
+from node.kernels.fixed.arithmetic import LOW31, bits, mul, shift, shift_down
 from node.kernels.jit import kernel
 
 STEPS: Final = 1024  # of the table of sines, a turn
@@ -20,6 +20,9 @@ COUNTS_PER_RAD: Final = round(2.0**33 / (2.0 * math.pi))  # Q1
 RAD_PER_COUNT: Final = round(2.0 * math.pi * 2.0**28)  # Q60
 SIXTH: Final = round(2.0**31 / 6.0)
 TURN: Final = 0xFFFFFFFF
+ARCS: Final = np.array([round(math.atan(2.0**-k) * 2.0**60) for k in range(48)], np.int64)  # Q60
+HALF_TURN: Final = round(math.pi * 2.0**60)
+SHORTER: Final = round(2.0**31 * math.prod(1.0 / math.sqrt(1.0 + 4.0**-k) for k in range(48)))  # every turn lengthens
 
 
 @kernel
@@ -68,3 +71,24 @@ def exponential(rate: int, dt: int) -> int:
     series = (1 << 39) - x + (xx >> 1) - ((((xx * x) >> 39) * SIXTH) >> 31)
     power = int(POWERS[(y >> 31) & 255])
     return (power * (series >> 8)) >> (31 + whole)
+
+
+@kernel
+def polar(x: int, y: int) -> tuple[int, int]:
+    """Angle (rad, Q40) of the point (x, y) from x in -pi..pi, and its distance, in the format of both (below 2^61).
+
+    CORDIC: turns of arctan 2^-k towards the axis, shifts and sums alone. Source: Volder, IRE Trans. EC-8 (1959) 330.
+    """
+    if x == 0 and y == 0:
+        return 0, 0
+    room = 58 - bits(max(abs(x), abs(y)))
+    a, b, angle = shift_down(x, -room), shift_down(y, -room), 0
+    if a < 0:
+        angle = -HALF_TURN if b < 0 else HALF_TURN
+        a, b = -a, -b
+    for k in range(ARCS.shape[0]):
+        if b > 0:
+            a, b, angle = a + (b >> k), b - (a >> k), angle + ARCS[k]
+        else:
+            a, b, angle = a - (b >> k), b + (a >> k), angle - ARCS[k]
+    return (angle + (1 << 19)) >> 20, shift(mul(a, SHORTER), room)

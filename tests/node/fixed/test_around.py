@@ -8,19 +8,23 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from node.firmware.alignment import rotation
 from node.kernels.aiding_watch import find_mismatch, forget
-from node.kernels.alignment import to_tube
+from node.kernels.alignment import extreme_var, fit_circle, take_extremes, to_tube
 from node.kernels.calibration import COLDEST, HOTTEST, PARAMETERS, calibrate, identity_parameters
 from node.kernels.cluster import WEIGHT_Q, fuse
 from node.kernels.coarse_level import level_coarsely
 from node.kernels.delay import make_up_delay
 from node.kernels.fixed.border import config_in_integers, state_in_integers
+from node.kernels.fixed.extremes import variance_in_integers
 from node.kernels.fixed.layout import ANGLE_Q, FORCE_Q, RATE_Q, TIME_Q, VAR_Q, VECTOR_Q
 from node.kernels.fixed.record import FIXED_PARAMETERS, FORCE, formats_of, in_integers, scales_of
 from node.kernels.fixed.words import learn_numbers, learn_words, show_words
 from node.kernels.layout import DEG, PERIOD, default_config, new_state
 from node.kernels.quantity import NO_NUMBER, WARMTH_Q
 from node.kernels.record import AIDINGS, DELAYED, GUARD, MISMATCH, NODE
+from node.kernels.static_average import STATIC, add_static
+from node.kernels.sweep import MOST_SAMPLES, OFFSET, SWEEP, add_to_sweep
 
 G = 9.81
 RATE, PULL = st.floats(-9.0, 9.0), st.floats(-16.0 * G, 16.0 * G)
@@ -152,6 +156,99 @@ def test_a_node_is_levelled_coarsely_alike(lean: float, towards: float, weight: 
     level_coarsely(integers[0], settings[0], whole(rate, RATE_Q), whole(pull / G, FORCE_Q))
     if min(abs(abs(weight - 1.0) - 0.05), abs(lean - 0.1)) > 1e-6:
         np.testing.assert_allclose(integers[0]["down"] * 2.0**-VECTOR_Q, state[0]["down"], atol=1e-7)
+
+
+TILT = st.floats(-9.0 * DEG, 9.0 * DEG)
+
+
+@given(
+    st.tuples(TILT, TILT),
+    st.floats(-1.0, 1.75).map(lambda power: 10.0**power * DEG),
+    st.floats(-2.5, -0.5).map(lambda power: 10.0**power * DEG),
+    st.sampled_from([-20.0, -3.0, -1.0, 1.0, 2.0, 8.0, 20.0]),
+    st.integers(40, 400),
+    st.integers(0, 2**32 - 1),
+)
+def test_a_turn_is_fitted_alike(
+    mount: tuple[float, float], lean: float, noise: float, turns: float, samples: int, seed: int
+) -> None:
+    """Every mount, lean to 56 deg, noise of 0.003 to 0.3 deg, turns at any pace and either way."""
+    random, (pitch, roll) = np.random.default_rng(seed), mount
+    axis = np.array([math.sin(pitch), math.cos(pitch) * math.sin(roll), math.cos(pitch) * math.cos(roll)])
+    angles = np.cumsum(random.uniform(0.3, 1.7, samples))
+    angles *= turns * math.tau / angles[-1]
+    down = np.array([np.cos(angles), -np.sin(angles), np.ones(samples)]).T
+    down *= [math.sin(lean), math.sin(lean), math.cos(lean)]
+    pulls = -G * down @ rotation(axis) + G * noise * random.standard_normal((samples, 3))
+    sums = np.zeros(1, SWEEP)
+    integers = learnt(sums, ".sweeps")
+    for pull, angle in zip(pulls, angles, strict=True):
+        add_to_sweep(sums[0], pull, angle)
+        add_to_sweep(integers[0], whole(pull / G, FORCE_Q), int(whole(angle, ANGLE_Q)))
+    for fit in (fit_circle, take_extremes):
+        found = np.zeros(1, OFFSET)
+        own = learnt(found, ".offsets")
+        assert fit(sums[0], found[0]) == fit(integers[0], own[0]) == 1
+        shown = turned_back(own, OFFSET, ".offsets")
+        np.testing.assert_allclose(shown[0]["axis"], found[0]["axis"], atol=2e-7)
+        for name in ("pitch", "roll", "lean"):
+            assert shown[0][name] == pytest.approx(found[0][name], abs=3e-7), name
+        for name in ("pitch_std", "roll_std", "lean_std", "noise"):
+            assert shown[0][name] == pytest.approx(found[0][name], rel=1e-2), name
+
+
+@pytest.mark.parametrize("turns", [0.0, 0.25])
+def test_an_arc_has_no_middle_in_integers_either(turns: float) -> None:
+    integers = learnt(np.zeros(1, SWEEP), ".sweeps")
+    for angle in np.linspace(0.0, turns * math.tau, 100):
+        pull = whole([0.1 * math.cos(angle), 0.1 * math.sin(angle), -1.0], FORCE_Q)
+        add_to_sweep(integers[0], pull, int(whole(angle, ANGLE_Q)))
+    assert fit_circle(integers[0], learnt(np.zeros(1, OFFSET), ".offsets")[0]) == 0
+
+
+@pytest.mark.slow
+def test_the_sums_of_the_longest_turn_fit() -> None:
+    """Every angle at its largest, and every direction along an axis."""
+    sweep = learnt(np.zeros(1, SWEEP), ".sweeps")
+    pull, angle = whole([1.0, 0.0, 0.0], FORCE_Q), int(whole(20.2 * math.tau, ANGLE_Q))
+    for _ in range(MOST_SAMPLES):
+        add_to_sweep(sweep[0], pull, angle)
+    for name, one in (("sum_angle", 20.2 * math.tau), ("sum_angle_squares", (20.2 * math.tau) ** 2)):
+        assert turned_back(sweep, SWEEP, ".sweeps")[0][name] == pytest.approx(MOST_SAMPLES * one, rel=1e-6)
+    assert np.abs(sweep.view(np.int64)).max() < NO_NUMBER
+
+
+@given(st.floats(-1.0, 4.5).map(lambda power: 10.0**power), st.integers(1, 600))
+def test_the_law_of_extremes_is_the_same(ratio: float, samples: int) -> None:
+    found = variance_in_integers(round(ratio * 2.0**24), samples) * 2.0**-38
+    assert found == pytest.approx(extreme_var(ratio, samples), rel=1e-3)
+
+
+@given(
+    st.integers(1, 300),
+    st.integers(0, 2**32 - 1),
+    st.floats(-5.0, -1.0).map(lambda power: 10.0**power),
+    st.floats(-5.0, 0.0).map(lambda power: 10.0**power),
+    *VECTORS,
+)
+def test_a_static_record_is_summed_alike(
+    count: int, seed: int, rate_noise: float, force_noise: float, usual: Any, pull: Any
+) -> None:
+    random = np.random.default_rng(seed)
+    rates = np.array(usual) / 10.0 + rate_noise * random.standard_normal((count, 3))
+    pulls = np.array(pull) + force_noise * random.standard_normal((count, 3))
+    sums = np.zeros(1, STATIC)
+    own = learnt(sums, ".sums")
+    for rate, force in zip(rates, pulls, strict=True):
+        add_static(sums[0], rate, force, 30.0, 1)
+        add_static(own[0], whole(rate, RATE_Q), whole(force / G, FORCE_Q), round(30.0 * 2.0**WARMTH_Q), 1)
+    shown = turned_back(own, STATIC, ".sums")[0]
+    np.testing.assert_allclose(shown["mean"], sums[0]["mean"], atol=1e-7)
+    spread = np.maximum(np.sqrt(np.diag(sums[0]["scatter"])), 1e-30)
+    near = 1e-3 + math.sqrt(count) * np.array([1e-7] * 3 + [1e-6] * 3) / spread
+    assert (np.abs(shown["scatter"] - sums[0]["scatter"]) <= np.outer(spread, spread) * (near[:, None] + near)).all()
+    steps = np.sqrt(sums[0]["steps"])
+    np.testing.assert_allclose(np.sqrt(shown["steps"]), steps, rtol=1e-3, atol=1e-6 * math.sqrt(count))
 
 
 @given(st.data())

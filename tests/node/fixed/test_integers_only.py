@@ -1,4 +1,9 @@
-"""No float in the integer step: the types and the compiled code of every function of it are read."""
+"""No float in the integer step: the types and the compiled code of every function of it are read.
+
+The step is all of ``integer_step`` and ``integer_aiding``: also an alignment with the fit at its end, and a static
+record. Outside stands what reads the float64 record and shows it (``fixed_step``), and what Python orders on that
+record.
+"""
 
 import os
 import re
@@ -67,7 +72,9 @@ for function in functions():
     names.add(where)
     for found in floats_of(function):
         print(where, found)
-for part in "guard.judge_cycle cluster.fuse_imus calibration.correct make_up.make_up fixed.cycle.run_cycle".split():
+parts = "guard.judge_cycle cluster.fuse_imus calibration.correct make_up.make_up fixed.cycle.run_cycle "
+parts += "aligner.follow_turn aligner.realign fixed.circle.finish fixed.extremes.law static_average.add_static"
+for part in parts.split():
     assert "node.kernels." + part in names, part
 """
 ONE_HALF = """
