@@ -99,7 +99,7 @@ class NativeProfile:
         told = self._told
         if told is None or header.number - told.number >= HEADER_EVERY:
             return True
-        return header._replace(number=told.number) != told
+        return (header.sender, header.epoch, *header[3:]) != (told.sender, told.epoch, *told[3:])
 
     def _collect(self, type_: int, part: int, data: bytes, needed: int) -> list[bytes] | None:
         """All parts of a message in order once they are there; those of another count are forgotten."""
