@@ -26,7 +26,7 @@ from telemetry.messages import Message, Side
 from telemetry.presentation.can_messages import NATIVE, NativeMessage
 from telemetry.presentation.msgpack_codec import encode
 from telemetry.schema import SPEC_OF
-from telemetry.transport.hop import pack_frame
+from telemetry.transport.hop import Header, pack_frame
 
 EXCHANGES, ROUNDS = 100, 25
 PAYLOADS, DECODED = 20, 2000
@@ -162,7 +162,7 @@ def ends(name: str) -> tuple[TubeEnd, TubeEnd]:
 
 def frame_of(number: int, sender: int) -> Frame:
     """The aiding as the link hands it to its port."""
-    header = HEADER._replace(number=number, sender=sender)
+    header = Header(sender, HEADER.epoch, number, *HEADER[3:])
     return Frame(pack_frame(header, [(0, encode(AIDING))]), Priority.AIDING, "aiding")
 
 
