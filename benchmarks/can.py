@@ -8,11 +8,13 @@ import statistics
 import threading
 import time
 from collections.abc import Callable, Iterator
+from functools import partial
 from typing import Any
 
 import can
 import isotp
 
+from borechain.load.rounds import beside
 from sim.can.hub import CanHub
 from telemetry.application.can_load import AIDING, HEADER, steady
 from telemetry.media.can_loopback import register
@@ -20,13 +22,14 @@ from telemetry.media.can_loopback_protocol import INTERFACE
 from telemetry.media.isotp import Receiver, Sender
 from telemetry.media.port import STEPPER, Frame, Port, Priority, TubeEnd
 from telemetry.media.table import open_medium
-from telemetry.messages import Side
-from telemetry.presentation.can_messages import NATIVE
+from telemetry.messages import Message, Side
+from telemetry.presentation.can_messages import NATIVE, NativeMessage
 from telemetry.presentation.msgpack_codec import encode
 from telemetry.schema import SPEC_OF
-from telemetry.transport.hop import pack_frame
+from telemetry.transport.hop import Header, pack_frame
 
-EXCHANGES, ROUNDS = 300, 5
+EXCHANGES, ROUNDS = 100, 25
+PAYLOADS, DECODED = 20, 2000
 PATIENCE = 60.0
 NATIVE_AIDING = NATIVE[SPEC_OF[type(AIDING)].kind]
 context = multiprocessing.get_context("fork")  # before any thread is started
@@ -35,19 +38,25 @@ context = multiprocessing.get_context("fork")  # before any thread is started
 def run() -> dict[str, Any]:
     """Exchanges of one aiding there and back, s each; medians of rounds in turn.
 
+    A joint's controllers report own frames, since that is the acknowledgement, so every frame has two listeners: the
+    peer's ends are set up alike, and read theirs. That is the peer on the same bus; beside it stands one whose ends are
+    deaf to their own frames, which has the bus do half as much.
+
     Returns
     -------
     dict
-        ``ratios``: ours beside bare python-can (peer), ``slower`` says how many times; ``decode_us`` of every cyclic
-        message, and of ISO-TP ours beside can-isotp's.
+        ``ratios``: ours beside bare python-can (peer), ``slower`` says how many times, with its interval, and of
+        ISO-TP ours beside can-isotp's; ``decode_us`` of every cyclic message.
     """
     register()
     with served() as port, contextlib.ExitStack() as stack:
-        stack.enter_context(echoing(echo_bare, port))
+        for own in (True, False):
+            stack.enter_context(echoing(echo_bare, port, own))
         for profile in ("native", "tunnel"):
             stack.enter_context(echoing(echo_hop, *joint(port, profile)))
         exchanges = {
-            "bare": stack.enter_context(bare(port)),
+            "bare": stack.enter_context(bare(port, own=True)),
+            "deaf": stack.enter_context(bare(port, own=False)),
             "native FD": stack.enter_context(hop(*joint(port, "native"))),
             "tunnel FD": stack.enter_context(hop(*joint(port, "tunnel"))),
         }
@@ -57,15 +66,14 @@ def run() -> dict[str, Any]:
                 begun = time.perf_counter()
                 exchange(EXCHANGES)
                 times[name].append((time.perf_counter() - begun) / EXCHANGES)
-    medians = {name: statistics.median(values) for name, values in times.items()}
-    ratios = {name: beside(medians[name], medians["bare"]) for name in ("native FD", "tunnel FD")}
-    ratios["ISO-TP, 169 bytes, FD"] = beside(seconds_of(ours_isotp), seconds_of(their_isotp()))
+    ratios: dict[str, Any] = {}
+    for name in ("native FD", "tunnel FD"):
+        ratios[name] = beside(times[name], times["bare"])
+        ratios[f"{name}, peer deaf to its own"] = beside(times[name], times["deaf"])
+    theirs = their_isotp()
+    pairs = [(seconds_of(ours_isotp, PAYLOADS), seconds_of(theirs, PAYLOADS)) for _ in range(ROUNDS)]
+    ratios["ISO-TP, 169 bytes, FD"] = beside([ours for ours, _ in pairs], [peer for _, peer in pairs])
     return {"bench": "can", "ratios": ratios, "decode_us": decode_times()}
-
-
-def beside(ours: float, peer: float) -> dict[str, float]:
-    """A line of the result."""
-    return {"ours": ours, "peer": peer, "ratio": peer / ours, "slower": ours / peer}
 
 
 @contextlib.contextmanager
@@ -104,31 +112,41 @@ def echoing(target: Callable[..., None], *arguments: Any) -> Iterator[None]:
 
 
 @contextlib.contextmanager
-def bare(port: int) -> Iterator[Callable[[int], None]]:
-    """Exchanges by python-can alone, of a frame as long as an aiding's."""
+def bare(port: int, *, own: bool) -> Iterator[Callable[[int], None]]:
+    """Exchanges by python-can alone, of a frame as long as an aiding's, between ends that hear their own or do not."""
     data = bytes(NATIVE_AIDING.fd.layouts[0].length)
     message = can.Message(arbitration_id=0x1234567, data=data, is_fd=True, bitrate_switch=True)
-    with can.Bus(f"{port}/bare", interface=INTERFACE, ignore_config=True) as bus:
+    with bare_bus(port, own=own) as bus:
 
         def exchange(count: int) -> None:
             for _ in range(count):
                 bus.send(message)
-                if bus.recv(PATIENCE) is None:
-                    raise RuntimeError("no answer")
+                next_heard(bus, PATIENCE)
 
         exchange(10)
         yield exchange
 
 
-def echo_bare(port: int, ready: Any) -> None:
+def bare_bus(port: int, *, own: bool) -> can.BusABC:
+    """One end of the peer."""
+    return can.Bus(f"{port}/bare {own}", interface=INTERFACE, ignore_config=True, receive_own_messages=own)
+
+
+def next_heard(bus: can.BusABC, patience: float | None) -> can.Message:
+    """The next frame of the other end."""
+    while (arrived := bus.recv(patience)) is not None:
+        if arrived.is_rx:
+            return arrived
+    raise RuntimeError("no answer")
+
+
+def echo_bare(port: int, own: bool, ready: Any) -> None:
     """Send back what comes."""
     register()
-    with can.Bus(f"{port}/bare", interface=INTERFACE, ignore_config=True) as bus:
+    with bare_bus(port, own=own) as bus:
         ready.set()
         while True:
-            arrived = bus.recv()
-            if arrived is not None:
-                bus.send(arrived)
+            bus.send(next_heard(bus, None))
 
 
 def joint(port: int, profile: str) -> tuple[str, str]:
@@ -144,7 +162,7 @@ def ends(name: str) -> tuple[TubeEnd, TubeEnd]:
 
 def frame_of(number: int, sender: int) -> Frame:
     """The aiding as the link hands it to its port."""
-    header = HEADER._replace(number=number, sender=sender)
+    header = Header(sender, HEADER.epoch, number, *HEADER[3:])
     return Frame(pack_frame(header, [(0, encode(AIDING))]), Priority.AIDING, "aiding")
 
 
@@ -230,7 +248,7 @@ def their_isotp() -> Callable[[], None]:
     return carry
 
 
-def seconds_of(act: Callable[[], None], count: int = 300) -> float:
+def seconds_of(act: Callable[[], object], count: int) -> float:
     """Median duration of ``act``, s."""
     times = []
     for _ in range(count):
@@ -246,8 +264,15 @@ def decode_times() -> dict[str, float]:
     for traffic in steady(1):
         native = NATIVE[SPEC_OF[type(traffic.message)].kind]
         data = native.fd.pack(native.raws_of(traffic.message), 1)
-        found[native.name] = 1e6 * seconds_of(lambda n=native, d=data: n.message_of(n.fd.unpack(d)), 2000)  # type: ignore[misc]
+        decode = partial(decoded, native, data)
+        found[native.name] = 1e6 * seconds_of(decode, DECODED)
     return found
+
+
+def decoded(native: NativeMessage, frames: list[bytes]) -> Message:
+    """Message of the data of its frames on CAN FD."""
+    message: Message = native.message(*native.unpack(frames, fd=True))
+    return message
 
 
 if __name__ == "__main__":

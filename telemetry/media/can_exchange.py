@@ -14,7 +14,7 @@ from typing import NamedTuple
 
 from telemetry.errors import TelemetryError
 from telemetry.media.can_identifier import FLOW_CONTROL, PART_MASK, PRESENCE, PRIORITIES, TUNNEL, Identifier
-from telemetry.media.can_profile import Profile, Split
+from telemetry.media.can_profile import NativePart, Profile, Split
 from telemetry.media.can_timing import CLASSIC_LARGEST, BitRates
 from telemetry.media.isotp import FLOW, Receiver, Sender, TransferError
 from telemetry.media.port import MAX_FRAME, Frame, Priority
@@ -39,11 +39,22 @@ BUDGET_BURST = 2.0  # s of a budget at once
 SILENCE = 3.5  # s after which another end may take the place of one that fell silent
 
 
+HELD = tuple(
+    tuple(frozenset(p for p in PRIORITIES if p >= urgent or p in heavy) for urgent in range(len(PRIORITIES) + 1))
+    for heavy in ((), (Priority.STATE,))
+)  # what waits: by whether the bus is heavy and by what is on its way, or nothing
+
+
 class CanData(NamedTuple):
     """Identifier and data of a frame to send."""
 
     identifier: int
     data: bytes
+
+
+def part_data(part: NativePart, address: int) -> CanData:
+    """Frame of one part of a message."""
+    return CanData(Identifier(part.priority, part.type, address, part.part).pack(), part.data)
 
 
 class Outgoing:
@@ -68,8 +79,7 @@ class Outgoing:
     def next_frame(self, address: int) -> CanData:
         """The next frame; not while the receiver is waited for, nor when it is done."""
         if self._parts:
-            part = self._parts.popleft()
-            return CanData(Identifier(part.priority, part.type, address, part.part).pack(), part.data)
+            return part_data(self._parts.popleft(), address)
         if self._sender is None:
             raise ValueError("payload: expected something left to send, got none")
         return CanData(Identifier(self.frame.priority, TUNNEL, address).pack(), self._sender.next_frame())
@@ -104,7 +114,7 @@ class Traffic:
 
     def is_heavy(self, now: float) -> bool:
         """Whether node states have to wait."""
-        return self._busy_at(now) > HEAVY * MEMORY
+        return self._busy > 0.0 and self._busy_at(now) > HEAVY * MEMORY
 
     def _busy_at(self, now: float) -> float:
         return self._busy * math.exp(-max(now - self._at, 0.0) / MEMORY)
@@ -244,7 +254,9 @@ class CanExchange:
             return None
         if self._answers:
             return self._answers.popleft()
-        self._start(now)
+        whole = self._start(now) if len(self.queue) else None
+        if whole is not None or not self._outgoing:
+            return whole
         ready = [p for p, o in self._outgoing.items() if not o.awaits_flow]
         return self._continue(min(ready), now) if ready else None
 
@@ -254,18 +266,22 @@ class CanExchange:
         identifier = Identifier(Priority.HELLO, PRESENCE, self.address, self._nonce & PART_MASK)
         return CanData(identifier.pack(), age.to_bytes(4) + self._nonce.to_bytes(4))
 
-    def _start(self, now: float) -> None:
-        """Begin the most urgent payload that waits, where it is more urgent than all that are on their way."""
-        urgent = min(self._outgoing, default=len(Priority))
-        if not len(self.queue):
-            return
-        held = [p for p in PRIORITIES if p >= urgent or (p is Priority.STATE and self.traffic.is_heavy(now))]
-        frame = self.queue.take(held)
-        if frame is not None:
-            split = Split([], frame.payload)
-            if self.profile is not None:
-                split = self.profile.split(frame.payload, fd=self.largest > CLASSIC_LARGEST)
-            self._outgoing[frame.priority] = Outgoing(frame, split, self.largest, now)
+    def _start(self, now: float) -> CanData | None:
+        """Begin the most urgent payload that waits, where it is more urgent than all that are on their way.
+
+        Returns its frame where one part of a form of its own is all of it.
+        """
+        urgent = min(self._outgoing, default=len(PRIORITIES))
+        frame = self.queue.take(HELD[self.traffic.is_heavy(now)][urgent])
+        if frame is None:
+            return None
+        split = Split([], frame.payload)
+        if self.profile is not None:
+            split = self.profile.split(frame.payload, fd=self.largest > CLASSIC_LARGEST)
+        if split.rest is None and len(split.parts) == 1:
+            return part_data(split.parts[0], self.address)
+        self._outgoing[frame.priority] = Outgoing(frame, split, self.largest, now)
+        return None
 
     def _continue(self, priority: Priority, now: float) -> CanData:
         outgoing = self._outgoing[priority]

@@ -25,7 +25,7 @@ from telemetry.media.can_timing import BitRates
 from telemetry.media.port import Frame
 from telemetry.media.queued_port import QueuedPort
 
-TICK = 0.05  # s, that the thread waits for a frame before it looks at the time
+TICK = 0.05  # s, between two looks at the time; the thread waits as long for a frame
 BUSY_LIMIT = 512  # frames that may wait while the other end takes them; fewer wait for one that is absent
 FIRST_PAUSE, LAST_PAUSE = 0.1, 5.0  # s, before a bus is opened again
 UNHEARD_LIMIT = 64  # payloads kept until ``listen``
@@ -75,6 +75,7 @@ class CanPort(QueuedPort):
         self._lock = threading.RLock()
         self._deliver: Callable[[bytes], object] | None = None
         self._unheard: deque[bytes] = deque(maxlen=UNHEARD_LIMIT)
+        self._look_at = -math.inf
         self._pause, self._reopen_at = FIRST_PAUSE, math.inf
         self._thread = threading.Thread(target=self._run, name=f"can {name}", daemon=True)
         self._thread.start()
@@ -159,7 +160,9 @@ class CanPort(QueuedPort):
     def _pump(self) -> None:
         """Hand the controller its next frame."""
         now = time.monotonic()
-        self._exchange.advance(now)
+        if now >= self._look_at:
+            self._look_at = now + TICK
+            self._exchange.advance(now)
         if self._bus is None or self._closed:
             return
         frame = self._exchange.next_frame(now)

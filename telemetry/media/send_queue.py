@@ -52,12 +52,11 @@ class SendQueue:
 
     def take(self, held: Container[Priority] = ()) -> Frame | None:
         """The next frame, of a priority that is not ``held`` back; None where there is none."""
-        able = [frame for frame in self._waiting if frame.priority not in held]
-        if not able:
-            return None
-        frame = min(able, key=lambda f: f.priority)
-        self._waiting.remove(frame)
-        return frame
+        chosen = None
+        for place, frame in enumerate(self._waiting):
+            if frame.priority not in held and (chosen is None or frame.priority < self._waiting[chosen].priority):
+                chosen = place
+        return None if chosen is None else self._waiting.pop(chosen)
 
     def put_back(self, frame: Frame) -> None:
         """Put a frame that was taken to its place before the others again."""

@@ -61,7 +61,7 @@ def number_encoder(signal: Signal, check: Check, low: float, high: float) -> Cal
 def integer_encoder(signal: Signal, check: Check, low: float, high: float) -> Encoder:
     """Function from an integer, a flag or a member of an enumeration that has all numbers from ``low`` to ``high``."""
     first = signal.first
-    high = min(high, signal.highest_value)
+    low, high = max(low, signal.lowest_value), min(high, signal.highest_value)
 
     def raws_of(value: Any) -> tuple[int, ...]:
         if type(value) is int and low <= value <= high:
@@ -95,12 +95,11 @@ def bytes_encoder(check: Check) -> Encoder:
 
 def decoder_of(field: Field, signal: Signal) -> Decoder:
     """Function from a raw number to the value it stands for, or to the component of the vector."""
-    first, step = signal.first, signal.step
+    first = signal.first
     check = codec_of(field).check if signal.name == field.name else component_check(codec_of(field).check)
     match signal.scale:
         case Scale.DECIBEL:
-            levels = [10.0 ** ((first + raw) * step / 10.0) for raw in range(signal.largest + 1)]
-            return [0.0, *levels[1:]].__getitem__
+            return levels_of(signal).__getitem__
         case Scale.BYTES:
             return partial(int.to_bytes, length=signal.bits // 8)
         case Scale.SWITCH:
@@ -113,17 +112,30 @@ def decoder_of(field: Field, signal: Signal) -> Decoder:
 def number_decoder(signal: Signal, check: Check, low: float, high: float) -> Decoder:
     """Function from a raw number to a number; ``low`` and ``high`` bound what needs no check."""
     first, step, largest = signal.first, signal.step, signal.largest
-    # a decimal step divides one: dividing gives the nearest number, multiplying may not
-    parts = round(1.0 / step)
-    is_decimal = abs(parts * step - 1.0) < 1e-12
+    parts = parts_of_one(signal)
 
     def value_of(raw: int) -> Any:
-        value = (first + raw) / parts if is_decimal else (first + raw) * step
+        value = (first + raw) / parts if parts else (first + raw) * step
         return value if low <= value <= high else check(value)
 
     if signal.scale is Scale.AGE:
         return lambda raw: math.inf if raw == largest else value_of(raw)
     return value_of
+
+
+def parts_of_one(signal: Signal) -> int:
+    """How often a decimal step divides one, 0 where it does not.
+
+    Dividing by it gives the nearest number, multiplying by the step may not.
+    """
+    parts = round(1.0 / signal.step)
+    return parts if abs(parts * signal.step - 1.0) < 1e-12 else 0
+
+
+def levels_of(signal: Signal) -> list[float]:
+    """Variance of each raw number."""
+    levels = [10.0 ** ((signal.first + raw) * signal.step / 10.0) for raw in range(signal.largest + 1)]
+    return [0.0, *levels[1:]]
 
 
 def component_check(check: Check) -> Check:

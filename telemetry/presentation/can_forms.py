@@ -26,7 +26,10 @@ class Layout:
 
 
 class Form:
-    """A message in frames of one kind of CAN: packs and unpacks all its signals at once."""
+    """A message in frames of one kind of CAN: packs and unpacks all its signals at once.
+
+    ``places`` of the signals in their order: frame, first bit, largest raw number.
+    """
 
     def __init__(self, layouts: tuple[Layout, ...], signals: Iterable[Signal]) -> None:
         self.layouts = layouts
@@ -37,12 +40,12 @@ class Form:
             for signal, start in layout.places
             if signal is not COUNT
         }
-        self._places = [(*found[signal.name], signal.largest) for signal in signals]
+        self.places = [(*found[signal.name], signal.largest) for signal in signals]
 
     def pack(self, raws: Iterable[int], count: int) -> list[bytes]:
         """Data of each frame; ``raws`` in the order of the signals."""
         bits = [count & COUNT.largest] * len(self._lengths)
-        for (frame, start, _), raw in zip(self._places, raws, strict=True):
+        for (frame, start, _), raw in zip(self.places, raws, strict=True):
             bits[frame] |= raw << start
         return [number.to_bytes(length, "little") for number, length in zip(bits, self._lengths, strict=True)]
 
@@ -58,7 +61,7 @@ class Form:
             if len(data) != layout.length:
                 raise DecodeError(f"{layout.name}: expected {layout.length} bytes, got {len(data)}")
         bits = [int.from_bytes(data, "little") for data in frames]
-        return [bits[frame] >> start & largest for frame, start, largest in self._places]
+        return [bits[frame] >> start & largest for frame, start, largest in self.places]
 
 
 def groups(signals: list[Signal], bits: int) -> list[list[Signal]]:

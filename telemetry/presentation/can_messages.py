@@ -7,8 +7,9 @@ msgpack and goes as signals, or the other way round, need not become an object b
 
 from __future__ import annotations
 
+import contextlib
 from collections.abc import Callable, Sequence
-from functools import partial
+from functools import cached_property, partial
 from operator import add, attrgetter, itemgetter
 from typing import Any, NamedTuple
 
@@ -16,9 +17,10 @@ from telemetry.errors import DecodeError, EncodeError
 from telemetry.media.can_timing import CLASSIC_LARGEST, FD_LARGEST
 from telemetry.messages import Message
 from telemetry.presentation.can_coders import decoder_of, encoder_of, number_encoder
+from telemetry.presentation.can_compiled import Packer, Rounded, Unpacker, packer_of, unpacker_of
 from telemetry.presentation.can_forms import FD_PART, Form, Layout, groups, laid_out
-from telemetry.presentation.can_signals import COUNT_BITS, ON_STEP, signals_of
-from telemetry.schema import SCHEMA, Kind, MessageSpec
+from telemetry.presentation.can_signals import COUNT_BITS, ON_STEP, Signal, signals_of
+from telemetry.schema import SCHEMA, Field, Kind, MessageSpec
 
 # no signals: a wired joint has no radio, and what is sealed goes as it is, by ISO-TP
 UNSAID = {"upper_margin": "where there is no radio", "lower_margin": "where there is no radio", "seal": "as signals"}
@@ -86,6 +88,44 @@ class NativeMessage:
         everything = list(self.signals.values())
         self.fd = Form((laid_out(self.name, FD_PART, everything, FD_LARGEST),), everything)
         self.classic = Form(self._classic_layouts(), everything)
+        self._by_field: list[tuple[Field, list[Signal]]] = [
+            *by_field,
+            *((spec.fields[k], []) for k, _, _ in self._unsaid),
+        ]
+
+    def pack(self, values: Sequence[Any], count: int, *, fd: bool) -> list[bytes]:
+        """Data of each frame; ``values`` are those of all fields of the schema, unchecked, see ``raws_of_values``."""
+        data = self.packers[fd](values, count)
+        return data if data is not None else self.form(fd=fd).pack(self.raws_of_values(values), count)
+
+    def unpack(self, frames: Sequence[bytes], *, fd: bool) -> list[Any]:
+        """Values of all fields of the schema, of the data of each frame.
+
+        Raises
+        ------
+        DecodeError
+            When a frame has another length, or a value is outside the range of the schema; named.
+        """
+        with contextlib.suppress(ValueError):  # of a member that an enumeration has not
+            values = self.unpackers[fd](frames)
+            if values is not None:
+                return values
+        return self.values_of(self.form(fd=fd).unpack(frames))
+
+    def form(self, *, fd: bool) -> Form:
+        """Its frames on CAN FD or on classic CAN."""
+        return self.fd if fd else self.classic
+
+    @cached_property
+    def packers(self) -> tuple[Packer, Packer]:
+        """Compiled for classic CAN and for CAN FD."""
+        rounded = [Rounded(one.value, one.rate, one.variance) for one in self._roundings]
+        return packer_of(self._by_field, rounded, self.classic), packer_of(self._by_field, rounded, self.fd)
+
+    @cached_property
+    def unpackers(self) -> tuple[Unpacker, Unpacker]:
+        """Compiled for classic CAN and for CAN FD."""
+        return unpacker_of(self._by_field, self.classic), unpacker_of(self._by_field, self.fd)
 
     def raws_of(self, message: Message) -> list[int]:
         """Raw numbers of a message, see ``raws_of_values``."""

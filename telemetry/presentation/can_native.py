@@ -11,7 +11,7 @@ from telemetry.errors import DecodeError, EncodeError
 from telemetry.media.can_profile import NativePart, Split
 from telemetry.media.port import Priority
 from telemetry.messages import Message
-from telemetry.presentation.can_forms import FD_PART, Form
+from telemetry.presentation.can_forms import FD_PART
 from telemetry.presentation.can_messages import NATIVE
 from telemetry.presentation.can_signals import COUNT
 from telemetry.presentation.msgpack_codec import CODEC_OF, open_payload, values_of_opened
@@ -72,11 +72,11 @@ class NativeProfile:
             raise DecodeError("unknown_identifier")
         if not data:
             raise DecodeError("bad_length")
-        form = message.fd if part == FD_PART else message.classic
-        frames = [data] if part == FD_PART else self._collect(type_, part, data, len(form.layouts))
+        is_fd = part == FD_PART
+        frames = [data] if is_fd else self._collect(type_, part, data, len(message.classic.layouts))
         if frames is None:
             return None
-        values = message.values_of(form.unpack(frames))
+        values = message.unpack(frames, fd=is_fd)
         epoch = self._epoch.get(source)
         if epoch is None:
             raise DecodeError("unknown_sender")
@@ -99,7 +99,7 @@ class NativeProfile:
         told = self._told
         if told is None or header.number - told.number >= HEADER_EVERY:
             return True
-        return header._replace(number=told.number) != told
+        return (header.sender, header.epoch, *header[3:]) != (told.sender, told.epoch, *told[3:])
 
     def _collect(self, type_: int, part: int, data: bytes, needed: int) -> list[bytes] | None:
         """All parts of a message in order once they are there; those of another count are forgotten."""
@@ -122,13 +122,12 @@ def native_parts(payload: bytes, count: int, *, fd: bool) -> list[NativePart] | 
         native = NATIVE.get(opened.kind)
         if native is None:
             return None
-        form: Form = native.fd if fd else native.classic
-        frames = form.pack(native.raws_of_values(values_of_opened(opened)), count)
+        frames = native.pack(values_of_opened(opened), count, fd=fd)
     except (DecodeError, EncodeError):
         return None
     return [
         NativePart(PRIORITIES[native.kind], int(native.kind), layout.part, data)
-        for layout, data in zip(form.layouts, frames, strict=True)
+        for layout, data in zip(native.form(fd=fd).layouts, frames, strict=True)
     ]
 
 

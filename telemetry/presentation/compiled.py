@@ -76,12 +76,14 @@ def checking(field: Field, place: int, sequence: str) -> list[str]:
     return [f"if not ({right.format(v=v, low=field.low, high=field.high)}):", f"    {check}"]
 
 
-def compiled(lines: list[str], space: dict[str, Any], codecs: Sequence[FieldCodec]) -> Callable[[Any], Any]:
-    """Function of one argument ``given``; its lines may name what is in ``space`` and the checks of all fields."""
+def compiled(
+    lines: list[str], space: dict[str, Any], codecs: Sequence[FieldCodec], arguments: str = "given"
+) -> Callable[..., Any]:
+    """Function of its lines, which may name ``arguments``, what is in ``space`` and the checks of all fields."""
     space |= {"inf": math.inf} | {f"check{k}": codec.check for k, codec in enumerate(codecs)}
-    source = "def function(given):\n" + "\n".join(f"    {line}" for line in lines)
+    source = f"def function({arguments}):\n" + "\n".join(f"    {line}" for line in lines)
     exec(compile(source, "<compiled from the schema>", "exec"), space)
-    function: Callable[[Any], Any] = space["function"]
+    function: Callable[..., Any] = space["function"]
     return function
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from dataclasses import fields, replace
 from pathlib import Path
 from typing import Any
@@ -13,6 +14,7 @@ from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 from messages_of_schema import MESSAGES
 
+from telemetry.application.can_load import Traffic, steady
 from telemetry.errors import DecodeError, EncodeError
 from telemetry.messages import Aiding, Command, Hello, Mode, NodeState, TimeReply, TimeRequest
 from telemetry.presentation.can_dbc import IDENTIFIER_MASK, dbc_text, differences, identifier_of, layouts
@@ -26,7 +28,7 @@ from telemetry.presentation.can_native import (
     rounded_frame,
 )
 from telemetry.presentation.can_signals import Scale
-from telemetry.presentation.msgpack_codec import encode
+from telemetry.presentation.msgpack_codec import encode, open_payload, values_of_opened
 from telemetry.schema import Kind
 from telemetry.transport.hop import HopLink, parse_frame
 
@@ -118,6 +120,7 @@ def test_an_age_that_is_infinite_arrives_so_and_a_long_one_stays_finite() -> Non
         (replace(STATE, aiding_age=math.nan), "NodeState: aiding_age: expected"),
         (replace(STATE, upper_margin=12.0), "NodeState: upper_margin: expected none where there is no radio"),
         (TimeRequest(math.inf), "TimeRequest: asked_at: expected"),
+        (replace(AIDING, under_torque=-1), "Aiding: under_torque: expected"),  # type: ignore[arg-type]
         (Hello(1, 2**40, 1, Mode.STILL, 1.0), "Hello: boot_count: expected an integer"),
     ],
 )
@@ -135,6 +138,44 @@ def test_a_frame_of_another_length_is_refused_by_name(kind: Kind, length: int) -
         assume(length != form.layouts[0].length)
         with pytest.raises(DecodeError, match=f"{form.layouts[0].name}: expected .* bytes, got {length}"):
             form.unpack([bytes(length), *right[1:]])
+
+
+def outcome(act: Callable[[], Any]) -> str:
+    """What comes of a call, or the error it raises; -0.0 is told from 0.0."""
+    try:
+        return repr(act())
+    except (EncodeError, DecodeError) as error:
+        return f"{type(error).__name__}: {error}"
+
+
+ODD = (0.0, -0.0, math.inf, -math.inf, math.nan, 1, -1, 2**60, True, None, "x", b"", 1e300, [0.0, 1, 0.0], (0.0,) * 3)
+
+
+@pytest.mark.slow
+@given(cyclic(), st.data(), st.booleans())
+def test_compiled_and_field_by_field_say_the_same(message: Any, data: st.DataObject, fd: bool) -> None:
+    native = native_of(message)
+    values = values_of_opened(open_payload(encode(message)))
+    if data.draw(st.booleans()):
+        values[data.draw(st.integers(0, len(values) - 1))] = data.draw(st.sampled_from(ODD))
+    form = native.form(fd=fd)
+    said = outcome(lambda: form.pack(native.raws_of_values(values), 17))
+    assert outcome(lambda: native.pack(values, 17, fd=fd)) == said
+    frames = [data.draw(st.binary(min_size=layout.length, max_size=layout.length)) for layout in form.layouts]
+    if "Error" not in said and data.draw(st.booleans()):
+        frames = native.pack(values, 17, fd=fd)
+    heard = outcome(lambda: native.values_of(form.unpack(frames)))
+    assert outcome(lambda: native.unpack(frames, fd=fd)) == heard
+
+
+@pytest.mark.parametrize("traffic", steady(1), ids=lambda traffic: type(traffic.message).__name__)
+@pytest.mark.parametrize("fd", [False, True])
+def test_what_comes_all_the_time_takes_the_compiled_way(traffic: Traffic, fd: bool) -> None:
+    native = native_of(traffic.message)
+    values = values_of_opened(open_payload(encode(traffic.message)))
+    data = native.packers[fd](values, 17)
+    assert data is not None
+    assert native.unpackers[fd](data) is not None
 
 
 @pytest.mark.parametrize("kind", CYCLIC)

@@ -1,0 +1,202 @@
+"""A node that relays an aiding over zenoh, beside a process that puts the same bytes on as it hears them."""
+
+from __future__ import annotations
+
+import contextlib
+import multiprocessing
+import queue
+import socket
+import statistics
+import tempfile
+import threading
+import time
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import Any
+
+from borechain.load.rounds import beside
+from node.process.drivers.timed import TimedImu
+from node.process.host import run_node
+from sim.rig.realtime import clock_offset
+from sim.world.recording import record, turning_once
+from sim.world.world import World
+from telemetry.application.endpoint import Endpoint
+from telemetry.media.port import Port, TubeEnd
+from telemetry.media.zenoh_bus import ZenohBus, open_client, open_router, use_few_threads
+from telemetry.media.zenoh_port import CONNECT_TIMEOUT, ZenohMedium
+from telemetry.messages import ENCODER, Aiding, Side
+from telemetry.presentation.msgpack_codec import decode
+from telemetry.runtime.hosting import OwnTime, Place
+from telemetry.transport.hop import parse_frame
+
+ROUNDS, EXCHANGES = 25, 40
+RIG, TUBE, BELOW = "relay", 1, 2
+THERE, BACK = "bare/there", "bare/back"
+PATIENCE, TURN = 60.0, 0.05  # s
+RECORDED = 600.0  # s, for which the string rests; the benchmark takes a few
+context = multiprocessing.get_context("fork")  # before any session is opened
+
+
+def run() -> dict[str, Any]:
+    """From a put above to its arrival below: of the encoder's aiding through a node, and of bytes through a process.
+
+    Both stand between the same two ends, on the same router, and take one put in and one put out. The node judges the
+    aiding on the way, steps its filter and writes the path anew.
+
+    Returns
+    -------
+    dict
+        ``ratios``: ours beside the peer, with how many times ``slower`` and the interval of that.
+    """
+    with tempfile.TemporaryDirectory(prefix="borechain-") as place, contextlib.ExitStack() as stack:
+        folder, endpoint = Path(place), free_endpoint()
+        world = turning_once(TUBE, time.monotonic(), RECORDED, 1.0, 2.0 * RECORDED, 1, 0.0)
+        record(world, folder)
+        stack.enter_context(running(relay_as_node, world, folder, endpoint))
+        stack.enter_context(running(relay_bare, endpoint))
+        bus = stack.enter_context(open_router(endpoint))
+        encoder = stack.enter_context(contextlib.closing(EncoderEnd(bus)))
+        bare = Bare(bus)
+        encoder.meet()
+        bare.meet()
+        times: tuple[list[float], list[float]] = ([], [])
+        for _ in range(ROUNDS):
+            ours = [encoder.exchange() for _ in range(EXCHANGES)]
+            payload = bytes(encoder.length)
+            peer = [bare.exchange(payload) for _ in range(EXCHANGES)]
+            for kept, found in zip(times, (ours, peer), strict=True):
+                kept.append(statistics.median(found))
+    return {"bench": "relay", "ratios": {"relay over zenoh": beside(*times)}}
+
+
+def free_endpoint() -> str:
+    """An endpoint that nobody has."""
+    with socket.socket() as probe:
+        probe.bind(("127.0.0.1", 0))
+        return f"tcp/127.0.0.1:{probe.getsockname()[1]}"
+
+
+@contextlib.contextmanager
+def running(target: Callable[..., None], *arguments: Any) -> Iterator[None]:
+    """A process beside this one; it finds the router once there is one."""
+    process = context.Process(target=target, args=arguments, daemon=True)
+    process.start()
+    try:
+        yield
+    finally:
+        process.terminate()
+        process.join()
+
+
+def relay_as_node(world: World, folder: Path, endpoint: str) -> None:
+    """Be the node of the tube, between the encoder and a tube below."""
+    own_time = OwnTime({Side.UPPER: ENCODER, Side.LOWER: BELOW}, clock_offset(world, TUBE))
+    imu = TimedImu(folder / f"tube-{TUBE}.npy")
+    run_node(Place(RIG, endpoint, folder / "node"), world.tube_settings(TUBE), [imu], own_time)
+
+
+def relay_bare(endpoint: str) -> None:
+    """Put on what is heard, on the thread that hears it."""
+    use_few_threads()  # as a node does
+    with open_client(endpoint, CONNECT_TIMEOUT) as bus:
+        onward = bus.publisher(BACK)
+        bus.subscribe_at_once(THERE, lambda _key, payload: onward.put(payload))
+        threading.Event().wait()
+
+
+class Bare:
+    """Both ends around the bare process."""
+
+    def __init__(self, bus: ZenohBus) -> None:
+        self._there = bus.publisher(THERE)
+        self._arrivals: queue.SimpleQueue[float] = queue.SimpleQueue()
+        bus.subscribe_at_once(BACK, lambda _key, _payload: self._arrivals.put(time.perf_counter()))
+
+    def meet(self) -> None:
+        """Wait until the other process answers."""
+        until = time.monotonic() + PATIENCE
+        while time.monotonic() < until:
+            self._there.put(b"anybody")
+            with contextlib.suppress(queue.Empty):
+                self._arrivals.get(timeout=TURN)
+                return
+        raise RuntimeError("the bare process did not answer")
+
+    def exchange(self, payload: bytes) -> float:
+        """Time of one payload there and back, s."""
+        begun = time.perf_counter()
+        self._there.put(payload)
+        return self._arrivals.get(timeout=PATIENCE) - begun
+
+
+class EncoderEnd:
+    """The encoder's end above the node, and whoever listens below it."""
+
+    def __init__(self, bus: ZenohBus) -> None:
+        medium = ZenohMedium(bus)
+        self.length = 0  # bytes of the newest frame with an aiding
+        self._endpoint = Endpoint(ENCODER, frozenset({Side.LOWER}), boot_count=1, is_clock_root=True)
+        self._above: queue.SimpleQueue[bytes] = queue.SimpleQueue()
+        self._below: queue.SimpleQueue[tuple[float, bytes]] = queue.SimpleQueue()
+        self._upper: Port = medium.open_port(TubeEnd(RIG, ENCODER, Side.LOWER, TUBE))
+        self._lower: Port = medium.open_port(TubeEnd(RIG, BELOW, Side.UPPER, TUBE))
+        self._upper.listen(self._above.put)
+        self._lower.listen(lambda frame: self._below.put((time.perf_counter(), frame)))
+        self._sequence = 1 << 32
+
+    def close(self) -> None:
+        """Let both ends go."""
+        self._upper.close()
+        self._lower.close()
+
+    def meet(self) -> None:
+        """Wait until the node has its clock and hands an aiding down."""
+        until = time.monotonic() + PATIENCE
+        while time.monotonic() < until:
+            with contextlib.suppress(queue.Empty):
+                self._hand_down(TURN)
+                return
+        raise RuntimeError("the node relayed nothing")
+
+    def exchange(self) -> float:
+        """Time from the put of one aiding to the arrival of what the node makes of it, s."""
+        try:
+            return self._hand_down(PATIENCE)
+        except queue.Empty:
+            raise RuntimeError(f"aiding {self._sequence}: the node did not relay it") from None
+
+    def _hand_down(self, patience: float) -> float:
+        self._attend()
+        now = time.monotonic()
+        self._sequence += 1
+        clock = self._endpoint.clock
+        aiding = Aiding(0.0, 1e-8, 0.0, 0.0, 0.0, clock.rig_from_local(now), self._sequence, 0, epoch=clock.epoch)
+        self._endpoint.send_aiding(aiding, now)
+        ((_, frame),) = self._endpoint.take_frames(now)
+        self.length = len(frame.payload)
+        begun = time.perf_counter()
+        self._upper.send(frame)
+        until = begun + patience
+        while True:
+            arrived, heard = self._below.get(timeout=max(until - time.perf_counter(), 0.0))
+            if self._sequence in sequences(heard):
+                return arrived - begun
+
+    def _attend(self) -> None:
+        """Answer the node's questions, such as for the time, and say hello."""
+        with contextlib.suppress(queue.Empty):
+            while True:
+                self._endpoint.receive(Side.LOWER, self._above.get_nowait(), time.monotonic())
+        now = time.monotonic()
+        self._endpoint.advance(now)
+        for _, frame in self._endpoint.take_frames(now):
+            self._upper.send(frame)
+
+
+def sequences(frame: bytes) -> list[int]:
+    """Sequence numbers of the aidings in a frame of the link."""
+    parsed = parse_frame(frame)
+    if parsed is None:
+        raise RuntimeError("expected a frame of the link")
+    messages = [decode(content) for _, content in parsed[1]]
+    return [message.sequence for message in messages if isinstance(message, Aiding)]
