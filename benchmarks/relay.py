@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import itertools
 import multiprocessing
 import queue
 import socket
@@ -33,6 +34,7 @@ ROUNDS, EXCHANGES = 25, 40
 RIG, TUBE, BELOW = "relay", 1, 2
 THERE, BACK = "bare/there", "bare/back"
 PATIENCE, TURN = 60.0, 0.05  # s
+NUMBER = 8  # bytes, by which the bare exchange knows its own
 RECORDED = 600.0  # s, for which the string rests; the benchmark takes a few
 context = multiprocessing.get_context("fork")  # before any session is opened
 
@@ -41,7 +43,7 @@ def run() -> dict[str, Any]:
     """From a put above to its arrival below: of the encoder's aiding through a node, and of bytes through a process.
 
     Both stand between the same two ends, on the same router, and take one put in and one put out. The node judges the
-    aiding on the way, steps its filter and writes the path anew.
+    aiding on the way, keeps it for its filter and writes the path anew.
 
     Returns
     -------
@@ -62,8 +64,7 @@ def run() -> dict[str, Any]:
         times: tuple[list[float], list[float]] = ([], [])
         for _ in range(ROUNDS):
             ours = [encoder.exchange() for _ in range(EXCHANGES)]
-            payload = bytes(encoder.length)
-            peer = [bare.exchange(payload) for _ in range(EXCHANGES)]
+            peer = [bare.exchange(encoder.length) for _ in range(EXCHANGES)]
             for kept, found in zip(times, (ours, peer), strict=True):
                 kept.append(statistics.median(found))
     return {"bench": "relay", "ratios": {"relay over zenoh": beside(*times)}}
@@ -109,24 +110,29 @@ class Bare:
 
     def __init__(self, bus: ZenohBus) -> None:
         self._there = bus.publisher(THERE)
-        self._arrivals: queue.SimpleQueue[float] = queue.SimpleQueue()
-        bus.subscribe_at_once(BACK, lambda _key, _payload: self._arrivals.put(time.perf_counter()))
+        self._arrivals: queue.SimpleQueue[tuple[float, bytes]] = queue.SimpleQueue()
+        self._numbers = itertools.count()
+        bus.subscribe_at_once(BACK, lambda _key, payload: self._arrivals.put((time.perf_counter(), payload)))
 
     def meet(self) -> None:
         """Wait until the other process answers."""
         until = time.monotonic() + PATIENCE
         while time.monotonic() < until:
-            self._there.put(b"anybody")
             with contextlib.suppress(queue.Empty):
-                self._arrivals.get(timeout=TURN)
+                self.exchange(NUMBER, TURN)
                 return
         raise RuntimeError("the bare process did not answer")
 
-    def exchange(self, payload: bytes) -> float:
-        """Time of one payload there and back, s."""
+    def exchange(self, length: int, patience: float = PATIENCE) -> float:
+        """Time of ``length`` bytes there and back, s."""
+        payload = next(self._numbers).to_bytes(NUMBER).ljust(length, b"\0")
         begun = time.perf_counter()
         self._there.put(payload)
-        return self._arrivals.get(timeout=PATIENCE) - begun
+        until = begun + patience
+        while True:
+            arrived, heard = self._arrivals.get(timeout=max(until - time.perf_counter(), 0.0))
+            if heard == payload:
+                return arrived - begun
 
 
 class EncoderEnd:
