@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import itertools
 import multiprocessing
 import queue
 import socket
@@ -26,13 +27,16 @@ from telemetry.media.zenoh_bus import ZenohBus, open_client, open_router, use_fe
 from telemetry.media.zenoh_port import CONNECT_TIMEOUT, ZenohMedium
 from telemetry.messages import ENCODER, Aiding, Side
 from telemetry.presentation.msgpack_codec import decode
+from telemetry.runtime.event_loop import run as run_loop
 from telemetry.runtime.hosting import OwnTime, Place
+from telemetry.runtime.inbox import Inbox
 from telemetry.transport.hop import parse_frame
 
 ROUNDS, EXCHANGES = 25, 40
 RIG, TUBE, BELOW = "relay", 1, 2
-THERE, BACK = "bare/there", "bare/back"
+BARE, LOOP = "bare", "loop"  # beginnings of the keys of either process that puts on
 PATIENCE, TURN = 60.0, 0.05  # s
+NUMBER = 8  # bytes, by which the bare exchange knows its own
 RECORDED = 600.0  # s, for which the string rests; the benchmark takes a few
 context = multiprocessing.get_context("fork")  # before any session is opened
 
@@ -41,32 +45,40 @@ def run() -> dict[str, Any]:
     """From a put above to its arrival below: of the encoder's aiding through a node, and of bytes through a process.
 
     Both stand between the same two ends, on the same router, and take one put in and one put out. The node judges the
-    aiding on the way, steps its filter and writes the path anew.
+    aiding on the way, keeps it for its filter and writes the path anew.
 
     Returns
     -------
     dict
-        ``ratios``: ours beside the peer, with how many times ``slower`` and the interval of that.
+        ``ratios``: ours beside the peer, with how many times ``slower`` and the interval of that; and what it takes to
+        hand the same bytes to an asyncio loop on the way, as a node does, beside the same peer.
     """
     with tempfile.TemporaryDirectory(prefix="borechain-") as place, contextlib.ExitStack() as stack:
         folder, endpoint = Path(place), free_endpoint()
         world = turning_once(TUBE, time.monotonic(), RECORDED, 1.0, 2.0 * RECORDED, 1, 0.0)
         record(world, folder)
         stack.enter_context(running(relay_as_node, world, folder, endpoint))
-        stack.enter_context(running(relay_bare, endpoint))
+        stack.enter_context(running(put_on, endpoint))
+        stack.enter_context(running(put_on_by_loop, endpoint))
         bus = stack.enter_context(open_router(endpoint))
         encoder = stack.enter_context(contextlib.closing(EncoderEnd(bus)))
-        bare = Bare(bus)
-        encoder.meet()
-        bare.meet()
-        times: tuple[list[float], list[float]] = ([], [])
+        bare, loop = Exchange(bus, BARE), Exchange(bus, LOOP)
+        for end in (encoder, bare, loop):
+            end.meet()
+        acts: dict[str, Callable[[], float]] = {
+            "relay": encoder.exchange,
+            "loop": lambda: loop.exchange(encoder.length),
+            "bare": lambda: bare.exchange(encoder.length),
+        }
+        times: dict[str, list[float]] = {name: [] for name in acts}
         for _ in range(ROUNDS):
-            ours = [encoder.exchange() for _ in range(EXCHANGES)]
-            payload = bytes(encoder.length)
-            peer = [bare.exchange(payload) for _ in range(EXCHANGES)]
-            for kept, found in zip(times, (ours, peer), strict=True):
-                kept.append(statistics.median(found))
-    return {"bench": "relay", "ratios": {"relay over zenoh": beside(*times)}}
+            for name, act in acts.items():
+                times[name].append(statistics.median(act() for _ in range(EXCHANGES)))
+    ratios = {
+        "relay over zenoh": beside(times["relay"], times["bare"]),
+        "handed to an asyncio loop": beside(times["loop"], times["bare"]),
+    }
+    return {"bench": "relay", "ratios": ratios}
 
 
 def free_endpoint() -> str:
@@ -95,38 +107,60 @@ def relay_as_node(world: World, folder: Path, endpoint: str) -> None:
     run_node(Place(RIG, endpoint, folder / "node"), world.tube_settings(TUBE), [imu], own_time)
 
 
-def relay_bare(endpoint: str) -> None:
+def put_on(endpoint: str) -> None:
     """Put on what is heard, on the thread that hears it."""
     use_few_threads()  # as a node does
     with open_client(endpoint, CONNECT_TIMEOUT) as bus:
-        onward = bus.publisher(BACK)
-        bus.subscribe_at_once(THERE, lambda _key, payload: onward.put(payload))
+        onward = bus.publisher(f"{BARE}/back")
+        bus.subscribe_at_once(f"{BARE}/there", lambda _key, payload: onward.put(payload))
         threading.Event().wait()
 
 
-class Bare:
-    """Both ends around the bare process."""
+def put_on_by_loop(endpoint: str) -> None:
+    """Put on what is heard, on the loop of a process, where a node handles everything."""
+    use_few_threads()
+    run_loop(live_by_loop(endpoint))
 
-    def __init__(self, bus: ZenohBus) -> None:
-        self._there = bus.publisher(THERE)
-        self._arrivals: queue.SimpleQueue[float] = queue.SimpleQueue()
-        bus.subscribe_at_once(BACK, lambda _key, _payload: self._arrivals.put(time.perf_counter()))
+
+async def live_by_loop(endpoint: str) -> None:
+    """``put_on_by_loop`` on the running loop."""
+    with open_client(endpoint, CONNECT_TIMEOUT) as bus:
+        onward = bus.publisher(f"{LOOP}/back")
+        inbox: Inbox[bytes] = Inbox()
+        bus.subscribe_at_once(f"{LOOP}/there", lambda _key, payload: inbox.put(payload))
+        while (payload := await inbox.get()) is not None:
+            onward.put(payload)
+
+
+class Exchange:
+    """Both ends around a process that puts on what it hears; ``keys`` is the beginning of its keys."""
+
+    def __init__(self, bus: ZenohBus, keys: str) -> None:
+        self._keys = keys
+        self._there = bus.publisher(f"{keys}/there")
+        self._arrivals: queue.SimpleQueue[tuple[float, bytes]] = queue.SimpleQueue()
+        self._numbers = itertools.count()
+        bus.subscribe_at_once(f"{keys}/back", lambda _key, payload: self._arrivals.put((time.perf_counter(), payload)))
 
     def meet(self) -> None:
         """Wait until the other process answers."""
         until = time.monotonic() + PATIENCE
         while time.monotonic() < until:
-            self._there.put(b"anybody")
             with contextlib.suppress(queue.Empty):
-                self._arrivals.get(timeout=TURN)
+                self.exchange(NUMBER, TURN)
                 return
-        raise RuntimeError("the bare process did not answer")
+        raise RuntimeError(f"{self._keys}: nobody put on what was sent")
 
-    def exchange(self, payload: bytes) -> float:
-        """Time of one payload there and back, s."""
+    def exchange(self, length: int, patience: float = PATIENCE) -> float:
+        """Time of ``length`` bytes there and back, s."""
+        payload = next(self._numbers).to_bytes(NUMBER).ljust(length, b"\0")
         begun = time.perf_counter()
         self._there.put(payload)
-        return self._arrivals.get(timeout=PATIENCE) - begun
+        until = begun + patience
+        while True:
+            arrived, heard = self._arrivals.get(timeout=max(until - time.perf_counter(), 0.0))
+            if heard == payload:
+                return arrived - begun
 
 
 class EncoderEnd:
