@@ -73,7 +73,7 @@ for function in functions():
     for found in floats_of(function):
         print(where, found)
 parts = "guard.judge_cycle cluster.fuse_imus calibration.correct make_up.make_up fixed.cycle.run_cycle "
-parts += "aligner.follow_turn aligner.realign fixed.circle.finish fixed.extremes.law static_average.add_static"
+parts += "aligner.follow_turn realign.realign fixed.circle.finish fixed.extremes.law static_average.add_static"
 for part in parts.split():
     assert "node.kernels." + part in names, part
 """
