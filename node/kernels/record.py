@@ -316,6 +316,7 @@ def forget_session(nodes: Array) -> None:
     guard["aidings"]["seen"] = 0
     guard["rate"] = guard["sane_rate"] = guard["aiding_var"] = 0.0
     guard["rate_at"] = -np.inf
+    guard["swing"] = np.zeros(1, SWING)
     guard["jumped"] = guard["untimely"] = guard["agreed"] = guard["rest_cycles"] = 0
     nodes["twist"]["heard_at"] = -np.inf
     nodes["twist"]["torque"] = 0.0

@@ -3,8 +3,9 @@
 Inside a cycle the spin is linear about its mean (``node.kernels.fixed_lag``). Where it bends by w'' (rad/s^3) the angle
 to a moment inside is off by up to ``w'' T^3 / (72 sqrt(3)) = b T / 62``, with b = w'' T^2 / 2 what the mean of a cycle
 is off from those beside it. A ramp bends where it begins and ends, and that is over with the next cycles. A head that
-ripples, or sticks and slips, bends in nearly all of them: from one aiding to the next such errors are alike, no filter
-averages them away, and they come before innovations can show them.
+ripples, or sticks and slips, bends in nearly all of them: from one aiding to the next such errors hang together, and
+they come before innovations can show them. The slope from the neighbours' means is wrong too, by up to three times as
+much in swings of 3 s; that swings about zero, and the filter averages it.
 """
 
 from __future__ import annotations
@@ -17,7 +18,7 @@ from node.kernels.layout import DEG, PERIOD, RING
 from node.kernels.numbers import half, mean, number, square, turn
 from node.kernels.quantity import rate, seconds
 
-LEAST_BEND: Final = rate(1.0 * DEG)  # rad/s, that no noise of a gyroscope reaches
+LEAST_BEND: Final = rate(0.5 * DEG)  # rad/s, that no noise of a gyroscope reaches
 SWINGING: Final = 10  # cycles that bend, less those that do not, from where it is no ramp
 MOST: Final = 16  # likewise, that are counted
 MEMORY: Final = 16  # cycles over which the variance is averaged
