@@ -41,7 +41,7 @@ AIDING_DOUBTED = constant(Code.AIDING_DOUBTED)
 
 @kernel
 def misfit_var(node: Any) -> float:
-    """Variance (rad^2) of the yaw by the misfit; while the head turns also by its swings, for a rest shows their end."""
+    """Variance (rad^2) of the yaw by the misfit; while the head turns also by its swings, which a rest ends."""
     guard = node.guard
     shown = max(guard.excess, guard.shared) if guard.doubted == 1 else 0
     swung = swing_var(node) if guard.rate != 0 else 0
