@@ -21,6 +21,7 @@ from node.kernels.jit import constant, kernel
 from node.kernels.layout import DEG
 from node.kernels.numbers import held, is_number, mean, number, product, ratio, root, square, times, turn
 from node.kernels.quantity import NONE, factor, seconds, variance
+from node.kernels.swings import swing_var
 
 MEMORY: Final = 32  # aidings over which the misfit is averaged
 DOUBTED: Final = factor(
@@ -40,9 +41,11 @@ AIDING_DOUBTED = constant(Code.AIDING_DOUBTED)
 
 @kernel
 def misfit_var(node: Any) -> float:
-    """Variance (rad^2) of the yaw by the misfit."""
+    """Variance (rad^2) of the yaw by the misfit; while the head turns also by its swings, which a rest ends."""
     guard = node.guard
-    return number(min(max(guard.excess, guard.shared), LARGEST_MISFIT)) if guard.doubted == 1 else 0
+    shown = max(guard.excess, guard.shared) if guard.doubted == 1 else 0
+    swung = swing_var(node) if guard.rate != 0 else 0
+    return number(min(max(shown, swung), LARGEST_MISFIT))
 
 
 @kernel

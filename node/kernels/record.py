@@ -16,8 +16,8 @@ from node.kernels.static_average import STATIC
 from node.kernels.sweep import OFFSET, SWEEP
 
 # of the saved record; 1 and 2 held the filter alone, 3 what a start clears as well, 4 no doubts, 5 fewer mismatches,
-# 6 no odd forces
-NODE_LAYOUT: Final = 7
+# 6 no odd forces, 7 no swings
+NODE_LAYOUT: Final = 8
 EVENTS_KEPT: Final = 32  # that wait to be said
 NUMBERS: Final = 10  # of one event
 DISAGREEMENTS: Final = 3  # aidings in a row, until a mismatch is a fault
@@ -67,6 +67,13 @@ MISMATCH: Final = np.dtype(
     ],
     align=True,
 )
+SWING: Final = np.dtype(
+    [
+        ("cycles", "i8"),  # whose rates bend, less those that do not
+        ("excess", "f8"),  # rad^2, mean of what a bend makes of the yaw
+    ],
+    align=True,
+)
 GUARD: Final = np.dtype(
     [
         ("readings", READINGS),  # the newest readings, to see repeats
@@ -92,6 +99,7 @@ GUARD: Final = np.dtype(
         ("before", "f8"),  # rad, the innovation before
         ("likeness", "f8"),  # mean of the products of neighbours over their variances
         ("shared", "f8"),  # rad^2, mean of the products of neighbours
+        ("swing", SWING),  # of the drive, between cycles
         ("jump", "f8"),  # rad, by which resets that nothing explains have moved the yaw
         ("last_jump", "f8"),  # rad, of it by the reset since the last aiding that agreed
         ("odd", "i8"),  # cycles in a row whose force at rest is not that of gravity as the filter has it
@@ -309,6 +317,7 @@ def forget_session(nodes: Array) -> None:
     guard["aidings"]["seen"] = 0
     guard["rate"] = guard["sane_rate"] = guard["aiding_var"] = 0.0
     guard["rate_at"] = -np.inf
+    guard["swing"] = np.zeros(1, SWING)
     guard["jumped"] = guard["untimely"] = guard["agreed"] = guard["rest_cycles"] = 0
     nodes["twist"]["heard_at"] = -np.inf
     nodes["twist"]["torque"] = 0.0

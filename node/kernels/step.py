@@ -49,6 +49,7 @@ from node.kernels.resets import doubt_stamp, set_stamp_prior, start_over
 from node.kernels.rest_watch import watch_rest
 from node.kernels.sensor_watch import largest
 from node.kernels.static_average import follow_recording
+from node.kernels.swings import follow_swing
 from node.kernels.twist import gate_twist, holds_survey, reaching_var, twist_var
 
 STILL_CYCLES: Final = 4  # after which a node takes itself for standing
@@ -162,6 +163,7 @@ def after_loop(node: Any, moment: Array, status: int, waits: int) -> None:
     node.cycles += 1
     if node.status & FILTER_FAULT:
         start_over(node.filter, node.config)
+    follow_swing(node)
     judge_cycle(node, node.status, moment[END])
 
 

@@ -123,6 +123,7 @@ class RoughImu:
         if sensor.g_sensitivity_dps_per_g > 0.0:
             drawn = stream(self._seed, Stream.ROUGH_PULL, *self._key).standard_normal((3, 3))
             rate = rate + force @ (math.radians(sensor.g_sensitivity_dps_per_g) / G * drawn).T
+        rate = rate + 0.5 * sensor.scale_asymmetry * np.abs(rate)
         limits = math.radians(self._errors.gyroscope.range_dps), G * sensor.force_range_g
         for values, limit, bit in ((rate, limits[0], GYRO_CLIPPED), (force, limits[1], FORCE_CLIPPED)):
             cut |= bit * np.any(np.abs(values) >= AT_RANGE * limit, axis=1)

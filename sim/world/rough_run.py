@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from functools import cached_property
 
@@ -19,6 +20,7 @@ from sim.world.rough_truth import RoughTruth, transported
 from sim.world.truth import TubeTruth, Twist
 
 Array = npt.NDArray[np.float64]
+EARTH = 7.292115e-5  # rad/s. Source: WGS 84, NGA.STND.0036
 
 
 class RoughRun:
@@ -68,8 +70,17 @@ class RoughRun:
 
     def perfect(self, truth: TubeTruth, frame: Array) -> tuple[Array, Array]:
         """Rates and forces (n, 3) on the grid in the frame of an IMU (3, 3), rad/s and m/s^2."""
-        return truth.rate(self.moved.t) @ frame.T, truth.force(self.moved.t) @ frame.T
+        rate, force = truth.rate(self.moved.t), truth.force(self.moved.t)
+        if self._section.latitude_deg is not None:
+            rate = rate + earth_rate(self._section.latitude_deg, truth.attitude(self.moved.t))
+        return rate @ frame.T, force @ frame.T
 
     def imu(self, errors: ImuErrors, tube: int, imu: int) -> RoughImu:
         """One IMU of a tube."""
         return RoughImu(self._section, errors, self._seed, tube, imu, self.moved.t, self.moved.driven)
+
+
+def earth_rate(latitude_deg: float, attitude: Array) -> Array:
+    """Rate (n, 3, rad/s) by which the earth turns a body of these attitudes, R_ned_from_body (n, 3, 3)."""
+    latitude = math.radians(latitude_deg)
+    return np.asarray(EARTH * np.array([math.cos(latitude), 0.0, -math.sin(latitude)]) @ attitude)

@@ -69,6 +69,9 @@ class RoughSensorSection(Section):
     jitter_ms: NotNegative = Field(0.0, le=100.0, description="of the time stamp of every cycle")
     force_range_g: Positive = 8.0
     g_sensitivity_dps_per_g: NotNegative = Field(0.0, description="of the gyroscope, each axis to each force; 1 sigma")
+    scale_asymmetry: float = Field(
+        0.0, ge=-0.1, le=0.1, description="of the gyroscope: its scale in one direction less that in the other"
+    )
     rectification_dps_per_g2: NotNegative = Field(0.0, description="of the gyroscope, each axis, under vibration")
     warm_up_dps: float = Field(0.0, ge=-10.0, le=10.0, description="drift of each gyroscope until it is warm")
     warm_up_s: Positive = Field(120.0, description="time constant of that")
@@ -84,6 +87,9 @@ class RoughSection(Section):
     """The field's world."""
 
     samples_hz: float = Field(1000.0, ge=50.0, le=5000.0, description="at which motion and vibration are followed")
+    latitude_deg: float | None = Field(
+        None, ge=-90.0, le=90.0, description="where the gyroscopes feel the earth turn; without it they do not"
+    )
     drive: RoughDriveSection = RoughDriveSection()
     string: RoughStringSection = RoughStringSection()
     encoder: RoughEncoderSection = RoughEncoderSection()

@@ -191,6 +191,26 @@ def test_a_sensor_warms_up() -> None:
     assert warm.temperature[-1] - warm.temperature[0] == pytest.approx(20.0 * math.exp(-0.2), rel=0.1)
 
 
+def test_a_scale_that_is_another_one_backwards() -> None:
+    drive = {"turns_back_deg": 30.0}
+    even = rough_world(drive=drive).rough_cycles(1).readings[:, 2]
+    uneven = rough_world(drive=drive, sensor={"scale_asymmetry": 0.02}).rough_cycles(1).readings[:, 2]
+    forward, backward = even > math.radians(70.0), even < math.radians(-10.0)
+    assert forward.any()
+    assert backward.any()
+    np.testing.assert_allclose(uneven[forward] / even[forward], 1.01, rtol=1e-6)
+    np.testing.assert_allclose(uneven[backward] / even[backward], 0.99, rtol=1e-6)
+
+
+def test_the_earth_turns_under_a_gyroscope() -> None:
+    still, turned = rough_world(), rough_world(latitude_deg=50.0)
+    felt = turned.rough_cycles(1).readings[:, :3] - still.rough_cycles(1).readings[:, :3]
+    # a whole turn in a sidereal day; about an axis that leans by 2 deg to the north nearly that of the vertical
+    rest = felt[still.rough_cycles(1).readings[:, 2] == 0.0]
+    np.testing.assert_allclose(np.linalg.norm(rest, axis=1), math.tau / 86164.1, rtol=1e-6)
+    np.testing.assert_allclose(rest[:, 2], -math.tau / 86164.1 * math.sin(math.radians(48.0)), rtol=1e-4)
+
+
 @pytest.mark.slow
 def test_one_seed_one_reading() -> None:
     sections = {"sensor": {"frames_hz": 50.0, "jitter_ms": 5.0}, "vibration": {"torsional_dps": 5.0}}

@@ -42,6 +42,8 @@ ROWS: dict[str, Disturbance] = {
     "misalignment 0.05 deg at 88 deg": Disturbance(inclination_deg=88.0, lean_deg=0.05),
     "clean, 88 deg": Disturbance(inclination_deg=88.0),
     "time stamps jitter by 5 ms": Disturbance(jitter_ms=5.0),
+    "scale asymmetry 2e-3, turned back by 30 deg": Disturbance(asymmetry=2e-3, turns_back_deg=30.0),
+    "earth rate at 50 deg of latitude": Disturbance(earth=math.tau / 86164.1),
     "warm-up drift 0.2 deg/s": Disturbance(warm_up_dps=0.2, warm_up_c=10.0),
     "warm-up drift 1 deg/s": Disturbance(warm_up_dps=1.0, warm_up_c=20.0),
     "encoder eccentric by 0.02 deg": Disturbance(eccentricity_deg=0.02),
@@ -53,6 +55,7 @@ ROWS: dict[str, Disturbance] = {
     "unwinds 0.5 deg at rest": Disturbance(twist_deg=0.5, hold_s=5.0, unwind_s=20.0),
     "untold twist of 2 deg": Disturbance(twist_deg=2.0),
     "30 deg, through 20 deg of azimuth": Disturbance(inclination_deg=30.0, azimuth_turn_deg=10.0),
+    "outliers 5 %": Disturbance(outliers=0.05),
     "outliers 20 %": Disturbance(outliers=0.2),
     "mark misread by 5 deg": Disturbance(wrong_mark_deg=5.0),
     "mark misread by 180 deg": Disturbance(wrong_mark_deg=180.0),
@@ -95,14 +98,12 @@ def drill(name: str, seed: int) -> Seen:
     std = MARK_STD if grows else 0.0
     drives = [joint + float(marks[0]) + (0.0 if grows else misread), second + float(marks[1]) + misread]
     lower = Joint(joint - second + float(marks[2]), std)
-    lowest = TubeSettings(1, Joint(drives[0], std), state_every=1)
     upper = TubeSettings(2, Joint(drives[1], std), lower, state_every=1)
-    tubes = [_tube(lowest)] + ([_tube(upper)] if grows else [])
+    tubes = [_tube(TubeSettings(1, Joint(drives[0], std), state_every=1))] + ([_tube(upper)] if grows else [])
     sensors = [world.sensor(joint, phase)] + ([world.sensor(second, phase)] if grows else [])
     clocks = CLOCK_STD * random.standard_normal(2)
-    said, count = world.encoder(), len(world.ends)
+    said, count, faults, surveys = world.encoder(), len(world.ends), [], 0
     yaw, var, flagged = np.full(count, math.nan), np.full(count, math.nan), np.ones(count, np.bool_)
-    faults, surveys = [], 0
 
     def relay(k: int) -> None:
         now, aiding = float(world.ends[k]), said[k]
@@ -137,19 +138,17 @@ def drill(name: str, seed: int) -> Seen:
     ends = world.ends + phase
     error = np.mod(yaw - joint - world.yaw(ends) + math.pi, math.tau) - math.pi
     told = np.array([flagged[k : k + 11].any() for k in range(count)])
-    turning, resting = world.is_turning(ends, 20.0), world.is_resting(ends, 5.0)
-    return Seen(error, var, told, turning, resting, tuple(faults), surveys)
+    return Seen(error, var, told, world.is_turning(ends, 20.0), world.is_resting(ends, 5.0), tuple(faults), surveys)
 
 
 def figures(name: str, seen: Sequence[Seen]) -> list[float]:
     """Of the seeds of one row: NEES turning and at rest, unflagged (%), false faults a run, surveys (%)."""
-    chosen = [[getattr(s, when) & ~s.told for s in seen] for when in ("turning", "resting")]
-    nees = [np.concatenate([(s.error**2 / s.var)[c] for s, c in zip(seen, cs, strict=True)]) for cs in chosen]
+    parts = [[(s.error**2 / s.var)[getattr(s, when) & ~s.told] for s in seen] for when in ("turning", "resting")]
     lies = [np.mean(((s.error**2 > 9.0 * s.var) & ~s.told)[s.turning | s.resting]) for s in seen]
     false = [sum(code not in TRUE_FAULTS.get(name, ()) for code in s.faults) for s in seen]
-    share = np.mean([s.surveys for s in seen]) / BLOCKS
-    means = [float(np.mean(n)) if len(n) else math.nan for n in nees]
-    return [*means, 100.0 * float(np.mean(lies)), float(np.mean(false)), 100.0 * float(share)]
+    means = [float(np.mean(n)) if len(n) else math.nan for n in map(np.concatenate, parts)]
+    surveys = float(np.mean([s.surveys for s in seen])) / BLOCKS
+    return [*means, 100.0 * float(np.mean(lies)), float(np.mean(false)), 100.0 * surveys]
 
 
 def main(seeds: int) -> None:

@@ -60,6 +60,8 @@ class Disturbance:
     crystal: float = 0.0
     jitter_ms: float = 0.0
     pull_dps_per_g: float = 0.0
+    asymmetry: float = 0.0  # of the gyroscope's scale between the two directions
+    earth: float = 0.0  # rad/s, of its turn at 50 deg of latitude
     lean_deg: float = 0.0  # of the gyroscope's axes
     warm_up_dps: float = 0.0
     warm_up_c: float = 0.0
@@ -193,13 +195,14 @@ class SecondWorld:
         frame = (c * x + s * y, c * y - s * x, z)
         spin = np.gradient(self.string, 1.0 / HERTZ)
         rate = np.stack([np.sum(a * self._across, axis=1) for a in frame[:2]] + [spin], axis=1)
+        rate = rate + what.earth * np.stack([0.6428 * a[:, 0] - 0.766 * a[:, 2] for a in frame], axis=1)
         force = np.stack([-G * a[:, 2] for a in frame], axis=1)
         force[:, 0] -= LEVER * spin**2
         force[:, 1] += LEVER * np.gradient(spin, 1.0 / HERTZ)
         shake = np.where(self.driven > 0.0, what.turning_g, what.resting_g)
         if np.any(shake > 0.0):
             force = force + 9.80665 * shake[:, None] * np.stack([self._band() for _ in range(3)], axis=1)
-        values, cut, warm = self._with_errors(rate, force)
+        values, cut, heat = self._with_errors(rate, force)
         ends = self.ends + phase
         if what.frames_hz:
             mean, late = self._in_frames(values, ends)
@@ -208,16 +211,16 @@ class SecondWorld:
             mean, late = self._exact(values + math.sqrt(HERTZ) * noise * random.standard_normal((n, 6)), ends)
         borders = np.searchsorted(self.t, np.concatenate([[ends[0] - PERIOD], ends]))
         bits = [np.bitwise_or.reduce(cut[a:b]) for a, b in itertools.pairwise(borders)]
-        heat = 25.0 + what.warm_up_c * np.interp(ends, self.t, warm)
-        return Cycles(mean[:, :3], mean[:, 3:], np.array(bits), late, heat)
+        return Cycles(mean[:, :3], mean[:, 3:], np.array(bits), late, np.interp(ends, self.t, heat))
 
     def _with_errors(self, rate: Array, force: Array) -> tuple[Array, npt.NDArray[np.int64], Array]:
-        """What the converters give but for white noise (n, 6), bits of what they clip, and how warm (0..1) they are."""
+        """What the converters give but for white noise (n, 6), bits of what they clip, and how warm (C) they are."""
         what, random = self.what, self.random
         matrix = math.radians(what.lean_deg) * random.standard_normal((3, 3))
         np.fill_diagonal(matrix, 1.0 + 1e-3 * random.standard_normal(3))
         pull = math.radians(what.pull_dps_per_g) / G * random.standard_normal((3, 3))
         warm = 1.0 - np.exp(-np.maximum(self.t - BEGIN, 0.0) / 120.0)
+        rate = rate + 0.5 * what.asymmetry * np.abs(rate)
         rate = rate @ matrix.T + force @ pull.T + math.radians(what.warm_up_dps) * warm[:, None]
         limits = math.radians(500.0), 8.0 * 9.80665
         cut = np.any(np.abs(rate) >= limits[0], axis=1) + 2 * np.any(np.abs(force) >= limits[1], axis=1)
@@ -227,9 +230,8 @@ class SecondWorld:
         kicks = random.standard_normal(rate.shape)
         kicks[1:] *= math.sqrt(1.0 - phi * phi)
         wander = GYRO_WANDER * lfilter([1.0], [1.0, -phi], kicks, axis=0)
-        tilt = what.force_bias_g * G if what.force_bias_g else math.radians(0.002) * G
-        offset = tilt * random.standard_normal(3)
-        return np.concatenate([rate + constant + wander, force + offset], axis=1), cut, warm
+        offset = G * (what.force_bias_g or math.radians(0.002)) * random.standard_normal(3)
+        return np.concatenate([rate + constant + wander, force + offset], axis=1), cut, 25.0 + what.warm_up_c * warm
 
     def _exact(self, values: Array, ends: Array) -> tuple[Array, Array]:
         """Means over the cycles as their time stamps have them, and that nothing is late."""
@@ -282,10 +284,9 @@ class SecondWorld:
     def encoder(self) -> list[Aiding]:
         """What the encoder node makes of its counter in every cycle."""
         node, what, said = EncoderNode(), self.what, []
-        jump = round(what.jump_deg / 360.0 * LINES)
         for now in self.ends:
             k = int(np.searchsorted(self._edges, now, side="right")) - 1
-            off = jump if now >= BEGIN + 85.0 else 0
+            off = round(what.jump_deg / 360.0 * LINES) if now >= BEGIN + 85.0 else 0
             if what.index and now >= BEGIN + 85.0:
                 turns = np.floor(np.interp([BEGIN + 85.0, now], self.t, self.head) / math.tau)
                 off = off if turns[0] == turns[1] else 0
