@@ -7,17 +7,17 @@ STAMP := $(VENV)/.installed
 SOAK ?= 168
 FROM ?= 50000
 SEEDS ?= 20000
-# five workers on two cores, for most of a worker's time goes by waiting for processes: those tests come first
-WORKERS ?= $(shell echo $$((5 * $$(getconf _NPROCESSORS_ONLN) / 2)))
+# three workers a core, for most of a worker's time goes by waiting for processes: those tests come first
+WORKERS ?= $(shell echo $$((3 * $$(getconf _NPROCESSORS_ONLN))))
 # a test run starts hundreds of processes; where the environment forbids bytecode each would compile what it imports
 unexport PYTHONDONTWRITEBYTECODE
 PYTEST := $(BIN)/python -m pytest --numprocesses $(WORKERS) --maxprocesses 8 --dist worksteal
 
 .DEFAULT_GOAL := rig
-.PHONY: help rig test quick check lint types contracts kernels kernels-of-strings other-kernels bytecode browser fast tests statistical truth explore lock study soak seeds clean test-socketcan test-compose
+.PHONY: help rig test quick check lint types contracts kernels kernels-of-strings kernels-of-integers other-kernels bytecode browser fast tests statistical truth explore lock study soak seeds clean test-socketcan test-compose
 
 help:  ## list the targets
-	@awk -F ':.*## ' '/^[a-z-]+:.*## / { printf "make %-18s %s\n", $$1, $$2 }' $(MAKEFILE_LIST)
+	@awk -F ':.*## ' '/^[a-z-]+:.*## / { printf "make %-20s %s\n", $$1, $$2 }' $(MAKEFILE_LIST)
 
 rig: $(STAMP)  ## set up and drill wellbore 1
 	$(BIN)/borechain rig scenarios/wellbore-1.toml --speed max --seed 1
@@ -48,12 +48,15 @@ types: $(STAMP)  ## mypy, strict
 contracts: $(STAMP)  ## which package may import which
 	$(BIN)/lint-imports
 
-kernels: kernels-of-strings other-kernels  ## compile what the tests would compile, each worker for itself
+kernels: kernels-of-strings kernels-of-integers other-kernels  ## compile what the tests would compile, each worker for itself
 
 kernels-of-strings: $(STAMP)  ## those of a node's usual kernel and of strings
 	$(BIN)/python tests/tools/compile_kernels.py strings
 
-other-kernels: $(STAMP)  ## those of a node's other kernels and of surveys
+kernels-of-integers: $(STAMP)  ## those of a node in integers
+	$(BIN)/python tests/tools/compile_kernels.py integers
+
+other-kernels: $(STAMP)  ## those of a node as published, and of surveys
 	$(BIN)/python tests/tools/compile_kernels.py others
 
 bytecode: $(STAMP)  ## compile what the tests import, asserts rewritten, each worker for itself

@@ -1,6 +1,6 @@
-"""Compile what most tests would compile, each worker for itself: ``strings`` or ``others``, which share nothing.
+"""Compile what most tests would compile, each worker for itself: ``strings``, ``integers`` or ``others``.
 
-Together they would keep one core busy for a minute while the other waits.
+They share nothing, and together they would keep one core busy for minutes while the other waits.
 """
 
 import importlib
@@ -15,19 +15,30 @@ def strings() -> None:
     run_seed((LAB, 1))
 
 
+def integers() -> None:
+    """A node in integers."""
+    warm_kernel("fixed")
+
+
 def others() -> None:
     """The other kernels of a node, and surveys."""
     from groundstation.survey.compiled_model import warm
-    from node.firmware.kernel_choice import kernel_of
     from node.firmware.settings import KERNELS
-    from node.kernels.warm import warm_step
 
     for kernel in KERNELS:
-        if kernel != "float64":
-            loop = kernel_of(kernel)
-            warm_step(loop.step, loop.aiding)
+        if kernel not in {"float64", "fixed"}:
+            warm_kernel(kernel)
     warm()
 
 
+def warm_kernel(name: str) -> None:
+    """Compile a kernel of a node."""
+    from node.firmware.kernel_choice import kernel_of
+    from node.kernels.warm import warm_step
+
+    loop = kernel_of(name)
+    warm_step(loop.step, loop.aiding)
+
+
 if __name__ == "__main__":
-    {"strings": strings, "others": others}[sys.argv[1]]()
+    {"strings": strings, "integers": integers, "others": others}[sys.argv[1]]()
