@@ -264,7 +264,7 @@ def integers_in_parts(loop: Loop) -> Loop:
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("kernel", ["float64", "fixed", "published"])
+@pytest.mark.parametrize("kernel", ["float64", pytest.param("fixed", marks=pytest.mark.statistical), "published"])
 def test_the_compiled_step_does_what_the_step_in_parts_does(kernel: str) -> None:
     whole, parts = tube(kernel), tube(kernel)
     parts._loop = (integers_in_parts if kernel == "fixed" else in_parts)(parts._loop)
