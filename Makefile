@@ -7,9 +7,8 @@ STAMP := $(VENV)/.installed
 SOAK ?= 168
 FROM ?= 50000
 SEEDS ?= 20000
-# five workers on two cores: much of a worker's time goes by waiting for processes, whose tests come first, but each
-# costs 20 s of CPU before its first test
-WORKERS ?= $(shell echo $$((5 * $$(getconf _NPROCESSORS_ONLN) / 2)))
+# six workers on two cores: two compute and four wait for processes (tests/conftest.py); each costs 5 s of CPU
+WORKERS ?= $(shell echo $$((3 * $$(getconf _NPROCESSORS_ONLN))))
 # a test run starts hundreds of processes; where the environment forbids bytecode each would compile what it imports
 unexport PYTHONDONTWRITEBYTECODE
 PYTEST := $(BIN)/python -m pytest --numprocesses $(WORKERS) --maxprocesses 8 --dist worksteal

@@ -31,7 +31,30 @@ if os.access(MEMORY, os.W_OK) and shutil.disk_usage(MEMORY).free > ROOM:
     # a third of the time went by waiting for a disk to sync what nobody will read after a power cut
     os.environ.setdefault("PYTEST_DEBUG_TEMPROOT", str(MEMORY))
 
+TESTS = Path(__file__).parent
 WAITING = ("process", "install")  # markers of tests that wait for processes more than they compute
+WAITS_S = {  # roughly how long a file waits, of those that wait for more than the usual time or are not marked
+    "processes/test_rig.py": 225,
+    "processes/test_trust.py": 90,
+    "processes/test_own_clock.py": 80,
+    "processes/test_field_calibration.py": 70,
+    "test_installation.py": 65,
+    "page/test_story.py": 45,
+    "test_calibration_commands.py": 45,
+    "groundstation/test_process.py": 30,
+    "page/test_looks.py": 30,
+    "processes/test_bench_hour.py": 30,
+    "processes/test_keys.py": 25,
+    "processes/test_log.py": 25,
+    "test_bench_node.py": 25,
+    "telemetry/test_media.py": 20,
+    "telemetry/test_runtime.py": 20,
+    "groundstation/test_page.py": 20,
+    "telemetry/test_access.py": 15,
+    "test_command_line.py": 15,
+    "test_survey_command.py": 12,
+}
+WAITS_MARKED_S = 15
 MARKER_OF = {"processes": "process", "test_installation.py": "install"}  # first part of the path below tests/
 
 
@@ -43,24 +66,26 @@ def pytest_collection_modifyitems(items: list[pytest.Item]) -> Iterator[None]:
     items[:] = dealt(items, int(os.environ.get("PYTEST_XDIST_WORKER_COUNT", "1")))
 
 
-def dealt(items: Sequence[pytest.Item], workers: int) -> list[pytest.Item]:
-    """Tests in such an order that every worker begins with his part of those that wait.
+def dealt(items: Sequence[pytest.Item], workers: int, cores: int = os.cpu_count() or 1) -> list[pytest.Item]:
+    """Tests in such an order that a worker a core computes while the others wait for processes, from the first test on.
 
-    xdist cuts the list into equal parts, a worker each, and whoever has done his takes from the end of another's. Where
-    the rigs of real processes stand last, two workers have nothing left and the third waits for one rig after another.
+    xdist cuts the list into equal parts, a worker each, and whoever has done his takes from the end of another's. So
+    what waits stands at the beginning of all parts but the last ones. Where every worker began with some of it, half
+    of the machine was idle for four minutes of six; where it stood last, one worker waited for rig after rig.
     """
     modules: dict[Path, list[pytest.Item]] = {}
     for item in items:
         modules.setdefault(item.path, []).append(item)
-    waiting = {
-        path: any(item.get_closest_marker(name) for item in own for name in WAITING) for path, own in modules.items()
-    }
-    first = sorted((own for path, own in modules.items() if waiting[path]), key=len, reverse=True)
-    others = [item for path, own in modules.items() if not waiting[path] for item in own]
-    order: list[pytest.Item] = []
+    waits = {path: waits_s(own) for path, own in modules.items()}
+    others = [item for path, own in modules.items() if not waits[path] for item in own]
     shares: list[list[pytest.Item]] = [[] for _ in range(workers)]
-    for own in first:
-        min(shares, key=len).extend(own)
+    lengths = [0] * max(workers - cores, 1)  # s, of those who wait
+    for path in sorted(modules, key=lambda path: -waits[path]):
+        if waits[path]:
+            waiter = lengths.index(min(lengths))
+            lengths[waiter] += waits[path]
+            shares[waiter] += modules[path]
+    order: list[pytest.Item] = []
     for worker, share in enumerate(shares):
         room = max((len(items) - len(order)) // (workers - worker) - len(share), 0)
         order += share + others[:room]
@@ -68,11 +93,18 @@ def dealt(items: Sequence[pytest.Item], workers: int) -> list[pytest.Item]:
     return order
 
 
+def waits_s(own: Sequence[pytest.Item]) -> int:
+    """How long a file waits for processes, s; 0 where it computes."""
+    if (known := WAITS_S.get(own[0].path.relative_to(TESTS).as_posix())) is not None:
+        return known
+    is_marked = any(item.get_closest_marker(name) for item in own for name in WAITING)
+    return WAITS_MARKED_S if is_marked else 0
+
+
 def mark(items: Sequence[pytest.Item]) -> None:
     """Mark the tests of a folder or file whose tests cost alike."""
-    tests = Path(__file__).parent
     for item in items:
-        if item.path.is_relative_to(tests):
-            first = item.path.relative_to(tests).parts[0]
+        if item.path.is_relative_to(TESTS):
+            first = item.path.relative_to(TESTS).parts[0]
             if first in MARKER_OF:
                 item.add_marker(MARKER_OF[first])
