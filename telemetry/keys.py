@@ -100,6 +100,11 @@ TABLE: Final[tuple[Key, ...]] = (
         "query, publish",
         "everything that the ground station takes in, where somebody listens: for recordings (msgpack); ?since=17",
     ),
+    Key(
+        "borechain/{rig}/ground/changes",
+        "query, publish",
+        "when each answer changed last: a listener that a full line has cost one sees it and asks",
+    ),
     Key("borechain/{rig}/ground/schema", "query", "JSON schema of every answer below ground/"),
     Key("borechain/{rig}/ground/recalibration", "query, publish", "calibration in the field: progress and result"),
     Key("borechain/{rig}/ground/orders", "query, publish", "the newest orders with their course and outcome"),

@@ -5,16 +5,17 @@ import html
 import re
 import time
 from collections.abc import Callable, Iterator
+from pathlib import Path
 from typing import Any
 
 import pytest
 from hand_fed import Rig
 from served import Served, serving
 
-from borechain.client import connect
+from borechain.client import Ground, connect
 from borechain.crew import panels
 from borechain.crew.app import CrewApp
-from borechain.crew.picture import Picture
+from borechain.crew.picture import Picture, View
 
 pytestmark = pytest.mark.slow
 
@@ -101,10 +102,37 @@ async def test_from_the_alarm_to_the_right_answers_with_one_key(served: Served) 
             assert ">  1 raised projection 20.0 m 0 deg N: 43.1 ± 0.1 cm over 80 % of 45 cm" in text
             await pilot.press("a")
             text = await until(
-                app, served, lambda text: "acknowledge alarm 1: done" in text and "1 ack anna proj" in text
+                app, served, lambda text: "acknowledge alarm 1: done" in text and "1 ack anna proj" in text, speaks
             )
             await pilot.press("a")
-            await until(app, served, lambda text: "alarm 1: anna has acknowledged it" in text)
+            await until(app, served, lambda text: "alarm 1: anna has acknowledged it" in text, speaks)
+
+
+class Lossy:
+    """A ground station of whose published answers the bus drops some."""
+
+    def __init__(self, ground: Ground, dropped: set[str]) -> None:
+        self.ask, self.order = ground.ask, ground.order
+        self._ground = ground
+        self._dropped = dropped
+
+    def follow(self, path: str, call: Callable[[str, View], object]) -> None:
+        self._ground.follow(path, lambda path, view: None if path in self._dropped else call(path, view))
+
+
+async def test_what_the_bus_has_dropped_is_asked_for(tmp_path: Path) -> None:
+    """An alarm that somebody acknowledged is shown so, though no word of it arrived."""
+    rig = Rig(tmp_path, target=20.0)
+    for stop in range(1, 4):
+        rig.drill(stop, 0.3)
+    with serving(rig) as served, connect(served.endpoint, timeout=10.0) as ground:
+        app = CrewApp(Lossy(ground, {"alarms", "orders"}), "rig-1", "anna", Clock())
+        async with app.run_test(size=SIZE):
+            await app.workers.wait_for_complete()  # every answer of the beginning has arrived
+            await asyncio.to_thread(served.do, drift)
+            await until(app, served, lambda text: ">  1 raised projection" in text, speaks)
+            await asyncio.to_thread(ground.order, "alarm", "ben", action="acknowledge", number=1)
+            await until(app, served, lambda text: ">  1 ack ben proj" in text, speaks)
 
 
 async def test_a_ground_station_that_is_frozen_is_dont_know_and_not_green(served: Served) -> None:
@@ -205,3 +233,15 @@ def test_an_older_answer_does_not_replace_a_newer_one() -> None:
     assert found.status["tubes"] == 2
     found.on_answer("status", {"revision": 1, "utc": "2026-01-01T00:00:09+00:00", "tubes": 3}, 2.0)  # after a restart
     assert found.status["tubes"] == 3
+
+
+def test_an_answer_is_missed_that_is_of_before_its_path_changed_or_of_a_former_start() -> None:
+    def at(revision: int, minute: int, **more: Any) -> dict[str, Any]:
+        return {"revision": revision, "utc": f"2026-01-01T00:{minute:02d}:00+00:00"} | more
+
+    known = picture(status=at(7, 5), verdict=at(3, 1), string=at(9, 2), column=at(9, 8), wall=at(2, 2), alarms=at(1, 4))
+    assert known.missed == []
+    rows = [{"path": "status", "changed_at": 7}, {"path": "alarms", "changed_at": 2}, {"path": "events", "changed_at": 8}]
+    known.on_answer("changes", at(8, 6, changes=rows), 1.0)
+    # of the two that are newer than the word of the changes one came after it, the other is of a former start
+    assert known.missed == ["string", "alarms", "orders"]

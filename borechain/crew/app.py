@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import queue
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from typing import Any, ClassVar, Protocol
 
 from textual.app import App, ComposeResult
@@ -82,6 +82,8 @@ class CrewApp(App[None]):
         self._clock = clock
         self._arrived: queue.SimpleQueue[tuple[str, View]] = queue.SimpleQueue()
         self._chosen = 0
+        self._is_asking = False
+        self._judged: View = {}  # answer of what changed when, that was looked at for what was missed
 
     def compose(self) -> ComposeResult:
         """The parts of the screen, from the top down."""
@@ -98,6 +100,7 @@ class CrewApp(App[None]):
     def on_mount(self) -> None:
         """Follow the ground station from now on."""
         self._source.follow("**", lambda path, view: self._arrived.put((path, view)))
+        self._is_asking = True
         self.run_worker(self._ask_all, thread=True)
         self.set_interval(REFRESH, self.paint)
         self.paint()
@@ -113,6 +116,7 @@ class CrewApp(App[None]):
         if self._ended():
             self.exit()
         picture = self.picture
+        self._catch_up()
         for name, text in (
             ("header", panels.header(picture, now)),
             ("verdict", panels.verdict(picture, now)),
@@ -123,6 +127,16 @@ class CrewApp(App[None]):
             ("actions", panels.actions(picture, ACTION_ROWS)),
         ):
             self.query_one(f"#{name}", Static).update(text)
+
+    def _catch_up(self) -> None:
+        """Ask for what was published and did not arrive, once for each word of what has changed."""
+        told = self.picture.answers.get("changes", {})
+        if self._is_asking or told is self._judged:
+            return
+        self._judged = told
+        if missed := self.picture.missed:
+            self._is_asking = True
+            self.run_worker(lambda: self._ask_for(missed), thread=True)
 
     def action_choose(self, step: int) -> None:
         """Choose another alarm."""
@@ -177,9 +191,14 @@ class CrewApp(App[None]):
 
     def _ask_all(self) -> None:
         """What is not published by itself at once, asked for at the beginning; nobody there is no fault."""
-        for path in (*PATHS, *(f"nodes/{row['tube']}" for row in self._ask("string").get("tubes", []))):
+        self._ask_for([*PATHS, *(f"nodes/{row['tube']}" for row in self._ask("string").get("tubes", []))])
+
+    def _ask_for(self, paths: Sequence[str]) -> None:
+        """Ask for answers that did not come by themselves."""
+        for path in paths:
             if view := self._ask(path):
                 self._arrived.put((path, view))
+        self._is_asking = False
 
     def _ask(self, path: str) -> View:
         try:

@@ -46,6 +46,15 @@ class Picture:
         if path == "verdict":
             self.verdict_at = now
 
+    @property
+    def missed(self) -> list[str]:
+        """Paths of which a newer answer was published than is known: under load a bus drops some."""
+        told = self.answers.get("changes")
+        if told is None:
+            return []
+        changed_at = {row["path"]: row["changed_at"] for row in told["changes"]}
+        return [path for path in PATHS if is_outdated(self.answers.get(path), told, changed_at.get(path, 0))]
+
     def age(self, now: float) -> float:
         """Seconds since anything was heard."""
         return now - self.heard_at
@@ -97,3 +106,10 @@ class Picture:
         """The tube at the bit."""
         rows = self.answers.get("string", {}).get("tubes", [])
         return int(rows[-1]["tube"]) if rows else None
+
+
+def is_outdated(known: View | None, told: View, changed_at: int) -> bool:
+    """Whether an answer is of before its path changed, or of a former start of the ground station."""
+    if known is None or known["revision"] < changed_at:
+        return True
+    return bool(known["revision"] > told["revision"] and known["utc"] < told["utc"])

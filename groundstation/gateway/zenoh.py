@@ -17,7 +17,7 @@ from groundstation.service.intake import BEGIN, Intake, pack_intake
 from groundstation.service.model import RigModel
 from groundstation.service.orders import Order
 from groundstation.service.paths import FIXED, LONGEST_NUMBER, PATTERNS, Path, check_parameters, find, paths
-from groundstation.service.process import GroundProcess
+from groundstation.service.process import BEATS, GroundProcess
 from groundstation.service.views import Parameters
 from telemetry import keys
 from telemetry.errors import TelemetryError
@@ -29,7 +29,6 @@ ORDER_TIMEOUT = 30.0  # wall s, for which who ordered is kept waiting
 BUSY = f"the ground station has {WAITING} questions to answer; ask again later"
 COMMON_PARAMETERS = ("accept",)
 ENCODINGS = {"json": JSON, "msgpack": MSGPACK}
-BEATS = ("verdict",)  # paths that are published without end, and only where somebody listens
 INTAKE_AT_ONCE = 500  # events of one answer
 PRIVATE = ("folder", "key_file", "keys", "database_url", "wall", "hole")  # settings that are nobody's business
 WHO = "zenoh"  # ordered, where the order does not say

@@ -67,7 +67,8 @@ class RigModel:
         self.events: deque[Event] = deque(maxlen=EVENTS_SHOWN)
         self.static_records: deque[StaticRecord] = deque(maxlen=STATIC_RECORDS_SHOWN)
         self.seen = Counter[str]()  # rows of each stream since the start
-        self.revision = 0  # grows with everything that comes in
+        self.revision = 0  # grows with everything that comes in, and with all that is published
+        self.changed_at: dict[str, int] = {}  # revision at which each path without a number changed last
         self.waiting: list[Waiting] = []  # surveys whose depth is not known yet
         self.undated = 0  # surveys without rig time, which never have one
         self.set_aside: list[SurveyMeasurement] = []  # of a faulty sensor, never fused

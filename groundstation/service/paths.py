@@ -98,6 +98,7 @@ FIXED: dict[str, Path] = {
     "alarms": Path(alarm_views.alarms, key_fields.ALARMS),
     "recalibration": Path(views.recalibration, key_fields.RECALIBRATION),
     "orders": Path(order_views.orders, key_fields.ORDERS),
+    "changes": Path(views.changes, key_fields.CHANGES),
     "schema": Path(lambda _k, _p: {"schemas": schemas()}, key_fields.SCHEMA),
 }
 MEMBERS: dict[str, Member] = {

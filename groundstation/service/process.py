@@ -53,6 +53,7 @@ if TYPE_CHECKING:
 
 STARTS = 1 << 31  # numbers of a start by lot
 HEARTBEAT = 1.0  # s, own clock, between two verdicts
+BEATS = ("verdict", "changes")  # paths that are published without end
 CHANGED_BY_SURVEY = ("measurements", "stations", "trajectory", "uncertainty", "column")
 EARLY = 64  # readings of the depth that may come before rig time is known
 GROUND_STATION = "ground station"  # who orders that something be sent again
@@ -265,7 +266,7 @@ class GroundProcess(Process):
             self._beat_at = now
         if now >= self._beat_at + HEARTBEAT:
             self._beat_at = now
-            self._publish(["verdict"])
+            self._publish(list(BEATS))
 
     def _on_refused(self, _severity: Severity, code: str, arguments: dict[str, Scalar]) -> None:
         """Frames or messages came under seals that are not to be believed."""
@@ -466,6 +467,9 @@ class GroundProcess(Process):
         return [*CHANGED_BY_SURVEY, *self._wall_paths]
 
     def _publish(self, changed: list[str]) -> None:
+        model = self.model
+        model.revision += 1  # whoever holds an older answer can tell
+        model.changed_at |= {path: model.revision for path in changed if "/" not in path and path not in BEATS}
         for listener in self.listeners:
             listener(changed)
 

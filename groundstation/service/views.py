@@ -75,6 +75,11 @@ def status(k: RigModel, _p: Parameters) -> View:
     }
 
 
+def changes(k: RigModel, _p: Parameters) -> View:
+    """When each path changed last: whoever holds an answer of before has missed one."""
+    return {"changes": [{"path": path, "changed_at": at} for path, at in sorted(k.changed_at.items())]}
+
+
 def string(k: RigModel, _p: Parameters) -> View:
     """Tubes from top to bottom."""
     bit = k.depths.latest
