@@ -241,7 +241,11 @@ def test_an_answer_is_missed_that_is_of_before_its_path_changed_or_of_a_former_s
 
     known = picture(status=at(7, 5), verdict=at(3, 1), string=at(9, 2), column=at(9, 8), wall=at(2, 2), alarms=at(1, 4))
     assert known.missed == []
-    rows = [{"path": "status", "changed_at": 7}, {"path": "alarms", "changed_at": 2}, {"path": "events", "changed_at": 8}]
+    rows = [
+        {"path": "status", "changed_at": 7},
+        {"path": "alarms", "changed_at": 2},
+        {"path": "events", "changed_at": 8},
+    ]
     known.on_answer("changes", at(8, 6, changes=rows), 1.0)
     # of the two that are newer than the word of the changes one came after it, the other is of a former start
     assert known.missed == ["string", "alarms", "orders"]

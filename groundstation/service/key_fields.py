@@ -478,7 +478,10 @@ WALL: Fields = (
 CHANGES: Fields = (
     rows(
         "changes",
-        (text("path", "below ground/, without those of a number"), integer("changed_at", "revision of its newest change")),
+        (
+            text("path", "below ground/, without those of a number"),
+            integer("changed_at", "revision of its newest change"),
+        ),
     ),
 )
 SCHEMA: Fields = (mapping("schemas", "JSON schema of the answer of each path, made from the code that answers"),)

@@ -162,7 +162,9 @@ def test_a_node_finds_its_yaw_keeps_it_over_kills_of_both_and_ends_when_asked(
     reply = surface.first(Reply, lambda r: r.sequence == 5)
     assert reply.done
     assert reply.values["cycle_max"] > 0.0
-    assert reply.values["aiding_max"] >= 0.0  # by two clocks, which know of each other to milliseconds on a busy machine
+    assert (
+        reply.values["aiding_max"] >= 0.0
+    )  # by two clocks, which know of each other to milliseconds on a busy machine
 
     string.kill("node")
     saved = tmp_path / "saved"
