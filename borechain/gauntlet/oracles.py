@@ -214,10 +214,11 @@ def _flags(model: RigModel) -> Iterator[str]:
     """Flags have their effects: a faulty sensor's survey is not fused, and an unknown yaw gives no azimuth."""
     for station in model.stations:
         for cluster in station.clusters:
-            if NodeFlag.SENSOR_FAULT in cluster.measurement.flags:
-                yield f"tube {cluster.measurement.tube}: a survey of a faulty sensor is fused"
-        yaws = [cluster.yaw_var for cluster in station.counting]
-        flagged = [NodeFlag.YAW_UNTRUSTED in cluster.measurement.flags for cluster in station.counting]
+            if NodeFlag.SENSOR_FAULT in cluster.flags:
+                yield f"tube {cluster.tube}: a survey of a faulty sensor is fused"
+        counting = [station.clusters[place] for place in station.counting]
+        yaws = [cluster.fused_yaw_var for cluster in counting]
+        flagged = [NodeFlag.YAW_UNTRUSTED in cluster.flags for cluster in counting]
         if flagged and all(flagged) and min(yaws) < math.radians(UNKNOWN_DEG) ** 2:
             yield f"station at {station.md:.2f} m: untrusted yaws have a sigma of {math.sqrt(min(yaws)):.4f} rad"
         if any(flagged) and not all(flagged):

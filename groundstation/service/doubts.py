@@ -7,7 +7,6 @@ from collections.abc import Iterator
 
 from groundstation.service.model import RigModel
 from groundstation.service.verdict import Doubt, Known
-from groundstation.survey.trust import Trust
 
 BEHIND = 1.5  # tubes by which the deepest survey may be behind the bit
 ALARMS = {
@@ -43,7 +42,7 @@ def _doubts(k: RigModel) -> Iterator[tuple[Doubt, str]]:
     deepest, bit = stations[-1], k.depths.latest
     if bit is not None and bit - deepest.md > BEHIND * k.config.tube_length:
         yield Doubt.STALE, f"the bit is at {bit:.1f} m, the deepest survey at {deepest.md:.1f} m"
-    if all(cluster.trust is not Trust.FULL for cluster in deepest.counting):
+    if not deepest.is_trusted:
         yield Doubt.YAW, f"the yaw of the survey at {deepest.md:.1f} m is untrusted"
 
 

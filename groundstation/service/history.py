@@ -15,6 +15,8 @@ import numpy.typing as npt
 from groundstation.survey.columns import Deviation
 
 Array = npt.NDArray[np.float64]
+Few = npt.NDArray[np.float32]
+COVARIANCE = (3, 4, 4, 5)  # places of a covariance's entries in a row
 KEPT = 512  # moments; of more every second of the older half goes
 SAME_STOP = 15.0  # s, within which two surveys were taken at one stop
 
@@ -23,24 +25,28 @@ SAME_STOP = 15.0  # s, within which two surveys were taken at one stop
 class Moment:
     """What was known at one time: deviations at the stations from the collar down, and at the target.
 
-    The deviations are kept as one array, a row a station: as objects those of a day would need a hundred megabytes.
+    The deviations are kept as one array, a row a station, to seven digits, and what many moments have in common is kept
+    once: as objects those of a day would need a hundred megabytes.
     """
 
     number: int
     at: float  # s, rig time of the newest survey
-    table: Array  # (n, 9): measured depth, along, offset (2), covariance (4), limit
+    where: Array  # (n, 2) m: measured depth and limit of every station
+    found: Few  # (n, 6) m and m^2: along, offset (2), covariance (north, both, east)
     projection: Deviation | None
 
     @property
     def rows(self) -> list[Deviation]:
         """Deviations from the collar down."""
-        values = zip(*(self.table[:, k].tolist() for k in (0, 1, -1)), self.table, strict=True)
-        return [Deviation(md, along, row[2:4], row[4:8].reshape(2, 2), limit) for md, along, limit, row in values]
+        found = self.found.astype(np.float64)
+        covs = found[:, COVARIANCE].reshape(-1, 2, 2)
+        values = zip(self.where.tolist(), found[:, 0].tolist(), found[:, 1:3], covs, strict=True)
+        return [Deviation(md, along, offset, cov, limit) for (md, limit), along, offset, cov in values]
 
     @property
     def deepest(self) -> float:
         """Measured depth of the newest station, m."""
-        return float(self.table[-1, 0])
+        return float(self.where[-1, 0])
 
     @property
     def about(self) -> Deviation:
@@ -66,8 +72,11 @@ class History:
     def add(self, rows: Sequence[Deviation], projection: Deviation | None) -> None:
         """Keep what is known at the end of a stop."""
         self.count += 1
-        table = np.array([(d.md, d.along, *d.offset, *d.cov.ravel(), d.limit) for d in rows])
-        self.moments.append(Moment(self.count, self._newest[1], table, projection))
+        where = np.array([(d.md, d.limit) for d in rows])
+        if self.moments and np.array_equal(self.moments[-1].where, where):
+            where = self.moments[-1].where
+        found = np.array([(d.along, *d.offset, d.cov[0, 0], d.cov[0, 1], d.cov[1, 1]) for d in rows], np.float32)
+        self.moments.append(Moment(self.count, self._newest[1], where, found, projection))
         if len(self.moments) > KEPT:
             half = KEPT // 2
             self.moments = self.moments[:half:2] + self.moments[half:]

@@ -9,153 +9,18 @@ from __future__ import annotations
 import itertools
 import math
 from bisect import bisect_left, insort
-from collections.abc import Callable
-from dataclasses import dataclass, field
-from typing import Any
+from dataclasses import dataclass
 
 from groundstation.config import GroundConfig
 from groundstation.service.alarms import AlarmList
+from groundstation.service.clusters import Cluster
 from groundstation.service.history import SAME_STOP, History
+from groundstation.service.station import SurveyStation
 from groundstation.survey.columns import Deviation, deviations, project
-from groundstation.survey.fusion import (
-    Departure,
-    Evidence,
-    GrowingBayes,
-    Weighting,
-    departure_from,
-    judge_departure,
-    weighted,
-)
-from groundstation.survey.resolve import Direction, Quality
+from groundstation.survey.fusion import Evidence, judge_departure
+from groundstation.survey.resolve import Direction
 from groundstation.survey.shared import SharedErrors
 from groundstation.survey.trajectory import Point, Trajectory
-from groundstation.survey.trust import UNKNOWN_YAW_VAR, Trust
-from telemetry.messages import SurveyMeasurement
-
-
-@dataclass(frozen=True, slots=True)
-class ResolvedStop:
-    """One resolved survey measurement."""
-
-    measurement: SurveyMeasurement
-    md: float
-    direction: Direction
-    quality: Quality
-    trust: Trust = Trust.FULL
-    seq: int = 0  # place in the order in which surveys were placed
-
-    @property
-    def at(self) -> float:
-        """Rig time of the stop, s."""
-        return self.measurement.station_at
-
-    @property
-    def yaw_var(self) -> float:
-        """Random variance of the yaw (rad^2) with which it is fused."""
-        return self.measurement.yaw_var + (UNKNOWN_YAW_VAR if self.trust is Trust.UNKNOWN_YAW else 0.0)
-
-
-def _in_time(cluster: ResolvedStop) -> tuple[float, int]:
-    """What the clusters of a station are ordered by."""
-    return cluster.at, cluster.measurement.tube
-
-
-@dataclass(slots=True)
-class SurveyStation:
-    """One depth of the hole and every cluster measured there, oldest first.
-
-    ``drops`` are the places of clusters that found another hole than those before them.
-    """
-
-    md: float
-    clusters: list[ResolvedStop] = field(default_factory=list)
-    drops: list[int] = field(default_factory=list)
-    _departures: dict[int, Departure] = field(default_factory=dict)
-    _fused: tuple[tuple[int, ...], Direction] | None = None  # with what it was made of
-    _shown: tuple[tuple[int, ...], dict[str, Any]] | None = None
-    _counted: GrowingBayes = field(default_factory=GrowingBayes)
-    _with_untrusted: GrowingBayes | None = None
-
-    @property
-    def count(self) -> int:
-        """Clusters measured here."""
-        return len(self.clusters)
-
-    @property
-    def first(self) -> int:
-        """Place of the first cluster that counts."""
-        return self.first_before(self.count)
-
-    def first_before(self, place: int) -> int:
-        """Place of the first cluster that counted when the one at ``place`` came."""
-        return max((drop for drop in self.drops if drop < place), default=0)
-
-    def add_stop(self, cluster: ResolvedStop) -> None:
-        """Add a cluster in the order of time; what was judged of later ones is forgotten."""
-        place = self.count
-        while place and _in_time(self.clusters[place - 1]) > _in_time(cluster):
-            place -= 1
-        self.clusters.insert(place, cluster)
-        self.forget(place)
-
-    def forget(self, place: int) -> None:
-        """Forget decisions from ``place`` on."""
-        self.drops = [drop for drop in self.drops if drop < place]
-        self._departures = {k: d for k, d in self._departures.items() if k < place}
-
-    @property
-    def counting(self) -> list[ResolvedStop]:
-        """Clusters that count: of those since the hole moved the trusted ones, or all where none is."""
-        since = self.clusters[self.first :]
-        return [cluster for cluster in since if cluster.trust is Trust.FULL] or since
-
-    @property
-    def untrusted(self) -> int:
-        """Clusters measured here whose yaw is not believed."""
-        return sum(cluster.trust is not Trust.FULL for cluster in self.clusters)
-
-    def readings(self) -> list[Direction]:
-        """Directions of the clusters that count."""
-        return [cluster.direction for cluster in self.counting]
-
-    @property
-    def _made_of(self) -> tuple[int, ...]:
-        """What changes with every cluster that comes or does not count any more."""
-        return self.count, *self.drops
-
-    def shown(self, show: Callable[[SurveyStation], dict[str, Any]]) -> dict[str, Any]:
-        """What one view shows of the clusters that count; made anew where another has come."""
-        made_of = self._made_of
-        if self._shown is None or self._shown[0] != made_of:
-            self._shown = made_of, show(self)
-        return self._shown[1]
-
-    def fused(self, weighting: Weighting) -> Direction:
-        """Direction from the clusters that count; worked out anew where another has come."""
-        made_of = self._made_of
-        if self._fused is None or self._fused[0] != made_of:
-            readings = self.readings()
-            is_sum = weighting is Weighting.BAYES
-            self._fused = made_of, self._counted.of(readings) if is_sum else weighted(readings, weighting)
-        return self._fused[1]
-
-    def _sum_of_all(self) -> GrowingBayes:
-        """Sum of the clusters since the hole moved, whether they are believed or not."""
-        if not self.untrusted:
-            return self._counted  # of which it is a part: what comes next is added to it
-        if self._with_untrusted is None:
-            self._with_untrusted = GrowingBayes()
-        return self._with_untrusted
-
-    def departure(self, place: int) -> Departure | None:
-        """How far the cluster at ``place`` departed from those before; None for the first of its hole."""
-        first = self.first_before(place)
-        if first == place:
-            return None
-        if place not in self._departures:
-            earlier = self._sum_of_all().of([c.direction for c in self.clusters[first:place]])
-            self._departures[place] = departure_from(earlier, self.clusters[place].direction)
-        return self._departures[place]
 
 
 @dataclass(frozen=True, slots=True)
@@ -194,7 +59,7 @@ class Hole:
         self._newest_at = -math.inf  # s, rig time of the newest survey
         self.version = 0  # grows with every survey
 
-    def add_stop(self, stop: ResolvedStop, epoch: int) -> None:
+    def add_cluster(self, cluster: Cluster, epoch: int) -> None:
         """Take a survey with rig time of an epoch.
 
         Raises
@@ -202,15 +67,15 @@ class Hole:
         numpy.linalg.LinAlgError
             When it cannot be weighed; it was not taken.
         """
-        _ = stop.direction.information
+        _ = cluster.direction.information
         self.version += 1
-        if self._history.begins_stop(epoch, stop.at):
+        if self._history.begins_stop(epoch, cluster.at):
             self.settle()
             self._history.add(self._deviations, self._projection)
-        self._history.on_survey(epoch, stop.at)
-        self._station_at(stop.md).add_stop(stop)
-        self._unsettled_since = min(self._unsettled_since, stop.at)
-        self._newest_at = max(self._newest_at, stop.at)
+        self._history.on_survey(epoch, cluster.at)
+        self._station_at(cluster.md).add_cluster(cluster)
+        self._unsettled_since = min(self._unsettled_since, cluster.at)
+        self._newest_at = max(self._newest_at, cluster.at)
 
     @property
     def stations(self) -> list[SurveyStation]:
@@ -332,12 +197,9 @@ class Hole:
 
     def _clusters_after(self, time: float) -> list[tuple[float, int, int]]:
         """Clusters read later than a rig time (s) as (time, station, place), in their order."""
-        found = []
+        found: list[tuple[float, int, int]] = []
         for number, station in enumerate(self._stations):
-            for place in range(station.count - 1, -1, -1):
-                if station.clusters[place].at <= time:
-                    break
-                found.append((station.clusters[place].at, number, place))
+            found += [(at, number, place) for at, place in station.times_after(time)]
         return sorted(found)
 
     def _judge_stop(self, stop: list[tuple[float, int, int]]) -> None:

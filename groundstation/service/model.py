@@ -12,19 +12,21 @@ import numpy.typing as npt
 
 from groundstation.config import GroundConfig
 from groundstation.errors import SurveyError
+from groundstation.service.clusters import cluster_of
 from groundstation.service.crew_alarms import CrewAlarms
 from groundstation.service.depth import DepthLog
-from groundstation.service.hole import Hole, ResolvedStop, SurveyStation
+from groundstation.service.hole import Hole
 from groundstation.service.live_wall import LiveWall
 from groundstation.service.numbers import Numbers
 from groundstation.service.orders import OrderBook
 from groundstation.service.recalibration.procedure import FieldProcedure
 from groundstation.service.rig_alarms import Health, RigAlarms
+from groundstation.service.station import SurveyStation
 from groundstation.service.stops import Stops
 from groundstation.service.tally import Tally
 from groundstation.survey.joint_angles import JointAngles
 from groundstation.survey.resolve import Direction, check, combine_imus, resolve
-from groundstation.survey.shared import SharedErrors
+from groundstation.survey.shared import Reading, SharedErrors
 from groundstation.survey.trust import Trust, trust_of, with_unknown_yaw
 from telemetry.messages import EPOCH_UNKNOWN, Event, NodeFlag, NodeState, StaticRecord, SurveyMeasurement
 
@@ -230,7 +232,7 @@ class RigModel:
         )
         epoch = measurement.epoch or self.epoch
         number = self.seen["measurements"] + 1
-        self.hole.add_stop(ResolvedStop(measurement, md, direction, quality, trust, number), epoch)
+        self.hole.add_cluster(cluster_of(measurement, md, direction, quality, trust, number), epoch)
         self.seen["measurements"] = number
 
     def on_event(self, event: Event) -> None:
@@ -265,7 +267,7 @@ class RigModel:
     def _hops_if_unknown(self, measurement: SurveyMeasurement) -> int:
         return measurement.hops if measurement.tube not in self.tally.tubes else -1
 
-    def _direction(self, m: SurveyMeasurement, trust: Trust, force: Array, force_cov: Array) -> Direction:
+    def _direction(self, m: SurveyMeasurement, trust: Trust, force: Array, force_cov: Array) -> Reading:
         """Direction of a measurement with what it shares with others."""
         resolved = resolve(force, force_cov, m.yaw, m.yaw_var)
         if trust is Trust.UNKNOWN_YAW:

@@ -21,9 +21,14 @@ def window(rows: Iterable[Row], newest: int, p: Parameters) -> list[Row]:
     SelectorError
         When a parameter is no number of this stream: after a restart the numbers begin anew.
     """
-    since, limit = _whole("since", p, 0, newest), _whole("limit", p, MOST, MOST)
+    since, limit = span(newest, p)
     after = sorted((row for row in rows if row["seq"] > since), key=lambda row: int(row["seq"]))
     return after[:limit]
+
+
+def span(newest: int, p: Parameters) -> tuple[int, int]:
+    """The number ``since``, and the ``limit`` of the rows after it; errors as ``window``."""
+    return _whole("since", p, 0, newest), _whole("limit", p, MOST, MOST)
 
 
 def _whole(name: str, p: Parameters, default: int, most: int) -> int:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import datetime
 import math
+from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import partial
 from typing import Any
@@ -11,13 +12,14 @@ from typing import Any
 import numpy as np
 
 from groundstation.errors import SelectorError, SurveyError
-from groundstation.service.hole import ResolvedStop, SurveyStation
+from groundstation.service.clusters import Cluster
 from groundstation.service.model import RigModel
-from groundstation.service.streams import STREAMED, window
+from groundstation.service.station import SurveyStation
+from groundstation.service.streams import STREAMED, span, window
 from groundstation.survey.fusion import Weighting
 from groundstation.survey.resolve import angle_stds, angles
 from groundstation.survey.trajectory import Point, interpolate
-from telemetry.messages import Event, NodeFlag, NodeState, StaticRecord, SurveyMeasurement
+from telemetry.messages import Event, NodeFlag, NodeState, StaticRecord
 
 View = dict[str, Any]
 Parameters = dict[str, str]
@@ -154,39 +156,40 @@ def direction_view(weighting: Weighting, s: SurveyStation) -> View:
         "measurements": s.count,
         "dropped_measurements": s.first,
         "untrusted_measurements": s.untrusted,
-    } | typical_reading(s.counting)
+    } | typical_reading(s)
 
 
-def typical_reading(readings: list[ResolvedStop]) -> View:
+def typical_reading(s: SurveyStation) -> View:
     """Root mean squares over the readings of a station; columns that ``borechain survey --instrument relay`` takes."""
-    force_vars = [force_var(c.measurement) for c in readings]
-    systematic_vars = [c.measurement.systematic_var for c in readings]
+    yaw, systematic, force = s.mean_variances()
     return {
-        "sigma_yaw_deg": math.degrees(math.sqrt(float(np.mean([c.yaw_var for c in readings])))),
-        "sigma_systematic_deg": math.degrees(math.sqrt(float(np.mean(systematic_vars)))),
-        "sigma_force_mps2": math.sqrt(float(np.mean(force_vars))),
+        "sigma_yaw_deg": math.degrees(math.sqrt(yaw)),
+        "sigma_systematic_deg": math.degrees(math.sqrt(systematic)),
+        "sigma_force_mps2": math.sqrt(force),
     }
-
-
-def force_var(reading: SurveyMeasurement) -> float:
-    """Variance (m/s^2)^2 of the mean force of a cluster on one axis: its IMUs weigh by their own."""
-    variances = [sum(imu.force_cov[axis][axis] for axis in range(3)) / 3.0 for imu in reading.imus]
-    first = variances[0]
-    return first / sum(first / variance for variance in variances) if min(variances) > 0.0 else 0.0
 
 
 def measurements(k: RigModel, p: Parameters) -> View:
     """Every cluster; ``station`` and ``tube`` select, ``since`` and ``limit`` give them as they came."""
+    newest = k.seen["measurements"]
+    since, limit = span(newest, p) if streamed(p) else (0, None)
+    found = list(_selected(k, p, since))
+    if streamed(p):
+        found.sort()
+    rows = [cluster(k.stations[n - 1].clusters[place], n) for _, n, place in found[:limit]]
+    return {"newest": newest, "measurements": rows}
+
+
+def _selected(k: RigModel, p: Parameters, since: int) -> Iterator[tuple[int, int, int]]:
+    """Number, station and place of the clusters after the number ``since`` that the parameters select."""
     by_station = Range.parse("station", p["station"]) if "station" in p else None
     by_tube = Range.parse("tube", p["tube"]) if "tube" in p else None
-    rows = [
-        cluster(c, n)
-        for n, s in enumerate(k.stations, 1)
-        for c in s.clusters
-        if (by_station is None or by_station.holds(n)) and (by_tube is None or by_tube.holds(c.measurement.tube))
-    ]
-    newest = k.seen["measurements"]
-    return {"newest": newest, "measurements": window(rows, newest, p) if streamed(p) else rows}
+    for n, s in enumerate(k.stations, 1):
+        if by_station is None or by_station.holds(n):
+            numbers, tubes = s.clusters.column("number"), s.clusters.column("tube")
+            for place in np.flatnonzero(numbers > since).tolist():
+                if by_tube is None or by_tube.holds(int(tubes[place])):
+                    yield int(numbers[place]), n, place
 
 
 def station_measurements(k: RigModel, n: int) -> View:
@@ -195,30 +198,29 @@ def station_measurements(k: RigModel, n: int) -> View:
     return {"station": n, "measurements": rows}
 
 
-def cluster(c: ResolvedStop, n: int) -> View:
+def cluster(c: Cluster, n: int) -> View:
     """One cluster, resolved."""
-    m = c.measurement
     inclination, azimuth = angles(c.direction.lean, c.direction.down)
     sigma_inclination, sigma_azimuth = angle_stds(c.direction.lean, c.direction.down, c.direction.total_cov)
     return {
-        "seq": c.seq,
+        "seq": c.number,
         "station": n,
         "md_m": round(c.md, 6),
-        "tube": m.tube,
-        "sequence": m.sequence,
-        "station_at_s": m.station_at,
-        "hops": m.hops,
+        "tube": c.tube,
+        "sequence": c.sequence,
+        "station_at_s": c.at,
+        "hops": c.hops,
         "inclination_deg": math.degrees(inclination),
         "azimuth_deg": math.degrees(azimuth),
         "sigma_inclination_deg": math.degrees(sigma_inclination),
         "sigma_azimuth_deg": math.degrees(sigma_azimuth),
-        "yaw_deg": math.degrees(m.yaw),
-        "sigma_yaw_deg": math.degrees(math.sqrt(m.yaw_var)),
-        "sigma_systematic_deg": math.degrees(math.sqrt(m.systematic_var)),
-        "forces_mps2": [list(imu.force) for imu in m.imus],
-        "samples": m.samples,
-        "settle_s": m.settle_time,
-        "flags": flag_names(m.flags),
+        "yaw_deg": math.degrees(c.yaw),
+        "sigma_yaw_deg": math.degrees(math.sqrt(c.yaw_var)),
+        "sigma_systematic_deg": math.degrees(math.sqrt(c.systematic_var)),
+        "forces_mps2": [list(force) for force in c.forces],
+        "samples": c.samples,
+        "settle_s": c.settle_time,
+        "flags": flag_names(c.flags),
         "trust": c.trust.name.lower(),
         "quality": c.quality.name.lower().split("|") if c.quality and c.quality.name else [],
     }

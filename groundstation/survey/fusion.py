@@ -10,7 +10,7 @@ Source: thesis 3.6 and 4.3, eqs. 3.39-3.42.
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, field
 from enum import Enum
 
@@ -73,16 +73,24 @@ class GrowingBayes:
 
     def __init__(self) -> None:
         self._fusion = StationFusion()
-        self._taken: list[Direction] = []
+        self._begin = self._end = 0
 
-    def of(self, readings: list[Direction]) -> Direction:
-        """The same as ``bayes``, bit for bit; worked out from the beginning where an earlier reading is another one."""
-        if readings[: len(self._taken)] != self._taken:
-            self._fusion, self._taken = StationFusion(), []
-        for reading in readings[len(self._taken) :]:
+    def of(self, begin: int, end: int, readings: Callable[[int, int], Iterable[Direction]]) -> Direction:
+        """The same as ``bayes`` of the readings from ``begin`` to before ``end``, bit for bit.
+
+        ``readings(begin, end)`` gives those of such a range.
+        """
+        if begin != self._begin or end < self._end or self._end < begin:
+            self._fusion, self._begin, self._end = StationFusion(), begin, begin
+        for reading in readings(self._end, end):
             self._fusion.add_reading(reading)
-            self._taken.append(reading)
+        self._end = end
         return self._fusion.fused()
+
+    def forget(self, place: int) -> None:
+        """The reading at a place, and those behind it, are others than before."""
+        if place < self._end:
+            self._fusion, self._end = StationFusion(), self._begin
 
 
 def vertical(lean: Array, sense: float) -> float:

@@ -34,28 +34,30 @@ class Reading(Direction):
     at the place of every joint above. Fifty tubes share 250 errors, and a ground station keeps every reading.
     """
 
-    __slots__ = ("_causes", "_information", "_places", "_width")
-    _causes: Array
+    __slots__ = ("_information", "causes", "places", "width")
     _information: Array | None
-    _places: Places
-    _width: int
+    causes: Array
+    places: Places
+    width: int
 
-    def __init__(self, bare: Direction, causes: Array, places: Places, width: int) -> None:
+    def __init__(
+        self, bare: Direction, causes: Array, places: Places, width: int, information: Array | None = None
+    ) -> None:
         """``causes`` (2, 5); ``places`` of the mount, the joints and the axes, among the ``width`` errors known."""
         for name in ("lean", "down", "cov"):
             object.__setattr__(self, name, getattr(bare, name))
-        object.__setattr__(self, "_causes", causes)
-        object.__setattr__(self, "_places", places)
-        object.__setattr__(self, "_width", width)
-        object.__setattr__(self, "_information", None)
+        object.__setattr__(self, "causes", causes)
+        object.__setattr__(self, "places", places)
+        object.__setattr__(self, "width", width)
+        object.__setattr__(self, "_information", information)
 
     @property
     def shared(self) -> Array:
         """Columns (2, s), made anew."""
-        columns = np.zeros((2, self._width))
-        columns[:, self._places[0]] = self._causes[:, 0]
-        columns[:, self._places[1:-AXES]] = self._causes[:, 1:2]
-        columns[:, self._places[-AXES:]] = self._causes[:, -AXES:]
+        columns = np.zeros((2, self.width))
+        columns[:, self.places[0]] = self.causes[:, 0]
+        columns[:, self.places[1:-AXES]] = self.causes[:, 1:2]
+        columns[:, self.places[-AXES:]] = self.causes[:, -AXES:]
         return columns
 
     @property

@@ -117,7 +117,7 @@ def test_readings_after_a_movement_count_together(tmp_path: Path) -> None:
     model = knowing(tmp_path, moving(6, 5), 6)
     first = model.stations[0]
     assert (first.count, first.first) == (6, 4)
-    assert len(first.readings()) == 2
+    assert len(first.counting) == 2
     assert inclination_deg(model, 0) == pytest.approx(2.0, abs=1e-6)
     assert {moved.at // BETWEEN_STOPS for moved in model.hole.moved} == {5}
 
@@ -147,9 +147,7 @@ def test_a_neighbour_that_changed_at_another_stop_is_no_evidence(tmp_path: Path)
 
 def result(model: RigModel) -> dict[str, Any]:
     """All that follows from the surveys."""
-    stations = [
-        (s.md, s.first, [(c.measurement.tube, c.measurement.sequence) for c in s.clusters]) for s in model.stations
-    ]
+    stations = [(s.md, s.first, [(c.tube, c.sequence) for c in s.clusters]) for s in model.stations]
     fused = [model.fused(s) for s in model.stations]
     directions = [np.concatenate([f.lean, [f.down], f.cov.ravel(), f.total_cov.ravel()]) for f in fused]
     points = [np.concatenate([[p.md], p.position, p.cov.ravel()]) for p in model.hole.trajectory]

@@ -209,7 +209,8 @@ async def test_a_restart_forgets_and_doubles_nothing(rig: tuple[Rig, ZenohBus], 
     assert [(s.md, s.count) for s in model.stations] == [(2.0, 2), (4.0, 1)]
     assert [e.sequence for e in model.events] == [7]
     again.run(3.0)
-    again.tube.submit(next(iter(model.stations[0].clusters)).measurement, again.now)  # its receipt was lost
+    stored = next(one.message for one in again.ground.store.messages() if isinstance(one.message, SurveyMeasurement))
+    again.tube.submit(stored, again.now)  # its receipt was lost
     again.run(2.0)
     assert [(s.md, s.count) for s in model.stations] == [(2.0, 2), (4.0, 1)]
     assert again.tube.outbox_size == 0

@@ -1,0 +1,140 @@
+"""One depth of the hole and every cluster that was measured there. No I/O."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+
+from groundstation.service.clusters import Cluster, Clusters
+from groundstation.survey.fusion import Departure, GrowingBayes, Weighting, departure_from, weighted
+from groundstation.survey.resolve import Direction
+from groundstation.survey.shared import Reading
+from groundstation.survey.trust import UNKNOWN_YAW_VAR, Trust
+
+
+@dataclass(slots=True)
+class SurveyStation:
+    """One depth of the hole (m) and every cluster measured there, oldest first.
+
+    ``drops`` are the places of clusters that found another hole than those before them.
+    """
+
+    md: float
+    clusters: Clusters = field(default_factory=Clusters)
+    drops: list[int] = field(default_factory=list)
+    untrusted: int = 0  # clusters whose yaw is not believed
+    _fused: tuple[tuple[int, ...], Direction] | None = None  # with what it was made of
+    _shown: tuple[tuple[int, ...], dict[str, Any]] | None = None
+    _all: GrowingBayes = field(default_factory=GrowingBayes)
+    _trusted: GrowingBayes | None = None
+
+    @property
+    def count(self) -> int:
+        """Clusters measured here."""
+        return len(self.clusters)
+
+    @property
+    def first(self) -> int:
+        """Place of the first cluster that counts."""
+        return self.first_before(self.count)
+
+    def first_before(self, place: int) -> int:
+        """Place of the first cluster that counted when the one at ``place`` came."""
+        return max((drop for drop in self.drops if drop < place), default=0)
+
+    def add_cluster(self, cluster: Cluster) -> None:
+        """Add a cluster in the order of time; what was judged of later ones is forgotten.
+
+        Raises
+        ------
+        numpy.linalg.LinAlgError
+            When it cannot be weighed; it was not added.
+        """
+        place = self.clusters.insert(cluster)
+        self.untrusted += cluster.trust is not Trust.FULL
+        self.drops = [drop for drop in self.drops if drop < place]
+        self._all.forget(place)
+        if self._trusted is not None:
+            self._trusted.forget(place)
+
+    def times_after(self, time: float) -> Iterator[tuple[float, int]]:
+        """Time (s) and place of each cluster that was read later than a time (s), in their order."""
+        at = self.clusters.column("at")
+        if len(at) and at[-1] > time:
+            first = int(np.searchsorted(at, time, "right"))
+            yield from zip(at[first:].tolist(), range(first, len(at)), strict=True)
+
+    @property
+    def counting(self) -> list[int]:
+        """Places of the clusters that count: of those since the hole moved the trusted ones, or all where none is."""
+        since = range(self.first, self.count)
+        if not self.untrusted:
+            return list(since)
+        is_trusted = self.clusters.column("trust") == Trust.FULL
+        return [place for place in since if is_trusted[place]] or list(since)
+
+    @property
+    def is_trusted(self) -> bool:
+        """Whether the yaw of a cluster that counts is believed."""
+        return bool((self.clusters.column("trust")[self.counting] == Trust.FULL).any())
+
+    def mean_variances(self) -> tuple[float, float, float]:
+        """Of the clusters that count: of the yaw as it is fused, systematic (both rad^2), of the force (m/s^2)^2."""
+        counting, column = self.counting, self.clusters.column
+        unknown = UNKNOWN_YAW_VAR * (column("trust")[counting] == Trust.UNKNOWN_YAW)
+        yaw = float(np.mean(column("yaw_var")[counting] + unknown))
+        systematic, force = (float(np.mean(column(name)[counting])) for name in ("systematic_var", "force_var"))
+        return yaw, systematic, force
+
+    @property
+    def _made_of(self) -> tuple[int, ...]:
+        """What changes with every cluster that comes or does not count any more."""
+        return self.count, *self.drops
+
+    def shown(self, show: Callable[[SurveyStation], dict[str, Any]]) -> dict[str, Any]:
+        """What one view shows of the clusters that count; made anew where another has come."""
+        made_of = self._made_of
+        if self._shown is None or self._shown[0] != made_of:
+            self._shown = made_of, show(self)
+        return self._shown[1]
+
+    def fused(self, weighting: Weighting) -> Direction:
+        """Direction from the clusters that count; worked out anew where another has come."""
+        made_of = self._made_of
+        if self._fused is None or self._fused[0] != made_of:
+            self._fused = made_of, self._fuse(weighting)
+        return self._fused[1]
+
+    def _fuse(self, weighting: Weighting) -> Direction:
+        counting = self.counting
+        if weighting is not Weighting.BAYES:
+            return weighted([self.clusters.reading(place) for place in counting], weighting)
+        if len(counting) == self.count - self.first:
+            return self._sum_of_all(self.count)
+        if self._trusted is None:
+            self._trusted = GrowingBayes()
+        return self._trusted.of(self.first, self.count, self._trusted_readings)
+
+    def _sum_of_all(self, end: int) -> Direction:
+        """Direction from the clusters before a place since the hole moved, whether they are believed or not."""
+        return self._all.of(self.first_before(end), end, self._readings)
+
+    def _readings(self, begin: int, end: int) -> Iterator[Reading]:
+        return map(self.clusters.reading, range(begin, end))
+
+    def _trusted_readings(self, begin: int, end: int) -> Iterator[Reading]:
+        trust = self.clusters.column("trust")
+        return (self.clusters.reading(place) for place in range(begin, end) if trust[place] == Trust.FULL)
+
+    def departure(self, place: int) -> Departure | None:
+        """How far the cluster at ``place`` departed from those before; None for the first of its hole."""
+        if self.first_before(place) == place:
+            return None
+        known = self.clusters.departure(place)
+        if known is None:
+            known = departure_from(self._sum_of_all(place), self.clusters.reading(place))
+            self.clusters.keep_departure(place, known)
+        return known
