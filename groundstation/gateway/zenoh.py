@@ -16,7 +16,7 @@ from groundstation.errors import GroundError, SelectorError
 from groundstation.service.intake import BEGIN, Intake, pack_intake
 from groundstation.service.model import RigModel
 from groundstation.service.orders import Order
-from groundstation.service.paths import FIXED, LONGEST_NUMBER, PATTERNS, Path, check_parameters, find, paths
+from groundstation.service.paths import LONGEST_NUMBER, PATTERNS, Path, check_parameters, find, is_of_the_hole, paths
 from groundstation.service.process import BEATS, GroundProcess
 from groundstation.service.views import Parameters
 from telemetry import keys
@@ -102,7 +102,7 @@ class ZenohGateway:
         What shows the whole hole is put one path a turn of the loop: who asks meanwhile waits for one of them at most.
         """
         self._publish_intake()
-        late = dict.fromkeys(path for path in changed if path in FIXED and FIXED[path].is_of_the_hole)
+        late = dict.fromkeys(path for path in changed if is_of_the_hole(path))
         for path in changed:
             if path not in late:
                 self._put(path)

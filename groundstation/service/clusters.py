@@ -21,7 +21,7 @@ from telemetry.messages import NodeFlag, SurveyMeasurement
 
 Array = npt.NDArray[np.float64]
 AXES = 3
-ROOM, GROWTH = 4, 8  # rows of a new table, and the share of its rows by which it grows
+GROWTH = 8  # share of its rows by which a table grows; most stations know one survey, some a hundred
 ROW: Final = np.dtype(
     [
         *((name, np.int64) for name in ("sequence", "hops", "samples", "flags", "number")),
@@ -95,7 +95,7 @@ class Clusters:
     """Clusters in the order of time, and of each how far it departed from those before it, once that is known."""
 
     def __init__(self) -> None:
-        self._rows = np.empty(ROOM, ROW)
+        self._rows = np.empty(1, ROW)
         self._forces: list[bytes] = []
         self._places: list[Places] = []
 
@@ -149,7 +149,7 @@ class Clusters:
         information = direction.information
         place, count = self._place_of(cluster.order), len(self)
         if count == len(self._rows):
-            self._rows = np.concatenate([self._rows, np.empty(ROOM + count // GROWTH, ROW)])
+            self._rows = np.concatenate([self._rows, np.empty(1 + count // GROWTH, ROW)])
         self._rows[place + 1 : count + 1] = self._rows[place:count]
         row = self._rows[place]
         for name in COPIED:

@@ -145,6 +145,11 @@ def fields_of(path: str) -> Fields:
     return known.fields
 
 
+def is_of_the_hole(path: str) -> bool:
+    """Whether a path shows the whole hole, and so changes with a survey only."""
+    return path in FIXED and FIXED[path].is_of_the_hole
+
+
 def check_parameters(found: Iterable[Path], parameters: Parameters, common: tuple[str, ...] = ()) -> None:
     """Refuse a parameter that none of the paths asked for takes; ``common`` are those of every path.
 

@@ -31,7 +31,8 @@ class Witnesses:
     """What the tubes' events say of the encoder."""
 
     def __init__(self) -> None:
-        self._contradicted: dict[int, Event] = {}  # newest contradiction, by tube
+        # newest contradiction by tube and start: a stranger with the number of a tube speaks for itself alone
+        self._contradicted: dict[tuple[int, str, float], Event] = {}
         self._starts: deque[Event] = deque(maxlen=STARTS_KEPT)
         self._off: Times = {}
         self._blind: Times = {}  # without a gyroscope
@@ -53,12 +54,14 @@ class Witnesses:
         elif event.code == "sensor_recovered" and event.arguments.get("after") in BLIND:
             self._end_blind(place, event)
         elif event.code in AGAINST_THE_ENCODER:
-            self._contradicted[event.tube] = event
+            self._contradicted[event.tube, *self._start_before(event)] = event
+            while len(self._contradicted) > STARTS_KEPT:
+                del self._contradicted[next(iter(self._contradicted))]
         found = next((one for one in self._contradicted.values() if self._speaks_against_the_encoder(one, heard)), None)
         if found is None or (told := self._together(found)) == self._told:
             return ""
         self._told = told
-        return f"tubes {', '.join(str(tube) for tube in sorted(e.tube for e in told))} at {found.at:.0f} s"
+        return f"tubes {', '.join(str(tube) for tube in sorted({e.tube for e in told}))} at {found.at:.0f} s"
 
     def _speaks_against_the_encoder(self, event: Event, heard: Collection[int]) -> bool:
         together = self._together(event)

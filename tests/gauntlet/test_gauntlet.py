@@ -106,6 +106,7 @@ def test_combined_seeds_hold(first: int) -> None:
         (321753, ("surveys-lost", "not-finite")),  # the survey came with the last word of the run
         # the ground station knows of the stop from its second half only
         (322663, ("encoder-from-zero", "cut-again-and-again", "node-memory-rots", "database-deleted")),
+        (409896, ("same-number", "encoder-slips")),  # a stranger with the same number had nothing to say
         (51633, ("surveys-lost", "gyro-step")),  # a gyroscope that turned its tube while nobody corrected it
     ],
 )

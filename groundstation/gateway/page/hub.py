@@ -15,6 +15,7 @@ from typing import Any
 import orjson
 
 from groundstation.errors import SelectorError
+from groundstation.service.paths import is_of_the_hole
 from groundstation.service.process import HEARTBEAT, GroundProcess
 
 PATHS = ("status", "verdict", "string", "column", "history", "uncertainty", "wall", "alarms", "orders")
@@ -111,13 +112,16 @@ class Hub:
                     reader.note(path)
 
     def _event(self, path: str) -> bytes:
-        if path not in self._rendered:
-            try:
-                answer = self._process.operator.ask_json(path)
-            except SelectorError:
-                return b""
-            self._rendered[path] = event("answer", {"path": path, "answer": orjson.Fragment(answer)})
-        return self._rendered[path]
+        if path in self._rendered:
+            return self._rendered[path]
+        try:
+            answer = self._process.operator.ask_json(path)
+        except SelectorError:
+            return b""
+        rendered = event("answer", {"path": path, "answer": orjson.Fragment(answer)})
+        if not is_of_the_hole(path):  # what shows a long hole is long, and its text is kept already
+            self._rendered[path] = rendered
+        return rendered
 
 
 def event(kind: str, content: dict[str, Any]) -> bytes:
