@@ -63,7 +63,7 @@ KINDS: tuple[AlarmKind, ...] = (
     AlarmKind(
         "reference",
         BAD,
-        "several gyroscopes contradict the encoder at one time: it may have slipped; check the azimuths",
+        "the encoder may have slipped: gyroscopes contradict it at one time, or none has watched it; check the azimuths",
     ),
     AlarmKind(
         "joint",

@@ -2,7 +2,8 @@
 
 A tube is a witness of a time if it ran through it: one that started then, or stood still, took the yaw that it was
 given, and one whose gyroscope gave nothing took the rate of the encoder: none of them has anything to say. So a
-contradiction counts against the encoder when all who could have seen it agree.
+contradiction counts against the encoder when all who could have seen it agree. Where every tube starts upon a yaw that
+was saved over other joints than its own, nobody has watched the encoder meanwhile, and that is said too.
 """
 
 from __future__ import annotations
@@ -15,6 +16,7 @@ from telemetry.messages import EPOCH_UNKNOWN, Event
 
 AGAINST_THE_ENCODER = ("yaw_reset", "gyro_step", "gyro_scale")
 STARTS = ("booted", "restored")
+ELSEWHERE = "reference_changed"  # the yaw of a node came over other joints before
 BLIND = ("bad_sample", "gyro_saturated", "gyro_stuck")  # the gyroscope gives nothing, until the sensor has recovered
 CYCLE = 10.0 / 19.0  # s, of a node
 SETTLED_AFTER = 10.0  # s after a start in which a tube may still find its yaw
@@ -36,6 +38,7 @@ class Witnesses:
         self._starts: deque[Event] = deque(maxlen=STARTS_KEPT)
         self._off: Times = {}
         self._blind: Times = {}  # without a gyroscope
+        self._elsewhere: dict[int, Event] = {}  # newest start upon a yaw of another place, by tube
         self._told: tuple[Event, ...] = ()
         self._spans: dict[int, tuple[float, float]] = {}  # s, first and last event of each epoch
 
@@ -57,6 +60,10 @@ class Witnesses:
             self._contradicted[event.tube, *self._start_before(event)] = event
             while len(self._contradicted) > STARTS_KEPT:
                 del self._contradicted[next(iter(self._contradicted))]
+        elif event.code == ELSEWHERE and self._has_just_been_restored(event):
+            self._elsewhere[event.tube] = event
+            if nobody := self._nobody_has_watched(event, heard):
+                return nobody
         found = next((one for one in self._contradicted.values() if self._speaks_against_the_encoder(one, heard)), None)
         if found is None or (told := self._together(found)) == self._told:
             return ""
@@ -76,6 +83,17 @@ class Witnesses:
         if any(e.code != "yaw_reset" for e in settled):
             enough = ENOUGH  # alone, a gyroscope is wrong sooner
         return len(settled) >= max(enough, 1)
+
+    def _has_just_been_restored(self, event: Event) -> bool:
+        code, at = self._start_before(event)
+        return code == "restored" and event.at <= at + SETTLED_AFTER
+
+    def _nobody_has_watched(self, event: Event, heard: Collection[int]) -> str:
+        """Says so where all who are heard have just started upon a yaw of another place."""
+        found = [self._elsewhere.get(tube) for tube in heard]
+        if not all(one is not None and self._apart(*sorted([one, event], key=_in_time)) <= TOGETHER for one in found):
+            return ""
+        return f"nobody watched it before {event.at:.0f} s: what the tubes had saved is of other places"
 
     def _together(self, event: Event) -> tuple[Event, ...]:
         return tuple(

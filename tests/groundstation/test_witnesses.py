@@ -117,6 +117,28 @@ def test_a_stranger_of_the_same_number_takes_no_witness_away() -> None:
     assert told([*known, stranger, event(1, 100.0, "yaw_reset", 3)]) == []
 
 
+SWAPPED = [
+    event(2, 22.0, "restored", 12), event(2, 22.5, "reference_changed", 14),
+    event(1, 23.0, "restored", 13), event(1, 23.1, "reference_changed", 14),
+]  # fmt: skip
+
+
+def test_where_all_start_upon_a_yaw_of_another_place_nobody_has_watched_the_encoder() -> None:
+    said = ["nobody watched it before 23 s: what the tubes had saved is of other places"]
+    assert told(SWAPPED) == said
+    assert told([*BOTH_STARTED, *SWAPPED]) == said
+    assert told(SWAPPED, heard=(1, 2, 3)) == []  # tube 3 did
+    ran_on = [event(1, 23.1, "reference_changed", 14), event(2, 23.1, "reference_changed", 14)]
+    assert told([*BOTH_STARTED, *ran_on]) == []  # a tube was added above them
+
+
+def test_a_stranger_that_has_just_started_does_not_hide_what_the_tube_of_its_number_saw() -> None:
+    gone = event(1, 131.0, "restored", 13)
+    stranger = [event(2, 114.2, "booted", 1), event(2, 114.2, "yaw_reset", 2)]
+    began = [event(1, 0.0, "restored", 7), event(2, 0.0, "restored", 7)]
+    assert told([*began, event(2, 114.1, "yaw_reset", 11), *stranger, gone]) == ["tubes 2 at 114 s"]
+
+
 def test_contradictions_of_two_times_are_not_added_up() -> None:
     late = event(2, 200.0, "yaw_reset")
     assert told([*BOTH_STARTED, event(1, 100.0, "yaw_reset"), late]) == []
