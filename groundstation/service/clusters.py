@@ -147,16 +147,17 @@ class Clusters:
         """
         direction = cluster.direction
         information = direction.information
-        place, count = self._place_of(cluster.order), len(self)
+        place, count, known = self._place_of(cluster.order), len(self), self._rows
         if count == len(self._rows):
-            self._rows = np.concatenate([self._rows, np.empty(1 + count // GROWTH, ROW)])
+            self._rows = np.empty(count + 1 + count // GROWTH, ROW)
+            self._rows[:count] = known
         self._rows[place + 1 : count + 1] = self._rows[place:count]
-        row = self._rows[place]
-        for name in COPIED:
-            row[name] = getattr(cluster, name)
-        for name in ("lean", "down", "cov"):
-            row[name] = getattr(direction, name)
-        row["information"], row["causes"], row["width"] = information, direction.causes, direction.width
+        c, d = cluster, direction
+        self._rows[place] = (
+            c.sequence, c.hops, c.samples, c.flags, c.number, c.tube, d.width, c.trust, c.quality, c.at, c.md, c.yaw,
+            c.yaw_var, c.systematic_var, c.force_var, c.settle_time, d.lean, d.down, d.cov, information, d.causes,
+            0.0, np.nan,
+        )  # fmt: skip
         self._forces.insert(place, np.array(cluster.forces).tobytes())
         self._places.insert(place, direction.places)
         self.forget_departures(place)
@@ -188,5 +189,4 @@ PLAIN = (
     "tube", "sequence", "at", "hops", "md", "yaw", "yaw_var", "systematic_var", "force_var", "samples", "settle_time",
     "number",
 )  # fmt: skip
-COPIED = (*PLAIN, "flags", "quality", "trust")
 NOTHING: Final = np.zeros((2, 0))

@@ -63,7 +63,7 @@ KINDS: tuple[AlarmKind, ...] = (
     AlarmKind(
         "reference",
         BAD,
-        "the encoder may have slipped: gyroscopes contradict it at one time, or none has watched it; check the azimuths",
+        "the encoder may have slipped: gyroscopes contradict it at once, or none has watched it; check the azimuths",
     ),
     AlarmKind(
         "joint",

@@ -1,0 +1,120 @@
+"""Surveys as rows of a table: what goes in comes out, in the order of time, and each takes little memory."""
+
+import gc
+import math
+import tracemalloc
+from dataclasses import fields, replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from groundstation.config import GroundConfig
+from groundstation.service.clusters import Cluster, Clusters, cluster_of
+from groundstation.service.model import RigModel
+from groundstation.survey.resolve import Direction, Quality, resolve
+from groundstation.survey.shared import Reading, SharedErrors
+from groundstation.survey.trust import Trust
+from telemetry.messages import ImuMean, NodeFlag, SurveyMeasurement
+
+VAR = 1e-7
+COV = ((VAR, 0.0, 0.0), (0.0, VAR, 0.0), (0.0, 0.0, VAR))
+MOST_BYTES = 700  # of a survey
+EVERY = (Trust.FULL, Trust.UNKNOWN_YAW)
+
+
+def survey(tube: int, number: int, at: float, imus: int = 1) -> SurveyMeasurement:
+    lean = 0.001 * tube
+    force = (9.81 * math.sin(lean), 0.0, -9.81 * math.cos(lean))
+    means = tuple(ImuMean((force[0] + 1e-4 * imu, *force[1:]), COV) for imu in range(imus))
+    flags = NodeFlag.RESTORED if number % 2 else NodeFlag.NONE
+    return SurveyMeasurement(tube, number, at, tube, means, 0.1 * tube, 1e-8, 1e-7, 32, 20.0, flags)
+
+
+def cluster(tube: int, number: int, at: float, imus: int = 1) -> Cluster:
+    measured = survey(tube, number, at, imus)
+    resolved = resolve(np.array(measured.imus[0].force), np.array(COV), measured.yaw, measured.yaw_var)
+    reading = SharedErrors().reading(resolved, tube, list(range(tube + 1, tube + 3)), 1e-7, 1e-8, 1e-3)
+    quality = Quality.MOTION | Quality.SPREAD if number % 3 == 0 else Quality.GOOD
+    return cluster_of(measured, 2.0 * tube, reading, quality, EVERY[number % 2], number)
+
+
+def same(one: Cluster, other: Cluster) -> bool:
+    plain = [field.name for field in fields(Cluster) if field.name != "direction"]
+    mine, theirs = one.direction, other.direction
+    arrays = ("lean", "down", "cov", "shared", "information", "total_cov")
+    return all(getattr(one, name) == getattr(other, name) for name in plain) and all(
+        np.array_equal(getattr(mine, name), getattr(theirs, name)) for name in arrays
+    )
+
+
+@given(st.lists(st.tuples(st.integers(1, 50), st.integers(0, 20), st.integers(1, 4)), max_size=30))
+def test_whatever_is_inserted_is_given_back_in_the_order_of_time(course: list[tuple[int, int, int]]) -> None:
+    clusters, expected = Clusters(), list[Cluster]()
+    for number, (tube, at, imus) in enumerate(course):
+        expected.append(cluster(tube, number, float(at), imus))
+        expected.sort(key=lambda known: known.order)
+        place = clusters.insert(next(one for one in expected if one.number == number))
+        assert expected[place].number == number
+    assert len(clusters) == len(expected)
+    assert all(same(one, other) for one, other in zip(clusters, expected, strict=True))
+    assert [one.number for one in clusters[:2]] == [one.number for one in expected[:2]]
+
+
+def test_a_place_that_there_is_not_is_named() -> None:
+    clusters = Clusters()
+    clusters.insert(cluster(1, 1, 5.0))
+    assert clusters[-1].number == 1
+    with pytest.raises(IndexError, match="cluster 1: expected one of 1"):
+        _ = clusters[1]
+
+
+def test_what_cannot_be_weighed_is_not_inserted() -> None:
+    nothing_known = np.zeros((2, 2))
+    bare = Direction(np.zeros(2), 1.0, nothing_known, np.zeros((2, 0)))
+    direction = Reading(bare, np.zeros((2, 5)), np.zeros(5, np.intp), 5)
+    clusters = Clusters()
+    with pytest.raises(np.linalg.LinAlgError):
+        clusters.insert(replace(cluster(1, 1, 5.0), direction=direction))
+    assert len(clusters) == 0
+
+
+def test_a_departure_is_kept_until_an_earlier_cluster_comes() -> None:
+    clusters = Clusters()
+    for number, at in enumerate((5.0, 7.0, 9.0)):
+        clusters.insert(cluster(1, number, at))
+    clusters.keep_departure(1, (np.array([1e-3, 2e-3]), 2.5))
+    clusters.keep_departure(2, (np.array([3e-3, 0.0]), 1.5))
+    known = clusters.departure(1)
+    assert known is not None
+    np.testing.assert_array_equal(known[0], [1e-3, 2e-3])
+    assert known[1] == 2.5
+    clusters.insert(cluster(1, 3, 8.0))
+    assert clusters.departure(1) is not None
+    assert [clusters.departure(place) for place in (0, 2, 3)] == [None, None, None]
+
+
+@pytest.mark.slow
+def test_a_survey_takes_little_memory(tmp_path: Path) -> None:
+    """Ten tubes that survey the same stations again and again."""
+    model = RigModel(GroundConfig(folder=tmp_path, target=40.0))
+    model.tally.restore(list(range(10, 0, -1)))
+
+    def drill(stops: range) -> int:
+        for stop in stops:
+            for tube in range(1, 11):
+                assert model.on_survey(survey(tube, stop, 100.0 * stop + 0.5 * tube), 2.0 * tube) == ""
+        model.hole.settle()
+        gc.collect()
+        return tracemalloc.get_traced_memory()[0]
+
+    drill(range(1, 50))
+    tracemalloc.start()
+    try:
+        before, after = drill(range(50, 100)), drill(range(100, 200))
+    finally:
+        tracemalloc.stop()
+    assert sum(station.count for station in model.stations) == 1990
+    assert 200.0 < (after - before) / 1000 < MOST_BYTES
