@@ -4,19 +4,14 @@ A row is the message as it came (telemetry's payload) with the depth it was give
 of string below its tube. The same message twice is one row: identity is tube, sequence and content, so a tube that lost
 its memory and counts anew still gets its surveys stored.
 
-A disk that refuses leaves what is there readable: a database that cannot be written is opened all the same, a row that
-is damaged is passed over and counted, and a file that was deleted under the running program is noticed before the next
-commit, which would be lost with it.
+A row that is damaged is passed over and counted.
 """
 
 from __future__ import annotations
 
-import contextlib
 import math
-import sqlite3
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from pathlib import Path
 from typing import Any
 
 import sqlalchemy as sa
@@ -24,7 +19,24 @@ import sqlalchemy as sa
 from groundstation.errors import StoreError
 from groundstation.service.alarm_record import DamagedAlarmError, alarm_of_text, alarm_to_text
 from groundstation.service.crew_alarms import CrewAlarm
+from groundstation.service.database import Database
 from groundstation.service.depth import NEVER, Doubt, Instant
+from groundstation.service.tables import (
+    ADD,
+    ADD_ALARM,
+    ALARMS,
+    BLOCKS,
+    DROP,
+    DROP_ALARM,
+    FIND,
+    JOINTS,
+    MESSAGES,
+    META,
+    PLACE,
+    RECALIBRATION,
+    STANDS,
+    STRING,
+)
 from groundstation.survey.joint_angles import Joint, Pair
 from telemetry.errors import DecodeError
 from telemetry.messages import Event, Kept, Stand, StaticRecord, SurveyMeasurement
@@ -33,76 +45,7 @@ from telemetry.presentation.content import content_of
 from telemetry.presentation.msgpack_codec import decode, encode
 from telemetry.runtime.disk import MACHINE, Disk
 
-SCHEMA = 3
-READABLE = (2, 3)  # schemas; what a later one has more is made when it is opened
 ALARMS_KEPT = 1000
-SHOWN = 5  # tables named of a database that is not ours
-METADATA = sa.MetaData()
-META = sa.Table(
-    "meta",
-    METADATA,
-    sa.Column("name", sa.String(32), primary_key=True),
-    sa.Column("value", sa.String(64), nullable=False),
-)
-MESSAGES = sa.Table(
-    "messages",
-    METADATA,
-    sa.Column("id", sa.Integer, primary_key=True),
-    sa.Column("tube", sa.Integer, nullable=False),
-    sa.Column("sequence", sa.BigInteger, nullable=False),
-    sa.Column("content", sa.String(32), nullable=False),
-    sa.Column("kind", sa.String(16), nullable=False),
-    sa.Column("md", sa.Float),
-    sa.Column("below", sa.Float),
-    sa.Column("payload", sa.LargeBinary, nullable=False),
-    sa.UniqueConstraint("tube", "sequence", "content"),
-)
-SAME = sa.and_(*(MESSAGES.c[name] == sa.bindparam(f"its_{name}") for name in ("tube", "sequence", "content")))
-FIND, DROP, ADD = sa.select(MESSAGES.c.payload).where(SAME), sa.delete(MESSAGES).where(SAME), sa.insert(MESSAGES)
-PLACE = sa.update(MESSAGES).where(SAME).values(md=sa.bindparam("depth"))
-STANDS = sa.Table(
-    "stands",
-    METADATA,
-    sa.Column("epoch", sa.BigInteger, primary_key=True, autoincrement=False),
-    sa.Column("begun_at", sa.Float, primary_key=True),
-    sa.Column("ended_at", sa.Float, nullable=False),
-    sa.Column("md", sa.Float, nullable=False),
-)
-STRING = sa.Table(
-    "string",
-    METADATA,
-    sa.Column("place", sa.Integer, primary_key=True, autoincrement=False),
-    sa.Column("tube", sa.Integer, nullable=False),
-)
-BLOCKS = sa.Table(
-    "blocks",
-    METADATA,
-    sa.Column("sha256", sa.String(64), primary_key=True),
-    sa.Column("content", sa.LargeBinary, nullable=False),
-)
-RECALIBRATION = sa.Table(
-    "recalibration",
-    METADATA,
-    sa.Column("id", sa.Integer, primary_key=True, autoincrement=False),
-    sa.Column("progress", sa.Text, nullable=False),
-)
-
-
-JOINTS = sa.Table(
-    "joints",
-    METADATA,
-    sa.Column("upper", sa.Integer, primary_key=True, autoincrement=False),
-    sa.Column("lower", sa.Integer, primary_key=True, autoincrement=False),
-    sa.Column("angle", sa.Float, nullable=False),
-    sa.Column("var", sa.Float, nullable=False),
-)
-ALARMS = sa.Table(
-    "alarms",
-    METADATA,
-    sa.Column("number", sa.Integer, primary_key=True, autoincrement=False),
-    sa.Column("content", sa.Text, nullable=False),
-)
-DROP_ALARM, ADD_ALARM = sa.delete(ALARMS).where(ALARMS.c.number == sa.bindparam("its_number")), sa.insert(ALARMS)
 
 
 @dataclass(frozen=True, slots=True)
@@ -114,43 +57,17 @@ class Stored:
     below: float | None = None
 
 
-class Store:
-    """Database of one rig.
-
-    Parameters
-    ----------
-    url : SQLAlchemy URL; SQLite runs in WAL mode with every commit forced to the disk
-    disk : that holds a database which is a file
+class Store(Database):
+    """What one rig's ground station keeps.
 
     Attributes
     ----------
-    refusal : why the database takes nothing, or empty
     damaged : messages that could not be read
-
-    Raises
-    ------
-    StoreError
-        When the database cannot be opened, is no database, or belongs to another version.
     """
 
     def __init__(self, url: str, disk: Disk = MACHINE) -> None:
-        self._disk = disk
-        self._engine = _engine_of(url, disk)
-        address = self._engine.url
-        self._where = address.database or address.render_as_string(hide_password=True)
-        self._file = Path(address.database) if self._engine.dialect.name == "sqlite" and address.database else None
-        self.refusal = ""
+        super().__init__(url, disk)
         self.damaged = 0
-        self.boots = 0
-        try:
-            with self._refusing("; choose a writable --folder or another database"):
-                if self._file is not None:
-                    disk.make_folder(self._file.parent)
-                self._begin(self._check_schema())
-        except StoreError:
-            self.close()
-            raise
-        self._inode = self._found_inode()
 
     def add_message(self, message: Kept, md: float | None, below: float | None = None) -> bool:
         """Store one message, see ``add_messages``."""
@@ -337,89 +254,6 @@ class Store:
                 self.damaged += 1
         return found
 
-    def _has(self, table: sa.Table) -> bool:
-        """Whether there is a table; a database of before that cannot be written lacks the later ones."""
-        with self._refusing():
-            return sa.inspect(self._engine).has_table(table.name)
-
-    def close(self) -> None:
-        """Close every connection."""
-        self._engine.dispose()
-
-    @contextlib.contextmanager
-    def _writing(self) -> Iterator[sa.Connection]:
-        """A transaction, committed to a file that still has its name."""
-        try:
-            with self._refusing():
-                if self._found_inode() != self._inode:
-                    raise StoreError(f"database {self._where}: was removed or replaced while the ground station ran")
-                with self._engine.begin() as connection:
-                    yield connection
-        except StoreError as error:
-            self.refusal = str(error)
-            self._engine.dispose()  # a file that was opened while it could not be written stays so
-            raise
-        self.refusal = ""
-
-    def _found_inode(self) -> int:
-        """Identity of the file that has the database's name; 0 where there is none, or no file."""
-        return self._disk.identity(self._file) if self._file is not None else 0
-
-    @contextlib.contextmanager
-    def _refusing(self, remedy: str = "") -> Iterator[None]:
-        """Name the database and the reason in whatever it refuses."""
-        try:
-            yield
-        except StoreError:
-            raise
-        except (sa.exc.SQLAlchemyError, OSError) as error:
-            reason = str(getattr(error, "orig", None) or getattr(error, "strerror", None) or error)
-            raise StoreError(f"database {self._where}: {reason}{remedy}") from error
-
-    def _check_schema(self) -> list[str]:
-        """Look without a change whether the database is one of ours; its tables, none of a new one."""
-        tables = sorted(sa.inspect(self._engine).get_table_names())
-        if tables and META.name not in tables:
-            raise StoreError(
-                f"database {self._where}: expected an empty one or that of a ground station, "
-                f"got tables {', '.join(tables[:SHOWN])}; choose another --folder or database"
-            )
-        found = self._meta() if tables else {}
-        if found and found.get("schema") not in [str(schema) for schema in READABLE]:
-            wanted = " or ".join(map(str, READABLE))
-            raise StoreError(
-                f"database {self._where}: expected schema {wanted}, got {found.get('schema')}; "
-                "one of a later version is read by that version"
-            )
-        return tables if found else []
-
-    def _meta(self) -> dict[str, str]:
-        with self._engine.connect() as connection:
-            return {row.name: row.value for row in connection.execute(sa.select(META))}
-
-    def _begin(self, tables: list[str]) -> None:
-        """Make ready for writing and count this start; a database of ours that refuses is read all the same."""
-        if self._engine.dialect.name == "sqlite":
-            self._engine.dispose()  # the connection that only looked is not durable
-            sa.event.listen(self._engine, "connect", _durable)
-        try:
-            with self._refusing():
-                if lacking := [table for table in METADATA.sorted_tables if table.name not in tables]:
-                    METADATA.create_all(self._engine, lacking)
-                self._count_start()
-        except StoreError as error:
-            if not tables:
-                raise
-            self.refusal = str(error)
-
-    def _count_start(self) -> None:
-        boots = int(self._meta().get("boots", "0")) + 1
-        rows = [{"name": "schema", "value": str(SCHEMA)}, {"name": "boots", "value": str(boots)}]
-        self.boots = boots
-        with self._engine.begin() as connection:
-            connection.execute(sa.delete(META).where(META.c.name.in_(["schema", "boots"])))
-            connection.execute(sa.insert(META), rows)
-
 
 def _numbers(*values: float) -> str:
     return " ".join(map(repr, values))
@@ -443,28 +277,3 @@ def row_of(message: Kept, payload: bytes) -> dict[str, Any]:
 def is_depth(value: object) -> bool:
     """Whether a stored depth is one, or not known yet."""
     return value is None or (isinstance(value, float) and math.isfinite(value) and value >= 0.0)
-
-
-def _engine_of(url: str, disk: Disk) -> sa.Engine:
-    """Engine of a URL, a file by ``disk``; a refusal does not repeat the URL, which may hold a password."""
-    try:
-        address = sa.make_url(url)
-        if address.get_backend_name() == "sqlite" and address.database and not address.query:
-            file = Path(address.database)
-            return sa.create_engine(address, creator=lambda _record=None: disk.connect(file))
-        if address.drivername == "postgresql":
-            address = address.set(drivername="postgresql+psycopg")
-        return sa.create_engine(address)
-    except (sa.exc.SQLAlchemyError, ImportError) as error:
-        raise StoreError(
-            f"database URL: expected one such as sqlite:///FILE whose driver is installed: {error}"
-        ) from error
-
-
-def _durable(connection: sa.engine.interfaces.DBAPIConnection, _record: object) -> None:
-    cursor = connection.cursor()
-    with contextlib.suppress(sqlite3.OperationalError):  # a file that cannot be written can be read
-        cursor.execute("PRAGMA journal_mode=WAL")
-    cursor.execute("PRAGMA synchronous=FULL")
-    cursor.execute("PRAGMA busy_timeout=5000")
-    cursor.close()

@@ -11,8 +11,8 @@ import pytest
 from borechain.gauntlet import rig as gauntlet_rig
 from borechain.gauntlet.run import run_seed, shrink
 from groundstation.errors import StoreError
+from groundstation.service import database
 from groundstation.service import model as model_module
-from groundstation.service import store as store_module
 from groundstation.service.process import GroundProcess
 from groundstation.service.store import Stored
 from groundstation.survey.trust import Trust
@@ -99,13 +99,13 @@ def refused_and_receipted(patch: pytest.MonkeyPatch) -> None:
 
 
 def synchronous_below_full(patch: pytest.MonkeyPatch) -> None:
-    plain = store_module._durable
+    plain = database._durable
 
     def not_durable(connection: object, record: object) -> None:
         plain(connection, record)  # type: ignore[arg-type]
         connection.execute("PRAGMA synchronous=NORMAL")  # type: ignore[attr-defined]
 
-    patch.setattr(store_module, "_durable", not_durable)
+    patch.setattr(database, "_durable", not_durable)
 
 
 def boots_not_forced(patch: pytest.MonkeyPatch) -> None:
