@@ -33,6 +33,7 @@ ENCODER: Final = np.dtype(
         ("edge_at", "f8"),  # s, rig time of the last edge; NaN: none yet
         ("edge_angle", "f8"),  # rad, of that edge
         ("resting", "i8"),  # 1: the present rest has its number
+        ("doubtful_angle", "f8"),  # rad, of a rest's last reading, if it contradicted the measurement; else NaN
         ("placed", "i8"),  # 1: it is known what the head went beyond its last edge
         ("beyond", "f8"),  # counts, that
         ("beyond_var", "f8"),  # counts^2, of it
@@ -53,7 +54,8 @@ SAMPLE: Final = 9
 def new_encoder(first_sequence: int, largest_torque: float) -> Array:
     """Encoder node before its first cycle, one record of dtype ``ENCODER``; the string was under ``largest_torque``."""
     made = np.zeros(1, ENCODER)
-    made["sequence"], made["edge_at"], made["largest_torque"] = first_sequence, np.nan, largest_torque
+    made["sequence"], made["largest_torque"] = first_sequence, largest_torque
+    made["edge_at"] = made["doubtful_angle"] = np.nan
     return made
 
 
@@ -102,13 +104,18 @@ def measure_turning(encoder: Any, sample: Array, aiding: Array) -> None:
 def measure_rest(encoder: Any, sample: Array, aiding: Array) -> None:
     """The place of the rest inside its count; a count that is another one without an edge is a new measurement.
 
-    A tube whose gyroscope saw nothing move looks again then, and doubts it.
+    A tube whose gyroscope saw nothing move looks again then, and doubts it. Two readings in a row must say so: after
+    one that was off alone the rest would be the same measurement under another number, and be used twice.
     """
-    before_angle = encoder.edge_angle
+    before_angle, doubtful = encoder.edge_angle, encoder.doubtful_angle
     take_edge(encoder, sample)
-    if encoder.resting == 0 or encoder.edge_angle != before_angle:
+    encoder.doubtful_angle = math.nan
+    if encoder.resting == 0 or encoder.edge_angle == doubtful:
         encoder.resting = 1
         encoder.sequence += 1
+    elif encoder.edge_angle != before_angle:
+        encoder.doubtful_angle = encoder.edge_angle
+        encoder.edge_angle = before_angle
     if encoder.placed == 0:
         encoder.placed, encoder.beyond, encoder.beyond_var = 1, sample[BEYOND], sample[BEYOND_VAR]
     beyond = encoder.beyond if sample[RISING] != 0.0 else -encoder.beyond
