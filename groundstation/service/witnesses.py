@@ -34,7 +34,7 @@ class Witnesses:
 
     def __init__(self) -> None:
         # newest contradiction by tube and start: a stranger with the number of a tube speaks for itself alone
-        self._contradicted: dict[tuple[int, str, float], Event] = {}
+        self._contradicted: dict[tuple[int, int], Event] = {}
         self._starts: deque[Event] = deque(maxlen=STARTS_KEPT)
         self._off: Times = {}
         self._blind: Times = {}  # without a gyroscope
@@ -57,10 +57,11 @@ class Witnesses:
         elif event.code == "sensor_recovered" and event.arguments.get("after") in BLIND:
             self._end_blind(place, event)
         elif event.code in AGAINST_THE_ENCODER:
-            self._contradicted[event.tube, *self._start_before(event)] = event
+            start = self._start_before(event)
+            self._contradicted[event.tube, 0 if start is None else start.sequence] = event
             while len(self._contradicted) > STARTS_KEPT:
                 del self._contradicted[next(iter(self._contradicted))]
-        elif event.code == ELSEWHERE and self._has_just_been_restored(event):
+        elif event.code == ELSEWHERE and self._was_restored(event) and not self._was_settled(event):
             self._elsewhere[event.tube] = event
             if nobody := self._nobody_has_watched(event, heard):
                 return nobody
@@ -74,7 +75,7 @@ class Witnesses:
         together = self._together(event)
         tubes = {e.tube for e in together}
         seeing = [tube for tube in heard if tube in tubes or not self._was_without_gyroscope(tube, event)]
-        if tubes >= set(seeing) and any(self._start_before(e)[0] == "restored" for e in together):
+        if tubes >= set(seeing) and any(self._was_restored(e) for e in together):
             return True  # every yaw that was saved or known says another thing
         # one that has just started contradicts what it saved: the string may have turned while it was off
         settled = [e for e in together if self._was_settled(e)]
@@ -83,10 +84,6 @@ class Witnesses:
         if any(e.code != "yaw_reset" for e in settled):
             enough = ENOUGH  # alone, a gyroscope is wrong sooner
         return len(settled) >= max(enough, 1)
-
-    def _has_just_been_restored(self, event: Event) -> bool:
-        code, at = self._start_before(event)
-        return code == "restored" and event.at <= at + SETTLED_AFTER
 
     def _nobody_has_watched(self, event: Event, heard: Collection[int]) -> str:
         """Says so where all who are heard have just started upon a yaw of another place."""
@@ -121,14 +118,21 @@ class Witnesses:
 
     def _was_settled(self, event: Event) -> bool:
         """Whether a tube had found its yaw before, since its start."""
-        return event.epoch != EPOCH_UNKNOWN and event.at >= self._start_before(event)[1] + SETTLED_AFTER
+        if event.epoch == EPOCH_UNKNOWN:
+            return False
+        start = self._start_before(event)
+        return start is None or self._apart(start, event) >= SETTLED_AFTER
 
-    def _start_before(self, event: Event) -> tuple[str, float]:
-        """Kind and time of the start that an event followed, by its number: two tubes may have the same name."""
-        known = (s for s in self._starts if (s.tube, s.epoch) == (event.tube, event.epoch))
+    def _was_restored(self, event: Event) -> bool:
+        """Whether a tube had gone on from what it had saved."""
+        start = self._start_before(event)
+        return start is not None and start.code == "restored"
+
+    def _start_before(self, event: Event) -> Event | None:
+        """The start that an event followed, by its number: two tubes may have the same name, and epochs may change."""
+        known = (start for start in self._starts if start.tube == event.tube and start.epoch <= event.epoch)
         before = [start for start in known if start.sequence <= event.sequence]
-        start = max(before, key=lambda start: (start.sequence, start.at), default=None)
-        return ("", -math.inf) if start is None else (start.code, start.at)
+        return max(before, key=lambda start: (start.sequence, *_in_time(start)), default=None)
 
     def _end_blind(self, place: tuple[int, int], event: Event) -> None:
         """The gyroscope gives something again: the newest time without one that had begun has an end.

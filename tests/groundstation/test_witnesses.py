@@ -137,6 +137,12 @@ def test_a_stranger_that_has_just_started_does_not_hide_what_the_tube_of_its_num
     stranger = [event(2, 114.2, "booted", 1), event(2, 114.2, "yaw_reset", 2)]
     began = [event(1, 0.0, "restored", 7), event(2, 0.0, "restored", 7)]
     assert told([*began, event(2, 114.1, "yaw_reset", 11), *stranger, gone]) == ["tubes 2 at 114 s"]
+    # nor after the encoder has started again, when the last start of the tube is of another epoch
+    later = [
+        event(2, 14.0, "booted", 1, epoch=2), event(2, 16.0, "yaw_reset", 13, epoch=2),
+        event(1, 20.0, "restored", 13, epoch=2),
+    ]  # fmt: skip
+    assert told([*began, event(2, 300.0, "stopped", 12), *later]) == ["tubes 2 at 16 s"]
 
 
 def test_contradictions_of_two_times_are_not_added_up() -> None:
