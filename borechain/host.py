@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import contextlib
 import queue
+import sys
 import warnings
 from collections.abc import Callable
 from contextlib import AbstractContextManager
@@ -21,6 +22,8 @@ from telemetry.media.zenoh_bus import ZenohBus, open_client, open_router
 from telemetry.media.zenoh_port import CONNECT_TIMEOUT
 from telemetry.runtime.hosting import Place, begin_process, on_termination, reporting
 
+SAY_EVERY = 10.0  # wall s, of who is waited for
+
 
 def run_medium(
     place: Place,
@@ -35,8 +38,9 @@ def run_medium(
 ) -> None:
     """World, joints and clock; in a rig without an outside router its session is the router.
 
-    ``cued`` says that somebody plays the operator, ``transports`` which joints are not on zenoh, ``hole`` which one of
-    the scenario's site is drilled.
+    ``cued`` says that a launcher has started all processes and plays the operator; without one, whoever has not joined
+    is waited for: nobody knows how long it compiles. ``transports`` says which joints are not on zenoh, ``hole`` which
+    one of the scenario's site is drilled.
     """
     from sim.rig.bus_stepper import BusStepper
     from sim.rig.scheduler import Progress, Scheduler
@@ -64,11 +68,19 @@ def run_medium(
             def tell(progress: Progress) -> None:
                 wanted.put(pack_progress(progress))
 
-            scheduler = Scheduler(world, stepper, tell, speed, cued=cued, seal_depth=seal_depth)
+            absent = None if cued else say_absent
+            scheduler = Scheduler(world, stepper, tell, speed, cued=cued, seal_depth=seal_depth, absent=absent)
             on_termination(scheduler.stop)
             with contextlib.closing(stepper):
                 if scheduler.run():
                     scheduler.linger()
+
+
+def say_absent(name: str, waited: float) -> None:
+    """Say now and then who has not joined the rig (wall s)."""
+    if waited > 0.0 and waited % SAY_EVERY == 0.0:
+        sys.stderr.write(f"borechain medium: {name} has not joined for {waited:.0f} s, it is waited for\n")
+        sys.stderr.flush()
 
 
 def depth_sealer(place: Path | None) -> Callable[[bytes], bytes]:

@@ -10,6 +10,7 @@ from __future__ import annotations
 import bisect
 import contextlib
 import heapq
+import itertools
 import math
 import queue
 import time
@@ -53,6 +54,18 @@ class Progress:
     cue: str = ""  # what the operator is to do now
 
 
+def give_up(name: str, waited: float) -> None:
+    """Wait no longer for a process that was started and does not come.
+
+    Raises
+    ------
+    RigError
+        After ``ATTACH_LIMIT``.
+    """
+    if waited >= ATTACH_LIMIT:
+        raise RigError(f"process {name} did not attach within {ATTACH_LIMIT:.0f} s")
+
+
 class Scheduler:
     """Conducts one scenario.
 
@@ -64,6 +77,7 @@ class Scheduler:
     speed : rig seconds per wall second, infinite for as fast as possible
     cued : somebody plays the operator and is waited for, so that what he does falls on the same rig time in every run
     seal_depth : what the source of the depth makes of a reading's payload
+    absent : called with the name of a process that is waited for and for how long it has been (wall s); it may raise
     """
 
     def __init__(
@@ -75,11 +89,13 @@ class Scheduler:
         *,
         cued: bool = False,
         seal_depth: Callable[[bytes], bytes] = bytes,
+        absent: Callable[[str, float], None] | None = None,
     ) -> None:
         self.world = world
         self.stepper = stepper
         self._tell = tell
         self._cued = cued
+        self._absent = absent or give_up
         self._speed = speed
         medium = world.scenario.medium
         self.channel = LinkChannel(
@@ -231,14 +247,14 @@ class Scheduler:
 
         One that was there and does not come back by itself is perhaps frozen: the launcher is told to end it.
         """
-        for turn in range(int(ATTACH_LIMIT / TELL_EVERY)):
+        for turn in itertools.count():
+            self._absent(address_name(address), turn * TELL_EVERY)
             if turn == int(FROZEN_AFTER / TELL_EVERY) and address in self._attached:
                 self._end_hung([address])
             self._tell(self.progress)
             if self._stopping or self.stepper.wait_for(address, alive=True, timeout=TELL_EVERY):
                 self._attached.add(address)
                 return
-        raise RigError(f"process {address_name(address)} did not attach within {ATTACH_LIMIT:.0f} s")
 
     def _cut_power(self, address: int) -> None:
         """Have the launcher cut the power of a process; the rig's time goes on when it is gone."""

@@ -97,3 +97,19 @@ def test_the_joint_readings_are_those_of_the_scenario() -> None:
 def test_the_compose_file_has_keys_a_router_encoder_medium_two_nodes_and_ground() -> None:
     assert {name.split("-")[0] for name in SERVICES} == {"keys", "router", "encoder", "medium", "node", "ground"}
     assert len(SERVICES) == 7
+
+
+def test_a_medium_waits_for_whoever_has_not_joined_and_says_so(tmp_path: Path) -> None:
+    """Services of a cold start compile for minutes where the machine is busy."""
+    words = command(
+        "medium", "compose-2", "--router", "--endpoint", free_endpoint(), "--rig", "alone", "--folder", str(tmp_path)
+    )
+    with subprocess.Popen(words, cwd=REPOSITORY, stderr=subprocess.PIPE, text=True) as alone:
+        try:
+            assert alone.stderr is not None
+            said = alone.stderr.readline()
+            assert said == "borechain medium: encoder has not joined for 10 s, it is waited for\n"
+            alone.terminate()
+            assert alone.wait(30.0) == 0
+        finally:
+            alone.kill()
