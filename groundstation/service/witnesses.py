@@ -16,6 +16,8 @@ from telemetry.messages import EPOCH_UNKNOWN, Event
 
 AGAINST_THE_ENCODER = ("yaw_reset", "gyro_step", "gyro_scale")
 STARTS = ("booted", "restored")
+REJECTED = "aiding_rejected"  # the first of a row of aidings that contradict a yaw, up to its reset
+CUT_SHORT = 60.0  # s from there to a start, after which it was an outlier
 ELSEWHERE = "reference_changed"  # the yaw of a node came over other joints before
 BLIND = ("bad_sample", "gyro_saturated", "gyro_stuck")  # the gyroscope gives nothing, until the sensor has recovered
 CYCLE = 10.0 / 19.0  # s, of a node
@@ -38,6 +40,7 @@ class Witnesses:
         self._starts: deque[Event] = deque(maxlen=STARTS_KEPT)
         self._off: Times = {}
         self._blind: Times = {}  # without a gyroscope
+        self._rejected: dict[int, Event] = {}  # newest row of contradictions without an outcome, by tube
         self._elsewhere: dict[int, Event] = {}  # newest start upon a yaw of another place, by tube
         self._told: tuple[Event, ...] = ()
         self._spans: dict[int, tuple[float, float]] = {}  # s, first and last event of each epoch
@@ -49,6 +52,7 @@ class Witnesses:
         if event.code in STARTS:
             self._starts.append(event)
             _add_time(self._off, place, event.at - OFF_BEFORE, event.at)
+            self._count_what_was_cut_short(event)
         elif event.code == "overrun":
             _add_time(self._off, place, event.at, event.at + CYCLE * int(str(event.arguments.get("missed", 0))))
         elif event.code in BLIND:
@@ -56,11 +60,11 @@ class Witnesses:
             return ""  # what it tells next says whether that is over by now
         elif event.code == "sensor_recovered" and event.arguments.get("after") in BLIND:
             self._end_blind(place, event)
+        elif event.code == REJECTED:
+            self._rejected[event.tube] = event
         elif event.code in AGAINST_THE_ENCODER:
-            start = self._start_before(event)
-            self._contradicted[event.tube, 0 if start is None else start.sequence] = event
-            while len(self._contradicted) > STARTS_KEPT:
-                del self._contradicted[next(iter(self._contradicted))]
+            self._rejected.pop(event.tube, None)
+            self._count(event)
         elif event.code == ELSEWHERE and self._was_restored(event) and not self._was_settled(event):
             self._elsewhere[event.tube] = event
             if nobody := self._nobody_has_watched(event, heard):
@@ -70,6 +74,19 @@ class Witnesses:
             return ""
         self._told = told
         return f"tubes {', '.join(str(tube) for tube in sorted({e.tube for e in told}))} at {found.at:.0f} s"
+
+    def _count(self, event: Event) -> None:
+        start = self._start_before(event)
+        self._contradicted[event.tube, 0 if start is None else start.sequence] = event
+        while len(self._contradicted) > STARTS_KEPT:
+            del self._contradicted[next(iter(self._contradicted))]
+
+    def _count_what_was_cut_short(self, start: Event) -> None:
+        """A tube that lost its power as it began to contradict will not say so again: it takes what it is given then."""
+        rejected = self._rejected.get(start.tube)
+        is_before = rejected is not None and _in_time(rejected) <= _in_time(start)
+        if rejected is not None and is_before and self._apart(rejected, start) <= CUT_SHORT:
+            self._count(self._rejected.pop(start.tube))
 
     def _speaks_against_the_encoder(self, event: Event, heard: Collection[int]) -> bool:
         together = self._together(event)

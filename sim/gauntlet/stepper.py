@@ -46,8 +46,8 @@ class FaultyStepper(InProcessStepper):
             self._thawing[address] = self._frozen.pop(address)
 
     def is_frozen(self, address: int) -> bool:
-        """Whether a process stands still."""
-        return address in self._frozen
+        """Whether a process stands still, or has not moved since."""
+        return address in self._frozen or address in self._thawing
 
     def follow(self, progress: Progress) -> None:
         """Make what runs equal to what the schedule wants; the power may go at a start too."""

@@ -107,6 +107,8 @@ def test_combined_seeds_hold(first: int) -> None:
         # the ground station knows of the stop from its second half only
         (322663, ("encoder-from-zero", "cut-again-and-again", "node-memory-rots", "database-deleted")),
         (409896, ("same-number", "encoder-slips")),  # a stranger with the same number had nothing to say
+        (502133, ("frozen", "bytes-rot")),  # the ground station had not moved since it stood still
+        (502246, ("all-cut", "encoder-slips")),  # the power went while both began to contradict
         (417334, ("encoder-from-zero", "same-number", "gyro-stuck", "encoder-slips")),  # nor does an older epoch
         (403035, ("folders-swapped", "encoder-slips")),  # both had saved the yaw of another place
         (51633, ("surveys-lost", "gyro-step")),  # a gyroscope that turned its tube while nobody corrected it

@@ -145,6 +145,15 @@ def test_a_stranger_that_has_just_started_does_not_hide_what_the_tube_of_its_num
     assert told([*began, event(2, 300.0, "stopped", 12), *later]) == ["tubes 2 at 16 s"]
 
 
+def test_two_tubes_whose_contradiction_a_cut_of_power_has_ended_speak_against_the_encoder() -> None:
+    rejections = [event(2, 117.9, "aiding_rejected", 10), event(1, 118.4, "aiding_rejected", 10)]
+    starts = [event(2, 137.4, "restored", 13), event(1, 138.4, "restored", 14)]
+    assert told([*BOTH_STARTED, *rejections, *starts]) == ["tubes 1, 2 at 118 s"]
+    assert told([*BOTH_STARTED, *rejections, starts[0]]) == []  # the other one ran on, and took it for an outlier
+    late = [event(2, 237.4, "restored", 13), event(1, 238.4, "restored", 14)]
+    assert told([*BOTH_STARTED, *rejections, *late]) == []
+
+
 def test_contradictions_of_two_times_are_not_added_up() -> None:
     late = event(2, 200.0, "yaw_reset")
     assert told([*BOTH_STARTED, event(1, 100.0, "yaw_reset"), late]) == []
