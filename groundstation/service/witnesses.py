@@ -82,7 +82,7 @@ class Witnesses:
             del self._contradicted[next(iter(self._contradicted))]
 
     def _count_what_was_cut_short(self, start: Event) -> None:
-        """A tube that lost its power as it began to contradict will not say so again: it takes what it is given then."""
+        """A tube that lost its power as it began to contradict will not go on: it takes the yaw that it is given."""
         rejected = self._rejected.get(start.tube)
         is_before = rejected is not None and _in_time(rejected) <= _in_time(start)
         if rejected is not None and is_before and self._apart(rejected, start) <= CUT_SHORT:

@@ -6,10 +6,12 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from node.firmware.kernel_choice import kernel_of
 from node.firmware.settings import TubeSettings
 from node.firmware.torque import TorqueSettings
 from node.kernels.jit import leave_blas_out
 from node.kernels.layout import PERIOD
+from node.kernels.warm import warm_encoder, warm_step
 from node.process.drivers.source import EncoderSource, ImuSource
 from node.process.encoder_process import EncoderProcess
 from node.process.tube_process import TubeProcess
@@ -40,7 +42,10 @@ def run_node(
     seals = seals_at(place.keys, settings.tube, settings.reach, place.rig)
 
     def build(timing: CycleTiming | None = None) -> TubeProcess:
-        return TubeProcess(settings, place.folder, key=key, imus=imus, timing=timing, seals=seals)
+        process = TubeProcess(settings, place.folder, key=key, imus=imus, timing=timing, seals=seals)
+        loop = kernel_of(settings.kernel)
+        warm_step(loop.step, loop.aiding)  # on a cold machine half a minute, for which who has said that he lives hangs
+        return process
 
     name = f"node {settings.tube}"
     warn_of_keys(name, seals)
@@ -66,7 +71,9 @@ def run_encoder(
 
     def build(timing: CycleTiming | None = None) -> EncoderProcess:
         # on a board nobody can tell a new folder from one that was lost
-        return EncoderProcess(place.folder, source, torque, timing, reach, seals=seals, is_new=own_time is None)
+        process = EncoderProcess(place.folder, source, torque, timing, reach, seals=seals, is_new=own_time is None)
+        warm_encoder()
+        return process
 
     warn_of_keys("encoder", seals)
     if own_time is None:
