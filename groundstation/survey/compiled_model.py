@@ -13,8 +13,10 @@ import hashlib
 import importlib.util
 import math
 import sys
+import tempfile
 from collections.abc import Callable, Sequence
 from dataclasses import replace
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -197,16 +199,19 @@ def _record(survey: Survey) -> Array:
 
 
 def _load(source: str) -> Callable[..., Any]:
-    """Function of a written model, from the cache folder of the kernels."""
-    from node.kernels.jit import cache_folder
+    """Function of a written model, from the cache folder of the kernels.
+
+    Each lies in a folder of its own: a compiled function is kept as long as the sources beside it stay what they were.
+    """
+    from node.kernels.jit import folder_in_use
 
     name = f"model_{hashlib.sha256(source.encode()).hexdigest()[:16]}"
-    path = cache_folder() / "models" / f"{name}.py"
+    path = folder_in_use() / "models" / name / f"{name}.py"
     if not path.exists():
         path.parent.mkdir(parents=True, exist_ok=True)
-        fresh = path.with_suffix(f".{id(source)}.new")
-        fresh.write_text(source)
-        fresh.replace(path)
+        with tempfile.NamedTemporaryFile("w", dir=path.parent, suffix=".new", delete=False) as fresh:
+            fresh.write(source)
+        Path(fresh.name).replace(path)  # whoever writes it beside us writes the same
     spec = importlib.util.spec_from_file_location(name, path)
     if spec is None or spec.loader is None:
         raise ToolError(f"{path}: the compiled model cannot be loaded; remove the file")

@@ -84,6 +84,11 @@ if not os.environ.get("NUMBA_CACHE_DIR"):
     use_cache()
 
 
+def folder_in_use() -> Path:
+    """Folder that compiled kernels are kept in by this process: the usual one, or what took its place."""
+    return Path(vars(config)["CACHE_DIR"])
+
+
 def leave_blas_out() -> None:
     """Have numba load without a BLAS: for a process of ours, whose kernels multiply by themselves.
 
@@ -108,7 +113,7 @@ class SourceLocator(UserProvidedCacheLocator):
 
     def __init__(self, function: Callable[..., Any], file: str) -> None:
         super().__init__(function, file)  # type: ignore[no-untyped-call]
-        self._place = Path(vars(config)["CACHE_DIR"]) / function.__module__
+        self._place = folder_in_use() / function.__module__
         self._stamp = source_digest() + folder_digest(Path(file).parent)
 
     def get_cache_path(self) -> str:

@@ -4,18 +4,20 @@ import math
 from dataclasses import replace
 from pathlib import Path
 
+import numba
 import numpy as np
 import pytest
 
 from groundstation.errors import SurveyError, ToolError
 from groundstation.survey.analysis import analyse
-from groundstation.survey.compiled_model import COMPILED_FROM, CompiledModel, warm, write_model
+from groundstation.survey.compiled_model import COMPILED_FROM, CompiledModel, _load, warm, write_model
 from groundstation.survey.error_model import propagate
 from groundstation.survey.error_sources import Leg, Site, Survey
 from groundstation.survey.frames import Frame, Norths
 from groundstation.survey.instruments import Mode, Term, Tool, load_tool, shipped
 from groundstation.survey.methods import Method, positions
 from groundstation.survey.records import Record
+from node.kernels import jit
 
 SITE = Site(9.80665, 50_300.0, math.radians(68.0), math.radians(2.0), math.radians(55.0))
 
@@ -124,3 +126,18 @@ def test_a_warmed_tool_serves_surveys_of_any_length() -> None:
     warm(["relay"])
     record = Record(np.array([0.0, 2.0, 4.0]), np.zeros(3), np.zeros(3), [0, 1, 2], {})
     assert analyse(record, Method.BALANCED_TANGENTIAL, load_tool("relay"), SITE).uncertainty.model.quick_parts
+
+
+def test_an_instrument_stays_compiled_whatever_other_is_compiled_after_it(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setitem(vars(numba.config), "CACHE_DIR", str(tmp_path))
+
+    def stamp(name: str) -> str:
+        jit.folder_digest.cache_clear()  # as a process that has just begun
+        return str(_load(write_model(load_tool(name)))._cache._impl.locator.get_source_stamp())
+
+    before = stamp("relay")
+    assert stamp("mwd-rev5.1") != before
+    assert stamp("relay") == before
+    assert {path.suffix for path in tmp_path.rglob("model_*") if path.is_file()} <= {".py", ".pyc"}
