@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import gc
 import os
 import shutil
 from collections.abc import Iterator, Sequence
@@ -30,6 +31,10 @@ MEMORY, ROOM = Path("/dev/shm"), 1 << 30  # bytes; a whole run leaves some 50 MB
 if os.access(MEMORY, os.W_OK) and shutil.disk_usage(MEMORY).free > ROOM:
     # a third of the time went by waiting for a disk to sync what nobody will read after a power cut
     os.environ.setdefault("PYTEST_DEBUG_TEMPROOT", str(MEMORY))
+
+# the collector looks through all that lives whenever enough was made anew: modules and tests live to the end, so it
+# is off while they are loaded and leaves them out from then on
+gc.disable()
 
 TESTS = Path(__file__).parent
 WAITING = ("process", "install")  # markers of tests that wait for processes more than they compute
@@ -64,6 +69,12 @@ def pytest_collection_modifyitems(items: list[pytest.Item]) -> Iterator[None]:
     mark(items)
     yield
     items[:] = dealt(items, int(os.environ.get("PYTEST_XDIST_WORKER_COUNT", "1")))
+
+
+def pytest_collection_finish() -> None:
+    """Leave what was loaded out of every collection of garbage."""
+    gc.freeze()
+    gc.enable()
 
 
 def dealt(items: Sequence[pytest.Item], workers: int, cores: int = os.cpu_count() or 1) -> list[pytest.Item]:
