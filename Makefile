@@ -14,7 +14,7 @@ unexport PYTHONDONTWRITEBYTECODE
 PYTEST := $(BIN)/python -m pytest --numprocesses $(WORKERS) --maxprocesses 8 --dist worksteal
 
 .DEFAULT_GOAL := rig
-.PHONY: help rig test quick check lint types contracts kernels kernels-of-strings kernels-of-integers other-kernels bytecode browser fast tests statistical truth explore lock study soak seeds clean test-socketcan test-compose
+.PHONY: help rig test quick check lint types contracts kernels kernels-of-floats kernels-of-integers bytecode browser fast tests statistical truth explore lock study soak seeds clean test-socketcan test-compose
 
 help:  ## list the targets
 	@awk -F ':.*## ' '/^[a-z-]+:.*## / { printf "make %-20s %s\n", $$1, $$2 }' $(MAKEFILE_LIST)
@@ -51,16 +51,13 @@ types: $(STAMP)  ## mypy, strict
 contracts: $(STAMP)  ## which package may import which
 	$(BIN)/lint-imports
 
-kernels: kernels-of-strings kernels-of-integers other-kernels  ## compile what the tests would compile, each worker for itself
+kernels: kernels-of-floats kernels-of-integers  ## compile what the tests would compile, each worker for itself
 
-kernels-of-strings: $(STAMP)  ## those of a node's usual kernel and of strings
-	$(BIN)/python tests/tools/compile_kernels.py strings
+kernels-of-floats: $(STAMP)  ## those of a node, as it is and as published, of strings and of surveys
+	$(BIN)/python tests/tools/compile_kernels.py floats
 
 kernels-of-integers: $(STAMP)  ## those of a node in integers
 	$(BIN)/python tests/tools/compile_kernels.py integers
-
-other-kernels: $(STAMP)  ## those of a node as published, and of surveys
-	$(BIN)/python tests/tools/compile_kernels.py others
 
 bytecode: $(STAMP)  ## compile what the tests import, asserts rewritten, each worker for itself
 	$(BIN)/python -m pytest --collect-only --quiet --quiet > /dev/null || true  # the tests tell
