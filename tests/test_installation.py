@@ -196,7 +196,7 @@ def test_every_command_helps_and_does_its_job_or_names_the_extra_it_needs(
     assert int(helped.stdout) > 30
     started = environment.run("--version")
     assert (started.returncode, "version" in started.stdout) == (0, True), started.stderr
-    with forked_commands.start(environment.python, cwd=environment.folder, env=surroundings()) as forker:
+    with forked_commands.Forker(environment.python, cwd=environment.folder, env=surroundings()) as forker:
         check_jobs(environment, forker, extra)
     assert not (environment.folder / "never").exists()
     assert (environment.folder / "run").exists() == (extra == "ground")
@@ -211,10 +211,10 @@ def test_every_command_helps_and_does_its_job_or_names_the_extra_it_needs(
     assert str(overwritten) in refused.stderr
 
 
-def check_jobs(environment: Environment, forker: subprocess.Popen[str], extra: str) -> None:
+def check_jobs(environment: Environment, forker: forked_commands.Forker, extra: str) -> None:
     """Every command does its job there, or names the extra that it needs."""
     for words, needed, status, expected in JOBS:
-        done = forked_commands.run(*words, cwd=environment.folder, forker=forker)
+        done = forked_commands.run(*words, cwd=environment.folder, source=forker)
         assert "Traceback" not in done.stderr, done.stderr
         if needed in (None, extra):
             assert (done.returncode, expected in done.stdout + done.stderr) == (status, True), (words, done.stderr)
@@ -224,7 +224,7 @@ def check_jobs(environment: Environment, forker: subprocess.Popen[str], extra: s
             assert refused.groups() == (needed, needed), words
             assert (done.returncode, done.stdout) == (1, "")
     drilled = forked_commands.run(
-        "rig", "rig-3", "--inline", "--json", "--out", "run", cwd=environment.folder, forker=forker
+        "rig", "rig-3", "--inline", "--json", "--out", "run", cwd=environment.folder, source=forker
     )
     if extra == "ground":
         assert [station["md_m"] for station in json.loads(drilled.stdout)["stations"]] == [2.0, 4.0, 6.0]

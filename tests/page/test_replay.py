@@ -2,7 +2,6 @@
 
 import re
 import signal
-import subprocess
 from collections.abc import Callable
 from pathlib import Path
 
@@ -10,7 +9,7 @@ import pytest
 from hand_fed import Rig
 from page_client import PageClient, free_port
 from playwright.sync_api import Page, expect
-from rigs import command
+from rigs import started
 from tapes import write
 
 pytestmark = pytest.mark.process
@@ -26,9 +25,8 @@ def test_a_recording_is_shown_as_what_was_known_then(tmp_path: Path, watched: Op
     stations = rig.ask("stations")["stations"]
     rig.ground.close()
     port = free_port()
-    words = command("replay", str(tmp_path / "shift.mcap"), "--page", f"127.0.0.1:{port}", "--speed", "max")
-    with subprocess.Popen(words, stderr=subprocess.PIPE, text=True) as replay:
-        assert replay.stderr is not None
+    words = ("replay", str(tmp_path / "shift.mcap"), "--page", f"127.0.0.1:{port}", "--speed", "max")
+    with started(*words) as replay:
         assert replay.stderr.readline() == f"borechain ground: page http://127.0.0.1:{port}\n"
         page = watched(f"http://127.0.0.1:{port}")
         told = "REPLAY of shift.mcap: what was known then; no rig is shown live"

@@ -17,6 +17,9 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from forked_commands import Command, warm_forker
+from forked_commands import run as run_forked
+
 REPOSITORY = Path(__file__).parents[2]
 PATIENCE = 120.0
 FIRST_PORT, SHARE = 12_000, 1_000
@@ -67,7 +70,7 @@ def ends(group: int) -> bool:
 class Rig:
     """A running ``borechain rig`` and how to talk to it."""
 
-    process: subprocess.Popen[str]
+    process: Command | subprocess.Popen[str]
     endpoint: str
     out: Path
 
@@ -96,17 +99,12 @@ class Rig:
 
 @contextlib.contextmanager
 def running_rig(
-    tmp_path: Path, *arguments: str, scenario: str = "scenarios/rig-3.toml", before: Sequence[str] = ()
+    tmp_path: Path, *arguments: str, scenario: str = "scenarios/rig-3.toml", by: Sequence[str] | None = None
 ) -> Iterator[Rig]:
+    """A rig that is forked, or started by a command line that begins with the words ``by``."""
     endpoint, out = free_endpoint(), tmp_path / "run"
-    process = subprocess.Popen(
-        [*before, *command("rig", scenario, "--json", "--endpoint", endpoint, "--out", str(out), *arguments)],
-        cwd=REPOSITORY,
-        stdout=subprocess.PIPE,
-        stderr=subprocess.PIPE,
-        text=True,
-        start_new_session=True,
-    )
+    words = ("rig", scenario, "--json", "--endpoint", endpoint, "--out", str(out), *arguments)
+    process = started(*words, own_session=True) if by is None else started_by(by, *words)
     try:
         yield Rig(process, endpoint, out)
     finally:
@@ -115,6 +113,23 @@ def running_rig(
         process.communicate()
 
 
-def run(*arguments: str, cwd: Path = REPOSITORY) -> subprocess.CompletedProcess[str]:
+def started_by(by: Sequence[str], *words: str) -> subprocess.Popen[str]:
+    """A command in a session of its own, started as a user does, behind the words ``by``."""
+    return subprocess.Popen(
+        [*by, *command(*words)],
+        cwd=REPOSITORY,
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
+        start_new_session=True,
+    )
+
+
+def started(*words: str, own_session: bool = False) -> Command:
+    """A command that hosts processes of a rig, or is one."""
+    return Command(*words, source=warm_forker(), cwd=REPOSITORY, own_session=own_session)
+
+
+def run(*words: str, cwd: Path = REPOSITORY) -> subprocess.CompletedProcess[str]:
     """A command to its end."""
-    return subprocess.run(command(*arguments), capture_output=True, text=True, cwd=cwd, check=False, timeout=PATIENCE)
+    return run_forked(*words, timeout=PATIENCE, cwd=cwd, source=warm_forker())

@@ -4,14 +4,14 @@ import contextlib
 import json
 import math
 import queue
-import subprocess
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
 import pytest
 import yaml
-from rigs import PATIENCE, REPOSITORY, command, free_endpoint
+from forked_commands import Command
+from rigs import PATIENCE, REPOSITORY, free_endpoint, run, started
 
 from sim.world.scenario import load_scenario
 from sim.world.world import World
@@ -28,20 +28,20 @@ def local(words: list[str], endpoint: str, folder: Path, keys: Path) -> list[str
     swapped = [{"/state": str(folder), "/keys": str(keys)}.get(w, w) for w in swapped]
     if "--speed" in swapped:
         swapped[swapped.index("--speed") + 1] = "40"
-    return command(*swapped)
+    return swapped
 
 
 @contextlib.contextmanager
-def services(folder: Path) -> Iterator[tuple[dict[str, subprocess.Popen[str]], str]]:
+def services(folder: Path) -> Iterator[tuple[dict[str, Command], str]]:
     endpoint = free_endpoint().replace("tcp/", "tls/")
-    running: dict[str, subprocess.Popen[str]] = {}
+    running: dict[str, Command] = {}
     try:
         for name, service in SERVICES.items():
             words = local([str(word) for word in service["command"]], endpoint, folder / name, folder / "keys")
             if name == "keys":  # the others wait until it has ended well
-                assert subprocess.run(words, cwd=REPOSITORY, check=False).returncode == 0
+                assert run(*words).returncode == 0
                 continue
-            running[name] = subprocess.Popen(words, cwd=REPOSITORY, stderr=subprocess.PIPE, text=True)
+            running[name] = started(*words)
         yield running, endpoint
     finally:
         for process in running.values():
@@ -101,12 +101,9 @@ def test_the_compose_file_has_keys_a_router_encoder_medium_two_nodes_and_ground(
 
 def test_a_medium_waits_for_whoever_has_not_joined_and_says_so(tmp_path: Path) -> None:
     """Services of a cold start compile for minutes where the machine is busy."""
-    words = command(
-        "medium", "compose-2", "--router", "--endpoint", free_endpoint(), "--rig", "alone", "--folder", str(tmp_path)
-    )
-    with subprocess.Popen(words, cwd=REPOSITORY, stderr=subprocess.PIPE, text=True) as alone:
+    place = ("--endpoint", free_endpoint(), "--rig", "alone", "--folder", str(tmp_path))
+    with started("medium", "compose-2", "--router", *place) as alone:
         try:
-            assert alone.stderr is not None
             said = alone.stderr.readline()
             assert said == "borechain medium: encoder has not joined for 10 s, it is waited for\n"
             alone.terminate()

@@ -2,10 +2,9 @@
 
 import re
 import signal
-import subprocess
 from pathlib import Path
 
-from rigs import command, free_endpoint, run
+from rigs import free_endpoint, run, started
 
 from borechain.crew.log import RunLog
 
@@ -14,8 +13,7 @@ LINE = re.compile(r"\d{4}-\d\d-\d\dT\d\d:\d\d:\d\dZ +\d+\.\d s (\w+) +(.+)")
 
 def test_a_run_is_logged_a_line_for_whatever_happens_and_its_recording_gives_the_same_stations(tmp_path: Path) -> None:
     endpoint, recording = free_endpoint(), tmp_path / "run.mcap"
-    words = command("record", str(recording), "--endpoint", endpoint)
-    recorder = subprocess.Popen(words, stderr=subprocess.PIPE, text=True)
+    recorder = started("record", str(recording), "--endpoint", endpoint)
     done = run("rig", "rig-3", "--endpoint", endpoint, "--out", str(tmp_path / "run"), "--fault", "kill-node:1@70+20")
     recorder.send_signal(signal.SIGINT)
     try:

@@ -10,7 +10,6 @@ import queue
 import shutil
 import signal
 import socket
-import subprocess
 import threading
 import time
 from collections.abc import Callable, Iterator
@@ -19,7 +18,8 @@ from typing import Any
 
 import pytest
 from click.testing import CliRunner
-from rigs import PATIENCE, REPOSITORY, command, free_endpoint, run
+from forked_commands import Command as Forked
+from rigs import PATIENCE, free_endpoint, run, started
 
 from borechain.pki.access import read_access
 from borechain.pki.rig_keys import add_tube, init_rig
@@ -78,14 +78,11 @@ class String:
         self.folder, self.endpoint = folder, endpoint
         self.world = turning_once(1, time.monotonic(), 600.0, 10.0, 700.0, seed=4, clock_std=0.0)
         record(self.world, folder)
-        self.running: dict[str, subprocess.Popen[str]] = {}
+        self.running: dict[str, Forked] = {}
 
     def start(self, name: str, *options: str) -> None:
-        words = command(name, "--clock", "own", "--rig", RIG, "--endpoint", self.endpoint, *options)
-        words += ["--folder", str(self.folder / name)]
-        self.running[name] = subprocess.Popen(
-            words, cwd=REPOSITORY, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
-        )
+        place = ("--endpoint", self.endpoint, "--folder", str(self.folder / name))
+        self.running[name] = started(name, "--clock", "own", "--rig", RIG, *options, *place)
 
     def start_encoder(self) -> None:
         recording = f"timed:{self.folder / 'encoder.npy'}"

@@ -52,7 +52,7 @@ def test_read_only_folders_of_a_node_and_the_ground_station_are_told_and_lose_no
     def has_measured() -> bool:
         return bool((ask(rig, "borechain/*/ground/status") or {}).get("measurements"))
 
-    with running_rig(tmp_path, "--speed", "20", before=APART) as rig:
+    with running_rig(tmp_path, "--speed", "20", by=APART) as rig:
         rig.until(has_measured)
         told = {("tube_disk", "tube 1"), ("disk", "database")}
         node, ground = rig.out / "state" / "tube-1", rig.out / "state" / "ground"

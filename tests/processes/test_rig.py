@@ -13,7 +13,7 @@ from typing import Any
 
 import pytest
 from forked_commands import run as run_forked
-from rigs import REPOSITORY, command, ends, free_endpoint, run, running_rig, titles_of_group
+from rigs import REPOSITORY, ends, free_endpoint, run, running_rig, started, titles_of_group
 
 from groundstation.service.store import Store
 from telemetry.media.zenoh_bus import open_client
@@ -44,7 +44,7 @@ def inline(tmp_path_factory: pytest.TempPathFactory) -> tuple[dict[str, Any], Pa
 def test_three_tubes_give_three_stations_near_the_truth_and_leave_nothing_running(
     tmp_path: Path, inline: tuple[dict[str, Any], Path]
 ) -> None:
-    with running_rig(tmp_path, "--seed", "5") as rig:
+    with running_rig(tmp_path, "--seed", "5", by=()) as rig:
         result = rig.result()
         assert ends(rig.process.pid)
     assert [s["measurements"] for s in result["stations"]] == [3, 2, 1]
@@ -219,10 +219,8 @@ def test_a_column_that_leaves_its_tolerance_raises_alarms(scenario: Path, tmp_pa
 def test_an_operator_who_does_not_read_stops_nobody(tmp_path: Path) -> None:
     with running_rig(tmp_path, "--speed", "60") as rig:
         rig.pid_of("borechain node 1")
-        watching = command("watch", f"{GROUND}/**", "--endpoint", rig.endpoint)
-        with subprocess.Popen(watching, stdout=subprocess.PIPE, text=True) as watcher:
+        with started("watch", f"{GROUND}/**", "--endpoint", rig.endpoint) as watcher:
             try:
-                assert watcher.stdout is not None
                 assert watcher.stdout.readline().startswith("{")
                 os.kill(watcher.pid, signal.SIGSTOP)
                 result = rig.result()

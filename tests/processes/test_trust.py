@@ -3,12 +3,11 @@
 import os
 import resource
 import signal
-import subprocess
 from pathlib import Path
 from typing import Any
 
 import pytest
-from rigs import REPOSITORY, Rig, command, ends, free_endpoint, running_rig, titles_of_group
+from rigs import Rig, ends, free_endpoint, run, running_rig, titles_of_group
 
 from groundstation.errors import LeaseError
 from groundstation.gateway.lease import take_lease
@@ -61,8 +60,7 @@ def test_a_second_ground_station_is_refused_by_name(tmp_path: Path) -> None:
     endpoint = free_endpoint()
     with open_router(endpoint), open_client(endpoint, timeout=20.0) as first:
         take_lease(first, "rig-1")
-        words = command("ground", "--clock", "own", "--endpoint", endpoint, "--folder", str(tmp_path / "second"))
-        second = subprocess.run(words, cwd=REPOSITORY, capture_output=True, text=True, check=False, timeout=120.0)
+        second = run("ground", "--clock", "own", "--endpoint", endpoint, "--folder", str(tmp_path / "second"))
         assert second.returncode == 1
         assert f"rig rig-1: process {os.getpid()} on " in second.stderr
         assert len(second.stderr.strip().splitlines()) == 1

@@ -6,7 +6,7 @@ from collections.abc import Iterator
 
 import msgpack
 import pytest
-from rigs import command, free_endpoint, run
+from rigs import free_endpoint, run, started
 
 from telemetry.media.zenoh_bus import open_router
 
@@ -44,13 +44,11 @@ def test_a_value_of_any_form_is_one_line_of_json(payload: bytes, value: object) 
     place = free_endpoint()
     with open_router(place) as bus:
         publisher = bus.publisher(KEY)
-        words = command("watch", KEY, "--endpoint", place, "--count", "1")
-        with subprocess.Popen(words, stdout=subprocess.PIPE, text=True) as watching:
+        with started("watch", KEY, "--endpoint", place, "--count", "1") as watching:
             while watching.poll() is None:
                 publisher.put(payload)
                 try:
                     watching.wait(0.05)
                 except subprocess.TimeoutExpired:
                     continue
-            assert watching.stdout is not None
             assert json.loads(watching.stdout.read()) == {"key": KEY, "value": value}

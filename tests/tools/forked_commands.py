@@ -1,84 +1,225 @@
 """Commands of ours, each in a process of its own that is forked from one which has imported what they import.
 
 What a command writes, how it ends and what it leaves behind are those of ``python -m borechain``; a start costs a
-hundredth of a second where it costs one or two. Not for a command that hosts a process of the rig: those look at who
-started them.
+hundredth of a second where it costs one or two. Of a ``warm`` forker everything that a rig hosts is forked too: its
+children give their rigs a fork server that has imported and compiled everything, which costs another second else.
 """
 
 from __future__ import annotations
 
 import atexit
 import contextlib
+import fcntl
 import functools
 import importlib
 import json
 import os
 import select
+import signal
+import socket
 import subprocess
 import sys
-import tempfile
+import time
 import traceback
 from pathlib import Path
-from typing import Any
+from typing import IO, Any
 
 LAZY = ("matplotlib.pyplot", "scipy.optimize", "scipy.stats", "scipy.signal", "scipy.spatial")  # inside commands
+WARM = "borechain.warm"
+ONE_THREAD = dict.fromkeys(("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS"), "1")  # a thread forks not
+LONGEST = 1 << 16  # bytes of an order
+ASIDE = 500  # no file of a launcher has such a number
 
 
-def run(
-    *words: object, timeout: float = 120.0, cwd: Path | None = None, forker: Any = None
-) -> subprocess.CompletedProcess[str]:
-    """Run ``borechain`` with ``words`` to its end, forked from ``forker`` or from this worker's own."""
-    with tempfile.TemporaryDirectory() as folder:
-        out, err = Path(folder) / "out", Path(folder) / "err"
-        said = [str(word) for word in words]
-        order = {"words": said, "cwd": str(cwd or Path.cwd()), "out": str(out), "err": str(err)}
-        forker = forker or server()
-        forker.stdin.write(json.dumps(order) + "\n")
-        forker.stdin.flush()
-        if not select.select([forker.stdout], [], [], timeout)[0]:
-            forker.kill()
-            raise TimeoutError(f"borechain {' '.join(said)}: not done in {timeout:g} s")
-        status = int(forker.stdout.readline())
-        return subprocess.CompletedProcess(said, status, out.read_text(), err.read_text())
+class Forker:
+    """A process that forks commands of ``python``'s environment; it ends with its last user.
+
+    Parameters
+    ----------
+    python : interpreter
+    preload : modules besides those of the commands
+    options : of ``subprocess.Popen``
+    """
+
+    def __init__(self, python: str | Path = sys.executable, preload: tuple[str, ...] = (), **options: Any) -> None:
+        self._channel, theirs = socket.socketpair(socket.AF_UNIX, socket.SOCK_SEQPACKET)
+        self._process = subprocess.Popen([python, __file__, *preload], stdin=theirs, **options)
+        theirs.close()
+
+    def __enter__(self) -> Forker:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self._channel.close()
+        self._process.wait()
+
+    def order(self, order: dict[str, Any], files: list[int]) -> None:
+        """Have a command forked that writes into ``files``; the last of them tells its pid and its exit status."""
+        socket.send_fds(self._channel, [json.dumps(order).encode()], files)
 
 
 @functools.cache
-def server() -> Any:
-    """The process that forks, one for each worker of the tests."""
-    started = start(sys.executable)
-    atexit.register(started.__exit__, None, None, None)  # it ends with its input
-    return started
+def forker(*preload: str) -> Forker:
+    """The forker of this worker of the tests."""
+    made = Forker(preload=preload, env=os.environ | ONE_THREAD)
+    atexit.register(made.__exit__)
+    return made
 
 
-def start(python: str | Path, **options: Any) -> subprocess.Popen[str]:
-    """A process that forks commands of ``python``'s environment."""
-    return subprocess.Popen([python, __file__], stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True, **options)
+def warm_forker() -> Forker:
+    """One with the kernels, whose children host processes of a rig."""
+    return forker(WARM)
 
 
-def serve() -> None:
-    """Fork a child for every order that comes, wait for it and answer its exit status."""
-    from borechain.__main__ import COMMANDS, main
+class Command:
+    """``borechain`` with ``words`` as a process, with the methods of ``subprocess.Popen``.
 
-    for module in (*(module for module, _, _ in COMMANDS.values()), *LAZY):
+    Parameters
+    ----------
+    source : who forks it
+    own_session : whether it begins a session and a process group
+    """
+
+    def __init__(self, *words: object, source: Forker, cwd: Path | None = None, own_session: bool = False) -> None:
+        ends = [os.pipe() for _ in range(3)]
+        self.args = [str(word) for word in words]
+        source.order(
+            {"words": self.args, "cwd": str(cwd or Path.cwd()), "own_session": own_session}, [end[1] for end in ends]
+        )
+        for _, theirs in ends:
+            os.close(theirs)
+        self.stdout, self.stderr, self._status = (os.fdopen(ours, encoding="utf-8") for ours, _ in ends)
+        self.returncode: int | None = None
+        self.pid = int(self._status.readline())
+
+    def __enter__(self) -> Command:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.stdout.close()
+        self.stderr.close()
+        self.wait()
+
+    def poll(self) -> int | None:
+        """Exit status, or None while it lives."""
+        with contextlib.suppress(subprocess.TimeoutExpired):
+            self.wait(0.0)
+        return self.returncode
+
+    def wait(self, timeout: float | None = None) -> int:
+        """Exit status, once it has ended."""
+        if self.returncode is None:
+            if not select.select([self._status], [], [], timeout)[0]:
+                raise subprocess.TimeoutExpired(self.args, timeout or 0.0)
+            self.returncode = int(self._status.readline())
+            self._status.close()
+        return self.returncode
+
+    def communicate(self, timeout: float | None = None) -> tuple[str, str]:
+        """What it wrote, once it has ended and nobody can write any more."""
+        until = None if timeout is None else time.monotonic() + timeout
+        texts = {self.stdout: b"", self.stderr: b""}
+        rest: list[IO[str]] = [file for file in texts if not file.closed]
+        while rest:
+            left = None if until is None else max(until - time.monotonic(), 0.0)
+            ready = select.select(rest, [], [], left)[0]
+            if not ready:
+                raise subprocess.TimeoutExpired(self.args, timeout or 0.0)
+            for file in ready:
+                if read := os.read(file.fileno(), LONGEST):
+                    texts[file] += read
+                else:
+                    rest.remove(file)
+                    file.close()
+        self.wait(timeout)
+        return texts[self.stdout].decode(), texts[self.stderr].decode()
+
+    def send_signal(self, number: int) -> None:
+        """Send it a signal, where it lives."""
+        if self.poll() is None:
+            os.kill(self.pid, number)
+
+    def terminate(self) -> None:
+        """Ask it to end."""
+        self.send_signal(signal.SIGTERM)
+
+    def kill(self) -> None:
+        """End it."""
+        self.send_signal(signal.SIGKILL)
+
+
+def run(
+    *words: object, timeout: float = 120.0, cwd: Path | None = None, source: Forker | None = None
+) -> subprocess.CompletedProcess[str]:
+    """Run ``borechain`` with ``words`` to its end, forked from ``source`` or from this worker's own forker."""
+    command = Command(*words, source=source or forker(), cwd=cwd)
+    try:
+        out, err = command.communicate(timeout)
+    finally:
+        command.kill()
+    return subprocess.CompletedProcess(command.args, command.wait(), out, err)
+
+
+def serve(preload: list[str]) -> None:
+    """Fork a child for every order that comes, and tell its pid and how it ended."""
+    from borechain.__main__ import COMMANDS
+
+    for module in (*preload, *(module for module, _, _ in COMMANDS.values()), *LAZY):
         with contextlib.suppress(ModuleNotFoundError):  # where an extra is missing, its commands say so
             importlib.import_module(module)
-    for line in sys.stdin:
-        order = json.loads(line)
-        child = os.fork()
+    channel = socket.socket(fileno=os.dup(0))
+    woken, wake = os.pipe()
+    os.set_blocking(wake, False)
+    signal.set_wakeup_fd(wake)
+    signal.signal(signal.SIGCHLD, lambda _number, _frame: None)
+    told: dict[int, int] = {}  # who hears how a child ends, by its pid
+    while True:
+        ready = select.select([channel, woken], [], [])[0]
+        if woken in ready:
+            os.read(woken, LONGEST)
+            tell_ends(told)
+        if channel in ready:
+            order, files, _, _ = socket.recv_fds(channel, LONGEST, 3)
+            if not order:
+                return
+            child = os.fork()
+            if child == 0:
+                for file in (channel.detach(), woken, wake, *told.values()):
+                    os.close(file)
+                be(json.loads(order), files, is_host=bool(preload))
+            os.write(files[2], f"{child}\n".encode())
+            told[child] = files[2]
+            os.close(files[0])
+            os.close(files[1])
+
+
+def tell_ends(told: dict[int, int]) -> None:
+    """Say of every child that has ended with which status."""
+    while told:
+        child, status = os.waitpid(-1, os.WNOHANG)
         if child == 0:
-            be(order, main)
-        print(os.waitstatus_to_exitcode(os.waitpid(child, 0)[1]), flush=True)
+            return
+        with contextlib.suppress(BrokenPipeError), os.fdopen(told.pop(child), "w") as listener:
+            listener.write(f"{os.waitstatus_to_exitcode(status)}\n")
 
 
-def be(order: dict[str, Any], main: Any) -> None:
+def be(order: dict[str, Any], files: list[int], *, is_host: bool) -> None:
     """Be the command, and end."""
+    signal.set_wakeup_fd(-1)
+    signal.signal(signal.SIGCHLD, signal.SIG_DFL)
+    if order["own_session"]:
+        os.setsid()
     os.chdir(order["cwd"])
-    os.dup2(os.open(os.devnull, os.O_RDONLY), 0)
-    for number, name in ((1, "out"), (2, "err")):
-        os.dup2(os.open(order[name], os.O_WRONLY | os.O_CREAT), number)
+    for number, file in enumerate((os.open(os.devnull, os.O_RDONLY), files[0], files[1])):
+        os.dup2(file, number)
+        os.close(file)
+    os.close(files[2])
+    program = sys.modules["__main__"] = importlib.import_module("borechain.__main__")
+    if is_host:
+        fork_servers_from(server_in_waiting())
     status = 0
     try:
-        main(order["words"])
+        program.main(order["words"])
     except SystemExit as end:
         status = end.code if isinstance(end.code, int) else 1
         if isinstance(end.code, str):
@@ -91,5 +232,44 @@ def be(order: dict[str, Any], main: Any) -> None:
     os._exit(status)
 
 
+def server_in_waiting() -> tuple[int, socket.socket]:
+    """A copy of this process that will be a fork server once it is told; it ends where it is not.
+
+    It is made before the command has a thread, which no fork takes along.
+    """
+    ours, theirs = socket.socketpair(socket.AF_UNIX, socket.SOCK_SEQPACKET)
+    child = os.fork()
+    if child:
+        theirs.close()
+        return child, ours
+    ours.close()
+    order, files, _, _ = socket.recv_fds(theirs, LONGEST, 8)
+    if order:
+        code, numbers = json.loads(order)
+        aside = [fcntl.fcntl(file, fcntl.F_DUPFD, ASIDE) for file in files]  # never on a number still to be given
+        for number, file in zip(numbers, aside, strict=True):
+            os.dup2(file, number)
+            os.close(file)
+        exec(code, {})
+    os._exit(0)
+
+
+def fork_servers_from(waiting: tuple[int, socket.socket]) -> None:
+    """Have ``multiprocessing`` take what waits for its first fork server, in place of an interpreter that it starts."""
+    from multiprocessing import util
+
+    usual = util.spawnv_passfds
+
+    def spawn(path: Any, words: Any, files: Any) -> int:
+        if "multiprocessing.forkserver" not in words[-1]:
+            return int(usual(path, words, files))
+        socket.send_fds(waiting[1], [json.dumps([words[-1], list(files)]).encode()], files)
+        waiting[1].close()
+        util.spawnv_passfds = usual  # type: ignore[attr-defined]
+        return waiting[0]
+
+    util.spawnv_passfds = spawn  # type: ignore[attr-defined]
+
+
 if __name__ == "__main__":
-    serve()
+    serve(sys.argv[1:])
