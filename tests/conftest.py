@@ -24,6 +24,7 @@ if PROFILE != "explore":
     # ran what before would change the examples
     providers._get_local_constants = providers.Constants
 
+os.environ.setdefault("BORECHAIN_TEST_RUN", str(os.getpid()))  # its workers share what forks commands for them
 if "PYTEST_XDIST_WORKER" in os.environ:
     os.environ.setdefault("BORECHAIN_CORES", "1")  # every worker is a core; a pool in each would start twice as many
 

@@ -75,7 +75,7 @@ def test_what_is_said_of_before_is_what_an_uncalibrated_rig_shows(
     drifted.write_text(text[: text.index("[calibration]")].replace('"kill-node:2@474+15"', ""))
     path = "field-calibration-path.csv"
     (tmp_path / path).write_text((REPOSITORY / "scenarios" / path).read_text())
-    with running_rig(tmp_path, "--seed", "1", scenario=str(drifted)) as rig:
+    with running_rig(tmp_path, "--seed", "1", "--inline", scenario=str(drifted)) as rig:
         assert "calibration" not in rig.result()
     world = World(load_scenario(drifted), 1)
     errors = []

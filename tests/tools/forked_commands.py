@@ -7,10 +7,10 @@ children give their rigs a fork server that has imported and compiled everything
 
 from __future__ import annotations
 
-import atexit
 import contextlib
 import fcntl
 import functools
+import gc
 import importlib
 import json
 import os
@@ -27,12 +27,16 @@ from typing import IO, Any
 LAZY = ("matplotlib.pyplot", "scipy.optimize", "scipy.stats", "scipy.signal", "scipy.spatial")  # inside commands
 WARM = "borechain.warm"
 ONE_THREAD = dict.fromkeys(("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS"), "1")  # a thread forks not
+RUN = int(os.environ.get("BORECHAIN_TEST_RUN", os.getpid()))  # pid of what all workers of the tests descend from
+END = b"end"
 LONGEST = 1 << 16  # bytes of an order
 ASIDE = 500  # no file of a launcher has such a number
 
 
 class Forker:
-    """A process that forks commands of ``python``'s environment; it ends with its last user.
+    """A process that forks commands of ``python``'s environment, for all workers of one run of the tests.
+
+    Whoever needs it first starts it; it ends with the run, or after a ``with``.
 
     Parameters
     ----------
@@ -42,16 +46,30 @@ class Forker:
     """
 
     def __init__(self, python: str | Path = sys.executable, preload: tuple[str, ...] = (), **options: Any) -> None:
-        self._channel, theirs = socket.socketpair(socket.AF_UNIX, socket.SOCK_SEQPACKET)
-        self._process = subprocess.Popen([python, __file__, *preload], stdin=theirs, **options)
-        theirs.close()
+        self._server: subprocess.Popen[bytes] | None = None
+        self._channel = socket.socket(socket.AF_UNIX, socket.SOCK_SEQPACKET)
+        address = "\0" + " ".join(map(str, ("forker", RUN, python, *preload)))  # that no file stands for
+        while True:
+            with contextlib.suppress(ConnectionRefusedError):
+                self._channel.connect(address)
+                return
+            with socket.socket(socket.AF_UNIX, socket.SOCK_SEQPACKET) as listener:
+                try:
+                    listener.bind(address)
+                except OSError:  # another worker begins just now
+                    continue
+                listener.listen()
+                words = [python, __file__, str(RUN), *preload]
+                self._server = subprocess.Popen(words, stdin=listener, **options)
 
     def __enter__(self) -> Forker:
         return self
 
     def __exit__(self, *_: object) -> None:
+        self._channel.send(END)
         self._channel.close()
-        self._process.wait()
+        if self._server is not None:
+            self._server.wait()
 
     def order(self, order: dict[str, Any], files: list[int]) -> None:
         """Have a command forked that writes into ``files``; the last of them tells its pid and its exit status."""
@@ -60,10 +78,8 @@ class Forker:
 
 @functools.cache
 def forker(*preload: str) -> Forker:
-    """The forker of this worker of the tests."""
-    made = Forker(preload=preload, env=os.environ | ONE_THREAD)
-    atexit.register(made.__exit__)
-    return made
+    """The forker of this run of the tests."""
+    return Forker(preload=preload, env=os.environ | ONE_THREAD)
 
 
 def warm_forker() -> Forker:
@@ -160,47 +176,78 @@ def run(
     return subprocess.CompletedProcess(command.args, command.wait(), out, err)
 
 
-def serve(preload: list[str]) -> None:
-    """Fork a child for every order that comes, and tell its pid and how it ended."""
+class Server:
+    """Forks a child for every order that comes, and tells its pid and how it ended.
+
+    Parameters
+    ----------
+    run : pid; with that process it ends
+    is_host : whether its children give fork servers to rigs
+    """
+
+    def __init__(self, run: int, *, is_host: bool) -> None:
+        self._is_host = is_host
+        self._listener = socket.socket(fileno=os.dup(0))
+        self._end = os.pidfd_open(run)
+        self._woken, self._wake = os.pipe()
+        os.set_blocking(self._wake, False)
+        signal.set_wakeup_fd(self._wake)
+        signal.signal(signal.SIGCHLD, lambda _number, _frame: None)
+        self._users: list[socket.socket] = []
+        self._told: dict[int, int] = {}  # who hears how a child ends, by its pid
+
+    def serve(self) -> None:
+        """Take orders until one says that it is the last."""
+        while True:
+            ready = select.select([self._listener, self._woken, self._end, *self._users], [], [])[0]
+            if self._end in ready:
+                return
+            if self._woken in ready:
+                os.read(self._woken, LONGEST)
+                self._tell_ends()
+            if self._listener in ready:
+                self._users.append(self._listener.accept()[0])
+            for user in [user for user in self._users if user in ready]:
+                order, files, _, _ = socket.recv_fds(user, LONGEST, 3)
+                if order == END:
+                    return
+                if order:
+                    self._fork(json.loads(order), files)
+                else:
+                    self._users.remove(user)
+                    user.close()
+
+    def _fork(self, order: dict[str, Any], files: list[int]) -> None:
+        child = os.fork()
+        if child == 0:
+            sockets = (self._listener, *self._users)
+            for file in (self._end, self._woken, self._wake, *self._told.values(), *(s.detach() for s in sockets)):
+                os.close(file)
+            be(order, files, is_host=self._is_host)
+        os.write(files[2], f"{child}\n".encode())
+        self._told[child] = files[2]
+        for file in files[:2]:
+            os.close(file)
+
+    def _tell_ends(self) -> None:
+        while self._told:
+            child, status = os.waitpid(-1, os.WNOHANG)
+            if child == 0:
+                return
+            with contextlib.suppress(BrokenPipeError), os.fdopen(self._told.pop(child), "w") as listener:
+                listener.write(f"{os.waitstatus_to_exitcode(status)}\n")
+
+
+def serve(run: int, preload: list[str]) -> None:
+    """Import what commands import, and fork them until the run of the tests has ended."""
     from borechain.__main__ import COMMANDS
 
     for module in (*preload, *(module for module, _, _ in COMMANDS.values()), *LAZY):
         with contextlib.suppress(ModuleNotFoundError):  # where an extra is missing, its commands say so
             importlib.import_module(module)
-    channel = socket.socket(fileno=os.dup(0))
-    woken, wake = os.pipe()
-    os.set_blocking(wake, False)
-    signal.set_wakeup_fd(wake)
-    signal.signal(signal.SIGCHLD, lambda _number, _frame: None)
-    told: dict[int, int] = {}  # who hears how a child ends, by its pid
-    while True:
-        ready = select.select([channel, woken], [], [])[0]
-        if woken in ready:
-            os.read(woken, LONGEST)
-            tell_ends(told)
-        if channel in ready:
-            order, files, _, _ = socket.recv_fds(channel, LONGEST, 3)
-            if not order:
-                return
-            child = os.fork()
-            if child == 0:
-                for file in (channel.detach(), woken, wake, *told.values()):
-                    os.close(file)
-                be(json.loads(order), files, is_host=bool(preload))
-            os.write(files[2], f"{child}\n".encode())
-            told[child] = files[2]
-            os.close(files[0])
-            os.close(files[1])
-
-
-def tell_ends(told: dict[int, int]) -> None:
-    """Say of every child that has ended with which status."""
-    while told:
-        child, status = os.waitpid(-1, os.WNOHANG)
-        if child == 0:
-            return
-        with contextlib.suppress(BrokenPipeError), os.fdopen(told.pop(child), "w") as listener:
-            listener.write(f"{os.waitstatus_to_exitcode(status)}\n")
+    gc.collect()
+    gc.freeze()
+    Server(run, is_host=bool(preload)).serve()
 
 
 def be(order: dict[str, Any], files: list[int], *, is_host: bool) -> None:
@@ -272,4 +319,4 @@ def fork_servers_from(waiting: tuple[int, socket.socket]) -> None:
 
 
 if __name__ == "__main__":
-    serve(sys.argv[1:])
+    serve(int(sys.argv[1]), sys.argv[2:])
