@@ -53,10 +53,11 @@ contracts: $(STAMP)  ## which package may import which
 
 kernels: kernels-of-floats kernels-of-integers  ## compile what the tests would compile, each worker for itself
 
-kernels-of-floats: $(STAMP)  ## those of a node, as it is and as published, of strings and of surveys
+# what they import is compiled once, before them
+kernels-of-floats: bytecode  ## those of a node, as it is and as published, of strings and of surveys
 	$(BIN)/python tests/tools/compile_kernels.py floats
 
-kernels-of-integers: $(STAMP)  ## those of a node in integers
+kernels-of-integers: bytecode  ## those of a node in integers
 	$(BIN)/python tests/tools/compile_kernels.py integers
 
 bytecode: $(STAMP)  ## compile what the tests import, asserts rewritten, each worker for itself
