@@ -307,7 +307,7 @@ class GroundProcess(Process):
             is_present = stand.epoch in (EPOCH_UNKNOWN, model.epoch) and stand.ended_at <= reading.at
             is_news = is_present and not model.depths.is_of_before(stand, model.epoch)
             if is_news and stand.md <= model.tally.deepest:
-                self._on_stand(stand if stand.epoch == model.epoch else replace(stand, epoch=model.epoch))
+                self._on_stand(Stand(model.epoch, stand.begun_at, stand.ended_at, stand.md))
         self._keep_stand(reading)
         self._place_waiting()
         self._publish(["status", "string"])

@@ -116,7 +116,7 @@ class FaultyWorld(World):
             self._counted[t] = super().encoder_sample(t)
         count, edge_at, rising, torque, earlier = self._counted[t]
         off = self.zero - self.jumps.get(ENCODER, 0.0)
-        return count + self.slipped, edge_at - off, rising, torque, tuple(edge - off for edge in earlier)
+        return count + self.slipped, edge_at - off, rising, torque, tuple([edge - off for edge in earlier])
 
     def imu_sample(self, tube: int, cycle: int) -> Reading:
         """Reading of a tube, spoiled where its sensor fails."""

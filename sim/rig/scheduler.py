@@ -37,6 +37,7 @@ TELL_EVERY = 0.5  # wall s
 CUE_LIMIT = 120.0  # wall s
 CUE_AGAIN = 2.0  # rig s, until an operator who was too early tries again
 REBOOT_TIME = 5.0  # rig s that a process may be missing before the rig's time waits for it
+FRAME_AT = {Side.UPPER: Due.UPPER_FRAME, Side.LOWER: Due.LOWER_FRAME}  # event of a frame that comes in at an end
 Entry = tuple[float, int, int, int, "Due | None", bytes, "float | None"]
 
 
@@ -380,7 +381,7 @@ class Scheduler:
             end = self._other_end(address, sent.side)
             for delay, arriving in self.channel.deliveries(address, sent.side, frame):
                 if end is not None:
-                    self._push(at + delay, end[0], Due(int(end[1])), arriving)
+                    self._push(at + delay, end[0], FRAME_AT[end[1]], arriving)
         wake = self.world.true_time(address, answer.wake_at) if math.isfinite(answer.wake_at) else math.inf
         if math.isfinite(wake) and self._wake.get(address) != wake:
             self._push(wake, address, Due.TIMER, b"")
@@ -399,7 +400,7 @@ class Scheduler:
             joints = chain[min(place, other) + 1 : max(place, other) + 1]
             facing = Side.UPPER if side is Side.LOWER else Side.LOWER
             for delay, arriving, margin in radio.deliveries(sender, side, chain[other], joints, at, frame):
-                self._push(at + delay, chain[other], Due(int(facing)), arriving, margin)
+                self._push(at + delay, chain[other], FRAME_AT[facing], arriving, margin)
 
     def _other_end(self, address: int, side: Side) -> tuple[int, Side] | None:
         """Which port a port looks into now; None at the bit, at the surface and at an open joint."""

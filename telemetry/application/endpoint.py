@@ -9,9 +9,8 @@ from __future__ import annotations
 
 import math
 from collections import Counter, OrderedDict, deque
-from dataclasses import dataclass
 from functools import partial
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
 
 from telemetry.application.clock import ClockFilter
 from telemetry.application.outbox import Outbox
@@ -96,16 +95,14 @@ PRIORITIES: dict[Kind, Priority] = {
 }
 
 
-@dataclass(frozen=True, slots=True)
-class Received:
+class Received(NamedTuple):
     """A message for this process and the end it came in at."""
 
     message: Message
     side: Side
 
 
-@dataclass(frozen=True, slots=True)
-class Neighbour:
+class Neighbour(NamedTuple):
     """Who is at the other side of a joint."""
 
     tube: int
@@ -232,7 +229,10 @@ class Endpoint:
         """Frames to put on the wire now."""
         seals = self.seals
         if seals is None:
-            return [(side, frame) for side, link in self._links.items() for frame in link.take_frames(now)]
+            frames: list[tuple[Side, Frame]] = []
+            for side, link in self._links.items():
+                frames += [(side, frame) for frame in link.take_frames(now)]
+            return frames
         return [
             (side, frame)
             for side, link in self._links.items()
@@ -241,7 +241,10 @@ class Endpoint:
 
     def next_wake(self, now: float) -> float:
         """Local time (s) at which ``advance`` and ``take_frames`` have work that no frame brings."""
-        wake = min((link.next_wake(now) for link in self._links.values()), default=math.inf)
+        wake = math.inf
+        for link in self._links.values():
+            if (due := link.next_wake(now)) < wake:
+                wake = due
         return wake if self.seals is None else min(wake, self.seals.next_wake())
 
     def send_aiding(self, aiding: Aiding, now: float) -> None:
@@ -561,9 +564,11 @@ class Endpoint:
             self._send_due(self._outbox, Side.UPPER, now)
 
     def _send_due(self, outbox: Outbox, side: Side, now: float) -> None:
-        if side is Side.UPPER and side in self._links:
+        if not len(outbox) or side not in self._links:
+            return
+        if side is Side.UPPER:
             for payload in outbox.due_payloads(now):
                 self._links[side].send_reliable(self._sealed(payload), Priority.SURVEY)
-        elif side in self._links:
+        else:
             for payload in outbox.due_payloads(now):
                 self._send_down(payload, open_payload(payload).target, Priority.COMMAND)

@@ -40,6 +40,7 @@ class MessageCodec:
         self._spec = spec
         self._readers: dict[int, Reader] = {}  # by schema version, compiled when a payload of it comes
         self.kind = spec.kind
+        self._number = int(spec.kind)
         self.message = spec.message
         self.newest = spec.newest
         self.fields = tuple(codec_of(field) for field in spec.fields)
@@ -71,7 +72,7 @@ class MessageCodec:
         """Payload of the values of all fields, which are checked, in the earliest schema version that has them."""
         version = 1
         for place, since, before in self._later:
-            if since > version and values[place] != before:
+            if values[place] != before and since > version:
                 version = since
         origin = NO_TARGET if self._origin is None else values[self._origin]
         sequence = 0 if self._sequence is None else values[self._sequence]
@@ -79,7 +80,7 @@ class MessageCodec:
             values[place] = pack(values[place])
         body = dict(zip(self._keys[version], values, strict=False))
         target = origin if self.goes_down else BASE
-        rows = {"v": version, "k": int(self.kind), "o": origin, "t": target, "s": sequence, "b": body}
+        rows = {"v": version, "k": self._number, "o": origin, "t": target, "s": sequence, "b": body}
         return bytes(msgpack.packb(rows))
 
 
