@@ -7,9 +7,11 @@ that was deleted under the running program is noticed before the next commit, wh
 from __future__ import annotations
 
 import contextlib
+import functools
 import sqlite3
 from collections.abc import Iterable, Iterator, Mapping
 from pathlib import Path
+from typing import Any, Final
 
 import sqlalchemy as sa
 
@@ -18,6 +20,7 @@ from groundstation.service.tables import ADD_META, ALL_META, DROP_META, META, ME
 from telemetry.runtime.disk import MACHINE, Disk
 
 SHOWN = 5  # tables named of a database that is not ours
+COMPILED: Final[dict[Any, Any]] = {}  # statements for SQLite by their keys; as many as the sources have
 
 
 class Database:
@@ -152,8 +155,7 @@ def _engine_of(url: str, disk: Disk) -> sa.Engine:
     try:
         address = sa.make_url(url)
         if address.get_backend_name() == "sqlite" and address.database and not address.query:
-            file = Path(address.database)
-            return sa.create_engine(address, creator=lambda _record=None: disk.connect(file))
+            return _engine_of_file(address, disk)
         if address.drivername == "postgresql":
             address = address.set(drivername="postgresql+psycopg")
         return sa.create_engine(address)
@@ -161,6 +163,26 @@ def _engine_of(url: str, disk: Disk) -> sa.Engine:
         raise StoreError(
             f"database URL: expected one such as sqlite:///FILE whose driver is installed: {error}"
         ) from error
+
+
+def _engine_of_file(address: sa.URL, disk: Disk) -> sa.Engine:
+    """Engine of a file: statements are compiled once a process for all of them, which costs more than a whole start."""
+    file, dialect = Path(address.database or ""), _sqlite()
+
+    def connect() -> Any:
+        return disk.connect(file)
+
+    pool = sa.QueuePool(connect, dialect=dialect)
+    return sa.Engine(pool, dialect, address, execution_options={"compiled_cache": COMPILED})
+
+
+@functools.cache
+def _sqlite() -> sa.Dialect:
+    """SQLAlchemy's dialect of SQLite, which has seen a connection."""
+    engine = sa.create_engine("sqlite://")
+    engine.connect().close()
+    engine.dispose()
+    return engine.dialect
 
 
 def _durable(connection: sa.engine.interfaces.DBAPIConnection, _record: object) -> None:
