@@ -425,9 +425,9 @@ class GroundProcess(Process):
         its depth at the next reading or look, with all that came meanwhile and in their order: whether a reading
         brackets its time already is a matter of a millisecond.
         """
+        if not self._arrived:
+            return  # as nearly always: it is asked after every event
         arrived, self._arrived = self._arrived, []
-        if not arrived:
-            return
         try:
             are_new = self._store_arrived(arrived)
         except StoreError:

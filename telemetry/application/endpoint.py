@@ -64,7 +64,7 @@ STATE_WAIT = 1.15  # s for which a node's state waits for those of the nodes bel
 HOP_WAIT = 0.005  # s, longer by a frame's way where fewer hops are left: after a loss the lowest goes first again
 WAITING_HOPS = 100
 REPORT_EVERY = 60.0  # s between two looks at what queues dropped
-DROPS = ("reliable_dropped", "best_effort_dropped", "outbox_dropped")  # counters of what found no place in a queue
+DROPS = ("reliable_dropped", "best_effort_dropped")  # counters of what found no place in a link's queue
 ONE_HOP = (Kind.AIDING, Kind.HELLO, Kind.TIME_REQUEST, Kind.TIME_REPLY)
 RELIABLE = (
     Kind.SURVEY_MEASUREMENT,
@@ -373,8 +373,8 @@ class Endpoint:
     @property
     def dropped(self) -> int:
         """What found no place in any queue since the start."""
-        counters = self.link_counters()
-        return sum(counters.get(name, 0) for name in DROPS)
+        links = [link.counters for link in self._links.values()]
+        return self._outbox.dropped + sum([counters[name] for counters in links for name in DROPS])
 
     def export_state(self) -> bytes:
         """What must survive a restart: numbers, unreceipted messages, answered commands."""
