@@ -7,7 +7,7 @@ import math
 import secrets
 import time
 from collections import deque
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import replace
 from typing import TYPE_CHECKING, Protocol
 
@@ -391,11 +391,10 @@ class GroundProcess(Process):
             self.store.keep_joints(self.model.joints.known)
             self._kept_joints = dict(self.model.joints.known)
 
-    @contextlib.contextmanager
-    def _refusing_disk(self) -> Iterator[None]:
+    @staticmethod
+    def _refusing_disk() -> contextlib.suppress:
         """Go on where the disk refuses: the store remembers why, and the next look tells it."""
-        with contextlib.suppress(StoreError):
-            yield
+        return contextlib.suppress(StoreError)
 
     def on_message(self, message: Message, now: float) -> None:
         """A message has come, from the string or from a recording."""

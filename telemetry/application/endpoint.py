@@ -231,7 +231,8 @@ class Endpoint:
         if seals is None:
             frames: list[tuple[Side, Frame]] = []
             for side, link in self._links.items():
-                frames += [(side, frame) for frame in link.take_frames(now)]
+                if taken := link.take_frames(now):
+                    frames += [(side, frame) for frame in taken]
             return frames
         return [
             (side, frame)

@@ -37,7 +37,7 @@ class MessageCodec:
 
     def __init__(self, spec: MessageSpec) -> None:
         self._spec = spec
-        self._readers: dict[int, Reader] = {}  # by schema version, compiled when a payload of it comes
+        self.readers: dict[int, Reader] = {}  # by schema version, compiled when a payload of it comes
         self.kind = spec.kind
         self.message = spec.message
         self.newest = spec.newest
@@ -58,10 +58,8 @@ class MessageCodec:
         return packer_of(self._spec, self.fields, None if self.goes_down else BASE)
 
     def reader(self, version: int) -> Reader:
-        """Function from the fields of a payload of a schema version to its message."""
-        reader = self._readers.get(version)
-        if reader is None:
-            reader = self._readers[version] = reader_of(self._spec, self.fields, version)
+        """Make the function from the fields of a payload of a schema version to its message."""
+        reader = self.readers[version] = reader_of(self._spec, self.fields, version)
         return reader
 
     def pack(self, values: list[Any]) -> bytes:
@@ -87,7 +85,8 @@ def encode(message: Message) -> bytes:
         values = codec.values(message)
     except ValueError as error:
         raise EncodeError(f"{type(message).__name__}: {error}") from error
-    return codec.pack(values)
+    payload: bytes = msgpack.packb(codec.rows(values))
+    return payload
 
 
 def decode(payload: bytes) -> Message:
@@ -144,7 +143,9 @@ def decode_opened(opened: Opened) -> Message:
     if type(body) is not dict:
         body = body_of(opened)
     try:
-        decoded: Message = codec.reader(rows["v"])(body)
+        version = rows["v"]
+        read = codec.readers.get(version) or codec.reader(version)
+        decoded: Message = read(body)
     except ValueError as error:
         raise DecodeError(f"{codec.message.__name__}: {error}") from error
     return decoded

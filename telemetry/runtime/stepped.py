@@ -45,6 +45,7 @@ class Sent(NamedTuple):
     at: float
 
 
+CYCLE, DEPTH = Due.CYCLE, Due.DEPTH
 SIDE_OF: Final = {Due.UPPER_FRAME: Side.UPPER, Due.LOWER_FRAME: Side.LOWER}  # that a frame comes in at
 
 
@@ -94,20 +95,13 @@ def dispatch(process: Process, event: DueEvent, frame: bytes) -> None:
     """Hand one event to the process; the data of a frame that came by radio are its margin (dB)."""
     kind, at, data = event
     side = SIDE_OF.get(kind)
-    if side is None:
-        handle_other(process, kind, at, data)
-    elif data is None:
+    if side is not None and data is None:
         process.on_frame(side, frame, at)
-    else:
+    elif side is not None:
         process.on_frame(side, frame, at, float(data))
-
-
-def handle_other(process: Process, kind: Due, at: float, data: Any) -> None:
-    """Hand an event that is no frame to the process."""
-    match kind:
-        case Due.CYCLE:
-            process.on_cycle(data, at)
-        case Due.TIMER:
-            process.on_timer(at)
-        case Due.DEPTH:
-            process.on_depth(data, at)
+    elif kind is CYCLE:
+        process.on_cycle(data, at)
+    elif kind is DEPTH:
+        process.on_depth(data, at)
+    else:
+        process.on_timer(at)

@@ -146,10 +146,13 @@ class HopLink:
         """Send what waited for others to go with, or what has waited until ``now`` (s)."""
         if not self._patient:
             return
-        for topic in [topic for topic, waiting in self._patient.items() if waiting.until <= now]:
-            waiting = self._patient.pop(topic)
-            self.send_best_effort(waiting.payload, topic, waiting.priority)
-        self._patient_until = min((waiting.until for waiting in self._patient.values()), default=math.inf)
+        before, self._patient, self._patient_until = self._patient, {}, math.inf
+        for topic, waiting in before.items():
+            if waiting.until <= now:
+                self.send_best_effort(waiting.payload, topic, waiting.priority)
+            else:
+                self._patient[topic] = waiting
+                self._patient_until = min(self._patient_until, waiting.until)
 
     def receive(self, frame: bytes, now: float, margin: float = math.inf) -> list[bytes]:
         """Payloads of a frame that were not delivered before; garbage is counted and gives none.
