@@ -322,7 +322,8 @@ class GroundProcess(Process):
         """
         depths = self.model.depths
         depths.add_stand(stand)
-        before = [known for known in depths.stands if (known.epoch, known.begun_at) < (stand.epoch, stand.begun_at)]
+        begin = stand.epoch, stand.begun_at
+        before = [known for known in depths.stands if (known.epoch, known.begun_at) < begin]
         whole = stand
         while before and (before[-1].epoch, before[-1].md) == (stand.epoch, stand.md):
             whole = replace(stand, begun_at=before.pop().begun_at)

@@ -96,7 +96,7 @@ class FaultyWorld(World):
         if address in self.drifts:
             since, rate = self.drifts[address]
             shown += rate * max(t - since, 0.0)
-        return shown + self.jumps.get(address, 0.0)
+        return shown + self.jumps[address] if address in self.jumps else shown
 
     def true_time(self, address: int, local: float) -> float:
         """Rig time of the truth at which the clock of a process shows ``local`` (s)."""

@@ -281,8 +281,8 @@ class Scheduler:
 
     def _push(self, at: float, address: int, kind: Due | None, frame: bytes, margin: float | None = None) -> None:
         self._count += 1
-        rank = 9 if kind is None else int(kind)
-        heapq.heappush(self._queue, (at, address, rank, self._count, kind, frame, margin))
+        # an event's kind is its rank; at one time a cycle of all comes last
+        heapq.heappush(self._queue, (at, address, 9 if kind is None else kind, self._count, kind, frame, margin))
 
     def _pace(self, rig_time: float) -> None:
         ahead = (rig_time - self.world.begin) / self._speed - (time.monotonic() - self._wall_begin)
@@ -306,8 +306,8 @@ class Scheduler:
                 self._add(steps, true_time, address, kind, at, margin, frame)
         answers = self.stepper.round(steps)
         self._end_hung(self.stepper.drain_hung())
-        for address in sorted(answers):
-            self._on_answer(address, answers[address], true_time)
+        for address, answer in sorted(answers.items()) if len(answers) > 1 else answers.items():
+            self._on_answer(address, answer, true_time)
 
     def _add(
         self,
@@ -321,7 +321,11 @@ class Scheduler:
     ) -> None:
         local = self.world.local_clock(address, at)
         true_time[address, local] = at
-        steps.setdefault(address, []).append((DueEvent(kind, local, data), frame))
+        event = DueEvent(kind, local, data), frame
+        if address in steps:
+            steps[address].append(event)
+        else:
+            steps[address] = [event]
 
     def _add_cycle(
         self, at: float, steps: dict[int, list[FrameEvent]], true_time: dict[tuple[int, float], float]
@@ -383,9 +387,10 @@ class Scheduler:
                 if end is not None:
                     self._push(at + delay, *end, arriving)
         wake = self.world.true_time(address, answer.wake_at) if math.isfinite(answer.wake_at) else math.inf
-        if math.isfinite(wake) and self._wake.get(address) != wake:
-            self._push(wake, address, Due.TIMER, b"")
-        self._wake[address] = wake
+        if self._wake.get(address) != wake:
+            if math.isfinite(wake):
+                self._push(wake, address, TIMER, b"")
+            self._wake[address] = wake
 
     def _radiate(self, radio: RadioChannel, sender: int, side: Side, at: float, frame: bytes) -> None:
         """Have every end hear a frame that its radio reaches, in a closed string up to the drive head."""

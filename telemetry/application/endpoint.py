@@ -398,6 +398,8 @@ class Endpoint:
 
     def _handle_one_hop(self, side: Side, message: Message, now: float) -> Message | None:
         match message:
+            case Aiding():
+                return message if side is Side.UPPER and self._is_measured(message, now) else None
             case Hello():
                 self._meet(side, message, now)
             case TimeRequest() if self.clock.synchronised and side is not self._sync_side:
@@ -408,8 +410,6 @@ class Endpoint:
                 self._links[side].send_best_effort(encode(reply), Kind.TIME_REPLY, Priority.TIME)
             case TimeReply() if side is self._sync_side:
                 self.clock.exchange(message, now)
-            case Aiding() if side is Side.UPPER and self._is_measured(message, now):
-                return message
         return None
 
     def _meet(self, side: Side, hello: Hello, now: float) -> None:

@@ -186,10 +186,12 @@ class HopLink:
         if not (self._best_effort or self._queue or self._outstanding or self._ack_due <= now):
             return frames  # as nearly always: it is asked after every event
         entries = self._due_entries(now)
-        while entries or self._ack_due <= now:
-            count = bundled(entries, self.bundle_limit) if len(entries) > 1 else 1
+        while len(entries) > 1:
+            count = bundled(entries, self.bundle_limit)
             frames.append(self._build(entries[:count]))
             entries = entries[count:]
+        if entries or self._ack_due <= now:
+            frames.append(self._build(entries))
         return frames
 
     def next_wake(self, now: float) -> float:
@@ -284,6 +286,9 @@ class HopLink:
         peer_epoch = max(self._peer_epoch, 0)
         header = Header(self._address, self.epoch, self._frames, peer_epoch, self._received, self._received_mask)
         payload = pack_frame(header, [entry[:2] for entry in entries])
+        if len(entries) == 1:  # as nearly always
+            _, _, priority, topic = entries[0]
+            return Frame(payload, priority, None if topic is None else (topic,))
         priority = min([entry.priority for entry in entries], default=Priority.COMMAND)
         return Frame(payload, priority, common_topic(entries))
 
@@ -295,7 +300,7 @@ def epoch_of(boot_count: int, session: int, address: int) -> int:
 
 def pack_frame(header: Header, entries: Iterable[tuple[int, bytes]]) -> bytes:
     """Bytes of a frame."""
-    body: bytes = msgpack.packb([VERSION, *header, list(entries)])
+    body: bytes = msgpack.packb((VERSION, *header, list(entries)))
     return zlib.crc32(body).to_bytes(4, "little") + body
 
 
@@ -314,8 +319,11 @@ def parse_frame(frame: bytes) -> tuple[Header, list[Any]] | None:
     if version != VERSION or not are_integers or not isinstance(entries, list):
         return None
     header = Header(sender, epoch, number, peer_epoch, ack, mask)
-    if min(header) < 0 or not all(map(_is_entry, entries)):
+    if min(header) < 0:
         return None
+    for entry in entries:
+        if not _is_entry(entry):
+            return None
     return header, entries
 
 
