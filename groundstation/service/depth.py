@@ -145,13 +145,10 @@ class DepthLog:
 
     def is_of_before(self, stand: Stand, epoch: int) -> bool:
         """Whether a stand without an epoch is known from one before ``epoch``: the encoder's clock may run on."""
-        if stand.epoch != EPOCH_UNKNOWN or not self._has_others(epoch):
+        if stand.epoch != EPOCH_UNKNOWN:
             return False
         before = (known for known in self.stands if known.epoch != epoch and stand.ended_at <= known.ended_at)
         return any(_same(replace(stand, epoch=known.epoch), known) for known in before)
-
-    def _has_others(self, epoch: int) -> bool:
-        return any([known.epoch != epoch for known in self.stands])
 
     @property
     def doubt(self) -> Doubt:

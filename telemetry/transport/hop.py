@@ -319,11 +319,8 @@ def parse_frame(frame: bytes) -> tuple[Header, list[Any]] | None:
     if version != VERSION or not are_integers or not isinstance(entries, list):
         return None
     header = Header(sender, epoch, number, peer_epoch, ack, mask)
-    if min(header) < 0:
+    if min(header) < 0 or not all(map(_is_entry, entries)):
         return None
-    for entry in entries:
-        if not _is_entry(entry):
-            return None
     return header, entries
 
 
