@@ -15,11 +15,13 @@ from node.firmware.edge_interpolation import stopped_at
 from node.firmware.torque import TorqueSettings, drive_record
 from node.kernels.encoder import BEYOND, BEYOND_VAR, EDGE_STD, QUANTUM, SAMPLE, encoder_step, new_encoder
 from node.kernels.record import A_RATE, A_TORQUE, A_VALID, A_YAW, A_YAW_VAR, AIDING
+from telemetry.frozen import quickly_made
 from telemetry.messages import EPOCH_UNKNOWN, Aiding
 
 STOP_STD = 1.5 * EDGE_STD / QUANTUM  # counts; the form of a stop is not exactly a power of time
 
 
+@quickly_made
 @dataclass(frozen=True, slots=True)
 class EncoderSample:
     """One reading of the counter."""

@@ -11,6 +11,7 @@ import math
 from collections.abc import Callable, Sequence
 from typing import Any
 
+from telemetry.frozen import writable
 from telemetry.presentation.fields import FieldCodec
 from telemetry.quantities import ValueKind
 from telemetry.schema import Field, MessageSpec
@@ -112,12 +113,3 @@ def compiled(
     exec(compile(source, "<compiled from the schema>", "exec"), space)
     function: Callable[..., Any] = space["function"]
     return function
-
-
-def writable(message: type[Any]) -> type[Any]:
-    """Twin of a frozen message whose fields can be assigned.
-
-    An instance becomes the message by ``__class__``, which Python allows between classes of the same slots. A frozen
-    dataclass assigns each field by a call: for a state that takes six times as long.
-    """
-    return type(f"Writable{message.__name__}", (), {"__slots__": message.__slots__})
