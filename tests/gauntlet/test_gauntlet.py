@@ -74,7 +74,7 @@ def test_seeds_hold_and_repeat_bit_for_bit(seed: int) -> None:
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize(("world", "part"), product(range(WORLDS), range(PARTS)))
+@pytest.mark.parametrize(("world", "part"), list(product(range(WORLDS), range(PARTS))))
 def test_combined_seeds_hold(world: int, part: int) -> None:
     # whoever runs it works out one world, not all of them
     seeds = [seed for seed in range(1, COMBINED + 1) if seed % WORLDS == world][part::PARTS]
