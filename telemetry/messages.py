@@ -14,6 +14,8 @@ import math
 from dataclasses import dataclass, field
 from typing import TypeAlias
 
+from telemetry.frozen import quickly_made
+
 SCHEMA_VERSION = 5  # the newest; a payload carries the earliest that can say it
 ENCODER = 0
 MAX_TUBE = 250
@@ -88,6 +90,7 @@ class UploadPhase(enum.IntEnum):
     UNTRUSTED = 4  # this segment was not made with the key of the rig
 
 
+@quickly_made
 @dataclass(frozen=True, slots=True)
 class Aiding:
     """The yaw reference on its way down. ``yaw`` is the measurement, passed on unchanged by the scheme ``forward``.
@@ -112,6 +115,7 @@ class Aiding:
     seal: bytes = b""  # of the measurement, under a key of the rig; empty without keys
 
 
+@quickly_made
 @dataclass(frozen=True, slots=True)
 class Hello:
     """Who is at the other end of this joint."""
@@ -123,6 +127,7 @@ class Hello:
     link_quality: float  # 0..1, share of this side's frames lately acknowledged or expected and received
 
 
+@quickly_made
 @dataclass(frozen=True, slots=True)
 class TimeRequest:
     """First half of a two-way time exchange over one joint."""
@@ -130,6 +135,7 @@ class TimeRequest:
     asked_at: float  # s, clock of the asker
 
 
+@quickly_made
 @dataclass(frozen=True, slots=True)
 class TimeReply:
     """Second half of the exchange: the neighbour tells its own clock, and what it knows of rig time."""
@@ -143,6 +149,7 @@ class TimeReply:
     epoch: int = EPOCH_UNKNOWN  # of rig_at
 
 
+@quickly_made
 @dataclass(frozen=True, slots=True)
 class NodeState:
     """A node's account of itself, best effort, latest wins."""
@@ -172,6 +179,7 @@ class NodeState:
     lower_margin: float = math.inf  # dB, the same from below
 
 
+@quickly_made
 @dataclass(frozen=True, slots=True)
 class ImuMean:
     """Mean specific force of one IMU over the moving average of a stop, body frame, calibrated."""
@@ -180,6 +188,7 @@ class ImuMean:
     force_cov: Matrix3  # (m/s^2)^2, covariance of the mean
 
 
+@quickly_made
 @dataclass(frozen=True, slots=True)
 class SurveyMeasurement:
     """One cluster at one stop. ``(tube, sequence)`` is its identity; kept by the tube until a ``Receipt`` came."""
@@ -198,6 +207,7 @@ class SurveyMeasurement:
     epoch: int = EPOCH_UNKNOWN
 
 
+@quickly_made
 @dataclass(frozen=True, slots=True)
 class Receipt:
     """The ground station stored the message ``(tube, sequence)`` of this content; the tube may forget that one."""
@@ -207,6 +217,7 @@ class Receipt:
     content: bytes = b""  # hash of the payload, ``telemetry.presentation.content``
 
 
+@quickly_made
 @dataclass(frozen=True, slots=True)
 class Command:
     """An order to one node, acknowledged by a ``Reply`` with the same ``sequence`` (unique per ground station)."""
@@ -217,6 +228,7 @@ class Command:
     arguments: dict[str, Scalar] = field(default_factory=dict)
 
 
+@quickly_made
 @dataclass(frozen=True, slots=True)
 class Reply:
     """Outcome of a command. ``values`` came with schema version 3."""
@@ -228,6 +240,7 @@ class Reply:
     values: dict[str, Value] = field(default_factory=dict)  # what the table of commands promises
 
 
+@quickly_made
 @dataclass(frozen=True, slots=True)
 class Event:
     """Something that happened. Shares the sequence with survey measurements and is acknowledged the same way."""
@@ -241,6 +254,7 @@ class Event:
     epoch: int = EPOCH_UNKNOWN
 
 
+@quickly_made
 @dataclass(frozen=True, slots=True)
 class BlockSegment:
     """One part of a parameter block on its way to a node, answered by a ``BlockStatus``."""
@@ -255,6 +269,7 @@ class BlockSegment:
     tag: bytes  # HMAC-SHA256 under the rig's key of all the above
 
 
+@quickly_made
 @dataclass(frozen=True, slots=True)
 class BlockStatus:
     """A node's account of an upload, and of the block that it uses meanwhile."""
@@ -269,6 +284,7 @@ class BlockStatus:
     detail: str
 
 
+@quickly_made
 @dataclass(frozen=True, slots=True)
 class StaticRecord:
     """Raw readings averaged at rest, before any correction. Kept and receipted like a survey measurement."""
@@ -288,6 +304,7 @@ class StaticRecord:
     epoch: int = EPOCH_UNKNOWN
 
 
+@quickly_made
 @dataclass(frozen=True, slots=True)
 class Stand:
     """The bit stood at one depth."""
@@ -298,6 +315,7 @@ class Stand:
     md: float  # m
 
 
+@quickly_made
 @dataclass(frozen=True, slots=True)
 class DepthReading:
     """Depth of the bit, from the rig to the ground station on a key of its own.
@@ -312,6 +330,7 @@ class DepthReading:
     epoch: int = EPOCH_UNKNOWN  # a source that does not know it is taken to mean the present one
 
 
+@quickly_made
 @dataclass(frozen=True, slots=True)
 class SessionOffer:
     """The base offers a session to a tube whose seals it does not know; the numbers are in its own seal."""

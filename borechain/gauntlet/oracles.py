@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import contextlib
 import math
 import sqlite3
 from collections.abc import Collection, Iterator
@@ -52,6 +51,7 @@ class Observer:
         self._starts: dict[int, tuple[object, set[int]]] = {}  # process that is known, and numbers of all, by address
         self._kept: tuple[bytes, set[tuple[int, int, str]]] = (b"", set())
         self._keeper: object = None  # the ground station's process that has written it
+        self._reader = sqlite3.connect(":memory:")
         self.found: list[str] = []
         rig.channel.listeners.append(self.on_frame)
         rig.before_cut.append(self._see_alarms)  # what the crew has seen does not go with the power
@@ -98,8 +98,13 @@ class Observer:
         if image is not self._kept[0] or keeper is not self._keeper:
             taken = self._kept[1] if disk.handled and keeper is self._keeper else set()
             self._keeper = keeper
-            self._kept = image, taken | (messages_of(image) if image else set())
+            self._kept = image, taken | (self._messages_of(image) if image else set())
         return self._kept[1]
+
+    def _messages_of(self, image: bytes) -> set[tuple[int, int, str]]:
+        """Tube, number and content of every message in the image of a database."""
+        self._reader.deserialize(image)
+        return set(self._reader.execute("SELECT tube, sequence, content FROM messages"))
 
     def _repeated_starts(self) -> Iterator[str]:
         for address, process in self._rig.stepper.processes.items():
@@ -125,13 +130,6 @@ class Observer:
                 continue  # held up on its way, and of an epoch that this ground station has never heard
             if is_off and not model.is_stale(tube):
                 yield f"tube {tube} without power is shown fresh"
-
-
-def messages_of(image: bytes) -> set[tuple[int, int, str]]:
-    """Tube, number and content of every message in the image of a database."""
-    with contextlib.closing(sqlite3.connect(":memory:")) as connection:
-        connection.deserialize(image)
-        return set(connection.execute("SELECT tube, sequence, content FROM messages"))
 
 
 def violations(

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from dataclasses import asdict, fields
+from dataclasses import fields
 from typing import Any
 
 from groundstation.errors import GroundError
@@ -17,7 +17,9 @@ class DamagedAlarmError(GroundError, ValueError):
 
 def alarm_to_text(alarm: CrewAlarm) -> str:
     """One line; NaN and infinity are written as Python's JSON does."""
-    return json.dumps(asdict(alarm), sort_keys=True)
+    row = {name: getattr(alarm, name) for name in CrewAlarm.__slots__}
+    row["condition"] = {name: getattr(alarm.condition, name) for name in Condition.__slots__}
+    return json.dumps(row, sort_keys=True)
 
 
 def alarm_of_text(text: str) -> CrewAlarm:

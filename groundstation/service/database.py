@@ -7,17 +7,20 @@ that was deleted under the running program is noticed before the next commit, wh
 from __future__ import annotations
 
 import contextlib
+import functools
 import sqlite3
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator, Mapping
 from pathlib import Path
+from typing import Any, Final
 
 import sqlalchemy as sa
 
 from groundstation.errors import StoreError
-from groundstation.service.tables import META, METADATA, READABLE, SCHEMA
+from groundstation.service.tables import ADD_META, ALL_META, DROP_META, META, METADATA, READABLE, SCHEMA
 from telemetry.runtime.disk import MACHINE, Disk
 
 SHOWN = 5  # tables named of a database that is not ours
+COMPILED: Final[dict[Any, Any]] = {}  # statements for SQLite by their keys; as many as the sources have
 
 
 class Database:
@@ -47,6 +50,7 @@ class Database:
         self._file = Path(address.database) if self._engine.dialect.name == "sqlite" and address.database else None
         self.refusal = ""
         self.boots = 0
+        self._tables: set[str] = set()
         try:
             with self._refusing("; choose a writable --folder or another database"):
                 if self._file is not None:
@@ -59,8 +63,7 @@ class Database:
 
     def _has(self, table: sa.Table) -> bool:
         """Whether there is a table; a database of before that cannot be written lacks the later ones."""
-        with self._refusing():
-            return sa.inspect(self._engine).has_table(table.name)
+        return table.name in self._tables
 
     def close(self) -> None:
         """Close every connection."""
@@ -115,17 +118,25 @@ class Database:
 
     def _meta(self) -> dict[str, str]:
         with self._engine.connect() as connection:
-            return {row.name: row.value for row in connection.execute(sa.select(META))}
+            return {row.name: row.value for row in connection.execute(ALL_META)}
+
+    @staticmethod
+    def _replace_meta(connection: sa.Connection, values: Mapping[str, str], without: Iterable[str] = ()) -> None:
+        """Store values by their names, in the place of those stored before, of which those ``without`` go."""
+        connection.execute(DROP_META, [{"its_name": name} for name in (*values, *without)])
+        connection.execute(ADD_META, [{"name": name, "value": value} for name, value in values.items()])
 
     def _begin(self, tables: list[str]) -> None:
         """Make ready for writing and count this start; a database of ours that refuses is read all the same."""
         if self._engine.dialect.name == "sqlite":
             self._engine.dispose()  # the connection that only looked is not durable
             sa.event.listen(self._engine, "connect", _durable)
+        self._tables = set(tables)
         try:
             with self._refusing():
                 if lacking := [table for table in METADATA.sorted_tables if table.name not in tables]:
                     METADATA.create_all(self._engine, lacking)
+                self._tables.update(METADATA.tables)
                 self._count_start()
         except StoreError as error:
             if not tables:
@@ -134,11 +145,9 @@ class Database:
 
     def _count_start(self) -> None:
         boots = int(self._meta().get("boots", "0")) + 1
-        rows = [{"name": "schema", "value": str(SCHEMA)}, {"name": "boots", "value": str(boots)}]
         self.boots = boots
         with self._engine.begin() as connection:
-            connection.execute(sa.delete(META).where(META.c.name.in_(["schema", "boots"])))
-            connection.execute(sa.insert(META), rows)
+            self._replace_meta(connection, {"schema": str(SCHEMA), "boots": str(boots)})
 
 
 def _engine_of(url: str, disk: Disk) -> sa.Engine:
@@ -146,8 +155,7 @@ def _engine_of(url: str, disk: Disk) -> sa.Engine:
     try:
         address = sa.make_url(url)
         if address.get_backend_name() == "sqlite" and address.database and not address.query:
-            file = Path(address.database)
-            return sa.create_engine(address, creator=lambda _record=None: disk.connect(file))
+            return _engine_of_file(address, disk)
         if address.drivername == "postgresql":
             address = address.set(drivername="postgresql+psycopg")
         return sa.create_engine(address)
@@ -155,6 +163,26 @@ def _engine_of(url: str, disk: Disk) -> sa.Engine:
         raise StoreError(
             f"database URL: expected one such as sqlite:///FILE whose driver is installed: {error}"
         ) from error
+
+
+def _engine_of_file(address: sa.URL, disk: Disk) -> sa.Engine:
+    """Engine of a file: statements are compiled once a process for all of them, which costs more than a whole start."""
+    file, dialect = Path(address.database or ""), _sqlite()
+
+    def connect() -> Any:
+        return disk.connect(file)
+
+    pool = sa.QueuePool(connect, dialect=dialect)
+    return sa.Engine(pool, dialect, address, execution_options={"compiled_cache": COMPILED})
+
+
+@functools.cache
+def _sqlite() -> sa.Dialect:
+    """SQLAlchemy's dialect of SQLite, which has seen a connection."""
+    engine = sa.create_engine("sqlite://")
+    engine.connect().close()
+    engine.dispose()
+    return engine.dialect
 
 
 def _durable(connection: sa.engine.interfaces.DBAPIConnection, _record: object) -> None:

@@ -122,12 +122,12 @@ class DepthLog:
 
     def add_stand(self, stand: Stand) -> bool:
         """Remember that the bit stood, or that it still does; whether it is a stand not known before."""
-        place = next((k for k in range(len(self.stands) - 1, -1, -1) if _same(self.stands[k], stand)), None)
-        if place is not None:
+        for place in range(len(self.stands) - 1, -1, -1):
             known = self.stands[place]
-            begun_at, ended_at = min(known.begun_at, stand.begun_at), max(known.ended_at, stand.ended_at)
-            self.stands[place] = Stand(stand.epoch, begun_at, ended_at, stand.md)
-            return False
+            if known.md == stand.md and _same(known, stand):
+                begun_at, ended_at = min(known.begun_at, stand.begun_at), max(known.ended_at, stand.ended_at)
+                self.stands[place] = Stand(stand.epoch, begun_at, ended_at, stand.md)
+                return False
         since = self._trusted[:2] if self.jumped and self._trusted is not None else (math.inf, 0.0)
         if (stand.epoch, stand.ended_at) > since or self._is_of_a_doubtful_time(stand):
             self.refusals["a stand of a doubtful time"] += 1

@@ -30,6 +30,8 @@ class Series:
 
     def missing(self) -> Iterator[Range]:
         """Ranges that have not come, in order."""
+        if not self.beyond and self.told <= self.complete:
+            return
         before = self.complete
         for number in (*sorted(self.beyond), max(self.told, self.complete) + 1):
             if number > before + 1:

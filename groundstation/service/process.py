@@ -7,7 +7,7 @@ import math
 import secrets
 import time
 from collections import deque
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import replace
 from typing import TYPE_CHECKING, Protocol
 
@@ -307,7 +307,7 @@ class GroundProcess(Process):
             is_present = stand.epoch in (EPOCH_UNKNOWN, model.epoch) and stand.ended_at <= reading.at
             is_news = is_present and not model.depths.is_of_before(stand, model.epoch)
             if is_news and stand.md <= model.tally.deepest:
-                self._on_stand(stand if stand.epoch == model.epoch else replace(stand, epoch=model.epoch))
+                self._on_stand(Stand(model.epoch, stand.begun_at, stand.ended_at, stand.md))
         self._keep_stand(reading)
         self._place_waiting()
         self._publish(["status", "string"])
@@ -322,7 +322,8 @@ class GroundProcess(Process):
         """
         depths = self.model.depths
         depths.add_stand(stand)
-        before = [known for known in depths.stands if (known.epoch, known.begun_at) < (stand.epoch, stand.begun_at)]
+        begin = stand.epoch, stand.begun_at
+        before = [known for known in depths.stands if (known.epoch, known.begun_at) < begin]
         whole = stand
         while before and (before[-1].epoch, before[-1].md) == (stand.epoch, stand.md):
             whole = replace(stand, begun_at=before.pop().begun_at)
@@ -391,11 +392,10 @@ class GroundProcess(Process):
             self.store.keep_joints(self.model.joints.known)
             self._kept_joints = dict(self.model.joints.known)
 
-    @contextlib.contextmanager
-    def _refusing_disk(self) -> Iterator[None]:
+    @staticmethod
+    def _refusing_disk() -> contextlib.suppress:
         """Go on where the disk refuses: the store remembers why, and the next look tells it."""
-        with contextlib.suppress(StoreError):
-            yield
+        return contextlib.suppress(StoreError)
 
     def on_message(self, message: Message, now: float) -> None:
         """A message has come, from the string or from a recording."""
@@ -425,9 +425,9 @@ class GroundProcess(Process):
         its depth at the next reading or look, with all that came meanwhile and in their order: whether a reading
         brackets its time already is a matter of a millisecond.
         """
+        if not self._arrived:
+            return  # as nearly always: it is asked after every event
         arrived, self._arrived = self._arrived, []
-        if not arrived:
-            return
         try:
             are_new = self._store_arrived(arrived)
         except StoreError:

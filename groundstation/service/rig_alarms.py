@@ -151,7 +151,7 @@ class RigAlarms:
         """Have an alarm stand while there is a ``detail``, and be cleared when there is none."""
         if detail:
             self.alert(code, subject, detail, again=False)
-        else:
+        elif (code, subject) in self._standing:
             self.clear(code, subject)
 
     def stands(self, code: str, subject: str) -> bool:

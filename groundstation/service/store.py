@@ -24,18 +24,24 @@ from groundstation.service.depth import NEVER, Doubt, Instant
 from groundstation.service.tables import (
     ADD,
     ADD_ALARM,
+    ADD_STAND,
     ALARMS,
+    ALL_ALARMS,
+    ALL_BLOCKS,
+    ALL_JOINTS,
+    ALL_MESSAGES,
+    ALL_STANDS,
     BLOCKS,
     DROP,
     DROP_ALARM,
+    DROP_OVERLAPS,
     FIND,
     JOINTS,
-    MESSAGES,
-    META,
     PLACE,
+    PROGRESS,
     RECALIBRATION,
-    STANDS,
     STRING,
+    WHOLE_STRING,
 )
 from groundstation.survey.joint_angles import Joint, Pair
 from telemetry.errors import DecodeError
@@ -92,7 +98,8 @@ class Store(Database):
         there = connection.execute(FIND, same).first()
         if there is not None and there.payload == payload:
             return False
-        connection.execute(DROP, same)  # of a row that is damaged
+        if there is not None:
+            connection.execute(DROP, same)  # it is damaged
         kind = type(one.message).__name__
         connection.execute(ADD, {**row, "kind": kind, "md": one.md, "below": one.below, "payload": payload})
         return True
@@ -109,20 +116,15 @@ class Store(Database):
     def keep_stand(self, stand: Stand) -> None:
         """Store that the bit stood, in the place of what it overlaps."""
         with self._writing() as connection:
-            overlaps = sa.and_(
-                STANDS.c.epoch == stand.epoch,
-                STANDS.c.begun_at <= stand.ended_at,
-                STANDS.c.ended_at >= stand.begun_at,
-                STANDS.c.md == stand.md,
-            )
-            connection.execute(sa.delete(STANDS).where(overlaps))
+            its = {"its_epoch": stand.epoch, "its_begin": stand.begun_at, "its_end": stand.ended_at, "its_md": stand.md}
+            connection.execute(DROP_OVERLAPS, its)
             row = {"epoch": stand.epoch, "begun_at": stand.begun_at, "ended_at": stand.ended_at, "md": stand.md}
-            connection.execute(sa.insert(STANDS).values(**row))
+            connection.execute(ADD_STAND, row)
 
     def messages(self) -> Iterator[Stored]:
         """Everything stored, in the order of arrival; what is damaged is passed over and counted."""
         with self._refusing(), self._engine.connect() as connection:
-            for row in connection.execute(sa.select(MESSAGES).order_by(MESSAGES.c.id)):
+            for row in connection.execute(ALL_MESSAGES):
                 try:
                     message = decode(row.payload)
                 except DecodeError:
@@ -135,24 +137,21 @@ class Store(Database):
 
     def stands(self) -> list[Stand]:
         """Where the bit stood, in the order of time."""
-        order = sa.select(STANDS).order_by(STANDS.c.epoch, STANDS.c.begun_at)
         with self._refusing(), self._engine.connect() as connection:
-            return [Stand(row.epoch, row.begun_at, row.ended_at, row.md) for row in connection.execute(order)]
+            return [Stand(row.epoch, row.begun_at, row.ended_at, row.md) for row in connection.execute(ALL_STANDS)]
 
     def keep_epoch(self, epoch: int) -> None:
         """Store the epoch of rig time."""
         with self._writing() as connection:
-            connection.execute(sa.delete(META).where(META.c.name == "epoch"))
-            connection.execute(sa.insert(META).values(name="epoch", value=str(epoch)))
+            self._replace_meta(connection, {"epoch": str(epoch)})
 
     def keep_depth_doubt(self, doubt: Doubt) -> None:
         """Store since when depths are refused, and when the crew accepted one."""
-        rows = [{"name": "depth_accepted", "value": _numbers(*doubt.accepted)}]
+        values = {"depth_accepted": _numbers(*doubt.accepted)}
         if doubt.trusted is not None:
-            rows.append({"name": "depth_trusted", "value": _numbers(*doubt.trusted)})
+            values["depth_trusted"] = _numbers(*doubt.trusted)
         with self._writing() as connection:
-            connection.execute(sa.delete(META).where(META.c.name.in_(["depth_accepted", "depth_trusted"])))
-            connection.execute(sa.insert(META), rows)
+            self._replace_meta(connection, values, without=["depth_trusted"])
 
     def depth_doubt(self) -> Doubt:
         """Since when depths have been refused, and when the crew accepted one."""
@@ -184,7 +183,7 @@ class Store(Database):
         if not self._has(JOINTS):
             return {}
         with self._refusing(), self._engine.connect() as connection:
-            return {(row.upper, row.lower): Joint(row.angle, row.var) for row in connection.execute(sa.select(JOINTS))}
+            return {(row.upper, row.lower): Joint(row.angle, row.var) for row in connection.execute(ALL_JOINTS)}
 
     def epoch(self) -> int:
         """Epoch of rig time that was known last, 0 for none."""
@@ -200,7 +199,7 @@ class Store(Database):
     def tally(self) -> list[int]:
         """Tubes of the string, top first."""
         with self._refusing(), self._engine.connect() as connection:
-            return [row.tube for row in connection.execute(sa.select(STRING).order_by(STRING.c.place))]
+            return [row.tube for row in connection.execute(WHOLE_STRING)]
 
     def keep_block(self, block: ParameterBlock) -> None:
         """Store a parameter block before it is sent, so that what a tube uses can be named later."""
@@ -212,7 +211,7 @@ class Store(Database):
     def blocks(self) -> list[ParameterBlock]:
         """Every block that was sent."""
         with self._refusing(), self._engine.connect() as connection:
-            rows = connection.execute(sa.select(BLOCKS).order_by(BLOCKS.c.sha256)).all()
+            rows = connection.execute(ALL_BLOCKS).all()
         try:
             return [unpack_block(row.content) for row in rows]
         except DecodeError as error:
@@ -227,7 +226,7 @@ class Store(Database):
     def progress(self) -> str | None:
         """How far the calibration in the field had come."""
         with self._refusing(), self._engine.connect() as connection:
-            return connection.execute(sa.select(RECALIBRATION.c.progress)).scalar()
+            return connection.execute(PROGRESS).scalar()
 
     def keep_alarms(self, alarms: Iterable[CrewAlarm]) -> None:
         """Store alarms as they are now; of all the newest are kept."""
@@ -245,7 +244,7 @@ class Store(Database):
         if not self._has(ALARMS):
             return []
         with self._refusing(), self._engine.connect() as connection:
-            rows = connection.execute(sa.select(ALARMS).order_by(ALARMS.c.number)).all()
+            rows = connection.execute(ALL_ALARMS).all()
         found = []
         for row in rows:
             try:

@@ -13,6 +13,8 @@ META = sa.Table(
     sa.Column("name", sa.String(32), primary_key=True),
     sa.Column("value", sa.String(64), nullable=False),
 )
+ALL_META, ADD_META = sa.select(META), sa.insert(META)
+DROP_META = sa.delete(META).where(META.c.name == sa.bindparam("its_name"))
 MESSAGES = sa.Table(
     "messages",
     METADATA,
@@ -28,6 +30,7 @@ MESSAGES = sa.Table(
 )
 SAME = sa.and_(*(MESSAGES.c[name] == sa.bindparam(f"its_{name}") for name in ("tube", "sequence", "content")))
 FIND, DROP, ADD = sa.select(MESSAGES.c.payload).where(SAME), sa.delete(MESSAGES).where(SAME), sa.insert(MESSAGES)
+ALL_MESSAGES = sa.select(MESSAGES).order_by(MESSAGES.c.id)
 PLACE = sa.update(MESSAGES).where(SAME).values(md=sa.bindparam("depth"))
 STANDS = sa.Table(
     "stands",
@@ -37,24 +40,35 @@ STANDS = sa.Table(
     sa.Column("ended_at", sa.Float, nullable=False),
     sa.Column("md", sa.Float, nullable=False),
 )
+ALL_STANDS = sa.select(STANDS).order_by(STANDS.c.epoch, STANDS.c.begun_at)
+ADD_STAND = sa.insert(STANDS)
+DROP_OVERLAPS = sa.delete(STANDS).where(
+    STANDS.c.epoch == sa.bindparam("its_epoch"),
+    STANDS.c.begun_at <= sa.bindparam("its_end"),
+    STANDS.c.ended_at >= sa.bindparam("its_begin"),
+    STANDS.c.md == sa.bindparam("its_md"),
+)
 STRING = sa.Table(
     "string",
     METADATA,
     sa.Column("place", sa.Integer, primary_key=True, autoincrement=False),
     sa.Column("tube", sa.Integer, nullable=False),
 )
+WHOLE_STRING = sa.select(STRING).order_by(STRING.c.place)
 BLOCKS = sa.Table(
     "blocks",
     METADATA,
     sa.Column("sha256", sa.String(64), primary_key=True),
     sa.Column("content", sa.LargeBinary, nullable=False),
 )
+ALL_BLOCKS = sa.select(BLOCKS).order_by(BLOCKS.c.sha256)
 RECALIBRATION = sa.Table(
     "recalibration",
     METADATA,
     sa.Column("id", sa.Integer, primary_key=True, autoincrement=False),
     sa.Column("progress", sa.Text, nullable=False),
 )
+PROGRESS = sa.select(RECALIBRATION.c.progress)
 JOINTS = sa.Table(
     "joints",
     METADATA,
@@ -63,10 +77,12 @@ JOINTS = sa.Table(
     sa.Column("angle", sa.Float, nullable=False),
     sa.Column("var", sa.Float, nullable=False),
 )
+ALL_JOINTS = sa.select(JOINTS)
 ALARMS = sa.Table(
     "alarms",
     METADATA,
     sa.Column("number", sa.Integer, primary_key=True, autoincrement=False),
     sa.Column("content", sa.Text, nullable=False),
 )
+ALL_ALARMS = sa.select(ALARMS).order_by(ALARMS.c.number)
 DROP_ALARM, ADD_ALARM = sa.delete(ALARMS).where(ALARMS.c.number == sa.bindparam("its_number")), sa.insert(ALARMS)

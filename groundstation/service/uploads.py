@@ -46,7 +46,7 @@ class Uploads:
 
     def next_due(self) -> float:
         """When something is due (s), infinite if nothing is under way."""
-        return min((upload.next_due for upload in self._running.values()), default=math.inf)
+        return min([upload.next_due for upload in self._running.values()], default=math.inf)
 
     def on_status(self, status: BlockStatus) -> bool:
         """Handle a node's status of an upload; True when it is the last word on one that is under way."""

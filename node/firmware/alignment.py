@@ -54,4 +54,5 @@ def rotation(axis: Array) -> Array:
 
 def angles_of(axis: Array) -> tuple[float, float]:
     """Pitch and roll (rad) of the tube's axis in an IMU's frame: (sin p, cos p sin r, cos p cos r)."""
-    return math.asin(min(max(float(axis[0]), -1.0), 1.0)), math.atan2(float(axis[1]), float(axis[2]))
+    x, y, z = axis.tolist()
+    return math.asin(min(max(x, -1.0), 1.0)), math.atan2(y, z)

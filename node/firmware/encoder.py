@@ -15,11 +15,13 @@ from node.firmware.edge_interpolation import stopped_at
 from node.firmware.torque import TorqueSettings, drive_record
 from node.kernels.encoder import BEYOND, BEYOND_VAR, EDGE_STD, QUANTUM, SAMPLE, encoder_step, new_encoder
 from node.kernels.record import A_RATE, A_TORQUE, A_VALID, A_YAW, A_YAW_VAR, AIDING
-from telemetry.messages import Aiding
+from telemetry.frozen import quickly_made
+from telemetry.messages import EPOCH_UNKNOWN, Aiding
 
 STOP_STD = 1.5 * EDGE_STD / QUANTUM  # counts; the form of a stop is not exactly a power of time
 
 
+@quickly_made
 @dataclass(frozen=True, slots=True)
 class EncoderSample:
     """One reading of the counter."""
@@ -47,8 +49,8 @@ class EncoderNode:
         self._drive = drive_record(settings)
         self._sample, self._aiding = np.zeros(SAMPLE), np.zeros(AIDING)
 
-    def on_cycle(self, sample: EncoderSample, now: float) -> Aiding:
-        """Measure at ``now`` (s, rig time): the last edge while turning, its place in the count at rest."""
+    def on_cycle(self, sample: EncoderSample, now: float, epoch: int = EPOCH_UNKNOWN) -> Aiding:
+        """Measure at ``now`` (s, rig time of an epoch): the last edge while turning, its place in the count at rest."""
         taken, aiding, encoder = self._sample, self._aiding, self.encoders[0]
         torque = math.nan if sample.torque is None else sample.torque
         taken[:BEYOND] = (
@@ -69,4 +71,5 @@ class EncoderNode:
             hops=0,
             torque=float(aiding[A_TORQUE]),
             under_torque=bool(encoder["holding"]),
+            epoch=epoch,
         )

@@ -24,6 +24,12 @@ from telemetry.messages import (
     SurveyMeasurement,
 )
 
+# flags as integers: an operation on members takes ten times as long
+SENSOR_FAULT, YAW_UNTRUSTED = int(NodeFlag.SENSOR_FAULT), int(NodeFlag.YAW_UNTRUSTED)
+AIDING_OLD, INNOVATION_REJECTED = int(NodeFlag.AIDING_OLD), int(NodeFlag.INNOVATION_REJECTED)
+RATE_EXCEEDED, RESTORED = int(NodeFlag.RATE_EXCEEDED), int(NodeFlag.RESTORED)
+CLOCK_UNSYNCHRONISED, BIAS_UNKNOWN = int(NodeFlag.CLOCK_UNSYNCHRONISED), int(NodeFlag.BIAS_UNKNOWN)
+STATIC_BIAS = int(Mode.STATIC_BIAS)
 VAR_FLOOR = (0.001 * DEG) ** 2
 VAR_CEILING = 100.0  # rad^2, the largest that a message says; a yaw of that variance is any yaw
 
@@ -50,12 +56,15 @@ class Reporter:
     @property
     def sensor_flags(self) -> NodeFlag:
         """What a reader of the node's yaw must know of its sensors."""
-        flags, guard = NodeFlag.NONE, self._node["guard"]
+        return NodeFlag(self._sensor_bits())
+
+    def _sensor_bits(self) -> int:
+        bits, guard = 0, self._node["guard"]
         if guard["gyro"]["fault"]:
-            flags |= NodeFlag.SENSOR_FAULT | NodeFlag.YAW_UNTRUSTED
+            bits |= SENSOR_FAULT | YAW_UNTRUSTED
         if guard["force"]["fault"]:
-            flags |= NodeFlag.SENSOR_FAULT
-        return flags
+            bits |= SENSOR_FAULT
+        return bits
 
     @property
     def yaw(self) -> float:
@@ -74,22 +83,22 @@ class Reporter:
 
     def flags(self, context: RigContext, now: float) -> NodeFlag:
         """What the node says of the trust in its own yaw at ``now`` (s, own clock)."""
-        state, flags = self._state, self.sensor_flags
+        state, bits = self._state, self._sensor_bits()
         if not state["yaw_known"]:
-            flags |= NodeFlag.YAW_UNTRUSTED
+            bits |= YAW_UNTRUSTED
         if now - state["last_aided"] > self._settings.aiding_old_after:
-            flags |= NodeFlag.AIDING_OLD
+            bits |= AIDING_OLD
         if state["rejected"]:
-            flags |= NodeFlag.INNOVATION_REJECTED
+            bits |= INNOVATION_REJECTED
         if state["rate_exceeded"]:
-            flags |= NodeFlag.RATE_EXCEEDED
+            bits |= RATE_EXCEEDED
         if self._restored:
-            flags |= NodeFlag.RESTORED
+            bits |= RESTORED
         if not context.synchronised:
-            flags |= NodeFlag.CLOCK_UNSYNCHRONISED
-        if state["mode"] == Mode.STATIC_BIAS:
-            flags |= NodeFlag.BIAS_UNKNOWN
-        return flags
+            bits |= CLOCK_UNSYNCHRONISED
+        if state["mode"] == STATIC_BIAS:
+            bits |= BIAS_UNKNOWN
+        return NodeFlag(bits)
 
     def pending_events(self, pending: Iterable[PendingEvent], context: RigContext) -> Iterator[Event]:
         """Events of the parts of the firmware that have no number of their own for them."""
@@ -142,7 +151,7 @@ class Reporter:
     def report(self, end: float, context: RigContext, block: tuple[int, bytes]) -> NodeState:
         """Account at ``end`` (s, own clock); ``block`` is version and short hash of the parameters in use."""
         state, mount = self._state, self._node["mount"]
-        bias = state["static_bias"] + state["bias"]
+        bias_x, bias_y, bias_z = (state["static_bias"] + state["bias"]).tolist()
         pitch, roll = angles_of(mount["axis"][0])
         return NodeState(
             tube=self._settings.tube,
@@ -152,7 +161,7 @@ class Reporter:
             yaw=self.yaw,
             yaw_var=self.yaw_var,
             systematic_var=self.systematic_var,
-            gyro_bias=(float(bias[0]), float(bias[1]), float(bias[2])),
+            gyro_bias=(bias_x, bias_y, bias_z),
             scale_factor=float(state["scale"]),
             innovation=float(state["innovation"]),
             innovation_var=float(state["innovation_var"]),
@@ -168,7 +177,7 @@ class Reporter:
 
     def _mode(self, *, aligning: bool) -> Mode:
         """State of the node: what the kernels follow, unless a sensor fails or an alignment is under way."""
-        if NodeFlag.SENSOR_FAULT in self.sensor_flags:
+        if self._sensor_bits() & SENSOR_FAULT:
             return Mode.FAULT
         return Mode.ALIGNMENT if aligning else Mode(int(self._state["mode"]))
 

@@ -128,6 +128,8 @@ class Tube:
             a.torque,
             float(node["down_torsion"]),
             a.under_torque,
+            a.epoch,
+            a.seal,
         )
 
     def on_cycle(self, reading: ImuReading, context: RigContext) -> list[Said]:

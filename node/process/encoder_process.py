@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 import secrets
 from collections.abc import Callable
-from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -92,8 +91,7 @@ class EncoderProcess(Process):
         sample = self._source.read(now) if self._source is not None else sample_of(data)
         self._lap(Stage.READ)
         if sample is not None:
-            measured = replace(self.encoder.on_cycle(sample, now), epoch=self.endpoint.clock.epoch)
-            self.endpoint.send_aiding(measured, now)
+            self.endpoint.send_aiding(self.encoder.on_cycle(sample, now, self.endpoint.clock.epoch), now)
         if self._timing is None:  # an own clock advances time between the cycles
             self.endpoint.advance(now)
         self._seal_watch.look(now)
@@ -120,7 +118,7 @@ def sample_of(data: Any) -> EncoderSample | None:
         if len(more) > 2:
             return None
         torque = None if not more or more[0] is None else float(more[0])
-        earlier = tuple(float(edge) for edge in more[1]) if len(more) > 1 else ()
+        earlier = tuple(map(float, more[1])) if len(more) > 1 else ()
         sample = EncoderSample(int(count), float(edge_at), bool(rising), torque, earlier=earlier)
     except (TypeError, ValueError, OverflowError):
         return None

@@ -250,7 +250,7 @@ class TubeProcess(Process):
         aiding = across(aiding, self.settings.above[:silent], self.settings.stiffness)
         onward = self.tube.on_aiding(aiding, clock.local_from_rig(aiding.valid_at), clock.variance(now))
         if onward is not None:
-            self._send(replace(onward, epoch=aiding.epoch, seal=aiding.seal), now)
+            self._send(onward, now)
 
     def _context(self, now: float) -> RigContext:
         clock = self.endpoint.clock
@@ -279,11 +279,17 @@ class TubeProcess(Process):
 
     def _with_process_state(self, state: NodeState) -> NodeState:
         """A state with what the process knows beside the firmware: epoch, numbers given out, trouble with the disk."""
-        flags = state.flags | (NodeFlag.NOT_SAVED if self._saver.is_refused else NodeFlag.NONE)
+        flags = state.flags | NodeFlag.NOT_SAVED if self._saver.is_refused else state.flags
         endpoint = self.endpoint
-        upper, lower = (endpoint.margin(side) for side in Side)
-        known = replace(state, flags=flags, hops=endpoint.told_hops, epoch=endpoint.clock.epoch)
-        return replace(known, numbered=endpoint.newest_sequence, upper_margin=upper, lower_margin=lower)
+        return replace(
+            state,
+            flags=flags,
+            hops=endpoint.told_hops,
+            epoch=endpoint.clock.epoch,
+            numbered=endpoint.newest_sequence,
+            upper_margin=endpoint.margin(Side.UPPER),
+            lower_margin=endpoint.margin(Side.LOWER),
+        )
 
     def _keep(self, said: Kept, now: float) -> None:
         """Keep a message for the ground station; surveys and records stay in the log when it has them."""
@@ -379,7 +385,7 @@ def reading_of(data: Any, now: float) -> ImuReading:
     except (TypeError, ValueError, OverflowError):
         return ImuReading(now - PERIOD, now, NOTHING, NOTHING)
     first, *others = [imu_reading(row, begin, now) for row in rows]
-    return replace(first, others=tuple(others))
+    return replace(first, others=tuple(others)) if others else first
 
 
 def imu_reading(items: Any, start: float, end: float) -> ImuReading:
@@ -388,7 +394,7 @@ def imu_reading(items: Any, start: float, end: float) -> ImuReading:
     Perhaps a temperature follows, bits of what was at its range within the cycle, and by how much its window was late.
     """
     try:
-        numbers = [float(item) for item in items]
+        numbers = list(map(float, items))
     except (TypeError, ValueError, OverflowError):
         numbers = []
     if not 6 <= len(numbers) <= 9:

@@ -43,7 +43,10 @@ class FaultyChannel(LinkChannel):
     def deliveries(self, sender: int, side: Side, frame: bytes) -> list[tuple[float, bytes]]:
         """Delay (s) and bytes of each copy of the next frame leaving this port; none when it is lost."""
         port = (sender, side)
-        self.overheard.setdefault(port, deque(maxlen=OVERHEARD)).append(frame)
+        overheard = self.overheard.get(port)
+        if overheard is None:
+            overheard = self.overheard[port] = deque(maxlen=OVERHEARD)
+        overheard.append(frame)
         for listener in self.listeners:
             listener(sender, side, frame)
         found = super().deliveries(sender, side, frame)

@@ -78,7 +78,9 @@ class FaultyStepper(InProcessStepper):
         answers = {}
         for address in sorted(steps):
             try:
-                events = self._events_of(address, steps[address])
+                events = steps[address]
+                if address in self._frozen or address in self._thawing or address == BASE:
+                    events = self._events_of(address, events)
                 if events and address in self.processes:
                     answers[address] = step(self.processes[address], events)
             except PowerCutError:

@@ -96,7 +96,7 @@ class FaultyWorld(World):
         if address in self.drifts:
             since, rate = self.drifts[address]
             shown += rate * max(t - since, 0.0)
-        return shown + self.jumps.get(address, 0.0)
+        return shown + self.jumps[address] if address in self.jumps else shown
 
     def true_time(self, address: int, local: float) -> float:
         """Rig time of the truth at which the clock of a process shows ``local`` (s)."""
@@ -116,7 +116,7 @@ class FaultyWorld(World):
             self._counted[t] = super().encoder_sample(t)
         count, edge_at, rising, torque, earlier = self._counted[t]
         off = self.zero - self.jumps.get(ENCODER, 0.0)
-        return count + self.slipped, edge_at - off, rising, torque, tuple(edge - off for edge in earlier)
+        return count + self.slipped, edge_at - off, rising, torque, tuple([edge - off for edge in earlier])
 
     def imu_sample(self, tube: int, cycle: int) -> Reading:
         """Reading of a tube, spoiled where its sensor fails."""

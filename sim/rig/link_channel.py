@@ -40,13 +40,15 @@ class LinkChannel:
         if drawn is None:
             drawn = self._streams[sender, side] = PortStream(self._seed, Stream.LINK, sender, int(side))
         fate, wait, again = drawn.draw()
-        if fate < self.loss or (sender, side) in self.severed:
+        if fate < self.loss or (self.severed and (sender, side) in self.severed):
             self.lost += 1
             return []
         first = self.latency + self._jitter * wait
         delays = [first]
         if fate > 1.0 - self.duplicate:
             delays.append(first + self.latency + self._jitter * again)
+        if self.corrupt == 0.0:  # as nearly always
+            return [(delay, frame) for delay in delays]
         return [(delay, drawn.damage(frame, self.corrupt)) for delay in delays]
 
 

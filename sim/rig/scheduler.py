@@ -37,6 +37,8 @@ TELL_EVERY = 0.5  # wall s
 CUE_LIMIT = 120.0  # wall s
 CUE_AGAIN = 2.0  # rig s, until an operator who was too early tries again
 REBOOT_TIME = 5.0  # rig s that a process may be missing before the rig's time waits for it
+FRAME_AT = {Side.UPPER: Due.UPPER_FRAME, Side.LOWER: Due.LOWER_FRAME}  # event of a frame that comes in at an end
+CYCLE, TIMER = Due.CYCLE, Due.TIMER
 Entry = tuple[float, int, int, int, "Due | None", bytes, "float | None"]
 
 
@@ -113,8 +115,8 @@ class Scheduler:
         self._count = 0
         self._cycle = 0
         self._wake: dict[int, float] = {}
-        self._string: tuple[int, ...] = ()
-        self._open_top = False
+        self._ends: dict[tuple[int, Side], tuple[int, Due]] = {}
+        self._join(())
         self._attached: set[int] = set()  # that were there at any time
         self._missing_since: dict[int, float] = {}
         self._changes: deque[Change] = deque()
@@ -161,7 +163,7 @@ class Scheduler:
         self._attach(BASE)
         if self.world.rack is None:
             at_start = self.world.scenario.file.rig.tubes_at_start
-            self._string = tuple(range(at_start, 0, -1))
+            self._join(tuple(range(at_start, 0, -1)), open_top=self._open_top)
             for tube in reversed(self._string):
                 self._want(tube)
         self._wall_begin = time.monotonic()
@@ -175,7 +177,8 @@ class Scheduler:
             limit = self._queue[0][0] + self.channel.latency
             if self._changes:
                 limit = min(limit, self._changes[0].at)
-            self._pace(self._queue[0][0])
+            if self._speed < math.inf:
+                self._pace(self._queue[0][0])
             self._round(limit)
 
     def _all_changes(self) -> list[Change]:
@@ -200,13 +203,13 @@ class Scheduler:
     def _enter(self, phase: Phase) -> None:
         self.progress.phase = f"{phase.kind} tube {phase.tube}"
         if phase.kind == "add":
-            self._open_top = True
+            self._join(self._string, open_top=True)
             self._want(phase.tube)
         self._tell(self.progress)
 
     def _enter_rack(self) -> None:
         self.progress.phase = "rack"
-        self._string = tuple(range(self.world.scenario.tubes, 0, -1))
+        self._join(tuple(range(self.world.scenario.tubes, 0, -1)), open_top=self._open_top)
         for tube in reversed(self._string):
             self._want(tube)
 
@@ -215,7 +218,7 @@ class Scheduler:
         for tube in self._string:
             if tube in self.progress.wanted:
                 self._cut_power(tube)
-        self._string = ()
+        self._join((), open_top=self._open_top)
 
     def _cue(self, name: str) -> None:
         """Let the operator act while the rig's time stands still."""
@@ -233,8 +236,7 @@ class Scheduler:
         self.progress.cue = ""
 
     def _close_joint(self, tube: int) -> None:
-        self._string = (tube, *self._string)
-        self._open_top = False
+        self._join((tube, *self._string))
 
     def _want(self, address: int) -> None:
         if address not in self.progress.wanted:
@@ -279,12 +281,10 @@ class Scheduler:
 
     def _push(self, at: float, address: int, kind: Due | None, frame: bytes, margin: float | None = None) -> None:
         self._count += 1
-        rank = 9 if kind is None else int(kind)
-        heapq.heappush(self._queue, (at, address, rank, self._count, kind, frame, margin))
+        # an event's kind is its rank; at one time a cycle of all comes last
+        heapq.heappush(self._queue, (at, address, 9 if kind is None else kind, self._count, kind, frame, margin))
 
     def _pace(self, rig_time: float) -> None:
-        if math.isinf(self._speed):
-            return
         ahead = (rig_time - self.world.begin) / self._speed - (time.monotonic() - self._wall_begin)
         if ahead > 0.0:
             with contextlib.suppress(queue.Empty):
@@ -293,20 +293,21 @@ class Scheduler:
     def _round(self, limit: float) -> None:
         steps: dict[int, list[FrameEvent]] = {}
         true_time: dict[tuple[int, float], float] = {}
-        while self._queue and self._queue[0][0] < limit:
-            at, address, _, _, kind, frame, margin = heapq.heappop(self._queue)
+        events, wake = self._queue, self._wake
+        while events and events[0][0] < limit:
+            at, address, _, _, kind, frame, margin = heapq.heappop(events)
             self.now = at
             if kind is None:
                 self._add_cycle(at, steps, true_time)
-            elif kind is Due.CYCLE:
+            elif kind is CYCLE:
                 if address in self.stepper.alive():
                     self._add_sample(at, address, int.from_bytes(frame), steps, true_time)
-            elif kind is not Due.TIMER or self._wake.get(address) == at:
+            elif kind is not TIMER or wake.get(address) == at:
                 self._add(steps, true_time, address, kind, at, margin, frame)
         answers = self.stepper.round(steps)
         self._end_hung(self.stepper.drain_hung())
-        for address in sorted(answers):
-            self._on_answer(address, answers[address], true_time)
+        for address, answer in sorted(answers.items()) if len(answers) > 1 else answers.items():
+            self._on_answer(address, answer, true_time)
 
     def _add(
         self,
@@ -320,7 +321,11 @@ class Scheduler:
     ) -> None:
         local = self.world.local_clock(address, at)
         true_time[address, local] = at
-        steps.setdefault(address, []).append((DueEvent(kind, local, data), frame))
+        event = DueEvent(kind, local, data), frame
+        if address in steps:
+            steps[address].append(event)
+        else:
+            steps[address] = [event]
 
     def _add_cycle(
         self, at: float, steps: dict[int, list[FrameEvent]], true_time: dict[tuple[int, float], float]
@@ -377,14 +382,15 @@ class Scheduler:
             if self._radio is not None and not is_cable(address, sent.side):
                 self._radiate(self._radio, address, sent.side, at, frame)
                 continue
-            end = self._other_end(address, sent.side)
+            end = self._ends.get((address, sent.side))  # None at the bit, at the surface and at an open joint
             for delay, arriving in self.channel.deliveries(address, sent.side, frame):
                 if end is not None:
-                    self._push(at + delay, end[0], Due(int(end[1])), arriving)
+                    self._push(at + delay, *end, arriving)
         wake = self.world.true_time(address, answer.wake_at) if math.isfinite(answer.wake_at) else math.inf
-        if math.isfinite(wake) and self._wake.get(address) != wake:
-            self._push(wake, address, Due.TIMER, b"")
-        self._wake[address] = wake
+        if self._wake.get(address) != wake:
+            if math.isfinite(wake):
+                self._push(wake, address, TIMER, b"")
+            self._wake[address] = wake
 
     def _radiate(self, radio: RadioChannel, sender: int, side: Side, at: float, frame: bytes) -> None:
         """Have every end hear a frame that its radio reaches, in a closed string up to the drive head."""
@@ -399,23 +405,16 @@ class Scheduler:
             joints = chain[min(place, other) + 1 : max(place, other) + 1]
             facing = Side.UPPER if side is Side.LOWER else Side.LOWER
             for delay, arriving, margin in radio.deliveries(sender, side, chain[other], joints, at, frame):
-                self._push(at + delay, chain[other], Due(int(facing)), arriving, margin)
+                self._push(at + delay, chain[other], FRAME_AT[facing], arriving, margin)
 
-    def _other_end(self, address: int, side: Side) -> tuple[int, Side] | None:
-        """Which port a port looks into now; None at the bit, at the surface and at an open joint."""
-        chain = (BASE, ENCODER, *self._string)
-        if address not in chain or (self._open_top and (address, side) in self._open_ends()):
-            return None
-        place = chain.index(address) + (1 if side is Side.LOWER else -1)
-        if not 0 <= place < len(chain):
-            return None
-        return chain[place], Side.UPPER if side is Side.LOWER else Side.LOWER
-
-    def _open_ends(self) -> set[tuple[int, Side]]:
-        ends = {(ENCODER, Side.LOWER)}
-        if self._string:
-            ends.add((self._string[0], Side.UPPER))
-        return ends
+    def _join(self, string: tuple[int, ...], *, open_top: bool = False) -> None:
+        """Have these tubes hang, top first, and every port look into another; not through an open joint at the head."""
+        self._string, self._open_top, self._ends = string, open_top, {}
+        for upper, lower in itertools.pairwise((BASE, ENCODER, *string)):
+            if upper == ENCODER and open_top:
+                continue
+            self._ends[upper, Side.LOWER] = lower, FRAME_AT[Side.UPPER]
+            self._ends[lower, Side.UPPER] = upper, FRAME_AT[Side.LOWER]
 
 
 def is_cable(address: int, side: Side) -> bool:

@@ -4,8 +4,7 @@ from __future__ import annotations
 
 import enum
 from collections.abc import Mapping
-from dataclasses import dataclass
-from typing import Protocol
+from typing import NamedTuple, Protocol
 
 from telemetry.runtime.stepped import DueEvent, Sent
 
@@ -20,8 +19,7 @@ class Acted(enum.StrEnum):
     NO_ANSWER = "no answer"  # of the ground station or the operator: to be asked again
 
 
-@dataclass(frozen=True, slots=True)
-class Answer:
+class Answer(NamedTuple):
     """What one process did in a step: frames it sent, in order, and its next timer (s, its clock)."""
 
     frames: list[tuple[Sent, bytes]]

@@ -160,12 +160,12 @@ class World:
 
     def local_clock(self, address: int, t: float) -> float:
         """What the clock of a process shows at rig time ``t`` (s)."""
-        offset, drift = self._clock(address)
+        offset, drift = self._clocks[address]
         return t + offset + drift * (t - self.begin)
 
     def true_time(self, address: int, local: float) -> float:
         """Rig time at which the clock of a process shows ``local`` (s)."""
-        offset, drift = self._clock(address)
+        offset, drift = self._clocks[address]
         return self.begin + (local - offset - self.begin) / (1.0 + drift)
 
     def tube_settings(self, tube: int) -> TubeSettings:
@@ -470,16 +470,13 @@ class World:
         errors: list[float] = (std * self._random(Stream.MOUNTS, 0).standard_normal(self.scenario.tubes + 1)).tolist()
         return errors
 
-    def _clock(self, address: int) -> tuple[float, float]:
-        if address == ENCODER:
-            return 0.0, 0.0
-        return self._clocks[0 if address == BASE else address]
-
     @cached_property
-    def _clocks(self) -> list[tuple[float, float]]:
+    def _clocks(self) -> dict[int, tuple[float, float]]:
+        """Offset (s) and drift of the clock of each process against that of the encoder, by address."""
         clocks = self.scenario.file.clocks
         draws = self._random(Stream.CLOCKS, 0).standard_normal((self.scenario.tubes + 1, 2))
-        return [(clocks.offset_std_s * a, clocks.drift_std_ppm * 1e-6 * b) for a, b in draws.tolist()]
+        drawn = [(clocks.offset_std_s * a, clocks.drift_std_ppm * 1e-6 * b) for a, b in draws.tolist()]
+        return {ENCODER: (0.0, 0.0), BASE: drawn[0]} | dict(enumerate(drawn[1:], 1))
 
     def _random(self, purpose: Stream, tube: int, imu: int = 0) -> np.random.Generator:
         further = [imu] if imu else []  # the first IMU of a tube draws what it draws alone

@@ -9,9 +9,8 @@ from __future__ import annotations
 
 import math
 from collections import Counter, OrderedDict, deque
-from dataclasses import dataclass
 from functools import partial
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
 
 from telemetry.application.clock import ClockFilter
 from telemetry.application.outbox import Outbox
@@ -65,7 +64,7 @@ STATE_WAIT = 1.15  # s for which a node's state waits for those of the nodes bel
 HOP_WAIT = 0.005  # s, longer by a frame's way where fewer hops are left: after a loss the lowest goes first again
 WAITING_HOPS = 100
 REPORT_EVERY = 60.0  # s between two looks at what queues dropped
-DROPS = ("reliable_dropped", "best_effort_dropped", "outbox_dropped")  # counters of what found no place in a queue
+DROPS = ("reliable_dropped", "best_effort_dropped")  # counters of what found no place in a link's queue
 ONE_HOP = (Kind.AIDING, Kind.HELLO, Kind.TIME_REQUEST, Kind.TIME_REPLY)
 RELIABLE = (
     Kind.SURVEY_MEASUREMENT,
@@ -96,16 +95,14 @@ PRIORITIES: dict[Kind, Priority] = {
 }
 
 
-@dataclass(frozen=True, slots=True)
-class Received:
+class Received(NamedTuple):
     """A message for this process and the end it came in at."""
 
     message: Message
     side: Side
 
 
-@dataclass(frozen=True, slots=True)
-class Neighbour:
+class Neighbour(NamedTuple):
     """Who is at the other side of a joint."""
 
     tube: int
@@ -232,7 +229,11 @@ class Endpoint:
         """Frames to put on the wire now."""
         seals = self.seals
         if seals is None:
-            return [(side, frame) for side, link in self._links.items() for frame in link.take_frames(now)]
+            frames: list[tuple[Side, Frame]] = []
+            for side, link in self._links.items():
+                if taken := link.take_frames(now):
+                    frames += [(side, frame) for frame in taken]
+            return frames
         return [
             (side, frame)
             for side, link in self._links.items()
@@ -241,7 +242,10 @@ class Endpoint:
 
     def next_wake(self, now: float) -> float:
         """Local time (s) at which ``advance`` and ``take_frames`` have work that no frame brings."""
-        wake = min((link.next_wake(now) for link in self._links.values()), default=math.inf)
+        wake = math.inf
+        for link in self._links.values():
+            if (due := link.next_wake(now)) < wake:
+                wake = due
         return wake if self.seals is None else min(wake, self.seals.next_wake())
 
     def send_aiding(self, aiding: Aiding, now: float) -> None:
@@ -370,8 +374,8 @@ class Endpoint:
     @property
     def dropped(self) -> int:
         """What found no place in any queue since the start."""
-        counters = self.link_counters()
-        return sum(counters.get(name, 0) for name in DROPS)
+        links = [link.counters for link in self._links.values()]
+        return self._outbox.dropped + sum([counters[name] for counters in links for name in DROPS])
 
     def export_state(self) -> bytes:
         """What must survive a restart: numbers, unreceipted messages, answered commands."""
@@ -394,6 +398,8 @@ class Endpoint:
 
     def _handle_one_hop(self, side: Side, message: Message, now: float) -> Message | None:
         match message:
+            case Aiding():
+                return message if side is Side.UPPER and self._is_measured(message, now) else None
             case Hello():
                 self._meet(side, message, now)
             case TimeRequest() if self.clock.synchronised and side is not self._sync_side:
@@ -404,8 +410,6 @@ class Endpoint:
                 self._links[side].send_best_effort(encode(reply), Kind.TIME_REPLY, Priority.TIME)
             case TimeReply() if side is self._sync_side:
                 self.clock.exchange(message, now)
-            case Aiding() if side is Side.UPPER and self._is_measured(message, now):
-                return message
         return None
 
     def _meet(self, side: Side, hello: Hello, now: float) -> None:
@@ -561,9 +565,11 @@ class Endpoint:
             self._send_due(self._outbox, Side.UPPER, now)
 
     def _send_due(self, outbox: Outbox, side: Side, now: float) -> None:
-        if side is Side.UPPER and side in self._links:
+        if not len(outbox) or side not in self._links:
+            return
+        if side is Side.UPPER:
             for payload in outbox.due_payloads(now):
                 self._links[side].send_reliable(self._sealed(payload), Priority.SURVEY)
-        elif side in self._links:
+        else:
             for payload in outbox.due_payloads(now):
                 self._send_down(payload, open_payload(payload).target, Priority.COMMAND)

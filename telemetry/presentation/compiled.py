@@ -11,12 +11,15 @@ import math
 from collections.abc import Callable, Sequence
 from typing import Any
 
+from telemetry.frozen import writable
 from telemetry.presentation.fields import FieldCodec
 from telemetry.quantities import ValueKind
 from telemetry.schema import Field, MessageSpec
 
 Reader = Callable[[dict[str, Any]], Any]  # message of its fields by their keys; raises ValueError
 Lister = Callable[[Any], list[Any]]  # values of the fields of a message; raises ValueError
+Packer = Callable[[list[Any]], dict[str, Any]]  # what is put into msgpack of the values of all fields
+NOBODY = 255  # address
 RIGHT = {
     ValueKind.NUMBER: "type({v}) is float and {low!r} <= {v} <= {high!r}",
     ValueKind.INTEGER: "type({v}) is int and {low!r} <= {v} <= {high!r}",
@@ -57,6 +60,31 @@ def lister_of(spec: MessageSpec, codecs: Sequence[FieldCodec]) -> Lister:
     return lister
 
 
+def packer_of(spec: MessageSpec, codecs: Sequence[FieldCodec], target: int | None) -> Packer:
+    """Function from the values of all fields, checked, to a map, of the earliest schema version that has them.
+
+    ``target`` is the address that the message goes to; None: its tube.
+    """
+    names = [codec.name for codec in codecs]
+    later = [k for k, codec in enumerate(codecs) if codec.since > 1]
+    space: dict[str, Any] = {f"before{k}": codecs[k].before for k in later}
+    lines = [f"{' '.join(f'v{k},' for k in range(len(codecs)))} = given", "version = 1"]
+    lines += [f"if v{k} != before{k}: version = {codecs[k].since}" for k in later]  # in the order of their versions
+    for k, codec in enumerate(codecs):
+        if codec.pack is not None:
+            space[f"pack{k}"] = codec.pack
+            lines.append(f"v{k} = pack{k}(v{k})")
+    lines.append(f"body = {{{', '.join(f'{c.key!r}: v{k}' for k, c in enumerate(codecs) if c.since == 1)}}}")
+    lines += [f"if version >= {codecs[k].since}: body[{codecs[k].key!r}] = v{k}" for k in later]
+    origin = f"v{names.index('tube')}" if "tube" in names else NOBODY
+    sequence = f"v{names.index('sequence')}" if "sequence" in names else 0
+    route = f"'o': {origin}, 't': {origin if target is None else target}, 's': {sequence}"
+    packer: Packer = compiled(
+        [*lines, f"return {{'v': version, 'k': {int(spec.kind)}, {route}, 'b': body}}"], space, codecs
+    )
+    return packer
+
+
 def checking(field: Field, place: int, sequence: str) -> list[str]:
     """Lines that check the value of a field; ``sequence`` is the type that vectors come in."""
     v = f"v{place}"
@@ -85,12 +113,3 @@ def compiled(
     exec(compile(source, "<compiled from the schema>", "exec"), space)
     function: Callable[..., Any] = space["function"]
     return function
-
-
-def writable(message: type[Any]) -> type[Any]:
-    """Twin of a frozen message whose fields can be assigned.
-
-    An instance becomes the message by ``__class__``, which Python allows between classes of the same slots. A frozen
-    dataclass assigns each field by a call: for a state that takes six times as long.
-    """
-    return type(f"Writable{message.__name__}", (), {"__slots__": message.__slots__})

@@ -76,7 +76,8 @@ def enumerated(q: Quantity, enumeration: Callable[[int], Any]) -> Callable[[Any]
     members: dict[int, Any] = {}
 
     def checked(value: Any) -> Any:
-        if type(value) is not int or (member := members.get(value)) is None:
+        is_plain = type(value) is int or type(value) is enumeration
+        if not is_plain or (member := members.get(value)) is None:
             member = members[int(value)] = enumeration(check_integer(q, value))
         return member
 
@@ -199,6 +200,8 @@ def _imu(item: Any) -> ImuMean:
 
 def _stand(q: Quantity, item: Any) -> Stand:
     if isinstance(item, Stand):
+        if _is_right(q, item):
+            return item
         item = pack_stands([item])[0]
     if not isinstance(item, list) or len(item) != 4:
         raise ValueError(f"{q.name}: expected epoch, begin, end and depth, got {item!r:.40}")
@@ -209,6 +212,18 @@ def _stand(q: Quantity, item: Any) -> Stand:
     if not (begun_at <= ended_at and q.low <= md <= q.high):
         raise ValueError(f"{q.name}: expected begin, end and a depth of {q.low:g}..{q.high:g} m, got {item!r:.60}")
     return Stand(epoch, begun_at, ended_at, md)
+
+
+def _is_right(q: Quantity, stand: Stand) -> bool:
+    """Whether a stand is as the schema says without a conversion, as nearly always."""
+    begun_at, ended_at, md = stand.begun_at, stand.ended_at, stand.md
+    return (
+        type(stand.epoch) is int
+        and type(begun_at) is type(ended_at) is type(md) is float
+        and 0 <= stand.epoch <= MAX_EPOCH
+        and -LARGEST_TIME <= begun_at <= ended_at <= LARGEST_TIME
+        and max(q.low, -LARGEST_TIME) <= md <= min(q.high, LARGEST_TIME)
+    )
 
 
 def _check_names(q: Quantity, value: Any) -> None:

@@ -13,12 +13,11 @@ import msgpack
 
 from telemetry.errors import DecodeError, EncodeError
 from telemetry.messages import BASE, SCHEMA_VERSION, Message
-from telemetry.presentation.compiled import Lister, Reader, lister_of, reader_of
+from telemetry.presentation.compiled import Lister, Packer, Reader, lister_of, packer_of, reader_of
 from telemetry.presentation.fields import MAX_BINARY, codec_of
 from telemetry.schema import SCHEMA, U53, Kind, MessageSpec
 
 MAX_PAYLOAD = 4096
-NO_TARGET = 255
 HIGHEST_ADDRESS = 255
 DOWNWARD = (Kind.RECEIPT, Kind.COMMAND, Kind.BLOCK_SEGMENT, Kind.SESSION_OFFER)
 
@@ -38,49 +37,35 @@ class MessageCodec:
 
     def __init__(self, spec: MessageSpec) -> None:
         self._spec = spec
-        self._readers: dict[int, Reader] = {}  # by schema version, compiled when a payload of it comes
+        self.readers: dict[int, Reader] = {}  # by schema version, compiled when a payload of it comes
         self.kind = spec.kind
         self.message = spec.message
         self.newest = spec.newest
         self.fields = tuple(codec_of(field) for field in spec.fields)
         self.goes_down = spec.kind in DOWNWARD
-        names = [field.name for field in self.fields]
-        self._later = [(place, f.since, f.before) for place, f in enumerate(self.fields) if f.since > 1]
-        self._packed = [(place, f.pack) for place, f in enumerate(self.fields) if f.pack is not None]
         sinces = [field.since for field in self.fields]
         if sinces != sorted(sinces):
             raise ValueError(f"{spec.message.__name__}: expected fields of later schema versions after all others")
-        keys = [[field.key for field in self.fields if field.since <= version] for version in range(self.newest + 1)]
-        self._keys = keys  # of each version
-        self._origin = names.index("tube") if "tube" in names else None
-        self._sequence = names.index("sequence") if "sequence" in names else None
 
     @cached_property
     def values(self) -> Lister:
         """Function from a message to the values of its fields, checked."""
         return lister_of(self._spec, self.fields)
 
+    @cached_property
+    def rows(self) -> Packer:
+        """Function from the values of all fields, checked, to what is put into msgpack."""
+        return packer_of(self._spec, self.fields, None if self.goes_down else BASE)
+
     def reader(self, version: int) -> Reader:
-        """Function from the fields of a payload of a schema version to its message."""
-        reader = self._readers.get(version)
-        if reader is None:
-            reader = self._readers[version] = reader_of(self._spec, self.fields, version)
+        """Make the function from the fields of a payload of a schema version to its message."""
+        reader = self.readers[version] = reader_of(self._spec, self.fields, version)
         return reader
 
     def pack(self, values: list[Any]) -> bytes:
         """Payload of the values of all fields, which are checked, in the earliest schema version that has them."""
-        version = 1
-        for place, since, before in self._later:
-            if since > version and values[place] != before:
-                version = since
-        origin = NO_TARGET if self._origin is None else values[self._origin]
-        sequence = 0 if self._sequence is None else values[self._sequence]
-        for place, pack in self._packed:
-            values[place] = pack(values[place])
-        body = dict(zip(self._keys[version], values, strict=False))
-        target = origin if self.goes_down else BASE
-        rows = {"v": version, "k": int(self.kind), "o": origin, "t": target, "s": sequence, "b": body}
-        return bytes(msgpack.packb(rows))
+        payload: bytes = msgpack.packb(self.rows(values))
+        return payload
 
 
 CODECS: dict[type[Any], MessageCodec] = {spec.message: MessageCodec(spec) for spec in SCHEMA}
@@ -100,7 +85,8 @@ def encode(message: Message) -> bytes:
         values = codec.values(message)
     except ValueError as error:
         raise EncodeError(f"{type(message).__name__}: {error}") from error
-    return codec.pack(values)
+    payload: bytes = msgpack.packb(codec.rows(values))
+    return payload
 
 
 def decode(payload: bytes) -> Message:
@@ -123,8 +109,10 @@ def open_payload(payload: bytes) -> Opened:
         When the bytes have no envelope of this version.
     """
     rows = _unpack(payload)
-    get = rows.get
-    version, kind, origin, target, sequence = get("v"), get("k"), get("o"), get("t"), get("s")
+    try:
+        version, kind, origin, target, sequence = rows["v"], rows["k"], rows["o"], rows["t"], rows["s"]
+    except KeyError:  # what is missing is None, which no check lets pass
+        version, kind, origin, target, sequence = map(rows.get, "vkots")
     if type(version) is not int or not 1 <= version <= SCHEMA_VERSION:
         raise DecodeError(f"payload: expected schema version 1 to {SCHEMA_VERSION}, got {version!r:.40}")
     codec = CODEC_OF.get(kind) if type(kind) is int else None
@@ -150,9 +138,14 @@ def decode_opened(opened: Opened) -> Message:
         When a field is missing or outside its range.
     """
     codec = CODEC_OF[opened.kind]
-    body = body_of(opened)
+    rows = opened.rows
+    body = rows.get("b")
+    if type(body) is not dict:
+        body = body_of(opened)
     try:
-        decoded: Message = codec.reader(opened.rows["v"])(body)
+        version = rows["v"]
+        read = codec.readers.get(version) or codec.reader(version)
+        decoded: Message = read(body)
     except ValueError as error:
         raise DecodeError(f"{codec.message.__name__}: {error}") from error
     return decoded

@@ -9,9 +9,8 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterable
-from dataclasses import dataclass
 from enum import IntEnum
-from typing import Any
+from typing import Any, Final, NamedTuple
 
 import msgpack
 
@@ -31,8 +30,7 @@ class Due(IntEnum):
     DEPTH = 4
 
 
-@dataclass(frozen=True, slots=True)
-class DueEvent:
+class DueEvent(NamedTuple):
     """One event for a process: its kind, its local time (s) and what belongs to it."""
 
     kind: Due
@@ -40,12 +38,15 @@ class DueEvent:
     data: Any = None  # CYCLE: [start, *sample]; DEPTH: the reading's payload; of a frame by radio its margin, dB
 
 
-@dataclass(frozen=True, slots=True)
-class Sent:
+class Sent(NamedTuple):
     """A frame that left the process at the local time ``at`` (s)."""
 
     side: Side
     at: float
+
+
+CYCLE, DEPTH = Due.CYCLE, Due.DEPTH
+SIDE_OF: Final = {Due.UPPER_FRAME: Side.UPPER, Due.LOWER_FRAME: Side.LOWER}  # that a frame comes in at
 
 
 def pack_step(number: int, events: Iterable[DueEvent]) -> bytes:
@@ -91,20 +92,16 @@ def run_step(process: Process, events: Iterable[tuple[DueEvent, bytes]], send: C
 
 
 def dispatch(process: Process, event: DueEvent, frame: bytes) -> None:
-    """Hand one event to the process."""
-    match event.kind:
-        case Due.UPPER_FRAME:
-            process.on_frame(Side.UPPER, frame, event.at, *heard_with(event))
-        case Due.LOWER_FRAME:
-            process.on_frame(Side.LOWER, frame, event.at, *heard_with(event))
-        case Due.CYCLE:
-            process.on_cycle(event.data, event.at)
-        case Due.DEPTH:
-            process.on_depth(event.data, event.at)
-        case Due.TIMER:
-            process.on_timer(event.at)
-
-
-def heard_with(event: DueEvent) -> tuple[float, ...]:
-    """Margin (dB) of a frame that came by radio; nothing of one that came by cable."""
-    return () if event.data is None else (float(event.data),)
+    """Hand one event to the process; the data of a frame that came by radio are its margin (dB)."""
+    kind, at, data = event
+    side = SIDE_OF.get(kind)
+    if side is not None and data is None:
+        process.on_frame(side, frame, at)
+    elif side is not None:
+        process.on_frame(side, frame, at, float(data))
+    elif kind is CYCLE:
+        process.on_cycle(data, at)
+    elif kind is DEPTH:
+        process.on_depth(data, at)
+    else:
+        process.on_timer(at)

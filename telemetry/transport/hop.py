@@ -83,6 +83,10 @@ class HopLink:
     address : of this process
     boot_count : its starts so far, so that the other end can tell a restart from a long silence
     nearest : chooses the other end, where frames of several are heard
+
+    Attributes
+    ----------
+    epoch : boot, session and address of this end
     """
 
     def __init__(self, address: int, boot_count: int, nearest: Nearest | None = None) -> None:
@@ -91,6 +95,7 @@ class HopLink:
         self._address = address
         self._boot_count = boot_count
         self._session = 0
+        self.epoch = epoch_of(boot_count, 0, address)
         self.peer: tuple[int, int] | None = None  # address and boot count of the other end
         self.last_heard = -math.inf
         self.quality = 1.0
@@ -139,10 +144,15 @@ class HopLink:
 
     def release(self, now: float = math.inf) -> None:
         """Send what waited for others to go with, or what has waited until ``now`` (s)."""
-        for topic in [topic for topic, waiting in self._patient.items() if waiting.until <= now]:
-            waiting = self._patient.pop(topic)
-            self.send_best_effort(waiting.payload, topic, waiting.priority)
-        self._patient_until = min((waiting.until for waiting in self._patient.values()), default=math.inf)
+        if not self._patient:
+            return
+        before, self._patient, self._patient_until = self._patient, {}, math.inf
+        for topic, waiting in before.items():
+            if waiting.until <= now:
+                self.send_best_effort(waiting.payload, topic, waiting.priority)
+            else:
+                self._patient[topic] = waiting
+                self._patient_until = min(self._patient_until, waiting.until)
 
     def receive(self, frame: bytes, now: float, margin: float = math.inf) -> list[bytes]:
         """Payloads of a frame that were not delivered before; garbage is counted and gives none.
@@ -164,7 +174,7 @@ class HopLink:
         self.counters["frames_received"] += 1
         if ack_epoch == self.epoch:
             self._acknowledged(ack, ack_mask)
-        if not self._is_me(ack_epoch):
+        elif not self._is_me(ack_epoch):
             entries = [entry for entry in entries if entry[0] == 0]
         return [payload for number, payload in entries if number == 0 or self._is_new(number, now)]
 
@@ -176,23 +186,20 @@ class HopLink:
         if not (self._best_effort or self._queue or self._outstanding or self._ack_due <= now):
             return frames  # as nearly always: it is asked after every event
         entries = self._due_entries(now)
-        while entries or self._ack_due <= now:
+        while len(entries) > 1:
             count = bundled(entries, self.bundle_limit)
             frames.append(self._build(entries[:count]))
             entries = entries[count:]
+        if entries or self._ack_due <= now:
+            frames.append(self._build(entries))
         return frames
 
     def next_wake(self, now: float) -> float:
         """When ``take_frames`` has something to do without further input, infinite if never."""
-        wake = min(self._ack_due, self._patient_until)
+        wake = self._ack_due if self._ack_due < self._patient_until else self._patient_until
         if self._outstanding and self.is_up(now):
             wake = min(wake, *(one.send_at for one in self._outstanding.values()))
         return wake
-
-    @property
-    def epoch(self) -> int:
-        """Boot, session and address of this end."""
-        return self._boot_count << BOOT_SHIFT | (self._session & 0xFFFF) << SESSION_SHIFT | self._address
 
     @property
     def waiting(self) -> int:
@@ -205,6 +212,8 @@ class HopLink:
 
     def _on_peer(self, sender: int, epoch: int) -> None:
         """Notice another process at the other end (start our numbers anew) or its new session (forget its numbers)."""
+        if epoch == self._peer_epoch and self.peer is not None and sender == self.peer[0]:
+            return  # as nearly always
         peer = (sender, epoch >> BOOT_SHIFT)
         if peer != self.peer:
             if self.peer is not None:
@@ -219,6 +228,7 @@ class HopLink:
 
     def _restart(self) -> None:
         self._session += 1
+        self.epoch = epoch_of(self._boot_count, self._session, self._address)
         self._next_number = 1
         again = OrderedDict((o.payload, o.priority) for o in self._outstanding.values())
         again.update(self._queue)
@@ -226,8 +236,10 @@ class HopLink:
         self._outstanding.clear()
 
     def _update_quality(self, count: int) -> None:
-        missed = max(min(count - self._peer_count - 1, 32), 0) if self._peer_count else 0
-        self._peer_count = max(self._peer_count, count)
+        before, missed = self._peer_count, 0
+        if before and count != before + 1:
+            missed = max(min(count - before - 1, 32), 0)
+        self._peer_count = max(before, count)
         self.quality *= (1.0 - QUALITY_WEIGHT) ** (missed + 1)
         self.quality += QUALITY_WEIGHT
 
@@ -251,7 +263,7 @@ class HopLink:
 
     def _due_entries(self, now: float) -> list[Entry]:
         entries: list[Entry] = []
-        if self.is_up(now):
+        if (self._queue or self._outstanding) and self.is_up(now):
             oldest = next(iter(self._outstanding), self._next_number)
             while self._queue and self._next_number - oldest < WINDOW:
                 payload, priority = self._queue.popitem(last=False)
@@ -262,8 +274,9 @@ class HopLink:
                     entries.append(Entry(number, outstanding.payload, outstanding.priority))
                     outstanding.send_at = now + outstanding.timeout
                     outstanding.timeout = min(2.0 * outstanding.timeout, LAST_TIMEOUT)
-        entries.extend(Entry(0, payload, priority, topic) for topic, (payload, priority) in self._best_effort.items())
-        self._best_effort.clear()
+        if self._best_effort:
+            entries += [Entry(0, payload, priority, topic) for topic, (payload, priority) in self._best_effort.items()]
+            self._best_effort.clear()
         return entries
 
     def _build(self, entries: list[Entry]) -> Frame:
@@ -272,14 +285,22 @@ class HopLink:
         self.counters["frames_sent"] += 1
         peer_epoch = max(self._peer_epoch, 0)
         header = Header(self._address, self.epoch, self._frames, peer_epoch, self._received, self._received_mask)
-        payload = pack_frame(header, [(entry.number, entry.payload) for entry in entries])
-        priority = min((entry.priority for entry in entries), default=Priority.COMMAND)
+        payload = pack_frame(header, [entry[:2] for entry in entries])
+        if len(entries) == 1:  # as nearly always
+            _, _, priority, topic = entries[0]
+            return Frame(payload, priority, None if topic is None else (topic,))
+        priority = min([entry.priority for entry in entries], default=Priority.COMMAND)
         return Frame(payload, priority, common_topic(entries))
+
+
+def epoch_of(boot_count: int, session: int, address: int) -> int:
+    """Name of a sender in its frames."""
+    return boot_count << BOOT_SHIFT | (session & 0xFFFF) << SESSION_SHIFT | address
 
 
 def pack_frame(header: Header, entries: Iterable[tuple[int, bytes]]) -> bytes:
     """Bytes of a frame."""
-    body: bytes = msgpack.packb([VERSION, *header, [list(entry) for entry in entries]])
+    body: bytes = msgpack.packb((VERSION, *header, list(entries)))
     return zlib.crc32(body).to_bytes(4, "little") + body
 
 
@@ -305,7 +326,7 @@ def parse_frame(frame: bytes) -> tuple[Header, list[Any]] | None:
 
 def common_topic(entries: Iterable[Entry]) -> Hashable | None:
     """Topic of a frame with these entries: theirs together where all are best effort, None where one is numbered."""
-    topics = tuple(entry.topic for entry in entries)
+    topics = tuple([entry.topic for entry in entries])
     if not topics:
         return ACKNOWLEDGEMENT
     return None if None in topics else topics
@@ -323,7 +344,7 @@ def bundled(entries: Iterable[Entry], limit: int) -> int:
 
 
 def _is_entry(entry: object) -> bool:
-    if not isinstance(entry, list) or len(entry) != 2:
+    if type(entry) is not list or len(entry) != 2:
         return False
     number, payload = entry
-    return type(number) is int and 0 <= number < 2**53 and isinstance(payload, bytes)
+    return type(number) is int and 0 <= number < 2**53 and type(payload) is bytes
