@@ -1,4 +1,4 @@
-"""Functions that check the fields of one kind of message, compiled from the schema: one reads a body, one a message.
+"""Functions for the fields of one kind of message, compiled from the schema: for reading and for writing it.
 
 Every process checks what it says and what it believes. What a loop over the fields would look up each time is written
 out here: a value that is as the schema says takes a comparison, and anything else goes to its field's check, which
@@ -11,12 +11,17 @@ import math
 from collections.abc import Callable, Sequence
 from typing import Any
 
+import msgpack
+
 from telemetry.presentation.fields import FieldCodec
 from telemetry.quantities import ValueKind
 from telemetry.schema import Field, MessageSpec
 
+NO_TARGET = 255
 Reader = Callable[[dict[str, Any]], Any]  # message of its fields by their keys; raises ValueError
 Lister = Callable[[Any], list[Any]]  # values of the fields of a message; raises ValueError
+Picker = Callable[[dict[str, Any]], list[Any]]  # values of all fields of a body, unchecked; raises KeyError
+Writer = Callable[[Sequence[Any]], bytes]  # payload of the values of all fields, which are checked
 RIGHT = {
     ValueKind.NUMBER: "type({v}) is float and {low!r} <= {v} <= {high!r}",
     ValueKind.INTEGER: "type({v}) is int and {low!r} <= {v} <= {high!r}",
@@ -55,6 +60,41 @@ def lister_of(spec: MessageSpec, codecs: Sequence[FieldCodec]) -> Lister:
         lines += [f"v{k} = given.{field.name}", *checking(field, k, "tuple")]
     lister: Lister = compiled([*lines, f"return [{', '.join(f'v{k}' for k in range(len(codecs)))}]"], {}, codecs)
     return lister
+
+
+def picker_of(codecs: Sequence[FieldCodec], version: int) -> Picker:
+    """Function from the body of a payload of a schema version to the values of all fields, unchecked."""
+    space = {f"default{k}": codec.default for k, codec in enumerate(codecs) if codec.since > version}
+    picked = [f"default{k}()" if codec.since > version else f"given[{codec.key!r}]" for k, codec in enumerate(codecs)]
+    picker: Picker = compiled([f"return [{', '.join(picked)}]"], space, codecs)
+    return picker
+
+
+def writer_of(spec: MessageSpec, codecs: Sequence[FieldCodec], target: int | None) -> Writer:
+    """Function from the values of all fields to the payload, in the earliest schema version that has them.
+
+    The envelope names the tube and the number among them; ``target`` is who is addressed, or None for that tube.
+    """
+    space: dict[str, Any] = {"packb": msgpack.packb}
+    places = range(len(codecs))
+    lines = [f"{' '.join(f'v{k},' for k in places)} = given", "version = 1"]
+    for k in places:
+        if codecs[k].since > 1:
+            space[f"before{k}"] = codecs[k].before
+            lines += [f"if v{k} != before{k}:", f"    version = {codecs[k].since}"]
+    for k in places:
+        if codecs[k].pack is not None:
+            space[f"pack{k}"] = codecs[k].pack
+            lines.append(f"v{k} = pack{k}(v{k})")
+    for version in range(1, spec.newest + 1):
+        body = ", ".join(f"{codecs[k].key!r}: v{k}" for k in places if codecs[k].since <= version)
+        lines += [f"if version == {version}:", f"    body = {{{body}}}"]
+    place = {codec.name: f"v{k}" for k, codec in enumerate(codecs)}
+    origin, sequence = place.get("tube", str(NO_TARGET)), place.get("sequence", "0")
+    to = origin if target is None else str(target)
+    rows = f"'v': version, 'k': {int(spec.kind)}, 'o': {origin}, 't': {to}, 's': {sequence}, 'b': body"
+    writer: Writer = compiled([*lines, f"return packb({{{rows}}})"], space, codecs)
+    return writer
 
 
 def checking(field: Field, place: int, sequence: str) -> list[str]:

@@ -12,7 +12,7 @@ from __future__ import annotations
 import math
 import zlib
 from collections import Counter, OrderedDict
-from collections.abc import Hashable, Iterable
+from collections.abc import Hashable, Iterable, Sequence
 from dataclasses import dataclass
 from typing import Any, NamedTuple
 
@@ -139,6 +139,8 @@ class HopLink:
 
     def release(self, now: float = math.inf) -> None:
         """Send what waited for others to go with, or what has waited until ``now`` (s)."""
+        if not self._patient:
+            return
         for topic in [topic for topic, waiting in self._patient.items() if waiting.until <= now]:
             waiting = self._patient.pop(topic)
             self.send_best_effort(waiting.payload, topic, waiting.priority)
@@ -162,7 +164,7 @@ class HopLink:
         self._update_quality(number)
         self.last_heard = now
         self.counters["frames_received"] += 1
-        if ack_epoch == self.epoch:
+        if self._outstanding and ack_epoch == self.epoch:
             self._acknowledged(ack, ack_mask)
         if not self._is_me(ack_epoch):
             entries = [entry for entry in entries if entry[0] == 0]
@@ -177,7 +179,7 @@ class HopLink:
             return frames  # as nearly always: it is asked after every event
         entries = self._due_entries(now)
         while entries or self._ack_due <= now:
-            count = bundled(entries, self.bundle_limit)
+            count = bundled(entries, self.bundle_limit) if len(entries) > 1 else len(entries)
             frames.append(self._build(entries[:count]))
             entries = entries[count:]
         return frames
@@ -262,8 +264,9 @@ class HopLink:
                     entries.append(Entry(number, outstanding.payload, outstanding.priority))
                     outstanding.send_at = now + outstanding.timeout
                     outstanding.timeout = min(2.0 * outstanding.timeout, LAST_TIMEOUT)
-        entries.extend(Entry(0, payload, priority, topic) for topic, (payload, priority) in self._best_effort.items())
-        self._best_effort.clear()
+        if self._best_effort:
+            entries += [Entry(0, payload, priority, topic) for topic, (payload, priority) in self._best_effort.items()]
+            self._best_effort.clear()
         return entries
 
     def _build(self, entries: list[Entry]) -> Frame:
@@ -271,15 +274,15 @@ class HopLink:
         self._ack_due = math.inf
         self.counters["frames_sent"] += 1
         peer_epoch = max(self._peer_epoch, 0)
-        header = Header(self._address, self.epoch, self._frames, peer_epoch, self._received, self._received_mask)
+        header = (self._address, self.epoch, self._frames, peer_epoch, self._received, self._received_mask)
         payload = pack_frame(header, [(entry.number, entry.payload) for entry in entries])
-        priority = min((entry.priority for entry in entries), default=Priority.COMMAND)
+        priority = min([entry.priority for entry in entries], default=Priority.COMMAND)
         return Frame(payload, priority, common_topic(entries))
 
 
-def pack_frame(header: Header, entries: Iterable[tuple[int, bytes]]) -> bytes:
-    """Bytes of a frame."""
-    body: bytes = msgpack.packb([VERSION, *header, [list(entry) for entry in entries]])
+def pack_frame(header: Sequence[int], entries: Sequence[Sequence[object]]) -> bytes:
+    """Bytes of a frame with a ``Header``; an entry is its number and its payload."""
+    body: bytes = msgpack.packb([VERSION, *header, entries])
     return zlib.crc32(body).to_bytes(4, "little") + body
 
 
@@ -298,14 +301,12 @@ def parse_frame(frame: bytes) -> tuple[Header, list[Any]] | None:
     if version != VERSION or not are_integers or not isinstance(entries, list):
         return None
     header = Header(sender, epoch, number, peer_epoch, ack, mask)
-    if min(header) < 0 or not all(map(_is_entry, entries)):
-        return None
-    return header, entries
+    return (header, entries) if min(header) >= 0 and all(map(_is_entry, entries)) else None
 
 
 def common_topic(entries: Iterable[Entry]) -> Hashable | None:
     """Topic of a frame with these entries: theirs together where all are best effort, None where one is numbered."""
-    topics = tuple(entry.topic for entry in entries)
+    topics = tuple([entry.topic for entry in entries])
     if not topics:
         return ACKNOWLEDGEMENT
     return None if None in topics else topics
