@@ -250,7 +250,7 @@ class TubeProcess(Process):
         aiding = across(aiding, self.settings.above[:silent], self.settings.stiffness)
         onward = self.tube.on_aiding(aiding, clock.local_from_rig(aiding.valid_at), clock.variance(now))
         if onward is not None:
-            self._send(replace(onward, epoch=aiding.epoch, seal=aiding.seal), now)
+            self._send(onward, now)
 
     def _context(self, now: float) -> RigContext:
         clock = self.endpoint.clock
