@@ -30,7 +30,8 @@ from telemetry.transport.hop import Header, pack_frame
 
 EXCHANGES, ROUNDS = 100, 25
 PAYLOADS, DECODED = 20, 2000
-PATIENCE = 60.0
+PATIENCE, TURN, TRIES = 60.0, 1.0, 10  # s
+AIDING_BYTES = len(encode(AIDING))
 NATIVE_AIDING = NATIVE[SPEC_OF[type(AIDING)].kind]
 context = multiprocessing.get_context("fork")  # before any thread is started
 
@@ -172,6 +173,7 @@ def hop(where: str, name: str) -> Iterator[Callable[[int], None]]:
     with open_medium(where) as medium:
         mine = medium.open_port(ends(name)[0])
         pinger = Pinger(mine)
+        pinger.meet()
         pinger.exchange(10)
         yield pinger.exchange
 
@@ -184,19 +186,32 @@ class Pinger:
         self._done = threading.Event()
         port.listen(self._on_frame)
 
+    def meet(self) -> None:
+        """Send until the other end answers: the first as signals tell neither end yet who sends them."""
+        for _ in range(TRIES):
+            self._begin(1)
+            if self._done.wait(TURN):
+                return
+        raise RuntimeError("no answer")
+
     def exchange(self, count: int) -> None:
         """There and back ``count`` times."""
+        self._begin(count)
+        if not self._done.wait(PATIENCE):
+            raise RuntimeError("no answer")
+
+    def _begin(self, count: int) -> None:
         self._left = count
         self._done.clear()
         self._send()
-        if not self._done.wait(PATIENCE):
-            raise RuntimeError("no answer")
 
     def _send(self) -> None:
         self._number += 1
         self._port.send(frame_of(self._number, STEPPER))
 
-    def _on_frame(self, _frame: bytes) -> None:
+    def _on_frame(self, frame: bytes) -> None:
+        if not holds_aiding(frame):
+            return
         self._left -= 1
         if self._left > 0:
             self._send()
@@ -209,9 +224,19 @@ def echo_hop(where: str, name: str, ready: Any) -> None:
     with open_medium(where) as medium:
         port = medium.open_port(ends(name)[1])
         numbers = iter(range(1, 1 << 30))
-        port.listen(lambda _frame: port.send(frame_of(next(numbers), 1)))
+
+        def answer(frame: bytes) -> None:
+            if holds_aiding(frame):
+                port.send(frame_of(next(numbers), 1))
+
+        port.listen(answer)
         ready.set()
         threading.Event().wait()
+
+
+def holds_aiding(frame: bytes) -> bool:
+    """Whether a frame of the link is more than its header, which the native profile repeats every eighth time."""
+    return len(frame) > AIDING_BYTES
 
 
 def ours_isotp() -> None:

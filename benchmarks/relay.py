@@ -70,13 +70,18 @@ def run() -> dict[str, Any]:
             "loop": lambda: loop.exchange(encoder.length),
             "bare": lambda: bare.exchange(encoder.length),
         }
-        times: dict[str, list[float]] = {name: [] for name in acts}
+        times: dict[str, list[float]] = {f"{name}{how}": [] for name in acts for how in ("", " in turn")}
         for _ in range(ROUNDS):
             for name, act in acts.items():
                 times[name].append(statistics.median(act() for _ in range(EXCHANGES)))
+            turns = [[act() for act in acts.values()] for _ in range(EXCHANGES)]
+            for name, found in zip(acts, zip(*turns, strict=True), strict=True):
+                times[f"{name} in turn"].append(statistics.median(found))
     ratios = {
         "relay over zenoh": beside(times["relay"], times["bare"]),
         "handed to an asyncio loop": beside(times["loop"], times["bare"]),
+        "relay over zenoh, in turn with the peer": beside(times["relay in turn"], times["bare in turn"]),
+        "handed to an asyncio loop, in turn with the peer": beside(times["loop in turn"], times["bare in turn"]),
     }
     return {"bench": "relay", "ratios": ratios}
 

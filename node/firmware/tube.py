@@ -87,6 +87,7 @@ class Tube:
         self.nodes, self.node = nodes, nodes[0]
         self.config = self.node["config"]
         self.state, self._mount = self.node["filter"], self.node["mount"]
+        self._down = tuple(nodes[f"down_{name}"] for name in ("systematic", "offset", "torsion"))  # arrays of one
         self._crew = crew_record(settings, configs)
         self._next_sequence = next_sequence
         self.reporter = Reporter(settings, nodes, next_sequence, restored=restored)
@@ -115,18 +116,18 @@ class Tube:
         )
         if not self._loop.aiding(self.nodes, self._crew, taken) & ONWARD:
             return None
-        node = self.node
+        systematic_var, offset, torsion_var = self._down
         return Aiding(
             a.yaw,
             a.yaw_var,
-            float(node["down_systematic"]),
-            float(node["down_offset"]),
+            float(systematic_var[0]),
+            float(offset[0]),
             a.rate,
             a.valid_at,
             a.sequence,
             a.hops + 1,
             a.torque,
-            float(node["down_torsion"]),
+            float(torsion_var[0]),
             a.under_torque,
             a.epoch,
             a.seal,

@@ -13,7 +13,7 @@ from collections import Counter, deque
 from typing import NamedTuple
 
 from telemetry.errors import TelemetryError
-from telemetry.media.can_identifier import FLOW_CONTROL, PART_MASK, PRESENCE, PRIORITIES, TUNNEL, Identifier
+from telemetry.media.can_identifier import FLOW_CONTROL, PART_MASK, PRESENCE, PRIORITIES, TUNNEL, packed
 from telemetry.media.can_profile import NativePart, Profile, Split
 from telemetry.media.can_timing import CLASSIC_LARGEST, BitRates
 from telemetry.media.isotp import FLOW, Receiver, Sender, TransferError
@@ -54,7 +54,7 @@ class CanData(NamedTuple):
 
 def part_data(part: NativePart, address: int) -> CanData:
     """Frame of one part of a message."""
-    return CanData(Identifier(part.priority, part.type, address, part.part).pack(), part.data)
+    return CanData(packed(part.priority, part.type, address, part.part), part.data)
 
 
 class Outgoing:
@@ -82,7 +82,7 @@ class Outgoing:
             return part_data(self._parts.popleft(), address)
         if self._sender is None:
             raise ValueError("payload: expected something left to send, got none")
-        return CanData(Identifier(self.frame.priority, TUNNEL, address).pack(), self._sender.next_frame())
+        return CanData(packed(self.frame.priority, TUNNEL, address), self._sender.next_frame())
 
     def on_flow(self, data: bytes) -> None:
         """Take the receiver's answer, see ``isotp.Sender``."""
@@ -204,22 +204,22 @@ class CanExchange:
         return payload
 
     def _take(self, bits: int, data: bytes, now: float) -> bytes | None:
-        identifier = Identifier.unpack(bits)
-        if identifier is None:
+        urgency, type_, source = bits >> 26, bits >> 21 & 0x1F, bits >> 13 & 0xFF
+        if urgency >= len(PRIORITIES):
             self.counters["unknown_identifier"] += 1
             return None
-        if identifier.source == self.address:
-            self._on_double(identifier, data, now)
+        if source == self.address:
+            self._on_double(type_, data, now)
             return None
-        if not self._is_partner(identifier.source, now):
+        if not self._is_partner(source, now):
             self.counters["third_talker"] += 1
             return None
-        if identifier.type == TUNNEL:
-            return self._on_data(identifier.priority, data, now)
-        if identifier.type == FLOW_CONTROL:
-            self._on_flow(identifier.priority, data, now)
-        elif identifier.type != PRESENCE:
-            return self._on_part(identifier, data)
+        if type_ == TUNNEL:
+            return self._on_data(PRIORITIES[urgency], data, now)
+        if type_ == FLOW_CONTROL:
+            self._on_flow(PRIORITIES[urgency], data, now)
+        elif type_ != PRESENCE:
+            return self._on_part(source, type_, bits & PART_MASK, data)
         return None
 
     def advance(self, now: float) -> None:
@@ -263,8 +263,8 @@ class CanExchange:
     def _presence(self, now: float) -> CanData:
         """Sign of life: how long this end is here (ms), and its nonce, by which two of one address are told apart."""
         age = min(int(1e3 * (now - self._begun)), 0xFFFFFFFF)
-        identifier = Identifier(Priority.HELLO, PRESENCE, self.address, self._nonce & PART_MASK)
-        return CanData(identifier.pack(), age.to_bytes(4) + self._nonce.to_bytes(4))
+        identifier = packed(Priority.HELLO, PRESENCE, self.address, self._nonce & PART_MASK)
+        return CanData(identifier, age.to_bytes(4) + self._nonce.to_bytes(4))
 
     def _start(self, now: float) -> CanData | None:
         """Begin the most urgent payload that waits, where it is more urgent than all that are on their way.
@@ -275,11 +275,12 @@ class CanExchange:
         frame = self.queue.take(HELD[self.traffic.is_heavy(now)][urgent])
         if frame is None:
             return None
-        split = Split([], frame.payload)
-        if self.profile is not None:
+        if self.profile is None:
+            split = Split([], frame.payload)
+        else:
             split = self.profile.split(frame.payload, fd=self.largest > CLASSIC_LARGEST)
-        if split.rest is None and len(split.parts) == 1:
-            return part_data(split.parts[0], self.address)
+            if split.rest is None and len(split.parts) == 1:
+                return part_data(split.parts[0], self.address)
         self._outgoing[frame.priority] = Outgoing(frame, split, self.largest, now)
         return None
 
@@ -291,13 +292,13 @@ class CanExchange:
             del self._outgoing[priority]
         return data
 
-    def _on_part(self, identifier: Identifier, data: bytes) -> bytes | None:
+    def _on_part(self, source: int, type_: int, part: int, data: bytes) -> bytes | None:
         """Take a part of a message that has a form of its own."""
         if self.profile is None:
             self.counters["unknown_identifier"] += 1
             return None
         try:
-            return self.profile.join(identifier.source, identifier.type, identifier.part, data)
+            return self.profile.join(source, type_, part, data)
         except TelemetryError as error:  # of a message that is none, or that nobody could have written
             self.counters[f"refused: {error}" if " " in str(error) else str(error)] += 1
         return None
@@ -312,7 +313,7 @@ class CanExchange:
             self.counters[str(error)] += 1
         if (answer := incoming.receiver.flow) is not None:
             incoming.receiver.flow = None
-            self._answers.append(CanData(Identifier(priority, FLOW_CONTROL, self.address).pack(), answer))
+            self._answers.append(CanData(packed(priority, FLOW_CONTROL, self.address), answer))
         if payload is not None and self.profile is not None:
             self.profile.observe(payload)
         return payload
@@ -348,10 +349,10 @@ class CanExchange:
         self.partner, self._heard_at = source, now
         return True
 
-    def _on_double(self, identifier: Identifier, data: bytes, now: float) -> None:
+    def _on_double(self, type_: int, data: bytes, now: float) -> None:
         """Somebody else has this address: the younger falls silent, the older shows itself."""
         self.counters["same_address"] += 1
-        if identifier.type != PRESENCE or len(data) != 8:
+        if type_ != PRESENCE or len(data) != 8:
             self._presence_is_due = not self.is_mute
             return
         theirs = int.from_bytes(data[:4]) / 1e3, int.from_bytes(data[4:])

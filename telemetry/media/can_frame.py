@@ -12,11 +12,16 @@ EXTENDED, REMOTE, ERROR = 0x80000000, 0x40000000, 0x20000000  # flags of can_id
 IDENTIFIER = 0x1FFFFFFF
 ERROR_CONTROLLER, ERROR_PROTOCOL, ERROR_ACK, ERROR_BUS_OFF = 0x04, 0x08, 0x20, 0x40  # classes of an error frame
 RX_OVERFLOW = 0x01  # data[1] of a controller error
-BIT_RATE_SWITCH, ERROR_PASSIVE = 0x01, 0x02  # flags of an FD frame
+BIT_RATE_SWITCH, ERROR_PASSIVE, IS_FD = 0x01, 0x02, 0x04  # flags of an FD frame
+FD_FLAGS = BIT_RATE_SWITCH | IS_FD
 OWN = 0x01  # in a reserved byte of the loopback bus: the receiver's own frame, now acknowledged
 CLASSIC = struct.Struct("<IBBBB8s")
 FD = struct.Struct("<IBBBB64s")
-EMPTY_ERROR = bytes(8)
+HEAD = struct.Struct("<IB")  # what either begins with: identifier and length
+OWN_FRAME = 1 << 32  # beside the flags of Linux in an identifier that is handed on: an own frame, acknowledged
+HEADER = 8  # bytes before the data
+LENGTH_AT, OWN_AT, COUNT_AT = 4, 6, 7  # places of bytes in it
+Arrival = tuple[int, bytes]  # identifier with its flags, and data
 
 
 @dataclass(frozen=True, slots=True)
@@ -62,6 +67,17 @@ def unpack(datagram: bytes) -> tuple[CanFrame, int]:
     if length > len(data):
         raise ValueError(f"CAN frame: expected a length of at most {len(data)}, got {length}")
     return CanFrame(can_id, data[:length], fd, bool(reserved & OWN)), count
+
+
+def is_frame(datagram: bytes) -> bool:
+    """Whether ``unpack`` takes it."""
+    return len(datagram) in (FD.size, CLASSIC.size) and datagram[LENGTH_AT] <= len(datagram) - HEADER
+
+
+def arrival_of(datagram: bytes) -> Arrival:
+    """What ``unpack`` finds, as a port takes it; of what is a frame."""
+    identifier, length = HEAD.unpack_from(datagram)
+    return identifier | (OWN_FRAME if datagram[OWN_AT] & OWN else 0), datagram[HEADER : HEADER + length]
 
 
 def error_frame(error_class: int, detail: int = 0) -> CanFrame:

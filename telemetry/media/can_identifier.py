@@ -27,8 +27,7 @@ class Identifier(NamedTuple):
 
     def pack(self) -> int:
         """The 29 bits."""
-        head = self.priority << 26 | self.type << 21 | self.source << 13
-        return head | self.destination << 5 | self.part
+        return packed(self.priority, self.type, self.source, self.part, self.destination)
 
     @classmethod
     def unpack(cls, bits: int) -> Identifier | None:
@@ -37,3 +36,8 @@ class Identifier(NamedTuple):
         if priority >= len(PRIORITIES):
             return None
         return cls(PRIORITIES[priority], bits >> 21 & 0x1F, bits >> 13 & 0xFF, bits & PART_MASK, bits >> 5 & 0xFF)
+
+
+def packed(priority: int, type_: int, source: int, part: int = 0, destination: int = EVERYBODY) -> int:
+    """The 29 bits of an identifier of these parts."""
+    return priority << 26 | type_ << 21 | source << 13 | destination << 5 | part

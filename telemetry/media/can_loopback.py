@@ -16,14 +16,18 @@ import can
 from can.interfaces import BACKENDS
 
 from telemetry.media.can_frame import (
+    COUNT_AT,
     ERROR,
     ERROR_CONTROLLER,
     EXTENDED,
     IDENTIFIER,
     REMOTE,
     RX_OVERFLOW,
+    Arrival,
     CanFrame,
+    arrival_of,
     error_frame,
+    is_frame,
     unpack,
 )
 from telemetry.media.can_loopback_protocol import (
@@ -40,6 +44,7 @@ from telemetry.media.can_loopback_protocol import (
 )
 
 ATTACH_LIMIT = 2.0  # s
+OVERRUN = error_frame(ERROR_CONTROLLER, RX_OVERFLOW)
 ASK_EVERY = 0.5  # s of silence, after which a controller makes sure that its hub is still there
 
 
@@ -53,7 +58,7 @@ class LoopbackBus(can.BusABC):
 
     Parameters
     ----------
-    channel : ``PORT/SEGMENT``
+    channel : ``PORT/SEGMENT``; ``socket`` holds its frames, see ``can_frame``
     fd : whether it speaks CAN FD; one that does not destroys every FD frame on its segment
     receive_own_messages : whether it hears its own frames once they are acknowledged
     receive_buffer : bytes, asked of the system; a frame takes some 800
@@ -81,9 +86,9 @@ class LoopbackBus(can.BusABC):
         self._count = 0
         self._overrun_pending = False
         self._ask_at = 0.0
-        self._socket = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
-        self._socket.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, receive_buffer)
-        self._socket.connect(("127.0.0.1", int(port)))
+        self.socket = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
+        self.socket.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, receive_buffer)
+        self.socket.connect(("127.0.0.1", int(port)))
         self._attach(segment, (FLAG_FD if fd else 0) | (FLAG_OWN if receive_own_messages else 0))
         super().__init__(channel=channel, **kwargs)
         self._can_protocol = can.CanProtocol.CAN_FD if fd else can.CanProtocol.CAN_20
@@ -95,60 +100,81 @@ class LoopbackBus(can.BusABC):
             raise can.CanOperationError(f"{self.channel_info}: an FD frame on a controller without FD")
         frame = CanFrame(identifier_of(msg), bytes(msg.data), msg.is_fd)
         try:
-            self._socket.send(frame.pack())
+            self.socket.send(frame.pack())
         except OSError as error:
             raise can.CanOperationError(f"{self.channel_info}: {error.strerror}", error.errno) from error
 
     def restart(self) -> None:
         """Take part again after bus-off."""
-        self._socket.send(RESTART)
+        self.socket.send(RESTART)
 
     def fileno(self) -> int:
         """Descriptor that is readable when a frame waits."""
-        return self._socket.fileno()
+        return self.socket.fileno()
 
     def shutdown(self) -> None:
         """Leave the segment."""
         super().shutdown()
-        if self._socket.fileno() >= 0:
+        if self.socket.fileno() >= 0:
             with contextlib.suppress(OSError):  # the hub left first
-                self._socket.send(DETACH)
-            self._socket.close()
+                self.socket.send(DETACH)
+            self.socket.close()
 
     def _attach(self, segment: str, flags: int) -> None:
         try:
-            self._socket.settimeout(ATTACH_LIMIT)
-            self._socket.send(ATTACH + bytes([flags]) + segment.encode())
-            answered = self._socket.recv(LARGEST_DATAGRAM) == ATTACHED
+            self.socket.settimeout(ATTACH_LIMIT)
+            self.socket.send(ATTACH + bytes([flags]) + segment.encode())
+            answered = self.socket.recv(LARGEST_DATAGRAM) == ATTACHED
         except OSError:
             answered = False
+        self.socket.settimeout(None)
         if not answered:
-            self._socket.close()
+            self.socket.close()
             raise can.CanInitializationError(
                 f"{self.channel_info}: no hub answers on that UDP port: is the simulated bus running?"
             )
 
+    def take(self) -> Arrival | None:
+        """The frame that waits, without python-can's message of it; None where none comes while the socket waits.
+
+        Raises
+        ------
+        can.CanOperationError
+            When the hub is not there, or another one.
+        """
+        if self._overrun_pending:
+            self._overrun_pending = False
+            return OVERRUN.can_id, OVERRUN.data
+        datagram = self._next_datagram()
+        return None if datagram is None else arrival_of(datagram)
+
     def _recv_internal(self, timeout: float | None) -> tuple[can.Message | None, bool]:
         if self._overrun_pending:
             self._overrun_pending = False
-            return message_of(error_frame(ERROR_CONTROLLER, RX_OVERFLOW), self.channel_info), True
-        readable, _, _ = select.select([self._socket], [], [], timeout)
+            return message_of(OVERRUN, self.channel_info), True
+        readable, _, _ = select.select([self.socket], [], [], timeout)
         if not readable:
             self._make_sure_of_hub()
             return None, False
-        self._ask_at = time.monotonic() + ASK_EVERY
+        datagram = self._next_datagram()
+        return None if datagram is None else message_of(unpack(datagram)[0], self.channel_info), False
+
+    def _next_datagram(self) -> bytes | None:
+        """The frame that waits, counted; None where there is none, or something else."""
         try:
-            datagram = self._socket.recv(LARGEST_DATAGRAM)
+            datagram = self.socket.recv(LARGEST_DATAGRAM)
+        except (BlockingIOError, TimeoutError):
+            self._make_sure_of_hub()
+            return None
         except OSError as error:
             raise can.CanOperationError(f"{self.channel_info}: {error.strerror}", error.errno) from error
         if datagram == DETACH:
             raise can.CanOperationError(f"{self.channel_info}: the hub was started anew")
-        try:
-            frame, count = unpack(datagram)
-        except ValueError:
-            return None, False
-        self._watch_count(count)
-        return message_of(frame, self.channel_info), False
+        self._ask_at = time.monotonic() + ASK_EVERY
+        if not is_frame(datagram):
+            return None
+        self._watch_count(datagram[COUNT_AT])
+        return datagram
 
     def _make_sure_of_hub(self) -> None:
         """Say that this controller is here: a hub that has gone, maybe with a frame of ours, shows by an error."""
@@ -156,7 +182,7 @@ class LoopbackBus(can.BusABC):
         if now >= self._ask_at:
             self._ask_at = now + ASK_EVERY
             try:
-                self._socket.send(HERE)
+                self.socket.send(HERE)
             except OSError as error:
                 raise can.CanOperationError(f"{self.channel_info}: {error.strerror}", error.errno) from error
 

@@ -1,4 +1,4 @@
-"""A port on a CAN joint: python-can's bus and a thread that listens to it, around ``can_exchange``.
+"""A port on a CAN joint: a controller and a thread that listens to it, around ``can_exchange``.
 
 python-can raises errors of its own that are no ``OSError``; a bus that fails, or that the controller has left, is
 opened again with a growing pause, for ever: a joint that opens is an ordinary event of drilling.
@@ -13,19 +13,28 @@ import threading
 import time
 from collections import deque
 from collections.abc import Callable
+from functools import partial
 
 import can
 
 from telemetry.errors import MediumError
+from telemetry.media.can_controller import TICK, Controller, controller_of
 from telemetry.media.can_exchange import CanExchange
-from telemetry.media.can_frame import ERROR_BUS_OFF, ERROR_CONTROLLER, RX_OVERFLOW
+from telemetry.media.can_frame import (
+    ERROR,
+    ERROR_BUS_OFF,
+    ERROR_CONTROLLER,
+    EXTENDED,
+    IDENTIFIER,
+    OWN_FRAME,
+    RX_OVERFLOW,
+)
 from telemetry.media.can_log import CanLog
 from telemetry.media.can_profile import Profile
-from telemetry.media.can_timing import BitRates
+from telemetry.media.can_timing import CLASSIC_LARGEST, BitRates
 from telemetry.media.port import Frame
 from telemetry.media.queued_port import QueuedPort
 
-TICK = 0.05  # s, between two looks at the time; the thread waits as long for a frame
 BUSY_LIMIT = 512  # frames that may wait while the other end takes them; fewer wait for one that is absent
 FIRST_PAUSE, LAST_PAUSE = 0.1, 5.0  # s, before a bus is opened again
 UNHEARD_LIMIT = 64  # payloads kept until ``listen``
@@ -65,9 +74,8 @@ class CanPort(QueuedPort):
         is_stepped: bool = False,
     ) -> None:
         super().__init__(name, limit=limit)
-        self._open_bus = open_bus
-        self._is_fd = largest > 8
-        self._bus: can.BusABC | None = opened(open_bus, name)
+        self._open = partial(opened, open_bus, name, largest > CLASSIC_LARGEST, log)
+        self._controller: Controller | None = self._open()
         nonce = random.getrandbits(32)
         begun = time.monotonic()
         self._exchange = CanExchange(address, largest, self._queue, nonce, begun, profile, rates, is_stepped=is_stepped)
@@ -92,7 +100,7 @@ class CanPort(QueuedPort):
             return super().send(frame)
 
     def listen(self, deliver: Callable[[bytes], object]) -> None:
-        """Call ``deliver``, which only puts into a queue, on the port's thread for every frame that arrives."""
+        """Call ``deliver``, which never waits, on the port's thread for every frame that arrives."""
         with self._lock:
             while self._unheard:
                 deliver(self._unheard.popleft())
@@ -105,8 +113,8 @@ class CanPort(QueuedPort):
                 return
             self._closed = True
         self._thread.join()
-        if self._bus is not None:
-            self._bus.shutdown()
+        if self._controller is not None:
+            self._controller.shutdown()
         if self._log is not None:
             self._log.close()
 
@@ -116,40 +124,38 @@ class CanPort(QueuedPort):
 
     def _drain(self) -> None:
         with self._lock:
-            self._pump()
+            self._pump(time.monotonic())
 
     def _run(self) -> None:
         while not self._closed:
-            if self._bus is None:
+            if self._controller is None:
                 time.sleep(TICK)
                 self._reopen()
                 continue
             try:
-                message = self._bus.recv(TICK)
+                arrival = self._controller.receive()
             except (can.CanError, OSError, ValueError):
                 self._lose_bus("bus_lost")
                 continue
             with self._lock:
-                self._on_message(message)
-                self._pump()
+                now = time.monotonic()
+                if arrival is not None:
+                    self._on_arrival(*arrival, now)
+                self._pump(now)
 
-    def _on_message(self, message: can.Message | None) -> None:
-        now = time.monotonic()
-        if message is None:
-            return
-        if self._log is not None:
-            self._log.write(message)
-        if message.is_error_frame:
-            self._on_error(message.arbitration_id, bytes(message.data))
-        elif not message.is_rx:
-            self._exchange.on_acknowledged(now)
-            self._pause = FIRST_PAUSE
-        elif not message.is_extended_id or message.is_remote_frame:
-            self.counters["unknown_identifier"] += 1
-        else:
-            payload = self._exchange.on_frame(message.arbitration_id, bytes(message.data), now)
+    def _on_arrival(self, identifier: int, data: bytes, now: float) -> None:
+        kind = identifier & ~IDENTIFIER  # what the flags say that it is
+        if kind == EXTENDED:
+            payload = self._exchange.on_frame(identifier & IDENTIFIER, data, now)
             if payload is not None:
                 (self._deliver or self._unheard.append)(payload)
+        elif kind & ERROR:
+            self._on_error(identifier & IDENTIFIER, data)
+        elif kind & OWN_FRAME:
+            self._exchange.on_acknowledged(now)
+            self._pause = FIRST_PAUSE
+        else:
+            self.counters["unknown_identifier"] += 1
 
     def _on_error(self, error_class: int, data: bytes) -> None:
         if error_class & ERROR_BUS_OFF:
@@ -157,35 +163,27 @@ class CanPort(QueuedPort):
         elif error_class & ERROR_CONTROLLER and data[1:2] and data[1] & RX_OVERFLOW:
             self.counters["receive_overruns"] += 1
 
-    def _pump(self) -> None:
+    def _pump(self, now: float) -> None:
         """Hand the controller its next frame."""
-        now = time.monotonic()
         if now >= self._look_at:
             self._look_at = now + TICK
             self._exchange.advance(now)
-        if self._bus is None or self._closed:
+        if self._controller is None or self._closed:
             return
         frame = self._exchange.next_frame(now)
         if frame is None:
             if not self._exchange.is_up:
                 self._queue.forget_outdated()
             return
-        message = can.Message(
-            arbitration_id=frame.identifier,
-            data=frame.data,
-            is_extended_id=True,
-            is_fd=self._is_fd,
-            bitrate_switch=self._is_fd,
-        )
         try:
-            self._bus.send(message)
+            self._controller.send(frame.identifier, frame.data)
         except (can.CanError, OSError):
             self.counters["refused_by_controller"] += 1
             self._exchange.on_refused()
 
     def _lose_bus(self, reason: str) -> None:
         with self._lock:  # who sends meanwhile must not hand a frame to a bus that will never acknowledge it
-            lost, self._bus = self._bus, None
+            lost, self._controller = self._controller, None
             self.counters[reason] += 1
             self._exchange.on_refused()
             self._reopen_at = time.monotonic() + self._pause
@@ -198,18 +196,18 @@ class CanPort(QueuedPort):
         if time.monotonic() < self._reopen_at:
             return
         try:
-            bus = opened(self._open_bus, self._name)
+            controller = self._open()
         except MediumError:
             self._reopen_at = time.monotonic() + self._pause
             self._pause = min(2.0 * self._pause, LAST_PAUSE)
             return
         with self._lock:
-            self._bus = bus
-            self._pump()
+            self._controller = controller
+            self._pump(time.monotonic())
 
 
-def opened(open_bus: OpenBus, name: str) -> can.BusABC:
-    """The bus, its errors as ours.
+def opened(open_bus: OpenBus, name: str, is_fd: bool, log: CanLog | None) -> Controller:
+    """The controller, its errors as ours.
 
     Raises
     ------
@@ -217,6 +215,6 @@ def opened(open_bus: OpenBus, name: str) -> can.BusABC:
         When it cannot be opened.
     """
     try:
-        return open_bus()
+        return controller_of(open_bus(), is_fd=is_fd, log=log)
     except (can.CanError, OSError, ValueError) as error:
         raise MediumError(f"CAN port {name}: {error}") from error

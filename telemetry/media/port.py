@@ -71,7 +71,7 @@ class TubeEnd:
 
 
 class Port(Protocol):
-    """One end of a joint on some bus; all calls come from one thread."""
+    """One end of a joint on some bus; calls come one at a time, some maybe from within ``deliver``."""
 
     @property
     def largest_payload(self) -> int:
@@ -108,7 +108,7 @@ class Port(Protocol):
         """
 
     def listen(self, deliver: Callable[[bytes], object]) -> None:
-        """Call ``deliver``, which must only put into a queue, for every frame that arrives; maybe on another thread."""
+        """Call ``deliver``, which must never wait, for every frame that arrives; maybe on another thread."""
 
     def close(self) -> None:
         """Let the end go; the other end sees that nobody listens. A second call does nothing."""

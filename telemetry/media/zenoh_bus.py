@@ -1,6 +1,6 @@
 """zenoh as our bus: explicit endpoints, no scouting, bytes in and out. The only module that imports zenoh.
 
-Callbacks arrive on zenoh's own threads; a callback must only put into a queue or take a lock.
+Callbacks arrive on zenoh's own threads; a callback must only put into a queue or take a lock, see ``ZenohBus.hear``.
 """
 
 from __future__ import annotations
@@ -19,6 +19,7 @@ from telemetry.media.credentials import Credentials
 
 MSGPACK = "application/msgpack"
 JSON = "application/json"
+LINE = 16  # batches that wait for a line, the most that zenoh allows; made when they are needed
 ONE_POOL = (
     "(app: (worker_threads: 1), acc: (handover: app), tx: (handover: app), rx: (handover: app), net: (handover: app))"
 )
@@ -38,6 +39,17 @@ class Publisher:
 
     def __init__(self, publisher: zenoh.Publisher) -> None:
         self._publisher = publisher
+        self._heard: dict[str, bool] = {}  # what was told of it last, once it is watched
+
+    def watch(self) -> None:
+        """Be told from now on whether anybody subscribes: to ask takes longer than to put, which is done each time."""
+
+        def note(status: Any) -> None:
+            self._heard["now"] = bool(status.matching)
+
+        self._publisher.declare_matching_listener(zenoh.handlers.Callback(note, indirect=False))
+        status: Any = self._publisher.matching_status
+        self._heard.setdefault("now", bool(status.matching))  # what was told meanwhile is newer
 
     def put(self, payload: bytes) -> None:
         """Send one payload.
@@ -55,6 +67,8 @@ class Publisher:
     @property
     def is_heard(self) -> bool:
         """Whether anybody subscribes to the key."""
+        if self._heard:
+            return self._heard["now"]
         status: Any = self._publisher.matching_status
         return bool(status.matching)
 
@@ -126,6 +140,14 @@ class ZenohBus:
         """Call ``callback`` on the receiving thread itself, so it must only put into a queue."""
         direct: Any = zenoh.handlers.Callback(lambda s: callback(str(s.key_expr), s.payload.to_bytes()), indirect=False)
         return Subscription(self._session.declare_subscriber(pattern, direct))
+
+    def hear(self, key: str, callback: Callable[[bytes], object]) -> Subscription:
+        """Call ``callback(payload)`` on the receiving thread itself.
+
+        It may put, but what is ``droppable`` alone: that thread may be the one which empties the line.
+        """
+        direct: Any = zenoh.handlers.Callback(lambda s: callback(s.payload.to_bytes()), indirect=False)
+        return Subscription(self._session.declare_subscriber(key, direct))
 
     def queryable_kept(self, pattern: str, handler: Callable[[Query], object]) -> None:
         """Hand queries that intersect ``pattern`` to ``handler`` on a foreign thread; ``Query.finish`` ends each."""
@@ -219,6 +241,7 @@ def open_client(endpoint: str, timeout: float, credentials: Credentials | None =
         "connect/endpoints": [endpoint],
         "connect/timeout_ms": int(timeout * 1000),
         "connect/exit_on_failure": True,
+        "transport/link/tx/queue/size/data": LINE,
         "connect/retry": {"period_init_ms": 50, "period_max_ms": 500, "period_increase_factor": 1.5},
     }
     if credentials is not None:

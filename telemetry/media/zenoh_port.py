@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import threading
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -14,21 +15,45 @@ from telemetry.media.zenoh_bus import Subscription, ZenohBus, open_client
 
 CONNECT_TIMEOUT = 30.0  # s
 WITH_KEYS = ",keys="
+FRAMES = "application/octet-stream"
+
+
+class Hearing(threading.local):
+    """Whether this thread is one of zenoh's, about to hand a frame out."""
+
+    now = False
+
+
+hearing = Hearing()
 
 
 class ZenohPort(QueuedPort):
-    """One end of a joint on two keys, see ``port.Port``; it is up while anybody subscribes to ``send_key``."""
+    """One end of a joint on two keys, see ``port.Port``; it is up while anybody subscribes to ``send_key``.
+
+    A frame that is sent in answer, on the thread of zenoh's that heard the other one, never waits for room in the line:
+    that thread makes the room.
+    """
 
     def __init__(self, bus: ZenohBus, send_key: str, receive_key: str) -> None:
         super().__init__(send_key)
         self._bus = bus
         self._receive_key = receive_key
-        self._publisher = bus.publisher(send_key, encoding="application/octet-stream")
+        self._publisher = bus.publisher(send_key, encoding=FRAMES)
+        self._answering = bus.publisher(send_key, encoding=FRAMES, droppable=True)
+        self._publisher.watch()
         self._subscription: Subscription | None = None
 
     def listen(self, deliver: Callable[[bytes], object]) -> None:
-        """Call ``deliver``, which only puts into a queue, on a foreign thread for every frame that arrives."""
-        self._subscription = self._bus.subscribe_at_once(self._receive_key, lambda _key, frame: deliver(frame))
+        """Call ``deliver``, which never waits, on a foreign thread for every frame that arrives."""
+
+        def hear(frame: bytes) -> None:
+            hearing.now = True
+            try:
+                deliver(frame)
+            finally:
+                hearing.now = False
+
+        self._subscription = self._bus.hear(self._receive_key, hear)
 
     def close(self) -> None:
         """Let the end go."""
@@ -36,6 +61,7 @@ class ZenohPort(QueuedPort):
             return
         self._closed = True
         self._publisher.close()
+        self._answering.close()
         if self._subscription is not None:
             self._subscription.close()
 
@@ -43,7 +69,7 @@ class ZenohPort(QueuedPort):
         return self._publisher.is_heard
 
     def _drain(self) -> None:
-        self._queue.drain(self._is_heard, self._publisher.put)
+        self._queue.drain(self._is_heard, (self._answering if hearing.now else self._publisher).put)
 
 
 class ZenohMedium:

@@ -48,7 +48,8 @@ def packer_of(fields: Sequence[tuple[Field, Sequence[Signal]]], rounded: Sequenc
         for n, signal in enumerate(signals):
             frame, start, _ = next(places)
             name = f"r{k}_{n}"
-            lines += raw_lines(name, f"v{k}" if len(signals) == 1 else f"v{k}_{n}", signal, added)
+            steps = f"n{k}" if any(one.value == k for one in rounded) else None
+            lines += raw_lines(name, f"v{k}" if len(signals) == 1 else f"v{k}_{n}", signal, added, steps)
             bits[frame].append(f"{name} << {start}")
     data = [
         f"({' | '.join(of)}).to_bytes({layout.length}, 'little')" for of, layout in zip(bits, form.layouts, strict=True)
@@ -114,26 +115,26 @@ def rounding(one: Rounded, signal: Signal) -> list[str]:
     step = f"{signal.step!r}" if one.rate is None else f"(v{one.rate} * {signal.step!r})"
     return [
         f"s{one.value} = v{one.value} / {signal.step!r}",
-        f"a{one.value} = {step} * {step} / 12.0",
-        f"if abs(s{one.value} - round(s{one.value})) <= {ON_STEP!r}:",
-        f"    a{one.value} = 0.0",
+        f"n{one.value} = round(s{one.value})",
+        f"a{one.value} = 0.0 if abs(s{one.value} - n{one.value}) <= {ON_STEP!r} else {step} * {step} / 12.0",
     ]
 
 
-def raw_lines(raw: str, v: str, signal: Signal, added: Sequence[str]) -> list[str]:
-    """Lines that make the raw number of a value."""
+def raw_lines(raw: str, v: str, signal: Signal, added: Sequence[str], steps: str | None) -> list[str]:
+    """Lines that make the raw number of a value; ``steps`` are how many it is where that is known already."""
+    steps = steps or f"round({v} / {signal.step!r})"
     match signal.scale:
         case Scale.LINEAR:
-            return [f"{raw} = round({v} / {signal.step!r}) - {signal.first}"]
+            return [f"{raw} = {steps} - {signal.first}"]
         case Scale.CIRCLE:
-            return [f"{raw} = round({v} / {signal.step!r}) & {signal.largest}"]
+            return [f"{raw} = {steps} & {signal.largest}"]
         case Scale.INTEGER | Scale.SWITCH:
             return [f"{raw} = {v} - {signal.first}"]
         case Scale.BYTES:
             return [f"{raw} = int.from_bytes({v})"]
         case Scale.AGE:
-            steps = f"round(min({v} / {signal.step!r}, {signal.largest})) - {signal.first}"
-            return [f"{raw} = {signal.largest} if {v} == inf else min({steps}, {signal.largest - 1})"]
+            age = f"round(min({v} / {signal.step!r}, {signal.largest})) - {signal.first}"
+            return [f"{raw} = {signal.largest} if {v} == inf else min({age}, {signal.largest - 1})"]
     whole = f"x = {v} + ({' + '.join(added)})" if added else f"x = {v}"
     return [
         whole,

@@ -27,6 +27,12 @@ PRIORITIES = {
 }
 HEADER_EVERY = 8  # frames
 BY_TYPE = {int(kind): native for kind, native in NATIVE.items()}
+HEADS = {
+    kind: tuple(
+        [(PRIORITIES[kind], int(kind), layout.part) for layout in native.form(fd=fd).layouts] for fd in (False, True)
+    )
+    for kind, native in NATIVE.items()
+}  # of each frame, on classic CAN and on CAN FD
 HALF = (COUNT.largest + 1) // 2
 
 
@@ -99,7 +105,7 @@ class NativeProfile:
         told = self._told
         if told is None or header.number - told.number >= HEADER_EVERY:
             return True
-        return (header.sender, header.epoch, *header[3:]) != (told.sender, told.epoch, *told[3:])
+        return header[3:] != told[3:] or header[:2] != told[:2]
 
     def _collect(self, type_: int, part: int, data: bytes, needed: int) -> list[bytes] | None:
         """All parts of a message in order once they are there; those of another count are forgotten."""
@@ -125,10 +131,7 @@ def native_parts(payload: bytes, count: int, *, fd: bool) -> list[NativePart] | 
         frames = native.pack(values_of_opened(opened), count, fd=fd)
     except (DecodeError, EncodeError):
         return None
-    return [
-        NativePart(PRIORITIES[native.kind], int(native.kind), layout.part, data)
-        for layout, data in zip(native.form(fd=fd).layouts, frames, strict=True)
-    ]
+    return [NativePart(*head, data) for head, data in zip(HEADS[native.kind][fd], frames, strict=True)]
 
 
 def rounded(message: Message) -> Message:

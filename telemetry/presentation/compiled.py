@@ -1,4 +1,4 @@
-"""Functions that check the fields of one kind of message, compiled from the schema: one reads a body, one a message.
+"""Functions for the fields of one kind of message, compiled from the schema: for reading and for writing it.
 
 Every process checks what it says and what it believes. What a loop over the fields would look up each time is written
 out here: a value that is as the schema says takes a comparison, and anything else goes to its field's check, which
@@ -11,15 +11,18 @@ import math
 from collections.abc import Callable, Sequence
 from typing import Any
 
+import msgpack
+
 from telemetry.frozen import writable
 from telemetry.presentation.fields import FieldCodec
 from telemetry.quantities import ValueKind
 from telemetry.schema import Field, MessageSpec
 
+NO_TARGET = 255
 Reader = Callable[[dict[str, Any]], Any]  # message of its fields by their keys; raises ValueError
 Lister = Callable[[Any], list[Any]]  # values of the fields of a message; raises ValueError
-Packer = Callable[[list[Any]], dict[str, Any]]  # what is put into msgpack of the values of all fields
-NOBODY = 255  # address
+Picker = Callable[[dict[str, Any]], list[Any]]  # values of all fields of a body, unchecked; raises KeyError
+Writer = Callable[[Sequence[Any]], bytes]  # payload of the values of all fields, which are checked
 RIGHT = {
     ValueKind.NUMBER: "type({v}) is float and {low!r} <= {v} <= {high!r}",
     ValueKind.INTEGER: "type({v}) is int and {low!r} <= {v} <= {high!r}",
@@ -60,29 +63,39 @@ def lister_of(spec: MessageSpec, codecs: Sequence[FieldCodec]) -> Lister:
     return lister
 
 
-def packer_of(spec: MessageSpec, codecs: Sequence[FieldCodec], target: int | None) -> Packer:
-    """Function from the values of all fields, checked, to a map, of the earliest schema version that has them.
+def picker_of(codecs: Sequence[FieldCodec], version: int) -> Picker:
+    """Function from the body of a payload of a schema version to the values of all fields, unchecked."""
+    space = {f"default{k}": codec.default for k, codec in enumerate(codecs) if codec.since > version}
+    picked = [f"default{k}()" if codec.since > version else f"given[{codec.key!r}]" for k, codec in enumerate(codecs)]
+    picker: Picker = compiled([f"return [{', '.join(picked)}]"], space, codecs)
+    return picker
 
-    ``target`` is the address that the message goes to; None: its tube.
+
+def writer_of(spec: MessageSpec, codecs: Sequence[FieldCodec], target: int | None) -> Writer:
+    """Function from the values of all fields to the payload, in the earliest schema version that has them.
+
+    The envelope names the tube and the number among them; ``target`` is who is addressed, or None for that tube.
     """
-    names = [codec.name for codec in codecs]
-    later = [k for k, codec in enumerate(codecs) if codec.since > 1]
-    space: dict[str, Any] = {f"before{k}": codecs[k].before for k in later}
-    lines = [f"{' '.join(f'v{k},' for k in range(len(codecs)))} = given", "version = 1"]
-    lines += [f"if v{k} != before{k}: version = {codecs[k].since}" for k in later]  # in the order of their versions
-    for k, codec in enumerate(codecs):
-        if codec.pack is not None:
-            space[f"pack{k}"] = codec.pack
+    space: dict[str, Any] = {"packb": msgpack.packb}
+    places = range(len(codecs))
+    lines = [f"{' '.join(f'v{k},' for k in places)} = given", "version = 1"]
+    for k in places:
+        if codecs[k].since > 1:
+            space[f"before{k}"] = codecs[k].before
+            lines += [f"if v{k} != before{k}:", f"    version = {codecs[k].since}"]
+    for k in places:
+        if codecs[k].pack is not None:
+            space[f"pack{k}"] = codecs[k].pack
             lines.append(f"v{k} = pack{k}(v{k})")
-    lines.append(f"body = {{{', '.join(f'{c.key!r}: v{k}' for k, c in enumerate(codecs) if c.since == 1)}}}")
-    lines += [f"if version >= {codecs[k].since}: body[{codecs[k].key!r}] = v{k}" for k in later]
-    origin = f"v{names.index('tube')}" if "tube" in names else NOBODY
-    sequence = f"v{names.index('sequence')}" if "sequence" in names else 0
-    route = f"'o': {origin}, 't': {origin if target is None else target}, 's': {sequence}"
-    packer: Packer = compiled(
-        [*lines, f"return {{'v': version, 'k': {int(spec.kind)}, {route}, 'b': body}}"], space, codecs
-    )
-    return packer
+    for version in range(1, spec.newest + 1):
+        body = ", ".join(f"{codecs[k].key!r}: v{k}" for k in places if codecs[k].since <= version)
+        lines += [f"if version == {version}:", f"    body = {{{body}}}"]
+    place = {codec.name: f"v{k}" for k, codec in enumerate(codecs)}
+    origin, sequence = place.get("tube", str(NO_TARGET)), place.get("sequence", "0")
+    to = origin if target is None else str(target)
+    rows = f"'v': version, 'k': {int(spec.kind)}, 'o': {origin}, 't': {to}, 's': {sequence}, 'b': body"
+    writer: Writer = compiled([*lines, f"return packb({{{rows}}})"], space, codecs)
+    return writer
 
 
 def checking(field: Field, place: int, sequence: str) -> list[str]:

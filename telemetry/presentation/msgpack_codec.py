@@ -13,7 +13,7 @@ import msgpack
 
 from telemetry.errors import DecodeError, EncodeError
 from telemetry.messages import BASE, SCHEMA_VERSION, Message
-from telemetry.presentation.compiled import Lister, Packer, Reader, lister_of, packer_of, reader_of
+from telemetry.presentation.compiled import Lister, Picker, Reader, Writer, lister_of, picker_of, reader_of, writer_of
 from telemetry.presentation.fields import MAX_BINARY, codec_of
 from telemetry.schema import SCHEMA, U53, Kind, MessageSpec
 
@@ -38,11 +38,11 @@ class MessageCodec:
     def __init__(self, spec: MessageSpec) -> None:
         self._spec = spec
         self.readers: dict[int, Reader] = {}  # by schema version, compiled when a payload of it comes
+        self._pickers: dict[int, Picker] = {}
         self.kind = spec.kind
         self.message = spec.message
         self.newest = spec.newest
         self.fields = tuple(codec_of(field) for field in spec.fields)
-        self.goes_down = spec.kind in DOWNWARD
         sinces = [field.since for field in self.fields]
         if sinces != sorted(sinces):
             raise ValueError(f"{spec.message.__name__}: expected fields of later schema versions after all others")
@@ -52,20 +52,22 @@ class MessageCodec:
         """Function from a message to the values of its fields, checked."""
         return lister_of(self._spec, self.fields)
 
-    @cached_property
-    def rows(self) -> Packer:
-        """Function from the values of all fields, checked, to what is put into msgpack."""
-        return packer_of(self._spec, self.fields, None if self.goes_down else BASE)
-
     def reader(self, version: int) -> Reader:
         """Make the function from the fields of a payload of a schema version to its message."""
         reader = self.readers[version] = reader_of(self._spec, self.fields, version)
         return reader
 
-    def pack(self, values: list[Any]) -> bytes:
-        """Payload of the values of all fields, which are checked, in the earliest schema version that has them."""
-        payload: bytes = msgpack.packb(self.rows(values))
-        return payload
+    def picker(self, version: int) -> Picker:
+        """Function from the fields of a payload of a schema version to the values of all fields, unchecked."""
+        picker = self._pickers.get(version)
+        if picker is None:
+            picker = self._pickers[version] = picker_of(self.fields, version)
+        return picker
+
+    @cached_property
+    def pack(self) -> Writer:
+        """Function from the values of all fields, which are checked, to the payload."""
+        return writer_of(self._spec, self.fields, None if self.kind in DOWNWARD else BASE)
 
 
 CODECS: dict[type[Any], MessageCodec] = {spec.message: MessageCodec(spec) for spec in SCHEMA}
@@ -85,8 +87,7 @@ def encode(message: Message) -> bytes:
         values = codec.values(message)
     except ValueError as error:
         raise EncodeError(f"{type(message).__name__}: {error}") from error
-    payload: bytes = msgpack.packb(codec.rows(values))
-    return payload
+    return codec.pack(values)
 
 
 def decode(payload: bytes) -> Message:
@@ -109,24 +110,35 @@ def open_payload(payload: bytes) -> Opened:
         When the bytes have no envelope of this version.
     """
     rows = _unpack(payload)
-    try:
-        version, kind, origin, target, sequence = rows["v"], rows["k"], rows["o"], rows["t"], rows["s"]
-    except KeyError:  # what is missing is None, which no check lets pass
-        version, kind, origin, target, sequence = map(rows.get, "vkots")
+    get = rows.get
+    version, kind, origin, target, sequence = get("v"), get("k"), get("o"), get("t"), get("s")
+    codec = CODEC_OF.get(kind) if type(kind) is int else None
+    if (
+        codec is not None
+        and type(version) is type(origin) is type(target) is type(sequence) is int
+        and 1 <= version <= codec.newest
+        and 0 <= origin <= HIGHEST_ADDRESS
+        and 0 <= target <= HIGHEST_ADDRESS
+        and 0 <= sequence <= U53
+    ):
+        return Opened(codec.kind, origin, target, sequence, rows)
+    raise _refusal(version, kind, origin, target, sequence)
+
+
+def _refusal(version: Any, kind: Any, origin: Any, target: Any, sequence: Any) -> DecodeError:
+    """What is wrong with an envelope: the first of its fields that is not as it must be."""
     if type(version) is not int or not 1 <= version <= SCHEMA_VERSION:
-        raise DecodeError(f"payload: expected schema version 1 to {SCHEMA_VERSION}, got {version!r:.40}")
+        return DecodeError(f"payload: expected schema version 1 to {SCHEMA_VERSION}, got {version!r:.40}")
     codec = CODEC_OF.get(kind) if type(kind) is int else None
     if codec is None:
-        raise DecodeError(f"payload: unknown kind {kind!r:.40}")
+        return DecodeError(f"payload: unknown kind {kind!r:.40}")
     if version > codec.newest:
-        raise DecodeError(f"payload: {codec.kind.name.lower()}: expected version {codec.newest}, got {version}")
+        return DecodeError(f"payload: {codec.kind.name.lower()}: expected version {codec.newest}, got {version}")
     if type(origin) is not int or not 0 <= origin <= HIGHEST_ADDRESS:
-        raise _wrong_route("o", HIGHEST_ADDRESS, origin)
+        return _wrong_route("o", HIGHEST_ADDRESS, origin)
     if type(target) is not int or not 0 <= target <= HIGHEST_ADDRESS:
-        raise _wrong_route("t", HIGHEST_ADDRESS, target)
-    if type(sequence) is not int or not 0 <= sequence <= U53:
-        raise _wrong_route("s", U53, sequence)
-    return Opened(codec.kind, origin, target, sequence, rows)
+        return _wrong_route("t", HIGHEST_ADDRESS, target)
+    return _wrong_route("s", U53, sequence)
 
 
 def decode_opened(opened: Opened) -> Message:
@@ -159,9 +171,11 @@ def values_of_opened(opened: Opened) -> list[Any]:
     DecodeError
         When there are no fields at all.
     """
-    version, get = opened.rows["v"], body_of(opened).get
-    fields = CODEC_OF[opened.kind].fields
-    return [get(field.key) if field.since <= version else field.default() for field in fields]
+    version, body, codec = opened.rows["v"], body_of(opened), CODEC_OF[opened.kind]
+    try:
+        return codec.picker(version)(body)
+    except KeyError:
+        return [body.get(f.key) if f.since <= version else f.default() for f in codec.fields]
 
 
 def body_of(opened: Opened) -> dict[str, Any]:

@@ -121,7 +121,8 @@ async def live_by_own_clock(
         contextlib.closing(build(timing)) as process,
         own_ports(place.rig, address, own_time.neighbours, media) as ports,
     ):
-        loop = OwnClockLoop(process, ports, OwnClock(own_time.offset), timing, period, partial(complain, name))
+        clock, report = OwnClock(own_time.offset), partial(complain, name)
+        loop = OwnClockLoop(process, ports, clock, timing, period, report, at_once=True)
 
         def write() -> None:
             write_timing(place.folder, timing.report() | loop.losses())

@@ -48,19 +48,20 @@ class Mailbox(Generic[T]):
                 self.dropped += 1
                 return False
             self._items.append(item)
-        self._wake()
+        self.wake()
         return True
 
     def close(self) -> None:
         """Forget what waits and take nothing more, from any thread or signal handler of the loop."""
         self._closed = True
-        self._wake()
+        self.wake()
 
     def take(self) -> T | None:
         """The oldest item, or None where there is none."""
         return self._items.popleft() if self._items and not self._closed else None
 
-    def _wake(self) -> None:
+    def wake(self) -> None:
+        """Have ``arrived`` called, from any thread."""
         if self._wake_is_due:
             return
         self._wake_is_due = True

@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import asyncio
 import math
+import threading
 import time
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
@@ -90,15 +91,17 @@ class OwnClockLoop:
     """Runs a process by its own clock on the running asyncio loop.
 
     What arrives is handled in the callback that announces it, without a task in between: fifty processes on two cores
-    spend more on turns of their loops than on frames.
+    spend more on turns of their loops than on frames. Where that may be, a frame is even handled on the thread that
+    hears it: one that finds the process idle, with nothing due and nothing before it, does not wake the loop.
 
     Parameters
     ----------
-    process : what is run
+    process : what is run; one call at a time
     ports : its ends that have a neighbour
     clock, timing : its clock, and where the durations are kept
     period : s, of a cycle
     report : takes a line about an end at which nobody is heard
+    at_once : frames may be handled on the threads that hear them: nothing but this loop calls the process
     """
 
     def __init__(
@@ -109,7 +112,11 @@ class OwnClockLoop:
         timing: CycleTiming,
         period: float,
         report: Callable[[str], None] = lambda line: None,
+        *,
+        at_once: bool = False,
     ) -> None:
+        self._at_once, self._thread = at_once, threading.get_ident()
+        self._calling = threading.Lock()  # held by whoever calls the process
         self._process, self._ports, self._clock, self._timing = process, ports, clock, timing
         self._report = report
         self._asyncio = asyncio.get_running_loop()
@@ -148,7 +155,8 @@ class OwnClockLoop:
         try:
             await self._ended
         finally:
-            self._ended = None
+            with self._calling:
+                self._ended = None
             self._set_timer(math.inf)
 
     def losses(self) -> dict[str, Any]:
@@ -167,8 +175,14 @@ class OwnClockLoop:
             if self._inbox.is_closed:
                 self._ended.set_result(None)
             else:
-                self._turn()
+                with self._calling:
+                    self._turn()
         except Exception as error:
+            self._fail(error)
+
+    def _fail(self, error: Exception) -> None:
+        """End ``run`` by an error."""
+        if self._ended is not None and not self._ended.done():
             self._ended.set_exception(error)
 
     def _on_timer(self) -> None:
@@ -248,7 +262,37 @@ class OwnClockLoop:
             )
 
     def _on_frame(self, side: Side, frame: bytes) -> None:
-        self._inbox.put(lambda process, now: process.on_frame(side, frame, now))
+        if not (self._at_once and self._handle_at_once(side, frame)):
+            self._inbox.put(lambda process, now: process.on_frame(side, frame, now))
+
+    def _handle_at_once(self, side: Side, frame: bytes) -> bool:
+        """Handle a frame on the foreign thread that heard it; False where the loop has to.
+
+        That thread never waits for the loop: its medium may need it for what the loop is sending.
+        """
+        if threading.get_ident() == self._thread or not self._calling.acquire(blocking=False):
+            return False
+        try:
+            now = self._clock.now()
+            if not self._is_idle(now):
+                return False
+            self._timing.begin()
+            self._process.on_frame(side, frame, now)
+            self._timing.lap(Stage.FRAME)
+            now = self._clock.now()
+            send(self._process, self._ports, now)
+            if self._process.next_wake(now) < self._timer_due:
+                self._inbox.wake()
+        except Exception as error:
+            self._asyncio.call_soon_threadsafe(self._fail, error)
+        finally:
+            self._calling.release()
+        return True
+
+    def _is_idle(self, now: float) -> bool:
+        """Whether the process runs, nothing is due and nothing waits."""
+        runs = self._ended is not None and not self._ended.done() and not self._inbox.is_closed
+        return runs and not len(self._inbox) and now < self._next_moment()
 
 
 def run_cycle(

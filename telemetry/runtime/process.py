@@ -14,8 +14,8 @@ from telemetry.runtime.joint_watch import JointFault
 class Process:
     """Base of a process: hands time and frames to its ``endpoint``; a subclass takes what it can use of the rest.
 
-    It is driven by a stepper (``stepped``) or by a clock of its own (``own_clock``) and knows neither. All calls come
-    from one thread, ``now`` is its own clock (s).
+    It is driven by a stepper (``stepped``) or by a clock of its own (``own_clock``) and knows neither. Calls come one
+    at a time, ``now`` is its own clock (s).
     """
 
     endpoint: Endpoint

@@ -12,7 +12,7 @@ from __future__ import annotations
 import math
 import zlib
 from collections import Counter, OrderedDict
-from collections.abc import Hashable, Iterable
+from collections.abc import Hashable, Iterable, Sequence
 from dataclasses import dataclass
 from typing import Any, NamedTuple
 
@@ -172,7 +172,7 @@ class HopLink:
         self._update_quality(number)
         self.last_heard = now
         self.counters["frames_received"] += 1
-        if ack_epoch == self.epoch:
+        if self._outstanding and ack_epoch == self.epoch:
             self._acknowledged(ack, ack_mask)
         elif not self._is_me(ack_epoch):
             entries = [entry for entry in entries if entry[0] == 0]
@@ -284,7 +284,7 @@ class HopLink:
         self._ack_due = math.inf
         self.counters["frames_sent"] += 1
         peer_epoch = max(self._peer_epoch, 0)
-        header = Header(self._address, self.epoch, self._frames, peer_epoch, self._received, self._received_mask)
+        header = (self._address, self.epoch, self._frames, peer_epoch, self._received, self._received_mask)
         payload = pack_frame(header, [entry[:2] for entry in entries])
         if len(entries) == 1:  # as nearly always
             _, _, priority, topic = entries[0]
@@ -298,9 +298,9 @@ def epoch_of(boot_count: int, session: int, address: int) -> int:
     return boot_count << BOOT_SHIFT | (session & 0xFFFF) << SESSION_SHIFT | address
 
 
-def pack_frame(header: Header, entries: Iterable[tuple[int, bytes]]) -> bytes:
-    """Bytes of a frame."""
-    body: bytes = msgpack.packb((VERSION, *header, list(entries)))
+def pack_frame(header: Sequence[int], entries: Sequence[Sequence[object]]) -> bytes:
+    """Bytes of a frame with a ``Header``; an entry is its number and its payload."""
+    body: bytes = msgpack.packb([VERSION, *header, entries])
     return zlib.crc32(body).to_bytes(4, "little") + body
 
 
@@ -319,9 +319,7 @@ def parse_frame(frame: bytes) -> tuple[Header, list[Any]] | None:
     if version != VERSION or not are_integers or not isinstance(entries, list):
         return None
     header = Header(sender, epoch, number, peer_epoch, ack, mask)
-    if min(header) < 0 or not all(map(_is_entry, entries)):
-        return None
-    return header, entries
+    return (header, entries) if min(header) >= 0 and all(map(_is_entry, entries)) else None
 
 
 def common_topic(entries: Iterable[Entry]) -> Hashable | None:

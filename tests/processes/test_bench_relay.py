@@ -25,7 +25,12 @@ def test_a_node_relays_every_aiding_of_the_benchmark() -> None:
     done = subprocess.run([sys.executable, "-c", FEW], capture_output=True, text=True, check=False)
     assert done.returncode == 0, done.stderr
     ratios = json.loads(done.stdout)["ratios"]
-    assert list(ratios) == ["relay over zenoh", "handed to an asyncio loop"]
+    assert list(ratios) == [
+        "relay over zenoh",
+        "handed to an asyncio loop",
+        "relay over zenoh, in turn with the peer",
+        "handed to an asyncio loop, in turn with the peer",
+    ]
     for row in ratios.values():
         low, high = row["slower_interval"]
         assert 0.0 < low <= row["slower"] <= high

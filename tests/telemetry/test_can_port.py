@@ -7,6 +7,7 @@ import threading
 import time
 from collections.abc import Callable, Iterator
 from pathlib import Path
+from typing import Any
 
 import can
 import cantools
@@ -15,7 +16,19 @@ import pytest
 from sim.can.hub import CanHub, running_hub
 from sim.can.wire import CanWire
 from telemetry.errors import MediumError
+from telemetry.media.can_controller import Controller, LibraryController, LoopbackController, controller_of
+from telemetry.media.can_frame import (
+    ERROR,
+    ERROR_CONTROLLER,
+    EXTENDED,
+    IDENTIFIER,
+    OWN_FRAME,
+    RX_OVERFLOW,
+    Arrival,
+)
 from telemetry.media.can_identifier import TUNNEL, Identifier
+from telemetry.media.can_log import CanLog
+from telemetry.media.can_loopback import register
 from telemetry.media.can_loopback_protocol import INTERFACE
 from telemetry.media.can_medium import segment_of
 from telemetry.media.can_port import CanPort
@@ -247,3 +260,55 @@ def test_faults_of_a_joint_are_told_once_a_minute() -> None:
         assert [f.times for f in watch.find(ports, 61.5)] == [2]
         assert watch.find(ports, 200.0) == []
         port.close()
+
+
+@pytest.mark.parametrize("is_fd", [True, False])
+def test_a_controller_says_the_same_with_and_without_messages_of_the_library(
+    stack: contextlib.ExitStack, hub: CanHub, tmp_path: Path, is_fd: bool
+) -> None:
+    register()
+    log = CanLog(tmp_path / "joint.asc", "end")
+    stack.callback(log.close)
+    ends = [controller_of(bus_on(hub.port, fd=is_fd), is_fd=is_fd, log=one) for one in (None, log)]
+    assert [type(end) for end in ends] == [LoopbackController, LibraryController]
+    for end in ends:
+        stack.callback(end.shutdown)
+    data = bytes(range(64 if is_fd else 8))
+    for end in ends:
+        end.send(0x1ABCDEF5, data)
+        heard = [arrived(one) for one in ends]
+        own = [OWN_FRAME if one is end else 0 for one in ends]
+        assert heard == [(0x1ABCDEF5 | EXTENDED | flag, data) for flag in own]
+    assert [end.receive() for end in ends] == [None, None]
+
+
+def test_a_controller_tells_overruns_and_a_hub_that_has_gone(stack: contextlib.ExitStack) -> None:
+    register()
+    with running_hub() as hub:
+        small = bus_on(hub.port, fd=True, receive_buffer=4096)
+        slow = controller_of(small, is_fd=True, log=None)
+        stack.callback(slow.shutdown)
+        quick = controller_of(bus_on(hub.port, fd=True), is_fd=True, log=None)
+        stack.callback(quick.shutdown)
+        for _ in range(300):
+            quick.send(1, bytes(64))
+            arrived(quick)
+        errors = [arrival for arrival in iter(slow.receive, None) if arrival[0] & ERROR]
+        quick.send(2, b"")  # by whose count the gap shows
+        errors += [arrival for arrival in iter(slow.receive, None) if arrival[0] & ERROR]
+    assert [(identifier & IDENTIFIER, data[1]) for identifier, data in errors] == [(ERROR_CONTROLLER, RX_OVERFLOW)]
+    with pytest.raises((can.CanError, OSError)):
+        until(slow.receive)
+
+
+def bus_on(port: int, **options: Any) -> can.BusABC:
+    """A controller of the segment ``joint``."""
+    return can.Bus(f"{port}/joint", interface=INTERFACE, ignore_config=True, **{"receive_own_messages": True} | options)
+
+
+def arrived(controller: Controller) -> Arrival:
+    """The next frame."""
+    found: list[Arrival | None] = []
+    until(lambda: found.append(controller.receive()) or found[-1])
+    assert found[-1] is not None
+    return found[-1]

@@ -10,10 +10,10 @@ from hypothesis import given
 from hypothesis import strategies as st
 from messages_of_schema import MESSAGES
 
-from telemetry.messages import DepthReading, SessionOffer
+from telemetry.messages import BASE, DepthReading, SessionOffer
 from telemetry.presentation.compiled import lister_of, reader_of
 from telemetry.presentation.fields import codec_of
-from telemetry.presentation.msgpack_codec import decode, encode
+from telemetry.presentation.msgpack_codec import DOWNWARD, decode, encode, open_payload, values_of_opened
 from telemetry.schema import SCHEMA, SPEC_OF, Field, MessageSpec
 
 EDGES = [math.nan, math.inf, -math.inf, -0.0, 1e300, 2**63, -1, 0, 1, 2.0, True, None, "text", b"", b"12345678", [], {}]
@@ -118,3 +118,32 @@ def test_a_message_that_was_read_is_as_frozen_as_one_that_was_made(message: Any)
     assert pickle.loads(pickle.dumps(read)) == message == dataclasses.replace(read)
     with pytest.raises(dataclasses.FrozenInstanceError):
         setattr(read, dataclasses.fields(read)[0].name, 0)
+
+
+@pytest.mark.parametrize("message", ONE_OF.values(), ids=lambda message: type(message).__name__)
+def test_a_written_payload_is_that_of_a_map_in_the_earliest_version(message: Any) -> None:
+    spec = SPEC_OF[type(message)]
+    codecs = [codec_of(field) for field in spec.fields]
+    values = [codec.check(getattr(message, codec.name)) for codec in codecs]
+    version = max([1, *(c.since for c, value in zip(codecs, values, strict=True) if c.since > 1 and value != c.before)])
+    packed = [v if c.pack is None else c.pack(v) for c, v in zip(codecs, values, strict=True)]
+    body = {c.key: value for c, value in zip(codecs, packed, strict=True) if c.since <= version}
+    origin = getattr(message, "tube", 255)
+    target = origin if spec.kind in DOWNWARD else BASE
+    rows = {
+        "v": version, "k": int(spec.kind), "o": origin, "t": target, "s": getattr(message, "sequence", 0), "b": body
+    }  # fmt: skip
+    assert encode(message) == msgpack.packb(rows)
+
+
+@pytest.mark.parametrize("message", ONE_OF.values(), ids=lambda message: type(message).__name__)
+def test_values_are_picked_as_they_came_and_one_that_is_missing_is_none(message: Any) -> None:
+    payload = encode(message)
+    opened = open_payload(payload)
+    codecs = [codec_of(field) for field in SPEC_OF[type(message)].fields]
+    version, body = opened.rows["v"], opened.rows["b"]
+    expected = [body.get(c.key) if c.since <= version else c.default() for c in codecs]
+    assert values_of_opened(opened) == expected
+    lost = dict(list(body.items())[1:])
+    without = values_of_opened(opened._replace(rows=opened.rows | {"b": lost}))
+    assert without == [None, *expected[1:]]

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import asyncio
 import contextlib
+import math
 import os
 import signal
 import socket
@@ -11,7 +12,7 @@ import subprocess
 import sys
 import threading
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import AsyncIterator, Callable, Iterator
 from dataclasses import dataclass
 from itertools import pairwise
 from pathlib import Path
@@ -24,10 +25,11 @@ from telemetry import keys
 from telemetry.application.endpoint import Endpoint
 from telemetry.errors import MediumError
 from telemetry.media.neighbours import neighbour_ports, stepped_ports
-from telemetry.media.port import Frame, TubeEnd
+from telemetry.media.port import Frame, Port, Priority, TubeEnd
 from telemetry.media.zenoh_bus import JSON, Query, ZenohBus, open_client, open_router
 from telemetry.media.zenoh_port import ZenohMedium
-from telemetry.messages import ENCODER, Side
+from telemetry.messages import ENCODER, Message, Side, TimeReply, TimeRequest
+from telemetry.presentation.msgpack_codec import decode, encode
 from telemetry.runtime import step_client
 from telemetry.runtime.hosting import Place
 from telemetry.runtime.inbox import INBOX_LIMIT, Inbox
@@ -37,6 +39,7 @@ from telemetry.runtime.step_client import STEP, AsyncStepClient, StepAssembler, 
 from telemetry.runtime.step_stream import StepStream
 from telemetry.runtime.stepped import Due, DueEvent, pack_step, run_step, unpack_step
 from telemetry.runtime.timing import CycleTiming
+from telemetry.transport.hop import HopLink, parse_frame
 
 PATIENCE = 30.0
 RIG = "runtime"
@@ -51,6 +54,20 @@ class Plain(Process):
 
     def on_depth(self, rig_time: float, md: float) -> None:
         self.depths.append((rig_time, md))
+
+
+class Watched(Plain):
+    """Keeps on which threads frames are handled, and refuses those that say so."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.threads: list[int] = []
+
+    def on_frame(self, side: Side, frame: bytes, now: float, margin: float = math.inf) -> None:
+        self.threads.append(threading.get_ident())
+        if frame == b"refuse":
+            raise RuntimeError("no more")
+        super().on_frame(side, frame, now, margin)
 
 
 class HastyClock(OwnClock):
@@ -326,6 +343,41 @@ class TestOwnClock:
         assert line.startswith("lower end: nobody heard for 60 s, the port is down")
         assert not loop.losses()["ports"]["lower"]["is_up"]
 
+    async def test_an_idle_process_answers_on_the_thread_that_hears(self, router: Router) -> None:
+        process = Watched()
+        async with running_at_once(process, router.bus) as (loop, sender):
+            answers: list[bytes] = []
+            sender.listen(answers.append)
+            await until(lambda: loop.losses()["ports"]["lower"]["is_up"])
+            while set(process.threads) <= {threading.get_ident()}:  # until no cycle was due just then
+                asking = HopLink(1, 1)
+                asking.send_best_effort(encode(TimeRequest(1.0)), "time", Priority.TIME)
+                (frame,) = asking.take_frames(1.0)
+                answers.clear()
+                await asyncio.to_thread(sender.send, frame)
+            await until(lambda: any(isinstance(said, TimeReply) for frame in answers for said in messages_of(frame)))
+
+    async def test_a_frame_that_finds_the_process_at_work_waits_for_the_loop(self, router: Router) -> None:
+        process = Watched()
+        async with running_at_once(process, router.bus) as (loop, sender):
+            meanwhile: list[int] = []
+
+            def work(_process: Process, _now: float) -> None:
+                thread = threading.Thread(target=sender.send, args=(Frame(b"no frame"),))
+                thread.start()
+                thread.join(PATIENCE)
+                meanwhile.extend(process.threads)
+
+            loop.call(work)
+            await until(lambda: process.endpoint.link_counters().get("bad_frames") == 1)
+        assert meanwhile == []
+        assert process.threads == [threading.get_ident()]
+
+    async def test_an_error_on_the_thread_that_hears_ends_the_loop(self, router: Router) -> None:
+        with pytest.raises(RuntimeError, match="no more"):
+            async with running_at_once(Watched(), router.bus) as (_, sender):
+                await asyncio.to_thread(sender.send, Frame(b"refuse"))
+
     def test_a_silent_end_is_named_once_until_somebody_is_heard(self) -> None:
         watch = AbsenceWatch(Side, begin=100.0)
         nobody: dict[Side, object] = dict.fromkeys(Side)
@@ -336,6 +388,32 @@ class TestOwnClock:
         assert watch.find(nobody, 101.0 + 2.0 * ABSENT_LIMIT) == [Side.UPPER]
         assert watch.find(nobody | {Side.LOWER: "tube"}, 102.0 + 2.0 * ABSENT_LIMIT) == []
         assert watch.find(nobody, 103.0 + 3.0 * ABSENT_LIMIT) == [Side.LOWER]
+
+
+@contextlib.asynccontextmanager
+async def running_at_once(process: Process, bus: ZenohBus) -> AsyncIterator[tuple[OwnClockLoop, Port]]:
+    """Loop of a process whose frames are handled on the threads that hear them, and the end that it listens to."""
+    medium = ZenohMedium(bus)
+    ports = neighbour_ports(medium, RIG, ENCODER, {Side.LOWER: 1})
+    loop = OwnClockLoop(process, ports, OwnClock(), CycleTiming(), 0.5, at_once=True)
+    sender = medium.open_port(TubeEnd(RIG, 1, Side.UPPER, ENCODER))
+    running = asyncio.create_task(loop.run())
+    began = asyncio.Event()
+    loop.call(lambda p, now: began.set())
+    await asyncio.wait_for(began.wait(), PATIENCE)
+    await until(lambda: sender.is_up)
+    try:
+        yield loop, sender
+        loop.stop()
+    finally:
+        await asyncio.wait_for(running, PATIENCE)
+
+
+def messages_of(frame: bytes) -> list[Message]:
+    """What a frame of the link says."""
+    parsed = parse_frame(frame)
+    assert parsed is not None
+    return [decode(payload) for _, payload in parsed[1]]
 
 
 async def until(probe: Callable[[], bool]) -> None:
