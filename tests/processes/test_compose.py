@@ -4,6 +4,7 @@ import contextlib
 import json
 import math
 import queue
+import re
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
@@ -18,6 +19,7 @@ from sim.world.world import World
 from telemetry.media.credentials import credentials_of
 from telemetry.media.zenoh_bus import ZenohBus, open_client
 
+WAITED_FOR = re.compile(r"borechain medium: \w+ has not joined for \d+ s, it is waited for")
 SERVICES: dict[str, dict[str, Any]] = yaml.safe_load((REPOSITORY / "docker-compose.yml").read_text())["services"]
 
 
@@ -78,7 +80,8 @@ def test_the_services_drill_two_tubes_together_and_end_when_asked(tmp_path: Path
             process.terminate()
             _, errors = process.communicate(timeout=30.0)
             assert process.returncode == 0, (name, errors)
-            assert errors == ""
+            # on a busy machine a process may join late, which the medium has to say
+            assert [line for line in errors.splitlines() if not WAITED_FOR.fullmatch(line)] == []
 
 
 def test_the_joint_readings_are_those_of_the_scenario() -> None:
