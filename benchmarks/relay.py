@@ -16,6 +16,7 @@ from pathlib import Path
 from typing import Any
 
 from borechain.load.rounds import beside
+from node.kernels.warm import warm_up
 from node.process.drivers.timed import TimedImu
 from node.process.host import run_node
 from sim.rig.realtime import clock_offset
@@ -53,6 +54,7 @@ def run() -> dict[str, Any]:
         ``ratios``: ours beside the peer, with how many times ``slower`` and the interval of that; and what it takes to
         hand the same bytes to an asyncio loop on the way, as a node does, beside the same peer.
     """
+    warm_up()  # before time counts: a fresh machine compiles for half a minute
     with tempfile.TemporaryDirectory(prefix="borechain-") as place, contextlib.ExitStack() as stack:
         folder, endpoint = Path(place), free_endpoint()
         world = turning_once(TUBE, time.monotonic(), RECORDED, 1.0, 2.0 * RECORDED, 1, 0.0)
