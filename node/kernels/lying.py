@@ -3,7 +3,7 @@
 The tilt of the filter is two small turns across the axis. Of an upright tube they are where gravity comes from; of one
 that lies one of them is, and a turn about the axis, by what the scale was wrong, is none of them: levelling would take
 3 deg of it for 90 deg across and the rest for biases. So at the begin of a rest gravity is turned about the axis to
-where the accelerometer feels it. And the rates across the axis are part of the yaw's, with their noise.
+where the accelerometer feels it.
 """
 
 from __future__ import annotations
@@ -12,16 +12,13 @@ from typing import Any, Final
 
 from node.kernels.coarse_level import GRAVITY_ERROR
 from node.kernels.jit import kernel
-from node.kernels.layout import RING, Array
-from node.kernels.numbers import fraction, length, root, square, times, turn
-from node.kernels.priors import noise_over
-from node.kernels.quantity import ONE, factor
-from node.kernels.resets import open_yaw
+from node.kernels.layout import Array
+from node.kernels.numbers import fraction, length, times
+from node.kernels.quantity import factor
 
 LYING: Final = factor(0.5)  # part of gravity along the axis, below which a tube lies
 FIRST: Final = 2  # cycles of a rest, in which it is turned: then the filter levels
 LEAST: Final = factor(2e-3)  # of a turn, rad: five sigmas of a force
-LARGEST: Final = factor(1.99)
 
 
 @kernel
@@ -51,16 +48,3 @@ def turn_about_axis(down: Array, c: float, s: float) -> None:
     x, y = down[0], down[1]
     down[0] = times(x, c) - times(y, s)
     down[1] = times(x, s) + times(y, c)
-
-
-@kernel
-def widen_lying(node: Any) -> None:
-    """Open the yaw by the noise of the rates across: psi' has (wx ux + wy uy) / (1 + uz), N^2 (1 - uz) / (1 + uz)."""
-    state = node.filter
-    along = state.now_down[2]
-    if node.guard.rate == 0 or state.still_cycles > 0 or abs(along) > LYING or state.cycles == 0:
-        return
-    newest = (state.cycles - 1) % RING
-    period = state.ring_end[newest] - state.ring_start[newest]
-    turned = turn(root(noise_over(node.config, 0, 1, period)), period)
-    open_yaw(state, times(square(turned), min(fraction(ONE - along, ONE + along), LARGEST)))

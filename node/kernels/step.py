@@ -22,7 +22,7 @@ from node.kernels.guard import admits, gate_aiding, guard_reading, judge_cycle
 from node.kernels.intake import take_readings
 from node.kernels.jit import constant, entry, kernel, shared_body
 from node.kernels.layout import CLOCK_SLACK, DEG, Array, Scheme, Status
-from node.kernels.lying import turn_down, widen_lying
+from node.kernels.lying import turn_down
 from node.kernels.make_up import follow_joints
 from node.kernels.modes import STATIC_BIAS
 from node.kernels.numbers import angle_of, half, held, ratio, root, stamp_square, time_root
@@ -168,7 +168,6 @@ def after_loop(node: Any, moment: Array, status: int, waits: int) -> None:
         start_over(node.filter, node.config)
     follow_swing(node)
     follow_ramp(node)
-    widen_lying(node)
     judge_cycle(node, node.status, moment[END])
 
 
