@@ -5,6 +5,7 @@ fault      evidence                                                             
 ========== ======================================================================= =================
 step       innovations beyond the gate that grow alike, while readings look sane   3 aidings in a row
 small step the same, by less than 0.15 deg/s, or 0.3 deg/s at 60 deg/s or more    6 aidings in a row
+winding    a step of a string that has just started, or unwinds: it may be its twist  6 aidings in a row
 scale      innovations beyond the gate that grow in proportion to the rate         3 aidings in a row
 ========== ======================================================================= =================
 
@@ -12,7 +13,8 @@ A wrong aiding makes one large innovation that then stays; a wrong gyroscope mak
 That is how the two are distinguished: what a ripple of the drive, a disc off its centre or a sensor that leans leaves
 between two aidings comes and goes, and is a misfit (``node.kernels.doubts``). A small step is looked at for longer, for
 a part of a swing looks like one: of a swing of once a turn (ten aidings at 71 deg/s) six are never alike. A string that
-unwinds below a standing drive head looks like a step.
+winds up as it starts, or unwinds below a standing drive head, looks like a step too, until it has: within three seconds
+it is never alike in six.
 """
 
 from __future__ import annotations
@@ -33,8 +35,11 @@ SMALL_STEP: Final = rate(math.radians(0.15))  # rad/s, up to which a step is loo
 SMALL_SWING: Final = rate(math.radians(0.3))  # rad/s, likewise, where the string turns at full speed
 SLOWEST_SWING: Final = rate(math.radians(60.0))  # rad/s, from where it does: the slower, the smaller are its swings
 STEADY: Final = factor(0.3)  # of the mean mismatch, by which those of one step may differ from it
+WINDING: Final = rate(math.radians(0.3))  # rad/s, from where a mismatch of a string that starts is looked at for longer
+UNWINDING: Final = rate(math.radians(0.5))  # rad/s, likewise, of one that rests
 GROSS: Final = rate(math.radians(5.0))  # rad/s, from where a mismatch is a fault however it changes
 SLOWEST_SCALE: Final = rate(math.radians(5.0))  # rad/s, from where a mismatch may be one of scale
+AT_ONCE, STARTING, AT_REST = constant(0), constant(1), constant(2)  # how long a mismatch is looked at
 GYRO_STEP, GYRO_SCALE = constant(Fault.GYRO_STEP), constant(Fault.GYRO_SCALE)
 
 
@@ -48,7 +53,15 @@ def forget(watch: Any) -> None:
 
 @kernel
 def find_mismatch(
-    watch: Any, found: Any, innovation: float, sigma: float, spin: float, now: float, rejected: int, reset: int
+    watch: Any,
+    found: Any,
+    innovation: float,
+    sigma: float,
+    spin: float,
+    now: float,
+    rejected: int,
+    reset: int,
+    patience: int,
 ) -> None:
     """Take one judged aiding (rad, sigmas, rad/s, s) into ``watch``; leaves what enough of them show in ``found``.
 
@@ -56,6 +69,7 @@ def find_mismatch(
     ----------
     watch, found : records of dtype ``AIDINGS`` and ``MISMATCH``; no fault in ``found``: they show nothing
     rejected, reset : 1 when the filter rejected the aiding, and when it took its yaw from it
+    patience : ``AT_ONCE``, or ``STARTING`` or ``AT_REST`` while a string may wind up or unwind
     """
     found.fault = found.refuted = 0
     grown = innovation - watch.left
@@ -83,9 +97,7 @@ def find_mismatch(
     usual = recent_mismatch(watch)
     steady, proportional = is_steady(watch, usual), is_proportional(watch)
     gross = abs(mismatch) >= GROSS
-    slowest = min(abs(watch.spin[0]), abs(spin))
-    large = abs(usual) >= SMALL_SWING if slowest >= SLOWEST_SWING else abs(usual) >= SMALL_STEP
-    wanted = DISAGREEMENTS if large else MOST_DISAGREEMENTS
+    wanted = DISAGREEMENTS if is_large(watch, abs(usual), abs(spin), patience) else MOST_DISAGREEMENTS
     if not (proportional or gross or (steady and watch.seen >= wanted)):
         found.refuted = 0 if steady else 1
         if watch.seen == MOST_DISAGREEMENTS or not steady:
@@ -96,6 +108,15 @@ def find_mismatch(
     found.spin = spin + mismatch
     found.steady = 1 if steady else 0
     watch.seen = 0
+
+
+@kernel
+def is_large(watch: Any, usual: float, spin: float, patience: int) -> bool:
+    """Whether three mismatches of this size (rad/s) are enough at this ``spin`` (rad/s)."""
+    if (patience == STARTING and usual >= WINDING) or (patience == AT_REST and usual >= UNWINDING):
+        return False
+    slowest = min(abs(watch.spin[0]), spin)
+    return bool(usual >= SMALL_SWING if slowest >= SLOWEST_SWING else usual >= SMALL_STEP)
 
 
 @kernel

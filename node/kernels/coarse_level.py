@@ -19,7 +19,7 @@ TX, TY = constant(Err.TILT_X), constant(Err.TILT_Y)
 UNKNOWN_VAR: Final = variance(0.25)  # rad^2 of tilt, above which nothing is known that a reading could spoil
 SLOWEST: Final = rate(6.0 * DEG)  # rad/s, up to which a mean over a cycle is that of one attitude
 GRAVITY_ERROR: Final = factor(0.05)  # of gravity, at rest
-COS_FAR_OFF: Final = factor(math.cos(0.1))  # of rad, beyond which the linear levelling is not left to itself
+FAR_OFF: Final = factor(1.0 - math.cos(0.1))  # of an upright tube; more is not left to the linear levelling
 
 
 @kernel
@@ -32,6 +32,7 @@ def level_coarsely(state: Any, config: Any, turning: Array, force: Array) -> Non
         return
     down = state.down
     along = times(force[0], down[0]) + times(force[1], down[1]) + times(force[2], down[2])
-    if -along < times(weight, COS_FAR_OFF):
+    linear = times(FAR_OFF, times(down[2], down[2]))  # of one that lies a turn about its axis is many across it
+    if -along < weight - times(weight, linear):
         for k in range(3):
             down[k] = -fraction(force[k], weight)

@@ -56,8 +56,8 @@ def noise_var(node: Any) -> float:
 
 @kernel
 def unexplained_var(node: Any) -> float:
-    """Variance (rad^2) of the yaw that no filter averages away: of the misfit, of the jump, of a late window."""
-    return held(misfit_var(node) + square(node.guard.jump) + window_var(node))
+    """Variance (rad^2) of the yaw that no filter averages away: of misfit, ramps, the jump, of a late window."""
+    return held(misfit_var(node) + node.guard.ramp.doubt + square(node.guard.jump) + window_var(node))
 
 
 @kernel

@@ -10,7 +10,7 @@ from __future__ import annotations
 
 from typing import Any, Final
 
-from node.kernels.aiding_watch import STEADY, find_mismatch, forget
+from node.kernels.aiding_watch import AT_ONCE, AT_REST, STARTING, STEADY, find_mismatch, forget
 from node.kernels.angles import wrap
 from node.kernels.doubts import explain_jump, follow_jump, follow_misfit, misfit_var
 from node.kernels.events import Code, Fault, tell, told, told_count, told_degrees
@@ -37,9 +37,11 @@ from node.kernels.numbers import (
 )
 from node.kernels.priors import bias_var, is_beyond_gate, scale_var
 from node.kernels.quantity import NONE, angle, factor, rate, rate_variance, seconds, variance
+from node.kernels.ramps import explain_ramp, follow_fit, is_starting
 from node.kernels.record import A_CLOCK_VAR, A_RATE, A_VALID, A_YAW, A_YAW_VAR
 from node.kernels.resets import (
     begin_epoch,
+    forget_scale,
     lose_tilt,
     lose_yaw,
     lose_yaw_ahead,
@@ -274,7 +276,8 @@ def judge_cycle(node: Any, status: int, at: float) -> None:
         guard.jump = guard.jump if reset == 0 else 0  # a yaw that was unknown has nothing to be contradicted
         return
     sigma = root(max(state.innovation_var, 0) + misfit_var(node))
-    find_mismatch(guard.aidings, guard.found, state.innovation, sigma, state.now_rate, at, rejected, reset)
+    patience = patience_of(node)
+    find_mismatch(guard.aidings, guard.found, state.innovation, sigma, state.now_rate, at, rejected, reset, patience)
     if guard.gyro.fault == 0:
         follow_doubts(node, rejected, reset)
     if guard.found.fault != 0:
@@ -286,15 +289,29 @@ def judge_cycle(node: Any, status: int, at: float) -> None:
 
 
 @kernel
+def patience_of(node: Any) -> int:
+    """How long a mismatch is looked at: a string that starts may wind up, one that stood still may unwind."""
+    if is_starting(node):
+        return STARTING
+    return AT_REST if node.guard.rest_cycles > 0 and stood_in_this_rest(node) else AT_ONCE
+
+
+@kernel
 def follow_doubts(node: Any, rejected: int, reset: int) -> None:
-    """What an aiding shows that was used, or rejected but not for a step, is a misfit; a reset is a jump."""
+    """What an aiding shows that was used, or rejected but not for a step, is a misfit; a reset is a jump.
+
+    A reset soon after a start: what the string did then may have gone into the scale before it was rejected.
+    """
     guard = node.guard
+    follow_fit(node, rejected)
     if rejected == 0:
         guard.last_jump = 0
     if rejected == 0 or guard.found.refuted == 1:
         follow_misfit(node)
     if reset == 1:
         follow_jump(node)
+        if is_starting(node):
+            forget_scale(node.filter, guard.ramp.scale, square(guard.ramp.scale_std))
 
 
 @kernel
@@ -306,7 +323,14 @@ def is_settling(node: Any) -> bool:
     guard, state = node.guard, node.filter
     if guard.rest_cycles == 0 or state.still_cycles > 0 or abs(state.now_rate) > LARGEST_DRIFT:
         return False
-    return not state.stopped_at > state.now - lasting(state.now, guard.rest_cycles + 1)
+    return not stood_in_this_rest(node)
+
+
+@kernel
+def stood_in_this_rest(node: Any) -> bool:
+    """Whether the node has stood still since the head did."""
+    state = node.filter
+    return bool(state.stopped_at > state.now - lasting(state.now, node.guard.rest_cycles + 1))
 
 
 @kernel
@@ -388,6 +412,7 @@ def learn_mismatch(node: Any) -> None:
     trust, found = guard.gyro, guard.found
     reconsider(node)
     explain_jump(node)
+    explain_ramp(guard.ramp)
     prior = max(bias_var(config, 2) + state.static_bias_var[2], LEARNT_VAR)
     of_scale = state.P[S, S]
     learnable = found.steady == 1 and abs(found.rate) <= LARGEST_STEP

@@ -16,8 +16,8 @@ from node.kernels.static_average import STATIC
 from node.kernels.sweep import OFFSET, SWEEP
 
 # of the saved record; 1 and 2 held the filter alone, 3 what a start clears as well, 4 no doubts, 5 fewer mismatches,
-# 6 no odd forces, 7 no swings
-NODE_LAYOUT: Final = 8
+# 6 no odd forces, 7 no swings, 8 no ramps
+NODE_LAYOUT: Final = 9
 EVENTS_KEPT: Final = 32  # that wait to be said
 NUMBERS: Final = 10  # of one event
 DISAGREEMENTS: Final = 3  # aidings in a row, until a mismatch is a fault
@@ -74,6 +74,24 @@ SWING: Final = np.dtype(
     ],
     align=True,
 )
+RAMP: Final = np.dtype(
+    [
+        ("left", "i8"),  # cycles whose aidings still show what the ramp did
+        ("lasted", "i8"),  # cycles since it began
+        ("seen", "i8"),  # aidings of it
+        ("misfit", "f8"),  # sum of their squares over their variances
+        ("largest", "f8"),  # rad^2, of their squares
+        ("doubted", "i8"),  # 1: it does not fit
+        ("opened", "i8"),  # 1: the yaw has been opened for it
+        ("doubt", "f8"),  # rad^2, variance of the yaw by the ramps that did not fit
+        ("cycles", "i8"),  # since the node stood still
+        ("scale", "f8"),  # scale error of the z gyroscope, then
+        ("scale_std", "f8"),  # of it
+        ("sense", "i8"),  # 1 or -1: the way in which the string turned fast last; 0: not yet
+        ("back", "f8"),  # rad, turned the other way since the node stood still
+    ],
+    align=True,
+)
 GUARD: Final = np.dtype(
     [
         ("readings", READINGS),  # the newest readings, to see repeats
@@ -100,6 +118,7 @@ GUARD: Final = np.dtype(
         ("likeness", "f8"),  # mean of the products of neighbours over their variances
         ("shared", "f8"),  # rad^2, mean of the products of neighbours
         ("swing", SWING),  # of the drive, between cycles
+        ("ramp", RAMP),  # of the drive, over cycles
         ("jump", "f8"),  # rad, by which resets that nothing explains have moved the yaw
         ("last_jump", "f8"),  # rad, of it by the reset since the last aiding that agreed
         ("odd", "i8"),  # cycles in a row whose force at rest is not that of gravity as the filter has it

@@ -78,6 +78,13 @@ def take_mismatch(state: Any, of_bias: float, of_scale: float) -> None:
 
 
 @kernel
+def forget_scale(state: Any, scale: float, var: float) -> None:
+    """What was learnt of the scale since it was ``scale``, with a variance of ``var``, was not the gyroscope's."""
+    state.scale = scale
+    isolate(state.P, S, var)
+
+
+@kernel
 def lose_tilt(state: Any) -> None:
     """Nothing is known of how the tube leans: an old tilt would be explained as a gyroscope's bias."""
     isolate(state.P, TX, UNKNOWN_TILT_VAR)

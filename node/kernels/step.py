@@ -22,11 +22,13 @@ from node.kernels.guard import admits, gate_aiding, guard_reading, judge_cycle
 from node.kernels.intake import take_readings
 from node.kernels.jit import constant, entry, kernel, shared_body
 from node.kernels.layout import CLOCK_SLACK, DEG, Array, Scheme, Status
+from node.kernels.lying import turn_down
 from node.kernels.make_up import follow_joints
 from node.kernels.modes import STATIC_BIAS
 from node.kernels.numbers import angle_of, half, held, ratio, root, stamp_square, time_root
 from node.kernels.priors import set_stamp
 from node.kernels.quantity import LONG_AGO, NONE, factor, rate, rate_variance, seconds
+from node.kernels.ramps import follow_ramp
 from node.kernels.record import (
     A_HOPS,
     A_OFFSET,
@@ -138,6 +140,7 @@ def before_loop(node: Any, settings: Any, moment: Array, saturated: int) -> int:
     """Judge the readings, follow the clock, level coarsely, count; 1 if the survey of this stop has to wait."""
     state = node.filter
     start, end = moment[START], moment[END]
+    turn_down(node)
     guard_reading(node, settings, saturated, end)
     watch_rest(node, settings, end)
     follow_clock(node, settings, moment)
@@ -164,6 +167,7 @@ def after_loop(node: Any, moment: Array, status: int, waits: int) -> None:
     if node.status & FILTER_FAULT:
         start_over(node.filter, node.config)
     follow_swing(node)
+    follow_ramp(node)
     judge_cycle(node, node.status, moment[END])
 
 

@@ -10,7 +10,7 @@ from string_of_one import Sample, Spoil, StringOfOne
 from node.errors import ConfigurationError
 from node.firmware.sensor_limits import SensorLimits
 from node.firmware.settings import TubeSettings, crew_record
-from node.kernels.aiding_watch import find_mismatch, forget
+from node.kernels.aiding_watch import AT_ONCE, find_mismatch, forget
 from node.kernels.events import Fault
 from node.kernels.guard import contradicts
 from node.kernels.layout import DEG, Err, default_config
@@ -262,7 +262,7 @@ class Watched:
         forget(self.watch)
 
     def takes(self, innovation: float, spin: float, now: float, *, rejected: bool = True) -> Fault:
-        find_mismatch(self.watch, self.found, innovation, 1e-4, spin, now, int(rejected), 0)
+        find_mismatch(self.watch, self.found, innovation, 1e-4, spin, now, int(rejected), 0, AT_ONCE)
         return Fault(int(self.found["fault"]))
 
 

@@ -79,6 +79,26 @@ def test_single_wrong_readings_make_a_rest_no_surer_than_it_is() -> None:
     assert not any((run.told & run.resting).any() for run in runs)
 
 
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    ("key", "seeds"),
+    [
+        ("misalignment", (6,)),  # gravity 3 deg off about the axis: no survey, and a step that was none
+        ("jitter", (3, 7, 10, 12)),  # NEES 21 and 48, half of all cycles beyond three sigmas
+        ("asymmetry", tuple(range(1, 13))),  # NEES 1.9 at rest; of three that were worst 4.5
+        ("unwinds", (1, 2, 7)),  # NEES 770, 70 % beyond three sigmas, two steps and a scale that were none
+        ("untold-twist", (1, 5, 6)),  # NEES 12 000, three steps and three scales that were none
+    ],
+)
+def test_seeds_that_a_node_was_wrong_about_are_honest(key: str, seeds: tuple[int, ...]) -> None:
+    (case,) = chosen_cases(key)
+    made = row(case, [run_seed((dict(case.setup), seed)) for seed in seeds])
+    assert max(made["nees_turning"], made["nees_rest"]) <= 1.5
+    assert made["unflagged_percent"] <= 1.0
+    assert made["gyro_step"] == made["gyro_scale"] == made["other_faults"] == 0.0
+    assert made["surveys_percent"] == 100.0
+
+
 def test_a_row_says_what_it_saw() -> None:
     world, run, found = drilled("random-phase")
     (case,) = chosen_cases("random-phase")

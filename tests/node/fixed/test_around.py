@@ -9,7 +9,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from node.firmware.alignment import rotation
-from node.kernels.aiding_watch import find_mismatch, forget
+from node.kernels.aiding_watch import AT_ONCE, find_mismatch, forget
 from node.kernels.alignment import extreme_var, fit_circle, take_extremes, to_tube
 from node.kernels.calibration import COLDEST, HOTTEST, PARAMETERS, calibrate, identity_parameters
 from node.kernels.cluster import WEIGHT_Q, fuse
@@ -135,9 +135,9 @@ def test_mismatches_are_found_alike(aidings: Any, sigma: float) -> None:
     now = 1000.0
     for innovation, spin, elapsed in aidings:
         now += elapsed
-        find_mismatch(watch[0], found[0], innovation, sigma, spin, now, 1, 0)
+        find_mismatch(watch[0], found[0], innovation, sigma, spin, now, 1, 0, AT_ONCE)
         given_whole = whole(innovation, ANGLE_Q), whole(sigma, ANGLE_Q), whole(spin, RATE_Q), whole(now, TIME_Q)
-        find_mismatch(own[0], fixed[0], *(int(x) for x in given_whole), 1, 0)
+        find_mismatch(own[0], fixed[0], *(int(x) for x in given_whole), 1, 0, AT_ONCE)
         shown = turned_back(fixed, MISMATCH)
         assert [shown[0][k] for k in ("fault", "steady", "refuted")] == [
             found[0][k] for k in ("fault", "steady", "refuted")
