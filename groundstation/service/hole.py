@@ -13,7 +13,7 @@ from dataclasses import dataclass
 
 from groundstation.config import GroundConfig
 from groundstation.service.alarms import AlarmList
-from groundstation.service.clusters import Cluster
+from groundstation.service.clusters import Cluster, Clusters, Table
 from groundstation.service.history import SAME_STOP, History
 from groundstation.service.station import SurveyStation
 from groundstation.survey.columns import Deviation, deviations, project
@@ -46,6 +46,7 @@ class Hole:
         self._config = config
         self._shared = shared
         self._design = config.design
+        self._surveys = Table()
         self._stations: list[SurveyStation] = []
         self._moved: list[Moved] = []
         self._alarms = AlarmList()
@@ -161,7 +162,7 @@ class Hole:
                 return station
             if station.md > md:
                 break
-        station = SurveyStation(md)
+        station = SurveyStation(md, Clusters(self._surveys))
         insort(self._stations, station, key=lambda known: known.md)
         return station
 

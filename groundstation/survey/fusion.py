@@ -74,6 +74,7 @@ class GrowingBayes:
     def __init__(self) -> None:
         self._fusion = StationFusion()
         self._begin = self._end = 0
+        self._known: Direction | None = None  # what they came to
 
     def of(self, begin: int, end: int, readings: Callable[[int, int], Iterable[Direction]]) -> Direction:
         """The same as ``bayes`` of the readings from ``begin`` to before ``end``, bit for bit.
@@ -81,16 +82,18 @@ class GrowingBayes:
         ``readings(begin, end)`` gives those of such a range.
         """
         if begin != self._begin or end < self._end or self._end < begin:
-            self._fusion, self._begin, self._end = StationFusion(), begin, begin
-        for reading in readings(self._end, end):
-            self._fusion.add_reading(reading)
+            self._fusion, self._begin, self._end, self._known = StationFusion(), begin, begin, None
+        if self._known is None or self._end != end:
+            for reading in readings(self._end, end):
+                self._fusion.add_reading(reading)
+            self._known = self._fusion.fused()
         self._end = end
-        return self._fusion.fused()
+        return self._known
 
     def forget(self, place: int) -> None:
         """The reading at a place, and those behind it, are others than before."""
         if place < self._end:
-            self._fusion, self._end = StationFusion(), self._begin
+            self._fusion, self._end, self._known = StationFusion(), self._begin, None
 
 
 def vertical(lean: Array, sense: float) -> float:
