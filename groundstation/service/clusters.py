@@ -8,16 +8,16 @@ from __future__ import annotations
 
 import math
 from array import array
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from typing import Any, Final, overload
 
 import numpy as np
 import numpy.typing as npt
 
-from groundstation.survey.fusion import Departure
+from groundstation.survey.fusion import Departure, Stack
 from groundstation.survey.resolve import Direction, Quality
-from groundstation.survey.shared import CAUSES, Places, Reading
+from groundstation.survey.shared import CAUSES, Places, Reading, put_columns
 from groundstation.survey.trust import UNKNOWN_YAW_VAR, Trust
 from telemetry.messages import NodeFlag, SurveyMeasurement
 
@@ -132,12 +132,24 @@ class Table:
         self.places.append(d.places)
         return row
 
+    def column(self, name: str) -> npt.NDArray[Any]:
+        """One number of every survey, (n,) or (n, ...): a look at the table."""
+        return self.rows[name][: len(self)]
+
     def reading(self, number: int) -> Reading:
         """Direction of the survey in a row."""
         row = self.rows[number]
         bare = Direction(row["lean"].copy(), float(row["down"]), row["cov"].copy(), NOTHING)
         causes, information = row["causes"].copy(), row["information"].copy()
         return Reading(bare, causes, self.places[number], int(row["width"]), information)
+
+    def stack(self, numbers: Sequence[int]) -> Stack:
+        """Directions of the surveys in several rows, side by side."""
+        rows, places = self.rows[numbers], [self.places[number] for number in numbers]
+        shared = np.zeros((len(numbers), 2, int(rows["width"].max())))
+        for own, row, at in zip(shared, rows["causes"], places, strict=True):
+            put_columns(own, row, at)
+        return Stack(rows["lean"], rows["down"], rows["cov"], rows["information"], shared)
 
     def cluster(self, number: int) -> Cluster:
         """The survey in a row."""
@@ -189,6 +201,10 @@ class Clusters:
     def column(self, name: str) -> npt.NDArray[Any]:
         """One number of every cluster, (n,) or (n, ...)."""
         return np.asarray(self._table.rows[name][np.array(self._rows)])
+
+    def row(self, place: int) -> int:
+        """Row of the table that holds the cluster at a place."""
+        return self._rows[place]
 
     def place_of(self, row: int) -> int:
         """Place of a row of the table."""
