@@ -1,4 +1,4 @@
-"""The surveys of a station as rows of one table. No I/O.
+"""The surveys of a hole as rows of one table, and those of a station. No I/O.
 
 A ground station keeps every survey of a hole, ten thousand of them after a day. As objects each would take two
 kilobytes; as a row it takes a sixth of that, and is an object again where somebody looks at it.
@@ -6,22 +6,25 @@ kilobytes; as a row it takes a sixth of that, and is an object again where someb
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+import math
+from array import array
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from typing import Any, Final, overload
 
 import numpy as np
 import numpy.typing as npt
 
-from groundstation.survey.fusion import Departure
+from groundstation.survey.fusion import Departure, Stack
 from groundstation.survey.resolve import Direction, Quality
-from groundstation.survey.shared import CAUSES, Places, Reading
+from groundstation.survey.shared import CAUSES, Places, Reading, put_columns
 from groundstation.survey.trust import UNKNOWN_YAW_VAR, Trust
 from telemetry.messages import NodeFlag, SurveyMeasurement
 
 Array = npt.NDArray[np.float64]
 AXES = 3
-GROWTH = 8  # share of its rows by which a table grows; most stations know one survey, some a hundred
+FEWEST = 64  # rows of a table
+GROWTH = 8  # share of its rows by which a table grows
 ROW: Final = np.dtype(
     [
         *((name, np.int64) for name in ("sequence", "hops", "samples", "flags", "number")),
@@ -91,16 +94,91 @@ def force_var(measurement: SurveyMeasurement) -> float:
     return first / sum(first / variance for variance in variances) if min(variances) > 0.0 else 0.0
 
 
-class Clusters:
-    """Clusters in the order of time, and of each how far it departed from those before it, once that is known."""
+class Table:
+    """The surveys of a hole in the order of their coming, whatever station they belong to.
+
+    A table of each station would grow by a row or two at a time, and what those left behind them on the heap was as
+    much as the surveys themselves.
+    """
 
     def __init__(self) -> None:
-        self._rows = np.empty(1, ROW)
-        self._forces: list[bytes] = []
-        self._places: list[Places] = []
+        self.rows = np.empty(FEWEST, ROW)
+        self.forces: list[bytes] = []
+        self.places: list[Places] = []
 
     def __len__(self) -> int:
-        return len(self._forces)
+        return len(self.forces)
+
+    def append_cluster(self, cluster: Cluster) -> int:
+        """Add a survey from which no departure is known yet; returns its row.
+
+        Raises
+        ------
+        numpy.linalg.LinAlgError
+            When it cannot be weighed; it was not added.
+        """
+        c, d = cluster, cluster.direction
+        information = d.information
+        row, known = len(self), self.rows
+        if row == len(known):
+            self.rows = np.empty(row + row // GROWTH, ROW)
+            self.rows[:row] = known
+        self.rows[row] = (
+            c.sequence, c.hops, c.samples, c.flags, c.number, c.tube, d.width, c.trust, c.quality, c.at, c.md, c.yaw,
+            c.yaw_var, c.systematic_var, c.force_var, c.settle_time, d.lean, d.down, d.cov, information, d.causes,
+            0.0, np.nan,
+        )  # fmt: skip
+        self.forces.append(np.array(cluster.forces).tobytes())
+        self.places.append(d.places)
+        return row
+
+    def column(self, name: str) -> npt.NDArray[Any]:
+        """One number of every survey, (n,) or (n, ...): a look at the table."""
+        return self.rows[name][: len(self)]
+
+    def reading(self, number: int) -> Reading:
+        """Direction of the survey in a row."""
+        row = self.rows[number]
+        bare = Direction(row["lean"].copy(), float(row["down"]), row["cov"].copy(), NOTHING)
+        causes, information = row["causes"].copy(), row["information"].copy()
+        return Reading(bare, causes, self.places[number], int(row["width"]), information)
+
+    def stack(self, numbers: Sequence[int]) -> Stack:
+        """Directions of the surveys in several rows, side by side."""
+        rows, places = self.rows[numbers], [self.places[number] for number in numbers]
+        shared = np.zeros((len(numbers), 2, int(rows["width"].max())))
+        for own, row, at in zip(shared, rows["causes"], places, strict=True):
+            put_columns(own, row, at)
+        return Stack(rows["lean"], rows["down"], rows["cov"], rows["information"], shared)
+
+    def cluster(self, number: int) -> Cluster:
+        """The survey in a row."""
+        row = self.rows[number]
+        forces = np.frombuffer(self.forces[number]).reshape(-1, AXES).tolist()
+        return Cluster(
+            **{name: row[name].item() for name in PLAIN},
+            forces=tuple(tuple(force) for force in forces),
+            flags=NodeFlag(int(row["flags"])),
+            quality=Quality(int(row["quality"])),
+            trust=Trust(int(row["trust"])),
+            direction=self.reading(number),
+        )
+
+
+class Clusters:
+    """Clusters of a station in the order of time, and of each how far it departed from those before it, once known.
+
+    Parameters
+    ----------
+    table : that holds them
+    """
+
+    def __init__(self, table: Table | None = None) -> None:
+        self._table = Table() if table is None else table
+        self._rows = array("I")  # of the table, in the order of time
+
+    def __len__(self) -> int:
+        return len(self._rows)
 
     def __iter__(self) -> Iterator[Cluster]:
         return (self[place] for place in range(len(self)))
@@ -114,28 +192,23 @@ class Clusters:
             return [self[one] for one in range(*place.indices(len(self)))]
         if not -len(self) <= place < len(self):
             raise IndexError(f"cluster {place}: expected one of {len(self)}")
-        place %= len(self)
-        row = self._rows[place]
-        forces = np.frombuffer(self._forces[place]).reshape(-1, AXES).tolist()
-        return Cluster(
-            **{name: row[name].item() for name in PLAIN},
-            forces=tuple(tuple(force) for force in forces),
-            flags=NodeFlag(int(row["flags"])),
-            quality=Quality(int(row["quality"])),
-            trust=Trust(int(row["trust"])),
-            direction=self.reading(place),
-        )
+        return self._table.cluster(self._rows[place])
 
     def reading(self, place: int) -> Reading:
         """Direction of the cluster at a place."""
-        row = self._rows[place]
-        bare = Direction(row["lean"].copy(), float(row["down"]), row["cov"].copy(), NOTHING)
-        causes, information = row["causes"].copy(), row["information"].copy()
-        return Reading(bare, causes, self._places[place], int(row["width"]), information)
+        return self._table.reading(self._rows[place])
 
     def column(self, name: str) -> npt.NDArray[Any]:
-        """One number of every cluster, (n,) or (n, ...): a look at the table, which the next insertion may end."""
-        return self._rows[name][: len(self)]
+        """One number of every cluster, (n,) or (n, ...)."""
+        return np.asarray(self._table.rows[name][np.array(self._rows)])
+
+    def row(self, place: int) -> int:
+        """Row of the table that holds the cluster at a place."""
+        return self._rows[place]
+
+    def place_of(self, row: int) -> int:
+        """Place of a row of the table."""
+        return self._rows.index(row)
 
     def insert(self, cluster: Cluster) -> int:
         """Insert a cluster in the order of time; returns its place.
@@ -145,42 +218,32 @@ class Clusters:
         numpy.linalg.LinAlgError
             When it cannot be weighed; it was not inserted.
         """
-        direction = cluster.direction
-        information = direction.information
-        place, count, known = self._place_of(cluster.order), len(self), self._rows
-        if count == len(self._rows):
-            self._rows = np.empty(count + 1 + count // GROWTH, ROW)
-            self._rows[:count] = known
-        self._rows[place + 1 : count + 1] = self._rows[place:count]
-        c, d = cluster, direction
-        self._rows[place] = (
-            c.sequence, c.hops, c.samples, c.flags, c.number, c.tube, d.width, c.trust, c.quality, c.at, c.md, c.yaw,
-            c.yaw_var, c.systematic_var, c.force_var, c.settle_time, d.lean, d.down, d.cov, information, d.causes,
-            0.0, np.nan,
-        )  # fmt: skip
-        self._forces.insert(place, np.array(cluster.forces).tobytes())
-        self._places.insert(place, direction.places)
+        row = self._table.append_cluster(cluster)
+        place = self._place_of(cluster.order)
+        self._rows.insert(place, row)
         self.forget_departures(place)
         return place
 
     def departure(self, place: int) -> Departure | None:
         """How far a cluster departed from those before it; None where nobody has worked it out."""
-        size = float(self._rows["departure"][place])
-        return None if np.isnan(size) else (self._rows["departed"][place].copy(), size)
+        row = self._table.rows[self._rows[place]]
+        size = float(row["departure"])
+        return None if math.isnan(size) else (row["departed"].copy(), size)
 
     def keep_departure(self, place: int, departure: Departure) -> None:
         """Keep how far a cluster departed from those before it."""
-        self._rows["departed"][place], self._rows["departure"][place] = departure
+        row = self._table.rows[self._rows[place]]
+        row["departed"], row["departure"] = departure
 
     def forget_departures(self, place: int) -> None:
         """Forget those of the clusters from a place on."""
-        self._rows["departure"][place : len(self)] = np.nan
+        if place < len(self) - 1:
+            self._table.rows["departure"][np.array(self._rows[place:])] = np.nan
 
     def _place_of(self, order: tuple[float, int]) -> int:
         """Place behind all clusters that are not later."""
-        at, tube = self._rows["at"], self._rows["tube"]
-        place = len(self)
-        while place and (at[place - 1], tube[place - 1]) > order:
+        rows, place = self._table.rows, len(self)
+        while place and (rows["at"][self._rows[place - 1]], rows["tube"][self._rows[place - 1]]) > order:
             place -= 1
         return place
 

@@ -9,6 +9,7 @@ contradict each other neither is believed.
 from __future__ import annotations
 
 import math
+from array import array
 from bisect import bisect_right, insort
 from collections import Counter, deque
 from dataclasses import dataclass, field, replace
@@ -27,12 +28,15 @@ RETURNED = 0.1  # m from the last reading before a jump, within which the depth 
 
 @dataclass(slots=True)
 class Track:
-    """Readings of one epoch in the order of time; ``run[k]`` says that all between k - 1 and k were equal and close."""
+    """Readings of one epoch in the order of time; ``run[k]`` says that all between k - 1 and k were equal and close.
+
+    They are numbers side by side: as objects each would take four times the room, and two come in a second of drilling.
+    """
 
     gap: float
-    at: list[float] = field(default_factory=list)
-    md: list[float] = field(default_factory=list)
-    run: list[bool] = field(default_factory=list)
+    at: array[float] = field(default_factory=lambda: array("d"))
+    md: array[float] = field(default_factory=lambda: array("d"))
+    run: array[int] = field(default_factory=lambda: array("b"))
 
     def append_reading(self, at: float, md: float) -> bool:
         """Add a reading, later than all; True when the bit has come to rest at a new depth."""

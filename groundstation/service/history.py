@@ -18,6 +18,7 @@ Array = npt.NDArray[np.float64]
 Few = npt.NDArray[np.float32]
 COVARIANCE = (3, 4, 4, 5)  # places of a covariance's entries in a row
 KEPT = 512  # moments; of more every second of the older half goes
+ROOM = 8  # part of its length that a table of stations has left for those below
 SAME_STOP = 15.0  # s, within which two surveys were taken at one stop
 
 
@@ -60,6 +61,7 @@ class History:
     def __init__(self) -> None:
         self.moments: list[Moment] = []
         self._newest = (0, -math.inf)  # epoch, and s of rig time in it
+        self._where = np.empty((0, 2))  # of the newest moment, with room for the stations below
         self.count = 0
 
     def begins_stop(self, epoch: int, at: float) -> bool:
@@ -72,14 +74,24 @@ class History:
     def add(self, rows: Sequence[Deviation], projection: Deviation | None) -> None:
         """Keep what is known at the end of a stop."""
         self.count += 1
-        where = np.array([(d.md, d.limit) for d in rows])
-        if self.moments and np.array_equal(self.moments[-1].where, where):
-            where = self.moments[-1].where
+        where = self._kept_once(np.array([(d.md, d.limit) for d in rows]))
         found = np.array([(d.along, *d.offset, d.cov[0, 0], d.cov[0, 1], d.cov[1, 1]) for d in rows], np.float32)
         self.moments.append(Moment(self.count, self._newest[1], where, found, projection))
         if len(self.moments) > KEPT:
             half = KEPT // 2
             self.moments = self.moments[:half:2] + self.moments[half:]
+
+    def _kept_once(self, where: Array) -> Array:
+        """The same depths and limits, where the newest moment has them or those above them: a look at its own."""
+        known = self.moments[-1].where if self.moments else where[:0]
+        if len(known) <= len(where) and np.array_equal(known, where[: len(known)]):
+            if len(where) > len(self._where):
+                self._where = np.empty((len(where) + len(where) // ROOM, 2))
+                self._where[: len(known)] = known
+            self._where[len(known) : len(where)] = where[len(known) :]
+        else:
+            self._where = where
+        return self._where[: len(where)]
 
     def on_survey(self, epoch: int, at: float) -> None:
         """Follow the time of the surveys."""

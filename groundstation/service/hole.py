@@ -11,13 +11,15 @@ import math
 from bisect import bisect_left, insort
 from dataclasses import dataclass
 
+import numpy as np
+
 from groundstation.config import GroundConfig
 from groundstation.service.alarms import AlarmList
-from groundstation.service.clusters import Cluster
+from groundstation.service.clusters import Cluster, Clusters, Table
 from groundstation.service.history import SAME_STOP, History
 from groundstation.service.station import SurveyStation
 from groundstation.survey.columns import Deviation, deviations, project
-from groundstation.survey.fusion import Evidence, judge_departure
+from groundstation.survey.fusion import Evidence, Weighting, departures_from, judge_departure
 from groundstation.survey.resolve import Direction
 from groundstation.survey.shared import SharedErrors
 from groundstation.survey.trajectory import Point, Trajectory
@@ -46,6 +48,9 @@ class Hole:
         self._config = config
         self._shared = shared
         self._design = config.design
+        self._surveys = Table()
+        self._station_of: list[SurveyStation] = []  # of each of its rows
+        self._surveyed: dict[float, SurveyStation] = {}  # since the last time, by depth
         self._stations: list[SurveyStation] = []
         self._moved: list[Moved] = []
         self._alarms = AlarmList()
@@ -73,7 +78,10 @@ class Hole:
             self.settle()
             self._history.add(self._deviations, self._projection)
         self._history.on_survey(epoch, cluster.at)
-        self._station_at(cluster.md).add_cluster(cluster)
+        station = self._station_at(cluster.md)
+        station.add_cluster(cluster)
+        self._station_of.append(station)
+        self._surveyed[station.md] = station
         self._unsettled_since = min(self._unsettled_since, cluster.at)
         self._newest_at = max(self._newest_at, cluster.at)
 
@@ -128,7 +136,15 @@ class Hole:
         since, self._unsettled_since = self._unsettled_since, math.inf
         if since < math.inf:
             self._judge_movement(since)
+            self._fuse_surveyed()
             self._work_out()
+
+    def _fuse_surveyed(self) -> None:
+        """Fuse together what stations have one more cluster of since the last time."""
+        surveyed, self._surveyed = self._surveyed, {}
+        if self._config.weighting is Weighting.BAYES and (grown := [s for s in surveyed.values() if s.lacks_newest]):
+            newest = self._surveys.stack([station.clusters.row(station.count - 1) for station in grown])
+            SurveyStation.add_newest(grown, newest)
 
     def _work_out(self) -> None:
         self._draw([(one.md, one.fused(self._config.weighting)) for one in self._stations if one.md > 0.0])
@@ -161,7 +177,7 @@ class Hole:
                 return station
             if station.md > md:
                 break
-        station = SurveyStation(md)
+        station = SurveyStation(md, Clusters(self._surveys))
         insort(self._stations, station, key=lambda known: known.md)
         return station
 
@@ -197,14 +213,27 @@ class Hole:
 
     def _clusters_after(self, time: float) -> list[tuple[float, int, int]]:
         """Clusters read later than a rig time (s) as (time, station, place), in their order."""
-        found: list[tuple[float, int, int]] = []
-        for number, station in enumerate(self._stations):
-            found += [(at, number, place) for at, place in station.times_after(time)]
+        found = []
+        for row in np.flatnonzero(self._surveys.column("at") > time).tolist():
+            station = self._station_of[row]
+            number = bisect_left(self._stations, station.md, key=lambda known: known.md)
+            found.append((float(self._surveys.rows["at"][row]), number, station.clusters.place_of(row)))
         return sorted(found)
+
+    def _find_departures(self, stop: list[tuple[float, int, int]]) -> None:
+        """Work out together how far clusters departed from what those before them are known to have come to."""
+        around = [(self._stations[number], place) for _, number, place in stop]
+        found = [(one, place, earlier) for one, place in around if (earlier := one.known_before(place)) is not None]
+        if found:
+            newest = self._surveys.stack([station.clusters.row(place) for station, place, _ in found])
+            departed = departures_from([earlier for _, _, earlier in found], newest)
+            for (station, place, _), departure in zip(found, departed, strict=True):
+                station.clusters.keep_departure(place, departure)
 
     def _judge_stop(self, stop: list[tuple[float, int, int]]) -> None:
         """Neighbours are the nearest stations above and below that were read at the same stop."""
         by_depth = sorted(stop, key=lambda cluster: cluster[1:])
+        self._find_departures(by_depth)
         seen = [self._stations[number].departure(place) for _, number, place in by_depth]
         for k, (at, number, place) in enumerate(by_depth):
             own = seen[k]

@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
+import contextlib
 import math
 from collections import Counter, deque
-from collections.abc import Callable, Hashable
+from collections.abc import Callable, Hashable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-import numpy.typing as npt
 
 from groundstation.config import GroundConfig
 from groundstation.errors import SurveyError
@@ -20,17 +20,17 @@ from groundstation.service.live_wall import LiveWall
 from groundstation.service.numbers import Numbers
 from groundstation.service.orders import OrderBook
 from groundstation.service.recalibration.procedure import FieldProcedure
+from groundstation.service.resolving import ResolvedSurvey, resolve_survey, resolve_surveys
 from groundstation.service.rig_alarms import Health, RigAlarms
 from groundstation.service.station import SurveyStation
 from groundstation.service.stops import Stops
 from groundstation.service.tally import Tally
 from groundstation.survey.joint_angles import JointAngles
-from groundstation.survey.resolve import Direction, check, combine_imus, resolve
-from groundstation.survey.shared import Reading, SharedErrors
+from groundstation.survey.resolve import Direction, Resolved, check
+from groundstation.survey.shared import Reading, SharedErrors, weigh_together
 from groundstation.survey.trust import Trust, trust_of, with_unknown_yaw
 from telemetry.messages import EPOCH_UNKNOWN, Event, NodeFlag, NodeState, StaticRecord, SurveyMeasurement
 
-Array = npt.NDArray[np.float64]
 EVENTS_SHOWN = 10_000
 STATIC_RECORDS_SHOWN = 1_000
 ACCELEROMETER_NOISE_DEG = 0.02  # one sample, for the check of motion
@@ -46,6 +46,14 @@ class Waiting:
 
     measurement: SurveyMeasurement
     below: float | None
+
+
+@dataclass(frozen=True, slots=True)
+class Prepared:
+    """A survey that is about to be fused: what it comes to by itself, and with what it shares with others."""
+
+    survey: ResolvedSurvey
+    direction: Reading
 
 
 class RigModel:
@@ -202,8 +210,17 @@ class RigModel:
         knows = math.isfinite(self.rig_now) and depth_is_heard and bool(heard)
         return max(self.rig_alarms.health, Health.GOOD if knows else Health.UNKNOWN)
 
-    def on_survey(self, measurement: SurveyMeasurement, md: float | None, below: float | None = None) -> str:
-        """Resolve and fuse a stored measurement; returns the kind of alarm where it is not used as it is, or ''."""
+    def on_survey(
+        self,
+        measurement: SurveyMeasurement,
+        md: float | None,
+        below: float | None = None,
+        prepared: Prepared | None = None,
+    ) -> str:
+        """Resolve and fuse a stored measurement; returns the kind of alarm where it is not used as it is, or ''.
+
+        ``prepared`` is what it comes to, where ``prepare`` has worked that out.
+        """
         trust = trust_of(measurement.flags)
         if trust is Trust.UNDATED:
             self.undated += 1
@@ -215,21 +232,34 @@ class RigModel:
             self.waiting.append(Waiting(measurement, below))
             return ""  # most wait for a moment; the watch tells of those that wait longer
         try:
-            self._fuse(measurement, md, trust)
+            self._fuse(measurement, md, trust, prepared or self._prepare(measurement, resolve_survey(measurement)))
         except (SurveyError, np.linalg.LinAlgError):
             self.refused += 1
             return "survey_refused"
         return "" if trust is Trust.FULL else "survey_untrusted"
 
-    def _fuse(self, measurement: SurveyMeasurement, md: float, trust: Trust) -> None:
-        forces = np.array([imu.force for imu in measurement.imus])
-        covs = np.array([imu.force_cov for imu in measurement.imus])
-        combined = combine_imus(forces, covs)
-        direction = self._direction(measurement, trust, *combined)
+    def prepare(self, measurements: Sequence[SurveyMeasurement]) -> list[Prepared | None]:
+        """What many measurements come to, worked out together; to be fused in this order, and the next after them.
+
+        None for each that is not fused, or is to be looked at by itself.
+        """
+        placed = [one for one in measurements if trust_of(one.flags) not in (Trust.UNDATED, Trust.SET_ASIDE)]
+        resolved = resolve_surveys(placed)
+        if any(one is None for one in resolved):
+            return [None] * len(measurements)
+        found = {id(one): self._prepare(one, own) for one, own in zip(placed, resolved, strict=True) if own is not None}
+        with contextlib.suppress(np.linalg.LinAlgError):  # of one, which is refused when its turn has come
+            weigh_together([one.direction for one in found.values()])
+        return [found.get(id(one)) for one in measurements]
+
+    def _prepare(self, measurement: SurveyMeasurement, resolved: ResolvedSurvey) -> Prepared:
+        return Prepared(resolved, self._direction(measurement, trust_of(measurement.flags), resolved.resolved))
+
+    def _fuse(self, measurement: SurveyMeasurement, md: float, trust: Trust, prepared: Prepared) -> None:
+        found, direction = prepared.survey, prepared.direction
         noise = math.radians(ACCELEROMETER_NOISE_DEG) * self.config.gravity
-        quality = check(
-            forces, covs, combined, self.config.gravity, measurement.samples, measurement.settle_time, noise
-        )
+        samples, settle_time = measurement.samples, measurement.settle_time
+        quality = check(found.forces, found.covs, found.combined, self.config.gravity, samples, settle_time, noise)
         epoch = measurement.epoch or self.epoch
         number = self.seen["measurements"] + 1
         self.hole.add_cluster(cluster_of(measurement, md, direction, quality, trust, number), epoch)
@@ -267,9 +297,8 @@ class RigModel:
     def _hops_if_unknown(self, measurement: SurveyMeasurement) -> int:
         return measurement.hops if measurement.tube not in self.tally.tubes else -1
 
-    def _direction(self, m: SurveyMeasurement, trust: Trust, force: Array, force_cov: Array) -> Reading:
+    def _direction(self, m: SurveyMeasurement, trust: Trust, resolved: Resolved) -> Reading:
         """Direction of a measurement with what it shares with others."""
-        resolved = resolve(force, force_cov, m.yaw, m.yaw_var)
         if trust is Trust.UNKNOWN_YAW:
             resolved = with_unknown_yaw(resolved)
         return self.shared.reading(

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import itertools
 import math
 import secrets
 import time
@@ -16,7 +17,7 @@ from groundstation.errors import SelectorError, StoreError
 from groundstation.service.conditions import conditions_of
 from groundstation.service.crew_alarms import Times
 from groundstation.service.intake import DEPTH, MESSAGE, ORDER, TIMER, Tape
-from groundstation.service.model import RigModel
+from groundstation.service.model import Prepared, RigModel
 from groundstation.service.operator import BlockUpload, Operator, Outgoing
 from groundstation.service.orders import Order
 from groundstation.service.stops import belongs
@@ -55,6 +56,7 @@ STARTS = 1 << 31  # numbers of a start by lot
 HEARTBEAT = 1.0  # s, own clock, between two verdicts
 BEATS = ("verdict", "changes")  # paths that are published without end
 CHANGED_BY_SURVEY = ("measurements", "stations", "trajectory", "uncertainty", "column")
+RESTORED_TOGETHER = 256  # messages
 EARLY = 64  # readings of the depth that may come before rig time is known
 GROUND_STATION = "ground station"  # who orders that something be sent again
 
@@ -138,8 +140,7 @@ class GroundProcess(Process):
         self.operator.changed = self._publish
         self.operator.ended = self.endpoint.withdraw
         self.operator.accepted = self._note_order
-        for stored in self.store.messages():
-            self._apply_stored(stored.message, stored.md, stored.below)
+        self._restore_messages()
         self.model.crew_alarms.restore(self.store.alarms(), conditions_of(self.model))
 
     def on_frame(self, side: Side, frame: bytes, now: float, margin: float = math.inf) -> None:
@@ -449,7 +450,22 @@ class GroundProcess(Process):
         self._keep_tally()
         return self.store.add_messages(arrived)
 
-    def _apply_stored(self, message: Kept, md: float | None, below: float | None) -> list[str]:
+    def _restore_messages(self) -> None:
+        """Go on with everything that was stored, some hundred messages at a time."""
+        messages = self.store.messages()
+        while some := list(itertools.islice(messages, RESTORED_TOGETHER)):
+            placed = {
+                place: one.message
+                for place, one in enumerate(some)
+                if isinstance(one.message, SurveyMeasurement) and one.md is not None
+            }
+            prepared = dict(zip(placed, self.model.prepare(list(placed.values())), strict=True))
+            for place, one in enumerate(some):
+                self._apply_stored(one.message, one.md, one.below, prepared.get(place))
+
+    def _apply_stored(
+        self, message: Kept, md: float | None, below: float | None, prepared: Prepared | None = None
+    ) -> list[str]:
         """Add a stored message to the model; returns the paths that changed."""
         self.model.numbers.add_number(message.tube, message.sequence)
         if isinstance(message, Event):
@@ -463,7 +479,7 @@ class GroundProcess(Process):
         self.model.stops.on_survey(epoch, message.station_at, message.tube)
         if md is not None:
             self._on_surveyed(epoch, message.station_at)
-        self.watch.on_survey(message, self.model.on_survey(message, md, below))
+        self.watch.on_survey(message, self.model.on_survey(message, md, below, prepared))
         return [*CHANGED_BY_SURVEY, *self._wall_paths]
 
     def _publish(self, changed: list[str]) -> None:

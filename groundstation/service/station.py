@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
 
 from groundstation.service.clusters import Cluster, Clusters
-from groundstation.survey.fusion import Departure, GrowingBayes, Weighting, departure_from, weighted
+from groundstation.survey.fusion import Departure, GrowingBayes, Stack, Weighting, departure_from, weighted
 from groundstation.survey.resolve import Direction
 from groundstation.survey.shared import Reading
 from groundstation.survey.trust import UNKNOWN_YAW_VAR, Trust
@@ -59,13 +59,6 @@ class SurveyStation:
         self._all.forget(place)
         if self._trusted is not None:
             self._trusted.forget(place)
-
-    def times_after(self, time: float) -> Iterator[tuple[float, int]]:
-        """Time (s) and place of each cluster that was read later than a time (s), in their order."""
-        at = self.clusters.column("at")
-        if len(at) and at[-1] > time:
-            first = int(np.searchsorted(at, time, "right"))
-            yield from zip(at[first:].tolist(), range(first, len(at)), strict=True)
 
     @property
     def counting(self) -> list[int]:
@@ -117,6 +110,22 @@ class SurveyStation:
         if self._trusted is None:
             self._trusted = GrowingBayes()
         return self._trusted.of(self.first, self.count, self._trusted_readings)
+
+    @property
+    def lacks_newest(self) -> bool:
+        """Whether the direction is that of all clusters that count, of which the newest alone is not in it yet."""
+        return not self.untrusted and self._all.lacks_one(self.first, self.count)
+
+    @staticmethod
+    def add_newest(stations: Sequence[SurveyStation], readings: Stack) -> None:
+        """Add to each of several stations its newest cluster, the one that it lacks."""
+        GrowingBayes.grow_each([one._all for one in stations], readings)
+
+    def known_before(self, place: int) -> Direction | None:
+        """What the clusters before one came to, where it has not departed from them yet and that is known."""
+        begin = self.first_before(place)
+        is_open = begin < place and self.clusters.departure(place) is None
+        return self._all.known(begin, place) if is_open else None
 
     def _sum_of_all(self, end: int) -> Direction:
         """Direction from the clusters before a place since the hole moved, whether they are believed or not."""

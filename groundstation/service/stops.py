@@ -8,8 +8,11 @@ above the collar does not.
 from __future__ import annotations
 
 import math
+from array import array
 from collections.abc import Iterator
 from dataclasses import dataclass, field
+
+import numpy as np
 
 from groundstation.service.tally import Tally
 from telemetry.messages import Stand
@@ -18,7 +21,7 @@ SHORTEST = 30.0  # s that a stand must last for its survey to be owed
 AROUND = 2.0  # s by which the times of a survey and of a stand may differ
 IN_THE_HOLE = 0.01  # m below the collar from which a node owes a survey
 STOPS_KEPT = 1000
-SURVEYS_KEPT = 100_000
+SURVEYS_KEPT = 200_000
 
 
 @dataclass(slots=True)
@@ -42,9 +45,15 @@ class Stop:
         Where it went on in a later epoch, the earlier one had no other end: what is of it and later is of the stop,
         also where nobody heard a depth till then.
         """
+        return any(epoch == own and begin <= at <= end for own, begin, end in self.spans)
+
+    @property
+    def spans(self) -> Iterator[tuple[int, float, float]]:
+        """Epoch and times (s) between which ``has`` holds."""
         *ended, last = self.stand, *self.later
-        went_on = any(stand.epoch == epoch and stand.begun_at - AROUND <= at for stand in ended)
-        return went_on or belongs(last, epoch, at)
+        for stand in ended:
+            yield stand.epoch, stand.begun_at - AROUND, math.inf
+        yield last.epoch, last.begun_at - AROUND, last.ended_at + AROUND
 
     def covers(self, stand: Stand) -> bool:
         """Whether a stand is a part of the stop."""
@@ -56,6 +65,33 @@ class Stop:
         if newest.epoch != epoch:
             return math.inf
         return self.lasted + rig_now - newest.ended_at
+
+
+class Taken:
+    """Surveys by epoch, time (s) and tube in the order of their coming, the newest half of ``SURVEYS_KEPT`` at least.
+
+    They are numbers side by side, 20 bytes a survey: only stops that are not judged yet ask for them.
+    """
+
+    def __init__(self) -> None:
+        self._epochs, self._at, self._tubes = array("q"), array("d"), array("I")
+
+    def add_survey(self, epoch: int, at: float, tube: int) -> None:
+        """A survey has come."""
+        self._epochs.append(epoch)
+        self._at.append(at)
+        self._tubes.append(tube)
+        if len(self._at) > SURVEYS_KEPT:
+            oldest = slice(SURVEYS_KEPT // 2)
+            del self._epochs[oldest], self._at[oldest], self._tubes[oldest]
+
+    def tubes_of(self, stop: Stop) -> set[int]:
+        """Tubes of which a survey was taken during a stop."""
+        epochs, at, tubes = np.array(self._epochs), np.array(self._at), np.array(self._tubes)
+        found = np.zeros(len(at), bool)
+        for epoch, begin, end in stop.spans:
+            found |= (epochs == epoch) & (begin <= at) & (at <= end)
+        return set(tubes[found].tolist())
 
 
 class Stops:
@@ -71,18 +107,16 @@ class Stops:
         self._tally = tally
         self._due = due
         self._stops: list[Stop] = []
-        self._surveys: dict[tuple[int, float, int], None] = {}  # epoch, time and tube
+        self._taken = Taken()
 
     def __iter__(self) -> Iterator[Stop]:
         return iter(self._stops)
 
     def on_survey(self, epoch: int, at: float, tube: int) -> None:
         """A survey has come, wherever it belongs."""
-        self._surveys[epoch, at, tube] = None
-        if len(self._surveys) > SURVEYS_KEPT:
-            del self._surveys[next(iter(self._surveys))]
+        self._taken.add_survey(epoch, at, tube)
         for stop in self._stops:
-            if tube in stop.missing and stop.has(epoch, at):
+            if stop.missing and tube in stop.missing and stop.has(epoch, at):
                 stop.missing.discard(tube)
 
     def know(self, stand: Stand) -> bool:
@@ -112,8 +146,7 @@ class Stops:
             if stop.judged or stop.lasted < SHORTEST or stop.age(epoch, rig_now) < self._due:
                 continue
             stop.judged = True
-            answered = {tube for e, at, tube in self._surveys if stop.has(e, at)}
-            stop.missing = set(stop.tubes) - answered
+            stop.missing = set(stop.tubes) - self._taken.tubes_of(stop)
 
     def _add_tubes(self, stop: Stop) -> None:
         """A tube that is heard while the bit stands hung there before."""

@@ -18,12 +18,15 @@ import numpy as np
 import numpy.typing as npt
 
 from groundstation.survey.resolve import Direction
-from groundstation.survey.shared import Fused, Packed, added
+from groundstation.survey.shared import Fused, Packed, added, packed_each, stacked
 
 Array = npt.NDArray[np.float64]
 # a departure in the plane is beyond this length as often (4.55 %) as one number is beyond two standard deviations
 DEPARTED = math.sqrt(-2.0 * math.log(math.erfc(math.sqrt(2.0))))
 QUADRATIC_TO = 4.0  # standard deviations up to which the adaptive scheme is quadratic
+
+
+Departure = tuple[Array, float]
 
 
 class Weighting(Enum):
@@ -40,32 +43,71 @@ class Weighting(Enum):
 POWERS = {Weighting.EQUAL: 0, Weighting.LINEAR: 1, Weighting.QUADRATIC: 2, Weighting.CUBIC: 3}
 
 
+@dataclass(frozen=True, slots=True)
+class Stack:
+    """Readings of several stations, one of each, side by side: (n, 2), (n,), (n, 2, 2), (n, 2, 2) and (n, 2, s)."""
+
+    lean: Array
+    down: Array
+    cov: Array
+    information: Array
+    shared: Array
+
+
+def stack_of(readings: Sequence[Direction]) -> Stack:
+    """Readings side by side."""
+    rows = [(one.lean, one.down, one.cov, one.information) for one in readings]
+    lean, down, cov, information = map(np.array, zip(*rows, strict=True))
+    return Stack(lean, down, cov, information, stacked(readings, max(one.width for one in readings)))
+
+
 @dataclass(slots=True)
 class StationFusion:
     """Running recursive Bayes of one station."""
 
     count: int = 0
-    _information: Array = field(default_factory=lambda: np.zeros((2, 2)))
-    _weighted: Array = field(default_factory=lambda: np.zeros(2))
-    _random: Array = field(default_factory=lambda: np.zeros((2, 2)))
+    _sums: Array = field(default_factory=lambda: np.zeros((5, 2)))  # information, weighted lean, random covariance
     _shared: Packed = field(default_factory=lambda: Packed(np.zeros((2, 0))))
     _down: float = 0.0
 
     def add_reading(self, reading: Direction) -> None:
         """Take one more cluster; it weighs by all it does not know, shared errors included."""
-        information = reading.information
-        self._information = self._information + information
-        self._weighted = self._weighted + information @ reading.lean
-        self._random = self._random + information @ reading.cov @ information
-        self._shared = Packed(added(self._shared.columns(), information @ reading.shared))
-        self._down += reading.down
-        self.count += 1
+        self.add_each([self], stack_of([reading]))
 
     def fused(self) -> Direction:
         """Mean, random covariance (2, 2) and shared columns (2, s)."""
-        gain = np.asarray(np.linalg.inv(self._information), np.float64)
-        lean = gain @ self._weighted
-        return Fused(lean, vertical(lean, self._down), gain @ self._random @ gain, gain @ self._shared.columns())
+        return self.fuse_each([self])[0]
+
+    @staticmethod
+    def add_each(fusions: Sequence[StationFusion], readings: Stack) -> None:
+        """Give each of several stations its reading; the same bit for bit as one after the other."""
+        weighed = readings.information @ readings.shared
+        shared = np.zeros((*weighed.shape[:2], max(weighed.shape[2], *(one._shared.width for one in fusions))))
+        for own, one in zip(shared, fusions, strict=True):
+            one._shared.fill(own)
+        shared[:, :, : weighed.shape[2]] += weighed
+        lean = (readings.information @ readings.lean[:, :, None])[:, :, 0]
+        random = readings.information @ readings.cov @ readings.information
+        sums = np.array([one._sums for one in fusions])
+        sums[:, :2] += readings.information
+        sums[:, 2] += lean
+        sums[:, 3:] += random
+        for one, own, packed, down in zip(fusions, sums, packed_each(shared), readings.down.tolist(), strict=True):
+            one._sums, one._shared, one._down = own.copy(), packed, one._down + down
+            one.count += 1
+
+    @staticmethod
+    def fuse_each(fusions: Sequence[StationFusion]) -> list[Direction]:
+        """What each of several stations comes to."""
+        sums = np.array([one._sums for one in fusions])
+        gains = np.linalg.inv(sums[:, :2])
+        leans = (gains @ sums[:, 2, :, None])[:, :, 0]
+        covs = gains @ sums[:, 3:] @ gains
+        shared = np.zeros((len(fusions), 2, max(one._shared.width for one in fusions)))
+        for own, one in zip(shared, fusions, strict=True):
+            one._shared.fill(own)
+        rows = zip(fusions, leans, covs, packed_each(gains @ shared), strict=True)
+        return [Fused(lean.copy(), vertical(lean, one._down), cov.copy(), packed) for one, lean, cov, packed in rows]
 
 
 class GrowingBayes:
@@ -74,6 +116,7 @@ class GrowingBayes:
     def __init__(self) -> None:
         self._fusion = StationFusion()
         self._begin = self._end = 0
+        self._known: Direction | None = None  # what they came to
 
     def of(self, begin: int, end: int, readings: Callable[[int, int], Iterable[Direction]]) -> Direction:
         """The same as ``bayes`` of the readings from ``begin`` to before ``end``, bit for bit.
@@ -81,16 +124,34 @@ class GrowingBayes:
         ``readings(begin, end)`` gives those of such a range.
         """
         if begin != self._begin or end < self._end or self._end < begin:
-            self._fusion, self._begin, self._end = StationFusion(), begin, begin
-        for reading in readings(self._end, end):
-            self._fusion.add_reading(reading)
+            self._fusion, self._begin, self._end, self._known = StationFusion(), begin, begin, None
+        if self._known is None or self._end != end:
+            for reading in readings(self._end, end):
+                self._fusion.add_reading(reading)
+            self._known = self._fusion.fused()
         self._end = end
-        return self._fusion.fused()
+        return self._known
+
+    def known(self, begin: int, end: int) -> Direction | None:
+        """What the readings of a range came to, where that is what was asked for last."""
+        return self._known if (begin, end) == (self._begin, self._end) else None
+
+    def lacks_one(self, begin: int, end: int) -> bool:
+        """Whether of the readings of a range the last one alone is not in the sum yet."""
+        return (begin, end) == (self._begin, self._end + 1)
+
+    @staticmethod
+    def grow_each(growing: Sequence[GrowingBayes], readings: Stack) -> None:
+        """Add to each of several sums the one reading that it lacks."""
+        fusions = [one._fusion for one in growing]
+        StationFusion.add_each(fusions, readings)
+        for one, known in zip(growing, StationFusion.fuse_each(fusions), strict=True):
+            one._end, one._known = one._end + 1, known
 
     def forget(self, place: int) -> None:
         """The reading at a place, and those behind it, are others than before."""
         if place < self._end:
-            self._fusion, self._end = StationFusion(), self._begin
+            self._fusion, self._end, self._known = StationFusion(), self._begin, None
 
 
 def vertical(lean: Array, sense: float) -> float:
@@ -145,13 +206,17 @@ def departure_from(earlier: Direction, newest: Direction) -> tuple[Array, float]
 
     The covariance of the difference knows what the two have in common: an error of the same mount cancels.
     """
-    difference = newest.lean - earlier.lean
-    apart = added(newest.shared, -earlier.shared)
-    cov = newest.cov + earlier.cov + apart @ apart.T
-    return difference, math.sqrt(float(difference @ np.linalg.solve(cov, difference)))
+    return departures_from([earlier], stack_of([newest]))[0]
 
 
-Departure = tuple[Array, float]
+def departures_from(earlier: Sequence[Direction], newest: Stack) -> list[Departure]:
+    """The same of several stations."""
+    differences = newest.lean - np.array([one.lean for one in earlier])
+    apart = -stacked(earlier, max(newest.shared.shape[2], *(one.width for one in earlier)))
+    apart[:, :, : newest.shared.shape[2]] += newest.shared
+    covs = newest.cov + np.array([one.cov for one in earlier]) + apart @ apart.transpose(0, 2, 1)
+    squares = differences[:, None] @ np.linalg.solve(covs, differences[:, :, None])
+    return [(one, math.sqrt(square)) for one, square in zip(differences, squares[:, 0, 0].tolist(), strict=True)]
 
 
 @dataclass(frozen=True, slots=True)

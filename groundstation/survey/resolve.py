@@ -8,6 +8,7 @@ Source: thesis eqs. 1.1-1.3, with the sign of the specific force of a body at re
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 from enum import IntFlag
 
@@ -56,6 +57,15 @@ class Direction:
         return np.asarray(self.cov + shared @ shared.T)
 
     @property
+    def width(self) -> int:
+        """How many shared columns there are."""
+        return int(self.shared.shape[1])
+
+    def fill(self, columns: Array) -> None:
+        """Put the shared columns into zeros (2, s or more)."""
+        columns[:, : self.width] = self.shared
+
+    @property
     def information(self) -> Array:
         """Inverse (2, 2) of ``total_cov``.
 
@@ -89,19 +99,37 @@ def resolve(force: Array, force_cov: Array, yaw: float, yaw_var: float) -> Resol
     SurveyError
         When the force vanishes or is not finite, or nothing is uncertain in some direction of the lean.
     """
-    size = math.sqrt(force.dot(force))
-    if not math.isfinite(size) or size < 1e-3 or not math.isfinite(yaw):
-        raise SurveyError(f"resolve: expected a finite specific force and yaw, got |f| = {size} m/s^2, yaw = {yaw} rad")
+    return resolve_all(force[None], force_cov[None], [yaw], [yaw_var])[0]
+
+
+def resolve_all(forces: Array, covs: Array, yaws: Sequence[float], yaw_vars: Sequence[float]) -> list[Resolved]:
+    """The same of many stops, (n, 3) and (n, 3, 3), bit for bit; raises where one of them cannot be resolved."""
+    sizes = np.sqrt((forces[:, None] @ forces[:, :, None])[:, 0, 0])
+    for size, yaw in zip(sizes.tolist(), yaws, strict=True):
+        if not math.isfinite(size) or size < 1e-3 or not math.isfinite(yaw):
+            raise SurveyError(
+                f"resolve: expected a finite specific force and yaw, got |f| = {size} m/s^2, yaw = {yaw} rad"
+            )
+    turns = np.array([_turn(yaw) for yaw in yaws])
+    units = forces / sizes[:, None]
+    leans = (turns @ units[:, :, None])[:, :, 0]
+    by_force = (turns - leans[:, :, None] * units[:, None]) / sizes[:, None, None]
+    by_yaw = np.stack([-leans[:, 1], leans[:, 0]], axis=1)
+    turned = np.array(yaw_vars)[:, None, None] * (by_yaw[:, :, None] * by_yaw[:, None])
+    found = by_force @ covs @ by_force.transpose(0, 2, 1) + turned
+    if not is_covariance(found):
+        raise SurveyError(f"resolve: expected a positive definite covariance of the lean, got {found.tolist()}")
+    nothing = np.zeros((2, 0))
+    directions = [
+        Direction(lean, -unit[2], cov, nothing) for lean, unit, cov in zip(leans, units.tolist(), found, strict=True)
+    ]
+    return [Resolved(*row) for row in zip(directions, by_force, by_yaw, strict=True)]
+
+
+def _turn(yaw: float) -> list[list[float]]:
+    """From the body to north and east (2, 3)."""
     c, s = math.cos(yaw), math.sin(yaw)
-    turn = np.array([[c, -s, 0.0], [s, c, 0.0]])
-    unit = force / size
-    lean = turn @ unit
-    by_force = (turn - lean[:, None] * unit) / size
-    by_yaw = np.array([-lean[1], lean[0]])
-    cov = by_force @ force_cov @ by_force.T + yaw_var * (by_yaw[:, None] * by_yaw)
-    if not is_covariance(cov):
-        raise SurveyError(f"resolve: expected a positive definite covariance of the lean, got {cov.tolist()}")
-    return Resolved(Direction(lean, float(-unit[2]), cov, np.zeros((2, 0))), by_force, by_yaw)
+    return [[c, -s, 0.0], [s, c, 0.0]]
 
 
 def is_covariance(covs: Array) -> bool:
@@ -158,7 +186,9 @@ def angle_stds(lean: Array, down: float, cov: Array) -> tuple[float, float]:
 
 
 def combine_imus(forces: Array, covs: Array) -> tuple[Array, Array]:
-    """Inverse-variance mean of the IMUs of a cluster: forces (n, 3), covariances (n, 3, 3). Source: thesis eq. 3.42.
+    """Inverse-variance mean of the IMUs of a cluster: forces (..., n, 3), covariances (..., n, 3, 3).
+
+    Source: thesis eq. 3.42.
 
     Raises
     ------
@@ -168,9 +198,9 @@ def combine_imus(forces: Array, covs: Array) -> tuple[Array, Array]:
     if not is_covariance(covs):
         raise SurveyError(f"cluster: expected a positive definite force covariance of each IMU, got {covs.tolist()}")
     information = np.linalg.inv(covs)
-    cov = np.linalg.inv(information.sum(axis=0))
-    mean = cov @ np.einsum("nij,nj->i", information, forces)
-    return mean, cov
+    cov = np.linalg.inv(information.sum(axis=-3))
+    mean = cov @ np.einsum("...nij,...nj->...i", information, forces)[..., None]
+    return mean[..., 0], cov
 
 
 def check(

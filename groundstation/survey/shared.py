@@ -55,10 +55,12 @@ class Reading(Direction):
     def shared(self) -> Array:
         """Columns (2, s), made anew."""
         columns = np.zeros((2, self.width))
-        columns[:, self.places[0]] = self.causes[:, 0]
-        columns[:, self.places[1:-AXES]] = self.causes[:, 1:2]
-        columns[:, self.places[-AXES:]] = self.causes[:, -AXES:]
+        self.fill(columns)
         return columns
+
+    def fill(self, columns: Array) -> None:
+        """Put the columns into zeros (2, s or more)."""
+        put_columns(columns, self.causes, self.places)
 
     @property
     def information(self) -> Array:
@@ -70,22 +72,45 @@ class Reading(Direction):
         return known
 
 
+def put_columns(columns: Array, causes: Array, places: Places) -> None:
+    """Put the columns of a reading into zeros (2, s): mount, every joint alike, and the axes, from (2, 5)."""
+    columns[:, places[0]] = causes[:, 0]
+    columns[:, places[1:-AXES]] = causes[:, 1:2]
+    columns[:, places[-AXES:]] = causes[:, -AXES:]
+
+
 class Packed:
     """Columns (k, s) of which most are zero: a station knows those of the tubes that passed it, of a hundred tubes."""
 
     __slots__ = ("_places", "_values", "_width")
 
-    def __init__(self, columns: Array) -> None:
-        places = np.flatnonzero(columns.any(axis=0))
+    def __init__(self, columns: Array, places: Places | None = None) -> None:
+        """``places`` of those that are not zero, where they are known."""
+        places = np.flatnonzero(columns.any(axis=0)) if places is None else places
         self._places = places.astype(np.uint16 if columns.shape[1] <= MOST_OF_16_BITS else np.intp)
         self._values = columns[:, places]
-        self._width = columns.shape[1]
+        self._width = int(columns.shape[1])
+
+    @property
+    def width(self) -> int:
+        """How many there are."""
+        return self._width
 
     def columns(self) -> Array:
         """All of them (k, s), made anew."""
         columns = np.zeros((len(self._values), self._width))
-        columns[:, self._places] = self._values
+        self.fill(columns)
         return columns
+
+    def fill(self, columns: Array) -> None:
+        """Put them into zeros (k, s or more)."""
+        columns[:, self._places] = self._values
+
+
+def packed_each(columns: Array) -> list[Packed]:
+    """Columns (n, k, s) of several, each packed by itself."""
+    are_some = np.asarray(columns.any(axis=1))
+    return [Packed(own, some.nonzero()[0]) for own, some in zip(columns, are_some, strict=True)]
 
 
 class Fused(Direction):
@@ -94,14 +119,23 @@ class Fused(Direction):
     __slots__ = ("_packed",)
     _packed: Packed
 
-    def __init__(self, lean: Array, down: float, cov: Array, shared: Array) -> None:
-        for name, value in (("lean", lean), ("down", down), ("cov", cov), ("_packed", Packed(shared))):
+    def __init__(self, lean: Array, down: float, cov: Array, packed: Packed) -> None:
+        for name, value in (("lean", lean), ("down", down), ("cov", cov), ("_packed", packed)):
             object.__setattr__(self, name, value)
 
     @property
     def shared(self) -> Array:
         """Columns (2, s), made anew."""
         return self._packed.columns()
+
+    @property
+    def width(self) -> int:
+        """How many columns there are."""
+        return self._packed.width
+
+    def fill(self, columns: Array) -> None:
+        """Put the columns into zeros (2, s or more)."""
+        self._packed.fill(columns)
 
 
 class SharedErrors:
@@ -171,6 +205,30 @@ class SharedErrors:
         names = [tube, *above]
         inner: list[Name] = [("joint", upper, lower) for lower, upper in pairwise(names)]
         return [*inner, ("drive", names[-1])]
+
+
+def stacked(directions: Sequence[Direction], width: int) -> Array:
+    """Columns (n, 2, width) of directions, with zeros for those that one does not know."""
+    columns = np.zeros((len(directions), 2, width))
+    for own, direction in zip(columns, directions, strict=True):
+        direction.fill(own)
+    return columns
+
+
+def weigh_together(readings: Sequence[Reading]) -> None:
+    """Work out the information of many readings at once, bit for bit as each by itself.
+
+    Raises
+    ------
+    numpy.linalg.LinAlgError
+        When one of them has none; then none is known.
+    """
+    if not readings:
+        return
+    shared = stacked(readings, max(one.width for one in readings))
+    covs = np.array([one.cov for one in readings]) + shared @ shared.transpose(0, 2, 1)
+    for one, information in zip(readings, np.linalg.inv(covs), strict=True):
+        object.__setattr__(one, "_information", information)
 
 
 def widened(shared: Array, columns: int) -> Array:

@@ -83,3 +83,21 @@ def test_a_lonely_peak_stays(place: int, count: int) -> None:
 def test_fewer_than_three_points_are_refused() -> None:
     with pytest.raises(ValueError, match="at least 3 points"):
         largest_triangles(np.zeros(5), np.zeros(5), 2)
+
+
+def test_moments_keep_their_depths_whatever_stations_come_later() -> None:
+    """Depths that a moment has in common with the one before are kept once, below them or between them come more."""
+    history, told = History(), []
+    for depths in (
+        [0.0, 2.0],
+        [0.0, 2.0],
+        [0.0, 2.0, 4.0],
+        [0.0, 2.0, 4.0, 6.0],
+        [0.0, 1.0, 2.0, 4.0, 6.0],
+        [0.0, 1.0],
+    ):
+        history.add([Deviation(md, md, np.zeros(2), np.eye(2), 0.05 + 0.01 * md) for md in depths], None)
+        told.append([(md, 0.05 + 0.01 * md) for md in depths])
+    assert [list(map(tuple, moment.where.tolist())) for moment in history.moments] == told
+    same, more = history.moments[0].where, history.moments[1].where
+    assert np.shares_memory(same, more)

@@ -94,3 +94,18 @@ def test_a_tube_that_is_heard_first_after_a_start_of_the_encoder_owes_the_survey
     stops.on_survey(3, 39.0, 1)
     stops.judge(3, 41.0)
     assert missing(stops) == {2}
+
+
+def test_surveys_are_kept_until_their_stop_is_judged(tally: Tally, monkeypatch: pytest.MonkeyPatch) -> None:
+    """The oldest go by halves; a stop of which the surveys are there owes nothing."""
+    monkeypatch.setattr("groundstation.service.stops.SURVEYS_KEPT", 8)
+    stops = Stops(tally, DUE)
+    for stop in range(6):
+        for tube in (1, 2):
+            stops.on_survey(2, 1010.0 + 100.0 * stop, tube)
+    for stop in range(6):
+        stops.on_stand(Stand(2, 1000.0 + 100.0 * stop, 1040.0 + 100.0 * stop, 4.0 + stop))
+    stops.judge(2, 1700.0)
+    owing = [stop.stand.begun_at for stop in stops if stop.missing]
+    assert owing == [1000.0, 1100.0, 1200.0][: len(owing)]
+    assert 2 <= len(owing) <= 4

@@ -184,7 +184,7 @@ def test_packed_columns_are_the_same_when_they_are_unpacked(columns: np.ndarray)
 def test_many_columns_of_which_few_are_known_take_little_room() -> None:
     columns = np.zeros((2, 70_000))
     columns[:, [3, 69_999]] = [[1.0, 2.0], [3.0, 4.0]]
-    np.testing.assert_array_equal(Fused(np.zeros(2), 1.0, np.eye(2), columns).shared, columns)
+    np.testing.assert_array_equal(Fused(np.zeros(2), 1.0, np.eye(2), Packed(columns)).shared, columns)
     tracemalloc.start()
     kept = [Packed(columns) for _ in range(100)]
     held, _ = tracemalloc.get_traced_memory()
