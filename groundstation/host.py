@@ -21,7 +21,6 @@ from telemetry.media.zenoh_bus import ZenohBus
 from telemetry.media.zenoh_port import ZenohMedium
 from telemetry.messages import BASE, ENCODER, Side, address_name
 from telemetry.runtime.event_loop import run, stop_on_signals
-from telemetry.runtime.heap import keep_large_blocks_apart
 from telemetry.runtime.hosting import Place, begin_process, complain, joined, reporting, warn_of_keys
 from telemetry.runtime.own_clock import OwnClock, OwnClockLoop
 from telemetry.runtime.step_client import AsyncStepClient, serve_stepped
@@ -51,7 +50,7 @@ def run_ground(
         # settings, key and database are looked at before half a minute is spent on a router that may be absent
         given = {"rig": place.rig, "folder": place.folder, "key_file": place.key_file, "keys": place.keys}
         config = checked_config(**given, **settings)
-        prepare()
+        load_kernels()
         with (
             contextlib.closing(GroundProcess(config)) as process,
             page_of(page) as serve_page,
@@ -61,12 +60,6 @@ def run_ground(
             take_lease(bus, place.rig)
             doors = partial(answering, process, bus, serve_page)
             run(serve_by_own_clock(process, bus, doors) if own_clock else serve_on_stepper(process, bus, place, doors))
-
-
-def prepare() -> None:
-    """What the process does before it holds anything."""
-    keep_large_blocks_apart()
-    load_kernels()
 
 
 def load_kernels() -> None:
