@@ -115,6 +115,7 @@ def crew_record(settings: TubeSettings, configs: Array) -> Array:
     crew["unseen_var"] = settings.unseen_std**2
     crew["scheme"], crew["state_every"] = int(settings.scheme), settings.state_every
     crew["torsion_gate"], crew["joints"] = int(settings.torsion == "gate"), get_args(JointRule).index(settings.joints)
+    crew["as_published"] = int(settings.kernel == "published")
     crew["stamp_walk"] = configs["stamp_walk"][0]
     for name in ("stiffness", "aiding_old_after"):
         crew[name] = getattr(settings, name)

@@ -43,7 +43,7 @@ AIDING_DOUBTED = constant(Code.AIDING_DOUBTED)
 @kernel
 def is_starting(node: Any) -> bool:
     """Whether the string has started a few cycles ago, as the head did."""
-    return bool(node.guard.rate != 0 and node.filter.still_cycles == 0 and node.guard.ramp.cycles <= STARTING)
+    return bool(node.guard.rate != 0 and node.filter.still_cycles == 0 and 0 < node.guard.ramp.cycles <= STARTING)
 
 
 @kernel

@@ -128,7 +128,7 @@ def enter(nodes: Array, settings: Array, parameters: Array, readings: Array, mom
 def leave(nodes: Array, settings: Array, moment: Array, status: int, waits: int) -> int:
     """What comes after a loop that returned ``status``; ``waits`` is the answer of ``enter``."""
     node, crew = nodes[0], settings[0]
-    after_loop(node, moment, status, waits)
+    after_loop(node, crew, moment, status, waits)
     follow_alignment(node, crew, moment[START], moment[END])
     if crew.imus > 1 and is_quiet(node):
         learn_offsets(node, crew)
@@ -155,7 +155,7 @@ def before_loop(node: Any, settings: Any, moment: Array, saturated: int) -> int:
 
 
 @kernel
-def after_loop(node: Any, moment: Array, status: int, waits: int) -> None:
+def after_loop(node: Any, settings: Any, moment: Array, status: int, waits: int) -> None:
     """Take what the loop made of the cycle."""
     if waits == 1:
         node.filter.surveyed = 0
@@ -167,7 +167,8 @@ def after_loop(node: Any, moment: Array, status: int, waits: int) -> None:
     if node.status & FILTER_FAULT:
         start_over(node.filter, node.config)
     follow_swing(node)
-    follow_ramp(node)
+    if settings.as_published == 0:
+        follow_ramp(node)
     judge_cycle(node, node.status, moment[END])
 
 
