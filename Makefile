@@ -46,18 +46,18 @@ lint: $(STAMP)  ## ruff: rules and format
 	$(BIN)/ruff format --check .
 
 types: $(STAMP)  ## mypy, strict
-	$(BIN)/mypy
+	nice $(BIN)/mypy
 
 contracts: $(STAMP)  ## which package may import which
 	$(BIN)/lint-imports
 
 kernels: kernels-of-floats kernels-of-integers  ## compile what the tests would compile, each worker for itself
 
-# what they import is compiled once, before them
+# those in integers take longest and get a core of their own; what the others import is compiled once, before them
 kernels-of-floats: bytecode  ## those of a node, as it is and as published, of strings and of surveys
-	$(BIN)/python tests/tools/compile_kernels.py floats
+	nice $(BIN)/python tests/tools/compile_kernels.py floats
 
-kernels-of-integers: bytecode  ## those of a node in integers
+kernels-of-integers: $(STAMP)  ## those of a node in integers
 	$(BIN)/python tests/tools/compile_kernels.py integers
 
 bytecode: $(STAMP)  ## compile what the tests import, asserts rewritten, each worker for itself
