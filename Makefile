@@ -29,13 +29,15 @@ test:  ## set up and run every check and every test, in parallel
 quick: $(STAMP)  ## lint, types, contracts and the fast tests: under 90 s
 	$(MAKE) --jobs=4 check fast
 
-# the lock is complete, so nothing is left to resolve, and its two halves are installed at once; what is imported is
-# compiled then, and the rest never
+# the lock is complete, so nothing is left to resolve; uv installs it in a tenth of the time, and where uv finds no index
+# (it does not read pip's settings) pip does. What is imported is compiled then, and the rest never
+LOCKED := --no-deps --require-hashes --requirement
 $(STAMP): requirements.lock pyproject.toml
 	$(PYTHON) -m venv $(VENV)
-	for half in 0 1; do awk '/^[a-z0-9]/ { count++ } count % 2 == '$$half requirements.lock > $(VENV)/half-$$half; done
-	ls $(VENV)/half-0 $(VENV)/half-1 | xargs -n 1 -P 2 \
-	  $(BIN)/python -m pip install --quiet --no-compile --no-deps --require-hashes --requirement
+	awk '/^[a-z0-9]/ { own = /^uv==/ } own' requirements.lock > $(VENV)/uv.lock
+	$(BIN)/python -m pip install --quiet --no-compile $(LOCKED) $(VENV)/uv.lock
+	$(BIN)/uv pip install --python $(BIN)/python --quiet $(LOCKED) requirements.lock \
+	  || $(BIN)/python -m pip install --quiet --no-compile $(LOCKED) requirements.lock
 	$(BIN)/python -m pip install --quiet --no-compile --no-build-isolation --no-deps --editable .
 	touch $@
 
