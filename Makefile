@@ -23,8 +23,8 @@ rig: $(STAMP)  ## set up and drill wellbore 1
 	$(BIN)/borechain rig scenarios/wellbore-1.toml --speed max --seed 1
 
 test:  ## set up and run every check and every test, in parallel
-	$(MAKE) --jobs=6 --output-sync browser kernels bytecode check
-	$(MAKE) tests
+	$(MAKE) --jobs=6 --output-sync browser kernels bytecode lint contracts
+	$(MAKE) --jobs=2 types tests  # two compilers keep both cores busy before, and types wait for nobody
 
 quick: $(STAMP)  ## lint, types, contracts and the fast tests: under 90 s
 	$(MAKE) --jobs=4 check fast
@@ -55,9 +55,9 @@ contracts: $(STAMP)  ## which package may import which
 
 kernels: kernels-of-floats kernels-of-integers  ## compile what the tests would compile, each worker for itself
 
-# those in integers take longest and get a core of their own; what the others import is compiled once, before them
+# those in integers take longest and begin at once; what the others import is compiled once, before them
 kernels-of-floats: bytecode  ## those of a node, as it is and as published, of strings and of surveys
-	nice $(BIN)/python tests/tools/compile_kernels.py floats
+	$(BIN)/python tests/tools/compile_kernels.py floats
 
 kernels-of-integers: $(STAMP)  ## those of a node in integers
 	$(BIN)/python tests/tools/compile_kernels.py integers
