@@ -48,7 +48,7 @@ lint: $(STAMP)  ## ruff: rules and format
 	$(BIN)/ruff format --check .
 
 types: $(STAMP)  ## mypy, strict
-	nice $(BIN)/mypy
+	$(BIN)/mypy
 
 contracts: $(STAMP)  ## which package may import which
 	$(BIN)/lint-imports
