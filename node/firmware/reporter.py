@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator
+from dataclasses import replace
 
 import numpy as np
 
@@ -52,6 +53,7 @@ class Reporter:
         self._state = self._node["filter"]
         self._next_sequence = next_sequence
         self._restored = restored
+        self._surveyed: SurveyMeasurement | None = None  # as it was said last
 
     @property
     def sensor_flags(self) -> NodeFlag:
@@ -74,7 +76,7 @@ class Reporter:
     @property
     def yaw_var(self) -> float:
         """Random variance of ``yaw``, rad^2."""
-        return min(max(float(self._state["now_P"][Err.YAW, Err.YAW]), VAR_FLOOR), VAR_CEILING)
+        return _sayable(float(self._state["now_P"][Err.YAW, Err.YAW]))
 
     @property
     def systematic_var(self) -> float:
@@ -112,7 +114,7 @@ class Reporter:
     def survey(self, end: float, context: RigContext) -> SurveyMeasurement:
         """Measurement of this station, which ended at ``end`` (s, own clock); of a cluster without means the fused."""
         state = self._state
-        return SurveyMeasurement(
+        self._surveyed = SurveyMeasurement(
             tube=self._settings.tube,
             sequence=self._next_sequence(),
             station_at=context.rig_now,
@@ -124,7 +126,27 @@ class Reporter:
             samples=int(self._config["survey_samples"]),
             settle_time=end - float(state["stopped_at"]),
             flags=self.flags(context, end),
+            epoch=context.epoch,
         )
+        return self._surveyed
+
+    def revised_survey(self, end: float, context: RigContext) -> SurveyMeasurement | None:
+        """The last survey again, by its time, with the yaw that it had by what came since; None before the first.
+
+        It is trusted as the node is now, but for its time, which is the one that it was given.
+        """
+        if self._surveyed is None:
+            return None
+        state, undated = self._state, self._surveyed.flags & NodeFlag.CLOCK_UNSYNCHRONISED
+        self._surveyed = replace(
+            self._surveyed,
+            sequence=self._next_sequence(),
+            yaw=float(from_binary(state["surveyed_yaw"])),
+            yaw_var=_sayable(float(state["surveyed_var"])),
+            systematic_var=float(self._node["revision"]["systematic"]) + self._settings.mount_std**2,
+            flags=self.flags(context, end) & ~NodeFlag.CLOCK_UNSYNCHRONISED | undated,
+        )
+        return self._surveyed
 
     def _cluster_means(self) -> tuple[ImuMean, ...]:
         """Those of the IMUs of a cluster that were in use over the whole of the last survey."""
@@ -180,6 +202,11 @@ class Reporter:
         if self._sensor_bits() & SENSOR_FAULT:
             return Mode.FAULT
         return Mode.ALIGNMENT if aligning else Mode(int(self._state["mode"]))
+
+
+def _sayable(variance: float) -> float:
+    """A random variance (rad^2) within what a message says."""
+    return min(max(variance, VAR_FLOOR), VAR_CEILING)
 
 
 def mean_of(force: Array, cov: Array) -> ImuMean:

@@ -30,6 +30,7 @@ from node.kernels.step import (
     SAY_ESTIMATE,
     SAY_EVENTS,
     SAY_RECORD,
+    SAY_REVISION,
     SAY_STATE,
     SAY_SURVEY,
     is_quiet,
@@ -216,6 +217,7 @@ class Tube:
         """Correct readings by ``block`` from the next cycle on."""
         recorrect(self.state, self.parameters, block, float(self.node["temperature"]))
         self.parameters = block
+        self.state["smoothing"] = 0
         self._corrections[0] = record_of(block)[0]
         self._block = (block.version, block.sha256()[:SHORT_HASH])
 
@@ -260,6 +262,8 @@ class Tube:
             yield record or reporter.event("static_record_empty", Severity.ERROR, context.rig_now, {})
         if says & SAY_SURVEY:
             yield reporter.survey(end, context)
+        if says & SAY_REVISION and (revised := reporter.revised_survey(end, context)) is not None:
+            yield revised
         if says & SAY_ESTIMATE:
             yield self._of_estimate(reporter.estimate(context))
         if says & SAY_STATE:

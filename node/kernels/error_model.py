@@ -83,3 +83,10 @@ def isolate(P: Array, state: int, variance: float) -> None:
         P[state, j] = 0
         P[j, state] = 0
     P[state, state] = variance
+
+
+@kernel
+def set_apart(state: Any, error: int, variance: float) -> None:
+    """Give one error of the filter the variance ``variance``, and no correlation with others or the last survey."""
+    isolate(state.P, error, variance)
+    state.surveyed_with[error] = 0

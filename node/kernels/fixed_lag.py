@@ -10,12 +10,13 @@ from __future__ import annotations
 from typing import Any, Final
 
 from node.kernels.angles import advance_binary, from_binary, to_binary, wrap
-from node.kernels.error_model import isolate, propagate
+from node.kernels.error_model import isolate, propagate, set_apart
 from node.kernels.jit import constant, kernel
 from node.kernels.layout import CLOCK_SLACK, INVERTED, RING, STATES, UNKNOWN_YAW_VAR, Array, Err, Status
 from node.kernels.ring import drop_first_pending, stood_still
+from node.kernels.smoothing import carry
 from node.kernels.strapdown import rotate_down, yaw_rate
-from node.kernels.update import clear, feed_back, innovation_var, intersect, joseph, level, zero_rate
+from node.kernels.update import clear, correct, innovation_var, intersect, level, zero_rate
 
 PSI, BZ, D = constant(Err.YAW), constant(Err.BIAS_Z), constant(Err.STAMP)
 AIDED, REJECTED, YAW_RESET = int(Status.AIDED), int(Status.REJECTED), int(Status.YAW_RESET)
@@ -78,7 +79,12 @@ def advance(state: Any, config: Any, cycle: int, until: float) -> None:
     if dt <= 0.0:
         return
     gap = state.ring_start[cycle % RING] - state.epoch
+    if state.smoothing == 1:
+        turning = 0.0 if stood_still(state, cycle) else 1.0
+        carry(state, spin(state, cycle, state.epoch, until), dt, turning, config)
     state.yaw = turn(state, config, cycle, state.epoch, until, state.yaw, state.down, state.P)
+    if state.down[2] < INVERTED:
+        state.surveyed_with[PSI] = 0.0
     if gap > 1e-3:
         # cycles were lost: the rate of this one stands for them, and is not trusted further than its own size
         missed = state.ring_rate[cycle % RING, 2] * gap
@@ -111,9 +117,9 @@ def interpolation_var(state: Any, cycle: int, at: float) -> float:
 def reset_yaw(state: Any, config: Any, yaw: float, var: float) -> None:
     """Take the yaw from the aiding; the bias is re-inflated and no cross term is kept, for they are stale."""
     state.yaw = to_binary(yaw)
-    isolate(state.P, PSI, var)
+    set_apart(state, PSI, var)
     prior = config.bias_std[2] ** 2 + state.static_bias_var[2]
-    isolate(state.P, BZ, max(prior, state.P[BZ, BZ]))
+    set_apart(state, BZ, max(prior, state.P[BZ, BZ]))
     state.bias[2] = 0.0
     state.yaw_known = 1
     state.rejected = 0
@@ -151,12 +157,11 @@ def aid(state: Any, config: Any, yaw: float, r_var: float, rate: float, at: floa
         if state.rejected < config.reject_limit:
             return REJECTED
         reset_yaw(state, config, yaw, r_var + (rate * config.stamp_std) ** 2)
-        isolate(state.P, D, config.stamp_std**2)
+        set_apart(state, D, config.stamp_std**2)
         state.stamp = 0.0
         state.last_aided = at
         return REJECTED | AIDED | YAW_RESET
-    joseph(state.P, state.ph, s, state.gain)
-    feed_back(state, residual)
+    correct(state, s, residual)
     state.rejected = 0
     state.last_aided = at
     return AIDED

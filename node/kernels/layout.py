@@ -115,6 +115,10 @@ STATE: Final = np.dtype(
         # the last survey
         ("survey_force", "f8", (3,)),  # m/s^2, mean of the last survey
         ("survey_force_cov", "f8", (3, 3)),  # (m/s^2)^2, of that mean
+        ("smoothing", "i8"),  # 1 while what comes tells of its yaw
+        ("surveyed_yaw", "u4"),  # 2^-32 turn, that yaw by all that has come since
+        ("surveyed_var", "f8"),  # rad^2, of it
+        ("surveyed_with", "f8", (STATES,)),  # covariance of it with the error states
         # work space of the updates
         ("h", "f8", (STATES,)),  # work space of the updates
         ("ph", "f8", (STATES,)),  # work space of the updates

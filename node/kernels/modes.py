@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Any, Final
 
-from node.kernels.error_model import isolate
+from node.kernels.error_model import set_apart
 from node.kernels.jit import constant, kernel
 from node.kernels.layout import UNKNOWN_YAW_VAR, Array, Err, Status
 from node.kernels.numbers import held, mean
@@ -59,7 +59,7 @@ def learn_static_bias(state: Any, config: Any, rate: Array, dt: float, quiet: in
         state.static_bias[k] = mean(state.bias_sum[k], state.bias_count)
         state.static_bias_var[k] = bias_mean_var(config, k, total)
         state.bias[k] = 0
-        isolate(state.P, BX + k, held(bias_var(config, k) + state.static_bias_var[k]))
+        set_apart(state, BX + k, held(bias_var(config, k) + state.static_bias_var[k]))
     state.mode = TRACKING
     return BIAS_KNOWN
 
@@ -71,7 +71,7 @@ def guard_rate(state: Any, config: Any, rate_z: float) -> int:
         first = state.rate_exceeded == 0
         state.rate_exceeded = 1
         state.yaw_known = 0
-        isolate(state.P, PSI, UNKNOWN_VAR)
+        set_apart(state, PSI, UNKNOWN_VAR)
         return RATE_EXCEEDED if first else 0
     if state.rate_exceeded == 1:
         state.rate_exceeded = 0

@@ -39,6 +39,7 @@ def realign(node: Any, settings: Any) -> None:
             rotation[i, j] = 0
             for k in range(3):
                 rotation[i, j] += times(aligner.rotations[1, i, k], aligner.rotations[0, j, k])
+    state.smoothing = 0  # the last survey is of the frame before
     turn_vector(rotation, state.down, work)
     turn_vector(rotation, state.now_down, work)
     turn_vector(rotation, state.static_bias, work)

@@ -16,8 +16,8 @@ from node.kernels.static_average import STATIC
 from node.kernels.sweep import OFFSET, SWEEP
 
 # of the saved record; 1 and 2 held the filter alone, 3 what a start clears as well, 4 no doubts, 5 fewer mismatches,
-# 6 no odd forces, 7 no swings, 8 no ramps
-NODE_LAYOUT: Final = 9
+# 6 no odd forces, 7 no swings, 8 no ramps, 9 no revisions
+NODE_LAYOUT: Final = 10
 EVENTS_KEPT: Final = 32  # that wait to be said
 NUMBERS: Final = 10  # of one event
 DISAGREEMENTS: Final = 3  # aidings in a row, until a mismatch is a fault
@@ -222,6 +222,14 @@ CLUSTER: Final = np.dtype(
     ],
     align=True,
 )
+REVISION: Final = np.dtype(
+    [
+        ("turned", "i8"),  # cycles of turning since the survey
+        ("said_var", "f8"),  # rad^2, random variance of its yaw, as it was said last
+        ("systematic", "f8"),  # rad^2, systematic variance, likewise
+    ],
+    align=True,
+)
 RECORDING: Final = np.dtype(
     [
         ("running", "i8"),  # 1 while a record is being taken
@@ -256,6 +264,7 @@ NODE: Final = np.dtype(
         ("down_offset", "f8"),  # rad, of the aiding handed down
         ("down_systematic", "f8"),  # rad^2, of its constant errors
         ("down_torsion", "f8"),  # rad^2, of its twist
+        ("revision", REVISION),  # of the last survey
         ("events", EVENTS),  # what it has yet to say
         ("cluster", CLUSTER),  # IMUs of the tube beside each other
         ("aligner", ALIGNER),  # an alignment under way
@@ -344,6 +353,7 @@ def forget_session(nodes: Array) -> None:
     nodes["twist"]["holding"] = 0
     nodes["joints"]["hops"] = -1
     nodes["joints"]["solved"] = 0
+    nodes["revision"] = np.zeros(1, REVISION)
     nodes["aligner"] = np.zeros(1, ALIGNER)
     nodes["recording"] = np.zeros(1, RECORDING)
     nodes["events"]["told"] = nodes["events"]["said"] = 0

@@ -10,7 +10,7 @@ from __future__ import annotations
 from typing import Any, Final
 
 from node.kernels.angles import wrap, wrap_positive
-from node.kernels.error_model import isolate
+from node.kernels.error_model import set_apart
 from node.kernels.jit import constant, kernel
 from node.kernels.layout import PENDING, Err, Status
 from node.kernels.numbers import held, kept_angle, offset_angle
@@ -73,7 +73,7 @@ def change_reference(state: Any, config: Any, systematic_var: float, offset: flo
     state.pending = 0
     if first or state.yaw_known == 0:
         return 0
-    isolate(state.P, PSI, held(state.P[PSI, PSI] + step_var))
+    set_apart(state, PSI, held(state.P[PSI, PSI] + step_var))
     if stamp_var(config) > 0:
-        isolate(state.P, D, held(state.P[D, D] + stamp_var(config)))
+        set_apart(state, D, held(state.P[D, D] + stamp_var(config)))
     return REFERENCE_CHANGED

@@ -9,7 +9,7 @@ from __future__ import annotations
 import math
 from typing import Any, Final
 
-from node.kernels.error_model import isolate
+from node.kernels.error_model import isolate, set_apart
 from node.kernels.jit import constant, kernel
 from node.kernels.layout import STATES, UNKNOWN_YAW_VAR, Err
 from node.kernels.modes import STATIC_BIAS
@@ -41,21 +41,21 @@ def open_yaw(state: Any, var: float) -> None:
 @kernel
 def lose_yaw(state: Any) -> None:
     """Nothing is known of the yaw, now and at the filter's epoch."""
-    isolate(state.P, PSI, UNKNOWN_VAR)
+    set_apart(state, PSI, UNKNOWN_VAR)
     isolate(state.now_P, PSI, UNKNOWN_VAR)
 
 
 @kernel
 def lose_yaw_ahead(state: Any) -> None:
     """Nothing is known of the yaw from the filter's epoch on; what is said of the present stays until the cycle."""
-    isolate(state.P, PSI, UNKNOWN_VAR)
+    set_apart(state, PSI, UNKNOWN_VAR)
 
 
 @kernel
 def settle_yaw(state: Any, aiding_var: float) -> None:
     """A yaw that proved itself: a rest is one measurement (``aiding_var``, rad^2), however often it was used."""
     var = max(state.P[PSI, PSI], aiding_var)
-    isolate(state.P, PSI, var)
+    set_apart(state, PSI, var)
     state.now_P[PSI, PSI] = max(state.now_P[PSI, PSI], var)
 
 
@@ -64,16 +64,16 @@ def open_biases(state: Any, config: Any) -> None:
     """A gyroscope that may be another one: each bias has at least its prior, the scale no cross terms."""
     for k in range(3):
         prior = held(bias_var(config, k) + state.static_bias_var[k])
-        isolate(state.P, BX + k, max(prior, state.P[BX + k, BX + k]))
-    isolate(state.P, S, state.P[S, S])
+        set_apart(state, BX + k, max(prior, state.P[BX + k, BX + k]))
+    set_apart(state, S, state.P[S, S])
 
 
 @kernel
 def take_mismatch(state: Any, of_bias: float, of_scale: float) -> None:
     """The gyroscope's bias or scale took a step: their variances are opened, and the yaw starts again."""
-    isolate(state.P, PSI, UNKNOWN_VAR)
-    isolate(state.P, BZ, held(of_bias))
-    isolate(state.P, S, of_scale)
+    set_apart(state, PSI, UNKNOWN_VAR)
+    set_apart(state, BZ, held(of_bias))
+    set_apart(state, S, of_scale)
     isolate(state.now_P, PSI, UNKNOWN_VAR)
 
 
@@ -81,20 +81,20 @@ def take_mismatch(state: Any, of_bias: float, of_scale: float) -> None:
 def forget_scale(state: Any, scale: float, var: float) -> None:
     """What was learnt of the scale since it was ``scale``, with a variance of ``var``, was not the gyroscope's."""
     state.scale = scale
-    isolate(state.P, S, var)
+    set_apart(state, S, var)
 
 
 @kernel
 def lose_tilt(state: Any) -> None:
     """Nothing is known of how the tube leans: an old tilt would be explained as a gyroscope's bias."""
-    isolate(state.P, TX, UNKNOWN_TILT_VAR)
-    isolate(state.P, TY, UNKNOWN_TILT_VAR)
+    set_apart(state, TX, UNKNOWN_TILT_VAR)
+    set_apart(state, TY, UNKNOWN_TILT_VAR)
 
 
 @kernel
 def set_stamp_prior(state: Any, var: float) -> None:
     """The time stamp of an aiding is off by so much (s^2) before the first was used."""
-    isolate(state.P, D, var)
+    set_apart(state, D, var)
 
 
 @kernel
@@ -115,7 +115,7 @@ def move_bias(state: Any, k: int, rate: float, var: float, wander_var: float) ->
     state.static_bias[k] = rate
     state.static_bias_var[k] = var
     state.bias[k] = 0
-    isolate(state.P, BX + k, held(var + wander_var))
+    set_apart(state, BX + k, held(var + wander_var))
 
 
 @kernel
@@ -126,11 +126,11 @@ def forget_bias(state: Any, config: Any) -> None:
         state.static_bias_var[k] = 0
         state.bias[k] = 0
         state.bias_sum[k] = 0
-        isolate(state.P, BX + k, boot_bias_var(config))
+        set_apart(state, BX + k, boot_bias_var(config))
     state.scale = 0
     state.bias_count = 0
     state.mode = STATIC_BIAS
-    isolate(state.P, S, scale_var(config))
+    set_apart(state, S, scale_var(config))
 
 
 @kernel
@@ -147,13 +147,14 @@ def resume(state: Any) -> None:
     state.pending = 0
     state.still_cycles = 0
     state.rejected = 0
+    state.smoothing = 0
     state.bias_count = 0
     for k in range(3):
         state.bias_sum[k] = 0
     state.yaw = state.now_yaw
     if was_turning:
         state.last_sequence = -1
-        isolate(state.P, PSI, UNKNOWN_VAR)
+        set_apart(state, PSI, UNKNOWN_VAR)
         lose_tilt(state)
     copy_covariance(state)
 
@@ -166,7 +167,7 @@ def begin_epoch(state: Any) -> None:
     state.last_sequence = -1
     state.last_aided = LONG_AGO
     state.stopped_at = NOT_YET
-    isolate(state.P, PSI, UNKNOWN_VAR)
+    set_apart(state, PSI, UNKNOWN_VAR)
     copy_covariance(state)
 
 
@@ -211,5 +212,6 @@ def start_over(state: Any, config: Any) -> None:
     state.still_cycles = 0
     state.stopped_at = NOT_YET
     state.surveyed = 1
+    state.smoothing = 0
     state.rate_exceeded = 0
     state.bias_count = 0

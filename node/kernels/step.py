@@ -49,6 +49,7 @@ from node.kernels.record import (
 from node.kernels.relay import offer_aiding
 from node.kernels.resets import doubt_stamp, set_stamp_prior, start_over
 from node.kernels.rest_watch import watch_rest
+from node.kernels.revision import follow_revision, open_revision
 from node.kernels.sensor_watch import largest
 from node.kernels.static_average import follow_recording
 from node.kernels.swings import follow_swing
@@ -60,7 +61,7 @@ LEAST_STAMP: Final = seconds(1e-4)  # s, of a time stamp, whatever the clock say
 MOST_STAMP: Final = seconds(CLOCK_SLACK)
 NEAR, FAR = factor(0.8), factor(1.25)  # of a time stamp's prior that is left alone
 LARGE_MOVE_VAR: Final = rate_variance(3e-3 * 3e-3)  # s^2, of a clock, beyond what the wander of the time stamp covers
-SAY_EVENTS, SAY_SURVEY, SAY_ESTIMATE, SAY_STATE, SAY_RECORD, ADMITTED = 1, 2, 4, 8, 16, 32
+SAY_EVENTS, SAY_SURVEY, SAY_ESTIMATE, SAY_STATE, SAY_RECORD, ADMITTED, SAY_REVISION = 1, 2, 4, 8, 16, 32, 64
 REFUSED: Final = -1  # the times of a cycle are such that it cannot be run
 USED, ONWARD = 1, 2  # of an aiding: it is for the filter, and it goes down
 FORWARD, FILTER_FAULT = int(Scheme.FORWARD), int(Status.FILTER_FAULT)
@@ -187,8 +188,11 @@ def conclude(node: Any, settings: Any, moment: Array) -> int:
         says |= SAY_RECORD
     if status & SURVEY_READY:
         says |= SAY_SURVEY
+        open_revision(node, settings)
         if settings.imus > 1:
             survey_imus(node, settings, node.config.survey_samples)
+    elif follow_revision(node, status):
+        says |= SAY_REVISION
     if settings.scheme != FORWARD and state.yaw_known == 1:
         says |= SAY_ESTIMATE
     if status & ~AIDED or node.cycles % settings.state_every == 0:

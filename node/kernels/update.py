@@ -12,6 +12,7 @@ from typing import Any
 from node.kernels.angles import advance_binary
 from node.kernels.jit import constant, kernel
 from node.kernels.layout import STATES, Array, Err
+from node.kernels.smoothing import look_back
 
 TX, TY, PSI = constant(Err.TILT_X), constant(Err.TILT_Y), constant(Err.YAW)
 BX, S, D = constant(Err.BIAS_X), constant(Err.SCALE), constant(Err.STAMP)
@@ -79,6 +80,15 @@ def feed_back(state: Any, residual: float) -> None:
 
 
 @kernel
+def correct(state: Any, s: float, residual: float) -> None:
+    """Update by a ``residual`` of the variance ``s``, whose H and P H^T are in the record: filter and last survey."""
+    joseph(state.P, state.ph, s, state.gain)
+    if state.smoothing == 1:
+        look_back(state, s, residual)
+    feed_back(state, residual)
+
+
+@kernel
 def clear(h: Array) -> None:
     """Zero the measurement row."""
     for i in range(STATES):
@@ -93,8 +103,7 @@ def zero_rate(state: Any, rate: Array, dt: float, config: Any) -> None:
         state.h[BX + k] = 1.0
         noise = config.attitude_factor * config.gyro_noise[k]
         s = innovation_var(state.P, state.h, noise * noise / dt, state.ph)
-        joseph(state.P, state.ph, s, state.gain)
-        feed_back(state, rate[k] - state.static_bias[k] - state.bias[k])
+        correct(state, s, rate[k] - state.static_bias[k] - state.bias[k])
 
 
 @kernel
@@ -111,6 +120,4 @@ def level(state: Any, force: Array, config: Any) -> None:
             state.h[TY] = -state.down[0]
             state.h[TX] = state.down[1]
         s = innovation_var(state.P, state.h, r_var, state.ph)
-        residual = force[k] / config.gravity + state.down[k]
-        joseph(state.P, state.ph, s, state.gain)
-        feed_back(state, residual)
+        correct(state, s, force[k] / config.gravity + state.down[k])

@@ -26,7 +26,7 @@ from node.kernels.record import (
     START,
     SYNCHRONISED,
 )
-from node.kernels.step import ONWARD, SAY_EVENTS, SAY_SURVEY
+from node.kernels.step import ONWARD, SAY_EVENTS, SAY_REVISION, SAY_SURVEY
 from sim.campaign.sensors import draw, read_sensors
 
 YAW = int(Err.YAW)
@@ -103,6 +103,8 @@ def drill(
                 if made < surveys.shape[0]:
                     keep_survey(surveys[made], nodes[k], crews[k], cycle, k, top)
                 made += 1
+            elif says & SAY_REVISION and made <= surveys.shape[0]:
+                revise_survey(surveys[:made], nodes[k], k)
             if says & SAY_EVENTS:
                 count_events(nodes[k], counts[k])
         if heard:
@@ -167,6 +169,20 @@ def keep_survey(kept: Any, node: Any, crew: Any, cycle: int, k: int, tubes: int)
         kept.force[i] = state.survey_force[i]
         for j in range(3):
             kept.force_cov[i, j] = state.survey_force_cov[i, j]
+
+
+@kernel
+def revise_survey(surveys: Array, node: Any, k: int) -> None:
+    """Put what a node says of its last survey in the place of what it said before."""
+    state = node.filter
+    for place in range(surveys.shape[0] - 1, -1, -1):
+        kept = surveys[place]
+        if kept.tube == k + 1:
+            kept.yaw = from_binary(state.surveyed_yaw)
+            kept.yaw_var = max(state.surveyed_var, VAR_FLOOR)
+            kept.systematic_var = node.revision.systematic
+            kept.trusted = 1 if state.yaw_known == 1 else 0
+            return
 
 
 @kernel

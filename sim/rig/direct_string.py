@@ -20,7 +20,7 @@ from node.firmware.inputs import ImuReading, RigContext
 from node.firmware.reporter import VAR_FLOOR
 from node.firmware.tube import Tube
 from node.kernels.address import firmware
-from node.kernels.angles import from_binary
+from node.kernels.angles import from_binary, wrap
 from node.kernels.calibration import PARAMETERS, USUAL
 from node.kernels.layout import PERIOD, Err, Scheme, default_config
 from node.kernels.record import A_VALID, END, LATE, READING, SATURATED, TEMPERATURE, new_node
@@ -45,7 +45,7 @@ NEVER = 10**9  # cycles
 
 @dataclass(frozen=True, slots=True)
 class Survey:
-    """One survey, judged at the cycle that made it."""
+    """One survey, judged at the cycle that made it, as it was said first or revised later."""
 
     cycle: int
     tube: int
@@ -66,6 +66,7 @@ class StringRun:
     systematic_var: Array  # rad^2, as the node states it
     gyro_bias: Array  # rad/s, z axis, estimate
     surveys: list[Survey] = field(default_factory=list)
+    revisions: list[Survey] = field(default_factory=list)  # surveys that were said again, by the cycle of the first
     events: list[tuple[int, Event]] = field(default_factory=list)  # with the cycle
     states: list[tuple[int, NodeState]] = field(default_factory=list)  # with the cycle
 
@@ -388,11 +389,20 @@ class DirectString:
                 if isinstance(message, Aiding):
                     self._own[tube] = message
                 elif isinstance(message, SurveyMeasurement):
-                    run.surveys.append(Survey(cycle, tube, float(run.total_error[cycle, tube - 1]), message))
+                    self._take_survey(cycle, tube, message)
                 elif isinstance(message, Event):
                     run.events.append((cycle, message))
                 elif isinstance(message, NodeState):
                     run.states.append((cycle, message))
+
+    def _take_survey(self, cycle: int, tube: int, message: SurveyMeasurement) -> None:
+        run = self.run
+        for first in reversed(run.surveys):
+            if (first.tube, first.measurement.station_at) == (tube, message.station_at):
+                moved = wrap(message.yaw - first.measurement.yaw)
+                run.revisions.append(Survey(first.cycle, tube, first.error + moved, message))
+                return
+        run.surveys.append(Survey(cycle, tube, float(run.total_error[cycle, tube - 1]), message))
 
 
 def aiding_vector(aiding: Aiding) -> tuple[float, ...]:

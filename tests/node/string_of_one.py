@@ -22,7 +22,14 @@ Spoil = Callable[[int, Sample], Sample]
 class StringOfOne:
     """Rest, turn at 71 deg/s, rest, ... ; ``run`` goes cycle by cycle and keeps yaw, variance, flags and events."""
 
-    def __init__(self, seed: int, spoil: Spoil = lambda _, sample: sample, blocks: int = 3, loss: float = 0.01) -> None:
+    def __init__(
+        self,
+        seed: int,
+        spoil: Spoil = lambda _, sample: sample,
+        blocks: int = 3,
+        loss: float = 0.01,
+        **changed: dict[str, object],
+    ) -> None:
         tables = {
             "rig": {"tubes": 1, "tubes_at_start": 1, "tube_length_m": 1.0},
             "path": {"straight": {"inclination_deg": 2.0}},
@@ -30,6 +37,7 @@ class StringOfOne:
             "joints": {"reading_std_deg": 0.0, "mount_std_deg": 0.0},
             "clocks": {"joint_std_ms": 0.0, "wander_std_ms": 0.0, "stated_std_ms": 0.1},
             "medium": {"link": "off", "loss": loss},
+            **changed,
         }
         self.world = World(scenario_of(tables), seed)
         self.motion, self.cycles = self.world.motion, self.world.cycles

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 from typing import Any, Final
 
-from node.kernels.error_model import isolate
+from node.kernels.error_model import set_apart
 from node.kernels.fixed.arithmetic import mul, shift
 from node.kernels.fixed.layout import ANGLE_Q, CEILING, LEVEL_Q, RATE_Q, UNIT, VAR_Q
 from node.kernels.fixed.trigonometry import TURN, difference, radians
-from node.kernels.fixed.update import UNITY, feed_back, innovation_var, joseph
+from node.kernels.fixed.update import UNITY, correct, innovation_var
 from node.kernels.jit import constant, kernel
 from node.kernels.layout import Err, Status
 
@@ -22,8 +22,8 @@ SQUARE_RIGHT: Final = ANGLE_Q - VAR_Q // 2
 def reset_yaw(state: Any, config: Any, yaw: int, var: int) -> None:
     """Take the yaw (binary) from the aiding; the bias is re-inflated and no cross term is kept, for they are stale."""
     state.yaw = yaw & TURN
-    isolate(state.P, PSI, min(var, CEILING))
-    isolate(state.P, BZ, max(min(config.bias_var[2] + state.static_bias_var[2], CEILING), state.P[BZ, BZ]))
+    set_apart(state, PSI, min(var, CEILING))
+    set_apart(state, BZ, max(min(config.bias_var[2] + state.static_bias_var[2], CEILING), state.P[BZ, BZ]))
     state.bias[2] = 0
     state.yaw_known = 1
     state.rejected = 0
@@ -46,7 +46,8 @@ def aid(state: Any, config: Any, yaw: int, r_var: int, rate: int, at: int) -> in
         reset_yaw(state, config, yaw, unknown_var)
         state.last_aided = at
         return AIDED | YAW_RESET
-    s = innovation_var(state, PSI, UNITY, D, h if config.stamp_on == 1 else 0, r_var)
+    of_stamp = h if config.stamp_on == 1 else 0
+    s = innovation_var(state, PSI, UNITY, D, of_stamp, r_var)
     residual = radians(difference(yaw, int(state.yaw)))
     state.innovation = residual
     state.innovation_var = s
@@ -57,12 +58,11 @@ def aid(state: Any, config: Any, yaw: int, r_var: int, rate: int, at: int) -> in
         if state.rejected < config.reject_limit:
             return REJECTED
         reset_yaw(state, config, yaw, unknown_var)
-        isolate(state.P, D, config.stamp_var)
+        set_apart(state, D, config.stamp_var)
         state.stamp = 0
         state.last_aided = at
         return REJECTED | AIDED | YAW_RESET
-    joseph(state, s)
-    feed_back(state, residual)
+    correct(state, PSI, UNITY, D, of_stamp, s, residual)
     state.rejected = 0
     state.last_aided = at
     return AIDED

@@ -34,6 +34,7 @@ from node.kernels.jit import kernel
 from node.kernels.layout import STATES, Array, Err
 
 LARGEST: Final = 1 << 61
+YAW: Final = int(Err.YAW)
 LIMIT: Final = 2.0**61  # the same, which a float holds exactly
 HIGHEST: Final = float(CEILING)
 LOG2_E: Final = math.log2(math.e)
@@ -82,6 +83,7 @@ def show_cycle(fixed: Any, state: Any, gravity: float) -> None:
     state.rejected, state.cycles, state.consumed = fixed.rejected, fixed.cycles, fixed.consumed
     state.mode, state.still_cycles, state.surveyed = fixed.mode, fixed.still_cycles, fixed.surveyed
     state.rate_exceeded, state.bias_count = fixed.rate_exceeded, fixed.bias_count
+    state.smoothing, state.surveyed_yaw = fixed.smoothing, fixed.surveyed_yaw
     state.stopped_at = fixed.stopped_at * time if fixed.stopped_at != NEVER else math.nan
 
 
@@ -101,6 +103,9 @@ def show_covariance(fixed: Any, state: Any) -> None:
         for j in range(STATES):
             state.P[i, j] = fixed.P[i, j] * COUNT[i, j]
             state.now_P[i, j] = fixed.now_P[i, j] * COUNT[i, j]
+    state.surveyed_var = fixed.surveyed_var * COUNT[YAW, YAW]
+    for j in range(STATES):
+        state.surveyed_with[j] = fixed.surveyed_with[j] * COUNT[YAW, j]
 
 
 @kernel
@@ -209,6 +214,10 @@ def learn_state(fixed: Any, state: Any, gravity: float) -> None:
         for j in range(3):
             share = state.survey_force_cov[i, j] / (gravity * gravity)
             fixed.survey_force_cov[i, j] = held(fixed, share * 4.0**FORCE_Q)
+    fixed.smoothing, fixed.surveyed_yaw = state.smoothing, state.surveyed_yaw
+    fixed.surveyed_var = held(fixed, state.surveyed_var * COVARIANCE[YAW, YAW])
+    for j in range(STATES):
+        fixed.surveyed_with[j] = held(fixed, state.surveyed_with[j] * COVARIANCE[YAW, j])
     fixed.gain_q = 0
     for k in range(fixed.gain.shape[0]):
         fixed.ph[k] = fixed.rest[k] = fixed.gain[k] = 0

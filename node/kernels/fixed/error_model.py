@@ -82,6 +82,24 @@ def transform(P: Array, angle: int, dt: int) -> None:
 
 
 @kernel
+def carry(state: Any, wz: int, dt: int, turning: int, config: Any) -> None:
+    """Covariance of the yaw at the last survey with the states over ``dt``: ``node.kernels.smoothing.carry``."""
+    decays(state, config, dt)
+    along = state.surveyed_with
+    if turning == 1:
+        angle = mul(wz, dt)
+        sq30, cq30 = sine_cosine(counts(angle, STEP_Q) & TURN)
+        s, c = sq30 << 1, cq30 << 1
+        step, spin = dt >> STEP_RIGHT, angle >> SCALE_RIGHT
+        tx, ty = along[TX], along[TY]
+        along[TX] = mul(tx, c) + mul(ty, s) - mul(along[BX], step)
+        along[TY] = mul(ty, c) - mul(tx, s) - mul(along[BY], step)
+        along[PSI] -= mul(along[BZ], step) + mul(along[S], spin)
+    for k in range(3):
+        along[BX + k] = mul(along[BX + k], state.decay[k])
+
+
+@kernel
 def add_process_noise(P: Array, dt: int, turning: int, f: Array, config: Any) -> None:
     """G Q G^T on the diagonal: walk dt of the attitude, (B sigma_b)^2 (1 - f^2) of the biases; ``f`` (3) in Q31."""
     for k in range(3):

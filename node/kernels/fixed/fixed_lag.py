@@ -7,7 +7,7 @@ from typing import Any, Final
 from node.kernels.error_model import isolate
 from node.kernels.fixed.aiding import RATE_RIGHT, aid
 from node.kernels.fixed.arithmetic import mul, quotient, shift
-from node.kernels.fixed.error_model import decays, propagate, widen
+from node.kernels.fixed.error_model import carry, decays, propagate, widen
 from node.kernels.fixed.layout import (
     FAST,
     LONGEST_GAP,
@@ -113,7 +113,11 @@ def advance(state: Any, config: Any, cycle: int, until: int) -> None:
     if dt <= 0:
         return
     gap = state.ring_start[cycle & SLOT] - state.epoch
+    if state.smoothing == 1:
+        carry_survey(state, config, cycle, until - dt, until)
     state.yaw = turn(state, config, cycle, until - dt, until, int(state.yaw), state.down, state.P)
+    if state.down[2] < INVERTED_DOWN:
+        state.surveyed_with[PSI] = 0
     if gap > MISSED_GAP:
         # cycles were lost: the rate of this one stands for them, and is not trusted further than its own size
         missed = gap_angle(state.ring_rate[cycle & SLOT, 2], gap_held(state, gap))
@@ -125,6 +129,18 @@ def advance(state: Any, config: Any, cycle: int, until: int) -> None:
         for k in range(3):
             state.bias[k] = mul(state.bias[k], state.decay[k])
     state.epoch = until
+
+
+@kernel
+def carry_survey(state: Any, config: Any, cycle: int, begin: int, end: int) -> None:
+    """Carry the yaw at the last survey along from ``begin`` to ``end`` (s, Q28), in the pieces of ``turn``."""
+    wz, dt = spin(state, cycle, begin, end), end - begin
+    turning = 0 if stood_still(state, cycle) else 1
+    longest = LONGEST_STEP if abs(wz) < FAST else ONE_SECOND
+    while dt > 0:
+        piece = min(dt, longest)
+        dt -= piece
+        carry(state, wz, piece, turning, config)
 
 
 @kernel

@@ -87,6 +87,10 @@ FIXED_STATE: Final = np.dtype(
         # the last survey
         ("survey_force", "i8", (3,)),  # g, Q26
         ("survey_force_cov", "i8", (3, 3)),  # g^2, Q52
+        ("smoothing", "i8"),
+        ("surveyed_yaw", "u4"),  # binary angle
+        ("surveyed_var", "i8"),  # rad^2, Q56
+        ("surveyed_with", "i8", (STATES,)),  # rad units, Q56
         # work space of the updates
         ("ph", "i8", (STATES,)),  # P H^T, Q56
         ("rest", "i8", (STATES,)),  # P H^T - S K, what rounding left

@@ -73,6 +73,8 @@ OWN_FORMATS: Final[dict[str, Any]] = {
     "marks": ANGLE_Q,
     "joints.offset": ANGLE_Q,
     "joints.var": VAR_Q,
+    "said_var": VAR_Q,
+    "revision.systematic": VAR_Q,
     "temperature": WARMTH_Q,
     "raw_rate": RATE_Q,
     "raw_force": FORCE,

@@ -59,19 +59,45 @@ def joseph(state: Any, s: int) -> None:
 
 
 @kernel
-def correction(state: Any, i: int, residual: int) -> int:
-    """K_i r in units (Q40) of a ``residual`` in Q40."""
-    q = state.gain_q
-    value = mul(residual, state.gain[i])
+def correction(state: Any, gain: int, q: int, residual: int) -> int:
+    """K r in units (Q40) of a ``residual`` in Q40, for a ``gain`` K 2^q of 31 bits."""
+    value = mul(residual, gain)
     value = shift(value, q - 31) if q >= 31 else clamp(state, value, LARGEST_CORRECTION >> (31 - q)) << (31 - q)
     return clamp(state, value, LARGEST_CORRECTION)
 
 
 @kernel
+def correct(state: Any, a: int, ha: int, b: int, hb: int, s: int, residual: int) -> None:
+    """Update by a ``residual`` of the variance ``s`` (Q56), H as in ``innovation_var``: filter and last survey."""
+    joseph(state, s)
+    if state.smoothing == 1:
+        look_back(state, a, ha, b, hb, s, residual)
+    feed_back(state, residual)
+
+
+@kernel
+def look_back(state: Any, a: int, ha: int, b: int, hb: int, s: int, residual: int) -> None:
+    """The yaw at the last survey by an innovation: ``node.kernels.smoothing.look_back``."""
+    along, ph = state.surveyed_with, state.ph
+    shared = mul(along[a], ha) + mul(along[b], hb)
+    mantissa, exponent = reciprocal(s)
+    lift = bits(abs(shared)) - 31
+    q = min(30 - lift + exponent, 62)
+    gain = shift((shift(shared, lift) * mantissa) >> 31, 30 - lift + exponent - q)
+    up, down = max(0, 31 - q), max(0, q - 31)
+    for j in range(STATES):
+        along[j] -= shift(mul(ph[j] << up, gain), down)
+    state.surveyed_var = max(state.surveyed_var - shift(mul(shared << up, gain), down), 0)
+    corrected = counts(correction(state, gain, q, residual), ANGLE_Q)
+    state.surveyed_yaw = (int(state.surveyed_yaw) + corrected) & TURN
+
+
+@kernel
 def feed_back(state: Any, residual: int) -> None:
     """Closed loop: add K r to the estimates, ``residual`` in Q40."""
-    ex = clamp(state, shift(correction(state, TX, residual), ANGLE_Q - VECTOR_Q), LARGEST_TILT)
-    ey = clamp(state, shift(correction(state, TY, residual), ANGLE_Q - VECTOR_Q), LARGEST_TILT)
+    gain, q = state.gain, state.gain_q
+    ex = clamp(state, shift(correction(state, gain[TX], q, residual), ANGLE_Q - VECTOR_Q), LARGEST_TILT)
+    ey = clamp(state, shift(correction(state, gain[TY], q, residual), ANGLE_Q - VECTOR_Q), LARGEST_TILT)
     if ex != 0 or ey != 0:
         down = state.down
         ux, uy, uz = down[0], down[1], down[2]
@@ -80,10 +106,10 @@ def feed_back(state: Any, residual: int) -> None:
         down[2] = uz + shift(ux * ey - uy * ex, VECTOR_Q)
         normalise(down)
     for k in range(3):
-        state.bias[k] += correction(state, BX + k, residual)
-    state.yaw = (int(state.yaw) + counts(correction(state, PSI, residual), ANGLE_Q)) & TURN
-    state.scale += correction(state, S, residual)
-    state.stamp += correction(state, D, residual)
+        state.bias[k] += correction(state, gain[BX + k], q, residual)
+    state.yaw = (int(state.yaw) + counts(correction(state, gain[PSI], q, residual), ANGLE_Q)) & TURN
+    state.scale += correction(state, gain[S], q, residual)
+    state.stamp += correction(state, gain[D], q, residual)
 
 
 @kernel
@@ -92,8 +118,8 @@ def zero_rate(state: Any, rate: Array, dt: int, config: Any) -> None:
     for k in range(3):
         r_var = shift(quotient(config.rate_walk[k], max(dt, SHORTEST)), 30 - TIME_Q)
         s = innovation_var(state, BX + k, UNITY, BX + k, 0, r_var)
-        joseph(state, s)
-        feed_back(state, clamp(state, rate[k] - state.static_bias[k] - state.bias[k], LARGEST_RESIDUAL))
+        off = clamp(state, rate[k] - state.static_bias[k] - state.bias[k], LARGEST_RESIDUAL)
+        correct(state, BX + k, UNITY, BX + k, 0, s, off)
 
 
 @kernel
@@ -108,5 +134,4 @@ def level(state: Any, force: Array, config: Any) -> None:
             ha, hb = -down[0], down[1]
         s = innovation_var(state, a, ha << 1, b, hb << 1, config.force_var)
         residual = (force[k] << (ANGLE_Q - FORCE_Q)) + (down[k] << (ANGLE_Q - VECTOR_Q))
-        joseph(state, s)
-        feed_back(state, clamp(state, residual, LARGEST_RESIDUAL))
+        correct(state, a, ha << 1, b, hb << 1, s, clamp(state, residual, LARGEST_RESIDUAL))
