@@ -9,7 +9,7 @@ from __future__ import annotations
 import math
 from array import array
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any, Final, overload
 
 import numpy as np
@@ -24,10 +24,11 @@ from telemetry.messages import NodeFlag, SurveyMeasurement
 Array = npt.NDArray[np.float64]
 AXES = 3
 FEWEST = 64  # rows of a table
+NO_NUMBER = -1
 GROWTH = 8  # share of its rows by which a table grows
 ROW: Final = np.dtype(
     [
-        *((name, np.int64) for name in ("sequence", "hops", "samples", "flags", "number")),
+        *((name, np.int64) for name in ("sequence", "replaces", "hops", "samples", "flags", "number")),
         *((name, np.uint32) for name in ("tube", "width")),
         *((name, np.uint8) for name in ("trust", "quality")),
         *((name, np.float64) for name in ("at", "md", "yaw", "yaw_var", "systematic_var", "force_var", "settle_time")),
@@ -63,6 +64,7 @@ class Cluster:
     trust: Trust
     number: int  # place in the order in which surveys were placed
     direction: Reading
+    replaces: int = NO_NUMBER  # the tube's number of the survey that this one revises
 
     @property
     def order(self) -> tuple[float, int]:
@@ -117,20 +119,35 @@ class Table:
         numpy.linalg.LinAlgError
             When it cannot be weighed; it was not added.
         """
-        c, d = cluster, cluster.direction
-        information = d.information
+        information = cluster.direction.information
         row, known = len(self), self.rows
         if row == len(known):
             self.rows = np.empty(row + row // GROWTH, ROW)
             self.rows[:row] = known
-        self.rows[row] = (
-            c.sequence, c.hops, c.samples, c.flags, c.number, c.tube, d.width, c.trust, c.quality, c.at, c.md, c.yaw,
-            c.yaw_var, c.systematic_var, c.force_var, c.settle_time, d.lean, d.down, d.cov, information, d.causes,
-            0.0, np.nan,
-        )  # fmt: skip
         self.forces.append(np.array(cluster.forces).tobytes())
-        self.places.append(d.places)
+        self.places.append(cluster.direction.places)
+        self._write(row, cluster, information)
         return row
+
+    def replace_cluster(self, row: int, cluster: Cluster) -> None:
+        """Put a survey in the place of the one that it revises; errors as ``append_cluster``."""
+        information = cluster.direction.information
+        self.places[row] = cluster.direction.places
+        self._write(row, replace(cluster, replaces=int(self.rows[row]["sequence"])), information)
+
+    def is_revised_by(self, row: int, cluster: Cluster) -> bool:
+        """Whether a survey is that of a row again: of the same tube and time, and the same readings."""
+        known = self.rows[row]
+        is_alike = (known["at"], known["tube"]) == (cluster.at, cluster.tube)
+        return bool(is_alike and self.forces[row] == np.array(cluster.forces).tobytes())
+
+    def _write(self, row: int, cluster: Cluster, information: Array) -> None:
+        c, d = cluster, cluster.direction
+        self.rows[row] = (
+            c.sequence, c.replaces, c.hops, c.samples, c.flags, c.number, c.tube, d.width, c.trust, c.quality, c.at,
+            c.md, c.yaw, c.yaw_var, c.systematic_var, c.force_var, c.settle_time, d.lean, d.down, d.cov, information,
+            d.causes, 0.0, np.nan,
+        )  # fmt: skip
 
     def column(self, name: str) -> npt.NDArray[Any]:
         """One number of every survey, (n,) or (n, ...): a look at the table."""
@@ -224,6 +241,18 @@ class Clusters:
         self.forget_departures(place)
         return place
 
+    def revised_by(self, cluster: Cluster) -> int | None:
+        """Place of the survey that a cluster is again, with another yaw; None of a new one."""
+        place = self._place_of(cluster.order) - 1
+        if place >= 0 and self._table.is_revised_by(self._rows[place], cluster):
+            return place
+        return None
+
+    def replace_cluster(self, place: int, cluster: Cluster) -> None:
+        """Put a cluster in the place of the one that it revises; errors as ``insert``."""
+        self._table.replace_cluster(self._rows[place], cluster)
+        self.forget_departures(place)
+
     def departure(self, place: int) -> Departure | None:
         """How far a cluster departed from those before it; None where nobody has worked it out."""
         row = self._table.rows[self._rows[place]]
@@ -249,7 +278,7 @@ class Clusters:
 
 
 PLAIN = (
-    "tube", "sequence", "at", "hops", "md", "yaw", "yaw_var", "systematic_var", "force_var", "samples", "settle_time",
-    "number",
+    "tube", "sequence", "replaces", "at", "hops", "md", "yaw", "yaw_var", "systematic_var", "force_var", "samples",
+    "settle_time", "number",
 )  # fmt: skip
 NOTHING: Final = np.zeros((2, 0))

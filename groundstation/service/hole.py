@@ -23,6 +23,7 @@ from groundstation.survey.fusion import Evidence, Weighting, departures_from, ju
 from groundstation.survey.resolve import Direction
 from groundstation.survey.shared import SharedErrors
 from groundstation.survey.trajectory import Point, Trajectory
+from groundstation.survey.trust import Trust
 
 
 @dataclass(frozen=True, slots=True)
@@ -64,8 +65,10 @@ class Hole:
         self._newest_at = -math.inf  # s, rig time of the newest survey
         self.version = 0  # grows with every survey
 
-    def add_cluster(self, cluster: Cluster, epoch: int) -> None:
-        """Take a survey with rig time of an epoch.
+    def add_cluster(self, cluster: Cluster, epoch: int) -> bool:
+        """Take a survey with rig time of an epoch; a revision of one that is known takes its place, unless it is older.
+
+        Returns whether it was taken.
 
         Raises
         ------
@@ -73,17 +76,27 @@ class Hole:
             When it cannot be weighed; it was not taken.
         """
         _ = cluster.direction.information
-        self.version += 1
         if self._history.begins_stop(epoch, cluster.at):
             self.settle()
             self._history.add(self._deviations, self._projection)
-        self._history.on_survey(epoch, cluster.at)
         station = self._station_at(cluster.md)
-        station.add_cluster(cluster)
-        self._station_of.append(station)
+        revised = station.clusters.revised_by(cluster)
+        if revised is None:
+            station.add_cluster(cluster)
+            self._station_of.append(station)
+        elif not station.revise_cluster(revised, cluster):
+            return False
+        self.version += 1
+        self._history.on_survey(epoch, cluster.at)
         self._surveyed[station.md] = station
         self._unsettled_since = min(self._unsettled_since, cluster.at)
         self._newest_at = max(self._newest_at, cluster.at)
+        return True
+
+    def has_untrusted(self, tube: int) -> bool:
+        """Whether the yaw of any survey of a tube is not believed."""
+        column = self._surveys.column
+        return bool(((column("tube") == tube) & (column("trust") != Trust.FULL)).any())
 
     @property
     def stations(self) -> list[SurveyStation]:

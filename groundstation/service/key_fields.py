@@ -172,6 +172,7 @@ MEASUREMENT: Fields = (
     MD,
     TUBE,
     integer("sequence", "the tube's number of it"),
+    integer("replaces", "the tube's number of the same survey before its yaw was known better", null=True),
     number("station_at_s", "rig time, end of the average"),
     integer("hops", "distance from the encoder in tubes"),
     *ANGLES,

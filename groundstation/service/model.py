@@ -32,6 +32,7 @@ from groundstation.survey.trust import Trust, trust_of, with_unknown_yaw
 from telemetry.messages import EPOCH_UNKNOWN, Event, NodeFlag, NodeState, StaticRecord, SurveyMeasurement
 
 EVENTS_SHOWN = 10_000
+UNTRUSTED = "survey_untrusted"  # alarm: a survey is fused with an unknown yaw
 STATIC_RECORDS_SHOWN = 1_000
 ACCELEROMETER_NOISE_DEG = 0.02  # one sample, for the check of motion
 ABOVE_COLLAR = 0.01  # m, of rounding; a node higher up is in no hole
@@ -236,7 +237,7 @@ class RigModel:
         except (SurveyError, np.linalg.LinAlgError):
             self.refused += 1
             return "survey_refused"
-        return "" if trust is Trust.FULL else "survey_untrusted"
+        return "" if trust is Trust.FULL else UNTRUSTED
 
     def prepare(self, measurements: Sequence[SurveyMeasurement]) -> list[Prepared | None]:
         """What many measurements come to, worked out together; to be fused in this order, and the next after them.
@@ -262,8 +263,8 @@ class RigModel:
         quality = check(found.forces, found.covs, found.combined, self.config.gravity, samples, settle_time, noise)
         epoch = measurement.epoch or self.epoch
         number = self.seen["measurements"] + 1
-        self.hole.add_cluster(cluster_of(measurement, md, direction, quality, trust, number), epoch)
-        self.seen["measurements"] = number
+        if self.hole.add_cluster(cluster_of(measurement, md, direction, quality, trust, number), epoch):
+            self.seen["measurements"] = number
 
     def on_event(self, event: Event) -> None:
         """Remember what happened."""

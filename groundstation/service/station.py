@@ -26,6 +26,7 @@ class SurveyStation:
     clusters: Clusters = field(default_factory=Clusters)
     drops: list[int] = field(default_factory=list)
     untrusted: int = 0  # clusters whose yaw is not believed
+    revised: int = 0  # clusters that were put in the place of others
     _fused: tuple[tuple[int, ...], Direction] | None = None  # with what it was made of
     _shown: tuple[tuple[int, ...], dict[str, Any]] | None = None
     _all: GrowingBayes = field(default_factory=GrowingBayes)
@@ -55,6 +56,27 @@ class SurveyStation:
         """
         place = self.clusters.insert(cluster)
         self.untrusted += cluster.trust is not Trust.FULL
+        self._forget(place)
+
+    def revise_cluster(self, place: int, cluster: Cluster) -> bool:
+        """Put a cluster in the place of the survey that it is again, unless a newer one of it is known: False.
+
+        Raises
+        ------
+        numpy.linalg.LinAlgError
+            When it cannot be weighed; the one before stays.
+        """
+        before = self.clusters[place]
+        if cluster.sequence <= before.sequence:
+            return False
+        self.clusters.replace_cluster(place, cluster)
+        self.untrusted += (cluster.trust is not Trust.FULL) - (before.trust is not Trust.FULL)
+        self.revised += 1
+        self._forget(place)
+        return True
+
+    def _forget(self, place: int) -> None:
+        """What was judged of the cluster at a place and of later ones is to be judged anew."""
         self.drops = [drop for drop in self.drops if drop < place]
         self._all.forget(place)
         if self._trusted is not None:
@@ -84,8 +106,8 @@ class SurveyStation:
 
     @property
     def _made_of(self) -> tuple[int, ...]:
-        """What changes with every cluster that comes or does not count any more."""
-        return self.count, *self.drops
+        """What changes with every cluster that comes, is revised or does not count any more."""
+        return self.count, self.revised, *self.drops
 
     def shown(self, show: Callable[[SurveyStation], dict[str, Any]]) -> dict[str, Any]:
         """What one view shows of the clusters that count; made anew where another has come."""

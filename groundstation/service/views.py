@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 
 from groundstation.errors import SelectorError, SurveyError
-from groundstation.service.clusters import Cluster
+from groundstation.service.clusters import NO_NUMBER, Cluster
 from groundstation.service.model import RigModel
 from groundstation.service.station import SurveyStation
 from groundstation.service.streams import STREAMED, span, window
@@ -208,6 +208,7 @@ def cluster(c: Cluster, n: int) -> View:
         "md_m": round(c.md, 6),
         "tube": c.tube,
         "sequence": c.sequence,
+        "replaces": None if c.replaces == NO_NUMBER else c.replaces,
         "station_at_s": c.at,
         "hops": c.hops,
         "inclination_deg": math.degrees(inclination),

@@ -6,7 +6,7 @@ import math
 from dataclasses import dataclass
 
 from groundstation.service.depth import CONTRADICTION
-from groundstation.service.model import RigModel
+from groundstation.service.model import UNTRUSTED, RigModel
 from groundstation.service.numbers import Range
 from groundstation.service.witnesses import Witnesses
 from groundstation.survey.joint_angles import Pair, RestingYaw
@@ -110,11 +110,17 @@ class Watch:
             self._alarms.alert("reference", "encoder", against)
 
     def on_survey(self, measurement: SurveyMeasurement, outcome: str) -> None:
-        """Tell what a survey was not used for: ``outcome`` is a kind of alarm, or empty."""
+        """Tell what a survey was not used for: ``outcome`` is a kind of alarm, or empty.
+
+        A tube whose surveys are all believed, for the last that was not is revised, is told of no longer.
+        """
+        subject = f"tube {measurement.tube}"
         if outcome:
             flags = ", ".join(str(flag.name).lower() for flag in NodeFlag if flag and flag in measurement.flags)
             detail = f"number {measurement.sequence} at {measurement.station_at:.1f} s"
-            self._alarms.alert(outcome, f"tube {measurement.tube}", f"{detail}: {flags}" if flags else detail)
+            self._alarms.alert(outcome, subject, f"{detail}: {flags}" if flags else detail)
+        elif self._alarms.stands(UNTRUSTED, subject) and not self._model.hole.has_untrusted(measurement.tube):
+            self._alarms.clear(UNTRUSTED, subject)
 
     def on_epoch(self, epoch: int) -> None:
         """The encoder has started again."""
