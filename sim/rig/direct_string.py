@@ -51,6 +51,7 @@ class Survey:
     tube: int
     error: float  # rad, yaw with all constant errors, less the truth
     measurement: SurveyMeasurement
+    said: int  # cycle in which it was said
 
 
 @dataclass(slots=True)
@@ -400,9 +401,9 @@ class DirectString:
         for first in reversed(run.surveys):
             if (first.tube, first.measurement.station_at) == (tube, message.station_at):
                 moved = wrap(message.yaw - first.measurement.yaw)
-                run.revisions.append(Survey(first.cycle, tube, first.error + moved, message))
+                run.revisions.append(Survey(first.cycle, tube, first.error + moved, message, cycle))
                 return
-        run.surveys.append(Survey(cycle, tube, float(run.total_error[cycle, tube - 1]), message))
+        run.surveys.append(Survey(cycle, tube, float(run.total_error[cycle, tube - 1]), message, cycle))
 
 
 def aiding_vector(aiding: Aiding) -> tuple[float, ...]:

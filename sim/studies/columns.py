@@ -145,6 +145,18 @@ FIXED_POINT_NEES: Columns = (
     ("nees_turning", "turning"),
     ("nees_total", "with joints"),
 )
+LIMITS: Columns = (
+    ("case", "case"),
+    ("quantity", "quantity"),
+    ("ours", "ours, deg"),
+    ("low", "low"),
+    ("high", "high"),
+    ("to_reach", "to reach"),
+    ("reached", "reached"),
+    ("bound", "bound, deg"),
+    ("ratio", "of the bound"),
+    ("nees", "NEES"),
+)
 FIELD: Columns = (
     ("case", "disturbance"),
     ("yaw_rms_turning_deg", "yaw rms turning, deg"),

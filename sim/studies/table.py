@@ -183,6 +183,16 @@ STUDIES = by_name(
             short="--seeds 2 --disturbance random-phase",
         ),
         Study(
+            "limits",
+            "How near a node comes to the best filter and the best smoother on the same data: at rest and at surveys.",
+            f"{MODULES}.limits",
+            (Table("Limits, {seeds} seeds", columns.LIMITS, columns.LIMITS),),
+            (SEEDS,),
+            drawn=False,
+            full=("--seeds 200",),
+            short="--seeds 2",
+        ),
+        Study(
             "alignment",
             "Mount of an IMU from two slow turns: a circle fit beside (max + min) / 2, and the survey after.",
             f"{MODULES}.alignment",

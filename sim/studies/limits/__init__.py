@@ -1,0 +1,1 @@
+"""How near a node is to the best that its data hold."""
