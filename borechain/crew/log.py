@@ -122,7 +122,8 @@ class RunLog:
         self._newest = max(self._newest, row["seq"])
         lean = f"{row['inclination_deg']:.2f} deg to {row['azimuth_deg']:.0f} deg"
         trust = "" if row["trust"] == "full" else f", {row['trust'].replace('_', ' ')}"
-        self._line("survey", f"tube {row['tube']} at {row['md_m']:.2f} m: {lean}{trust}")
+        again = "" if row["replaces"] is None else ", again"
+        self._line("survey", f"tube {row['tube']} at {row['md_m']:.2f} m: {lean}{trust}{again}")
 
     def _tell_alarm(self, alarm: View) -> None:
         now = alarm["state"], alarm["level"]

@@ -44,10 +44,8 @@ def test_a_run_is_logged_a_line_for_whatever_happens_and_its_recording_gives_the
 
 
 def test_a_survey_whose_news_was_lost_on_the_way_is_told_in_the_end_and_every_one_once() -> None:
-    rows = [
-        {"seq": n, "tube": 1, "md_m": 2.0 * n, "inclination_deg": 1.0, "azimuth_deg": 40.0, "trust": "full"}
-        for n in (1, 2, 3)
-    ]
+    alike = {"tube": 1, "inclination_deg": 1.0, "azimuth_deg": 40.0, "trust": "full"}
+    rows = [alike | {"seq": n, "md_m": 2.0 * n, "replaces": 7 if n == 3 else None} for n in (1, 2, 3)]
     answers = {
         "measurements": {"measurements": rows},
         "alarms": {"open": [], "closed": []},
@@ -65,3 +63,4 @@ def test_a_survey_whose_news_was_lost_on_the_way_is_told_in_the_end_and_every_on
         *(f"tube 1 at {md:.2f} m: 1.00" for md in (2.0, 6.0, 4.0)),
         "ON TARGET",
     ]
+    assert [text.endswith(", again") for text in told] == [False, True, False, False]
