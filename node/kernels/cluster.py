@@ -11,7 +11,7 @@ from typing import Any, Final
 from node.kernels.calibration import USUAL
 from node.kernels.cluster_watch import choose_imus, compare_imus, tell_members, watch_imus
 from node.kernels.fixed.arithmetic import mul, quotient
-from node.kernels.guard import is_heard
+from node.kernels.gates import is_heard
 from node.kernels.jit import kernel
 from node.kernels.layout import RING, Array
 from node.kernels.numbers import by_type, fraction, mean, square, times, within

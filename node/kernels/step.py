@@ -18,7 +18,8 @@ from node.kernels.cycle import run_cycle
 from node.kernels.doubts import noise_var, unexplained_var
 from node.kernels.events import Code, tell, told, told_degrees
 from node.kernels.fixed.layout import ANGLE_Q, VECTOR_Q
-from node.kernels.guard import admits, gate_aiding, guard_reading, judge_cycle
+from node.kernels.gates import admits, gate_aiding
+from node.kernels.guard import guard_reading, judge_cycle
 from node.kernels.intake import take_readings
 from node.kernels.jit import constant, entry, kernel, shared_body
 from node.kernels.layout import CLOCK_SLACK, DEG, Array, Scheme, Status

@@ -12,7 +12,7 @@ from node.firmware.sensor_limits import SensorLimits
 from node.firmware.settings import TubeSettings, crew_record
 from node.kernels.aiding_watch import AT_ONCE, find_mismatch, forget
 from node.kernels.events import Fault
-from node.kernels.guard import contradicts
+from node.kernels.gates import contradicts
 from node.kernels.layout import DEG, Err, default_config
 from node.kernels.record import AIDINGS, MISMATCH, new_node
 from node.kernels.sensor_watch import find_faults
