@@ -30,8 +30,7 @@ def uncertainty(k: RigModel, p: dict[str, str]) -> View:
     """Ellipse in plan and ellipsoid of every station at a confidence, and what they are made of."""
     confidence = _confidence(p.get("confidence"))
     plane, space = coverage_radius(confidence, 2), coverage_radius(confidence, 3)
-    points = k.hole.trajectory
-    covs = np.array([point.cov for point in points])
+    points, covs = k.hole.trajectory.points, k.hole.trajectory.covs
     shared = np.array([point.shared for point in points])
     random = np.diagonal(covs, axis1=1, axis2=2) - shared.sum(axis=1)
     rows = zip(points, plan_ellipses(covs, plane), *axes(covs, space), random, shared, strict=True)
@@ -81,7 +80,7 @@ def column(k: RigModel, p: dict[str, str]) -> View:
     """
     design = k.config.design
     moment = _moment(k, p["moment"]) if "moment" in p else None
-    rows = k.hole.deviations if moment is None else moment.rows
+    rows = list(k.hole.deviations) if moment is None else moment.rows
     end = k.hole.projection if moment is None else moment.projection
     return {
         "design": {

@@ -101,6 +101,19 @@ class SurveyStation:
             self._fused = made_of, self._fuse(weighting)
         return self._fused[1]
 
+    @property
+    def direction(self) -> Direction:
+        """What it came to when it was fused last.
+
+        Raises
+        ------
+        ValueError
+            When it never was.
+        """
+        if self._fused is None:
+            raise ValueError(f"station at {self.md:g} m: expected one that was fused")
+        return self._fused[1]
+
     def _fuse(self, weighting: Weighting) -> Direction:
         counting = self.counting
         if weighting is not Weighting.BAYES:

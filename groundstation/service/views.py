@@ -228,7 +228,7 @@ def cluster(c: Cluster, n: int) -> View:
 
 def trajectory(k: RigModel, p: Parameters) -> View:
     """Positions with covariance: at the stations, in a range of depth, or interpolated at one depth."""
-    points = k.hole.trajectory
+    points = k.hole.trajectory.points
     if "md" in p:
         wanted = Range.parse("md", p["md"])
         if wanted.single:

@@ -11,6 +11,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from itertools import pairwise
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -95,6 +96,16 @@ class Packed:
     def width(self) -> int:
         """How many there are."""
         return self._width
+
+    @property
+    def places(self) -> npt.NDArray[Any]:
+        """Places (c,) of those that may not be zero."""
+        return self._places
+
+    @property
+    def values(self) -> Array:
+        """What stands there, (k, c)."""
+        return self._values
 
     def columns(self) -> Array:
         """All of them (k, s), made anew."""

@@ -11,8 +11,10 @@ from __future__ import annotations
 
 import itertools
 import math
+import operator
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from typing import Final
 
 import numpy as np
 import numpy.typing as npt
@@ -21,6 +23,7 @@ from groundstation.errors import SurveyError
 from groundstation.survey.methods import OPPOSITE, Method, dogleg, leg, ratio_factor
 from groundstation.survey.resolve import Direction, angles
 from groundstation.survey.shared import added, widened
+from groundstation.survey.tangents import Tangent, tangents_along
 
 Array = npt.NDArray[np.float64]
 BLOCK = 64  # stations, whose columns are held at a time
@@ -37,18 +40,22 @@ class Point:
     shared: Array  # (3, s) m, change for one standard deviation of every shared error, or what is kept of that
 
 
-def tangents_of(directions: Sequence[Direction]) -> Array:
-    """Downhole unit vectors (n, 3)."""
-    return np.array([(*direction.lean.tolist(), direction.down) for direction in directions])
+ROW: Final = np.dtype([(name, np.float64, shape) for name, shape in (("md", ()), ("position", 3), ("cov", (3, 3)))])
+FEWEST = 8  # rows of a table
+GROWTH = 8  # share of its rows by which a table grows
 
 
-def tangent_jacobians(tangents: Array) -> Array:
-    """D tangent / d lean (n, 3, 2); the vertical part follows from the unit length."""
-    down = np.copysign(np.maximum(np.abs(tangents[:, 2]), 1e-6), tangents[:, 2])
-    jacobians = np.zeros((len(tangents), 3, 2))
-    jacobians[:, 0, 0] = jacobians[:, 1, 1] = 1.0
-    jacobians[:, 2] = -tangents[:, :2] / down[:, None]
-    return jacobians
+@dataclass(frozen=True, slots=True)
+class Sums:
+    """What a hole has come to at a station: the running sums of the kernel, and the length of the last leg (m)."""
+
+    own: Array  # (3, 3)
+    passed: Array  # (3, s)
+    length: float
+
+    def copied(self) -> Sums:
+        """The same, to go on with."""
+        return Sums(self.own.copy(), self.passed.copy(), self.length)
 
 
 class Trajectory:
@@ -73,12 +80,42 @@ class Trajectory:
         self._method = method
         self._keep = keep
         first = collar or Direction(np.zeros(2), 1.0, np.zeros((2, 2)), np.zeros((2, 0)))
-        tangents = tangents_of([first])
-        jacobian = tangent_jacobians(tangents)[0]
-        self._last_cov, self._last_shared = jacobian @ first.cov @ jacobian.T, jacobian @ first.shared  # of the tangent
-        self._length = 0.0
-        self._own, self._passed = np.zeros((3, 3)), np.zeros((3, 0))  # running sums, see the kernel
-        self.points = [Point(start_md, tangents[0], np.zeros(3), np.zeros((3, 3)), keep(np.zeros((1, 3, 0)))[0])]
+        self._tangents = tangents_along([first])  # of the collar and every station
+        self._rows = np.zeros(FEWEST, ROW)
+        self._rows["md"][0] = start_md
+        self._kept = list(keep(np.zeros((1, 3, 0))))
+        self._sums = Sums(np.zeros((3, 3)), np.zeros((3, 0)), 0.0)
+        self._marks = [self._sums.copied()]  # at the collar and every BLOCK stations from there
+
+    def __len__(self) -> int:
+        """How many points there are."""
+        return len(self._tangents)
+
+    def __getitem__(self, place: int) -> Point:
+        place = range(len(self))[place]
+        md, position, cov = self._rows[place]
+        unit = np.array(self._tangents[place].unit)
+        return Point(float(md), unit, position.copy(), cov.copy(), self._kept[place])
+
+    @property
+    def points(self) -> list[Point]:
+        """Every station and the collar before them, made anew."""
+        return [self[place] for place in range(len(self))]
+
+    @property
+    def md(self) -> Array:
+        """Depths (n,) of the points, m."""
+        return np.asarray(self._rows["md"][: len(self)])
+
+    @property
+    def positions(self) -> Array:
+        """Positions (n, 3) of the points, m."""
+        return np.asarray(self._rows["position"][: len(self)])
+
+    @property
+    def covs(self) -> Array:
+        """Covariances (n, 3, 3) of the positions, m^2."""
+        return np.asarray(self._rows["cov"][: len(self)])
 
     def append(self, md: float, direction: Direction) -> Point:
         """Add the station at ``md`` (m).
@@ -89,7 +126,7 @@ class Trajectory:
             When the depth does not grow, or the two directions are opposite.
         """
         self.extend([(md, direction)])
-        return self.points[-1]
+        return self[-1]
 
     def extend(self, stations: Sequence[tuple[float, Direction]]) -> None:
         """Add stations (m, direction); the same bit for bit as one after the other, and several times as fast.
@@ -99,69 +136,106 @@ class Trajectory:
         SurveyError
             When a depth does not grow, or two directions are opposite; then none is added.
         """
-        if not stations:
+        self._extend([md for md, _ in stations], tangents_along([direction for _, direction in stations]))
+
+    def lead_through(self, stations: Sequence[tuple[float, Direction]]) -> None:
+        """Lead it from the collar through these stations (m, direction), bit for bit as one that is drawn anew.
+
+        Down to the first one that is another than before it stays as it is.
+
+        Raises
+        ------
+        SurveyError
+            When a depth does not grow, or two directions are opposite; then what is below may be lacking.
+        """
+        mds, tangents = [md for md, _ in stations], tangents_along([one for _, one in stations], self._tangents)
+        known = zip(self.md[1:].tolist(), self._tangents[1:], strict=True)
+        are_same = map(operator.eq, zip(mds, tangents, strict=True), known)
+        same = sum(itertools.takewhile(bool, are_same))
+        if same < len(self) - 1:
+            same -= same % BLOCK
+            self._cut(same)
+        self._extend(mds[same:], tangents[same:])
+
+    def _cut(self, count: int) -> None:
+        """Go back to the first stations, a number of blocks."""
+        del self._tangents[count + 1 :], self._kept[count + 1 :], self._marks[count // BLOCK + 1 :]
+        self._sums = self._marks[-1].copied()
+
+    def _extend(self, mds: Sequence[float], tangents: Sequence[Tangent]) -> None:
+        if not tangents:
             return
-        before = self.points[-1]
-        mds, directions = zip(*stations, strict=True)
-        lengths = np.diff([before.md, *mds])
+        before = len(self) - 1
+        depths = [float(self._rows["md"][before]), *mds]
+        lengths = np.diff(depths)
         for n, length in enumerate(lengths.tolist()):
             if not 0.0 < length < math.inf:
-                raise SurveyError(f"trajectory: expected a depth beyond {[before.md, *mds][n]:g} m, got {mds[n]:g} m")
-        tangents = np.concatenate([before.tangent[None], tangents_of(directions)])
-        legs = self._legs(lengths, [before.md, *mds], tangents, directions)
-        positions = np.add.accumulate([before.position, *legs])
-        for first in range(0, len(mds), BLOCK):
-            block = slice(first, first + BLOCK)
-            jacobians = tangent_jacobians(tangents[1:][block])
-            own = np.array([direction.cov for direction in directions[block]])
-            covs = jacobians @ own @ jacobians.transpose(0, 2, 1)
-            columns = [jacobian @ one.shared for jacobian, one in zip(jacobians, directions[block], strict=True)]
-            rows = zip(mds[block], tangents[1:][block], positions[1:][block], strict=True)
-            for row, errors in zip(rows, self._follow(lengths[block], covs, columns), strict=True):
-                self.points.append(Point(*row, *errors))
+                raise SurveyError(f"trajectory: expected a depth beyond {depths[n]:g} m, got {mds[n]:g} m")
+        along = [self._tangents[-1], *tangents]
+        legs = self._legs(lengths, depths, along)
+        self._make_room(len(tangents))
+        own = self._rows[before + 1 : before + 1 + len(mds)]
+        own["md"] = mds
+        own["position"] = np.add.accumulate([self._rows["position"][before], *legs])[1:]
+        first = 0
+        while first < len(mds):
+            some = slice(first, min(first + BLOCK - (before + first) % BLOCK, len(mds)))
+            covs, kept = self._follow(lengths[some], along[some.start : some.stop + 1])
+            own["cov"][some] = covs
+            self._kept += kept
+            first = some.stop
+            if (before + first) % BLOCK == 0:
+                self._marks.append(self._sums.copied())
+        self._tangents += tangents
 
-    def _follow(self, lengths: Array, covs: Array, columns: list[Array]) -> list[tuple[Array, Array]]:
-        """Covariance (3, 3) of each position at the ends of legs (n,), m, and what is kept of its shared columns.
+    def _make_room(self, more: int) -> None:
+        """Have rows for more points."""
+        known, count = self._rows, len(self)
+        if count + more > len(known):
+            self._rows = np.zeros(count + more + (count + more) // GROWTH, ROW)
+            self._rows[:count] = known[:count]
 
-        From those of their tangents, (n, 3, 3) and (3, s) each.
+    def _follow(self, lengths: Array, tangents: Sequence[Tangent]) -> tuple[Array, list[Array]]:
+        """Covariances (n, 3, 3) of the positions at the ends of legs (n,), m, and what is kept of the shared columns.
+
+        ``tangents`` are those at both ends of each, n + 1.
         """
         from groundstation.survey.kernels.position_errors import add_stations  # whoever only reads needs no compiler
 
-        known = max(self._last_shared.shape[1], self._passed.shape[1])
-        widths = list(itertools.accumulate((own.shape[1] for own in columns), max, initial=known))
-        tangents = np.zeros((len(columns) + 1, 3, widths[-1]))
-        for n, own in enumerate((self._last_shared, *columns)):
-            tangents[n, :, : own.shape[1]] = own
-        of_tangents = np.concatenate([self._last_cov[None], covs])
+        columns = [one.columns for one in tangents]
+        known = max(self._sums.passed.shape[1], columns[0].width)
+        widths = list(itertools.accumulate((one.width for one in columns[1:]), max, initial=known))
+        starts = np.array([0, *itertools.accumulate(len(one.places) for one in columns)])
+        places = np.concatenate([one.places for one in columns]).astype(np.intp, copy=False)
         ends = 0.5 * lengths
         weights = ends.copy()  # of the station before each, which has both its legs now
-        weights[0] += 0.5 * self._length
+        weights[0] += 0.5 * self._sums.length
         weights[1:] += ends[:-1]
-        passed, shared, out = widened(self._passed, widths[-1]), np.empty_like(tangents[1:]), np.empty_like(covs)
-        add_stations(weights, ends, tangents, of_tangents, passed, self._own, shared, out)
-        self._passed, self._length = passed, float(lengths[-1])
-        self._last_cov, self._last_shared = covs[-1], columns[-1]
-        points: list[tuple[Array, Array]] = []
+        passed, own = widened(self._sums.passed, widths[-1]), self._sums.own
+        shared, out = np.empty((len(lengths), 3, widths[-1])), np.empty((len(lengths), 3, 3))
+        of_tangents = np.array([one.cov for one in tangents])
+        values = np.concatenate([one.values for one in columns], axis=1)
+        add_stations(weights, ends, starts, places, values, of_tangents, passed, own, shared, out)
+        self._sums = Sums(own, passed, float(lengths[-1]))
+        kept: list[Array] = []
         for width, same in itertools.groupby(widths[1:]):
-            run = slice(len(points), len(points) + len(list(same)))
+            run = slice(len(kept), len(kept) + len(list(same)))
             known_here = shared[run, :, :width]
-            points += zip(out[run] + known_here @ known_here.transpose(0, 2, 1), self._keep(known_here), strict=True)
-        return points
+            out[run] += known_here @ known_here.transpose(0, 2, 1)
+            kept.extend(self._keep(known_here))
+        return out, kept
 
-    def _legs(self, lengths: Array, mds: Sequence[float], tangents: Array, directions: Sequence[Direction]) -> Array:
+    def _legs(self, lengths: Array, mds: Sequence[float], tangents: Sequence[Tangent]) -> Array:
         """Displacements (n, 3) from station to station."""
         if self._method is Method.BALANCED_TANGENTIAL:
-            return np.asarray((0.5 * lengths)[:, None] * (tangents[:-1] + tangents[1:]))
-        return np.array(
-            [
-                self._leg(md, tangent, length, direction)
-                for md, tangent, length, direction in zip(mds, tangents, lengths.tolist(), directions, strict=False)
-            ]
-        )
+            units = np.array([one.unit for one in tangents])
+            return np.asarray((0.5 * lengths)[:, None] * (units[:-1] + units[1:]))
+        ends = zip(mds, itertools.pairwise(tangents), lengths.tolist(), strict=False)
+        return np.array([self._leg(md, *pair, length) for md, pair, length in ends])
 
-    def _leg(self, md: float, tangent: Array, length: float, direction: Direction) -> Array:
-        i1, a1 = angles(tangent[:2], float(tangent[2]))
-        i2, a2 = angles(direction.lean, direction.down)
+    def _leg(self, md: float, before: Tangent, tangent: Tangent, length: float) -> Array:
+        i1, a1 = angles(np.array(before.unit[:2]), before.unit[2])
+        i2, a2 = angles(tangent.direction.lean, tangent.direction.down)
         if self._method is Method.MINIMUM_CURVATURE and dogleg(math, i1, a1, i2, a2) > math.pi - OPPOSITE:
             raise SurveyError(f"trajectory: the hole turns back on itself between {md:g} and {md + length:g} m")
         return np.array(leg(math, self._method, length, i1, a1, i2, a2))

@@ -92,6 +92,36 @@ def test_a_long_hole_at_once_is_the_same_as_station_by_station(method: Method) -
         np.testing.assert_array_equal(appended.shared, extended.shared)
 
 
+@pytest.mark.parametrize("count", [1, BLOCK - 1, BLOCK, 2 * BLOCK + 3])
+def test_a_hole_that_has_changed_is_drawn_as_one_that_never_was_another(count: int) -> None:
+    """Stations that change, come between others, are added below or go, at the borders of the blocks and within."""
+    stations = [(float(k), turned(0.3 + 1e-3 * k, 0.01 * k, 1e-3, [1e-3] * (1 + k // 50))) for k in range(1, count + 1)]
+    other = turned(0.2, 1.0, 2e-3, [1e-3] * 5)
+    led = Trajectory()
+    led.lead_through(stations)
+    for place in sorted({0, count // 2, min(BLOCK, count - 1), count - 1}):
+        for changed in (
+            [*stations[:place], (stations[place][0], other), *stations[place + 1 :]],
+            [*stations[:place], (stations[place][0] - 0.5, other), *stations[place:]],
+            stations[:place],
+            [*stations, (count + 1.0, other)],
+            stations,
+        ):
+            led.lead_through(changed)
+            anew = Trajectory()
+            anew.extend(changed)
+            assert len(led) == len(anew) == len(changed) + 1
+            for one, drawn in zip(led.points, anew.points, strict=True):
+                assert one.md == drawn.md
+                np.testing.assert_array_equal(one.tangent, drawn.tangent)
+                np.testing.assert_array_equal(one.position, drawn.position)
+                np.testing.assert_array_equal(one.cov, drawn.cov)
+                np.testing.assert_array_equal(one.shared, drawn.shared)
+            np.testing.assert_array_equal(led.md, [one.md for one in anew.points])
+            np.testing.assert_array_equal(led.positions, [one.position for one in anew.points])
+            np.testing.assert_array_equal(led.covs, [one.cov for one in anew.points])
+
+
 def test_a_point_keeps_of_its_columns_what_the_trajectory_is_told() -> None:
     whole, sums = Trajectory(), Trajectory(keep=lambda columns: (columns**2).sum(axis=-1))
     for trajectory in (whole, sums):
