@@ -31,7 +31,7 @@ def uncertainty(k: RigModel, p: dict[str, str]) -> View:
     confidence = _confidence(p.get("confidence"))
     plane, space = coverage_radius(confidence, 2), coverage_radius(confidence, 3)
     points, covs = k.hole.trajectory.points, k.hole.trajectory.covs
-    shared = np.array([point.shared for point in points])
+    shared = k.hole.variances
     random = np.diagonal(covs, axis1=1, axis2=2) - shared.sum(axis=1)
     rows = zip(points, plan_ellipses(covs, plane), *axes(covs, space), random, shared, strict=True)
     return {

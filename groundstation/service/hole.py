@@ -9,10 +9,12 @@ from __future__ import annotations
 import itertools
 import math
 from bisect import bisect_left, insort
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
+from typing import Final
 
 import numpy as np
+import numpy.typing as npt
 
 from groundstation.config import GroundConfig
 from groundstation.service.alarms import AlarmList
@@ -24,6 +26,9 @@ from groundstation.survey.fusion import Evidence, Weighting, departures_from, ju
 from groundstation.survey.shared import SharedErrors
 from groundstation.survey.trajectory import Point, Trajectory
 
+Array = npt.NDArray[np.float64]
+NOTHING: Final = np.zeros((3, 0))
+
 
 @dataclass(frozen=True, slots=True)
 class Moved:
@@ -33,6 +38,11 @@ class Moved:
     at: float  # s
     dropped: int  # earlier clusters that no longer count
     evidence: Evidence
+
+
+def no_columns(columns: Array) -> Iterator[Array]:
+    """What the points of a hole keep of their shared columns."""
+    return itertools.repeat(NOTHING, len(columns))
 
 
 class Hole:
@@ -54,7 +64,7 @@ class Hole:
         self._moved: list[Moved] = []
         self._alarms = AlarmList()
         self._history = History()
-        self._trajectory = Trajectory(keep=shared.variances)  # of the variances of its positions by kind, (kinds, 3)
+        self._trajectory = Trajectory(keep=no_columns)
         self._deviations = self._deviate()
         self._projection: Deviation | None = None
         self._unsettled_since = math.inf  # s, rig time of the oldest survey from which nothing follows yet
@@ -109,6 +119,14 @@ class Hole:
         """From the collar down."""
         self.settle()
         return self._trajectory
+
+    @property
+    def variances(self) -> Array:
+        """Variances (n, kinds, 3) of the positions along the trajectory (m^2) by what their stations share.
+
+        They are worked out when they are asked for: a start goes through hundreds of stops and shows none of them.
+        """
+        return np.concatenate([self._shared.variances(columns) for columns in self.trajectory.columns()])
 
     def point_of(self, station: SurveyStation) -> Point:
         """Point of the trajectory at a station; the collar for one at its depth."""

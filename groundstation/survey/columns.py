@@ -170,7 +170,7 @@ class Deviations:
         return (Deviation(*row) for row in rows)
 
     def worst(self, first: int = 0) -> Deviation | None:
-        """The worst from a place on, by the share of the tolerance that is used up, the first of equals; None of none."""
+        """The worst from a place on, by the share of the tolerance used, the first of equals; None of none."""
         limit = self.limit[first:]
         size = np.hypot(self.offset[first:, 0], self.offset[first:, 1])
         infinite = np.where(size > 0.0, np.inf, 0.0)

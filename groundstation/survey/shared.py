@@ -89,7 +89,7 @@ class Packed:
         """``places`` of those that are not zero, where they are known."""
         places = np.flatnonzero(columns.any(axis=0)) if places is None else places
         self._places = places.astype(np.uint16 if columns.shape[1] <= MOST_OF_16_BITS else np.intp)
-        self._values = columns[:, places]
+        self._values = columns.take(places, axis=1)
         self._width = int(columns.shape[1])
 
     @property
@@ -106,6 +106,12 @@ class Packed:
     def values(self) -> Array:
         """What stands there, (k, c)."""
         return self._values
+
+    def under(self, matrix: Array) -> Packed:
+        """What a matrix (j, k) makes of them: (j, s)."""
+        made = Packed.__new__(Packed)
+        made._places, made._values, made._width = self._places, matrix @ self._values, self._width
+        return made
 
     def columns(self) -> Array:
         """All of them (k, s), made anew."""
@@ -140,6 +146,11 @@ class Fused(Direction):
         return self._packed.columns()
 
     @property
+    def packed(self) -> Packed:
+        """Columns as they are kept."""
+        return self._packed
+
+    @property
     def width(self) -> int:
         """How many columns there are."""
         return self._packed.width
@@ -147,6 +158,11 @@ class Fused(Direction):
     def fill(self, columns: Array) -> None:
         """Put the columns into zeros (2, s or more)."""
         self._packed.fill(columns)
+
+
+def packed_of(direction: Direction) -> Packed:
+    """Columns of any direction, packed."""
+    return direction.packed if isinstance(direction, Fused) else Packed(direction.shared)
 
 
 class SharedErrors:

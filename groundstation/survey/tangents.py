@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import itertools
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
@@ -10,10 +9,9 @@ import numpy as np
 import numpy.typing as npt
 
 from groundstation.survey.resolve import Direction
-from groundstation.survey.shared import Packed, packed_each, stacked
+from groundstation.survey.shared import Packed, packed_of
 
 Array = npt.NDArray[np.float64]
-TOGETHER = 64  # directions whose columns are held side by side
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -35,15 +33,13 @@ def tangents_along(directions: Sequence[Direction], known: Sequence[Tangent] = (
 
 
 def _worked_out(directions: Sequence[Direction]) -> Iterator[Tangent]:
-    """Those with equally many columns together: the last bits of a product depend on that."""
-    for width, alike in itertools.groupby(directions, lambda direction: direction.width):
-        while some := list(itertools.islice(alike, TOGETHER)):
-            units = units_of(some)
-            jacobians = jacobians_of(units)
-            covs = jacobians @ np.array([one.cov for one in some]) @ jacobians.transpose(0, 2, 1)
-            columns = packed_each(jacobians @ stacked(some, width))
-            for direction, unit, cov, packed in zip(some, units.tolist(), covs, columns, strict=True):
-                yield Tangent(direction, tuple(unit), cov.copy(), packed)
+    if not directions:
+        return
+    units = units_of(directions)
+    jacobians = jacobians_of(units)
+    covs = jacobians @ np.array([one.cov for one in directions]) @ jacobians.transpose(0, 2, 1)
+    for direction, unit, jacobian, cov in zip(directions, units.tolist(), jacobians, covs, strict=True):
+        yield Tangent(direction, tuple(unit), cov.copy(), packed_of(direction).under(jacobian))
 
 
 def units_of(directions: Sequence[Direction]) -> Array:

@@ -12,7 +12,7 @@ from __future__ import annotations
 import itertools
 import math
 import operator
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from typing import Final
 
@@ -66,7 +66,7 @@ class Trajectory:
     method : of the legs
     collar : direction at the first depth, known: vertical by default
     start_md : m
-    keep : makes of the shared columns (n, 3, s) of n points what these keep of them, a row each: all by default, which
+    keep : makes of the shared columns (n, 3, s) of n points what these keep of them, one each: all by default, which
         of a string of fifty tubes is 750 numbers a point
     """
 
@@ -75,7 +75,7 @@ class Trajectory:
         method: Method = Method.BALANCED_TANGENTIAL,
         collar: Direction | None = None,
         start_md: float = 0.0,
-        keep: Callable[[Array], Array] = np.asarray,
+        keep: Callable[[Array], Iterable[Array]] = np.asarray,
     ) -> None:
         self._method = method
         self._keep = keep
@@ -180,13 +180,24 @@ class Trajectory:
         first = 0
         while first < len(mds):
             some = slice(first, min(first + BLOCK - (before + first) % BLOCK, len(mds)))
-            covs, kept = self._follow(lengths[some], along[some.start : some.stop + 1])
+            self._sums, runs, covs = _follow(self._sums, lengths[some], along[some.start : some.stop + 1])
+            for begin, run in zip(itertools.accumulate(map(len, runs), initial=0), runs, strict=False):
+                covs[begin : begin + len(run)] += run @ run.transpose(0, 2, 1)
+                self._kept.extend(self._keep(run))
             own["cov"][some] = covs
-            self._kept += kept
             first = some.stop
             if (before + first) % BLOCK == 0:
                 self._marks.append(self._sums.copied())
         self._tangents += tangents
+
+    def columns(self) -> Iterator[Array]:
+        """Shared columns (n, 3, s) of the points from the collar down, some at a time, as many as were known there."""
+        yield np.zeros((1, 3, 0))
+        lengths = np.diff(self.md)
+        for number, mark in enumerate(self._marks):
+            some = slice(number * BLOCK, min((number + 1) * BLOCK, len(lengths)))
+            if some.start < some.stop:
+                yield from _follow(mark.copied(), lengths[some], self._tangents[some.start : some.stop + 1])[1]
 
     def _make_room(self, more: int) -> None:
         """Have rows for more points."""
@@ -194,36 +205,6 @@ class Trajectory:
         if count + more > len(known):
             self._rows = np.zeros(count + more + (count + more) // GROWTH, ROW)
             self._rows[:count] = known[:count]
-
-    def _follow(self, lengths: Array, tangents: Sequence[Tangent]) -> tuple[Array, list[Array]]:
-        """Covariances (n, 3, 3) of the positions at the ends of legs (n,), m, and what is kept of the shared columns.
-
-        ``tangents`` are those at both ends of each, n + 1.
-        """
-        from groundstation.survey.kernels.position_errors import add_stations  # whoever only reads needs no compiler
-
-        columns = [one.columns for one in tangents]
-        known = max(self._sums.passed.shape[1], columns[0].width)
-        widths = list(itertools.accumulate((one.width for one in columns[1:]), max, initial=known))
-        starts = np.array([0, *itertools.accumulate(len(one.places) for one in columns)])
-        places = np.concatenate([one.places for one in columns]).astype(np.intp, copy=False)
-        ends = 0.5 * lengths
-        weights = ends.copy()  # of the station before each, which has both its legs now
-        weights[0] += 0.5 * self._sums.length
-        weights[1:] += ends[:-1]
-        passed, own = widened(self._sums.passed, widths[-1]), self._sums.own
-        shared, out = np.empty((len(lengths), 3, widths[-1])), np.empty((len(lengths), 3, 3))
-        of_tangents = np.array([one.cov for one in tangents])
-        values = np.concatenate([one.values for one in columns], axis=1)
-        add_stations(weights, ends, starts, places, values, of_tangents, passed, own, shared, out)
-        self._sums = Sums(own, passed, float(lengths[-1]))
-        kept: list[Array] = []
-        for width, same in itertools.groupby(widths[1:]):
-            run = slice(len(kept), len(kept) + len(list(same)))
-            known_here = shared[run, :, :width]
-            out[run] += known_here @ known_here.transpose(0, 2, 1)
-            kept.extend(self._keep(known_here))
-        return out, kept
 
     def _legs(self, lengths: Array, mds: Sequence[float], tangents: Sequence[Tangent]) -> Array:
         """Displacements (n, 3) from station to station."""
@@ -239,6 +220,37 @@ class Trajectory:
         if self._method is Method.MINIMUM_CURVATURE and dogleg(math, i1, a1, i2, a2) > math.pi - OPPOSITE:
             raise SurveyError(f"trajectory: the hole turns back on itself between {md:g} and {md + length:g} m")
         return np.array(leg(math, self._method, length, i1, a1, i2, a2))
+
+
+def _follow(sums: Sums, lengths: Array, tangents: Sequence[Tangent]) -> tuple[Sums, list[Array], Array]:
+    """Go on from sums, which are used up, by legs (n,), m, with the tangents at both ends of each, n + 1.
+
+    Returns the sums, the shared columns (.., 3, s) of the positions at the ends of the legs, those with equally many
+    together, and the covariances (n, 3, 3) that are their own.
+    """
+    from groundstation.survey.kernels.position_errors import add_stations  # whoever only reads needs no compiler
+
+    columns = [one.columns for one in tangents]
+    known = max(sums.passed.shape[1], columns[0].width)
+    widths = list(itertools.accumulate((one.width for one in columns[1:]), max, initial=known))
+    starts = np.array([0, *itertools.accumulate(len(one.places) for one in columns)])
+    places = np.concatenate([one.places for one in columns]).astype(np.intp, copy=False)
+    ends = 0.5 * lengths
+    weights = ends.copy()  # of the station before each, which has both its legs now
+    weights[0] += 0.5 * sums.length
+    weights[1:] += ends[:-1]
+    passed, shared, out = (
+        widened(sums.passed, widths[-1]),
+        np.empty((len(ends), 3, widths[-1])),
+        np.empty((len(ends), 3, 3)),
+    )
+    covs, values = np.array([one.cov for one in tangents]), np.concatenate([one.values for one in columns], axis=1)
+    add_stations(weights, ends, starts, places, values, covs, passed, sums.own, shared, out)
+    runs, end = [], 0
+    for width, same in itertools.groupby(widths[1:]):
+        begin, end = end, end + len(list(same))
+        runs.append(shared[begin:end, :, :width])
+    return Sums(sums.own, passed, float(lengths[-1])), runs, out
 
 
 def interpolate(points: list[Point], md: float) -> Point:
