@@ -82,8 +82,9 @@ def write_day(url: str, hours: float, tubes: int) -> int:
             stands_at = BEGUN_AT + ROUND_S * stop + DRILLING_S
             store.keep_stand(Stand(EPOCH, stands_at, stands_at + ROUND_S - DRILLING_S, md))
             at = stands_at + SURVEYED_AFTER_S
-            read = [(replace(survey_of(tube, stop + 1, at), epoch=EPOCH), TUBE_LENGTH * tube) for tube in up_to(tubes)]
-            store.add_messages([Stored(survey, md - below, below) for survey, below in read])
+            surveyed = [replace(survey_of(tube, stop + 1, at, tubes - tube + 1), epoch=EPOCH) for tube in up_to(tubes)]
+            below = [TUBE_LENGTH * tube for tube in up_to(tubes)]
+            store.add_messages([Stored(one, md - own, own) for one, own in zip(surveyed, below, strict=True)])
             surveys += tubes
     return surveys
 
