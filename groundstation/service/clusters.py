@@ -17,7 +17,7 @@ import numpy.typing as npt
 
 from groundstation.survey.fusion import Departure, Stack
 from groundstation.survey.resolve import Direction, Quality
-from groundstation.survey.shared import CAUSES, Places, Reading, put_columns
+from groundstation.survey.shared import CAUSES, Places, Reading, columns_of
 from groundstation.survey.trust import UNKNOWN_YAW_VAR, Trust
 from telemetry.messages import NodeFlag, SurveyMeasurement
 
@@ -146,9 +146,7 @@ class Table:
     def stack(self, numbers: Sequence[int]) -> Stack:
         """Directions of the surveys in several rows, side by side."""
         rows, places = self.rows[numbers], [self.places[number] for number in numbers]
-        shared = np.zeros((len(numbers), 2, int(rows["width"].max())))
-        for own, row, at in zip(shared, rows["causes"], places, strict=True):
-            put_columns(own, row, at)
+        shared = columns_of(rows["causes"], places, int(rows["width"].max()))
         return Stack(rows["lean"], rows["down"], rows["cov"], rows["information"], shared)
 
     def cluster(self, number: int) -> Cluster:
@@ -226,9 +224,13 @@ class Clusters:
 
     def departure(self, place: int) -> Departure | None:
         """How far a cluster departed from those before it; None where nobody has worked it out."""
-        row = self._table.rows[self._rows[place]]
-        size = float(row["departure"])
-        return None if math.isnan(size) else (row["departed"].copy(), size)
+        row = self._rows[place]
+        size = self._table.rows["departure"].item(row)
+        return None if math.isnan(size) else (self._table.rows["departed"][row].copy(), size)
+
+    def knows_departure(self, place: int) -> bool:
+        """Whether it is known how far a cluster departed from those before it."""
+        return not math.isnan(self._table.rows["departure"].item(self._rows[place]))
 
     def keep_departure(self, place: int, departure: Departure) -> None:
         """Keep how far a cluster departed from those before it."""

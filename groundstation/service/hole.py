@@ -151,7 +151,7 @@ class Hole:
         if since < math.inf:
             changed = self._judge_movement(since)
             self._fuse(changed)
-            self._work_out()
+            self._work_out(changed)
 
     def _fuse(self, changed: Sequence[SurveyStation]) -> None:
         """Fuse the stations of which something may have changed, together those that have one more cluster."""
@@ -159,17 +159,15 @@ class Hole:
         if weighting is Weighting.BAYES and (grown := [station for station in changed if station.lacks_newest]):
             newest = self._surveys.stack([station.clusters.row(station.count - 1) for station in grown])
             SurveyStation.add_newest(grown, newest)
-        for station in changed:
-            station.fused(weighting)
 
-    def _work_out(self) -> None:
-        drawn = [one for one in self._stations if one.md > 0.0]
-        self._trajectory.lead_through([(one.md, one.direction) for one in drawn])
+    def _work_out(self, changed: Sequence[SurveyStation]) -> None:
+        weighting = self._config.weighting
+        self._trajectory.put((one.md, one.fused(weighting)) for one in changed if one.md > 0.0)
         self._deviations = self._deviate()
         worst = self._deviations.worst(first=1)
         if worst is None:
             return
-        self._projection = project(self._trajectory[-1], drawn[-1].direction, self._design)
+        self._projection = project(self._trajectory[-1], self._stations[-1].fused(weighting), self._design)
         self._alarms.judge_deviation("deviation", worst, self._newest_at)
         self._alarms.judge_deviation("projection", self._projection, self._newest_at)
 
@@ -223,11 +221,12 @@ class Hole:
 
     def _clusters_after(self, time: float) -> list[tuple[float, int, int]]:
         """Clusters read later than a rig time (s) as (time, station, place), in their order."""
-        found = []
-        for row in np.flatnonzero(self._surveys.column("at") > time).tolist():
+        all_at, found = self._surveys.column("at"), []
+        rows = np.flatnonzero(all_at > time)
+        numbers = {id(station): number for number, station in enumerate(self._stations)} if len(rows) else {}
+        for row, at in zip(rows.tolist(), all_at[rows].tolist(), strict=True):
             station = self._station_of[row]
-            number = bisect_left(self._stations, station.md, key=lambda known: known.md)
-            found.append((float(self._surveys.rows["at"][row]), number, station.clusters.place_of(row)))
+            found.append((at, numbers[id(station)], station.clusters.place_of(row)))
         return sorted(found)
 
     def _find_departures(self, stop: list[tuple[float, int, int]]) -> None:

@@ -43,7 +43,7 @@ class SurveyStation:
 
     def first_before(self, place: int) -> int:
         """Place of the first cluster that counted when the one at ``place`` came."""
-        return max((drop for drop in self.drops if drop < place), default=0)
+        return max((drop for drop in self.drops if drop < place), default=0) if self.drops else 0
 
     def add_cluster(self, cluster: Cluster) -> None:
         """Add a cluster in the order of time; what was judged of later ones is forgotten.
@@ -101,24 +101,10 @@ class SurveyStation:
             self._fused = made_of, self._fuse(weighting)
         return self._fused[1]
 
-    @property
-    def direction(self) -> Direction:
-        """What it came to when it was fused last.
-
-        Raises
-        ------
-        ValueError
-            When it never was.
-        """
-        if self._fused is None:
-            raise ValueError(f"station at {self.md:g} m: expected one that was fused")
-        return self._fused[1]
-
     def _fuse(self, weighting: Weighting) -> Direction:
-        counting = self.counting
         if weighting is not Weighting.BAYES:
-            return weighted([self.clusters.reading(place) for place in counting], weighting)
-        if len(counting) == self.count - self.first:
+            return weighted([self.clusters.reading(place) for place in self.counting], weighting)
+        if not self.untrusted or len(self.counting) == self.count - self.first:
             return self._sum_of_all(self.count)
         if self._trusted is None:
             self._trusted = GrowingBayes()
@@ -137,7 +123,7 @@ class SurveyStation:
     def known_before(self, place: int) -> Direction | None:
         """What the clusters before one came to, where it has not departed from them yet and that is known."""
         begin = self.first_before(place)
-        is_open = begin < place and self.clusters.departure(place) is None
+        is_open = begin < place and not self.clusters.knows_departure(place)
         return self._all.known(begin, place) if is_open else None
 
     def _sum_of_all(self, end: int) -> Direction:

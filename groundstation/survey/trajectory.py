@@ -11,9 +11,9 @@ from __future__ import annotations
 
 import itertools
 import math
-import operator
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass
+from operator import itemgetter
 from typing import Final
 
 import numpy as np
@@ -22,11 +22,13 @@ import numpy.typing as npt
 from groundstation.errors import SurveyError
 from groundstation.survey.methods import OPPOSITE, Method, dogleg, leg, ratio_factor
 from groundstation.survey.resolve import Direction, angles
-from groundstation.survey.shared import added, widened
-from groundstation.survey.tangents import Tangent, tangents_along
+from groundstation.survey.shared import Packed, added, packed_of, widened
+from groundstation.survey.tangents import tangent_jacobians, tangents_of
 
 Array = npt.NDArray[np.float64]
 BLOCK = 64  # stations, whose columns are held at a time
+NONE: Final = Packed(np.zeros((3, 0)))
+FROM_ZERO: Final = np.zeros(1, np.intp)
 
 
 @dataclass(frozen=True, slots=True)
@@ -40,7 +42,17 @@ class Point:
     shared: Array  # (3, s) m, change for one standard deviation of every shared error, or what is kept of that
 
 
-ROW: Final = np.dtype([(name, np.float64, shape) for name, shape in (("md", ()), ("position", 3), ("cov", (3, 3)))])
+ROW: Final = np.dtype(
+    [
+        ("md", np.float64),
+        ("tangent", np.float64, 3),
+        ("own", np.float64, (3, 3)),  # covariance of the tangent that no other shares
+        ("width", np.intp),  # shared columns that the direction knows
+        ("count", np.intp),  # of them those that are kept
+        ("position", np.float64, 3),
+        ("cov", np.float64, (3, 3)),
+    ]
+)
 FEWEST = 8  # rows of a table
 GROWTH = 8  # share of its rows by which a table grows
 
@@ -59,7 +71,7 @@ class Sums:
 
 
 class Trajectory:
-    """Positions of stations in order of depth, one appended at a time.
+    """Positions of stations in order of depth.
 
     Parameters
     ----------
@@ -80,26 +92,29 @@ class Trajectory:
         self._method = method
         self._keep = keep
         first = collar or Direction(np.zeros(2), 1.0, np.zeros((2, 2)), np.zeros((2, 0)))
-        self._tangents = tangents_along([first])  # of the collar and every station
         self._rows = np.zeros(FEWEST, ROW)
-        self._rows["md"][0] = start_md
-        self._kept = list(keep(np.zeros((1, 3, 0))))
+        self._directions: list[Direction] = []  # of the collar and every station
+        self._columns: list[Packed] = []  # (3, s), of their tangents
+        self._insert(0, start_md, first)
+        self._direct([0])
+        self._kept = list(keep(np.zeros((1, 3, 0))))  # of every point that is drawn
         self._sums = Sums(np.zeros((3, 3)), np.zeros((3, 0)), 0.0)
         self._marks = [self._sums.copied()]  # at the collar and every BLOCK stations from there
 
     def __len__(self) -> int:
         """How many points there are."""
-        return len(self._tangents)
+        return len(self._directions)
 
     def __getitem__(self, place: int) -> Point:
         place = range(len(self))[place]
-        md, position, cov = self._rows[place]
-        unit = np.array(self._tangents[place].unit)
-        return Point(float(md), unit, position.copy(), cov.copy(), self._kept[place])
+        row = self._rows[place]
+        return Point(
+            float(row["md"]), row["tangent"].copy(), row["position"].copy(), row["cov"].copy(), self._kept[place]
+        )
 
     @property
     def points(self) -> list[Point]:
-        """Every station and the collar before them, made anew."""
+        """The collar and every station, made anew."""
         return [self[place] for place in range(len(self))]
 
     @property
@@ -136,121 +151,137 @@ class Trajectory:
         SurveyError
             When a depth does not grow, or two directions are opposite; then none is added.
         """
-        self._extend([md for md, _ in stations], tangents_along([direction for _, direction in stations]))
+        depths = [float(self._rows["md"][len(self) - 1]), *(md for md, _ in stations)]
+        for before, md in itertools.pairwise(depths):
+            if not 0.0 < md - before < math.inf:
+                raise SurveyError(f"trajectory: expected a depth beyond {before:g} m, got {md:g} m")
+        known = len(self)
+        for md, direction in stations:
+            self._insert(len(self), md, direction)
+        self._direct(range(known, len(self)))
+        try:
+            self._draw(known)
+        except SurveyError:
+            del self._directions[known:], self._columns[known:]
+            raise
 
-    def lead_through(self, stations: Sequence[tuple[float, Direction]]) -> None:
-        """Lead it from the collar through these stations (m, direction), bit for bit as one that is drawn anew.
+    def put(self, stations: Iterable[tuple[float, Direction]]) -> None:
+        """Put stations (m, direction) between the others, or in the place of those at the same depth.
 
-        Down to the first one that is another than before it stays as it is.
+        What is above the first of them stays as it is; the whole is bit for bit as one that is drawn anew.
 
         Raises
         ------
         SurveyError
-            When a depth does not grow, or two directions are opposite; then what is below may be lacking.
+            When a depth is not below the first; then none is put.
         """
-        mds, tangents = [md for md, _ in stations], tangents_along([one for _, one in stations], self._tangents)
-        known = zip(self.md[1:].tolist(), self._tangents[1:], strict=True)
-        are_same = map(operator.eq, zip(mds, tangents, strict=True), known)
-        same = sum(itertools.takewhile(bool, are_same))
-        if same < len(self) - 1:
-            same -= same % BLOCK
-            self._cut(same)
-        self._extend(mds[same:], tangents[same:])
-
-    def _cut(self, count: int) -> None:
-        """Go back to the first stations, a number of blocks."""
-        del self._tangents[count + 1 :], self._kept[count + 1 :], self._marks[count // BLOCK + 1 :]
-        self._sums = self._marks[-1].copied()
-
-    def _extend(self, mds: Sequence[float], tangents: Sequence[Tangent]) -> None:
-        if not tangents:
-            return
-        before = len(self) - 1
-        depths = [float(self._rows["md"][before]), *mds]
-        lengths = np.diff(depths)
-        for n, length in enumerate(lengths.tolist()):
-            if not 0.0 < length < math.inf:
-                raise SurveyError(f"trajectory: expected a depth beyond {depths[n]:g} m, got {mds[n]:g} m")
-        along = [self._tangents[-1], *tangents]
-        legs = self._legs(lengths, depths, along)
-        self._make_room(len(tangents))
-        own = self._rows[before + 1 : before + 1 + len(mds)]
-        own["md"] = mds
-        own["position"] = np.add.accumulate([self._rows["position"][before], *legs])[1:]
-        first = 0
-        while first < len(mds):
-            some = slice(first, min(first + BLOCK - (before + first) % BLOCK, len(mds)))
-            self._sums, runs, covs = _follow(self._sums, lengths[some], along[some.start : some.stop + 1])
-            for begin, run in zip(itertools.accumulate(map(len, runs), initial=0), runs, strict=False):
-                covs[begin : begin + len(run)] += run @ run.transpose(0, 2, 1)
-                self._kept.extend(self._keep(run))
-            own["cov"][some] = covs
-            first = some.stop
-            if (before + first) % BLOCK == 0:
-                self._marks.append(self._sums.copied())
-        self._tangents += tangents
+        changed, collar = [], float(self._rows["md"][0])
+        stations = sorted(stations, key=itemgetter(0))
+        for md, _ in stations:
+            if not collar < md < math.inf:
+                raise SurveyError(f"trajectory: expected a depth beyond {collar:g} m, got {md:g} m")
+        for md, direction in stations:
+            place = int(np.searchsorted(self.md, md))
+            if place == len(self) or self._rows["md"][place] != md:
+                self._insert(place, md, direction)
+            elif self._directions[place] is direction:
+                continue
+            self._directions[place] = direction
+            changed.append(place)
+        self._direct(changed)
+        if changed:
+            self._draw(changed[0])
 
     def columns(self) -> Iterator[Array]:
         """Shared columns (n, 3, s) of the points from the collar down, some at a time, as many as were known there."""
         yield np.zeros((1, 3, 0))
-        lengths = np.diff(self.md)
-        for number, mark in enumerate(self._marks):
-            some = slice(number * BLOCK, min((number + 1) * BLOCK, len(lengths)))
-            if some.start < some.stop:
-                yield from _follow(mark.copied(), lengths[some], self._tangents[some.start : some.stop + 1])[1]
+        for begin, mark in zip(range(0, len(self) - 1, BLOCK), self._marks, strict=False):
+            yield from self._follow(mark.copied(), begin, min(begin + BLOCK, len(self) - 1))[1]
 
-    def _make_room(self, more: int) -> None:
-        """Have rows for more points."""
+    def _insert(self, place: int, md: float, direction: Direction) -> None:
+        """Have a row for a station; what follows from its direction is not in it yet."""
         known, count = self._rows, len(self)
-        if count + more > len(known):
-            self._rows = np.zeros(count + more + (count + more) // GROWTH, ROW)
-            self._rows[:count] = known[:count]
+        if count == len(known):
+            self._rows = np.zeros(count + 1 + count // GROWTH, ROW)
+            self._rows[:count] = known
+        self._rows[place + 1 : count + 1] = self._rows[place:count]
+        self._rows["md"][place] = md
+        self._directions.insert(place, direction)
+        self._columns.insert(place, NONE)
 
-    def _legs(self, lengths: Array, mds: Sequence[float], tangents: Sequence[Tangent]) -> Array:
+    def _direct(self, places: Sequence[int]) -> None:
+        """Work out what follows from the directions at some places by themselves."""
+        if not places:
+            return
+        directions = [self._directions[place] for place in places]
+        tangents = tangents_of(directions)
+        jacobians = tangent_jacobians(tangents)
+        for place, direction, jacobian in zip(places, directions, jacobians, strict=True):
+            self._columns[place] = packed_of(direction).under(jacobian)
+        rows, at = self._rows, np.array(places)
+        rows["tangent"][at] = tangents
+        rows["own"][at] = jacobians @ np.array([one.cov for one in directions]) @ jacobians.transpose(0, 2, 1)
+        rows["width"][at] = [direction.width for direction in directions]
+        rows["count"][at] = [len(self._columns[place].places) for place in places]
+
+    def _draw(self, first: int) -> None:
+        """Work out the positions from a place on."""
+        begin = first - 1
+        if begin < len(self._kept) - 1:
+            begin -= begin % BLOCK
+            del self._kept[begin + 1 :], self._marks[begin // BLOCK + 1 :]
+            self._sums = self._marks[-1].copied()
+        rows = self._rows[begin : len(self)]
+        rows["position"] = np.add.accumulate([rows["position"][0], *self._legs(rows)])
+        while begin < len(self) - 1:
+            end = min(begin - begin % BLOCK + BLOCK, len(self) - 1)
+            self._sums, runs, covs = self._follow(self._sums, begin, end)
+            for place, run in zip(itertools.accumulate(map(len, runs), initial=0), runs, strict=False):
+                covs[place : place + len(run)] += run @ run.transpose(0, 2, 1)
+                self._kept.extend(self._keep(run))
+            self._rows["cov"][begin + 1 : end + 1] = covs
+            begin = end
+            if begin % BLOCK == 0:
+                self._marks.append(self._sums.copied())
+
+    def _follow(self, sums: Sums, begin: int, end: int) -> tuple[Sums, list[Array], Array]:
+        """Go on with sums, which are used up, from one place to another.
+
+        Returns the sums, the shared columns (.., 3, s) of the positions after ``begin`` up to ``end``, those with
+        equally many together, and the covariances (n, 3, 3) that are their own.
+        """
+        from groundstation.survey.kernels.position_errors import add_stations  # whoever only reads needs no compiler
+
+        rows, columns = self._rows[begin : end + 1], self._columns[begin : end + 1]
+        known = max(sums.passed.shape[1], int(rows["width"][0]))
+        widths = np.maximum(np.maximum.accumulate(rows["width"][1:]), known)
+        starts = np.concatenate([FROM_ZERO, rows["count"].cumsum()])
+        places = np.concatenate([one.places for one in columns]).astype(np.intp, copy=False)
+        values = np.concatenate([one.values for one in columns], axis=1)
+        ends = 0.5 * np.diff(rows["md"])
+        weights = ends.copy()  # of the station before each, which has both its legs now
+        weights[0] += 0.5 * sums.length
+        weights[1:] += ends[:-1]
+        width = int(widths[-1])
+        passed, shared, out = widened(sums.passed, width), np.empty((len(ends), 3, width)), np.empty((len(ends), 3, 3))
+        add_stations(weights, ends, starts, places, values, rows["own"].copy(), passed, sums.own, shared, out)
+        borders = [0, *(np.flatnonzero(np.diff(widths)) + 1).tolist(), len(widths)]
+        runs = [shared[a:b, :, : int(widths[a])] for a, b in itertools.pairwise(borders)]
+        return Sums(sums.own, passed, float(rows["md"][-1] - rows["md"][-2])), runs, out
+
+    def _legs(self, rows: npt.NDArray[np.void]) -> Array:
         """Displacements (n, 3) from station to station."""
         if self._method is Method.BALANCED_TANGENTIAL:
-            units = np.array([one.unit for one in tangents])
-            return np.asarray((0.5 * lengths)[:, None] * (units[:-1] + units[1:]))
-        ends = zip(mds, itertools.pairwise(tangents), lengths.tolist(), strict=False)
-        return np.array([self._leg(md, *pair, length) for md, pair, length in ends])
+            return np.asarray((0.5 * np.diff(rows["md"]))[:, None] * (rows["tangent"][:-1] + rows["tangent"][1:]))
+        return np.array([self._leg(*ends) for ends in itertools.pairwise(rows)])
 
-    def _leg(self, md: float, before: Tangent, tangent: Tangent, length: float) -> Array:
-        i1, a1 = angles(np.array(before.unit[:2]), before.unit[2])
-        i2, a2 = angles(tangent.direction.lean, tangent.direction.down)
+    def _leg(self, before: np.void, after: np.void) -> Array:
+        i1, a1 = angles(before["tangent"][:2], float(before["tangent"][2]))
+        i2, a2 = angles(after["tangent"][:2], float(after["tangent"][2]))
+        md, below = float(before["md"]), float(after["md"])
         if self._method is Method.MINIMUM_CURVATURE and dogleg(math, i1, a1, i2, a2) > math.pi - OPPOSITE:
-            raise SurveyError(f"trajectory: the hole turns back on itself between {md:g} and {md + length:g} m")
-        return np.array(leg(math, self._method, length, i1, a1, i2, a2))
-
-
-def _follow(sums: Sums, lengths: Array, tangents: Sequence[Tangent]) -> tuple[Sums, list[Array], Array]:
-    """Go on from sums, which are used up, by legs (n,), m, with the tangents at both ends of each, n + 1.
-
-    Returns the sums, the shared columns (.., 3, s) of the positions at the ends of the legs, those with equally many
-    together, and the covariances (n, 3, 3) that are their own.
-    """
-    from groundstation.survey.kernels.position_errors import add_stations  # whoever only reads needs no compiler
-
-    columns = [one.columns for one in tangents]
-    known = max(sums.passed.shape[1], columns[0].width)
-    widths = list(itertools.accumulate((one.width for one in columns[1:]), max, initial=known))
-    starts = np.array([0, *itertools.accumulate(len(one.places) for one in columns)])
-    places = np.concatenate([one.places for one in columns]).astype(np.intp, copy=False)
-    ends = 0.5 * lengths
-    weights = ends.copy()  # of the station before each, which has both its legs now
-    weights[0] += 0.5 * sums.length
-    weights[1:] += ends[:-1]
-    passed, shared, out = (
-        widened(sums.passed, widths[-1]),
-        np.empty((len(ends), 3, widths[-1])),
-        np.empty((len(ends), 3, 3)),
-    )
-    covs, values = np.array([one.cov for one in tangents]), np.concatenate([one.values for one in columns], axis=1)
-    add_stations(weights, ends, starts, places, values, covs, passed, sums.own, shared, out)
-    runs, end = [], 0
-    for width, same in itertools.groupby(widths[1:]):
-        begin, end = end, end + len(list(same))
-        runs.append(shared[begin:end, :, :width])
-    return Sums(sums.own, passed, float(lengths[-1])), runs, out
+            raise SurveyError(f"trajectory: the hole turns back on itself between {md:g} and {below:g} m")
+        return np.array(leg(math, self._method, below - md, i1, a1, i2, a2))
 
 
 def interpolate(points: list[Point], md: float) -> Point:
