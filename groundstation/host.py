@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import asyncio
 import contextlib
+import gc
 from collections.abc import AsyncIterator, Callable, Iterator
 from functools import partial
 from typing import Any
@@ -69,6 +70,7 @@ def load_kernels() -> None:
 
     leave_blas_out()
     warm_up()
+    gc.freeze()  # what was imported stays: to look through all of it for garbage keeps whoever asks waiting for 0.1 s
 
 
 def no_page(_process: GroundProcess) -> contextlib.AbstractAsyncContextManager[None]:

@@ -89,7 +89,8 @@ def cluster_of(
 
 def force_var(measurement: SurveyMeasurement) -> float:
     """Variance (m/s^2)^2 of the mean force of a cluster on one axis: its IMUs weigh by their own."""
-    variances = [sum(imu.force_cov[axis][axis] for axis in range(AXES)) / AXES for imu in measurement.imus]
+    covs = (imu.force_cov for imu in measurement.imus)
+    variances = [(x[0] + y[1] + z[2]) / AXES for x, y, z in covs]
     first = variances[0]
     return first / sum(first / variance for variance in variances) if min(variances) > 0.0 else 0.0
 

@@ -203,26 +203,26 @@ def combine_imus(forces: Array, covs: Array) -> tuple[Array, Array]:
     return mean[..., 0], cov
 
 
-def check(
+def check_all(
     forces: Array,
     covs: Array,
     combined: tuple[Array, Array],
     gravity: float,
-    samples: int,
-    settle_time: float,
+    samples: Sequence[int],
+    settle_times: Sequence[float],
     sample_std: float,
-) -> Quality:
-    """Quality of a stop with what its IMUs come to; ``sample_std`` (m/s^2) is the sensor's own noise in one sample."""
-    quality = Quality.GOOD
-    mean, cov = combined
-    largest_var = max(max(imu[0][0], imu[1][1], imu[2][2]) for imu in covs.tolist())
-    if abs(math.sqrt(mean.dot(mean)) - gravity) > GRAVITY_TOLERANCE * gravity:
-        quality |= Quality.GRAVITY
-    if largest_var * samples > (3.0 * sample_std) ** 2:
-        quality |= Quality.MOTION
-    if settle_time < SHORTEST_SETTLE:
-        quality |= Quality.SETTLE
-    spread = np.abs(forces - mean).max()
-    if spread**2 > 16.0 * (largest_var + cov.diagonal().max()):
-        quality |= Quality.SPREAD
-    return quality
+) -> list[Quality]:
+    """Quality of stops, (n, imus, 3) and (n, imus, 3, 3), with what the IMUs of each come to, (n, 3) and (n, 3, 3).
+
+    ``sample_std`` (m/s^2) is the sensor's own noise in one sample.
+    """
+    means, mean_covs = combined
+    largest_var = covs.diagonal(axis1=-2, axis2=-1).max(axis=(-2, -1))
+    sizes = np.sqrt((means[:, None] @ means[:, :, None])[:, 0, 0])
+    spread = np.abs(forces - means[:, None]).max(axis=(-2, -1))
+    spread_var = largest_var + mean_covs.diagonal(axis1=-2, axis2=-1).max(axis=-1)
+    wrong = np.where(np.abs(sizes - gravity) > GRAVITY_TOLERANCE * gravity, Quality.GRAVITY, Quality.GOOD)
+    wrong |= np.where(largest_var * samples > (3.0 * sample_std) ** 2, Quality.MOTION, Quality.GOOD)
+    wrong |= np.where(np.asarray(settle_times) < SHORTEST_SETTLE, Quality.SETTLE, Quality.GOOD)
+    wrong |= np.where(spread**2 > 16.0 * spread_var, Quality.SPREAD, Quality.GOOD)
+    return [Quality(each) for each in wrong.tolist()]
