@@ -23,6 +23,7 @@ from telemetry.messages import NodeFlag, SurveyMeasurement
 
 Array = npt.NDArray[np.float64]
 AXES = 3
+TOGETHER = 256  # surveys whose columns are laid out at a time
 FEWEST = 64  # rows of a table
 GROWTH = 8  # share of its rows by which a table grows
 ROW: Final = np.dtype(
@@ -95,6 +96,12 @@ def force_var(measurement: SurveyMeasurement) -> float:
     return first / sum(first / variance for variance in variances) if min(variances) > 0.0 else 0.0
 
 
+def forces_of(kept: bytes) -> list[list[float]]:
+    """Forces (imus, 3) as a table keeps them, m/s^2."""
+    forces: list[list[float]] = np.frombuffer(kept).reshape(-1, AXES).tolist()
+    return forces
+
+
 class Table:
     """The surveys of a hole in the order of their coming, whatever station they belong to.
 
@@ -150,10 +157,22 @@ class Table:
         shared = columns_of(rows["causes"], places, int(rows["width"].max()))
         return Stack(rows["lean"], rows["down"], rows["cov"], rows["information"], shared)
 
+    def covs(self, numbers: Sequence[int]) -> Array:
+        """Covariances (n, 2, 2) of the leans of the surveys in several rows, what they share with others included."""
+        widths = self.rows["width"][numbers]
+        covs = self.rows["cov"][numbers]
+        for width in np.unique(widths).tolist():
+            alike = np.flatnonzero(widths == width)
+            for some in np.split(alike, range(TOGETHER, len(alike), TOGETHER)):
+                rows = [numbers[place] for place in some.tolist()]
+                shared = columns_of(self.rows["causes"][rows], [self.places[row] for row in rows], width)
+                covs[some] += shared @ shared.transpose(0, 2, 1)
+        return covs
+
     def cluster(self, number: int) -> Cluster:
         """The survey in a row."""
         row = self.rows[number]
-        forces = np.frombuffer(self.forces[number]).reshape(-1, AXES).tolist()
+        forces = forces_of(self.forces[number])
         return Cluster(
             **{name: row[name].item() for name in PLAIN},
             forces=tuple(tuple(force) for force in forces),

@@ -92,6 +92,11 @@ class Hole:
         self._newest_at = max(self._newest_at, cluster.at)
 
     @property
+    def surveys(self) -> Table:
+        """Every survey in the order of their coming."""
+        return self._surveys
+
+    @property
     def stations(self) -> list[SurveyStation]:
         """Stations from the collar down."""
         self.settle()

@@ -4,18 +4,14 @@ from __future__ import annotations
 
 import datetime
 import math
-from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import partial
 from typing import Any
 
-import numpy as np
-
 from groundstation.errors import SelectorError, SurveyError
-from groundstation.service.clusters import Cluster
 from groundstation.service.model import RigModel
 from groundstation.service.station import SurveyStation
-from groundstation.service.streams import STREAMED, span, window
+from groundstation.service.streams import STREAMED, window
 from groundstation.survey.fusion import Weighting
 from groundstation.survey.resolve import angle_stds, angles
 from groundstation.survey.trajectory import Point, interpolate
@@ -166,63 +162,6 @@ def typical_reading(s: SurveyStation) -> View:
         "sigma_yaw_deg": math.degrees(math.sqrt(yaw)),
         "sigma_systematic_deg": math.degrees(math.sqrt(systematic)),
         "sigma_force_mps2": math.sqrt(force),
-    }
-
-
-def measurements(k: RigModel, p: Parameters) -> View:
-    """Every cluster; ``station`` and ``tube`` select, ``since`` and ``limit`` give them as they came."""
-    newest = k.seen["measurements"]
-    since, limit = span(newest, p) if streamed(p) else (0, None)
-    found = list(_selected(k, p, since))
-    if streamed(p):
-        found.sort()
-    rows = [cluster(k.stations[n - 1].clusters[place], n) for _, n, place in found[:limit]]
-    return {"newest": newest, "measurements": rows}
-
-
-def _selected(k: RigModel, p: Parameters, since: int) -> Iterator[tuple[int, int, int]]:
-    """Number, station and place of the clusters after the number ``since`` that the parameters select."""
-    by_station = Range.parse("station", p["station"]) if "station" in p else None
-    by_tube = Range.parse("tube", p["tube"]) if "tube" in p else None
-    for n, s in enumerate(k.stations, 1):
-        if by_station is None or by_station.holds(n):
-            numbers, tubes = s.clusters.column("number"), s.clusters.column("tube")
-            for place in np.flatnonzero(numbers > since).tolist():
-                if by_tube is None or by_tube.holds(int(tubes[place])):
-                    yield int(numbers[place]), n, place
-
-
-def station_measurements(k: RigModel, n: int) -> View:
-    """Every cluster of one station."""
-    rows = [cluster(c, n) for c in k.stations[n - 1].clusters]
-    return {"station": n, "measurements": rows}
-
-
-def cluster(c: Cluster, n: int) -> View:
-    """One cluster, resolved."""
-    inclination, azimuth = angles(c.direction.lean, c.direction.down)
-    sigma_inclination, sigma_azimuth = angle_stds(c.direction.lean, c.direction.down, c.direction.total_cov)
-    return {
-        "seq": c.number,
-        "station": n,
-        "md_m": round(c.md, 6),
-        "tube": c.tube,
-        "sequence": c.sequence,
-        "station_at_s": c.at,
-        "hops": c.hops,
-        "inclination_deg": math.degrees(inclination),
-        "azimuth_deg": math.degrees(azimuth),
-        "sigma_inclination_deg": math.degrees(sigma_inclination),
-        "sigma_azimuth_deg": math.degrees(sigma_azimuth),
-        "yaw_deg": math.degrees(c.yaw),
-        "sigma_yaw_deg": math.degrees(math.sqrt(c.yaw_var)),
-        "sigma_systematic_deg": math.degrees(math.sqrt(c.systematic_var)),
-        "forces_mps2": [list(force) for force in c.forces],
-        "samples": c.samples,
-        "settle_s": c.settle_time,
-        "flags": flag_names(c.flags),
-        "trust": c.trust.name.lower(),
-        "quality": c.quality.name.lower().split("|") if c.quality and c.quality.name else [],
     }
 
 

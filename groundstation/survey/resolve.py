@@ -23,6 +23,7 @@ ASYMMETRY = 1e-9  # of the largest entry, rounding in the covariance of a node
 CONDITION = 1e14  # beyond it the inverse of a covariance is noise
 PLAINLY = 1e-10  # of the trace to the power k, the determinant (k, k) of a matrix that needs no closer look
 A_FEW = 64  # numbers, up to which they are looked at one by one
+UPRIGHT = 1e-9  # lean, below which there is no azimuth
 SHORTEST_SETTLE = 16.0  # s, of the 32-point moving average
 
 
@@ -174,15 +175,24 @@ def angles(lean: Array, down: float) -> tuple[float, float]:
 
 def angle_stds(lean: Array, down: float, cov: Array) -> tuple[float, float]:
     """Standard deviations (rad) of inclination and azimuth; the azimuth's is at most pi, where nothing is known."""
-    size = math.hypot(lean[0], lean[1])
-    if size < 1e-9:
-        return math.sqrt(float(np.trace(cov)) / 2.0), math.pi
-    along = lean / size
-    across = np.array([-along[1], along[0]])
-    vertical = max(abs(down), 1e-6)
-    inclination = math.sqrt(max(float(along @ cov @ along), 0.0)) / vertical
-    azimuth = math.sqrt(max(float(across @ cov @ across), 0.0)) / size
-    return inclination, min(azimuth, math.pi)
+    return angle_stds_of_all(lean[None], [down], cov[None])[0]
+
+
+def angle_stds_of_all(leans: Array, downs: Sequence[float], covs: Array) -> list[tuple[float, float]]:
+    """The same of many directions, (n, 2) and (n, 2, 2)."""
+    sizes = [math.hypot(x, y) for x, y in leans.tolist()]
+    along = leans / np.array([size if size >= UPRIGHT else 1.0 for size in sizes])[:, None]
+    across = np.stack([-along[:, 1], along[:, 0]], axis=1)
+    variances = ((unit[:, None] @ covs @ unit[:, :, None])[:, 0, 0].tolist() for unit in (along, across))
+    traces = np.trace(covs, axis1=1, axis2=2).tolist()
+    return [_stds(*row) for row in zip(sizes, downs, *variances, traces, strict=True)]
+
+
+def _stds(size: float, down: float, along_var: float, across_var: float, trace: float) -> tuple[float, float]:
+    if size < UPRIGHT:
+        return math.sqrt(trace / 2.0), math.pi
+    inclination = math.sqrt(max(along_var, 0.0)) / max(abs(down), 1e-6)
+    return inclination, min(math.sqrt(max(across_var, 0.0)) / size, math.pi)
 
 
 def combine_imus(forces: Array, covs: Array) -> tuple[Array, Array]:
