@@ -220,6 +220,10 @@ class Clusters:
         """One number of every cluster, (n,) or (n, ...)."""
         return np.asarray(self._table.rows[name][np.array(self._rows)])
 
+    def rows(self, places: Sequence[int]) -> npt.NDArray[np.void]:
+        """Numbers of the clusters at some places, side by side."""
+        return self._table.rows[[self._rows[place] for place in places]]
+
     def row(self, place: int) -> int:
         """Row of the table that holds the cluster at a place."""
         return self._rows[place]

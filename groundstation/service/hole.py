@@ -24,7 +24,7 @@ from groundstation.service.station import SurveyStation
 from groundstation.survey.columns import Deviation, Deviations, deviations, project
 from groundstation.survey.fusion import Evidence, Weighting, departures_from, judge_departure
 from groundstation.survey.shared import SharedErrors
-from groundstation.survey.trajectory import Point, Trajectory
+from groundstation.survey.trajectory import Trajectory
 
 Array = npt.NDArray[np.float64]
 NOTHING: Final = np.zeros((3, 0))
@@ -133,10 +133,9 @@ class Hole:
         """
         return np.concatenate([self._shared.variances(columns) for columns in self.trajectory.columns()])
 
-    def point_of(self, station: SurveyStation) -> Point:
-        """Point of the trajectory at a station; the collar for one at its depth."""
-        trajectory = self.trajectory
-        return trajectory[int(np.searchsorted(trajectory.md, station.md)) if station.md > 0.0 else 0]
+    def place_of(self, station: SurveyStation) -> int:
+        """Place of a station in the trajectory; that of the collar for one at its depth."""
+        return int(np.searchsorted(self.trajectory.md, station.md)) if station.md > 0.0 else 0
 
     @property
     def deviations(self) -> Deviations:

@@ -20,6 +20,8 @@ from groundstation.survey.resolve import Quality, angle_stds_of_all, angles
 from groundstation.survey.trust import Trust
 from telemetry.messages import NodeFlag
 
+DEGREES = 180.0 / math.pi  # in a radian
+
 
 def measurements(k: RigModel, p: Parameters) -> View:
     """Every cluster; ``station`` and ``tube`` select, ``since`` and ``limit`` give them as they came."""
@@ -57,51 +59,38 @@ def measurement_rows(surveys: Table, rows: Sequence[int], stations: Sequence[int
     if not rows:
         return []
     table = surveys.rows[rows]
-    plain = (table[name].tolist() for name in PLAIN)
-    pointing = [angles(*way) for way in zip(table["lean"], table["down"].tolist(), strict=True)]
-    stds = angle_stds_of_all(table["lean"], table["down"].tolist(), surveys.covs(rows))
-    forces = [forces_of(surveys.forces[row]) for row in rows]
-    return [_row(*one) for one in zip(*plain, stations, pointing, stds, forces, strict=True)]
-
-
-PLAIN = (
-    "number", "md", "tube", "sequence", "at", "hops", "yaw", "yaw_var", "systematic_var", "samples", "settle_time",
-    "flags", "trust", "quality",
-)  # fmt: skip
-
-
-def _row(
-    number: int, md: float, tube: int, sequence: int, at: float, hops: int, yaw: float, yaw_var: float,
-    systematic_var: float, samples: int, settle_time: float, flags: int, trust: int, quality: int, station: int,
-    pointing: tuple[float, float], stds: tuple[float, float], forces: list[list[float]],
-) -> View:  # fmt: skip
-    return {
-        "seq": number,
-        "station": station,
-        "md_m": round(md, 6),
-        "tube": tube,
-        "sequence": sequence,
-        "station_at_s": at,
-        "hops": hops,
-        "inclination_deg": math.degrees(pointing[0]),
-        "azimuth_deg": math.degrees(pointing[1]),
-        "sigma_inclination_deg": math.degrees(stds[0]),
-        "sigma_azimuth_deg": math.degrees(stds[1]),
-        "yaw_deg": math.degrees(yaw),
-        "sigma_yaw_deg": math.degrees(math.sqrt(yaw_var)),
-        "sigma_systematic_deg": math.degrees(math.sqrt(systematic_var)),
-        "forces_mps2": forces,
-        "samples": samples,
-        "settle_s": settle_time,
-        "flags": list(_flag_names(flags)),
-        "trust": _trust_name(trust),
-        "quality": list(_quality_names(quality)),
+    downs = table["down"].tolist()
+    pointing = np.array([angles(*way) for way in zip(table["lean"], downs, strict=True)])
+    stds = np.array(angle_stds_of_all(table["lean"], downs, surveys.covs(rows)))
+    columns = {
+        "seq": table["number"],
+        "station": np.array(stations),
+        "md_m": [round(md, 6) for md in table["md"].tolist()],
+        "tube": table["tube"],
+        "sequence": table["sequence"],
+        "station_at_s": table["at"],
+        "hops": table["hops"],
+        "inclination_deg": DEGREES * pointing[:, 0],
+        "azimuth_deg": DEGREES * pointing[:, 1],
+        "sigma_inclination_deg": DEGREES * stds[:, 0],
+        "sigma_azimuth_deg": DEGREES * stds[:, 1],
+        "yaw_deg": DEGREES * table["yaw"],
+        "sigma_yaw_deg": DEGREES * np.sqrt(table["yaw_var"]),
+        "sigma_systematic_deg": DEGREES * np.sqrt(table["systematic_var"]),
+        "forces_mps2": [forces_of(surveys.forces[row]) for row in rows],
+        "samples": table["samples"],
+        "settle_s": table["settle_time"],
+        "flags": [_flag_names(flags) for flags in table["flags"].tolist()],
+        "trust": [_trust_name(trust) for trust in table["trust"].tolist()],
+        "quality": [_quality_names(quality) for quality in table["quality"].tolist()],
     }
+    values = (column.tolist() if isinstance(column, np.ndarray) else column for column in columns.values())
+    return [dict(zip(columns, row, strict=True)) for row in zip(*values, strict=True)]
 
 
 @functools.cache
-def _flag_names(flags: int) -> tuple[str, ...]:
-    return tuple(flag_names(NodeFlag(flags)))
+def _flag_names(flags: int) -> list[str]:
+    return flag_names(NodeFlag(flags))
 
 
 @functools.cache
@@ -110,6 +99,6 @@ def _trust_name(trust: int) -> str:
 
 
 @functools.cache
-def _quality_names(quality: int) -> tuple[str, ...]:
+def _quality_names(quality: int) -> list[str]:
     name = Quality(quality).name
-    return tuple(name.lower().split("|")) if quality and name else ()
+    return name.lower().split("|") if quality and name else []

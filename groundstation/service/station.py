@@ -2,11 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
 from typing import Any
-
-import numpy as np
 
 from groundstation.service.clusters import Cluster, Clusters
 from groundstation.survey.fusion import Departure, GrowingBayes, Stack, Weighting, departure_from, weighted
@@ -76,10 +74,10 @@ class SurveyStation:
 
     def mean_variances(self) -> tuple[float, float, float]:
         """Of the clusters that count: of the yaw as it is fused, systematic (both rad^2), of the force (m/s^2)^2."""
-        counting, column = self.counting, self.clusters.column
-        unknown = UNKNOWN_YAW_VAR * (column("trust")[counting] == Trust.UNKNOWN_YAW)
-        yaw = float(np.mean(column("yaw_var")[counting] + unknown))
-        systematic, force = (float(np.mean(column(name)[counting])) for name in ("systematic_var", "force_var"))
+        rows = self.clusters.rows(self.counting)
+        unknown = UNKNOWN_YAW_VAR * (rows["trust"] == Trust.UNKNOWN_YAW)
+        each = (rows["yaw_var"] + unknown, rows["systematic_var"], rows["force_var"])
+        yaw, systematic, force = (float(values.sum()) / len(values) for values in each)
         return yaw, systematic, force
 
     @property
@@ -87,12 +85,14 @@ class SurveyStation:
         """What changes with every cluster that comes or does not count any more."""
         return self.count, *self.drops
 
-    def shown(self, show: Callable[[SurveyStation], dict[str, Any]]) -> dict[str, Any]:
-        """What one view shows of the clusters that count; made anew where another has come."""
-        made_of = self._made_of
-        if self._shown is None or self._shown[0] != made_of:
-            self._shown = made_of, show(self)
-        return self._shown[1]
+    @property
+    def shown(self) -> dict[str, Any] | None:
+        """What a view showed last of the clusters that count; None where another has come since."""
+        return self._shown[1] if self._shown is not None and self._shown[0] == self._made_of else None
+
+    def show(self, view: dict[str, Any]) -> None:
+        """Keep what a view shows of the clusters that count."""
+        self._shown = self._made_of, view
 
     def fused(self, weighting: Weighting) -> Direction:
         """Direction from the clusters that count; worked out anew where another has come."""

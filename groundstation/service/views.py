@@ -4,20 +4,25 @@ from __future__ import annotations
 
 import datetime
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
-from functools import partial
 from typing import Any
+
+import numpy as np
+import numpy.typing as npt
 
 from groundstation.errors import SelectorError, SurveyError
 from groundstation.service.model import RigModel
 from groundstation.service.station import SurveyStation
 from groundstation.service.streams import STREAMED, window
 from groundstation.survey.fusion import Weighting
-from groundstation.survey.resolve import angle_stds, angles
+from groundstation.survey.resolve import Direction, angle_stds_of_all, angles
 from groundstation.survey.trajectory import Point, interpolate
 from telemetry.messages import Event, NodeFlag, NodeState, StaticRecord
 
 View = dict[str, Any]
+Array = npt.NDArray[np.float64]
+POSITION = ("north_m", "east_m", "tvd_m", "sigma_north_m", "sigma_east_m", "sigma_tvd_m")
 Parameters = dict[str, str]
 
 
@@ -128,27 +133,46 @@ def alignment(s: NodeState) -> View | None:
 def stations(k: RigModel, p: Parameters) -> View:
     """All stations, fused; ``md`` selects."""
     wanted = Range.parse("md", p["md"]) if "md" in p else None
-    rows = [station(k, n) for n, s in enumerate(k.stations, 1) if wanted is None or wanted.holds(s.md)]
-    return {"stations": rows}
+    numbers = [n for n, s in enumerate(k.stations, 1) if wanted is None or wanted.holds(s.md)]
+    return {"stations": station_rows(k, numbers)}
 
 
 def station(k: RigModel, n: int) -> View:
     """One station, fused; ``n`` from 1."""
-    s = k.stations[n - 1]
-    row = {"station": n, "md_m": round(s.md, 6)} | s.shown(partial(direction_view, k.config.weighting))
-    return row | position(k.hole.point_of(s))
+    return station_rows(k, [n])[0]
 
 
-def direction_view(weighting: Weighting, s: SurveyStation) -> View:
+def station_rows(k: RigModel, numbers: Sequence[int]) -> list[View]:
+    """Stations of these numbers, fused; those to which nothing has come since they were shown last are as they were."""
+    known, drawn = k.stations, k.hole.trajectory
+    chosen = [known[n - 1] for n in numbers]
+    changed = [s for s in chosen if s.shown is None]
+    for s, view in zip(changed, direction_views(k.config.weighting, changed), strict=True):
+        s.show(view)
+    places = [k.hole.place_of(s) for s in chosen]
+    positions = position_views(drawn.positions[places], drawn.covs[places])
+    rows = zip(numbers, chosen, positions, strict=True)
+    return [{"station": n, "md_m": round(s.md, 6)} | (s.shown or {}) | position for n, s, position in rows]
+
+
+def direction_views(weighting: Weighting, chosen: Sequence[SurveyStation]) -> list[View]:
+    """Directions of stations and what each is made of."""
+    if not chosen:
+        return []
+    fused = [s.fused(weighting) for s in chosen]
+    downs, covs = [one.down for one in fused], np.array([one.total_cov for one in fused])
+    stds = angle_stds_of_all(np.array([one.lean for one in fused]), downs, covs)
+    return [direction_view(*row) for row in zip(chosen, fused, stds, strict=True)]
+
+
+def direction_view(s: SurveyStation, fused: Direction, stds: tuple[float, float]) -> View:
     """Direction of a station and what it is made of."""
-    fused = s.fused(weighting)
     inclination, azimuth = angles(fused.lean, fused.down)
-    sigma_inclination, sigma_azimuth = angle_stds(fused.lean, fused.down, fused.total_cov)
     return {
         "inclination_deg": math.degrees(inclination),
         "azimuth_deg": math.degrees(azimuth),
-        "sigma_inclination_deg": math.degrees(sigma_inclination),
-        "sigma_azimuth_deg": math.degrees(sigma_azimuth),
+        "sigma_inclination_deg": math.degrees(stds[0]),
+        "sigma_azimuth_deg": math.degrees(stds[1]),
         "measurements": s.count,
         "dropped_measurements": s.first,
         "untrusted_measurements": s.untrusted,
@@ -250,16 +274,14 @@ def point_view(point: Point) -> View:
 
 def position(point: Point) -> View:
     """Position and its standard deviations."""
-    north, east, tvd = point.position.tolist()
-    sigma = [math.sqrt(max(var, 0.0)) for var in point.cov.diagonal().tolist()]
-    return {
-        "north_m": north,
-        "east_m": east,
-        "tvd_m": tvd,
-        "sigma_north_m": sigma[0],
-        "sigma_east_m": sigma[1],
-        "sigma_tvd_m": sigma[2],
-    }
+    return position_views(point.position[None], point.cov[None])[0]
+
+
+def position_views(positions: Array, covs: Array) -> list[View]:
+    """Positions (n, 3), m, and their standard deviations from covariances (n, 3, 3)."""
+    stds = np.sqrt(np.maximum(covs.diagonal(axis1=1, axis2=2), 0.0))
+    rows = np.concatenate([positions, stds], axis=1).tolist()
+    return [dict(zip(POSITION, row, strict=True)) for row in rows]
 
 
 def flag_names(flags: NodeFlag) -> list[str]:
