@@ -52,6 +52,7 @@ def run_ground(
         given = {"rig": place.rig, "folder": place.folder, "key_file": place.key_file, "keys": place.keys}
         config = checked_config(**given, **settings)
         load_kernels()
+        keep_imports()
         with (
             contextlib.closing(GroundProcess(config)) as process,
             page_of(page) as serve_page,
@@ -70,7 +71,11 @@ def load_kernels() -> None:
 
     leave_blas_out()
     warm_up()
-    gc.freeze()  # what was imported stays: to look through all of it for garbage keeps whoever asks waiting for 0.1 s
+
+
+def keep_imports() -> None:
+    """Never look through what was imported for garbage: whoever asks would be kept waiting for 0.1 s."""
+    gc.freeze()
 
 
 def no_page(_process: GroundProcess) -> contextlib.AbstractAsyncContextManager[None]:
