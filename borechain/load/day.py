@@ -22,7 +22,7 @@ from groundstation.host import run_ground
 from groundstation.service.store import Store, Stored
 from sim.errors import RigError
 from sim.rig.processes import ProcessTable, Spec
-from sim.rig.realtime import footprint, pids
+from sim.rig.realtime import cpu_seconds, footprint, pids
 from telemetry.media.zenoh_bus import open_router
 from telemetry.messages import Stand, SurveyMeasurement
 from telemetry.runtime.hosting import Place
@@ -54,7 +54,7 @@ def measure_day(hours: float, tubes: int, endpoint: str, page: PageSettings, fol
             table.start(GROUND)
             ground = Ground(bus, RIG)
             moments = wait_for_history(ground)
-            started_s = time.monotonic() - begun
+            started_s, started_cpu_s = time.monotonic() - begun, cpu_seconds(pids(table)[GROUND])
             picture_s = first_picture(page)
             looked = [asked(page, f"column?moment={number}") for number in moments[:: max(len(moments) // MOMENTS, 1)]]
             return {
@@ -62,6 +62,7 @@ def measure_day(hours: float, tubes: int, endpoint: str, page: PageSettings, fol
                 "stations": len(ground.stations()),
                 "moments": len(moments),
                 "started_s": round(started_s, ROUNDING),
+                "started_cpu_s": round(started_cpu_s, ROUNDING),
                 "picture_ms": round(1e3 * picture_s, ROUNDING),
                 "history_ms": round(1e3 * asked(page, "history"), ROUNDING),
                 "moment_ms": figures(looked),

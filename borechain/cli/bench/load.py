@@ -96,7 +96,7 @@ def day(hours: float, tubes: int, address: str, endpoint: str, as_json: bool) ->
     if as_json:
         click.echo(json.dumps(result))
         return
-    start = f"answers {result['started_s']:.1f} s after its start"
+    start = f"answers {result['started_s']:.1f} s after its start, {result['started_cpu_s']:.1f} s of CPU"
     click.echo(f"{result['surveys']} surveys at {result['stations']} stations: {start}")
     again = f"asked again {result['history_ms']:.0f} ms"
     click.echo(f"page opened: {result['picture_ms']:.0f} ms until the history has come; {again}")
