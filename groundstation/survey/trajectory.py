@@ -27,7 +27,8 @@ from groundstation.survey.tangents import tangent_jacobians, tangents_of
 
 Array = npt.NDArray[np.float64]
 BLOCK = 64  # stations, whose columns are held at a time
-NONE: Final = Packed(np.zeros((3, 0)))
+NONE: Final = Packed(np.zeros((2, 0)))
+NOTHING: Final = np.zeros(0)
 FROM_ZERO: Final = np.zeros(1, np.intp)
 
 
@@ -94,7 +95,8 @@ class Trajectory:
         first = collar or Direction(np.zeros(2), 1.0, np.zeros((2, 2)), np.zeros((2, 0)))
         self._rows = np.zeros(FEWEST, ROW)
         self._directions: list[Direction] = []  # of the collar and every station
-        self._columns: list[Packed] = []  # (3, s), of their tangents
+        self._columns: list[Packed] = []  # (2, s), of each
+        self._down: list[Array] = []  # and what those come to in the vertical, (c,) of those that are kept
         self._insert(0, start_md, first)
         self._direct([0])
         self._kept = list(keep(np.zeros((1, 3, 0))))  # of every point that is drawn
@@ -162,7 +164,7 @@ class Trajectory:
         try:
             self._draw(known)
         except SurveyError:
-            del self._directions[known:], self._columns[known:]
+            del self._directions[known:], self._columns[known:], self._down[known:]
             raise
 
     def put(self, stations: Iterable[tuple[float, Direction]]) -> None:
@@ -208,6 +210,7 @@ class Trajectory:
         self._rows["md"][place] = md
         self._directions.insert(place, direction)
         self._columns.insert(place, NONE)
+        self._down.insert(place, NOTHING)
 
     def _direct(self, places: Sequence[int]) -> None:
         """Work out what follows from the directions at some places by themselves."""
@@ -217,7 +220,8 @@ class Trajectory:
         tangents = tangents_of(directions)
         jacobians = tangent_jacobians(tangents)
         for place, direction, jacobian in zip(places, directions, jacobians, strict=True):
-            self._columns[place] = packed_of(direction).under(jacobian)
+            columns = self._columns[place] = packed_of(direction)
+            self._down[place] = (jacobian @ columns.values)[2].copy()
         rows, at = self._rows, np.array(places)
         rows["tangent"][at] = tangents
         rows["own"][at] = jacobians @ np.array([one.cov for one in directions]) @ jacobians.transpose(0, 2, 1)
@@ -257,14 +261,17 @@ class Trajectory:
         widths = np.maximum(np.maximum.accumulate(rows["width"][1:]), known)
         starts = np.concatenate([FROM_ZERO, rows["count"].cumsum()])
         places = np.concatenate([one.places for one in columns]).astype(np.intp, copy=False)
-        values = np.concatenate([one.values for one in columns], axis=1)
+        lean, down = (
+            np.concatenate([one.values for one in columns], axis=1),
+            np.concatenate(self._down[begin : end + 1]),
+        )
         ends = 0.5 * np.diff(rows["md"])
         weights = ends.copy()  # of the station before each, which has both its legs now
         weights[0] += 0.5 * sums.length
         weights[1:] += ends[:-1]
         width = int(widths[-1])
         passed, shared, out = widened(sums.passed, width), np.empty((len(ends), 3, width)), np.empty((len(ends), 3, 3))
-        add_stations(weights, ends, starts, places, values, rows["own"].copy(), passed, sums.own, shared, out)
+        add_stations(weights, ends, starts, places, lean, down, rows["own"].copy(), passed, sums.own, shared, out)
         borders = [0, *(np.flatnonzero(np.diff(widths)) + 1).tolist(), len(widths)]
         runs = [shared[a:b, :, : int(widths[a])] for a, b in itertools.pairwise(borders)]
         return Sums(sums.own, passed, float(rows["md"][-1] - rows["md"][-2])), runs, out
