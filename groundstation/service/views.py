@@ -201,7 +201,7 @@ def trajectory(k: RigModel, p: Parameters) -> View:
                 raise SelectorError(f"parameter md: {error}") from error
         else:
             points = [point for point in points if wanted.holds(point.md)]
-    return {"method": "balanced-tangential", "points": [point_view(q) for q in points]}
+    return {"method": "balanced-tangential", "points": point_views(points)}
 
 
 def events(k: RigModel, p: Parameters) -> View:
@@ -261,7 +261,15 @@ def static_record(r: StaticRecord, seq: int) -> View:
     }
 
 
-def point_view(point: Point) -> View:
+def point_views(points: Sequence[Point]) -> list[View]:
+    """Points of the trajectory."""
+    if not points:
+        return []
+    positions = position_views(np.array([q.position for q in points]), np.array([q.cov for q in points]))
+    return [point_view(*row) for row in zip(points, positions, strict=True)]
+
+
+def point_view(point: Point, position: View) -> View:
     """One point of the trajectory."""
     inclination, azimuth = angles(point.tangent[:2], float(point.tangent[2]))
     row: View = {
@@ -269,12 +277,7 @@ def point_view(point: Point) -> View:
         "inclination_deg": math.degrees(inclination),
         "azimuth_deg": math.degrees(azimuth),
     }
-    return row | position(point) | {"covariance_m2": point.cov.tolist()}
-
-
-def position(point: Point) -> View:
-    """Position and its standard deviations."""
-    return position_views(point.position[None], point.cov[None])[0]
+    return row | position | {"covariance_m2": point.cov.tolist()}
 
 
 def position_views(positions: Array, covs: Array) -> list[View]:
