@@ -21,7 +21,6 @@ from borechain.load.crowd import ROUND_S, TUBE_LENGTH, state_of
 from borechain.load.day import ADVANCE, ADVANCES, BEGUN_AT, EPOCH, depth_of, surveys_at, up_to, write_day
 from borechain.recording.replay import TapeClock
 from groundstation.config import GroundConfig, checked_config
-from groundstation.host import load_kernels
 from groundstation.service.process import GroundProcess
 from sim.errors import RigError
 from telemetry.application.depth_source import DepthSource
@@ -141,7 +140,6 @@ def measure_learning(surveys: int, tubes: int, stops: int, folder: Path) -> dict
     RigError
         When it has not fused all of them.
     """
-    load_kernels()
     settings: dict[str, Any] = {"tube_length": TUBE_LENGTH, "target": TUBE_LENGTH * (tubes + ADVANCES * ADVANCE)}
     known = -(-surveys // tubes)  # stops
     tenth, whole = (checked_config(rig=RIG, folder=folder / str(n), **settings) for n in (known // TENTH, known))

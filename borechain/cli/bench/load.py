@@ -120,8 +120,9 @@ def learn(surveys: int, tubes: int, stops: int, as_json: bool) -> None:
     """
     from borechain.cli.tables import show_table
     from borechain.load.learning import measure_learning
-    from groundstation.host import keep_imports
+    from groundstation.host import keep_imports, load_kernels
 
+    load_kernels()
     keep_imports()
     with tempfile.TemporaryDirectory(prefix="borechain-") as folder:
         result: dict[str, Any] = {"bench": "learn", "tubes": tubes}
