@@ -96,7 +96,7 @@ class Crowd(Process):
             self._surveyed_round = int(number) + 1
             for tube in range(1, self.tubes + 1):
                 self.surveys += 1
-                self.endpoint.submit(survey_of(tube, self._surveyed_round, now), now)
+                self.endpoint.submit(survey_of(tube, self._surveyed_round, now, self.tubes - tube + 1), now)
 
 
 def state_of(tube: int, hops: int, now: float) -> NodeState:
@@ -106,11 +106,11 @@ def state_of(tube: int, hops: int, now: float) -> NodeState:
     )
 
 
-def survey_of(tube: int, number: int, now: float) -> SurveyMeasurement:
+def survey_of(tube: int, number: int, now: float, hops: int) -> SurveyMeasurement:
     """Survey of a tube in a hole that leans a little to the north."""
     noise = ((SURVEY_VAR, 0.0, 0.0), (0.0, SURVEY_VAR, 0.0), (0.0, 0.0, SURVEY_VAR))
     imus = (ImuMean((9.81 * math.sin(LEAN), 0.0, -9.81 * math.cos(LEAN)), noise),)
-    return SurveyMeasurement(tube, number, now, 1, imus, 0.0, 1e-8, 1e-8, 32, 5.0, NodeFlag.NONE)
+    return SurveyMeasurement(tube, number, now, hops, imus, 0.0, 1e-8, 1e-8, 32, 5.0, NodeFlag.NONE)
 
 
 @contextlib.contextmanager

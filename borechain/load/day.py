@@ -22,9 +22,9 @@ from groundstation.host import run_ground
 from groundstation.service.store import Store, Stored
 from sim.errors import RigError
 from sim.rig.processes import ProcessTable, Spec
-from sim.rig.realtime import footprint, pids
+from sim.rig.realtime import cpu_seconds, footprint, pids
 from telemetry.media.zenoh_bus import open_router
-from telemetry.messages import Stand
+from telemetry.messages import Stand, SurveyMeasurement
 from telemetry.runtime.hosting import Place
 
 EPOCH = 1
@@ -44,7 +44,8 @@ def measure_day(hours: float, tubes: int, endpoint: str, page: PageSettings, fol
     """
     place = Place(RIG, endpoint, folder)
     settings: dict[str, Any] = {"tube_length": TUBE_LENGTH, "target": TUBE_LENGTH * (tubes + ADVANCES * ADVANCE)}
-    surveys = write_day(checked_config(rig=RIG, folder=place.folder, **settings).url, hours, tubes)
+    stops = max(int(3600.0 * hours / ROUND_S), 1)
+    surveys = write_day(checked_config(rig=RIG, folder=place.folder, **settings).url, stops, tubes)
     table = ProcessTable({GROUND: Spec(partial(run_ground, own_clock=True, page=page), (place, settings))}, [])
     try:
         table.warm()
@@ -53,7 +54,7 @@ def measure_day(hours: float, tubes: int, endpoint: str, page: PageSettings, fol
             table.start(GROUND)
             ground = Ground(bus, RIG)
             moments = wait_for_history(ground)
-            started_s = time.monotonic() - begun
+            started_s, started_cpu_s = time.monotonic() - begun, cpu_seconds(pids(table)[GROUND])
             picture_s = first_picture(page)
             looked = [asked(page, f"column?moment={number}") for number in moments[:: max(len(moments) // MOMENTS, 1)]]
             return {
@@ -61,6 +62,7 @@ def measure_day(hours: float, tubes: int, endpoint: str, page: PageSettings, fol
                 "stations": len(ground.stations()),
                 "moments": len(moments),
                 "started_s": round(started_s, ROUNDING),
+                "started_cpu_s": round(started_cpu_s, ROUNDING),
                 "picture_ms": round(1e3 * picture_s, ROUNDING),
                 "history_ms": round(1e3 * asked(page, "history"), ROUNDING),
                 "moment_ms": figures(looked),
@@ -70,22 +72,32 @@ def measure_day(hours: float, tubes: int, endpoint: str, page: PageSettings, fol
         table.stop()
 
 
-def write_day(url: str, hours: float, tubes: int) -> int:
-    """Fill a database with a survey of every tube at every stop of some hours; returns how many there are."""
-    stops = max(int(3600.0 * hours / ROUND_S), 1)
+def write_day(url: str, stops: int, tubes: int) -> int:
+    """Fill a database with a survey of every tube in the hole at every stop; returns how many there are."""
     surveys = 0
     with contextlib.closing(Store(url)) as store:
         store.keep_epoch(EPOCH)
         store.keep_tally(list(range(tubes, 0, -1)))
         for stop in range(stops):
-            md = TUBE_LENGTH * tubes + ADVANCE * (stop * ADVANCES // stops)
+            md = depth_of(tubes, stop * ADVANCES // stops)
             stands_at = BEGUN_AT + ROUND_S * stop + DRILLING_S
             store.keep_stand(Stand(EPOCH, stands_at, stands_at + ROUND_S - DRILLING_S, md))
-            at = stands_at + SURVEYED_AFTER_S
-            read = [(replace(survey_of(tube, stop + 1, at), epoch=EPOCH), TUBE_LENGTH * tube) for tube in up_to(tubes)]
-            store.add_messages([Stored(survey, md - below, below) for survey, below in read])
-            surveys += tubes
+            taken = surveys_at(tubes, md, stop + 1, stands_at + SURVEYED_AFTER_S)
+            below = [TUBE_LENGTH * (survey.tube - 1) for survey in taken]
+            store.add_messages([Stored(one, md - own, own) for one, own in zip(taken, below, strict=True)])
+            surveys += len(taken)
     return surveys
+
+
+def depth_of(tubes: int, advances: int) -> float:
+    """Depth (m) of the bit after some advances; after all of them the last tube has gone down."""
+    return max(TUBE_LENGTH * tubes - ADVANCES * ADVANCE, TUBE_LENGTH) + ADVANCE * advances
+
+
+def surveys_at(tubes: int, md: float, number: int, at: float) -> list[SurveyMeasurement]:
+    """What the tubes that hang in the hole survey at one stop, at ``at`` (s, rig time)."""
+    inside = [tube for tube in up_to(tubes) if TUBE_LENGTH * (tube - 1) < md]
+    return [replace(survey_of(tube, number, at, tubes - tube + 1), epoch=EPOCH) for tube in inside]
 
 
 def up_to(tubes: int) -> range:

@@ -28,10 +28,11 @@ RIG = "load"
 GROUND = "base"
 ASKED = ("verdict", "string", "stations", "trajectory", "column", "alarms", "nodes/1", "uncertainty")
 ASK_EVERY_S = 0.05
-SETTLED_S = 5.0  # after all have been heard, until it is measured
+JOINING_S = 5.0  # that readers are given on top of what is measured
 HEARD_WITHIN_S = 60.0
 LEFT_WITHIN_S = 30.0
 DRILLED_M = 8.0  # at most in a run, however long
+READERS = "*-*.json"  # what each of them writes
 WEIGH_EVERY_S = 30.0
 SPARE_M = 20.0  # of the design below all tubes
 ROUNDING = 2
@@ -67,11 +68,12 @@ def measure(load: Load, endpoint: str, page: PageSettings, folder: Path) -> dict
                 table.start(GROUND)
                 ground = Ground(bus, RIG)
                 wait_for_all(ground, load.tubes)
-                until = time.monotonic() + SETTLED_S + load.seconds
+                until = time.monotonic() + JOINING_S + load.seconds
                 readers = readers_of(load, endpoint, page, until, folder)
                 specs |= readers
                 for name in readers:
                     table.start(name)
+                wait_for_readers(bus, folder, load.browsers + load.terminals)
                 cost = bear(ground, bus, table, until)
                 for name in readers:
                     table.running[name].join(LEFT_WITHIN_S)
@@ -107,6 +109,16 @@ def wait_for_all(ground: Ground, tubes: int) -> None:
     raise RigError(f"the ground station has not heard {tubes} tubes within {HEARD_WITHIN_S:.0f} s")
 
 
+def wait_for_readers(bus: ZenohBus, folder: Path, count: int) -> None:
+    """Wait until each of ``count`` readers has had its first news, and the process that does nothing else answers."""
+    deadline = time.monotonic() + HEARD_WITHIN_S
+    while time.monotonic() < deadline:
+        if len(list(folder.glob(READERS))) == count and bus.get(BARE, ASK_EVERY_S):
+            return
+        time.sleep(ASK_EVERY_S)
+    raise RigError(f"browsers and terminals have not heard the ground station within {HEARD_WITHIN_S:.0f} s")
+
+
 def readers_of(load: Load, endpoint: str, page: PageSettings, until: float, folder: Path) -> dict[str, Spec]:
     """Processes of those who look."""
     browsers = {
@@ -126,7 +138,6 @@ def bear(ground: Ground, bus: ZenohBus, table: ProcessTable, until: float) -> di
     In turn with it a process is asked that does nothing else: where the machine lets that one wait too, the ground
     station is not to blame.
     """
-    time.sleep(SETTLED_S)
     pid = pids(table)[GROUND]
     begun, cpu = time.monotonic(), cpu_seconds(pid)
     taken: list[float] = []

@@ -22,12 +22,17 @@ PART = 65_536  # bytes
 
 
 def follow_page(host: str, port: int, until: float, out: Path) -> None:
-    """Read the stream of a page until a time (s, monotonic) and write how late each state of a tube was (s)."""
+    """Read the stream of a page until a time (s, monotonic) and write how late each state of a tube was (s).
+
+    ``out`` is there, and empty, as soon as the first news has come.
+    """
     begin_process("browser")
-    late = []
+    late: list[float] = []
     with contextlib.closing(socket.create_connection((host, port), CONNECT_S)) as connection:
         connection.sendall(f"GET /api/stream HTTP/1.1\r\nHost: {host}\r\n\r\n".encode())
         for line in lines(connection, until):
+            if not late:
+                out.touch()
             if line.startswith(b"data: ") and b'"path"' in line:
                 told = json.loads(line[6:])
                 late += lateness(told["path"], told["answer"])
@@ -44,6 +49,8 @@ def follow_keys(endpoint: str, rig: str, until: float, out: Path) -> None:
         while (left := until - time.monotonic()) > 0.0:
             with contextlib.suppress(queue.Empty):
                 late += lateness(*arrived.get(timeout=left))
+                if len(late) <= 1:
+                    out.touch()
     out.write_text(json.dumps(late))
 
 

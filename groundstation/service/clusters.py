@@ -17,12 +17,13 @@ import numpy.typing as npt
 
 from groundstation.survey.fusion import Departure, Stack
 from groundstation.survey.resolve import Direction, Quality
-from groundstation.survey.shared import CAUSES, Places, Reading, put_columns
+from groundstation.survey.shared import CAUSES, Places, Reading, columns_of
 from groundstation.survey.trust import UNKNOWN_YAW_VAR, Trust
 from telemetry.messages import NodeFlag, SurveyMeasurement
 
 Array = npt.NDArray[np.float64]
 AXES = 3
+TOGETHER = 256  # surveys whose columns are laid out at a time
 FEWEST = 64  # rows of a table
 NO_NUMBER = -1
 GROWTH = 8  # share of its rows by which a table grows
@@ -91,9 +92,16 @@ def cluster_of(
 
 def force_var(measurement: SurveyMeasurement) -> float:
     """Variance (m/s^2)^2 of the mean force of a cluster on one axis: its IMUs weigh by their own."""
-    variances = [sum(imu.force_cov[axis][axis] for axis in range(AXES)) / AXES for imu in measurement.imus]
+    covs = (imu.force_cov for imu in measurement.imus)
+    variances = [(x[0] + y[1] + z[2]) / AXES for x, y, z in covs]
     first = variances[0]
     return first / sum(first / variance for variance in variances) if min(variances) > 0.0 else 0.0
+
+
+def forces_of(kept: bytes) -> list[list[float]]:
+    """Forces (imus, 3) as a table keeps them, m/s^2."""
+    forces: list[list[float]] = np.frombuffer(kept).reshape(-1, AXES).tolist()
+    return forces
 
 
 class Table:
@@ -163,15 +171,25 @@ class Table:
     def stack(self, numbers: Sequence[int]) -> Stack:
         """Directions of the surveys in several rows, side by side."""
         rows, places = self.rows[numbers], [self.places[number] for number in numbers]
-        shared = np.zeros((len(numbers), 2, int(rows["width"].max())))
-        for own, row, at in zip(shared, rows["causes"], places, strict=True):
-            put_columns(own, row, at)
+        shared = columns_of(rows["causes"], places, int(rows["width"].max()))
         return Stack(rows["lean"], rows["down"], rows["cov"], rows["information"], shared)
+
+    def covs(self, numbers: Sequence[int]) -> Array:
+        """Covariances (n, 2, 2) of the leans of the surveys in several rows, what they share with others included."""
+        widths = self.rows["width"][numbers]
+        covs = self.rows["cov"][numbers]
+        for width in np.unique(widths).tolist():
+            alike = np.flatnonzero(widths == width)
+            for some in np.split(alike, range(TOGETHER, len(alike), TOGETHER)):
+                rows = [numbers[place] for place in some.tolist()]
+                shared = columns_of(self.rows["causes"][rows], [self.places[row] for row in rows], width)
+                covs[some] += shared @ shared.transpose(0, 2, 1)
+        return covs
 
     def cluster(self, number: int) -> Cluster:
         """The survey in a row."""
         row = self.rows[number]
-        forces = np.frombuffer(self.forces[number]).reshape(-1, AXES).tolist()
+        forces = forces_of(self.forces[number])
         return Cluster(
             **{name: row[name].item() for name in PLAIN},
             forces=tuple(tuple(force) for force in forces),
@@ -219,6 +237,10 @@ class Clusters:
         """One number of every cluster, (n,) or (n, ...)."""
         return np.asarray(self._table.rows[name][np.array(self._rows)])
 
+    def rows(self, places: Sequence[int]) -> npt.NDArray[np.void]:
+        """Numbers of the clusters at some places, side by side."""
+        return self._table.rows[[self._rows[place] for place in places]]
+
     def row(self, place: int) -> int:
         """Row of the table that holds the cluster at a place."""
         return self._rows[place]
@@ -255,9 +277,13 @@ class Clusters:
 
     def departure(self, place: int) -> Departure | None:
         """How far a cluster departed from those before it; None where nobody has worked it out."""
-        row = self._table.rows[self._rows[place]]
-        size = float(row["departure"])
-        return None if math.isnan(size) else (row["departed"].copy(), size)
+        row = self._rows[place]
+        size = self._table.rows["departure"].item(row)
+        return None if math.isnan(size) else (self._table.rows["departed"][row].copy(), size)
+
+    def knows_departure(self, place: int) -> bool:
+        """Whether it is known how far a cluster departed from those before it."""
+        return not math.isnan(self._table.rows["departure"].item(self._rows[place]))
 
     def keep_departure(self, place: int, departure: Departure) -> None:
         """Keep how far a cluster departed from those before it."""

@@ -15,7 +15,6 @@ from groundstation.service.thinning import FEWEST, largest_triangles
 from groundstation.survey.columns import Deviation, dominant
 from groundstation.survey.ellipsoid import Ellipse, axes, coverage_radius, plan_ellipses
 from groundstation.survey.shared import KIND_NAMES
-from groundstation.survey.trajectory import Point
 
 Array = npt.NDArray[np.float64]
 View = dict[str, Any]
@@ -24,17 +23,20 @@ POINTS, MOST_POINTS = 200, 1000  # of the history
 LONGEST_NUMBER = 18  # digits
 SHOWN = 30  # numbers that a refusal names
 CM = 100.0
+SOURCES = ("random", *KIND_NAMES)
+SIGMAS = ("sigma_north_m", "sigma_east_m", "sigma_tvd_m")
 
 
 def uncertainty(k: RigModel, p: dict[str, str]) -> View:
     """Ellipse in plan and ellipsoid of every station at a confidence, and what they are made of."""
     confidence = _confidence(p.get("confidence"))
     plane, space = coverage_radius(confidence, 2), coverage_radius(confidence, 3)
-    points = k.hole.trajectory
-    covs = np.array([point.cov for point in points])
-    shared = np.array([point.shared for point in points])
-    random = np.diagonal(covs, axis1=1, axis2=2) - shared.sum(axis=1)
-    rows = zip(points, plan_ellipses(covs, plane), *axes(covs, space), random, shared, strict=True)
+    drawn, by_kind = k.hole.trajectory, k.hole.variances
+    random = np.diagonal(drawn.covs, axis1=1, axis2=2) - by_kind.sum(axis=1)
+    stds = np.sqrt(np.maximum(np.concatenate([random[:, None], by_kind], axis=1), 0.0))
+    sizes, directions = axes(drawn.covs, space)
+    columns = (drawn.md, drawn.covs, sizes, directions, stds)
+    rows = zip(*(column.tolist() for column in columns), plan_ellipses(drawn.covs, plane), strict=True)
     return {
         "confidence": confidence,
         "sigma_plane": plane,
@@ -52,26 +54,21 @@ def _confidence(text: str | None) -> float:
     return confidence
 
 
-def _region(point: Point, ellipse: Ellipse, sizes: Array, directions: Array, random: Array, shared: Array) -> View:
-    sources = zip(KIND_NAMES, shared, strict=True)
+def _region(
+    md: float, cov: list[list[float]], sizes: list[float], directions: list[list[float]], stds: list[list[float]],
+    ellipse: Ellipse,
+) -> View:  # fmt: skip
     return {
-        "md_m": round(point.md, 6),
-        "covariance_m2": point.cov.tolist(),
+        "md_m": round(md, 6),
+        "covariance_m2": cov,
         "plan_ellipse": {
             "major_m": ellipse.major,
             "minor_m": ellipse.minor,
             "azimuth_deg": math.degrees(ellipse.azimuth),
         },
-        "ellipsoid": [
-            {"semi_axis_m": s, "direction": d} for s, d in zip(sizes.tolist(), directions.tolist(), strict=True)
-        ],
-        "sources": {name: _stds(variances) for name, variances in (("random", random), *sources)},
+        "ellipsoid": [{"semi_axis_m": s, "direction": d} for s, d in zip(sizes, directions, strict=True)],
+        "sources": {name: dict(zip(SIGMAS, own, strict=True)) for name, own in zip(SOURCES, stds, strict=True)},
     }
-
-
-def _stds(variances: Array) -> View:
-    north, east, tvd = (math.sqrt(max(variance, 0.0)) for variance in variances.tolist())
-    return {"sigma_north_m": north, "sigma_east_m": east, "sigma_tvd_m": tvd}
 
 
 def column(k: RigModel, p: dict[str, str]) -> View:
@@ -81,7 +78,7 @@ def column(k: RigModel, p: dict[str, str]) -> View:
     """
     design = k.config.design
     moment = _moment(k, p["moment"]) if "moment" in p else None
-    rows = k.hole.deviations if moment is None else moment.rows
+    rows = list(k.hole.deviations) if moment is None else moment.rows
     end = k.hole.projection if moment is None else moment.projection
     return {
         "design": {

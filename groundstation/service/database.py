@@ -19,6 +19,7 @@ from groundstation.errors import StoreError
 from groundstation.service.tables import ADD_META, ALL_META, DROP_META, META, METADATA, READABLE, SCHEMA
 from telemetry.runtime.disk import MACHINE, Disk
 
+CACHE_KB = 256  # of pages that a connection keeps: rows come at the end, and the usual 2 MB fill within an hour
 SHOWN = 5  # tables named of a database that is not ours
 COMPILED: Final[dict[Any, Any]] = {}  # statements for SQLite by their keys; as many as the sources have
 
@@ -191,4 +192,5 @@ def _durable(connection: sa.engine.interfaces.DBAPIConnection, _record: object) 
         cursor.execute("PRAGMA journal_mode=WAL")
     cursor.execute("PRAGMA synchronous=FULL")
     cursor.execute("PRAGMA busy_timeout=5000")
+    cursor.execute(f"PRAGMA cache_size=-{CACHE_KB}")
     cursor.close()

@@ -20,13 +20,13 @@ ALARMS = {
 def known_of(k: RigModel) -> Known:
     """What the model knows of the way of the hole."""
     design = k.config.design
-    surveyed = k.hole.deviations[1:]
+    worst = k.hole.deviations.worst(first=1)
     return Known(
         target=design.length,
         curvature=math.radians(k.config.steering_deg_per_m),
         bit=k.depths.latest,
-        worst=max(surveyed, key=lambda d: d.ratio, default=None),
-        projection=k.hole.projection if surveyed else None,
+        worst=worst,
+        projection=k.hole.projection if worst is not None else None,
         doubts=tuple(_doubts(k)),
     )
 

@@ -6,17 +6,17 @@ It is made of the stored surveys as they are applied, so it is the same after a 
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 import numpy.typing as npt
 
-from groundstation.survey.columns import Deviation
+from groundstation.survey.columns import Deviation, Deviations
 
 Array = npt.NDArray[np.float64]
 Few = npt.NDArray[np.float32]
 COVARIANCE = (3, 4, 4, 5)  # places of a covariance's entries in a row
+UPPER = (0, 1, 3)  # of the entries of a covariance those that are not said twice
 KEPT = 512  # moments; of more every second of the older half goes
 ROOM = 8  # part of its length that a table of stations has left for those below
 SAME_STOP = 15.0  # s, within which two surveys were taken at one stop
@@ -71,11 +71,12 @@ class History:
             return False
         return epoch > newest_epoch or (epoch == newest_epoch and at > newest_at + SAME_STOP)
 
-    def add(self, rows: Sequence[Deviation], projection: Deviation | None) -> None:
+    def add(self, rows: Deviations, projection: Deviation | None) -> None:
         """Keep what is known at the end of a stop."""
         self.count += 1
-        where = self._kept_once(np.array([(d.md, d.limit) for d in rows]))
-        found = np.array([(d.along, *d.offset, d.cov[0, 0], d.cov[0, 1], d.cov[1, 1]) for d in rows], np.float32)
+        where = self._kept_once(np.stack([rows.md, rows.limit], axis=1))
+        covs = rows.cov.reshape(-1, 4)
+        found = np.column_stack([rows.along, rows.offset, covs[:, UPPER]]).astype(np.float32)
         self.moments.append(Moment(self.count, self._newest[1], where, found, projection))
         if len(self.moments) > KEPT:
             half = KEPT // 2

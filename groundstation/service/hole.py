@@ -9,21 +9,26 @@ from __future__ import annotations
 import itertools
 import math
 from bisect import bisect_left, insort
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
+from typing import Final
 
 import numpy as np
+import numpy.typing as npt
 
 from groundstation.config import GroundConfig
 from groundstation.service.alarms import AlarmList
 from groundstation.service.clusters import Cluster, Clusters, Table
 from groundstation.service.history import SAME_STOP, History
 from groundstation.service.station import SurveyStation
-from groundstation.survey.columns import Deviation, deviations, project
+from groundstation.survey.columns import Deviation, Deviations, deviations, project
 from groundstation.survey.fusion import Evidence, Weighting, departures_from, judge_departure
-from groundstation.survey.resolve import Direction
 from groundstation.survey.shared import SharedErrors
-from groundstation.survey.trajectory import Point, Trajectory
+from groundstation.survey.trajectory import Trajectory
 from groundstation.survey.trust import Trust
+
+Array = npt.NDArray[np.float64]
+NOTHING: Final = np.zeros((3, 0))
 
 
 @dataclass(frozen=True, slots=True)
@@ -34,6 +39,11 @@ class Moved:
     at: float  # s
     dropped: int  # earlier clusters that no longer count
     evidence: Evidence
+
+
+def no_columns(columns: Array) -> Iterator[Array]:
+    """What the points of a hole keep of their shared columns."""
+    return itertools.repeat(NOTHING, len(columns))
 
 
 class Hole:
@@ -51,15 +61,12 @@ class Hole:
         self._design = config.design
         self._surveys = Table()
         self._station_of: list[SurveyStation] = []  # of each of its rows
-        self._surveyed: dict[float, SurveyStation] = {}  # since the last time, by depth
         self._stations: list[SurveyStation] = []
         self._moved: list[Moved] = []
         self._alarms = AlarmList()
         self._history = History()
-        self._trajectory = self._at_collar()
-        self._drawn: list[tuple[float, Direction]] = []  # stations of the trajectory, m and direction
-        self._deviations = deviations(self._trajectory.points, self._design)
-        self._point_at: dict[float, Point] = {}  # of every station below the collar, by its depth
+        self._trajectory = Trajectory(keep=no_columns)
+        self._deviations = self._deviate()
         self._projection: Deviation | None = None
         self._unsettled_since = math.inf  # s, rig time of the oldest survey from which nothing follows yet
         self._newest_at = -math.inf  # s, rig time of the newest survey
@@ -88,7 +95,6 @@ class Hole:
             return False
         self.version += 1
         self._history.on_survey(epoch, cluster.at)
-        self._surveyed[station.md] = station
         self._unsettled_since = min(self._unsettled_since, cluster.at)
         self._newest_at = max(self._newest_at, cluster.at)
         return True
@@ -97,6 +103,11 @@ class Hole:
         """Whether the yaw of any survey of a tube is not believed."""
         column = self._surveys.column
         return bool(((column("tube") == tube) & (column("trust") != Trust.FULL)).any())
+
+    @property
+    def surveys(self) -> Table:
+        """Every survey in the order of their coming."""
+        return self._surveys
 
     @property
     def stations(self) -> list[SurveyStation]:
@@ -122,18 +133,25 @@ class Hole:
         return self._history
 
     @property
-    def trajectory(self) -> list[Point]:
-        """Points from the collar down."""
+    def trajectory(self) -> Trajectory:
+        """From the collar down."""
         self.settle()
-        return self._trajectory.points
-
-    def point_of(self, station: SurveyStation) -> Point:
-        """Point of the trajectory at a station; the collar for one at its depth."""
-        self.settle()
-        return self._point_at.get(station.md, self._trajectory.points[0])
+        return self._trajectory
 
     @property
-    def deviations(self) -> list[Deviation]:
+    def variances(self) -> Array:
+        """Variances (n, kinds, 3) of the positions along the trajectory (m^2) by what their stations share.
+
+        They are worked out when they are asked for: a start goes through hundreds of stops and shows none of them.
+        """
+        return np.concatenate([self._shared.variances(columns) for columns in self.trajectory.columns()])
+
+    def place_of(self, station: SurveyStation) -> int:
+        """Place of a station in the trajectory; that of the collar for one at its depth."""
+        return int(np.searchsorted(self.trajectory.md, station.md)) if station.md > 0.0 else 0
+
+    @property
+    def deviations(self) -> Deviations:
         """Deviation from the design axis at every point of the trajectory."""
         self.settle()
         return self._deviations
@@ -148,40 +166,32 @@ class Hole:
         """Work out what follows from the surveys that have come since the last time."""
         since, self._unsettled_since = self._unsettled_since, math.inf
         if since < math.inf:
-            self._judge_movement(since)
-            self._fuse_surveyed()
-            self._work_out()
+            changed = self._judge_movement(since)
+            self._fuse(changed)
+            self._work_out(changed)
 
-    def _fuse_surveyed(self) -> None:
-        """Fuse together what stations have one more cluster of since the last time."""
-        surveyed, self._surveyed = self._surveyed, {}
-        if self._config.weighting is Weighting.BAYES and (grown := [s for s in surveyed.values() if s.lacks_newest]):
+    def _fuse(self, changed: Sequence[SurveyStation]) -> None:
+        """Fuse the stations of which something may have changed, together those that have one more cluster."""
+        weighting = self._config.weighting
+        if weighting is Weighting.BAYES and (grown := [station for station in changed if station.lacks_newest]):
             newest = self._surveys.stack([station.clusters.row(station.count - 1) for station in grown])
             SurveyStation.add_newest(grown, newest)
 
-    def _work_out(self) -> None:
-        self._draw([(one.md, one.fused(self._config.weighting)) for one in self._stations if one.md > 0.0])
-        if not self._drawn:
+    def _work_out(self, changed: Sequence[SurveyStation]) -> None:
+        weighting = self._config.weighting
+        self._trajectory.put((one.md, one.fused(weighting)) for one in changed if one.md > 0.0)
+        self._deviations = self._deviate()
+        worst = self._deviations.worst(first=1)
+        if worst is None:
             return
-        worst = max(self._deviations[1:], key=lambda d: d.ratio)
-        self._projection = project(self._trajectory.points[-1], self._drawn[-1][1], self._design)
+        self._projection = project(self._trajectory[-1], self._stations[-1].fused(weighting), self._design)
         self._alarms.judge_deviation("deviation", worst, self._newest_at)
         self._alarms.judge_deviation("projection", self._projection, self._newest_at)
 
-    def _draw(self, stations: list[tuple[float, Direction]]) -> None:
-        """Trajectory through stations (m, direction); where none has changed the new ones are added to it."""
-        same = zip(stations, self._drawn, strict=False)
-        if len(stations) < len(self._drawn) or any(new[1] is not old[1] for new, old in same):
-            self._trajectory, self._drawn, self._deviations = self._at_collar(), [], []
-        added = stations[len(self._drawn) :]
-        self._trajectory.extend(added)
-        self._drawn += added
-        self._point_at = {point.md: point for point in self._trajectory.points[1:]}
-        self._deviations += deviations(self._trajectory.points[len(self._deviations) :], self._design)
-
-    def _at_collar(self) -> Trajectory:
-        """A trajectory without stations; a point of it keeps the variances of its position by kind, (kinds, 3)."""
-        return Trajectory(keep=self._shared.variances)
+    def _deviate(self) -> Deviations:
+        """Deviations of the trajectory as it is drawn."""
+        drawn = self._trajectory
+        return deviations(drawn.md, drawn.positions, drawn.covs, self._design)
 
     def _station_at(self, md: float) -> SurveyStation:
         first = bisect_left(self._stations, md - 2.0 * self._config.station_tolerance, key=lambda known: known.md)
@@ -194,10 +204,11 @@ class Hole:
         insort(self._stations, station, key=lambda known: known.md)
         return station
 
-    def _judge_movement(self, since: float) -> None:
+    def _judge_movement(self, since: float) -> list[SurveyStation]:
         """Drop earlier clusters where the hole moved, at every stop from the one at rig time ``since`` (s) on.
 
-        Each stop is judged as a whole, so the order in which its surveys arrive changes nothing.
+        Each stop is judged as a whole, so the order in which its surveys arrive changes nothing. Returns the stations
+        of these stops; to none of the others anything has happened.
         """
         stops = self._stops(since)
         begin = stops[0][0][0]
@@ -207,6 +218,7 @@ class Hole:
                 self._stations[number].drops = [d for d in self._stations[number].drops if d != place]
         for stop in stops:
             self._judge_stop(stop)
+        return [self._stations[number] for number in sorted({number for stop in stops for _, number, _ in stop})]
 
     def _stops(self, since: float) -> list[list[tuple[float, int, int]]]:
         """Stops that lasted to rig time ``since`` (s) or came later: clusters as (time, station, place) in their order.
@@ -226,11 +238,12 @@ class Hole:
 
     def _clusters_after(self, time: float) -> list[tuple[float, int, int]]:
         """Clusters read later than a rig time (s) as (time, station, place), in their order."""
-        found = []
-        for row in np.flatnonzero(self._surveys.column("at") > time).tolist():
+        all_at, found = self._surveys.column("at"), []
+        rows = np.flatnonzero(all_at > time)
+        numbers = {id(station): number for number, station in enumerate(self._stations)} if len(rows) else {}
+        for row, at in zip(rows.tolist(), all_at[rows].tolist(), strict=True):
             station = self._station_of[row]
-            number = bisect_left(self._stations, station.md, key=lambda known: known.md)
-            found.append((float(self._surveys.rows["at"][row]), number, station.clusters.place_of(row)))
+            found.append((at, numbers[id(station)], station.clusters.place_of(row)))
         return sorted(found)
 
     def _find_departures(self, stop: list[tuple[float, int, int]]) -> None:

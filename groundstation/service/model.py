@@ -26,7 +26,7 @@ from groundstation.service.station import SurveyStation
 from groundstation.service.stops import Stops
 from groundstation.service.tally import Tally
 from groundstation.survey.joint_angles import JointAngles
-from groundstation.survey.resolve import Direction, Resolved, check
+from groundstation.survey.resolve import Direction, Quality, Resolved
 from groundstation.survey.shared import Reading, SharedErrors, weigh_together
 from groundstation.survey.trust import Trust, trust_of, with_unknown_yaw
 from telemetry.messages import EPOCH_UNKNOWN, Event, NodeFlag, NodeState, StaticRecord, SurveyMeasurement
@@ -34,7 +34,6 @@ from telemetry.messages import EPOCH_UNKNOWN, Event, NodeFlag, NodeState, Static
 EVENTS_SHOWN = 10_000
 UNTRUSTED = "survey_untrusted"  # alarm: a survey is fused with an unknown yaw
 STATIC_RECORDS_SHOWN = 1_000
-ACCELEROMETER_NOISE_DEG = 0.02  # one sample, for the check of motion
 ABOVE_COLLAR = 0.01  # m, of rounding; a node higher up is in no hole
 EPOCHS_KEPT = 8
 UNDATED_KEPT = 64  # states of a tube before it knows rig time
@@ -51,9 +50,9 @@ class Waiting:
 
 @dataclass(frozen=True, slots=True)
 class Prepared:
-    """A survey that is about to be fused: what it comes to by itself, and with what it shares with others."""
+    """A survey that is about to be fused: what is wrong with its stop, and its direction with what it shares."""
 
-    survey: ResolvedSurvey
+    quality: Quality
     direction: Reading
 
 
@@ -233,7 +232,7 @@ class RigModel:
             self.waiting.append(Waiting(measurement, below))
             return ""  # most wait for a moment; the watch tells of those that wait longer
         try:
-            self._fuse(measurement, md, trust, prepared or self._prepare(measurement, resolve_survey(measurement)))
+            self._fuse(measurement, md, trust, prepared or self._prepare_one(measurement))
         except (SurveyError, np.linalg.LinAlgError):
             self.refused += 1
             return "survey_refused"
@@ -245,7 +244,7 @@ class RigModel:
         None for each that is not fused, or is to be looked at by itself.
         """
         placed = [one for one in measurements if trust_of(one.flags) not in (Trust.UNDATED, Trust.SET_ASIDE)]
-        resolved = resolve_surveys(placed)
+        resolved = resolve_surveys(placed, self.config.gravity)
         if any(one is None for one in resolved):
             return [None] * len(measurements)
         found = {id(one): self._prepare(one, own) for one, own in zip(placed, resolved, strict=True) if own is not None}
@@ -253,17 +252,17 @@ class RigModel:
             weigh_together([one.direction for one in found.values()])
         return [found.get(id(one)) for one in measurements]
 
+    def _prepare_one(self, measurement: SurveyMeasurement) -> Prepared:
+        return self._prepare(measurement, resolve_survey(measurement, self.config.gravity))
+
     def _prepare(self, measurement: SurveyMeasurement, resolved: ResolvedSurvey) -> Prepared:
-        return Prepared(resolved, self._direction(measurement, trust_of(measurement.flags), resolved.resolved))
+        return Prepared(resolved.quality, self._direction(measurement, trust_of(measurement.flags), resolved.resolved))
 
     def _fuse(self, measurement: SurveyMeasurement, md: float, trust: Trust, prepared: Prepared) -> None:
-        found, direction = prepared.survey, prepared.direction
-        noise = math.radians(ACCELEROMETER_NOISE_DEG) * self.config.gravity
-        samples, settle_time = measurement.samples, measurement.settle_time
-        quality = check(found.forces, found.covs, found.combined, self.config.gravity, samples, settle_time, noise)
         epoch = measurement.epoch or self.epoch
         number = self.seen["measurements"] + 1
-        if self.hole.add_cluster(cluster_of(measurement, md, direction, quality, trust, number), epoch):
+        cluster = cluster_of(measurement, md, prepared.direction, prepared.quality, trust, number)
+        if self.hole.add_cluster(cluster, epoch):
             self.seen["measurements"] = number
 
     def on_event(self, event: Event) -> None:

@@ -10,7 +10,16 @@ from dataclasses import dataclass
 import orjson
 
 from groundstation.errors import SelectorError
-from groundstation.service import alarm_views, column_views, key_fields, order_views, verdict_views, views, wall_views
+from groundstation.service import (
+    alarm_views,
+    column_views,
+    key_fields,
+    measurement_views,
+    order_views,
+    verdict_views,
+    views,
+    wall_views,
+)
 from groundstation.service.answers import Fields, object_schema
 from groundstation.service.model import RigModel
 from groundstation.service.streams import STREAMED
@@ -87,7 +96,7 @@ FIXED: dict[str, Path] = {
     "verdict": Path(verdict_views.verdict, key_fields.VERDICT),
     "string": Path(views.string, key_fields.STRING),
     "stations": Path(views.stations, key_fields.STATIONS, ("md",), is_of_the_hole=True),
-    "measurements": Path(views.measurements, key_fields.MEASUREMENTS, ("station", "tube", *STREAMED)),
+    "measurements": Path(measurement_views.measurements, key_fields.MEASUREMENTS, ("station", "tube", *STREAMED)),
     "trajectory": Path(views.trajectory, key_fields.TRAJECTORY, ("md",), is_of_the_hole=True),
     "events": Path(views.events, key_fields.EVENTS, ("tube", *STREAMED)),
     "static_records": Path(views.static_records, key_fields.STATIC_RECORDS, ("tube", *STREAMED)),
@@ -104,7 +113,9 @@ FIXED: dict[str, Path] = {
 MEMBERS: dict[str, Member] = {
     "nodes/{tube}": Member(lambda k: sorted(k.nodes), views.node, key_fields.NODE),
     "stations/{n}": Member(_station_numbers, views.station, key_fields.STATION),
-    "stations/{n}/measurements": Member(_station_numbers, views.station_measurements, key_fields.STATION_MEASUREMENTS),
+    "stations/{n}/measurements": Member(
+        _station_numbers, measurement_views.station_measurements, key_fields.STATION_MEASUREMENTS
+    ),
     "orders/{n}": Member(lambda k: [known.number for known in k.orders], order_views.order, key_fields.ORDER),
 }
 PATTERNS = (*FIXED, *MEMBERS)

@@ -6,32 +6,30 @@ them works them out by the hundred: in small matrices one by one most of the tim
 
 from __future__ import annotations
 
+import math
 from collections import defaultdict
 from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-import numpy.typing as npt
 
 from groundstation.errors import SurveyError
-from groundstation.survey.resolve import Resolved, combine_imus, resolve_all
+from groundstation.survey.resolve import Quality, Resolved, check_all, combine_imus, resolve_all
 from telemetry.messages import SurveyMeasurement
 
-Array = npt.NDArray[np.float64]
+ACCELEROMETER_NOISE_DEG = 0.02  # one sample, for the check of motion
 
 
 @dataclass(frozen=True, slots=True)
 class ResolvedSurvey:
-    """What a survey comes to: its IMUs, (n, 3) m/s^2 and (n, 3, 3), their mean, and the direction."""
+    """What a survey comes to: its direction, and what is wrong with the stop."""
 
-    forces: Array
-    covs: Array
-    combined: tuple[Array, Array]
     resolved: Resolved
+    quality: Quality
 
 
-def resolve_survey(measurement: SurveyMeasurement) -> ResolvedSurvey:
-    """Direction of one survey.
+def resolve_survey(measurement: SurveyMeasurement, gravity: float) -> ResolvedSurvey:
+    """Direction of one survey under a gravity (m/s^2).
 
     Raises
     ------
@@ -40,10 +38,10 @@ def resolve_survey(measurement: SurveyMeasurement) -> ResolvedSurvey:
     numpy.linalg.LinAlgError
         When its IMUs cannot be weighed.
     """
-    return _resolve_alike([measurement])[0]
+    return _resolve_alike([measurement], gravity)[0]
 
 
-def resolve_surveys(measurements: Sequence[SurveyMeasurement]) -> list[ResolvedSurvey | None]:
+def resolve_surveys(measurements: Sequence[SurveyMeasurement], gravity: float) -> list[ResolvedSurvey | None]:
     """The same of many, bit for bit; None for those that are to be looked at one by one."""
     alike: dict[int, list[int]] = defaultdict(list)
     for place, measurement in enumerate(measurements):
@@ -51,7 +49,7 @@ def resolve_surveys(measurements: Sequence[SurveyMeasurement]) -> list[ResolvedS
     found: list[ResolvedSurvey | None] = [None] * len(measurements)
     for places in alike.values():
         try:
-            together = _resolve_alike([measurements[place] for place in places])
+            together = _resolve_alike([measurements[place] for place in places], gravity)
         except (SurveyError, np.linalg.LinAlgError):
             continue  # of one; who it is comes out where each is resolved by itself
         for place, one in zip(places, together, strict=True):
@@ -59,12 +57,14 @@ def resolve_surveys(measurements: Sequence[SurveyMeasurement]) -> list[ResolvedS
     return found
 
 
-def _resolve_alike(measurements: Sequence[SurveyMeasurement]) -> list[ResolvedSurvey]:
+def _resolve_alike(measurements: Sequence[SurveyMeasurement], gravity: float) -> list[ResolvedSurvey]:
     """Of surveys with the same number of IMUs."""
     forces = np.array([[imu.force for imu in one.imus] for one in measurements])
     covs = np.array([[imu.force_cov for imu in one.imus] for one in measurements])
-    means, mean_covs = combine_imus(forces, covs)
+    combined = combine_imus(forces, covs)
     yaws, yaw_vars = [one.yaw for one in measurements], [one.yaw_var for one in measurements]
-    resolved = resolve_all(means, mean_covs, yaws, yaw_vars)
-    combined = zip(means, mean_covs, strict=True)
-    return [ResolvedSurvey(*row) for row in zip(forces, covs, combined, resolved, strict=True)]
+    resolved = resolve_all(*combined, yaws, yaw_vars)
+    samples, settle_times = [one.samples for one in measurements], [one.settle_time for one in measurements]
+    noise = math.radians(ACCELEROMETER_NOISE_DEG) * gravity
+    quality = check_all(forces, covs, combined, gravity, samples, settle_times, noise)
+    return [ResolvedSurvey(*row) for row in zip(resolved, quality, strict=True)]

@@ -2,11 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
 from typing import Any
-
-import numpy as np
 
 from groundstation.service.clusters import Cluster, Clusters
 from groundstation.survey.fusion import Departure, GrowingBayes, Stack, Weighting, departure_from, weighted
@@ -44,7 +42,7 @@ class SurveyStation:
 
     def first_before(self, place: int) -> int:
         """Place of the first cluster that counted when the one at ``place`` came."""
-        return max((drop for drop in self.drops if drop < place), default=0)
+        return max((drop for drop in self.drops if drop < place), default=0) if self.drops else 0
 
     def add_cluster(self, cluster: Cluster) -> None:
         """Add a cluster in the order of time; what was judged of later ones is forgotten.
@@ -98,10 +96,10 @@ class SurveyStation:
 
     def mean_variances(self) -> tuple[float, float, float]:
         """Of the clusters that count: of the yaw as it is fused, systematic (both rad^2), of the force (m/s^2)^2."""
-        counting, column = self.counting, self.clusters.column
-        unknown = UNKNOWN_YAW_VAR * (column("trust")[counting] == Trust.UNKNOWN_YAW)
-        yaw = float(np.mean(column("yaw_var")[counting] + unknown))
-        systematic, force = (float(np.mean(column(name)[counting])) for name in ("systematic_var", "force_var"))
+        rows = self.clusters.rows(self.counting)
+        unknown = UNKNOWN_YAW_VAR * (rows["trust"] == Trust.UNKNOWN_YAW)
+        each = (rows["yaw_var"] + unknown, rows["systematic_var"], rows["force_var"])
+        yaw, systematic, force = (float(values.sum()) / len(values) for values in each)
         return yaw, systematic, force
 
     @property
@@ -109,12 +107,14 @@ class SurveyStation:
         """What changes with every cluster that comes, is revised or does not count any more."""
         return self.count, self.revised, *self.drops
 
-    def shown(self, show: Callable[[SurveyStation], dict[str, Any]]) -> dict[str, Any]:
-        """What one view shows of the clusters that count; made anew where another has come."""
-        made_of = self._made_of
-        if self._shown is None or self._shown[0] != made_of:
-            self._shown = made_of, show(self)
-        return self._shown[1]
+    @property
+    def shown(self) -> dict[str, Any] | None:
+        """What a view showed last of the clusters that count; None where another has come since."""
+        return self._shown[1] if self._shown is not None and self._shown[0] == self._made_of else None
+
+    def show(self, view: dict[str, Any]) -> None:
+        """Keep what a view shows of the clusters that count."""
+        self._shown = self._made_of, view
 
     def fused(self, weighting: Weighting) -> Direction:
         """Direction from the clusters that count; worked out anew where another has come."""
@@ -124,10 +124,9 @@ class SurveyStation:
         return self._fused[1]
 
     def _fuse(self, weighting: Weighting) -> Direction:
-        counting = self.counting
         if weighting is not Weighting.BAYES:
-            return weighted([self.clusters.reading(place) for place in counting], weighting)
-        if len(counting) == self.count - self.first:
+            return weighted([self.clusters.reading(place) for place in self.counting], weighting)
+        if not self.untrusted or len(self.counting) == self.count - self.first:
             return self._sum_of_all(self.count)
         if self._trusted is None:
             self._trusted = GrowingBayes()
@@ -146,7 +145,7 @@ class SurveyStation:
     def known_before(self, place: int) -> Direction | None:
         """What the clusters before one came to, where it has not departed from them yet and that is known."""
         begin = self.first_before(place)
-        is_open = begin < place and self.clusters.departure(place) is None
+        is_open = begin < place and not self.clusters.knows_departure(place)
         return self._all.known(begin, place) if is_open else None
 
     def _sum_of_all(self, end: int) -> Direction:

@@ -107,6 +107,7 @@ class Stops:
         self._tally = tally
         self._due = due
         self._stops: list[Stop] = []
+        self._owed: list[Stop] = []  # those that a survey is missing of
         self._taken = Taken()
 
     def __iter__(self) -> Iterator[Stop]:
@@ -115,9 +116,10 @@ class Stops:
     def on_survey(self, epoch: int, at: float, tube: int) -> None:
         """A survey has come, wherever it belongs."""
         self._taken.add_survey(epoch, at, tube)
-        for stop in self._stops:
-            if stop.missing and tube in stop.missing and stop.has(epoch, at):
+        for stop in self._owed:
+            if tube in stop.missing and stop.has(epoch, at):
                 stop.missing.discard(tube)
+                self._owed = [one for one in self._owed if one.missing]
 
     def know(self, stand: Stand) -> bool:
         """Whether a stand is that of a stop, or more of it."""
@@ -147,6 +149,8 @@ class Stops:
                 continue
             stop.judged = True
             stop.missing = set(stop.tubes) - self._taken.tubes_of(stop)
+            self._owed += [stop] if stop.missing else []
+        del self._owed[:-STOPS_KEPT]
 
     def _add_tubes(self, stop: Stop) -> None:
         """A tube that is heard while the bit stands hung there before."""

@@ -124,14 +124,14 @@ class Store(Database):
     def messages(self) -> Iterator[Stored]:
         """Everything stored, in the order of arrival; what is damaged is passed over and counted."""
         with self._refusing(), self._engine.connect() as connection:
-            for row in connection.execute(ALL_MESSAGES):
+            for payload, md, below in connection.execute(ALL_MESSAGES):
                 try:
-                    message = decode(row.payload)
+                    message = decode(payload)
                 except DecodeError:
                     self.damaged += 1
                     continue
-                if isinstance(message, SurveyMeasurement | Event | StaticRecord) and is_depth(row.md):
-                    yield Stored(message, row.md, row.below)
+                if isinstance(message, SurveyMeasurement | Event | StaticRecord) and is_depth(md):
+                    yield Stored(message, md, below)
                 else:
                     self.damaged += 1
 

@@ -4,24 +4,25 @@ from __future__ import annotations
 
 import datetime
 import math
-from collections.abc import Iterator
+from collections.abc import Sequence
 from dataclasses import dataclass
-from functools import partial
 from typing import Any
 
 import numpy as np
+import numpy.typing as npt
 
 from groundstation.errors import SelectorError, SurveyError
-from groundstation.service.clusters import NO_NUMBER, Cluster
 from groundstation.service.model import RigModel
 from groundstation.service.station import SurveyStation
-from groundstation.service.streams import STREAMED, span, window
+from groundstation.service.streams import STREAMED, window
 from groundstation.survey.fusion import Weighting
-from groundstation.survey.resolve import angle_stds, angles
+from groundstation.survey.resolve import Direction, angle_stds_of_all, angles
 from groundstation.survey.trajectory import Point, interpolate
 from telemetry.messages import Event, NodeFlag, NodeState, StaticRecord
 
 View = dict[str, Any]
+Array = npt.NDArray[np.float64]
+POSITION = ("north_m", "east_m", "tvd_m", "sigma_north_m", "sigma_east_m", "sigma_tvd_m")
 Parameters = dict[str, str]
 
 
@@ -132,27 +133,46 @@ def alignment(s: NodeState) -> View | None:
 def stations(k: RigModel, p: Parameters) -> View:
     """All stations, fused; ``md`` selects."""
     wanted = Range.parse("md", p["md"]) if "md" in p else None
-    rows = [station(k, n) for n, s in enumerate(k.stations, 1) if wanted is None or wanted.holds(s.md)]
-    return {"stations": rows}
+    numbers = [n for n, s in enumerate(k.stations, 1) if wanted is None or wanted.holds(s.md)]
+    return {"stations": station_rows(k, numbers)}
 
 
 def station(k: RigModel, n: int) -> View:
     """One station, fused; ``n`` from 1."""
-    s = k.stations[n - 1]
-    row = {"station": n, "md_m": round(s.md, 6)} | s.shown(partial(direction_view, k.config.weighting))
-    return row | position(k.hole.point_of(s))
+    return station_rows(k, [n])[0]
 
 
-def direction_view(weighting: Weighting, s: SurveyStation) -> View:
+def station_rows(k: RigModel, numbers: Sequence[int]) -> list[View]:
+    """Stations of these numbers, fused; those to which nothing has come since they were shown last are as they were."""
+    known, drawn = k.stations, k.hole.trajectory
+    chosen = [known[n - 1] for n in numbers]
+    changed = [s for s in chosen if s.shown is None]
+    for s, view in zip(changed, direction_views(k.config.weighting, changed), strict=True):
+        s.show(view)
+    places = [k.hole.place_of(s) for s in chosen]
+    positions = position_views(drawn.positions[places], drawn.covs[places])
+    rows = zip(numbers, chosen, positions, strict=True)
+    return [{"station": n, "md_m": round(s.md, 6)} | (s.shown or {}) | position for n, s, position in rows]
+
+
+def direction_views(weighting: Weighting, chosen: Sequence[SurveyStation]) -> list[View]:
+    """Directions of stations and what each is made of."""
+    if not chosen:
+        return []
+    fused = [s.fused(weighting) for s in chosen]
+    downs, covs = [one.down for one in fused], np.array([one.total_cov for one in fused])
+    stds = angle_stds_of_all(np.array([one.lean for one in fused]), downs, covs)
+    return [direction_view(*row) for row in zip(chosen, fused, stds, strict=True)]
+
+
+def direction_view(s: SurveyStation, fused: Direction, stds: tuple[float, float]) -> View:
     """Direction of a station and what it is made of."""
-    fused = s.fused(weighting)
     inclination, azimuth = angles(fused.lean, fused.down)
-    sigma_inclination, sigma_azimuth = angle_stds(fused.lean, fused.down, fused.total_cov)
     return {
         "inclination_deg": math.degrees(inclination),
         "azimuth_deg": math.degrees(azimuth),
-        "sigma_inclination_deg": math.degrees(sigma_inclination),
-        "sigma_azimuth_deg": math.degrees(sigma_azimuth),
+        "sigma_inclination_deg": math.degrees(stds[0]),
+        "sigma_azimuth_deg": math.degrees(stds[1]),
         "measurements": s.count,
         "dropped_measurements": s.first,
         "untrusted_measurements": s.untrusted,
@@ -169,67 +189,9 @@ def typical_reading(s: SurveyStation) -> View:
     }
 
 
-def measurements(k: RigModel, p: Parameters) -> View:
-    """Every cluster; ``station`` and ``tube`` select, ``since`` and ``limit`` give them as they came."""
-    newest = k.seen["measurements"]
-    since, limit = span(newest, p) if streamed(p) else (0, None)
-    found = list(_selected(k, p, since))
-    if streamed(p):
-        found.sort()
-    rows = [cluster(k.stations[n - 1].clusters[place], n) for _, n, place in found[:limit]]
-    return {"newest": newest, "measurements": rows}
-
-
-def _selected(k: RigModel, p: Parameters, since: int) -> Iterator[tuple[int, int, int]]:
-    """Number, station and place of the clusters after the number ``since`` that the parameters select."""
-    by_station = Range.parse("station", p["station"]) if "station" in p else None
-    by_tube = Range.parse("tube", p["tube"]) if "tube" in p else None
-    for n, s in enumerate(k.stations, 1):
-        if by_station is None or by_station.holds(n):
-            numbers, tubes = s.clusters.column("number"), s.clusters.column("tube")
-            for place in np.flatnonzero(numbers > since).tolist():
-                if by_tube is None or by_tube.holds(int(tubes[place])):
-                    yield int(numbers[place]), n, place
-
-
-def station_measurements(k: RigModel, n: int) -> View:
-    """Every cluster of one station."""
-    rows = [cluster(c, n) for c in k.stations[n - 1].clusters]
-    return {"station": n, "measurements": rows}
-
-
-def cluster(c: Cluster, n: int) -> View:
-    """One cluster, resolved."""
-    inclination, azimuth = angles(c.direction.lean, c.direction.down)
-    sigma_inclination, sigma_azimuth = angle_stds(c.direction.lean, c.direction.down, c.direction.total_cov)
-    return {
-        "seq": c.number,
-        "station": n,
-        "md_m": round(c.md, 6),
-        "tube": c.tube,
-        "sequence": c.sequence,
-        "replaces": None if c.replaces == NO_NUMBER else c.replaces,
-        "station_at_s": c.at,
-        "hops": c.hops,
-        "inclination_deg": math.degrees(inclination),
-        "azimuth_deg": math.degrees(azimuth),
-        "sigma_inclination_deg": math.degrees(sigma_inclination),
-        "sigma_azimuth_deg": math.degrees(sigma_azimuth),
-        "yaw_deg": math.degrees(c.yaw),
-        "sigma_yaw_deg": math.degrees(math.sqrt(c.yaw_var)),
-        "sigma_systematic_deg": math.degrees(math.sqrt(c.systematic_var)),
-        "forces_mps2": [list(force) for force in c.forces],
-        "samples": c.samples,
-        "settle_s": c.settle_time,
-        "flags": flag_names(c.flags),
-        "trust": c.trust.name.lower(),
-        "quality": c.quality.name.lower().split("|") if c.quality and c.quality.name else [],
-    }
-
-
 def trajectory(k: RigModel, p: Parameters) -> View:
     """Positions with covariance: at the stations, in a range of depth, or interpolated at one depth."""
-    points = k.hole.trajectory
+    points = k.hole.trajectory.points
     if "md" in p:
         wanted = Range.parse("md", p["md"])
         if wanted.single:
@@ -239,7 +201,7 @@ def trajectory(k: RigModel, p: Parameters) -> View:
                 raise SelectorError(f"parameter md: {error}") from error
         else:
             points = [point for point in points if wanted.holds(point.md)]
-    return {"method": "balanced-tangential", "points": [point_view(q) for q in points]}
+    return {"method": "balanced-tangential", "points": point_views(points)}
 
 
 def events(k: RigModel, p: Parameters) -> View:
@@ -299,7 +261,15 @@ def static_record(r: StaticRecord, seq: int) -> View:
     }
 
 
-def point_view(point: Point) -> View:
+def point_views(points: Sequence[Point]) -> list[View]:
+    """Points of the trajectory."""
+    if not points:
+        return []
+    positions = position_views(np.array([q.position for q in points]), np.array([q.cov for q in points]))
+    return [point_view(*row) for row in zip(points, positions, strict=True)]
+
+
+def point_view(point: Point, position: View) -> View:
     """One point of the trajectory."""
     inclination, azimuth = angles(point.tangent[:2], float(point.tangent[2]))
     row: View = {
@@ -307,21 +277,14 @@ def point_view(point: Point) -> View:
         "inclination_deg": math.degrees(inclination),
         "azimuth_deg": math.degrees(azimuth),
     }
-    return row | position(point) | {"covariance_m2": point.cov.tolist()}
+    return row | position | {"covariance_m2": point.cov.tolist()}
 
 
-def position(point: Point) -> View:
-    """Position and its standard deviations."""
-    north, east, tvd = point.position.tolist()
-    sigma = [math.sqrt(max(var, 0.0)) for var in point.cov.diagonal().tolist()]
-    return {
-        "north_m": north,
-        "east_m": east,
-        "tvd_m": tvd,
-        "sigma_north_m": sigma[0],
-        "sigma_east_m": sigma[1],
-        "sigma_tvd_m": sigma[2],
-    }
+def position_views(positions: Array, covs: Array) -> list[View]:
+    """Positions (n, 3), m, and their standard deviations from covariances (n, 3, 3)."""
+    stds = np.sqrt(np.maximum(covs.diagonal(axis1=1, axis2=2), 0.0))
+    rows = np.concatenate([positions, stds], axis=1).tolist()
+    return [dict(zip(POSITION, row, strict=True)) for row in rows]
 
 
 def flag_names(flags: NodeFlag) -> list[str]:

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -22,6 +22,7 @@ from groundstation.survey.trajectory import Point
 
 Array = npt.NDArray[np.float64]
 STEEPEST = 0.05  # cosine between hole and axis, below which the hole does not come to the target's depth
+ROUNDED = 1e-12  # of a ratio
 LEVELS = (0.5, 0.8, 1.0)  # of the tolerance, at which an alarm is due
 
 
@@ -147,20 +148,51 @@ class Deviation:
         return max((level for level in LEVELS if self.ratio >= level), default=0.0)
 
 
-def deviations(points: Sequence[Point], design: Design) -> list[Deviation]:
-    """Deviation of every point of a trajectory."""
-    offsets = np.array([point.position for point in points]).reshape(-1, 3) - np.array(design.head)
+@dataclass(frozen=True, slots=True)
+class Deviations:
+    """Deviations of points along a hole, numbers side by side: each is an object where somebody looks at it."""
+
+    md: Array  # (n,)
+    along: Array  # (n,)
+    offset: Array  # (n, 2)
+    cov: Array  # (n, 2, 2)
+    limit: Array  # (n,)
+
+    def __len__(self) -> int:
+        return len(self.md)
+
+    def __getitem__(self, place: int) -> Deviation:
+        md, along, limit = (float(values[place]) for values in (self.md, self.along, self.limit))
+        return Deviation(md, along, self.offset[place], self.cov[place], limit)
+
+    def __iter__(self) -> Iterator[Deviation]:
+        rows = zip(self.md.tolist(), self.along.tolist(), self.offset, self.cov, self.limit.tolist(), strict=True)
+        return (Deviation(*row) for row in rows)
+
+    def worst(self, first: int = 0) -> Deviation | None:
+        """The worst from a place on, by the share of the tolerance used, the first of equals; None of none."""
+        limit = self.limit[first:]
+        size = np.hypot(self.offset[first:, 0], self.offset[first:, 1])
+        infinite = np.where(size > 0.0, np.inf, 0.0)
+        ratio = np.where(limit > 0.0, size / np.where(limit > 0.0, limit, 1.0), infinite)
+        # of the few that come near it each says itself how large it is: two ways of rounding must not part them
+        near = np.flatnonzero(ratio >= (1.0 - ROUNDED) * ratio.max(initial=0.0)).tolist()
+        return max((self[first + place] for place in near), key=lambda one: one.ratio, default=None)
+
+
+def deviations(md: Array, positions: Array, covs: Array, design: Design) -> Deviations:
+    """Deviation of points at depths (n,), m, with positions (n, 3) and their covariances (n, 3, 3)."""
+    offsets = positions - np.array(design.head)
     # number by number: in a product of matrices the last bits of one point depend on how many others there are
     along, first, second = ((offsets * unit).sum(axis=1) for unit in (design.axis, *design.across))
     across = np.stack([first, second], axis=1)
-    covs = design.across @ np.array([point.cov for point in points]).reshape(-1, 3, 3) @ design.across.T
-    rows = zip(points, along.tolist(), across, covs, strict=True)
-    return [Deviation(p.md, way, offset, cov, design.tolerance.at(max(way, 0.0))) for p, way, offset, cov in rows]
+    limit = design.tolerance.start + design.tolerance.growth * np.maximum(along, 0.0)
+    return Deviations(md.copy(), along, across, design.across @ covs @ design.across.T, limit)
 
 
 def deviation(point: Point, design: Design) -> Deviation:
     """Deviation of one point."""
-    return deviations([point], design)[0]
+    return deviations(np.array([point.md]), point.position[None], point.cov[None], design)[0]
 
 
 def project(point: Point, direction: Direction, design: Design) -> Deviation:

@@ -103,11 +103,11 @@ class StationFusion:
         gains = np.linalg.inv(sums[:, :2])
         leans = (gains @ sums[:, 2, :, None])[:, :, 0]
         covs = gains @ sums[:, 3:] @ gains
-        shared = np.zeros((len(fusions), 2, max(one._shared.width for one in fusions)))
-        for own, one in zip(shared, fusions, strict=True):
-            one._shared.fill(own)
-        rows = zip(fusions, leans, covs, packed_each(gains @ shared), strict=True)
-        return [Fused(lean.copy(), vertical(lean, one._down), cov.copy(), packed) for one, lean, cov, packed in rows]
+        rows = zip(fusions, gains, leans, covs, strict=True)
+        return [
+            Fused(lean.copy(), vertical(lean, one._down), cov.copy(), one._shared.under(gain))
+            for one, gain, lean, cov in rows
+        ]
 
 
 class GrowingBayes:

@@ -23,6 +23,7 @@ ASYMMETRY = 1e-9  # of the largest entry, rounding in the covariance of a node
 CONDITION = 1e14  # beyond it the inverse of a covariance is noise
 PLAINLY = 1e-10  # of the trace to the power k, the determinant (k, k) of a matrix that needs no closer look
 A_FEW = 64  # numbers, up to which they are looked at one by one
+UPRIGHT = 1e-9  # lean, below which there is no azimuth
 SHORTEST_SETTLE = 16.0  # s, of the 32-point moving average
 
 
@@ -174,15 +175,24 @@ def angles(lean: Array, down: float) -> tuple[float, float]:
 
 def angle_stds(lean: Array, down: float, cov: Array) -> tuple[float, float]:
     """Standard deviations (rad) of inclination and azimuth; the azimuth's is at most pi, where nothing is known."""
-    size = math.hypot(lean[0], lean[1])
-    if size < 1e-9:
-        return math.sqrt(float(np.trace(cov)) / 2.0), math.pi
-    along = lean / size
-    across = np.array([-along[1], along[0]])
-    vertical = max(abs(down), 1e-6)
-    inclination = math.sqrt(max(float(along @ cov @ along), 0.0)) / vertical
-    azimuth = math.sqrt(max(float(across @ cov @ across), 0.0)) / size
-    return inclination, min(azimuth, math.pi)
+    return angle_stds_of_all(lean[None], [down], cov[None])[0]
+
+
+def angle_stds_of_all(leans: Array, downs: Sequence[float], covs: Array) -> list[tuple[float, float]]:
+    """The same of many directions, (n, 2) and (n, 2, 2)."""
+    sizes = [math.hypot(x, y) for x, y in leans.tolist()]
+    along = leans / np.array([size if size >= UPRIGHT else 1.0 for size in sizes])[:, None]
+    across = np.stack([-along[:, 1], along[:, 0]], axis=1)
+    variances = ((unit[:, None] @ covs @ unit[:, :, None])[:, 0, 0].tolist() for unit in (along, across))
+    traces = np.trace(covs, axis1=1, axis2=2).tolist()
+    return [_stds(*row) for row in zip(sizes, downs, *variances, traces, strict=True)]
+
+
+def _stds(size: float, down: float, along_var: float, across_var: float, trace: float) -> tuple[float, float]:
+    if size < UPRIGHT:
+        return math.sqrt(trace / 2.0), math.pi
+    inclination = math.sqrt(max(along_var, 0.0)) / max(abs(down), 1e-6)
+    return inclination, min(math.sqrt(max(across_var, 0.0)) / size, math.pi)
 
 
 def combine_imus(forces: Array, covs: Array) -> tuple[Array, Array]:
@@ -203,26 +213,26 @@ def combine_imus(forces: Array, covs: Array) -> tuple[Array, Array]:
     return mean[..., 0], cov
 
 
-def check(
+def check_all(
     forces: Array,
     covs: Array,
     combined: tuple[Array, Array],
     gravity: float,
-    samples: int,
-    settle_time: float,
+    samples: Sequence[int],
+    settle_times: Sequence[float],
     sample_std: float,
-) -> Quality:
-    """Quality of a stop with what its IMUs come to; ``sample_std`` (m/s^2) is the sensor's own noise in one sample."""
-    quality = Quality.GOOD
-    mean, cov = combined
-    largest_var = max(max(imu[0][0], imu[1][1], imu[2][2]) for imu in covs.tolist())
-    if abs(math.sqrt(mean.dot(mean)) - gravity) > GRAVITY_TOLERANCE * gravity:
-        quality |= Quality.GRAVITY
-    if largest_var * samples > (3.0 * sample_std) ** 2:
-        quality |= Quality.MOTION
-    if settle_time < SHORTEST_SETTLE:
-        quality |= Quality.SETTLE
-    spread = np.abs(forces - mean).max()
-    if spread**2 > 16.0 * (largest_var + cov.diagonal().max()):
-        quality |= Quality.SPREAD
-    return quality
+) -> list[Quality]:
+    """Quality of stops, (n, imus, 3) and (n, imus, 3, 3), with what the IMUs of each come to, (n, 3) and (n, 3, 3).
+
+    ``sample_std`` (m/s^2) is the sensor's own noise in one sample.
+    """
+    means, mean_covs = combined
+    largest_var = covs.diagonal(axis1=-2, axis2=-1).max(axis=(-2, -1))
+    sizes = np.sqrt((means[:, None] @ means[:, :, None])[:, 0, 0])
+    spread = np.abs(forces - means[:, None]).max(axis=(-2, -1))
+    spread_var = largest_var + mean_covs.diagonal(axis1=-2, axis2=-1).max(axis=-1)
+    wrong = np.where(np.abs(sizes - gravity) > GRAVITY_TOLERANCE * gravity, Quality.GRAVITY, Quality.GOOD)
+    wrong |= np.where(largest_var * samples > (3.0 * sample_std) ** 2, Quality.MOTION, Quality.GOOD)
+    wrong |= np.where(np.asarray(settle_times) < SHORTEST_SETTLE, Quality.SETTLE, Quality.GOOD)
+    wrong |= np.where(spread**2 > 16.0 * spread_var, Quality.SPREAD, Quality.GOOD)
+    return [Quality(each) for each in wrong.tolist()]

@@ -11,6 +11,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from itertools import pairwise
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -79,6 +80,20 @@ def put_columns(columns: Array, causes: Array, places: Places) -> None:
     columns[:, places[-AXES:]] = causes[:, -AXES:]
 
 
+def columns_of(causes: Array, places: Sequence[Places], width: int) -> Array:
+    """Columns (n, 2, width) of several readings, from (n, 2, 5) and the places of each."""
+    columns = np.zeros((len(causes), 2, width))
+    counts = np.array([len(own) for own in places])
+    ends = counts.cumsum()
+    cause = np.ones(ends[-1], np.intp)  # of a place: every joint alike
+    cause[ends - counts] = 0
+    for axis in range(AXES):
+        cause[ends - AXES + axis] = CAUSES - AXES + axis
+    reading = np.repeat(np.arange(len(causes)), counts)
+    columns[reading, :, np.concatenate(places)] = causes[reading, :, cause]
+    return columns
+
+
 class Packed:
     """Columns (k, s) of which most are zero: a station knows those of the tubes that passed it, of a hundred tubes."""
 
@@ -88,13 +103,29 @@ class Packed:
         """``places`` of those that are not zero, where they are known."""
         places = np.flatnonzero(columns.any(axis=0)) if places is None else places
         self._places = places.astype(np.uint16 if columns.shape[1] <= MOST_OF_16_BITS else np.intp)
-        self._values = columns[:, places]
+        self._values = columns.take(places, axis=1)
         self._width = int(columns.shape[1])
 
     @property
     def width(self) -> int:
         """How many there are."""
         return self._width
+
+    @property
+    def places(self) -> npt.NDArray[Any]:
+        """Places (c,) of those that may not be zero."""
+        return self._places
+
+    @property
+    def values(self) -> Array:
+        """What stands there, (k, c)."""
+        return self._values
+
+    def under(self, matrix: Array) -> Packed:
+        """What a matrix (j, k) makes of them: (j, s)."""
+        made = Packed.__new__(Packed)
+        made._places, made._values, made._width = self._places, matrix @ self._values, self._width
+        return made
 
     def columns(self) -> Array:
         """All of them (k, s), made anew."""
@@ -129,6 +160,11 @@ class Fused(Direction):
         return self._packed.columns()
 
     @property
+    def packed(self) -> Packed:
+        """Columns as they are kept."""
+        return self._packed
+
+    @property
     def width(self) -> int:
         """How many columns there are."""
         return self._packed.width
@@ -138,14 +174,18 @@ class Fused(Direction):
         self._packed.fill(columns)
 
 
+def packed_of(direction: Direction) -> Packed:
+    """Columns of any direction, packed."""
+    return direction.packed if isinstance(direction, Fused) else Packed(direction.shared)
+
+
 class SharedErrors:
     """The columns, in the order in which they were met."""
 
     def __init__(self) -> None:
         self._columns: dict[Name, int] = {}
         self._places: dict[str, list[int]] = {}  # of the columns of each kind, in the order of their coming
-
-        self._known: dict[tuple[Name, ...], Places] = {}
+        self._known: dict[tuple[int, ...] | int, Places] = {}  # by a tube and those above it, or a tube alone
 
     def __len__(self) -> int:
         return len(self._columns)
@@ -170,9 +210,8 @@ class SharedErrors:
         force_bias_std : m/s^2, of each axis of the accelerometer, left after calibration
         """
         mount_var = min(mount_var, systematic_var)
-        chain = self._chain(tube, above)
-        places = self._places_of((("mount", tube), *chain, *(("bias", tube, axis) for axis in range(3))))
-        each = math.sqrt((systematic_var - mount_var) / len(chain))
+        places = self._places_of(tube, above)
+        each = math.sqrt((systematic_var - mount_var) / (len(places) - 1 - AXES))
         causes = np.empty((2, CAUSES))
         causes[:, 0] = math.sqrt(mount_var) * resolved.by_yaw
         causes[:, 1] = each * resolved.by_yaw
@@ -187,15 +226,19 @@ class SharedErrors:
             members[places[places < len(members)], number] = 1.0
         return np.asarray(members.T @ np.swapaxes(columns**2, -1, -2))
 
-    def _places_of(self, names: tuple[Name, ...]) -> Places:
-        """Places of errors' columns, the next ones where they are met for the first time; kept once for all."""
-        if names not in self._known:
+    def _places_of(self, tube: int, above: Sequence[int] | None) -> Places:
+        """Places of the errors of a tube, the next ones where they are met for the first time; kept once for all."""
+        string = tube if above is None else (tube, *above)
+        known = self._known.get(string)
+        if known is None:
+            chain = self._chain(tube, above)
+            names: list[Name] = [("mount", tube), *chain, *(("bias", tube, axis) for axis in range(AXES))]
             for name in names:
                 if name not in self._columns:
                     self._columns[name] = len(self._columns)
                     self._places.setdefault(KINDS[str(name[0])], []).append(self._columns[name])
-            self._known[names] = np.array([self._columns[name] for name in names], np.intp)
-        return self._known[names]
+            known = self._known[string] = np.array([self._columns[name] for name in names], np.intp)
+        return known
 
     @staticmethod
     def _chain(tube: int, above: Sequence[int] | None) -> list[Name]:
@@ -225,7 +268,8 @@ def weigh_together(readings: Sequence[Reading]) -> None:
     """
     if not readings:
         return
-    shared = stacked(readings, max(one.width for one in readings))
+    causes, places = np.array([one.causes for one in readings]), [one.places for one in readings]
+    shared = columns_of(causes, places, max(one.width for one in readings))
     covs = np.array([one.cov for one in readings]) + shared @ shared.transpose(0, 2, 1)
     for one, information in zip(readings, np.linalg.inv(covs), strict=True):
         object.__setattr__(one, "_information", information)

@@ -11,8 +11,10 @@ from __future__ import annotations
 
 import itertools
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass
+from operator import itemgetter
+from typing import Final
 
 import numpy as np
 import numpy.typing as npt
@@ -20,10 +22,14 @@ import numpy.typing as npt
 from groundstation.errors import SurveyError
 from groundstation.survey.methods import OPPOSITE, Method, dogleg, leg, ratio_factor
 from groundstation.survey.resolve import Direction, angles
-from groundstation.survey.shared import added, widened
+from groundstation.survey.shared import Packed, added, packed_of, widened
+from groundstation.survey.tangents import tangent_jacobians, tangents_of
 
 Array = npt.NDArray[np.float64]
 BLOCK = 64  # stations, whose columns are held at a time
+NONE: Final = Packed(np.zeros((2, 0)))
+NOTHING: Final = np.zeros(0)
+FROM_ZERO: Final = np.zeros(1, np.intp)
 
 
 @dataclass(frozen=True, slots=True)
@@ -37,29 +43,43 @@ class Point:
     shared: Array  # (3, s) m, change for one standard deviation of every shared error, or what is kept of that
 
 
-def tangents_of(directions: Sequence[Direction]) -> Array:
-    """Downhole unit vectors (n, 3)."""
-    return np.array([(*direction.lean.tolist(), direction.down) for direction in directions])
+ROW: Final = np.dtype(
+    [
+        ("md", np.float64),
+        ("tangent", np.float64, 3),
+        ("own", np.float64, (3, 3)),  # covariance of the tangent that no other shares
+        ("width", np.intp),  # shared columns that the direction knows
+        ("count", np.intp),  # of them those that are kept
+        ("position", np.float64, 3),
+        ("cov", np.float64, (3, 3)),
+    ]
+)
+FEWEST = 8  # rows of a table
+GROWTH = 8  # share of its rows by which a table grows
 
 
-def tangent_jacobians(tangents: Array) -> Array:
-    """D tangent / d lean (n, 3, 2); the vertical part follows from the unit length."""
-    down = np.copysign(np.maximum(np.abs(tangents[:, 2]), 1e-6), tangents[:, 2])
-    jacobians = np.zeros((len(tangents), 3, 2))
-    jacobians[:, 0, 0] = jacobians[:, 1, 1] = 1.0
-    jacobians[:, 2] = -tangents[:, :2] / down[:, None]
-    return jacobians
+@dataclass(frozen=True, slots=True)
+class Sums:
+    """What a hole has come to at a station: the running sums of the kernel, and the length of the last leg (m)."""
+
+    own: Array  # (3, 3)
+    passed: Array  # (3, s)
+    length: float
+
+    def copied(self) -> Sums:
+        """The same, to go on with."""
+        return Sums(self.own.copy(), self.passed.copy(), self.length)
 
 
 class Trajectory:
-    """Positions of stations in order of depth, one appended at a time.
+    """Positions of stations in order of depth.
 
     Parameters
     ----------
     method : of the legs
     collar : direction at the first depth, known: vertical by default
     start_md : m
-    keep : makes of the shared columns (n, 3, s) of n points what these keep of them, a row each: all by default, which
+    keep : makes of the shared columns (n, 3, s) of n points what these keep of them, one each: all by default, which
         of a string of fifty tubes is 750 numbers a point
     """
 
@@ -68,17 +88,51 @@ class Trajectory:
         method: Method = Method.BALANCED_TANGENTIAL,
         collar: Direction | None = None,
         start_md: float = 0.0,
-        keep: Callable[[Array], Array] = np.asarray,
+        keep: Callable[[Array], Iterable[Array]] = np.asarray,
     ) -> None:
         self._method = method
         self._keep = keep
         first = collar or Direction(np.zeros(2), 1.0, np.zeros((2, 2)), np.zeros((2, 0)))
-        tangents = tangents_of([first])
-        jacobian = tangent_jacobians(tangents)[0]
-        self._last_cov, self._last_shared = jacobian @ first.cov @ jacobian.T, jacobian @ first.shared  # of the tangent
-        self._length = 0.0
-        self._own, self._passed = np.zeros((3, 3)), np.zeros((3, 0))  # running sums, see the kernel
-        self.points = [Point(start_md, tangents[0], np.zeros(3), np.zeros((3, 3)), keep(np.zeros((1, 3, 0)))[0])]
+        self._rows = np.zeros(FEWEST, ROW)
+        self._directions: list[Direction] = []  # of the collar and every station
+        self._columns: list[Packed] = []  # (2, s), of each
+        self._down: list[Array] = []  # and what those come to in the vertical, (c,) of those that are kept
+        self._insert(0, start_md, first)
+        self._direct([0])
+        self._kept = list(keep(np.zeros((1, 3, 0))))  # of every point that is drawn
+        self._sums = Sums(np.zeros((3, 3)), np.zeros((3, 0)), 0.0)
+        self._marks = [self._sums.copied()]  # at the collar and every BLOCK stations from there
+
+    def __len__(self) -> int:
+        """How many points there are."""
+        return len(self._directions)
+
+    def __getitem__(self, place: int) -> Point:
+        place = range(len(self))[place]
+        row = self._rows[place]
+        return Point(
+            float(row["md"]), row["tangent"].copy(), row["position"].copy(), row["cov"].copy(), self._kept[place]
+        )
+
+    @property
+    def points(self) -> list[Point]:
+        """The collar and every station, made anew."""
+        return [self[place] for place in range(len(self))]
+
+    @property
+    def md(self) -> Array:
+        """Depths (n,) of the points, m."""
+        return np.asarray(self._rows["md"][: len(self)])
+
+    @property
+    def positions(self) -> Array:
+        """Positions (n, 3) of the points, m."""
+        return np.asarray(self._rows["position"][: len(self)])
+
+    @property
+    def covs(self) -> Array:
+        """Covariances (n, 3, 3) of the positions, m^2."""
+        return np.asarray(self._rows["cov"][: len(self)])
 
     def append(self, md: float, direction: Direction) -> Point:
         """Add the station at ``md`` (m).
@@ -89,7 +143,7 @@ class Trajectory:
             When the depth does not grow, or the two directions are opposite.
         """
         self.extend([(md, direction)])
-        return self.points[-1]
+        return self[-1]
 
     def extend(self, stations: Sequence[tuple[float, Direction]]) -> None:
         """Add stations (m, direction); the same bit for bit as one after the other, and several times as fast.
@@ -99,72 +153,142 @@ class Trajectory:
         SurveyError
             When a depth does not grow, or two directions are opposite; then none is added.
         """
-        if not stations:
+        depths = [float(self._rows["md"][len(self) - 1]), *(md for md, _ in stations)]
+        for before, md in itertools.pairwise(depths):
+            if not 0.0 < md - before < math.inf:
+                raise SurveyError(f"trajectory: expected a depth beyond {before:g} m, got {md:g} m")
+        known = len(self)
+        for md, direction in stations:
+            self._insert(len(self), md, direction)
+        self._direct(range(known, len(self)))
+        try:
+            self._draw(known)
+        except SurveyError:
+            del self._directions[known:], self._columns[known:], self._down[known:]
+            raise
+
+    def put(self, stations: Iterable[tuple[float, Direction]]) -> None:
+        """Put stations (m, direction) between the others, or in the place of those at the same depth.
+
+        What is above the first of them stays as it is; the whole is bit for bit as one that is drawn anew.
+
+        Raises
+        ------
+        SurveyError
+            When a depth is not below the first; then none is put.
+        """
+        changed, collar = [], float(self._rows["md"][0])
+        stations = sorted(stations, key=itemgetter(0))
+        for md, _ in stations:
+            if not collar < md < math.inf:
+                raise SurveyError(f"trajectory: expected a depth beyond {collar:g} m, got {md:g} m")
+        for md, direction in stations:
+            place = int(np.searchsorted(self.md, md))
+            if place == len(self) or self._rows["md"][place] != md:
+                self._insert(place, md, direction)
+            elif self._directions[place] is direction:
+                continue
+            self._directions[place] = direction
+            changed.append(place)
+        self._direct(changed)
+        if changed:
+            self._draw(changed[0])
+
+    def columns(self) -> Iterator[Array]:
+        """Shared columns (n, 3, s) of the points from the collar down, some at a time, as many as were known there."""
+        yield np.zeros((1, 3, 0))
+        for begin, mark in zip(range(0, len(self) - 1, BLOCK), self._marks, strict=False):
+            yield from self._follow(mark.copied(), begin, min(begin + BLOCK, len(self) - 1))[1]
+
+    def _insert(self, place: int, md: float, direction: Direction) -> None:
+        """Have a row for a station; what follows from its direction is not in it yet."""
+        known, count = self._rows, len(self)
+        if count == len(known):
+            self._rows = np.zeros(count + 1 + count // GROWTH, ROW)
+            self._rows[:count] = known
+        self._rows[place + 1 : count + 1] = self._rows[place:count]
+        self._rows["md"][place] = md
+        self._directions.insert(place, direction)
+        self._columns.insert(place, NONE)
+        self._down.insert(place, NOTHING)
+
+    def _direct(self, places: Sequence[int]) -> None:
+        """Work out what follows from the directions at some places by themselves."""
+        if not places:
             return
-        before = self.points[-1]
-        mds, directions = zip(*stations, strict=True)
-        lengths = np.diff([before.md, *mds])
-        for n, length in enumerate(lengths.tolist()):
-            if not 0.0 < length < math.inf:
-                raise SurveyError(f"trajectory: expected a depth beyond {[before.md, *mds][n]:g} m, got {mds[n]:g} m")
-        tangents = np.concatenate([before.tangent[None], tangents_of(directions)])
-        legs = self._legs(lengths, [before.md, *mds], tangents, directions)
-        positions = np.add.accumulate([before.position, *legs])
-        for first in range(0, len(mds), BLOCK):
-            block = slice(first, first + BLOCK)
-            jacobians = tangent_jacobians(tangents[1:][block])
-            own = np.array([direction.cov for direction in directions[block]])
-            covs = jacobians @ own @ jacobians.transpose(0, 2, 1)
-            columns = [jacobian @ one.shared for jacobian, one in zip(jacobians, directions[block], strict=True)]
-            rows = zip(mds[block], tangents[1:][block], positions[1:][block], strict=True)
-            for row, errors in zip(rows, self._follow(lengths[block], covs, columns), strict=True):
-                self.points.append(Point(*row, *errors))
+        directions = [self._directions[place] for place in places]
+        tangents = tangents_of(directions)
+        jacobians = tangent_jacobians(tangents)
+        for place, direction, jacobian in zip(places, directions, jacobians, strict=True):
+            columns = self._columns[place] = packed_of(direction)
+            self._down[place] = (jacobian @ columns.values)[2].copy()
+        rows, at = self._rows, np.array(places)
+        rows["tangent"][at] = tangents
+        rows["own"][at] = jacobians @ np.array([one.cov for one in directions]) @ jacobians.transpose(0, 2, 1)
+        rows["width"][at] = [direction.width for direction in directions]
+        rows["count"][at] = [len(self._columns[place].places) for place in places]
 
-    def _follow(self, lengths: Array, covs: Array, columns: list[Array]) -> list[tuple[Array, Array]]:
-        """Covariance (3, 3) of each position at the ends of legs (n,), m, and what is kept of its shared columns.
+    def _draw(self, first: int) -> None:
+        """Work out the positions from a place on."""
+        begin = first - 1
+        if begin < len(self._kept) - 1:
+            begin -= begin % BLOCK
+            del self._kept[begin + 1 :], self._marks[begin // BLOCK + 1 :]
+            self._sums = self._marks[-1].copied()
+        rows = self._rows[begin : len(self)]
+        rows["position"] = np.add.accumulate([rows["position"][0], *self._legs(rows)])
+        while begin < len(self) - 1:
+            end = min(begin - begin % BLOCK + BLOCK, len(self) - 1)
+            self._sums, runs, covs = self._follow(self._sums, begin, end)
+            for place, run in zip(itertools.accumulate(map(len, runs), initial=0), runs, strict=False):
+                covs[place : place + len(run)] += run @ run.transpose(0, 2, 1)
+                self._kept.extend(self._keep(run))
+            self._rows["cov"][begin + 1 : end + 1] = covs
+            begin = end
+            if begin % BLOCK == 0:
+                self._marks.append(self._sums.copied())
 
-        From those of their tangents, (n, 3, 3) and (3, s) each.
+    def _follow(self, sums: Sums, begin: int, end: int) -> tuple[Sums, list[Array], Array]:
+        """Go on with sums, which are used up, from one place to another.
+
+        Returns the sums, the shared columns (.., 3, s) of the positions after ``begin`` up to ``end``, those with
+        equally many together, and the covariances (n, 3, 3) that are their own.
         """
         from groundstation.survey.kernels.position_errors import add_stations  # whoever only reads needs no compiler
 
-        known = max(self._last_shared.shape[1], self._passed.shape[1])
-        widths = list(itertools.accumulate((own.shape[1] for own in columns), max, initial=known))
-        tangents = np.zeros((len(columns) + 1, 3, widths[-1]))
-        for n, own in enumerate((self._last_shared, *columns)):
-            tangents[n, :, : own.shape[1]] = own
-        of_tangents = np.concatenate([self._last_cov[None], covs])
-        ends = 0.5 * lengths
+        rows, columns = self._rows[begin : end + 1], self._columns[begin : end + 1]
+        known = max(sums.passed.shape[1], int(rows["width"][0]))
+        widths = np.maximum(np.maximum.accumulate(rows["width"][1:]), known)
+        starts = np.concatenate([FROM_ZERO, rows["count"].cumsum()])
+        places = np.concatenate([one.places for one in columns]).astype(np.intp, copy=False)
+        lean, down = (
+            np.concatenate([one.values for one in columns], axis=1),
+            np.concatenate(self._down[begin : end + 1]),
+        )
+        ends = 0.5 * np.diff(rows["md"])
         weights = ends.copy()  # of the station before each, which has both its legs now
-        weights[0] += 0.5 * self._length
+        weights[0] += 0.5 * sums.length
         weights[1:] += ends[:-1]
-        passed, shared, out = widened(self._passed, widths[-1]), np.empty_like(tangents[1:]), np.empty_like(covs)
-        add_stations(weights, ends, tangents, of_tangents, passed, self._own, shared, out)
-        self._passed, self._length = passed, float(lengths[-1])
-        self._last_cov, self._last_shared = covs[-1], columns[-1]
-        points: list[tuple[Array, Array]] = []
-        for width, same in itertools.groupby(widths[1:]):
-            run = slice(len(points), len(points) + len(list(same)))
-            known_here = shared[run, :, :width]
-            points += zip(out[run] + known_here @ known_here.transpose(0, 2, 1), self._keep(known_here), strict=True)
-        return points
+        width = int(widths[-1])
+        passed, shared, out = widened(sums.passed, width), np.empty((len(ends), 3, width)), np.empty((len(ends), 3, 3))
+        add_stations(weights, ends, starts, places, lean, down, rows["own"].copy(), passed, sums.own, shared, out)
+        borders = [0, *(np.flatnonzero(np.diff(widths)) + 1).tolist(), len(widths)]
+        runs = [shared[a:b, :, : int(widths[a])] for a, b in itertools.pairwise(borders)]
+        return Sums(sums.own, passed, float(rows["md"][-1] - rows["md"][-2])), runs, out
 
-    def _legs(self, lengths: Array, mds: Sequence[float], tangents: Array, directions: Sequence[Direction]) -> Array:
+    def _legs(self, rows: npt.NDArray[np.void]) -> Array:
         """Displacements (n, 3) from station to station."""
         if self._method is Method.BALANCED_TANGENTIAL:
-            return np.asarray((0.5 * lengths)[:, None] * (tangents[:-1] + tangents[1:]))
-        return np.array(
-            [
-                self._leg(md, tangent, length, direction)
-                for md, tangent, length, direction in zip(mds, tangents, lengths.tolist(), directions, strict=False)
-            ]
-        )
+            return np.asarray((0.5 * np.diff(rows["md"]))[:, None] * (rows["tangent"][:-1] + rows["tangent"][1:]))
+        return np.array([self._leg(*ends) for ends in itertools.pairwise(rows)])
 
-    def _leg(self, md: float, tangent: Array, length: float, direction: Direction) -> Array:
-        i1, a1 = angles(tangent[:2], float(tangent[2]))
-        i2, a2 = angles(direction.lean, direction.down)
+    def _leg(self, before: np.void, after: np.void) -> Array:
+        i1, a1 = angles(before["tangent"][:2], float(before["tangent"][2]))
+        i2, a2 = angles(after["tangent"][:2], float(after["tangent"][2]))
+        md, below = float(before["md"]), float(after["md"])
         if self._method is Method.MINIMUM_CURVATURE and dogleg(math, i1, a1, i2, a2) > math.pi - OPPOSITE:
-            raise SurveyError(f"trajectory: the hole turns back on itself between {md:g} and {md + length:g} m")
-        return np.array(leg(math, self._method, length, i1, a1, i2, a2))
+            raise SurveyError(f"trajectory: the hole turns back on itself between {md:g} and {below:g} m")
+        return np.array(leg(math, self._method, below - md, i1, a1, i2, a2))
 
 
 def interpolate(points: list[Point], md: float) -> Point:

@@ -12,9 +12,10 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from groundstation.config import GroundConfig
-from groundstation.service.clusters import Cluster, Clusters, cluster_of
+from groundstation.service.clusters import Cluster, Clusters, Table, cluster_of
+from groundstation.service.measurement_views import measurement_rows
 from groundstation.service.model import RigModel
-from groundstation.survey.resolve import Direction, Quality, resolve
+from groundstation.survey.resolve import Direction, Quality, angle_stds, angles, resolve
 from groundstation.survey.shared import Reading, SharedErrors
 from groundstation.survey.trust import Trust
 from telemetry.messages import ImuMean, NodeFlag, SurveyMeasurement
@@ -94,6 +95,27 @@ def test_a_departure_is_kept_until_an_earlier_cluster_comes() -> None:
     clusters.insert(cluster(1, 3, 8.0))
     assert clusters.departure(1) is not None
     assert [clusters.departure(place) for place in (0, 2, 3)] == [None, None, None]
+
+
+def test_what_is_shown_of_many_surveys_is_what_each_of_them_says() -> None:
+    """Surveys are shown column by column, those with equally many shared errors together."""
+    table = Table()
+    known = [
+        cluster(tube, number, 10.0 * number, imus=1 + number % 3) for number, tube in enumerate((1, 4, 2, 4, 1), 1)
+    ]
+    rows = [table.append_cluster(one) for one in known]
+    shown = measurement_rows(table, rows[::-1], [3, 1, 1, 2, 9])
+    for view, one, station in zip(shown, known[::-1], (3, 1, 1, 2, 9), strict=True):
+        inclination, azimuth = angles(one.direction.lean, one.direction.down)
+        stds = angle_stds(one.direction.lean, one.direction.down, one.direction.total_cov)
+        assert (view["seq"], view["tube"], view["station"], view["md_m"]) == (one.number, one.tube, station, one.md)
+        assert (view["inclination_deg"], view["azimuth_deg"]) == (math.degrees(inclination), math.degrees(azimuth))
+        assert (view["sigma_inclination_deg"], view["sigma_azimuth_deg"]) == tuple(map(math.degrees, stds))
+        assert view["forces_mps2"] == [list(force) for force in one.forces]
+        assert view["flags"] == (["restored"] if one.flags else [])
+        assert view["trust"] == one.trust.name.lower()
+        assert view["quality"] == (["motion", "spread"] if one.quality else [])
+    assert measurement_rows(table, [], []) == []
 
 
 @pytest.mark.slow

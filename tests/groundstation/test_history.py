@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 from groundstation.errors import SelectorError
 from groundstation.service.history import KEPT, History
 from groundstation.service.thinning import largest_triangles
-from groundstation.survey.columns import Deviation
+from groundstation.survey.columns import Deviations
 
 STOPS = (0.3, 0.3, 0.3, 1.0, 1.9)  # deg
 
@@ -45,14 +45,20 @@ def test_each_stop_leaves_what_was_known_at_its_end_also_after_a_restart(tmp_pat
     again.ground.close()
 
 
+def straight_down(depths: list[float]) -> Deviations:
+    """Deviations of a hole that is where it should be."""
+    md, none = np.array(depths), np.zeros((len(depths), 2))
+    return Deviations(md, md, none, np.broadcast_to(np.eye(2), (len(depths), 2, 2)), 0.05 + 0.01 * md)
+
+
 def test_it_never_grows_without_bound_and_keeps_the_newest() -> None:
     history = History()
-    row = Deviation(1.0, 1.0, np.zeros(2), np.zeros((2, 2)), 1.0)
+    row = straight_down([1.0])
     for stop in range(5 * KEPT):
         at = 100.0 * stop
         assert history.begins_stop(1, at) == (stop > 0)
         if stop:
-            history.add([row], None)
+            history.add(row, None)
         history.on_survey(1, at)
         assert not history.begins_stop(1, at + 10.0)
     assert history.begins_stop(2, 0.0)  # rig time began anew
@@ -96,7 +102,7 @@ def test_moments_keep_their_depths_whatever_stations_come_later() -> None:
         [0.0, 1.0, 2.0, 4.0, 6.0],
         [0.0, 1.0],
     ):
-        history.add([Deviation(md, md, np.zeros(2), np.eye(2), 0.05 + 0.01 * md) for md in depths], None)
+        history.add(straight_down(depths), None)
         told.append([(md, 0.05 + 0.01 * md) for md in depths])
     assert [list(map(tuple, moment.where.tolist())) for moment in history.moments] == told
     same, more = history.moments[0].where, history.moments[1].where

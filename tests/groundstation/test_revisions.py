@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 from test_model import Placed, passes
 
 from groundstation.config import GroundConfig
-from groundstation.service import views
+from groundstation.service import measurement_views, views
 from groundstation.service.model import RigModel
 from telemetry.messages import NodeFlag
 
@@ -29,7 +29,7 @@ def heard(tmp_path: Path, measurements: list[Placed]) -> RigModel:
 
 def shown(model: RigModel) -> dict[str, Any]:
     """What operators see, but for the numbers that say in which order it came."""
-    rows = views.measurements(model, {})["measurements"]
+    rows = measurement_views.measurements(model, {})["measurements"]
     for row in rows:
         del row["seq"], row["replaces"]
     return {
@@ -72,12 +72,12 @@ def test_the_last_word_of_every_survey_counts_in_whatever_order_they_come(tmp_pa
 def test_a_revision_says_what_it_replaces_and_is_new_in_the_stream(tmp_path: Path) -> None:
     first = passes(2, lambda _stop, _station: 1.0)
     model = heard(tmp_path, first)
-    newest = views.measurements(model, {})["newest"]
+    newest = measurement_views.measurements(model, {})["newest"]
     model.on_survey(*revised(first[0], 7, 1e-3))
     model.on_survey(*revised(first[0], 9, 2e-3))
-    answer = views.measurements(model, {"since": str(newest), "limit": "10"})
+    answer = measurement_views.measurements(model, {"since": str(newest), "limit": "10"})
     assert [(row["sequence"], row["replaces"], row["seq"]) for row in answer["measurements"]] == [(9, 7, newest + 2)]
-    assert len(views.measurements(model, {})["measurements"]) == len(first)
+    assert len(measurement_views.measurements(model, {})["measurements"]) == len(first)
 
 
 def test_an_older_word_that_comes_late_changes_nothing(tmp_path: Path) -> None:

@@ -30,6 +30,20 @@ for sequence in range(1, 100_000):
 """
 
 
+HOARDER = """
+import os, sys
+from borechain.load.crowd import survey_of
+from groundstation.service.store import Store, Stored
+from sim.rig.realtime import footprint
+store = Store(sys.argv[1])
+def fill(stops):
+    for stop in stops:
+        store.add_messages([Stored(survey_of(tube, stop, 1.0, tube), 1.0, 1.0) for tube in range(1, 51)])
+    return footprint(os.getpid())["private_mb"]
+print(-fill(range(1, 11)) + fill(range(11, 51)))
+"""
+
+
 OPENER = """
 import os, sys
 from groundstation.errors import StoreError
@@ -226,3 +240,10 @@ def test_a_doubt_that_cannot_be_read_from_the_database_is_one_plain_error(tmp_pa
         database.execute("update meta set value = ? where name = 'depth_trusted'", (text,))
     with closing(Store(url)) as store, pytest.raises(StoreError, match="expected numbers of the depth"):
         store.depth_doubt()
+
+
+def test_what_is_stored_takes_no_memory(tmp_path: Path) -> None:
+    """The usual cache of SQLite would keep every page that is written, up to 2 MB."""
+    run = [sys.executable, "-c", HOARDER, f"sqlite:///{tmp_path / 'base.db'}"]
+    grown_mb = float(subprocess.run(run, check=True, capture_output=True, text=True).stdout)
+    assert grown_mb < 0.5

@@ -20,6 +20,7 @@ OWN = {
     "realtime": "realtime",
     "page": "load",
     "day": "load",
+    "learn": "load",
     "killed": "load",
     "hour": "hour",
 }  # and the module of each
@@ -70,6 +71,7 @@ def bench(context: click.Context) -> None:
       borechain bench realtime --nodes 50 --seconds 120
       borechain bench page
       borechain bench day --hours 24
+      borechain bench learn
       borechain bench killed --times 200
       borechain bench hour
     """

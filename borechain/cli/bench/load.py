@@ -1,4 +1,4 @@
-"""``borechain bench page``, ``day`` and ``killed``: a ground station under load, of a long past, killed again."""
+"""``borechain bench page``, ``day``, ``learn`` and ``killed``: a ground station under load, of a long past, killed."""
 
 from __future__ import annotations
 
@@ -96,12 +96,44 @@ def day(hours: float, tubes: int, address: str, endpoint: str, as_json: bool) ->
     if as_json:
         click.echo(json.dumps(result))
         return
-    start = f"answers {result['started_s']:.1f} s after its start"
+    start = f"answers {result['started_s']:.1f} s after its start, {result['started_cpu_s']:.1f} s of CPU"
     click.echo(f"{result['surveys']} surveys at {result['stations']} stations: {start}")
     again = f"asked again {result['history_ms']:.0f} ms"
     click.echo(f"page opened: {result['picture_ms']:.0f} ms until the history has come; {again}")
     click.echo(line("an earlier moment", result["moment_ms"]))
     click.echo(f"memory: {result['private_mb']:.0f} MB")
+
+
+@click.command()
+@click.option("--surveys", type=click.IntRange(500, 1_000_000), default=10_000, show_default=True, help="That it has.")
+@click.option("--tubes", type=click.IntRange(2, 250), default=50, show_default=True, help="That survey at every stop.")
+@click.option("--stops", type=click.IntRange(3, 24), default=12, show_default=True, help="That it learns more.")
+@json_option
+@needs("orjson", "rich", "scipy", "sqlalchemy")
+@plain_faults
+def learn(surveys: int, tubes: int, stops: int, as_json: bool) -> None:
+    """What a ground station that has thousands of surveys needs to start, to learn one more and to answer, in CPU time.
+
+    \b
+    Example:
+      borechain bench learn --surveys 10000
+    """
+    from borechain.cli.tables import show_table
+    from borechain.load.learning import measure_learning
+    from groundstation.host import keep_imports, load_kernels
+
+    load_kernels()
+    keep_imports()
+    with tempfile.TemporaryDirectory(prefix="borechain-") as folder:
+        result: dict[str, Any] = {"bench": "learn", "tubes": tubes}
+        result |= measure_learning(surveys, tubes, stops, Path(folder))
+    if as_json:
+        click.echo(json.dumps(result))
+        return
+    columns = [(key, key) for key in ("what", "unit", "p50", "p99", "max", "count", "bound", "holds")]
+    show_table(f"{result['surveys']} surveys at {result['stations']} stations, CPU time", result["figures"], columns)
+    sizes = ", ".join(f"{size:.0f} bytes {of}" for of, size in result["store_bytes_of_a_survey"].items())
+    click.echo(f"database, for each survey: {sizes}")
 
 
 def line(what: str, figures: dict[str, Any]) -> str:

@@ -8,7 +8,7 @@ from hypothesis import assume, given
 from hypothesis import strategies as st
 
 from groundstation.errors import SurveyError
-from groundstation.survey.columns import PRESETS, Design, Deviation, deviation, dominant, project, tolerance
+from groundstation.survey.columns import PRESETS, Design, Deviation, Deviations, deviation, dominant, project, tolerance
 from groundstation.survey.resolve import Direction, angles
 from groundstation.survey.trajectory import Point
 
@@ -250,3 +250,27 @@ def test_in_a_vertical_hole_the_azimuth_is_nothing() -> None:
     assert found.name == "inclination"
     assert found.by_azimuth == 0.0
     assert found.by_inclination == pytest.approx(0.03)
+
+
+@given(
+    st.lists(
+        st.tuples(
+            st.sampled_from([0.0, 0.1, 0.3]) | st.floats(-1.0, 1.0),
+            st.floats(-1.0, 1.0),
+            st.sampled_from([0.0, 0.1, 0.2]),
+        ),
+        max_size=8,
+    ),
+    st.integers(0, 3),
+)
+def test_the_worst_of_many_deviations_is_the_worst_of_each(rows: list[tuple[float, float, float]], first: int) -> None:
+    table = np.array(rows).reshape(-1, 3)
+    md, covs = np.arange(float(len(rows))), np.broadcast_to(np.eye(2), (len(rows), 2, 2))
+    found = Deviations(md, md, table[:, :2], covs, table[:, 2])
+    each = list(found)
+    assert [one.md for one in each] == md.tolist() == [found[k].md for k in range(len(found))]
+    expected = max(each[first:], key=lambda one: one.ratio, default=None)
+    worst = found.worst(first)
+    assert (worst is None) == (expected is None)
+    if worst is not None and expected is not None:
+        assert (worst.md, worst.ratio) == (expected.md, expected.ratio)

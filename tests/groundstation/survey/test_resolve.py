@@ -14,7 +14,7 @@ from groundstation.survey.resolve import (
     Quality,
     angle_stds,
     angles,
-    check,
+    check_all,
     combine_imus,
     is_covariance,
     resolve,
@@ -185,7 +185,8 @@ def test_quality_names_what_is_wrong() -> None:
     good, cov = force_at_rest(2.0 * DEG, 1.0, 0.0)[None, :], (np.eye(3) * (0.0034**2 / 32))[None, :, :]
 
     def judged(forces: np.ndarray, covs: np.ndarray, settle_time: float) -> Quality:
-        return check(forces, covs, combine_imus(forces, covs), G, 32, settle_time, 0.0034)
+        mean, cov = combine_imus(forces, covs)
+        return check_all(forces[None], covs[None], (mean[None], cov[None]), G, [32], [settle_time], 0.0034)[0]
 
     assert judged(good, cov, 19.0) == Quality.GOOD
     assert judged(good * 1.01, cov, 19.0) == Quality.GRAVITY

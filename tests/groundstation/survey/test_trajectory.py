@@ -2,6 +2,7 @@
 
 import math
 from dataclasses import replace
+from operator import itemgetter
 
 import numpy as np
 import pytest
@@ -90,6 +91,46 @@ def test_a_long_hole_at_once_is_the_same_as_station_by_station(method: Method) -
         np.testing.assert_array_equal(appended.position, extended.position)
         np.testing.assert_array_equal(appended.cov, extended.cov)
         np.testing.assert_array_equal(appended.shared, extended.shared)
+
+
+@pytest.mark.parametrize("count", [1, BLOCK - 1, BLOCK, 2 * BLOCK + 3])
+def test_a_hole_whose_stations_change_is_as_one_that_is_drawn_anew(count: int) -> None:
+    """Stations that change, come between others and below, at the borders of the blocks and within."""
+    stations = {float(k): turned(0.3 + 1e-3 * k, 0.01 * k, 1e-3, [1e-3] * (1 + k // 50)) for k in range(1, count + 1)}
+    put = Trajectory()
+    put.put(reversed(stations.items()))
+    for number, place in enumerate(sorted({1, count // 2 + 1, min(BLOCK, count), count})):
+        other = [turned(0.2, number + 0.1 * k, 2e-3, [1e-3] * (4 + number)) for k in range(4)]
+        for changed in (
+            {float(place): other[0]},
+            {place - 0.5: other[0], float(place): other[1]},
+            {count + 1.0 + number: other[2], 0.25 + 0.1 * number: other[3]},
+        ):
+            stations |= changed
+            put.put([*changed.items(), (float(place), stations[place])])
+            anew = Trajectory()
+            anew.extend(sorted(stations.items(), key=itemgetter(0)))
+            assert len(put) == len(anew) == len(stations) + 1
+            for one, drawn in zip(put.points, anew.points, strict=True):
+                assert one.md == drawn.md
+                np.testing.assert_array_equal(one.tangent, drawn.tangent)
+                np.testing.assert_array_equal(one.position, drawn.position)
+                np.testing.assert_array_equal(one.cov, drawn.cov)
+                np.testing.assert_array_equal(one.shared, drawn.shared)
+            np.testing.assert_array_equal(put.md, [one.md for one in anew.points])
+            np.testing.assert_array_equal(put.positions, [one.position for one in anew.points])
+            np.testing.assert_array_equal(put.covs, [one.cov for one in anew.points])
+            shown = [columns for some in put.columns() for columns in some]
+            for columns, point in zip(shown, anew.points, strict=True):
+                np.testing.assert_array_equal(columns, point.shared)
+
+
+def test_a_station_above_the_collar_is_refused() -> None:
+    trajectory = Trajectory(start_md=1.0)
+    for md in (0.5, 1.0, math.nan, math.inf):
+        with pytest.raises(SurveyError, match="expected a depth beyond 1 m"):
+            trajectory.put([(2.0, lean_of(0.1, 0.0)), (md, lean_of(0.1, 0.0))])
+    assert len(trajectory) == 1
 
 
 def test_a_point_keeps_of_its_columns_what_the_trajectory_is_told() -> None:

@@ -1,0 +1,180 @@
+"""A ground station that has thousands of surveys: its start, what one more costs it, and how long answers take.
+
+One process, without bus and page, so that its figures are the ground station's own. Bounds are those of its
+specification; a row that misses its bound says so.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import itertools
+import time
+from collections import defaultdict
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from borechain.load.crowd import ROUND_S, TUBE_LENGTH, state_of
+from borechain.load.day import ADVANCE, ADVANCES, BEGUN_AT, EPOCH, depth_of, surveys_at, up_to, write_day
+from borechain.recording.replay import TapeClock
+from groundstation.config import GroundConfig, checked_config
+from groundstation.service.process import GroundProcess
+from sim.errors import RigError
+from telemetry.application.depth_source import DepthSource
+from telemetry.messages import SurveyMeasurement
+from telemetry.presentation.msgpack_codec import encode
+
+RIG = "load"
+READINGS, READ_EVERY_S = 20, 2.0  # of the depth at a stop
+SHORTLY_S = 0.01  # until the next reading
+COURSES = 3  # stops at one depth
+TENTH = 10
+QUESTIONS = 5  # after a survey
+START_S, LEARN_MS, ANSWER_MS = 2.0, 1.0, 20.0  # at most
+ASKED = (
+    "status", "verdict", "string", "nodes/1", "stations", "stations/1", "stations/1/measurements", "trajectory",
+    "uncertainty", "column", "history", "events", "alarms", "measurements", "changes",
+)  # fmt: skip
+
+
+@dataclass(frozen=True, slots=True)
+class Figure:
+    """One row: a median, a 99th percentile and the largest of ``count``, in a unit, and the bound of the percentile."""
+
+    what: str
+    unit: str
+    p50: float
+    p99: float
+    most: float
+    count: int
+    bound: float
+
+    @property
+    def row(self) -> dict[str, Any]:
+        """As a table has it."""
+        return {
+            "what": self.what, "unit": self.unit, "p50": self.p50, "p99": self.p99, "max": self.most,
+            "count": self.count, "bound": self.bound, "holds": self.p99 <= self.bound,
+        }  # fmt: skip
+
+
+class Hearing:
+    """A ground station that is told what a string says, and asked meanwhile; what each takes is kept.
+
+    Parameters
+    ----------
+    config : of its settings, with the database it starts upon
+    tubes, begin : of the string, and rig time (s) from which on it goes on
+    """
+
+    def __init__(self, config: GroundConfig, tubes: int, begin: float) -> None:
+        self._tubes = tubes
+        self._now = begin
+        self._clock = TapeClock(begin, EPOCH)
+        self._source = DepthSource()
+        self._questions = itertools.cycle(ASKED)
+        self.taken: dict[str, list[float]] = defaultdict(list)  # s of CPU
+        with self._timing("start"):
+            self.ground = GroundProcess(config)
+            self.ground.model.hole.settle()
+        self.ground.clock = self._clock
+
+    def drill(self, number: int, md: float) -> list[SurveyMeasurement]:
+        """Drill to ``md`` (m) and let the string stand there; returns the surveys that it takes."""
+        for tube in up_to(self._tubes):
+            state = state_of(tube, self._tubes - tube + 1, self._now)
+            self.ground.on_message(replace(state, epoch=EPOCH, cycles=number), self._now)
+        for _ in range(READINGS):
+            self._read(md, READ_EVERY_S)
+        return surveys_at(self._tubes, md, number, self._now)
+
+    def learn_together(self, surveys: list[SurveyMeasurement], md: float) -> None:
+        """All surveys of a stop come before the next reading of the depth, as a string sends them."""
+        before = time.process_time()
+        self._take(surveys, md)
+        self.ground.model.hole.settle()
+        self.taken["learning each of a stop"].append((time.process_time() - before) / len(surveys))
+
+    def learn_alone(self, surveys: list[SurveyMeasurement], md: float) -> None:
+        """The hole is worked out again after each of them."""
+        for survey in surveys:
+            with self._timing("learning one alone"):
+                self._take([survey], md)
+                self.ground.model.hole.settle()
+
+    def learn_asked(self, surveys: list[SurveyMeasurement], md: float) -> None:
+        """Somebody asks after each of them; the first question waits until the hole is worked out."""
+        for survey in surveys:
+            self._take([survey], md)
+            for path in itertools.islice(self._questions, QUESTIONS):
+                with self._timing(path):
+                    self.ground.operator.ask_json(path)
+
+    def _take(self, surveys: list[SurveyMeasurement], md: float) -> None:
+        """Surveys come, are stored, and find their depth with the next reading."""
+        for survey in surveys:
+            self.ground.on_message(survey, self._now)
+        self.ground.before_frames()
+        self._read(md, SHORTLY_S)
+
+    def _read(self, md: float, after: float) -> None:
+        self._now += after
+        self._clock.rig_now = self._now
+        self.ground.on_depth(encode(self._source.measure(self._now, md)), self._now)
+
+    @contextlib.contextmanager
+    def _timing(self, what: str) -> Iterator[None]:
+        before = time.process_time()
+        yield
+        self.taken[what].append(time.process_time() - before)
+
+
+def measure_learning(surveys: int, tubes: int, stops: int, folder: Path) -> dict[str, Any]:
+    """Start a ground station upon so many surveys, let it learn some stops more and ask it, see ``Hearing``.
+
+    Raises
+    ------
+    RigError
+        When it has not fused all of them.
+    """
+    settings: dict[str, Any] = {"tube_length": TUBE_LENGTH, "target": TUBE_LENGTH * (tubes + ADVANCES * ADVANCE)}
+    known = -(-surveys // tubes)  # stops
+    tenth, whole = (checked_config(rig=RIG, folder=folder / str(n), **settings) for n in (known // TENTH, known))
+    sizes = [bytes_of_a_survey(config, n, tubes) for config, n in ((tenth, known // TENTH), (whole, known))]
+    hearing = Hearing(whole, tubes, BEGUN_AT + ROUND_S * (known + 1))
+    model = hearing.ground.model
+    before = model.seen["measurements"]
+    with contextlib.closing(hearing.ground):
+        courses = itertools.cycle((hearing.learn_together, hearing.learn_alone, hearing.learn_asked))
+        learnt = 0
+        for stop, learn in zip(range(1, stops + 1), courses, strict=False):
+            md = depth_of(tubes, ADVANCES + (stop - 1) // COURSES)
+            taken = hearing.drill(known + stop, md)
+            learn(taken, md)
+            learnt += len(taken)
+        if model.seen["measurements"] != before + learnt:
+            raise RigError(f"{learnt} surveys came, {model.seen['measurements'] - before} were fused")
+        stations = len(model.stations)
+    return {
+        "surveys": before + learnt,
+        "stations": stations,
+        "store_bytes_of_a_survey": {"of a tenth": sizes[0], "of all": sizes[1]},
+        "figures": [figure(what, taken).row for what, taken in hearing.taken.items()],
+    }
+
+
+def bytes_of_a_survey(config: GroundConfig, stops: int, tubes: int) -> float:
+    """Fill a database with the surveys of some stops; returns its size by their number."""
+    count = write_day(config.url, stops, tubes)
+    return sum(file.stat().st_size for file in config.folder.iterdir()) / count
+
+
+def figure(what: str, taken: list[float]) -> Figure:
+    """The row of what was timed."""
+    unit, scale, bound = ("s", 1.0, START_S) if what == "start" else ("ms", 1e3, ANSWER_MS)
+    bound = LEARN_MS if what.startswith("learning") else bound
+    p50, p99 = (scale * float(value) for value in np.percentile(taken, (50.0, 99.0)))
+    return Figure(what, unit, p50, p99, scale * max(taken), len(taken), bound)
