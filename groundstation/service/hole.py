@@ -23,6 +23,7 @@ from groundstation.survey.fusion import Evidence, Weighting, departures_from, ju
 from groundstation.survey.resolve import Direction
 from groundstation.survey.shared import SharedErrors
 from groundstation.survey.trajectory import Point, Trajectory
+from groundstation.survey.transport import Carried, carry
 
 
 @dataclass(frozen=True, slots=True)
@@ -55,6 +56,7 @@ class Hole:
         self._moved: list[Moved] = []
         self._alarms = AlarmList()
         self._history = History()
+        self._carried: dict[float, Carried] = {}  # by the depth of a station, where the string turns in a bent hole
         self._trajectory = self._at_collar()
         self._drawn: list[tuple[float, Direction]] = []  # stations of the trajectory, m and direction
         self._deviations = deviations(self._trajectory.points, self._design)
@@ -114,6 +116,23 @@ class Hole:
         self.settle()
         return self._trajectory.points
 
+    def direction_of(self, station: SurveyStation) -> Direction:
+        """Direction of the hole at a station, the transport of the string in it."""
+        self.settle()
+        carried = self._carried.get(station.md)
+        return station.fused(self._config.weighting) if carried is None else carried.direction
+
+    @property
+    def has_transport(self) -> bool:
+        """Whether the string turns against its head in a bent hole."""
+        return self._config.string_transport == "parallel"
+
+    def transport_of(self, station: SurveyStation) -> tuple[float, float]:
+        """Transport of the string that is in the azimuth of a station, and its standard deviation (rad)."""
+        self.settle()
+        carried = self._carried.get(station.md)
+        return (0.0, 0.0) if carried is None else (carried.gamma, carried.std)
+
     def point_of(self, station: SurveyStation) -> Point:
         """Point of the trajectory at a station; the collar for one at its depth."""
         self.settle()
@@ -147,13 +166,23 @@ class Hole:
             SurveyStation.add_newest(grown, newest)
 
     def _work_out(self) -> None:
-        self._draw([(one.md, one.fused(self._config.weighting)) for one in self._stations if one.md > 0.0])
-        if not self._drawn:
+        stations = [(one.md, one.fused(self._config.weighting)) for one in self._stations if one.md > 0.0]
+        if not stations:
             return
+        self._draw(self._with_transport(stations))
         worst = max(self._deviations[1:], key=lambda d: d.ratio)
         self._projection = project(self._trajectory.points[-1], self._drawn[-1][1], self._design)
         self._alarms.judge_deviation("deviation", worst, self._newest_at)
         self._alarms.judge_deviation("projection", self._projection, self._newest_at)
+
+    def _with_transport(self, stations: list[tuple[float, Direction]]) -> list[tuple[float, Direction]]:
+        """The same stations (m, direction) with the transport of their string, where it has one."""
+        if not self.has_transport:
+            return stations
+        mds, measured = zip(*stations, strict=True)
+        places = self._shared.transport_places(len(stations) + 1)
+        self._carried = dict(zip(mds, carry(self._config.collar, measured, places), strict=True))
+        return [(md, carried.direction) for md, carried in self._carried.items()]
 
     def _draw(self, stations: list[tuple[float, Direction]]) -> None:
         """Trajectory through stations (m, direction); where none has changed the new ones are added to it."""
@@ -168,7 +197,7 @@ class Hole:
 
     def _at_collar(self) -> Trajectory:
         """A trajectory without stations; a point of it keeps the variances of its position by kind, (kinds, 3)."""
-        return Trajectory(keep=self._shared.variances)
+        return Trajectory(collar=self._config.collar, keep=self._shared.variances)
 
     def _station_at(self, md: float) -> SurveyStation:
         first = bisect_left(self._stations, md - 2.0 * self._config.station_tolerance, key=lambda known: known.md)

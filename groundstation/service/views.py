@@ -13,10 +13,10 @@ import numpy as np
 
 from groundstation.errors import SelectorError, SurveyError
 from groundstation.service.clusters import Cluster
+from groundstation.service.hole import Hole
 from groundstation.service.model import RigModel
 from groundstation.service.station import SurveyStation
 from groundstation.service.streams import STREAMED, span, window
-from groundstation.survey.fusion import Weighting
 from groundstation.survey.resolve import angle_stds, angles
 from groundstation.survey.trajectory import Point, interpolate
 from telemetry.messages import Event, NodeFlag, NodeState, StaticRecord
@@ -139,13 +139,16 @@ def stations(k: RigModel, p: Parameters) -> View:
 def station(k: RigModel, n: int) -> View:
     """One station, fused; ``n`` from 1."""
     s = k.stations[n - 1]
-    row = {"station": n, "md_m": round(s.md, 6)} | s.shown(partial(direction_view, k.config.weighting))
+    show = partial(direction_view, k.hole)
+    # what a string turns by in a bent hole changes with the stations above
+    row = {"station": n, "md_m": round(s.md, 6)} | (show(s) if k.hole.has_transport else s.shown(show))
     return row | position(k.hole.point_of(s))
 
 
-def direction_view(weighting: Weighting, s: SurveyStation) -> View:
+def direction_view(hole: Hole, s: SurveyStation) -> View:
     """Direction of a station and what it is made of."""
-    fused = s.fused(weighting)
+    fused = hole.direction_of(s)
+    gamma, gamma_std = hole.transport_of(s)
     inclination, azimuth = angles(fused.lean, fused.down)
     sigma_inclination, sigma_azimuth = angle_stds(fused.lean, fused.down, fused.total_cov)
     return {
@@ -153,6 +156,8 @@ def direction_view(weighting: Weighting, s: SurveyStation) -> View:
         "azimuth_deg": math.degrees(azimuth),
         "sigma_inclination_deg": math.degrees(sigma_inclination),
         "sigma_azimuth_deg": math.degrees(sigma_azimuth),
+        "transport_deg": math.degrees(gamma),
+        "sigma_transport_deg": math.degrees(gamma_std),
         "measurements": s.count,
         "dropped_measurements": s.first,
         "untrusted_measurements": s.untrusted,

@@ -25,6 +25,7 @@ CAUSES = 2 + AXES  # of the columns of a reading: mount, joint, and each axis
 MOST_OF_16_BITS = 1 << 16
 KINDS = {"mount": "mounts", "joint": "joints", "drive": "joints", "string": "joints", "bias": "accelerometer_bias"}
 KIND_NAMES = sorted(set(KINDS.values()))
+TRANSPORT = "transport"  # of columns that random errors share; they are of no kind
 
 
 class Reading(Direction):
@@ -146,6 +147,7 @@ class SharedErrors:
         self._places: dict[str, list[int]] = {}  # of the columns of each kind, in the order of their coming
 
         self._known: dict[tuple[Name, ...], Places] = {}
+        self._transport: list[int] = []
 
     def __len__(self) -> int:
         return len(self._columns)
@@ -187,13 +189,20 @@ class SharedErrors:
             members[places[places < len(members)], number] = 1.0
         return np.asarray(members.T @ np.swapaxes(columns**2, -1, -2))
 
+    def transport_places(self, count: int) -> list[int]:
+        """Places of so many columns of the transport in a bent hole, see ``groundstation.survey.transport``."""
+        while len(self._transport) < count:
+            self._transport += self._places_of(((TRANSPORT, len(self._transport)),)).tolist()
+        return self._transport[:count]
+
     def _places_of(self, names: tuple[Name, ...]) -> Places:
         """Places of errors' columns, the next ones where they are met for the first time; kept once for all."""
         if names not in self._known:
             for name in names:
                 if name not in self._columns:
                     self._columns[name] = len(self._columns)
-                    self._places.setdefault(KINDS[str(name[0])], []).append(self._columns[name])
+                    if (kind := KINDS.get(str(name[0]))) is not None:
+                        self._places.setdefault(kind, []).append(self._columns[name])
             self._known[names] = np.array([self._columns[name] for name in names], np.intp)
         return self._known[names]
 

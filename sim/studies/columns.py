@@ -145,6 +145,17 @@ FIXED_POINT_NEES: Columns = (
     ("nees_turning", "turning"),
     ("nees_total", "with joints"),
 )
+BENT: Columns = (
+    ("case", "hole"),
+    ("string", "string"),
+    ("told", "the ground station was told"),
+    ("azimuth_rms_deg", "azimuth rms, deg"),
+    ("azimuth_nees", "NEES"),
+    ("toe_rms_cm", "toe rms, cm"),
+    ("toe_nees", "NEES in plan"),
+    ("inside_percent", "toes inside 95 %, %"),
+    ("between_cm", "toe between stations, cm"),
+)
 FIELD: Columns = (
     ("case", "disturbance"),
     ("yaw_rms_turning_deg", "yaw rms turning, deg"),

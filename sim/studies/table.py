@@ -183,6 +183,15 @@ STUDIES = by_name(
             short="--seeds 2 --disturbance random-phase",
         ),
         Study(
+            "bent-holes",
+            "Azimuth and toe of a bent hole: what the string does there, and what the ground station was told of it.",
+            f"{MODULES}.bent",
+            (Table("Bent holes, {seeds} seeds", columns.BENT, columns.BENT),),
+            (Option("seeds", 20, 2, 10_000),),
+            drawn=False,
+            short="--seeds 2",
+        ),
+        Study(
             "alignment",
             "Mount of an IMU from two slow turns: a circle fit beside (max + min) / 2, and the survey after.",
             f"{MODULES}.alignment",
