@@ -145,6 +145,17 @@ FIXED_POINT_NEES: Columns = (
     ("nees_turning", "turning"),
     ("nees_total", "with joints"),
 )
+FORCE_BIAS: Columns = (
+    ("case", "inclination, stop"),
+    ("azimuth_measured_deg", "azimuth rms as measured, deg"),
+    ("azimuth_corrected_deg", "under the blocks of the stop before, deg"),
+    ("azimuth_nees", "NEES of that"),
+    ("bias_xy_mg", "bias rms across, mg"),
+    ("stated_xy_mg", "stated"),
+    ("bias_z_mg", "along, mg"),
+    ("stated_z_mg", "stated"),
+    ("bias_nees", "NEES of the bias"),
+)
 BENT: Columns = (
     ("case", "hole"),
     ("string", "string"),

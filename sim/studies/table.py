@@ -183,12 +183,23 @@ STUDIES = by_name(
             short="--seeds 2 --disturbance random-phase",
         ),
         Study(
+            "force-bias",
+            "Biases of accelerometers of 1 mg from the surveys of a string, stop by stop, and the azimuth under them.",
+            f"{MODULES}.force_bias",
+            (Table("Accelerometer biases, {seeds} seeds", columns.FORCE_BIAS, columns.FORCE_BIAS),),
+            (Option("seeds", 20, 2, 10_000),),
+            drawn=False,
+            full=("--seeds 40",),
+            short="--seeds 2",
+        ),
+        Study(
             "bent-holes",
             "Azimuth and toe of a bent hole: what the string does there, and what the ground station was told of it.",
             f"{MODULES}.bent",
             (Table("Bent holes, {seeds} seeds", columns.BENT, columns.BENT),),
             (Option("seeds", 20, 2, 10_000),),
             drawn=False,
+            full=("--seeds 40",),
             short="--seeds 2",
         ),
         Study(
