@@ -93,6 +93,10 @@ class Hole:
         self.settle()
         return self._stations
 
+    def has_survey_of(self, tube: int) -> bool:
+        """Whether a tube has surveyed below the collar."""
+        return bool(np.any((self._surveys.column("tube") == tube) & (self._surveys.column("md") > 0.0)))
+
     @property
     def moved(self) -> list[Moved]:
         """Where the hole moved."""

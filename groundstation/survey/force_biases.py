@@ -10,6 +10,7 @@ that much against the one above: what cannot be told apart so keeps the variance
 
 from __future__ import annotations
 
+import hashlib
 from collections import defaultdict
 from collections.abc import Hashable, Sequence
 from dataclasses import dataclass
@@ -54,11 +55,24 @@ class Look:
 
 @dataclass(frozen=True, slots=True)
 class ForceBias:
-    """Bias (3,) m/s^2 of one tube's accelerometer with its covariance (3, 3), and from how many looks."""
+    """Bias (3,) m/s^2 of one tube's accelerometer with its covariance (3, 3), and what it is from.
+
+    ``residual_rms`` (m/s^2) is what the bias leaves of the sizes of the tube's forces, ``digest`` of its looks.
+    """
 
     bias: Array
     cov: Array
     looks: int
+    residual_rms: float
+    digest: str
+
+
+@dataclass(frozen=True, slots=True)
+class SurveyedBiases:
+    """Bias of every tube that has one, and why others have none."""
+
+    found: dict[int, ForceBias]
+    refused: dict[int, str]
 
 
 def look_of(
@@ -122,13 +136,18 @@ def solve_biases(looks: Sequence[Look], bias_std: float, gravity_std: float) -> 
         normal.add(rows, places, np.array([[1.0 / look.excess_var]]), np.array([look.excess]))
     for together in stations.values():
         _add_station(normal, together, own, bias_std)
-    cov = np.linalg.inv(normal.matrix)
+    cov = np.asarray(np.linalg.inv(normal.matrix), np.float64)
     errors = cov @ normal.right
-    counts = {tube: sum(look.tube == tube for look in looks) for tube in tubes}
-    return {
-        tube: ForceBias(bias_std * errors[at], bias_std**2 * cov[np.ix_(at, at)], counts[tube])
-        for tube, at in own.items()
-    }
+    off = gravity_std * float(errors[gravity])
+    found = {}
+    for tube, at in own.items():
+        its = [look for look in looks if look.tube == tube]
+        bias = bias_std * errors[at]
+        left = [look.excess - off - float(look.unit @ bias) for look in its]
+        digest = hashlib.sha256(b"".join(look.lean.tobytes() + look.unit.tobytes() for look in its)).hexdigest()
+        residual_rms = float(np.sqrt(np.mean(np.square(left))))
+        found[tube] = ForceBias(bias, np.asarray(bias_std**2 * cov[np.ix_(at, at)]), len(its), residual_rms, digest)
+    return found
 
 
 def _add_station(normal: Normal, looks: Sequence[Look], own: dict[int, Places], bias_std: float) -> None:
@@ -137,7 +156,7 @@ def _add_station(normal: Normal, looks: Sequence[Look], own: dict[int, Places], 
     for look in looks:
         rows = np.concatenate([look.columns, bias_std * look.by_force], axis=1)
         places = np.concatenate([look.places, own[look.tube]])
-        information = np.linalg.inv(look.cov)
+        information = np.asarray(np.linalg.inv(look.cov), np.float64)
         normal.add(rows, places, information, look.lean)
         weighed[:, places] += information @ rows
         weight += information

@@ -220,9 +220,7 @@ def test_one_record_is_a_hole_by_either_setting() -> None:
     hole = Borehole.spiral(20.0 * DEG, 0.0, 50.0 * DEG, 40.0, 20.0 * DEG)
     mds = np.linspace(2.0, 40.0, 20)
     head, stations, _ = surveyed(hole, mds)
-    other = Borehole(
-        np.concatenate([[0.0], mds]),
-        *(np.array(values) for values in zip(*(angles(one.lean, one.down) for one in [head, *stations]), strict=True)),
-    )
+    seen = np.array([angles(one.lean, one.down) for one in [head, *stations]])
+    other = Borehole(np.concatenate([[0.0], mds]), seen[:, 0], seen[:, 1])
     for md, one in zip(mds.tolist(), stations, strict=True):
         assert other.direction(md) == pytest.approx(angles(one.lean, one.down), abs=1e-9)
