@@ -29,13 +29,13 @@ def _looks(k: RigModel) -> Iterator[Look]:
     for station in k.stations:
         if station.md <= 0.0:
             continue  # at the collar tubes may be anywhere
-        for place in station.counting:
-            cluster = station.clusters[place]
+        for place, cluster in enumerate(station.clusters):
             if cluster.trust is not Trust.FULL:
                 continue
+            hole = station.md, station.first_before(place + 1)  # before and after it moved these are two
             force = np.mean(np.array(cluster.forces), axis=0)
             var, yaw = cluster.force_var, cluster.yaw
-            yield look_of(station.md, cluster.tube, cluster.direction, force, var, yaw, k.config.gravity)
+            yield look_of(hole, cluster.tube, cluster.direction, force, var, yaw, k.config.gravity)
 
 
 def _why_not(k: RigModel, tube: int) -> str:

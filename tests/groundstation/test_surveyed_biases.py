@@ -66,20 +66,23 @@ class Drilled:
         return model
 
 
-def found_by(folder: Path, hole: Drilled) -> dict[int, ForceBias]:
-    return surveyed_biases(hole.tell(RigModel(GroundConfig(folder=folder, mount_std_deg=0.0)))).found
+def found_by(folder: Path, hole: Drilled, stated_deg: float = SENSOR_STD_DEG) -> dict[int, ForceBias]:
+    config = GroundConfig(folder=folder, mount_std_deg=0.0, accelerometer_bias_std_deg=stated_deg)
+    return surveyed_biases(hole.tell(RigModel(config))).found
 
 
-def test_any_tool_faces_show_the_biases_as_well_as_stated(tmp_path: Path) -> None:
+@pytest.mark.parametrize(("stated_deg", "known_mg"), [(SENSOR_STD_DEG, 0.1), (0.002, 1.0)])
+def test_any_tool_faces_show_the_biases_as_well_as_stated(tmp_path: Path, stated_deg: float, known_mg: float) -> None:
+    """A ground station that was told of small biases takes large ones for a hole that moved, and so knows less."""
     squares, stds = [], []
     for seed in range(40):
         hole = Drilled(seed)
-        for tube, one in found_by(tmp_path, hole).items():
+        for tube, one in found_by(tmp_path, hole, stated_deg).items():
             error = one.bias - hole.biases[tube]
             squares.append(float(error @ np.linalg.solve(one.cov, error)) / 3.0)
             stds.append(np.sqrt(np.diagonal(one.cov)))
     assert 0.8 < np.mean(squares) < 1.2
-    assert np.sqrt(np.mean(np.square(stds), axis=0))[:2] == pytest.approx([0.06 * MILLI_G] * 2, rel=0.5)
+    assert np.sqrt(np.mean(np.array(stds)[:, :2] ** 2)) < known_mg * MILLI_G
 
 
 def test_the_same_turn_between_all_stops_shows_no_bias(tmp_path: Path) -> None:
@@ -102,7 +105,8 @@ def test_a_survey_whose_yaw_is_not_believed_says_nothing_of_a_bias(tmp_path: Pat
     before = found_by(tmp_path, hole)
     wrong, md = hole.surveys[-1]
     forged = replace(wrong, sequence=99, yaw=wrong.yaw + 2.0, station_at=wrong.station_at + 30.0)
-    model = hole.tell(RigModel(GroundConfig(folder=tmp_path, mount_std_deg=0.0)))
+    config = GroundConfig(folder=tmp_path, mount_std_deg=0.0, accelerometer_bias_std_deg=SENSOR_STD_DEG)
+    model = hole.tell(RigModel(config))
     assert model.on_survey(replace(forged, flags=NodeFlag.YAW_UNTRUSTED), md) == "survey_untrusted"
     after = surveyed_biases(model).found
     assert [one.bias.tolist() for one in after.values()] == [one.bias.tolist() for one in before.values()]
