@@ -223,12 +223,6 @@ COMMANDS: tuple[CommandSpec, ...] = (
     CommandSpec(
         "recalibrate",
         ObeyedBy.GROUND,
-        "proposes the accelerometer biases that the surveys of the hole show, in place of attitudes and `solve`",
-        action="surveys",
-    ),
-    CommandSpec(
-        "recalibrate",
-        ObeyedBy.GROUND,
         "uploads the proposed blocks, if they are those that were shown",
         (_argument("proposal", TEXT, "hash that the solution showed", needed=True),),
         action="confirm",
@@ -238,6 +232,12 @@ COMMANDS: tuple[CommandSpec, ...] = (
         ObeyedBy.GROUND,
         "ends the calibration; a block that a tube has stays there",
         action="cancel",
+    ),
+    CommandSpec(
+        "recalibrate",
+        ObeyedBy.GROUND,
+        "proposes the accelerometer biases that the surveys of the hole show, in place of attitudes and `solve`",
+        action="surveys",
     ),
 )
 NAMES = tuple(dict.fromkeys(spec.name for spec in COMMANDS))
