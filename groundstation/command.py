@@ -42,6 +42,28 @@ WEIGHTINGS = ("bayes", "equal", "linear", "quadratic", "cubic", "adaptive")
     help="The most by which this rig bends a hole back; until where a correction still helps follows from it.",
 )
 @click.option(
+    "--string-transport",
+    type=click.Choice(("shortest", "parallel")),
+    default="shortest",
+    show_default=True,
+    help="Yaw of a tube in a bent hole: that of the head, or as a shaft without twist carries it along.",
+)
+@click.option(
+    "--collar-inclination-deg",
+    type=click.FloatRange(0.0, 180.0, max_open=True),
+    default=0.0,
+    show_default=True,
+    help="Of the hole at the collar, where the head holds the string.",
+)
+@click.option("--collar-azimuth-deg", type=float, default=0.0, show_default=True, help="Of the hole at the collar.")
+@click.option(
+    "--collar-std-deg",
+    type=click.FloatRange(0.0),
+    default=0.0,
+    show_default=True,
+    help="Standard error of the direction at the collar, each way.",
+)
+@click.option(
     "--weighting",
     type=click.Choice(WEIGHTINGS),
     default=WEIGHTINGS[0],
@@ -89,6 +111,10 @@ def ground(
     column_radius_m: float,
     tolerance: str,
     steering_deg_per_m: float,
+    string_transport: str,
+    collar_inclination_deg: float,
+    collar_azimuth_deg: float,
+    collar_std_deg: float,
     weighting: str,
     accelerometer_bias_std_deg: float,
     mount_std_deg: float,
@@ -123,6 +149,10 @@ def ground(
         "column_radius": column_radius_m,
         "tolerance": tolerance,
         "steering_deg_per_m": steering_deg_per_m,
+        "string_transport": string_transport,
+        "collar_inclination_deg": collar_inclination_deg,
+        "collar_azimuth_deg": collar_azimuth_deg,
+        "collar_std_deg": collar_std_deg,
         "weighting": weighting,
         "accelerometer_bias_std_deg": accelerometer_bias_std_deg,
         "mount_std_deg": mount_std_deg,

@@ -3,14 +3,17 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
+import numpy as np
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
 from groundstation.errors import ConfigurationError
 from groundstation.survey.columns import PRESETS, Design
 from groundstation.survey.fusion import Weighting
+from groundstation.survey.resolve import Direction, known
 from telemetry import keys
 
 Positive = Annotated[float, Field(gt=0.0)]
@@ -30,6 +33,12 @@ class GroundConfig(BaseModel):
     gravity: Positive = Field(9.81, description="m/s^2, of the site")
     accelerometer_bias_std_deg: float = Field(0.002, ge=0.0, description="left after calibration, as a tilt")
     mount_std_deg: float = Field(0.05, ge=0.0, description="of the IMU in its tube, about the axis")
+    string_transport: Literal["shortest", "parallel"] = Field(
+        "shortest", description="yaw of a tube in a bent hole: that of the head, or as a shaft without twist carries it"
+    )
+    collar_inclination_deg: float = Field(0.0, ge=0.0, lt=180.0, description="of the hole at the collar")
+    collar_azimuth_deg: float = 0.0
+    collar_std_deg: float = Field(0.0, ge=0.0, description="of the direction at the collar, each way")
     weighting: Weighting = Field(Weighting.BAYES, description="how the readings of one station count")
     target: Positive = Field(30.0, description="m, length of the design axis")
     design_inclination_deg: float = Field(0.0, ge=0.0, le=180.0)
@@ -54,6 +63,16 @@ class GroundConfig(BaseModel):
     def url(self) -> str:
         """Database to use."""
         return self.database_url or f"sqlite:///{self.folder / 'ground.sqlite'}"
+
+    @property
+    def collar(self) -> Direction:
+        """Direction of the hole at the collar, known as well as is stated."""
+        inclination, azimuth = math.radians(self.collar_inclination_deg), math.radians(self.collar_azimuth_deg)
+        along = np.array([math.cos(azimuth), math.sin(azimuth)])
+        across = np.array([-along[1], along[0]])
+        lean_cov = math.cos(inclination) ** 2 * np.outer(along, along) + np.outer(across, across)
+        var = math.radians(self.collar_std_deg) ** 2
+        return replace(known(inclination, azimuth), cov=var * lean_cov)
 
     @property
     def design(self) -> Design:

@@ -23,8 +23,10 @@ from groundstation.service.history import SAME_STOP, History
 from groundstation.service.station import SurveyStation
 from groundstation.survey.columns import Deviation, Deviations, deviations, project
 from groundstation.survey.fusion import Evidence, Weighting, departures_from, judge_departure
+from groundstation.survey.resolve import Direction
 from groundstation.survey.shared import SharedErrors
 from groundstation.survey.trajectory import Trajectory
+from groundstation.survey.transport import Carried, carry
 from groundstation.survey.trust import Trust
 
 Array = npt.NDArray[np.float64]
@@ -65,7 +67,8 @@ class Hole:
         self._moved: list[Moved] = []
         self._alarms = AlarmList()
         self._history = History()
-        self._trajectory = Trajectory(keep=no_columns)
+        self._carried: dict[float, Carried] = {}  # by the depth of a station, where the string turns in a bent hole
+        self._trajectory = Trajectory(collar=config.collar, keep=no_columns)
         self._deviations = self._deviate()
         self._projection: Deviation | None = None
         self._unsettled_since = math.inf  # s, rig time of the oldest survey from which nothing follows yet
@@ -115,6 +118,10 @@ class Hole:
         self.settle()
         return self._stations
 
+    def has_survey_of(self, tube: int) -> bool:
+        """Whether a tube has surveyed below the collar."""
+        return bool(np.any((self._surveys.column("tube") == tube) & (self._surveys.column("md") > 0.0)))
+
     @property
     def moved(self) -> list[Moved]:
         """Where the hole moved."""
@@ -137,6 +144,23 @@ class Hole:
         """From the collar down."""
         self.settle()
         return self._trajectory
+
+    def direction_of(self, station: SurveyStation) -> Direction:
+        """Direction of the hole at a station, the transport of the string in it."""
+        self.settle()
+        carried = self._carried.get(station.md)
+        return station.fused(self._config.weighting) if carried is None else carried.direction
+
+    @property
+    def has_transport(self) -> bool:
+        """Whether the string turns against its head in a bent hole."""
+        return self._config.string_transport == "parallel"
+
+    def transport_of(self, station: SurveyStation) -> tuple[float, float]:
+        """Transport of the string that is in the azimuth of a station, and its standard deviation (rad)."""
+        self.settle()
+        carried = self._carried.get(station.md)
+        return (0.0, 0.0) if carried is None else (carried.gamma, carried.std)
 
     @property
     def variances(self) -> Array:
@@ -178,15 +202,31 @@ class Hole:
             SurveyStation.add_newest(grown, newest)
 
     def _work_out(self, changed: Sequence[SurveyStation]) -> None:
-        weighting = self._config.weighting
-        self._trajectory.put((one.md, one.fused(weighting)) for one in changed if one.md > 0.0)
+        self._trajectory.put(self._directions(changed))
         self._deviations = self._deviate()
         worst = self._deviations.worst(first=1)
         if worst is None:
             return
-        self._projection = project(self._trajectory[-1], self._stations[-1].fused(weighting), self._design)
+        self._projection = project(self._trajectory[-1], self.direction_of(self._stations[-1]), self._design)
         self._alarms.judge_deviation("deviation", worst, self._newest_at)
         self._alarms.judge_deviation("projection", self._projection, self._newest_at)
+
+    def _directions(self, changed: Sequence[SurveyStation]) -> list[tuple[float, Direction]]:
+        """Stations in the hole (m, direction) that may be others than before.
+
+        Where the string turns in a bent hole these are all: what it turns by is that of the stations above, and of the
+        one below too.
+        """
+        weighting = self._config.weighting
+        if not self.has_transport:
+            return [(one.md, one.fused(weighting)) for one in changed if one.md > 0.0]
+        measured = [(one.md, one.fused(weighting)) for one in self._stations if one.md > 0.0]
+        if not measured:
+            return []
+        mds, directions = zip(*measured, strict=True)
+        places = self._shared.transport_places(len(measured) + 1)
+        self._carried = dict(zip(mds, carry(self._config.collar, directions, places), strict=True))
+        return [(md, carried.direction) for md, carried in self._carried.items()]
 
     def _deviate(self) -> Deviations:
         """Deviations of the trajectory as it is drawn."""

@@ -155,6 +155,8 @@ STATION: Fields = (
     MD,
     *ANGLES,
     *SIGMA_ANGLES,
+    number("transport_deg", "by which the string turns in the bent hole above: in the azimuth, not in measurements"),
+    number("sigma_transport_deg", "standard deviation of that"),
     integer("measurements", "clusters measured here"),
     integer("dropped_measurements", "of them from before the hole moved"),
     integer("untrusted_measurements", "of them with a yaw that is taken for unknown"),

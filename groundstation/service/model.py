@@ -321,5 +321,5 @@ class RigModel:
         return self._shown[view][1]
 
     def fused(self, station: SurveyStation) -> Direction:
-        """Direction of a station from the clusters that count."""
-        return station.fused(self.config.weighting)
+        """Direction of the hole at a station from the clusters that count."""
+        return self.hole.direction_of(station)

@@ -11,6 +11,7 @@ import time
 from collections import deque
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
+from functools import partial
 from typing import Any
 
 from groundstation.config import GroundConfig
@@ -22,6 +23,7 @@ from groundstation.service.paths import find
 from groundstation.service.recalibration.control import Recalibration
 from groundstation.service.recalibration.procedure import Request
 from groundstation.service.store import Store
+from groundstation.service.surveyed_biases import surveyed_biases
 from groundstation.service.uploads import Uploads
 from groundstation.service.views import View
 from telemetry.application.arguments import check_arguments, parse_parameters, parse_tube
@@ -72,7 +74,9 @@ class Operator:
         self._numbers = itertools.count((start << START_SHIFT) + 1)
         self._pending: deque[Outgoing] = deque()
         self._accepted_at: dict[int, float] = {}  # s, own clock, of the orders that have no answer yet
-        self._recalibration = Recalibration(model.recalibration, store, config.calibrations, self._cancel_upload)
+        self._recalibration = Recalibration(
+            model.recalibration, store, config.calibrations, self._cancel_upload, partial(surveyed_biases, model)
+        )
         self._handlers: dict[str, Callable[[Order], None]] = {
             spec.name: getattr(self, spec.name) for spec in COMMANDS if spec.by is ObeyedBy.GROUND
         }
@@ -262,7 +266,7 @@ class Operator:
         ended = self._uploads is not None and self._uploads.on_status(status)
         self._orders.on_block_status(status, ended=ended)
         if ended:
-            self._model.recalibration.on_block_status(status)
+            self._model.recalibration.on_block_status(status, has_surveyed=self._model.hole.has_survey_of(status.tube))
 
     def publish_orders(self) -> None:
         """Have the orders that changed published."""

@@ -12,11 +12,11 @@ import numpy as np
 import numpy.typing as npt
 
 from groundstation.errors import SelectorError, SurveyError
+from groundstation.service.hole import Hole
 from groundstation.service.model import RigModel
 from groundstation.service.station import SurveyStation
 from groundstation.service.streams import STREAMED, window
-from groundstation.survey.fusion import Weighting
-from groundstation.survey.resolve import Direction, angle_stds_of_all, angles
+from groundstation.survey.resolve import angle_stds_of_all, angles
 from groundstation.survey.trajectory import Point, interpolate
 from telemetry.messages import Event, NodeFlag, NodeState, StaticRecord
 
@@ -143,11 +143,14 @@ def station(k: RigModel, n: int) -> View:
 
 
 def station_rows(k: RigModel, numbers: Sequence[int]) -> list[View]:
-    """Stations of these numbers, fused; those to which nothing has come since they were shown last are as they were."""
+    """Stations of these numbers, fused; those to which nothing has come since they were shown last are as they were.
+
+    What a string turns by in a bent hole changes with the stations around.
+    """
     known, drawn = k.stations, k.hole.trajectory
     chosen = [known[n - 1] for n in numbers]
-    changed = [s for s in chosen if s.shown is None]
-    for s, view in zip(changed, direction_views(k.config.weighting, changed), strict=True):
+    changed = chosen if k.hole.has_transport else [s for s in chosen if s.shown is None]
+    for s, view in zip(changed, direction_views(k.hole, changed), strict=True):
         s.show(view)
     places = [k.hole.place_of(s) for s in chosen]
     positions = position_views(drawn.positions[places], drawn.covs[places])
@@ -155,24 +158,31 @@ def station_rows(k: RigModel, numbers: Sequence[int]) -> list[View]:
     return [{"station": n, "md_m": round(s.md, 6)} | (s.shown or {}) | position for n, s, position in rows]
 
 
-def direction_views(weighting: Weighting, chosen: Sequence[SurveyStation]) -> list[View]:
+def direction_views(hole: Hole, chosen: Sequence[SurveyStation]) -> list[View]:
     """Directions of stations and what each is made of."""
     if not chosen:
         return []
-    fused = [s.fused(weighting) for s in chosen]
-    downs, covs = [one.down for one in fused], np.array([one.total_cov for one in fused])
-    stds = angle_stds_of_all(np.array([one.lean for one in fused]), downs, covs)
-    return [direction_view(*row) for row in zip(chosen, fused, stds, strict=True)]
+    found = [hole.direction_of(s) for s in chosen]
+    downs, covs = [one.down for one in found], np.array([one.total_cov for one in found])
+    stds = angle_stds_of_all(np.array([one.lean for one in found]), downs, covs)
+    return [
+        direction_view(s, angles(one.lean, one.down), own, hole.transport_of(s))
+        for s, one, own in zip(chosen, found, stds, strict=True)
+    ]
 
 
-def direction_view(s: SurveyStation, fused: Direction, stds: tuple[float, float]) -> View:
-    """Direction of a station and what it is made of."""
-    inclination, azimuth = angles(fused.lean, fused.down)
+def direction_view(
+    s: SurveyStation, pointing: tuple[float, float], stds: tuple[float, float], transport: tuple[float, float]
+) -> View:
+    """Direction of a station and what it is made of; angles, their standard deviations and the transport in rad."""
+    inclination, azimuth = pointing
     return {
         "inclination_deg": math.degrees(inclination),
         "azimuth_deg": math.degrees(azimuth),
         "sigma_inclination_deg": math.degrees(stds[0]),
         "sigma_azimuth_deg": math.degrees(stds[1]),
+        "transport_deg": math.degrees(transport[0]),
+        "sigma_transport_deg": math.degrees(transport[1]),
         "measurements": s.count,
         "dropped_measurements": s.first,
         "untrusted_measurements": s.untrusted,

@@ -78,6 +78,12 @@ class Direction:
         return np.asarray(np.linalg.inv(self.total_cov))
 
 
+def known(inclination: float, azimuth: float) -> Direction:
+    """A direction (rad) that is known."""
+    lean = math.sin(inclination) * np.array([math.cos(azimuth), math.sin(azimuth)])
+    return Direction(lean, math.cos(inclination), np.zeros((2, 2)), np.zeros((2, 0)))
+
+
 @dataclass(frozen=True, slots=True)
 class Resolved:
     """A resolved stop: its direction, without shared errors, and how they would act on it."""

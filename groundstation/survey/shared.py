@@ -26,6 +26,7 @@ CAUSES = 2 + AXES  # of the columns of a reading: mount, joint, and each axis
 MOST_OF_16_BITS = 1 << 16
 KINDS = {"mount": "mounts", "joint": "joints", "drive": "joints", "string": "joints", "bias": "accelerometer_bias"}
 KIND_NAMES = sorted(set(KINDS.values()))
+TRANSPORT = "transport"  # of columns that random errors share; they are of no kind
 
 
 class Reading(Direction):
@@ -186,6 +187,7 @@ class SharedErrors:
         self._columns: dict[Name, int] = {}
         self._places: dict[str, list[int]] = {}  # of the columns of each kind, in the order of their coming
         self._known: dict[tuple[int, ...] | int, Places] = {}  # by a tube and those above it, or a tube alone
+        self._transport: list[int] = []
 
     def __len__(self) -> int:
         return len(self._columns)
@@ -226,19 +228,29 @@ class SharedErrors:
             members[places[places < len(members)], number] = 1.0
         return np.asarray(members.T @ np.swapaxes(columns**2, -1, -2))
 
+    def transport_places(self, count: int) -> list[int]:
+        """Places of so many columns of the transport in a bent hole, see ``groundstation.survey.transport``."""
+        while len(self._transport) < count:
+            self._transport.append(self._place_of((TRANSPORT, len(self._transport))))
+        return self._transport[:count]
+
     def _places_of(self, tube: int, above: Sequence[int] | None) -> Places:
-        """Places of the errors of a tube, the next ones where they are met for the first time; kept once for all."""
+        """Places of the errors of a tube, kept once for all of its readings in one string."""
         string = tube if above is None else (tube, *above)
         known = self._known.get(string)
         if known is None:
             chain = self._chain(tube, above)
             names: list[Name] = [("mount", tube), *chain, *(("bias", tube, axis) for axis in range(AXES))]
-            for name in names:
-                if name not in self._columns:
-                    self._columns[name] = len(self._columns)
-                    self._places.setdefault(KINDS[str(name[0])], []).append(self._columns[name])
-            known = self._known[string] = np.array([self._columns[name] for name in names], np.intp)
+            known = self._known[string] = np.array([self._place_of(name) for name in names], np.intp)
         return known
+
+    def _place_of(self, name: Name) -> int:
+        """Place of the column of an error, the next one where it is met for the first time."""
+        if name not in self._columns:
+            self._columns[name] = len(self._columns)
+            if (kind := KINDS.get(str(name[0]))) is not None:
+                self._places.setdefault(kind, []).append(self._columns[name])
+        return self._columns[name]
 
     @staticmethod
     def _chain(tube: int, above: Sequence[int] | None) -> list[Name]:

@@ -157,6 +157,28 @@ LIMITS: Columns = (
     ("ratio", "of the bound"),
     ("nees", "NEES"),
 )
+FORCE_BIAS: Columns = (
+    ("case", "inclination, stop"),
+    ("azimuth_measured_deg", "azimuth rms as measured, deg"),
+    ("azimuth_corrected_deg", "under the blocks of the stop before, deg"),
+    ("azimuth_nees", "NEES of that"),
+    ("bias_xy_mg", "bias rms across, mg"),
+    ("stated_xy_mg", "stated"),
+    ("bias_z_mg", "along, mg"),
+    ("stated_z_mg", "stated"),
+    ("bias_nees", "NEES of the bias"),
+)
+BENT: Columns = (
+    ("case", "hole"),
+    ("string", "string"),
+    ("told", "the ground station was told"),
+    ("azimuth_rms_deg", "azimuth rms, deg"),
+    ("azimuth_nees", "NEES"),
+    ("toe_rms_cm", "toe rms, cm"),
+    ("toe_nees", "NEES in plan"),
+    ("inside_percent", "toes inside 95 %, %"),
+    ("between_cm", "toe between stations, cm"),
+)
 FIELD: Columns = (
     ("case", "disturbance"),
     ("yaw_rms_turning_deg", "yaw rms turning, deg"),

@@ -62,10 +62,10 @@ class Borehole:
         return cls(np.array([0.0, length]), np.full(2, inclination), np.full(2, azimuth))
 
     @classmethod
-    def spiral(cls, inclination: float, azimuth: float, turn: float, length: float) -> Borehole:
-        """A hole of ``length`` (m) and one ``inclination`` whose azimuth goes on by ``turn`` (rad) evenly."""
+    def spiral(cls, inclination: float, azimuth: float, turn: float, length: float, build: float = 0.0) -> Borehole:
+        """A hole of ``length`` (m) whose azimuth goes on by ``turn`` and its inclination by ``build`` (rad) evenly."""
         md = np.linspace(0.0, length, SPIRAL_STATIONS)
-        return cls(md, np.full(len(md), inclination), azimuth + turn * md / length)
+        return cls(md, inclination + build * md / length, azimuth + turn * md / length)
 
     def _check(self, inclination: Array, azimuth: Array, where: str) -> None:
         if len(self.md) < 2:

@@ -48,6 +48,8 @@ class RoughMotion:
         base, rate, _ = motion.drive(self.t)
         self.driven = (rate > 0.0).astype(np.float64)
         self.head = base + self._added(section.drive, motion, base, rate)
+        if section.drive.stop_spread_deg > 0.0:
+            self.head += self._turned_further(section.drive, motion, base, seed)
         self.string = self._through_play(section.string, seed)
 
     def twist(self, section: RoughStringSection) -> Array:
@@ -73,6 +75,15 @@ class RoughMotion:
             back = smooth_step(self.t - drill.end - BACK_AFTER, BACK_WITHIN)[0]
             added -= math.radians(section.turns_back_deg) * back
         return added
+
+    def _turned_further(self, section: RoughDriveSection, motion: Motion, base: Array, seed: int) -> Array:
+        """Angle (n,) rad by which the head turns beyond the schedule's, evenly with that: a driller stops anywhere."""
+        parts = stream(seed, Stream.ROUGH_STOP_ANGLES).random(len(self._drills))
+        further = np.zeros_like(base)
+        for part, drill in zip(parts.tolist(), self._drills, strict=True):
+            begin, end = motion.drive(np.array([drill.start, drill.end]))[0]
+            further += part * np.clip((base - begin) / (end - begin), 0.0, 1.0)
+        return np.asarray(math.radians(section.stop_spread_deg) * further)
 
     def _through_play(self, section: RoughStringSection, seed: int) -> Array:
         """The head drives the string at one flank; after a stop it runs on, and waits there for the head."""

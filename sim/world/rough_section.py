@@ -22,6 +22,7 @@ class RoughDriveSection(Section):
     stick_slip_s: Positive = Field(5.0, description="of one swing")
     dead_stop_dps: NotNegative = Field(0.0, description="rate from which the head stops dead; 0: it is braked to rest")
     turns_back_deg: NotNegative = Field(0.0, le=90.0, description="after every stop, within 3 s")
+    stop_spread_deg: NotNegative = Field(0.0, le=360.0, description="drawn up to so much more turning before each stop")
 
 
 class RoughStringSection(Section):

@@ -50,11 +50,12 @@ class StraightSection(Section):
 
 
 class SpiralSection(Section):
-    """A hole of one inclination whose azimuth turns evenly over its length."""
+    """A hole whose azimuth turns evenly over its length, and its inclination with it."""
 
     inclination_deg: float = Field(0.0, ge=0.0, le=90.0)
     azimuth_deg: Angle = 0.0
     turn_deg: Angle = Field(0.0, description="of the azimuth, from the collar to the last bit's depth")
+    build_deg: float = Field(0.0, ge=-90.0, le=90.0, description="of the inclination, likewise")
 
 
 class PathSection(Section):
@@ -526,10 +527,9 @@ def _hole(path: Path, section: PathSection, length: float) -> Borehole:
         )
     if section.spiral is not None:
         spiral = section.spiral
-        inclination, azimuth, turn = (
-            math.radians(angle) for angle in (spiral.inclination_deg, spiral.azimuth_deg, spiral.turn_deg)
-        )
-        return Borehole.spiral(inclination, azimuth, turn, max(length, 1.0))
+        turned = (spiral.inclination_deg, spiral.azimuth_deg, spiral.turn_deg, spiral.build_deg)
+        inclination, azimuth, turn, build = map(math.radians, turned)
+        return Borehole.spiral(inclination, azimuth, turn, max(length, 1.0), build)
     if section.straight is not None:
         straight = section.straight
         end = max(length, 1.0)

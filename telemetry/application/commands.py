@@ -233,6 +233,12 @@ COMMANDS: tuple[CommandSpec, ...] = (
         "ends the calibration; a block that a tube has stays there",
         action="cancel",
     ),
+    CommandSpec(
+        "recalibrate",
+        ObeyedBy.GROUND,
+        "proposes the accelerometer biases that the surveys of the hole show, in place of attitudes and `solve`",
+        action="surveys",
+    ),
 )
 NAMES = tuple(dict.fromkeys(spec.name for spec in COMMANDS))
 

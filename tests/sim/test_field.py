@@ -108,3 +108,15 @@ def test_a_row_says_what_it_saw() -> None:
     rms = float(np.degrees(np.sqrt(np.mean(found.error[found.resting] ** 2))))
     assert made["yaw_rms_rest_deg"] == pytest.approx(rms)
     assert made["unflagged_percent"] < 1.0
+
+
+@pytest.mark.slow
+def test_a_bent_hole_is_judged_by_its_surveys_at_the_ground_station() -> None:
+    """The node does not know what its string turns by, and its figures say so."""
+    (case,) = chosen_cases("transport")
+    made = row(case, [run_seed((dict(case.setup), seed)) for seed in (1, 2, 3, 4)])
+    assert made["nees_rest"] > 1e4
+    assert made["unflagged_percent"] == 100.0
+    assert made["azimuth_rms_deg"] < 0.1
+    assert made["azimuth_nees"] <= 1.5
+    assert made["reached"]

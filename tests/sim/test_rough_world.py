@@ -233,3 +233,24 @@ def test_one_seed_one_reading() -> None:
 def test_what_cannot_be_is_refused(sections: dict[str, dict[str, object]], message: str) -> None:
     with pytest.raises(ScenarioError, match=message):
         scenario_of({**SHORT, **sections})
+
+
+def test_a_driller_stops_anywhere_and_the_encoder_knows_where() -> None:
+    plain, spread = rough_world(), rough_world(drive={"stop_spread_deg": 360.0})
+    stops = [phase.end for phase in plain.phases if phase.kind == "stop"]
+    further = np.degrees(spread.truth(1).yaw(np.array(stops)) - plain.truth(1).yaw(np.array(stops)))
+    assert 0.0 < further[0] < 360.0
+    assert 0.0 < further[1] - further[0] < 360.0
+    assert further[1] - further[0] != pytest.approx(further[0], abs=1.0)
+    for at, turned in zip(stops, further.tolist(), strict=True):
+        counted = spread.encoder_sample(at)[0] - plain.encoder_sample(at)[0]
+        assert counted * 360.0 / 4096 == pytest.approx(turned, abs=0.1)
+    begin = [phase.start for phase in plain.phases if phase.kind == "drill"][:1]
+    np.testing.assert_array_equal(spread.truth(1).yaw(np.array(begin)), plain.truth(1).yaw(np.array(begin)))
+
+
+def test_a_spiral_builds_evenly() -> None:
+    hole = Borehole.spiral(math.radians(5.0), 0.0, math.radians(60.0), 30.0, math.radians(30.0))
+    middle, end = (np.degrees(hole.direction(md)) for md in (15.0, 30.0))
+    assert middle == pytest.approx([20.0, 30.0], abs=1e-9)
+    assert end == pytest.approx([35.0, 60.0], abs=1e-9)

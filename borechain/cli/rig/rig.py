@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import contextlib
 import json
+import math
 import sys
 import tempfile
 import time
@@ -399,6 +400,19 @@ def ground_settings(world: World) -> dict[str, Any]:
         "design_azimuth_deg": file.design.azimuth_deg,
         "column_radius": file.design.radius_m,
         "tolerance": file.design.tolerance,
+    } | transport_settings(world)
+
+
+def transport_settings(world: World) -> dict[str, Any]:
+    """What the operator enters where the string turns in a bent hole: that it does, and how the hole begins."""
+    rough = world.scenario.file.rough
+    if rough is None or rough.string.transport == "shortest":
+        return {}
+    inclination, azimuth = world.scenario.hole.direction(0.0)
+    return {
+        "string_transport": rough.string.transport,
+        "collar_inclination_deg": math.degrees(inclination),
+        "collar_azimuth_deg": math.degrees(azimuth),
     }
 
 

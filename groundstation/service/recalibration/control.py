@@ -14,6 +14,7 @@ from groundstation.errors import SelectorError
 from groundstation.service.recalibration.procedure import FieldProcedure
 from groundstation.service.recalibration.progress import Progress
 from groundstation.service.store import Store
+from groundstation.survey.force_biases import SurveyedBiases
 
 
 class Recalibration:
@@ -25,15 +26,22 @@ class Recalibration:
     store : where progress and blocks are kept
     folder : of the calibrations
     cancel_upload : ends the upload to a tube
+    biases : works out what the surveys of the hole tell of accelerometers
     """
 
     def __init__(
-        self, procedure: FieldProcedure, store: Store, folder: Path, cancel_upload: Callable[[int], None]
+        self,
+        procedure: FieldProcedure,
+        store: Store,
+        folder: Path,
+        cancel_upload: Callable[[int], None],
+        biases: Callable[[], SurveyedBiases],
     ) -> None:
         self.procedure = procedure
         self._store = store
         self._folder = folder
         self._cancel_upload = cancel_upload
+        self._biases = biases
         kept = store.progress()
         procedure.restore(Progress.from_json(kept) if kept else Progress(), store.blocks())
         self._kept = kept
@@ -58,6 +66,8 @@ class Recalibration:
                 procedure.attitude(arguments["pitch"], arguments["roll"], arguments["seconds"], rig_now)
             case "solve":
                 procedure.solve(datetime.datetime.now(datetime.UTC).date().isoformat(), rig_now)
+            case "surveys":
+                procedure.propose_biases(self._biases(), datetime.datetime.now(datetime.UTC).date().isoformat())
             case "confirm":
                 self._confirm(arguments["proposal"])
             case "cancel":

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import hashlib
 import math
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 
 from groundstation.calibration.errors import CalibrationError
@@ -25,7 +25,8 @@ from groundstation.service.recalibration.progress import (
     attitude_view,
     tube_view,
 )
-from groundstation.service.recalibration.solution import propose
+from groundstation.service.recalibration.solution import Proposal, propose, propose_bias
+from groundstation.survey.force_biases import SurveyedBiases
 from telemetry.messages import BlockStatus, NodeState, Reply, Scalar, StaticRecord, UploadPhase
 from telemetry.parameters import SHORT_HASH, ParameterBlock
 
@@ -84,7 +85,8 @@ class FieldProcedure:
             raise SelectorError(f"a calibration of tubes {_list(p.tubes)} is {p.stage}; expected action=cancel before")
         if not tubes:
             raise SelectorError("tubes: expected those of the string, no tube is known")
-        self.progress = Progress(Stage.COLLECTING, [], {tube: TubeProgress(tube) for tube in sorted(set(tubes))})
+        begun = {tube: TubeProgress(tube) for tube in sorted(set(tubes))}
+        self.progress = Progress(Stage.COLLECTING, [], begun, mixed=p.mixed)
         self._records.clear()
         self._again.clear()
         self._questions.clear()
@@ -115,11 +117,35 @@ class FieldProcedure:
             When no calibration is collecting, or no tube can be solved; the message has the reason of each.
         """
         self._expect(*BEFORE_UPLOAD)
-        p = self.progress
         self._leave(rig_now)
+        self._propose_all(lambda tube, before: propose(self._rests(tube), before, self._gravity, day))
+
+    def propose_biases(self, surveyed: SurveyedBiases, day: str) -> None:
+        """Propose blocks with the accelerometer biases that the surveys of the hole show.
+
+        Raises
+        ------
+        SelectorError
+            When no calibration has begun, attitudes were entered, or no tube has a bias; the message has the reason
+            of each.
+        """
+        self._expect(*BEFORE_UPLOAD)
+        if self.progress.attitudes:
+            raise SelectorError("expected no attitudes beside surveys; expected action=begin before")
+
+        def made(tube: TubeProgress, before: ParameterBlock) -> Proposal:
+            bias = surveyed.found.get(tube.tube)
+            if bias is None:
+                raise CalibrationError(surveyed.refused.get(tube.tube, "expected surveys below the collar, got none"))
+            return propose_bias(bias, before, self._gravity, day)
+
+        self._propose_all(made)
+
+    def _propose_all(self, made: Callable[[TubeProgress, ParameterBlock], Proposal]) -> None:
+        p = self.progress
         for tube in p.tubes.values():
             try:
-                self._propose(tube, day)
+                self._propose(tube, made)
             except CalibrationError as error:
                 tube.phase, tube.detail, tube.proposed, tube.found = Phase.REFUSED, str(error), "", None
         hashes = [block.sha256() for tube in p.tubes.values() if (block := tube.block) is not None]
@@ -222,8 +248,10 @@ class FieldProcedure:
             tube.phase, tube.restarted = Phase.CONFIRMED, True
             tube.hash_after_restart = self._whole_hash(tube, state.parameters_hash.hex())
 
-    def on_block_status(self, status: BlockStatus) -> None:
-        """Handle the last word on an upload."""
+    def on_block_status(self, status: BlockStatus, *, has_surveyed: bool = False) -> None:
+        """Handle the last word on an upload to a tube that has surveyed the hole before or has not."""
+        if status.phase is UploadPhase.APPLIED and has_surveyed and status.tube not in self.progress.mixed:
+            self.progress.mixed.append(status.tube)
         tube = self.progress.tubes.get(status.tube)
         if tube is None or tube.phase is not Phase.UPLOADING or (block := tube.block) is None:
             return
@@ -273,14 +301,14 @@ class FieldProcedure:
         attitudes = self.progress.attitudes
         return [Rest(attitudes[k].pitch, attitudes[k].roll, r) for k, r in sorted(self._good(tube).items())]
 
-    def _propose(self, tube: TubeProgress, day: str) -> None:
+    def _propose(self, tube: TubeProgress, made: Callable[[TubeProgress, ParameterBlock], Proposal]) -> None:
         before = self._before(tube)
         if before is None:
             raise CalibrationError(
                 f"block in use: expected one that this ground station has sent, got {tube.hash_before or 'no answer'}"
             )
-        made = propose(self._rests(tube), before, self._gravity, day)
-        tube.proposed, tube.found, tube.calibration = made.block.canonical().hex(), made.found, made.calibration
+        found = made(tube, before)
+        tube.proposed, tube.found, tube.calibration = found.block.canonical().hex(), found.found, found.calibration
         tube.phase, tube.detail = Phase.PROPOSED, ""
 
     def _before(self, tube: TubeProgress) -> ParameterBlock | None:

@@ -91,6 +91,7 @@ class Progress:
     attitudes: list[Attitude] = field(default_factory=list)
     tubes: dict[int, TubeProgress] = field(default_factory=dict)
     proposal: str = ""  # hash of all proposed blocks
+    mixed: list[int] = field(default_factory=list)  # tubes whose block was replaced after a survey of the hole
 
     def to_json(self) -> str:
         """Text for the database."""
@@ -109,7 +110,7 @@ class Progress:
             orders = {int(sequence): place for sequence, place in row["orders"].items()}
             tubes[int(name)] = TubeProgress(**row | {"phase": Phase(row["phase"]), "orders": orders, "found": found})
         attitudes = [Attitude(**row) for row in whole["attitudes"]]
-        return cls(Stage(whole["stage"]), attitudes, tubes, whole["proposal"])
+        return cls(Stage(whole["stage"]), attitudes, tubes, whole["proposal"], whole.get("mixed", []))
 
 
 def attitude_view(attitude: Attitude, number: int) -> View:

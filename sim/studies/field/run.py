@@ -15,7 +15,8 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from groundstation.survey.resolve import angles, resolve
+from groundstation.survey.resolve import angle_stds, angles, known, resolve
+from groundstation.survey.transport import carry
 from node.kernels.angles import wrap
 from sim.rig.direct_string import DirectString, StringRun
 from sim.studies.field.cases import ALL, BLOCKS, CASES, Case
@@ -23,7 +24,7 @@ from sim.studies.pool import Step, over_cores, seeded
 from sim.studies.scenarios import Tables
 from sim.world.scenario import scenario_of
 from sim.world.world import World
-from telemetry.messages import NodeFlag
+from telemetry.messages import NodeFlag, SurveyMeasurement
 
 Array = npt.NDArray[np.float64]
 Mask = npt.NDArray[np.bool_]
@@ -39,6 +40,7 @@ DOUBTS = (
     | NodeFlag.BIAS_UNKNOWN
 )
 FAULTS = ("gyro_saturated", "gyro_stuck", "gyro_step", "gyro_scale", "force_saturated", "force_stuck", "bad_sample")
+AZIMUTH = ("azimuth_error", "azimuth_std")
 NEES, UNFLAGGED, FALSE = 1.5, 0.01, 0.02  # to reach
 
 
@@ -53,7 +55,8 @@ class FieldRun:
     resting: Mask
     faults: dict[str, int]
     surveys: int
-    azimuth_error: Array  # (surveys,) rad
+    azimuth_error: Array  # (surveys,) rad, as the ground station has it
+    azimuth_std: Array  # (surveys,) rad, as it states it
 
 
 def steps(disturbance: str, seeds: int) -> int:
@@ -92,16 +95,26 @@ def judge(world: World, run: StringRun) -> FieldRun:
         if event.code in faults and event.tube == 1:
             faults[event.code] += 1
     surveys = [survey.measurement for survey in run.surveys if survey.tube == 1]
-    azimuth = world.scenario.hole.direction
-    errors = []
-    for survey in surveys:
-        mean = survey.imus[0]
-        direction = resolve(np.array(mean.force), np.array(mean.force_cov), survey.yaw, survey.yaw_var).direction
-        truth = azimuth(world.bit_depth(survey.station_at))[1]
-        errors.append(wrap(angles(direction.lean, direction.down)[1] - truth))
+    azimuth_error, azimuth_std = judge_azimuths(world, surveys)
     error, var = run.total_error[:, 0], run.total_var[:, 0]
     turning, resting = judged(world)
-    return FieldRun(error, var, told, turning, resting, faults, len(surveys), np.array(errors))
+    return FieldRun(error, var, told, turning, resting, faults, len(surveys), azimuth_error, azimuth_std)
+
+
+def judge_azimuths(world: World, surveys: Sequence[SurveyMeasurement]) -> tuple[Array, Array]:
+    """Errors and standard deviations (surveys,), rad, of what a ground station that knows its string makes of them."""
+    hole = world.scenario.hole
+    found = []
+    for one in surveys:
+        force, cov = np.array(one.imus[0].force), np.array(one.imus[0].force_cov)
+        found.append(resolve(force, cov, one.yaw, one.yaw_var + one.systematic_var).direction)
+    rough = world.scenario.file.rough
+    if rough is not None and rough.string.transport == "parallel" and found:
+        found = [carried.direction for carried in carry(known(*hole.direction(0.0)), found, range(len(found) + 1))]
+    true = [hole.direction(world.bit_depth(one.station_at))[1] for one in surveys]
+    azimuths = [angles(one.lean, one.down)[1] for one in found]
+    stds = [angle_stds(one.lean, one.down, one.total_cov)[1] for one in found]
+    return np.array([wrap(a - b) for a, b in zip(azimuths, true, strict=True)]), np.array(stds)
 
 
 def judged(world: World) -> tuple[Mask, Mask]:
@@ -123,7 +136,12 @@ def row(case: Case, runs: Sequence[FieldRun]) -> dict[str, Any]:
     faults = {code: float(np.mean([r.faults[code] for r in runs])) for code in FAULTS if code not in case.true_faults}
     surveys = float(np.mean([r.surveys for r in runs])) / BLOCKS
     others = sum(count for code, count in faults.items() if code not in ("gyro_step", "gyro_scale"))
-    worst = max(value for value in (nees_turning, nees_rest, 0.0) if math.isfinite(value))
+    azimuth_error, azimuth_std = (np.concatenate([getattr(r, name) for r in runs]) for name in AZIMUTH)
+    azimuth_nees = float(np.mean(azimuth_error**2 / azimuth_std**2)) if surveys else math.nan
+    judged_nees, lying = [nees_turning, nees_rest], unflagged
+    if case.by_ground:
+        judged_nees, lying = [azimuth_nees], float(np.mean(np.abs(azimuth_error) > SIGMAS * azimuth_std))
+    worst = max(value for value in (*judged_nees, 0.0) if math.isfinite(value))
     false = max(faults["gyro_step"], faults["gyro_scale"], others)
     return {
         "case": case.name,
@@ -137,11 +155,11 @@ def row(case: Case, runs: Sequence[FieldRun]) -> dict[str, Any]:
         "gyro_scale": faults["gyro_scale"],
         "other_faults": others,
         "surveys_percent": 100.0 * surveys,
-        "azimuth_rms_deg": math.degrees(math.sqrt(float(np.mean(np.concatenate([r.azimuth_error for r in runs]) ** 2))))
-        if surveys
-        else math.nan,
-        "reached": worst <= NEES and unflagged <= UNFLAGGED and false <= FALSE and surveys >= 1.0,
+        "azimuth_rms_deg": math.degrees(math.sqrt(float(np.mean(azimuth_error**2)))) if surveys else math.nan,
+        "azimuth_nees": azimuth_nees,
+        "reached": worst <= NEES and lying <= UNFLAGGED and false <= FALSE and surveys >= 1.0,
         "unseen": case.unseen,
+        "by_ground": case.by_ground,
     }
 
 
@@ -168,4 +186,6 @@ def verdicts(result: dict[str, Any]) -> list[str]:
         f"{FALSE:g} false faults a run and every survey"
     ]
     lines += [f"not reached: {name}" for name in missed if name not in unseen]
-    return lines + [f"not for one node to see: {name}" for name in unseen]
+    lines += [f"not for one node to see: {name}" for name in unseen]
+    by_ground = [(r["case"], r["azimuth_nees"]) for r in result["cases"] if r["by_ground"]]
+    return lines + [f"judged by its surveys at the ground station: {name}: NEES {nees:.2f}" for name, nees in by_ground]

@@ -1,0 +1,1 @@
+"""What the surveys of a string tell of the biases of its accelerometers."""
