@@ -22,16 +22,16 @@ from telemetry.media.can_loopback_protocol import INTERFACE
 from telemetry.media.isotp import Receiver, Sender
 from telemetry.media.port import STEPPER, Frame, Port, Priority, TubeEnd
 from telemetry.media.table import open_medium
+from telemetry.media.unwritten import Content
 from telemetry.messages import Message, Side
 from telemetry.presentation.can_messages import NATIVE, NativeMessage
-from telemetry.presentation.msgpack_codec import encode
+from telemetry.presentation.msgpack_codec import unwritten
 from telemetry.schema import SPEC_OF
-from telemetry.transport.hop import Header, pack_frame
+from telemetry.transport.hop import Header, LinkFrame, parse_frame
 
 EXCHANGES, ROUNDS = 100, 25
 PAYLOADS, DECODED = 20, 2000
 PATIENCE, TURN, TRIES = 60.0, 1.0, 10  # s
-AIDING_BYTES = len(encode(AIDING))
 NATIVE_AIDING = NATIVE[SPEC_OF[type(AIDING)].kind]
 context = multiprocessing.get_context("fork")  # before any thread is started
 
@@ -164,7 +164,7 @@ def ends(name: str) -> tuple[TubeEnd, TubeEnd]:
 def frame_of(number: int, sender: int) -> Frame:
     """The aiding as the link hands it to its port."""
     header = Header(sender, HEADER.epoch, number, *HEADER[3:])
-    return Frame(pack_frame(header, [(0, encode(AIDING))]), Priority.AIDING, "aiding")
+    return Frame(LinkFrame(header, [(0, unwritten(AIDING))]), Priority.AIDING, "aiding")
 
 
 @contextlib.contextmanager
@@ -209,7 +209,7 @@ class Pinger:
         self._number += 1
         self._port.send(frame_of(self._number, STEPPER))
 
-    def _on_frame(self, frame: bytes) -> None:
+    def _on_frame(self, frame: Content) -> None:
         if not holds_aiding(frame):
             return
         self._left -= 1
@@ -225,7 +225,7 @@ def echo_hop(where: str, name: str, ready: Any) -> None:
         port = medium.open_port(ends(name)[1])
         numbers = iter(range(1, 1 << 30))
 
-        def answer(frame: bytes) -> None:
+        def answer(frame: Content) -> None:
             if holds_aiding(frame):
                 port.send(frame_of(next(numbers), 1))
 
@@ -234,9 +234,10 @@ def echo_hop(where: str, name: str, ready: Any) -> None:
         threading.Event().wait()
 
 
-def holds_aiding(frame: bytes) -> bool:
+def holds_aiding(frame: Content) -> bool:
     """Whether a frame of the link is more than its header, which the native profile repeats every eighth time."""
-    return len(frame) > AIDING_BYTES
+    parsed = parse_frame(frame)
+    return parsed is not None and len(parsed[1]) > 0
 
 
 def ours_isotp() -> None:

@@ -27,6 +27,7 @@ from groundstation.service.watch import Watch
 from telemetry.application.endpoint import Endpoint
 from telemetry.application.seal_watch import SealWatch, refusal_of
 from telemetry.errors import DecodeError
+from telemetry.media.unwritten import Content
 from telemetry.messages import (
     BASE,
     EPOCH_UNKNOWN,
@@ -143,7 +144,7 @@ class GroundProcess(Process):
         self._restore_messages()
         self.model.crew_alarms.restore(self.store.alarms(), conditions_of(self.model))
 
-    def on_frame(self, side: Side, frame: bytes, now: float, margin: float = math.inf) -> None:
+    def on_frame(self, side: Side, frame: Content, now: float, margin: float = math.inf) -> None:
         """A frame arrived from the encoder."""
         self._send_pending(now)
         for received in self.endpoint.receive(side, frame, now, margin):

@@ -14,6 +14,7 @@ from node.process.counter import BootCounter
 from node.process.drivers.source import EncoderSource, SafeEncoder
 from telemetry.application.endpoint import Endpoint
 from telemetry.application.seal_watch import SealWatch
+from telemetry.media.unwritten import Content
 from telemetry.messages import ENCODER, Command, Event, Reply, Scalar, Severity, Side
 from telemetry.runtime.disk import MACHINE, Disk
 from telemetry.runtime.joint_watch import JointFault
@@ -74,7 +75,7 @@ class EncoderProcess(Process):
         if counter.fault:
             self._send_event(Severity.ERROR, "boot_counter_lost", {"detail": counter.fault[:200]})
 
-    def on_frame(self, side: Side, frame: bytes, now: float, margin: float = math.inf) -> None:
+    def on_frame(self, side: Side, frame: Content, now: float, margin: float = math.inf) -> None:
         """A frame arrived at one end; the encoder refuses commands."""
         for received in self.endpoint.receive(side, frame, now, margin):
             if isinstance(received.message, Command):

@@ -31,6 +31,7 @@ from node.process.survey_log import SurveyLog
 from telemetry.application.endpoint import REPORT_EVERY, Endpoint
 from telemetry.application.seal_watch import SealWatch
 from telemetry.errors import EncodeError
+from telemetry.media.unwritten import Content
 from telemetry.messages import (
     EPOCH_UNKNOWN,
     Aiding,
@@ -157,7 +158,7 @@ class TubeProcess(Process):
         """The filter of the node, one-element array of dtype ``STATE``."""
         return np.asarray(self.nodes["filter"])
 
-    def on_frame(self, side: Side, frame: bytes, now: float, margin: float = math.inf) -> None:
+    def on_frame(self, side: Side, frame: Content, now: float, margin: float = math.inf) -> None:
         """A frame arrived at one end (``now``: s, own clock), by radio with a ``margin`` (dB)."""
         self._now = now
         for received in self.endpoint.receive(side, frame, now, margin):

@@ -21,6 +21,7 @@ from sim.world.world import World
 from telemetry.application.endpoint import Endpoint
 from telemetry.media.neighbours import neighbour_ports
 from telemetry.media.port import Medium
+from telemetry.media.unwritten import Content
 from telemetry.media.zenoh_bus import open_router
 from telemetry.media.zenoh_port import ZenohMedium
 from telemetry.messages import BASE, ENCODER, NodeFlag, NodeState, Side, address_name
@@ -76,7 +77,7 @@ class Surface(Process):
         if not self.interrupted:
             await self._loop.run()
 
-    def on_frame(self, side: Side, frame: bytes, now: float, margin: float = math.inf) -> None:
+    def on_frame(self, side: Side, frame: Content, now: float, margin: float = math.inf) -> None:
         """A frame arrived from the encoder."""
         for received in self.endpoint.receive(side, frame, now, margin):
             state = received.message

@@ -19,6 +19,7 @@ from telemetry.media.can_timing import CLASSIC_LARGEST, BitRates
 from telemetry.media.isotp import FLOW, Receiver, Sender, TransferError
 from telemetry.media.port import MAX_FRAME, Frame, Priority
 from telemetry.media.send_queue import SendQueue
+from telemetry.media.unwritten import Content
 
 ACKNOWLEDGE_LIMIT = 0.1  # s; a frame takes 1.3 ms at 125 kbit/s
 PRESENCE_EVERY = 0.25  # s without any other acknowledged frame
@@ -194,7 +195,7 @@ class CanExchange:
         self._go_down()
         self._presence_is_due = True
 
-    def on_frame(self, bits: int, data: bytes, now: float) -> bytes | None:
+    def on_frame(self, bits: int, data: bytes, now: float) -> Content | None:
         """Take a frame of somebody else; returns the payload it completes. Garbage is counted."""
         self.traffic.add(len(data), now)
         payload = self._take(bits, data, now)
@@ -203,7 +204,7 @@ class CanExchange:
             return None
         return payload
 
-    def _take(self, bits: int, data: bytes, now: float) -> bytes | None:
+    def _take(self, bits: int, data: bytes, now: float) -> Content | None:
         urgency, type_, source = bits >> 26, bits >> 21 & 0x1F, bits >> 13 & 0xFF
         if urgency >= len(PRIORITIES):
             self.counters["unknown_identifier"] += 1
@@ -278,7 +279,7 @@ class CanExchange:
         if self.profile is None:
             split = Split([], frame.payload)
         else:
-            split = self.profile.split(frame.payload, fd=self.largest > CLASSIC_LARGEST)
+            split = self.profile.split(frame.content, fd=self.largest > CLASSIC_LARGEST)
             if split.rest is None and len(split.parts) == 1:
                 return part_data(split.parts[0], self.address)
         self._outgoing[frame.priority] = Outgoing(frame, split, self.largest, now)
@@ -292,7 +293,7 @@ class CanExchange:
             del self._outgoing[priority]
         return data
 
-    def _on_part(self, source: int, type_: int, part: int, data: bytes) -> bytes | None:
+    def _on_part(self, source: int, type_: int, part: int, data: bytes) -> Content | None:
         """Take a part of a message that has a form of its own."""
         if self.profile is None:
             self.counters["unknown_identifier"] += 1

@@ -34,6 +34,7 @@ from telemetry.media.can_profile import Profile
 from telemetry.media.can_timing import CLASSIC_LARGEST, BitRates
 from telemetry.media.port import Frame
 from telemetry.media.queued_port import QueuedPort
+from telemetry.media.unwritten import Content
 
 BUSY_LIMIT = 512  # frames that may wait while the other end takes them; fewer wait for one that is absent
 FIRST_PAUSE, LAST_PAUSE = 0.1, 5.0  # s, before a bus is opened again
@@ -81,8 +82,8 @@ class CanPort(QueuedPort):
         self._exchange = CanExchange(address, largest, self._queue, nonce, begun, profile, rates, is_stepped=is_stepped)
         self._log, self._limit = log, limit
         self._lock = threading.RLock()
-        self._deliver: Callable[[bytes], object] | None = None
-        self._unheard: deque[bytes] = deque(maxlen=UNHEARD_LIMIT)
+        self._deliver: Callable[[Content], object] | None = None
+        self._unheard: deque[Content] = deque(maxlen=UNHEARD_LIMIT)
         self._look_at = -math.inf
         self._pause, self._reopen_at = FIRST_PAUSE, math.inf
         self._thread = threading.Thread(target=self._run, name=f"can {name}", daemon=True)
@@ -99,7 +100,7 @@ class CanPort(QueuedPort):
             self._queue.limit = max(BUSY_LIMIT, self._limit) if self._exchange.is_up else self._limit
             return super().send(frame)
 
-    def listen(self, deliver: Callable[[bytes], object]) -> None:
+    def listen(self, deliver: Callable[[Content], object]) -> None:
         """Call ``deliver``, which never waits, on the port's thread for every frame that arrives."""
         with self._lock:
             while self._unheard:

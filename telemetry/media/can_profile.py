@@ -6,6 +6,7 @@ import importlib
 from typing import NamedTuple, Protocol, cast
 
 from telemetry.media.port import Priority
+from telemetry.media.unwritten import Content
 
 # name -> module with ``open_profile() -> Profile``; imported when it is asked for, for it stands above this room
 PROFILES = {"native": "telemetry.presentation.can_native"}
@@ -32,10 +33,10 @@ class Split(NamedTuple):
 class Profile(Protocol):
     """Forms of one end of a joint."""
 
-    def split(self, payload: bytes, *, fd: bool) -> Split:
+    def split(self, content: Content, *, fd: bool) -> Split:
         """Parts of a frame of the link that is to be sent."""
 
-    def join(self, source: int, type_: int, part: int, data: bytes) -> bytes | None:
+    def join(self, source: int, type_: int, part: int, data: bytes) -> Content | None:
         """Frame of the link that a part which arrived completes, or None while others are missing.
 
         Raises

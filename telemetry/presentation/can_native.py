@@ -10,13 +10,14 @@ from __future__ import annotations
 from telemetry.errors import DecodeError, EncodeError
 from telemetry.media.can_profile import NativePart, Split
 from telemetry.media.port import Priority
+from telemetry.media.unwritten import Content
 from telemetry.messages import Message
 from telemetry.presentation.can_forms import FD_PART
 from telemetry.presentation.can_messages import NATIVE
 from telemetry.presentation.can_signals import COUNT
-from telemetry.presentation.msgpack_codec import CODEC_OF, open_payload, values_of_opened
+from telemetry.presentation.msgpack_codec import CODEC_OF, UnwrittenMessage, open_payload, values_of_opened
 from telemetry.schema import SPEC_OF, Kind
-from telemetry.transport.hop import Header, pack_frame, parse_frame
+from telemetry.transport.hop import Header, LinkFrame, pack_frame, parse_frame
 
 PRIORITIES = {
     Kind.TIME_REQUEST: Priority.TIME,
@@ -45,18 +46,18 @@ class NativeProfile:
         self._count: dict[int, int] = {}  # of its frames so far
         self._parts: dict[int, dict[int, bytes]] = {}  # by type: parts of the message that is coming in
 
-    def split(self, payload: bytes, *, fd: bool) -> Split:
+    def split(self, content: Content, *, fd: bool) -> Split:
         """Parts of a frame of the link that is to be sent."""
-        parsed = parse_frame(payload)
+        parsed = parse_frame(content)
         if parsed is None:
-            return Split([], payload)
+            return Split([], bytes(content))
         header, entries = parsed
         parts: list[NativePart] = []
         rest: list[tuple[int, bytes]] = []
-        for number, content in entries:
-            frames = native_parts(content, header.number, fd=fd) if number == 0 else None
+        for number, payload in entries:
+            frames = native_parts(payload, header.number, fd=fd) if number == 0 else None
             if frames is None:
-                rest.append((number, content))
+                rest.append((number, bytes(payload)))
             else:
                 parts += frames
         # an acknowledgement alone is said again because the one before was not heard
@@ -65,7 +66,7 @@ class NativeProfile:
         self._told = header
         return Split(parts, pack_frame(header, rest))
 
-    def join(self, source: int, type_: int, part: int, data: bytes) -> bytes | None:
+    def join(self, source: int, type_: int, part: int, data: bytes) -> Content | None:
         """Frame of the link that a part which arrived completes, or None while others are missing.
 
         Raises
@@ -89,7 +90,8 @@ class NativeProfile:
         newest = self._count.get(source, 0)
         number = newest + (data[0] - newest + HALF & COUNT.largest) - HALF  # urgent frames come before older ones
         self._count[source] = max(newest, number)
-        return pack_frame(Header(source, epoch, max(number, 1), 0, 0, 0), [(0, CODEC_OF[type_].pack(values))])
+        header = Header(source, epoch, max(number, 1), 0, 0, 0)
+        return LinkFrame(header, [(0, UnwrittenMessage(CODEC_OF[type_], values))])
 
     def observe(self, payload: bytes) -> None:
         """See a frame of the link that came by ISO-TP: who sends in which boot and session, and how many so far."""
@@ -121,7 +123,7 @@ class NativeProfile:
         return [parts[k] for k in range(needed)]
 
 
-def native_parts(payload: bytes, count: int, *, fd: bool) -> list[NativePart] | None:
+def native_parts(payload: Content, count: int, *, fd: bool) -> list[NativePart] | None:
     """Frames of a cyclic message; None for one that only the tunnel carries."""
     try:
         opened = open_payload(payload)

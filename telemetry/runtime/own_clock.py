@@ -18,6 +18,7 @@ from functools import partial
 from typing import Any
 
 from telemetry.media.port import Port
+from telemetry.media.unwritten import Content
 from telemetry.messages import Side
 from telemetry.runtime.inbox import Mailbox
 from telemetry.runtime.joint_watch import JointWatch
@@ -261,11 +262,11 @@ class OwnClockLoop:
                 "does the neighbour run, and is it the right one?"
             )
 
-    def _on_frame(self, side: Side, frame: bytes) -> None:
+    def _on_frame(self, side: Side, frame: Content) -> None:
         if not (self._at_once and self._handle_at_once(side, frame)):
             self._inbox.put(lambda process, now: process.on_frame(side, frame, now))
 
-    def _handle_at_once(self, side: Side, frame: bytes) -> bool:
+    def _handle_at_once(self, side: Side, frame: Content) -> bool:
         """Handle a frame on the foreign thread that heard it; False where the loop has to.
 
         That thread never waits for the loop: its medium may need it for what the loop is sending.

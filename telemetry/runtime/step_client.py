@@ -18,6 +18,7 @@ from functools import partial
 
 from telemetry import keys
 from telemetry.media.port import Frame, Port
+from telemetry.media.unwritten import Content
 from telemetry.media.zenoh_bus import ZenohBus
 from telemetry.messages import Side, address_name
 from telemetry.runtime.inbox import Inbox
@@ -250,5 +251,5 @@ async def serve_stepped(process: Process, client: AsyncStepClient, report: Repor
         client.leave()
 
 
-def _put_frame(arrive: Callable[[Arrival], object], channel: int, frame: bytes) -> None:
-    arrive((channel, frame))
+def _put_frame(arrive: Callable[[Arrival], object], channel: int, frame: Content) -> None:
+    arrive((channel, bytes(frame)))
