@@ -13,7 +13,7 @@ from collections import Counter, deque
 from typing import NamedTuple
 
 from telemetry.errors import TelemetryError
-from telemetry.media.can_identifier import FLOW_CONTROL, PART_MASK, PRESENCE, PRIORITIES, TUNNEL, packed
+from telemetry.media.can_identifier import FLOW_CONTROL, PART_MASK, PRESENCE, PRIORITIES, SOURCE_SHIFT, TUNNEL, packed
 from telemetry.media.can_profile import NativePart, Profile, Split
 from telemetry.media.can_timing import CLASSIC_LARGEST, BitRates
 from telemetry.media.isotp import FLOW, Receiver, Sender, TransferError
@@ -55,7 +55,7 @@ class CanData(NamedTuple):
 
 def part_data(part: NativePart, address: int) -> CanData:
     """Frame of one part of a message."""
-    return CanData(packed(part.priority, part.type, address, part.part), part.data)
+    return CanData(part.identifier | address << SOURCE_SHIFT, part.data)
 
 
 class Outgoing:

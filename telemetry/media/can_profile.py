@@ -5,7 +5,6 @@ from __future__ import annotations
 import importlib
 from typing import NamedTuple, Protocol, cast
 
-from telemetry.media.port import Priority
 from telemetry.media.unwritten import Content
 
 # name -> module with ``open_profile() -> Profile``; imported when it is asked for, for it stands above this room
@@ -15,11 +14,9 @@ NAMES = (TUNNEL_ALONE, *PROFILES)
 
 
 class NativePart(NamedTuple):
-    """One frame of a message that has a form of its own."""
+    """One frame of a message that has a form of its own: its identifier but for who sends it, and its data."""
 
-    priority: Priority
-    type: int
-    part: int
+    identifier: int
     data: bytes
 
 

@@ -4,18 +4,15 @@ from __future__ import annotations
 
 
 class Unwritten:
-    """Something to say that knows its parts; its bytes are made once, when they are asked for.
+    """Something to say that knows its parts; its bytes are made once, when they are asked for."""
 
-    Parameters
-    ----------
-    most : bytes that it takes at most, so that a queue need not have it written to know that it has room
-    """
+    __slots__ = ("_written",)
+    _written: bytes | None  # None at first
 
-    __slots__ = ("_written", "most")
-
-    def __init__(self, most: int) -> None:
-        self.most = most
-        self._written: bytes | None = None
+    @property
+    def most(self) -> int:
+        """Bytes that it takes at most, so that a queue need not have it written to know that it has room."""
+        raise NotImplementedError
 
     def __bytes__(self) -> bytes:
         """Its bytes."""

@@ -8,6 +8,7 @@ signal can express goes by ISO-TP as well, so nothing is lost by the profile but
 from __future__ import annotations
 
 from telemetry.errors import DecodeError, EncodeError
+from telemetry.media.can_identifier import packed
 from telemetry.media.can_profile import NativePart, Split
 from telemetry.media.port import Priority
 from telemetry.media.unwritten import Content
@@ -15,7 +16,7 @@ from telemetry.messages import Message
 from telemetry.presentation.can_forms import FD_PART
 from telemetry.presentation.can_messages import NATIVE
 from telemetry.presentation.can_signals import COUNT
-from telemetry.presentation.msgpack_codec import CODEC_OF, UnwrittenMessage, open_payload, values_of_opened
+from telemetry.presentation.msgpack_codec import CODEC_OF, Opened, UnwrittenMessage, open_payload, values_of_opened
 from telemetry.schema import SPEC_OF, Kind
 from telemetry.transport.hop import Header, LinkFrame, pack_frame, parse_frame
 
@@ -30,10 +31,11 @@ HEADER_EVERY = 8  # frames
 BY_TYPE = {int(kind): native for kind, native in NATIVE.items()}
 HEADS = {
     kind: tuple(
-        [(PRIORITIES[kind], int(kind), layout.part) for layout in native.form(fd=fd).layouts] for fd in (False, True)
+        [packed(PRIORITIES[kind], int(kind), 0, layout.part) for layout in native.form(fd=fd).layouts]
+        for fd in (False, True)
     )
     for kind, native in NATIVE.items()
-}  # of each frame, on classic CAN and on CAN FD
+}  # identifiers of the frames but for who sends them, on classic CAN and on CAN FD
 HALF = (COUNT.largest + 1) // 2
 
 
@@ -126,14 +128,15 @@ class NativeProfile:
 def native_parts(payload: Content, count: int, *, fd: bool) -> list[NativePart] | None:
     """Frames of a cyclic message; None for one that only the tunnel carries."""
     try:
-        opened = open_payload(payload)
-        native = NATIVE.get(opened.kind)
+        said = payload if isinstance(payload, UnwrittenMessage) else open_payload(payload)
+        native = NATIVE.get(said.kind)
         if native is None:
             return None
-        frames = native.pack(values_of_opened(opened), count, fd=fd)
+        values = values_of_opened(said) if isinstance(said, Opened) else said.values
+        frames = native.pack(values, count, fd=fd)
     except (DecodeError, EncodeError):
         return None
-    return [NativePart(*head, data) for head, data in zip(HEADS[native.kind][fd], frames, strict=True)]
+    return list(map(NativePart, HEADS[native.kind][fd], frames))
 
 
 def rounded(message: Message) -> Message:

@@ -94,8 +94,18 @@ class UnwrittenMessage(Unwritten):
     __slots__ = ("codec", "values")
 
     def __init__(self, codec: MessageCodec, values: list[Any]) -> None:
-        super().__init__(MAX_PAYLOAD)
+        self._written = None
         self.codec, self.values = codec, values
+
+    @property
+    def most(self) -> int:
+        """Bytes that it takes at most."""
+        return MAX_PAYLOAD
+
+    @property
+    def kind(self) -> Kind:
+        """Kind of the message."""
+        return self.codec.kind
 
     def opened(self) -> Opened:
         """What ``open_payload`` finds in its payload."""

@@ -83,8 +83,13 @@ class LinkFrame(Unwritten):
     __slots__ = ("entries", "header")
 
     def __init__(self, header: Header, entries: Sequence[tuple[int, Content]]) -> None:
-        super().__init__(HEADER_BYTES + sum([ENTRY_BYTES + most_of(payload) for _, payload in entries]))
+        self._written = None
         self.header, self.entries = header, entries
+
+    @property
+    def most(self) -> int:
+        """Bytes that it takes at most."""
+        return HEADER_BYTES + sum([ENTRY_BYTES + most_of(payload) for _, payload in self.entries])
 
     def _write(self) -> bytes:
         return pack_frame(self.header, [(number, bytes(payload)) for number, payload in self.entries])

@@ -16,6 +16,9 @@ from messages_of_schema import MESSAGES
 
 from telemetry.application.can_load import Traffic, steady
 from telemetry.errors import DecodeError, EncodeError
+from telemetry.media.can_identifier import Identifier
+from telemetry.media.can_profile import NativePart
+from telemetry.media.unwritten import Content
 from telemetry.messages import Aiding, Command, Hello, Mode, NodeState, TimeReply, TimeRequest
 from telemetry.presentation.can_dbc import IDENTIFIER_MASK, dbc_text, differences, identifier_of, layouts
 from telemetry.presentation.can_forms import FD_PART
@@ -264,16 +267,23 @@ def test_an_acknowledgement_that_was_lost_is_said_again() -> None:
     assert lower.waiting == 0
 
 
+def type_and_part(part: NativePart) -> tuple[int, int]:
+    """What its identifier says of a part."""
+    identifier = Identifier.unpack(part.identifier)
+    assert identifier is not None
+    return identifier.type, identifier.part
+
+
 def carry(
     sender: HopLink, receiver: HopLink, out: NativeProfile, into: NativeProfile, now: float, *, fd: bool = True
 ) -> list[bytes]:
     """Payloads that arrive of all frames that are due."""
-    arrived: list[bytes] = []
+    arrived: list[Content] = []
     for frame in sender.take_frames(now):
-        split = out.split(frame.payload, fd=fd)
+        split = out.split(frame.content, fd=fd)
         for part in split.parts:
             try:
-                joined = into.join(sender._address, part.type, part.part, part.data)
+                joined = into.join(sender._address, *type_and_part(part), part.data)
             except DecodeError:
                 continue
             if joined is not None:
@@ -281,7 +291,7 @@ def carry(
         if split.rest is not None:
             into.observe(split.rest)
             arrived += receiver.receive(split.rest, now)
-    return arrived
+    return [bytes(payload) for payload in arrived]
 
 
 @pytest.mark.parametrize("fd", [True, False])
@@ -306,7 +316,7 @@ def test_only_the_signals_travel_while_there_is_no_news() -> None:
         upper.send_best_effort(encode(replace(AIDING, valid_at=1000.0 + k)), "aiding")
         (frame,) = upper.take_frames(2.0 + k)
         split = ours.split(frame.payload, fd=True)
-        assert [(part.type, part.part, len(part.data)) for part in split.parts] == [(1, FD_PART, 32)]
+        assert [(type_and_part(part), len(part.data)) for part in split.parts] == [((1, FD_PART), 32)]
         carried.append(split.rest is not None)
     assert sum(carried) <= 4
 
@@ -338,9 +348,9 @@ def test_parts_of_two_messages_are_not_put_together() -> None:
     assert first is not None
     assert second is not None
     profile.observe(header_of(2))
-    joined = [profile.join(2, part.type, part.part, part.data) for part in [*first[:2], *second]]
+    joined = [profile.join(2, *type_and_part(part), part.data) for part in [*first[:2], *second]]
     (whole,) = [frame for frame in joined if frame is not None]
-    parsed = parse_frame(whole)
+    parsed = parse_frame(bytes(whole))
     assert parsed is not None
     assert parsed[1] == [[0, encode(rounded(replace(AIDING, yaw=2.0)))]]
 
