@@ -279,7 +279,7 @@ class CanExchange:
         if self.profile is None:
             split = Split([], frame.payload)
         else:
-            split = self.profile.split(frame.content, fd=self.largest > CLASSIC_LARGEST)
+            split = self.profile.split(frame.content, now, fd=self.largest > CLASSIC_LARGEST)
             if split.rest is None and len(split.parts) == 1:
                 return part_data(split.parts[0], self.address)
         self._outgoing[frame.priority] = Outgoing(frame, split, self.largest, now)

@@ -30,8 +30,8 @@ class Split(NamedTuple):
 class Profile(Protocol):
     """Forms of one end of a joint."""
 
-    def split(self, content: Content, *, fd: bool) -> Split:
-        """Parts of a frame of the link that is to be sent."""
+    def split(self, content: Content, now: float, *, fd: bool) -> Split:
+        """Parts of a frame of the link that is to be sent at ``now`` (s)."""
 
     def join(self, source: int, type_: int, part: int, data: bytes) -> Content | None:
         """Frame of the link that a part which arrived completes, or None while others are missing.

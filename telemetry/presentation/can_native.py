@@ -7,6 +7,8 @@ signal can express goes by ISO-TP as well, so nothing is lost by the profile but
 
 from __future__ import annotations
 
+import math
+
 from telemetry.errors import DecodeError, EncodeError
 from telemetry.media.can_identifier import packed
 from telemetry.media.can_profile import NativePart, Split
@@ -27,7 +29,7 @@ PRIORITIES = {
     Kind.HELLO: Priority.HELLO,
     Kind.NODE_STATE: Priority.STATE,
 }
-HEADER_EVERY = 8  # frames
+HEADER_EVERY = 2.0  # s, after which an end that has lost it, or started anew, is told again
 BY_TYPE = {int(kind): native for kind, native in NATIVE.items()}
 HEADS = {
     kind: tuple(
@@ -44,12 +46,13 @@ class NativeProfile:
 
     def __init__(self) -> None:
         self._told: Header | None = None  # the newest header that went by ISO-TP
+        self._told_at = -math.inf  # s
         self._epoch: dict[int, int] = {}  # of each sender
         self._count: dict[int, int] = {}  # of its frames so far
         self._parts: dict[int, dict[int, bytes]] = {}  # by type: parts of the message that is coming in
 
-    def split(self, content: Content, *, fd: bool) -> Split:
-        """Parts of a frame of the link that is to be sent."""
+    def split(self, content: Content, now: float, *, fd: bool) -> Split:
+        """Parts of a frame of the link that is to be sent at ``now`` (s)."""
         parsed = parse_frame(content)
         if parsed is None:
             return Split([], bytes(content))
@@ -63,9 +66,9 @@ class NativeProfile:
             else:
                 parts += frames
         # an acknowledgement alone is said again because the one before was not heard
-        if parts and not rest and not self._is_news(header):
+        if parts and not rest and not self._is_news(header, now):
             return Split(parts, None)
-        self._told = header
+        self._told, self._told_at = header, now
         return Split(parts, pack_frame(header, rest))
 
     def join(self, source: int, type_: int, part: int, data: bytes) -> Content | None:
@@ -104,10 +107,10 @@ class NativeProfile:
                 self._epoch[header.sender], self._count[header.sender] = header.epoch, 0
             self._count[header.sender] = max(self._count[header.sender], header.number)
 
-    def _is_news(self, header: Header) -> bool:
+    def _is_news(self, header: Header, now: float) -> bool:
         """Whether the other end has to see the header; now and then it has to anyway, since one may be lost."""
         told = self._told
-        if told is None or header.number - told.number >= HEADER_EVERY:
+        if told is None or now - self._told_at >= HEADER_EVERY:
             return True
         return header[3:] != told[3:] or header[:2] != told[:2]
 
