@@ -25,13 +25,14 @@ from telemetry.media.table import open_medium
 from telemetry.media.unwritten import Content
 from telemetry.messages import Message, Side
 from telemetry.presentation.can_messages import NATIVE, NativeMessage
-from telemetry.presentation.msgpack_codec import unwritten
+from telemetry.presentation.msgpack_codec import encode, unwritten
 from telemetry.schema import SPEC_OF
-from telemetry.transport.hop import Header, LinkFrame, parse_frame
+from telemetry.transport.hop import Header, LinkFrame
 
 EXCHANGES, ROUNDS = 100, 25
 PAYLOADS, DECODED = 20, 2000
 PATIENCE, TURN, TRIES = 60.0, 1.0, 10  # s
+AIDING_BYTES = len(encode(AIDING))
 NATIVE_AIDING = NATIVE[SPEC_OF[type(AIDING)].kind]
 context = multiprocessing.get_context("fork")  # before any thread is started
 
@@ -235,9 +236,8 @@ def echo_hop(where: str, name: str, ready: Any) -> None:
 
 
 def holds_aiding(frame: Content) -> bool:
-    """Whether a frame of the link is more than its header, which the native profile repeats every eighth time."""
-    parsed = parse_frame(frame)
-    return parsed is not None and len(parsed[1]) > 0
+    """Whether a frame of the link is more than its header, which the native profile says again now and then."""
+    return bool(frame.entries) if isinstance(frame, LinkFrame) else len(frame) > AIDING_BYTES
 
 
 def ours_isotp() -> None:
