@@ -38,7 +38,7 @@ class SendQueue:
             return False
         if not self._replace(frame):
             self._waiting.append(frame)
-        if len(self._waiting) > self.limit:
+        while len(self._waiting) > self.limit:
             self._remove("dropped", [self._most_dispensable()])
         return True
 
