@@ -152,7 +152,7 @@ def moved(one: tuple[dict[str, Any], Path], other: tuple[dict[str, Any], Path]) 
 
 
 def yaws_of(folder: Path) -> dict[tuple[int, int], float]:
-    """Yaws (rad) of the surveys in the store of a run, by tube and place: an event more takes a number of the tube's."""
+    """Yaws (rad) of the surveys in the store of a run, by tube and place: an event more takes a number too."""
     with contextlib.closing(Store(f"sqlite:///{folder / 'state' / 'ground' / 'ground.sqlite'}")) as store:
         surveys = [stored.message for stored in store.messages() if isinstance(stored.message, SurveyMeasurement)]
     found: dict[tuple[int, int], float] = {}
