@@ -171,6 +171,7 @@ def wellbore(tmp_path_factory: pytest.TempPathFactory) -> tuple[dict[str, Any], 
 
 
 @pytest.mark.statistical
+@pytest.mark.timeout(LONG)
 @pytest.mark.parametrize("transport", ["zenoh", "can", "can-classic", "mixed"])
 def test_wellbore_1_is_the_same_over_every_medium(
     tmp_path: Path, transport: str, wellbore: tuple[dict[str, Any], Path]
