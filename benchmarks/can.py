@@ -22,12 +22,12 @@ from telemetry.media.can_loopback_protocol import INTERFACE
 from telemetry.media.isotp import Receiver, Sender
 from telemetry.media.port import STEPPER, Frame, Port, Priority, TubeEnd
 from telemetry.media.table import open_medium
-from telemetry.media.unwritten import Content
 from telemetry.messages import Message, Side
 from telemetry.presentation.can_messages import NATIVE, NativeMessage
 from telemetry.presentation.msgpack_codec import encode, unwritten
 from telemetry.schema import SPEC_OF
 from telemetry.transport.hop import Header, LinkFrame
+from telemetry.unwritten import Content
 
 EXCHANGES, ROUNDS = 100, 25
 PAYLOADS, DECODED = 20, 2000

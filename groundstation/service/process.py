@@ -27,7 +27,6 @@ from groundstation.service.watch import Watch
 from telemetry.application.endpoint import Endpoint
 from telemetry.application.seal_watch import SealWatch, refusal_of
 from telemetry.errors import DecodeError
-from telemetry.media.unwritten import Content
 from telemetry.messages import (
     BASE,
     EPOCH_UNKNOWN,
@@ -49,6 +48,7 @@ from telemetry.presentation.msgpack_codec import decode
 from telemetry.runtime.disk import MACHINE, Disk
 from telemetry.runtime.process import Process
 from telemetry.transport.authentication import read_key
+from telemetry.unwritten import Content
 
 if TYPE_CHECKING:
     from telemetry.application.seals import Seals

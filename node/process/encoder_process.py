@@ -14,12 +14,12 @@ from node.process.counter import BootCounter
 from node.process.drivers.source import EncoderSource, SafeEncoder
 from telemetry.application.endpoint import Endpoint
 from telemetry.application.seal_watch import SealWatch
-from telemetry.media.unwritten import Content
 from telemetry.messages import ENCODER, Command, Event, Reply, Scalar, Severity, Side
 from telemetry.runtime.disk import MACHINE, Disk
 from telemetry.runtime.joint_watch import JointFault
 from telemetry.runtime.process import Process
 from telemetry.runtime.timing import CycleTiming, Stage
+from telemetry.unwritten import Content
 
 if TYPE_CHECKING:
     from telemetry.application.seals import Seals

@@ -31,7 +31,6 @@ from node.process.survey_log import SurveyLog
 from telemetry.application.endpoint import REPORT_EVERY, Endpoint
 from telemetry.application.seal_watch import SealWatch
 from telemetry.errors import EncodeError
-from telemetry.media.unwritten import Content
 from telemetry.messages import (
     EPOCH_UNKNOWN,
     Aiding,
@@ -52,6 +51,7 @@ from telemetry.runtime.disk import MACHINE, Disk
 from telemetry.runtime.joint_watch import JointFault
 from telemetry.runtime.process import Process
 from telemetry.runtime.timing import CycleTiming, Stage
+from telemetry.unwritten import Content
 
 if TYPE_CHECKING:
     from telemetry.application.seals import Seals

@@ -17,11 +17,11 @@ from sim.rig.stepper import Acted, Answer, FrameEvent
 from telemetry import keys
 from telemetry.media.port import STEPPER, Frame, Port, TubeEnd
 from telemetry.media.table import open_medium
-from telemetry.media.unwritten import Content
 from telemetry.media.zenoh_bus import Publisher, ZenohBus
 from telemetry.messages import BASE, Side, address_name
 from telemetry.runtime.step_stream import StepListener, StepStream
 from telemetry.runtime.stepped import Due, DueEvent, pack_step, unpack_done
+from telemetry.unwritten import Content
 
 FRAME_TICK = 0.05  # wall s
 Arrival = tuple[str, int, int, bytes]  # what, address, side or whether it lives, payload

@@ -6,9 +6,9 @@ import math
 from typing import get_args
 
 from telemetry.application.endpoint import Endpoint
-from telemetry.media.unwritten import Content
 from telemetry.messages import BASE, Kept, Side
 from telemetry.runtime.process import Process
+from telemetry.unwritten import Content
 
 
 class PlainBase(Process):

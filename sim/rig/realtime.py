@@ -21,7 +21,6 @@ from sim.world.world import World
 from telemetry.application.endpoint import Endpoint
 from telemetry.media.neighbours import neighbour_ports
 from telemetry.media.port import Medium
-from telemetry.media.unwritten import Content
 from telemetry.media.zenoh_bus import open_router
 from telemetry.media.zenoh_port import ZenohMedium
 from telemetry.messages import BASE, ENCODER, NodeFlag, NodeState, Side, address_name
@@ -30,6 +29,7 @@ from telemetry.runtime.event_loop import stop_on_signals
 from telemetry.runtime.own_clock import OwnClock, OwnClockLoop
 from telemetry.runtime.process import Process
 from telemetry.runtime.timing import CycleTiming
+from telemetry.unwritten import Content
 
 TICKS = os.sysconf("SC_CLK_TCK")  # a second, of the CPU time in /proc
 COME_LIMIT = 60.0  # s, until every node was heard

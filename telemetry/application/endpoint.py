@@ -17,7 +17,6 @@ from telemetry.application.outbox import Outbox
 from telemetry.application.saved_state import SavedState, is_needed, pack_state, parse_state
 from telemetry.errors import DecodeError
 from telemetry.media.port import Frame, Priority
-from telemetry.media.unwritten import Content
 from telemetry.messages import (
     BASE,
     ENCODER,
@@ -51,6 +50,7 @@ from telemetry.presentation.msgpack_codec import (
 from telemetry.schema import Kind
 from telemetry.transport.hop import BUNDLE_LIMIT, HopLink
 from telemetry.transport.nearest import Nearest
+from telemetry.unwritten import Content
 
 if TYPE_CHECKING:
     from telemetry.application.seals import Seals

@@ -19,7 +19,7 @@ from telemetry.media.can_timing import CLASSIC_LARGEST, BitRates
 from telemetry.media.isotp import FLOW, Receiver, Sender, TransferError
 from telemetry.media.port import MAX_FRAME, Frame, Priority
 from telemetry.media.send_queue import SendQueue
-from telemetry.media.unwritten import Content
+from telemetry.unwritten import Content
 
 ACKNOWLEDGE_LIMIT = 0.1  # s; a frame takes 1.3 ms at 125 kbit/s
 PRESENCE_EVERY = 0.25  # s without any other acknowledged frame

@@ -34,7 +34,7 @@ from telemetry.media.can_profile import Profile
 from telemetry.media.can_timing import CLASSIC_LARGEST, BitRates
 from telemetry.media.port import Frame
 from telemetry.media.queued_port import QueuedPort
-from telemetry.media.unwritten import Content
+from telemetry.unwritten import Content
 
 BUSY_LIMIT = 512  # frames that may wait while the other end takes them; fewer wait for one that is absent
 FIRST_PAUSE, LAST_PAUSE = 0.1, 5.0  # s, before a bus is opened again

@@ -5,7 +5,7 @@ from __future__ import annotations
 import importlib
 from typing import NamedTuple, Protocol, cast
 
-from telemetry.media.unwritten import Content
+from telemetry.unwritten import Content
 
 # name -> module with ``open_profile() -> Profile``; imported when it is asked for, for it stands above this room
 PROFILES = {"native": "telemetry.presentation.can_native"}

@@ -13,8 +13,8 @@ from dataclasses import dataclass
 from enum import IntEnum
 from typing import NamedTuple, Protocol
 
-from telemetry.media.unwritten import Content, Unwritten
 from telemetry.messages import Side
+from telemetry.unwritten import Content, Unwritten
 
 MAX_FRAME = 16384  # bytes, largest frame of the hop link
 STEPPER = 254  # in place of a neighbour's address: whoever hands a stepped process its frames

@@ -13,7 +13,6 @@ from telemetry.errors import DecodeError, EncodeError
 from telemetry.media.can_identifier import packed
 from telemetry.media.can_profile import NativePart, Split
 from telemetry.media.port import Priority
-from telemetry.media.unwritten import Content
 from telemetry.messages import Message
 from telemetry.presentation.can_forms import FD_PART
 from telemetry.presentation.can_messages import NATIVE
@@ -21,6 +20,7 @@ from telemetry.presentation.can_signals import COUNT
 from telemetry.presentation.msgpack_codec import CODEC_OF, Opened, UnwrittenMessage, open_payload, values_of_opened
 from telemetry.schema import SPEC_OF, Kind
 from telemetry.transport.hop import Header, LinkFrame, pack_frame, parse_frame
+from telemetry.unwritten import Content
 
 PRIORITIES = {
     Kind.TIME_REQUEST: Priority.TIME,

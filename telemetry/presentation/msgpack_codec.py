@@ -12,7 +12,6 @@ from typing import Any, NamedTuple
 import msgpack
 
 from telemetry.errors import DecodeError, EncodeError
-from telemetry.media.unwritten import Content, Unwritten
 from telemetry.messages import BASE, SCHEMA_VERSION, Message
 from telemetry.presentation.compiled import (
     NO_TARGET,
@@ -27,6 +26,7 @@ from telemetry.presentation.compiled import (
 )
 from telemetry.presentation.fields import MAX_BINARY, codec_of
 from telemetry.schema import SCHEMA, U53, Kind, MessageSpec
+from telemetry.unwritten import Content, Unwritten
 
 MAX_PAYLOAD = 4096
 HIGHEST_ADDRESS = 255

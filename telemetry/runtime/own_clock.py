@@ -18,12 +18,12 @@ from functools import partial
 from typing import Any
 
 from telemetry.media.port import Port
-from telemetry.media.unwritten import Content
 from telemetry.messages import Side
 from telemetry.runtime.inbox import Mailbox
 from telemetry.runtime.joint_watch import JointWatch
 from telemetry.runtime.process import Process
 from telemetry.runtime.timing import CycleTiming, Stage
+from telemetry.unwritten import Content
 
 FRAMES_TOGETHER = 16  # taken before what they made is sent, while more wait
 ABSENT_LIMIT = 60.0  # s without a neighbour until that is reported

@@ -7,9 +7,9 @@ from typing import Any
 
 from telemetry.application.endpoint import Endpoint
 from telemetry.media.port import Frame
-from telemetry.media.unwritten import Content
 from telemetry.messages import Side
 from telemetry.runtime.joint_watch import JointFault
+from telemetry.unwritten import Content
 
 
 class Process:

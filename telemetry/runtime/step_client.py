@@ -18,13 +18,13 @@ from functools import partial
 
 from telemetry import keys
 from telemetry.media.port import Frame, Port
-from telemetry.media.unwritten import Content
 from telemetry.media.zenoh_bus import ZenohBus
 from telemetry.messages import Side, address_name
 from telemetry.runtime.inbox import Inbox
 from telemetry.runtime.process import Process
 from telemetry.runtime.step_stream import StepStream
 from telemetry.runtime.stepped import Due, DueEvent, Sent, pack_done, run_step, unpack_step
+from telemetry.unwritten import Content
 
 ABSENT_LIMIT = 60.0  # wall s without a first step until that is reported
 UP_LIMIT, UP_TICK = 5.0, 0.001  # wall s that the other end of a port may take to be there, and between two looks

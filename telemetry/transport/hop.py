@@ -19,8 +19,8 @@ from typing import Any, NamedTuple
 import msgpack
 
 from telemetry.media.port import MAX_FRAME, Frame, Priority
-from telemetry.media.unwritten import Content, Unwritten
 from telemetry.transport.nearest import Nearest
+from telemetry.unwritten import Content, Unwritten
 
 VERSION = 1
 WINDOW = 64

@@ -18,7 +18,6 @@ from telemetry.application.can_load import Traffic, steady
 from telemetry.errors import DecodeError, EncodeError
 from telemetry.media.can_identifier import Identifier
 from telemetry.media.can_profile import NativePart
-from telemetry.media.unwritten import Content
 from telemetry.messages import Aiding, Command, Hello, Mode, NodeState, TimeReply, TimeRequest
 from telemetry.presentation.can_dbc import IDENTIFIER_MASK, dbc_text, differences, identifier_of, layouts
 from telemetry.presentation.can_forms import FD_PART
@@ -34,6 +33,7 @@ from telemetry.presentation.can_signals import Scale
 from telemetry.presentation.msgpack_codec import encode, open_payload, values_of_opened
 from telemetry.schema import Kind
 from telemetry.transport.hop import HopLink, parse_frame
+from telemetry.unwritten import Content
 
 DBC = Path(__file__).parents[2] / "docs" / "borechain.dbc"
 AIDING = Aiding(1.0, 2e-6, 3e-7, -0.3, 1.24, 1234.56789, 7 << 32 | 5, 3, 480.0, 1e-5, True)
