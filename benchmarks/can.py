@@ -24,9 +24,10 @@ from telemetry.media.port import STEPPER, Frame, Port, Priority, TubeEnd
 from telemetry.media.table import open_medium
 from telemetry.messages import Message, Side
 from telemetry.presentation.can_messages import NATIVE, NativeMessage
-from telemetry.presentation.msgpack_codec import encode
+from telemetry.presentation.msgpack_codec import encode, unwritten
 from telemetry.schema import SPEC_OF
-from telemetry.transport.hop import Header, pack_frame
+from telemetry.transport.hop import Header, LinkFrame
+from telemetry.unwritten import Content
 
 EXCHANGES, ROUNDS = 100, 25
 PAYLOADS, DECODED = 20, 2000
@@ -164,7 +165,7 @@ def ends(name: str) -> tuple[TubeEnd, TubeEnd]:
 def frame_of(number: int, sender: int) -> Frame:
     """The aiding as the link hands it to its port."""
     header = Header(sender, HEADER.epoch, number, *HEADER[3:])
-    return Frame(pack_frame(header, [(0, encode(AIDING))]), Priority.AIDING, "aiding")
+    return Frame(LinkFrame(header, [(0, unwritten(AIDING))]), Priority.AIDING, "aiding")
 
 
 @contextlib.contextmanager
@@ -209,7 +210,7 @@ class Pinger:
         self._number += 1
         self._port.send(frame_of(self._number, STEPPER))
 
-    def _on_frame(self, frame: bytes) -> None:
+    def _on_frame(self, frame: Content) -> None:
         if not holds_aiding(frame):
             return
         self._left -= 1
@@ -225,7 +226,7 @@ def echo_hop(where: str, name: str, ready: Any) -> None:
         port = medium.open_port(ends(name)[1])
         numbers = iter(range(1, 1 << 30))
 
-        def answer(frame: bytes) -> None:
+        def answer(frame: Content) -> None:
             if holds_aiding(frame):
                 port.send(frame_of(next(numbers), 1))
 
@@ -234,9 +235,9 @@ def echo_hop(where: str, name: str, ready: Any) -> None:
         threading.Event().wait()
 
 
-def holds_aiding(frame: bytes) -> bool:
-    """Whether a frame of the link is more than its header, which the native profile repeats every eighth time."""
-    return len(frame) > AIDING_BYTES
+def holds_aiding(frame: Content) -> bool:
+    """Whether a frame of the link is more than its header, which the native profile says again now and then."""
+    return bool(frame.entries) if isinstance(frame, LinkFrame) else len(frame) > AIDING_BYTES
 
 
 def ours_isotp() -> None:

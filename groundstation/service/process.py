@@ -48,6 +48,7 @@ from telemetry.presentation.msgpack_codec import decode
 from telemetry.runtime.disk import MACHINE, Disk
 from telemetry.runtime.process import Process
 from telemetry.transport.authentication import read_key
+from telemetry.unwritten import Content
 
 if TYPE_CHECKING:
     from telemetry.application.seals import Seals
@@ -143,7 +144,7 @@ class GroundProcess(Process):
         self._restore_messages()
         self.model.crew_alarms.restore(self.store.alarms(), conditions_of(self.model))
 
-    def on_frame(self, side: Side, frame: bytes, now: float, margin: float = math.inf) -> None:
+    def on_frame(self, side: Side, frame: Content, now: float, margin: float = math.inf) -> None:
         """A frame arrived from the encoder."""
         self._send_pending(now)
         for received in self.endpoint.receive(side, frame, now, margin):

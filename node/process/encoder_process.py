@@ -19,6 +19,7 @@ from telemetry.runtime.disk import MACHINE, Disk
 from telemetry.runtime.joint_watch import JointFault
 from telemetry.runtime.process import Process
 from telemetry.runtime.timing import CycleTiming, Stage
+from telemetry.unwritten import Content
 
 if TYPE_CHECKING:
     from telemetry.application.seals import Seals
@@ -74,7 +75,7 @@ class EncoderProcess(Process):
         if counter.fault:
             self._send_event(Severity.ERROR, "boot_counter_lost", {"detail": counter.fault[:200]})
 
-    def on_frame(self, side: Side, frame: bytes, now: float, margin: float = math.inf) -> None:
+    def on_frame(self, side: Side, frame: Content, now: float, margin: float = math.inf) -> None:
         """A frame arrived at one end; the encoder refuses commands."""
         for received in self.endpoint.receive(side, frame, now, margin):
             if isinstance(received.message, Command):

@@ -51,6 +51,7 @@ from telemetry.runtime.disk import MACHINE, Disk
 from telemetry.runtime.joint_watch import JointFault
 from telemetry.runtime.process import Process
 from telemetry.runtime.timing import CycleTiming, Stage
+from telemetry.unwritten import Content
 
 if TYPE_CHECKING:
     from telemetry.application.seals import Seals
@@ -157,7 +158,7 @@ class TubeProcess(Process):
         """The filter of the node, one-element array of dtype ``STATE``."""
         return np.asarray(self.nodes["filter"])
 
-    def on_frame(self, side: Side, frame: bytes, now: float, margin: float = math.inf) -> None:
+    def on_frame(self, side: Side, frame: Content, now: float, margin: float = math.inf) -> None:
         """A frame arrived at one end (``now``: s, own clock), by radio with a ``margin`` (dB)."""
         self._now = now
         for received in self.endpoint.receive(side, frame, now, margin):

@@ -21,6 +21,7 @@ from telemetry.media.zenoh_bus import Publisher, ZenohBus
 from telemetry.messages import BASE, Side, address_name
 from telemetry.runtime.step_stream import StepListener, StepStream
 from telemetry.runtime.stepped import Due, DueEvent, pack_step, unpack_done
+from telemetry.unwritten import Content
 
 FRAME_TICK = 0.05  # wall s
 Arrival = tuple[str, int, int, bytes]  # what, address, side or whether it lives, payload
@@ -44,13 +45,17 @@ class FarEnds:
         self.close()
         for side, end in self._ends.items():
             port = self._opened.enter_context(open_medium(self._media[side])).open_port(end)
-            port.listen(partial(arrive, side))
+            port.listen(partial(_hand_bytes, arrive, side))
             self.ports[side] = port
 
     def close(self) -> None:
         """Leave them."""
         self.ports.clear()
         self._opened.close()
+
+
+def _hand_bytes(arrive: Callable[[Side, bytes], object], side: Side, frame: Content) -> None:
+    arrive(side, bytes(frame))
 
 
 class Seat:

@@ -8,6 +8,7 @@ from typing import get_args
 from telemetry.application.endpoint import Endpoint
 from telemetry.messages import BASE, Kept, Side
 from telemetry.runtime.process import Process
+from telemetry.unwritten import Content
 
 
 class PlainBase(Process):
@@ -19,7 +20,7 @@ class PlainBase(Process):
             tuple[int, int], tuple[Kept, float]
         ] = {}  # by tube and sequence: what came, when (own clock)
 
-    def on_frame(self, side: Side, frame: bytes, now: float, margin: float = math.inf) -> None:
+    def on_frame(self, side: Side, frame: Content, now: float, margin: float = math.inf) -> None:
         """A frame arrived from the encoder."""
         for received in self.endpoint.receive(side, frame, now, margin):
             message = received.message

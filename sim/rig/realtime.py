@@ -29,6 +29,7 @@ from telemetry.runtime.event_loop import stop_on_signals
 from telemetry.runtime.own_clock import OwnClock, OwnClockLoop
 from telemetry.runtime.process import Process
 from telemetry.runtime.timing import CycleTiming
+from telemetry.unwritten import Content
 
 TICKS = os.sysconf("SC_CLK_TCK")  # a second, of the CPU time in /proc
 COME_LIMIT = 60.0  # s, until every node was heard
@@ -76,7 +77,7 @@ class Surface(Process):
         if not self.interrupted:
             await self._loop.run()
 
-    def on_frame(self, side: Side, frame: bytes, now: float, margin: float = math.inf) -> None:
+    def on_frame(self, side: Side, frame: Content, now: float, margin: float = math.inf) -> None:
         """A frame arrived from the encoder."""
         for received in self.endpoint.receive(side, frame, now, margin):
             state = received.message

@@ -73,18 +73,23 @@ def frame_bytes(message: Message, profile: str, *, fd: bool, sealed: bool = Fals
 
 
 def duration(message: Message, profile: str, rates: BitRates, *, fd: bool, sealed: bool = False) -> float:
-    """Bus time of a message, s; of the native profile with its share of the headers that go by ISO-TP."""
-    own = sum(rates.duration(length, fd=fd) for length in frame_bytes(message, profile, fd=fd, sealed=sealed))
+    """Bus time of a message, s."""
+    return sum(rates.duration(length, fd=fd) for length in frame_bytes(message, profile, fd=fd, sealed=sealed))
+
+
+def headers(profile: str, rates: BitRates, *, fd: bool, sealed: bool = False) -> float:
+    """Share of its time that the bus is busy with the headers that both ends of the native profile say again."""
     if sealed or profile == "tunnel":
-        return own
+        return 0.0
     header = frame_lengths(len(pack_frame(HEADER, [])), FD_LARGEST if fd else CLASSIC_LARGEST)
-    return own + sum(rates.duration(length, fd=fd) for length in header) / HEADER_EVERY
+    return 2.0 * sum(rates.duration(length, fd=fd) for length in header) / HEADER_EVERY
 
 
 def load(traffic: list[Traffic], profile: str, rates: BitRates, *, fd: bool, sealed: bool = False) -> float:
     """Share of its time that the bus is busy, signs of life included; over 1: it cannot carry that."""
     messages = sum(t.rate * duration(t.message, profile, rates, fd=fd, sealed=sealed) for t in traffic)
-    return messages + presences(traffic, profile) * rates.duration(PRESENCE_BYTES, fd=fd)
+    signs = presences(traffic, profile) * rates.duration(PRESENCE_BYTES, fd=fd)
+    return messages + headers(profile, rates, fd=fd, sealed=sealed) + signs
 
 
 def presences(traffic: list[Traffic], profile: str) -> float:

@@ -45,10 +45,12 @@ from telemetry.presentation.msgpack_codec import (
     decode_opened,
     encode,
     open_payload,
+    unwritten,
 )
 from telemetry.schema import Kind
 from telemetry.transport.hop import BUNDLE_LIMIT, HopLink
 from telemetry.transport.nearest import Nearest
+from telemetry.unwritten import Content
 
 if TYPE_CHECKING:
     from telemetry.application.seals import Seals
@@ -172,7 +174,7 @@ class Endpoint:
         if side in self._links:
             self._links[side].bundle_limit = min(limit, BUNDLE_LIMIT)
 
-    def receive(self, side: Side, frame: bytes, now: float, margin: float = math.inf) -> list[Received]:
+    def receive(self, side: Side, frame: Content, now: float, margin: float = math.inf) -> list[Received]:
         """Take a frame from one end, heard with a ``margin`` (dB); returns the messages for this process.
 
         Garbage is counted.
@@ -182,7 +184,7 @@ class Endpoint:
             self.counters["no_such_end"] += 1
             return []
         if self.seals is not None:
-            opened = self.seals.joints[side].open(frame, now)
+            opened = self.seals.joints[side].open(bytes(frame), now)
             if opened is None:
                 return []
             frame = opened
@@ -221,7 +223,7 @@ class Endpoint:
             self._send_hello(now if is_news else now + HELLO_WAIT)
         if self._sync_side in self._links and now >= self._sync_at + self._sync_pace():
             self._sync_at = now
-            self._links[self._sync_side].send_best_effort(encode(TimeRequest(now)), Kind.TIME_REQUEST, Priority.TIME)
+            self._links[self._sync_side].send_best_effort(unwritten(TimeRequest(now)), Kind.TIME_REQUEST, Priority.TIME)
         self._send_kept(now)
         self._send_due(self._commands, Side.LOWER, now)
 
@@ -254,7 +256,7 @@ class Endpoint:
         if self.seals is not None and self.address == ENCODER:
             aiding = self.seals.measurement.close(aiding)
         if Side.LOWER in self._links:
-            self._links[Side.LOWER].send_best_effort(encode(aiding), Kind.AIDING, Priority.AIDING)
+            self._links[Side.LOWER].send_best_effort(unwritten(aiding), Kind.AIDING, Priority.AIDING)
             self._links[Side.LOWER].release()
 
     def ask_time(self, now: float) -> None:
@@ -268,7 +270,7 @@ class Endpoint:
             below = self._links.get(Side.LOWER)
             wait = STATE_WAIT + HOP_WAIT * max(WAITING_HOPS - self.hops, 0)
             until = now + wait if below is not None and below.is_up(now) else now
-            payload = self._sealed(encode(state))
+            payload = unwritten(state) if self.seals is None else self._sealed(encode(state))
             link.send_with_others(payload, (Kind.NODE_STATE, state.tube), Priority.STATE, until)
 
     def submit(self, message: Kept, now: float) -> None:
@@ -387,8 +389,8 @@ class Endpoint:
             self._outbox.keep_payload(sequence, payload, -math.inf, needed=needed)
         self._answered.update(saved.answered)
 
-    def _handle(self, side: Side, payload: bytes, now: float) -> Message | None:
-        opened = open_payload(payload if self.seals is None else self.seals.content(payload))
+    def _handle(self, side: Side, payload: Content, now: float) -> Message | None:
+        opened = open_payload(payload if self.seals is None else self.seals.content(bytes(payload)))
         kind = opened.kind
         if kind in ONE_HOP:
             return self._handle_one_hop(side, decode_opened(opened), now)
@@ -407,7 +409,7 @@ class Endpoint:
                 var = min(clock.variance(now), 1e9)
                 rig_now = clock.rig_from_local(now)
                 reply = TimeReply(message.asked_at, now, now, rig_now, clock.rig_rate, var, clock.epoch)
-                self._links[side].send_best_effort(encode(reply), Kind.TIME_REPLY, Priority.TIME)
+                self._links[side].send_best_effort(unwritten(reply), Kind.TIME_REPLY, Priority.TIME)
             case TimeReply() if side is self._sync_side:
                 self.clock.exchange(message, now)
         return None
@@ -427,7 +429,7 @@ class Endpoint:
             self.hops = hops
             self._hello_at = -math.inf
 
-    def _handle_upward(self, opened: Opened, payload: bytes, now: float) -> Message | None:
+    def _handle_upward(self, opened: Opened, payload: Content, now: float) -> Message | None:
         if opened.kind is Kind.DEPTH_READING:
             raise DecodeError("depth reading: expected on its own key")
         if self.address != BASE:
@@ -441,7 +443,7 @@ class Endpoint:
             self._commands.settle(message.sequence)
         return message
 
-    def _handle_downward(self, opened: Opened, payload: bytes, now: float) -> Message | None:
+    def _handle_downward(self, opened: Opened, payload: Content, now: float) -> Message | None:
         if opened.target != self.address:
             self._pass(Side.LOWER, opened, payload)
             return None
@@ -454,13 +456,13 @@ class Endpoint:
             return None
         return message
 
-    def _heard(self, opened: Opened, payload: bytes, now: float) -> Message | None:
+    def _heard(self, opened: Opened, payload: Content, now: float) -> Message | None:
         """Message of a tube to the base, None where its seal is not to be believed."""
         seals = self.seals
         if seals is None:
             return decode_opened(opened)
         tube = opened.origin
-        heard = seals.hear(payload, tube, now)
+        heard = seals.hear(bytes(payload), tube, now)
         self._send_offers()
         if not heard.is_believed:
             return None
@@ -469,13 +471,13 @@ class Endpoint:
         message = decode_opened(opened)
         return message if seals.is_of(message, tube) else None
 
-    def _told(self, opened: Opened, payload: bytes, now: float) -> Message | None:
+    def _told(self, opened: Opened, payload: Content, now: float) -> Message | None:
         """Message of the base to this tube, None where its seal is not to be believed or it was for the seals alone."""
         seals = self.seals
         if seals is None:
             message = decode_opened(opened)
             return None if isinstance(message, SessionOffer) else message
-        if not seals.is_told(payload, now, is_offer=opened.kind is Kind.SESSION_OFFER):
+        if not seals.is_told(bytes(payload), now, is_offer=opened.kind is Kind.SESSION_OFFER):
             return None
         message = decode_opened(opened)
         if not seals.is_of(message, self.address):
@@ -521,13 +523,13 @@ class Endpoint:
         else:
             self.counters["foreign_receipts"] += 1
 
-    def _pass(self, side: Side, opened: Opened, payload: bytes) -> None:
+    def _pass(self, side: Side, opened: Opened, payload: Content) -> None:
         """Hand on the very bytes that came."""
         link = self._links.get(side)
         if link is None:
             self.counters["nowhere_to_go"] += 1
         elif opened.kind in RELIABLE:
-            link.send_reliable(payload, PRIORITIES[opened.kind])
+            link.send_reliable(bytes(payload), PRIORITIES[opened.kind])
         else:
             link.send_best_effort(payload, (opened.kind, opened.origin), PRIORITIES[opened.kind])
             if opened.kind is Kind.NODE_STATE:
@@ -536,7 +538,7 @@ class Endpoint:
     def _send_hello(self, until: float) -> None:
         for link in self._links.values():
             hello = Hello(self.address, self.boot_count, self.hops, self.mode, link.quality)
-            link.send_with_others(encode(hello), Kind.HELLO, Priority.HELLO, until)
+            link.send_with_others(unwritten(hello), Kind.HELLO, Priority.HELLO, until)
 
     def _nearest(self, side: Side) -> Nearest | None:
         """Who is chosen at an end; base station and encoder are joined by a cable, where one alone is heard."""

@@ -191,7 +191,7 @@ class Seals:
         for frame in frames:
             payload = joint.close(frame.payload)
             if payload is not None:
-                sealed.append(frame._replace(payload=payload))
+                sealed.append(frame._replace(content=payload))
         return sealed
 
     def advance(self, now: float) -> None:

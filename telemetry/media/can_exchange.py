@@ -13,17 +13,19 @@ from collections import Counter, deque
 from typing import NamedTuple
 
 from telemetry.errors import TelemetryError
-from telemetry.media.can_identifier import FLOW_CONTROL, PART_MASK, PRESENCE, PRIORITIES, TUNNEL, packed
+from telemetry.media.can_identifier import FLOW_CONTROL, PART_MASK, PRESENCE, PRIORITIES, SOURCE_SHIFT, TUNNEL, packed
 from telemetry.media.can_profile import NativePart, Profile, Split
 from telemetry.media.can_timing import CLASSIC_LARGEST, BitRates
 from telemetry.media.isotp import FLOW, Receiver, Sender, TransferError
 from telemetry.media.port import MAX_FRAME, Frame, Priority
 from telemetry.media.send_queue import SendQueue
+from telemetry.unwritten import Content
 
 ACKNOWLEDGE_LIMIT = 0.1  # s; a frame takes 1.3 ms at 125 kbit/s
 PRESENCE_EVERY = 0.25  # s without any other acknowledged frame
 STEPPED_LIMIT = 60.0  # s, instead of the limits above and below where a stepper waits for every frame
 FLOW_LIMIT = 1.0  # s, that a receiver may take to answer, and a sender between two frames (N_Bs, N_Cr)
+PAUSE_LIMIT = 0.5  # s, that a transfer may stand still before it begins anew: its receiver has not given it up by then
 HEAVY = 0.55  # share of a bus beyond which node states wait; what goes on anyway brings it to 0.6 at most
 MEMORY = 1.0  # s, of the mean load
 BUDGETS = {
@@ -54,7 +56,7 @@ class CanData(NamedTuple):
 
 def part_data(part: NativePart, address: int) -> CanData:
     """Frame of one part of a message."""
-    return CanData(packed(part.priority, part.type, address, part.part), part.data)
+    return CanData(part.identifier | address << SOURCE_SHIFT, part.data)
 
 
 class Outgoing:
@@ -178,7 +180,7 @@ class CanExchange:
         self._acknowledged_at = -math.inf
         self._heard_at = -math.inf
         self._presence_is_due = True
-        self._answers: deque[CanData] = deque(maxlen=len(Priority))
+        self._answers: dict[Priority, CanData] = {}  # of receivers, to senders that wait for them
         self._outgoing: dict[Priority, Outgoing] = {}
         self._incoming: dict[Priority, Incoming] = {}
 
@@ -188,13 +190,18 @@ class CanExchange:
         self._acknowledged_at = now
         self.is_up = not self.is_mute
 
+    def is_alone(self, now: float) -> bool:
+        """Whether nobody has been there for some time, or ever."""
+        return not self.is_up and now - self._acknowledged_at > SILENCE
+
     def on_refused(self) -> None:
         """The controller took no frame, or has forgotten it."""
         self._in_flight_since = None
         self._go_down()
+        self._put_back()
         self._presence_is_due = True
 
-    def on_frame(self, bits: int, data: bytes, now: float) -> bytes | None:
+    def on_frame(self, bits: int, data: bytes, now: float) -> Content | None:
         """Take a frame of somebody else; returns the payload it completes. Garbage is counted."""
         self.traffic.add(len(data), now)
         payload = self._take(bits, data, now)
@@ -203,7 +210,7 @@ class CanExchange:
             return None
         return payload
 
-    def _take(self, bits: int, data: bytes, now: float) -> bytes | None:
+    def _take(self, bits: int, data: bytes, now: float) -> Content | None:
         urgency, type_, source = bits >> 26, bits >> 21 & 0x1F, bits >> 13 & 0xFF
         if urgency >= len(PRIORITIES):
             self.counters["unknown_identifier"] += 1
@@ -227,14 +234,17 @@ class CanExchange:
         since = self._in_flight_since
         if since is not None and now - since > self._acknowledge_limit:
             self._go_down()
+            if now - since > PAUSE_LIMIT:
+                self._put_back()
         for priority, outgoing in list(self._outgoing.items()):
             if outgoing.awaits_flow and now - outgoing.moved_at > self._flow_limit:
                 self.counters["no_flow_control"] += 1
                 del self._outgoing[priority]
-        for incoming in self._incoming.values():
+        for priority, incoming in self._incoming.items():
             if incoming.receiver.is_open and now - incoming.moved_at > self._flow_limit:
                 self.counters["interrupted"] += 1
                 incoming.receiver.abandon()
+                self._answers.pop(priority, None)
 
     def next_frame(self, now: float) -> CanData | None:
         """The frame to hand to the controller now; None while it has one, or when nothing is to be sent."""
@@ -253,7 +263,7 @@ class CanExchange:
         if not self.is_up:
             return None
         if self._answers:
-            return self._answers.popleft()
+            return self._answers.pop(min(self._answers))
         whole = self._start(now) if len(self.queue) else None
         if whole is not None or not self._outgoing:
             return whole
@@ -278,7 +288,7 @@ class CanExchange:
         if self.profile is None:
             split = Split([], frame.payload)
         else:
-            split = self.profile.split(frame.payload, fd=self.largest > CLASSIC_LARGEST)
+            split = self.profile.split(frame.content, now, fd=self.largest > CLASSIC_LARGEST)
             if split.rest is None and len(split.parts) == 1:
                 return part_data(split.parts[0], self.address)
         self._outgoing[frame.priority] = Outgoing(frame, split, self.largest, now)
@@ -292,7 +302,7 @@ class CanExchange:
             del self._outgoing[priority]
         return data
 
-    def _on_part(self, source: int, type_: int, part: int, data: bytes) -> bytes | None:
+    def _on_part(self, source: int, type_: int, part: int, data: bytes) -> Content | None:
         """Take a part of a message that has a form of its own."""
         if self.profile is None:
             self.counters["unknown_identifier"] += 1
@@ -313,7 +323,7 @@ class CanExchange:
             self.counters[str(error)] += 1
         if (answer := incoming.receiver.flow) is not None:
             incoming.receiver.flow = None
-            self._answers.append(CanData(packed(priority, FLOW_CONTROL, self.address), answer))
+            self._answers[priority] = CanData(packed(priority, FLOW_CONTROL, self.address), answer)
         if payload is not None and self.profile is not None:
             self.profile.observe(payload)
         return payload
@@ -331,16 +341,22 @@ class CanExchange:
             del self._outgoing[priority]
 
     def _go_down(self) -> None:
-        """Nobody is there: what was on its way waits again where it must not be lost."""
+        """Nobody is there: what must not be lost stands still on its way, the rest of what was on it is forgotten.
+
+        A machine at work may do nothing for as long, and then goes on where it was.
+        """
         self.is_up = False
-        self._answers.clear()
-        for outgoing in self._outgoing.values():
-            if outgoing.frame.topic is None:
-                self.queue.put_back(outgoing.frame)
-            else:
+        for priority, outgoing in list(self._outgoing.items()):
+            if outgoing.frame.topic is not None:
                 self.counters["interrupted"] += 1
-        self._outgoing.clear()
+                del self._outgoing[priority]
         self.queue.forget_outdated()
+
+    def _put_back(self) -> None:
+        """What was on its way waits again, to begin anew."""
+        for outgoing in self._outgoing.values():
+            self.queue.put_back(outgoing.frame)
+        self._outgoing.clear()
 
     def _is_partner(self, source: int, now: float) -> bool:
         """Whether this is the other end of the joint; a third talker is not heard while that one is."""
@@ -359,5 +375,6 @@ class CanExchange:
         if theirs > (now - self._begun, self._nonce):
             self.is_mute = True
             self._go_down()
+            self._put_back()
         else:
             self._presence_is_due = True

@@ -13,6 +13,7 @@ EVERYBODY = 255
 # types of the message kinds are their numbers (``telemetry.schema.Kind``); those of the medium itself stand above
 PRESENCE, FLOW_CONTROL, TUNNEL = 29, 30, 31
 PART_MASK = 0x1F
+SOURCE_SHIFT = 13
 PRIORITIES = tuple(Priority)
 
 
@@ -35,9 +36,10 @@ class Identifier(NamedTuple):
         priority = bits >> 26
         if priority >= len(PRIORITIES):
             return None
-        return cls(PRIORITIES[priority], bits >> 21 & 0x1F, bits >> 13 & 0xFF, bits & PART_MASK, bits >> 5 & 0xFF)
+        source, destination = bits >> SOURCE_SHIFT & 0xFF, bits >> 5 & 0xFF
+        return cls(PRIORITIES[priority], bits >> 21 & 0x1F, source, bits & PART_MASK, destination)
 
 
 def packed(priority: int, type_: int, source: int, part: int = 0, destination: int = EVERYBODY) -> int:
     """The 29 bits of an identifier of these parts."""
-    return priority << 26 | type_ << 21 | source << 13 | destination << 5 | part
+    return priority << 26 | type_ << 21 | source << SOURCE_SHIFT | destination << 5 | part

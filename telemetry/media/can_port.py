@@ -34,10 +34,12 @@ from telemetry.media.can_profile import Profile
 from telemetry.media.can_timing import CLASSIC_LARGEST, BitRates
 from telemetry.media.port import Frame
 from telemetry.media.queued_port import QueuedPort
+from telemetry.unwritten import Content
 
 BUSY_LIMIT = 512  # frames that may wait while the other end takes them; fewer wait for one that is absent
 FIRST_PAUSE, LAST_PAUSE = 0.1, 5.0  # s, before a bus is opened again
 UNHEARD_LIMIT = 64  # payloads kept until ``listen``
+LOOK_LIMIT = 0.5  # s, after which an arrival is taken to have been read where others never cease
 OpenBus = Callable[[], can.BusABC]
 
 
@@ -79,11 +81,11 @@ class CanPort(QueuedPort):
         nonce = random.getrandbits(32)
         begun = time.monotonic()
         self._exchange = CanExchange(address, largest, self._queue, nonce, begun, profile, rates, is_stepped=is_stepped)
-        self._log, self._limit = log, limit
+        self._log, self._limit, self._busy_limit = log, limit, max(BUSY_LIMIT, limit)
         self._lock = threading.RLock()
-        self._deliver: Callable[[bytes], object] | None = None
-        self._unheard: deque[bytes] = deque(maxlen=UNHEARD_LIMIT)
-        self._look_at = -math.inf
+        self._deliver: Callable[[Content], object] | None = None
+        self._unheard: deque[Content] = deque(maxlen=UNHEARD_LIMIT)
+        self._looked_at = -math.inf
         self._pause, self._reopen_at = FIRST_PAUSE, math.inf
         self._thread = threading.Thread(target=self._run, name=f"can {name}", daemon=True)
         self._thread.start()
@@ -96,10 +98,10 @@ class CanPort(QueuedPort):
     def send(self, frame: Frame) -> bool:
         """Send a frame now, or as soon as the other end is there."""
         with self._lock:
-            self._queue.limit = max(BUSY_LIMIT, self._limit) if self._exchange.is_up else self._limit
+            self._queue.limit = self._limit if self._exchange.is_alone(time.monotonic()) else self._busy_limit
             return super().send(frame)
 
-    def listen(self, deliver: Callable[[bytes], object]) -> None:
+    def listen(self, deliver: Callable[[Content], object]) -> None:
         """Call ``deliver``, which never waits, on the port's thread for every frame that arrives."""
         with self._lock:
             while self._unheard:
@@ -127,6 +129,7 @@ class CanPort(QueuedPort):
             self._pump(time.monotonic())
 
     def _run(self) -> None:
+        asked = time.monotonic()
         while not self._closed:
             if self._controller is None:
                 time.sleep(TICK)
@@ -141,7 +144,9 @@ class CanPort(QueuedPort):
                 now = time.monotonic()
                 if arrival is not None:
                     self._on_arrival(*arrival, now)
+                self._look(asked if arrival is None else now - LOOK_LIMIT)
                 self._pump(now)
+            asked = now
 
     def _on_arrival(self, identifier: int, data: bytes, now: float) -> None:
         kind = identifier & ~IDENTIFIER  # what the flags say that it is
@@ -163,11 +168,17 @@ class CanPort(QueuedPort):
         elif error_class & ERROR_CONTROLLER and data[1:2] and data[1] & RX_OVERFLOW:
             self.counters["receive_overruns"] += 1
 
+    def _look(self, read_until: float) -> None:
+        """Let time pass up to when (s) all that the controller had is known to have been read.
+
+        What is missing may lie there unread, where this thread had no time to read it.
+        """
+        if read_until >= self._looked_at:
+            self._looked_at = read_until + TICK
+            self._exchange.advance(read_until)
+
     def _pump(self, now: float) -> None:
         """Hand the controller its next frame."""
-        if now >= self._look_at:
-            self._look_at = now + TICK
-            self._exchange.advance(now)
         if self._controller is None or self._closed:
             return
         frame = self._exchange.next_frame(now)

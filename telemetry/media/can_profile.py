@@ -5,7 +5,7 @@ from __future__ import annotations
 import importlib
 from typing import NamedTuple, Protocol, cast
 
-from telemetry.media.port import Priority
+from telemetry.unwritten import Content
 
 # name -> module with ``open_profile() -> Profile``; imported when it is asked for, for it stands above this room
 PROFILES = {"native": "telemetry.presentation.can_native"}
@@ -14,11 +14,9 @@ NAMES = (TUNNEL_ALONE, *PROFILES)
 
 
 class NativePart(NamedTuple):
-    """One frame of a message that has a form of its own."""
+    """One frame of a message that has a form of its own: its identifier but for who sends it, and its data."""
 
-    priority: Priority
-    type: int
-    part: int
+    identifier: int
     data: bytes
 
 
@@ -32,10 +30,10 @@ class Split(NamedTuple):
 class Profile(Protocol):
     """Forms of one end of a joint."""
 
-    def split(self, payload: bytes, *, fd: bool) -> Split:
-        """Parts of a frame of the link that is to be sent."""
+    def split(self, content: Content, now: float, *, fd: bool) -> Split:
+        """Parts of a frame of the link that is to be sent at ``now`` (s)."""
 
-    def join(self, source: int, type_: int, part: int, data: bytes) -> bytes | None:
+    def join(self, source: int, type_: int, part: int, data: bytes) -> Content | None:
         """Frame of the link that a part which arrived completes, or None while others are missing.
 
         Raises

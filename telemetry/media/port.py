@@ -14,6 +14,7 @@ from enum import IntEnum
 from typing import NamedTuple, Protocol
 
 from telemetry.messages import Side
+from telemetry.unwritten import Content, Unwritten
 
 MAX_FRAME = 16384  # bytes, largest frame of the hop link
 STEPPER = 254  # in place of a neighbour's address: whoever hands a stepped process its frames
@@ -36,14 +37,26 @@ class Frame(NamedTuple):
 
     Parameters
     ----------
-    payload : the bytes on the wire
+    content : the bytes on the wire, or what they are made of where a medium asks for them
     priority : class of its most urgent content
     topic : best effort: a newer frame of the same topic replaces one that still waits; None: must not be lost
     """
 
-    payload: bytes
+    content: Content
     priority: Priority = Priority.SURVEY
     topic: Hashable | None = None
+
+    @property
+    def payload(self) -> bytes:
+        """The bytes on the wire."""
+        return bytes(self.content)
+
+    def is_larger_than(self, largest: int) -> bool:
+        """Whether it takes more bytes than that."""
+        content = self.content
+        if isinstance(content, Unwritten) and content.most <= largest:
+            return False
+        return len(content) > largest
 
 
 @dataclass(frozen=True, slots=True)
@@ -107,7 +120,7 @@ class Port(Protocol):
             When the port is closed or the bus is lost.
         """
 
-    def listen(self, deliver: Callable[[bytes], object]) -> None:
+    def listen(self, deliver: Callable[[Content], object]) -> None:
         """Call ``deliver``, which must never wait, for every frame that arrives; maybe on another thread."""
 
     def close(self) -> None:

@@ -33,12 +33,12 @@ class SendQueue:
 
     def offer(self, frame: Frame) -> bool:
         """Put a frame in; returns False for one that is too large."""
-        if len(frame.payload) > self.largest:
+        if frame.is_larger_than(self.largest):
             self.counters["too_large"] += 1
             return False
         if not self._replace(frame):
             self._waiting.append(frame)
-        if len(self._waiting) > self.limit:
+        while len(self._waiting) > self.limit:
             self._remove("dropped", [self._most_dispensable()])
         return True
 

@@ -5,8 +5,10 @@ Callbacks arrive on zenoh's own threads; a callback must only put into a queue o
 
 from __future__ import annotations
 
+import ctypes
 import json
 import os
+import threading
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass
@@ -138,7 +140,12 @@ class ZenohBus:
 
     def subscribe_at_once(self, pattern: str, callback: Callable[[str, bytes], object]) -> Subscription:
         """Call ``callback`` on the receiving thread itself, so it must only put into a queue."""
-        direct: Any = zenoh.handlers.Callback(lambda s: callback(str(s.key_expr), s.payload.to_bytes()), indirect=False)
+
+        def take(sample: Any) -> None:
+            stay_known()
+            callback(str(sample.key_expr), sample.payload.to_bytes())
+
+        direct: Any = zenoh.handlers.Callback(take, indirect=False)
         return Subscription(self._session.declare_subscriber(pattern, direct))
 
     def hear(self, key: str, callback: Callable[[bytes], object]) -> Subscription:
@@ -146,7 +153,12 @@ class ZenohBus:
 
         It may put, but what is ``droppable`` alone: that thread may be the one which empties the line.
         """
-        direct: Any = zenoh.handlers.Callback(lambda s: callback(s.payload.to_bytes()), indirect=False)
+
+        def take(sample: Any) -> None:
+            stay_known()
+            callback(sample.payload.to_bytes())
+
+        direct: Any = zenoh.handlers.Callback(take, indirect=False)
         return Subscription(self._session.declare_subscriber(key, direct))
 
     def queryable_kept(self, pattern: str, handler: Callable[[Query], object]) -> None:
@@ -192,6 +204,27 @@ class ZenohBus:
         self._declared.clear()
         with suppress(zenoh.ZError):
             self._session.close()  # type: ignore[no-untyped-call]
+
+
+class KnownThread(threading.local):
+    """Whether the interpreter keeps the state of this thread."""
+
+    here = False
+
+
+known_thread = KnownThread()
+
+
+def stay_known() -> None:
+    """Have the interpreter keep what it knows of this foreign thread, from within its first callback on.
+
+    It makes a state for each callback of a thread that it did not start and drops it at the end: memory of the system's
+    for the frames of its functions, taken and given back each time. One claim that is never given back keeps the state
+    for as long as the process lives; zenoh's threads are few and live as long.
+    """
+    if not known_thread.here:
+        known_thread.here = True
+        ctypes.pythonapi.PyGILState_Ensure()
 
 
 def use_few_threads() -> None:

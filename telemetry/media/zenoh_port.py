@@ -9,7 +9,7 @@ from pathlib import Path
 
 from telemetry import keys
 from telemetry.media.credentials import credentials_for
-from telemetry.media.port import TubeEnd
+from telemetry.media.port import Frame, TubeEnd
 from telemetry.media.queued_port import QueuedPort
 from telemetry.media.zenoh_bus import Subscription, ZenohBus, open_client
 
@@ -42,6 +42,16 @@ class ZenohPort(QueuedPort):
         self._answering = bus.publisher(send_key, encoding=FRAMES, droppable=True)
         self._publisher.watch()
         self._subscription: Subscription | None = None
+
+    def send(self, frame: Frame) -> bool:
+        """Send a frame now, or as soon as the other end is there."""
+        if len(self._queue) or self._closed or not self._publisher.is_heard:
+            return super().send(frame)
+        payload = frame.payload  # as nearly always: nothing waits, and nothing has to
+        if len(payload) > self._queue.largest:
+            return super().send(frame)
+        (self._answering if hearing.now else self._publisher).put(payload)
+        return True
 
     def listen(self, deliver: Callable[[bytes], object]) -> None:
         """Call ``deliver``, which never waits, on a foreign thread for every frame that arrives."""

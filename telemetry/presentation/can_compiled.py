@@ -54,7 +54,8 @@ def packer_of(fields: Sequence[tuple[Field, Sequence[Signal]]], rounded: Sequenc
     data = [
         f"({' | '.join(of)}).to_bytes({layout.length}, 'little')" for of, layout in zip(bits, form.layouts, strict=True)
     ]
-    packer: Packer = compiled([*lines, f"return [{', '.join(data)}]"], {"log10": math.log10}, [], "values, count")
+    space = {f"kind_of_v{k}": field.enumeration for k, (field, _) in enumerate(fields)} | {"log10": math.log10}
+    packer: Packer = compiled([*lines, f"return [{', '.join(data)}]"], space, [], "values, count")
     return packer
 
 
@@ -95,7 +96,7 @@ def guard(v: str, field: Field, signals: Sequence[Signal]) -> list[str]:
         axes = [f"{v}_{n}" for n in range(3)]
         within = " and ".join(f"{low!r} <= {axis} <= {high!r}" for axis in axes)
         return [
-            f"if type({v}) is not list or len({v}) != 3:",
+            f"if type({v}) not in (list, tuple) or len({v}) != 3:",
             OTHERWISE,
             f"{', '.join(axes)} = {v}",
             f"if not (type({axes[0]}) is type({axes[1]}) is type({axes[2]}) is float and {within}):",
@@ -104,6 +105,8 @@ def guard(v: str, field: Field, signals: Sequence[Signal]) -> list[str]:
     if signals[0].scale in (Scale.LINEAR, Scale.INTEGER):
         low, high = max(low, signals[0].lowest_value), min(high, signals[0].highest_value)
     right = RIGHT[field.kind].format(v=v, low=low, high=high)
+    if field.enumeration is not None:  # a member as well as its number
+        right = f"(type({v}) is int or type({v}) is kind_of_{v}) and {low!r} <= {v} <= {high!r}"
     halves = (
         [f"{v}_0, {v}_1 = {v}[:{int(high) // 2}], {v}[{int(high) // 2}:]"] if field.kind is ValueKind.BINARY else []
     )

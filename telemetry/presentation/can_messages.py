@@ -7,7 +7,6 @@ msgpack and goes as signals, or the other way round, need not become an object b
 
 from __future__ import annotations
 
-import contextlib
 from collections.abc import Callable, Sequence
 from functools import cached_property, partial
 from operator import add, attrgetter, itemgetter
@@ -106,10 +105,12 @@ class NativeMessage:
         DecodeError
             When a frame has another length, or a value is outside the range of the schema; named.
         """
-        with contextlib.suppress(ValueError):  # of a member that an enumeration has not
+        try:
             values = self.unpackers[fd](frames)
-            if values is not None:
-                return values
+        except ValueError:  # of a member that an enumeration has not
+            values = None
+        if values is not None:
+            return values
         return self.values_of(self.form(fd=fd).unpack(frames))
 
     def form(self, *, fd: bool) -> Form:

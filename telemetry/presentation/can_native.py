@@ -7,16 +7,20 @@ signal can express goes by ISO-TP as well, so nothing is lost by the profile but
 
 from __future__ import annotations
 
+import math
+
 from telemetry.errors import DecodeError, EncodeError
+from telemetry.media.can_identifier import packed
 from telemetry.media.can_profile import NativePart, Split
 from telemetry.media.port import Priority
 from telemetry.messages import Message
 from telemetry.presentation.can_forms import FD_PART
 from telemetry.presentation.can_messages import NATIVE
 from telemetry.presentation.can_signals import COUNT
-from telemetry.presentation.msgpack_codec import CODEC_OF, open_payload, values_of_opened
+from telemetry.presentation.msgpack_codec import CODEC_OF, Opened, UnwrittenMessage, open_payload, values_of_opened
 from telemetry.schema import SPEC_OF, Kind
-from telemetry.transport.hop import Header, pack_frame, parse_frame
+from telemetry.transport.hop import Header, LinkFrame, pack_frame, parse_frame
+from telemetry.unwritten import Content
 
 PRIORITIES = {
     Kind.TIME_REQUEST: Priority.TIME,
@@ -25,14 +29,15 @@ PRIORITIES = {
     Kind.HELLO: Priority.HELLO,
     Kind.NODE_STATE: Priority.STATE,
 }
-HEADER_EVERY = 8  # frames
+HEADER_EVERY = 2.0  # s, after which an end that has lost it, or started anew, is told again
 BY_TYPE = {int(kind): native for kind, native in NATIVE.items()}
 HEADS = {
     kind: tuple(
-        [(PRIORITIES[kind], int(kind), layout.part) for layout in native.form(fd=fd).layouts] for fd in (False, True)
+        [packed(PRIORITIES[kind], int(kind), 0, layout.part) for layout in native.form(fd=fd).layouts]
+        for fd in (False, True)
     )
     for kind, native in NATIVE.items()
-}  # of each frame, on classic CAN and on CAN FD
+}  # identifiers of the frames but for who sends them, on classic CAN and on CAN FD
 HALF = (COUNT.largest + 1) // 2
 
 
@@ -41,31 +46,32 @@ class NativeProfile:
 
     def __init__(self) -> None:
         self._told: Header | None = None  # the newest header that went by ISO-TP
+        self._told_at = -math.inf  # s
         self._epoch: dict[int, int] = {}  # of each sender
         self._count: dict[int, int] = {}  # of its frames so far
         self._parts: dict[int, dict[int, bytes]] = {}  # by type: parts of the message that is coming in
 
-    def split(self, payload: bytes, *, fd: bool) -> Split:
-        """Parts of a frame of the link that is to be sent."""
-        parsed = parse_frame(payload)
+    def split(self, content: Content, now: float, *, fd: bool) -> Split:
+        """Parts of a frame of the link that is to be sent at ``now`` (s)."""
+        parsed = parse_frame(content)
         if parsed is None:
-            return Split([], payload)
+            return Split([], bytes(content))
         header, entries = parsed
         parts: list[NativePart] = []
         rest: list[tuple[int, bytes]] = []
-        for number, content in entries:
-            frames = native_parts(content, header.number, fd=fd) if number == 0 else None
+        for number, payload in entries:
+            frames = native_parts(payload, header.number, fd=fd) if number == 0 else None
             if frames is None:
-                rest.append((number, content))
+                rest.append((number, bytes(payload)))
             else:
                 parts += frames
         # an acknowledgement alone is said again because the one before was not heard
-        if parts and not rest and not self._is_news(header):
+        if parts and not rest and not self._is_news(header, now):
             return Split(parts, None)
-        self._told = header
+        self._told, self._told_at = header, now
         return Split(parts, pack_frame(header, rest))
 
-    def join(self, source: int, type_: int, part: int, data: bytes) -> bytes | None:
+    def join(self, source: int, type_: int, part: int, data: bytes) -> Content | None:
         """Frame of the link that a part which arrived completes, or None while others are missing.
 
         Raises
@@ -89,7 +95,8 @@ class NativeProfile:
         newest = self._count.get(source, 0)
         number = newest + (data[0] - newest + HALF & COUNT.largest) - HALF  # urgent frames come before older ones
         self._count[source] = max(newest, number)
-        return pack_frame(Header(source, epoch, max(number, 1), 0, 0, 0), [(0, CODEC_OF[type_].pack(values))])
+        header = Header(source, epoch, max(number, 1), 0, 0, 0)
+        return LinkFrame(header, [(0, UnwrittenMessage(CODEC_OF[type_], values))])
 
     def observe(self, payload: bytes) -> None:
         """See a frame of the link that came by ISO-TP: who sends in which boot and session, and how many so far."""
@@ -100,10 +107,10 @@ class NativeProfile:
                 self._epoch[header.sender], self._count[header.sender] = header.epoch, 0
             self._count[header.sender] = max(self._count[header.sender], header.number)
 
-    def _is_news(self, header: Header) -> bool:
+    def _is_news(self, header: Header, now: float) -> bool:
         """Whether the other end has to see the header; now and then it has to anyway, since one may be lost."""
         told = self._told
-        if told is None or header.number - told.number >= HEADER_EVERY:
+        if told is None or now - self._told_at >= HEADER_EVERY:
             return True
         return header[3:] != told[3:] or header[:2] != told[:2]
 
@@ -121,17 +128,18 @@ class NativeProfile:
         return [parts[k] for k in range(needed)]
 
 
-def native_parts(payload: bytes, count: int, *, fd: bool) -> list[NativePart] | None:
+def native_parts(payload: Content, count: int, *, fd: bool) -> list[NativePart] | None:
     """Frames of a cyclic message; None for one that only the tunnel carries."""
     try:
-        opened = open_payload(payload)
-        native = NATIVE.get(opened.kind)
+        said = payload if isinstance(payload, UnwrittenMessage) else open_payload(payload)
+        native = NATIVE.get(said.kind)
         if native is None:
             return None
-        frames = native.pack(values_of_opened(opened), count, fd=fd)
+        values = values_of_opened(said) if isinstance(said, Opened) else said.values
+        frames = native.pack(values, count, fd=fd)
     except (DecodeError, EncodeError):
         return None
-    return [NativePart(*head, data) for head, data in zip(HEADS[native.kind][fd], frames, strict=True)]
+    return list(map(NativePart, HEADS[native.kind][fd], frames))
 
 
 def rounded(message: Message) -> Message:

@@ -13,9 +13,20 @@ import msgpack
 
 from telemetry.errors import DecodeError, EncodeError
 from telemetry.messages import BASE, SCHEMA_VERSION, Message
-from telemetry.presentation.compiled import Lister, Picker, Reader, Writer, lister_of, picker_of, reader_of, writer_of
+from telemetry.presentation.compiled import (
+    NO_TARGET,
+    Lister,
+    Picker,
+    Reader,
+    Writer,
+    lister_of,
+    picker_of,
+    reader_of,
+    writer_of,
+)
 from telemetry.presentation.fields import MAX_BINARY, codec_of
 from telemetry.schema import SCHEMA, U53, Kind, MessageSpec
+from telemetry.unwritten import Content, Unwritten
 
 MAX_PAYLOAD = 4096
 HIGHEST_ADDRESS = 255
@@ -23,13 +34,17 @@ DOWNWARD = (Kind.RECEIPT, Kind.COMMAND, Kind.BLOCK_SEGMENT, Kind.SESSION_OFFER)
 
 
 class Opened(NamedTuple):
-    """A payload whose envelope has been read, which is all that a relay needs; its fields have not been read yet."""
+    """A payload whose envelope has been read, which is all that a relay needs; its fields have not been read yet.
+
+    Of one that was never written there are the ``values`` of its fields, checked, and no ``rows``.
+    """
 
     kind: Kind
     origin: int
     target: int
     sequence: int
     rows: dict[str, Any]
+    values: list[Any] | None = None
 
 
 class MessageCodec:
@@ -44,6 +59,9 @@ class MessageCodec:
         self.newest = spec.newest
         self.fields = tuple(codec_of(field) for field in spec.fields)
         sinces = [field.since for field in self.fields]
+        names = [field.name for field in self.fields]
+        self.tube_at = names.index("tube") if "tube" in names else None
+        self.sequence_at = names.index("sequence") if "sequence" in names else None
         if sinces != sorted(sinces):
             raise ValueError(f"{spec.message.__name__}: expected fields of later schema versions after all others")
 
@@ -70,6 +88,36 @@ class MessageCodec:
         return writer_of(self._spec, self.fields, None if self.kind in DOWNWARD else BASE)
 
 
+class UnwrittenMessage(Unwritten):
+    """A message as the values of all its fields, checked; its payload is made where somebody asks for the bytes."""
+
+    __slots__ = ("codec", "values")
+
+    def __init__(self, codec: MessageCodec, values: list[Any]) -> None:
+        self._written = None
+        self.codec, self.values = codec, values
+
+    @property
+    def most(self) -> int:
+        """Bytes that it takes at most."""
+        return MAX_PAYLOAD
+
+    @property
+    def kind(self) -> Kind:
+        """Kind of the message."""
+        return self.codec.kind
+
+    def opened(self) -> Opened:
+        """What ``open_payload`` finds in its payload."""
+        codec, values = self.codec, self.values
+        origin = NO_TARGET if codec.tube_at is None else values[codec.tube_at]
+        sequence = 0 if codec.sequence_at is None else values[codec.sequence_at]
+        return Opened(codec.kind, origin, origin if codec.kind in DOWNWARD else BASE, sequence, {}, values)
+
+    def _write(self) -> bytes:
+        return self.codec.pack(self.values)
+
+
 CODECS: dict[type[Any], MessageCodec] = {spec.message: MessageCodec(spec) for spec in SCHEMA}
 CODEC_OF: dict[int, MessageCodec] = {int(codec.kind): codec for codec in CODECS.values()}
 
@@ -83,14 +131,36 @@ def encode(message: Message) -> bytes:
         When a field is outside its range.
     """
     codec = CODECS[type(message)]
+    return codec.pack(checked_values(codec, message))
+
+
+def unwritten(message: Message) -> UnwrittenMessage:
+    """Message as it will be written, in the earliest schema version that can express it.
+
+    Raises
+    ------
+    EncodeError
+        When a field is outside its range.
+    """
+    codec = CODECS[type(message)]
+    return UnwrittenMessage(codec, checked_values(codec, message))
+
+
+def checked_values(codec: MessageCodec, message: Message) -> list[Any]:
+    """Values of the fields of a message.
+
+    Raises
+    ------
+    EncodeError
+        When a field is outside its range.
+    """
     try:
-        values = codec.values(message)
+        return codec.values(message)
     except ValueError as error:
         raise EncodeError(f"{type(message).__name__}: {error}") from error
-    return codec.pack(values)
 
 
-def decode(payload: bytes) -> Message:
+def decode(payload: Content) -> Message:
     """Message of a payload.
 
     Raises
@@ -101,7 +171,7 @@ def decode(payload: bytes) -> Message:
     return decode_opened(open_payload(payload))
 
 
-def open_payload(payload: bytes) -> Opened:
+def open_payload(payload: Content) -> Opened:
     """Payload with its envelope read and checked.
 
     Raises
@@ -109,6 +179,8 @@ def open_payload(payload: bytes) -> Opened:
     DecodeError
         When the bytes have no envelope of this version.
     """
+    if isinstance(payload, UnwrittenMessage):
+        return payload.opened()
     rows = _unpack(payload)
     get = rows.get
     version, kind, origin, target, sequence = get("v"), get("k"), get("o"), get("t"), get("s")
@@ -150,6 +222,9 @@ def decode_opened(opened: Opened) -> Message:
         When a field is missing or outside its range.
     """
     codec = CODEC_OF[opened.kind]
+    if opened.values is not None:
+        said: Message = codec.message(*opened.values)
+        return said
     rows = opened.rows
     body = rows.get("b")
     if type(body) is not dict:
@@ -171,6 +246,8 @@ def values_of_opened(opened: Opened) -> list[Any]:
     DecodeError
         When there are no fields at all.
     """
+    if opened.values is not None:
+        return opened.values
     version, body, codec = opened.rows["v"], body_of(opened), CODEC_OF[opened.kind]
     try:
         return codec.picker(version)(body)
@@ -193,7 +270,7 @@ def body_of(opened: Opened) -> dict[str, Any]:
     return body
 
 
-def _unpack(payload: bytes) -> dict[str, Any]:
+def _unpack(payload: Content) -> dict[str, Any]:
     if len(payload) > MAX_PAYLOAD:
         raise DecodeError(f"payload: expected at most {MAX_PAYLOAD} bytes, got {len(payload)}")
     try:

@@ -23,6 +23,7 @@ from telemetry.runtime.inbox import Mailbox
 from telemetry.runtime.joint_watch import JointWatch
 from telemetry.runtime.process import Process
 from telemetry.runtime.timing import CycleTiming, Stage
+from telemetry.unwritten import Content
 
 FRAMES_TOGETHER = 16  # taken before what they made is sent, while more wait
 ABSENT_LIMIT = 60.0  # s without a neighbour until that is reported
@@ -261,11 +262,11 @@ class OwnClockLoop:
                 "does the neighbour run, and is it the right one?"
             )
 
-    def _on_frame(self, side: Side, frame: bytes) -> None:
+    def _on_frame(self, side: Side, frame: Content) -> None:
         if not (self._at_once and self._handle_at_once(side, frame)):
             self._inbox.put(lambda process, now: process.on_frame(side, frame, now))
 
-    def _handle_at_once(self, side: Side, frame: bytes) -> bool:
+    def _handle_at_once(self, side: Side, frame: Content) -> bool:
         """Handle a frame on the foreign thread that heard it; False where the loop has to.
 
         That thread never waits for the loop: its medium may need it for what the loop is sending.

@@ -9,6 +9,7 @@ from telemetry.application.endpoint import Endpoint
 from telemetry.media.port import Frame
 from telemetry.messages import Side
 from telemetry.runtime.joint_watch import JointFault
+from telemetry.unwritten import Content
 
 
 class Process:
@@ -20,7 +21,7 @@ class Process:
 
     endpoint: Endpoint
 
-    def on_frame(self, side: Side, frame: bytes, now: float, margin: float = math.inf) -> None:
+    def on_frame(self, side: Side, frame: Content, now: float, margin: float = math.inf) -> None:
         """A frame arrived at one end; the messages for this process are for a subclass to take.
 
         A radio tells the ``margin`` (dB) over its threshold with which it was heard.

@@ -24,6 +24,7 @@ from telemetry.runtime.inbox import Inbox
 from telemetry.runtime.process import Process
 from telemetry.runtime.step_stream import StepStream
 from telemetry.runtime.stepped import Due, DueEvent, Sent, pack_done, run_step, unpack_step
+from telemetry.unwritten import Content
 
 ABSENT_LIMIT = 60.0  # wall s without a first step until that is reported
 UP_LIMIT, UP_TICK = 5.0, 0.001  # wall s that the other end of a port may take to be there, and between two looks
@@ -250,5 +251,5 @@ async def serve_stepped(process: Process, client: AsyncStepClient, report: Repor
         client.leave()
 
 
-def _put_frame(arrive: Callable[[Arrival], object], channel: int, frame: bytes) -> None:
-    arrive((channel, frame))
+def _put_frame(arrive: Callable[[Arrival], object], channel: int, frame: Content) -> None:
+    arrive((channel, bytes(frame)))

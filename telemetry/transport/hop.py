@@ -20,12 +20,14 @@ import msgpack
 
 from telemetry.media.port import MAX_FRAME, Frame, Priority
 from telemetry.transport.nearest import Nearest
+from telemetry.unwritten import Content, Unwritten
 
 VERSION = 1
 WINDOW = 64
 QUEUE_LIMIT = 512
 BEST_EFFORT_LIMIT = 320  # a state of every tube that a string can have, and what neighbours say to each other
 ENTRY_BYTES = 13  # around a payload, at most
+HEADER_BYTES = 64  # around the entries, at most
 BUNDLE_LIMIT = MAX_FRAME - 1024  # bytes of payloads that share a frame, with what is around each
 FIRST_TIMEOUT = 0.06  # s, one round trip and the wait of a lonely acknowledgement
 LAST_TIMEOUT = 2.0  # s
@@ -50,7 +52,7 @@ class Outstanding:
 class Patient(NamedTuple):
     """Best effort that waits for others to go with, until a time (s)."""
 
-    payload: bytes
+    payload: Content
     priority: Priority
     until: float
 
@@ -59,7 +61,7 @@ class Entry(NamedTuple):
     """A payload that is due; best effort has the number 0 and a topic."""
 
     number: int
-    payload: bytes
+    payload: Content
     priority: Priority
     topic: Hashable | None = None
 
@@ -73,6 +75,24 @@ class Header(NamedTuple):
     ack_epoch: int
     ack: int
     ack_mask: int
+
+
+class LinkFrame(Unwritten):
+    """A frame as its header and entries, of which its bytes are made where a medium asks for them."""
+
+    __slots__ = ("entries", "header")
+
+    def __init__(self, header: Header, entries: Sequence[tuple[int, Content]]) -> None:
+        self._written = None
+        self.header, self.entries = header, entries
+
+    @property
+    def most(self) -> int:
+        """Bytes that it takes at most."""
+        return HEADER_BYTES + sum([ENTRY_BYTES + most_of(payload) for _, payload in self.entries])
+
+    def _write(self) -> bytes:
+        return pack_frame(self.header, [(number, bytes(payload)) for number, payload in self.entries])
 
 
 class HopLink:
@@ -110,7 +130,7 @@ class HopLink:
         self._next_number = 1
         self._outstanding: OrderedDict[int, Outstanding] = OrderedDict()
         self._queue: OrderedDict[bytes, Priority] = OrderedDict()
-        self._best_effort: OrderedDict[Hashable, tuple[bytes, Priority]] = OrderedDict()
+        self._best_effort: OrderedDict[Hashable, tuple[Content, Priority]] = OrderedDict()
         self._patient: dict[Hashable, Patient] = {}
         self._patient_until = math.inf
 
@@ -127,7 +147,7 @@ class HopLink:
             self.counters["reliable_dropped"] += 1
         self._queue[payload] = priority
 
-    def send_best_effort(self, payload: bytes, topic: Hashable, priority: Priority = Priority.STATE) -> None:
+    def send_best_effort(self, payload: Content, topic: Hashable, priority: Priority = Priority.STATE) -> None:
         """Queue a payload that the newest of its ``topic`` replaces."""
         self._best_effort.pop(topic, None)
         if len(self._best_effort) >= BEST_EFFORT_LIMIT:
@@ -135,7 +155,7 @@ class HopLink:
             self.counters["best_effort_dropped"] += 1
         self._best_effort[topic] = payload, priority
 
-    def send_with_others(self, payload: bytes, topic: Hashable, priority: Priority, until: float) -> None:
+    def send_with_others(self, payload: Content, topic: Hashable, priority: Priority, until: float) -> None:
         """Queue a best effort that goes with the next ``release``, and alone at ``until`` (s)."""
         if (waiting := self._patient.pop(topic, None)) is not None:
             until = min(until, waiting.until)
@@ -154,7 +174,7 @@ class HopLink:
                 self._patient[topic] = waiting
                 self._patient_until = min(self._patient_until, waiting.until)
 
-    def receive(self, frame: bytes, now: float, margin: float = math.inf) -> list[bytes]:
+    def receive(self, frame: Content, now: float, margin: float = math.inf) -> list[Content]:
         """Payloads of a frame that were not delivered before; garbage is counted and gives none.
 
         ``margin`` is what the radio heard it with over its threshold, dB.
@@ -175,7 +195,7 @@ class HopLink:
         if self._outstanding and ack_epoch == self.epoch:
             self._acknowledged(ack, ack_mask)
         elif not self._is_me(ack_epoch):
-            entries = [entry for entry in entries if entry[0] == 0]
+            entries = [(0, payload) for number, payload in entries if number == 0]
         return [payload for number, payload in entries if number == 0 or self._is_new(number, now)]
 
     def take_frames(self, now: float) -> list[Frame]:
@@ -284,13 +304,12 @@ class HopLink:
         self._ack_due = math.inf
         self.counters["frames_sent"] += 1
         peer_epoch = max(self._peer_epoch, 0)
-        header = (self._address, self.epoch, self._frames, peer_epoch, self._received, self._received_mask)
-        payload = pack_frame(header, [entry[:2] for entry in entries])
+        header = Header(self._address, self.epoch, self._frames, peer_epoch, self._received, self._received_mask)
         if len(entries) == 1:  # as nearly always
-            _, _, priority, topic = entries[0]
-            return Frame(payload, priority, None if topic is None else (topic,))
+            number, payload, priority, topic = entries[0]
+            return Frame(LinkFrame(header, [(number, payload)]), priority, None if topic is None else (topic,))
         priority = min([entry.priority for entry in entries], default=Priority.COMMAND)
-        return Frame(payload, priority, common_topic(entries))
+        return Frame(LinkFrame(header, [entry[:2] for entry in entries]), priority, common_topic(entries))
 
 
 def epoch_of(boot_count: int, session: int, address: int) -> int:
@@ -304,8 +323,15 @@ def pack_frame(header: Sequence[int], entries: Sequence[Sequence[object]]) -> by
     return zlib.crc32(body).to_bytes(4, "little") + body
 
 
-def parse_frame(frame: bytes) -> tuple[Header, list[Any]] | None:
+def most_of(payload: Content) -> int:
+    """Bytes that a payload takes at most."""
+    return payload.most if isinstance(payload, Unwritten) else len(payload)
+
+
+def parse_frame(frame: Content) -> tuple[Header, Sequence[Any]] | None:
     """Header and entries of a frame; None for anything else."""
+    if isinstance(frame, Unwritten):
+        return (frame.header, frame.entries) if isinstance(frame, LinkFrame) else None
     if not 5 < len(frame) <= MAX_FRAME:
         return None
     body = frame[4:]

@@ -8,6 +8,7 @@ import os
 import signal
 import subprocess
 import sys
+from collections import Counter
 from pathlib import Path
 from typing import Any
 
@@ -20,6 +21,7 @@ from telemetry.media.zenoh_bus import open_client
 from telemetry.messages import Event, SurveyMeasurement
 
 GROUND = "borechain/*/ground"
+LONG = 900.0  # s, for ten tubes on a machine that others use
 
 
 def drill(folder: Path, *arguments: str) -> dict[str, Any]:
@@ -130,20 +132,67 @@ def test_a_scenario_names_the_media_of_its_joints(tmp_path: Path) -> None:
 def test_the_native_profile_moves_the_result_by_next_to_nothing(
     tmp_path: Path, inline: tuple[dict[str, Any], Path]
 ) -> None:
-    exact, folder = inline
     native = drill_inline(tmp_path, "--seed", "5", "--transport", "can-native")
-    assert native["digest"] != exact["digest"]
-    for ours, theirs in zip(native["stations"], exact["stations"], strict=True):
-        assert abs(math.remainder(ours["azimuth_deg"] - theirs["azimuth_deg"], 360.0)) < 0.02
-    yaws = []
-    for drilled in (folder, tmp_path / "run"):
-        path = drilled / "state" / "ground" / "ground.sqlite"
-        with contextlib.closing(Store(f"sqlite:///{path}")) as store:
-            surveys = [stored.message for stored in store.messages() if isinstance(stored.message, SurveyMeasurement)]
-        yaws.append({(survey.tube, survey.sequence): survey.yaw for survey in surveys})
+    assert native["digest"] != inline[0]["digest"]
+    yaw, azimuth = moved((native, tmp_path / "run"), inline)
+    assert yaw < 0.002
+    assert azimuth < 0.02
+
+
+def moved(one: tuple[dict[str, Any], Path], other: tuple[dict[str, Any], Path]) -> tuple[float, float]:
+    """By how much two runs differ, deg: rms of the surveys' yaws, most of the stations' azimuths."""
+    yaws = [yaws_of(folder) for _, folder in (one, other)]
     assert yaws[0].keys() == yaws[1].keys()
     apart = [math.degrees(math.remainder(yaws[0][key] - yaws[1][key], math.tau)) for key in yaws[0]]
-    assert math.sqrt(sum(a * a for a in apart) / len(apart)) < 0.002
+    turns = [
+        math.remainder(ours["azimuth_deg"] - theirs["azimuth_deg"], 360.0)
+        for ours, theirs in zip(one[0]["stations"], other[0]["stations"], strict=True)
+    ]
+    return math.sqrt(sum(a * a for a in apart) / len(apart)), max(map(abs, turns))
+
+
+def yaws_of(folder: Path) -> dict[tuple[int, int], float]:
+    """Yaws (rad) of the surveys in the store of a run, by tube and place: an event more takes a number too."""
+    with contextlib.closing(Store(f"sqlite:///{folder / 'state' / 'ground' / 'ground.sqlite'}")) as store:
+        surveys = [stored.message for stored in store.messages() if isinstance(stored.message, SurveyMeasurement)]
+    found: dict[tuple[int, int], float] = {}
+    places: Counter[int] = Counter()
+    for survey in sorted(surveys, key=lambda survey: (survey.tube, survey.sequence)):
+        places[survey.tube] += 1
+        found[survey.tube, places[survey.tube]] = survey.yaw
+    return found
+
+
+@pytest.fixture(scope="module")
+def wellbore(tmp_path_factory: pytest.TempPathFactory) -> tuple[dict[str, Any], Path]:
+    """Result of wellbore 1, ten tubes, in one process with seed 1, and the folder of its run."""
+    folder = tmp_path_factory.mktemp("wellbore")
+    return drill_inline(folder, "--seed", "1", scenario="wellbore-1"), folder / "run"
+
+
+@pytest.mark.statistical
+@pytest.mark.timeout(LONG)
+@pytest.mark.parametrize("transport", ["zenoh", "can", "can-classic", "mixed"])
+def test_wellbore_1_is_the_same_over_every_medium(
+    tmp_path: Path, transport: str, wellbore: tuple[dict[str, Any], Path]
+) -> None:
+    words = ("--speed", "max", "--seed", "1", "--transport", transport)
+    with running_rig(tmp_path, *words, scenario="scenarios/wellbore-1.toml") as rig:
+        result = rig.result(LONG)
+    print(f"wellbore 1 over {transport}: digest {result['digest']}")
+    assert result["digest"] == wellbore[0]["digest"]
+
+
+@pytest.mark.statistical
+def test_the_native_profile_moves_wellbore_1_by_next_to_nothing(
+    tmp_path: Path, wellbore: tuple[dict[str, Any], Path]
+) -> None:
+    native = drill_inline(tmp_path, "--seed", "1", "--transport", "can-native", scenario="wellbore-1")
+    yaw, azimuth = moved((native, tmp_path / "run"), wellbore)
+    print(f"wellbore 1 on the native profile: yaw {yaw:.6f} deg rms, azimuth at most {azimuth:.6f} deg from the exact")
+    assert native["digest"] != wellbore[0]["digest"]
+    assert yaw <= 0.002
+    assert azimuth <= 0.02
 
 
 @pytest.mark.parametrize("words", [("--inline", "--transport", "can"), ("--transport", "can-native")])

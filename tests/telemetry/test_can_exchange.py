@@ -141,6 +141,39 @@ def test_what_must_not_be_lost_survives_a_joint_that_opens_in_its_middle() -> No
     assert len(upper.queue) == 0
 
 
+def test_a_transfer_goes_on_where_it_was_after_a_moment_in_which_nothing_moved() -> None:
+    upper, lower, wire = joined()
+    upper.queue.offer(Frame(bytes(500), Priority.SURVEY))
+    wire.run(20 * STEP)
+    wire.is_open = True
+    wire.run(ACKNOWLEDGE_LIMIT + 0.1)
+    assert not upper.is_up
+    wire.is_open = False
+    wire.run(0.5)
+    assert wire.heard[1] == [bytes(500)]
+    assert not upper.counters
+    assert not lower.counters
+
+
+def test_an_answer_waits_as_long_as_its_transfer() -> None:
+    first = Identifier(Priority.SURVEY, TUNNEL, 2).pack(), b"\x10\x64" + bytes(6)
+    for pause, answers in ((ACKNOWLEDGE_LIMIT + 0.1, 1), (FLOW_LIMIT + 0.1, 0)):
+        lower = end(1)
+        assert lower.next_frame(0.0) is not None  # its sign of life
+        lower.on_acknowledged(0.0)
+        lower.queue.offer(Frame(b"mine"))
+        assert lower.next_frame(0.0) is not None
+        lower.on_frame(*first, 0.0)
+        lower.advance(pause)
+        assert not lower.is_up
+        lower.on_acknowledged(pause)
+        sent = []
+        while (frame := lower.next_frame(pause)) is not None:
+            sent.append(Identifier.unpack(frame.identifier))
+            lower.on_acknowledged(pause)
+        assert [identifier.type for identifier in sent if identifier is not None].count(FLOW_CONTROL) == answers
+
+
 @pytest.mark.slow
 @pytest.mark.parametrize("largest", [8, 64])
 def test_links_on_the_native_profile_lose_nothing_over_a_wire_that_does(largest: int) -> None:

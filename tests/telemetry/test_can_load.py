@@ -86,7 +86,7 @@ class SimulatedJoint:
         opened = self._opened(to, payload) if payload is not None else None
         parsed = parse_frame(opened) if opened is not None else None
         for _, content in parsed[1] if parsed is not None else []:
-            self.heard[to].append((self.now, decode(content_of_sealed(content))))
+            self.heard[to].append((self.now, decode(content_of_sealed(bytes(content)))))
 
 
 SIDES = (Side.LOWER, Side.UPPER)  # of the joint, of the encoder above and the tube below

@@ -130,6 +130,27 @@ def test_a_bus_that_goes_away_with_a_frame_stops_nobody(stack: contextlib.ExitSt
             end.close()
 
 
+def test_a_bus_that_stands_still_for_a_moment_loses_nothing(stack: contextlib.ExitStack, hub: CanHub) -> None:
+    """As on a machine at work: both ends see an open joint for a moment, with transfers and answers on their way."""
+    ends = Ends(stack, hub.port, ("classic", "classic"))
+    until(lambda: ends.upper.is_up and ends.lower.is_up)
+    frames = [b"%d takes several frames" % k for k in range(300)]
+
+    def give(some: list[bytes]) -> None:
+        for frame in some:
+            for end in ends.ports:
+                end.send(Frame(frame))
+
+    def stand_still(_wire: CanWire) -> None:
+        until(lambda: not ends.upper.is_up and not ends.lower.is_up)
+        give(frames[150:])
+
+    give(frames[:150])
+    hub.act(stand_still, segment_of(UPPER))
+    until(lambda: ends.heard == (frames, frames))
+    assert not {"dropped", "no_flow_control"} & (set(ends.upper.counters) | set(ends.lower.counters))
+
+
 def test_a_neighbour_without_fd_throws_the_controller_off_and_nobody_raises(
     stack: contextlib.ExitStack, hub: CanHub
 ) -> None:

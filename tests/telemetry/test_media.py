@@ -5,8 +5,10 @@ from __future__ import annotations
 import asyncio
 import contextlib
 import itertools
+import queue
 import random
 import socket
+import threading
 import time
 from collections.abc import AsyncIterator, Callable, Iterator
 from contextlib import AbstractContextManager
@@ -22,7 +24,7 @@ from telemetry.media.memory import joint
 from telemetry.media.port import Frame, Priority, TubeEnd
 from telemetry.media.send_queue import SEND_LIMIT, SendQueue
 from telemetry.media.table import MEDIA, open_medium
-from telemetry.media.zenoh_bus import open_router
+from telemetry.media.zenoh_bus import open_client, open_router
 from telemetry.messages import Side
 from telemetry.runtime.inbox import Inbox
 from telemetry.transport.hop import HopLink
@@ -265,6 +267,30 @@ def test_no_router_is_one_line(monkeypatch: pytest.MonkeyPatch) -> None:
         open_medium("zenoh:tcp/127.0.0.1:1"),
     ):
         pass
+
+
+def test_a_thread_of_zenohs_stays_known_from_one_callback_to_the_next() -> None:
+    class Calls(threading.local):
+        count = 0
+
+    calls, heard = Calls(), queue.SimpleQueue[tuple[int, int]]()
+
+    def hear(_frame: bytes) -> None:
+        calls.count += 1
+        heard.put((threading.get_ident(), calls.count))
+
+    with zenoh_place() as endpoint, open_client(endpoint, PATIENCE) as ours, open_client(endpoint, PATIENCE) as theirs:
+        ours.hear("known", hear)
+        publisher = theirs.publisher("known")
+        deadline = time.monotonic() + PATIENCE
+        while not publisher.is_heard:
+            assert time.monotonic() < deadline
+        for _ in range(20):
+            publisher.put(b"frame")
+        found = [heard.get(timeout=PATIENCE) for _ in range(20)]
+    for thread in {thread for thread, _ in found}:
+        counts = [count for one, count in found if one == thread]
+        assert counts == list(range(1, len(counts) + 1))
 
 
 def test_an_end_in_memory_has_one_port() -> None:
