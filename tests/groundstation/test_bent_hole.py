@@ -15,7 +15,7 @@ from test_model import survey
 from borechain.cli.rig.rig import ground_settings
 from borechain.inline import InlineRig
 from groundstation.config import GroundConfig
-from groundstation.service import views
+from groundstation.service import measurement_views, views
 from groundstation.service.model import RigModel
 from sim.world.scenario import scenario_of
 from sim.world.world import World
@@ -59,7 +59,7 @@ def test_stations_have_the_transport_and_measurements_have_not(tmp_path: Path) -
         assert row["azimuth_deg"] == pytest.approx(n * STEP_DEG, abs=3e-3)
         assert row["transport_deg"] == pytest.approx(n * LACKED_DEG, abs=3e-3)
         assert 0.0 < row["sigma_transport_deg"] < 0.05
-        for measured in views.station_measurements(model, n)["measurements"]:
+        for measured in measurement_views.station_measurements(model, n)["measurements"]:
             assert measured["azimuth_deg"] == pytest.approx(row["azimuth_deg"] - row["transport_deg"], abs=1e-6)
 
 
