@@ -24,7 +24,10 @@ pytestmark = pytest.mark.slow
 
 COUNT = 2.0 * np.pi / 2.0**32  # rad
 SOURCE = Path(__file__).parents[1] / "benchmarks" / "node.py"
-BETWEEN_CYCLES = ("bias", "scale", "stamp", "down", "P", "now_P", "now_down", "survey_force", "survey_force_cov")
+BETWEEN_CYCLES = (
+    *("bias", "scale", "stamp", "down", "P", "now_P", "now_down", "survey_force", "survey_force_cov"),
+    *("surveyed_var", "surveyed_with"),
+)
 
 needs_compiler = pytest.mark.skipif(
     shutil.which(shlex.split(os.environ.get("CC") or "cc")[0]) is None, reason="no C compiler here"

@@ -47,6 +47,9 @@ typedef struct {
     double bias_sum[3];
     /* the last survey */
     double survey_force[3], survey_force_cov[3][3];
+    int64_t smoothing;
+    uint32_t surveyed_yaw;
+    double surveyed_var, surveyed_with[STATES];
     /* work space of the updates */
     double h[STATES], ph[STATES], gain[STATES];
 } State;

@@ -11,6 +11,8 @@ from pathlib import Path
 
 from sim.rig.processes import ProcessTable
 from sim.rig.realtime import footprint, pids
+from telemetry.messages import SurveyMeasurement
+from telemetry.presentation.msgpack_codec import decode
 
 GROUND = "base"  # as the table of processes has it
 STOP_EVERY_S, STOP_S, FINISH_S = 90.0, 26.0, 30.0  # of rig time
@@ -96,5 +98,8 @@ class Scales:
             (tables,) = connection.execute("select count(*) from sqlite_master where name = 'messages'").fetchone()
             if not tables:
                 return size / 1e3, 0
-            (surveys,) = connection.execute("select count(*) from messages where kind = 'SurveyMeasurement'").fetchone()
-        return size / 1e3, int(surveys)
+            rows = connection.execute("select payload from messages where kind = 'SurveyMeasurement'").fetchall()
+        # one that was said again has the tube and the time of the first
+        said = (decode(payload) for (payload,) in rows)
+        surveys = {(m.tube, m.station_at) for m in said if isinstance(m, SurveyMeasurement)}
+        return size / 1e3, len(surveys)

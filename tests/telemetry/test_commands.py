@@ -101,7 +101,7 @@ def test_what_is_no_tube_is_refused(tube: str) -> None:
     ("name", "action", "named"),
     [
         ("dance", "", "take_survey|static_record"),
-        ("recalibrate", "", "begin|attitude|solve|confirm|cancel, got ''"),
+        ("recalibrate", "", "begin|attitude|solve|confirm|cancel|surveys, got ''"),
         ("recalibrate", "dance", "got 'dance'"),
         ("align", "begin", "expected no action"),
     ],

@@ -102,7 +102,7 @@ def drill(name: str, seed: int) -> Seen:
     tubes = [_tube(TubeSettings(1, Joint(drives[0], std), state_every=1))] + ([_tube(upper)] if grows else [])
     sensors = [world.sensor(joint, phase)] + ([world.sensor(second, phase)] if grows else [])
     clocks = CLOCK_STD * random.standard_normal(2)
-    said, count, faults, surveys = world.encoder(), len(world.ends), [], 0
+    said, count, faults, surveys = world.encoder(), len(world.ends), [], set()
     yaw, var, flagged = np.full(count, math.nan), np.full(count, math.nan), np.ones(count, np.bool_)
 
     def relay(k: int) -> None:
@@ -131,14 +131,14 @@ def drill(name: str, seed: int) -> Seen:
                     flagged[k] = bool(message.flags & DOUBTS)
                 elif isinstance(message, Event) and message.code in FAULTS:
                     faults.append(message.code)
-                surveys += isinstance(message, SurveyMeasurement)
+                surveys |= {message.station_at} if isinstance(message, SurveyMeasurement) else set()
         yaw[k], var[k] = tubes[0].yaw, tubes[0].yaw_var + tubes[0].systematic_var
         if phase <= LATENCY:
             relay(k)
-    ends = world.ends + phase
-    error = np.mod(yaw - joint - world.yaw(ends) + math.pi, math.tau) - math.pi
+    at = world.ends + phase
+    error = np.mod(yaw - joint - world.yaw(at) + math.pi, math.tau) - math.pi
     told = np.array([flagged[k : k + 11].any() for k in range(count)])
-    return Seen(error, var, told, world.is_turning(ends, 20.0), world.is_resting(ends, 5.0), tuple(faults), surveys)
+    return Seen(error, var, told, world.is_turning(at, 20.0), world.is_resting(at, 5.0), tuple(faults), len(surveys))
 
 
 def figures(name: str, seen: Sequence[Seen]) -> list[float]:
