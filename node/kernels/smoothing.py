@@ -50,11 +50,12 @@ def look_back(state: Any, s: float, residual: float) -> None:
 
     K = c H^T / S, c+ = c - K (P H^T)^T, var+ = var - K H c^T.
     """
-    along = 0.0
+    along, h, ph = state.surveyed_with, state.h, state.ph
+    shared = 0.0
     for j in range(STATES):
-        along += state.surveyed_with[j] * state.h[j]
-    gain = along / s
+        shared += along[j] * h[j]
+    gain = shared / s
     for j in range(STATES):
-        state.surveyed_with[j] -= gain * state.ph[j]
-    state.surveyed_var -= gain * along
+        along[j] -= gain * ph[j]
+    state.surveyed_var -= gain * shared
     state.surveyed_yaw = advance_binary(state.surveyed_yaw, gain * residual)

@@ -37,8 +37,11 @@ def innovation_var(state: Any, a: int, ha: int, b: int, hb: int, r_var: int) -> 
 
 
 @kernel
-def joseph(state: Any, s: int) -> None:
-    """Covariance after the update with K = P H^T / S; leaves K 2^q (31 bits) in ``state.gain``, q in ``gain_q``."""
+def joseph(state: Any, s: int) -> tuple[int, int]:
+    """Covariance after the update with K = P H^T / S; leaves K 2^q (31 bits) in ``state.gain``, q in ``gain_q``.
+
+    Returns mantissa and exponent of 1 / S.
+    """
     P, ph, gain, rest = state.P, state.ph, state.gain, state.rest
     largest = 0
     for i in range(STATES):
@@ -56,6 +59,7 @@ def joseph(state: Any, s: int) -> None:
         for j in range(i, STATES):
             P[i, j] -= shift(mul(wide, gain[j]), down) + shift(gain[i] * rest[j], q)
             P[j, i] = P[i, j]
+    return mantissa, exponent
 
 
 @kernel
@@ -69,22 +73,27 @@ def correction(state: Any, gain: int, q: int, residual: int) -> int:
 @kernel
 def correct(state: Any, a: int, ha: int, b: int, hb: int, s: int, residual: int) -> None:
     """Update by a ``residual`` of the variance ``s`` (Q56), H as in ``innovation_var``: filter and last survey."""
-    joseph(state, s)
+    mantissa, exponent = joseph(state, s)
     if state.smoothing == 1:
-        look_back(state, a, ha, b, hb, s, residual)
+        along = state.surveyed_with
+        shared = mul(along[a], ha)
+        if hb != 0:
+            shared += mul(along[b], hb)
+        look_back(state, shared, mantissa, exponent, residual)
     feed_back(state, residual)
 
 
 @kernel
-def look_back(state: Any, a: int, ha: int, b: int, hb: int, s: int, residual: int) -> None:
-    """The yaw at the last survey by an innovation: ``node.kernels.smoothing.look_back``."""
-    along, ph = state.surveyed_with, state.ph
-    shared = mul(along[a], ha) + mul(along[b], hb)
-    mantissa, exponent = reciprocal(s)
+def look_back(state: Any, shared: int, mantissa: int, exponent: int, residual: int) -> None:
+    """The yaw at the last survey by an innovation: ``node.kernels.smoothing.look_back``.
+
+    ``shared`` is its covariance with what is measured (Q56), ``mantissa`` and ``exponent`` are of 1 / S.
+    """
     lift = bits(abs(shared)) - 31
     q = min(30 - lift + exponent, 62)
     gain = shift((shift(shared, lift) * mantissa) >> 31, 30 - lift + exponent - q)
     up, down = max(0, 31 - q), max(0, q - 31)
+    along, ph = state.surveyed_with, state.ph
     for j in range(STATES):
         along[j] -= shift(mul(ph[j] << up, gain), down)
     state.surveyed_var = max(state.surveyed_var - shift(mul(shared << up, gain), down), 0)
