@@ -2,17 +2,19 @@
 
 from __future__ import annotations
 
+from abc import ABC, abstractmethod
 
-class Unwritten:
+
+class Unwritten(ABC):
     """Something to say that knows its parts; its bytes are made once, when they are asked for."""
 
     __slots__ = ("_written",)
     _written: bytes | None  # None at first
 
     @property
+    @abstractmethod
     def most(self) -> int:
         """Bytes that it takes at most, so that a queue need not have it written to know that it has room."""
-        raise NotImplementedError
 
     def __bytes__(self) -> bytes:
         """Its bytes."""
@@ -24,9 +26,9 @@ class Unwritten:
         """How many bytes."""
         return len(bytes(self))
 
+    @abstractmethod
     def _write(self) -> bytes:
         """Make its bytes."""
-        raise NotImplementedError
 
 
 Content = bytes | Unwritten
