@@ -109,38 +109,6 @@ static void isolate(Matrix P, int state, double variance)
     P[state][state] = variance;
 }
 
-static void set_apart(State *state, int error, double variance)
-{
-    isolate(state->P, error, variance);
-    state->surveyed_with[error] = 0.0;
-}
-
-/* The yaw at the last survey by what comes after it: its covariance with the states, and its updates. */
-
-static void carry(State *state, double wz, double dt, double turning, const Config *config)
-{
-    double *along = state->surveyed_with;
-    double c = cos(wz * dt * turning), s = sin(wz * dt * turning), step = dt * turning;
-    double tx = along[TX], ty = along[TY];
-    along[TX] = c * tx + s * ty - step * along[BX];
-    along[TY] = -s * tx + c * ty - step * along[BY];
-    along[PSI] -= step * (along[BZ] + wz * along[SCALE]);
-    for (int k = 0; k < 3; k++)
-        along[BX + k] *= exp(-dt / config->bias_tau[k]);
-}
-
-static void look_back(State *state, double s, double residual)
-{
-    double along = 0.0;
-    for (int j = 0; j < STATES; j++)
-        along += state->surveyed_with[j] * state->h[j];
-    double gain = along / s;
-    for (int j = 0; j < STATES; j++)
-        state->surveyed_with[j] -= gain * state->ph[j];
-    state->surveyed_var -= gain * along;
-    state->surveyed_yaw = advance_binary(state->surveyed_yaw, gain * residual);
-}
-
 /* Scalar updates in Joseph form. */
 
 static void clear(double h[STATES])
@@ -189,14 +157,6 @@ static void feed_back(State *state, double residual)
     state->stamp += gain[STAMP] * residual;
 }
 
-static void correct(State *state, double s, double residual)
-{
-    joseph(state->P, state->ph, s, state->gain);
-    if (state->smoothing)
-        look_back(state, s, residual);
-    feed_back(state, residual);
-}
-
 static void zero_rate(State *state, const double rate[3], double dt, const Config *config)
 {
     for (int k = 0; k < 3; k++) {
@@ -204,7 +164,8 @@ static void zero_rate(State *state, const double rate[3], double dt, const Confi
         state->h[BX + k] = 1.0;
         double noise = config->attitude_factor * config->gyro_noise[k];
         double s = innovation_var(state->P, state->h, noise * noise / dt, state->ph);
-        correct(state, s, rate[k] - state->static_bias[k] - state->bias[k]);
+        joseph(state->P, state->ph, s, state->gain);
+        feed_back(state, rate[k] - state->static_bias[k] - state->bias[k]);
     }
 }
 
@@ -222,7 +183,9 @@ static void level(State *state, const double force[3], const Config *config)
             state->h[TX] = state->down[1];
         }
         double s = innovation_var(state->P, state->h, r_var, state->ph);
-        correct(state, s, force[k] / config->gravity + state->down[k]);
+        double residual = force[k] / config->gravity + state->down[k];
+        joseph(state->P, state->ph, s, state->gain);
+        feed_back(state, residual);
     }
 }
 

@@ -81,13 +81,7 @@ static void advance(State *state, const Config *config, int64_t cycle, double un
     if (dt <= 0.0)
         return;
     double gap = state->ring_start[cycle % RING] - state->epoch;
-    if (state->smoothing) {
-        double turning = stood_still(state, cycle) ? 0.0 : 1.0;
-        carry(state, spin(state, cycle, state->epoch, until), dt, turning, config);
-    }
     state->yaw = turn(state, config, cycle, state->epoch, until, state->yaw, state->down, state->P);
-    if (state->down[2] < INVERTED)
-        state->surveyed_with[PSI] = 0.0;
     if (gap > 1e-3)
         state->P[PSI][PSI] += square(state->ring_rate[cycle % RING][2] * gap);
     for (int k = 0; k < 3; k++)
@@ -111,8 +105,8 @@ static double interpolation_var(const State *state, int64_t cycle, double at)
 static void reset_yaw(State *state, const Config *config, double yaw, double var)
 {
     state->yaw = to_binary(yaw);
-    set_apart(state, PSI, var);
-    set_apart(state, BZ, larger(square(config->bias_std[2]) + state->static_bias_var[2], state->P[BZ][BZ]));
+    isolate(state->P, PSI, var);
+    isolate(state->P, BZ, larger(square(config->bias_std[2]) + state->static_bias_var[2], state->P[BZ][BZ]));
     state->bias[2] = 0.0;
     state->yaw_known = 1;
     state->rejected = 0;
@@ -139,12 +133,13 @@ static int64_t aid(State *state, const Config *config, double yaw, double r_var,
         if (state->rejected < config->reject_limit)
             return REJECTED;
         reset_yaw(state, config, yaw, r_var + square(rate * config->stamp_std));
-        set_apart(state, STAMP, square(config->stamp_std));
+        isolate(state->P, STAMP, square(config->stamp_std));
         state->stamp = 0.0;
         state->last_aided = at;
         return REJECTED | AIDED | YAW_RESET;
     }
-    correct(state, s, residual);
+    joseph(state->P, state->ph, s, state->gain);
+    feed_back(state, residual);
     state->rejected = 0;
     state->last_aided = at;
     return AIDED;

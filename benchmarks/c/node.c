@@ -44,7 +44,7 @@ static int64_t learn_static_bias(State *state, const Config *config, const doubl
         double correlated = 2.0 * square(config->bias_std[k]) * config->bias_tau[k] / total;
         state->static_bias_var[k] = square(config->gyro_noise[k]) / total + correlated;
         state->bias[k] = 0.0;
-        set_apart(state, BX + k, square(config->bias_std[k]) + state->static_bias_var[k]);
+        isolate(state->P, BX + k, square(config->bias_std[k]) + state->static_bias_var[k]);
     }
     state->mode = TRACKING;
     return BIAS_KNOWN;
@@ -56,7 +56,7 @@ static int64_t guard_rate(State *state, const Config *config, double rate_z)
         int first = state->rate_exceeded == 0;
         state->rate_exceeded = 1;
         state->yaw_known = 0;
-        set_apart(state, PSI, UNKNOWN_YAW_VAR);
+        isolate(state->P, PSI, UNKNOWN_YAW_VAR);
         return first ? RATE_EXCEEDED : 0;
     }
     if (state->rate_exceeded) {
@@ -86,15 +86,6 @@ static void average_force(State *state, int64_t samples)
         }
 }
 
-static void begin_smoothing(State *state)
-{
-    state->smoothing = state->yaw_known;
-    state->surveyed_yaw = state->yaw;
-    state->surveyed_var = state->P[PSI][PSI];
-    for (int j = 0; j < STATES; j++)
-        state->surveyed_with[j] = state->P[PSI][j];
-}
-
 static int64_t step_modes(State *state, const Config *config, int64_t quiet, int64_t joined, double end)
 {
     int64_t status = state->mode == HELD && (joined == 1 || !quiet) ? JOINT_CLOSED : 0;
@@ -119,7 +110,6 @@ static int64_t step_modes(State *state, const Config *config, int64_t quiet, int
     state->mode = joined == 1 ? STILL : HELD;
     if (!state->surveyed && joined == 1 && state->still_cycles >= config->settle_cycles) {
         average_force(state, config->survey_samples);
-        begin_smoothing(state);
         state->surveyed = 1;
         state->mode = SURVEY;
         status |= SURVEY_READY;
@@ -139,9 +129,9 @@ static int64_t change_reference(State *state, const Config *config, const Input 
     state->pending = 0;
     if (first || !state->yaw_known)
         return 0;
-    set_apart(state, PSI, state->P[PSI][PSI] + step_var);
+    isolate(state->P, PSI, state->P[PSI][PSI] + step_var);
     if (config->stamp_std > 0.0)
-        set_apart(state, STAMP, state->P[STAMP][STAMP] + square(config->stamp_std));
+        isolate(state->P, STAMP, state->P[STAMP][STAMP] + square(config->stamp_std));
     return REFERENCE_CHANGED;
 }
 

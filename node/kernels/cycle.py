@@ -11,7 +11,6 @@ from node.kernels.layout import STATES, Array, Status
 from node.kernels.modes import STATIC_BIAS, SURVEY_READY, guard_rate, is_quiet, learn_static_bias, step_modes
 from node.kernels.moving_average import average_force
 from node.kernels.ring import push
-from node.kernels.smoothing import begin_smoothing
 
 BAD_SAMPLE, FILTER_FAULT = int(Status.BAD_SAMPLE), int(Status.FILTER_FAULT)
 
@@ -41,7 +40,6 @@ def run_cycle(state: Any, config: Any, rate: Array, force: Array, start: float, 
     status |= step_modes(state, config, quiet, joined, end)
     if status & SURVEY_READY:
         average_force(state, config.survey_samples)
-        begin_smoothing(state)
     for i in range(STATES):
         if not (state.P[i, i] >= 0.0 and math.isfinite(state.P[i, i])):
             return status | FILTER_FAULT

@@ -83,7 +83,7 @@ def advance(state: Any, config: Any, cycle: int, until: float) -> None:
         turning = 0.0 if stood_still(state, cycle) else 1.0
         carry(state, spin(state, cycle, state.epoch, until), dt, turning, config)
     state.yaw = turn(state, config, cycle, state.epoch, until, state.yaw, state.down, state.P)
-    if state.down[2] < INVERTED:
+    if state.smoothing == 1 and state.down[2] < INVERTED:
         state.surveyed_with[PSI] = 0.0
     if gap > 1e-3:
         # cycles were lost: the rate of this one stands for them, and is not trusted further than its own size

@@ -14,6 +14,7 @@ from node.kernels.jit import constant, kernel
 from node.kernels.layout import Err, Scheme, Status
 from node.kernels.numbers import half, times
 from node.kernels.quantity import factor
+from node.kernels.smoothing import begin_smoothing
 
 PSI = constant(Err.YAW)
 FORWARD = int(Scheme.FORWARD)
@@ -26,13 +27,14 @@ WORTH_LAST: Final = factor(0.8)  # of the variance said before, that is worth a 
 
 @kernel
 def open_revision(node: Any, settings: Any) -> None:
-    """The survey that is said now may be said again, where what contradicts its yaw would be seen."""
+    """The survey that is said now may be said again, where its yaw is known and what contradicts it would be seen."""
     state, revision = node.filter, node.revision
     revision.turned = 0
     revision.said_var = state.now_P[PSI, PSI]
     revision.systematic = state.systematic_var
-    if settings.scheme != FORWARD or settings.as_published == 1 or is_doubted(node):
-        state.smoothing = 0
+    state.smoothing = 0
+    if settings.scheme == FORWARD and settings.as_published == 0 and not is_doubted(node):
+        begin_smoothing(state)
 
 
 @kernel

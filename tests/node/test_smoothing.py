@@ -142,7 +142,6 @@ class Surveyed:
         self.state = self.node["filter"]
         self.state["P"][PSI, PSI] = self.state["now_P"][PSI, PSI] = 1.0
         self.state["yaw_known"], self.state["still_cycles"] = 1, 40
-        begin_smoothing(self.state)
         open_revision(self.node, self.settings[0])
 
     def follows(self, var: float, status: Status = Status.NONE) -> bool:
@@ -190,6 +189,5 @@ def test_a_twist_that_came_since_counts() -> None:
 def test_only_our_form_of_the_encoders_measurement_is_smoothed(name: str, value: int) -> None:
     surveyed = Surveyed()
     surveyed.settings[name] = value
-    begin_smoothing(surveyed.state)
     open_revision(surveyed.node, surveyed.settings[0])
     assert not surveyed.follows(0.1)

@@ -116,7 +116,7 @@ def advance(state: Any, config: Any, cycle: int, until: int) -> None:
     if state.smoothing == 1:
         carry_survey(state, config, cycle, until - dt, until)
     state.yaw = turn(state, config, cycle, until - dt, until, int(state.yaw), state.down, state.P)
-    if state.down[2] < INVERTED_DOWN:
+    if state.smoothing == 1 and state.down[2] < INVERTED_DOWN:
         state.surveyed_with[PSI] = 0
     if gap > MISSED_GAP:
         # cycles were lost: the rate of this one stands for them, and is not trusted further than its own size
