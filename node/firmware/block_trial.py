@@ -78,6 +78,8 @@ def recorrect(state: Any, before: ParameterBlock, after: ParameterBlock, tempera
             raw = state[ring] @ matrix.T + bias
             matrix, bias = model_at(new, temperature)
             state[ring] = np.linalg.solve(matrix, (raw - bias).T).T
+    if before.gyroscope != after.gyroscope:
+        state["ring_split"] = 0
 
 
 def model_at(sensor: SensorParameters, temperature: float) -> tuple[Array, Array]:

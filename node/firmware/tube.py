@@ -23,7 +23,7 @@ from node.kernels.cluster import begin_cluster
 from node.kernels.layout import DEG, UNKNOWN_YAW_VAR, Array, Scheme
 from node.kernels.modes import STATIC_BIAS
 from node.kernels.quantity import NONE
-from node.kernels.record import AIDING, MOMENT, READING
+from node.kernels.record import AIDING, MOMENT, READING, SPLIT
 from node.kernels.resets import forget_bias, lose_tilt
 from node.kernels.step import (
     ADMITTED,
@@ -53,6 +53,7 @@ from telemetry.messages import (
 from telemetry.parameters import SHORT_HASH, ParameterBlock
 
 PUT_AIDING = struct.Struct(f"{AIDING}d").pack_into  # a third of what numpy takes for a dozen numbers
+NO_PARTS = (0.0,) * (READING - SPLIT)
 LONGEST_WORTH = 1e9  # s, of a saved yaw: a string that is said never to turn unseen
 
 Said = Aiding | SurveyMeasurement | StaticRecord | Event | NodeState
@@ -281,4 +282,5 @@ class Tube:
 
 
 def _row_of(reading: ImuReading) -> tuple[float, ...]:
-    return (*reading.rate, *reading.force, reading.temperature, reading.saturated, reading.late)
+    head = (*reading.rate, *reading.force, reading.temperature, reading.saturated, reading.late)
+    return (*head, 1.0, *reading.parts) if reading.parts else (*head, *NO_PARTS)

@@ -11,9 +11,10 @@ from typing import Any, Final
 
 from node.kernels.angles import advance_binary, from_binary, to_binary, wrap
 from node.kernels.error_model import isolate, propagate, set_apart
+from node.kernels.increments import bend_at, bent_angle, faster
 from node.kernels.jit import constant, kernel
 from node.kernels.layout import CLOCK_SLACK, INVERTED, RING, STATES, UNKNOWN_YAW_VAR, Array, Err, Status
-from node.kernels.ring import drop_first_pending, stood_still
+from node.kernels.ring import drop_first_pending, is_split, stood_still
 from node.kernels.smoothing import carry
 from node.kernels.strapdown import rotate_down, yaw_rate
 from node.kernels.update import clear, correct, innovation_var, intersect, level, zero_rate
@@ -37,13 +38,16 @@ def slope(state: Any, cycle: int) -> float:
 
 @kernel
 def spin(state: Any, cycle: int, begin: float, end: float) -> float:
-    """Mean spin (rad/s) from ``begin`` to ``end`` (s) inside ``cycle``: it changes linearly about the cycle's mean."""
+    """Mean spin (rad/s) from ``begin`` to ``end`` (s) inside ``cycle``: that of its parts, or linear about its mean."""
     slot = cycle % RING
     if stood_still(state, cycle):
         return 0.0
     inside = max(begin, state.ring_start[slot])  # the rest are cycles that were lost
-    off_centre = 0.5 * (inside + end - state.ring_start[slot] - state.ring_end[slot])
-    measured = state.ring_rate[slot, 2] + slope(state, cycle) * off_centre
+    if is_split(state, cycle):
+        beyond = faster(state, cycle, inside, end)
+    else:
+        beyond = slope(state, cycle) * 0.5 * (inside + end - state.ring_start[slot] - state.ring_end[slot])
+    measured = state.ring_rate[slot, 2] + beyond
     return float((measured - state.static_bias[2] - state.bias[2]) / (1.0 + state.scale))
 
 
@@ -100,12 +104,17 @@ def interpolation_var(state: Any, cycle: int, at: float) -> float:
 
     Where the drive starts or ends a ramp the spin at the edge of a cycle is wrong by up to a quarter of the bend, and
     so are the angle from the edge to ``at`` (s) and the effect of the time stamp's error d. On a ramp of slope a that
-    effect is w d + a d^2 / 2, of which the filter takes the first term: E[(a d^2 / 2)^2] = 3/4 a^2 P_dd^2.
+    effect is w d + a d^2 / 2, of which the filter takes the first term: E[(a d^2 / 2)^2] = 3/4 a^2 P_dd^2. Where the
+    parts of the cycle are known the bend is that of its parts.
     """
     slot = cycle % RING
     inside = min(at - state.ring_start[slot], state.ring_end[slot] - at)
     if cycle == 0:
         return 0.0
+    if is_split(state, cycle):
+        curved = slope(state, cycle) * state.P[D, D]
+        beside = (0.25 * bend_at(state, cycle, at)) ** 2 * state.P[D, D]
+        return float(bent_angle(state, cycle, at) ** 2 + beside + 0.75 * curved * curved)
     bend = 2.0 * (state.ring_rate[slot, 2] - state.ring_rate[(cycle - 1) % RING, 2])
     if cycle + 1 < state.cycles:
         bend = 0.5 * bend - (state.ring_rate[(cycle + 1) % RING, 2] - state.ring_rate[slot, 2])

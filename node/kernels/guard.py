@@ -14,7 +14,7 @@ from node.kernels.doubts import follow_jump, follow_misfit, misfit_var
 from node.kernels.events import Fault, tell
 from node.kernels.gates import RATE_AGE
 from node.kernels.jit import constant, kernel
-from node.kernels.layout import DEG, Status
+from node.kernels.layout import DEG, RECENT, Status
 from node.kernels.mismatches import learn_mismatch, recover_gyro
 from node.kernels.modes import STATIC_BIAS
 from node.kernels.numbers import lasting, root, scaled, square, times, unscaled
@@ -49,6 +49,7 @@ def guard_reading(node: Any, settings: Any, saturated: int, at: float) -> None:
         for k in range(3):
             turning[k] = state.static_bias[k] + state.bias[k]
         turning[2] += scaled(guard.rate if known else guard.sane_rate, state.scale)
+        state.ring_split[state.cycles % RECENT] = 0
     else:
         guard.sane_rate = measured
     if accelerometer != 0 or keeps_out(node):

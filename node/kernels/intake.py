@@ -11,6 +11,7 @@ from node.kernels.delay import make_up_delay
 from node.kernels.jit import kernel
 from node.kernels.layout import Array
 from node.kernels.numbers import are_numbers
+from node.kernels.parts import read_parts, split_cycle
 from node.kernels.record import FX, LATE, SATURATED, TEMPERATURE, WX
 from node.kernels.resets import open_yaw
 
@@ -29,6 +30,8 @@ def take_readings(node: Any, settings: Any, parameters: Array, readings: Array, 
     for i in range(3):
         rate[i], force[i] = readings[0, WX + i], readings[0, FX + i]
     correct_one(node, parameters, 0, node.temperature, rate, force)
+    read_parts(node, parameters, readings[0], 0, length)
+    split_cycle(node, 1)
     doubt_turn(node, make_up_delay(node.cluster.delayed[0], readings[0, LATE], rate, length))
     return int(readings[0, SATURATED])
 
@@ -44,11 +47,13 @@ def take_cluster(node: Any, settings: Any, parameters: Array, readings: Array, l
         for i in range(3):
             rate[i], force[i] = readings[k, WX + i], readings[k, FX + i]
         correct_one(node, parameters, k, node.temperature, rate, force)
+        read_parts(node, parameters, readings[k], k, length)
         doubt = max(doubt, make_up_delay(node.cluster.delayed[k], readings[k, LATE], rate, length))
         for i in range(3):
             cluster.readings[k, i] = rate[i] - offsets[k, i]
     doubt_turn(node, doubt)
     fuse_imus(node, settings, readings)
+    split_cycle(node, settings.imus)
 
 
 @kernel

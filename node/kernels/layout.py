@@ -15,6 +15,9 @@ Array: TypeAlias = "np.ndarray[Any, np.dtype[Any]]"
 
 STATES: Final = 8
 RING: Final = 64
+PARTS: Final = 8  # of a cycle, whose turn a sensor may tell each by itself
+RECENT: Final = 8  # cycles of which they are kept
+KNOWN, BEGAN_STILL, ENDED_STILL = 1, 2, 4  # bits of such a cycle: its parts are known, it began and ended at rest
 PENDING: Final = 4
 UNKNOWN_YAW_VAR: Final = 3.29  # rad^2, uniform over the turn
 CLOCK_SLACK: Final = 0.05  # s, by which an aiding may seem to be of the next cycle for the clock's error alone
@@ -104,6 +107,8 @@ STATE: Final = np.dtype(
         ("ring_rate", "f8", (RING, 3)),  # rad/s, mean over each
         ("ring_force", "f8", (RING, 3)),  # m/s^2, mean over each
         ("ring_quiet", "i8", (RING,)),  # 1 where the node was at rest
+        ("ring_split", "i8", (RECENT,)),  # what of the inside of each of the last is known, as bits
+        ("ring_parts", "f8", (RECENT, PARTS)),  # rad/s about the axis, of each part beyond the mean of its cycle
         # modes
         ("mode", "i8"),  # 1 static bias, 3 tracking, 4 still, 5 survey, 6 held
         ("still_cycles", "i8"),  # cycles at rest in a row

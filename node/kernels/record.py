@@ -11,13 +11,13 @@ from typing import Final
 import numpy as np
 
 from node.kernels.alignment import MAX_IMUS, MOUNT, new_mount
-from node.kernels.layout import CONFIG, RING, STATE, Array, new_state
+from node.kernels.layout import CONFIG, PARTS, RING, STATE, Array, new_state
 from node.kernels.static_average import STATIC
 from node.kernels.sweep import OFFSET, SWEEP
 
 # of the saved record; 1 and 2 held the filter alone, 3 what a start clears as well, 4 no doubts, 5 fewer mismatches,
-# 6 no odd forces, 7 no swings, 8 no ramps, 9 no revisions
-NODE_LAYOUT: Final = 10
+# 6 no odd forces, 7 no swings, 8 no ramps, 9 no revisions, 10 no parts of cycles
+NODE_LAYOUT: Final = 11
 EVENTS_KEPT: Final = 32  # that wait to be said
 NUMBERS: Final = 10  # of one event
 DISAGREEMENTS: Final = 3  # aidings in a row, until a mismatch is a fault
@@ -200,6 +200,8 @@ CLUSTER: Final = np.dtype(
         ("faults", "i8", (MAX_IMUS,)),  # ``Fault`` of the newest cycle
         ("watches", READINGS, (MAX_IMUS,)),  # what the raw readings of each show by themselves
         ("delayed", DELAYED, (MAX_IMUS,)),  # windows of each that are not the cycles'
+        ("split", "i8", (MAX_IMUS,)),  # 1: it tells the parts of the newest cycle
+        ("parts", "f8", (MAX_IMUS, PARTS)),  # rad/s, of these beyond their mean, about the tube's axis
         ("expected", "f8", (3,)),  # rad/s, before the IMUs were apart
         ("cycles", "i8"),  # cycles written so far
         ("ring_force", "f8", (MAX_IMUS, RING, 3)),  # m/s^2, corrected, tube's frame
@@ -309,8 +311,8 @@ KEPT: Final = ("filter", "mount", "guard", "twist", "joints")  # what a save hol
 KEPT_SIZE: Final = int(NODE.fields["cycles"][1]) if NODE.fields else 0  # bytes of it, from the first on
 
 # what one cycle brings, float64; of every IMU a row
-WX, WY, WZ, FX, FY, FZ, TEMPERATURE, SATURATED, LATE = range(9)
-READING: Final = 9
+WX, WY, WZ, FX, FY, FZ, TEMPERATURE, SATURATED, LATE, SPLIT, PART = range(11)
+READING: Final = PART + PARTS
 START, END, JOINED, HOPS, CLOCK_VAR, SYNCHRONISED = range(6)
 MOMENT: Final = 6
 # an aiding, float64; see ``node.kernels.step.node_aiding``

@@ -8,7 +8,7 @@ from __future__ import annotations
 from typing import Any, TypeAlias
 
 from node.kernels.jit import kernel
-from node.kernels.layout import RING, Array
+from node.kernels.layout import BEGAN_STILL, ENDED_STILL, RECENT, RING, Array
 
 Number: TypeAlias = float  # or an integer in the format of the state given
 
@@ -29,13 +29,25 @@ def push(state: Any, start: Number, end: Number, rate: Array, force: Array, quie
 
 
 @kernel
+def is_split(state: Any, cycle: int) -> bool:
+    """Whether the parts of ``cycle`` are known; those of the oldest kept may be the coming cycle's already."""
+    return bool(cycle >= 0 and cycle > state.cycles - RECENT and state.ring_split[cycle % RECENT] != 0)
+
+
+@kernel
+def was_quiet(state: Any, cycle: int, where: int) -> bool:
+    """Whether ``cycle`` was quiet, or at least at the end that counts, ``BEGAN_STILL`` or ``ENDED_STILL``."""
+    if state.ring_quiet[cycle % RING] != 0:
+        return True
+    return bool(is_split(state, cycle) and state.ring_split[cycle % RECENT] & where != 0)
+
+
+@kernel
 def stood_still(state: Any, cycle: int) -> bool:
-    """Whether the string stood still in ``cycle``: it and both neighbours were quiet."""
-    if state.ring_quiet[cycle % RING] == 0 or cycle == 0:
+    """Whether the string stood still in ``cycle``: it was quiet, and so were its neighbours where they touch it."""
+    if state.ring_quiet[cycle % RING] == 0 or cycle == 0 or not was_quiet(state, cycle - 1, ENDED_STILL):
         return False
-    if state.ring_quiet[(cycle - 1) % RING] == 0:
-        return False
-    return bool(cycle + 1 >= state.cycles or state.ring_quiet[(cycle + 1) % RING] != 0)
+    return bool(cycle + 1 >= state.cycles or was_quiet(state, cycle + 1, BEGAN_STILL))
 
 
 @kernel

@@ -92,8 +92,9 @@ def node_step(nodes: Array, settings: Array, parameters: Array, readings: Array,
     ----------
     nodes, settings : one-element arrays of dtype ``NODE`` and ``SETTINGS``
     parameters : of dtype ``PARAMETERS``: the block in use, then the own correction of each IMU
-    readings : (imus, 9) rates (rad/s), forces (m/s^2), temperature (C), bits of what was at the range, and by how much
-        (s) the window that they are of ended before the cycle
+    readings : (imus, 18) rates (rad/s), forces (m/s^2), temperature (C), bits of what was at the range, by how much (s)
+        the window that they are of ended before the cycle, and 1 where the eight parts of this window are known, whose
+        rates about z (rad/s) follow
     moment : (6,) start and end (s, own clock), joined, hops, variance of the clock (s^2), synchronised
     """
     return int(step_around(run_cycle, nodes, settings, parameters, readings, moment))

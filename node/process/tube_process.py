@@ -17,15 +17,15 @@ from node.firmware.settings import TubeSettings
 from node.firmware.silent_tubes import across
 from node.firmware.tube import Tube
 from node.kernels.alignment import new_mount
-from node.kernels.calibration import USUAL
-from node.kernels.layout import PERIOD, Array, Scheme, default_config
+from node.kernels.layout import Array, Scheme, default_config
 from node.kernels.record import new_node
 from node.kernels.resets import forget_bias, lose_tilt
 from node.process.block_store import BlockStore
 from node.process.block_updater import BlockUpdater, load_parameters
 from node.process.command_handlers import CommandHandlers
 from node.process.counter import BootCounter
-from node.process.drivers.source import NOTHING, ImuSource, SafeImu
+from node.process.drivers.source import ImuSource, SafeImu
+from node.process.reading import reading_of
 from node.process.saver import Saver
 from node.process.survey_log import SurveyLog
 from telemetry.application.endpoint import REPORT_EVERY, Endpoint
@@ -183,7 +183,7 @@ class TubeProcess(Process):
         if self._imus:
             start, samples = reading.start, [imu.read(reading.start, now) for imu in self._imus]
             first, *others = [
-                ImuReading(start, now, s.rate, s.force, s.temperature, s.saturated, s.late) for s in samples
+                ImuReading(start, now, s.rate, s.force, s.temperature, s.saturated, s.late, s.parts) for s in samples
             ]
             reading = replace(first, others=tuple(others))
         self._lap(Stage.READ)
@@ -372,35 +372,3 @@ def jump_of(event: Event) -> float:
     """By how much (s) the event says that the own clock jumped, at most what a clock may be doubted by."""
     by = event.arguments.get("by_s", MAX_CLOCK_STD)
     return min(abs(float(by)), MAX_CLOCK_STD) if isinstance(by, (int, float)) else MAX_CLOCK_STD
-
-
-def reading_of(data: Any, now: float) -> ImuReading:
-    """Reading of a cycle that ended at ``now`` (s, own clock); invalid data give a reading of NaN.
-
-    ``data`` is the start and the numbers of the IMU, or the start and a list of numbers for each IMU of a cluster.
-    """
-    try:
-        start, *items = data
-        begin = float(start)
-        rows = items if items and all(isinstance(item, list | tuple) for item in items) else [items]
-    except (TypeError, ValueError, OverflowError):
-        return ImuReading(now - PERIOD, now, NOTHING, NOTHING)
-    first, *others = [imu_reading(row, begin, now) for row in rows]
-    return replace(first, others=tuple(others)) if others else first
-
-
-def imu_reading(items: Any, start: float, end: float) -> ImuReading:
-    """Reading of one IMU from ``start`` to ``end`` (s, own clock): three rates, three forces.
-
-    Perhaps a temperature follows, bits of what was at its range within the cycle, and by how much its window was late.
-    """
-    try:
-        numbers = list(map(float, items))
-    except (TypeError, ValueError, OverflowError):
-        numbers = []
-    if not 6 <= len(numbers) <= 9:
-        return ImuReading(start, end, NOTHING, NOTHING)
-    wx, wy, wz, fx, fy, fz, *rest = numbers
-    clipped = int(rest[1]) if len(rest) > 1 and math.isfinite(rest[1]) else 0
-    temperature = rest[0] if rest else USUAL
-    return ImuReading(start, end, (wx, wy, wz), (fx, fy, fz), temperature, clipped)

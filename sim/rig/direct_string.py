@@ -16,15 +16,16 @@ import numpy as np
 import numpy.typing as npt
 
 from node.firmware.encoder import EncoderNode, EncoderSample
-from node.firmware.inputs import ImuReading, RigContext
+from node.firmware.inputs import RigContext
 from node.firmware.reporter import VAR_FLOOR
 from node.firmware.tube import Tube
 from node.kernels.address import firmware
 from node.kernels.angles import from_binary, wrap
 from node.kernels.calibration import PARAMETERS, USUAL
 from node.kernels.layout import PERIOD, Err, Scheme, default_config
-from node.kernels.record import A_VALID, END, LATE, READING, SATURATED, TEMPERATURE, new_node
+from node.kernels.record import A_VALID, END, LATE, PART, READING, SATURATED, SPLIT, TEMPERATURE, new_node
 from node.kernels.step import ADMITTED
+from node.process.reading import reading_of
 from sim.errors import ScenarioError
 from sim.rig.encoder_course import is_plain, measured_of
 from sim.rig.plain_encoder import PlainEncoder
@@ -258,6 +259,10 @@ class DirectString:
                 readings[:, tube - 1, 0, TEMPERATURE] = found.temperature
                 readings[:, tube - 1, 0, SATURATED] = found.clipped
                 readings[:, tube - 1, 0, LATE] = found.late
+            if (parts := world.imu_parts(tube)) is not None:
+                known = np.isfinite(parts).all(axis=1)
+                readings[:, tube - 1, 0, SPLIT] = known
+                readings[:, tube - 1, 0, PART:] = np.where(known[:, None], parts, 0.0)
         return readings
 
     def _arrivals(self, measured_at: Array) -> Array:
@@ -317,8 +322,8 @@ class DirectString:
         begin, end = self.world.cycle_end(cycle - 1) + phase, self.world.cycle_end(cycle) + phase
         shift = self.clock_shifts.get(tube, 0.0)
         sample = self.world.imu_sample(tube, cycle)
-        wx, wy, wz, fx, fy, fz, *more = sample if self._spoil is None else self._spoil(tube, cycle, sample)
-        reading = ImuReading(begin + shift, end + shift, (wx, wy, wz), (fx, fy, fz), *more)
+        spoilt = sample if self._spoil is None else self._spoil(tube, cycle, sample)
+        reading = reading_of((begin + shift, *spoilt), end + shift)
         return self.tubes[tube].on_cycle(reading, self._context(tube, string[0], end))
 
     def _context(self, tube: int, top: int, end: float) -> RigContext:

@@ -14,9 +14,11 @@ import numpy as np
 import numpy.typing as npt
 
 from node.kernels.calibration import USUAL
-from node.kernels.layout import PERIOD
+from node.kernels.layout import PARTS, PERIOD
 from node.process.drivers.frame_clock import FrameClock
+from node.process.drivers.parts import parts_of
 from sim.world.imu_errors import ImuErrors
+from sim.world.increments import eighths
 from sim.world.rough_section import RoughSection, RoughSensorSection, RoughVibrationSection
 from sim.world.streams import Stream, stream
 
@@ -30,12 +32,16 @@ FRAME_STEPS = 32768.0  # of a range
 
 @dataclass(frozen=True, slots=True)
 class Cycles:
-    """Readings of one IMU: (cycles, 6) rad/s and m/s^2, (cycles,) C, bits, and s that their windows were late by."""
+    """Readings of one IMU: (cycles, 6) rad/s and m/s^2, (cycles,) C, bits, and s that their windows were late by.
+
+    ``parts`` are the rates about z of the eighths of each window (cycles, 8), rad/s; NaN or None if not told.
+    """
 
     readings: Array
     temperature: Array
     clipped: Flags
     late: Array
+    parts: Array | None
 
 
 def band_noise(random: np.random.Generator, count: int, rate: float, lowest: float, highest: float) -> Array:
@@ -96,12 +102,14 @@ class RoughImu:
         slow = slow + math.radians(sensor.warm_up_dps) * self._warmth(times)[:, None]
         if sensor.frames_hz > 0.0:
             measured = self._frames(rate, force, times, slow)
-            mean, flags, late = self._means(measured, times, ends)
+            mean, flags, late, parts = self._means(measured, times, ends)
         else:
             mean = self._exact(rate, force, ends, slow)
             flags, late = np.zeros(len(ends), np.int64), np.zeros(len(ends))
+            parts = self._eighths(rate[:, 2], mean[:, 2], ends) if self._errors.gyroscope.increments else None
         flags |= self._by_cycle(hidden, ends)
-        return Cycles(mean, USUAL + sensor.warm_up_c * self._warmth(ends), flags, late + sensor.delay)
+        temperature = USUAL + sensor.warm_up_c * self._warmth(ends)
+        return Cycles(mean, temperature, flags, late + sensor.delay, parts)
 
     def _warmth(self, t: Array) -> Array:
         """How far (0..1) the sensor has warmed up by rig times ``t``."""
@@ -161,6 +169,17 @@ class RoughImu:
         accelerometer = self._errors.accelerometer.model_copy(update={"vibration_mps2": 0.0})
         return self._measured(ImuErrors(self._errors.gyroscope, accelerometer), mean[:, :3] + slow, mean[:, 3:], PERIOD)
 
+    def _eighths(self, rate: Array, mean: Array, ends: Array) -> Array:
+        """What each eighth between two time stamps shows, the ``rate`` (n,) on the grid about z: (m, 8) rad/s."""
+        stamps = self._stamps(ends)
+        borders = stamps[:-1, None] + np.diff(stamps)[:, None] * (np.arange(PARTS) / PARTS)
+        borders = np.append(borders.ravel(), stamps[-1])
+        turned = (self._mean_between(rate, borders) * np.diff(borders)).reshape(-1, PARTS)
+        turned *= (PERIOD / np.diff(stamps))[:, None]
+        shown = float(self._errors.constants(stream(self._seed, Stream.GYRO, *self._key))[1][2, 2])
+        noise = stream(self._seed, Stream.INCREMENTS, *self._key)
+        return eighths(mean, shown * turned, self._errors.gyroscope, noise)
+
     def _measured(self, errors: ImuErrors, rate: Array, force: Array, period: float) -> Array:
         gyro = errors.gyro(stream(self._seed, Stream.GYRO, *self._key), rate, force, period)
         random = stream(self._seed, Stream.ACCELEROMETER, *self._key)
@@ -183,10 +202,10 @@ class RoughImu:
         at = np.interp(stamps, self._t, integral)
         return np.asarray(np.diff(at) / np.diff(stamps))
 
-    def _means(self, frames: Array, times: Array, ends: Array) -> tuple[Array, Flags, Array]:
+    def _means(self, frames: Array, times: Array, ends: Array) -> tuple[Array, Flags, Array, Array]:
         """Mean of the frames that each read finds, bits of the cycles of which one stood at the range, and lateness.
 
-        The last is what a driver makes of the frames it counts.
+        The last is what a driver makes of the frames it counts, and so are the eighths of the window.
         """
         cuts = np.searchsorted(times, self._stamps(ends))
         sums = np.concatenate([np.zeros((1, 6)), np.cumsum(frames, axis=0)])
@@ -195,10 +214,13 @@ class RoughImu:
         high = np.concatenate([[0], np.cumsum(np.any(np.abs(frames[:, :3]) >= limit, axis=1))])
         clipped = np.asarray(GYRO_CLIPPED * (high[cuts[1:]] > high[cuts[:-1]]), np.int64)
         clock, late = FrameClock(self._section.sensor.frames_hz), np.zeros(len(ends))
+        parts = np.full((len(ends), PARTS), np.nan)
         for k, (end, found) in enumerate(zip(ends.tolist(), np.diff(cuts).tolist(), strict=True)):
             clock.on_read(end, found)
             late[k] = end - clock.end
-        return mean, clipped, late
+            if told := parts_of(frames[cuts[k] : cuts[k + 1], 2]):
+                parts[k] = told
+        return mean, clipped, late, parts
 
     def _by_cycle(self, cut: Flags, ends: Array) -> Flags:
         """Bits of the samples of every cycle together."""

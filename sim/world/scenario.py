@@ -134,6 +134,7 @@ class GyroSection(Section):
     g_sensitivity_dps_per_g: NotNegative = 0.0
     bias_step_dps: float = Field(0.0, description="of the z axis, from the first turning on")
     instantaneous: bool = Field(False, description="read once at the end of a cycle, not averaged over it")
+    increments: bool = Field(False, description="tells the turn about z in every eighth of a cycle; a FIFO always does")
     range_dps: Positive = 500.0
     resolution_dps: NotNegative = Field(2.6e-3, description="500 deg/s / 32768 over 34 readings of one cycle")
 

@@ -42,6 +42,7 @@ class Stream(IntEnum):
     ROUGH_JITTER = 45  # of an IMU's time stamps
     ROUGH_PULL = 46  # of the force on a gyroscope's axes
     ROUGH_STOP_ANGLES = 47  # where a driller stops
+    INCREMENTS = 48  # noise of the eighths of a cycle about their mean
     WELLS = 2000  # a string in one of many wells, for the coverage of ellipses
     TURN_TABLE = 3001  # a gyroscope and its table
     ROBOT_ARM = 3002  # an accelerometer and its arm

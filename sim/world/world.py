@@ -13,11 +13,13 @@ import numpy.typing as npt
 from node.firmware.imu_settings import ImuSettings
 from node.firmware.settings import Joint, PassedTube, TubeSettings
 from node.firmware.torque import TorqueSettings
+from node.kernels.calibration import USUAL
 from node.kernels.layout import PERIOD, Scheme
 from sim.errors import ScenarioError
 from sim.faults import KillNode
 from sim.world.disc import Disc
 from sim.world.imu_errors import Drift, ImuErrors, single_samples
+from sim.world.increments import borders_of, eighths
 from sim.world.motion import Motion, Phase, Trapezoid
 from sim.world.rack import Rack
 from sim.world.radio import RadioLinks
@@ -90,6 +92,7 @@ class World:
         self.faults: tuple[KillNode, ...] = scenario.faults
         self._noises = file.node.imu_noise or (1.0,) * file.node.imus
         self._samples: dict[tuple[int, int], Array] = {}
+        self._parts: dict[tuple[int, int], Array] = {}
         self._rough_cycles: dict[tuple[int, int], Cycles] = {}
         self._rough_truths: dict[int, RoughTruth] = {}
         edge_std = math.radians(file.encoder.edge_std_deg)
@@ -121,18 +124,23 @@ class World:
     def imu_sample(self, tube: int, cycle: int) -> list[Any]:
         """Three mean rates (rad/s) and three mean specific forces (m/s^2) of one cycle, errors and all.
 
-        In a rough world temperature (C), bits of what was clipped and the lateness of the window (s) follow. Of several
-        IMUs a list of such lists.
+        In a rough world temperature (C), bits of what was clipped and the lateness of the window (s) follow, and of a
+        sensor that tells increments the rates about z (rad/s) of the eighths of the window. Of several IMUs a list of
+        such lists.
         """
         one, *others = [self._imu_sample(tube, cycle, imu) for imu in range(len(self._noises))]
         return [one, *others] if others else one
 
     def _imu_sample(self, tube: int, cycle: int, imu: int) -> list[Any]:
         sample: list[Any] = self.imu_samples(tube, imu)[cycle].tolist()
-        if self.scenario.file.rough is None:
-            return sample
-        found = self.rough_cycles(tube, imu)
-        return [*sample, float(found.temperature[cycle]), int(found.clipped[cycle]), float(found.late[cycle])]
+        parts = self.imu_parts(tube, imu)
+        known = parts is not None and bool(np.isfinite(parts[cycle]).all())
+        if self.scenario.file.rough is not None:
+            found = self.rough_cycles(tube, imu)
+            sample += [float(found.temperature[cycle]), int(found.clipped[cycle]), float(found.late[cycle])]
+        elif known:
+            sample += [USUAL, 0, 0.0]
+        return sample + parts[cycle].tolist() if parts is not None and known else sample
 
     def encoder_sample(self, t: float) -> tuple[int, float, int, float | None, tuple[float, ...]]:
         """Count, rig time of its last edge, 1 (the string turns one way, so every edge rises), torque, earlier edges.
@@ -360,6 +368,29 @@ class World:
         if (tube, imu) not in self._samples:
             self._samples[tube, imu] = self.readings(tube, self.ends + self.phase(tube), PERIOD, imu)
         return self._samples[tube, imu]
+
+    def imu_parts(self, tube: int, imu: int = 0) -> Array | None:
+        """Rates about z (cycles, 8, rad/s) of the eighths of each window; NaN where, and None if they are not told."""
+        file = self.scenario.file
+        if file.rough is not None:
+            return self.rough_cycles(tube, imu).parts
+        if not file.gyroscope.increments or file.gyroscope.instantaneous:
+            return None
+        if (tube, imu) not in self._parts:
+            self._parts[tube, imu] = self._eighths(tube, imu)
+        return self._parts[tube, imu]
+
+    def _eighths(self, tube: int, imu: int) -> Array:
+        ends, random = self.ends + self.phase(tube), self._random(Stream.GYRO, tube, imu)
+        errors = ImuErrors(self.scenario.file.gyroscope, self.scenario.file.accelerometer).times(self._noises[imu])
+        shown = float((errors.constants(random)[1] @ self.imu_frame(tube, imu)[:, 2])[2])  # of a turn about the axis
+        borders = borders_of(ends)
+        turned = self.truth(tube).turned(borders.ravel())[0].reshape(borders.shape)
+        noise = self._random(Stream.INCREMENTS, tube, imu)
+        found = eighths(self.imu_samples(tube, imu)[:, 2], shown * np.diff(turned, axis=1), errors.gyroscope, noise)
+        if self.rack is not None:
+            found[ends <= self.rack.end] = np.nan
+        return found
 
     def readings(self, tube: int, ends: Array, period: float, imu: int = 0) -> Array:
         """Readings (n, 6) of the means over ``period`` (s) that end at the rig times ``ends`` (n,), one after another.

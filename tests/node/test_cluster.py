@@ -24,8 +24,9 @@ from node.kernels.cluster_watch import DISAGREEING, HEALTHY
 from node.kernels.layout import DEG, PERIOD, Err, default_config
 from node.kernels.record import new_node
 from node.process.drivers.replay import ReplayImu
+from node.process.reading import reading_of
 from node.process.tube_command import node as command
-from node.process.tube_process import TubeProcess, reading_of
+from node.process.tube_process import TubeProcess
 from telemetry.messages import Event, NodeFlag, Severity, SurveyMeasurement
 from telemetry.parameters import SensorParameters
 

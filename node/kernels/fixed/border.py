@@ -69,6 +69,10 @@ def show_cycle(fixed: Any, state: Any, gravity: float) -> None:
     rate, time, vector = 2.0**-RATE_Q, 2.0**-TIME_Q, 2.0**-VECTOR_Q
     state.ring_start[slot], state.ring_end[slot] = fixed.ring_start[slot] * time, fixed.ring_end[slot] * time
     state.ring_quiet[slot] = fixed.ring_quiet[slot]
+    recent = (fixed.cycles - 1) % fixed.ring_split.shape[0]
+    state.ring_split[recent] = fixed.ring_split[recent]
+    for j in range(fixed.ring_parts.shape[1]):
+        state.ring_parts[recent, j] = fixed.ring_parts[recent, j] * rate
     for k in range(3):
         state.ring_rate[slot, k] = fixed.ring_rate[slot, k] * rate
         state.ring_force[slot, k] = fixed.ring_force[slot, k] * (2.0**-FORCE_Q * gravity)
@@ -268,6 +272,9 @@ def learn_ring(fixed: Any, state: Any, gravity: float) -> None:
         hold_vector(fixed, fixed.ring_rate[k], state.ring_rate[k], 2.0**RATE_Q)
         hold_forces(fixed, fixed.ring_force[k], state.ring_force[k], gravity)
         fixed.ring_quiet[k] = state.ring_quiet[k]
+    for k in range(fixed.ring_split.shape[0]):
+        fixed.ring_split[k] = state.ring_split[k]
+        hold_vector(fixed, fixed.ring_parts[k], state.ring_parts[k], 2.0**RATE_Q)
 
 
 @kernel

@@ -25,9 +25,11 @@ from node.kernels.fixed.strapdown import half_turn, rotate_down, yaw_rate
 from node.kernels.fixed.trigonometry import TURN, counts
 from node.kernels.fixed.update import level, zero_rate
 from node.kernels.fixed_lag import COARSE
+from node.kernels.increments import bend_at, bent_angle, faster
 from node.kernels.jit import constant, kernel
 from node.kernels.layout import CLOCK_SLACK, INVERTED, RING, STATES, Array, Err, Status
-from node.kernels.ring import drop_first_pending, stood_still
+from node.kernels.numbers import square
+from node.kernels.ring import drop_first_pending, is_split, stood_still
 
 PSI, BZ, D = constant(Err.YAW), constant(Err.BIAS_Z), constant(Err.STAMP)
 LATE_DROPPED = int(Status.LATE_DROPPED)
@@ -53,12 +55,14 @@ def true_rate_z(state: Any, measured: int) -> int:
 
 @kernel
 def spin(state: Any, cycle: int, begin: int, end: int) -> int:
-    """Mean spin (rad/s, Q46) from ``begin`` to ``end`` (s, Q28) inside ``cycle``: linear about its mean."""
+    """Mean spin (rad/s, Q46) from ``begin`` to ``end`` (s, Q28) inside ``cycle``: of its parts, or linear."""
     if stood_still(state, cycle):
         return 0
     slot = cycle & SLOT
     measured = state.ring_rate[slot, 2]
-    if cycle > 0 and cycle + 1 < state.cycles:
+    if is_split(state, cycle):
+        measured += faster(state, cycle, max(begin, state.ring_start[slot]), end)
+    elif cycle > 0 and cycle + 1 < state.cycles:
         before, after = (cycle - 1) & SLOT, (cycle + 1) & SLOT
         inside = max(begin, state.ring_start[slot])  # the rest are cycles that were lost
         off = inside + end - state.ring_start[slot] - state.ring_end[slot]
@@ -156,6 +160,10 @@ def interpolation_var(state: Any, cycle: int, at: int) -> int:
     if cycle == 0:
         return 0
     slot = cycle & SLOT
+    if is_split(state, cycle):
+        a_unit = shift(bend_at(state, cycle, at), RATE_RIGHT + 2)
+        beside = mul(mul(state.P[D, D], a_unit), a_unit)
+        return square(bent_angle(state, cycle, at)) + beside + curvature_var(state, cycle)
     inside = abs(min(at - state.ring_start[slot], state.ring_end[slot] - at))
     bend = 2 * (state.ring_rate[slot, 2] - state.ring_rate[(cycle - 1) & SLOT, 2])
     if cycle + 1 < state.cycles:

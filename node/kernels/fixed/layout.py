@@ -10,7 +10,7 @@ from typing import Final
 
 import numpy as np
 
-from node.kernels.layout import PENDING, RING, STATES, UNKNOWN_YAW_VAR
+from node.kernels.layout import PARTS, PENDING, RECENT, RING, STATES, UNKNOWN_YAW_VAR
 
 TIME_Q: Final = 28  # s, 3.7 ns
 RATE_Q: Final = 46  # rad/s, also of the scale (1) and the stamp (s): read as Q40 they count units of 2^-6
@@ -76,6 +76,8 @@ FIXED_STATE: Final = np.dtype(
         ("ring_rate", "i8", (RING, 3)),  # rad/s, Q46
         ("ring_force", "i8", (RING, 3)),  # g, Q26
         ("ring_quiet", "i8", (RING,)),
+        ("ring_split", "i8", (RECENT,)),
+        ("ring_parts", "i8", (RECENT, PARTS)),  # rad/s, Q46
         # modes
         ("mode", "i8"),
         ("still_cycles", "i8"),

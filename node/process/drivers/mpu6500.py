@@ -2,8 +2,9 @@
 
 Sampled at 50 Hz behind the sensor's own low-pass of 20 Hz, a cycle is 26 frames of 14 bytes, well inside the FIFO's
 512. The mean of the frames is that of their own window, which ends half a frame after the newest, earlier by the delay
-of the low-pass; the sample says so. Source: InvenSense, MPU-6500 register map and descriptions,
-revision 2.1 (registers, WHO_AM_I = 0x70, temperature, delays) and product specification, revision 1.3 (sensitivities).
+of the low-pass; the sample says so, and what the eighths of that window turned. Source: InvenSense, MPU-6500 register
+map and descriptions, revision 2.1 (registers, WHO_AM_I = 0x70, temperature, delays) and product specification,
+revision 1.3 (sensitivities).
 """
 
 from __future__ import annotations
@@ -20,6 +21,7 @@ import numpy as np
 
 from node.errors import SensorError
 from node.process.drivers.frame_clock import FrameClock
+from node.process.drivers.parts import parts_of
 from node.process.drivers.source import ImuSample
 
 SMPLRT_DIV, CONFIG, GYRO_CONFIG, ACCEL_CONFIG, ACCEL_CONFIG_2 = 0x19, 0x1A, 0x1B, 0x1C, 0x1D
@@ -42,6 +44,7 @@ EVERYTHING: Final = 0xF8  # of FIFO_EN: temperature, three rates, force
 G: Final = 9.80665  # m/s^2
 RESET_TIME, WAKE_TIME = 0.1, 0.05  # s
 TRIES: Final = 2  # of one transfer
+MISSED: Final = 2.0  # frames, by which those of a cycle may differ from what it takes
 
 
 class Bus(Protocol):
@@ -160,6 +163,9 @@ class Mpu6500:
             raise SensorError(f"mpu6500: expected about {expected:.0f} frames in the FIFO, got {frames}")
         sample = self._mean(self._drain(frames * FRAME))
         self._frames.on_read(end, frames)
+        lacks = abs(frames * self._frames.period - (end - begin))
+        if fresh or overflown or lacks > MISSED * self._frames.period:  # its window is not known to be the cycle's
+            sample = replace(sample, parts=())
         if overflown:
             self._empty()
             self._frames.begin()
@@ -204,6 +210,7 @@ class Mpu6500:
             (float(force[0]), float(force[1]), float(force[2])),
             float(frames[:, 3].mean()) / 333.87 + 21.0,
             saturated,
+            parts=parts_of(frames[:, 6] * self._rate_lsb),
         )
 
     def _get(self, register: int) -> int:

@@ -1,0 +1,48 @@
+"""What the process of a tube is given as its cycle's data, as a reading."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+from typing import Any
+
+from node.firmware.inputs import ImuReading
+from node.kernels.calibration import USUAL
+from node.kernels.layout import PARTS, PERIOD
+from node.process.drivers.source import NOTHING
+
+LEAST, MOST = 6, 9  # numbers of an IMU that does not tell the parts of its cycle
+
+
+def reading_of(data: Any, now: float) -> ImuReading:
+    """Reading of a cycle that ended at ``now`` (s, own clock); invalid data give a reading of NaN.
+
+    ``data`` is the start and the numbers of the IMU, or the start and a list of numbers for each IMU of a cluster.
+    """
+    try:
+        start, *items = data
+        begin = float(start)
+        rows = items if items and all(isinstance(item, list | tuple) for item in items) else [items]
+    except (TypeError, ValueError, OverflowError):
+        return ImuReading(now - PERIOD, now, NOTHING, NOTHING)
+    first, *others = [imu_reading(row, begin, now) for row in rows]
+    return replace(first, others=tuple(others)) if others else first
+
+
+def imu_reading(items: Any, start: float, end: float) -> ImuReading:
+    """Reading of one IMU from ``start`` to ``end`` (s, own clock): three rates, three forces.
+
+    Perhaps a temperature follows, bits of what was at its range within the cycle, by how much its window was late, and
+    the rates about z of the eighths of that window.
+    """
+    try:
+        numbers = list(map(float, items))
+    except (TypeError, ValueError, OverflowError):
+        numbers = []
+    if not (LEAST <= len(numbers) <= MOST or len(numbers) == MOST + PARTS):
+        return ImuReading(start, end, NOTHING, NOTHING)
+    wx, wy, wz, fx, fy, fz, *rest = numbers
+    clipped = int(rest[1]) if len(rest) > 1 and math.isfinite(rest[1]) else 0
+    temperature = rest[0] if rest else USUAL
+    late = rest[2] if len(rest) > 2 and math.isfinite(rest[2]) else 0.0
+    return ImuReading(start, end, (wx, wy, wz), (fx, fy, fz), temperature, clipped, late, tuple(rest[3:]))

@@ -1,0 +1,35 @@
+"""What a gyroscope that keeps more than the mean of a cycle tells of its eighths."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import numpy.typing as npt
+
+from node.kernels.layout import PARTS, PERIOD
+from sim.world.scenario import GyroSection
+
+Array = npt.NDArray[np.float64]
+
+
+def borders_of(ends: Array) -> Array:
+    """Rig times (n, 9) of the borders of the eighths of cycles that end at ``ends`` (n,), s."""
+    return np.asarray(ends[:, None] + PERIOD * (np.arange(-PARTS, 1) / PARTS))
+
+
+def eighths(mean: Array, turned: Array, gyroscope: GyroSection, random: np.random.Generator) -> Array:
+    """Rates about z (n, 8, rad/s) of the eighths of cycles: as exact as their mean is, with the noise of their band.
+
+    Their noise is white and its mean is that of the cycle, which ``mean`` has already.
+
+    Parameters
+    ----------
+    mean : (n,) rad/s, readings of the cycles
+    turned : (n, 8) rad, that the z axis of a gyroscope without noise and bias shows of each eighth
+    gyroscope : its noise
+    random : of the noise
+    """
+    white = math.radians(gyroscope.noise_dps_rthz[2]) / math.sqrt(PERIOD / PARTS)
+    apart = turned * (PARTS / PERIOD) + white * random.standard_normal(turned.shape)
+    return np.asarray(mean[:, None] + apart - apart.mean(axis=1, keepdims=True))
