@@ -8,7 +8,7 @@
 #include <stddef.h>
 #include <stdint.h>
 
-enum { STATES = 8, RING = 64, PENDING = 4 };
+enum { STATES = 8, RING = 64, PENDING = 4, PARTS = 8, RECENT = 8 };
 #define UNKNOWN_YAW_VAR 3.29 /* rad^2 */
 #define CLOCK_SLACK 0.05 /* s */
 #define COARSE 25.0 /* times its own variance, from where an aiding is worth less for its time than for itself */
@@ -40,6 +40,8 @@ typedef struct {
     int64_t cycles, consumed;
     double ring_start[RING], ring_end[RING], ring_rate[RING][3], ring_force[RING][3];
     int64_t ring_quiet[RING];
+    int64_t ring_split[RECENT]; /* 0: its readings are means of cycles alone */
+    double ring_parts[RECENT][PARTS];
     /* modes */
     int64_t mode, still_cycles;
     double stopped_at;

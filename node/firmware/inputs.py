@@ -21,7 +21,9 @@ class ImuReading:
     temperature: float = USUAL  # C
     saturated: int = 0  # bits of what was at its range within the cycle, as the driver saw it: 1 gyroscope, 2 force
     late: float = 0.0  # s, by which the window that was measured ended before the cycle
-    parts: tuple[float, ...] = ()  # rad/s, mean rates about z of the eighths of that window; nothing: not known
+    # rad/s, nine mean rates about z: of what that window shows of the cycle before, and of the eighths of this one as
+    # far as it shows them; nothing: not known
+    parts: tuple[float, ...] = ()
     others: tuple[ImuReading, ...] = ()  # of the further IMUs of a cluster, in the same cycle
 
 

@@ -11,7 +11,7 @@ from node.kernels.delay import make_up_delay
 from node.kernels.jit import kernel
 from node.kernels.layout import Array
 from node.kernels.numbers import are_numbers
-from node.kernels.parts import read_parts, split_cycle
+from node.kernels.parts import put_right, read_parts, split_cycle
 from node.kernels.record import FX, LATE, SATURATED, TEMPERATURE, WX
 from node.kernels.resets import open_yaw
 
@@ -33,6 +33,7 @@ def take_readings(node: Any, settings: Any, parameters: Array, readings: Array, 
     read_parts(node, parameters, readings[0], 0, length)
     split_cycle(node, 1)
     doubt_turn(node, make_up_delay(node.cluster.delayed[0], readings[0, LATE], rate, length))
+    put_right(node, 1)
     return int(readings[0, SATURATED])
 
 
@@ -54,6 +55,7 @@ def take_cluster(node: Any, settings: Any, parameters: Array, readings: Array, l
     doubt_turn(node, doubt)
     fuse_imus(node, settings, readings)
     split_cycle(node, settings.imus)
+    put_right(node, settings.imus)
 
 
 @kernel

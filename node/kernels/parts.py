@@ -10,11 +10,12 @@ from typing import Any, Final
 
 from node.kernels.cluster import of_weighed, weighed
 from node.kernels.jit import kernel
-from node.kernels.layout import BEGAN_STILL, ENDED_STILL, KNOWN, PARTS, RECENT, Array
+from node.kernels.layout import BEGAN_STILL, ENDED_STILL, KNOWN, PARTS, RECENT, RING, Array
 from node.kernels.modes import STATIC_BIAS
-from node.kernels.numbers import half, is_number, number, over, share, times
+from node.kernels.numbers import half, is_number, number, over, share, speed, times
 from node.kernels.quantity import factor
-from node.kernels.record import LATE, PART, SPLIT
+from node.kernels.record import BEHIND, LATE, PART, SPLIT
+from node.kernels.ring import is_split
 
 LEAST: Final = factor(0.5)  # of a turn about the tube's axis, that a gyroscope's z axis shows
 
@@ -23,7 +24,9 @@ LEAST: Final = factor(0.5)  # of a turn about the tube's axis, that a gyroscope'
 def read_parts(node: Any, parameters: Array, reading: Array, imu: int, length: float) -> None:
     """Leave in the cluster how much faster each part of the coming cycle turned than all of it, by one IMU.
 
-    Its correction has been made, its delay not: that is known until then of the window before.
+    Its correction has been made, its delay not: that is known until then of the window before. Of the last part the end
+    is missing where the window was late: the slope from the part before goes on, but not through 0, for what slows down
+    is stopping.
 
     Parameters
     ----------
@@ -32,40 +35,66 @@ def read_parts(node: Any, parameters: Array, reading: Array, imu: int, length: f
     length : s, of the cycle
     """
     cluster = node.cluster
-    cluster.split[imu] = 1 if reading[SPLIT] != 0 else 0
+    memory = cluster.delayed[imu]
+    cluster.split[imu] = memory.told = 1 if reading[SPLIT] != 0 and are_parts(reading) else 0
     if cluster.split[imu] == 0:
         return
     told, own = reading[PART:], cluster.parts[imu]
-    for j in range(PARTS):
-        if not is_number(told[j]):
-            cluster.split[imu] = 0
-            return
-    late, since = reading[LATE], cluster.delayed[imu].late
+    late, since, part = reading[LATE], memory.late, half(half(half(length)))
     since = since if is_number(since) else late
-    turned = axis_reading(node, parameters, imu)
+    rise = told[PARTS - 1] - told[PARTS - 2]
+    ahead = told[PARTS - 1] + share(half(rise), part, part - half(late))
+    if (ahead < 0) != (told[PARTS - 1] < 0):
+        ahead = 0 * ahead
     total: float = 0
     for j in range(PARTS):
-        own[j] = told[j] if late == 0 and since == 0 else in_cycle(told, j, since, length - late + since, length)
-        total += own[j]
+        own[j] = told[j]
+        total += half(half(half(told[j])))
+    window = length - late + since
+    shown = share(total, length, window) - share(told[PARTS - 1], late, window) + share(reading[BEHIND], since, window)
+    turned = axis_reading(node, parameters, imu)
+    memory.behind, memory.ahead = over(reading[BEHIND] - shown, turned), over(ahead - shown, turned)
+    own[PARTS - 1] += share(ahead - told[PARTS - 1], late, part)
+    total += half(half(half(own[PARTS - 1] - told[PARTS - 1])))
     for j in range(PARTS):
-        own[j] = over(own[j] - half(half(half(total))), turned)
+        own[j] = over(own[j] - total, turned)
 
 
 @kernel
-def in_cycle(told: Array, part: int, since: float, window: float, length: float) -> float:
-    """Mean rate over a part of a cycle (``length`` s) by those ``told`` of a ``window`` (s).
+def are_parts(reading: Array) -> bool:
+    """Whether a reading's parts are all finite numbers."""
+    found = 1 if is_number(reading[BEHIND]) else 0
+    for j in range(PARTS):
+        found += 1 if is_number(reading[PART + j]) else 0
+    return found == PARTS + 1
 
-    The window began ``since`` s before the cycle; where it ends before it, the last of its parts goes on.
-    """
-    cell, step = half(half(half(length))), half(half(half(window)))
-    begin = since + part * cell
+
+@kernel
+def put_right(node: Any, imus: int) -> None:
+    """Add to the last cycle, which the filter has not passed yet, what the windows that came now show of its end."""
+    state, cluster = node.filter, node.cluster
+    newest = state.cycles - 1
     total: float = 0
-    for i in range(PARTS):
-        first = max(begin, i * step)
-        last = begin + cell if i == PARTS - 1 else min(begin + cell, (i + 1) * step)
-        if last > first:
-            total += share(told[i], last - first, cell)
-    return total
+    shown: float = 0
+    for k in range(imus):
+        total += cluster.weights[k] if imus > 1 else 0
+    for k in range(imus):
+        if imus == 1:
+            shown = cluster.delayed[k].shown
+        elif cluster.used[k] == 1:
+            shown += weighed(cluster.delayed[k].shown, cluster.weights[k], total)
+    if imus > 1:
+        shown = of_weighed(shown, total)
+    if shown == 0 or newest < state.consumed:
+        return
+    slot = newest % RING
+    length = state.ring_end[slot] - state.ring_start[slot]
+    faster = speed(shown, length)
+    state.ring_rate[slot, 2] += faster
+    if is_split(state, newest):
+        for j in range(PARTS):
+            state.ring_parts[newest % RECENT, j] -= faster
+        state.ring_parts[newest % RECENT, PARTS - 1] += PARTS * faster
 
 
 @kernel

@@ -189,6 +189,11 @@ DELAYED: Final = np.dtype(
         ("rate", "f8", (3,)),  # rad/s, of that window
         ("change", "f8", (3,)),  # rad/s, of it since the one before
         ("missing", "f8", (3,)),  # rad, turn of its cycle that the sensor had yet to show
+        # of the window that has just come, by its parts
+        ("told", "i8"),  # 1: they are known
+        ("behind", "f8"),  # rad/s beyond the mean, about the axis, of what was missing of the cycle before
+        ("ahead", "f8"),  # rad/s, likewise, of what is missing now
+        ("shown", "f8"),  # rad, turn of the cycle before beyond what was taken for missing
     ],
     align=True,
 )
@@ -311,7 +316,7 @@ KEPT: Final = ("filter", "mount", "guard", "twist", "joints")  # what a save hol
 KEPT_SIZE: Final = int(NODE.fields["cycles"][1]) if NODE.fields else 0  # bytes of it, from the first on
 
 # what one cycle brings, float64; of every IMU a row
-WX, WY, WZ, FX, FY, FZ, TEMPERATURE, SATURATED, LATE, SPLIT, PART = range(11)
+WX, WY, WZ, FX, FY, FZ, TEMPERATURE, SATURATED, LATE, SPLIT, BEHIND, PART = range(12)
 READING: Final = PART + PARTS
 START, END, JOINED, HOPS, CLOCK_VAR, SYNCHRONISED = range(6)
 MOMENT: Final = 6

@@ -15,7 +15,7 @@ from node.kernels.angles import wrap
 from node.kernels.cluster import learn_offsets, survey_imus
 from node.kernels.coarse_level import level_coarsely
 from node.kernels.cycle import run_cycle
-from node.kernels.doubts import noise_var, unexplained_var
+from node.kernels.doubts import noise_var, unexplained_var, window_var
 from node.kernels.events import Code, tell, told, told_degrees
 from node.kernels.fixed.layout import ANGLE_Q, VECTOR_Q
 from node.kernels.gates import admits, gate_aiding
@@ -92,9 +92,9 @@ def node_step(nodes: Array, settings: Array, parameters: Array, readings: Array,
     ----------
     nodes, settings : one-element arrays of dtype ``NODE`` and ``SETTINGS``
     parameters : of dtype ``PARAMETERS``: the block in use, then the own correction of each IMU
-    readings : (imus, 18) rates (rad/s), forces (m/s^2), temperature (C), bits of what was at the range, by how much (s)
-        the window that they are of ended before the cycle, and 1 where the eight parts of this window are known, whose
-        rates about z (rad/s) follow
+    readings : (imus, 20) rates (rad/s), forces (m/s^2), temperature (C), bits of what was at the range, by how much (s)
+        the window that they are of ended before the cycle, and 1 where its inside is known: then mean rates about z
+        (rad/s) follow, of what it shows of the cycle before, and of the eighths of this one as far as it shows them
     moment : (6,) start and end (s, own clock), joined, hops, variance of the clock (s^2), synchronised
     """
     return int(step_around(run_cycle, nodes, settings, parameters, readings, moment))
@@ -280,7 +280,7 @@ def aiding_around(offer_aiding: Callable[..., int], nodes: Array, settings: Arra
             node.filter,
             node.config,
             aiding[A_YAW],
-            aiding[A_YAW_VAR] + noise_var(node),
+            aiding[A_YAW_VAR] + noise_var(node) + window_var(node),
             own_systematic(node),
             node.down_offset,
             aiding[A_VALID],

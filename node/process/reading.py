@@ -33,13 +33,13 @@ def imu_reading(items: Any, start: float, end: float) -> ImuReading:
     """Reading of one IMU from ``start`` to ``end`` (s, own clock): three rates, three forces.
 
     Perhaps a temperature follows, bits of what was at its range within the cycle, by how much its window was late, and
-    the rates about z of the eighths of that window.
+    the mean rates about z of what it shows of the cycle before and of the eighths of this one.
     """
     try:
         numbers = list(map(float, items))
     except (TypeError, ValueError, OverflowError):
         numbers = []
-    if not (LEAST <= len(numbers) <= MOST or len(numbers) == MOST + PARTS):
+    if not (LEAST <= len(numbers) <= MOST or len(numbers) == MOST + 1 + PARTS):
         return ImuReading(start, end, NOTHING, NOTHING)
     wx, wy, wz, fx, fy, fz, *rest = numbers
     clipped = int(rest[1]) if len(rest) > 1 and math.isfinite(rest[1]) else 0

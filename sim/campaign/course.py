@@ -115,6 +115,7 @@ def refuse_others(scenario: Scenario) -> None:
         "joints.head_turn_deg": file.joints.head_turn_deg > 0.0,
         "joints.mount_tilt_std_deg": file.joints.mount_tilt_std_deg > 0.0,
         "gyroscope.instantaneous": file.gyroscope.instantaneous,
+        "gyroscope.increments": file.gyroscope.increments,
         "gyroscope.bias_step_dps": file.gyroscope.bias_step_dps != 0.0,
         "encoder.edge_times = false": not file.encoder.edge_times,
         'encoder.phase = "random"': file.encoder.phase != "locked",

@@ -23,7 +23,7 @@ from node.kernels.address import firmware
 from node.kernels.angles import from_binary, wrap
 from node.kernels.calibration import PARAMETERS, USUAL
 from node.kernels.layout import PERIOD, Err, Scheme, default_config
-from node.kernels.record import A_VALID, END, LATE, PART, READING, SATURATED, SPLIT, TEMPERATURE, new_node
+from node.kernels.record import A_VALID, BEHIND, END, LATE, READING, SATURATED, SPLIT, TEMPERATURE, new_node
 from node.kernels.step import ADMITTED
 from node.process.reading import reading_of
 from sim.errors import ScenarioError
@@ -262,7 +262,7 @@ class DirectString:
             if (parts := world.imu_parts(tube)) is not None:
                 known = np.isfinite(parts).all(axis=1)
                 readings[:, tube - 1, 0, SPLIT] = known
-                readings[:, tube - 1, 0, PART:] = np.where(known[:, None], parts, 0.0)
+                readings[:, tube - 1, 0, BEHIND:] = np.where(known[:, None], parts, 0.0)
         return readings
 
     def _arrivals(self, measured_at: Array) -> Array:

@@ -19,7 +19,9 @@ def borders_of(ends: Array) -> Array:
 
 
 def eighths(mean: Array, turned: Array, gyroscope: GyroSection, random: np.random.Generator) -> Array:
-    """Rates about z (n, 8, rad/s) of the eighths of cycles: as exact as their mean is, with the noise of their band.
+    """Rates about z (n, 9, rad/s) as a driver tells them: 0, for nothing is shown of the cycle before, and the eighths.
+
+    They are as exact as the mean is, with the noise of their band.
 
     Their noise is white and its mean is that of the cycle, which ``mean`` has already.
 
@@ -32,4 +34,5 @@ def eighths(mean: Array, turned: Array, gyroscope: GyroSection, random: np.rando
     """
     white = math.radians(gyroscope.noise_dps_rthz[2]) / math.sqrt(PERIOD / PARTS)
     apart = turned * (PARTS / PERIOD) + white * random.standard_normal(turned.shape)
-    return np.asarray(mean[:, None] + apart - apart.mean(axis=1, keepdims=True))
+    own = mean[:, None] + apart - apart.mean(axis=1, keepdims=True)
+    return np.concatenate([np.zeros((len(mean), 1)), own], axis=1)

@@ -34,7 +34,7 @@ FRAME_STEPS = 32768.0  # of a range
 class Cycles:
     """Readings of one IMU: (cycles, 6) rad/s and m/s^2, (cycles,) C, bits, and s that their windows were late by.
 
-    ``parts`` are the rates about z of the eighths of each window (cycles, 8), rad/s; NaN or None if not told.
+    ``parts`` (cycles, 9) rad/s are as a driver tells them, see ``node.process.drivers.parts``; NaN or None if not told.
     """
 
     readings: Array
@@ -170,7 +170,7 @@ class RoughImu:
         return self._measured(ImuErrors(self._errors.gyroscope, accelerometer), mean[:, :3] + slow, mean[:, 3:], PERIOD)
 
     def _eighths(self, rate: Array, mean: Array, ends: Array) -> Array:
-        """What each eighth between two time stamps shows, the ``rate`` (n,) on the grid about z: (m, 8) rad/s."""
+        """What each eighth between two time stamps shows, the ``rate`` (n,) on the grid about z: (m, 9) rad/s."""
         stamps = self._stamps(ends)
         borders = stamps[:-1, None] + np.diff(stamps)[:, None] * (np.arange(PARTS) / PARTS)
         borders = np.append(borders.ravel(), stamps[-1])
@@ -214,11 +214,13 @@ class RoughImu:
         high = np.concatenate([[0], np.cumsum(np.any(np.abs(frames[:, :3]) >= limit, axis=1))])
         clipped = np.asarray(GYRO_CLIPPED * (high[cuts[1:]] > high[cuts[:-1]]), np.int64)
         clock, late = FrameClock(self._section.sensor.frames_hz), np.zeros(len(ends))
-        parts = np.full((len(ends), PARTS), np.nan)
+        parts = np.full((len(ends), PARTS + 1), np.nan)
+        delay = self._section.sensor.delay
         for k, (end, found) in enumerate(zip(ends.tolist(), np.diff(cuts).tolist(), strict=True)):
             clock.on_read(end, found)
             late[k] = end - clock.end
-            if told := parts_of(frames[cuts[k] : cuts[k + 1], 2]):
+            window = (clock.end - delay - found * clock.period, clock.end - delay)
+            if k > 0 and (told := parts_of(frames[cuts[k] : cuts[k + 1], 2], window, end - PERIOD, end)):
                 parts[k] = told
         return mean, clipped, late, parts
 

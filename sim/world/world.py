@@ -125,8 +125,7 @@ class World:
         """Three mean rates (rad/s) and three mean specific forces (m/s^2) of one cycle, errors and all.
 
         In a rough world temperature (C), bits of what was clipped and the lateness of the window (s) follow, and of a
-        sensor that tells increments the rates about z (rad/s) of the eighths of the window. Of several IMUs a list of
-        such lists.
+        sensor that tells increments nine rates about z (rad/s) of its inside. Of several IMUs a list of such lists.
         """
         one, *others = [self._imu_sample(tube, cycle, imu) for imu in range(len(self._noises))]
         return [one, *others] if others else one
@@ -370,7 +369,7 @@ class World:
         return self._samples[tube, imu]
 
     def imu_parts(self, tube: int, imu: int = 0) -> Array | None:
-        """Rates about z (cycles, 8, rad/s) of the eighths of each window; NaN where, and None if they are not told."""
+        """What is told of the inside of the cycles (cycles, 9) rad/s; NaN where, and None if, nothing is."""
         file = self.scenario.file
         if file.rough is not None:
             return self.rough_cycles(tube, imu).parts

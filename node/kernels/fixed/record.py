@@ -28,7 +28,7 @@ from node.kernels.fixed.layout import (
 )
 from node.kernels.layout import CONFIG, STATE, Array
 from node.kernels.quantity import WARMTH_Q
-from node.kernels.record import AIDING, MOMENT, NODE, PART, READING, SETTINGS
+from node.kernels.record import AIDING, BEHIND, MOMENT, NODE, READING, SETTINGS
 from node.kernels.static_average import FORCE_PART, MEAN_Q, RATE_PART
 from node.kernels.sweep import PRODUCT_Q, SQUARE_Q
 from node.kernels.twist import STIFFNESS_Q, TORQUE_Q
@@ -87,6 +87,9 @@ OWN_FORMATS: Final[dict[str, Any]] = {
     "late": TIME_Q,
     "change": RATE_Q,
     "missing": ANGLE_Q,
+    "behind": RATE_Q,
+    "ahead": RATE_Q,
+    "shown": ANGLE_Q,
     "expected": RATE_Q,
     "ring_force": FORCE,
     "parts": RATE_Q,
@@ -159,7 +162,7 @@ OWN_FORMATS: Final[dict[str, Any]] = {
     "rotations": VECTOR_Q,
     "turn": VECTOR_Q,
 }
-READING_FORMATS: Final = np.array([RATE_Q] * 3 + [FORCE] * 3 + [WARMTH_Q, 0, TIME_Q, 0] + [RATE_Q] * (READING - PART))
+READING_FORMATS: Final = np.array([RATE_Q] * 3 + [FORCE] * 3 + [WARMTH_Q, 0, TIME_Q, 0] + [RATE_Q] * (READING - BEHIND))
 MOMENT_FORMATS: Final = np.array([TIME_Q, TIME_Q, 0, 0, VAR_Q, 0])
 AIDING_FORMATS: Final = np.array(
     [ANGLE_Q, VAR_Q, VAR_Q, ANGLE_Q, RATE_Q, TIME_Q, 0, 0, TORQUE_Q, VAR_Q, 0, VAR_Q],

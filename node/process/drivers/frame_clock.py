@@ -1,37 +1,45 @@
 """When the newest frame of a sensor's FIFO was taken: its own crystal, found by counting frames between reads.
 
-The period is that of the frames counted over the last minutes. At a read at t the newest frame was taken between t - p
-and t, with p that period. The frames counted since the read before carry its time on; where it leaves those bounds it
-is put back. It is then known to a millisecond.
+A read at t that brings the count of frames to n says that frame n came at t at the latest and frame n + 1 later. Frames
+come evenly, at a + p n, so of the last reads
+
+    t_i - p (n_i + 1)  <  a  <=  t_i - p n_i
+
+and the a and p are taken that stay farthest from all of these bounds. Reads fall anywhere between two frames, so the
+bounds close in as 1 over the number of reads: to 0.2 ms in half a minute. A read that was late, and a crystal that
+wanders as it warms up, break bounds by little, and the middle between them stays where it was.
 """
 
 from __future__ import annotations
 
 import math
+from collections import deque
 from typing import Final
 
-MEMORY: Final = 300.0  # s, over which frames are counted
-PRIOR: Final = 0.5  # s, that the rate of the data sheet is worth
+import numpy as np
+import numpy.typing as npt
+
+Array = npt.NDArray[np.float64]
+READS: Final = 64  # that are looked at, half a minute of cycles
+ENOUGH: Final = 16  # of them, from where the crystal is known
+KNOWN: Final = 1e-3  # of a period that is known, by which it may wander until it is looked at again
 LARGEST_ERROR: Final = 0.2  # of a crystal; more is a FIFO that was read late
+NARROWER: Final = 16  # times that the range of the period is cut by a third
 
 
 class FrameClock:
     """Of one sensor, whose frames come at about ``rate`` (Hz)."""
 
     def __init__(self, rate: float) -> None:
-        self._nominal = 1.0 / rate  # s
-        self._seconds, self._counted = PRIOR, PRIOR * rate
-        self._read_at = math.nan
+        self._nominal = self.period = 1.0 / rate  # s; the period is that of the frames as found so far
+        self._spread = LARGEST_ERROR  # of it
+        self._reads: deque[tuple[float, float]] = deque(maxlen=READS)
         self.newest = math.nan  # s, on the clock that reads it
 
     def begin(self) -> None:
         """Forget the phase: the FIFO was emptied. The crystal is the same."""
-        self.newest = self._read_at = math.nan
-
-    @property
-    def period(self) -> float:
-        """Of the frames, s."""
-        return self._seconds / self._counted
+        self._reads.clear()
+        self.newest = math.nan
 
     @property
     def end(self) -> float:
@@ -40,18 +48,41 @@ class FrameClock:
 
     def on_read(self, at: float, frames: int) -> float:
         """Time of the newest of ``frames`` that were read at ``at`` (s)."""
-        self._count(at - self._read_at, frames)
-        self._read_at = at
-        if math.isnan(self.newest):
-            self.newest = at - 0.5 * self.period
-            return self.newest
-        self.newest = min(max(self.newest + frames * self.period, at - self.period), at)
+        if self._reads:
+            before, count = self._reads[-1]
+            expected = (at - before) / self._nominal
+            if abs(frames - expected) > LARGEST_ERROR * expected + 1.0:  # some were lost
+                self._reads.clear()
+            else:
+                frames += int(count)
+        self._reads.append((at, float(frames)))
+        t, n = np.array(self._reads).T
+        if len(t) > 1:
+            counted = (t[-1] - t[0]) / (n[-1] - n[0])
+            spread = 1.0 / (n[-1] - n[0])
+            lowest = max(counted * (1.0 - spread), self.period * (1.0 - self._spread))
+            highest = min(counted * (1.0 + spread), self.period * (1.0 + self._spread))
+            self.period = farthest_period(t, n, lowest, highest) if lowest < highest else counted
+            self._spread = KNOWN if len(t) >= ENOUGH else LARGEST_ERROR
+        earliest, latest = bounds(t, n, self.period)
+        self.newest = min(0.5 * (earliest + latest) + self.period * n[-1], at)
         return self.newest
 
-    def _count(self, seconds: float, frames: int) -> None:
-        expected = seconds / self._nominal
-        if not abs(frames - expected) <= LARGEST_ERROR * expected + 1.0:  # the first, or one that lost some
-            return
-        kept = max(1.0 - seconds / MEMORY, 0.0)
-        self._seconds = kept * self._seconds + seconds
-        self._counted = kept * self._counted + frames
+
+def bounds(t: Array, n: Array, period: float) -> tuple[float, float]:
+    """What the phase a is between (s), by reads at ``t`` (k,) s that brought the counts ``n`` (k,)."""
+    phase = t - period * n
+    return float(phase.max() - period), float(phase.min())
+
+
+def farthest_period(t: Array, n: Array, lowest: float, highest: float) -> float:
+    """The period (s) between two that leaves the phase the widest bounds, whose width is a concave function of it."""
+    for _ in range(NARROWER):
+        third = (highest - lowest) / 3.0
+        low, high = lowest + third, highest - third
+        (after, before), (later, sooner) = bounds(t, n, low), bounds(t, n, high)
+        if before - after < sooner - later:
+            lowest = low
+        else:
+            highest = high
+    return 0.5 * (lowest + highest)

@@ -2,7 +2,7 @@
 
 Sampled at 50 Hz behind the sensor's own low-pass of 20 Hz, a cycle is 26 frames of 14 bytes, well inside the FIFO's
 512. The mean of the frames is that of their own window, which ends half a frame after the newest, earlier by the delay
-of the low-pass; the sample says so, and what the eighths of that window turned. Source: InvenSense, MPU-6500 register
+of the low-pass; the sample says so, and what the eighths of the cycle turned. Source: InvenSense, MPU-6500 register
 map and descriptions, revision 2.1 (registers, WHO_AM_I = 0x70, temperature, delays) and product specification,
 revision 1.3 (sensitivities).
 """
@@ -21,7 +21,7 @@ import numpy as np
 
 from node.errors import SensorError
 from node.process.drivers.frame_clock import FrameClock
-from node.process.drivers.parts import parts_of
+from node.process.drivers.parts import Array, parts_of
 from node.process.drivers.source import ImuSample
 
 SMPLRT_DIV, CONFIG, GYRO_CONFIG, ACCEL_CONFIG, ACCEL_CONFIG_2 = 0x19, 0x1A, 0x1B, 0x1C, 0x1D
@@ -44,7 +44,6 @@ EVERYTHING: Final = 0xF8  # of FIFO_EN: temperature, three rates, force
 G: Final = 9.80665  # m/s^2
 RESET_TIME, WAKE_TIME = 0.1, 0.05  # s
 TRIES: Final = 2  # of one transfer
-MISSED: Final = 2.0  # frames, by which those of a cycle may differ from what it takes
 
 
 class Bus(Protocol):
@@ -161,15 +160,16 @@ class Mpu6500:
         if frames < 1 or (not fresh and not frames >= 0.5 * expected):
             self._empty()
             raise SensorError(f"mpu6500: expected about {expected:.0f} frames in the FIFO, got {frames}")
-        sample = self._mean(self._drain(frames * FRAME))
+        sample, rates = self._mean(self._drain(frames * FRAME))
         self._frames.on_read(end, frames)
-        lacks = abs(frames * self._frames.period - (end - begin))
-        if fresh or overflown or lacks > MISSED * self._frames.period:  # its window is not known to be the cycle's
-            sample = replace(sample, parts=())
+        shown = self._frames.end - self._delay
+        if not (fresh or overflown):  # else its window may be any
+            parts = parts_of(rates, (shown - frames * self._frames.period, shown), begin, end)
+            sample = replace(sample, parts=parts)
         if overflown:
             self._empty()
             self._frames.begin()
-        return replace(sample, late=end - self._frames.end + self._delay)
+        return replace(sample, late=end - shown)
 
     def close(self) -> None:
         """Release the bus."""
@@ -199,19 +199,19 @@ class Mpu6500:
             taken += bytes(self._block(FIFO_R_W, min(BURST, length - len(taken))))
         return bytes(taken)
 
-    def _mean(self, data: bytes) -> ImuSample:
+    def _mean(self, data: bytes) -> tuple[ImuSample, Array]:
         frames = np.array(list(struct.iter_unpack(">7h", data)), dtype=np.float64)
         force = frames[:, :3].mean(axis=0) * self._force_lsb
         rate = frames[:, 4:].mean(axis=0) * self._rate_lsb
         at_range = (frames >= 32767.0) | (frames <= -32768.0)
         saturated = int(np.any(at_range[:, 4:])) | 2 * int(np.any(at_range[:, :3]))
-        return ImuSample(
+        sample = ImuSample(
             (float(rate[0]), float(rate[1]), float(rate[2])),
             (float(force[0]), float(force[1]), float(force[2])),
             float(frames[:, 3].mean()) / 333.87 + 21.0,
             saturated,
-            parts=parts_of(frames[:, 6] * self._rate_lsb),
         )
+        return sample, frames[:, 6] * self._rate_lsb
 
     def _get(self, register: int) -> int:
         return self._block(register, 1)[0]

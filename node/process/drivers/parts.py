@@ -1,4 +1,4 @@
-"""The eighths of a window from the frames of a FIFO, each with its own mean."""
+"""The inside of a window of a FIFO, by its frames: what it shows of the cycle before, and of the eighths of its own."""
 
 from __future__ import annotations
 
@@ -8,16 +8,27 @@ import numpy.typing as npt
 from node.kernels.layout import PARTS
 
 Array = npt.NDArray[np.float64]
+LEAST = 2 * PARTS  # frames of a window that is looked into
 
 
-def parts_of(rates: Array) -> tuple[float, ...]:
-    """Mean rates of the eighths of a window by its frames ``rates`` (n,), of equal length; nothing of less than eight.
+def parts_of(rates: Array, window: tuple[float, float], begin: float, end: float) -> tuple[float, ...]:
+    """Mean rates before a cycle and over its eighths (9), of a window that ends in the last of them; else nothing.
 
     A border inside a frame shares it: the turn is linear from one end of a frame to the other.
+
+    Parameters
+    ----------
+    rates : (n,) rad/s, of frames of equal length
+    window : s, from when to when they stand for the motion
+    begin, end : s, of the cycle
     """
-    count = len(rates)
-    if count < PARTS:
+    first, last = window
+    borders = begin + (end - begin) * (np.arange(PARTS + 1) / PARTS)
+    borders[-1] = last
+    if len(rates) < LEAST or not (first <= begin and borders[-2] < last <= end):
         return ()
-    turned = np.concatenate([[0.0], np.cumsum(rates)])
-    at = np.interp(np.arange(PARTS + 1) * (count / PARTS), np.arange(count + 1.0), turned)
-    return tuple((np.diff(at) * (PARTS / count)).tolist())
+    borders = np.concatenate([[first], borders])
+    turned = np.concatenate([[0.0], np.cumsum(rates)]) * ((last - first) / len(rates))
+    at = np.interp(borders, np.linspace(first, last, len(rates) + 1), turned)
+    lengths = np.diff(borders)
+    return tuple(np.divide(np.diff(at), lengths, out=np.zeros(PARTS + 1), where=lengths > 0.0).tolist())

@@ -23,6 +23,7 @@ BASE: Tables = {
     "joints": {"reading_std_deg": 0.0, "mount_std_deg": 0.0},
     "accelerometer": {"bias_std_deg": 0.0},
     "encoder": {"phase": "random"},
+    "gyroscope": {"increments": True},
     "medium": {"link": "off", "loss": 0.0},
     "rough": {"samples_hz": 250.0},
 }
@@ -44,6 +45,10 @@ class Case:
 
 def _rough(hertz: float = 250.0, **sections: Mapping[str, Any]) -> Tables:
     return changed(BASE, rough={"samples_hz": hertz, **sections})
+
+
+def _means_alone(setup: Tables) -> Tables:
+    return changed(setup, gyroscope={"increments": False})
 
 
 def _at(setup: Tables, inclination_deg: float) -> Tables:
@@ -75,6 +80,7 @@ SCALE = "an encoder that misses a part of every turn is a gyroscope that shows t
 CASES = (
     Case("locked", "clean, cycles locked", changed(_rough(), encoder={"phase": "locked"})),
     Case("random-phase", "clean, random phase", _rough()),
+    Case("means", "the same, of a sensor that gives means alone", _means_alone(_rough())),
     Case(
         "mpu6500",
         "MPU-6500: frames of 50 Hz behind 20 Hz, crystal 1 % off",
@@ -93,7 +99,8 @@ CASES = (
         _at(changed(_rough(), gyroscope={"misalignment_std_deg": 0.05}), 88.0),
     ),
     Case("clean-88", "clean, 88 deg", _at(_rough(), 88.0)),
-    Case("jitter", "time stamps jitter by 5 ms", _rough(sensor={"jitter_ms": 5.0})),
+    Case("jitter", "time stamps jitter by 5 ms", _means_alone(_rough(sensor={"jitter_ms": 5.0}))),
+    Case("jitter-fifo", "the same, of a FIFO that is read", _rough(FINE_HZ, sensor={**MPU, "jitter_ms": 5.0})),
     Case("asymmetry", "scale asymmetry 2e-3, turned back by 30 deg", _uneven()),
     Case("earth", "earth rate at 50 deg of latitude", changed(BASE, rough={"samples_hz": 250.0, "latitude_deg": 50.0})),
     Case("warm-up-0.2", "warm-up drift 0.2 deg/s", _rough(sensor={"warm_up_dps": 0.2, "warm_up_c": 10.0})),

@@ -8,7 +8,7 @@ import pytest
 from one_node import events_since, node_of
 
 from node.kernels.fixed.node import FixedNode
-from node.kernels.layout import DEG, PERIOD
+from node.kernels.layout import DEG, PARTS, PERIOD
 from node.kernels.record import AIDING, MOMENT, READING
 from node.kernels.step import node_aiding, node_step
 from sim.studies.fixed_point.run import LIMITS
@@ -68,7 +68,17 @@ class Rig:
             rate[2] = 8.7
         if "not a number" in present:
             rate[1] = math.nan
-        return [*rate, *pull, 20.0 + 30.0 * math.sin(k / 500.0), 0.0, 0.01 if imu == 0 else 0.0]
+        late, split = 0.01 if imu == 0 else 0.0, k % 700 < 500
+        parts = rate[2] + random.normal(0.0, 4e-4, 1 + PARTS)
+        return [
+            *rate,
+            *pull,
+            20.0 + 30.0 * math.sin(k / 500.0),
+            0.0,
+            late,
+            float(split),
+            *(parts if split else 0 * parts),
+        ]
 
     def aiding(self, k: int) -> np.ndarray:
         """The encoder's word after cycle ``k``."""
