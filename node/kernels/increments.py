@@ -18,7 +18,7 @@ from node.kernels.ring import is_split
 
 INSTANT: Final = seconds(1e-6)  # s, up to which a time is no time
 GAP: Final = seconds(1e-3)  # s, between two cycles that adjoin
-BENT: Final = factor(0.2)  # of a bend, see ``bent_angle``
+BENT: Final = factor(0.25)  # of a bend, see ``bent_angle``
 
 
 @kernel
@@ -40,13 +40,16 @@ def part_at(state: Any, cycle: int, at: float) -> int:
 
 @kernel
 def rise(state: Any, cycle: int, part: int) -> float:
-    """How much faster (rad/s) a part of ``cycle`` turned than the one before; that of PARTS is the first of the next.
+    """How much faster (rad/s) a part turned than the one before; parts beyond those of ``cycle`` are its neighbours'.
 
     No number where one of the two is not known.
     """
+    if part < 0 or part > PARTS:
+        cycle += -1 if part < 0 else 1
+        part += PARTS if part < 0 else -PARTS
     if 0 < part < PARTS:
         own = state.ring_parts[cycle % RECENT]
-        return number(own[part] - own[part - 1])
+        return number(own[part] - own[part - 1]) if is_split(state, cycle) and cycle < state.cycles else NONE
     before = cycle - 1 if part == 0 else cycle
     after = before + 1
     if after >= state.cycles or not (is_split(state, before) and is_split(state, after)):
@@ -91,13 +94,26 @@ def faster(state: Any, cycle: int, begin: float, end: float) -> float:
 
 
 @kernel
-def bend_at(state: Any, cycle: int, at: float) -> float:
-    """How much the rates of the parts about ``at`` (s) bend (rad/s): the rise to its part less the rise from it."""
-    part = part_at(state, cycle, at)
+def bend(state: Any, cycle: int, part: int) -> float:
+    """How much the rates of three parts bend (rad/s): the rise to the one in the middle less the rise from it."""
     into, out = rise(state, cycle, part), rise(state, cycle, part + 1)
     if not is_number(into):
-        return out
-    return number(into - out) if is_number(out) else into
+        return number(out) if is_number(out) else 0
+    return number(into - out) if is_number(out) else number(into)
+
+
+@kernel
+def bend_at(state: Any, cycle: int, at: float) -> float:
+    """How much the rates about ``at`` (s) bend or jump (rad/s), as one bend.
+
+    A head that stops dead within a part leaves bends of two signs in the parts beside it, and perhaps none in its own.
+    Their sum is the jump, which counts for two bends; where a ramp begins or ends all three are of one sign.
+    """
+    part = part_at(state, cycle, at)
+    own, before, after = bend(state, cycle, part), bend(state, cycle, part - 1), bend(state, cycle, part + 1)
+    if (before < 0) == (after < 0):
+        return number(own)
+    return number(max(abs(own), 2 * (abs(before) + abs(after))))
 
 
 @kernel
@@ -105,7 +121,8 @@ def bent_angle(state: Any, cycle: int, at: float) -> float:
     """Standard deviation (rad) of the angle to ``at`` (s) in a split ``cycle``, for the spin is linear in each part.
 
     A drive that starts or ends a ramp anywhere within a part or in those beside it, of a bend b: the angle up to the
-    fraction f of the part, of length T, is off by b T f (1 - f) / 5 rms, and by a quarter in place of a fifth at most.
+    fraction f of the part, of length T, is off by at most b T f (1 - f) / 4, and by four fifths of that rms.
+    One that jumps by c makes twice that of it.
     """
     length = part_length(state, cycle)
     off = at - state.ring_start[cycle % RING] - part_at(state, cycle, at) * length

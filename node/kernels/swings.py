@@ -17,6 +17,7 @@ from node.kernels.jit import kernel
 from node.kernels.layout import DEG, PERIOD, RING
 from node.kernels.numbers import half, mean, number, square, turn
 from node.kernels.quantity import rate, seconds
+from node.kernels.ring import is_split
 
 LEAST_BEND: Final = rate(0.5 * DEG)  # rad/s, that no noise of a gyroscope reaches
 SWINGING: Final = 10  # cycles that bend, less those that do not, from where it is no ramp
@@ -39,6 +40,9 @@ def follow_swing(node: Any) -> None:
     if state.cycles < 3:
         return
     newest = state.cycles - 1
+    if is_split(state, newest - 1):
+        swing.cycles, swing.excess = 0, 0 * swing.excess
+        return
     outer = half(state.ring_rate[newest % RING, 2] + state.ring_rate[(newest - 2) % RING, 2])
     bend = abs(outer - state.ring_rate[(newest - 1) % RING, 2])
     swing.cycles = min(swing.cycles + 1, MOST) if bend > LEAST_BEND else max(swing.cycles - 1, 0)
