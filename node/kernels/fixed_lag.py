@@ -189,8 +189,9 @@ def take_pending(state: Any, config: Any, cycle: int, until: float) -> int:
         held = min(at, until)
         if held >= state.epoch:
             advance(state, config, cycle, held)
-            yaw -= spin(state, cycle, held, at) * (at - held)
-            spread, own = interpolation_var(state, cycle, at), var
+            within = cycle + 1 if at > until and is_split(state, cycle + 1) else cycle
+            yaw -= spin(state, within, held, at) * (at - held)
+            spread, own = interpolation_var(state, within, at), var
             status |= aid(state, config, yaw, var + spread, spin(state, cycle, held, held), at)
             if spread > COARSE * own:
                 state.last_sequence = -1  # a repetition at rest is better timed

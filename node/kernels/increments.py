@@ -49,10 +49,10 @@ def rise(state: Any, cycle: int, part: int) -> float:
         part += PARTS if part < 0 else -PARTS
     if 0 < part < PARTS:
         own = state.ring_parts[cycle % RECENT]
-        return number(own[part] - own[part - 1]) if is_split(state, cycle) and cycle < state.cycles else NONE
+        return number(own[part] - own[part - 1]) if is_split(state, cycle) else NONE
     before = cycle - 1 if part == 0 else cycle
     after = before + 1
-    if after >= state.cycles or not (is_split(state, before) and is_split(state, after)):
+    if not (is_split(state, before) and is_split(state, after)):
         return NONE
     if state.ring_start[after % RING] - state.ring_end[before % RING] > GAP:
         return NONE

@@ -31,7 +31,7 @@ def push(state: Any, start: Number, end: Number, rate: Array, force: Array, quie
 @kernel
 def is_split(state: Any, cycle: int) -> bool:
     """Whether the parts of ``cycle`` are known; those of the oldest kept may be the coming cycle's already."""
-    return bool(cycle >= 0 and cycle > state.cycles - RECENT and state.ring_split[cycle % RECENT] != 0)
+    return bool(max(state.cycles - RECENT, -1) < cycle < state.cycles and state.ring_split[cycle % RECENT] != 0)
 
 
 @kernel

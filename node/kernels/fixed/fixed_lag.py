@@ -197,8 +197,9 @@ def take_pending(state: Any, config: Any, cycle: int, until: int) -> int:
         if held >= state.epoch:
             advance(state, config, cycle, held)
             beyond = min(at - held, LONGEST_STEP)
-            yaw = (yaw - counts(mul(spin(state, cycle, held, at), beyond), STEP_Q)) & TURN
-            spread, own = interpolation_var(state, cycle, at), int(var)
+            within = cycle + 1 if at > until and is_split(state, cycle + 1) else cycle
+            yaw = (yaw - counts(mul(spin(state, within, held, at), beyond), STEP_Q)) & TURN
+            spread, own = interpolation_var(state, within, at), int(var)
             status |= aid(state, config, yaw, var + spread, spin(state, cycle, held, held), at)
             if spread > COARSE * own:
                 state.last_sequence = -1
