@@ -21,6 +21,7 @@ class ImuReading:
     temperature: float = USUAL  # C
     saturated: int = 0  # bits of what was at its range within the cycle, as the driver saw it: 1 gyroscope, 2 force
     late: float = 0.0  # s, by which the window that was measured ended before the cycle
+    late_std: float = 0.0  # s, of that
     # rad/s, nine mean rates about z: of what that window shows of the cycle before, and of the eighths of this one as
     # far as it shows them; nothing: not known
     parts: tuple[float, ...] = ()

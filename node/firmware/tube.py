@@ -282,5 +282,5 @@ class Tube:
 
 
 def _row_of(reading: ImuReading) -> tuple[float, ...]:
-    head = (*reading.rate, *reading.force, reading.temperature, reading.saturated, reading.late)
+    head = (*reading.rate, *reading.force, reading.temperature, reading.saturated, reading.late, reading.late_std)
     return (*head, 1.0, *reading.parts) if reading.parts else (*head, *NO_PARTS)

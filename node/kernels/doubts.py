@@ -20,7 +20,7 @@ from node.kernels.fixed.layout import ANGLE_Q, VECTOR_Q
 from node.kernels.jit import constant, kernel
 from node.kernels.layout import DEG
 from node.kernels.numbers import held, is_number, mean, number, product, ratio, root, square, times, turn
-from node.kernels.quantity import NONE, factor, seconds, variance
+from node.kernels.quantity import NONE, factor, variance
 from node.kernels.swings import swing_var
 
 MEMORY: Final = 32  # aidings over which the misfit is averaged
@@ -35,7 +35,6 @@ SETTLED: Final = 9  # variances, within which two jumps cancel each other
 LEAST: Final = factor(0.01)  # of a variance, that is left of it without the misfit
 LARGEST_MISFIT: Final = variance((5.0 * DEG) ** 2)  # rad^2
 LARGEST_NOISE: Final = variance((0.1 * DEG) ** 2)  # rad^2, of it in the variance of an aiding
-WINDOW_STD: Final = seconds(2.5e-4)  # s, of the end of a window that a driver dates
 AIDING_DOUBTED = constant(Code.AIDING_DOUBTED)
 
 
@@ -63,10 +62,10 @@ def unexplained_var(node: Any) -> float:
 @kernel
 def window_var(node: Any) -> float:
     """Variance (rad^2) of the yaw while the head turns, for a driver that dates the window of its readings."""
-    late = node.cluster.delayed[0].late
-    if late == 0 or not is_number(late):
+    window = node.cluster.delayed[0]
+    if window.late == 0 or not is_number(window.late):
         return 0
-    return square(turn(node.guard.rate, WINDOW_STD))
+    return square(turn(node.guard.rate, window.std))
 
 
 @kernel

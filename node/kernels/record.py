@@ -186,6 +186,7 @@ ALIGNER: Final = np.dtype(
 DELAYED: Final = np.dtype(
     [
         ("late", "f8"),  # s, by which the window before ended before its cycle; NaN: there was none
+        ("std", "f8"),  # s, of it
         ("rate", "f8", (3,)),  # rad/s, of that window
         ("change", "f8", (3,)),  # rad/s, of it since the one before
         ("missing", "f8", (3,)),  # rad, turn of its cycle that the sensor had yet to show
@@ -316,7 +317,7 @@ KEPT: Final = ("filter", "mount", "guard", "twist", "joints")  # what a save hol
 KEPT_SIZE: Final = int(NODE.fields["cycles"][1]) if NODE.fields else 0  # bytes of it, from the first on
 
 # what one cycle brings, float64; of every IMU a row
-WX, WY, WZ, FX, FY, FZ, TEMPERATURE, SATURATED, LATE, SPLIT, BEHIND, PART = range(12)
+WX, WY, WZ, FX, FY, FZ, TEMPERATURE, SATURATED, LATE, LATE_STD, SPLIT, BEHIND, PART = range(13)
 READING: Final = PART + PARTS
 START, END, JOINED, HOPS, CLOCK_VAR, SYNCHRONISED = range(6)
 MOMENT: Final = 6

@@ -93,8 +93,9 @@ def node_step(nodes: Array, settings: Array, parameters: Array, readings: Array,
     nodes, settings : one-element arrays of dtype ``NODE`` and ``SETTINGS``
     parameters : of dtype ``PARAMETERS``: the block in use, then the own correction of each IMU
     readings : (imus, 20) rates (rad/s), forces (m/s^2), temperature (C), bits of what was at the range, by how much (s)
-        the window that they are of ended before the cycle, and 1 where its inside is known: then mean rates about z
-        (rad/s) follow, of what it shows of the cycle before, and of the eighths of this one as far as it shows them
+        the window that they are of ended before the cycle, its standard deviation (s), and 1 where the inside of the
+        window is known: then mean rates about z (rad/s) follow, of what it shows of the cycle before, and of the
+        eighths of this one as far as it shows them
     moment : (6,) start and end (s, own clock), joined, hops, variance of the clock (s^2), synchronised
     """
     return int(step_around(run_cycle, nodes, settings, parameters, readings, moment))

@@ -9,9 +9,15 @@ from typing import Any
 from node.firmware.inputs import ImuReading
 from node.kernels.calibration import USUAL
 from node.kernels.layout import PARTS, PERIOD
-from node.process.drivers.source import NOTHING
+from node.process.drivers.source import NOTHING, ImuSample
 
-LEAST, MOST = 6, 9  # numbers of an IMU that does not tell the parts of its cycle
+LEAST, MOST = 6, 10  # numbers of an IMU that does not tell the parts of its cycle
+
+
+def reading_from(sample: ImuSample, start: float, end: float) -> ImuReading:
+    """What a sensor of the node's own gave for the cycle from ``start`` to ``end`` (s, own clock)."""
+    s = sample
+    return ImuReading(start, end, s.rate, s.force, s.temperature, s.saturated, s.late, s.late_std, s.parts)
 
 
 def reading_of(data: Any, now: float) -> ImuReading:
@@ -32,8 +38,9 @@ def reading_of(data: Any, now: float) -> ImuReading:
 def imu_reading(items: Any, start: float, end: float) -> ImuReading:
     """Reading of one IMU from ``start`` to ``end`` (s, own clock): three rates, three forces.
 
-    Perhaps a temperature follows, bits of what was at its range within the cycle, by how much its window was late, and
-    the mean rates about z of what it shows of the cycle before and of the eighths of this one.
+    Perhaps a temperature follows, bits of what was at its range within the cycle, by how much its window was late and
+    the standard deviation of that, and mean rates about z: of what the window shows of the cycle before, and of the
+    eighths of this one.
     """
     try:
         numbers = list(map(float, items))
@@ -45,4 +52,5 @@ def imu_reading(items: Any, start: float, end: float) -> ImuReading:
     clipped = int(rest[1]) if len(rest) > 1 and math.isfinite(rest[1]) else 0
     temperature = rest[0] if rest else USUAL
     late = rest[2] if len(rest) > 2 and math.isfinite(rest[2]) else 0.0
-    return ImuReading(start, end, (wx, wy, wz), (fx, fy, fz), temperature, clipped, late, tuple(rest[3:]))
+    late_std = rest[3] if len(rest) > 3 and math.isfinite(rest[3]) else 0.0
+    return ImuReading(start, end, (wx, wy, wz), (fx, fy, fz), temperature, clipped, late, late_std, tuple(rest[4:]))

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from node.errors import ConfigurationError
-from node.firmware.inputs import ImuReading, RigContext
+from node.firmware.inputs import RigContext
 from node.firmware.saved_state import resume
 from node.firmware.settings import TubeSettings
 from node.firmware.silent_tubes import across
@@ -25,7 +25,7 @@ from node.process.block_updater import BlockUpdater, load_parameters
 from node.process.command_handlers import CommandHandlers
 from node.process.counter import BootCounter
 from node.process.drivers.source import ImuSource, SafeImu
-from node.process.reading import reading_of
+from node.process.reading import reading_from, reading_of
 from node.process.saver import Saver
 from node.process.survey_log import SurveyLog
 from telemetry.application.endpoint import REPORT_EVERY, Endpoint
@@ -182,9 +182,7 @@ class TubeProcess(Process):
         reading = reading_of(data, now)
         if self._imus:
             start, samples = reading.start, [imu.read(reading.start, now) for imu in self._imus]
-            first, *others = [
-                ImuReading(start, now, s.rate, s.force, s.temperature, s.saturated, s.late, s.parts) for s in samples
-            ]
+            first, *others = [reading_from(sample, start, now) for sample in samples]
             reading = replace(first, others=tuple(others))
         self._lap(Stage.READ)
         context = self._context(now)

@@ -23,7 +23,7 @@ from node.kernels.address import firmware
 from node.kernels.angles import from_binary, wrap
 from node.kernels.calibration import PARAMETERS, USUAL
 from node.kernels.layout import PERIOD, Err, Scheme, default_config
-from node.kernels.record import A_VALID, BEHIND, END, LATE, READING, SATURATED, SPLIT, TEMPERATURE, new_node
+from node.kernels.record import A_VALID, BEHIND, END, LATE, LATE_STD, READING, SATURATED, SPLIT, TEMPERATURE, new_node
 from node.kernels.step import ADMITTED
 from node.process.reading import reading_of
 from sim.errors import ScenarioError
@@ -259,10 +259,11 @@ class DirectString:
                 readings[:, tube - 1, 0, TEMPERATURE] = found.temperature
                 readings[:, tube - 1, 0, SATURATED] = found.clipped
                 readings[:, tube - 1, 0, LATE] = found.late
+                readings[:, tube - 1, 0, LATE_STD] = found.late_std
             if (parts := world.imu_parts(tube)) is not None:
-                known = np.isfinite(parts).all(axis=1)
+                known = np.isfinite(parts[:, 0])
                 readings[:, tube - 1, 0, SPLIT] = known
-                readings[:, tube - 1, 0, BEHIND:] = np.where(known[:, None], parts, 0.0)
+                readings[known, tube - 1, 0, BEHIND:] = parts[known]
         return readings
 
     def _arrivals(self, measured_at: Array) -> Array:

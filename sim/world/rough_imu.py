@@ -32,7 +32,7 @@ FRAME_STEPS = 32768.0  # of a range
 
 @dataclass(frozen=True, slots=True)
 class Cycles:
-    """Readings of one IMU: (cycles, 6) rad/s and m/s^2, (cycles,) C, bits, and s that their windows were late by.
+    """Readings of one IMU: (cycles, 6) rad/s and m/s^2, (cycles,) C, bits, s that their windows were late by, its std.
 
     ``parts`` (cycles, 9) rad/s are as a driver tells them, see ``node.process.drivers.parts``; NaN or None if not told.
     """
@@ -41,6 +41,7 @@ class Cycles:
     temperature: Array
     clipped: Flags
     late: Array
+    late_std: Array
     parts: Array | None
 
 
@@ -102,14 +103,15 @@ class RoughImu:
         slow = slow + math.radians(sensor.warm_up_dps) * self._warmth(times)[:, None]
         if sensor.frames_hz > 0.0:
             measured = self._frames(rate, force, times, slow)
-            mean, flags, late, parts = self._means(measured, times, ends)
+            parts: Array | None
+            mean, flags, late, std, parts = self._means(measured, times, ends)
         else:
             mean = self._exact(rate, force, ends, slow)
-            flags, late = np.zeros(len(ends), np.int64), np.zeros(len(ends))
+            flags, late, std = np.zeros(len(ends), np.int64), np.zeros(len(ends)), np.zeros(len(ends))
             parts = self._eighths(rate[:, 2], mean[:, 2], ends) if self._errors.gyroscope.increments else None
         flags |= self._by_cycle(hidden, ends)
         temperature = USUAL + sensor.warm_up_c * self._warmth(ends)
-        return Cycles(mean, temperature, flags, late + sensor.delay, parts)
+        return Cycles(mean, temperature, flags, late + sensor.delay, std, parts)
 
     def _warmth(self, t: Array) -> Array:
         """How far (0..1) the sensor has warmed up by rig times ``t``."""
@@ -202,7 +204,7 @@ class RoughImu:
         at = np.interp(stamps, self._t, integral)
         return np.asarray(np.diff(at) / np.diff(stamps))
 
-    def _means(self, frames: Array, times: Array, ends: Array) -> tuple[Array, Flags, Array, Array]:
+    def _means(self, frames: Array, times: Array, ends: Array) -> tuple[Array, Flags, Array, Array, Array]:
         """Mean of the frames that each read finds, bits of the cycles of which one stood at the range, and lateness.
 
         The last is what a driver makes of the frames it counts, and so are the eighths of the window.
@@ -213,16 +215,16 @@ class RoughImu:
         limit = AT_RANGE * math.radians(self._errors.gyroscope.range_dps)
         high = np.concatenate([[0], np.cumsum(np.any(np.abs(frames[:, :3]) >= limit, axis=1))])
         clipped = np.asarray(GYRO_CLIPPED * (high[cuts[1:]] > high[cuts[:-1]]), np.int64)
-        clock, late = FrameClock(self._section.sensor.frames_hz), np.zeros(len(ends))
+        clock, late, std = FrameClock(self._section.sensor.frames_hz), np.zeros(len(ends)), np.zeros(len(ends))
         parts = np.full((len(ends), PARTS + 1), np.nan)
         delay = self._section.sensor.delay
         for k, (end, found) in enumerate(zip(ends.tolist(), np.diff(cuts).tolist(), strict=True)):
             clock.on_read(end, found)
-            late[k] = end - clock.end
+            late[k], std[k] = end - clock.end, clock.std
             window = (clock.end - delay - found * clock.period, clock.end - delay)
             if k > 0 and (told := parts_of(frames[cuts[k] : cuts[k + 1], 2], window, end - PERIOD, end)):
                 parts[k] = told
-        return mean, clipped, late, parts
+        return mean, clipped, late, std, parts
 
     def _by_cycle(self, cut: Flags, ends: Array) -> Flags:
         """Bits of the samples of every cycle together."""

@@ -124,8 +124,9 @@ class World:
     def imu_sample(self, tube: int, cycle: int) -> list[Any]:
         """Three mean rates (rad/s) and three mean specific forces (m/s^2) of one cycle, errors and all.
 
-        In a rough world temperature (C), bits of what was clipped and the lateness of the window (s) follow, and of a
-        sensor that tells increments nine rates about z (rad/s) of its inside. Of several IMUs a list of such lists.
+        In a rough world temperature (C), bits of what was clipped, the lateness of the window and its standard
+        deviation (s) follow, and of a sensor that tells increments nine rates about z (rad/s) of its inside. Of several
+        IMUs a list of such lists.
         """
         one, *others = [self._imu_sample(tube, cycle, imu) for imu in range(len(self._noises))]
         return [one, *others] if others else one
@@ -136,9 +137,10 @@ class World:
         known = parts is not None and bool(np.isfinite(parts[cycle]).all())
         if self.scenario.file.rough is not None:
             found = self.rough_cycles(tube, imu)
-            sample += [float(found.temperature[cycle]), int(found.clipped[cycle]), float(found.late[cycle])]
+            sample += [float(found.temperature[cycle]), int(found.clipped[cycle])]
+            sample += [float(found.late[cycle]), float(found.late_std[cycle])]
         elif known:
-            sample += [USUAL, 0, 0.0]
+            sample += [USUAL, 0, 0.0, 0.0]
         return sample + parts[cycle].tolist() if parts is not None and known else sample
 
     def encoder_sample(self, t: float) -> tuple[int, float, int, float | None, tuple[float, ...]]:

@@ -63,6 +63,38 @@ def test_the_mean_of_a_changing_rate_is_its_integral() -> None:
     assert cycles.driver.read(0.0, PERIOD).rate[2] == pytest.approx(12.5 * DEG, rel=0.05)
 
 
+def test_the_inside_of_a_cycle_is_told_part_by_part() -> None:
+    """A string that gains 35 deg/s in every second, in frames of 20 ms, once the phase of the frames is known."""
+    cycles, slope = Cycles(), 35.0 * DEG
+    assert cycles.read().parts == ()  # what a FIFO held at the start may be of any length
+    frames, taken = 0, 0
+    for k in range(1, 60):
+        end, turned = 100.0 + (k + 1) * PERIOD, []
+        count = math.floor((k + 1) * PERIOD * 50.0) - math.floor(k * PERIOD * 50.0)
+        for _ in range(count):
+            turned.append(slope * (frames % 200) * 0.02)
+            cycles.chip.live(0.02, (0.0, 0.0, turned[-1]), FORCE)
+            frames += 1
+        sample = cycles.driver.read(end - PERIOD, end)
+        if k > 40 and np.all(np.diff(turned) > 0.0):
+            behind, *parts = sample.parts
+            assert np.diff(parts)[:-1] == pytest.approx(
+                slope * PERIOD / 8.0, abs=2.0 * RATE_LSB + 0.01 * slope * PERIOD
+            )
+            assert behind < parts[0] < sample.rate[2] < parts[-1]
+            taken += 1
+    assert taken > 5
+
+
+def test_a_cycle_after_lost_frames_tells_its_mean_alone() -> None:
+    cycles = Cycles()
+    for _ in range(5):
+        cycles.read()
+    assert len(cycles.read().parts) == 9
+    cycles.chip.live(0.7 * PERIOD, RATE, FORCE)
+    assert cycles.driver.read(cycles.now, cycles.now + PERIOD).parts == ()
+
+
 @pytest.mark.parametrize("rate_range", [250, 500, 1000, 2000])
 @pytest.mark.parametrize("force_range", [2, 4, 8, 16])
 def test_every_range_gives_the_same_reading(rate_range: int, force_range: int) -> None:

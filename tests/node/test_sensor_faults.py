@@ -101,7 +101,7 @@ def test_a_faulty_gyroscope_is_flagged_and_recovered_from(
     make, names = KINDS[kind]
     string = StringOfOne(seed, make(at)).run()
     flagged = min(string.first(name, at) for name in names if name in string.codes(at))
-    assert flagged - at < FLAGGED_WITHIN
+    assert flagged - at <= FLAGGED_WITHIN
     assert NodeFlag.SENSOR_FAULT | NodeFlag.YAW_UNTRUSTED in string.states[flagged].flags
     assert string.states[flagged].mode is Mode.FAULT
     recovered = [cycle for cycle, event in string.events if event.code == "sensor_recovered" and cycle >= at]

@@ -185,6 +185,47 @@ def test_a_front_end_is_late_and_clips() -> None:
     assert not clipped[exact[:, 2] == 0.0].any()
 
 
+def test_the_eighths_of_a_cycle_are_what_the_string_turned_in_them() -> None:
+    told = changed(SHORT, **QUIET)
+    told = changed(told, gyroscope={"increments": True})
+    for world in (World(scenario_of(told), 3), World(scenario_of(changed(told, rough={"samples_hz": 1000.0})), 3)):
+        parts = world.imu_parts(1)
+        assert parts is not None
+        borders = world.ends[:, None] + np.arange(-8, 1) / (8.0 * 1.9)
+        turned = np.diff(world.truth(1).turned(borders.ravel())[0].reshape(borders.shape), axis=1)
+        np.testing.assert_allclose(parts[:, 1:] / (8.0 * 1.9), turned, atol=math.radians(1e-4))
+        np.testing.assert_allclose(parts[:, 1:].mean(axis=1), world.imu_samples(1)[:, 2], atol=1e-9)
+
+
+def test_the_noise_of_the_eighths_is_white_and_has_the_cycles_for_its_mean() -> None:
+    tables = changed(SHORT, gyroscope={"increments": True, "resolution_dps": 0.0})
+    alone, told = World(scenario_of(SHORT | {"gyroscope": {"resolution_dps": 0.0}}), 3), World(scenario_of(tables), 3)
+    np.testing.assert_array_equal(told.imu_samples(1), alone.imu_samples(1))
+    parts = told.imu_parts(1)
+    assert parts is not None
+    still = told.truth(1).rate(told.ends - 0.5)[:, 2] == 0.0
+    rest = parts[still & np.roll(still, 1) & np.roll(still, -1), 1:]
+    assert rest.mean(axis=1) == pytest.approx(told.imu_samples(1)[still & np.roll(still, 1) & np.roll(still, -1), 2])
+    expected = math.radians(7.313e-3) * math.sqrt(8.0 * 1.9)
+    assert np.diff(rest, axis=1).std() == pytest.approx(math.sqrt(2.0) * expected, rel=0.1)
+
+
+@pytest.mark.slow
+def test_a_fifo_tells_what_turned_in_each_part_but_for_the_end_that_its_filter_holds_back() -> None:
+    sensor = {"frames_hz": 50.0, "low_pass_hz": 20.0, "crystal": 0.01}
+    world = rough_world(hertz=1000.0, sensor=sensor)
+    parts = world.imu_parts(1)
+    assert parts is not None
+    borders = world.ends[:, None] + np.arange(-8, 1) / (8.0 * 1.9)
+    turned = np.diff(world.truth(1).turned(borders.ravel())[0].reshape(borders.shape), axis=1)
+    late = world.rough_cycles(1).late
+    assert late.min() > 0.0
+    found = parts[40:, 1:8] / (8.0 * 1.9)  # by then the crystal is known
+    off = found - turned[40:, :7]
+    assert np.degrees(np.abs(off).max()) < 0.05  # 71 deg/s for half a millisecond, and the bends of a ramp
+    assert np.degrees(off.std()) < 0.01
+
+
 def test_a_sensor_warms_up() -> None:
     warm = rough_world(sensor={"warm_up_dps": 1.0, "warm_up_s": 5.0, "warm_up_c": 20.0}).rough_cycles(1)
     np.testing.assert_allclose(np.degrees(warm.readings[-1, :3]), 1.0, atol=1e-3)

@@ -31,6 +31,7 @@ MPU, PULL = {"frames_hz": 50.0, "low_pass_hz": 20.0}, {"pull_dps_per_g": 0.1}
 ROWS: dict[str, Disturbance] = {
     "clean, cycles locked": Disturbance(locked=True),
     "clean, random phase": Disturbance(),
+    "the same, of a sensor that gives means alone": Disturbance(increments=False),
     "MPU-6500: frames of 50 Hz behind 20 Hz, crystal 1 % off": Disturbance(crystal=0.01, **MPU),
     "ripple of 30 %, 4 s": Disturbance(ripple=0.3),
     "stick-slip": Disturbance(stick_slip=True),
@@ -41,7 +42,8 @@ ROWS: dict[str, Disturbance] = {
     "g-sensitivity 0.1 deg/s/g at 30 deg": Disturbance(inclination_deg=30.0, **PULL),
     "misalignment 0.05 deg at 88 deg": Disturbance(inclination_deg=88.0, lean_deg=0.05),
     "clean, 88 deg": Disturbance(inclination_deg=88.0),
-    "time stamps jitter by 5 ms": Disturbance(jitter_ms=5.0),
+    "time stamps jitter by 5 ms": Disturbance(jitter_ms=5.0, increments=False),
+    "the same, of a FIFO that is read": Disturbance(jitter_ms=5.0, **MPU),
     "scale asymmetry 2e-3, turned back by 30 deg": Disturbance(asymmetry=2e-3, turns_back_deg=30.0),
     "earth rate at 50 deg of latitude": Disturbance(earth=math.tau / 86164.1),
     "warm-up drift 0.2 deg/s": Disturbance(warm_up_dps=0.2, warm_up_c=10.0),
@@ -174,7 +176,9 @@ def _tube(settings: TubeSettings) -> Tube:
 def _reading(sensor: Cycles, k: int, end: float) -> ImuReading:
     (wx, wy, wz), (fx, fy, fz) = sensor.rate[k].tolist(), sensor.force[k].tolist()
     heat, clipped, late = float(sensor.temperature[k]), int(sensor.clipped[k]), float(sensor.late[k])
-    return ImuReading(end - PERIOD, end, (wx, wy, wz), (fx, fy, fz), heat, clipped, late)
+    told = tuple(sensor.parts[k].tolist()) if np.isfinite(sensor.parts[k]).all() else ()
+    window = late, float(sensor.late_std[k]), told
+    return ImuReading(end - PERIOD, end, (wx, wy, wz), (fx, fy, fz), heat, clipped, *window)
 
 
 if __name__ == "__main__":

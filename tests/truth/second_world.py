@@ -17,6 +17,7 @@ from scipy.signal import butter, lfilter, sosfilt, sosfilt_zi
 
 from node.firmware.encoder import EncoderNode, EncoderSample
 from node.process.drivers.frame_clock import FrameClock
+from node.process.drivers.parts import parts_of
 from telemetry.messages import Aiding
 
 Array = npt.NDArray[np.float64]
@@ -67,6 +68,7 @@ class Disturbance:
     warm_up_c: float = 0.0
     force_bias_g: float = 0.0
     locked: bool = False
+    increments: bool = True  # the sensor tells the inside of its cycles
 
 
 @dataclass(frozen=True, slots=True)
@@ -77,6 +79,8 @@ class Cycles:
     force: Array  # (m, 3) m/s^2
     clipped: npt.NDArray[np.int64]
     late: Array  # s
+    late_std: Array  # s
+    parts: Array  # (m, 9) rad/s; NaN where the inside of a cycle is not told
     temperature: Array  # C
 
 
@@ -205,13 +209,14 @@ class SecondWorld:
         values, cut, heat = self._with_errors(rate, force)
         ends = self.ends + phase
         if what.frames_hz:
-            mean, late = self._in_frames(values, ends)
+            mean, late, std, parts = self._in_frames(values, ends)
         else:
             noise = np.concatenate([np.tile(GYRO_WHITE, (n, 1)), np.full((n, 3), FORCE_WHITE)], axis=1)
-            mean, late = self._exact(values + math.sqrt(HERTZ) * noise * random.standard_normal((n, 6)), ends)
+            measured = values + math.sqrt(HERTZ) * noise * random.standard_normal((n, 6))
+            mean, late, std, parts = self._exact(measured, ends)
         borders = np.searchsorted(self.t, np.concatenate([[ends[0] - PERIOD], ends]))
         bits = [np.bitwise_or.reduce(cut[a:b]) for a, b in itertools.pairwise(borders)]
-        return Cycles(mean[:, :3], mean[:, 3:], np.array(bits), late, np.interp(ends, self.t, heat))
+        return Cycles(mean[:, :3], mean[:, 3:], np.array(bits), late, std, parts, np.interp(ends, self.t, heat))
 
     def _with_errors(self, rate: Array, force: Array) -> tuple[Array, npt.NDArray[np.int64], Array]:
         """What the converters give but for white noise (n, 6), bits of what they clip, and how warm (C) they are."""
@@ -233,15 +238,19 @@ class SecondWorld:
         offset = G * (what.force_bias_g or math.radians(0.002)) * random.standard_normal(3)
         return np.concatenate([rate + constant + wander, force + offset], axis=1), cut, 25.0 + what.warm_up_c * warm
 
-    def _exact(self, values: Array, ends: Array) -> tuple[Array, Array]:
-        """Means over the cycles as their time stamps have them, and that nothing is late."""
-        stamps = np.concatenate([[ends[0] - PERIOD], ends])
+    def _exact(self, values: Array, ends: Array) -> tuple[Array, Array, Array, Array]:
+        """Means over the cycles and their eighths as their time stamps have them, and that nothing is late."""
+        stamps, nothing = np.concatenate([[ends[0] - PERIOD], ends]), np.zeros(len(ends))
         stamps = stamps + 1e-3 * self.what.jitter_ms * self.random.standard_normal(len(stamps))
-        summed = np.stack([np.interp(stamps, self.t, integral(v)) for v in values.T], axis=1)
-        return np.diff(summed, axis=0) / np.diff(stamps)[:, None], np.zeros(len(ends))
+        fine = np.interp(np.arange(8 * len(ends) + 1) / 8.0, np.arange(len(stamps)), stamps)
+        summed = np.stack([np.interp(fine, self.t, integral(v)) for v in values.T], axis=1)
+        parts = np.pad((np.diff(summed[:, 2]) / np.diff(fine)).reshape(-1, 8), ((0, 0), (1, 0)))
+        if not self.what.increments:
+            parts[:] = np.nan
+        return np.diff(summed[::8], axis=0) / np.diff(stamps)[:, None], nothing, nothing, parts
 
-    def _in_frames(self, values: Array, ends: Array) -> tuple[Array, Array]:
-        """Means of the frames that a driver finds at the end of a cycle, and by how much (s) it says they are late."""
+    def _in_frames(self, values: Array, ends: Array) -> tuple[Array, Array, Array, Array]:
+        """Means of the frames that a driver finds in a cycle, how late it says they are (s), its error, their parts."""
         what, delay = self.what, 0.0
         if what.low_pass_hz:
             sections = butter(2, what.low_pass_hz, fs=HERTZ, output="sos")
@@ -253,12 +262,16 @@ class SecondWorld:
         frames = np.stack([np.interp(at, self.t, v) for v in values.T], axis=1)
         white = np.concatenate([GYRO_WHITE, np.full(3, FORCE_WHITE)]) * math.sqrt(what.frames_hz)
         frames = frames + white * self.random.standard_normal(frames.shape)
-        clock, mean, late = FrameClock(what.frames_hz), np.zeros((len(ends), 6)), np.zeros(len(ends))
+        clock, mean, late = FrameClock(what.frames_hz), np.zeros((len(ends), 6)), np.zeros((len(ends), 2))
+        parts = np.full((len(ends), 9), np.nan)
         borders = np.searchsorted(at, np.concatenate([[ends[0] - PERIOD], ends]), side="right")
         for k, end in enumerate(ends):
             clock.on_read(float(end), int(borders[k + 1] - borders[k]))
-            mean[k], late[k] = frames[borders[k] : borders[k + 1]].mean(axis=0), end - clock.end
-        return mean, late + delay
+            found, shown = frames[borders[k] : borders[k + 1]], clock.end - delay
+            mean[k], late[k] = found.mean(axis=0), (end - shown, clock.std)
+            if k and (told := parts_of(found[:, 2], (shown - len(found) * clock.period, shown), end - PERIOD, end)):
+                parts[k] = told
+        return mean, late[:, 0], late[:, 1], parts
 
     def _build_disc(self) -> None:
         """Find every passage of a line, forward or backward."""

@@ -161,9 +161,9 @@ def interpolation_var(state: Any, cycle: int, at: int) -> int:
         return 0
     slot = cycle & SLOT
     if is_split(state, cycle):
-        a_unit = shift(bend_at(state, cycle, at), RATE_RIGHT + 2)
+        a_unit = shift(int(bend_at(state, cycle, at)), RATE_RIGHT + 2)
         beside = mul(mul(state.P[D, D], a_unit), a_unit)
-        return square(bent_angle(state, cycle, at)) + beside + curvature_var(state, cycle)
+        return int(square(bent_angle(state, cycle, at))) + beside + curvature_var(state, cycle)
     inside = abs(min(at - state.ring_start[slot], state.ring_end[slot] - at))
     bend = 2 * (state.ring_rate[slot, 2] - state.ring_rate[(cycle - 1) & SLOT, 2])
     if cycle + 1 < state.cycles:

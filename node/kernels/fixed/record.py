@@ -85,6 +85,7 @@ OWN_FORMATS: Final[dict[str, Any]] = {
     "down_torsion": VAR_Q,
     "numbers": TOLD_Q,
     "late": TIME_Q,
+    "delayed.std": TIME_Q,
     "change": RATE_Q,
     "missing": ANGLE_Q,
     "behind": RATE_Q,
@@ -162,7 +163,9 @@ OWN_FORMATS: Final[dict[str, Any]] = {
     "rotations": VECTOR_Q,
     "turn": VECTOR_Q,
 }
-READING_FORMATS: Final = np.array([RATE_Q] * 3 + [FORCE] * 3 + [WARMTH_Q, 0, TIME_Q, 0] + [RATE_Q] * (READING - BEHIND))
+READING_FORMATS: Final = np.array(
+    [RATE_Q] * 3 + [FORCE] * 3 + [WARMTH_Q, 0, TIME_Q, TIME_Q, 0] + [RATE_Q] * (READING - BEHIND)
+)
 MOMENT_FORMATS: Final = np.array([TIME_Q, TIME_Q, 0, 0, VAR_Q, 0])
 AIDING_FORMATS: Final = np.array(
     [ANGLE_Q, VAR_Q, VAR_Q, ANGLE_Q, RATE_Q, TIME_Q, 0, 0, TORQUE_Q, VAR_Q, 0, VAR_Q],

@@ -6,8 +6,9 @@ come evenly, at a + p n, so of the last reads
     t_i - p (n_i + 1)  <  a  <=  t_i - p n_i
 
 and the a and p are taken that stay farthest from all of these bounds. Reads fall anywhere between two frames, so the
-bounds close in as 1 over the number of reads: to 0.2 ms in half a minute. A read that was late, and a crystal that
-wanders as it warms up, break bounds by little, and the middle between them stays where it was.
+bounds close in as 1 over the number of reads: to 0.2 ms in half a minute. Where a cycle is nearly a whole number of
+frames they close in slowly, and what they leave is told as a standard deviation. A crystal that wanders as it warms up
+keeps no bounds for long: then fewer of the last reads are looked at.
 """
 
 from __future__ import annotations
@@ -20,7 +21,7 @@ import numpy as np
 import numpy.typing as npt
 
 Array = npt.NDArray[np.float64]
-READS: Final = 64  # that are looked at, half a minute of cycles
+READS: Final = (256, 64, 16)  # that are looked at: two minutes of cycles, or fewer where they contradict each other
 ENOUGH: Final = 16  # of them, from where the crystal is known
 KNOWN: Final = 1e-3  # of a period that is known, by which it may wander until it is looked at again
 LARGEST_ERROR: Final = 0.2  # of a crystal; more is a FIFO that was read late
@@ -33,8 +34,9 @@ class FrameClock:
     def __init__(self, rate: float) -> None:
         self._nominal = self.period = 1.0 / rate  # s; the period is that of the frames as found so far
         self._spread = LARGEST_ERROR  # of it
-        self._reads: deque[tuple[float, float]] = deque(maxlen=READS)
+        self._reads: deque[tuple[float, float]] = deque(maxlen=READS[0])
         self.newest = math.nan  # s, on the clock that reads it
+        self.std = math.nan  # s, of it
 
     def begin(self) -> None:
         """Forget the phase: the FIFO was emptied. The crystal is the same."""
@@ -57,16 +59,26 @@ class FrameClock:
                 frames += int(count)
         self._reads.append((at, float(frames)))
         t, n = np.array(self._reads).T
+        for count in READS:
+            self._look_at(t[-count:], n[-count:])
+            if self.std > 0.0:
+                break
+        self.std = abs(self.std)
+        return self.newest
+
+    def _look_at(self, t: Array, n: Array) -> None:
+        """Find period and phase by reads at ``t`` (k,) s that brought the counts ``n`` (k,)."""
+        period = self.period
         if len(t) > 1:
             counted = (t[-1] - t[0]) / (n[-1] - n[0])
             spread = 1.0 / (n[-1] - n[0])
-            lowest = max(counted * (1.0 - spread), self.period * (1.0 - self._spread))
-            highest = min(counted * (1.0 + spread), self.period * (1.0 + self._spread))
-            self.period = farthest_period(t, n, lowest, highest) if lowest < highest else counted
+            lowest = max(counted * (1.0 - spread), period * (1.0 - self._spread))
+            highest = min(counted * (1.0 + spread), period * (1.0 + self._spread))
+            period = farthest_period(t, n, lowest, highest) if lowest < highest else counted
             self._spread = KNOWN if len(t) >= ENOUGH else LARGEST_ERROR
-        earliest, latest = bounds(t, n, self.period)
-        self.newest = min(0.5 * (earliest + latest) + self.period * n[-1], at)
-        return self.newest
+        earliest, latest = bounds(t, n, period)
+        self.period, self.std = period, (latest - earliest) / math.sqrt(12.0)
+        self.newest = min(0.5 * (earliest + latest) + period * n[-1], t[-1])
 
 
 def bounds(t: Array, n: Array, period: float) -> tuple[float, float]:

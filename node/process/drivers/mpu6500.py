@@ -169,7 +169,7 @@ class Mpu6500:
         if overflown:
             self._empty()
             self._frames.begin()
-        return replace(sample, late=end - shown)
+        return replace(sample, late=end - shown, late_std=self._frames.std)
 
     def close(self) -> None:
         """Release the bus."""

@@ -14,11 +14,13 @@ from node.kernels.aligner import Reason, begin_alignment, drop_alignment
 from node.kernels.alignment import CIRCLE, EXTREMES
 from node.kernels.fixed.node import FixedNode
 from node.kernels.layout import DEG, PERIOD
+from node.kernels.record import READING, SATURATED
 from node.kernels.static_average import has_moved
 from node.kernels.step import SAY_RECORD, node_aiding, node_step
 
 G = 9.81
 NOISE = 0.02 * DEG
+NOTHING_MORE = [0.0] * (READING - SATURATED)  # nothing at its range, nothing late, no parts
 MOUNTS = (0.01, -0.02), (-0.03, 0.005), (0.02, 0.03)  # pitch and roll of each IMU
 
 
@@ -59,7 +61,7 @@ class Pair:
             pull = -G * down
             pull[:2] -= spin * spin * self.floats[1][0]["place"][k]
             rate = imu @ np.array([0.0, 0.0, spin]) + self.random.normal(0.0, 1.6e-4, 3)
-            rows.append([*rate, *(imu @ pull + self.random.normal(0.0, G * self.noise, 3)), 30.0, 0.0, 0.0])
+            rows.append([*rate, *(imu @ pull + self.random.normal(0.0, G * self.noise, 3)), 30.0, *NOTHING_MORE])
         return np.array(rows)
 
     def cycle(self, spin: float = 0.0, *, aided: bool = True) -> None:
