@@ -75,12 +75,18 @@ def open_misfit(node: Any) -> None:
 
 @kernel
 def is_reversed(node: Any) -> bool:
-    """Whether the encoder counts backwards, which is told once: as fast as the gyroscope turns, the other way."""
+    """Whether the encoder counts backwards, which is told once: as fast as the gyroscope turns, the other way.
+
+    One that did so does it until it turns with the gyroscope, or rests: the last edges of a stop are slow.
+    """
     state, guard = node.filter, node.guard
     slowest = min(abs(guard.rate), abs(state.now_rate))
-    if slowest < SLOWEST_REVERSED or is_faulty(guard.gyro):
+    if is_faulty(guard.gyro):
         return False
-    against = bool((guard.rate < 0) != (state.now_rate < 0) and abs(guard.rate + state.now_rate) < half(slowest))
+    if slowest < SLOWEST_REVERSED:
+        return bool(guard.reversed == 1 and guard.rate != 0)
+    alike = guard.reversed == 1 or abs(guard.rate + state.now_rate) < half(slowest)
+    against = bool((guard.rate < 0) != (state.now_rate < 0) and alike)
     if against and guard.reversed == 0:
         told, own = told_degrees(guard.rate, RATE_Q), told_degrees(state.now_rate, RATE_Q)
         tell(node, ENCODER_REVERSED, told, own, NONE, NONE)

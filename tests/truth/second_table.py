@@ -1,18 +1,14 @@
-"""The table of the field's disturbances by a second world, beside that of the study: `make truth`.
+"""The field's disturbances in a second world.
 
 A cycle is told of if the node carries a doubt in it or in one of the ten after it.
 """
 
 from __future__ import annotations
 
-import csv
 import itertools
 import math
-import sys
 from collections.abc import Sequence
-from concurrent.futures import ProcessPoolExecutor
 from dataclasses import dataclass
-from pathlib import Path
 
 import numpy as np
 import numpy.typing as npt
@@ -26,7 +22,6 @@ from node.kernels.record import new_node
 from telemetry.messages import Aiding, Event, NodeFlag, NodeState, SurveyMeasurement
 
 Array = npt.NDArray[np.float64]
-STUDY = Path(__file__).parents[2] / "docs" / "results" / "field.csv"
 MPU, PULL = {"frames_hz": 50.0, "low_pass_hz": 20.0}, {"pull_dps_per_g": 0.1}
 ROWS: dict[str, Disturbance] = {
     "clean, cycles locked": Disturbance(locked=True),
@@ -153,22 +148,6 @@ def figures(name: str, seen: Sequence[Seen]) -> list[float]:
     return [*means, 100.0 * float(np.mean(lies)), float(np.mean(false)), 100.0 * surveys]
 
 
-def main(seeds: int) -> None:
-    """Print both tables beside each other."""
-    with STUDY.open() as file:
-        study = {row["case"]: row for row in csv.DictReader(file)}
-    print(f"{'':56s}   NEES turning            rest     unflagged %    false faults       surveys %")
-    print(f"{seeds} seeds of the second world, then the study{'':16s}" + 5 * "  second   study")
-    with ProcessPoolExecutor() as pool:
-        for name in ROWS:
-            ours = figures(name, list(pool.map(drill, itertools.repeat(name), range(1, seeds + 1))))
-            theirs = [float(study[name][key]) for key in ("nees_turning", "nees_rest", "unflagged_percent")]
-            theirs.append(sum(float(study[name][key]) for key in ("gyro_step", "gyro_scale", "other_faults")))
-            theirs.append(float(study[name]["surveys_percent"]))
-            pairs = zip(ours, theirs, strict=True)
-            print(f"{name:56s}" + "".join(f"{a:8.3g}{b:8.3g}" for a, b in pairs), flush=True)
-
-
 def _tube(settings: TubeSettings) -> Tube:
     return Tube(settings, default_config(), new_node(default_config()), itertools.count().__next__, restored=False)
 
@@ -176,10 +155,5 @@ def _tube(settings: TubeSettings) -> Tube:
 def _reading(sensor: Cycles, k: int, end: float) -> ImuReading:
     (wx, wy, wz), (fx, fy, fz) = sensor.rate[k].tolist(), sensor.force[k].tolist()
     heat, clipped, late = float(sensor.temperature[k]), int(sensor.clipped[k]), float(sensor.late[k])
-    told = tuple(sensor.parts[k].tolist()) if np.isfinite(sensor.parts[k]).all() else ()
-    window = late, float(sensor.late_std[k]), told
+    window = late, float(sensor.late_std[k]), tuple(sensor.parts[k][np.isfinite(sensor.parts[k])].tolist())
     return ImuReading(end - PERIOD, end, (wx, wy, wz), (fx, fy, fz), heat, clipped, *window)
-
-
-if __name__ == "__main__":
-    main(int(sys.argv[1]) if len(sys.argv) > 1 else 20)

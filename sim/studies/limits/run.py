@@ -1,6 +1,6 @@
 """How near a node comes to the best that its data hold: at rest, at its surveys, and when it says them again.
 
-Aiding comes at a random phase of the node's cycle. *At rest* is every cycle of a rest from 20 s after the stop on;
+Aiding comes at a random phase of the node's cycle, and the gyroscope tells the eighths of its cycles. *At rest* is every cycle of a rest from 20 s after the stop on;
 *at the survey* is the yaw as it is said first, *revised* what is known of it when the rest ends, and *smoothed* when
 the string has turned on. The bound beside each is that of the best filter, or the best smoother, on the same data
 (`bound`). The last rest has no turning after it and is not judged.
@@ -32,6 +32,7 @@ RATIO = 1.2  # of ours to the bound, at most
 BASE: Tables = changed(
     RESTING,
     encoder={"phase": "random"},
+    gyroscope={"increments": True},
     joints={"reading_std_deg": 0.0, "mount_std_deg": 0.0},
     medium={"loss": 0.0},
 )
