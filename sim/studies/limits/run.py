@@ -1,9 +1,9 @@
 """How near a node comes to the best that its data hold: at rest, at its surveys, and when it says them again.
 
-Aiding comes at a random phase of the node's cycle, and the gyroscope tells the eighths of its cycles. *At rest* is every cycle of a rest from 20 s after the stop on;
-*at the survey* is the yaw as it is said first, *revised* what is known of it when the rest ends, and *smoothed* when
-the string has turned on. The bound beside each is that of the best filter, or the best smoother, on the same data
-(`bound`). The last rest has no turning after it and is not judged.
+Aiding comes at a random phase of the node's cycle, and the gyroscope tells the eighths of its cycles. *At rest* is
+every cycle of a rest from 20 s after the stop on; *at the survey* is the yaw as it is said first, *revised* what is
+known of it when the rest ends, and *smoothed* when the string has turned on. The bound beside each is that of the best
+filter, or the best smoother, on the same data (`bound`). The last rest has no turning after it and is not judged.
 """
 
 from __future__ import annotations
