@@ -13,7 +13,7 @@ from groundstation.report.style import SERIES, new_figure, styled, tidy
 @styled
 def soak_figure(samples: Sequence[Sample]) -> Figure:
     """Memory, objects and open files of the process, and the database, over hours of rig time and over surveys."""
-    figure = new_figure(4.2, f"One rig under faults for {samples[-1].hours:.0f} h, {samples[-1].surveys} surveys")
+    figure = new_figure(4.2, f"One rig under faults for {samples[-1].hours:.0f} h")
     (memory, objects), (handles, database) = figure.subplots(2, 2)
     hours = [sample.hours for sample in samples]
     memory.plot(hours, [sample.memory_mib for sample in samples], color=SERIES[0], label="process")
@@ -24,8 +24,9 @@ def soak_figure(samples: Sequence[Sample]) -> Figure:
     objects.set(ylabel="thousands of objects", ylim=(0.0, None))
     handles.plot(hours, [sample.handles for sample in samples], color=SERIES[0])
     handles.set(ylabel="open files", ylim=(0.0, None))
-    database.plot([sample.surveys for sample in samples], [s.database_kib for s in samples], color=SERIES[0])
-    database.set(ylabel="database, KiB", xlabel="surveys", ylim=(0.0, None))
+    # a database is deleted now and then, and begins anew
+    database.plot([sample.surveys for sample in samples], [s.database_kib for s in samples], "o", color=SERIES[0])
+    database.set(ylabel="database, KiB", xlabel="surveys in it", ylim=(0.0, None))
     for axes in (memory, objects, handles):
         axes.set_xlabel("h")
     return tidy(figure)

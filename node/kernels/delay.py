@@ -26,12 +26,12 @@ def make_up_delay(memory: Any, late: float, rate: Array, length: float) -> float
     Returns the variance (rad^2) of the turn about z that is taken for missing and not put right later. ``memory`` is a
     record of dtype ``DELAYED``; after a reading that was none it begins anew.
     """
+    memory.shown = 0
     if not (is_number(rate[0]) and is_number(rate[1]) and is_number(rate[2])):
         memory.late = NONE
         return 0
     known = is_number(memory.late)
     exact = late == 0 and not (known and memory.late != 0)
-    memory.shown = 0
     window = length - late + (memory.late if known else late)
     bend = 0
     for k in range(3):
@@ -42,7 +42,7 @@ def make_up_delay(memory: Any, late: float, rate: Array, length: float) -> float
         if k == 2 and memory.told == 1:
             ahead = memory.ahead
         missing = turn(measured + ahead, late)
-        if k == 2 and memory.told == 1 and known:
+        if k == 2 and memory.told == 1 and memory.joins == 1 and known:
             shown = turn(measured + memory.behind, memory.late)
             memory.shown, memory.missing[k] = shown - memory.missing[k], shown
         if known and not exact:

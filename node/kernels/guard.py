@@ -17,7 +17,7 @@ from node.kernels.jit import constant, kernel
 from node.kernels.layout import DEG, RECENT, Status
 from node.kernels.mismatches import learn_mismatch, recover_gyro
 from node.kernels.modes import STATIC_BIAS
-from node.kernels.numbers import lasting, root, scaled, square, times, unscaled
+from node.kernels.numbers import half, lasting, root, scaled, square, times, unscaled
 from node.kernels.odd_force import keeps_out
 from node.kernels.quantity import NONE, angle, rate
 from node.kernels.ramps import follow_fit, is_starting
@@ -132,9 +132,9 @@ def is_settling(node: Any) -> bool:
 
 @kernel
 def stood_in_this_rest(node: Any) -> bool:
-    """Whether the node has stood still since the head did."""
+    """Whether the node has stood still since the head did, or the cycle before; half a cycle keeps rounding out of it."""
     state = node.filter
-    return bool(state.stopped_at > state.now - lasting(state.now, node.guard.rest_cycles + 1))
+    return bool(state.stopped_at > state.now - half(lasting(state.now, 2 * node.guard.rest_cycles + 3)))
 
 
 @kernel

@@ -11,7 +11,7 @@ from node.kernels.delay import make_up_delay
 from node.kernels.jit import kernel
 from node.kernels.layout import Array
 from node.kernels.numbers import are_numbers
-from node.kernels.parts import put_right, read_parts, split_cycle
+from node.kernels.parts import read_parts, split_cycle
 from node.kernels.record import FX, LATE, LATE_STD, SATURATED, TEMPERATURE, WX
 from node.kernels.resets import open_yaw
 
@@ -34,7 +34,6 @@ def take_readings(node: Any, settings: Any, parameters: Array, readings: Array, 
     split_cycle(node, 1)
     node.cluster.delayed[0].std = readings[0, LATE_STD]
     doubt_turn(node, make_up_delay(node.cluster.delayed[0], readings[0, LATE], rate, length))
-    put_right(node, 1)
     return int(readings[0, SATURATED])
 
 
@@ -57,7 +56,6 @@ def take_cluster(node: Any, settings: Any, parameters: Array, readings: Array, l
     doubt_turn(node, doubt)
     fuse_imus(node, settings, readings)
     split_cycle(node, settings.imus)
-    put_right(node, settings.imus)
 
 
 @kernel

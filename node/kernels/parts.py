@@ -34,8 +34,10 @@ def read_parts(node: Any, parameters: Array, reading: Array, imu: int, length: f
     reading : (READING,) of the IMU
     length : s, of the cycle
     """
-    cluster = node.cluster
+    state, cluster = node.filter, node.cluster
     memory = cluster.delayed[imu]
+    newest = state.cycles - 1
+    memory.joins = 1 if is_split(state, newest) and newest >= state.consumed else 0
     cluster.split[imu] = memory.told = 1 if reading[SPLIT] != 0 and are_parts(reading) else 0
     if cluster.split[imu] == 0:
         return
@@ -71,9 +73,14 @@ def are_parts(reading: Array) -> bool:
 
 @kernel
 def put_right(node: Any, imus: int) -> None:
-    """Add to the last cycle, which the filter has not passed yet, what the windows that came now show of its end."""
+    """Add to the last cycle, which the filter has not passed yet, what the windows that came now show of its end.
+
+    Not where the guard has put something else in the place of these.
+    """
     state, cluster = node.filter, node.cluster
     newest = state.cycles - 1
+    if state.ring_split[state.cycles % RECENT] == 0:
+        return
     total: float = 0
     shown: float = 0
     for k in range(imus):
@@ -84,17 +91,15 @@ def put_right(node: Any, imus: int) -> None:
         elif cluster.used[k] == 1:
             shown += weighed(cluster.delayed[k].shown, cluster.weights[k], total)
     if imus > 1:
-        shown = of_weighed(shown, total)
-    if shown == 0 or newest < state.consumed:
+        shown = of_weighed(shown, total) if total > 0 else 0
+    if shown == 0:
         return
     slot = newest % RING
-    length = state.ring_end[slot] - state.ring_start[slot]
-    faster = speed(shown, length)
+    faster = speed(shown, state.ring_end[slot] - state.ring_start[slot])
     state.ring_rate[slot, 2] += faster
-    if is_split(state, newest):
-        for j in range(PARTS):
-            state.ring_parts[newest % RECENT, j] -= faster
-        state.ring_parts[newest % RECENT, PARTS - 1] += PARTS * faster
+    for j in range(PARTS):
+        state.ring_parts[newest % RECENT, j] -= faster
+    state.ring_parts[newest % RECENT, PARTS - 1] += PARTS * faster
 
 
 @kernel

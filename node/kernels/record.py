@@ -192,6 +192,7 @@ DELAYED: Final = np.dtype(
         ("missing", "f8", (3,)),  # rad, turn of its cycle that the sensor had yet to show
         # of the window that has just come, by its parts
         ("told", "i8"),  # 1: they are known
+        ("joins", "i8"),  # 1: those of the cycle before are too, which waits for the filter
         ("behind", "f8"),  # rad/s beyond the mean, about the axis, of what was missing of the cycle before
         ("ahead", "f8"),  # rad/s, likewise, of what is missing now
         ("shown", "f8"),  # rad, turn of the cycle before beyond what was taken for missing

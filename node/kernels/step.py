@@ -27,6 +27,7 @@ from node.kernels.lying import turn_down
 from node.kernels.make_up import follow_joints
 from node.kernels.modes import STATIC_BIAS
 from node.kernels.numbers import angle_of, half, held, ratio, root, stamp_square, time_root
+from node.kernels.parts import put_right
 from node.kernels.priors import set_stamp
 from node.kernels.quantity import LONG_AGO, NONE, factor, rate, rate_variance, seconds
 from node.kernels.ramps import follow_ramp
@@ -146,6 +147,7 @@ def before_loop(node: Any, settings: Any, moment: Array, saturated: int) -> int:
     start, end = moment[START], moment[END]
     turn_down(node)
     guard_reading(node, settings, saturated, end)
+    put_right(node, settings.imus)
     watch_rest(node, settings, end)
     follow_clock(node, settings, moment)
     level_coarsely(state, node.config, node.rate, node.force)

@@ -69,10 +69,12 @@ def show_cycle(fixed: Any, state: Any, gravity: float) -> None:
     rate, time, vector = 2.0**-RATE_Q, 2.0**-TIME_Q, 2.0**-VECTOR_Q
     state.ring_start[slot], state.ring_end[slot] = fixed.ring_start[slot] * time, fixed.ring_end[slot] * time
     state.ring_quiet[slot] = fixed.ring_quiet[slot]
-    recent = (fixed.cycles - 1) % fixed.ring_split.shape[0]
-    state.ring_split[recent] = fixed.ring_split[recent]
-    for j in range(fixed.ring_parts.shape[1]):
-        state.ring_parts[recent, j] = fixed.ring_parts[recent, j] * rate
+    for cycle in range(max(fixed.cycles - 2, 0), fixed.cycles):  # a late window puts the cycle before right
+        recent, before = cycle % fixed.ring_split.shape[0], cycle % fixed.ring_start.shape[0]
+        state.ring_split[recent] = fixed.ring_split[recent]
+        state.ring_rate[before, 2] = fixed.ring_rate[before, 2] * rate
+        for j in range(fixed.ring_parts.shape[1]):
+            state.ring_parts[recent, j] = fixed.ring_parts[recent, j] * rate
     for k in range(3):
         state.ring_rate[slot, k] = fixed.ring_rate[slot, k] * rate
         state.ring_force[slot, k] = fixed.ring_force[slot, k] * (2.0**-FORCE_Q * gravity)

@@ -70,15 +70,8 @@ class Rig:
             rate[1] = math.nan
         late, split = 0.01 if imu == 0 else 0.0, k % 700 < 500
         parts = rate[2] + random.normal(0.0, 4e-4, 1 + PARTS)
-        return [
-            *rate,
-            *pull,
-            20.0 + 30.0 * math.sin(k / 500.0),
-            0.0,
-            late,
-            float(split),
-            *(parts if split else 0 * parts),
-        ]
+        window = late, 3e-4 * (late > 0.0), float(split), *(parts if split else 0 * parts)
+        return [*rate, *pull, 20.0 + 30.0 * math.sin(k / 500.0), 0.0, *window]
 
     def aiding(self, k: int) -> np.ndarray:
         """The encoder's word after cycle ``k``."""
