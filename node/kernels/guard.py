@@ -132,7 +132,7 @@ def is_settling(node: Any) -> bool:
 
 @kernel
 def stood_in_this_rest(node: Any) -> bool:
-    """Whether the node has stood still since the head did, or the cycle before; half a cycle keeps rounding out of it."""
+    """Whether the node has stood still since the head did, or the cycle before: half a cycle off the grid of cycles."""
     state = node.filter
     return bool(state.stopped_at > state.now - half(lasting(state.now, 2 * node.guard.rest_cycles + 3)))
 

@@ -86,7 +86,7 @@ class Rig:
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize(("seed", "imus", "joints"), [(2, 3, 2), (3, 2, 0), (4, 1, 2), (5, 3, 1), (6, 1, 0), (7, 1, 1)])
+@pytest.mark.parametrize(("seed", "imus", "joints"), [(2, 3, 2), (3, 2, 0), (8, 1, 2), (5, 3, 1), (6, 1, 0), (7, 1, 1)])
 def test_a_node_does_the_same_in_integers(seed: int, imus: int, joints: int) -> None:
     """Where no scale is learnt anew: the prior of one is 0.1, the range of the integers 0.054 (decision 11)."""
     rig = Rig(imus, np.random.default_rng(seed))
