@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from typing import Any, Final
 
-from node.kernels.cluster import of_weighed, weighed
+from node.kernels.cluster import fuse, of_weighed, weighed
 from node.kernels.jit import kernel
 from node.kernels.layout import BEGAN_STILL, ENDED_STILL, KNOWN, PARTS, RECENT, RING, Array
 from node.kernels.modes import STATIC_BIAS
@@ -151,17 +151,12 @@ def is_at_rest(node: Any, beyond: float) -> bool:
 @kernel
 def fuse_parts(cluster: Any, imus: int, own: Array) -> bool:
     """Inverse-variance mean of the parts of the IMUs in use into ``own`` (8); whether every one of them tells its."""
-    total: float = 0
+    count = 0
     for k in range(imus):
         if cluster.used[k] == 1 and cluster.split[k] == 0:
             return False
-        total += cluster.weights[k]
-    if not total > 0:
+        count += cluster.used[k]
+    if count == 0:
         return False
-    for j in range(PARTS):
-        own[j] = 0
-        for k in range(imus):
-            if cluster.used[k] == 1:
-                own[j] += weighed(cluster.parts[k, j], cluster.weights[k], total)
-        own[j] = of_weighed(own[j], total)
+    fuse(cluster.parts[:], cluster.weights, own)
     return True
