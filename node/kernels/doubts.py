@@ -19,7 +19,7 @@ from node.kernels.events import Code, tell, told, told_degrees
 from node.kernels.fixed.layout import ANGLE_Q, VECTOR_Q
 from node.kernels.jit import constant, kernel
 from node.kernels.layout import DEG
-from node.kernels.numbers import held, is_number, mean, number, product, ratio, root, square, times, turn
+from node.kernels.numbers import held, is_number, lasting, mean, number, product, ratio, root, square, times, turn
 from node.kernels.quantity import NONE, factor, variance
 from node.kernels.swings import swing_var
 
@@ -31,6 +31,8 @@ CLEARED: Final = factor(1.5)  # likewise, below which it is none any more
 ALIKE: Final = factor(0.7)  # mean of the products of neighbours over the variance, from where they hang together
 UNLIKE: Final = factor(0.3)  # likewise, below which they do not any more
 MOST: Final = 9  # variances, that one innovation counts for: outliers and faults are for the gate
+SURE: Final = 5  # sigmas, from where what a gyroscope cannot explain is a jump
+UNSURE_CYCLES: Final = 2  # in which it may have been wrong before it contradicted, or turned otherwise than last
 SETTLED: Final = 9  # variances, within which two jumps cancel each other
 LEAST: Final = factor(0.01)  # of a variance, that is left of it without the misfit
 LARGEST_MISFIT: Final = variance((5.0 * DEG) ** 2)  # rad^2
@@ -107,6 +109,22 @@ def follow_jump(node: Any) -> None:
     if square(guard.jump) < SETTLED * state.innovation_var:
         guard.jump = 0
     state.systematic_var = held(max(state.systematic_var + square(guard.jump) - square(before), 0))
+
+
+@kernel
+def keep_contradiction(node: Any) -> None:
+    """The gyroscope turns out to give nothing while aidings contradict it: at rest it may explain what it turned by.
+
+    What is left is a jump, of which the node will know nothing more. Where the head turned nothing can be said.
+    """
+    state, guard = node.filter, node.guard
+    if state.rejected == 0 or guard.rest_cycles < state.rejected:
+        return
+    turned = turn(state.now_rate, lasting(state.now, state.rejected))
+    unsure = abs(turn(state.now_rate, lasting(state.now, UNSURE_CYCLES))) + SURE * root(state.innovation_var)
+    jump = wrap(state.innovation + turned)
+    if abs(jump) > unsure:
+        guard.jump = wrap(guard.jump + jump)
 
 
 @kernel

@@ -20,7 +20,7 @@ from node.kernels.numbers import angle_of, half, is_number, lasting, square, tim
 from node.kernels.priors import is_beyond_gate
 from node.kernels.quantity import NONE, rate, seconds, variance
 from node.kernels.record import A_CLOCK_VAR, A_RATE, A_VALID, A_YAW, A_YAW_VAR
-from node.kernels.resets import begin_epoch, open_yaw
+from node.kernels.resets import begin_epoch, doubt_yaw, open_yaw
 from node.kernels.trust import is_faulty
 
 SLOWEST_REVERSED: Final = rate(5.0 * DEG)  # rad/s, from where encoder and gyroscope are seen to turn against each other
@@ -70,7 +70,7 @@ def open_misfit(node: Any) -> None:
     """What innovations showed beyond their variance is of the yaw too."""
     var = misfit_var(node)
     if var > 0:
-        open_yaw(node.filter, var)
+        doubt_yaw(node.filter, var)
 
 
 @kernel

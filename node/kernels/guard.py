@@ -10,7 +10,7 @@ from __future__ import annotations
 from typing import Any, Final
 
 from node.kernels.aiding_watch import AT_ONCE, AT_REST, STARTING, find_mismatch, forget
-from node.kernels.doubts import follow_jump, follow_misfit, misfit_var
+from node.kernels.doubts import follow_jump, follow_misfit, keep_contradiction, misfit_var
 from node.kernels.events import Fault, tell
 from node.kernels.gates import RATE_AGE
 from node.kernels.jit import constant, kernel
@@ -156,6 +156,7 @@ def follow_gyro(node: Any, fault: int) -> None:
             tell(node, fault, NONE, NONE, NONE, NONE)
         if trust.fault == 0:
             trust.cycles = 0
+            keep_contradiction(node)
         if trust.fault == GYRO_STEP and trust.proving == 1 and guard.step.fault != 0:
             node.filter.static_bias[2] += guard.step.rate  # what looked like a step was this fault's beginning
             guard.step.fault = 0

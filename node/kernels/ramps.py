@@ -21,7 +21,7 @@ from node.kernels.jit import constant, kernel
 from node.kernels.layout import DEG, RING, Err
 from node.kernels.numbers import half, held, mean, ratio, root, square, times, turn
 from node.kernels.quantity import NONE, factor, rate, variance
-from node.kernels.resets import forget_scale, open_yaw
+from node.kernels.resets import doubt_yaw, forget_scale, open_yaw
 
 LEAST_CHANGE: Final = rate(5.0 * DEG)  # rad/s, from one cycle to the next, on a ramp
 REACH: Final = 10  # cycles after it, whose aidings still show what it did
@@ -120,7 +120,7 @@ def doubt_ramp(node: Any, own: float, rejected: int) -> None:
     ramp.doubt = held(max(ramp.doubt, own))
     if ramp.opened == 0:
         ramp.opened = 1
-        open_yaw(state, ramp.largest)
+        doubt_yaw(state, ramp.largest)
         forget_scale(state, ramp.scale, square(ramp.scale_std))
 
 

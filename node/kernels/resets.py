@@ -39,6 +39,13 @@ def open_yaw(state: Any, var: float) -> None:
 
 
 @kernel
+def doubt_yaw(state: Any, var: float) -> None:
+    """The yaw may be off by a further ``var`` (rad^2): an encoder at rest, which repeats itself, is to tell it anew."""
+    open_yaw(state, var)
+    state.last_sequence = -1
+
+
+@kernel
 def lose_yaw(state: Any) -> None:
     """Nothing is known of the yaw, now and at the filter's epoch."""
     set_apart(state, PSI, UNKNOWN_VAR)

@@ -19,7 +19,7 @@ from node.kernels.modes import STATIC_BIAS, TRACKING, UNBIASED_STILL_RATE
 from node.kernels.numbers import factor_of, half, held, mean, root, square, times, turn
 from node.kernels.priors import bias_var, calm_bias, noise_over, widen_bias
 from node.kernels.quantity import NONE, rate, seconds
-from node.kernels.resets import move_bias, open_yaw
+from node.kernels.resets import doubt_yaw, move_bias
 
 CYCLES: Final = 8  # whose mean and spread are looked at
 SETTLING: Final = 2  # cycles of a rest before those
@@ -136,11 +136,9 @@ def take_bias(node: Any, settings: Any, since: int) -> None:
             widen_bias(config, k, abs(moved))
         move_bias(state, k, usual, held(var), bias_var(config, k))
     moved_z = off
-    if known:
-        open_yaw(state, square(turn(moved_z * since, period)))
-    else:
+    if not known:
         state.mode = TRACKING
-    state.last_sequence = -1  # the rest is to be judged again
+    doubt_yaw(state, square(turn(moved_z * since, period)) if known else 0)
     state.rejected = 0
     guard.before_steps = NONE
     guard.step.fault = 0

@@ -13,7 +13,7 @@ from node.firmware.settings import TubeSettings, crew_record
 from node.kernels.aiding_watch import AT_ONCE, find_mismatch, forget
 from node.kernels.events import Fault
 from node.kernels.gates import contradicts
-from node.kernels.layout import DEG, Err, default_config
+from node.kernels.layout import DEG, PERIOD, Err, default_config
 from node.kernels.record import AIDINGS, MISMATCH, new_node
 from node.kernels.sensor_watch import find_faults
 from telemetry.messages import Mode, NodeFlag
@@ -146,6 +146,29 @@ def test_a_new_scale_is_named_and_learnt(factor: float, healthy: StringOfOne) ->
     assert min(c for c, e in string.events if c >= at and e.code in ("gyro_scale", "gyro_step")) - begins < 10
     assert string.codes(at)[-1] == "stopped"
     assert abs(string.error[-1]) < 3.0 * string.std[-1]
+
+
+@pytest.mark.parametrize("slipped_deg", [20.0, -100.0, 0.0])
+def test_what_the_encoder_jumped_by_before_a_gyroscope_was_found_stuck_stays_in_doubt(
+    slipped_deg: float, healthy: StringOfOne
+) -> None:
+    """The readings of before are all that contradicts it; afterwards the node takes the yaw that it is given."""
+    at = healthy.resting(1)
+    jump = {"jump_deg": slipped_deg, "jump_s": (at + 1) * PERIOD}
+    string = StringOfOne(1, stick(at + 2, (0, 1, 2)), rough={"encoder": jump}).advance(at + LASTS + SETTLED)
+    assert {"gyro_stuck", "sensor_recovered"} <= set(string.codes(at))
+    assert string.codes(at).count("yaw_reset") == 0
+    systematic = math.sqrt(float(string.tube.state["systematic_var"]))
+    assert systematic == pytest.approx(abs(slipped_deg) * DEG, abs=0.1 * DEG)
+
+
+def test_a_yaw_that_a_stop_left_in_doubt_follows_an_encoder_that_rests(healthy: StringOfOne) -> None:
+    """A scale that changed on the ramp, then a small step at rest: the resting encoder repeats itself, and is right."""
+    ramp, at = healthy.resting(1, 0.0) - 3, healthy.resting(1, 0.4)
+    rescaled, stepped = rescale(ramp, 1.1), step(at, 0.3, at + 3)
+    string = StringOfOne(1, lambda cycle, sample: stepped(cycle, rescaled(cycle, sample))).advance(at + 40)
+    assert "aiding_doubted" in string.codes(ramp)
+    assert abs(string.error[at + 39]) < 0.1 * DEG
 
 
 def test_no_cross_term_is_kept_when_a_fault_is_found(healthy: StringOfOne) -> None:
