@@ -28,7 +28,7 @@ from groundstation.service.tally import Tally
 from groundstation.survey.joint_angles import JointAngles
 from groundstation.survey.resolve import Direction, Quality, Resolved
 from groundstation.survey.shared import Reading, SharedErrors, weigh_together
-from groundstation.survey.trust import Trust, trust_of, with_unknown_yaw
+from groundstation.survey.trust import Trust, trust_of, with_uncertain_yaw, with_unknown_yaw
 from telemetry.messages import EPOCH_UNKNOWN, Event, NodeFlag, NodeState, StaticRecord, SurveyMeasurement
 
 EVENTS_SHOWN = 10_000
@@ -301,6 +301,8 @@ class RigModel:
         """Direction of a measurement with what it shares with others."""
         if trust is Trust.UNKNOWN_YAW:
             resolved = with_unknown_yaw(resolved)
+        else:
+            resolved = with_uncertain_yaw(resolved, m.yaw_var + m.systematic_var)
         return self.shared.reading(
             resolved,
             m.tube,

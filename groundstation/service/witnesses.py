@@ -17,6 +17,7 @@ from telemetry.messages import EPOCH_UNKNOWN, Event
 AGAINST_THE_ENCODER = ("yaw_reset", "gyro_step", "gyro_scale")
 STARTS = ("booted", "restored")
 REJECTED = "aiding_rejected"  # the first of a row of aidings that contradict a yaw, up to its reset
+SEEN_LATER = 10.0  # s from there to a gyroscope that is found to give nothing: it gave nothing then
 CUT_SHORT = 60.0  # s from there to a start, after which it was an outlier
 ELSEWHERE = "reference_changed"  # the yaw of a node came over other joints before
 BLIND = ("bad_sample", "gyro_saturated", "gyro_stuck")  # the gyroscope gives nothing, until the sensor has recovered
@@ -56,7 +57,7 @@ class Witnesses:
         elif event.code == "overrun":
             _add_time(self._off, place, event.at, event.at + CYCLE * int(str(event.arguments.get("missed", 0))))
         elif event.code in BLIND:
-            _add_time(self._blind, place, event.at, math.inf)
+            _add_time(self._blind, place, self._blind_since(event), math.inf)
             return ""  # what it tells next says whether that is over by now
         elif event.code == "sensor_recovered" and event.arguments.get("after") in BLIND:
             self._end_blind(place, event)
@@ -150,6 +151,15 @@ class Witnesses:
         known = (start for start in self._starts if start.tube == event.tube and start.epoch <= event.epoch)
         before = [start for start in known if start.sequence <= event.sequence]
         return max(before, key=lambda start: (start.sequence, *_in_time(start)), default=None)
+
+    def _blind_since(self, event: Event) -> float:
+        """Rig time (s) from which on a tube had no gyroscope: from where it began to contradict, if it just did.
+
+        That one repeats itself is seen after some cycles; whether it or the encoder was wrong in them, nobody can say.
+        """
+        rejected = self._rejected.pop(event.tube, event)
+        is_of_this = rejected.epoch == event.epoch and 0.0 <= event.at - rejected.at <= SEEN_LATER
+        return rejected.at - CYCLE if is_of_this else event.at
 
     def _end_blind(self, place: tuple[int, int], event: Event) -> None:
         """The gyroscope gives something again: the newest time without one that had begun has an end.

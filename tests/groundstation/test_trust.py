@@ -15,12 +15,17 @@ from groundstation.service import views
 from groundstation.service.model import RigModel
 from groundstation.survey.fusion import Weighting
 from groundstation.survey.resolve import angles, resolve
-from groundstation.survey.trust import EFFECTS, UNKNOWN_YAW_VAR, Trust, trust_of, with_unknown_yaw
+from groundstation.survey.trust import EFFECTS, UNKNOWN_YAW_VAR, Trust, trust_of, with_uncertain_yaw, with_unknown_yaw
 from telemetry.messages import ImuMean, NodeFlag, SurveyMeasurement
 
 G, DEG, VAR = 9.81, math.pi / 180.0, (0.0034**2) / 32
 COV = ((VAR, 0.0, 0.0), (0.0, VAR, 0.0), (0.0, 0.0, VAR))
 MD = 4.0
+
+
+def force_at(inclination_deg: float) -> np.ndarray:
+    """Specific force (m/s^2) of a tube that leans to the north at a yaw of 0."""
+    return np.array([G * math.sin(inclination_deg * DEG), 0.0, -G * math.cos(inclination_deg * DEG)])
 
 
 def survey(tube: int, yaw_error_deg: float = 0.0, flags: NodeFlag = NodeFlag.NONE) -> SurveyMeasurement:
@@ -105,12 +110,41 @@ def test_a_further_flag_never_gains_trust(one: int, other: int) -> None:
 @given(st.floats(0.0, 360.0), st.floats(0.01, 60.0))
 @settings(suppress_health_check=[HealthCheck.function_scoped_fixture])
 def test_whatever_the_yaw_is_the_truth_is_within_the_uncertainty(yaw_error_deg: float, inclination_deg: float) -> None:
-    force = np.array([G * math.sin(inclination_deg * DEG), 0.0, -G * math.cos(inclination_deg * DEG)])
+    force = force_at(inclination_deg)
     true = resolve(force, np.array(COV), 0.0, 1e-8).direction
     seen = with_unknown_yaw(resolve(force, np.array(COV), yaw_error_deg * DEG, 1e-8)).direction
     off = seen.lean - true.lean
     assert math.sqrt(off @ np.linalg.solve(seen.total_cov, off)) < 3.0
     assert angles(seen.lean, seen.down)[0] == pytest.approx(inclination_deg * DEG, abs=1e-9)
+
+
+@given(st.floats(-2.0, 2.0), st.floats(0.01, 60.0), st.floats(0.01, 60.0))
+def test_a_yaw_that_is_off_by_two_sigmas_leaves_the_truth_within_about_three(
+    sigmas: float, sigma_deg: float, inclination_deg: float
+) -> None:
+    """Its lean is on a circle: without that a sigma of 20 deg would put the truth a hundred sigmas away."""
+    force, yaw_var = force_at(inclination_deg), (sigma_deg * DEG) ** 2
+    true = resolve(force, np.array(COV), 0.0, 1e-8).direction
+    seen = with_uncertain_yaw(resolve(force, np.array(COV), sigmas * sigma_deg * DEG, yaw_var), yaw_var).direction
+    off = seen.lean - true.lean
+    assert math.sqrt(off @ np.linalg.solve(seen.total_cov, off)) < 3.2
+
+
+@pytest.mark.parametrize("sigma_deg", [1.0, 20.0, 60.0])
+def test_the_variance_along_the_lean_is_the_mean_square_of_what_the_circle_leaves_the_line_by(sigma_deg: float) -> None:
+    resolved, errors = resolve(force_at(30.0), np.array(COV), 0.0, 1e-8), np.random.default_rng(1).normal(size=200_000)
+    spread = with_uncertain_yaw(resolved, (sigma_deg * DEG) ** 2).direction.cov - resolved.direction.cov
+    assert spread[0, 0] == pytest.approx(np.mean((0.5 * (np.cos(errors * sigma_deg * DEG) - 1.0)) ** 2), rel=0.03)
+    assert spread[1, 1] == pytest.approx(0.0, abs=1e-15)
+
+
+def test_of_two_surveys_the_one_whose_yaw_is_in_doubt_moves_nothing(tmp_path: Path) -> None:
+    """One tube at one stop, before and after the encoder slipped by what its systematic variance says."""
+    good, doubted = survey(1), replace(survey(1, 26.6), sequence=2, station_at=130.0, systematic_var=(23.5 * DEG) ** 2)
+    station = station_of(tmp_path, good, doubted)
+    assert station is not None
+    assert station["inclination_deg"] == pytest.approx(5.0, abs=0.01)
+    assert (station["azimuth_deg"] + 180.0) % 360.0 - 180.0 == pytest.approx(0.0, abs=0.05)
 
 
 def test_an_unknown_flag_of_a_later_version_sets_aside(tmp_path: Path) -> None:

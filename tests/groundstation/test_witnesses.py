@@ -63,6 +63,16 @@ def test_a_tube_that_has_just_started_is_enough_where_the_other_has_no_gyroscope
     assert told([*BOTH_STARTED, against, event(2, 40.0, "stopped", 12)]) == []
 
 
+@pytest.mark.parametrize(("found_at", "said"), [(103.0, ["tubes 1 at 102 s"]), (120.0, [])])
+def test_a_gyroscope_that_sticks_as_the_encoder_slips_was_no_witness_since_it_contradicted(
+    found_at: float, said: list[str]
+) -> None:
+    """Both began to contradict at one time; what it would have made of the slip, nobody can say."""
+    began = [event(1, 100.0, "aiding_rejected"), event(2, 100.0, "aiding_rejected")]
+    events = [*began, event(1, 102.0, "yaw_reset", 11), event(2, found_at, "gyro_stuck", 11)]
+    assert told([*BOTH_STARTED, *events, event(2, 140.0, "stopped", 12)]) == said
+
+
 @pytest.mark.parametrize("cycles", ["many", -3, math.nan, math.inf, 1e300])
 def test_a_recovery_that_says_nothing_sensible_of_its_length_does_no_harm(cycles: Scalar) -> None:
     recovered = event(2, 103.0, "sensor_recovered", 11, after="gyro_saturated", cycles=cycles)
