@@ -15,11 +15,13 @@ from typing import TYPE_CHECKING, NamedTuple
 from telemetry.application.clock import ClockFilter
 from telemetry.application.outbox import Outbox
 from telemetry.application.saved_state import SavedState, is_needed, pack_state, parse_state
+from telemetry.application.standstill import Standstill
 from telemetry.errors import DecodeError
 from telemetry.media.port import Frame, Priority
 from telemetry.messages import (
     BASE,
     ENCODER,
+    EPOCH_UNKNOWN,
     HOPS_UNKNOWN,
     MAX_TUBE,
     Aiding,
@@ -30,6 +32,7 @@ from telemetry.messages import (
     Kept,
     Message,
     Mode,
+    NodeFlag,
     NodeState,
     Receipt,
     Reply,
@@ -95,6 +98,14 @@ PRIORITIES: dict[Kind, Priority] = {
     Kind.DEPTH_READING: Priority.STATE,
     Kind.SESSION_OFFER: Priority.COMMAND,
 }
+
+
+def is_undated(opened: Opened) -> bool:
+    """Whether a state does not say when it was, for its tube did not know rig time."""
+    state = decode_opened(opened)
+    return isinstance(state, NodeState) and (
+        state.epoch == EPOCH_UNKNOWN or NodeFlag.CLOCK_UNSYNCHRONISED in state.flags
+    )
 
 
 class Received(NamedTuple):
@@ -163,6 +174,7 @@ class Endpoint:
         self._commands = Outbox()
         self._hello_at = -math.inf
         self._sync_at = -math.inf
+        self._standstill = Standstill()
         if restored is not None:
             try:
                 self._restore(parse_state(restored))
@@ -183,6 +195,7 @@ class Endpoint:
         if link is None:
             self.counters["no_such_end"] += 1
             return []
+        self._standstill.move(now)
         if self.seals is not None:
             opened = self.seals.joints[side].open(bytes(frame), now)
             if opened is None:
@@ -211,6 +224,7 @@ class Endpoint:
 
     def advance(self, now: float) -> None:
         """Let time pass: neighbours that fell silent, hello, time requests, end-to-end repetition."""
+        self._standstill.move(now)
         for side, link in self._links.items():
             if self.neighbours[side] is not None and not link.is_up(now):
                 self.neighbours[side] = None
@@ -432,6 +446,9 @@ class Endpoint:
     def _handle_upward(self, opened: Opened, payload: Content, now: float) -> Message | None:
         if opened.kind is Kind.DEPTH_READING:
             raise DecodeError("depth reading: expected on its own key")
+        if opened.kind is Kind.NODE_STATE and self._standstill.may_have_waited(now) and is_undated(opened):
+            self.counters["old_states"] += 1
+            return None
         if self.address != BASE:
             self._pass(Side.UPPER, opened, payload)
             return None

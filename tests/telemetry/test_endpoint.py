@@ -2,6 +2,7 @@
 
 import math
 from dataclasses import replace
+from typing import Any
 
 import pytest
 from hypothesis import given, settings
@@ -13,6 +14,7 @@ from telemetry.media.memory import MemoryPort, joint
 from telemetry.messages import (
     BASE,
     ENCODER,
+    EPOCH_UNKNOWN,
     Aiding,
     Command,
     Event,
@@ -258,6 +260,35 @@ def test_a_relay_hands_on_the_very_bytes_that_came(monkeypatch: pytest.MonkeyPat
     chain.run(3.0)
     assert event in chain.got[BASE]
     assert len(encoded) == 1
+
+
+@pytest.mark.parametrize("frozen", [2, BASE])
+@pytest.mark.parametrize("stood_still", [15.0, 1.0])
+@pytest.mark.parametrize(
+    ("said", "is_known_to_wait"),
+    [
+        ({"epoch": 1}, False),  # it tells its time
+        ({"epoch": EPOCH_UNKNOWN}, True),
+        ({"epoch": 1, "flags": NodeFlag.CLOCK_UNSYNCHRONISED}, True),
+    ],
+    ids=["dated", "without an epoch", "unsynchronised"],
+)
+def test_a_state_without_a_time_that_waited_in_a_process_that_stood_still_is_not_handed_on(
+    frozen: int, stood_still: float, said: dict[str, Any], is_known_to_wait: bool
+) -> None:
+    """It would show a tube fresh that may have lost its power since; the next is due within a second."""
+    chain = Chain([2, 1])
+    chain.run(5.0)
+    station = chain.stations.pop(frozen)
+    chain.stations[1].send_state(replace(state(7), **said), chain.local(1))
+    chain.run(stood_still)
+    chain.stations[frozen] = station
+    chain.run(3.0)
+    came = [m for m in chain.got[BASE] if isinstance(m, NodeState)]
+    assert len(came) == (0 if is_known_to_wait and stood_still > 2.0 else 1)
+    chain.stations[1].send_state(replace(state(8), **said), chain.local(1))
+    chain.run(3.0)
+    assert [m.cycles for m in chain.got[BASE] if isinstance(m, NodeState)][-1] == 8
 
 
 def speak(chain: Chain, periods: int, silent: int = 0) -> dict[int, int]:
