@@ -113,6 +113,11 @@ def test_combined_seeds_hold(world: int, part: int) -> None:
         (502246, ("all-cut", "encoder-slips")),  # the power went while both began to contradict
         (417334, ("encoder-from-zero", "same-number", "gyro-stuck", "encoder-slips")),  # nor does an older epoch
         (403035, ("folders-swapped", "encoder-slips")),  # both had saved the yaw of another place
+        (144714, ("gyro-stuck", "encoder-slips")),  # it slipped in the cycles that a gyroscope repeated itself in
+        (118333, ("gyro-stuck", "gyro-saturated", "encoder-dead", "encoder-slips")),  # and the other was blind
+        (117024, ("frozen", "node-memory-lost", "node-disk-refuses")),  # a state without a time had waited
+        (144802, ("frozen", "node-memory-rots", "same-number")),  # the same
+        (100342, ("gyro-step", "gyro-scale")),  # the yaw was opened at rest, and the resting encoder not heard again
         (51633, ("surveys-lost", "gyro-step")),  # a gyroscope that turned its tube while nobody corrected it
     ],
 )
