@@ -51,7 +51,7 @@ def inputs_of(world: World) -> Inputs:
     moments, aidings = np.zeros((cycles, tubes, MOMENT)), np.zeros((cycles, AIDING))
     angle, rate, _ = world.motion.drive(world.ends)
     for k in range(tubes):
-        readings[:, k, 0, :6] = world.imu_samples(k + 1)
+        readings[:, k, 0, :6] = world.sensors.samples(k + 1)
         readings[:, k, 0, 6] = 25.0
         moments[:, k, START], moments[:, k, END] = world.ends - (world.ends[1] - world.ends[0]), world.ends
         moments[:, k, HOPS], moments[:, k, CLOCK_VAR] = tubes - k, CLOCK_STD**2 * (tubes - k)

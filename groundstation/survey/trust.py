@@ -25,7 +25,9 @@ from telemetry.messages import NodeFlag
 Array = npt.NDArray[np.float64]
 UNKNOWN_YAW_VAR = math.pi**2 / 3.0  # rad^2, uniform on the circle
 ALONG, ACROSS = 1.5, UNKNOWN_YAW_VAR  # of the squared lean
-STRAIGHT_VAR = math.radians(0.5) ** 2  # rad^2, of a yaw up to which the circle leaves the line by less than a force errs
+STRAIGHT_VAR = (
+    math.radians(0.5) ** 2
+)  # rad^2, of a yaw up to which the circle is off the line by less than a force errs
 
 
 class Trust(IntEnum):

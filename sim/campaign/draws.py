@@ -77,9 +77,9 @@ def draws_of(world: World) -> Draws:
     clocks = file.clocks
     stated = clocks.joint_std_ms if clocks.stated_std_ms is None else clocks.stated_std_ms
     return Draws(
-        frame=world.first_angle + np.array([world.frame_angle(tube) for tube in tubes]),
+        frame=world.first_angle + np.array([world.marks.frame_angle(tube) for tube in tubes]),
         clock_var=(1e-3 * stated) ** 2 * np.arange(1.0, count + 1.0),
-        systematic=np.array([[world.marks_error(tube, max(top, tube)) for top in range(count + 1)] for tube in tubes]),
+        systematic=np.array([[world.marks.error(tube, max(top, tube)) for top in range(count + 1)] for tube in tubes]),
         measured=measured_of(world),
         heard=aiding_passes(file.aiding, world.ends - world.begin, seed),
     )

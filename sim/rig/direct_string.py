@@ -253,14 +253,14 @@ class DirectString:
         readings = np.zeros((world.cycles, len(self.tubes), 1, READING))
         readings[..., TEMPERATURE] = USUAL
         for tube in self.tubes:
-            readings[:, tube - 1, 0, :TEMPERATURE] = world.imu_samples(tube)
+            readings[:, tube - 1, 0, :TEMPERATURE] = world.sensors.samples(tube)
             if world.scenario.file.rough is not None:
-                found = world.rough_cycles(tube)
+                found = world.sensors.rough_cycles(tube)
                 readings[:, tube - 1, 0, TEMPERATURE] = found.temperature
                 readings[:, tube - 1, 0, SATURATED] = found.clipped
                 readings[:, tube - 1, 0, LATE] = found.late
                 readings[:, tube - 1, 0, LATE_STD] = found.late_std
-            if (parts := world.imu_parts(tube)) is not None:
+            if (parts := world.sensors.parts(tube)) is not None:
                 known = np.isfinite(parts[:, 0])
                 readings[:, tube - 1, 0, SPLIT] = known
                 readings[known, tube - 1, 0, BEHIND:] = parts[known]

@@ -68,7 +68,7 @@ def run_seed(job: tuple[Tables, int]) -> LabRun:
 def judge(world: World, run: StringRun) -> LabRun:
     """Errors hop by hop: the top tube is the first."""
     tubes = range(world.scenario.tubes, 0, -1)
-    bias = np.stack([run.gyro_bias[:, tube - 1] - world.gyro_bias(tube) for tube in tubes], axis=1)
+    bias = np.stack([run.gyro_bias[:, tube - 1] - world.sensors.gyro_bias(tube) for tube in tubes], axis=1)
     surveys = {survey.tube: survey.measurement for survey in run.surveys}
     return LabRun(
         run.error[:, ::-1],

@@ -8,8 +8,9 @@ import numpy as np
 import numpy.typing as npt
 
 from node.kernels.layout import PERIOD
+from sim.world.marks import wrap
 from sim.world.scenario import scenario_of
-from sim.world.world import World, wrap
+from sim.world.world import World
 from telemetry.messages import ENCODER
 
 Array = npt.NDArray[np.float64]
@@ -24,7 +25,7 @@ def record(world: World, folder: Path) -> None:
     np.save(folder / "encoder.npy", counts(world, ends))
     for tube in range(1, world.scenario.tubes + 1):
         clock = np.array([world.local_clock(tube, end) for end in ends.tolist()])
-        np.save(folder / f"tube-{tube}.npy", np.column_stack([clock, world.readings(tube, ends, step)]))
+        np.save(folder / f"tube-{tube}.npy", np.column_stack([clock, world.sensors.readings(tube, ends, step)]))
 
 
 def counts(world: World, ends: Array) -> Array:

@@ -115,7 +115,7 @@ def a_survey_is_the_mean_of_what_was_read(step: Step | None) -> str:
         return [*sample[:3], *held[3:]] if at <= cycle < at + LASTS else sample
 
     string = drilled(step, spoil)
-    read = string.world.imu_samples(1)[:, 3:]
+    read = string.world.sensors.samples(1)[:, 3:]
     surveys = [survey for survey in string.string.run.surveys if survey.cycle >= at]
     for survey in surveys:
         rows = slice(survey.cycle - SAMPLES + 1, survey.cycle + 1)

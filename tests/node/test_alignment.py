@@ -148,7 +148,7 @@ def test_with_the_sensors_of_the_world_a_survey_errs_by_the_mount_before_and_by_
 
 def error_by_the_mount(world: World, inclination: float) -> float:
     """What a survey at the last stop errs while the lean of the IMU is not corrected, rad; the tool face decides."""
-    x, y, z = world.imu_frame(1) @ world.truth(1).force(np.array([world.motion.phases[-1].start]))[0]
+    x, y, z = world.sensors.frame(1) @ world.truth(1).force(np.array([world.motion.phases[-1].start]))[0]
     return math.atan2(math.hypot(x, y), -z) - inclination
 
 

@@ -53,7 +53,7 @@ def test_without_noise_every_sensor_reads_what_it_reads_in_the_world_of_a_rig() 
     tubes = tubes_of(world, draws_of(world).frame)
     felt = course.rate, course.force, course.circle, course.shaken
     for tube in (1, 2, 3):
-        samples = world.imu_samples(tube)
+        samples = world.sensors.samples(tube)
         for cycle in np.flatnonzero(made.course.powered >= tube)[::7].tolist():
             read_sensors(noise, tubes[tube - 1], False, 0.0, *felt, work.drawn, work.reading, int(cycle), tube - 1)
             assert np.allclose(work.reading[0, :6], samples[cycle], rtol=0.0, atol=2e-9), (tube, cycle)

@@ -136,7 +136,7 @@ def steps_deg(string: DirectString) -> list[float]:
     world, error = string.world, string.run.total_error
     for add in [phase for phase in world.phases if phase.kind == "add"]:
         before, after = (int((t - world.begin) / PERIOD) for t in (add.start - 2.0, add.end - 5.0))
-        slipped = [float(np.diff(world.unseen(tube, np.array([add.start, add.end])))[0]) for tube in (1, 2)]
+        slipped = [float(np.diff(world.marks.unseen(tube, np.array([add.start, add.end])))[0]) for tube in (1, 2)]
         found += np.degrees(error[after, :2] - error[before, :2] + slipped).tolist()
     return found
 

@@ -90,15 +90,15 @@ def test_cues_have_names_of_their_own_and_come_in_order() -> None:
 
 def test_drift_changes_raw_readings_by_its_matrix_and_bias_alone() -> None:
     drifted, plain = World(load_scenario(FIELD), 1), World(without("drift"), 1)
-    drift = drifted.drift(2)
+    drift = drifted.sensors.drift(2)
     assert drift is not None
-    assert plain.drift(2) is None
+    assert plain.sensors.drift(2) is None
     for cycle in (10, 200, 1200):
         clean, felt = np.array(plain.imu_sample(2, cycle)), np.array(drifted.imu_sample(2, cycle))
         np.testing.assert_array_equal(clean[:3], felt[:3])
         np.testing.assert_allclose(felt[3:], drift.matrix @ clean[3:] + drift.bias, atol=0.01)  # noise is not drifted
-    assert not np.allclose(drift.matrix, drifted.drift(1).matrix)  # type: ignore[union-attr]
-    np.testing.assert_array_equal(drift.matrix, World(load_scenario(FIELD), 1).drift(2).matrix)  # type: ignore[union-attr]
+    assert not np.allclose(drift.matrix, drifted.sensors.drift(1).matrix)  # type: ignore[union-attr]
+    np.testing.assert_array_equal(drift.matrix, World(load_scenario(FIELD), 1).sensors.drift(2).matrix)  # type: ignore[union-attr]
 
 
 def test_drift_has_its_standard_deviations() -> None:

@@ -17,9 +17,10 @@ from borechain.inline import InlineRig
 from node.process.tube_process import TubeProcess
 from sim.rig.scheduler import Progress
 from sim.studies.soil_link.wet_clay import expected, largest_difference, surveys_of, wet_clay
+from sim.world.marks import wrap
 from sim.world.parsing import read_toml
 from sim.world.scenario import scenario_of
-from sim.world.world import World, wrap
+from sim.world.world import World
 
 PIPE = Path(__file__).parents[2] / "scenarios" / "pipe-5.toml"
 DEAD, KILLED, DOWN = 3, 70.0, 100.0  # tube, s after the start, s

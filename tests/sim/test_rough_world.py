@@ -49,7 +49,7 @@ def rough_world(*, seed: int = 3, hertz: float = 250.0, quiet: bool = True, **se
 def test_without_an_effect_it_is_the_plain_world() -> None:
     plain = World(scenario_of(SHORT), 3)
     rough = rough_world(hertz=1000.0, quiet=False)
-    found, known = rough.imu_samples(1), plain.imu_samples(1)
+    found, known = rough.sensors.samples(1), plain.sensors.samples(1)
     np.testing.assert_allclose(found[:, :3], known[:, :3], atol=1e-4)
     np.testing.assert_allclose(found[:, 3:], known[:, 3:], atol=5e-3)  # quadrature over the corners of a ramp
     np.testing.assert_allclose(rough.truth(1).yaw(plain.ends), plain.truth(1).yaw(plain.ends), atol=1e-6)
@@ -115,7 +115,7 @@ def test_a_shaft_in_a_bent_hole_turns_by_the_solid_angle() -> None:
     spiral = {"spiral": {"inclination_deg": 30.0, "turn_deg": 20.0}}
     tables = changed(SHORT, **QUIET)
     shaft = World(scenario_of({**tables, "path": spiral, "rough": {"string": {"transport": "parallel"}}}), 3)
-    turned = float(np.sum(shaft.imu_samples(1)[:, 2])) / 1.9
+    turned = float(np.sum(shaft.sensors.samples(1)[:, 2])) / 1.9
     head = shaft.motion.drive(np.array([shaft.end]))[0][0] - shaft.first_angle
     assert turned == pytest.approx(head, abs=1e-3)  # the gyroscope of a shaft sees the head's turn and no more
 
@@ -173,12 +173,12 @@ def test_vibration_has_its_band_and_size() -> None:
 
 @pytest.mark.slow
 def test_a_front_end_is_late_and_clips() -> None:
-    exact = rough_world(hertz=1000.0).imu_samples(1)
-    late = rough_world(hertz=1000.0, sensor={"frames_hz": 1000.0, "low_pass_hz": 20.0}).imu_samples(1)
+    exact = rough_world(hertz=1000.0).sensors.samples(1)
+    late = rough_world(hertz=1000.0, sensor={"frames_hz": 1000.0, "low_pass_hz": 20.0}).sensors.samples(1)
     ramp = np.argmax(exact[:, 2] > math.radians(20.0))  # 35 deg/s^2 for two seconds
     delay = (exact[ramp, 2] - late[ramp, 2]) / math.radians(35.0)
     assert delay == pytest.approx(math.sqrt(2.0) / (math.tau * 20.0), abs=2e-3)
-    shaken = rough_world(hertz=1000.0, vibration={"turning_g": 4.0}).rough_cycles(1)
+    shaken = rough_world(hertz=1000.0, vibration={"turning_g": 4.0}).sensors.rough_cycles(1)
     clipped = shaken.clipped & FORCE_CLIPPED > 0
     turning = exact[:, 2] > math.radians(70.0)
     assert clipped[turning].all()
@@ -189,23 +189,25 @@ def test_the_eighths_of_a_cycle_are_what_the_string_turned_in_them() -> None:
     told = changed(SHORT, **QUIET)
     told = changed(told, gyroscope={"increments": True})
     for world in (World(scenario_of(told), 3), World(scenario_of(changed(told, rough={"samples_hz": 1000.0})), 3)):
-        parts = world.imu_parts(1)
+        parts = world.sensors.parts(1)
         assert parts is not None
         borders = world.ends[:, None] + np.arange(-8, 1) / (8.0 * 1.9)
         turned = np.diff(world.truth(1).turned(borders.ravel())[0].reshape(borders.shape), axis=1)
         np.testing.assert_allclose(parts[:, 1:] / (8.0 * 1.9), turned, atol=math.radians(1e-4))
-        np.testing.assert_allclose(parts[:, 1:].mean(axis=1), world.imu_samples(1)[:, 2], atol=1e-9)
+        np.testing.assert_allclose(parts[:, 1:].mean(axis=1), world.sensors.samples(1)[:, 2], atol=1e-9)
 
 
 def test_the_noise_of_the_eighths_is_white_and_has_the_cycles_for_its_mean() -> None:
     tables = changed(SHORT, gyroscope={"increments": True, "resolution_dps": 0.0})
     alone, told = World(scenario_of(SHORT | {"gyroscope": {"resolution_dps": 0.0}}), 3), World(scenario_of(tables), 3)
-    np.testing.assert_array_equal(told.imu_samples(1), alone.imu_samples(1))
-    parts = told.imu_parts(1)
+    np.testing.assert_array_equal(told.sensors.samples(1), alone.sensors.samples(1))
+    parts = told.sensors.parts(1)
     assert parts is not None
     still = told.truth(1).rate(told.ends - 0.5)[:, 2] == 0.0
     rest = parts[still & np.roll(still, 1) & np.roll(still, -1), 1:]
-    assert rest.mean(axis=1) == pytest.approx(told.imu_samples(1)[still & np.roll(still, 1) & np.roll(still, -1), 2])
+    assert rest.mean(axis=1) == pytest.approx(
+        told.sensors.samples(1)[still & np.roll(still, 1) & np.roll(still, -1), 2]
+    )
     expected = math.radians(7.313e-3) * math.sqrt(8.0 * 1.9)
     assert np.diff(rest, axis=1).std() == pytest.approx(math.sqrt(2.0) * expected, rel=0.1)
 
@@ -214,11 +216,11 @@ def test_the_noise_of_the_eighths_is_white_and_has_the_cycles_for_its_mean() -> 
 def test_a_fifo_tells_what_turned_in_each_part_but_for_the_end_that_its_filter_holds_back() -> None:
     sensor = {"frames_hz": 50.0, "low_pass_hz": 20.0, "crystal": 0.01}
     world = rough_world(hertz=1000.0, sensor=sensor)
-    parts = world.imu_parts(1)
+    parts = world.sensors.parts(1)
     assert parts is not None
     borders = world.ends[:, None] + np.arange(-8, 1) / (8.0 * 1.9)
     turned = np.diff(world.truth(1).turned(borders.ravel())[0].reshape(borders.shape), axis=1)
-    late = world.rough_cycles(1).late
+    late = world.sensors.rough_cycles(1).late
     assert late.min() > 0.0
     found = parts[40:, 1:8] / (8.0 * 1.9)  # by then the crystal is known
     off = found - turned[40:, :7]
@@ -227,15 +229,15 @@ def test_a_fifo_tells_what_turned_in_each_part_but_for_the_end_that_its_filter_h
 
 
 def test_a_sensor_warms_up() -> None:
-    warm = rough_world(sensor={"warm_up_dps": 1.0, "warm_up_s": 5.0, "warm_up_c": 20.0}).rough_cycles(1)
+    warm = rough_world(sensor={"warm_up_dps": 1.0, "warm_up_s": 5.0, "warm_up_c": 20.0}).sensors.rough_cycles(1)
     np.testing.assert_allclose(np.degrees(warm.readings[-1, :3]), 1.0, atol=1e-3)
     assert warm.temperature[-1] - warm.temperature[0] == pytest.approx(20.0 * math.exp(-0.2), rel=0.1)
 
 
 def test_a_scale_that_is_another_one_backwards() -> None:
     drive = {"turns_back_deg": 30.0}
-    even = rough_world(drive=drive).rough_cycles(1).readings[:, 2]
-    uneven = rough_world(drive=drive, sensor={"scale_asymmetry": 0.02}).rough_cycles(1).readings[:, 2]
+    even = rough_world(drive=drive).sensors.rough_cycles(1).readings[:, 2]
+    uneven = rough_world(drive=drive, sensor={"scale_asymmetry": 0.02}).sensors.rough_cycles(1).readings[:, 2]
     forward, backward = even > math.radians(70.0), even < math.radians(-10.0)
     assert forward.any()
     assert backward.any()
@@ -245,9 +247,9 @@ def test_a_scale_that_is_another_one_backwards() -> None:
 
 def test_the_earth_turns_under_a_gyroscope() -> None:
     still, turned = rough_world(), rough_world(latitude_deg=50.0)
-    felt = turned.rough_cycles(1).readings[:, :3] - still.rough_cycles(1).readings[:, :3]
+    felt = turned.sensors.rough_cycles(1).readings[:, :3] - still.sensors.rough_cycles(1).readings[:, :3]
     # a whole turn in a sidereal day; about an axis that leans by 2 deg to the north nearly that of the vertical
-    rest = felt[still.rough_cycles(1).readings[:, 2] == 0.0]
+    rest = felt[still.sensors.rough_cycles(1).readings[:, 2] == 0.0]
     np.testing.assert_allclose(np.linalg.norm(rest, axis=1), math.tau / 86164.1, rtol=1e-6)
     np.testing.assert_allclose(rest[:, 2], -math.tau / 86164.1 * math.sin(math.radians(48.0)), rtol=1e-4)
 
@@ -256,8 +258,8 @@ def test_the_earth_turns_under_a_gyroscope() -> None:
 def test_one_seed_one_reading() -> None:
     sections = {"sensor": {"frames_hz": 50.0, "jitter_ms": 5.0}, "vibration": {"torsional_dps": 5.0}}
     one, other = (rough_world(hertz=1000.0, quiet=False, **sections) for _ in range(2))
-    np.testing.assert_array_equal(one.imu_samples(1), other.imu_samples(1))
-    assert not np.array_equal(one.imu_samples(1), rough_world(seed=4, hertz=1000.0, quiet=False).imu_samples(1))
+    np.testing.assert_array_equal(one.sensors.samples(1), other.sensors.samples(1))
+    assert not np.array_equal(one.sensors.samples(1), rough_world(seed=4, hertz=1000.0, quiet=False).sensors.samples(1))
 
 
 @pytest.mark.parametrize(

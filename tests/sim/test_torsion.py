@@ -8,10 +8,11 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from sim.world.marks import wrap
 from sim.world.motion import Motion, Trapezoid
 from sim.world.scenario import TorsionSection, load_scenario
 from sim.world.torsion import StringTorsion, polar_moment, smooth_step, stiffness
-from sim.world.world import World, wrap
+from sim.world.world import World
 
 SCENARIO = load_scenario(Path(__file__).parents[2] / "scenarios" / "torsion-10.toml")
 TURN = Trapezoid(10.0 * math.pi, 1.2, 0.6)

@@ -12,11 +12,12 @@ from hypothesis import strategies as st
 from groundstation.survey.resolve import angles, resolve
 from node.kernels.layout import PERIOD
 from sim.world.borehole import Borehole
+from sim.world.marks import wrap
 from sim.world.motion import Motion, Trapezoid
 from sim.world.scenario import TorsionSection, load_scenario
 from sim.world.torsion import StringTorsion
 from sim.world.truth import TubeTruth
-from sim.world.world import World, wrap
+from sim.world.world import World
 
 SCENARIOS = Path(__file__).parents[2] / "scenarios"
 TURN = Trapezoid(20.0 * 2.0 * math.pi, math.radians(71.0), math.radians(35.0))

@@ -9,8 +9,9 @@ import pytest
 from node.kernels.layout import PERIOD
 from sim.errors import ScenarioError
 from sim.world.imu_errors import ImuErrors, gauss_markov, quantise
+from sim.world.marks import wrap
 from sim.world.scenario import AccelerometerSection, GyroSection, load_scenario
-from sim.world.world import World, wrap
+from sim.world.world import World
 from telemetry.messages import BASE, ENCODER, Side
 
 SCENARIO = load_scenario(Path(__file__).parents[2] / "scenarios" / "rig-3.toml")
@@ -134,13 +135,13 @@ def test_a_tube_may_have_several_imus_and_the_first_reads_what_it_reads_alone(tm
 
 def test_a_mount_leans_as_the_scenario_has_it_and_turns_nothing_else(tmp_path: Path) -> None:
     world = World(load_scenario(scenario_of(tmp_path, ("joints", "mount_tilt_std_deg = 1.0"), ("node", "imus = 2"))), 7)
-    frames = [world.imu_frame(tube, imu) for tube in (1, 2, 3) for imu in (0, 1)]
+    frames = [world.sensors.frame(tube, imu) for tube in (1, 2, 3) for imu in (0, 1)]
     leans = np.degrees([math.acos(frame[2, 2]) for frame in frames])
     assert 0.1 < leans.mean() < 4.0
     assert len(set(leans)) == len(leans)
     plain = np.array([World(SCENARIO, 7).imu_sample(2, cycle) for cycle in range(60)]).mean(axis=0)
     tilted = np.array([world.imu_sample(2, cycle)[0] for cycle in range(60)]).mean(axis=0)
-    np.testing.assert_allclose(tilted[3:], world.imu_frame(2) @ plain[3:], atol=1e-4)
+    np.testing.assert_allclose(tilted[3:], world.sensors.frame(2) @ plain[3:], atol=1e-4)
 
 
 @pytest.mark.parametrize("lines", ["imus = 0", "imus = 9", "imus = 2\nimu_noise = [1.0]", "imu_noise = [1.0, 1.0]"])

@@ -85,7 +85,7 @@ class Turn:
     def __init__(self, setup: Setup, seed: int) -> None:
         self._setup = setup
         self.world = World(scenario_of(dict(setup.tables())), seed)
-        self.tilts = np.array(self.world.imu_tilt(1))
+        self.tilts = np.array(self.world.sensors.tilt(1))
 
     def run(self, method: str) -> Outcome:
         """Let one node rest, turn and rest; ``method`` is of its alignment, ``none`` leaves the mount as it is."""

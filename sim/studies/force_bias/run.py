@@ -106,7 +106,7 @@ def judge(world: World, surveys: Sequence[Survey]) -> BiasRun:
 
 def bias_of(world: World, tube: int) -> Array:
     """Of a tube's accelerometer (3,), m/s^2."""
-    drift = world.drift(tube)
+    drift = world.sensors.drift(tube)
     return np.zeros(AXES) if drift is None else drift.bias
 
 
