@@ -76,7 +76,7 @@ class Crowd(Process):
 
     def happen(self, now: float) -> None:
         """Something that the ground station must never lose."""
-        number = self.endpoint.new_sequence()
+        number = self.endpoint.series.take()
         self.endpoint.submit(Event(ENCODER, number, now, Severity.INFO, "stopped"), now)
         self.events += 1
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from dataclasses import dataclass, field
 
-from telemetry.application.endpoint import SERIES_SHIFT
+from telemetry.application.series import SERIES_SHIFT
 
 Range = tuple[int, int]  # first and last number
 SERIES_KEPT = 64

@@ -12,8 +12,8 @@ from groundstation.service.witnesses import Witnesses
 from groundstation.survey.joint_angles import Pair, RestingYaw
 from groundstation.survey.shared_scale import shared_scale
 from groundstation.survey.trust import Trust, trust_of
-from telemetry.application.endpoint import SERIES_SHIFT
 from telemetry.application.seal_watch import CODE, refusal_of
+from telemetry.application.series import SERIES_SHIFT
 from telemetry.messages import EPOCH_UNKNOWN, Event, Mode, NodeFlag, NodeState, SurveyMeasurement
 
 LOOK_EVERY = 0.5  # s, own clock

@@ -108,7 +108,7 @@ class EncoderProcess(Process):
             self._timing.lap(stage)
 
     def _send_event(self, severity: Severity, code: str, arguments: dict[str, Scalar]) -> None:
-        number, epoch = self.endpoint.new_sequence(), self.endpoint.clock.epoch
+        number, epoch = self.endpoint.series.take(), self.endpoint.clock.epoch
         self.endpoint.submit(Event(ENCODER, number, self._now, severity, code, arguments, epoch), self._now)
 
 

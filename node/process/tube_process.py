@@ -133,7 +133,7 @@ class TubeProcess(Process):
         )
         self._seal_watch = SealWatch(self.endpoint, self._send_event)
         restored = saved is not None
-        next_sequence = self.endpoint.new_sequence
+        next_sequence = self.endpoint.series.take
         self.tube = Tube(
             settings,
             self.config,
@@ -255,8 +255,8 @@ class TubeProcess(Process):
         clock = self.endpoint.clock
         var = min(clock.variance(now), MAX_CLOCK_STD**2)
         return RigContext(
-            joined=self.endpoint.neighbours[Side.UPPER] is not None,
-            hops=self.endpoint.hops,
+            joined=self.endpoint.place.neighbours[Side.UPPER] is not None,
+            hops=self.endpoint.place.hops,
             rig_now=clock.rig_from_local(now),
             clock_var=var,
             synchronised=clock.synchronised and var < SYNCHRONISED_STD**2,
@@ -283,9 +283,9 @@ class TubeProcess(Process):
         return replace(
             state,
             flags=flags,
-            hops=endpoint.told_hops,
+            hops=endpoint.place.told_hops,
             epoch=endpoint.clock.epoch,
-            numbered=endpoint.newest_sequence,
+            numbered=endpoint.series.newest,
             upper_margin=endpoint.margin(Side.UPPER),
             lower_margin=endpoint.margin(Side.LOWER),
         )
@@ -338,7 +338,7 @@ class TubeProcess(Process):
 
     def _tell_of_silent_tubes(self) -> None:
         """Report when the neighbour above is heard over the heads of silent tubes, and when these are back."""
-        silent = self.endpoint.skipped if self.endpoint.neighbours[Side.UPPER] is not None else self._skipped
+        silent = self.endpoint.skipped if self.endpoint.place.neighbours[Side.UPPER] is not None else self._skipped
         if silent == self._skipped:
             return
         nearest = self.settings.tube + 1
@@ -352,7 +352,7 @@ class TubeProcess(Process):
     def _send_event(self, severity: Severity, code: str, arguments: dict[str, Scalar]) -> None:
         """Keep an event of the process; it is saved before its frame leaves."""
         clock = self.endpoint.clock
-        rig_now, number = clock.rig_from_local(self._now), self.endpoint.new_sequence()
+        rig_now, number = clock.rig_from_local(self._now), self.endpoint.series.take()
         self._keep(Event(self.settings.tube, number, rig_now, severity, code, arguments, clock.epoch), self._now)
 
     def _save(self) -> None:

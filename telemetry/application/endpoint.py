@@ -8,13 +8,16 @@ on as the bytes that came; what is for it, it decodes and hands to its process. 
 from __future__ import annotations
 
 import math
-from collections import Counter, OrderedDict, deque
-from functools import partial
+from collections import Counter
 from typing import TYPE_CHECKING, NamedTuple
 
+from telemetry.application.answers import Answers
 from telemetry.application.clock import ClockFilter
+from telemetry.application.kinds import ONE_HOP, PRIORITIES, RELIABLE
 from telemetry.application.outbox import Outbox
+from telemetry.application.place import Place
 from telemetry.application.saved_state import SavedState, is_needed, pack_state, parse_state
+from telemetry.application.series import Series
 from telemetry.application.standstill import Standstill
 from telemetry.errors import DecodeError
 from telemetry.media.port import Frame, Priority
@@ -22,8 +25,6 @@ from telemetry.messages import (
     BASE,
     ENCODER,
     EPOCH_UNKNOWN,
-    HOPS_UNKNOWN,
-    MAX_TUBE,
     Aiding,
     BlockSegment,
     BlockStatus,
@@ -52,7 +53,6 @@ from telemetry.presentation.msgpack_codec import (
 )
 from telemetry.schema import Kind
 from telemetry.transport.hop import BUNDLE_LIMIT, HopLink
-from telemetry.transport.nearest import Nearest
 from telemetry.unwritten import Content
 
 if TYPE_CHECKING:
@@ -63,41 +63,11 @@ HELLO_WAIT = 0.6  # s for which a hello waits for an aiding or a state to go wit
 SYNC_BURST = 30  # exchanges at the quick pace after a start
 SYNC_QUICK = 1.0  # s
 SYNC_SLOW = 10.0  # s
-ANSWERS_KEPT = 64
-SERIES_SHIFT = 24  # of a sequence number: below it the count, above it the start at which the count began
 STATE_WAIT = 1.15  # s for which a node's state waits for those of the nodes below, to go up with them
 HOP_WAIT = 0.005  # s, longer by a frame's way where fewer hops are left: after a loss the lowest goes first again
 WAITING_HOPS = 100
 REPORT_EVERY = 60.0  # s between two looks at what queues dropped
 DROPS = ("reliable_dropped", "best_effort_dropped")  # counters of what found no place in a link's queue
-ONE_HOP = (Kind.AIDING, Kind.HELLO, Kind.TIME_REQUEST, Kind.TIME_REPLY)
-RELIABLE = (
-    Kind.SURVEY_MEASUREMENT,
-    Kind.EVENT,
-    Kind.REPLY,
-    Kind.RECEIPT,
-    Kind.COMMAND,
-    Kind.BLOCK_SEGMENT,
-    Kind.BLOCK_STATUS,
-    Kind.STATIC_RECORD,
-)
-PRIORITIES: dict[Kind, Priority] = {
-    Kind.TIME_REQUEST: Priority.TIME,
-    Kind.TIME_REPLY: Priority.TIME,
-    Kind.AIDING: Priority.AIDING,
-    Kind.HELLO: Priority.HELLO,
-    Kind.COMMAND: Priority.COMMAND,
-    Kind.RECEIPT: Priority.COMMAND,
-    Kind.SURVEY_MEASUREMENT: Priority.SURVEY,
-    Kind.EVENT: Priority.SURVEY,
-    Kind.REPLY: Priority.SURVEY,
-    Kind.NODE_STATE: Priority.STATE,
-    Kind.STATIC_RECORD: Priority.SURVEY,
-    Kind.BLOCK_STATUS: Priority.SURVEY,
-    Kind.BLOCK_SEGMENT: Priority.BLOCK,
-    Kind.DEPTH_READING: Priority.STATE,
-    Kind.SESSION_OFFER: Priority.COMMAND,
-}
 
 
 def is_undated(opened: Opened) -> bool:
@@ -113,17 +83,6 @@ class Received(NamedTuple):
 
     message: Message
     side: Side
-
-
-class Neighbour(NamedTuple):
-    """Who is at the other side of a joint."""
-
-    tube: int
-    boot_count: int
-    hops: int
-    mode: Mode
-    link_quality: float
-    last_heard: float
 
 
 class Endpoint:
@@ -157,20 +116,15 @@ class Endpoint:
         self.clock = ClockFilter(is_root=is_clock_root, epoch=boot_count)
         self.counters: Counter[str] = Counter()
         self.mode = Mode.BOOT
-        self.neighbours: dict[Side, Neighbour | None] = dict.fromkeys(Side)
-        self.hops = 0 if address == ENCODER else HOPS_UNKNOWN
-        self._hops_are_told = address == ENCODER
-        self._reach = reach
-        self._links = {side: HopLink(address, boot_count, self._nearest(side)) for side in sorted(sides)}
+        self.place = Place(address, reach, self.counters)
+        self._links = {side: HopLink(address, boot_count, self.place.nearest(side)) for side in sorted(sides)}
         toward_encoder = Side.LOWER if address == BASE else Side.UPPER
         self._sync_side = None if is_clock_root else toward_encoder
         # a process that lost its numbers begins another series, so that none is given to a second message
-        self._next_sequence = (boot_count << SERIES_SHIFT) + 1 if boot_count > 1 and address != BASE else 1
+        self.series = Series(boot_count if boot_count > 1 and address != BASE else 0)
         self._outbox = Outbox()
         self._holding = False
-        self._answered: OrderedDict[int, bytes] = OrderedDict()
-        self._answered_here: deque[int] = deque()  # numbers of the session with the base
-        self._too_old = 0  # number of an order from which on down none of the session is obeyed
+        self._answers = Answers()
         self._commands = Outbox()
         self._hello_at = -math.inf
         self._sync_at = -math.inf
@@ -226,8 +180,8 @@ class Endpoint:
         """Let time pass: neighbours that fell silent, hello, time requests, end-to-end repetition."""
         self._standstill.move(now)
         for side, link in self._links.items():
-            if self.neighbours[side] is not None and not link.is_up(now):
-                self.neighbours[side] = None
+            if self.place.neighbours[side] is not None and not link.is_up(now):
+                self.place.neighbours[side] = None
         if self.seals is not None:
             self.seals.advance(now)
             self._send_offers()
@@ -282,7 +236,7 @@ class Endpoint:
         self.mode = state.mode
         if (link := self._links.get(Side.UPPER)) is not None:
             below = self._links.get(Side.LOWER)
-            wait = STATE_WAIT + HOP_WAIT * max(WAITING_HOPS - self.hops, 0)
+            wait = STATE_WAIT + HOP_WAIT * max(WAITING_HOPS - self.place.hops, 0)
             until = now + wait if below is not None and below.is_up(now) else now
             payload = unwritten(state) if self.seals is None else self._sealed(encode(state))
             link.send_with_others(payload, (Kind.NODE_STATE, state.tube), Priority.STATE, until)
@@ -306,22 +260,6 @@ class Endpoint:
         """Send once more what was receipted before, because the ground station asks for it."""
         self._outbox.keep_payload(sequence, payload, now)
 
-    @property
-    def told_hops(self) -> int:
-        """Distance from the encoder as a neighbour told it since the start; a saved one may be of another string."""
-        return self.hops if self._hops_are_told else HOPS_UNKNOWN
-
-    @property
-    def newest_sequence(self) -> int:
-        """Newest number given out, 0 before the first."""
-        return self._next_sequence - 1 if self._next_sequence & ((1 << SERIES_SHIFT) - 1) > 1 else 0
-
-    def new_sequence(self) -> int:
-        """Number of the next survey or event."""
-        sequence = self._next_sequence
-        self._next_sequence += 1
-        return sequence
-
     def command(self, command: Command, now: float) -> None:
         """Send an order down the string until its reply comes (base station)."""
         self._commands.keep_payload(command.sequence, encode(command), now)
@@ -335,12 +273,7 @@ class Endpoint:
         """Answer a command; the answer is kept, so that a repeated command is answered and not obeyed again."""
         del now
         payload = encode(reply)
-        self._answered[reply.sequence] = payload
-        while len(self._answered) > ANSWERS_KEPT:
-            self._answered.popitem(last=False)
-        self._answered_here.append(reply.sequence)
-        if len(self._answered_here) > ANSWERS_KEPT:
-            self._too_old = max(self._too_old, self._answered_here.popleft())
+        self._answers.keep(reply.sequence, payload)
         self._links[Side.UPPER].send_reliable(self._sealed(payload))
 
     def send_segment(self, segment: BlockSegment) -> None:
@@ -358,14 +291,12 @@ class Endpoint:
 
     def margin(self, side: Side) -> float:
         """What the neighbour at one end is heard with over the radio's threshold, dB; infinite without radio or it."""
-        return math.inf if self.neighbours[side] is None else self._links[side].margin
+        return math.inf if self.place.neighbours[side] is None else self._links[side].margin
 
     @property
     def skipped(self) -> int:
         """Silent tubes between this one and its upper neighbour."""
-        if self._reach == 1 or self.address in (BASE, ENCODER) or (above := self._links[Side.UPPER].peer) is None:
-            return 0
-        return int(min(self._distance(Side.UPPER, above[0]), self._reach)) - 1
+        return self.place.skipped(self._upper)
 
     @property
     def outbox_size(self) -> int:
@@ -395,13 +326,13 @@ class Endpoint:
 
     def export_state(self) -> bytes:
         """What must survive a restart: numbers, unreceipted messages, answered commands."""
-        return pack_state(self._next_sequence, self._outbox.contents(), list(self._answered.items()), self.hops)
+        return pack_state(self.series.following, self._outbox.contents(), self._answers.contents(), self.place.hops)
 
     def _restore(self, saved: SavedState) -> None:
-        self._next_sequence, self.hops = saved.next_sequence, saved.hops
+        self.series.following, self.place.hops = saved.next_sequence, saved.hops
         for sequence, payload, needed in saved.parcels:
             self._outbox.keep_payload(sequence, payload, -math.inf, needed=needed)
-        self._answered.update(saved.answered)
+        self._answers.restore(saved.answered)
 
     def _handle(self, side: Side, payload: Content, now: float) -> Message | None:
         opened = open_payload(payload if self.seals is None else self.seals.content(bytes(payload)))
@@ -429,18 +360,7 @@ class Endpoint:
         return None
 
     def _meet(self, side: Side, hello: Hello, now: float) -> None:
-        self.neighbours[side] = Neighbour(
-            hello.tube, hello.boot_count, hello.hops, hello.mode, self._links[side].quality, now
-        )
-        if side is not Side.UPPER or hello.hops == HOPS_UNKNOWN:
-            return
-        hops = hello.hops + 1 + self.skipped
-        if hops > MAX_TUBE:
-            self.counters["impossible_hops"] += 1
-            return
-        self._hops_are_told = True
-        if hops != self.hops:
-            self.hops = hops
+        if self.place.meet(side, hello, self._upper, self._links[side].quality, now):
             self._hello_at = -math.inf
 
     def _handle_upward(self, opened: Opened, payload: Content, now: float) -> Message | None:
@@ -468,8 +388,8 @@ class Endpoint:
         if isinstance(message, Receipt):
             self._settle(message)
             return None
-        if isinstance(message, Command) and message.sequence in self._answered:
-            self._links[Side.UPPER].send_reliable(self._sealed(self._answered[message.sequence]))
+        if isinstance(message, Command) and message.sequence in self._answers:
+            self._links[Side.UPPER].send_reliable(self._sealed(self._answers.payload(message.sequence)))
             return None
         return message
 
@@ -500,13 +420,12 @@ class Endpoint:
         if not seals.is_of(message, self.address):
             return None
         if isinstance(message, SessionOffer):
-            self._answered_here.clear()
-            self._too_old = 0
+            self._answers.begin_session()
             self._outbox.make_due(now)  # what was sent without a session was not believed
             self._send_kept(now)
             return None
-        is_command = isinstance(message, Command) and message.sequence not in self._answered
-        return None if is_command and not seals.is_order_new(opened.sequence, self._too_old) else message
+        is_command = isinstance(message, Command) and message.sequence not in self._answers
+        return None if is_command and not seals.is_order_new(opened.sequence, self._answers.too_old) else message
 
     def _is_measured(self, aiding: Aiding, now: float) -> bool:
         """Whether the encoder measured what an aiding says; without keys everybody is believed."""
@@ -552,29 +471,16 @@ class Endpoint:
             if opened.kind is Kind.NODE_STATE:
                 link.release()
 
+    @property
+    def _upper(self) -> int | None:
+        """Who is heard at the upper end."""
+        link = self._links.get(Side.UPPER)
+        return None if link is None or link.peer is None else link.peer[0]
+
     def _send_hello(self, until: float) -> None:
         for link in self._links.values():
-            hello = Hello(self.address, self.boot_count, self.hops, self.mode, link.quality)
+            hello = Hello(self.address, self.boot_count, self.place.hops, self.mode, link.quality)
             link.send_with_others(unwritten(hello), Kind.HELLO, Priority.HELLO, until)
-
-    def _nearest(self, side: Side) -> Nearest | None:
-        """Who is chosen at an end; base station and encoder are joined by a cable, where one alone is heard."""
-        cable = self.address == BASE or (self.address == ENCODER and side is Side.UPPER)
-        return None if self._reach == 1 or cable else Nearest(partial(self._distance, side))
-
-    def _distance(self, side: Side, other: int) -> float:
-        """Tubes from here to ``other``, which speaks at one end; infinite for one that cannot be there.
-
-        Tubes are numbered from the lowest up. Where the encoder is heard although tubes hang between, they are silent;
-        how many there are is known from before.
-        """
-        if self.address == ENCODER:
-            return float(MAX_TUBE + 1 - other) if 0 < other <= MAX_TUBE else math.inf
-        if side is Side.UPPER and other == ENCODER:
-            away = max(self.hops, 1) + 0.5  # a tube as near comes first: it was added between
-        else:
-            away = float(other - self.address if side is Side.UPPER else self.address - other)
-        return away if 0.0 < away < self._reach + 1.0 else math.inf
 
     def _sync_pace(self) -> float:
         return SYNC_QUICK if self.clock.exchanges < SYNC_BURST else SYNC_SLOW

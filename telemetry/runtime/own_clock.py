@@ -255,7 +255,7 @@ class OwnClockLoop:
         send(self._process, self._ports, now)
         self._timing.lap(Stage.SYNCHRONISE)
         self._synchronised = self._schedule.due
-        for side in self._absence.find(self._process.endpoint.neighbours, now):
+        for side in self._absence.find(self._process.endpoint.place.neighbours, now):
             state = "up" if self._ports[side].is_up else "down"
             self._report(
                 f"{side.name.lower()} end: nobody heard for {ABSENT_LIMIT:.0f} s, the port is {state}; "

@@ -21,6 +21,7 @@ from node.process import counter as counter_module
 from node.process.command_handlers import CommandHandlers
 from node.process.tube_process import TubeProcess
 from sim.gauntlet.disk import FaultyDisk
+from telemetry.application.answers import KEPT, Answers
 from telemetry.application.clock import ClockFilter
 from telemetry.application.endpoint import Endpoint
 from telemetry.application.outbox import LIMIT, Outbox, Parcel
@@ -147,11 +148,13 @@ def newest_dropped(patch: pytest.MonkeyPatch) -> None:
 
 
 def newest_answer_forgotten(patch: pytest.MonkeyPatch) -> None:
-    def reply(endpoint: Endpoint, answer: Reply, now: float) -> None:
-        if len(endpoint._answered) < 64:
-            endpoint._answered[answer.sequence] = encode(answer)
+    plain = Answers.keep
 
-    patch.setattr(Endpoint, "reply", reply)
+    def keep(answers: Answers, sequence: int, payload: bytes) -> None:
+        if len(answers.contents()) < KEPT:
+            plain(answers, sequence, payload)
+
+    patch.setattr(Answers, "keep", keep)
 
 
 def clock_variance_of_one_hop(patch: pytest.MonkeyPatch) -> None:

@@ -4,7 +4,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from groundstation.service.numbers import Numbers
-from telemetry.application.endpoint import SERIES_SHIFT
+from telemetry.application.series import SERIES_SHIFT
 
 
 def gaps(numbers: Numbers, tube: int) -> list[tuple[int, int]]:

@@ -36,7 +36,7 @@ def test_a_later_life_goes_on_with_bias_and_numbers(tmp_path: Path) -> None:
     second = TubeProcess(TubeSettings(3), tmp_path)
     assert second.boots == first.boots + 1
     assert second.state[0]["mode"] == first.state[0]["mode"]
-    assert second.endpoint.new_sequence() >= first.endpoint.outbox_size + 1
+    assert second.endpoint.series.take() >= first.endpoint.outbox_size + 1
     assert second.endpoint.outbox_size == first.endpoint.outbox_size > 0
     cycles(second, 5, now + 30.0)
 
@@ -236,11 +236,11 @@ def test_a_node_runs_on_where_the_disk_refuses_and_says_so_once(
 def test_a_place_in_the_string_that_was_saved_is_not_told_as_known(tmp_path: Path) -> None:
     """Two tubes that were given each other's saved state must not turn the ground station's order round."""
     first = TubeProcess(TubeSettings(3), tmp_path)
-    first.endpoint.hops = 2
+    first.endpoint.place.hops = 2
     first.close()
     again = TubeProcess(TubeSettings(3), tmp_path)
-    assert again.endpoint.hops == 2
-    assert again.endpoint.told_hops == HOPS_UNKNOWN
+    assert again.endpoint.place.hops == 2
+    assert again.endpoint.place.told_hops == HOPS_UNKNOWN
 
 
 def test_a_yaw_of_any_variance_can_be_said(tmp_path: Path) -> None:

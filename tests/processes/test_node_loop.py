@@ -70,7 +70,7 @@ async def test_a_node_loses_and_regains_its_neighbour_and_ends_when_told(router:
     async def hears(boots: int | None) -> None:
         async with asyncio.timeout(PATIENCE):
             while True:
-                above = built[0].endpoint.neighbours[Side.UPPER] if built else None
+                above = built[0].endpoint.place.neighbours[Side.UPPER] if built else None
                 if (above.boot_count if above else None) == boots and built:
                     return
                 await asyncio.sleep(0.02)
@@ -79,7 +79,7 @@ async def test_a_node_loses_and_regains_its_neighbour_and_ends_when_told(router:
     node = asyncio.create_task(live_by_own_clock("node 1", place, 1, OwnTime({Side.UPPER: ENCODER}), build, PERIOD))
     async with encoder_above(router, boots=1):
         await hears(1)
-        assert built[0].endpoint.hops == 1
+        assert built[0].endpoint.place.hops == 1
     await hears(None)
     async with encoder_above(router, boots=2):
         await hears(2)

@@ -75,9 +75,9 @@ class Joint:
         """An aiding goes down; an event goes up and is acknowledged."""
         self._number += 1
         encoder, tube = self.encoder, self.tube
-        self.until("the clock", lambda: tube.endpoint.neighbours[Side.UPPER] and tube.endpoint.clock.synchronised)
+        self.until("the clock", lambda: tube.endpoint.place.neighbours[Side.UPPER] and tube.endpoint.clock.synchronised)
         sent = rounded(Aiding(1.0, 1e-6, 0.0, 0.0, 0.1, 100.0 + self._number, self._number, 0, epoch=1))
-        event = Event(1, tube.endpoint.new_sequence(), 5.0, Severity.INFO, "booted", {"number": self._number})
+        event = Event(1, tube.endpoint.series.take(), 5.0, Severity.INFO, "booted", {"number": self._number})
         tube.endpoint.submit(event, time.monotonic())
         sent_at = -1.0
 

@@ -123,12 +123,12 @@ class SealedString:
             self.cycles += 1
             tube.send_state(state(self.cycles), self.now)
         elif kind in (Kind.SURVEY_MEASUREMENT, Kind.RECEIPT):
-            tube.submit(survey(1, tube.new_sequence()), self.now)
+            tube.submit(survey(1, tube.series.take()), self.now)
         elif kind is Kind.EVENT:
-            tube.submit(Event(1, tube.new_sequence(), self.now, Severity.INFO, "said"), self.now)
+            tube.submit(Event(1, tube.series.take(), self.now, Severity.INFO, "said"), self.now)
         elif kind is Kind.STATIC_RECORD:
             v = (0.0, 0.0, 0.0)
-            tube.submit(StaticRecord(1, tube.new_sequence(), 1, 1.0, 2.0, 5, v, COV, v, COV, 20.0, False), self.now)
+            tube.submit(StaticRecord(1, tube.series.take(), 1, 1.0, 2.0, 5, v, COV, v, COV, 20.0, False), self.now)
         elif kind in (Kind.COMMAND, Kind.REPLY):
             base.command(Command(1, self.number, "take_survey"), self.now)
         elif kind in (Kind.BLOCK_SEGMENT, Kind.BLOCK_STATUS):
@@ -169,9 +169,9 @@ class SealedString:
         """Everything that a message could have changed."""
         return (
             {address: list(messages) for address, messages in self.heard.items()},
-            {a: (e.outbox_size, e.clock.exchanges, e.hops, e.mode) for a, e in self.endpoints.items()},
+            {a: (e.outbox_size, e.clock.exchanges, e.place.hops, e.mode) for a, e in self.endpoints.items()},
             {
-                a: [n and (n.tube, n.boot_count, n.hops) for n in e.neighbours.values()]
+                a: [n and (n.tube, n.boot_count, n.hops) for n in e.place.neighbours.values()]
                 for a, e in self.endpoints.items()
             },
         )

@@ -79,13 +79,13 @@ class String:
             point = self.points[tube]
             point.send_state(
                 NodeState(
-                    tube, self.now, point.hops, Mode.TRACKING, 1.0, 1e-6, 1e-6, ZERO, 0.0, 0.0, 1e-7, 0.5, 1e-9,
+                    tube, self.now, point.place.hops, Mode.TRACKING, 1.0, 1e-6, 1e-6, ZERO, 0.0, 0.0, 1e-7, 0.5, 1e-9,
                     NodeFlag.NONE, number, 0,
                 ),
                 self.now,
             )  # fmt: skip
             if is_told:
-                event = Event(tube, point.new_sequence(), self.now, Severity.INFO, "booted", {})
+                event = Event(tube, point.series.take(), self.now, Severity.INFO, "booted", {})
                 point.submit(event, self.now)
 
     def _carry(self) -> None:
@@ -143,7 +143,7 @@ def test_what_waits_at_an_open_joint_is_bounded(plugged: tuple[String, list[int]
 
 def test_every_tube_finds_its_place(plugged: tuple[String, list[int]]) -> None:
     string, _ = plugged
-    assert [string.points[tube].hops for tube in TUBES] == [1, 2, 3]
+    assert [string.points[tube].place.hops for tube in TUBES] == [1, 2, 3]
     assert all(string.points[tube].clock.synchronised for tube in TUBES)
 
 

@@ -9,7 +9,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from sealed_string import state
 
-from telemetry.application.endpoint import PRIORITIES, Endpoint, Received
+from telemetry.application.endpoint import Endpoint, Received
+from telemetry.application.kinds import PRIORITIES
 from telemetry.media.memory import MemoryPort, joint
 from telemetry.messages import (
     BASE,
@@ -117,7 +118,7 @@ def test_what_is_held_back_leaves_when_it_is_released() -> None:
     node = chain.stations[1]
     node.hold()
     for k in range(3):
-        node.submit(Event(1, node.new_sequence(), 0.0, Severity.INFO, "stopped", {"yaw_deg": float(k)}), chain.local(1))
+        node.submit(Event(1, node.series.take(), 0.0, Severity.INFO, "stopped", {"yaw_deg": float(k)}), chain.local(1))
     chain.run(20.0)
     assert not [m for m in chain.got[BASE] if isinstance(m, Event)]
     assert node.outbox_size == 3
@@ -130,26 +131,26 @@ def test_what_is_held_back_leaves_when_it_is_released() -> None:
 def test_neighbours_and_hops_are_found_without_configuration() -> None:
     chain = Chain([3, 2, 1])
     chain.run(10.0)
-    assert [chain.stations[a].hops for a in (ENCODER, 3, 2, 1)] == [0, 1, 2, 3]
-    two = chain.stations[2].neighbours
+    assert [chain.stations[a].place.hops for a in (ENCODER, 3, 2, 1)] == [0, 1, 2, 3]
+    two = chain.stations[2].place.neighbours
     assert two[Side.UPPER] is not None
     assert two[Side.UPPER].tube == 3
     assert two[Side.LOWER] is not None
     assert two[Side.LOWER].tube == 1
-    assert chain.stations[1].neighbours[Side.LOWER] is None
+    assert chain.stations[1].place.neighbours[Side.LOWER] is None
 
 
 def test_a_tube_added_at_the_top_moves_all_others_down() -> None:
     chain = Chain([1])
     chain.run(6.0)
-    assert chain.stations[1].hops == 1
+    assert chain.stations[1].place.hops == 1
     chain.addresses.insert(2, 2)
     chain.stations[2] = chain.build(2, 1)
     chain.got[2] = []
     chain.joints[1:] = [joint(50), joint(51)]
     chain.run(8.0)
-    assert [chain.stations[a].hops for a in (2, 1)] == [1, 2]
-    lower = chain.stations[ENCODER].neighbours[Side.LOWER]
+    assert [chain.stations[a].place.hops for a in (2, 1)] == [1, 2]
+    lower = chain.stations[ENCODER].place.neighbours[Side.LOWER]
     assert lower is not None
     assert lower.tube == 2
 
@@ -159,9 +160,9 @@ def test_a_silent_neighbour_is_noticed() -> None:
     chain.run(5.0)
     chain.joints[2][0].is_open = True
     chain.run(5.0)
-    assert chain.stations[1].neighbours[Side.UPPER] is None
-    assert chain.stations[2].neighbours[Side.LOWER] is None
-    assert chain.stations[2].neighbours[Side.UPPER] is not None
+    assert chain.stations[1].place.neighbours[Side.UPPER] is None
+    assert chain.stations[2].place.neighbours[Side.LOWER] is None
+    assert chain.stations[2].place.neighbours[Side.UPPER] is not None
 
 
 @pytest.mark.slow
@@ -173,7 +174,7 @@ def test_surveys_arrive_once_each_and_are_receipted(seed: int, loss: float, dupl
     for tube in (1, 2, 3, 4):
         for _ in range(3):
             station = chain.stations[tube]
-            station.submit(survey(tube, station.new_sequence()), chain.local(tube))
+            station.submit(survey(tube, station.series.take()), chain.local(tube))
     chain.run(60.0)
     assert sorted(set(chain.surveys())) == [(t, s) for t in (1, 2, 3, 4) for s in (1, 2, 3)]
     assert [chain.stations[t].outbox_size for t in (1, 2, 3, 4)] == [0, 0, 0, 0]
@@ -186,7 +187,7 @@ def test_a_relay_that_dies_with_surveys_in_its_hands_loses_none() -> None:
     chain.joints[2][1].is_open = True
     for _ in range(5):
         station = chain.stations[1]
-        station.submit(survey(1, station.new_sequence()), chain.local(1))
+        station.submit(survey(1, station.series.take()), chain.local(1))
     chain.run(2.0)
     chain.stations[2] = chain.build(2, 2, chain.stations[2].export_state())
     chain.joints[2][0].is_open = chain.joints[2][1].is_open = False
@@ -199,11 +200,11 @@ def test_a_tube_that_restarts_before_its_receipt_sends_again_and_counts_on() -> 
     chain.run(5.0)
     chain.joints[1][0].is_open = True
     station = chain.stations[1]
-    station.submit(survey(1, station.new_sequence()), chain.local(1))
+    station.submit(survey(1, station.series.take()), chain.local(1))
     chain.run(1.0)
     chain.stations[1] = chain.build(1, 2, chain.stations[1].export_state())
     chain.joints[1][0].is_open = False
-    assert chain.stations[1].new_sequence() == 2
+    assert chain.stations[1].series.take() == 2
     chain.run(40.0)
     assert set(chain.surveys()) == {(1, 1)}
     assert chain.stations[1].outbox_size == 0
@@ -255,7 +256,7 @@ def test_a_relay_hands_on_the_very_bytes_that_came(monkeypatch: pytest.MonkeyPat
         return plain(message)
 
     monkeypatch.setattr(room, "encode", counted)
-    event = Event(1, chain.stations[1].new_sequence(), 100.0, Severity.INFO, "stopped")
+    event = Event(1, chain.stations[1].series.take(), 100.0, Severity.INFO, "stopped")
     chain.stations[1].submit(event, chain.local(1))
     chain.run(3.0)
     assert event in chain.got[BASE]

@@ -159,7 +159,7 @@ def works_still(string: SealedString) -> None:
     assert string.endpoints[1].outbox_size == 1
     string.run(15.0)
     assert string.endpoints[1].outbox_size == 0  # it was stored, and the receipt came back
-    assert string.endpoints[ENCODER].neighbours[Side.LOWER] is not None
+    assert string.endpoints[ENCODER].place.neighbours[Side.LOWER] is not None
 
 
 @pytest.fixture(scope="module")

@@ -74,13 +74,13 @@ def test_a_frame_of_another_is_counted_and_changes_nothing() -> None:
 
 def test_distances_are_counted_in_tubes_from_the_lowest_up() -> None:
     tube = Endpoint(3, frozenset(Side), boot_count=1, reach=2)
-    above = {other: tube._distance(Side.UPPER, other) for other in (1, 2, 4, 5, 6)}
+    above = {other: tube.place.distance(Side.UPPER, other) for other in (1, 2, 4, 5, 6)}
     assert above == {1: math.inf, 2: math.inf, 4: 1.0, 5: 2.0, 6: math.inf}
-    assert [tube._distance(Side.LOWER, other) for other in (4, 2, 1, ENCODER)] == [math.inf, 1.0, 2.0, math.inf]
-    assert tube._distance(Side.UPPER, ENCODER) == 1.5
-    tube.hops = 2
-    assert tube._distance(Side.UPPER, ENCODER) == 2.5
-    tube.hops = 3
-    assert tube._distance(Side.UPPER, ENCODER) == math.inf
+    assert [tube.place.distance(Side.LOWER, other) for other in (4, 2, 1, ENCODER)] == [math.inf, 1.0, 2.0, math.inf]
+    assert tube.place.distance(Side.UPPER, ENCODER) == 1.5
+    tube.place.hops = 2
+    assert tube.place.distance(Side.UPPER, ENCODER) == 2.5
+    tube.place.hops = 3
+    assert tube.place.distance(Side.UPPER, ENCODER) == math.inf
     head = Endpoint(ENCODER, frozenset(Side), boot_count=1, is_clock_root=True, reach=2)
-    assert head._distance(Side.LOWER, 7) < head._distance(Side.LOWER, 6)
+    assert head.place.distance(Side.LOWER, 7) < head.place.distance(Side.LOWER, 6)

@@ -81,7 +81,7 @@ def test_what_is_honest_arrives_under_seals_and_nothing_is_counted(folder: Path)
     kinds = {type(message).__name__ for message in string.heard[BASE]}
     assert kinds == {"SurveyMeasurement", "Event", "StaticRecord", "NodeState", "Reply", "BlockStatus"}
     assert string.endpoints[1].outbox_size == 0
-    assert string.endpoints[1].hops == 2
+    assert string.endpoints[1].place.hops == 2
 
 
 @pytest.mark.slow
@@ -235,7 +235,7 @@ def test_a_revoked_tube_is_believed_nothing(tmp_path: Path) -> None:
     string.endpoints[2].submit(survey(2, 50), string.now)
     string.run(10.0)
     assert len(string.heard[BASE]) == heard
-    assert all(n is None for n in (string.endpoints[ENCODER].neighbours[Side.LOWER],))
+    assert all(n is None for n in (string.endpoints[ENCODER].place.neighbours[Side.LOWER],))
     assert string.counts()["seal_wrong_tag"] > 0
 
 
@@ -332,8 +332,8 @@ def test_an_unsealed_neighbour_and_a_sealed_one_do_not_meet(folder: Path) -> Non
     string = SealedString(folder)
     string.endpoints[1].seals = None
     string.run(5.0)
-    assert string.endpoints[1].neighbours[Side.UPPER] is None
-    assert string.endpoints[2].neighbours[Side.LOWER] is None
+    assert string.endpoints[1].place.neighbours[Side.UPPER] is None
+    assert string.endpoints[2].place.neighbours[Side.LOWER] is None
     assert string.counts_of(2)["seal_unsealed"] > 0
 
 

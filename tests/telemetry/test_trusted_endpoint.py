@@ -5,9 +5,10 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from telemetry.application.endpoint import SERIES_SHIFT, Endpoint
+from telemetry.application.endpoint import Endpoint
 from telemetry.application.outbox import LIMIT, Outbox
 from telemetry.application.saved_state import STATE_LAYOUT
+from telemetry.application.series import SERIES_SHIFT
 from telemetry.errors import DecodeError
 from telemetry.messages import (
     BASE,
@@ -79,7 +80,7 @@ def test_whatever_hop_count_a_neighbour_names_the_endpoint_speaks_on(hops: int) 
     above = Neighbour(tube)
     above.say(encode(Hello(ENCODER, 1, hops, Mode.BOOT, 1.0)), reliable=False)
     above.listen()
-    assert tube.hops <= MAX_TUBE
+    assert tube.place.hops <= MAX_TUBE
     restored = Endpoint(3, frozenset(Side), boot_count=2, restored=tube.export_state())
     assert restored.counters["bad_saved_state"] == 0
     assert Neighbour(restored).listen() is not None
@@ -100,7 +101,7 @@ def test_a_state_that_is_none_is_not_believed(rows: tuple[object, ...]) -> None:
     restored = Endpoint(3, frozenset(Side), boot_count=2, restored=saved)
     restored.advance(10.0)
     assert restored.take_frames(10.0) is not None
-    assert HOPS_UNKNOWN <= restored.hops <= MAX_TUBE
+    assert HOPS_UNKNOWN <= restored.place.hops <= MAX_TUBE
 
 
 @given(st.binary(max_size=200))
@@ -111,11 +112,11 @@ def test_any_bytes_for_a_state_are_survived(saved: bytes) -> None:
 
 def test_a_tube_that_lost_its_numbers_gives_none_out_twice() -> None:
     first = Endpoint(3, frozenset(Side), boot_count=1)
-    assert first.new_sequence() == 1
+    assert first.series.take() == 1
     lost = Endpoint(3, frozenset(Side), boot_count=4)
-    assert lost.newest_sequence == 0
-    assert lost.new_sequence() == (4 << SERIES_SHIFT) + 1
-    assert lost.newest_sequence == (4 << SERIES_SHIFT) + 1
+    assert lost.series.newest == 0
+    assert lost.series.take() == (4 << SERIES_SHIFT) + 1
+    assert lost.series.newest == (4 << SERIES_SHIFT) + 1
 
 
 def test_a_full_outbox_drops_what_may_be_lost_first_and_never_the_newest() -> None:
