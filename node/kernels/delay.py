@@ -11,12 +11,26 @@ show what the cycle before lacked: that cycle is put right in the ring, before t
 
 from __future__ import annotations
 
-from typing import Any
+from typing import Any, Final
 
 from node.kernels.jit import kernel
 from node.kernels.layout import Array
-from node.kernels.numbers import half, is_number, share, speed, square, turn
+from node.kernels.numbers import half, is_number, mean, share, speed, square, turn
 from node.kernels.quantity import NONE
+
+MEMORY: Final = 256  # windows, over which an error that has grown is taken for one that stays
+
+
+@kernel
+def date_window(memory: Any, std: float) -> None:
+    """Take in how well the end of a window is dated, ``std`` (s); ``memory`` is a record of dtype ``DELAYED``.
+
+    The phase of a crystal is off by the same in every window until reads have shown better. What a date is off by
+    beyond the best of late comes and goes.
+    """
+    known = is_number(memory.late) and memory.late != 0
+    memory.std = std
+    memory.lasting = min(memory.lasting + mean(std - memory.lasting, MEMORY), std) if known else std
 
 
 @kernel

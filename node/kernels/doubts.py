@@ -19,7 +19,19 @@ from node.kernels.events import Code, tell, told, told_degrees
 from node.kernels.fixed.layout import ANGLE_Q, VECTOR_Q
 from node.kernels.jit import constant, kernel
 from node.kernels.layout import DEG
-from node.kernels.numbers import held, is_number, lasting, mean, number, product, ratio, root, square, times, turn
+from node.kernels.numbers import (
+    held,
+    is_number,
+    lasting,
+    mean,
+    number,
+    product,
+    ratio,
+    root,
+    square,
+    times,
+    turn,
+)
 from node.kernels.quantity import NONE, factor, variance
 from node.kernels.swings import swing_var
 
@@ -62,12 +74,22 @@ def unexplained_var(node: Any) -> float:
 
 
 @kernel
+def is_dated(node: Any) -> bool:
+    """Whether a driver dates the window of its readings."""
+    late = node.cluster.delayed[0].late
+    return bool(late != 0 and is_number(late))
+
+
+@kernel
 def window_var(node: Any) -> float:
-    """Variance (rad^2) of the yaw while the head turns, for a driver that dates the window of its readings."""
-    window = node.cluster.delayed[0]
-    if window.late == 0 or not is_number(window.late):
-        return 0
-    return square(turn(node.guard.rate, window.std))
+    """Variance (rad^2) of the yaw while the head turns, by what that date may be off."""
+    return square(turn(node.guard.rate, node.cluster.delayed[0].std)) if is_dated(node) else 0
+
+
+@kernel
+def passing_var(node: Any) -> float:
+    """Variance (rad^2) of an aiding by that part of it which is another one in every window."""
+    return window_var(node) - square(turn(node.guard.rate, node.cluster.delayed[0].lasting)) if is_dated(node) else 0
 
 
 @kernel

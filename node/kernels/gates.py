@@ -10,17 +10,17 @@ from typing import Any, Final
 
 from node.kernels.aiding_watch import forget
 from node.kernels.angles import wrap
-from node.kernels.doubts import misfit_var
+from node.kernels.doubts import is_dated, misfit_var
 from node.kernels.events import Code, tell, told, told_count, told_degrees
 from node.kernels.fixed.layout import RATE_Q, TIME_Q
 from node.kernels.jit import constant, kernel
 from node.kernels.layout import CLOCK_SLACK, DEG, PERIOD, Array, Err
 from node.kernels.modes import STATIC_BIAS
-from node.kernels.numbers import angle_of, half, is_number, lasting, square, time_root, turn
+from node.kernels.numbers import angle_of, half, is_number, lasting, square, stamp_square, time_root, turn
 from node.kernels.priors import is_beyond_gate
 from node.kernels.quantity import NONE, rate, seconds, variance
 from node.kernels.record import A_CLOCK_VAR, A_RATE, A_VALID, A_YAW, A_YAW_VAR
-from node.kernels.resets import begin_epoch, doubt_yaw, open_yaw
+from node.kernels.resets import begin_epoch, doubt_stamp, doubt_yaw, open_yaw
 from node.kernels.trust import is_faulty
 
 SLOWEST_REVERSED: Final = rate(5.0 * DEG)  # rad/s, from where encoder and gyroscope are seen to turn against each other
@@ -57,6 +57,8 @@ def gate_aiding(node: Any, aiding: Array) -> bool:
         return False
     if aiding[A_RATE] == 0 and guard.rate != 0:  # what the turning left unexplained, a rest shows
         open_misfit(node)
+    elif aiding[A_RATE] != 0 and guard.rate == 0:
+        doubt_date(node)
     guard.rate, guard.rate_at, guard.aiding_var = aiding[A_RATE], valid_local, aiding[A_YAW_VAR]
     if is_reversed(node) or not is_placed(state, aiding):
         return False
@@ -71,6 +73,17 @@ def open_misfit(node: Any) -> None:
     var = misfit_var(node)
     if var > 0:
         doubt_yaw(node.filter, var)
+
+
+@kernel
+def doubt_date(node: Any) -> None:
+    """The head starts: aidings are off by what the date of the windows is off for good, as by their own time stamp.
+
+    A date that is another one in every window leaves nothing of the kind, and a time stamp would learn its noise.
+    """
+    window = node.cluster.delayed[0]
+    if is_dated(node) and half(window.std) < window.lasting:
+        doubt_stamp(node.filter, stamp_square(window.lasting))
 
 
 @kernel

@@ -7,7 +7,7 @@ from typing import Any
 from node.kernels.alignment import to_tube
 from node.kernels.calibration import calibrate
 from node.kernels.cluster import fuse_imus
-from node.kernels.delay import make_up_delay
+from node.kernels.delay import date_window, make_up_delay
 from node.kernels.jit import kernel
 from node.kernels.layout import Array
 from node.kernels.numbers import are_numbers
@@ -32,7 +32,7 @@ def take_readings(node: Any, settings: Any, parameters: Array, readings: Array, 
     correct_one(node, parameters, 0, node.temperature, rate, force)
     read_parts(node, parameters, readings[0], 0, length)
     split_cycle(node, 1)
-    node.cluster.delayed[0].std = readings[0, LATE_STD]
+    date_window(node.cluster.delayed[0], readings[0, LATE_STD])
     doubt_turn(node, make_up_delay(node.cluster.delayed[0], readings[0, LATE], rate, length))
     return int(readings[0, SATURATED])
 
@@ -49,7 +49,7 @@ def take_cluster(node: Any, settings: Any, parameters: Array, readings: Array, l
             rate[i], force[i] = readings[k, WX + i], readings[k, FX + i]
         correct_one(node, parameters, k, node.temperature, rate, force)
         read_parts(node, parameters, readings[k], k, length)
-        cluster.delayed[k].std = readings[k, LATE_STD]
+        date_window(cluster.delayed[k], readings[k, LATE_STD])
         doubt = max(doubt, make_up_delay(node.cluster.delayed[k], readings[k, LATE], rate, length))
         for i in range(3):
             cluster.readings[k, i] = rate[i] - offsets[k, i]

@@ -187,6 +187,7 @@ DELAYED: Final = np.dtype(
     [
         ("late", "f8"),  # s, by which the window before ended before its cycle; NaN: there was none
         ("std", "f8"),  # s, of it
+        ("lasting", "f8"),  # s, of what stays of its error from window to window
         ("rate", "f8", (3,)),  # rad/s, of that window
         ("change", "f8", (3,)),  # rad/s, of it since the one before
         ("missing", "f8", (3,)),  # rad, turn of its cycle that the sensor had yet to show

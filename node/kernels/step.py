@@ -15,7 +15,7 @@ from node.kernels.angles import wrap
 from node.kernels.cluster import learn_offsets, survey_imus
 from node.kernels.coarse_level import level_coarsely
 from node.kernels.cycle import run_cycle
-from node.kernels.doubts import noise_var, unexplained_var, window_var
+from node.kernels.doubts import noise_var, passing_var, unexplained_var
 from node.kernels.events import Code, tell, told, told_degrees
 from node.kernels.fixed.layout import ANGLE_Q, VECTOR_Q
 from node.kernels.gates import admits, gate_aiding
@@ -283,7 +283,7 @@ def aiding_around(offer_aiding: Callable[..., int], nodes: Array, settings: Arra
             node.filter,
             node.config,
             aiding[A_YAW],
-            aiding[A_YAW_VAR] + noise_var(node) + window_var(node),
+            aiding[A_YAW_VAR] + noise_var(node) + passing_var(node),
             own_systematic(node),
             node.down_offset,
             aiding[A_VALID],

@@ -8,11 +8,13 @@ from emulated_mpu6500 import EmulatedMpu6500
 from hypothesis import given
 from hypothesis import strategies as st
 
-from node.kernels.delay import make_up_delay
+from node.kernels.delay import date_window, make_up_delay
 from node.kernels.layout import DEG, PERIOD
 from node.kernels.record import DELAYED
 from node.process.drivers.frame_clock import FrameClock
 from node.process.drivers.mpu6500 import DELAYS, Mpu6500
+from sim.studies.field.cases import CASES
+from sim.studies.field.run import row, run_seed
 
 RATES = st.floats(-70.0, 70.0).map(math.radians)
 LATE = st.floats(-0.01, 0.03)
@@ -45,6 +47,35 @@ class Late:
 
     def truth(self) -> np.ndarray:
         return np.array([self.at(k * PERIOD) - self.at(PERIOD) for k in range(2, len(self.late))])
+
+
+@pytest.mark.parametrize(
+    ("told_ms", "lasting_ms"),
+    [
+        ([5.8, 2.0, 0.3, 0.3, 0.3], 0.3),  # bounds that close in upon the phase of a crystal
+        ([1.9, 0.1, 3.5, 0.8, 0.1] * 20, 0.1),  # time stamps that jitter: bounds that contradict each other
+        ([0.1] + [1.0] * 2000, 1.0),  # a phase that is known less well from now on
+    ],
+)
+def test_what_stays_of_a_dates_error_is_the_best_of_late(told_ms: list[float], lasting_ms: float) -> None:
+    memory = np.zeros(1, DELAYED).view(np.recarray)[0]
+    memory.late = math.nan
+    for std in told_ms:
+        date_window.py_func(memory, 1e-3 * std)
+        memory.late = 0.01
+    assert memory.lasting == pytest.approx(1e-3 * lasting_ms, rel=0.05)
+    assert memory["std"] == 1e-3 * told_ms[-1]
+
+
+@pytest.mark.statistical
+@pytest.mark.timeout(600)
+def test_an_mpu6500_with_delay_crystal_and_fifo_is_as_good_as_it_says_and_never_called_faulty() -> None:
+    case = next(case for case in CASES if case.key == "mpu6500")
+    figures = row(case, [run_seed((case.setup, seed)) for seed in range(1, 101)])
+    assert 0.8 < figures["nees_turning"] < 1.25
+    assert 0.8 < figures["nees_rest"] < 1.25
+    assert figures["gyro_step"] == figures["gyro_scale"] == figures["other_faults"] == 0
+    assert figures["surveys_percent"] == 100
 
 
 @given(RATES, LATE)

@@ -86,6 +86,7 @@ OWN_FORMATS: Final[dict[str, Any]] = {
     "numbers": TOLD_Q,
     "late": TIME_Q,
     "delayed.std": TIME_Q,
+    "delayed.lasting": TIME_Q,
     "change": RATE_Q,
     "missing": ANGLE_Q,
     "behind": RATE_Q,
