@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import contextlib
-import itertools
 import math
 import secrets
 import time
@@ -13,15 +11,17 @@ from dataclasses import replace
 from typing import TYPE_CHECKING, Protocol
 
 from groundstation.config import GroundConfig
-from groundstation.errors import SelectorError, StoreError
+from groundstation.errors import SelectorError
 from groundstation.service.conditions import conditions_of
 from groundstation.service.crew_alarms import Times
 from groundstation.service.intake import DEPTH, MESSAGE, ORDER, TIMER, Tape
-from groundstation.service.model import Prepared, RigModel
+from groundstation.service.keeper import Keeper, refusing_disk
+from groundstation.service.learner import Learner
+from groundstation.service.model import RigModel
 from groundstation.service.operator import BlockUpload, Operator, Outgoing
 from groundstation.service.orders import Order
-from groundstation.service.stops import belongs
-from groundstation.service.store import Store, Stored
+from groundstation.service.stands import take_stand
+from groundstation.service.store import Store
 from groundstation.service.uploads import Uploads
 from groundstation.service.watch import Watch
 from telemetry.application.endpoint import Endpoint
@@ -33,14 +33,12 @@ from telemetry.messages import (
     BlockStatus,
     DepthReading,
     Event,
-    Kept,
     Message,
     NodeState,
     Reply,
     Scalar,
     Severity,
     Side,
-    Stand,
     StaticRecord,
     SurveyMeasurement,
 )
@@ -56,8 +54,6 @@ if TYPE_CHECKING:
 STARTS = 1 << 31  # numbers of a start by lot
 HEARTBEAT = 1.0  # s, own clock, between two verdicts
 BEATS = ("verdict", "changes")  # paths that are published without end
-CHANGED_BY_SURVEY = ("measurements", "stations", "trajectory", "uncertainty", "column")
-RESTORED_TOGETHER = 256  # messages
 EARLY = 64  # readings of the depth that may come before rig time is known
 GROUND_STATION = "ground station"  # who orders that something be sent again
 
@@ -121,27 +117,16 @@ class GroundProcess(Process):
         self.start_number = start
         self.listeners: list[Listener] = []
         self._stale: set[int] = set()
-        self._arrived: list[Stored] = []  # since the last transaction
         self._early: deque[DepthReading] = deque(maxlen=EARLY)
-        self._kept_stand: Stand | None = None
         self._beat_at = -math.inf
         self._plane = -1  # of the wall, that the bit has passed last
-        self._wall_paths = ["wall"] if self.model.wall is not None else []
-        self.model.epoch = self.store.epoch()
-        self.model.restore_tally(self.store.tally())
-        self._kept_tally = list(self.model.tally.tubes)
-        self._kept_joints = self.store.joints()
-        self.model.joints.known.update(self._kept_joints)
-        self._kept_doubt = self.store.depth_doubt()
-        self.model.depths.recall(self._kept_doubt)
-        for stand in self.store.stands():
-            self._on_stand(stand)
-        self.model.depths.restore(list(self.model.depths.stands))
+        self._keeper = Keeper(self.store, self.model)
+        self._learner = Learner(self.store, self.model, self.watch, self._keeper)
         self.operator = Operator(config, self.model, self.store, self._uploads, start)
         self.operator.changed = self._publish
         self.operator.ended = self.endpoint.withdraw
         self.operator.accepted = self._note_order
-        self._restore_messages()
+        self._learner.restore()
         self.model.crew_alarms.restore(self.store.alarms(), conditions_of(self.model))
 
     def on_frame(self, side: Side, frame: Content, now: float, margin: float = math.inf) -> None:
@@ -185,7 +170,7 @@ class GroundProcess(Process):
             self._note(TIMER, now)
         self._advance_time(now)
         self._send_pending(now)
-        with self._refusing_disk():
+        with refusing_disk():
             for outgoing in self.operator.due_requests(now):
                 self._send(outgoing, now)
         for segment in self._uploads.due_segments(now) if self._uploads is not None else ():
@@ -236,14 +221,14 @@ class GroundProcess(Process):
         if is_new:
             if before != EPOCH_UNKNOWN:
                 self.watch.on_epoch(clock.epoch)
-            with self._refusing_disk():
+            with refusing_disk():
                 self.store.keep_epoch(clock.epoch)
         while self._early:
             self._on_reading(self._early.popleft(), now)
 
     def _look(self, now: float) -> None:
         """Find what is wrong, ask again for what is missing, and publish who fell silent or came back."""
-        self._keep_depth_doubt()
+        self._keeper.keep_depth_doubt()
         self._place_waiting()
         self.watch.look(now)
         alarms, refusal = self.model.rig_alarms, self.store.refusal
@@ -279,7 +264,7 @@ class GroundProcess(Process):
         alarms = self.model.crew_alarms
         alarms.update(conditions_of(self.model), Times(now, self.model.rig_now, time.time()))
         if changed := alarms.drain_changed():
-            with self._refusing_disk():
+            with refusing_disk():
                 self.store.keep_alarms(changed)
             self._publish(["alarms"])
 
@@ -301,7 +286,7 @@ class GroundProcess(Process):
         model = self.model
         refused = model.depths.on_reading(reading, model.epoch, model.rig_now, now, model.tally.deepest)
         self.watch.on_depth("" if refused == "repeated" else refused)
-        self._keep_depth_doubt()
+        self._keeper.keep_depth_doubt()
         if refused:
             return
         model.depth_heard_at = now
@@ -309,95 +294,13 @@ class GroundProcess(Process):
             is_present = stand.epoch in (EPOCH_UNKNOWN, model.epoch) and stand.ended_at <= reading.at
             is_news = is_present and not model.depths.is_of_before(stand, model.epoch)
             if is_news and stand.md <= model.tally.deepest:
-                self._on_stand(Stand(model.epoch, stand.begun_at, stand.ended_at, stand.md))
-        self._keep_stand(reading)
+                take_stand(model.depths, model.stops, replace(stand, epoch=model.epoch))
+        self._keeper.keep_stand(reading)
         self._place_waiting()
         self._publish(["status", "string"])
         if self.model.wall is not None and (plane := self.model.wall.plane_of(reading.md)) != self._plane:
             self._plane = plane
             self._publish(["wall"])
-
-    def _on_stand(self, stand: Stand) -> None:
-        """Remember a stand; one that follows another at a smaller depth is a stop.
-
-        One that follows another at the same depth goes on with its stop: nothing is known of the time in between.
-        """
-        depths = self.model.depths
-        depths.add_stand(stand)
-        begin = stand.epoch, stand.begun_at
-        before = [known for known in depths.stands if (known.epoch, known.begun_at) < begin]
-        whole = stand
-        while before and (before[-1].epoch, before[-1].md) == (stand.epoch, stand.md):
-            whole = replace(stand, begun_at=before.pop().begun_at)
-        if stand not in depths.stands:
-            return
-        is_stop = before[-1].md < stand.md if before else self.model.stops.know(whole)
-        if is_stop:
-            self.model.stops.on_stand(whole)
-        elif before and before[-1].md == stand.md:
-            self.model.stops.on_later_stand(before[-1], whole)
-
-    def _on_surveyed(self, epoch: int, at: float) -> None:
-        """The first stand that is known is a stop where a survey was taken in it: nobody heard how it began."""
-        for first in self.model.depths.stands[:1]:
-            if belongs(first, epoch, at):
-                self.model.stops.on_stand(first)
-
-    def _keep_stand(self, reading: DepthReading) -> None:
-        """Store a stand when it begins and when it has ended."""
-        newest = self.model.depths.stands[-1] if self.model.depths.stands else None
-        kept = self._kept_stand
-        has_begun = newest is not None and (kept is None or newest.begun_at != kept.begun_at)
-        has_ended = newest is not None and reading.md != newest.md and newest != kept
-        if newest is not None and (has_begun or has_ended):
-            with self._refusing_disk():
-                for stand in self.model.depths.stands[-2:]:
-                    self.store.keep_stand(stand)
-                self._kept_stand = newest
-
-    def _place_waiting(self) -> None:
-        """Fuse the surveys whose depth is known by now."""
-        placeable = self.model.placeable()
-        if not placeable:
-            return
-        try:
-            self.store.place_messages((one.measurement, md) for one, md in placeable)
-        except StoreError:
-            self.model.waiting += [one for one, _ in placeable]
-            return
-        hole = self.model.hole
-        before = list(hole.alarms.alarms), len(hole.moved), hole.history.count
-        changed = {path for one, md in placeable for path in self._apply_stored(one.measurement, md, one.below)}
-        if before[:2] != (hole.alarms.alarms, len(hole.moved)):
-            changed.add("alarms")
-        if before[2] != hole.history.count:
-            changed.add("history")
-        self._publish(sorted(changed))
-
-    def _keep_tally(self) -> None:
-        """Store a new order of the string before anything is placed by it."""
-        if self.model.tally.tubes != self._kept_tally:
-            self.store.keep_tally(list(self.model.tally.tubes))
-            self._kept_tally = list(self.model.tally.tubes)
-
-    def _keep_depth_doubt(self) -> None:
-        """Store when depths begin to be refused after a jump, and when they no longer are."""
-        doubt = self.model.depths.doubt
-        if doubt != self._kept_doubt:
-            with self._refusing_disk():
-                self.store.keep_depth_doubt(doubt)
-                self._kept_doubt = doubt
-
-    def _keep_joints(self) -> None:
-        """Store the angle of a joint when it is known first."""
-        if self.model.joints.known != self._kept_joints:
-            self.store.keep_joints(self.model.joints.known)
-            self._kept_joints = dict(self.model.joints.known)
-
-    @staticmethod
-    def _refusing_disk() -> contextlib.suppress:
-        """Go on where the disk refuses: the store remembers why, and the next look tells it."""
-        return contextlib.suppress(StoreError)
 
     def on_message(self, message: Message, now: float) -> None:
         """A message has come, from the string or from a recording."""
@@ -406,13 +309,12 @@ class GroundProcess(Process):
         match message:
             case NodeState() if self.model.on_state(message, now):
                 self.watch.on_state(message)
-                with self._refusing_disk():
-                    self._keep_tally()
-                    self._keep_joints()
+                with refusing_disk():
+                    self._keeper.keep_tally()
+                    self._keeper.keep_joints()
                 self._publish([f"nodes/{message.tube}"])
             case SurveyMeasurement() | Event() | StaticRecord():
-                below = self.model.string_below(message) if isinstance(message, SurveyMeasurement) else None
-                self._arrived.append(Stored(message, None, below))
+                self._learner.take(message)
             case Reply():
                 self.model.orders.on_reply(message)
                 self.model.recalibration.on_reply(message, now)
@@ -421,67 +323,16 @@ class GroundProcess(Process):
         self.operator.publish_orders()
 
     def _keep_arrived(self) -> None:
-        """Store what came together, in one transaction, before any of it is acknowledged.
+        """Store and learn what came together before any of it is acknowledged."""
+        stored, changed = self._learner.learn_arrived()
+        for message in stored:
+            self.endpoint.acknowledge(message)
+        if stored:
+            self._publish(changed)
 
-        What was stored already changes nothing; what is not stored is not acknowledged, and comes again. A survey gets
-        its depth at the next reading or look, with all that came meanwhile and in their order: whether a reading
-        brackets its time already is a matter of a millisecond.
-        """
-        if not self._arrived:
-            return  # as nearly always: it is asked after every event
-        arrived, self._arrived = self._arrived, []
-        try:
-            are_new = self._store_arrived(arrived)
-        except StoreError:
-            for one in arrived:
-                if isinstance(one.message, Event):
-                    self.watch.on_known_event(one.message)
-            return
-        changed: dict[str, None] = {}
-        for one, is_new in zip(arrived, are_new, strict=True):
-            if is_new:
-                changed |= dict.fromkeys(self._apply_stored(one.message, None, one.below))
-                if isinstance(one.message, Event):
-                    self.watch.on_event(one.message)
-            self.endpoint.acknowledge(one.message)
-        self._publish(list(changed))
-
-    def _store_arrived(self, arrived: list[Stored]) -> list[bool]:
-        """Put messages on the disk, with the order of the string that places them; which of them are new."""
-        self._keep_tally()
-        return self.store.add_messages(arrived)
-
-    def _restore_messages(self) -> None:
-        """Go on with everything that was stored, some hundred messages at a time."""
-        messages = self.store.messages()
-        while some := list(itertools.islice(messages, RESTORED_TOGETHER)):
-            placed = {
-                place: one.message
-                for place, one in enumerate(some)
-                if isinstance(one.message, SurveyMeasurement) and one.md is not None
-            }
-            prepared = dict(zip(placed, self.model.prepare(list(placed.values())), strict=True))
-            for place, one in enumerate(some):
-                self._apply_stored(one.message, one.md, one.below, prepared.get(place))
-
-    def _apply_stored(
-        self, message: Kept, md: float | None, below: float | None, prepared: Prepared | None = None
-    ) -> list[str]:
-        """Add a stored message to the model; returns the paths that changed."""
-        self.model.numbers.add_number(message.tube, message.sequence)
-        if isinstance(message, Event):
-            self.model.on_event(message)
-            self.watch.on_known_event(message)
-            return ["events"]
-        if isinstance(message, StaticRecord):
-            self.model.on_static_record(message)
-            return ["static_records"]
-        epoch = message.epoch or self.model.epoch
-        self.model.stops.on_survey(epoch, message.station_at, message.tube)
-        if md is not None:
-            self._on_surveyed(epoch, message.station_at)
-        self.watch.on_survey(message, self.model.on_survey(message, md, below, prepared))
-        return [*CHANGED_BY_SURVEY, *self._wall_paths]
+    def _place_waiting(self) -> None:
+        if changed := self._learner.place_waiting():
+            self._publish(changed)
 
     def _publish(self, changed: list[str]) -> None:
         model = self.model

@@ -13,6 +13,8 @@ from borechain.gauntlet.run import run_seed, shrink
 from groundstation.errors import StoreError
 from groundstation.service import database
 from groundstation.service import model as model_module
+from groundstation.service.keeper import Keeper
+from groundstation.service.learner import Learner
 from groundstation.service.process import GroundProcess
 from groundstation.service.store import Stored
 from groundstation.survey.trust import Trust
@@ -77,26 +79,26 @@ def flags_ignored(patch: pytest.MonkeyPatch) -> None:
 
 
 def receipt_before_the_store(patch: pytest.MonkeyPatch) -> None:
-    plain = GroundProcess._store_arrived
+    plain = GroundProcess._keep_arrived
 
-    def store_arrived(process: GroundProcess, arrived: list[Stored]) -> list[bool]:
-        for one in arrived:
+    def keep_arrived(process: GroundProcess) -> None:
+        for one in process._learner._arrived:
             process.endpoint.acknowledge(one.message)
-        return plain(process, arrived)
+        plain(process)
 
-    patch.setattr(GroundProcess, "_store_arrived", store_arrived)
+    patch.setattr(GroundProcess, "_keep_arrived", keep_arrived)
 
 
 def refused_and_receipted(patch: pytest.MonkeyPatch) -> None:
-    plain = GroundProcess._store_arrived
+    plain = Learner.store_arrived
 
-    def store_arrived(process: GroundProcess, arrived: list[Stored]) -> list[bool]:
+    def store_arrived(learner: Learner, arrived: list[Stored]) -> list[bool]:
         try:
-            return plain(process, arrived)
+            return plain(learner, arrived)
         except StoreError:
             return [False] * len(arrived)
 
-    patch.setattr(GroundProcess, "_store_arrived", store_arrived)
+    patch.setattr(Learner, "store_arrived", store_arrived)
 
 
 def synchronous_below_full(patch: pytest.MonkeyPatch) -> None:
@@ -121,7 +123,7 @@ def boots_not_forced(patch: pytest.MonkeyPatch) -> None:
 
 
 def order_of_string_not_kept(patch: pytest.MonkeyPatch) -> None:
-    patch.setattr(GroundProcess, "_keep_tally", lambda process: None)
+    patch.setattr(Keeper, "keep_tally", lambda keeper: None)
 
 
 def receipt_by_number(patch: pytest.MonkeyPatch) -> None:

@@ -1,0 +1,126 @@
+"""From messages to the model: stored first, all that came together at once, then learnt in their order."""
+
+from __future__ import annotations
+
+import itertools
+
+from groundstation.errors import StoreError
+from groundstation.service.keeper import Keeper
+from groundstation.service.model import Prepared, RigModel
+from groundstation.service.stands import take_survey
+from groundstation.service.store import Store, Stored
+from groundstation.service.watch import Watch
+from telemetry.messages import Event, Kept, StaticRecord, SurveyMeasurement
+
+CHANGED_BY_SURVEY = ("measurements", "stations", "trajectory", "uncertainty", "column")
+RESTORED_TOGETHER = 256  # messages
+
+
+class Learner:
+    """Stores what comes and adds it to a model.
+
+    Parameters
+    ----------
+    store : open
+    model, watch : that learn
+    keeper : of the order of the string, by which surveys are placed
+    """
+
+    def __init__(self, store: Store, model: RigModel, watch: Watch, keeper: Keeper) -> None:
+        self._store, self._model, self._watch, self._keeper = store, model, watch, keeper
+        self._arrived: list[Stored] = []  # since the last transaction
+        self._by_survey = (*CHANGED_BY_SURVEY, *(["wall"] if model.wall is not None else []))
+
+    def take(self, message: Kept) -> None:
+        """A message has come; it is stored with those that come beside it."""
+        below = self._model.string_below(message) if isinstance(message, SurveyMeasurement) else None
+        self._arrived.append(Stored(message, None, below))
+
+    def learn_arrived(self) -> tuple[list[Kept], list[str]]:
+        """Store and learn what came together; returns what is on the disk now, to be acknowledged, and changed paths.
+
+        What was stored already changes nothing; what is not stored is not acknowledged, and comes again. A survey gets
+        its depth at the next reading or look, with all that came meanwhile and in their order: whether a reading
+        brackets its time already is a matter of a millisecond.
+        """
+        if not self._arrived:
+            return [], []  # as nearly always: it is asked after every event
+        arrived, self._arrived = self._arrived, []
+        try:
+            are_new = self.store_arrived(arrived)
+        except StoreError:
+            for one in arrived:
+                if isinstance(one.message, Event):
+                    self._watch.on_known_event(one.message)
+            return [], []
+        changed: dict[str, None] = {}
+        for one, is_new in zip(arrived, are_new, strict=True):
+            if is_new:
+                changed |= dict.fromkeys(self._learn(one.message, None, one.below))
+                if isinstance(one.message, Event):
+                    self._watch.on_event(one.message)
+        return [one.message for one in arrived], list(changed)
+
+    def store_arrived(self, arrived: list[Stored]) -> list[bool]:
+        """Put messages on the disk, with the order of the string that places them; which of them are new.
+
+        Raises
+        ------
+        StoreError
+            When the disk refuses.
+        """
+        self._keeper.keep_tally()
+        return self._store.add_messages(arrived)
+
+    def place_waiting(self) -> list[str]:
+        """Fuse the surveys whose depth is known by now; returns the paths that changed."""
+        model = self._model
+        placeable = model.placeable()
+        if not placeable:
+            return []
+        try:
+            self._store.place_messages((one.measurement, md) for one, md in placeable)
+        except StoreError:
+            model.waiting += [one for one, _ in placeable]
+            return []
+        hole = model.hole
+        before = list(hole.alarms.alarms), len(hole.moved), hole.history.count
+        changed = {path for one, md in placeable for path in self._learn(one.measurement, md, one.below)}
+        if before[:2] != (hole.alarms.alarms, len(hole.moved)):
+            changed.add("alarms")
+        if before[2] != hole.history.count:
+            changed.add("history")
+        return sorted(changed)
+
+    def restore(self) -> None:
+        """Go on with everything that was stored, some hundred messages at a time."""
+        messages = self._store.messages()
+        while some := list(itertools.islice(messages, RESTORED_TOGETHER)):
+            placed = {
+                place: one.message
+                for place, one in enumerate(some)
+                if isinstance(one.message, SurveyMeasurement) and one.md is not None
+            }
+            prepared = dict(zip(placed, self._model.prepare(list(placed.values())), strict=True))
+            for place, one in enumerate(some):
+                self._learn(one.message, one.md, one.below, prepared.get(place))
+
+    def _learn(
+        self, message: Kept, md: float | None, below: float | None, prepared: Prepared | None = None
+    ) -> tuple[str, ...]:
+        """Add a stored message to the model; returns the paths that changed."""
+        model = self._model
+        model.numbers.add_number(message.tube, message.sequence)
+        if isinstance(message, Event):
+            model.on_event(message)
+            self._watch.on_known_event(message)
+            return ("events",)
+        if isinstance(message, StaticRecord):
+            model.on_static_record(message)
+            return ("static_records",)
+        epoch = message.epoch or model.epoch
+        model.stops.on_survey(epoch, message.station_at, message.tube)
+        if md is not None:
+            take_survey(model.depths, model.stops, epoch, message.station_at)
+        self._watch.on_survey(message, model.on_survey(message, md, below, prepared))
+        return self._by_survey

@@ -1,0 +1,36 @@
+"""Which stands of the bit are stops, as they come in. No I/O."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+from groundstation.service.depth import DepthLog
+from groundstation.service.stops import Stops, belongs
+from telemetry.messages import Stand
+
+
+def take_stand(depths: DepthLog, stops: Stops, stand: Stand) -> None:
+    """Remember a stand; one that follows another at a smaller depth is a stop.
+
+    One that follows another at the same depth goes on with its stop: nothing is known of the time in between.
+    """
+    depths.add_stand(stand)
+    begin = stand.epoch, stand.begun_at
+    before = [known for known in depths.stands if (known.epoch, known.begun_at) < begin]
+    whole = stand
+    while before and (before[-1].epoch, before[-1].md) == (stand.epoch, stand.md):
+        whole = replace(stand, begun_at=before.pop().begun_at)
+    if stand not in depths.stands:
+        return
+    is_stop = before[-1].md < stand.md if before else stops.know(whole)
+    if is_stop:
+        stops.on_stand(whole)
+    elif before and before[-1].md == stand.md:
+        stops.on_later_stand(before[-1], whole)
+
+
+def take_survey(depths: DepthLog, stops: Stops, epoch: int, at: float) -> None:
+    """The first stand that is known is a stop where a survey was taken in it (s): nobody heard how it began."""
+    for first in depths.stands[:1]:
+        if belongs(first, epoch, at):
+            stops.on_stand(first)
