@@ -104,9 +104,7 @@ class Watch:
 
         One that the disk refuses is judged each time it comes: its warning must not wait for room on a disk.
         """
-        tubes = self._model.tally.tubes
-        heard = [tube for tube in tubes if not self._model.is_stale(tube)] or tubes  # none: the events are stored ones
-        if against := self._witnesses.on_event(event, heard):
+        if against := self._witnesses.on_event(event, self._heard):
             self._alarms.alert("reference", "encoder", against)
 
     def on_survey(self, measurement: SurveyMeasurement, outcome: str) -> None:
@@ -160,6 +158,12 @@ class Watch:
             gap.complete_from = complete_from
             gap.asked_at, gap.asked = now - ASK_EVERY + GAP_AFTER, gap.asked if sent else ASKED_AT_MOST
 
+    @property
+    def _heard(self) -> list[int]:
+        """Tubes that are heard; all where none is, for what comes then is stored."""
+        tubes = self._model.tally.tubes
+        return [tube for tube in tubes if not self._model.is_stale(tube)] or tubes
+
     def _look_at_joint(self, state: NodeState) -> None:
         """Tell where the yaws of two neighbours part."""
         if state.mode not in AT_REST or trust_of(state.flags) is not Trust.FULL:
@@ -181,6 +185,8 @@ class Watch:
         known.numbers = numbers
         if now >= known.found_at + GAP_AFTER:
             self._alarms.hold("numbers_missing", f"tube {tube}", f"numbers {numbers[0]} to {numbers[1]}")
+            if against := self._witnesses.on_lost(tube, numbers[0], self._heard):
+                self._alarms.alert("reference", "encoder", against)
         return known
 
     def _give_up(self, tube: int, gap: Gap) -> None:

@@ -11,6 +11,7 @@ from __future__ import annotations
 import math
 from collections import deque
 from collections.abc import Collection
+from dataclasses import replace
 
 from telemetry.messages import EPOCH_UNKNOWN, Event
 
@@ -18,6 +19,7 @@ AGAINST_THE_ENCODER = ("yaw_reset", "gyro_step", "gyro_scale")
 STARTS = ("booted", "restored")
 REJECTED = "aiding_rejected"  # the first of a row of aidings that contradict a yaw, up to its reset
 SEEN_LATER = 10.0  # s from there to a gyroscope that is found to give nothing: it gave nothing then
+OUTCOME_WITHIN = 4  # numbers after it, of which one says what came of it
 CUT_SHORT = 60.0  # s from there to a start, after which it was an outlier
 ELSEWHERE = "reference_changed"  # the yaw of a node came over other joints before
 BLIND = ("bad_sample", "gyro_saturated", "gyro_stuck")  # the gyroscope gives nothing, until the sensor has recovered
@@ -70,6 +72,20 @@ class Witnesses:
             self._elsewhere[event.tube] = event
             if nobody := self._nobody_has_watched(event, heard):
                 return nobody
+        return self._judge(heard)
+
+    def on_lost(self, tube: int, first: int, heard: Collection[int]) -> str:
+        """What a tube said from number ``first`` on is lost; says who contradicts the encoder where that is new, or ''.
+
+        If it had just begun to contradict, that its yaw was reset may be among it: what is not known is not excused.
+        """
+        rejected = self._rejected.get(tube)
+        if rejected is None or not rejected.sequence < first <= rejected.sequence + OUTCOME_WITHIN:
+            return ""
+        self._count(replace(self._rejected.pop(tube), code="yaw_reset"))
+        return self._judge(heard)
+
+    def _judge(self, heard: Collection[int]) -> str:
         found = next((one for one in self._contradicted.values() if self._speaks_against_the_encoder(one, heard)), None)
         if found is None or (told := self._together(found)) == self._told:
             return ""

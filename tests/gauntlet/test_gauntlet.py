@@ -118,6 +118,10 @@ def test_combined_seeds_hold(world: int, part: int) -> None:
         (117024, ("frozen", "node-memory-lost", "node-disk-refuses")),  # a state without a time had waited
         (144802, ("frozen", "node-memory-rots", "same-number")),  # the same
         (100342, ("gyro-step", "gyro-scale")),  # the yaw was opened at rest, and the resting encoder not heard again
+        (
+            632171,
+            ("old-receipts", "database-old", "encoder-slips"),
+        ),  # the word of a reset went with the database
         (51633, ("surveys-lost", "gyro-step")),  # a gyroscope that turned its tube while nobody corrected it
     ],
 )

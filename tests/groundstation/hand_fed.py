@@ -43,7 +43,8 @@ class Rig:
 
     def depth(self, md: float) -> None:
         """The bit is moved to a depth, and stands there from now on."""
-        self.now += 20.0 if md != self.md else 0.0
+        if md != self.md:
+            self.run(20.0)
         for _ in range(3):
             self.now += 0.5
             self.read_depth(md)

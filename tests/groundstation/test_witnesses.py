@@ -63,6 +63,24 @@ def test_a_tube_that_has_just_started_is_enough_where_the_other_has_no_gyroscope
     assert told([*BOTH_STARTED, against, event(2, 40.0, "stopped", 12)]) == []
 
 
+@pytest.mark.parametrize(
+    ("first_lost", "other", "said"),
+    [
+        (12, event(1, 120.0, "booted", 9), "tubes 2 at 100 s"),
+        (20, event(1, 120.0, "booted", 9), ""),  # what came of it was known by then
+        (12, event(1, 120.0, "stopped", 12), ""),  # the other has watched and seen nothing
+    ],
+)
+def test_a_contradiction_whose_outcome_was_lost_with_the_database_counts(
+    first_lost: int, other: Event, said: str
+) -> None:
+    witnesses = Witnesses()
+    for one in (*BOTH_STARTED, event(2, 100.0, "aiding_rejected", 11), other, event(2, 121.0, "stopped", 14)):
+        assert witnesses.on_event(one, (1, 2)) == ""
+    assert witnesses.on_lost(2, first_lost, (1, 2)) == said
+    assert witnesses.on_lost(2, first_lost, (1, 2)) == ""
+
+
 @pytest.mark.parametrize(("found_at", "said"), [(103.0, ["tubes 1 at 102 s"]), (120.0, [])])
 def test_a_gyroscope_that_sticks_as_the_encoder_slips_was_no_witness_since_it_contradicted(
     found_at: float, said: list[str]
