@@ -66,8 +66,7 @@ class Witnesses:
         elif event.code == REJECTED:
             self._rejected[event.tube] = event
         elif event.code in AGAINST_THE_ENCODER:
-            self._rejected.pop(event.tube, None)
-            self._count(event)
+            self._count(self._dated(event, self._rejected.pop(event.tube, event)))
         elif event.code == ELSEWHERE and self._was_restored(event) and not self._was_settled(event):
             self._elsewhere[event.tube] = event
             if nobody := self._nobody_has_watched(event, heard):
@@ -97,6 +96,12 @@ class Witnesses:
         self._contradicted[event.tube, 0 if start is None else start.sequence] = event
         while len(self._contradicted) > STARTS_KEPT:
             del self._contradicted[next(iter(self._contradicted))]
+
+    @staticmethod
+    def _dated(event: Event, rejected: Event) -> Event:
+        """A contradiction of a tube that does not know rig time any more is of when it began."""
+        is_undated = event.epoch == EPOCH_UNKNOWN and rejected.sequence < event.sequence
+        return replace(event, at=rejected.at, epoch=rejected.epoch) if is_undated else event
 
     def _count_what_was_cut_short(self, start: Event) -> None:
         """A tube that lost its power as it began to contradict will not go on: it takes the yaw that it is given."""

@@ -216,6 +216,7 @@ def aid_late(state: Any, config: Any, yaw: float, var: float, at: float) -> int:
             earliest = begin
         cycle -= 1
     if earliest > at + 1e-3:
+        state.last_sequence = -1  # it was not used either
         return LATE_DROPPED
     lag = state.epoch - at
     var += interpolation_var(state, cycle + 1, at)

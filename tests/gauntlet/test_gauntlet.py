@@ -122,6 +122,9 @@ def test_combined_seeds_hold(world: int, part: int) -> None:
             632171,
             ("old-receipts", "database-old", "encoder-slips"),
         ),  # the word of a reset went with the database
+        (653470, ("gyro-step", "encoder-slips", "wild-numbers")),  # its clock was gone when the yaw was reset
+        # an aiding that came too late counted as used
+        (653438, ("surveys-lost", "gyro-saturated-below", "encoder-slips", "wild-numbers")),
         (51633, ("surveys-lost", "gyro-step")),  # a gyroscope that turned its tube while nobody corrected it
     ],
 )

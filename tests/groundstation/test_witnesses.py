@@ -63,6 +63,14 @@ def test_a_tube_that_has_just_started_is_enough_where_the_other_has_no_gyroscope
     assert told([*BOTH_STARTED, against, event(2, 40.0, "stopped", 12)]) == []
 
 
+def test_a_tube_whose_clock_is_gone_contradicts_when_it_began_to() -> None:
+    """A forged answer about the time left it without an epoch before its yaw was reset."""
+    undated = event(2, 2.9e8, "yaw_reset", 12, epoch=0)
+    began = [event(tube, 100.0, "aiding_rejected") for tube in (1, 2)]
+    assert told([*BOTH_STARTED, *began, undated, event(1, 102.0, "yaw_reset", 12)]) == ["tubes 1, 2 at 100 s"]
+    assert told([*BOTH_STARTED, undated, event(1, 102.0, "yaw_reset", 12)]) == []
+
+
 @pytest.mark.parametrize(
     ("first_lost", "other", "said"),
     [

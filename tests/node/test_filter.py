@@ -269,3 +269,20 @@ def test_a_clock_error_is_found_and_taken_off_where_it_acts() -> None:
         bench.spin(60, stamp_error=error)
         assert bench.record["stamp"] == pytest.approx(-error, abs=2e-4)
         assert abs(bench.error_deg()) < 0.02
+
+
+def test_an_aiding_that_came_too_late_is_judged_when_it_is_repeated() -> None:
+    """A clock that was put wrong for a moment dates it before all that is known; the encoder at rest says it again."""
+    bench = Bench()
+    bench.stand(40)
+    bench.yaw += 10.0 * DEG  # the encoder slips
+    bench.aid(age=60.0)
+    dropped = Status.NONE
+    for _ in range(3):
+        dropped |= bench.cycle()
+    assert dropped & Status.LATE_DROPPED
+    assert bench.error_deg() == pytest.approx(-10.0, abs=0.1)
+    for _ in range(12):
+        bench.aid(fresh=False)
+        bench.cycle()
+    assert bench.error_deg() == pytest.approx(0.0, abs=0.05)

@@ -224,6 +224,7 @@ def aid_late(state: Any, config: Any, yaw: int, var: int, at: int) -> int:
             earliest = begin
         cycle -= 1
     if earliest > at + MISSED_GAP:
+        state.last_sequence = -1  # it was not used either
         return LATE_DROPPED
     lag = state.epoch - at
     var += interpolation_var(state, cycle + 1, at)
