@@ -43,8 +43,10 @@ class Rig:
 
     def depth(self, md: float) -> None:
         """The bit is moved to a depth, and stands there from now on."""
-        if md != self.md:
-            self.run(20.0)
+        for _ in range(20 if md != self.md else 0):
+            self.now += 1.0
+            for endpoint in (self.tube, self.ground.endpoint):
+                endpoint.advance(self.now)
         for _ in range(3):
             self.now += 0.5
             self.read_depth(md)
