@@ -35,6 +35,7 @@ ACK_DELAY = 0.02  # s
 SILENCE = 3.5  # s after which the other end is taken for gone
 BOOT_SHIFT = 24
 SESSION_SHIFT = 8
+SESSION_MASK = 0xFFFF
 QUALITY_WEIGHT = 1.0 / 32.0
 ACKNOWLEDGEMENT = "acknowledgement"  # topic of a frame that holds nothing else
 
@@ -188,6 +189,9 @@ class HopLink:
             self.counters["overheard"] += 1
             return []
         self.margin = margin
+        if epoch != self._peer_epoch and self._is_of_before(epoch) and self.is_up(now):
+            self.counters["stale_frames"] += 1
+            return []
         self._on_peer(sender, epoch)
         self._update_quality(number)
         self.last_heard = now
@@ -229,6 +233,16 @@ class HopLink:
     def _is_me(self, epoch: int) -> bool:
         """Whether the other end means this process and not the one before a restart, whose numbers it still uses."""
         return epoch >> BOOT_SHIFT == self._boot_count and epoch & 0xFF == self._address
+
+    def _is_of_before(self, epoch: int) -> bool:
+        """Whether an epoch is of a session that this peer has ended.
+
+        A port that was blocked hands urgent frames on first, and those of the session before after them. They would
+        have its numbers counted anew, and those of the present one never be complete.
+        """
+        same_process = epoch >> BOOT_SHIFT == self._peer_epoch >> BOOT_SHIFT and epoch & 0xFF == self._peer_epoch & 0xFF
+        since = (self._peer_epoch >> SESSION_SHIFT) - (epoch >> SESSION_SHIFT)
+        return same_process and 0 < since & SESSION_MASK <= SESSION_MASK >> 1
 
     def _on_peer(self, sender: int, epoch: int) -> None:
         """Notice another process at the other end (start our numbers anew) or its new session (forget its numbers)."""
@@ -314,7 +328,7 @@ class HopLink:
 
 def epoch_of(boot_count: int, session: int, address: int) -> int:
     """Name of a sender in its frames."""
-    return boot_count << BOOT_SHIFT | (session & 0xFFFF) << SESSION_SHIFT | address
+    return boot_count << BOOT_SHIFT | (session & SESSION_MASK) << SESSION_SHIFT | address
 
 
 def pack_frame(header: Sequence[int], entries: Sequence[Sequence[object]]) -> bytes:

@@ -108,6 +108,43 @@ def test_a_restarted_sender_is_understood_at_once() -> None:
     assert pair.got[1] == [b"one", b"two"]
 
 
+def passed(sender: HopLink, other: HopLink, now: float) -> list[bytes]:
+    """What the other end gets of what is due, where a beat goes each way before and an acknowledgement after."""
+    got: list[bytes] = []
+    for one, two, at in ((other, sender, now), (sender, other, now), (other, sender, now + ACK_DELAY)):
+        one.send_best_effort(b"beat", "beat")
+        for frame in one.take_frames(at):
+            got += [payload for payload in two.receive(frame.payload, at) if payload != b"beat"]
+    return got
+
+
+def test_a_frame_of_a_session_that_has_ended_has_no_number_counted_anew() -> None:
+    """A port that was blocked hands urgent frames on first: those of the session before come after."""
+    sender, first, second = HopLink(1, 1), HopLink(2, 1), HopLink(2, 2)
+    passed(sender, first, 100.0)
+    for payload in payloads(8):
+        sender.send_reliable(payload)
+    stale = sender.take_frames(101.0)
+    assert passed(sender, second, 101.0) == payloads(8)
+    for frame in stale:
+        assert second.receive(frame.payload, 101.1) == []
+    assert second.counters["stale_frames"] == len(stale) > 0
+    for payload in payloads(16)[8:]:
+        sender.send_reliable(payload)
+    assert passed(sender, second, 101.2) == payloads(16)[8:]
+    assert sender.waiting == 0
+
+
+def test_a_session_that_was_made_up_keeps_nobody_out_for_long() -> None:
+    peer, other = HopLink(1, 1), HopLink(2, 1)
+    passed(peer, other, 100.0)
+    forged = pack_frame(Header(1, 1 << 24 | 500 << 8 | 1, 1, other.epoch, 0, 0), [])
+    other.receive(forged, 100.1)
+    peer.send_reliable(b"kept")
+    assert passed(peer, other, 100.2) == []
+    assert passed(peer, other, 100.2 + SILENCE) == [b"kept"]
+
+
 def test_another_tube_at_the_joint_gets_what_waits() -> None:
     pair = Pair()
     pair.run(1.0)
