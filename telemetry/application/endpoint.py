@@ -18,13 +18,12 @@ from telemetry.application.outbox import Outbox
 from telemetry.application.place import Place
 from telemetry.application.saved_state import SavedState, is_needed, pack_state, parse_state
 from telemetry.application.series import Series
-from telemetry.application.standstill import Standstill
+from telemetry.application.standstill import Standstill, is_undated
 from telemetry.errors import DecodeError
 from telemetry.media.port import Frame, Priority
 from telemetry.messages import (
     BASE,
     ENCODER,
-    EPOCH_UNKNOWN,
     Aiding,
     BlockSegment,
     BlockStatus,
@@ -33,7 +32,6 @@ from telemetry.messages import (
     Kept,
     Message,
     Mode,
-    NodeFlag,
     NodeState,
     Receipt,
     Reply,
@@ -68,14 +66,6 @@ HOP_WAIT = 0.005  # s, longer by a frame's way where fewer hops are left: after 
 WAITING_HOPS = 100
 REPORT_EVERY = 60.0  # s between two looks at what queues dropped
 DROPS = ("reliable_dropped", "best_effort_dropped")  # counters of what found no place in a link's queue
-
-
-def is_undated(opened: Opened) -> bool:
-    """Whether a state does not say when it was, for its tube did not know rig time."""
-    state = decode_opened(opened)
-    return isinstance(state, NodeState) and (
-        state.epoch == EPOCH_UNKNOWN or NodeFlag.CLOCK_UNSYNCHRONISED in state.flags
-    )
 
 
 class Received(NamedTuple):
@@ -366,7 +356,8 @@ class Endpoint:
     def _handle_upward(self, opened: Opened, payload: Content, now: float) -> Message | None:
         if opened.kind is Kind.DEPTH_READING:
             raise DecodeError("depth reading: expected on its own key")
-        if opened.kind is Kind.NODE_STATE and self._standstill.may_have_waited(now) and is_undated(opened):
+        waited = opened.kind is Kind.NODE_STATE and self._standstill.may_have_waited(now)
+        if waited and is_undated(decode_opened(opened)):
             self.counters["old_states"] += 1
             return None
         if self.address != BASE:

@@ -8,6 +8,8 @@ from __future__ import annotations
 
 import math
 
+from telemetry.messages import EPOCH_UNKNOWN, Message, NodeFlag, NodeState
+
 STOOD_STILL = 2.0  # s without an event, which nobody has whose hello is due every second
 DRAINED_AFTER = 1.0  # s, in which what waited has come
 
@@ -28,3 +30,10 @@ class Standstill:
     def may_have_waited(self, now: float) -> bool:
         """Whether what comes at ``now`` (s) may have been said before the process went on."""
         return now <= self._waited_until
+
+
+def is_undated(message: Message) -> bool:
+    """Whether a message is a state that does not say when it was, for its tube did not know rig time."""
+    if not isinstance(message, NodeState):
+        return False
+    return message.epoch == EPOCH_UNKNOWN or NodeFlag.CLOCK_UNSYNCHRONISED in message.flags
