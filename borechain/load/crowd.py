@@ -36,7 +36,7 @@ from telemetry.runtime.process import Process
 from telemetry.runtime.timing import CycleTiming
 
 TUBE_LENGTH = 2.0  # m
-ABOVE = 10.0  # m, of the bit at the start above the depth that all tubes reach
+ABOVE = 10.0  # m, of the bit at the start above the depth that all tubes reach, as far as there is a hole
 ROUND_S = 120.0  # of drilling and standing, about that of a published bore
 DRILLING_S = 80.0  # of a round
 SURVEYED_AFTER_S = 22.0  # of standing
@@ -89,7 +89,7 @@ class Crowd(Process):
     def _drill(self, now: float, elapsed: float) -> None:
         number, into = divmod(elapsed, ROUND_S)
         if self._turn % max(self.tubes // 2, 1) == 0:
-            depth = TUBE_LENGTH * self.tubes - ABOVE
+            depth = max(TUBE_LENGTH * self.tubes - ABOVE, 0.0)
             depth += self.speed * (number * DRILLING_S + min(into, DRILLING_S))
             self._depth.put(encode(self._source.measure(now, depth)))
         if into >= DRILLING_S + SURVEYED_AFTER_S and self._surveyed_round <= number:

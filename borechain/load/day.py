@@ -15,6 +15,7 @@ from typing import Any
 from borechain.client import Ground, NoAnswerError
 from borechain.load.crowd import DRILLING_S, ROUND_S, SURVEYED_AFTER_S, TUBE_LENGTH, survey_of
 from borechain.load.page import ASK_EVERY_S, GROUND, HEARD_WITHIN_S, RIG, ROUNDING, figures
+from borechain.load.patience import wait_for
 from borechain.load.readers import CONNECT_S, lines
 from groundstation.config import checked_config
 from groundstation.gateway.page.settings import PageSettings
@@ -107,13 +108,13 @@ def up_to(tubes: int) -> range:
 
 def wait_for_history(ground: Ground) -> list[int]:
     """Numbers of the moments, as soon as the ground station answers."""
-    deadline = time.monotonic() + HEARD_WITHIN_S
-    while time.monotonic() < deadline:
-        try:
+
+    def look() -> list[int] | None:
+        with contextlib.suppress(NoAnswerError):
             return [int(moment["moment"]) for moment in ground.ask("history", points=1000)["moments"]]
-        except NoAnswerError:
-            time.sleep(ASK_EVERY_S)
-    raise RigError(f"the ground station has not answered within {HEARD_WITHIN_S:.0f} s")
+        return None
+
+    return wait_for(look, "the ground station has not answered", HEARD_WITHIN_S, ASK_EVERY_S)
 
 
 def first_picture(page: PageSettings) -> float:

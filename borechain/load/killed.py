@@ -6,16 +6,16 @@ import contextlib
 import random
 import time
 from collections import Counter
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
 from borechain.load.crowd import Crowd, living
+from borechain.load.patience import wait_for
 from groundstation.config import checked_config
 from groundstation.host import run_ground
 from groundstation.service.store import Store
-from sim.errors import RigError
 from sim.rig.processes import ProcessTable, Spec
 from telemetry.media.zenoh_bus import open_router
 from telemetry.messages import ENCODER
@@ -102,33 +102,18 @@ def first_receipt(crowd: Crowd, hand_over: Callable[[], None]) -> float:
 def receipts(crowd: Crowd, hand_over: Callable[[], None], wanted: int) -> None:
     """Hand over until so many more were receipted."""
     until = crowd.receipted + wanted
-    for _ in moments():
-        if crowd.receipted >= until:
-            return
-        if crowd.endpoint.outbox_size < AT_ONCE:
+
+    def are_enough() -> bool:
+        if crowd.receipted < until and crowd.endpoint.outbox_size < AT_ONCE:
             hand_over()
+        return crowd.receipted >= until
+
+    wait_until(are_enough)
 
 
 def wait_until(true: Callable[[], bool]) -> None:
-    """Look again and again."""
-    for _ in moments():
-        if true():
-            return
-
-
-def moments() -> Iterator[None]:
-    """Moments to look at, for a minute.
-
-    Raises
-    ------
-    RigError
-        After it.
-    """
-    deadline = time.monotonic() + PATIENCE_S
-    while time.monotonic() < deadline:
-        yield
-        time.sleep(LOOK_S)
-    raise RigError(f"the ground station has receipted nothing for {PATIENCE_S:.0f} s after it was killed")
+    """Look again and again at what is receipted."""
+    wait_for(lambda: true() or None, "the ground station was killed and has receipted nothing", PATIENCE_S, LOOK_S)
 
 
 def count(outcome: Outcome, url: str) -> None:

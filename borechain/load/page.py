@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import itertools
 import json
 import math
@@ -15,10 +16,10 @@ import numpy as np
 
 from borechain.client import Ground, NoAnswerError
 from borechain.load.crowd import DRILLING_S, ROUND_S, TUBE_LENGTH, Crowd, living
+from borechain.load.patience import wait_for
 from borechain.load.readers import BARE, CONNECT_S, answer_nothing, follow_keys, follow_page
 from groundstation.gateway.page.settings import PageSettings
 from groundstation.host import run_ground
-from sim.errors import RigError
 from sim.rig.processes import ProcessTable, Spec
 from sim.rig.realtime import cpu_seconds, footprint, pids
 from telemetry.media.zenoh_bus import ZenohBus, open_router
@@ -98,25 +99,23 @@ def speed_of(seconds: float) -> float:
 
 def wait_for_all(ground: Ground, tubes: int) -> None:
     """Wait until the ground station knows every tube."""
-    deadline = time.monotonic() + HEARD_WITHIN_S
-    while time.monotonic() < deadline:
-        try:
-            if len(ground.ask("string")["tubes"]) == tubes:
-                return
-        except NoAnswerError:
-            pass
-        time.sleep(ASK_EVERY_S)
-    raise RigError(f"the ground station has not heard {tubes} tubes within {HEARD_WITHIN_S:.0f} s")
+
+    def look() -> bool | None:
+        with contextlib.suppress(NoAnswerError):
+            return len(ground.ask("string")["tubes"]) == tubes or None
+        return None
+
+    wait_for(look, f"the ground station has not heard {tubes} tubes", HEARD_WITHIN_S, ASK_EVERY_S)
 
 
 def wait_for_readers(bus: ZenohBus, folder: Path, count: int) -> None:
     """Wait until each of ``count`` readers has had its first news, and the process that does nothing else answers."""
-    deadline = time.monotonic() + HEARD_WITHIN_S
-    while time.monotonic() < deadline:
-        if len(list(folder.glob(READERS))) == count and bus.get(BARE, ASK_EVERY_S):
-            return
-        time.sleep(ASK_EVERY_S)
-    raise RigError(f"browsers and terminals have not heard the ground station within {HEARD_WITHIN_S:.0f} s")
+
+    def look() -> bool | None:
+        have_heard = len(list(folder.glob(READERS))) == count
+        return True if have_heard and bus.get(BARE, ASK_EVERY_S) else None
+
+    wait_for(look, "browsers and terminals have not heard the ground station", HEARD_WITHIN_S, ASK_EVERY_S)
 
 
 def readers_of(load: Load, endpoint: str, page: PageSettings, until: float, folder: Path) -> dict[str, Spec]:
