@@ -96,7 +96,8 @@ def drill(scenario: Scenario, seed: int = 1, folder: Path | None = None) -> dict
 
 
 def _drill(scenario: Scenario, seed: int, folder: Path) -> dict[str, Any]:
-    from borechain.cli.rig.rig import Job, drill_inline, result_of
+    from borechain.cli.rig.result import result_of
+    from borechain.cli.rig.rig import Job, drill_inline
     from sim.rig.launcher import prepare_folder
     from sim.world.world import World
 

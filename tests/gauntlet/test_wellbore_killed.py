@@ -5,7 +5,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from borechain.cli.rig.rig import ground_settings
+from borechain.cli.rig.ground_settings import ground_settings
 from borechain.gauntlet.oracles import Observer
 from borechain.gauntlet.rig import GauntletRig
 from sim.gauntlet.disk import FaultyDisk

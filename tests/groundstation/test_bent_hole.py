@@ -12,7 +12,7 @@ import pytest
 from schemas import check_answers
 from test_model import survey
 
-from borechain.cli.rig.rig import ground_settings
+from borechain.cli.rig.ground_settings import ground_settings
 from borechain.inline import InlineRig
 from groundstation.config import GroundConfig
 from groundstation.service import measurement_views, views

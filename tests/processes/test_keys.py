@@ -7,7 +7,8 @@ from pathlib import Path
 
 from rigs import REPOSITORY, free_endpoint, running_rig
 
-from borechain.cli.rig.rig import ground_settings, result_of
+from borechain.cli.rig.ground_settings import ground_settings
+from borechain.cli.rig.result import result_of
 from borechain.inline import InlineRig
 from borechain.pki.rig_keys import add_tube, init_rig, rotate_keys
 from sim.rig.scheduler import Progress

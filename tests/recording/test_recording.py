@@ -18,7 +18,7 @@ from schemas import check_answers
 from tapes import INTAKE, KEY, shown, write
 
 from borechain.cli.ground.record import replay as replay_command
-from borechain.cli.rig.rig import ground_settings
+from borechain.cli.rig.ground_settings import ground_settings
 from borechain.inline import InlineRig
 from borechain.recording.files import NAME, Recording, RecordingError, RecordingWriter, Sample
 from borechain.recording.replay import replay_file

@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from borechain.cli.rig.rig import ground_settings
+from borechain.cli.rig.ground_settings import ground_settings
 from borechain.inline import InlineRig
 from node.process.tube_process import TubeProcess
 from sim.rig.scheduler import Progress

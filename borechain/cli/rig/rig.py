@@ -4,11 +4,10 @@ from __future__ import annotations
 
 import contextlib
 import json
-import math
 import sys
 import tempfile
 import time
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import partial
 from importlib.util import find_spec
@@ -20,7 +19,9 @@ import click
 from borechain.cli.faults import EnvironmentFault, InputFault, needs, plain_faults
 from borechain.cli.notices import warnings_in_lines
 from borechain.cli.options import fault_option, json_option, scenario_argument, seed_option, speed_option
-from borechain.cli.tables import console
+from borechain.cli.rig.ground_settings import ground_settings
+from borechain.cli.rig.progress import progress
+from borechain.cli.rig.result import ASKED, ask, get_json, lacking, result_of, selector_of, show_result
 from borechain.crew.log import RunLog
 from groundstation.page_options import page_options, page_settings
 from telemetry import keys
@@ -36,8 +37,6 @@ if TYPE_CHECKING:
     from sim.world.world import World
     from telemetry.media.zenoh_bus import ZenohBus
 
-NAMED = 5  # surveys named that are missing
-ASKED = ("stations", "measurements", "column", "alarms", "recalibration", "wall")
 PRELOAD = {"float64": "borechain.warm", "fixed": "borechain.warm_all", "published": "borechain.warm_all"}  # by kernel
 
 
@@ -262,13 +261,6 @@ def say(line: str) -> None:
     sys.stdout.flush()
 
 
-def lacking(missing: list[dict[str, Any]], measured: int, folder: Path) -> str:
-    """Line about surveys that the stops of a run asked for and nobody has."""
-    named = ", ".join(f"tube {row['tube']} at {row['bit_md_m']:g} m of the bit" for row in missing[:NAMED])
-    more = f" and {len(missing) - NAMED} more" if len(missing) > NAMED else ""
-    return f"expected {measured + len(missing)} surveys, {len(missing)} are missing: {named}{more}; files in {folder}"
-
-
 @dataclass(frozen=True, slots=True)
 class Ran:
     """A rig that has finished: what its ground station answered, and what ran."""
@@ -385,163 +377,3 @@ def operator_of(world: World, rig_name: str) -> Callable[[ZenohBus, str], Acted]
 def settings_of(world: World, job: Job) -> dict[str, Any]:
     """Settings of the ground station, with the wall of which the hole is a column."""
     return ground_settings(world) | ({"wall": job.wall, "hole": job.hole} if job.wall is not None else {})
-
-
-def ground_settings(world: World) -> dict[str, Any]:
-    """What the operator enters at the ground station: tally, design, and what calibration left."""
-    file = world.scenario.file
-    return {
-        "tube_length": world.scenario.tube_length,
-        "gravity": file.accelerometer.gravity_mps2,
-        "accelerometer_bias_std_deg": file.accelerometer.bias_std_deg,
-        "mount_std_deg": file.joints.mount_std_deg,
-        "target": file.design.length_m or world.scenario.tubes * world.scenario.tube_length,
-        "design_inclination_deg": file.design.inclination_deg,
-        "design_azimuth_deg": file.design.azimuth_deg,
-        "column_radius": file.design.radius_m,
-        "tolerance": file.design.tolerance,
-    } | transport_settings(world)
-
-
-def transport_settings(world: World) -> dict[str, Any]:
-    """What the operator enters where the string turns in a bent hole: that it does, and how the hole begins."""
-    rough = world.scenario.file.rough
-    if rough is None or rough.string.transport == "shortest":
-        return {}
-    inclination, azimuth = world.scenario.hole.direction(0.0)
-    return {
-        "string_transport": rough.string.transport,
-        "collar_inclination_deg": math.degrees(inclination),
-        "collar_azimuth_deg": math.degrees(azimuth),
-    }
-
-
-def ask(bus: ZenohBus, rig_name: str) -> dict[str, Any]:
-    """Stations, trajectory and measurements as any operator would get them."""
-    return {path: get_json(bus, selector_of(rig_name, path)) for path in ASKED}
-
-
-def selector_of(rig_name: str, path: str, parameters: Mapping[str, str] | None = None) -> str:
-    """Selector of an answer of the ground station."""
-    asked = ";".join(f"{name}={value}" for name, value in (parameters or {}).items())
-    return f"borechain/{rig_name}/ground/{path}" + (f"?{asked}" if asked else "")
-
-
-def get_json(bus: ZenohBus, selector: str) -> Any:
-    """One reply of the ground station."""
-    from sim.errors import RigError
-
-    replies = bus.get(selector, timeout=10.0)
-    if len(replies) != 1 or replies[0].error is not None:
-        raise RigError(f"{selector}: expected one answer of the ground station, got {len(replies)}")
-    return json.loads(replies[0].payload)
-
-
-def result_of(answers: dict[str, Any], world: World) -> dict[str, Any]:
-    """The JSON object of the command."""
-    from sim.rig.calibration_report import calibration
-    from sim.rig.report import digest, figures, missing_surveys, station_table
-
-    stations = station_table(answers["stations"]["stations"], world)
-    measurements = answers["measurements"]["measurements"]
-    result: dict[str, Any] = {
-        "stations": stations,
-        "figures": figures(stations, measurements, world),
-        "measurements": len(measurements),
-        "column": {key: answers["column"][key] for key in ("worst", "projection", "dominant")},
-        "missing": missing_surveys(measurements, world),
-        "alarms": answers["alarms"]["active"],
-        "rig_alarms": answers["alarms"]["rig"],
-        "rig_s": round(world.end - world.begin, 3),
-        "digest": digest(stations),
-    }
-    if "wall" in answers:
-        result["wall"] = answers["wall"]["wall"]
-    if world.rack is not None:
-        result["calibration"] = calibration(answers["recalibration"], measurements, world)
-    return result
-
-
-class progress:  # noqa: N801
-    """Progress bar on stderr, silent for scripts."""
-
-    def __init__(self, world: World, *, quiet: bool) -> None:
-        from rich.console import Console
-        from rich.progress import BarColumn, Progress, TextColumn, TimeRemainingColumn
-
-        self._bar = Progress(
-            TextColumn("{task.description:<16}"),
-            BarColumn(),
-            TextColumn("{task.completed:.0f}/{task.total:.0f} s of rig time"),
-            TimeRemainingColumn(),
-            console=Console(stderr=True),
-            disable=quiet,
-        )
-        self._task = self._bar.add_task("starting", total=world.end - world.begin)
-
-    def __enter__(self) -> Callable[[Tick | Progress], None]:
-        self._bar.start()
-        return self._show
-
-    def __exit__(self, *_: object) -> None:
-        self._bar.stop()
-
-    def _show(self, tick: Tick | Progress) -> None:
-        self._bar.update(self._task, completed=tick.rig_time - tick.begin, description=tick.phase)
-
-
-def show_result(result: dict[str, Any], folder: Path) -> None:
-    """Station table beside the truth, and the figures, for people."""
-    from rich.table import Table
-
-    paper = console(100)
-    table = Table(title="Stations: measured, below it the truth")
-    for name in ("#", "MD m", "looks", "incl deg", "azi deg", "north m", "east m", "TVD m", "sigma N cm", "sigma E cm"):
-        table.add_column(name, justify="right")
-    for s in result["stations"]:
-        t = s["truth"]
-        lines = [
-            f"{s[key]:.{digits}f}\n[dim]{t[key]:.{digits}f}[/dim]"
-            for key, digits in (("inclination_deg", 3), ("azimuth_deg", 2), ("north_m", 4), ("east_m", 4), ("tvd_m", 4))
-        ]
-        sigmas = [f"{100.0 * s[key]:.3f}" for key in ("sigma_north_m", "sigma_east_m")]
-        table.add_row(str(s["station"]), f"{s['md_m']:.2f}", str(s["measurements"]), *lines, *sigmas)
-    paper.print(table)
-    for name, value in result["figures"].items():
-        values = value if isinstance(value, list) else [value]
-        shown = " ".join("-" if v is None else f"{v:.4f}" for v in values)
-        paper.print(f"{name:22} {shown}")
-    show_column(result)
-    for alarm in result["rig_alarms"]:
-        click.echo(f"alarm  {alarm['code']:15} {alarm['subject']}: {alarm['detail']}")
-    if "calibration" in result:
-        show_calibration(result["calibration"])
-    processes = "one process" if result["processes"] == 1 else f"{result['processes']} processes"
-    paper.print(
-        f"{len(result['stations'])} stations, {result['measurements']} measurements, {processes}, "
-        f"{result['rig_s']:.0f} s of rig time in {result['wall_s']:.1f} s"
-    )
-    paper.print(f"digest {result['digest']}\nfiles  {folder}", soft_wrap=True)
-
-
-def show_column(result: dict[str, Any]) -> None:
-    """Where the column is against its design, in a line each."""
-    for name in ("worst", "projection"):
-        d = result["column"][name]
-        if d is not None:
-            click.echo(
-                f"column {name:15} {d['deviation_cm']:.1f} ± {d['sigma_cm']:.2f} cm "
-                f"towards {d['direction_deg']:.0f} deg at {d['md_m']:.1f} m, {d['used_percent']:.0f} % of the tolerance"
-            )
-    for alarm in result["alarms"]:
-        click.echo(f"alarm  {alarm['kind']:15} {alarm['level_percent']} % of the tolerance at {alarm['md_m']:.1f} m")
-
-
-def show_calibration(calibration: dict[str, Any]) -> None:
-    """What the calibration in the field was good for, and the block of each tube."""
-    errors = calibration["inclination_rms_deg"]
-    shown = ", ".join(f"{name} {'-' if value is None else f'{value:.4f}'}" for name, value in errors.items())
-    click.echo(f"calibration, inclination_rms_deg: {shown}")
-    for t in calibration["tubes"]:
-        cut = f", after its power cut {t['hash_after_restart'][:8]}" if t["restarted"] else ""
-        click.echo(f"tube {t['tube']:<3} block {t['hash_before'][:8]} -> {t['hash'][:8]} version {t['version']}{cut}")
