@@ -20,7 +20,6 @@ from borechain.gauntlet.sight import Sight
 from sim.gauntlet.kinds import KINDS
 from sim.gauntlet.plan import drawn_kinds, steps_of
 from sim.rig.report import digest
-from telemetry.messages import BASE
 
 ALL = tuple(kind.name for kind in KINDS)
 USUAL = "minute"
@@ -99,13 +98,12 @@ def _run(rig: GauntletRig, outcome: Outcome) -> None:
     outcome.alarms = sorted({code for code, _, _, standing in rows if standing})
     outcome.cleared = sorted({code for code, _, _, standing in rows if not standing})
     outcome.measurements = len(rig.inline.ask("measurements")["measurements"])
-    has_words = not (rig.disk(BASE).handled and "numbers_missing" in outcome.alarms)  # of tubes, that are not lost
     outcome.violations = [
         *observer.found,
         *violations(
             rig,
             observer.told,
-            encoder_can_be_judged=(is_of_few or (sight.has_seen and has_words)) and not sight.nobody_could_know,
+            encoder_can_be_judged=(is_of_few or sight.has_seen) and not sight.nobody_could_know,
             depth_can_be_judged=is_of_few or not sight.has_believed_a_wrong_depth,
         ),
     ]

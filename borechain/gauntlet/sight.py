@@ -1,9 +1,8 @@
 """Whether anything on the rig could have shown that the encoder, or the depth, was wrong.
 
 That the encoder slipped shows only against a gyroscope that ran through it. Where three faults or more leave none, a
-slip is a turn of the string to everything that measures, and no alarm can be asked for. So it is where three or more
-leave one, and what it said was lost with a database that somebody took back: the crew is told which numbers. A depth
-that is wrong shows against one that was known before: not to a ground station that starts then upon such a database.
+slip is a turn of the string to everything that measures, and no alarm can be asked for. A depth that is wrong shows
+against one that was known before: not to a ground station that starts then upon a database that somebody took back.
 """
 
 from __future__ import annotations

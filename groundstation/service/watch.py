@@ -17,6 +17,7 @@ from telemetry.application.series import SERIES_SHIFT
 from telemetry.messages import EPOCH_UNKNOWN, Event, Mode, NodeFlag, NodeState, SurveyMeasurement
 
 LOOK_EVERY = 0.5  # s, own clock
+DOUBTING_VAR = math.radians(5.0) ** 2  # rad^2, systematic, of a yaw that may have jumped
 AHEAD = 0.5  # s by which a node's rig time may be ahead of the ground station's
 PLACED_WITHIN = 5.0  # s of rig time after which a survey without a depth is told
 GAP_AFTER = 30.0  # s that a number may be on its way
@@ -185,7 +186,9 @@ class Watch:
         known.numbers = numbers
         if now >= known.found_at + GAP_AFTER:
             self._alarms.hold("numbers_missing", f"tube {tube}", f"numbers {numbers[0]} to {numbers[1]}")
-            if against := self._witnesses.on_lost(tube, numbers[0], self._heard):
+            state = self._model.nodes.get(tube)
+            doubts = state is not None and state.systematic_var >= DOUBTING_VAR
+            if against := self._witnesses.on_lost(tube, numbers, self._heard, doubts=doubts):
                 self._alarms.alert("reference", "encoder", against)
         return known
 

@@ -30,6 +30,7 @@ ENOUGH = 2  # tubes
 STARTS_KEPT = 1000
 EPOCHS_KEPT = 100
 OFF_BEFORE = 30.0  # s before a start in which a tube may have been without power
+SAID_KEPT = 50  # of a tube
 TIMES_KEPT = 20  # of a tube and epoch
 Times = dict[tuple[int, int], deque[tuple[float, float]]]  # s, rig time, by tube and epoch
 
@@ -45,6 +46,7 @@ class Witnesses:
         self._blind: Times = {}  # without a gyroscope
         self._rejected: dict[int, Event] = {}  # newest row of contradictions without an outcome, by tube
         self._elsewhere: dict[int, Event] = {}  # newest start upon a yaw of another place, by tube
+        self._said: dict[int, deque[Event]] = {}  # newest events, by tube
         self._told: tuple[Event, ...] = ()
         self._spans: dict[int, tuple[float, float]] = {}  # s, first and last event of each epoch
 
@@ -52,6 +54,7 @@ class Witnesses:
         """Handle an event while these tubes are heard; says who contradicts the encoder where that is new, or ''."""
         place = event.tube, event.epoch
         self._add_to_span(event)
+        self._said.setdefault(event.tube, deque(maxlen=SAID_KEPT)).append(event)
         if event.code in STARTS:
             self._starts.append(event)
             _add_time(self._off, place, event.at - OFF_BEFORE, event.at)
@@ -73,15 +76,19 @@ class Witnesses:
                 return nobody
         return self._judge(heard)
 
-    def on_lost(self, tube: int, first: int, heard: Collection[int]) -> str:
-        """What a tube said from number ``first`` on is lost; says who contradicts the encoder where that is new, or ''.
+    def on_lost(self, tube: int, lost: tuple[int, int], heard: Collection[int], *, doubts: bool) -> str:
+        """Messages of a tube are lost, the first and last by number; says who contradicts the encoder where it is new.
 
-        If it had just begun to contradict, that its yaw was reset may be among it: what is not known is not excused.
+        That its yaw was reset may be among them, if it had just begun to contradict, or ``doubts`` its yaw by now. What
+        is not known is not excused.
         """
         rejected = self._rejected.get(tube)
-        if rejected is None or not rejected.sequence < first <= rejected.sequence + OUTCOME_WITHIN:
+        if rejected is not None and rejected.sequence < lost[0] <= rejected.sequence + OUTCOME_WITHIN:
+            self._count(replace(self._rejected.pop(tube), code="yaw_reset"))
+        elif doubts and (after := next((e for e in self._said.get(tube, ()) if e.sequence > lost[1]), None)):
+            self._count(replace(after, code="yaw_reset"))
+        else:
             return ""
-        self._count(replace(self._rejected.pop(tube), code="yaw_reset"))
         return self._judge(heard)
 
     def _judge(self, heard: Collection[int]) -> str:

@@ -85,8 +85,25 @@ def test_a_contradiction_whose_outcome_was_lost_with_the_database_counts(
     witnesses = Witnesses()
     for one in (*BOTH_STARTED, event(2, 100.0, "aiding_rejected", 11), other, event(2, 121.0, "stopped", 14)):
         assert witnesses.on_event(one, (1, 2)) == ""
-    assert witnesses.on_lost(2, first_lost, (1, 2)) == said
-    assert witnesses.on_lost(2, first_lost, (1, 2)) == ""
+    assert witnesses.on_lost(2, (first_lost, 13), (1, 2), doubts=False) == said
+    assert witnesses.on_lost(2, (first_lost, 13), (1, 2), doubts=False) == ""
+
+
+@pytest.mark.parametrize(
+    ("doubts", "other", "said"),
+    [
+        (True, event(1, 120.0, "booted", 9), "tubes 2 at 121 s"),
+        (False, event(1, 120.0, "booted", 9), ""),
+        (True, event(1, 120.0, "stopped", 12), ""),  # the other has watched and seen nothing
+    ],
+)
+def test_a_tube_that_doubts_its_yaw_contradicts_where_its_words_are_lost(doubts: bool, other: Event, said: str) -> None:
+    witnesses = Witnesses()
+    for one in (*BOTH_STARTED, event(2, 90.0, "stopped", 9), other, event(2, 121.0, "stopped", 14)):
+        assert witnesses.on_event(one, (1, 2)) == ""
+    for _ in range(2):
+        assert witnesses.on_lost(2, (10, 13), (1, 2), doubts=doubts) == said
+        said = ""
 
 
 @pytest.mark.parametrize(("found_at", "said"), [(103.0, ["tubes 1 at 102 s"]), (120.0, [])])
