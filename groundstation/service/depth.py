@@ -75,6 +75,7 @@ class Doubt:
 
     trusted: tuple[int, float, float] | None = None  # epoch, time and depth (m) of the last reading before a jump
     accepted: Instant = NEVER  # at which the crew accepted the depth
+    times: tuple[Stand, ...] = ()  # of which no stand is believed; the last has no end while a jump lasts
 
 
 class DepthLog:
@@ -120,6 +121,8 @@ class DepthLog:
         if reason:
             self.refusals[reason] += 1
             return reason
+        if self._doubtful and self._doubtful[-1].ended_at == math.inf:  # it had no end at the last start
+            self._doubtful[-1] = replace(self._doubtful[-1], ended_at=reading.at)
         self._trusted = (epoch, reading.at, reading.md)
         self._track(epoch).append_reading(reading.at, reading.md)
         return ""
@@ -157,11 +160,15 @@ class DepthLog:
     @property
     def doubt(self) -> Doubt:
         """What is to be kept beside the stands."""
-        return Doubt(self._trusted if self.jumped else None, self._accepted)
+        times = tuple(self._doubtful)
+        if self.jumped and times:
+            times = (*times[:-1], replace(times[-1], ended_at=math.inf))
+        return Doubt(self._trusted if self.jumped else None, self._accepted, times)
 
     def recall(self, doubt: Doubt) -> None:
         """Go on with what was kept, before any stand is believed."""
         self._accepted = doubt.accepted
+        self._doubtful.extend(doubt.times)
         if doubt.trusted is not None:
             self.jumped = f"from {doubt.trusted[2]:.2f} m, before the ground station's start"
             self._raw = self._trusted = doubt.trusted

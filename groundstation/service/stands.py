@@ -22,7 +22,7 @@ def take_stand(depths: DepthLog, stops: Stops, stand: Stand) -> None:
         whole = replace(stand, begun_at=before.pop().begun_at)
     if stand not in depths.stands:
         return
-    is_stop = before[-1].md < stand.md if before else stops.know(whole)
+    is_stop = before[-1].md < stand.md if before else stops.know(whole) or stops.was_surveyed(whole)
     if is_stop:
         stops.on_stand(whole)
     elif before and before[-1].md == stand.md:

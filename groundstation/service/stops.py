@@ -15,11 +15,12 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from groundstation.service.tally import Tally
-from telemetry.messages import Stand
+from telemetry.messages import EPOCH_UNKNOWN, Stand
 
 SHORTEST = 30.0  # s that a stand must last for its survey to be owed
 AROUND = 2.0  # s by which the times of a survey and of a stand may differ
 IN_THE_HOLE = 0.01  # m below the collar from which a node owes a survey
+SETTLED = 5.0  # s into an epoch of rig time in which those are heard who hung at a stop of an earlier one
 STOPS_KEPT = 1000
 SURVEYS_KEPT = 200_000
 
@@ -109,6 +110,7 @@ class Stops:
         self._stops: list[Stop] = []
         self._owed: list[Stop] = []  # those that a survey is missing of
         self._taken = Taken()
+        self._epoch, self._epoch_since = EPOCH_UNKNOWN, math.nan  # s of rig time, first judged at
 
     def __iter__(self) -> Iterator[Stop]:
         return iter(self._stops)
@@ -124,6 +126,10 @@ class Stops:
     def know(self, stand: Stand) -> bool:
         """Whether a stand is that of a stop, or more of it."""
         return any(_same(stop.stand, stand) for stop in self._stops)
+
+    def was_surveyed(self, stand: Stand) -> bool:
+        """Whether a survey has come that was taken during a stand."""
+        return bool(self._taken.tubes_of(Stop(stand, ())))
 
     def on_stand(self, stand: Stand) -> None:
         """A stand has begun, or lasted longer; the tubes are those that are known to hang while it lasts."""
@@ -143,11 +149,16 @@ class Stops:
             self._add_tubes(known)
 
     def judge(self, epoch: int, rig_now: float) -> None:
-        """Find what is overdue at ``rig_now`` (s)."""
-        for stop in self._stops:
-            if stop.judged or stop.lasted < SHORTEST or stop.age(epoch, rig_now) < self._due:
+        """Find what is overdue at ``rig_now`` (s); nothing is while no tube is known that could owe it."""
+        if epoch != self._epoch or math.isnan(self._epoch_since):
+            self._epoch, self._epoch_since = epoch, rig_now
+        is_new = not rig_now >= self._epoch_since + SETTLED
+        for stop in self._stops if self._tally.tubes else ():
+            age = stop.age(epoch, rig_now)
+            if stop.judged or stop.lasted < SHORTEST or age < self._due or (is_new and age == math.inf):
                 continue
             stop.judged = True
+            stop.tubes = stop.tubes or tuple(self._in_the_hole(stop.stand.md))
             stop.missing = set(stop.tubes) - self._taken.tubes_of(stop)
             self._owed += [stop] if stop.missing else []
         del self._owed[:-STOPS_KEPT]

@@ -11,7 +11,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import astuple, dataclass
 from typing import Any
 
 import sqlalchemy as sa
@@ -146,25 +146,29 @@ class Store(Database):
             self._replace_meta(connection, {"epoch": str(epoch)})
 
     def keep_depth_doubt(self, doubt: Doubt) -> None:
-        """Store since when depths are refused, and when the crew accepted one."""
+        """Store since when depths are refused, when the crew accepted one, and of which times none is believed."""
         values = {"depth_accepted": _numbers(*doubt.accepted)}
         if doubt.trusted is not None:
             values["depth_trusted"] = _numbers(*doubt.trusted)
+        if doubt.times:
+            values["depth_doubted"] = "; ".join(_numbers(*astuple(stand)) for stand in doubt.times)
         with self._writing() as connection:
-            self._replace_meta(connection, values, without=["depth_trusted"])
+            self._replace_meta(connection, values, without=["depth_trusted", "depth_doubted"])
 
     def depth_doubt(self) -> Doubt:
-        """Since when depths have been refused, and when the crew accepted one."""
+        """What was kept last of what is doubtful of the depth."""
         with self._refusing():
             meta = self._meta()
-        trusted, accepted = meta.get("depth_trusted"), meta.get("depth_accepted")
+        trusted, accepted, times = (meta.get(f"depth_{name}") for name in ("trusted", "accepted", "doubted"))
         try:
             return Doubt(
-                None if trusted is None else _reading_of(trusted), NEVER if accepted is None else _instant_of(accepted)
+                None if trusted is None else _reading_of(trusted),
+                NEVER if accepted is None else _instant_of(accepted),
+                () if times is None else tuple(map(_stand_of, times.split(";"))),
             )
         except ValueError as error:
             raise StoreError(
-                f"database {self._where}: expected numbers of the depth, got {trusted!r} and {accepted!r}"
+                f"database {self._where}: expected numbers of the depth, got {trusted!r}, {accepted!r} and {times!r}"
             ) from error
 
     def keep_joints(self, joints: Mapping[Pair, Joint]) -> None:
@@ -266,6 +270,11 @@ def _reading_of(text: str) -> tuple[int, float, float]:
 def _instant_of(text: str) -> Instant:
     epoch, at = text.split()
     return int(epoch), float(at)
+
+
+def _stand_of(text: str) -> Stand:
+    epoch, begun_at, ended_at, md = text.split()
+    return Stand(int(epoch), float(begun_at), float(ended_at), float(md))
 
 
 def row_of(message: Kept, payload: bytes) -> dict[str, Any]:

@@ -125,6 +125,12 @@ def test_combined_seeds_hold(world: int, part: int) -> None:
         (653470, ("gyro-step", "encoder-slips", "wild-numbers")),  # its clock was gone when the yaw was reset
         # an aiding that came too late counted as used
         (653438, ("surveys-lost", "gyro-saturated-below", "encoder-slips", "wild-numbers")),
+        # a stand of a time that was doubtful before the ground station's start
+        (1010316, ("ground-cut", "depth-jumps-down", "depth-backwards")),
+        # the first stand was a stop, which was kept shorter than it was
+        (1000528, ("encoder-from-zero", "ground-cut", "old-receipts", "database-deleted")),
+        # a stop was judged in the moment of another epoch, before any tube was known
+        (1002690, ("encoder-cut", "bytes-rot", "folders-swapped", "database-deleted")),
         (51633, ("surveys-lost", "gyro-step")),  # a gyroscope that turned its tube while nobody corrected it
     ],
 )

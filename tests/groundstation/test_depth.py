@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 from groundstation.service.depth import DepthLog, Track
 from telemetry.application.depth_source import DepthSource
 from telemetry.errors import EncodeError
-from telemetry.messages import DepthReading, Stand
+from telemetry.messages import EPOCH_UNKNOWN, DepthReading, Stand
 from telemetry.presentation.msgpack_codec import decode, encode
 from telemetry.quantities import MAX_STANDS
 
@@ -157,8 +157,31 @@ def test_a_stand_of_the_time_of_a_jump_is_not_believed_when_the_depth_has_return
     assert bit.read(2.0) == ""
     assert bit.stand(10.0) > at
     bit.hear_stands()
-    assert [stand.md for stand in bit.log.stands] == [2.0]
+    assert [stand.md for stand in bit.log.stands] == [0.1, 2.0]  # where the source met the bit, and where it is
     assert bit.log.at(EPOCH, at) is None
+
+
+@pytest.mark.parametrize("ends", ["before the start", "after the start", "by the crew"])
+def test_a_doubtful_time_stays_doubtful_over_a_start(ends: str) -> None:
+    bit = Bit()
+    bit.move_to(2.0)
+    bit.now += CYCLE
+    assert bit.read(3.0) == "after a jump"
+    at = bit.stand(30.0)
+    wrong = Stand(EPOCH, at - 10.0, at + 10.0, 3.0)
+    if ends == "before the start":
+        bit.now += CYCLE
+        assert bit.read(2.0) == ""
+    doubt, bit.log = bit.log.doubt, DepthLog(0.5, 5.0)
+    bit.log.recall(doubt)
+    if ends == "by the crew":
+        bit.log.accept()
+    bit.now += CYCLE
+    assert bit.read(2.0) == ""
+    assert not bit.log.add_stand(wrong)
+    later = bit.stand(10.0)
+    assert bit.log.doubt.times[-1].ended_at < later
+    assert bit.log.add_stand(Stand(EPOCH, later - 1.0, later + 1.0, 2.0))
 
 
 def test_two_stands_that_contradict_each_other_are_both_doubtful_and_the_present_is_a_jump() -> None:
@@ -241,6 +264,20 @@ def test_whatever_the_bit_does_a_depth_that_is_known_is_the_right_one(moves: lis
         known = bit.log.at(EPOCH, 0.5 * (t0 + t1))
         assert known is not None
         assert min(d0, d1) - 1e-9 <= known <= max(d0, d1) + 1e-9
+
+
+@pytest.mark.parametrize("epoch", [EPOCH_UNKNOWN, EPOCH + 1])
+def test_a_source_tells_where_it_met_the_bit_in_each_epoch(epoch: int) -> None:
+    """Without an epoch what was before cannot be told any more: rig time counts anew."""
+    source, first = DepthSource(), EPOCH_UNKNOWN if epoch == EPOCH_UNKNOWN else EPOCH
+    assert source.measure(100.0, 2.0, first).stands == (Stand(first, 100.0, 100.0, 2.0),)
+    source.measure(100.5, 2.1, first)
+    before = source.measure(101.0, 2.1, first).stands
+    assert before == (Stand(first, 100.0, 100.0, 2.0), Stand(first, 100.5, 101.0, 2.1))
+    for at, md in ((5.0, 2.2), (5.5, 2.3)):
+        source.measure(at, md, epoch)
+    now = (Stand(epoch, 5.0, 5.0, 2.2), Stand(epoch, 5.5, 6.0, 2.3))
+    assert source.measure(6.0, 2.3, epoch).stands == (now if epoch == EPOCH_UNKNOWN else (*before, *now))
 
 
 def test_a_reading_with_all_its_stands_travels() -> None:

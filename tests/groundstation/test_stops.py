@@ -1,7 +1,11 @@
 """Which surveys a stop owes, however its stands were heard of."""
 
+import math
+
 import pytest
 
+from groundstation.service.depth import DepthLog
+from groundstation.service.stands import take_stand, take_survey
 from groundstation.service.stops import Stops
 from groundstation.service.tally import Tally
 from telemetry.messages import Stand
@@ -93,6 +97,44 @@ def test_a_tube_that_is_heard_first_after_a_start_of_the_encoder_owes_the_survey
     stops.on_later_stand(FIRST, LATER)
     stops.on_survey(3, 39.0, 1)
     stops.judge(3, 41.0)
+    assert missing(stops) == {2}
+
+
+def test_a_stop_is_judged_when_somebody_is_known_who_could_owe_its_survey() -> None:
+    """A ground station that lost its database, and hears of nobody till the encoder starts again."""
+    known = Tally(2.0)
+    stops = Stops(known, DUE)
+    stops.on_stand(Stand(2, 1000.0, 1040.0, 4.0))
+    stops.judge(2, 1040.0)
+    for at in (7.0, 20.0):
+        stops.judge(3, at)
+    assert not any(stop.judged for stop in stops)
+    known.on_hops(2, 1)
+    known.on_hops(1, 2)
+    stops.judge(3, 21.0)
+    assert missing(stops) == {1, 2}
+
+
+def test_the_tubes_of_a_stop_of_before_are_heard_first(tally: Tally) -> None:
+    stops = Stops(tally, DUE)
+    stops.on_stand(Stand(2, 1000.0, 1040.0, 4.0))
+    stops.judge(2, 1040.0)
+    stops.judge(3, math.nan)
+    stops.judge(3, 7.0)
+    assert missing(stops) == set()
+    stops.judge(3, 12.0)
+    assert missing(stops) == {1, 2}
+
+
+def test_the_first_stand_is_a_stop_as_soon_as_it_has_lasted_till_a_survey_in_it(tally: Tally) -> None:
+    """It was stored when it began, and the survey before the ground station's start."""
+    depths, stops = DepthLog(0.5, 5.0), Stops(tally, DUE)
+    take_stand(depths, stops, Stand(3, 10.0, 10.5, 4.0))
+    stops.on_survey(3, 30.0, 1)
+    take_survey(depths, stops, 3, 30.0)
+    assert list(stops) == []
+    take_stand(depths, stops, Stand(3, 10.0, 71.0, 4.0))
+    stops.judge(3, 71.0)
     assert missing(stops) == {2}
 
 

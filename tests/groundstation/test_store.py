@@ -1,5 +1,6 @@
 """The store on a real file, killed in the middle of its work."""
 
+import math
 import os
 import signal
 import sqlite3
@@ -224,20 +225,28 @@ def test_another_schema_is_refused(tmp_path: Path) -> None:
 
 def test_what_is_doubtful_of_the_depth_is_kept(tmp_path: Path) -> None:
     url = f"sqlite:///{tmp_path / 'ground.sqlite'}"
-    for doubt in (Doubt(), Doubt((1, 1e9 + 0.1, 3.25)), Doubt((2, 0.1, 1 / 3), (1, 2.5)), Doubt(None, (2, 1 / 3))):
+    times = (Stand(1, 0.1, math.inf, 1 / 3), Stand(2, -math.inf, 1e9 + 0.1, 3.25))
+    for doubt in (
+        Doubt(),
+        Doubt((1, 1e9 + 0.1, 3.25)),
+        Doubt((2, 0.1, 1 / 3), (1, 2.5)),
+        Doubt(None, (2, 1 / 3), times),
+        Doubt(None, (2, 1 / 3)),
+    ):
         with closing(Store(url)) as store:
             store.keep_depth_doubt(doubt)
         with closing(Store(url)) as store:
             assert store.depth_doubt() == doubt
 
 
-@pytest.mark.parametrize("text", ["", "1 2", "1 2 x", "a 2.0 3.0"])
-def test_a_doubt_that_cannot_be_read_from_the_database_is_one_plain_error(tmp_path: Path, text: str) -> None:
+@pytest.mark.parametrize("name", ["trusted", "doubted"])
+@pytest.mark.parametrize("text", ["", "1 2", "1 2 x", "a 2.0 3.0", "1 2.0 3.0 4.0; 5"])
+def test_a_doubt_that_cannot_be_read_from_the_database_is_one_plain_error(tmp_path: Path, name: str, text: str) -> None:
     url = f"sqlite:///{tmp_path / 'ground.sqlite'}"
     with closing(Store(url)) as store:
-        store.keep_depth_doubt(Doubt((1, 2.0, 3.0)))
+        store.keep_depth_doubt(Doubt((1, 2.0, 3.0), times=(Stand(1, 2.0, 3.0, 4.0),)))
     with closing(sqlite3.connect(tmp_path / "ground.sqlite")) as database, database:
-        database.execute("update meta set value = ? where name = 'depth_trusted'", (text,))
+        database.execute("update meta set value = ? where name = ?", (text, f"depth_{name}"))
     with closing(Store(url)) as store, pytest.raises(StoreError, match="expected numbers of the depth"):
         store.depth_doubt()
 
