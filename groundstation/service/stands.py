@@ -8,11 +8,15 @@ from groundstation.service.depth import DepthLog
 from groundstation.service.stops import Stops, belongs
 from telemetry.messages import Stand
 
+FIRST_EPOCH = 1  # of rig time: an encoder that has never started before
+
 
 def take_stand(depths: DepthLog, stops: Stops, stand: Stand) -> None:
     """Remember a stand; one that follows another at a smaller depth is a stop.
 
-    One that follows another at the same depth goes on with its stop: nothing is known of the time in between.
+    One that follows another at the same depth goes on with its stop: nothing is known of the time in between. The first
+    that is known is a stop where a tube surveyed in it, and where the encoder has started before: who hears first then
+    of a string that rests in its hole has lost what came before, and lacks the surveys of it.
     """
     depths.add_stand(stand)
     begin = stand.epoch, stand.begun_at
@@ -22,7 +26,10 @@ def take_stand(depths: DepthLog, stops: Stops, stand: Stand) -> None:
         whole = replace(stand, begun_at=before.pop().begun_at)
     if stand not in depths.stands:
         return
-    is_stop = before[-1].md < stand.md if before else stops.know(whole) or stops.was_surveyed(whole)
+    if before:
+        is_stop = before[-1].md < stand.md
+    else:
+        is_stop = stand.epoch != FIRST_EPOCH or stops.know(whole) or stops.was_surveyed(whole)
     if is_stop:
         stops.on_stand(whole)
     elif before and before[-1].md == stand.md:

@@ -1,8 +1,7 @@
 """What sends the depth of the bit: numbers the readings and repeats the last stands in each.
 
 Nobody asks for a reading that was lost, so each carries what the ground station needs of those before: where the bit
-stood, and from when to when. Where a source met the bit first is told like a stand, of no duration if it moved: the
-next stand is known by it as one that the bit came to.
+stood, and from when to when.
 """
 
 from __future__ import annotations
@@ -28,13 +27,11 @@ class DepthSource:
 
     def measure(self, at: float, md: float, epoch: int = EPOCH_UNKNOWN) -> DepthReading:
         """Reading of the depth ``md`` (m) at rig time ``at`` (s); two alike one after the other are a stand."""
-        if self._last is None or self._last[0] != epoch:
-            self._stands.append(Stand(epoch, at, at, md))
-        elif at < self._last[1]:
-            self._stands.clear()  # rig time counts anew, whether or not the source knows its epoch
-            self._stands.append(Stand(epoch, at, at, md))
-        elif self._last[2] == md:
-            self._extend_stand(epoch, self._last[1], at, md)
+        if self._last is not None and self._last[0] == epoch:
+            if at < self._last[1]:
+                self._stands.clear()  # rig time counts anew, whether or not the source knows its epoch
+            elif self._last[2] == md:
+                self._extend_stand(epoch, self._last[1], at, md)
         self._last = (epoch, at, md)
         self._sequence += 1
         return DepthReading(self._sequence, at, md, tuple(self._stands), epoch)

@@ -129,6 +129,8 @@ def test_combined_seeds_hold(world: int, part: int) -> None:
         (1010316, ("ground-cut", "depth-jumps-down", "depth-backwards")),
         # the first stand was a stop, which was kept shorter than it was
         (1000528, ("encoder-from-zero", "ground-cut", "old-receipts", "database-deleted")),
+        # nor was it when nobody surveyed, and the encoder had started since the bit came to it
+        (1107259, ("encoder-from-zero", "old-receipts", "node-memory-rots", "ground-disk-refuses", "database-deleted")),
         # a stop was judged in the moment of another epoch, before any tube was known
         (1002690, ("encoder-cut", "bytes-rot", "folders-swapped", "database-deleted")),
         (51633, ("surveys-lost", "gyro-step")),  # a gyroscope that turned its tube while nobody corrected it

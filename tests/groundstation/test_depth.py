@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 from groundstation.service.depth import DepthLog, Track
 from telemetry.application.depth_source import DepthSource
 from telemetry.errors import EncodeError
-from telemetry.messages import EPOCH_UNKNOWN, DepthReading, Stand
+from telemetry.messages import DepthReading, Stand
 from telemetry.presentation.msgpack_codec import decode, encode
 from telemetry.quantities import MAX_STANDS
 
@@ -157,7 +157,7 @@ def test_a_stand_of_the_time_of_a_jump_is_not_believed_when_the_depth_has_return
     assert bit.read(2.0) == ""
     assert bit.stand(10.0) > at
     bit.hear_stands()
-    assert [stand.md for stand in bit.log.stands] == [0.1, 2.0]  # where the source met the bit, and where it is
+    assert [stand.md for stand in bit.log.stands] == [2.0]
     assert bit.log.at(EPOCH, at) is None
 
 
@@ -264,20 +264,6 @@ def test_whatever_the_bit_does_a_depth_that_is_known_is_the_right_one(moves: lis
         known = bit.log.at(EPOCH, 0.5 * (t0 + t1))
         assert known is not None
         assert min(d0, d1) - 1e-9 <= known <= max(d0, d1) + 1e-9
-
-
-@pytest.mark.parametrize("epoch", [EPOCH_UNKNOWN, EPOCH + 1])
-def test_a_source_tells_where_it_met_the_bit_in_each_epoch(epoch: int) -> None:
-    """Without an epoch what was before cannot be told any more: rig time counts anew."""
-    source, first = DepthSource(), EPOCH_UNKNOWN if epoch == EPOCH_UNKNOWN else EPOCH
-    assert source.measure(100.0, 2.0, first).stands == (Stand(first, 100.0, 100.0, 2.0),)
-    source.measure(100.5, 2.1, first)
-    before = source.measure(101.0, 2.1, first).stands
-    assert before == (Stand(first, 100.0, 100.0, 2.0), Stand(first, 100.5, 101.0, 2.1))
-    for at, md in ((5.0, 2.2), (5.5, 2.3)):
-        source.measure(at, md, epoch)
-    now = (Stand(epoch, 5.0, 5.0, 2.2), Stand(epoch, 5.5, 6.0, 2.3))
-    assert source.measure(6.0, 2.3, epoch).stands == (now if epoch == EPOCH_UNKNOWN else (*before, *now))
 
 
 def test_a_reading_with_all_its_stands_travels() -> None:

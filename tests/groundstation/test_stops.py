@@ -129,13 +129,23 @@ def test_the_tubes_of_a_stop_of_before_are_heard_first(tally: Tally) -> None:
 def test_the_first_stand_is_a_stop_as_soon_as_it_has_lasted_till_a_survey_in_it(tally: Tally) -> None:
     """It was stored when it began, and the survey before the ground station's start."""
     depths, stops = DepthLog(0.5, 5.0), Stops(tally, DUE)
-    take_stand(depths, stops, Stand(3, 10.0, 10.5, 4.0))
-    stops.on_survey(3, 30.0, 1)
-    take_survey(depths, stops, 3, 30.0)
+    take_stand(depths, stops, Stand(1, 10.0, 10.5, 4.0))
+    stops.on_survey(1, 30.0, 1)
+    take_survey(depths, stops, 1, 30.0)
     assert list(stops) == []
-    take_stand(depths, stops, Stand(3, 10.0, 71.0, 4.0))
-    stops.judge(3, 71.0)
+    take_stand(depths, stops, Stand(1, 10.0, 71.0, 4.0))
+    stops.judge(1, 71.0)
     assert missing(stops) == {2}
+
+
+@pytest.mark.parametrize(("epoch", "lacking"), [(1, set()), (2, {1, 2})])
+def test_a_string_that_is_met_at_rest_lacks_its_surveys_where_the_encoder_has_started_before(
+    tally: Tally, epoch: int, lacking: set[int]
+) -> None:
+    depths, stops = DepthLog(0.5, 5.0), Stops(tally, DUE)
+    take_stand(depths, stops, Stand(epoch, 10.0, 71.0, 4.0))
+    stops.judge(epoch, 71.0)
+    assert missing(stops) == lacking
 
 
 def test_surveys_are_kept_until_their_stop_is_judged(tally: Tally, monkeypatch: pytest.MonkeyPatch) -> None:
