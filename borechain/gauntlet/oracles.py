@@ -22,7 +22,7 @@ from telemetry.transport.hop import BEST_EFFORT_LIMIT, QUEUE_LIMIT, WINDOW, pars
 
 DEPTH_TOLERANCE = 0.05  # m
 SIGMAS = 5.0  # of a direction in the plane; 3 are exceeded by one good survey in ninety
-LATE = 2.0  # s that the ground station may take to notice a silence
+LATE = 2.0  # s that the ground station may take to notice a silence, or that a survey is overdue
 TOLD = frozenset(
     {
         *("survey_missing", "numbers_lost", "numbers_missing", "survey_set_aside", "survey_unplaced"),
@@ -247,7 +247,7 @@ def _expected(rig: GauntletRig) -> list[tuple[int, float]]:
     """
     stops = [(phase.tube, rig.world.true_depth(phase.end)) for phase in rig.world.phases if phase.kind == "stop"]
     model = rig.inline.ground.model
-    due = model.config.survey_after
+    due = model.config.survey_after + LATE
     waits = [one.stand.md for one in model.stops if not one.judged and one.age(model.epoch, model.rig_now) < due]
     owed = _nodes([stop for stop in stops if not any(abs(stop[1] - md) <= DEPTH_TOLERANCE for md in waits)])
     heard = max((stand.ended_at for stand in model.depths.stands if stand.epoch == model.epoch), default=math.inf)

@@ -41,6 +41,7 @@ class Witnesses:
     def __init__(self) -> None:
         # newest contradiction by tube and start: a stranger with the number of a tube speaks for itself alone
         self._contradicted: dict[tuple[int, int], Event] = {}
+        self._began: dict[tuple[int, int], Event] = {}  # its first rejected aiding, by tube and number
         self._starts: deque[Event] = deque(maxlen=STARTS_KEPT)
         self._off: Times = {}
         self._blind: Times = {}  # without a gyroscope
@@ -69,7 +70,8 @@ class Witnesses:
         elif event.code == REJECTED:
             self._rejected[event.tube] = event
         elif event.code in AGAINST_THE_ENCODER:
-            self._count(self._dated(event, self._rejected.pop(event.tube, event)))
+            rejected = self._rejected.pop(event.tube, event)
+            self._count(self._dated(event, rejected), rejected)
         elif event.code == ELSEWHERE and self._was_restored(event) and not self._was_settled(event):
             self._elsewhere[event.tube] = event
             if nobody := self._nobody_has_watched(event, heard):
@@ -84,9 +86,9 @@ class Witnesses:
         """
         rejected = self._rejected.get(tube)
         if rejected is not None and rejected.sequence < lost[0] <= rejected.sequence + OUTCOME_WITHIN:
-            self._count(replace(self._rejected.pop(tube), code="yaw_reset"))
+            self._count(replace(rejected, code="yaw_reset"), self._rejected.pop(tube))
         elif doubts and (after := next((e for e in self._said.get(tube, ()) if e.sequence > lost[1]), None)):
-            self._count(replace(after, code="yaw_reset"))
+            self._count(replace(after, code="yaw_reset"), after)
         else:
             return ""
         return self._judge(heard)
@@ -98,7 +100,11 @@ class Witnesses:
         self._told = told
         return f"tubes {', '.join(str(tube) for tube in sorted({e.tube for e in told}))} at {found.at:.0f} s"
 
-    def _count(self, event: Event) -> None:
+    def _count(self, event: Event, began: Event) -> None:
+        """A tube contradicts the encoder, since an aiding that it rejected before; one of long ago was an outlier."""
+        self._began[event.tube, event.sequence] = began if self._apart(began, event) <= CUT_SHORT else event
+        while len(self._began) > STARTS_KEPT:
+            del self._began[next(iter(self._began))]
         start = self._start_before(event)
         self._contradicted[event.tube, 0 if start is None else start.sequence] = event
         while len(self._contradicted) > STARTS_KEPT:
@@ -115,7 +121,7 @@ class Witnesses:
         rejected = self._rejected.get(start.tube)
         is_before = rejected is not None and _in_time(rejected) <= _in_time(start)
         if rejected is not None and is_before and self._apart(rejected, start) <= CUT_SHORT:
-            self._count(self._rejected.pop(start.tube))
+            self._count(rejected, self._rejected.pop(start.tube))
 
     def _speaks_against_the_encoder(self, event: Event, heard: Collection[int]) -> bool:
         together = self._together(event)
@@ -204,8 +210,13 @@ class Witnesses:
             _add_time(self._blind, place, event.at - CYCLE * cycles, event.at)
 
     def _has_watched(self, tube: int, event: Event) -> bool:
-        """Whether a tube ran, had settled and had a gyroscope at the time of an event: it could have seen the same."""
-        return not _is_in(self._off, tube, event) and not self._was_without_gyroscope(tube, event)
+        """Whether a tube ran, had settled and had a gyroscope all the while that another contradicted.
+
+        It could have seen the same. What contradicts happened before the first aiding that was rejected for it: one
+        that began to listen since has nothing to say.
+        """
+        began = self._began.get((event.tube, event.sequence), event)
+        return not any(_is_in(self._off, tube, at) or self._was_without_gyroscope(tube, at) for at in (began, event))
 
     def _was_without_gyroscope(self, tube: int, event: Event) -> bool:
         return _is_in(self._blind, tube, event)

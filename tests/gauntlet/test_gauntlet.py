@@ -133,6 +133,10 @@ def test_combined_seeds_hold(world: int, part: int) -> None:
         (1107259, ("encoder-from-zero", "old-receipts", "node-memory-rots", "ground-disk-refuses", "database-deleted")),
         # a stop was judged in the moment of another epoch, before any tube was known
         (1002690, ("encoder-cut", "bytes-rot", "folders-swapped", "database-deleted")),
+        # who began to listen after the other had begun to contradict
+        (1205090, ("node-cut", "encoder-from-zero", "bursts", "joint-deaf", "encoder-slips")),
+        # a survey that became overdue with the last word of the run
+        (1205930, ("encoder-from-zero", "bytes-rot", "boots-damaged", "force-stuck", "depth-lost")),
         (51633, ("surveys-lost", "gyro-step")),  # a gyroscope that turned its tube while nobody corrected it
     ],
 )

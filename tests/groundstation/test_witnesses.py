@@ -47,6 +47,17 @@ def test_a_tube_that_has_not_watched_is_no_witness_for_the_encoder_in_whatever_o
         assert told([*BOTH_STARTED, *events, event(2, 140.0, "stopped", 12)]) == ["tubes 1 at 100 s"]
 
 
+@pytest.mark.parametrize(
+    ("rejected_at", "said"),
+    [(84.0, ["tubes 1 at 100 s"]), (95.0, []), (10.0, [])],
+    ids=["before it listened", "since it listens", "an outlier of long ago"],
+)
+def test_who_began_to_listen_after_a_contradiction_had_begun_is_no_witness(rejected_at: float, said: list[str]) -> None:
+    """The joints lost most frames after a slip, so that the reset came late; the other had started meanwhile."""
+    began, reset = event(1, rejected_at, "aiding_rejected", 9), event(1, 100.0, "yaw_reset")
+    assert told([*BOTH_STARTED, began, event(2, 82.0, "restored", 9), reset]) == said
+
+
 def test_a_time_without_a_gyroscope_is_known_by_its_end_where_its_begin_went_with_the_database() -> None:
     recovered = event(2, 103.0, "sensor_recovered", 11, after="gyro_saturated", cycles=44)
     for events in permutations([recovered, event(1, 100.0, "yaw_reset")]):
