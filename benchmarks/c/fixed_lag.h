@@ -174,6 +174,20 @@ static void move_pending(State *state, int64_t to, int64_t from)
     state->pending_sequence[to] = state->pending_sequence[from];
 }
 
+static void drop_first_pending(State *state)
+{
+    state->pending--;
+    for (int64_t k = 0; k < state->pending; k++)
+        move_pending(state, k, k + 1);
+}
+
+static void drop_repetitions(State *state)
+{
+    while (state->pending > 1 && state->pending_sequence[1] == state->pending_sequence[0]
+           && state->pending_yaw[1] == state->pending_yaw[0])
+        drop_first_pending(state);
+}
+
 static int64_t take_pending(State *state, const Config *config, int64_t cycle, double until)
 {
     int64_t status = 0;
@@ -184,15 +198,16 @@ static int64_t take_pending(State *state, const Config *config, int64_t cycle, d
             advance(state, config, cycle, held);
             yaw -= spin(state, cycle, held, at) * (at - held);
             double spread = interpolation_var(state, cycle, at);
-            status |= aid(state, config, yaw, var + spread, spin(state, cycle, held, held), at);
+            int64_t used = aid(state, config, yaw, var + spread, spin(state, cycle, held, held), at);
+            status |= used;
             if (spread > COARSE * var)
                 state->last_sequence = -1;
+            else if (used == AIDED)
+                drop_repetitions(state);
         } else {
             status |= aid_late(state, config, yaw, var, at);
         }
-        state->pending--;
-        for (int64_t k = 0; k < state->pending; k++)
-            move_pending(state, k, k + 1);
+        drop_first_pending(state);
     }
     return status;
 }

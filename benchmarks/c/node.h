@@ -11,7 +11,7 @@
 enum { STATES = 8, RING = 64, PENDING = 4, PARTS = 8, RECENT = 8 };
 #define UNKNOWN_YAW_VAR 3.29 /* rad^2 */
 #define CLOCK_SLACK 0.05 /* s */
-#define COARSE 25.0 /* times its own variance, from where an aiding is worth less for its time than for itself */
+#define COARSE 4.0 /* times its own variance, from where an aiding is worth less for its time than for itself */
 #define INVERTED (-0.9848077530122081) /* downward part of the axis at 170 deg of inclination */
 enum { TX, TY, PSI, BX, BY, BZ, SCALE, STAMP }; /* error states */
 

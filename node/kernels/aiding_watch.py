@@ -5,6 +5,7 @@ fault      evidence                                                             
 ========== ======================================================================= =================
 step       innovations beyond the gate that grow alike, while readings look sane   3 aidings in a row
 small step the same, by less than 0.15 deg/s, or 0.3 deg/s at 60 deg/s or more    6 aidings in a row
+slowing    a step of less than 0.22 deg/s, while the string slows down             4 aidings in a row
 winding    a step of a string that has just started, or unwinds: it may be its twist  6 aidings in a row
 scale      innovations beyond the gate that grow in proportion to the rate         3 aidings in a row
 ========== ======================================================================= =================
@@ -14,7 +15,7 @@ That is how the two are distinguished: what a ripple of the drive, a disc off it
 between two aidings comes and goes, and is a misfit (``node.kernels.doubts``). A small step is looked at for longer, for
 a part of a swing looks like one: of a swing of once a turn (ten aidings at 71 deg/s) six are never alike. A string that
 winds up as it starts, or unwinds below a standing drive head, looks like a step too, until it has: within three seconds
-it is never alike in six.
+it is never alike in six. So do, in three, the readings of a string that slows down which are older than they say.
 """
 
 from __future__ import annotations
@@ -34,11 +35,16 @@ SMALLEST_STEP: Final = rate(math.radians(0.03))  # rad/s
 SMALL_STEP: Final = rate(math.radians(0.15))  # rad/s, up to which a step is looked at for longer
 SMALL_SWING: Final = rate(math.radians(0.3))  # rad/s, likewise, where the string turns at full speed
 SLOWEST_SWING: Final = rate(math.radians(60.0))  # rad/s, from where it does: the slower, the smaller are its swings
+SLOWED: Final = rate(math.radians(10.0))  # rad/s, by which a string that comes to rest has slowed down meanwhile
+LATE_READINGS: Final = rate(
+    math.radians(0.22)
+)  # rad/s, of readings that are 6 ms late while it slows down by 35 deg/s^2
 STEADY: Final = factor(0.3)  # of the mean mismatch, by which those of one step may differ from it
 WINDING: Final = rate(math.radians(0.15))  # rad/s, from where one of a string that starts is looked at for longer
 UNWINDING: Final = rate(math.radians(0.5))  # rad/s, likewise, of one that rests
 GROSS: Final = rate(math.radians(5.0))  # rad/s, from where a mismatch is a fault however it changes
 SLOWEST_SCALE: Final = rate(math.radians(5.0))  # rad/s, from where a mismatch may be one of scale
+WHILE_SLOWING: Final = DISAGREEMENTS + 1
 AT_ONCE, STARTING, AT_REST = constant(0), constant(1), constant(2)  # how long a mismatch is looked at
 GYRO_STEP, GYRO_SCALE = constant(Fault.GYRO_STEP), constant(Fault.GYRO_SCALE)
 
@@ -98,6 +104,8 @@ def find_mismatch(
     steady, proportional = is_steady(watch, usual), is_proportional(watch)
     gross = abs(mismatch) >= GROSS
     wanted = DISAGREEMENTS if is_large(watch, abs(usual), abs(spin), patience) else MOST_DISAGREEMENTS
+    if is_slowing(watch, abs(usual), abs(spin)):
+        wanted = max(wanted, WHILE_SLOWING)
     if not (proportional or gross or (steady and watch.seen >= wanted)):
         found.refuted = 0 if steady else 1
         if watch.seen == MOST_DISAGREEMENTS or not steady:
@@ -117,6 +125,12 @@ def is_large(watch: Any, usual: float, spin: float, patience: int) -> bool:
         return False
     slowest = min(abs(watch.spin[0]), spin)
     return bool(usual >= SMALL_SWING if slowest >= SLOWEST_SWING else usual >= SMALL_STEP)
+
+
+@kernel
+def is_slowing(watch: Any, usual: float, spin: float) -> bool:
+    """Whether mismatches of this size (rad/s) may be those of late readings, at a ``spin`` (rad/s) on its way down."""
+    return bool(usual < LATE_READINGS and abs(watch.spin[0]) - spin >= SLOWED)
 
 
 @kernel

@@ -14,7 +14,7 @@ from node.kernels.error_model import isolate, propagate, set_apart
 from node.kernels.increments import bend_at, bent_angle, faster
 from node.kernels.jit import constant, kernel
 from node.kernels.layout import CLOCK_SLACK, INVERTED, RING, STATES, UNKNOWN_YAW_VAR, Array, Err, Status
-from node.kernels.ring import drop_first_pending, is_split, stood_still
+from node.kernels.ring import drop_first_pending, drop_repetitions, is_split, stood_still
 from node.kernels.smoothing import carry
 from node.kernels.strapdown import rotate_down, yaw_rate
 from node.kernels.update import clear, correct, innovation_var, intersect, level, zero_rate
@@ -23,7 +23,7 @@ PSI, BZ, D = constant(Err.YAW), constant(Err.BIAS_Z), constant(Err.STAMP)
 AIDED, REJECTED, YAW_RESET = int(Status.AIDED), int(Status.REJECTED), int(Status.YAW_RESET)
 LATE_DROPPED = int(Status.LATE_DROPPED)
 BX = constant(Err.BIAS_X)
-COARSE: Final = 25  # times its own variance, from where an aiding is worth less for its time than for itself
+COARSE: Final = 4  # times its own variance, from where an aiding is worth less for its time than for itself
 
 
 @kernel
@@ -192,9 +192,12 @@ def take_pending(state: Any, config: Any, cycle: int, until: float) -> int:
             within = cycle + 1 if at > until and is_split(state, cycle + 1) else cycle
             yaw -= spin(state, within, held, at) * (at - held)
             spread, own = interpolation_var(state, within, at), var
-            status |= aid(state, config, yaw, var + spread, spin(state, cycle, held, held), at)
+            used = aid(state, config, yaw, var + spread, spin(state, cycle, held, held), at)
+            status |= used
             if spread > COARSE * own:
                 state.last_sequence = -1  # a repetition at rest is better timed
+            elif used == AIDED:
+                drop_repetitions(state)  # they wait behind it and say nothing more
         else:
             status |= aid_late(state, config, yaw, var, at)
         drop_first_pending(state)

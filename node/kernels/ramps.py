@@ -7,6 +7,10 @@ what they contradicted it by is systematic variance of the yaw, and half of that
 fits. What the ramp taught of the gyroscope's scale is forgotten. In honest noise the sum of squares stays far below its
 limit (0.7 an aiding, at most 22 in 640 ramps), and none of this happens.
 
+The head at rest is measured once in a rest, and that measurement judges the turn to it: one beyond two sigmas says that
+the string ran on into some play, or that the gyroscope's readings were not of their time. It is used, and what it
+contradicted is in doubt likewise. One honest stop in twenty is doubted so, by no more than it deserves.
+
 A gyroscope's scale is not the same in both directions (asymmetry, IEEE Std 528). It is learnt in the one in which the
 string turns fast, so an angle turned back is off by a part of itself.
 """
@@ -22,6 +26,7 @@ from node.kernels.layout import DEG, RING, Err
 from node.kernels.numbers import half, held, mean, ratio, root, square, times, turn
 from node.kernels.quantity import NONE, factor, rate, variance
 from node.kernels.resets import doubt_yaw, forget_scale, open_yaw
+from node.kernels.twist import twist_var
 
 LEAST_CHANGE: Final = rate(5.0 * DEG)  # rad/s, from one cycle to the next, on a ramp
 REACH: Final = 10  # cycles after it, whose aidings still show what it did
@@ -29,6 +34,7 @@ LONGEST: Final = 16  # cycles; rates that change for longer are a drive that swi
 MOST: Final = 16  # variances, that one innovation counts for
 MOST_TIMES: Final = factor(16.0)
 LIMIT: Final = factor(36.0)  # sum of innovation^2 / variance, from where the ramp does not fit
+CONTRADICTED: Final = 4  # variances, from where the head at rest and the turn to it do not fit
 LARGEST: Final = variance(DEG**2)  # rad^2, variance of an innovation that counts by itself
 LEAST_DOUBT: Final = variance((0.002 * DEG) ** 2)  # rad^2, that is none any more
 STARTING: Final = 14  # cycles of a string that has started, in which it may wind up, or be taken for a scale
@@ -104,6 +110,28 @@ def follow_fit(node: Any, rejected: int) -> None:
     ramp.largest = max(ramp.largest, min(own, MOST * min(whole, LARGEST)))
     if ramp.misfit > LIMIT:
         doubt_ramp(node, own, rejected)
+    elif rejected == 0 and own > CONTRADICTED * whole and has_come_to_rest(node):
+        doubt_stop(node, own - whole)
+
+
+@kernel
+def has_come_to_rest(node: Any) -> bool:
+    """Whether the aiding used last is a head's at rest, well timed, of a string whose twist nobody tells.
+
+    It is said only once in a rest. Where a twist is told the yaw was opened by it, and more is not to be doubted.
+    """
+    state = node.filter
+    is_well_timed = state.still_cycles > 0 and state.last_sequence != -1
+    return bool(node.guard.rate == 0 and is_well_timed and twist_var(node.twist) == 0)
+
+
+@kernel
+def doubt_stop(node: Any, var: float) -> None:
+    """The head at rest is not where its string was turned to: a variance (rad^2) for whichever of the two is right."""
+    state, ramp = node.filter, node.guard.ramp
+    doubt = held(max(ramp.doubt, var))
+    state.systematic_var = held(state.systematic_var + doubt - ramp.doubt)
+    ramp.doubt = doubt
 
 
 @kernel

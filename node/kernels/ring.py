@@ -73,3 +73,14 @@ def drop_first_pending(state: Any) -> None:
         state.pending_yaw[k] = state.pending_yaw[k + 1]
         state.pending_var[k] = state.pending_var[k + 1]
         state.pending_sequence[k] = state.pending_sequence[k + 1]
+
+
+@kernel
+def drop_repetitions(state: Any) -> None:
+    """Leave in the queue one of its first measurement and of those behind that are the same again."""
+    while (
+        state.pending > 1
+        and state.pending_sequence[1] == state.pending_sequence[0]
+        and state.pending_yaw[1] == state.pending_yaw[0]
+    ):
+        drop_first_pending(state)

@@ -179,7 +179,7 @@ STUDIES = by_name(
             (Table("Field, {seeds} seeds", columns.FIELD, columns.FIELD),),
             (Option("disturbance", ALL, choices=KEYS), Option("seeds", 20, 2, 10_000)),
             drawn=False,
-            full=("--seeds 40",),
+            full=("--seeds 100",),
             short="--seeds 2 --disturbance random-phase",
         ),
         Study(

@@ -170,6 +170,24 @@ def test_a_repeated_measurement_at_rest_is_used_once() -> None:
     assert bench.now - bench.record["last_aided"] < 1.1
 
 
+def test_a_measurement_that_waits_twice_is_used_once() -> None:
+    """Until one at rest has been used in full its repetitions are let in, and several may wait together."""
+    left = []
+    for copies in (1, 3):
+        bench = Bench()
+        bench.stand(110)
+        for matrix in ("P", "now_P"):
+            bench.record[matrix][Err.YAW, Err.YAW] += (0.02 * DEG) ** 2
+        for _ in range(copies):
+            bench.record["last_sequence"] = -1
+            bench.aid(fresh=False, age=0.1)
+        assert bench.record["pending"] == copies
+        bench.stand(4, aided=False)
+        assert bench.record["pending"] == 0
+        left.append(bench.record["P"].copy())
+    assert np.array_equal(*left)
+
+
 def test_a_new_joint_above_reopens_the_yaw_without_a_false_alarm() -> None:
     bench = Bench()
     bench.stand(110)

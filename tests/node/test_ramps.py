@@ -71,6 +71,36 @@ def test_a_ramp_that_does_not_fit_is_in_doubt_and_every_one_that_does_halves_it(
     assert doubts == pytest.approx([(3.5 * SIGMA) ** 2 / 2**k for k in (0, 1, 2)])
 
 
+@pytest.mark.parametrize(
+    ("sigmas", "rate", "still", "sequence", "doubted"),
+    [
+        (1.9, 0.0, 3, 7, False),
+        (-2.5, 0.0, 3, 7, True),
+        (2.5, 0.1, 3, 7, False),  # the head turns
+        (2.5, 0.0, 0, 7, False),  # the node does not stand yet
+        (2.5, 0.0, 3, -1, False),  # the ramp has made its time worth little, it will be said again
+    ],
+)
+def test_what_the_head_at_rest_contradicts_is_in_doubt(
+    sigmas: float, rate: float, still: int, sequence: int, doubted: bool
+) -> None:
+    turning = Turning()
+    turning.ramp_up([0.0] * 6)
+    turning.cycle(0.0, still=still)
+    turning.node["guard"]["rate"], turning.state["last_sequence"] = rate, sequence
+    turning.state["systematic_var"] = 1e-6
+    turning.aid(sigmas)
+    wanted = (sigmas**2 - 1.0) * SIGMA**2 if doubted else 0.0
+    assert turning.ramp["doubt"] == pytest.approx(wanted)
+    assert turning.state["systematic_var"] == pytest.approx(1e-6 + wanted)
+    turning.node["twist"]["known"], turning.node["twist"]["std"] = 1, 0.1
+    turning.aid(9.0)  # a twist that is told has opened the yaw
+    turning.node["twist"]["known"] = 0
+    turning.aid(0.9 * sigmas)  # a smaller one is no further doubt
+    assert turning.ramp["doubt"] == pytest.approx(wanted)
+    assert turning.state["systematic_var"] == pytest.approx(1e-6 + wanted)
+
+
 def test_what_the_ramp_taught_of_the_scale_is_forgotten() -> None:
     turning = Turning()
     for k in range(3):

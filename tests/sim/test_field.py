@@ -85,6 +85,10 @@ def test_single_wrong_readings_make_a_rest_no_surer_than_it_is() -> None:
     [
         ("misalignment", (6,)),  # gravity 3 deg off about the axis: no survey, and a step that was none
         ("jitter", (3, 7, 10, 12)),  # NEES 21 and 48, half of all cycles beyond three sigmas
+        ("jitter", (42, 46, 55)),  # a stop that was turned to wrongly: 23 % of all cycles beyond three sigmas
+        ("jitter-fifo", (13, 14)),  # a step that was none
+        ("backlash-0.1", tuple(range(1, 9))),  # NEES 3.2 at rest, 4.6 % beyond three sigmas
+        ("backlash-0.5", (1, 2, 3)),
         ("asymmetry", tuple(range(1, 13))),  # NEES 1.9 at rest; of three that were worst 4.5
         ("unwinds", (1, 2, 7)),  # NEES 770, 70 % beyond three sigmas, two steps and a scale that were none
         ("untold-twist", (1, 5, 6)),  # NEES 12 000, three steps and three scales that were none

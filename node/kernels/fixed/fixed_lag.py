@@ -29,10 +29,10 @@ from node.kernels.increments import bend_at, bent_angle, faster
 from node.kernels.jit import constant, kernel
 from node.kernels.layout import CLOCK_SLACK, INVERTED, RING, STATES, Array, Err, Status
 from node.kernels.numbers import square
-from node.kernels.ring import drop_first_pending, is_split, stood_still
+from node.kernels.ring import drop_first_pending, drop_repetitions, is_split, stood_still
 
 PSI, BZ, D = constant(Err.YAW), constant(Err.BIAS_Z), constant(Err.STAMP)
-LATE_DROPPED = int(Status.LATE_DROPPED)
+AIDED, LATE_DROPPED = int(Status.AIDED), int(Status.LATE_DROPPED)
 UNITY_SCALE: Final = 1 << 30
 SCALE_RIGHT: Final = RATE_Q - 30
 SQUARE_Q: Final = VAR_Q // 2  # of an angle whose square is a variance
@@ -200,9 +200,12 @@ def take_pending(state: Any, config: Any, cycle: int, until: int) -> int:
             within = cycle + 1 if at > until and is_split(state, cycle + 1) else cycle
             yaw = (yaw - counts(mul(spin(state, within, held, at), beyond), STEP_Q)) & TURN
             spread, own = interpolation_var(state, within, at), int(var)
-            status |= aid(state, config, yaw, var + spread, spin(state, cycle, held, held), at)
+            used = aid(state, config, yaw, var + spread, spin(state, cycle, held, held), at)
+            status |= used
             if spread > COARSE * own:
                 state.last_sequence = -1
+            elif used == AIDED:
+                drop_repetitions(state)
         else:
             status |= aid_late(state, config, yaw, var, at)
         drop_first_pending(state)
