@@ -152,10 +152,10 @@ class Stops:
         """Find what is overdue at ``rig_now`` (s); nothing is while no tube is known that could owe it."""
         if epoch != self._epoch or math.isnan(self._epoch_since):
             self._epoch, self._epoch_since = epoch, rig_now
-        is_new = not rig_now >= self._epoch_since + SETTLED
+        is_settled = rig_now >= self._epoch_since + SETTLED
         for stop in self._stops if self._tally.tubes else ():
             age = stop.age(epoch, rig_now)
-            if stop.judged or stop.lasted < SHORTEST or age < self._due or (is_new and age == math.inf):
+            if stop.judged or stop.lasted < SHORTEST or age < self._due or (age == math.inf and not is_settled):
                 continue
             stop.judged = True
             stop.tubes = stop.tubes or tuple(self._in_the_hole(stop.stand.md))

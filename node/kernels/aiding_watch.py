@@ -36,15 +36,13 @@ SMALL_STEP: Final = rate(math.radians(0.15))  # rad/s, up to which a step is loo
 SMALL_SWING: Final = rate(math.radians(0.3))  # rad/s, likewise, where the string turns at full speed
 SLOWEST_SWING: Final = rate(math.radians(60.0))  # rad/s, from where it does: the slower, the smaller are its swings
 SLOWED: Final = rate(math.radians(10.0))  # rad/s, by which a string that comes to rest has slowed down meanwhile
-LATE_READINGS: Final = rate(
-    math.radians(0.22)
-)  # rad/s, of readings that are 6 ms late while it slows down by 35 deg/s^2
+LATE_READINGS: Final = rate(math.radians(0.22))  # rad/s, of such that are 6 ms late while it slows by 35 deg/s^2
 STEADY: Final = factor(0.3)  # of the mean mismatch, by which those of one step may differ from it
 WINDING: Final = rate(math.radians(0.15))  # rad/s, from where one of a string that starts is looked at for longer
 UNWINDING: Final = rate(math.radians(0.5))  # rad/s, likewise, of one that rests
 GROSS: Final = rate(math.radians(5.0))  # rad/s, from where a mismatch is a fault however it changes
 SLOWEST_SCALE: Final = rate(math.radians(5.0))  # rad/s, from where a mismatch may be one of scale
-WHILE_SLOWING: Final = DISAGREEMENTS + 1
+WHILE_SLOWING: Final = DISAGREEMENTS + 1  # aidings in a row
 AT_ONCE, STARTING, AT_REST = constant(0), constant(1), constant(2)  # how long a mismatch is looked at
 GYRO_STEP, GYRO_SCALE = constant(Fault.GYRO_STEP), constant(Fault.GYRO_SCALE)
 
