@@ -20,7 +20,7 @@ LIMIT = 100_000  # readings kept of an epoch, those at rest in a stand count as 
 STANDS_KEPT = 10_000
 EPOCHS_KEPT = 8
 DOUBTS_KEPT = 100
-CONTRADICTION = "a stand contradicts another"
+CONTRADICTION, DOUBTFUL = "a stand contradicts another", "a stand of a doubtful time"
 AHEAD, LATE = 2.0, 30.0  # s against rig time
 SLACK = 0.02  # m, of two readings
 RETURNED = 0.1  # m from the last reading before a jump, within which the depth is believed again
@@ -127,28 +127,35 @@ class DepthLog:
         self._track(epoch).append_reading(reading.at, reading.md)
         return ""
 
-    def add_stand(self, stand: Stand) -> bool:
-        """Remember that the bit stood, or that it still does; whether it is a stand not known before."""
+    def add_stand(self, told: Stand) -> Stand | None:
+        """Remember that the bit stood, or that it still does; the stand as it is known now, None where not believed.
+
+        One that began in a doubtful time and lasts until the newest reading is believed from the end of that time on.
+        """
+        stand = self._after_doubtful_times(told)
+        if stand is None:
+            self.refusals[DOUBTFUL] += 1
+            return None
         for place in range(len(self.stands) - 1, -1, -1):
             known = self.stands[place]
             if known.md == stand.md and _same(known, stand):
                 begun_at, ended_at = min(known.begun_at, stand.begun_at), max(known.ended_at, stand.ended_at)
                 self.stands[place] = Stand(stand.epoch, begun_at, ended_at, stand.md)
-                return False
+                return self.stands[place]
         since = self._trusted[:2] if self.jumped and self._trusted is not None else (math.inf, 0.0)
-        if (stand.epoch, stand.ended_at) > since or self._is_of_a_doubtful_time(stand):
-            self.refusals["a stand of a doubtful time"] += 1
-            return False
+        if (stand.epoch, stand.ended_at) > since:
+            self.refusals[DOUBTFUL] += 1
+            return None
         against = [known for known in self.stands if known.epoch == stand.epoch and not self._agree(known, stand)]
         if against:
             self.refusals[CONTRADICTION] += 1
             for doubtful in (*against, stand):
                 self._doubt(doubtful)
             self._suspect(max(against, key=lambda known: known.begun_at), stand)
-            return False
+            return None
         insort(self.stands, stand, key=lambda known: (known.epoch, known.begun_at))
         del self.stands[:-STANDS_KEPT]
-        return True
+        return stand
 
     def is_of_before(self, stand: Stand, epoch: int) -> bool:
         """Whether a stand without an epoch is known from one before ``epoch``: the encoder's clock may run on."""
@@ -197,11 +204,15 @@ class DepthLog:
             self._accepted = self._raw[:2]
         self.jumped, self._raw = "", None
 
-    def _is_of_a_doubtful_time(self, stand: Stand) -> bool:
-        """Whether no stand of its time is believed; one in which the crew has looked is, whatever came before."""
+    def _after_doubtful_times(self, stand: Stand) -> Stand | None:
+        """What of a stand is not of a doubtful time; one in which the crew has looked is not, whatever came before."""
         looked = (stand.epoch, stand.begun_at) <= self._accepted < (stand.epoch, stand.ended_at)
         doubtful = (d for d in self._doubtful if not (looked and (d.epoch, d.ended_at) <= self._accepted))
-        return any(_overlap(time, stand) for time in doubtful)
+        begun_at = max((time.ended_at for time in doubtful if _overlap(time, stand)), default=stand.begun_at)
+        if begun_at == stand.begun_at:
+            return stand
+        goes_on = self._trusted == (stand.epoch, stand.ended_at, stand.md)
+        return replace(stand, begun_at=begun_at) if goes_on and begun_at < stand.ended_at else None
 
     def _suspect(self, one: Stand, other: Stand) -> None:
         """Take a contradiction for a jump that nobody heard: what came since may be as wrong as the later stand."""

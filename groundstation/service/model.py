@@ -89,7 +89,9 @@ class RigModel:
         self._tally_known_at = math.inf  # s, own clock, from which on every tube is taken to have been heard
         self.depth_heard_at = -math.inf  # s, own clock
         self._begun_at: dict[int, float] = {}  # s, own clock, of rig time 0 of each epoch that was heard
-        self._newest: dict[int, dict[int, deque[tuple[float, int]]]] = {}  # times and cycles by tube and epoch
+        self._newest: dict[int, dict[int, tuple[float, int]]] = {}  # times and cycles by tube and epoch
+        self._numbered: dict[int, int] = {}  # newest number given, by tube, as its newest state with a time tells
+        self._undated: dict[int, deque[tuple[int, float, int]]] = {}  # epochs, times and cycles by tube
         self._heard_at: dict[int, float] = {}  # s, own clock, of each tube's newest state
         self.shared = SharedErrors()
         self.hole = Hole(config, self.shared)
@@ -117,6 +119,8 @@ class RigModel:
         self._heard_at[state.tube] = max(self._heard_at.get(state.tube, -math.inf), spoke_at)
         if known is None or state.epoch != known.epoch or state.at >= known.at:
             self.nodes[state.tube] = state
+            if self.is_dated(state):
+                self._numbered[state.tube] = state.numbered
             if state.tube not in self.tally.tubes and now < self._tally_known_at:
                 self._tally_known_at = now + ALL_HEARD_WITHIN
             self.tally.on_hops(state.tube, state.hops)
@@ -136,22 +140,25 @@ class RigModel:
     def _is_repeated(self, state: NodeState) -> bool:
         """Whether a state has come before, or a newer one of its epoch; a clock or a count may go back, not both.
 
-        Without an epoch there is no newer: a board that starts again counts from the beginning.
+        Without an epoch there is no newer: a board that starts again counts from the beginning. And as clock and count
+        may go back in turn, those whose clock says nothing are known one by one: their time does not betray their age.
+        The number that was given last does, for a start goes on with larger ones.
         """
+        now = state.at, state.cycles
+        if state.epoch == EPOCH_UNKNOWN or NodeFlag.CLOCK_UNSYNCHRONISED in state.flags:
+            undated = self._undated.setdefault(state.tube, deque(maxlen=UNDATED_KEPT))
+            if (state.epoch, *now) in undated or 0 < state.numbered < self._numbered.get(state.tube, 0):
+                return True
+            undated.append((state.epoch, *now))
+        if state.epoch == EPOCH_UNKNOWN:
+            return False
         newest = self._newest.setdefault(state.tube, {})
-        known = newest.setdefault(state.epoch, deque(maxlen=UNDATED_KEPT))
+        known = newest.get(state.epoch)
+        if known is not None and state.at <= known[0] and state.cycles <= known[1]:
+            return True
+        newest[state.epoch] = now
         while len(newest) > EPOCHS_KEPT:
             del newest[next(iter(newest))]
-        now = state.at, state.cycles
-        if state.epoch == EPOCH_UNKNOWN:
-            is_known = now in known
-        else:
-            is_known = any(state.at <= at and state.cycles <= cycles for at, cycles in known)
-        if is_known:
-            return True
-        if state.epoch != EPOCH_UNKNOWN:
-            known.clear()
-        known.append(now)
         return False
 
     def _is_of_before(self, state: NodeState, known: NodeState) -> bool:
@@ -182,12 +189,15 @@ class RigModel:
         return self.tally.length_below(measurement.tube)
 
     def depth_of(self, measurement: SurveyMeasurement, below: float | None) -> float | None:
-        """Measured depth (m) of the tube's node when it surveyed; None where no depth brackets its time."""
+        """Measured depth (m) of the tube's node when it surveyed; None where no depth brackets its time.
+
+        Nor where the string that hung there then did not reach that depth: tubes below are not known yet.
+        """
         below = self.string_below(measurement) if below is None else below
         if below is None or trust_of(measurement.flags) is Trust.UNDATED:
             return None
         bit = self.depths.at(measurement.epoch or self.epoch, measurement.station_at)
-        if bit is None or bit - below < -ABOVE_COLLAR:
+        if bit is None or bit - below < -ABOVE_COLLAR or not self.tally.reaches(bit, measurement.hops, below):
             return None
         return max(bit - below, 0.0)
 

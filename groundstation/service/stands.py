@@ -11,23 +11,23 @@ from telemetry.messages import Stand
 FIRST_EPOCH = 1  # of rig time: an encoder that has never started before
 
 
-def take_stand(depths: DepthLog, stops: Stops, stand: Stand) -> None:
+def take_stand(depths: DepthLog, stops: Stops, told: Stand) -> None:
     """Remember a stand; one that follows another at a smaller depth is a stop.
 
-    One that follows another at the same depth goes on with its stop: nothing is known of the time in between. The first
-    that is known is a stop where a tube surveyed in it, and where the encoder has started before: who hears first then
-    of a string that rests in its hole has lost what came before, and lacks the surveys of it.
+    One that follows another at the same depth goes on with its stop: nothing is known of the time in between. One that
+    follows a stop that was too short for a survey is one in its place, wherever it is: the string was lifted off. The
+    first that is known is a stop where a tube surveyed in it, and where the encoder has started before: who hears first
+    then of a string that rests in its hole has lost what came before, and lacks the surveys of it.
     """
-    depths.add_stand(stand)
-    begin = stand.epoch, stand.begun_at
-    before = [known for known in depths.stands if (known.epoch, known.begun_at) < begin]
+    stand = depths.add_stand(told)
+    if stand is None:
+        return
+    before = [known for known in depths.stands if (known.epoch, known.begun_at) < (stand.epoch, stand.begun_at)]
     whole = stand
     while before and (before[-1].epoch, before[-1].md) == (stand.epoch, stand.md):
         whole = replace(stand, begun_at=before.pop().begun_at)
-    if stand not in depths.stands:
-        return
     if before:
-        is_stop = before[-1].md < stand.md
+        is_stop = before[-1].md < stand.md or (before[-1].md > stand.md and stops.is_too_short(before[-1]))
     else:
         is_stop = stand.epoch != FIRST_EPOCH or stops.know(whole) or stops.was_surveyed(whole)
     if is_stop:

@@ -127,6 +127,10 @@ class Stops:
         """Whether a stand is that of a stop, or more of it."""
         return any(_same(stop.stand, stand) for stop in self._stops)
 
+    def is_too_short(self, stand: Stand) -> bool:
+        """Whether a stand is that of a stop, or a part of it, in which no survey was owed."""
+        return any(stop.covers(stand) and stop.lasted < SHORTEST for stop in self._stops)
+
     def was_surveyed(self, stand: Stand) -> bool:
         """Whether a survey has come that was taken during a stand."""
         return bool(self._taken.tubes_of(Stop(stand, ())))

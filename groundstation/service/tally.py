@@ -62,6 +62,10 @@ class Tally:
             return f"the bit is at {md:.2f} m, {hanging + 1} tubes speak, {hanging} of them below the collar"
         return ""
 
+    def reaches(self, md: float, hops: int, below: float) -> bool:
+        """Whether the bit can be so deep (m) under a tube so many hops down with ``below`` (m) of string below it."""
+        return hops < 1 or md <= (hops + FITS) * self._tube_length + below
+
     def length_below(self, tube: int) -> float | None:
         """Length (m) of string below a tube's node, which sits at the tube's lower end; None for an unknown tube."""
         if tube not in self.tubes:

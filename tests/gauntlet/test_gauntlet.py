@@ -137,6 +137,19 @@ def test_combined_seeds_hold(world: int, part: int) -> None:
         (1205090, ("node-cut", "encoder-from-zero", "bursts", "joint-deaf", "encoder-slips")),
         # a survey that became overdue with the last word of the run
         (1205930, ("encoder-from-zero", "bytes-rot", "boots-damaged", "force-stuck", "depth-lost")),
+        # stands that began in a doubtful time and went on after it
+        (2001346, ("cut-again-and-again", "node-memory-rots", "depth-backwards")),
+        (2012043, ("ground-off-across-stop", "node-memory-lost", "depth-jumps-down")),
+        # a stop for which the string was lifted off the bottom, as far as the depth told
+        (2007872, ("bytes-rot", "depth-lost", "depth-jumps-down", "depth-backwards")),
+        # states without a time that were sent in again, among some of an earlier start
+        (2014942, ("old-receipts", "bytes-rot", "ground-disk-refuses", "splice")),
+        # one of before that had never come up
+        (2101463, ("node-cut", "replay")),
+        # a wrong stand that was in doubt only as long as anybody listened
+        (2102135, ("frozen", "encoder-boots-lost", "depth-jumps-down")),
+        # a stranger that made up the length of a string of which one tube was not known
+        (2201462, ("node-memory-rots", "same-number", "database-deleted")),
         (51633, ("surveys-lost", "gyro-step")),  # a gyroscope that turned its tube while nobody corrected it
     ],
 )

@@ -115,7 +115,7 @@ def test_a_bit_that_moves_too_fast_from_one_epoch_to_the_next_has_jumped(by: flo
     first = DepthReading(2, 7.0, 3.0 + by, (), EPOCH + 1)
     assert log.on_reading(first, EPOCH + 1, 7.0, own + 1.0, 1e3) == reason
     stand = Stand(EPOCH + 1, 6.0, 8.0, 3.0 + by)
-    assert log.add_stand(stand) == (reason == "")
+    assert log.add_stand(stand) == (None if reason else stand)
     if reason:
         assert log.jumped == f"from 3.00 m to {3.0 + by:.2f} m in 1.0 s"
         log.accept()
@@ -182,6 +182,45 @@ def test_a_doubtful_time_stays_doubtful_over_a_start(ends: str) -> None:
     later = bit.stand(10.0)
     assert bit.log.doubt.times[-1].ended_at < later
     assert bit.log.add_stand(Stand(EPOCH, later - 1.0, later + 1.0, 2.0))
+
+
+def test_a_stand_that_began_in_a_doubtful_time_and_goes_on_is_believed_from_its_end_on() -> None:
+    """Whoever was off when the depth returned hears of the return later than it was, in the midst of a stand."""
+    bit = Bit()
+    bit.move_to(2.0)
+    bit.now += CYCLE
+    assert bit.read(3.0) == "after a jump"
+    bit.stand(10.0)
+    doubt, bit.log = bit.log.doubt, DepthLog(0.5, 5.0)
+    bit.log.recall(doubt)
+    bit.now += CYCLE
+    bit.read(2.0, heard=False)
+    before = bit.stand(20.0, heard=False)
+    bit.hear_stands()
+    heard_again = bit.now
+    assert bit.log.stands == []
+    after = bit.stand(10.0)
+    bit.hear_stands()
+    assert bit.log.stands == [Stand(EPOCH, heard_again, bit.now, 2.0)]
+    assert bit.log.at(EPOCH, before) is None
+    assert bit.log.at(EPOCH, after) == 2.0
+
+
+def test_a_wrong_stand_is_not_believed_of_the_time_in_which_nobody_heard_its_readings() -> None:
+    """It ended unheard, so nothing says that it was in doubt to its end; the depth has returned when it is heard of."""
+    bit = Bit()
+    bit.move_to(2.0)
+    bit.now += CYCLE
+    assert bit.read(3.0) == "after a jump"
+    bit.stand(10.0)
+    unheard = bit.stand(20.0, heard=False)
+    bit.now += CYCLE
+    bit.read(2.0, heard=False)
+    bit.stand(1.0, heard=False)
+    bit.hear_stands()
+    assert bit.log.jumped == ""
+    assert bit.log.at(EPOCH, unheard) is None
+    assert [stand.md for stand in bit.log.stands] == [2.0]
 
 
 def test_two_stands_that_contradict_each_other_are_both_doubtful_and_the_present_is_a_jump() -> None:

@@ -161,3 +161,18 @@ def test_surveys_are_kept_until_their_stop_is_judged(tally: Tally, monkeypatch: 
     owing = [stop.stand.begun_at for stop in stops if stop.missing]
     assert owing == [1000.0, 1100.0, 1200.0][: len(owing)]
     assert 2 <= len(owing) <= 4
+
+
+@pytest.mark.parametrize(("stood", "owed"), [(4.0, {1, 2}), (40.0, set())])
+def test_a_stop_that_was_too_short_goes_on_where_the_string_was_lifted_to(
+    tally: Tally, stood: float, owed: set[int]
+) -> None:
+    """One that was long enough owes its surveys itself; then the bit that is pulled up owes none."""
+    depths, stops = DepthLog(0.5, 5.0), Stops(tally, DUE)
+    end = 1020.0 + stood
+    for stand in (Stand(1, 1000.0, 1010.0, 4.0), Stand(1, 1020.0, end, 5.6), Stand(1, end + 4.0, end + 80.0, 4.8)):
+        take_stand(depths, stops, stand)
+    for tube in (1, 2):
+        stops.on_survey(1, 1030.0 if stood > 30.0 else 0.0, tube)
+    stops.judge(1, end + 80.0)
+    assert missing(stops) == owed

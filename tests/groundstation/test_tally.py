@@ -38,3 +38,12 @@ def test_a_restored_order_holds_until_reports_complete_another() -> None:
     assert order.tubes == [4, 3, 2, 1]
     order.on_hops(2, 3)
     assert order.tubes == [4, 3, 2, 1]
+
+
+def test_a_string_of_which_too_few_tubes_are_known_does_not_reach_the_bit() -> None:
+    """The tube was the first and, as far as is known, the last; the bit was two tubes deep when it surveyed."""
+    order = Tally(2.0)
+    assert not order.reaches(4.8, hops=1, below=0.0)
+    assert order.reaches(4.8, hops=1, below=2.0)
+    assert order.reaches(4.8, hops=2, below=0.0)
+    assert order.reaches(4.8, hops=-1, below=0.0)
