@@ -6,7 +6,8 @@ fault      evidence                                                             
 step       innovations beyond the gate that grow alike, while readings look sane   3 aidings in a row
 small step the same, by less than 0.15 deg/s, or 0.3 deg/s at 60 deg/s or more    6 aidings in a row
 slowing    a step of less than 0.22 deg/s, while the string slows down             4 aidings in a row
-winding    a step of a string that has just started, or unwinds: it may be its twist  6 aidings in a row
+winding    a step of a string that has just started: it may be its twist            6 aidings in a row
+unwinding  a step of more than 0.5 deg/s of one at rest: likewise                   7 aidings in a row
 scale      innovations beyond the gate that grow in proportion to the rate         3 aidings in a row
 ========== ======================================================================= =================
 
@@ -15,7 +16,8 @@ That is how the two are distinguished: what a ripple of the drive, a disc off it
 between two aidings comes and goes, and is a misfit (``node.kernels.doubts``). A small step is looked at for longer, for
 a part of a swing looks like one: of a swing of once a turn (ten aidings at 71 deg/s) six are never alike. A string that
 winds up as it starts, or unwinds below a standing drive head, looks like a step too, until it has: within three seconds
-it is never alike in six. So do, in three, the readings of a string that slows down which are older than they say.
+it is never alike in six while it speeds up, nor in seven however evenly it does. So do, in three, the readings of a
+string that slows down which are older than they say.
 """
 
 from __future__ import annotations
@@ -43,6 +45,7 @@ UNWINDING: Final = rate(math.radians(0.5))  # rad/s, likewise, of one that rests
 GROSS: Final = rate(math.radians(5.0))  # rad/s, from where a mismatch is a fault however it changes
 SLOWEST_SCALE: Final = rate(math.radians(5.0))  # rad/s, from where a mismatch may be one of scale
 WHILE_SLOWING: Final = DISAGREEMENTS + 1  # aidings in a row
+STILL_WANTED: Final = 2  # aidings, of a step that was seen before the scale was forgotten
 AT_ONCE, STARTING, AT_REST = constant(0), constant(1), constant(2)  # how long a mismatch is looked at
 GYRO_STEP, GYRO_SCALE = constant(Fault.GYRO_STEP), constant(Fault.GYRO_SCALE)
 
@@ -53,6 +56,13 @@ def forget(watch: Any) -> None:
     watch.left = 0
     watch.at = NONE
     watch.seen = 0
+
+
+@kernel
+def keep_newest(watch: Any) -> None:
+    """Have two aidings more show a step: what the filter had learnt, and has forgotten now, may have made it."""
+    while watch.seen > MOST_DISAGREEMENTS - STILL_WANTED:
+        drop_oldest(watch)
 
 
 @kernel
@@ -104,7 +114,12 @@ def find_mismatch(
     wanted = DISAGREEMENTS if is_large(watch, abs(usual), abs(spin), patience) else MOST_DISAGREEMENTS
     if is_slowing(watch, abs(usual), abs(spin)):
         wanted = max(wanted, WHILE_SLOWING)
-    if not (proportional or gross or (steady and watch.seen >= wanted)):
+    enough = steady and watch.seen >= wanted
+    if enough and patience == AT_REST and wanted == MOST_DISAGREEMENTS and found.steady == 0:
+        enough, found.steady = False, 1  # within three seconds it may yet have been a twist
+    elif not enough:
+        found.steady = 0
+    if not (proportional or gross or enough):
         found.refuted = 0 if steady else 1
         if watch.seen == MOST_DISAGREEMENTS or not steady:
             drop_oldest(watch)

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from typing import Any, Final
 
-from node.kernels.aiding_watch import AT_ONCE, AT_REST, STARTING, find_mismatch, forget
+from node.kernels.aiding_watch import AT_ONCE, AT_REST, STARTING, find_mismatch, forget, keep_newest
 from node.kernels.doubts import follow_jump, follow_misfit, keep_contradiction, misfit_var
 from node.kernels.events import Fault, tell
 from node.kernels.gates import RATE_AGE
@@ -116,6 +116,7 @@ def follow_doubts(node: Any, rejected: int, reset: int) -> None:
         follow_jump(node)
         if is_starting(node):
             forget_scale(node.filter, guard.ramp.scale, square(guard.ramp.scale_std))
+            keep_newest(guard.aidings)  # they contradicted by a scale that is gone
 
 
 @kernel

@@ -127,7 +127,7 @@ def test_an_angle_turned_back_opens_the_yaw_by_the_asymmetry(back_deg: float) ->
 
 
 @pytest.mark.parametrize(("patience", "size_dps", "wanted"), [
-    (AT_ONCE, 1.0, 3), (STARTING, 1.0, 6), (AT_REST, 1.0, 6), (AT_REST, 0.4, 3), (STARTING, 6.0, 3),
+    (AT_ONCE, 1.0, 3), (STARTING, 1.0, 6), (AT_REST, 1.0, 7), (AT_REST, 0.4, 3), (STARTING, 6.0, 3),
 ])  # fmt: skip
 def test_what_may_be_a_winding_string_is_looked_at_for_longer(patience: int, size_dps: float, wanted: int) -> None:
     watch, found = np.zeros(1, AIDINGS)[0], np.zeros(1, MISMATCH)[0]
