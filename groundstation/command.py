@@ -73,9 +73,9 @@ WEIGHTINGS = ("bayes", "equal", "linear", "quadratic", "cubic", "adaptive")
 @click.option(
     "--accelerometer-bias-std-deg",
     type=click.FloatRange(0.0),
-    default=0.002,
+    default=0.06,
     show_default=True,
-    help="Accelerometer bias left after calibration, as a tilt, standard deviation.",
+    help="Accelerometer bias as a tilt, standard deviation: 1 mg of the bare sensor, 0.002 of calibrated ones.",
 )
 @click.option(
     "--mount-std-deg",

@@ -16,6 +16,7 @@ from groundstation.survey.fusion import Weighting
 from groundstation.survey.resolve import Direction, known
 from telemetry import keys
 
+SENSOR_BIAS_DEG = 0.06  # of an accelerometer, as a tilt: 1 mg, of one that nobody has calibrated
 Positive = Annotated[float, Field(gt=0.0)]
 
 
@@ -31,7 +32,9 @@ class GroundConfig(BaseModel):
     keys: Path | None = Field(None, description="keys of the base, file or folder; without them everybody is believed")
     tube_length: Positive = Field(2.0, description="m, of every tube of the tally")
     gravity: Positive = Field(9.81, description="m/s^2, of the site")
-    accelerometer_bias_std_deg: float = Field(0.002, ge=0.0, description="left after calibration, as a tilt")
+    accelerometer_bias_std_deg: float = Field(
+        SENSOR_BIAS_DEG, ge=0.0, description="as a tilt; 0.002 where every sensor is calibrated"
+    )
     mount_std_deg: float = Field(0.05, ge=0.0, description="of the IMU in its tube, about the axis")
     string_transport: Literal["shortest", "parallel"] = Field(
         "shortest", description="yaw of a tube in a bent hole: that of the head, or as a shaft without twist carries it"

@@ -7,18 +7,18 @@ from collections.abc import Iterator
 
 import numpy as np
 
+from groundstation.config import SENSOR_BIAS_DEG
 from groundstation.service.model import RigModel
 from groundstation.survey.force_biases import Look, SurveyedBiases, look_of, solve_biases
 from groundstation.survey.trust import Trust
 
-SENSOR_STD_DEG = 0.06  # as a tilt: 1 mg, of a sensor whose calibration nobody answers for any more
 GRAVITY_STD = 2e-3  # m/s^2, of what is entered for the site
 
 
 def surveyed_biases(k: RigModel) -> SurveyedBiases:
     """What all surveys that count tell; those of tubes that get no block help to know the stations."""
     config = k.config
-    bias_std = math.radians(max(config.accelerometer_bias_std_deg, SENSOR_STD_DEG)) * config.gravity
+    bias_std = math.radians(max(config.accelerometer_bias_std_deg, SENSOR_BIAS_DEG)) * config.gravity
     looks = list(_looks(k))
     found = solve_biases(looks, bias_std, GRAVITY_STD)
     refused = {tube: reason for tube in found if (reason := _why_not(k, tube))}

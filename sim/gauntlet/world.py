@@ -14,6 +14,7 @@ TUBE_LENGTH = 2.0  # m
 COMMON: dict[str, Any] = {
     "rig": {"tubes": 2, "tube_length_m": TUBE_LENGTH, "tubes_at_start": 2},
     "path": {"straight": {"inclination_deg": 3.0, "azimuth_deg": 40.0}},
+    "accelerometer": {"bias_std_deg": 0.002},  # calibrated
 }
 # a string of two tubes rests, drills a part of a length and is surveyed
 MINUTE = COMMON | {

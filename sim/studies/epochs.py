@@ -15,7 +15,7 @@ import numpy.typing as npt
 from node.kernels.layout import PERIOD, Scheme
 from sim.rig.direct_string import DirectString
 from sim.studies.lab import ACCELERATION_DPS2, RATE_DPS, TURNS
-from sim.studies.scenarios import Tables, complete
+from sim.studies.scenarios import CALIBRATED, Tables, complete
 from sim.world.scenario import scenario_of
 from sim.world.world import World
 
@@ -27,6 +27,7 @@ RESTING: Tables = {
     "path": {"straight": {"inclination_deg": 2.0}},
     "schedule": {"add_s": 60.0, "stop_s": 60.0, "finish_s": 5.0, "blocks": BLOCKS},
     "rotation": {"turns": TURNS, "rate_dps": RATE_DPS, "acceleration_dps2": ACCELERATION_DPS2},
+    "accelerometer": CALIBRATED,
     "medium": {"link": "off"},
 }
 

@@ -140,10 +140,12 @@ class GyroSection(Section):
 
 
 class AccelerometerSection(Section):
-    """Accelerometer of every node, after calibration."""
+    """Accelerometer of every node, as its readings come: the sensor's own, or what a calibration has left of it."""
 
     noise_deg: NotNegative = Field(0.02, description="one 1.9 Hz sample, as a tilt")
-    bias_std_deg: NotNegative = Field(0.002, description="left after calibration, each axis, as a tilt")
+    bias_std_deg: NotNegative = Field(
+        0.06, description="each axis, as a tilt: 1 mg of a sensor that is not calibrated; 0.002 of one that is"
+    )
     vibration_mps2: NotNegative = Field(0.05, description="while drilling")
     radius_m: NotNegative = Field(0.02, description="of the IMU from the tube axis")
     gravity_mps2: Positive = 9.81

@@ -14,6 +14,7 @@ from telemetry.messages import ImuMean, Mode, NodeFlag, NodeState, Side, SurveyM
 from telemetry.presentation.msgpack_codec import encode
 
 VAR = (0.0034**2) / 32
+CALIBRATED = {"accelerometer_bias_std_deg": 0.002}
 COV = ((VAR, 0.0, 0.0), (0.0, VAR, 0.0), (0.0, 0.0, VAR))
 
 
@@ -21,7 +22,7 @@ class Rig:
     """A ground station and the station of tube 1, joined directly by hand: frames in, frames out."""
 
     def __init__(self, folder: Path, **settings: Any) -> None:
-        self.ground = GroundProcess(GroundConfig(folder=folder, **settings))
+        self.ground = GroundProcess(GroundConfig(folder=folder, **CALIBRATED | settings))
         self.tube = Endpoint(1, frozenset(Side), boot_count=1, is_clock_root=True)
         self.now = 1000.0
         self.source = DepthSource()

@@ -14,11 +14,11 @@ import pytest
 from memory_rig import Rig
 from schemas import check_answer
 
-from groundstation.config import GroundConfig
+from groundstation.config import SENSOR_BIAS_DEG, GroundConfig
 from groundstation.errors import SelectorError
 from groundstation.service import key_fields
 from groundstation.service.model import RigModel
-from groundstation.service.surveyed_biases import GRAVITY_STD, SENSOR_STD_DEG, surveyed_biases
+from groundstation.service.surveyed_biases import GRAVITY_STD, surveyed_biases
 from groundstation.survey.force_biases import ForceBias
 from telemetry.messages import ImuMean, NodeFlag, SurveyMeasurement
 from telemetry.parameters import ParameterBlock, SensorParameters
@@ -66,12 +66,12 @@ class Drilled:
         return model
 
 
-def found_by(folder: Path, hole: Drilled, stated_deg: float = SENSOR_STD_DEG) -> dict[int, ForceBias]:
+def found_by(folder: Path, hole: Drilled, stated_deg: float = SENSOR_BIAS_DEG) -> dict[int, ForceBias]:
     config = GroundConfig(folder=folder, mount_std_deg=0.0, accelerometer_bias_std_deg=stated_deg)
     return surveyed_biases(hole.tell(RigModel(config))).found
 
 
-@pytest.mark.parametrize(("stated_deg", "known_mg"), [(SENSOR_STD_DEG, 0.1), (0.002, 1.0)])
+@pytest.mark.parametrize(("stated_deg", "known_mg"), [(SENSOR_BIAS_DEG, 0.1), (0.002, 1.0)])
 def test_any_tool_faces_show_the_biases_as_well_as_stated(tmp_path: Path, stated_deg: float, known_mg: float) -> None:
     """A ground station that was told of small biases takes large ones for a hole that moved, and so knows less."""
     squares, stds = [], []
@@ -95,7 +95,7 @@ def test_one_tube_by_itself_shows_what_lies_along_gravity_and_little_across(tmp_
     hole = Drilled(4)
     hole.surveys = [placed for placed in hole.surveys if placed[0].tube == 2]
     (one,) = found_by(tmp_path, hole).values()
-    across = np.sqrt(np.diagonal(one.cov))[:2] / (SENSOR_STD_DEG * DEG * G)
+    across = np.sqrt(np.diagonal(one.cov))[:2] / (SENSOR_BIAS_DEG * DEG * G)
     assert np.all((across > 0.5) & (across < 1.0))  # by the sizes of its forces, which lean
     assert abs(one.bias[2] - hole.biases[2][2]) < 3.0 * math.sqrt(one.cov[2, 2]) < 1.0 * MILLI_G
 
@@ -105,7 +105,7 @@ def test_a_survey_whose_yaw_is_not_believed_says_nothing_of_a_bias(tmp_path: Pat
     before = found_by(tmp_path, hole)
     wrong, md = hole.surveys[-1]
     forged = replace(wrong, sequence=99, yaw=wrong.yaw + 2.0, station_at=wrong.station_at + 30.0)
-    config = GroundConfig(folder=tmp_path, mount_std_deg=0.0, accelerometer_bias_std_deg=SENSOR_STD_DEG)
+    config = GroundConfig(folder=tmp_path, mount_std_deg=0.0, accelerometer_bias_std_deg=SENSOR_BIAS_DEG)
     model = hole.tell(RigModel(config))
     assert model.on_survey(replace(forged, flags=NodeFlag.YAW_UNTRUSTED), md) == "survey_untrusted"
     after = surveyed_biases(model).found

@@ -35,6 +35,7 @@ class StringOfOne:
             "path": {"straight": {"inclination_deg": 2.0}},
             "schedule": {"add_s": 60.0, "stop_s": 60.0, "finish_s": 5.0, "blocks": blocks},
             "joints": {"reading_std_deg": 0.0, "mount_std_deg": 0.0},
+            "accelerometer": {"bias_std_deg": 0.002},
             "clocks": {"joint_std_ms": 0.0, "wander_std_ms": 0.0, "stated_std_ms": 0.1},
             "medium": {"link": "off", "loss": loss},
             **changed,

@@ -53,7 +53,7 @@ def refusal(scenario: Path, *faults: str) -> str:
         ("stop_s = 26.0", "stop_s = 26.0\nbegin_s = inf", "schedule.begin_s"),
         ("add_s = 58.0", "add_s = 10.0\njoint_s = 10.0", "schedule.joint_s"),
         ("[rig]", "[gyroscope]\nconstant_bias_dps = [nan, 0, 0]\n[rig]", "gyroscope.constant_bias_dps"),
-        ("[rig]", "[accelerometer]\nnoise_deg = inf\n[rig]", "accelerometer.noise_deg"),
+        ("bias_std_deg = 0.002", "noise_deg = inf", "accelerometer.noise_deg"),
         ("[rig]", "[medium]\nlatency_ms = inf\n[rig]", "medium.latency_ms"),
         ("[rig]", "[medium]\nloss = 0.95\n[rig]", "medium.loss"),
         ("[rig]", '[node]\nscheme = "guess"\n[rig]', "node.scheme"),

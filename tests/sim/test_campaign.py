@@ -41,6 +41,7 @@ def scenario(**changed: dict[str, Any]) -> Scenario:
         "path": {"straight": {"inclination_deg": 20.0, "azimuth_deg": 35.0}},
         "schedule": {"add_s": 58.0, "stop_s": 32.0, "finish_s": 5.0},
         "rotation": {"turns": 5.0},
+        "accelerometer": {"bias_std_deg": 0.002},
         "medium": {"link": "off"},
     }
     return scenario_of({name: usual.get(name, {}) | changed.get(name, {}) for name in usual | changed})

@@ -26,7 +26,7 @@ from groundstation.survey.transport import carry
 from node.kernels.angles import wrap
 from sim.rig.direct_string import DirectString, Survey
 from sim.studies.pool import Step, over_cores, seeded
-from sim.studies.scenarios import Tables, changed
+from sim.studies.scenarios import CALIBRATED, Tables, changed
 from sim.world.scenario import scenario_of
 from sim.world.world import World
 
@@ -39,6 +39,7 @@ BASE: Tables = {
     "schedule": {"add_s": 60.0, "stop_s": 40.0, "finish_s": 5.0},
     "rotation": {"turns": 7.3},
     "encoder": {"phase": "random"},
+    "accelerometer": CALIBRATED,
     "medium": {"link": "off"},
 }
 HOLES = {

@@ -25,6 +25,7 @@ from groundstation.survey.trajectory import Trajectory
 from sim.studies.epochs import resting, run_seed
 from sim.studies.pool import RunAll, Step, over_cores
 from sim.studies.published import wellbore_1
+from sim.studies.scenarios import CALIBRATED
 from sim.world.borehole import Borehole
 from sim.world.scenario import AccelerometerSection, JointSection
 from sim.world.streams import Stream, stream
@@ -59,7 +60,7 @@ class Rig:
 
     def __init__(self, seed: int) -> None:
         self.random = stream(seed, Stream.WELLS)
-        joints, accelerometer = JointSection(), AccelerometerSection()
+        joints, accelerometer = JointSection(), AccelerometerSection(**CALIBRATED)
         self.joint_std = math.radians(joints.reading_std_deg)
         self.mount_std = math.radians(joints.mount_std_deg)
         self.gravity = accelerometer.gravity_mps2
