@@ -157,6 +157,36 @@ LIMITS: Columns = (
     ("ratio", "of the bound"),
     ("nees", "NEES"),
 )
+BRIDGING: Columns = (
+    ("case", "case"),
+    ("quantity", "quantity"),
+    ("alone_deg", "bound of one, deg"),
+    ("together_deg", "of ten together"),
+    ("play_deg", "play that takes it, deg"),
+    ("azimuth_alone_deg", "azimuth of 32 points, one, deg"),
+    ("azimuth_together_deg", "ten"),
+)
+WORLDS: Columns = (
+    ("case", "case"),
+    ("quantity", "rms, deg, of"),
+    ("published", "published"),
+    ("to_reach", "to reach"),
+    ("assumed", "assumed world"),
+    ("assumed_low", "low"),
+    ("assumed_high", "high"),
+    ("assumed_nees", "NEES"),
+    ("rough", "rough world"),
+    ("rough_low", "low"),
+    ("rough_high", "high"),
+    ("rough_nees", "NEES"),
+)
+WORLDS_CONSISTENCY: Columns = (
+    ("case", "case"),
+    ("assumed_deg", "assumed world: yaw rms, deg"),
+    ("assumed_nees", "NEES"),
+    ("rough_deg", "rough world: yaw rms, deg"),
+    ("rough_nees", "NEES"),
+)
 FORCE_BIAS: Columns = (
     ("case", "inclination, stop"),
     ("azimuth_measured_deg", "azimuth rms as measured, deg"),

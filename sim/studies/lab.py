@@ -53,6 +53,7 @@ class LabRun:
 
     error: Array  # rad, at the end of every cycle
     var: Array  # rad^2, as the node states it
+    total_var: Array  # rad^2, with its systematic part
     bias_error: Array  # rad/s, z gyroscope, estimate minus truth
     azimuth_error: Array  # (hops,) rad, mean force and mean yaw of the window of rest
     survey_error: Array  # (hops,) rad, of the node's own last survey; NaN if it made none
@@ -73,6 +74,7 @@ def judge(world: World, run: StringRun) -> LabRun:
     return LabRun(
         run.error[:, ::-1],
         run.var[:, ::-1],
+        run.total_var[:, ::-1],
         bias,
         np.array([_azimuth_of_rest(world, run, tube) for tube in tubes]),
         np.array([_azimuth_of_survey(surveys.get(tube)) for tube in tubes]),
@@ -80,7 +82,7 @@ def judge(world: World, run: StringRun) -> LabRun:
 
 
 def _azimuth_of_rest(world: World, run: StringRun, tube: int) -> float:
-    force = np.array([world.imu_sample(tube, int(cycle))[3:] for cycle in np.flatnonzero(REST)])
+    force = np.array([world.imu_sample(tube, int(cycle))[3:6] for cycle in np.flatnonzero(REST)])
     yaw = run.yaw[REST, tube - 1]
     mean = float(yaw[0] + np.mean(wrapped(yaw - yaw[0])))
     return _azimuth(force.mean(axis=0), np.cov(force.T) / len(force), mean, float(run.var[REST, tube - 1].mean()))

@@ -70,7 +70,7 @@ class RoughRun:
 
     def perfect(self, truth: TubeTruth, frame: Array) -> tuple[Array, Array]:
         """Rates and forces (n, 3) on the grid in the frame of an IMU (3, 3), rad/s and m/s^2."""
-        rate, force = truth.rate(self.moved.t), truth.force(self.moved.t)
+        rate, force = truth.rate_and_force(self.moved.t)
         if self._section.latitude_deg is not None:
             rate = rate + earth_rate(self._section.latitude_deg, truth.attitude(self.moved.t))
         return rate @ frame.T, force @ frame.T

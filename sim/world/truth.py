@@ -100,6 +100,12 @@ class TubeTruth:
         along = self._along(t)
         return self._force(t, along, self._attitude(t, along[0]))
 
+    def rate_and_force(self, t: Array) -> tuple[Array, Array]:
+        """Both at once: body rate (rad/s) and specific force (m/s^2), (n, 3) each."""
+        along = self._along(t)
+        attitude = self._attitude(t, along[0])
+        return self._rate(t, along, attitude), self._force(t, along, attitude)
+
     def _attitude(self, t: Array, tangent: Array) -> Array:
         return np.asarray(lean_rotation(tangent) @ _turn(self.yaw(t)))
 

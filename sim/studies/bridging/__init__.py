@@ -1,0 +1,1 @@
+"""What gyroscopes that bridge outages together could gain."""

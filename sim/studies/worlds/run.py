@@ -1,0 +1,182 @@
+"""Every figure asked of the filter in two worlds, the one that it assumes and a rough one, beside each other.
+
+The assumed world is that of the other studies: noise, clocks, drive and encoder as the filter models them. The rough
+one is `scenarios/rough.toml`, all of its disturbances at once, upon the same strings under the same aiding. Untold
+twist is left out there: one that is wound up once and is smaller than what the scale factor may be off is seen by
+nobody (docs/field.md), and every row would show the same tenth of a degree. The first row has it, by itself.
+
+NEES is of the yaw against everything that the node states, doubts and the errors of joints and mounts included.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+
+from node.kernels.layout import Scheme
+from sim.studies import epochs, lab
+from sim.studies.consistency.run import SHOWN, setup_of
+from sim.studies.lab import LAB, REST, ROTATING, LabRun
+from sim.studies.modes.run import CASES, Case, setups
+from sim.studies.pool import Step, over_cores, seeded
+from sim.studies.scenarios import Tables, changed, complete
+from sim.studies.trials import rms_deg
+from sim.world.parsing import read_toml
+from sim.world.shipped import shipped_folder
+
+World = Callable[[Tables], Tables]
+FILE = "rough.toml"
+FIRST, LONG = "update-modes", "fifty-nodes"
+TWIST = Case("continuous 1.9 Hz, untold twist", LAB, None, 0.013, 0.035)
+
+
+def assumed(setup: Tables) -> Tables:
+    """The world of the filter's own model."""
+    return setup
+
+
+def twisted(setup: Tables) -> Tables:
+    """The rough world as it is shipped."""
+    shipped = read_toml(shipped_folder() / FILE)
+    return changed(setup, rough=shipped["rough"], encoder=shipped["encoder"])
+
+
+def rough(setup: Tables) -> Tables:
+    """The rough world without untold twist."""
+    tables = twisted(setup)["rough"]
+    kept = {key: value for key, value in tables["string"].items() if key != "twist_deg"}
+    return changed(twisted(setup), rough={**tables, "string": kept})
+
+
+WORLDS: dict[str, World] = {"assumed": assumed, "rough": rough}
+ALL, CONSISTENCY = "all", "consistency"
+
+
+@dataclass(frozen=True, slots=True)
+class Job:
+    """A string in either world, how many of its seeds, and which figures are of it; none: its consistency."""
+
+    worlds: dict[str, Tables]
+    seeds: int
+    cases: tuple[Case, ...] = ()
+
+
+def jobs_of(part: str, seeds: int, string_seeds: int, hops: int) -> list[Job]:
+    """What one part, or all, runs."""
+    jobs = []
+    for name in (name for name in CASES if part in (ALL, name)):
+        if name == FIRST:
+            jobs.append(Job({"assumed": LAB, "rough": twisted(LAB)}, seeds, (TWIST,)))
+        for setup, cases in setups(name):
+            if name == LONG:
+                of_last = tuple(shortened(case, hops) for case in cases)
+                jobs.append(Job(in_both(changed(setup, rig=complete(hops))), string_seeds, of_last))
+            else:
+                jobs.append(Job(in_both(setup), seeds, tuple(cases)))
+    if part in (ALL, CONSISTENCY):
+        jobs.append(Job(in_both(setup_of(Scheme.FORWARD, hops)), string_seeds))
+    return jobs
+
+
+def in_both(setup: Tables) -> dict[str, Tables]:
+    """A setup in either world."""
+    return {world: of(setup) for world, of in WORLDS.items()}
+
+
+def shortened(case: Case, hops: int) -> Case:
+    """The last node of a string of so many."""
+    return replace(case, name=f"node {hops} of {hops}", hop=hops - 1)
+
+
+def steps(part: str, seeds: int, string_seeds: int, hops: int) -> int:
+    """Runs of both worlds."""
+    return sum(len(job.worlds) * job.seeds for job in jobs_of(part, seeds, string_seeds, hops))
+
+
+def run(part: str, seeds: int, string_seeds: int, hops: int, step: Step) -> dict[str, Any]:
+    """Both tables; ``step`` is called after each run.
+
+    Parameters
+    ----------
+    part : the name of a table of modes, ``consistency``, or ``all``
+    seeds : of strings of one and two nodes
+    string_seeds : of the long string
+    hops : that it has
+
+    Returns
+    -------
+    dict
+        ``cases``: a row for each figure asked; ``consistency``: one for each epoch and hop.
+    """
+    result: dict[str, Any] = {"experiment": "worlds", "seeds": seeds, "string_seeds": string_seeds, "hops": hops}
+    result["cases"], result[CONSISTENCY] = [], []
+    with over_cores(max(seeds, string_seeds), step) as run_all:
+        for job in jobs_of(part, seeds, string_seeds, hops):
+            seeded_of = {world: seeded(setup, job.seeds) for world, setup in job.worlds.items()}
+            if job.cases:
+                runs = {world: run_all(lab.run_seed, of) for world, of in seeded_of.items()}
+                result["cases"] += [row for case in job.cases for row in rows_of(case, runs)]
+            else:
+                result[CONSISTENCY] += consistency(
+                    {world: run_all(epochs.run_seed, of) for world, of in seeded_of.items()}
+                )
+    return result
+
+
+def rows_of(case: Case, runs: dict[str, list[LabRun]]) -> list[dict[str, Any]]:
+    """Figures of one case in either world."""
+    hop = case.hop
+    told: list[tuple[str, float | None, Callable[[LabRun], Any], Any]] = [
+        ("yaw", case.yaw, lambda one: one.error[REST, hop], REST),
+        ("azimuth", case.azimuth, lambda one: one.azimuth_error[hop : hop + 1], None),
+        ("yaw, rotating", case.rotating, lambda one: one.error[ROTATING, hop], ROTATING),
+    ]
+    rows = []
+    for quantity, to_reach, error, when in told:
+        row: dict[str, Any] = {"case": case.name, "quantity": quantity, "to_reach": to_reach}
+        row["published"] = case.published if quantity == "azimuth" else None
+        for world, found in runs.items():
+            row[world], row[f"{world}_low"], row[f"{world}_high"] = rms_deg([error(one) for one in found])
+            row[f"{world}_nees"] = None if when is None else nees_of(found, when, hop)
+        rows.append(row)
+    return rows
+
+
+def nees_of(runs: Sequence[LabRun], when: lab.Mask, hop: int) -> float:
+    """Mean of error^2 over the variance stated with its systematic part."""
+    return float(np.mean([one.error[when, hop] ** 2 / one.total_var[when, hop] for one in runs]))
+
+
+def consistency(found: dict[str, list[epochs.EpochRun]]) -> list[dict[str, Any]]:
+    """NEES at fixed epochs with the errors of joints and mounts, in either world: one row an epoch and hop."""
+    turning = next(iter(found.values()))[0].turning
+    rows = []
+    for epoch, turns in enumerate(turning):
+        state = "turning" if turns else "at rest"
+        for hop in (h for h in SHOWN if h <= next(iter(found.values()))[0].error.shape[1]):
+            row: dict[str, Any] = {"case": f"{state} {epoch // 2 + 1}, hop {hop}"}
+            for world, runs in found.items():
+                error = np.array([one.total_error[epoch, hop - 1] for one in runs])
+                var = np.array([one.total_var[epoch, hop - 1] for one in runs])
+                row[f"{world}_deg"] = math.degrees(math.sqrt(float(np.mean(error**2))))
+                row[f"{world}_nees"] = float(np.mean(error**2 / var))
+            rows.append(row)
+    return rows
+
+
+def verdicts(result: dict[str, Any]) -> list[str]:
+    """In each world: how many figures are reached, and how far from 1 the NEES is."""
+    lines = []
+    asked = [row for row in result["cases"] if row["to_reach"] is not None]
+    for world in WORLDS:
+        reached = sum(row[world] <= row["to_reach"] for row in asked)
+        words = [f"{reached} of {len(asked)} figures reached"] if asked else []
+        for rows, of in ((result["cases"], "NEES"), (result[CONSISTENCY], "NEES along the string")):
+            stated = [row[f"{world}_nees"] for row in rows if row[f"{world}_nees"] is not None]
+            words += [f"{of} {min(stated):.2g} to {max(stated):.2g}"] if stated else []
+        lines.append(f"{world}: {', '.join(words)}")
+    return lines

@@ -1,0 +1,49 @@
+"""The study of both worlds: what its rough one is made of, and that its assumed one is the other studies'."""
+
+import pytest
+
+from node.kernels.layout import Scheme
+from sim.studies.bridging.run import mean_of
+from sim.studies.consistency.run import setup_of, table
+from sim.studies.epochs import run_seed
+from sim.studies.lab import LAB
+from sim.studies.limits.bound import Model
+from sim.studies.worlds.run import jobs_of, rough, run, steps, twisted
+from sim.world.parsing import read_toml
+from sim.world.shipped import shipped_folder
+
+SEEDS = 2
+
+
+def test_the_rough_world_is_the_one_that_is_shipped_but_for_its_untold_twist() -> None:
+    shipped = read_toml(shipped_folder() / "rough.toml")
+    assert twisted(LAB) == {**LAB, "rough": shipped["rough"], "encoder": shipped["encoder"]}
+    string = dict(shipped["rough"]["string"])
+    assert string.pop("twist_deg") > 0.0
+    assert rough(LAB)["rough"] == {**shipped["rough"], "string": string}
+
+
+@pytest.mark.parametrize("part", ["all", "update-modes", "single-updates", "two-nodes", "fifty-nodes", "consistency"])
+def test_every_part_runs_as_often_as_it_says(part: str) -> None:
+    jobs = jobs_of(part, 5, 3, 7)
+    assert steps(part, 5, 3, 7) == sum(2 * job.seeds for job in jobs)
+    assert {job.seeds for job in jobs} <= {3, 5}
+    assert all(case.hop < job.worlds["rough"]["rig"]["tubes"] <= 7 for job in jobs for case in job.cases)
+
+
+@pytest.mark.slow
+def test_its_assumed_world_is_that_of_the_consistency_study() -> None:
+    done: list[None] = []
+    found = run("consistency", SEEDS, SEEDS, 2, lambda: done.append(None))
+    assert len(done) == steps("consistency", SEEDS, SEEDS, 2)
+    runs = [run_seed((setup_of(Scheme.FORWARD, 2), seed)) for seed in range(1, SEEDS + 1)]
+    expected = [row["nees_total"] for row in table(Scheme.FORWARD, runs)]
+    assert [row["assumed_nees"] for row in found["consistency"]] == pytest.approx(expected)
+    assert all(row["rough_nees"] > 0.0 and row["rough_deg"] != row["assumed_deg"] for row in found["consistency"])
+
+
+def test_the_mean_of_gyroscopes_shares_the_errors_of_the_aiding() -> None:
+    one = Model(1e-4, 2e-5, 16.0, 1e-3, 5e-3, 1e-4)
+    ten = mean_of(one, 4)
+    assert (ten.noise, ten.bias_std, ten.scale_std) == (0.5e-4, 1e-5, 0.5e-3)
+    assert (ten.bias_tau, ten.stamp_std, ten.stamp_walk) == (one.bias_tau, one.stamp_std, one.stamp_walk)
