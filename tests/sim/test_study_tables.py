@@ -22,7 +22,8 @@ from sim.studies.table import STUDIES
 
 RESULTS = Path(__file__).parents[2] / "docs" / "results"
 # the longest with two seeds; the modes share the code of two-nodes, the others have tests of their own
-LONG = {"ingredients", "worlds", "update-modes", "single-updates", "fifty-nodes", "delay", "consistency", "outage", "bent-holes"}
+LONG = {"ingredients", "update-modes", "single-updates", "fifty-nodes", "delay", "consistency", "outage", "bent-holes"}
+LONG |= {"worlds"}
 STUDY = """
     from groundstation.report.style import new_figure
 
