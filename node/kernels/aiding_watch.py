@@ -115,8 +115,8 @@ def find_mismatch(
     if is_slowing(watch, abs(usual), abs(spin)):
         wanted = max(wanted, WHILE_SLOWING)
     enough = steady and watch.seen >= wanted
-    if enough and patience == AT_REST and wanted == MOST_DISAGREEMENTS and found.steady == 0:
-        enough, found.steady = False, 1  # within three seconds it may yet have been a twist
+    if enough and patience == AT_REST and abs(usual) >= UNWINDING and found.steady == 0:
+        enough, found.steady = False, 1  # one more: within three seconds it may yet have been a twist
     elif not enough:
         found.steady = 0
     if not (proportional or gross or enough):

@@ -134,7 +134,9 @@ def test_both_worlds_show_the_same(name: str) -> None:
     told = np.array([[s.told[s.turning | s.resting].mean() for s in here], [s.told.mean() for s in there]])
     for when in ("turning", "resting"):
         ours, theirs = (np.sqrt([np.mean(s.error[getattr(s, when)] ** 2) for s in runs]) for runs in (here, there))
-        # medians of runs, for the tails of rows that are not mastered yet hang on single resets
-        assert 1 / 3 < np.median(ours) / np.median(theirs) < 3, when
+        # pairs of runs, for tails hang on single resets; and whether an index comes before one is even odds in either
+        # world, so that a median of runs is of one half here and of the other there
+        assert np.mean(3.0 * ours[:, None] > theirs) > 0.5, when
+        assert np.mean(3.0 * theirs[:, None] > ours) > 0.5, when
     assert abs(told[0].mean() - told[1].mean()) < 0.35
     assert np.mean([s.surveys for s in here]) == np.mean([s.surveys for s in there]) == BLOCKS
