@@ -26,6 +26,7 @@ class Rig:
         self.tube = Endpoint(1, frozenset(Side), boot_count=1, is_clock_root=True)
         self.now = 1000.0
         self.source = DepthSource()
+        self.hops: dict[int, int] = {}  # as each tube has told them last
 
     md = 0.0
 
@@ -65,6 +66,7 @@ class Rig:
         self.run(1.0)
 
     def tell(self, tube: int, hops: int, scale: float = 0.0) -> None:
+        self.hops[tube] = hops
         state = NodeState(
             tube, self.now, hops, Mode.TRACKING, 1.0, 1e-6, 1e-6, (0.0, 0.0, 0.0), scale, 0.0, 1e-6, 0.1, 1e-8,
             NodeFlag.NONE, 5, 0,
@@ -92,7 +94,8 @@ class Rig:
     def survey(self, tube: int, sequence: int, inclination_deg: float = 2.0, flags: NodeFlag = NodeFlag.NONE) -> None:
         lean = math.radians(inclination_deg)
         imus = (ImuMean((9.81 * math.sin(lean), 0.0, -9.81 * math.cos(lean)), COV),)
-        message = SurveyMeasurement(tube, sequence, self.now, 1, imus, 0.0, 1e-8, 1e-8, 32, 20.0, flags)
+        hops = self.hops.get(tube, 1)
+        message = SurveyMeasurement(tube, sequence, self.now, hops, imus, 0.0, 1e-8, 1e-8, 32, 20.0, flags)
         self.tube.submit(message, self.now)
         self.run(2.0)
         self.read_depth(self.md)
