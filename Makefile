@@ -79,7 +79,7 @@ statistical: $(STAMP)  ## the statistical tests at full size, properties with mo
 	HYPOTHESIS_PROFILE=study $(PYTEST) -m "hypothesis and not statistical"
 
 truth: $(STAMP)  ## the table of the field by a second world, beside the study's
-	PYTHONPATH=tests/truth $(BIN)/python tests/truth/both_tables.py 20
+	PYTHONPATH=tests/truth $(BIN)/python tests/truth/both_tables.py 100
 
 explore: $(STAMP)  ## the properties with examples that no run before has seen
 	HYPOTHESIS_PROFILE=explore $(BIN)/python -m pytest -m hypothesis

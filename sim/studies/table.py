@@ -217,9 +217,9 @@ STUDIES = by_name(
                 ),
             ),
             (
-                Option("part", "all", choices=("all", *MODES, "consistency")),
-                Option("string-seeds", 6, 2, 10_000, help="Of the long string."),
-                Option("hops", 50, 2, 50, help="Of the long string."),
+                Option("part", "all", choices=("all", *MODES, "consistency"), help="One table of both, or all."),
+                Option("string-seeds", 6, 2, 10_000, help="Seeds of the long string."),
+                Option("hops", 50, 2, 50, help="Nodes of the long string."),
                 Option("seeds", 20, 2, 10_000),
             ),
             drawn=False,
