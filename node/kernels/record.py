@@ -62,7 +62,7 @@ MISMATCH: Final = np.dtype(
         ("fault", "i8"),  # ``Fault``; 0: there is none
         ("rate", "f8"),  # rad/s, true minus measured
         ("spin", "f8"),  # rad/s, true
-        ("steady", "i8"),  # 1: the aidings show the same
+        ("steady", "i8"),  # 1: the aidings show the same, also while one more of a string at rest is waited for
         ("refuted", "i8"),  # 1: the aiding was rejected, and not for a step of the gyroscope
     ],
     align=True,

@@ -22,8 +22,10 @@ from sim.studies.table import STUDIES
 
 RESULTS = Path(__file__).parents[2] / "docs" / "results"
 # the longest with two seeds; the modes share the code of two-nodes, the others have tests of their own
-LONG = {"ingredients", "update-modes", "single-updates", "fifty-nodes", "delay", "consistency", "outage", "bent-holes"}
-LONG |= {"worlds"}
+LONG = {
+    *("ingredients", "update-modes", "single-updates", "fifty-nodes", "delay", "consistency", "outage", "bent-holes"),
+    "worlds",
+}
 STUDY = """
     from groundstation.report.style import new_figure
 

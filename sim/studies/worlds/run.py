@@ -47,9 +47,9 @@ def twisted(setup: Tables) -> Tables:
 
 def rough(setup: Tables) -> Tables:
     """The rough world without untold twist."""
-    tables = twisted(setup)["rough"]
-    kept = {key: value for key, value in tables["string"].items() if key != "twist_deg"}
-    return changed(twisted(setup), rough={**tables, "string": kept})
+    tables = twisted(setup)
+    string = {key: value for key, value in tables["rough"]["string"].items() if key != "twist_deg"}
+    return changed(tables, rough={"string": string})
 
 
 WORLDS: dict[str, World] = {"assumed": assumed, "rough": rough}
