@@ -8,6 +8,7 @@ small step the same, by less than 0.15 deg/s, or 0.3 deg/s at 60 deg/s or more  
 slowing    a step of less than 0.22 deg/s, while the string slows down             4 aidings in a row
 winding    a step of a string that has just started: it may be its twist            6 aidings in a row
 unwinding  a step of more than 0.5 deg/s of one at rest: likewise                   7 aidings in a row
+outliers   a step of any size, where an aiding was wrong lately                     4 aidings in a row
 scale      innovations beyond the gate that grow in proportion to the rate         3 aidings in a row
 ========== ======================================================================= =================
 
@@ -17,7 +18,8 @@ between two aidings comes and goes, and is a misfit (``node.kernels.doubts``). A
 a part of a swing looks like one: of a swing of once a turn (ten aidings at 71 deg/s) six are never alike. A string that
 winds up as it starts, or unwinds below a standing drive head, looks like a step too, until it has: within three seconds
 it is never alike in six while it speeds up, nor in seven however evenly it does. So do, in three, the readings of a
-string that slows down which are older than they say.
+string that slows down which are older than they say. And where one aiding in five is wrong, three in a row may be, each
+by about as much more than the one before.
 """
 
 from __future__ import annotations
@@ -44,7 +46,8 @@ WINDING: Final = rate(math.radians(0.15))  # rad/s, from where one of a string t
 UNWINDING: Final = rate(math.radians(0.5))  # rad/s, likewise, of one that rests
 GROSS: Final = rate(math.radians(5.0))  # rad/s, from where a mismatch is a fault however it changes
 SLOWEST_SCALE: Final = rate(math.radians(5.0))  # rad/s, from where a mismatch may be one of scale
-WHILE_SLOWING: Final = DISAGREEMENTS + 1  # aidings in a row
+ONE_MORE: Final = DISAGREEMENTS + 1  # aidings in a row, of a string that slows, or where an aiding was wrong lately
+REMEMBERED: Final = 32  # aidings used, for which one that was wrong is
 STILL_WANTED: Final = 2  # aidings, of a step that was seen before the scale was forgotten
 AT_ONCE, STARTING, AT_REST = constant(0), constant(1), constant(2)  # how long a mismatch is looked at
 GYRO_STEP, GYRO_SCALE = constant(Fault.GYRO_STEP), constant(Fault.GYRO_SCALE)
@@ -92,6 +95,8 @@ def find_mismatch(
     elif -grown > HALF_TURN:
         grown += WHOLE_TURN
     elapsed = now - watch.at if is_number(watch.at) else 0
+    if rejected == 0:
+        watch.wrong = REMEMBERED if watch.left != 0 else max(watch.wrong - 1, 0)
     watch.left = 0 if reset == 1 or rejected == 0 else innovation
     watch.at = now
     if rejected == 0:
@@ -112,8 +117,8 @@ def find_mismatch(
     steady, proportional = is_steady(watch, usual), is_proportional(watch)
     gross = abs(mismatch) >= GROSS
     wanted = DISAGREEMENTS if is_large(watch, abs(usual), abs(spin), patience) else MOST_DISAGREEMENTS
-    if is_slowing(watch, abs(usual), abs(spin)):
-        wanted = max(wanted, WHILE_SLOWING)
+    if watch.wrong > 0 or is_slowing(watch, abs(usual), abs(spin)):
+        wanted = max(wanted, ONE_MORE)
     enough = steady and watch.seen >= wanted
     if enough and patience == AT_REST and abs(usual) >= UNWINDING and found.steady == 0:
         enough, found.steady = False, 1  # one more: within three seconds it may yet have been a twist

@@ -17,11 +17,11 @@ from node.kernels.jit import constant, kernel
 from node.kernels.layout import DEG, RECENT, Status
 from node.kernels.mismatches import learn_mismatch, recover_gyro
 from node.kernels.modes import STATIC_BIAS
-from node.kernels.numbers import half, lasting, root, scaled, square, times, unscaled
+from node.kernels.numbers import half, lasting, root, scaled, times, unscaled
 from node.kernels.odd_force import keeps_out
 from node.kernels.quantity import NONE, angle, rate
-from node.kernels.ramps import follow_fit, is_starting
-from node.kernels.resets import forget_scale, lose_tilt, lose_yaw_ahead, open_biases
+from node.kernels.ramps import follow_fit, is_starting, learn_scale_anew
+from node.kernels.resets import lose_tilt, lose_yaw_ahead, open_biases
 from node.kernels.sensor_watch import find_faults
 from node.kernels.trust import SANE_CYCLES, hold, is_faulty, tell_recovery
 
@@ -115,7 +115,7 @@ def follow_doubts(node: Any, rejected: int, reset: int) -> None:
     if reset == 1:
         follow_jump(node)
         if is_starting(node):
-            forget_scale(node.filter, guard.ramp.scale, square(guard.ramp.scale_std))
+            learn_scale_anew(node)
             keep_newest(guard.aidings)  # they contradicted by a scale that is gone
 
 

@@ -149,7 +149,15 @@ def doubt_ramp(node: Any, own: float, rejected: int) -> None:
     if ramp.opened == 0:
         ramp.opened = 1
         doubt_yaw(state, ramp.largest)
-        forget_scale(state, ramp.scale, square(ramp.scale_std))
+        learn_scale_anew(node)
+
+
+@kernel
+def learn_scale_anew(node: Any) -> None:
+    """What the ramp taught of the scale is forgotten; that it is open again makes as much of a step as a start."""
+    ramp = node.guard.ramp
+    forget_scale(node.filter, ramp.scale, square(ramp.scale_std))
+    ramp.cycles = 0
 
 
 @kernel

@@ -16,8 +16,9 @@ from node.kernels.static_average import STATIC
 from node.kernels.sweep import OFFSET, SWEEP
 
 # of the saved record; 1 and 2 held the filter alone, 3 what a start clears as well, 4 no doubts, 5 fewer mismatches,
-# 6 no odd forces, 7 no swings, 8 no ramps, 9 no revisions, 10 no parts of cycles
-NODE_LAYOUT: Final = 11
+# 6 no odd forces, 7 no swings, 8 no ramps, 9 no revisions, 10 no parts of cycles,
+# 11 no wrong aidings
+NODE_LAYOUT: Final = 12
 EVENTS_KEPT: Final = 32  # that wait to be said
 NUMBERS: Final = 10  # of one event
 DISAGREEMENTS: Final = 3  # aidings in a row, until a mismatch is a fault
@@ -54,6 +55,7 @@ AIDINGS: Final = np.dtype(
         ("seen", "i8"),  # mismatches in a row
         ("mismatch", "f8", (MOST_DISAGREEMENTS,)),  # rad/s, true minus measured, of the last aidings
         ("spin", "f8", (MOST_DISAGREEMENTS,)),  # rad/s, true, at the same time
+        ("wrong", "i8"),  # aidings used, until one that was wrong is forgotten; 0: it is
     ],
     align=True,
 )
@@ -84,7 +86,7 @@ RAMP: Final = np.dtype(
         ("doubted", "i8"),  # 1: it does not fit
         ("opened", "i8"),  # 1: the yaw has been opened for it
         ("doubt", "f8"),  # rad^2, variance of the yaw by the ramps that did not fit
-        ("cycles", "i8"),  # since the node stood still
+        ("cycles", "i8"),  # since the node stood still, or has forgotten a scale
         ("scale", "f8"),  # scale error of the z gyroscope, then
         ("scale_std", "f8"),  # of it
         ("sense", "i8"),  # 1 or -1: the way in which the string turned fast last; 0: not yet
@@ -353,7 +355,7 @@ def forget_session(nodes: Array) -> None:
     guard["readings"]["clipped"] = 0
     guard["aidings"]["at"] = np.nan
     guard["aidings"]["left"] = 0.0
-    guard["aidings"]["seen"] = 0
+    guard["aidings"]["seen"] = guard["aidings"]["wrong"] = 0
     guard["rate"] = guard["sane_rate"] = guard["aiding_var"] = 0.0
     guard["rate_at"] = -np.inf
     guard["swing"] = np.zeros(1, SWING)

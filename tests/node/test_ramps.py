@@ -12,7 +12,8 @@ from hypothesis import strategies as st
 
 from node.kernels.aiding_watch import AT_ONCE, AT_REST, STARTING, find_mismatch, forget
 from node.kernels.layout import PERIOD, RING, Err, default_config
-from node.kernels.ramps import LONGEST, REACH, follow_fit, follow_ramp
+from node.kernels.ramps import LONGEST, REACH, follow_fit, follow_ramp, is_starting
+from node.kernels.ramps import STARTING as LONGEST_START
 from node.kernels.record import AIDINGS, MISMATCH, new_node
 
 FASTEST = math.radians(71.0)
@@ -111,6 +112,13 @@ def test_what_the_ramp_taught_of_the_scale_is_forgotten() -> None:
         turning.aid(4.0)
     assert turning.state["scale"] == 0.0
     assert turning.state["P"][Err.SCALE, Err.SCALE] == pytest.approx(1e-6)
+    turning.node["guard"]["rate"] = FASTEST
+    assert turning.ramp["cycles"] == 1  # of the four: a step is looked at as long as one of a string that starts
+    for _ in range(LONGEST_START - 1):
+        turning.cycle(FASTEST)
+        assert is_starting(turning.node)
+    turning.cycle(FASTEST)
+    assert not is_starting(turning.node)
 
 
 @pytest.mark.parametrize("back_deg", [5.0, 30.0])

@@ -312,6 +312,19 @@ def test_a_bias_that_grows_the_innovation_is_a_step_and_one_with_the_rate_a_scal
     assert last is Fault.GYRO_SCALE
 
 
+def test_three_in_a_row_are_no_step_where_an_aiding_was_wrong_lately() -> None:
+    def wanted(used_since: int) -> int:
+        watched, now = Watched(), 0.5
+        watched.takes(0.0, 1.0, now, rejected=False)
+        for innovation, rejected in [(0.5, True)] + [(0.0, False)] * (1 + used_since):
+            now += 0.5
+            watched.takes(innovation, 1.0, now, rejected=rejected)
+        found = [watched.takes(0.01 * k, 1.0, now + 0.5 * k) for k in range(1, 7)]
+        return 1 + found.index(Fault.GYRO_STEP)
+
+    assert [wanted(0), wanted(31), wanted(32)] == [4, 4, 3]
+
+
 def test_a_part_of_a_swing_of_once_a_turn_is_no_step() -> None:
     watched = Watched()
     watched.takes(0.0, 1.24, 0.0, rejected=False)

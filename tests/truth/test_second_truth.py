@@ -123,6 +123,23 @@ def test_a_twist_that_is_wound_up_and_let_go_evenly_is_no_fault_of_the_gyroscope
     assert np.mean(run.error[judged] ** 2 / run.var[judged]) <= 1.5
 
 
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    ("name", "seed"),
+    [
+        ("g-sensitivity 0.1 deg/s/g at 30 deg", 70),  # 0.4 of it by one axis: a swing of 0.2 deg/s, five steps
+        ("misalignment 0.05 deg at 88 deg", 72),  # a scale that was opened took a part of a swing: two steps
+        ("outliers 20 %", 28),  # a scale that was opened took a wrong aiding: a step, and a scale by its end
+        ("outliers 20 %", 32),  # three in a row, each by as much more than the one before: a step
+        ("outliers 20 %", 36),  # as 28, in a yaw that was set anew
+        ("outliers 20 %", 38),  # as 28: two steps
+        ("outliers 20 %", 65),  # as 32
+    ],
+)
+def test_what_comes_and_goes_is_no_fault_of_the_gyroscope(name: str, seed: int) -> None:
+    assert not drill(name, seed).faults
+
+
 def kinds_of(name: str, when: str, rms: np.ndarray) -> list[np.ndarray]:
     """Runs whose medians may be compared: whether an index comes before the reset is even odds in either world."""
     if name != "the same, with an index" or when != "turning":

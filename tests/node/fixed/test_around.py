@@ -125,7 +125,11 @@ def test_imus_are_fused_alike(imus: Any) -> None:
 
 
 @given(
-    st.lists(st.tuples(st.floats(-0.25, 0.25), st.floats(1.0, 6.0), st.floats(1.0, 60.0)), min_size=3, max_size=12),
+    st.lists(
+        st.tuples(st.integers(-250, 250), st.floats(1.0, 6.0), st.floats(1.0, 60.0), st.integers(0, 1)),
+        min_size=3,
+        max_size=12,
+    ),
     st.floats(1e-4, 0.01),
 )
 def test_mismatches_are_found_alike(aidings: Any, sigma: float) -> None:
@@ -133,17 +137,17 @@ def test_mismatches_are_found_alike(aidings: Any, sigma: float) -> None:
     forget(watch[0])
     own, fixed = learnt(watch, ".aidings"), learnt(found)
     now = 1000.0
-    for innovation, spin, elapsed in aidings:
-        now += elapsed
-        find_mismatch(watch[0], found[0], innovation, sigma, spin, now, 1, 0, AT_ONCE)
+    for thousandths, spin, elapsed, rejected in aidings:
+        innovation, now = 1e-3 * thousandths, now + elapsed
+        find_mismatch(watch[0], found[0], innovation, sigma, spin, now, rejected, 0, AT_ONCE)
         given_whole = whole(innovation, ANGLE_Q), whole(sigma, ANGLE_Q), whole(spin, RATE_Q), whole(now, TIME_Q)
-        find_mismatch(own[0], fixed[0], *(int(x) for x in given_whole), 1, 0, AT_ONCE)
+        find_mismatch(own[0], fixed[0], *(int(x) for x in given_whole), rejected, 0, AT_ONCE)
         shown = turned_back(fixed, MISMATCH)
         assert [shown[0][k] for k in ("fault", "steady", "refuted")] == [
             found[0][k] for k in ("fault", "steady", "refuted")
         ]
         assert shown[0]["rate"] == pytest.approx(found[0]["rate"], abs=1e-6)
-        assert own[0]["seen"] == watch[0]["seen"]
+        assert [own[0][k] for k in ("seen", "wrong")] == [watch[0][k] for k in ("seen", "wrong")]
 
 
 @given(st.floats(0.0, math.pi), st.floats(0.0, math.tau), st.floats(0.9, 1.1), st.floats(0.0, 0.2))
