@@ -113,6 +113,12 @@ class Hearing:
                 with self._timing(path):
                     self.ground.operator.ask_json(path)
 
+    def ask_first(self) -> None:
+        """Somebody asks for each path for the first time: what is kept from answer to answer is not there yet."""
+        for path in ASKED:
+            with self._timing("the first answer of each"):
+                self.ground.operator.ask_json(path)
+
     def _take(self, surveys: list[SurveyMeasurement], md: float) -> None:
         """Surveys come, are stored, and find their depth with the next reading."""
         for survey in surveys:
@@ -153,6 +159,8 @@ def measure_learning(surveys: int, tubes: int, stops: int, folder: Path) -> dict
         for stop, learn in zip(range(1, stops + 1), courses, strict=False):
             md = depth_of(tubes, ADVANCES + (stop - 1) // COURSES)
             taken = hearing.drill(known + stop, md)
+            if stop == 1:
+                hearing.ask_first()
             learn(taken, md)
             learnt += len(taken)
         if model.seen["measurements"] != before + learnt:

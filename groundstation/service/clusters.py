@@ -241,6 +241,11 @@ class Clusters:
         """Numbers of the clusters at some places, side by side."""
         return self._table.rows[[self._rows[place] for place in places]]
 
+    @property
+    def table_rows(self) -> npt.NDArray[np.int64]:
+        """Rows (n,) of the table that hold the clusters."""
+        return np.array(self._rows, np.int64)
+
     def row(self, place: int) -> int:
         """Row of the table that holds the cluster at a place."""
         return self._rows[place]

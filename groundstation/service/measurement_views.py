@@ -8,12 +8,14 @@ from __future__ import annotations
 
 import functools
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
+from typing import Final
 
 import numpy as np
 
 from groundstation.service.clusters import NO_NUMBER, Table, forces_of
 from groundstation.service.model import RigModel
+from groundstation.service.row_texts import Numbers
 from groundstation.service.streams import span
 from groundstation.service.views import Parameters, Range, View, flag_names, streamed
 from groundstation.survey.resolve import Quality, angle_stds_of_all, angles
@@ -21,36 +23,52 @@ from groundstation.survey.trust import Trust
 from telemetry.messages import NodeFlag
 
 DEGREES = 180.0 / math.pi  # in a radian
+NO_ROWS: Final = np.empty(0, np.int64)
 
 
 def measurements(k: RigModel, p: Parameters) -> View:
     """Every cluster; ``station`` and ``tube`` select, ``since`` and ``limit`` give them as they came."""
-    newest = k.seen["measurements"]
-    since, limit = span(newest, p) if streamed(p) else (0, None)
-    found = list(_selected(k, p, since))
-    if streamed(p):
-        found.sort()
-    found = found[:limit]
-    rows = [k.stations[n - 1].clusters.row(place) for _, n, place in found]
-    return {"newest": newest, "measurements": measurement_rows(k.hole.surveys, rows, [n for _, n, _ in found])}
+    rows, stations = _selected(k, p)
+    return {
+        "newest": k.seen["measurements"],
+        "measurements": measurement_rows(k.hole.surveys, rows.tolist(), stations.tolist()),
+    }
 
 
-def _selected(k: RigModel, p: Parameters, since: int) -> Iterator[tuple[int, int, int]]:
-    """Number, station and place of the clusters after the number ``since`` that the parameters select."""
+def measurements_text(k: RigModel, p: Parameters) -> bytes:
+    """JSON of ``measurements``. A row shows something else once it is revised, or a station comes above its own."""
+    surveys = k.hole.surveys
+    rows, stations = _selected(k, p)
+
+    def render(places: Numbers) -> list[View]:
+        return measurement_rows(surveys, rows[places].tolist(), stations[places].tolist())
+
+    texts = k.measurement_texts.texts_of(rows, np.stack([surveys.column("number")[rows], stations], axis=1), render)
+    return b'{"newest":%d,"measurements":[%b]}' % (k.seen["measurements"], b",".join(texts))
+
+
+def _selected(k: RigModel, p: Parameters) -> tuple[Numbers, Numbers]:
+    """Rows (n,) of the table that the parameters select, and the numbers of their stations."""
+    since, limit = span(k.seen["measurements"], p) if streamed(p) else (0, None)
     by_station = Range.parse("station", p["station"]) if "station" in p else None
     by_tube = Range.parse("tube", p["tube"]) if "tube" in p else None
-    for n, s in enumerate(k.stations, 1):
-        if by_station is None or by_station.holds(n):
-            numbers, tubes = s.clusters.column("number"), s.clusters.column("tube")
-            for place in np.flatnonzero(numbers > since).tolist():
-                if by_tube is None or by_tube.holds(int(tubes[place])):
-                    yield int(numbers[place]), n, place
+    chosen = [(n, one) for n, one in enumerate(k.stations, 1) if by_station is None or by_station.holds(n)]
+    rows = np.concatenate([NO_ROWS, *(one.clusters.table_rows for _, one in chosen)])
+    stations = np.repeat([n for n, _ in chosen], [one.count for _, one in chosen]).astype(np.int64)
+    table = k.hole.surveys
+    keeps = table.column("number")[rows] > since
+    if by_tube is not None:
+        keeps &= np.fromiter(map(by_tube.holds, table.column("tube")[rows].tolist()), np.bool_, len(rows))
+    rows, stations = rows[keeps], stations[keeps]
+    if streamed(p):
+        order = np.argsort(table.column("number")[rows], kind="stable")[:limit]
+        rows, stations = rows[order], stations[order]
+    return rows, stations
 
 
 def station_measurements(k: RigModel, n: int) -> View:
     """Every cluster of one station."""
-    clusters = k.stations[n - 1].clusters
-    rows = [clusters.row(place) for place in range(len(clusters))]
+    rows = k.stations[n - 1].clusters.table_rows.tolist()
     return {"station": n, "measurements": measurement_rows(k.hole.surveys, rows, [n] * len(rows))}
 
 

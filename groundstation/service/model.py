@@ -22,6 +22,7 @@ from groundstation.service.orders import OrderBook
 from groundstation.service.recalibration.procedure import FieldProcedure
 from groundstation.service.resolving import ResolvedSurvey, resolve_survey, resolve_surveys
 from groundstation.service.rig_alarms import Health, RigAlarms
+from groundstation.service.row_texts import RowTexts
 from groundstation.service.station import SurveyStation
 from groundstation.service.stops import Stops
 from groundstation.service.tally import Tally
@@ -98,6 +99,7 @@ class RigModel:
         self.recalibration = FieldProcedure(config.gravity)
         self.orders = OrderBook()
         self._shown: dict[Hashable, tuple[int, bytes]] = {}
+        self.measurement_texts = RowTexts(marks=2)
         self.wall = None if config.wall is None else LiveWall(config.wall, config.hole)
 
     @property

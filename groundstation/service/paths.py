@@ -45,6 +45,7 @@ class Path:
     own: Fields
     parameters: tuple[str, ...] = ()
     is_of_the_hole: bool = False
+    text: Callable[[RigModel, Parameters], bytes] | None = None  # JSON of ``view``, where rows of it are kept as such
 
     def show(self, k: RigModel, p: Parameters) -> View:
         """The whole answer: what every answer has, and the view."""
@@ -52,9 +53,12 @@ class Path:
 
     def json(self, k: RigModel, p: Parameters) -> bytes:
         """The whole answer as JSON; of the hole the text of the last time, behind a header of now."""
-        if not self.is_of_the_hole or p:
+        if self.text is not None:
+            text = self.text(k, p)
+        elif self.is_of_the_hole and not p:
+            text = k.last_shown(self.view, lambda: orjson.dumps(self.view(k, p)))
+        else:
             return orjson.dumps(self.show(k, p))
-        text = k.last_shown(self.view, lambda: orjson.dumps(self.view(k, p)))
         return orjson.dumps(header(k))[:-1] + b"," + text[1:]
 
     @property
@@ -96,7 +100,12 @@ FIXED: dict[str, Path] = {
     "verdict": Path(verdict_views.verdict, key_fields.VERDICT),
     "string": Path(views.string, key_fields.STRING),
     "stations": Path(views.stations, key_fields.STATIONS, ("md",), is_of_the_hole=True),
-    "measurements": Path(measurement_views.measurements, key_fields.MEASUREMENTS, ("station", "tube", *STREAMED)),
+    "measurements": Path(
+        measurement_views.measurements,
+        key_fields.MEASUREMENTS,
+        ("station", "tube", *STREAMED),
+        text=measurement_views.measurements_text,
+    ),
     "trajectory": Path(views.trajectory, key_fields.TRAJECTORY, ("md",), is_of_the_hole=True),
     "events": Path(views.events, key_fields.EVENTS, ("tube", *STREAMED)),
     "static_records": Path(views.static_records, key_fields.STATIC_RECORDS, ("tube", *STREAMED)),

@@ -5,6 +5,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
+import orjson
 import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
@@ -13,10 +14,15 @@ from test_model import Placed, passes
 from groundstation.config import GroundConfig
 from groundstation.service import measurement_views, views
 from groundstation.service.model import RigModel
+from groundstation.service.paths import FIXED, header
 from telemetry.messages import NodeFlag
 
 STOPS = 5
 LATER = 1000  # numbers of revisions; those of surveys are the stop's
+SELECTIONS: list[dict[str, str]] = [
+    {}, {"tube": "2"}, {"station": "2..3"}, {"station": "1", "tube": "2.."}, {"since": "1", "limit": "3"},
+    {"tube": "9"},
+]  # fmt: skip
 
 
 def heard(tmp_path: Path, measurements: list[Placed]) -> RigModel:
@@ -109,3 +115,20 @@ def test_a_better_yaw_shows_in_the_station(tmp_path: Path) -> None:
     (after,) = views.stations(model, {})["stations"]
     assert after["azimuth_deg"] - before["azimuth_deg"] == pytest.approx(1.0)
     assert after["sigma_yaw_deg"] == pytest.approx(0.5 * before["sigma_yaw_deg"])
+
+
+@settings(suppress_health_check=[HealthCheck.function_scoped_fixture], max_examples=40, deadline=None)
+@given(st.data())
+def test_the_text_of_all_measurements_is_that_of_now_however_often_it_was_asked_for(
+    tmp_path: Path, data: st.DataObject
+) -> None:
+    first = data.draw(st.permutations(passes(3, lambda _stop, _station: 1.0)))  # a station may come above others
+    course = first + [revised(one, LATER + n, 1e-3) for n, one in enumerate(data.draw(st.permutations(first))[:3])]
+    model, path = heard(tmp_path, []), FIXED["measurements"]
+    for placed in course:
+        model.on_survey(*placed)
+        for parameters in data.draw(st.lists(st.sampled_from(SELECTIONS), max_size=3)):
+            shown_now = measurement_views.measurements(model, parameters)
+            answer = orjson.loads(path.json(model, parameters))
+            assert {name: answer[name] for name in shown_now} == orjson.loads(orjson.dumps(shown_now))
+            assert list(answer) == [*header(model), *shown_now]
