@@ -29,7 +29,7 @@ from telemetry.schema import SPEC_OF
 from telemetry.transport.hop import Header, LinkFrame
 from telemetry.unwritten import Content
 
-EXCHANGES, ROUNDS = 100, 25
+EXCHANGES, ROUNDS = 1000, 15
 PAYLOADS, DECODED = 20, 2000
 PATIENCE, TURN, TRIES = 60.0, 1.0, 10  # s
 AIDING_BYTES = len(encode(AIDING))
