@@ -27,7 +27,7 @@ from borechain.cli.rig.rig import Job, drill_in_processes, process_table, settin
 from borechain.host import opened_router
 from borechain.inline import InlineRig
 from borechain.load.hour import scenario_text
-from sim.rig.in_process import InProcessStepper
+from sim.rig.in_process import InProcessStepper, unwritten
 from sim.rig.launcher import Tick
 from sim.rig.processes import ProcessTable
 from sim.rig.realtime import cpu_seconds, footprint, pids
@@ -180,7 +180,7 @@ def drilled_inline(scenario: Path, folder: Path) -> tuple[Meter, Counting]:
     job = Job(scenario, 1, math.inf)
     world = world_of(job)
     rig = InlineRig(world, settings_of(world, job), job.rig_name, folder)
-    rig.stepper = counting = Counting(rig.stepper.builders)
+    rig.stepper = counting = Counting(rig.stepper.builders, carry=unwritten)
     meter = Meter(time.process_time)
     rig.run(meter.follow)
     rig.close()

@@ -20,7 +20,7 @@ from node.process.encoder_process import EncoderProcess
 from node.process.host import seals_at
 from node.process.tube_process import TubeProcess
 from sim.errors import RigError
-from sim.rig.in_process import Build, InProcessStepper
+from sim.rig.in_process import Build, InProcessStepper, unwritten
 from sim.rig.launcher import private_folder
 from sim.rig.operator import Operator
 from sim.rig.scheduler import Progress, Scheduler
@@ -75,7 +75,7 @@ class InlineRig:
         for tube in range(1, world.scenario.tubes + 1):
             place = private_folder(folder, f"tube-{tube}")
             builders[tube] = partial(self._build_tube, tube, place, block_key, keys, disk_of(tube))
-        self.stepper = InProcessStepper(builders, self._act_on_cue, rounded_frame if native else bytes)
+        self.stepper = InProcessStepper(builders, self._act_on_cue, rounded_frame if native else unwritten)
 
     def _build_encoder(self, folder: Path, keys: Path | None, disk: Disk, lot: Callable[[int], int]) -> EncoderProcess:
         is_new, self._has_encoder_run = not self._has_encoder_run, True

@@ -27,7 +27,8 @@ CYCLE = 10.0 / 19.0  # s, of a node
 SETTLED_AFTER = 10.0  # s after a start in which a tube may still find its yaw
 TOGETHER = 30.0  # s
 ENOUGH = 2  # tubes
-STARTS_KEPT = 1000
+STARTS_KEPT = 1000  # of all tubes
+STARTS_OF_ONE = 100
 EPOCHS_KEPT = 100
 OFF_BEFORE = 30.0  # s before a start in which a tube may have been without power
 SAID_KEPT = 50  # of a tube
@@ -42,7 +43,7 @@ class Witnesses:
         # newest contradiction by tube and start: a stranger with the number of a tube speaks for itself alone
         self._contradicted: dict[tuple[int, int], Event] = {}
         self._began: dict[tuple[int, int], Event] = {}  # its first rejected aiding, by tube and number
-        self._starts: deque[Event] = deque(maxlen=STARTS_KEPT)
+        self._starts: dict[int, deque[Event]] = {}  # newest of each tube
         self._off: Times = {}
         self._blind: Times = {}  # without a gyroscope
         self._rejected: dict[int, Event] = {}  # newest row of contradictions without an outcome, by tube
@@ -57,7 +58,7 @@ class Witnesses:
         self._add_to_span(event)
         self._said.setdefault(event.tube, deque(maxlen=SAID_KEPT)).append(event)
         if event.code in STARTS:
-            self._starts.append(event)
+            self._starts.setdefault(event.tube, deque(maxlen=STARTS_OF_ONE)).append(event)
             _add_time(self._off, place, event.at - OFF_BEFORE, event.at)
             self._count_what_was_cut_short(event)
         elif event.code == "overrun":
@@ -94,7 +95,11 @@ class Witnesses:
         return self._judge(heard)
 
     def _judge(self, heard: Collection[int]) -> str:
-        found = next((one for one in self._contradicted.values() if self._speaks_against_the_encoder(one, heard)), None)
+        known = self._contradicted.values()
+        # one that has just started contradicts what it saved: the string may have turned while it was off
+        settled = [one for one in known if self._was_settled(one)]
+        restored = [one for one in known if self._was_restored(one)]
+        found = next((one for one in known if self._speaks_against_the_encoder(one, settled, restored, heard)), None)
         if found is None or (told := self._together(found)) == self._told:
             return ""
         self._told = told
@@ -123,31 +128,41 @@ class Witnesses:
         if rejected is not None and is_before and self._apart(rejected, start) <= CUT_SHORT:
             self._count(rejected, self._rejected.pop(start.tube))
 
-    def _speaks_against_the_encoder(self, event: Event, heard: Collection[int]) -> bool:
-        together = self._together(event)
-        tubes = {e.tube for e in together}
-        seeing = [tube for tube in heard if tube in tubes or not self._was_without_gyroscope(tube, event)]
-        if tubes >= set(seeing) and any(self._was_restored(e) for e in together):
+    def _speaks_against_the_encoder(
+        self, event: Event, settled: Collection[Event], restored: Collection[Event], heard: Collection[int]
+    ) -> bool:
+        """Whether all who could have seen what an event says agree.
+
+        Of all contradictions some are of tubes that had found their yaw, ``settled``, or had it saved, ``restored``.
+        """
+        beside = [e for e in settled if self._is_beside(e, event)]
+        if len(beside) >= ENOUGH:
+            return True
+        may_all_agree = any(self._is_beside(e, event) for e in restored)
+        if not beside and not may_all_agree:
+            return False
+        tubes = {e.tube for e in self._together(event)}
+        if may_all_agree and all(tube in tubes or self._was_without_gyroscope(tube, event) for tube in heard):
             return True  # every yaw that was saved or known says another thing
-        # one that has just started contradicts what it saved: the string may have turned while it was off
-        settled = [e for e in together if self._was_settled(e)]
-        others = [tube for tube in heard if tube not in tubes and self._has_watched(tube, event)]
-        enough = min(ENOUGH, len(settled) + len(others))
-        if any(e.code != "yaw_reset" for e in settled):
-            enough = ENOUGH  # alone, a gyroscope is wrong sooner
-        return len(settled) >= max(enough, 1)
+        if not beside or beside[0].code != "yaw_reset":
+            return False  # alone, a gyroscope is wrong sooner
+        return not any(tube not in tubes and self._has_watched(tube, event) for tube in heard)
 
     def _nobody_has_watched(self, event: Event, heard: Collection[int]) -> str:
         """Says so where all who are heard have just started upon a yaw of another place."""
         found = [self._elsewhere.get(tube) for tube in heard]
-        if not all(one is not None and self._apart(*sorted([one, event], key=_in_time)) <= TOGETHER for one in found):
+        if not all(one is not None and self._is_beside(one, event) for one in found):
             return ""
         return f"nobody watched it before {event.at:.0f} s: what the tubes had saved is of other places"
 
     def _together(self, event: Event) -> tuple[Event, ...]:
-        return tuple(
-            e for e in self._contradicted.values() if self._apart(*sorted([e, event], key=_in_time)) <= TOGETHER
-        )
+        return tuple(e for e in self._contradicted.values() if self._is_beside(e, event))
+
+    def _is_beside(self, one: Event, other: Event) -> bool:
+        """Whether two events, whichever was earlier, are of one time."""
+        if one.epoch == other.epoch:
+            return abs(one.at - other.at) <= TOGETHER
+        return self._apart(*sorted([one, other], key=_in_time)) <= TOGETHER
 
     def _apart(self, earlier: Event, later: Event) -> float:
         """Seconds between two events; where rig time began anew in between, those that are known to have gone by.
@@ -182,7 +197,7 @@ class Witnesses:
 
     def _start_before(self, event: Event) -> Event | None:
         """The start that an event followed, by its number: two tubes may have the same name, and epochs may change."""
-        known = (start for start in self._starts if start.tube == event.tube and start.epoch <= event.epoch)
+        known = (start for start in self._starts.get(event.tube, ()) if start.epoch <= event.epoch)
         before = [start for start in known if start.sequence <= event.sequence]
         return max(before, key=lambda start: (start.sequence, *_in_time(start)), default=None)
 

@@ -10,6 +10,7 @@ import numpy as np
 from sim.rig.link_channel import LinkChannel
 from sim.world.streams import Stream, stream
 from telemetry.messages import Side
+from telemetry.unwritten import Content
 
 OVERHEARD = 64  # frames of a port that a hostile neighbour has recorded
 Port = tuple[int, Side]
@@ -40,15 +41,15 @@ class FaultyChannel(LinkChannel):
         self._draws: dict[Port, np.random.Generator] = {}
         self._left_of_burst: dict[Port, int] = {}
 
-    def deliveries(self, sender: int, side: Side, frame: bytes) -> list[tuple[float, bytes]]:
-        """Delay (s) and bytes of each copy of the next frame leaving this port; none when it is lost."""
+    def deliveries(self, sender: int, side: Side, frame: Content) -> list[tuple[float, Content]]:
+        """Delay (s) and copy, for each copy of the next frame leaving this port; none when it is lost."""
         port = (sender, side)
         overheard = self.overheard.get(port)
         if overheard is None:
             overheard = self.overheard[port] = deque(maxlen=OVERHEARD)
-        overheard.append(frame)
+        overheard.append(bytes(frame))
         for listener in self.listeners:
-            listener(sender, side, frame)
+            listener(sender, side, bytes(frame))
         found = super().deliveries(sender, side, frame)
         if not (self.port_loss or self.port_delay or self.reordering or self.burst):
             return found

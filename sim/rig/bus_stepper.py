@@ -211,7 +211,7 @@ class BusStepper:
     def _send(self, seat: Seat, events: list[FrameEvent]) -> None:
         for event, frame in events:
             if event.kind <= Side.LOWER:
-                seat.put(Side(event.kind), frame)
+                seat.put(Side(event.kind), bytes(frame))
             elif event.kind is Due.DEPTH:
                 self._depth.put(event.data)  # for whoever watches; the ground station has it in its step
         seat.step(event for event, _ in events)

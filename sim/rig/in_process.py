@@ -14,8 +14,10 @@ from sim.rig.stepper import Acted, Answer, FrameEvent
 from telemetry.messages import address_name
 from telemetry.runtime.process import Process
 from telemetry.runtime.stepped import Sent, run_step
+from telemetry.unwritten import Content
 
 Build = Callable[[], Process]
+Carry = Callable[[Content], Content]
 
 
 class InProcessStepper:
@@ -25,14 +27,14 @@ class InProcessStepper:
     ----------
     builders : how to start the process of each address, as its computer would after its power came
     act_on_cue : plays the operator
-    carry : what a medium makes of every frame
+    carry : what a medium makes of every frame; by default its bytes
     """
 
     def __init__(
         self,
         builders: Mapping[int, Build],
         act_on_cue: Callable[[str], Acted] = lambda _cue: Acted.DONE,
-        carry: Callable[[bytes], bytes] = bytes,
+        carry: Carry = bytes,
     ) -> None:
         self._carry = carry
         self.builders = dict(builders)
@@ -83,8 +85,13 @@ class InProcessStepper:
         return self.builders[address]()
 
 
-def step(process: Process, events: list[FrameEvent], carry: Callable[[bytes], bytes] = bytes) -> Answer:
+def unwritten(frame: Content) -> Content:
+    """A frame as the link hands it over: one that nobody wants the bytes of need not become any."""
+    return frame
+
+
+def step(process: Process, events: list[FrameEvent], carry: Carry = bytes) -> Answer:
     """One step of one process: its events in order, and after each the frames that it sends."""
-    frames: list[tuple[Sent, bytes]] = []
-    wake_at = run_step(process, events, lambda sent, frame: frames.append((sent, carry(frame.payload))))
+    frames: list[tuple[Sent, Content]] = []
+    wake_at = run_step(process, events, lambda sent, frame: frames.append((sent, carry(frame.content))))
     return Answer(frames, wake_at)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from sim.world.streams import Stream, stream
 from telemetry.messages import Side
+from telemetry.unwritten import Content
 
 BLOCK = 1024
 DAMAGE = 1  # of a port's streams: which bit is flipped; apart from the fates, so that damage shifts no other draw
@@ -34,8 +35,8 @@ class LinkChannel:
         self.severed: set[tuple[int, Side]] = set()
         self.lost = 0
 
-    def deliveries(self, sender: int, side: Side, frame: bytes) -> list[tuple[float, bytes]]:
-        """Delay (s) and bytes of each copy of the next frame leaving this port; none when it is lost."""
+    def deliveries(self, sender: int, side: Side, frame: Content) -> list[tuple[float, Content]]:
+        """Delay (s) and copy, for each copy of the next frame leaving this port; none when it is lost."""
         drawn = self._streams.get((sender, side))
         if drawn is None:
             drawn = self._streams[sender, side] = PortStream(self._seed, Stream.LINK, sender, int(side))
@@ -49,7 +50,7 @@ class LinkChannel:
             delays.append(first + self.latency + self._jitter * again)
         if self.corrupt == 0.0:  # as nearly always
             return [(delay, frame) for delay in delays]
-        return [(delay, drawn.damage(frame, self.corrupt)) for delay in delays]
+        return [(delay, drawn.damage(bytes(frame), self.corrupt)) for delay in delays]
 
 
 class PortStream:

@@ -30,6 +30,7 @@ from telemetry.application.depth_source import DepthSource
 from telemetry.messages import BASE, ENCODER, Side, address_name
 from telemetry.presentation.msgpack_codec import encode
 from telemetry.runtime.stepped import Due, DueEvent
+from telemetry.unwritten import Content
 
 ATTACH_LIMIT = 90.0  # wall s
 FROZEN_AFTER = 30.0  # wall s of it, after which a process that was there is ended
@@ -39,7 +40,7 @@ CUE_AGAIN = 2.0  # rig s, until an operator who was too early tries again
 REBOOT_TIME = 5.0  # rig s that a process may be missing before the rig's time waits for it
 FRAME_AT = {Side.UPPER: Due.UPPER_FRAME, Side.LOWER: Due.LOWER_FRAME}  # event of a frame that comes in at an end
 CYCLE, TIMER = Due.CYCLE, Due.TIMER
-Entry = tuple[float, int, int, int, "Due | None", bytes, "float | None"]
+Entry = tuple[float, int, int, int, "Due | None", Content, "float | None"]
 
 
 @dataclass(slots=True)
@@ -279,7 +280,7 @@ class Scheduler:
             self._tell(self.progress)
             self.progress.kill = []
 
-    def _push(self, at: float, address: int, kind: Due | None, frame: bytes, margin: float | None = None) -> None:
+    def _push(self, at: float, address: int, kind: Due | None, frame: Content, margin: float | None = None) -> None:
         self._count += 1
         # an event's kind is its rank; at one time a cycle of all comes last
         heapq.heappush(self._queue, (at, address, 9 if kind is None else kind, self._count, kind, frame, margin))
@@ -301,7 +302,7 @@ class Scheduler:
                 self._add_cycle(at, steps, true_time)
             elif kind is CYCLE:
                 if address in self.stepper.alive():
-                    self._add_sample(at, address, int.from_bytes(frame), steps, true_time)
+                    self._add_sample(at, address, int.from_bytes(bytes(frame)), steps, true_time)
             elif kind is not TIMER or wake.get(address) == at:
                 self._add(steps, true_time, address, kind, at, margin, frame)
         answers = self.stepper.round(steps)
@@ -317,7 +318,7 @@ class Scheduler:
         kind: Due,
         at: float,
         data: object,
-        frame: bytes,
+        frame: Content,
     ) -> None:
         local = self.world.local_clock(address, at)
         true_time[address, local] = at
@@ -392,7 +393,7 @@ class Scheduler:
                 self._push(wake, address, TIMER, b"")
             self._wake[address] = wake
 
-    def _radiate(self, radio: RadioChannel, sender: int, side: Side, at: float, frame: bytes) -> None:
+    def _radiate(self, radio: RadioChannel, sender: int, side: Side, at: float, frame: Content) -> None:
         """Have every end hear a frame that its radio reaches, in a closed string up to the drive head."""
         chain = (ENCODER, *self._string)
         if sender not in chain:
@@ -404,7 +405,7 @@ class Scheduler:
                 return
             joints = chain[min(place, other) + 1 : max(place, other) + 1]
             facing = Side.UPPER if side is Side.LOWER else Side.LOWER
-            for delay, arriving, margin in radio.deliveries(sender, side, chain[other], joints, at, frame):
+            for delay, arriving, margin in radio.deliveries(sender, side, chain[other], joints, at, bytes(frame)):
                 self._push(at + delay, chain[other], FRAME_AT[facing], arriving, margin)
 
     def _join(self, string: tuple[int, ...], *, open_top: bool = False) -> None:

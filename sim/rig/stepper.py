@@ -7,8 +7,9 @@ from collections.abc import Mapping
 from typing import NamedTuple, Protocol
 
 from telemetry.runtime.stepped import DueEvent, Sent
+from telemetry.unwritten import Content
 
-FrameEvent = tuple[DueEvent, bytes]  # an event and its frame, empty where it has none
+FrameEvent = tuple[DueEvent, Content]  # an event and its frame, empty where it has none
 
 
 class Acted(enum.StrEnum):
@@ -22,7 +23,7 @@ class Acted(enum.StrEnum):
 class Answer(NamedTuple):
     """What one process did in a step: frames it sent, in order, and its next timer (s, its clock)."""
 
-    frames: list[tuple[Sent, bytes]]
+    frames: list[tuple[Sent, Content]]
     wake_at: float
 
 

@@ -150,13 +150,13 @@ def rounded(message: Message) -> Message:
     return native.message_of(native.raws_of(message))
 
 
-def rounded_frame(payload: bytes) -> bytes:
+def rounded_frame(frame: Content) -> bytes:
     """A frame of the link whose cyclic messages are as they would arrive."""
-    parsed = parse_frame(payload)
+    parsed = parse_frame(frame)
     if parsed is None:
-        return payload
+        return bytes(frame)
     header, entries = parsed
-    return pack_frame(header, [(number, _rounded_payload(content)) for number, content in entries])
+    return pack_frame(header, [(number, _rounded_payload(bytes(content))) for number, content in entries])
 
 
 def _rounded_payload(payload: bytes) -> bytes:

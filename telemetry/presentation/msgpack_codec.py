@@ -91,10 +91,11 @@ class MessageCodec:
 class UnwrittenMessage(Unwritten):
     """A message as the values of all its fields, checked; its payload is made where somebody asks for the bytes."""
 
-    __slots__ = ("codec", "values")
+    __slots__ = ("_opened", "codec", "values")
 
     def __init__(self, codec: MessageCodec, values: list[Any]) -> None:
         self._written = None
+        self._opened: Opened | None = None
         self.codec, self.values = codec, values
 
     @property
@@ -108,11 +109,14 @@ class UnwrittenMessage(Unwritten):
         return self.codec.kind
 
     def opened(self) -> Opened:
-        """What ``open_payload`` finds in its payload."""
-        codec, values = self.codec, self.values
-        origin = NO_TARGET if codec.tube_at is None else values[codec.tube_at]
-        sequence = 0 if codec.sequence_at is None else values[codec.sequence_at]
-        return Opened(codec.kind, origin, origin if codec.kind in DOWNWARD else BASE, sequence, {}, values)
+        """What ``open_payload`` finds in its payload; worked out once for all the hops it goes over."""
+        if self._opened is None:
+            codec, values = self.codec, self.values
+            origin = NO_TARGET if codec.tube_at is None else values[codec.tube_at]
+            sequence = 0 if codec.sequence_at is None else values[codec.sequence_at]
+            target = origin if codec.kind in DOWNWARD else BASE
+            self._opened = Opened(codec.kind, origin, target, sequence, {}, values)
+        return self._opened
 
     def _write(self) -> bytes:
         return self.codec.pack(self.values)

@@ -18,6 +18,7 @@ from telemetry.errors import MediumError
 from telemetry.media.port import Frame
 from telemetry.messages import Side
 from telemetry.runtime.process import Process
+from telemetry.unwritten import Content
 
 
 class Due(IntEnum):
@@ -80,7 +81,9 @@ def unpack_done(payload: bytes) -> tuple[int, list[Sent], float]:
     return number, [Sent(Side(side), at) for side, at in sent], wake_at
 
 
-def run_step(process: Process, events: Iterable[tuple[DueEvent, bytes]], send: Callable[[Sent, Frame], None]) -> float:
+def run_step(
+    process: Process, events: Iterable[tuple[DueEvent, Content]], send: Callable[[Sent, Frame], None]
+) -> float:
     """Hand ``process`` the events of a step and ``send`` what leaves it after each; returns its next timer (s)."""
     now = -math.inf
     for event, frame in events:
@@ -91,7 +94,7 @@ def run_step(process: Process, events: Iterable[tuple[DueEvent, bytes]], send: C
     return process.next_wake(now)
 
 
-def dispatch(process: Process, event: DueEvent, frame: bytes) -> None:
+def dispatch(process: Process, event: DueEvent, frame: Content) -> None:
     """Hand one event to the process; the data of a frame that came by radio are its margin (dB)."""
     kind, at, data = event
     side = SIDE_OF.get(kind)

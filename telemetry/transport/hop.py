@@ -131,7 +131,7 @@ class HopLink:
         self._next_number = 1
         self._outstanding: OrderedDict[int, Outstanding] = OrderedDict()
         self._queue: OrderedDict[bytes, Priority] = OrderedDict()
-        self._best_effort: OrderedDict[Hashable, tuple[Content, Priority]] = OrderedDict()
+        self._best_effort: OrderedDict[Hashable, Entry] = OrderedDict()
         self._patient: dict[Hashable, Patient] = {}
         self._patient_until = math.inf
 
@@ -154,7 +154,7 @@ class HopLink:
         if len(self._best_effort) >= BEST_EFFORT_LIMIT:
             self._best_effort.popitem(last=False)
             self.counters["best_effort_dropped"] += 1
-        self._best_effort[topic] = payload, priority
+        self._best_effort[topic] = Entry(0, payload, priority, topic)
 
     def send_with_others(self, payload: Content, topic: Hashable, priority: Priority, until: float) -> None:
         """Queue a best effort that goes with the next ``release``, and alone at ``until`` (s)."""
@@ -309,7 +309,7 @@ class HopLink:
                     outstanding.send_at = now + outstanding.timeout
                     outstanding.timeout = min(2.0 * outstanding.timeout, LAST_TIMEOUT)
         if self._best_effort:
-            entries += [Entry(0, payload, priority, topic) for topic, (payload, priority) in self._best_effort.items()]
+            entries += self._best_effort.values()
             self._best_effort.clear()
         return entries
 
@@ -374,7 +374,7 @@ def bundled(entries: Iterable[Entry], limit: int) -> int:
     """How many of the first entries share a frame: at most ``limit`` bytes of them, but one in any case."""
     count = total = 0
     for entry in entries:
-        total += len(entry.payload) + ENTRY_BYTES
+        total += len(bytes(entry.payload)) + ENTRY_BYTES
         if count > 0 and total > limit:
             break
         count += 1

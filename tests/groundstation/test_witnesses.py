@@ -1,6 +1,7 @@
 """Which contradictions of gyroscope and encoder speak against the encoder."""
 
 import math
+from collections.abc import Collection
 from itertools import permutations
 
 import pytest
@@ -16,7 +17,7 @@ def event(tube: int, at: float, code: str, number: int = 10, epoch: int = 1, **a
 BOTH_STARTED = [event(1, 0.0, "restored", 1), event(2, 0.0, "restored", 1)]
 
 
-def told(events: list[Event], heard: tuple[int, ...] = (1, 2)) -> list[str]:
+def told(events: list[Event], heard: Collection[int] = (1, 2)) -> list[str]:
     witnesses = Witnesses()
     return [said for one in events if (said := witnesses.on_event(one, heard))]
 
@@ -239,3 +240,22 @@ def test_contradictions_before_and_after_a_start_of_the_encoder_are_added_up(
     """Rig time of the third epoch begins at 500 s, of which the one before knows nothing."""
     first = [*BOTH_STARTED, event(1, 100.0, "yaw_reset"), *between, event(1, 500.0, "stopped", 12, epoch=3)]
     assert told([*first, event(2, second, "yaw_reset", epoch=3)]) == said
+
+
+@pytest.mark.parametrize(("start", "growth"), [("booted", 5.0), ("restored", 20.0)])
+def test_what_an_event_costs_while_a_string_starts_grows_with_its_tubes_or_with_their_square(
+    monkeypatch: pytest.MonkeyPatch, start: str, growth: float
+) -> None:
+    """Tubes that only booted cannot speak together; of those that had saved their yaw one more has yet to say."""
+    compared = []
+    is_beside = Witnesses._is_beside
+    monkeypatch.setattr(Witnesses, "_is_beside", lambda *of: compared.append(1) or is_beside(*of))
+
+    def comparisons_of_an_event(tubes: int) -> float:
+        compared.clear()
+        starts = [event(tube, 0.0, start, 1) for tube in range(tubes)]
+        resets = [event(tube, 4.0 + 1e-3 * tube, "yaw_reset", 2) for tube in range(tubes)]
+        assert told([*starts, *resets], range(tubes + 1)) == []
+        return len(compared) / tubes
+
+    assert comparisons_of_an_event(100) <= growth * max(comparisons_of_an_event(25), 1.0)
