@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, NamedTuple
 
 from telemetry.application.answers import Answers
 from telemetry.application.clock import ClockFilter
-from telemetry.application.kinds import ONE_HOP, PRIORITIES, RELIABLE
+from telemetry.application.kinds import ONE_HOP, PRIORITIES, RELIABLE, is_warning
 from telemetry.application.outbox import Outbox
 from telemetry.application.place import Place
 from telemetry.application.saved_state import SavedState, is_needed, pack_state, parse_state
@@ -62,6 +62,7 @@ SYNC_BURST = 30  # exchanges at the quick pace after a start
 SYNC_QUICK = 1.0  # s
 SYNC_SLOW = 10.0  # s
 STATE_WAIT = 1.15  # s for which a node's state waits for those of the nodes below, to go up with them
+KEPT_WAIT = 1.15  # s for which what is no warning waits for a state to go up with
 HOP_WAIT = 0.005  # s, longer by a frame's way where fewer hops are left: after a loss the lowest goes first again
 WAITING_HOPS = 100
 REPORT_EVERY = 60.0  # s between two looks at what queues dropped
@@ -114,6 +115,7 @@ class Endpoint:
         self.series = Series(boot_count if boot_count > 1 and address != BASE else 0)
         self._outbox = Outbox()
         self._holding = False
+        self._has_states = False  # whether states go up from here, with which others may go
         self._answers = Answers()
         self._commands = Outbox()
         self._hello_at = -math.inf
@@ -230,10 +232,20 @@ class Endpoint:
             until = now + wait if below is not None and below.is_up(now) else now
             payload = unwritten(state) if self.seals is None else self._sealed(encode(state))
             link.send_with_others(payload, (Kind.NODE_STATE, state.tube), Priority.STATE, until)
+            self._has_states = True
+            if until == now:
+                self._send_waiting(now)
 
     def submit(self, message: Kept, now: float) -> None:
-        """Keep a message until the ground station has receipted it, and send it unless messages are held back."""
-        self._outbox.keep_payload(message.sequence, encode(message), now, needed=is_needed(message))
+        """Keep a message until the ground station has receipted it, and send it unless messages are held back.
+
+        What is no warning goes up with the next states, in their frames.
+        """
+        payload, needed = encode(message), is_needed(message)
+        if is_warning(message) or not self._has_states:
+            self._outbox.keep_payload(message.sequence, payload, now, needed=needed)
+        else:
+            self._outbox.keep_waiting(message.sequence, payload, now + KEPT_WAIT, needed=needed)
         self._send_kept(now)
 
     def hold(self) -> None:
@@ -361,7 +373,7 @@ class Endpoint:
             self.counters["old_states"] += 1
             return None
         if self.address != BASE:
-            self._pass(Side.UPPER, opened, payload)
+            self._pass(Side.UPPER, opened, payload, now)
             return None
         message = self._heard(opened, payload, now)
         if isinstance(message, Reply):
@@ -373,7 +385,7 @@ class Endpoint:
 
     def _handle_downward(self, opened: Opened, payload: Content, now: float) -> Message | None:
         if opened.target != self.address:
-            self._pass(Side.LOWER, opened, payload)
+            self._pass(Side.LOWER, opened, payload, now)
             return None
         message = self._told(opened, payload, now)
         if isinstance(message, Receipt):
@@ -450,7 +462,7 @@ class Endpoint:
         else:
             self.counters["foreign_receipts"] += 1
 
-    def _pass(self, side: Side, opened: Opened, payload: Content) -> None:
+    def _pass(self, side: Side, opened: Opened, payload: Content, now: float) -> None:
         """Hand on the very bytes that came."""
         link = self._links.get(side)
         if link is None:
@@ -461,6 +473,8 @@ class Endpoint:
             link.send_best_effort(payload, (opened.kind, opened.origin), PRIORITIES[opened.kind])
             if opened.kind is Kind.NODE_STATE:
                 link.release()
+                self._has_states = True
+                self._send_waiting(now)
 
     @property
     def _upper(self) -> int | None:
@@ -479,6 +493,11 @@ class Endpoint:
     def _send_kept(self, now: float) -> None:
         if not self._holding:
             self._send_due(self._outbox, Side.UPPER, now)
+
+    def _send_waiting(self, now: float) -> None:
+        """A state goes up: what waited for one goes with it."""
+        if self._outbox.release(now):
+            self._send_kept(now)
 
     def _send_due(self, outbox: Outbox, side: Side, now: float) -> None:
         if not len(outbox) or side not in self._links:

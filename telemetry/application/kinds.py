@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from telemetry.media.port import Priority
+from telemetry.messages import Event, Kept, Severity
 from telemetry.schema import Kind
 
 ONE_HOP = (Kind.AIDING, Kind.HELLO, Kind.TIME_REQUEST, Kind.TIME_REPLY)
@@ -33,3 +34,8 @@ PRIORITIES: dict[Kind, Priority] = {
     Kind.DEPTH_READING: Priority.STATE,
     Kind.SESSION_OFFER: Priority.COMMAND,
 }
+
+
+def is_warning(message: Kept) -> bool:
+    """Whether the crew may have to act at once."""
+    return isinstance(message, Event) and message.severity is not Severity.INFO

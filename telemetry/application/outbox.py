@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections import deque
 from collections.abc import Iterator
 from dataclasses import dataclass
 
@@ -19,6 +20,7 @@ class Parcel:
     send_at: float
     wait: float = FIRST_RETRY
     needed: bool = True  # never dropped for another
+    was_sent: bool = False
 
 
 class Outbox:
@@ -29,15 +31,16 @@ class Outbox:
 
     def __init__(self, limit: int = LIMIT) -> None:
         self._parcels: dict[int, Parcel] = {}
+        self._waiting: deque[int] = deque(maxlen=limit)  # numbers of those that wait for others to go with
         self._limit = limit
         self.dropped = 0
 
     def __len__(self) -> int:
         return len(self._parcels)
 
-    def keep_payload(self, sequence: int, payload: bytes, now: float, *, needed: bool = True) -> None:
-        """Keep a payload; it is due at once. What is not ``needed`` goes first where there is no place."""
-        self._parcels[sequence] = Parcel(payload, now, needed=needed)
+    def keep_payload(self, sequence: int, payload: bytes, due: float, *, needed: bool = True) -> None:
+        """Keep a payload that is due at a time (s). What is not ``needed`` goes first where there is no place."""
+        self._parcels[sequence] = Parcel(payload, due, needed=needed)
         if len(self._parcels) > self._limit:
             oldest = next((n for n, parcel in self._parcels.items() if not parcel.needed), next(iter(self._parcels)))
             del self._parcels[oldest]
@@ -56,9 +59,23 @@ class Outbox:
         """Payloads to send now; each is due again later, with growing patience."""
         for parcel in self._parcels.values():
             if parcel.send_at <= now:
-                parcel.send_at = now + parcel.wait
+                parcel.send_at, parcel.was_sent = now + parcel.wait, True
                 parcel.wait = min(2.0 * parcel.wait, LAST_RETRY)
                 yield parcel.payload
+
+    def keep_waiting(self, sequence: int, payload: bytes, until: float, *, needed: bool = True) -> None:
+        """Keep a payload that goes with the next ``release``, and alone at ``until`` (s)."""
+        self.keep_payload(sequence, payload, until, needed=needed)
+        self._waiting.append(sequence)
+
+    def release(self, now: float) -> bool:
+        """Have what waited for others to go with sent now; whether anything did."""
+        hastened = False
+        while self._waiting:
+            parcel = self._parcels.get(self._waiting.popleft())
+            if parcel is not None and not parcel.was_sent:
+                parcel.send_at, hastened = now, True
+        return hastened
 
     def make_due(self, now: float) -> None:
         """Have everything sent again now: whoever has it to take can, from now on."""

@@ -19,6 +19,7 @@ from sealed_string import DOWN, SealedString, make_folder, messages_in
 
 from telemetry.application.end_seal import HEAD as END_HEAD
 from telemetry.application.end_seal import OVERHEAD as END_OVERHEAD
+from telemetry.application.endpoint import KEPT_WAIT
 from telemetry.media.port import Priority
 from telemetry.messages import BASE, ENCODER, Side
 from telemetry.presentation.msgpack_codec import encode, open_payload
@@ -38,6 +39,7 @@ UP = (
 )
 END_TO_END = (*UP, *DOWN)
 ON_A_JOINT = (*ONE_HOP, *END_TO_END)
+ARRIVED = KEPT_WAIT + 0.5  # s, after which what was said has arrived, though it waited for a state to go up with
 LONG = 12.0  # s, after which what nobody has proven is counted
 FOREIGN = SealKey(b"not of this rig!")
 
@@ -57,7 +59,7 @@ def recorded(folder: Path, kind: Kind, repeats: int = 3) -> SealedString:
     string.settle()
     for _ in range(repeats):
         string.say(kind)
-        string.run(1.0)
+        string.run(ARRIVED)
     string.evidence = string.frames_with(kind)[-4:]
     assert string.evidence, f"no frame brought a {kind.name.lower()}"
     return string
@@ -227,7 +229,7 @@ def truncated_payload(_string: SealedString, _kind: Kind, payloads: list[bytes])
 def spliced_payload(string: SealedString, kind: Kind, payloads: list[bytes]) -> Iterable[bytes]:
     """The seal of one message with what another says, and the other way round."""
     string.say(Kind.EVENT if kind is not Kind.EVENT else Kind.NODE_STATE)
-    string.run(1.0)
+    string.run(ARRIVED)
     others = [p for frame in string.wire[BASE, Side.LOWER] for k, p in messages_in(frame) if k is not kind]
     others = [p for p in others if p[0] == payloads[0][0]]
     yield payloads[0][:END_OVERHEAD] + others[-1][END_OVERHEAD:]

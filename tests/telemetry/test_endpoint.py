@@ -9,9 +9,10 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from sealed_string import state
 
-from telemetry.application.endpoint import Endpoint, Received
+from telemetry.application.endpoint import KEPT_WAIT, Endpoint, Received
 from telemetry.application.kinds import PRIORITIES
 from telemetry.media.memory import MemoryPort, joint
+from telemetry.media.port import Frame
 from telemetry.messages import (
     BASE,
     ENCODER,
@@ -28,7 +29,8 @@ from telemetry.messages import (
     Side,
     SurveyMeasurement,
 )
-from telemetry.presentation.msgpack_codec import Kind
+from telemetry.presentation.msgpack_codec import Kind, open_payload
+from telemetry.transport.hop import parse_frame
 
 TICK = 1.0 / 1.9
 AIDING = Aiding(1.0, 1e-6, 0.0, 0.0, 0.1, 100.0, 1, 0)
@@ -324,6 +326,33 @@ def test_states_go_up_in_one_frame_however_long_the_string_is(tubes: int) -> Non
     assert told == set(range(1, tubes + 1))
     for address in (ENCODER, *range(tubes, 1, -1)):
         assert heard[address] < 1.1 * cycles  # with hellos, clocks and acknowledgements; each state alone: tubes / 2
+
+
+@pytest.mark.parametrize(
+    ("severity", "latest", "frames"), [(Severity.INFO, KEPT_WAIT + 0.2, 1), (Severity.WARNING, 0.2, 6)]
+)
+def test_what_is_no_warning_goes_up_with_the_next_states(
+    monkeypatch: pytest.MonkeyPatch, severity: Severity, latest: float, frames: int
+) -> None:
+    chain = Chain([6, 5, 4, 3, 2, 1])
+    chain.run(20.0)
+    speak(chain, 3)
+    told, to_the_base, with_events = len(chain.got[BASE]), chain.joints[0][1], []
+    put = to_the_base.send
+
+    def counting(frame: Frame) -> bool:
+        _, entries = parse_frame(frame.payload) or (None, [])
+        with_events.extend([frame] if any(open_payload(entry).kind is Kind.EVENT for _, entry in entries) else [])
+        return put(frame)
+
+    monkeypatch.setattr(to_the_base, "send", counting)
+    for tube in range(6, 0, -1):
+        chain.stations[tube].submit(Event(tube, 1, chain.now, severity, "stopped", {}), chain.local(tube))
+    if severity is Severity.INFO:
+        speak(chain, 1)
+    chain.run(latest)
+    assert sorted(m.tube for m in chain.got[BASE][told:] if isinstance(m, Event)) == [1, 2, 3, 4, 5, 6]
+    assert len(with_events) == frames
 
 
 @pytest.mark.slow

@@ -7,7 +7,7 @@ import datetime
 from pathlib import Path
 
 import pytest
-from attacks import END_ATTACKS, END_TO_END, JOINT_ATTACKS, ON_A_JOINT, PAGE, cell, name_of, outcomes
+from attacks import ARRIVED, END_ATTACKS, END_TO_END, JOINT_ATTACKS, ON_A_JOINT, PAGE, cell, name_of, outcomes
 from hypothesis import given
 from hypothesis import strategies as st
 from sealed_string import NOW, SealedString, aiding, make_folder, messages_in, survey
@@ -134,7 +134,7 @@ def forgeries(folder: Path, count: int) -> int:
     string = SealedString(folder)
     string.settle()
     string.say(Kind.SURVEY_MEASUREMENT)
-    string.run(1.0)
+    string.run(ARRIVED)
     base, tube = string.seals(BASE), string.seals(1)
     frame = string.frames_with(Kind.SURVEY_MEASUREMENT)[-1]
     (payload,) = [p for kind, p in messages_in(frame) if kind is Kind.SURVEY_MEASUREMENT]

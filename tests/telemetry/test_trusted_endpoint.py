@@ -134,6 +134,18 @@ def test_a_full_outbox_drops_what_may_be_lost_first_and_never_the_newest() -> No
     assert outbox.payload(3 * LIMIT - 1) == b"z"
 
 
+def test_what_waits_for_others_goes_with_the_next_or_alone_in_time_and_once() -> None:
+    outbox = Outbox()
+    outbox.keep_waiting(1, b"with others", 2.0)
+    assert list(outbox.due_payloads(1.0)) == []
+    assert outbox.release(1.0)
+    assert list(outbox.due_payloads(1.0)) == [b"with others"]
+    outbox.keep_waiting(2, b"alone", 3.0)
+    assert list(outbox.due_payloads(3.0)) == [b"alone"]
+    assert not outbox.release(3.0)
+    assert list(outbox.due_payloads(3.0)) == []
+
+
 def test_a_depth_on_a_joint_is_no_message(tube: Endpoint) -> None:
     from telemetry.messages import DepthReading
 
