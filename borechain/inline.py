@@ -14,6 +14,7 @@ from pathlib import Path
 from typing import Any
 
 from borechain.host import depth_sealer
+from borechain.rare_collection import rare_collection
 from groundstation.config import GroundConfig
 from groundstation.service.process import GroundProcess
 from node.process.encoder_process import EncoderProcess
@@ -110,7 +111,8 @@ class InlineRig:
             self.stepper.follow(progress)
             show(progress)
 
-        Scheduler(self.world, self.stepper, follow, speed, cued=True, seal_depth=self._seal_depth).run()
+        with rare_collection():
+            Scheduler(self.world, self.stepper, follow, speed, cued=True, seal_depth=self._seal_depth).run()
 
     @property
     def is_begun(self) -> bool:

@@ -2,14 +2,12 @@
 
 from __future__ import annotations
 
-import contextlib
-import gc
 import hashlib
 import shutil
 import tempfile
 import time
 import traceback
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -17,13 +15,13 @@ from typing import Any
 from borechain.gauntlet.oracles import Observer, violations
 from borechain.gauntlet.rig import PLANS, GauntletRig, make_ready, new_rig
 from borechain.gauntlet.sight import Sight
+from borechain.rare_collection import rare_collection
 from sim.gauntlet.kinds import KINDS
 from sim.gauntlet.plan import drawn_kinds, steps_of
 from sim.rig.report import digest
 
 ALL = tuple(kind.name for kind in KINDS)
 USUAL = "minute"
-COLLECT_EVERY = 50_000  # objects
 FEW = 2  # kinds of faults that may never mislead the crew without a word, whatever can be seen
 
 
@@ -51,7 +49,7 @@ def run_seed(seed: int, allowed: Sequence[str] = ALL, kinds: Sequence[str] | Non
     began = time.process_time()
     folder = Path(tempfile.mkdtemp(prefix="gauntlet-"))
     try:
-        with _rare_collection():
+        with rare_collection():
             rig = new_rig(plan, seed, folder)
             _run(rig, outcome)
             rig.close()
@@ -107,17 +105,6 @@ def _run(rig: GauntletRig, outcome: Outcome) -> None:
             depth_can_be_judged=is_of_few or not sight.has_believed_a_wrong_depth,
         ),
     ]
-
-
-@contextlib.contextmanager
-def _rare_collection() -> Iterator[None]:
-    """Look for cycles of garbage rarely: by default a third of the time of a seed goes into it."""
-    usual = gc.get_threshold()
-    gc.set_threshold(COLLECT_EVERY, *usual[1:])
-    try:
-        yield
-    finally:
-        gc.set_threshold(*usual)
 
 
 def _alarms(rig: GauntletRig) -> list[tuple[str, str, int, bool]]:

@@ -65,6 +65,8 @@ class JointAngles:
         self._resting: dict[int, RestingYaw] = {}
         self._differing: dict[Pair, int] = {}  # readings in a row that differ from what is known
         self._departed: set[Pair] = set()
+        self._string: tuple[int, ...] = ()
+        self._above: dict[int, int] = {}  # tube above each but the topmost
 
     def on_motion(self, tube: int) -> None:
         """A tube moves, or does not know its yaw."""
@@ -81,10 +83,11 @@ class JointAngles:
         yaw : later than the last one of its tube
         """
         self._resting[yaw.tube] = yaw
-        neighbours = list(pairwise(string))
-        for pair in [pair for pair in self.known if pair not in neighbours]:
-            self._forget(pair)
-        above = next((self._resting.get(upper) for upper, lower in neighbours if lower == yaw.tube), None)
+        if (hanging := tuple(string)) != self._string:
+            self._string, self._above = hanging, {lower: upper for upper, lower in pairwise(hanging)}
+            for pair in [(upper, lower) for upper, lower in self.known if self._above.get(lower) != upper]:
+                self._forget(pair)
+        above = self._resting.get(self._above[yaw.tube]) if yaw.tube in self._above else None
         if above is None or abs(above.at - yaw.at) > APART:
             return None
         return self._compare((above.tube, yaw.tube), Joint(float(wrap(yaw.yaw - above.yaw)), above.var + yaw.var))

@@ -115,6 +115,7 @@ class Endpoint:
         self.series = Series(boot_count if boot_count > 1 and address != BASE else 0)
         self._outbox = Outbox()
         self._holding = False
+        self._passes_states = False  # whether a state is in the frame that is looked at
         self._has_states = False  # whether states go up from here, with which others may go
         self._answers = Answers()
         self._commands = Outbox()
@@ -166,6 +167,10 @@ class Endpoint:
                 continue
             if message is not None:
                 received.append(Received(message, side))
+        if self._passes_states:
+            self._passes_states = False
+            self._links[Side.UPPER].release()
+            self._send_waiting(now)
         return received
 
     def advance(self, now: float) -> None:
@@ -339,6 +344,8 @@ class Endpoint:
     def _handle(self, side: Side, payload: Content, now: float) -> Message | None:
         opened = open_payload(payload if self.seals is None else self.seals.content(bytes(payload)))
         kind = opened.kind
+        if kind is Kind.NODE_STATE:
+            return self._handle_upward(opened, payload, now)
         if kind in ONE_HOP:
             return self._handle_one_hop(side, decode_opened(opened), now)
         if kind in DOWNWARD:
@@ -373,7 +380,7 @@ class Endpoint:
             self.counters["old_states"] += 1
             return None
         if self.address != BASE:
-            self._pass(Side.UPPER, opened, payload, now)
+            self._pass(Side.UPPER, opened, payload)
             return None
         message = self._heard(opened, payload, now)
         if isinstance(message, Reply):
@@ -385,7 +392,7 @@ class Endpoint:
 
     def _handle_downward(self, opened: Opened, payload: Content, now: float) -> Message | None:
         if opened.target != self.address:
-            self._pass(Side.LOWER, opened, payload, now)
+            self._pass(Side.LOWER, opened, payload)
             return None
         message = self._told(opened, payload, now)
         if isinstance(message, Receipt):
@@ -462,19 +469,18 @@ class Endpoint:
         else:
             self.counters["foreign_receipts"] += 1
 
-    def _pass(self, side: Side, opened: Opened, payload: Content, now: float) -> None:
+    def _pass(self, side: Side, opened: Opened, payload: Content) -> None:
         """Hand on the very bytes that came."""
-        link = self._links.get(side)
+        link, kind = self._links.get(side), opened.kind
         if link is None:
             self.counters["nowhere_to_go"] += 1
-        elif opened.kind in RELIABLE:
-            link.send_reliable(bytes(payload), PRIORITIES[opened.kind])
+        elif kind is Kind.NODE_STATE:  # as nearly always
+            link.send_best_effort(payload, (kind, opened.origin), Priority.STATE)
+            self._passes_states = self._has_states = True
+        elif kind in RELIABLE:
+            link.send_reliable(bytes(payload), PRIORITIES[kind])
         else:
-            link.send_best_effort(payload, (opened.kind, opened.origin), PRIORITIES[opened.kind])
-            if opened.kind is Kind.NODE_STATE:
-                link.release()
-                self._has_states = True
-                self._send_waiting(now)
+            link.send_best_effort(payload, (kind, opened.origin), PRIORITIES[kind])
 
     @property
     def _upper(self) -> int | None:
