@@ -9,6 +9,8 @@ An exchange asked at t1, received t2, replied t3, back t4 measures ((t2 - t1) + 
 difference of its two delays. That half is at most half of what the round trip took beyond the shortest one. Where even
 the shortest was long (a machine that does many things has just started fifty nodes), it may have waited one way only:
 until three of late have taken as long and found the same, all of it beyond a plausible round trip counts as a wait.
+A reply that took seconds is no measurement: whoever asked has asked again since, or it was recorded and comes again
+after a start, when nothing better is known.
 """
 
 from __future__ import annotations
@@ -23,6 +25,7 @@ JITTER_STD = 0.4e-3  # s, of one exchange over one joint
 OFFSET_WALK = 2e-6  # s/sqrt(s)
 DRIFT_WALK = 1e-9  # 1/sqrt(s)
 PLAUSIBLE_ROUND_TRIP = 0.02  # s, of a joint whose ends both wait; a longer one must be seen more than once
+LONGEST_ROUND_TRIP = 2.0  # s, two requests at the quick pace
 AGREEING, OF_LATE = 3, 8  # exchanges: so often, of so many
 GATE = 6.0  # sigmas
 RESET_AFTER = 3  # exchanges that disagree in a row
@@ -99,9 +102,9 @@ class ClockFilter:
         self._disagreed = RESET_AFTER - 1
 
     def exchange(self, reply: TimeReply, back: float) -> None:
-        """Take the reply that came ``back`` at the local time (s) given."""
+        """Take the reply that came ``back`` at the local time (s) given, unless it cannot be or took too long."""
         round_trip = (back - reply.asked_at) - (reply.replied_at - reply.received_at)
-        if self.is_root or round_trip < 0.0:
+        if self.is_root or not 0.0 <= round_trip <= LONGEST_ROUND_TRIP:
             return
         measured = 0.5 * ((reply.received_at - reply.asked_at) + (reply.replied_at - back))
         self._least_round_trip = min(self._least_round_trip, round_trip)

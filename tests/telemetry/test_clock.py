@@ -136,3 +136,17 @@ def test_a_clock_that_is_told_of_its_jump_says_so_and_believes_the_next_exchange
     local = clocks.local(0, t + 1.0)
     assert abs(node.rig_from_local(local) - t - 1.0) < 5e-3
     assert math.sqrt(node.variance(local)) < 5e-3
+
+
+def test_a_reply_of_long_ago_that_comes_again_tells_no_time() -> None:
+    """A ground station that has just started knows nothing better, and half of seven seconds would make it wrong."""
+    recorded = TimeReply(1006.0, 1006.003, 1006.003, 1006.003, 1.0, 0.0, 2)
+    started = ClockFilter()
+    started.exchange(recorded, 1014.8)
+    assert not started.synchronised
+    started.exchange(TimeReply(1015.0, 1015.003, 1015.003, 1015.003, 1.0, 0.0, 2), 1015.006)
+    assert started.rig_from_local(1015.006) == pytest.approx(1015.006, abs=1e-3)
+    before = started.rig_from_local(1016.0)
+    for _ in range(5):
+        started.exchange(recorded, 1016.0)
+    assert started.rig_from_local(1016.0) == before
