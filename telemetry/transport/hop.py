@@ -372,12 +372,9 @@ def common_topic(entries: Iterable[Entry]) -> Hashable | None:
 
 def bundled(entries: Iterable[Entry], limit: int) -> int:
     """How many of the first entries share a frame: at most ``limit`` bytes of them, but one in any case."""
-    sizes = [len(bytes(entry.payload)) + ENTRY_BYTES for entry in entries]
-    if sum(sizes) <= limit:
-        return len(sizes)  # as nearly always
     count = total = 0
-    for size in sizes:
-        total += size
+    for entry in entries:
+        total += len(bytes(entry.payload)) + ENTRY_BYTES
         if count > 0 and total > limit:
             break
         count += 1
