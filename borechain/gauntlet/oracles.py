@@ -171,8 +171,8 @@ def queues(rig: GauntletRig) -> Iterator[str]:
     """Queues that are longer than their limits."""
     for address, process in rig.stepper.processes.items():
         endpoint = process.endpoint
-        if endpoint.outbox_size > LIMIT:
-            yield f"process {address}: {endpoint.outbox_size} messages wait"
+        if endpoint.mail.outbox_size > LIMIT:
+            yield f"process {address}: {endpoint.mail.outbox_size} messages wait"
         if endpoint.waiting > 2 * (QUEUE_LIMIT + WINDOW + BEST_EFFORT_LIMIT):
             yield f"process {address}: {endpoint.waiting} payloads wait in its links"
 

@@ -76,15 +76,15 @@ class Crowd(Process):
 
     def happen(self, now: float) -> None:
         """Something that the ground station must never lose."""
-        number = self.endpoint.series.take()
-        self.endpoint.submit(Event(ENCODER, number, now, Severity.INFO, "stopped"), now)
+        number = self.endpoint.mail.series.take()
+        self.endpoint.mail.submit(Event(ENCODER, number, now, Severity.INFO, "stopped"), now)
         self.events += 1
 
     @property
     def receipted(self) -> int:
         """Events that the ground station has receipted; asked on another thread it may be too few, never too many."""
         events = self.events
-        return events - self.endpoint.outbox_size
+        return events - self.endpoint.mail.outbox_size
 
     def _drill(self, now: float, elapsed: float) -> None:
         number, into = divmod(elapsed, ROUND_S)
@@ -96,7 +96,7 @@ class Crowd(Process):
             self._surveyed_round = int(number) + 1
             for tube in range(1, self.tubes + 1):
                 self.surveys += 1
-                self.endpoint.submit(survey_of(tube, self._surveyed_round, now, self.tubes - tube + 1), now)
+                self.endpoint.mail.submit(survey_of(tube, self._surveyed_round, now, self.tubes - tube + 1), now)
 
 
 def state_of(tube: int, hops: int, now: float) -> NodeState:

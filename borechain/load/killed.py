@@ -78,7 +78,7 @@ def kill_again_and_again(
                     if len(outcome.back_s) <= times:
                         receipts(crowd, hand_over, lot.randint(1, MOST_RECEIPTS))
                         table.kill("base")
-                wait_until(lambda: crowd.endpoint.outbox_size == 0)
+                wait_until(lambda: crowd.endpoint.mail.outbox_size == 0)
     finally:
         table.stop()
     count(outcome, checked_config(rig=RIG, folder=folder, **settings).url)
@@ -104,7 +104,7 @@ def receipts(crowd: Crowd, hand_over: Callable[[], None], wanted: int) -> None:
     until = crowd.receipted + wanted
 
     def are_enough() -> bool:
-        if crowd.receipted < until and crowd.endpoint.outbox_size < AT_ONCE:
+        if crowd.receipted < until and crowd.endpoint.mail.outbox_size < AT_ONCE:
             hand_over()
         return crowd.receipted >= until
 

@@ -124,7 +124,7 @@ class GroundProcess(Process):
         self._learner = Learner(self.store, self.model, self.watch, self._keeper)
         self.operator = Operator(config, self.model, self.store, self._uploads, start)
         self.operator.changed = self._publish
-        self.operator.ended = self.endpoint.withdraw
+        self.operator.ended = self.endpoint.mail.withdraw
         self.operator.accepted = self._note_order
         self._learner.restore()
         self.model.crew_alarms.restore(self.store.alarms(), conditions_of(self.model))
@@ -174,7 +174,7 @@ class GroundProcess(Process):
             for outgoing in self.operator.due_requests(now):
                 self._send(outgoing, now)
         for segment in self._uploads.due_segments(now) if self._uploads is not None else ():
-            self.endpoint.send_segment(segment)
+            self.endpoint.mail.send_segment(segment)
         super().on_timer(now)
         if self.watch.is_due(now):
             self._look(now)
@@ -207,7 +207,7 @@ class GroundProcess(Process):
         if isinstance(outgoing, BlockUpload):
             self.operator.start_upload(outgoing, now)
         else:
-            self.endpoint.command(outgoing, now)
+            self.endpoint.mail.command(outgoing, now)
 
     def _advance_time(self, now: float) -> None:
         """Follow rig time and its epoch, also where nothing comes any more."""
@@ -326,7 +326,7 @@ class GroundProcess(Process):
         """Store and learn what came together before any of it is acknowledged."""
         stored, changed = self._learner.learn_arrived()
         for message in stored:
-            self.endpoint.acknowledge(message)
+            self.endpoint.mail.acknowledge(message)
         if stored:
             self._publish(changed)
 

@@ -80,7 +80,7 @@ class EncoderProcess(Process):
         for received in self.endpoint.receive(side, frame, now, margin):
             if isinstance(received.message, Command):
                 refusal = Reply(ENCODER, received.message.sequence, False, "the encoder node takes no commands")
-                self.endpoint.reply(refusal, now)
+                self.endpoint.mail.reply(refusal)
 
     def on_cycle(self, data: Any, now: float) -> None:
         """The counter was read: ``data`` is start (s), count, time of its last edge (s), 1 if it rose, torque, edges.
@@ -108,8 +108,8 @@ class EncoderProcess(Process):
             self._timing.lap(stage)
 
     def _send_event(self, severity: Severity, code: str, arguments: dict[str, Scalar]) -> None:
-        number, epoch = self.endpoint.series.take(), self.endpoint.clock.epoch
-        self.endpoint.submit(Event(ENCODER, number, self._now, severity, code, arguments, epoch), self._now)
+        number, epoch = self.endpoint.mail.series.take(), self.endpoint.clock.epoch
+        self.endpoint.mail.submit(Event(ENCODER, number, self._now, severity, code, arguments, epoch), self._now)
 
 
 def sample_of(data: Any) -> EncoderSample | None:

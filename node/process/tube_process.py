@@ -133,7 +133,7 @@ class TubeProcess(Process):
         )
         self._seal_watch = SealWatch(self.endpoint, self._send_event)
         restored = saved is not None
-        next_sequence = self.endpoint.series.take
+        next_sequence = self.endpoint.mail.series.take
         self.tube = Tube(
             settings,
             self.config,
@@ -166,10 +166,10 @@ class TubeProcess(Process):
             if isinstance(message, Aiding) and received.side is Side.UPPER:
                 self._on_aiding(message, now)
             elif isinstance(message, Command):
-                self.endpoint.reply(self._commands.obey(message), now)
+                self.endpoint.mail.reply(self._commands.obey(message))
                 self._save()
             elif isinstance(message, BlockSegment):
-                self.endpoint.send_status(self._blocks.on_segment(message, now))
+                self.endpoint.mail.send_status(self._blocks.on_segment(message, now))
         self._save_if_due()
 
     def on_cycle(self, data: Any, now: float) -> None:
@@ -196,7 +196,7 @@ class TubeProcess(Process):
                 self.endpoint.clock.doubt(jump_of(message))
             self._send(message, now)
         if self._blocks.trying and (status := self._blocks.on_cycle(self.tube.raw)) is not None:
-            self.endpoint.send_status(status)
+            self.endpoint.mail.send_status(status)
         if self._timing is None:  # an own clock advances time between the cycles
             self.endpoint.advance(now)
         self._lap(Stage.REPORT)
@@ -285,7 +285,7 @@ class TubeProcess(Process):
             flags=flags,
             hops=endpoint.place.told_hops,
             epoch=endpoint.clock.epoch,
-            numbered=endpoint.series.newest,
+            numbered=endpoint.mail.series.newest,
             upper_margin=endpoint.margin(Side.UPPER),
             lower_margin=endpoint.margin(Side.LOWER),
         )
@@ -296,14 +296,14 @@ class TubeProcess(Process):
             self._log.append_payload(said.sequence, encode(said))
         self._saver.due = True
         if self._saver.spent:
-            self.endpoint.hold()
-        self.endpoint.submit(said, now)
+            self.endpoint.mail.hold()
+        self.endpoint.mail.submit(said, now)
 
     def _resend(self, first: int, last: int) -> tuple[int, int]:
         """Send the surveys and records of these numbers again; how many, and from which number all are kept."""
         found = self._log.payloads(first, last)[:RESENT_TOGETHER]
         for sequence, payload in found:
-            self.endpoint.submit_again(sequence, payload, self._now)
+            self.endpoint.mail.submit_again(sequence, payload, self._now)
         self._saver.due = self._saver.due or bool(found)
         return len(found), self._log.complete_from
 
@@ -352,12 +352,12 @@ class TubeProcess(Process):
     def _send_event(self, severity: Severity, code: str, arguments: dict[str, Scalar]) -> None:
         """Keep an event of the process; it is saved before its frame leaves."""
         clock = self.endpoint.clock
-        rig_now, number = clock.rig_from_local(self._now), self.endpoint.series.take()
+        rig_now, number = clock.rig_from_local(self._now), self.endpoint.mail.series.take()
         self._keep(Event(self.settings.tube, number, rig_now, severity, code, arguments, clock.epoch), self._now)
 
     def _save(self) -> None:
         self._saver.save(self.nodes, self.endpoint.export_state())
-        self.endpoint.release(self._now)
+        self.endpoint.mail.release(self._now)
 
     def _save_if_due(self) -> bool:
         if self._saver.due and not self._saver.spent:

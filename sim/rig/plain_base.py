@@ -26,4 +26,4 @@ class PlainBase(Process):
             message = received.message
             if isinstance(message, get_args(Kept)):
                 self.arrived.setdefault((message.tube, message.sequence), (message, now))
-                self.endpoint.acknowledge(message)
+                self.endpoint.mail.acknowledge(message)

@@ -1,7 +1,7 @@
 """One process of the string in conversation with its neighbours, and through them with the ground station.
 
 An endpoint owns a link at each end. What is for one hop it handles itself (neighbours, time); what travels it passes
-on as the bytes that came; what is for it, it decodes and hands to its process. All of it is driven from outside by
+on as the bytes that came; what is for it or comes from it is for its ``mail``. All of it is driven from outside by
 ``receive``, ``advance`` and ``take_frames``; there is no clock, thread or socket in here.
 """
 
@@ -11,13 +11,11 @@ import math
 from collections import Counter
 from typing import TYPE_CHECKING, NamedTuple
 
-from telemetry.application.answers import Answers
 from telemetry.application.clock import ClockFilter
-from telemetry.application.kinds import ONE_HOP, PRIORITIES, RELIABLE, is_warning
-from telemetry.application.outbox import Outbox
+from telemetry.application.kinds import ONE_HOP, PRIORITIES, RELIABLE
+from telemetry.application.mail import Mail
 from telemetry.application.place import Place
-from telemetry.application.saved_state import SavedState, is_needed, pack_state, parse_state
-from telemetry.application.series import Series
+from telemetry.application.saved_state import parse_state
 from telemetry.application.standstill import Standstill, is_undated
 from telemetry.errors import DecodeError
 from telemetry.media.port import Frame, Priority
@@ -25,22 +23,14 @@ from telemetry.messages import (
     BASE,
     ENCODER,
     Aiding,
-    BlockSegment,
-    BlockStatus,
-    Command,
     Hello,
-    Kept,
     Message,
     Mode,
     NodeState,
-    Receipt,
-    Reply,
-    SessionOffer,
     Side,
     TimeReply,
     TimeRequest,
 )
-from telemetry.presentation.content import content_of, content_of_message
 from telemetry.presentation.msgpack_codec import (
     DOWNWARD,
     Opened,
@@ -62,7 +52,6 @@ SYNC_BURST = 30  # exchanges at the quick pace after a start
 SYNC_QUICK = 1.0  # s
 SYNC_SLOW = 10.0  # s
 STATE_WAIT = 1.15  # s for which a node's state waits for those of the nodes below, to go up with them
-KEPT_WAIT = 1.15  # s for which what is no warning waits for a state to go up with
 HOP_WAIT = 0.005  # s, longer by a frame's way where fewer hops are left: after a loss the lowest goes first again
 WAITING_HOPS = 100
 REPORT_EVERY = 60.0  # s between two looks at what queues dropped
@@ -111,22 +100,20 @@ class Endpoint:
         self._links = {side: HopLink(address, boot_count, self.place.nearest(side)) for side in sorted(sides)}
         toward_encoder = Side.LOWER if address == BASE else Side.UPPER
         self._sync_side = None if is_clock_root else toward_encoder
-        # a process that lost its numbers begins another series, so that none is given to a second message
-        self.series = Series(boot_count if boot_count > 1 and address != BASE else 0)
-        self._outbox = Outbox()
-        self._holding = False
+        links = self._links.get(Side.UPPER), self._links.get(Side.LOWER)
+        self.mail = Mail(address, boot_count, *links, self.counters, seals)
         self._passes_states = False  # whether a state is in the frame that is looked at
-        self._has_states = False  # whether states go up from here, with which others may go
-        self._answers = Answers()
-        self._commands = Outbox()
         self._hello_at = -math.inf
         self._sync_at = -math.inf
         self._standstill = Standstill()
         if restored is not None:
             try:
-                self._restore(parse_state(restored))
+                saved = parse_state(restored)
             except DecodeError:
                 self.counters["bad_saved_state"] += 1
+            else:
+                self.place.hops = saved.hops
+                self.mail.restore(saved)
 
     def limit_bundles(self, side: Side, limit: int) -> None:
         """Let payloads share a frame at one end only up to ``limit`` bytes: a large frame holds an urgent one up."""
@@ -170,7 +157,7 @@ class Endpoint:
         if self._passes_states:
             self._passes_states = False
             self._links[Side.UPPER].release()
-            self._send_waiting(now)
+            self.mail.go_with_states(now)
         return received
 
     def advance(self, now: float) -> None:
@@ -181,7 +168,7 @@ class Endpoint:
                 self.place.neighbours[side] = None
         if self.seals is not None:
             self.seals.advance(now)
-            self._send_offers()
+            self.mail.send_offers()
         if now >= self._hello_at + HELLO_EVERY:
             is_news = self._hello_at == -math.inf
             self._hello_at = now
@@ -189,8 +176,7 @@ class Endpoint:
         if self._sync_side in self._links and now >= self._sync_at + self._sync_pace():
             self._sync_at = now
             self._links[self._sync_side].send_best_effort(unwritten(TimeRequest(now)), Kind.TIME_REQUEST, Priority.TIME)
-        self._send_kept(now)
-        self._send_due(self._commands, Side.LOWER, now)
+        self.mail.send_due(now)
 
     def take_frames(self, now: float) -> list[tuple[Side, Frame]]:
         """Frames to put on the wire now."""
@@ -235,66 +221,11 @@ class Endpoint:
             below = self._links.get(Side.LOWER)
             wait = STATE_WAIT + HOP_WAIT * max(WAITING_HOPS - self.place.hops, 0)
             until = now + wait if below is not None and below.is_up(now) else now
-            payload = unwritten(state) if self.seals is None else self._sealed(encode(state))
+            payload = unwritten(state) if self.seals is None else self.seals.close_up(encode(state))
             link.send_with_others(payload, (Kind.NODE_STATE, state.tube), Priority.STATE, until)
-            self._has_states = True
+            self.mail.has_states = True
             if until == now:
-                self._send_waiting(now)
-
-    def submit(self, message: Kept, now: float) -> None:
-        """Keep a message until the ground station has receipted it, and send it unless messages are held back.
-
-        What is no warning goes up with the next states, in their frames.
-        """
-        payload, needed = encode(message), is_needed(message)
-        if is_warning(message) or not self._has_states:
-            self._outbox.keep_payload(message.sequence, payload, now, needed=needed)
-        else:
-            self._outbox.keep_waiting(message.sequence, payload, now + KEPT_WAIT, needed=needed)
-        self._send_kept(now)
-
-    def hold(self) -> None:
-        """Send no message that is kept before ``release``: what must be on the disk first is not yet."""
-        self._holding = True
-
-    def release(self, now: float) -> None:
-        """Send what was held back."""
-        if self._holding:
-            self._holding = False
-            self._send_kept(now)
-
-    def submit_again(self, sequence: int, payload: bytes, now: float) -> None:
-        """Send once more what was receipted before, because the ground station asks for it."""
-        self._outbox.keep_payload(sequence, payload, now)
-
-    def command(self, command: Command, now: float) -> None:
-        """Send an order down the string until its reply comes (base station)."""
-        self._commands.keep_payload(command.sequence, encode(command), now)
-        self._send_due(self._commands, Side.LOWER, now)
-
-    def withdraw(self, sequence: int) -> None:
-        """Send an order no more (base station)."""
-        self._commands.settle(sequence)
-
-    def reply(self, reply: Reply, now: float) -> None:
-        """Answer a command; the answer is kept, so that a repeated command is answered and not obeyed again."""
-        del now
-        payload = encode(reply)
-        self._answers.keep(reply.sequence, payload)
-        self._links[Side.UPPER].send_reliable(self._sealed(payload))
-
-    def send_segment(self, segment: BlockSegment) -> None:
-        """Send a part of a parameter block down; what is lost with a relay the upload repeats (base station)."""
-        self._send_down(encode(segment), segment.tube, Priority.BLOCK)
-
-    def send_status(self, status: BlockStatus) -> None:
-        """Tell the ground station how an upload stands."""
-        self._links[Side.UPPER].send_reliable(self._sealed(encode(status)))
-
-    def acknowledge(self, message: Kept) -> None:
-        """Tell a tube that its message is stored, this one and no other of its number (base station)."""
-        receipt = Receipt(message.tube, message.sequence, content_of_message(message))
-        self._send_down(encode(receipt), receipt.tube, Priority.COMMAND)
+                self.mail.go_with_states(now)
 
     def margin(self, side: Side) -> float:
         """What the neighbour at one end is heard with over the radio's threshold, dB; infinite without radio or it."""
@@ -304,11 +235,6 @@ class Endpoint:
     def skipped(self) -> int:
         """Silent tubes between this one and its upper neighbour."""
         return self.place.skipped(self._upper)
-
-    @property
-    def outbox_size(self) -> int:
-        """Surveys and events that the ground station has not receipted yet."""
-        return len(self._outbox)
 
     @property
     def waiting(self) -> int:
@@ -322,24 +248,18 @@ class Endpoint:
             total.update(self.seals.counters())
         for link in self._links.values():
             total.update(link.counters)
-        total["outbox_dropped"] = self._outbox.dropped
+        total["outbox_dropped"] = self.mail.dropped
         return dict(total)
 
     @property
     def dropped(self) -> int:
         """What found no place in any queue since the start."""
         links = [link.counters for link in self._links.values()]
-        return self._outbox.dropped + sum([counters[name] for counters in links for name in DROPS])
+        return self.mail.dropped + sum([counters[name] for counters in links for name in DROPS])
 
     def export_state(self) -> bytes:
         """What must survive a restart: numbers, unreceipted messages, answered commands."""
-        return pack_state(self.series.following, self._outbox.contents(), self._answers.contents(), self.place.hops)
-
-    def _restore(self, saved: SavedState) -> None:
-        self.series.following, self.place.hops = saved.next_sequence, saved.hops
-        for sequence, payload, needed in saved.parcels:
-            self._outbox.keep_payload(sequence, payload, -math.inf, needed=needed)
-        self._answers.restore(saved.answered)
+        return self.mail.export_state(self.place.hops)
 
     def _handle(self, side: Side, payload: Content, now: float) -> Message | None:
         opened = open_payload(payload if self.seals is None else self.seals.content(bytes(payload)))
@@ -349,7 +269,10 @@ class Endpoint:
         if kind in ONE_HOP:
             return self._handle_one_hop(side, decode_opened(opened), now)
         if kind in DOWNWARD:
-            return self._handle_downward(opened, payload, now)
+            if opened.target == self.address:
+                return self.mail.open_from_base(opened, payload, now)
+            self._pass(Side.LOWER, opened, payload)
+            return None
         return self._handle_upward(opened, payload, now)
 
     def _handle_one_hop(self, side: Side, message: Message, now: float) -> Message | None:
@@ -382,92 +305,13 @@ class Endpoint:
         if self.address != BASE:
             self._pass(Side.UPPER, opened, payload)
             return None
-        message = self._heard(opened, payload, now)
-        if isinstance(message, Reply):
-            order = self._commands.payload(message.sequence)
-            if order is None or open_payload(order).target != message.tube:
-                return None  # answered already, or by somebody who was not asked
-            self._commands.settle(message.sequence)
-        return message
-
-    def _handle_downward(self, opened: Opened, payload: Content, now: float) -> Message | None:
-        if opened.target != self.address:
-            self._pass(Side.LOWER, opened, payload)
-            return None
-        message = self._told(opened, payload, now)
-        if isinstance(message, Receipt):
-            self._settle(message)
-            return None
-        if isinstance(message, Command) and message.sequence in self._answers:
-            self._links[Side.UPPER].send_reliable(self._sealed(self._answers.payload(message.sequence)))
-            return None
-        return message
-
-    def _heard(self, opened: Opened, payload: Content, now: float) -> Message | None:
-        """Message of a tube to the base, None where its seal is not to be believed."""
-        seals = self.seals
-        if seals is None:
-            return decode_opened(opened)
-        tube = opened.origin
-        heard = seals.hear(bytes(payload), tube, now)
-        self._send_offers()
-        if not heard.is_believed:
-            return None
-        if heard.begins_session:
-            self._commands.make_due(now)
-        message = decode_opened(opened)
-        return message if seals.is_of(message, tube) else None
-
-    def _told(self, opened: Opened, payload: Content, now: float) -> Message | None:
-        """Message of the base to this tube, None where its seal is not to be believed or it was for the seals alone."""
-        seals = self.seals
-        if seals is None:
-            message = decode_opened(opened)
-            return None if isinstance(message, SessionOffer) else message
-        if not seals.is_told(bytes(payload), now, is_offer=opened.kind is Kind.SESSION_OFFER):
-            return None
-        message = decode_opened(opened)
-        if not seals.is_of(message, self.address):
-            return None
-        if isinstance(message, SessionOffer):
-            self._answers.begin_session()
-            self._outbox.make_due(now)  # what was sent without a session was not believed
-            self._send_kept(now)
-            return None
-        is_command = isinstance(message, Command) and message.sequence not in self._answers
-        return None if is_command and not seals.is_order_new(opened.sequence, self._answers.too_old) else message
+        return self.mail.open_from_tube(opened, payload, now)
 
     def _is_measured(self, aiding: Aiding, now: float) -> bool:
         """Whether the encoder measured what an aiding says; without keys everybody is believed."""
         if self.seals is None or not self.clock.synchronised:
             return True  # what comes before rig time is known is not used
         return self.seals.measurement.admits(aiding, self.clock.epoch, self.clock.rig_from_local(now))
-
-    def _sealed(self, payload: bytes) -> bytes:
-        """Payload for the base, sealed where there are keys."""
-        return payload if self.seals is None else self.seals.close_up(payload)
-
-    def _send_down(self, payload: bytes, tube: int, priority: Priority) -> None:
-        """Send what must arrive to a tube; without a session under keys it waits for its repetition."""
-        sealed = payload if self.seals is None else self.seals.close_down(payload, tube)
-        if sealed is not None:
-            self._links[Side.LOWER].send_reliable(sealed, priority)
-
-    def _send_offers(self) -> None:
-        """Offer sessions to tubes whose seals the base does not know."""
-        if self.seals is not None and Side.LOWER in self._links:
-            for tube, payload in self.seals.due_offers():
-                self._links[Side.LOWER].send_best_effort(payload, (Kind.SESSION_OFFER, tube), Priority.COMMAND)
-
-    def _settle(self, receipt: Receipt) -> None:
-        """Forget what the ground station stored; a receipt for other content is of another life, or forged."""
-        payload = self._outbox.payload(receipt.sequence)
-        if payload is None:
-            return
-        if content_of(payload) == receipt.content:
-            self._outbox.settle(receipt.sequence)
-        else:
-            self.counters["foreign_receipts"] += 1
 
     def _pass(self, side: Side, opened: Opened, payload: Content) -> None:
         """Hand on the very bytes that came."""
@@ -476,7 +320,7 @@ class Endpoint:
             self.counters["nowhere_to_go"] += 1
         elif kind is Kind.NODE_STATE:  # as nearly always
             link.send_best_effort(payload, (kind, opened.origin), Priority.STATE)
-            self._passes_states = self._has_states = True
+            self._passes_states = True
         elif kind in RELIABLE:
             link.send_reliable(bytes(payload), PRIORITIES[kind])
         else:
@@ -495,22 +339,3 @@ class Endpoint:
 
     def _sync_pace(self) -> float:
         return SYNC_QUICK if self.clock.exchanges < SYNC_BURST else SYNC_SLOW
-
-    def _send_kept(self, now: float) -> None:
-        if not self._holding:
-            self._send_due(self._outbox, Side.UPPER, now)
-
-    def _send_waiting(self, now: float) -> None:
-        """A state goes up: what waited for one goes with it."""
-        if self._outbox.release(now):
-            self._send_kept(now)
-
-    def _send_due(self, outbox: Outbox, side: Side, now: float) -> None:
-        if not len(outbox) or side not in self._links:
-            return
-        if side is Side.UPPER:
-            for payload in outbox.due_payloads(now):
-                self._links[side].send_reliable(self._sealed(payload), Priority.SURVEY)
-        else:
-            for payload in outbox.due_payloads(now):
-                self._send_down(payload, open_payload(payload).target, Priority.COMMAND)

@@ -25,7 +25,7 @@ from node.process.tube_process import TubeProcess
 from sim.gauntlet.disk import FaultyDisk
 from telemetry.application.answers import KEPT, Answers
 from telemetry.application.clock import ClockFilter
-from telemetry.application.endpoint import Endpoint
+from telemetry.application.mail import Mail
 from telemetry.application.outbox import LIMIT, Outbox, Parcel
 from telemetry.messages import (
     BASE,
@@ -83,7 +83,7 @@ def receipt_before_the_store(patch: pytest.MonkeyPatch) -> None:
 
     def keep_arrived(process: GroundProcess) -> None:
         for one in process._learner._arrived:
-            process.endpoint.acknowledge(one.message)
+            process.endpoint.mail.acknowledge(one.message)
         plain(process)
 
     patch.setattr(GroundProcess, "_keep_arrived", keep_arrived)
@@ -127,7 +127,7 @@ def order_of_string_not_kept(patch: pytest.MonkeyPatch) -> None:
 
 
 def receipt_by_number(patch: pytest.MonkeyPatch) -> None:
-    patch.setattr(Endpoint, "_settle", lambda endpoint, receipt: endpoint._outbox.settle(receipt.sequence))
+    patch.setattr(Mail, "_settle", lambda mail, receipt: mail._outbox.settle(receipt.sequence))
 
 
 def order_not_saved(patch: pytest.MonkeyPatch) -> None:
@@ -235,10 +235,10 @@ def a_receipt_of_other_content_settles_nothing(folder: Path) -> str:
     link.last_heard = math.inf
     for number in range(1, 10):
         link.send_best_effort(encode(Receipt(1, number, b"\1" * 16)), number)
-    before = endpoint.outbox_size
+    before = endpoint.mail.outbox_size
     for frame in link.take_frames(0.0):
         process.on_frame(Side.UPPER, frame.payload, 0.0)
-    return "" if endpoint.outbox_size == before > 0 else "a message is forgotten"
+    return "" if endpoint.mail.outbox_size == before > 0 else "a message is forgotten"
 
 
 def the_order_of_the_string_outlives_the_ground_station(folder: Path) -> str:

@@ -96,6 +96,6 @@ class Rig:
         imus = (ImuMean((9.81 * math.sin(lean), 0.0, -9.81 * math.cos(lean)), COV),)
         hops = self.hops.get(tube, 1)
         message = SurveyMeasurement(tube, sequence, self.now, hops, imus, 0.0, 1e-8, 1e-8, 32, 20.0, flags)
-        self.tube.submit(message, self.now)
+        self.tube.mail.submit(message, self.now)
         self.run(2.0)
         self.read_depth(self.md)

@@ -101,7 +101,7 @@ class Rig:
         """What happens before a cycle is read; for a subclass."""
 
     def watch(self, ground: GroundProcess) -> None:
-        send, hear = ground.endpoint.send_segment, ground.operator.on_block_status
+        send, hear = ground.endpoint.mail.send_segment, ground.operator.on_block_status
 
         def sending(segment: BlockSegment) -> None:
             self.sent.append(segment.index)
@@ -111,7 +111,7 @@ class Rig:
             self.said.append(status)
             hear(status)
 
-        ground.endpoint.send_segment = sending  # type: ignore[method-assign]
+        ground.endpoint.mail.send_segment = sending  # type: ignore[method-assign]
         ground.operator.on_block_status = hearing  # type: ignore[method-assign]
 
     @property

@@ -40,7 +40,7 @@ class Served:
 
         def submit(rig: Rig) -> None:
             number = 500 + rig.ground.model.seen["events"]
-            rig.tube.submit(Event(1, number, rig.now, Severity.INFO, "stopped"), rig.now)
+            rig.tube.mail.submit(Event(1, number, rig.now, Severity.INFO, "stopped"), rig.now)
             rig.run(2.0)
 
         self.do(submit)

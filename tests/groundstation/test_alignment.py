@@ -76,13 +76,13 @@ def test_two_imus_of_a_process_arrive_as_two_means(tmp_path: Path) -> None:
     settings = TubeSettings(1, limits=NOISELESS, imus=(ImuSettings(), ImuSettings(noise=2.0)))
     process = TubeProcess(settings, tmp_path)
     surveys: list[SurveyMeasurement] = []
-    submit = process.endpoint.submit
+    submit = process.endpoint.mail.submit
 
     def keep(message: object, now: float) -> None:
         surveys.extend([message] if isinstance(message, SurveyMeasurement) else [])
         submit(message, now)  # type: ignore[arg-type]
 
-    process.endpoint.submit = keep  # type: ignore[method-assign, assignment]
+    process.endpoint.mail.submit = keep  # type: ignore[method-assign, assignment]
     process.tube.take_survey()
     process._context = lambda now: RigContext(True, 1, now, 1e-8, True)  # type: ignore[method-assign]
     now = 1000.0

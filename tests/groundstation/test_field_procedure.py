@@ -208,18 +208,18 @@ def test_a_tube_cut_in_the_middle_of_its_upload_tells_its_old_block_and_is_asked
     rig.command("begin")
     rig.collect(PRESETS)
     before = rig.tube(1).tube.parameters.sha256().hex()
-    plain = rig.ground.endpoint.send_segment
+    plain = rig.ground.endpoint.mail.send_segment
 
     def lose(segment: BlockSegment) -> None:
         if segment.tube == 2 or segment.index < 2:
             plain(segment)
 
-    rig.ground.endpoint.send_segment = lose  # type: ignore[method-assign]
+    rig.ground.endpoint.mail.send_segment = lose  # type: ignore[method-assign]
     rig.command("confirm", proposal=rig.command("solve")["proposal"])
     rig.run(4.0)
     rig.start(1)
     assert rig.tube(1).tube.parameters.sha256().hex() == before
-    rig.ground.endpoint.send_segment = plain  # type: ignore[method-assign]
+    rig.ground.endpoint.mail.send_segment = plain  # type: ignore[method-assign]
     rig.run(60.0, rig.is_done)
     check(rig)
     rows = {row["tube"]: row for row in rig.view()["tubes"]}

@@ -210,7 +210,7 @@ def test_a_database_that_vanishes_is_told_and_nothing_is_acknowledged(rig: Drill
     assert rig.health() == "bad"
     waiting = rig.stepper.processes[1]
     assert isinstance(waiting, TubeProcess)
-    assert waiting.endpoint.outbox_size > 0
+    assert waiting.endpoint.mail.outbox_size > 0
     rig.cut(BASE)
     rig.start(BASE)
     rig.finish()

@@ -153,8 +153,8 @@ async def test_a_wrong_selector_is_told_the_right_ones(rig: tuple[Rig, ZenohBus]
 async def test_every_answer_has_the_fields_that_its_key_promises(rig: tuple[Rig, ZenohBus]) -> None:
     it, _ = rig
     it.survey(1, 3, inclination_deg=40.0)  # out of any tolerance
-    it.tube.submit(Event(1, 9, it.now, Severity.WARNING, "overrun", {"missed": 3, "share": None}), it.now)
-    it.tube.submit(
+    it.tube.mail.submit(Event(1, 9, it.now, Severity.WARNING, "overrun", {"missed": 3, "share": None}), it.now)
+    it.tube.mail.submit(
         StaticRecord(1, 10, 77, 1.0, 21.0, 38, (0.0, 0.0, 0.1), COV, (0.0, 0.0, -9.8), COV, 30.0, False), it.now
     )
     it.ground.operator.command(1, "align", {"turns": 3.0})
@@ -200,7 +200,7 @@ async def test_silence_is_noticed_and_told_where_no_depth_comes_any_more(rig: tu
 
 async def test_a_restart_forgets_and_doubles_nothing(rig: tuple[Rig, ZenohBus], start: Callable[[], Rig]) -> None:
     it, bus = rig
-    it.tube.submit(Event(1, 7, it.now, Severity.INFO, "stopped"), it.now)
+    it.tube.mail.submit(Event(1, 7, it.now, Severity.INFO, "stopped"), it.now)
     it.run(2.0)
     before = (await ask(bus, f"{GROUND}/stations"))["stations"]
     again = start()
@@ -210,10 +210,10 @@ async def test_a_restart_forgets_and_doubles_nothing(rig: tuple[Rig, ZenohBus], 
     assert [e.sequence for e in model.events] == [7]
     again.run(3.0)
     stored = next(one.message for one in again.ground.store.messages() if isinstance(one.message, SurveyMeasurement))
-    again.tube.submit(stored, again.now)  # its receipt was lost
+    again.tube.mail.submit(stored, again.now)  # its receipt was lost
     again.run(2.0)
     assert [(s.md, s.count) for s in model.stations] == [(2.0, 2), (4.0, 1)]
-    assert again.tube.outbox_size == 0
+    assert again.tube.mail.outbox_size == 0
     assert before[0]["measurements"] == 2
 
 
@@ -239,10 +239,10 @@ def test_a_covariance_that_is_none_is_kept_and_counted_now_and_after_a_restart(s
     rig.run(3.0)
     rig.depth(2.0)
     rig.state(1, 1)
-    rig.tube.submit(replace(MEASUREMENT, imus=(ImuMean((0.0, 0.0, -9.81), NO_COV),), station_at=rig.now), rig.now)
+    rig.tube.mail.submit(replace(MEASUREMENT, imus=(ImuMean((0.0, 0.0, -9.81), NO_COV),), station_at=rig.now), rig.now)
     rig.run(2.0)
     rig.read_depth(2.0)
-    assert rig.tube.outbox_size == 0
+    assert rig.tube.mail.outbox_size == 0
     assert (rig.ground.model.refused, rig.ground.model.stations) == (1, [])
     rig.ground.store.close()
     assert start().ground.model.refused == 1
@@ -268,7 +268,7 @@ def test_a_joint_that_contradicts_its_marks_is_an_alarm_until_the_crew_has_looke
     rig = start()
     rig.speak(1)
     event = Event(1, 7, rig.now, Severity.WARNING, "joint_contradicts_marks", dict(arguments))
-    rig.tube.submit(event, rig.now)
+    rig.tube.mail.submit(event, rig.now)
     rig.run(2.0)
     (told,) = [row for row in rig.ask("alarms")["rig"] if row["code"] == "joint"]
     assert told["subject"] == "joint above tube 1"
@@ -348,7 +348,7 @@ def test_a_survey_without_a_depth_is_kept_and_counted(start: Callable[[], Rig]) 
     assert rig.ground.model.unplaced == 1
     assert "survey_unplaced" in rig.alarms()
     assert [s.md for s in rig.ground.store.messages()] == [None]
-    assert rig.tube.outbox_size == 0
+    assert rig.tube.mail.outbox_size == 0
 
 
 async def published(bus: ZenohBus, arrived: Callable[[], bool]) -> None:
@@ -428,7 +428,7 @@ async def test_an_order_waits_for_nobody_and_its_course_is_published(
         }
         number = next(o["order"] for o in orders if o["tube"] == 1)
         it.run(1.0)
-        it.tube.reply(Reply(1, number, True, "", {"version": 7, "sha256": "ab", "of a later node": 1}), it.now)
+        it.tube.mail.reply(Reply(1, number, True, "", {"version": 7, "sha256": "ab", "of a later node": 1}))
         it.run(1.0)
         answer = await live
         assert (answer["state"], answer["done"], answer["values"]) == ("done", True, {"version": 7, "sha256": "ab"})
@@ -468,7 +468,7 @@ async def test_an_order_without_an_answer_names_its_number_and_key(
 async def test_static_records_are_shown_by_tube(rig: tuple[Rig, ZenohBus]) -> None:
     it, bus = rig
     record = StaticRecord(1, 9, 77, 1.0, 21.0, 38, (0.0, 0.0, 0.1), COV, (0.0, 0.0, -9.8), COV, 30.0, False)
-    it.tube.submit(record, it.now)
+    it.tube.mail.submit(record, it.now)
     it.run(2.0)
     (row,) = (await ask(bus, f"{GROUND}/static_records?tube=1"))["static_records"]
     assert (row["order"], row["samples"], row["moved"], row["temperature_c"]) == (77, 38, False, 30.0)

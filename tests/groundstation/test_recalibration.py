@@ -84,19 +84,19 @@ def test_a_turning_node_waits_with_the_block_until_it_stands(rig: Rig) -> None:
 
 def lose(rig: Rig, keep: Callable[[BlockSegment], bool]) -> None:
     """Have the segments that are not kept disappear with a relay, until ``watch`` is called again."""
-    send = rig.ground.endpoint.send_segment
-    rig.ground.endpoint.send_segment = lambda s: send(s) if keep(s) else None  # type: ignore[method-assign]
+    send = rig.ground.endpoint.mail.send_segment
+    rig.ground.endpoint.mail.send_segment = lambda s: send(s) if keep(s) else None  # type: ignore[method-assign]
 
 
 def test_a_node_killed_in_the_middle_keeps_its_block_and_resumes(rig: Rig) -> None:
     assert rig.upload(block(1)).phase is UploadPhase.APPLIED
     rig.sent.clear()
-    plain = rig.ground.endpoint.send_segment
+    plain = rig.ground.endpoint.mail.send_segment
     lose(rig, lambda s: s.index < 2)
     order = rig.ground.operator.upload(block(2, bias=2e-3))
     rig.run(3.0)
     assert rig.said[-1].received == 0b00011
-    rig.ground.endpoint.send_segment = plain  # type: ignore[method-assign]
+    rig.ground.endpoint.mail.send_segment = plain  # type: ignore[method-assign]
     rig.start(1)
     assert rig.tube(1).tube.parameters == block(1)
     rig.run(60.0, lambda: order.ended)
@@ -116,7 +116,7 @@ def test_a_ground_station_that_restarts_goes_on_where_the_node_is(rig: Rig) -> N
 
 
 def test_a_segment_changed_on_its_way_is_refused_told_and_repeated(rig: Rig) -> None:
-    send, changed = rig.ground.endpoint.send_segment, []
+    send, changed = rig.ground.endpoint.mail.send_segment, []
 
     def tamper(segment: BlockSegment) -> None:
         if segment.index == 1 and not changed:
@@ -124,7 +124,7 @@ def test_a_segment_changed_on_its_way_is_refused_told_and_repeated(rig: Rig) -> 
             segment = replace(segment, data=bytes(len(segment.data)))
         send(segment)
 
-    rig.ground.endpoint.send_segment = tamper  # type: ignore[method-assign]
+    rig.ground.endpoint.mail.send_segment = tamper  # type: ignore[method-assign]
     assert rig.upload(block()).phase is UploadPhase.APPLIED
     rig.run(5.0)
     assert rig.tube(1).tube.parameters == block()
@@ -156,8 +156,8 @@ def test_a_node_without_a_key_takes_no_block_and_a_ground_station_without_one_se
 
 def test_what_was_recorded_of_an_old_upload_changes_nothing(rig: Rig) -> None:
     recorded: list[BlockSegment] = []
-    send = rig.ground.endpoint.send_segment
-    rig.ground.endpoint.send_segment = lambda s: (recorded.append(s), send(s))[1]  # type: ignore[func-returns-value, method-assign]
+    send = rig.ground.endpoint.mail.send_segment
+    rig.ground.endpoint.mail.send_segment = lambda s: (recorded.append(s), send(s))[1]  # type: ignore[func-returns-value, method-assign]
     rig.upload(block(1))
     rig.upload(block(2, bias=2e-3))
     rig.said.clear()
@@ -263,7 +263,7 @@ def test_a_static_record_is_taken_stored_and_still_known_after_a_restart(rig: Ri
     (record,) = rig.ground.model.static_records
     assert (record.tube, record.command, record.moved) == (1, order.number, False)
     assert record.temperature == pytest.approx(30.0)
-    assert rig.tube(1).endpoint.outbox_size == 0
+    assert rig.tube(1).endpoint.mail.outbox_size == 0
     rig.start(BASE)
     assert list(rig.ground.model.static_records) == [record]
 

@@ -34,7 +34,7 @@ def rig(tmp_path: Path) -> Iterator[Rig]:
 
 
 def happen(rig: Rig, number: int) -> None:
-    rig.tube.submit(Event(1, 100 + number, rig.now, Severity.INFO, "stopped"), rig.now)
+    rig.tube.mail.submit(Event(1, 100 + number, rig.now, Severity.INFO, "stopped"), rig.now)
     rig.run(2.0)
 
 

@@ -95,7 +95,7 @@ def test_an_overrun_is_counted_told_once_and_covered_by_the_next_reading(tmp_pat
 def test_the_timing_is_told_up_the_chain_only_by_a_node_that_measures(tmp_path: Path, measured: bool) -> None:
     pair = Pair(tmp_path, CycleTiming() if measured else None)
     pair.cycle(0.0, 0.02)
-    pair.base.command(Command(1, 77, "timing"), BEGIN + PERIOD)
+    pair.base.mail.command(Command(1, 77, "timing"), BEGIN + PERIOD)
     for _ in range(3):
         pair.cycle(0.0, 0.02)
     (reply,) = pair.told(Reply)

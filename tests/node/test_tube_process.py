@@ -36,8 +36,8 @@ def test_a_later_life_goes_on_with_bias_and_numbers(tmp_path: Path) -> None:
     second = TubeProcess(TubeSettings(3), tmp_path)
     assert second.boots == first.boots + 1
     assert second.state[0]["mode"] == first.state[0]["mode"]
-    assert second.endpoint.series.take() >= first.endpoint.outbox_size + 1
-    assert second.endpoint.outbox_size == first.endpoint.outbox_size > 0
+    assert second.endpoint.mail.series.take() >= first.endpoint.mail.outbox_size + 1
+    assert second.endpoint.mail.outbox_size == first.endpoint.mail.outbox_size > 0
     cycles(second, 5, now + 30.0)
 
 
@@ -136,12 +136,12 @@ def test_events_without_end_do_not_wear_the_flash(tmp_path: Path, saves: list[in
         process.take_frames(now)
     assert storm // 2 > len(saves) >= AT_ONCE + storm // SPACING - 1
     assert len(saves) <= AT_ONCE + storm // SPACING + 1
-    told = process.endpoint.outbox_size
+    told = process.endpoint.mail.outbox_size
     assert told > storm // 2, "every jump is kept"
     noisy(process, SPACING, now)
     loaded = Journal(tmp_path).load()
     assert loaded is not None
-    assert len(msgpack.unpackb(loaded[1])[2]) == process.endpoint.outbox_size >= told, "the last one is not lost"
+    assert len(msgpack.unpackb(loaded[1])[2]) == process.endpoint.mail.outbox_size >= told, "the last one is not lost"
 
 
 def test_a_start_tells_what_its_yaw_is_worth(tmp_path: Path) -> None:

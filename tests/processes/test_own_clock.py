@@ -59,7 +59,7 @@ class Surface(Process):
     def on_frame(self, side: Side, frame: bytes, now: float, margin: float = math.inf) -> None:
         for received in self.endpoint.receive(side, frame, now, margin):
             if isinstance(received.message, Event):
-                self.endpoint.acknowledge(received.message)
+                self.endpoint.mail.acknowledge(received.message)
             self.heard.put(received.message)
 
     def first(self, kind: type, fits: Callable[[Any], bool]) -> Any:
@@ -155,7 +155,7 @@ def test_a_node_finds_its_yaw_keeps_it_over_kills_of_both_and_ends_when_asked(
     state = surface.first(NodeState, lambda s: not s.flags & UNFIT)
     assert abs(yaw_error(string.world, 1, state.yaw, state.at)) < 0.02
     assert state.hops == 1
-    surface.loop.call(lambda process, now: process.endpoint.command(Command(1, 5, "timing"), now))
+    surface.loop.call(lambda process, now: process.endpoint.mail.command(Command(1, 5, "timing"), now))
     reply = surface.first(Reply, lambda r: r.sequence == 5)
     assert reply.done
     assert reply.values["cycle_max"] > 0.0
@@ -234,7 +234,7 @@ def test_a_sealed_string_on_can_is_heard_over_tls(tmp_path: Path) -> None:
         string.start("node", "--tube", "1", "--imu", imu, angle, "--upper", joint, *under)
         state = surface.first(NodeState, lambda s: not s.flags & UNFIT)
         assert abs(yaw_error(string.world, 1, state.yaw, state.at)) < 0.02
-        surface.loop.call(lambda process, at: process.endpoint.command(Command(1, 5, "timing"), at))
+        surface.loop.call(lambda process, at: process.endpoint.mail.command(Command(1, 5, "timing"), at))
         assert surface.first(Reply, lambda r: r.sequence == 5).done
         assert surface.endpoint.seals is not None
         assert surface.endpoint.seals.failures() == {}

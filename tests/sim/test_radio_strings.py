@@ -92,7 +92,7 @@ def test_where_only_the_neighbour_is_heard_the_dead_tube_cuts_the_aiding(tmp_pat
 def test_nothing_is_lost_over_a_dead_tube_and_every_survey_has_its_place(pipe: Drilled) -> None:
     measurements = pipe.rig.ask("measurements")["measurements"]
     assert Counter(m["tube"] for m in measurements) == {1: 2, 2: 2, 3: 1, 4: 2, 5: 2}
-    assert all(p.endpoint.outbox_size == 0 for p in pipe.rig.stepper.processes.values())
+    assert all(p.endpoint.mail.outbox_size == 0 for p in pipe.rig.stepper.processes.values())
     for m in measurements:
         bit = pipe.world.bit_depth(m["station_at_s"])
         assert m["md_m"] == pytest.approx(bit - (m["tube"] - 1) * pipe.world.scenario.tube_length, abs=1e-6)

@@ -77,8 +77,8 @@ class Joint:
         encoder, tube = self.encoder, self.tube
         self.until("the clock", lambda: tube.endpoint.place.neighbours[Side.UPPER] and tube.endpoint.clock.synchronised)
         sent = rounded(Aiding(1.0, 1e-6, 0.0, 0.0, 0.1, 100.0 + self._number, self._number, 0, epoch=1))
-        event = Event(1, tube.endpoint.series.take(), 5.0, Severity.INFO, "booted", {"number": self._number})
-        tube.endpoint.submit(event, time.monotonic())
+        event = Event(1, tube.endpoint.mail.series.take(), 5.0, Severity.INFO, "booted", {"number": self._number})
+        tube.endpoint.mail.submit(event, time.monotonic())
         sent_at = -1.0
 
         def is_heard() -> bool:  # what may be lost is sent again, as an encoder does

@@ -19,7 +19,7 @@ from sealed_string import DOWN, SealedString, make_folder, messages_in
 
 from telemetry.application.end_seal import HEAD as END_HEAD
 from telemetry.application.end_seal import OVERHEAD as END_OVERHEAD
-from telemetry.application.endpoint import KEPT_WAIT
+from telemetry.application.mail import KEPT_WAIT
 from telemetry.media.port import Priority
 from telemetry.messages import BASE, ENCODER, Side
 from telemetry.presentation.msgpack_codec import encode, open_payload
@@ -186,7 +186,7 @@ def heard(string: SealedString, kind: Kind) -> object:
     victim = 1 if kind in DOWN else BASE
     of_kind = [m for m in string.heard[victim] if open_payload(encode(m)).kind is kind]
     repeatable = kind in (Kind.BLOCK_SEGMENT, Kind.BLOCK_STATUS)
-    return list(dict.fromkeys(of_kind)) if repeatable else of_kind, string.endpoints[1].outbox_size
+    return list(dict.fromkeys(of_kind)) if repeatable else of_kind, string.endpoints[1].mail.outbox_size
 
 
 def forged_payload(string: SealedString, kind: Kind, payloads: list[bytes]) -> Iterable[bytes]:

@@ -113,7 +113,7 @@ class SealedString:
         self.run(8.0)
         self.talking = False
         self.run(1.0)
-        assert all(self.endpoints[address].outbox_size == 0 for address in (2, 1))
+        assert all(self.endpoints[address].mail.outbox_size == 0 for address in (2, 1))
 
     def say(self, kind: Kind) -> None:
         """Have a message of a kind said by who says it: tube 1, or the base to tube 1."""
@@ -123,16 +123,18 @@ class SealedString:
             self.cycles += 1
             tube.send_state(state(self.cycles), self.now)
         elif kind in (Kind.SURVEY_MEASUREMENT, Kind.RECEIPT):
-            tube.submit(survey(1, tube.series.take()), self.now)
+            tube.mail.submit(survey(1, tube.mail.series.take()), self.now)
         elif kind is Kind.EVENT:
-            tube.submit(Event(1, tube.series.take(), self.now, Severity.INFO, "said"), self.now)
+            tube.mail.submit(Event(1, tube.mail.series.take(), self.now, Severity.INFO, "said"), self.now)
         elif kind is Kind.STATIC_RECORD:
             v = (0.0, 0.0, 0.0)
-            tube.submit(StaticRecord(1, tube.series.take(), 1, 1.0, 2.0, 5, v, COV, v, COV, 20.0, False), self.now)
+            tube.mail.submit(
+                StaticRecord(1, tube.mail.series.take(), 1, 1.0, 2.0, 5, v, COV, v, COV, 20.0, False), self.now
+            )
         elif kind in (Kind.COMMAND, Kind.REPLY):
-            base.command(Command(1, self.number, "take_survey"), self.now)
+            base.mail.command(Command(1, self.number, "take_survey"), self.now)
         elif kind in (Kind.BLOCK_SEGMENT, Kind.BLOCK_STATUS):
-            base.send_segment(BlockSegment(1, self.number, 1, bytes(32), 1, 0, b"x", bytes(32)))
+            base.mail.send_segment(BlockSegment(1, self.number, 1, bytes(32), 1, 0, b"x", bytes(32)))
 
     def inject(self, end: End, frame: bytes) -> None:
         """A frame from nowhere arrives at one end, and what follows of it."""
@@ -169,7 +171,7 @@ class SealedString:
         """Everything that a message could have changed."""
         return (
             {address: list(messages) for address, messages in self.heard.items()},
-            {a: (e.outbox_size, e.clock.exchanges, e.place.hops, e.mode) for a, e in self.endpoints.items()},
+            {a: (e.mail.outbox_size, e.clock.exchanges, e.place.hops, e.mode) for a, e in self.endpoints.items()},
             {
                 a: [n and (n.tube, n.boot_count, n.hops) for n in e.place.neighbours.values()]
                 for a, e in self.endpoints.items()
@@ -201,16 +203,16 @@ class SealedString:
         for received in endpoint.receive(side, frame, self.now):
             message = received.message
             if isinstance(message, get_args(Kept)) and message in self.heard[address]:
-                endpoint.acknowledge(message)  # stored already, by number and content
+                endpoint.mail.acknowledge(message)  # stored already, by number and content
                 continue
             if not isinstance(message, Aiding):
                 self.heard[address].append(message)
             if address == BASE and isinstance(message, get_args(Kept)):
-                endpoint.acknowledge(message)
+                endpoint.mail.acknowledge(message)
             elif isinstance(message, Command):
-                endpoint.reply(Reply(address, message.sequence, True, ""), self.now)
+                endpoint.mail.reply(Reply(address, message.sequence, True, ""))
             elif isinstance(message, BlockSegment):
-                endpoint.send_status(
+                endpoint.mail.send_status(
                     BlockStatus(1, message.sequence, bytes(32), UploadPhase.PARTIAL, 1, 0, bytes(32), "")
                 )
             elif isinstance(message, Aiding):

@@ -85,8 +85,8 @@ class String:
                 self.now,
             )  # fmt: skip
             if is_told:
-                event = Event(tube, point.series.take(), self.now, Severity.INFO, "booted", {})
-                point.submit(event, self.now)
+                event = Event(tube, point.mail.series.take(), self.now, Severity.INFO, "booted", {})
+                point.mail.submit(event, self.now)
 
     def _carry(self) -> None:
         moving = True
@@ -116,7 +116,7 @@ class String:
             if isinstance(message, Aiding):
                 point.send_aiding(replace(message, hops=message.hops + 1), self.now)
             elif isinstance(message, Event):
-                point.acknowledge(message)
+                point.mail.acknowledge(message)
 
 
 @pytest.fixture(scope="module")
@@ -162,7 +162,7 @@ def test_nothing_kept_is_lost_and_nothing_comes_twice_after_its_receipt(plugged:
         numbers = sorted(sequence for address, sequence in arrived if address == tube)
         assert numbers == list(range(1, len(numbers) + 1))
         assert len(numbers) >= APART / EVENT_EVERY
-        assert string.points[tube].outbox_size <= 1
+        assert string.points[tube].mail.outbox_size <= 1
     states = [(at, m) for at, m in string.heard[BASE] if isinstance(m, NodeState)]
     assert {m.tube for _, m in states} == set(TUBES)
     assert max(at - m.at for at, m in states if at > APART + 5.0) <= 2.0 * CYCLE

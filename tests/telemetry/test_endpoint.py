@@ -9,8 +9,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from sealed_string import state
 
-from telemetry.application.endpoint import KEPT_WAIT, Endpoint, Received
+from telemetry.application.endpoint import Endpoint, Received
 from telemetry.application.kinds import PRIORITIES
+from telemetry.application.mail import KEPT_WAIT
 from telemetry.media.memory import MemoryPort, joint
 from telemetry.media.port import Frame
 from telemetry.messages import (
@@ -104,9 +105,9 @@ class Chain:
         self.got[address].append(received.message)
         match received.message:
             case SurveyMeasurement() | Event() as kept:
-                station.acknowledge(kept)
+                station.mail.acknowledge(kept)
             case Command() as command:
-                station.reply(Reply(address, command.sequence, True, command.name), now)
+                station.mail.reply(Reply(address, command.sequence, True, command.name))
             case Aiding() as aiding:
                 station.send_aiding(replace(aiding, hops=aiding.hops + 1), now)
 
@@ -118,16 +119,18 @@ def test_what_is_held_back_leaves_when_it_is_released() -> None:
     chain = Chain([2, 1])
     chain.run(3.0)
     node = chain.stations[1]
-    node.hold()
+    node.mail.hold()
     for k in range(3):
-        node.submit(Event(1, node.series.take(), 0.0, Severity.INFO, "stopped", {"yaw_deg": float(k)}), chain.local(1))
+        node.mail.submit(
+            Event(1, node.mail.series.take(), 0.0, Severity.INFO, "stopped", {"yaw_deg": float(k)}), chain.local(1)
+        )
     chain.run(20.0)
     assert not [m for m in chain.got[BASE] if isinstance(m, Event)]
-    assert node.outbox_size == 3
-    node.release(chain.local(1))
+    assert node.mail.outbox_size == 3
+    node.mail.release(chain.local(1))
     chain.run(2.0)
     assert [m.sequence for m in chain.got[BASE] if isinstance(m, Event)] == [1, 2, 3]
-    assert node.outbox_size == 0
+    assert node.mail.outbox_size == 0
 
 
 def test_neighbours_and_hops_are_found_without_configuration() -> None:
@@ -176,10 +179,10 @@ def test_surveys_arrive_once_each_and_are_receipted(seed: int, loss: float, dupl
     for tube in (1, 2, 3, 4):
         for _ in range(3):
             station = chain.stations[tube]
-            station.submit(survey(tube, station.series.take()), chain.local(tube))
+            station.mail.submit(survey(tube, station.mail.series.take()), chain.local(tube))
     chain.run(60.0)
     assert sorted(set(chain.surveys())) == [(t, s) for t in (1, 2, 3, 4) for s in (1, 2, 3)]
-    assert [chain.stations[t].outbox_size for t in (1, 2, 3, 4)] == [0, 0, 0, 0]
+    assert [chain.stations[t].mail.outbox_size for t in (1, 2, 3, 4)] == [0, 0, 0, 0]
 
 
 def test_a_relay_that_dies_with_surveys_in_its_hands_loses_none() -> None:
@@ -189,7 +192,7 @@ def test_a_relay_that_dies_with_surveys_in_its_hands_loses_none() -> None:
     chain.joints[2][1].is_open = True
     for _ in range(5):
         station = chain.stations[1]
-        station.submit(survey(1, station.series.take()), chain.local(1))
+        station.mail.submit(survey(1, station.mail.series.take()), chain.local(1))
     chain.run(2.0)
     chain.stations[2] = chain.build(2, 2, chain.stations[2].export_state())
     chain.joints[2][0].is_open = chain.joints[2][1].is_open = False
@@ -202,20 +205,20 @@ def test_a_tube_that_restarts_before_its_receipt_sends_again_and_counts_on() -> 
     chain.run(5.0)
     chain.joints[1][0].is_open = True
     station = chain.stations[1]
-    station.submit(survey(1, station.series.take()), chain.local(1))
+    station.mail.submit(survey(1, station.mail.series.take()), chain.local(1))
     chain.run(1.0)
     chain.stations[1] = chain.build(1, 2, chain.stations[1].export_state())
     chain.joints[1][0].is_open = False
-    assert chain.stations[1].series.take() == 2
+    assert chain.stations[1].mail.series.take() == 2
     chain.run(40.0)
     assert set(chain.surveys()) == {(1, 1)}
-    assert chain.stations[1].outbox_size == 0
+    assert chain.stations[1].mail.outbox_size == 0
 
 
 def test_a_command_is_obeyed_once_and_answered_whatever_is_lost() -> None:
     chain = Chain([2, 1], seed=3, loss=0.3, duplicate=0.3)
     chain.run(5.0)
-    chain.stations[BASE].command(Command(1, 77, "take_survey"), chain.local(BASE))
+    chain.stations[BASE].mail.command(Command(1, 77, "take_survey"), chain.local(BASE))
     chain.run(60.0)
     assert [m for m in chain.got[1] if isinstance(m, Command)] == [Command(1, 77, "take_survey")]
     assert [m for m in chain.got[BASE] if isinstance(m, Reply)] == [Reply(1, 77, True, "take_survey")]
@@ -224,12 +227,12 @@ def test_a_command_is_obeyed_once_and_answered_whatever_is_lost() -> None:
 def test_a_command_repeated_after_a_restart_is_answered_from_memory() -> None:
     chain = Chain([1])
     chain.run(5.0)
-    chain.stations[BASE].command(Command(1, 5, "take_survey"), chain.local(BASE))
+    chain.stations[BASE].mail.command(Command(1, 5, "take_survey"), chain.local(BASE))
     chain.run(5.0)
     chain.stations[1] = chain.build(1, 2, chain.stations[1].export_state())
     chain.stations[BASE] = chain.build(BASE, 2)
     chain.run(5.0)
-    chain.stations[BASE].command(Command(1, 5, "take_survey"), chain.local(BASE))
+    chain.stations[BASE].mail.command(Command(1, 5, "take_survey"), chain.local(BASE))
     chain.run(10.0)
     assert len([m for m in chain.got[1] if isinstance(m, Command)]) == 1
     assert len([m for m in chain.got[BASE] if isinstance(m, Reply)]) == 2
@@ -246,20 +249,21 @@ def test_aiding_goes_down_hop_by_hop_and_only_down() -> None:
 
 
 def test_a_relay_hands_on_the_very_bytes_that_came(monkeypatch: pytest.MonkeyPatch) -> None:
-    import telemetry.application.endpoint as room
+    from telemetry.application import endpoint, mail
 
     chain = Chain([2, 1])
     chain.run(5.0)
     encoded: list[int] = []
-    plain = room.encode
+    plain = mail.encode
 
     def counted(message: Message) -> bytes:
         encoded.extend([1] if isinstance(message, Event) else [])
         return plain(message)
 
-    monkeypatch.setattr(room, "encode", counted)
-    event = Event(1, chain.stations[1].series.take(), 100.0, Severity.INFO, "stopped")
-    chain.stations[1].submit(event, chain.local(1))
+    for room in (endpoint, mail):
+        monkeypatch.setattr(room, "encode", counted)
+    event = Event(1, chain.stations[1].mail.series.take(), 100.0, Severity.INFO, "stopped")
+    chain.stations[1].mail.submit(event, chain.local(1))
     chain.run(3.0)
     assert event in chain.got[BASE]
     assert len(encoded) == 1
@@ -347,7 +351,7 @@ def test_what_is_no_warning_goes_up_with_the_next_states(
 
     monkeypatch.setattr(to_the_base, "send", counting)
     for tube in range(6, 0, -1):
-        chain.stations[tube].submit(Event(tube, 1, chain.now, severity, "stopped", {}), chain.local(tube))
+        chain.stations[tube].mail.submit(Event(tube, 1, chain.now, severity, "stopped", {}), chain.local(tube))
     if severity is Severity.INFO:
         speak(chain, 1)
     chain.run(latest)

@@ -143,7 +143,7 @@ def is_bounded(string: SealedString) -> None:
         assert len(endpoint.link_counters()) < COUNTERS_AT_MOST
         for link in endpoint._links.values():
             assert link.waiting <= QUEUE_LIMIT + WINDOW
-        assert endpoint.outbox_size <= 256
+        assert endpoint.mail.outbox_size <= 256
         assert len(endpoint.export_state()) < 2**20
 
 
@@ -154,11 +154,11 @@ def works_still(string: SealedString) -> None:
             string.start(address, new=True)
     string.talking = True
     string.run(30.0)
-    assert string.endpoints[1].outbox_size == 0
+    assert string.endpoints[1].mail.outbox_size == 0
     string.say(Kind.SURVEY_MEASUREMENT)
-    assert string.endpoints[1].outbox_size == 1
+    assert string.endpoints[1].mail.outbox_size == 1
     string.run(15.0)
-    assert string.endpoints[1].outbox_size == 0  # it was stored, and the receipt came back
+    assert string.endpoints[1].mail.outbox_size == 0  # it was stored, and the receipt came back
     assert string.endpoints[ENCODER].place.neighbours[Side.LOWER] is not None
 
 

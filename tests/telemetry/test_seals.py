@@ -80,7 +80,7 @@ def test_what_is_honest_arrives_under_seals_and_nothing_is_counted(folder: Path)
     assert string.counts() == {}
     kinds = {type(message).__name__ for message in string.heard[BASE]}
     assert kinds == {"SurveyMeasurement", "Event", "StaticRecord", "NodeState", "Reply", "BlockStatus"}
-    assert string.endpoints[1].outbox_size == 0
+    assert string.endpoints[1].mail.outbox_size == 0
     assert string.endpoints[1].place.hops == 2
 
 
@@ -93,7 +93,7 @@ def test_restarts_of_everybody_cost_no_survey_and_count_as_no_attack(folder: Pat
         string.say(Kind.SURVEY_MEASUREMENT)
         string.start(address)
         string.run(20.0)
-    assert string.endpoints[1].outbox_size == 0
+    assert string.endpoints[1].mail.outbox_size == 0
     assert string.counts() == {}
 
 
@@ -232,7 +232,7 @@ def test_a_revoked_tube_is_believed_nothing(tmp_path: Path) -> None:
     string.run(3.0)  # the others read their new files
     string.endpoints[2].seals = Seals(old, 2, Side)  # it starts anew with its old ones
     string.say(Kind.NODE_STATE)
-    string.endpoints[2].submit(survey(2, 50), string.now)
+    string.endpoints[2].mail.submit(survey(2, 50), string.now)
     string.run(10.0)
     assert len(string.heard[BASE]) == heard
     assert all(n is None for n in (string.endpoints[ENCODER].place.neighbours[Side.LOWER],))
@@ -320,11 +320,11 @@ def test_an_order_of_frames_as_large_as_can_be_is_sealed(folder: Path) -> None:
     string = SealedString(folder)
     string.settle()
     for number in range(40):
-        string.endpoints[1].submit(
+        string.endpoints[1].mail.submit(
             Event(1, 100 + number, 1.0, Severity.INFO, "x", {"text": "y" * 200, "z": number}), string.now
         )
     string.run(3.0)
-    assert string.endpoints[1].outbox_size == 0
+    assert string.endpoints[1].mail.outbox_size == 0
     assert max(len(frame) for frame in string.wire[BASE, Side.LOWER]) <= MAX_FRAME
 
 

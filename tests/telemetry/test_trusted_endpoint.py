@@ -66,12 +66,12 @@ def tube() -> Endpoint:
 
 def test_a_receipt_for_other_content_empties_no_outbox(tube: Endpoint) -> None:
     above = Neighbour(tube)
-    tube.submit(EVENT, above.now)
+    tube.mail.submit(EVENT, above.now)
     above.say(encode(Receipt(3, 1)), encode(Receipt(3, 1, bytes(16))))
-    assert tube.outbox_size == 1
+    assert tube.mail.outbox_size == 1
     assert tube.counters["foreign_receipts"] == 2
     above.say(encode(Receipt(3, 1, content_of_message(EVENT))))
-    assert tube.outbox_size == 0
+    assert tube.mail.outbox_size == 0
 
 
 @given(st.integers(HOPS_UNKNOWN, BASE))
@@ -112,11 +112,11 @@ def test_any_bytes_for_a_state_are_survived(saved: bytes) -> None:
 
 def test_a_tube_that_lost_its_numbers_gives_none_out_twice() -> None:
     first = Endpoint(3, frozenset(Side), boot_count=1)
-    assert first.series.take() == 1
+    assert first.mail.series.take() == 1
     lost = Endpoint(3, frozenset(Side), boot_count=4)
-    assert lost.series.newest == 0
-    assert lost.series.take() == (4 << SERIES_SHIFT) + 1
-    assert lost.series.newest == (4 << SERIES_SHIFT) + 1
+    assert lost.mail.series.newest == 0
+    assert lost.mail.series.take() == (4 << SERIES_SHIFT) + 1
+    assert lost.mail.series.newest == (4 << SERIES_SHIFT) + 1
 
 
 def test_a_full_outbox_drops_what_may_be_lost_first_and_never_the_newest() -> None:
@@ -160,7 +160,7 @@ def test_only_who_was_asked_answers_an_order() -> None:
     base = Endpoint(BASE, frozenset({Side.LOWER}), boot_count=1)
     link = HopLink(ENCODER, 1)
     link.send_best_effort(encode(Hello(ENCODER, 1, 0, Mode.BOOT, 1.0)), "hello")
-    base.command(Command(3, 9, "take_survey"), 100.0)
+    base.mail.command(Command(3, 9, "take_survey"), 100.0)
     heard: list[object] = []
     for reply in (None, Reply(2, 9, False, "stolen"), Reply(3, 9, True, ""), Reply(3, 9, True, "again")):
         if reply is not None:
