@@ -101,7 +101,7 @@ def _run(rig: GauntletRig, outcome: Outcome) -> None:
         *violations(
             rig,
             observer.told,
-            encoder_can_be_judged=(is_of_few or sight.has_seen) and not sight.nobody_could_know,
+            encoder_can_be_judged=is_of_few or (sight.has_seen and not sight.nobody_could_know),
             depth_can_be_judged=is_of_few or not sight.has_believed_a_wrong_depth,
         ),
     ]

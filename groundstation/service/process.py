@@ -131,6 +131,8 @@ class GroundProcess(Process):
 
     def on_frame(self, side: Side, frame: Content, now: float, margin: float = math.inf) -> None:
         """A frame arrived from the encoder."""
+        if now - self.model.now > HEARTBEAT:
+            self._advance_time(now)  # it stood still: what it knew then must not be shown as of now
         self._send_pending(now)
         for received in self.endpoint.receive(side, frame, now, margin):
             self.on_message(received.message, now)

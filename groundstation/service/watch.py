@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from groundstation.service.depth import CONTRADICTION
 from groundstation.service.model import UNTRUSTED, RigModel
 from groundstation.service.numbers import Range
-from groundstation.service.witnesses import Witnesses
+from groundstation.service.witnesses import OFF_BEFORE, Witnesses
 from groundstation.survey.joint_angles import Pair, RestingYaw
 from groundstation.survey.shared_scale import shared_scale
 from groundstation.survey.trust import Trust, trust_of
@@ -68,6 +68,7 @@ class Watch:
         self._looked_at = now
         self._alarms.advance(now, self._model.rig_now)
         self._look_at_nodes()
+        self._look_at_encoder()
         self._look_at_belt()
         self._look_at_depth(now)
         self._look_at_surveys()
@@ -214,6 +215,14 @@ class Watch:
         for tube in model.tally.tubes:
             silent = "silent" if math.isfinite(model.age(tube)) else "not heard since the ground station started"
             self._alarms.hold("tube_silent", f"tube {tube}", silent if model.is_stale(tube) else "")
+
+    def _look_at_encoder(self) -> None:
+        model = self._model
+        if not model.knows_tubes:
+            return  # who ran all the while may not have been heard yet
+        lately = [tube for tube in model.tally.tubes if model.age(tube) <= OFF_BEFORE]
+        if nobody := self._witnesses.look(model.epoch, model.rig_now, lately):
+            self._alarms.alert("reference", "encoder", nobody)
 
     def _look_at_belt(self) -> None:
         nodes = self._model.nodes

@@ -3,7 +3,8 @@
 A tube is a witness of a time if it ran through it: one that started then, or stood still, took the yaw that it was
 given, and one whose gyroscope gave nothing took the rate of the encoder: none of them has anything to say. So a
 contradiction counts against the encoder when all who could have seen it agree. Where every tube starts upon a yaw that
-was saved over other joints than its own, nobody has watched the encoder meanwhile, and that is said too.
+was saved over other joints than its own, or without any because the string turned when the power went, nobody has
+watched the encoder meanwhile, and that is said too.
 """
 
 from __future__ import annotations
@@ -13,6 +14,7 @@ from collections import deque
 from collections.abc import Collection
 from dataclasses import replace
 
+from telemetry.application.series import SERIES_SHIFT
 from telemetry.messages import EPOCH_UNKNOWN, Event
 
 AGAINST_THE_ENCODER = ("yaw_reset", "gyro_step", "gyro_scale")
@@ -50,6 +52,7 @@ class Witnesses:
         self._elsewhere: dict[int, Event] = {}  # newest start upon a yaw of another place, by tube
         self._said: dict[int, deque[Event]] = {}  # newest events, by tube
         self._told: tuple[Event, ...] = ()
+        self._told_blank: tuple[Event, ...] = ()
         self._spans: dict[int, tuple[float, float]] = {}  # s, first and last event of each epoch
 
     def on_event(self, event: Event, heard: Collection[int]) -> str:
@@ -93,6 +96,24 @@ class Witnesses:
         else:
             return ""
         return self._judge(heard)
+
+    def look(self, epoch: int, rig_now: float, lately: Collection[int]) -> str:
+        """Says so where all who were heard lately started at one time without a yaw; at a rig time (s) of an epoch.
+
+        Nothing links what the encoder counts now to what it counted before. Whoever ran all the while below a tube
+        without power is heard again within the time in which that tube settles.
+        """
+        starts = tuple([max(self._starts.get(tube, ()), key=_in_time, default=None) for tube in lately])
+        blank = tuple([one for one in starts if one is not None and _is_blank(one)])
+        if not blank or len(blank) < len(starts) or blank == self._told_blank:
+            return ""
+        newest = max(blank, key=_in_time)
+        if newest.epoch == epoch and rig_now < newest.at + SETTLED_AFTER:
+            return ""
+        if not all(self._is_beside(one, newest) for one in blank):
+            return ""
+        self._told_blank = blank
+        return f"nobody watched it before {newest.at:.0f} s: no tube has kept its yaw"
 
     def _judge(self, heard: Collection[int]) -> str:
         known = self._contradicted.values()
@@ -247,6 +268,13 @@ def _is_in(times: Times, tube: int, event: Event) -> bool:
     """Whether an event happened within a time of a tube, or before it had settled after that."""
     own = times.get((tube, event.epoch), ())
     return any(since <= event.at <= until + SETTLED_AFTER for since, until in own)
+
+
+def _is_blank(start: Event) -> bool:
+    """Whether a tube that ran before starts without a yaw: it turned meanwhile, or has lost its memory."""
+    if start.code == "restored":
+        return start.arguments.get("worth_h") == 0.0
+    return start.sequence >> SERIES_SHIFT > 0
 
 
 def _in_time(event: Event) -> tuple[int, float]:

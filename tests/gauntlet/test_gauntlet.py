@@ -150,6 +150,12 @@ def test_combined_seeds_hold(world: int, part: int) -> None:
         (2102135, ("frozen", "encoder-boots-lost", "depth-jumps-down")),
         # a stranger that made up the length of a string of which one tube was not known
         (2201462, ("node-memory-rots", "same-number", "database-deleted")),
+        # all lost their power as the string turned, and the encoder slipped before the first was back
+        (9377568, ("all-cut", "encoder-slips")),
+        # the same, a second after it had slipped
+        (9343416, ("all-cut", "encoder-dead", "encoder-slips")),
+        # the first word that came after the ground station had stood still said nothing of a tube
+        (9375046, ("frozen", "bytes-rot")),
         (51633, ("surveys-lost", "gyro-step")),  # a gyroscope that turned its tube while nobody corrected it
     ],
 )

@@ -10,7 +10,8 @@ from hypothesis import strategies as st
 
 from groundstation.config import GroundConfig
 from groundstation.service.model import RigModel
-from telemetry.messages import EPOCH_UNKNOWN, Mode, NodeFlag, NodeState
+from groundstation.service.process import GroundProcess
+from telemetry.messages import EPOCH_UNKNOWN, Mode, NodeFlag, NodeState, Side
 
 VAR = 1e-7
 
@@ -121,3 +122,14 @@ def test_silence_is_judged_by_arrival_where_the_times_of_two_clocks_are_not_comp
     model.on_rig_time(1100.0, 1)
     model.on_state(replace(node_state(1, at=1000.0, cycles=50), **undated), 5.0)
     assert model.age(1) == 0.0
+
+
+def test_a_ground_station_that_stood_still_shows_nobody_fresh_whatever_comes_first(tmp_path: Path) -> None:
+    """Its own time is that of every event, also of a frame that holds no message for it."""
+    ground = GroundProcess(GroundConfig(folder=tmp_path))
+    ground.on_timer(100.0)
+    ground.on_message(node_state(1, at=50.0, cycles=1), 100.0)
+    assert not ground.model.is_stale(1)
+    ground.on_frame(Side.LOWER, b"noise", 130.0)
+    assert ground.model.is_stale(1)
+    ground.close()

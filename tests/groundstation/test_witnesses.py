@@ -7,6 +7,7 @@ from itertools import permutations
 import pytest
 
 from groundstation.service.witnesses import Witnesses
+from telemetry.application.series import SERIES_SHIFT
 from telemetry.messages import Event, Scalar, Severity
 
 
@@ -240,6 +241,43 @@ def test_contradictions_before_and_after_a_start_of_the_encoder_are_added_up(
     """Rig time of the third epoch begins at 500 s, of which the one before knows nothing."""
     first = [*BOTH_STARTED, event(1, 100.0, "yaw_reset"), *between, event(1, 500.0, "stopped", 12, epoch=3)]
     assert told([*first, event(2, second, "yaw_reset", epoch=3)]) == said
+
+
+VOID = [event(2, 22.0, "restored", 12, worth_h=0.0), event(1, 23.0, "restored", 13, worth_h=0.0)]
+
+
+@pytest.mark.parametrize(
+    ("events", "lately", "said"),
+    [
+        (VOID, (1, 2), "nobody watched it before 23 s: no tube has kept its yaw"),
+        ([VOID[0], event(1, 23.0, "booted", (1 << SERIES_SHIFT) + 1)], (1, 2), "nobody watched it before 23 s: "),
+        (VOID[:1], (2,), "nobody watched it before 22 s: "),  # the other one has been silent for long
+        (VOID[:1], (1, 2), ""),
+        ([VOID[0], event(1, 23.0, "restored", 13, worth_h=4.0)], (1, 2), ""),  # stood still when the power went
+        ([VOID[0], event(1, 60.0, "restored", 13, worth_h=0.0)], (1, 2), ""),  # watched while the other was off
+        ([event(2, 22.0, "booted", 1), event(1, 23.0, "booted", 1)], (1, 2), ""),  # for the first time
+        (VOID, (1, 2, 3), ""),
+        ([], (), ""),
+    ],
+)
+def test_where_no_tube_has_kept_its_yaw_nobody_has_watched_the_encoder(
+    events: list[Event], lately: Collection[int], said: str
+) -> None:
+    witnesses = Witnesses()
+    for one in (event(1, 1.0, "restored", 1, worth_h=3.0), event(2, 1.0, "booted", 1), *events):
+        assert witnesses.on_event(one, lately) == ""
+    assert witnesses.look(1, 30.0, lately) == ""  # whoever watched may be heard yet
+    told = witnesses.look(1, 80.0, lately)
+    assert told.startswith(said)
+    assert bool(told) == bool(said)
+    assert witnesses.look(1, 81.0, lately) == ""  # once
+
+
+def test_tubes_without_a_yaw_are_told_at_once_where_rig_time_has_begun_anew() -> None:
+    witnesses = Witnesses()
+    for one in VOID:
+        witnesses.on_event(one, (1, 2))
+    assert witnesses.look(2, 3.0, (1, 2)).startswith("nobody watched")
 
 
 @pytest.mark.parametrize(("start", "growth"), [("booted", 5.0), ("restored", 20.0)])
