@@ -1,4 +1,4 @@
-"""Survey mathematics against welleng and wellpathpy, side by side in one run.
+"""Survey mathematics against welleng and wellpathpy, and many wells against one by one, side by side in one run.
 
 Run it as ``borechain bench survey`` or by itself. Every pair is timed in alternating blocks, so that a slow spell of
 the machine meets both; a figure is the median of a block, a ratio the median over the blocks.
@@ -18,9 +18,9 @@ from typing import Any
 import numpy as np
 
 from groundstation.survey.analysis import analyse
-from groundstation.survey.compiled_model import COMPILED_FROM, warm
-from groundstation.survey.error_sources import Site
-from groundstation.survey.instruments import load_tool
+from groundstation.survey.compiled_model import COMPILED_FROM, locate_many, warm
+from groundstation.survey.error_sources import Site, Survey
+from groundstation.survey.instruments import Tool, load_tool
 from groundstation.survey.methods import Method, positions
 from groundstation.survey.records import Record
 from groundstation.survey.resolve import Direction
@@ -28,6 +28,7 @@ from groundstation.survey.trajectory import Trajectory
 
 STATIONS = 1000
 SHORT = COMPILED_FROM - 1  # stations of the longest survey that is compiled only where its model is held
+WELLS, WELL_STATIONS = 10_000, 10  # of a batch
 SHARED = 250  # errors that the stations of fifty tubes share
 BLOCKS = 7
 REPEATS = 15
@@ -90,6 +91,24 @@ def append_time() -> float:
         trajectory.append(md[k], direction)
         times.append(time.perf_counter() - begin)
     return statistics.median(times)
+
+
+def batch(tool: Tool, site: Site) -> dict[str, float]:
+    """Seconds a well of a batch, and of the same wells one call each; the model is held."""
+    random = np.random.default_rng(2)
+    shape = WELLS, WELL_STATIONS
+    md = np.broadcast_to(2.0 * np.arange(WELL_STATIONS), shape).copy()
+    inclination, azimuth = random.uniform(0.01, 0.1, shape), random.uniform(0.0, 2.0 * np.pi, shape)
+    method, lines = Method.MINIMUM_CURVATURE, list(range(WELL_STATIONS))
+    alone = Record(md[0], inclination[0], azimuth[0], lines, {})
+    survey = Survey(md, inclination, azimuth, md)
+    found = compare(
+        lambda: locate_many(method, survey, tool, site),
+        lambda: analyse(alone, method, tool, site).uncertainty.cov,
+    )
+    return {"ours": found["ours"] / WELLS, "peer": found["peer"]} | {
+        name: WELLS * found[name] for name in ("ratio", "ratio_min", "ratio_max")
+    }
 
 
 def run() -> dict[str, Any]:
@@ -161,6 +180,7 @@ def run() -> dict[str, Any]:
         f"survey of {SHORT} stations, model held, totals, against welleng": dict(compare(ours_short, peer_short)),
         f"survey of {SHORT} stations, not compiled, totals, against welleng": dict(by_arrays),
         "positions of 1000 stations, against wellpathpy": dict(compare(path, peer_path)),
+        f"a well of {WELL_STATIONS} stations in a batch of {WELLS}, against a call each": dict(batch(tool, site)),
         f"append one station, {SHARED} shared errors (no peer)": {"ours": append_time(), "peer": None, "ratio": None},
     }
     ours_import, peer_import = import_time("groundstation.survey.analysis"), import_time("welleng.survey")

@@ -17,14 +17,20 @@ import tempfile
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
+from typing import Any, NoReturn
 
 import numpy as np
 import numpy.typing as npt
 
 from groundstation.errors import SurveyError, ToolError
 from groundstation.survey.compiled_source import CURVED, GIVEN, STRAIGHT, loop_sources, write_model
-from groundstation.survey.error_model import Uncertainty, check_legs, depth_variance, propagate
+from groundstation.survey.error_model import (
+    Uncertainty,
+    check_legs,
+    depth_variance,
+    propagate,
+    surface_covariance,
+)
 from groundstation.survey.error_sources import RECORD, SECONDS_A_METRE, Leg, Site, Survey
 from groundstation.survey.gyro_modes import TURNS, mode_weights, sections_of
 from groundstation.survey.instruments import Tool, load_tool
@@ -53,7 +59,7 @@ class CompiledModel:
         self._by_source = by_source
         self._parameters = np.array([*tool.parameters.values(), 0.0])
         self._depth_variance = depth_variance(tool)
-        self._function = _load(write_model(tool, by_source=by_source))
+        self._function, self._of_many = _load(write_model(tool, by_source=by_source))
 
     def run(self, method: Method, md: Array, inclination: Array, azimuth: Array, site: Site) -> tuple[Array, Array]:
         """Positions (n, 3) and their covariances (n, 3, 3) of one well (n,).
@@ -91,6 +97,36 @@ class CompiledModel:
         places[:, 2] = survey.tvd
         return self._run(GIVEN, places, survey, site, slot_allowance=slot_allowance)
 
+    def locate_many(self, method: Method, survey: Survey, site: Site, *, slot_allowance: bool) -> tuple[Array, Array]:
+        """Positions (w, n, 3) of wells (w, n) that begin at zero, and their covariances (w, n, 3, 3).
+
+        The survey's own TVD is not looked at. Errors as ``run``; they name the well, from 0.
+        """
+        md, inclination, azimuth = (np.ascontiguousarray(x) for x in (survey.md, survey.inclination, survey.azimuth))
+        check_stations(md, inclination, azimuth)
+        if self._in_modes:
+            places = positions(method, md, inclination, azimuth)
+            survey = replace(survey, tvd=places[..., 2])
+            return places, propagate(survey, [Leg(self.tool)], site, slot_allowance=slot_allowance).cov
+        path = {Method.BALANCED_TANGENTIAL: STRAIGHT, Method.MINIMUM_CURVATURE: CURVED}.get(method, GIVEN)
+        places = positions(method, md, inclination, azimuth) if path == GIVEN else np.zeros((*md.shape, 3))
+        cov = np.zeros((*md.shape, 3, 3))
+        well, status = self._of_many(
+            md, inclination, azimuth, path, slot_allowance, site.gravity, site.b_field, site.dip, site.declination,
+            site.latitude, self._parameters, _record(survey), np.zeros((0, 0, 0)), places, cov, np.zeros((0, 0, 0, 0)),
+        )  # fmt: skip
+        if status != 0:
+            self._refuse(status, replace(survey, tvd=places[..., 2]), site, f"well {well}, ")
+        cov[:, 0] = surface_covariance(md, inclination, azimuth, self.tool)
+        return places, cov
+
+    def _refuse(self, status: int, survey: Survey, site: Site, where: str = "") -> NoReturn:
+        """Say what is wrong with the station at which the loop ended."""
+        if status > 0:
+            raise SurveyError(f"survey: {where}station {status}: the hole turns straight back on itself")
+        propagate(survey, [Leg(self.tool)], site)  # names the term
+        raise ToolError(f"{self.tool.name}: {where}a weight has no value at station {-status}; give singular weights")
+
     def _run(
         self, path: int, places: Array, survey: Survey, site: Site, *, slot_allowance: bool
     ) -> tuple[Array, dict[str, Array]]:
@@ -102,11 +138,8 @@ class CompiledModel:
             site.declination, site.latitude, self._parameters, _record(survey), self._modes(survey, site), places, cov,
             parts,
         )  # fmt: skip
-        if status > 0:
-            raise SurveyError(f"survey: station {status}: the hole turns straight back on itself")
-        if status < 0:
-            propagate(survey, [Leg(self.tool)], site, slot_allowance=slot_allowance)  # names the term
-            raise ToolError(f"{self.tool.name}: a weight has no value at station {-status}; give singular weights")
+        if status != 0:
+            self._refuse(status, survey, site)
         if survey.md[0] == 0.0:  # as ``surface_covariance``
             sine, azimuth = math.sin(survey.inclination[0]), survey.azimuth[0]
             along = np.array([sine * math.cos(azimuth), sine * math.sin(azimuth), math.cos(survey.inclination[0])])
@@ -181,6 +214,22 @@ def locate(
     return places, Uncertainty(survey, tuple(legs), site, slot_allowance, cov, parts)
 
 
+def locate_many(
+    method: Method, survey: Survey, tool: Tool, site: Site, *, slot_allowance: bool = False
+) -> tuple[Array, Array]:
+    """Positions (w, n, 3) of many wells (w, n) that begin at zero, and their covariances (w, n, 3, 3), at one go.
+
+    A call a well costs more than a short well. The survey's own TVD is not looked at.
+
+    Raises
+    ------
+    SurveyError, ToolError
+        As ``error_model.propagate``; where the loop finds it, with the number of the well, from 0.
+    """
+    check_legs(survey, [Leg(tool)])
+    return _model(tool, by_source=False).locate_many(method, survey, site, slot_allowance=slot_allowance)
+
+
 def compiled_parts(found: Uncertainty) -> dict[str, Array]:
     """Covariances (n, 3, 3) of one well by source, compiled."""
     model = _model(found.legs[0].tool, by_source=True)
@@ -188,18 +237,18 @@ def compiled_parts(found: Uncertainty) -> dict[str, Array]:
 
 
 def _record(survey: Survey) -> Array:
-    """Time and further columns (r, n) of a record, their defaults where it has none."""
-    out = np.empty((1 + len(RECORD), len(survey.md)))
-    out[0] = survey.record.get("Time", SECONDS_A_METRE * survey.md)
-    out[1:] = DEFAULTS
+    """Time and further columns (..., r, n) of a record, their defaults where it has none."""
+    out = np.empty((*survey.md.shape[:-1], 1 + len(RECORD), survey.md.shape[-1]))
+    out[..., 0, :] = survey.record.get("Time", SECONDS_A_METRE * survey.md)
+    out[..., 1:, :] = DEFAULTS
     for row, name in enumerate(RECORD, 1):
         if name in survey.record:
-            out[row] = survey.record[name]
+            out[..., row, :] = survey.record[name]
     return out
 
 
-def _load(source: str) -> Callable[..., Any]:
-    """Function of a written model, from the cache folder of the kernels.
+def _load(source: str) -> tuple[Callable[..., Any], Callable[..., Any]]:
+    """Functions of a written model for one well and for many, from the cache folder of the kernels.
 
     Each lies in a folder of its own: a compiled function is kept as long as the sources beside it stay what they were.
     """
@@ -218,5 +267,4 @@ def _load(source: str) -> Callable[..., Any]:
     module = importlib.util.module_from_spec(spec)
     sys.modules[name] = module  # the compiler's cache asks for it by its name
     spec.loader.exec_module(module)
-    function: Callable[..., Any] = module.well
-    return function
+    return module.well, module.wells

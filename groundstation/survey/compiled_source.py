@@ -1,4 +1,4 @@
-"""The compiled loop of an instrument, as text: one function that walks down a well once.
+"""The compiled loop of an instrument, as text: a function that walks down a well once, and one that does so for many.
 
 Position, weights of all sources, their running sums and the covariance are locals each; the equations are those of
 ``error_model``. ``compiled_model`` says what the function takes and gives.
@@ -110,6 +110,21 @@ END = """
         if not abs(c0 + c2 + c5) < 1e24:
             return -k
     return 0
+
+
+@kernel
+def wells(
+    md, inc, azi, path, slot, gravity, b_field, dip, declination, latitude, parameters, record, modes, positions, cov,
+    parts,
+):
+    for w in range(len(md)):
+        status = well(
+            md[w], inc[w], azi[w], path, slot, gravity, b_field, dip, declination, latitude, parameters, record[w],
+            modes, positions[w], cov[w], parts,
+        )
+        if status != 0:
+            return w, status
+    return 0, 0
 """
 AXES = ("x", "y", "z")
 PAIRS = (("x", "x"), ("x", "y"), ("y", "y"), ("x", "z"), ("y", "z"), ("z", "z"))  # the covariance's entries, in order

@@ -10,7 +10,7 @@ import pytest
 
 from groundstation.errors import SurveyError, ToolError
 from groundstation.survey.analysis import analyse
-from groundstation.survey.compiled_model import COMPILED_FROM, CompiledModel, _load, warm, write_model
+from groundstation.survey.compiled_model import COMPILED_FROM, CompiledModel, _load, locate_many, warm, write_model
 from groundstation.survey.error_model import propagate
 from groundstation.survey.error_sources import Leg, Site, Survey
 from groundstation.survey.frames import Frame, Norths
@@ -49,6 +49,40 @@ def test_a_compiled_tool_gives_what_the_arrays_give(name: str) -> None:
             wanted = propagate(survey, [Leg(tool)], SITE, slot_allowance=tool.slot_allowance).cov
             scale = np.trace(wanted, axis1=1, axis2=2)[:, None, None] + 1e-30
             assert np.max(np.abs(cov - wanted) / scale) < 1e-11
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", ["relay", "stim300", "gyro-continuous"])
+@pytest.mark.parametrize("method", list(Method))
+def test_many_wells_at_one_go_are_what_each_is(name: str, method: Method) -> None:
+    random = np.random.default_rng(3)
+    md = np.cumsum(random.uniform(0.5, 30.0, (20, 12)), axis=1)
+    md[::2] -= md[::2, :1]  # every other begins at the datum
+    inclination, azimuth = random.uniform(0.0, 0.4, md.shape), random.uniform(0.0, math.tau, md.shape)
+    record = {"SigmaYaw": random.uniform(0.001, 0.01, md.shape)}
+    tool = load_tool(name)
+    survey = Survey(md, inclination, azimuth, md, record)
+    places, cov = locate_many(method, survey, tool, SITE, slot_allowance=True)
+    for w in range(len(md)):
+        alone = Survey(md[w], inclination[w], azimuth[w], md[w], {"SigmaYaw": record["SigmaYaw"][w]})
+        expected, wanted, _ = CompiledModel(tool).locate(method, alone, SITE, slot_allowance=True)
+        np.testing.assert_allclose(places[w], expected, rtol=0.0, atol=1e-9)
+        np.testing.assert_allclose(cov[w], wanted, rtol=1e-9, atol=1e-15)
+
+
+def test_a_well_of_many_that_cannot_be_is_named() -> None:
+    md, zero = np.array([[0.0, 10.0, 20.0]] * 3), np.zeros((3, 3))
+    back = zero.copy()
+    back[1] = 0.0, math.pi, math.pi
+    method, tool = Method.MINIMUM_CURVATURE, load_tool("stim300")
+    deeper = md.copy()
+    deeper[2] = 10.0, 20.0, 15.0
+    with pytest.raises(SurveyError, match="well 1, station 1: the hole turns straight back"):
+        locate_many(method, Survey(md, back, zero, md), tool, SITE)
+    with pytest.raises(SurveyError, match="station 2: expected a depth beyond 20 m, got 15 m"):
+        locate_many(
+            method, Survey(md + [[0.0], [0.0], [10.0]] * np.array([1.0, 1.0, -0.5]), zero, zero, md), tool, SITE
+        )
 
 
 GYRO_MODELS = sorted((Path(__file__).parents[2] / "data" / "survey").glob("spe90408-model-4.toml"))
@@ -135,7 +169,7 @@ def test_an_instrument_stays_compiled_whatever_other_is_compiled_after_it(
 
     def stamp(name: str) -> str:
         jit.folder_digest.cache_clear()  # as a process that has just begun
-        return str(_load(write_model(load_tool(name)))._cache._impl.locator.get_source_stamp())
+        return str(_load(write_model(load_tool(name)))[0]._cache._impl.locator.get_source_stamp())
 
     before = stamp("relay")
     assert stamp("mwd-rev5.1") != before
