@@ -13,6 +13,7 @@ import numpy as np
 import numpy.typing as npt
 
 from groundstation.survey.columns import Design
+from groundstation.survey.plane_errors import PlaneErrors
 
 Array = npt.NDArray[np.float64]
 TOE = 0.05  # m, by which a column may end above the depth asked for: its last leg goes on
@@ -41,8 +42,8 @@ class Columns:
     designs: Array  # (columns, 2) of the heads
     planned: Array  # (columns, depths, 2) of the design axes
     states: npt.NDArray[np.int8]  # (columns, depths)
-    own: Array  # (columns, depths, 2, k)
-    shared: Array  # (columns, depths, 2, s)
+    own: PlaneErrors
+    shared: PlaneErrors
     radii: Array  # (columns, depths)
     radius_stds: Array  # (columns, depths)
     radius_correlation: float = 1.0  # of the radii of two columns at one depth
@@ -61,7 +62,8 @@ class Columns:
         states = np.where(finite, State.SURVEYED, State.MISSING).astype(np.int8)
         return cls(
             names, depths, centres, np.asarray(covs), designs, np.broadcast_to(designs[:, None, :], centres.shape),
-            states, roots(np.asarray(covs)), np.zeros((*shape, 2, 0)), np.full(shape, radius), np.zeros(shape),
+            states, PlaneErrors.of_planes(roots(np.asarray(covs))), PlaneErrors.of_planes(np.zeros((*shape, 2, 0))),
+            np.full(shape, radius), np.zeros(shape),
         )  # fmt: skip
 
     def subset(self, which: npt.NDArray[np.intp]) -> Columns:
@@ -69,8 +71,8 @@ class Columns:
         names = [self.names[k] for k in which.tolist()]
         return replace(
             self, names=names, centres=self.centres[which], covs=self.covs[which], designs=self.designs[which],
-            planned=self.planned[which], states=self.states[which], own=self.own[which], shared=self.shared[which],
-            radii=self.radii[which], radius_stds=self.radius_stds[which],
+            planned=self.planned[which], states=self.states[which], own=self.own.subset(which),
+            shared=self.shared.subset(which), radii=self.radii[which], radius_stds=self.radius_stds[which],
         )  # fmt: skip
 
     @property
@@ -101,13 +103,32 @@ def plane_frame(designs: list[Design]) -> Array:
     return np.concatenate([middle.across, middle.axis[None, :]])
 
 
-def at_depths(positions: Array, tangents: Array, errors: Array, depths: Array) -> tuple[Array, Array]:
-    """Centres (w, z, 2) and their errors (w, z, 2, k) where wells cross the planes of ``depths``.
+@dataclass(frozen=True, slots=True)
+class Cut:
+    """Wells (w, n) where planes (z,) cut them.
 
-    Positions (w, n, 3) and errors (w, n, 3, k), one column a standard deviation, in a frame whose third axis is the
-    normal of the planes. Between stations the centre follows the cubic that has the stations' places and slopes; its
-    errors are those of the two stations, blended. An error along the normal moves the centre by the slope of the hole.
-    nan further than ``TOE`` above the first or below the last station.
+    Attributes
+    ----------
+    centres : (w, z, 2); nan further than ``TOE`` above the first or below the last station
+    upper, share : (w, z) station above each plane, and the share of the one below it
+    slope : (w, n, 2) of the hole at its stations, m in the plane for a metre along its normal
+    """
+
+    centres: Array
+    upper: npt.NDArray[np.intp]
+    share: Array
+    slope: Array
+
+    def in_plane(self, errors: Array) -> Array:
+        """What errors (w, n, 3, k) of the stations do in a plane (w, n, 2, k): along its normal by the hole's slope."""
+        return errors[..., :2, :] - self.slope[..., :, None] * errors[..., 2:, :]
+
+
+def cut(positions: Array, tangents: Array, depths: Array) -> Cut:
+    """Where wells cross the planes of ``depths`` (z,), in a frame whose third axis is the normal of the planes.
+
+    Positions and tangents (w, n, 3). Between stations the centre follows the cubic that has the stations' places and
+    slopes.
     """
     tvd = positions[..., 2]
     slope = tangents[..., :2] / tangents[..., 2:]
@@ -115,13 +136,11 @@ def at_depths(positions: Array, tangents: Array, errors: Array, depths: Array) -
     k = np.clip(np.sum(tvd[:, None, :] <= depths[None, :, None], axis=-1) - 1, 0, tvd.shape[1] - 2)
     top, bottom = tvd[wells, k], tvd[wells, k + 1]
     step = bottom - top
-    f = ((depths - top) / step)[..., None]
+    share = (depths - top) / step
+    f = share[..., None]
     p0, p1 = positions[wells, k][..., :2], positions[wells, k + 1][..., :2]
     m0, m1 = slope[wells, k] * step[..., None], slope[wells, k + 1] * step[..., None]
     centre = p0 + f * (m0 + f * (3.0 * (p1 - p0) - 2.0 * m0 - m1 + f * (2.0 * (p0 - p1) + m0 + m1)))
-    plane = errors[..., :2, :] - slope[..., :, None] * errors[..., 2:, :]
-    g = f[..., None]
-    blended = (1.0 - g) * plane[wells, k] + g * plane[wells, k + 1]
     beyond = (depths[None, :] > tvd[:, -1:] + TOE) | (depths[None, :] < tvd[:, :1] - TOE)
     centre[beyond] = np.nan
-    return centre, blended
+    return Cut(centre, k, share, slope)

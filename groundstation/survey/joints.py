@@ -16,6 +16,7 @@ from groundstation.survey.as_built import Columns, State
 from groundstation.survey.wall import largest_distance, probability_thin, thickness
 
 Array = npt.NDArray[np.float64]
+AT_ONCE = 64  # joints that are judged together
 
 
 @dataclass(frozen=True, slots=True)
@@ -32,6 +33,12 @@ class Joints:
 
 def joints(columns: Columns, pairs: npt.NDArray[np.intp], required: float) -> Joints:
     """Judge every joint at every depth; ``required`` is the thickness in m."""
+    parts = [_joints(columns, pairs[k : k + AT_ONCE], required) for k in range(0, max(len(pairs), 1), AT_ONCE)]
+    return Joints(*(np.concatenate([getattr(part, name) for part in parts]) for name in Joints.__slots__))
+
+
+def _joints(columns: Columns, pairs: npt.NDArray[np.intp], required: float) -> Joints:
+    """Judge some of them."""
     a, b = pairs[:, 0], pairs[:, 1]
     apart = columns.centres[b] - columns.centres[a]
     distance = np.hypot(apart[..., 0], apart[..., 1])
@@ -77,7 +84,7 @@ def with_detours(columns: Columns, found: Joints, detours: Sequence[Detour], req
 def pair_covariance(columns: Columns, pairs: npt.NDArray[np.intp]) -> Array:
     """Covariance (joints, depths, 2, 2) of the second centre against the first: what both share cancels."""
     a, b = pairs[:, 0], pairs[:, 1]
-    cross = np.einsum("jzis,jzks->jzik", columns.shared[a], columns.shared[b])
+    cross = np.einsum("jzis,jzks->jzik", columns.shared.at(a), columns.shared.at(b))
     return np.asarray(columns.covs[a] + columns.covs[b] - cross - np.swapaxes(cross, -1, -2))
 
 

@@ -16,16 +16,16 @@ import numpy.typing as npt
 
 from groundstation.survey.as_built import Columns, State
 from groundstation.survey.voids import power_centre
-from groundstation.survey.wall_errors import FURTHEST, Errors, Point, add_radius
+from groundstation.survey.wall_errors import FURTHEST, Errors, Mixture, Point, add_radius, parted
 
 Array = npt.NDArray[np.float64]
+Indices = npt.NDArray[np.intp]
 VOID_DEPTHS = 6  # of a layer, among which the likeliest point of a void is looked for
 ACROSS = 0.05  # of a triangle, by which the point between three columns may lie beyond its side
 NEGLIGIBLE = 1e-9  # probability of a void between three columns below which they are not drawn
 SAMPLES = 8192
 FEWEST = 1024
 BUDGET = 1e8  # columns around voids times depths times samples
-BATCH = 512
 SEED = 20_260_102  # the same grid gives the same probability
 
 
@@ -54,7 +54,7 @@ def void_chance(columns: Columns, triples: npt.NDArray[np.intp], samples: int = 
             for depths in (np.flatnonzero(layer == k) for k in range(errors.layers))
             if len(depths)
         ]
-        likely = [point for point in found if point is not None and point[1] > NEGLIGIBLE]
+        likely = [point for point in found if point is not None and point.chance > NEGLIGIBLE]
         points += likely
         if likely or np.any(_as_surveyed(columns, triple.tolist(), near)):
             kept.append((triple.tolist(), near))
@@ -65,21 +65,20 @@ def void_chance(columns: Columns, triples: npt.NDArray[np.intp], samples: int = 
             each[n] = _as_surveyed(columns, three, near)
         total = np.max(each, axis=0, initial=0.0)
         return _answer(columns, total, np.zeros(depths_count), each, [three for three, _ in kept])
-    shifts, share = np.array([shift for shift, _ in points]), np.array([chance for _, chance in points])
-    share /= share.sum()
+    mixture = Mixture(points, errors.size)
     cost = sum(2 + len(near) for _, near in kept) + len(columns.names)
     samples = int(np.clip(BUDGET / (cost * depths_count), FEWEST, samples))
-    rng = np.random.default_rng(SEED)
-    for begin in range(0, samples, BATCH):
-        count = min(BATCH, samples - begin)
-        x = rng.standard_normal((count, errors.size)) + shifts[rng.choice(len(share), count, p=share)]
-        weight = 1.0 / (np.exp(x @ shifts.T - 0.5 * np.sum(shifts**2, axis=1)) @ share)
-        centres, radii = errors.drawn(x)
-        any_open = np.zeros((count, depths_count), bool)
-        for n, (three, near) in enumerate(kept):
-            opened = void_open(centres, radii, three, near)
-            each[n] += weight @ opened
-            any_open |= opened
+    parts = list(parted([[*three, *near] for three, near in kept], mixture.at_once(samples), depths_count))
+    for x, weight in mixture.batches(samples, np.random.default_rng(SEED)):
+        any_open = np.zeros((len(x), depths_count), bool)
+        for some, which in parts:
+            centres, radii = errors.drawn(x, which)
+            place = {column: k for k, column in enumerate(which.tolist())}
+            for n in some:
+                three, near = ([place[k] for k in group] for group in kept[n])
+                opened = void_open(centres, radii, three, near)
+                each[n] += weight @ opened
+                any_open |= opened
         total, square = total + weight @ any_open, square + weight**2 @ any_open
     mean = total / samples
     error = np.sqrt(np.maximum(square / samples - mean**2, 0.0) / samples)
@@ -118,7 +117,7 @@ def void_point(
         for k, depth in enumerate(depths)
         if np.all(weights[k] > -ACROSS)
     ]
-    return max(points, key=lambda point: point[1], default=None)
+    return max(points, key=lambda point: point.chance, default=None)
 
 
 def _void_point_at(
@@ -129,23 +128,21 @@ def _void_point_at(
     With the barycentric weights w of the middle, its distance from the three grows by the sum of w times what each of
     them moves away; the others have to move away by themselves.
     """
-    c = errors.columns
-    rows, rests = [np.zeros(errors.size)], []
-    for column, weight in zip(triple.tolist(), weights.tolist(), strict=True):
-        rows[0] += weight * _away(errors, column, depth, middle)
-    rests.append(_depth_in(c, int(triple[0]), depth, middle))
-    for column in near:
-        rest = _depth_in(c, column, depth, middle)
-        if rest > 0.0:
-            rows.append(_away(errors, column, depth, middle))
-            rests.append(rest)
-    wanted = np.maximum(rests, 0.0)
+    covering = [k for k in near if _depth_in(errors.columns, k, depth, middle) > 0.0]
+    about = [*triple.tolist(), *covering]
+    few = errors.among(about)
+    rows, rests = [np.zeros(few.size)], [_depth_in(few.columns, 0, depth, middle)]
+    for k, weight in enumerate(weights.tolist()):
+        rows[0] += weight * _away(few, k, depth, middle)
+    for k in range(len(weights), len(about)):
+        rows.append(_away(few, k, depth, middle))
+        rests.append(_depth_in(few.columns, k, depth, middle))
+    wanted, numbers = np.maximum(rests, 0.0), errors.numbers(about)
     shift = -np.linalg.pinv(np.array(rows), rcond=1e-9) @ wanted
     if np.any(-np.array(rows) @ shift < 0.5 * wanted):  # columns that cannot move
-        shift = np.zeros(errors.size)
-        return shift, 0.0
+        return Point(numbers, np.zeros(few.size), 0.0)
     size = float(np.linalg.norm(shift))
-    return shift * min(1.0, FURTHEST / max(size, 1e-12)), 0.5 * math.erfc(size / math.sqrt(2.0))
+    return Point(numbers, shift * min(1.0, FURTHEST / max(size, 1e-12)), 0.5 * math.erfc(size / math.sqrt(2.0)))
 
 
 def _away(errors: Errors, column: int, depth: int, middle: Array) -> Array:
@@ -154,8 +151,8 @@ def _away(errors: Errors, column: int, depth: int, middle: Array) -> Array:
     away = middle - c.centres[column, depth]
     unit = away / max(float(np.hypot(*away)), 1e-9)
     out = np.zeros(errors.size)
-    out[: errors.shared] = unit @ c.shared[column, depth]
-    out[errors.own_slice(column)] = unit @ c.own[column, depth]
+    out[: errors.shared] = unit @ c.shared.at([column])[0, depth]
+    out[errors.own_slice(column)] = unit @ c.own.at([column])[0, depth]
     add_radius(errors, out, column, depth, 1.0)
     return out
 
@@ -183,7 +180,9 @@ def near_triple(columns: Columns, triple: npt.NDArray[np.intp]) -> list[int]:
     return [k for k in np.flatnonzero(apart < reach).tolist() if k not in triple.tolist()]
 
 
-def void_open(centres: Array, radii: Array, triple: Sequence[int], near: Sequence[int]) -> npt.NDArray[np.bool_]:
+def void_open(
+    centres: Array, radii: Array, triple: Sequence[int] | Indices, near: Sequence[int] | Indices
+) -> npt.NDArray[np.bool_]:
     """Whether the plane is open between three columns: (n, depths).
 
     Of centres (columns, n, depths, 2) and radii (columns, n, depths), m.

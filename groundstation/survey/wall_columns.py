@@ -16,17 +16,19 @@ import numpy as np
 import numpy.typing as npt
 
 from groundstation.errors import SurveyError
-from groundstation.survey.as_built import TOE, Columns, State, at_depths, plane_frame
+from groundstation.survey.as_built import TOE, Columns, State, cut, plane_frame
 from groundstation.survey.columns import Design
 from groundstation.survey.ellipsoid import check_covariance
 from groundstation.survey.error_columns import ErrorColumns, error_columns
 from groundstation.survey.error_sources import Leg, Site, Survey
 from groundstation.survey.instruments import Mode, Tool
 from groundstation.survey.methods import Method, positions, tangents
+from groundstation.survey.plane_errors import PlaneErrors
 
 Array = npt.NDArray[np.float64]
 FLATTEST = 0.17  # cosine (80 deg) between a hole and the planes' normal, below which it is not cut by them
 SAME_END = 1e-6  # m
+AT_ONCE = 256  # columns that are computed together: thousands would need hundreds of megabytes
 
 
 class Status(Enum):
@@ -132,21 +134,22 @@ def build(plans: Sequence[ColumnPlan], holes: Sequence[Hole], assumed: Assumptio
             surveyed[k], ends[k] = turned[w, last, 2], turned[w, -1, 2]
             toes[k] = places[w, last]
             toe_covs[k] = sum(c.effects[w, last] @ c.effects[w, last].T for c in errors)
+        found = cut(turned, tangent, depths)
+        centres[members] = found.centres
+        book.cut(members, found.upper, found.share)
         for source in errors:
-            at, moved = at_depths(turned, tangent, np.einsum("ij,wnjm->wnim", frame, source.effects), depths)
-            centres[members] = at
+            plane = found.in_plane(np.einsum("ij,wnjm->wnim", frame, source.effects))
             for w, k in enumerate(members):
-                book.add(k, _key(source, plans[k]), moved[w])
+                book.add(k, _key(source, plans[k]), plane[w])
+        book.close()
     centres, states = _states(plans, frame, depths, centres, surveyed, ends)
-    _add_site_errors(book, plans, depths, surveyed, assumed.wander)
     planned = np.stack([_design_centres(plan.design, frame, depths) for plan in plans])
     heads_in_plane = np.array([frame[:2] @ plan.design.head for plan in plans])
     radii, stds, layer = _radii(plans, depths, assumed.layers)
-    own, shared = book.arrays()
-    covs = own @ np.swapaxes(own, -1, -2) + shared @ np.swapaxes(shared, -1, -2)
+    own, shared = book.errors(_site_errors(plans, depths, surveyed, assumed.wander))
     columns = Columns(
-        [plan.design.name for plan in plans], depths, centres, covs, heads_in_plane, planned, states, own, shared,
-        radii, stds, assumed.radius_correlation, layer,
+        [plan.design.name for plan in plans], depths, centres, _covariances(own, shared), heads_in_plane, planned,
+        states, own, shared, radii, stds, assumed.radius_correlation, layer,
     )  # fmt: skip
     surveyed_md = np.array([way.surveyed_md if way else np.nan for way in ways])
     end_md = np.array([way.end_md if way else np.nan for way in ways])
@@ -202,12 +205,12 @@ def _depths(plans: Sequence[ColumnPlan], frame: Array, step: float) -> Array:
 
 
 def _alike(plans: Sequence[ColumnPlan], ways: Sequence[Way | None]) -> list[list[int]]:
-    """Columns with as many stations of one tool, for one computation each."""
+    """Columns with as many stations of one tool, for one computation each; not too many at once."""
     groups: dict[tuple[int, int], list[int]] = {}
     for k, (plan, way) in enumerate(zip(plans, ways, strict=True)):
         if way is not None:
             groups.setdefault((len(way.md), id(plan.tool)), []).append(k)
-    return list(groups.values())
+    return [some[k : k + AT_ONCE] for some in groups.values() for k in range(0, len(some), AT_ONCE)]
 
 
 def _survey(some: list[tuple[ColumnPlan, Way]], assumed: Assumptions) -> tuple[Array, Array, list[ErrorColumns]]:
@@ -231,40 +234,79 @@ def _key(source: ErrorColumns, plan: ColumnPlan) -> str | None:
 
 
 class _Book:
-    """Errors of all columns as they come: shared ones by name, own ones by column."""
+    """Errors of all columns at their stations as they come: shared ones by name, own ones by column."""
 
     def __init__(self, count: int, depths: int) -> None:
-        self._shape = (count, depths, 2)
-        self._shared: dict[str, Array] = {}
-        self._own: list[list[Array]] = [[] for _ in range(count)]
+        self._upper, self._share = np.zeros((count, depths), np.intp), np.zeros((count, depths))
+        self._names: dict[str, int] = {}  # number of every shared error
+        self._open: dict[int, tuple[list[Array], dict[int, Array]]] = {}  # own and shared ones, by column
+        self._own = [np.zeros((1, 2, 0))] * count
+        self._shared: list[tuple[list[int], Array]] = [([], np.zeros((1, 2, 0)))] * count  # and their numbers
+
+    def cut(self, columns: list[int], upper: npt.NDArray[np.intp], share: Array) -> None:
+        """Say between which stations planes cut some columns."""
+        self._upper[columns], self._share[columns] = upper, share
 
     def add(self, column: int, key: str | None, errors: Array) -> None:
-        """Errors (depths, 2, m) of one column."""
+        """Errors (stations, 2, m) of one column."""
+        own, shared = self._open.setdefault(column, ([], {}))
         if key is None:
-            self._own[column].append(errors[..., np.any(errors != 0.0, axis=(0, 1))])
-        else:
-            self._shared.setdefault(key, np.zeros(self._shape))[column] += errors[..., 0]
+            own.append(errors)
+            return
+        number = self._names.setdefault(key, len(self._names))
+        shared[number] = shared[number] + errors[..., 0] if number in shared else errors[..., 0]
 
-    def arrays(self) -> tuple[Array, Array]:
-        """Own (columns, depths, 2, k) and shared (columns, depths, 2, s)."""
-        width = max((sum(e.shape[-1] for e in errors) for errors in self._own), default=0)
-        own = np.zeros((*self._shape, width))
-        for column, errors in enumerate(self._own):
-            at = 0
-            for part in errors:
-                own[column, ..., at : at + part.shape[-1]] = part
-                at += part.shape[-1]
-        shared = list(self._shared.values())
-        return own, np.stack(shared, axis=-1) if shared else np.zeros((*self._shape, 0))
+    def close(self) -> None:
+        """All errors of the columns so far have come: their own become as few numbers as say the same."""
+        for k, (own, shared) in self._open.items():
+            stations = len(own[0] if own else next(iter(shared.values())))
+            self._own[k] = fewest(np.concatenate([np.zeros((stations, 2, 0)), *own], axis=-1))
+            self._shared[k] = list(shared), np.moveaxis(np.array([*shared.values()]).reshape(-1, stations, 2), 0, -1)
+        self._open = {}
+
+    def errors(self, alike: Array) -> tuple[PlaneErrors, PlaneErrors]:
+        """Own and shared errors; ``alike`` (columns, depths, e) are those of no station, which are a column's own."""
+        shared = []
+        while self._shared:  # each is let go of as it is written anew: together they are many
+            numbers, effects = self._shared.pop()
+            wide = np.zeros((len(effects), 2, len(self._names)))
+            wide[..., numbers] = effects
+            shared.append(wide)
+        shared.reverse()
+        return (
+            PlaneErrors.of_stations(self._own, self._upper, self._share, alike),
+            PlaneErrors.of_stations(shared, self._upper, self._share, alike[..., :0]),
+        )
 
 
-def _add_site_errors(book: _Book, plans: Sequence[ColumnPlan], depths: Array, surveyed: Array, wander: float) -> None:
-    """Setting out of the head, and the way an unsurveyed length may go."""
-    for k, plan in enumerate(plans):
-        below = np.maximum(depths - surveyed[k], 0.0) if np.isfinite(surveyed[k]) else np.zeros(len(depths))
-        for size in (np.full(len(depths), plan.head_std), wander * below):
-            if np.any(size > 0.0):
-                book.add(k, None, size[:, None, None] * np.eye(2))
+def fewest(errors: Array) -> Array:
+    """Errors (stations, 2, m) of one column by not more numbers than it has places that err.
+
+    They are Gaussian and come to a plane by blending, so that all that counts is their covariance E E^T. With E^T = Q R
+    that is R^T R, and R has a row a place at the most.
+    """
+    stations, directions, _ = errors.shape
+    if errors.shape[-1] == 0:
+        return errors
+    triangle = np.asarray(np.linalg.qr(errors[1:].reshape((stations - 1) * directions, -1).T, mode="r"))
+    first = np.zeros((1, directions, len(triangle)))  # the first station errs in nothing
+    return np.concatenate([first, triangle.T.reshape(stations - 1, directions, -1)])
+
+
+def _site_errors(plans: Sequence[ColumnPlan], depths: Array, surveyed: Array, wander: float) -> Array:
+    """Setting out of the head, and the way an unsurveyed length may go (columns, depths, 2): m, either way alike."""
+    below = np.maximum(depths - np.where(np.isfinite(surveyed), surveyed, np.inf)[:, None], 0.0)
+    heads = np.array([plan.head_std for plan in plans])[:, None]
+    return np.stack([np.broadcast_to(heads, below.shape), wander * below], axis=-1)
+
+
+def _covariances(own: PlaneErrors, shared: PlaneErrors) -> Array:
+    """Covariances (columns, depths, 2, 2) of own and shared errors together."""
+    out = np.empty((*own.upper.shape, 2, 2))
+    for k in range(0, len(out), AT_ONCE):
+        some = range(k, min(k + AT_ONCE, len(out)))
+        out[some] = sum(e @ np.swapaxes(e, -1, -2) for e in (own.at(some), shared.at(some)))
+    return out
 
 
 def _states(

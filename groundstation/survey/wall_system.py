@@ -24,13 +24,12 @@ from groundstation.survey.as_built import Columns, State
 from groundstation.survey.joints import Detour, Joints
 from groundstation.survey.void_chance import VOID_DEPTHS, near_triple, void_open, void_point
 from groundstation.survey.wall import limits
-from groundstation.survey.wall_errors import Errors, Point, add_radius, design_point
+from groundstation.survey.wall_errors import Errors, Mixture, Point, add_radius, design_point, parted
 
 Array = npt.NDArray[np.float64]
 SAMPLES = 8192
 FEWEST = 1024
 BUDGET = 2e8  # joints times depths times samples
-BATCH = 512
 SURE = 1.0 - 1e-6  # probability of one joint beyond which the whole is not asked
 NEGLIGIBLE = 1e-9  # probability of a joint below which it is not sampled but added
 SEED = 20_260_101  # the same wall gives the same probability
@@ -74,19 +73,13 @@ def system_probability(
     points = _design_points(errors, asked, required)
     if not points:
         return SystemProbability(min(neglected, 1.0), 0.0, certain=False)
-    shifts = np.array([shift for shift, _ in points])
-    share = np.array([chance for _, chance in points])
-    share /= share.sum()
-    judge = _Judge(errors, asked, required)
-    samples = int(np.clip(BUDGET / (judge.cost * len(columns.depths)), FEWEST, samples))
-    rng = np.random.default_rng(SEED)
+    mixture = Mixture(points, errors.size)
+    samples = int(np.clip(BUDGET / (asked.cost * len(columns.depths)), FEWEST, samples))
+    judge = _Judge(errors, asked, required, mixture.at_once(samples))
     total = square = 0.0
-    for begin in range(0, samples, BATCH):
-        count = min(BATCH, samples - begin)
-        x = rng.standard_normal((count, errors.size)) + shifts[rng.choice(len(share), count, p=share)]
-        ratio = np.exp(x @ shifts.T - 0.5 * np.sum(shifts**2, axis=1)) @ share  # q / phi
-        weight = np.where(judge.any_open(x), 1.0 / ratio, 0.0)
-        total, square = total + float(weight.sum()), square + float((weight**2).sum())
+    for x, weight in mixture.batches(samples, np.random.default_rng(SEED)):
+        counted = np.where(judge.any_open(x), weight, 0.0)
+        total, square = total + float(counted.sum()), square + float((counted**2).sum())
     mean = total / samples
     error = math.sqrt(max(square / samples - mean**2, 0.0) / samples)
     return SystemProbability(min(mean + neglected, 1.0), error, certain=False)
@@ -102,6 +95,11 @@ class _Asked:
     ways: list[list[list[list[int]]]]  # of every joint, its detours
     triples: npt.NDArray[np.intp]  # (t, 3)
     nearby: list[list[int]]  # of every triple, what may cover its middle
+
+    @property
+    def cost(self) -> int:
+        """What a sample costs at one depth: what is drawn and what is asked of it."""
+        return len(self.pairs) + sum(2 + len(near) for near in self.nearby) + len(self.columns.names)
 
     @classmethod
     def among(
@@ -144,56 +142,79 @@ def _design_points(errors: Errors, asked: _Asked, required: float) -> list[Point
         some = depths[np.unique(np.linspace(0, len(depths) - 1, VOID_DEPTHS).astype(np.intp))]
         for triple, near in zip(asked.triples, asked.nearby, strict=True):
             point = void_point(errors, triple, near, some)
-            if point is not None and point[1] > 0.0:
+            if point is not None and point.chance > 0.0:
                 points.append(point)
     return points
 
 
 def _joint_point(errors: Errors, pair: npt.NDArray[np.intp], depth: int, required: float) -> Point:
     """Most likely point at which a joint is just too thin, and about how likely it is."""
-    c = errors.columns
-    a, b = (int(k) for k in pair)
-    apart = c.centres[b, depth] - c.centres[a, depth]
+    both = pair.tolist()
+    two = errors.among(both)
+    c = two.columns
+    apart = c.centres[1, depth] - c.centres[0, depth]
     distance = max(float(np.hypot(*apart)), 1e-9)
     unit = apart / distance
-    normal = np.zeros(errors.size)  # change of (limit - distance) for one standard deviation of each number
-    normal[: errors.shared] -= unit @ (c.shared[b, depth] - c.shared[a, depth])
-    normal[errors.own_slice(b)] -= unit @ c.own[b, depth]
-    normal[errors.own_slice(a)] += unit @ c.own[a, depth]
-    for k in (a, b):
+    own, shared = c.own.at(range(2))[:, depth], c.shared.at(range(2))[:, depth]
+    normal = np.zeros(two.size)  # change of (limit - distance) for one standard deviation of each number
+    normal[: two.shared] -= unit @ (shared[1] - shared[0])
+    normal[two.own_slice(1)] -= unit @ own[1]
+    normal[two.own_slice(0)] += unit @ own[0]
+    for k in range(2):
         r = float(c.radii[k, depth])
-        add_radius(errors, normal, k, depth, r / math.sqrt(max(r**2 - 0.25 * required**2, 1e-6 * r**2)))
-    limit = float(limits(c.radii[a, depth : depth + 1], c.radii[b, depth : depth + 1], required)[0])
-    return design_point(normal, limit - distance)
+        add_radius(two, normal, k, depth, r / math.sqrt(max(r**2 - 0.25 * required**2, 1e-6 * r**2)))
+    limit = float(limits(c.radii[0, depth : depth + 1], c.radii[1, depth : depth + 1], required)[0])
+    return design_point(errors.numbers(both), normal, limit - distance)
 
 
 class _Judge:
-    """Judges samples by the exact geometry."""
+    """Judges samples by the exact geometry, a part of the wall at a time; not more ``samples`` at once."""
 
-    def __init__(self, errors: Errors, asked: _Asked, required: float) -> None:
+    def __init__(self, errors: Errors, asked: _Asked, required: float, samples: int) -> None:
         self._errors, self._asked, self._required = errors, asked, required
-        self.cost = len(asked.pairs) + sum(2 + len(near) for near in asked.nearby) + len(asked.columns.names)
+        joints = [
+            [*pair, *(k for way in ways for leg in way for k in leg)]
+            for pair, ways in zip(asked.pairs.tolist(), asked.ways, strict=True)
+        ]
+        voids = [[*triple, *near] for triple, near in zip(asked.triples.tolist(), asked.nearby, strict=True)]
+        depths = len(errors.columns.depths)
+        self._joints, self._voids = (list(parted(groups, samples, depths)) for groups in (joints, voids))
 
     def any_open(self, x: Array) -> npt.NDArray[np.bool_]:
         """Whether anything is open in each sample (n,)."""
-        centres, radii = self._errors.drawn(x)
         found = np.zeros(len(x), bool)
         judged = np.isfinite(self._asked.probability)
-        for pair, ways, here in zip(self._asked.pairs.tolist(), self._asked.ways, judged, strict=True):
-            thin = self._thin(centres, radii, pair)
-            for way in ways:
-                if np.any(thin):
-                    thin &= np.any([self._thin(centres, radii, leg) for leg in way], axis=0)
-            found |= np.any(thin & here, axis=1)
-        for triple, near in zip(self._asked.triples.tolist(), self._asked.nearby, strict=True):
-            found |= np.any(void_open(centres, radii, triple, near), axis=1)
+        for some, which in self._joints:
+            centres, radii = self._errors.drawn(x, which)
+            place = self._places(which)
+            pairs = self._asked.pairs[some.start : some.stop]
+            thin = self._thin(centres, radii, place, pairs)
+            for k, ways in enumerate(self._asked.ways[some.start : some.stop]):
+                for way in ways:
+                    if np.any(thin[k]):
+                        thin[k] &= np.any(self._thin(centres, radii, place, np.array(way)), axis=0)
+            found |= np.any(thin & judged[some.start : some.stop, None], axis=(0, 2))
+        for some, which in self._voids:
+            centres, radii = self._errors.drawn(x, which)
+            place = self._places(which)
+            for k in some:
+                three, others = place[self._asked.triples[k]], place[self._asked.nearby[k]]
+                found |= np.any(void_open(centres, radii, three, others), axis=1)
         return found
 
-    def _thin(self, centres: Array, radii: Array, pair: list[int]) -> npt.NDArray[np.bool_]:
-        """Whether a joint is too thin or not there: (samples, depths)."""
-        a, b = pair
+    def _places(self, which: npt.NDArray[np.intp]) -> npt.NDArray[np.intp]:
+        """Place of every column among those that are drawn."""
+        out = np.zeros(len(self._errors.columns.names), np.intp)
+        out[which] = np.arange(len(which))
+        return out
+
+    def _thin(
+        self, centres: Array, radii: Array, place: npt.NDArray[np.intp], pairs: npt.NDArray[np.intp]
+    ) -> npt.NDArray[np.bool_]:
+        """Whether joints are too thin or not there (joints, samples, depths); ``place`` of columns in what is drawn."""
+        a, b = place[pairs[:, 0]], place[pairs[:, 1]]
         apart = centres[b] - centres[a]
         with np.errstate(invalid="ignore"):
             thick = np.hypot(apart[..., 0], apart[..., 1]) <= limits(radii[a], radii[b], self._required)
-        stands = np.all(self._errors.columns.states[pair] <= State.UNSURVEYED, axis=0)
-        return np.asarray(~(thick & stands))
+        stands = np.all(self._errors.columns.states[pairs] <= State.UNSURVEYED, axis=1)
+        return np.asarray(~(thick & stands[:, None]))

@@ -10,6 +10,7 @@ from hypothesis import strategies as st
 from walls_by_sampling import uncovered
 
 from groundstation.survey.as_built import Columns, State
+from groundstation.survey.plane_errors import PlaneErrors
 from groundstation.survey.void_chance import void_chance, void_open
 from groundstation.survey.voids import power_centre, triples_of
 from groundstation.survey.wall_verdict import Kind, Verdict, judge
@@ -27,7 +28,8 @@ def four(stds: tuple[float, ...], cv: float = 0.0) -> Columns:
     centres = np.repeat(HEADS[:, None, :], planes, axis=1)
     return Columns(
         ["A", "B", "C", "D"], np.linspace(0.0, 20.0, planes), centres, own @ own, HEADS, centres.copy(),
-        np.full((4, planes), State.SURVEYED, np.int8), own, np.zeros((4, planes, 2, 0)),
+        np.full((4, planes), State.SURVEYED, np.int8), PlaneErrors.of_planes(own),
+        PlaneErrors.of_planes(np.zeros((4, planes, 2, 0))),
         np.full((4, planes), RADIUS), np.full((4, planes), RADIUS * cv), 0.0,
     )  # fmt: skip
 

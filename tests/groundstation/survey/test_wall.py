@@ -12,9 +12,10 @@ from scipy.special import ndtr
 from scipy.stats import ncx2
 
 from groundstation.errors import SurveyError
-from groundstation.survey.as_built import Columns, at_depths
+from groundstation.survey.as_built import Columns, Cut, cut
 from groundstation.survey.joints import extra_column, joints, neighbours_in_grid, neighbours_in_line, worst
 from groundstation.survey.methods import Method, positions, tangents
+from groundstation.survey.plane_errors import PlaneErrors
 from groundstation.survey.trajectory import Point, on_arc
 from groundstation.survey.wall import largest_distance, margin, probability_beyond, thickness
 
@@ -224,11 +225,18 @@ def centre_on_arc(md: np.ndarray, position: np.ndarray, tangent: np.ndarray, tvd
     return on_arc(upper, lower, low).position[:2]
 
 
+def in_planes(found: Cut, errors: np.ndarray) -> np.ndarray:
+    """Errors (w, z, 2, k) of columns in planes, of those of their stations (w, n, 3, k)."""
+    effects = list(found.in_plane(errors))
+    nothing = np.zeros((*found.share.shape, 0))
+    return PlaneErrors.of_stations(effects, found.upper, found.share, nothing).at(range(len(effects)))
+
+
 @pytest.mark.slow
 def test_centres_at_a_depth_lie_on_the_arcs_of_the_wells() -> None:
     md, position, tangent = random_wells(6, 16)
     depths = np.linspace(0.0, 29.5, 60)
-    centres, _ = at_depths(position, tangent, np.zeros((6, 16, 3, 3)), depths)
+    centres = cut(position, tangent, depths).centres
     for well in range(6):
         for depth, centre in zip(depths, centres[well], strict=True):
             np.testing.assert_allclose(
@@ -241,9 +249,10 @@ def test_centres_at_the_depths_of_stations_are_the_stations() -> None:
     generator = np.random.default_rng(10)
     root = generator.normal(0.0, 0.01, (1, 10, 3, 3))
     covs = root @ np.swapaxes(root, -1, -2)
-    centres, errors = at_depths(position, tangent, root, position[0, :, 2])
+    found = cut(position, tangent, position[0, :, 2])
+    errors = in_planes(found, root)
     plane = errors @ np.swapaxes(errors, -1, -2)
-    np.testing.assert_allclose(centres[0], position[0, :, :2], atol=1e-12)
+    np.testing.assert_allclose(found.centres[0], position[0, :, :2], atol=1e-12)
     slope = tangent[0, :, :2] / tangent[0, :, 2:]
     for k in range(10):
         lateral = np.concatenate([np.eye(2), -slope[k][:, None]], axis=1)
@@ -254,7 +263,7 @@ def test_below_its_toe_a_column_has_no_centre() -> None:
     inclination = np.zeros((2, 4))
     md = np.array([[0.0, 2.0, 4.0, 6.0], [0.0, 1.0, 2.0, 3.0]])
     position = positions(Method.MINIMUM_CURVATURE, md, inclination, inclination)
-    centres, _ = at_depths(position, tangents(inclination, inclination), np.zeros((2, 4, 3, 3)), np.arange(8.0))
+    centres = cut(position, tangents(inclination, inclination), np.arange(8.0)).centres
     np.testing.assert_array_equal(np.isnan(centres[0, :, 0]), np.arange(8.0) > 6.0)
     np.testing.assert_array_equal(np.isnan(centres[1, :, 1]), np.arange(8.0) > 3.0)
 
@@ -265,9 +274,10 @@ def test_an_error_of_depth_moves_the_centre_by_the_slope_of_the_hole() -> None:
     md = np.array([[0.0, 5.0, 10.0]])
     position = positions(Method.MINIMUM_CURVATURE, md, inclination, azimuth)
     covs = np.broadcast_to(np.diag([1e-6, 4e-6, 9e-4]), (1, 3, 3, 3))
-    centres, errors = at_depths(position, tangents(inclination, azimuth), np.sqrt(covs), np.array([2.0, 7.0]))
+    found = cut(position, tangents(inclination, azimuth), np.array([2.0, 7.0]))
+    errors = in_planes(found, np.sqrt(covs))
     plane = errors @ np.swapaxes(errors, -1, -2)
-    np.testing.assert_allclose(centres[0], [[0.0, 2.0 * math.tan(tilt)], [0.0, 7.0 * math.tan(tilt)]], atol=1e-12)
+    np.testing.assert_allclose(found.centres[0], [[0.0, 2.0 * math.tan(tilt)], [0.0, 7.0 * math.tan(tilt)]], atol=1e-12)
     expected = np.diag([1e-6, 4e-6 + 9e-4 * math.tan(tilt) ** 2])
     np.testing.assert_allclose(plane[0], [expected, expected], atol=1e-15)
 

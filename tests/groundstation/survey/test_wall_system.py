@@ -14,6 +14,7 @@ from groundstation.survey.joints import (
     neighbours_in_line,
     pair_radii,
 )
+from groundstation.survey.plane_errors import PlaneErrors
 from groundstation.survey.voids import triples_of
 from groundstation.survey.wall import largest_distance, probability_beyond, probability_thin
 from groundstation.survey.wall_system import system_probability
@@ -42,8 +43,9 @@ def columns_of(
     shape = (count, planes)
     names = [f"C{k + 1}" for k in range(count)]
     return Columns(
-        names, depths, centres, covs, heads, centres.copy(), np.full(shape, State.SURVEYED, np.int8), mine, ours,
-        np.full(shape, RADIUS), np.full(shape, RADIUS * cv), correlation,
+        names, depths, centres, covs, heads, centres.copy(), np.full(shape, State.SURVEYED, np.int8),
+        PlaneErrors.of_planes(mine), PlaneErrors.of_planes(ours), np.full(shape, RADIUS),
+        np.full(shape, RADIUS * cv), correlation,
     )  # fmt: skip
 
 
@@ -117,11 +119,12 @@ def test_the_probability_of_any_opening_is_that_of_drawn_walls() -> None:
     shared[:, 1, 0] = 0.03 * np.linspace(-1.0, 1.0, count)  # pulls the wall apart evenly
     head = 0.008
     columns = columns_of(heads, 0.020, shared, cv=cv, correlation=rho)
-    own = np.concatenate([columns.own, np.broadcast_to(head * np.eye(2), (count, 3, 2, 2))], axis=-1)
-    covs = own @ np.swapaxes(own, -1, -2) + columns.shared @ np.swapaxes(columns.shared, -1, -2)
+    mine, ours = columns.own.at(range(count)), columns.shared.at(range(count))
+    mine = np.concatenate([mine, np.broadcast_to(head * np.eye(2), (count, 3, 2, 2))], axis=-1)
+    covs = mine @ np.swapaxes(mine, -1, -2) + ours @ np.swapaxes(ours, -1, -2)
     columns = Columns(
-        columns.names, columns.depths, columns.centres, covs, columns.designs, columns.planned, columns.states, own,
-        columns.shared, columns.radii, columns.radius_stds, rho,
+        columns.names, columns.depths, columns.centres, covs, columns.designs, columns.planned, columns.states,
+        PlaneErrors.of_planes(mine),        columns.shared, columns.radii, columns.radius_stds, rho,
     )  # fmt: skip
     pairs = neighbours_in_line(count, closed=False)
     found = system_probability(columns, joints(columns, pairs, REQUIRED), REQUIRED)
