@@ -52,7 +52,7 @@ class Witnesses:
         self._elsewhere: dict[int, Event] = {}  # newest start upon a yaw of another place, by tube
         self._said: dict[int, deque[Event]] = {}  # newest events, by tube
         self._told: tuple[Event, ...] = ()
-        self._told_blank: tuple[Event, ...] = ()
+        self._told_blank: list[Event] = []
         self._spans: dict[int, tuple[float, float]] = {}  # s, first and last event of each epoch
 
     def on_event(self, event: Event, heard: Collection[int]) -> str:
@@ -103,9 +103,13 @@ class Witnesses:
         Nothing links what the encoder counts now to what it counted before. Whoever ran all the while below a tube
         without power is heard again within the time in which that tube settles.
         """
-        starts = tuple([max(self._starts.get(tube, ()), key=_in_time, default=None) for tube in lately])
-        blank = tuple([one for one in starts if one is not None and _is_blank(one)])
-        if not blank or len(blank) < len(starts) or blank == self._told_blank:
+        blank: list[Event] = []
+        for tube in lately:
+            start = max(self._starts.get(tube, ()), key=_in_time, default=None)
+            if start is None or not _is_blank(start):
+                return ""  # as nearly always, by the first of them
+            blank.append(start)
+        if not blank or blank == self._told_blank:
             return ""
         newest = max(blank, key=_in_time)
         if newest.epoch == epoch and rig_now < newest.at + SETTLED_AFTER:

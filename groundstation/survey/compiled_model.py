@@ -40,6 +40,7 @@ Array = npt.NDArray[np.float64]
 COMPILED_FROM = 100  # stations
 COMPILED_BEFORE = ("relay", "mwd-rev5.1")  # by ``make kernels``
 HELD = 32  # models of a process
+PATHS = {Method.BALANCED_TANGENTIAL: STRAIGHT, Method.MINIMUM_CURVATURE: CURVED}  # the others are found before
 DEFAULTS = np.array(list(RECORD.values()))[:, None]  # of what a record may leave out
 
 
@@ -80,7 +81,7 @@ class CompiledModel:
         The latter of a model made ``by_source``; the survey's own TVD is not looked at. Errors as ``run``.
         """
         check_stations(survey.md, survey.inclination, survey.azimuth)
-        path = {Method.BALANCED_TANGENTIAL: STRAIGHT, Method.MINIMUM_CURVATURE: CURVED}.get(method, GIVEN)
+        path = PATHS.get(method, GIVEN)
         if path == GIVEN or self._in_modes:
             places = positions(method, survey.md, survey.inclination, survey.azimuth)
             survey = replace(survey, tvd=places[:, 2])
@@ -108,7 +109,7 @@ class CompiledModel:
             places = positions(method, md, inclination, azimuth)
             survey = replace(survey, tvd=places[..., 2])
             return places, propagate(survey, [Leg(self.tool)], site, slot_allowance=slot_allowance).cov
-        path = {Method.BALANCED_TANGENTIAL: STRAIGHT, Method.MINIMUM_CURVATURE: CURVED}.get(method, GIVEN)
+        path = PATHS.get(method, GIVEN)
         places = positions(method, md, inclination, azimuth) if path == GIVEN else np.zeros((*md.shape, 3))
         cov = np.zeros((*md.shape, 3, 3))
         well, status = self._of_many(

@@ -73,10 +73,10 @@ def void_chance(columns: Columns, triples: npt.NDArray[np.intp], samples: int = 
         any_open = np.zeros((len(x), depths_count), bool)
         for some, which in parts:
             centres, radii = errors.drawn(x, which)
-            place = {column: k for k, column in enumerate(which.tolist())}
+            place = errors.places(which)
             for n in some:
-                three, near = ([place[k] for k in group] for group in kept[n])
-                opened = void_open(centres, radii, three, near)
+                triple, others = (place[group] for group in kept[n])
+                opened = void_open(centres, radii, triple, others)
                 each[n] += weight @ opened
                 any_open |= opened
         total, square = total + weight @ any_open, square + weight**2 @ any_open

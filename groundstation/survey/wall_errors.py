@@ -65,6 +65,12 @@ class Errors:
         common = np.arange(self.layers) + self.common_index(0)
         return np.concatenate([np.arange(self.shared), *own, *radii, common]).astype(np.intp)
 
+    def places(self, which: Indices) -> Indices:
+        """Place of every column among some that are ``drawn``."""
+        out = np.zeros(len(self.columns.names), np.intp)
+        out[which] = np.arange(len(which))
+        return out
+
     @property
     def size(self) -> int:
         """How many numbers there are."""

@@ -186,7 +186,7 @@ class _Judge:
         judged = np.isfinite(self._asked.probability)
         for some, which in self._joints:
             centres, radii = self._errors.drawn(x, which)
-            place = self._places(which)
+            place = self._errors.places(which)
             pairs = self._asked.pairs[some.start : some.stop]
             thin = self._thin(centres, radii, place, pairs)
             for k, ways in enumerate(self._asked.ways[some.start : some.stop]):
@@ -196,17 +196,11 @@ class _Judge:
             found |= np.any(thin & judged[some.start : some.stop, None], axis=(0, 2))
         for some, which in self._voids:
             centres, radii = self._errors.drawn(x, which)
-            place = self._places(which)
+            place = self._errors.places(which)
             for k in some:
                 three, others = place[self._asked.triples[k]], place[self._asked.nearby[k]]
                 found |= np.any(void_open(centres, radii, three, others), axis=1)
         return found
-
-    def _places(self, which: npt.NDArray[np.intp]) -> npt.NDArray[np.intp]:
-        """Place of every column among those that are drawn."""
-        out = np.zeros(len(self._errors.columns.names), np.intp)
-        out[which] = np.arange(len(which))
-        return out
 
     def _thin(
         self, centres: Array, radii: Array, place: npt.NDArray[np.intp], pairs: npt.NDArray[np.intp]
