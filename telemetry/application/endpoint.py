@@ -37,6 +37,7 @@ from telemetry.presentation.msgpack_codec import (
     decode_opened,
     encode,
     open_payload,
+    state_origin,
     unwritten,
 )
 from telemetry.schema import Kind
@@ -146,8 +147,11 @@ class Endpoint:
                     self.clock.suspect_neighbour()
                 self._sync_at = -math.inf
         received = []
+        is_relay = self.address != BASE and not self._standstill.may_have_waited(now)
         for payload in payloads:
             try:
+                if is_relay and self._passes_on(payload):
+                    continue
                 message = self._handle(side, payload, now)
             except DecodeError:
                 self.counters["bad_payloads"] += 1
@@ -264,8 +268,6 @@ class Endpoint:
     def _handle(self, side: Side, payload: Content, now: float) -> Message | None:
         opened = open_payload(payload if self.seals is None else self.seals.content(bytes(payload)))
         kind = opened.kind
-        if kind is Kind.NODE_STATE:
-            return self._handle_upward(opened, payload, now)
         if kind in ONE_HOP:
             return self._handle_one_hop(side, decode_opened(opened), now)
         if kind in DOWNWARD:
@@ -318,13 +320,26 @@ class Endpoint:
         link, kind = self._links.get(side), opened.kind
         if link is None:
             self.counters["nowhere_to_go"] += 1
-        elif kind is Kind.NODE_STATE:  # as nearly always
-            link.send_best_effort(payload, (kind, opened.origin), Priority.STATE)
-            self._passes_states = True
+        elif kind is Kind.NODE_STATE:
+            self._pass_state(opened.origin, payload)
         elif kind in RELIABLE:
             link.send_reliable(bytes(payload), PRIORITIES[kind])
         else:
             link.send_best_effort(payload, (kind, opened.origin), PRIORITIES[kind])
+
+    def _passes_on(self, payload: Content) -> bool:
+        """Hand on what is the state of a tube, as nearly all is that a relay sees; False for anything else."""
+        tube = state_origin(payload if self.seals is None else self.seals.content(bytes(payload)))
+        if tube is not None:
+            self._pass_state(tube, payload)
+        return tube is not None
+
+    def _pass_state(self, tube: int, payload: Content) -> None:
+        if (link := self._links.get(Side.UPPER)) is None:
+            self.counters["nowhere_to_go"] += 1
+            return
+        link.send_best_effort(payload, (Kind.NODE_STATE, tube), Priority.STATE)
+        self._passes_states = True
 
     @property
     def _upper(self) -> int | None:

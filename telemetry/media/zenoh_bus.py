@@ -332,10 +332,14 @@ def _held(session: zenoh.Session) -> Iterator[ZenohBus]:
 
 
 def _config(mode: str, settings: dict[str, Any]) -> zenoh.Config:
-    """Session settings, without any scouting on the network."""
+    """Session settings, without any scouting on the network.
+
+    Nor does any payload go by shared memory, which zenoh would set aside at the first above 3 KiB, 16 MiB a process:
+    the states of a long string are longer, its frames are not so many.
+    """
     config = zenoh.Config()
-    quiet = {"mode": mode, "scouting/multicast/enabled": False, "scouting/gossip/enabled": False}
-    for key, value in (quiet | settings).items():
+    never = ("scouting/multicast/enabled", "scouting/gossip/enabled", "transport/shared_memory/enabled")
+    for key, value in ({"mode": mode} | dict.fromkeys(never, False) | settings).items():
         config.insert_json5(key, json.dumps(value))
     return config
 

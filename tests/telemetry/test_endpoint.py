@@ -30,8 +30,8 @@ from telemetry.messages import (
     Side,
     SurveyMeasurement,
 )
-from telemetry.presentation.msgpack_codec import Kind, open_payload
-from telemetry.transport.hop import parse_frame
+from telemetry.presentation.msgpack_codec import Kind, encode, open_payload
+from telemetry.transport.hop import pack_frame, parse_frame
 
 TICK = 1.0 / 1.9
 AIDING = Aiding(1.0, 1e-6, 0.0, 0.0, 0.1, 100.0, 1, 0)
@@ -391,3 +391,13 @@ def test_any_bytes_on_any_port_are_counted_and_dropped(frame: bytes, side: Side)
 
 def test_every_kind_of_message_has_a_priority() -> None:
     assert set(PRIORITIES) == set(Kind)
+
+
+def test_a_state_that_is_damaged_behind_its_tube_is_refused_where_it_is_read() -> None:
+    damaged = encode(state(1, 7))[:-5]
+    relay = Endpoint(3, frozenset({Side.UPPER, Side.LOWER}), boot_count=1)
+    base = Endpoint(BASE, frozenset({Side.LOWER}), boot_count=1)
+    assert relay.receive(Side.LOWER, pack_frame((4, 1 << 24 | 4, 1, 0, 0, 0), [(0, damaged)]), 10.0) == []
+    for frame in (frame for side, frame in relay.take_frames(10.0) if side is Side.UPPER):
+        assert base.receive(Side.LOWER, frame.payload, 10.0) == []
+    assert (relay.counters["bad_payloads"], base.counters["bad_payloads"]) == (0, 1)

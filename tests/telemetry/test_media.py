@@ -293,6 +293,21 @@ def test_a_thread_of_zenohs_stays_known_from_one_callback_to_the_next() -> None:
         assert counts == list(range(1, len(counts) + 1))
 
 
+def test_a_long_payload_takes_no_shared_memory() -> None:
+    heard: queue.SimpleQueue[bytes] = queue.SimpleQueue()
+    with zenoh_place() as endpoint, open_client(endpoint, PATIENCE) as ours, open_client(endpoint, PATIENCE) as theirs:
+        theirs.subscribe("long", lambda _key, payload: heard.put(payload))
+        onward = ours.publisher("long")
+        deadline = time.monotonic() + PATIENCE
+        while not onward.is_heard:
+            assert time.monotonic() < deadline
+        for _ in range(8):
+            onward.put(bytes(12_000))
+            assert heard.get(timeout=PATIENCE) == bytes(12_000)
+        mapped = Path("/proc/self/maps").read_text()
+    assert ".zenoh" not in mapped  # as the files of zenoh's segments are called
+
+
 def test_an_end_in_memory_has_one_port() -> None:
     with open_medium("memory:taken") as medium:
         port = medium.open_port(UPPER)

@@ -28,7 +28,7 @@ from telemetry.messages import (
     TimeRequest,
     UploadPhase,
 )
-from telemetry.presentation.msgpack_codec import MAX_PAYLOAD, decode, encode, open_payload
+from telemetry.presentation.msgpack_codec import MAX_PAYLOAD, decode, encode, open_payload, state_origin, unwritten
 from telemetry.schema import SCHEMA, Kind
 from telemetry.transport.hop import BUNDLE_LIMIT, ENTRY_BYTES, MAX_FRAME
 
@@ -84,6 +84,26 @@ def test_the_envelope_tells_the_route_without_the_body(message: Any) -> None:
     else:
         assert envelope.target == BASE
         assert envelope.origin == getattr(message, "tube", 255)
+
+
+@given(ANY)
+def test_a_state_is_known_by_its_first_bytes(message: Any) -> None:
+    tube = message.tube if isinstance(message, NodeState) else None
+    assert state_origin(encode(message)) == state_origin(unwritten(message)) == tube
+
+
+@given(MESSAGES[NodeState], st.data())
+def test_what_looks_like_a_state_is_one_of_that_tube_or_refused(state: NodeState, data: st.DataObject) -> None:
+    payload = bytearray(encode(state))
+    payload[data.draw(st.integers(0, 15))] = data.draw(st.integers(0, 255))
+    del payload[data.draw(st.just(len(payload)) | st.integers(0, len(payload))) :]
+    found = state_origin(bytes(payload))
+    try:
+        opened = open_payload(bytes(payload))
+    except DecodeError:
+        return
+    is_as_written = opened.kind is Kind.NODE_STATE and list(opened.rows)[:3] == ["v", "k", "o"]
+    assert found == (opened.origin if is_as_written else None)
 
 
 @given(MESSAGES[Aiding])
