@@ -19,7 +19,7 @@ from sim.campaign.sensors import NOISE, TUBE
 from sim.rig.direct_string import NEVER, aiding_passes
 from sim.rig.encoder_course import measured_of
 from sim.world.imu_errors import ImuErrors
-from sim.world.scenario import ScenarioFile
+from sim.world.scenario_file import ScenarioFile
 from sim.world.streams import Stream, stream
 from sim.world.world import World
 

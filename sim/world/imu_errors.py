@@ -9,7 +9,7 @@ import numpy as np
 import numpy.typing as npt
 
 from node.kernels.jit import kernel
-from sim.world.scenario import AccelerometerSection, DriftSection, GyroSection
+from sim.world.scenario_file import AccelerometerSection, DriftSection, GyroSection
 
 Array = npt.NDArray[np.float64]
 SAMPLE_RATE_HZ = 65.0  # of the gyroscope, whose single sample has the noise of this band. Source: thesis Table V.1

@@ -8,7 +8,7 @@ import numpy as np
 import numpy.typing as npt
 
 from node.kernels.layout import PARTS, PERIOD
-from sim.world.scenario import GyroSection
+from sim.world.scenario_file import GyroSection
 
 Array = npt.NDArray[np.float64]
 

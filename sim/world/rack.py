@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 import numpy.typing as npt
 
-from sim.world.scenario import CalibrationSection
+from sim.world.scenario_file import CalibrationSection
 from sim.world.truth import GAUSS_W, GAUSS_X
 
 if TYPE_CHECKING:

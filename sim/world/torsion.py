@@ -14,7 +14,7 @@ import numpy as np
 import numpy.typing as npt
 
 from sim.world.motion import Motion
-from sim.world.scenario import TorsionSection
+from sim.world.scenario_file import TorsionSection
 
 Array = npt.NDArray[np.float64]
 Course = tuple[Array, Array, Array]  # a quantity in time and its two derivatives, (n,) each

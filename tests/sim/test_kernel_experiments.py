@@ -20,7 +20,7 @@ from sim.studies.modes import run as modes
 from sim.studies.scenarios import Tables, changed, on_off
 from sim.studies.trials import rms_deg
 from sim.world.imu_errors import SAMPLE_RATE_HZ, single_samples
-from sim.world.scenario import GyroSection, NodeSection
+from sim.world.scenario_file import GyroSection, NodeSection
 
 pytestmark = pytest.mark.slow
 

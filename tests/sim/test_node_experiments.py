@@ -15,7 +15,8 @@ from sim.studies.outage import run as outage
 from sim.studies.scenarios import Tables, changed, on_off
 from sim.studies.trials import bootstrap, rms_deg
 from sim.studies.tuning import run as tuning
-from sim.world.scenario import AidingSection, scenario_of
+from sim.world.scenario import scenario_of
+from sim.world.scenario_file import AidingSection
 from sim.world.world import World
 
 pytestmark = pytest.mark.slow

@@ -10,7 +10,8 @@ from node.kernels.layout import PERIOD, Scheme
 from sim.errors import ScenarioError
 from sim.rig.direct_string import DirectString, StringRun, aiding_passes
 from sim.studies.epochs import resting
-from sim.world.scenario import AidingSection, scenario_of
+from sim.world.scenario import scenario_of
+from sim.world.scenario_file import AidingSection
 from sim.world.world import World
 from telemetry.parameters import ParameterBlock, SensorParameters
 

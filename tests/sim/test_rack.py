@@ -13,7 +13,8 @@ from sim.errors import ScenarioError
 from sim.rig.scheduler import Progress, Scheduler
 from sim.world.imu_errors import Drift
 from sim.world.rack import Rack
-from sim.world.scenario import CalibrationSection, DriftSection, Scenario, load_scenario
+from sim.world.scenario import Scenario, load_scenario
+from sim.world.scenario_file import CalibrationSection, DriftSection
 from sim.world.world import World
 from telemetry.messages import BASE
 

@@ -16,7 +16,7 @@ def test_every_shipped_scenario_is_valid(path: Path) -> None:
 
 
 def test_every_key_is_documented_or_says_it_all() -> None:
-    from sim.world.scenario import ScenarioFile
+    from sim.world.scenario_file import ScenarioFile
 
     for section in ScenarioFile.model_fields.values():
         annotation = section.annotation

@@ -10,7 +10,8 @@ from hypothesis import strategies as st
 
 from sim.world.marks import wrap
 from sim.world.motion import Motion, Trapezoid
-from sim.world.scenario import TorsionSection, load_scenario
+from sim.world.scenario import load_scenario
+from sim.world.scenario_file import TorsionSection
 from sim.world.torsion import StringTorsion, polar_moment, smooth_step, stiffness
 from sim.world.world import World
 

@@ -14,7 +14,8 @@ from node.kernels.layout import PERIOD
 from sim.world.borehole import Borehole
 from sim.world.marks import wrap
 from sim.world.motion import Motion, Trapezoid
-from sim.world.scenario import TorsionSection, load_scenario
+from sim.world.scenario import load_scenario
+from sim.world.scenario_file import TorsionSection
 from sim.world.torsion import StringTorsion
 from sim.world.truth import TubeTruth
 from sim.world.world import World

@@ -10,7 +10,8 @@ from node.kernels.layout import PERIOD
 from sim.errors import ScenarioError
 from sim.world.imu_errors import ImuErrors, gauss_markov, quantise
 from sim.world.marks import wrap
-from sim.world.scenario import AccelerometerSection, GyroSection, load_scenario
+from sim.world.scenario import load_scenario
+from sim.world.scenario_file import AccelerometerSection, GyroSection
 from sim.world.world import World
 from telemetry.messages import BASE, ENCODER, Side
 

@@ -27,7 +27,7 @@ from sim.studies.pool import RunAll, Step, over_cores
 from sim.studies.published import wellbore_1
 from sim.studies.scenarios import CALIBRATED
 from sim.world.borehole import Borehole
-from sim.world.scenario import AccelerometerSection, JointSection
+from sim.world.scenario_file import AccelerometerSection, JointSection
 from sim.world.streams import Stream, stream
 
 Array = npt.NDArray[np.float64]
