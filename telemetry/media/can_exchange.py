@@ -310,7 +310,8 @@ class CanExchange:
         try:
             return self.profile.join(source, type_, part, data)
         except TelemetryError as error:  # of a message that is none, or that nobody could have written
-            self.counters[f"refused: {error}" if " " in str(error) else str(error)] += 1
+            name, _, why = str(error).partition(":")  # counted without the value, of which there is no end
+            self.counters[f"refused: {name}" if why else name] += 1
         return None
 
     def _on_data(self, priority: Priority, data: bytes, now: float) -> bytes | None:

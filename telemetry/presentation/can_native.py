@@ -17,7 +17,14 @@ from telemetry.messages import Message
 from telemetry.presentation.can_forms import FD_PART
 from telemetry.presentation.can_messages import NATIVE
 from telemetry.presentation.can_signals import COUNT
-from telemetry.presentation.msgpack_codec import CODEC_OF, Opened, UnwrittenMessage, open_payload, values_of_opened
+from telemetry.presentation.msgpack_codec import (
+    CODEC_OF,
+    HIGHEST_ADDRESS,
+    Opened,
+    UnwrittenMessage,
+    open_payload,
+    values_of_opened,
+)
 from telemetry.schema import SPEC_OF, Kind
 from telemetry.transport.hop import Header, LinkFrame, pack_frame, parse_frame
 from telemetry.unwritten import Content
@@ -99,9 +106,12 @@ class NativeProfile:
         return LinkFrame(header, [(0, UnwrittenMessage(CODEC_OF[type_], values))])
 
     def observe(self, payload: bytes) -> None:
-        """See a frame of the link that came by ISO-TP: who sends in which boot and session, and how many so far."""
+        """See a frame of the link that came by ISO-TP: who sends in which boot and session, and how many so far.
+
+        A sender that no identifier can name sends no signals, and is not remembered.
+        """
         parsed = parse_frame(payload)
-        if parsed is not None:
+        if parsed is not None and parsed[0].sender <= HIGHEST_ADDRESS:
             header = parsed[0]
             if self._epoch.get(header.sender) != header.epoch:
                 self._epoch[header.sender], self._count[header.sender] = header.epoch, 0

@@ -170,7 +170,7 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
 @pytest.mark.slow
 @pytest.mark.parametrize("sealed", [True, False], ids=["sealed", "open"])
 def test_a_damaged_frame_stops_nobody(folder: Path, sealed: bool) -> None:
-    fuzz(folder, 12_000, sealed=sealed)
+    fuzz(folder, 300_000, sealed=sealed)
 
 
 @pytest.mark.statistical
