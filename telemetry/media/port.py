@@ -16,7 +16,7 @@ from typing import NamedTuple, Protocol
 from telemetry.messages import Side
 from telemetry.unwritten import Content, Unwritten
 
-MAX_FRAME = 16384  # bytes, largest frame of the hop link
+MAX_FRAME = 49152  # bytes, largest frame of the hop link: states of 170 tubes; zenoh takes 64 KiB in one piece
 STEPPER = 254  # in place of a neighbour's address: whoever hands a stepped process its frames
 
 

@@ -401,3 +401,15 @@ def test_a_state_that_is_damaged_behind_its_tube_is_refused_where_it_is_read() -
     for frame in (frame for side, frame in relay.take_frames(10.0) if side is Side.UPPER):
         assert base.receive(Side.LOWER, frame.payload, 10.0) == []
     assert (relay.counters["bad_payloads"], base.counters["bad_payloads"]) == (0, 1)
+
+
+def test_the_states_of_a_long_string_go_up_in_one_frame() -> None:
+    relay = Endpoint(160, frozenset({Side.UPPER, Side.LOWER}), boot_count=1)
+    entries = [(0, encode(state(1, tube))) for tube in range(1, 160)]
+    relay.receive(Side.LOWER, pack_frame((159, 1 << 24 | 159, 1, 0, 0, 0), []), 10.0)
+    relay.send_state(state(1, 160), 10.0)
+    relay.receive(Side.LOWER, pack_frame((159, 1 << 24 | 159, 2, 0, 0, 0), entries), 10.1)
+    up = [frame.payload for side, frame in relay.take_frames(10.1) if side is Side.UPPER]
+    (parsed,) = map(parse_frame, up)
+    assert parsed is not None
+    assert [open_payload(payload).origin for _, payload in parsed[1]] == list(range(1, 161))
