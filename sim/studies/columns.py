@@ -100,6 +100,20 @@ CONSISTENCY: Columns = (
     ("ours", "ours"),
     ("unit", "unit"),
 )
+HONESTY: Columns = (
+    ("case", "case"),
+    ("count", "epochs"),
+    ("yaw_rms_deg", "yaw rms, deg"),
+    ("nees", "NEES"),
+    ("nees_low", "low"),
+    ("nees_high", "high"),
+    ("nees_total", "with joints and mounts"),
+    ("nees_total_low", "low"),
+    ("nees_total_high", "high"),
+    ("inside_95_percent", "inside 95 %, %"),
+    ("inside_low", "low"),
+    ("inside_high", "high"),
+)
 OUTAGE: Columns = (("case", "case"), *HOPS, *plain("published", "ours", "unit", "to_reach", "reached"))
 OUTAGE_SHOWN: Columns = (("case", "case"), *HOPS, ("reached", "reached"))
 ALIGNMENT = plain("case", "quantity", "published", "ours", "low", "high", "unit")

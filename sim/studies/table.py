@@ -164,6 +164,19 @@ STUDIES = by_name(
             short="--seeds 2 --kernel fixed",
         ),
         Study(
+            "honesty",
+            "NEES and coverage to hop 50 over thousands of strings, by a campaign, with their intervals.",
+            f"{MODULES}.honesty",
+            (Table("{hops} nodes, {runs} strings", columns.HONESTY, columns.HONESTY),),
+            (
+                Option("runs", 1000, 2, 1_000_000, help="Strings, each a seed."),
+                Option("hops", 50, 1, 50, help="Nodes of a string."),
+            ),
+            counts="strings",
+            full=("--runs 10000",),
+            short="--runs 2 --hops 2",
+        ),
+        Study(
             "outage",
             "Consistency (NEES) of a string of five over the length of outages and the loss of every hop.",
             f"{MODULES}.outage",

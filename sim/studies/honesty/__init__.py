@@ -1,0 +1,1 @@
+"""Thousands of long strings, and whether their nodes know their own error."""

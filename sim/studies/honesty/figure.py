@@ -1,0 +1,15 @@
+"""NEES and coverage over hops."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from matplotlib.figure import Figure
+
+from sim.campaign.figure import honesty_figure
+
+
+def figures(result: dict[str, Any]) -> dict[str, Figure]:
+    """One figure."""
+    title = f"Honesty of {result['hops']} nodes, {result['runs']} strings"
+    return {result["experiment"]: honesty_figure(result["traces"], title)}
