@@ -1,6 +1,7 @@
 """The command line as its user meets it."""
 
 import os
+import socket
 import subprocess
 import sys
 from pathlib import Path
@@ -61,6 +62,13 @@ def test_a_wrong_argument_is_refused_in_words(words: tuple[str, ...], named: str
     assert named in done.stderr
     assert "Traceback" not in done.stderr
     assert done.stdout == ""
+
+
+def test_a_name_that_is_wrong_is_told_before_a_rig_that_runs() -> None:
+    with socket.create_server(("127.0.0.1", 0)) as other:
+        done = run("rig", "wellbor-1", "--endpoint", f"tcp/127.0.0.1:{other.getsockname()[1]}")
+    assert done.returncode == 2
+    assert "did you mean wellbore-1?" in done.stderr
 
 
 @pytest.mark.slow

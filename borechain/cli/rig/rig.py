@@ -108,7 +108,9 @@ def rig(
     from borechain.cli.rig.site import drill_site, has_site
     from borechain.host import opened_router
     from sim.rig.launcher import check_port_free
+    from sim.world.shipped import find_scenario
 
+    find_scenario(scenario)  # a wrong name is told first: whoever mistypes it may well have a rig running
     if inline != (transport == "can-native") and transport is not None:
         raise InputFault(
             f"--transport {transport}: expected {'real processes' if inline else '--inline'} with it; "
