@@ -11,20 +11,21 @@ from typing import Any
 
 import numpy as np
 
-from node.kernels.static_average import begin_sums, has_moved
+from node.kernels.static_average import FEWEST, begin_sums, has_moved
 from telemetry.messages import Matrix3, StaticRecord, Vector3
 
 SHORTEST, LONGEST = 5.0, 3600.0  # s
-FEWEST = 2  # samples of a covariance
 MOVED = 3.0  # times the noise, the spread of a record that was not at rest
 
 
 def begin_record(recording: Any, seconds: object, command: int, *, standing: bool) -> str:
-    """Begin with the next cycle of ``recording`` (of dtype ``RECORDING``); returns why not, or nothing."""
+    """Begin with the next cycle of ``recording`` (of dtype ``RECORDING``); returns why not, or nothing.
+
+    A record that is being taken makes way: whoever orders anew no longer wants it, since what was before the order,
+    such as another attitude, would be in it.
+    """
     if isinstance(seconds, bool) or not isinstance(seconds, int | float) or not SHORTEST <= seconds <= LONGEST:
         return f"seconds: expected {SHORTEST:g}..{LONGEST:g}, got {seconds!r:.40}"
-    if recording["running"]:
-        return "a static record is being taken"
     if not standing:
         return "the node is turning, or has not stood still for long enough"
     begin_sums(recording["sums"])

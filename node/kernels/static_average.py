@@ -16,6 +16,7 @@ from node.kernels.numbers import are_numbers, by_type, is_number, mean, number
 MEAN_Q: Final = RATE_Q  # of the means of rates and of forces: far finer than the noise of a reading
 RATE_PART, FORCE_PART = 25, 22  # Q of a product of deviations is the sum of its two
 FARTHEST: Final = 1 << (MEAN_Q + 4)  # from the mean that counts: 16 rad/s, 16 g
+FEWEST: Final = 2  # samples of a covariance
 MOST: Final = 1 << 59  # of a sum of products: 512 (rad/s)^2, 32768 g^2
 
 STATIC: Final = np.dtype(
@@ -121,7 +122,8 @@ def begin_sums(record: Any) -> None:
 def follow_recording(node: Any, start: float, end: float, standing: int) -> bool:
     """Take the cycle's raw reading (``start`` to ``end``, s, own clock) into the record being taken; whether it is due.
 
-    What is due is no longer running.
+    One that moved is due at once: it is worth nothing, and the node is free for the next. What is due is no longer
+    running.
     """
     recording = node.recording
     if recording.running == 0:
@@ -130,7 +132,8 @@ def follow_recording(node: Any, start: float, end: float, standing: int) -> bool
         recording.begun = start
     temperature = number(node.temperature) if is_number(node.temperature) else USUAL
     add_static(recording.sums, node.raw_rate, node.raw_force, temperature, standing)
-    if end - recording.begun < recording.seconds:
+    has_ended = recording.sums.moved == 1 and recording.sums.samples >= FEWEST
+    if end - recording.begun < recording.seconds and not has_ended:
         return False
     recording.running = 0
     return True

@@ -246,13 +246,35 @@ def test_a_record_that_moved_is_taken_again_and_never_counts(rig: Field) -> None
     check(rig)
 
 
+def test_a_record_that_was_asked_for_at_the_wrong_time_holds_no_attitude_up(rig: Field) -> None:
+    rig.command("begin")
+    rig.run(3.0)
+    rig.collect(PRESETS[:3])
+    late = {"tube": "1", "seconds": "60"}
+    rig.ground.operator.order("static_record", late)  # as a ground station does that came back at the end of a hold
+    rig.run(2.0)
+    for number, preset in enumerate(PRESETS[3:]):
+        rig.lay(*preset)
+        if number == 2:
+            rig.ground.operator.order("static_record", late)  # and one that asks before the next attitude is told
+            rig.run(2.0)
+        pitch, roll = map(str, preset)
+        rig.command("attitude", pitch_deg=pitch, roll_deg=roll, seconds=f"{SECONDS:g}")
+        rig.run(SECONDS + 4.0)
+    assert [row["records"] for row in rig.view()["tubes"]] == [len(PRESETS)] * 2
+    finish(rig)
+    check(rig)
+
+
 def test_a_record_that_ends_after_the_tubes_left_does_not_count(rig: Field) -> None:
     rig.command("begin")
     rig.run(3.0)
     rig.collect(PRESETS[:1])
     rig.tell(*PRESETS[1])
     rig.run(4.0)
-    rig.command("attitude", pitch_deg="90", roll_deg="0", seconds="8")  # told too early, and they are not there
+    rig.ground.endpoint.mail.command = lambda *_order: None  # type: ignore[method-assign]
+    # told too early, and they are not there; the order that would take the record's place does not come through
+    rig.command("attitude", pitch_deg="90", roll_deg="0", seconds="8")
     rig.run(6.0)
     records = [record for record in rig.ground.model.static_records if record.tube == 1]
     assert [record.moved for record in records] == [False, False]

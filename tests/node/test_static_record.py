@@ -119,11 +119,25 @@ def test_a_turning_node_refuses_and_one_that_starts_to_turn_says_so() -> None:
     assert "turning" in life.tube.start_record(20.0, 77)
     life.cycles(5)
     assert life.tube.start_record(20.0, 77) == ""
-    assert "being taken" in life.tube.start_record(20.0, 78)
     life.cycles(20)
-    life.cycles(3, rate=0.1 * DEG)
-    (record,) = records(life.cycles(30))
+    (record,) = records(life.cycles(3, rate=0.1 * DEG))  # it is worth nothing any more, so it ends
     assert record.moved
+    assert record.ended_at - record.begun_at < 20.0
+    assert records(life.cycles(60)) == []
+    assert life.tube.start_record(20.0, 78) == ""
+
+
+def test_a_new_order_takes_the_place_of_the_record_that_is_being_taken() -> None:
+    life = Life()
+    life.cycles(110)
+    assert life.tube.start_record(20.0, 77) == ""
+    life.cycles(20)
+    begun = life.now
+    assert life.tube.start_record(20.0, 78) == ""
+    (record,) = records(life.cycles(60))
+    assert (record.command, record.moved) == (78, False)
+    assert record.begun_at == pytest.approx(begun + 500.0)
+    assert record.samples == math.ceil(20.0 / PERIOD)
 
 
 def test_a_gyroscope_never_calibrated_can_be_recorded_but_not_while_it_turns_slowly() -> None:

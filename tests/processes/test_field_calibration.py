@@ -98,15 +98,27 @@ def test_what_is_said_of_before_is_what_an_uncalibrated_rig_shows(
 
 def test_a_ground_station_killed_while_it_collects_goes_on_to_its_blocks(tmp_path: Path, ask: Any) -> None:
     text = (REPOSITORY / SCENARIO).read_text().replace("tubes = 3", "tubes = 2").replace('"kill-node:2@474+15"', "")
-    with running_rig(tmp_path, "--seed", "1", "--speed", "60", scenario=str(written(tmp_path, text))) as rig:
-        rig.until(lambda: len((ask(rig, f"{GROUND}/recalibration") or {"attitudes": []})["attitudes"]) >= 3)
+    scenario = written(tmp_path, text)
+    rack = load_scenario(scenario).file.calibration
+    assert rack is not None
+    with running_rig(tmp_path, "--seed", "1", "--speed", "60", scenario=str(scenario)) as rig:
+
+        def shown() -> dict[str, Any]:
+            return ask(rig, f"{GROUND}/recalibration") or {"attitudes": [], "rig_time_s": None}
+
+        gone = rig.until(lambda: len(shown()["attitudes"]) >= 3 and shown()["rig_time_s"])
         os.kill(rig.pid_of("borechain ground"), signal.SIGKILL)
+        away = rig.until(lambda: shown()["rig_time_s"]) - gone
         result = rig.result()
+    # the rack goes on meanwhile, by the clock on the wall: an attitude at which nobody orders a record is lost
+    lost = 1 + int(away / (rack.hold_s + rack.move_s))
+    print(f"away for {away:.0f} s of rig time, at most {lost} attitudes lost")
     calibration = result["calibration"]
     assert result["restarts"] == 1
     assert calibration["state"] == "done"
     assert [row["tube"] for row in calibration["tubes"]] == [1, 2]
-    assert all(row["phase"] == "done" and row["records"] >= 11 for row in calibration["tubes"])
+    assert {row["phase"] for row in calibration["tubes"]} == {"done"}
+    assert min(row["records"] for row in calibration["tubes"]) >= len(rack.attitudes_deg) - lost
     assert calibration["inclination_rms_deg"]["after"] < 0.03
 
 
