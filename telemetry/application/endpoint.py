@@ -150,9 +150,12 @@ class Endpoint:
         is_relay = self.address != BASE and not self._standstill.may_have_waited(now)
         for payload in payloads:
             try:
-                if is_relay and self._passes_on(payload):
+                content = payload if self.seals is None else self.seals.content(bytes(payload))
+                tube = state_origin(content) if is_relay else None
+                if tube is not None:  # as nearly always
+                    self._pass_state(tube, payload)
                     continue
-                message = self._handle(side, payload, now)
+                message = self._handle(side, open_payload(content), payload, now)
             except DecodeError:
                 self.counters["bad_payloads"] += 1
                 continue
@@ -265,8 +268,7 @@ class Endpoint:
         """What must survive a restart: numbers, unreceipted messages, answered commands."""
         return self.mail.export_state(self.place.hops)
 
-    def _handle(self, side: Side, payload: Content, now: float) -> Message | None:
-        opened = open_payload(payload if self.seals is None else self.seals.content(bytes(payload)))
+    def _handle(self, side: Side, opened: Opened, payload: Content, now: float) -> Message | None:
         kind = opened.kind
         if kind in ONE_HOP:
             return self._handle_one_hop(side, decode_opened(opened), now)
@@ -326,13 +328,6 @@ class Endpoint:
             link.send_reliable(bytes(payload), PRIORITIES[kind])
         else:
             link.send_best_effort(payload, (kind, opened.origin), PRIORITIES[kind])
-
-    def _passes_on(self, payload: Content) -> bool:
-        """Hand on what is the state of a tube, as nearly all is that a relay sees; False for anything else."""
-        tube = state_origin(payload if self.seals is None else self.seals.content(bytes(payload)))
-        if tube is not None:
-            self._pass_state(tube, payload)
-        return tube is not None
 
     def _pass_state(self, tube: int, payload: Content) -> None:
         if (link := self._links.get(Side.UPPER)) is None:
