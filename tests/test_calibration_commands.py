@@ -339,3 +339,13 @@ def test_the_experiments_keep_the_tables_that_they_print(tmp_path: Path) -> None
         kept = (tmp_path / f"{name}.csv").read_text().splitlines()
         assert len(kept) == 1 + len(found["cases"])
         assert kept[0] == (ROOT / "docs" / "results" / f"{name}.csv").read_text().splitlines()[0]
+
+
+def test_an_experiment_whose_tables_cannot_be_kept_is_not_begun(tmp_path: Path) -> None:
+    (tmp_path / "file").touch()
+    done = run("experiment", "mwd", "--tools", 10_000, "--out", tmp_path / "file" / "results")
+    assert done.returncode == 1, done.stderr
+    assert done.stdout == ""
+    assert done.stderr.splitlines() == [
+        f"Error: {tmp_path / 'file' / 'results'}: Not a directory; choose a writable place"
+    ]

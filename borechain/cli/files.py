@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from pathlib import Path
 
 from borechain.cli.faults import EnvironmentFault, InputFault
@@ -19,6 +20,22 @@ def check_suffix(option: str, path: Path | None, *suffixes: str) -> None:
     """
     if path is not None and path.suffix.lower() not in suffixes:
         raise InputFault(f"{option} {path}: expected a name that ends in {', '.join(suffixes)}")
+
+
+def make_folder(path: Path) -> None:
+    """Make a folder to write into, before anything is computed.
+
+    Raises
+    ------
+    EnvironmentFault
+        When nothing can be written there.
+    """
+    try:
+        path.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise EnvironmentFault(f"{path}: {error.strerror}; choose a writable place") from error
+    if not os.access(path, os.W_OK):
+        raise EnvironmentFault(f"{path}: cannot be written; choose a writable place")
 
 
 def write_whole(path: Path, content: str | bytes) -> None:

@@ -13,6 +13,7 @@ import click
 from borechain.cli.experiment.output import keep, progress, show
 from borechain.cli.experiment.records import records
 from borechain.cli.faults import plain_faults
+from borechain.cli.files import make_folder
 from borechain.cli.options import json_option
 
 if TYPE_CHECKING:
@@ -100,6 +101,8 @@ def command_of(study: Study) -> click.Command:
 
     @plain_faults
     def run(out: Path | None, as_json: bool, **given: Any) -> None:
+        if out is not None:
+            make_folder(out)
         with progress(study.steps(given), study.counts, quiet=as_json) as step:
             result = study.run(given, step)
         keep(study, result, out)
