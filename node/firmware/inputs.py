@@ -39,3 +39,5 @@ class RigContext:
     clock_var: float  # s^2
     synchronised: bool
     epoch: int = EPOCH_UNKNOWN  # of rig_now
+    stepped: float = 0.0  # s, by which the clock dates later than in the last cycle for it was put right; NaN: unknown
+    drift_std: float = 0.0  # s/s, by which its rate may be off

@@ -139,8 +139,8 @@ class Tube:
 
     def on_cycle(self, reading: ImuReading, context: RigContext) -> list[Said]:
         """Take a cycle's reading in; returns what there is to say."""
-        moment = (reading.start, reading.end, context.joined, context.hops, context.clock_var, context.synchronised)
-        self._moment[:] = moment
+        around = (context.joined, context.hops, context.clock_var, context.synchronised)
+        self._moment[:] = (reading.start, reading.end, *around, context.stepped, context.drift_std)
         rows = self._readings
         rows[0] = _row_of(reading)
         for k in range(1, len(rows)):

@@ -179,6 +179,18 @@ def stamp_square(a: float) -> float:
     return a * a
 
 
+@by_type(lambda stamp, later: stamp - (later << (RATE_Q - TIME_Q)))
+def stamp_before(stamp: float, later: float) -> float:
+    """The error of a time stamp that is dated by a time ``later`` than it was."""
+    return stamp - later
+
+
+@by_type(lambda drift, time: shift(shift(drift, 16) * min(time, LONGEST), RATE_Q - 16))
+def drifted(drift: float, time: float) -> float:
+    """By how much (s) a clock is off by its ``drift`` (s/s) after a ``time``, in integers of up to 4096 s."""
+    return drift * time
+
+
 @by_type(lambda f: min(f * f, SCALE_CEILING) << 8)
 def scale_square(f: float) -> float:
     """The variance of a scale that is off by a factor; integers in unit^2, at most their ceiling."""

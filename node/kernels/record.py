@@ -323,8 +323,8 @@ KEPT_SIZE: Final = int(NODE.fields["cycles"][1]) if NODE.fields else 0  # bytes 
 # what one cycle brings, float64; of every IMU a row
 WX, WY, WZ, FX, FY, FZ, TEMPERATURE, SATURATED, LATE, LATE_STD, SPLIT, BEHIND, PART = range(13)
 READING: Final = PART + PARTS
-START, END, JOINED, HOPS, CLOCK_VAR, SYNCHRONISED = range(6)
-MOMENT: Final = 6
+START, END, JOINED, HOPS, CLOCK_VAR, SYNCHRONISED, STEPPED, DRIFT = range(8)
+MOMENT: Final = 8
 # an aiding, float64; see ``node.kernels.step.node_aiding``
 A_YAW, A_YAW_VAR, A_SYSTEMATIC, A_OFFSET, A_RATE, A_VALID, A_SEQUENCE, A_HOPS, A_TORQUE, A_TORSION = range(10)
 A_HELD, A_CLOCK_VAR = range(10, 12)

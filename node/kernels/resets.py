@@ -13,7 +13,7 @@ from node.kernels.error_model import isolate, set_apart
 from node.kernels.jit import constant, kernel
 from node.kernels.layout import STATES, UNKNOWN_YAW_VAR, Err
 from node.kernels.modes import STATIC_BIAS
-from node.kernels.numbers import held
+from node.kernels.numbers import held, stamp_before
 from node.kernels.priors import bias_var, boot_bias_var, scale_var, stamp_var
 from node.kernels.quantity import LONG_AGO, NOT_YET, ONE, variance
 
@@ -100,8 +100,24 @@ def lose_tilt(state: Any) -> None:
 
 @kernel
 def set_stamp_prior(state: Any, var: float) -> None:
-    """The time stamp of an aiding is off by so much (s^2) before the first was used."""
+    """The time stamp of an aiding is off by so much (s^2) for all that is known: what was learnt of it is void."""
+    state.stamp = 0
     set_apart(state, D, var)
+
+
+@kernel
+def move_dates(state: Any, later: float) -> None:
+    """The clock has dated everything by a known time ``later`` (s) since: what was learnt of its error still holds."""
+    state.stamp = stamp_before(state.stamp, later)
+    for k in range(state.pending):
+        state.pending_at[k] += later
+
+
+@kernel
+def forget_dates(state: Any) -> None:
+    """What waits was dated by a clock that nobody can compare with the present one; it may come again, dated anew."""
+    state.pending = 0
+    state.last_sequence = -1
 
 
 @kernel

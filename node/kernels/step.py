@@ -22,11 +22,11 @@ from node.kernels.gates import admits, gate_aiding
 from node.kernels.guard import guard_reading, judge_cycle
 from node.kernels.intake import take_readings
 from node.kernels.jit import constant, entry, kernel, shared_body
-from node.kernels.layout import CLOCK_SLACK, DEG, Array, Scheme, Status
+from node.kernels.layout import CLOCK_SLACK, DEG, Array, Err, Scheme, Status
 from node.kernels.lying import turn_down
 from node.kernels.make_up import follow_joints
 from node.kernels.modes import STATIC_BIAS
-from node.kernels.numbers import angle_of, half, held, ratio, root, stamp_square, time_root
+from node.kernels.numbers import angle_of, drifted, half, held, is_number, lasting, ratio, root, stamp_square, time_root
 from node.kernels.parts import put_right
 from node.kernels.priors import set_stamp
 from node.kernels.quantity import LONG_AGO, NONE, factor, rate, rate_variance, seconds
@@ -42,14 +42,16 @@ from node.kernels.record import (
     A_YAW,
     A_YAW_VAR,
     CLOCK_VAR,
+    DRIFT,
     END,
     HOPS,
     JOINED,
     START,
+    STEPPED,
     SYNCHRONISED,
 )
 from node.kernels.relay import offer_aiding
-from node.kernels.resets import doubt_stamp, set_stamp_prior, start_over
+from node.kernels.resets import doubt_stamp, forget_dates, move_dates, set_stamp_prior, start_over
 from node.kernels.rest_watch import watch_rest
 from node.kernels.revision import follow_revision, open_revision
 from node.kernels.sensor_watch import largest
@@ -82,7 +84,7 @@ STATUS_TOLD: Final = (
     int(Status.BAD_SAMPLE),
     FILTER_FAULT,
 )
-AIDING_REJECTED = constant(Code.AIDING_REJECTED)
+AIDING_REJECTED, D = constant(Code.AIDING_REJECTED), constant(Err.STAMP)
 
 
 @entry
@@ -97,7 +99,9 @@ def node_step(nodes: Array, settings: Array, parameters: Array, readings: Array,
         the window that they are of ended before the cycle, its standard deviation (s), and 1 where the inside of the
         window is known: then mean rates about z (rad/s) follow, of what it shows of the cycle before, and of the
         eighths of this one as far as it shows them
-    moment : (6,) start and end (s, own clock), joined, hops, variance of the clock (s^2), synchronised
+    moment : (8,) start and end (s, own clock), joined, hops, variance of the clock (s^2), synchronised, by how much (s)
+        the clock dates later than in the last cycle for it was put right (no number: nobody knows), and by how much its
+        rate may be off (s/s)
     """
     return int(step_around(run_cycle, nodes, settings, parameters, readings, moment))
 
@@ -237,25 +241,43 @@ def say_events(node: Any) -> int:
 def follow_clock(node: Any, settings: Any, moment: Array) -> None:
     """Let the prior of the time stamp be what the clock says of itself, and its wander that of the hops.
 
-    It is left alone while it is about right: another one costs the integer loop a conversion. A clock that knows much
-    better was put right by a step, whose variance is the difference of the two (a Kalman update's); one that knows
-    much worse has wandered by as much, or follows another neighbour.
+    The prior is left alone while it is about right: another one costs the integer loop a conversion. A clock that was
+    put right dates by a known step later, and what the filter has learnt of its error still holds, but for what it
+    wanders, until the clock knows better.
     """
-    config = node.config
+    config, state = node.config, node.filter
     if moment[SYNCHRONISED] == 0 or config.stamp_std == 0:
         return
     std = min(max(time_root(moment[CLOCK_VAR]), LEAST_STAMP), MOST_STAMP)
+    var, stepped, is_aided = stamp_square(std), moment[STEPPED], state.last_aided != LONG_AGO
+    is_void = not is_number(stepped)
+    if is_aided and moment[DRIFT] > 0:
+        doubt_stamp(state, wander_var(state, moment[END], moment[DRIFT]))
+    if is_void:
+        forget_dates(state)
+    elif is_aided and stepped != 0:
+        move_dates(state, stepped)
+        is_void = state.P[D, D] > var
     hops = max(int(moment[HOPS]), 1)
-    change = ratio(std, config.stamp_std)
-    if hops == node.stamp_hops and NEAR < change < FAR:
-        return
-    moved = abs(stamp_square(config.stamp_std) - stamp_square(std))
-    node.stamp_hops = hops
-    set_stamp(config, std, settings.stamp_walk, hops)
-    if node.filter.last_aided == LONG_AGO:
-        set_stamp_prior(node.filter, stamp_square(std))
-    elif moved > LARGE_MOVE_VAR:
-        doubt_stamp(node.filter, moved)
+    is_other = hops != node.stamp_hops or not NEAR < ratio(std, config.stamp_std) < FAR
+    grown = var - stamp_square(config.stamp_std)
+    if is_other:
+        node.stamp_hops = hops
+        set_stamp(config, std, settings.stamp_walk, hops)
+    if is_void or (is_other and not is_aided):
+        set_stamp_prior(state, var)
+    elif is_other and grown > LARGE_MOVE_VAR:
+        doubt_stamp(state, grown)
+
+
+@kernel
+def wander_var(state: Any, end: float, drift: float) -> float:
+    """Variance of what the time stamp has wandered in a cycle, by a clock's ``drift`` (s/s) that stays what it is.
+
+    The aidings of a string that turns show the stamp; since the last of them it wanders in proportion to the time.
+    """
+    unseen = max(lasting(end, state.still_cycles + 1), end - state.last_aided)
+    return stamp_square(drifted(drift, unseen)) - stamp_square(drifted(drift, unseen - lasting(end, 1)))
 
 
 @entry

@@ -247,20 +247,26 @@ class TubeProcess(Process):
         if silent > len(self.settings.above):
             return  # over joints that nobody told this node of
         aiding = across(aiding, self.settings.above[:silent], self.settings.stiffness)
-        onward = self.tube.on_aiding(aiding, clock.local_from_rig(aiding.valid_at), clock.variance(now))
+        valid_local = clock.local_from_rig(aiding.valid_at)
+        if math.isfinite(clock.stepped):
+            valid_local -= clock.stepped  # the cycle learns of the step, and moves what waits for it
+        onward = self.tube.on_aiding(aiding, valid_local, clock.variance(now))
         if onward is not None:
             self._send(onward, now)
 
     def _context(self, now: float) -> RigContext:
         clock = self.endpoint.clock
         var = min(clock.variance(now), MAX_CLOCK_STD**2)
+        is_dated = clock.synchronised and var < SYNCHRONISED_STD**2
         return RigContext(
             joined=self.endpoint.place.neighbours[Side.UPPER] is not None,
             hops=self.endpoint.place.hops,
             rig_now=clock.rig_from_local(now),
             clock_var=var,
-            synchronised=clock.synchronised and var < SYNCHRONISED_STD**2,
+            synchronised=is_dated,
             epoch=clock.epoch,
+            stepped=clock.take_step() if is_dated else 0.0,
+            drift_std=clock.drift_std,
         )
 
     def _send(self, said: Aiding | SurveyMeasurement | StaticRecord | Event | NodeState, now: float) -> None:

@@ -53,6 +53,8 @@ class ClockFilter:
         self._least_round_trip = math.inf
         self._of_late: deque[tuple[float, float]] = deque(maxlen=OF_LATE)  # s: round trip, measured
         self._another = False
+        self._jumped = False
+        self.stepped = 0.0  # s, see ``take_step``
 
     @property
     def synchronised(self) -> bool:
@@ -87,6 +89,23 @@ class ClockFilter:
             return math.inf
         return self._predicted(local)[0] + self._told.clock_var
 
+    @property
+    def drift_std(self) -> float:
+        """By how much the rate of rig time may be off, s/s.
+
+        Of the joints above only the variance of their time is known, and their rates are taken to be as well known.
+        """
+        own, _, drift_var = self._p
+        return math.sqrt(drift_var * (1.0 + self._told.clock_var / own)) if own > 0.0 else 0.0
+
+    def take_step(self) -> float:
+        """By how much (s) the clock dates later than when this was asked last, because it was put right since.
+
+        NaN where nobody knows, for the own clock may have jumped or rig time is another one.
+        """
+        stepped, self.stepped = self.stepped, 0.0
+        return stepped
+
     def change_neighbour(self) -> None:
         """Compare anew from the next exchange on, with another crystal; what is known of rig time stays till then."""
         self._another = True
@@ -100,6 +119,7 @@ class ClockFilter:
         p00, p01, p11 = self._p
         self._p = (p00 + seconds * seconds, p01, p11)
         self._disagreed = RESET_AFTER - 1
+        self._jumped = True
 
     def exchange(self, reply: TimeReply, back: float) -> None:
         """Take the reply that came ``back`` at the local time (s) given, unless it cannot be or took too long."""
@@ -112,11 +132,15 @@ class ClockFilter:
         wait = 0.5 * (round_trip - self._least_round_trip) + self._doubt()
         var = JITTER_STD**2 + wait * wait
         middle = 0.5 * (reply.asked_at + back)
+        continues = self.exchanges > 0 and reply.epoch == self._told.epoch and not self._jumped
+        before = self.rig_from_local(back)
         if self.exchanges == 0 or self._another:
             self._start(middle, measured, var)
         elif not self._update(middle, measured, var):
             return
         self._told = reply
+        self._jumped = False
+        self.stepped += (before - self.rig_from_local(back)) / self.rig_rate if continues else math.nan
 
     def _doubt(self) -> float:
         """How far (s) the shortest round trip itself may be off, for it may have waited one way only."""

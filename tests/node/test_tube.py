@@ -11,7 +11,7 @@ from node.firmware.inputs import ImuReading, RigContext
 from node.firmware.sensor_limits import SensorLimits
 from node.firmware.settings import Joint, TubeSettings
 from node.firmware.tube import Tube
-from node.kernels.layout import PERIOD, Err, Scheme, default_config
+from node.kernels.layout import PERIOD, Scheme, default_config
 from node.kernels.record import new_node
 from telemetry.messages import Aiding, Event, Mode, NodeFlag, NodeState, SurveyMeasurement
 
@@ -83,23 +83,6 @@ def test_an_aiding_that_a_poor_clock_cannot_place_in_a_turning_goes_on_unused(
     aiding = replace(AIDING, yaw=life.angle, rate=rate, valid_at=life.now, sequence=900)
     assert life.tube.on_aiding(aiding, life.now, clock_std**2) is not None
     assert int(life.tube.state["pending"]) == before + used
-
-
-def test_a_clock_put_right_in_mid_turn_reopens_the_time_stamp() -> None:
-    life = Life(tube())
-    life.clock_var = 0.04**2
-    life.cycles(40)
-    life.cycles(20, 1.0)
-    life.cycles(5, 1.0, aided=False)
-    learnt = stamp_var(life)
-    assert learnt < 0.01**2
-    life.clock_var = 0.01**2
-    life.cycles(1, 1.0, aided=False)
-    assert stamp_var(life) > 0.03**2
-
-
-def stamp_var(life: Life) -> float:
-    return float(life.tube.state["P"][Err.STAMP, Err.STAMP])
 
 
 def test_estimate_says_its_own_yaw_and_variance_each_cycle() -> None:

@@ -62,6 +62,55 @@ def test_errors_add_up_down_the_chain_and_do_not_grow_beyond() -> None:
     assert normalised.max() < 1.5
 
 
+@pytest.mark.slow
+def test_what_a_clock_says_of_its_steps_and_its_drift_accounts_for_all_that_dates_move() -> None:
+    """The error of a date, less the steps that were told: what is left is a rate that is off, by as much as is said."""
+    normalised = []
+    for seed in range(40):
+        clocks = Clocks(seed)
+        clocks.run(60.0 + seed)
+        for node in clocks.filters:
+            assert math.isnan(node.take_step())  # before the first exchange nobody knew
+        t = clocks.next[-1] if seed % 2 else 1060.0 + seed
+        before = [node.rig_from_local(clocks.local(k, t)) - t for k, node in enumerate(clocks.filters)]
+        for k in range(HOPS):
+            clocks.ask(k, t)
+        for k, (node, error) in enumerate(zip(clocks.filters, before, strict=True)):
+            later = t + 10.0
+            stepped = node.take_step()
+            assert node.take_step() == 0.0
+            back = node.rig_from_local(clocks.local(k, t)) - t
+            assert back + stepped == pytest.approx(error, abs=1e-6)  # put right a delay before
+            moved = node.rig_from_local(clocks.local(k, later)) - later - back
+            normalised.append(moved / (10.0 * node.drift_std))
+    # an exchange of this world is off by half of what a clock takes it to be
+    assert 0.05 < np.mean(np.square(normalised)) < 1.0
+    assert np.max(np.abs(normalised)) < 3.0
+
+
+@pytest.mark.parametrize("epoch", [2, 3])
+def test_of_rig_time_of_another_start_no_step_is_known(epoch: int) -> None:
+    node = ClockFilter()
+    for k in range(5):
+        asked = 1000.0 + k
+        node.exchange(TimeReply(asked, asked, asked, asked, 1.0, 0.0, 2), asked + 2 * LATENCY)
+    node.take_step()
+    node.exchange(TimeReply(1005.0, 1005.0, 1005.0, 9005.0, 1.0, 0.0, epoch), 1005.0 + 2 * LATENCY)
+    assert math.isnan(node.take_step()) == (epoch == 3)
+
+
+def test_a_clock_that_jumped_knows_no_step() -> None:
+    clocks = Clocks(4)
+    clocks.run(60.0)
+    node = clocks.filters[0]
+    node.take_step()
+    node.doubt(0.3)
+    clocks.ask(0, 1061.0)
+    assert math.isnan(node.take_step())
+    clocks.ask(0, 1062.0)
+    assert math.isfinite(node.take_step())
+
+
 def test_a_clock_that_is_wrong_because_frames_waited_says_so() -> None:
     """The first exchanges on a busy machine, where each way waits 0.3 s in the mean and much longer now and then."""
     random, offset = np.random.default_rng(5), 17.0

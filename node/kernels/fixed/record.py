@@ -167,7 +167,7 @@ OWN_FORMATS: Final[dict[str, Any]] = {
 READING_FORMATS: Final = np.array(
     [RATE_Q] * 3 + [FORCE] * 3 + [WARMTH_Q, 0, TIME_Q, TIME_Q, 0] + [RATE_Q] * (READING - BEHIND)
 )
-MOMENT_FORMATS: Final = np.array([TIME_Q, TIME_Q, 0, 0, VAR_Q, 0])
+MOMENT_FORMATS: Final = np.array([TIME_Q, TIME_Q, 0, 0, VAR_Q, 0, TIME_Q, RATE_Q])
 AIDING_FORMATS: Final = np.array(
     [ANGLE_Q, VAR_Q, VAR_Q, ANGLE_Q, RATE_Q, TIME_Q, 0, 0, TORQUE_Q, VAR_Q, 0, VAR_Q],
 )

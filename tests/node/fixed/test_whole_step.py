@@ -47,7 +47,9 @@ class Rig:
             self.hops, self.offset = self.hops % 3 + 1, float(random.uniform(-3.0, 3.0))
         rows = [self.reading(imu, k) for imu in range(self.imus)]
         joined = 0.0 if k % 1000 > 970 and self.spin == 0.0 else 1.0
-        return np.array(rows), np.array([self.now - PERIOD, self.now, joined, self.hops, 1e-6 * (1 + k // 1000), 1.0])
+        stepped = 0.0 if k % 9 else math.nan if k % 1800 == 900 else float(random.normal(0.0, 1e-4))
+        clock = (1e-6 * (1 + k // 1000), 1.0, stepped, 3e-6 / (1.0 + k / 1000))
+        return np.array(rows), np.array([self.now - PERIOD, self.now, joined, self.hops, *clock])
 
     def reading(self, imu: int, k: int) -> list[float]:
         """What one IMU reads."""
