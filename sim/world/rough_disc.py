@@ -60,6 +60,16 @@ class RoughDisc:
         earlier = self._edges[since:k][::-1].tolist()
         return int(self._after[k]) + off, float(self._edges[k]), rising, tuple(earlier)
 
+    def samples(self, t: Array) -> Array:
+        """Counts at rig times ``t`` (n,) s, times of their last edges and 1 where these rose, (n, 3), see ``sample``.
+
+        Neither readings that are off nor counts that jump are in it.
+        """
+        k = np.searchsorted(self._edges, t, side="right") - 1
+        found = np.stack([self._after[k], self._edges[k], self._rising[k]], axis=1).astype(np.float64)
+        found[k < 0] = self._first, self._begin, 1.0
+        return found
+
     def _shown(self, head: Array) -> Array:
         """Angle of the disc (n,), rad, of that of the head."""
         section, turned = self._section, head - head[0]

@@ -55,6 +55,29 @@ def band_noise(random: np.random.Generator, count: int, rate: float, lowest: flo
     return np.asarray(np.fft.irfft(spectrum, padded)[:count] * math.sqrt((padded / 2.0) / max(inside.sum(), 1)))
 
 
+def butterworth(low_pass: float, hertz: float) -> tuple[Array, Array]:
+    """Coefficients (3,) of the numerator and denominator of a low-pass of two poles at ``low_pass`` Hz."""
+    from scipy.signal import butter  # a second that only a world with a filter pays
+
+    b, a = butter(2, min(low_pass / (0.5 * hertz), 0.99))
+    return b, a
+
+
+def low_passed(values: Array, low_pass: float, hertz: float) -> Array:
+    """What a filter at ``low_pass`` Hz, at rest before the first, makes of ``values`` (n, m) at ``hertz`` samples/s."""
+    from scipy.signal import lfilter, lfilter_zi
+
+    b, a = butterworth(low_pass, hertz)
+    before = lfilter_zi(b, a)[:, None] * values[0]
+    return np.asarray(lfilter(b, a, values, axis=0, zi=before)[0])
+
+
+def pull_of(sensor: RoughSensorSection, seed: int, *imu: int) -> Array:
+    """What the forces do to the axes of a gyroscope (3, 3), rad/s by m/s^2."""
+    drawn = stream(seed, Stream.ROUGH_PULL, *imu).standard_normal((3, 3))
+    return np.asarray(math.radians(sensor.g_sensitivity_dps_per_g) / G * drawn)
+
+
 def shaken_angle(section: RoughVibrationSection, seed: int, tube: int, t: Array, driven: Array) -> Array:
     """Angle (n,) rad of a tube's torsional vibration at the grid ``t`` (n,) s, while it is ``driven``."""
     if section.torsional_dps == 0.0:
@@ -96,7 +119,8 @@ class RoughImu:
         sensor = self._section.sensor
         rate, force, hidden = self._converted(rate, force)
         if sensor.low_pass_hz > 0.0:
-            rate, force = self._filtered(rate, sensor), self._filtered(force, sensor)
+            hertz = 1.0 / float(self._t[1] - self._t[0])
+            rate, force = low_passed(rate, sensor.low_pass_hz, hertz), low_passed(force, sensor.low_pass_hz, hertz)
         # the warming up and a step of the bias are slow: of each frame they are those of its time
         times = self._frame_times(sensor) if sensor.frames_hz > 0.0 else ends
         slow = np.stack([np.interp(times, ends, bias[:, k]) for k in range(3)], axis=1)
@@ -131,22 +155,12 @@ class RoughImu:
             force = force + G * shaken
             rate = rate + math.radians(sensor.rectification_dps_per_g2) * np.sum(shaken**2, axis=1)[:, None]
         if sensor.g_sensitivity_dps_per_g > 0.0:
-            drawn = stream(self._seed, Stream.ROUGH_PULL, *self._key).standard_normal((3, 3))
-            rate = rate + force @ (math.radians(sensor.g_sensitivity_dps_per_g) / G * drawn).T
+            rate = rate + force @ pull_of(sensor, self._seed, *self._key).T
         rate = rate + 0.5 * sensor.scale_asymmetry * np.abs(rate)
         limits = math.radians(self._errors.gyroscope.range_dps), G * sensor.force_range_g
         for values, limit, bit in ((rate, limits[0], GYRO_CLIPPED), (force, limits[1], FORCE_CLIPPED)):
             cut |= bit * np.any(np.abs(values) >= AT_RANGE * limit, axis=1)
         return np.clip(rate, -limits[0], limits[0]), np.clip(force, -limits[1], limits[1]), cut
-
-    def _filtered(self, values: Array, sensor: RoughSensorSection) -> Array:
-        """Butterworth low-pass of two poles, at rest before the first sample."""
-        from scipy.signal import butter, lfilter, lfilter_zi  # a second that only a world with a filter pays
-
-        hertz = 1.0 / float(self._t[1] - self._t[0])
-        b, a = butter(2, min(sensor.low_pass_hz / (0.5 * hertz), 0.99))
-        before = lfilter_zi(b, a)[:, None] * values[0]
-        return np.asarray(lfilter(b, a, values, axis=0, zi=before)[0])
 
     def _frame_times(self, sensor: RoughSensorSection) -> Array:
         step = 1.0 / (sensor.frames_hz * (1.0 + sensor.crystal))

@@ -50,7 +50,7 @@ class RoughMotion:
         self.head = base + self._added(section.drive, motion, base, rate)
         if section.drive.stop_spread_deg > 0.0:
             self.head += self._turned_further(section.drive, motion, base, seed)
-        self.string = self._through_play(section.string, seed)
+        self.string = self.through_play(section.string, seed)
 
     def twist(self, section: RoughStringSection) -> Array:
         """Angle (n,) rad by which the string lags the head for its twist."""
@@ -85,8 +85,8 @@ class RoughMotion:
             further += part * np.clip((base - begin) / (end - begin), 0.0, 1.0)
         return np.asarray(math.radians(section.stop_spread_deg) * further)
 
-    def _through_play(self, section: RoughStringSection, seed: int) -> Array:
-        """The head drives the string at one flank; after a stop it runs on, and waits there for the head."""
+    def through_play(self, section: RoughStringSection, seed: int) -> Array:
+        """Angle (n,) rad of the string: the head drives it at one flank; after a stop it runs on and waits there."""
         play = math.radians(section.backlash_deg)
         if play == 0.0:
             return self.head
