@@ -36,6 +36,7 @@ from sim.campaign.course import Course
 from sim.campaign.draws import Draws, draws_of, fresh_nodes, noise_of, tubes_of
 from sim.campaign.drill import CODES, STATE_OF, SURVEY, drill
 from sim.campaign.sensors import Work, draw, new_work, read_sensors
+from sim.rig.encoder_course import measured_of
 from sim.studies.epochs import resting
 from sim.world.scenario import Scenario, load_scenario, scenario_of
 from sim.world.world import World
@@ -82,8 +83,8 @@ def kernels(
                 is_first = cycle == 0 or course.powered[cycle - 1] <= k
                 above = tubes[k - 1].hop_error if k > 0 else 0.0
                 felt = course.rate, course.force, course.circle, course.shaken
-                read_sensors(noise[0], tubes[k], is_first, above, *felt, work.drawn, work.reading, cycle, k)
-                reading = work.reading[0]
+                read_sensors(noise[0], tubes[k], is_first, above, *felt, work.drawn, work.readings[k], cycle, k)
+                reading = work.readings[k, 0]
             else:
                 reading = tape.readings[cycle, k]
                 tubes[k].hop_error, tubes[k].hop_loses = tape.errors[cycle, k], tape.loses[cycle, k]
@@ -121,8 +122,8 @@ def record(course: Course, noise: Any, tubes: Any, key: Any, work: Work, tape: T
             is_first = cycle == 0 or course.powered[cycle - 1] <= k
             above = tubes[k - 1].hop_error if k > 0 else 0.0
             felt = course.rate, course.force, course.circle, course.shaken
-            read_sensors(noise[0], tubes[k], is_first, above, *felt, work.drawn, work.reading, cycle, k)
-            tape.readings[cycle, k] = work.reading[0]
+            read_sensors(noise[0], tubes[k], is_first, above, *felt, work.drawn, work.readings[k], cycle, k)
+            tape.readings[cycle, k] = work.readings[k, 0]
             tape.errors[cycle, k], tape.loses[cycle, k] = tubes[k].hop_error, tubes[k].hop_loses
 
 
@@ -132,8 +133,9 @@ class OneRun:
     def __init__(self, scenario: Scenario) -> None:
         self.campaign = Campaign(scenario)
         self.world = World(scenario, SEED)
-        self.course, self.noise, self.draws = self.campaign.course, noise_of(scenario.file), draws_of(self.world)
-        self.key, self.work = np.array([SEED, 0], np.uint64), new_work()
+        self.course, self.noise = self.campaign.course, noise_of(scenario.file)
+        self.draws = draws_of(self.world, measured_of(self.world))
+        self.key, self.work = np.array([SEED, 0], np.uint64), new_work(scenario.tubes)
         shape = (len(self.course.ends), scenario.tubes)
         self.tape = Tape(np.zeros((*shape, READING)), np.zeros(shape), np.zeros(shape, np.int64))
         record(self.course, self.noise, self.tubes(), self.key, self.work, self.tape)
@@ -154,9 +156,9 @@ class OneRun:
         nodes, crews = fresh_nodes(self.world)
         count, epochs = len(nodes), len(self.course.epochs)
         corrections = np.stack([np.concatenate([record_of(ParameterBlock(k + 1, 0))] * 2) for k in range(count)])
-        taken = nodes, crews, corrections, self.course, self.noise, self.tubes(), self.draws, self.key, self.work
+        taken = nodes, crews, corrections, self.course, self.noise, self.tubes(), self.draws, None, self.key
         kept = np.zeros(count * epochs, SURVEY), np.zeros((epochs, count), STATE_OF), np.zeros((count, CODES), np.int64)
-        return spent(lambda: drill(*firmware(), *taken, *kept)) / self.campaign.node_cycles
+        return spent(lambda: drill(*firmware(), *taken, self.work, *kept)) / self.campaign.node_cycles
 
     def with_columns(self) -> float:
         """Seconds of a node-cycle of a run from its draws to its columns."""

@@ -18,11 +18,13 @@ import numpy.typing as npt
 from node.firmware.block_trial import record_of
 from node.kernels.address import firmware
 from node.kernels.layout import Array
-from sim.campaign.course import Course, course_of
+from sim.campaign.course import ANY_SEED, Course, course_of, joined_of
 from sim.campaign.draws import Draws, draws_of, fresh_nodes, noise_of, tubes_of
 from sim.campaign.drill import CODES, STATE_OF, SURVEY, drill
+from sim.campaign.field_draws import FieldRun, RoughWorld
 from sim.campaign.sensors import new_work
 from sim.rig.direct_string import wrapped
+from sim.rig.encoder_course import measured_of
 from sim.world.scenario import Scenario
 from sim.world.world import World
 from telemetry.parameters import ParameterBlock
@@ -86,10 +88,11 @@ class Campaign:
         self.course: Course = course_of(scenario)
         self._noise = noise_of(scenario.file)
         self._mount_var = float(np.radians(scenario.file.joints.mount_std_deg)) ** 2
-        self._depth = World(scenario, 1).motion.depth(self.course.ends)[0]
-        count = scenario.tubes
+        world, count, rough = World(scenario, ANY_SEED), scenario.tubes, scenario.file.rough
+        self._depth = world.motion.depth(self.course.ends)[0]
+        self.rough = None if rough is None else RoughWorld(world, rough)
         self._corrections = np.stack([np.concatenate([record_of(ParameterBlock(k + 1, 0))] * 2) for k in range(count)])
-        self._work = new_work()
+        self._work = new_work(count)
 
     @property
     def node_cycles(self) -> int:
@@ -105,7 +108,11 @@ class Campaign:
     def run(self, seed: int) -> tuple[Columns, Columns]:
         """Surveys and epochs of one run."""
         world = World(self._scenario, seed)
-        draws, count = draws_of(world), self._scenario.tubes
+        count, course = self._scenario.tubes, self.course
+        field = None if self.rough is None else self.rough.run(world)
+        draws = draws_of(world, measured_of(world) if field is None else field.measured)
+        if not course.locked:
+            course = course._replace(joined=joined_of(world, course.powered, draws.phase))
         nodes, crews = fresh_nodes(world)
         surveys = np.zeros(MOST_SURVEYS * count * len(self.course.epochs), SURVEY)
         epochs = np.zeros((len(self.course.epochs), count), STATE_OF)
@@ -118,28 +125,29 @@ class Campaign:
             nodes,
             crews,
             self._corrections,
-            self.course,
+            course,
             self._noise,
             tubes_of(world, draws.frame),
             draws,
+            None if field is None else field.field,
             key,
             self._work,
             surveys,
             epochs,
             counts,
         )
-        return self._surveys(seed, draws, surveys[:made]), self._epochs(seed, draws, epochs)
+        return self._surveys(seed, draws, field, surveys[:made]), self._epochs(seed, draws, field, epochs)
 
-    def _surveys(self, seed: int, draws: Draws, made: Array) -> Columns:
+    def _surveys(self, seed: int, draws: Draws, field: FieldRun | None, made: Array) -> Columns:
         course, place, cycle = self.course, made["tube"] - 1, made["cycle"]
         md = self._depth[cycle] - place * self._scenario.tube_length
-        error, systematic = self._errors(draws, place, cycle, made["yaw"])
+        error, systematic = self._errors(draws, field, place, cycle, made["yaw"])
         inclination, azimuth = self._direction_errors(made, md)
         return {
             "run": np.full(len(made), seed, np.int64),
             "tube": made["tube"].astype(np.int16),
             "hop": (made["top"] - place).astype(np.int16),
-            "at": course.ends[cycle],
+            "at": course.ends[cycle] + draws.phase[place],
             "md": md,
             "yaw_error": error,
             "systematic_error": systematic,
@@ -150,15 +158,15 @@ class Campaign:
             "trusted": made["trusted"].astype(bool),
         }
 
-    def _epochs(self, seed: int, draws: Draws, epochs: Array) -> Columns:
+    def _epochs(self, seed: int, draws: Draws, field: FieldRun | None, epochs: Array) -> Columns:
         course = self.course
         which, place = np.nonzero(np.arange(epochs.shape[1]) < course.powered[course.epochs][:, None])
         cycle, kept = course.epochs[which], epochs[which, place]
-        error, systematic = self._errors(draws, place, cycle, kept["yaw"])
+        error, systematic = self._errors(draws, field, place, cycle, kept["yaw"])
         return {
             "run": np.full(len(kept), seed, np.int64),
             "hop": (course.powered[cycle] - place).astype(np.int16),
-            "at": course.ends[cycle],
+            "at": course.ends[cycle] + draws.phase[place],
             "turning": course.turning[which],
             "known": kept["known"].astype(bool),
             "yaw_error": error,
@@ -168,11 +176,18 @@ class Campaign:
         }
 
     def _errors(
-        self, draws: Draws, place: npt.NDArray[np.int64], cycle: npt.NDArray[np.int64], yaw: Array
+        self,
+        draws: Draws,
+        field: FieldRun | None,
+        place: npt.NDArray[np.int64],
+        cycle: npt.NDArray[np.int64],
+        yaw: Array,
     ) -> tuple[Array, Array]:
         """Errors of yaws (n,), whole and constant part."""
-        truth = self.course.head[cycle] + draws.frame[place]
-        return wrapped(yaw - truth), draws.systematic[place, self.course.tops[cycle]]
+        turned = self.course.head[cycle]
+        if self.rough is not None and field is not None:
+            turned = self.rough.turned(field, place, cycle, self.course.ends[cycle] + draws.phase[place])
+        return wrapped(yaw - (turned + draws.frame[place])), draws.systematic[place, self.course.tops[cycle]]
 
     def _direction_errors(self, made: Array, md: Array) -> tuple[Array, Array]:
         """Errors of inclination and azimuth (n,), from gravity and yaw. Source: thesis eqs. 1.1-1.3."""

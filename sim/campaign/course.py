@@ -13,8 +13,9 @@ import numpy as np
 import numpy.typing as npt
 
 from node.kernels.layout import PERIOD
-from sim.errors import ScenarioError
+from sim.campaign.refusals import refuse_others
 from sim.rig.direct_string import SILENT_AFTER
+from sim.world.motion import Motion
 from sim.world.scenario import Scenario
 from sim.world.truth import TubeTruth
 from sim.world.world import World
@@ -57,75 +58,57 @@ def course_of(scenario: Scenario) -> Course:
     adds = [phase for phase in world.phases if phase.kind == "add"]
     powered = file.rig.tubes_at_start + sum((phase.start <= ends).astype(np.int64) for phase in adds)
     powered = np.asarray(powered, np.int64) * np.ones(len(ends), np.int64)
-    opened = np.zeros(len(ends), bool)
-    missed = np.zeros(len(ends), bool)
-    for phase in adds:
-        opened |= (phase.start < ends) & (ends < phase.joint_closed)
-        missed |= (phase.start + SILENT_AFTER < ends) & (ends < phase.joint_closed)
-    joined = np.ones((len(ends), count))
-    rows = np.arange(len(ends))
-    joined[rows[opened], powered[opened] - 1] = 0.0
-    below = missed & (powered > 1)
-    joined[rows[below], powered[below] - 2] = 0.0
     still = motion.starting_at(0.0)
-    truths = [
-        TubeTruth(scenario.hole, still, k * scenario.tube_length, 0.0, 0.0, file.accelerometer.gravity_mps2)
-        for k in range(count)
-    ]
-    rates, forces = zip(*(truth.cycle_means(ends, PERIOD) for truth in truths), strict=True)
-    radius = file.accelerometer.radius_m
-    around = TubeTruth(scenario.hole, still, 0.0, 0.0, radius, file.accelerometer.gravity_mps2)
-    circle = around.cycle_means(ends, PERIOD)[1] - forces[0]
+    rate, force, circle = felt_by(scenario, still, ends) if file.rough is None else nothing_felt(count)
     shaken = (motion.drive(ends)[1] > 0.0) | (motion.drive(ends - PERIOD)[1] > 0.0)
     phases = [phase for phase in world.phases if phase.kind in ("drill", "stop")]
     return Course(
         begin=world.begin,
         ends=ends,
         powered=powered,
-        joined=joined,
-        heard=~opened,
+        joined=joined_of(world, powered, np.zeros(count)),
+        heard=~are_open(world, ends, 0.0),
         shaken=shaken.astype(float),
         head=still.drive(ends)[0],
         tops=motion.tops(ends).astype(np.int64),
-        rate=np.stack(rates, axis=1),
-        force=np.stack(forces, axis=1),
-        circle=np.ascontiguousarray(circle[:, :2]),
+        rate=rate,
+        force=force,
+        circle=circle,
         epochs=np.array([math.floor((p.end - BEFORE_END - world.begin) / PERIOD) for p in phases], np.int64),
         turning=np.array([p.kind == "drill" for p in phases]),
         locked=file.encoder.phase == "locked",
     )
 
 
-def refuse_others(scenario: Scenario) -> None:
-    """Refuse what a campaign cannot express.
+def felt_by(scenario: Scenario, still: Motion, ends: Array) -> tuple[Array, Array, Array]:
+    """Rates, forces and circle of a ``Course``, of the ``still`` head's motion."""
+    a = scenario.file.accelerometer
+    truths = [
+        TubeTruth(scenario.hole, still, k * scenario.tube_length, 0.0, 0.0, a.gravity_mps2)
+        for k in range(scenario.tubes)
+    ]
+    rates, forces = zip(*(truth.cycle_means(ends, PERIOD) for truth in truths), strict=True)
+    around = TubeTruth(scenario.hole, still, 0.0, 0.0, a.radius_m, a.gravity_mps2)
+    circle = around.cycle_means(ends, PERIOD)[1] - forces[0]
+    return np.stack(rates, axis=1), np.stack(forces, axis=1), np.ascontiguousarray(circle[:, :2])
 
-    Raises
-    ------
-    ScenarioError
-        Names the key and the command that can.
-    """
-    file = scenario.file
-    beyond = {
-        "torsion": file.torsion is not None,
-        "calibration": file.calibration is not None,
-        "drift": file.drift is not None,
-        "rough": file.rough is not None,
-        "faults": bool(scenario.faults),
-        "joints.unseen_std_deg": file.joints.unseen_std_deg > 0.0,
-        "joints.head_turn_deg": file.joints.head_turn_deg > 0.0,
-        "joints.mount_tilt_std_deg": file.joints.mount_tilt_std_deg > 0.0,
-        "gyroscope.instantaneous": file.gyroscope.instantaneous,
-        "gyroscope.increments": file.gyroscope.increments,
-        "gyroscope.bias_step_dps": file.gyroscope.bias_step_dps != 0.0,
-        "encoder.edge_times = false": not file.encoder.edge_times,
-        'encoder.phase = "random"': file.encoder.phase != "locked",
-        "node.imus": file.node.imus > 1,
-        "node.scheme": file.node.scheme != "forward",
-        "node.kernel": file.node.kernel != "float64",
-        "node.joints": file.node.joints != "marks",
-    }
-    for key, found in beyond.items():
-        if found:
-            raise ScenarioError(
-                f"{key}: a campaign cannot express it; borechain rig runs such a scenario, seed by seed"
-            )
+
+def nothing_felt(tubes: int) -> tuple[Array, Array, Array]:
+    """Of a rough world, whose nodes feel what ``sim.campaign.field`` has."""
+    return np.zeros((0, tubes, 3)), np.zeros((0, tubes, 3)), np.zeros((0, 2))
+
+
+def are_open(world: World, t: Array, since: float) -> npt.NDArray[np.bool_]:
+    """Whether the joint below the head is open at ``t`` (s), of any shape, and was for ``since`` s."""
+    found = np.zeros(t.shape, bool)
+    for phase in world.phases:
+        if phase.kind == "add":
+            found |= (phase.start + since < t) & (t < phase.joint_closed)
+    return found
+
+
+def joined_of(world: World, powered: npt.NDArray[np.int64], later: Array) -> Array:
+    """``Course.joined`` of tubes whose cycles end ``later`` (tubes,) s than the encoder's."""
+    at, place, top = world.ends[:, None] + later, np.arange(len(later)), powered[:, None] - 1
+    opened, missed = are_open(world, at, 0.0), are_open(world, at, SILENT_AFTER)
+    return np.where(opened & ((place == top) | ((place == top - 1) & missed)), 0.0, 1.0)

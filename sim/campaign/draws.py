@@ -17,7 +17,6 @@ from node.kernels.layout import PERIOD, Array, default_config
 from node.kernels.record import new_node
 from sim.campaign.sensors import NOISE, TUBE
 from sim.rig.direct_string import NEVER, aiding_passes
-from sim.rig.encoder_course import measured_of
 from sim.world.imu_errors import ImuErrors
 from sim.world.scenario_file import ScenarioFile
 from sim.world.streams import Stream, stream
@@ -28,6 +27,7 @@ class Draws(NamedTuple):
     """The constants of one run, tube 1 first."""
 
     frame: Array  # (tubes,) rad, of the IMU's frame with the head at 0
+    phase: Array  # (tubes,) s, by which its cycles end after the encoder's
     clock_var: Array  # (tubes,) s^2, stated, by hops
     systematic: Array  # (tubes, tubes + 1) rad, error of the marks by tube and the top tube
     measured: Array  # (cycles, AIDING) what the encoder said
@@ -62,6 +62,7 @@ def tubes_of(world: World, frame: Array) -> Array:
     tubes = np.zeros(len(frame), TUBE)
     errors = ImuErrors(file.gyroscope, file.accelerometer)
     for number, tube in enumerate(tubes, 1):
+        tube["phase"] = world.phase(number)
         tube["cos"], tube["sin"] = math.cos(frame[number - 1]), math.sin(frame[number - 1])
         tube["rate_bias"], tube["spread"] = errors.constants(stream(seed, Stream.GYRO, number))
         tube["force_bias"] = errors.force_bias(stream(seed, Stream.ACCELEROMETER, number))
@@ -70,17 +71,18 @@ def tubes_of(world: World, frame: Array) -> Array:
     return tubes
 
 
-def draws_of(world: World) -> Draws:
-    """The constants of the run of a world's seed."""
+def draws_of(world: World, measured: Array) -> Draws:
+    """The constants of the run of a world's seed, whose encoder ``measured`` (cycles, AIDING)."""
     file, count, seed = world.scenario.file, world.scenario.tubes, world.seed
     tubes = range(1, count + 1)
     clocks = file.clocks
     stated = clocks.joint_std_ms if clocks.stated_std_ms is None else clocks.stated_std_ms
     return Draws(
         frame=world.first_angle + np.array([world.marks.frame_angle(tube) for tube in tubes]),
+        phase=np.array([world.phase(tube) for tube in tubes]),
         clock_var=(1e-3 * stated) ** 2 * np.arange(1.0, count + 1.0),
         systematic=np.array([[world.marks.error(tube, max(top, tube)) for top in range(count + 1)] for tube in tubes]),
-        measured=measured_of(world),
+        measured=measured,
         heard=aiding_passes(file.aiding, world.ends - world.begin, seed),
     )
 

@@ -27,6 +27,7 @@ from node.kernels.record import (
     SYNCHRONISED,
 )
 from node.kernels.step import ONWARD, SAY_EVENTS, SAY_REVISION, SAY_SURVEY
+from sim.campaign.frames import draw_parts, read_frames
 from sim.campaign.sensors import draw, read_sensors
 
 YAW = int(Err.YAW)
@@ -64,6 +65,7 @@ def drill(
     noise: Array,
     tubes: Array,
     draws: Any,
+    field: Any,
     key: Array,
     work: Any,
     surveys: Array,
@@ -78,6 +80,7 @@ def drill(
     nodes, crews : (tubes,) of dtype ``NODE``, as new, and ``SETTINGS``
     corrections : (tubes, 2) of dtype ``PARAMETERS``
     course, draws : ``sim.campaign.course.Course`` and ``sim.campaign.draws.Draws``
+    field : ``sim.campaign.field.Field``; None in a plain world, for which the loop is compiled without it
     noise, tubes : (1,) and (tubes,) of dtype ``sim.campaign.sensors.NOISE`` and ``TUBE``
     key : (2,) of the run, see ``sim.campaign.philox``
     work : ``sim.campaign.sensors.Work``
@@ -86,19 +89,17 @@ def drill(
     counts : (tubes, CODES) of events by code
     """
     made, epoch = 0, 0
-    rate, force, circle, shaken, powered = course.rate, course.force, course.circle, course.shaken, course.powered
-    reading, moment, clock_var = work.reading, work.moment, draws.clock_var
+    powered, moment, clock_var = course.powered, work.moment, draws.clock_var
     for cycle in range(course.ends.shape[0]):
         top = powered[cycle]
         heard = course.heard[cycle] and draws.heard[cycle]
+        read_string(course, noise, tubes, field, key, work, cycle)
+        if heard and not course.locked:
+            hand_down(aid, nodes, crews, noise[0], tubes, draws.measured[cycle], work.aiding, top)
         for k in range(top):
-            tube, is_first = tubes[k], cycle == 0 or powered[cycle - 1] <= k
-            draw(work.counter, key, work.words, work.drawn, cycle, k)
-            above = tubes[k - 1].hop_error if k > 0 else 0.0
-            read_sensors(noise[0], tube, is_first, above, rate, force, circle, shaken, work.drawn, reading, cycle, k)
-            set_moment(course, clock_var, moment, cycle, k)
+            set_moment(course, clock_var, tubes[k].phase, moment, cycle, k)
             one = slice(k, k + 1)
-            says = step(nodes[one], crews[one], corrections[k], reading, moment)
+            says = step(nodes[one], crews[one], corrections[k], work.readings[k], moment)
             if says & SAY_SURVEY:
                 if made < surveys.shape[0]:
                     keep_survey(surveys[made], nodes[k], crews[k], cycle, k, top)
@@ -107,7 +108,7 @@ def drill(
                 revise_survey(surveys[:made], nodes[k], k)
             if says & SAY_EVENTS:
                 count_events(nodes[k], counts[k])
-        if heard:
+        if heard and course.locked:
             hand_down(aid, nodes, crews, noise[0], tubes, draws.measured[cycle], work.aiding, top)
         if epoch < course.epochs.shape[0] and course.epochs[epoch] == cycle:
             for k in range(top):
@@ -117,11 +118,28 @@ def drill(
 
 
 @shared_body
-def set_moment(course: Any, clock_var: Array, moment: Array, cycle: int, k: int) -> None:
-    """Times of a tube's cycle, and what its link would tell it."""
+def read_string(course: Any, noise: Array, tubes: Array, field: Any, key: Array, work: Any, cycle: int) -> None:
+    """Read the sensors of all tubes of the string in a cycle, and take their hops on."""
+    rate, force, circle, shaken, powered = course.rate, course.force, course.circle, course.shaken, course.powered
+    drawn = work.drawn
+    for k in range(powered[cycle]):
+        tube, is_first, reading = tubes[k], cycle == 0 or powered[cycle - 1] <= k, work.readings[k]
+        draw(work.counter, key, work.words, drawn, cycle, k)
+        above = tubes[k - 1].hop_error if k > 0 else 0.0
+        if field is not None:
+            draw_parts(work.counter, key, work.words, field.desk.drawn, cycle, k)
+            end = course.ends[cycle] + tube.phase
+            read_frames(noise[0], tube, is_first, above, field, drawn, reading, end, cycle, k)
+        else:
+            read_sensors(noise[0], tube, is_first, above, rate, force, circle, shaken, drawn, reading, cycle, k)
+
+
+@shared_body
+def set_moment(course: Any, clock_var: Array, phase: float, moment: Array, cycle: int, k: int) -> None:
+    """Times of a tube's cycle, which is ``phase`` s later than the encoder's, and what its link would tell it."""
     below = course.powered[cycle] - 1 - k  # hops from the head, less one
-    moment[START] = course.begin + cycle * PERIOD
-    moment[END] = course.ends[cycle]
+    moment[START] = course.begin + cycle * PERIOD + phase
+    moment[END] = course.ends[cycle] + phase
     moment[JOINED] = course.joined[cycle, k]
     moment[HOPS] = below + 1
     moment[CLOCK_VAR] = clock_var[below]

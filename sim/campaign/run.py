@@ -7,7 +7,7 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
-from sim.campaign.chunk import Campaign, scenario_digest
+from sim.campaign.chunk import campaign_of, scenario_digest
 from sim.campaign.engine import compute
 from sim.campaign.store import Folder
 from sim.campaign.summary import accuracy, honesty
@@ -41,14 +41,14 @@ def run_campaign(
     RigError
         When the folder is another campaign's or cannot be written, or the cluster is lost.
     """
-    last = first + runs - 1
-    node_cycles = Campaign(scenario).node_cycles
+    last, pickled = first + runs - 1, pickle.dumps(scenario)
+    node_cycles = campaign_of(pickled).node_cycles
     folder = Folder(path, name, scenario_digest(scenario))
     missing = folder.missing(first, last)
     computed = sum(end - begin + 1 for begin, end in missing)
     for _ in range(runs - computed):
         step()
-    for (begin, end), chunk in compute(pickle.dumps(scenario), missing, engine, scheduler):
+    for (begin, end), chunk in compute(pickled, missing, engine, scheduler):
         folder.keep(begin, end, chunk)
         for _ in range(end - begin + 1):
             step()

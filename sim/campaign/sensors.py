@@ -48,6 +48,7 @@ TUBE: Final = np.dtype(
         ("spread", "f8", (3, 3)),  # reading of the gyroscope by the true rates
         ("rate_bias", "f8", (3,)),  # rad/s
         ("force_bias", "f8", (3,)),  # m/s^2
+        ("phase", "f8"),  # s, by which its cycles end after the encoder's
         ("hop_clock", "f8"),  # s, error of rig time across the joint as many hops below the head as the tube's index
         ("wander", "f8", (3,)),  # rad/s, of this cycle
         ("hop_wander", "f8"),  # s, of this cycle
@@ -64,14 +65,14 @@ class Work(NamedTuple):
     counter: Array  # (4,) uint64, see ``sim.campaign.philox``
     words: Array  # (4,) uint64
     drawn: Array  # (DRAWN,)
-    reading: Array  # (1, READING)
+    readings: Array  # (tubes, 1, READING)
     moment: Array  # (MOMENT,)
     aiding: Array  # (AIDING,)
 
 
-def new_work() -> Work:
-    """Work space."""
-    vectors = np.zeros(DRAWN), np.zeros((1, READING)), np.zeros(MOMENT), np.zeros(AIDING)
+def new_work(tubes: int) -> Work:
+    """Work space of a string."""
+    vectors = np.zeros(DRAWN), np.zeros((tubes, 1, READING)), np.zeros(MOMENT), np.zeros(AIDING)
     return Work(np.zeros(4, np.uint64), np.zeros(4, np.uint64), *vectors)
 
 
@@ -117,9 +118,8 @@ def read_sensors(
         true_forces[2],
     )
     shaking = math.sqrt(noise.force**2 + (noise.shaking * shaken[cycle]) ** 2)
-    left, fresh = (0.0, 1.0) if is_first else (noise.wander_phi, noise.wander_fresh)
+    wander_on(noise, tube, is_first, drawn)
     for i in range(3):
-        tube.wander[i] = left * tube.wander[i] + fresh * noise.wander[i] * drawn[3 + i]
         read = tube.rate_bias[i] + tube.wander[i] + noise.rate[i] * drawn[i] + noise.pull * force[i]
         for j in range(3):
             read += tube.spread[i, j] * rate[j]
@@ -128,6 +128,20 @@ def read_sensors(
         row[i] = min(max(read, -noise.limit), noise.limit)
         row[3 + i] = force[i] + tube.force_bias[i] + shaking * drawn[6 + i]
     row[TEMPERATURE], row[SATURATED] = USUAL, 0.0
+    cross_hop(noise, tube, is_first, above, drawn)
+
+
+@kernel
+def wander_on(noise: Any, tube: Any, is_first: bool, drawn: Array) -> None:
+    """Take what wanders of a tube's gyroscope on by a cycle."""
+    left, fresh = (0.0, 1.0) if is_first else (noise.wander_phi, noise.wander_fresh)
+    for i in range(3):
+        tube.wander[i] = left * tube.wander[i] + fresh * noise.wander[i] * drawn[3 + i]
+
+
+@kernel
+def cross_hop(noise: Any, tube: Any, is_first: bool, above: float, drawn: Array) -> None:
+    """Take a tube's hop on by a cycle: its clock, and whether it loses an aiding."""
     left, fresh = (0.0, 1.0) if is_first else (noise.clock_phi, noise.clock_fresh)
     tube.hop_wander = left * tube.hop_wander + fresh * noise.clock * drawn[CLOCK]
     tube.hop_error = tube.hop_clock + tube.hop_wander + above

@@ -21,6 +21,7 @@ import pyarrow as pa
 import pyarrow.parquet as pq
 
 from node.kernels.jit import source_digest
+from node.process.drivers import frame_clock
 from sim.campaign.chunk import EPOCH_COLUMNS, RUNS, SURVEY_COLUMNS, Chunk, Columns
 from sim.errors import RigError
 
@@ -164,9 +165,10 @@ def write_whole(file: Path, content: bytes) -> None:
 
 
 def code_digest() -> str:
-    """Digest of everything that decides what a run gives: the kernels, and the world that draws for them."""
+    """Digest of everything that decides what a run gives: kernels, the world that draws for them, and the driver."""
     digest = hashlib.sha256(source_digest().encode())
     here = Path(__file__).parents[1]
-    for source in sorted([*(here / "world").rglob("*.py"), *(here / "campaign").glob("*.py")]):
+    driver = Path(frame_clock.__file__)
+    for source in sorted([*(here / "world").rglob("*.py"), *(here / "campaign").glob("*.py"), driver]):
         digest.update(source.name.encode() + source.read_bytes())
     return digest.hexdigest()[:16]

@@ -26,6 +26,7 @@ from sim.campaign.store import MANIFEST, Folder
 from sim.campaign.summary import OverRuns, Sum, honesty
 from sim.errors import RigError, ScenarioError
 from sim.rig.direct_string import DirectString
+from sim.rig.encoder_course import measured_of
 from sim.world.scenario import Scenario, load_scenario, scenario_of
 from sim.world.world import World
 
@@ -50,14 +51,14 @@ def scenario(**changed: dict[str, Any]) -> Scenario:
 def test_without_noise_every_sensor_reads_what_it_reads_in_the_world_of_a_rig() -> None:
     quiet = scenario(gyroscope=QUIET_GYRO | {"misalignment_std_deg": 0.3}, accelerometer=QUIET_FORCE)
     world, made = World(quiet, 5), Campaign(quiet)
-    noise, work, course = noise_of(quiet.file)[0], new_work(), made.course
-    tubes = tubes_of(world, draws_of(world).frame)
+    noise, work, course = noise_of(quiet.file)[0], new_work(1), made.course
+    tubes = tubes_of(world, draws_of(world, measured_of(world)).frame)
     felt = course.rate, course.force, course.circle, course.shaken
     for tube in (1, 2, 3):
         samples = world.sensors.samples(tube)
         for cycle in np.flatnonzero(made.course.powered >= tube)[::7].tolist():
-            read_sensors(noise, tubes[tube - 1], False, 0.0, *felt, work.drawn, work.reading, int(cycle), tube - 1)
-            assert np.allclose(work.reading[0, :6], samples[cycle], rtol=0.0, atol=2e-9), (tube, cycle)
+            read_sensors(noise, tubes[tube - 1], False, 0.0, *felt, work.drawn, work.readings[0], int(cycle), tube - 1)
+            assert np.allclose(work.readings[0, 0, :6], samples[cycle], rtol=0.0, atol=2e-9), (tube, cycle)
 
 
 def test_what_a_rig_gives_its_nodes_gives_the_same_nodes_here_bit_for_bit() -> None:

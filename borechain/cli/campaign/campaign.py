@@ -44,11 +44,13 @@ def campaign(
 
     Every run is a seed: its string, sensors, noise and losses. The link is off; what stands for it are its effects,
     as [medium], [clocks] and [aiding] of the scenario have them. Results are Parquet tables, a pair for 64 runs, which
-    pandas, polars and duckdb read; a campaign that was cut off goes on where it was, and --runs may grow.
+    pandas, polars and duckdb read; a campaign that was cut off goes on where it was, and --runs may grow. A key that
+    a campaign cannot express, of [rough] too, is refused by its name.
 
     \b
     Examples:
       borechain campaign wellbore-1 --runs 1000
+      borechain campaign rough --runs 1000
       borechain campaign wellbore-1 --runs 100000 --engine dask --scheduler tcp://head:8786
     """
     if scheduler is not None and engine != "dask":
