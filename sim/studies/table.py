@@ -165,15 +165,16 @@ STUDIES = by_name(
         ),
         Study(
             "honesty",
-            "NEES and coverage to hop 50 over thousands of strings, by a campaign, with their intervals.",
+            "NEES and coverage to hop 50 over thousands of strings in either world, by a campaign, with intervals.",
             f"{MODULES}.honesty",
-            (Table("{hops} nodes, {runs} strings", columns.HONESTY, columns.HONESTY),),
+            (Table("{hops} nodes, {world} world, {runs} strings", columns.HONESTY, columns.HONESTY),),
             (
                 Option("runs", 1000, 2, 1_000_000, help="Strings, each a seed."),
                 Option("hops", 50, 1, 50, help="Nodes of a string."),
+                Option("world", "assumed", choices=("assumed", "rough"), help="That of the filter, or a rough one."),
             ),
             counts="strings",
-            full=("--runs 10000",),
+            full=("--runs 10000", "--runs 10000 --world rough"),
             short="--runs 2 --hops 2",
         ),
         Study(

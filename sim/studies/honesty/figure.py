@@ -11,5 +11,6 @@ from sim.campaign.figure import honesty_figure
 
 def figures(result: dict[str, Any]) -> dict[str, Figure]:
     """One figure."""
-    title = f"Honesty of {result['hops']} nodes, {result['runs']} strings"
+    where = "" if result["world"] == "assumed" else f" in a {result['world']} world"
+    title = f"Honesty of {result['hops']} nodes{where}, {result['runs']} strings"
     return {result["experiment"]: honesty_figure(result["traces"], title)}
