@@ -159,8 +159,10 @@ class RoughImu:
         rate = rate + 0.5 * sensor.scale_asymmetry * np.abs(rate)
         limits = math.radians(self._errors.gyroscope.range_dps), G * sensor.force_range_g
         for values, limit, bit in ((rate, limits[0], GYRO_CLIPPED), (force, limits[1], FORCE_CLIPPED)):
-            cut |= bit * np.any(np.abs(values) >= AT_RANGE * limit, axis=1)
-        return np.clip(rate, -limits[0], limits[0]), np.clip(force, -limits[1], limits[1]), cut
+            if max(values.max(), -values.min()) >= AT_RANGE * limit:
+                cut |= bit * np.any(np.abs(values) >= AT_RANGE * limit, axis=1)
+                np.clip(values, -limit, limit, out=values)
+        return rate, force, cut
 
     def _frame_times(self, sensor: RoughSensorSection) -> Array:
         step = 1.0 / (sensor.frames_hz * (1.0 + sensor.crystal))

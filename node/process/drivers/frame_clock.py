@@ -18,9 +18,10 @@ from collections import deque
 from typing import Final
 
 import numpy as np
-import numpy.typing as npt
 
-Array = npt.NDArray[np.float64]
+from node.kernels.jit import kernel
+from node.kernels.layout import Array
+
 READS: Final = (256, 64, 16)  # that are looked at: two minutes of cycles, or fewer where they contradict each other
 ENOUGH: Final = 16  # of them, from where the crystal is known
 KNOWN: Final = 1e-3  # of a period that is known, by which it may wander until it is looked at again
@@ -81,12 +82,17 @@ class FrameClock:
         self.newest = min(0.5 * (earliest + latest) + period * n[-1], t[-1])
 
 
+@kernel
 def bounds(t: Array, n: Array, period: float) -> tuple[float, float]:
     """What the phase a is between (s), by reads at ``t`` (k,) s that brought the counts ``n`` (k,)."""
-    phase = t - period * n
-    return float(phase.max() - period), float(phase.min())
+    earliest = latest = t[0] - period * n[0]
+    for k in range(1, t.shape[0]):
+        phase = t[k] - period * n[k]
+        earliest, latest = max(earliest, phase), min(latest, phase)
+    return earliest - period, latest
 
 
+@kernel
 def farthest_period(t: Array, n: Array, lowest: float, highest: float) -> float:
     """The period (s) between two that leaves the phase the widest bounds, whose width is a concave function of it."""
     for _ in range(NARROWER):
