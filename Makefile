@@ -74,7 +74,7 @@ fast: $(STAMP)  ## the fast tests; part of `make quick`
 tests: $(STAMP)  ## every test but the statistical ones at full size
 	$(PYTEST) -m "not statistical"
 
-statistical: $(STAMP)  ## the statistical tests at full size, properties with more examples; part of `make study`
+statistical: kernels  ## the statistical tests at full size, properties with more examples; part of `make study`
 	$(PYTEST) -m statistical
 	HYPOTHESIS_PROFILE=study $(PYTEST) -m "hypothesis and not statistical"
 
@@ -87,7 +87,6 @@ explore: $(STAMP)  ## the properties with examples that no run before has seen
 study: $(STAMP) statistical  ## every study of the table, with many seeds; their tables are committed in docs/results
 	$(BIN)/borechain experiment all --out docs/results
 	$(BIN)/borechain bench realtime --nodes 50 --seconds 120 --out docs/results
-	$(BIN)/borechain gauntlet --seeds 20000
 	$(BIN)/python docs/make_faults.py
 
 soak: $(STAMP)  ## 100 000 seeds of the gauntlet, SOAK hours of a rig under faults, an hour of processes

@@ -7,12 +7,14 @@ the end of each turning and of each rest, so that samples of one seed are nearly
 from __future__ import annotations
 
 import math
+import pickle
 from dataclasses import dataclass
 
 import numpy as np
 import numpy.typing as npt
 
 from node.kernels.layout import PERIOD, Scheme
+from sim.campaign.chunk import campaign_of
 from sim.rig.direct_string import DirectString
 from sim.studies.lab import ACCELERATION_DPS2, RATE_DPS, TURNS
 from sim.studies.scenarios import CALIBRATED, Tables, complete
@@ -61,6 +63,17 @@ def run_seed(job: tuple[Tables, int]) -> EpochRun:
     tables, seed = job
     world = World(scenario_of(dict(tables)), seed)
     return judge(DirectString(world))
+
+
+def run_campaign_seed(job: tuple[Tables, int]) -> EpochRun:
+    """One seed of one complete string by a campaign, for a pool of processes."""
+    tables, seed = job
+    epochs = campaign_of(pickle.dumps(scenario_of(dict(tables)))).run(seed)[1]
+    tubes = int(epochs["hop"].max())
+    total_error, var = epochs["yaw_error"], epochs["yaw_var"]
+    rows = (total_error - epochs["systematic_error"], var, total_error, var + epochs["systematic_var"])
+    error, var, total_error, total_var = (values.reshape(-1, tubes)[:, ::-1] for values in rows)
+    return EpochRun(error, var, total_error, total_var, epochs["turning"].reshape(-1, tubes)[:, 0])
 
 
 def judge(string: DirectString) -> EpochRun:

@@ -223,7 +223,7 @@ STUDIES = by_name(
             (
                 Table("Two worlds, {seeds} seeds, {string_seeds} of {hops} nodes", columns.WORLDS, columns.WORLDS),
                 Table(
-                    "NEES to hop {hops}, {string_seeds} seeds",
+                    "NEES to hop {hops}, {strings} strings",
                     columns.WORLDS_CONSISTENCY,
                     columns.WORLDS_CONSISTENCY,
                     rows="consistency",
@@ -233,12 +233,13 @@ STUDIES = by_name(
             (
                 Option("part", "all", choices=("all", *MODES, "consistency"), help="One table of both, or all."),
                 Option("string-seeds", 6, 2, 10_000, help="Seeds of the long string."),
+                Option("strings", 100, 2, 10_000, help="Seeds of its NEES, by a campaign."),
                 Option("hops", 50, 2, 50, help="Nodes of the long string."),
                 Option("seeds", 20, 2, 10_000),
             ),
             drawn=False,
-            full=("--seeds 40 --string-seeds 8",),
-            short="--hops 2 --seeds 2 --string-seeds 2",
+            full=("--seeds 40 --string-seeds 8 --strings 500",),
+            short="--hops 2 --seeds 2 --string-seeds 2 --strings 2",
         ),
         Study(
             "force-bias",

@@ -171,11 +171,12 @@ def test_seeds_of_a_string_that_is_drilled_in_hold(seed: int) -> None:
 
 @pytest.mark.statistical
 @pytest.mark.timeout(3000)
-@pytest.mark.parametrize("plan", ["minute", "drilled-in"])
-def test_two_thousand_seeds_hold(plan: str) -> None:
-    count = {"minute": 2000, "drilled-in": 200}[plan]
+@pytest.mark.parametrize("block", range(8))
+@pytest.mark.parametrize(("plan", "count"), [("minute", 250), ("drilled-in", 25)])
+def test_two_thousand_seeds_hold(plan: str, count: int, block: int) -> None:
+    first = 10_000 + count * block
     failed = [
-        outcome for seed in range(10_000, 10_000 + count) if (outcome := judged((seed, ALL, None, plan))).violations
+        outcome for seed in range(first, first + count) if (outcome := judged((seed, ALL, None, plan))).violations
     ]
     assert [(outcome.seed, outcome.kinds, outcome.violations) for outcome in failed] == []
 

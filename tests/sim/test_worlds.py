@@ -1,11 +1,12 @@
 """The study of both worlds: what its rough one is made of, and that its assumed one is the other studies'."""
 
+import numpy as np
 import pytest
 
 from node.kernels.layout import Scheme
 from sim.studies.bridging.run import mean_of
 from sim.studies.consistency.run import setup_of, table
-from sim.studies.epochs import run_seed
+from sim.studies.epochs import run_campaign_seed, run_seed
 from sim.studies.lab import LAB
 from sim.studies.limits.bound import Model
 from sim.studies.worlds.run import jobs_of, rough, run, steps, twisted
@@ -25,21 +26,32 @@ def test_the_rough_world_is_the_one_that_is_shipped_but_for_its_untold_twist() -
 
 @pytest.mark.parametrize("part", ["all", "update-modes", "single-updates", "two-nodes", "fifty-nodes", "consistency"])
 def test_every_part_runs_as_often_as_it_says(part: str) -> None:
-    jobs = jobs_of(part, 5, 3, 7)
-    assert steps(part, 5, 3, 7) == sum(2 * job.seeds for job in jobs)
-    assert {job.seeds for job in jobs} <= {3, 5}
+    jobs = jobs_of(part, 5, 3, 9, 7)
+    assert steps(part, 5, 3, 9, 7) == sum(2 * job.seeds for job in jobs)
+    assert {job.seeds for job in jobs} <= {3, 5, 9}
     assert all(case.hop < job.worlds["rough"]["rig"]["tubes"] <= 7 for job in jobs for case in job.cases)
 
 
 @pytest.mark.slow
 def test_its_assumed_world_is_that_of_the_consistency_study() -> None:
     done: list[None] = []
-    found = run("consistency", SEEDS, SEEDS, 2, lambda: done.append(None))
-    assert len(done) == steps("consistency", SEEDS, SEEDS, 2)
-    runs = [run_seed((setup_of(Scheme.FORWARD, 2), seed)) for seed in range(1, SEEDS + 1)]
+    found = run("consistency", SEEDS, SEEDS, SEEDS, 2, lambda: done.append(None))
+    assert len(done) == steps("consistency", SEEDS, SEEDS, SEEDS, 2)
+    runs = [run_campaign_seed((setup_of(Scheme.FORWARD, 2), seed)) for seed in range(1, SEEDS + 1)]
     expected = [row["nees_total"] for row in table(Scheme.FORWARD, runs)]
     assert [row["assumed_nees"] for row in found["consistency"]] == pytest.approx(expected)
     assert all(row["rough_nees"] > 0.0 and row["rough_deg"] != row["assumed_deg"] for row in found["consistency"])
+
+
+@pytest.mark.slow
+def test_a_string_by_a_campaign_has_the_joints_and_the_epochs_of_the_string_of_its_seed() -> None:
+    job = (setup_of(Scheme.FORWARD, 3), 4)
+    one, other = run_seed(job), run_campaign_seed(job)
+    assert other.turning.tolist() == one.turning.tolist()
+    assert other.error.shape == one.error.shape
+    assert np.allclose(other.total_error - other.error, one.total_error - one.error, rtol=0.0, atol=1e-12)
+    assert np.allclose(other.total_var - other.var, one.total_var - one.var, rtol=1e-6)
+    assert np.allclose(other.var, one.var, rtol=0.5)
 
 
 def test_the_mean_of_gyroscopes_shares_the_errors_of_the_aiding() -> None:

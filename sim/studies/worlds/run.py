@@ -65,7 +65,7 @@ class Job:
     cases: tuple[Case, ...] = ()
 
 
-def jobs_of(part: str, seeds: int, string_seeds: int, hops: int) -> list[Job]:
+def jobs_of(part: str, seeds: int, string_seeds: int, strings: int, hops: int) -> list[Job]:
     """What one part, or all, runs."""
     jobs = []
     for name in (name for name in CASES if part in (ALL, name)):
@@ -78,7 +78,7 @@ def jobs_of(part: str, seeds: int, string_seeds: int, hops: int) -> list[Job]:
             else:
                 jobs.append(Job(in_both(setup), seeds, tuple(cases)))
     if part in (ALL, CONSISTENCY):
-        jobs.append(Job(in_both(setup_of(Scheme.FORWARD, hops)), string_seeds))
+        jobs.append(Job(in_both(setup_of(Scheme.FORWARD, hops)), strings))
     return jobs
 
 
@@ -92,12 +92,12 @@ def shortened(case: Case, hops: int) -> Case:
     return replace(case, name=f"node {hops} of {hops}", hop=hops - 1)
 
 
-def steps(part: str, seeds: int, string_seeds: int, hops: int) -> int:
+def steps(part: str, seeds: int, string_seeds: int, strings: int, hops: int) -> int:
     """Runs of both worlds."""
-    return sum(len(job.worlds) * job.seeds for job in jobs_of(part, seeds, string_seeds, hops))
+    return sum(len(job.worlds) * job.seeds for job in jobs_of(part, seeds, string_seeds, strings, hops))
 
 
-def run(part: str, seeds: int, string_seeds: int, hops: int, step: Step) -> dict[str, Any]:
+def run(part: str, seeds: int, string_seeds: int, strings: int, hops: int, step: Step) -> dict[str, Any]:
     """Both tables; ``step`` is called after each run.
 
     Parameters
@@ -105,6 +105,7 @@ def run(part: str, seeds: int, string_seeds: int, hops: int, step: Step) -> dict
     part : the name of a table of modes, ``consistency``, or ``all``
     seeds : of strings of one and two nodes
     string_seeds : of the long string
+    strings : of the long string whose NEES is told epoch by epoch, by a campaign
     hops : that it has
 
     Returns
@@ -113,16 +114,16 @@ def run(part: str, seeds: int, string_seeds: int, hops: int, step: Step) -> dict
         ``cases``: a row for each figure asked; ``consistency``: one for each epoch and hop.
     """
     result: dict[str, Any] = {"experiment": "worlds", "seeds": seeds, "string_seeds": string_seeds, "hops": hops}
-    result["cases"], result[CONSISTENCY] = [], []
-    with over_cores(max(seeds, string_seeds), step) as run_all:
-        for job in jobs_of(part, seeds, string_seeds, hops):
+    result["strings"], result["cases"], result[CONSISTENCY] = strings, [], []
+    with over_cores(max(seeds, string_seeds, strings), step) as run_all:
+        for job in jobs_of(part, seeds, string_seeds, strings, hops):
             seeded_of = {world: seeded(setup, job.seeds) for world, setup in job.worlds.items()}
             if job.cases:
                 runs = {world: run_all(lab.run_seed, of) for world, of in seeded_of.items()}
                 result["cases"] += [row for case in job.cases for row in rows_of(case, runs)]
             else:
                 result[CONSISTENCY] += consistency(
-                    {world: run_all(epochs.run_seed, of) for world, of in seeded_of.items()}
+                    {world: run_all(epochs.run_campaign_seed, of) for world, of in seeded_of.items()}
                 )
     return result
 
