@@ -75,7 +75,7 @@ tests: $(STAMP)  ## every test but the statistical ones at full size
 	$(PYTEST) -m "not statistical"
 
 statistical: kernels  ## the statistical tests at full size, properties with more examples; part of `make study`
-	$(PYTEST) -m statistical
+	$(PYTEST) --timeout 1200 -m statistical  # a watchdog: six workers that compile the integers at once take minutes each
 	HYPOTHESIS_PROFILE=study $(PYTEST) -m "hypothesis and not statistical"
 
 truth: $(STAMP)  ## the table of the field by a second world, beside the study's

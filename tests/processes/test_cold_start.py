@@ -12,7 +12,7 @@ from rigs import PATIENCE, REPOSITORY, command, free_endpoint
 from telemetry import keys
 from telemetry.media.zenoh_bus import open_router
 
-COMPILING = 240.0  # s, that a node's kernels may take on a busy machine
+COMPILING = 600.0  # s, that a node's kernels may take on a busy machine
 
 
 @pytest.mark.parametrize(
