@@ -18,12 +18,12 @@ import numpy.typing as npt
 from node.firmware.block_trial import record_of
 from node.kernels.address import firmware
 from node.kernels.layout import Array
-from sim.campaign.course import ANY_SEED, Course, course_of, joined_of
+from sim.campaign.course import ANY_SEED, Course, course_of
 from sim.campaign.draws import Draws, draws_of, fresh_nodes, noise_of, tubes_of
 from sim.campaign.drill import CODES, STATE_OF, SURVEY, drill
 from sim.campaign.field_draws import FieldRun, RoughWorld
 from sim.campaign.sensors import new_work
-from sim.rig.direct_string import wrapped
+from sim.rig.direct_string import joined_of, wrapped
 from sim.rig.encoder_course import measured_of
 from sim.world.scenario import Scenario
 from sim.world.world import World

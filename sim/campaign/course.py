@@ -14,7 +14,7 @@ import numpy.typing as npt
 
 from node.kernels.layout import PERIOD
 from sim.campaign.refusals import refuse_others
-from sim.rig.direct_string import SILENT_AFTER
+from sim.rig.direct_string import are_open, joined_of
 from sim.world.motion import Motion
 from sim.world.scenario import Scenario
 from sim.world.truth import TubeTruth
@@ -67,7 +67,7 @@ def course_of(scenario: Scenario) -> Course:
         ends=ends,
         powered=powered,
         joined=joined_of(world, powered, np.zeros(count)),
-        heard=~are_open(world, ends, 0.0),
+        heard=~are_open(world, ends),
         shaken=shaken.astype(float),
         head=still.drive(ends)[0],
         tops=motion.tops(ends).astype(np.int64),
@@ -96,19 +96,3 @@ def felt_by(scenario: Scenario, still: Motion, ends: Array) -> tuple[Array, Arra
 def nothing_felt(tubes: int) -> tuple[Array, Array, Array]:
     """Of a rough world, whose nodes feel what ``sim.campaign.field`` has."""
     return np.zeros((0, tubes, 3)), np.zeros((0, tubes, 3)), np.zeros((0, 2))
-
-
-def are_open(world: World, t: Array, since: float) -> npt.NDArray[np.bool_]:
-    """Whether the joint below the head is open at ``t`` (s), of any shape, and was for ``since`` s."""
-    found = np.zeros(t.shape, bool)
-    for phase in world.phases:
-        if phase.kind == "add":
-            found |= (phase.start + since < t) & (t < phase.joint_closed)
-    return found
-
-
-def joined_of(world: World, powered: npt.NDArray[np.int64], later: Array) -> Array:
-    """``Course.joined`` of tubes whose cycles end ``later`` (tubes,) s than the encoder's."""
-    at, place, top = world.ends[:, None] + later, np.arange(len(later)), powered[:, None] - 1
-    opened, missed = are_open(world, at, 0.0), are_open(world, at, SILENT_AFTER)
-    return np.where(opened & ((place == top) | ((place == top - 1) & missed)), 0.0, 1.0)

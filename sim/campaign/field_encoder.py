@@ -7,22 +7,8 @@ import math
 import numpy as np
 import numpy.typing as npt
 
-from node.firmware.edge_interpolation import stopped_at
-from node.firmware.encoder import STOP_STD
-from node.firmware.torque import drive_record
-from node.kernels.encoder import (
-    BEYOND,
-    BEYOND_VAR,
-    COUNT,
-    EDGE_AT,
-    NOW,
-    RISING,
-    SAMPLE,
-    TIMED,
-    new_encoder,
-)
-from node.kernels.record import A_SEQUENCE, AIDING
-from sim.rig.encoder_course import measure
+from node.kernels.encoder import COUNT, EDGE_AT, NOW, RISING, SAMPLE, TIMED
+from sim.rig.encoder_course import aidings_of
 from sim.world.rough_disc import RoughDisc
 from sim.world.rough_section import RoughEncoderSection
 from sim.world.streams import Stream, stream
@@ -46,16 +32,8 @@ def measured_in_field(world: World, section: RoughEncoderSection, t: Array, head
     samples = np.zeros((len(ends), SAMPLE))
     samples[:, NOW], samples[:, TIMED] = ends, 1.0
     samples[:, [COUNT, EDGE_AT, RISING]] = disc.samples(ends)
-    resting = ~(np.diff(samples[:, EDGE_AT], prepend=math.inf) > 0.0)
-    for cycle in np.flatnonzero(resting & ~np.concatenate([[False], resting[:-1]])):  # the first of each rest
-        _, edge_at, _, earlier = disc.sample(float(ends[cycle]))
-        samples[cycle, BEYOND : BEYOND_VAR + 1] = stopped_at((edge_at, *earlier), STOP_STD)
     samples[:, COUNT] += outliers(section, len(ends), math.tau / len(world.disc.errors), seed)
-    rows, torque = np.zeros((len(ends), AIDING)), world.torque_settings()
-    measure(new_encoder(0, torque.drilling), drive_record(torque), samples, rows)
-    if world.scenario.file.aiding.renumbered:
-        rows[:, A_SEQUENCE] = np.arange(len(ends))
-    return rows
+    return aidings_of(world, samples, lambda cycle: disc.sample(float(ends[cycle]))[3])
 
 
 def outliers(section: RoughEncoderSection, cycles: int, quantum: float, seed: int) -> Array:

@@ -225,20 +225,16 @@ class DirectString:
         phases = np.array([self._phases[tube] for tube in tubes])
         ends = np.array([world.cycle_end(cycle) for cycle in range(-1, world.cycles)])
         powered = np.array([len(self._string_at(end)) for end in ends[1:]])
-        at = ends[1:, None] + phases
         place = np.arange(len(tubes))
-        opened, missed = self._are_open(at), self._are_open(at, SILENT_AFTER)
-        top = powered[:, None] - 1
-        joined = ~(opened & ((place == top) | ((place == top - 1) & missed)))
         lost = self._lost | (place >= powered[:, None])
         first_lost = np.where(lost.any(axis=1), lost.argmax(axis=1), len(tubes))
-        is_sent = self.passes & ~self._are_open(ends[1:]) & self._hands_on
+        is_sent = self.passes & ~are_open(world, ends[1:]) & self._hands_on
         return StringCourse(
             begins=ends[:-1],
             ends=ends[1:],
             phases=phases,
             powered=powered,
-            joined=joined.astype(np.float64),
+            joined=joined_of(world, powered, phases),
             clock_var=self._clock_var,
             readings=self._readings(),
             measured=measured,
@@ -273,13 +269,6 @@ class DirectString:
         if medium.dated_by == "arrival":
             valid += 1e-3 * medium.delay_ms + medium.latency * np.arange(1, hops + 1)
         return np.asarray(valid + self._clocks)
-
-    def _are_open(self, t: Array, since: float = 0.0) -> Mask:
-        """Whether the joint below the head is open at ``t`` (s), and was for ``since`` s."""
-        found = np.zeros(t.shape, np.bool_)
-        for phase in self._adds:
-            found |= (phase.start + since < t) & (t < phase.joint_closed)
-        return found
 
     def _run_together(self, first: int, last: int) -> int:
         """Take all nodes through cycles in one call, until one has something to say; returns which cycle is next."""
@@ -410,6 +399,28 @@ class DirectString:
                 run.revisions.append(Survey(first.cycle, tube, first.error + moved, message, cycle))
                 return
         run.surveys.append(Survey(cycle, tube, float(run.total_error[cycle, tube - 1]), message, cycle))
+
+
+def are_open(world: World, t: Array, since: float = 0.0) -> Mask:
+    """Whether the joint below the head is open at ``t`` (s), of any shape, and was for ``since`` s."""
+    found = np.zeros(t.shape, np.bool_)
+    for phase in world.phases:
+        if phase.kind == "add":
+            found |= (phase.start + since < t) & (t < phase.joint_closed)
+    return found
+
+
+def joined_of(world: World, powered: npt.NDArray[np.int64], later: Array) -> Array:
+    """1 where a tube's upper joint is closed for all it knows, (cycles, tubes), else 0.
+
+    Parameters
+    ----------
+    powered : (cycles,) tubes in the string
+    later : (tubes,) s, by which cycles end after the encoder's
+    """
+    at, place, top = world.ends[:, None] + later, np.arange(len(later)), powered[:, None] - 1
+    opened, missed = are_open(world, at), are_open(world, at, SILENT_AFTER)
+    return np.where(opened & ((place == top) | ((place == top - 1) & missed)), 0.0, 1.0)
 
 
 def aiding_vector(aiding: Aiding) -> tuple[float, ...]:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable, Iterable
 
 import numpy as np
 import numpy.typing as npt
@@ -45,15 +46,26 @@ def measured_of(world: World) -> Array:
     samples[:, RISING] = samples[:, TIMED] = 1.0  # the string turns one way
     samples[:, EDGE_AT] = np.minimum(disc.times_of(counts), ends)
     samples[ends <= world.motion.begin, EDGE_AT] = world.begin
+    return aidings_of(world, samples, lambda cycle: disc.times_of(counts[cycle] - np.arange(1, EDGES)).tolist())
+
+
+def aidings_of(world: World, samples: Array, edges_before: Callable[[int], Iterable[float]]) -> Array:
+    """What the firmware of the encoder makes of samples (cycles, SAMPLE): (cycles, AIDING).
+
+    Parameters
+    ----------
+    samples : without what is known of where inside its count the head stopped, which is added
+    edges_before : times (s) of the edges before the last one of a cycle's sample, newest first
+    """
     resting = ~(np.diff(samples[:, EDGE_AT], prepend=math.inf) > 0.0)
-    for cycle in np.flatnonzero(resting & ~np.concatenate([[False], resting[:-1]])):  # the first of each rest
-        edges = disc.times_of(counts[cycle] - np.arange(EDGES))
-        samples[cycle, BEYOND : BEYOND_VAR + 1] = stopped_at((samples[cycle, EDGE_AT], *edges[1:].tolist()), STOP_STD)
-    rows = np.zeros((len(ends), AIDING))
+    for cycle in np.flatnonzero(resting & ~np.concatenate([[False], resting[:-1]])).tolist():  # the first of each rest
+        edges = (float(samples[cycle, EDGE_AT]), *edges_before(cycle))
+        samples[cycle, BEYOND : BEYOND_VAR + 1] = stopped_at(edges, STOP_STD)
+    rows = np.zeros((len(samples), AIDING))
     torque = world.torque_settings()
     measure(new_encoder(0, torque.drilling), drive_record(torque), samples, rows)
     if world.scenario.file.aiding.renumbered:
-        rows[:, A_SEQUENCE] = np.arange(len(ends))
+        rows[:, A_SEQUENCE] = np.arange(len(rows))
     return rows
 
 

@@ -158,11 +158,13 @@ class RoughImu:
             rate = rate + force @ pull_of(sensor, self._seed, *self._key).T
         rate = rate + 0.5 * sensor.scale_asymmetry * np.abs(rate)
         limits = math.radians(self._errors.gyroscope.range_dps), G * sensor.force_range_g
+        converted = []
         for values, limit, bit in ((rate, limits[0], GYRO_CLIPPED), (force, limits[1], FORCE_CLIPPED)):
-            if max(values.max(), -values.min()) >= AT_RANGE * limit:
+            reaches = max(values.max(), -values.min()) >= AT_RANGE * limit
+            if reaches:
                 cut |= bit * np.any(np.abs(values) >= AT_RANGE * limit, axis=1)
-                np.clip(values, -limit, limit, out=values)
-        return rate, force, cut
+            converted.append(np.clip(values, -limit, limit) if reaches else values)
+        return converted[0], converted[1], cut
 
     def _frame_times(self, sensor: RoughSensorSection) -> Array:
         step = 1.0 / (sensor.frames_hz * (1.0 + sensor.crystal))
