@@ -4,9 +4,10 @@ A survey whose yaw is unknown still knows how far the tube leans, but not to whi
 circle, its lean would be off from the one measured by l (cos e - 1) along it and l sin e across it. The second moments
 of these are 3/2 l^2 and 1/2 l^2; across, the variance of an unknown yaw, pi^2/3 l^2, is larger and is used.
 
-A yaw that is known to some degrees is between the two: its lean lies on a part of a circle, not on the straight line
-that a variance across it describes. Of a normal e with the variance v the second moment along is
-l^2 (3/2 - 2 exp(-v/2) + exp(-2 v)/2), which begins as 3/4 v^2 l^2.
+A yaw that is known is between the two: its lean lies on a part of a circle, not on the straight line that a variance
+across it describes. Of a normal e with the variance v the second moment along is
+l^2 (3/2 - 2 exp(-v/2) + exp(-2 v)/2), which begins as 3/4 v^2 l^2. In a flat hole even half a degree of yaw counts: the
+force knows the length of a lean by the cosine of the inclination better than that of an upright tube.
 """
 
 from __future__ import annotations
@@ -25,9 +26,6 @@ from telemetry.messages import NodeFlag
 Array = npt.NDArray[np.float64]
 UNKNOWN_YAW_VAR = math.pi**2 / 3.0  # rad^2, uniform on the circle
 ALONG, ACROSS = 1.5, UNKNOWN_YAW_VAR  # of the squared lean
-STRAIGHT_VAR = (
-    math.radians(0.5) ** 2
-)  # rad^2, of a yaw up to which the circle is off the line by less than a force errs
 
 
 class Trust(IntEnum):
@@ -72,9 +70,8 @@ def with_unknown_yaw(resolved: Resolved) -> Resolved:
 
 def with_uncertain_yaw(resolved: Resolved, yaw_var: float) -> Resolved:
     """The same stop where the whole variance of its yaw (rad^2) may take its lean off the straight line."""
-    if not yaw_var > STRAIGHT_VAR:
-        return resolved
-    return _spread(resolved, ALONG - 2.0 * math.exp(-yaw_var / 2.0) + math.exp(-2.0 * yaw_var) / 2.0, 0.0)
+    a = math.expm1(-yaw_var / 2.0)
+    return _spread(resolved, a * a * (3.0 + 2.0 * a + a * a / 2.0), 0.0)  # without a difference of what is nearly equal
 
 
 def _spread(resolved: Resolved, along: float, across: float) -> Resolved:

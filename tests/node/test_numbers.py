@@ -66,7 +66,8 @@ CASES: dict[str, tuple[Callable[..., Any], list[tuple[str, float, float]], str, 
     ),
     "turn": (n.turn, [("rate", -32, 32), ("time", -4096, 4096)], "angle", 3e-7, 64),
     "turn of a cycle": (n.turn, [("rate", -32, 32), ("time", -8, 8)], "angle", 0.0, 2),
-    "speed": (n.speed, [("angle", -4, 4), ("time", 1e-3, 6)], "rate", 3e-9, 40000),
+    "speed": (n.speed, [("angle", -1, 1), ("time", 1e-3, 6)], "rate", 3e-9, 40000),
+    "speed of a large angle": (n.speed, [("angle", -4, 4), ("time", 4e-3, 6)], "rate", 3e-9, 40000),
     "square": (n.square, [("angle", -4, 4)], "var", 0.0, 2.0**31),
     "product": (n.product, [("angle", -4, 4), ("angle", -4, 4)], "var", 0.0, 2.0**31),
     "root": (n.root, [("var", 0, 16)], "angle", 5e-9, 2),
@@ -105,7 +106,7 @@ CASES: dict[str, tuple[Callable[..., Any], list[tuple[str, float, float]], str, 
         2e-9,
         600,
     ),
-    "added": (added, [("joint", -256, 256), ("joint", -256, 256)], "joint", 0.0, 0),
+    "added": (added, [("joint", -256, 256), ("joint", -256, 256)], "joint", 0.0, 64),  # the float has 53 bits of 59
     "fine force": (fine, [("force", -32, 32)], "mean", 0.0, 0),
     "all but one": (lambda a: without_one(a, 7000), [("mean", -64, 64)], "mean", 0.0, 1),
     "degrees": (lambda a: told_degrees(a, ANGLE_Q), [("angle", -1000, 1000)], "told", 1e-8, 1),
@@ -134,6 +135,7 @@ def test_what_is_beyond_the_range_is_held(large: int) -> None:
     assert KERNELS["fine force"](large) == -KERNELS["fine force"](-large) == 32 << MEAN_Q
     assert KERNELS["square"](large) == KERNELS["square"](-large) == 16 << VAR_Q
     assert KERNELS["product"](large, -large) == -16 << VAR_Q
+    assert KERNELS["speed"](1 << ANGLE_Q, 1) == -KERNELS["speed"](-1 << ANGLE_Q, 1) == 1024 << RATE_Q
     assert KERNELS["fraction"](large, 1) == -KERNELS["fraction"](-large, 1) == 2 << VECTOR_Q
     assert KERNELS["ratio"](large, 0) == -KERNELS["ratio"](-large, 0) == 1 << 61
     assert KERNELS["root"](-large) == 0

@@ -224,8 +224,9 @@ def test_the_sums_of_the_longest_turn_fit() -> None:
 
 @given(st.floats(-1.0, 4.5).map(lambda power: 10.0**power), st.integers(1, 600))
 def test_the_law_of_extremes_is_the_same(ratio: float, samples: int) -> None:
+    """Few samples of little noise lie so far below the radius that the law ends; what it comes to then is next to 0."""
     found = variance_in_integers(round(ratio * 2.0**24), samples) * 2.0**-38
-    assert found == pytest.approx(extreme_var(ratio, samples), rel=1e-3)
+    assert found == pytest.approx(extreme_var(ratio, samples), rel=1e-3, abs=1e-6)
 
 
 @given(
