@@ -9,9 +9,8 @@ from __future__ import annotations
 import itertools
 import math
 from bisect import bisect_left, insort
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Final
 
 import numpy as np
 import numpy.typing as npt
@@ -30,7 +29,6 @@ from groundstation.survey.transport import Carried, carry
 from groundstation.survey.trust import Trust
 
 Array = npt.NDArray[np.float64]
-NOTHING: Final = np.zeros((3, 0))
 
 
 @dataclass(frozen=True, slots=True)
@@ -41,11 +39,6 @@ class Moved:
     at: float  # s
     dropped: int  # earlier clusters that no longer count
     evidence: Evidence
-
-
-def no_columns(columns: Array) -> Iterator[Array]:
-    """What the points of a hole keep of their shared columns."""
-    return itertools.repeat(NOTHING, len(columns))
 
 
 class Hole:
@@ -68,7 +61,7 @@ class Hole:
         self._alarms = AlarmList()
         self._history = History()
         self._carried: dict[float, Carried] = {}  # by the depth of a station, where the string turns in a bent hole
-        self._trajectory = Trajectory(collar=config.collar, keep=no_columns)
+        self._trajectory = Trajectory(collar=config.collar, keeps_columns=False)
         self._deviations = self._deviate()
         self._projection: Deviation | None = None
         self._unsettled_since = math.inf  # s, rig time of the oldest survey from which nothing follows yet

@@ -2,8 +2,9 @@
 
 A station enters two legs, so its weight in the position is half their summed length, and half the last leg for the last
 station (the Jacobian of the balanced tangential method, used for every method as the industry's error model does).
-Its errors are kept by running sums in a compiled loop: appending costs the same however many stations there are. What
-stations share may become more columns as the hole grows; the columns of a point are those known when it was added.
+Its errors are kept by running sums in a compiled loop: appending costs the same however many stations there are, and
+where one changes, those below are drawn from the nearest mark above. What stations share may become more columns as the
+hole grows; the columns of a point are those known when it was added.
 Source: thesis 2.1-2.3 and eqs. I.1-I.12. Frame: north, east, down.
 """
 
@@ -11,7 +12,7 @@ from __future__ import annotations
 
 import itertools
 import math
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from operator import itemgetter
 from typing import Final
@@ -22,12 +23,13 @@ import numpy.typing as npt
 from groundstation.errors import SurveyError
 from groundstation.survey.methods import OPPOSITE, Method, dogleg, leg, ratio_factor
 from groundstation.survey.resolve import Direction, angles
-from groundstation.survey.shared import Packed, added, packed_of, widened
+from groundstation.survey.shared import Packed, added, packed_of
 from groundstation.survey.tangents import tangent_jacobians, tangents_of
 
 Array = npt.NDArray[np.float64]
-BLOCK = 64  # stations, whose columns are held at a time
+BLOCK = 64  # stations from mark to mark
 NONE: Final = Packed(np.zeros((2, 0)))
+UNKNOWN: Final = np.zeros((3, 0))
 NOTHING: Final = np.zeros(0)
 FROM_ZERO: Final = np.zeros(1, np.intp)
 
@@ -40,7 +42,7 @@ class Point:
     tangent: Array  # (3,)
     position: Array  # (3,) m, north east down
     cov: Array  # (3, 3) m^2, random and shared
-    shared: Array  # (3, s) m, change for one standard deviation of every shared error, or what is kept of that
+    shared: Array  # (3, s) m, change for one standard deviation of every shared error; (3, 0) where it is not kept
 
 
 ROW: Final = np.dtype(
@@ -66,9 +68,15 @@ class Sums:
     passed: Array  # (3, s)
     length: float
 
-    def copied(self) -> Sums:
-        """The same, to go on with."""
-        return Sums(self.own.copy(), self.passed.copy(), self.length)
+
+@dataclass(frozen=True, slots=True)
+class Followed:
+    """What comes of going down a part of a hole."""
+
+    sums: Sums  # at its end
+    marks: list[Sums]  # after every `BLOCK` stations of the hole
+    runs: list[Array]  # (.., 3, s) shared columns of the positions, those with equally many together, if wanted
+    covs: Array  # (n, 3, 3)
 
 
 class Trajectory:
@@ -79,8 +87,7 @@ class Trajectory:
     method : of the legs
     collar : direction at the first depth, known: vertical by default
     start_md : m
-    keep : makes of the shared columns (n, 3, s) of n points what these keep of them, one each: all by default, which
-        of a string of fifty tubes is 750 numbers a point
+    keeps_columns : whether every point keeps its shared columns, which of a string of fifty tubes are 750 numbers
     """
 
     def __init__(
@@ -88,10 +95,11 @@ class Trajectory:
         method: Method = Method.BALANCED_TANGENTIAL,
         collar: Direction | None = None,
         start_md: float = 0.0,
-        keep: Callable[[Array], Iterable[Array]] = np.asarray,
+        *,
+        keeps_columns: bool = True,
     ) -> None:
         self._method = method
-        self._keep = keep
+        self._keeps_columns = keeps_columns
         first = collar or Direction(np.zeros(2), 1.0, np.zeros((2, 2)), np.zeros((2, 0)))
         self._rows = np.zeros(FEWEST, ROW)
         self._directions: list[Direction] = []  # of the collar and every station
@@ -99,9 +107,9 @@ class Trajectory:
         self._down: list[Array] = []  # and what those come to in the vertical, (c,) of those that are kept
         self._insert(0, start_md, first)
         self._direct([0])
-        self._kept = list(keep(np.zeros((1, 3, 0))))  # of every point that is drawn
+        self._kept = [UNKNOWN]  # shared columns of every point that is drawn
         self._sums = Sums(np.zeros((3, 3)), np.zeros((3, 0)), 0.0)
-        self._marks = [self._sums.copied()]  # at the collar and every BLOCK stations from there
+        self._marks = [self._sums]  # at the collar and every BLOCK stations from there
 
     def __len__(self) -> int:
         """How many points there are."""
@@ -196,9 +204,9 @@ class Trajectory:
 
     def columns(self) -> Iterator[Array]:
         """Shared columns (n, 3, s) of the points from the collar down, some at a time, as many as were known there."""
-        yield np.zeros((1, 3, 0))
+        yield UNKNOWN[None]
         for begin, mark in zip(range(0, len(self) - 1, BLOCK), self._marks, strict=False):
-            yield from self._follow(mark.copied(), begin, min(begin + BLOCK, len(self) - 1))[1]
+            yield from self._follow(mark, begin, min(begin + BLOCK, len(self) - 1), with_columns=True).runs
 
     def _insert(self, place: int, md: float, direction: Direction) -> None:
         """Have a row for a station; what follows from its direction is not in it yet."""
@@ -234,26 +242,20 @@ class Trajectory:
         if begin < len(self._kept) - 1:
             begin -= begin % BLOCK
             del self._kept[begin + 1 :], self._marks[begin // BLOCK + 1 :]
-            self._sums = self._marks[-1].copied()
+            self._sums = self._marks[-1]
         rows = self._rows[begin : len(self)]
         rows["position"] = np.add.accumulate([rows["position"][0], *self._legs(rows)])
-        while begin < len(self) - 1:
-            end = min(begin - begin % BLOCK + BLOCK, len(self) - 1)
-            self._sums, runs, covs = self._follow(self._sums, begin, end)
-            for place, run in zip(itertools.accumulate(map(len, runs), initial=0), runs, strict=False):
-                covs[place : place + len(run)] += run @ run.transpose(0, 2, 1)
-                self._kept.extend(self._keep(run))
-            self._rows["cov"][begin + 1 : end + 1] = covs
-            begin = end
-            if begin % BLOCK == 0:
-                self._marks.append(self._sums.copied())
+        followed = self._follow(self._sums, begin, len(self) - 1, with_columns=self._keeps_columns)
+        rows["cov"][1:] = followed.covs
+        self._sums = followed.sums
+        self._marks += followed.marks
+        if self._keeps_columns:
+            self._kept += itertools.chain.from_iterable(followed.runs)
+        else:
+            self._kept += [UNKNOWN] * (len(rows) - 1)
 
-    def _follow(self, sums: Sums, begin: int, end: int) -> tuple[Sums, list[Array], Array]:
-        """Go on with sums, which are used up, from one place to another.
-
-        Returns the sums, the shared columns (.., 3, s) of the positions after ``begin`` up to ``end``, those with
-        equally many together, and the covariances (n, 3, 3) that are their own.
-        """
+    def _follow(self, sums: Sums, begin: int, end: int, *, with_columns: bool) -> Followed:
+        """Go on with sums from one place to another."""
         from groundstation.survey.kernels.position_errors import add_stations  # whoever only reads needs no compiler
 
         rows, columns = self._rows[begin : end + 1], self._columns[begin : end + 1]
@@ -265,16 +267,30 @@ class Trajectory:
             np.concatenate([one.values for one in columns], axis=1),
             np.concatenate(self._down[begin : end + 1]),
         )
-        ends = 0.5 * np.diff(rows["md"])
+        legs = np.diff(rows["md"])
+        ends = 0.5 * legs
         weights = ends.copy()  # of the station before each, which has both its legs now
         weights[0] += 0.5 * sums.length
         weights[1:] += ends[:-1]
-        width = int(widths[-1])
-        passed, shared, out = widened(sums.passed, width), np.empty((len(ends), 3, width)), np.empty((len(ends), 3, 3))
-        add_stations(weights, ends, starts, places, lean, down, rows["own"].copy(), passed, sums.own, shared, out)
-        borders = [0, *(np.flatnonzero(np.diff(widths)) + 1).tolist(), len(widths)]
-        runs = [shared[a:b, :, : int(widths[a])] for a, b in itertools.pairwise(borders)]
-        return Sums(sums.own, passed, float(rows["md"][-1] - rows["md"][-2])), runs, out
+        width, count = int(widths[-1]), len(ends)
+        marked = np.arange(BLOCK - begin % BLOCK, count + 1, BLOCK) - 1
+        marks, own_marks = np.empty((len(marked), 3, width)), np.empty((len(marked), 3, 3))
+        passed, own = np.zeros((3, width)), sums.own.copy()
+        passed[:, : sums.passed.shape[1]] = sums.passed
+        shared, covs = np.empty((count if with_columns else 0, 3, width)), np.empty((count, 3, 3))
+        add_stations(
+            weights, ends, starts, places, lean, down, rows["own"].copy(), widths, passed, own,
+            int(marked[0]) if len(marked) else count, BLOCK, marks, own_marks, shared, covs,
+        )  # fmt: skip
+        return Followed(
+            Sums(own, passed, float(legs[-1])),
+            [
+                Sums(own_marks[number].copy(), marks[number, :, : int(widths[k])].copy(), float(legs[k]))
+                for number, k in enumerate(marked.tolist())
+            ],
+            runs_of(shared, widths) if with_columns else [],
+            covs,
+        )
 
     def _legs(self, rows: npt.NDArray[np.void]) -> Array:
         """Displacements (n, 3) from station to station."""
@@ -289,6 +305,12 @@ class Trajectory:
         if self._method is Method.MINIMUM_CURVATURE and dogleg(math, i1, a1, i2, a2) > math.pi - OPPOSITE:
             raise SurveyError(f"trajectory: the hole turns back on itself between {md:g} and {below:g} m")
         return np.array(leg(math, self._method, below - md, i1, a1, i2, a2))
+
+
+def runs_of(shared: Array, widths: npt.NDArray[np.intp]) -> list[Array]:
+    """Parts of columns (n, 3, s) with as many columns as were known of each, those with equally many together."""
+    borders = [0, *(np.flatnonzero(np.diff(widths)) + 1).tolist(), len(widths)]
+    return [shared[a:b, :, : int(widths[a])] for a, b in itertools.pairwise(borders)]
 
 
 def interpolate(points: list[Point], md: float) -> Point:

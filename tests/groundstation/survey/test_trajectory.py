@@ -133,13 +133,16 @@ def test_a_station_above_the_collar_is_refused() -> None:
     assert len(trajectory) == 1
 
 
-def test_a_point_keeps_of_its_columns_what_the_trajectory_is_told() -> None:
-    whole, sums = Trajectory(), Trajectory(keep=lambda columns: (columns**2).sum(axis=-1))
-    for trajectory in (whole, sums):
+def test_points_that_keep_no_columns_are_the_same() -> None:
+    whole, bare = Trajectory(), Trajectory(keeps_columns=False)
+    for trajectory in (whole, bare):
         trajectory.extend([(2.0 * k, turned(0.1, 0.2, 1e-3, [1e-3] * (1 + k // 2))) for k in range(1, 6)])
-    for all_of_it, summed in zip(whole.points, sums.points, strict=True):
-        np.testing.assert_array_equal(summed.cov, all_of_it.cov)
-        np.testing.assert_allclose(summed.shared, np.diagonal(all_of_it.shared @ all_of_it.shared.T))
+    for one, other in zip(whole.points, bare.points, strict=True):
+        np.testing.assert_array_equal(one.position, other.position)
+        np.testing.assert_array_equal(one.cov, other.cov)
+        assert other.shared.shape == (3, 0)
+    for columns, one in zip((row for some in bare.columns() for row in some), whole.points, strict=True):
+        np.testing.assert_array_equal(columns, one.shared)
 
 
 def parts_at_once(mds: np.ndarray, leans: list[Direction]) -> tuple[np.ndarray, np.ndarray]:
