@@ -21,7 +21,7 @@ from borechain.load.crowd import ROUND_S, TUBE_LENGTH, state_of
 from borechain.load.day import ADVANCE, ADVANCES, BEGUN_AT, EPOCH, depth_of, surveys_at, up_to, write_day
 from borechain.recording.replay import TapeClock
 from groundstation.config import GroundConfig, checked_config
-from groundstation.service.process import GroundProcess
+from groundstation.host import started
 from sim.errors import RigError
 from telemetry.application.depth_source import DepthSource
 from telemetry.messages import SurveyMeasurement
@@ -78,7 +78,7 @@ class Hearing:
         self._questions = itertools.cycle(ASKED)
         self.taken: dict[str, list[float]] = defaultdict(list)  # s of CPU
         with self._timing("start"):
-            self.ground = GroundProcess(config)
+            self.ground = started(config)
             self.ground.model.hole.settle()
         self.ground.clock = self._clock
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import itertools
 
 from groundstation.errors import StoreError
+from groundstation.service.alarms import Alarm
 from groundstation.service.keeper import Keeper
 from groundstation.service.model import Prepared, RigModel
 from groundstation.service.stands import take_survey
@@ -29,6 +30,7 @@ class Learner:
     def __init__(self, store: Store, model: RigModel, watch: Watch, keeper: Keeper) -> None:
         self._store, self._model, self._watch, self._keeper = store, model, watch, keeper
         self._arrived: list[Stored] = []  # since the last transaction
+        self._known: tuple[list[Alarm], int, int] = ([], 0, 0)  # alarms of the hole, moves and stops that were told
         self._by_survey = (*CHANGED_BY_SURVEY, *(["wall"] if model.wall is not None else []))
 
     def take(self, message: Kept) -> None:
@@ -83,14 +85,17 @@ class Learner:
         except StoreError:
             model.waiting += [one for one, _ in placeable]
             return []
-        hole = model.hole
-        before = list(hole.alarms.alarms), len(hole.moved), hole.history.count
-        changed = {path for one, md in placeable for path in self._learn(one.measurement, md, one.below)}
-        if before[:2] != (hole.alarms.alarms, len(hole.moved)):
-            changed.add("alarms")
-        if before[2] != hole.history.count:
-            changed.add("history")
-        return sorted(changed)
+        return sorted({path for one, md in placeable for path in self._learn(one.measurement, md, one.below)})
+
+    def find_consequences(self) -> list[str]:
+        """Work out the hole, and return the paths of what changed with it: alarms of deviations, stops that ended.
+
+        Surveys come one by one, tube by tube: to be asked at every look, and not for each of them.
+        """
+        hole = self._model.hole
+        before, self._known = self._known, (list(hole.alarms.alarms), len(hole.moved), hole.history.count)
+        paths = {"alarms": before[:2] != self._known[:2], "history": before[2] != self._known[2]}
+        return [path for path, has_changed in paths.items() if has_changed]
 
     def restore(self) -> None:
         """Go on with everything that was stored, some hundred messages at a time."""
@@ -104,6 +109,7 @@ class Learner:
             prepared = dict(zip(placed, self._model.prepare(list(placed.values())), strict=True))
             for place, one in enumerate(some):
                 self._learn(one.message, one.md, one.below, prepared.get(place))
+        self.find_consequences()
 
     def _learn(
         self, message: Kept, md: float | None, below: float | None, prepared: Prepared | None = None

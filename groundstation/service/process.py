@@ -232,6 +232,8 @@ class GroundProcess(Process):
         """Find what is wrong, ask again for what is missing, and publish who fell silent or came back."""
         self._keeper.keep_depth_doubt()
         self._place_waiting()
+        if consequences := self._learner.find_consequences():
+            self._publish(consequences)
         self.watch.look(now)
         alarms, refusal = self.model.rig_alarms, self.store.refusal
         alarms.hold("disk", "database", refusal)

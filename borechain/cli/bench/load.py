@@ -120,10 +120,9 @@ def learn(surveys: int, tubes: int, stops: int, as_json: bool) -> None:
     """
     from borechain.cli.tables import show_table
     from borechain.load.learning import measure_learning
-    from groundstation.host import keep_imports, load_kernels
+    from groundstation.host import load_kernels
 
     load_kernels()
-    keep_imports()
     with tempfile.TemporaryDirectory(prefix="borechain-") as folder:
         result: dict[str, Any] = {"bench": "learn", "tubes": tubes}
         result |= measure_learning(surveys, tubes, stops, Path(folder))
