@@ -12,6 +12,8 @@ import pytest
 from hypothesis import settings
 from hypothesis.internal.conjecture import providers
 
+from sim.one_thread import one_thread_each
+
 # the first example of a property compiles the kernel, which no deadline of an example can foresee; the same commit
 # gives the same examples everywhere, more of them in `make study`, and new ones are looked for by `make explore`
 settings.register_profile("borechain", deadline=None, derandomize=True, max_examples=40)
@@ -25,6 +27,7 @@ if PROFILE != "explore":
     providers._get_local_constants = providers.Constants
 
 os.environ.setdefault("BORECHAIN_TEST_RUN", str(os.getpid()))  # its workers share what forks commands for them
+one_thread_each()
 if "PYTEST_XDIST_WORKER" in os.environ:
     os.environ.setdefault("BORECHAIN_CORES", "1")  # every worker is a core; a pool in each would start twice as many
 

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any, Final
 from sim.campaign.chunk import Chunk, run_chunk
 from sim.campaign.store import code_digest
 from sim.errors import RigError
+from sim.one_thread import one_thread_each
 from sim.studies.pool import cores
 
 if TYPE_CHECKING:
@@ -46,6 +47,7 @@ def on_this_machine(scenario: bytes, ranges: Sequence[Range]) -> Computed:
         for first, last in ranges:
             yield (first, last), run_chunk(scenario, first, last)
         return
+    one_thread_each()
     run_chunk(scenario, 1, 1)  # compiles, or finds the compiled: the others then only load
     with multiprocessing.get_context("spawn").Pool(processes) as pool:
         yield from pool.imap_unordered(work_of, [(scenario, *span) for span in ranges])

@@ -11,10 +11,11 @@ from dataclasses import dataclass, field
 from multiprocessing.context import ForkServerProcess
 from typing import Any
 
+from sim.one_thread import one_thread_each
+
 STOP_SCHEDULE = ((signal.SIGTERM, 5.0), (signal.SIGKILL, 5.0))  # signal, wall seconds until the next
 RESTART_LIMIT = 5  # deaths of a process that are answered with a new start within ...
 RESTART_WINDOW = 600.0  # ... this time, wall s
-ONE_THREAD = ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS")
 
 
 @dataclass(frozen=True, slots=True)
@@ -42,8 +43,7 @@ class ProcessTable:
 
     def __post_init__(self) -> None:
         """Prepare the fork server; it starts with the first process."""
-        for name in ONE_THREAD:
-            os.environ.setdefault(name, "1")
+        one_thread_each()
         self._context = multiprocessing.get_context("forkserver")
         self._context.set_forkserver_preload(self.preload)
 

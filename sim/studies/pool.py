@@ -10,6 +10,7 @@ from functools import partial
 from typing import Protocol, TypeVar
 
 from sim.errors import RigError
+from sim.one_thread import one_thread_each
 
 Job = TypeVar("Job")
 Found = TypeVar("Found")
@@ -35,6 +36,7 @@ def over_cores(most: int, step: Step) -> Iterator[RunAll]:
     if most <= FEW or processes == 1:
         yield partial(_here, step)
         return
+    one_thread_each()
     with multiprocessing.get_context("spawn").Pool(processes) as pool:
 
         def run_all(work: Callable[[Job], Found], jobs: Iterable[Job]) -> list[Found]:

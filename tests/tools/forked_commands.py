@@ -24,9 +24,10 @@ import traceback
 from pathlib import Path
 from typing import IO, Any
 
+from sim.one_thread import one_thread_each
+
 LAZY = ("matplotlib.pyplot", "scipy.optimize", "scipy.stats", "scipy.signal", "scipy.spatial")  # inside commands
 WARM = "borechain.warm"
-ONE_THREAD = dict.fromkeys(("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS"), "1")  # a thread forks not
 RUN = int(os.environ.get("BORECHAIN_TEST_RUN", os.getpid()))  # pid of what all workers of the tests descend from
 END = b"end"
 LONGEST = 1 << 16  # bytes of an order
@@ -79,7 +80,8 @@ class Forker:
 @functools.cache
 def forker(*preload: str) -> Forker:
     """The forker of this run of the tests."""
-    return Forker(preload=preload, env=os.environ | ONE_THREAD)
+    one_thread_each()  # a process with more of them cannot fork
+    return Forker(preload=preload, env=os.environ)
 
 
 def warm_forker() -> Forker:
