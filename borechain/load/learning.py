@@ -99,10 +99,11 @@ class Hearing:
         self.taken["learning each of a stop"].append((time.process_time() - before) / len(surveys))
 
     def learn_alone(self, surveys: list[SurveyMeasurement], md: float) -> None:
-        """The hole is worked out again after each of them."""
+        """Each comes by itself, and the hole is worked out after it, as the next look or the next question has it."""
         for survey in surveys:
             with self._timing("learning one alone"):
                 self._take([survey], md)
+            with self._timing("working out the hole then"):
                 self.ground.model.hole.settle()
 
     def learn_asked(self, surveys: list[SurveyMeasurement], md: float) -> None:

@@ -45,6 +45,25 @@ def test_each_stop_leaves_what_was_known_at_its_end_also_after_a_restart(tmp_pat
     again.ground.close()
 
 
+def test_what_follows_from_a_survey_is_published_at_the_next_look(tmp_path: Path) -> None:
+    """An alarm of the deviation with the survey that reaches it, a moment with the first survey of the next stop."""
+    rig = Rig(tmp_path, target=20.0)
+    published: list[str] = []
+    rig.ground.listeners.append(published.extend)
+    rig.run(5.0)
+    seen = []
+    for stop, inclination_deg in enumerate(STOPS, 1):
+        published.clear()
+        rig.drill(stop, inclination_deg)
+        seen.append((published.count("history"), len(rig.ground.model.hole.alarms.alarms), "alarms" in published))
+        assert {"measurements", "trajectory", "column"} <= set(published)
+    assert [moments for moments, _, _ in seen] == [0, 1, 1, 1, 1]
+    raised = np.diff([count for _, count, _ in seen], prepend=0) > 0
+    assert raised.any()
+    assert all(told for (_, _, told), is_new in zip(seen, raised, strict=True) if is_new)
+    rig.ground.close()
+
+
 def straight_down(depths: list[float]) -> Deviations:
     """Deviations of a hole that is where it should be."""
     md, none = np.array(depths), np.zeros((len(depths), 2))
