@@ -81,7 +81,7 @@ def draws_of(world: World, measured: Array) -> Draws:
         frame=world.first_angle + np.array([world.marks.frame_angle(tube) for tube in tubes]),
         phase=np.array([world.phase(tube) for tube in tubes]),
         clock_var=(1e-3 * stated) ** 2 * np.arange(1.0, count + 1.0),
-        systematic=np.array([[world.marks.error(tube, max(top, tube)) for top in range(count + 1)] for tube in tubes]),
+        systematic=np.array([np.pad(world.marks.errors(tube), (tube, 0), "edge") for tube in tubes]),
         measured=measured,
         heard=aiding_passes(file.aiding, world.ends - world.begin, seed),
     )

@@ -101,11 +101,10 @@ class DrillString:
         Where joints are solved it is the mark of the time when the tube was on top, and what each solution left.
         """
         if self.scenario.file.node.joints == "marks":
-            errors = np.array([self.marks.error(tube, top) for top in range(tube, self.scenario.tubes + 1)])
-            rigid = errors[np.maximum(self.motion.tops(t), tube) - tube]
+            rigid = self.marks.errors(tube)[np.maximum(self.motion.tops(t), tube) - tube]
         else:
             made_up = max(self.scenario.file.rig.tubes_at_start, tube)
-            rigid = self.marks.error(tube, made_up) - self.marks.unseen(tube, t)
+            rigid = self.marks.errors(tube)[made_up - tube] - self.marks.unseen(tube, t)
         return np.asarray(rigid if self.torsion is None else rigid + self.torsion.twist(tube, t)[0])
 
     def truth_station(self, md: float) -> dict[str, float]:

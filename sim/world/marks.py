@@ -48,11 +48,11 @@ class Marks:
             Joint(wrap(lower[tube] + lower_error[tube]), std),
         )
 
-    def error(self, tube: int, top: int) -> float:
-        """What the marks from the head to a tube are wrong by while ``top`` is the top tube, rad."""
+    def errors(self, tube: int) -> Array:
+        """What the marks from the head to a tube are wrong by while each from that tube on is the top one, (n,) rad."""
         drive_error, lower_error = self._joint_errors
-        above = sum(lower_error[k] for k in range(tube + 1, top + 1))
-        return drive_error[top] + above - self.mounts[tube]
+        above = np.concatenate([np.zeros(1), np.cumsum(lower_error[tube + 1 :])])
+        return np.asarray(drive_error[tube:] + above - self.mounts[tube])
 
     def frame_angle(self, tube: int) -> float:
         """Angle (rad) from the head to the IMU's frame of a tube.
