@@ -86,7 +86,6 @@ class World(DrillString):
     def tube_settings(self, tube: int) -> TubeSettings:
         """What the crew enters for a tube: the readings of its scribe marks and their stated errors."""
         joints = self.marks.read(tube)
-        radius = self.scenario.file.accelerometer.radius_m
         passed = range(tube + 1, min(tube + self.reach - 1, self.scenario.tubes) + 1)
         return TubeSettings(
             tube=tube,
@@ -98,10 +97,15 @@ class World(DrillString):
             stiffness=self._stiffness,
             torsion="variance" if self.scenario.file.node.torsion == "variance" else "gate",
             joints=self.scenario.file.node.joints,
-            imus=tuple(ImuSettings((radius, 0.0), noise) for noise in self.sensors.noises),
+            imus=self._imu_settings,
             reach=self.reach,
             above=tuple(self.marks.read(other) for other in passed),
         )
+
+    @cached_property
+    def _imu_settings(self) -> tuple[ImuSettings, ...]:
+        radius = self.scenario.file.accelerometer.radius_m
+        return tuple(ImuSettings((radius, 0.0), noise) for noise in self.sensors.noises)
 
     @property
     def reach(self) -> int:
