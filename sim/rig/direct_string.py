@@ -298,12 +298,11 @@ class DirectString:
 
     def _run_one_by_one(self, cycle: int, string: Sequence[int]) -> None:
         said = {tube: self._run_cycle(cycle, tube, string) for tube in string}
-        for tube in string:
-            state = self.nodes[tube - 1]["filter"]
-            self.run.yaw[cycle, tube - 1] = from_binary(state["now_yaw"])
-            self.run.var[cycle, tube - 1] = state["now_P"][Err.YAW, Err.YAW]
-            self.run.systematic_var[cycle, tube - 1] = state["systematic_var"]
-            self.run.gyro_bias[cycle, tube - 1] = state["static_bias"][2] + state["bias"][2]
+        run, known = self.run, self.nodes["filter"][: len(string)]
+        run.yaw[cycle, : len(string)] = [from_binary(yaw) for yaw in known["now_yaw"].tolist()]
+        run.var[cycle, : len(string)] = known["now_P"][:, Err.YAW, Err.YAW]
+        run.systematic_var[cycle, : len(string)] = known["systematic_var"]
+        run.gyro_bias[cycle, : len(string)] = known["static_bias"][:, 2] + known["bias"][:, 2]
         self._judge(cycle, cycle + 1)
         self._take(cycle, string, said)
 
