@@ -80,7 +80,7 @@ def list_(context: click.Context) -> None:
 @click.pass_context
 @plain_faults
 def all_(context: click.Context, short: bool, out: Path | None) -> None:
-    """Run every study of the table as the committed results have it: hours.
+    """Run every study of the table as the committed results have it: most of an hour on two cores.
 
     \b
     Example:
