@@ -16,7 +16,7 @@ import numpy as np
 
 from node.firmware.settings import Kernel
 from node.kernels.layout import Scheme
-from sim.studies.epochs import EpochRun, resting, run_campaign_seed, run_seed
+from sim.studies.epochs import EpochRun, resting, run_seed
 from sim.studies.pool import Step, over_cores, seeded
 from sim.studies.scenarios import Tables, changed, on_off
 
@@ -66,9 +66,7 @@ def run(
     with over_cores(seeds, step) as run_all:
         for scheme in schemes_of(kernel):
             count = seeds if scheme is Scheme.FORWARD else control_seeds or seeds
-            by_campaign = scheme is Scheme.FORWARD and kernel == "float64"  # the others a campaign cannot express
-            work = run_campaign_seed if by_campaign else run_seed
-            rows = table(scheme, run_all(work, seeded(setup_of(scheme, hops, kernel), count)))
+            rows = table(scheme, run_all(run_seed, seeded(setup_of(scheme, hops, kernel), count)))
             cases += rows
             judged = verdict([row[name] for row in rows for name in ("nees", "nees_total")])
             schemes[scheme.name.lower()] = {**judged, "seeds": count, "standard_error": math.sqrt(2.0 / count)}
