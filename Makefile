@@ -89,7 +89,7 @@ study: $(STAMP)  ## statistical tests, and every study with many seeds: its tabl
 	$(BIN)/borechain bench realtime --nodes 50 --seconds 120 --out docs/results
 	$(BIN)/python docs/make_faults.py
 
-# the tests wait for processes a third of their time, which the studies use; they are in nobody's way
+# what the tests leave of the cores, the studies use; they are in no test's way
 studies: kernels  ## the studies; part of `make study`
 	nice -n 10 $(BIN)/borechain experiment all --out docs/results
 

@@ -79,7 +79,6 @@ class Hearing:
         self.taken: dict[str, list[float]] = defaultdict(list)  # s of CPU
         with self._timing("start"):
             self.ground = started(config)
-            self.ground.model.hole.settle()
         self.ground.clock = self._clock
 
     def drill(self, number: int, md: float) -> list[SurveyMeasurement]:

@@ -298,11 +298,12 @@ class DirectString:
 
     def _run_one_by_one(self, cycle: int, string: Sequence[int]) -> None:
         said = {tube: self._run_cycle(cycle, tube, string) for tube in string}
-        run, known = self.run, self.nodes["filter"][: len(string)]
-        run.yaw[cycle, : len(string)] = [from_binary(yaw) for yaw in known["now_yaw"].tolist()]
-        run.var[cycle, : len(string)] = known["now_P"][:, Err.YAW, Err.YAW]
-        run.systematic_var[cycle, : len(string)] = known["systematic_var"]
-        run.gyro_bias[cycle, : len(string)] = known["static_bias"][:, 2] + known["bias"][:, 2]
+        run, powered = self.run, np.s_[cycle, : len(string)]
+        known = self.nodes["filter"][: len(string)]
+        run.yaw[powered] = [from_binary(yaw) for yaw in known["now_yaw"].tolist()]
+        run.var[powered] = known["now_P"][:, Err.YAW, Err.YAW]
+        run.systematic_var[powered] = known["systematic_var"]
+        run.gyro_bias[powered] = known["static_bias"][:, 2] + known["bias"][:, 2]
         self._judge(cycle, cycle + 1)
         self._take(cycle, string, said)
 
