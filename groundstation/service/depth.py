@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import math
 from array import array
-from bisect import bisect_right, insort
+from bisect import bisect_left, bisect_right, insort
 from collections import Counter, deque
 from dataclasses import dataclass, field, replace
 
@@ -153,9 +153,14 @@ class DepthLog:
                 self._doubt(doubtful)
             self._suspect(max(against, key=lambda known: known.begun_at), stand)
             return None
-        insort(self.stands, stand, key=lambda known: (known.epoch, known.begun_at))
+        insort(self.stands, stand, key=_begin)
         del self.stands[:-STANDS_KEPT]
         return stand
+
+    def stand_before(self, stand: Stand) -> Stand | None:
+        """The last known stand that began before another."""
+        place = bisect_left(self.stands, (stand.epoch, stand.begun_at), key=_begin)
+        return self.stands[place - 1] if place else None
 
     def is_of_before(self, stand: Stand, epoch: int) -> bool:
         """Whether a stand without an epoch is known from one before ``epoch``: the encoder's clock may run on."""
@@ -194,7 +199,7 @@ class DepthLog:
         found = None if track is None else track.depth_at(time)
         if found is not None:
             return found
-        k = bisect_right(self.stands, (epoch, time), key=lambda stand: (stand.epoch, stand.begun_at)) - 1
+        k = bisect_right(self.stands, (epoch, time), key=_begin) - 1
         stand = self.stands[k] if k >= 0 else None
         return stand.md if stand is not None and stand.epoch == epoch and time <= stand.ended_at else None
 
@@ -294,6 +299,10 @@ class DepthLog:
             while len(self._tracks) > EPOCHS_KEPT:
                 del self._tracks[next(iter(self._tracks))]
         return self._tracks[epoch]
+
+
+def _begin(stand: Stand) -> Instant:
+    return stand.epoch, stand.begun_at
 
 
 def _same(one: Stand, other: Stand) -> bool:

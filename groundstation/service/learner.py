@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import itertools
+from dataclasses import replace
 
 from groundstation.errors import StoreError
 from groundstation.service.alarms import Alarm
@@ -34,16 +35,20 @@ class Learner:
         self._by_survey = (*CHANGED_BY_SURVEY, *(["wall"] if model.wall is not None else []))
 
     def take(self, message: Kept) -> None:
-        """A message has come; it is stored with those that come beside it."""
-        below = self._model.string_below(message) if isinstance(message, SurveyMeasurement) else None
-        self._arrived.append(Stored(message, None, below))
+        """A message has come; it is stored with those that come beside it, a survey with the depth that it has now."""
+        md = below = None
+        if isinstance(message, SurveyMeasurement):
+            below = self._model.string_below(message)
+            md = None if below is None else self._model.depth_of(message, below)
+        self._arrived.append(Stored(message, md, below))
 
     def learn_arrived(self) -> tuple[list[Kept], list[str]]:
         """Store and learn what came together; returns what is on the disk now, to be acknowledged, and changed paths.
 
-        What was stored already changes nothing; what is not stored is not acknowledged, and comes again. A survey gets
-        its depth at the next reading or look, with all that came meanwhile and in their order: whether a reading
-        brackets its time already is a matter of a millisecond.
+        What was stored already changes nothing; what is not stored is not acknowledged, and comes again. A survey is
+        fused at the next reading or look, with all that came meanwhile and in their order: whether a reading brackets
+        its time already is a matter of a millisecond. Where one does, as nearly always, its row needs no second
+        transaction.
         """
         if not self._arrived:
             return [], []  # as nearly always: it is asked after every event
@@ -58,7 +63,7 @@ class Learner:
         changed: dict[str, None] = {}
         for one, is_new in zip(arrived, are_new, strict=True):
             if is_new:
-                changed |= dict.fromkeys(self._learn(one.message, None, one.below))
+                changed |= dict.fromkeys(self._learn(one.message, None, one.below, kept=one.md))
                 if isinstance(one.message, Event):
                     self._watch.on_event(one.message)
         return [one.message for one in arrived], list(changed)
@@ -78,13 +83,16 @@ class Learner:
         """Fuse the surveys whose depth is known by now; returns the paths that changed."""
         model = self._model
         placeable = model.placeable()
-        if not placeable:
-            return []
+        moved: list[tuple[Kept, float | None]] = [(one.measurement, md) for one, md in placeable if one.kept != md]
+        moved += [(one.measurement, None) for one in model.waiting if one.kept is not None]
         try:
-            self._store.place_messages((one.measurement, md) for one, md in placeable)
+            if moved:
+                self._store.place_messages(moved)
         except StoreError:
             model.waiting += [one for one, _ in placeable]
             return []
+        if moved:
+            model.waiting = [replace(one, kept=None) for one in model.waiting]
         return sorted({path for one, md in placeable for path in self._learn(one.measurement, md, one.below)})
 
     def find_consequences(self) -> list[str]:
@@ -112,7 +120,12 @@ class Learner:
         self.find_consequences()
 
     def _learn(
-        self, message: Kept, md: float | None, below: float | None, prepared: Prepared | None = None
+        self,
+        message: Kept,
+        md: float | None,
+        below: float | None,
+        prepared: Prepared | None = None,
+        kept: float | None = None,
     ) -> tuple[str, ...]:
         """Add a stored message to the model; returns the paths that changed."""
         model = self._model
@@ -128,5 +141,5 @@ class Learner:
         model.stops.on_survey(epoch, message.station_at, message.tube)
         if md is not None:
             take_survey(model.depths, model.stops, epoch, message.station_at)
-        self._watch.on_survey(message, model.on_survey(message, md, below, prepared))
+        self._watch.on_survey(message, model.on_survey(message, md, below, prepared, kept))
         return self._by_survey

@@ -43,10 +43,14 @@ ALL_HEARD_WITHIN = 2.0  # s after the last tube that was new, of tubes that spea
 
 @dataclass(frozen=True, slots=True)
 class Waiting:
-    """A stored survey whose depth is not known, and the length (m) of string below its tube when it came."""
+    """A stored survey that waits for its depth, and the length (m) of string below its tube when it came.
+
+    ``kept`` is the depth (m) that the store has of it already; the next reading may yet say otherwise.
+    """
 
     measurement: SurveyMeasurement
     below: float | None
+    kept: float | None = None
 
 
 @dataclass(frozen=True, slots=True)
@@ -205,6 +209,8 @@ class RigModel:
 
     def placeable(self) -> list[tuple[Waiting, float]]:
         """Surveys that waited for their depth and have it now; they wait no more."""
+        if not self.waiting:
+            return []  # as nearly always: it is asked at every reading
         found = [(one, self.depth_of(one.measurement, one.below)) for one in self.waiting]
         self.waiting = [one for one, md in found if md is None]
         return [(one, md) for one, md in found if md is not None]
@@ -228,10 +234,12 @@ class RigModel:
         md: float | None,
         below: float | None = None,
         prepared: Prepared | None = None,
+        kept: float | None = None,
     ) -> str:
         """Resolve and fuse a stored measurement; returns the kind of alarm where it is not used as it is, or ''.
 
-        ``prepared`` is what it comes to, where ``prepare`` has worked that out.
+        ``prepared`` is what it comes to, where ``prepare`` has worked that out; ``kept`` is for one that waits, see
+        ``Waiting``.
         """
         trust = trust_of(measurement.flags)
         if trust is Trust.UNDATED:
@@ -241,7 +249,7 @@ class RigModel:
             self.set_aside.append(measurement)
             return "survey_set_aside"
         if md is None:
-            self.waiting.append(Waiting(measurement, below))
+            self.waiting.append(Waiting(measurement, below, kept))
             return ""  # most wait for a moment; the watch tells of those that wait longer
         try:
             self._fuse(measurement, md, trust, prepared or self._prepare_one(measurement))

@@ -22,18 +22,17 @@ def take_stand(depths: DepthLog, stops: Stops, told: Stand) -> None:
     stand = depths.add_stand(told)
     if stand is None:
         return
-    before = [known for known in depths.stands if (known.epoch, known.begun_at) < (stand.epoch, stand.begun_at)]
-    whole = stand
-    while before and (before[-1].epoch, before[-1].md) == (stand.epoch, stand.md):
-        whole = replace(stand, begun_at=before.pop().begun_at)
-    if before:
-        is_stop = before[-1].md < stand.md or (before[-1].md > stand.md and stops.is_too_short(before[-1]))
+    whole, before = stand, depths.stand_before(stand)
+    while before is not None and (before.epoch, before.md) == (stand.epoch, stand.md):
+        whole, before = replace(stand, begun_at=before.begun_at), depths.stand_before(before)
+    if before is not None:
+        is_stop = before.md < stand.md or (before.md > stand.md and stops.is_too_short(before))
     else:
         is_stop = stand.epoch != FIRST_EPOCH or stops.know(whole) or stops.was_surveyed(whole)
     if is_stop:
         stops.on_stand(whole)
-    elif before and before[-1].md == stand.md:
-        stops.on_later_stand(before[-1], whole)
+    elif before is not None and before.md == stand.md:
+        stops.on_later_stand(before, whole)
 
 
 def take_survey(depths: DepthLog, stops: Stops, epoch: int, at: float) -> None:

@@ -173,9 +173,8 @@ class Stops:
             stop.tubes = tuple(dict.fromkeys((*stop.tubes, *self._in_the_hole(stop.stand.md))))
 
     def _in_the_hole(self, md: float) -> Iterator[int]:
-        for tube in self._tally.tubes:
-            below = self._tally.length_below(tube)
-            if below is not None and md - below > IN_THE_HOLE:
+        for tube, below in self._tally.lengths_below():
+            if md - below > IN_THE_HOLE:
                 yield tube
 
 

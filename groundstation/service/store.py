@@ -104,8 +104,8 @@ class Store(Database):
         connection.execute(ADD, {**row, "kind": kind, "md": one.md, "below": one.below, "payload": payload})
         return True
 
-    def place_messages(self, placed: Iterable[tuple[Kept, float]]) -> None:
-        """Store the depths (m) of messages that came before they were known: of all, or of none."""
+    def place_messages(self, placed: Iterable[tuple[Kept, float | None]]) -> None:
+        """Store the depths (m) of messages that came earlier, or take them back (None): all or none."""
         rows = []
         for message, md in placed:
             row = row_of(message, encode(message))

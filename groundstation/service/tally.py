@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Collection
+from collections.abc import Collection, Iterator
 
 FITS = 0.5  # of a tube's length by which depth and tally may differ
 
@@ -65,6 +65,11 @@ class Tally:
     def reaches(self, md: float, hops: int, below: float) -> bool:
         """Whether the bit can be so deep (m) under a tube so many hops down with ``below`` (m) of string below it."""
         return hops < 1 or md <= (hops + FITS) * self._tube_length + below
+
+    def lengths_below(self) -> Iterator[tuple[int, float]]:
+        """Every tube from the top down, with the length (m) of string below its node."""
+        for place, tube in enumerate(self.tubes, 1):
+            yield tube, (len(self.tubes) - place) * self._tube_length
 
     def length_below(self, tube: int) -> float | None:
         """Length (m) of string below a tube's node, which sits at the tube's lower end; None for an unknown tube."""
