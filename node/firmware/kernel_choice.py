@@ -7,6 +7,7 @@ from typing import NamedTuple
 
 from node.firmware.settings import Kernel
 from node.kernels.cycle import run_cycle
+from node.kernels.layout import Array
 from node.kernels.relay import offer_aiding
 from node.kernels.step import node_aiding, node_step
 
@@ -23,8 +24,11 @@ class Loop(NamedTuple):
     aiding: Callable[..., int]
 
 
-def kernel_of(kernel: Kernel) -> Loop:
-    """What a node with the kernel chosen runs; all but the default are loaded only when used."""
+def kernel_of(kernel: Kernel, integers: Array | None = None) -> Loop:
+    """What a node with the kernel chosen runs; all but the default are loaded only when used.
+
+    ``integers`` is the memory of a node in integers, see ``node.kernels.fixed.node.FixedNode``.
+    """
     if kernel == "float64":
         return Loop(run_cycle, offer_aiding, node_step, node_aiding)
     if kernel == "published":
@@ -34,5 +38,5 @@ def kernel_of(kernel: Kernel) -> Loop:
         return Loop(published.run_cycle, published.offer_aiding, published_step, published_aiding)
     from node.kernels.fixed.node import FixedNode
 
-    fixed = FixedNode()
+    fixed = FixedNode(integers)
     return Loop(fixed.run_cycle, fixed.offer_aiding, fixed.step, fixed.aiding)

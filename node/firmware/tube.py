@@ -36,7 +36,6 @@ from node.kernels.step import (
     SAY_SURVEY,
     is_quiet,
     is_standing,
-    node_step,
 )
 from node.kernels.twist import twist_var
 from telemetry.messages import (
@@ -72,6 +71,7 @@ class Tube:
     parameters : block in use; None is the identity
     corrections : (1 + IMUs,) of dtype ``PARAMETERS``, where the step reads the block in use and each IMU's own
         correction, owned by the caller; None: by the node
+    integers : memory of the kernel in integers, one-element array of dtype ``INTEGERS``, likewise
     """
 
     def __init__(
@@ -84,6 +84,7 @@ class Tube:
         restored: bool,
         parameters: ParameterBlock | None = None,
         corrections: Array | None = None,
+        integers: Array | None = None,
     ) -> None:
         self.settings = settings
         nodes["config"] = configs
@@ -99,7 +100,7 @@ class Tube:
         count = len(settings.imus)
         if count > 1:
             begin_cluster(self.node, self._crew[0])
-        self._loop = kernel_of(settings.kernel)
+        self._loop = kernel_of(settings.kernel, integers)
         own = [ParameterBlock(settings.tube, 0, imu.gyroscope, imu.accelerometer) for imu in settings.imus]
         self._corrections = np.zeros(1 + count, PARAMETERS) if corrections is None else corrections
         self._corrections[:] = np.concatenate([record_of(block) for block in (own[0], *own)])
@@ -147,11 +148,6 @@ class Tube:
             rows[k] = _row_of(reading.others[k - 1]) if k <= len(reading.others) else math.nan
         says = self._loop.step(self.nodes, self._crew, self._corrections, rows, self._moment)
         return [] if says in (0, ADMITTED) else list(self.say(says, reading.end, context))
-
-    @property
-    def runs_together(self) -> bool:
-        """Whether the node may be one of many that ``node.kernels.string`` takes through a cycle: the float64 loop."""
-        return self._loop.step is node_step
 
     @property
     def crew(self) -> Array:

@@ -7,7 +7,7 @@ address calls the very code that a rig runs.
 from __future__ import annotations
 
 import functools
-from typing import Any, cast
+from typing import Any, Final, cast
 
 import numba
 import numpy as np
@@ -18,6 +18,8 @@ from node.kernels.calibration import identity_parameters
 from node.kernels.layout import default_config
 from node.kernels.record import AIDING, MOMENT, READING, SETTINGS, new_node
 from node.kernels.step import node_aiding, node_step
+
+BY_ADDRESS: Final = ("float64", "fixed")  # kernels
 
 
 class ByAddress(WrapperAddressProtocol):
@@ -47,11 +49,20 @@ def _kind_of(value: ByAddress, _: Any) -> FunctionType:
 
 
 @functools.cache
-def firmware() -> tuple[ByAddress, ByAddress]:
-    """``node_step`` and ``node_aiding``."""
+def firmware(kernel: str = "float64") -> tuple[ByAddress, ByAddress]:
+    """``node_step`` and ``node_aiding`` of one of ``BY_ADDRESS``; those in integers are loaded only when used."""
+    if kernel == "float64":
+        return _by_address(node_step, node_aiding)
+    from node.kernels.fixed.record import new_integers
+    from node.kernels.fixed.step import fixed_aiding, fixed_step
+
+    return _by_address(fixed_step, fixed_aiding, new_integers())
+
+
+def _by_address(step: Any, aid: Any, *integers: Any) -> tuple[ByAddress, ByAddress]:
     nodes, crews = new_node(default_config()), np.zeros(1, SETTINGS)
     corrections = np.concatenate([identity_parameters()] * 2)
     return (
-        ByAddress(node_step, nodes, crews, corrections, np.zeros((1, READING)), np.zeros(MOMENT)),
-        ByAddress(node_aiding, nodes, crews, np.zeros(AIDING)),
+        ByAddress(step, nodes, crews, corrections, np.zeros((1, READING)), np.zeros(MOMENT), *integers),
+        ByAddress(aid, nodes, crews, np.zeros(AIDING), *integers),
     )

@@ -62,7 +62,9 @@ class Desk(NamedTuple):
     """Work space of a reading that is made of frames."""
 
     borders: Array  # (PARTS + 2,) frames
-    sums: Array  # (2, SUMS)
+    before: Array  # (SUMS,) over the frames before the window
+    felt: Array  # (SUMS,) over those before a border
+    shows: Array  # (SUMS,) what the z gyroscope shows of each sum
     same: Array  # (SAME,)
     drawn: Array  # (2 PARTS,) normal
     noise: Array  # (PARTS + 1,) rad/s, of the z gyroscope, summed over the frames of each part
@@ -168,7 +170,7 @@ class StillString:
             torsional=np.zeros(0),
             shaken=np.zeros(0),
             fifos=np.zeros(0, FIFO),
-            desk=Desk(*(np.zeros(shape) for shape in (PARTS + 2, (2, SUMS), SAME, 2 * PARTS, PARTS + 1))),
+            desk=Desk(*(np.zeros(shape) for shape in (PARTS + 2, SUMS, SUMS, SUMS, SAME, 2 * PARTS, PARTS + 1))),
         )
 
     def _sums(self) -> tuple[Array, npt.NDArray[np.int64]]:

@@ -16,7 +16,7 @@ from node.kernels.jit import kernel
 from node.kernels.layout import PARTS, PERIOD, Array
 from node.kernels.record import BEHIND, LATE, LATE_STD, SATURATED, SPLIT, TEMPERATURE
 from node.process.drivers.parts import LEAST
-from sim.campaign.field import FELT, FINER, MOVED, SAME
+from sim.campaign.field import FELT, FINER, MOVED, SAME, SUMS
 from sim.campaign.philox import normals, uniforms
 from sim.campaign.sensors import cross_hop, wander_on
 
@@ -66,23 +66,32 @@ def read_frames(
     middle = first + 0.5 * (found - 1)
     cold = math.exp(-(since + front.frame * middle) / front.warm_up_s)
     drift, drift_on = front.warm_up * (1.0 - cold), front.warm_up * cold * front.frame / front.warm_up_s
-    row[:TEMPERATURE] = 0.0
     set_noise(noise_z, borders, pieces, front.rate[2], drawn[2], desk.drawn)
-    kind, ahead = field.sums[field.kinds[k]], 0.0
-    sum_until(desk.sums[0], kind, field.moved, field.torsional, fifo, borders[0], shaken_from, shaken_to)
+    kind, felt, shows, drifts = (
+        field.sums[field.kinds[k]],
+        desk.felt,
+        desk.shows,
+        set_shows(desk.shows, noise, tube, fifo),
+    )
+    sum_until(felt, kind, field.moved, field.torsional, fifo, borders[pieces], shaken_from, shaken_to)
+    last = shown_of(shows, felt)
+    sum_until(desk.before, kind, field.moved, field.torsional, fifo, borders[0], shaken_from, shaken_to)
+    before = shown_of(shows, desk.before)
+    slack = set_means(row, noise, tube, fifo, desk.before, felt, drift, found)
+    row[3], row[4] = row[3] + slack * row[4], row[4] - slack * row[3]
     for piece in range(pieces):
-        before, after = desk.sums[piece % 2], desk.sums[1 - piece % 2]
-        sum_until(after, kind, field.moved, field.torsional, fifo, borders[piece + 1], shaken_from, shaken_to)
+        after = last
+        if piece < pieces - 1:
+            sum_until(felt, kind, field.moved, field.torsional, fifo, borders[piece + 1], shaken_from, shaken_to)
+            after = shown_of(shows, felt)
         length = borders[piece + 1] - borders[piece]
         centre = 0.5 * (borders[piece + 1] + borders[piece] - 1.0)
-        shown = add_piece(row, noise, tube, fifo, before, after, (drift + drift_on * (centre - middle)) * length)
-        ahead += after[SLACK_ANGLE] - before[SLACK_ANGLE]
-        row[2] += noise_z[piece]
-        row[BEHIND + piece] = (shown + noise_z[piece]) / length + same[2] if length > 0.0 else 0.0
-    slack = ahead / found
-    row[3], row[4] = row[3] + slack * row[4], row[4] - slack * row[3]
+        drifted = drifts * (drift + drift_on * (centre - middle)) * length
+        row[2] += noise_z[piece] / found
+        row[BEHIND + piece] = (after - before + drifted + noise_z[piece]) / length + same[2] if length > 0.0 else 0.0
+        before = after
     for i in range(SAME):
-        row[i] = row[i] / found + same[i]
+        row[i] += same[i]
     for i in range(3):
         row[i] = min(max(row[i], -noise.limit), noise.limit)
     warm = 1.0 - math.exp(-(end - front.first) / front.warm_up_s)
@@ -195,27 +204,51 @@ def sum_until(
 
 
 @kernel
-def add_piece(row: Array, noise: Any, tube: Any, fifo: Any, before: Array, after: Array, drift: float) -> float:
-    """Add to ``row`` (SAME,) what the sensors show of the frames between two sums, and return what of it is about z.
+def set_shows(shows: Array, noise: Any, tube: Any, fifo: Any) -> float:
+    """Set what the z gyroscope shows of each sum (SUMS,), and return what it shows of a drift of all three."""
+    c, s, spread = tube.cos, tube.sin, tube.spread
+    by_force = (
+        spread[2, 0] * fifo.pull[0, 0] + spread[2, 1] * fifo.pull[1, 0] + spread[2, 2] * fifo.pull[2, 0],
+        spread[2, 0] * fifo.pull[0, 1] + spread[2, 1] * fifo.pull[1, 1] + spread[2, 2] * fifo.pull[2, 1],
+        spread[2, 0] * fifo.pull[0, 2] + spread[2, 1] * fifo.pull[1, 2] + spread[2, 2] * fifo.pull[2, 2] + noise.pull,
+    )
+    shows[0], shows[1] = c * spread[2, 0] - s * spread[2, 1], s * spread[2, 0] + c * spread[2, 1]
+    shows[2] = shows[SLACK_RATE] = shows[TORSIONAL] = spread[2, 2]
+    shows[3], shows[4], shows[5] = c * by_force[0] - s * by_force[1], s * by_force[0] + c * by_force[1], by_force[2]
+    shows[CIRCLE], shows[CIRCLE + 1], shows[SLACK_ANGLE] = by_force[0], by_force[1], 0.0
+    return float(spread[2, 0] + spread[2, 1] + spread[2, 2])
 
-    ``drift`` (rad/s) is that of each gyroscope, as a sum over these frames.
+
+@kernel
+def shown_of(shows: Array, felt: Array) -> float:
+    """What the z gyroscope shows of sums (SUMS,), rad/s."""
+    shown = 0.0
+    for j in range(SUMS):
+        shown += shows[j] * felt[j]
+    return shown
+
+
+@kernel
+def set_means(
+    row: Array, noise: Any, tube: Any, fifo: Any, before: Array, after: Array, drift: float, found: int
+) -> float:
+    """Set ``row`` (SAME,) to the mean of the ``found`` frames between two sums; returns that of the slack, rad.
+
+    ``drift`` (rad/s) is that of each gyroscope, as a mean over these frames.
     """
     c, s = tube.cos, tube.sin
     x, y = after[0] - before[0], after[1] - before[1]
     z = after[2] - before[2] + after[SLACK_RATE] - before[SLACK_RATE] + after[TORSIONAL] - before[TORSIONAL]
     across, along = after[3] - before[3], after[4] - before[4]
     force = (
-        c * across + s * along + after[CIRCLE] - before[CIRCLE],
-        c * along - s * across + after[CIRCLE + 1] - before[CIRCLE + 1],
-        after[5] - before[5],
+        (c * across + s * along + after[CIRCLE] - before[CIRCLE]) / found,
+        (c * along - s * across + after[CIRCLE + 1] - before[CIRCLE + 1]) / found,
+        (after[5] - before[5]) / found,
     )
-    rate = (c * x + s * y, c * y - s * x, z)
-    shown = 0.0
+    rate = ((c * x + s * y) / found, (c * y - s * x) / found, z / found)
     for i in range(3):
-        shown = noise.pull * force[i]
+        row[i], row[3 + i] = noise.pull * force[i], force[i]
         for j in range(3):
             pulled = fifo.pull[j, 0] * force[0] + fifo.pull[j, 1] * force[1] + fifo.pull[j, 2] * force[2]
-            shown += tube.spread[i, j] * (rate[j] + pulled + drift)
-        row[i] += shown
-        row[3 + i] += force[i]
-    return shown
+            row[i] += tube.spread[i, j] * (rate[j] + pulled + drift)
+    return float(after[SLACK_ANGLE] - before[SLACK_ANGLE]) / found

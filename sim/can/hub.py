@@ -54,6 +54,7 @@ class CanHub:
         self.wires: dict[str, CanWire] = {}
         self._segment_of: dict[Address, str] = {}
         self._counts: dict[Address, int] = {}
+        self._due: dict[str, float] = {}  # s, when each segment has more
         self._socket = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
         self._socket.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, RECEIVE_BUFFER)
         self._socket.setsockopt(socket.IPPROTO_IP, IP_RECVERR, 1)  # learn that a controller's process is gone
@@ -83,6 +84,7 @@ class CanHub:
         """Change a segment, such as cut it, from any thread."""
         with self._lock:
             change(self.wires[segment])
+            self._due[segment] = -math.inf
         self._wake_out.send(b"w")
 
     def close(self) -> None:
@@ -95,9 +97,10 @@ class CanHub:
         with self._lock:
             while (arrival := self._receive()) is not None:
                 self._on_datagram(*arrival)
-            now, due = time.monotonic(), math.inf
-            for segment in list(self.wires):
-                due = min(due, self._advance(segment, now))
+            now = time.monotonic()
+            for segment in [segment for segment, due in self._due.items() if due <= now]:
+                self._advance(segment, now)
+            due = min(self._due.values(), default=math.inf)
         return min(max(due - now, 0.0), LONGEST_WAIT)
 
     def _receive(self) -> tuple[bytes, Address] | None:
@@ -129,6 +132,7 @@ class CanHub:
             self._detach(address)
         elif datagram == RESTART:
             self.wires[segment].restart(address)
+            self._due[segment] = -math.inf
         elif datagram != HERE:
             with contextlib.suppress(ValueError):
                 frame, _ = unpack(datagram)
@@ -140,6 +144,7 @@ class CanHub:
         wire = self.wires.setdefault(segment, CanWire(self._rates))
         wire.attach(address, fd=bool(flags & FLAG_FD), hears_itself=bool(flags & FLAG_OWN))
         self._segment_of[address], self._counts[address] = segment, 0
+        self._due[segment] = -math.inf  # somebody may have waited for a listener
         self._put(ATTACHED, address)
 
     def _detach(self, address: Address) -> None:
@@ -148,19 +153,21 @@ class CanHub:
         if segment is None:
             return
         self.wires[segment].detach(address)
+        self._due[segment] = -math.inf
         if not self.wires[segment].controllers:
-            del self.wires[segment]
+            del self.wires[segment], self._due[segment]
 
-    def _advance(self, segment: str, now: float) -> float:
-        """Hand out what the segment has for its controllers; returns when it has more (s)."""
+    def _advance(self, segment: str, now: float) -> None:
+        """Hand out what the segment has for its controllers."""
         wire = self.wires.get(segment)
         if wire is None:
-            return math.inf
+            return  # its last controller went meanwhile
         for address, frame in wire.advance(now):
             if isinstance(address, tuple) and address in self._counts:
                 self._counts[address] += 1
                 self._put(frame.pack(self._counts[address]), address)
-        return wire.due()
+        if segment in self.wires:
+            self._due[segment] = wire.due()
 
     def _put(self, datagram: bytes, address: Address) -> None:
         try:

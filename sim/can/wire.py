@@ -103,27 +103,26 @@ class CanWire:
         """When ``advance`` has something to do next (s), infinite if never."""
         if self._current is not None:
             return self._current.end
-        starts = [controller.waiting[0][0] for controller in self._able().values()]
-        return max(min(starts), self._idle_at) if starts else math.inf
+        earliest = math.inf
+        for name, one in self.controllers.items():
+            if one.waiting and one.waiting[0][0] < earliest and self._is_able(name, one):
+                earliest = one.waiting[0][0]
+        return max(earliest, self._idle_at)
 
     def advance(self, now: float) -> list[Delivery]:
         """Everything that controllers get until ``now``, in order."""
         deliveries: list[Delivery] = []
-        while self.due() <= now:
+        while (due := self.due()) <= now:
             if self._current is None:
-                self._current = self._begin(self.due(), deliveries)
+                self._current = self._begin(due, deliveries)
             else:
                 self._end(self._current, deliveries)
                 self._current = None
         return deliveries
 
-    def _able(self) -> dict[Hashable, Controller]:
-        """Controllers with something to send, but for one that has learnt that it is alone."""
-        return {
-            name: c
-            for name, c in self.controllers.items()
-            if c.waiting and not c.is_off and not (c.unacknowledged and not self._listeners(name))
-        }
+    def _is_able(self, name: Hashable, one: Controller) -> bool:
+        """Whether a controller with something to send may: not one that has learnt that it is alone."""
+        return not one.is_off and not (one.unacknowledged and not self._listeners(name))
 
     def _listeners(self, *senders: Hashable) -> list[Hashable]:
         """Controllers that acknowledge what ``senders`` send."""
@@ -133,9 +132,13 @@ class CanWire:
 
     def _begin(self, start: float, deliveries: list[Delivery]) -> Transmission | None:
         """Arbitrate among those who wait at ``start``; None when the winner is alone."""
-        contenders = {name: c for name, c in self._able().items() if c.waiting[0][0] <= start}
-        lowest = min(c.waiting[0][1].rank for c in contenders.values())
-        winners = {name: c.waiting[0][1] for name, c in contenders.items() if c.waiting[0][1].rank == lowest}
+        firsts = {
+            name: one.waiting[0][1]
+            for name, one in self.controllers.items()
+            if one.waiting and one.waiting[0][0] <= start and self._is_able(name, one)
+        }
+        lowest = min(frame.rank for frame in firsts.values())
+        winners = {name: frame for name, frame in firsts.items() if frame.rank == lowest}
         senders, frame = tuple(winners), next(iter(winners.values()))
         if not self._listeners(*senders) and len(senders) == 1:
             self._miss_acknowledgement(senders[0], deliveries)

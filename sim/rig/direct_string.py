@@ -19,9 +19,10 @@ from node.firmware.encoder import EncoderNode, EncoderSample
 from node.firmware.inputs import RigContext
 from node.firmware.reporter import VAR_FLOOR
 from node.firmware.tube import Tube
-from node.kernels.address import firmware
+from node.kernels.address import BY_ADDRESS, firmware
 from node.kernels.angles import from_binary, wrap
 from node.kernels.calibration import PARAMETERS, USUAL
+from node.kernels.fixed.record import INTEGERS
 from node.kernels.layout import PERIOD, Err, Scheme, default_config
 from node.kernels.record import A_VALID, BEHIND, END, LATE, LATE_STD, READING, SATURATED, SPLIT, TEMPERATURE, new_node
 from node.kernels.step import ADMITTED
@@ -105,12 +106,12 @@ class DirectString:
         if self._file.medium.link != "off":
             raise ScenarioError('medium.link: expected "off" for a string without frames')
         self._spoil = spoil
-        self._step, self._aid = firmware()
         count, self._imus = world.scenario.tubes, self._file.node.imus
         config = self._tuned_config()
         # the records of all tubes in one array, so that a cycle is read off in a few operations
         self.nodes = np.repeat(new_node(config), count)
         self._corrections = np.zeros((count, 1 + self._imus), PARAMETERS)
+        self._integers = np.zeros(count, INTEGERS) if self._file.node.kernel == "fixed" else None
         self.tubes = {tube: self._fresh_tube(tube, config, state_every) for tube in range(1, count + 1)}
         self._encoder = EncoderNode(torque=world.torque_settings())
         sensor = self._file.encoder
@@ -126,8 +127,7 @@ class DirectString:
         self._crews = np.concatenate([tube.crew for tube in self.tubes.values()])
         self.clock_shifts: dict[int, float] = {}
         self._mount_var = math.radians(self._file.joints.mount_std_deg) ** 2
-        plain = spoil is None and self._imus == 1
-        self._runs_together = plain and all(tube.runs_together for tube in self.tubes.values())
+        self._runs_together = spoil is None and self._imus == 1 and self._file.node.kernel in BY_ADDRESS
         forward = all(tube.settings.scheme is Scheme.FORWARD for tube in self.tubes.values())
         self._hands_on = self._runs_together and forward
         at_once = self._hands_on and is_plain(world)
@@ -188,6 +188,7 @@ class DirectString:
             iter(range(NEVER)).__next__,
             restored=False,
             corrections=self._corrections[tube - 1],
+            integers=None if self._integers is None else self._integers[tube - 1 : tube],
         )
 
     def _losses(self) -> Mask:
@@ -273,13 +274,14 @@ class DirectString:
     def _run_together(self, first: int, last: int) -> int:
         """Take all nodes through cycles in one call, until one has something to say; returns which cycle is next."""
         course, desk = self._course, self._desk
+        step, aid = firmware(self._file.node.kernel)
         if course is None:
             raise ScenarioError("string: expected nodes that run together")
         shifts = np.array([self.clock_shifts.get(tube, 0.0) for tube in self.tubes])
-        nodes, crews = self.nodes, self._crews
+        nodes, crews, integers = self.nodes, self._crews, self._integers
         corrections = self._corrections
         reached = run_string(
-            self._step, self._aid, nodes, crews, corrections, course, shifts, desk, self._kept, first, last
+            step, aid, nodes, crews, corrections, course, shifts, desk, self._kept, first, last, integers
         )
         self._judge(first, reached)
         cycle = reached - 1
@@ -293,7 +295,7 @@ class DirectString:
             )
         self._take(cycle, range(n, 0, -1), said)
         if telling and course.locked:
-            hand_down(self._aid, nodes, crews, course, shifts, desk, cycle)
+            hand_down(aid, nodes, crews, course, shifts, desk, cycle, integers)
         return reached
 
     def _run_one_by_one(self, cycle: int, string: Sequence[int]) -> None:

@@ -1,7 +1,8 @@
 """A string without a link in one call: cycle after cycle of every node, and aiding from hop to hop.
 
-What a node does is ``node.kernels.step``, called by its address. Everything that does not depend on what the nodes do
-is worked out before: schedule, readings, what the encoder measures and what becomes of it on its way.
+What a node does is ``node.kernels.step``, or the same in integers, called by its address. Everything that does not
+depend on what the nodes do is worked out before: schedule, readings, what the encoder measures and what becomes of it
+on its way.
 """
 
 from __future__ import annotations
@@ -82,6 +83,7 @@ def run_string(
     kept: Any,
     first: int,
     last: int,
+    integers: Any,
 ) -> int:
     """Take the string through the cycles ``first``..``last`` - 1; returns the cycle before which it stopped.
 
@@ -90,7 +92,7 @@ def run_string(
 
     Parameters
     ----------
-    step, aid : ``node_step`` and ``node_aiding``, see ``node.kernels.address``
+    step, aid, integers : see ``node.kernels.string``
     nodes, crews : (tubes,) of dtype ``NODE`` and ``SETTINGS``
     corrections : (tubes, imus + 1) of dtype ``PARAMETERS``
     shifts : (tubes,) s, of the nodes' clocks
@@ -98,21 +100,23 @@ def run_string(
     for cycle in range(first, last):
         tubes = course.powered[cycle]
         if not course.locked:
-            hand_down(aid, nodes, crews, course, shifts, desk, cycle)
+            hand_down(aid, nodes, crews, course, shifts, desk, cycle, integers)
         set_moments(course, shifts, desk.moments, cycle)
         readings = course.readings[cycle]
-        string_step(step, nodes[:tubes], crews, corrections, readings, desk.moments, desk.mask, desk.says)
+        string_step(step, nodes[:tubes], crews, corrections, readings, desk.moments, desk.mask, desk.says, integers)
         keep(nodes, tubes, kept, cycle)
         for k in range(tubes):
             if desk.says[k] & ~ADMITTED != 0:
                 return cycle + 1
         if course.locked:
-            hand_down(aid, nodes, crews, course, shifts, desk, cycle)
+            hand_down(aid, nodes, crews, course, shifts, desk, cycle, integers)
     return last
 
 
 @kernel
-def hand_down(aid: Any, nodes: Array, crews: Array, course: Any, shifts: Array, desk: Any, cycle: int) -> None:
+def hand_down(
+    aid: Any, nodes: Array, crews: Array, course: Any, shifts: Array, desk: Any, cycle: int, integers: Any
+) -> None:
     """Hand the aiding of a cycle down the string as far as it is not lost."""
     reach, tubes = course.reach[cycle], course.powered[cycle]
     if reach == 0:
@@ -122,7 +126,7 @@ def hand_down(aid: Any, nodes: Array, crews: Array, course: Any, shifts: Array, 
         desk.places[hop] = k
         desk.valid[hop] = course.arrivals[cycle, hop] + shifts[k]
     desk.aiding[:] = course.measured[cycle]
-    string_aiding(aid, nodes, crews, desk.places, reach, desk.valid, desk.aiding)
+    string_aiding(aid, nodes, crews, desk.places, reach, desk.valid, desk.aiding, integers)
 
 
 @kernel

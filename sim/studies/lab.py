@@ -8,6 +8,7 @@ counts. Joints and mounts are exact and the accelerometer has noise only, as the
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -62,8 +63,22 @@ class LabRun:
 def run_seed(job: tuple[Tables, int]) -> LabRun:
     """One seed of one scenario, for a pool of processes."""
     tables, seed = job
-    world = World(scenario_of(dict(tables)), seed)
-    return judge(world, DirectString(world).drill())
+    return run_seed_of_each(([tables], seed))[0]
+
+
+def run_seed_of_each(job: tuple[Sequence[Tables], int]) -> list[LabRun]:
+    """One seed of several scenarios; the world of those that differ in their aiding alone is worked out once."""
+    setups, seed = job
+    worlds: dict[str, World] = {}
+    runs = []
+    for tables in setups:
+        scenario = scenario_of(dict(tables))
+        unaided = scenario.file.model_dump_json(exclude={"aiding"})
+        if unaided not in worlds:
+            worlds[unaided] = World(scenario, seed)
+        world = worlds[unaided].aided_like(scenario)
+        runs.append(judge(world, DirectString(world).drill()))
+    return runs
 
 
 def judge(world: World, run: StringRun) -> LabRun:
@@ -82,7 +97,7 @@ def judge(world: World, run: StringRun) -> LabRun:
 
 
 def _azimuth_of_rest(world: World, run: StringRun, tube: int) -> float:
-    force = np.array([world.imu_sample(tube, int(cycle))[3:6] for cycle in np.flatnonzero(REST)])
+    force = world.sensors.samples(tube)[REST, 3:6]
     yaw = run.yaw[REST, tube - 1]
     mean = float(yaw[0] + np.mean(wrapped(yaw - yaw[0])))
     return _azimuth(force.mean(axis=0), np.cov(force.T) / len(force), mean, float(run.var[REST, tube - 1].mean()))

@@ -6,7 +6,9 @@ import multiprocessing
 import os
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
+from contextvars import ContextVar
 from functools import partial
+from multiprocessing.pool import Pool
 from typing import Protocol, TypeVar
 
 from sim.errors import RigError
@@ -17,6 +19,7 @@ Found = TypeVar("Found")
 Step = Callable[[], None]
 CORES = "BORECHAIN_CORES"
 FEW = 2  # jobs at a time, that this process does itself
+KEPT: ContextVar[list[Pool] | None] = ContextVar("pool", default=None)  # where one is kept: it, once it is started
 
 
 class RunAll(Protocol):
@@ -30,14 +33,14 @@ class RunAll(Protocol):
 def over_cores(most: int, step: Step) -> Iterator[RunAll]:
     """Yield the function that runs jobs on all cores, ``most`` at a time; ``step`` is called after each job.
 
-    A process takes seconds to start, so a study keeps one pool for all its batches, and `FEW` need none.
+    A process takes seconds to start, so a study keeps one pool for all its batches, many studies keep theirs in
+    ``one_pool``, and `FEW` jobs need none.
     """
     processes = min(cores(), most)
     if most <= FEW or processes == 1:
         yield partial(_here, step)
         return
-    one_thread_each()
-    with multiprocessing.get_context("spawn").Pool(processes) as pool:
+    with _pool_of(processes) as pool:
 
         def run_all(work: Callable[[Job], Found], jobs: Iterable[Job]) -> list[Found]:
             results = []
@@ -47,6 +50,37 @@ def over_cores(most: int, step: Step) -> Iterator[RunAll]:
             return results
 
         yield run_all
+
+
+@contextmanager
+def one_pool() -> Iterator[None]:
+    """Have all of ``over_cores`` inside run on the same processes, which are started when first asked for."""
+    token = KEPT.set([])
+    try:
+        yield
+    finally:
+        for pool in KEPT.get() or ():
+            pool.terminate()
+            pool.join()
+        KEPT.reset(token)
+
+
+@contextmanager
+def _pool_of(processes: int) -> Iterator[Pool]:
+    """Processes of its own, or those that are kept, of which there is one a core."""
+    kept = KEPT.get()
+    if kept is None:
+        with _started(processes) as pool:
+            yield pool
+        return
+    if not kept:
+        kept.append(_started(cores()))
+    yield kept[0]
+
+
+def _started(processes: int) -> Pool:
+    one_thread_each()
+    return multiprocessing.get_context("spawn").Pool(processes)
 
 
 def cores() -> int:

@@ -26,6 +26,11 @@ class Scenario:
         self.tube_length = file.rig.tube_length_m
         self.medium = file.medium
 
+    def aided_like(self, other: Scenario) -> Scenario:
+        """The same under the aiding of another."""
+        file = self.file.model_copy(update={"aiding": other.file.aiding})
+        return Scenario(file, self.hole, self.faults)
+
     def drilling(self, name: str) -> Scenario:
         """The same with a hole of its site.
 

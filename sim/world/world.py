@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import copy
 import math
 from functools import cached_property
 from itertools import pairwise
@@ -44,6 +45,12 @@ class World(DrillString):
         self.faults: tuple[KillNode, ...] = scenario.faults
         self._check_faults()
         self.radio = self._radio_links()
+
+    def aided_like(self, scenario: Scenario) -> World:
+        """The same world under the aiding of another scenario: what was worked out of it holds for either."""
+        other = copy.copy(self)
+        other.scenario = self.scenario.aided_like(scenario)
+        return other
 
     def imu_sample(self, tube: int, cycle: int) -> list[Any]:
         """What a tube reads in a cycle, see ``Sensors.sample``."""

@@ -86,11 +86,14 @@ def all_(context: click.Context, short: bool, out: Path | None) -> None:
     Example:
       borechain experiment all --out docs/results
     """
+    from sim.studies.pool import one_pool
+
     folder = [] if out is None else ["--out", str(out)]
-    for study in studies().values():
-        for words in (study.short,) if short else study.full:
-            click.echo(f"borechain experiment {study.name} {words}".rstrip(), err=True)
-            command_of(study).main([*shlex.split(words), *folder], standalone_mode=False, parent=context)
+    with one_pool():
+        for study in studies().values():
+            for words in (study.short,) if short else study.full:
+                click.echo(f"borechain experiment {study.name} {words}".rstrip(), err=True)
+                command_of(study).main([*shlex.split(words), *folder], standalone_mode=False, parent=context)
 
 
 ABOUT_ALL = ("all", "list")

@@ -14,10 +14,15 @@ from node.kernels.warm import warm_loop, warm_step
 
 
 class FixedNode:
-    """Integers of one node; every method but the properties has the signature of a float64 kernel."""
+    """Integers of one node; every method but the properties has the signature of a float64 kernel.
 
-    def __init__(self) -> None:
-        self._integers = new_integers()
+    Parameters
+    ----------
+    integers : one-element array of dtype ``INTEGERS``, new, owned by the caller; None: by the node
+    """
+
+    def __init__(self, integers: Array | None = None) -> None:
+        self._integers = new_integers() if integers is None else integers
 
     @property
     def overflows(self) -> int:

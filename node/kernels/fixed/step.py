@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from node.kernels.fixed.cycle import run_cycle
 from node.kernels.fixed.node_words import learn_aiding, learn_inputs, learn_node, show_node
-from node.kernels.jit import kernel
+from node.kernels.jit import entry, kernel
 from node.kernels.layout import Array
 from node.kernels.relay import offer_aiding
 from node.kernels.step import aiding_around, step_around
@@ -26,7 +26,7 @@ def integer_aiding(nodes: Array, settings: Array, aiding: Array) -> int:
     return int(aiding_around(offer_aiding, nodes, settings, aiding))
 
 
-@kernel
+@entry
 def fixed_step(
     nodes: Array, settings: Array, parameters: Array, readings: Array, moment: Array, integers: Array
 ) -> int:
@@ -45,7 +45,7 @@ def fixed_step(
     return says
 
 
-@kernel
+@entry
 def fixed_aiding(nodes: Array, settings: Array, aiding: Array, integers: Array) -> int:
     """Take one aiding into a node as ``node.kernels.step.node_aiding``; ``integers`` as ``fixed_step``."""
     learn_node(nodes, settings, integers)

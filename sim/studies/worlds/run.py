@@ -11,8 +11,9 @@ NEES is of the yaw against everything that the node states, doubts and the error
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
+from itertools import groupby
 from typing import Any
 
 import numpy as np
@@ -93,12 +94,14 @@ def shortened(case: Case, hops: int) -> Case:
 
 
 def steps(part: str, seeds: int, string_seeds: int, strings: int, hops: int) -> int:
-    """Runs of both worlds."""
-    return sum(len(job.worlds) * job.seeds for job in jobs_of(part, seeds, string_seeds, strings, hops))
+    """Seeds of either world: of all strings that are run together, and of the long one."""
+    jobs = jobs_of(part, seeds, string_seeds, strings, hops)
+    alone = [job.seeds for job in jobs if not job.cases]
+    return len(WORLDS) * sum([*(count for count, _ in together(jobs)), *alone])
 
 
 def run(part: str, seeds: int, string_seeds: int, strings: int, hops: int, step: Step) -> dict[str, Any]:
-    """Both tables; ``step`` is called after each run.
+    """Both tables; ``step`` is called after each seed.
 
     Parameters
     ----------
@@ -115,17 +118,29 @@ def run(part: str, seeds: int, string_seeds: int, strings: int, hops: int, step:
     """
     result: dict[str, Any] = {"experiment": "worlds", "seeds": seeds, "string_seeds": string_seeds, "hops": hops}
     result["strings"], result["cases"], result[CONSISTENCY] = strings, [], []
+    jobs = jobs_of(part, seeds, string_seeds, strings, hops)
     with over_cores(max(seeds, string_seeds, strings), step) as run_all:
-        for job in jobs_of(part, seeds, string_seeds, strings, hops):
-            seeded_of = {world: seeded(setup, job.seeds) for world, setup in job.worlds.items()}
-            if job.cases:
-                runs = {world: run_all(lab.run_seed, of) for world, of in seeded_of.items()}
-                result["cases"] += [row for case in job.cases for row in rows_of(case, runs)]
-            else:
-                result[CONSISTENCY] += consistency(
-                    {world: run_all(epochs.run_campaign_seed, of) for world, of in seeded_of.items()}
-                )
+        for count, some in together(jobs):
+            runs: dict[str, list[list[LabRun]]] = {}
+            for world in WORLDS:
+                runs[world] = run_all(lab.run_seed_of_each, seeded([job.worlds[world] for job in some], count))
+            for place, job in enumerate(some):
+                of_job = {world: [of_seed[place] for of_seed in found] for world, found in runs.items()}
+                result["cases"] += [row for case in job.cases for row in rows_of(case, of_job)]
+        for job in (job for job in jobs if not job.cases):
+            result[CONSISTENCY] += consistency(
+                {
+                    world: run_all(epochs.run_campaign_seed, seeded(setup, job.seeds))
+                    for world, setup in job.worlds.items()
+                }
+            )
     return result
+
+
+def together(jobs: Sequence[Job]) -> Iterator[tuple[int, list[Job]]]:
+    """Strings that stand one after the other and have as many seeds: they are run seed by seed, with their seeds."""
+    for count, some in groupby((job for job in jobs if job.cases), key=lambda job: job.seeds):
+        yield count, list(some)
 
 
 def rows_of(case: Case, runs: dict[str, list[LabRun]]) -> list[dict[str, Any]]:
