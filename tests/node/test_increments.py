@@ -168,7 +168,7 @@ class Turned:
         readings[:, LATE], readings[:, SPLIT], readings[:, BEHIND:] = self.late, 1.0, self.gain * rates
         if spoil is not None:
             spoil(readings)
-        moment = np.array([begin, end, 1.0, 1.0, 1e-6, 1.0])
+        moment = np.array([begin, end, 1.0, 1.0, 1e-6, 1.0, 0.0, 0.0])
         node_step(self.nodes, self.settings, self.parameters, readings, moment)
         self.k += 1
         return self.nodes[0]["filter"]

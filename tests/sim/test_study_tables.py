@@ -2,6 +2,7 @@
 
 import csv
 import json
+import os
 import shlex
 import textwrap
 from pathlib import Path
@@ -16,7 +17,7 @@ from sim.errors import RigError, TableError
 from sim.instruments.instrument import Instrument
 from sim.instruments.table import INSTRUMENTS
 from sim.named import by_name
-from sim.studies.pool import CORES, cores, over_cores, seeded
+from sim.studies.pool import CORES, cores, one_pool, over_cores, seeded
 from sim.studies.study import Option, Study, Table
 from sim.studies.table import STUDIES
 
@@ -185,6 +186,25 @@ def test_the_pool_keeps_the_order_of_its_seeds_and_tells_of_each(
         assert run_all(times_seed, seeded(10, seeds)) == [10 * seed for seed in range(1, seeds + 1)]
         assert len(stepped) == seeds
         assert run_all(times_seed, seeded(7, 1)) == [7]
+
+
+def process_of(_: tuple[None, int]) -> int:
+    return os.getpid()
+
+
+@pytest.mark.slow
+def test_one_pool_is_kept_for_all_that_ask_inside_and_is_gone_after(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv(CORES, "2")
+    with one_pool():
+        processes: set[int] = set()
+        for _ in range(2):
+            with over_cores(3, lambda: None) as run_all:
+                processes |= set(run_all(process_of, seeded(None, 20)))
+        assert len(processes) <= 2
+        assert all(Path("/proc", str(process)).exists() for process in processes)
+    assert not any(Path("/proc", str(process)).exists() for process in processes)
+    with over_cores(3, lambda: None) as run_all:
+        assert processes.isdisjoint(run_all(process_of, seeded(None, 3)))
 
 
 @pytest.mark.parametrize("given", ["0", "two", "-1", "1.5"])

@@ -1,5 +1,7 @@
 """The study of both worlds: what its rough one is made of, and that its assumed one is the other studies'."""
 
+from collections.abc import Callable
+
 import numpy as np
 import pytest
 
@@ -7,13 +9,17 @@ from node.kernels.layout import Scheme
 from sim.studies.bridging.run import mean_of
 from sim.studies.consistency.run import setup_of, table
 from sim.studies.epochs import run_campaign_seed, run_seed
-from sim.studies.lab import LAB
+from sim.studies.lab import LAB, run_seed_of_each
+from sim.studies.lab import run_seed as lab_seed
 from sim.studies.limits.bound import Model
+from sim.studies.scenarios import Tables, changed, on_off
 from sim.studies.worlds.run import jobs_of, rough, run, steps, twisted
 from sim.world.parsing import read_toml
 from sim.world.shipped import shipped_folder
 
 SEEDS = 2
+FIRST, SECOND = changed(LAB, aiding=on_off(20.0, 10.0)), changed(LAB, aiding={"every_s": 5.0})
+UNLIKE = changed(LAB, path={"straight": {"inclination_deg": 3.0}})
 
 
 def test_the_rough_world_is_the_one_that_is_shipped_but_for_its_untold_twist() -> None:
@@ -26,8 +32,9 @@ def test_the_rough_world_is_the_one_that_is_shipped_but_for_its_untold_twist() -
 
 @pytest.mark.parametrize("part", ["all", "update-modes", "single-updates", "two-nodes", "fifty-nodes", "consistency"])
 def test_every_part_runs_as_often_as_it_says(part: str) -> None:
+    """The strings that have as many seeds run seed by seed, in either world."""
     jobs = jobs_of(part, 5, 3, 9, 7)
-    assert steps(part, 5, 3, 9, 7) == sum(2 * job.seeds for job in jobs)
+    assert steps(part, 5, 3, 9, 7) == sum(2 * seeds for seeds in {job.seeds for job in jobs})
     assert {job.seeds for job in jobs} <= {3, 5, 9}
     assert all(case.hop < job.worlds["rough"]["rig"]["tubes"] <= 7 for job in jobs for case in job.cases)
 
@@ -52,6 +59,18 @@ def test_a_string_by_a_campaign_has_the_joints_and_the_epochs_of_the_string_of_i
     assert np.allclose(other.total_error - other.error, one.total_error - one.error, rtol=0.0, atol=1e-12)
     assert np.allclose(other.total_var - other.var, one.total_var - one.var, rtol=1e-6)
     assert np.allclose(other.var, one.var, rtol=0.5)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("of", [lambda setup: setup, rough], ids=["assumed", "rough"])
+def test_aidings_that_share_a_world_are_those_that_have_one_each(of: Callable[[Tables], Tables]) -> None:
+    setups = [of(changed(setup, schedule={"blocks": 1})) for setup in (LAB, FIRST, SECOND, UNLIKE)]
+    shared = run_seed_of_each((setups, 4))
+    for one, setup in zip(shared, setups, strict=True):
+        alone = lab_seed((setup, 4))
+        for name in ("error", "var", "total_var", "bias_error", "azimuth_error", "survey_error"):
+            np.testing.assert_array_equal(getattr(one, name), getattr(alone, name))
+    assert len({one.error.tobytes() for one in shared}) == len(setups)
 
 
 def test_the_mean_of_gyroscopes_shares_the_errors_of_the_aiding() -> None:

@@ -67,7 +67,7 @@ class Pair:
     def cycle(self, spin: float = 0.0, *, aided: bool = True) -> None:
         """One cycle, and an aiding after it; all that both say and tell has to be the same."""
         self.now, self.yaw = self.now + PERIOD, self.yaw + spin * PERIOD
-        readings, moment = self.read(spin), np.array([self.now - PERIOD, self.now, 1.0, 1.0, 1e-6, 1.0])
+        readings, moment = self.read(spin), np.array([self.now - PERIOD, self.now, 1.0, 1.0, 1e-6, 1.0, 0.0, 0.0])
         says = node_step(*self.floats, readings.copy(), moment), self.fixed.step(*self.integers, readings, moment)
         assert says[0] == says[1]
         self.said = says[0]
