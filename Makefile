@@ -14,7 +14,7 @@ unexport PYTHONDONTWRITEBYTECODE
 PYTEST := $(BIN)/python -m pytest --numprocesses $(WORKERS) --maxprocesses 8 --dist worksteal
 
 .DEFAULT_GOAL := rig
-.PHONY: help rig test quick check lint types contracts kernels kernels-of-floats kernels-of-integers bytecode browser fast tests statistical truth explore lock study studies soak seeds clean test-socketcan test-compose
+.PHONY: help rig test quick check lint types contracts bounds kernels kernels-of-floats kernels-of-integers bytecode browser fast tests statistical truth explore lock study studies soak seeds clean test-socketcan test-compose
 
 help:  ## list the targets
 	@awk -F ':.*## ' '/^[a-z-]+:.*## / { printf "make %-20s %s\n", $$1, $$2 }' $(MAKEFILE_LIST)
@@ -52,6 +52,11 @@ types: $(STAMP)  ## mypy, strict
 
 contracts: $(STAMP)  ## which package may import which
 	$(BIN)/lint-imports
+
+# a kernel reads beyond the end of an array without a word; compiled like this it raises. Five minutes, most of it compiling
+bounds: $(STAMP)  ## the tests of the kernels with every index checked
+	NUMBA_BOUNDSCHECK=1 NUMBA_CACHE_DIR=$(VENV)/checked $(BIN)/python -m pytest -p no:xdist \
+	  -m "not (slow or process or install or statistical)" tests/node tests/sim tests/groundstation/survey
 
 kernels: kernels-of-floats kernels-of-integers  ## compile what the tests would compile, each worker for itself
 
