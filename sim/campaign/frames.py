@@ -67,12 +67,8 @@ def read_frames(
     cold = math.exp(-(since + front.frame * middle) / front.warm_up_s)
     drift, drift_on = front.warm_up * (1.0 - cold), front.warm_up * cold * front.frame / front.warm_up_s
     set_noise(noise_z, borders, pieces, front.rate[2], drawn[2], desk.drawn)
-    kind, felt, shows, drifts = (
-        field.sums[field.kinds[k]],
-        desk.felt,
-        desk.shows,
-        set_shows(desk.shows, noise, tube, fifo),
-    )
+    kind, felt, shows = field.sums[field.kinds[k]], desk.felt, desk.shows
+    drifts = set_shows(shows, noise, tube, fifo)
     sum_until(felt, kind, field.moved, field.torsional, fifo, borders[pieces], shaken_from, shaken_to)
     last = shown_of(shows, felt)
     sum_until(desk.before, kind, field.moved, field.torsional, fifo, borders[0], shaken_from, shaken_to)
