@@ -42,6 +42,7 @@ from groundstation.service.tables import (
     RECALIBRATION,
     STRING,
     WHOLE_STRING,
+    add_new,
 )
 from groundstation.survey.joint_angles import Joint, Pair
 from telemetry.errors import DecodeError
@@ -93,15 +94,16 @@ class Store(Database):
     @staticmethod
     def _add(connection: sa.Connection, one: Stored) -> bool:
         payload = encode(one.message)
-        row = row_of(one.message, payload)
-        same = {f"its_{name}": value for name, value in row.items()}
-        there = connection.execute(FIND, same).first()
-        if there is not None and there.payload == payload:
-            return False
-        if there is not None:
-            connection.execute(DROP, same)  # it is damaged
+        same = row_of(one.message, payload)
         kind = type(one.message).__name__
-        connection.execute(ADD, {**row, "kind": kind, "md": one.md, "below": one.below, "payload": payload})
+        row = {**same, "kind": kind, "md": one.md, "below": one.below, "payload": payload}
+        if connection.execute(add_new(connection.dialect.name), row).rowcount == 1:
+            return True
+        its = {f"its_{name}": value for name, value in same.items()}
+        if connection.execute(FIND, its).scalar() == payload:
+            return False
+        connection.execute(DROP, its)  # it is damaged
+        connection.execute(ADD, row)
         return True
 
     def place_messages(self, placed: Iterable[tuple[Kept, float | None]]) -> None:

@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+import functools
+
 import sqlalchemy as sa
+from sqlalchemy.dialects import sqlite
 
 SCHEMA = 3
 READABLE = (2, 3)  # schemas; what a later one has more is made when it is opened
@@ -86,3 +89,13 @@ ALARMS = sa.Table(
 )
 ALL_ALARMS = sa.select(ALARMS).order_by(ALARMS.c.number)
 DROP_ALARM, ADD_ALARM = sa.delete(ALARMS).where(ALARMS.c.number == sa.bindparam("its_number")), sa.insert(ALARMS)
+
+
+@functools.cache
+def add_new(dialect: str) -> sa.Insert:
+    """Insertion of a message that does nothing where it is there already."""
+    if dialect == "postgresql":
+        from sqlalchemy.dialects import postgresql  # 2 MB that nobody with a file needs
+
+        return postgresql.insert(MESSAGES).on_conflict_do_nothing()
+    return sqlite.insert(MESSAGES).on_conflict_do_nothing()
