@@ -53,7 +53,7 @@ types: $(STAMP)  ## mypy, strict
 contracts: $(STAMP)  ## which package may import which
 	$(BIN)/lint-imports
 
-# a kernel reads beyond the end of an array without a word; compiled like this it raises. Five minutes, most of it compiling
+# a kernel reads beyond the end of an array without a word; compiled like this it raises. Three minutes, most of it compiling
 bounds: $(STAMP)  ## the tests of the kernels with every index checked
 	NUMBA_BOUNDSCHECK=1 NUMBA_CACHE_DIR=$(VENV)/checked $(BIN)/python -m pytest -p no:xdist \
 	  -m "not (slow or process or install or statistical)" tests/node tests/sim tests/groundstation/survey
