@@ -22,7 +22,7 @@ from node.firmware.tube import Tube
 from node.kernels.address import BY_ADDRESS, firmware
 from node.kernels.angles import from_binary, wrap
 from node.kernels.calibration import PARAMETERS, USUAL
-from node.kernels.fixed.record import INTEGERS
+from node.kernels.fixed.record import new_integers
 from node.kernels.layout import PERIOD, Err, Scheme, default_config
 from node.kernels.record import A_VALID, BEHIND, END, LATE, LATE_STD, READING, SATURATED, SPLIT, TEMPERATURE, new_node
 from node.kernels.step import ADMITTED
@@ -111,7 +111,7 @@ class DirectString:
         # the records of all tubes in one array, so that a cycle is read off in a few operations
         self.nodes = np.repeat(new_node(config), count)
         self._corrections = np.zeros((count, 1 + self._imus), PARAMETERS)
-        self._integers = np.zeros(count, INTEGERS) if self._file.node.kernel == "fixed" else None
+        self._integers = np.repeat(new_integers(), count) if self._file.node.kernel == "fixed" else None
         self.tubes = {tube: self._fresh_tube(tube, config, state_every) for tube in range(1, count + 1)}
         self._encoder = EncoderNode(torque=world.torque_settings())
         sensor = self._file.encoder

@@ -107,7 +107,8 @@ def day(hours: float, tubes: int, address: str, endpoint: str, as_json: bool) ->
 @click.command()
 @click.option("--surveys", type=click.IntRange(500, 1_000_000), default=10_000, show_default=True, help="That it has.")
 @click.option("--tubes", type=click.IntRange(2, 250), default=50, show_default=True, help="That survey at every stop.")
-@click.option("--stops", type=click.IntRange(3, 24), default=12, show_default=True, help="That it learns more.")
+# after 15 stops the bit is deeper than its string by what a ground station lets pass
+@click.option("--stops", type=click.IntRange(3, 15), default=12, show_default=True, help="That it learns more.")
 @json_option
 @needs("orjson", "rich", "scipy", "sqlalchemy")
 @plain_faults
