@@ -31,7 +31,7 @@ from sim.errors import ScenarioError
 from sim.rig.encoder_course import is_plain, measured_of
 from sim.rig.plain_encoder import PlainEncoder
 from sim.rig.string_course import Kept, StringCourse, hand_down, new_desk, run_string
-from sim.world.imu_errors import gauss_markov
+from sim.world.disturbance.wander import gauss_markov
 from sim.world.scenario_file import AidingSection
 from sim.world.streams import Stream, stream
 from sim.world.world import World
