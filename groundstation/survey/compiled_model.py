@@ -253,7 +253,7 @@ def _load(source: str) -> tuple[Callable[..., Any], Callable[..., Any]]:
 
     Each lies in a folder of its own: a compiled function is kept as long as the sources beside it stay what they were.
     """
-    from node.kernels.jit import folder_in_use
+    from node.kernels.arithmetic.jit import folder_in_use
 
     name = f"model_{hashlib.sha256(source.encode()).hexdigest()[:16]}"
     path = folder_in_use() / "models" / name / f"{name}.py"

@@ -35,7 +35,7 @@ LOCAL = re.compile(r"\b[vt]\d+\b")
 HEAD = """
 import math
 
-from node.kernels.jit import kernel
+from node.kernels.arithmetic.jit import kernel
 
 _sin, _cos, _tan, _sqrt, _abs, _max, _min = math.sin, math.cos, math.tan, math.sqrt, abs, max, min
 

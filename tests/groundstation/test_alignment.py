@@ -16,7 +16,7 @@ from groundstation.survey.resolve import combine_imus
 from node.firmware.imu_settings import ImuSettings
 from node.firmware.inputs import RigContext
 from node.firmware.settings import TubeSettings
-from node.kernels.layout import DEG, PERIOD
+from node.kernels.arithmetic.formats import DEG, PERIOD
 from node.process.tube_process import TubeProcess
 from telemetry.messages import ImuMean, Mode, NodeFlag, Stand, SurveyMeasurement
 

@@ -18,11 +18,12 @@ from node.firmware.imu_settings import ImuSettings
 from node.firmware.inputs import ImuReading, RigContext
 from node.firmware.settings import Kernel, TubeSettings
 from node.firmware.tube import Tube
-from node.kernels.alignment import MAX_IMUS
-from node.kernels.cluster import fuse
-from node.kernels.cluster_watch import DISAGREEING, HEALTHY
-from node.kernels.layout import DEG, PERIOD, Err, default_config
-from node.kernels.record import new_node
+from node.kernels.arithmetic.formats import DEG, PERIOD
+from node.kernels.record.filter_record import Err, default_config
+from node.kernels.record.node_record import new_node
+from node.kernels.record.sensor_record import MAX_IMUS
+from node.kernels.sensors.cluster import fuse
+from node.kernels.sensors.cluster_watch import DISAGREEING, HEALTHY
 from node.process.drivers.replay import ReplayImu
 from node.process.reading import reading_of
 from node.process.tube_command import node as command

@@ -10,7 +10,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from groundstation.survey.resolve import angles, resolve
-from node.kernels.layout import PERIOD
+from node.kernels.arithmetic.formats import PERIOD
 from sim.world.borehole import Borehole
 from sim.world.marks import wrap
 from sim.world.motion import Motion, Trapezoid

@@ -31,7 +31,7 @@ def integers() -> None:
 def warm_kernel(name: str) -> None:
     """Compile a kernel of a node."""
     from node.firmware.kernel_choice import kernel_of
-    from node.kernels.warm import warm_step
+    from node.kernels.step.warm import warm_step
 
     loop = kernel_of(name)
     warm_step(loop.step, loop.aiding)

@@ -12,7 +12,7 @@ from __future__ import annotations
 import numpy as np
 import numpy.typing as npt
 
-from node.kernels.jit import kernel
+from node.kernels.arithmetic.jit import kernel
 
 Array = npt.NDArray[np.float64]
 Places = npt.NDArray[np.intp]

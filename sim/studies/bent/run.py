@@ -23,7 +23,7 @@ from groundstation.survey.resolve import Direction, angle_stds, angles, known, r
 from groundstation.survey.shared import SharedErrors
 from groundstation.survey.trajectory import Point, Trajectory
 from groundstation.survey.transport import carry
-from node.kernels.angles import wrap
+from node.kernels.arithmetic.angles import wrap
 from sim.rig.direct_string import DirectString, Survey
 from sim.studies.pool import Step, over_cores, seeded
 from sim.studies.scenarios import CALIBRATED, Tables, changed

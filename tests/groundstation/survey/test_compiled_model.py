@@ -17,7 +17,7 @@ from groundstation.survey.frames import Frame, Norths
 from groundstation.survey.instruments import Mode, Term, Tool, load_tool, shipped
 from groundstation.survey.methods import Method, positions
 from groundstation.survey.records import Record
-from node.kernels import jit
+from node.kernels.arithmetic import jit
 
 SITE = Site(9.80665, 50_300.0, math.radians(68.0), math.radians(2.0), math.radians(55.0))
 
