@@ -13,7 +13,7 @@ from groundstation.config import GroundConfig, checked_config
 from groundstation.gateway.lease import take_lease
 from groundstation.gateway.page.settings import PageSettings, listen
 from groundstation.gateway.zenoh import ZenohGateway
-from groundstation.service.process import GroundProcess
+from groundstation.service.process.ground_process import GroundProcess
 from node.kernels.arithmetic.formats import PERIOD
 from telemetry import keys
 from telemetry.media.credentials import file_name

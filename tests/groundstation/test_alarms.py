@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from groundstation.service.alarms import Alarm, AlarmList
+from groundstation.service.hole.deviation_alarms import Alarm, AlarmList
 from groundstation.survey.columns import Deviation
 
 

@@ -15,8 +15,8 @@ from schemas import check_answers
 
 from groundstation.config import GroundConfig
 from groundstation.errors import SelectorError
-from groundstation.service import alarm_views, column_views
-from groundstation.service.model import RigModel
+from groundstation.service.answers import alarm_views, column_views
+from groundstation.service.answers.model import RigModel
 from groundstation.survey.ellipsoid import plan_ellipse
 from groundstation.survey.resolve import angles
 from telemetry.messages import ImuMean, NodeFlag, SurveyMeasurement

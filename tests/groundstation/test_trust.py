@@ -11,8 +11,8 @@ from hypothesis import HealthCheck, example, given, settings
 from hypothesis import strategies as st
 
 from groundstation.config import GroundConfig
-from groundstation.service import views
-from groundstation.service.model import RigModel
+from groundstation.service.answers import views
+from groundstation.service.answers.model import RigModel
 from groundstation.survey.fusion import Weighting
 from groundstation.survey.resolve import angles, resolve
 from groundstation.survey.trust import EFFECTS, UNKNOWN_YAW_VAR, Trust, trust_of, with_uncertain_yaw, with_unknown_yaw
