@@ -25,7 +25,7 @@ FORBIDDEN = [
     ("telemetry/transport/hop.py", "import telemetry.application.clock"),
     ("node/kernels/arithmetic/angles.py", "import node.firmware.encoder"),
     ("groundstation/config.py", "import node.firmware.settings"),
-    ("groundstation/survey/resolve.py", "import groundstation.service.disk.ground_store"),
+    ("groundstation/survey/fusion/resolve.py", "import groundstation.service.disk.ground_store"),
     ("groundstation/calibration/quality.py", "import groundstation.report.style"),
     ("sim/rig/report.py", "import groundstation.service.disk.ground_store"),
     ("groundstation/service/process/operator_access.py", "import groundstation.gateway.zenoh"),
@@ -35,6 +35,7 @@ FORBIDDEN = [
     ("borechain/cli/options.py", "import can"),
     ("node/kernels/record/filter_record.py", "import msgpack"),
     ("node/firmware/encoder.py", "import asyncio"),
+    ("groundstation/survey/tools/formulas.py", "import groundstation.survey.wall.voids"),
     ("node/kernels/record/ring.py", "import node.kernels.filter.resets"),
     ("node/kernels/filter/fixed/cycle.py", "import node.kernels.filter.float64.cycle"),
 ]

@@ -14,7 +14,7 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
-from groundstation.survey.resolve import angles, resolve
+from groundstation.survey.fusion.resolve import angles, resolve
 from node.kernels.arithmetic.angles import wrap
 from node.kernels.arithmetic.formats import PERIOD
 from sim.rig.direct_string import DirectString, StringRun, wrapped

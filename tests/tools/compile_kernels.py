@@ -10,7 +10,7 @@ import sys
 
 def floats() -> None:
     """The usual kernel of a node and the string of the studies around it, the other kernels in floats, and surveys."""
-    from groundstation.survey.compiled_model import warm
+    from groundstation.survey.well.compiled_model import warm
     from node.firmware.settings import KERNELS
 
     importlib.import_module("borechain.warm")

@@ -9,7 +9,7 @@ from groundstation.service.alarms.rig_alarms import Level
 from groundstation.service.answers.model import RigModel
 from groundstation.service.answers.verdict_views import FINEST_CM
 from groundstation.service.hole.deviation_alarms import Alarm
-from groundstation.survey.columns import LEVELS
+from groundstation.survey.wall.column_deviation import LEVELS
 
 LEVEL_OF = dict(zip(LEVELS, (Level.NOTICE, Level.DEGRADED, Level.BAD), strict=True))
 

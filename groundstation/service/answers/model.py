@@ -26,10 +26,10 @@ from groundstation.service.string.depth import DepthLog
 from groundstation.service.string.message_numbers import Numbers
 from groundstation.service.string.stops import Stops
 from groundstation.service.string.tally import Tally
-from groundstation.survey.joint_angles import JointAngles
-from groundstation.survey.resolve import Direction, Quality, Resolved
-from groundstation.survey.shared import Reading, SharedErrors, weigh_together
-from groundstation.survey.trust import Trust, trust_of, with_uncertain_yaw, with_unknown_yaw
+from groundstation.survey.fusion.joint_angles import JointAngles
+from groundstation.survey.fusion.resolve import Direction, Quality, Resolved
+from groundstation.survey.fusion.shared import Reading, SharedErrors, weigh_together
+from groundstation.survey.fusion.survey_trust import Trust, trust_of, with_uncertain_yaw, with_unknown_yaw
 from telemetry.messages import EPOCH_UNKNOWN, Event, NodeFlag, NodeState, StaticRecord, SurveyMeasurement
 
 EVENTS_SHOWN = 10_000

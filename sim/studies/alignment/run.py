@@ -17,7 +17,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from groundstation.survey.resolve import angles, resolve
+from groundstation.survey.fusion.resolve import angles, resolve
 from node.firmware.alignment import METHODS, angles_of
 from node.firmware.settings import Kernel
 from node.kernels.arithmetic.formats import PERIOD
