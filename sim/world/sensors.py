@@ -8,8 +8,8 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from node.kernels.calibration import USUAL
-from node.kernels.layout import PERIOD
+from node.kernels.arithmetic.formats import PERIOD
+from node.kernels.sensors.correction import USUAL
 from sim.world.disturbance.bias_step import stepped_bias
 from sim.world.disturbance.drift import Drift, draw_drift
 from sim.world.disturbance.gyroscope import draw_gyroscope

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from node.kernels.jit import kernel
+from sim.kernel import kernel
 from sim.world.disturbance.reach import most_force, most_rate
 from sim.world.disturbance.row import ActsOn, Array, Compiled, Disturbance, ImuSamples, OneImu
 from sim.world.disturbance.vibration import G
@@ -103,7 +103,12 @@ CLIPPED_RATES = Disturbance(
     "clipped-rates", ("gyroscope.range_dps",), ActsOn.GRID, clip_signal, compiled=Compiled(), beyond=clips_rates
 )
 CLIPPED_FORCES = Disturbance(
-    "clipped-forces", ("rough.sensor.force_range_g",), ActsOn.GRID, clip_forces, compiled=Compiled(), beyond=clips_forces
+    "clipped-forces",
+    ("rough.sensor.force_range_g",),
+    ActsOn.GRID,
+    clip_forces,
+    compiled=Compiled(),
+    beyond=clips_forces,
 )
 STEPS = Disturbance(
     "steps",

@@ -6,7 +6,8 @@ import math
 
 import numpy as np
 
-from node.kernels.layout import PARTS, PERIOD
+from node.kernels.arithmetic.formats import PERIOD
+from node.kernels.record.filter_record import PARTS
 from sim.world.disturbance.row import ActsOn, Array, Disturbance, OneImu
 from sim.world.streams import Stream
 

@@ -11,7 +11,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from node.kernels.layout import PARTS, PERIOD
+from node.kernels.arithmetic.formats import PERIOD
+from node.kernels.record.filter_record import PARTS
 from node.process.drivers.frame_clock import FrameClock
 from node.process.drivers.parts import parts_of
 from sim.world.disturbance.converter import AT_RANGE, FORCE_CLIPPED, GYRO_CLIPPED

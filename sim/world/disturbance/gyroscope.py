@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from node.kernels.jit import kernel
+from sim.kernel import kernel
 from sim.world.disturbance.row import ActsOn, Array, Compiled, Disturbance, ImuSamples, OneImu
 from sim.world.scenario_file import ScenarioFile
 from sim.world.streams import Stream

@@ -14,6 +14,7 @@ SLIP = 5.0 / 3.0  # of the mean rate, by which a stick-slip turns faster than th
 STEPPING = 2.0  # times its mean, above the rate of any smooth step
 PULLS = 3.0  # sigma of a drawn sensitivity to force, on each of three axes
 
+
 def most_turning(file: ScenarioFile, rough: RoughSection) -> float:
     """Rate at which a string turns at most, deg/s: that of the drive, as it swings, and of what follows a stop."""
     rotation, drive = file.rotation, rough.drive

@@ -7,8 +7,9 @@ from typing import Any
 
 import numpy as np
 
-from node.kernels.calibration import USUAL
-from node.kernels.layout import PARTS, PERIOD
+from node.kernels.arithmetic.formats import PERIOD
+from node.kernels.record.filter_record import PARTS
+from node.kernels.sensors.correction import USUAL
 from sim.world.disturbance.eighths import borders_of, eighths
 from sim.world.disturbance.fifo import (
     clipped_by_cycle,

@@ -14,7 +14,7 @@ from typing import Any, NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from node.kernels.layout import PERIOD
+from node.kernels.arithmetic.formats import PERIOD
 from sim.world.rough_section import RoughSection
 from sim.world.scenario_file import ScenarioFile
 from sim.world.section import Section

@@ -65,7 +65,11 @@ def shakes_at_rest(file: ScenarioFile) -> dict[str, bool]:
 
 
 TORSIONAL = Disturbance(
-    "torsional-vibration", ("rough.vibration.torsional_dps", *BAND), ActsOn.MOTION, twist_to_and_fro, compiled=Compiled()
+    "torsional-vibration",
+    ("rough.vibration.torsional_dps", *BAND),
+    ActsOn.MOTION,
+    twist_to_and_fro,
+    compiled=Compiled(),
 )
 VIBRATION = Disturbance(
     "vibration",

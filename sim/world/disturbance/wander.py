@@ -7,8 +7,8 @@ from typing import Any
 
 import numpy as np
 
-from node.kernels.jit import kernel
-from node.kernels.layout import PERIOD
+from node.kernels.arithmetic.formats import PERIOD
+from sim.kernel import kernel
 from sim.world.disturbance.lanes import Lane
 from sim.world.disturbance.row import ActsOn, Array, Compiled, Disturbance, ImuSamples, OneImu
 from sim.world.scenario_file import ScenarioFile
