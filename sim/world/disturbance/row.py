@@ -139,12 +139,15 @@ class CycleNow(NamedTuple):
 
     end: float  # s, rig time
     is_first: bool  # of the tube: what wanders begins anew
-    shaken: float  # 1 while the bit shakes the string, else 0
-    share: float  # of the noise of one sample, which their mean has
-    is_mean: bool  # the samples are means of cycles; of frames the noise about z comes by the parts of the window
-    since: float  # s, from when the sensor was cold to the middle of the samples
-    found: int  # samples
+    shaken: float  # 1 while the bit shakes the string of a plain world, else 0
+    rate: tuple[float, float, float]  # rad/s, mean of what the housing feels
+    force: tuple[float, float, float]  # m/s^2, likewise
+    found: int  # samples, whose mean the reading is
     frame: float  # s, from one sample to the next
+    share: float  # of the noise of one sample, that their mean has
+    is_mean: bool  # the one sample is the mean of a cycle; of frames the noise about z comes by the parts of the window
+    since: float  # s, from when the sensor was cold to the middle of the samples
+    age: float  # s, from when the sensor was cold to the end of the cycle
 
 
 @dataclass(frozen=True)
@@ -156,10 +159,10 @@ class Compiled:
     shared, tube : fields (name, dtype, shape) of the record of all tubes and of that of one
     set_shared : fills the first, (1,), from the scenario
     set_tube : fills the second from what the row drew
-    gains : what the sensor shows of the rates and forces that it feels: changes (6, 6), rows are what it reads
-    lane : which three normal numbers of a cycle it takes, ``Lane``; None: none
-    felt, read : kernels ``act(shared, tube, now, drawn, six)`` that add to the six rates and forces, before what is
-        felt becomes what is read and after it
+    gains : what the sensor shows of rates and forces, (6, 6), from what the row drew
+    lane : of ``Lane``, which three normal numbers of a cycle it takes; None: none
+    felt, read : kernels ``act(shared, tube, now, drawn, row)`` that add to the rates and forces of the reading ``row``,
+        before what is felt becomes what is read and after it
     parts : kernel ``act(shared, tube, now, drawn, further, borders, pieces, parts)`` that adds to what the z gyroscope
         shows of each part of a window, summed over its frames, beside what is the same in all of them
     """
@@ -168,7 +171,7 @@ class Compiled:
     tube: tuple[Any, ...] = ()
     set_shared: Callable[[Any, ScenarioFile], None] | None = None
     set_tube: Callable[[Any, Any], None] | None = None
-    gains: Callable[[Array, Any, ScenarioFile], None] | None = None
+    gains: Callable[[Any, ScenarioFile], Array] | None = None
     lane: int | None = None
     felt: Any = None
     read: Any = None

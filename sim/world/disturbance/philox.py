@@ -12,7 +12,7 @@ from typing import Final
 import numpy as np
 
 from node.kernels.arithmetic.formats import Array
-from node.kernels.arithmetic.jit import kernel
+from sim.kernel import kernel
 
 ROUNDS: Final = 10
 WORD: Final = np.uint64(0xFFFFFFFF)
