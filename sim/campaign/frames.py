@@ -12,13 +12,13 @@ from typing import Any
 import numpy as np
 
 from node.kernels.calibration import USUAL
-from node.kernels.jit import kernel
 from node.kernels.layout import PARTS, PERIOD, Array
 from node.kernels.record import BEHIND, LATE, LATE_STD, SATURATED, SPLIT, TEMPERATURE
 from node.process.drivers.parts import LEAST
 from sim.campaign.field import FELT, FINER, MOVED, SAME, SUMS
 from sim.campaign.philox import normals, uniforms
-from sim.campaign.sensors import cross_hop, wander_on
+from sim.campaign.sensors import wander_on
+from sim.kernel import kernel
 
 CIRCLE, SLACK_RATE, SLACK_ANGLE, TORSIONAL = FELT, FELT + 2, FELT + 3, FELT + MOVED
 
@@ -36,7 +36,6 @@ def read_frames(
     noise: Any,
     tube: Any,
     is_first: bool,
-    above: float,
     field: Any,
     drawn: Array,
     reading: Array,
@@ -44,11 +43,11 @@ def read_frames(
     cycle: int,
     k: int,
 ) -> None:
-    """Fill ``reading`` (1, READING) of tube ``k`` in a cycle that ends at ``end`` (s), and the tube's hop.
+    """Fill ``reading`` (1, READING) of tube ``k`` in a cycle that ends at ``end`` (s).
 
     Parameters
     ----------
-    noise, tube, is_first, above, drawn : see ``sim.campaign.sensors.read_sensors``
+    noise, tube, is_first, drawn : see ``sim.campaign.sensors.read_sensors``
     field : ``sim.campaign.field.Field``, with what ``draw_parts`` has left in its desk
     """
     front, fifo, row, desk = field.front_end[0], field.fifos[k], reading[0], field.desk
@@ -94,7 +93,6 @@ def read_frames(
     row[TEMPERATURE], row[SATURATED] = USUAL + front.warm_up_c * warm, 0.0
     row[LATE], row[LATE_STD] = late, field.times.late_std[place, cycle]
     row[SPLIT] = 1.0 if pieces > 1 else 0.0
-    cross_hop(noise, tube, is_first, above, drawn)
 
 
 @kernel

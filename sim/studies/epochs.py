@@ -15,7 +15,7 @@ import numpy.typing as npt
 
 from node.kernels.layout import PERIOD, Scheme
 from sim.campaign.chunk import campaign_of
-from sim.rig.direct_string import DirectString
+from sim.string.direct_string import DirectString
 from sim.studies.lab import ACCELERATION_DPS2, RATE_DPS, TURNS
 from sim.studies.scenarios import CALIBRATED, Tables, complete
 from sim.world.scenario import scenario_of

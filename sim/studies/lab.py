@@ -17,7 +17,8 @@ import numpy.typing as npt
 from groundstation.survey.resolve import angles, resolve
 from node.kernels.angles import wrap
 from node.kernels.layout import PERIOD
-from sim.rig.direct_string import DirectString, StringRun, wrapped
+from sim.string.direct_string import DirectString
+from sim.string.result import StringRun, wrapped
 from sim.studies.scenarios import Tables, complete
 from sim.world.motion import Trapezoid
 from sim.world.scenario import scenario_of

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from typing import Any
 
-from sim.rig.plain_encoder import LINES
+from sim.string.plain_encoder import LINES
 from sim.studies.lab import REST, LabRun
 from sim.studies.scenarios import Tables, changed
 from sim.studies.trials import Trials, rms_deg, row

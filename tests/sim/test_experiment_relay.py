@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from node.kernels.layout import Scheme
-from sim.rig.direct_string import DirectString
+from sim.string.direct_string import DirectString
 from sim.studies.epochs import resting, run_seed
 from sim.studies.relay.run import run, table
 from sim.world.scenario import scenario_of

@@ -12,7 +12,7 @@ from node.firmware.settings import KERNELS
 from node.kernels.encoder import COUNTS_PER_TURN
 from node.kernels.layout import PERIOD, Scheme
 from node.process.tube_command import node
-from sim.rig.plain_encoder import LINES, PlainEncoder
+from sim.string.plain_encoder import LINES, PlainEncoder
 from sim.studies import published_form
 from sim.studies.ingredients import run as ingredients
 from sim.studies.lab import LAB, REST, ROTATING, LabRun, run_seed

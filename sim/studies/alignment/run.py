@@ -21,7 +21,7 @@ from groundstation.survey.resolve import angles, resolve
 from node.firmware.alignment import METHODS, angles_of
 from node.firmware.settings import Kernel
 from node.kernels.layout import PERIOD, default_config
-from sim.rig.direct_string import DirectString
+from sim.string.direct_string import DirectString
 from sim.studies.pool import Step, over_cores, seeded
 from sim.studies.scenarios import Tables, complete
 from sim.studies.trials import bootstrap, row

@@ -24,7 +24,8 @@ from groundstation.survey.shared import SharedErrors
 from groundstation.survey.trajectory import Point, Trajectory
 from groundstation.survey.transport import carry
 from node.kernels.angles import wrap
-from sim.rig.direct_string import DirectString, Survey
+from sim.string.direct_string import DirectString
+from sim.string.result import StringSurvey
 from sim.studies.pool import Step, over_cores, seeded
 from sim.studies.scenarios import CALIBRATED, Tables, changed
 from sim.world.scenario import scenario_of
@@ -93,7 +94,7 @@ def run_seed(job: tuple[Tables, int]) -> BentRun:
     return judge(world, DirectString(world).drill().surveys)
 
 
-def judge(world: World, surveys: Sequence[Survey]) -> BentRun:
+def judge(world: World, surveys: Sequence[StringSurvey]) -> BentRun:
     """What a ground station makes of all surveys, told either way, against the hole."""
     hole = world.scenario.hole
     shared = SharedErrors()
@@ -115,7 +116,7 @@ def judge(world: World, surveys: Sequence[Survey]) -> BentRun:
     return found
 
 
-def fused_stations(world: World, surveys: Sequence[Survey], shared: SharedErrors) -> dict[float, Direction]:
+def fused_stations(world: World, surveys: Sequence[StringSurvey], shared: SharedErrors) -> dict[float, Direction]:
     """Direction of every station as its tubes measured it, by measured depth (m) from the collar down."""
     file = world.scenario.file
     mount_var = math.radians(file.joints.mount_std_deg) ** 2

@@ -18,7 +18,8 @@ import numpy.typing as npt
 from groundstation.survey.resolve import angle_stds, angles, known, resolve
 from groundstation.survey.transport import carry
 from node.kernels.angles import wrap
-from sim.rig.direct_string import DirectString, StringRun
+from sim.string.direct_string import DirectString
+from sim.string.result import StringRun
 from sim.studies.field.cases import ALL, BLOCKS, CASES, Case
 from sim.studies.pool import Step, over_cores, seeded
 from sim.studies.scenarios import Tables

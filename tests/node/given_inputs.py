@@ -22,11 +22,11 @@ GIVEN: Final = np.dtype(
 
 
 @kernel
-def replay(
+def count_other_answers(
     step: Any,
     aid: Any,
     nodes: Array,
-    crews: Array,
+    settings: Array,
     corrections: Array,
     given: Array,
     readings: Array,
@@ -38,7 +38,7 @@ def replay(
     Parameters
     ----------
     step, aid : ``node_step`` and ``node_aiding``, see ``node.kernels.address``
-    nodes, crews : (tubes,) of dtype ``NODE``, as they were at first, and ``SETTINGS``
+    nodes, settings : (tubes,) of dtype ``NODE``, as they were at first, and ``SETTINGS``
     corrections : (tubes, 2) of dtype ``PARAMETERS``
     given : (n,) of dtype ``GIVEN``
     readings, moments, aidings : (n, 1, READING), (n, MOMENT), (n, AIDING) of a cycle, and of what was heard
@@ -49,11 +49,11 @@ def replay(
         k = row.place
         one = slice(k, k + 1)
         if row.kind == CYCLE:
-            answer = step(nodes[one], crews[one], corrections[k], readings[n], moments[n])
+            answer = step(nodes[one], settings[one], corrections[k], readings[n], moments[n])
             if answer & SAY_EVENTS:  # its firmware takes them out at once
                 nodes[k].events.said = nodes[k].events.told
         else:
-            answer = aid(nodes[one], crews[one], aidings[n])
+            answer = aid(nodes[one], settings[one], aidings[n])
         if answer != row.answer:
             others += 1
     return others
