@@ -10,7 +10,7 @@ from typing import Any
 import msgpack
 
 from borechain.gauntlet.rig import GauntletRig
-from groundstation.service.model import RigModel
+from groundstation.service.answers.model import RigModel
 from sim.gauntlet.fault import TUBES
 from sim.gauntlet.world import TUBE_LENGTH, FaultyWorld
 from sim.rig.report import wrap_deg

@@ -12,7 +12,7 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 from borechain.inline import InlineRig
-from groundstation.service.process import GroundProcess
+from groundstation.service.process.ground_process import GroundProcess
 from node.process.tube_process import TubeProcess
 from sim.gauntlet.channel import FaultyChannel
 from sim.gauntlet.disk import FaultyDisk

@@ -15,7 +15,7 @@ from borechain.load.crowd import Crowd, living
 from borechain.load.patience import wait_for
 from groundstation.config import checked_config
 from groundstation.host import run_ground
-from groundstation.service.store import Store
+from groundstation.service.disk.ground_store import Store
 from sim.rig.processes import ProcessTable, Spec
 from telemetry.media.zenoh_bus import open_router
 from telemetry.messages import ENCODER

@@ -12,8 +12,8 @@ from pathlib import Path
 import msgpack
 
 from borechain.recording.files import RecordingWriter, Sample
-from groundstation.service.intake import BEGIN, IntakeError, unpack_intake
-from groundstation.service.paths import schemas
+from groundstation.service.answers.paths import schemas
+from groundstation.service.process.intake_tape import BEGIN, IntakeError, unpack_intake
 from telemetry import keys
 from telemetry.media.zenoh_bus import ZenohBus
 

@@ -10,8 +10,8 @@ from pathlib import Path
 from borechain.recording.files import Recording, RecordingError
 from groundstation.config import checked_config
 from groundstation.errors import GroundError
-from groundstation.service.intake import BEGIN, DEPTH, MESSAGE, ORDER, Intake, IntakeError, unpack_intake
-from groundstation.service.process import GroundProcess
+from groundstation.service.process.ground_process import GroundProcess
+from groundstation.service.process.intake_tape import BEGIN, DEPTH, MESSAGE, ORDER, Intake, IntakeError, unpack_intake
 from telemetry import keys
 from telemetry.errors import BorechainError
 

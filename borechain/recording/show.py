@@ -11,7 +11,7 @@ from borechain.recording.files import Recording
 from borechain.recording.replay import Replayed, open_replay
 from groundstation.gateway.page.settings import PageSettings
 from groundstation.host import page_of
-from groundstation.service.intake import Intake
+from groundstation.service.process.intake_tape import Intake
 from telemetry.runtime.event_loop import run, stop_on_signals
 
 TOGETHER = 64  # events after which browsers are served, however late the replay is

@@ -11,13 +11,13 @@ import pytest
 from borechain.gauntlet import rig as gauntlet_rig
 from borechain.gauntlet.run import run_seed, shrink
 from groundstation.errors import StoreError
-from groundstation.service import database
-from groundstation.service import model as model_module
-from groundstation.service.keeper import Keeper
-from groundstation.service.learner import Learner
-from groundstation.service.process import GroundProcess
-from groundstation.service.store import Stored
-from groundstation.survey.trust import Trust
+from groundstation.service.answers import model as model_module
+from groundstation.service.disk import database
+from groundstation.service.disk.ground_store import Stored
+from groundstation.service.disk.keeper import Keeper
+from groundstation.service.process.ground_process import GroundProcess
+from groundstation.service.process.learner import Learner
+from groundstation.survey.fusion.survey_trust import Trust
 from node.firmware.settings import TubeSettings
 from node.process import counter as counter_module
 from node.process.command_handlers import CommandHandlers

@@ -6,9 +6,9 @@ import json
 from pathlib import Path
 
 from borechain.recording.files import RecordingWriter, Sample
-from groundstation.service.intake import BEGIN, Intake, pack_intake
-from groundstation.service.paths import schemas
-from groundstation.service.process import GroundProcess
+from groundstation.service.answers.paths import schemas
+from groundstation.service.process.ground_process import GroundProcess
+from groundstation.service.process.intake_tape import BEGIN, Intake, pack_intake
 
 KEY = "borechain/rig-1/ground/"
 INTAKE = "borechain/rig-1/intake"

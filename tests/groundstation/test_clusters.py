@@ -12,12 +12,12 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from groundstation.config import GroundConfig
-from groundstation.service.clusters import Cluster, Clusters, Table, cluster_of
-from groundstation.service.measurement_views import measurement_rows
-from groundstation.service.model import RigModel
-from groundstation.survey.resolve import Direction, Quality, angle_stds, angles, resolve
-from groundstation.survey.shared import Reading, SharedErrors
-from groundstation.survey.trust import Trust
+from groundstation.service.answers.measurement_views import measurement_rows
+from groundstation.service.answers.model import RigModel
+from groundstation.service.hole.resolved_stops import Cluster, Clusters, Table, cluster_of
+from groundstation.survey.fusion.resolve import Direction, Quality, angle_stds, angles, resolve
+from groundstation.survey.fusion.shared import Reading, SharedErrors
+from groundstation.survey.fusion.survey_trust import Trust
 from telemetry.messages import ImuMean, NodeFlag, SurveyMeasurement
 
 VAR = 1e-7

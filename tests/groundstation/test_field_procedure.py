@@ -13,10 +13,10 @@ from schemas import check_answer
 from groundstation.calibration.attitudes import true_vectors
 from groundstation.calibration.block import read
 from groundstation.errors import SelectorError
-from groundstation.service import key_fields
-from groundstation.service.recalibration.procedure import FieldProcedure, Request
-from groundstation.service.recalibration.progress import Phase, Progress, Stage
-from node.kernels.layout import DEG
+from groundstation.service.answers import key_fields
+from groundstation.service.orders.recalibration.procedure import FieldProcedure, Request
+from groundstation.service.orders.recalibration.recalibration_progress import Phase, Progress, Stage
+from node.kernels.arithmetic.formats import DEG
 from telemetry.messages import BASE, BlockSegment, Reply, StaticRecord
 from telemetry.parameters import ParameterBlock, SensorParameters
 

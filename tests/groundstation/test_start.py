@@ -10,9 +10,9 @@ from borechain.load.crowd import ROUND_S
 from borechain.load.day import ADVANCES, BEGUN_AT, depth_of, write_day
 from borechain.load.learning import ASKED, Hearing, measure_learning
 from groundstation.config import GroundConfig
-from groundstation.service.model import RigModel
-from groundstation.service.paths import find
-from groundstation.service.process import GroundProcess
+from groundstation.service.answers.model import RigModel
+from groundstation.service.answers.paths import find
+from groundstation.service.process.ground_process import GroundProcess
 
 TUBES, STOPS = 8, 12
 OF_THE_HOLE = ("stations", "stations/1", "trajectory", "uncertainty", "column", "history", "measurements")

@@ -15,7 +15,7 @@ from rigs import REPOSITORY, ends, free_endpoint, running_rig
 
 from groundstation.calibration.block import read
 from groundstation.calibration.field import inclination
-from groundstation.service.store import Store
+from groundstation.service.disk.ground_store import Store
 from sim.rig.report import rms
 from sim.world.scenario import load_scenario
 from sim.world.world import World

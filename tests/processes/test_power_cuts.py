@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from rigs import running_rig
 
-from groundstation.service.store import Store
+from groundstation.service.disk.ground_store import Store
 from sim.faults import KillNode
 from sim.world.scenario import load_scenario
 from sim.world.world import World

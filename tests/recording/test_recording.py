@@ -22,9 +22,9 @@ from borechain.cli.rig.ground_settings import ground_settings
 from borechain.inline import InlineRig
 from borechain.recording.files import NAME, Recording, RecordingError, RecordingWriter, Sample
 from borechain.recording.replay import replay_file
-from groundstation.service.intake import IntakeError, pack_intake, unpack_intake
-from groundstation.service.paths import schemas
-from groundstation.service.process import GroundProcess
+from groundstation.service.answers.paths import schemas
+from groundstation.service.process.ground_process import GroundProcess
+from groundstation.service.process.intake_tape import IntakeError, pack_intake, unpack_intake
 from sim.rig.scheduler import Progress
 from sim.world.scenario import load_scenario, scenario_of
 from sim.world.world import World

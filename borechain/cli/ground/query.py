@@ -97,8 +97,8 @@ def csv_of(answers: list[Reply]) -> str:
 
     check_installed("scipy")
     from groundstation.errors import SelectorError
-    from groundstation.service.csv_tables import table_of
-    from groundstation.service.paths import fields_of
+    from groundstation.service.answers.csv_tables import table_of
+    from groundstation.service.answers.paths import fields_of
 
     if len(answers) != 1:
         raise InputFault(f"--csv: expected one answer, got {len(answers)}: {', '.join(one.key for one in answers[:5])}")
