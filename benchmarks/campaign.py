@@ -24,11 +24,11 @@ from typing import Any, NamedTuple
 import numpy as np
 from numba import njit
 
-from node.kernels.angles import wrap
-from node.kernels.cycle import run_cycle
-from node.kernels.layout import CYCLE_RATE_HZ
-from node.kernels.record import A_HOPS, A_SEQUENCE, A_SYSTEMATIC, A_VALID, A_YAW, A_YAW_VAR, READING
-from node.kernels.relay import offer_aiding
+from node.kernels.arithmetic.angles import wrap
+from node.kernels.arithmetic.formats import CYCLE_RATE_HZ
+from node.kernels.filter.float64.cycle import run_cycle
+from node.kernels.record.node_record import A_HOPS, A_SEQUENCE, A_SYSTEMATIC, A_VALID, A_YAW, A_YAW_VAR, READING
+from node.kernels.string.relay import offer_aiding
 from sim.campaign.chunk import RUNS, Campaign, run_chunk
 from sim.campaign.sensors import CLOCK, LOSS, draw, read_sensors
 from sim.string.drill import drill_string, new_memory
@@ -37,7 +37,7 @@ from sim.string.hops import cross_hop, draw_hops
 from sim.string.nodes import loop_of, new_nodes
 from sim.string.readings import DrawnReadings
 from sim.string.schedule import StringSchedule, redraw_schedule
-from sim.studies.epochs import resting
+from sim.studies.epochs import resting_string
 from sim.world.scenario import Scenario, load_scenario, scenario_of
 from sim.world.world import World
 
@@ -210,7 +210,7 @@ def command_time(runs: int) -> tuple[float, float]:
 
 def long_string() -> tuple[float, float]:
     """Processor's seconds of one run of a string of ``LONG`` tubes, and the rig's seconds in it."""
-    campaign = Campaign(scenario_of(dict(resting(LONG))))
+    campaign = Campaign(scenario_of(dict(resting_string(LONG))))
     campaign.run(SEED)
     cycles = len(campaign.string.schedule.ends)
     return statistics.median(spent(lambda: campaign.run(SEED)) for _ in range(3)), cycles / CYCLE_RATE_HZ

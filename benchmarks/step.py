@@ -19,15 +19,18 @@ import numpy as np
 
 from node.firmware.inputs import ImuReading, RigContext
 from node.firmware.tube import Tube
-from node.kernels.calibration import PARAMETERS
-from node.kernels.layout import default_config
-from node.kernels.record import AIDING, new_node
+from node.kernels.record.filter_record import default_config
+from node.kernels.record.node_record import (
+    AIDING,
+    new_node,
+)
+from node.kernels.record.sensor_record import PARAMETERS
 from sim.string.drill import drill_string, new_memory
 from sim.string.hops import HOP
 from sim.string.nodes import StringNodes, loop_of
 from sim.string.readings import RecordedReadings, record_readings
 from sim.string.schedule import StringSchedule
-from sim.studies.epochs import resting
+from sim.studies.epochs import resting_string
 from sim.world.scenario import scenario_of
 from sim.world.world import World
 from telemetry.messages import Aiding
@@ -159,7 +162,7 @@ def run() -> dict[str, Any]:
     RuntimeError
         When the nodes end with another yaw by another caller.
     """
-    world = World(scenario_of(dict(resting(TUBES))), 1)
+    world = World(scenario_of(dict(resting_string(TUBES))), 1)
     inputs = inputs_of(world)
     callers = {
         "node by node, from Python": (node_by_node, "float64"),

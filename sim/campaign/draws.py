@@ -6,7 +6,7 @@ import math
 
 import numpy as np
 
-from node.kernels.layout import PERIOD, Array
+from node.kernels.arithmetic.formats import PERIOD, Array
 from sim.campaign.sensors import NOISE, TUBE
 from sim.world.imu_errors import ImuErrors
 from sim.world.scenario_file import ScenarioFile

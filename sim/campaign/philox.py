@@ -11,7 +11,7 @@ from typing import Final
 
 import numpy as np
 
-from node.kernels.layout import Array
+from node.kernels.arithmetic.formats import Array
 from sim.kernel import kernel
 
 ROUNDS: Final = 10

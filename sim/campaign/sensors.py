@@ -11,9 +11,9 @@ from typing import Any, Final
 
 import numpy as np
 
-from node.kernels.calibration import USUAL
-from node.kernels.layout import Array
-from node.kernels.record import SATURATED, TEMPERATURE
+from node.kernels.arithmetic.formats import Array
+from node.kernels.record.node_record import SATURATED, TEMPERATURE
+from node.kernels.sensors.correction import USUAL
 from sim.campaign.philox import normals, uniforms
 from sim.kernel import kernel
 

@@ -18,9 +18,9 @@ import numpy.typing as npt
 from node.firmware.inputs import RigContext
 from node.firmware.reporter import VAR_FLOOR
 from node.firmware.tube import Tube
-from node.kernels.angles import wrap
-from node.kernels.fixed.record import new_integers
-from node.kernels.step import ADMITTED
+from node.kernels.arithmetic.angles import wrap
+from node.kernels.record.integer_node import new_integers
+from node.kernels.step.node_step import ADMITTED
 from sim.errors import ScenarioError
 from sim.string.drill import drill_string, hand_down, new_memory, no_estimates
 from sim.string.head_measurements import measure_head, row_of_aiding

@@ -12,8 +12,8 @@ from typing import Final, NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from node.kernels.layout import PERIOD, Array
-from node.kernels.record import AIDING
+from node.kernels.arithmetic.formats import PERIOD, Array
+from node.kernels.record.node_record import AIDING
 from sim.campaign.draws import frames_of, noise_of, tubes_of
 from sim.campaign.field_draws import FieldRun, RoughWorld
 from sim.campaign.refusals import refuse_others

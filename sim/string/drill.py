@@ -1,7 +1,7 @@
 """The kernel of a string: readings in, aiding from hop to hop, every node stepped, what they know kept.
 
 One for a study, whose readings are worked out before and which stops where a node has something to say, and for a run
-of a campaign. What a node does is ``node.kernels.step``, or the same in integers, called by its address.
+of a campaign. What a node does is ``node.kernels.step.node_step``, or the same in integers, called by its address.
 """
 
 from __future__ import annotations
@@ -12,9 +12,9 @@ import numpy as np
 import numpy.typing as npt
 from numba import types
 
-from node.kernels.layout import Array
-from node.kernels.numbers import taken_where
-from node.kernels.record import (
+from node.kernels.arithmetic.formats import Array
+from node.kernels.arithmetic.operations import taken_where
+from node.kernels.record.node_record import (
     A_HOPS,
     A_OFFSET,
     A_SYSTEMATIC,
@@ -29,7 +29,7 @@ from node.kernels.record import (
     START,
     SYNCHRONISED,
 )
-from node.kernels.step import ONWARD
+from node.kernels.step.node_step import ONWARD
 from sim.kernel import kernel, shared_body
 from sim.string.readings import supply_readings
 from sim.string.result import log_epoch, log_node, trace_node

@@ -11,7 +11,8 @@ import numpy.typing as npt
 from node.firmware.edge_interpolation import EDGES, stopped_at
 from node.firmware.encoder import STOP_STD
 from node.firmware.torque import drive_record
-from node.kernels.encoder import (
+from node.kernels.record.node_record import A_SEQUENCE, AIDING
+from node.kernels.string.encoder_step import (
     BEYOND,
     BEYOND_VAR,
     COUNT,
@@ -25,7 +26,6 @@ from node.kernels.encoder import (
     encoder_step,
     new_encoder,
 )
-from node.kernels.record import A_SEQUENCE, AIDING
 from sim.kernel import kernel
 from sim.string.plain_encoder import PlainEncoder
 from sim.world.world import World

@@ -11,7 +11,7 @@ from typing import Any, Final
 import numpy as np
 import numpy.typing as npt
 
-from node.kernels.layout import PERIOD, Array
+from node.kernels.arithmetic.formats import PERIOD, Array
 from sim.kernel import kernel
 from sim.world.imu_errors import gauss_markov
 from sim.world.scenario_file import ScenarioFile

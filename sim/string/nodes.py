@@ -9,10 +9,12 @@ from typing import Final, NamedTuple
 import numpy as np
 
 from node.firmware.settings import Kernel, crew_record
-from node.kernels.address import BY_ADDRESS, ByAddress, firmware
-from node.kernels.calibration import PARAMETERS, identity_parameters
-from node.kernels.layout import Array, default_config
-from node.kernels.record import AIDING, MOMENT, READING, SETTINGS, new_node
+from node.kernels.arithmetic.formats import Array
+from node.kernels.record.filter_record import default_config
+from node.kernels.record.node_record import AIDING, MOMENT, READING, SETTINGS, new_node
+from node.kernels.record.sensor_record import PARAMETERS
+from node.kernels.sensors.correction import identity_parameters
+from node.kernels.step.address import BY_ADDRESS, ByAddress, firmware
 from sim.errors import ScenarioError
 from sim.world.scenario_file import ScenarioFile
 from sim.world.world import World

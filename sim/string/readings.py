@@ -10,9 +10,9 @@ from typing import Any, NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from node.kernels.calibration import USUAL
-from node.kernels.layout import PERIOD, Array
-from node.kernels.record import BEHIND, LATE, LATE_STD, READING, SATURATED, SPLIT, TEMPERATURE
+from node.kernels.arithmetic.formats import PERIOD, Array
+from node.kernels.record.node_record import BEHIND, LATE, LATE_STD, READING, SATURATED, SPLIT, TEMPERATURE
+from node.kernels.sensors.correction import USUAL
 from sim.campaign.frames import draw_parts, read_frames
 from sim.campaign.sensors import CLOCK, DRAWN, LOSS, draw, read_sensors
 from sim.kernel import shared_body
@@ -119,7 +119,7 @@ def supply_readings(recorded: Any, drawn: Any, field: Any, schedule: Any, hops: 
     """
     if drawn is not None:
         draw_readings(drawn, field, schedule, hops, cycle)
-        readings = drawn.readings
+        readings: Array = drawn.readings
     if recorded is not None:
         recall_hops(recorded, hops, cycle)
         readings = recorded.readings[cycle]

@@ -10,9 +10,9 @@ import numpy as np
 import numpy.typing as npt
 
 from node.firmware.reporter import VAR_FLOOR
-from node.kernels.angles import from_binary
-from node.kernels.layout import Err
-from node.kernels.step import ADMITTED, SAY_EVENTS, SAY_REVISION, SAY_SURVEY
+from node.kernels.arithmetic.angles import from_binary
+from node.kernels.record.filter_record import Err
+from node.kernels.step.node_step import ADMITTED, SAY_EVENTS, SAY_REVISION, SAY_SURVEY
 from sim.kernel import kernel
 from telemetry.messages import Event, NodeState, SurveyMeasurement
 
@@ -112,7 +112,7 @@ def trace_node(trace: Any, node: Any, says: int, cycle: int, k: int) -> bool:
     trace.systematic_var[cycle, k] = state.systematic_var
     trace.bias[cycle, k] = state.static_bias[2] + state.bias[2]
     trace.says[k] = says
-    return says & ~ADMITTED != 0
+    return bool(says & ~ADMITTED != 0)
 
 
 @kernel

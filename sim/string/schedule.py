@@ -7,7 +7,7 @@ from typing import NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from node.kernels.layout import PERIOD
+from node.kernels.arithmetic.formats import PERIOD
 from sim.world.scenario_file import AidingSection
 from sim.world.streams import Stream, stream
 from sim.world.world import World
@@ -67,7 +67,8 @@ def phases_of(world: World) -> Array:
 def count_powered(world: World) -> npt.NDArray[np.int64]:
     """Tubes that are powered in each cycle, (cycles,)."""
     starts = np.array([phase.start for phase in world.phases if phase.kind == "add"])
-    return world.scenario.file.rig.tubes_at_start + (starts <= world.ends[:, None]).sum(axis=1, dtype=np.int64)
+    added = (starts <= world.ends[:, None]).sum(axis=1, dtype=np.int64)
+    return np.asarray(world.scenario.file.rig.tubes_at_start + added, np.int64)
 
 
 def is_sent(world: World) -> Mask:

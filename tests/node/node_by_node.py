@@ -9,8 +9,8 @@ import numpy as np
 
 from node.firmware.encoder import EncoderNode, EncoderSample
 from node.firmware.inputs import RigContext
-from node.kernels.angles import from_binary
-from node.kernels.layout import Err, Scheme
+from node.kernels.arithmetic.angles import from_binary
+from node.kernels.record.filter_record import Err, Scheme
 from node.process.reading import reading_of
 from sim.string.direct_string import DirectString
 from sim.string.hops import record_hops

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from node.firmware.settings import JointRule
-from node.kernels.layout import PERIOD
+from node.kernels.arithmetic.formats import PERIOD
 from sim.string.direct_string import DirectString
 from sim.string.result import StringRun
 from sim.world.scenario import scenario_of
