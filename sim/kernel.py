@@ -1,4 +1,4 @@
-"""How the simulator's kernels are compiled: as the node's, and kept until a source of any room that they are made of moves.
+"""How the simulator's kernels are compiled: as the node's, and kept until a source changes that they are made of.
 
 A kernel of a string holds those of the world that fill its readings, which lie in another folder than it.
 """
@@ -18,7 +18,7 @@ ROOMS: Final = tuple(Path(__file__).parent / room for room in ("campaign", "stri
 
 
 class SimLocator(SourceLocator):
-    """Place of a kept function of the simulator: by its module, until a kernel of the node or a room of ours changes."""
+    """Place of a kept function of the simulator: by its module, until the node's kernels or ours change."""
 
     def __init__(self, function: Callable[..., Any], file: str) -> None:
         super().__init__(function, file)
@@ -40,6 +40,6 @@ def kernel(function: Function) -> Function:
 def shared_body(function: Function) -> Function:
     """Write ``function`` into every kernel that calls it, so that what it is given costs nothing.
 
-    A choice by ``is None`` of what a kernel was given is made as that kernel is compiled.
+    What stands under ``if argument is not None`` is left out where a kernel is given None.
     """
     return compiled(function, inline="always")

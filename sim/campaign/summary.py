@@ -16,7 +16,7 @@ import numpy as np
 import numpy.typing as npt
 
 from sim.campaign.chunk import Columns
-from sim.rig.direct_string import wrapped
+from sim.string.result import wrapped
 
 Array = npt.NDArray[np.float64]
 INTERVAL: Final = 1.959963984540054  # sigma, of 95 % of normal errors

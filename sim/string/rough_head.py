@@ -8,7 +8,7 @@ import numpy as np
 import numpy.typing as npt
 
 from node.kernels.string.encoder_step import COUNT, EDGE_AT, NOW, RISING, SAMPLE, TIMED
-from sim.rig.encoder_course import aidings_of
+from sim.string.head_measurements import measure_samples
 from sim.world.rough_disc import RoughDisc
 from sim.world.rough_section import RoughEncoderSection
 from sim.world.streams import Stream, stream
@@ -33,7 +33,7 @@ def measured_in_field(world: World, section: RoughEncoderSection, t: Array, head
     samples[:, NOW], samples[:, TIMED] = ends, 1.0
     samples[:, [COUNT, EDGE_AT, RISING]] = disc.samples(ends)
     samples[:, COUNT] += outliers(section, len(ends), math.tau / len(world.disc.errors), seed)
-    return aidings_of(world, samples, lambda cycle: disc.sample(float(ends[cycle]))[3])
+    return measure_samples(world, samples, lambda cycle: disc.sample(float(ends[cycle]))[3])
 
 
 def outliers(section: RoughEncoderSection, cycles: int, quantum: float, seed: int) -> Array:

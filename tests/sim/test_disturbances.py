@@ -158,7 +158,9 @@ def test_a_row_that_is_on_changes_what_a_rig_reads(name: str) -> None:
 def test_a_row_without_a_form_for_campaigns_is_refused_by_its_key(name: str) -> None:
     scenario = scenario_of(dict(REFUSED[name]))
     row = next(row for row in TABLE if row.name == name)
-    with pytest.raises(ScenarioError, match=r"a campaign cannot express it; borechain rig runs such a scenario") as said:
+    with pytest.raises(
+        ScenarioError, match=r"a campaign cannot express it; borechain rig runs such a scenario"
+    ) as said:
         Campaign(scenario)
     assert row.owns(str(said.value).split(":")[0])
 
@@ -180,7 +182,9 @@ def test_a_row_without_noise_reads_in_a_campaign_what_it_reads_in_a_rig(name: st
     assert np.quantile(apart[apart[:, SPLIT] == 0.0, BEHIND:], 0.9) < 2e-4
 
 
-@pytest.mark.parametrize(("name", "which"), [(name, k) for name, all_of in DRAWN_ANEW.items() for k in range(len(all_of))])
+@pytest.mark.parametrize(
+    ("name", "which"), [(name, k) for name, all_of in DRAWN_ANEW.items() for k in range(len(all_of))]
+)
 def test_what_is_drawn_anew_is_distributed_as_in_a_rig(name: str, which: int) -> None:
     scenario = scenario_of(dict(DRAWN_ANEW[name][which]))
     pairs = [(campaign_rows(scenario, seed)[:, :6], rig_rows(scenario, seed)[:, :6]) for seed in range(1, 7)]
@@ -212,7 +216,9 @@ def alike(ours: np.ndarray, theirs: np.ndarray) -> bool:
 
 @pytest.mark.parametrize("tables", [PLAIN, ROUGH], ids=["plain", "rough"])
 def test_what_is_constant_of_a_tube_is_what_a_rig_draws_to_the_last_bit(tables: Tables) -> None:
-    on = changed(tables, gyroscope={"constant_bias_std_dps": 0.1, "scale_factor_std": 0.05, "misalignment_std_deg": 1.0})
+    on = changed(
+        tables, gyroscope={"constant_bias_std_dps": 0.1, "scale_factor_std": 0.05, "misalignment_std_deg": 1.0}
+    )
     file = scenario_of(dict(changed(on, accelerometer={"bias_std_deg": 1.0}))).file
     tube, drawn = make_tubes(file, SEED, np.zeros(2))[1], constants_of(OneImu(file, SEED, 2))
     np.testing.assert_array_equal(tube["rate_bias"], drawn["gyroscope"].bias)

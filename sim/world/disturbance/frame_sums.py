@@ -59,7 +59,7 @@ class Desk(NamedTuple):
 
 
 class Field(NamedTuple):
-    """What the nodes of a rough world feel, beside ``sim.campaign.course.Course``."""
+    """What the nodes of a rough world feel, beside ``sim.string.schedule.StringSchedule``."""
 
     sums: Array  # (kinds, rows, FELT) of a perfect sensor behind its filter, over the frames before
     kinds: npt.NDArray[np.int64]  # (tubes,) which of them a tube sees
