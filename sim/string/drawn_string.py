@@ -23,7 +23,7 @@ from sim.string.readings import DrawnReadings, felt_by, new_readings
 from sim.string.result import LOGGED_STATE, LOGGED_SURVEY, StationLog, wrapped
 from sim.string.rough_runs import FieldRun, RoughWorld
 from sim.string.schedule import StringSchedule, redraw_schedule, schedule_of
-from sim.world.disturbance.records import make_shared
+from sim.world.disturbance.records import make_shared, make_tubes
 from sim.world.scenario import Scenario
 from sim.world.world import World
 

@@ -1,7 +1,10 @@
 """One table of disturbances: what a row does to a rig it does to a campaign, or a campaign refuses it by name."""
 
+import ast
+import functools
 from collections.abc import Iterator
-from typing import Any, get_args
+from pathlib import Path
+from typing import Any, get_args, get_origin
 
 import numpy as np
 import pytest
@@ -11,9 +14,10 @@ from node.kernels.record.node_record import BEHIND, LATE, LATE_STD, READING, SPL
 from sim.campaign.chunk import Campaign
 from sim.errors import ScenarioError
 from sim.string.allowlist import UNUSED, is_expressed, refused_keys
+from sim.string.drawn_string import frames_of
 from sim.string.readings import felt_by
 from sim.string.rough_runs import RoughWorld
-from sim.studies.scenarios import Tables, changed
+from sim.studies.scenarios import Tables, change_sections
 from sim.world.disturbance.chain import lane_starts
 from sim.world.disturbance.lanes import draw_further, draw_numbers
 from sim.world.disturbance.reading import constants_of, read_frames, read_sensors
@@ -45,12 +49,12 @@ STRING: Tables = {
 }
 PLAIN: Tables = STRING
 FIELD = {"vibration": {"highest_hz": 200.0}, "sensor": {"frames_hz": 50.0, "low_pass_hz": 20.0}}
-ROUGH: Tables = changed(STRING, rough={"samples_hz": 500.0, **FIELD})
+ROUGH: Tables = change_sections(STRING, rough={"samples_hz": 500.0, **FIELD})
 
 
 def rough_with(**tables: dict[str, Any]) -> Tables:
     """The rough string with other values of keys of some tables below ``rough``."""
-    return changed(ROUGH, rough={name: FIELD[name] | values for name, values in tables.items()})
+    return change_sections(ROUGH, rough={name: FIELD[name] | values for name, values in tables.items()})
 
 
 def sensor(**values: float) -> Tables:
@@ -58,7 +62,7 @@ def sensor(**values: float) -> Tables:
 
 
 def gyroscope(**values: Any) -> Tables:
-    return changed(PLAIN, gyroscope=values)
+    return change_sections(PLAIN, gyroscope=values)
 
 
 # each row of the table on, above a string on which it is off; what is drawn cycle by cycle is alike by distribution
@@ -73,35 +77,35 @@ EXACT: dict[str, Tables] = {
     "pull-along": gyroscope(g_sensitivity_dps_per_g=0.5),
     "steps": gyroscope(resolution_dps=0.7),
     "range": gyroscope(range_dps=50.0),
-    "force-bias": changed(PLAIN, accelerometer={"bias_std_deg": 1.0}),
+    "force-bias": change_sections(PLAIN, accelerometer={"bias_std_deg": 1.0}),
 }
 DRAWN_ANEW: dict[str, tuple[Tables, ...]] = {
     "torsional-vibration": (rough_with(vibration={"torsional_dps": 5.0}),),
     "vibration": (rough_with(vibration={"turning_g": 0.5}),),
     "wander": (
         gyroscope(bias_std_dps=(0.1, 0.2, 0.3), bias_tau_s=0.8),
-        changed(ROUGH, gyroscope={"bias_std_dps": (0.1, 0.2, 0.3), "bias_tau_s": 0.8}),
+        change_sections(ROUGH, gyroscope={"bias_std_dps": (0.1, 0.2, 0.3), "bias_tau_s": 0.8}),
     ),
     "white-noise": (
         gyroscope(noise_dps_rthz=(0.1, 0.2, 0.3)),
-        changed(ROUGH, gyroscope={"noise_dps_rthz": (0.1, 0.2, 0.3)}),
+        change_sections(ROUGH, gyroscope={"noise_dps_rthz": (0.1, 0.2, 0.3)}),
     ),
     "force-noise": (
-        changed(PLAIN, accelerometer={"noise_deg": 0.1, "vibration_mps2": 0.5}),
-        changed(ROUGH, accelerometer={"noise_deg": 0.1}),
+        change_sections(PLAIN, accelerometer={"noise_deg": 0.1, "vibration_mps2": 0.5}),
+        change_sections(ROUGH, accelerometer={"noise_deg": 0.1}),
     ),
 }
 REFUSED: dict[str, Tables] = {
-    "earth-rate": changed(ROUGH, rough={"latitude_deg": 50.0}),
-    "mount-tilt": changed(PLAIN, joints={"mount_tilt_std_deg": 1.0}),
+    "earth-rate": change_sections(ROUGH, rough={"latitude_deg": 50.0}),
+    "mount-tilt": change_sections(PLAIN, joints={"mount_tilt_std_deg": 1.0}),
     "rectification": rough_with(vibration={"turning_g": 0.5}, sensor={"rectification_dps_per_g2": 1.0}),
     "asymmetry": sensor(scale_asymmetry=0.01),
-    "clipped-rates": changed(ROUGH, gyroscope={"range_dps": 60.0}),
+    "clipped-rates": change_sections(ROUGH, gyroscope={"range_dps": 60.0}),
     "clipped-forces": sensor(force_range_g=0.9),
     "jitter": sensor(jitter_ms=10.0),
     "single-samples": gyroscope(instantaneous=True),
     "bias-step": gyroscope(bias_step_dps=1.0),
-    "drift": changed(PLAIN, drift={"accelerometer_bias_std_mps2": 0.1}),
+    "drift": change_sections(PLAIN, drift={"accelerometer_bias_std_mps2": 0.1}),
     "eighths": gyroscope(increments=True),
 }
 
@@ -119,22 +123,23 @@ def rig_rows(scenario: Scenario, seed: int) -> np.ndarray:
     return rows
 
 
-def campaign_rows(scenario: Scenario, seed: int) -> np.ndarray:
-    """What the only tube of a campaign reads, likewise."""
+def campaign_rows(scenario: Scenario, seed: int, tube: int = 1) -> np.ndarray:
+    """What a tube of a campaign reads, likewise, as if it were in the string from the first cycle on."""
     world, rough = World(scenario, seed), scenario.file.rough
     shared, drawn, reading = make_shared(scenario.file)[0], np.zeros(DRAWN), np.zeros((1, READING))
-    tube = make_tubes(scenario.file, seed, np.array([world.first_angle + world.marks.frame_angle(1)]))[0]
+    own = make_tubes(scenario.file, seed, frames_of(world))[tube - 1]
     draws = np.zeros(4, np.uint64), np.array([seed, 0], np.uint64), np.zeros(4, np.uint64)
     felt = felt_by(scenario, world.motion.starting_at(0.0), world.ends)
     run = None if rough is None else RoughWorld(world, rough).run(world)
     rows = np.zeros((world.cycles, READING))
-    for cycle, end in enumerate(world.ends.tolist()):
-        draw_numbers(*draws, drawn, cycle, 0)
+    for cycle, end in enumerate((world.ends + world.phase(tube)).tolist()):
+        place = cycle, tube - 1
+        draw_numbers(*draws, drawn, *place)
         if run is None:
-            read_sensors(shared, tube, cycle == 0, *felt, drawn, reading, end, cycle, 0)
+            read_sensors(shared, own, cycle == 0, *felt, drawn, reading, end, *place)
         else:
-            draw_further(*draws, run.field.desk.drawn, cycle, 0)
-            read_frames(shared, tube, cycle == 0, run.field, drawn, reading, end, cycle, 0)
+            draw_further(*draws, run.field.desk.drawn, *place)
+            read_frames(shared, own, cycle == 0, run.field, drawn, reading, end, *place)
         rows[cycle] = reading[0]
     return rows
 
@@ -216,10 +221,10 @@ def alike(ours: np.ndarray, theirs: np.ndarray) -> bool:
 
 @pytest.mark.parametrize("tables", [PLAIN, ROUGH], ids=["plain", "rough"])
 def test_what_is_constant_of_a_tube_is_what_a_rig_draws_to_the_last_bit(tables: Tables) -> None:
-    on = changed(
+    on = change_sections(
         tables, gyroscope={"constant_bias_std_dps": 0.1, "scale_factor_std": 0.05, "misalignment_std_deg": 1.0}
     )
-    file = scenario_of(dict(changed(on, accelerometer={"bias_std_deg": 1.0}))).file
+    file = scenario_of(dict(change_sections(on, accelerometer={"bias_std_deg": 1.0}))).file
     tube, drawn = make_tubes(file, SEED, np.zeros(2))[1], constants_of(OneImu(file, SEED, 2))
     np.testing.assert_array_equal(tube["rate_bias"], drawn["gyroscope"].bias)
     np.testing.assert_array_equal(tube["gains"][:, :3], drawn["gyroscope"].matrix)
@@ -245,67 +250,94 @@ HONEST: Tables = {
     "rotation": {"turns": 2.0},
     "medium": {"link": "off", "loss": 0.1},
 }
-IN_FIELD: Tables = changed(
+IN_FIELD: Tables = change_sections(
     HONEST,
     encoder={"phase": "random"},
     rough={
         "samples_hz": 500.0,
         "drive": {"ripple": 0.1, "stick_slip": 0.1, "dead_stop_dps": 2.0, "turns_back_deg": 1.0},
         "string": {"backlash_deg": 0.1, "twist_deg": 0.5},
-        "encoder": {"eccentricity_deg": 0.05, "belt_slip": 0.001, "outliers": 0.05},
+        "encoder": {"eccentricity_deg": 0.05, "belt_slip": 0.001, "outliers": 0.3},
         "vibration": {"turning_g": 0.2, "torsional_dps": 2.0, "highest_hz": 200.0},
         "sensor": {"frames_hz": 50.0, "low_pass_hz": 20.0, "warm_up_dps": 0.1, "warm_up_c": 5.0},
     },
 )
-SPIRAL = {"straight": None, "spiral": {"inclination_deg": 20.0, "azimuth_deg": 35.0, "turn_deg": 10.0}}
+FOLDER = Path(__file__).parents[2] / "scenarios"
+SPIRAL = {"inclination_deg": 20.0, "azimuth_deg": 35.0, "turn_deg": 10.0}
 ATTITUDES = [[0, 0], [0, 45], [0, 90], [0, 135], [0, 180], [0, -135], [45, 0], [90, 0], [-90, 0], [-45, 0]]
-RACK = {"calibration": {"attitudes_deg": ATTITUDES}}
-WALL = {"site": {"holes": [{"name": "a"}, {"name": "b", "north_m": 1.0}]}}
-# what a key needs beside it to mean anything
+SOIL = [{"sand": 0.5, "clay": 0.1, "water": 0.1}]
+HOLES = [{"name": "a"}, {"name": "b", "north_m": 1.0}]
+# what a key needs beside it to mean anything, by the key or the table that it is in
 BESIDE: dict[str, dict[str, Any]] = {
-    "path.spiral": {"path": SPIRAL},
+    "path.spiral.": {"path": {"straight": None, "spiral": SPIRAL}},
+    "torsion": {"schedule": {"stop_s": 40.0}},
     "aiding.on_s": {"aiding": {"off_s": 10.0}},
     "medium.delay_ms": {"medium": {"dated_by": "arrival"}},
     "medium.latency_ms": {"medium": {"dated_by": "arrival"}},
-    "calibration": RACK,
-    "site": WALL,
+    "calibration.": {"calibration": {"attitudes_deg": ATTITUDES}},
+    "radio": {"medium": {"link": "on"}},
+    "radio.": {"radio": {"soil": SOIL}},
+    "radio.pipe": {"radio": {"soil": [], "mode": "pipe", "pipe": {}, "frequency_mhz": 5800.0}},
+    "site.": {"site": {"holes": HOLES}},
 }
-# values that differ from the usual ones and can be, where the rule of ``other_value`` makes none
+# other values than the usual ones, where the rule of ``other_value`` has none that can be or that would be noticed
 OTHER: dict[str, Any] = {
-    "version": 0,
     "rig.tubes": 3,
     "rig.tube_length_m": 2.5,
     "rig.tubes_at_start": 0,
     "rig.depth_at_start_m": 1.0,
-    "path.displacements": "rig-3-path.csv",
-    "path.stations": "field-calibration-path.csv",
+    "path.straight": {"inclination_deg": 10.0},
     "schedule.blocks": 3,
     "rotation.advance_m": 1.0,
     "joints.head_turn_deg": 10.0,
+    "gyroscope.range_dps": 60.0,
     "encoder.counts_per_turn": 2048,
     "clocks.stated_std_ms": 1.0,
     "medium.transports": ["can"],
+    "radio": {"soil": SOIL},
+    "radio.attempts": 4,
+    "radio.soil": [{"sand": 0.3, "clay": 0.1, "water": 0.1}],
+    "radio.burst_every_s": 100.0,
+    "radio.pipe.reach": 1,
+    "aiding.off_s": 10.0,
     "aiding.every_s": 5.0,
     "node.tuning": {"gyro_noise": 1e-3},
     "node.imus": 2,
     "node.imu_noise": [2.0],
     "design.length_m": 5.0,
+    "calibration": {"attitudes_deg": ATTITUDES},
     "calibration.attitudes_deg": [*ATTITUDES, [0, -90]],
+    "site": {"holes": HOLES},
     "site.name": "other",
     "site.holes": [{"name": "a"}, {"name": "c", "north_m": 1.0}],
-    "radio.soil": [{"sand": 0.5, "clay": 0.1, "water": 0.1}],
-    "radio.burst_every_s": 100.0,
-    "radio.pipe.reach": 1,
     "rough.latitude_deg": 50.0,
+    "rough.encoder.outliers": 0.1,
+    "rough.vibration.highest_hz": 150.0,
+    "rough.sensor.frames_hz": 100.0,
+    "rough.sensor.low_pass_hz": 15.0,
     "rough.sensor.crystal": 0.01,
-    "faults": ["kill-node:1@20+5"],
-    "disturbance": {},
+    "rough.sensor.force_range_g": 0.9,
+    "faults": ["kill-node:1@60+5"],
 }
+# tables of the other scenario, of a key that takes the place of others
+INSTEAD: dict[str, dict[str, Any]] = {
+    "path.displacements": {"path": {"straight": None, "displacements": str(FOLDER / "wellbore-1-path.csv")}},
+    "path.stations": {"path": {"straight": None, "stations": str(FOLDER / "field-calibration-path.csv")}},
+    "path.spiral": {"path": {"straight": None, "spiral": SPIRAL}},
+    "radio.mode": {"medium": {"link": "on"}, "radio": {"mode": "pipe", "pipe": {}, "frequency_mhz": 5800.0}},
+    "rough": {"rough": IN_FIELD["rough"], "encoder": IN_FIELD["encoder"]},
+}
+# the format has one version, and what ``disturbance`` holds is of rows that the table of the program has none of
+ELSEWHERE = ("version", "disturbance")
 
 
 def section_in(annotation: Any) -> type[BaseModel] | None:
-    """The table that a field of a scenario is, or may be."""
-    found = [a for a in (annotation, *get_args(annotation)) if isinstance(a, type) and issubclass(a, BaseModel)]
+    """The table that a field of a scenario is, or may be; of a list of tables none."""
+    if isinstance(annotation, type):
+        kinds: tuple[Any, ...] = (annotation,)
+    else:
+        kinds = () if get_origin(annotation) is tuple else get_args(annotation)
+    found = [kind for kind in kinds if isinstance(kind, type) and issubclass(kind, BaseModel)]
     return found[0] if found else None
 
 
@@ -341,53 +373,62 @@ def other_value(key: str) -> Any:
     return 1.1 * usual if usual else 0.03
 
 
-def tables_with(key: str, value: Any) -> dict[str, Any]:
-    """A scenario of few tubes that holds a key; of a table that may be absent what it needs stands in it."""
-    tables: dict[str, Any] = dict(IN_FIELD if key.startswith(("rough.", "rough")) and key != "rough" else HONEST)
+def usual_tables(key: str) -> Tables:
+    """A scenario of few tubes in which a key means something."""
+    tables = IN_FIELD if key.startswith("rough.") else HONEST
     for name, needed in BESIDE.items():
-        if key == name or key.startswith(f"{name}."):
-            tables = dict(changed(tables, **needed))
-    if value is USUAL_VALUE:
-        return tables
+        if key == name or key.startswith(name):
+            tables = change_sections(tables, **needed)
+    return tables
+
+
+def other_tables(key: str) -> Tables:
+    """The same with another value of the key."""
+    if key in INSTEAD:
+        return change_sections(HONEST, **INSTEAD[key])
     *within, last = key.split(".")
-    return put(tables, within, last, value)
-
-
-USUAL_VALUE = object()
+    return put(dict(usual_tables(key)), within, last, other_value(key))
 
 
 def put(tables: dict[str, Any], within: list[str], last: str, value: Any) -> dict[str, Any]:
+    """Tables with a value at a key."""
     if not within:
-        beside = tables.get(last) if isinstance(value, dict) else None
-        return {**tables, last: {**beside, **value} if isinstance(beside, dict) else value}
+        return {**tables, last: value}
     first, *deeper = within
     return {**tables, first: put(tables.get(first) or {}, deeper, last, value)}
 
 
-def columns(tables: dict[str, Any]) -> dict[str, np.ndarray]:
-    chunk = Campaign(scenario_of(tables)).chunk(SEED, SEED)
-    return {**chunk.surveys, **{f"epochs {name}": values for name, values in chunk.epochs.items()}}
+@functools.lru_cache(maxsize=8)
+def _found(tables: str) -> tuple[dict[str, np.ndarray], list[np.ndarray]]:
+    scenario = scenario_of(ast.literal_eval(tables))
+    campaign = Campaign(scenario)
+    chunk = campaign.chunk(SEED, SEED)
+    columns = {**chunk.surveys, **{f"epochs {name}": values for name, values in chunk.epochs.items()}}
+    measured = campaign.string.drill(SEED).schedule.measured
+    return columns, [measured, *(campaign_rows(scenario, SEED, tube) for tube in range(1, scenario.tubes + 1))]
 
 
-def same(one: dict[str, np.ndarray], other: dict[str, np.ndarray]) -> bool:
-    return all(np.array_equal(one[name], other[name], equal_nan=one[name].dtype.kind == "f") for name in one)
+def found_alike(one: Tables, other: Tables) -> bool:
+    """Whether campaigns of two scenarios measure, read and find the same, to the last bit."""
+    (columns, rows), (others, other_rows) = _found(repr(dict(one))), _found(repr(dict(other)))
+    pairs = [*((values, others[name]) for name, values in columns.items()), *zip(rows, other_rows, strict=False)]
+    return len(rows) == len(other_rows) and all(np.array_equal(a, b, equal_nan=a.dtype.kind == "f") for a, b in pairs)
 
 
-@pytest.mark.parametrize("key", KEYS)
-def test_a_key_changes_what_a_campaign_finds_or_is_refused_or_is_listed_as_unused(key: str) -> None:
-    tables = tables_with(key, other_value(key))
-    scenario = scenario_of(tables)
-    if refused := list(refused_keys(scenario)):
-        asked = [name for name in refused if key == name.split(" ")[0] or key.startswith(f"{name}.")]
-        assert asked, refused
-        with pytest.raises(ScenarioError, match=asked[0] if len(refused) == 1 else ""):
-            Campaign(scenario)
+@pytest.mark.parametrize("key", [key for key in KEYS if key not in ELSEWHERE])
+def test_a_key_changes_what_a_campaign_reads_or_finds_or_is_refused_or_is_listed_as_unused(key: str) -> None:
+    usual, other = usual_tables(key), other_tables(key)
+    if refused := list(refused_keys(scenario_of(dict(other)))):
+        assert any(key == name.split(" ")[0] or key.startswith(f"{name}.") for name in refused), refused
+        with pytest.raises(ScenarioError) as said:
+            Campaign(scenario_of(dict(other)))
+        assert str(said.value).startswith(f"{refused[0]}: a campaign cannot express it; borechain rig runs")
         assert key not in UNUSED
         return
-    assert same(columns(tables), columns(tables_with(key, USUAL_VALUE))) == (key in UNUSED)
+    assert found_alike(usual, other) == (key in UNUSED)
 
 
-def test_a_key_of_nobody_is_refused() -> None:
+def test_a_key_that_neither_a_row_nor_a_part_of_the_string_has_is_refused() -> None:
     assert not is_expressed("gyroscope.hysteresis_dps")
     assert is_expressed("gyroscope.noise_dps_rthz")
     assert not is_expressed("gyroscope.bias_step_dps")

@@ -36,7 +36,8 @@ def filter_signal(samples: ImuSamples, imu: OneImu, _: None) -> None:
 
 def needs_filter(file: ScenarioFile) -> dict[str, bool]:
     """Frames lie between those of a finer grid, on which nothing is smooth that no filter has passed."""
-    return {"rough.sensor.low_pass_hz = 0": file.rough is not None and file.rough.sensor.low_pass_hz == 0.0}
+    sensor = None if file.rough is None else file.rough.sensor
+    return {"rough.sensor.low_pass_hz = 0": sensor is not None and sensor.frames_hz > 0.0 == sensor.low_pass_hz}
 
 
 LOW_PASS = Disturbance(  # a campaign has the frames of a perfect sensor behind it, ``sim.world.disturbance.frame_sums``
