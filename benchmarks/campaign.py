@@ -37,8 +37,8 @@ from sim.string.nodes import loop_of, new_nodes
 from sim.string.readings import DrawnReadings
 from sim.string.schedule import StringSchedule, redraw_schedule
 from sim.studies.epochs import resting_string
-from sim.world.disturbance.lanes import CLOCK, LOSS, draw_numbers
-from sim.world.disturbance.reading import read_sensors
+from sim.world.disturbance.lanes import CLOCK, draw_numbers
+from sim.world.disturbance.reading import LOSS, read_sensors
 from sim.world.scenario import Scenario, load_scenario, scenario_of
 from sim.world.world import World
 
@@ -104,8 +104,10 @@ def draw_node(schedule: StringSchedule, drawn: DrawnReadings, hops: Any, cycle: 
     """Draw what a node reads in a cycle, and its hop."""
     felt, numbers, is_first = drawn.felt, drawn.numbers, cycle == 0 or schedule.powered[cycle - 1] <= k
     draw_numbers(drawn.counter, drawn.key, drawn.words, numbers, cycle, k)
-    truth, end = (felt.rate, felt.force, felt.circle, felt.shaken), schedule.ends[cycle] + schedule.later[k]
-    read_sensors(drawn.shared[0], drawn.tubes[k], is_first, *truth, numbers, drawn.readings[k], end, cycle, k)
+    rates, forces, circle, shaken = felt.rate, felt.force, felt.circle, felt.shaken
+    shared, tube, reading = drawn.shared[0], drawn.tubes[k], drawn.readings[k]
+    end = schedule.ends[cycle] + schedule.later[k]
+    read_sensors(shared, tube, is_first, rates, forces, circle, shaken, numbers, reading, end, cycle, k)
     cross_hop(drawn.hop_noise[0], hops, k, is_first, numbers[CLOCK], numbers[LOSS])
 
 
