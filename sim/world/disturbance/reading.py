@@ -125,7 +125,7 @@ def move_tube(motion: TubeMotion, imu: OneImu) -> Array:
     return motion.angle
 
 
-@shared_body
+@kernel
 def read_sensors(
     shared: Any,
     tube: Any,
