@@ -5,6 +5,7 @@ A kernel of a string holds those of the world that fill its readings, which lie 
 
 from __future__ import annotations
 
+import hashlib
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any, Final, TypeVar, cast
@@ -23,6 +24,10 @@ class SimLocator(SourceLocator):
     def __init__(self, function: Callable[..., Any], file: str) -> None:
         super().__init__(function, file)
         self._stamp = source_digest() + "".join(map(folder_digest, ROOMS))
+        # a folder a version: what was compiled of another one names classes that may have moved
+        self._place = self._place.with_name(
+            f"{self._place.name}-{hashlib.sha256(self._stamp.encode()).hexdigest()[:16]}"
+        )
 
 
 def compiled(function: Function, **options: Any) -> Function:

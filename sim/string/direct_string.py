@@ -19,7 +19,6 @@ from node.firmware.inputs import RigContext
 from node.firmware.reporter import VAR_FLOOR
 from node.firmware.tube import Tube
 from node.kernels.arithmetic.angles import wrap
-from node.kernels.record.integer_node import new_integers
 from node.kernels.step.node_step import ADMITTED
 from sim.errors import ScenarioError
 from sim.string.drill import drill_string, hand_down, new_memory, no_estimates
@@ -61,8 +60,7 @@ class DirectString:
         if file.medium.link != "off":
             raise ScenarioError('medium.link: expected "off" for a string without frames')
         self.world = world
-        self._loop = loop_of(file.node.kernel)
-        self._integers = np.repeat(new_integers(), count) if file.node.kernel == "fixed" else None
+        self._loop = loop_of(file.node.kernel, count)
         self._nodes = new_nodes(world, state_every)
         self.nodes = self._nodes.records
         config = tuned_config(file)
@@ -98,7 +96,7 @@ class DirectString:
 
     def _tube(self, tube: int, config: Array, state_every: int) -> Tube:
         """The node of a tube on its records, which says what the kernel found that it has to say."""
-        one = slice(tube - 1, tube)
+        one, integers = slice(tube - 1, tube), self._loop.integers
         return Tube(
             replace(self.world.tube_settings(tube), state_every=state_every),
             config,
@@ -106,23 +104,22 @@ class DirectString:
             iter(range(NEVER)).__next__,
             restored=False,
             corrections=self._nodes.corrections[tube - 1],
-            integers=None if self._integers is None else self._integers[one],
+            integers=None if integers is None else integers.memory[one],
         )
 
     def _advance(self, first: int, last: int) -> int:
         """Run the cycle ``first``, and those after it while no node has anything to say; returns which is next."""
-        (step, aid), nodes, integers, schedule = self._loop, self._nodes, self._integers, self.schedule
-        hops, estimates, memory = self._hops, self._estimates, self._memory
+        loop, nodes, schedule, hops = self._loop, self._nodes, self.schedule, self._hops
         shifts = np.array([self.clock_shifts.get(tube, 0.0) for tube in self.tubes])
-        given = step, aid, nodes, schedule, hops, shifts, memory, first, last, self._recorded
-        reached = int(drill_string(*given, integers=integers, estimates=estimates, trace=self._trace))
+        given = *loop, nodes, schedule, hops, shifts, self._memory, first, last, self._recorded
+        reached = int(drill_string(*given, estimates=self._estimates, trace=self._trace))
         self._set_beside_truth(first, reached)
         cycle = reached - 1
         telling = np.flatnonzero(self._trace.says[: schedule.powered[cycle]] & ~ADMITTED).tolist()[::-1]
         for place in telling:
             self._keep_messages(cycle, place, self._messages(cycle, place, float(shifts[place])))
         if telling and schedule.locked:
-            hand_down(aid, nodes, schedule, hops, shifts, memory.aiding, cycle, integers, estimates)
+            hand_down(*loop[1:], nodes, schedule, hops, shifts, self._memory.aiding, cycle, self._estimates)
         return reached
 
     def _messages(self, cycle: int, place: int, shift: float) -> Sequence[Message]:

@@ -90,8 +90,8 @@ class DrawnString:
         world, count = World(self.scenario, seed), self.scenario.tubes
         rough = None if self.rough is None else self.rough.run(world)
         schedule = redraw_schedule(self.schedule, world, measure_head(world) if rough is None else rough.measured)
-        (step, aid), nodes, log = loop_of("float64"), new_nodes(world), self.new_log()
-        given = step, aid, nodes, schedule, draw_hops(world), np.zeros(count), new_memory(), 0, world.cycles
+        loop, nodes, log = loop_of("float64", count), new_nodes(world), self.new_log()
+        given = *loop, nodes, schedule, draw_hops(world), np.zeros(count), new_memory(), 0, world.cycles
         field = None if rough is None else rough.field
         drill_string(*given, drawn=self.new_readings(world), field=field, log=log)
         systematic = np.array([np.pad(world.marks.errors(tube), (tube, 0), "edge") for tube in range(1, count + 1)])

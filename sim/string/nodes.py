@@ -11,6 +11,7 @@ import numpy as np
 from node.firmware.settings import Kernel, crew_record
 from node.kernels.arithmetic.formats import Array
 from node.kernels.record.filter_record import default_config
+from node.kernels.record.integer_node import new_integers
 from node.kernels.record.node_record import AIDING, MOMENT, READING, SETTINGS, new_node
 from node.kernels.record.sensor_record import PARAMETERS
 from node.kernels.sensors.correction import identity_parameters
@@ -57,11 +58,32 @@ def tuned_config(file: ScenarioFile) -> Array:
     return config
 
 
+class IntegerLoop(NamedTuple):
+    """Firmware of nodes in integers, by address, with its memory."""
+
+    step: ByAddress
+    aid: ByAddress
+    memory: Array  # (tubes,) of dtype ``INTEGERS``
+
+
+class FirmwareLoop(NamedTuple):
+    """Compiled firmware as ``sim.string.drill`` takes it: of nodes in floats by address, or of nodes in integers."""
+
+    step: ByAddress | None
+    aid: ByAddress | None
+    integers: IntegerLoop | None
+
+
+def loop_of(kernel: Kernel, tubes: int) -> FirmwareLoop:
+    """What so many nodes with a kernel run; all but the default are loaded only when used."""
+    if kernel == "fixed":
+        return FirmwareLoop(None, None, IntegerLoop(*firmware(kernel), np.repeat(new_integers(), tubes)))
+    return FirmwareLoop(*(firmware(kernel) if kernel in BY_ADDRESS else published_firmware()), None)
+
+
 @functools.cache
-def loop_of(kernel: Kernel) -> tuple[ByAddress, ByAddress]:
-    """Step and intake of aiding of a kernel, by address; all but the default are loaded only when used."""
-    if kernel in BY_ADDRESS:
-        return firmware(kernel)
+def published_firmware() -> tuple[ByAddress, ByAddress]:
+    """Step and intake of aiding of the form in print, by address."""
     from node.kernels.published.step import published_aiding, published_step
 
     records, settings = new_node(default_config()), np.zeros(1, SETTINGS)

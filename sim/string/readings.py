@@ -136,15 +136,16 @@ def recall_hops(recorded: Any, hops: Array, cycle: int) -> None:
 @shared_body
 def draw_readings(drawn: Any, field: Any, schedule: Any, hops: Array, cycle: int) -> None:
     """Draw the readings and the hops of all tubes of the string in a cycle."""
-    felt, powered, noise = drawn.felt, schedule.powered, drawn.noise[0]
+    felt, powered, noise, hop_noise = drawn.felt, schedule.powered, drawn.noise[0], drawn.hop_noise[0]
     rate, force, circle, shaken, numbers = felt.rate, felt.force, felt.circle, felt.shaken, drawn.numbers
+    tubes, readings, counter, key, words = drawn.tubes, drawn.readings, drawn.counter, drawn.key, drawn.words
     for k in range(powered[cycle]):
-        tube, reading, is_first = drawn.tubes[k], drawn.readings[k], cycle == 0 or powered[cycle - 1] <= k
-        draw(drawn.counter, drawn.key, drawn.words, numbers, cycle, k)
+        tube, reading, is_first = tubes[k], readings[k], cycle == 0 or powered[cycle - 1] <= k
+        draw(counter, key, words, numbers, cycle, k)
         if field is not None:
-            draw_parts(drawn.counter, drawn.key, drawn.words, field.desk.drawn, cycle, k)
+            draw_parts(counter, key, words, field.desk.drawn, cycle, k)
             end = schedule.ends[cycle] + schedule.later[k]
             read_frames(noise, tube, is_first, field, numbers, reading, end, cycle, k)
         else:
             read_sensors(noise, tube, is_first, rate, force, circle, shaken, numbers, reading, cycle, k)
-        cross_hop(drawn.hop_noise[0], hops, k, is_first, numbers[CLOCK], numbers[LOSS])
+        cross_hop(hop_noise, hops, k, is_first, numbers[CLOCK], numbers[LOSS])

@@ -13,12 +13,13 @@ from node.firmware.reporter import VAR_FLOOR
 from node.kernels.arithmetic.angles import from_binary
 from node.kernels.record.filter_record import Err
 from node.kernels.step.node_step import ADMITTED, SAY_EVENTS, SAY_REVISION, SAY_SURVEY
-from sim.kernel import kernel
+from sim.kernel import kernel, shared_body
 from telemetry.messages import Event, NodeState, SurveyMeasurement
 
 Array = npt.NDArray[np.float64]
 Mask = npt.NDArray[np.bool_]
 YAW: Final = int(Err.YAW)
+LOGGED: Final = SAY_SURVEY | SAY_REVISION | SAY_EVENTS  # of what a node says
 
 LOGGED_SURVEY: Final = np.dtype(
     [
@@ -128,7 +129,7 @@ def log_node(log: Any, node: Any, says: int, top: int, cycle: int, k: int) -> No
         node.events.said = node.events.told
 
 
-@kernel
+@shared_body
 def log_epoch(log: Any, nodes: Array, top: int, cycle: int) -> None:
     """Keep what every filter knows where an epoch ends with the cycle."""
     epoch = log.epochs[cycle]
