@@ -116,9 +116,16 @@ def trace_node(trace: Any, node: Any, says: int, cycle: int, k: int) -> bool:
     return bool(says & ~ADMITTED != 0)
 
 
-@kernel
+@shared_body
 def log_node(log: Any, node: Any, says: int, top: int, cycle: int, k: int) -> None:
-    """Keep a survey that a node made or revised, of a string of ``top`` tubes; its events are let go."""
+    """Keep what a campaign wants of what a node of a string of ``top`` tubes has to say, which is seldom anything."""
+    if says & LOGGED:
+        log_said(log, node, says, top, cycle, k)
+
+
+@kernel
+def log_said(log: Any, node: Any, says: int, top: int, cycle: int, k: int) -> None:
+    """Keep a survey that a node made or revised; its events are let go."""
     if says & SAY_SURVEY:
         if log.made[0] < log.surveys.shape[0]:
             log_survey(log.surveys[log.made[0]], node, cycle, k, top)
