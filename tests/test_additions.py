@@ -71,7 +71,7 @@ STUDY = Addition(
             "coin",
             "Whether a coin is fair.",
             f"{MODULES}.coin",
-            (Table("{throws} throws", (("case", "case"), ("ours", "ours")), (("case", "case"), ("ours", "ours"))),),
+            (ResultTable("{throws} throws", (("case", "case"), ("ours", "ours")), (("case", "case"), ("ours", "ours"))),),
             (Option("throws", 4, 1, 10),),
             drawn=False,
         ),
@@ -107,7 +107,63 @@ def simulate_records(seed):
     },
     named="simulate_records(seed)",
 )
-ADDITIONS = (COMMAND, MEDIUM, STUDY, INSTRUMENT)
+DISTURBANCE = Addition(
+    row="a disturbance",
+    table="sim/world/disturbance/table.py",
+    head="TABLE: Final[tuple[Disturbance, ...]] = (\n",
+    line='    *import_module("sim.world.disturbance.hum").ROWS,\n',
+    files={
+        "sim/world/disturbance/hum.py": """
+import numpy as np
+
+from sim.kernel import kernel
+from sim.world.disturbance.lanes import Lane
+from sim.world.disturbance.row import ActsOn, Compiled, Disturbance
+from sim.world.section import NotNegative, Section
+from sim.world.streams import Stream
+
+
+class HumSection(Section):
+    size_rps: NotNegative = 0.0
+    spread_rps: NotNegative = 0.0
+
+
+def draw(imu):
+    section = imu.section_of(HUM)
+    return section.size_rps * np.random.default_rng((imu.seed, imu.tube)).random(), section.spread_rps
+
+
+def hum(samples, imu, drawn):
+    size, spread = drawn
+    noise = np.random.default_rng((imu.seed, 7, imu.tube)).standard_normal(len(samples.t))
+    of_mean = spread if samples.period > 0.5 else spread * np.sqrt(1.0 / 1.9 / samples.period)
+    samples.rate[:, 2] += size * np.sin(0.01 * samples.t) + of_mean * noise
+
+
+def set_tube(tube, drawn):
+    tube["hum"], tube["hum_spread"] = drawn
+
+
+@kernel
+def read_hum(shared, tube, now, drawn, row):
+    row[2] += tube.hum * np.sin(0.01 * now.end) + tube.hum_spread * drawn[0]
+
+
+HUM = Disturbance(
+    "hum",
+    (),
+    ActsOn.SAMPLES,
+    hum,
+    draw,
+    Compiled(tube=(("hum", "f8"), ("hum_spread", "f8")), set_tube=set_tube, lane=Lane.NEXT, read=read_hum),
+    section=HumSection,
+)
+CREAK = Disturbance("creak", (), ActsOn.SAMPLES, lambda samples, imu, _: hum(samples, imu, (0.1, 0.0)), section=HumSection)
+""",
+    },
+    named="sim/world/disturbance/wander.py",
+)
+ADDITIONS = (COMMAND, MEDIUM, STUDY, INSTRUMENT, DISTURBANCE)
 
 
 def add(folder: Path, addition: Addition) -> None:
@@ -185,7 +241,7 @@ def test_a_tube_obeys_an_added_command_and_its_ranges_hold(copy: Path) -> None:
 
 def test_frames_cross_an_added_medium(copy: Path) -> None:
     out = run(copy, "-c", program("""
-        from telemetry.media.port import Frame, TubeEnd
+        from telemetry.media.port import PortFrame, TubeEnd
         from telemetry.media.media_table import open_medium
         from telemetry.messages import Side
 
@@ -193,7 +249,7 @@ def test_frames_cross_an_added_medium(copy: Path) -> None:
             lower_end = TubeEnd("rig", 2, Side.LOWER, 1)
             upper, lower = medium.open_port(lower_end), medium.open_port(lower_end.facing)
             lower.listen(print)
-            upper.send(Frame(b"hello"))
+            upper.send(PortFrame(b"hello"))
             upper.close()
             lower.close()
     """))  # fmt: skip

@@ -1,7 +1,7 @@
 """A string made ready for many seeds: what they share is worked out once, readings are drawn in the loop.
 
 Joints, mounts, clocks and sensors of a run are the draws of the world of its seed (``sim.world``), so a run has the
-string that a rig of its seed has; what is drawn cycle by cycle comes from ``sim.campaign.philox``.
+string that a rig of its seed has; what is drawn cycle by cycle comes from ``sim.world.disturbance.philox``.
 """
 
 from __future__ import annotations
@@ -14,16 +14,16 @@ import numpy.typing as npt
 
 from node.kernels.arithmetic.formats import PERIOD, Array
 from node.kernels.record.node_record import AIDING
-from sim.campaign.draws import frames_of, noise_of, tubes_of
-from sim.campaign.field_draws import FieldRun, RoughWorld
-from sim.campaign.refusals import refuse_others
+from sim.string.allowlist import refuse_others
 from sim.string.drill import drill_string, new_memory
 from sim.string.head_measurements import measure_head
 from sim.string.hops import draw_hops, hop_noise_of
 from sim.string.nodes import loop_of, new_nodes
 from sim.string.readings import DrawnReadings, felt_by, new_readings
 from sim.string.result import LOGGED_STATE, LOGGED_SURVEY, StationLog, wrapped
+from sim.string.rough_runs import FieldRun, RoughWorld
 from sim.string.schedule import StringSchedule, redraw_schedule, schedule_of
+from sim.world.disturbance.records import make_shared, make_tubes
 from sim.world.scenario import Scenario
 from sim.world.world import World
 
@@ -76,7 +76,7 @@ class DrawnString:
         self.turning = np.array([p.kind == "drill" for p in phases])
         self._head, self._tops = still.drive(world.ends)[0], world.motion.tops(world.ends).astype(np.int64)
         self._depth = world.motion.depth(world.ends)[0]
-        self._noise, self._hop_noise = noise_of(scenario.file), hop_noise_of(scenario.file)
+        self._shared, self._hop_noise = make_shared(scenario.file), hop_noise_of(scenario.file)
         self._epoch_of = np.full(world.cycles, -1)
         self._epoch_of[self.epochs] = np.arange(len(self.epochs))
 
@@ -99,8 +99,8 @@ class DrawnString:
 
     def new_readings(self, world: World) -> DrawnReadings:
         """What the readings of a world's seed are drawn from."""
-        tubes = tubes_of(world, frames_of(world))
-        return new_readings(world.seed, self._noise, tubes, self._hop_noise, self.felt)
+        tubes = make_tubes(self.scenario.file, world.seed, frames_of(world))
+        return new_readings(world.seed, self._shared, tubes, self._hop_noise, self.felt)
 
     def new_log(self) -> StationLog:
         """What is kept of a run, before it."""
@@ -134,3 +134,9 @@ class DrawnString:
         inclination = np.arctan2(lean, -unit[:, 2]) - np.arctan2(true_lean, true[:, 2])
         azimuth = wrapped(np.arctan2(east, north) - np.arctan2(true[:, 1], true[:, 0]))
         return inclination, np.where(true_lean > PLUMB, azimuth, np.nan)
+
+
+def frames_of(world: World) -> Array:
+    """Angles (tubes,) rad of the IMUs' frames with the head at 0."""
+    tubes = range(1, world.scenario.tubes + 1)
+    return np.asarray(world.first_angle + np.array([world.marks.frame_angle(tube) for tube in tubes]))

@@ -13,7 +13,7 @@ import numpy.typing as npt
 
 from node.kernels.arithmetic.formats import PERIOD, Array
 from sim.kernel import kernel
-from sim.world.imu_errors import gauss_markov
+from sim.world.disturbance.wander import gauss_markov
 from sim.world.scenario_file import ScenarioFile
 from sim.world.streams import Stream, stream
 from sim.world.world import World

@@ -13,10 +13,11 @@ import numpy.typing as npt
 from node.kernels.arithmetic.formats import PERIOD, Array
 from node.kernels.record.node_record import BEHIND, LATE, LATE_STD, READING, SATURATED, SPLIT, TEMPERATURE
 from node.kernels.sensors.correction import USUAL
-from sim.campaign.frames import draw_parts, read_frames
-from sim.campaign.sensors import CLOCK, DRAWN, LOSS, draw, read_sensors
 from sim.kernel import shared_body
 from sim.string.hops import cross_hop, record_hops
+from sim.world.disturbance.lanes import CLOCK, LOSS, draw_further, draw_numbers
+from sim.world.disturbance.reading import read_frames, read_sensors
+from sim.world.disturbance.records import DRAWN
 from sim.world.motion import Motion
 from sim.world.scenario import Scenario
 from sim.world.truth import TubeTruth
@@ -46,13 +47,13 @@ class FeltTruth(NamedTuple):
 class DrawnReadings(NamedTuple):
     """What the readings of one seed are drawn from, cycle by cycle."""
 
-    key: Array  # (2,) of the run, see ``sim.campaign.philox``
+    key: Array  # (2,) of the run, see ``sim.world.disturbance.philox``
     counter: Array  # (4,) uint64, likewise
     words: Array  # (4,) uint64
     numbers: Array  # (DRAWN,) of a tube and cycle
     readings: Array  # (tubes, 1, READING) of a cycle
-    noise: Array  # (1,) of dtype ``sim.campaign.sensors.NOISE``
-    tubes: Array  # (tubes,) of dtype ``sim.campaign.sensors.TUBE``
+    shared: Array  # (1,) of dtype ``SHARED`` of ``sim.world.disturbance.records``
+    tubes: Array  # (tubes,) of dtype ``TUBE``, likewise
     hop_noise: Array  # (1,) of dtype ``sim.string.hops.HOP_NOISE``
     felt: FeltTruth
 
@@ -76,7 +77,7 @@ def record_readings(world: World) -> RecordedReadings:
     return RecordedReadings(readings, *record_hops(world))
 
 
-def new_readings(seed: int, noise: Array, tubes: Array, hop_noise: Array, felt: FeltTruth) -> DrawnReadings:
+def new_readings(seed: int, shared: Array, tubes: Array, hop_noise: Array, felt: FeltTruth) -> DrawnReadings:
     """What the readings of a seed are drawn from, see ``DrawnReadings``."""
     return DrawnReadings(
         key=np.array([seed & 0xFFFFFFFF, seed >> 32], np.uint64),
@@ -84,7 +85,7 @@ def new_readings(seed: int, noise: Array, tubes: Array, hop_noise: Array, felt: 
         words=np.zeros(4, np.uint64),
         numbers=np.zeros(DRAWN),
         readings=np.zeros((len(tubes), 1, READING)),
-        noise=noise,
+        shared=shared,
         tubes=tubes,
         hop_noise=hop_noise,
         felt=felt,
@@ -94,7 +95,7 @@ def new_readings(seed: int, noise: Array, tubes: Array, hop_noise: Array, felt: 
 def felt_by(scenario: Scenario, motion: Motion, ends: Array) -> FeltTruth:
     """What perfect sensors read of the ``motion`` of a head that starts at 0, over cycles that end at ``ends`` (s).
 
-    Of a rough world nothing: its nodes feel what ``sim.campaign.field`` has.
+    Of a rough world nothing: its nodes feel what ``sim.world.disturbance.frame_sums`` has.
     """
     count, a = scenario.tubes, scenario.file.accelerometer
     turns = (motion.drive(ends)[1] > 0.0) | (motion.drive(ends - PERIOD)[1] > 0.0)
@@ -115,7 +116,7 @@ def supply_readings(recorded: Any, drawn: Any, field: Any, schedule: Any, hops: 
     Parameters
     ----------
     recorded, drawn : ``RecordedReadings`` or ``DrawnReadings``; the other is None, and not compiled
-    field : ``sim.campaign.field.Field`` of a rough world whose readings are drawn, else None
+    field : ``sim.world.disturbance.frame_sums.Field`` of a rough world whose readings are drawn, else None
     """
     if drawn is not None:
         draw_readings(drawn, field, schedule, hops, cycle)
@@ -136,16 +137,16 @@ def recall_hops(recorded: Any, hops: Array, cycle: int) -> None:
 @shared_body
 def draw_readings(drawn: Any, field: Any, schedule: Any, hops: Array, cycle: int) -> None:
     """Draw the readings and the hops of all tubes of the string in a cycle."""
-    felt, powered, noise, hop_noise = drawn.felt, schedule.powered, drawn.noise[0], drawn.hop_noise[0]
+    felt, powered, shared, hop_noise = drawn.felt, schedule.powered, drawn.shared[0], drawn.hop_noise[0]
     rate, force, circle, shaken, numbers = felt.rate, felt.force, felt.circle, felt.shaken, drawn.numbers
     tubes, readings, counter, key, words = drawn.tubes, drawn.readings, drawn.counter, drawn.key, drawn.words
     for k in range(powered[cycle]):
         tube, reading, is_first = tubes[k], readings[k], cycle == 0 or powered[cycle - 1] <= k
-        draw(counter, key, words, numbers, cycle, k)
+        end = schedule.ends[cycle] + schedule.later[k]
+        draw_numbers(counter, key, words, numbers, cycle, k)
         if field is not None:
-            draw_parts(counter, key, words, field.desk.drawn, cycle, k)
-            end = schedule.ends[cycle] + schedule.later[k]
-            read_frames(noise, tube, is_first, field, numbers, reading, end, cycle, k)
+            draw_further(counter, key, words, field.desk.drawn, cycle, k)
+            read_frames(shared, tube, is_first, field, numbers, reading, end, cycle, k)
         else:
-            read_sensors(noise, tube, is_first, rate, force, circle, shaken, numbers, reading, cycle, k)
+            read_sensors(shared, tube, is_first, rate, force, circle, shaken, numbers, reading, end, cycle, k)
         cross_hop(hop_noise, hops, k, is_first, numbers[CLOCK], numbers[LOSS])

@@ -20,13 +20,14 @@ from node.kernels.record.node_record import AIDING, MOMENT, READING
 from node.kernels.step.address import firmware
 from sim.campaign import engine
 from sim.campaign.chunk import RUNS, Campaign, run_chunk, scenario_digest
-from sim.campaign.draws import frames_of, noise_of, tubes_of
 from sim.campaign.run import run_campaign
-from sim.campaign.sensors import DRAWN, read_sensors
 from sim.campaign.store import MANIFEST, Folder
 from sim.campaign.summary import OverRuns, Sum, honesty
 from sim.errors import RigError, ScenarioError
 from sim.string.direct_string import DirectString
+from sim.string.drawn_string import frames_of
+from sim.world.disturbance.reading import read_sensors
+from sim.world.disturbance.records import DRAWN, make_shared, make_tubes
 from sim.world.scenario import Scenario, load_scenario, scenario_of
 from sim.world.world import World
 
@@ -51,12 +52,13 @@ def scenario(**changed: dict[str, Any]) -> Scenario:
 def test_without_noise_every_sensor_reads_what_it_reads_in_the_world_of_a_rig() -> None:
     quiet = scenario(gyroscope=QUIET_GYRO | {"misalignment_std_deg": 0.3}, accelerometer=QUIET_FORCE)
     world, made = World(quiet, 5), Campaign(quiet)
-    noise, reading, drawn = noise_of(quiet.file)[0], np.zeros((1, READING)), np.zeros(DRAWN)
-    tubes, powered = tubes_of(world, frames_of(world)), made.string.schedule.powered
+    shared, reading, drawn = make_shared(quiet.file)[0], np.zeros((1, READING)), np.zeros(DRAWN)
+    tubes, powered = make_tubes(quiet.file, 5, frames_of(world)), made.string.schedule.powered
     for tube in (1, 2, 3):
         samples = world.sensors.samples(tube)
         for cycle in np.flatnonzero(powered >= tube)[::7].tolist():
-            read_sensors(noise, tubes[tube - 1], False, *made.string.felt, drawn, reading, int(cycle), tube - 1)
+            felt, end = made.string.felt, float(world.ends[cycle])
+            read_sensors(shared, tubes[tube - 1], False, *felt, drawn, reading, end, int(cycle), tube - 1)
             assert np.allclose(reading[0, :6], samples[cycle], rtol=0.0, atol=2e-9), (tube, cycle)
 
 

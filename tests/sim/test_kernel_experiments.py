@@ -20,7 +20,7 @@ from sim.studies.lab import LAB, REST, ROTATING, LabRun, run_seed
 from sim.studies.modes import run as modes
 from sim.studies.scenarios import Tables, change_sections, on_off
 from sim.studies.trials import rms_deg
-from sim.world.imu_errors import SAMPLE_RATE_HZ, single_samples
+from sim.world.disturbance.white_noise import SAMPLE_RATE_HZ, densities
 from sim.world.scenario_file import GyroSection, NodeSection
 
 pytestmark = pytest.mark.slow
@@ -124,8 +124,8 @@ def test_a_plain_encoder_reads_the_middle_of_its_count() -> None:
 
 def test_a_single_sample_has_the_noise_of_its_band() -> None:
     gyroscope = GyroSection()
-    single = single_samples(gyroscope, PERIOD)
-    for one, mean in zip(single.noise_dps_rthz, gyroscope.noise_dps_rthz, strict=True):
+    single = densities(gyroscope.model_copy(update={"instantaneous": True}), PERIOD)
+    for one, mean in zip(single, gyroscope.noise_dps_rthz, strict=True):
         assert one / math.sqrt(PERIOD) == pytest.approx(mean * math.sqrt(SAMPLE_RATE_HZ))
 
 

@@ -14,19 +14,24 @@ from scipy.stats import ks_2samp
 from node.kernels.record.filter_record import PARTS
 from node.kernels.record.node_record import BEHIND, LATE, LATE_STD, READING, SPLIT, TEMPERATURE
 from sim.campaign.chunk import Campaign
-from sim.campaign.draws import frames_of, noise_of, tubes_of
-from sim.campaign.field import FINER, Field
-from sim.campaign.field_encoder import measured_in_field
-from sim.campaign.frames import read_frames, set_noise
-from sim.campaign.sensors import DRAWN
-from sim.campaign.vibration import Vibration
 from sim.errors import ScenarioError
 from sim.string.direct_string import DirectString
+from sim.string.drawn_string import frames_of
 from sim.string.head_measurements import row_of_aiding
+from sim.string.rough_head import measured_in_field
 from sim.studies.epochs import epochs_of
 from sim.studies.scenarios import Tables, change_sections
 from sim.studies.worlds.run import rough_world
-from sim.world.rough_imu import RoughImu, band_noise, low_passed
+from sim.world.disturbance import fifo
+from sim.world.disturbance.frame_layout import FINER
+from sim.world.disturbance.frame_sums import Field
+from sim.world.disturbance.frame_vibration import Vibration
+from sim.world.disturbance.low_pass import low_passed
+from sim.world.disturbance.reading import read_frames
+from sim.world.disturbance.records import DRAWN, make_shared, make_tubes
+from sim.world.disturbance.row import OneImu
+from sim.world.disturbance.vibration import band_noise
+from sim.world.disturbance.white_noise import add_part_noise
 from sim.world.scenario import Scenario, load_scenario, scenario_of
 from sim.world.world import World
 
@@ -71,12 +76,12 @@ def alike(monkeypatch: pytest.MonkeyPatch) -> Callable[[Field], None]:
     """Have the frames of a world's FIFOs come when those of a campaign's run do, to which half a place is nothing."""
 
     def follow(field: Field) -> None:
-        def frame_times(self: RoughImu, _sensor: Any) -> np.ndarray:
-            front, fifo = field.front_end[0], field.fifos[self._key[0] - 1]
-            first = front["first"] + front["frame"] * (fifo["row"] + fifo["share"]) / FINER
-            return np.arange(first, self._t[-1], front["frame"])
+        def frame_times(imu: OneImu, t: np.ndarray) -> np.ndarray:
+            front, own = field.front_end[0], field.fifos[imu.tube - 1]
+            first = front["first"] + front["frame"] * (own["row"] + own["share"]) / FINER
+            return np.arange(first, t[-1], front["frame"])
 
-        monkeypatch.setattr(RoughImu, "_frame_times", frame_times)
+        monkeypatch.setattr(fifo, "frame_times", frame_times)
 
     return follow
 
@@ -95,16 +100,16 @@ def test_without_noise_every_sensor_reads_what_it_reads_in_the_rough_world(
     scenario = without_noise(drawn)
     world, made = World(scenario, 5), Campaign(scenario)
     assert made.string.rough is not None
-    run, noise = made.string.rough.run(world), noise_of(scenario.file)[0]
+    run, shared = made.string.rough.run(world), make_shared(scenario.file)[0]
     reading, drawn_numbers = np.zeros((1, READING)), np.zeros(DRAWN)
     alike(run.field)
-    tubes = tubes_of(world, frames_of(world))
+    tubes = make_tubes(scenario.file, 5, frames_of(world))
     for tube in range(1, scenario.tubes + 1):
         found = world.sensors.rough_cycles(tube)
         rows = np.zeros((world.cycles, READING))
         for cycle in range(world.cycles):
             end = float(world.ends[cycle] + world.phase(tube))
-            read_frames(noise, tubes[tube - 1], False, run.field, drawn_numbers, reading, end, cycle, tube - 1)
+            read_frames(shared, tubes[tube - 1], False, run.field, drawn_numbers, reading, end, cycle, tube - 1)
             rows[cycle] = reading[0]
         off = np.abs(rows[:, :6] - found.readings)
         assert off[:, :3].max() < 1e-4
@@ -148,7 +153,7 @@ def test_noise_of_the_parts_of_a_window_is_that_of_its_frames() -> None:
     shares = [np.clip(np.minimum(b, frames + 1.0) - np.maximum(a, frames), 0.0, 1.0) for a, b in pairwise(borders)]
     noises = np.zeros((20_000, PARTS + 1))
     for noise in noises:
-        set_noise(noise, borders, PARTS + 1, 2.0, random.standard_normal(), random.standard_normal(2 * PARTS))
+        add_part_noise(noise, borders, PARTS + 1, 2.0, random.standard_normal(), random.standard_normal(2 * PARTS))
     wanted = 4.0 * np.array(shares) @ np.array(shares).T
     assert np.allclose(np.cov(noises.T), wanted, rtol=0.0, atol=0.02 * wanted.max())
 

@@ -16,19 +16,14 @@ import numpy.typing as npt
 
 from node.kernels.arithmetic.formats import PERIOD, Array
 from node.kernels.record.filter_record import PARTS
-from sim.campaign.frame_times import FrameTimes, no_frames
-from sim.world.rough_imu import low_passed
+from sim.world.disturbance.frame_layout import FELT, FINER, MOVED, SUMS
+from sim.world.disturbance.frame_times import FrameTimes, no_frames
+from sim.world.disturbance.low_pass import low_passed
 from sim.world.rough_run import RoughRun
 from sim.world.rough_section import RoughSection, RoughVibrationSection
-from sim.world.scenario import Scenario
 from sim.world.truth import TubeTruth
 from sim.world.world import World
 
-FINER: Final = 4  # than the frames is the grid of their sums
-FELT: Final = 6  # rates (rad/s) and forces without the circle about the axis (m/s^2)
-MOVED: Final = 4  # that circle (m/s^2), and rate (rad/s) and angle (rad) by which the string runs ahead of the head
-SUMS: Final = FELT + MOVED + 1  # with the torsional vibration, rad/s
-SAME: Final = 6  # rates and forces
 AT_ONCE: Final = 1 << 15  # samples of the grid, whose attitudes are held at one time
 ALIKE: Final = 1e-9  # rad/s and m/s^2, within which two tubes see the same
 
@@ -37,11 +32,6 @@ FRONT_END: Final = np.dtype(
         ("first", "f8"),  # s, rig time of the first frame of a FIFO of phase 0
         ("frame", "f8"),  # s, from one frame to the next, by the sensor's own crystal
         ("delay", "f8"),  # s, of the filter
-        ("rate", "f8", (3,)),  # rad/s, noise of a frame, standard deviation
-        ("force", "f8"),  # m/s^2, likewise
-        ("warm_up", "f8"),  # rad/s, that the gyroscopes drift by until they are warm
-        ("warm_up_c", "f8"),  # C, by which the sensor warms meanwhile
-        ("warm_up_s", "f8"),  # time constant of both
     ],
     align=True,
 )
@@ -50,8 +40,7 @@ FIFO: Final = np.dtype(
         ("frame", "i8"),  # number of the first frame in the tube's first cycle
         ("row", "i8"),  # phase of the frames on the grid of the sums: a row, and a share of the way to the next
         ("share", "f8"),
-        ("place", "i8"),  # see ``sim.campaign.frame_times``
-        ("pull", "f8", (3, 3)),  # rad/s by m/s^2, of the force on the gyroscopes
+        ("place", "i8"),  # see ``sim.world.disturbance.frame_times``
         ("torsional", "i8"),  # frames by which the tube's torsional vibration is read later
         ("shaken", "i8", (3,)),  # likewise of each axis of the forces
     ],
@@ -65,8 +54,6 @@ class Desk(NamedTuple):
     borders: Array  # (PARTS + 2,) frames
     before: Array  # (SUMS,) over the frames before the window
     felt: Array  # (SUMS,) over those before a border
-    shows: Array  # (SUMS,) what the z gyroscope shows of each sum
-    same: Array  # (SAME,)
     drawn: Array  # (2 PARTS,) normal
     noise: Array  # (PARTS + 1,) rad/s, of the z gyroscope, summed over the frames of each part
 
@@ -80,7 +67,7 @@ class Field(NamedTuple):
     driven: Array  # (cycles, 2) s, rig time, from when to when vibration passes in it
     front_end: Array  # (1,) of dtype ``FRONT_END``
     moved: Array  # (rows, MOVED) of this run, sums likewise
-    torsional: Array  # (drawn + 1,) rad/s, of this run, sums of frames, see ``sim.campaign.vibration``
+    torsional: Array  # (drawn + 1,) rad/s, of this run, sums of frames, see ``sim.world.disturbance.frame_vibration``
     shaken: Array  # (drawn + 1,) m/s^2, likewise
     fifos: Array  # (tubes,) of dtype ``FIFO``, of this run
     desk: Desk
@@ -104,23 +91,11 @@ def frame_sums(values: Array, hertz: float, frame: float) -> Array:
     return sums
 
 
-def front_end_of(scenario: Scenario, section: RoughSection, begin: float) -> Array:
-    """Sensor of every tube, (1,) of dtype ``FRONT_END``; ``begin`` is the grid's, s.
-
-    A frame's noise is that of its band, as in ``sim.world.rough_imu``; it is larger than the converter's steps, so that
-    their error is one more noise.
-    """
-    sensor, gyroscope, accelerometer = section.sensor, scenario.file.gyroscope, scenario.file.accelerometer
-    step = math.radians(gyroscope.range_dps / 32768.0) if gyroscope.resolution_dps > 0.0 else 0.0
-    made = np.zeros(1, FRONT_END)
+def front_end_of(section: RoughSection, begin: float) -> Array:
+    """Sensor of every tube, (1,) of dtype ``FRONT_END``; ``begin`` is the grid's, s."""
+    sensor, made = section.sensor, np.zeros(1, FRONT_END)
     made["first"], made["frame"] = begin, 1.0 / (sensor.frames_hz * (1.0 + sensor.crystal))
     made["delay"] = sensor.delay
-    white = np.radians(np.array(gyroscope.noise_dps_rthz)) * math.sqrt(sensor.frames_hz)
-    made["rate"] = np.sqrt(white**2 + step**2 / 12.0)
-    tilt = math.radians(1.0) * accelerometer.gravity_mps2
-    made["force"] = accelerometer.noise_deg * tilt * math.sqrt(PERIOD * sensor.frames_hz)
-    made["warm_up"], made["warm_up_c"] = math.radians(sensor.warm_up_dps), sensor.warm_up_c
-    made["warm_up_s"] = sensor.warm_up_s
     return made
 
 
@@ -147,11 +122,12 @@ class StillString:
             }
         )
         still = world.motion.starting_at(0.0)
-        self._run = RoughRun(quiet, still, world.begin, world.seed, world.disc.errors)
+        file = world.scenario.file.model_copy(update={"rough": quiet})
+        self._run = RoughRun(file, still, world.begin, world.seed, world.disc.errors)
         self.moved = self._run.moved
         self._hertz, self._low_pass = section.samples_hz, section.sensor.low_pass_hz
         self._delay = section.sensor.delay
-        self._front_end = front_end_of(world.scenario, section, float(self.moved.t[0]))
+        self._front_end = front_end_of(section, float(self.moved.t[0]))
         self.frame = float(self._front_end["frame"][0])
 
     def field(self) -> Field:
@@ -171,7 +147,7 @@ class StillString:
             torsional=np.zeros(0),
             shaken=np.zeros(0),
             fifos=np.zeros(0, FIFO),
-            desk=Desk(*(np.zeros(shape) for shape in (PARTS + 2, SUMS, SUMS, SUMS, SAME, 2 * PARTS, PARTS + 1))),
+            desk=Desk(*(np.zeros(shape) for shape in (PARTS + 2, SUMS, SUMS, 2 * PARTS, PARTS + 1))),
         )
 
     def _sums(self) -> tuple[Array, npt.NDArray[np.int64]]:

@@ -1,9 +1,9 @@
 """Vibration as the frames of a sensor show it, drawn at once for a run and read by every tube from elsewhere.
 
 The world draws noise of a flat band on its fine grid, passes it through the sensor's filter and takes it at the frames
-(``sim.world.rough_imu``). What the frames then hold is a stationary normal process whose spectrum is that of
-the filtered band folded at the frames' rate; it is drawn as such. Its alias near 0 Hz is what the yaw drifts by, so the
-mean over a cycle of the vibration itself would not do. It is cut off where the string starts and stops, so the jump
+(``sim.world.disturbance.vibration``). What the frames then hold is a stationary normal process whose spectrum is that
+of the filtered band folded at the frames' rate; it is drawn as such. Its alias near 0 Hz is what the yaw drifts by, so
+the mean over a cycle of the vibration itself would not do. It is cut off where the string starts and stops, so the jump
 that an angle makes there is not shown.
 """
 
@@ -15,7 +15,8 @@ from typing import Final
 import numpy as np
 import numpy.typing as npt
 
-from sim.world.rough_imu import G, butterworth
+from sim.world.disturbance.low_pass import butterworth
+from sim.world.disturbance.vibration import G
 from sim.world.rough_section import RoughSection
 
 Array = npt.NDArray[np.float64]

@@ -5,13 +5,11 @@ from __future__ import annotations
 import math
 
 import numpy as np
-import numpy.typing as npt
 
 from node.kernels.arithmetic.formats import PERIOD
 from node.kernels.record.filter_record import PARTS
-from sim.world.scenario_file import GyroSection
-
-Array = npt.NDArray[np.float64]
+from sim.world.disturbance.row import ActsOn, Array, Disturbance, OneImu
+from sim.world.streams import Stream
 
 
 def borders_of(ends: Array) -> Array:
@@ -19,21 +17,23 @@ def borders_of(ends: Array) -> Array:
     return np.asarray(ends[:, None] + PERIOD * (np.arange(-PARTS, 1) / PARTS))
 
 
-def eighths(mean: Array, turned: Array, gyroscope: GyroSection, random: np.random.Generator) -> Array:
+def eighths(mean: Array, turned: Array, imu: OneImu) -> Array:
     """Rates about z (n, 9, rad/s) as a driver tells them: 0, for nothing is shown of the cycle before, and the eighths.
 
-    They are as exact as the mean is, with the noise of their band.
-
-    Their noise is white and its mean is that of the cycle, which ``mean`` has already.
+    They are as exact as the mean is. Their noise is white, of their band, and its mean is that of the cycle, which
+    ``mean`` has already.
 
     Parameters
     ----------
     mean : (n,) rad/s, readings of the cycles
     turned : (n, 8) rad, that the z axis of a gyroscope without noise and bias shows of each eighth
-    gyroscope : its noise
-    random : of the noise
     """
-    white = math.radians(gyroscope.noise_dps_rthz[2]) / math.sqrt(PERIOD / PARTS)
-    apart = turned * (PARTS / PERIOD) + white * random.standard_normal(turned.shape)
+    density = imu.noise * imu.file.gyroscope.noise_dps_rthz[2]
+    white = math.radians(density) / math.sqrt(PERIOD / PARTS)
+    noise = imu.random(Stream.INCREMENTS).standard_normal(turned.shape)
+    apart = turned * (PARTS / PERIOD) + white * noise
     own = mean[:, None] + apart - apart.mean(axis=1, keepdims=True)
     return np.concatenate([np.zeros((len(mean), 1)), own], axis=1)
+
+
+EIGHTHS = Disturbance("eighths", ("gyroscope.increments",), ActsOn.TAKING)

@@ -12,8 +12,8 @@ from typing import Final
 import numpy as np
 
 from node.kernels.arithmetic.formats import Array
-from sim.campaign.field import frame_sums
-from sim.world.rough_imu import low_passed
+from sim.world.disturbance.frame_sums import frame_sums
+from sim.world.disturbance.low_pass import low_passed
 from sim.world.rough_motion import RoughMotion
 from sim.world.rough_section import RoughSection
 from sim.world.world import World

@@ -12,12 +12,12 @@ import numpy as np
 import numpy.typing as npt
 
 from node.kernels.arithmetic.formats import Array
-from sim.campaign.field import FIFO, FINER, Field, StillString
-from sim.campaign.field_encoder import measured_in_field
-from sim.campaign.frame_times import PLACES, find_frames
-from sim.campaign.moving_string import MovingString
-from sim.campaign.vibration import Vibration, frames_drawn
-from sim.world.rough_imu import pull_of
+from sim.string.moving_string import MovingString
+from sim.string.rough_head import measured_in_field
+from sim.world.disturbance.frame_layout import FINER
+from sim.world.disturbance.frame_sums import FIFO, Field, StillString
+from sim.world.disturbance.frame_times import PLACES, find_frames
+from sim.world.disturbance.frame_vibration import Vibration, frames_drawn
 from sim.world.rough_motion import MARGIN
 from sim.world.rough_section import RoughSection
 from sim.world.streams import Stream, stream
@@ -97,7 +97,6 @@ class RoughWorld:
             fifo["frame"] = whole + 1 + math.floor(moved)
             row = (moved - math.floor(moved)) * FINER
             fifo["row"], fifo["share"] = math.floor(row), row - math.floor(row)
-            fifo["pull"] = pull_of(self._section.sensor, seed, number)
             find_frames(self._field.times, place, self._section.sensor.frames_hz, self._frame)
         apart = drawn - 2 - self._frames
         fifos["torsional"] = random.integers(apart, size=len(fifos))
