@@ -15,7 +15,7 @@ from numba import config, njit
 from node.kernels.arithmetic.jit import OPTIONS, SourceLocator, folder_digest, known_by_its_sources, source_digest
 
 Function = TypeVar("Function", bound=Callable[..., Any])
-ROOMS: Final = tuple(Path(__file__).parent / room for room in ("campaign", "string", "world"))  # that hold kernels
+ROOMS: Final = tuple(Path(__file__).parent / room for room in ("string", "world"))  # that hold kernels
 
 
 class SimLocator(SourceLocator):

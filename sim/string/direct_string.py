@@ -26,7 +26,7 @@ from sim.string.head_measurements import measure_head, row_of_aiding
 from sim.string.hops import HOP
 from sim.string.nodes import NEVER, loop_of, new_nodes, tuned_config
 from sim.string.readings import record_readings
-from sim.string.result import NodeTrace, StringRun, StringSurvey, wrapped
+from sim.string.result import NodeTrace, StringRun, StringSurvey, wrap_angles
 from sim.string.schedule import StringSchedule, schedule_of
 from sim.world.world import World
 from telemetry.messages import Aiding, Event, Message, NodeState, SurveyMeasurement
@@ -134,7 +134,7 @@ class DirectString:
         """Set what the nodes knew in the cycles ``first``..``last`` - 1 beside the truth."""
         run, rows = self.run, np.s_[first:last]
         unknown = np.isnan(run.yaw[rows])
-        run.total_error[rows] = wrapped(run.yaw[rows] - self._truth[rows])
+        run.total_error[rows] = wrap_angles(run.yaw[rows] - self._truth[rows])
         run.systematic_error[rows] = np.where(unknown, math.nan, self._systematic[rows])
         run.var[rows] = np.maximum(run.var[rows], VAR_FLOOR)
         run.systematic_var[rows] += self._mount_var

@@ -72,7 +72,7 @@ class StringRun:
     @property
     def error(self) -> Array:
         """Random part of the yaw error (cycles, tubes), rad."""
-        return wrapped(self.total_error - self.systematic_error)
+        return wrap_angles(self.total_error - self.systematic_error)
 
     @property
     def total_var(self) -> Array:
@@ -99,8 +99,8 @@ class StationLog(NamedTuple):
     epochs: npt.NDArray[np.int64]  # (cycles,) number of the epoch that a cycle ends with, else -1
 
 
-def wrapped(angle: Array) -> Array:
-    """Angles in [-pi, pi), rad."""
+def wrap_angles(angle: Array) -> Array:
+    """The same angles in [-pi, pi), rad."""
     return np.asarray(np.mod(angle + math.pi, math.tau) - math.pi)
 
 
