@@ -30,6 +30,7 @@ class Addition:
     line: str
     files: dict[str, str]
     named: str  # how the row names the file or folder of what is added
+    imports: str = ""  # line that the table's file begins with
 
 
 COMMAND = Addition(
@@ -111,55 +112,58 @@ DISTURBANCE = Addition(
     row="a disturbance",
     table="sim/world/disturbance/table.py",
     head="TABLE: Final[tuple[Disturbance, ...]] = (\n",
-    line='    *import_module("sim.world.disturbance.hum").ROWS,\n',
+    line="    HUM,\n    CREAK,\n",
+    imports="from sim.world.disturbance.hum import CREAK, HUM\n",
     files={
         "sim/world/disturbance/hum.py": """
+import math
+
 import numpy as np
 
-from sim.kernel import kernel
+from sim.kernel import shared_body
 from sim.world.disturbance.lanes import Lane
 from sim.world.disturbance.row import ActsOn, Compiled, Disturbance
 from sim.world.section import NotNegative, Section
-from sim.world.streams import Stream
+from sim.world.streams import stream
+
+PURPOSE = 99
 
 
 class HumSection(Section):
     size_rps: NotNegative = 0.0
-    spread_rps: NotNegative = 0.0
+    noise_rps: NotNegative = 0.0
 
 
 def draw(imu):
     section = imu.section_of(HUM)
-    return section.size_rps * np.random.default_rng((imu.seed, imu.tube)).random(), section.spread_rps
+    return section.size_rps * float(stream(imu.seed, PURPOSE, imu.tube).random()), section.noise_rps
 
 
 def hum(samples, imu, drawn):
-    size, spread = drawn
-    noise = np.random.default_rng((imu.seed, 7, imu.tube)).standard_normal(len(samples.t))
-    of_mean = spread if samples.period > 0.5 else spread * np.sqrt(1.0 / 1.9 / samples.period)
-    samples.rate[:, 2] += size * np.sin(0.01 * samples.t) + of_mean * noise
+    size, noise = drawn
+    white = noise / math.sqrt(1.9 * samples.period) * stream(imu.seed, PURPOSE, imu.tube, 1).standard_normal(len(samples.t))
+    samples.rate = samples.rate + np.outer(size * np.sin(0.01 * samples.t) + white, [0.0, 0.0, 1.0])
 
 
 def set_tube(tube, drawn):
-    tube["hum"], tube["hum_spread"] = drawn
+    tube["hum"], tube["hum_noise"] = drawn
 
 
-@kernel
-def read_hum(shared, tube, now, drawn, row):
-    row[2] += tube.hum * np.sin(0.01 * now.end) + tube.hum_spread * drawn[0]
+@shared_body
+def read_hum(_shared, tube, now, drawn, at, row):
+    row[2] += tube.hum * math.sin(0.01 * now.end) + tube.hum_noise * drawn[at]
 
 
-HUM = Disturbance(
-    "hum",
-    (),
-    ActsOn.SAMPLES,
-    hum,
-    draw,
-    Compiled(tube=(("hum", "f8"), ("hum_spread", "f8")), set_tube=set_tube, lane=Lane.NEXT, read=read_hum),
-    section=HumSection,
-)
-CREAK = Disturbance("creak", (), ActsOn.SAMPLES, lambda samples, imu, _: hum(samples, imu, (0.1, 0.0)), section=HumSection)
-""",
+FORM = Compiled(tube=(("hum", "f8"), ("hum_noise", "f8")), set_tube=set_tube, lane=Lane.NEXT, read=read_hum)
+HUM = Disturbance("hum", (), ActsOn.SAMPLES, hum, draw, FORM, section=HumSection)
+
+
+def creak(samples, imu, _):
+    samples.force = samples.force + imu.section_of(CREAK).size_rps
+
+
+CREAK = Disturbance("creak", (), ActsOn.SAMPLES, creak, section=HumSection)
+"""
     },
     named="sim/world/disturbance/wander.py",
 )
@@ -173,7 +177,8 @@ def add(folder: Path, addition: Addition) -> None:
     if head.endswith("by_name(\n"):  # the list opens on one of the next lines
         opening, bracket, after = after.partition("[\n")
         head += opening + bracket
-    path.write_text(before + head + addition.line + after)
+    text, opening = before + head + addition.line + after, "from __future__ import annotations\n"
+    path.write_text(text.replace(opening, f"{opening}{addition.imports}", 1) if addition.imports else text)
     for name, text in addition.files.items():
         (folder / name).parent.mkdir(exist_ok=True)
         with (folder / name).open("a") as file:
@@ -271,3 +276,93 @@ def test_an_added_instrument_writes_its_records(copy: Path) -> None:
         print(records.files["plumb.csv"], records.truth)
     """))  # fmt: skip
     assert out == "b'angle_deg\\n0\\n' {'plumb': {'seed': 3}}\n"
+
+
+def run_with_firmware(copy: Path, home: Path, *words: str) -> str:
+    """Output of Python in the copy, which has the compiled firmware of this checkout and compiles its own world."""
+    from node.kernels.arithmetic.jit import cache_folder, folder_in_use
+
+    kept = home / "borechain" / cache_folder().name
+    if not kept.exists():
+        rooms = [room for room in folder_in_use().iterdir() if room.name.startswith("node.kernels.")]
+        for room in rooms:
+            shutil.copytree(room, kept / room.name)
+    environment = {name: value for name, value in os.environ.items() if name != "NUMBA_CACHE_DIR"}
+    environment |= {"PYTHONPATH": str(copy), "XDG_CACHE_HOME": str(home)}
+    done = subprocess.run(
+        [sys.executable, *words], cwd=copy, env=environment, capture_output=True, text=True, check=False
+    )
+    assert done.returncode == 0, done.stderr
+    return done.stdout
+
+
+def test_an_added_disturbance_acts_in_a_plain_rig_a_rough_rig_and_a_campaign_or_is_refused_there(
+    copy: Path, tmp_path: Path
+) -> None:
+    """The mean of what it adds is the same in all of them, and so is the spread, within 5 sigma of 150 cycles."""
+    out = run_with_firmware(copy, tmp_path, "-c", program("""
+        import json
+        import numpy as np
+        from sim.campaign.chunk import Campaign
+        from sim.errors import ScenarioError
+        from sim.string.hops import draw_hops
+        from sim.string.readings import supply_readings
+        from sim.world.scenario import scenario_of
+        from sim.world.world import World
+
+        PLAIN = {
+            "rig": {"tubes": 1, "tubes_at_start": 1, "tube_length_m": 2.0},
+            "path": {"straight": {}},
+            "schedule": {"add_s": 90.0, "stop_s": 24.0, "finish_s": 5.0},
+            "rotation": {"turns": 2.0},
+            "medium": {"link": "off"},
+        }
+        ROUGH = PLAIN | {"rough": {"samples_hz": 250.0, "sensor": {"frames_hz": 50.0, "low_pass_hz": 20.0}}}
+
+        def with_hum(tables, name="hum", **keys):
+            return scenario_of(tables | {"disturbance": {name: keys}})
+
+        def of_rig(scenario):
+            return World(scenario, 3).sensors.samples(1)[:150, 2]
+
+        def of_campaign(scenario):
+            string, world = Campaign(scenario).string, World(scenario, 3)
+            drawn, hops = string.new_readings(world), draw_hops(world)
+            field = None if string.rough is None else string.rough.run(world).field
+            rows = [
+                supply_readings(None, drawn, field, string.schedule, hops, cycle)[0, 0, 2] for cycle in range(150)
+            ]
+            return np.array(rows)
+
+        found = {}
+        for name, tables in (("plain", PLAIN), ("rough", ROUGH)):
+            for where, read in (("rig", of_rig), ("campaign", of_campaign)):
+                off = read(scenario_of(tables))
+                hum = read(with_hum(tables, size_rps=0.1)) - off
+                noise = read(with_hum(tables, noise_rps=0.1)) - off
+                found[f"{name} {where}"] = [hum.mean(), hum.std(), noise.mean(), noise.std()]
+        for tables in (PLAIN, ROUGH):
+            creaking = with_hum(tables, "creak", size_rps=1.0)
+            assert np.abs(World(creaking, 3).sensors.samples(1) - World(scenario_of(tables), 3).sensors.samples(1)).max() > 0.9
+            try:
+                Campaign(creaking)
+            except ScenarioError as error:
+                found["refused"] = str(error)
+        try:
+            with_hum(PLAIN, "hum", size=1.0)
+        except ScenarioError as error:
+            found["misspelt"] = str(error)
+        surveys = [Campaign(with_hum(PLAIN, size_rps=size)).chunk(1, 1).epochs["yaw_error"] for size in (0.0, 0.01)]
+        found["changes what nodes know"] = bool((surveys[0] != surveys[1]).any())
+        print(json.dumps(found))
+    """))  # fmt: skip
+    found = json.loads(out)
+    wanted = found["plain rig"]
+    for where in ("plain campaign", "rough rig", "rough campaign"):
+        assert found[where][:2] == pytest.approx(wanted[:2], abs=1e-3), where
+        assert abs(found[where][2]) < 5.0 * 0.1 / 150**0.5
+        assert found[where][3] == pytest.approx(0.1, rel=0.3), where
+    assert wanted[1] > 5e-3
+    assert found["refused"].startswith("disturbance.creak: a campaign cannot express it; borechain rig runs")
+    assert "disturbance.hum: size: unknown key" in found["misspelt"]
+    assert found["changes what nodes know"]

@@ -15,9 +15,8 @@ from node.kernels.record.node_record import BEHIND, LATE, LATE_STD, READING, SAT
 from node.kernels.sensors.correction import USUAL
 from sim.kernel import shared_body
 from sim.string.hops import cross_hop, record_hops
-from sim.world.disturbance.lanes import CLOCK, LOSS, draw_further, draw_numbers
-from sim.world.disturbance.reading import read_frames, read_sensors
-from sim.world.disturbance.records import DRAWN
+from sim.world.disturbance.lanes import CLOCK, draw_further, draw_numbers
+from sim.world.disturbance.reading import DRAWN, LOSS, read_frames, read_sensors
 from sim.world.motion import Motion
 from sim.world.scenario import Scenario
 from sim.world.truth import TubeTruth
@@ -137,16 +136,19 @@ def recall_hops(recorded: Any, hops: Array, cycle: int) -> None:
 @shared_body
 def draw_readings(drawn: Any, field: Any, schedule: Any, hops: Array, cycle: int) -> None:
     """Draw the readings and the hops of all tubes of the string in a cycle."""
-    felt, powered, shared, hop_noise = drawn.felt, schedule.powered, drawn.shared[0], drawn.hop_noise[0]
+    # named before the loop over tubes, in which naming an array of a tuple costs as much as a sum
+    felt, powered, end, later = drawn.felt, schedule.powered, schedule.ends[cycle], schedule.later
     rate, force, circle, shaken, numbers = felt.rate, felt.force, felt.circle, felt.shaken, drawn.numbers
-    tubes, readings, counter, key, words = drawn.tubes, drawn.readings, drawn.counter, drawn.key, drawn.words
+    counter, key, words, readings, tubes = drawn.counter, drawn.key, drawn.words, drawn.readings, drawn.tubes
+    shared, hop_noise = drawn.shared[0], drawn.hop_noise[0]
     for k in range(powered[cycle]):
         tube, reading, is_first = tubes[k], readings[k], cycle == 0 or powered[cycle - 1] <= k
-        end = schedule.ends[cycle] + schedule.later[k]
         draw_numbers(counter, key, words, numbers, cycle, k)
         if field is not None:
             draw_further(counter, key, words, field.desk.drawn, cycle, k)
-            read_frames(shared, tube, is_first, field, numbers, reading, end, cycle, k)
+            read_frames(shared, tube, is_first, field, numbers, reading, end + later[k], cycle, k)
         else:
-            read_sensors(shared, tube, is_first, rate, force, circle, shaken, numbers, reading, end, cycle, k)
+            read_sensors(
+                shared, tube, is_first, rate, force, circle, shaken, numbers, reading, end + later[k], cycle, k
+            )
         cross_hop(hop_noise, hops, k, is_first, numbers[CLOCK], numbers[LOSS])

@@ -20,8 +20,8 @@ from sim.string.rough_runs import RoughWorld
 from sim.studies.scenarios import Tables, change_sections
 from sim.world.disturbance.chain import lane_starts
 from sim.world.disturbance.lanes import draw_further, draw_numbers
-from sim.world.disturbance.reading import constants_of, read_frames, read_sensors
-from sim.world.disturbance.records import DRAWN, make_shared, make_tubes
+from sim.world.disturbance.reading import DRAWN, constants_of, read_frames, read_sensors
+from sim.world.disturbance.records import make_shared, make_tubes
 from sim.world.disturbance.row import OneImu
 from sim.world.disturbance.table import TABLE
 from sim.world.scenario import Scenario, scenario_of

@@ -27,8 +27,8 @@ from sim.world.disturbance.frame_layout import FINER
 from sim.world.disturbance.frame_sums import Field
 from sim.world.disturbance.frame_vibration import Vibration
 from sim.world.disturbance.low_pass import low_passed
-from sim.world.disturbance.reading import read_frames
-from sim.world.disturbance.records import DRAWN, make_shared, make_tubes
+from sim.world.disturbance.reading import DRAWN, read_frames
+from sim.world.disturbance.records import make_shared, make_tubes
 from sim.world.disturbance.row import OneImu
 from sim.world.disturbance.vibration import band_noise
 from sim.world.disturbance.white_noise import add_part_noise

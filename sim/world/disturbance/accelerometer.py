@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from node.kernels.arithmetic.formats import PERIOD
-from sim.kernel import kernel
+from sim.kernel import shared_body
 from sim.world.disturbance.lanes import Lane
 from sim.world.disturbance.row import ActsOn, Array, Compiled, Disturbance, ImuSamples, OneImu
 from sim.world.scenario_file import ScenarioFile
@@ -36,8 +36,8 @@ def set_bias(tube: Any, bias: Array) -> None:
     tube["force_bias"] = bias
 
 
-@kernel
-def read_bias(_: Any, tube: Any, __: Any, ___: Array, row: Array) -> None:
+@shared_body
+def read_bias(_shared: Any, tube: Any, _now: Any, _drawn: Array, _at: int, row: Array) -> None:
     """Add the bias."""
     for i in range(3):
         row[3 + i] += tube.force_bias[i]
@@ -67,12 +67,12 @@ def set_noise(shared: Any, file: ScenarioFile) -> None:
         shared["shaking"] = 0.0
 
 
-@kernel
-def read_noise(shared: Any, _: Any, now: Any, drawn: Array, row: Array) -> None:
+@shared_body
+def read_noise(shared: Any, _tube: Any, now: Any, drawn: Array, at: int, row: Array) -> None:
     """Noise and shaking of a mean, as one."""
     size = now.share * math.sqrt(shared.force**2 + (shared.shaking * now.shaken) ** 2)
     for i in range(3):
-        row[3 + i] += size * drawn[i]
+        row[3 + i] += size * drawn[at + i]
 
 
 FORCE_BIAS = Disturbance(

@@ -11,7 +11,7 @@ from typing import Any, Final
 
 from node.kernels.arithmetic.formats import Array
 from sim.kernel import compiled
-from sim.world.disturbance.lanes import WIDTH, Lane
+from sim.world.disturbance.lanes import FREE, WIDTH, Lane, count_numbers
 from sim.world.disturbance.row import Compiled, Disturbance
 
 FORMS: Final = ("felt", "read", "parts")  # of ``Compiled``
@@ -19,24 +19,25 @@ FORMS: Final = ("felt", "read", "parts")  # of ``Compiled``
 
 def lane_starts(rows: Sequence[Disturbance]) -> dict[str, int]:
     """First number of the lane of every row that takes one, by its name."""
-    starts, free = {}, len(Lane) - 1
+    starts, free = {}, FREE
     for row in rows:
-        if row.compiled is not None and row.compiled.lane is not None:
-            lane = free if row.compiled.lane == Lane.NEXT else row.compiled.lane
-            free += row.compiled.lane == Lane.NEXT
+        lane = None if row.compiled is None else row.compiled.lane
+        if lane == Lane.NEXT:
+            starts[row.name], free = free, free + WIDTH
+        elif lane is not None:
             starts[row.name] = WIDTH * lane
     return starts
 
 
-def lanes_of(rows: Sequence[Disturbance]) -> int:
-    """Lanes that are drawn for a node and cycle."""
-    return max(len(Lane) - 1, *(start // WIDTH + 1 for start in lane_starts(rows).values()))
+def count_drawn(rows: Sequence[Disturbance]) -> int:
+    """Numbers that are drawn for a node and cycle."""
+    return count_numbers(sum(start >= FREE for start in lane_starts(rows).values()))
 
 
 def chain_forms(rows: Sequence[Disturbance], form: str) -> Any:
     """One kernel that calls one of ``FORMS`` of every row that has it, in their order."""
     starts = lane_starts(rows)
-    chain = compiled(do_nothing_apart if form == "parts" else do_nothing, cache=False)
+    chain = compiled(do_nothing_apart if form == "parts" else do_nothing, cache=False, inline="always")
     for row in rows:
         act = getattr(row.compiled or Compiled(), form)
         if act is not None:
@@ -57,23 +58,21 @@ def do_nothing_apart(
 
 def after(before: Any, act: Any, start: int) -> Any:
     """Kernel of those ``before`` and one row more, whose lane begins at ``start``."""
-    end = start + WIDTH
 
     def act_in_order(shared: Any, tube: Any, now: Any, drawn: Array, row: Array) -> None:
         before(shared, tube, now, drawn, row)
-        act(shared, tube, now, drawn[start:end], row)
+        act(shared, tube, now, drawn, start, row)
 
-    return compiled(act_in_order, cache=False)
+    return compiled(act_in_order, cache=False, inline="always")
 
 
 def after_parts(before: Any, act: Any, start: int) -> Any:
     """Likewise of what adds to the parts of a window."""
-    end = start + WIDTH
 
     def act_in_order(
         shared: Any, tube: Any, now: Any, drawn: Array, further: Array, borders: Array, pieces: int, parts: Array
     ) -> None:
         before(shared, tube, now, drawn, further, borders, pieces, parts)
-        act(shared, tube, now, drawn[start:end], further, borders, pieces, parts)
+        act(shared, tube, now, drawn, start, further, borders, pieces, parts)
 
-    return compiled(act_in_order, cache=False)
+    return compiled(act_in_order, cache=False, inline="always")

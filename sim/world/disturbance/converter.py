@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from sim.kernel import kernel
+from sim.kernel import shared_body
 from sim.world.disturbance.reach import most_force, most_rate
 from sim.world.disturbance.row import ActsOn, Array, Compiled, Disturbance, ImuSamples, OneImu
 from sim.world.disturbance.vibration import G
@@ -79,8 +79,8 @@ def set_step(shared: Any, file: ScenarioFile) -> None:
         shared["white"] = np.sqrt(shared["white"] ** 2 + step_of(file, is_frame=True) ** 2 / 12.0)
 
 
-@kernel
-def read_steps(shared: Any, _: Any, __: Any, ___: Array, row: Array) -> None:
+@shared_body
+def read_steps(shared: Any, _tube: Any, _now: Any, _drawn: Array, _at: int, row: Array) -> None:
     """Round the rates to the step."""
     if shared.step > 0.0:
         for i in range(3):
@@ -92,8 +92,8 @@ def set_limit(shared: Any, file: ScenarioFile) -> None:
     shared["limit"] = math.radians(file.gyroscope.range_dps)
 
 
-@kernel
-def read_within(shared: Any, _: Any, __: Any, ___: Array, row: Array) -> None:
+@shared_body
+def read_within(shared: Any, _tube: Any, _now: Any, _drawn: Array, _at: int, row: Array) -> None:
     """Cut the rates at the range."""
     for i in range(3):
         row[i] = min(max(row[i], -shared.limit), shared.limit)

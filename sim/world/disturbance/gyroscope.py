@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from sim.kernel import kernel
+from sim.kernel import shared_body
 from sim.world.disturbance.row import ActsOn, Array, Compiled, Disturbance, ImuSamples, OneImu
 from sim.world.scenario_file import ScenarioFile
 from sim.world.streams import Stream
@@ -48,8 +48,8 @@ def set_bias(tube: Any, drawn: GyroscopeConstants) -> None:
     tube["rate_bias"] = drawn.bias
 
 
-@kernel
-def read_bias(_: Any, tube: Any, __: Any, ___: Array, row: Array) -> None:
+@shared_body
+def read_bias(_shared: Any, tube: Any, _now: Any, _drawn: Array, _at: int, row: Array) -> None:
     """Add the bias."""
     for i in range(3):
         row[i] += tube.rate_bias[i]

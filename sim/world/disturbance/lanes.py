@@ -12,9 +12,9 @@ from sim.kernel import kernel
 from sim.world.disturbance.philox import normals, uniforms
 
 WIDTH: Final = 3  # numbers of a lane
-GAUSSIAN: Final = 10  # of the numbers of the fixed lanes are normal, the two after them uniform
-FIXED: Final = 12
-CLOCK, LOSS = 9, 10  # of one hop, see ``sim.string.hops``
+CLOCK: Final = 9  # number, normal, of the clock of one hop, see ``sim.string.hops``
+FREE: Final = 10  # number from which the lanes begin that rows may take
+UNIFORM: Final = 2  # numbers at the end, of which the first decides whether a hop loses an aiding
 
 
 class Lane(IntEnum):
@@ -24,22 +24,19 @@ class Lane(IntEnum):
     WHITE = 0
     WANDER = 1
     FORCE = 2
-    HOP = 3  # of the aiding: ``CLOCK``, ``LOSS``, which is uniform, and one to spare
 
 
-def numbers_of(lanes: int) -> int:
-    """Numbers of so many lanes, as many as whole blocks of four."""
-    return -(-WIDTH * lanes // 4) * 4
+def count_numbers(free_lanes: int) -> int:
+    """Numbers of a node and cycle with so many lanes beside the fixed ones, as many as whole blocks of four."""
+    return -(-(FREE + WIDTH * free_lanes + UNIFORM) // 4) * 4
 
 
 @kernel
 def draw_numbers(counter: Array, key: Array, words: Array, drawn: Array, cycle: int, k: int) -> None:
-    """Fill ``drawn`` (n,) for a tube and a cycle, see ``Lane``."""
+    """Fill ``drawn`` (n,) for a tube and a cycle: all but the last ``UNIFORM`` normal."""
     counter[0], counter[1], counter[2] = np.uint64(cycle), np.uint64(k), np.uint64(0)
     uniforms(counter, key, words, drawn)
-    normals(drawn[:GAUSSIAN])
-    if drawn.shape[0] > FIXED:
-        normals(drawn[FIXED:])
+    normals(drawn[:-UNIFORM])
 
 
 @kernel

@@ -13,7 +13,7 @@ from node.kernels.record.filter_record import PARTS
 from node.kernels.record.node_record import BEHIND, LATE, LATE_STD, SATURATED, SPLIT, TEMPERATURE
 from node.kernels.sensors.correction import USUAL
 from sim.kernel import kernel, shared_body
-from sim.world.disturbance.chain import chain_forms, lanes_of
+from sim.world.disturbance.chain import chain_forms, count_drawn
 from sim.world.disturbance.eighths import borders_of, eighths
 from sim.world.disturbance.fifo import (
     clipped_by_cycle,
@@ -25,12 +25,14 @@ from sim.world.disturbance.fifo import (
 )
 from sim.world.disturbance.frame_layout import FINER
 from sim.world.disturbance.gyroscope import GYROSCOPE
+from sim.world.disturbance.lanes import UNIFORM
 from sim.world.disturbance.row import ActsOn, Array, Constants, CycleNow, Flags, ImuSamples, OneImu, TubeMotion
 from sim.world.disturbance.table import TABLE
 from sim.world.disturbance.warm_up import warmth
 from sim.world.disturbance.window import add_shaking, cut_window, set_felt, shaking_span, shown_of, sum_until
 
-LANES: Final = lanes_of(TABLE)
+DRAWN: Final = count_drawn(TABLE)  # numbers of a node and cycle
+LOSS: Final = DRAWN - UNIFORM  # place of the one that decides whether a hop loses an aiding
 FEEL, READ, PART = (chain_forms(TABLE, form) for form in ("felt", "read", "parts"))  # kernels of all rows, in order
 
 
@@ -225,9 +227,9 @@ def read_felt(shared: Any, tube: Any, now: Any, drawn: Array, row: Array, apart:
     FEEL(shared, tube, now, drawn, row)
     x, y, z, u, v, w = row[0], row[1], row[2], row[3], row[4], row[5]
     for i in range(3):
-        g, f = tube.gains[i], tube.force_gains[i]
-        row[i] = g[0] * x + g[1] * y + g[2] * z + g[3] * u + g[4] * v + g[5] * w
-        row[3 + i] = f[0] * u + f[1] * v + f[2] * w
+        row[i] = tube.gains[i, 0] * x + tube.gains[i, 1] * y + tube.gains[i, 2] * z
+        row[i] += tube.gains[i, 3] * u + tube.gains[i, 4] * v + tube.gains[i, 5] * w
+        row[3 + i] = tube.force_gains[i, 0] * u + tube.force_gains[i, 1] * v + tube.force_gains[i, 2] * w
     row[2] += apart
     row[TEMPERATURE], row[SATURATED] = USUAL, 0.0
     READ(shared, tube, now, drawn, row)

@@ -12,13 +12,10 @@ import numpy as np
 
 from node.kernels.arithmetic.formats import Array
 from sim.world.disturbance.frame_layout import CIRCLE, SLACK_RATE, SUMS, TORSIONAL
-from sim.world.disturbance.lanes import numbers_of
-from sim.world.disturbance.reading import LANES
 from sim.world.disturbance.row import Compiled, OneImu
 from sim.world.disturbance.table import TABLE
 from sim.world.scenario_file import ScenarioFile
 
-DRAWN: Final = numbers_of(LANES)  # numbers of a node and cycle
 FORMS: Final[tuple[Compiled, ...]] = tuple(row.compiled for row in TABLE if row.compiled is not None)
 SHARED: Final = np.dtype([field for form in FORMS for field in form.shared], align=True)
 TUBE: Final = np.dtype(

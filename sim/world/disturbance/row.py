@@ -160,11 +160,11 @@ class Compiled:
     set_shared : fills the first, (1,), from the scenario
     set_tube : fills the second from what the row drew
     gains : what the sensor shows of rates and forces, (6, 6), from what the row drew
-    lane : of ``Lane``, which three normal numbers of a cycle it takes; None: none
-    felt, read : kernels ``act(shared, tube, now, drawn, row)`` that add to the rates and forces of the reading ``row``,
-        before what is felt becomes what is read and after it
-    parts : kernel ``act(shared, tube, now, drawn, further, borders, pieces, parts)`` that adds to what the z gyroscope
-        shows of each part of a window, summed over its frames, beside what is the same in all of them
+    lane : of ``Lane``, which three normal numbers of a cycle it takes, from ``drawn[at]`` on; None: none
+    felt, read : ``act(shared, tube, now, drawn, at, row)``, a ``shared_body`` that adds to the rates and forces of the
+        reading ``row``, before what is felt becomes what is read and after it
+    parts : ``act(shared, tube, now, drawn, at, further, borders, pieces, parts)``, likewise, that adds to what the z
+        gyroscope shows of each part of a window, summed over its frames, beside what is the same in all of them
     """
 
     shared: tuple[Any, ...] = ()

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from node.kernels.arithmetic.formats import PERIOD
-from sim.kernel import kernel
+from sim.kernel import kernel, shared_body
 from sim.world.disturbance.lanes import Lane
 from sim.world.disturbance.row import ActsOn, Array, Compiled, Disturbance, ImuSamples, OneImu
 from sim.world.scenario_file import ScenarioFile
@@ -53,12 +53,12 @@ def set_wander(shared: Any, file: ScenarioFile) -> None:
     shared["wander_fresh"] = math.sqrt(1.0 - phi**2)
 
 
-@kernel
-def wander_on(shared: Any, tube: Any, now: Any, drawn: Array, row: Array) -> None:
+@shared_body
+def wander_on(shared: Any, tube: Any, now: Any, drawn: Array, at: int, row: Array) -> None:
     """Take what wanders on by a cycle, and add it."""
     left, fresh = (0.0, 1.0) if now.is_first else (shared.wander_phi, shared.wander_fresh)
     for i in range(3):
-        tube.wandered[i] = left * tube.wandered[i] + fresh * shared.wander[i] * drawn[i]
+        tube.wandered[i] = left * tube.wandered[i] + fresh * shared.wander[i] * drawn[at + i]
         row[i] += tube.wandered[i]
 
 

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from node.kernels.record.node_record import TEMPERATURE
-from sim.kernel import kernel
+from sim.kernel import shared_body
 from sim.world.disturbance.row import ActsOn, Array, Compiled, Disturbance, ImuSamples, OneImu
 from sim.world.scenario_file import ScenarioFile
 
@@ -35,25 +35,33 @@ def set_warm_up(shared: Any, file: ScenarioFile) -> None:
         shared["warm_up_s"] = sensor.warm_up_s
 
 
-@kernel
-def feel_warm_up(shared: Any, _: Any, now: Any, __: Array, six: Array) -> None:
+@shared_body
+def feel_warm_up(shared: Any, _tube: Any, now: Any, _drawn: Array, _at: int, row: Array) -> None:
     """Drift in the middle of the samples, which is their mean."""
     if shared.warm_up != 0.0:
         drift = shared.warm_up * (1.0 - math.exp(-now.since / shared.warm_up_s))
         for i in range(3):
-            six[i] += drift
+            row[i] += drift
 
 
-@kernel
-def tell_warmth(shared: Any, _: Any, now: Any, __: Array, row: Array) -> None:
+@shared_body
+def tell_warmth(shared: Any, _tube: Any, now: Any, _drawn: Array, _at: int, row: Array) -> None:
     """Temperature that the driver reads at the end of a cycle."""
     if shared.warm_up_c != 0.0:
         row[TEMPERATURE] += shared.warm_up_c * (1.0 - math.exp(-now.age / shared.warm_up_s))
 
 
-@kernel
+@shared_body
 def part_warm_up(
-    shared: Any, tube: Any, now: Any, _: Array, __: Array, borders: Array, pieces: int, parts: Array
+    shared: Any,
+    tube: Any,
+    now: Any,
+    _drawn: Array,
+    _at: int,
+    _further: Array,
+    borders: Array,
+    pieces: int,
+    parts: Array,
 ) -> None:
     """What the parts of a window have more or less of it than their mean, as it rises evenly."""
     if shared.warm_up == 0.0:

@@ -9,7 +9,7 @@ import numpy as np
 
 from node.kernels.arithmetic.formats import PERIOD
 from node.kernels.record.filter_record import PARTS
-from sim.kernel import kernel
+from sim.kernel import kernel, shared_body
 from sim.world.disturbance.lanes import Lane
 from sim.world.disturbance.row import ActsOn, Array, Compiled, Disturbance, ImuSamples, OneImu
 from sim.world.scenario_file import GyroSection, ScenarioFile
@@ -43,21 +43,29 @@ def set_white(shared: Any, file: ScenarioFile) -> None:
         shared["white"] = white * math.sqrt(file.rough.sensor.frames_hz)
 
 
-@kernel
-def read_white(shared: Any, _: Any, now: Any, drawn: Array, row: Array) -> None:
+@shared_body
+def read_white(shared: Any, _tube: Any, now: Any, drawn: Array, at: int, row: Array) -> None:
     """Noise of a mean; about z that of frames comes by the parts of the window."""
-    row[0] += shared.white[0] * now.share * drawn[0]
-    row[1] += shared.white[1] * now.share * drawn[1]
+    row[0] += shared.white[0] * now.share * drawn[at]
+    row[1] += shared.white[1] * now.share * drawn[at + 1]
     if now.is_mean:
-        row[2] += shared.white[2] * now.share * drawn[2]
+        row[2] += shared.white[2] * now.share * drawn[at + 2]
 
 
-@kernel
+@shared_body
 def part_white(
-    shared: Any, _: Any, __: Any, drawn: Array, further: Array, borders: Array, pieces: int, parts: Array
+    shared: Any,
+    _tube: Any,
+    _now: Any,
+    drawn: Array,
+    at: int,
+    further: Array,
+    borders: Array,
+    pieces: int,
+    parts: Array,
 ) -> None:
     """Noise about z of the parts of a window."""
-    add_part_noise(parts, borders, pieces, shared.white[2], drawn[2], further)
+    add_part_noise(parts, borders, pieces, shared.white[2], drawn[at + 2], further)
 
 
 @kernel
