@@ -24,7 +24,7 @@ rig: $(STAMP)  ## set up and drill wellbore 1
 
 test:  ## set up and run every check and every test, in parallel
 	$(MAKE) --jobs=6 --output-sync browser kernels bytecode lint contracts
-	$(MAKE) --jobs=2 types tests  # two compilers keep both cores busy before, and types wait for nobody
+	$(MAKE) --jobs=2 types tests  # the two compilers above keep both cores busy until here; types depend on neither
 
 quick: $(STAMP)  ## lint, types, contracts and the fast tests: under 90 s
 	$(MAKE) --jobs=4 check fast

@@ -1,7 +1,7 @@
 """A whole rig inside this process: firmware, links and ground station as objects, stepped by the scheduler.
 
 Everything that a rig of processes runs is here but the bus and the operating system's processes. The digest is the
-same, bit for bit, at a fraction of the CPU time; nobody can ask it while it runs.
+same, bit for bit, at a fraction of the CPU time; no query is answered while it runs.
 """
 
 from __future__ import annotations

@@ -37,7 +37,7 @@ OURS = ("borechain", "groundstation", "node", "sim", "telemetry")
 RECORD = str(ROOT / "scenarios" / "wellbore-1-path.csv")
 TURN_TABLE = str(ROOT / "tests" / "data" / "calibration" / "calibration_node_a1_gyro.csv")
 NEEDS = re.compile(r"Error: needs the extra (\w+): pip install 'borechain\[(\w+)\]' \(\w+ is not installed\)\n")
-# a command that connects is given an endpoint where nobody listens: it has passed every check of its options then
+# a command that connects is given an endpoint without a listener: it has passed every check of its options then
 NOWHERE = ("--endpoint", "tcp/127.0.0.1:1")
 WALK = """
 import contextlib, io, click
@@ -205,7 +205,7 @@ def test_every_command_helps_and_does_its_job_or_names_the_extra_it_needs(
     else:
         assert NEEDS.fullmatch(environment.run(program=("-m", "groundstation")).stderr)
     overwritten = environment.site / "node" / "__init__.py"
-    overwritten.write_text('"""Somebody else\'s, installed over ours."""\n')
+    overwritten.write_text('"""A foreign one, installed over ours."""\n')
     refused = environment.run("router")
     assert (refused.returncode, len(refused.stderr.splitlines())) == (1, 1)
     assert str(overwritten) in refused.stderr
@@ -262,7 +262,7 @@ def test_a_board_runs_its_node_without_the_other_packages(board: Environment) ->
 def test_a_package_of_somebody_else_is_named_with_its_place(tmp_path: Path, name: str) -> None:
     foreign = tmp_path / "foreign" / name / "__init__.py"
     foreign.parent.mkdir(parents=True)
-    foreign.write_text('"""Somebody else\'s."""\n')
+    foreign.write_text('"""A foreign one."""\n')
     path = [str(foreign.parents[1]), str(ROOT)]
     program = f"import sys; sys.path[:0] = {path}; from borechain.__main__ import main; main(['router'])"
     done = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, check=False, timeout=60)

@@ -31,7 +31,7 @@ LOOK_S = 0.002
 
 @dataclass
 class KillOutcome:
-    """What became of the events: handed over, receipted, kept, and how soon a new life receipted the first (s)."""
+    """Counts of events handed over, receipted and kept, and the times of the first receipts after each start (s)."""
 
     handed: int = 0
     lost: int = 0
@@ -112,7 +112,7 @@ def await_receipts(crowd: Crowd, hand_over: Callable[[], None], wanted: int) -> 
 
 
 def wait_until(true: Callable[[], bool]) -> None:
-    """Look again and again at what is receipted."""
+    """Wait until ``true()``, asked again and again."""
     wait_for(lambda: true() or None, "the ground station was killed and has receipted nothing", PATIENCE_S, LOOK_S)
 
 

@@ -50,7 +50,7 @@ class SecretGeneration:
 
 @dataclass(frozen=True, slots=True)
 class RigSecret:
-    """What a rig's folder holds beside the key files."""
+    """Content of a rig's folder beside the key files."""
 
     rig: str
     generations: tuple[SecretGeneration, ...]  # the oldest first
@@ -114,7 +114,7 @@ def add_tube(folder: Path, tube: int, now: datetime.datetime) -> Path:
 
 
 def revoke_tube(folder: Path, tube: int, now: datetime.datetime) -> RigSecret:
-    """Have a tube believed nothing from now on, and make new keys for all others.
+    """Revoke a tube, so that it is believed nothing from now on, and make new keys for all others.
 
     Raises
     ------
@@ -193,7 +193,7 @@ def _rotate(folder: Path, secret: RigSecret, now: datetime.datetime) -> RigSecre
 
 
 def _write(folder: Path, secret: RigSecret, addresses: Iterable[int]) -> None:
-    """The secret last: until it is written the files of before the change can be made again."""
+    """Write the secret last: until then the earlier files can be made again."""
     for address in addresses:
         write_private(_file_of(folder, address), pack_ring(secret.ring(address)))
     write_access(folder, secret.rig, secret.revoked)

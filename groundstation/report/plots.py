@@ -110,7 +110,7 @@ def survey_figure(
 
 
 def _off_axis(position: Array, design: ColumnDesign | None) -> tuple[float, float]:
-    """Distance (m) from the design axis and what is allowed there."""
+    """Distance (m) from the design axis and its tolerance (m) there."""
     if design is None:
         return 0.0, math.inf
     offset = position - np.array(design.head)

@@ -101,7 +101,7 @@ def resume(nodes: Array, configs: Array) -> bool:
     """Make a saved node ready for its first cycle after an outage of unknown length; whether it cut an alignment.
 
     What is learnt stays: constants, mounts, trust in the sensors, the twist. What belongs to the session goes, and
-    nobody knows what torque there was meanwhile. The configuration in use is again the one given, ``configs`` (1).
+    the torque meanwhile is unknown. The configuration in use is again the one given, ``configs`` (1).
     """
     forget_session(nodes)
     nodes["config"] = configs

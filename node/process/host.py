@@ -70,7 +70,7 @@ def run_encoder(
     seals = seals_at(place.keys, ENCODER, reach, place.rig)
 
     def build(timing: CycleTiming | None = None) -> EncoderProcess:
-        # on a board nobody can tell a new folder from one that was lost
+        # on a board a new folder cannot be told from one that was lost
         process = EncoderProcess(place.folder, source, torque, timing, reach, seals=seals, is_new=own_time is None)
         warm_encoder()
         return process

@@ -99,7 +99,7 @@ class Journal:
         raise fault
 
     def _look(self) -> None:
-        """Find the newest good slot before the first save, where nobody asked for its contents."""
+        """Find the newest good slot before the first save, where its contents were not loaded."""
         try:
             self.load()
         except SavedStateError:

@@ -246,7 +246,7 @@ class TubeProcess(Process):
             self._timing.add_duration(CycleStage.AIDING, clock.rig_from_local(now) - aiding.valid_at)
         silent = self.endpoint.skipped
         if silent > len(self.settings.above):
-            return  # over joints that nobody told this node of
+            return  # over joints that this node was not told of
         aiding = across(aiding, self.settings.above[:silent], self.settings.stiffness)
         valid_local = clock.local_from_rig(aiding.valid_at)
         if math.isfinite(clock.stepped):

@@ -100,7 +100,7 @@ class StringRun:
 class DirectString:
     """One string of one world.
 
-    ``clock_shifts`` moves the clock of a tube by so many seconds, a plain field to be changed by whoever tests.
+    ``clock_shifts`` moves the clock of a tube by so many seconds, a plain field to be changed by tests.
 
     Parameters
     ----------
@@ -168,7 +168,7 @@ class DirectString:
             yield cycle
 
     def _advance(self, first: int, last: int) -> int:
-        """Run the cycle ``first``, and those after it while nobody has anything to say; returns which is next."""
+        """Run the cycle ``first``, and those after it while no message is due; returns the next cycle."""
         if self._hands_on:
             return self._run_together(first, last)
         string = self._string_at(self.world.cycle_end(first))

@@ -50,7 +50,7 @@ ONCE_AIDED: Mask = ROTATING & (STOP - TURN.duration + FIRST_PERIOD <= ENDS)
 
 @dataclass(frozen=True, slots=True)
 class LabRun:
-    """What one seed left: yaw errors (cycles, hops) rad and the rest, hop by hop from the head down."""
+    """Results of one seed: yaw errors (cycles, hops) rad and the rest, hop by hop from the head down."""
 
     error: Array  # rad, at the end of every cycle
     var: Array  # rad^2, as the node states it

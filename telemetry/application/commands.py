@@ -25,7 +25,7 @@ STAGES = ("synchronise", "start", "aiding", "frame", "read", "filter", "report",
 
 
 class ObeyedBy(enum.Enum):
-    """Who obeys a command."""
+    """Process that obeys a command."""
 
     TUBE = "tube"
     GROUND = "ground station"
@@ -33,7 +33,7 @@ class ObeyedBy(enum.Enum):
 
 @dataclass(frozen=True, slots=True)
 class Argument:
-    """An argument: what it may be, whether it is needed, and what stands for it where it is left out."""
+    """An argument: its range, whether it is required, and its default."""
 
     quantity: Quantity
     needed: bool = False
@@ -181,7 +181,7 @@ COMMANDS: tuple[CommandSpec, ...] = (
     CommandSpec(
         "alarm",
         ObeyedBy.GROUND,
-        "says that whoever orders it knows of the alarm; whoever does so later is told who was first",
+        "confirms that the sender knows of the alarm; a later sender is told who was first",
         (ALARM_NUMBER,),
         action="acknowledge",
     ),
@@ -244,7 +244,7 @@ NAMES = tuple(dict.fromkeys(spec.name for spec in COMMANDS))
 
 
 def find_command(name: str, action: str = "") -> CommandSpec:
-    """Line of the table.
+    """Return the table's line of a command.
 
     Raises
     ------

@@ -35,7 +35,7 @@ def node_of(imus: int, joints: int, random: np.random.Generator) -> tuple[np.nda
 
 
 def events_since(nodes: np.ndarray, said: int) -> list[tuple[Any, ...]]:
-    """Codes and numbers of the events that nobody has taken yet."""
+    """Codes and numbers of the events that were not taken yet."""
     events = nodes[0]["events"]
     ring = [events["ring"][k % EVENTS_KEPT] for k in range(said, int(events["told"]))]
     events["said"] = events["told"]

@@ -1,4 +1,4 @@
-"""The whole cycle of a tube at every inclination and rotation: no number that is none, no jump, no variance below 0."""
+"""The whole cycle of a tube at every inclination and rotation: no NaN, no jump, no variance below 0."""
 
 import math
 

@@ -81,7 +81,7 @@ def test_what_a_rig_gives_its_nodes_gives_the_same_nodes_here_bit_for_bit() -> N
 
 
 def same_bits(one: np.ndarray, other: np.ndarray) -> bool:
-    """Whether all fields are the same bit for bit; what lies between two of them is nobody's."""
+    """Whether all fields are the same bit for bit; padding between two of them is ignored."""
     if one.dtype.names is None:
         return one.tobytes() == other.tobytes()
     return all(same_bits(one[name], other[name]) for name in one.dtype.names)
@@ -197,7 +197,7 @@ def test_a_campaign_cut_off_goes_on_and_equals_the_uninterrupted_bit_for_bit(tmp
 
 
 def nothing() -> None:
-    """Nobody looks at the progress."""
+    """Ignore the progress."""
 
 
 def test_a_folder_of_another_campaign_is_refused_by_what_differs(tmp_path: Path) -> None:

@@ -62,7 +62,7 @@ def page(tubes: int, browsers: int, terminals: int, seconds: float, address: str
 
 
 def free_page(address: str, endpoint: str) -> PageSettings:
-    """Where a page is to be, once nobody else is found there or at the endpoint; a plain error otherwise."""
+    """Settings of a page at ``address``, checked to be free like the endpoint; a plain error otherwise."""
     from groundstation.gateway.page.settings import PageSettings, listen, parse_address
     from sim.rig.launcher import check_port_free
 

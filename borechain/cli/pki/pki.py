@@ -185,7 +185,7 @@ def password(role: str, path: Path) -> None:
 
 
 def stdin_is_terminal() -> bool:
-    """Whether somebody can be asked."""
+    """Return whether a question can be asked on the terminal."""
     return sys.stdin.isatty()
 
 

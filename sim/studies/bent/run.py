@@ -100,7 +100,7 @@ def run_seed(job: tuple[Tables, int]) -> BentRun:
 
 
 def trajectory_errors(world: World, surveys: Sequence[Survey]) -> BentRun:
-    """What a ground station makes of all surveys, told either way, against the hole."""
+    """Errors of a ground station's trajectory of all surveys, by what it was told of the string."""
     hole = world.scenario.hole
     shared = SharedErrors()
     stations = fused_stations(world, surveys, shared)
