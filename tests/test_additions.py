@@ -71,7 +71,7 @@ STUDY = Addition(
             "coin",
             "Whether a coin is fair.",
             f"{MODULES}.coin",
-            (Table("{throws} throws", (("case", "case"), ("ours", "ours")), (("case", "case"), ("ours", "ours"))),),
+            (ResultTable("{throws} throws", (("case", "case"), ("ours", "ours")), (("case", "case"), ("ours", "ours"))),),
             (Option("throws", 4, 1, 10),),
             drawn=False,
         ),
@@ -185,7 +185,7 @@ def test_a_tube_obeys_an_added_command_and_its_ranges_hold(copy: Path) -> None:
 
 def test_frames_cross_an_added_medium(copy: Path) -> None:
     out = run(copy, "-c", program("""
-        from telemetry.media.port import Frame, TubeEnd
+        from telemetry.media.port import PortFrame, TubeEnd
         from telemetry.media.media_table import open_medium
         from telemetry.messages import Side
 
@@ -193,7 +193,7 @@ def test_frames_cross_an_added_medium(copy: Path) -> None:
             lower_end = TubeEnd("rig", 2, Side.LOWER, 1)
             upper, lower = medium.open_port(lower_end), medium.open_port(lower_end.facing)
             lower.listen(print)
-            upper.send(Frame(b"hello"))
+            upper.send(PortFrame(b"hello"))
             upper.close()
             lower.close()
     """))  # fmt: skip
