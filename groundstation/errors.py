@@ -22,7 +22,7 @@ class GroundError(BorechainError):
 
 
 class SurveyError(GroundError, InputError, ValueError):
-    """The numbers given are no survey."""
+    """The numbers given are not a valid survey."""
 
 
 class ToolError(GroundError, InputError, ValueError):

@@ -22,7 +22,7 @@ class ConfigurationError(NodeError, InputError, ValueError):
 
 
 class SavedStateError(NodeError, ValueError):
-    """The bytes are no saved state of this layout."""
+    """The bytes are not a saved state of this layout."""
 
 
 class SensorError(NodeError, OSError):

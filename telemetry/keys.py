@@ -103,7 +103,7 @@ TABLE: Final[tuple[Key, ...]] = (
     Key(
         "borechain/{rig}/ground/changes",
         "query, publish",
-        "when each answer changed last: a listener that a full line has cost one sees it and asks",
+        "when each answer changed last: a listener that lost one to a full line sees it and asks again",
     ),
     Key("borechain/{rig}/ground/schema", "query", "JSON schema of every answer below ground/"),
     Key("borechain/{rig}/ground/recalibration", "query, publish", "calibration in the field: progress and result"),

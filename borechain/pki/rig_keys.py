@@ -75,7 +75,7 @@ def init_rig(
     Raises
     ------
     KeyFileError
-        When the folder has a secret already, cannot be written, or the name is none.
+        When the folder has a secret already, cannot be written, or the name is invalid.
     """
     if not NAME.fullmatch(rig):
         raise KeyFileError(f"rig: expected 1 to 64 letters, digits, - and _, got {rig!r:.80}")
@@ -100,7 +100,7 @@ def add_tube(folder: Path, tube: int, now: datetime.datetime) -> Path:
     Raises
     ------
     KeyFileError
-        When the folder holds no rig's keys, the tube's were revoked, or the number is none.
+        When the folder holds no rig's keys, the tube's were revoked, or the number is invalid.
     """
     secret = read_secret(folder)
     if not 1 <= tube <= MAX_TUBE:
@@ -119,7 +119,7 @@ def revoke_tube(folder: Path, tube: int, now: datetime.datetime) -> RigSecret:
     Raises
     ------
     KeyFileError
-        When the folder holds no rig's keys, or the number is none.
+        When the folder holds no rig's keys, or the number is invalid.
     """
     secret = read_secret(folder)
     if not 1 <= tube <= MAX_TUBE:
@@ -130,7 +130,7 @@ def revoke_tube(folder: Path, tube: int, now: datetime.datetime) -> RigSecret:
 
 
 def rotate_keys(folder: Path, now: datetime.datetime) -> RigSecret:
-    """Make new keys for everybody; those of before are valid for a day.
+    """Make new keys for all; the old ones stay valid for a day.
 
     Raises
     ------
@@ -160,7 +160,7 @@ def read_secret(folder: Path) -> RigSecret:
     Raises
     ------
     KeyFileError
-        When it cannot be read, is open to others or is none.
+        When it cannot be read, is open to others or is invalid.
     """
     path = folder / SECRET_FILE
     text = read_private(path)

@@ -112,7 +112,7 @@ class Recording:
         Raises
         ------
         RecordingError
-            When it is no recording of this version.
+            When it is not a recording of this version.
         """
         try:
             with self.path.open("rb") as file:

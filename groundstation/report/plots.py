@@ -60,7 +60,7 @@ def survey_figure(
     Raises
     ------
     SurveyError
-        When the arrays do not fit each other or the confidence is none.
+        When the arrays do not fit each other or the confidence is not between 0 and 1.
     """
     n = len(md)
     if n < 2 or positions.shape != (n, 3) or covs.shape != (n, 3, 3):

@@ -50,7 +50,7 @@ def gyro_step(reading: Reading) -> Reading:
 
 
 def gyro_scale(reading: Reading) -> Reading:
-    """Return the reading with a gyroscope that shows a tenth too much."""
+    """Return the reading with a gyroscope that reads 10 % too high."""
     return [*reading[:2], reading[2] * 1.1, *reading[3:]]
 
 

@@ -36,7 +36,7 @@ from telemetry.unwritten import Content
 if TYPE_CHECKING:
     from telemetry.application.seals import Seals
 
-KEPT_WAIT = 1.15  # s for which what is no warning waits for a state to go up with
+KEPT_WAIT = 1.15  # s that a message other than a warning waits for a state to go up with
 
 
 class EndToEndDelivery:
@@ -80,7 +80,7 @@ class EndToEndDelivery:
     def submit(self, message: Kept, now: float) -> None:
         """Keep a message until the ground station has receipted it, and send it unless messages are held back.
 
-        What is no warning goes up with the next states, in their frames.
+        Messages other than warnings go up with the next states, in their frames.
         """
         payload, needed = encode(message), is_needed(message)
         if is_warning(message) or not self.has_states:

@@ -58,7 +58,7 @@ def unpack_frame(datagram: bytes) -> tuple[CanFrame, int]:
     Raises
     ------
     ValueError
-        When the bytes are no frame.
+        When the bytes are not a frame.
     """
     fd = len(datagram) == FD.size
     if not fd and len(datagram) != CLASSIC.size:

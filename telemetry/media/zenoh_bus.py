@@ -171,7 +171,7 @@ class ZenohBus:
         Raises
         ------
         MediumError
-            When the selector is no valid key expression.
+            When the selector is not a valid key expression.
         """
         try:
             replies = self._session.get(selector, timeout=timeout, consolidation=zenoh.ConsolidationMode.NONE)
@@ -316,7 +316,7 @@ def end_declaration(declared: Any) -> None:
 
 
 def keys_intersect(selector_key: str, key: str) -> bool:
-    """Whether two key expressions have a key in common; False for what is no key expression."""
+    """Whether two key expressions have a key in common; False for an invalid key expression."""
     try:
         return bool(zenoh.KeyExpr(selector_key).intersects(zenoh.KeyExpr(key)))
     except zenoh.ZError:

@@ -185,7 +185,7 @@ def read_private(path: Path) -> str:
     Raises
     ------
     KeyFileError
-        When it cannot be read, is no text or is open to others.
+        When it cannot be read, is not text or is open to others.
     """
     try:
         with path.open(encoding="ascii") as file:

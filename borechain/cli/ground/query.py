@@ -145,7 +145,7 @@ def watch(
 
 
 def check_selector(selector: str) -> None:
-    """Refuse what is no key expression before anything connects.
+    """Refuse an invalid key expression before anything connects.
 
     Raises
     ------

@@ -18,7 +18,7 @@ import numpy.typing as npt
 from groundstation.errors import SurveyError
 
 Array = npt.NDArray[np.float64]
-GRAVITY_TOLERANCE = 0.005  # of g, |f| of a stop that was no stop
+GRAVITY_TOLERANCE = 0.005  # of g, largest ||f| - g| of a stop at rest
 ASYMMETRY = 1e-9  # of the largest entry, rounding in the covariance of a node
 CONDITION = 1e14  # beyond it the inverse of a covariance is noise
 PLAINLY = 1e-10  # of the trace to the power k, the determinant (k, k) of a matrix that needs no closer look
@@ -209,7 +209,7 @@ def combine_imus(forces: Array, covs: Array) -> tuple[Array, Array]:
     Raises
     ------
     SurveyError
-        When one of the covariances is none.
+        When one of the covariances is invalid.
     """
     if not is_covariance(covs):
         raise SurveyError(f"cluster: expected a positive definite force covariance of each IMU, got {covs.tolist()}")

@@ -34,7 +34,7 @@ class Trust(IntEnum):
     FULL = 0  # as its variances say
     UNKNOWN_YAW = 1  # fused with the variance of an unknown yaw, beside no survey that is trusted
     SET_ASIDE = 2  # kept and shown, never fused
-    UNDATED = 3  # its time is no rig time, so it has no depth
+    UNDATED = 3  # its time is not rig time, so it has no depth
 
 
 EFFECTS: dict[NodeFlag, Trust] = {
