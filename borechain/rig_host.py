@@ -77,7 +77,7 @@ def run_medium(
 
 
 def say_absent(name: str, waited: float) -> None:
-    """Say now and then who has not joined the rig (wall s)."""
+    """Report now and then which processes have not joined the rig (wall s)."""
     if waited > 0.0 and waited % SAY_EVERY == 0.0:
         sys.stderr.write(f"borechain medium: {name} has not joined for {waited:.0f} s, it is waited for\n")
         sys.stderr.flush()

@@ -47,7 +47,7 @@ class KillOutcome:
 def kill_again_and_again(
     times: int, endpoint: str, folder: Path, database: str | None = None, seed: int = 1
 ) -> KillOutcome:
-    """Kill a ground station ``times`` times at moments by lot, and count what its database keeps at the end.
+    """Kill a ground station ``times`` times at random moments, and count what its database keeps at the end.
 
     ``database`` is the URL of an empty one; SQLite in ``folder`` without it.
 

@@ -33,7 +33,7 @@ from telemetry.transport.key_ring import (
 
 SECRET_FILE = "rig.secret"
 SECRET_SIZE = 32  # bytes
-OVERLAP = datetime.timedelta(days=1)  # for which the keys of before a rotation are valid
+OVERLAP = datetime.timedelta(days=1)  # for which the old keys stay valid after a rotation
 ALWAYS = (BASE, ENCODER, DEPTH_SOURCE)  # processes that every rig has
 NAME = re.compile(r"[A-Za-z0-9_-]{1,64}")
 
@@ -141,7 +141,7 @@ def rotate_keys(folder: Path, now: datetime.datetime) -> RigSecret:
 
 
 def retire_keys(folder: Path) -> RigSecret:
-    """Leave the keys of before the newest out of every file: all that matter have new ones.
+    """Remove all but the newest keys from every file, once every process of the rig has them.
 
     Raises
     ------

@@ -37,9 +37,9 @@ class EncoderProcess(Process):
     reach : tubes away that its radio hears, see ``TubeSettings``
     disk : that holds the folder
     seals : what it says and believes under keys; None: everybody is believed
-    is_new : this encoder was never heard before. Otherwise a start that cannot be counted is numbered by lot: an epoch
+    is_new : never heard before on this rig. Otherwise a start that cannot be counted gets a random number: an epoch
         that came before would mix the depths of two times
-    lot : number below its argument by lot
+    lot : random number below its argument
 
     Raises
     ------

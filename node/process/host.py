@@ -44,7 +44,7 @@ def run_node(
     def build(timing: CycleTiming | None = None) -> TubeProcess:
         process = TubeProcess(settings, place.folder, key=key, imus=imus, timing=timing, seals=seals)
         loop = kernel_of(settings.kernel)
-        warm_step(loop.step, loop.aiding)  # on a cold machine half a minute, for which who has said that he lives hangs
+        warm_step(loop.step, loop.aiding)  # half a minute on a cold machine: before the token of life
         return process
 
     name = f"node {settings.tube}"

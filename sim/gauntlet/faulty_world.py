@@ -85,7 +85,7 @@ class FaultyWorld(World):
     def let_drift(self, address: int, t: float, rate: float) -> None:
         """Let the clock of a process run fast by ``rate`` s/s from rig time ``t`` (s) of the truth on.
 
-        What it has gained by a drift of before it keeps: a clock does not run backwards.
+        It keeps what it has gained by an earlier drift: a clock does not run backwards.
         """
         since, before = self.drifts.get(address, (t, 0.0))
         self.jumps[address] = self.jumps.get(address, 0.0) + before * max(t - since, 0.0)

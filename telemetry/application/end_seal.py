@@ -2,7 +2,7 @@
 
 A sealed payload begins with a byte that no payload of ours begins with; a relay hands it on as it is. It names two
 random session numbers, the tube's and the base's, and its tag covers both. Neither side believes what does not name
-the present pair, so nothing of before a restart of either is believed, and neither has to keep a counter.
+the present pair, so nothing from before a restart of either is believed, and neither has to keep a counter.
 
 The pair comes about so: a tube begins with a number of its own and 0 for the base's. The base answers what names no
 pair it knows with an offer, sealed for the tube's number, of a number drawn for this purpose. The tube takes an offer
@@ -124,7 +124,7 @@ class SealingEnd:
         self._ring = ring
         self._lot = lot
         self._pair = Pair(lot(), 0)
-        self._before: Pair | None = None  # the pair of before the newest offer
+        self._before: Pair | None = None  # the pair in use before the newest offer
         self._began_at = -math.inf
         self._bases_newest: int | None = None
 

@@ -19,7 +19,7 @@ from telemetry.errors import MediumError
 LENGTH = struct.Struct(">I")
 CHUNK = 1 << 16
 LARGEST = 1 << 26  # bytes; a peer that announces more is not a process of ours
-NAME_LIMIT = 10.0  # wall s that one who connects may take to say who it is
+NAME_LIMIT = 10.0  # wall s within which a connecting process must say which it is
 
 
 class StepStream:

@@ -243,7 +243,7 @@ def other_fields(slot: bytes) -> bytes:
 
 
 def before_checksums(version: int) -> Callable[[bytes], bytes]:
-    """The header of before, with the version alone: magic, version, 0, generation, bytes of state and blob."""
+    """The earlier header, with the version alone: magic, version, 0, generation, bytes of state and blob."""
 
     def slot_of(slot: bytes) -> bytes:
         state, blob = bytes(4096), b"blob"

@@ -153,7 +153,7 @@ def test_a_new_scale_is_named_and_learnt(factor: float, healthy: StringOfOne) ->
 def test_what_the_encoder_jumped_by_before_a_gyroscope_was_found_stuck_stays_in_doubt(
     slipped_deg: float, healthy: StringOfOne
 ) -> None:
-    """The readings of before are all that contradicts it; afterwards the node takes the yaw that it is given."""
+    """Earlier readings are all that contradicts it; afterwards the node takes the yaw that it is given."""
     at = healthy.resting(1)
     jump = {"jump_deg": slipped_deg, "jump_s": (at + 1) * PERIOD}
     string = StringOfOne(1, stick(at + 2, (0, 1, 2)), rough={"encoder": jump}).advance(at + LASTS + SETTLED)

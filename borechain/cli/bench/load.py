@@ -159,7 +159,7 @@ def latency_line(what: str, figures: dict[str, Any]) -> str:
 @require_modules("orjson", "rich", "scipy", "sqlalchemy")
 @plain_faults
 def killed(times: int, database: str | None, endpoint: str, as_json: bool, seed: int) -> None:
-    """Kill a ground station at moments by lot while it takes events, and look whether what it receipted is kept.
+    """Kill a ground station at random moments while it takes events, and check that what it receipted is kept.
 
     Exit status 1 when anything was lost or doubled.
 

@@ -15,7 +15,7 @@ from groundstation.gateway.page.hub import Hub
 from groundstation.gateway.page.settings import PageSettings
 from groundstation.service.process.ground_process import GroundProcess
 
-CONNECTIONS = 200  # at a time; who comes later is told to come again
+CONNECTIONS = 200  # at a time; a later one is told to come again
 IDLE_S = 10.0  # for which a connection may have no request, or be closing
 SWEEP_S = 1.0
 LARGEST_HEAD = 16_384  # bytes of a request before its body

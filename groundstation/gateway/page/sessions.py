@@ -1,4 +1,4 @@
-"""Who is signed in at the page: sessions by lot, and what wrong passwords cost. No I/O, no clock of its own."""
+"""Sessions of the page: random tokens, and the delay after wrong passwords. No I/O, no clock of its own."""
 
 from __future__ import annotations
 
