@@ -9,7 +9,7 @@ import pytest
 
 ROOT = Path(__file__).parents[2]
 PROGRAM = (
-    "import subprocess, sys; from numba import config; from node.kernels import jit; print(config.CACHE_DIR);"
+    "import subprocess, sys; from numba import config; import node.kernels.arithmetic.jit; print(config.CACHE_DIR);"
     "subprocess.run([sys.executable, '-c', 'import node.kernels.arithmetic.jit'], check=True)"
 )
 
@@ -86,7 +86,7 @@ print([sum(function.stats.cache_misses.values()) for function in (step.node_step
 def test_an_edited_kernel_is_another(tmp_path: Path) -> None:
     digest = digest_in(copied(tmp_path))
     assert digest == digest_in(ROOT)
-    with (tmp_path / "node" / "kernels" / "angles.py").open("a") as kernel:
+    with (tmp_path / "node" / "kernels" / "turns" / "gates.py").open("a") as kernel:
         kernel.write("# edited\n")
     assert digest_in(tmp_path) != digest
 

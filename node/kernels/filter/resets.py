@@ -196,7 +196,7 @@ def begin_epoch(state: Any) -> None:
 
 @kernel
 def start_over(state: Any, config: Any) -> None:
-    """Invalid covariance: the filter knows nothing but its constant bias and its mode. Source: ``layout.new_state``."""
+    """Invalid covariance: nothing is known but the constant bias and the mode; as ``filter_record.new_state``."""
     for i in range(STATES):
         for j in range(STATES):
             state.P[i, j] = 0

@@ -32,7 +32,7 @@ def begin_smoothing(state: Any) -> None:
 
 @kernel
 def carry(state: Any, wz: float, dt: float, turning: float, config: Any) -> None:
-    """Covariance with the states over ``dt`` (s) at the spin ``wz`` (rad/s), as ``error_model.propagate``: c F^T."""
+    """Covariance with the states over ``dt`` (s) at the spin ``wz`` (rad/s), as ``propagation.propagate``: c F^T."""
     along = state.surveyed_with
     c, s = math.cos(wz * dt * turning), math.sin(wz * dt * turning)
     step = dt * turning

@@ -1,4 +1,4 @@
-"""The border of the integer loop: configuration, state, readings and aiding between SI floats and Q formats.
+"""Conversion at the edge of the integer loop: configuration, state, readings and aiding, SI floats and Q formats.
 
 Here alone a float becomes an integer and an integer a float, beside the loop and never inside it: readings once a
 cycle, configuration and state when somebody changed them. What does not fit is held at the end of its range and

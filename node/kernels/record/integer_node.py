@@ -1,8 +1,8 @@
 """All memory of a node in integers: the record of the floats, field by field, with a Q format for every float.
 
-Filter and configuration have records of their own (``layout``). Of the others the words lie as those of the floats
-do, so that showing and learning them is one loop over words with a table of scales; the quantities and their ranges
-are those of ``node.kernels.arithmetic.operations``. A word that holds a whole number is copied.
+Filter and configuration have records of their own (``integer_filter``). Of the others the words lie as those of the
+floats do, so that showing and learning them is one loop over words with a table of scales; the quantities and their
+ranges are those of ``node.kernels.arithmetic.operations``. A word that holds a whole number is copied.
 """
 
 from __future__ import annotations

@@ -21,7 +21,7 @@ from node.kernels.step.fixed_step import integer_aiding, integer_step
 INSPECTOR = """
 import re, sys
 import numba
-from numba.core import types
+from numba import types
 from numba.core.dispatcher import Dispatcher
 from node.kernels.arithmetic.integers import mul
 
@@ -72,8 +72,9 @@ for function in functions():
     names.add(where)
     for found in floats_of(function):
         print(where, found)
-parts = "guard.judge_cycle cluster.fuse_imus calibration.correct make_up.make_up fixed.cycle.run_cycle "
-parts += "aligner.follow_turn realign.realign fixed.circle.finish fixed.extremes.law static_average.add_static"
+parts = "turns.guard.judge_cycle sensors.cluster.fuse_imus sensors.correction.correct string.make_up.make_up "
+parts += "filter.fixed.cycle.run_cycle sensors.aligner.follow_turn sensors.realign.realign "
+parts += "sensors.integer_circle.finish sensors.integer_extremes.law sensors.static_average.add_static"
 for part in parts.split():
     assert "node.kernels." + part in names, part
 """
@@ -97,7 +98,7 @@ for function in (clean, leaky, divided):
 FLOATS_ONLY = """
 import numba
 from node.kernels.arithmetic.angles import HALF_TURN, wrap
-from node.kernels.arithmetic.quantity import ConstantType
+from node.kernels.arithmetic.compiler import ConstantType
 
 def refuse(_):
     raise TypeError("an integer")

@@ -1,7 +1,7 @@
 """Propagation of the error covariance in integers: P- = F P F^T + G Q G^T, of which the upper triangle is computed.
 
-P is Q56 of the units of ``layout``; the factors of F are Q31. F P is formed only where its product with F^T is
-wanted, and P- is mirrored, so it is symmetric by construction. A variance that would leave its range is held by
+P is Q56 of the units of ``arithmetic.formats``; the factors of F are Q31. F P is formed only where its product with
+F^T is wanted, and P- is mirrored, so it is symmetric by construction. A variance that would leave its range is held by
 scaling its row and column, which keeps P positive.
 """
 
