@@ -10,6 +10,7 @@ import numpy as np
 
 from node.errors import ConfigurationError
 from node.firmware.imu_settings import ImuSettings
+from node.firmware.kernel_choice import LOOPS
 from node.firmware.sensor_limits import USUAL_LIMITS, SensorLimits
 from node.kernels.arithmetic.formats import DEG, Array
 from node.kernels.record.filter_record import Scheme
@@ -17,7 +18,7 @@ from node.kernels.record.node_record import SETTINGS
 from node.kernels.record.sensor_record import MAX_IMUS
 from telemetry.messages import MAX_TUBE
 
-Kernel: TypeAlias = Literal["float64", "fixed", "published"]
+Kernel: TypeAlias = Literal["float64", "fixed"]
 KERNELS: Final = get_args(Kernel)
 TorsionRule: TypeAlias = Literal["gate", "variance"]
 MAX_REACH: Final = 8  # tubes away
@@ -51,7 +52,7 @@ class TubeSettings:
     scheme: Scheme = Scheme.FORWARD
     state_every: int = 2  # cycles from one report to the next
     aiding_old_after: float = 3.0  # s
-    kernel: Kernel = "float64"  # of the loop; fixed is for a controller without floats, published for experiments
+    kernel: str = "float64"  # of the loop, see ``LOOPS``; fixed is for a controller without floats
     limits: SensorLimits = USUAL_LIMITS  # of its IMU
     stiffness: float = math.inf  # N m/rad, G J / L of this tube; infinite: rigid
     torsion: TorsionRule = "gate"  # aiding under torque: not used, or used with the variance of the twist
@@ -76,7 +77,7 @@ class TubeSettings:
         require(math.isfinite(age) and age > 0.0, f"aiding_old_after: expected a time in s, got {age}")
         count = len(self.imus)
         require(1 <= count <= MAX_IMUS, f"imus: expected 1..{MAX_IMUS} IMUs, got {count}")
-        require(self.kernel in KERNELS, f"kernel: expected one of {', '.join(KERNELS)}, got {self.kernel}")
+        require(self.kernel in LOOPS, f"kernel: expected one of {', '.join(LOOPS)}, got {self.kernel}")
         alone = self.kernel != "float64" and self.scheme is Scheme.INTERSECTION
         require(not alone, f"scheme: expected forward or estimate with the kernel {self.kernel}, got intersection")
         require(self.stiffness > 0.0, f"stiffness: expected more than 0 N m/rad, got {self.stiffness}")
@@ -116,7 +117,6 @@ def crew_record(settings: TubeSettings, configs: Array) -> Array:
     crew["unseen_var"] = settings.unseen_std**2
     crew["scheme"], crew["state_every"] = int(settings.scheme), settings.state_every
     crew["torsion_gate"], crew["joints"] = int(settings.torsion == "gate"), get_args(JointRule).index(settings.joints)
-    crew["as_published"] = int(settings.kernel == "published")
     crew["stamp_walk"] = configs["stamp_walk"][0]
     for name in ("stiffness", "aiding_old_after"):
         crew[name] = getattr(settings, name)

@@ -44,10 +44,10 @@ SCHEMES = ("forward", "estimate", "intersection")
 )
 @click.option(
     "--kernel",
-    type=click.Choice(["float64", "fixed", "published"]),
+    type=click.Choice(["float64", "fixed"]),
     default="float64",
     show_default=True,
-    help="Filter in floating point, in integers, or in its published form (for comparison only).",
+    help="Filter in floating point or in integers.",
 )
 @click.option(
     "--scheme",
@@ -125,7 +125,7 @@ def node(
     lower_joint_deg: float,
     joint_std_deg: float,
     mount_std_deg: float,
-    kernel: Literal["float64", "fixed", "published"],
+    kernel: Literal["float64", "fixed"],
     scheme: str,
     stiffness_nm: float,
     torsion: Literal["gate", "variance"],

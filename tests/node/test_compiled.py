@@ -22,8 +22,9 @@ import numpy as np
 from numba import njit
 from numba.core.runtime import _nrt_python, rtsys
 from node.kernels.sensors.correction import calibrate, identity_parameters
-from node.kernels.record.filter_record import PERIOD, default_config, new_state
-from node.kernels.sensors.static_average import STATIC, add_static, has_moved
+from node.kernels.record.filter_record import default_config, new_state
+from node.kernels.record.sensor_record import STATIC
+from node.kernels.sensors.static_average import add_static, has_moved
 
 run_cycle = import_module(os.environ["CYCLE"]).run_cycle
 offer_aiding = import_module(os.environ["RELAY"]).offer_aiding
@@ -140,7 +141,7 @@ def test_the_cache_follows_the_sources() -> None:
     ("cycle", "relay"),
     [
         ("node.kernels.filter.float64.cycle", "node.kernels.string.relay"),
-        ("node.kernels.published.cycle", "node.kernels.published.cycle"),
+        ("sim.studies.published_form.feed_forward", "sim.studies.published_form.feed_forward"),
     ],
 )
 def test_a_cycle_allocates_nothing(cycle: str, relay: str, unoptimised: dict[str, str]) -> None:

@@ -37,7 +37,7 @@ if TYPE_CHECKING:
     from sim.world.world import World
     from telemetry.media.zenoh_bus import ZenohBus
 
-PRELOAD = {"float64": "borechain.warm", "fixed": "borechain.warm_all", "published": "borechain.warm_all"}  # by kernel
+PRELOAD = {"float64": "borechain.warm", "fixed": "borechain.warm_all"}  # by kernel
 
 
 @click.command()

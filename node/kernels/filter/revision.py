@@ -33,7 +33,7 @@ def open_revision(node: Any, settings: Any) -> None:
     revision.said_var = state.now_P[PSI, PSI]
     revision.systematic = state.systematic_var
     state.smoothing = 0
-    if settings.scheme == FORWARD and settings.as_published == 0 and not is_doubted(node):
+    if settings.scheme == FORWARD and not is_doubted(node):
         begin_smoothing(state)
 
 

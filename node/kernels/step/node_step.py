@@ -147,8 +147,15 @@ def enter(nodes: Array, settings: Array, parameters: Array, readings: Array, mom
 @kernel
 def leave(nodes: Array, settings: Array, moment: Array, status: int, waits: int) -> int:
     """What comes after a loop that returned ``status``; ``waits`` is the answer of ``enter``."""
+    node = nodes[0]
+    after_loop(node, moment, status, waits)
+    return conclude_cycle(nodes, settings, moment)
+
+
+@kernel
+def conclude_cycle(nodes: Array, settings: Array, moment: Array) -> int:
+    """What comes after the cycle was judged: alignment, offsets of the IMUs, and what there is to say."""
     node, crew = nodes[0], settings[0]
-    after_loop(node, crew, moment, status, waits)
     follow_alignment(node, crew, moment[START], moment[END])
     if crew.imus > 1 and is_quiet(node):
         learn_offsets(node, crew)
@@ -176,8 +183,17 @@ def before_loop(node: Any, settings: Any, moment: Array, saturated: int) -> int:
 
 
 @kernel
-def after_loop(node: Any, settings: Any, moment: Array, status: int, waits: int) -> None:
-    """Take what the loop made of the cycle."""
+def after_loop(node: Any, moment: Array, status: int, waits: int) -> None:
+    """Take what the loop made of the cycle, and judge it."""
+    take_status(node, status, waits)
+    follow_swing(node)
+    follow_ramp(node)
+    judge_cycle(node, node.status, moment[END])
+
+
+@kernel
+def take_status(node: Any, status: int, waits: int) -> None:
+    """Take what the loop says of the cycle; see ``leave``."""
     if waits == 1:
         node.filter.surveyed = 0
     node.status = status | node.noticed
@@ -187,10 +203,6 @@ def after_loop(node: Any, settings: Any, moment: Array, status: int, waits: int)
     node.cycles += 1
     if node.status & FILTER_FAULT:
         start_over(node.filter, node.config)
-    follow_swing(node)
-    if settings.as_published == 0:
-        follow_ramp(node)
-    judge_cycle(node, node.status, moment[END])
 
 
 @kernel

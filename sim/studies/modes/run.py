@@ -16,7 +16,7 @@ import numpy as np
 
 from sim.studies.lab import LAB, ONCE_AIDED, REST, ROTATING, LabRun
 from sim.studies.pool import Step
-from sim.studies.published_form import EXPERIMENTS, FORMS, rows_of
+from sim.studies.published_form.published_forms import EXPERIMENTS, FORMS, rows_of, run_published
 from sim.studies.scenarios import Tables, changed, complete, on_off
 from sim.studies.trials import rms_deg, row, trace, trials
 
@@ -99,7 +99,7 @@ def run(name: str, seeds: int, step: Step) -> dict[str, Any]:
     """
     cases: list[dict[str, Any]] = []
     traces: dict[str, Any] = {}
-    with trials(seeds, step) as run_all:
+    with trials(seeds, step, run_published) as run_all:
         for setup, of_setup in setups(name):
             runs = run_all(setup)
             for case in of_setup:

@@ -1,5 +1,6 @@
 """The integer loop and the float64 loop side by side, and the node that is built on either."""
 
+from collections.abc import Callable
 from dataclasses import replace
 
 import numpy as np
@@ -7,7 +8,7 @@ import pytest
 
 from node.errors import ConfigurationError
 from node.firmware.inputs import ImuReading, RigContext
-from node.firmware.kernel_choice import Loop, kernel_of
+from node.firmware.kernel_choice import Loop, added_loop, kernel_of
 from node.firmware.settings import TubeSettings
 from node.firmware.tube import Tube
 from node.kernels.arithmetic.formats import CEILING, DEG, PERIOD, VAR_Q, Array
@@ -46,6 +47,7 @@ from node.kernels.step.shadow_words import learn_aiding, learn_inputs, learn_nod
 from node.kernels.string.relay import offer_aiding
 from node.kernels.turns.doubts import noise_var
 from sim.studies.fixed_point.run import AIDING_VAR, LIMITS, compare, inputs, rows_of
+from sim.studies.published_form.published_step import leave_published, published_loop
 from telemetry.messages import Aiding, NodeState
 
 WORK_SPACE = {"h", "ph", "gain"}
@@ -201,7 +203,7 @@ def reports(kernel: str, *, forget: bool) -> list[NodeState]:
     return said
 
 
-def in_parts(loop: Loop) -> Loop:
+def in_parts(loop: Loop, leave: Callable[..., int] = leave) -> Loop:
     """The step and the aiding of a loop, called part by part from Python."""
 
     def step(nodes: Array, settings: Array, parameters: Array, readings: Array, moment: Array) -> int:
@@ -267,8 +269,12 @@ def integers_in_parts(loop: Loop) -> Loop:
 @pytest.mark.slow
 @pytest.mark.parametrize("kernel", ["float64", pytest.param("fixed", marks=pytest.mark.statistical), "published"])
 def test_the_compiled_step_does_what_the_step_in_parts_does(kernel: str) -> None:
-    whole, parts = tube(kernel), tube(kernel)
-    parts._loop = (integers_in_parts if kernel == "fixed" else in_parts)(parts._loop)
+    with added_loop("published", published_loop):
+        whole, parts = tube(kernel), tube(kernel)
+    if kernel == "fixed":
+        parts._loop = integers_in_parts(parts._loop)
+    else:
+        parts._loop = in_parts(parts._loop, leave_published if kernel == "published" else leave)
     for k, given in enumerate(inputs(1300, 8)):
         around = RigContext(True, 1 + k // 900, given.end, 1e-8 * (1 + k // 500), True)
         rate = given.rate if k % 211 else (np.nan, 0.0, 0.0)
@@ -307,5 +313,5 @@ def test_float64_is_the_default_and_untouched() -> None:
 
 
 def test_an_unknown_kernel_is_refused() -> None:
-    with pytest.raises(ConfigurationError, match="kernel: expected one of float64, fixed, published, got Q16"):
+    with pytest.raises(ConfigurationError, match="kernel: expected one of float64, fixed, got Q16"):
         replace(TubeSettings(1), kernel="Q16")

@@ -7,17 +7,28 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from node.errors import ConfigurationError
 from node.firmware.inputs import ImuReading, RigContext
-from node.firmware.kernel_choice import kernel_of
+from node.firmware.kernel_choice import LOOPS, added_loop, kernel_of
 from node.firmware.settings import TubeSettings
 from node.firmware.tube import Tube
 from node.kernels.arithmetic.formats import DEG, PERIOD, Array
 from node.kernels.filter.float64.propagation import BX, PSI, TX, TY
-from node.kernels.published import cycle as published
-from node.kernels.published.euler import error_rates, euler_rates, geometry_of, point_down, propagate, tilt_of
-from node.kernels.published.step import published_aiding, published_step
 from node.kernels.record.filter_record import STATES, Err, Status, default_config, new_state
 from node.kernels.record.node_record import new_node
+from sim.errors import ScenarioError
+from sim.studies.lab import LAB, run_seed
+from sim.studies.published_form import feed_forward as published
+from sim.studies.published_form.euler_angles import (
+    error_rates,
+    euler_rates,
+    geometry_of,
+    point_down,
+    propagate,
+    tilt_of,
+)
+from sim.studies.published_form.published_forms import KERNEL, setup_of
+from sim.studies.published_form.published_step import published_aiding, published_loop, published_step
 from telemetry.messages import Aiding, Event, NodeFlag, NodeState
 
 G = 9.81
@@ -151,13 +162,9 @@ def test_an_aiding_is_moved_from_its_time_of_validity(age: float) -> None:
 
 def tube(tilt: float) -> tuple[Tube, Array]:
     config = default_config()
-    node = Tube(
-        TubeSettings(1, state_every=1, kernel="published"),
-        config,
-        new_node(config),
-        iter(range(10**6)).__next__,
-        restored=False,
-    )
+    with added_loop(KERNEL, published_loop):
+        settings = TubeSettings(1, state_every=1, kernel=KERNEL)
+        node = Tube(settings, config, new_node(config), iter(range(10**6)).__next__, restored=False)
     return node, -G * np.array([-math.sin(tilt), 0.0, math.cos(tilt)])
 
 
@@ -278,10 +285,24 @@ def test_six_states_are_estimated_and_the_other_two_stay_as_they_began() -> None
     assert P[BX, BX] != prior[BX, BX]
 
 
-def test_it_is_chosen_by_the_settings() -> None:
-    assert kernel_of("published") == (
-        published.run_cycle,
-        published.offer_aiding,
-        published_step,
-        published_aiding,
-    )
+def test_it_is_chosen_by_the_settings_while_a_study_offers_it() -> None:
+    ours = dict(LOOPS)
+    with added_loop(KERNEL, published_loop):
+        assert kernel_of(KERNEL) == (published.run_cycle, published.offer_aiding, published_step, published_aiding)
+        assert TubeSettings(1, kernel=KERNEL).kernel == KERNEL
+    assert ours == LOOPS
+    with pytest.raises(ConfigurationError, match="kernel: expected one of float64, fixed, got published"):
+        TubeSettings(1, kernel=KERNEL)
+
+
+@pytest.mark.parametrize("name", ["float64", "fixed", KERNEL])
+def test_no_study_takes_the_name_of_a_kernel(name: str) -> None:
+    ours = dict(LOOPS)
+    with added_loop(KERNEL, published_loop), pytest.raises(ConfigurationError, match=f"another name .*got {name}"):
+        added_loop(name, published_loop).__enter__()
+    assert ours == LOOPS
+
+
+def test_a_scenario_of_the_published_form_is_refused_outside_its_study() -> None:
+    with pytest.raises(ScenarioError, match=r"node\.kernel: expected one of float64, fixed, got 'published'"):
+        run_seed((setup_of(LAB, "published filter"), 1))

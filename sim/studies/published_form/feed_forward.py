@@ -19,10 +19,18 @@ from node.kernels.filter.float64.propagation import BX, PSI, TX, TY
 from node.kernels.filter.float64.update import clear, innovation_var, joseph
 from node.kernels.filter.modes import STATIC_BIAS, SURVEY_READY, guard_rate, is_quiet, learn_static_bias, step_modes
 from node.kernels.filter.moving_average import average_force
-from node.kernels.published.euler import ATTITUDE, error_rates, euler_rates, geometry_of, point_down, propagate, tilt_of
 from node.kernels.record.filter_record import STATES, UNKNOWN_YAW_VAR, Status
 from node.kernels.record.ring import drop_first_pending, push
 from node.kernels.string import relay
+from sim.studies.published_form.euler_angles import (
+    ATTITUDE,
+    error_rates,
+    euler_rates,
+    geometry_of,
+    point_down,
+    propagate,
+    tilt_of,
+)
 
 BAD_SAMPLE, FILTER_FAULT = int(Status.BAD_SAMPLE), int(Status.FILTER_FAULT)
 STEEPEST = math.pi / 3.0  # rad, of phi and theta, beyond which the tilt has diverged
