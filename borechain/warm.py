@@ -11,7 +11,7 @@ import sim.rig.bus_stepper
 import sim.rig.scheduler
 import sim.world.world
 from groundstation.survey.kernels import position_errors
-from node.kernels.arithmetic.jit import leave_blas_out
+from node.kernels.arithmetic.compiler import leave_blas_out
 from node.kernels.step.warm import warm_encoder, warm_up
 
 leave_blas_out()

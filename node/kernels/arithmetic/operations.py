@@ -2,6 +2,9 @@
 
 For floats each is the plain expression, to the last bit. For integers it is what stands beside it in integers, in the
 formats of ``node.kernels.arithmetic.quantity``; an argument beyond its range is held, so that nothing overflows.
+
+What it buys is that of ``node.kernels.arithmetic.quantity``: one source, and no speed. A call that numba takes by type
+is the code of the function taken.
 """
 
 from __future__ import annotations
@@ -13,6 +16,7 @@ from typing import Any, Final, TypeVar
 from numba import types
 from numba.extending import overload
 
+from node.kernels.arithmetic.compiler import NO_WRAPPER
 from node.kernels.arithmetic.formats import ANGLE_Q, CEILING, PERIOD, RATE_Q, TIME_Q, VECTOR_Q, Array
 from node.kernels.arithmetic.integers import mean_of, mul, quotient, root_of, shift
 from node.kernels.arithmetic.jit import kernel
@@ -20,7 +24,7 @@ from node.kernels.arithmetic.quantity import NO_NUMBER
 from node.kernels.arithmetic.trigonometry import TURN, counts, difference, radians
 
 Function = TypeVar("Function", bound=Callable[..., Any])
-OPTIONS: Final[Any] = {"error_model": "numpy", "no_cfunc_wrapper": True}
+OPTIONS: Final[Any] = {"error_model": "numpy", **NO_WRAPPER}
 LARGEST: Final = 1 << 61
 TWO: Final = 1 << 31
 UNITY: Final = 1 << VECTOR_Q

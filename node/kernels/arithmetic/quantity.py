@@ -19,6 +19,9 @@ temperature C                              23      256 C
 
 Sums, comparisons and products with small whole numbers are those of the language for both; for products, quotients
 and roots of quantities see ``node.kernels.arithmetic.operations``.
+
+What it buys: one source for both arithmetics, and no speed. The modules around the filter (sensors, string, turns,
+step) would stand there twice, and a rule be changed in one of them.
 """
 
 from __future__ import annotations
@@ -27,18 +30,15 @@ import math
 from typing import Any, Final
 
 from numba import types
-from numba.core.imputils import lower_constant
-from numba.core.typeconv.castgraph import Conversion
-from numba.core.typing.typeof import Purpose
-from numba.extending import lower_cast, models, overload, register_model, typeof_impl
+from numba.extending import typeof_impl
 
+from node.kernels.arithmetic.compiler import ConstantType, is_argument
 from node.kernels.arithmetic.formats import ANGLE_Q, FORCE_Q, NEVER, RATE_Q, TIME_Q, VAR_Q, VECTOR_Q
 
 NO_NUMBER: Final = 1 << 60  # in integers, where a float is NaN
 RATE_VAR_Q: Final = VAR_Q + 12  # (rad/s)^2
 WARMTH_Q: Final = VECTOR_Q - 7  # C
 STANDARD_GRAVITY: Final = 9.80665
-FORMS: Final = (types.float64, types.int64)
 
 
 class Constant(float):
@@ -53,49 +53,12 @@ class Constant(float):
         return made
 
 
-class ConstantType(types.Opaque):
-    """Type of one constant, as numba knows it: it becomes the float or the integer of what it meets.
-
-    It has to meet something: alone, as under a minus, numba takes it for the integer.
-    """
-
-    def __init__(self, value: float, fixed: int) -> None:
-        self.value, self.fixed = value, fixed
-        super().__init__(f"Constant({value!r}, {fixed})")
-
-    def can_convert_to(self, _: Any, other: Any) -> Any:
-        """To the two forms and to nothing else."""
-        return Conversion.safe if other in FORMS else None
-
-    def unify(self, _: Any, other: Any) -> Any:
-        """The form of the other branch."""
-        return other if other in FORMS else None
-
-
-register_model(ConstantType)(models.OpaqueModel)
-
-
 @typeof_impl.register(Constant)
 def _type_of(value: Constant, context: Any) -> Any:
     """In a kernel it is a constant; Python hands it to one as the float that it is."""
-    if context.purpose is Purpose.argument:
+    if is_argument(context):
         return types.float64
     return ConstantType(float(value), value.fixed)
-
-
-@lower_constant(ConstantType)  # type: ignore[no-untyped-call]
-def _lower(context: Any, _builder: Any, _type: Any, _value: Any) -> Any:
-    return context.get_dummy_value()
-
-
-@lower_cast(ConstantType, types.float64)  # type: ignore[no-untyped-call]
-def _to_float(context: Any, _builder: Any, kind: ConstantType, _to: Any, _value: Any) -> Any:
-    return context.get_constant(types.float64, kind.value)
-
-
-@lower_cast(ConstantType, types.int64)  # type: ignore[no-untyped-call]
-def _to_integer(context: Any, _builder: Any, kind: ConstantType, _to: Any, _value: Any) -> Any:
-    return context.get_constant(types.int64, kind.fixed)
 
 
 def quantity(value: float, q: int) -> Constant:
@@ -147,17 +110,3 @@ NONE: Final = Constant(math.nan, NO_NUMBER)  # no number
 LONG_AGO: Final = Constant(-math.inf, NEVER)  # a time before all others
 NOT_YET: Final = Constant(math.nan, NEVER)  # a time that has not been
 ONE: Final = factor(1.0)
-
-
-@overload(min, strict=False)
-def _least(a: Any, b: Any) -> Any:
-    if isinstance(a, ConstantType) or isinstance(b, ConstantType):
-        return lambda a, b: b if b < a else a
-    return None
-
-
-@overload(max, strict=False)
-def _most(a: Any, b: Any) -> Any:
-    if isinstance(a, ConstantType) or isinstance(b, ConstantType):
-        return lambda a, b: b if b > a else a
-    return None

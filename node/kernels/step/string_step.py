@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from typing import Any
 
-from numba.core import types
+from numba import types
 
 from node.kernels.arithmetic.formats import Array
 from node.kernels.arithmetic.jit import kernel
