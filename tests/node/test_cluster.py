@@ -11,7 +11,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
-from groundstation.survey.resolve import combine_imus
+from groundstation.survey.fusion.resolve import combine_imus
 from node.errors import ConfigurationError
 from node.firmware.alignment import rotation
 from node.firmware.imu_settings import ImuSettings

@@ -14,15 +14,15 @@ if TYPE_CHECKING:
 
 def floats() -> None:
     """The usual kernel of a node and the string of the studies around it, the published form of it, and surveys."""
-    from groundstation.survey.compiled_model import warm
+    from groundstation.survey.well.compiled_model import preload_models
 
-    importlib.import_module("borechain.warm")
+    importlib.import_module("borechain.preload")
     from sim.studies.lab import LAB, run_seed
     from sim.studies.published_form.published_step import published_loop
 
     run_seed((LAB, 1))
     warm_loop(published_loop())
-    warm()
+    preload_models()
 
 
 def integers() -> None:
