@@ -17,9 +17,9 @@ from borechain.cli.faults import EnvironmentFault
 from node.kernels.record.filter_record import default_config
 from node.kernels.record.node_record import MOMENT, READING, SETTINGS, new_node
 from node.kernels.sensors.correction import identity_parameters
-from node.kernels.step.address import firmware
+from node.kernels.step.address import firmware_addresses
 from node.kernels.step.node_step import node_step
-from node.kernels.step.warm import warm_up
+from node.kernels.step.precompile import warm_up
 
 LEAST = 2.0  # times, below which an address is not worth its code
 
@@ -62,7 +62,7 @@ def run() -> dict[str, Any]:
         When the address makes it less than ``LEAST`` times faster.
     """
     warm_up()
-    step, _ = firmware()
+    step, _ = firmware_addresses()
     nodes, settings = new_node(default_config()), np.zeros(1, SETTINGS)
     parameters = np.concatenate([identity_parameters()] * 2)
     taken = nodes, settings, parameters, np.zeros((1, 1, READING)), np.zeros((1, MOMENT))

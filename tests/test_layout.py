@@ -42,8 +42,8 @@ def test_every_equation_named_in_a_kernel_is_in_the_document() -> None:
         assert hasattr(importlib.import_module(module), function), name
     assert {
         "node.kernels.filter.float64.strapdown.yaw_rate",
-        "node.kernels.filter.float64.propagation.propagate",
-        "node.kernels.filter.float64.update.joseph",
+        "node.kernels.filter.float64.propagation.propagate_covariance",
+        "node.kernels.filter.float64.update.joseph_update",
     } <= listed
 
 

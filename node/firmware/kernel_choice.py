@@ -6,7 +6,7 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from typing import Final, NamedTuple, TypeAlias
 
-from node.errors import ConfigurationError
+from node.errors import NodeConfigurationError
 from node.kernels.arithmetic.formats import Array
 
 
@@ -61,7 +61,7 @@ def added_loop(kernel: str, make: MakeLoop) -> Iterator[None]:
         When there is a kernel of that name.
     """
     if kernel in LOOPS:
-        raise ConfigurationError(f"kernel: expected another name than {', '.join(LOOPS)}, got {kernel}")
+        raise NodeConfigurationError(f"kernel: expected another name than {', '.join(LOOPS)}, got {kernel}")
     LOOPS[kernel] = make
     try:
         yield

@@ -9,14 +9,14 @@ from dataclasses import replace
 
 import numpy as np
 
-from node.firmware.alignment import alignment_in_use, order_alignment
-from node.firmware.block_trial import record_of, recorrect
+from node.firmware.alignment_orders import alignment_in_use, order_alignment
+from node.firmware.block_trial import record_of, recorrect_ring
 from node.firmware.event_table import take_events
 from node.firmware.inputs import ImuReading, RigContext
 from node.firmware.kernel_choice import kernel_of
-from node.firmware.reporter import Reporter
-from node.firmware.settings import TubeSettings, crew_record
+from node.firmware.reporter import NodeReporter
 from node.firmware.static_record import begin_record, static_record
+from node.firmware.tube_settings import TubeSettings, settings_record
 from node.kernels.arithmetic.formats import DEG, Array
 from node.kernels.arithmetic.quantity import NONE
 from node.kernels.filter.modes import STATIC_BIAS
@@ -94,9 +94,9 @@ class Tube:
         self.config = self.node["config"]
         self.state, self._mount = self.node["filter"], self.node["mount"]
         self._down = tuple(nodes[f"down_{name}"] for name in ("systematic", "offset", "torsion"))  # arrays of one
-        self._crew = crew_record(settings, configs)
+        self._crew = settings_record(settings, configs)
         self._next_sequence = next_sequence
-        self.reporter = Reporter(settings, nodes, next_sequence, restored=restored)
+        self.reporter = NodeReporter(settings, nodes, next_sequence, restored=restored)
         self._restored, self._worth = restored, self._saved_yaw_worth()
         count = len(settings.imus)
         if count > 1:
@@ -215,7 +215,7 @@ class Tube:
 
     def use(self, block: ParameterBlock) -> None:
         """Correct readings by ``block`` from the next cycle on."""
-        recorrect(self.state, self.parameters, block, float(self.node["temperature"]))
+        recorrect_ring(self.state, self.parameters, block, float(self.node["temperature"]))
         self.parameters = block
         self.state["smoothing"] = 0
         self._corrections[0] = record_of(block)[0]

@@ -9,7 +9,7 @@ import pytest
 from numba import config
 
 COUNT_COMPILATIONS = """
-from node.kernels.step.warm import warm_up
+from node.kernels.step.precompile import warm_up
 from node.kernels.step.node_step import node_aiding, node_step
 warm_up()
 for function in (node_step, node_aiding):

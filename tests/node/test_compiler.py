@@ -18,13 +18,13 @@ import pytest
 
 from node.kernels.arithmetic.compiler import ByAddress
 from node.kernels.arithmetic.formats import RATE_Q
-from node.kernels.arithmetic.jit import compiled
+from node.kernels.arithmetic.jit import compile_function
 from node.kernels.arithmetic.operations import by_type
-from node.kernels.arithmetic.quantity import NONE, rate
+from node.kernels.arithmetic.quantity import NONE, rate_quantity
 
 ROOT = Path(__file__).parents[2]
 PRIVATE = re.compile(r"^\s*(?:from|import)\s+numba\.(?!extending)", re.MULTILINE)
-LIMIT = rate(0.5)
+LIMIT = rate_quantity(0.5)
 WHOLE = 1 << RATE_Q
 KEPT = """
 from node.kernels.arithmetic.compiler import leave_blas_out
@@ -38,7 +38,7 @@ print(sum(shift.stats.cache_misses.values()), sum(shift.stats.cache_hits.values(
 
 def unkept(function: Any, **options: Any) -> Any:
     """Compile a function of a test, which is not kept."""
-    return compiled(function, cache=False, **options)
+    return compile_function(function, cache=False, **options)
 
 
 @unkept

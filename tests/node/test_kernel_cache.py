@@ -67,12 +67,12 @@ def digest_in(folder: Path) -> str:
 
 @pytest.mark.slow
 def test_a_copy_of_the_sources_loads_what_was_compiled_of_them(tmp_path: Path) -> None:
-    from node.kernels.step.warm import warm_up
+    from node.kernels.step.precompile import warm_up
 
     warm_up()
     program = """
 import node, node.kernels.step.node_step as step
-from node.kernels.step.warm import warm_up
+from node.kernels.step.precompile import warm_up
 warm_up()
 print(node.__file__)
 print([sum(function.stats.cache_misses.values()) for function in (step.node_step, step.node_aiding)])

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from borechain.cli.rig.rig_command import PRELOAD
-from node.firmware.settings import KERNELS
+from node.firmware.tube_settings import KERNELS
 from node.kernels.arithmetic.formats import PERIOD
 from node.kernels.record.filter_record import Scheme
 from node.kernels.string.encoder_step import COUNTS_PER_TURN

@@ -34,7 +34,7 @@ def integers() -> None:
 
 def warm_loop(loop: "Loop") -> None:
     """Compile a kernel of a node."""
-    from node.kernels.step.warm import warm_step
+    from node.kernels.step.precompile import warm_step
 
     warm_step(loop.step, loop.aiding)
 

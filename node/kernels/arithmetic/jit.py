@@ -109,7 +109,7 @@ class SourceLocator(UserProvidedCacheLocator):
         return self._stamp
 
 
-def compiled(function: Function, **options: Any) -> Function:
+def compile_function(function: Function, **options: Any) -> Function:
     """Have ``function`` compiled with our options and these when it is first called."""
     with kept_where(SourceLocator):
         return cast("Function", njit(**OPTIONS | options)(function))
@@ -117,12 +117,12 @@ def compiled(function: Function, **options: Any) -> Function:
 
 def kernel(function: Function) -> Function:
     """Compile ``function`` on its first call or load it from the cache."""
-    return compiled(function)
+    return compile_function(function)
 
 
-def entry(function: Function) -> Function:
+def entry_kernel(function: Function) -> Function:
     """Compile ``function`` as a kernel that others may call by its address, and need not hold a copy of."""
-    return compiled(function, no_cfunc_wrapper=False)
+    return compile_function(function, no_cfunc_wrapper=False)
 
 
 def shared_body(function: Function) -> Function:
@@ -131,9 +131,9 @@ def shared_body(function: Function) -> Function:
     It buys no speed of its own: one body stands for every filter that a step is made with. Numba cannot keep a function
     that takes another (decision 23), so without it each step would have a body of its own.
     """
-    return compiled(function, inline="always")
+    return compile_function(function, inline="always")
 
 
-def constant(value: int) -> int:
+def kernel_constant(value: int) -> int:
     """An integer that kernels give to each other: for every other plain ``int`` numba compiles the callee anew."""
     return cast("int", np.int64(value))

@@ -61,52 +61,52 @@ def _type_of(value: Constant, context: Any) -> Any:
     return ConstantType(float(value), value.fixed)
 
 
-def quantity(value: float, q: int) -> Constant:
+def quantity_in_q(value: float, q: int) -> Constant:
     """A constant in Q``q``."""
     return Constant(value, round(value * 2.0**q))
 
 
-def seconds(value: float) -> Constant:
+def time_quantity(value: float) -> Constant:
     """A time."""
-    return quantity(value, TIME_Q)
+    return quantity_in_q(value, TIME_Q)
 
 
-def rate(value: float) -> Constant:
+def rate_quantity(value: float) -> Constant:
     """An angular rate, rad/s."""
-    return quantity(value, RATE_Q)
+    return quantity_in_q(value, RATE_Q)
 
 
-def angle(value: float) -> Constant:
+def angle_quantity(value: float) -> Constant:
     """An angle, rad."""
-    return quantity(value, ANGLE_Q)
+    return quantity_in_q(value, ANGLE_Q)
 
 
-def force(value: float) -> Constant:
+def force_quantity(value: float) -> Constant:
     """A specific force, m/s^2; in integers by standard gravity."""
     return Constant(value, round(value / STANDARD_GRAVITY * 2.0**FORCE_Q))
 
 
-def variance(value: float) -> Constant:
+def variance_quantity(value: float) -> Constant:
     """A variance, rad^2, or s^2 of a clock."""
-    return quantity(value, VAR_Q)
+    return quantity_in_q(value, VAR_Q)
 
 
-def rate_variance(value: float) -> Constant:
+def rate_variance_quantity(value: float) -> Constant:
     """A variance of a rate, (rad/s)^2."""
-    return quantity(value, RATE_VAR_Q)
+    return quantity_in_q(value, RATE_VAR_Q)
 
 
-def warmth(value: float) -> Constant:
+def temperature_quantity(value: float) -> Constant:
     """A temperature, C; in integers it counts 128 C, so that it is a factor."""
-    return quantity(value, WARMTH_Q)
+    return quantity_in_q(value, WARMTH_Q)
 
 
-def factor(value: float) -> Constant:
+def factor_quantity(value: float) -> Constant:
     """A number without a unit, -2..2 where it multiplies."""
-    return quantity(value, VECTOR_Q)
+    return quantity_in_q(value, VECTOR_Q)
 
 
 NONE: Final = Constant(math.nan, NO_NUMBER)  # no number
 LONG_AGO: Final = Constant(-math.inf, NEVER)  # a time before all others
 NOT_YET: Final = Constant(math.nan, NEVER)  # a time that has not been
-ONE: Final = factor(1.0)
+ONE: Final = factor_quantity(1.0)

@@ -21,7 +21,7 @@ BY_ADDRESS: Final = ("float64", "fixed")  # kernels
 
 
 @functools.cache
-def firmware(kernel: str = "float64") -> tuple[ByAddress, ByAddress]:
+def firmware_addresses(kernel: str = "float64") -> tuple[ByAddress, ByAddress]:
     """``node_step`` and ``node_aiding`` of one of ``BY_ADDRESS``; those in integers are loaded only when used."""
     if kernel == "float64":
         return _by_address(node_step, node_aiding)

@@ -9,14 +9,7 @@ from node.firmware.kernel_choice import Loop
 from node.kernels.arithmetic.formats import Array
 from node.kernels.arithmetic.jit import kernel
 from node.kernels.record.node_record import END, JOINED, START
-from node.kernels.step.node_step import (
-    REFUSED,
-    aiding_around,
-    conclude_cycle,
-    enter,
-    say_events,
-    take_status,
-)
+from node.kernels.step.node_step import REFUSED, aiding_around, begin_step, conclude_cycle, say_events, take_status
 from node.kernels.turns.guard import judge_cycle
 from node.kernels.turns.swings import follow_swing
 from sim.studies.published_form.feed_forward import offer_aiding, run_cycle
@@ -26,7 +19,7 @@ from sim.studies.published_form.feed_forward import offer_aiding, run_cycle
 def published_step(nodes: Array, settings: Array, parameters: Array, readings: Array, moment: Array) -> int:
     """One cycle of one node as ``node.kernels.step.node_step.node_step``; returns what there is to say."""
     node = nodes[0]
-    waits = enter(nodes, settings, parameters, readings, moment)
+    waits = begin_step(nodes, settings, parameters, readings, moment)
     if waits == REFUSED:
         return int(say_events(node))
     joined = 1 if moment[JOINED] != 0 else 0
@@ -36,7 +29,7 @@ def published_step(nodes: Array, settings: Array, parameters: Array, readings: A
 
 @kernel
 def leave_published(nodes: Array, settings: Array, moment: Array, status: int, waits: int) -> int:
-    """What comes after the loop, as ``node.kernels.step.node_step.leave`` but for the ramps."""
+    """What comes after the loop, as ``node.kernels.step.node_step.end_step`` but for the ramps."""
     node = nodes[0]
     take_status(node, status, waits)
     follow_swing(node)

@@ -106,7 +106,7 @@ def refuse(_):
 ConstantType.fixed = property(refuse, lambda *_: None)
 """
 FLOAT_STEP = """
-from node.kernels.step.warm import warm_up
+from node.kernels.step.precompile import warm_up
 warm_up()
 print("all floats")
 """

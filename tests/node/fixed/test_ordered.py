@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from one_node import events_since, node_of
 
-from node.firmware.alignment import rotation
+from node.firmware.alignment_orders import tube_rotation
 from node.firmware.static_record import MOVED, begin_record
 from node.kernels.arithmetic.formats import DEG, PERIOD
 from node.kernels.record.node_record import READING, SATURATED
@@ -37,7 +37,7 @@ class Pair:
         self.integers = tuple(part.copy() for part in self.floats)
         angles = (mount, *MOUNTS[1:])[:imus]
         axes = [(math.sin(p), math.cos(p) * math.sin(r), math.cos(p) * math.cos(r)) for p, r in angles]
-        self.imus = [rotation(np.array(axis)).T for axis in axes]
+        self.imus = [tube_rotation(np.array(axis)).T for axis in axes]
         self.lean, self.noise, self.yaw, self.now, self.sequence = lean, NOISE, 0.3, 1000.0, 0
         self.told: list[tuple[Any, ...]] = []
         self.said = 0
