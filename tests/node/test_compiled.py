@@ -21,7 +21,7 @@ from importlib import import_module
 import numpy as np
 from numba import njit
 from numba.core.runtime import _nrt_python, rtsys
-from node.kernels.sensors.correction import calibrate, identity_parameters
+from node.kernels.sensors.correction import correct_cycle, identity_parameters
 from node.kernels.record.filter_record import default_config, new_state
 from node.kernels.record.sensor_record import STATIC
 from node.kernels.sensors.static_average import add_static, has_moved
@@ -39,7 +39,7 @@ def drive(state, config, parameters, average, raw_rate, raw_force, cycles):
             rate[i], force[i] = raw_rate[i], raw_force[i]
         add_static(average, rate, force, 30.0, 1)
         has_moved(average, 3.0)
-        calibrate(parameters, 30.0, rate, force)
+        correct_cycle(parameters, 30.0, rate, force)
         run_cycle(state, config, rate, force, start, start + 0.5, 1)
         offer_aiding(state, config, 0.1, 1e-6, 1e-6, 0.0, start + 0.4, k, 0)
 

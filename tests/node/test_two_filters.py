@@ -74,7 +74,7 @@ def test_both_forms_give_what_the_table_says(pair: TwoForms) -> None:
         if pair.gives:
             assert given in types_of(pair.gives, integers) - {"Array"}, place
         else:
-            assert given == "None" or place == "fixed.update.joseph", place  # which gives 1 / S to ``look_back``
+            assert given == "None" or place == "fixed.update.joseph_update", place  # which gives 1 / S to ``look_back``
 
 
 def test_an_argument_that_is_told_alike_is_of_one_form_of_numbers() -> None:

@@ -23,7 +23,7 @@ import re, sys
 import numba
 from numba import types
 from numba.core.dispatcher import Dispatcher
-from node.kernels.arithmetic.integers import mul
+from node.kernels.arithmetic.integers import multiply_q31
 
 FLOAT = re.compile(r"\\b(double|float|half|bfloat|x86_fp80|fp128)\\b")
 
@@ -72,9 +72,10 @@ for function in functions():
     names.add(where)
     for found in floats_of(function):
         print(where, found)
-parts = "turns.guard.judge_cycle sensors.cluster.fuse_imus sensors.correction.correct string.make_up.make_up "
-parts += "filter.fixed.cycle.run_cycle sensors.aligner.follow_turn sensors.realign.realign "
-parts += "sensors.integer_circle.finish sensors.integer_extremes.law sensors.static_average.add_static"
+parts = "turns.guard.judge_cycle sensors.cluster.fuse_imus sensors.correction.correct_sensor string.make_up.make_up "
+parts += "filter.fixed.cycle.run_cycle sensors.aligner.follow_turn sensors.realign.realign_filter "
+parts += "sensors.integer_circle.write_circle_offset "
+parts += "sensors.integer_extremes.nonexceedance_probability sensors.static_average.add_static"
 for part in parts.split():
     assert "node.kernels." + part in names, part
 """
@@ -82,10 +83,10 @@ ONE_HALF = """
 kernel = numba.njit(error_model="numpy")
 @kernel
 def clean(x):
-    return mul(x, 1 << 30) + (x >> 1) // 3
+    return multiply_q31(x, 1 << 30) + (x >> 1) // 3
 @kernel
 def leaky(x):
-    return mul(x, 1 << 30) + int((x >> 1) * 0.5)
+    return multiply_q31(x, 1 << 30) + int((x >> 1) * 0.5)
 @kernel
 def divided(x):
     return int(x / 2)
@@ -97,7 +98,7 @@ for function in (clean, leaky, divided):
 
 FLOATS_ONLY = """
 import numba
-from node.kernels.arithmetic.angles import HALF_TURN, wrap
+from node.kernels.arithmetic.angles import HALF_TURN, wrap_angle
 from node.kernels.arithmetic.compiler import ConstantType
 
 def refuse(_):
