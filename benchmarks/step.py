@@ -92,7 +92,7 @@ class String:
             )
             for k, one in enumerate(settings)
         ]
-        self.crews = np.concatenate([tube.crew for tube in self.tubes])
+        self.crews = np.concatenate([tube.settings_record for tube in self.tubes])
         self.places = np.arange(tubes)[::-1].copy()
 
 

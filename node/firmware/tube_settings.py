@@ -115,22 +115,25 @@ def require_setting(condition: bool, message: str) -> None:
 def settings_record(settings: TubeSettings, configs: Array) -> Array:
     """Settings as the step reads them, one record of dtype ``SETTINGS``; ``configs`` is the node's configuration."""
     made = np.zeros(1, SETTINGS)
-    crew, limits = made[0], settings.limits
-    crew["drive_angle"], crew["drive_var"] = settings.drive_joint.angle, settings.drive_joint.std**2
-    crew["lower_angle"], crew["lower_var"] = settings.lower_joint.angle, settings.lower_joint.std**2
-    crew["unseen_var"] = settings.unseen_std**2
-    crew["scheme"], crew["state_every"] = int(settings.scheme), settings.state_every
-    crew["torsion_gate"], crew["joints"] = int(settings.torsion == "gate"), get_args(JointRule).index(settings.joints)
-    crew["stamp_walk"] = configs["stamp_walk"][0]
+    record, limits = made[0], settings.limits
+    record["drive_angle"], record["drive_var"] = settings.drive_joint.angle, settings.drive_joint.std**2
+    record["lower_angle"], record["lower_var"] = settings.lower_joint.angle, settings.lower_joint.std**2
+    record["unseen_var"] = settings.unseen_std**2
+    record["scheme"], record["state_every"] = int(settings.scheme), settings.state_every
+    record["torsion_gate"], record["joints"] = (
+        int(settings.torsion == "gate"),
+        get_args(JointRule).index(settings.joints),
+    )
+    record["stamp_walk"] = configs["stamp_walk"][0]
     for name in ("stiffness", "aiding_old_after"):
-        crew[name] = getattr(settings, name)
+        record[name] = getattr(settings, name)
     count = len(settings.imus)
-    crew["imus"], crew["tilt_noise"] = count, configs["force_std"][0] / configs["gravity"][0]
-    crew["place"][:count] = [imu.offset for imu in settings.imus]
-    crew["noise"][:count] = [imu.noise for imu in settings.imus]
-    crew["weight"][:count] = np.array([imu.noise for imu in settings.imus]) ** -2.0
+    record["imus"], record["tilt_noise"] = count, configs["force_std"][0] / configs["gravity"][0]
+    record["place"][:count] = [imu.offset for imu in settings.imus]
+    record["noise"][:count] = [imu.noise for imu in settings.imus]
+    record["weight"][:count] = np.array([imu.noise for imu in settings.imus]) ** -2.0
     for name in ("gyro_noise", "bias_std", "force_std"):
-        crew[f"plain_{name}"] = configs[name][0]
+        record[f"plain_{name}"] = configs[name][0]
     for name in ("rate_range", "force_range", "repeats_together", "repeats_alone"):
-        crew[name] = getattr(limits, name)
+        record[name] = getattr(limits, name)
     return made

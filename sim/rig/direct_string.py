@@ -137,7 +137,7 @@ class DirectString:
         stated = clocks.joint_std_ms if clocks.stated_std_ms is None else clocks.stated_std_ms
         self._clock_var = (1e-3 * stated) ** 2 * np.arange(1, count + 1)  # s^2, by hops
         self._adds = [phase for phase in world.phases if phase.kind == "add"]
-        self._crews = np.concatenate([tube.crew for tube in self.tubes.values()])
+        self._crews = np.concatenate([tube.settings_record for tube in self.tubes.values()])
         self.clock_shifts: dict[int, float] = {}
         self._mount_var = math.radians(self._file.joints.mount_std_deg) ** 2
         self._runs_together = spoil is None and self._imus == 1 and self._file.node.kernel in BY_ADDRESS

@@ -159,7 +159,7 @@ def test_the_sensor_off_the_axis_needs_its_place_to_be_known() -> None:
     errors = []
     for offset in ((0.0, 0.0), (radius, 0.0)):
         bored = Bored(tilt=(0.0, 0.0))
-        bored.tube._crew[0]["place"][0] = offset
+        bored.tube._settings_record[0]["place"][0] = offset
         bored.ordered("circle", 5.0)
         for _ in range(math.ceil(5.1 * math.tau / rate / PERIOD) + 4):
             wx, wy, wz, fx, fy, fz = bored.reading(rate)

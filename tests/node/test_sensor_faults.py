@@ -346,11 +346,11 @@ def test_a_growth_over_half_a_turn_is_that_of_the_shorter_way() -> None:
 
 def test_one_knock_is_no_fault_of_the_accelerometer() -> None:
     limits = SensorLimits()
-    crew = settings_record(TubeSettings(1, limits=limits), default_config())[0]
+    record = settings_record(TubeSettings(1, limits=limits), default_config())[0]
     watch = new_node(default_config())[0]["guard"]["readings"]
 
     def faults(rate: list[float], force: list[float], saturated: int = 0) -> tuple[int, int]:
-        return find_faults(watch, crew, np.array(rate), np.array(force), saturated)
+        return find_faults(watch, record, np.array(rate), np.array(force), saturated)
 
     limit = limits.force_range
     rates = [[1e-4 * k, 2e-4 * k, 3e-4 * k] for k in range(9)]

@@ -38,9 +38,9 @@ def aidings(draw: st.DrawFn) -> Aiding:
 
 def through(aiding: Aiding, number: int, passed: PassedTube) -> Aiding:
     """What a living tube hands down of an aiding."""
-    crew = TubeSettings(number, drive_joint=passed.drive_joint, lower_joint=passed.lower_joint, stiffness=STIFFNESS)
+    settings = TubeSettings(number, drive_joint=passed.drive_joint, lower_joint=passed.lower_joint, stiffness=STIFFNESS)
     config = default_config()
-    tube = Tube(crew, config, new_node(config), lambda: 1, restored=False)
+    tube = Tube(settings, config, new_node(config), lambda: 1, restored=False)
     onward = tube.on_aiding(aiding, aiding.valid_at)
     assert onward is not None
     return onward

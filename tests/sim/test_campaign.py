@@ -71,7 +71,9 @@ def test_what_a_rig_gives_its_nodes_gives_the_same_nodes_here_bit_for_bit() -> N
     string.drill()
     rows = np.array(heard.rows, GIVEN)
     assert {CYCLE, HEARD} == set(rows["kind"].tolist())
-    crews, corrections = zip(*((tube._crew, tube._corrections) for tube in string.tubes.values()), strict=True)
+    crews, corrections = zip(
+        *((tube._settings_record, tube._corrections) for tube in string.tubes.values()), strict=True
+    )
     again = before.copy()
     taken = (np.array(heard.readings), np.array(heard.moments), np.array(heard.aidings))
     tables = (np.concatenate(crews), np.stack(corrections))

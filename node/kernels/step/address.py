@@ -32,9 +32,9 @@ def firmware_addresses(kernel: str = "float64") -> tuple[ByAddress, ByAddress]:
 
 
 def _by_address(step: Any, aid: Any, *integers: Any) -> tuple[ByAddress, ByAddress]:
-    nodes, crews = new_node(default_config()), np.zeros(1, SETTINGS)
+    nodes, settings = new_node(default_config()), np.zeros(1, SETTINGS)
     corrections = np.concatenate([identity_parameters()] * 2)
     return (
-        ByAddress(step, nodes, crews, corrections, np.zeros((1, READING)), np.zeros(MOMENT), *integers),
-        ByAddress(aid, nodes, crews, np.zeros(AIDING), *integers),
+        ByAddress(step, nodes, settings, corrections, np.zeros((1, READING)), np.zeros(MOMENT), *integers),
+        ByAddress(aid, nodes, settings, np.zeros(AIDING), *integers),
     )

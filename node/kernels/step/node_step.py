@@ -148,11 +148,11 @@ def begin_step(nodes: Array, settings: Array, parameters: Array, readings: Array
 
     Returns ``REFUSED``, and the step ends here, or what ``end_step`` is to be told: whether the survey waits.
     """
-    node, crew = nodes[0], settings[0]
+    node, node_settings = nodes[0], settings[0]
     if not admits_cycle(node, moment[START], moment[END]):
         return REFUSED
-    saturated = take_readings(node, crew, parameters, readings, moment[END] - moment[START])
-    return before_loop(node, crew, moment, saturated)
+    saturated = take_readings(node, node_settings, parameters, readings, moment[END] - moment[START])
+    return before_loop(node, node_settings, moment, saturated)
 
 
 @kernel
@@ -166,11 +166,11 @@ def end_step(nodes: Array, settings: Array, moment: Array, status: int, waits: i
 @kernel
 def conclude_cycle(nodes: Array, settings: Array, moment: Array) -> int:
     """What comes after the cycle was judged: alignment, offsets of the IMUs, and what there is to say."""
-    node, crew = nodes[0], settings[0]
-    follow_alignment(node, crew, moment[START], moment[END])
-    if crew.imus > 1 and is_quiet(node):
-        learn_offsets(node, crew)
-    return report_cycle(node, crew, moment)
+    node, node_settings = nodes[0], settings[0]
+    follow_alignment(node, node_settings, moment[START], moment[END])
+    if node_settings.imus > 1 and is_quiet(node):
+        learn_offsets(node, node_settings)
+    return report_cycle(node, node_settings, moment)
 
 
 @kernel
@@ -356,14 +356,14 @@ def aiding_around(offer_aiding: Callable[..., int], nodes: Array, settings: Arra
 @kernel
 def take_aiding(nodes: Array, settings: Array, aiding: Array) -> int:
     """Gate an aiding, and leave this node's offset and systematic variance in its record; ``USED`` and ``ONWARD``."""
-    node, crew = nodes[0], settings[0]
+    node, node_settings = nodes[0], settings[0]
     from_drive = aiding[A_HOPS] == 0
-    node.down_offset = wrap_angle(aiding[A_OFFSET] + (crew.drive_angle if from_drive else 0))
-    node.down_systematic = bounded_variance(aiding[A_SYSTEMATIC] + (crew.drive_var if from_drive else 0))
-    node.down_torsion = reaching_var(aiding[A_TORSION], aiding[A_TORQUE], crew.stiffness)
-    follow_joints(node, crew, aiding)
-    used = gate_aiding(node, aiding) and gate_twist(node, crew, aiding)
-    return (USED if used else 0) | (ONWARD if crew.scheme == FORWARD else 0)
+    node.down_offset = wrap_angle(aiding[A_OFFSET] + (node_settings.drive_angle if from_drive else 0))
+    node.down_systematic = bounded_variance(aiding[A_SYSTEMATIC] + (node_settings.drive_var if from_drive else 0))
+    node.down_torsion = reaching_var(aiding[A_TORSION], aiding[A_TORQUE], node_settings.stiffness)
+    follow_joints(node, node_settings, aiding)
+    used = gate_aiding(node, aiding) and gate_twist(node, node_settings, aiding)
+    return (USED if used else 0) | (ONWARD if node_settings.scheme == FORWARD else 0)
 
 
 @kernel
@@ -375,6 +375,6 @@ def own_systematic(node: Any) -> float:
 @kernel
 def hand_down(nodes: Array, settings: Array) -> None:
     """Add the joint below to what the record hands down."""
-    node, crew = nodes[0], settings[0]
-    node.down_offset = wrap_angle(node.down_offset + crew.lower_angle)
-    node.down_systematic = bounded_variance(node.down_systematic + crew.lower_var)
+    node, node_settings = nodes[0], settings[0]
+    node.down_offset = wrap_angle(node.down_offset + node_settings.lower_angle)
+    node.down_systematic = bounded_variance(node.down_systematic + node_settings.lower_var)

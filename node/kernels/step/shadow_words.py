@@ -68,12 +68,12 @@ def learn_node(nodes: Array, settings: Array, integers: Array) -> None:
         words[FILTER_AT : FILTER_AT + STATE_WORDS],
         words[CONFIG_AT : CONFIG_AT + CONFIG_WORDS],
     )
-    crew = settings.view(np.int64)
-    if met == 0 or words_differ(own.read_settings, crew):
-        copy_words(own.read_settings, crew)
+    given = settings.view(np.int64)
+    if met == 0 or words_differ(own.read_settings, given):
+        copy_words(own.read_settings, given)
         made = inside[SETTINGS_INSIDE : SETTINGS_INSIDE + SETTINGS_WORDS]
         floats = settings.view(np.float64)
-        learn_words(own.node.filter, made, crew, floats, SETTINGS_SCALES, SETTINGS_POWERS, own.gravity)
+        learn_words(own.node.filter, made, given, floats, SETTINGS_SCALES, SETTINGS_POWERS, own.gravity)
     last = (END_AT if met == 0 else ALIGNER_AT if settings[0].imus > 1 else CLUSTER_AT) - AROUND_AT
     around, floats = words[AROUND_AT:END_AT], nodes.view(np.float64)[AROUND_AT:END_AT]
     made = inside[INSIDE : INSIDE + END_AT - AROUND_AT]

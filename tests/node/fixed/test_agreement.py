@@ -231,13 +231,13 @@ def in_parts(loop: Loop, leave: Callable[..., int] = end_step) -> Loop:
 def integers_in_parts(loop: Loop) -> Loop:
     """The step and the aiding of the integers, called part by part from Python over their own record."""
     integers = new_integers()
-    nodes, crews, own = integers["node"], integers["settings"], integers[0]
+    nodes, own_settings, own = integers["node"], integers["settings"], integers[0]
 
     def step(shadows: Array, settings: Array, parameters: Array, readings: Array, moment: Array) -> int:
         learn_node(shadows, settings, integers)
         learn_inputs(parameters, readings, moment, integers)
         waits, node, times = (
-            begin_step(nodes, crews, own["parameters"], own["readings"], own["moment"]),
+            begin_step(nodes, own_settings, own["parameters"], own["readings"], own["moment"]),
             nodes[0],
             own["moment"],
         )
@@ -246,20 +246,20 @@ def integers_in_parts(loop: Loop) -> Loop:
         else:
             reading = node["rate"], node["force"], int(times[START]), int(times[END]), int(times[JOINED])
             status = fixed_run_cycle(node["filter"], node["config"], *reading)
-            says = end_step(nodes, crews, times, int(status), waits)
+            says = end_step(nodes, own_settings, times, int(status), waits)
         show_node(shadows, settings, integers, True)
         return int(says)
 
     def aiding(shadows: Array, settings: Array, given: Array) -> int:
         learn_node(shadows, settings, integers)
         learn_aiding(given, integers)
-        node, taken, gates = nodes[0], own["aiding"].tolist(), take_aiding(nodes, crews, own["aiding"])
+        node, taken, gates = nodes[0], own["aiding"].tolist(), take_aiding(nodes, own_settings, own["aiding"])
         if gates & USED:
             yaw, yaw_var, _, _, _, valid_at, sequence, hops, *_ = taken
             about = own_systematic(node), int(node["down_offset"]), valid_at, sequence, hops
             node["noticed"] |= offer_aiding(node["filter"], node["config"], yaw, yaw_var + noise_var(node), *about)
         if gates & ONWARD:
-            hand_down(nodes, crews)
+            hand_down(nodes, own_settings)
         show_node(shadows, settings, integers, False)
         return int(gates)
 

@@ -63,9 +63,9 @@ from node.kernels.record.integer_node import new_integers
 from node.kernels.step.fixed_step import integer_aiding, integer_step
 
 integers = new_integers()
-nodes, crews, own = integers["node"], integers["settings"], integers[0]
-integer_step(nodes, crews, own["parameters"], own["readings"], own["moment"])
-integer_aiding(nodes, crews, own["aiding"])
+nodes, settings, own = integers["node"], integers["settings"], integers[0]
+integer_step(nodes, settings, own["parameters"], own["readings"], own["moment"])
+integer_aiding(nodes, settings, own["aiding"])
 names = set()
 for function in functions():
     where = f"{function.__module__}.{function.__name__}"
