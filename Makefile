@@ -61,7 +61,7 @@ bounds: $(STAMP)  ## the tests of the kernels with every index checked
 kernels: kernels-of-floats kernels-of-integers  ## compile what the tests would compile, each worker for itself
 
 # those in integers take longest and begin at once; what the others import is compiled once, before them
-kernels-of-floats: bytecode  ## those of a node, as it is and as published, of strings and of surveys
+kernels-of-floats: bytecode  ## those of a node, of the published form, of strings and of surveys
 	$(BIN)/python tests/tools/compile_kernels.py floats
 
 kernels-of-integers: $(STAMP)  ## those of a node in integers

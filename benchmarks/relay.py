@@ -16,9 +16,9 @@ from pathlib import Path
 from typing import Any
 
 from borechain.load.rounds import compare_rounds
-from node.kernels.step.warm import warm_up
+from node.kernels.step.precompile import warm_up
 from node.process.drivers.timed import TimedImu
-from node.process.host import run_node
+from node.process.node_host import run_node
 from sim.rig.realtime import clock_offset
 from sim.world.recording import record, turning_once
 from sim.world.world import World

@@ -18,7 +18,7 @@ from borechain.rig_host import depth_sealer
 from groundstation.config import GroundConfig
 from groundstation.service.process.ground_process import GroundProcess
 from node.process.encoder_process import EncoderProcess
-from node.process.host import seals_at
+from node.process.node_host import seals_at
 from node.process.tube_process import TubeProcess
 from sim.errors import RigError
 from sim.rig.in_process import Build, InProcessStepper, unwritten

@@ -68,7 +68,7 @@ def run_ground(
 def load_kernels() -> None:
     """Compile what surveys are computed with, or load it, before it says that it lives: no question waits for that."""
     from groundstation.survey.well.kernels.position_errors import warm_up
-    from node.kernels.arithmetic.jit import leave_blas_out
+    from node.kernels.arithmetic.compiler import leave_blas_out
 
     leave_blas_out()
     warm_up()

@@ -17,7 +17,7 @@ class NodeError(BorechainError):
     """Root of every error of this package."""
 
 
-class ConfigurationError(NodeError, InputError, ValueError):
+class NodeConfigurationError(NodeError, InputError, ValueError):
     """A setting is outside its range."""
 
 

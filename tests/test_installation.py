@@ -15,6 +15,7 @@ import shutil
 import signal
 import subprocess
 import sys
+import tomllib
 import zipfile
 from collections.abc import Iterator
 from dataclasses import dataclass
@@ -269,6 +270,26 @@ def test_a_package_of_somebody_else_is_named_with_its_place(tmp_path: Path, name
     assert done.returncode == 1
     assert len(done.stderr.splitlines()) == 1
     assert str(foreign) in done.stderr
+
+
+def test_the_lowest_numba_allowed_does_what_the_kernels_lean_on(tmp_path: Path) -> None:
+    """Of numba's private modules, see ``node.kernels.arithmetic.compiler``; no later one may be the first to do it."""
+    asked = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]["dependencies"]
+    lowest = {needed.name: str(needed.specifier).removeprefix(">=") for needed in map(Requirement, asked)}
+    subprocess.run([sys.executable, "-m", "venv", "--without-pip", tmp_path / "venv"], check=True)
+    made = Environment(tmp_path / "venv" / "bin" / "python", tmp_path)
+    done = pip(made.python, "--only-binary", ":all:", f"numba=={lowest['numba']}", f"numpy>={lowest['numpy']}")
+    if done.returncode:
+        pytest.skip(f"numba {lowest['numba']}: the index has no wheel of it: {done.stderr.strip().splitlines()[-1]}")
+    for distribution in closure(["pytest"], "", {}).values():
+        for top in {file.parts[0] for file in distribution.files or ()} - {"..", "__pycache__"}:
+            (made.site / top).symlink_to(Path(str(distribution.locate_file(top))))
+    options = ("--noconftest", "-c", os.devnull, "-p", "no:cacheprovider", "-W", "ignore::pytest.PytestWarning")
+    tests = ROOT / "tests" / "node" / "test_compiler.py"
+    program = f"import sys; sys.path.insert(0, {str(ROOT)!r}); import numba, pytest; print(numba.__version__); "
+    program += f"sys.exit(pytest.main({[*options, str(tests)]!r}))"
+    done = made.run("-c", program, program=())
+    assert (done.returncode, done.stdout.splitlines()[0]) == (0, lowest["numba"]), done.stdout
 
 
 @pytest.mark.parametrize("version", ["3.12", "3.13"])

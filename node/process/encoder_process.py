@@ -8,7 +8,7 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from node.firmware.encoder import EncoderNode, EncoderSample
+from node.firmware.encoder_node import EncoderNode, EncoderSample
 from node.firmware.torque import TorqueSettings
 from node.process.counter import BootCounter
 from node.process.drivers.source import EncoderSource, SafeEncoder

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from node.firmware.settings import JointRule
+from node.firmware.tube_settings import JointRule
 from node.kernels.arithmetic.formats import PERIOD
 from sim.rig.direct_string import DirectString, StringRun
 from sim.world.scenario import scenario_of

@@ -45,11 +45,7 @@ if TYPE_CHECKING:
     from sim.world.world import World
     from telemetry.media.zenoh_bus import ZenohBus
 
-PRELOAD = {
-    "float64": "borechain.preload",
-    "fixed": "borechain.preload_all",
-    "published": "borechain.preload_all",
-}  # by kernel
+PRELOAD = {"float64": "borechain.preload", "fixed": "borechain.preload_all"}  # by kernel
 
 
 @click.command()
@@ -350,7 +346,7 @@ def process_table(
     """Every process of the rig, one line each; ``steps`` is the socket at which they meet their stepper."""
     from borechain.rig_host import run_medium
     from groundstation.host import run_ground
-    from node.process.host import run_encoder, run_node
+    from node.process.node_host import run_encoder, run_node
     from sim.rig.launcher import private_folder
     from sim.rig.processes import ProcessTable, Spec
     from telemetry.messages import BASE, ENCODER

@@ -18,8 +18,8 @@ import numpy as np
 import numpy.typing as npt
 
 from groundstation.survey.fusion.resolve import direction_angles, resolve_direction
-from node.firmware.alignment import METHODS, angles_of
-from node.firmware.settings import Kernel
+from node.firmware.alignment_orders import METHODS, angles_of
+from node.firmware.tube_settings import Kernel
 from node.kernels.arithmetic.formats import PERIOD
 from node.kernels.record.filter_record import default_config
 from sim.rig.direct_string import DirectString

@@ -17,7 +17,7 @@ import numpy.typing as npt
 
 from groundstation.survey.fusion.resolve import angle_stds, direction_angles, known_direction, resolve_direction
 from groundstation.survey.fusion.transport import carry_directions
-from node.kernels.arithmetic.angles import wrap
+from node.kernels.arithmetic.angles import wrap_angle
 from sim.rig.direct_string import DirectString, StringRun
 from sim.studies.field.cases import ALL, BLOCKS, CASES, DisturbanceCase
 from sim.studies.pool import Step, over_cores, seed_jobs
@@ -117,7 +117,7 @@ def judge_azimuths(world: World, surveys: Sequence[SurveyMeasurement]) -> tuple[
     true = [hole.direction(world.bit_depth(one.station_at))[1] for one in surveys]
     azimuths = [direction_angles(one.lean, one.down)[1] for one in found]
     stds = [angle_stds(one.lean, one.down, one.total_cov)[1] for one in found]
-    return np.array([wrap(a - b) for a, b in zip(azimuths, true, strict=True)]), np.array(stds)
+    return np.array([wrap_angle(a - b) for a, b in zip(azimuths, true, strict=True)]), np.array(stds)
 
 
 def judged_cycles(world: World) -> tuple[Mask, Mask]:

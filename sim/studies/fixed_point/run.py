@@ -14,7 +14,7 @@ from typing import Any
 
 import numpy as np
 
-from node.firmware.settings import Kernel
+from node.firmware.tube_settings import Kernel
 from node.kernels.arithmetic.angles import wrap_positive
 from node.kernels.arithmetic.formats import DEG, PERIOD
 from node.kernels.filter.float64.cycle import run_cycle

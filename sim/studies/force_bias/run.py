@@ -18,7 +18,7 @@ import numpy.typing as npt
 from groundstation.survey.fusion.force_biases import ForceBias, Look, look_of, solve_biases
 from groundstation.survey.fusion.resolve import angle_stds, direction_angles, resolve_direction
 from groundstation.survey.fusion.shared import SharedErrors
-from node.kernels.arithmetic.angles import wrap
+from node.kernels.arithmetic.angles import wrap_angle
 from sim.rig.direct_string import DirectString, Survey
 from sim.studies.pool import Step, over_cores, seed_jobs
 from sim.studies.scenarios import Tables
@@ -113,7 +113,7 @@ def bias_of(world: World, tube: int) -> Array:
 def azimuth_error(world: World, look: Look, bias: Array) -> float:
     """Error (rad) of the azimuth of a survey of a straight hole that is read with a bias (3,) taken off."""
     lean = look.lean - look.by_force @ bias
-    return wrap(direction_angles(lean, 1.0)[1] - world.scenario.hole.direction(0.0)[1])
+    return wrap_angle(direction_angles(lean, 1.0)[1] - world.scenario.hole.direction(0.0)[1])
 
 
 def azimuth_std(look: Look, bias_cov: Array) -> float:

@@ -7,11 +7,11 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from node.firmware.kernel_choice import kernel_of
-from node.firmware.settings import TubeSettings
 from node.firmware.torque import TorqueSettings
+from node.firmware.tube_settings import TubeSettings
+from node.kernels.arithmetic.compiler import leave_blas_out
 from node.kernels.arithmetic.formats import PERIOD
-from node.kernels.arithmetic.jit import leave_blas_out
-from node.kernels.step.warm import warm_encoder, warm_step
+from node.kernels.step.precompile import warm_encoder, warm_step
 from node.process.drivers.source import EncoderSource, ImuSource
 from node.process.encoder_process import EncoderProcess
 from node.process.tube_process import TubeProcess
