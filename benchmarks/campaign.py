@@ -24,7 +24,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numba import njit
 
-from node.kernels.arithmetic.angles import wrap
+from node.kernels.arithmetic.angles import wrap_angle
 from node.kernels.arithmetic.formats import CYCLE_RATE_HZ
 from node.kernels.filter.float64.cycle import run_cycle
 from node.kernels.record.node_record import A_HOPS, A_SEQUENCE, A_SYSTEMATIC, A_VALID, A_YAW, A_YAW_VAR, READING
@@ -83,7 +83,7 @@ def kernels(
             if hops[hop].loses:
                 break
             k = top - 1 - hop
-            offset = wrap(offset + (settings[k].drive_angle if hop == 0 else settings[k + 1].lower_angle))
+            offset = wrap_angle(offset + (settings[k].drive_angle if hop == 0 else settings[k + 1].lower_angle))
             systematic += settings[k].drive_var if hop == 0 else settings[k + 1].lower_var
             offer_aiding(
                 nodes[k].filter,

@@ -91,7 +91,7 @@ class String:
             )
             for k, one in enumerate(settings)
         ]
-        settings = np.concatenate([tube.crew for tube in self.tubes])
+        settings = np.concatenate([tube.settings_record for tube in self.tubes])
         self.arrays = StringNodes(self.nodes, settings, self.corrections)
 
 

@@ -10,9 +10,10 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any, Final, TypeVar, cast
 
-from numba import config, njit
+from numba import njit
 
-from node.kernels.arithmetic.jit import OPTIONS, SourceLocator, folder_digest, known_by_its_sources, source_digest
+from node.kernels.arithmetic.compiler import kept_where
+from node.kernels.arithmetic.jit import OPTIONS, SourceLocator, folder_digest, source_digest
 
 Function = TypeVar("Function", bound=Callable[..., Any])
 ROOMS: Final = tuple(Path(__file__).parent / room for room in ("string", "world"))  # that hold kernels
@@ -32,8 +33,7 @@ class SimLocator(SourceLocator):
 
 def compiled(function: Function, **options: Any) -> Function:
     """Have ``function`` compiled with the node's options and these when it is first called."""
-    with known_by_its_sources():
-        vars(config)["CACHE_LOCATOR_CLASSES"] = f"{__name__}.{SimLocator.__name__}"
+    with kept_where(SimLocator):
         return cast("Function", njit(**OPTIONS | options)(function))
 
 

@@ -18,7 +18,7 @@ import numpy.typing as npt
 from node.firmware.inputs import RigContext
 from node.firmware.reporter import VAR_FLOOR
 from node.firmware.tube import Tube
-from node.kernels.arithmetic.angles import wrap
+from node.kernels.arithmetic.angles import wrap_angle
 from node.kernels.step.node_step import ADMITTED
 from sim.errors import ScenarioError
 from sim.string.drill import drill_string, hand_down, new_memory, no_estimates
@@ -156,7 +156,7 @@ class DirectString:
         run = self.run
         for first in reversed(run.surveys):
             if (first.tube, first.measurement.station_at) == (tube, message.station_at):
-                moved = wrap(message.yaw - first.measurement.yaw)
+                moved = wrap_angle(message.yaw - first.measurement.yaw)
                 run.revisions.append(StringSurvey(first.cycle, tube, first.error + moved, message, cycle))
                 return
         run.surveys.append(StringSurvey(cycle, tube, float(run.total_error[cycle, tube - 1]), message, cycle))
