@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator
-from dataclasses import replace
 
 import numpy as np
 
@@ -13,6 +12,7 @@ from node.firmware.pending_event import PendingEvent
 from node.firmware.settings import TubeSettings
 from node.kernels.angles import from_binary, wrap
 from node.kernels.layout import DEG, Array, Err
+from telemetry.frozen import replace
 from telemetry.messages import (
     Aiding,
     Event,

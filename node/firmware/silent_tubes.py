@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import replace
 
 from node.firmware.settings import Joint, PassedTube
 from node.kernels.angles import wrap
 from node.kernels.twist import reaching_var
+from telemetry.frozen import replace
 from telemetry.messages import Aiding
 
 

@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 import struct
 from collections.abc import Callable, Iterator
-from dataclasses import replace
 
 import numpy as np
 
@@ -38,6 +37,7 @@ from node.kernels.step import (
     is_standing,
 )
 from node.kernels.twist import twist_var
+from telemetry.frozen import replace
 from telemetry.messages import (
     Aiding,
     Event,

@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 import math
-from dataclasses import replace
 from typing import Any
 
 from node.firmware.inputs import ImuReading
 from node.kernels.calibration import USUAL
 from node.kernels.layout import PARTS, PERIOD
 from node.process.drivers.source import NOTHING, ImuSample
+from telemetry.frozen import replace
 
 LEAST, MOST = 6, 10  # numbers of an IMU that does not tell the parts of its cycle
 

@@ -35,6 +35,7 @@ from sim.world.imu_errors import gauss_markov
 from sim.world.scenario_file import AidingSection
 from sim.world.streams import Stream, stream
 from sim.world.world import World
+from telemetry import frozen
 from telemetry.messages import Aiding, Event, Message, NodeState, SurveyMeasurement
 
 Array = npt.NDArray[np.float64]
@@ -339,7 +340,7 @@ class DirectString:
             else:
                 sample = EncoderSample(count, edge_at, bool(rising), torque, earlier=earlier)
                 measured = self._encoder.on_cycle(sample, end)
-            found.append(replace(measured, sequence=cycle) if self._file.aiding.renumbered else measured)
+            found.append(frozen.replace(measured, sequence=cycle) if self._file.aiding.renumbered else measured)
         return found
 
     def _relay(self, cycle: int, string: Sequence[int]) -> None:

@@ -11,17 +11,22 @@ import math
 from collections.abc import Callable, Sequence
 from typing import Any, NamedTuple
 
+from telemetry.presentation.can_checks import check_of
 from telemetry.presentation.can_coders import levels_of, parts_of_one
 from telemetry.presentation.can_forms import Form
 from telemetry.presentation.can_signals import COUNT, ON_STEP, Scale, Signal
-from telemetry.presentation.compiled import RIGHT, compiled
-from telemetry.presentation.fields import codec_of
 from telemetry.quantities import ValueKind
 from telemetry.schema import Field
 
 Packer = Callable[[Sequence[Any], int], list[bytes] | None]  # data of each frame of the values of all fields, a count
 Unpacker = Callable[[Sequence[bytes]], list[Any] | None]  # values of all fields; raises ValueError
 OTHERWISE = "    return None"
+RIGHT = {
+    ValueKind.NUMBER: "type({v}) is float and {low!r} <= {v} <= {high!r}",
+    ValueKind.INTEGER: "type({v}) is int and {low!r} <= {v} <= {high!r}",
+    ValueKind.BOOLEAN: "{v} is True or {v} is False",
+    ValueKind.BINARY: "type({v}) is bytes and {low!r} <= len({v}) <= {high!r}",
+}  # what needs no check
 
 
 class Rounded(NamedTuple):
@@ -55,7 +60,7 @@ def packer_of(fields: Sequence[tuple[Field, Sequence[Signal]]], rounded: Sequenc
         f"({' | '.join(of)}).to_bytes({layout.length}, 'little')" for of, layout in zip(bits, form.layouts, strict=True)
     ]
     space = {f"kind_of_v{k}": field.enumeration for k, (field, _) in enumerate(fields)} | {"log10": math.log10}
-    packer: Packer = compiled([*lines, f"return [{', '.join(data)}]"], space, [], "values, count")
+    packer: Packer = compiled([*lines, f"return [{', '.join(data)}]"], space, "values, count")
     return packer
 
 
@@ -80,8 +85,8 @@ def unpacker_of(fields: Sequence[tuple[Field, Sequence[Signal]]], form: Form) ->
             found.append(f"({', '.join(names)})")
         else:
             found.append(" + ".join(names))
-    codecs = [codec_of(field) for field, _ in fields]
-    unpacker: Unpacker = compiled([*lines, f"return [{', '.join(found)}]"], space, codecs, "frames")
+    space |= {f"check{k}": check_of(field) for k, (field, _) in enumerate(fields) if field.enumeration is not None}
+    unpacker: Unpacker = compiled([*lines, f"return [{', '.join(found)}]"], space, "frames")
     return unpacker
 
 
@@ -173,3 +178,15 @@ def within(name: str, field: Field) -> list[str]:
     """Lines that give up where a value is outside the range of the schema."""
     low = -field.high if field.kind is ValueKind.VECTOR else field.low
     return [f"if not {low!r} <= {name} <= {field.high!r}:", OTHERWISE]
+
+
+def compiled(lines: list[str], space: dict[str, Any], arguments: str) -> Callable[..., Any]:
+    """Function of its lines, which may name ``arguments``, what is in ``space`` and infinity.
+
+    Read signal by signal a message takes three times as long and more, which ``benchmarks/codec.py`` holds.
+    """
+    space["inf"] = math.inf
+    source = f"def function({arguments}):\n" + "\n".join(f"    {line}" for line in lines)
+    exec(compile(source, "<compiled from the schema>", "exec"), space)
+    function: Callable[..., Any] = space["function"]
+    return function

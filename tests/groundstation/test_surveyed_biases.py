@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import json
 import math
-from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -20,6 +19,7 @@ from groundstation.service import key_fields
 from groundstation.service.model import RigModel
 from groundstation.service.surveyed_biases import GRAVITY_STD, surveyed_biases
 from groundstation.survey.force_biases import ForceBias
+from telemetry.frozen import replace
 from telemetry.messages import ImuMean, NodeFlag, SurveyMeasurement
 from telemetry.parameters import ParameterBlock, SensorParameters
 

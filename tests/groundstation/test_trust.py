@@ -1,7 +1,6 @@
 """Every flag of a survey has its stated effect on the fusion, whatever the rest of the survey is."""
 
 import math
-from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -16,6 +15,7 @@ from groundstation.service.model import RigModel
 from groundstation.survey.fusion import Weighting
 from groundstation.survey.resolve import angles, resolve
 from groundstation.survey.trust import EFFECTS, UNKNOWN_YAW_VAR, Trust, trust_of, with_uncertain_yaw, with_unknown_yaw
+from telemetry.frozen import replace
 from telemetry.messages import ImuMean, NodeFlag, SurveyMeasurement
 
 G, DEG, VAR = 9.81, math.pi / 180.0, (0.0034**2) / 32

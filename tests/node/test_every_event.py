@@ -2,7 +2,6 @@
 
 import math
 from collections.abc import Callable
-from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -15,6 +14,7 @@ from node.firmware.tube import Tube
 from node.kernels.events import Code
 from node.kernels.layout import DEG, PERIOD, default_config
 from node.kernels.record import new_node
+from telemetry.frozen import replace
 from telemetry.messages import Aiding, Event
 
 G = 9.81

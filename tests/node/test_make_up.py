@@ -1,7 +1,6 @@
 """The joint that was made up above a node: solved from the yaw it kept, from the marks, or from both."""
 
 import math
-from dataclasses import replace
 
 import pytest
 
@@ -12,6 +11,7 @@ from node.firmware.tube import Tube
 from node.kernels.encoder import QUANTUM
 from node.kernels.layout import DEG, PERIOD, default_config
 from node.kernels.record import forget_session, new_node
+from telemetry.frozen import replace
 from telemetry.messages import Aiding, Event
 
 OLD = 0.05 * DEG  # of the mark between the head and this tube while it was on top

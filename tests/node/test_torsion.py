@@ -1,7 +1,6 @@
 """What a node does about the twist of the string above it: handed on, gated or stated, waited for."""
 
 import math
-from dataclasses import replace
 
 import pytest
 from hypothesis import given, settings
@@ -14,6 +13,7 @@ from node.firmware.settings import Joint, Kernel, TorsionRule, TubeSettings
 from node.firmware.tube import Tube
 from node.kernels.layout import PERIOD, Err, Scheme, default_config
 from node.kernels.record import new_node
+from telemetry.frozen import replace
 from telemetry.messages import Aiding, Event, SurveyMeasurement
 
 STIFFNESS = 17_413.0  # N m/rad, 60/50 mm, 3 m

@@ -1,7 +1,6 @@
 """What a tube says and hands on."""
 
 import math
-from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -13,6 +12,7 @@ from node.firmware.settings import Joint, TubeSettings
 from node.firmware.tube import Tube
 from node.kernels.layout import PERIOD, Scheme, default_config
 from node.kernels.record import new_node
+from telemetry.frozen import replace
 from telemetry.messages import Aiding, Event, Mode, NodeFlag, NodeState, SurveyMeasurement
 
 DRIVE, LOWER = Joint(0.5, 1e-3), Joint(-0.2, 2e-3)

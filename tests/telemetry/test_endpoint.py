@@ -1,7 +1,6 @@
 """A chain of stations over joints with troubles: base, encoder and tubes."""
 
 import math
-from dataclasses import replace
 from typing import Any
 
 import pytest
@@ -12,6 +11,7 @@ from sealed_string import state
 from telemetry.application.endpoint import Endpoint, Received
 from telemetry.application.kinds import PRIORITIES
 from telemetry.application.mail import KEPT_WAIT
+from telemetry.frozen import replace
 from telemetry.media.memory import MemoryPort, joint
 from telemetry.media.port import Frame
 from telemetry.messages import (
