@@ -35,6 +35,7 @@ FORBIDDEN = [
     ("borechain/cli/options.py", "import can"),
     ("node/kernels/layout.py", "import msgpack"),
     ("node/firmware/encoder.py", "import asyncio"),
+    ("node/firmware/inputs.py", "import msgspec"),
 ]
 
 
