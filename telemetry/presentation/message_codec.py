@@ -5,7 +5,7 @@ from __future__ import annotations
 import enum
 import re
 from collections.abc import Callable, Mapping, Sequence
-from functools import cache
+from functools import cache, partial
 from typing import Any, TypeAlias
 
 from msgspec import DecodeError as MsgspecError
@@ -23,7 +23,6 @@ Values: TypeAlias = Sequence[Any]
 # the field that msgspec refuses, in what it says
 NAMED = re.compile(r"required field `(\w+)`|`\$(?:\.(\w+)|\[(\d+)\])")
 REFUSED = (MsgspecError, ValueError, TypeError, RecursionError)  # whatever it raises for bytes
-NO_TEXT = (bytes,)  # it would take text for encoded bytes
 
 
 class MessageCodec:
@@ -45,7 +44,7 @@ class MessageCodec:
         self._structs = {version: struct_of(spec, version) for version in versions}
         self._decoders = {version: Decoder(struct) for version, struct in self._structs.items()}
         self._widths = {version: sum(since <= version for since in sinces) for version in versions}
-        self._checked = struct_of(spec, spec.newest, as_list=True)
+        self._check: Callable[[Values], Struct] = check_of_values(spec)
         self._newer = [(k, f.since, f.before) for k, f in reversed([*enumerate(spec.fields)]) if f.since > 1]
         self._before = {v: tuple(f.before for f in spec.fields if f.since > v) for v in versions}
         self._makers = [(place, make) for place, field in enumerate(spec.fields) if (make := maker_of(field))]
@@ -61,11 +60,11 @@ class MessageCodec:
         """
         values = astuple(message)
         try:
-            return astuple(convert(values, self._checked, from_attributes=True, builtin_types=NO_TEXT))
+            return astuple(self._check(values))
         except ValidationError:
             pass  # it may be of a type derived from the right one
         try:
-            return astuple(convert(plain(values), self._checked, builtin_types=NO_TEXT))
+            return astuple(self._check(plain(values)))
         except ValidationError as error:
             raise EncodeError(f"{self.name}: {named(error, self._names)}") from error
 
@@ -100,6 +99,17 @@ class MessageCodec:
         return 1, self._structs[1](*values[: self._widths[1]])
 
 
+def check_of_values(spec: MessageSpec) -> Callable[[Values], Struct]:
+    """Function from the values of all fields of a message to a struct of them, checked; each option takes its time."""
+    kinds = {field.kind for field in spec.fields}
+    options: dict[str, Any] = {"type": struct_of(spec, spec.newest, as_list=True)}
+    if ValueKind.BINARY in kinds:
+        options["builtin_types"] = (bytes,)  # else it takes text for encoded bytes
+    if kinds & {ValueKind.IMUS, ValueKind.STANDS}:
+        options["from_attributes"] = True
+    return partial(convert, **options)
+
+
 def maker_of(field: Field) -> Callable[[Any], Any] | None:
     """Function from what comes on the wire to a value of the message, where that is another one."""
     if field.enumeration is not None and issubclass(field.enumeration, enum.Flag):
@@ -120,7 +130,8 @@ def stands_of(stands: tuple[Any, ...]) -> tuple[Stand, ...]:
 def named(error: Exception, keys: Mapping[str, str]) -> str:
     """What is wrong, after the name of the field that it is wrong with, of those that stand under ``keys``."""
     found = NAMED.search(str(error))
-    return f"{keys[found[found.lastindex or 0]]}: {error}" if found else str(error)
+    key = found[found.lastindex or 0] if found else None
+    return f"{keys.get(key, key)}: {error}" if key else str(error)
 
 
 def plain(value: Any) -> Any:
