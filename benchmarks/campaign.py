@@ -25,19 +25,19 @@ import numpy as np
 from numba import njit
 
 from node.firmware.block_trial import record_of
-from node.kernels.address import firmware
-from node.kernels.angles import wrap
-from node.kernels.cycle import run_cycle
-from node.kernels.layout import CYCLE_RATE_HZ, PERIOD
-from node.kernels.record import A_HOPS, A_SEQUENCE, A_SYSTEMATIC, A_VALID, A_YAW, A_YAW_VAR, READING
-from node.kernels.relay import offer_aiding
+from node.kernels.arithmetic.angles import wrap
+from node.kernels.arithmetic.formats import CYCLE_RATE_HZ, PERIOD
+from node.kernels.filter.float64.cycle import run_cycle
+from node.kernels.record.node_record import A_HOPS, A_SEQUENCE, A_SYSTEMATIC, A_VALID, A_YAW, A_YAW_VAR, READING
+from node.kernels.step.address import firmware
+from node.kernels.string.relay import offer_aiding
 from sim.campaign.chunk import RUNS, Campaign, run_chunk
 from sim.campaign.course import Course
 from sim.campaign.draws import Draws, draws_of, fresh_nodes, noise_of, tubes_of
 from sim.campaign.drill import CODES, STATE_OF, SURVEY, drill
 from sim.campaign.sensors import Work, draw, new_work, read_sensors
 from sim.rig.encoder_course import measured_of
-from sim.studies.epochs import resting
+from sim.studies.epochs import resting_string
 from sim.world.scenario import Scenario, load_scenario, scenario_of
 from sim.world.world import World
 from telemetry.parameters import ParameterBlock
@@ -221,7 +221,7 @@ def command_time(runs: int) -> tuple[float, float]:
 
 def long_string() -> tuple[float, float]:
     """Processor's seconds of one run of a string of ``LONG`` tubes, and the rig's seconds in it."""
-    campaign = Campaign(scenario_of(dict(resting(LONG))))
+    campaign = Campaign(scenario_of(dict(resting_string(LONG))))
     campaign.run(SEED)
     course = campaign.course
     return statistics.median(spent(lambda: campaign.run(SEED)) for _ in range(3)), len(course.ends) / CYCLE_RATE_HZ

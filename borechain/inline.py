@@ -13,10 +13,10 @@ from functools import partial
 from pathlib import Path
 from typing import Any
 
-from borechain.host import depth_sealer
 from borechain.rare_collection import rare_collection
+from borechain.rig_host import depth_sealer
 from groundstation.config import GroundConfig
-from groundstation.service.process import GroundProcess
+from groundstation.service.process.ground_process import GroundProcess
 from node.process.encoder_process import EncoderProcess
 from node.process.host import seals_at
 from node.process.tube_process import TubeProcess

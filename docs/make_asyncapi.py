@@ -11,8 +11,8 @@ DOCS = Path(__file__).parent
 sys.path[:0] = [str(DOCS.parent)]
 
 from borechain import __version__  # noqa: E402
-from groundstation.service.answers import object_schema  # noqa: E402
-from groundstation.service.paths import FIXED, MEMBERS  # noqa: E402
+from groundstation.service.answers.answer_fields import object_schema  # noqa: E402
+from groundstation.service.answers.paths import FIXED, MEMBERS  # noqa: E402
 from telemetry import keys  # noqa: E402
 
 PUBLISHED = {

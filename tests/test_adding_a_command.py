@@ -29,7 +29,7 @@ import json, sys
 from pathlib import Path
 from groundstation.config import GroundConfig
 from groundstation.errors import SelectorError
-from groundstation.service.process import GroundProcess
+from groundstation.service.process.ground_process import GroundProcess
 from node.firmware.settings import TubeSettings
 from node.process.tube_process import TubeProcess
 folder = Path(sys.argv[1])

@@ -28,7 +28,7 @@ from borechain.client import (
     shaped,
 )
 from groundstation.gateway.page.settings import PageSettings
-from groundstation.service import key_fields
+from groundstation.service.answers import key_fields
 from telemetry.media.zenoh_bus import open_client
 
 pytestmark = pytest.mark.slow

@@ -12,7 +12,7 @@ import numpy.typing as npt
 
 from groundstation.calibration.attitudes import least_squares, rank_of
 from groundstation.calibration.errors import CalibrationError
-from groundstation.survey.resolve import is_covariance
+from groundstation.survey.fusion.resolve import is_covariance
 
 Array = npt.NDArray[np.float64]
 SHORTEST_SPAN = 10.0  # K; a slope from less is noise times a long lever
@@ -57,7 +57,7 @@ class TemperatureFit:
         return float(np.sqrt(np.mean(self.residuals**2)))
 
 
-def fit(
+def fit_temperature_polynomials(
     truth: Array,
     readings: Array,
     temperature: Array,

@@ -13,12 +13,20 @@ import msgpack
 import orjson
 
 from groundstation.errors import GroundError, SelectorError
-from groundstation.service.intake import BEGIN, Intake, pack_intake
-from groundstation.service.model import RigModel
-from groundstation.service.orders import Order
-from groundstation.service.paths import LONGEST_NUMBER, PATTERNS, Path, check_parameters, find, is_of_the_hole, paths
-from groundstation.service.process import BEATS, GroundProcess
-from groundstation.service.views import Parameters
+from groundstation.service.answers.model import RigModel
+from groundstation.service.answers.paths import (
+    LONGEST_NUMBER,
+    PATTERNS,
+    Path,
+    check_parameters,
+    find,
+    is_of_the_hole,
+    paths,
+)
+from groundstation.service.answers.views import Parameters
+from groundstation.service.orders.order_book import Order
+from groundstation.service.process.ground_process import BEATS, GroundProcess
+from groundstation.service.process.intake_tape import BEGIN, Intake, pack_intake
 from telemetry import keys
 from telemetry.errors import TelemetryError
 from telemetry.media.zenoh_bus import JSON, MSGPACK, Publisher, Query, ZenohBus

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from node.kernels.calibration import USUAL
+from node.kernels.sensors.correction import USUAL
 from telemetry.frozen import Frozen
 from telemetry.messages import EPOCH_UNKNOWN
 

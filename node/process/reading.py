@@ -6,8 +6,9 @@ import math
 from typing import Any
 
 from node.firmware.inputs import ImuReading
-from node.kernels.calibration import USUAL
-from node.kernels.layout import PARTS, PERIOD
+from node.kernels.arithmetic.formats import PERIOD
+from node.kernels.record.filter_record import PARTS
+from node.kernels.sensors.correction import USUAL
 from node.process.drivers.source import NOTHING, ImuSample
 from telemetry.frozen import replace
 

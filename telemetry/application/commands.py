@@ -1,8 +1,8 @@
 """What an operator may order: one line a command, read by the node, the ground station and the documentation.
 
 To add a command, add its line to ``COMMANDS`` and a method of its name: to ``node.process.command_handlers`` for one
-that a tube obeys, to ``groundstation.service.operator`` for one that the ground station obeys itself. Values are SI
-and radians; an operator reads and writes them with the unit in the name (``pitch_deg``).
+that a tube obeys, to ``groundstation.service.process.operator_access`` for one that the ground station obeys itself.
+Values are SI and radians; an operator reads and writes them with the unit in the name (``pitch_deg``).
 """
 
 from __future__ import annotations

@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Any
 
 from groundstation.config import GroundConfig
-from groundstation.service.process import GroundProcess
+from groundstation.service.process.ground_process import GroundProcess
 from telemetry.application.depth_source import DepthSource
 from telemetry.application.endpoint import Endpoint
 from telemetry.messages import ImuMean, Mode, NodeFlag, NodeState, Side, SurveyMeasurement

@@ -9,8 +9,8 @@ from typing import Any
 import numpy as np
 
 from groundstation.config import GroundConfig
-from groundstation.service.orders import Order
-from groundstation.service.process import GroundProcess
+from groundstation.service.orders.order_book import Order
+from groundstation.service.process.ground_process import GroundProcess
 from node.firmware.sensor_limits import SensorLimits
 from node.firmware.settings import TubeSettings
 from node.process.encoder_process import EncoderProcess

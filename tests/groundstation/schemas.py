@@ -5,9 +5,9 @@ from typing import Any
 
 import jsonschema
 
-from groundstation.service.answers import Fields, object_schema
-from groundstation.service.model import RigModel
-from groundstation.service.paths import paths
+from groundstation.service.answers.answer_fields import Fields, object_schema
+from groundstation.service.answers.model import RigModel
+from groundstation.service.answers.paths import paths
 
 
 @functools.cache

@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from groundstation.service.alarms import Alarm, AlarmList
-from groundstation.survey.columns import Deviation
+from groundstation.service.hole.deviation_alarms import Alarm, AlarmList
+from groundstation.survey.wall.column_deviation import Deviation
 
 
 def at(used: float, md: float = 10.0) -> Deviation:

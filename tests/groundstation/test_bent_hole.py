@@ -15,8 +15,8 @@ from test_model import survey
 from borechain.cli.rig.ground_settings import ground_settings
 from borechain.inline import InlineRig
 from groundstation.config import GroundConfig
-from groundstation.service import measurement_views, views
-from groundstation.service.model import RigModel
+from groundstation.service.answers import measurement_views, views
+from groundstation.service.answers.model import RigModel
 from sim.world.scenario import scenario_of
 from sim.world.world import World
 from telemetry.messages import SurveyMeasurement

@@ -12,8 +12,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from groundstation.errors import SelectorError, StoreError
-from groundstation.service.alarm_record import DamagedAlarmError, alarm_of_text, alarm_to_text
-from groundstation.service.crew_alarms import (
+from groundstation.service.alarms.crew_alarms import (
     DELAYS,
     OPEN_AT_MOST,
     SETTLED_AFTER,
@@ -23,8 +22,9 @@ from groundstation.service.crew_alarms import (
     State,
     Times,
 )
-from groundstation.service.rig_alarms import Level
-from groundstation.service.store import Store
+from groundstation.service.alarms.rig_alarms import Level
+from groundstation.service.disk.alarm_record import DamagedAlarmError, alarm_of_text, alarm_to_text
+from groundstation.service.disk.ground_store import Store
 
 UTC = 1.8e9
 CLOCK = Condition("clock", "tube 3", Level.BAD, "its rig time is 2.0 s ahead")

@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from groundstation.service.depth import DepthLog, Track
+from groundstation.service.string.depth import DepthLog, Track
 from telemetry.application.depth_source import DepthSource
 from telemetry.errors import EncodeError
 from telemetry.messages import DepthReading, Stand

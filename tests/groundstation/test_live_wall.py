@@ -12,8 +12,8 @@ from hand_fed import Rig
 from borechain.api import wall as judged_wall
 from groundstation.config import GroundConfig
 from groundstation.errors import SurveyError
-from groundstation.service.model import RigModel
-from groundstation.service.wall_views import stations_of
+from groundstation.service.answers.model import RigModel
+from groundstation.service.answers.wall_views import stations_of
 
 pytestmark = pytest.mark.slow
 

@@ -3,7 +3,7 @@
 from hypothesis import given
 from hypothesis import strategies as st
 
-from groundstation.service.numbers import Numbers
+from groundstation.service.string.message_numbers import Numbers
 from telemetry.application.series import SERIES_SHIFT
 
 

@@ -8,9 +8,9 @@ from memory_rig import Rig
 
 from groundstation.config import GroundConfig
 from groundstation.errors import SelectorError
-from groundstation.service.operator import ANSWERED_WITHIN, OPEN_AT_MOST
-from groundstation.service.orders import KEPT, Order, OrderBook, OrderState
-from groundstation.service.process import GroundProcess
+from groundstation.service.orders.order_book import KEPT, Order, OrderBook, OrderState
+from groundstation.service.process.ground_process import GroundProcess
+from groundstation.service.process.operator_access import ANSWERED_WITHIN, OPEN_AT_MOST
 from telemetry.application.commands import find_command
 from telemetry.messages import BASE
 from telemetry.parameters import ParameterBlock, SensorParameters

@@ -11,9 +11,9 @@ from hypothesis import strategies as st
 from test_model import Placed, passes
 
 from groundstation.config import GroundConfig
-from groundstation.service import measurement_views, views
-from groundstation.service.model import RigModel
-from groundstation.service.paths import FIXED, header
+from groundstation.service.answers import measurement_views, views
+from groundstation.service.answers.model import RigModel
+from groundstation.service.answers.paths import FIXED, header
 from telemetry.frozen import replace
 from telemetry.messages import NodeFlag
 

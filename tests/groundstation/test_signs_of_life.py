@@ -8,8 +8,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from groundstation.config import GroundConfig
-from groundstation.service.model import RigModel
-from groundstation.service.process import GroundProcess
+from groundstation.service.answers.model import RigModel
+from groundstation.service.process.ground_process import GroundProcess
 from telemetry.frozen import replace
 from telemetry.messages import EPOCH_UNKNOWN, Mode, NodeFlag, NodeState, Side
 

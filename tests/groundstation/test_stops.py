@@ -4,10 +4,10 @@ import math
 
 import pytest
 
-from groundstation.service.depth import DepthLog
-from groundstation.service.stands import take_stand, take_survey
-from groundstation.service.stops import Stops
-from groundstation.service.tally import Tally
+from groundstation.service.string.depth import DepthLog
+from groundstation.service.string.stands import take_stand, take_survey
+from groundstation.service.string.stops import Stops
+from groundstation.service.string.tally import Tally
 from telemetry.messages import Stand
 
 DUE = 60.0
@@ -150,7 +150,7 @@ def test_a_string_that_is_met_at_rest_lacks_its_surveys_where_the_encoder_has_st
 
 def test_surveys_are_kept_until_their_stop_is_judged(tally: Tally, monkeypatch: pytest.MonkeyPatch) -> None:
     """The oldest go by halves; a stop of which the surveys are there owes nothing."""
-    monkeypatch.setattr("groundstation.service.stops.SURVEYS_KEPT", 8)
+    monkeypatch.setattr("groundstation.service.string.stops.SURVEYS_KEPT", 8)
     stops = Stops(tally, DUE)
     for stop in range(6):
         for tube in (1, 2):

@@ -14,15 +14,15 @@ from pathlib import Path
 import pytest
 
 from groundstation.errors import StoreError
-from groundstation.service.depth import Doubt
-from groundstation.service.store import Store
+from groundstation.service.disk.ground_store import Store
+from groundstation.service.string.depth import Doubt
 from telemetry.messages import Event, ImuMean, NodeFlag, Severity, Stand, SurveyMeasurement
 
 COV = ((1e-6, 0.0, 0.0), (0.0, 1e-6, 0.0), (0.0, 0.0, 1e-6))
 
 WRITER = """
 import sys
-from groundstation.service.store import Store
+from groundstation.service.disk.ground_store import Store
 from telemetry.messages import Event, Severity
 store = Store(sys.argv[1])
 for sequence in range(1, 100_000):
@@ -34,7 +34,7 @@ for sequence in range(1, 100_000):
 HOARDER = """
 import os, sys
 from borechain.load.crowd import survey_of
-from groundstation.service.store import Store, Stored
+from groundstation.service.disk.ground_store import Store, Stored
 from sim.rig.realtime import footprint
 store = Store(sys.argv[1])
 def fill(stops):
@@ -48,7 +48,7 @@ print(-fill(range(1, 11)) + fill(range(11, 51)))
 OPENER = """
 import os, sys
 from groundstation.errors import StoreError
-from groundstation.service.store import Store
+from groundstation.service.disk.ground_store import Store
 Store("sqlite://").close()  # everything is imported before the rights are given up
 if os.geteuid() == 0:
     os.setuid(65534)

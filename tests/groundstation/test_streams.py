@@ -15,7 +15,7 @@ from schemas import check_answers
 
 from groundstation.errors import SelectorError
 from groundstation.host import answering
-from groundstation.service.paths import paths
+from groundstation.service.answers.paths import paths
 from telemetry.media.zenoh_bus import open_client, open_router
 from telemetry.messages import Event, Severity
 

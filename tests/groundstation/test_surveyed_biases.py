@@ -15,10 +15,10 @@ from schemas import check_answer
 
 from groundstation.config import SENSOR_BIAS_DEG, GroundConfig
 from groundstation.errors import SelectorError
-from groundstation.service import key_fields
-from groundstation.service.model import RigModel
-from groundstation.service.surveyed_biases import GRAVITY_STD, surveyed_biases
-from groundstation.survey.force_biases import ForceBias
+from groundstation.service.answers import key_fields
+from groundstation.service.answers.model import RigModel
+from groundstation.service.orders.surveyed_biases import GRAVITY_STD, surveyed_biases
+from groundstation.survey.fusion.force_biases import ForceBias
 from telemetry.frozen import replace
 from telemetry.messages import ImuMean, NodeFlag, SurveyMeasurement
 from telemetry.parameters import ParameterBlock, SensorParameters

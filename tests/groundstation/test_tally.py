@@ -1,4 +1,4 @@
-from groundstation.service.tally import Tally
+from groundstation.service.string.tally import Tally
 
 
 def test_a_tube_added_at_the_top_leaves_the_depths_of_the_others() -> None:

@@ -10,12 +10,12 @@ from hypothesis import strategies as st
 from schemas import check_answer
 
 from groundstation.config import GroundConfig
-from groundstation.service.key_fields import VERDICT
-from groundstation.service.model import RigModel
-from groundstation.service.rounding import rounded, rounded_std
-from groundstation.service.verdict import WINDS, Doubt, Known, Verdict, Word, direction, judge, wind
-from groundstation.service.verdict_views import line, verdict
-from groundstation.survey.columns import Deviation
+from groundstation.service.alarms.verdict import WINDS, Doubt, Known, Verdict, Word, direction, judge, wind
+from groundstation.service.answers.key_fields import VERDICT
+from groundstation.service.answers.model import RigModel
+from groundstation.service.answers.rounding import rounded, rounded_std
+from groundstation.service.answers.verdict_views import line, verdict
+from groundstation.survey.wall.column_deviation import Deviation
 
 LENGTH, LIMIT = 20.0, 0.45
 CURVATURE = math.radians(0.5)

@@ -6,7 +6,7 @@ from itertools import permutations
 
 import pytest
 
-from groundstation.service.witnesses import Witnesses
+from groundstation.service.alarms.witnesses import Witnesses
 from telemetry.application.series import SERIES_SHIFT
 from telemetry.messages import Event, Scalar, Severity
 

@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 from rigs import running_rig
 
-from groundstation.service.store import Store
-from sim.faults import KillNode
+from groundstation.service.disk.ground_store import Store
+from sim.node_kills import KillNode
 from sim.world.scenario import load_scenario
 from sim.world.world import World
 from telemetry.messages import BASE, ENCODER

@@ -16,7 +16,7 @@ import pytest
 from forked_commands import run as run_forked
 from rigs import REPOSITORY, ends, free_endpoint, run, running_rig, started, titles_of_group
 
-from groundstation.service.store import Store
+from groundstation.service.disk.ground_store import Store
 from telemetry.media.zenoh_bus import open_client
 from telemetry.messages import Event, SurveyMeasurement
 

@@ -23,7 +23,7 @@ from groundstation.gateway.page.guard import GuardMiddleware, RequestError
 from groundstation.gateway.page.hub import Hub
 from groundstation.gateway.page.openapi import document
 from groundstation.gateway.page.settings import PageSettings
-from groundstation.service.process import GroundProcess
+from groundstation.service.process.ground_process import GroundProcess
 
 FILES = Path(__file__).parent / "static"
 

@@ -19,11 +19,11 @@ from groundstation.gateway.page.passwords import DRILLER, LONGEST, is_right
 from groundstation.gateway.page.reports import Reporter
 from groundstation.gateway.page.sessions import Session, Sessions, WrongPasswords, is_from
 from groundstation.gateway.page.settings import PageSettings
-from groundstation.service.csv_tables import table_of
-from groundstation.service.operator import check_name
-from groundstation.service.orders import Order
-from groundstation.service.paths import check_parameters, find
-from groundstation.service.process import GroundProcess
+from groundstation.service.answers.csv_tables import table_of
+from groundstation.service.answers.paths import check_parameters, find
+from groundstation.service.orders.order_book import Order
+from groundstation.service.process.ground_process import GroundProcess
+from groundstation.service.process.operator_access import check_name
 from telemetry.errors import TelemetryError
 
 READERS = 64  # streams at a time

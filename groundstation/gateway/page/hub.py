@@ -15,8 +15,8 @@ from typing import Any
 import orjson
 
 from groundstation.errors import SelectorError
-from groundstation.service.paths import is_of_the_hole
-from groundstation.service.process import HEARTBEAT, GroundProcess
+from groundstation.service.answers.paths import is_of_the_hole
+from groundstation.service.process.ground_process import HEARTBEAT, GroundProcess
 
 PATHS = ("status", "verdict", "string", "column", "history", "uncertainty", "wall", "alarms", "orders")
 NODES, VERDICT = "nodes/", "verdict"

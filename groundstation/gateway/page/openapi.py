@@ -8,9 +8,9 @@ from typing import Any
 
 from groundstation.gateway.page.passwords import ROLES
 from groundstation.gateway.page.reports import SUBJECTS
-from groundstation.service.answers import object_schema
-from groundstation.service.key_fields import HEADER, ORDER
-from groundstation.service.paths import FIXED, MEMBERS, Member, Path
+from groundstation.service.answers.answer_fields import object_schema
+from groundstation.service.answers.key_fields import HEADER, ORDER
+from groundstation.service.answers.paths import FIXED, MEMBERS, Member, Path
 from telemetry.application.arguments import shown_name
 from telemetry.application.commands import COMMANDS, CommandSpec
 from telemetry.quantities import ValueKind

@@ -8,11 +8,11 @@ from datetime import UTC, datetime
 
 from groundstation.errors import GroundError
 from groundstation.gateway.page.guard import RequestError
-from groundstation.service.csv_tables import table_of
-from groundstation.service.live_wall import Neighbourhood
-from groundstation.service.model import RigModel
-from groundstation.service.paths import find
-from groundstation.service.wall_views import stations_of
+from groundstation.service.answers.csv_tables import table_of
+from groundstation.service.answers.model import RigModel
+from groundstation.service.answers.paths import find
+from groundstation.service.answers.wall_views import stations_of
+from groundstation.service.hole.live_wall import Neighbourhood
 
 SUBJECTS = ("wall", "hole")
 REPORT_WITHIN_S = 20.0  # that one takes on a slow machine, the first after a start

@@ -13,7 +13,7 @@ import uvicorn
 from groundstation.gateway.page.application import application
 from groundstation.gateway.page.hub import Hub
 from groundstation.gateway.page.settings import PageSettings
-from groundstation.service.process import GroundProcess
+from groundstation.service.process.ground_process import GroundProcess
 
 CONNECTIONS = 200  # at a time; who comes later is told to come again
 IDLE_S = 10.0  # for which a connection may have no request, or be closing

@@ -1,0 +1,280 @@
+"""What the ground station looks at from time to time: what stands in its model becomes alarms. No I/O."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+from groundstation.service.alarms.witnesses import OFF_BEFORE, Witnesses
+from groundstation.service.answers.model import UNTRUSTED, RigModel
+from groundstation.service.string.depth import CONTRADICTION
+from groundstation.service.string.message_numbers import Range
+from groundstation.survey.fusion.joint_angles import Pair, RestingYaw
+from groundstation.survey.fusion.shared_scale import shared_scale
+from groundstation.survey.fusion.survey_trust import Trust, trust_of
+from telemetry.application.seal_watch import CODE, refusal_of
+from telemetry.application.series import SERIES_SHIFT
+from telemetry.messages import EPOCH_UNKNOWN, Event, Mode, NodeFlag, NodeState, SurveyMeasurement
+
+LOOK_EVERY = 0.5  # s, own clock
+DOUBTING_VAR = math.radians(5.0) ** 2  # rad^2, systematic, of a yaw that may have jumped
+AHEAD = 0.5  # s by which a node's rig time may be ahead of the ground station's
+PLACED_WITHIN = 5.0  # s of rig time after which a survey without a depth is told
+GAP_AFTER = 30.0  # s that a number may be on its way
+ASK_EVERY = 120.0  # s between two orders to send a range again
+ASKED_AT_MOST = 3
+REFUSALS = 3  # readings of the depth refused in a row until that is told
+SENSOR = NodeFlag.SENSOR_FAULT | NodeFlag.YAW_UNTRUSTED | NodeFlag.RATE_EXCEEDED
+AT_REST = (Mode.STILL, Mode.SURVEY)
+OF_THE_DISK = ("saved_state_lost", "boot_counter_lost", "parameters_fallback")
+
+
+@dataclass(slots=True)
+class Gap:
+    """A range of a tube's numbers that has not come."""
+
+    numbers: Range
+    found_at: float  # s, own clock
+    asked_at: float = -math.inf
+    asked: int = 0
+    complete_from: int = 0  # number from which on the tube has kept its surveys
+
+
+class Watch:
+    """Looks at a model and raises its alarms.
+
+    Parameters
+    ----------
+    model : of the rig
+    """
+
+    def __init__(self, model: RigModel) -> None:
+        self._model = model
+        self._alarms = model.rig_alarms
+        self._looked_at = -math.inf
+        self._refused_in_a_row = 0
+        self._contradictions = 0
+        self._gaps: dict[int, Gap] = {}
+        self._witnesses = Witnesses()
+        self._told_unplaced: set[int] = set()  # tubes
+        self._depth_due = math.inf  # s, own clock, since when tubes are known and a depth may be expected
+
+    def is_due(self, now: float) -> bool:
+        """Whether to look again at ``now`` (s, own clock)."""
+        return now >= self._looked_at + LOOK_EVERY
+
+    def look(self, now: float) -> None:
+        """Look at everything, at ``now`` (s, own clock)."""
+        self._looked_at = now
+        self._alarms.advance(now, self._model.rig_now)
+        self._look_at_nodes()
+        self._look_at_encoder()
+        self._look_at_belt()
+        self._look_at_depth(now)
+        self._look_at_surveys()
+        self._look_at_stops()
+
+    def on_state(self, state: NodeState) -> None:
+        """Judge what a node says of itself."""
+        tube, hold = f"tube {state.tube}", self._alarms.hold
+        hold("tube_sensor", tube, ", ".join(str(flag.name).lower() for flag in SENSOR & state.flags))
+        hold("tube_disk", tube, "its disk refuses" if NodeFlag.NOT_SAVED in state.flags else "")
+        hold("clock", tube, self._clock_fault(state))
+        self._look_at_joint(state)
+        if self._model.numbers.on_told(state.tube, state.numbered):
+            self._alarms.alert("tube_counts_anew", tube, f"newest number {state.numbered}")
+
+    def on_event(self, event: Event) -> None:
+        """Judge an event when it comes."""
+        tube = f"tube {event.tube}" if event.tube else "encoder"
+        is_later_series = event.sequence >> SERIES_SHIFT > 0
+        if event.code == "restored" or (event.code == "booted" and is_later_series):
+            self._alarms.alert("tube_restarted", tube, event.code)
+        elif event.code in OF_THE_DISK:
+            self._alarms.alert("tube_restarted", tube, f"{event.code}: {event.arguments.get('detail', '')}"[:200])
+        elif event.code == "queue_full":
+            self._alarms.alert("tube_queue", tube, f"{event.arguments.get('dropped')} dropped")
+        elif event.code == CODE:
+            self._alarms.alert(CODE, tube, refusal_of(event.arguments))
+        elif event.code == "joint_contradicts_marks":
+            angle, marks = (_number(event, name) for name in ("angle_deg", "marks_deg"))
+            what = f"its angle by the yaws is {angle:.1f} deg, by its marks {marks:.1f} deg"
+            self._alarms.alert("joint", f"joint above {tube}", f"{what}; see the command accept_joints")
+
+    def on_known_event(self, event: Event) -> None:
+        """Judge an event that has come, or was stored before a restart of the ground station.
+
+        One that the disk refuses is judged each time it comes: its warning must not wait for room on a disk.
+        """
+        if against := self._witnesses.on_event(event, self._heard):
+            self._alarms.alert("reference", "encoder", against)
+
+    def on_survey(self, measurement: SurveyMeasurement, outcome: str) -> None:
+        """Tell what a survey was not used for: ``outcome`` is a kind of alarm, or empty.
+
+        A tube whose surveys are all believed, for the last that was not is revised, is told of no longer.
+        """
+        subject = f"tube {measurement.tube}"
+        if outcome:
+            flags = ", ".join(str(flag.name).lower() for flag in NodeFlag if flag and flag in measurement.flags)
+            detail = f"number {measurement.sequence} at {measurement.station_at:.1f} s"
+            self._alarms.alert(outcome, subject, f"{detail}: {flags}" if flags else detail)
+        elif self._alarms.stands(UNTRUSTED, subject) and not self._model.hole.has_untrusted(measurement.tube):
+            self._alarms.clear(UNTRUSTED, subject)
+
+    def on_epoch(self, epoch: int) -> None:
+        """The encoder has started again."""
+        self._alarms.alert("epoch", "encoder", f"epoch {epoch}")
+
+    def on_depth(self, refused: str) -> None:
+        """A reading of the depth was taken, or refused for a reason."""
+        self._refused_in_a_row = self._refused_in_a_row + 1 if refused else 0
+        jumped = self._model.depths.jumped
+        if jumped:
+            self._alarms.hold("depth_refused", "depth", f"it jumped {jumped}; see the command accept_depth")
+        elif self._refused_in_a_row >= REFUSALS or not refused:
+            self._alarms.hold("depth_refused", "depth", refused)
+        contradictions = self._model.depths.refusals[CONTRADICTION]
+        if contradictions > self._contradictions:
+            self._contradictions = contradictions
+            self._alarms.alert("depth_refused", "stands", "stands of the bit contradict each other")
+
+    def gaps_to_ask(self, now: float) -> list[tuple[int, Range]]:
+        """Tubes and ranges that are to be asked for at ``now`` (s, own clock)."""
+        asked = []
+        for tube in self._model.numbers.tubes:
+            gap = self._gap_of(tube, now)
+            if gap is None or now < gap.found_at + GAP_AFTER or now < gap.asked_at + ASK_EVERY:
+                continue
+            if gap.asked >= ASKED_AT_MOST:
+                self._give_up(tube, gap)
+            elif not self._model.is_stale(tube):
+                gap.asked_at, gap.asked = now, gap.asked + 1
+                asked.append((tube, gap.numbers))
+        return asked
+
+    def on_resent(self, tube: int, sent: int, complete_from: int, now: float) -> None:
+        """A tube has answered; what it does not have any more will not come."""
+        gap = self._gaps.get(tube)
+        if gap is not None:
+            gap.complete_from = complete_from
+            gap.asked_at, gap.asked = now - ASK_EVERY + GAP_AFTER, gap.asked if sent else ASKED_AT_MOST
+
+    @property
+    def _heard(self) -> list[int]:
+        """Tubes that are heard; all where none is, for what comes then is stored."""
+        tubes = self._model.tally.tubes
+        return [tube for tube in tubes if not self._model.is_stale(tube)] or tubes
+
+    def _look_at_joint(self, state: NodeState) -> None:
+        """Tell where the yaws of two neighbours part."""
+        if state.mode not in AT_REST or trust_of(state.flags) is not Trust.FULL:
+            self._model.joints.on_motion(state.tube)
+            return
+        yaw = RestingYaw(state.tube, state.at, state.yaw, state.yaw_var)
+        if change := self._model.joints.on_yaw(self._model.tally.tubes, yaw):
+            what = f"the yaws part by {math.degrees(change.by):.1f} deg at {state.at:.0f} s"
+            self._alarms.alert("joint", subject_of(change.pair), f"{what}; see the command accept_joints")
+
+    def _gap_of(self, tube: int, now: float) -> Gap | None:
+        numbers, known = self._model.numbers.gap(tube), self._gaps.get(tube)
+        if numbers is None:
+            self._gaps.pop(tube, None)
+            self._alarms.clear("numbers_missing", f"tube {tube}")
+            return None
+        if known is None or known.numbers[0] != numbers[0]:
+            known = self._gaps[tube] = Gap(numbers, now)
+        known.numbers = numbers
+        if now >= known.found_at + GAP_AFTER:
+            self._alarms.hold("numbers_missing", f"tube {tube}", f"numbers {numbers[0]} to {numbers[1]}")
+            state = self._model.nodes.get(tube)
+            doubts = state is not None and state.systematic_var >= DOUBTING_VAR
+            if against := self._witnesses.on_lost(tube, numbers, self._heard, doubts=doubts):
+                self._alarms.alert("reference", "encoder", against)
+        return known
+
+    def _give_up(self, tube: int, gap: Gap) -> None:
+        first, last = gap.numbers
+        self._model.numbers.give_up(tube, gap.numbers)
+        if first < gap.complete_from:
+            what = f"numbers {first} to {last}; surveys may be among those before {gap.complete_from}"
+        else:
+            what = f"numbers {first} to {last}, which were events"
+        self._alarms.alert("numbers_lost", f"tube {tube}", what)
+
+    def _clock_fault(self, state: NodeState) -> str:
+        model = self._model
+        if state.epoch not in (EPOCH_UNKNOWN, model.epoch):
+            return f"it counts from epoch {state.epoch}, the encoder from {model.epoch}"
+        if NodeFlag.CLOCK_UNSYNCHRONISED not in state.flags and state.at > model.rig_now + AHEAD:
+            return f"its rig time is {state.at - model.rig_now:.1f} s ahead"
+        return ""
+
+    def _look_at_nodes(self) -> None:
+        model = self._model
+        for tube in model.tally.tubes:
+            silent = "silent" if math.isfinite(model.age(tube)) else "not heard since the ground station started"
+            self._alarms.hold("tube_silent", f"tube {tube}", silent if model.is_stale(tube) else "")
+
+    def _look_at_encoder(self) -> None:
+        model = self._model
+        if not model.knows_tubes:
+            return  # who ran all the while may not have been heard yet
+        lately = [tube for tube in model.tally.tubes if model.age(tube) <= OFF_BEFORE]
+        if nobody := self._witnesses.look(model.epoch, model.rig_now, lately):
+            self._alarms.alert("reference", "encoder", nobody)
+
+    def _look_at_belt(self) -> None:
+        nodes = self._model.nodes
+        shared = shared_scale([nodes[tube].scale_factor for tube in self._model.tally.tubes if tube in nodes])
+        if shared is None:
+            self._alarms.hold("belt", "encoder", "")
+            return
+        sense = "less" if shared.by > 0.0 else "more"
+        what = f"it turns {100.0 * abs(shared.by):.2f} % {sense} than {shared.nodes} gyroscopes say"
+        self._alarms.hold("belt", "encoder", what)
+
+    def _look_at_depth(self, now: float) -> None:
+        model = self._model
+        was_heard = math.isfinite(model.depth_heard_at)
+        if model.tally.tubes:
+            self._depth_due = min(self._depth_due, now)
+        silent = now > max(model.depth_heard_at, self._depth_due) + model.config.stale_after
+        why = "no reading comes" if was_heard else "not heard since the ground station started"
+        self._alarms.hold("depth_silent", "depth", why if silent else "")
+        heard = [tube for tube in model.tally.tubes if not model.is_stale(tube)]
+        bit = model.depths.latest
+        comparable = was_heard and not silent and model.knows_tubes
+        misfit = model.tally.misfit(bit, heard) if bit is not None and comparable else ""
+        self._alarms.hold("depth_contradicts", "depth", misfit)
+
+    def _look_at_surveys(self) -> None:
+        model = self._model
+        overdue: dict[int, list[int]] = {}
+        for one in model.waiting:
+            m = one.measurement
+            if m.epoch not in (EPOCH_UNKNOWN, model.epoch) or model.rig_now > m.station_at + PLACED_WITHIN:
+                overdue.setdefault(m.tube, []).append(m.sequence)
+        for tube in {one.measurement.tube for one in model.waiting} | self._told_unplaced:
+            numbers = ", ".join(map(str, overdue.get(tube, [])[:10]))
+            self._alarms.hold("survey_unplaced", f"tube {tube}", f"numbers {numbers}" if numbers else "")
+        self._told_unplaced = set(overdue)
+
+    def _look_at_stops(self) -> None:
+        self._model.stops.judge(self._model.epoch, self._model.rig_now)
+        for stop in self._model.stops:
+            if stop.judged:
+                missing = ", ".join(map(str, sorted(stop.missing)))
+                subject = f"stop at {stop.stand.md:.2f} m, {stop.stand.epoch}/{stop.stand.begun_at:.0f} s"
+                self._alarms.hold("survey_missing", subject, f"tubes {missing}" if missing else "")
+
+
+def _number(event: Event, name: str) -> float:
+    """An argument of an event; NaN where it is none, for somebody may have made the event up."""
+    value = event.arguments.get(name)
+    return float(value) if isinstance(value, int | float) else math.nan
+
+
+def subject_of(pair: Pair) -> str:
+    """What an alarm of a joint is about."""
+    return f"joint of tubes {pair[0]} and {pair[1]}"

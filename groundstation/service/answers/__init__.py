@@ -1,0 +1,1 @@
+"""What operators and screens are shown: views, their fields and the paths below ground/."""

@@ -1,0 +1,107 @@
+"""What the key of the verdict holds: every number with as many digits as its uncertainty is worth."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+from groundstation.service.alarms.verdict import Verdict, Word, direction, judge, wind
+from groundstation.service.alarms.verdict_doubts import known_of
+from groundstation.service.answers.model import RigModel
+from groundstation.service.answers.rounding import rounded, rounded_std
+from groundstation.survey.wall.column_deviation import Deviation
+
+View = dict[str, Any]
+CM = 100.0
+FINEST_CM = 0.1  # cm, of a line for a screen
+PHRASES = {
+    Word.ON_TARGET: "ON TARGET",
+    Word.WATCH: "WATCH",
+    Word.STEER: "STEER",
+    Word.OUT: "OUT",
+    Word.DONT_KNOW: "DON'T KNOW",
+}
+
+
+def verdict(k: RigModel, _p: dict[str, str]) -> View:
+    """The verdict of this moment."""
+    known = known_of(k)
+    found = judge(known)
+    way = None if found.about is None or found.act_before is None else steer(found.about, found)
+    return {
+        "rig": k.config.rig,
+        "good_for_s": k.config.stale_after,
+        "verdict": found.word.value,
+        "by_surveys": found.by_surveys.value,
+        "line": line(found),
+        "todo": todo(found.word, way),
+        "why": list(found.why),
+        "doubts": [doubt.value for doubt in found.doubts],
+        "bit_md_m": known.bit,
+        "target_m": known.target,
+        "what": found.what or None,
+        "off": None if found.about is None else off(found.about),
+        "steer": way,
+    }
+
+
+def off(d: Deviation) -> View:
+    """How far off, where, and in which direction."""
+    return {
+        "md_m": round(d.md, 2),
+        "deviation_cm": rounded(CM * d.size, CM * d.std),
+        "sigma_cm": rounded_std(CM * d.std),
+        "limit_cm": round(CM * d.limit, 1),
+        "used_percent": round(100.0 * d.ratio) if math.isfinite(d.ratio) else None,
+        "azimuth_deg": round(math.degrees(direction(d))) % 360,
+        "wind": wind(direction(d)),
+    }
+
+
+def steer(d: Deviation, found: Verdict) -> View:
+    """Where to, and until when."""
+    back = direction(d) + math.pi
+    return {
+        "azimuth_deg": round(math.degrees(back)) % 360,
+        "wind": wind(back),
+        "before_md_m": None if found.act_before is None else round(found.act_before, 1),
+        "left_m": None if found.left is None else round(found.left, 1),
+    }
+
+
+def line(found: Verdict) -> str:
+    """The verdict as one line for a screen."""
+    phrase, d = PHRASES[found.word], found.about
+    if found.word is Word.DONT_KNOW:
+        return f"{phrase}: {found.why[0]}"
+    if d is None:
+        return phrase
+    spread = max(rounded_std(CM * d.std), FINEST_CM)
+    size = rounded(CM * d.size, spread) if spread >= 1.0 else CM * d.size  # rounded once, as it is written
+    is_end = found.what == "projection"
+    where = "ends" if is_end else f"at {d.md:.1f} m"
+    said = f"{phrase}: {where} {size:.1f} ± {spread:.1f} cm at {round(math.degrees(direction(d))) % 360} deg"
+    said += f" {wind(direction(d))}; limit {CM * d.limit:.0f} ({100.0 * d.ratio:.0f} %)"
+    if found.act_before is None or found.left is None or found.word is Word.OUT:
+        return said
+    return f"{said}; act " + (f"before {found.act_before:.1f} m" if found.left > 0.0 else "at once")
+
+
+def todo(word: Word, way: View | None) -> str:
+    """What to do, in a line for a screen."""
+    match word:
+        case Word.ON_TARGET:
+            return "go on"
+        case Word.WATCH | Word.STEER if way is not None:
+            verb = "steer" if word is Word.STEER else "if it grows, steer"
+            where = f"{verb} to {way['azimuth_deg']:g} deg {way['wind']}"
+            if way["left_m"] is not None and way["left_m"] <= 0.0:
+                return f"{where} at once"
+            left = "" if way["left_m"] is None else f", {way['left_m']:.1f} m are left"
+            return f"{where} before {way['before_md_m']:.1f} m{left}"
+        case Word.WATCH | Word.STEER:
+            return "go on, and look at the next survey"
+        case Word.OUT:
+            return "stop; the column is out of its tolerance, or will be whatever is done: ask the engineer"
+        case Word.DONT_KNOW:
+            return "do not drill on by this screen until the cause is mended"

@@ -1,0 +1,196 @@
+"""The database of a ground station, a file or a server: opened, checked, written to durably, named where it refuses.
+
+A disk that refuses leaves what is there readable: a database that cannot be written is opened all the same, and a file
+that was deleted under the running program is noticed before the next commit, which would be lost with it.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import functools
+import sqlite3
+from collections.abc import Iterable, Iterator, Mapping
+from pathlib import Path
+from typing import Any, Final
+
+import sqlalchemy as sa
+
+from groundstation.errors import StoreError
+from groundstation.service.disk.database_tables import ADD_META, ALL_META, DROP_META, META, METADATA, READABLE, SCHEMA
+from telemetry.runtime.disk import MACHINE, Disk
+
+CACHE_KB = 256  # of pages that a connection keeps: rows come at the end, and the usual 2 MB fill within an hour
+SHOWN = 5  # tables named of a database that is not ours
+COMPILED: Final[dict[Any, Any]] = {}  # statements for SQLite by their keys; as many as the sources have
+
+
+class Database:
+    """Database of one rig.
+
+    Parameters
+    ----------
+    url : SQLAlchemy URL; SQLite runs in WAL mode with every commit forced to the disk
+    disk : that holds a database which is a file
+
+    Attributes
+    ----------
+    refusal : why the database takes nothing, or empty
+    boots : starts of the ground station upon it, this one included
+
+    Raises
+    ------
+    StoreError
+        When the database cannot be opened, is no database, or belongs to another version.
+    """
+
+    def __init__(self, url: str, disk: Disk = MACHINE) -> None:
+        self._disk = disk
+        self._engine = _engine_of(url, disk)
+        address = self._engine.url
+        self._where = address.database or address.render_as_string(hide_password=True)
+        self._file = Path(address.database) if self._engine.dialect.name == "sqlite" and address.database else None
+        self.refusal = ""
+        self.boots = 0
+        self._tables: set[str] = set()
+        try:
+            with self._refusing("; choose a writable --folder or another database"):
+                if self._file is not None:
+                    disk.make_folder(self._file.parent)
+                self._begin(self._check_schema())
+        except StoreError:
+            self.close()
+            raise
+        self._inode = self._found_inode()
+
+    def _has(self, table: sa.Table) -> bool:
+        """Whether there is a table; a database of before that cannot be written lacks the later ones."""
+        return table.name in self._tables
+
+    def close(self) -> None:
+        """Close every connection."""
+        self._engine.dispose()
+
+    @contextlib.contextmanager
+    def _writing(self) -> Iterator[sa.Connection]:
+        """A transaction, committed to a file that still has its name."""
+        try:
+            with self._refusing():
+                if self._found_inode() != self._inode:
+                    raise StoreError(f"database {self._where}: was removed or replaced while the ground station ran")
+                with self._engine.begin() as connection:
+                    yield connection
+        except StoreError as error:
+            self.refusal = str(error)
+            self._engine.dispose()  # a file that was opened while it could not be written stays so
+            raise
+        self.refusal = ""
+
+    def _found_inode(self) -> int:
+        """Identity of the file that has the database's name; 0 where there is none, or no file."""
+        return self._disk.identity(self._file) if self._file is not None else 0
+
+    @contextlib.contextmanager
+    def _refusing(self, remedy: str = "") -> Iterator[None]:
+        """Name the database and the reason in whatever it refuses."""
+        try:
+            yield
+        except StoreError:
+            raise
+        except (sa.exc.SQLAlchemyError, OSError) as error:
+            reason = str(getattr(error, "orig", None) or getattr(error, "strerror", None) or error)
+            raise StoreError(f"database {self._where}: {reason}{remedy}") from error
+
+    def _check_schema(self) -> list[str]:
+        """Look without a change whether the database is one of ours; its tables, none of a new one."""
+        tables = sorted(sa.inspect(self._engine).get_table_names())
+        if tables and META.name not in tables:
+            raise StoreError(
+                f"database {self._where}: expected an empty one or that of a ground station, "
+                f"got tables {', '.join(tables[:SHOWN])}; choose another --folder or database"
+            )
+        found = self._meta() if tables else {}
+        if found and found.get("schema") not in [str(schema) for schema in READABLE]:
+            wanted = " or ".join(map(str, READABLE))
+            raise StoreError(
+                f"database {self._where}: expected schema {wanted}, got {found.get('schema')}; "
+                "one of a later version is read by that version"
+            )
+        return tables if found else []
+
+    def _meta(self) -> dict[str, str]:
+        with self._engine.connect() as connection:
+            return {row.name: row.value for row in connection.execute(ALL_META)}
+
+    @staticmethod
+    def _replace_meta(connection: sa.Connection, values: Mapping[str, str], without: Iterable[str] = ()) -> None:
+        """Store values by their names, in the place of those stored before, of which those ``without`` go."""
+        connection.execute(DROP_META, [{"its_name": name} for name in (*values, *without)])
+        connection.execute(ADD_META, [{"name": name, "value": value} for name, value in values.items()])
+
+    def _begin(self, tables: list[str]) -> None:
+        """Make ready for writing and count this start; a database of ours that refuses is read all the same."""
+        if self._engine.dialect.name == "sqlite":
+            self._engine.dispose()  # the connection that only looked is not durable
+            sa.event.listen(self._engine, "connect", _durable)
+        self._tables = set(tables)
+        try:
+            with self._refusing():
+                if lacking := [table for table in METADATA.sorted_tables if table.name not in tables]:
+                    METADATA.create_all(self._engine, lacking)
+                self._tables.update(METADATA.tables)
+                self._count_start()
+        except StoreError as error:
+            if not tables:
+                raise
+            self.refusal = str(error)
+
+    def _count_start(self) -> None:
+        boots = int(self._meta().get("boots", "0")) + 1
+        self.boots = boots
+        with self._engine.begin() as connection:
+            self._replace_meta(connection, {"schema": str(SCHEMA), "boots": str(boots)})
+
+
+def _engine_of(url: str, disk: Disk) -> sa.Engine:
+    """Engine of a URL, a file by ``disk``; a refusal does not repeat the URL, which may hold a password."""
+    try:
+        address = sa.make_url(url)
+        if address.get_backend_name() == "sqlite" and address.database and not address.query:
+            return _engine_of_file(address, disk)
+        if address.drivername == "postgresql":
+            address = address.set(drivername="postgresql+psycopg")
+        return sa.create_engine(address)
+    except (sa.exc.SQLAlchemyError, ImportError) as error:
+        raise StoreError(
+            f"database URL: expected one such as sqlite:///FILE whose driver is installed: {error}"
+        ) from error
+
+
+def _engine_of_file(address: sa.URL, disk: Disk) -> sa.Engine:
+    """Engine of a file: statements are compiled once a process for all of them, which costs more than a whole start."""
+    file, dialect = Path(address.database or ""), _sqlite()
+
+    def connect() -> Any:
+        return disk.connect(file)
+
+    pool = sa.QueuePool(connect, dialect=dialect)
+    return sa.Engine(pool, dialect, address, execution_options={"compiled_cache": COMPILED})
+
+
+@functools.cache
+def _sqlite() -> sa.Dialect:
+    """SQLAlchemy's dialect of SQLite, which has seen a connection."""
+    engine = sa.create_engine("sqlite://")
+    engine.connect().close()
+    engine.dispose()
+    return engine.dialect
+
+
+def _durable(connection: sa.engine.interfaces.DBAPIConnection, _record: object) -> None:
+    cursor = connection.cursor()
+    with contextlib.suppress(sqlite3.OperationalError):  # a file that cannot be written can be read
+        cursor.execute("PRAGMA journal_mode=WAL")
+    cursor.execute("PRAGMA synchronous=FULL")
+    cursor.execute("PRAGMA busy_timeout=5000")
+    cursor.execute(f"PRAGMA cache_size=-{CACHE_KB}")
+    cursor.close()

@@ -1,0 +1,1 @@
+"""The hole as it was surveyed: resolved stops, stations, trajectory, deviations, neighbours. No I/O."""

@@ -1,0 +1,1 @@
+"""What operators order, uploads and the calibration in the field."""

@@ -1,0 +1,356 @@
+"""The ground station as a process: link to the string, model, store, and the operator's doors."""
+
+from __future__ import annotations
+
+import math
+import secrets
+import time
+from collections import deque
+from collections.abc import Callable, Mapping
+from typing import TYPE_CHECKING, Protocol
+
+from groundstation.config import GroundConfig
+from groundstation.errors import SelectorError
+from groundstation.service.alarms.conditions import conditions_of
+from groundstation.service.alarms.crew_alarms import Times
+from groundstation.service.alarms.watch import Watch
+from groundstation.service.answers.model import RigModel
+from groundstation.service.disk.ground_store import Store
+from groundstation.service.disk.keeper import Keeper, refusing_disk
+from groundstation.service.orders.order_book import Order
+from groundstation.service.orders.uploads import Uploads
+from groundstation.service.process.intake_tape import DEPTH, MESSAGE, ORDER, TIMER, Tape
+from groundstation.service.process.learner import Learner
+from groundstation.service.process.operator_access import BlockUpload, Operator, Outgoing
+from groundstation.service.string.stands import take_stand
+from telemetry.application.endpoint import Endpoint
+from telemetry.application.seal_watch import SealWatch, refusal_of
+from telemetry.errors import DecodeError
+from telemetry.frozen import replace
+from telemetry.messages import (
+    BASE,
+    EPOCH_UNKNOWN,
+    BlockStatus,
+    DepthReading,
+    Event,
+    Message,
+    NodeState,
+    Reply,
+    Scalar,
+    Severity,
+    Side,
+    StaticRecord,
+    SurveyMeasurement,
+)
+from telemetry.presentation.msgpack_codec import decode
+from telemetry.runtime.disk import MACHINE, Disk
+from telemetry.runtime.process_interface import Process
+from telemetry.transport.authentication import read_key
+from telemetry.unwritten import Content
+
+if TYPE_CHECKING:
+    from telemetry.application.seals import Seals
+
+STARTS = 1 << 31  # numbers of a start by lot
+HEARTBEAT = 1.0  # s, own clock, between two verdicts
+BEATS = ("verdict", "changes")  # paths that are published without end
+EARLY = 64  # readings of the depth that may come before rig time is known
+GROUND_STATION = "ground station"  # who orders that something be sent again
+
+
+class RigClock(Protocol):
+    """What tells rig time: the clock of the link, or a recording."""
+
+    @property
+    def synchronised(self) -> bool:
+        """Whether rig time is known."""
+
+    @property
+    def epoch(self) -> int:
+        """Epoch of rig time."""
+
+    def rig_from_local(self, local: float) -> float:
+        """Rig time (s) at a time of the own clock (s)."""
+
+
+Listener = Callable[[list[str]], None]  # takes the paths below ground/ that changed
+
+
+class GroundProcess(Process):
+    """Everything the ground station does at each event of its link.
+
+    Whoever drives it and whoever comes in by ``operator`` does so on one thread.
+
+    Parameters
+    ----------
+    config : validated settings
+    lot : number below its argument by lot; a simulated rig draws from its seed
+    disk : that holds the database
+
+    Raises
+    ------
+    StoreError
+        When the database cannot be opened.
+    KeyFileError
+        When a key file is configured and holds no key.
+    """
+
+    def __init__(
+        self, config: GroundConfig, lot: Callable[[int], int] = secrets.randbelow, disk: Disk = MACHINE
+    ) -> None:
+        self.config = config
+        seals = None
+        if config.keys is not None:
+            from telemetry.application.seals import seals_of  # without keys no cryptography is loaded
+
+            seals = seals_of(config.keys, BASE, [Side.LOWER], rig=config.rig)
+        self._uploads = uploads_of(config, seals)
+        self.store = Store(config.url, disk)
+        # by lot, not counted: a database that was deleted or restored must not repeat a number that the string has seen
+        start = 1 + lot(STARTS)
+        self.model = RigModel(config)
+        self.watch = Watch(self.model)
+        self.endpoint = Endpoint(BASE, frozenset({Side.LOWER}), boot_count=start, seals=seals)
+        self._seal_watch = SealWatch(self.endpoint, self._on_refused)
+        self.clock: RigClock = self.endpoint.clock
+        self.tape = Tape()
+        self.start_number = start
+        self.listeners: list[Listener] = []
+        self._stale: set[int] = set()
+        self._early: deque[DepthReading] = deque(maxlen=EARLY)
+        self._beat_at = -math.inf
+        self._plane = -1  # of the wall, that the bit has passed last
+        self._keeper = Keeper(self.store, self.model)
+        self._learner = Learner(self.store, self.model, self.watch, self._keeper)
+        self.operator = Operator(config, self.model, self.store, self._uploads, start)
+        self.operator.changed = self._publish
+        self.operator.ended = self.endpoint.mail.withdraw
+        self.operator.accepted = self._note_order
+        self._learner.restore()
+        self.model.crew_alarms.restore(self.store.alarms(), conditions_of(self.model))
+
+    def on_frame(self, side: Side, frame: Content, now: float, margin: float = math.inf) -> None:
+        """A frame arrived from the encoder."""
+        if now - self.model.now > HEARTBEAT:
+            self._advance_time(now)  # it stood still: what it knew then must not be shown as of now
+        self._send_pending(now)
+        for received in self.endpoint.receive(side, frame, now, margin):
+            self.on_message(received.message, now)
+
+    def before_frames(self) -> None:
+        """Receipts leave for what came since the last time, once it is stored."""
+        self._keep_arrived()
+
+    def on_depth(self, payload: bytes, now: float) -> None:
+        """The rig measured the depth of the bit; bytes that are no reading are counted."""
+        self._keep_arrived()
+        seals = self.endpoint.seals
+        content = payload if seals is None else seals.depth_content(payload)
+        if content is None:
+            return
+        self._note(DEPTH, now, content)
+        try:
+            reading = decode(content)
+        except DecodeError:
+            reading = None
+        if not isinstance(reading, DepthReading):
+            self.endpoint.counters["bad_depths"] += 1
+            self.model.rig_alarms.alert("bad_input", "depth", "bytes that are no reading of the depth")
+            return
+        if seals is not None and not seals.is_next_depth(reading.sequence):
+            return
+        self._advance_time(now)
+        if not self.clock.synchronised:
+            self._early.append(reading)  # what bounds it is not known yet
+            return
+        self._on_reading(reading, now)
+
+    def on_timer(self, now: float) -> None:
+        """Advance to ``now``: orders and uploads, hello, time requests, repetition, and what is wrong by now."""
+        self._keep_arrived()
+        if self.watch.is_due(now) or self._early:
+            self._note(TIMER, now)
+        self._advance_time(now)
+        self._send_pending(now)
+        with refusing_disk():
+            for outgoing in self.operator.due_requests(now):
+                self._send(outgoing, now)
+        for segment in self._uploads.due_segments(now) if self._uploads is not None else ():
+            self.endpoint.mail.send_segment(segment)
+        super().on_timer(now)
+        if self.watch.is_due(now):
+            self._look(now)
+
+    def next_wake(self, now: float) -> float:
+        """Local time (s) of the next timer."""
+        if self.operator.has_pending:
+            return now
+        due = self._uploads.next_due() if self._uploads is not None else math.inf
+        return min(super().next_wake(now), due)
+
+    def close(self) -> None:
+        """Close the database."""
+        self.store.close()
+
+    def _note(self, kind: str, now: float, content: object = None) -> None:
+        """Put an event on the tape, with the rig time at which it came."""
+        clock = self.clock
+        rig_now = clock.rig_from_local(now) if clock.synchronised else math.nan
+        self.tape.add(kind, now, rig_now, clock.epoch, content)
+
+    def _note_order(self, name: str, parameters: Mapping[str, str], by: str) -> None:
+        self._note(ORDER, self.model.now, [name, dict(parameters), by])
+
+    def _send_pending(self, now: float) -> None:
+        for outgoing in self.operator.take_pending():
+            self._send(outgoing, now)
+
+    def _send(self, outgoing: Outgoing, now: float) -> None:
+        if isinstance(outgoing, BlockUpload):
+            self.operator.start_upload(outgoing, now)
+        else:
+            self.endpoint.mail.command(outgoing, now)
+
+    def _advance_time(self, now: float) -> None:
+        """Follow rig time and its epoch, also where nothing comes any more."""
+        model, clock = self.model, self.clock
+        model.now = now
+        model.revision += 1
+        if not clock.synchronised:
+            return
+        is_new, before = clock.epoch != model.epoch, model.epoch
+        model.on_rig_time(clock.rig_from_local(now), clock.epoch)
+        if is_new:
+            if before != EPOCH_UNKNOWN:
+                self.watch.on_epoch(clock.epoch)
+            with refusing_disk():
+                self.store.keep_epoch(clock.epoch)
+        while self._early:
+            self._on_reading(self._early.popleft(), now)
+
+    def _look(self, now: float) -> None:
+        """Find what is wrong, ask again for what is missing, and publish who fell silent or came back."""
+        self._keeper.keep_depth_doubt()
+        self._place_waiting()
+        if consequences := self._learner.find_consequences():
+            self._publish(consequences)
+        self.watch.look(now)
+        alarms, refusal = self.model.rig_alarms, self.store.refusal
+        alarms.hold("disk", "database", refusal)
+        alarms.hold("database", "database", f"{self.store.damaged} messages" if self.store.damaged else "")
+        dropped = self.endpoint.dropped
+        alarms.hold("queue", "ground station", f"{dropped} dropped" if dropped else "")
+        self._seal_watch.look(now)
+        alarms.hold(
+            "key_file", "ground station", self.endpoint.seals.trouble if self.endpoint.seals is not None else ""
+        )
+        for tube, (first, last) in self.watch.gaps_to_ask(now):
+            self._ask_again(tube, first, last)
+        self.operator.expire_orders(now)
+        stale = {tube for tube in self.model.nodes if self.model.is_stale(tube)}
+        changed, self._stale = sorted(stale ^ self._stale), stale
+        if changed:
+            self._publish([*(f"nodes/{tube}" for tube in changed), "status", "string"])
+        self._tell_crew(now)
+        if alarms.drain_changed():
+            self._publish(["alarms", "status", "verdict"])
+            self._beat_at = now
+        if now >= self._beat_at + HEARTBEAT:
+            self._beat_at = now
+            self._publish(list(BEATS))
+
+    def _on_refused(self, _severity: Severity, code: str, arguments: dict[str, Scalar]) -> None:
+        """Frames or messages came under seals that are not to be believed."""
+        self.model.rig_alarms.alert(code, "ground station", refusal_of(arguments))
+
+    def _tell_crew(self, now: float) -> None:
+        """Follow what is wrong with the alarms that the crew works with, and keep them."""
+        alarms = self.model.crew_alarms
+        alarms.update(conditions_of(self.model), Times(now, self.model.rig_now, time.time()))
+        if changed := alarms.drain_changed():
+            with refusing_disk():
+                self.store.keep_alarms(changed)
+            self._publish(["alarms"])
+
+    def _ask_again(self, tube: int, first: int, last: int) -> None:
+        """Order a tube to send the surveys of a range of numbers again."""
+        try:
+            order = self.operator.command(tube, "resend", {"first": first, "last": last}, by=GROUND_STATION)
+        except SelectorError:
+            return  # the tube is not known yet; the gap stays
+        order.when_answered(lambda: self._on_resent(order))
+
+    def _on_resent(self, order: Order) -> None:
+        values = order.values
+        if order.done and order.tube is not None:
+            sent, complete_from = int(str(values.get("sent", 0))), int(str(values.get("complete_from", 0)))
+            self.watch.on_resent(order.tube, sent, complete_from, self.model.now)
+
+    def _on_reading(self, reading: DepthReading, now: float) -> None:
+        model = self.model
+        refused = model.depths.on_reading(reading, model.epoch, model.rig_now, now, model.tally.deepest)
+        self.watch.on_depth("" if refused == "repeated" else refused)
+        self._keeper.keep_depth_doubt()
+        if refused:
+            return
+        model.depth_heard_at = now
+        for stand in reading.stands:
+            is_present = stand.epoch in (EPOCH_UNKNOWN, model.epoch) and stand.ended_at <= reading.at
+            is_news = is_present and not model.depths.is_of_before(stand, model.epoch)
+            if is_news and stand.md <= model.tally.deepest:
+                take_stand(model.depths, model.stops, replace(stand, epoch=model.epoch))
+        self._keeper.keep_stand(reading)
+        self._place_waiting()
+        self._publish(["status", "string"])
+        if self.model.wall is not None and (plane := self.model.wall.plane_of(reading.md)) != self._plane:
+            self._plane = plane
+            self._publish(["wall"])
+
+    def on_message(self, message: Message, now: float) -> None:
+        """A message has come, from the string or from a recording."""
+        self._note(MESSAGE, now, message)
+        self._advance_time(now)
+        match message:
+            case NodeState() if self.model.on_state(message, now):
+                self.watch.on_state(message)
+                with refusing_disk():
+                    self._keeper.keep_tally()
+                    self._keeper.keep_joints()
+                self._publish([f"nodes/{message.tube}"])
+            case SurveyMeasurement() | Event() | StaticRecord():
+                self._learner.take(message)
+            case Reply():
+                self.model.orders.on_reply(message)
+                self.model.recalibration.on_reply(message, now)
+            case BlockStatus():
+                self.operator.on_block_status(message)
+        self.operator.publish_orders()
+
+    def _keep_arrived(self) -> None:
+        """Store and learn what came together before any of it is acknowledged."""
+        stored, changed = self._learner.learn_arrived()
+        for message in stored:
+            self.endpoint.mail.acknowledge(message)
+        if stored:
+            self._publish(changed)
+
+    def _place_waiting(self) -> None:
+        if changed := self._learner.place_waiting():
+            self._publish(changed)
+
+    def _publish(self, changed: list[str]) -> None:
+        model = self.model
+        model.revision += 1  # whoever holds an older answer can tell
+        model.changed_at |= {path: model.revision for path in changed if "/" not in path and path not in BEATS}
+        for listener in self.listeners:
+            listener(changed)
+
+
+def uploads_of(config: GroundConfig, seals: Seals | None) -> Uploads | None:
+    """Uploads under the keys of each tube, or under the one key of the rig; None without any."""
+    if seals is not None:
+        return Uploads(seals.block_key_of)
+    if config.key_file is None:
+        return None
+    key = read_key(config.key_file)
+    return Uploads(lambda _tube: key)

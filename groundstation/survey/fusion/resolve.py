@@ -1,0 +1,244 @@
+"""From the specific force of a stop and the tracked yaw to the direction of the tube.
+
+The result is the lean vector l = (sin I cos A, sin I sin A), the horizontal part of the tube's downhole direction. It
+stays regular where the azimuth does not (I -> 0), so covariances are carried in it and converted at the end.
+Source: thesis eqs. 1.1-1.3, with the sign of the specific force of a body at rest (up).
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from enum import IntFlag
+
+import numpy as np
+import numpy.typing as npt
+
+from groundstation.errors import SurveyError
+
+Array = npt.NDArray[np.float64]
+GRAVITY_TOLERANCE = 0.005  # of g, |f| of a stop that was no stop
+ASYMMETRY = 1e-9  # of the largest entry, rounding in the covariance of a node
+CONDITION = 1e14  # beyond it the inverse of a covariance is noise
+PLAINLY = 1e-10  # of the trace to the power k, the determinant (k, k) of a matrix that needs no closer look
+A_FEW = 64  # numbers, up to which they are looked at one by one
+UPRIGHT = 1e-9  # lean, below which there is no azimuth
+SHORTEST_SETTLE = 16.0  # s, of the 32-point moving average
+
+
+class Quality(IntFlag):
+    """What is wrong with a stop; 0 is good."""
+
+    GOOD = 0
+    GRAVITY = 1  # |f| is not g
+    MOTION = 2  # the readings scatter more than the sensor does
+    SETTLE = 4  # the average began before the stop
+    SPREAD = 8  # the IMUs of the cluster disagree
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Direction:
+    """Direction of a tube in the north-east plane.
+
+    ``cov`` (2, 2) is random. ``shared`` (2, s) holds the change of ``lean`` for one standard deviation of each of the
+    ``s`` errors that readings share (joints, mounts, accelerometer biases); ``s`` may differ between readings, what is
+    missing is zero. ``down`` is the vertical part of the direction.
+    """
+
+    lean: Array
+    down: float
+    cov: Array
+    shared: Array
+
+    @property
+    def total_cov(self) -> Array:
+        """Covariance (2, 2) with the shared errors in it."""
+        shared = self.shared
+        return np.asarray(self.cov + shared @ shared.T)
+
+    @property
+    def width(self) -> int:
+        """How many shared columns there are."""
+        return int(self.shared.shape[1])
+
+    def fill(self, columns: Array) -> None:
+        """Put the shared columns into zeros (2, s or more)."""
+        columns[:, : self.width] = self.shared
+
+    @property
+    def information(self) -> Array:
+        """Inverse (2, 2) of ``total_cov``.
+
+        Raises
+        ------
+        numpy.linalg.LinAlgError
+            When there is none.
+        """
+        return np.asarray(np.linalg.inv(self.total_cov))
+
+
+def known_direction(inclination: float, azimuth: float) -> Direction:
+    """A direction (rad) that is known."""
+    lean = math.sin(inclination) * np.array([math.cos(azimuth), math.sin(azimuth)])
+    return Direction(lean, math.cos(inclination), np.zeros((2, 2)), np.zeros((2, 0)))
+
+
+@dataclass(frozen=True, slots=True)
+class Resolved:
+    """A resolved stop: its direction, without shared errors, and how they would act on it."""
+
+    direction: Direction
+    by_force: Array  # (2, 3) change of the lean for one m/s^2 on each body axis
+    by_yaw: Array  # (2,) change of the lean for one rad of yaw
+
+
+def resolve_direction(force: Array, force_cov: Array, yaw: float, yaw_var: float) -> Resolved:
+    """Direction from a mean specific force.
+
+    Parameters
+    ----------
+    force, force_cov : (3,) m/s^2 and (3, 3), body frame x, y across, z downhole
+    yaw, yaw_var : rad and rad^2, of the body about its axis from reference north
+
+    Raises
+    ------
+    SurveyError
+        When the force vanishes or is not finite, or nothing is uncertain in some direction of the lean.
+    """
+    return resolve_all(force[None], force_cov[None], [yaw], [yaw_var])[0]
+
+
+def resolve_all(forces: Array, covs: Array, yaws: Sequence[float], yaw_vars: Sequence[float]) -> list[Resolved]:
+    """The same of many stops, (n, 3) and (n, 3, 3), bit for bit; raises where one of them cannot be resolved."""
+    sizes = np.sqrt((forces[:, None] @ forces[:, :, None])[:, 0, 0])
+    for size, yaw in zip(sizes.tolist(), yaws, strict=True):
+        if not math.isfinite(size) or size < 1e-3 or not math.isfinite(yaw):
+            raise SurveyError(
+                f"resolve: expected a finite specific force and yaw, got |f| = {size} m/s^2, yaw = {yaw} rad"
+            )
+    turns = np.array([_turn(yaw) for yaw in yaws])
+    units = forces / sizes[:, None]
+    leans = (turns @ units[:, :, None])[:, :, 0]
+    by_force = (turns - leans[:, :, None] * units[:, None]) / sizes[:, None, None]
+    by_yaw = np.stack([-leans[:, 1], leans[:, 0]], axis=1)
+    turned = np.array(yaw_vars)[:, None, None] * (by_yaw[:, :, None] * by_yaw[:, None])
+    found = by_force @ covs @ by_force.transpose(0, 2, 1) + turned
+    if not is_covariance(found):
+        raise SurveyError(f"resolve: expected a positive definite covariance of the lean, got {found.tolist()}")
+    nothing = np.zeros((2, 0))
+    directions = [
+        Direction(lean, -unit[2], cov, nothing) for lean, unit, cov in zip(leans, units.tolist(), found, strict=True)
+    ]
+    return [Resolved(*row) for row in zip(directions, by_force, by_yaw, strict=True)]
+
+
+def _turn(yaw: float) -> list[list[float]]:
+    """From the body to north and east (2, 3)."""
+    c, s = math.cos(yaw), math.sin(yaw)
+    return [[c, -s, 0.0], [s, c, 0.0]]
+
+
+def is_covariance(covs: Array) -> bool:
+    """Whether every matrix of (..., k, k) is finite, symmetric, positive definite and safely invertible."""
+    if covs.size <= A_FEW and all(_is_plainly_one(cov) for cov in covs.reshape(-1, *covs.shape[-2:]).tolist()):
+        return True
+    if not np.all(np.isfinite(covs)):
+        return False
+    asymmetry = np.max(np.abs(covs - np.swapaxes(covs, -1, -2)), axis=(-2, -1))
+    values = np.linalg.eigvalsh(covs)
+    symmetric = np.all(asymmetry <= ASYMMETRY * np.max(np.abs(covs), axis=(-2, -1)))
+    return bool(symmetric and np.all(values[..., 0] * CONDITION > values[..., -1]))
+
+
+def _is_plainly_one(cov: list[list[float]]) -> bool:
+    """Whether a matrix (k, k), k to 3, is far from being none: a few products in place of eigenvalues.
+
+    The smallest eigenvalue is at least the determinant over the trace to the power k - 1.
+    """
+    k = len(cov)
+    if not 1 < k <= 3:
+        return False
+    size = max(abs(value) for row in cov for value in row)
+    if any(not abs(cov[i][j] - cov[j][i]) <= ASYMMETRY * size for i in range(k) for j in range(i)):
+        return False
+    minor = cov[0][0] * cov[1][1] - cov[1][0] * cov[1][0]
+    det, trace = minor, cov[0][0] + cov[1][1]
+    if k == 3:
+        (_, _, _), (b, _, _), (c, e, f) = cov
+        det = f * minor - e * (cov[0][0] * e - b * c) + c * (b * e - cov[1][1] * c)
+        trace += f
+    # a product, for a power of numbers of a hostile message would raise where this is infinite
+    return cov[0][0] > 0.0 and minor > 0.0 and det > PLAINLY * math.prod([trace] * k)
+
+
+def direction_angles(lean: Array, down: float) -> tuple[float, float]:
+    """Inclination in [0, pi] and azimuth in [0, 2 pi) of a direction (rad)."""
+    inclination = math.atan2(math.hypot(lean[0], lean[1]), down)
+    azimuth = math.atan2(lean[1], lean[0]) % (2.0 * math.pi)
+    return inclination, azimuth if azimuth < 2.0 * math.pi else 0.0
+
+
+def angle_stds(lean: Array, down: float, cov: Array) -> tuple[float, float]:
+    """Standard deviations (rad) of inclination and azimuth; the azimuth's is at most pi, where nothing is known."""
+    return angle_stds_of_all(lean[None], [down], cov[None])[0]
+
+
+def angle_stds_of_all(leans: Array, downs: Sequence[float], covs: Array) -> list[tuple[float, float]]:
+    """The same of many directions, (n, 2) and (n, 2, 2)."""
+    sizes = [math.hypot(x, y) for x, y in leans.tolist()]
+    along = leans / np.array([size if size >= UPRIGHT else 1.0 for size in sizes])[:, None]
+    across = np.stack([-along[:, 1], along[:, 0]], axis=1)
+    variances = ((unit[:, None] @ covs @ unit[:, :, None])[:, 0, 0].tolist() for unit in (along, across))
+    traces = np.trace(covs, axis1=1, axis2=2).tolist()
+    return [_stds(*row) for row in zip(sizes, downs, *variances, traces, strict=True)]
+
+
+def _stds(size: float, down: float, along_var: float, across_var: float, trace: float) -> tuple[float, float]:
+    if size < UPRIGHT:
+        return math.sqrt(trace / 2.0), math.pi
+    inclination = math.sqrt(max(along_var, 0.0)) / max(abs(down), 1e-6)
+    return inclination, min(math.sqrt(max(across_var, 0.0)) / size, math.pi)
+
+
+def combine_imus(forces: Array, covs: Array) -> tuple[Array, Array]:
+    """Inverse-variance mean of the IMUs of a cluster: forces (..., n, 3), covariances (..., n, 3, 3).
+
+    Source: thesis eq. 3.42.
+
+    Raises
+    ------
+    SurveyError
+        When one of the covariances is none.
+    """
+    if not is_covariance(covs):
+        raise SurveyError(f"cluster: expected a positive definite force covariance of each IMU, got {covs.tolist()}")
+    information = np.linalg.inv(covs)
+    cov = np.linalg.inv(information.sum(axis=-3))
+    mean = cov @ np.einsum("...nij,...nj->...i", information, forces)[..., None]
+    return mean[..., 0], cov
+
+
+def check_all(
+    forces: Array,
+    covs: Array,
+    combined: tuple[Array, Array],
+    gravity: float,
+    samples: Sequence[int],
+    settle_times: Sequence[float],
+    sample_std: float,
+) -> list[Quality]:
+    """Quality of stops, (n, imus, 3) and (n, imus, 3, 3), with what the IMUs of each come to, (n, 3) and (n, 3, 3).
+
+    ``sample_std`` (m/s^2) is the sensor's own noise in one sample.
+    """
+    means, mean_covs = combined
+    largest_var = covs.diagonal(axis1=-2, axis2=-1).max(axis=(-2, -1))
+    sizes = np.sqrt((means[:, None] @ means[:, :, None])[:, 0, 0])
+    spread = np.abs(forces - means[:, None]).max(axis=(-2, -1))
+    spread_var = largest_var + mean_covs.diagonal(axis1=-2, axis2=-1).max(axis=-1)
+    wrong = np.where(np.abs(sizes - gravity) > GRAVITY_TOLERANCE * gravity, Quality.GRAVITY, Quality.GOOD)
+    wrong |= np.where(largest_var * samples > (3.0 * sample_std) ** 2, Quality.MOTION, Quality.GOOD)
+    wrong |= np.where(np.asarray(settle_times) < SHORTEST_SETTLE, Quality.SETTLE, Quality.GOOD)
+    wrong |= np.where(spread**2 > 16.0 * spread_var, Quality.SPREAD, Quality.GOOD)
+    return [Quality(each) for each in wrong.tolist()]
