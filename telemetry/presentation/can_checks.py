@@ -17,11 +17,11 @@ def check_of(field: Field) -> Check:
     """Check of one line of the schema."""
     check: Check = partial(CHECKS[field.kind], field)
     if field.enumeration is not None:
-        return enumerated(field, field.enumeration)
-    return quick(field, QUICK[field.kind], check) if field.kind in QUICK else check
+        return member_check(field, field.enumeration)
+    return quick_check(field, QUICK[field.kind], check) if field.kind in QUICK else check
 
 
-def quick(q: Quantity, kind: type[Any], check: Check) -> Check:
+def quick_check(q: Quantity, kind: type[Any], check: Check) -> Check:
     """Check of a number that asks ``check`` only where it is not as nearly always: of its type and in its range."""
     low, high = q.low, q.high
 
@@ -31,7 +31,7 @@ def quick(q: Quantity, kind: type[Any], check: Check) -> Check:
     return checked
 
 
-def enumerated(q: Quantity, enumeration: Callable[[int], Any]) -> Check:
+def member_check(q: Quantity, enumeration: Callable[[int], Any]) -> Check:
     """Check of an integer that stands for a member or for flags."""
     members: dict[int, Any] = {}
 

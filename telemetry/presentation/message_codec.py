@@ -64,9 +64,9 @@ class MessageCodec:
         except ValidationError:
             pass  # it may be of a type derived from the right one
         try:
-            return astuple(self._check(plain(values)))
+            return astuple(self._check(to_plain(values)))
         except ValidationError as error:
-            raise EncodeError(f"{self.name}: {named(error, self._names)}") from error
+            raise EncodeError(f"{self.name}: {name_refusal(error, self._names)}") from error
 
     def read(self, version: int, body: Raw) -> Values:
         """Values of the body of a payload of a schema version; those of later versions are what stands for them.
@@ -79,7 +79,7 @@ class MessageCodec:
         try:
             return astuple(self._decoders[version].decode(body)) + self._before[version]
         except REFUSED as error:
-            raise DecodeError(f"{self.name}: {named(error, self._names)}") from error
+            raise DecodeError(f"{self.name}: {name_refusal(error, self._names)}") from error
 
     def message_of(self, values: Values) -> Message:
         """Message of the values of its fields."""
@@ -127,21 +127,21 @@ def stands_of(stands: tuple[Any, ...]) -> tuple[Stand, ...]:
     return tuple([Stand(*astuple(stand)) for stand in stands])
 
 
-def named(error: Exception, keys: Mapping[str, str]) -> str:
+def name_refusal(error: Exception, keys: Mapping[str, str]) -> str:
     """What is wrong, after the name of the field that it is wrong with, of those that stand under ``keys``."""
     found = NAMED.search(str(error))
     key = found[found.lastindex or 0] if found else None
     return f"{keys.get(key, key)}: {error}" if key else str(error)
 
 
-def plain(value: Any) -> Any:
+def to_plain(value: Any) -> Any:
     """A value whose type is derived from one of Python's own, as one of that: a number of numpy as a float."""
     if isinstance(value, list | tuple):
-        return tuple(map(plain, value))
+        return tuple(map(to_plain, value))
     if isinstance(value, dict):
-        return {plain(name): plain(item) for name, item in value.items()}
+        return {to_plain(name): to_plain(item) for name, item in value.items()}
     if isinstance(value, ImuMean | Stand):
-        return plain(astuple(value))
+        return to_plain(astuple(value))
     own = next((kind for kind in (bool, int, float, str) if isinstance(value, kind)), None)
     return value if own is None else own(value)
 

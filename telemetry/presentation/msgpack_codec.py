@@ -13,7 +13,7 @@ from msgspec.msgpack import Decoder, Encoder
 
 from telemetry.errors import DecodeError
 from telemetry.messages import BASE, SCHEMA_VERSION, Message
-from telemetry.presentation.message_codec import CODEC_OF, CODECS, REFUSED, MessageCodec, Values, named
+from telemetry.presentation.message_codec import CODEC_OF, CODECS, REFUSED, MessageCodec, Values, name_refusal
 from telemetry.schema import U53, Kind
 from telemetry.unwritten import Content, Unwritten
 
@@ -68,7 +68,7 @@ class UnwrittenMessage(Unwritten):
     def opened(self) -> Envelope[Values]:
         """What ``open_payload`` finds in its payload; worked out once for all the hops it goes over."""
         if self._opened is None:
-            self._opened = enveloped(self.codec, self.codec.newest, self.values, self.values)
+            self._opened = envelope_of(self.codec, self.codec.newest, self.values, self.values)
         return self._opened
 
     def _write(self) -> bytes:
@@ -99,7 +99,7 @@ def unwritten(message: Message) -> UnwrittenMessage:
     return UnwrittenMessage(codec, codec.values_of(message))
 
 
-def enveloped(codec: MessageCodec, version: int, values: Values, body: Body) -> Envelope[Body]:
+def envelope_of(codec: MessageCodec, version: int, values: Values, body: Body) -> Envelope[Body]:
     """Body in its envelope; the tube and the number of the message are among its ``values``."""
     origin = NO_TARGET if codec.tube_at is None else values[codec.tube_at]
     sequence = 0 if codec.sequence_at is None else values[codec.sequence_at]
@@ -110,7 +110,7 @@ def enveloped(codec: MessageCodec, version: int, values: Values, body: Body) -> 
 def write_payload(codec: MessageCodec, values: Values) -> bytes:
     """Payload of the values of all fields of a message, which are checked, in the earliest schema version."""
     version, body = codec.body_of(values)
-    return ENCODER.encode(enveloped(codec, version, values, body))
+    return ENCODER.encode(envelope_of(codec, version, values, body))
 
 
 def decode(payload: Content) -> Message:
@@ -139,7 +139,7 @@ def open_payload(payload: Content) -> Opened:
     try:
         opened = ENVELOPES.decode(bytes(payload))
     except REFUSED as error:
-        raise DecodeError(f"payload: {named(error, NAMES)}") from error
+        raise DecodeError(f"payload: {name_refusal(error, NAMES)}") from error
     newest = CODEC_OF[opened.kind].newest
     if opened.version > newest:
         raise DecodeError(f"payload: {opened.kind.name.lower()}: expected version {newest}, got {opened.version}")

@@ -43,7 +43,7 @@ def type_of(field: Field) -> Any:
     return TYPES[field.kind](field)
 
 
-def number(low: float = -LARGEST, high: float = LARGEST) -> Any:
+def number_type(low: float = -LARGEST, high: float = LARGEST) -> Any:
     """A number in a range; finite unless that reaches to infinity.
 
     Raises
@@ -57,57 +57,57 @@ def number(low: float = -LARGEST, high: float = LARGEST) -> Any:
     return Annotated[float, Meta(ge=ends[0], le=ends[1])]
 
 
-def integer(field: Field) -> Any:
+def integer_type(field: Field) -> Any:
     """An integer in the range of a field, or a member of its enumeration; flags come as their number."""
     if field.enumeration is not None and not issubclass(field.enumeration, enum.Flag):
         return field.enumeration
     return Annotated[int, Meta(ge=int(field.low), le=int(field.high))]
 
 
-def binary(field: Field) -> Any:
+def binary_type(field: Field) -> Any:
     """Bytes, as many as the range of a field says."""
     return Annotated[bytes, Meta(min_length=int(field.low), max_length=int(field.high))]
 
 
-def vector(limit: float) -> Any:
+def vector_type(limit: float) -> Any:
     """Three numbers of magnitude up to the limit."""
-    return tuple_of(*[number(-limit, limit)] * 3)
+    return tuple_type(*[number_type(-limit, limit)] * 3)
 
 
-def covariance(limit: float) -> Any:
+def covariance_type(limit: float) -> Any:
     """Three rows of three numbers of magnitude up to the limit, variances of zero or more on the diagonal."""
-    var, cov = number(0.0, limit), number(-limit, limit)
-    return tuple_of(tuple_of(var, cov, cov), tuple_of(cov, var, cov), tuple_of(cov, cov, var))
+    var, cov = number_type(0.0, limit), number_type(-limit, limit)
+    return tuple_type(tuple_type(var, cov, cov), tuple_type(cov, var, cov), tuple_type(cov, cov, var))
 
 
-def names_with(values: Any) -> Any:
+def names_type(values: Any) -> Any:
     """A few short names, each with a value."""
-    return limited(DICT[TEXT, values], MAX_ARGUMENTS)
+    return limited_type(DICT[TEXT, values], MAX_ARGUMENTS)
 
 
-def stands_of(field: Field) -> Any:
+def stands_type(field: Field) -> Any:
     """Stands of the bit: epoch, begin, end and depth, the end not before the begin."""
     stand = defstruct(
         "StandOnWire",
         [
             ("epoch", Annotated[int, Meta(ge=0, le=MAX_EPOCH)]),
-            ("begun_at", number(-LARGEST_TIME, LARGEST_TIME)),
-            ("ended_at", number(-LARGEST_TIME, LARGEST_TIME)),
-            ("md", number(field.low, field.high)),
+            ("begun_at", number_type(-LARGEST_TIME, LARGEST_TIME)),
+            ("ended_at", number_type(-LARGEST_TIME, LARGEST_TIME)),
+            ("md", number_type(field.low, field.high)),
         ],
         array_like=True,
         forbid_unknown_fields=True,
         namespace={"__post_init__": _check_stand},
     )
-    return limited(tuple_of(stand, ...), MAX_STANDS)
+    return limited_type(tuple_type(stand, ...), MAX_STANDS)
 
 
-def tuple_of(*kinds: Any) -> Any:
+def tuple_type(*kinds: Any) -> Any:
     """Type of a tuple of values of these types."""
     return TUPLE[kinds]
 
 
-def limited(kind: Any, most: int, least: int = 0) -> Any:
+def limited_type(kind: Any, most: int, least: int = 0) -> Any:
     """Type of a collection of so many items."""
     return ANNOTATED[kind, Meta(min_length=least, max_length=most)]
 
@@ -125,24 +125,24 @@ def _check_order(reading: Any) -> None:
 
 
 TEXT = Annotated[str, Meta(max_length=MAX_TEXT)]
-SCALAR: Any = None | bool | Annotated[int, Meta(ge=-(2**63), le=2**63 - 1)] | number() | TEXT
-NUMBERS = limited(tuple_of(number(), ...), MAX_LIST)
+SCALAR: Any = None | bool | Annotated[int, Meta(ge=-(2**63), le=2**63 - 1)] | number_type() | TEXT
+NUMBERS = limited_type(tuple_type(number_type(), ...), MAX_LIST)
 IMU = defstruct(
     "ImuOnWire",
-    [("force", vector(LARGEST_FORCE)), ("force_cov", covariance(LARGEST_COVARIANCE))],
+    [("force", vector_type(LARGEST_FORCE)), ("force_cov", covariance_type(LARGEST_COVARIANCE))],
     array_like=True,
     forbid_unknown_fields=True,
 )
 TYPES: dict[ValueKind, Callable[[Field], Any]] = {
-    ValueKind.NUMBER: lambda field: number(field.low, field.high),
-    ValueKind.INTEGER: integer,
+    ValueKind.NUMBER: lambda field: number_type(field.low, field.high),
+    ValueKind.INTEGER: integer_type,
     ValueKind.BOOLEAN: lambda _: bool,
     ValueKind.TEXT: lambda _: TEXT,
-    ValueKind.BINARY: binary,
-    ValueKind.VECTOR: lambda field: vector(field.high),
-    ValueKind.COVARIANCE: lambda field: covariance(field.high),
-    ValueKind.IMUS: lambda _: limited(tuple_of(IMU, ...), MAX_IMUS, least=1),
-    ValueKind.SCALARS: lambda _: names_with(SCALAR),
-    ValueKind.VALUES: lambda _: names_with(SCALAR | NUMBERS),
-    ValueKind.STANDS: stands_of,
+    ValueKind.BINARY: binary_type,
+    ValueKind.VECTOR: lambda field: vector_type(field.high),
+    ValueKind.COVARIANCE: lambda field: covariance_type(field.high),
+    ValueKind.IMUS: lambda _: limited_type(tuple_type(IMU, ...), MAX_IMUS, least=1),
+    ValueKind.SCALARS: lambda _: names_type(SCALAR),
+    ValueKind.VALUES: lambda _: names_type(SCALAR | NUMBERS),
+    ValueKind.STANDS: stands_type,
 }

@@ -17,7 +17,7 @@ from telemetry.frozen import replace
 from telemetry.messages import BASE, Aiding, DepthReading, NodeState, Reply, SessionOffer, Stand
 from telemetry.presentation.message_codec import CODECS
 from telemetry.presentation.msgpack_codec import DOWNWARD, decode, encode, open_payload, values_of_opened
-from telemetry.presentation.wire_structs import number
+from telemetry.presentation.wire_structs import number_type
 from telemetry.schema import SCHEMA, SPEC_OF, Field, MessageSpec
 
 EDGES = [math.nan, math.inf, -math.inf, -0.0, 1e300, 2**63, -1, 0, 1, 2.0, True, None, "text", b"", b"12345678", [], {}]
@@ -166,7 +166,7 @@ def test_what_is_in_the_list_of_another_field_is_refused_by_that() -> None:
 
 def test_a_range_without_an_end_would_let_nan_in() -> None:
     with pytest.raises(ValueError, match="NaN"):
-        number(-math.inf, math.inf)
+        number_type(-math.inf, math.inf)
 
 
 def test_numbers_of_numpy_are_written_as_any_other() -> None:
