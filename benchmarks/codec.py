@@ -18,7 +18,7 @@ from typing import Any
 import msgpack
 import numpy as np
 
-from borechain.load.rounds import beside
+from borechain.load.rounds import compare_rounds
 from groundstation.survey import error_model
 from groundstation.survey.compiled_model import locate, warm
 from groundstation.survey.error_sources import Leg, Site, Survey
@@ -192,7 +192,7 @@ def timed(ours: Callable[[], object], theirs: Callable[[], object]) -> dict[str,
     counts = [max(1, math.ceil(SPELL / seconds(act, 1))) for act in (ours, theirs)]
     for _ in range(ROUNDS):
         times.append([seconds(act, count) for act, count in zip((ours, theirs), counts, strict=True)])
-    return beside([one for one, _ in times], [other for _, other in times])
+    return compare_rounds([one for one, _ in times], [other for _, other in times])
 
 
 def seconds(act: Callable[[], object], count: int) -> float:

@@ -46,7 +46,7 @@ ENVELOPES, ENCODER = Decoder(Envelope[Raw]), Encoder()
 
 
 class UnwrittenMessage(Unwritten):
-    """A message as the values of all its fields, checked; its payload is made where somebody asks for the bytes."""
+    """A message as the values of all its fields, checked; its payload is made when its bytes are needed."""
 
     __slots__ = ("_opened", "codec", "values")
 
