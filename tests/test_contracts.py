@@ -37,6 +37,7 @@ FORBIDDEN = [
     ("borechain/cli/shared_options.py", "import can"),
     ("node/kernels/record/filter_record.py", "import msgpack"),
     ("node/firmware/encoder_node.py", "import asyncio"),
+    ("node/firmware/inputs.py", "import msgspec"),
     ("groundstation/survey/tools/formulas.py", "import groundstation.survey.wall.voids"),
     ("node/kernels/record/ring.py", "import node.kernels.filter.resets"),
     ("node/kernels/filter/fixed/cycle.py", "import node.kernels.filter.float64.cycle"),

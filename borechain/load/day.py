@@ -7,7 +7,6 @@ import json
 import socket
 import time
 import urllib.request
-from dataclasses import replace
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -24,6 +23,7 @@ from groundstation.service.disk.ground_store import Store, Stored
 from sim.errors import RigError
 from sim.rig.processes import ProcessTable, Spec
 from sim.rig.realtime import cpu_seconds, footprint, pids
+from telemetry.frozen import replace
 from telemetry.media.zenoh_bus import open_router
 from telemetry.messages import Stand, SurveyMeasurement
 from telemetry.runtime.hosting import Place

@@ -1,7 +1,6 @@
 """A survey that is said again takes the place of the one before: it is as if the last word were the only one."""
 
 import math
-from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -15,6 +14,7 @@ from groundstation.config import GroundConfig
 from groundstation.service.answers import measurement_views, views
 from groundstation.service.answers.model import RigModel
 from groundstation.service.answers.paths import FIXED, header
+from telemetry.frozen import replace
 from telemetry.messages import NodeFlag
 
 STOPS = 5

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import json
 import math
-from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -20,6 +19,7 @@ from groundstation.service.answers import key_fields
 from groundstation.service.answers.model import RigModel
 from groundstation.service.orders.surveyed_biases import GRAVITY_STD, surveyed_biases
 from groundstation.survey.fusion.force_biases import ForceBias
+from telemetry.frozen import replace
 from telemetry.messages import ImuMean, NodeFlag, SurveyMeasurement
 from telemetry.parameters import ParameterBlock, SensorParameters
 

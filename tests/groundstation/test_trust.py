@@ -1,7 +1,6 @@
 """Every flag of a survey has its stated effect on the fusion, whatever the rest of the survey is."""
 
 import math
-from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -23,6 +22,7 @@ from groundstation.survey.fusion.survey_trust import (
     with_uncertain_yaw,
     with_unknown_yaw,
 )
+from telemetry.frozen import replace
 from telemetry.messages import ImuMean, NodeFlag, SurveyMeasurement
 
 G, DEG, VAR = 9.81, math.pi / 180.0, (0.0034**2) / 32

@@ -1,7 +1,8 @@
-"""How each kind of field is checked and put into msgpack."""
+"""How each kind of field is checked by hand, and what of it msgpack packs: what the codec is held to."""
 
 from __future__ import annotations
 
+import enum
 import math
 from collections.abc import Callable
 from copy import copy
@@ -27,15 +28,13 @@ from telemetry.quantities import (
 )
 from telemetry.schema import LARGEST_TIME, MAX_EPOCH, Field
 
-MAX_BINARY = 256
 LARGEST_COVARIANCE, LARGEST_FORCE = 1e6, 1e3  # (m/s^2)^2 and the like, m/s^2
 
 Check = Callable[[Quantity, Any], Any]
-QUICK: dict[ValueKind, type[Any]] = {ValueKind.NUMBER: float, ValueKind.INTEGER: int}
 
 
 @dataclass(frozen=True, slots=True)
-class FieldCodec:
+class ByHand:
     """One field on the wire: attribute, short key, check (raises ValueError), and what is packed if not the value."""
 
     name: str
@@ -50,38 +49,19 @@ class FieldCodec:
         return copy(self.before)
 
 
-def codec_of(field: Field) -> FieldCodec:
-    """Codec of one line of the schema."""
-    check, pack = CODECS[field.kind]
+def by_hand(field: Field) -> ByHand:
+    """Checks of one line of the schema."""
+    check, pack = CHECKS[field.kind]
     checked: Callable[[Any], Any] = partial(check, field)
     if field.enumeration is not None:
-        checked = enumerated(field, field.enumeration)
-    elif field.kind in QUICK:
-        checked = quick(field, QUICK[field.kind], checked)
-    return FieldCodec(field.name, field.key, checked, pack, field.since, field.before)
+        checked = partial(check_member, field)
+    return ByHand(field.name, field.key, checked, pack, field.since, field.before)
 
 
-def quick(q: Quantity, kind: type[Any], check: Callable[[Any], Any]) -> Callable[[Any], Any]:
-    """Check of a number that calls ``check`` only for one of another type or out of its range."""
-    low, high = q.low, q.high
-
-    def checked(value: Any) -> Any:
-        return value if type(value) is kind and low <= value <= high else check(value)
-
-    return checked
-
-
-def enumerated(q: Quantity, enumeration: Callable[[int], Any]) -> Callable[[Any], Any]:
-    """Check of an integer that stands for a member or for flags."""
-    members: dict[int, Any] = {}
-
-    def checked(value: Any) -> Any:
-        is_plain = type(value) is int or type(value) is enumeration
-        if not is_plain or (member := members.get(value)) is None:
-            member = members[int(value)] = enumeration(check_integer(q, value))
-        return member
-
-    return checked
+def check_member(field: Field, value: Any) -> enum.IntEnum | enum.IntFlag:
+    """A member or flags of their number."""
+    assert field.enumeration is not None
+    return field.enumeration(check_integer(field, value))
 
 
 def check_vector(q: Quantity, value: Any) -> tuple[float, float, float]:
@@ -150,7 +130,7 @@ def pack_stands(stands: Any) -> list[Any]:
     return [[stand.epoch, stand.begun_at, stand.ended_at, stand.md] for stand in stands]
 
 
-CODECS: dict[ValueKind, tuple[Check, Callable[[Any], Any] | None]] = {
+CHECKS: dict[ValueKind, tuple[Check, Callable[[Any], Any] | None]] = {
     ValueKind.NUMBER: (check_number, None),
     ValueKind.INTEGER: (check_integer, None),
     ValueKind.BOOLEAN: (check_boolean, None),
@@ -168,14 +148,6 @@ CODECS: dict[ValueKind, tuple[Check, Callable[[Any], Any] | None]] = {
 def _vector(name: str, value: Any, limit: float) -> tuple[float, float, float]:
     if not isinstance(value, list | tuple) or len(value) != 3:
         raise ValueError(f"{name}: expected three numbers, got {value!r:.40}")
-    x, y, z = value
-    if (
-        type(x) is type(y) is type(z) is float
-        and -limit <= x <= limit
-        and -limit <= y <= limit
-        and -limit <= z <= limit
-    ):
-        return x, y, z
     for item in value:
         if isinstance(item, bool) or not isinstance(item, int | float) or not -limit <= item <= limit:
             raise ValueError(f"{name}: expected numbers within +-{limit:g}, got {item!r:.40}")
@@ -200,8 +172,6 @@ def _imu(item: Any) -> ImuMean:
 
 def _stand(q: Quantity, item: Any) -> Stand:
     if isinstance(item, Stand):
-        if _is_right(q, item):
-            return item
         item = pack_stands([item])[0]
     if not isinstance(item, list) or len(item) != 4:
         raise ValueError(f"{q.name}: expected epoch, begin, end and depth, got {item!r:.40}")
@@ -212,18 +182,6 @@ def _stand(q: Quantity, item: Any) -> Stand:
     if not (begun_at <= ended_at and q.low <= md <= q.high):
         raise ValueError(f"{q.name}: expected begin, end and a depth of {q.low:g}..{q.high:g} m, got {item!r:.60}")
     return Stand(epoch, begun_at, ended_at, md)
-
-
-def _is_right(q: Quantity, stand: Stand) -> bool:
-    """Whether a stand is as the schema says without a conversion: the usual case."""
-    begun_at, ended_at, md = stand.begun_at, stand.ended_at, stand.md
-    return (
-        type(stand.epoch) is int
-        and type(begun_at) is type(ended_at) is type(md) is float
-        and 0 <= stand.epoch <= MAX_EPOCH
-        and -LARGEST_TIME <= begun_at <= ended_at <= LARGEST_TIME
-        and max(q.low, -LARGEST_TIME) <= md <= min(q.high, LARGEST_TIME)
-    )
 
 
 def _check_names(q: Quantity, value: Any) -> None:
