@@ -13,17 +13,10 @@ import msgpack
 import orjson
 
 from groundstation.errors import GroundError, SelectorError
+from groundstation.service.answers.answer_table import LONGEST_NUMBER, PATTERNS, find_answer
 from groundstation.service.answers.model import RigModel
-from groundstation.service.answers.paths import (
-    LONGEST_NUMBER,
-    PATTERNS,
-    Path,
-    check_parameters,
-    find,
-    is_of_the_hole,
-    paths,
-)
-from groundstation.service.answers.views import Parameters
+from groundstation.service.answers.paths import AnsweredPath, answered_paths, check_parameters, find_path
+from groundstation.service.answers.streamed_rows import Parameters
 from groundstation.service.orders.order_book import Order
 from groundstation.service.process.ground_process import BEATS, GroundProcess
 from groundstation.service.process.intake_tape import BEGIN, Intake, pack_intake
@@ -110,7 +103,7 @@ class ZenohGateway:
         What shows the whole hole is put one path a turn of the loop: who asks meanwhile waits for one of them at most.
         """
         self._publish_intake()
-        late = dict.fromkeys(path for path in changed if is_of_the_hole(path))
+        late = dict.fromkeys(path for path in changed if find_answer(path).of_the_hole)
         for path in changed:
             if path not in late:
                 self._put(path)
@@ -162,7 +155,7 @@ class ZenohGateway:
 
     def _news(self, path: str) -> bytes:
         """Answer to publish: of a stream the rows that have come since the last one."""
-        model, found = self._process.model, find(self._process.model, path)
+        model, found = self._process.model, find_path(self._process.model, path)
         if not found.is_stream:
             return found.json(model, {})
         since, self._told[path] = self._told.get(path, 0), model.seen[path]
@@ -181,10 +174,10 @@ class ZenohGateway:
 
     def _replies(self, query: Query) -> list[tuple[str, bytes]]:
         model = self._process.model
-        found = {path: one for path, one in paths(model).items() if query.intersects(self._key(path))}
+        found = {path: one for path, one in answered_paths(model).items() if query.intersects(self._key(path))}
         path = query.selector_key.partition("/ground/")[2]
         if not found and path and "*" not in path:
-            find(model, path)  # which says what there is in its place
+            find_path(model, path)  # which says what there is in its place
         if not found:
             raise SelectorError(
                 f"{query.selector_key}: no such key; expected below {self._key('')}: {', '.join(PATTERNS)}"
@@ -194,7 +187,7 @@ class ZenohGateway:
             raise SelectorError(f"parameter accept: expected json or msgpack, got {accept!r}")
         parameters = {name: value for name, value in query.parameters.items() if name not in COMMON_PARAMETERS}
         check_parameters(found.values(), parameters, COMMON_PARAMETERS)
-        pack = msgpack_of if accept == "msgpack" else Path.json
+        pack = msgpack_of if accept == "msgpack" else AnsweredPath.json
         return [(self._key(path), pack(one, model, parameters)) for path, one in found.items()]
 
     def _take_order(self, query: Query) -> None:
@@ -240,6 +233,6 @@ def refuse(query: Query, reason: str) -> None:
     query.finish()
 
 
-def msgpack_of(path: Path, model: RigModel, parameters: Parameters) -> bytes:
+def msgpack_of(path: AnsweredPath, model: RigModel, parameters: Parameters) -> bytes:
     """The answer of a path in msgpack."""
     return bytes(msgpack.packb(path.show(model, parameters)))

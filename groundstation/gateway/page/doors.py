@@ -20,7 +20,7 @@ from groundstation.gateway.page.reports import Reporter
 from groundstation.gateway.page.sessions import Session, Sessions, WrongPasswords, is_from
 from groundstation.gateway.page.settings import PageSettings
 from groundstation.service.answers.csv_tables import table_of
-from groundstation.service.answers.paths import check_parameters, find
+from groundstation.service.answers.paths import check_parameters, find_path
 from groundstation.service.orders.order_book import Order
 from groundstation.service.process.ground_process import GroundProcess
 from groundstation.service.process.operator_access import check_name
@@ -61,7 +61,7 @@ class Doors:
         path = request.path_params["path"]
         parameters = dict(request.query_params)
         try:
-            found = find(self._process.model, path)
+            found = find_path(self._process.model, path)
             check_parameters([found], parameters)
             return Response(found.json(self._process.model, parameters), media_type="application/json")
         except SelectorError as error:
@@ -73,7 +73,7 @@ class Doors:
         path, model = request.path_params["path"], self._process.model
         parameters = dict(request.query_params)
         try:
-            found = find(model, path)
+            found = find_path(model, path)
             check_parameters([found], parameters)
             text = table_of(path, found.fields, found.show(model, parameters))
         except SelectorError as error:
@@ -255,7 +255,7 @@ def address_of(request: Request) -> str:
 def is_known(process: GroundProcess, path: str) -> bool:
     """Whether there is an answer of this path, so that its parameters are what is wrong."""
     try:
-        find(process.model, path)
+        find_path(process.model, path)
     except SelectorError:
         return False
     return True

@@ -8,9 +8,8 @@ from typing import Any
 
 from groundstation.gateway.page.passwords import ROLES
 from groundstation.gateway.page.reports import SUBJECTS
-from groundstation.service.answers.answer_fields import object_schema
-from groundstation.service.answers.key_fields import HEADER, ORDER
-from groundstation.service.answers.paths import FIXED, MEMBERS, Member, Path
+from groundstation.service.answers.answer_table import ANSWERS, AnswerKey
+from groundstation.service.answers.shapes.answer_fields import object_schema
 from telemetry.application.arguments import shown_name
 from telemetry.application.commands import COMMANDS, CommandSpec
 from telemetry.quantities import ValueKind
@@ -44,7 +43,7 @@ SESSION = {
 
 def document(version: str) -> View:
     """The whole document."""
-    answers = {f"/api/{pattern}": {"get": asked(pattern, path)} for pattern, path in (FIXED | MEMBERS).items()}
+    answers = {f"/api/{pattern}": {"get": asked(answer)} for pattern, answer in ANSWERS.items()}
     orders = {f"/api/cmd/{name}": {"post": ordered(name)} for name in dict.fromkeys(spec.name for spec in COMMANDS)}
     return {
         "openapi": "3.1.0",
@@ -59,17 +58,15 @@ def document(version: str) -> View:
     }
 
 
-def asked(pattern: str, path: Path | Member) -> View:
+def asked(answer: AnswerKey) -> View:
     """One answer."""
-    inside = [
-        {"name": name, "in": "path", "required": True, "schema": {"type": "integer"}}
-        for name in re.findall(r"\{([a-z]+)\}", pattern)
-    ]
-    query = path.parameters if isinstance(path, Path) else ()
+    inside = [{"name": name, "in": "path", "required": True, "schema": {"type": "integer"}} for name in answer.numbers]
+    query = [{"name": name, "in": "query", "schema": {"type": "string"}} for name in answer.parameters]
     return {
-        "operationId": "ask_" + re.sub(r"[^a-z_]+", "_", pattern).strip("_"),
-        "parameters": inside + [{"name": name, "in": "query", "schema": {"type": "string"}} for name in query],
-        "responses": {"200": content_of("the answer", object_schema(path.fields))} | refusals(400, 401, 404),
+        "operationId": "ask_" + re.sub(r"[^a-z_]+", "_", answer.path).strip("_"),
+        "parameters": inside
+        + [{"name": name, "in": "query", "schema": {"type": "string"}} for name in answer.parameters],
+        "responses": {"200": content_of("the answer", object_schema(answer.fields))} | refusals(400, 401, 404),
     }
 
 
@@ -108,7 +105,7 @@ def ordered(name: str) -> View:
     specs = [spec for spec in COMMANDS if spec.name == name]
     schemas = [arguments_of(spec) for spec in specs]
     body = schemas[0] if len(schemas) == 1 else {"oneOf": schemas}
-    order = object_schema((*HEADER, *ORDER))
+    order = object_schema(ANSWERS["orders/{n}"].fields)
     return {
         "operationId": f"order_{name}",
         "description": "; ".join(f"{spec.action}: {spec.meaning}" if spec.action else spec.meaning for spec in specs),

@@ -10,7 +10,7 @@ from groundstation.errors import GroundError
 from groundstation.gateway.page.guard import RequestError
 from groundstation.service.answers.csv_tables import table_of
 from groundstation.service.answers.model import RigModel
-from groundstation.service.answers.paths import find
+from groundstation.service.answers.paths import find_path
 from groundstation.service.answers.wall_views import stations_of
 from groundstation.service.hole.live_wall import Neighbourhood
 
@@ -48,7 +48,7 @@ class Reporter:
         if self._is_busy:
             raise RequestError(503, "another report is being made", retry_after=REPORT_WITHIN_S)
         found = wall.judged(stations_of(self._model), self._model.depths.latest)
-        stations = find(self._model, "stations")
+        stations = find_path(self._model, "stations")
         text = table_of("stations", stations.fields, stations.show(self._model, {}))
         inputs = [*wall.inputs, ("the stations of this rig", hashlib.sha256(text.encode()).hexdigest())]
         self._is_busy = True
