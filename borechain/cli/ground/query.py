@@ -63,7 +63,7 @@ def query(
       borechain query 'borechain/rig-1/ground/stations' --csv > stations.csv
       borechain query 'borechain/rig-1/cmd/take_survey?tube=3'
     """
-    from borechain.client import who_is_there
+    from borechain.rig_search import who_is_there
     from telemetry.media.credentials import credentials_for
     from telemetry.media.zenoh_bus import open_client
 

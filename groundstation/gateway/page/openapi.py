@@ -64,8 +64,7 @@ def asked(answer: AnswerKey) -> View:
     query = [{"name": name, "in": "query", "schema": {"type": "string"}} for name in answer.parameters]
     return {
         "operationId": "ask_" + re.sub(r"[^a-z_]+", "_", answer.path).strip("_"),
-        "parameters": inside
-        + [{"name": name, "in": "query", "schema": {"type": "string"}} for name in answer.parameters],
+        "parameters": inside + query,
         "responses": {"200": content_of("the answer", object_schema(answer.fields))} | refusals(400, 401, 404),
     }
 

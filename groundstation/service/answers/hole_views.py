@@ -13,7 +13,7 @@ from groundstation.errors import SelectorError, SurveyError
 from groundstation.service.answers.answer_views import member_view_of, view_of
 from groundstation.service.answers.model import RigModel
 from groundstation.service.answers.selector_range import SelectorRange
-from groundstation.service.answers.shapes.answer_fields import filled_answer
+from groundstation.service.answers.shapes.answer_fields import filled_answers
 from groundstation.service.answers.shapes.hole_answers import (
     PlanEllipse,
     PositionSigmas,
@@ -65,10 +65,10 @@ def station_rows(k: RigModel, numbers: Sequence[int]) -> list[Station]:
         s.show(values)
     places = [hole.place_of(s) for s in chosen]
     positions = position_values(drawn.positions[places], drawn.covs[places])
-    return [
-        filled_answer(Station, {"station": n, "md_m": round(s.md, 6)} | (s.shown or {}) | position)
-        for n, s, position in zip(numbers, chosen, positions, strict=True)
-    ]
+    rows = zip(numbers, chosen, positions, strict=True)
+    return filled_answers(
+        Station, ({"station": n, "md_m": round(s.md, 6)} | (s.shown or {}) | position for n, s, position in rows)
+    )
 
 
 def direction_values(hole: Hole, chosen: Sequence[SurveyStation]) -> list[Values]:
@@ -132,10 +132,10 @@ def trajectory_points(points: Sequence[Point]) -> list[TrajectoryPoint]:
     if not points:
         return []
     positions = position_values(np.array([q.position for q in points]), np.array([q.cov for q in points]))
-    return [trajectory_point(*row) for row in zip(points, positions, strict=True)]
+    return filled_answers(TrajectoryPoint, map(point_values, points, positions))
 
 
-def trajectory_point(point: Point, position: Values) -> TrajectoryPoint:
+def point_values(point: Point, position: Values) -> Values:
     """One point of the trajectory."""
     inclination, azimuth = angles(point.tangent[:2], float(point.tangent[2]))
     way = {
@@ -143,7 +143,7 @@ def trajectory_point(point: Point, position: Values) -> TrajectoryPoint:
         "inclination_deg": math.degrees(inclination),
         "azimuth_deg": math.degrees(azimuth),
     }
-    return filled_answer(TrajectoryPoint, way | position | {"covariance_m2": point.cov.tolist()})
+    return way | position | {"covariance_m2": point.cov.tolist()}
 
 
 def position_values(positions: Array, covs: Array) -> list[Values]:

@@ -18,7 +18,7 @@ from groundstation.service.answers.answer_views import member_view_of, view_of
 from groundstation.service.answers.model import RigModel
 from groundstation.service.answers.row_texts import Numbers
 from groundstation.service.answers.selector_range import SelectorRange
-from groundstation.service.answers.shapes.answer_fields import filled_rows
+from groundstation.service.answers.shapes.answer_fields import filled_columns
 from groundstation.service.answers.shapes.hole_answers import (
     MeasurementRow,
     MeasurementsAnswer,
@@ -115,7 +115,7 @@ def measurement_rows(surveys: Table, rows: Sequence[int], stations: Sequence[int
         "trust": [_trust_name(trust) for trust in table["trust"].tolist()],
         "quality": [_quality_names(quality) for quality in table["quality"].tolist()],
     }
-    return filled_rows(MeasurementRow, {name: plain_column(column) for name, column in columns.items()})
+    return filled_columns(MeasurementRow, {name: plain_column(column) for name, column in columns.items()})
 
 
 def plain_column(column: Any) -> list[Any]:

@@ -140,32 +140,31 @@ def kind_of(hint: Any) -> tuple[str, type[Any] | None]:
     return JSON_KINDS.get(hint, ""), None
 
 
-def filled_answer(shape: type[Shape], values: dict[str, Any]) -> Shape:
-    """An answer of these values, made more quickly than from arguments.
+def filled_answers(shape: type[Shape], rows: Iterable[dict[str, Any]]) -> list[Shape]:
+    """Answers of these values, all made alike; quicker than from arguments.
 
     Raises
     ------
     TypeError
-        When ``values`` are not its fields in their order.
+        When the first row's are not the fields of the class in their order.
     """
-    check_names(shape, [*values])
-    made = object.__new__(shape)
-    made.__dict__ = values
-    return made
+    found: list[Shape] = []
+    for values in rows:
+        if not found:
+            check_names(shape, [*values])
+        made = object.__new__(shape)
+        made.__dict__ = values
+        found.append(made)
+    return found
 
 
-def filled_rows(shape: type[Shape], columns: Mapping[str, Iterable[Any]]) -> list[Shape]:
-    """Rows of which each column is given, one for each field; errors as ``filled_answer``."""
-    names = [*columns]
-    check_names(shape, names)
-    rows = [object.__new__(shape) for _ in next(iter(columns.values()))]
-    for row, values in zip(rows, zip(*columns.values(), strict=True), strict=True):
-        row.__dict__ = dict(zip(names, values, strict=True))
-    return rows
+def filled_columns(shape: type[Shape], columns: Mapping[str, Iterable[Any]]) -> list[Shape]:
+    """The same of columns, one a field."""
+    return filled_answers(shape, (dict(zip(columns, row, strict=True)) for row in zip(*columns.values(), strict=True)))
 
 
 def check_names(shape: type[Any], names: list[str]) -> None:
-    """Refuse names that are not those of the fields, in their order; errors as ``filled_answer``."""
+    """Refuse names that are not those of the fields, in their order; errors as ``filled_answers``."""
     expected = _NAMES[shape]
     if names != expected:
         raise TypeError(f"{shape.__name__}: expected {', '.join(expected)}, got {', '.join(names)}")
