@@ -56,7 +56,7 @@ COMMAND = Addition(
 )
 MEDIUM = Addition(
     row="a medium",
-    table="telemetry/media/table.py",
+    table="telemetry/media/media_table.py",
     head="MEDIA: dict[str, str] = {\n",
     line='    "tin-can": "telemetry.media.tin_can",\n',
     files={"telemetry/media/tin_can.py": "from telemetry.media.memory import open_medium\n"},
@@ -64,14 +64,14 @@ MEDIUM = Addition(
 )
 STUDY = Addition(
     row="a study",
-    table="sim/studies/table.py",
+    table="sim/studies/study_table.py",
     head="STUDIES = by_name(\n",
     line="""
         Study(
             "coin",
             "Whether a coin is fair.",
             f"{MODULES}.coin",
-            (Table("{throws} throws", (("case", "case"), ("ours", "ours")), (("case", "case"), ("ours", "ours"))),),
+            (ResultTable("{throws} throws", (("case", "case"), ("ours", "ours")), (("case", "case"), ("ours", "ours"))),),
             (Option("throws", 4, 1, 10),),
             drawn=False,
         ),
@@ -79,11 +79,11 @@ STUDY = Addition(
     files={
         "sim/studies/coin/__init__.py": "",
         "sim/studies/coin/run.py": """
-def steps(throws):
+def count_steps(throws):
     return throws
 
 
-def run(throws, step):
+def run_study(throws, step):
     for _ in range(throws):
         step()
     return {"experiment": "coin", "throws": throws, "cases": [{"case": "heads", "ours": 0.25}]}
@@ -93,7 +93,7 @@ def run(throws, step):
 )
 INSTRUMENT = Addition(
     row="an instrument that writes records",
-    table="sim/instruments/table.py",
+    table="sim/instruments/instrument_table.py",
     head="INSTRUMENTS = by_name(\n",
     line='        Instrument("plumb", "a plumb line", f"{MODULES}.plumb_line"),\n',
     files={
@@ -101,11 +101,11 @@ INSTRUMENT = Addition(
 from sim.instruments.instrument import Records
 
 
-def records(seed):
+def simulate_records(seed):
     return Records({"plumb.csv": b"angle_deg\\n0\\n"}, {"plumb": {"seed": seed}})
 """
     },
-    named="records(seed)",
+    named="simulate_records(seed)",
 )
 ADDITIONS = (COMMAND, MEDIUM, STUDY, INSTRUMENT)
 
@@ -185,15 +185,15 @@ def test_a_tube_obeys_an_added_command_and_its_ranges_hold(copy: Path) -> None:
 
 def test_frames_cross_an_added_medium(copy: Path) -> None:
     out = run(copy, "-c", program("""
-        from telemetry.media.port import Frame, TubeEnd
-        from telemetry.media.table import open_medium
+        from telemetry.media.port import PortFrame, TubeEnd
+        from telemetry.media.media_table import open_medium
         from telemetry.messages import Side
 
         with open_medium("tin-can:garden") as medium:
             lower_end = TubeEnd("rig", 2, Side.LOWER, 1)
             upper, lower = medium.open_port(lower_end), medium.open_port(lower_end.facing)
             lower.listen(print)
-            upper.send(Frame(b"hello"))
+            upper.send(PortFrame(b"hello"))
             upper.close()
             lower.close()
     """))  # fmt: skip
@@ -209,7 +209,7 @@ def test_an_added_study_runs_as_every_other(copy: Path) -> None:
 
 def test_an_added_instrument_writes_its_records(copy: Path) -> None:
     out = run(copy, "-c", program("""
-        from sim.instruments.table import INSTRUMENTS
+        from sim.instruments.instrument_table import INSTRUMENTS
 
         records = INSTRUMENTS["plumb"].records(3)
         print(records.files["plumb.csv"], records.truth)

@@ -15,8 +15,8 @@ from groundstation.config import GroundConfig
 from groundstation.service.answers.measurement_views import measurement_rows
 from groundstation.service.answers.model import RigModel
 from groundstation.service.hole.resolved_stops import Cluster, Clusters, Table, cluster_of
-from groundstation.survey.fusion.resolve import Direction, Quality, angle_stds, angles, resolve
-from groundstation.survey.fusion.shared import Reading, SharedErrors
+from groundstation.survey.fusion.resolve import Direction, Quality, angle_stds, direction_angles, resolve_direction
+from groundstation.survey.fusion.shared import SharedErrors, StopDirection
 from groundstation.survey.fusion.survey_trust import Trust
 from telemetry.messages import ImuMean, NodeFlag, SurveyMeasurement
 
@@ -36,7 +36,7 @@ def survey(tube: int, number: int, at: float, imus: int = 1) -> SurveyMeasuremen
 
 def cluster(tube: int, number: int, at: float, imus: int = 1) -> Cluster:
     measured = survey(tube, number, at, imus)
-    resolved = resolve(np.array(measured.imus[0].force), np.array(COV), measured.yaw, measured.yaw_var)
+    resolved = resolve_direction(np.array(measured.imus[0].force), np.array(COV), measured.yaw, measured.yaw_var)
     reading = SharedErrors().reading(resolved, tube, list(range(tube + 1, tube + 3)), 1e-7, 1e-8, 1e-3)
     quality = Quality.MOTION | Quality.SPREAD if number % 3 == 0 else Quality.GOOD
     return cluster_of(measured, 2.0 * tube, reading, quality, EVERY[number % 2], number)
@@ -75,7 +75,7 @@ def test_a_place_that_there_is_not_is_named() -> None:
 def test_what_cannot_be_weighed_is_not_inserted() -> None:
     nothing_known = np.zeros((2, 2))
     bare = Direction(np.zeros(2), 1.0, nothing_known, np.zeros((2, 0)))
-    direction = Reading(bare, np.zeros((2, 5)), np.zeros(5, np.intp), 5)
+    direction = StopDirection(bare, np.zeros((2, 5)), np.zeros(5, np.intp), 5)
     clusters = Clusters()
     with pytest.raises(np.linalg.LinAlgError):
         clusters.insert(replace(cluster(1, 1, 5.0), direction=direction))
@@ -106,7 +106,7 @@ def test_what_is_shown_of_many_surveys_is_what_each_of_them_says() -> None:
     rows = [table.append_cluster(one) for one in known]
     shown = measurement_rows(table, rows[::-1], [3, 1, 1, 2, 9])
     for view, one, station in zip(shown, known[::-1], (3, 1, 1, 2, 9), strict=True):
-        inclination, azimuth = angles(one.direction.lean, one.direction.down)
+        inclination, azimuth = direction_angles(one.direction.lean, one.direction.down)
         stds = angle_stds(one.direction.lean, one.direction.down, one.direction.total_cov)
         assert (view["seq"], view["tube"], view["station"], view["md_m"]) == (one.number, one.tube, station, one.md)
         assert (view["inclination_deg"], view["azimuth_deg"]) == (math.degrees(inclination), math.degrees(azimuth))

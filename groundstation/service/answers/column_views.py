@@ -21,7 +21,7 @@ from groundstation.service.answers.shapes.column_answers import (
 from groundstation.service.answers.streamed_rows import Parameters
 from groundstation.service.answers.thinning import FEWEST, largest_triangles
 from groundstation.service.hole.history import History, Moment
-from groundstation.survey.wall.column_deviation import Deviation, dominant
+from groundstation.survey.wall.column_deviation import Deviation, lateral_errors
 
 POINTS, MOST_POINTS = 200, 1000  # of the history
 SHOWN = 30  # numbers that a refusal names
@@ -97,7 +97,7 @@ def _dominant(k: RigModel) -> DominantAngle | None:
     leaning = [station for station in k.stations if station.md > 0.0]
     if not leaning:
         return None
-    found = dominant(k.fused(leaning[-1]), k.hole.trajectory[-1].md)
+    found = lateral_errors(k.fused(leaning[-1]), k.hole.trajectory[-1].md)
     return DominantAngle(found.name, found.by_inclination, found.by_azimuth)
 
 

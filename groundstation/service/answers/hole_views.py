@@ -22,16 +22,16 @@ from groundstation.service.answers.shapes.hole_answers import (
     StationRegion,
     StationsAnswer,
     TrajectoryAnswer,
-    TrajectoryPoint,
+    TrajectoryRow,
     UncertaintyAnswer,
 )
 from groundstation.service.answers.streamed_rows import Parameters
 from groundstation.service.hole.station import SurveyStation
 from groundstation.service.hole.surveyed_hole import Hole
-from groundstation.survey.fusion.resolve import angle_stds_of_all, angles
+from groundstation.survey.fusion.resolve import angle_stds_of_all, direction_angles
 from groundstation.survey.fusion.shared import KIND_NAMES
-from groundstation.survey.well.ellipsoid import Ellipse, axes, coverage_radius, plan_ellipses
-from groundstation.survey.well.trajectory import Point, interpolate
+from groundstation.survey.well.ellipsoid import Ellipse, coverage_radius, ellipsoid_axes, plan_ellipses
+from groundstation.survey.well.trajectory import TrajectoryPoint, interpolate_point
 
 Array = npt.NDArray[np.float64]
 Values = dict[str, Any]  # of some fields of a row
@@ -79,7 +79,7 @@ def direction_values(hole: Hole, chosen: Sequence[SurveyStation]) -> list[Values
     downs, covs = [one.down for one in found], np.array([one.total_cov for one in found])
     stds = angle_stds_of_all(np.array([one.lean for one in found]), downs, covs)
     return [
-        direction_value(s, angles(one.lean, one.down), own, hole.transport_of(s))
+        direction_value(s, direction_angles(one.lean, one.down), own, hole.transport_of(s))
         for s, one, own in zip(chosen, found, stds, strict=True)
     ]
 
@@ -119,7 +119,7 @@ def answer_trajectory(k: RigModel, p: Parameters) -> TrajectoryAnswer:
     wanted = SelectorRange.of_parameter("md", p)
     if wanted.single:
         try:
-            points = [interpolate(points, wanted.low)]
+            points = [interpolate_point(points, wanted.low)]
         except SurveyError as error:
             raise SelectorError(f"parameter md: {error}") from error
     elif "md" in p:
@@ -127,17 +127,17 @@ def answer_trajectory(k: RigModel, p: Parameters) -> TrajectoryAnswer:
     return TrajectoryAnswer("balanced-tangential", trajectory_points(points))
 
 
-def trajectory_points(points: Sequence[Point]) -> list[TrajectoryPoint]:
+def trajectory_points(points: Sequence[TrajectoryPoint]) -> list[TrajectoryRow]:
     """Points of the trajectory."""
     if not points:
         return []
     positions = position_values(np.array([q.position for q in points]), np.array([q.cov for q in points]))
-    return filled_answers(TrajectoryPoint, map(point_values, points, positions))
+    return filled_answers(TrajectoryRow, map(point_values, points, positions))
 
 
-def point_values(point: Point, position: Values) -> Values:
+def point_values(point: TrajectoryPoint, position: Values) -> Values:
     """One point of the trajectory."""
-    inclination, azimuth = angles(point.tangent[:2], float(point.tangent[2]))
+    inclination, azimuth = direction_angles(point.tangent[:2], float(point.tangent[2]))
     way = {
         "md_m": round(point.md, 6),
         "inclination_deg": math.degrees(inclination),
@@ -161,7 +161,7 @@ def answer_uncertainty(k: RigModel, p: Parameters) -> UncertaintyAnswer:
     plane, space = coverage_radius(confidence, 2), coverage_radius(confidence, 3)
     random = np.diagonal(drawn.covs, axis1=1, axis2=2) - by_kind.sum(axis=1)
     stds = np.sqrt(np.maximum(np.concatenate([random[:, None], by_kind], axis=1), 0.0))
-    sizes, directions = axes(drawn.covs, space)
+    sizes, directions = ellipsoid_axes(drawn.covs, space)
     columns = (drawn.md, drawn.covs, sizes, directions, stds)
     rows = zip(*(column.tolist() for column in columns), plan_ellipses(drawn.covs, plane), strict=True)
     return UncertaintyAnswer(confidence, plane, space, [_region(*row) for row in rows])

@@ -27,7 +27,7 @@ from groundstation.service.answers.shapes.hole_answers import (
 from groundstation.service.answers.streamed_rows import Parameters, is_streamed, window_limits
 from groundstation.service.answers.string_views import flag_names
 from groundstation.service.hole.resolved_stops import NO_NUMBER, Table, forces_of
-from groundstation.survey.fusion.resolve import Quality, angle_stds_of_all, angles
+from groundstation.survey.fusion.resolve import Quality, angle_stds_of_all, direction_angles
 from groundstation.survey.fusion.survey_trust import Trust
 from telemetry.messages import NodeFlag
 
@@ -90,7 +90,7 @@ def measurement_rows(surveys: Table, rows: Sequence[int], stations: Sequence[int
         return []
     table = surveys.rows[rows]
     downs = table["down"].tolist()
-    pointing = np.array([angles(*way) for way in zip(table["lean"], downs, strict=True)])
+    pointing = np.array([direction_angles(*way) for way in zip(table["lean"], downs, strict=True)])
     stds = np.array(angle_stds_of_all(table["lean"], downs, surveys.covs(rows)))
     columns = {
         "seq": table["number"],

@@ -28,7 +28,7 @@ from groundstation.service.string.stops import Stops
 from groundstation.service.string.tally import Tally
 from groundstation.survey.fusion.joint_angles import JointAngles
 from groundstation.survey.fusion.resolve import Direction, Quality, Resolved
-from groundstation.survey.fusion.shared import Reading, SharedErrors, weigh_together
+from groundstation.survey.fusion.shared import SharedErrors, StopDirection, weigh_together
 from groundstation.survey.fusion.survey_trust import Trust, trust_of, with_uncertain_yaw, with_unknown_yaw
 from telemetry.messages import EPOCH_UNKNOWN, Event, NodeFlag, NodeState, StaticRecord, SurveyMeasurement
 
@@ -58,7 +58,7 @@ class Prepared:
     """A survey that is about to be fused: what is wrong with its stop, and its direction with what it shares."""
 
     quality: Quality
-    direction: Reading
+    direction: StopDirection
 
 
 class RigModel:
@@ -317,7 +317,7 @@ class RigModel:
     def _hops_if_unknown(self, measurement: SurveyMeasurement) -> int:
         return measurement.hops if measurement.tube not in self.tally.tubes else -1
 
-    def _direction(self, m: SurveyMeasurement, trust: Trust, resolved: Resolved) -> Reading:
+    def _direction(self, m: SurveyMeasurement, trust: Trust, resolved: Resolved) -> StopDirection:
         """Direction of a measurement with what it shares with others."""
         if trust is Trust.UNKNOWN_YAW:
             resolved = with_unknown_yaw(resolved)

@@ -17,7 +17,7 @@ import numpy.typing as npt
 
 from groundstation.survey.fusion.fusion import Departure, Stack
 from groundstation.survey.fusion.resolve import Direction, Quality
-from groundstation.survey.fusion.shared import CAUSES, Places, Reading, columns_of
+from groundstation.survey.fusion.shared import CAUSES, Places, StopDirection, columns_of
 from groundstation.survey.fusion.survey_trust import UNKNOWN_YAW_VAR, Trust
 from telemetry.messages import NodeFlag, SurveyMeasurement
 
@@ -64,7 +64,7 @@ class Cluster:
     quality: Quality
     trust: Trust
     number: int  # place in the order in which surveys were placed
-    direction: Reading
+    direction: StopDirection
     replaces: int = NO_NUMBER  # the tube's number of the survey that this one revises
 
     @property
@@ -79,7 +79,7 @@ class Cluster:
 
 
 def cluster_of(
-    measurement: SurveyMeasurement, md: float, direction: Reading, quality: Quality, trust: Trust, number: int
+    measurement: SurveyMeasurement, md: float, direction: StopDirection, quality: Quality, trust: Trust, number: int
 ) -> Cluster:
     """A stored measurement with its depth (m), and what it was resolved to."""
     m = measurement
@@ -161,12 +161,12 @@ class Table:
         """One number of every survey, (n,) or (n, ...): a look at the table."""
         return self.rows[name][: len(self)]
 
-    def reading(self, number: int) -> Reading:
+    def reading(self, number: int) -> StopDirection:
         """Direction of the survey in a row."""
         row = self.rows[number]
         bare = Direction(row["lean"].copy(), float(row["down"]), row["cov"].copy(), NOTHING)
         causes, information = row["causes"].copy(), row["information"].copy()
-        return Reading(bare, causes, self.places[number], int(row["width"]), information)
+        return StopDirection(bare, causes, self.places[number], int(row["width"]), information)
 
     def stack(self, numbers: Sequence[int]) -> Stack:
         """Directions of the surveys in several rows, side by side."""
@@ -229,7 +229,7 @@ class Clusters:
             raise IndexError(f"cluster {place}: expected one of {len(self)}")
         return self._table.cluster(self._rows[place])
 
-    def reading(self, place: int) -> Reading:
+    def reading(self, place: int) -> StopDirection:
         """Direction of the cluster at a place."""
         return self._table.reading(self._rows[place])
 

@@ -7,9 +7,9 @@ from dataclasses import dataclass, field
 from typing import Any
 
 from groundstation.service.hole.resolved_stops import Cluster, Clusters
-from groundstation.survey.fusion.fusion import Departure, GrowingBayes, Stack, Weighting, departure_from, weighted
+from groundstation.survey.fusion.fusion import Departure, GrowingBayes, Stack, Weighting, departure_from, fuse_by_scheme
 from groundstation.survey.fusion.resolve import Direction
-from groundstation.survey.fusion.shared import Reading
+from groundstation.survey.fusion.shared import StopDirection
 from groundstation.survey.fusion.survey_trust import UNKNOWN_YAW_VAR, Trust
 
 
@@ -125,7 +125,7 @@ class SurveyStation:
 
     def _fuse(self, weighting: Weighting) -> Direction:
         if weighting is not Weighting.BAYES:
-            return weighted([self.clusters.reading(place) for place in self.counting], weighting)
+            return fuse_by_scheme([self.clusters.reading(place) for place in self.counting], weighting)
         if not self.untrusted or len(self.counting) == self.count - self.first:
             return self._sum_of_all(self.count)
         if self._trusted is None:
@@ -152,10 +152,10 @@ class SurveyStation:
         """Direction from the clusters before a place since the hole moved, whether they are believed or not."""
         return self._all.of(self.first_before(end), end, self._readings)
 
-    def _readings(self, begin: int, end: int) -> Iterator[Reading]:
+    def _readings(self, begin: int, end: int) -> Iterator[StopDirection]:
         return map(self.clusters.reading, range(begin, end))
 
-    def _trusted_readings(self, begin: int, end: int) -> Iterator[Reading]:
+    def _trusted_readings(self, begin: int, end: int) -> Iterator[StopDirection]:
         trust = self.clusters.column("trust")
         return (self.clusters.reading(place) for place in range(begin, end) if trust[place] == Trust.FULL)
 

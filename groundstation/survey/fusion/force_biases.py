@@ -18,8 +18,8 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
-from groundstation.survey.fusion.resolve import resolve
-from groundstation.survey.fusion.shared import Reading
+from groundstation.survey.fusion.resolve import resolve_direction
+from groundstation.survey.fusion.shared import StopDirection
 
 Array = npt.NDArray[np.float64]
 Places = npt.NDArray[np.intp]
@@ -76,7 +76,7 @@ class SurveyedBiases:
 
 
 def look_of(
-    station: Hashable, tube: int, reading: Reading, force: Array, var: float, yaw: float, gravity: float
+    station: Hashable, tube: int, reading: StopDirection, force: Array, var: float, yaw: float, gravity: float
 ) -> Look:
     """Look of a reading.
 
@@ -91,7 +91,7 @@ def look_of(
     mount, joints = reading.causes[:, :1], reading.causes[:, 1:2]
     places = reading.places[:-AXES]
     columns = np.concatenate([mount, np.repeat(joints, len(places) - 1, axis=1)], axis=1)
-    by_force = resolve(force, var * np.eye(AXES), yaw, 0.0).by_force
+    by_force = resolve_direction(force, var * np.eye(AXES), yaw, 0.0).by_force
     return Look(
         station, tube, reading.lean, reading.cov, by_force, columns, places, force / size, size - gravity, var
     )  # fmt: skip

@@ -29,7 +29,7 @@ KIND_NAMES = sorted(set(KINDS.values()))
 TRANSPORT = "transport"  # of columns that random errors share; they are of no kind
 
 
-class Reading(Direction):
+class StopDirection(Direction):
     """Direction of one tube's stop. Its columns are made when they are asked for, out of what all of them come from.
 
     The mount, each joint and the three axes of the accelerometer: that is five columns, of which that of a joint stands
@@ -200,7 +200,7 @@ class SharedErrors:
         systematic_var: float,
         mount_var: float,
         force_bias_std: float,
-    ) -> Reading:
+    ) -> StopDirection:
         """Direction of a reading with its columns.
 
         Parameters
@@ -218,7 +218,7 @@ class SharedErrors:
         causes[:, 0] = math.sqrt(mount_var) * resolved.by_yaw
         causes[:, 1] = each * resolved.by_yaw
         causes[:, 2:] = force_bias_std * resolved.by_force
-        return Reading(resolved.direction, causes, places, len(self._columns))
+        return StopDirection(resolved.direction, causes, places, len(self._columns))
 
     def variances(self, columns: Array) -> Array:
         """Variances (n, kinds, k) of what has these columns (n, k, s), by kind in the order of ``KIND_NAMES``."""
@@ -262,7 +262,7 @@ class SharedErrors:
         return [*inner, ("drive", names[-1])]
 
 
-def stacked(directions: Sequence[Direction], width: int) -> Array:
+def stack_shared_errors(directions: Sequence[Direction], width: int) -> Array:
     """Columns (n, 2, width) of directions, with zeros for those that one does not know."""
     columns = np.zeros((len(directions), 2, width))
     for own, direction in zip(columns, directions, strict=True):
@@ -270,7 +270,7 @@ def stacked(directions: Sequence[Direction], width: int) -> Array:
     return columns
 
 
-def weigh_together(readings: Sequence[Reading]) -> None:
+def weigh_together(readings: Sequence[StopDirection]) -> None:
     """Work out the information of many readings at once, bit for bit as each by itself.
 
     Raises
@@ -287,13 +287,13 @@ def weigh_together(readings: Sequence[Reading]) -> None:
         object.__setattr__(one, "_information", information)
 
 
-def widened(shared: Array, columns: int) -> Array:
+def widen_shared_errors(shared: Array, columns: int) -> Array:
     """The same columns with zeros for those met later: (k, columns)."""
     missing = columns - shared.shape[1]
     return shared if missing == 0 else np.concatenate([shared, np.zeros((shared.shape[0], missing))], axis=1)
 
 
-def added(one: Array, other: Array) -> Array:
+def add_shared_errors(one: Array, other: Array) -> Array:
     """Sum of two sets of columns of different width."""
     columns = max(one.shape[1], other.shape[1])
-    return widened(one, columns) + widened(other, columns)
+    return widen_shared_errors(one, columns) + widen_shared_errors(other, columns)

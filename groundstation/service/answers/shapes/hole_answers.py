@@ -112,7 +112,7 @@ class StationMeasurementsAnswer:
 
 
 @answer
-class TrajectoryPoint:
+class TrajectoryRow:
     """One point of the trajectory."""
 
     md_m: MeasuredDepth
@@ -132,7 +132,7 @@ class TrajectoryAnswer:
     """Positions with covariance."""
 
     method: Annotated[str, "how the stations are joined", OneOf("balanced-tangential")]
-    points: list[TrajectoryPoint]
+    points: list[TrajectoryRow]
 
 
 @answer
