@@ -29,12 +29,12 @@ from typing import Any, TypeVar
 
 from borechain.rig_search import live_rigs, who_is_there
 from groundstation.service.answers.answer_table import ANSWERS
-from groundstation.service.answers.shapes.alarm_answers import Alarm
-from groundstation.service.answers.shapes.answer_fields import AnswerField, answer, fields_of_answer
-from groundstation.service.answers.shapes.column_answers import Off, Steer, Verdict
-from groundstation.service.answers.shapes.hole_answers import Station
-from groundstation.service.answers.shapes.order_answers import Order
-from groundstation.service.answers.shapes.string_answers import AnswerHeader
+from groundstation.service.answers.shapes.alarm_shapes import Alarm
+from groundstation.service.answers.shapes.answer_fields import AnswerField, answer_class, fields_of_answer
+from groundstation.service.answers.shapes.column_shapes import Off, Steer, Verdict
+from groundstation.service.answers.shapes.hole_shapes import Station
+from groundstation.service.answers.shapes.order_shapes import Order
+from groundstation.service.answers.shapes.string_shapes import AnswerHeader
 from telemetry import keys
 from telemetry.errors import BorechainError
 from telemetry.media.credentials import credentials_for
@@ -80,7 +80,7 @@ class AnswerError(ClientError, ValueError):
     """The answer is not one of this version."""
 
 
-@answer
+@answer_class
 class AnsweredVerdict(Verdict, AnswerHeader):
     """A verdict behind the header of its answer, which says of when it is."""
 

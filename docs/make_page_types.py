@@ -16,7 +16,7 @@ sys.path[:0] = [str(DOCS.parent)]
 
 from groundstation.service.answers.answer_table import ANSWERS, AnswerKey  # noqa: E402
 from groundstation.service.answers.shapes.answer_fields import AnswerField, fields_of_answer  # noqa: E402
-from groundstation.service.answers.shapes.string_answers import AnswerHeader  # noqa: E402
+from groundstation.service.answers.shapes.string_shapes import AnswerHeader  # noqa: E402
 
 TYPES = DOCS.parent / "groundstation" / "gateway" / "page" / "static" / "js" / "answers.d.ts"
 SCALARS = {"number": "number", "integer": "number", "string": "string", "boolean": "boolean"}

@@ -29,7 +29,7 @@ from groundstation.gateway.page.passwords import drawn_password, hash_of, is_rig
 from groundstation.gateway.page.server import CONNECTIONS, SERVER_TASK
 from groundstation.gateway.page.sessions import LONGEST_HOLD_S, SESSIONS, VALID_S, Sessions, WrongPasswords, is_from
 from groundstation.gateway.page.settings import PageSettings, check_certificate, listen, parse_address
-from groundstation.service.answers.paths import PATTERNS
+from groundstation.service.answers.answer_table import PATTERNS
 from telemetry.application.commands import COMMANDS
 from telemetry.errors import KeyFileError
 

@@ -10,7 +10,7 @@ from groundstation.service.alarms.verdict import wind
 from groundstation.service.answers.answer_texts import finite_or_none, utc_or_none
 from groundstation.service.answers.answer_views import view_of
 from groundstation.service.answers.model import RigModel
-from groundstation.service.answers.shapes.alarm_answers import (
+from groundstation.service.answers.shapes.alarm_shapes import (
     Alarm,
     AlarmsAnswer,
     MovedStation,

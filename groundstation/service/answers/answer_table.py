@@ -10,10 +10,10 @@ from dataclasses import dataclass
 from typing import Any, Final
 
 from groundstation.errors import SelectorError
-from groundstation.service.answers.shapes.alarm_answers import AlarmsAnswer
+from groundstation.service.answers.shapes.alarm_shapes import AlarmsAnswer
 from groundstation.service.answers.shapes.answer_fields import Fields, fields_of_answer, object_schema
-from groundstation.service.answers.shapes.column_answers import ColumnAnswer, HistoryAnswer, Verdict
-from groundstation.service.answers.shapes.hole_answers import (
+from groundstation.service.answers.shapes.column_shapes import ColumnAnswer, HistoryAnswer, Verdict
+from groundstation.service.answers.shapes.hole_shapes import (
     MeasurementsAnswer,
     Station,
     StationMeasurementsAnswer,
@@ -21,8 +21,8 @@ from groundstation.service.answers.shapes.hole_answers import (
     TrajectoryAnswer,
     UncertaintyAnswer,
 )
-from groundstation.service.answers.shapes.order_answers import Order, OrdersAnswer, RecalibrationAnswer
-from groundstation.service.answers.shapes.string_answers import (
+from groundstation.service.answers.shapes.order_shapes import Order, OrdersAnswer, RecalibrationAnswer
+from groundstation.service.answers.shapes.string_shapes import (
     AnswerHeader,
     ChangesAnswer,
     EventsAnswer,
@@ -32,7 +32,7 @@ from groundstation.service.answers.shapes.string_answers import (
     StatusAnswer,
     StringAnswer,
 )
-from groundstation.service.answers.shapes.wall_answers import WallAnswer
+from groundstation.service.answers.shapes.wall_shapes import WallAnswer
 from groundstation.service.answers.streamed_rows import STREAMED
 from telemetry import keys
 

@@ -10,10 +10,10 @@ from groundstation.errors import SelectorError
 from groundstation.service.answers.answer_table import LONGEST_NUMBER
 from groundstation.service.answers.answer_views import view_of
 from groundstation.service.answers.model import RigModel
-from groundstation.service.answers.shapes.column_answers import (
+from groundstation.service.answers.shapes.column_shapes import (
     ColumnAnswer,
-    ColumnDesign,
     ColumnDeviation,
+    DesignAxis,
     DominantAngle,
     HistoryAnswer,
     HistoryMoment,
@@ -39,7 +39,7 @@ def answer_column(k: RigModel, p: Parameters) -> ColumnAnswer:
     rows = list(hole.deviations) if moment is None else moment.rows
     end = hole.projection if moment is None else moment.projection
     return ColumnAnswer(
-        design=ColumnDesign(
+        design=DesignAxis(
             inclination_deg=config.design_inclination_deg,
             azimuth_deg=config.design_azimuth_deg,
             target_m=config.design.length,

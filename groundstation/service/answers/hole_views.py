@@ -14,7 +14,7 @@ from groundstation.service.answers.answer_views import member_view_of, view_of
 from groundstation.service.answers.model import RigModel
 from groundstation.service.answers.selector_range import SelectorRange
 from groundstation.service.answers.shapes.answer_fields import filled_answers
-from groundstation.service.answers.shapes.hole_answers import (
+from groundstation.service.answers.shapes.hole_shapes import (
     PlanEllipse,
     PositionSigmas,
     SemiAxis,

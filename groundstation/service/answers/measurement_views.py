@@ -19,7 +19,7 @@ from groundstation.service.answers.model import RigModel
 from groundstation.service.answers.row_texts import Numbers
 from groundstation.service.answers.selector_range import SelectorRange
 from groundstation.service.answers.shapes.answer_fields import filled_columns
-from groundstation.service.answers.shapes.hole_answers import (
+from groundstation.service.answers.shapes.hole_shapes import (
     MeasurementRow,
     MeasurementsAnswer,
     StationMeasurementsAnswer,

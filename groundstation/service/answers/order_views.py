@@ -6,7 +6,7 @@ from groundstation.errors import SelectorError
 from groundstation.service.answers.answer_texts import finite_or_none
 from groundstation.service.answers.answer_views import member_view_of, view_of
 from groundstation.service.answers.model import RigModel
-from groundstation.service.answers.shapes.order_answers import Order, OrdersAnswer
+from groundstation.service.answers.shapes.order_shapes import Order, OrdersAnswer
 from groundstation.service.answers.streamed_rows import Parameters
 from groundstation.service.orders.order_book import Order as SentOrder
 from telemetry.application.arguments import shown_values

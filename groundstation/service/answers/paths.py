@@ -32,7 +32,7 @@ from groundstation.service.answers.answer_texts import finite_or_none, json_of, 
 from groundstation.service.answers.answer_views import MAKERS, view_of
 from groundstation.service.answers.model import RigModel
 from groundstation.service.answers.shapes.answer_fields import Fields
-from groundstation.service.answers.shapes.string_answers import AnswerHeader, SchemaAnswer
+from groundstation.service.answers.shapes.string_shapes import AnswerHeader, SchemaAnswer
 from groundstation.service.answers.streamed_rows import Parameters
 
 # each tells ``MAKERS`` of its views when it is imported
@@ -59,19 +59,20 @@ class AnsweredPath:
 
     def show(self, k: RigModel, p: Parameters) -> dict[str, Any]:
         """The whole answer as plain objects: what every answer has, and what its view makes."""
-        return dict(plain_answer(answer_header(k)) | plain_answer(self._made(k, p)))
+        return dict(plain_answer(answer_header(k)) | plain_answer(self.view(k, p)))
 
     def json(self, k: RigModel, p: Parameters) -> bytes:
         """The whole answer as JSON; of the hole the text of the last time, behind a header of now."""
         if (text_of := MAKERS[self.answer.shape].text) is not None:
             text = text_of(k, p)
         elif self.answer.of_the_hole and not p:
-            text = k.last_shown(self.answer.path, lambda: json_of(self._made(k, p)))
+            text = k.last_shown(self.answer.path, lambda: json_of(self.view(k, p)))
         else:
-            text = json_of(self._made(k, p))
+            text = json_of(self.view(k, p))
         return json_of(answer_header(k))[:-1] + b"," + text[1:]
 
-    def _made(self, k: RigModel, p: Parameters) -> Any:
+    def view(self, k: RigModel, p: Parameters) -> Any:
+        """What stands behind the header."""
         return MAKERS[self.answer.shape].view(k, p if self.number is None else self.number)
 
     @property

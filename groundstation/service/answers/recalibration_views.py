@@ -6,7 +6,7 @@ import math
 
 from groundstation.service.answers.answer_views import view_of
 from groundstation.service.answers.model import RigModel
-from groundstation.service.answers.shapes.order_answers import (
+from groundstation.service.answers.shapes.order_shapes import (
     InclinationRms,
     RecalibrationAnswer,
     RestAttitude,

@@ -8,7 +8,7 @@ from groundstation.service.answers.answer_texts import finite_or_none
 from groundstation.service.answers.answer_views import member_view_of, view_of
 from groundstation.service.answers.model import RigModel
 from groundstation.service.answers.selector_range import SelectorRange
-from groundstation.service.answers.shapes.string_answers import (
+from groundstation.service.answers.shapes.string_shapes import (
     ChangesAnswer,
     EventRow,
     EventsAnswer,

@@ -10,7 +10,7 @@ from groundstation.service.alarms.verdict_doubts import known_of
 from groundstation.service.answers.answer_views import view_of
 from groundstation.service.answers.model import RigModel
 from groundstation.service.answers.rounding import rounded, rounded_std
-from groundstation.service.answers.shapes.column_answers import Off, Steer, Verdict
+from groundstation.service.answers.shapes.column_shapes import Off, Steer, Verdict
 from groundstation.service.answers.streamed_rows import Parameters
 from groundstation.survey.wall.column_deviation import Deviation
 
@@ -30,7 +30,7 @@ def answer_verdict(k: RigModel, _p: Parameters) -> Verdict:
     """The verdict of this moment."""
     rig, good_for, known = k.config.rig, k.config.stale_after, known_of(k)
     found = judge(known)
-    way = None if found.about is None or found.act_before is None else steering(found.about, found)
+    way = None if found.about is None or found.act_before is None else steering_view(found.about, found)
     return Verdict(
         rig=rig,
         good_for_s=good_for,
@@ -43,12 +43,12 @@ def answer_verdict(k: RigModel, _p: Parameters) -> Verdict:
         bit_md_m=known.bit,
         target_m=known.target,
         what=found.what or None,
-        off=None if found.about is None else off_target(found.about),
+        off=None if found.about is None else off_target_view(found.about),
         steer=way,
     )
 
 
-def off_target(d: Deviation) -> Off:
+def off_target_view(d: Deviation) -> Off:
     """How far off, where, and in which direction."""
     return Off(
         md_m=round(d.md, 2),
@@ -61,7 +61,7 @@ def off_target(d: Deviation) -> Off:
     )
 
 
-def steering(d: Deviation, found: HoleVerdict) -> Steer:
+def steering_view(d: Deviation, found: HoleVerdict) -> Steer:
     """Where to, and until when."""
     back = direction(d) + math.pi
     return Steer(

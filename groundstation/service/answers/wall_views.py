@@ -10,7 +10,7 @@ import numpy as np
 from groundstation.service.answers.answer_texts import finite_or_none
 from groundstation.service.answers.answer_views import view_of
 from groundstation.service.answers.model import RigModel
-from groundstation.service.answers.shapes.wall_answers import (
+from groundstation.service.answers.shapes.wall_shapes import (
     ClosingColumn,
     WallAnswer,
     WallHole,

@@ -1,6 +1,6 @@
 """How an answer is described: by one class, whose fields say what they hold.
 
-    @answer
+    @answer_class
     class Off:
         \"\"\"How far off the hole is.\"\"\"
 
@@ -80,7 +80,7 @@ _NAMES: dict[type[Any], list[str]] = {}
 
 
 @dataclass_transform()
-def answer(shape: type[Shape]) -> type[Shape]:
+def answer_class(shape: type[Shape]) -> type[Shape]:
     """Make a dataclass of an answer, or of a part of one.
 
     Raises
@@ -100,7 +100,7 @@ def fields_of_answer(shape: type[Any]) -> Fields:
 
 
 def read_field(shape: type[Any], name: str, hint: Any) -> AnswerField:
-    """Field of a class by its annotation; errors as ``answer``."""
+    """Field of a class by its annotation; errors as ``answer_class``."""
     bare, *notes = get_args(hint) if get_origin(hint) is Annotated else (hint,)
     meaning = next((note for note in notes if isinstance(note, str)), "")
     choices = next((note.choices for note in notes if isinstance(note, OneOf)), ())

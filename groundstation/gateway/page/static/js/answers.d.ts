@@ -218,7 +218,7 @@ export interface MeasurementsAnswer {
 }
 
 /** One point of the trajectory. */
-export interface TrajectoryPoint {
+export interface TrajectoryRow {
   /** measured depth */
   md_m: number;
   /** from the vertical */
@@ -245,7 +245,7 @@ export interface TrajectoryPoint {
 export interface TrajectoryAnswer {
   /** how the stations are joined */
   method: "balanced-tangential";
-  points: TrajectoryPoint[];
+  points: TrajectoryRow[];
 }
 
 /** One event of a node. */
@@ -361,7 +361,7 @@ export interface UncertaintyAnswer {
 }
 
 /** Design of the column. */
-export interface ColumnDesign {
+export interface DesignAxis {
   /** of the axis */
   inclination_deg: number;
   /** of the axis */
@@ -412,7 +412,7 @@ export interface DominantAngle {
 
 /** Deviation from the design axis at every station, and projected to the target. */
 export interface ColumnAnswer {
-  design: ColumnDesign;
+  design: DesignAxis;
   stations: ColumnDeviation[];
   worst: ColumnDeviation;
   projection: ColumnDeviation | null;

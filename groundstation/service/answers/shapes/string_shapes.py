@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import Annotated, Any
 
 from groundstation.service.alarms.rig_alarms import Health
-from groundstation.service.answers.shapes.answer_fields import OneOf, answer
+from groundstation.service.answers.shapes.answer_fields import OneOf, answer_class
 from telemetry.messages import Mode, NodeFlag, Severity
 
 Tube = Annotated[int, "number of the tube"]
@@ -18,7 +18,7 @@ SystematicSigma = Annotated[float, "constant errors of joints; never averages aw
 Flags = Annotated[list[str], "trust in the own yaw", OneOf(*(str(flag.name).lower() for flag in NodeFlag if flag))]
 
 
-@answer
+@answer_class
 class AnswerHeader:
     """What every answer begins with."""
 
@@ -29,7 +29,7 @@ class AnswerHeader:
     rig_time_s: Annotated[float | None, "rig time now"]
 
 
-@answer
+@answer_class
 class StatusAnswer:
     """Rig time, depth, counts, health."""
 
@@ -52,7 +52,7 @@ class StatusAnswer:
     alarms: Annotated[list[str], "kinds that stand"]
 
 
-@answer
+@answer_class
 class StringTube:
     """One tube of the string."""
 
@@ -62,14 +62,14 @@ class StringTube:
     stale: Annotated[bool, "silent for too long"]
 
 
-@answer
+@answer_class
 class StringAnswer:
     """Tubes from top to bottom."""
 
     tubes: list[StringTube]
 
 
-@answer
+@answer_class
 class MountOffset:
     """Offset of an IMU's mount that a node corrects."""
 
@@ -78,7 +78,7 @@ class MountOffset:
     sigma_deg: Annotated[float, "of both"]
 
 
-@answer
+@answer_class
 class NodeAnswer:
     """Last state of one node."""
 
@@ -109,7 +109,7 @@ class NodeAnswer:
     alignment: MountOffset | None
 
 
-@answer
+@answer_class
 class EventRow:
     """One event of a node."""
 
@@ -122,7 +122,7 @@ class EventRow:
     arguments: Annotated[dict[str, Any], "of the event"]
 
 
-@answer
+@answer_class
 class EventsAnswer:
     """Events of the nodes."""
 
@@ -130,7 +130,7 @@ class EventsAnswer:
     events: list[EventRow]
 
 
-@answer
+@answer_class
 class StaticRecordRow:
     """One average at rest."""
 
@@ -149,7 +149,7 @@ class StaticRecordRow:
     moved: Annotated[bool, "it was not at rest all the time"]
 
 
-@answer
+@answer_class
 class StaticRecordsAnswer:
     """Raw readings averaged at rest."""
 
@@ -157,7 +157,7 @@ class StaticRecordsAnswer:
     static_records: list[StaticRecordRow]
 
 
-@answer
+@answer_class
 class PathChange:
     """Newest change of one path."""
 
@@ -165,14 +165,14 @@ class PathChange:
     changed_at: Annotated[int, "revision of its newest change"]
 
 
-@answer
+@answer_class
 class ChangesAnswer:
     """When each path changed last."""
 
     changes: list[PathChange]
 
 
-@answer
+@answer_class
 class SchemaAnswer:
     """JSON schema of every answer."""
 

@@ -4,14 +4,14 @@ from __future__ import annotations
 
 from typing import Annotated
 
-from groundstation.service.answers.shapes.answer_fields import OneOf, answer
+from groundstation.service.answers.shapes.answer_fields import OneOf, answer_class
 from groundstation.survey.wall.as_built import ColumnState
 
 OfHead = Annotated[float, "of its head"]
 JointState = Annotated[str, "the worst along it", OneOf(*(state.name.lower() for state in ColumnState))]
 
 
-@answer
+@answer_class
 class WallHole:
     """One hole of the neighbourhood."""
 
@@ -23,7 +23,7 @@ class WallHole:
     surveyed_to_m: Annotated[float | None, "depth of its last survey"]
 
 
-@answer
+@answer_class
 class WallJoint:
     """One joint between two columns."""
 
@@ -37,7 +37,7 @@ class WallJoint:
     thinnest_at_m: Annotated[float, "where that is"]
 
 
-@answer
+@answer_class
 class ClosingColumn:
     """One more column, which would close what is open."""
 
@@ -49,7 +49,7 @@ class ClosingColumn:
     closes: Annotated[bool, "whether one column is enough"]
 
 
-@answer
+@answer_class
 class WallNeighbourhood:
     """The hole that is drilled and those beside it."""
 
@@ -65,7 +65,7 @@ class WallNeighbourhood:
     extra_columns: list[ClosingColumn]
 
 
-@answer
+@answer_class
 class WallAnswer:
     """The joints of now; null where no wall was named."""
 

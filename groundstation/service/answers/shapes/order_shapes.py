@@ -4,13 +4,13 @@ from __future__ import annotations
 
 from typing import Annotated, Any
 
-from groundstation.service.answers.shapes.answer_fields import OneOf, answer
-from groundstation.service.answers.shapes.string_answers import Tube
+from groundstation.service.answers.shapes.answer_fields import OneOf, answer_class
+from groundstation.service.answers.shapes.string_shapes import Tube
 from groundstation.service.orders.order_book import OrderState
 from groundstation.service.orders.recalibration.recalibration_progress import Phase, Stage
 
 
-@answer
+@answer_class
 class Order:
     """An order and what became of it."""
 
@@ -28,14 +28,14 @@ class Order:
     values: Annotated[dict[str, Any], "of the reply, see the table of commands"]
 
 
-@answer
+@answer_class
 class OrdersAnswer:
     """The newest orders, the oldest of them first."""
 
     orders: list[Order]
 
 
-@answer
+@answer_class
 class RestAttitude:
     """One attitude at which the tubes rest."""
 
@@ -46,7 +46,7 @@ class RestAttitude:
     left_at_s: Annotated[float | None, "rig time; null while the tubes are there"]
 
 
-@answer
+@answer_class
 class SensorModel:
     """What corrects the readings of a sensor."""
 
@@ -54,7 +54,7 @@ class SensorModel:
     bias_mps2: Annotated[list[float], "at the reference temperature"]
 
 
-@answer
+@answer_class
 class InclinationRms:
     """Error of the inclination before and after a calibration."""
 
@@ -62,7 +62,7 @@ class InclinationRms:
     after: Annotated[float, "over the attitudes"]
 
 
-@answer
+@answer_class
 class SolutionFigures:
     """How well a calibration fits its records."""
 
@@ -73,7 +73,7 @@ class SolutionFigures:
     inclination_rms_deg: InclinationRms
 
 
-@answer
+@answer_class
 class TubeCalibration:
     """Calibration in the field of one tube."""
 
@@ -95,7 +95,7 @@ class TubeCalibration:
     solution: SolutionFigures | None
 
 
-@answer
+@answer_class
 class RecalibrationAnswer:
     """Calibration in the field: how far, and what it found."""
 

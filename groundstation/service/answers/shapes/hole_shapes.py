@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from typing import Annotated
 
-from groundstation.service.answers.shapes.answer_fields import OneOf, answer
-from groundstation.service.answers.shapes.string_answers import (
+from groundstation.service.answers.shapes.answer_fields import OneOf, answer_class
+from groundstation.service.answers.shapes.string_shapes import (
     Flags,
     Newest,
     Seq,
@@ -29,7 +29,7 @@ RmsOfStation = Annotated[float, "root mean square of those that count"]
 SemiAxisLength = Annotated[float, "semi-axis"]
 
 
-@answer
+@answer_class
 class Station:
     """One station of the hole, fused."""
 
@@ -57,14 +57,14 @@ class Station:
     sigma_tvd_m: Sigma
 
 
-@answer
+@answer_class
 class StationsAnswer:
     """All stations, fused."""
 
     stations: list[Station]
 
 
-@answer
+@answer_class
 class MeasurementRow:
     """One survey of one node."""
 
@@ -95,7 +95,7 @@ class MeasurementRow:
     quality: Annotated[list[str], "checks that it failed"]
 
 
-@answer
+@answer_class
 class MeasurementsAnswer:
     """Every survey that belongs to a station."""
 
@@ -103,7 +103,7 @@ class MeasurementsAnswer:
     measurements: list[MeasurementRow]
 
 
-@answer
+@answer_class
 class StationMeasurementsAnswer:
     """Every survey of one station."""
 
@@ -111,7 +111,7 @@ class StationMeasurementsAnswer:
     measurements: list[MeasurementRow]
 
 
-@answer
+@answer_class
 class TrajectoryRow:
     """One point of the trajectory."""
 
@@ -127,7 +127,7 @@ class TrajectoryRow:
     covariance_m2: PositionCovariance
 
 
-@answer
+@answer_class
 class TrajectoryAnswer:
     """Positions with covariance."""
 
@@ -135,7 +135,7 @@ class TrajectoryAnswer:
     points: list[TrajectoryRow]
 
 
-@answer
+@answer_class
 class PlanEllipse:
     """Ellipse of a region of uncertainty, seen from above."""
 
@@ -144,7 +144,7 @@ class PlanEllipse:
     azimuth_deg: Annotated[float, "of the major one"]
 
 
-@answer
+@answer_class
 class SemiAxis:
     """One of three of the ellipsoid of a region of uncertainty."""
 
@@ -152,7 +152,7 @@ class SemiAxis:
     direction: Annotated[list[float], "unit vector: north, east, down"]
 
 
-@answer
+@answer_class
 class PositionSigmas:
     """What one source of errors makes of the uncertainty of a position."""
 
@@ -161,7 +161,7 @@ class PositionSigmas:
     sigma_tvd_m: Sigma
 
 
-@answer
+@answer_class
 class StationRegion:
     """Region of uncertainty of one station."""
 
@@ -172,7 +172,7 @@ class StationRegion:
     sources: dict[str, PositionSigmas]
 
 
-@answer
+@answer_class
 class UncertaintyAnswer:
     """Regions of uncertainty and what they are made of."""
 

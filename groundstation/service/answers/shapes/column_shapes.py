@@ -5,16 +5,16 @@ from __future__ import annotations
 from typing import Annotated
 
 from groundstation.service.alarms.verdict import WINDS, Doubt, Word
-from groundstation.service.answers.shapes.answer_fields import OneOf, answer
-from groundstation.service.answers.shapes.hole_answers import MeasuredDepth
+from groundstation.service.answers.shapes.answer_fields import OneOf, answer_class
+from groundstation.service.answers.shapes.hole_shapes import MeasuredDepth
 
 FromAxis = Annotated[float, "from the design axis"]
 Wind = Annotated[str, "the same as a word", OneOf(*WINDS)]
 SOME_WORD = OneOf(*(word.value for word in Word))
 
 
-@answer
-class ColumnDesign:
+@answer_class
+class DesignAxis:
     """Design of the column."""
 
     inclination_deg: Annotated[float, "of the axis"]
@@ -24,7 +24,7 @@ class ColumnDesign:
     tolerance: Annotated[str, "preset"]
 
 
-@answer
+@answer_class
 class ColumnDeviation:
     """Deviation of the hole from the design axis at one depth."""
 
@@ -41,7 +41,7 @@ class ColumnDeviation:
     level_percent: Annotated[float, "highest alarm level reached"]
 
 
-@answer
+@answer_class
 class DominantAngle:
     """Which of two angles makes more of the uncertainty of the toe."""
 
@@ -50,18 +50,18 @@ class DominantAngle:
     by_azimuth_m: Annotated[float, "part of the uncertainty"]
 
 
-@answer
+@answer_class
 class ColumnAnswer:
     """Deviation from the design axis at every station, and projected to the target."""
 
-    design: ColumnDesign
+    design: DesignAxis
     stations: list[ColumnDeviation]
     worst: ColumnDeviation
     projection: ColumnDeviation | None
     dominant: DominantAngle | None
 
 
-@answer
+@answer_class
 class HistoryMoment:
     """What was known of the column at the end of one stop."""
 
@@ -73,14 +73,14 @@ class HistoryMoment:
     used_percent: Annotated[float, "of the tolerance"]
 
 
-@answer
+@answer_class
 class HistoryAnswer:
     """What was known at the end of every stop, thinned."""
 
     moments: list[HistoryMoment]
 
 
-@answer
+@answer_class
 class Off:
     """How far off the hole is, at which measured depth, and towards which azimuth."""
 
@@ -93,7 +93,7 @@ class Off:
     wind: Wind
 
 
-@answer
+@answer_class
 class Steer:
     """Where to steer to, and the last depth from which it helps."""
 
@@ -103,7 +103,7 @@ class Steer:
     left_m: Annotated[float | None, "of drilling until there"]
 
 
-@answer
+@answer_class
 class Verdict:
     """on_target, watch, steer, out or dont_know, with its reasons; good for ``good_for_s`` after its arrival."""
 

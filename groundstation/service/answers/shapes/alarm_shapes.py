@@ -7,8 +7,8 @@ from typing import Annotated
 from groundstation.service.alarms.crew_alarms import State as AlarmState
 from groundstation.service.alarms.rig_alarms import KINDS, Level
 from groundstation.service.alarms.verdict import WINDS
-from groundstation.service.answers.shapes.answer_fields import OneOf, answer
-from groundstation.service.answers.shapes.hole_answers import MeasuredDepth
+from groundstation.service.answers.shapes.answer_fields import OneOf, answer_class
+from groundstation.service.answers.shapes.hole_shapes import MeasuredDepth
 
 CODES = tuple(kind.code for kind in KINDS)
 LevelName = Annotated[str, "how much it matters", OneOf(*(level.name.lower() for level in Level))]
@@ -16,7 +16,7 @@ Subject = Annotated[str, "what it is about"]
 Detail = Annotated[str, "what is known of it"]
 
 
-@answer
+@answer_class
 class Alarm:
     """One alarm as the crew works with it."""
 
@@ -41,7 +41,7 @@ class Alarm:
     cleared_at_s: Annotated[float | None, "rig time at which its cause was gone"]
 
 
-@answer
+@answer_class
 class ToleranceAlarmRow:
     """One alarm of the deviation or of the projection, with the threshold that it passed."""
 
@@ -55,7 +55,7 @@ class ToleranceAlarmRow:
     cleared_at_s: Annotated[float | None, "rig time"]
 
 
-@answer
+@answer_class
 class MovedStation:
     """A station where a survey contradicted those before it: the hole moved."""
 
@@ -66,7 +66,7 @@ class MovedStation:
     neighbours_sigma: Annotated[list[float], "of the stations beside it"]
 
 
-@answer
+@answer_class
 class RigAlarmRow:
     """One alarm of the rig itself."""
 
@@ -79,7 +79,7 @@ class RigAlarmRow:
     count: Annotated[int, "times it was raised"]
 
 
-@answer
+@answer_class
 class AlarmsAnswer:
     """What the crew works with, and what it is made of."""
 
