@@ -118,3 +118,8 @@ def test_the_step_is_told_in_its_order() -> None:
     assert len(named) == 10
     assert -1 not in places
     assert places == sorted(places)
+
+
+def test_the_types_of_the_page_are_made_from_the_classes_of_the_answers() -> None:
+    made = script("make_page_types")
+    assert made.TYPES.read_text() == made.types_text(), "run python docs/make_page_types.py"
