@@ -1,8 +1,8 @@
 """A ground station asked, followed and ordered from Python.
 
-    from borechain.client import connect
+    from borechain.client import connect_to_ground
 
-    with connect("tcp/127.0.0.1:7447", "rig-1") as ground:
+    with connect_to_ground("tcp/127.0.0.1:7447", "rig-1") as ground:
         print(ground.verdict().line)
         for row in ground.stream("measurements"):
             print(row["md_m"], row["inclination_deg"])
@@ -53,7 +53,7 @@ __all__ = [
     "Station",
     "Steer",
     "Verdict",
-    "connect",
+    "connect_to_ground",
     "live_rigs",
     "shape_answer",
 ]
@@ -178,7 +178,7 @@ class Ground:
 
 
 @contextlib.contextmanager
-def connect(
+def connect_to_ground(
     endpoint: str = keys.DEFAULT_ENDPOINT,
     rig: str = keys.DEFAULT_RIG,
     timeout: float = PATIENCE,

@@ -267,7 +267,7 @@ DESCRIBED = """
     import make_asyncapi, make_page_types, make_tables
     from borechain.client import AnsweredVerdict, shape_answer
     from groundstation.config import GroundConfig
-    from groundstation.gateway.page.openapi import document
+    from groundstation.gateway.page.openapi import openapi_document
     from groundstation.service.answers.model import RigModel
     from groundstation.service.answers.paths import find_path
 
@@ -281,7 +281,7 @@ def test_an_added_field_is_wherever_its_answer_is_described(copy: Path) -> None:
     """JSON, schema, OpenAPI, AsyncAPI, docs/keys.md, client and page's type, from one line in the class."""
     out = run(copy, "-c", program(DESCRIBED) + program("""
         verdict, schemas = answered("verdict"), answered("schema")["schemas"]
-        asked = document("1")["paths"]["/api/verdict"]["get"]["responses"]["200"]["content"]["application/json"]
+        asked = openapi_document("1")["paths"]["/api/verdict"]["get"]["responses"]["200"]["content"]["application/json"]
         told = make_asyncapi.document()["components"]["messages"]["verdict"]["payload"]
         print(json.dumps({
             "json": verdict["mud_c"],
@@ -305,7 +305,7 @@ def test_an_added_answer_is_asked_for_followed_and_described(copy: Path) -> None
         print(json.dumps({
             "json": [answered("mud"), answered("mud", tube="3")],
             "schema": answered("schema")["schemas"]["mud"],
-            "parameters": document("1")["paths"]["/api/mud"]["get"]["parameters"],
+            "parameters": openapi_document("1")["paths"]["/api/mud"]["get"]["parameters"],
             "channel": make_asyncapi.document()["channels"]["mud"]["address"],
             "heard": "hear_mud" in make_asyncapi.document()["operations"],
             "keys": make_tables.key_table(),

@@ -23,11 +23,11 @@ from borechain.client import (
     RefusedError,
     Station,
     Steer,
-    connect,
+    connect_to_ground,
     live_rigs,
     shape_answer,
 )
-from groundstation.gateway.page.settings import PageSettings
+from groundstation.gateway.page.page_settings import PageSettings
 from groundstation.service.answers.answer_table import ANSWERS
 from groundstation.service.answers.shapes.answer_fields import Fields, fields_of_answer
 from telemetry.media.zenoh_bus import open_client
@@ -49,7 +49,7 @@ def served(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Served]:
 
 @pytest.fixture
 def ground(served: Served) -> Iterator[Ground]:
-    with connect(served.endpoint, timeout=10.0) as ground:
+    with connect_to_ground(served.endpoint, timeout=10.0) as ground:
         yield ground
 
 

@@ -80,7 +80,7 @@ class ZenohGateway:
             handle(query)
         except Exception as error:
             self._process.endpoint.counters["failed_queries"] += 1
-            refuse(query, f"{query.selector_key}: the ground station failed: {type(error).__name__}")
+            refuse_query(query, f"{query.selector_key}: the ground station failed: {type(error).__name__}")
 
     def close(self) -> None:
         """Publish what is left and answer nothing more; from the loop or a signal handler of it."""
@@ -92,7 +92,7 @@ class ZenohGateway:
     def _arrive(self, handle: Handler, query: Query) -> None:
         """Queue a query, on a thread of the bus."""
         if not self._inbox.put((handle, query)):
-            refuse(query, BUSY)
+            refuse_query(query, BUSY)
 
     def _key(self, path: str) -> str:
         return keys.GROUND.format(rig=self._rig, path=path)
@@ -147,7 +147,7 @@ class ZenohGateway:
         """Give whoever records what did not reach it: the events after number ``since`` that are kept."""
         since = query.parameters.get("since", "0")
         if not since.isdecimal() or len(since) > LONGEST_NUMBER:
-            refuse(query, f"parameter since: expected a whole number, got {since!r:.40}")
+            refuse_query(query, f"parameter since: expected a whole number, got {since!r:.40}")
             return
         events = list(self._process.tape.after(min(int(since), self._process.tape.newest)))[:INTAKE_AT_ONCE]
         query.reply(query.selector_key, bytes(msgpack.packb([pack_intake(event) for event in events])), MSGPACK)
@@ -165,7 +165,7 @@ class ZenohGateway:
         try:
             replies = self._replies(query)
         except SelectorError as error:
-            refuse(query, str(error))
+            refuse_query(query, str(error))
             return
         encoding = ENCODINGS[query.parameters.get("accept", "json")]
         for key, payload in replies:
@@ -193,7 +193,7 @@ class ZenohGateway:
     def _take_order(self, query: Query) -> None:
         """Accept an order; its answer is awaited beside all other work."""
         if len(self._awaited) >= WAITING:
-            refuse(query, BUSY)
+            refuse_query(query, BUSY)
             return
         if not keys.is_order(query.selector_key):
             query.finish()  # a question that covers every key orders nothing
@@ -202,7 +202,7 @@ class ZenohGateway:
         try:
             order = self._operator.order(name, query.parameters, query.parameters.get("by", WHO))
         except (GroundError, TelemetryError) as error:
-            refuse(query, f"{query.selector_key}: {error}")
+            refuse_query(query, f"{query.selector_key}: {error}")
             return
         task = asyncio.create_task(self._reply_when_answered(query, order))
         self._awaited.add(task)
@@ -216,7 +216,7 @@ class ZenohGateway:
             async with asyncio.timeout(ORDER_TIMEOUT):
                 await answered.wait()
         except TimeoutError:
-            refuse(
+            refuse_query(
                 query,
                 f"order {order.number}: tube {order.tube} has not answered {name} within {ORDER_TIMEOUT:.0f} s; "
                 f"it is still being asked, see {self._key(f'orders/{order.number}')}",
@@ -227,7 +227,7 @@ class ZenohGateway:
             query.finish()
 
 
-def refuse(query: Query, reason: str) -> None:
+def refuse_query(query: Query, reason: str) -> None:
     """End a query with what is wrong with it."""
     query.reply_error(reason)
     query.finish()

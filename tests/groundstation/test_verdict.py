@@ -12,7 +12,7 @@ from schemas import check_answer, shown_on
 from groundstation.config import GroundConfig
 from groundstation.service.alarms.verdict import WINDS, Doubt, Known, Verdict, Word, direction, judge, wind
 from groundstation.service.answers.model import RigModel
-from groundstation.service.answers.rounding import rounded, rounded_std
+from groundstation.service.answers.rounding import round_to_std, rounded_std
 from groundstation.service.answers.shapes.answer_fields import fields_of_answer
 from groundstation.service.answers.shapes.column_shapes import Verdict as VerdictAnswer
 from groundstation.service.answers.verdict_views import verdict_line
@@ -124,7 +124,7 @@ def test_north_is_0_and_east_is_90() -> None:
     [(44.1234, 0.2345, 44.12, 0.24), (44.1234, 12.3, 44.0, 13.0), (1.0, 0.0, 1.0, 0.0), (123.4, 123.4, 120.0, 130.0)],
 )
 def test_numbers_have_the_digits_that_they_are_worth(value: float, std: float, told: float, told_std: float) -> None:
-    assert rounded(value, std) == told
+    assert round_to_std(value, std) == told
     assert rounded_std(std) == told_std
 
 

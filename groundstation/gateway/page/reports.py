@@ -7,7 +7,7 @@ import hashlib
 from datetime import UTC, datetime
 
 from groundstation.errors import GroundError
-from groundstation.gateway.page.guard import RequestError
+from groundstation.gateway.page.request_guard import RequestError
 from groundstation.service.answers.csv_tables import table_of
 from groundstation.service.answers.model import RigModel
 from groundstation.service.answers.paths import find_path
@@ -19,7 +19,7 @@ REPORT_WITHIN_S = 20.0  # that one takes on a slow machine, the first after a st
 Inputs = list[tuple[str, str]]
 
 
-class Reporter:
+class ReportTypesetter:
     """Sets one report at a time, beside the loop that drives the ground station.
 
     Parameters

@@ -9,7 +9,7 @@ from groundstation.service.alarms.verdict import Word, direction, judge, wind
 from groundstation.service.alarms.verdict_doubts import known_of
 from groundstation.service.answers.answer_views import view_of
 from groundstation.service.answers.model import RigModel
-from groundstation.service.answers.rounding import rounded, rounded_std
+from groundstation.service.answers.rounding import round_to_std, rounded_std
 from groundstation.service.answers.shapes.column_shapes import Off, Steer, Verdict
 from groundstation.service.answers.streamed_rows import Parameters
 from groundstation.survey.wall.column_deviation import Deviation
@@ -52,7 +52,7 @@ def off_target_view(d: Deviation) -> Off:
     """How far off, where, and in which direction."""
     return Off(
         md_m=round(d.md, 2),
-        deviation_cm=rounded(CM * d.size, CM * d.std),
+        deviation_cm=round_to_std(CM * d.size, CM * d.std),
         sigma_cm=rounded_std(CM * d.std),
         limit_cm=round(CM * d.limit, 1),
         used_percent=round(100.0 * d.ratio) if math.isfinite(d.ratio) else None,
@@ -80,7 +80,7 @@ def verdict_line(found: HoleVerdict) -> str:
     if d is None:
         return phrase
     spread = max(rounded_std(CM * d.std), FINEST_CM)
-    size = rounded(CM * d.size, spread) if spread >= 1.0 else CM * d.size  # rounded once, as it is written
+    size = round_to_std(CM * d.size, spread) if spread >= 1.0 else CM * d.size  # rounded once, as it is written
     is_end = found.what == "projection"
     where = "ends" if is_end else f"at {d.md:.1f} m"
     said = f"{phrase}: {where} {size:.1f} ± {spread:.1f} cm at {round(math.degrees(direction(d))) % 360} deg"

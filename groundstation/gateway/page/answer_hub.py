@@ -119,12 +119,12 @@ class Hub:
             answer = self._process.operator.ask_json(path)
         except SelectorError:
             return b""
-        rendered = event("answer", {"path": path, "answer": orjson.Fragment(answer)})
+        rendered = server_sent_event("answer", {"path": path, "answer": orjson.Fragment(answer)})
         if not find_answer(path).of_the_hole:  # what shows a long hole is long, and its text is kept already
             self._rendered[path] = rendered
         return rendered
 
 
-def event(kind: str, content: dict[str, Any]) -> bytes:
+def server_sent_event(kind: str, content: dict[str, Any]) -> bytes:
     """One server-sent event."""
     return b"event: %s\ndata: %s\n\n" % (kind.encode(), orjson.dumps(content))
