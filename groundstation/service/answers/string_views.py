@@ -48,7 +48,7 @@ def answer_status(k: RigModel, _p: Parameters) -> StatusAnswer:
 
 @view_of(ChangesAnswer)
 def answer_changes(k: RigModel, _p: Parameters) -> ChangesAnswer:
-    """When each path changed last: a listener that holds an answer of before has missed one."""
+    """Revision at which each path changed last: a client with an older answer has missed a change."""
     return ChangesAnswer([PathChange(path, at) for path, at in sorted(k.changed_at.items())])
 
 
