@@ -9,7 +9,7 @@ import numpy as np
 
 from sim.kernel import shared_body
 from sim.world.disturbance.reach import most_force, most_rate
-from sim.world.disturbance.row import ActsOn, Array, Compiled, Disturbance, ImuSamples, OneImu
+from sim.world.disturbance.row import ActsOn, Array, Compiled, Disturbance, ImuSamples, Mask, OneImu
 from sim.world.disturbance.vibration import G
 from sim.world.scenario_file import ScenarioFile
 
@@ -18,7 +18,7 @@ AT_RANGE = 0.999  # of a range, from where a sample stands at it
 FRAME_STEPS = 32768.0  # of a range
 
 
-def clipped(values: Array, limit: float) -> tuple[Array, Array]:
+def clipped(values: Array, limit: float) -> tuple[Array, Mask]:
     """Values (n, 3) within a range, and whether any of a row stood at it (n,)."""
     if max(values.max(), -values.min()) < AT_RANGE * limit:
         return values, np.zeros(len(values), np.bool_)

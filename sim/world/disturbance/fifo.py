@@ -16,7 +16,7 @@ from node.kernels.record.filter_record import PARTS
 from node.process.drivers.fifo_window import parts_of
 from node.process.drivers.frame_clock import FrameClock
 from sim.world.disturbance.converter import AT_RANGE, FORCE_CLIPPED, GYRO_CLIPPED
-from sim.world.disturbance.row import ActsOn, Array, Compiled, Disturbance, Flags, ImuSamples, OneImu
+from sim.world.disturbance.row import ActsOn, Array, Compiled, Disturbance, Flags, ImuSamples, Mask, OneImu
 from sim.world.scenario_file import ScenarioFile
 from sim.world.streams import Stream
 
@@ -111,7 +111,7 @@ def read_fifo(frames: ImuSamples, imu: OneImu) -> FifoReads:
     return FifoReads(mean, GYRO_CLIPPED * any_between(at_range, cuts), late + sensor.delay, std, parts)
 
 
-def any_between(flags: Array, cuts: Flags) -> Flags:
+def any_between(flags: Mask, cuts: Flags) -> Flags:
     """1 where any of the ``flags`` (n,) is set from one cut (m + 1,) to the next, (m,)."""
     sums = np.concatenate([[0], np.cumsum(flags)])
     return np.asarray(sums[cuts[1:]] > sums[cuts[:-1]], np.int64)

@@ -40,7 +40,8 @@ FEEL, READ, PART = (chain_forms(TABLE, form) for form in ("felt", "read", "parts
 class Cycles:
     """Readings of one IMU: (cycles, 6) rad/s and m/s^2, (cycles,) C, bits, s that their windows were late by, its std.
 
-    ``parts`` (cycles, 9) rad/s are as a driver tells them, see ``node.process.drivers.fifo_window``; NaN or None if not told.
+    ``parts`` (cycles, 9) rad/s are as a driver tells them, see ``node.process.drivers.fifo_window``; NaN or None if
+    not told.
     """
 
     readings: Array

@@ -23,6 +23,7 @@ from sim.world.truth import TubeTruth
 
 Array = npt.NDArray[np.float64]
 Flags = npt.NDArray[np.int64]
+Mask = npt.NDArray[np.bool_]
 Constants = Mapping[str, Any]  # by the name of the row that drew them
 
 
