@@ -24,7 +24,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numba import njit
 
-from node.kernels.arithmetic.angles import wrap
+from node.kernels.arithmetic.angles import wrap_angle
 from node.kernels.arithmetic.formats import CYCLE_RATE_HZ
 from node.kernels.filter.float64.cycle import run_cycle
 from node.kernels.record.node_record import A_HOPS, A_SEQUENCE, A_SYSTEMATIC, A_VALID, A_YAW, A_YAW_VAR, READING
@@ -32,13 +32,11 @@ from node.kernels.string.relay import offer_aiding
 from sim.campaign.chunk import RUNS, Campaign, run_chunk
 from sim.string.drill import drill_string, new_memory
 from sim.string.head_measurements import measure_head
-from sim.string.hops import cross_hop, draw_hops
+from sim.string.hops import draw_hops
 from sim.string.nodes import loop_of, new_nodes
-from sim.string.readings import DrawnReadings
+from sim.string.readings import DrawnReadings, draw_readings
 from sim.string.schedule import StringSchedule, redraw_schedule
 from sim.studies.epochs import resting_string
-from sim.world.disturbance.lanes import CLOCK, draw_numbers
-from sim.world.disturbance.reading import LOSS, read_sensors
 from sim.world.scenario import Scenario, load_scenario, scenario_of
 from sim.world.world import World
 
@@ -67,9 +65,10 @@ def kernels(
     """The filter of every node over all cycles: what it reads is drawn here, or lies on the ``tape``."""
     for cycle in range(schedule.ends.shape[0]):
         top, start, end = schedule.powered[cycle], schedule.begins[cycle], schedule.ends[cycle]
+        if is_drawn:
+            draw_readings(drawn, None, schedule, hops, cycle)
         for k in range(top):
             if is_drawn:
-                draw_node(schedule, drawn, hops, cycle, k)
                 reading = drawn.readings[k, 0]
             else:
                 reading = tape.readings[cycle, k]
@@ -84,7 +83,7 @@ def kernels(
             if hops[hop].loses:
                 break
             k = top - 1 - hop
-            offset = wrap(offset + (settings[k].drive_angle if hop == 0 else settings[k + 1].lower_angle))
+            offset = wrap_angle(offset + (settings[k].drive_angle if hop == 0 else settings[k + 1].lower_angle))
             systematic += settings[k].drive_var if hop == 0 else settings[k + 1].lower_var
             offer_aiding(
                 nodes[k].filter,
@@ -99,24 +98,12 @@ def kernels(
             )
 
 
-@njit(error_model="numpy", inline="always")
-def draw_node(schedule: StringSchedule, drawn: DrawnReadings, hops: Any, cycle: int, k: int) -> None:
-    """Draw what a node reads in a cycle, and its hop."""
-    felt, numbers, is_first = drawn.felt, drawn.numbers, cycle == 0 or schedule.powered[cycle - 1] <= k
-    draw_numbers(drawn.counter, drawn.key, drawn.words, numbers, cycle, k)
-    rates, forces, circle, shaken = felt.rate, felt.force, felt.circle, felt.shaken
-    shared, tube, reading = drawn.shared[0], drawn.tubes[k], drawn.readings[k]
-    end = schedule.ends[cycle] + schedule.later[k]
-    read_sensors(shared, tube, is_first, rates, forces, circle, shaken, numbers, reading, end, cycle, k)
-    cross_hop(drawn.hop_noise[0], hops, k, is_first, numbers[CLOCK], numbers[LOSS])
-
-
 @njit(error_model="numpy")
 def record(schedule: StringSchedule, drawn: DrawnReadings, hops: Any, tape: Tape) -> None:
     """Draw what ``kernels`` would, and keep it."""
     for cycle in range(schedule.ends.shape[0]):
+        draw_readings(drawn, None, schedule, hops, cycle)
         for k in range(schedule.powered[cycle]):
-            draw_node(schedule, drawn, hops, cycle, k)
             tape.readings[cycle, k] = drawn.readings[k, 0]
             tape.errors[cycle, k], tape.loses[cycle, k] = hops[k].error, hops[k].loses
 
@@ -146,10 +133,10 @@ class OneRun:
 
     def whole(self) -> float:
         """Seconds of a node-cycle of the campaign's own loop."""
-        (step, aid), nodes, log = loop_of("float64"), new_nodes(self.world), self.campaign.string.new_log()
-        drawn, hops = self.drawn()
+        (drawn, hops), log = self.drawn(), self.campaign.string.new_log()
+        loop, nodes = loop_of("float64", len(hops)), new_nodes(self.world)
         shifts, memory, cycles = np.zeros(len(hops)), new_memory(), self.world.cycles
-        given = step, aid, nodes, self.schedule, hops, shifts, memory, 0, cycles
+        given = *loop, nodes, self.schedule, hops, shifts, memory, 0, cycles
         return spent(lambda: drill_string(*given, drawn=drawn, log=log)) / self.campaign.node_cycles
 
     def with_columns(self) -> float:

@@ -8,7 +8,6 @@ import statistics
 import tempfile
 import time
 from collections.abc import Callable
-from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -17,6 +16,7 @@ from telemetry.application.can_load import HEADER, steady_traffic
 from telemetry.application.depth_seal import open_depth, seal_depth
 from telemetry.application.end_seal import content_of_sealed, is_sealed
 from telemetry.application.seals import Seals, seals_of
+from telemetry.frozen import replace
 from telemetry.media.credentials import DEPTH_SOURCE
 from telemetry.messages import (
     BASE,
@@ -140,7 +140,7 @@ def joined(one: JointSeal, other: JointSeal) -> tuple[JointSeal, JointSeal]:
 
 
 def verify_times(folder: Path) -> dict[str, float]:
-    """Median time (us) of each cyclic message at whoever believes it: tube 1, of its state the base."""
+    """Median time (us) of verifying each cyclic message at its receiver: tube 1, or the base for a tube's state."""
     found = {}
     base, tube = opened(folder, BASE, [Side.LOWER]), opened(folder, 1, Side)
     encoder = opened(folder, ENCODER, Side)

@@ -91,7 +91,7 @@ class String:
             )
             for k, one in enumerate(settings)
         ]
-        settings = np.concatenate([tube.crew for tube in self.tubes])
+        settings = np.concatenate([tube.settings_record for tube in self.tubes])
         self.arrays = StringNodes(self.nodes, settings, self.corrections)
 
 
@@ -144,9 +144,8 @@ def drilling(string: String, inputs: Inputs) -> Callable[[int, int], None]:
     """The kernel of a string, from a cycle to another."""
     count, memory = len(string.tubes), new_memory()
     hops, shifts = np.zeros(count, HOP), np.zeros(count)
-    (step, aid), nodes, schedule, recorded = loop_of("float64"), string.arrays, inputs.schedule, inputs.recorded
-    given = step, aid, nodes, schedule, hops, shifts, memory
-    return lambda first, last: drill_string(*given, first, last, recorded)
+    given = *loop_of("float64", count), string.arrays, inputs.schedule, hops, shifts, memory
+    return lambda first, last: drill_string(*given, first, last, inputs.recorded)
 
 
 def run() -> dict[str, Any]:

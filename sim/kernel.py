@@ -5,16 +5,18 @@ A kernel of a string holds those of the world that fill its readings, which lie 
 
 from __future__ import annotations
 
+import hashlib
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any, Final, TypeVar, cast
 
-from numba import config, njit
+from numba import njit
 
-from node.kernels.arithmetic.jit import OPTIONS, SourceLocator, folder_digest, known_by_its_sources, source_digest
+from node.kernels.arithmetic.compiler import kept_where
+from node.kernels.arithmetic.jit import OPTIONS, SourceLocator, folder_digest, source_digest
 
 Function = TypeVar("Function", bound=Callable[..., Any])
-ROOMS: Final = tuple(Path(__file__).parent / room for room in ("campaign", "string", "world"))  # that hold kernels
+ROOMS: Final = tuple(Path(__file__).parent / room for room in ("string", "world"))  # that hold kernels
 
 
 class SimLocator(SourceLocator):
@@ -23,12 +25,15 @@ class SimLocator(SourceLocator):
     def __init__(self, function: Callable[..., Any], file: str) -> None:
         super().__init__(function, file)
         self._stamp = source_digest() + "".join(map(folder_digest, ROOMS))
+        # a folder a version: what was compiled of another one names classes that may have moved
+        self._place = self._place.with_name(
+            f"{self._place.name}-{hashlib.sha256(self._stamp.encode()).hexdigest()[:16]}"
+        )
 
 
 def compiled(function: Function, **options: Any) -> Function:
     """Have ``function`` compiled with the node's options and these when it is first called."""
-    with known_by_its_sources():
-        vars(config)["CACHE_LOCATOR_CLASSES"] = f"{__name__}.{SimLocator.__name__}"
+    with kept_where(SimLocator):
         return cast("Function", njit(**OPTIONS | options)(function))
 
 

@@ -50,10 +50,13 @@ def test_the_tables_of_a_page_are_made_from_the_code(make_tables: ModuleType, pa
 
 
 def test_every_key_below_ground_has_its_fields(make_tables: ModuleType) -> None:
-    from telemetry.keys import GROUND, TABLE
+    from groundstation.service.answers.answer_table import known_keys
+    from telemetry.keys import GROUND
 
     below = {
-        key.template.removeprefix(GROUND.format(rig="{rig}", path="")) for key in TABLE if "/ground/" in key.template
+        key.template.removeprefix(GROUND.format(rig="{rig}", path=""))
+        for key in known_keys()
+        if "/ground/" in key.template
     }
     text = (DOCS / "keys.md").read_text()
     assert below == {line.strip("# `") for line in text.splitlines() if line.startswith("### `")}
@@ -109,9 +112,14 @@ def test_the_step_is_told_in_its_order() -> None:
         for name in cell.split("`")[1::2]
     ]
     whole = source_of("node_step")
-    for name in ("step_around", "enter", "before_loop", "leave", "after_loop"):
+    for name in ("step_around", "begin_step", "before_loop", "end_step", "after_loop", "conclude_cycle"):
         whole = whole.replace(f"{name}(", source_of(name) + "(", 1)
     places = [whole.find(f"{name}(") for name in named]
     assert len(named) == 10
     assert -1 not in places
     assert places == sorted(places)
+
+
+def test_the_types_of_the_page_are_made_from_the_classes_of_the_answers() -> None:
+    made = script("make_page_types")
+    assert made.TYPES.read_text() == made.types_text(), "run python docs/make_page_types.py"

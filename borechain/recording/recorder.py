@@ -12,7 +12,7 @@ from pathlib import Path
 import msgpack
 
 from borechain.recording.recording_file import RecordedSample, RecordingWriter
-from groundstation.service.answers.paths import schemas
+from groundstation.service.answers.answer_table import schemas_by_path
 from groundstation.service.process.intake_tape import BEGIN, IntakeError, unpack_intake
 from telemetry import keys
 from telemetry.media.zenoh_bus import ZenohBus
@@ -23,7 +23,7 @@ WAITING = 100_000  # samples that may wait to be written; more are dropped and c
 
 @dataclass(slots=True)
 class RecordingSummary:
-    """How a recording went: samples, events of the intake that are missing, and samples dropped here."""
+    """Counts of a recording: samples, events of the intake that are missing, and samples dropped here."""
 
     samples: int = 0
     first: int = 0  # number of the first event of the intake
@@ -51,7 +51,7 @@ class Recorder:
         self.course = RecordingSummary()
         self._bus = bus
         self._arrived: queue.Queue[RecordedSample | None] = queue.Queue(WAITING)
-        shown = {pattern: json.dumps(schema).encode() for pattern, schema in schemas().items()}
+        shown = {pattern: json.dumps(schema).encode() for pattern, schema in schemas_by_path().items()}
         self._writer = RecordingWriter(path, rig, shown)
         self._intake = keys.INTAKE.format(rig=rig)
         for key in (keys.GROUND.format(rig=rig, path="**"), keys.DEPTH.format(rig=rig), self._intake):
@@ -85,7 +85,7 @@ class Recorder:
         self.course.samples += 1
 
     def _take_intake(self, sample: RecordedSample) -> None:
-        """Write an event once, in its order; what did not reach us before it is asked for."""
+        """Write an event once, in its order; missing earlier ones are asked for."""
         number = number_of(sample.payload)
         if number > self.course.newest + 1:
             self._ask_for_more()
@@ -118,7 +118,7 @@ class Recorder:
 
 
 def number_of(payload: bytes) -> int:
-    """Number of an event; 0 of what is none, and of the settings."""
+    """Number of an event; 0 of the settings and of anything else."""
     try:
         event = unpack_intake(payload)
     except IntakeError:

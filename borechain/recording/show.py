@@ -9,7 +9,7 @@ from pathlib import Path
 
 from borechain.recording.ground_replay import Replayed, open_replay
 from borechain.recording.recording_file import Recording
-from groundstation.gateway.page.settings import PageSettings
+from groundstation.gateway.page.page_settings import PageSettings
 from groundstation.host import page_of
 from groundstation.service.process.intake_tape import Intake
 from telemetry.runtime.event_loop import run_event_loop, stop_on_signals
@@ -33,7 +33,7 @@ def show_recording(recording: Recording, folder: Path, page: PageSettings, speed
 
 
 async def serve_recording(replayed: Replayed, events: Iterator[Intake], page: PageSettings, speed: float) -> None:
-    """The page, with the events given beside it."""
+    """Serve the page while the events are given to the ground station."""
     ended = asyncio.Event()
     stop_on_signals(ended.set)
     with page_of(page) as serve_page:
@@ -47,7 +47,7 @@ async def serve_recording(replayed: Replayed, events: Iterator[Intake], page: Pa
 
 
 async def give_all(replayed: Replayed, events: Iterator[Intake], speed: float) -> None:
-    """Give every event at its time."""
+    """Apply every event at its time."""
     loop = asyncio.get_running_loop()
     begun_at, first = loop.time(), None
     for number, event in enumerate(events):

@@ -1,6 +1,6 @@
 """A chunk of a campaign: some runs one after another, as columns of numbers.
 
-Whoever computes a chunk, a process of this machine or a worker of a cluster, gets the same numbers: they depend on the
+Every computer of a chunk, a process of this machine or a worker of a cluster, gets the same numbers: they depend on the
 scenario and the numbers of the runs alone.
 """
 

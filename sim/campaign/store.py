@@ -168,7 +168,7 @@ def write_whole(file: Path, content: bytes) -> None:
 def code_digest() -> str:
     """Digest of everything that decides what a run gives: kernels, the world and its string, and the driver."""
     digest = hashlib.sha256(source_digest().encode())
-    driver = Path(frame_clock.__file__)
-    for source in sorted([*(source for room in ROOMS for source in room.rglob("*.py")), driver]):
+    sources = [source for room in (*ROOMS, Path(__file__).parent) for source in room.rglob("*.py")]
+    for source in sorted([*sources, Path(frame_clock.__file__)]):
         digest.update(source.name.encode() + source.read_bytes())
     return digest.hexdigest()[:16]

@@ -18,8 +18,7 @@ import numpy.typing as npt
 from node.firmware.inputs import RigContext
 from node.firmware.reporter import VAR_FLOOR
 from node.firmware.tube import Tube
-from node.kernels.arithmetic.angles import wrap
-from node.kernels.record.integer_node import new_integers
+from node.kernels.arithmetic.angles import wrap_angle
 from node.kernels.step.node_step import ADMITTED
 from sim.errors import ScenarioError
 from sim.string.drill import drill_string, hand_down, new_memory, no_estimates
@@ -27,7 +26,7 @@ from sim.string.head_measurements import measure_head, row_of_aiding
 from sim.string.hops import HOP
 from sim.string.nodes import NEVER, loop_of, new_nodes, tuned_config
 from sim.string.readings import record_readings
-from sim.string.result import NodeTrace, StringRun, StringSurvey, wrapped
+from sim.string.result import NodeTrace, StringRun, StringSurvey, wrap_angles
 from sim.string.schedule import StringSchedule, schedule_of
 from sim.world.world import World
 from telemetry.messages import Aiding, Event, Message, NodeState, SurveyMeasurement
@@ -61,8 +60,7 @@ class DirectString:
         if file.medium.link != "off":
             raise ScenarioError('medium.link: expected "off" for a string without frames')
         self.world = world
-        self._loop = loop_of(file.node.kernel)
-        self._integers = np.repeat(new_integers(), count) if file.node.kernel == "fixed" else None
+        self._loop = loop_of(file.node.kernel, count)
         self._nodes = new_nodes(world, state_every)
         self.nodes = self._nodes.records
         config = tuned_config(file)
@@ -98,7 +96,7 @@ class DirectString:
 
     def _tube(self, tube: int, config: Array, state_every: int) -> Tube:
         """The node of a tube on its records, which says what the kernel found that it has to say."""
-        one = slice(tube - 1, tube)
+        one, integers = slice(tube - 1, tube), self._loop.integers
         return Tube(
             replace(self.world.tube_settings(tube), state_every=state_every),
             config,
@@ -106,23 +104,22 @@ class DirectString:
             iter(range(NEVER)).__next__,
             restored=False,
             corrections=self._nodes.corrections[tube - 1],
-            integers=None if self._integers is None else self._integers[one],
+            integers=None if integers is None else integers.memory[one],
         )
 
     def _advance(self, first: int, last: int) -> int:
         """Run the cycle ``first``, and those after it while no node has anything to say; returns which is next."""
-        (step, aid), nodes, integers, schedule = self._loop, self._nodes, self._integers, self.schedule
-        hops, estimates, memory = self._hops, self._estimates, self._memory
+        loop, nodes, schedule, hops = self._loop, self._nodes, self.schedule, self._hops
         shifts = np.array([self.clock_shifts.get(tube, 0.0) for tube in self.tubes])
-        given = step, aid, nodes, schedule, hops, shifts, memory, first, last, self._recorded
-        reached = int(drill_string(*given, integers=integers, estimates=estimates, trace=self._trace))
+        given = *loop, nodes, schedule, hops, shifts, self._memory, first, last, self._recorded
+        reached = int(drill_string(*given, estimates=self._estimates, trace=self._trace))
         self._set_beside_truth(first, reached)
         cycle = reached - 1
         telling = np.flatnonzero(self._trace.says[: schedule.powered[cycle]] & ~ADMITTED).tolist()[::-1]
         for place in telling:
             self._keep_messages(cycle, place, self._messages(cycle, place, float(shifts[place])))
         if telling and schedule.locked:
-            hand_down(aid, nodes, schedule, hops, shifts, memory.aiding, cycle, integers, estimates)
+            hand_down(*loop[1:], nodes, schedule, hops, shifts, self._memory.aiding, cycle, self._estimates)
         return reached
 
     def _messages(self, cycle: int, place: int, shift: float) -> Sequence[Message]:
@@ -137,7 +134,7 @@ class DirectString:
         """Set what the nodes knew in the cycles ``first``..``last`` - 1 beside the truth."""
         run, rows = self.run, np.s_[first:last]
         unknown = np.isnan(run.yaw[rows])
-        run.total_error[rows] = wrapped(run.yaw[rows] - self._truth[rows])
+        run.total_error[rows] = wrap_angles(run.yaw[rows] - self._truth[rows])
         run.systematic_error[rows] = np.where(unknown, math.nan, self._systematic[rows])
         run.var[rows] = np.maximum(run.var[rows], VAR_FLOOR)
         run.systematic_var[rows] += self._mount_var
@@ -159,7 +156,7 @@ class DirectString:
         run = self.run
         for first in reversed(run.surveys):
             if (first.tube, first.measurement.station_at) == (tube, message.station_at):
-                moved = wrap(message.yaw - first.measurement.yaw)
+                moved = wrap_angle(message.yaw - first.measurement.yaw)
                 run.revisions.append(StringSurvey(first.cycle, tube, first.error + moved, message, cycle))
                 return
         run.surveys.append(StringSurvey(cycle, tube, float(run.total_error[cycle, tube - 1]), message, cycle))

@@ -20,7 +20,7 @@ from sim.string.head_measurements import measure_head
 from sim.string.hops import draw_hops, hop_noise_of
 from sim.string.nodes import loop_of, new_nodes
 from sim.string.readings import DrawnReadings, felt_by, new_readings
-from sim.string.result import LOGGED_STATE, LOGGED_SURVEY, StationLog, wrapped
+from sim.string.result import LOGGED_STATE, LOGGED_SURVEY, StationLog, wrap_angles
 from sim.string.rough_runs import FieldRun, RoughWorld
 from sim.string.schedule import StringSchedule, redraw_schedule, schedule_of
 from sim.world.disturbance.records import make_shared, make_tubes
@@ -90,8 +90,8 @@ class DrawnString:
         world, count = World(self.scenario, seed), self.scenario.tubes
         rough = None if self.rough is None else self.rough.run(world)
         schedule = redraw_schedule(self.schedule, world, measure_head(world) if rough is None else rough.measured)
-        (step, aid), nodes, log = loop_of("float64"), new_nodes(world), self.new_log()
-        given = step, aid, nodes, schedule, draw_hops(world), np.zeros(count), new_memory(), 0, world.cycles
+        loop, nodes, log = loop_of("float64", count), new_nodes(world), self.new_log()
+        given = *loop, nodes, schedule, draw_hops(world), np.zeros(count), new_memory(), 0, world.cycles
         field = None if rough is None else rough.field
         drill_string(*given, drawn=self.new_readings(world), field=field, log=log)
         systematic = np.array([np.pad(world.marks.errors(tube), (tube, 0), "edge") for tube in range(1, count + 1)])
@@ -122,7 +122,7 @@ class DrawnString:
         if self.rough is not None and run.rough is not None:
             at = run.schedule.ends[cycle] + run.schedule.later[place]
             turned = self.rough.turned(run.rough, place, cycle, at)
-        return wrapped(yaw - (turned + run.frame[place])), run.systematic[place, self._tops[cycle]]
+        return wrap_angles(yaw - (turned + run.frame[place])), run.systematic[place, self._tops[cycle]]
 
     def direction_errors(self, surveys: Array, md: Array) -> tuple[Array, Array]:
         """Errors of inclination and azimuth (n,), from gravity and yaw. Source: thesis eqs. 1.1-1.3."""
@@ -132,7 +132,7 @@ class DrawnString:
         true = self.scenario.hole.tangent(np.maximum(md, 0.0))[0]
         lean, true_lean = np.hypot(north, east), np.hypot(true[:, 0], true[:, 1])
         inclination = np.arctan2(lean, -unit[:, 2]) - np.arctan2(true_lean, true[:, 2])
-        azimuth = wrapped(np.arctan2(east, north) - np.arctan2(true[:, 1], true[:, 0]))
+        azimuth = wrap_angles(np.arctan2(east, north) - np.arctan2(true[:, 1], true[:, 0]))
         return inclination, np.where(true_lean > PLUMB, azimuth, np.nan)
 
 

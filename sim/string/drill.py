@@ -10,10 +10,8 @@ from typing import Any, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
-from numba import types
 
 from node.kernels.arithmetic.formats import Array
-from node.kernels.arithmetic.operations import taken_where
 from node.kernels.record.node_record import (
     A_HOPS,
     A_OFFSET,
@@ -63,6 +61,7 @@ def no_estimates(tubes: int) -> SaidEstimates:
 def drill_string(
     step: Any,
     aid: Any,
+    integers: Any,
     nodes: Any,
     schedule: Any,
     hops: Array,
@@ -73,7 +72,6 @@ def drill_string(
     recorded: Any = None,
     drawn: Any = None,
     field: Any = None,
-    integers: Any = None,
     estimates: Any = None,
     trace: Any = None,
     log: Any = None,
@@ -85,50 +83,51 @@ def drill_string(
 
     Parameters
     ----------
-    step, aid : see ``sim.string.nodes.loop_of``
+    step, aid, integers : ``sim.string.nodes.FirmwareLoop``
     nodes : ``sim.string.nodes.StringNodes``
     schedule : ``sim.string.schedule.StringSchedule``
     hops : (tubes,) of dtype ``sim.string.hops.HOP``
     shifts : (tubes,) s, of the nodes' clocks
     memory : ``CycleMemory``
     recorded, drawn, field : see ``sim.string.readings.supply_readings``
-    integers : (tubes,) of dtype ``INTEGERS`` of nodes in integers
     estimates : ``SaidEstimates``; None where nodes hand on what came
     trace, log : ``NodeTrace`` and ``StationLog`` of ``sim.string.result``
     """
+    records, settings, corrections = nodes.records, nodes.settings, nodes.corrections
+    powered, moment = schedule.powered, memory.moment
     for cycle in range(first, last):
         readings = supply_readings(recorded, drawn, field, schedule, hops, cycle)
         if not schedule.locked:
-            hand_down(aid, nodes, schedule, hops, shifts, memory.aiding, cycle, integers, estimates)
-        is_told = False
-        for k in range(schedule.powered[cycle]):
-            set_moment(schedule, shifts, memory.moment, cycle, k)
-            says = step_node(step, nodes, readings, memory.moment, k, integers)
+            hand_down(aid, integers, nodes, schedule, hops, shifts, memory.aiding, cycle, estimates)
+        is_told, top = False, powered[cycle]
+        for k in range(top):
+            set_moment(schedule, shifts, moment, cycle, k)
+            says = step_node(step, integers, records, settings, corrections[k], readings[k], moment, k)
             if estimates is not None:
                 estimates.told[k] = False
             if trace is not None:
-                is_told = trace_node(trace, nodes.records[k], says, cycle, k) or is_told
+                is_told = trace_node(trace, records[k], says, cycle, k) or is_told
             if log is not None:
-                log_node(log, nodes.records[k], says, schedule.powered[cycle], cycle, k)
+                log_node(log, records[k], says, top, cycle, k)
         if is_told:
             return cycle + 1
         if schedule.locked:
-            hand_down(aid, nodes, schedule, hops, shifts, memory.aiding, cycle, integers, estimates)
+            hand_down(aid, integers, nodes, schedule, hops, shifts, memory.aiding, cycle, estimates)
         if log is not None:
-            log_epoch(log, nodes.records, schedule.powered[cycle], cycle)
+            log_epoch(log, records, top, cycle)
     return last
 
 
 @kernel
 def hand_down(
     aid: Any,
+    integers: Any,
     nodes: Any,
     schedule: Any,
     hops: Array,
     shifts: Array,
     aiding: Array,
     cycle: int,
-    integers: Any,
     estimates: Any,
 ) -> None:
     """Hand the aiding of a cycle down the string: what came until a hop loses it, or what each node said by itself.
@@ -138,18 +137,19 @@ def hand_down(
     aiding : (AIDING,) memory
     others : see ``drill_string``
     """
-    top, is_there = schedule.powered[cycle], schedule.is_sent[cycle]
+    top, is_there, dated_late = schedule.powered[cycle], schedule.is_sent[cycle], schedule.dated_late
+    records, settings = nodes.records, nodes.settings
     aiding[:] = schedule.measured[cycle]
     valid = aiding[A_VALID]
     for hop in range(top):
         k, is_taken = top - 1 - hop, False
         if is_there and hops[hop].loses == 0:
-            aiding[A_VALID] = valid + schedule.dated_late[hop] + hops[hop].error + shifts[k]
-            is_taken = aid_node(aid, nodes, aiding, k, integers) & ONWARD != 0
+            aiding[A_VALID] = valid + dated_late[hop] + hops[hop].error + shifts[k]
+            is_taken = aid_node(aid, integers, records, settings, aiding, k) & ONWARD != 0
         if estimates is None:
             if not is_taken:
                 return
-            pass_on(nodes.records[k], aiding)
+            pass_on(records[k], aiding)
         else:
             is_there = estimates.told[k]
             aiding[:] = estimates.said[k]
@@ -177,33 +177,25 @@ def set_moment(schedule: Any, shifts: Array, moment: Array, cycle: int, k: int) 
     moment[SYNCHRONISED] = 1.0
 
 
-def has_integers(*kinds: Any) -> bool:
-    """Whether the last of some arguments is the memory of nodes in integers, and not None."""
-    return isinstance(kinds[-1], types.Array)
-
-
-def step_integers(step: Any, nodes: Any, readings: Array, moment: Array, k: int, integers: Any) -> int:
-    """One cycle of a node in integers."""
-    one = slice(k, k + 1)
-    corrections = nodes.corrections[k]
-    return int(step(nodes.records[one], nodes.settings[one], corrections, readings[k], moment, integers[one]))
-
-
-@taken_where(has_integers, step_integers)
-def step_node(step: Any, nodes: Any, readings: Array, moment: Array, k: int, _: Any) -> int:
+@shared_body
+def step_node(
+    step: Any, integers: Any, nodes: Array, settings: Array, corrections: Array, readings: Array, moment: Array, k: int
+) -> int:
     """One cycle of a node; returns what it has to say."""
     one = slice(k, k + 1)
-    return int(step(nodes.records[one], nodes.settings[one], nodes.corrections[k], readings[k], moment))
+    if step is not None:
+        says: int = step(nodes[one], settings[one], corrections, readings, moment)
+    if integers is not None:
+        says = integers.step(nodes[one], settings[one], corrections, readings, moment, integers.memory[one])
+    return says
 
 
-def aid_integers(aid: Any, nodes: Any, aiding: Array, k: int, integers: Any) -> int:
-    """One aiding of a node in integers."""
-    one = slice(k, k + 1)
-    return int(aid(nodes.records[one], nodes.settings[one], aiding, integers[one]))
-
-
-@taken_where(has_integers, aid_integers)
-def aid_node(aid: Any, nodes: Any, aiding: Array, k: int, _: Any) -> int:
+@shared_body
+def aid_node(aid: Any, integers: Any, nodes: Array, settings: Array, aiding: Array, k: int) -> int:
     """One aiding of a node; returns what it makes of it."""
     one = slice(k, k + 1)
-    return int(aid(nodes.records[one], nodes.settings[one], aiding))
+    if aid is not None:
+        answer: int = aid(nodes[one], settings[one], aiding)
+    if integers is not None:
+        answer = integers.aid(nodes[one], settings[one], aiding, integers.memory[one])
+    return answer

@@ -4,17 +4,20 @@ from __future__ import annotations
 
 import functools
 from dataclasses import replace
-from typing import Final, NamedTuple
+from typing import Any, Final, NamedTuple
 
 import numpy as np
 
-from node.firmware.settings import Kernel, crew_record
+from node.firmware.kernel_choice import kernel_of
+from node.firmware.tube_settings import settings_record
+from node.kernels.arithmetic.compiler import ByAddress
 from node.kernels.arithmetic.formats import Array
 from node.kernels.record.filter_record import default_config
+from node.kernels.record.integer_node import new_integers
 from node.kernels.record.node_record import AIDING, MOMENT, READING, SETTINGS, new_node
 from node.kernels.record.sensor_record import PARAMETERS
 from node.kernels.sensors.correction import identity_parameters
-from node.kernels.step.address import BY_ADDRESS, ByAddress, firmware
+from node.kernels.step.address import BY_ADDRESS, firmware_addresses
 from sim.errors import ScenarioError
 from sim.world.scenario_file import ScenarioFile
 from sim.world.world import World
@@ -36,7 +39,7 @@ def new_nodes(world: World, state_every: int = NEVER) -> StringNodes:
     told = [replace(world.tube_settings(k + 1), state_every=state_every) for k in range(world.scenario.tubes)]
     corrections = np.zeros((len(told), 1 + world.scenario.file.node.imus), PARAMETERS)
     corrections[:] = identity_parameters()
-    settings = np.concatenate([crew_record(one, config) for one in told])
+    settings = np.concatenate([settings_record(one, config) for one in told])
     return StringNodes(np.repeat(new_node(config), len(told)), settings, corrections)
 
 
@@ -57,16 +60,38 @@ def tuned_config(file: ScenarioFile) -> Array:
     return config
 
 
-@functools.cache
-def loop_of(kernel: Kernel) -> tuple[ByAddress, ByAddress]:
-    """Step and intake of aiding of a kernel, by address; all but the default are loaded only when used."""
-    if kernel in BY_ADDRESS:
-        return firmware(kernel)
-    from node.kernels.published.step import published_aiding, published_step
+class IntegerLoop(NamedTuple):
+    """Firmware of nodes in integers, by address, with its memory."""
 
+    step: ByAddress
+    aid: ByAddress
+    memory: Array  # (tubes,) of dtype ``INTEGERS``
+
+
+class FirmwareLoop(NamedTuple):
+    """Compiled firmware as ``sim.string.drill`` takes it: of nodes in floats by address, or of nodes in integers."""
+
+    step: ByAddress | None
+    aid: ByAddress | None
+    integers: IntegerLoop | None
+
+
+def loop_of(kernel: str, tubes: int) -> FirmwareLoop:
+    """What so many nodes with a kernel run; all but the default are loaded only when used."""
+    if kernel == "fixed":
+        return FirmwareLoop(None, None, IntegerLoop(*firmware_addresses(kernel), np.repeat(new_integers(), tubes)))
+    if kernel in BY_ADDRESS:
+        return FirmwareLoop(*firmware_addresses(kernel), None)
+    loop = kernel_of(kernel)
+    return FirmwareLoop(*addresses_of(loop.step, loop.aiding), None)
+
+
+@functools.cache
+def addresses_of(step: Any, aiding: Any) -> tuple[ByAddress, ByAddress]:
+    """Step and intake of aiding of a study's own form of the filter, each an ``entry_kernel``, by address."""
     records, settings = new_node(default_config()), np.zeros(1, SETTINGS)
     parameters = np.concatenate([identity_parameters()] * 2)
     return (
-        ByAddress(published_step, records, settings, parameters, np.zeros((1, READING)), np.zeros(MOMENT)),
-        ByAddress(published_aiding, records, settings, np.zeros(AIDING)),
+        ByAddress(step, records, settings, parameters, np.zeros((1, READING)), np.zeros(MOMENT)),
+        ByAddress(aiding, records, settings, np.zeros(AIDING)),
     )

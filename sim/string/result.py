@@ -13,12 +13,13 @@ from node.firmware.reporter import VAR_FLOOR
 from node.kernels.arithmetic.angles import from_binary
 from node.kernels.record.filter_record import Err
 from node.kernels.step.node_step import ADMITTED, SAY_EVENTS, SAY_REVISION, SAY_SURVEY
-from sim.kernel import kernel
+from sim.kernel import kernel, shared_body
 from telemetry.messages import Event, NodeState, SurveyMeasurement
 
 Array = npt.NDArray[np.float64]
 Mask = npt.NDArray[np.bool_]
 YAW: Final = int(Err.YAW)
+LOGGED: Final = SAY_SURVEY | SAY_REVISION | SAY_EVENTS  # of what a node says
 
 LOGGED_SURVEY: Final = np.dtype(
     [
@@ -71,7 +72,7 @@ class StringRun:
     @property
     def error(self) -> Array:
         """Random part of the yaw error (cycles, tubes), rad."""
-        return wrapped(self.total_error - self.systematic_error)
+        return wrap_angles(self.total_error - self.systematic_error)
 
     @property
     def total_var(self) -> Array:
@@ -98,8 +99,8 @@ class StationLog(NamedTuple):
     epochs: npt.NDArray[np.int64]  # (cycles,) number of the epoch that a cycle ends with, else -1
 
 
-def wrapped(angle: Array) -> Array:
-    """Angles in [-pi, pi), rad."""
+def wrap_angles(angle: Array) -> Array:
+    """The same angles in [-pi, pi), rad."""
     return np.asarray(np.mod(angle + math.pi, math.tau) - math.pi)
 
 
@@ -115,9 +116,16 @@ def trace_node(trace: Any, node: Any, says: int, cycle: int, k: int) -> bool:
     return bool(says & ~ADMITTED != 0)
 
 
-@kernel
+@shared_body
 def log_node(log: Any, node: Any, says: int, top: int, cycle: int, k: int) -> None:
-    """Keep a survey that a node made or revised, of a string of ``top`` tubes; its events are let go."""
+    """Keep what a campaign wants of what a node of a string of ``top`` tubes has to say, which is seldom anything."""
+    if says & LOGGED:
+        log_said(log, node, says, top, cycle, k)
+
+
+@kernel
+def log_said(log: Any, node: Any, says: int, top: int, cycle: int, k: int) -> None:
+    """Keep a survey that a node made or revised; its events are let go."""
     if says & SAY_SURVEY:
         if log.made[0] < log.surveys.shape[0]:
             log_survey(log.surveys[log.made[0]], node, cycle, k, top)
@@ -128,7 +136,7 @@ def log_node(log: Any, node: Any, says: int, top: int, cycle: int, k: int) -> No
         node.events.said = node.events.told
 
 
-@kernel
+@shared_body
 def log_epoch(log: Any, nodes: Array, top: int, cycle: int) -> None:
     """Keep what every filter knows where an epoch ends with the cycle."""
     epoch = log.epochs[cycle]

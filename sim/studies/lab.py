@@ -15,10 +15,10 @@ import numpy as np
 import numpy.typing as npt
 
 from groundstation.survey.fusion.resolve import direction_angles, resolve_direction
-from node.kernels.arithmetic.angles import wrap
+from node.kernels.arithmetic.angles import wrap_angle
 from node.kernels.arithmetic.formats import PERIOD
 from sim.string.direct_string import DirectString
-from sim.string.result import StringRun, wrapped
+from sim.string.result import StringRun, wrap_angles
 from sim.studies.scenarios import Tables, complete_string
 from sim.world.motion import Trapezoid
 from sim.world.scenario import scenario_of
@@ -51,7 +51,7 @@ ONCE_AIDED: Mask = ROTATING & (STOP - TURN.duration + FIRST_PERIOD <= ENDS)
 
 @dataclass(frozen=True, slots=True)
 class LabRun:
-    """What one seed left: yaw errors (cycles, hops) rad and the rest, hop by hop from the head down."""
+    """Results of one seed: yaw errors (cycles, hops) rad and the rest, hop by hop from the head down."""
 
     error: Array  # rad, at the end of every cycle
     var: Array  # rad^2, as the node states it
@@ -100,7 +100,7 @@ def errors_by_hop(world: World, run: StringRun) -> LabRun:
 def _azimuth_of_rest(world: World, run: StringRun, tube: int) -> float:
     force = world.sensors.samples(tube)[REST, 3:6]
     yaw = run.yaw[REST, tube - 1]
-    mean = float(yaw[0] + np.mean(wrapped(yaw - yaw[0])))
+    mean = float(yaw[0] + np.mean(wrap_angles(yaw - yaw[0])))
     return _azimuth(force.mean(axis=0), np.cov(force.T) / len(force), mean, float(run.var[REST, tube - 1].mean()))
 
 
@@ -114,4 +114,4 @@ def _azimuth_of_survey(survey: SurveyMeasurement | None) -> float:
 def _azimuth(force: Array, cov: Array, yaw: float, yaw_var: float) -> float:
     """Azimuth of the tube in (-pi, pi]; the hole leans north, so it is the error."""
     direction = resolve_direction(force, cov, yaw, yaw_var).direction
-    return wrap(direction_angles(direction.lean, direction.down)[1])
+    return wrap_angle(direction_angles(direction.lean, direction.down)[1])

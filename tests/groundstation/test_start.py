@@ -11,7 +11,7 @@ from borechain.load.day import ADVANCES, BEGUN_AT, depth_of, write_day
 from borechain.load.learning import ASKED, LearningLoad, measure_learning
 from groundstation.config import GroundConfig
 from groundstation.service.answers.model import RigModel
-from groundstation.service.answers.paths import find
+from groundstation.service.answers.paths import find_path
 from groundstation.service.process.ground_process import GroundProcess
 
 TUBES, STOPS = 8, 12
@@ -20,14 +20,14 @@ OF_THE_HOLE = ("stations", "stations/1", "trajectory", "uncertainty", "column", 
 
 def answers(model: RigModel) -> dict[str, bytes]:
     """What is told of the hole now and at the end of every stop, without the header of the moment."""
-    told = {path: orjson.dumps(find(model, path).view(model, {})) for path in OF_THE_HOLE}
+    told = {path: orjson.dumps(find_path(model, path).view(model, {})) for path in OF_THE_HOLE}
     moments = [str(moment.number) for moment in model.hole.history.moments]
-    return told | {n: orjson.dumps(find(model, "column").view(model, {"moment": n})) for n in moments}
+    return told | {n: orjson.dumps(find_path(model, "column").view(model, {"moment": n})) for n in moments}
 
 
 @pytest.mark.slow
 def test_a_start_knows_to_the_last_byte_what_was_known_before_it(tmp_path: Path) -> None:
-    """Surveys of a stop that came together, one by one, and with somebody asking after each of them."""
+    """Surveys of a stop that came together, one by one, and with a query after each of them."""
     config = GroundConfig(folder=tmp_path, tube_length=2.0, target=40.0)
     stored = write_day(config.url, STOPS, TUBES)
     hearing = LearningLoad(config, TUBES, BEGUN_AT + ROUND_S * (STOPS + 1))

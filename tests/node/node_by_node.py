@@ -7,7 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from node.firmware.encoder import EncoderNode, EncoderSample
+from node.firmware.encoder_node import EncoderNode, EncoderSample
 from node.firmware.inputs import RigContext
 from node.kernels.arithmetic.angles import from_binary
 from node.kernels.record.filter_record import Err, Scheme

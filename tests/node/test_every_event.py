@@ -2,7 +2,6 @@
 
 import math
 from collections.abc import Callable
-from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -10,12 +9,13 @@ import pytest
 from node.firmware.event_table import EVENT_TABLE, take_events
 from node.firmware.imu_settings import ImuSettings
 from node.firmware.inputs import ImuReading, RigContext
-from node.firmware.settings import TubeSettings
 from node.firmware.tube import Tube
+from node.firmware.tube_settings import TubeSettings
 from node.kernels.arithmetic.formats import DEG, PERIOD
 from node.kernels.record.events import Code
 from node.kernels.record.filter_record import default_config
 from node.kernels.record.node_record import new_node
+from telemetry.frozen import replace
 from telemetry.messages import Aiding, Event
 
 G = 9.81

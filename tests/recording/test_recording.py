@@ -22,7 +22,7 @@ from borechain.cli.rig.ground_settings import ground_settings
 from borechain.inline import InlineRig
 from borechain.recording.ground_replay import replay_file
 from borechain.recording.recording_file import NAME, RecordedSample, Recording, RecordingError, RecordingWriter
-from groundstation.service.answers.paths import schemas
+from groundstation.service.answers.answer_table import schemas_by_path
 from groundstation.service.process.ground_process import GroundProcess
 from groundstation.service.process.intake_tape import IntakeError, pack_intake, unpack_intake
 from sim.rig.scheduler import Progress
@@ -131,7 +131,7 @@ def test_a_recording_that_is_cut_anywhere_is_read_to_the_cut(
 
 
 def test_no_more_than_two_chunks_are_lost_by_a_cut(drilled: tuple[Path, GroundProcess], tmp_path: Path) -> None:
-    """A file that nobody has closed holds all but what the newest chunk gathers."""
+    """A file that was not closed holds all but what the newest chunk gathers."""
     _, ground = drilled
     path = tmp_path / "open.mcap"
     written = 0
@@ -244,7 +244,7 @@ def test_the_layout_names_topics_and_fields_that_there_are() -> None:
     assert len(named) == 6
     for path in named:
         topic, *fields = path.removeprefix(KEY).removesuffix("[:]").split(".")
-        schema = schemas()[topic]
+        schema = schemas_by_path()[topic]
         for name in fields:
             schema = next((one for one in schema.get("anyOf", []) if one.get("type") == "object"), schema)
             schema = schema["properties"][name]

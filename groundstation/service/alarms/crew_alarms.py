@@ -16,7 +16,6 @@ from dataclasses import dataclass, replace
 
 from groundstation.errors import SelectorError
 from groundstation.service.alarms.rig_alarms import Level
-from telemetry.frozen import quickly_made
 
 OPEN_AT_MOST = 40  # alarms that are not cleared
 CLEARED_KEPT = 200
@@ -32,14 +31,13 @@ Key = tuple[str, str]  # code and subject
 class State(enum.StrEnum):
     """How far an alarm is."""
 
-    RAISED = "raised"  # its condition stands, nobody has acknowledged it
+    RAISED = "raised"  # its condition stands, not acknowledged
     ACKNOWLEDGED = "acknowledged"  # its condition stands
     SHELVED = "shelved"  # put away for a time
-    LATCHED = "latched"  # its condition is gone, nobody has acknowledged it
+    LATCHED = "latched"  # its condition is gone, not acknowledged
     CLEARED = "cleared"
 
 
-@quickly_made
 @dataclass(frozen=True, slots=True)
 class Times:
     """One moment: s of the own clock, of rig time (NaN where it is not known), and UTC since 1970."""
@@ -49,7 +47,6 @@ class Times:
     utc: float
 
 
-@quickly_made
 @dataclass(frozen=True, slots=True)
 class Condition:
     """Something that is wrong now: what, where (m along the hole), towards which azimuth (rad), beyond what."""
@@ -167,7 +164,7 @@ class CrewAlarms:
         Raises
         ------
         SelectorError
-            When there is none of that number, or somebody was first; it is told who.
+            When there is none of that number, or it was acknowledged before; the message says by whom.
         """
         alarm = self._get(number)
         if alarm.acknowledged_by:

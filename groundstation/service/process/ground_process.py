@@ -7,7 +7,6 @@ import secrets
 import time
 from collections import deque
 from collections.abc import Callable, Mapping
-from dataclasses import replace
 from typing import TYPE_CHECKING, Protocol
 
 from groundstation.config import GroundConfig
@@ -27,6 +26,7 @@ from groundstation.service.string.stands import take_stand
 from telemetry.application.endpoint import Endpoint
 from telemetry.application.seal_watch import SealWatch, refusal_of
 from telemetry.errors import DecodeError
+from telemetry.frozen import replace
 from telemetry.messages import (
     BASE,
     EPOCH_UNKNOWN,
@@ -79,7 +79,7 @@ Listener = Callable[[list[str]], None]  # takes the paths below ground/ that cha
 class GroundProcess(Process):
     """Everything the ground station does at each event of its link.
 
-    Whoever drives it and whoever comes in by ``operator`` does so on one thread.
+    Its driver and the callers of ``operator`` run on one thread.
 
     Parameters
     ----------
@@ -340,7 +340,7 @@ class GroundProcess(Process):
 
     def _publish(self, changed: list[str]) -> None:
         model = self.model
-        model.revision += 1  # whoever holds an older answer can tell
+        model.revision += 1  # an older answer can be told by it
         model.changed_at |= {path: model.revision for path in changed if "/" not in path and path not in BEATS}
         for listener in self.listeners:
             listener(changed)

@@ -1,7 +1,7 @@
 """What a ground station takes in, event by event: enough to give another one the same knowledge, bit for bit.
 
 An event is what came and the time at which it came, on the own clock and in rig time; frames, receipts and what was
-sent are not in it. A tape keeps the newest events for whoever listens a moment later.
+sent are not in it. A tape keeps the newest events for listeners that come a moment later.
 """
 
 from __future__ import annotations
@@ -15,7 +15,6 @@ import msgpack
 
 from groundstation.errors import GroundError
 from telemetry.errors import DecodeError
-from telemetry.frozen import quickly_made
 from telemetry.messages import Message
 from telemetry.presentation.msgpack_codec import decode, encode
 
@@ -30,7 +29,6 @@ class IntakeError(GroundError, ValueError):
     """The bytes are no event of an intake."""
 
 
-@quickly_made
 @dataclass(frozen=True, slots=True)
 class Intake:
     """One event: its number from 1, s of the own clock, rig time (s, NaN before it is known) and its epoch."""

@@ -12,8 +12,9 @@ import math
 from array import array
 from bisect import bisect_left, bisect_right, insort
 from collections import Counter, deque
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 
+from telemetry.frozen import replace
 from telemetry.messages import EPOCH_UNKNOWN, DepthReading, Stand
 
 LIMIT = 100_000  # readings kept of an epoch, those at rest in a stand count as two
@@ -220,7 +221,7 @@ class DepthLog:
         return replace(stand, begun_at=begun_at) if goes_on and begun_at < stand.ended_at else None
 
     def _suspect(self, one: Stand, other: Stand) -> None:
-        """Take a contradiction for a jump that nobody heard: what came since may be as wrong as the later stand."""
+        """Take a contradiction for an unheard jump: what came since may be as wrong as the later stand."""
         first, second = sorted((one, other), key=lambda stand: stand.begun_at)
         if not self.jumped:
             self.jumped = f"from {first.md:.2f} m to {second.md:.2f} m between two stands"

@@ -2,10 +2,9 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
-
 from groundstation.service.string.depth import DepthLog
 from groundstation.service.string.stops import Stops, belongs
+from telemetry.frozen import replace
 from telemetry.messages import Stand
 
 FIRST_EPOCH = 1  # of rig time: an encoder that has never started before
@@ -36,7 +35,7 @@ def take_stand(depths: DepthLog, stops: Stops, told: Stand) -> None:
 
 
 def take_survey(depths: DepthLog, stops: Stops, epoch: int, at: float) -> None:
-    """The first stand that is known is a stop where a survey was taken in it (s): nobody heard how it began."""
+    """Take the first known stand for a stop if a survey was taken in it, at ``at`` (s): its begin was not heard."""
     for first in depths.stands[:1]:
         if belongs(first, epoch, at):
             stops.on_stand(first)

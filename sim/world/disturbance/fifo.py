@@ -13,8 +13,8 @@ import numpy as np
 
 from node.kernels.arithmetic.formats import PERIOD
 from node.kernels.record.filter_record import PARTS
+from node.process.drivers.fifo_window import parts_of
 from node.process.drivers.frame_clock import FrameClock
-from node.process.drivers.parts import parts_of
 from sim.world.disturbance.converter import AT_RANGE, FORCE_CLIPPED, GYRO_CLIPPED
 from sim.world.disturbance.row import ActsOn, Array, Compiled, Disturbance, Flags, ImuSamples, Mask, OneImu
 from sim.world.scenario_file import ScenarioFile
@@ -30,7 +30,7 @@ class FifoReads:
     readings : (cycles, 6) rad/s and m/s^2
     clipped : (cycles,) bits
     late, late_std : (cycles,) s, by which windows end before their cycles by the filter and the FIFO
-    parts : (cycles, 9) rad/s, see ``node.process.drivers.parts``; NaN where none is told
+    parts : (cycles, 9) rad/s, see ``node.process.drivers.fifo_window``; NaN where none is told
     """
 
     readings: Array

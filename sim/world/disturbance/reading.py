@@ -40,7 +40,8 @@ FEEL, READ, PART = (chain_forms(TABLE, form) for form in ("felt", "read", "parts
 class Cycles:
     """Readings of one IMU: (cycles, 6) rad/s and m/s^2, (cycles,) C, bits, s that their windows were late by, its std.
 
-    ``parts`` (cycles, 9) rad/s are as a driver tells them, see ``node.process.drivers.parts``; NaN or None if not told.
+    ``parts`` (cycles, 9) rad/s are as a driver tells them, see ``node.process.drivers.fifo_window``; NaN or None if
+    not told.
     """
 
     readings: Array
@@ -175,7 +176,7 @@ def read_frames(
     """Fill ``reading`` (1, READING) of tube ``k`` of a rough world in a cycle that ends at ``end`` (s).
 
     The driver tells the mean of the frames that it finds, and what its window shows of the cycle before and of the
-    eighths of its own, as ``node.process.drivers.parts`` makes it of frames; here it is made of sums over frames.
+    eighths of its own, as ``node.process.drivers.fifo_window`` makes it of frames; here it is made of sums over frames.
 
     Parameters
     ----------

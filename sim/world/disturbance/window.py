@@ -7,7 +7,7 @@ from typing import Any
 
 from node.kernels.arithmetic.formats import PERIOD, Array
 from node.kernels.record.filter_record import PARTS
-from node.process.drivers.parts import LEAST
+from node.process.drivers.fifo_window import LEAST
 from sim.kernel import kernel
 from sim.world.disturbance.frame_layout import CIRCLE, FELT, FINER, MOVED, SLACK_ANGLE, SLACK_RATE, SUMS, TORSIONAL
 
