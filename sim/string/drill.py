@@ -30,7 +30,7 @@ from node.kernels.record.node_record import (
 from node.kernels.step.node_step import ONWARD
 from sim.kernel import kernel, shared_body
 from sim.string.readings import supply_readings
-from sim.string.result import log_epoch, log_node, trace_node
+from sim.string.result import LOGGED, log_epoch, log_node, trace_node
 
 
 class CycleMemory(NamedTuple):
@@ -107,8 +107,9 @@ def drill_string(
                 estimates.told[k] = False
             if trace is not None:
                 is_told = trace_node(trace, records[k], says, cycle, k) or is_told
-            if log is not None:
-                log_node(log, records[k], says, top, cycle, k)
+            if log is not None:  # noqa: SIM102  joined by "and" it would not be left out where there is no log
+                if says & LOGGED:
+                    log_node(log, records[k], says, top, cycle, k)
         if is_told:
             return cycle + 1
         if schedule.locked:
