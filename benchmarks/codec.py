@@ -19,12 +19,19 @@ import msgpack
 import numpy as np
 
 from borechain.load.rounds import compare_rounds
-from groundstation.survey import error_model
-from groundstation.survey.compiled_model import locate, warm
-from groundstation.survey.error_sources import Leg, Site, Survey
-from groundstation.survey.formulas import ARRAY, CONSTANTS, VARIABLES, compile_formulas, parse, plain
-from groundstation.survey.instruments import load_tool
-from groundstation.survey.methods import Method, positions
+from groundstation.survey.tools.formulas import (
+    ARRAY,
+    CONSTANTS,
+    VARIABLES,
+    compile_formulas,
+    normalise_name,
+    parse_formula,
+)
+from groundstation.survey.tools.instruments import load_tool
+from groundstation.survey.well.compiled_model import locate_stations, preload_models
+from groundstation.survey.well.error_propagation import propagate_errors
+from groundstation.survey.well.error_sources import Leg, Site, WellSurvey
+from groundstation.survey.well.methods import Method, station_positions
 from telemetry.messages import Aiding, Message, Mode, NodeFlag, NodeState
 from telemetry.presentation.can_checks import CHECKS
 from telemetry.presentation.can_messages import NATIVE
@@ -137,16 +144,16 @@ def frozen_pair() -> Pair:
 def survey_pairs() -> dict[str, Pair]:
     """The error model of a long survey, compiled and by arrays; a tool's formulas as a function, and walked."""
     tool, site, method = load_tool("mwd-rev5.1"), Site(9.80665, 50_000.0, np.radians(72.0)), Method.MINIMUM_CURVATURE
-    warm(["mwd-rev5.1"])
+    preload_models(["mwd-rev5.1"])
     md, inclination, azimuth = (np.linspace(*ends, STATIONS) for ends in ((0.0, 5000.0), (0.01, 1.5), (0.2, 2.0)))
-    survey, legs, start = Survey(md, inclination, azimuth, md), [Leg(tool)], np.zeros(3)
+    survey, legs, start = WellSurvey(md, inclination, azimuth, md), [Leg(tool)], np.zeros(3)
 
     def located() -> Any:
-        return locate(method, survey, legs, site, start, slot_allowance=True)[1].cov
+        return locate_stations(method, survey, legs, site, start, slot_allowance=True)[1].cov
 
     def by_arrays() -> Any:
-        tvd = positions(method, md, inclination, azimuth)[:, 2]
-        return error_model.propagate(Survey(md, inclination, azimuth, tvd), legs, site, slot_allowance=True).cov
+        tvd = station_positions(method, md, inclination, azimuth)[:, 2]
+        return propagate_errors(WellSurvey(md, inclination, azimuth, tvd), legs, site, slot_allowance=True).cov
 
     np.testing.assert_allclose(located(), by_arrays(), rtol=1e-6, atol=1e-9)
     formulas = [text for term in tool.terms for text in term.formulas]
@@ -154,8 +161,8 @@ def survey_pairs() -> dict[str, Pair]:
     inputs = [*values, *tool.parameters.values()]
     np.seterr(invalid="ignore")  # a root of less than nothing costs both the same
     function = compile_formulas(formulas, tuple(tool.parameters))
-    known = {plain(name): value for name, value in zip([*VARIABLES, *tool.parameters], inputs, strict=True)}
-    trees = [parse(text) for text in formulas]
+    known = {normalise_name(name): value for name, value in zip([*VARIABLES, *tool.parameters], inputs, strict=True)}
+    trees = [parse_formula(text) for text in formulas]
 
     def walked_all() -> list[Any]:
         return [walked(tree, known) for tree in trees]
@@ -174,7 +181,7 @@ def walked(node: ast.expr, known: dict[str, Any]) -> Any:
         case ast.Constant():
             return node.value
         case ast.Name():
-            name = plain(node.id)
+            name = normalise_name(node.id)
             return known[name] if name in known else CONSTANTS[name]
         case ast.UnaryOp():
             return -walked(node.operand, known)
@@ -182,7 +189,11 @@ def walked(node: ast.expr, known: dict[str, Any]) -> Any:
             return OPERATORS[type(node.op)](walked(node.left, known), walked(node.right, known))
         case ast.Call(func=ast.Name() as func):
             given = [walked(one, known) for one in node.args]
-            return given[0] * given[0] if plain(func.id) == "sqr" else getattr(ARRAY, plain(func.id))(*given)
+            return (
+                given[0] * given[0]
+                if normalise_name(func.id) == "sqr"
+                else getattr(ARRAY, normalise_name(func.id))(*given)
+            )
     raise RuntimeError(f"expected a formula, got {ast.dump(node)}")
 
 

@@ -1,4 +1,4 @@
-"""How a value of a cyclic message is checked where it is not as nearly always: converted, or refused by name."""
+"""How a value of a cyclic message is checked that is of another type or out of its range: converted, or refused."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ def check_of(field: Field) -> Check:
 
 
 def quick_check(q: Quantity, kind: type[Any], check: Check) -> Check:
-    """Check of a number that asks ``check`` only where it is not as nearly always: of its type and in its range."""
+    """Check of a number that calls ``check`` only for one of another type or out of its range."""
     low, high = q.low, q.high
 
     def checked(value: Any) -> Any:
