@@ -1,4 +1,4 @@
-"""How a value of a cyclic message is checked that is of another type or out of its range: converted, or refused."""
+"""Check of a value of a cyclic message outside the usual case: it is converted, or refused by name."""
 
 from __future__ import annotations
 
