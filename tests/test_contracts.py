@@ -30,6 +30,7 @@ FORBIDDEN = [
     ("sim/rig/report.py", "import groundstation.service.disk.ground_store"),
     ("groundstation/service/process/operator_access.py", "import groundstation.gateway.zenoh"),
     ("groundstation/service/orders/order_book.py", "import asyncio"),
+    ("groundstation/service/string/tally.py", "import groundstation.service.hole.history"),
     ("groundstation/service/process/ground_process.py", "import telemetry.media.zenoh_bus"),
     ("telemetry/application/clock.py", "import zenoh"),
     ("borechain/cli/options.py", "import can"),

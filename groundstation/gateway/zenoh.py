@@ -15,6 +15,7 @@ import orjson
 from groundstation.errors import GroundError, SelectorError
 from groundstation.service.answers.model import RigModel
 from groundstation.service.answers.paths import (
+    FIXED,
     LONGEST_NUMBER,
     PATTERNS,
     Path,
@@ -23,9 +24,10 @@ from groundstation.service.answers.paths import (
     is_of_the_hole,
     paths,
 )
+from groundstation.service.answers.revisions import BEATS
 from groundstation.service.answers.views import Parameters
 from groundstation.service.orders.order_book import Order
-from groundstation.service.process.ground_process import BEATS, GroundProcess
+from groundstation.service.process.ground_process import GroundProcess
 from groundstation.service.process.intake_tape import BEGIN, Intake, pack_intake
 from telemetry import keys
 from telemetry.errors import TelemetryError
@@ -65,7 +67,7 @@ class ZenohGateway:
         self._late: dict[str, None] = {}  # paths of the hole that are to be put
         self._intake = bus.publisher(keys.INTAKE.format(rig=self._rig), MSGPACK, droppable=True)
         self._taped = 0  # newest event of the intake that was published, 0 while nobody listens
-        self._told = dict(process.model.seen)  # newest row of each stream that was published, or there before
+        self._told = {path: process.model.newest_row(path) for path, one in FIXED.items() if one.is_stream}
         process.listeners.append(self._publish)
         bus.queryable_kept(self._key("**"), partial(self._arrive, self._answer))
         bus.queryable_kept(keys.INTAKE.format(rig=self._rig), partial(self._arrive, self._answer_intake))
@@ -165,7 +167,7 @@ class ZenohGateway:
         model, found = self._process.model, find(self._process.model, path)
         if not found.is_stream:
             return found.json(model, {})
-        since, self._told[path] = self._told.get(path, 0), model.seen[path]
+        since, self._told[path] = self._told.get(path, 0), model.newest_row(path)
         return found.json(model, {"since": str(since)})
 
     def _answer(self, query: Query) -> None:

@@ -146,4 +146,4 @@ class Rig:
         return order
 
     def codes(self, tube: int) -> list[str]:
-        return [event.code for event in self.ground.model.events if event.tube == tube]
+        return [event.code for event in self.ground.model.string.events if event.tube == tube]

@@ -121,13 +121,13 @@ def test_what_is_shown_of_many_surveys_is_what_each_of_them_says() -> None:
 @pytest.mark.slow
 def test_a_survey_takes_little_memory(tmp_path: Path) -> None:
     """Ten tubes that survey the same stations again and again."""
-    model = RigModel(GroundConfig(folder=tmp_path, target=40.0))
-    model.tally.restore(list(range(10, 0, -1)))
+    model = RigModel.begin(GroundConfig(folder=tmp_path, target=40.0))
+    model.string.tally.restore(list(range(10, 0, -1)))
 
     def drill(stops: range) -> int:
         for stop in stops:
             for tube in range(1, 11):
-                assert model.on_survey(survey(tube, stop, 100.0 * stop + 0.5 * tube), 2.0 * tube) == ""
+                assert model.placement.on_measurement(survey(tube, stop, 100.0 * stop + 0.5 * tube), 2.0 * tube) == ""
         model.hole.settle()
         gc.collect()
         return tracemalloc.get_traced_memory()[0]
@@ -138,5 +138,5 @@ def test_a_survey_takes_little_memory(tmp_path: Path) -> None:
         before, after = drill(range(50, 100)), drill(range(100, 200))
     finally:
         tracemalloc.stop()
-    assert sum(station.count for station in model.stations) == 1990
+    assert sum(station.count for station in model.hole.stations) == 1990
     assert 200.0 < (after - before) / 1000 < MOST_BYTES

@@ -239,7 +239,7 @@ def test_a_record_that_moved_is_taken_again_and_never_counts(rig: Field) -> None
     rig.run(SECONDS)
     rows = {row["tube"]: row for row in rig.view()["tubes"]}
     assert (rows[1]["records"], rows[2]["records"]) == (8, 9)
-    assert any(record.moved for record in rig.ground.model.static_records)
+    assert any(record.moved for record in rig.ground.model.string.static_records)
     rig.run(30.0, rig.is_complete)
     rig.collect(PRESETS[9:])
     finish(rig)
@@ -276,7 +276,7 @@ def test_a_record_that_ends_after_the_tubes_left_does_not_count(rig: Field) -> N
     # told too early, and they are not there; the order that would take the record's place does not come through
     rig.command("attitude", pitch_deg="90", roll_deg="0", seconds="8")
     rig.run(6.0)
-    records = [record for record in rig.ground.model.static_records if record.tube == 1]
+    records = [record for record in rig.ground.model.string.static_records if record.tube == 1]
     assert [record.moved for record in records] == [False, False]
     assert [row["records"] for row in rig.view()["tubes"]] == [1, 1]
 

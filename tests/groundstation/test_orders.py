@@ -43,7 +43,7 @@ def test_orders_to_a_silent_tube_are_bounded_and_withdrawn_in_the_end(rig: Rig) 
     with pytest.raises(SelectorError, match=f"tube 1: expected at most {OPEN_AT_MOST} orders without an answer"):
         operator.command(1, "take_survey")
     assert rig.order(2, "parameters").state is OrderState.DONE
-    operator.expire_orders(rig.ground.model.now + ANSWERED_WITHIN + 60.0)
+    operator.expire_orders(rig.ground.model.string.time.now + ANSWERED_WITHIN + 60.0)
     assert {order.state for order in orders} == {OrderState.FAILED}
     rig.join(2, 1)
     rig.run(70.0)

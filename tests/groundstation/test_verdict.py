@@ -133,7 +133,7 @@ def test_a_standard_deviation_is_never_told_smaller(std: float) -> None:
 
 
 def test_a_ground_station_that_knows_nothing_says_so(tmp_path: Path) -> None:
-    answer = verdict(RigModel(GroundConfig(folder=tmp_path)), {})
+    answer = verdict(RigModel.begin(GroundConfig(folder=tmp_path)), {})
     check_answer(answer, VERDICT)
     assert answer["verdict"] == "dont_know"
     assert answer["doubts"] == ["no_survey", "clock", "depth", "stale"]

@@ -84,7 +84,7 @@ class Hub:
         """A reader that is given the whole picture first; a verdict only if it is of this moment."""
         is_live = self._is_replay or time.monotonic() <= self._beat_at + BEATS_MISSED * HEARTBEAT
         paths = PATHS if is_live else tuple(path for path in PATHS if path != VERDICT)
-        reader = Reader((*paths, *(f"{NODES}{tube}" for tube in sorted(self._process.model.nodes))))
+        reader = Reader((*paths, *(f"{NODES}{tube}" for tube in sorted(self._process.model.string.states.newest))))
         self._readers.add(reader)
         return reader
 

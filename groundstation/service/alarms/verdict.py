@@ -16,6 +16,7 @@ from groundstation.survey.columns import LEVELS, Deviation
 LOWEST, STEER_AT, LIMIT = LEVELS  # of the tolerance
 WINDS = ("N", "NNE", "NE", "ENE", "E", "ESE", "SE", "SSE", "S", "SSW", "SW", "WSW", "W", "WNW", "NW", "NNW")
 SURELY = 2.0  # standard deviations
+FINEST_CM = 0.1  # cm, of a line for a screen
 
 
 class Word(enum.StrEnum):

@@ -135,10 +135,10 @@ def _points(text: str | None) -> int:
 
 
 def _dominant(k: RigModel) -> View | None:
-    leaning = [station for station in k.stations if station.md > 0.0]
+    leaning = [station for station in k.hole.stations if station.md > 0.0]
     if not leaning:
         return None
-    found = dominant(k.fused(leaning[-1]), k.hole.trajectory[-1].md)
+    found = dominant(k.hole.direction_of(leaning[-1]), k.hole.trajectory[-1].md)
     return {"angle": found.name, "by_inclination_m": found.by_inclination, "by_azimuth_m": found.by_azimuth}
 
 

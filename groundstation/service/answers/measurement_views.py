@@ -30,7 +30,7 @@ def measurements(k: RigModel, p: Parameters) -> View:
     """Every cluster; ``station`` and ``tube`` select, ``since`` and ``limit`` give them as they came."""
     rows, stations = _selected(k, p)
     return {
-        "newest": k.seen["measurements"],
+        "newest": k.hole.newest,
         "measurements": measurement_rows(k.hole.surveys, rows.tolist(), stations.tolist()),
     }
 
@@ -43,16 +43,16 @@ def measurements_text(k: RigModel, p: Parameters) -> bytes:
     def render(places: Numbers) -> list[View]:
         return measurement_rows(surveys, rows[places].tolist(), stations[places].tolist())
 
-    texts = k.measurement_texts.texts_of(rows, np.stack([surveys.column("number")[rows], stations], axis=1), render)
-    return b'{"newest":%d,"measurements":[%b]}' % (k.seen["measurements"], b",".join(texts))
+    texts = k.texts.measurements.texts_of(rows, np.stack([surveys.column("number")[rows], stations], axis=1), render)
+    return b'{"newest":%d,"measurements":[%b]}' % (k.hole.newest, b",".join(texts))
 
 
 def _selected(k: RigModel, p: Parameters) -> tuple[Numbers, Numbers]:
     """Rows (n,) of the table that the parameters select, and the numbers of their stations."""
-    since, limit = span(k.seen["measurements"], p) if streamed(p) else (0, None)
+    since, limit = span(k.hole.newest, p) if streamed(p) else (0, None)
     by_station = Range.parse("station", p["station"]) if "station" in p else None
     by_tube = Range.parse("tube", p["tube"]) if "tube" in p else None
-    chosen = [(n, one) for n, one in enumerate(k.stations, 1) if by_station is None or by_station.holds(n)]
+    chosen = [(n, one) for n, one in enumerate(k.hole.stations, 1) if by_station is None or by_station.holds(n)]
     rows = np.concatenate([NO_ROWS, *(one.clusters.table_rows for _, one in chosen)])
     stations = np.repeat([n for n, _ in chosen], [one.count for _, one in chosen]).astype(np.int64)
     table = k.hole.surveys
@@ -68,7 +68,7 @@ def _selected(k: RigModel, p: Parameters) -> tuple[Numbers, Numbers]:
 
 def station_measurements(k: RigModel, n: int) -> View:
     """Every cluster of one station."""
-    rows = k.stations[n - 1].clusters.table_rows.tolist()
+    rows = k.hole.stations[n - 1].clusters.table_rows.tolist()
     return {"station": n, "measurements": measurement_rows(k.hole.surveys, rows, [n] * len(rows))}
 
 

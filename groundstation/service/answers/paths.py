@@ -31,7 +31,7 @@ _NUMBER = re.compile(r"\{[a-z]+\}")
 
 
 def _station_numbers(k: RigModel) -> range:
-    return range(1, len(k.stations) + 1)
+    return range(1, len(k.hole.stations) + 1)
 
 
 @dataclass(frozen=True, slots=True)
@@ -56,7 +56,7 @@ class Path:
         if self.text is not None:
             text = self.text(k, p)
         elif self.is_of_the_hole and not p:
-            text = k.last_shown(self.view, lambda: orjson.dumps(self.view(k, p)))
+            text = k.texts.text_of(self.view, lambda: orjson.dumps(self.view(k, p)))
         else:
             return orjson.dumps(self.show(k, p))
         return orjson.dumps(header(k))[:-1] + b"," + text[1:]
@@ -74,7 +74,7 @@ class Path:
 
 def header(k: RigModel) -> View:
     """What every answer begins with."""
-    return {"revision": k.revision, "utc": utc_text(time.time()), "rig_time_s": finite(k.rig_now)}
+    return {"revision": k.revisions.newest, "utc": utc_text(time.time()), "rig_time_s": finite(k.string.time.rig_now)}
 
 
 @dataclass(frozen=True, slots=True)
@@ -120,7 +120,7 @@ FIXED: dict[str, Path] = {
     "schema": Path(lambda _k, _p: {"schemas": schemas()}, key_fields.SCHEMA),
 }
 MEMBERS: dict[str, Member] = {
-    "nodes/{tube}": Member(lambda k: sorted(k.nodes), views.node, key_fields.NODE),
+    "nodes/{tube}": Member(lambda k: sorted(k.string.states.newest), views.node, key_fields.NODE),
     "stations/{n}": Member(_station_numbers, views.station, key_fields.STATION),
     "stations/{n}/measurements": Member(
         _station_numbers, measurement_views.station_measurements, key_fields.STATION_MEASUREMENTS

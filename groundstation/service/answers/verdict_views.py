@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from typing import Any
 
-from groundstation.service.alarms.verdict import Verdict, Word, direction, judge, wind
+from groundstation.service.alarms.verdict import FINEST_CM, Verdict, Word, direction, judge, wind
 from groundstation.service.alarms.verdict_doubts import known_of
 from groundstation.service.answers.model import RigModel
 from groundstation.service.answers.rounding import rounded, rounded_std
@@ -13,7 +13,6 @@ from groundstation.survey.columns import Deviation
 
 View = dict[str, Any]
 CM = 100.0
-FINEST_CM = 0.1  # cm, of a line for a screen
 PHRASES = {
     Word.ON_TARGET: "ON TARGET",
     Word.WATCH: "WATCH",
@@ -25,7 +24,7 @@ PHRASES = {
 
 def verdict(k: RigModel, _p: dict[str, str]) -> View:
     """The verdict of this moment."""
-    known = known_of(k)
+    known = known_of(k.config, k.string, k.hole, k.rig_alarms)
     found = judge(known)
     way = None if found.about is None or found.act_before is None else steer(found.about, found)
     return {

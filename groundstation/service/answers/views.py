@@ -60,48 +60,52 @@ class Range:
 
 def status(k: RigModel, _p: Parameters) -> View:
     """Rig time, depth, counts, health."""
-    stale = [tube for tube in k.tally.tubes if k.is_stale(tube)]
     return {
         "rig": k.config.rig,
-        "bit_md_m": k.depths.latest,
-        "tubes": len(k.tally.tubes),
-        "stale_tubes": stale,
-        "stations": len(k.stations),
-        "measurements": sum(s.count for s in k.stations),
-        "unplaced_measurements": k.unplaced,
-        "refused_measurements": k.refused,
-        "set_aside_measurements": len(k.set_aside),
-        "untrusted_measurements": sum(s.untrusted for s in k.stations),
-        "health": k.health.name.lower(),
-        "epoch": k.epoch,
+        "bit_md_m": k.string.bit,
+        "tubes": len(k.string.tubes),
+        "stale_tubes": k.string.silent,
+        "stations": len(k.hole.stations),
+        "measurements": sum(s.count for s in k.hole.stations),
+        "unplaced_measurements": k.placement.unplaced,
+        "refused_measurements": k.placement.refused,
+        "set_aside_measurements": len(k.placement.set_aside),
+        "untrusted_measurements": sum(s.untrusted for s in k.hole.stations),
+        "health": k.rig_alarms.health_of(is_known=k.string.is_known).name.lower(),
+        "epoch": k.string.time.epoch,
         "alarms": sorted({alarm.kind.code for alarm in k.rig_alarms}),
     }
 
 
 def changes(k: RigModel, _p: Parameters) -> View:
     """When each path changed last: whoever holds an answer of before has missed one."""
-    return {"changes": [{"path": path, "changed_at": at} for path, at in sorted(k.changed_at.items())]}
+    return {"changes": [{"path": path, "changed_at": at} for path, at in sorted(k.revisions.changed_at.items())]}
 
 
 def string(k: RigModel, _p: Parameters) -> View:
     """Tubes from top to bottom."""
-    bit = k.depths.latest
     rows = []
-    for tube in k.tally.tubes:
-        below = k.tally.length_below(tube)
-        md = None if bit is None or below is None else round(bit - below, 6)
-        rows.append({"tube": tube, "md_m": md, "age_s": finite(k.age(tube)), "stale": k.is_stale(tube)})
+    for tube in k.string.tubes:
+        md = k.string.depth_of_node(tube)
+        rows.append(
+            {
+                "tube": tube,
+                "md_m": None if md is None else round(md, 6),
+                "age_s": finite(k.string.states.age(tube)),
+                "stale": k.string.states.is_stale(tube),
+            }
+        )
     return {"tubes": rows}
 
 
 def node(k: RigModel, tube: int) -> View:
     """Last state of one node."""
-    s = k.nodes[tube]
+    s = k.string.states.newest[tube]
     return {
         "tube": tube,
         "at_s": s.at,
-        "age_s": finite(k.age(tube)),
-        "stale": k.is_stale(tube),
+        "age_s": finite(k.string.states.age(tube)),
+        "stale": k.string.states.is_stale(tube),
         "hops": s.hops,
         "mode": s.mode.name.lower(),
         "yaw_deg": math.degrees(s.yaw),
@@ -133,7 +137,7 @@ def alignment(s: NodeState) -> View | None:
 def stations(k: RigModel, p: Parameters) -> View:
     """All stations, fused; ``md`` selects."""
     wanted = Range.parse("md", p["md"]) if "md" in p else None
-    numbers = [n for n, s in enumerate(k.stations, 1) if wanted is None or wanted.holds(s.md)]
+    numbers = [n for n, s in enumerate(k.hole.stations, 1) if wanted is None or wanted.holds(s.md)]
     return {"stations": station_rows(k, numbers)}
 
 
@@ -147,7 +151,7 @@ def station_rows(k: RigModel, numbers: Sequence[int]) -> list[View]:
 
     What a string turns by in a bent hole changes with the stations around.
     """
-    known, drawn = k.stations, k.hole.trajectory
+    known, drawn = k.hole.stations, k.hole.trajectory
     chosen = [known[n - 1] for n in numbers]
     changed = chosen if k.hole.has_transport else [s for s in chosen if s.shown is None]
     for s, view in zip(changed, direction_views(k.hole, changed), strict=True):
@@ -217,9 +221,8 @@ def trajectory(k: RigModel, p: Parameters) -> View:
 def events(k: RigModel, p: Parameters) -> View:
     """What happened; ``tube`` selects."""
     wanted = Range.parse("tube", p["tube"]) if "tube" in p else None
-    newest = k.seen["events"]
-    first = newest - len(k.events) + 1
-    rows = [event(e, n) for n, e in enumerate(k.events, first) if wanted is None or wanted.holds(e.tube)]
+    newest = k.string.events.newest
+    rows = [event(e, n) for n, e in k.string.events.numbered() if wanted is None or wanted.holds(e.tube)]
     return {"newest": newest, "events": window(rows, newest, p)}
 
 
@@ -239,10 +242,9 @@ def event(e: Event, seq: int) -> View:
 def static_records(k: RigModel, p: Parameters) -> View:
     """Raw readings averaged at rest; ``tube`` selects."""
     wanted = Range.parse("tube", p["tube"]) if "tube" in p else None
-    newest = k.seen["static_records"]
-    first = newest - len(k.static_records) + 1
+    newest = k.string.static_records.newest
     rows = [
-        static_record(r, n) for n, r in enumerate(k.static_records, first) if wanted is None or wanted.holds(r.tube)
+        static_record(r, n) for n, r in k.string.static_records.numbered() if wanted is None or wanted.holds(r.tube)
     ]
     return {"newest": newest, "static_records": window(rows, newest, p)}
 

@@ -22,12 +22,12 @@ def wall(k: RigModel, _p: dict[str, str]) -> View:
     """The joints of now; without a wall file nothing but that."""
     if k.wall is None:
         return {"wall": None}
-    return {"wall": neighbourhood(k.wall, k.wall.judged(stations_of(k), k.depths.latest))}
+    return {"wall": neighbourhood(k.wall, k.wall.judged(stations_of(k), k.string.bit))}
 
 
 def stations_of(k: RigModel) -> list[tuple[float, float, float]]:
     """Measured depth (m), inclination and azimuth (rad) of the stations below the collar."""
-    found = [(station.md, k.fused(station)) for station in k.stations if station.md > 0.0]
+    found = [(station.md, k.hole.direction_of(station)) for station in k.hole.stations if station.md > 0.0]
     return [(md, *angles(direction.lean, direction.down)) for md, direction in found]
 
 

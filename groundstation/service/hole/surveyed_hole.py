@@ -67,6 +67,7 @@ class Hole:
         self._unsettled_since = math.inf  # s, rig time of the oldest survey from which nothing follows yet
         self._newest_at = -math.inf  # s, rig time of the newest survey
         self.version = 0  # grows with every survey
+        self.newest = 0  # number of the measurement that came last, revisions included
 
     def add_cluster(self, cluster: Cluster, epoch: int) -> bool:
         """Take a survey with rig time of an epoch; a revision of one that is known takes its place, unless it is older.
@@ -90,6 +91,7 @@ class Hole:
         elif not station.revise_cluster(revised, cluster):
             return False
         self.version += 1
+        self.newest = cluster.number
         self._history.on_survey(epoch, cluster.at)
         self._unsettled_since = min(self._unsettled_since, cluster.at)
         self._newest_at = max(self._newest_at, cluster.at)

@@ -7,11 +7,11 @@ from dataclasses import replace
 
 from groundstation.errors import StoreError
 from groundstation.service.alarms.watch import Watch
-from groundstation.service.answers.model import Prepared, RigModel
+from groundstation.service.answers.model import RigModel
 from groundstation.service.disk.ground_store import Store, Stored
 from groundstation.service.disk.keeper import Keeper
 from groundstation.service.hole.deviation_alarms import Alarm
-from groundstation.service.string.stands import take_survey
+from groundstation.service.hole.placement import Prepared
 from telemetry.messages import Event, Kept, StaticRecord, SurveyMeasurement
 
 CHANGED_BY_SURVEY = ("measurements", "stations", "trajectory", "uncertainty", "column")
@@ -19,17 +19,20 @@ RESTORED_TOGETHER = 256  # messages
 
 
 class Learner:
-    """Stores what comes and adds it to a model.
+    """Stores what comes and adds it to what is known.
 
     Parameters
     ----------
     store : open
-    model, watch : that learn
+    model : whose parts learn
+    watch : that is told of it
     keeper : of the order of the string, by which surveys are placed
     """
 
     def __init__(self, store: Store, model: RigModel, watch: Watch, keeper: Keeper) -> None:
-        self._store, self._model, self._watch, self._keeper = store, model, watch, keeper
+        self._store, self._watch, self._keeper = store, watch, keeper
+        self._string, self._hole, self._placement = model.string, model.hole, model.placement
+        self._orders, self._recalibration = model.orders, model.recalibration
         self._arrived: list[Stored] = []  # since the last transaction
         self._known: tuple[list[Alarm], int, int] = ([], 0, 0)  # alarms of the hole, moves and stops that were told
         self._by_survey = (*CHANGED_BY_SURVEY, *(["wall"] if model.wall is not None else []))
@@ -38,8 +41,8 @@ class Learner:
         """A message has come; it is stored with those that come beside it, a survey with the depth that it has now."""
         md = below = None
         if isinstance(message, SurveyMeasurement):
-            below = self._model.string_below(message)
-            md = None if below is None else self._model.depth_of(message, below)
+            below = self._string.length_below(message)
+            md = None if below is None else self._string.depth_of(message, below)
         self._arrived.append(Stored(message, md, below))
 
     def learn_arrived(self) -> tuple[list[Kept], list[str]]:
@@ -81,18 +84,18 @@ class Learner:
 
     def place_waiting(self) -> list[str]:
         """Fuse the surveys whose depth is known by now; returns the paths that changed."""
-        model = self._model
-        placeable = model.placeable()
+        placement = self._placement
+        placeable = placement.take_placeable()
         moved: list[tuple[Kept, float | None]] = [(one.measurement, md) for one, md in placeable if one.kept != md]
-        moved += [(one.measurement, None) for one in model.waiting if one.kept is not None]
+        moved += [(one.measurement, None) for one in placement.waiting if one.kept is not None]
         try:
             if moved:
                 self._store.place_messages(moved)
         except StoreError:
-            model.waiting += [one for one, _ in placeable]
+            placement.waiting += [one for one, _ in placeable]
             return []
         if moved:
-            model.waiting = [replace(one, kept=None) for one in model.waiting]
+            placement.waiting = [replace(one, kept=None) for one in placement.waiting]
         return sorted({path for one, md in placeable for path in self._learn(one.measurement, md, one.below)})
 
     def find_consequences(self) -> list[str]:
@@ -100,7 +103,7 @@ class Learner:
 
         Surveys come one by one, tube by tube: to be asked at every look, and not for each of them.
         """
-        hole = self._model.hole
+        hole = self._hole
         before, self._known = self._known, (list(hole.alarms.alarms), len(hole.moved), hole.history.count)
         paths = {"alarms": before[:2] != self._known[:2], "history": before[2] != self._known[2]}
         return [path for path, has_changed in paths.items() if has_changed]
@@ -114,7 +117,7 @@ class Learner:
                 for place, one in enumerate(some)
                 if isinstance(one.message, SurveyMeasurement) and one.md is not None
             }
-            prepared = dict(zip(placed, self._model.prepare(list(placed.values())), strict=True))
+            prepared = dict(zip(placed, self._placement.prepare(list(placed.values())), strict=True))
             for place, one in enumerate(some):
                 self._learn(one.message, one.md, one.below, prepared.get(place))
         self.find_consequences()
@@ -128,18 +131,17 @@ class Learner:
         kept: float | None = None,
     ) -> tuple[str, ...]:
         """Add a stored message to the model; returns the paths that changed."""
-        model = self._model
-        model.numbers.add_number(message.tube, message.sequence)
+        self._string.numbers.add_number(message.tube, message.sequence)
         if isinstance(message, Event):
-            model.on_event(message)
+            self._string.events.append_row(message)
+            self._orders.on_event(message)
             self._watch.on_known_event(message)
             return ("events",)
         if isinstance(message, StaticRecord):
-            model.on_static_record(message)
+            self._string.static_records.append_row(message)
+            self._orders.on_static_record(message)
+            self._recalibration.on_static_record(message)
             return ("static_records",)
-        epoch = message.epoch or model.epoch
-        model.stops.on_survey(epoch, message.station_at, message.tube)
-        if md is not None:
-            take_survey(model.depths, model.stops, epoch, message.station_at)
-        self._watch.on_survey(message, model.on_survey(message, md, below, prepared, kept))
+        self._string.on_measurement(message, is_placed=md is not None)
+        self._watch.on_survey(message, self._placement.on_measurement(message, md, below, prepared, kept))
         return self._by_survey

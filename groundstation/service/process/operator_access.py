@@ -11,7 +11,6 @@ import time
 from collections import deque
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from functools import partial
 from typing import Any
 
 from groundstation.config import GroundConfig
@@ -26,6 +25,7 @@ from groundstation.service.orders.recalibration.control import Recalibration
 from groundstation.service.orders.recalibration.procedure import Request
 from groundstation.service.orders.surveyed_biases import surveyed_biases
 from groundstation.service.orders.uploads import Uploads
+from groundstation.survey.force_biases import SurveyedBiases
 from telemetry.application.arguments import check_arguments, parse_parameters, parse_tube
 from telemetry.application.commands import COMMANDS, CommandSpec, ObeyedBy, find_command
 from telemetry.errors import CommandError
@@ -58,7 +58,7 @@ class Operator:
     Parameters
     ----------
     config : of the ground station
-    model, store : what it knows, and where it keeps it
+    model, store : what is known, for its answers, and where it is kept
     uploads : that are under way; None without a key of the rig
     start : number of this start of the ground station, which no order of another start shares
     """
@@ -70,12 +70,12 @@ class Operator:
         self._model = model
         self._store = store
         self._uploads = uploads
-        self._orders = model.orders
+        self._orders, self._string = model.orders, model.string
         self._numbers = itertools.count((start << START_SHIFT) + 1)
         self._pending: deque[Outgoing] = deque()
         self._accepted_at: dict[int, float] = {}  # s, own clock, of the orders that have no answer yet
         self._recalibration = Recalibration(
-            model.recalibration, store, config.calibrations, self._cancel_upload, partial(surveyed_biases, model)
+            model.recalibration, store, config.calibrations, self._cancel_upload, self._surveyed_biases
         )
         self._handlers: dict[str, Callable[[Order], None]] = {
             spec.name: getattr(self, spec.name) for spec in COMMANDS if spec.by is ObeyedBy.GROUND
@@ -165,7 +165,7 @@ class Operator:
     def upload_parameters(self, order: Order) -> None:
         """Upload the calibrations that are named, as the version after the one in use unless a version is named."""
         tube, arguments = order.tube or 0, order.arguments
-        version, state = arguments.get("version"), self._model.nodes.get(tube)
+        version, state = arguments.get("version"), self._string.states.newest.get(tube)
         if version is None and state is None:
             raise SelectorError(f"tube {tube}: its state, and so its version, is not known yet; expected version=..")
         if version is None and state is not None:
@@ -178,19 +178,19 @@ class Operator:
     def recalibrate(self, order: Order) -> None:
         """Take a step of the calibration in the field."""
         self._check_key()
-        self._recalibration.step(order.spec.action, order.arguments, self._model.rig_now, self._model.tally.tubes)
+        self._recalibration.step(order.spec.action, order.arguments, self._string.time.rig_now, self._string.tubes)
         order.advance(OrderState.DONE)
         self.changed(["recalibration"])
 
     def accept_depth(self, order: Order) -> None:
         """Believe the depth that comes from now on."""
-        self._model.depths.accept()
+        self._string.depths.accept()
         self._model.rig_alarms.clear("depth_refused", "depth")
         order.advance(OrderState.DONE)
 
     def accept_joints(self, order: Order) -> None:
         """Take the angles at which the joints stand for right."""
-        self._model.joints.accept()
+        self._string.joints.accept()
         for alarm in list(self._model.rig_alarms):
             if alarm.kind.code == "joint":
                 self._model.rig_alarms.clear("joint", alarm.subject)
@@ -287,7 +287,7 @@ class Operator:
 
     def _new_order(self, spec: CommandSpec, tube: int | None, arguments: dict[str, Any], by: str) -> Order:
         utc = datetime.datetime.now(datetime.UTC).isoformat(timespec="milliseconds")
-        return Order(next(self._numbers), spec, tube, arguments, by, self._model.rig_now, utc)
+        return Order(next(self._numbers), spec, tube, arguments, by, self._string.time.rig_now, utc)
 
     def _keep(self, order: Order, *, wake: bool = True) -> None:
         self._orders.add(order)
@@ -302,6 +302,10 @@ class Operator:
         self._store.keep_block(block)
         self._model.recalibration.blocks[block.sha256().hex()] = block
         self._pending.append(BlockUpload(order.number, block))
+
+    def _surveyed_biases(self) -> SurveyedBiases:
+        states, mixed = self._string.states.newest, self._recalibration.procedure.progress.mixed
+        return surveyed_biases(self._config, self._model.hole, states, mixed)
 
     def _cancel_upload(self, tube: int) -> None:
         if self._uploads is not None:
@@ -320,7 +324,8 @@ class Operator:
             raise SelectorError(f"tube {tube}: expected at most {OPEN_AT_MOST} orders without an answer, got {waiting}")
 
     def _check_tube(self, tube: int) -> None:
-        known = self._model.tally.tubes + [t for t in sorted(self._model.nodes) if t not in self._model.tally.tubes]
+        hanging = self._string.tubes
+        known = hanging + [tube for tube in sorted(self._string.states.newest) if tube not in hanging]
         if tube not in known:
             expected = f"expected one of {', '.join(map(str, known))}" if known else "no tube has reported yet"
             raise SelectorError(f"tube {tube}: not in the string; {expected}")
