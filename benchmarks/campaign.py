@@ -25,12 +25,12 @@ import numpy as np
 from numba import njit
 
 from node.firmware.block_trial import record_of
-from node.kernels.address import firmware
-from node.kernels.angles import wrap
-from node.kernels.cycle import run_cycle
-from node.kernels.layout import CYCLE_RATE_HZ, PERIOD
-from node.kernels.record import A_HOPS, A_SEQUENCE, A_SYSTEMATIC, A_VALID, A_YAW, A_YAW_VAR, READING
-from node.kernels.relay import offer_aiding
+from node.kernels.arithmetic.angles import wrap
+from node.kernels.arithmetic.formats import CYCLE_RATE_HZ, PERIOD
+from node.kernels.filter.float64.cycle import run_cycle
+from node.kernels.record.node_record import A_HOPS, A_SEQUENCE, A_SYSTEMATIC, A_VALID, A_YAW, A_YAW_VAR, READING
+from node.kernels.step.address import firmware
+from node.kernels.string.relay import offer_aiding
 from sim.campaign.chunk import RUNS, Campaign, run_chunk
 from sim.campaign.course import Course
 from sim.campaign.draws import Draws, draws_of, fresh_nodes, noise_of, tubes_of

@@ -27,18 +27,20 @@ from numba import njit
 
 from borechain.cli.faults import EnvironmentFault
 from node.firmware.encoder import EncoderNode, EncoderSample
-from node.kernels.angles import advance_binary, from_binary
-from node.kernels.cycle import run_cycle
-from node.kernels.error_model import propagate
-from node.kernels.fixed_lag import aid
-from node.kernels.layout import CONFIG, CYCLE_RATE_HZ, DEG, PERIOD, STATE, STATES, default_config, new_state
-from node.kernels.relay import offer_aiding
-from node.kernels.strapdown import rotate_down, yaw_rate
+from node.kernels.arithmetic.angles import advance_binary, from_binary
+from node.kernels.arithmetic.formats import CYCLE_RATE_HZ, DEG, PERIOD
+from node.kernels.filter.float64.cycle import run_cycle
+from node.kernels.filter.float64.fixed_lag import aid
+from node.kernels.filter.float64.propagation import propagate
+from node.kernels.filter.float64.strapdown import rotate_down, yaw_rate
+from node.kernels.record.filter_record import CONFIG, STATE, STATES, default_config, new_state
+from node.kernels.string.relay import offer_aiding
 from sim.world.scenario import load_scenario
 from sim.world.world import World
 
 ROOT = Path(__file__).parents[1]
 SOURCE = Path(__file__).parent / "c" / "node.c"
+LAYOUT = "node/kernels/record/filter_record.py"
 FLAGS = ("-std=gnu11", "-O3", "-march=native")
 UNFUSED = "-ffp-contract=off"  # every product rounded by itself, as ours does
 SEED = 1
@@ -167,7 +169,9 @@ def build_c(folder: Path, *extra: str) -> Runner:
         last = (dtype.names or ())[-1]
         ours = dtype.itemsize, (dtype.fields or {})[last][1]
         if ours != (loaded.node_size(which), loaded.node_end(which)):
-            raise EnvironmentFault(f"{SOURCE}: its record {which} is laid out differently from node/kernels/layout.py")
+            raise EnvironmentFault(
+                f"{SOURCE}: its record {which} is laid out differently from node/kernels/record/filter_record.py"
+            )
     pointer = ctypes.c_void_p
     loaded.node_run.argtypes = [pointer] * 4 + [ctypes.c_int64, pointer, ctypes.c_int64]
     loaded.node_run.restype = None
@@ -201,22 +205,23 @@ class FixedStretch(Stretch):
     """The same part of the recording in integers, as the fixed-point loop takes it in."""
 
     def __init__(self, like: Stretch) -> None:
-        from node.kernels.fixed import border, layout
+        from node.kernels.arithmetic import formats as q
+        from node.kernels.record import filter_conversion
 
         gravity = float(like.config[0]["gravity"])
-        self.config, _ = border.config_in_integers(like.config[0])
-        self.begin = border.state_in_integers(like.begin[0], gravity)
+        self.config, _ = filter_conversion.config_in_integers(like.config[0])
+        self.begin = filter_conversion.state_in_integers(like.begin[0], gravity)
         self.state, self.passes = self.begin.copy(), like.passes
         self.outputs = np.zeros(len(like.inputs), FIXED_OUTPUT)
         self.inputs = np.zeros(len(like.inputs), FIXED_INPUT)
-        formats = dict.fromkeys(("rate", "turn_rate"), layout.RATE_Q)
-        formats |= dict.fromkeys(("yaw", "offset"), layout.ANGLE_Q)
-        formats |= dict.fromkeys(("start", "end", "valid_at"), layout.TIME_Q)
-        formats |= dict.fromkeys(("yaw_var", "systematic_var"), layout.VAR_Q)
+        formats = dict.fromkeys(("rate", "turn_rate"), q.RATE_Q)
+        formats |= dict.fromkeys(("yaw", "offset"), q.ANGLE_Q)
+        formats |= dict.fromkeys(("start", "end", "valid_at"), q.TIME_Q)
+        formats |= dict.fromkeys(("yaw_var", "systematic_var"), q.VAR_Q)
         for name in FIXED_INPUT.names or ():
             value = like.inputs[name]
             if name == "force":
-                value = np.rint(value / gravity * 2.0**layout.FORCE_Q)
+                value = np.rint(value / gravity * 2.0**q.FORCE_Q)
             elif name in formats:
                 value = np.rint(value * 2.0 ** formats[name])
             self.inputs[name] = value
@@ -224,10 +229,10 @@ class FixedStretch(Stretch):
 
 def fixed_runner() -> Runner | None:
     """The fixed-point loop with the arguments of ``run_compiled``; None where there is none."""
-    if importlib.util.find_spec("node.kernels.fixed") is None:
+    if importlib.util.find_spec("node.kernels.filter.fixed") is None:
         return None
-    from node.kernels.fixed.cycle import run_cycle
-    from node.kernels.relay import offer_aiding
+    from node.kernels.filter.fixed.cycle import run_cycle
+    from node.kernels.string.relay import offer_aiding
 
     runner: Runner = njit(error_model="numpy")(looped(run_cycle, offer_aiding))
     return runner

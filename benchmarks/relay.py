@@ -16,7 +16,7 @@ from pathlib import Path
 from typing import Any
 
 from borechain.load.rounds import beside
-from node.kernels.warm import warm_up
+from node.kernels.step.warm import warm_up
 from node.process.drivers.timed import TimedImu
 from node.process.host import run_node
 from sim.rig.realtime import clock_offset

@@ -20,11 +20,22 @@ from numba import njit
 
 from node.firmware.inputs import ImuReading, RigContext
 from node.firmware.tube import Tube
-from node.kernels.address import firmware
-from node.kernels.calibration import PARAMETERS
-from node.kernels.layout import default_config
-from node.kernels.record import AIDING, CLOCK_VAR, END, HOPS, JOINED, MOMENT, READING, START, SYNCHRONISED, new_node
-from node.kernels.string import string_aiding, string_step
+from node.kernels.record.filter_record import default_config
+from node.kernels.record.node_record import (
+    AIDING,
+    CLOCK_VAR,
+    END,
+    HOPS,
+    JOINED,
+    MOMENT,
+    READING,
+    START,
+    SYNCHRONISED,
+    new_node,
+)
+from node.kernels.record.sensor_record import PARAMETERS
+from node.kernels.step.address import firmware
+from node.kernels.step.string_step import string_aiding, string_step
 from sim.studies.epochs import resting
 from sim.world.scenario import scenario_of
 from sim.world.world import World

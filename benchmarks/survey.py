@@ -17,14 +17,14 @@ from typing import Any
 
 import numpy as np
 
-from groundstation.survey.analysis import analyse
-from groundstation.survey.compiled_model import COMPILED_FROM, locate_many, warm
-from groundstation.survey.error_sources import Site, Survey
-from groundstation.survey.instruments import Tool, load_tool
-from groundstation.survey.methods import Method, positions
-from groundstation.survey.records import Record
-from groundstation.survey.resolve import Direction
-from groundstation.survey.trajectory import Trajectory
+from groundstation.survey.fusion.resolve import Direction
+from groundstation.survey.tools.instruments import Tool, load_tool
+from groundstation.survey.well.analysis import analyse
+from groundstation.survey.well.compiled_model import COMPILED_FROM, locate_many, warm
+from groundstation.survey.well.error_sources import Site, Survey
+from groundstation.survey.well.methods import Method, positions
+from groundstation.survey.well.trajectory import Trajectory
+from groundstation.survey.well.well_record import Record
 
 STATIONS = 1000
 SHORT = COMPILED_FROM - 1  # stations of the longest survey that is compiled only where its model is held
@@ -183,7 +183,7 @@ def run() -> dict[str, Any]:
         f"a well of {WELL_STATIONS} stations in a batch of {WELLS}, against a call each": dict(batch(tool, site)),
         f"append one station, {SHARED} shared errors (no peer)": {"ours": append_time(), "peer": None, "ratio": None},
     }
-    ours_import, peer_import = import_time("groundstation.survey.analysis"), import_time("welleng.survey")
+    ours_import, peer_import = import_time("groundstation.survey.well.analysis"), import_time("welleng.survey")
     ratios["import, against welleng"] = {
         "ours": ours_import,
         "peer": peer_import,

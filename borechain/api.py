@@ -19,11 +19,11 @@ from telemetry.errors import BorechainError, InputError, MediumError
 
 if TYPE_CHECKING:
     from groundstation.calibration.attitudes import Fit
-    from groundstation.survey.analysis import Analysis
-    from groundstation.survey.error_sources import Site
-    from groundstation.survey.joints import Joints
-    from groundstation.survey.wall_file import Wall
-    from groundstation.survey.wall_verdict import Judgement
+    from groundstation.survey.wall.wall_file import Wall
+    from groundstation.survey.wall.wall_joints import Joints
+    from groundstation.survey.wall.wall_verdict import Judgement
+    from groundstation.survey.well.analysis import Analysis
+    from groundstation.survey.well.error_sources import Site
     from sim.world.scenario import Scenario
 
 __all__ = [
@@ -130,11 +130,11 @@ def survey(
     SurveyError, ToolError
         When the record or the instrument cannot be used.
     """
-    from groundstation.survey.analysis import analyse
-    from groundstation.survey.error_sources import Site
-    from groundstation.survey.instruments import load_tool
-    from groundstation.survey.methods import Method
-    from groundstation.survey.records import DisplacementRule, read_record
+    from groundstation.survey.files.survey_records import DisplacementRule, read_record
+    from groundstation.survey.tools.instruments import load_tool
+    from groundstation.survey.well.analysis import analyse
+    from groundstation.survey.well.error_sources import Site
+    from groundstation.survey.well.methods import Method
 
     place = site or Site(9.81, 50_000.0, math.radians(70.0), 0.0, math.radians(52.0))
     record = read_record(Path(file), DisplacementRule(displacement_rule))
@@ -149,8 +149,8 @@ def wall(file: str | Path) -> JudgedWall:
     SurveyError
         When the file or one that it names cannot be used.
     """
-    from groundstation.survey.joints import worst
-    from groundstation.survey.wall_file import judge_wall, read_wall
+    from groundstation.survey.wall.wall_file import judge_wall, read_wall
+    from groundstation.survey.wall.wall_joints import worst
 
     found = read_wall(Path(file))
     judgement = judge_wall(found)

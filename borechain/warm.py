@@ -10,9 +10,9 @@ import node.process.host
 import sim.rig.bus_stepper
 import sim.rig.scheduler
 import sim.world.world
-from groundstation.survey.kernels import position_errors
-from node.kernels.jit import leave_blas_out
-from node.kernels.warm import warm_encoder, warm_up
+from groundstation.survey.well.kernels import position_errors
+from node.kernels.arithmetic.jit import leave_blas_out
+from node.kernels.step.warm import warm_encoder, warm_up
 
 leave_blas_out()
 warm_up()

@@ -8,7 +8,7 @@ from __future__ import annotations
 from borechain import warm
 from node.firmware.kernel_choice import kernel_of
 from node.firmware.settings import KERNELS
-from node.kernels.warm import warm_step
+from node.kernels.step.warm import warm_step
 
 for kernel in KERNELS:
     loop = kernel_of(kernel)

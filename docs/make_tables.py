@@ -18,7 +18,7 @@ import node_tables  # noqa: E402
 from groundstation.service.alarms.rig_alarms import KINDS  # noqa: E402
 from groundstation.service.answers.answer_fields import Fields  # noqa: E402
 from groundstation.service.answers.paths import FIXED, MEMBERS  # noqa: E402
-from groundstation.survey.trust import EFFECTS, TOGETHER  # noqa: E402
+from groundstation.survey.fusion.survey_trust import EFFECTS, TOGETHER  # noqa: E402
 from telemetry import keys  # noqa: E402
 from telemetry.application.arguments import shown_name, shown_range  # noqa: E402
 from telemetry.application.commands import COMMANDS, Argument, CommandSpec  # noqa: E402

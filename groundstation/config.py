@@ -11,9 +11,9 @@ import numpy as np
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
 from groundstation.errors import ConfigurationError
-from groundstation.survey.columns import PRESETS, Design
-from groundstation.survey.fusion import Weighting
-from groundstation.survey.resolve import Direction, known
+from groundstation.survey.fusion.fusion import Weighting
+from groundstation.survey.fusion.resolve import Direction, known
+from groundstation.survey.wall.column_deviation import PRESETS, Design
 from telemetry import keys
 
 SENSOR_BIAS_DEG = 0.06  # of an accelerometer, as a tilt: 1 mg, of one that nobody has calibrated

@@ -14,7 +14,7 @@ from groundstation.gateway.lease import take_lease
 from groundstation.gateway.page.settings import PageSettings, listen
 from groundstation.gateway.zenoh import ZenohGateway
 from groundstation.service.process.ground_process import GroundProcess
-from node.kernels.layout import PERIOD
+from node.kernels.arithmetic.formats import PERIOD
 from telemetry import keys
 from telemetry.media.credentials import file_name
 from telemetry.media.neighbours import neighbour_ports, stepped_ports
@@ -65,8 +65,8 @@ def run_ground(
 
 def load_kernels() -> None:
     """Compile what surveys are computed with, or load it, before it says that it lives: no question waits for that."""
-    from groundstation.survey.kernels.position_errors import warm_up
-    from node.kernels.jit import leave_blas_out
+    from groundstation.survey.well.kernels.position_errors import warm_up
+    from node.kernels.arithmetic.jit import leave_blas_out
 
     leave_blas_out()
     warm_up()

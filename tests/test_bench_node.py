@@ -18,7 +18,7 @@ from click.testing import CliRunner
 
 from borechain.cli.bench.bench import bench
 from borechain.cli.faults import EnvironmentFault
-from node.kernels.layout import Status, default_config, new_state
+from node.kernels.record.filter_record import Status, default_config, new_state
 
 pytestmark = pytest.mark.slow
 

@@ -23,9 +23,9 @@ FORBIDDEN = [
     ("groundstation/errors.py", "import sim.errors"),
     ("sim/errors.py", "import borechain.cli.options"),
     ("telemetry/transport/hop.py", "import telemetry.application.clock"),
-    ("node/kernels/angles.py", "import node.firmware.encoder"),
+    ("node/kernels/arithmetic/angles.py", "import node.firmware.encoder"),
     ("groundstation/config.py", "import node.firmware.settings"),
-    ("groundstation/survey/resolve.py", "import groundstation.service.disk.ground_store"),
+    ("groundstation/survey/fusion/resolve.py", "import groundstation.service.disk.ground_store"),
     ("groundstation/calibration/quality.py", "import groundstation.report.style"),
     ("sim/rig/report.py", "import groundstation.service.disk.ground_store"),
     ("groundstation/service/process/operator_access.py", "import groundstation.gateway.zenoh"),
@@ -34,8 +34,11 @@ FORBIDDEN = [
     ("groundstation/service/process/ground_process.py", "import telemetry.media.zenoh_bus"),
     ("telemetry/application/clock.py", "import zenoh"),
     ("borechain/cli/options.py", "import can"),
-    ("node/kernels/layout.py", "import msgpack"),
+    ("node/kernels/record/filter_record.py", "import msgpack"),
     ("node/firmware/encoder.py", "import asyncio"),
+    ("groundstation/survey/tools/formulas.py", "import groundstation.survey.wall.column_joint.voids"),
+    ("node/kernels/record/ring.py", "import node.kernels.filter.resets"),
+    ("node/kernels/filter/fixed/cycle.py", "import node.kernels.filter.float64.cycle"),
 ]
 
 

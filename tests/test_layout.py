@@ -41,9 +41,9 @@ def test_every_equation_named_in_a_kernel_is_in_the_document() -> None:
         module, _, function = name.rpartition(".")
         assert hasattr(importlib.import_module(module), function), name
     assert {
-        "node.kernels.strapdown.yaw_rate",
-        "node.kernels.error_model.propagate",
-        "node.kernels.update.joseph",
+        "node.kernels.filter.float64.strapdown.yaw_rate",
+        "node.kernels.filter.float64.propagation.propagate",
+        "node.kernels.filter.float64.update.joseph",
     } <= listed
 
 

@@ -325,7 +325,7 @@ def test_an_instrument_that_errs_only_down_is_a_singular_covariance(tmp_path: Pa
 
 
 def test_what_a_wall_file_names_lies_beside_it(tmp_path: Path) -> None:
-    text = (ROOT / "groundstation" / "survey" / "tools" / "relay.toml").read_text()
+    text = (ROOT / "groundstation" / "survey" / "tools" / "models" / "relay.toml").read_text()
     (tmp_path / "mine.toml").write_text(text.replace('name = "relay"', 'name = "mine"'))
     wall = changed(tmp_path, WALL.name, 'instrument = "relay"', 'instrument = "mine.toml"')
     assert {row["instrument"] for row in answer("wall", wall, status=3)["columns"]} == {"mine"}

@@ -10,9 +10,9 @@ import numpy as np
 import pytest
 
 from node.firmware.event_table import EVENT_TABLE
-from node.kernels import step
-from node.kernels.events import Code
-from node.kernels.record import NODE
+from node.kernels.record.events import Code
+from node.kernels.record.node_record import NODE
+from node.kernels.step import node_step
 
 DOCS = Path(__file__).parents[1] / "docs"
 
@@ -96,7 +96,7 @@ def test_every_code_of_the_step_has_its_line(make_tables: ModuleType) -> None:
 
 def source_of(name: str) -> str:
     """Body of a function of the step."""
-    function = getattr(step, name)
+    function = getattr(node_step, name)
     return inspect.getsource(getattr(function, "py_func", function)).partition('"""')[2].partition('"""')[2]
 
 

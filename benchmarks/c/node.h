@@ -1,4 +1,4 @@
-/* Memory of one node, as node/kernels/layout.py declares it, and the recording that drives it.
+/* Memory of one node, as node/kernels/record/filter_record.py declares it, and the recording that drives it.
  *
  * A second implementation of the node's cycle, in plain C: a yardstick for the speed of the compiled Python and a
  * check of its results. Written from the equations in docs/equations.md; SI units and radians. */

@@ -10,7 +10,7 @@ import math
 import threading
 from collections.abc import Iterator
 
-from node.kernels.layout import PERIOD
+from node.kernels.arithmetic.formats import PERIOD
 from telemetry import keys
 from telemetry.application.depth_source import DepthSource
 from telemetry.application.endpoint import Endpoint

@@ -15,7 +15,7 @@ import numpy.typing as npt
 from groundstation.calibration.coverage import COVERAGE, coverage_factor
 from groundstation.calibration.errors import CalibrationError
 from groundstation.calibration.jig import Combined, Jig, combine, settings_of
-from groundstation.survey.resolve import is_covariance
+from groundstation.survey.fusion.resolve import is_covariance
 
 Array = npt.NDArray[np.float64]
 RANK_TOLERANCE = 1e-5  # of the largest singular value; below it a preset decides by its rounding

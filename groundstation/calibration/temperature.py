@@ -12,7 +12,7 @@ import numpy.typing as npt
 
 from groundstation.calibration.attitudes import least_squares, rank_of
 from groundstation.calibration.errors import CalibrationError
-from groundstation.survey.resolve import is_covariance
+from groundstation.survey.fusion.resolve import is_covariance
 
 Array = npt.NDArray[np.float64]
 SHORTEST_SPAN = 10.0  # K; a slope from less is noise times a long lever

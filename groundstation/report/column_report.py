@@ -15,9 +15,9 @@ import numpy.typing as npt
 from groundstation.report.document import Document, Origin, Section
 from groundstation.report.plots import survey_figure
 from groundstation.report.style import svg_of
-from groundstation.survey.columns import Design, Deviation, Tolerance, deviation
-from groundstation.survey.instruments import Tool
-from groundstation.survey.trajectory import Point
+from groundstation.survey.tools.instruments import Tool
+from groundstation.survey.wall.column_deviation import Design, Deviation, Tolerance, deviation
+from groundstation.survey.well.trajectory import Point
 
 Array = npt.NDArray[np.float64]
 CONFIDENCE = 0.95

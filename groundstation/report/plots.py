@@ -31,8 +31,8 @@ from groundstation.report.style import (
     styled,
     tidy,
 )
-from groundstation.survey.columns import Design
-from groundstation.survey.ellipsoid import coverage_radius
+from groundstation.survey.wall.column_deviation import Design
+from groundstation.survey.well.ellipsoid import coverage_radius
 
 Array = npt.NDArray[np.float64]
 

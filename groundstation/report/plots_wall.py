@@ -19,11 +19,11 @@ from matplotlib.patches import Circle, Rectangle
 
 from groundstation.errors import SurveyError
 from groundstation.report.style import GREY, INK, LIGHT, SERIES, WRONG, new_figure, region, styled, tidy
-from groundstation.survey.as_built import Columns, State
-from groundstation.survey.ellipsoid import coverage_radius
-from groundstation.survey.joints import ExtraColumn, Joints, pair_covariance, worst
-from groundstation.survey.wall import thickness
-from groundstation.survey.wall_verdict import stretches
+from groundstation.survey.wall.as_built import Columns, State
+from groundstation.survey.wall.column_joint import thickness
+from groundstation.survey.wall.wall_joints import ExtraColumn, Joints, pair_covariance, worst
+from groundstation.survey.wall.wall_verdict import stretches
+from groundstation.survey.well.ellipsoid import coverage_radius
 
 Array = npt.NDArray[np.float64]
 BAND = 0.95

@@ -24,7 +24,7 @@ from matplotlib.patches import Polygon
 from matplotlib.ticker import AutoLocator, FuncFormatter, MaxNLocator, NullFormatter
 
 from groundstation.errors import SurveyError
-from groundstation.survey.ellipsoid import outline
+from groundstation.survey.well.ellipsoid import outline
 
 Array = npt.NDArray[np.float64]
 WIDTH = 7.4  # in, of every figure

@@ -10,14 +10,14 @@ from groundstation.report.column_report import ColumnRecord, Site, clause, colum
 from groundstation.report.document import Document, Origin, Section
 from groundstation.report.plots_wall import wall_figure
 from groundstation.report.style import svg_of
-from groundstation.survey.as_built import State
-from groundstation.survey.error_columns import covariance, error_columns
-from groundstation.survey.error_sources import Leg, Survey
-from groundstation.survey.joints import worst, worst_depths
-from groundstation.survey.methods import positions
-from groundstation.survey.wall_columns import state_words
-from groundstation.survey.wall_file import Wall
-from groundstation.survey.wall_verdict import Judgement, Verdict, joint_name
+from groundstation.survey.wall.as_built import State
+from groundstation.survey.wall.wall_columns import state_words
+from groundstation.survey.wall.wall_file import Wall
+from groundstation.survey.wall.wall_joints import worst, worst_depths
+from groundstation.survey.wall.wall_verdict import Judgement, Verdict, joint_name
+from groundstation.survey.well.error_columns import covariance, error_columns
+from groundstation.survey.well.error_sources import Leg, Survey
+from groundstation.survey.well.methods import positions
 
 WORDS = {
     Verdict.TIGHT: "tight",

@@ -1,4 +1,4 @@
-"""Orders of an alignment, and what is said of the one in use; ``node.kernels.aligner`` follows the turns."""
+"""Orders of an alignment, and what is said of the one in use; ``node.kernels.sensors.aligner`` follows the turns."""
 
 from __future__ import annotations
 
@@ -7,9 +7,9 @@ from typing import Any, Final
 
 import numpy as np
 
-from node.kernels.aligner import begin_alignment
-from node.kernels.alignment import CIRCLE, EXTREMES, to_tube
-from node.kernels.layout import Array
+from node.kernels.arithmetic.formats import Array
+from node.kernels.sensors.aligner import begin_alignment
+from node.kernels.sensors.alignment import CIRCLE, EXTREMES, to_tube
 from telemetry.messages import Value
 
 METHODS: Final = {"circle": CIRCLE, "extremes": EXTREMES}

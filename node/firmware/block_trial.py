@@ -7,9 +7,9 @@ from typing import Any
 
 import numpy as np
 
-from node.kernels.calibration import COLDEST, HOTTEST, USUAL, calibrate, identity_parameters
-from node.kernels.layout import DEG, Array
-from node.kernels.modes import UNBIASED_STILL_RATE
+from node.kernels.arithmetic.formats import DEG, Array
+from node.kernels.filter.modes import UNBIASED_STILL_RATE
+from node.kernels.sensors.correction import COLDEST, HOTTEST, USUAL, calibrate, identity_parameters
 from telemetry.messages import Vector3
 from telemetry.parameters import POWERS, ParameterBlock, SensorParameters
 

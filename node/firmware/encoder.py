@@ -13,8 +13,8 @@ import numpy as np
 
 from node.firmware.edge_interpolation import stopped_at
 from node.firmware.torque import TorqueSettings, drive_record
-from node.kernels.encoder import BEYOND, BEYOND_VAR, EDGE_STD, QUANTUM, SAMPLE, encoder_step, new_encoder
-from node.kernels.record import A_RATE, A_TORQUE, A_VALID, A_YAW, A_YAW_VAR, AIDING
+from node.kernels.record.node_record import A_RATE, A_TORQUE, A_VALID, A_YAW, A_YAW_VAR, AIDING
+from node.kernels.string.encoder_step import BEYOND, BEYOND_VAR, EDGE_STD, QUANTUM, SAMPLE, encoder_step, new_encoder
 from telemetry.frozen import quickly_made
 from telemetry.messages import EPOCH_UNKNOWN, Aiding
 

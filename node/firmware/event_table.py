@@ -9,11 +9,11 @@ from typing import Any, Final
 
 from node.firmware.alignment import NAMES_OF_METHODS
 from node.firmware.pending_event import PendingEvent
-from node.kernels.aligner import FASTEST, LARGEST_OFFSET, MOST_LEAN, PATIENCE, Reason
-from node.kernels.events import Code, Fault
-from node.kernels.layout import DEG
-from node.kernels.make_up import MOVING, STARTED_ANEW, UNKNOWN
-from node.kernels.record import EVENTS_KEPT
+from node.kernels.arithmetic.formats import DEG
+from node.kernels.record.events import Code, Fault
+from node.kernels.record.node_record import EVENTS_KEPT
+from node.kernels.sensors.aligner import FASTEST, LARGEST_OFFSET, MOST_LEAN, PATIENCE, Reason
+from node.kernels.string.make_up import MOVING, STARTED_ANEW, UNKNOWN
 from telemetry.messages import Scalar, Severity
 
 JOINT_REASONS: Final = {

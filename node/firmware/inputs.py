@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from node.kernels.calibration import USUAL
+from node.kernels.sensors.correction import USUAL
 from telemetry.frozen import quickly_made
 from telemetry.messages import EPOCH_UNKNOWN
 

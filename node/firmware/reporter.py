@@ -11,8 +11,9 @@ from node.firmware.alignment import angles_of
 from node.firmware.inputs import RigContext
 from node.firmware.pending_event import PendingEvent
 from node.firmware.settings import TubeSettings
-from node.kernels.angles import from_binary, wrap
-from node.kernels.layout import DEG, Array, Err
+from node.kernels.arithmetic.angles import from_binary, wrap
+from node.kernels.arithmetic.formats import DEG, Array
+from node.kernels.record.filter_record import Err
 from telemetry.messages import (
     Aiding,
     Event,

@@ -1,8 +1,8 @@
 """What a node keeps over a loss of power, as bytes: its record and a blob of the telemetry.
 
 Layout of a slot: header, checksum, what of the record is kept, blob. The header names the layout of the record by the
-version of ``node.kernels.record`` and a checksum of what its fields are, so that neither a forgotten version nor a
-changed meaning is taken for the present one.
+version of ``node.kernels.record.node_record`` and a checksum of what its fields are, so that neither a forgotten
+version nor a changed meaning is taken for the present one.
 """
 
 from __future__ import annotations
@@ -15,9 +15,9 @@ from typing import Any, Final
 import numpy as np
 
 from node.errors import SavedStateError
-from node.kernels.layout import Array
-from node.kernels.record import KEPT, KEPT_SIZE, NODE, NODE_LAYOUT, forget_session
-from node.kernels.resets import resume as resume_filter
+from node.kernels.arithmetic.formats import Array
+from node.kernels.filter.resets import resume as resume_filter
+from node.kernels.record.node_record import KEPT, KEPT_SIZE, NODE, NODE_LAYOUT, forget_session
 
 # magic, version and format, checksum of the fields, generation, bytes of state and blob, when it was saved (s)
 HEADER: Final = struct.Struct("<4sHHIQIId")

@@ -11,9 +11,10 @@ import numpy as np
 from node.errors import ConfigurationError
 from node.firmware.imu_settings import ImuSettings
 from node.firmware.sensor_limits import USUAL_LIMITS, SensorLimits
-from node.kernels.alignment import MAX_IMUS
-from node.kernels.layout import DEG, Array, Scheme
-from node.kernels.record import SETTINGS
+from node.kernels.arithmetic.formats import DEG, Array
+from node.kernels.record.filter_record import Scheme
+from node.kernels.record.node_record import SETTINGS
+from node.kernels.record.sensor_record import MAX_IMUS
 from telemetry.messages import MAX_TUBE
 
 Kernel: TypeAlias = Literal["float64", "fixed", "published"]

@@ -6,16 +6,16 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 from node.firmware.settings import Joint, PassedTube
-from node.kernels.angles import wrap
-from node.kernels.twist import reaching_var
+from node.kernels.arithmetic.angles import wrap
+from node.kernels.string.twist import reaching_var
 from telemetry.messages import Aiding
 
 
 def across(aiding: Aiding, silent: Sequence[PassedTube], stiffness: float) -> Aiding:
     """The aiding as the lowest of the ``silent`` tubes would have handed it on.
 
-    A tube between adds its joints and its twist and changes nothing else (``node.kernels.relay``, scheme ``forward``),
-    so the tube below reaches the same yaw over it as through it.
+    A tube between adds its joints and its twist and changes nothing else (``node.kernels.string.relay``, scheme
+    ``forward``), so the tube below reaches the same yaw over it as through it.
 
     Parameters
     ----------

@@ -1,6 +1,6 @@
 """The static record: raw readings averaged at rest on command, for a calibration that the ground station solves.
 
-``node.kernels.static_average`` takes the sums in the node's record; here are the order and the message.
+``node.kernels.sensors.static_average`` takes the sums in the node's record; here are the order and the message.
 """
 
 from __future__ import annotations
@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 
-from node.kernels.static_average import FEWEST, begin_sums, has_moved
+from node.kernels.sensors.static_average import FEWEST, begin_sums, has_moved
 from telemetry.messages import Matrix3, StaticRecord, Vector3
 
 SHORTEST, LONGEST = 5.0, 3600.0  # s

@@ -1,4 +1,4 @@
-"""What the crew knows of the drive's torque; ``node.kernels.drive_torque`` follows it."""
+"""What the crew knows of the drive's torque; ``node.kernels.string.drive_torque`` follows it."""
 
 from __future__ import annotations
 
@@ -7,8 +7,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from node.firmware.settings import require
-from node.kernels.drive_torque import DRIVE, LARGEST
-from node.kernels.layout import Array
+from node.kernels.arithmetic.formats import Array
+from node.kernels.string.drive_torque import DRIVE, LARGEST
 
 
 @dataclass(frozen=True, slots=True)

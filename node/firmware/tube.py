@@ -17,15 +17,16 @@ from node.firmware.kernel_choice import kernel_of
 from node.firmware.reporter import Reporter
 from node.firmware.settings import TubeSettings, crew_record
 from node.firmware.static_record import begin_record, static_record
-from node.kernels.aligner import FASTEST, Reason, drop_alignment, refuse_alignment
-from node.kernels.calibration import PARAMETERS
-from node.kernels.cluster import begin_cluster
-from node.kernels.layout import DEG, UNKNOWN_YAW_VAR, Array, Scheme
-from node.kernels.modes import STATIC_BIAS
-from node.kernels.quantity import NONE
-from node.kernels.record import AIDING, MOMENT, READING, SPLIT
-from node.kernels.resets import forget_bias, lose_tilt
-from node.kernels.step import (
+from node.kernels.arithmetic.formats import DEG, Array
+from node.kernels.arithmetic.quantity import NONE
+from node.kernels.filter.modes import STATIC_BIAS
+from node.kernels.filter.resets import forget_bias, lose_tilt
+from node.kernels.record.filter_record import UNKNOWN_YAW_VAR, Scheme
+from node.kernels.record.node_record import AIDING, MOMENT, READING, SPLIT
+from node.kernels.record.sensor_record import PARAMETERS
+from node.kernels.sensors.aligner import FASTEST, Reason, drop_alignment, refuse_alignment
+from node.kernels.sensors.cluster import begin_cluster
+from node.kernels.step.node_step import (
     ADMITTED,
     ONWARD,
     SAY_ESTIMATE,
@@ -37,7 +38,7 @@ from node.kernels.step import (
     is_quiet,
     is_standing,
 )
-from node.kernels.twist import twist_var
+from node.kernels.string.twist import twist_var
 from telemetry.messages import (
     Aiding,
     Event,

@@ -9,9 +9,9 @@ from typing import TYPE_CHECKING
 from node.firmware.kernel_choice import kernel_of
 from node.firmware.settings import TubeSettings
 from node.firmware.torque import TorqueSettings
-from node.kernels.jit import leave_blas_out
-from node.kernels.layout import PERIOD
-from node.kernels.warm import warm_encoder, warm_step
+from node.kernels.arithmetic.formats import PERIOD
+from node.kernels.arithmetic.jit import leave_blas_out
+from node.kernels.step.warm import warm_encoder, warm_step
 from node.process.drivers.source import EncoderSource, ImuSource
 from node.process.encoder_process import EncoderProcess
 from node.process.tube_process import TubeProcess

@@ -19,7 +19,7 @@ from typing import Final
 
 from node.errors import SavedStateError
 from node.firmware.saved_state import Saved, pack, unpack
-from node.kernels.layout import Array
+from node.kernels.arithmetic.formats import Array
 from telemetry.runtime.disk import MACHINE, Disk
 
 SLOTS: Final = 32

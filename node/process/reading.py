@@ -7,8 +7,9 @@ from dataclasses import replace
 from typing import Any
 
 from node.firmware.inputs import ImuReading
-from node.kernels.calibration import USUAL
-from node.kernels.layout import PARTS, PERIOD
+from node.kernels.arithmetic.formats import PERIOD
+from node.kernels.record.filter_record import PARTS
+from node.kernels.sensors.correction import USUAL
 from node.process.drivers.source import NOTHING, ImuSample
 
 LEAST, MOST = 6, 10  # numbers of an IMU that does not tell the parts of its cycle

@@ -14,7 +14,7 @@ from pathlib import Path
 from typing import Final
 
 from node.errors import SavedStateError
-from node.kernels.layout import Array
+from node.kernels.arithmetic.formats import Array
 from node.process.journal import SLOTS, Journal
 from telemetry.application.saved_state import STATE_LAYOUT, layout_of
 from telemetry.messages import Scalar, Severity

@@ -156,7 +156,7 @@ def node(
       borechain node --tube 2 --clock own --imu mpu6500:1 --upper can:can0 --lower can:can1
     """
     from node.firmware.settings import Joint, TubeSettings
-    from node.kernels.layout import Scheme
+    from node.kernels.record.filter_record import Scheme
     from node.process.drivers.choice import imu_source
     from node.process.host import run_node
     from telemetry.messages import Side

@@ -16,10 +16,11 @@ from node.firmware.saved_state import resume
 from node.firmware.settings import TubeSettings
 from node.firmware.silent_tubes import across
 from node.firmware.tube import Tube
-from node.kernels.alignment import new_mount
-from node.kernels.layout import Array, Scheme, default_config
-from node.kernels.record import new_node
-from node.kernels.resets import forget_bias, lose_tilt
+from node.kernels.arithmetic.formats import Array
+from node.kernels.filter.resets import forget_bias, lose_tilt
+from node.kernels.record.filter_record import Scheme, default_config
+from node.kernels.record.node_record import new_node
+from node.kernels.record.sensor_record import new_mount
 from node.process.block_store import BlockStore
 from node.process.block_updater import BlockUpdater, load_parameters
 from node.process.command_handlers import CommandHandlers

@@ -16,8 +16,8 @@ import numpy as np
 import numpy.typing as npt
 
 from node.firmware.block_trial import record_of
-from node.kernels.address import firmware
-from node.kernels.layout import Array
+from node.kernels.arithmetic.formats import Array
+from node.kernels.step.address import firmware
 from sim.campaign.course import ANY_SEED, Course, course_of
 from sim.campaign.draws import Draws, draws_of, fresh_nodes, noise_of, tubes_of
 from sim.campaign.drill import CODES, STATE_OF, SURVEY, drill

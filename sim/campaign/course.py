@@ -12,7 +12,7 @@ from typing import NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from node.kernels.layout import PERIOD
+from node.kernels.arithmetic.formats import PERIOD
 from sim.campaign.refusals import refuse_others
 from sim.rig.direct_string import are_open, joined_of
 from sim.world.motion import Motion

@@ -13,8 +13,9 @@ import numpy as np
 import numpy.typing as npt
 
 from node.firmware.settings import crew_record
-from node.kernels.layout import PERIOD, Array, default_config
-from node.kernels.record import new_node
+from node.kernels.arithmetic.formats import PERIOD, Array
+from node.kernels.record.filter_record import default_config
+from node.kernels.record.node_record import new_node
 from sim.campaign.sensors import NOISE, TUBE
 from sim.rig.direct_string import NEVER, aiding_passes
 from sim.world.imu_errors import ImuErrors

@@ -1,6 +1,7 @@
 """One run of a campaign in one call: schedule, noise, the firmware of every node, aiding from hop to hop, surveys.
 
-What a node does is ``node.kernels.step``, as in a rig; what the world does to it is ``sim.world`` by other draws.
+What a node does is ``node.kernels.step.node_step``, as in a rig; what the world does to it is ``sim.world`` by other
+draws.
 """
 
 from __future__ import annotations
@@ -10,10 +11,11 @@ from typing import Any, Final
 
 import numpy as np
 
-from node.kernels.angles import from_binary
-from node.kernels.jit import kernel, shared_body
-from node.kernels.layout import PERIOD, Array, Err
-from node.kernels.record import (
+from node.kernels.arithmetic.angles import from_binary
+from node.kernels.arithmetic.formats import PERIOD, Array
+from node.kernels.arithmetic.jit import kernel, shared_body
+from node.kernels.record.filter_record import Err
+from node.kernels.record.node_record import (
     A_HOPS,
     A_OFFSET,
     A_SYSTEMATIC,
@@ -26,7 +28,7 @@ from node.kernels.record import (
     START,
     SYNCHRONISED,
 )
-from node.kernels.step import ONWARD, SAY_EVENTS, SAY_REVISION, SAY_SURVEY
+from node.kernels.step.node_step import ONWARD, SAY_EVENTS, SAY_REVISION, SAY_SURVEY
 from sim.campaign.frames import draw_parts, read_frames
 from sim.campaign.sensors import draw, read_sensors
 
@@ -76,7 +78,7 @@ def drill(
 
     Parameters
     ----------
-    step, aid : ``node_step`` and ``node_aiding``, see ``node.kernels.address``
+    step, aid : ``node_step`` and ``node_aiding``, see ``node.kernels.step.address``
     nodes, crews : (tubes,) of dtype ``NODE``, as new, and ``SETTINGS``
     corrections : (tubes, 2) of dtype ``PARAMETERS``
     course, draws : ``sim.campaign.course.Course`` and ``sim.campaign.draws.Draws``

@@ -14,7 +14,8 @@ from typing import Final, NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from node.kernels.layout import PARTS, PERIOD, Array
+from node.kernels.arithmetic.formats import PERIOD, Array
+from node.kernels.record.filter_record import PARTS
 from sim.campaign.frame_times import FrameTimes, no_frames
 from sim.world.rough_imu import low_passed
 from sim.world.rough_run import RoughRun

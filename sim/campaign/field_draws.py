@@ -11,7 +11,7 @@ from typing import NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from node.kernels.layout import Array
+from node.kernels.arithmetic.formats import Array
 from sim.campaign.field import FIFO, FINER, Field, StillString
 from sim.campaign.field_encoder import measured_in_field
 from sim.campaign.frame_times import PLACES, find_frames

@@ -7,7 +7,7 @@ import math
 import numpy as np
 import numpy.typing as npt
 
-from node.kernels.encoder import COUNT, EDGE_AT, NOW, RISING, SAMPLE, TIMED
+from node.kernels.string.encoder_step import COUNT, EDGE_AT, NOW, RISING, SAMPLE, TIMED
 from sim.rig.encoder_course import aidings_of
 from sim.world.rough_disc import RoughDisc
 from sim.world.rough_section import RoughEncoderSection

@@ -11,10 +11,11 @@ from typing import Any
 
 import numpy as np
 
-from node.kernels.calibration import USUAL
-from node.kernels.jit import kernel
-from node.kernels.layout import PARTS, PERIOD, Array
-from node.kernels.record import BEHIND, LATE, LATE_STD, SATURATED, SPLIT, TEMPERATURE
+from node.kernels.arithmetic.formats import PERIOD, Array
+from node.kernels.arithmetic.jit import kernel
+from node.kernels.record.filter_record import PARTS
+from node.kernels.record.node_record import BEHIND, LATE, LATE_STD, SATURATED, SPLIT, TEMPERATURE
+from node.kernels.sensors.correction import USUAL
 from node.process.drivers.parts import LEAST
 from sim.campaign.field import FELT, FINER, MOVED, SAME, SUMS
 from sim.campaign.philox import normals, uniforms

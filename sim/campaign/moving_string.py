@@ -11,7 +11,7 @@ from typing import Final
 
 import numpy as np
 
-from node.kernels.layout import Array
+from node.kernels.arithmetic.formats import Array
 from sim.campaign.field import frame_sums
 from sim.world.rough_imu import low_passed
 from sim.world.rough_motion import RoughMotion

@@ -11,8 +11,8 @@ from typing import Final
 
 import numpy as np
 
-from node.kernels.jit import kernel
-from node.kernels.layout import Array
+from node.kernels.arithmetic.formats import Array
+from node.kernels.arithmetic.jit import kernel
 
 ROUNDS: Final = 10
 WORD: Final = np.uint64(0xFFFFFFFF)

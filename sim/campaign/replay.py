@@ -6,9 +6,9 @@ from typing import Any, Final
 
 import numpy as np
 
-from node.kernels.jit import kernel
-from node.kernels.layout import Array
-from node.kernels.step import SAY_EVENTS
+from node.kernels.arithmetic.formats import Array
+from node.kernels.arithmetic.jit import kernel
+from node.kernels.step.node_step import SAY_EVENTS
 
 CYCLE, HEARD = 0, 1
 GIVEN: Final = np.dtype(
@@ -37,7 +37,7 @@ def replay(
 
     Parameters
     ----------
-    step, aid : ``node_step`` and ``node_aiding``, see ``node.kernels.address``
+    step, aid : ``node_step`` and ``node_aiding``, see ``node.kernels.step.address``
     nodes, crews : (tubes,) of dtype ``NODE``, as they were at first, and ``SETTINGS``
     corrections : (tubes, 2) of dtype ``PARAMETERS``
     given : (n,) of dtype ``GIVEN``

@@ -11,10 +11,10 @@ from typing import Any, Final, NamedTuple
 
 import numpy as np
 
-from node.kernels.calibration import USUAL
-from node.kernels.jit import kernel
-from node.kernels.layout import Array
-from node.kernels.record import AIDING, MOMENT, READING, SATURATED, TEMPERATURE
+from node.kernels.arithmetic.formats import Array
+from node.kernels.arithmetic.jit import kernel
+from node.kernels.record.node_record import AIDING, MOMENT, READING, SATURATED, TEMPERATURE
+from node.kernels.sensors.correction import USUAL
 from sim.campaign.philox import normals, uniforms
 
 DRAWN: Final = 12  # numbers a node and cycle: rates, their wander, forces, clock and loss of one hop, one to spare

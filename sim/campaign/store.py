@@ -20,7 +20,7 @@ import numpy as np
 import pyarrow as pa
 import pyarrow.parquet as pq
 
-from node.kernels.jit import source_digest
+from node.kernels.arithmetic.jit import source_digest
 from node.process.drivers import frame_clock
 from sim.campaign.chunk import EPOCH_COLUMNS, RUNS, SURVEY_COLUMNS, Chunk, Columns
 from sim.errors import RigError

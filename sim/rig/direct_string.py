@@ -19,13 +19,26 @@ from node.firmware.encoder import EncoderNode, EncoderSample
 from node.firmware.inputs import RigContext
 from node.firmware.reporter import VAR_FLOOR
 from node.firmware.tube import Tube
-from node.kernels.address import BY_ADDRESS, firmware
-from node.kernels.angles import from_binary, wrap
-from node.kernels.calibration import PARAMETERS, USUAL
-from node.kernels.fixed.record import new_integers
-from node.kernels.layout import PERIOD, Err, Scheme, default_config
-from node.kernels.record import A_VALID, BEHIND, END, LATE, LATE_STD, READING, SATURATED, SPLIT, TEMPERATURE, new_node
-from node.kernels.step import ADMITTED
+from node.kernels.arithmetic.angles import from_binary, wrap
+from node.kernels.arithmetic.formats import PERIOD
+from node.kernels.record.filter_record import Err, Scheme, default_config
+from node.kernels.record.integer_node import new_integers
+from node.kernels.record.node_record import (
+    A_VALID,
+    BEHIND,
+    END,
+    LATE,
+    LATE_STD,
+    READING,
+    SATURATED,
+    SPLIT,
+    TEMPERATURE,
+    new_node,
+)
+from node.kernels.record.sensor_record import PARAMETERS
+from node.kernels.sensors.correction import USUAL
+from node.kernels.step.address import BY_ADDRESS, firmware
+from node.kernels.step.node_step import ADMITTED
 from node.process.reading import reading_of
 from sim.errors import ScenarioError
 from sim.rig.encoder_course import is_plain, measured_of

@@ -11,7 +11,9 @@ import numpy.typing as npt
 from node.firmware.edge_interpolation import EDGES, stopped_at
 from node.firmware.encoder import STOP_STD
 from node.firmware.torque import drive_record
-from node.kernels.encoder import (
+from node.kernels.arithmetic.jit import kernel
+from node.kernels.record.node_record import A_SEQUENCE, AIDING
+from node.kernels.string.encoder_step import (
     BEYOND,
     BEYOND_VAR,
     COUNT,
@@ -23,8 +25,6 @@ from node.kernels.encoder import (
     encoder_step,
     new_encoder,
 )
-from node.kernels.jit import kernel
-from node.kernels.record import A_SEQUENCE, AIDING
 from sim.world.world import World
 
 Array = npt.NDArray[np.float64]

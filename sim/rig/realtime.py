@@ -13,7 +13,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
-from node.kernels.layout import PERIOD
+from node.kernels.arithmetic.formats import PERIOD
 from sim.errors import RigError
 from sim.rig.processes import ProcessTable
 from sim.world.recording import fastest_at, yaw_error

@@ -19,7 +19,7 @@ from collections.abc import Callable
 from dataclasses import dataclass, field
 from functools import partial
 
-from node.kernels.layout import PERIOD
+from node.kernels.arithmetic.formats import PERIOD
 from sim.errors import RigError
 from sim.rig.link_channel import LinkChannel
 from sim.rig.radio_channel import RadioChannel

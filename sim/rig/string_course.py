@@ -1,8 +1,8 @@
 """A string without a link in one call: cycle after cycle of every node, and aiding from hop to hop.
 
-What a node does is ``node.kernels.step``, or the same in integers, called by its address. Everything that does not
-depend on what the nodes do is worked out before: schedule, readings, what the encoder measures and what becomes of it
-on its way.
+What a node does is ``node.kernels.step.node_step``, or the same in integers, called by its address. Everything that
+does not depend on what the nodes do is worked out before: schedule, readings, what the encoder measures and what
+becomes of it on its way.
 """
 
 from __future__ import annotations
@@ -12,12 +12,13 @@ from typing import Any, Final, NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from node.kernels.angles import from_binary
-from node.kernels.jit import kernel
-from node.kernels.layout import Array, Err
-from node.kernels.record import AIDING, CLOCK_VAR, END, HOPS, JOINED, MOMENT, START, SYNCHRONISED
-from node.kernels.step import ADMITTED
-from node.kernels.string import string_aiding, string_step
+from node.kernels.arithmetic.angles import from_binary
+from node.kernels.arithmetic.formats import Array
+from node.kernels.arithmetic.jit import kernel
+from node.kernels.record.filter_record import Err
+from node.kernels.record.node_record import AIDING, CLOCK_VAR, END, HOPS, JOINED, MOMENT, START, SYNCHRONISED
+from node.kernels.step.node_step import ADMITTED
+from node.kernels.step.string_step import string_aiding, string_step
 
 YAW: Final = int(Err.YAW)
 
@@ -92,7 +93,7 @@ def run_string(
 
     Parameters
     ----------
-    step, aid, integers : see ``node.kernels.string``
+    step, aid, integers : see ``node.kernels.step.string_step``
     nodes, crews : (tubes,) of dtype ``NODE`` and ``SETTINGS``
     corrections : (tubes, imus + 1) of dtype ``PARAMETERS``
     shifts : (tubes,) s, of the nodes' clocks

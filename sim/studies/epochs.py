@@ -13,7 +13,8 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
-from node.kernels.layout import PERIOD, Scheme
+from node.kernels.arithmetic.formats import PERIOD
+from node.kernels.record.filter_record import Scheme
 from sim.campaign.chunk import campaign_of
 from sim.rig.direct_string import DirectString
 from sim.studies.lab import ACCELERATION_DPS2, RATE_DPS, TURNS

@@ -14,9 +14,9 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
-from groundstation.survey.resolve import angles, resolve
-from node.kernels.angles import wrap
-from node.kernels.layout import PERIOD
+from groundstation.survey.fusion.resolve import angles, resolve
+from node.kernels.arithmetic.angles import wrap
+from node.kernels.arithmetic.formats import PERIOD
 from sim.rig.direct_string import DirectString, StringRun, wrapped
 from sim.studies.scenarios import Tables, complete
 from sim.world.motion import Trapezoid

@@ -7,7 +7,8 @@ from dataclasses import dataclass
 from importlib import resources
 from pathlib import Path
 
-from groundstation.survey.records import DisplacementRule, Record, read_displacements
+from groundstation.survey.files.survey_records import DisplacementRule, read_displacements
+from groundstation.survey.well.well_record import Record
 
 AXES = ("north", "east", "tvd")
 

@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from node.kernels.layout import PERIOD
+from node.kernels.arithmetic.formats import PERIOD
 from sim.world.disc import Disc
 from sim.world.marks import Marks
 from sim.world.motion import Motion, Phase, Trapezoid

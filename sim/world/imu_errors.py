@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
-from node.kernels.jit import kernel
+from node.kernels.arithmetic.jit import kernel
 from sim.world.scenario_file import AccelerometerSection, DriftSection, GyroSection
 
 Array = npt.NDArray[np.float64]

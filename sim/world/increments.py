@@ -7,7 +7,8 @@ import math
 import numpy as np
 import numpy.typing as npt
 
-from node.kernels.layout import PARTS, PERIOD
+from node.kernels.arithmetic.formats import PERIOD
+from node.kernels.record.filter_record import PARTS
 from sim.world.scenario_file import GyroSection
 
 Array = npt.NDArray[np.float64]

@@ -13,8 +13,9 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
-from node.kernels.calibration import USUAL
-from node.kernels.layout import PARTS, PERIOD
+from node.kernels.arithmetic.formats import PERIOD
+from node.kernels.record.filter_record import PARTS
+from node.kernels.sensors.correction import USUAL
 from node.process.drivers.frame_clock import FrameClock
 from node.process.drivers.parts import parts_of
 from sim.world.imu_errors import ImuErrors

@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from node.kernels.jit import kernel
+from node.kernels.arithmetic.jit import kernel
 from sim.world.borehole import Borehole
 from sim.world.truth import TubeTruth
 

@@ -9,7 +9,7 @@ from typing import Annotated, Literal
 
 from pydantic import Field
 
-from node.kernels.alignment import MAX_IMUS
+from node.kernels.record.sensor_record import MAX_IMUS
 from sim.world.radio_section import RadioSection
 from sim.world.rough_section import RoughSection
 from sim.world.section import Angle, NotNegative, Positive, Probability, Section, Triple

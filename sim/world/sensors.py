@@ -8,8 +8,8 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from node.kernels.calibration import USUAL
-from node.kernels.layout import PERIOD
+from node.kernels.arithmetic.formats import PERIOD
+from node.kernels.sensors.correction import USUAL
 from sim.world.drill_string import DrillString
 from sim.world.imu_errors import Drift, ImuErrors, single_samples
 from sim.world.increments import borders_of, eighths

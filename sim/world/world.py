@@ -13,7 +13,7 @@ import numpy as np
 from node.firmware.imu_settings import ImuSettings
 from node.firmware.settings import TubeSettings
 from node.firmware.torque import TorqueSettings
-from node.kernels.layout import Scheme
+from node.kernels.record.filter_record import Scheme
 from sim.errors import ScenarioError
 from sim.faults import KillNode
 from sim.world.drill_string import DrillString

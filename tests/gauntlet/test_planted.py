@@ -19,7 +19,7 @@ from groundstation.service.process.ground_process import GroundProcess
 from groundstation.service.process.learner import Learner
 from groundstation.service.string import drill_string as string_module
 from groundstation.service.string.depth import DepthLog
-from groundstation.survey.trust import Trust
+from groundstation.survey.fusion.survey_trust import Trust
 from node.firmware.settings import TubeSettings
 from node.process import counter as counter_module
 from node.process.command_handlers import CommandHandlers

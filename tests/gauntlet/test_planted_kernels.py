@@ -12,10 +12,10 @@ import pytest
 from string_of_one import Sample, Spoil, StringOfOne
 
 from node.firmware.sensor_limits import SensorLimits
-from node.kernels.cycle import run_cycle
-from node.kernels.layout import Array
-from node.kernels.record import END, JOINED, START
-from node.kernels.step import REFUSED, enter, leave, say_events
+from node.kernels.arithmetic.formats import Array
+from node.kernels.filter.float64.cycle import run_cycle
+from node.kernels.record.node_record import END, JOINED, START
+from node.kernels.step.node_step import REFUSED, enter, leave, say_events
 
 SAMPLES = 32  # cycles, of a survey
 LASTS = 40  # cycles, of a fault that ends within a stop
@@ -23,7 +23,7 @@ Step = Callable[[Array, Array, Array, Array, Array], int]
 
 
 class StepInParts:
-    """``node.kernels.step.node_step`` by its parts; a plant undoes what they did."""
+    """``node.kernels.step.node_step.node_step`` by its parts; a plant undoes what they did."""
 
     def __call__(self, nodes: Array, settings: Array, parameters: Array, readings: Array, moment: Array) -> int:
         node = nodes[0]

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from groundstation.service.hole.deviation_alarms import Alarm, AlarmList
-from groundstation.survey.columns import Deviation
+from groundstation.survey.wall.column_deviation import Deviation
 
 
 def at(used: float, md: float = 10.0) -> Deviation:

@@ -12,11 +12,11 @@ from groundstation.service.answers.model import RigModel
 from groundstation.service.answers.views import node, stations
 from groundstation.service.hole.resolved_stops import force_var
 from groundstation.service.orders.order_book import Order
-from groundstation.survey.resolve import combine_imus
+from groundstation.survey.fusion.resolve import combine_imus
 from node.firmware.imu_settings import ImuSettings
 from node.firmware.inputs import RigContext
 from node.firmware.settings import TubeSettings
-from node.kernels.layout import DEG, PERIOD
+from node.kernels.arithmetic.formats import DEG, PERIOD
 from node.process.tube_process import TubeProcess
 from telemetry.messages import ImuMean, Mode, NodeFlag, Stand, SurveyMeasurement
 

@@ -15,9 +15,9 @@ from groundstation.config import GroundConfig
 from groundstation.service.answers.measurement_views import measurement_rows
 from groundstation.service.answers.model import RigModel
 from groundstation.service.hole.resolved_stops import Cluster, Clusters, Table, cluster_of
-from groundstation.survey.resolve import Direction, Quality, angle_stds, angles, resolve
-from groundstation.survey.shared import Reading, SharedErrors
-from groundstation.survey.trust import Trust
+from groundstation.survey.fusion.resolve import Direction, Quality, angle_stds, angles, resolve
+from groundstation.survey.fusion.shared import Reading, SharedErrors
+from groundstation.survey.fusion.survey_trust import Trust
 from telemetry.messages import ImuMean, NodeFlag, SurveyMeasurement
 
 VAR = 1e-7

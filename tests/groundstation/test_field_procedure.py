@@ -16,7 +16,7 @@ from groundstation.errors import SelectorError
 from groundstation.service.answers import key_fields
 from groundstation.service.orders.recalibration.procedure import FieldProcedure, Request
 from groundstation.service.orders.recalibration.recalibration_progress import Phase, Progress, Stage
-from node.kernels.layout import DEG
+from node.kernels.arithmetic.formats import DEG
 from telemetry.messages import BASE, BlockSegment, Reply, StaticRecord
 from telemetry.parameters import ParameterBlock, SensorParameters
 

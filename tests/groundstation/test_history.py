@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 from groundstation.errors import SelectorError
 from groundstation.service.answers.thinning import largest_triangles
 from groundstation.service.hole.history import KEPT, History
-from groundstation.survey.columns import Deviations
+from groundstation.survey.wall.column_deviation import Deviations
 
 STOPS = (0.3, 0.3, 0.3, 1.0, 1.9)  # deg
 

@@ -17,8 +17,8 @@ from groundstation.config import GroundConfig
 from groundstation.errors import SelectorError
 from groundstation.service.answers import alarm_views, column_views
 from groundstation.service.answers.model import RigModel
-from groundstation.survey.ellipsoid import plan_ellipse
-from groundstation.survey.resolve import angles
+from groundstation.survey.fusion.resolve import angles
+from groundstation.survey.well.ellipsoid import plan_ellipse
 from telemetry.messages import ImuMean, NodeFlag, SurveyMeasurement
 
 G = 9.81

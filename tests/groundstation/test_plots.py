@@ -17,16 +17,16 @@ from matplotlib.figure import Figure
 from groundstation.errors import SurveyError
 from groundstation.report import plots, plots_wall, style
 from groundstation.report.plots_wall import band_of_thickness, joint_name, ranking
-from groundstation.survey.as_built import Columns, State
-from groundstation.survey.columns import PRESETS, Design
-from groundstation.survey.error_model import propagate
-from groundstation.survey.error_sources import Leg, Site, Survey
-from groundstation.survey.fusion import POWERS, sequence_weights
-from groundstation.survey.instruments import load_tool
-from groundstation.survey.joints import Joints, extra_column, joints, neighbours_in_line, worst
-from groundstation.survey.methods import Method, positions
-from groundstation.survey.records import DisplacementRule, read_record
-from groundstation.survey.wall import probability_beyond, thickness
+from groundstation.survey.files.survey_records import DisplacementRule, read_record
+from groundstation.survey.fusion.fusion import POWERS, sequence_weights
+from groundstation.survey.tools.instruments import load_tool
+from groundstation.survey.wall.as_built import Columns, State
+from groundstation.survey.wall.column_deviation import PRESETS, Design
+from groundstation.survey.wall.column_joint import probability_beyond, thickness
+from groundstation.survey.wall.wall_joints import Joints, extra_column, joints, neighbours_in_line, worst
+from groundstation.survey.well.error_propagation import propagate
+from groundstation.survey.well.error_sources import Leg, Site, Survey
+from groundstation.survey.well.methods import Method, positions
 from sim.studies.coverage.figure import coverage_figure
 from sim.studies.region_of_uncertainty.figure import azimuth_error_figure, uncertainty_figure
 from sim.studies.weighting.figure import weighting_figure

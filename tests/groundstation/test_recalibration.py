@@ -17,7 +17,7 @@ from groundstation.service.orders.blocks import block_of
 from groundstation.service.orders.order_book import OrderState
 from groundstation.service.process.ground_process import GroundProcess
 from node.firmware.settings import TubeSettings
-from node.kernels.layout import DEG
+from node.kernels.arithmetic.formats import DEG
 from node.process.block_store import BlockStore
 from node.process.tube_process import TubeProcess
 from telemetry.messages import BASE, ENCODER, BlockSegment, StaticRecord, UploadPhase

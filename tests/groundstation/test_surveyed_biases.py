@@ -19,7 +19,7 @@ from groundstation.errors import SelectorError
 from groundstation.service.answers import key_fields
 from groundstation.service.answers.model import RigModel
 from groundstation.service.orders.surveyed_biases import GRAVITY_STD, surveyed_biases
-from groundstation.survey.force_biases import ForceBias
+from groundstation.survey.fusion.force_biases import ForceBias
 from telemetry.messages import ImuMean, NodeFlag, SurveyMeasurement
 from telemetry.parameters import ParameterBlock, SensorParameters
 

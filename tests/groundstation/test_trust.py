@@ -13,9 +13,16 @@ from hypothesis import strategies as st
 from groundstation.config import GroundConfig
 from groundstation.service.answers import views
 from groundstation.service.answers.model import RigModel
-from groundstation.survey.fusion import Weighting
-from groundstation.survey.resolve import angles, resolve
-from groundstation.survey.trust import EFFECTS, UNKNOWN_YAW_VAR, Trust, trust_of, with_uncertain_yaw, with_unknown_yaw
+from groundstation.survey.fusion.fusion import Weighting
+from groundstation.survey.fusion.resolve import angles, resolve
+from groundstation.survey.fusion.survey_trust import (
+    EFFECTS,
+    UNKNOWN_YAW_VAR,
+    Trust,
+    trust_of,
+    with_uncertain_yaw,
+    with_unknown_yaw,
+)
 from telemetry.messages import ImuMean, NodeFlag, SurveyMeasurement
 
 G, DEG, VAR = 9.81, math.pi / 180.0, (0.0034**2) / 32

@@ -15,7 +15,7 @@ from groundstation.service.answers.key_fields import VERDICT
 from groundstation.service.answers.model import RigModel
 from groundstation.service.answers.rounding import rounded, rounded_std
 from groundstation.service.answers.verdict_views import line, verdict
-from groundstation.survey.columns import Deviation
+from groundstation.survey.wall.column_deviation import Deviation
 
 LENGTH, LIMIT = 20.0, 0.45
 CURVATURE = math.radians(0.5)

@@ -4,9 +4,9 @@ import math
 
 import numpy as np
 
-from groundstation.survey.error_sources import Site, Survey
-from groundstation.survey.instruments import Mode, Term, Tool, load_tool
-from groundstation.survey.methods import Method, positions
+from groundstation.survey.tools.instruments import Mode, Term, Tool, load_tool
+from groundstation.survey.well.error_sources import Site, Survey
+from groundstation.survey.well.methods import Method, positions
 
 DEG = math.pi / 180.0
 SITE = Site(9.80665, 50_000.0, 72.0 * DEG, 3.0 * DEG, 60.0 * DEG)

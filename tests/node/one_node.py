@@ -4,11 +4,11 @@ from typing import Any
 
 import numpy as np
 
-from node.kernels.calibration import identity_parameters
-from node.kernels.cluster import begin_cluster
-from node.kernels.events import Code
-from node.kernels.layout import default_config
-from node.kernels.record import EVENTS_KEPT, SETTINGS, new_node
+from node.kernels.record.events import Code
+from node.kernels.record.filter_record import default_config
+from node.kernels.record.node_record import EVENTS_KEPT, SETTINGS, new_node
+from node.kernels.sensors.cluster import begin_cluster
+from node.kernels.sensors.correction import identity_parameters
 
 
 def node_of(imus: int, joints: int, random: np.random.Generator) -> tuple[np.ndarray, np.ndarray, np.ndarray]:

@@ -9,7 +9,7 @@ from itertools import islice
 import numpy as np
 import numpy.typing as npt
 
-from node.kernels.layout import PERIOD
+from node.kernels.arithmetic.formats import PERIOD
 from sim.rig.direct_string import DirectString
 from sim.world.scenario import scenario_of
 from sim.world.world import World

@@ -13,9 +13,10 @@ from node.firmware.imu_settings import ImuSettings
 from node.firmware.inputs import ImuReading, RigContext
 from node.firmware.settings import Kernel, TubeSettings
 from node.firmware.tube import Tube
-from node.kernels.aligner import PATIENCE
-from node.kernels.layout import DEG, PERIOD, default_config
-from node.kernels.record import new_node
+from node.kernels.arithmetic.formats import DEG, PERIOD
+from node.kernels.record.filter_record import default_config
+from node.kernels.record.node_record import new_node
+from node.kernels.sensors.aligner import PATIENCE
 from node.process.command_handlers import CommandHandlers
 from node.process.tube_process import TubeProcess
 from sim.studies.alignment.run import Setup, Turn

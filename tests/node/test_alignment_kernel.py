@@ -8,9 +8,10 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from node.firmware.alignment import angles_of, rotation
-from node.kernels.alignment import extreme_var, fit_circle, new_mount, take_extremes, to_tube
-from node.kernels.layout import DEG
-from node.kernels.sweep import OFFSET, SWEEP, add_to_sweep
+from node.kernels.arithmetic.formats import DEG
+from node.kernels.record.sensor_record import OFFSET, SWEEP, new_mount
+from node.kernels.sensors.alignment import extreme_var, fit_circle, take_extremes, to_tube
+from node.kernels.sensors.sweep import add_to_sweep
 
 G = 9.81
 tilts = st.floats(-9.0 * DEG, 9.0 * DEG)

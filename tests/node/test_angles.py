@@ -5,7 +5,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from node.kernels.angles import advance_binary, from_binary, to_binary, wrap, wrap_positive
+from node.kernels.arithmetic.angles import advance_binary, from_binary, to_binary, wrap, wrap_positive
 
 ANGLES = st.floats(-1e4, 1e4)
 

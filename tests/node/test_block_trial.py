@@ -16,9 +16,10 @@ from node.firmware.block_trial import (
     refusal,
     unfit,
 )
-from node.kernels.calibration import calibrate
-from node.kernels.layout import DEG, Err, default_config, new_state
-from node.kernels.resets import forget_bias
+from node.kernels.arithmetic.formats import DEG
+from node.kernels.filter.resets import forget_bias
+from node.kernels.record.filter_record import Err, default_config, new_state
+from node.kernels.sensors.correction import calibrate
 from telemetry.messages import Matrix3
 from telemetry.parameters import UNIT, ZERO, ParameterBlock, SensorParameters
 

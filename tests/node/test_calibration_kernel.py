@@ -12,8 +12,8 @@ from hypothesis import strategies as st
 from groundstation.calibration.block import Calibration, Provenance, model_of
 from groundstation.service.orders.blocks import block_of
 from node.firmware.block_trial import record_of
-from node.kernels.calibration import COLDEST, HOTTEST, USUAL, calibrate, identity_parameters
-from node.kernels.layout import DEG
+from node.kernels.arithmetic.formats import DEG
+from node.kernels.sensors.correction import COLDEST, HOTTEST, USUAL, calibrate, identity_parameters
 from telemetry.messages import Matrix3
 from telemetry.parameters import ParameterBlock, SensorParameters
 

@@ -14,9 +14,10 @@ from node.firmware.inputs import ImuReading, RigContext
 from node.firmware.sensor_limits import SensorLimits
 from node.firmware.settings import Joint, Kernel, TubeSettings
 from node.firmware.tube import Tube
-from node.kernels.layout import PERIOD, Err, default_config
-from node.kernels.record import new_node
-from node.kernels.resets import open_yaw
+from node.kernels.arithmetic.formats import PERIOD
+from node.kernels.filter.resets import open_yaw
+from node.kernels.record.filter_record import Err, default_config
+from node.kernels.record.node_record import new_node
 from sim.world.scenario import scenario_of
 from sim.world.world import World
 from telemetry.messages import Aiding, Event

@@ -11,18 +11,19 @@ from hypothesis import given
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
-from groundstation.survey.resolve import combine_imus
+from groundstation.survey.fusion.resolve import combine_imus
 from node.errors import ConfigurationError
 from node.firmware.alignment import rotation
 from node.firmware.imu_settings import ImuSettings
 from node.firmware.inputs import ImuReading, RigContext
 from node.firmware.settings import Kernel, TubeSettings
 from node.firmware.tube import Tube
-from node.kernels.alignment import MAX_IMUS
-from node.kernels.cluster import fuse
-from node.kernels.cluster_watch import DISAGREEING, HEALTHY
-from node.kernels.layout import DEG, PERIOD, Err, default_config
-from node.kernels.record import new_node
+from node.kernels.arithmetic.formats import DEG, PERIOD
+from node.kernels.record.filter_record import Err, default_config
+from node.kernels.record.node_record import new_node
+from node.kernels.record.sensor_record import MAX_IMUS
+from node.kernels.sensors.cluster import fuse
+from node.kernels.sensors.cluster_watch import DISAGREEING, HEALTHY
 from node.process.drivers.replay import ReplayImu
 from node.process.reading import reading_of
 from node.process.tube_command import node as command

@@ -9,8 +9,8 @@ import pytest
 from numba import config
 
 COUNT_COMPILATIONS = """
-from node.kernels.warm import warm_up
-from node.kernels.step import node_aiding, node_step
+from node.kernels.step.warm import warm_up
+from node.kernels.step.node_step import node_aiding, node_step
 warm_up()
 for function in (node_step, node_aiding):
     print(sum(function.stats.cache_misses.values()), sum(function.stats.cache_hits.values()))
@@ -21,9 +21,9 @@ from importlib import import_module
 import numpy as np
 from numba import njit
 from numba.core.runtime import _nrt_python, rtsys
-from node.kernels.calibration import calibrate, identity_parameters
-from node.kernels.layout import PERIOD, default_config, new_state
-from node.kernels.static_average import STATIC, add_static, has_moved
+from node.kernels.sensors.correction import calibrate, identity_parameters
+from node.kernels.record.filter_record import PERIOD, default_config, new_state
+from node.kernels.sensors.static_average import STATIC, add_static, has_moved
 
 run_cycle = import_module(os.environ["CYCLE"]).run_cycle
 offer_aiding = import_module(os.environ["RELAY"]).offer_aiding
@@ -59,12 +59,12 @@ import os
 import numpy as np
 from numba import njit
 from numba.core.runtime import _nrt_python, rtsys
-from node.kernels.calibration import identity_parameters
-from node.kernels.fixed.record import new_integers
-from node.kernels.fixed.step import fixed_aiding, fixed_step
-from node.kernels.layout import default_config
-from node.kernels.record import AIDING, MOMENT, READING, SETTINGS, new_node
-from node.kernels.step import node_aiding, node_step
+from node.kernels.sensors.correction import identity_parameters
+from node.kernels.record.integer_node import new_integers
+from node.kernels.step.fixed_step import fixed_aiding, fixed_step
+from node.kernels.record.filter_record import default_config
+from node.kernels.record.node_record import AIDING, MOMENT, READING, SETTINGS, new_node
+from node.kernels.step.node_step import node_aiding, node_step
 
 _nrt_python.memsys_enable_stats()
 
@@ -130,7 +130,7 @@ def test_a_second_start_does_not_compile() -> None:
 
 
 def test_the_cache_follows_the_sources() -> None:
-    from node.kernels.jit import cache_folder, source_digest
+    from node.kernels.arithmetic.jit import cache_folder, source_digest
 
     assert source_digest() in cache_folder().name
 
@@ -139,7 +139,7 @@ def test_the_cache_follows_the_sources() -> None:
 @pytest.mark.parametrize(
     ("cycle", "relay"),
     [
-        ("node.kernels.cycle", "node.kernels.relay"),
+        ("node.kernels.filter.float64.cycle", "node.kernels.string.relay"),
         ("node.kernels.published.cycle", "node.kernels.published.cycle"),
     ],
 )

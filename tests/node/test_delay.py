@@ -8,9 +8,9 @@ from emulated_mpu6500 import EmulatedMpu6500
 from hypothesis import given
 from hypothesis import strategies as st
 
-from node.kernels.delay import date_window, make_up_delay
-from node.kernels.layout import DEG, PERIOD
-from node.kernels.record import DELAYED
+from node.kernels.arithmetic.formats import DEG, PERIOD
+from node.kernels.record.node_record import DELAYED
+from node.kernels.sensors.delay import date_window, make_up_delay
 from node.process.drivers.frame_clock import FrameClock
 from node.process.drivers.mpu6500 import DELAYS, Mpu6500
 from sim.studies.field.cases import CASES

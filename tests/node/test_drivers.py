@@ -10,7 +10,7 @@ from emulated_mpu6500 import EmulatedMpu6500
 
 from node.errors import ConfigurationError, SensorError
 from node.firmware.settings import TubeSettings
-from node.kernels.layout import DEG, PERIOD
+from node.kernels.arithmetic.formats import DEG, PERIOD
 from node.process.drivers.choice import encoder_source, imu_source
 from node.process.drivers.mpu6500 import Mpu6500, open_bus
 from node.process.drivers.quadrature import QuadratureFile

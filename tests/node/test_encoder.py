@@ -3,7 +3,7 @@ import math
 import pytest
 
 from node.firmware.encoder import EncoderNode, EncoderSample
-from node.kernels.encoder import EDGE_STD, QUANTUM
+from node.kernels.string.encoder_step import EDGE_STD, QUANTUM
 
 
 def test_a_turning_head_is_known_at_its_last_edge() -> None:

@@ -7,9 +7,10 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from node.kernels.error_model import propagate
-from node.kernels.layout import PERIOD, STATES, Err, default_config
-from node.kernels.update import innovation_var, joseph
+from node.kernels.arithmetic.formats import PERIOD
+from node.kernels.filter.float64.propagation import propagate
+from node.kernels.filter.float64.update import innovation_var, joseph
+from node.kernels.record.filter_record import STATES, Err, default_config
 
 
 def random_covariance(seed: int) -> np.ndarray:

@@ -10,9 +10,10 @@ from hypothesis import strategies as st
 from node.firmware.inputs import ImuReading, RigContext
 from node.firmware.settings import TubeSettings
 from node.firmware.tube import Tube
-from node.kernels.angles import wrap
-from node.kernels.layout import DEG, PERIOD, default_config
-from node.kernels.record import new_node
+from node.kernels.arithmetic.angles import wrap
+from node.kernels.arithmetic.formats import DEG, PERIOD
+from node.kernels.record.filter_record import default_config
+from node.kernels.record.node_record import new_node
 from telemetry.messages import Aiding, Event, NodeFlag
 
 SUBSTEPS = 16

@@ -12,9 +12,10 @@ from node.firmware.imu_settings import ImuSettings
 from node.firmware.inputs import ImuReading, RigContext
 from node.firmware.settings import TubeSettings
 from node.firmware.tube import Tube
-from node.kernels.events import Code
-from node.kernels.layout import DEG, PERIOD, default_config
-from node.kernels.record import new_node
+from node.kernels.arithmetic.formats import DEG, PERIOD
+from node.kernels.record.events import Code
+from node.kernels.record.filter_record import default_config
+from node.kernels.record.node_record import new_node
 from telemetry.messages import Aiding, Event
 
 G = 9.81

@@ -7,12 +7,13 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from node.kernels.angles import from_binary, wrap
-from node.kernels.cycle import run_cycle
-from node.kernels.fixed_lag import spin
-from node.kernels.layout import DEG, PERIOD, Err, Status, default_config, new_state
-from node.kernels.relay import offer_aiding
-from node.kernels.ring import push
+from node.kernels.arithmetic.angles import from_binary, wrap
+from node.kernels.arithmetic.formats import DEG, PERIOD
+from node.kernels.filter.float64.cycle import run_cycle
+from node.kernels.filter.float64.fixed_lag import spin
+from node.kernels.record.filter_record import Err, Status, default_config, new_state
+from node.kernels.record.ring import push
+from node.kernels.string.relay import offer_aiding
 from telemetry.messages import Mode
 
 START = 1000.0

@@ -9,23 +9,22 @@ from hypothesis import given
 from hypothesis import strategies as st
 from one_node import node_of
 
-from node.kernels.calibration import identity_parameters
-from node.kernels.increments import bent_angle, faster
-from node.kernels.layout import (
+from node.kernels.arithmetic.formats import DEG, PERIOD
+from node.kernels.filter.increments import bent_angle, faster
+from node.kernels.record.filter_record import (
     BEGAN_STILL,
-    DEG,
     ENDED_STILL,
     KNOWN,
     PARTS,
-    PERIOD,
     RECENT,
     RING,
     default_config,
     new_state,
 )
-from node.kernels.record import BEHIND, LATE, PART, READING, SPLIT, WX
-from node.kernels.ring import is_split, stood_still
-from node.kernels.step import node_step
+from node.kernels.record.node_record import BEHIND, LATE, PART, READING, SPLIT, WX
+from node.kernels.record.ring import is_split, stood_still
+from node.kernels.sensors.correction import identity_parameters
+from node.kernels.step.node_step import node_step
 from node.process.drivers.parts import parts_of
 
 INSIDE = st.floats(0.0, 1.0)

@@ -6,8 +6,8 @@ import numpy as np
 from hypothesis import given
 from hypothesis import strategies as st
 
-from node.kernels.layout import STATES, Err
-from node.kernels.update import innovation_var, intersect, joseph
+from node.kernels.filter.float64.update import innovation_var, intersect, joseph
+from node.kernels.record.filter_record import STATES, Err
 
 PSI = int(Err.YAW)
 VARS = st.floats(1e-8, 1e-2)

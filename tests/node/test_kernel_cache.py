@@ -10,7 +10,7 @@ import pytest
 ROOT = Path(__file__).parents[2]
 PROGRAM = (
     "import subprocess, sys; from numba import config; from node.kernels import jit; print(config.CACHE_DIR);"
-    "subprocess.run([sys.executable, '-c', 'import node.kernels.jit'], check=True)"
+    "subprocess.run([sys.executable, '-c', 'import node.kernels.arithmetic.jit'], check=True)"
 )
 
 
@@ -59,7 +59,7 @@ def copied(folder: Path) -> Path:
 
 
 def digest_in(folder: Path) -> str:
-    program = "from node.kernels.jit import source_digest; print(source_digest())"
+    program = "from node.kernels.arithmetic.jit import source_digest; print(source_digest())"
     return subprocess.run(
         [sys.executable, "-c", program], cwd=folder, capture_output=True, text=True, check=True
     ).stdout
@@ -67,12 +67,12 @@ def digest_in(folder: Path) -> str:
 
 @pytest.mark.slow
 def test_a_copy_of_the_sources_loads_what_was_compiled_of_them(tmp_path: Path) -> None:
-    from node.kernels.warm import warm_up
+    from node.kernels.step.warm import warm_up
 
     warm_up()
     program = """
-import node, node.kernels.step as step
-from node.kernels.warm import warm_up
+import node, node.kernels.step.node_step as step
+from node.kernels.step.warm import warm_up
 warm_up()
 print(node.__file__)
 print([sum(function.stats.cache_misses.values()) for function in (step.node_step, step.node_aiding)])

@@ -7,7 +7,7 @@ import math
 import numpy as np
 import pytest
 
-from node.kernels.layout import Err
+from node.kernels.record.filter_record import Err
 from sim.rig.direct_string import DirectString
 from sim.studies.field.cases import BLOCKS
 from sim.studies.field.run import chosen_cases

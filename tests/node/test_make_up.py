@@ -9,9 +9,10 @@ from node.firmware.inputs import ImuReading, RigContext
 from node.firmware.sensor_limits import SensorLimits
 from node.firmware.settings import Joint, JointRule, TubeSettings
 from node.firmware.tube import Tube
-from node.kernels.encoder import QUANTUM
-from node.kernels.layout import DEG, PERIOD, default_config
-from node.kernels.record import forget_session, new_node
+from node.kernels.arithmetic.formats import DEG, PERIOD
+from node.kernels.record.filter_record import default_config
+from node.kernels.record.node_record import forget_session, new_node
+from node.kernels.string.encoder_step import QUANTUM
 from telemetry.messages import Aiding, Event
 
 OLD = 0.05 * DEG  # of the mark between the head and this tube while it was on top

@@ -10,14 +10,28 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from node.kernels import circular as c
-from node.kernels import numbers as n
-from node.kernels.aligner import inward, longest, tilt_of
-from node.kernels.angles import wrap, wrap_positive
-from node.kernels.cluster import WEIGHT_Q
-from node.kernels.events import TOLD_Q, told_degrees
-from node.kernels.fixed.layout import ANGLE_Q, FORCE_Q, NEVER, RATE_Q, TIME_Q, VAR_Q, VECTOR_Q
-from node.kernels.quantity import (
+from node.kernels.arithmetic import circular as c
+from node.kernels.arithmetic import operations as n
+from node.kernels.arithmetic.angles import wrap, wrap_positive
+from node.kernels.arithmetic.formats import (
+    ANGLE_Q,
+    FORCE_PART,
+    FORCE_Q,
+    MEAN_Q,
+    NEVER,
+    PRODUCT_Q,
+    RATE_PART,
+    RATE_Q,
+    SQUARE_Q,
+    STIFFNESS_Q,
+    TIME_Q,
+    TORQUE_Q,
+    TURNS_Q,
+    VAR_Q,
+    VECTOR_Q,
+    WEIGHT_Q,
+)
+from node.kernels.arithmetic.quantity import (
     LONG_AGO,
     NO_NUMBER,
     NONE,
@@ -32,13 +46,15 @@ from node.kernels.quantity import (
     variance,
     warmth,
 )
-from node.kernels.static_average import FORCE_PART, MEAN_Q, RATE_PART, added, fine, joint, without_one
-from node.kernels.sweep import PRODUCT_Q, SQUARE_Q, angle_square, fine_product
-from node.kernels.twist import STIFFNESS_Q, TORQUE_Q, wound
+from node.kernels.record.events import TOLD_Q, told_degrees
+from node.kernels.sensors.aligner import inward, longest, tilt_of
+from node.kernels.sensors.static_average import added, fine, joint, without_one
+from node.kernels.sensors.sweep import angle_square, fine_product
+from node.kernels.string.twist import wound
 
 Q = {"time": TIME_Q, "rate": RATE_Q, "angle": ANGLE_Q, "force": FORCE_Q, "var": VAR_Q, "factor": VECTOR_Q}
 Q |= {"torque": TORQUE_Q, "stiffness": STIFFNESS_Q, "weight": WEIGHT_Q, "stamp": VAR_Q + 12, "told": TOLD_Q}
-Q |= {"turns": c.TURNS_Q, "squares": SQUARE_Q, "fine": PRODUCT_Q, "mean": MEAN_Q}
+Q |= {"turns": TURNS_Q, "squares": SQUARE_Q, "fine": PRODUCT_Q, "mean": MEAN_Q}
 Q |= {"joint": 2 * RATE_PART, "mixed": RATE_PART + FORCE_PART}
 
 

@@ -14,8 +14,9 @@ import pytest
 
 from node.firmware.saved_state import FIELDS, layout_name, pack
 from node.firmware.settings import TubeSettings
-from node.kernels.layout import PERIOD, default_config
-from node.kernels.record import NODE_LAYOUT, new_node
+from node.kernels.arithmetic.formats import PERIOD
+from node.kernels.record.filter_record import default_config
+from node.kernels.record.node_record import NODE_LAYOUT, new_node
 from node.process.counter import LOTS, BootCounter
 from node.process.journal import SLOTS, Journal
 from node.process.tube_process import TubeProcess

@@ -10,11 +10,12 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from node.kernels.aiding_watch import AT_ONCE, AT_REST, STARTING, find_mismatch, forget
-from node.kernels.layout import PERIOD, RING, Err, default_config
-from node.kernels.ramps import LONGEST, REACH, follow_fit, follow_ramp, is_starting
-from node.kernels.ramps import STARTING as LONGEST_START
-from node.kernels.record import AIDINGS, MISMATCH, new_node
+from node.kernels.arithmetic.formats import PERIOD
+from node.kernels.record.filter_record import RING, Err, default_config
+from node.kernels.record.node_record import AIDINGS, MISMATCH, new_node
+from node.kernels.turns.aiding_watch import AT_ONCE, AT_REST, STARTING, find_mismatch, forget
+from node.kernels.turns.ramps import LONGEST, REACH, follow_fit, follow_ramp, is_starting
+from node.kernels.turns.ramps import STARTING as LONGEST_START
 
 FASTEST = math.radians(71.0)
 SIGMA = math.radians(0.02)

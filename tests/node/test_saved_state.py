@@ -10,8 +10,9 @@ from hypothesis import strategies as st
 
 from node.errors import SavedStateError
 from node.firmware.saved_state import description, layout_name, pack, resume, unpack
-from node.kernels.layout import DEG, Err, default_config
-from node.kernels.record import KEPT_SIZE, new_node
+from node.kernels.arithmetic.formats import DEG
+from node.kernels.record.filter_record import Err, default_config
+from node.kernels.record.node_record import KEPT_SIZE, new_node
 from node.process.counter import BootCounter
 from node.process.journal import Journal
 

@@ -10,12 +10,13 @@ from string_of_one import Sample, Spoil, StringOfOne
 from node.errors import ConfigurationError
 from node.firmware.sensor_limits import SensorLimits
 from node.firmware.settings import TubeSettings, crew_record
-from node.kernels.aiding_watch import AT_ONCE, find_mismatch, forget
-from node.kernels.events import Fault
-from node.kernels.gates import contradicts
-from node.kernels.layout import DEG, PERIOD, Err, default_config
-from node.kernels.record import AIDINGS, MISMATCH, new_node
-from node.kernels.sensor_watch import find_faults
+from node.kernels.arithmetic.formats import DEG, PERIOD
+from node.kernels.record.events import Fault
+from node.kernels.record.filter_record import Err, default_config
+from node.kernels.record.node_record import AIDINGS, MISMATCH, new_node
+from node.kernels.sensors.sensor_watch import find_faults
+from node.kernels.turns.aiding_watch import AT_ONCE, find_mismatch, forget
+from node.kernels.turns.gates import contradicts
 from telemetry.messages import Mode, NodeFlag
 
 FLAGGED_WITHIN = 10  # cycles

@@ -10,8 +10,8 @@ from node.errors import ConfigurationError
 from node.firmware.settings import MAX_REACH, Joint, PassedTube, TubeSettings
 from node.firmware.silent_tubes import across
 from node.firmware.tube import Tube
-from node.kernels.layout import default_config
-from node.kernels.record import new_node
+from node.kernels.record.filter_record import default_config
+from node.kernels.record.node_record import new_node
 from telemetry.messages import Aiding
 
 JOINTS = st.builds(Joint, st.floats(-math.pi, math.pi), st.floats(0.0, 0.01))

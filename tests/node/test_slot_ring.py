@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 
 from node.firmware.saved_state import Saved
-from node.kernels.layout import default_config
-from node.kernels.record import new_node
+from node.kernels.record.filter_record import default_config
+from node.kernels.record.node_record import new_node
 from node.process import journal as journal_module
 from node.process.journal import SLOTS, Journal
 from telemetry.runtime import disk as disk_module

@@ -10,13 +10,15 @@ from hypothesis import given
 from hypothesis import strategies as st
 from string_of_one import Sample, StringOfOne
 
-from node.kernels.angles import from_binary, wrap
-from node.kernels.error_model import propagate, set_apart
-from node.kernels.layout import PERIOD, STATES, Err, Status, default_config, new_state
-from node.kernels.record import SETTINGS, new_node
-from node.kernels.revision import follow_revision, open_revision
-from node.kernels.smoothing import begin_smoothing, carry
-from node.kernels.update import correct, innovation_var
+from node.kernels.arithmetic.angles import from_binary, wrap
+from node.kernels.arithmetic.formats import PERIOD
+from node.kernels.filter.covariance import set_apart
+from node.kernels.filter.float64.propagation import propagate
+from node.kernels.filter.float64.update import correct, innovation_var
+from node.kernels.filter.revision import follow_revision, open_revision
+from node.kernels.filter.smoothing import begin_smoothing, carry
+from node.kernels.record.filter_record import STATES, Err, Status, default_config, new_state
+from node.kernels.record.node_record import SETTINGS, new_node
 from sim.rig.direct_string import Survey
 from sim.studies.scenarios import on_off
 

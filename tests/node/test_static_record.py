@@ -11,9 +11,11 @@ from node.firmware.inputs import ImuReading, RigContext
 from node.firmware.sensor_limits import SensorLimits
 from node.firmware.settings import TubeSettings
 from node.firmware.tube import Tube
-from node.kernels.layout import DEG, PERIOD, default_config
-from node.kernels.record import new_node
-from node.kernels.static_average import STATIC, add_static, has_moved
+from node.kernels.arithmetic.formats import DEG, PERIOD
+from node.kernels.record.filter_record import default_config
+from node.kernels.record.node_record import new_node
+from node.kernels.record.sensor_record import STATIC
+from node.kernels.sensors.static_average import add_static, has_moved
 from telemetry.messages import Event, StaticRecord
 from telemetry.parameters import ParameterBlock, SensorParameters
 

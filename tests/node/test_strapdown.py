@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from node.kernels.strapdown import rotate_down, yaw_rate
+from node.kernels.filter.float64.strapdown import rotate_down, yaw_rate
 
 
 def lean(inclination: float, azimuth: float) -> np.ndarray:

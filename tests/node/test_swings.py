@@ -10,9 +10,10 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from node.kernels.layout import PERIOD, RING, default_config
-from node.kernels.record import new_node
-from node.kernels.swings import follow_swing, swing_var
+from node.kernels.arithmetic.formats import PERIOD
+from node.kernels.record.filter_record import RING, default_config
+from node.kernels.record.node_record import new_node
+from node.kernels.turns.swings import follow_swing, swing_var
 
 Array = npt.NDArray[np.float64]
 SPEED = math.radians(71.0)

@@ -10,8 +10,8 @@ from hypothesis import strategies as st
 from node.errors import ConfigurationError
 from node.firmware.encoder import EncoderNode, EncoderSample
 from node.firmware.torque import TorqueSettings, drive_record
-from node.kernels.drive_torque import follow_torque
-from node.kernels.encoder import new_encoder
+from node.kernels.string.drive_torque import follow_torque
+from node.kernels.string.encoder_step import new_encoder
 from node.process.encoder_process import sample_of
 
 

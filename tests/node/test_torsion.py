@@ -12,8 +12,9 @@ from node.firmware.inputs import ImuReading, RigContext
 from node.firmware.sensor_limits import SensorLimits
 from node.firmware.settings import Joint, Kernel, TorsionRule, TubeSettings
 from node.firmware.tube import Tube
-from node.kernels.layout import PERIOD, Err, Scheme, default_config
-from node.kernels.record import new_node
+from node.kernels.arithmetic.formats import PERIOD
+from node.kernels.record.filter_record import Err, Scheme, default_config
+from node.kernels.record.node_record import new_node
 from telemetry.messages import Aiding, Event, SurveyMeasurement
 
 STIFFNESS = 17_413.0  # N m/rad, 60/50 mm, 3 m

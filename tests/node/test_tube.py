@@ -11,8 +11,9 @@ from node.firmware.inputs import ImuReading, RigContext
 from node.firmware.sensor_limits import SensorLimits
 from node.firmware.settings import Joint, TubeSettings
 from node.firmware.tube import Tube
-from node.kernels.layout import PERIOD, Scheme, default_config
-from node.kernels.record import new_node
+from node.kernels.arithmetic.formats import PERIOD
+from node.kernels.record.filter_record import Scheme, default_config
+from node.kernels.record.node_record import new_node
 from telemetry.messages import Aiding, Event, Mode, NodeFlag, NodeState, SurveyMeasurement
 
 DRIVE, LOWER = Joint(0.5, 1e-3), Joint(-0.2, 2e-3)

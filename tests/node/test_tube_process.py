@@ -9,7 +9,8 @@ import numpy as np
 import pytest
 
 from node.firmware.settings import Joint, TubeSettings
-from node.kernels.layout import DEG, PERIOD, Err
+from node.kernels.arithmetic.formats import DEG, PERIOD
+from node.kernels.record.filter_record import Err
 from node.process.journal import Journal
 from node.process.saver import AT_ONCE, SAVE_EVERY, SPACING
 from node.process.tube_process import TubeProcess

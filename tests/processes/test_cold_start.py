@@ -18,11 +18,11 @@ COMPILING = 600.0  # s, that a node's kernels may take on a busy machine
 @pytest.mark.parametrize(
     ("name", "words", "kernel"),
     [
-        ("encoder", ["encoder"], "node.kernels.encoder"),
+        ("encoder", ["encoder"], "node.kernels.string.encoder_step"),
         pytest.param(
             "1",
             ["node", "--tube", "1", "--drive-joint-deg", "0"],
-            "node.kernels.step",
+            "node.kernels.step.node_step",
             marks=[pytest.mark.statistical, pytest.mark.timeout(PATIENCE + COMPILING)],
         ),
     ],

@@ -16,7 +16,7 @@ import pytest
 from rigs import PATIENCE, free_endpoint, run
 
 from node.firmware.settings import TubeSettings
-from node.kernels.layout import PERIOD
+from node.kernels.arithmetic.formats import PERIOD
 from node.process.drivers.timed import TimedImu
 from node.process.tube_process import TubeProcess
 from telemetry.application.endpoint import Endpoint

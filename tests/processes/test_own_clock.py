@@ -24,7 +24,7 @@ from rigs import PATIENCE, free_endpoint, run, started
 from borechain.pki.access import read_access
 from borechain.pki.rig_keys import add_tube, init_rig
 from groundstation.service.disk.ground_store import Store
-from node.kernels.layout import PERIOD
+from node.kernels.arithmetic.formats import PERIOD
 from node.process.encoder_command import encoder
 from node.process.tube_command import node
 from node.process.tube_process import TubeProcess

@@ -14,8 +14,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from node.firmware.tube import Tube
-from node.kernels.address import firmware
-from node.kernels.record import AIDING, MOMENT, READING
+from node.kernels.record.node_record import AIDING, MOMENT, READING
+from node.kernels.step.address import firmware
 from sim.campaign import engine
 from sim.campaign.chunk import RUNS, Campaign, run_chunk, scenario_digest
 from sim.campaign.draws import draws_of, noise_of, tubes_of

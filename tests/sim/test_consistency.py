@@ -5,7 +5,7 @@ import pytest
 from click.testing import CliRunner
 
 from borechain.cli.experiment.experiment import experiment
-from node.kernels.layout import Scheme
+from node.kernels.record.filter_record import Scheme
 from sim.rig.direct_string import DirectString
 from sim.studies.consistency.run import EVERY, run, setup_of, table, verdict
 from sim.studies.epochs import judge, run_seed

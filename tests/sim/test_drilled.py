@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from node.firmware.settings import JointRule
-from node.kernels.layout import PERIOD
+from node.kernels.arithmetic.formats import PERIOD
 from sim.rig.direct_string import DirectString, StringRun
 from sim.world.scenario import scenario_of
 from sim.world.world import World

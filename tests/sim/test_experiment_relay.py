@@ -5,7 +5,7 @@ import math
 import numpy as np
 import pytest
 
-from node.kernels.layout import Scheme
+from node.kernels.record.filter_record import Scheme
 from sim.rig.direct_string import DirectString
 from sim.studies.epochs import resting, run_seed
 from sim.studies.relay.run import run, table

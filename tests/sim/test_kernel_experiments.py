@@ -9,8 +9,9 @@ import pytest
 
 from borechain.cli.rig.rig import PRELOAD
 from node.firmware.settings import KERNELS
-from node.kernels.encoder import COUNTS_PER_TURN
-from node.kernels.layout import PERIOD, Scheme
+from node.kernels.arithmetic.formats import PERIOD
+from node.kernels.record.filter_record import Scheme
+from node.kernels.string.encoder_step import COUNTS_PER_TURN
 from node.process.tube_command import node
 from sim.rig.plain_encoder import LINES, PlainEncoder
 from sim.studies import published_form
@@ -135,8 +136,8 @@ def test_every_kernel_can_be_chosen_and_is_warmed_before_the_first_fork() -> Non
     assert set(PRELOAD) == set(KERNELS)
     program = (
         "import borechain.warm_all\n"
-        "from node.kernels import step\n"
-        "from node.kernels.fixed import step as fixed\n"
+        "from node.kernels.step import node_step as step\n"
+        "from node.kernels.step import fixed_step as fixed\n"
         "from node.kernels.published import step as published\n"
         "steps = (step.node_step, fixed.fixed_step, published.published_step)\n"
         "aidings = (step.node_aiding, fixed.fixed_aiding, published.published_aiding)\n"

@@ -5,7 +5,7 @@ import math
 import numpy as np
 import pytest
 
-from node.kernels.layout import PERIOD
+from node.kernels.arithmetic.formats import PERIOD
 from sim.rig.direct_string import DirectString, aiding_passes
 from sim.studies import epochs
 from sim.studies.delay import run as delay

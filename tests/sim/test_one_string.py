@@ -6,8 +6,9 @@ from typing import Any
 import numpy as np
 import pytest
 
-from node.kernels.address import BY_ADDRESS
-from node.kernels.layout import PERIOD, Scheme
+from node.kernels.arithmetic.formats import PERIOD
+from node.kernels.record.filter_record import Scheme
+from node.kernels.step.address import BY_ADDRESS
 from sim.errors import ScenarioError
 from sim.rig.direct_string import DirectString, StringRun, aiding_passes
 from sim.studies.epochs import resting

@@ -8,7 +8,7 @@ import pytest
 
 from borechain.inline import InlineRig
 from groundstation.calibration.attitudes import true_vectors
-from node.kernels.layout import PERIOD
+from node.kernels.arithmetic.formats import PERIOD
 from sim.errors import ScenarioError
 from sim.rig.scheduler import Progress, Scheduler
 from sim.world.imu_errors import Drift

@@ -10,8 +10,8 @@ import pytest
 from scipy.signal import welch
 from scipy.stats import ks_2samp
 
-from node.kernels.layout import PARTS
-from node.kernels.record import BEHIND, LATE, LATE_STD, READING, SPLIT, TEMPERATURE
+from node.kernels.record.filter_record import PARTS
+from node.kernels.record.node_record import BEHIND, LATE, LATE_STD, READING, SPLIT, TEMPERATURE
 from sim.campaign.chunk import Campaign
 from sim.campaign.draws import draws_of, noise_of, tubes_of
 from sim.campaign.field import FINER, Field

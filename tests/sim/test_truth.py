@@ -9,8 +9,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from groundstation.survey.resolve import angles, resolve
-from node.kernels.layout import PERIOD
+from groundstation.survey.fusion.resolve import angles, resolve
+from node.kernels.arithmetic.formats import PERIOD
 from sim.world.borehole import Borehole
 from sim.world.marks import wrap
 from sim.world.motion import Motion, Trapezoid

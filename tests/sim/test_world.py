@@ -6,7 +6,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from node.kernels.layout import PERIOD
+from node.kernels.arithmetic.formats import PERIOD
 from sim.errors import ScenarioError
 from sim.world.imu_errors import ImuErrors, gauss_markov, quantise
 from sim.world.marks import wrap

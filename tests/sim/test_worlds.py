@@ -5,7 +5,7 @@ from collections.abc import Callable
 import numpy as np
 import pytest
 
-from node.kernels.layout import Scheme
+from node.kernels.record.filter_record import Scheme
 from sim.studies.bridging.run import mean_of
 from sim.studies.consistency.run import setup_of, table
 from sim.studies.epochs import run_campaign_seed, run_seed

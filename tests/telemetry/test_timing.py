@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from node.kernels.layout import PERIOD
+from node.kernels.arithmetic.formats import PERIOD
 from telemetry.application.commands import STAGES
 from telemetry.runtime.own_clock import Schedule
 from telemetry.runtime.timing import BIN_RATIO, Durations, Stage

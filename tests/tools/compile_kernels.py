@@ -10,7 +10,7 @@ import sys
 
 def floats() -> None:
     """The usual kernel of a node and the string of the studies around it, the other kernels in floats, and surveys."""
-    from groundstation.survey.compiled_model import warm
+    from groundstation.survey.well.compiled_model import warm
     from node.firmware.settings import KERNELS
 
     importlib.import_module("borechain.warm")
@@ -31,7 +31,7 @@ def integers() -> None:
 def warm_kernel(name: str) -> None:
     """Compile a kernel of a node."""
     from node.firmware.kernel_choice import kernel_of
-    from node.kernels.warm import warm_step
+    from node.kernels.step.warm import warm_step
 
     loop = kernel_of(name)
     warm_step(loop.step, loop.aiding)

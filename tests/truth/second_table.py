@@ -17,8 +17,8 @@ from second_world import BEGIN, BLOCKS, DRILL, HOLD, PERIOD, STOP, Cycles, Distu
 from node.firmware.inputs import ImuReading, RigContext
 from node.firmware.settings import Joint, TubeSettings
 from node.firmware.tube import Tube
-from node.kernels.layout import default_config
-from node.kernels.record import new_node
+from node.kernels.record.filter_record import default_config
+from node.kernels.record.node_record import new_node
 from telemetry.messages import Aiding, Event, NodeFlag, NodeState, SurveyMeasurement
 
 Array = npt.NDArray[np.float64]

@@ -8,8 +8,8 @@ import math
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from groundstation.survey.analysis import Analysis
-    from groundstation.survey.frames import Frame
+    from groundstation.survey.well.analysis import Analysis
+    from groundstation.survey.well.reference_frames import Frame
 
 FRAME = ("north", "depth_reference", "height_datum")  # of every row of a table
 
@@ -48,7 +48,7 @@ def station_rows(
 
 def region(cov: Any, sigma: float) -> dict[str, Any]:
     """Region of uncertainty: half-widths at ``sigma`` standard deviations, and the covariance (1 sigma)."""
-    from groundstation.survey.ellipsoid import plan_ellipse
+    from groundstation.survey.well.ellipsoid import plan_ellipse
 
     ellipse = plan_ellipse(cov, sigma)
     half = [sigma * math.sqrt(max(float(cov[i, i]), 0.0)) for i in range(3)]
@@ -65,7 +65,7 @@ def region(cov: Any, sigma: float) -> dict[str, Any]:
 
 def highside(cov: Any, sigma: float, inclination: float, azimuth: float) -> dict[str, Any]:
     """The same in the axes of the hole: highside, to the right of it, along."""
-    from groundstation.survey.ellipsoid import hole_axes
+    from groundstation.survey.well.ellipsoid import hole_axes
 
     axes = hole_axes(inclination, azimuth)
     turned = axes @ cov @ axes.T
@@ -78,8 +78,8 @@ def at_depth(found: Analysis, md: float, sigma: float) -> dict[str, Any]:
     """Position on the arc and its uncertainty at any depth."""
     import numpy as np
 
-    from groundstation.survey.methods import tangents
-    from groundstation.survey.trajectory import Point, interpolate
+    from groundstation.survey.well.methods import tangents
+    from groundstation.survey.well.trajectory import Point, interpolate
 
     directions = tangents(found.record.inclination, found.azimuth)
     none, no_columns = np.zeros((3, 3)), np.zeros((3, 0))

@@ -14,7 +14,7 @@ from borechain.cli.options import json_option
 from borechain.cli.tables import console
 
 if TYPE_CHECKING:
-    from groundstation.survey.clearance import Clearance, Hole
+    from groundstation.survey.well.clearance import Clearance, Hole
 
 TOO_NEAR = 3  # exit status
 
@@ -82,8 +82,8 @@ def clearance(
     Example:
       borechain clearance pipe-1.csv pipe-2.csv --offset-head 0 1.2 0 --instrument gyro-continuous --same-instrument
     """
-    from groundstation.survey.clearance import Rule, clearance
-    from groundstation.survey.error_sources import Site
+    from groundstation.survey.well.clearance import Rule, clearance
+    from groundstation.survey.well.error_sources import Site
 
     site = Site(gravity, field_nt, math.radians(dip_deg), math.radians(declination_deg), math.radians(latitude_deg))
     serial = "one" if same_instrument else ""
@@ -102,11 +102,11 @@ def clearance(
 def _hole(path: Path, instrument: str, head: tuple[float, float, float], radius: float, serial: str) -> Hole:
     import numpy as np
 
-    from groundstation.survey.clearance import Hole
-    from groundstation.survey.error_sources import Leg, Survey
-    from groundstation.survey.field_files import read_any
-    from groundstation.survey.instruments import load_tool
-    from groundstation.survey.methods import Method, positions
+    from groundstation.survey.files.field_files import read_any
+    from groundstation.survey.tools.instruments import load_tool
+    from groundstation.survey.well.clearance import Hole
+    from groundstation.survey.well.error_sources import Leg, Survey
+    from groundstation.survey.well.methods import Method, positions
 
     record = read_any(path).record
     places = np.array(head) + positions(Method.MINIMUM_CURVATURE, record.md, record.inclination, record.azimuth)

@@ -19,11 +19,11 @@ from borechain.cli.tables import console
 from telemetry.runtime.command_line import check_installed
 
 if TYPE_CHECKING:
-    from groundstation.survey.analysis import Analysis
-    from groundstation.survey.depth_reference import DepthReference
-    from groundstation.survey.frames import Frame
-    from groundstation.survey.instruments import Tool
-    from groundstation.survey.records import Record
+    from groundstation.survey.tools.instruments import Tool
+    from groundstation.survey.well.analysis import Analysis
+    from groundstation.survey.well.depth_reference import DepthReference
+    from groundstation.survey.well.reference_frames import Frame
+    from groundstation.survey.well.well_record import Record
 
 NORTHS = ("site", "true", "grid", "magnetic")
 DEPTHS_FROM = (
@@ -37,8 +37,8 @@ def list_tools(context: click.Context, _option: click.Parameter, value: bool) ->
     """Names of the error models, one a line."""
     if not value:
         return
-    from groundstation.survey.instruments import load_tool, shipped
-    from groundstation.survey.owsg import owsg_names
+    from groundstation.survey.tools.instruments import load_tool, shipped
+    from groundstation.survey.tools.owsg import owsg_names
 
     for name in shipped():
         click.echo(f"{name:28} {load_tool(name).title}")
@@ -233,13 +233,13 @@ def survey(
       borechain survey scenarios/wellbore-1-path.csv --displacement-rule thesis
       borechain survey stations.csv --method minimum-curvature --instrument mwd-rev5.1 --sigma 2 --plot survey.svg
     """
-    from groundstation.survey.analysis import analyse, with_azimuth_error
-    from groundstation.survey.error_sources import Site
-    from groundstation.survey.field_files import read_any
-    from groundstation.survey.instruments import load_tool
-    from groundstation.survey.methods import Method
-    from groundstation.survey.programme import read_programme, read_tie_on
-    from groundstation.survey.records import DisplacementRule, with_collar
+    from groundstation.survey.files.field_files import read_any
+    from groundstation.survey.files.programme import read_programme, read_tie_on
+    from groundstation.survey.files.survey_records import DisplacementRule, with_collar
+    from groundstation.survey.tools.instruments import load_tool
+    from groundstation.survey.well.analysis import analyse, with_azimuth_error
+    from groundstation.survey.well.error_sources import Site
+    from groundstation.survey.well.methods import Method
 
     check_suffix("--out", out, ".csv")
     check_suffix("--by-source", by_source, ".csv")
@@ -319,7 +319,7 @@ def frame_of(
     north: str, answer: str | None, north_of_site_deg: float | None, convergence_deg: float, declination_deg: float
 ) -> Frame:
     """Norths of the record and of the answer."""
-    from groundstation.survey.frames import Frame, Norths
+    from groundstation.survey.well.reference_frames import Frame, Norths
 
     angles = (math.radians(angle) for angle in (north_of_site_deg or 0.0, convergence_deg, declination_deg))
     if answer is None:
@@ -335,7 +335,7 @@ def depths_of(
     origin: tuple[float, float, float] | None,
 ) -> DepthReference:
     """Depth references of the record and of the answer."""
-    from groundstation.survey.depth_reference import depth_reference
+    from groundstation.survey.well.depth_reference import depth_reference
 
     found = depth_reference(record, answer, height)
     from_datum = "height-datum" in (found.record, found.answer)
@@ -352,7 +352,7 @@ def draw(found: Analysis, instrument: str, sigma: float, title: str, path: Path)
     """Plan view, sections and uncertainty."""
     from groundstation.report.plots import survey_figure
     from groundstation.report.style import save
-    from groundstation.survey.ellipsoid import probability_of
+    from groundstation.survey.well.ellipsoid import probability_of
 
     confidence = probability_of(sigma, 2)
     words = (
@@ -364,8 +364,8 @@ def draw(found: Analysis, instrument: str, sigma: float, title: str, path: Path)
 
 def export(tool: Tool, record: Record, path: Path) -> None:
     """Instrument as ISCWSA JSON; one that asks for columns of a record, as a gyro with those of this one."""
-    from groundstation.survey.gyro_export import as_gyro, needs_record
-    from groundstation.survey.iscwsa_json import to_json
+    from groundstation.survey.tools.iscwsa_json import to_json
+    from groundstation.survey.well.gyro_export import as_gyro, needs_record
 
     written = as_gyro(tool, record) if needs_record(tool) else tool
     write_whole(path, to_json(written, datetime.datetime.now(datetime.UTC).date()))

@@ -18,9 +18,9 @@ from borechain.cli.tables import console
 from telemetry.runtime.command_line import check_installed
 
 if TYPE_CHECKING:
-    from groundstation.survey.joints import ExtraColumn, Joints
-    from groundstation.survey.wall_file import Wall
-    from groundstation.survey.wall_verdict import Judgement
+    from groundstation.survey.wall.wall_file import Wall
+    from groundstation.survey.wall.wall_joints import ExtraColumn, Joints
+    from groundstation.survey.wall.wall_verdict import Judgement
 
 SHOWN = 10
 NOT_TIGHT = 3  # exit status
@@ -60,9 +60,9 @@ def wall(
       borechain wall scenarios/walls/wall-40.toml --report wall.pdf
       borechain wall scenarios/walls/wall-40.toml --report K021.pdf --column K021
     """
-    from groundstation.survey.joints import worst
-    from groundstation.survey.wall_file import judge_wall, read_wall
-    from groundstation.survey.wall_verdict import Verdict
+    from groundstation.survey.wall.wall_file import judge_wall, read_wall
+    from groundstation.survey.wall.wall_joints import worst
+    from groundstation.survey.wall.wall_verdict import Verdict
 
     check_suffix("--plot", plot, *PLOT_FORMATS)
     check_suffix("--report", report, ".pdf")
@@ -107,7 +107,7 @@ def result_of(found: Wall, judgement: Judgement) -> dict[str, Any]:
     """The JSON object of the command."""
     import numpy as np
 
-    from groundstation.survey.joints import worst, worst_depths
+    from groundstation.survey.wall.wall_joints import worst, worst_depths
 
     judged, extras = judgement.joints, dict(judgement.extras)
     finite = np.where(np.isfinite(judged.thickness), judged.thickness, np.inf)
@@ -206,8 +206,8 @@ def largest_spacing(found: Wall, judged: Joints) -> list[dict[str, Any]]:
     """Widest joint at every depth; a missing column has no spacing, so its joints stand as null."""
     import numpy as np
 
-    from groundstation.survey.as_built import State
-    from groundstation.survey.wall_verdict import joint_name
+    from groundstation.survey.wall.as_built import State
+    from groundstation.survey.wall.wall_verdict import joint_name
 
     columns, rows = found.built.columns, []
     for z, depth in enumerate(columns.depths.tolist()):
@@ -221,7 +221,7 @@ def largest_spacing(found: Wall, judged: Joints) -> list[dict[str, Any]]:
 
 def closing(found: Wall) -> list[dict[str, Any]]:
     """How it closed, day by day; nothing where no day of drilling is stated."""
-    from groundstation.survey.wall_verdict import joint_name
+    from groundstation.survey.wall.wall_verdict import joint_name
 
     columns, rows = found.built.columns, []
     for stage in found.stages:
@@ -237,7 +237,7 @@ def closing(found: Wall) -> list[dict[str, Any]]:
 
 def allowance(found: Wall) -> dict[str, float] | None:
     """How far one column alone may shift along the wall at its toe; None for a wall without a spacing."""
-    from groundstation.survey.wall import margin
+    from groundstation.survey.wall.column_joint import margin
 
     if found.file.spacing is None:
         return None
@@ -248,8 +248,8 @@ def allowance(found: Wall) -> dict[str, float] | None:
 
 def joint_row(found: Wall, judged: Joints, joint: int, depth: int, thinnest: int) -> dict[str, Any]:
     """One joint at the depth where it is most probably too thin; what is missing has no distance: null."""
-    from groundstation.survey.as_built import State
-    from groundstation.survey.wall_verdict import joint_name
+    from groundstation.survey.wall.as_built import State
+    from groundstation.survey.wall.wall_verdict import joint_name
 
     columns = found.built.columns
     north, east, _ = (judged.offset[joint, depth] @ found.built.frame[:2]).tolist()
@@ -277,9 +277,9 @@ def column_row(found: Wall, k: int) -> dict[str, Any]:
     """State of one column, and its deviation from its design at its last survey."""
     import numpy as np
 
-    from groundstation.survey.columns import deviation
-    from groundstation.survey.trajectory import Point
-    from groundstation.survey.wall_columns import state_words
+    from groundstation.survey.wall.column_deviation import deviation
+    from groundstation.survey.wall.wall_columns import state_words
+    from groundstation.survey.well.trajectory import Point
 
     plan, built = found.plans[k], found.built
     row: dict[str, Any] = {

@@ -10,7 +10,7 @@ from groundstation.service.alarms.verdict import FINEST_CM
 from groundstation.service.hole.deviation_alarms import Alarm
 from groundstation.service.hole.surveyed_hole import Hole
 from groundstation.service.string.drill_string import DrillString
-from groundstation.survey.columns import LEVELS
+from groundstation.survey.wall.column_deviation import LEVELS
 
 LEVEL_OF = dict(zip(LEVELS, (Level.NOTICE, Level.DEGRADED, Level.BAD), strict=True))
 

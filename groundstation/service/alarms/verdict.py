@@ -11,7 +11,7 @@ import enum
 import math
 from dataclasses import dataclass, replace
 
-from groundstation.survey.columns import LEVELS, Deviation
+from groundstation.survey.wall.column_deviation import LEVELS, Deviation
 
 LOWEST, STEER_AT, LIMIT = LEVELS  # of the tolerance
 WINDS = ("N", "NNE", "NE", "ENE", "E", "ESE", "SE", "SSE", "S", "SSW", "SW", "WSW", "W", "WNW", "NW", "NNW")

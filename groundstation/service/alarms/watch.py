@@ -12,9 +12,9 @@ from groundstation.service.hole.surveyed_hole import Hole
 from groundstation.service.string.depth import CONTRADICTION
 from groundstation.service.string.drill_string import DrillString
 from groundstation.service.string.message_numbers import Range
-from groundstation.survey.joint_angles import Pair, RestingYaw
-from groundstation.survey.shared_scale import shared_scale
-from groundstation.survey.trust import Trust, trust_of
+from groundstation.survey.fusion.joint_angles import Pair, RestingYaw
+from groundstation.survey.fusion.shared_scale import shared_scale
+from groundstation.survey.fusion.survey_trust import Trust, trust_of
 from telemetry.application.seal_watch import CODE, refusal_of
 from telemetry.application.series import SERIES_SHIFT
 from telemetry.messages import EPOCH_UNKNOWN, Event, Mode, NodeFlag, NodeState, SurveyMeasurement

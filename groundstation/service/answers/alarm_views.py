@@ -11,7 +11,7 @@ from groundstation.service.alarms.verdict import wind
 from groundstation.service.answers.model import RigModel
 from groundstation.service.answers.views import finite, utc_text
 from groundstation.service.hole.deviation_alarms import Alarm
-from groundstation.survey.columns import LEVELS
+from groundstation.survey.wall.column_deviation import LEVELS
 
 View = dict[str, Any]
 

@@ -12,9 +12,9 @@ from groundstation.errors import SelectorError, SurveyError
 from groundstation.service.answers.model import RigModel
 from groundstation.service.answers.thinning import FEWEST, largest_triangles
 from groundstation.service.hole.history import Moment
-from groundstation.survey.columns import Deviation, dominant
-from groundstation.survey.ellipsoid import Ellipse, axes, coverage_radius, plan_ellipses
-from groundstation.survey.shared import KIND_NAMES
+from groundstation.survey.fusion.shared import KIND_NAMES
+from groundstation.survey.wall.column_deviation import Deviation, dominant
+from groundstation.survey.well.ellipsoid import Ellipse, axes, coverage_radius, plan_ellipses
 
 Array = npt.NDArray[np.float64]
 View = dict[str, Any]

@@ -18,8 +18,8 @@ from groundstation.service.answers.row_texts import Numbers
 from groundstation.service.answers.streamed_rows import span
 from groundstation.service.answers.views import Parameters, Range, View, flag_names, streamed
 from groundstation.service.hole.resolved_stops import NO_NUMBER, Table, forces_of
-from groundstation.survey.resolve import Quality, angle_stds_of_all, angles
-from groundstation.survey.trust import Trust
+from groundstation.survey.fusion.resolve import Quality, angle_stds_of_all, angles
+from groundstation.survey.fusion.survey_trust import Trust
 from telemetry.messages import NodeFlag
 
 DEGREES = 180.0 / math.pi  # in a radian

@@ -16,7 +16,7 @@ from groundstation.service.hole.surveyed_hole import Hole
 from groundstation.service.orders.order_book import OrderBook
 from groundstation.service.orders.recalibration.procedure import FieldProcedure
 from groundstation.service.string.drill_string import DrillString
-from groundstation.survey.shared import SharedErrors
+from groundstation.survey.fusion.shared import SharedErrors
 
 
 @dataclass(frozen=True, slots=True)

@@ -9,7 +9,7 @@ from groundstation.service.alarms.verdict import FINEST_CM, Verdict, Word, direc
 from groundstation.service.alarms.verdict_doubts import known_of
 from groundstation.service.answers.model import RigModel
 from groundstation.service.answers.rounding import rounded, rounded_std
-from groundstation.survey.columns import Deviation
+from groundstation.survey.wall.column_deviation import Deviation
 
 View = dict[str, Any]
 CM = 100.0

@@ -16,8 +16,8 @@ from groundstation.service.answers.model import RigModel
 from groundstation.service.answers.streamed_rows import STREAMED, window
 from groundstation.service.hole.station import SurveyStation
 from groundstation.service.hole.surveyed_hole import Hole
-from groundstation.survey.resolve import angle_stds_of_all, angles
-from groundstation.survey.trajectory import Point, interpolate
+from groundstation.survey.fusion.resolve import angle_stds_of_all, angles
+from groundstation.survey.well.trajectory import Point, interpolate
 from telemetry.messages import Event, NodeFlag, NodeState, StaticRecord
 
 View = dict[str, Any]

@@ -10,10 +10,10 @@ import numpy as np
 from groundstation.service.answers.model import RigModel
 from groundstation.service.answers.views import finite
 from groundstation.service.hole.live_wall import LiveWall, Neighbourhood
-from groundstation.survey.as_built import State
-from groundstation.survey.joints import worst_depths
-from groundstation.survey.resolve import angles
-from groundstation.survey.wall_verdict import Judgement, joint_name
+from groundstation.survey.fusion.resolve import angles
+from groundstation.survey.wall.as_built import State
+from groundstation.survey.wall.wall_joints import worst_depths
+from groundstation.survey.wall.wall_verdict import Judgement, joint_name
 
 View = dict[str, Any]
 

@@ -44,7 +44,7 @@ from groundstation.service.disk.database_tables import (
     add_new,
 )
 from groundstation.service.string.depth import NEVER, Doubt, Instant
-from groundstation.survey.joint_angles import Joint, Pair
+from groundstation.survey.fusion.joint_angles import Joint, Pair
 from telemetry.errors import DecodeError
 from telemetry.messages import Event, Kept, Stand, StaticRecord, SurveyMeasurement
 from telemetry.parameters import ParameterBlock, unpack_block

@@ -10,7 +10,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass, replace
 
-from groundstation.survey.columns import LEVELS, Deviation
+from groundstation.survey.wall.column_deviation import LEVELS, Deviation
 
 CLEARED_BELOW = 0.02  # of the tolerance, under a level
 

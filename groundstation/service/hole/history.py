@@ -11,7 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
-from groundstation.survey.columns import Deviation, Deviations
+from groundstation.survey.wall.column_deviation import Deviation, Deviations
 
 Array = npt.NDArray[np.float64]
 Few = npt.NDArray[np.float32]

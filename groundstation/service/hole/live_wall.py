@@ -13,9 +13,9 @@ from pathlib import Path
 import numpy as np
 
 from groundstation.errors import SurveyError
-from groundstation.survey.wall_columns import ColumnPlan, Hole, Status, build
-from groundstation.survey.wall_file import Wall, read_wall
-from groundstation.survey.wall_verdict import Judgement, judge
+from groundstation.survey.wall.wall_columns import ColumnPlan, Hole, Status, build
+from groundstation.survey.wall.wall_file import Wall, read_wall
+from groundstation.survey.wall.wall_verdict import Judgement, judge
 
 Station = tuple[float, float, float]  # measured depth (m), inclination, azimuth (rad)
 

@@ -15,9 +15,9 @@ from groundstation.service.hole.resolved_stops import cluster_of
 from groundstation.service.hole.resolving import ResolvedSurvey, resolve_survey, resolve_surveys
 from groundstation.service.hole.surveyed_hole import Hole
 from groundstation.service.string.drill_string import DrillString
-from groundstation.survey.resolve import Quality, Resolved
-from groundstation.survey.shared import Reading, SharedErrors, weigh_together
-from groundstation.survey.trust import Trust, trust_of, with_uncertain_yaw, with_unknown_yaw
+from groundstation.survey.fusion.resolve import Quality, Resolved
+from groundstation.survey.fusion.shared import Reading, SharedErrors, weigh_together
+from groundstation.survey.fusion.survey_trust import Trust, trust_of, with_uncertain_yaw, with_unknown_yaw
 from telemetry.messages import SurveyMeasurement
 
 UNTRUSTED = "survey_untrusted"  # alarm: a survey is fused with an unknown yaw

@@ -15,10 +15,10 @@ from typing import Any, Final, overload
 import numpy as np
 import numpy.typing as npt
 
-from groundstation.survey.fusion import Departure, Stack
-from groundstation.survey.resolve import Direction, Quality
-from groundstation.survey.shared import CAUSES, Places, Reading, columns_of
-from groundstation.survey.trust import UNKNOWN_YAW_VAR, Trust
+from groundstation.survey.fusion.fusion import Departure, Stack
+from groundstation.survey.fusion.resolve import Direction, Quality
+from groundstation.survey.fusion.shared import CAUSES, Places, Reading, columns_of
+from groundstation.survey.fusion.survey_trust import UNKNOWN_YAW_VAR, Trust
 from telemetry.messages import NodeFlag, SurveyMeasurement
 
 Array = npt.NDArray[np.float64]

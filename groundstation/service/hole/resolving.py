@@ -14,7 +14,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from groundstation.errors import SurveyError
-from groundstation.survey.resolve import Quality, Resolved, check_all, combine_imus, resolve_all
+from groundstation.survey.fusion.resolve import Quality, Resolved, check_all, combine_imus, resolve_all
 from telemetry.messages import SurveyMeasurement
 
 ACCELEROMETER_NOISE_DEG = 0.02  # one sample, for the check of motion

@@ -7,10 +7,10 @@ from dataclasses import dataclass, field
 from typing import Any
 
 from groundstation.service.hole.resolved_stops import Cluster, Clusters
-from groundstation.survey.fusion import Departure, GrowingBayes, Stack, Weighting, departure_from, weighted
-from groundstation.survey.resolve import Direction
-from groundstation.survey.shared import Reading
-from groundstation.survey.trust import UNKNOWN_YAW_VAR, Trust
+from groundstation.survey.fusion.fusion import Departure, GrowingBayes, Stack, Weighting, departure_from, weighted
+from groundstation.survey.fusion.resolve import Direction
+from groundstation.survey.fusion.shared import Reading
+from groundstation.survey.fusion.survey_trust import UNKNOWN_YAW_VAR, Trust
 
 
 @dataclass(slots=True)

@@ -20,13 +20,13 @@ from groundstation.service.hole.deviation_alarms import AlarmList
 from groundstation.service.hole.history import SAME_STOP, History
 from groundstation.service.hole.resolved_stops import Cluster, Clusters, Table
 from groundstation.service.hole.station import SurveyStation
-from groundstation.survey.columns import Deviation, Deviations, deviations, project
-from groundstation.survey.fusion import Evidence, Weighting, departures_from, judge_departure
-from groundstation.survey.resolve import Direction
-from groundstation.survey.shared import SharedErrors
-from groundstation.survey.trajectory import Trajectory
-from groundstation.survey.transport import Carried, carry
-from groundstation.survey.trust import Trust
+from groundstation.survey.fusion.fusion import Evidence, Weighting, departures_from, judge_departure
+from groundstation.survey.fusion.resolve import Direction
+from groundstation.survey.fusion.shared import SharedErrors
+from groundstation.survey.fusion.survey_trust import Trust
+from groundstation.survey.fusion.transport import Carried, carry
+from groundstation.survey.wall.column_deviation import Deviation, Deviations, deviations, project
+from groundstation.survey.well.trajectory import Trajectory
 
 Array = npt.NDArray[np.float64]
 

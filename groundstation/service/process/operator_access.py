@@ -25,7 +25,7 @@ from groundstation.service.orders.recalibration.control import Recalibration
 from groundstation.service.orders.recalibration.procedure import Request
 from groundstation.service.orders.surveyed_biases import surveyed_biases
 from groundstation.service.orders.uploads import Uploads
-from groundstation.survey.force_biases import SurveyedBiases
+from groundstation.survey.fusion.force_biases import SurveyedBiases
 from telemetry.application.arguments import check_arguments, parse_parameters, parse_tube
 from telemetry.application.commands import COMMANDS, CommandSpec, ObeyedBy, find_command
 from telemetry.errors import CommandError

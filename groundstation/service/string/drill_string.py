@@ -14,8 +14,8 @@ from groundstation.service.string.rig_time import RigTime
 from groundstation.service.string.stands import take_stand, take_survey
 from groundstation.service.string.stops import Stops
 from groundstation.service.string.tally import Tally
-from groundstation.survey.joint_angles import JointAngles
-from groundstation.survey.trust import Trust, trust_of
+from groundstation.survey.fusion.joint_angles import JointAngles
+from groundstation.survey.fusion.survey_trust import Trust, trust_of
 from telemetry.messages import EPOCH_UNKNOWN, DepthReading, Event, NodeState, Stand, StaticRecord, SurveyMeasurement
 
 EVENTS_KEPT = 10_000

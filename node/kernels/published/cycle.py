@@ -10,17 +10,19 @@ from __future__ import annotations
 import math
 from typing import Any
 
-from node.kernels import relay
-from node.kernels.angles import advance_binary, from_binary, wrap
-from node.kernels.error_model import BX, PSI, TX, TY, isolate
-from node.kernels.fixed_lag import AIDED, YAW_RESET, reset_yaw
-from node.kernels.jit import kernel
-from node.kernels.layout import STATES, UNKNOWN_YAW_VAR, Array, Status
-from node.kernels.modes import STATIC_BIAS, SURVEY_READY, guard_rate, is_quiet, learn_static_bias, step_modes
-from node.kernels.moving_average import average_force
+from node.kernels.arithmetic.angles import advance_binary, from_binary, wrap
+from node.kernels.arithmetic.formats import Array
+from node.kernels.arithmetic.jit import kernel
+from node.kernels.filter.covariance import isolate
+from node.kernels.filter.float64.fixed_lag import AIDED, YAW_RESET, reset_yaw
+from node.kernels.filter.float64.propagation import BX, PSI, TX, TY
+from node.kernels.filter.float64.update import clear, innovation_var, joseph
+from node.kernels.filter.modes import STATIC_BIAS, SURVEY_READY, guard_rate, is_quiet, learn_static_bias, step_modes
+from node.kernels.filter.moving_average import average_force
 from node.kernels.published.euler import ATTITUDE, error_rates, euler_rates, geometry_of, point_down, propagate, tilt_of
-from node.kernels.ring import drop_first_pending, push
-from node.kernels.update import clear, innovation_var, joseph
+from node.kernels.record.filter_record import STATES, UNKNOWN_YAW_VAR, Status
+from node.kernels.record.ring import drop_first_pending, push
+from node.kernels.string import relay
 
 BAD_SAMPLE, FILTER_FAULT = int(Status.BAD_SAMPLE), int(Status.FILTER_FAULT)
 STEEPEST = math.pi / 3.0  # rad, of phi and theta, beyond which the tilt has diverged
@@ -29,7 +31,7 @@ UNKNOWN_TILT_VAR = 0.25  # rad^2
 
 @kernel
 def run_cycle(state: Any, config: Any, rate: Array, force: Array, start: float, end: float, joined: int) -> int:
-    """One execution cycle as ``node.kernels.cycle.run_cycle``.
+    """One execution cycle as ``node.kernels.filter.float64.cycle.run_cycle``.
 
     A tilt that diverged starts upright again and the yaw is unknown until the next aiding, which resets it.
     """
@@ -68,7 +70,7 @@ def offer_aiding(
     sequence: int,
     hops: int,
 ) -> int:
-    """Queue one aiding as ``node.kernels.relay.offer_aiding``; a repetition is a measurement like any other."""
+    """Queue one aiding as ``node.kernels.string.relay.offer_aiding``; a repetition is a measurement like any other."""
     state.last_sequence = -1
     return relay.offer_aiding(state, config, yaw, yaw_var, systematic_var, offset, valid_at, sequence, hops)
 

@@ -9,9 +9,9 @@ from __future__ import annotations
 import math
 from typing import Any, TypeAlias
 
-from node.kernels.error_model import BX, BY, BZ, PSI, TX, TY, symmetrise
-from node.kernels.jit import kernel
-from node.kernels.layout import Array
+from node.kernels.arithmetic.formats import Array
+from node.kernels.arithmetic.jit import kernel
+from node.kernels.filter.float64.propagation import BX, BY, BZ, PSI, TX, TY, symmetrise
 
 # sin phi, cos phi, tan theta, 1 / cos theta, and the rates (rad/s) about the level axis and along the slope
 Geometry: TypeAlias = tuple[float, float, float, float, float, float]

@@ -19,8 +19,8 @@ from typing import Final
 
 import numpy as np
 
-from node.kernels.jit import kernel
-from node.kernels.layout import Array
+from node.kernels.arithmetic.formats import Array
+from node.kernels.arithmetic.jit import kernel
 
 READS: Final = (256, 64, 16)  # that are looked at: two minutes of cycles, or fewer where they contradict each other
 ENOUGH: Final = 16  # of them, from where the crystal is known

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import numpy.typing as npt
 
-from node.kernels.layout import PARTS
+from node.kernels.record.filter_record import PARTS
 
 Array = npt.NDArray[np.float64]
 LEAST = 2 * PARTS  # frames of a window that is looked into

@@ -9,7 +9,7 @@ from typing import Protocol, TypeVar
 
 from node.errors import SensorError
 from node.firmware.encoder import EncoderSample
-from node.kernels.calibration import USUAL
+from node.kernels.sensors.correction import USUAL
 from telemetry.messages import Scalar, Severity, Vector3
 
 NOTHING: Vector3 = (math.nan, math.nan, math.nan)

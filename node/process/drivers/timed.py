@@ -13,7 +13,7 @@ import numpy as np
 
 from node.errors import SensorError
 from node.firmware.encoder import EncoderSample
-from node.kernels.calibration import USUAL
+from node.kernels.sensors.correction import USUAL
 from node.process.drivers.replay import ENCODER_COLUMNS, IMU_COLUMNS, Rows, load_rows
 from node.process.drivers.source import ImuSample
 

@@ -17,10 +17,11 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from groundstation.survey.resolve import angles, resolve
+from groundstation.survey.fusion.resolve import angles, resolve
 from node.firmware.alignment import METHODS, angles_of
 from node.firmware.settings import Kernel
-from node.kernels.layout import PERIOD, default_config
+from node.kernels.arithmetic.formats import PERIOD
+from node.kernels.record.filter_record import default_config
 from sim.rig.direct_string import DirectString
 from sim.studies.pool import Step, over_cores, seeded
 from sim.studies.scenarios import Tables, complete

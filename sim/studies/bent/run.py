@@ -17,13 +17,13 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from groundstation.survey.ellipsoid import coverage_radius
-from groundstation.survey.fusion import StationFusion
-from groundstation.survey.resolve import Direction, angle_stds, angles, known, resolve
-from groundstation.survey.shared import SharedErrors
-from groundstation.survey.trajectory import Point, Trajectory
-from groundstation.survey.transport import carry
-from node.kernels.angles import wrap
+from groundstation.survey.fusion.fusion import StationFusion
+from groundstation.survey.fusion.resolve import Direction, angle_stds, angles, known, resolve
+from groundstation.survey.fusion.shared import SharedErrors
+from groundstation.survey.fusion.transport import carry
+from groundstation.survey.well.ellipsoid import coverage_radius
+from groundstation.survey.well.trajectory import Point, Trajectory
+from node.kernels.arithmetic.angles import wrap
 from sim.rig.direct_string import DirectString, Survey
 from sim.studies.pool import Step, over_cores, seeded
 from sim.studies.scenarios import CALIBRATED, Tables, changed

@@ -15,7 +15,7 @@ from typing import Any
 import numpy as np
 
 from node.firmware.settings import Kernel
-from node.kernels.layout import Scheme
+from node.kernels.record.filter_record import Scheme
 from sim.studies.epochs import EpochRun, resting, run_seed
 from sim.studies.pool import Step, over_cores, seeded
 from sim.studies.scenarios import Tables, changed, on_off

@@ -16,12 +16,12 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from groundstation.survey.ellipsoid import coverage_radius
-from groundstation.survey.fusion import StationFusion
-from groundstation.survey.methods import tangents
-from groundstation.survey.resolve import resolve
-from groundstation.survey.shared import SharedErrors
-from groundstation.survey.trajectory import Trajectory
+from groundstation.survey.fusion.fusion import StationFusion
+from groundstation.survey.fusion.resolve import resolve
+from groundstation.survey.fusion.shared import SharedErrors
+from groundstation.survey.well.ellipsoid import coverage_radius
+from groundstation.survey.well.methods import tangents
+from groundstation.survey.well.trajectory import Trajectory
 from sim.studies.epochs import resting, run_seed
 from sim.studies.pool import RunAll, Step, over_cores
 from sim.studies.published import wellbore_1

@@ -15,9 +15,9 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from groundstation.survey.resolve import angle_stds, angles, known, resolve
-from groundstation.survey.transport import carry
-from node.kernels.angles import wrap
+from groundstation.survey.fusion.resolve import angle_stds, angles, known, resolve
+from groundstation.survey.fusion.transport import carry
+from node.kernels.arithmetic.angles import wrap
 from sim.rig.direct_string import DirectString, StringRun
 from sim.studies.field.cases import ALL, BLOCKS, CASES, Case
 from sim.studies.pool import Step, over_cores, seeded

@@ -7,12 +7,13 @@ from typing import Any
 
 import numpy as np
 
-from node.kernels import cycle, relay
-from node.kernels.fixed import cycle as fixed_cycle
-from node.kernels.fixed.border import config_in_integers, state_in_integers
-from node.kernels.fixed.layout import ANGLE_Q, FORCE_Q, RATE_Q, TIME_Q, VAR_Q
-from node.kernels.jit import kernel
-from node.kernels.layout import DEG, PERIOD, Array, default_config, new_state
+from node.kernels.arithmetic.formats import ANGLE_Q, DEG, FORCE_Q, PERIOD, RATE_Q, TIME_Q, VAR_Q, Array
+from node.kernels.arithmetic.jit import kernel
+from node.kernels.filter.fixed import cycle as fixed_cycle
+from node.kernels.filter.float64 import cycle
+from node.kernels.record.filter_conversion import config_in_integers, state_in_integers
+from node.kernels.record.filter_record import default_config, new_state
+from node.kernels.string import relay
 
 AIDING_VAR = (0.003 * DEG) ** 2
 WARM = 400  # cycles before the clock is read

@@ -15,11 +15,12 @@ from typing import Any
 import numpy as np
 
 from node.firmware.settings import Kernel
-from node.kernels.angles import wrap_positive
-from node.kernels.cycle import run_cycle
-from node.kernels.fixed.node import FixedNode
-from node.kernels.layout import DEG, PERIOD, Err, Scheme, default_config, new_state
-from node.kernels.relay import offer_aiding
+from node.kernels.arithmetic.angles import wrap_positive
+from node.kernels.arithmetic.formats import DEG, PERIOD
+from node.kernels.filter.float64.cycle import run_cycle
+from node.kernels.record.filter_record import Err, Scheme, default_config, new_state
+from node.kernels.step.fixed_node import FixedNode
+from node.kernels.string.relay import offer_aiding
 from sim.studies.epochs import resting, run_seed
 from sim.studies.pool import Step, over_cores, seeded
 from sim.studies.relay.run import table

@@ -15,10 +15,10 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from groundstation.survey.force_biases import ForceBias, Look, look_of, solve_biases
-from groundstation.survey.resolve import angle_stds, angles, resolve
-from groundstation.survey.shared import SharedErrors
-from node.kernels.angles import wrap
+from groundstation.survey.fusion.force_biases import ForceBias, Look, look_of, solve_biases
+from groundstation.survey.fusion.resolve import angle_stds, angles, resolve
+from groundstation.survey.fusion.shared import SharedErrors
+from node.kernels.arithmetic.angles import wrap
 from sim.rig.direct_string import DirectString, Survey
 from sim.studies.pool import Step, over_cores, seeded
 from sim.studies.scenarios import Tables

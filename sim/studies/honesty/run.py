@@ -15,7 +15,7 @@ import tempfile
 from pathlib import Path
 from typing import Any
 
-from node.kernels.layout import Scheme
+from node.kernels.record.filter_record import Scheme
 from sim.campaign.run import run_campaign
 from sim.studies.consistency.run import EVERY, SHOWN, setup_of
 from sim.studies.pool import Step

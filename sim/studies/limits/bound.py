@@ -14,8 +14,8 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
-from node.kernels.layout import UNKNOWN_YAW_VAR
-from node.kernels.record import A_RATE, A_SEQUENCE, A_VALID, A_YAW_VAR
+from node.kernels.record.filter_record import UNKNOWN_YAW_VAR
+from node.kernels.record.node_record import A_RATE, A_SEQUENCE, A_VALID, A_YAW_VAR
 from sim.rig.direct_string import aiding_passes
 from sim.rig.encoder_course import measured_of
 from sim.world.world import World

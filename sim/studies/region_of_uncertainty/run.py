@@ -13,10 +13,10 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from groundstation.survey.analysis import analyse, magnetic_error, with_azimuth_error
-from groundstation.survey.error_sources import Site
-from groundstation.survey.instruments import load_tool
-from groundstation.survey.methods import Method
+from groundstation.survey.tools.instruments import load_tool
+from groundstation.survey.well.analysis import analyse, magnetic_error, with_azimuth_error
+from groundstation.survey.well.error_sources import Site
+from groundstation.survey.well.methods import Method
 from sim.studies.pool import Step
 from sim.studies.published import AXES, printed_regions, wellbore_1
 

@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 
-from node.kernels.layout import Scheme
+from node.kernels.record.filter_record import Scheme
 from sim.studies.epochs import EpochRun, resting, run_seed
 from sim.studies.pool import Step, over_cores, seeded
 

@@ -13,9 +13,9 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from groundstation.survey.fusion import Weighting, sequence_weights, weighted
-from groundstation.survey.resolve import Direction
-from groundstation.survey.trajectory import Trajectory
+from groundstation.survey.fusion.fusion import Weighting, sequence_weights, weighted
+from groundstation.survey.fusion.resolve import Direction
+from groundstation.survey.well.trajectory import Trajectory
 from sim.studies.pool import Step
 
 Array = npt.NDArray[np.float64]

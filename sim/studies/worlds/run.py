@@ -18,7 +18,7 @@ from typing import Any
 
 import numpy as np
 
-from node.kernels.layout import Scheme
+from node.kernels.record.filter_record import Scheme
 from sim.studies import epochs, lab
 from sim.studies.consistency.run import SHOWN, setup_of
 from sim.studies.lab import LAB, REST, ROTATING, LabRun

@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 
 from groundstation.errors import SurveyError
-from groundstation.survey.clearance import Hole, Rule, clearance
-from groundstation.survey.error_sources import Leg, Site, Survey
-from groundstation.survey.instruments import Mode, Term, Tool, load_tool
+from groundstation.survey.tools.instruments import Mode, Term, Tool, load_tool
+from groundstation.survey.well.clearance import Hole, Rule, clearance
+from groundstation.survey.well.error_sources import Leg, Site, Survey
 
 DATA = Path(__file__).parents[2] / "data" / "survey"
 DEG = math.pi / 180.0

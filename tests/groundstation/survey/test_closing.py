@@ -7,8 +7,8 @@ from pathlib import Path
 import pytest
 
 from groundstation.errors import SurveyError
-from groundstation.survey.closing import Stage
-from groundstation.survey.wall_file import read_wall
+from groundstation.survey.wall.closing import Stage
+from groundstation.survey.wall.wall_file import read_wall
 
 PIPES, ACROSS = 12, 2.4  # of a ring of freeze pipes; m, its diameter
 DAYS = [f"2026-11-{10 + k // 4}" for k in range(PIPES)]

@@ -8,9 +8,18 @@ from hypothesis import assume, given
 from hypothesis import strategies as st
 
 from groundstation.errors import SurveyError
-from groundstation.survey.columns import PRESETS, Design, Deviation, Deviations, deviation, dominant, project, tolerance
-from groundstation.survey.resolve import Direction, angles
-from groundstation.survey.trajectory import Point
+from groundstation.survey.fusion.resolve import Direction, angles
+from groundstation.survey.wall.column_deviation import (
+    PRESETS,
+    Design,
+    Deviation,
+    Deviations,
+    deviation,
+    dominant,
+    project,
+    tolerance,
+)
+from groundstation.survey.well.trajectory import Point
 
 DEG = math.pi / 180.0
 COV = np.array([[4e-4, 1e-4, 2e-5], [1e-4, 1e-4, -3e-5], [2e-5, -3e-5, 2.5e-5]])

@@ -9,15 +9,15 @@ import numpy as np
 import pytest
 
 from groundstation.errors import SurveyError, ToolError
-from groundstation.survey.analysis import analyse
-from groundstation.survey.compiled_model import COMPILED_FROM, CompiledModel, _load, locate_many, warm, write_model
-from groundstation.survey.error_model import propagate
-from groundstation.survey.error_sources import Leg, Site, Survey
-from groundstation.survey.frames import Frame, Norths
-from groundstation.survey.instruments import Mode, Term, Tool, load_tool, shipped
-from groundstation.survey.methods import Method, positions
-from groundstation.survey.records import Record
-from node.kernels import jit
+from groundstation.survey.tools.instruments import Mode, Term, Tool, load_tool, shipped
+from groundstation.survey.well.analysis import analyse
+from groundstation.survey.well.compiled_model import COMPILED_FROM, CompiledModel, _load, locate_many, warm, write_model
+from groundstation.survey.well.error_propagation import propagate
+from groundstation.survey.well.error_sources import Leg, Site, Survey
+from groundstation.survey.well.methods import Method, positions
+from groundstation.survey.well.reference_frames import Frame, Norths
+from groundstation.survey.well.well_record import Record
+from node.kernels.arithmetic import jit
 
 SITE = Site(9.80665, 50_300.0, math.radians(68.0), math.radians(2.0), math.radians(55.0))
 

@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 from scipy.stats import chi2
 
 from groundstation.errors import SurveyError
-from groundstation.survey.ellipsoid import (
+from groundstation.survey.well.ellipsoid import (
     axes,
     check_covariance,
     coverage_radius,

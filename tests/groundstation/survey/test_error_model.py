@@ -9,10 +9,10 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from groundstation.survey.error_model import Uncertainty, propagate
-from groundstation.survey.error_sources import RECORD, Leg, Site, Survey
-from groundstation.survey.instruments import Mode, Term, Tool, load_tool, shipped
-from groundstation.survey.methods import Method, positions
+from groundstation.survey.tools.instruments import Mode, Term, Tool, load_tool, shipped
+from groundstation.survey.well.error_propagation import Uncertainty, propagate
+from groundstation.survey.well.error_sources import RECORD, Leg, Site, Survey
+from groundstation.survey.well.methods import Method, positions
 
 with warnings.catch_warnings():
     warnings.simplefilter("ignore")

@@ -7,9 +7,9 @@ import pytest
 from wells import DEG, MWD, SITE, angle_term, hand_well, tool_of, well_of
 
 from groundstation.errors import SurveyError, ToolError
-from groundstation.survey.error_model import propagate
-from groundstation.survey.error_sources import Leg, Survey
-from groundstation.survey.instruments import Mode, Term, Tool, load_tool
+from groundstation.survey.tools.instruments import Mode, Term, Tool, load_tool
+from groundstation.survey.well.error_propagation import propagate
+from groundstation.survey.well.error_sources import Leg, Survey
 
 
 @pytest.mark.parametrize("md", [-0.001, 30.001, math.nan, math.inf])

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from groundstation.errors import SurveyError
-from groundstation.survey.field_files import read_any
+from groundstation.survey.files.field_files import read_any
 
 ROWS = ((0.0, 0.0, 0.0), (100.0, 10.0, 120.5), (250.5, 30.25, 121.0))
 COMMA, SEMI, TABS = "','", "';'", "tabs"

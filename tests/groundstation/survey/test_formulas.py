@@ -13,7 +13,7 @@ from hypothesis import example, given
 from hypothesis import strategies as st
 
 from groundstation.errors import ToolError
-from groundstation.survey.formulas import ARRAY, FUNCTIONS, VARIABLES, compile_formulas, is_zero, parse
+from groundstation.survey.tools.formulas import ARRAY, FUNCTIONS, VARIABLES, compile_formulas, is_zero, parse
 
 SCALAR = SimpleNamespace(  # the same functions of plain numbers
     sin=math.sin, cos=math.cos, tan=math.tan, sqrt=math.sqrt, abs=abs, max=max, min=min,

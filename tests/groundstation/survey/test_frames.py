@@ -8,14 +8,14 @@ import pytest
 from wells import DEG, MWD
 
 from groundstation.errors import SurveyError
-from groundstation.survey.analysis import Analysis, Stretch, analyse, legs_of
-from groundstation.survey.error_model import propagate
-from groundstation.survey.error_sources import Leg, Site, Survey
-from groundstation.survey.frames import Frame, Norths, TieOn
-from groundstation.survey.instruments import load_tool
-from groundstation.survey.methods import Method, positions
-from groundstation.survey.programme import read_programme, read_tie_on
-from groundstation.survey.records import Record
+from groundstation.survey.files.programme import read_programme, read_tie_on
+from groundstation.survey.tools.instruments import load_tool
+from groundstation.survey.well.analysis import Analysis, Stretch, analyse, legs_of
+from groundstation.survey.well.error_propagation import propagate
+from groundstation.survey.well.error_sources import Leg, Site, Survey
+from groundstation.survey.well.methods import Method, positions
+from groundstation.survey.well.reference_frames import Frame, Norths, TieOn
+from groundstation.survey.well.well_record import Record
 
 SITE = Site(9.80665, 50_000.0, 72.0 * DEG, -4.0 * DEG, 60.0 * DEG)
 NORTH_OF_SITE = 10.0 * DEG

@@ -8,7 +8,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from groundstation.survey.fusion import (
+from groundstation.survey.fusion.fusion import (
     DEPARTED,
     QUADRATIC_TO,
     GrowingBayes,
@@ -21,8 +21,8 @@ from groundstation.survey.fusion import (
     sequence_weights,
     weighted,
 )
-from groundstation.survey.resolve import Direction
-from groundstation.survey.trajectory import Trajectory
+from groundstation.survey.fusion.resolve import Direction
+from groundstation.survey.well.trajectory import Trajectory
 
 DEG = math.pi / 180.0
 NOTHING = np.zeros((2, 0))

@@ -6,13 +6,13 @@ import math
 import numpy as np
 import pytest
 
-from groundstation.survey.analysis import analyse
-from groundstation.survey.error_sources import Site
-from groundstation.survey.gyro_export import as_gyro, needs_record
-from groundstation.survey.instruments import load_tool
-from groundstation.survey.iscwsa_json import parse_json, to_json
-from groundstation.survey.methods import Method
-from groundstation.survey.records import Record
+from groundstation.survey.tools.instruments import load_tool
+from groundstation.survey.tools.iscwsa_json import parse_json, to_json
+from groundstation.survey.well.analysis import analyse
+from groundstation.survey.well.error_sources import Site
+from groundstation.survey.well.gyro_export import as_gyro, needs_record
+from groundstation.survey.well.methods import Method
+from groundstation.survey.well.well_record import Record
 
 DATE = datetime.date(2026, 11, 22)
 RELAY = load_tool("relay")

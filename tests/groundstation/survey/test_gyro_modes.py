@@ -7,13 +7,13 @@ import numpy as np
 import pytest
 
 from groundstation.errors import ToolError
-from groundstation.survey.error_columns import covariance, error_columns
-from groundstation.survey.error_model import propagate
-from groundstation.survey.error_sources import EARTH_RATE, Leg, Site, Survey
-from groundstation.survey.gyro_modes import mode_weights, sections_of
-from groundstation.survey.instruments import Mode, Term, Tool, load_tool, parse_toml
-from groundstation.survey.methods import Method, positions
-from groundstation.survey.owsg import owsg_names
+from groundstation.survey.tools.instruments import Mode, Term, Tool, load_tool, parse_toml
+from groundstation.survey.tools.owsg import owsg_names
+from groundstation.survey.well.error_columns import covariance, error_columns
+from groundstation.survey.well.error_propagation import propagate
+from groundstation.survey.well.error_sources import EARTH_RATE, Leg, Site, Survey
+from groundstation.survey.well.gyro_modes import mode_weights, sections_of
+from groundstation.survey.well.methods import Method, positions
 
 with warnings.catch_warnings():
     warnings.simplefilter("ignore")

@@ -12,7 +12,17 @@ from hypothesis import example, given
 from hypothesis import strategies as st
 
 from groundstation.errors import ToolError
-from groundstation.survey.instruments import UNITS, Mode, Term, Tool, load_tool, mode_of, number, parse_toml, shipped
+from groundstation.survey.tools.instruments import (
+    UNITS,
+    Mode,
+    Term,
+    Tool,
+    load_tool,
+    mode_of,
+    number,
+    parse_toml,
+    shipped,
+)
 
 DEG = math.pi / 180.0
 SHIPPED = [

@@ -15,11 +15,11 @@ from jsonschema import Draft202012Validator
 from referencing import Registry, Resource
 
 from groundstation.errors import ToolError
-from groundstation.survey.error_model import propagate
-from groundstation.survey.error_sources import Leg, Site, Survey
-from groundstation.survey.instruments import Mode, Term, Tool, load_tool, parse_toml, shipped
-from groundstation.survey.iscwsa_json import XCL, parse_json, to_json
-from groundstation.survey.methods import Method, positions
+from groundstation.survey.tools.instruments import Mode, Term, Tool, load_tool, parse_toml, shipped
+from groundstation.survey.tools.iscwsa_json import XCL, parse_json, to_json
+from groundstation.survey.well.error_propagation import propagate
+from groundstation.survey.well.error_sources import Leg, Site, Survey
+from groundstation.survey.well.methods import Method, positions
 
 with warnings.catch_warnings():
     warnings.simplefilter("ignore")

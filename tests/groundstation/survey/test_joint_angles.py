@@ -7,8 +7,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from groundstation.survey.joint_angles import AGREEING, JointAngles, JointChange, RestingYaw
-from groundstation.survey.methods import wrap
+from groundstation.survey.bearings import wrap
+from groundstation.survey.fusion.joint_angles import AGREEING, JointAngles, JointChange, RestingYaw
 
 STRING = (4, 3, 2, 1)
 STD = math.radians(0.05)

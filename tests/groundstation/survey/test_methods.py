@@ -8,7 +8,9 @@ from hypothesis import assume, example, given
 from hypothesis import strategies as st
 
 from groundstation.errors import SurveyError
-from groundstation.survey.methods import (
+from groundstation.survey.bearings import wrap
+from groundstation.survey.fusion.resolve import Direction
+from groundstation.survey.well.methods import (
     Method,
     closure,
     dogleg,
@@ -19,10 +21,8 @@ from groundstation.survey.methods import (
     sinc,
     tangents,
     vertical_section,
-    wrap,
 )
-from groundstation.survey.resolve import Direction
-from groundstation.survey.trajectory import Trajectory, interpolate
+from groundstation.survey.well.trajectory import Trajectory, interpolate
 
 DEG = math.pi / 180.0
 ARCS = [Method.MINIMUM_CURVATURE, Method.RADIUS_OF_CURVATURE]

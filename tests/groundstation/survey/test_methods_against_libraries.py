@@ -8,11 +8,7 @@ import numpy as np
 import pytest
 import wellpathpy
 
-from groundstation.survey.methods import (
-    Method,
-    dogleg_severity,
-    positions,
-)
+from groundstation.survey.well.methods import Method, dogleg_severity, positions
 
 with warnings.catch_warnings():
     warnings.simplefilter("ignore")

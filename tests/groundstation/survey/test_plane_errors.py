@@ -9,12 +9,12 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from groundstation.survey.columns import Design
-from groundstation.survey.instruments import load_tool
-from groundstation.survey.plane_errors import PlaneErrors
-from groundstation.survey.wall_columns import Assumptions, ColumnPlan, Hole, build, fewest
-from groundstation.survey.wall_errors import COLUMNS, PLACES, parted
-from groundstation.survey.wall_file import judge_wall, read_wall
+from groundstation.survey.tools.instruments import load_tool
+from groundstation.survey.wall.column_deviation import Design
+from groundstation.survey.wall.plane_errors import PlaneErrors
+from groundstation.survey.wall.wall_columns import Assumptions, ColumnPlan, Hole, build, fewest
+from groundstation.survey.wall.wall_errors import COLUMNS, PLACES, parted
+from groundstation.survey.wall.wall_file import judge_wall, read_wall
 
 
 @given(st.integers(0, 10_000), st.integers(2, 8), st.integers(0, 40))

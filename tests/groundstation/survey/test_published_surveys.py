@@ -9,11 +9,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from groundstation.survey.compiled_model import CompiledModel
-from groundstation.survey.error_model import Uncertainty, propagate
-from groundstation.survey.error_sources import Leg, Site, Survey
-from groundstation.survey.instruments import load_tool
-from groundstation.survey.methods import Method, positions
+from groundstation.survey.tools.instruments import load_tool
+from groundstation.survey.well.compiled_model import CompiledModel
+from groundstation.survey.well.error_propagation import Uncertainty, propagate
+from groundstation.survey.well.error_sources import Leg, Site, Survey
+from groundstation.survey.well.methods import Method, positions
 
 DATA = Path(__file__).parents[2] / "data" / "survey"
 DEG = math.pi / 180.0

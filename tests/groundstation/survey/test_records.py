@@ -9,14 +9,14 @@ from hypothesis import HealthCheck, example, given, settings
 from hypothesis import strategies as st
 
 from groundstation.errors import SurveyError
-from groundstation.survey.records import (
+from groundstation.survey.files.survey_records import (
     DisplacementRule,
-    Record,
     read_columns,
     read_displacements,
     read_record,
     read_stations,
 )
+from groundstation.survey.well.well_record import Record
 
 # A 20 m bore of the thesis, Table 4.1: md_m, b_cm, a_cm and the printed inclination and azimuth
 POTSDAM = [

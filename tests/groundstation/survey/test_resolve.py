@@ -9,7 +9,7 @@ from hypothesis import example, given
 from hypothesis import strategies as st
 
 from groundstation.errors import SurveyError
-from groundstation.survey.resolve import (
+from groundstation.survey.fusion.resolve import (
     Direction,
     Quality,
     angle_stds,

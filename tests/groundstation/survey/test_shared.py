@@ -11,11 +11,11 @@ from hypothesis import given
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
-from groundstation.survey.ellipsoid import coverage_radius
-from groundstation.survey.fusion import bayes
-from groundstation.survey.resolve import Direction, Resolved, resolve
-from groundstation.survey.shared import KIND_NAMES, Fused, Packed, SharedErrors, added, widened
-from groundstation.survey.trajectory import Trajectory
+from groundstation.survey.fusion.fusion import bayes
+from groundstation.survey.fusion.resolve import Direction, Resolved, resolve
+from groundstation.survey.fusion.shared import KIND_NAMES, Fused, Packed, SharedErrors, added, widened
+from groundstation.survey.well.ellipsoid import coverage_radius
+from groundstation.survey.well.trajectory import Trajectory
 
 G = 9.81
 DEG = math.pi / 180.0

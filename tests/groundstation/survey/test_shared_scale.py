@@ -5,7 +5,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from groundstation.survey.shared_scale import FEWEST, SCALE_STD, shared_scale
+from groundstation.survey.fusion.shared_scale import FEWEST, SCALE_STD, shared_scale
 
 
 @pytest.mark.parametrize("nodes", [FEWEST, 10, 50])

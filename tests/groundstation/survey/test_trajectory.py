@@ -10,14 +10,14 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from groundstation.errors import SurveyError
-from groundstation.survey.analysis import analyse
-from groundstation.survey.error_sources import Site
-from groundstation.survey.instruments import Mode, Term, load_tool
-from groundstation.survey.kernels.position_errors import add_stations, warm_up
-from groundstation.survey.methods import Method
-from groundstation.survey.records import Record
-from groundstation.survey.resolve import Direction
-from groundstation.survey.trajectory import BLOCK, Trajectory, interpolate
+from groundstation.survey.fusion.resolve import Direction
+from groundstation.survey.tools.instruments import Mode, Term, load_tool
+from groundstation.survey.well.analysis import analyse
+from groundstation.survey.well.error_sources import Site
+from groundstation.survey.well.kernels.position_errors import add_stations, warm_up
+from groundstation.survey.well.methods import Method
+from groundstation.survey.well.trajectory import BLOCK, Trajectory, interpolate
+from groundstation.survey.well.well_record import Record
 
 DEG = math.pi / 180.0
 

@@ -13,9 +13,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
-from groundstation.survey.resolve import Direction, angle_stds, angles, known
-from groundstation.survey.trajectory import Trajectory
-from groundstation.survey.transport import Carried, carry
+from groundstation.survey.fusion.resolve import Direction, angle_stds, angles, known
+from groundstation.survey.fusion.transport import Carried, carry
+from groundstation.survey.well.trajectory import Trajectory
 from sim.world.borehole import Borehole
 from sim.world.truth import lean_rotation
 

@@ -9,11 +9,11 @@ from hypothesis import given
 from hypothesis import strategies as st
 from walls_by_sampling import uncovered
 
-from groundstation.survey.as_built import Columns, State
-from groundstation.survey.plane_errors import PlaneErrors
-from groundstation.survey.void_chance import void_chance, void_open
-from groundstation.survey.voids import power_centre, triples_of
-from groundstation.survey.wall_verdict import Kind, Verdict, judge
+from groundstation.survey.wall.as_built import Columns, State
+from groundstation.survey.wall.plane_errors import PlaneErrors
+from groundstation.survey.wall.void_chance import void_chance, void_open
+from groundstation.survey.wall.voids import power_centre, triples_of
+from groundstation.survey.wall.wall_verdict import Kind, Verdict, judge
 
 RADIUS, SPACING = 0.6, 0.81
 HEADS = np.array([[0.0, 0.0], [0.0, SPACING], [SPACING, 0.0], [SPACING, SPACING]])

@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from groundstation.survey.voids import power_centre, voids
+from groundstation.survey.wall.voids import power_centre, voids
 
 
 def square_grid(count: int, spacing: float) -> np.ndarray:

@@ -12,12 +12,12 @@ from scipy.special import ndtr
 from scipy.stats import ncx2
 
 from groundstation.errors import SurveyError
-from groundstation.survey.as_built import Columns, Cut, cut
-from groundstation.survey.joints import extra_column, joints, neighbours_in_grid, neighbours_in_line, worst
-from groundstation.survey.methods import Method, positions, tangents
-from groundstation.survey.plane_errors import PlaneErrors
-from groundstation.survey.trajectory import Point, on_arc
-from groundstation.survey.wall import largest_distance, margin, probability_beyond, thickness
+from groundstation.survey.wall.as_built import Columns, Cut, cut
+from groundstation.survey.wall.column_joint import largest_distance, margin, probability_beyond, thickness
+from groundstation.survey.wall.plane_errors import PlaneErrors
+from groundstation.survey.wall.wall_joints import extra_column, joints, neighbours_in_grid, neighbours_in_line, worst
+from groundstation.survey.well.methods import Method, positions, tangents
+from groundstation.survey.well.trajectory import Point, on_arc
 
 DEG = math.pi / 180.0
 RADIUS, SPACING, REQUIRED, LENGTH = 0.60, 0.75, 0.80, 30.0

@@ -7,9 +7,9 @@ import numpy as np
 import pytest
 
 from groundstation.errors import SurveyError
-from groundstation.survey.as_built import State
-from groundstation.survey.wall_file import Wall, judge_wall, read_wall
-from groundstation.survey.wall_verdict import Judgement, Kind, Verdict
+from groundstation.survey.wall.as_built import State
+from groundstation.survey.wall.wall_file import Wall, judge_wall, read_wall
+from groundstation.survey.wall.wall_verdict import Judgement, Kind, Verdict
 
 DEG = math.pi / 180.0
 HOLE = "{0},0,{1},{2}\n{0},10,{1},{2}\n{0},{3},{1},{2}\n"

@@ -6,19 +6,13 @@ import numpy as np
 import pytest
 from walls_by_sampling import joint_thickness, uncovered
 
-from groundstation.survey.as_built import Columns, State
-from groundstation.survey.joints import (
-    Detour,
-    joints,
-    neighbours_in_grid,
-    neighbours_in_line,
-    pair_radii,
-)
-from groundstation.survey.plane_errors import PlaneErrors
-from groundstation.survey.voids import triples_of
-from groundstation.survey.wall import largest_distance, probability_beyond, probability_thin
-from groundstation.survey.wall_system import system_probability
-from groundstation.survey.wall_verdict import Kind, Verdict, judge
+from groundstation.survey.wall.as_built import Columns, State
+from groundstation.survey.wall.column_joint import largest_distance, probability_beyond, probability_thin
+from groundstation.survey.wall.plane_errors import PlaneErrors
+from groundstation.survey.wall.voids import triples_of
+from groundstation.survey.wall.wall_joints import Detour, joints, neighbours_in_grid, neighbours_in_line, pair_radii
+from groundstation.survey.wall.wall_system import system_probability
+from groundstation.survey.wall.wall_verdict import Kind, Verdict, judge
 
 RADIUS, REQUIRED = 0.6, 0.8
 DRAWS = 200_000

@@ -10,9 +10,11 @@ from node.firmware.inputs import ImuReading, RigContext
 from node.firmware.kernel_choice import Loop, kernel_of
 from node.firmware.settings import TubeSettings
 from node.firmware.tube import Tube
-from node.kernels.cycle import run_cycle
-from node.kernels.doubts import noise_var
-from node.kernels.fixed.border import (
+from node.kernels.arithmetic.formats import CEILING, DEG, PERIOD, VAR_Q, Array
+from node.kernels.filter.fixed.cycle import run_cycle as fixed_run_cycle
+from node.kernels.filter.float64.cycle import run_cycle
+from node.kernels.filter.resets import forget_bias
+from node.kernels.record.filter_conversion import (
     LARGEST,
     config_in_integers,
     held,
@@ -22,16 +24,12 @@ from node.kernels.fixed.border import (
     state_in_integers,
     to_fixed,
 )
-from node.kernels.fixed.cycle import run_cycle as fixed_run_cycle
-from node.kernels.fixed.layout import CEILING, FIXED_STATE, VAR_Q
-from node.kernels.fixed.node import FixedNode
-from node.kernels.fixed.node_words import learn_aiding, learn_inputs, learn_node, show_node
-from node.kernels.fixed.record import new_integers
-from node.kernels.layout import DEG, PERIOD, STATE, Array, Status, default_config, new_state
-from node.kernels.record import END, JOINED, START, new_node
-from node.kernels.relay import offer_aiding
-from node.kernels.resets import forget_bias
-from node.kernels.step import (
+from node.kernels.record.filter_record import STATE, Status, default_config, new_state
+from node.kernels.record.integer_filter import FIXED_STATE
+from node.kernels.record.integer_node import new_integers
+from node.kernels.record.node_record import END, JOINED, START, new_node
+from node.kernels.step.fixed_node import FixedNode
+from node.kernels.step.node_step import (
     ONWARD,
     REFUSED,
     USED,
@@ -44,6 +42,9 @@ from node.kernels.step import (
     say_events,
     take_aiding,
 )
+from node.kernels.step.shadow_words import learn_aiding, learn_inputs, learn_node, show_node
+from node.kernels.string.relay import offer_aiding
+from node.kernels.turns.doubts import noise_var
 from sim.studies.fixed_point.run import AIDING_VAR, LIMITS, compare, inputs, rows_of
 from telemetry.messages import Aiding, NodeState
 

@@ -8,9 +8,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from node.kernels.fixed.arithmetic import bits, clamp, inverse_root, mul, quotient, reciprocal, shift
-from node.kernels.fixed.layout import FIXED_STATE
-from node.kernels.fixed.trigonometry import counts, difference, exponential, radians, sine_cosine
+from node.kernels.arithmetic.integers import bits, clamp, inverse_root, mul, quotient, reciprocal, shift
+from node.kernels.arithmetic.trigonometry import counts, difference, exponential, radians, sine_cosine
+from node.kernels.record.integer_filter import FIXED_STATE
 
 WIDE = st.integers(-(2**62) + 1, 2**62 - 1)
 TURN = 2**32

@@ -9,22 +9,23 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from node.firmware.alignment import rotation
-from node.kernels.aiding_watch import AT_ONCE, find_mismatch, forget
-from node.kernels.alignment import extreme_var, fit_circle, take_extremes, to_tube
-from node.kernels.calibration import COLDEST, HOTTEST, PARAMETERS, calibrate, identity_parameters
-from node.kernels.cluster import WEIGHT_Q, fuse
-from node.kernels.coarse_level import level_coarsely
-from node.kernels.delay import make_up_delay
-from node.kernels.fixed.border import config_in_integers, state_in_integers
-from node.kernels.fixed.extremes import variance_in_integers
-from node.kernels.fixed.layout import ANGLE_Q, FORCE_Q, RATE_Q, TIME_Q, VAR_Q, VECTOR_Q
-from node.kernels.fixed.record import FIXED_PARAMETERS, FORCE, formats_of, in_integers, scales_of
-from node.kernels.fixed.words import learn_numbers, learn_words, show_words
-from node.kernels.layout import DEG, PERIOD, default_config, new_state
-from node.kernels.quantity import NO_NUMBER, WARMTH_Q
-from node.kernels.record import AIDINGS, DELAYED, GUARD, MISMATCH, NODE
-from node.kernels.static_average import STATIC, add_static
-from node.kernels.sweep import MOST_SAMPLES, OFFSET, SWEEP, add_to_sweep
+from node.kernels.arithmetic.formats import ANGLE_Q, DEG, FORCE_Q, PERIOD, RATE_Q, TIME_Q, VAR_Q, VECTOR_Q, WEIGHT_Q
+from node.kernels.arithmetic.quantity import NO_NUMBER, WARMTH_Q
+from node.kernels.record.filter_conversion import config_in_integers, state_in_integers
+from node.kernels.record.filter_record import default_config, new_state
+from node.kernels.record.integer_node import FIXED_PARAMETERS, FORCE, formats_of, in_integers, scales_of
+from node.kernels.record.node_record import AIDINGS, DELAYED, GUARD, MISMATCH, NODE
+from node.kernels.record.sensor_record import OFFSET, PARAMETERS, STATIC, SWEEP
+from node.kernels.record.word_conversion import learn_numbers, learn_words, show_words
+from node.kernels.sensors.alignment import extreme_var, fit_circle, take_extremes, to_tube
+from node.kernels.sensors.cluster import fuse
+from node.kernels.sensors.coarse_level import level_coarsely
+from node.kernels.sensors.correction import COLDEST, HOTTEST, calibrate, identity_parameters
+from node.kernels.sensors.delay import make_up_delay
+from node.kernels.sensors.integer_extremes import variance_in_integers
+from node.kernels.sensors.static_average import add_static
+from node.kernels.sensors.sweep import MOST_SAMPLES, add_to_sweep
+from node.kernels.turns.aiding_watch import AT_ONCE, find_mismatch, forget
 
 G = 9.81
 RATE, PULL = st.floats(-9.0, 9.0), st.floats(-16.0 * G, 16.0 * G)

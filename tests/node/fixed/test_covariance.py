@@ -5,13 +5,14 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from node.kernels.cycle import run_cycle
-from node.kernels.fixed.error_model import hold, widen
-from node.kernels.fixed.layout import CEILING, FIXED_STATE, VAR_Q
-from node.kernels.fixed.node import FixedNode
-from node.kernels.fixed.update import innovation_var, joseph
-from node.kernels.layout import DEG, PERIOD, STATES, Err, Status, default_config, new_state
-from node.kernels.relay import offer_aiding
+from node.kernels.arithmetic.formats import CEILING, DEG, PERIOD, VAR_Q
+from node.kernels.filter.fixed.propagation import hold, widen
+from node.kernels.filter.fixed.update import innovation_var, joseph
+from node.kernels.filter.float64.cycle import run_cycle
+from node.kernels.record.filter_record import STATES, Err, Status, default_config, new_state
+from node.kernels.record.integer_filter import FIXED_STATE
+from node.kernels.step.fixed_node import FixedNode
+from node.kernels.string.relay import offer_aiding
 
 G = 9.81
 

@@ -7,9 +7,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from node.kernels import strapdown
-from node.kernels.fixed.layout import RATE_Q, TIME_Q, VECTOR_Q
-from node.kernels.fixed.strapdown import half_turn, normalise, rotate_down, yaw_rate
+from node.kernels.arithmetic.formats import RATE_Q, TIME_Q, VECTOR_Q
+from node.kernels.filter.fixed.strapdown import half_turn, normalise, rotate_down, yaw_rate
+from node.kernels.filter.float64 import strapdown
 
 ONE = 2.0**VECTOR_Q
 

@@ -15,15 +15,15 @@ from typing import Any
 import numba
 import pytest
 
-from node.kernels.fixed.node import warm_up
-from node.kernels.fixed.step import integer_aiding, integer_step
+from node.kernels.step.fixed_node import warm_up
+from node.kernels.step.fixed_step import integer_aiding, integer_step
 
 INSPECTOR = """
 import re, sys
 import numba
 from numba.core import types
 from numba.core.dispatcher import Dispatcher
-from node.kernels.fixed.arithmetic import mul
+from node.kernels.arithmetic.integers import mul
 
 FLOAT = re.compile(r"\\b(double|float|half|bfloat|x86_fp80|fp128)\\b")
 
@@ -59,8 +59,8 @@ def functions():
     return [function for function in dict.fromkeys(found) if function.overloads]
 """
 STEP = """
-from node.kernels.fixed.record import new_integers
-from node.kernels.fixed.step import integer_aiding, integer_step
+from node.kernels.record.integer_node import new_integers
+from node.kernels.step.fixed_step import integer_aiding, integer_step
 
 integers = new_integers()
 nodes, crews, own = integers["node"], integers["settings"], integers[0]
@@ -96,8 +96,8 @@ for function in (clean, leaky, divided):
 
 FLOATS_ONLY = """
 import numba
-from node.kernels.angles import HALF_TURN, wrap
-from node.kernels.quantity import ConstantType
+from node.kernels.arithmetic.angles import HALF_TURN, wrap
+from node.kernels.arithmetic.quantity import ConstantType
 
 def refuse(_):
     raise TypeError("an integer")
@@ -105,7 +105,7 @@ def refuse(_):
 ConstantType.fixed = property(refuse, lambda *_: None)
 """
 FLOAT_STEP = """
-from node.kernels.warm import warm_up
+from node.kernels.step.warm import warm_up
 warm_up()
 print("all floats")
 """

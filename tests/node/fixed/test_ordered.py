@@ -10,13 +10,13 @@ from one_node import events_since, node_of
 
 from node.firmware.alignment import rotation
 from node.firmware.static_record import MOVED, begin_record
-from node.kernels.aligner import Reason, begin_alignment, drop_alignment
-from node.kernels.alignment import CIRCLE, EXTREMES
-from node.kernels.fixed.node import FixedNode
-from node.kernels.layout import DEG, PERIOD
-from node.kernels.record import READING, SATURATED
-from node.kernels.static_average import has_moved
-from node.kernels.step import SAY_RECORD, node_aiding, node_step
+from node.kernels.arithmetic.formats import DEG, PERIOD
+from node.kernels.record.node_record import READING, SATURATED
+from node.kernels.sensors.aligner import Reason, begin_alignment, drop_alignment
+from node.kernels.sensors.alignment import CIRCLE, EXTREMES
+from node.kernels.sensors.static_average import has_moved
+from node.kernels.step.fixed_node import FixedNode
+from node.kernels.step.node_step import SAY_RECORD, node_aiding, node_step
 
 G = 9.81
 NOISE = 0.02 * DEG

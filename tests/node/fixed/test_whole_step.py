@@ -7,10 +7,11 @@ import numpy as np
 import pytest
 from one_node import events_since, node_of
 
-from node.kernels.fixed.node import FixedNode
-from node.kernels.layout import DEG, PARTS, PERIOD
-from node.kernels.record import AIDING, MOMENT, READING
-from node.kernels.step import node_aiding, node_step
+from node.kernels.arithmetic.formats import DEG, PERIOD
+from node.kernels.record.filter_record import PARTS
+from node.kernels.record.node_record import AIDING, MOMENT, READING
+from node.kernels.step.fixed_node import FixedNode
+from node.kernels.step.node_step import node_aiding, node_step
 from sim.studies.fixed_point.run import LIMITS
 
 CYCLES, BLOCK, TURNING = 3000, 400, 180

@@ -11,12 +11,13 @@ from node.firmware.inputs import ImuReading, RigContext
 from node.firmware.kernel_choice import kernel_of
 from node.firmware.settings import TubeSettings
 from node.firmware.tube import Tube
-from node.kernels.error_model import BX, PSI, TX, TY
-from node.kernels.layout import DEG, PERIOD, STATES, Array, Err, Status, default_config, new_state
+from node.kernels.arithmetic.formats import DEG, PERIOD, Array
+from node.kernels.filter.float64.propagation import BX, PSI, TX, TY
 from node.kernels.published import cycle as published
 from node.kernels.published.euler import error_rates, euler_rates, geometry_of, point_down, propagate, tilt_of
 from node.kernels.published.step import published_aiding, published_step
-from node.kernels.record import new_node
+from node.kernels.record.filter_record import STATES, Err, Status, default_config, new_state
+from node.kernels.record.node_record import new_node
 from telemetry.messages import Aiding, Event, NodeFlag, NodeState
 
 G = 9.81
@@ -245,7 +246,7 @@ def test_a_reading_that_is_no_number_changes_nothing() -> None:
 
 
 def test_a_restart_goes_on_from_the_output() -> None:
-    from node.kernels.resets import resume
+    from node.kernels.filter.resets import resume
 
     config = default_config()
     states = new_state(config)

@@ -26,7 +26,7 @@ from groundstation.service.orders.recalibration.recalibration_progress import (
     tube_view,
 )
 from groundstation.service.orders.recalibration.solution import Proposal, propose, propose_bias
-from groundstation.survey.force_biases import SurveyedBiases
+from groundstation.survey.fusion.force_biases import SurveyedBiases
 from telemetry.messages import BlockStatus, NodeState, Reply, Scalar, StaticRecord, UploadPhase
 from telemetry.parameters import SHORT_HASH, ParameterBlock
 

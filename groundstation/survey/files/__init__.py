@@ -1,0 +1,1 @@
+"""Survey records and programmes as files."""

@@ -1,0 +1,299 @@
+"""Errors that readings share: the accelerometer biases and the mount of a tube, the marks of a joint.
+
+A tube keeps its IMU and a closed joint its reading, so two readings err alike as far as they have these in common.
+Each such error is one column; a reading's column is the change of its lean for one standard deviation. Whatever is
+linear in the readings (a fused station, a position) carries the same columns, and its covariance is their product with
+themselves.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from itertools import pairwise
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from groundstation.survey.fusion.resolve import Direction, Resolved
+
+Array = npt.NDArray[np.float64]
+Places = npt.NDArray[np.intp]
+Name = tuple[str | int, ...]
+AXES = 3  # of an accelerometer
+CAUSES = 2 + AXES  # of the columns of a reading: mount, joint, and each axis
+MOST_OF_16_BITS = 1 << 16
+KINDS = {"mount": "mounts", "joint": "joints", "drive": "joints", "string": "joints", "bias": "accelerometer_bias"}
+KIND_NAMES = sorted(set(KINDS.values()))
+TRANSPORT = "transport"  # of columns that random errors share; they are of no kind
+
+
+class Reading(Direction):
+    """Direction of one tube's stop. Its columns are made when they are asked for, out of what all of them come from.
+
+    The mount, each joint and the three axes of the accelerometer: that is five columns, of which that of a joint stands
+    at the place of every joint above. Fifty tubes share 250 errors, and a ground station keeps every reading.
+    """
+
+    __slots__ = ("_information", "causes", "places", "width")
+    _information: Array | None
+    causes: Array
+    places: Places
+    width: int
+
+    def __init__(
+        self, bare: Direction, causes: Array, places: Places, width: int, information: Array | None = None
+    ) -> None:
+        """``causes`` (2, 5); ``places`` of the mount, the joints and the axes, among the ``width`` errors known."""
+        for name in ("lean", "down", "cov"):
+            object.__setattr__(self, name, getattr(bare, name))
+        object.__setattr__(self, "causes", causes)
+        object.__setattr__(self, "places", places)
+        object.__setattr__(self, "width", width)
+        object.__setattr__(self, "_information", information)
+
+    @property
+    def shared(self) -> Array:
+        """Columns (2, s), made anew."""
+        columns = np.zeros((2, self.width))
+        self.fill(columns)
+        return columns
+
+    def fill(self, columns: Array) -> None:
+        """Put the columns into zeros (2, s or more)."""
+        put_columns(columns, self.causes, self.places)
+
+    @property
+    def information(self) -> Array:
+        """Inverse (2, 2) of ``total_cov``, worked out once."""
+        known = self._information
+        if known is None:
+            known = super().information
+            object.__setattr__(self, "_information", known)
+        return known
+
+
+def put_columns(columns: Array, causes: Array, places: Places) -> None:
+    """Put the columns of a reading into zeros (2, s): mount, every joint alike, and the axes, from (2, 5)."""
+    columns[:, places[0]] = causes[:, 0]
+    columns[:, places[1:-AXES]] = causes[:, 1:2]
+    columns[:, places[-AXES:]] = causes[:, -AXES:]
+
+
+def columns_of(causes: Array, places: Sequence[Places], width: int) -> Array:
+    """Columns (n, 2, width) of several readings, from (n, 2, 5) and the places of each."""
+    columns = np.zeros((len(causes), 2, width))
+    counts = np.array([len(own) for own in places])
+    ends = counts.cumsum()
+    cause = np.ones(ends[-1], np.intp)  # of a place: every joint alike
+    cause[ends - counts] = 0
+    for axis in range(AXES):
+        cause[ends - AXES + axis] = CAUSES - AXES + axis
+    reading = np.repeat(np.arange(len(causes)), counts)
+    columns[reading, :, np.concatenate(places)] = causes[reading, :, cause]
+    return columns
+
+
+class Packed:
+    """Columns (k, s) of which most are zero: a station knows those of the tubes that passed it, of a hundred tubes."""
+
+    __slots__ = ("_places", "_values", "_width")
+
+    def __init__(self, columns: Array, places: Places | None = None) -> None:
+        """``places`` of those that are not zero, where they are known."""
+        places = np.flatnonzero(columns.any(axis=0)) if places is None else places
+        self._places = places.astype(np.uint16 if columns.shape[1] <= MOST_OF_16_BITS else np.intp)
+        self._values = columns.take(places, axis=1)
+        self._width = int(columns.shape[1])
+
+    @property
+    def width(self) -> int:
+        """How many there are."""
+        return self._width
+
+    @property
+    def places(self) -> npt.NDArray[Any]:
+        """Places (c,) of those that may not be zero."""
+        return self._places
+
+    @property
+    def values(self) -> Array:
+        """What stands there, (k, c)."""
+        return self._values
+
+    def under(self, matrix: Array) -> Packed:
+        """What a matrix (j, k) makes of them: (j, s)."""
+        made = Packed.__new__(Packed)
+        made._places, made._values, made._width = self._places, matrix @ self._values, self._width
+        return made
+
+    def columns(self) -> Array:
+        """All of them (k, s), made anew."""
+        columns = np.zeros((len(self._values), self._width))
+        self.fill(columns)
+        return columns
+
+    def fill(self, columns: Array) -> None:
+        """Put them into zeros (k, s or more)."""
+        columns[:, self._places] = self._values
+
+
+def packed_each(columns: Array) -> list[Packed]:
+    """Columns (n, k, s) of several, each packed by itself."""
+    are_some = np.asarray(columns.any(axis=1))
+    return [Packed(own, some.nonzero()[0]) for own, some in zip(columns, are_some, strict=True)]
+
+
+class Fused(Direction):
+    """Direction from several readings; its columns are kept packed."""
+
+    __slots__ = ("_packed",)
+    _packed: Packed
+
+    def __init__(self, lean: Array, down: float, cov: Array, packed: Packed) -> None:
+        for name, value in (("lean", lean), ("down", down), ("cov", cov), ("_packed", packed)):
+            object.__setattr__(self, name, value)
+
+    @property
+    def shared(self) -> Array:
+        """Columns (2, s), made anew."""
+        return self._packed.columns()
+
+    @property
+    def packed(self) -> Packed:
+        """Columns as they are kept."""
+        return self._packed
+
+    @property
+    def width(self) -> int:
+        """How many columns there are."""
+        return self._packed.width
+
+    def fill(self, columns: Array) -> None:
+        """Put the columns into zeros (2, s or more)."""
+        self._packed.fill(columns)
+
+
+def packed_of(direction: Direction) -> Packed:
+    """Columns of any direction, packed."""
+    return direction.packed if isinstance(direction, Fused) else Packed(direction.shared)
+
+
+class SharedErrors:
+    """The columns, in the order in which they were met."""
+
+    def __init__(self) -> None:
+        self._columns: dict[Name, int] = {}
+        self._places: dict[str, list[int]] = {}  # of the columns of each kind, in the order of their coming
+        self._known: dict[tuple[int, ...] | int, Places] = {}  # by a tube and those above it, or a tube alone
+        self._transport: list[int] = []
+
+    def __len__(self) -> int:
+        return len(self._columns)
+
+    def reading(
+        self,
+        resolved: Resolved,
+        tube: int,
+        above: Sequence[int] | None,
+        systematic_var: float,
+        mount_var: float,
+        force_bias_std: float,
+    ) -> Reading:
+        """Direction of a reading with its columns.
+
+        Parameters
+        ----------
+        resolved : the stop
+        tube : whose node read
+        above : tubes above it, lowest first; None when the order of the string is not known
+        systematic_var, mount_var : rad^2, of the yaw: all constant errors, and the part of the tube's own mount
+        force_bias_std : m/s^2, of each axis of the accelerometer, left after calibration
+        """
+        mount_var = min(mount_var, systematic_var)
+        places = self._places_of(tube, above)
+        each = math.sqrt((systematic_var - mount_var) / (len(places) - 1 - AXES))
+        causes = np.empty((2, CAUSES))
+        causes[:, 0] = math.sqrt(mount_var) * resolved.by_yaw
+        causes[:, 1] = each * resolved.by_yaw
+        causes[:, 2:] = force_bias_std * resolved.by_force
+        return Reading(resolved.direction, causes, places, len(self._columns))
+
+    def variances(self, columns: Array) -> Array:
+        """Variances (n, kinds, k) of what has these columns (n, k, s), by kind in the order of ``KIND_NAMES``."""
+        members = np.zeros((columns.shape[-1], len(KIND_NAMES)))
+        for number, name in enumerate(KIND_NAMES):
+            places = np.array(self._places.get(name, ()), np.intp)
+            members[places[places < len(members)], number] = 1.0
+        return np.asarray(members.T @ np.swapaxes(columns**2, -1, -2))
+
+    def transport_places(self, count: int) -> list[int]:
+        """Places of so many columns of the transport in a bent hole, see ``groundstation.survey.fusion.transport``."""
+        while len(self._transport) < count:
+            self._transport.append(self._place_of((TRANSPORT, len(self._transport))))
+        return self._transport[:count]
+
+    def _places_of(self, tube: int, above: Sequence[int] | None) -> Places:
+        """Places of the errors of a tube, kept once for all of its readings in one string."""
+        string = tube if above is None else (tube, *above)
+        known = self._known.get(string)
+        if known is None:
+            chain = self._chain(tube, above)
+            names: list[Name] = [("mount", tube), *chain, *(("bias", tube, axis) for axis in range(AXES))]
+            known = self._known[string] = np.array([self._place_of(name) for name in names], np.intp)
+        return known
+
+    def _place_of(self, name: Name) -> int:
+        """Place of the column of an error, the next one where it is met for the first time."""
+        if name not in self._columns:
+            self._columns[name] = len(self._columns)
+            if (kind := KINDS.get(str(name[0]))) is not None:
+                self._places.setdefault(kind, []).append(self._columns[name])
+        return self._columns[name]
+
+    @staticmethod
+    def _chain(tube: int, above: Sequence[int] | None) -> list[Name]:
+        """Joints between the drive head and a tube. A node reports the sum of their variances, not its parts."""
+        if above is None:
+            return [("string",)]
+        names = [tube, *above]
+        inner: list[Name] = [("joint", upper, lower) for lower, upper in pairwise(names)]
+        return [*inner, ("drive", names[-1])]
+
+
+def stacked(directions: Sequence[Direction], width: int) -> Array:
+    """Columns (n, 2, width) of directions, with zeros for those that one does not know."""
+    columns = np.zeros((len(directions), 2, width))
+    for own, direction in zip(columns, directions, strict=True):
+        direction.fill(own)
+    return columns
+
+
+def weigh_together(readings: Sequence[Reading]) -> None:
+    """Work out the information of many readings at once, bit for bit as each by itself.
+
+    Raises
+    ------
+    numpy.linalg.LinAlgError
+        When one of them has none; then none is known.
+    """
+    if not readings:
+        return
+    causes, places = np.array([one.causes for one in readings]), [one.places for one in readings]
+    shared = columns_of(causes, places, max(one.width for one in readings))
+    covs = np.array([one.cov for one in readings]) + shared @ shared.transpose(0, 2, 1)
+    for one, information in zip(readings, np.linalg.inv(covs), strict=True):
+        object.__setattr__(one, "_information", information)
+
+
+def widened(shared: Array, columns: int) -> Array:
+    """The same columns with zeros for those met later: (k, columns)."""
+    missing = columns - shared.shape[1]
+    return shared if missing == 0 else np.concatenate([shared, np.zeros((shared.shape[0], missing))], axis=1)
+
+
+def added(one: Array, other: Array) -> Array:
+    """Sum of two sets of columns of different width."""
+    columns = max(one.shape[1], other.shape[1])
+    return widened(one, columns) + widened(other, columns)

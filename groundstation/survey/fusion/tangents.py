@@ -1,0 +1,26 @@
+"""Downhole unit vectors of directions, and how they follow from the lean. Frame: north, east, down."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+import numpy.typing as npt
+
+from groundstation.survey.fusion.resolve import Direction
+
+Array = npt.NDArray[np.float64]
+
+
+def tangents_of(directions: Sequence[Direction]) -> Array:
+    """Downhole unit vectors (n, 3)."""
+    return np.array([(*direction.lean.tolist(), direction.down) for direction in directions]).reshape(-1, 3)
+
+
+def tangent_jacobians(tangents: Array) -> Array:
+    """D tangent / d lean (n, 3, 2); the vertical part follows from the unit length."""
+    down = np.copysign(np.maximum(np.abs(tangents[:, 2]), 1e-6), tangents[:, 2])
+    jacobians = np.zeros((len(tangents), 3, 2))
+    jacobians[:, 0, 0] = jacobians[:, 1, 1] = 1.0
+    jacobians[:, 2] = -tangents[:, :2] / down[:, None]
+    return jacobians

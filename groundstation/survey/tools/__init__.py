@@ -1,0 +1,1 @@
+"""Instrument performance models: terms, weighting functions as text, and the data files of the tools."""

@@ -1,0 +1,1 @@
+"""Walls, shafts and grids of bored columns: joints, voids, verdict."""

@@ -1,0 +1,253 @@
+"""Is the column where it should be? Deviation from the design axis, tolerance, projection to the target.
+
+A design axis is a straight line from its head. At a depth along it the deviation is the part of the offset across it.
+For near-vertical columns inclination matters far more than azimuth; ``Dominant`` says which of the two does here.
+Source: EN 12716 for the preset of that name; thesis chapter 1 for 0.27 deg. Frame: north, east, down; m and rad.
+"""
+
+from __future__ import annotations
+
+import math
+import re
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+import numpy.typing as npt
+
+from groundstation.errors import SurveyError
+from groundstation.survey.fusion.resolve import Direction, angle_stds, angles
+from groundstation.survey.well.trajectory import Point
+
+Array = npt.NDArray[np.float64]
+STEEPEST = 0.05  # cosine between hole and axis, below which the hole does not come to the target's depth
+ROUNDED = 1e-12  # of a ratio
+LEVELS = (0.5, 0.8, 1.0)  # of the tolerance, at which an alarm is due
+
+
+@dataclass(frozen=True, slots=True)
+class Tolerance:
+    """Allowed deviation: ``start`` (m) at the head and ``growth`` (m/m) along the axis."""
+
+    name: str
+    start: float
+    growth: float
+
+    def at(self, along: float) -> float:
+        """Limit (m) at a length along the axis."""
+        return self.start + self.growth * along
+
+
+PRESETS = {
+    "en-12716": Tolerance("en-12716", 0.05, 0.02),
+    "5-cm": Tolerance("5-cm", 0.05, 0.0),
+    "0.27-deg": Tolerance("0.27-deg", 0.0, math.tan(math.radians(0.27))),
+}
+
+
+NUMBER = r"(\d+(?:\.\d+)?)"
+METRES = {"mm": 1e-3, "cm": 1e-2, "m": 1.0}
+# parts of a tolerance: what it adds at the head (m) and a metre of length (m/m)
+PARTS: list[tuple[str, Callable[[tuple[str, ...]], tuple[float, float]]]] = [
+    (rf"{NUMBER} ?(mm|cm|m) at {NUMBER} ?m", lambda g: (0.0, float(g[0]) * METRES[g[1]] / float(g[2]))),
+    (rf"{NUMBER} ?(mm|cm|m)", lambda g: (float(g[0]) * METRES[g[1]], 0.0)),
+    (rf"1 ?: ?{NUMBER}", lambda g: (0.0, 1.0 / float(g[0]))),
+    (rf"{NUMBER} ?%", lambda g: (0.0, float(g[0]) / 100.0)),
+    (rf"{NUMBER} ?deg", lambda g: (0.0, math.tan(math.radians(float(g[0]))))),
+]
+
+
+def tolerance(name: str) -> Tolerance:
+    """Preset by its name, or a sum of parts: ``50 mm + 1:200``, ``75 mm at 20 m``, ``1.5 %``, ``0.3 deg``.
+
+    Raises
+    ------
+    SurveyError
+        Names the presets and the forms.
+    """
+    if name in PRESETS:
+        return PRESETS[name]
+    start = growth = 0.0
+    for part in name.split("+"):
+        for pattern, values in PARTS:
+            match = re.fullmatch(pattern, part.strip())
+            if match is not None and all(float(text) > 0.0 for text in match.groups() if text not in METRES):
+                more = values(match.groups())
+                start, growth = start + more[0], growth + more[1]
+                break
+        else:
+            raise SurveyError(
+                "tolerance, by its name or as a sum like '50 mm + 1:200', '75 mm at 20 m', '1.5 %' or '0.3 deg': "
+                f"expected one of {', '.join(PRESETS)}, got {name!r}"
+            )
+    return Tolerance(name, start, growth)
+
+
+@dataclass(frozen=True)  # with a dictionary, for what is worked out once
+class Design:
+    """Axis of a column and what it is to become."""
+
+    name: str = "column"
+    head: tuple[float, float, float] = (0.0, 0.0, 0.0)  # m, in the frame of the trajectory
+    inclination: float = 0.0
+    azimuth: float = 0.0
+    length: float = 30.0  # m along the axis
+    radius: float = 0.6  # m, of the finished column
+    tolerance: Tolerance = PRESETS["en-12716"]
+
+    @cached_property
+    def axis(self) -> Array:
+        """Unit vector (3,) down the axis."""
+        s = math.sin(self.inclination)
+        return np.array([s * math.cos(self.azimuth), s * math.sin(self.azimuth), math.cos(self.inclination)])
+
+    @cached_property
+    def across(self) -> Array:
+        """Two unit vectors (2, 3) across the axis; for a vertical one they are north and east."""
+        c = math.cos(self.inclination)
+        a = np.array([c * math.cos(self.azimuth), c * math.sin(self.azimuth), -math.sin(self.inclination)])
+        b = np.array([-math.sin(self.azimuth), math.cos(self.azimuth), 0.0])
+        turn = np.array(
+            [[math.cos(self.azimuth), -math.sin(self.azimuth)], [math.sin(self.azimuth), math.cos(self.azimuth)]]
+        )
+        return np.asarray(turn @ np.stack([a, b]))
+
+
+@dataclass(frozen=True, slots=True)
+class Deviation:
+    """Where the column is against its design at one point."""
+
+    md: float
+    along: float  # m along the design axis
+    offset: Array  # (2,) m across the axis; north and east for a vertical one
+    cov: Array  # (2, 2) m^2
+    limit: float  # m
+
+    @property
+    def size(self) -> float:
+        """Distance (m) from the axis."""
+        return math.hypot(self.offset[0], self.offset[1])
+
+    @property
+    def std(self) -> float:
+        """Standard deviation (m) of the distance, along the offset (of the worst direction without one)."""
+        if self.size < 1e-9:
+            return math.sqrt(max(float(np.linalg.eigvalsh(self.cov)[-1]), 0.0))
+        unit = self.offset / self.size
+        return math.sqrt(max(float(unit @ self.cov @ unit), 0.0))
+
+    @property
+    def ratio(self) -> float:
+        """Share of the tolerance that is used up."""
+        return self.size / self.limit if self.limit > 0.0 else (math.inf if self.size > 0.0 else 0.0)
+
+    @property
+    def level(self) -> float:
+        """Highest alarm level reached, 0 for none."""
+        return max((level for level in LEVELS if self.ratio >= level), default=0.0)
+
+
+@dataclass(frozen=True, slots=True)
+class Deviations:
+    """Deviations of points along a hole, numbers side by side: each is an object where somebody looks at it."""
+
+    md: Array  # (n,)
+    along: Array  # (n,)
+    offset: Array  # (n, 2)
+    cov: Array  # (n, 2, 2)
+    limit: Array  # (n,)
+
+    def __len__(self) -> int:
+        return len(self.md)
+
+    def __getitem__(self, place: int) -> Deviation:
+        md, along, limit = (float(values[place]) for values in (self.md, self.along, self.limit))
+        return Deviation(md, along, self.offset[place], self.cov[place], limit)
+
+    def __iter__(self) -> Iterator[Deviation]:
+        rows = zip(self.md.tolist(), self.along.tolist(), self.offset, self.cov, self.limit.tolist(), strict=True)
+        return (Deviation(*row) for row in rows)
+
+    def worst(self, first: int = 0) -> Deviation | None:
+        """The worst from a place on, by the share of the tolerance used, the first of equals; None of none."""
+        limit = self.limit[first:]
+        size = np.hypot(self.offset[first:, 0], self.offset[first:, 1])
+        infinite = np.where(size > 0.0, np.inf, 0.0)
+        ratio = np.where(limit > 0.0, size / np.where(limit > 0.0, limit, 1.0), infinite)
+        # of the few that come near it each says itself how large it is: two ways of rounding must not part them
+        near = np.flatnonzero(ratio >= (1.0 - ROUNDED) * ratio.max(initial=0.0)).tolist()
+        return max((self[first + place] for place in near), key=lambda one: one.ratio, default=None)
+
+
+def deviations(md: Array, positions: Array, covs: Array, design: Design) -> Deviations:
+    """Deviation of points at depths (n,), m, with positions (n, 3) and their covariances (n, 3, 3)."""
+    offsets = positions - np.array(design.head)
+    # number by number: in a product of matrices the last bits of one point depend on how many others there are
+    along, first, second = ((offsets * unit).sum(axis=1) for unit in (design.axis, *design.across))
+    across = np.stack([first, second], axis=1)
+    limit = design.tolerance.start + design.tolerance.growth * np.maximum(along, 0.0)
+    return Deviations(md.copy(), along, across, design.across @ covs @ design.across.T, limit)
+
+
+def deviation(point: Point, design: Design) -> Deviation:
+    """Deviation of one point."""
+    return deviations(np.array([point.md]), point.position[None], point.cov[None], design)[0]
+
+
+def project(point: Point, direction: Direction, design: Design) -> Deviation:
+    """Deviation at the target if the hole goes on straight from a point; its uncertainty grows with the way.
+
+    The direction's own error and that of the position are taken as one (fully correlated), for the last station is in
+    both: the larger of the two possible answers.
+    """
+    offset = point.position - np.array(design.head)
+    axis, across = design.axis, design.across
+    along = float(point.tangent @ axis)
+    if along < STEEPEST:
+        return deviation(point, design)
+    rest = (design.length - float(offset @ axis)) / along
+    target = offset + rest * point.tangent
+    if rest <= 0.0:
+        return deviation(point, design)
+    # an error along the axis changes how far there is to go: what counts is its trace on the target's plane
+    across = across @ (np.eye(3) - np.outer(point.tangent, axis) / along)
+    down = math.copysign(max(abs(direction.down), 1e-6), direction.down)
+    jacobian = rest * (
+        across @ np.array([[1.0, 0.0], [0.0, 1.0], [-direction.lean[0] / down, -direction.lean[1] / down]])
+    )
+    turned = jacobian @ direction.total_cov @ jacobian.T
+    here = across @ point.cov @ across.T
+    root = _root(here) + _root(turned)
+    return Deviation(
+        point.md + rest, design.length, design.across @ target, root @ root.T, design.tolerance.at(design.length)
+    )
+
+
+def _root(cov: Array) -> Array:
+    values, vectors = np.linalg.eigh(cov)
+    return np.asarray(vectors * np.sqrt(np.maximum(values, 0.0)) @ vectors.T)
+
+
+@dataclass(frozen=True, slots=True)
+class Dominant:
+    """Which angle the position of a column hangs on: lateral error (m) of each, over its length."""
+
+    by_inclination: float
+    by_azimuth: float
+
+    @property
+    def name(self) -> str:
+        """``inclination`` or ``azimuth``.
+
+        A tilt errs alike along and across the lean, so its error is in both numbers: the azimuth dominates when what it
+        adds to the tilt's is more than that.
+        """
+        return "azimuth" if self.by_azimuth > math.sqrt(2.0) * self.by_inclination else "inclination"
+
+
+def dominant(direction: Direction, length: float) -> Dominant:
+    """Lateral errors L cos I sigma_I and L sin I sigma_A of a hole that leans all along like ``direction``."""
+    inclination, _ = angles(direction.lean, direction.down)
+    std_i, std_a = angle_stds(direction.lean, direction.down, direction.total_cov)
+    return Dominant(length * abs(math.cos(inclination)) * std_i, length * math.sin(inclination) * std_a)

@@ -1,0 +1,346 @@
+"""A wall as files: what is required of it (TOML), where its columns stand and how they were surveyed (CSV).
+
+Every file a wall file names lies beside it. What a column does not say of itself is that of the wall.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import math
+import tomllib
+from dataclasses import dataclass
+from datetime import date
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from groundstation.errors import SurveyError
+from groundstation.survey.tools.instruments import Tool, load_tool
+from groundstation.survey.wall.as_built import Columns
+from groundstation.survey.wall.closing import Stage, stages
+from groundstation.survey.wall.column_deviation import Tolerance, tolerance
+from groundstation.survey.wall.column_joint import largest_distance
+from groundstation.survey.wall.wall_columns import Assumptions, BuiltWall, ColumnPlan, Hole, Layer, build
+from groundstation.survey.wall.wall_joints import Detour, neighbours_in_grid, neighbours_in_line
+from groundstation.survey.wall.wall_tables import Defaults, Remedy, read_heads, read_holes
+from groundstation.survey.wall.wall_verdict import Judgement, judge
+from groundstation.survey.well.depth_reference import DEPTHS_FROM
+from groundstation.survey.well.error_sources import Site
+from groundstation.survey.well.methods import Method
+from groundstation.survey.well.reference_frames import NORTHS
+
+LAYOUTS = ("line", "shaft", "grid")
+NEEDED = ("radius_m", "thickness_m", "heads", "stations")
+SIGNED = ("project", "client", "calibration", "north", "height_datum")  # of the report alone
+DEPTHS = ("depth_reference", "answer_depth_reference")
+TEXTS = ("name", "heads", "stations", "layout", "tolerance", "instrument", "serial", "method", *SIGNED, *DEPTHS)
+REFERENCE_HEIGHT = "depth_reference_height_m"
+ORIGIN = ("northing_m", "easting_m", "height_m")
+POSITIVE = ("radius_m", "thickness_m", "spacing_m", "length_m", "depth_step_m", "gravity_mps2", "allowed_probability")
+NOT_NEGATIVE = (
+    "radius_cv", "radius_correlation", "head_sigma_m", "unsurveyed_percent", "inclination_deg", "azimuth_deg",
+)  # fmt: skip
+MOST = {
+    "allowed_probability": 0.5, "radius_cv": 0.5, "radius_correlation": 1.0, "unsurveyed_percent": 100.0,
+    "inclination_deg": 180.0, "azimuth_deg": 360.0,
+}  # fmt: skip
+LAYER_KEYS = ("from_m", "radius_m", "radius_cv")
+
+
+@dataclass(frozen=True, slots=True)
+class WallFile:
+    """Requirements of a wall; m and rad."""
+
+    path: Path
+    name: str
+    radius: float
+    thickness: float
+    layout: str
+    spacing: float | None
+    length: float | None
+    allowed: float  # probability
+    tolerance: Tolerance
+    tool: Tool
+    serial: str
+    head_std: float
+    inclination: float
+    azimuth: float
+    assumed: Assumptions
+    heads: Path
+    stations: Path
+    project: str = ""
+    client: str = ""
+    calibration: str = ""  # certificate of the instrument
+    north: str = "site"  # to which azimuths and coordinates belong
+    depths_read_from: str = DEPTHS_FROM[0]  # of stations and drilled depths
+    depth_reference: str = DEPTHS_FROM[0]  # of all answers: the heads' own
+    reference_height: float | None = None  # m, of the former above the latter
+    height_datum: str = ""
+    origin: tuple[float, float, float] | None = None  # m, northing, easting and height of the wall's zero
+
+    def digests(self) -> list[tuple[str, str]]:
+        """Name and SHA-256 of each file as it is now."""
+        inputs = (self.path, self.heads, self.stations)
+        return [(path.name, hashlib.sha256(path.read_bytes()).hexdigest()) for path in inputs]
+
+    @property
+    def defaults(self) -> Defaults:
+        """What columns take that do not say otherwise."""
+        return Defaults(
+            self.radius, self.length, self.inclination, self.azimuth, self.tolerance, self.tool, self.serial,
+            self.head_std, self.path.parent, self.calibration,
+            (self.depths_read_from, self.depth_reference, self.reference_height),
+        )  # fmt: skip
+
+
+@dataclass(frozen=True, slots=True)
+class Wall:
+    """A wall as surveyed: its columns in planes, pairs of neighbours and the ways by remedial columns."""
+
+    file: WallFile
+    plans: list[ColumnPlan]
+    built: BuiltWall
+    pairs: npt.NDArray[np.intp]
+    detours: list[Detour]
+    holes: list[Hole]
+    drilled_on: list[date | None]  # of every column
+
+    @property
+    def columns(self) -> Columns:
+        """The columns in planes across them."""
+        return self.built.columns
+
+    @property
+    def stages(self) -> list[Stage]:
+        """How it closed, day by day; none where no day of drilling is stated."""
+        return stages(self.columns, self.pairs, self.file.thickness, self.drilled_on, self.detours)
+
+    @property
+    def grid_spacing(self) -> float | None:
+        """Spacing (m) of a grid, whose plane must be covered; None for a wall or a shaft."""
+        return self.file.spacing if self.file.layout == "grid" else None
+
+
+def read_wall_file(path: Path) -> WallFile:
+    """Requirements of a TOML file.
+
+    Raises
+    ------
+    SurveyError, ToolError
+        One line: file, key, what was expected and what came.
+    """
+    try:
+        data = tomllib.loads(path.read_text("utf-8"))
+    except (OSError, UnicodeDecodeError) as error:
+        reason = getattr(error, "strerror", None) or "not a text file"
+        raise SurveyError(f"{path}: {reason}; expected a wall file") from error
+    except tomllib.TOMLDecodeError as error:
+        raise SurveyError(f"{path}: not TOML: {error}") from error
+    layers = data.pop("layer", [])
+    known = (*TEXTS, *POSITIVE, *NOT_NEGATIVE, *ORIGIN, REFERENCE_HEIGHT)
+    for key in data:
+        if key not in known:
+            raise SurveyError(f"{path}: {key}: unknown key; expected one of {', '.join(known)} or tables [[layer]]")
+    for key in NEEDED:
+        if key not in data:
+            raise SurveyError(f"{path}: {key} is missing")
+    values: dict[str, Any] = {key: _value(path, key, value) for key, value in data.items()}
+    layout = _one_of(path, values, "layout", LAYOUTS, "line")
+    if layout == "grid" and "spacing_m" not in values:
+        raise SurveyError(f"{path}: spacing_m is missing; a grid needs it to know who is whose neighbour")
+    method = Method(_one_of(path, values, "method", tuple(m.value for m in Method), Method.BALANCED_TANGENTIAL.value))
+    try:
+        largest_distance(values["radius_m"], values["thickness_m"])
+        allowed = tolerance(values.get("tolerance", "en-12716"))
+    except SurveyError as error:
+        raise SurveyError(f"{path}: {error}") from None
+    assumed = Assumptions(
+        method,
+        Site(gravity=values.get("gravity_mps2", 9.81)),
+        values.get("unsurveyed_percent", 1.0) / 100.0,
+        values.get("depth_step_m", 0.5),
+        _layers(path, layers, values.get("radius_cv", 0.0)),
+        values.get("radius_correlation", 1.0),
+    )
+    read_from = _one_of(path, values, "depth_reference", DEPTHS_FROM, DEPTHS_FROM[0])
+    return WallFile(
+        path,
+        values.get("name", path.stem),
+        values["radius_m"],
+        values["thickness_m"],
+        layout,
+        values.get("spacing_m"),
+        values.get("length_m"),
+        values.get("allowed_probability", 0.01),
+        allowed,
+        load_tool(beside(path, values.get("instrument", "relay"))),
+        values.get("serial", ""),
+        values.get("head_sigma_m", 0.0),
+        math.radians(values.get("inclination_deg", 0.0)),
+        math.radians(values.get("azimuth_deg", 0.0)),
+        assumed,
+        path.parent / values["heads"],
+        path.parent / values["stations"],
+        values.get("project", ""),
+        values.get("client", ""),
+        values.get("calibration", ""),
+        _one_of(path, values, "north", NORTHS, "site"),
+        read_from,
+        _one_of(path, values, "answer_depth_reference", DEPTHS_FROM, read_from),
+        values.get(REFERENCE_HEIGHT),
+        values.get("height_datum", ""),
+        _origin(path, values),
+    )
+
+
+def _origin(path: Path, values: dict[str, Any]) -> tuple[float, float, float] | None:
+    """Site coordinates of the wall's zero, all three or none."""
+    stated = [key for key in ORIGIN if key in values]
+    if not stated:
+        return None
+    if len(stated) < len(ORIGIN):
+        raise SurveyError(f"{path}: expected {', '.join(ORIGIN)} together, got {', '.join(stated)}")
+    return float(values["northing_m"]), float(values["easting_m"]), float(values["height_m"])
+
+
+def beside(path: Path, instrument: str) -> str:
+    """An instrument by its name, or the file of that name beside ``path``."""
+    return str(path.parent / instrument) if instrument.endswith((".toml", ".json")) else instrument
+
+
+def _one_of(path: Path, values: dict[str, Any], key: str, names: tuple[str, ...], default: str) -> str:
+    name = str(values.get(key, default))
+    if name not in names:
+        raise SurveyError(f"{path}: {key}: expected one of {', '.join(names)}, got {name!r}")
+    return name
+
+
+def _value(path: Path, key: str, value: Any) -> Any:
+    if key in TEXTS:
+        if not isinstance(value, str):
+            raise SurveyError(f"{path}: {key}: expected a text, got {value!r:.60}")
+        return value
+    usable = not isinstance(value, bool) and isinstance(value, int | float) and math.isfinite(value)
+    if usable and key in (*ORIGIN, REFERENCE_HEIGHT):
+        return float(value)
+    if not usable or value < 0.0 or (key in POSITIVE and value == 0.0):
+        sign = "positive" if key in POSITIVE else "non-negative"
+        raise SurveyError(f"{path}: {key}: expected a {sign} number, got {value!r:.60}")
+    if value > MOST.get(key, math.inf):
+        raise SurveyError(f"{path}: {key}: expected at most {MOST[key]:g}, got {value!r:.60}")
+    return float(value)
+
+
+def _layers(path: Path, tables: Any, radius_cv: float) -> tuple[Layer, ...]:
+    """Radii by depth; above the first layer the radius is that of the wall."""
+    layers = [Layer(-math.inf, None, radius_cv)]
+    if not isinstance(tables, list) or not all(isinstance(table, dict) for table in tables):
+        raise SurveyError(f"{path}: layer: expected tables [[layer]] with {', '.join(LAYER_KEYS)}")
+    for k, table in enumerate(tables, 1):
+        for key in table:
+            if key not in LAYER_KEYS:
+                raise SurveyError(f"{path}: layer {k}: {key}: unknown key; expected one of {', '.join(LAYER_KEYS)}")
+        if "from_m" not in table:
+            raise SurveyError(f"{path}: layer {k}: from_m is missing")
+        given = {key: _layer_value(path, k, key, value) for key, value in table.items()}
+        if given["from_m"] <= layers[-1].top:
+            raise SurveyError(
+                f"{path}: layer {k}: expected from_m beyond {layers[-1].top:g} m, got {given['from_m']:g} m"
+            )
+        layers.append(Layer(given["from_m"], given.get("radius_m"), given.get("radius_cv", radius_cv)))
+    return tuple(layers)
+
+
+def _layer_value(path: Path, k: int, key: str, value: Any) -> float:
+    usable = not isinstance(value, bool) and isinstance(value, int | float) and math.isfinite(value)
+    if not usable or (key != "from_m" and value < 0.0) or (key == "radius_m" and value == 0.0):
+        raise SurveyError(f"{path}: layer {k}: {key}: expected a positive number, got {value!r:.60}")
+    if key == "radius_cv" and value > MOST["radius_cv"]:
+        raise SurveyError(f"{path}: layer {k}: radius_cv: expected at most {MOST['radius_cv']:g}, got {value!r:.60}")
+    return float(value)
+
+
+def read_wall(path: Path) -> Wall:
+    """The whole wall; errors as ``read_wall_file``, of its CSV files with their line."""
+    file = read_wall_file(path)
+    rows = read_heads(file.heads, file.defaults)
+    names = [row.name for row in rows]
+    holes = read_holes(file.stations, names, [row.depths.height for row in rows])
+    length = file.length or max((float(hole.md[-1]) for hole in holes if len(hole.md)), default=0.0)
+    if not length and any(row.length is None for row in rows):
+        raise SurveyError(
+            f"{path}: length_m is missing; no column was surveyed, so nothing says how deep they are to go"
+        )
+    plans = [row.plan(length) for row in rows]
+    try:
+        built = build(plans, holes, file.assumed)
+    except SurveyError as error:
+        raise SurveyError(f"{path}: {error}") from None
+    pairs = _pairs(file, [row.remedy for row in rows], built)
+    detours = _detours(file.heads, names, [row.remedy for row in rows], pairs)
+    _check_design(file, built, pairs)
+    return Wall(file, plans, built, pairs, detours, holes, [row.drilled_on for row in rows])
+
+
+def judge_wall(wall: Wall) -> Judgement:
+    """Judge a wall by what its file requires."""
+    return judge(
+        wall.columns,
+        wall.pairs,
+        wall.file.thickness,
+        allowed=wall.file.allowed,
+        grid_spacing=wall.grid_spacing,
+        detours=wall.detours,
+    )
+
+
+def _pairs(file: WallFile, remedies: list[Remedy], built: BuiltWall) -> npt.NDArray[np.intp]:
+    """Neighbours among the columns of the design; remedial ones stand beside them."""
+    designed = np.array([k for k, remedy in enumerate(remedies) if not remedy.asked], np.intp)
+    heads = built.columns.designs[designed]
+    if file.layout == "grid":
+        found = neighbours_in_grid(heads, file.spacing or 0.0)
+    else:
+        found = neighbours_in_line(len(designed), closed=file.layout == "shaft")
+    if not len(found):
+        raise SurveyError(f"{file.heads}: expected at least two columns next to each other, got {len(designed)}")
+    return designed[found]
+
+
+def _detours(path: Path, names: list[str], remedies: list[Remedy], pairs: npt.NDArray[np.intp]) -> list[Detour]:
+    """Joints that a remedial column stands in for."""
+    found = []
+    index = {name: k for k, name in enumerate(names)}
+    for extra, remedy in enumerate(remedies):
+        for name in remedy.named:
+            if name not in index:
+                raise SurveyError(f"{path}: column {names[extra]}: column {name} is not among the heads")
+        if remedy.between:
+            a, b = (index[name] for name in remedy.between)
+            joints = [j for j, pair in enumerate(pairs.tolist()) if set(pair) == {a, b}]
+            if not joints:
+                raise SurveyError(f"{path}: column {names[extra]}: {'/'.join(remedy.between)} is no joint of this wall")
+            found.append(Detour(joints[0], np.array([[a, extra], [extra, b]], np.intp)))
+        if remedy.replaces:
+            gone = index[remedy.replaces]
+            for j, (a, b) in enumerate(pairs.tolist()):
+                if gone in (a, b):
+                    pair = [extra, b] if a == gone else [a, extra]
+                    found.append(Detour(j, np.array([pair], np.intp)))
+    return found
+
+
+def _check_design(file: WallFile, built: BuiltWall, pairs: npt.NDArray[np.intp]) -> None:
+    """Refuse a wall none of whose joints could ever be thick enough, built exactly as designed."""
+    columns = built.columns
+    a, b = pairs[:, 0], pairs[:, 1]
+    apart = columns.planned[b] - columns.planned[a]
+    distance = np.hypot(apart[..., 0], apart[..., 1])
+    limit = largest_distance(float(np.max(columns.radii)), file.thickness)
+    if float(np.min(distance)) > limit:
+        raise SurveyError(
+            f"{file.path}: the design cannot be met anywhere: its nearest columns are {np.min(distance):.3f} m apart, "
+            f"a joint of {file.thickness:g} m needs {limit:.3f} m or less"
+        )

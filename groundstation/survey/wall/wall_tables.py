@@ -1,0 +1,266 @@
+"""The two tables of a wall: heads (one column a row, with what sets it apart) and stations.
+
+Every refusal names file, line, column, what was expected and what came.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, field, replace
+from datetime import date
+from itertools import pairwise
+from pathlib import Path
+
+import numpy as np
+import numpy.typing as npt
+
+from groundstation.errors import SurveyError
+from groundstation.survey.files.survey_records import read_columns
+from groundstation.survey.tools.instruments import Tool, load_tool
+from groundstation.survey.wall.column_deviation import Design, Tolerance, tolerance
+from groundstation.survey.wall.wall_columns import ColumnPlan, Hole, Status
+from groundstation.survey.well.depth_reference import DEPTHS_FROM, DepthReference, depth_reference
+from groundstation.survey.well.reference_frames import SAME_DEPTH
+
+Array = npt.NDArray[np.float64]
+NUMBERS = (
+    "down_m", "inclination_deg", "azimuth_deg", "length_m", "radius_m", "drilled_to_m", "head_sigma_m",
+    "depth_reference_height_m",
+)  # fmt: skip
+SIGNED = ("down_m", "azimuth_deg", "depth_reference_height_m")  # may be negative
+WORDS = ("state", "instrument", "serial", "calibration", "tolerance", "between", "replaces", "drilled_on")
+
+
+@dataclass(frozen=True, slots=True)
+class Defaults:
+    """What a column takes that does not say otherwise; m and rad."""
+
+    radius: float
+    length: float | None
+    inclination: float
+    azimuth: float
+    tolerance: Tolerance
+    tool: Tool
+    serial: str
+    head_std: float
+    folder: Path  # of instrument files
+    calibration: str = ""
+    # what stations and drilled depths count from, what the heads do, and the height of the one above the other, if any
+    depths: tuple[str, str, float | None] = (DEPTHS_FROM[0], DEPTHS_FROM[0], None)
+
+
+@dataclass(frozen=True, slots=True)
+class Remedy:
+    """What a remedial column is there for."""
+
+    between: tuple[str, ...] = ()
+    replaces: str = ""
+
+    @property
+    def asked(self) -> bool:
+        """Whether the column is a remedial one."""
+        return bool(self.between or self.replaces)
+
+    @property
+    def named(self) -> tuple[str, ...]:
+        """Columns it names."""
+        return (*self.between, *((self.replaces,) if self.replaces else ()))
+
+
+@dataclass(frozen=True, slots=True)
+class HeadRow:
+    """One row of the heads."""
+
+    name: str
+    plan_without_length: ColumnPlan
+    length: float | None
+    remedy: Remedy
+    drilled_on: date | None = None
+    depths: DepthReference = field(default_factory=DepthReference)
+
+    def plan(self, length: float) -> ColumnPlan:
+        """The plan, ``length`` (m) where the row has none."""
+        design = replace(self.plan_without_length.design, length=self.length or length)
+        return replace(self.plan_without_length, design=design)
+
+
+def read_heads(path: Path, defaults: Defaults) -> list[HeadRow]:
+    """Columns of a wall in the order of the file.
+
+    Raises
+    ------
+    SurveyError, ToolError
+        Names file, line and column.
+    """
+    table, lines = read_columns(path, ("column", "north_m", "east_m"), texts=("column", *NUMBERS, *WORDS))
+    names = [str(name) for name in table["column"]]
+    seen: dict[str, int] = {}
+    for line, name in zip(lines, names, strict=True):
+        if not name:
+            raise SurveyError(f"{path}: line {line}: expected the name of a column")
+        if name in seen:
+            raise SurveyError(f"{path}: line {line}: column {name} stands in line {seen[name]} already")
+        seen[name] = line
+    heads = np.stack([table["north_m"], table["east_m"]], axis=1)
+    wrong = np.flatnonzero(~np.isfinite(heads).all(axis=1))
+    if len(wrong):
+        raise SurveyError(f"{path}: line {lines[wrong[0]]}: expected finite north_m and east_m")
+    tools: dict[str, Tool] = {}
+    rows = []
+    for k, (line, name) in enumerate(zip(lines, names, strict=True)):
+        cells = {key: str(table[key][k]) for key in (*NUMBERS, *WORDS) if key in table}
+        rows.append(_head(f"{path}: line {line}: column {name}", name, heads[k], cells, defaults, tools))
+    return rows
+
+
+def _head(
+    where: str, name: str, head: Array, cells: dict[str, str], defaults: Defaults, tools: dict[str, Tool]
+) -> HeadRow:
+    values = {key: _number(where, key, cells[key]) for key in NUMBERS if cells.get(key)}
+    status = _status(where, cells.get("state", ""))
+    try:
+        allowed = tolerance(cells["tolerance"]) if cells.get("tolerance") else defaults.tolerance
+        read_from, answer, height = defaults.depths
+        depths = depth_reference(read_from, answer, values.get("depth_reference_height_m", height))
+    except SurveyError as error:
+        raise SurveyError(f"{where}: {error}") from None
+    design = Design(
+        name,
+        (float(head[0]), float(head[1]), values.get("down_m", 0.0)),
+        math.radians(values["inclination_deg"]) if "inclination_deg" in values else defaults.inclination,
+        math.radians(values["azimuth_deg"]) if "azimuth_deg" in values else defaults.azimuth,
+        1.0,
+        values.get("radius_m", defaults.radius),
+        allowed,
+    )
+    tool = _tool(cells.get("instrument", ""), defaults, tools)
+    drilled = depths.to_answer(values["drilled_to_m"]) if "drilled_to_m" in values else None
+    if drilled is not None and drilled < 0.0:
+        raise SurveyError(f"{where}: drilled_to_m: {values['drilled_to_m']:g} m lies above the head")
+    plan = ColumnPlan(
+        design, tool, cells.get("serial") or defaults.serial, status, drilled,
+        values.get("head_sigma_m", defaults.head_std), cells.get("calibration") or defaults.calibration,
+    )  # fmt: skip
+    day = _day(where, cells.get("drilled_on", ""))
+    if day is not None and status in (Status.PLANNED, Status.NOT_DRILLED):
+        raise SurveyError(f"{where}: drilled_on: stated as {status.value}, yet drilled on {day}")
+    return HeadRow(name, plan, values.get("length_m", defaults.length), _remedy(where, cells), day, depths)
+
+
+def _day(where: str, text: str) -> date | None:
+    try:
+        return date.fromisoformat(text) if text else None
+    except ValueError:
+        raise SurveyError(f"{where}: drilled_on: expected a day as 2026-11-20, got {text!r}") from None
+
+
+def _number(where: str, key: str, text: str) -> float:
+    try:
+        value = float(text)
+    except ValueError:
+        value = math.nan
+    low = -math.inf if key in SIGNED else 0.0
+    if not math.isfinite(value) or value < low or (key in ("length_m", "radius_m") and value == 0.0):
+        raise SurveyError(
+            f"{where}: {key}: expected a number{'' if low < 0.0 else ' that is not negative'}, got {text!r}"
+        )
+    return value
+
+
+def _status(where: str, text: str) -> Status:
+    try:
+        return Status(text)
+    except ValueError:
+        names = ", ".join(status.value for status in Status if status.value)
+        raise SurveyError(f"{where}: state: expected one of {names}, or nothing, got {text!r}") from None
+
+
+def _tool(name: str, defaults: Defaults, tools: dict[str, Tool]) -> Tool:
+    """Instrument of a row; the same object for the same name."""
+    if not name:
+        return defaults.tool
+    if name not in tools:
+        tools[name] = load_tool(str(defaults.folder / name) if name.endswith((".toml", ".json")) else name)
+    return tools[name]
+
+
+def _remedy(where: str, cells: dict[str, str]) -> Remedy:
+    between = tuple(part.strip() for part in cells.get("between", "").split("/")) if cells.get("between") else ()
+    if between and (len(between) != 2 or between[0] == between[1]):
+        raise SurveyError(f"{where}: between: expected two columns as NAME/NAME, got {cells['between']!r}")
+    return Remedy(between, cells.get("replaces", ""))
+
+
+def read_holes(path: Path, names: list[str], heights: list[float]) -> list[Hole]:
+    """Stations of every column in the order of ``names``; none of one that was not surveyed.
+
+    Depths of a column are brought to its head by ``heights`` (m), how far what they count from lies above it. A station
+    at 0 m there tells the direction at the head, for between the two the string is straight.
+
+    Raises
+    ------
+    SurveyError
+        Names file, line and column.
+    """
+    needed = ("column", "md_m", "inclination_deg", "azimuth_deg")
+    table, lines = read_columns(path, needed, texts=("column",))
+    index = {name: k for k, name in enumerate(names)}
+    owner = np.array([index.get(str(name), -1) for name in table["column"]], np.intp)
+    unknown = np.flatnonzero(owner < 0)
+    if len(unknown):
+        k = int(unknown[0])
+        raise SurveyError(f"{path}: line {lines[k]}: column {table['column'][k]} is not among the heads")
+    order = np.argsort(owner, kind="stable")
+    owner, md, inc, azi = owner[order], *(table[name][order] for name in needed[1:])
+    line = np.array(lines, np.intp)[order]
+    _check_values(path, line, md, inc, azi)
+    counts = np.bincount(owner, minlength=len(names))
+    single = np.flatnonzero(counts == 1)
+    if len(single):
+        raise SurveyError(f"{path}: column {names[single[0]]}: expected at least two stations, got 1")
+    starts = np.concatenate([[0], np.cumsum(counts)])
+    lift = np.array(heights)[owner]
+    at_reference = (np.arange(len(md)) == starts[owner]) & (md == 0.0) & (lift > 0.0)
+    md = np.where(at_reference | (np.abs(md - lift) < SAME_DEPTH), 0.0, md - lift)
+    _check_depths(path, names, owner, line, md, starts[:-1][counts > 0])
+    parts = [slice(a, b) for a, b in pairwise(starts)]
+    return [Hole(md[part], np.radians(inc[part]), np.radians(azi[part])) for part in parts]
+
+
+def _check_depths(
+    path: Path,
+    names: list[str],
+    owner: npt.NDArray[np.intp],
+    line: npt.NDArray[np.intp],
+    md: Array,
+    starts: npt.NDArray[np.intp],
+) -> None:
+    same = np.ones(len(md), bool)
+    same[starts] = False
+    back = np.flatnonzero(same[1:] & ~(np.diff(md) > 0.0)) + 1
+    if len(back):
+        k = int(back[0])
+        raise SurveyError(
+            f"{path}: line {line[k]}: column {names[owner[k]]}: "
+            f"expected a depth beyond {md[k - 1]:g} m, got {md[k]:g} m"
+        )
+    off = starts[md[starts] != 0.0]
+    if len(off):
+        k = int(off[0])
+        raise SurveyError(
+            f"{path}: line {line[k]}: column {names[owner[k]]}: "
+            f"expected the head first, got a station {md[k]:g} m below it"
+        )
+
+
+def _check_values(
+    path: Path, line: npt.NDArray[np.intp], md: Array, inclination_deg: Array, azimuth_deg: Array
+) -> None:
+    for name, values, good in (
+        ("a finite md_m", md, np.isfinite(md)),
+        ("an inclination of 0..180 deg", inclination_deg, (inclination_deg >= 0.0) & (inclination_deg <= 180.0)),
+        ("a finite azimuth_deg", azimuth_deg, np.isfinite(azimuth_deg)),
+    ):
+        wrong = np.flatnonzero(~good)
+        if len(wrong):
+            raise SurveyError(f"{path}: line {line[wrong[0]]}: expected {name}, got {values[wrong[0]]:g}")

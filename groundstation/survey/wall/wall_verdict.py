@@ -1,0 +1,241 @@
+"""Verdict on a wall, a shaft or a grid: what is open, what is not known, and whether it may be called tight.
+
+Nothing is tight by default: a stretch that was not drilled is an opening, one that was not surveyed is not proven, and
+a wall whose joints are good one by one may still be doubtful as a whole.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from enum import Enum
+
+import numpy as np
+import numpy.typing as npt
+
+from groundstation.survey.wall.as_built import Columns, State
+from groundstation.survey.wall.void_chance import VoidChance, void_chance
+from groundstation.survey.wall.voids import Void, triples_of, voids
+from groundstation.survey.wall.wall_joints import (
+    Detour,
+    ExtraColumn,
+    Joints,
+    crossings,
+    extra_column,
+    joints,
+    with_detours,
+)
+from groundstation.survey.wall.wall_system import SystemProbability, system_probability
+
+Array = npt.NDArray[np.float64]
+DIAGONAL = 1.75  # spacings within which three columns may have a void between them
+
+
+class Verdict(Enum):
+    """What may be signed."""
+
+    TIGHT = "tight"
+    NOT_PROVEN = "not proven"  # nothing is open, but something is not known well enough
+    NOT_TIGHT = "not tight"
+
+
+class Kind(Enum):
+    """Why a wall is not tight, or not proven so."""
+
+    MISSING = "missing"  # no column where one is required
+    UNSURVEYED = "unsurveyed"
+    THIN = "thin"  # a joint thinner than required, as surveyed
+    VOID = "void"
+    CROSSING = "crossing"  # two neighbours have changed sides
+    DOUBTFUL = "doubtful"  # thick enough as surveyed, too thin with more than the allowed probability
+    SYSTEM = "system"  # every joint good, the whole doubtful
+
+
+OPEN = (Kind.MISSING, Kind.THIN, Kind.VOID, Kind.CROSSING)
+
+
+@dataclass(frozen=True, slots=True)
+class Finding:
+    """One reason, with its place."""
+
+    kind: Kind
+    what: str  # column, joint, or columns around a void
+    top: float  # m
+    bottom: float
+    text: str
+    probability: float | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class VoidFinding:
+    """A void of the plane at one depth."""
+
+    depth: float
+    void: Void
+
+
+@dataclass(frozen=True, slots=True)
+class Judgement:
+    """All that was found."""
+
+    verdict: Verdict
+    findings: list[Finding]
+    joints: Joints
+    voids: list[VoidFinding]
+    system: SystemProbability
+    extras: list[tuple[int, ExtraColumn]]  # (joint, column) for every joint that is open
+    void_chance: VoidChance | None = None  # of a grid
+
+
+def judge(
+    columns: Columns,
+    pairs: npt.NDArray[np.intp],
+    required: float,
+    *,
+    allowed: float = 0.01,
+    grid_spacing: float | None = None,
+    detours: Sequence[Detour] = (),
+) -> Judgement:
+    """Judge all joints, the plane of a grid, and the whole.
+
+    Parameters
+    ----------
+    required : thickness of a joint, m
+    allowed : probability of anything too thin or open up to which the wall counts as tight
+    grid_spacing : of a grid, m; its plane must be covered too
+    detours : ways by remedial columns
+    """
+    found = with_detours(columns, joints(columns, pairs, required), detours, required)
+    holes: list[VoidFinding] = []
+    triples = chance = None
+    if grid_spacing is not None:
+        triples = triples_of(columns.designs, DIAGONAL * grid_spacing)
+        holes = _voids(columns)
+        chance = void_chance(columns, triples)
+    whole = system_probability(columns, found, required, triples, detours)
+    findings = [
+        *_column_findings(columns),
+        *_joint_findings(columns, found, required, allowed),
+        *_void_findings(columns, holes),
+        *_likely_voids(columns, holes, chance, allowed),
+        *_crossing_findings(columns, pairs),
+    ]
+    if whole.probability > allowed and not findings:
+        text = f"every joint is good, yet anything is open or too thin with a probability of {whole.probability:.2g}"
+        findings.append(Finding(Kind.SYSTEM, "wall", *_ends(columns.depths), text, whole.probability))
+    proposals = [(j, extra_column(columns, found, j, required)) for j in range(len(pairs))]
+    extras = [(j, extra) for j, extra in proposals if extra is not None]
+    return Judgement(_verdict(findings), findings, found, holes, whole, extras, chance)
+
+
+def _verdict(findings: list[Finding]) -> Verdict:
+    if any(finding.kind in OPEN for finding in findings):
+        return Verdict.NOT_TIGHT
+    return Verdict.NOT_PROVEN if findings else Verdict.TIGHT
+
+
+def _ends(depths: Array) -> tuple[float, float]:
+    return float(depths[0]), float(depths[-1])
+
+
+def stretches(flags: npt.NDArray[np.bool_]) -> list[tuple[int, int]]:
+    """First and last index of every run of true values (n,)."""
+    edges = np.diff(np.concatenate([[0], flags.astype(np.int8), [0]]))
+    return list(zip(np.flatnonzero(edges == 1).tolist(), (np.flatnonzero(edges == -1) - 1).tolist(), strict=True))
+
+
+def _column_findings(columns: Columns) -> list[Finding]:
+    found = []
+    words = {State.MISSING: (Kind.MISSING, "is missing"), State.UNSURVEYED: (Kind.UNSURVEYED, "is not surveyed")}
+    for name, states in zip(columns.names, columns.states, strict=True):
+        for state, (kind, word) in words.items():
+            for first, last in stretches(states == state):
+                top, bottom = float(columns.depths[first]), float(columns.depths[last])
+                found.append(Finding(kind, name, top, bottom, f"column {name} {word} from {top:g} to {bottom:g} m"))
+    return found
+
+
+def joint_name(columns: Columns, pair: npt.NDArray[np.intp]) -> str:
+    """Names of its two columns."""
+    return f"{columns.names[pair[0]]}-{columns.names[pair[1]]}"
+
+
+def _joint_findings(columns: Columns, found: Joints, required: float, allowed: float) -> list[Finding]:
+    out = []
+    for pair, thick, chance in zip(found.pairs, found.thickness, found.probability, strict=True):
+        name, thin = joint_name(columns, pair), thick < required
+        likely = np.isfinite(thick) & ~thin & (chance > allowed)
+        for first, last in stretches(thin):
+            top, bottom, least = (
+                float(columns.depths[first]),
+                float(columns.depths[last]),
+                float(np.min(thick[first : last + 1])),
+            )
+            word = f"opens by {-least:.3f} m" if least < 0.0 else f"is {least:.3f} m thick"
+            text = f"joint {name} {word} at the least from {top:g} to {bottom:g} m; required {required:g} m"
+            out.append(Finding(Kind.THIN, name, top, bottom, text, float(np.max(chance[first : last + 1]))))
+        if np.any(likely) and not np.any(thin):
+            first, last = int(np.argmax(likely)), int(np.flatnonzero(likely)[-1])
+            top, bottom, most = float(columns.depths[first]), float(columns.depths[last]), float(np.max(chance[likely]))
+            text = f"joint {name} is too thin with a probability of {most:.2g} between {top:g} and {bottom:g} m"
+            out.append(Finding(Kind.DOUBTFUL, name, top, bottom, text, most))
+    return out
+
+
+def _voids(columns: Columns) -> list[VoidFinding]:
+    """Voids among the columns that stand, at every depth."""
+    return [
+        VoidFinding(float(depth), void)
+        for z, depth in enumerate(columns.depths)
+        for void in voids(columns.centres[:, z], columns.radii[:, z])
+    ]
+
+
+def _void_findings(columns: Columns, holes: list[VoidFinding]) -> list[Finding]:
+    """One finding for the same columns around it, over the depths at which it is there."""
+    around: dict[tuple[int, ...], list[VoidFinding]] = {}
+    for hole in holes:
+        around.setdefault(hole.void.columns, []).append(hole)
+    out = []
+    for members, same in around.items():
+        name = "-".join(columns.names[k] for k in members)
+        largest = max(same, key=lambda hole: hole.void.area)
+        top, bottom = min(h.depth for h in same), max(h.depth for h in same)
+        text = (
+            f"void between {name} from {top:g} to {bottom:g} m, at the most {1e4 * largest.void.area:.1f} cm2 "
+            f"and a hole of {100.0 * largest.void.radius:.1f} cm radius at {largest.depth:g} m, "
+            f"({largest.void.place[0]:.3f}, {largest.void.place[1]:.3f}) m"
+        )
+        out.append(Finding(Kind.VOID, name, top, bottom, text))
+    return out
+
+
+def _likely_voids(
+    columns: Columns, holes: list[VoidFinding], chance: VoidChance | None, allowed: float
+) -> list[Finding]:
+    """Where there is no void as surveyed, yet one is more likely than allowed."""
+    if chance is None:
+        return []
+    known = np.isin(columns.depths, [hole.depth for hole in holes]) | np.any(columns.states == State.MISSING, axis=0)
+    out = []
+    for first, last in stretches((chance.probability > allowed) & ~known):
+        worst = first + int(np.argmax(chance.probability[first : last + 1]))
+        three = chance.columns[worst]
+        if three is None:
+            continue
+        name, most = "-".join(columns.names[k] for k in three), float(chance.probability[worst])
+        top, bottom = float(columns.depths[first]), float(columns.depths[last])
+        text = (
+            f"a void has a probability of {most:.2g} at {columns.depths[worst]:g} m, most of all between {name} at "
+            f"({chance.places[worst][0]:.3f}, {chance.places[worst][1]:.3f}) m"
+        )
+        out.append(Finding(Kind.DOUBTFUL, name, top, bottom, text, most))
+    return out
+
+
+def _crossing_findings(columns: Columns, pairs: npt.NDArray[np.intp]) -> list[Finding]:
+    out = []
+    for joint, depth in crossings(columns, pairs):
+        name, at = joint_name(columns, pairs[joint]), float(columns.depths[depth])
+        out.append(Finding(Kind.CROSSING, name, at, at, f"columns {name} cross: they have changed sides at {at:g} m"))
+    return out

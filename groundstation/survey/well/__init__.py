@@ -1,0 +1,1 @@
+"""The hole: trajectory, reference frames, error propagation, clearance."""

@@ -1,0 +1,84 @@
+"""Errors of the positions of a hole, station by station: what stations share and what is each one's own.
+
+A station that another one follows counts with both of its legs from then on, the last one with its upper leg alone,
+
+    C_K = sum_{k<K} R_k + R*_K + (sum_{k<K} e_k + e*_K) (sum_{k<K} e_k + e*_K)^T
+
+so two running sums are all that is kept. Source: thesis eqs. I.1-I.12. Frame: north, east, down; m.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+import numpy.typing as npt
+
+from node.kernels.arithmetic.jit import kernel
+
+Array = npt.NDArray[np.float64]
+Places = npt.NDArray[np.intp]
+
+
+@kernel
+def add_stations(
+    weights: Array, ends: Array, starts: Places, places: Places, lean: Array, down: Array, covs: Array, widths: Places,
+    passed: Array, own: Array, first: int, every: int, marks: Array, own_marks: Array, shared: Array, out: Array,
+) -> None:  # fmt: skip
+    """Go on down a hole from the station where the sums end.
+
+    Parameters
+    ----------
+    weights, ends : (n,) m, half of both legs of the station before, half of the upper leg of each
+    starts, places, lean, down : (n + 2,), (c,), (2, c) and (c,), of every tangent from the station before on: the
+        columns from ``starts[k]`` to before ``starts[k + 1]`` are its change, level and vertical, for one standard
+        deviation of the shared errors at these places, and all others do not change it
+    covs : (n + 1, 3, 3), of the same tangents: the covariance that is its own
+    widths : (n,), how many shared errors are known at each position
+    passed, own : (3, s) and (3, 3), the running sums e and R; they go on with every station but the last
+    first, every, marks, own_marks : the sums after the station ``first``, and after every so many from there, are put
+        into (m, 3, s) and (m, 3, 3)
+    shared : (n, 3, s) m, set: columns e + e* of every position; of no rows where nobody wants them
+    out : (n, 3, 3) m^2, set: C of every position
+    """
+    mark = 0
+    for k in range(len(weights)):
+        weight, end = weights[k], ends[k]
+        for c in range(starts[k], starts[k + 1]):
+            s = places[c]
+            passed[0, s] += weight * lean[0, c]
+            passed[1, s] += weight * lean[1, c]
+            passed[2, s] += weight * down[c]
+        nn = ne = nd = ee = ed = dd = 0.0
+        c, last = starts[k + 1], starts[k + 2]
+        for s in range(widths[k]):
+            n, e, d = passed[0, s], passed[1, s], passed[2, s]
+            if c < last and places[c] == s:
+                n += end * lean[0, c]
+                e += end * lean[1, c]
+                d += end * down[c]
+                c += 1
+            if len(shared) > 0:
+                shared[k, 0, s], shared[k, 1, s], shared[k, 2, s] = n, e, d
+            nn += n * n
+            ne += n * e
+            nd += n * d
+            ee += e * e
+            ed += e * d
+            dd += d * d
+        of_shared = ((nn, ne, nd), (ne, ee, ed), (nd, ed, dd))
+        for i in range(3):
+            for j in range(3):
+                own[i, j] += weight * weight * covs[k, i, j]
+                out[k, i, j] = own[i, j] + end * end * covs[k + 1, i, j] + of_shared[i][j]
+        if k == first + mark * every:
+            marks[mark], own_marks[mark] = passed, own
+            mark += 1
+
+
+def warm_up() -> None:
+    """Compile the loop or load it from the cache, so that nobody's first survey waits for it."""
+    starts, places = np.array([0, 0, 1]), np.zeros(1, np.intp)
+    add_stations(
+        np.ones(1), np.ones(1), starts, places, np.zeros((2, 1)), np.zeros(1), np.zeros((2, 3, 3)), np.ones(1, np.intp),
+        np.zeros((3, 1)), np.zeros((3, 3)), 0, 1, np.empty((1, 3, 1)), np.empty((1, 3, 3)), np.empty((0, 3, 1)),
+        np.empty((1, 3, 3)),
+    )  # fmt: skip

@@ -1,0 +1,21 @@
+"""A survey as it is read: measured depths and directions, and what else stood beside them."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+
+Array = npt.NDArray[np.float64]
+
+
+@dataclass(frozen=True, slots=True)
+class Record:
+    """A survey as read: (n,) m, rad and rad; ``lines`` are those of the file, ``columns`` what else it holds."""
+
+    md: Array
+    inclination: Array
+    azimuth: Array
+    lines: list[int]
+    columns: dict[str, Array]

@@ -1,0 +1,163 @@
+"""Quantities in two forms: a constant is a float that knows its integer, and takes the form of what it meets.
+
+What stands around the filter is written once. Compiled over the float64 record a number is in SI units and radians;
+compiled over the integers it is in the Q format of what it measures:
+
+==========  =============================  ======  ============================
+quantity    of the floats                  Q       range of the integers
+==========  =============================  ======  ============================
+time        s                              28      2^32 s, and ``NEVER``
+rate        rad/s                          46      32 rad/s
+angle       rad                            40      2^20 rad; a square to 4 rad
+force       m/s^2                          26      32 g; the unit is g
+variance    rad^2                          56      12 rad^2
+            (rad/s)^2                      68      (3.1 deg/s)^2
+            s^2, of a clock                56      16 s^2
+factor      1                              30      2, where it multiplies
+temperature C                              23      256 C
+==========  =============================  ======  ============================
+
+Sums, comparisons and products with small whole numbers are those of the language for both; for products, quotients
+and roots of quantities see ``node.kernels.arithmetic.operations``.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import Any, Final
+
+from numba import types
+from numba.core.imputils import lower_constant
+from numba.core.typeconv.castgraph import Conversion
+from numba.core.typing.typeof import Purpose
+from numba.extending import lower_cast, models, overload, register_model, typeof_impl
+
+from node.kernels.arithmetic.formats import ANGLE_Q, FORCE_Q, NEVER, RATE_Q, TIME_Q, VAR_Q, VECTOR_Q
+
+NO_NUMBER: Final = 1 << 60  # in integers, where a float is NaN
+RATE_VAR_Q: Final = VAR_Q + 12  # (rad/s)^2
+WARMTH_Q: Final = VECTOR_Q - 7  # C
+STANDARD_GRAVITY: Final = 9.80665
+FORMS: Final = (types.float64, types.int64)
+
+
+class Constant(float):
+    """A float, and the integer that stands for it in the format of its quantity."""
+
+    fixed: int
+
+    def __new__(cls, value: float, fixed: int) -> Constant:
+        """Of a float and its integer."""
+        made = super().__new__(cls, value)
+        made.fixed = fixed
+        return made
+
+
+class ConstantType(types.Opaque):
+    """Type of one constant, as numba knows it: it becomes the float or the integer of what it meets.
+
+    It has to meet something: alone, as under a minus, numba takes it for the integer.
+    """
+
+    def __init__(self, value: float, fixed: int) -> None:
+        self.value, self.fixed = value, fixed
+        super().__init__(f"Constant({value!r}, {fixed})")
+
+    def can_convert_to(self, _: Any, other: Any) -> Any:
+        """To the two forms and to nothing else."""
+        return Conversion.safe if other in FORMS else None
+
+    def unify(self, _: Any, other: Any) -> Any:
+        """The form of the other branch."""
+        return other if other in FORMS else None
+
+
+register_model(ConstantType)(models.OpaqueModel)
+
+
+@typeof_impl.register(Constant)
+def _type_of(value: Constant, context: Any) -> Any:
+    """In a kernel it is a constant; Python hands it to one as the float that it is."""
+    if context.purpose is Purpose.argument:
+        return types.float64
+    return ConstantType(float(value), value.fixed)
+
+
+@lower_constant(ConstantType)  # type: ignore[no-untyped-call]
+def _lower(context: Any, _builder: Any, _type: Any, _value: Any) -> Any:
+    return context.get_dummy_value()
+
+
+@lower_cast(ConstantType, types.float64)  # type: ignore[no-untyped-call]
+def _to_float(context: Any, _builder: Any, kind: ConstantType, _to: Any, _value: Any) -> Any:
+    return context.get_constant(types.float64, kind.value)
+
+
+@lower_cast(ConstantType, types.int64)  # type: ignore[no-untyped-call]
+def _to_integer(context: Any, _builder: Any, kind: ConstantType, _to: Any, _value: Any) -> Any:
+    return context.get_constant(types.int64, kind.fixed)
+
+
+def quantity(value: float, q: int) -> Constant:
+    """A constant in Q``q``."""
+    return Constant(value, round(value * 2.0**q))
+
+
+def seconds(value: float) -> Constant:
+    """A time."""
+    return quantity(value, TIME_Q)
+
+
+def rate(value: float) -> Constant:
+    """An angular rate, rad/s."""
+    return quantity(value, RATE_Q)
+
+
+def angle(value: float) -> Constant:
+    """An angle, rad."""
+    return quantity(value, ANGLE_Q)
+
+
+def force(value: float) -> Constant:
+    """A specific force, m/s^2; in integers by standard gravity."""
+    return Constant(value, round(value / STANDARD_GRAVITY * 2.0**FORCE_Q))
+
+
+def variance(value: float) -> Constant:
+    """A variance, rad^2, or s^2 of a clock."""
+    return quantity(value, VAR_Q)
+
+
+def rate_variance(value: float) -> Constant:
+    """A variance of a rate, (rad/s)^2."""
+    return quantity(value, RATE_VAR_Q)
+
+
+def warmth(value: float) -> Constant:
+    """A temperature, C; in integers it counts 128 C, so that it is a factor."""
+    return quantity(value, WARMTH_Q)
+
+
+def factor(value: float) -> Constant:
+    """A number without a unit, -2..2 where it multiplies."""
+    return quantity(value, VECTOR_Q)
+
+
+NONE: Final = Constant(math.nan, NO_NUMBER)  # no number
+LONG_AGO: Final = Constant(-math.inf, NEVER)  # a time before all others
+NOT_YET: Final = Constant(math.nan, NEVER)  # a time that has not been
+ONE: Final = factor(1.0)
+
+
+@overload(min, strict=False)
+def _least(a: Any, b: Any) -> Any:
+    if isinstance(a, ConstantType) or isinstance(b, ConstantType):
+        return lambda a, b: b if b < a else a
+    return None
+
+
+@overload(max, strict=False)
+def _most(a: Any, b: Any) -> Any:
+    if isinstance(a, ConstantType) or isinstance(b, ConstantType):
+        return lambda a, b: b if b > a else a
+    return None

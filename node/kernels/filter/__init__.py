@@ -1,0 +1,1 @@
+"""The error-state filter of a node; what both arithmetics share."""

@@ -1,0 +1,43 @@
+"""One execution cycle of a node in integers, compiled whole: modes, increments, filter, prediction to now."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from node.kernels.arithmetic.formats import Array
+from node.kernels.arithmetic.jit import kernel
+from node.kernels.filter.fixed.fixed_lag import consume, predict_to_now
+from node.kernels.filter.modes import STATIC_BIAS, SURVEY_READY, guard_rate, is_quiet, learn_static_bias, step_modes
+from node.kernels.filter.moving_average import average_force
+from node.kernels.record.filter_record import STATES, Status
+from node.kernels.record.ring import push
+
+FILTER_FAULT = int(Status.FILTER_FAULT)
+
+
+@kernel
+def run_cycle(state: Any, config: Any, rate: Array, force: Array, start: int, end: int, joined: int) -> int:
+    """Take one cycle's IMU reading and leave the yaw at its end in the ``now_*`` fields; returns ``Status`` bits.
+
+    Parameters
+    ----------
+    state, config : records of dtype ``FIXED_STATE`` and ``FIXED_CONFIG``
+    rate : (3,) mean angular rate over the cycle, calibrated, rad/s, Q46, within 32 rad/s, body frame
+    force : (3,) mean specific force over the cycle, calibrated, g, Q26, within 32 g, body frame
+    start, end : s, Q28, the node's clock
+    joined : 1 while the upper joint is closed, else 0
+    """
+    quiet = is_quiet(state, config, rate)
+    status = guard_rate(state, config, rate[2])
+    push(state, start, end, rate, force, quiet)
+    if state.mode == STATIC_BIAS:
+        status |= learn_static_bias(state, config, rate, end - start, quiet)
+    status |= consume(state, config)
+    predict_to_now(state, config)
+    status |= step_modes(state, config, quiet, joined, end)
+    if status & SURVEY_READY:
+        average_force(state, config.survey_samples)
+    for i in range(STATES):
+        if state.P[i, i] < 0:
+            return status | FILTER_FAULT
+    return status

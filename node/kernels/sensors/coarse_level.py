@@ -1,0 +1,39 @@
+"""First levelling of a node that does not know how it leans: gravity's direction straight from the accelerometer.
+
+The filter's levelling is linear about its present guess. From upright it finds a horizontal tube 8 degrees wrong and an
+inverted one never, so a guess that is far off is replaced before the filter refines it.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import Any, Final
+
+from node.kernels.arithmetic.formats import DEG, Array
+from node.kernels.arithmetic.jit import constant, kernel
+from node.kernels.arithmetic.operations import fraction, length, times
+from node.kernels.arithmetic.quantity import factor, rate, variance
+from node.kernels.record.filter_record import Err
+from node.kernels.sensors.sensor_watch import largest
+
+TX, TY = constant(Err.TILT_X), constant(Err.TILT_Y)
+UNKNOWN_VAR: Final = variance(0.25)  # rad^2 of tilt, above which nothing is known that a reading could spoil
+SLOWEST: Final = rate(6.0 * DEG)  # rad/s, up to which a mean over a cycle is that of one attitude
+GRAVITY_ERROR: Final = factor(0.05)  # of gravity, at rest
+FAR_OFF: Final = factor(1.0 - math.cos(0.1))  # of an upright tube; more is not left to the linear levelling
+
+
+@kernel
+def level_coarsely(state: Any, config: Any, turning: Array, force: Array) -> None:
+    """Take the direction of a slow node's specific force (3, m/s^2) if its tilt is unknown; ``turning`` in rad/s."""
+    if min(state.P[TX, TX], state.P[TY, TY]) < UNKNOWN_VAR:
+        return
+    weight = length(force[0], force[1], force[2])
+    if abs(weight - config.gravity) > times(config.gravity, GRAVITY_ERROR) or largest(turning) > SLOWEST:
+        return
+    down = state.down
+    along = times(force[0], down[0]) + times(force[1], down[1]) + times(force[2], down[2])
+    linear = times(FAR_OFF, times(down[2], down[2]))  # of one that lies a turn about its axis is many across it
+    if -along < weight - times(weight, linear):
+        for k in range(3):
+            down[k] = -fraction(force[k], weight)

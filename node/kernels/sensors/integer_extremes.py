@@ -1,0 +1,72 @@
+"""The law of the largest of noisy samples around a circle, in integers: ``node.kernels.sensors.alignment.extreme_var``.
+
+Its product of normal distributions is a sum of their logarithms, from a table, and 2 to minus that sum.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import Final
+
+import numpy as np
+
+from node.kernels.arithmetic.formats import ANGLE_Q, VECTOR_Q
+from node.kernels.arithmetic.integers import mul, quotient, root_of, shift
+from node.kernels.arithmetic.jit import kernel
+from node.kernels.arithmetic.trigonometry import counts, exponential, sine_cosine
+
+LIMIT, STEP = 8.0, 0.1  # sigmas, range and step of the integrals over the law of an extreme
+PHASES: Final = 4  # of the sampling against the extremes, over which their law is averaged
+LEVEL_Q: Final = 24  # of a level, sigmas
+CELL_Q: Final = LEVEL_Q - 5  # of the table: 32 a sigma
+COUNT: Final = round(2.0 * LIMIT / STEP)
+LOWEST: Final = round(-LIMIT * 2.0**LEVEL_Q)
+LEVELS: Final = np.arange(-LIMIT, LIMIT + 0.05, 1.0 / 32.0)
+LOGS: Final = np.array(
+    [round(-math.log2(0.5 * math.erfc(-x / math.sqrt(2.0))) * 2.0**32) for x in LEVELS], np.int64
+)  # -log2 of the normal distribution, Q32
+NOTHING: Final = 32 << 32  # of a sum of them: the law is 0 in 31 bits
+LARGEST: Final = 1 << (LEVEL_Q + 20)  # ratio of radius and noise
+HALF_STEP_SQUARED: Final = round(STEP * STEP / 4.0 * 2.0**31)
+NEVER_BELOW: Final = 1 << 4  # rad, Q40, of a noise: as 1e-12 rad for floats, and a ratio still fits
+ONE: Final = 1 << VECTOR_Q
+
+
+@kernel
+def law(z: int, ratio: int, samples: int, phase: int) -> int:
+    """How probable it is (Q31) that no sample is above the radius by ``z`` sigmas (Q24)."""
+    total = 0
+    for k in range(samples):
+        cosine = sine_cosine((((k << 3) + 2 * phase + 1) << 32) // (samples << 3))[1]
+        level = z + (mul(ratio, max(ONE - cosine, 0)) << 1) - LOWEST
+        cell = level >> CELL_Q
+        if cell < LOGS.shape[0] - 1:
+            beyond = level & ((1 << CELL_Q) - 1)
+            total += LOGS[cell] - (((LOGS[cell] - LOGS[cell + 1]) * beyond) >> CELL_Q)
+        if total > NOTHING:
+            return 0
+    return exponential(total << 10, 1 << 28)
+
+
+@kernel
+def variance_in_integers(ratio: int, samples: int) -> int:
+    """As ``alignment.extreme_var``, Q38; ``ratio`` in Q24. In half steps the middles are odd numbers."""
+    first = second = 0
+    for phase in range(PHASES):
+        below = 0
+        for m in range(1, COUNT + 1):
+            above = law(LOWEST + (m << LEVEL_Q) // 10, ratio, samples, phase)
+            middle = 2 * m - 1 - COUNT
+            first += (above - below) * middle
+            second += (above - below) * middle * middle
+            below = above
+    mean = shift(first // PHASES, 8)
+    spread = max((second // PHASES << 15) - mean * mean, 0)
+    return shift(mul(spread, HALF_STEP_SQUARED), 8)
+
+
+def std_in_integers(lean: int, noise: int, samples: int) -> int:
+    """As ``node.kernels.sensors.alignment.extreme_std``, rad in Q40."""
+    sine = sine_cosine(counts(lean, ANGLE_Q))[0]
+    ratio = min(quotient(sine << 4, max(noise, NEVER_BELOW)), LARGEST)
+    return mul(noise, shift(root_of(variance_in_integers(ratio, samples) << 17), 12)) << 3

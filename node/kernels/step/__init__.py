@@ -1,0 +1,1 @@
+"""One step of a node, and ways to call it."""

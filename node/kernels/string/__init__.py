@@ -1,0 +1,1 @@
+"""What goes from tube to tube: encoder, aiding, twist and made-up joints."""

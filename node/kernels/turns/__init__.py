@@ -1,0 +1,1 @@
+"""What is believed of rates, aidings and turns: gates, doubts, faults."""

@@ -1,0 +1,157 @@
+"""What gyroscope and aiding leave unexplained between them: variance of the yaw until it is explained.
+
+Two kinds. A *misfit* is innovations that are larger than their variance again and again, or like the one before, which
+those of a right filter are not: a disc off its centre, a sensor that leans or feels vibration, a drive that swings
+between two samples. No filter averages it away, for it is not white: what the innovations have beyond their variance,
+or in common with the one before, is systematic variance of the yaw. The variance of an aiding has it up to a limit
+only: a gain that falls as innovations grow would let the yaw go. A *jump* is a reset after aidings that all
+contradicted the yaw: either the string slipped or the encoder did, and the node cannot know which. What it jumped by
+stays systematic until it jumps back. A sensor whose window is not the cycle's is dated by its driver, which is a little
+off for as long as its crystal is.
+"""
+
+from __future__ import annotations
+
+from typing import Any, Final
+
+from node.kernels.arithmetic.angles import wrap
+from node.kernels.arithmetic.formats import ANGLE_Q, DEG, VECTOR_Q
+from node.kernels.arithmetic.jit import constant, kernel
+from node.kernels.arithmetic.operations import (
+    held,
+    is_number,
+    lasting,
+    mean,
+    number,
+    product,
+    ratio,
+    root,
+    square,
+    times,
+    turn,
+)
+from node.kernels.arithmetic.quantity import NONE, factor, variance
+from node.kernels.record.events import Code, tell, told, told_degrees
+from node.kernels.turns.swings import swing_var
+
+MEMORY: Final = 32  # aidings over which the misfit is averaged
+DOUBTED: Final = factor(
+    2.0
+)  # mean of innovation^2 / variance, from where it is a misfit; of honest noise once in 10^5 hours
+CLEARED: Final = factor(1.5)  # likewise, below which it is none any more
+ALIKE: Final = factor(0.7)  # mean of the products of neighbours over the variance, from where they hang together
+UNLIKE: Final = factor(0.3)  # likewise, below which they do not any more
+MOST: Final = 9  # variances, that one innovation counts for: outliers and faults are for the gate
+SURE: Final = 5  # sigmas, from where what a gyroscope cannot explain is a jump
+UNSURE_CYCLES: Final = 2  # in which it may have been wrong before it contradicted, or turned otherwise than last
+SETTLED: Final = 9  # variances, within which two jumps cancel each other
+LEAST: Final = factor(0.01)  # of a variance, that is left of it without the misfit
+LARGEST_MISFIT: Final = variance((5.0 * DEG) ** 2)  # rad^2
+LARGEST_NOISE: Final = variance((0.1 * DEG) ** 2)  # rad^2, of it in the variance of an aiding
+AIDING_DOUBTED = constant(Code.AIDING_DOUBTED)
+
+
+@kernel
+def misfit_var(node: Any) -> float:
+    """Variance (rad^2) of the yaw by the misfit; while the head turns also by its swings, which a rest ends."""
+    guard = node.guard
+    shown = max(guard.excess, guard.shared) if guard.doubted == 1 else 0
+    swung = swing_var(node) if guard.rate != 0 else 0
+    return number(min(max(shown, swung), LARGEST_MISFIT))
+
+
+@kernel
+def noise_var(node: Any) -> float:
+    """Variance (rad^2) of an aiding by the misfit; of a head at rest none, for what misfits is the turning."""
+    return min(misfit_var(node), LARGEST_NOISE) if node.guard.rate != 0 else 0
+
+
+@kernel
+def unexplained_var(node: Any) -> float:
+    """Variance (rad^2) of the yaw that no filter averages away: of misfit, ramps, the jump, of a late window."""
+    return held(misfit_var(node) + node.guard.ramp.doubt + square(node.guard.jump) + window_var(node))
+
+
+@kernel
+def is_dated(node: Any) -> bool:
+    """Whether a driver dates the window of its readings."""
+    late = node.cluster.delayed[0].late
+    return bool(late != 0 and is_number(late))
+
+
+@kernel
+def window_var(node: Any) -> float:
+    """Variance (rad^2) of the yaw while the head turns, by what that date may be off."""
+    return square(turn(node.guard.rate, node.cluster.delayed[0].std)) if is_dated(node) else 0
+
+
+@kernel
+def passing_var(node: Any) -> float:
+    """Variance (rad^2) of an aiding by that part of it which is another one in every window."""
+    return window_var(node) - square(turn(node.guard.rate, node.cluster.delayed[0].lasting)) if is_dated(node) else 0
+
+
+@kernel
+def follow_misfit(node: Any) -> None:
+    """Take the innovation of an aiding in; ``state.innovation_var`` has the present misfit in it.
+
+    m += (r^2 / S - m) / n and E += (r^2 - S - E) / n, with S the variance without the misfit and r^2 at most 9 times
+    that with it; the same of the product with the innovation before, whose mean is that of no noise.
+    """
+    state, guard = node.filter, node.guard
+    whole = state.innovation_var
+    if not whole > 0:
+        return
+    plain = max(whole - noise_var(node), times(whole, LEAST))
+    own = min(square(state.innovation), MOST * whole)
+    guard.misfit += mean(ratio(own, plain) - guard.misfit, MEMORY)
+    guard.excess = max(guard.excess + mean(own - plain - guard.excess, MEMORY), 0)
+    common = max(min(product(state.innovation, guard.before), MOST * whole), -MOST * whole)
+    guard.likeness += mean(ratio(common, plain) - guard.likeness, MEMORY)
+    guard.shared = max(guard.shared + mean(common - guard.shared, MEMORY), 0)
+    guard.before = state.innovation
+    if guard.doubted == 0 and (guard.misfit > DOUBTED or guard.likeness > ALIKE):
+        guard.doubted = 1
+        sigma = told_degrees(root(misfit_var(node)), ANGLE_Q)
+        tell(node, AIDING_DOUBTED, told(guard.misfit, VECTOR_Q), sigma, NONE, NONE)
+    elif guard.doubted == 1 and guard.misfit < CLEARED and guard.likeness < UNLIKE:
+        guard.doubted = 0
+
+
+@kernel
+def follow_jump(node: Any) -> None:
+    """The yaw was taken from an aiding that contradicted it: it jumped by the innovation, unless it came back.
+
+    The systematic variance says so at once; from the next aiding on it is that of the aiding.
+    """
+    state, guard, before = node.filter, node.guard, node.guard.jump
+    guard.last_jump = state.innovation
+    guard.jump = wrap(guard.jump + state.innovation)
+    if square(guard.jump) < SETTLED * state.innovation_var:
+        guard.jump = 0
+    state.systematic_var = held(max(state.systematic_var + square(guard.jump) - square(before), 0))
+
+
+@kernel
+def keep_contradiction(node: Any) -> None:
+    """The gyroscope turns out to give nothing while aidings contradict it: at rest it may explain what it turned by.
+
+    What is left is a jump, of which the node will know nothing more. Where the head turned nothing can be said.
+    """
+    state, guard = node.filter, node.guard
+    if state.rejected == 0 or guard.rest_cycles < state.rejected:
+        return
+    turned = turn(state.now_rate, lasting(state.now, state.rejected))
+    unsure = abs(turn(state.now_rate, lasting(state.now, UNSURE_CYCLES))) + SURE * root(state.innovation_var)
+    jump = wrap(state.innovation + turned)
+    if abs(jump) > unsure:
+        guard.jump = wrap(guard.jump + jump)
+
+
+@kernel
+def explain_jump(node: Any) -> None:
+    """The last reset was the gyroscope's doing: what the yaw jumped by is no longer in doubt."""
+    guard = node.guard
+    if guard.last_jump != 0:
+        guard.jump = wrap(guard.jump - guard.last_jump) if guard.jump != 0 else 0
+        guard.last_jump = 0

@@ -1,0 +1,199 @@
+"""What a node does about a faulty sensor: the safe state, the way back, and the events of both.
+
+While the gyroscope's readings are wrong the encoder's rate stands for them and the yaw's variance is that of an unknown
+yaw. A step or a new scale is learnt (`mismatches`). Either way no cross term is kept. The node trusts itself again
+when readings are sane and several aidings in a row agree within a gate that is narrow again.
+"""
+
+from __future__ import annotations
+
+from typing import Any, Final
+
+from node.kernels.arithmetic.formats import DEG
+from node.kernels.arithmetic.jit import constant, kernel
+from node.kernels.arithmetic.operations import half, lasting, root, scaled, times, unscaled
+from node.kernels.arithmetic.quantity import NONE, angle, rate
+from node.kernels.filter.modes import STATIC_BIAS
+from node.kernels.filter.resets import lose_tilt, lose_yaw_ahead, open_biases
+from node.kernels.record.events import Fault, tell
+from node.kernels.record.filter_record import RECENT, Status
+from node.kernels.sensors.sensor_watch import find_faults
+from node.kernels.string.encoder_rate import RATE_AGE
+from node.kernels.turns.aiding_watch import AT_ONCE, AT_REST, STARTING, find_mismatch, forget, keep_newest
+from node.kernels.turns.doubts import follow_jump, follow_misfit, keep_contradiction, misfit_var
+from node.kernels.turns.mismatches import learn_mismatch, recover_gyro
+from node.kernels.turns.odd_force import keeps_out
+from node.kernels.turns.ramps import follow_fit, is_starting, learn_scale_anew
+from node.kernels.turns.trust import SANE_CYCLES, hold, is_faulty, tell_recovery
+
+AGREEING: Final = 4  # aidings in a row, until the node is trusted again
+NARROW_STD: Final = angle(1.0 * DEG)  # of an innovation that can show agreement
+CREDIBLE: Final = rate(5.0 * DEG)  # rad/s, from the encoder's rate, of a gyroscope that may be listened to again
+LARGEST_DRIFT: Final = rate(1.0 * DEG)  # rad/s, of a bias since the last rest; more is a fault, or a motion
+BAD_SAMPLE, GYRO_STEP = constant(Fault.BAD_SAMPLE), constant(Fault.GYRO_STEP)
+AIDED, REJECTED, YAW_RESET = int(Status.AIDED), int(Status.REJECTED), int(Status.YAW_RESET)
+REFERENCE_CHANGED = int(Status.REFERENCE_CHANGED)
+
+
+@kernel
+def guard_reading(node: Any, settings: Any, saturated: int, at: float) -> None:
+    """Judge the raw reading, and replace in ``node.rate`` and ``node.force`` what is not to be used."""
+    state, guard, turning, force = node.filter, node.guard, node.rate, node.force
+    gyro, accelerometer = find_faults(guard.readings, settings, node.raw_rate[:], node.raw_force[:], saturated)
+    known = abs(at - guard.rate_at) <= RATE_AGE
+    measured = unscaled(turning[2] - state.static_bias[2] - state.bias[2], state.scale)
+    if gyro == 0 and is_faulty(guard.gyro) and known and abs(measured - guard.rate) > CREDIBLE:
+        gyro = guard.gyro.fault
+    follow_gyro(node, gyro)
+    follow_force(node, accelerometer)
+    if gyro != 0:
+        for k in range(3):
+            turning[k] = state.static_bias[k] + state.bias[k]
+        turning[2] += scaled(guard.rate if known else guard.sane_rate, state.scale)
+        state.ring_split[state.cycles % RECENT] = 0
+    else:
+        guard.sane_rate = measured
+    if accelerometer != 0 or keeps_out(node):
+        for k in range(3):
+            force[k] = -times(node.config.gravity, state.now_down[k])
+    hold(node)
+
+
+@kernel
+def judge_cycle(node: Any, status: int, at: float) -> None:
+    """See what the filter made of the cycle that ended at ``at`` (s, own clock)."""
+    hold(node)
+    state, guard = node.filter, node.guard
+    if state.mode == STATIC_BIAS:
+        guard.before_steps = NONE  # the constant bias is measured again
+    if state.mode == STATIC_BIAS or status & REFERENCE_CHANGED or is_faulty(guard.gyro):
+        forget(guard.aidings)
+        return
+    if guard.reversed == 1 and guard.rate != 0:
+        forget(guard.aidings)
+        return
+    rejected = 1 if status & REJECTED else 0
+    reset = 1 if status & YAW_RESET else 0
+    if is_settling(node) or is_handled(node):
+        forget(guard.aidings)
+        return
+    if rejected == 0 and (status & AIDED == 0 or reset == 1):
+        guard.jump = guard.jump if reset == 0 else 0  # a yaw that was unknown has nothing to be contradicted
+        return
+    sigma = root(max(state.innovation_var, 0) + misfit_var(node))
+    patience = patience_of(node)
+    find_mismatch(guard.aidings, guard.found, state.innovation, sigma, state.now_rate, at, rejected, reset, patience)
+    if guard.gyro.fault == 0:
+        follow_doubts(node, rejected, reset)
+    if guard.found.fault != 0:
+        learn_mismatch(node)
+    elif guard.gyro.proving == 1:
+        guard.agreed = 0 if rejected == 1 else guard.agreed + (1 if sigma < NARROW_STD else 0)
+        if guard.agreed >= AGREEING:
+            recover_gyro(node)
+
+
+@kernel
+def patience_of(node: Any) -> int:
+    """How long a mismatch is looked at: a string that starts may wind up, one that stood still may unwind."""
+    if is_starting(node):
+        return STARTING
+    return AT_REST if node.guard.rest_cycles > 0 and stood_in_this_rest(node) else AT_ONCE
+
+
+@kernel
+def follow_doubts(node: Any, rejected: int, reset: int) -> None:
+    """What an aiding shows that was used, or rejected but not for a step, is a misfit; a reset is a jump.
+
+    A reset soon after a start: what the string did then may have gone into the scale before it was rejected.
+    """
+    guard = node.guard
+    follow_fit(node, rejected)
+    if rejected == 0:
+        guard.last_jump = 0
+    if rejected == 0 or guard.found.refuted == 1:
+        follow_misfit(node)
+    if reset == 1:
+        follow_jump(node)
+        if is_starting(node):
+            learn_scale_anew(node)
+            keep_newest(guard.aidings)  # they contradicted by a scale that is gone
+
+
+@kernel
+def is_settling(node: Any) -> bool:
+    """Whether the head rests and the node by its bias has not yet, by little: the rest will show which is wrong.
+
+    A node that stood still in this rest and does not any more is another matter: its gyroscope took a step.
+    """
+    guard, state = node.guard, node.filter
+    if guard.rest_cycles == 0 or state.still_cycles > 0 or abs(state.now_rate) > LARGEST_DRIFT:
+        return False
+    return not stood_in_this_rest(node)
+
+
+@kernel
+def stood_in_this_rest(node: Any) -> bool:
+    """Whether the node has stood still since the head did, or the cycle before: half a cycle off the grid of cycles."""
+    state = node.filter
+    return bool(state.stopped_at > state.now - half(lasting(state.now, 2 * node.guard.rest_cycles + 3)))
+
+
+@kernel
+def is_handled(node: Any) -> bool:
+    """Whether the tube is tilted while the head rests: it hangs on no string, and the encoder tells nothing of it."""
+    guard, state = node.guard, node.filter
+    across = 0
+    for k in range(2):
+        across = max(across, abs(node.rate[k] - state.static_bias[k] - state.bias[k]))
+    return bool(guard.rest_cycles > 0 and across > LARGEST_DRIFT)
+
+
+@kernel
+def follow_gyro(node: Any, fault: int) -> None:
+    """Take one cycle's judgement of the gyroscope."""
+    guard, trust = node.guard, node.guard.gyro
+    if fault != 0:
+        if trust.fault != fault:
+            tell(node, fault, NONE, NONE, NONE, NONE)
+        if trust.fault == 0:
+            trust.cycles = 0
+            keep_contradiction(node)
+        if trust.fault == GYRO_STEP and trust.proving == 1 and guard.step.fault != 0:
+            node.filter.static_bias[2] += guard.step.rate  # what looked like a step was this fault's beginning
+            guard.step.fault = 0
+        trust.fault, trust.proving, trust.sane = fault, 0, 0
+    elif is_faulty(trust):
+        trust.sane += 1
+        if trust.sane > SANE_CYCLES:
+            trust.proving = 1
+            guard.agreed = 0
+            forget(guard.aidings)
+            lose_yaw_ahead(node.filter)
+            open_biases(node.filter, node.config)
+    if trust.fault != 0:
+        trust.cycles += 1
+
+
+@kernel
+def follow_force(node: Any, fault: int) -> None:
+    """Take one cycle's judgement of the accelerometer."""
+    trust, state = node.guard.force, node.filter
+    if fault != 0:
+        told = BAD_SAMPLE in (trust.fault, fault)  # by the gyroscope, whose reading it is too
+        if trust.fault != fault and not told:
+            tell(node, fault, NONE, NONE, NONE, NONE)
+        if trust.fault == 0:
+            trust.cycles = 0
+        trust.fault, trust.proving, trust.sane = fault, 0, 0
+    elif is_faulty(trust):
+        trust.sane += 1
+        if trust.sane > SANE_CYCLES:
+            lose_tilt(state)
+            state.surveyed = 0
+            state.still_cycles = 0  # the average of a stop begins again
+            if trust.fault != BAD_SAMPLE:
+                tell_recovery(node, trust)
+            trust.fault, trust.proving, trust.sane, trust.cycles = 0, 0, 0, 0
+    if trust.fault != 0:
+        trust.cycles += 1

@@ -1,0 +1,100 @@
+"""A lasting mismatch of gyroscope and aiding is learnt as a step of the bias or as a scale, and may be reconsidered.
+
+The readings go on, the constant bias takes the mismatch, and the variances of yaw and bias are opened.
+"""
+
+from __future__ import annotations
+
+from typing import Any, Final
+
+from node.kernels.arithmetic.formats import DEG, RATE_Q
+from node.kernels.arithmetic.jit import constant, kernel
+from node.kernels.arithmetic.operations import fraction, half, is_number, scale_square, square, times
+from node.kernels.arithmetic.quantity import NONE, factor, rate, rate_variance
+from node.kernels.filter.priors import bias_var, scale_var
+from node.kernels.filter.resets import settle_yaw, take_mismatch
+from node.kernels.record.events import Fault, tell, told_degrees
+from node.kernels.record.filter_record import Err
+from node.kernels.turns.aiding_watch import STEADY
+from node.kernels.turns.doubts import explain_jump
+from node.kernels.turns.ramps import explain_ramp
+from node.kernels.turns.trust import tell_recovery
+
+LEARNT_VAR: Final = rate_variance((0.05 * DEG) * (0.05 * DEG))  # (rad/s)^2, error of a bias read from a mismatch
+LARGEST_STEP: Final = rate(10.0 * DEG)  # rad/s, that a bias may take; a gyroscope farther off is not listened to
+SLOWEST_SCALE: Final = rate(DEG)  # rad/s, from where a mismatch tells the size of a scale
+LARGEST_SCALE: Final = factor(0.1)  # 1, that is looked for
+UNSURE: Final = factor(0.1)  # of a step that was read, its error
+TAKEN_BACK: Final = factor(0.2)  # of a step, by which what cancels it may differ
+PSI, BZ, S = constant(Err.YAW), constant(Err.BIAS_Z), constant(Err.SCALE)
+GYRO_STEP, GYRO_SCALE = constant(Fault.GYRO_STEP), constant(Fault.GYRO_SCALE)
+
+
+@kernel
+def learn_mismatch(node: Any) -> None:
+    """A lasting mismatch belongs to the sensor: its bias or its scale takes it, and the yaw starts again."""
+    state, config, guard = node.filter, node.config, node.guard
+    trust, found = guard.gyro, guard.found
+    reconsider(node)
+    explain_jump(node)
+    explain_ramp(guard.ramp)
+    prior = max(bias_var(config, 2) + state.static_bias_var[2], LEARNT_VAR)
+    of_scale = state.P[S, S]
+    learnable = found.steady == 1 and abs(found.rate) <= LARGEST_STEP
+    if found.fault == GYRO_SCALE and scale_var(config) > 0:
+        change = fraction(abs(found.rate), abs(found.spin)) if abs(found.spin) > SLOWEST_SCALE else LARGEST_SCALE
+        of_scale = max(of_scale, scale_square(min(change, LARGEST_SCALE)))
+        learnable = True
+        undo_steps(node)
+    elif learnable:
+        if not is_number(guard.before_steps):
+            guard.before_steps, guard.first_step = state.static_bias[2], abs(found.rate)
+        state.static_bias[2] -= found.rate
+        prior += square(times(found.rate, UNSURE))
+    take_mismatch(state, prior, of_scale)
+    state.rejected = 0
+    guard.step.fault = found.fault if found.fault == GYRO_STEP and learnable else 0
+    guard.step.rate, guard.step.spin, guard.step.steady = found.rate, found.spin, found.steady
+    if trust.fault != found.fault:
+        tell(node, found.fault, told_degrees(found.rate, RATE_Q), told_degrees(found.spin, RATE_Q), NONE, NONE)
+    if trust.fault == 0:
+        trust.cycles = 0
+    trust.fault, trust.proving, trust.sane = found.fault, 1 if learnable else 0, 0
+    guard.agreed = 0
+
+
+@kernel
+def reconsider(node: Any) -> None:
+    """What a change of speed takes back was no step but the scale; the constant bias gets back what it took."""
+    found, before = node.guard.found, node.guard.step
+    if before.fault == 0 or abs(found.spin - before.spin) < half(abs(before.spin)):
+        return
+    if found.steady == 0 or abs(found.rate + before.rate) > times(abs(before.rate), TAKEN_BACK):
+        return
+    node.filter.static_bias[2] += before.rate
+    found.fault, found.rate, found.spin, found.steady = GYRO_SCALE, before.rate, before.spin, 1
+
+
+@kernel
+def undo_steps(node: Any) -> None:
+    """Steps that cancelled each other were the scale that is learnt now: the constant bias is the earlier one."""
+    state, guard = node.filter, node.guard
+    earlier = guard.before_steps
+    guard.before_steps = NONE
+    if not is_number(earlier):
+        return
+    if abs(state.static_bias[2] - earlier) < times(guard.first_step, STEADY):
+        state.static_bias[2] = earlier
+        state.bias[2] = 0
+
+
+@kernel
+def recover_gyro(node: Any) -> None:
+    """The gyroscope has proved itself."""
+    state, guard, trust = node.filter, node.guard, node.guard.gyro
+    if trust.fault == GYRO_STEP:  # it lasts, and the Gauss-Markov part would forget it
+        state.static_bias[2] += state.bias[2]
+        state.bias[2] = 0
+    settle_yaw(state, guard.aiding_var)
+    tell_recovery(node, trust)
+    trust.fault, trust.proving, trust.sane, trust.cycles = 0, 0, 0, 0
