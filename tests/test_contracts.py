@@ -36,7 +36,7 @@ FORBIDDEN = [
     ("borechain/cli/options.py", "import can"),
     ("node/kernels/record/filter_record.py", "import msgpack"),
     ("node/firmware/encoder.py", "import asyncio"),
-    ("groundstation/survey/tools/formulas.py", "import groundstation.survey.wall.column_joint.voids"),
+    ("groundstation/survey/tools/formulas.py", "import groundstation.survey.wall.voids"),
     ("node/kernels/record/ring.py", "import node.kernels.filter.resets"),
     ("node/kernels/filter/fixed/cycle.py", "import node.kernels.filter.float64.cycle"),
 ]
