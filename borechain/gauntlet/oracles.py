@@ -213,12 +213,12 @@ def _directions(rig: GauntletRig) -> Iterator[str]:
 def _flags(hole: Hole) -> Iterator[str]:
     """Flags have their effects: a faulty sensor's survey is not fused, and an unknown yaw gives no azimuth."""
     for station in hole.stations:
-        for cluster in station.clusters:
-            if NodeFlag.SENSOR_FAULT in cluster.flags:
-                yield f"tube {cluster.tube}: a survey of a faulty sensor is fused"
-        counting = [station.clusters[place] for place in station.counting]
-        yaws = [cluster.fused_yaw_var for cluster in counting]
-        flagged = [NodeFlag.YAW_UNTRUSTED in cluster.flags for cluster in counting]
+        for stop in station.stops:
+            if NodeFlag.SENSOR_FAULT in stop.flags:
+                yield f"tube {stop.tube}: a survey of a faulty sensor is fused"
+        counting = [station.stops[place] for place in station.counting]
+        yaws = [stop.fused_yaw_var for stop in counting]
+        flagged = [NodeFlag.YAW_UNTRUSTED in stop.flags for stop in counting]
         if flagged and all(flagged) and min(yaws) < math.radians(UNKNOWN_DEG) ** 2:
             yield f"station at {station.md:.2f} m: untrusted yaws have a sigma of {math.sqrt(min(yaws)):.4f} rad"
         if any(flagged) and not all(flagged):
@@ -254,7 +254,7 @@ def _expected(rig: GauntletRig) -> list[tuple[int, float]]:
     waits = [one.stand.md for one in string.stops if not one.judged and one.age(epoch, string.time.rig_now) < due]
     owed = _nodes([stop for stop in stops if not any(abs(stop[1] - md) <= DEPTH_TOLERANCE for md in waits)])
     heard = max((stand.ended_at for stand in string.depths.stands if stand.epoch == epoch), default=math.inf)
-    late = {one.measurement.tube for one in waiting if one.measurement.station_at > heard}
+    late = {one.message.tube for one in waiting if one.message.station_at > heard}
     coming = [one for one in _nodes([(max(late, default=0), rig.world.true_depth(rig.world.end))]) if one[0] in late]
     return [one for one in owed if not _is_among(one, coming)]
 

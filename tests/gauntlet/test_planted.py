@@ -12,13 +12,13 @@ from borechain.gauntlet import rig as gauntlet_rig
 from borechain.gauntlet.run import run_seed, shrink
 from groundstation.errors import StoreError
 from groundstation.service.disk import database
-from groundstation.service.disk.ground_store import Stored
 from groundstation.service.disk.keeper import Keeper
 from groundstation.service.hole import placement as placement_module
 from groundstation.service.process.ground_process import GroundProcess
 from groundstation.service.process.learner import Learner
 from groundstation.service.string import drill_string as string_module
 from groundstation.service.string.depth import DepthLog
+from groundstation.service.string.stored import Stored
 from groundstation.survey.fusion.survey_trust import Trust
 from node.firmware.settings import TubeSettings
 from node.process import counter as counter_module

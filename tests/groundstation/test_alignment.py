@@ -10,7 +10,7 @@ from memory_rig import NOISELESS, Rig
 from groundstation.config import GroundConfig
 from groundstation.service.answers.model import RigModel
 from groundstation.service.answers.views import node, stations
-from groundstation.service.hole.resolved_stops import force_var
+from groundstation.service.hole.resolving import force_vars
 from groundstation.service.orders.order_book import Order
 from groundstation.survey.fusion.resolve import combine_imus
 from node.firmware.imu_settings import ImuSettings
@@ -104,10 +104,10 @@ def test_the_ground_station_weighs_all_imus_of_a_survey() -> None:
         for angle, v in zip((lean, lean + 4e-4 / G), variances, strict=True)
     )
     survey = SurveyMeasurement(1, 1, 1000.0, 1, imus, 0.0, 1e-9, 1e-9, 32, 20.0, NodeFlag.NONE)
-    assert model.placement.on_measurement(survey, 2.0) == ""
+    assert model.placement.place_one(survey, 2.0) == ""
     row = stations(model, {})["stations"][0]
     assert row["inclination_deg"] * DEG == pytest.approx(lean + 1e-4 / G, abs=1e-9)
     assert row["sigma_force_mps2"] ** 2 == pytest.approx(0.75e-8)
     covs = np.array([imu.force_cov for imu in imus])
     _, cov = combine_imus(np.array([imu.force for imu in imus]), covs)
-    assert force_var(survey) == pytest.approx(np.trace(cov) / 3.0)
+    assert force_vars(covs[None])[0] == pytest.approx(np.trace(cov) / 3.0)

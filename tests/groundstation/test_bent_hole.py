@@ -41,7 +41,7 @@ def model_of(folder: Path, placed: list[Placed], **settings: Any) -> RigModel:
     model = RigModel.begin(GroundConfig(folder=folder, **settings))
     model.string.tally.restore([5, 4, 3, 2, 1])
     for measurement, md in placed:
-        assert model.placement.on_measurement(measurement, md) == ""
+        assert model.placement.place_one(measurement, md) == ""
         _ = model.hole.trajectory  # what follows from each is worked out as it comes
     return model
 
@@ -89,7 +89,7 @@ def test_a_station_between_two_others_changes_what_is_below_it(tmp_path: Path) -
     assert before["transport_deg"] != pytest.approx(5.0 * LACKED_DEG, abs=1e-4)
     assert abs(before["transport_deg"] - 5.0 * LACKED_DEG) < 3.0 * before["sigma_transport_deg"]
     for measurement, md in late:
-        model.placement.on_measurement(measurement, md)
+        model.placement.place_one(measurement, md)
     after = rows(model)[-1]
     assert abs(after["transport_deg"] - 5.0 * LACKED_DEG) < abs(before["transport_deg"] - 5.0 * LACKED_DEG)
 

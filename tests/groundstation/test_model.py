@@ -17,6 +17,7 @@ from groundstation.config import GroundConfig
 from groundstation.errors import SelectorError
 from groundstation.service.answers import alarm_views, column_views
 from groundstation.service.answers.model import RigModel
+from groundstation.service.string.stored import Stored
 from groundstation.survey.fusion.resolve import angles
 from groundstation.survey.well.ellipsoid import plan_ellipse
 from telemetry.messages import ImuMean, NodeFlag, SurveyMeasurement
@@ -59,7 +60,7 @@ def knowing(tmp_path: Path, measurements: list[Placed], tubes: int = 0, **settin
     model = RigModel.begin(GroundConfig(folder=tmp_path, **settings))
     model.string.tally.restore(list(range(tubes, 0, -1)))
     for measurement, md in measurements:
-        assert model.placement.on_measurement(measurement, md) == ""
+        assert model.placement.place_one(measurement, md) == ""
     return model
 
 
@@ -146,7 +147,7 @@ def test_a_neighbour_that_changed_at_another_stop_is_no_evidence(tmp_path: Path)
 
 def result(model: RigModel) -> dict[str, Any]:
     """All that follows from the surveys."""
-    stations = [(s.md, s.first, [(c.tube, c.sequence) for c in s.clusters]) for s in model.hole.stations]
+    stations = [(s.md, s.first, [(c.tube, c.sequence) for c in s.stops]) for s in model.hole.stations]
     fused = [model.hole.direction_of(s) for s in model.hole.stations]
     directions = [np.concatenate([f.lean, [f.down], f.cov.ravel(), f.total_cov.ravel()]) for f in fused]
     points = [np.concatenate([[p.md], p.position, p.cov.ravel()]) for p in model.hole.trajectory]
@@ -207,7 +208,7 @@ def test_a_station_that_was_met_later_changes_no_earlier_decision(tmp_path: Path
 def test_a_late_survey_clears_no_alarm_before_it_was_raised(tmp_path: Path) -> None:
     model = knowing(tmp_path, [(survey(1, 2, 1, 2.0), 4.0)], 1, tolerance="5-cm")
     assert model.hole.alarms.active
-    assert model.placement.on_measurement(survey(1, 1, 1, 2.0, azimuth_deg=180.0), 2.0) == ""
+    assert model.placement.place_one(survey(1, 1, 1, 2.0, azimuth_deg=180.0), 2.0) == ""
     assert any(alarm.cleared_at is not None for alarm in model.hole.alarms.alarms)
     for alarm in model.hole.alarms.alarms:
         assert alarm.cleared_at is None or alarm.cleared_at >= alarm.raised_at
@@ -218,7 +219,7 @@ def test_it_does_not_matter_whether_somebody_looks_between_two_surveys(tmp_path:
     measurements = moving(5, 5)
     looked_at = knowing(tmp_path, [], 5)
     for measurement, md in measurements:
-        looked_at.placement.on_measurement(measurement, md)
+        looked_at.placement.place_one(measurement, md)
         assert looked_at.hole.trajectory[-1].md == looked_at.hole.stations[-1].md
     together = knowing(tmp_path, measurements, 5)
     assert pickle.dumps(result(looked_at)) == pickle.dumps(result(together))
@@ -237,8 +238,8 @@ def test_a_measurement_that_is_none_is_counted_and_changes_nothing(tmp_path: Pat
     model = knowing(tmp_path, passes(2, lambda _stop, _station: 1.0), 2)
     before = result(model)
     bad = SurveyMeasurement(1, 9, 2000.0, 1, (ImuMean((0.0, 0.0, 0.0), COV),), 0.0, 1e-8, 1e-8, 32, 20.0, NodeFlag.NONE)
-    assert model.placement.on_measurement(bad, 2.0) == "survey_refused"
-    assert model.placement.on_measurement(survey(1, 10, 1, 1.0), None) == ""
+    assert model.placement.place_one(bad, 2.0) == "survey_refused"
+    assert model.placement.wait_for_depth(Stored(survey(1, 10, 1, 1.0), None)) == ""
     assert (model.placement.refused, model.placement.unplaced) == (1, 1)
     assert differing(result(model), before) == []
 

@@ -89,6 +89,6 @@ def test_a_depth_that_is_doubted_before_the_survey_is_fused_is_taken_back(rig: R
     again.now += 0.5
     again.ground.on_depth(encode(DepthReading(1000, again.now, HERE, (other,), epoch)), again.now)
     assert stored(again) == [None]
-    assert [one.kept for one in model.placement.waiting] == [None]
+    assert [one.md for one in model.placement.waiting] == [None]
     assert model.newest_row("measurements") == 0
     again.ground.close()

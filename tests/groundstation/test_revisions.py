@@ -29,7 +29,7 @@ def heard(tmp_path: Path, measurements: list[Placed]) -> RigModel:
     model = RigModel.begin(GroundConfig(folder=tmp_path))
     model.string.tally.restore(list(range(STOPS, 0, -1)))
     for measurement, md in measurements:
-        model.placement.on_measurement(measurement, md)
+        model.placement.place_one(measurement, md)
     return model
 
 
@@ -79,8 +79,8 @@ def test_a_revision_says_what_it_replaces_and_is_new_in_the_stream(tmp_path: Pat
     first = passes(2, lambda _stop, _station: 1.0)
     model = heard(tmp_path, first)
     newest = measurement_views.measurements(model, {})["newest"]
-    model.placement.on_measurement(*revised(first[0], 7, 1e-3))
-    model.placement.on_measurement(*revised(first[0], 9, 2e-3))
+    model.placement.place_one(*revised(first[0], 7, 1e-3))
+    model.placement.place_one(*revised(first[0], 9, 2e-3))
     answer = measurement_views.measurements(model, {"since": str(newest), "limit": "10"})
     assert [(row["sequence"], row["replaces"], row["seq"]) for row in answer["measurements"]] == [(9, 7, newest + 2)]
     assert len(measurement_views.measurements(model, {})["measurements"]) == len(first)
@@ -90,8 +90,8 @@ def test_an_older_word_that_comes_late_changes_nothing(tmp_path: Path) -> None:
     first = passes(2, lambda _stop, _station: 1.0)
     model = heard(tmp_path, [*first, revised(first[1], 9, 2e-3)])
     before, version = shown(model), model.hole.version
-    model.placement.on_measurement(*revised(first[1], 7, 1e-3))
-    model.placement.on_measurement(*first[1])
+    model.placement.place_one(*revised(first[1], 7, 1e-3))
+    model.placement.place_one(*first[1])
     assert shown(model) == before
     assert model.hole.version == version
 
@@ -102,7 +102,7 @@ def test_a_survey_whose_yaw_becomes_known_is_trusted_from_then_on(tmp_path: Path
     unknown = replace(measurement, flags=NodeFlag.RESTORED | NodeFlag.AIDING_OLD), md
     model = heard(tmp_path, [unknown])
     assert [station.untrusted for station in model.hole.stations] == [1]
-    model.placement.on_measurement(*revised((measurement, md), 5, 0.0))
+    model.placement.place_one(*revised((measurement, md), 5, 0.0))
     assert [station.untrusted for station in model.hole.stations] == [0]
     assert model.hole.stations[0].is_trusted
 
@@ -111,7 +111,7 @@ def test_a_better_yaw_shows_in_the_station(tmp_path: Path) -> None:
     first = passes(1, lambda _stop, _station: 30.0)
     model = heard(tmp_path, first)
     (before,) = views.stations(model, {})["stations"]
-    model.placement.on_measurement(*revised(first[0], 5, math.radians(1.0)))
+    model.placement.place_one(*revised(first[0], 5, math.radians(1.0)))
     (after,) = views.stations(model, {})["stations"]
     assert after["azimuth_deg"] - before["azimuth_deg"] == pytest.approx(1.0)
     assert after["sigma_yaw_deg"] == pytest.approx(0.5 * before["sigma_yaw_deg"])
@@ -126,7 +126,7 @@ def test_the_text_of_all_measurements_is_that_of_now_however_often_it_was_asked_
     course = first + [revised(one, LATER + n, 1e-3) for n, one in enumerate(data.draw(st.permutations(first))[:3])]
     model, path = heard(tmp_path, []), FIXED["measurements"]
     for placed in course:
-        model.placement.on_measurement(*placed)
+        model.placement.place_one(*placed)
         for parameters in data.draw(st.lists(st.sampled_from(SELECTIONS), max_size=3)):
             shown_now = measurement_views.measurements(model, parameters)
             answer = orjson.loads(path.json(model, parameters))

@@ -62,7 +62,7 @@ class Drilled:
     def tell(self, model: RigModel) -> RigModel:
         model.string.tally.restore(list(range(len(self.biases), 0, -1)))
         for measurement, md in self.surveys:
-            assert model.placement.on_measurement(measurement, md) == ""
+            assert model.placement.place_one(measurement, md) == ""
         return model
 
 
@@ -112,7 +112,7 @@ def test_a_survey_whose_yaw_is_not_believed_says_nothing_of_a_bias(tmp_path: Pat
     forged = replace(wrong, sequence=99, yaw=wrong.yaw + 2.0, station_at=wrong.station_at + 30.0)
     config = GroundConfig(folder=tmp_path, mount_std_deg=0.0, accelerometer_bias_std_deg=SENSOR_BIAS_DEG)
     model = hole.tell(RigModel.begin(config))
-    assert model.placement.on_measurement(replace(forged, flags=NodeFlag.YAW_UNTRUSTED), md) == "survey_untrusted"
+    assert model.placement.place_one(replace(forged, flags=NodeFlag.YAW_UNTRUSTED), md) == "survey_untrusted"
     after = biases_of(model)
     assert [one.bias.tolist() for one in after.values()] == [one.bias.tolist() for one in before.values()]
 

@@ -49,7 +49,7 @@ def station_of(folder: Path, *surveys: SurveyMeasurement, **config: Any) -> dict
     """What an operator sees of the one station."""
     model = RigModel.begin(GroundConfig(folder=folder, **config))
     for measurement in surveys:
-        model.placement.on_measurement(measurement, MD)
+        model.placement.place_one(measurement, MD)
     return views.stations(model, {})["stations"][0] if model.hole.stations else None
 
 
@@ -88,14 +88,14 @@ def test_a_trusted_survey_that_comes_later_takes_the_station_over(tmp_path: Path
 
 def test_a_survey_of_a_faulty_sensor_is_set_aside(tmp_path: Path) -> None:
     model = RigModel.begin(GroundConfig(folder=tmp_path))
-    assert model.placement.on_measurement(survey(1, flags=NodeFlag.SENSOR_FAULT), MD) == "survey_set_aside"
+    assert model.placement.place_one(survey(1, flags=NodeFlag.SENSOR_FAULT), MD) == "survey_set_aside"
     assert model.hole.stations == []
     assert views.status(model, {})["set_aside_measurements"] == 1
 
 
 def test_a_survey_without_rig_time_has_no_depth(tmp_path: Path) -> None:
     model = RigModel.begin(GroundConfig(folder=tmp_path))
-    assert model.placement.on_measurement(survey(1, flags=NodeFlag.CLOCK_UNSYNCHRONISED), MD) == "survey_unplaced"
+    assert model.placement.place_one(survey(1, flags=NodeFlag.CLOCK_UNSYNCHRONISED), MD) == "survey_unplaced"
     assert views.status(model, {})["unplaced_measurements"] == 1
 
 

@@ -118,10 +118,10 @@ class Watch:
         if against := self._witnesses.on_event(event, self._heard):
             self._alarms.alert("reference", "encoder", against)
 
-    def on_survey(self, measurement: SurveyMeasurement, outcome: str) -> None:
-        """Tell what a survey was not used for: ``outcome`` is a kind of alarm, or empty.
+    def on_measurement(self, measurement: SurveyMeasurement, outcome: str) -> None:
+        """Tell what a measurement was not used for: ``outcome`` is a kind of alarm, or empty.
 
-        A tube whose surveys are all believed, for the last that was not is revised, is told of no longer.
+        A tube whose measurements are all believed, for the last that was not is revised, is told of no longer.
         """
         subject = f"tube {measurement.tube}"
         if outcome:
@@ -257,10 +257,10 @@ class Watch:
         time, waiting = self._time, self._placement.waiting
         overdue: dict[int, list[int]] = {}
         for one in waiting:
-            m = one.measurement
+            m = one.message
             if m.epoch not in (EPOCH_UNKNOWN, time.epoch) or time.rig_now > m.station_at + PLACED_WITHIN:
                 overdue.setdefault(m.tube, []).append(m.sequence)
-        for tube in {one.measurement.tube for one in waiting} | self._told_unplaced:
+        for tube in {one.message.tube for one in waiting} | self._told_unplaced:
             numbers = ", ".join(map(str, overdue.get(tube, [])[:10]))
             self._alarms.hold("survey_unplaced", f"tube {tube}", f"numbers {numbers}" if numbers else "")
         self._told_unplaced = set(overdue)

@@ -17,7 +17,7 @@ from groundstation.service.answers.model import RigModel
 from groundstation.service.answers.row_texts import Numbers
 from groundstation.service.answers.streamed_rows import span
 from groundstation.service.answers.views import Parameters, Range, View, flag_names, streamed
-from groundstation.service.hole.resolved_stops import NO_NUMBER, Table, forces_of
+from groundstation.service.hole.resolved_stops import NO_NUMBER, ResolvedStops, forces_of
 from groundstation.survey.fusion.resolve import Quality, angle_stds_of_all, angles
 from groundstation.survey.fusion.survey_trust import Trust
 from telemetry.messages import NodeFlag
@@ -31,13 +31,13 @@ def measurements(k: RigModel, p: Parameters) -> View:
     rows, stations = _selected(k, p)
     return {
         "newest": k.hole.newest,
-        "measurements": measurement_rows(k.hole.surveys, rows.tolist(), stations.tolist()),
+        "measurements": measurement_rows(k.hole.stops, rows.tolist(), stations.tolist()),
     }
 
 
 def measurements_text(k: RigModel, p: Parameters) -> bytes:
     """JSON of ``measurements``. A row shows something else once it is revised, or a station comes above its own."""
-    surveys = k.hole.surveys
+    surveys = k.hole.stops
     rows, stations = _selected(k, p)
 
     def render(places: Numbers) -> list[View]:
@@ -53,9 +53,9 @@ def _selected(k: RigModel, p: Parameters) -> tuple[Numbers, Numbers]:
     by_station = Range.parse("station", p["station"]) if "station" in p else None
     by_tube = Range.parse("tube", p["tube"]) if "tube" in p else None
     chosen = [(n, one) for n, one in enumerate(k.hole.stations, 1) if by_station is None or by_station.holds(n)]
-    rows = np.concatenate([NO_ROWS, *(one.clusters.table_rows for _, one in chosen)])
+    rows = np.concatenate([NO_ROWS, *(one.stops.table_rows for _, one in chosen)])
     stations = np.repeat([n for n, _ in chosen], [one.count for _, one in chosen]).astype(np.int64)
-    table = k.hole.surveys
+    table = k.hole.stops
     keeps = table.column("number")[rows] > since
     if by_tube is not None:
         keeps &= np.fromiter(map(by_tube.holds, table.column("tube")[rows].tolist()), np.bool_, len(rows))
@@ -68,11 +68,11 @@ def _selected(k: RigModel, p: Parameters) -> tuple[Numbers, Numbers]:
 
 def station_measurements(k: RigModel, n: int) -> View:
     """Every cluster of one station."""
-    rows = k.hole.stations[n - 1].clusters.table_rows.tolist()
-    return {"station": n, "measurements": measurement_rows(k.hole.surveys, rows, [n] * len(rows))}
+    rows = k.hole.stations[n - 1].stops.table_rows.tolist()
+    return {"station": n, "measurements": measurement_rows(k.hole.stops, rows, [n] * len(rows))}
 
 
-def measurement_rows(surveys: Table, rows: Sequence[int], stations: Sequence[int]) -> list[View]:
+def measurement_rows(surveys: ResolvedStops, rows: Sequence[int], stations: Sequence[int]) -> list[View]:
     """Surveys in some rows of the table, each resolved and with the number of its station."""
     if not rows:
         return []

@@ -11,7 +11,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from dataclasses import astuple, dataclass
+from dataclasses import astuple
 from typing import Any
 
 import sqlalchemy as sa
@@ -44,6 +44,7 @@ from groundstation.service.disk.database_tables import (
     add_new,
 )
 from groundstation.service.string.depth import NEVER, Doubt, Instant
+from groundstation.service.string.stored import Stored
 from groundstation.survey.fusion.joint_angles import Joint, Pair
 from telemetry.errors import DecodeError
 from telemetry.messages import Event, Kept, Stand, StaticRecord, SurveyMeasurement
@@ -53,15 +54,6 @@ from telemetry.presentation.msgpack_codec import decode, encode
 from telemetry.runtime.disk import MACHINE, Disk
 
 ALARMS_KEPT = 1000
-
-
-@dataclass(frozen=True, slots=True)
-class Stored:
-    """A message from the store, the depth (m) it was measured at and the string (m) below its tube, if known."""
-
-    message: Kept
-    md: float | None
-    below: float | None = None
 
 
 class Store(Database):
@@ -80,7 +72,7 @@ class Store(Database):
         """Store one message, see ``add_messages``."""
         return self.add_messages([Stored(message, md, below)])[0]
 
-    def add_messages(self, arrived: Sequence[Stored]) -> list[bool]:
+    def add_messages(self, arrived: Sequence[Stored[Kept]]) -> list[bool]:
         """Store messages, all or none; durable on return. False for each that was already there.
 
         Raises
@@ -92,7 +84,7 @@ class Store(Database):
             return [self._add(connection, one) for one in arrived]
 
     @staticmethod
-    def _add(connection: sa.Connection, one: Stored) -> bool:
+    def _add(connection: sa.Connection, one: Stored[Kept]) -> bool:
         payload = encode(one.message)
         same = row_of(one.message, payload)
         kind = type(one.message).__name__
@@ -123,7 +115,7 @@ class Store(Database):
             row = {"epoch": stand.epoch, "begun_at": stand.begun_at, "ended_at": stand.ended_at, "md": stand.md}
             connection.execute(ADD_STAND, row)
 
-    def messages(self) -> Iterator[Stored]:
+    def messages(self) -> Iterator[Stored[Kept]]:
         """Everything stored, in the order of arrival; what is damaged is passed over and counted."""
         with self._refusing(), self._engine.connect() as connection:
             for payload, md, below in connection.execute(ALL_MESSAGES):

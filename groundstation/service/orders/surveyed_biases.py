@@ -37,13 +37,13 @@ def _looks(hole: Hole, gravity: float) -> Iterator[Look]:
     for station in hole.stations:
         if station.md <= 0.0:
             continue  # at the collar tubes may be anywhere
-        for place, cluster in enumerate(station.clusters):
-            if cluster.trust is not Trust.FULL:
+        for place, stop in enumerate(station.stops):
+            if stop.trust is not Trust.FULL:
                 continue
             where = station.md, station.first_before(place + 1)  # before and after it moved these are two
-            force = np.mean(np.array(cluster.forces), axis=0)
-            var, yaw = cluster.force_var, cluster.yaw
-            yield look_of(where, cluster.tube, cluster.direction, force, var, yaw, gravity)
+            force = np.mean(np.array(stop.forces), axis=0)
+            var, yaw = stop.force_var, stop.yaw
+            yield look_of(where, stop.tube, stop, (stop.causes, stop.places), force, var, yaw, gravity)
 
 
 def _why_not(hole: Hole, tube: int, state: NodeState | None, mixed: Collection[int]) -> str:
@@ -52,8 +52,6 @@ def _why_not(hole: Hole, tube: int, state: NodeState | None, mixed: Collection[i
         return "it is aligned, and another block would drop that"
     if tube in mixed:
         return "its block was replaced after its first survey of this hole"
-    if any(
-        len(cluster.forces) > 1 for station in hole.stations for cluster in station.clusters if cluster.tube == tube
-    ):
+    if any(len(stop.forces) > 1 for station in hole.stations for stop in station.stops if stop.tube == tube):
         return "it has several IMUs, of which a survey has one mean"
     return ""

@@ -3,15 +3,17 @@
 from __future__ import annotations
 
 import itertools
+from collections.abc import Sequence
 from dataclasses import replace
 
 from groundstation.errors import StoreError
 from groundstation.service.alarms.watch import Watch
 from groundstation.service.answers.model import RigModel
-from groundstation.service.disk.ground_store import Store, Stored
+from groundstation.service.disk.ground_store import Store
 from groundstation.service.disk.keeper import Keeper
 from groundstation.service.hole.deviation_alarms import Alarm
-from groundstation.service.hole.placement import Prepared
+from groundstation.service.hole.resolving import Found
+from groundstation.service.string.stored import Stored
 from telemetry.messages import Event, Kept, StaticRecord, SurveyMeasurement
 
 CHANGED_BY_SURVEY = ("measurements", "stations", "trajectory", "uncertainty", "column")
@@ -33,9 +35,9 @@ class Learner:
         self._store, self._watch, self._keeper = store, watch, keeper
         self._string, self._hole, self._placement = model.string, model.hole, model.placement
         self._orders, self._recalibration = model.orders, model.recalibration
-        self._arrived: list[Stored] = []  # since the last transaction
+        self._arrived: list[Stored[Kept]] = []  # since the last transaction
         self._known: tuple[list[Alarm], int, int] = ([], 0, 0)  # alarms of the hole, moves and stops that were told
-        self._by_survey = (*CHANGED_BY_SURVEY, *(["wall"] if model.wall is not None else []))
+        self._by_survey = CHANGED_BY_SURVEY if model.wall is None else (*CHANGED_BY_SURVEY, "wall")
 
     def take(self, message: Kept) -> None:
         """A message has come; it is stored with those that come beside it, a survey with the depth that it has now."""
@@ -66,12 +68,12 @@ class Learner:
         changed: dict[str, None] = {}
         for one, is_new in zip(arrived, are_new, strict=True):
             if is_new:
-                changed |= dict.fromkeys(self._learn(one.message, None, one.below, kept=one.md))
+                changed |= dict.fromkeys(self._learn(one))
                 if isinstance(one.message, Event):
                     self._watch.on_event(one.message)
         return [one.message for one in arrived], list(changed)
 
-    def store_arrived(self, arrived: list[Stored]) -> list[bool]:
+    def store_arrived(self, arrived: list[Stored[Kept]]) -> list[bool]:
         """Put messages on the disk, with the order of the string that places them; which of them are new.
 
         Raises
@@ -83,11 +85,11 @@ class Learner:
         return self._store.add_messages(arrived)
 
     def place_waiting(self) -> list[str]:
-        """Fuse the surveys whose depth is known by now; returns the paths that changed."""
+        """Fuse the measurements whose depth is known by now; returns the paths that changed."""
         placement = self._placement
         placeable = placement.take_placeable()
-        moved: list[tuple[Kept, float | None]] = [(one.measurement, md) for one, md in placeable if one.kept != md]
-        moved += [(one.measurement, None) for one in placement.waiting if one.kept is not None]
+        moved: list[tuple[Kept, float | None]] = [(one.message, md) for one, md in placeable if one.md != md]
+        moved += [(one.message, None) for one in placement.waiting if one.md is not None]
         try:
             if moved:
                 self._store.place_messages(moved)
@@ -95,8 +97,14 @@ class Learner:
             placement.waiting += [one for one, _ in placeable]
             return []
         if moved:
-            placement.waiting = [replace(one, kept=None) for one in placement.waiting]
-        return sorted({path for one, md in placeable for path in self._learn(one.measurement, md, one.below)})
+            placement.waiting = [replace(one, md=None) for one in placement.waiting]
+        if not placeable:
+            return []
+        measurements = [one.message for one, _ in placeable]
+        found = placement.resolve_measurements(measurements, [md for _, md in placeable])
+        for measurement, stop in zip(measurements, found, strict=True):
+            self._place(measurement, stop)
+        return sorted(self._by_survey)
 
     def find_consequences(self) -> list[str]:
         """Work out the hole, and return the paths of what changed with it: alarms of deviations, stops that ended.
@@ -113,35 +121,41 @@ class Learner:
         messages = self._store.messages()
         while some := list(itertools.islice(messages, RESTORED_TOGETHER)):
             placed = {
-                place: one.message
+                place: (one.message, one.md)
                 for place, one in enumerate(some)
                 if isinstance(one.message, SurveyMeasurement) and one.md is not None
             }
-            prepared = dict(zip(placed, self._placement.prepare(list(placed.values())), strict=True))
+            measurements, mds = [m for m, _ in placed.values()], [md for _, md in placed.values()]
+            found = dict(zip(placed, self._placement.resolve_measurements(measurements, mds), strict=True))
             for place, one in enumerate(some):
-                self._learn(one.message, one.md, one.below, prepared.get(place))
+                if place in placed:
+                    self._string.numbers.add_number(one.message.tube, one.message.sequence)
+                    self._place(placed[place][0], found[place])
+                else:
+                    self._learn(one)
         self.find_consequences()
 
-    def _learn(
-        self,
-        message: Kept,
-        md: float | None,
-        below: float | None,
-        prepared: Prepared | None = None,
-        kept: float | None = None,
-    ) -> tuple[str, ...]:
-        """Add a stored message to the model; returns the paths that changed."""
+    def _learn(self, one: Stored[Kept]) -> Sequence[str]:
+        """Add a stored message to what is known, a measurement to those that wait; returns the paths that changed."""
+        message = one.message
         self._string.numbers.add_number(message.tube, message.sequence)
-        if isinstance(message, Event):
-            self._string.events.append_row(message)
-            self._orders.on_event(message)
-            self._watch.on_known_event(message)
-            return ("events",)
-        if isinstance(message, StaticRecord):
-            self._string.static_records.append_row(message)
-            self._orders.on_static_record(message)
-            self._recalibration.on_static_record(message)
-            return ("static_records",)
-        self._string.on_measurement(message, is_placed=md is not None)
-        self._watch.on_survey(message, self._placement.on_measurement(message, md, below, prepared, kept))
-        return self._by_survey
+        match message:
+            case Event():
+                self._string.events.append_row(message)
+                self._orders.on_event(message)
+                self._watch.on_known_event(message)
+                return ("events",)
+            case StaticRecord():
+                self._string.static_records.append_row(message)
+                self._orders.on_static_record(message)
+                self._recalibration.on_static_record(message)
+                return ("static_records",)
+            case SurveyMeasurement():
+                self._string.on_measurement(message, is_placed=False)
+                self._watch.on_measurement(message, self._placement.wait_for_depth(Stored(message, one.md, one.below)))
+                return self._by_survey
+
+    def _place(self, measurement: SurveyMeasurement, found: Found | None) -> None:
+        """Give the hole what a measurement was resolved to."""
+        self._string.on_measurement(measurement, is_placed=True)
+        self._watch.on_measurement(measurement, self._placement.place(measurement, found))

@@ -142,7 +142,7 @@ class Stops:
             known.stand = stand
             self._add_tubes(known)
             return
-        self._stops.append(Stop(stand, tuple(self._in_the_hole(stand.md))))
+        self._stops.append(Stop(stand, tuple(self._tally.tubes_below(IN_THE_HOLE, stand.md))))
         del self._stops[:-STOPS_KEPT]
 
     def on_later_stand(self, before: Stand, stand: Stand) -> None:
@@ -162,7 +162,7 @@ class Stops:
             if stop.judged or stop.lasted < SHORTEST or age < self._due or (age == math.inf and not is_settled):
                 continue
             stop.judged = True
-            stop.tubes = stop.tubes or tuple(self._in_the_hole(stop.stand.md))
+            stop.tubes = stop.tubes or tuple(self._tally.tubes_below(IN_THE_HOLE, stop.stand.md))
             stop.missing = set(stop.tubes) - self._taken.tubes_of(stop)
             self._owed += [stop] if stop.missing else []
         del self._owed[:-STOPS_KEPT]
@@ -170,12 +170,7 @@ class Stops:
     def _add_tubes(self, stop: Stop) -> None:
         """A tube that is heard while the bit stands hung there before."""
         if not stop.judged:
-            stop.tubes = tuple(dict.fromkeys((*stop.tubes, *self._in_the_hole(stop.stand.md))))
-
-    def _in_the_hole(self, md: float) -> Iterator[int]:
-        for tube, below in self._tally.lengths_below():
-            if md - below > IN_THE_HOLE:
-                yield tube
+            stop.tubes = tuple(dict.fromkeys((*stop.tubes, *self._tally.tubes_below(IN_THE_HOLE, stop.stand.md))))
 
 
 def belongs(stand: Stand, epoch: int, at: float) -> bool:
