@@ -37,7 +37,7 @@ from sim.campaign.draws import Draws, draws_of, fresh_nodes, noise_of, tubes_of
 from sim.campaign.drill import CODES, STATE_OF, SURVEY, drill
 from sim.campaign.sensors import Work, draw, new_work, read_sensors
 from sim.rig.encoder_course import measured_of
-from sim.studies.epochs import resting
+from sim.studies.epochs import resting_string
 from sim.world.scenario import Scenario, load_scenario, scenario_of
 from sim.world.world import World
 from telemetry.parameters import ParameterBlock
@@ -221,7 +221,7 @@ def command_time(runs: int) -> tuple[float, float]:
 
 def long_string() -> tuple[float, float]:
     """Processor's seconds of one run of a string of ``LONG`` tubes, and the rig's seconds in it."""
-    campaign = Campaign(scenario_of(dict(resting(LONG))))
+    campaign = Campaign(scenario_of(dict(resting_string(LONG))))
     campaign.run(SEED)
     course = campaign.course
     return statistics.median(spent(lambda: campaign.run(SEED)) for _ in range(3)), len(course.ends) / CYCLE_RATE_HZ

@@ -14,14 +14,14 @@ from typing import Any
 import can
 import isotp
 
-from borechain.load.rounds import beside
-from sim.can.hub import CanHub
-from telemetry.application.can_load import AIDING, HEADER, steady
-from telemetry.media.can_loopback import register
+from borechain.load.rounds import compare_rounds
+from sim.can.can_hub import CanHub
+from telemetry.application.can_load import AIDING, HEADER, steady_traffic
+from telemetry.media.can_loopback import register_loopback
 from telemetry.media.can_loopback_protocol import INTERFACE
 from telemetry.media.isotp import Receiver, Sender
-from telemetry.media.port import STEPPER, Frame, Port, Priority, TubeEnd
-from telemetry.media.table import open_medium
+from telemetry.media.media_table import open_medium
+from telemetry.media.port import STEPPER, Port, PortFrame, Priority, TubeEnd
 from telemetry.messages import Message, Side
 from telemetry.presentation.can_messages import NATIVE, NativeMessage
 from telemetry.presentation.msgpack_codec import encode, unwritten
@@ -50,7 +50,7 @@ def run() -> dict[str, Any]:
         ``ratios``: ours beside bare python-can (peer), ``slower`` says how many times, with its interval, and of
         ISO-TP ours beside can-isotp's; ``decode_us`` of every cyclic message.
     """
-    register()
+    register_loopback()
     with served() as port, contextlib.ExitStack() as stack:
         for own in (True, False):
             stack.enter_context(echoing(echo_bare, port, own))
@@ -70,11 +70,11 @@ def run() -> dict[str, Any]:
                 times[name].append((time.perf_counter() - begun) / EXCHANGES)
     ratios: dict[str, Any] = {}
     for name in ("native FD", "tunnel FD"):
-        ratios[name] = beside(times[name], times["bare"])
-        ratios[f"{name}, peer deaf to its own"] = beside(times[name], times["deaf"])
+        ratios[name] = compare_rounds(times[name], times["bare"])
+        ratios[f"{name}, peer deaf to its own"] = compare_rounds(times[name], times["deaf"])
     theirs = their_isotp()
     pairs = [(seconds_of(ours_isotp, PAYLOADS), seconds_of(theirs, PAYLOADS)) for _ in range(ROUNDS)]
-    ratios["ISO-TP, 169 bytes, FD"] = beside([ours for ours, _ in pairs], [peer for _, peer in pairs])
+    ratios["ISO-TP, 169 bytes, FD"] = compare_rounds([ours for ours, _ in pairs], [peer for _, peer in pairs])
     return {"bench": "can", "ratios": ratios, "decode_us": decode_times()}
 
 
@@ -144,7 +144,7 @@ def next_heard(bus: can.BusABC, patience: float | None) -> can.Message:
 
 def echo_bare(port: int, own: bool, ready: Any) -> None:
     """Send back what comes."""
-    register()
+    register_loopback()
     with bare_bus(port, own=own) as bus:
         ready.set()
         while True:
@@ -162,10 +162,10 @@ def ends(name: str) -> tuple[TubeEnd, TubeEnd]:
     return lower.facing, lower
 
 
-def frame_of(number: int, sender: int) -> Frame:
+def frame_of(number: int, sender: int) -> PortFrame:
     """The aiding as the link hands it to its port."""
     header = Header(sender, HEADER.epoch, number, *HEADER[3:])
-    return Frame(LinkFrame(header, [(0, unwritten(AIDING))]), Priority.AIDING, "aiding")
+    return PortFrame(LinkFrame(header, [(0, unwritten(AIDING))]), Priority.AIDING, "aiding")
 
 
 @contextlib.contextmanager
@@ -287,7 +287,7 @@ def seconds_of(act: Callable[[], object], count: int) -> float:
 def decode_times() -> dict[str, float]:
     """Median time (us) from the data of a frame to each cyclic message."""
     found = {}
-    for traffic in steady(1):
+    for traffic in steady_traffic(1):
         native = NATIVE[SPEC_OF[type(traffic.message)].kind]
         data = native.fd.pack(native.raws_of(traffic.message), 1)
         decode = partial(decoded, native, data)

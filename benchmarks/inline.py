@@ -25,10 +25,10 @@ from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any, NamedTuple
 
-from borechain.cli.rig.rig import Job, drill_in_processes, process_table, settings_of, world_of
-from borechain.host import opened_router
+from borechain.cli.rig.rig_command import RigJob, drill_in_processes, process_table, settings_of, world_of
 from borechain.inline import InlineRig
 from borechain.load.hour import scenario_text
+from borechain.rig_host import opened_router
 from sim.rig.in_process import InProcessStepper, unwritten
 from sim.rig.launcher import Tick
 from sim.rig.processes import ProcessTable
@@ -186,7 +186,7 @@ def cost(tubes: int) -> dict[str, float]:
 def drilled_inline(scenario: Path, folder: Path) -> tuple[Meter, Counting]:
     """Drill with objects in this process."""
     folder.mkdir()
-    job = Job(scenario, 1, math.inf)
+    job = RigJob(scenario, 1, math.inf)
     world = world_of(job)
     rig = InlineRig(world, settings_of(world, job), job.rig_name, folder)
     rig.stepper = counting = Counting(rig.stepper.builders, carry=unwritten)
@@ -199,7 +199,7 @@ def drilled_inline(scenario: Path, folder: Path) -> tuple[Meter, Counting]:
 def drilled_by_processes(scenario: Path, folder: Path) -> tuple[Meter, dict[str, float]]:
     """Drill with a process a tube; memory of each (MB), what is shared by those who share it."""
     folder.mkdir()
-    job = Job(scenario, 1, math.inf, endpoint=free_endpoint())
+    job = RigJob(scenario, 1, math.inf, endpoint=free_endpoint())
     world = world_of(job)
     tables: list[ProcessTable] = []
     memory: dict[str, float] = {}

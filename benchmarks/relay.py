@@ -15,7 +15,7 @@ from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
 
-from borechain.load.rounds import beside
+from borechain.load.rounds import compare_rounds
 from node.kernels.step.warm import warm_up
 from node.process.drivers.timed import TimedImu
 from node.process.host import run_node
@@ -28,7 +28,7 @@ from telemetry.media.zenoh_bus import ZenohBus, open_client, open_router, use_fe
 from telemetry.media.zenoh_port import CONNECT_TIMEOUT, ZenohMedium
 from telemetry.messages import ENCODER, Aiding, Side
 from telemetry.presentation.msgpack_codec import decode
-from telemetry.runtime.event_loop import run as run_loop
+from telemetry.runtime.event_loop import run_event_loop as run_loop
 from telemetry.runtime.hosting import OwnTime, Place
 from telemetry.runtime.inbox import Inbox
 from telemetry.transport.hop import parse_frame
@@ -80,10 +80,12 @@ def run() -> dict[str, Any]:
             for name, found in zip(acts, zip(*turns, strict=True), strict=True):
                 times[f"{name} in turn"].append(statistics.median(found))
     ratios = {
-        "relay over zenoh": beside(times["relay"], times["bare"]),
-        "handed to an asyncio loop": beside(times["loop"], times["bare"]),
-        "relay over zenoh, in turn with the peer": beside(times["relay in turn"], times["bare in turn"]),
-        "handed to an asyncio loop, in turn with the peer": beside(times["loop in turn"], times["bare in turn"]),
+        "relay over zenoh": compare_rounds(times["relay"], times["bare"]),
+        "handed to an asyncio loop": compare_rounds(times["loop"], times["bare"]),
+        "relay over zenoh, in turn with the peer": compare_rounds(times["relay in turn"], times["bare in turn"]),
+        "handed to an asyncio loop, in turn with the peer": compare_rounds(
+            times["loop in turn"], times["bare in turn"]
+        ),
     }
     return {"bench": "relay", "ratios": ratios}
 

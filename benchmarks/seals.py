@@ -13,7 +13,7 @@ from pathlib import Path
 from typing import Any
 
 from borechain.pki.rig_keys import add_tube, init_rig
-from telemetry.application.can_load import HEADER, steady
+from telemetry.application.can_load import HEADER, steady_traffic
 from telemetry.application.depth_seal import open_depth, seal_depth
 from telemetry.application.end_seal import content_of_sealed, is_sealed
 from telemetry.application.seals import Seals, seals_of
@@ -146,7 +146,7 @@ def verify_times(folder: Path) -> dict[str, float]:
     encoder = opened(folder, ENCODER, Side)
     meet(base, tube)
     above, below = joined(encoder.joints[Side.LOWER], tube.joints[Side.UPPER])
-    for traffic in steady(1):
+    for traffic in steady_traffic(1):
         times = []
         for number in range(TIMES * 5):
             message, payload = traffic.message, b""

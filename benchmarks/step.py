@@ -36,7 +36,7 @@ from node.kernels.record.node_record import (
 from node.kernels.record.sensor_record import PARAMETERS
 from node.kernels.step.address import firmware
 from node.kernels.step.string_step import string_aiding, string_step
-from sim.studies.epochs import resting
+from sim.studies.epochs import resting_string
 from sim.world.scenario import scenario_of
 from sim.world.world import World
 from telemetry.messages import Aiding
@@ -190,7 +190,7 @@ def run() -> dict[str, Any]:
     RuntimeError
         When the nodes end with another yaw by another caller.
     """
-    world = World(scenario_of(dict(resting(TUBES))), 1)
+    world = World(scenario_of(dict(resting_string(TUBES))), 1)
     inputs = inputs_of(world)
     callers = {
         "node by node, from Python": (node_by_node, "float64"),

@@ -18,13 +18,13 @@ from typing import Any
 import numpy as np
 
 from groundstation.survey.fusion.resolve import Direction
-from groundstation.survey.tools.instruments import Tool, load_tool
-from groundstation.survey.well.analysis import analyse
-from groundstation.survey.well.compiled_model import COMPILED_FROM, locate_many, warm
-from groundstation.survey.well.error_sources import Site, Survey
-from groundstation.survey.well.methods import Method, positions
+from groundstation.survey.tools.instruments import SurveyTool, load_tool
+from groundstation.survey.well.analysis import analyse_survey
+from groundstation.survey.well.compiled_model import COMPILED_FROM, locate_many, preload_models
+from groundstation.survey.well.error_sources import Site, WellSurvey
+from groundstation.survey.well.methods import Method, station_positions
 from groundstation.survey.well.trajectory import Trajectory
-from groundstation.survey.well.well_record import Record
+from groundstation.survey.well.well_record import SurveyRecord
 
 STATIONS = 1000
 SHORT = COMPILED_FROM - 1  # stations of the longest survey that is compiled only where its model is held
@@ -93,18 +93,18 @@ def append_time() -> float:
     return statistics.median(times)
 
 
-def batch(tool: Tool, site: Site) -> dict[str, float]:
+def batch(tool: SurveyTool, site: Site) -> dict[str, float]:
     """Seconds a well of a batch, and of the same wells one call each; the model is held."""
     random = np.random.default_rng(2)
     shape = WELLS, WELL_STATIONS
     md = np.broadcast_to(2.0 * np.arange(WELL_STATIONS), shape).copy()
     inclination, azimuth = random.uniform(0.01, 0.1, shape), random.uniform(0.0, 2.0 * np.pi, shape)
     method, lines = Method.MINIMUM_CURVATURE, list(range(WELL_STATIONS))
-    alone = Record(md[0], inclination[0], azimuth[0], lines, {})
-    survey = Survey(md, inclination, azimuth, md)
+    alone = SurveyRecord(md[0], inclination[0], azimuth[0], lines, {})
+    survey = WellSurvey(md, inclination, azimuth, md)
     found = compare(
         lambda: locate_many(method, survey, tool, site),
-        lambda: analyse(alone, method, tool, site).uncertainty.cov,
+        lambda: analyse_survey(alone, method, tool, site).uncertainty.cov,
     )
     return {"ours": found["ours"] / WELLS, "peer": found["peer"]} | {
         name: WELLS * found[name] for name in ("ratio", "ratio_min", "ratio_max")
@@ -129,10 +129,10 @@ def run() -> dict[str, Any]:
         azi_reference="true",
     )  # fmt: skip
 
-    record = Record(md, inclination, azimuth, list(range(STATIONS)), {})
+    record = SurveyRecord(md, inclination, azimuth, list(range(STATIONS)), {})
 
     def analysed() -> Any:
-        return analyse(record, Method.MINIMUM_CURVATURE, tool, site).uncertainty
+        return analyse_survey(record, Method.MINIMUM_CURVATURE, tool, site).uncertainty
 
     def ours() -> Any:
         return analysed().cov
@@ -141,10 +141,10 @@ def run() -> dict[str, Any]:
         found = analysed()
         return found.cov, found.by_source()
 
-    short = Record(md[:SHORT], inclination[:SHORT], azimuth[:SHORT], list(range(SHORT)), {})
+    short = SurveyRecord(md[:SHORT], inclination[:SHORT], azimuth[:SHORT], list(range(SHORT)), {})
 
     def ours_short() -> Any:
-        return analyse(short, Method.MINIMUM_CURVATURE, tool, site).uncertainty.cov
+        return analyse_survey(short, Method.MINIMUM_CURVATURE, tool, site).uncertainty.cov
 
     def peer_short() -> Any:
         survey: Any = welleng.survey.Survey(
@@ -166,13 +166,13 @@ def run() -> dict[str, Any]:
         return errors.cov_NEVs, {name: part.cov_NEV for name, part in errors.errors.items()}
 
     def path() -> Any:
-        return positions(Method.MINIMUM_CURVATURE, md, inclination, azimuth)
+        return station_positions(Method.MINIMUM_CURVATURE, md, inclination, azimuth)
 
     def peer_path() -> Any:
         return wellpathpy.deviation(md, inclination_deg, azimuth_deg).minimum_curvature()
 
     by_arrays = compare(ours_short, peer_short)  # before a longer survey has the model held
-    warm(["mwd-rev5.1"])
+    preload_models(["mwd-rev5.1"])
     ratios: dict[str, dict[str, float | None]] = {
         "survey of 1000 stations, totals, against welleng": dict(compare(ours, peer)),
         "the same, alternating call by call": dict(alternating(ours, peer)),

@@ -11,10 +11,10 @@ import click
 from borechain import __version__
 
 COMMANDS = {
-    "rig": ("borechain.cli.rig.rig", "rig", "Drill a scenario with one real process a tube."),
+    "rig": ("borechain.cli.rig.rig_command", "rig", "Drill a scenario with one real process a tube."),
     "demo": ("borechain.cli.rig.demo", "demo", "Drill a hole with its page in a browser, for a first look."),
     "gauntlet": ("borechain.cli.gauntlet.gauntlet", "gauntlet", "Drill under faults drawn from one integer."),
-    "scenario": ("borechain.cli.scenario.scenario", "group", "List and show the scenarios of the program."),
+    "scenario": ("borechain.cli.scenario.scenario_command", "group", "List and show the scenarios of the program."),
     "node": ("node.process.tube_command", "node", "Run the node of one tube."),
     "encoder": ("node.process.encoder_command", "encoder", "Run the encoder node on the drive head."),
     "medium": ("borechain.cli.rig.medium", "medium", "Run world, joints and clock of a scenario."),
@@ -28,18 +28,22 @@ COMMANDS = {
     "query": ("borechain.cli.ground.query", "query", "Ask a running ground station."),
     "watch": ("borechain.cli.ground.query", "watch", "Follow what a running ground station publishes."),
     "crew": ("borechain.cli.ground.crew", "crew", "Show a running rig to its crew, on a screen of 80 x 24."),
-    "record": ("borechain.cli.ground.record", "record", "Record what a rig takes in and says into a file (MCAP)."),
-    "replay": ("borechain.cli.ground.record", "replay", "Give a recording to a ground station again."),
+    "record": (
+        "borechain.cli.ground.record_command",
+        "record",
+        "Record what a rig takes in and says into a file (MCAP).",
+    ),
+    "replay": ("borechain.cli.ground.record_command", "replay", "Give a recording to a ground station again."),
     "calibrate": (
         "borechain.cli.calibrate.calibrate",
         "calibrate",
         "Calibrate sensors from laboratory records.",
     ),
-    "allan": ("borechain.cli.calibrate.allan", "allan", "Noise of a sensor from a static record."),
+    "allan": ("borechain.cli.calibrate.allan_command", "allan", "Noise of a sensor from a static record."),
     "survey": ("borechain.cli.survey.survey", "survey", "Trajectory and region of uncertainty of a record."),
-    "clearance": ("borechain.cli.survey.clearance", "clearance", "How far two holes keep from each other."),
+    "clearance": ("borechain.cli.survey.clearance_command", "clearance", "How far two holes keep from each other."),
     "wall": (
-        "borechain.cli.survey.wall",
+        "borechain.cli.survey.wall_command",
         "wall",
         "Judge a wall: overlap, thickness, probability of a gap.",
     ),
@@ -93,13 +97,13 @@ def cli() -> None:
 def main(arguments: list[str] | None = None) -> None:
     """Run the command line and exit: 0 done, 1 the job could not be done here, 2 wrong arguments or input."""
     try:
-        from telemetry.runtime.command_line import run
+        from telemetry.runtime.command_line import run_command
     except ModuleNotFoundError as error:
         if (error.name or "").partition(".")[0] != "telemetry":
             raise
         found = find_spec("telemetry")
         sys.exit(f"borechain: expected the package telemetry of borechain, got {found.origin if found else 'none'}")
-    run(cli, "borechain", arguments)
+    run_command(cli, "borechain", arguments)
 
 
 if __name__ == "__main__":

@@ -18,7 +18,7 @@ from telemetry import keys
 from telemetry.errors import BorechainError, InputError, MediumError
 
 if TYPE_CHECKING:
-    from groundstation.calibration.attitudes import Fit
+    from groundstation.calibration.attitudes import AttitudeFit
     from groundstation.survey.wall.wall_file import Wall
     from groundstation.survey.wall.wall_joints import Joints
     from groundstation.survey.wall.wall_verdict import Judgement
@@ -97,13 +97,13 @@ def drill(scenario: Scenario, seed: int = 1, folder: Path | None = None) -> dict
 
 def _drill(scenario: Scenario, seed: int, folder: Path) -> dict[str, Any]:
     from borechain.cli.rig.result import result_of
-    from borechain.cli.rig.rig import Job, drill_inline
+    from borechain.cli.rig.rig_command import RigJob, drill_inline
     from sim.rig.launcher import prepare_folder
     from sim.world.world import World
 
     world = World(scenario, seed)
     prepare_folder(folder)
-    ran = drill_inline(world, Job(Path("scenario"), seed, math.inf), folder, lambda _progress: None)
+    ran = drill_inline(world, RigJob(Path("scenario"), seed, math.inf), folder, lambda _progress: None)
     return result_of(ran.answers, world)
 
 
@@ -132,13 +132,13 @@ def survey(
     """
     from groundstation.survey.files.survey_records import DisplacementRule, read_record
     from groundstation.survey.tools.instruments import load_tool
-    from groundstation.survey.well.analysis import analyse
+    from groundstation.survey.well.analysis import analyse_survey
     from groundstation.survey.well.error_sources import Site
     from groundstation.survey.well.methods import Method
 
     place = site or Site(9.81, 50_000.0, math.radians(70.0), 0.0, math.radians(52.0))
     record = read_record(Path(file), DisplacementRule(displacement_rule))
-    return analyse(record, Method(method), load_tool(instrument), place, section_azimuth)
+    return analyse_survey(record, Method(method), load_tool(instrument), place, section_azimuth)
 
 
 def wall(file: str | Path) -> JudgedWall:
@@ -150,14 +150,14 @@ def wall(file: str | Path) -> JudgedWall:
         When the file or one that it names cannot be used.
     """
     from groundstation.survey.wall.wall_file import judge_wall, read_wall
-    from groundstation.survey.wall.wall_joints import worst
+    from groundstation.survey.wall.wall_joints import worst_joint
 
     found = read_wall(Path(file))
     judgement = judge_wall(found)
-    return JudgedWall(found, judgement.joints, worst(judgement.joints), judgement)
+    return JudgedWall(found, judgement.joints, worst_joint(judgement.joints), judgement)
 
 
-def calibrate_turntable(file: str | Path, reference: float) -> Fit:
+def calibrate_turntable(file: str | Path, reference: float) -> AttitudeFit:
     """Matrix and bias of a triad from a turn table's record, with their standard errors.
 
     ``reference`` is the true rate or specific force of the first column of each pair, in the unit of the file, which
@@ -168,15 +168,15 @@ def calibrate_turntable(file: str | Path, reference: float) -> Fit:
     CalibrationError
         The file and line, what was expected and what came.
     """
-    from groundstation.calibration.attitudes import fit
-    from groundstation.calibration.records import read_turn_table
+    from groundstation.calibration.attitudes import fit_attitudes
+    from groundstation.calibration.calibration_records import read_turn_table
     from groundstation.calibration.turntable import as_observations
 
     record = read_turn_table(Path(file), reference)
-    return fit(*as_observations(record.positive, record.negative, reference))
+    return fit_attitudes(*as_observations(record.positive, record.negative, reference))
 
 
-def calibrate_attitudes(file: str | Path) -> Fit:
+def calibrate_attitudes(file: str | Path) -> AttitudeFit:
     """Matrix (m/s^2 per g) and bias (m/s^2) of an accelerometer from mean readings at preset pitch and roll.
 
     Raises
@@ -184,11 +184,11 @@ def calibrate_attitudes(file: str | Path) -> Fit:
     CalibrationError
         The file and line, what was expected and what came.
     """
-    from groundstation.calibration.attitudes import fit, true_vectors
-    from groundstation.calibration.records import read_attitudes
+    from groundstation.calibration.attitudes import fit_attitudes, true_vectors
+    from groundstation.calibration.calibration_records import read_attitudes
 
     record = read_attitudes(Path(file))
-    return fit(true_vectors(record.pitch, record.roll), record.readings)
+    return fit_attitudes(true_vectors(record.pitch, record.roll), record.readings)
 
 
 def query(selector: str, endpoint: str = keys.DEFAULT_ENDPOINT, timeout: float = 5.0) -> dict[str, Any]:

@@ -11,9 +11,9 @@ sys.path[:0] = [str(DOCS.parent), str(DOCS)]
 
 from make_tables import table  # noqa: E402
 
-from borechain.gauntlet.rig import LOOK_EVERY  # noqa: E402
-from borechain.gauntlet.run import Outcome, run_seed  # noqa: E402
-from sim.gauntlet.kinds import ANSWERS, KINDS, FaultKind  # noqa: E402
+from borechain.gauntlet.gauntlet_rig import LOOK_EVERY  # noqa: E402
+from borechain.gauntlet.gauntlet_run import SeedOutcome, run_seed  # noqa: E402
+from sim.gauntlet.fault_kinds import ANSWERS, KINDS, FaultKind  # noqa: E402
 
 SEEDS = 4
 PAGE = """# Faults
@@ -28,7 +28,7 @@ all that can be repaired is, and what was lost is told. A kind without an alarm 
 {table}"""
 
 
-def row_of(kind: FaultKind, outcomes: list[Outcome]) -> tuple[str, ...]:
+def row_of(kind: FaultKind, outcomes: list[SeedOutcome]) -> tuple[str, ...]:
     """One line of the table."""
     times = {code: max(o.told.get(code, 0.0) for o in outcomes) for o in outcomes for code in o.told}
     told = ", ".join(f"`{code}` {math.ceil(s)} s" for code, s in sorted(times.items()))

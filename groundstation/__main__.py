@@ -13,13 +13,13 @@ def main() -> None:
     """Run the ground station."""
     try:
         from groundstation.command import ground
-        from telemetry.runtime.command_line import run
+        from telemetry.runtime.command_line import run_command
     except ModuleNotFoundError as error:
         if (error.name or "").partition(".")[0] != "telemetry":
             raise
         found = find_spec("telemetry")
         sys.exit(f"{PROGRAM}: expected the package telemetry of borechain, got {found.origin if found else 'none'}")
-    run(ground, PROGRAM, packages=PACKAGES)
+    run_command(ground, PROGRAM, packages=PACKAGES)
 
 
 if __name__ == "__main__":

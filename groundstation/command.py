@@ -7,8 +7,8 @@ from pathlib import Path
 import click
 
 from groundstation.page_options import page_options, page_settings
-from telemetry.runtime.command_line import needs, plain_faults
-from telemetry.runtime.options import clock_option, key_option, keys_option, place_options
+from telemetry.runtime.command_line import plain_faults, require_modules
+from telemetry.runtime.process_options import clock_option, key_option, keys_option, place_options
 
 TOLERANCES = ("en-12716", "5-cm", "0.27-deg")
 POSITIVE = click.FloatRange(0.0, min_open=True)
@@ -101,7 +101,7 @@ WEIGHTINGS = ("bayes", "equal", "linear", "quadratic", "cubic", "adaptive")
 @key_option
 @keys_option
 @place_options
-@needs("orjson", "scipy", "sqlalchemy")
+@require_modules("orjson", "scipy", "sqlalchemy")
 @plain_faults
 def ground(
     tube_length_m: float,

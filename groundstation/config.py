@@ -12,8 +12,8 @@ from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
 from groundstation.errors import ConfigurationError
 from groundstation.survey.fusion.fusion import Weighting
-from groundstation.survey.fusion.resolve import Direction, known
-from groundstation.survey.wall.column_deviation import PRESETS, Design
+from groundstation.survey.fusion.resolve import Direction, known_direction
+from groundstation.survey.wall.column_deviation import PRESETS, ColumnDesign
 from telemetry import keys
 
 SENSOR_BIAS_DEG = 0.06  # of an accelerometer, as a tilt: 1 mg, of one that nobody has calibrated
@@ -75,12 +75,12 @@ class GroundConfig(BaseModel):
         across = np.array([-along[1], along[0]])
         lean_cov = math.cos(inclination) ** 2 * np.outer(along, along) + np.outer(across, across)
         var = math.radians(self.collar_std_deg) ** 2
-        return replace(known(inclination, azimuth), cov=var * lean_cov)
+        return replace(known_direction(inclination, azimuth), cov=var * lean_cov)
 
     @property
-    def design(self) -> Design:
+    def design(self) -> ColumnDesign:
         """Axis of the column."""
-        return Design(
+        return ColumnDesign(
             self.rig,
             inclination=math.radians(self.design_inclination_deg),
             azimuth=math.radians(self.design_azimuth_deg),

@@ -21,8 +21,8 @@ from telemetry.media.neighbours import neighbour_ports, stepped_ports
 from telemetry.media.zenoh_bus import ZenohBus
 from telemetry.media.zenoh_port import ZenohMedium
 from telemetry.messages import BASE, ENCODER, Side, address_name
-from telemetry.runtime.event_loop import run, stop_on_signals
-from telemetry.runtime.hosting import Place, begin_process, complain, joined, reporting, warn_of_keys
+from telemetry.runtime.event_loop import run_event_loop, stop_on_signals
+from telemetry.runtime.hosting import Place, begin_process, reporting_errors, rig_session, warn_of_keys, write_warning
 from telemetry.runtime.own_clock import OwnClock, OwnClockLoop
 from telemetry.runtime.step_client import AsyncStepClient, serve_stepped
 from telemetry.runtime.timing import CycleTiming
@@ -47,7 +47,7 @@ def run_ground(
         When the page's port is taken.
     """
     begin_process(NAME)
-    with reporting(NAME):
+    with reporting_errors(NAME):
         # settings, key and database are looked at before half a minute is spent on a router that may be absent
         given = {"rig": place.rig, "folder": place.folder, "key_file": place.key_file, "keys": place.keys}
         config = checked_config(**given, **settings)
@@ -55,12 +55,14 @@ def run_ground(
         with (
             contextlib.closing(started(config)) as process,
             page_of(page) as serve_page,
-            joined(place, file_name(BASE)) as bus,
+            rig_session(place, file_name(BASE)) as bus,
         ):
             warn_of_keys(NAME, process.endpoint.seals)
             take_lease(bus, place.rig)
             doors = partial(answering, process, bus, serve_page)
-            run(serve_by_own_clock(process, bus, doors) if own_clock else serve_on_stepper(process, bus, place, doors))
+            run_event_loop(
+                serve_by_own_clock(process, bus, doors) if own_clock else serve_on_stepper(process, bus, place, doors)
+            )
 
 
 def load_kernels() -> None:
@@ -93,7 +95,7 @@ async def serve_by_own_clock(process: GroundProcess, bus: ZenohBus, doors: Doors
     rig = process.config.rig
     async with doors() as answers:
         ports = neighbour_ports(ZenohMedium(bus), rig, BASE, {Side.LOWER: ENCODER})
-        loop = OwnClockLoop(process, ports, OwnClock(), CycleTiming(), PERIOD, partial(complain, NAME))
+        loop = OwnClockLoop(process, ports, OwnClock(), CycleTiming(), PERIOD, partial(write_warning, NAME))
         process.operator.wake = lambda: loop.call(lambda woken, now: woken.on_timer(now))
         bus.subscribe(keys.DEPTH.format(rig=rig), partial(hear_depth, loop))
         end_with(answers, loop.stop)
@@ -108,7 +110,7 @@ async def serve_on_stepper(process: GroundProcess, bus: ZenohBus, place: Place, 
         with place.step_stream(address_name(BASE)) as stream:
             client = AsyncStepClient(bus, rig, BASE, ports, stream)  # its token of life is last
             end_with(answers, client.stop)
-            await serve_stepped(process, client, partial(complain, NAME))
+            await serve_stepped(process, client, partial(write_warning, NAME))
 
 
 @contextlib.asynccontextmanager
@@ -135,7 +137,7 @@ def page_of(page: PageSettings | None) -> Iterator[ServePage]:
     from groundstation.gateway.page.server import serving_page  # without a page no web server is loaded
 
     with listen(page) as listening:
-        complain(NAME, f"page {page.url}")
+        write_warning(NAME, f"page {page.url}")
         yield lambda process: serving_page(process, page, listening)
 
 

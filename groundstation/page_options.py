@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from telemetry.media.credentials import needs_tls
-from telemetry.runtime.options import INSECURE
+from telemetry.runtime.process_options import INSECURE
 
 if TYPE_CHECKING:
     from groundstation.gateway.page.settings import PageSettings

@@ -13,13 +13,13 @@ def main() -> None:
     """Run the command: ``node`` (the default) or ``encoder``."""
     try:
         from node.process.commands import commands
-        from telemetry.runtime.command_line import run
+        from telemetry.runtime.command_line import run_command
     except ModuleNotFoundError as error:
         if (error.name or "").partition(".")[0] != "telemetry":
             raise
         found = find_spec("telemetry")
         sys.exit(f"{PROGRAM}: expected the package telemetry of borechain, got {found.origin if found else 'none'}")
-    run(commands, PROGRAM, packages=PACKAGES)
+    run_command(commands, PROGRAM, packages=PACKAGES)
 
 
 if __name__ == "__main__":

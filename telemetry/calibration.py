@@ -131,7 +131,7 @@ def from_json(text: str) -> Calibration:
     return calibration
 
 
-def write(path: Path, calibration: Calibration) -> None:
+def write_calibration(path: Path, calibration: Calibration) -> None:
     """Replace the file of a block in one step; a reader, or a loss of power, sees the old one or the new one.
 
     Raises
@@ -152,7 +152,7 @@ def write(path: Path, calibration: Calibration) -> None:
         raise CalibrationError(f"{path}: expected a place to write to, got {error.strerror}") from error
 
 
-def read(path: Path) -> Calibration:
+def read_calibration(path: Path) -> Calibration:
     """Block of a file.
 
     Raises

@@ -56,7 +56,7 @@ COMMAND = Addition(
 )
 MEDIUM = Addition(
     row="a medium",
-    table="telemetry/media/table.py",
+    table="telemetry/media/media_table.py",
     head="MEDIA: dict[str, str] = {\n",
     line='    "tin-can": "telemetry.media.tin_can",\n',
     files={"telemetry/media/tin_can.py": "from telemetry.media.memory import open_medium\n"},
@@ -64,7 +64,7 @@ MEDIUM = Addition(
 )
 STUDY = Addition(
     row="a study",
-    table="sim/studies/table.py",
+    table="sim/studies/study_table.py",
     head="STUDIES = by_name(\n",
     line="""
         Study(
@@ -93,7 +93,7 @@ def run(throws, step):
 )
 INSTRUMENT = Addition(
     row="an instrument that writes records",
-    table="sim/instruments/table.py",
+    table="sim/instruments/instrument_table.py",
     head="INSTRUMENTS = by_name(\n",
     line='        Instrument("plumb", "a plumb line", f"{MODULES}.plumb_line"),\n',
     files={
@@ -186,7 +186,7 @@ def test_a_tube_obeys_an_added_command_and_its_ranges_hold(copy: Path) -> None:
 def test_frames_cross_an_added_medium(copy: Path) -> None:
     out = run(copy, "-c", program("""
         from telemetry.media.port import Frame, TubeEnd
-        from telemetry.media.table import open_medium
+        from telemetry.media.media_table import open_medium
         from telemetry.messages import Side
 
         with open_medium("tin-can:garden") as medium:
@@ -209,7 +209,7 @@ def test_an_added_study_runs_as_every_other(copy: Path) -> None:
 
 def test_an_added_instrument_writes_its_records(copy: Path) -> None:
     out = run(copy, "-c", program("""
-        from sim.instruments.table import INSTRUMENTS
+        from sim.instruments.instrument_table import INSTRUMENTS
 
         records = INSTRUMENTS["plumb"].records(3)
         print(records.files["plumb.csv"], records.truth)

@@ -101,11 +101,11 @@ def test_a_free_yaw_is_found_beside_the_print_and_beside_an_earlier_file(tmp_pat
 
 
 def test_the_file_of_a_calibration_is_the_block_of_its_hash_in_si(tmp_path: Path) -> None:
-    from groundstation.calibration.block import read
+    from groundstation.calibration.block import read_calibration
 
     out = tmp_path / "gyro.json"
     found = answer("calibrate", "turntable", NODE_A1, "--reference", 720, "--out", out, "--date", "2024-05-31")
-    block = read(out)
+    block = read_calibration(out)
     assert block.sha256() == found["block_sha256"]
     assert block.sensor == "gyroscope"
     assert block.provenance.day == "2024-05-31"

@@ -7,7 +7,7 @@ import pytest
 from click.testing import CliRunner, Result
 
 from borechain.cli.link.link import link
-from borechain.cli.rig.rig import rig
+from borechain.cli.rig.rig_command import rig
 
 SCENARIOS = Path(__file__).parents[1] / "scenarios"
 

@@ -6,7 +6,7 @@ from pathlib import Path
 import pytest
 from click.testing import CliRunner, Result
 
-from borechain.cli.scenario.scenario import group
+from borechain.cli.scenario.scenario_command import group
 from sim.world.scenario import load_scenario
 
 SCENARIOS = Path(__file__).parents[1] / "scenarios"

@@ -2,6 +2,6 @@
 
 from __future__ import annotations
 
-from telemetry.runtime.command_line import EnvironmentFault, InputFault, needs, plain_faults
+from telemetry.runtime.command_line import EnvironmentFault, InputFault, plain_faults, require_modules
 
-__all__ = ["EnvironmentFault", "InputFault", "needs", "plain_faults"]
+__all__ = ["EnvironmentFault", "InputFault", "plain_faults", "require_modules"]

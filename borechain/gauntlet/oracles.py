@@ -9,10 +9,10 @@ from typing import Any
 
 import msgpack
 
-from borechain.gauntlet.rig import GauntletRig
+from borechain.gauntlet.gauntlet_rig import GauntletRig
 from groundstation.service.hole.surveyed_hole import Hole
 from sim.gauntlet.fault import TUBES
-from sim.gauntlet.world import TUBE_LENGTH, FaultyWorld
+from sim.gauntlet.faulty_world import TUBE_LENGTH, FaultyWorld
 from sim.rig.report import wrap_deg
 from telemetry.application.outbox import LIMIT
 from telemetry.messages import BASE, NodeFlag, Receipt, Side
@@ -59,7 +59,7 @@ class Observer:
     def look(self) -> None:
         """Look now."""
         self._see_alarms()
-        for text in (*self._freshness(), *queues(self._rig), *self._repeated_starts()):
+        for text in (*self._freshness(), *overlong_queues(self._rig), *self._repeated_starts()):
             self._tell(text)
 
     def on_frame(self, sender: int, side: Side, frame: bytes) -> None:
@@ -134,7 +134,7 @@ class Observer:
                 yield f"tube {tube} without power is shown fresh"
 
 
-def violations(
+def find_violations(
     rig: GauntletRig,
     seen: Collection[str] = (),
     *,
@@ -160,7 +160,7 @@ def violations(
         *_flags(rig.inline.ground.model.hole),
         *(_missing(rows, rig, standing | (told & {"depth_refused"})) if depth_can_be_judged else ()),
         *_health(rig.inline.ask("status")["health"], standing),
-        *queues(rig),
+        *overlong_queues(rig),
     ]
 
 
@@ -169,7 +169,7 @@ def _is_told(world: FaultyWorld, warned: set[str]) -> bool:
     return bool(warned & YAW and (world.misled or (world.spoiled and "joint" in warned)))
 
 
-def queues(rig: GauntletRig) -> Iterator[str]:
+def overlong_queues(rig: GauntletRig) -> Iterator[str]:
     """Queues that are longer than their limits."""
     for address, process in rig.stepper.processes.items():
         endpoint = process.endpoint

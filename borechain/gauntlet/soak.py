@@ -12,13 +12,13 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from borechain.gauntlet.gauntlet_rig import GauntletRig
 from borechain.gauntlet.oracles import Observer
-from borechain.gauntlet.rig import GauntletRig
-from sim.gauntlet.disk import FaultyDisk
 from sim.gauntlet.fault import EVERYBODY
-from sim.gauntlet.kinds import KINDS
+from sim.gauntlet.fault_kinds import KINDS
+from sim.gauntlet.faulty_disk import FaultyDisk
+from sim.gauntlet.faulty_world import COMMON, TUBE_LENGTH, FaultyWorld
 from sim.gauntlet.plan import drawn_kinds, steps_of
-from sim.gauntlet.world import COMMON, TUBE_LENGTH, FaultyWorld
 from sim.world.streams import Stream, stream
 from telemetry.messages import BASE
 
@@ -31,7 +31,7 @@ HEALABLE = tuple(kind.name for kind in KINDS if kind.name != "encoder-slips")
 
 
 @dataclass(frozen=True, slots=True)
-class Sample:
+class SoakSample:
     """State of the whole after some hours of rig time."""
 
     hours: float
@@ -45,7 +45,7 @@ class Sample:
     cpu_s: float
 
 
-def soak(hours: float, seed: int) -> Iterator[Sample]:
+def run_soak(hours: float, seed: int) -> Iterator[SoakSample]:
     """Drill and rest for ``hours`` of rig time under faults of a seed, and look at regular times."""
     world = FaultyWorld.of_tables(_tables(3600.0 * hours), seed)
     disks = {address: FaultyDisk(stream(seed, Stream.GAUNTLET, 4, address)) for address in EVERYBODY}
@@ -84,12 +84,12 @@ def _one_window(rig: GauntletRig, observer: Observer, number: int, begin: float)
     rig.advance(begin + WINDOW_S, observer.look)
 
 
-def _sample(rig: GauntletRig, observer: Observer) -> Sample:
+def _sample(rig: GauntletRig, observer: Observer) -> SoakSample:
     used = resource.getrusage(resource.RUSAGE_SELF)
     pages = int(Path("/proc/self/statm").read_text().split()[1])
     model = rig.ground.model if rig.ground is not None else None
     gc.collect()
-    return Sample(
+    return SoakSample(
         hours=(rig.now - rig.world.begin) / 3600.0,
         memory_mib=pages * resource.getpagesize() / 2**20,
         objects=len(gc.get_objects()),

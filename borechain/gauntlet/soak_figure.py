@@ -6,12 +6,12 @@ from collections.abc import Sequence
 
 from matplotlib.figure import Figure
 
-from borechain.gauntlet.soak import Sample
-from groundstation.report.style import SERIES, new_figure, styled, tidy
+from borechain.gauntlet.soak import SoakSample
+from groundstation.report.style import SERIES, new_figure, styled, tidy_ticks
 
 
 @styled
-def soak_figure(samples: Sequence[Sample]) -> Figure:
+def soak_figure(samples: Sequence[SoakSample]) -> Figure:
     """Memory, objects and open files of the process, and the database, over hours of rig time and over surveys."""
     figure = new_figure(4.2, f"One rig under faults for {samples[-1].hours:.0f} h")
     (memory, objects), (handles, database) = figure.subplots(2, 2)
@@ -29,4 +29,4 @@ def soak_figure(samples: Sequence[Sample]) -> Figure:
     database.set(ylabel="database, KiB", xlabel="surveys in it", ylim=(0.0, None))
     for axes in (memory, objects, handles):
         axes.set_xlabel("h")
-    return tidy(figure)
+    return tidy_ticks(figure)

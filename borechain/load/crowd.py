@@ -30,9 +30,9 @@ from telemetry.messages import (
     SurveyMeasurement,
 )
 from telemetry.presentation.msgpack_codec import encode
-from telemetry.runtime.event_loop import run
+from telemetry.runtime.event_loop import run_event_loop
 from telemetry.runtime.own_clock import OwnClock, OwnClockLoop
-from telemetry.runtime.process import Process
+from telemetry.runtime.process_interface import Process
 from telemetry.runtime.timing import CycleTiming
 
 TUBE_LENGTH = 2.0  # m
@@ -114,7 +114,7 @@ def survey_of(tube: int, number: int, now: float, hops: int) -> SurveyMeasuremen
 
 
 @contextlib.contextmanager
-def living(crowd: Crowd, bus: ZenohBus, rig: str) -> Iterator[OwnClockLoop]:
+def crowd_in_thread(crowd: Crowd, bus: ZenohBus, rig: str) -> Iterator[OwnClockLoop]:
     """A string that lives on a thread of its own while the context lasts."""
     loops: list[OwnClockLoop] = []
     there = threading.Event()
@@ -125,7 +125,7 @@ def living(crowd: Crowd, bus: ZenohBus, rig: str) -> Iterator[OwnClockLoop]:
         there.set()
         await loops[0].run()
 
-    thread = threading.Thread(target=lambda: run(live()))
+    thread = threading.Thread(target=lambda: run_event_loop(live()))
     thread.start()
     there.wait()
     try:

@@ -14,9 +14,9 @@ from typing import Any
 
 from borechain.client import Ground, NoAnswerError
 from borechain.load.crowd import DRILLING_S, ROUND_S, SURVEYED_AFTER_S, TUBE_LENGTH, survey_of
-from borechain.load.page import ASK_EVERY_S, GROUND, HEARD_WITHIN_S, RIG, ROUNDING, figures
+from borechain.load.page import ASK_EVERY_S, GROUND, HEARD_WITHIN_S, RIG, ROUNDING, latency_quantiles
 from borechain.load.patience import wait_for
-from borechain.load.readers import CONNECT_S, lines
+from borechain.load.readers import CONNECT_S, read_lines
 from groundstation.config import checked_config
 from groundstation.gateway.page.settings import PageSettings
 from groundstation.host import run_ground
@@ -58,7 +58,10 @@ def measure_day(hours: float, tubes: int, endpoint: str, page: PageSettings, fol
             moments = wait_for_history(ground)
             started_s, started_cpu_s = time.monotonic() - begun, cpu_seconds(pids(table)[GROUND])
             picture_s = first_picture(page)
-            looked = [asked(page, f"column?moment={number}") for number in moments[:: max(len(moments) // MOMENTS, 1)]]
+            looked = [
+                answer_seconds(page, f"column?moment={number}")
+                for number in moments[:: max(len(moments) // MOMENTS, 1)]
+            ]
             return {
                 "surveys": surveys,
                 "stations": len(ground.stations()),
@@ -66,8 +69,8 @@ def measure_day(hours: float, tubes: int, endpoint: str, page: PageSettings, fol
                 "started_s": round(started_s, ROUNDING),
                 "started_cpu_s": round(started_cpu_s, ROUNDING),
                 "picture_ms": round(1e3 * picture_s, ROUNDING),
-                "history_ms": round(1e3 * asked(page, "history"), ROUNDING),
-                "moment_ms": figures(looked),
+                "history_ms": round(1e3 * answer_seconds(page, "history"), ROUNDING),
+                "moment_ms": latency_quantiles(looked),
                 "private_mb": round(footprint(pids(table)[GROUND])["private_mb"], ROUNDING),
             }
     finally:
@@ -123,13 +126,13 @@ def first_picture(page: PageSettings) -> float:
     begun = time.monotonic()
     with contextlib.closing(socket.create_connection((page.host, page.port), CONNECT_S)) as connection:
         connection.sendall(f"GET /api/stream HTTP/1.1\r\nHost: {page.host}\r\n\r\n".encode())
-        for line in lines(connection, begun + CONNECT_S):
+        for line in read_lines(connection, begun + CONNECT_S):
             if line.startswith(b"data: ") and json.loads(line[6:]).get("path") == "history":
                 return time.monotonic() - begun
     raise RigError(f"the page has not shown its history within {CONNECT_S:.0f} s")
 
 
-def asked(page: PageSettings, path: str) -> float:
+def answer_seconds(page: PageSettings, path: str) -> float:
     """Seconds for which the page keeps whoever asks it for a path waiting."""
     begun = time.monotonic()
     with urllib.request.urlopen(f"{page.url}/api/{path}", timeout=CONNECT_S) as answer:

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from matplotlib.figure import Figure
 
 from borechain.load.hour import GROUND, Weight
-from groundstation.report.style import SERIES, new_figure, styled, tidy
+from groundstation.report.style import SERIES, new_figure, styled, tidy_ticks
 
 
 @styled
@@ -28,4 +28,4 @@ def hour_figure(weights: Sequence[Weight]) -> Figure:
     memory.legend()
     handles.set(ylabel="open files", xlabel="h", ylim=(0.0, None))
     database.set(ylabel="database, kB", xlabel="surveys", ylim=(0.0, None))
-    return tidy(figure)
+    return tidy_ticks(figure)

@@ -11,7 +11,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
-from borechain.load.crowd import Crowd, living
+from borechain.load.crowd import Crowd, crowd_in_thread
 from borechain.load.patience import wait_for
 from groundstation.config import checked_config
 from groundstation.host import run_ground
@@ -22,7 +22,7 @@ from telemetry.messages import ENCODER
 from telemetry.runtime.hosting import Place
 
 RIG = "killed"
-PRELOAD = "borechain.warm"
+PRELOAD = "borechain.preload"
 AT_ONCE = 8  # events that wait for their receipt
 MOST_RECEIPTS = 40  # of a life
 PATIENCE_S = 60.0
@@ -30,7 +30,7 @@ LOOK_S = 0.002
 
 
 @dataclass
-class Outcome:
+class KillOutcome:
     """What became of the events: handed over, receipted, kept, and how soon a new life receipted the first (s)."""
 
     handed: int = 0
@@ -46,7 +46,7 @@ class Outcome:
 
 def kill_again_and_again(
     times: int, endpoint: str, folder: Path, database: str | None = None, seed: int = 1
-) -> Outcome:
+) -> KillOutcome:
     """Kill a ground station ``times`` times at moments by lot, and count what its database keeps at the end.
 
     ``database`` is the URL of an empty one; SQLite in ``folder`` without it.
@@ -59,13 +59,13 @@ def kill_again_and_again(
     lot = random.Random(seed)
     settings: dict[str, Any] = {"database_url": database}
     place = Place(RIG, endpoint, folder)
-    table = ProcessTable({"base": Spec(started, (place, settings))}, [PRELOAD])
-    outcome = Outcome()
+    table = ProcessTable({"base": Spec(run_own_clock_ground, (place, settings))}, [PRELOAD])
+    outcome = KillOutcome()
     try:
         table.warm()
         with open_router(endpoint) as bus:
             crowd = Crowd(1, bus, RIG)
-            with living(crowd, bus, RIG) as loop:
+            with crowd_in_thread(crowd, bus, RIG) as loop:
 
                 def hand_over() -> None:
                     loop.call(lambda _process, now: crowd.happen(now))
@@ -76,16 +76,16 @@ def kill_again_and_again(
                     table.start("base")
                     outcome.back_s.append(first_receipt(crowd, hand_over) - begun)
                     if len(outcome.back_s) <= times:
-                        receipts(crowd, hand_over, lot.randint(1, MOST_RECEIPTS))
+                        await_receipts(crowd, hand_over, lot.randint(1, MOST_RECEIPTS))
                         table.kill("base")
                 wait_until(lambda: crowd.endpoint.mail.outbox_size == 0)
     finally:
         table.stop()
-    count(outcome, checked_config(rig=RIG, folder=folder, **settings).url)
+    count_losses(outcome, checked_config(rig=RIG, folder=folder, **settings).url)
     return outcome
 
 
-def started(place: Place, settings: dict[str, Any]) -> None:
+def run_own_clock_ground(place: Place, settings: dict[str, Any]) -> None:
     """The ground station as a process by its own clock."""
     run_ground(place, settings, own_clock=True)
 
@@ -99,7 +99,7 @@ def first_receipt(crowd: Crowd, hand_over: Callable[[], None]) -> float:
     return time.monotonic()
 
 
-def receipts(crowd: Crowd, hand_over: Callable[[], None], wanted: int) -> None:
+def await_receipts(crowd: Crowd, hand_over: Callable[[], None], wanted: int) -> None:
     """Hand over until so many more were receipted."""
     until = crowd.receipted + wanted
 
@@ -116,7 +116,7 @@ def wait_until(true: Callable[[], bool]) -> None:
     wait_for(lambda: true() or None, "the ground station was killed and has receipted nothing", PATIENCE_S, LOOK_S)
 
 
-def count(outcome: Outcome, url: str) -> None:
+def count_losses(outcome: KillOutcome, url: str) -> None:
     """Compare what was handed over with what is kept."""
     with contextlib.closing(Store(url)) as store:
         kept = Counter(stored.message.sequence for stored in store.messages() if stored.message.tube == ENCODER)

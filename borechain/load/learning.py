@@ -19,7 +19,7 @@ import numpy as np
 
 from borechain.load.crowd import ROUND_S, TUBE_LENGTH, state_of
 from borechain.load.day import ADVANCE, ADVANCES, BEGUN_AT, EPOCH, depth_of, surveys_at, up_to, write_day
-from borechain.recording.replay import TapeClock
+from borechain.recording.ground_replay import TapeClock
 from groundstation.config import GroundConfig, checked_config
 from groundstation.host import started
 from sim.errors import RigError
@@ -61,7 +61,7 @@ class Figure:
         }  # fmt: skip
 
 
-class Hearing:
+class LearningLoad:
     """A ground station that is told what a string says, and asked meanwhile; what each takes is kept.
 
     Parameters
@@ -139,7 +139,7 @@ class Hearing:
 
 
 def measure_learning(surveys: int, tubes: int, stops: int, folder: Path) -> dict[str, Any]:
-    """Start a ground station upon so many surveys, let it learn some stops more and ask it, see ``Hearing``.
+    """Start a ground station upon so many surveys, let it learn some stops more and ask it, see ``LearningLoad``.
 
     Raises
     ------
@@ -150,7 +150,7 @@ def measure_learning(surveys: int, tubes: int, stops: int, folder: Path) -> dict
     known = -(-surveys // tubes)  # stops
     tenth, whole = (checked_config(rig=RIG, folder=folder / str(n), **settings) for n in (known // TENTH, known))
     sizes = [bytes_of_a_survey(config, n, tubes) for config, n in ((tenth, known // TENTH), (whole, known))]
-    hearing = Hearing(whole, tubes, BEGUN_AT + ROUND_S * (known + 1))
+    hearing = LearningLoad(whole, tubes, BEGUN_AT + ROUND_S * (known + 1))
     hole = hearing.ground.model.hole
     before = hole.newest
     with contextlib.closing(hearing.ground):
@@ -170,7 +170,7 @@ def measure_learning(surveys: int, tubes: int, stops: int, folder: Path) -> dict
         "surveys": before + learnt,
         "stations": stations,
         "store_bytes_of_a_survey": {"of a tenth": sizes[0], "of all": sizes[1]},
-        "figures": [figure(what, taken).row for what, taken in hearing.taken.items()],
+        "figures": [timing_figure(what, taken).row for what, taken in hearing.taken.items()],
     }
 
 
@@ -180,7 +180,7 @@ def bytes_of_a_survey(config: GroundConfig, stops: int, tubes: int) -> float:
     return sum(file.stat().st_size for file in config.folder.iterdir()) / count
 
 
-def figure(what: str, taken: list[float]) -> Figure:
+def timing_figure(what: str, taken: list[float]) -> Figure:
     """The row of what was timed."""
     unit, scale, bound = ("s", 1.0, START_S) if what == "start" else ("ms", 1e3, ANSWER_MS)
     bound = LEARN_MS if what.startswith("learning") else bound

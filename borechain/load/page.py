@@ -15,7 +15,7 @@ from typing import Any
 import numpy as np
 
 from borechain.client import Ground, NoAnswerError
-from borechain.load.crowd import DRILLING_S, ROUND_S, TUBE_LENGTH, Crowd, living
+from borechain.load.crowd import DRILLING_S, ROUND_S, TUBE_LENGTH, Crowd, crowd_in_thread
 from borechain.load.patience import wait_for
 from borechain.load.readers import BARE, CONNECT_S, answer_nothing, follow_keys, follow_page
 from groundstation.gateway.page.settings import PageSettings
@@ -49,7 +49,7 @@ class Load:
     seconds: float = 150.0
 
 
-def measure(load: Load, endpoint: str, page: PageSettings, folder: Path) -> dict[str, Any]:
+def measure_load(load: Load, endpoint: str, page: PageSettings, folder: Path) -> dict[str, Any]:
     """Bear a load, and say what the ground station needed for it and how late news and answers were.
 
     Raises
@@ -60,12 +60,12 @@ def measure(load: Load, endpoint: str, page: PageSettings, folder: Path) -> dict
     settings = {"tube_length": TUBE_LENGTH, "target": TUBE_LENGTH * load.tubes + SPARE_M}
     serve = partial(run_ground, own_clock=True, page=page)
     specs = {GROUND: Spec(serve, (Place(RIG, endpoint, folder / "ground"), settings))}
-    table = ProcessTable(specs, ["borechain.warm"])
+    table = ProcessTable(specs, ["borechain.preload"])
     try:
         table.warm()
         with open_router(endpoint) as bus:
             crowd = Crowd(load.tubes, bus, RIG, speed_of(load.seconds))
-            with living(crowd, bus, RIG):
+            with crowd_in_thread(crowd, bus, RIG):
                 table.start(GROUND)
                 ground = Ground(bus, RIG)
                 wait_for_all(ground, load.tubes)
@@ -75,12 +75,12 @@ def measure(load: Load, endpoint: str, page: PageSettings, folder: Path) -> dict
                 for name in readers:
                     table.start(name)
                 wait_for_readers(bus, folder, load.browsers + load.terminals)
-                cost = bear(ground, bus, table, until)
+                cost = ask_until(ground, bus, table, until)
                 for name in readers:
                     table.running[name].join(LEFT_WITHIN_S)
                 return cost | {
-                    "browser_late_ms": figures(late(folder, "browser")),
-                    "terminal_late_ms": figures(late(folder, "terminal")),
+                    "browser_late_ms": latency_quantiles(read_lateness(folder, "browser")),
+                    "terminal_late_ms": latency_quantiles(read_lateness(folder, "terminal")),
                     "surveys": crowd.surveys,
                 }
     finally:
@@ -131,7 +131,7 @@ def readers_of(load: Load, endpoint: str, page: PageSettings, until: float, fold
     return browsers | terminals | {"bare": Spec(answer_nothing, (endpoint, until))}
 
 
-def bear(ground: Ground, bus: ZenohBus, table: ProcessTable, until: float) -> dict[str, Any]:
+def ask_until(ground: Ground, bus: ZenohBus, table: ProcessTable, until: float) -> dict[str, Any]:
     """Ask until a time (s, monotonic): how long answers took, and what the ground station needed meanwhile.
 
     In turn with it a process is asked that does nothing else: where the machine lets that one wait too, the ground
@@ -163,16 +163,16 @@ def bear(ground: Ground, bus: ZenohBus, table: ProcessTable, until: float) -> di
             bare.append(time.monotonic() - asked)
     cpu_percent = 100.0 * (cpu_seconds(pid) - cpu) / (time.monotonic() - begun)
     return {
-        "answer_ms": figures(taken),
+        "answer_ms": latency_quantiles(taken),
         "unanswered": unanswered,
-        "bare_ms": figures(bare),
+        "bare_ms": latency_quantiles(bare),
         "stations": stations,
         "cpu_percent": round(cpu_percent, ROUNDING),
         "memory_s_mb": weighed,
     }
 
 
-def late(folder: Path, who: str) -> list[float]:
+def read_lateness(folder: Path, who: str) -> list[float]:
     """What every reader of a kind has written, s."""
     found: list[float] = []
     for path in sorted(folder.glob(f"{who}-*.json")):
@@ -180,7 +180,7 @@ def late(folder: Path, who: str) -> list[float]:
     return found
 
 
-def figures(seconds: list[float]) -> dict[str, float | None]:
+def latency_quantiles(seconds: list[float]) -> dict[str, float | None]:
     """How many, and the median, 99th percentile and largest in ms."""
     if not seconds:
         return {"count": 0, "p50": None, "p99": None, "max": None}

@@ -30,12 +30,12 @@ def follow_page(host: str, port: int, until: float, out: Path) -> None:
     late: list[float] = []
     with contextlib.closing(socket.create_connection((host, port), CONNECT_S)) as connection:
         connection.sendall(f"GET /api/stream HTTP/1.1\r\nHost: {host}\r\n\r\n".encode())
-        for line in lines(connection, until):
+        for line in read_lines(connection, until):
             if not late:
                 out.touch()
             if line.startswith(b"data: ") and b'"path"' in line:
                 told = json.loads(line[6:])
-                late += lateness(told["path"], told["answer"])
+                late += state_lateness(told["path"], told["answer"])
     out.write_text(json.dumps(late))
 
 
@@ -48,7 +48,7 @@ def follow_keys(endpoint: str, rig: str, until: float, out: Path) -> None:
         Ground(bus, rig).follow("**", lambda path, view: arrived.put((path, view)))
         while (left := until - time.monotonic()) > 0.0:
             with contextlib.suppress(queue.Empty):
-                late += lateness(*arrived.get(timeout=left))
+                late += state_lateness(*arrived.get(timeout=left))
                 if len(late) <= 1:
                     out.touch()
     out.write_text(json.dumps(late))
@@ -68,12 +68,12 @@ def answer_empty(query: Query) -> None:
     query.finish()
 
 
-def lateness(path: str, answer: dict[str, Any]) -> list[float]:
+def state_lateness(path: str, answer: dict[str, Any]) -> list[float]:
     """Seconds since a tube told its state, whose rig time is the clock of this machine; nothing of other answers."""
     return [time.monotonic() - answer["at_s"]] if path.startswith(NODES) else []
 
 
-def lines(connection: socket.socket, until: float) -> Iterator[bytes]:
+def read_lines(connection: socket.socket, until: float) -> Iterator[bytes]:
     """Lines of a stream until a time (s, monotonic)."""
     rest = b""
     while (left := until - time.monotonic()) > 0.0:

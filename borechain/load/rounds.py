@@ -10,7 +10,7 @@ from typing import Any
 CONFIDENCE = 0.95
 
 
-def beside(ours: Sequence[float], peer: Sequence[float]) -> dict[str, Any]:
+def compare_rounds(ours: Sequence[float], peer: Sequence[float]) -> dict[str, Any]:
     """Row of a benchmark, of the times of each round (s).
 
     A round gives a ratio; ``slower`` is the median of these, so that a spell in which the machine was busy weighs no

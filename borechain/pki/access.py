@@ -86,7 +86,7 @@ def grants_of(rig: str, subject: str) -> list[Grant]:
     return grants
 
 
-def subjects(revoked: Iterable[int] = ()) -> list[str]:
+def common_names(revoked: Iterable[int] = ()) -> list[str]:
     """Common names that the router knows."""
     tubes = [f"tube-{tube}" for tube in range(1, MAX_TUBE + 1) if tube not in set(revoked)]
     return ["base", "encoder", "depth", *ROLES, *tubes]
@@ -129,7 +129,7 @@ def write_access(folder: Path, rig: str, revoked: Iterable[int]) -> None:
     KeyFileError
         When it cannot be written.
     """
-    settings = {"access_control": access_control(rig, subjects(revoked))}
+    settings = {"access_control": access_control(rig, common_names(revoked))}
     write_file(folder / ACCESS_FILE, json.dumps(settings, indent=1) + "\n")
 
 

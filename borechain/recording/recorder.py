@@ -11,7 +11,7 @@ from pathlib import Path
 
 import msgpack
 
-from borechain.recording.files import RecordingWriter, Sample
+from borechain.recording.recording_file import RecordedSample, RecordingWriter
 from groundstation.service.answers.paths import schemas
 from groundstation.service.process.intake_tape import BEGIN, IntakeError, unpack_intake
 from telemetry import keys
@@ -22,7 +22,7 @@ WAITING = 100_000  # samples that may wait to be written; more are dropped and c
 
 
 @dataclass(slots=True)
-class Course:
+class RecordingSummary:
     """How a recording went: samples, events of the intake that are missing, and samples dropped here."""
 
     samples: int = 0
@@ -48,16 +48,16 @@ class Recorder:
     """
 
     def __init__(self, bus: ZenohBus, rig: str, path: Path) -> None:
-        self.course = Course()
+        self.course = RecordingSummary()
         self._bus = bus
-        self._arrived: queue.Queue[Sample | None] = queue.Queue(WAITING)
+        self._arrived: queue.Queue[RecordedSample | None] = queue.Queue(WAITING)
         shown = {pattern: json.dumps(schema).encode() for pattern, schema in schemas().items()}
         self._writer = RecordingWriter(path, rig, shown)
         self._intake = keys.INTAKE.format(rig=rig)
         for key in (keys.GROUND.format(rig=rig, path="**"), keys.DEPTH.format(rig=rig), self._intake):
             bus.subscribe(key, self._arrive)
 
-    def run(self) -> Course:
+    def run(self) -> RecordingSummary:
         """Write until ``stop``; returns how it went."""
         with self._writer:
             while (sample := self._arrived.get()) is not None:
@@ -76,22 +76,22 @@ class Recorder:
 
     def _arrive(self, key: str, payload: bytes) -> None:
         try:
-            self._arrived.put_nowait(Sample(key, time.time_ns(), payload))
+            self._arrived.put_nowait(RecordedSample(key, time.time_ns(), payload))
         except queue.Full:
             self.course.dropped += 1
 
-    def _write(self, sample: Sample) -> None:
+    def _write(self, sample: RecordedSample) -> None:
         self._writer.write(sample)
         self.course.samples += 1
 
-    def _take_intake(self, sample: Sample) -> None:
+    def _take_intake(self, sample: RecordedSample) -> None:
         """Write an event once, in its order; what did not reach us before it is asked for."""
         number = number_of(sample.payload)
         if number > self.course.newest + 1:
             self._ask_for_more()
         self._keep(number, sample)
 
-    def _keep(self, number: int, sample: Sample) -> None:
+    def _keep(self, number: int, sample: RecordedSample) -> None:
         """Write an event that is new, and count what is missing before it; 0 are the settings."""
         course = self.course
         if number and number <= course.newest:
@@ -107,7 +107,7 @@ class Recorder:
         while self.course.newest > before and (rows := self._events_after(self.course.newest)):
             before = self.course.newest
             for payload in rows:
-                self._keep(number_of(payload), Sample(self._intake, time.time_ns(), payload))
+                self._keep(number_of(payload), RecordedSample(self._intake, time.time_ns(), payload))
 
     def _events_after(self, number: int) -> list[bytes]:
         for reply in self._bus.get(f"{self._intake}?since={number}", ANSWERED_WITHIN):

@@ -7,12 +7,12 @@ import contextlib
 from collections.abc import Iterator
 from pathlib import Path
 
-from borechain.recording.files import Recording
-from borechain.recording.replay import Replayed, open_replay
+from borechain.recording.ground_replay import Replayed, open_replay
+from borechain.recording.recording_file import Recording
 from groundstation.gateway.page.settings import PageSettings
 from groundstation.host import page_of
 from groundstation.service.process.intake_tape import Intake
-from telemetry.runtime.event_loop import run, stop_on_signals
+from telemetry.runtime.event_loop import run_event_loop, stop_on_signals
 
 TOGETHER = 64  # events after which browsers are served, however late the replay is
 
@@ -29,10 +29,10 @@ def show_recording(recording: Recording, folder: Path, page: PageSettings, speed
     """
     replayed, events = open_replay(recording, folder)
     with contextlib.closing(replayed.ground):
-        run(serve(replayed, events, page, speed))
+        run_event_loop(serve_recording(replayed, events, page, speed))
 
 
-async def serve(replayed: Replayed, events: Iterator[Intake], page: PageSettings, speed: float) -> None:
+async def serve_recording(replayed: Replayed, events: Iterator[Intake], page: PageSettings, speed: float) -> None:
     """The page, with the events given beside it."""
     ended = asyncio.Event()
     stop_on_signals(ended.set)

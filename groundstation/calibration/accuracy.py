@@ -58,7 +58,7 @@ def relative_error(preset: Array, mean: Array) -> Array:
     return np.asarray(100.0 * np.abs(preset - mean) / np.abs(preset))
 
 
-def characterise(preset: Array, records: Sequence[Array]) -> Characteristic:
+def sensor_characteristic(preset: Array, records: Sequence[Array]) -> Characteristic:
     """Characteristic of a sensor from a record of readings at each preset.
 
     Raises
@@ -74,7 +74,7 @@ def characterise(preset: Array, records: Sequence[Array]) -> Characteristic:
     return Characteristic(preset, mean, std, relative_error(preset, mean))
 
 
-def combine(*sensors: Accuracy) -> Accuracy:
+def combined_accuracy(*sensors: Accuracy) -> Accuracy:
     """Posterior of independent sensors by inverse variance.
 
     Raises

@@ -50,19 +50,19 @@ def walk_spectrum(frequency: Array) -> Array:
     return np.asarray(0.25 / np.sin(np.pi * frequency) ** 2 - 1.0 / 6.0)
 
 
-def window(frequency: Array, factor: int) -> Array:
+def allan_transfer_function(frequency: Array, factor: int) -> Array:
     """G_n(f) = 2 sin^4(pi n f) / (n sin pi f)^2, what an Allan variance sees of a spectrum."""
     return np.asarray(2.0 * np.sin(np.pi * factor * frequency) ** 4 / (factor * np.sin(np.pi * frequency)) ** 2)
 
 
-def design(factors: Array) -> Array:
+def allan_design_matrix(factors: Array) -> Array:
     """Allan variance (k, 3) of unit white noise, flicker and random walk at averaging factors (k,): 1/n, 1, n/3."""
     n = np.asarray(factors, dtype=np.float64)
     return np.stack([1.0 / n, np.ones_like(n), n / 3.0], axis=1)
 
 
 @lru_cache(maxsize=8)
-def moments(count: int, factors: tuple[int, ...]) -> tuple[Array, Array]:
+def spectral_moments(count: int, factors: tuple[int, ...]) -> tuple[Array, Array]:
     """Integrals over frequency of a design: ``first`` (3, k) of S_a G_n and ``second`` (3, 3, k, k), the covariance.
 
     ``first`` must come out as `design` (it does to 0.4 % at a tenth of the record, better below), which is how the
@@ -74,7 +74,7 @@ def moments(count: int, factors: tuple[int, ...]) -> tuple[Array, Array]:
     grid = (np.arange(count // 2) + 0.5) / (2 * (count // 2))  # midpoints of half a period: exact for white noise
     for start in range(0, grid.size, CHUNK):
         f = grid[start : start + CHUNK]
-        windows = np.stack([window(f, n) for n in factors])
+        windows = np.stack([allan_transfer_function(f, n) for n in factors])
         spectra = np.stack([np.ones_like(f), flicker_spectrum(f), walk_spectrum(f)])
         first += spectra @ windows.T
         for a in range(3):
@@ -98,7 +98,7 @@ class Estimate:
 
 
 @dataclass(frozen=True, slots=True)
-class Fit:
+class AllanFit:
     """N (white), F (floor) and K (walk, None where the record does not show it), with chi^2 of the fit.
 
     ``walk_evidence`` is the fall of chi^2 that the walk's term brings; it is kept above `WALK_EVIDENCE`.
@@ -117,15 +117,15 @@ class Fit:
         return self.chi2 <= self.degrees + 3.0 * math.sqrt(2.0 * self.degrees)
 
 
-def fit(variances: Array, factors: tuple[int, ...], count: int) -> Fit:
+def fit_allan_variances(variances: Array, factors: tuple[int, ...], count: int) -> AllanFit:
     """Weighted fit of sigma^2(n) = N^2 / n + F^2 (+ K^2 n / 3) to Allan variances (k,), per sample.
 
     The weights are the inverse of the covariance that the fitted terms themselves imply, iterated: weights from
     measured variances would favour those that came out low. Standard errors grow by sqrt(chi^2 / degrees) where that
     exceeds 1, so that a record with another shape than the model's is not believed too much.
     """
-    second = moments(count, factors)[1]
-    columns = design(np.array(factors))
+    second = spectral_moments(count, factors)[1]
+    columns = allan_design_matrix(np.array(factors))
     start = np.array([max(variances[0] * factors[0], 0.0), float(variances.min()), 0.0])
     two, two_cov, chi2 = _solve(variances, columns[:, :WALK], second, start)
     # the evidence is weighed under the hypothesis of no walk: with a walk its own variance would hide it
@@ -139,11 +139,11 @@ def fit(variances: Array, factors: tuple[int, ...], count: int) -> Fit:
         terms = WALK + 1
     degrees = len(factors) - terms
     cov = cov * max(chi2 / degrees, 1.0)
-    found = [root(float(squares[a]), math.sqrt(cov[a, a])) for a in range(terms)]
-    return Fit(found[WHITE], found[FLICKER], found[WALK] if terms > WALK else None, chi2, degrees, evidence)
+    found = [deviation_estimate(float(squares[a]), math.sqrt(cov[a, a])) for a in range(terms)]
+    return AllanFit(found[WHITE], found[FLICKER], found[WALK] if terms > WALK else None, chi2, degrees, evidence)
 
 
-def root(square: float, std: float) -> Estimate:
+def deviation_estimate(square: float, std: float) -> Estimate:
     """A deviation from its square and the square's standard error.
 
     Its logarithm is what is nearly normal, because the error of a variance is proportional to it; a square that is

@@ -14,7 +14,7 @@ import numpy.typing as npt
 
 from groundstation.calibration.coverage import COVERAGE, coverage_factor
 from groundstation.calibration.errors import CalibrationError
-from groundstation.calibration.jig import Combined, Jig, combine, settings_of
+from groundstation.calibration.jig import Combined, Jig, combined_uncertainty, settings_of
 from groundstation.survey.fusion.resolve import is_covariance
 
 Array = npt.NDArray[np.float64]
@@ -31,7 +31,7 @@ CANDIDATES = {  # pitch and roll (deg) an arm can be sent to, in the order in wh
 
 
 @dataclass(frozen=True, slots=True)
-class Linear:
+class LeastSquares:
     """Least squares of readings = basis @ coefficients: ``coefficients`` (k, 3), ``cov`` (3 k, 3 k) row-major of them.
 
     ``condition`` is of the basis; ``levers`` (n,) is the largest gain of one reading on any coefficient.
@@ -46,7 +46,7 @@ class Linear:
 
 
 @dataclass(frozen=True, slots=True)
-class Fit:
+class AttitudeFit:
     """Bias (3,) and matrix (3, 3) of an attitude set.
 
     ``cov`` (12, 12) is in the order of x above; ``residuals`` (n, 3) in the unit of the readings; ``rank`` of 4 and
@@ -99,13 +99,13 @@ def true_vectors(pitch: Array, roll: Array) -> Array:
     return np.stack([np.sin(pitch), np.cos(pitch) * np.sin(roll), np.cos(pitch) * np.cos(roll)], axis=-1)
 
 
-def fit(
+def fit_attitudes(
     truth: Array,
     readings: Array,
     covs: Array | None = None,
     jig: Jig | None = None,
     settings: npt.NDArray[np.intp] | None = None,
-) -> Fit:
+) -> AttitudeFit:
     """Bias and matrix from any set of attitudes.
 
     Parameters
@@ -135,8 +135,8 @@ def fit(
     combined = None
     if jig is not None and covs is None:
         settings = settings_of(truth) if settings is None else settings
-        combined = combine(basis, solved.residuals, truth, matrix, settings, jig)
-    return Fit(
+        combined = combined_uncertainty(basis, solved.residuals, truth, matrix, settings, jig)
+    return AttitudeFit(
         matrix=matrix,
         bias=solved.coefficients[0],
         cov=solved.cov[np.ix_(order, order)],
@@ -149,19 +149,19 @@ def fit(
     )
 
 
-def fit_free_yaw(truth: Array, readings: Array, like: Array, covs: Array | None = None) -> Fit:
+def fit_free_yaw(truth: Array, readings: Array, like: Array, covs: Array | None = None) -> AttitudeFit:
     """Bias, matrix and the yaw of the rig: readings = b + K Rz(yaw) truth, with K nearest to ``like`` in x and y.
 
-    A full matrix swallows any yaw, so one sensor cannot separate the two and the residuals are those of ``fit``: what
+    A full matrix swallows any yaw, so one sensor cannot separate the two and the residuals are those of ``fit_attitudes``: what
     fixes the yaw is ``like`` (3, 3), the matrix of an earlier calibration or of the mounting. Only its first two rows
     and columns count; an entry that is NaN is not known and does not count either.
 
     Raises
     ------
     CalibrationError
-        As ``fit``, and when ``like`` does not determine a yaw.
+        As ``fit_attitudes``, and when ``like`` does not determine a yaw.
     """
-    fixed = fit(truth, readings, covs)
+    fixed = fit_attitudes(truth, readings, covs)
     known = np.zeros((3, 3), dtype=bool)
     known[:2, :2] = np.isfinite(like[:2, :2])
     yaw = _nearest_yaw(fixed.matrix, like, known)
@@ -172,7 +172,7 @@ def fit_free_yaw(truth: Array, readings: Array, like: Array, covs: Array | None 
     yaw_by_matrix = -(weight @ turned) / (weight @ weight)
     jacobian = np.eye(12)
     jacobian[3:, 3:] = turned + np.outer(by_yaw.ravel(), yaw_by_matrix)
-    return Fit(
+    return AttitudeFit(
         matrix=fixed.matrix @ back,
         bias=fixed.bias,
         cov=jacobian @ fixed.cov @ jacobian.T,
@@ -186,7 +186,7 @@ def fit_free_yaw(truth: Array, readings: Array, like: Array, covs: Array | None 
     )
 
 
-def least_squares(basis: Array, scale: Array, readings: Array, covs: Array | None) -> Linear:
+def least_squares(basis: Array, scale: Array, readings: Array, covs: Array | None) -> LeastSquares:
     """Weighted least squares of readings (n, 3) = basis (n, k) @ coefficients (k, 3).
 
     ``scale`` (k,) divides the columns, so that condition and rounding do not depend on units. The rank is the caller's
@@ -215,7 +215,7 @@ def least_squares(basis: Array, scale: Array, readings: Array, covs: Array | Non
         noise_std = np.tile(np.sqrt(np.sum(residuals**2, axis=0) / (n - k)), k)
         cov = cov * np.outer(noise_std, noise_std)
     levers = np.abs(np.linalg.pinv(scaled)).max(axis=0)
-    return Linear(coefficients, cov, residuals, float(values[0] / values[-1]), rank_of(scaled), levers)
+    return LeastSquares(coefficients, cov, residuals, float(values[0] / values[-1]), rank_of(scaled), levers)
 
 
 def rank_of(basis: Array) -> int:

@@ -5,9 +5,26 @@ from __future__ import annotations
 import numpy as np
 
 from groundstation.calibration.temperature import TemperatureModel
-from telemetry.calibration import Array, Calibration, Provenance, from_json, read, to_json, write
+from telemetry.calibration import (
+    Array,
+    Calibration,
+    Provenance,
+    from_json,
+    read_calibration,
+    to_json,
+    write_calibration,
+)
 
-__all__ = ["Array", "Calibration", "Provenance", "from_json", "model_of", "read", "to_json", "write"]
+__all__ = [
+    "Array",
+    "Calibration",
+    "Provenance",
+    "from_json",
+    "model_of",
+    "read_calibration",
+    "to_json",
+    "write_calibration",
+]
 
 
 def model_of(calibration: Calibration) -> TemperatureModel:

@@ -31,11 +31,11 @@ def coverage_factor(degrees: int | None, coverage: float = COVERAGE) -> float:
     low, high = 0.0, LARGEST
     while high - low > 1e-12 * high:
         middle = 0.5 * (low + high)
-        low, high = (middle, high) if within(middle, degrees) < coverage else (low, middle)
+        low, high = (middle, high) if student_t_coverage(middle, degrees) < coverage else (low, middle)
     return 0.5 * (low + high)
 
 
-def within(t: float, degrees: int) -> float:
+def student_t_coverage(t: float, degrees: int) -> float:
     """P(|T| < t) of Student's distribution: with tan(a) = T / sqrt(n) its density is that of cos(a)^(n - 1)."""
     edge = math.atan(t / math.sqrt(degrees))
     angle = 0.5 * edge * (NODES + 1.0)

@@ -67,7 +67,7 @@ class Interval:
         return np.asarray(np.exp(np.interp(at, self.knots, self.widths) + beyond))
 
 
-def interval(spread: Spread, coverage: float = COVERAGE) -> Interval:
+def coverage_interval(spread: Spread, coverage: float = COVERAGE) -> Interval:
     """The interval of one parameter."""
     n, a, b, c = spread.degrees, spread.by_noise, spread.by_jig, spread.scale
     factor = coverage_factor(n, coverage)

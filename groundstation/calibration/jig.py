@@ -16,7 +16,7 @@ import numpy.typing as npt
 
 from groundstation.calibration.coverage import COVERAGE
 from groundstation.calibration.errors import CalibrationError
-from groundstation.calibration.intervals import Spread, interval
+from groundstation.calibration.intervals import Spread, coverage_interval
 
 Array = npt.NDArray[np.float64]
 UNREACHED = 1e-9  # of the jig's variance of all readings, below which it does not reach a direction
@@ -51,7 +51,7 @@ class Combined:
     expanded: Array
 
 
-def combine(
+def combined_uncertainty(
     basis: Array,
     residuals: Array,
     truth: Array,
@@ -80,7 +80,7 @@ def combine(
         spread = spreads[row][axis]
         noise = max(float(squares[axis]) / (n - k) - float(least[axis]), 0.0)
         std[row, axis] = math.sqrt(spread.by_noise * noise + spread.by_jig)
-        expanded[row, axis] = interval(spread, coverage).half_width(squares[axis])
+        expanded[row, axis] = coverage_interval(spread, coverage).half_width(squares[axis])
     return Combined(std, expanded)
 
 
@@ -110,12 +110,12 @@ def settings_of(truth: Array) -> npt.NDArray[np.intp]:
 
 def reading_errors(truth: Array, matrix: Array, settings: npt.NDArray[np.intp], jig: Jig) -> Array:
     """Covariance (n, 3, n, 3) of the readings of a sensor that a jig turns by errors."""
-    turned = -matrix @ cross(truth)  # (n, 3, 3) of a turn
+    turned = -matrix @ cross_product_matrices(truth)  # (n, 3, 3) of a turn
     together = jig.common**2 * (settings[:, None] == settings[None, :]) + jig.random**2 * np.eye(len(truth))
     return np.asarray(np.einsum("mn,mia,nja->minj", together, turned, turned))
 
 
-def cross(vectors: Array) -> Array:
+def cross_product_matrices(vectors: Array) -> Array:
     """Matrices (n, 3, 3) of v x."""
     x, y, z = vectors.T
     o = np.zeros_like(x)

@@ -25,7 +25,7 @@ def read_matrix(path: Path, unit: float = 1.0) -> Array:
         When the file holds no such matrix.
     """
     if path.suffix == ".json":
-        return np.asarray(block.read(path).matrix * unit)
+        return np.asarray(block.read_calibration(path).matrix * unit)
     try:
         content = tomllib.loads(path.read_text(encoding="utf-8"))
     except OSError as error:

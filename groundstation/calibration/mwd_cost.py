@@ -34,7 +34,7 @@ class Terms:
 
 
 @dataclass(frozen=True, slots=True)
-class Geometry:
+class AxisGeometry:
     """Vectors (n, 3) about their axes: size, angle and distance from the axis (n,), unit vectors (n, 3)."""
 
     size: Array
@@ -45,7 +45,7 @@ class Geometry:
     tangent: Array  # of growing angle
 
     @classmethod
-    def of(cls, vector: Array, axis: Array) -> Geometry:
+    def of(cls, vector: Array, axis: Array) -> AxisGeometry:
         """Spherical coordinates about ``axis`` (n, 3); on the axis itself any outward direction is as good."""
         size, along, outward, across = _split(vector, axis)
         on = across == 0.0
@@ -98,7 +98,7 @@ class Problem:
 
     def residuals(self, x: Array) -> Array:
         """Smooth residuals (4 n,) with the same sum of squares: e_g, and e_T or, on the axis, e_T times outward."""
-        at = Geometry.of(self.local(x).vector, self.axis)
+        at = AxisGeometry.of(self.local(x).vector, self.axis)
         e_t = at.angle - self.angle
         three = np.where(self.on_axis()[:, None], at.outward, np.array([1.0, 0.0, 0.0])) * e_t[:, None]
         return np.column_stack([at.size - self.size, three]).ravel()
@@ -106,20 +106,20 @@ class Problem:
     def residual_jacobian(self, x: Array) -> Array:
         """Derivative of ``residuals`` (4 n, k)."""
         local = self.local(x)
-        at = Geometry.of(local.vector, self.axis)
+        at = AxisGeometry.of(local.vector, self.axis)
         on_axis = self.on_axis()[:, None, None]
         lead = np.where(on_axis, at.outward[:, :, None], np.array([1.0, 0.0, 0.0])[:, None])
         turn = (self._swing(at) / at.size)[:, None, None] * at.around(self.axis)
         by_vector = lead * (at.tangent / at.size[:, None])[:, None, :] + np.where(on_axis, turn, 0.0)
         by_local = np.concatenate([at.radial[:, None, :], by_vector], axis=1) @ local.jacobian()
-        index, power = layout(self.powers)
+        index, power = parameter_layout(self.powers)
         t = np.vander(self.theta, self.powers, increasing=True)
         return np.asarray((by_local[:, :, index] * t[:, None, power]).reshape(-1, len(index)))
 
     def terms(self, x: Array) -> Terms:
         """Cost and its exact derivatives."""
         local = self.local(x)
-        at = Geometry.of(local.vector, self.axis)
+        at = AxisGeometry.of(local.vector, self.axis)
         e_g, e_t = at.size - self.size, at.angle - self.angle
         by_size = _outer(at.radial, at.radial)
         slant = at.tangent / at.size[:, None]
@@ -144,14 +144,14 @@ class Problem:
         """Whether the reference angle is 0 or pi."""
         return np.asarray(np.minimum(self.angle, np.pi - self.angle) < ON_AXIS)
 
-    def _swing(self, at: Geometry) -> Array:
+    def _swing(self, at: AxisGeometry) -> Array:
         """e_T / sin(angle), which tends to 1 or -1 on the axis."""
         e_t = at.angle - self.angle
         sine = at.across / at.size
         limit = np.where(self.angle < 1.0, 1.0, -1.0)
         return np.where(sine > 1e-8, e_t / np.maximum(sine, 1e-8), limit)
 
-    def _lift(self, at: Geometry, e_t: Array) -> Array:
+    def _lift(self, at: AxisGeometry, e_t: Array) -> Array:
         """e_T cot(angle), which tends to 1 on the axis and is held off where the cusp remains."""
         sine = at.across / at.size
         cotangent = np.cos(at.angle) / np.maximum(sine, 1.0 / STEEPEST)
@@ -159,7 +159,7 @@ class Problem:
 
     def _gather_first(self, each: Array) -> Array:
         """Sum of gradients (n, 12) by the local quantities as one by the parameters (k,)."""
-        index, power = layout(self.powers)
+        index, power = parameter_layout(self.powers)
         moments = np.vander(self.theta, self.powers, increasing=True).T @ each
         return np.asarray(moments[power, index])
 
@@ -168,14 +168,14 @@ class Problem:
 
         A parameter is a local quantity times theta^p, so only the moments sum theta^r h, r = 0..6, are needed.
         """
-        index, power = layout(self.powers)
+        index, power = parameter_layout(self.powers)
         t = np.vander(self.theta, 2 * self.powers - 1, increasing=True)
         moments = (t.T @ each.reshape(len(each), -1)).reshape(-1, LOCAL, LOCAL)
         return np.asarray(moments[power[:, None] + power, index[:, None], index])
 
 
 @cache
-def layout(powers: int = POWERS) -> tuple[npt.NDArray[np.intp], npt.NDArray[np.intp]]:
+def parameter_layout(powers: int = POWERS) -> tuple[npt.NDArray[np.intp], npt.NDArray[np.intp]]:
     """Local quantity and power of theta of each of the 12 or 30 parameters."""
     index = np.concatenate([np.repeat(np.arange(6), powers), 6 + np.arange(6)])
     power = np.concatenate([np.tile(np.arange(powers), 6), np.zeros(6, np.intp)])

@@ -13,9 +13,9 @@ import numpy.typing as npt
 
 from groundstation.calibration.errors import CalibrationError
 from groundstation.calibration.jig import Jig
-from groundstation.calibration.mwd_cost import Geometry, Problem, layout
+from groundstation.calibration.mwd_cost import AxisGeometry, Problem, parameter_layout
 from groundstation.calibration.mwd_model import volts_of
-from groundstation.calibration.mwd_record import Record
+from groundstation.calibration.mwd_record import TriadRecord
 
 Array = npt.NDArray[np.float64]
 POOR_LEVERAGE = 6.0
@@ -25,7 +25,7 @@ GRID_DEG = 30.0
 LEVELS = 5  # of temperature
 
 
-def covariance(problem: Problem, x: Array, free: Array) -> Array | None:
+def parameter_covariance(problem: Problem, x: Array, free: Array) -> Array | None:
     """(k, k) covariance of the parameters for residuals of variance 1; None where one of them is open."""
     normal = free.T @ problem.terms(x).normal @ free
     unit = np.sqrt(np.diag(normal))
@@ -73,7 +73,7 @@ def _noise_within(problem: Problem, x: Array, jacobian: Array, setting: npt.NDAr
     return float(left @ left / max(len(residuals) - axes.shape[1], 1))
 
 
-def refuse_open(record: Record, problem: Problem, free: Array) -> None:
+def refuse_open(record: TriadRecord, problem: Problem, free: Array) -> None:
     """Refuse a design that leaves a coefficient open, before anything is solved.
 
     Raises
@@ -82,8 +82,8 @@ def refuse_open(record: Record, problem: Problem, free: Array) -> None:
         With what the design has.
     """
     x = np.zeros(len(free))
-    cov = covariance(problem, x, free)
-    if cov is None or max(predict(record, x, cov)) > OPEN_LEVERAGE:
+    cov = parameter_covariance(problem, x, free)
+    if cov is None or max(predicted_stds(record, x, cov)) > OPEN_LEVERAGE:
         angles = len(np.unique(np.round(np.degrees(record.angle))))
         raise CalibrationError(
             f"the design cannot tell its {len(x)} coefficients apart ({angles} reference angles, temperatures over "
@@ -92,7 +92,7 @@ def refuse_open(record: Record, problem: Problem, free: Array) -> None:
         )
 
 
-def predict(record: Record, x: Array, cov: Array) -> tuple[float, float]:
+def predicted_stds(record: TriadRecord, x: Array, cov: Array) -> tuple[float, float]:
     """Largest standard deviations of size (in references) and angle (rad) that the parameters' covariance leaves."""
     steps = np.arange(0.0, 360.0, GRID_DEG)
     polar, around = np.meshgrid(np.radians(steps[steps <= 180.0]), np.radians(steps))
@@ -104,10 +104,10 @@ def predict(record: Record, x: Array, cov: Array) -> tuple[float, float]:
     # the angle counts from the tool's axis for the magnetometers too: it stands for any direction
     axis, size = np.tile([0.0, 0.0, 1.0], (len(vector), 1)), np.full(len(vector), record.unit)
     angle = np.tile(polar.ravel(), LEVELS)
-    there = Record(volts, temperature, size, axis, angle, record.axes, record.volts_per_unit).problem(len(x))
+    there = TriadRecord(volts, temperature, size, axis, angle, record.axes, record.volts_per_unit).problem(len(x))
     local = there.local(x)
-    at = Geometry.of(local.vector, axis)
-    index, power = layout(there.powers)
+    at = AxisGeometry.of(local.vector, axis)
+    index, power = parameter_layout(there.powers)
     rows = np.stack([at.radial, at.tangent / at.size[:, None]], axis=1) @ local.jacobian()
     rows = rows[:, :, index] * there.theta[:, None, None] ** power
     std = np.sqrt(np.maximum(np.einsum("nik,kl,nil->ni", rows, cov, rows), 0.0))

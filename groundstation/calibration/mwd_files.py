@@ -14,11 +14,11 @@ from pathlib import Path
 import numpy as np
 import numpy.typing as npt
 
+from groundstation.calibration.calibration_records import ANGLE_RATIO
 from groundstation.calibration.errors import CalibrationError
-from groundstation.calibration.mwd_model import nominal, tilt, vectors
+from groundstation.calibration.laboratory_tables import LARGEST, LaboratoryTable, check_range, line_error, read_table
+from groundstation.calibration.mwd_model import gravity_inclination, nominal_triad, vectors_of_volts
 from groundstation.calibration.mwd_record import ACCELEROMETER_VOLTS_PER_G
-from groundstation.calibration.records import ANGLE_RATIO
-from groundstation.calibration.tables import LARGEST, Table, check_range, read_table, refusal
 
 Array = npt.NDArray[np.float64]
 HEADER = "tilt_deg,tool_face_deg,temperature_c,a_v,b_v,c_v"
@@ -82,7 +82,7 @@ def read_mwd(path: Path, limit: float = LARGEST) -> MwdRecord:
     for line, row in zip(table.lines, rows, strict=True):
         _check_row(table, line, row, limit)
     if not np.any(rows[:, VOLTS]):
-        raise refusal(table.name, table.lines[0], "voltages", "nothing but 0")
+        raise line_error(table.name, table.lines[0], "voltages", "nothing but 0")
     _check_tilts(table, rows)
     has_field, has_site = rows.shape[1] >= 9, rows.shape[1] == 11
     return MwdRecord(
@@ -99,25 +99,27 @@ def read_mwd(path: Path, limit: float = LARGEST) -> MwdRecord:
     )
 
 
-def _check_row(table: Table, line: int, row: Array, limit: float) -> None:
+def _check_row(table: LaboratoryTable, line: int, row: Array, limit: float) -> None:
     if not 0.0 <= row[0] <= 180.0:
-        raise refusal(table.name, line, "a tilt of 0..180 deg", f"{row[0]:.6g}")
+        raise line_error(table.name, line, "a tilt of 0..180 deg", f"{row[0]:.6g}")
     if abs(row[1]) > 360.0:
-        raise refusal(table.name, line, "a tool face within +-360 deg", f"{row[1]:.6g}")
+        raise line_error(table.name, line, "a tool face within +-360 deg", f"{row[1]:.6g}")
     if not COLDEST <= row[2] <= HOTTEST:
-        raise refusal(table.name, line, f"a temperature of {COLDEST:.0f}..{HOTTEST:.0f} C", f"{row[2]:.6g}; kelvin?")
+        raise line_error(table.name, line, f"a temperature of {COLDEST:.0f}..{HOTTEST:.0f} C", f"{row[2]:.6g}; kelvin?")
     check_range(table.name, line, table.header[VOLTS], row[VOLTS], limit)
     if len(row) == 11 and not (row[9] > 0.0 and abs(row[10]) <= 90.0):
-        raise refusal(table.name, line, "field_ut > 0 and |dip_deg| <= 90", f"{row[9]:.6g} and {row[10]:.6g}")
+        raise line_error(table.name, line, "field_ut > 0 and |dip_deg| <= 90", f"{row[9]:.6g} and {row[10]:.6g}")
 
 
-def _check_tilts(table: Table, rows: Array) -> None:
+def _check_tilts(table: LaboratoryTable, rows: Array) -> None:
     """Refuse tilts in rad: the readings then lean 57 times as far as the jig is said to."""
-    seen = np.degrees(tilt(vectors(nominal("ABC", ACCELEROMETER_VOLTS_PER_G), rows[:, 3:6], rows[:, 2]))).max()
+    seen = np.degrees(
+        gravity_inclination(vectors_of_volts(nominal_triad("ABC", ACCELEROMETER_VOLTS_PER_G), rows[:, 3:6], rows[:, 2]))
+    ).max()
     largest = float(rows[:, 0].max())
     if largest > 0.0 and seen > ANGLE_RATIO * largest:
         line = table.lines[int(rows[:, 0].argmax())]
-        raise refusal(
+        raise line_error(
             table.name,
             line,
             f"tilts that explain readings leaning {seen:.3g} deg",

@@ -43,12 +43,12 @@ class Triad:
     @property
     def signs(self) -> Array:
         """Signs of the three outputs: C of the accelerometers is flipped."""
-        return signs(self.axes)
+        return axis_signs(self.axes)
 
     def coefficients(self) -> dict[str, float]:
         """The thirty values by name."""
         values = np.concatenate([self.scale.ravel(), self.bias.ravel(), self.cross])
-        return dict(zip(names(self.axes), values.tolist(), strict=True))
+        return dict(zip(coefficient_names(self.axes), values.tolist(), strict=True))
 
     @classmethod
     def of(cls, axes: str, coefficients: Mapping[str, float]) -> Triad:
@@ -59,9 +59,9 @@ class Triad:
         CalibrationError
             When one of the twelve is missing or a name is unknown.
         """
-        known = names(axes)
+        known = coefficient_names(axes)
         unknown = sorted(set(coefficients) - set(known))
-        missing = [name for name in names(axes, LOCAL) if name not in coefficients]
+        missing = [name for name in coefficient_names(axes, LOCAL) if name not in coefficients]
         if unknown or missing:
             raise CalibrationError(f"coefficients of {axes}: missing {missing}, unknown {unknown}")
         values = np.array([coefficients.get(name, 0.0) for name in known])
@@ -80,19 +80,19 @@ class Readings:
     azimuth: Array
 
 
-def signs(axes: str) -> Array:
+def axis_signs(axes: str) -> Array:
     """(3,) signs of the outputs of a triad. Source: eqs. (3)-(8)."""
     return np.array([1.0, 1.0, -1.0 if axes == ACCELEROMETER_AXES else 1.0])
 
 
-def names(axes: str, parameters: int = 30) -> list[str]:
+def coefficient_names(axes: str, parameters: int = 30) -> list[str]:
     """Names of the 12 or 30 coefficients of a triad, ``SF_A0 .. SF_C3 B_A0 .. B_C3 m_AB .. m_CB``."""
     powers = range(1 if parameters == LOCAL else POWERS)
     polynomials = [f"{kind}_{axis}{p}" for kind in ("SF", "B") for axis in axes for p in powers]
     return polynomials + [f"m_{axes[i]}{axes[j]}" for i, j in zip(ROW, COLUMN, strict=True)]
 
 
-def nominal(axes: str, volts_per_unit: float) -> Triad:
+def nominal_triad(axes: str, volts_per_unit: float) -> Triad:
     """Tool as drawn: one scale factor, no bias, no misalignment."""
     scale = np.zeros((3, POWERS))
     scale[:, 0] = volts_per_unit
@@ -104,28 +104,28 @@ def temperature_powers(temperature: Array, powers: int = POWERS) -> Array:
     return np.asarray(np.vander(temperature - REFERENCE_TEMPERATURE, powers, increasing=True))
 
 
-def mixing(cross: Array, sign: Array) -> Array:
+def mixing_matrix(cross: Array, sign: Array) -> Array:
     """(3, 3) matrix of G = mixing u: unit diagonal, minus the misalignments, rows times sign. Source: eqs. (3)-(8)."""
     matrix = np.eye(3, dtype=cross.dtype)
     matrix[ROW, COLUMN] = -cross
     return sign[:, None] * matrix
 
 
-def vectors(triad: Triad, volts: Array, temperature: Array) -> Array:
+def vectors_of_volts(triad: Triad, volts: Array, temperature: Array) -> Array:
     """Gravity or field (n, 3) of voltages (n, 3) at temperatures (n,) C. Source: eqs. (1)-(8)."""
     t = temperature_powers(temperature)
     u = volts / (t @ triad.scale.T) - t @ triad.bias.T
-    return np.asarray(u @ mixing(triad.cross, triad.signs).T)
+    return np.asarray(u @ mixing_matrix(triad.cross, triad.signs).T)
 
 
 def volts_of(triad: Triad, vector: Array, temperature: Array) -> Array:
-    """Voltages (n, 3) a tool would show; the inverse of ``vectors``."""
+    """Voltages (n, 3) a tool would show; the inverse of ``vectors_of_volts``."""
     t = temperature_powers(temperature)
-    u = np.linalg.solve(mixing(triad.cross, triad.signs), vector.T).T
+    u = np.linalg.solve(mixing_matrix(triad.cross, triad.signs), vector.T).T
     return np.asarray((t @ triad.scale.T) * (u + t @ triad.bias.T))
 
 
-def turned(triad: Triad, angle: float) -> Triad:
+def turned_triad(triad: Triad, angle: float) -> Triad:
     """The triad whose outputs are turned by ``angle`` (rad) from its first towards its second axis.
 
     The model is closed under this turn: with R the rotation and D = diag(R mixing) the misalignments become those of
@@ -133,13 +133,13 @@ def turned(triad: Triad, angle: float) -> Triad:
     """
     c, s = np.cos(angle), np.sin(angle)
     sign = triad.signs
-    mixed = np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]]) @ mixing(triad.cross, sign)
+    mixed = np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]]) @ mixing_matrix(triad.cross, sign)
     d = sign * np.diag(mixed)
     cross = -sign[ROW] * (mixed / d)[ROW, COLUMN]
     return Triad(triad.axes, triad.scale / d[:, None], triad.bias * d[:, None], cross)
 
 
-def tilt(gravity: Array) -> Array:
+def gravity_inclination(gravity: Array) -> Array:
     """Inclination (n,) in [0, pi] of gravity (n, 3). Source: eq. (11)."""
     return np.asarray(np.arctan2(np.hypot(gravity[:, 0], gravity[:, 1]), gravity[:, 2]))
 
@@ -149,13 +149,13 @@ def tool_face(gravity: Array) -> Array:
     return np.asarray(np.arctan2(-gravity[:, 1], gravity[:, 0]))
 
 
-def down(gravity: Array) -> Array:
+def vertical_directions(gravity: Array) -> Array:
     """Unit vectors (n, 3) of the vertical in the body's axes X, Y, Z."""
     flipped = gravity * np.array([-1.0, -1.0, 1.0])
     return np.asarray(flipped / np.linalg.norm(gravity, axis=1)[:, None])
 
 
-def azimuth(gravity: Array, field: Array) -> Array:
+def magnetic_azimuth(gravity: Array, field: Array) -> Array:
     """Azimuth (n,) in [0, 2 pi) from magnetic north. Source: eq. (12), inner sign plus."""
     ga, gb, gc = gravity.T
     hx, hy, hz = field.T
@@ -165,20 +165,20 @@ def azimuth(gravity: Array, field: Array) -> Array:
     return np.asarray(np.where(angle < 2.0 * np.pi, angle, 0.0))
 
 
-def dip(gravity: Array, field: Array) -> Array:
+def magnetic_dip(gravity: Array, field: Array) -> Array:
     """Angle (n,) of the field below the horizontal."""
-    along = np.einsum("nk,nk->n", down(gravity), field)
-    return np.asarray(np.arctan2(along, np.linalg.norm(np.cross(down(gravity), field), axis=1)))
+    along = np.einsum("nk,nk->n", vertical_directions(gravity), field)
+    return np.asarray(np.arctan2(along, np.linalg.norm(np.cross(vertical_directions(gravity), field), axis=1)))
 
 
-def evaluate(
+def tool_readings(
     accelerometers: Triad, magnetometers: Triad, gravity_volts: Array, field_volts: Array, temperature: Array
 ) -> Readings:
     """Everything a tool says about n readings. Source: eqs. (1)-(12)."""
-    gravity = vectors(accelerometers, gravity_volts, temperature)
-    field = vectors(magnetometers, field_volts, temperature)
+    gravity = vectors_of_volts(accelerometers, gravity_volts, temperature)
+    field = vectors_of_volts(magnetometers, field_volts, temperature)
     sizes = np.linalg.norm(gravity, axis=1), np.linalg.norm(field, axis=1)
-    return Readings(gravity, field, *sizes, tilt(gravity), azimuth(gravity, field))
+    return Readings(gravity, field, *sizes, gravity_inclination(gravity), magnetic_azimuth(gravity, field))
 
 
 @dataclass(frozen=True, slots=True)
@@ -202,7 +202,7 @@ class LocalModel:
         """Values at w, sigma, beta (n, 3) and cross (6,)."""
         inverse = 1.0 / (1.0 + sigma)
         ratio = w * inverse
-        matrix = mixing(cross, sign)
+        matrix = mixing_matrix(cross, sign)
         u = ratio - beta
         return cls(u, -ratio * inverse, 2.0 * ratio * inverse * inverse, u @ matrix.T, matrix, sign)
 

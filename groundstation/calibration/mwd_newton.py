@@ -23,7 +23,7 @@ SHORTEST = 1e-6  # of a step
 ROUNDING = 1e-13  # of the cost, by which it may seem to rise at the minimum
 
 
-def minimise(problem: Problem, free: Array) -> tuple[Array, int]:
+def minimise_cost(problem: Problem, free: Array) -> tuple[Array, int]:
     """Damped Newton-Raphson over y in x = free y from x = 0; returns x and the number of iterations.
 
     Source: eqs. (21), (22).
@@ -36,7 +36,7 @@ def minimise(problem: Problem, free: Array) -> tuple[Array, int]:
     y = np.zeros(free.shape[1])
     for iteration in range(1, LARGEST_ITERATIONS + 1):
         terms = problem.terms(free @ y)
-        step = direction(terms, free)
+        step = newton_step(terms, free)
         slope = float(terms.gradient @ free @ step)
         y, length = line_search(lambda at: problem.value(free @ at), y, step, terms.value, slope)
         if float(np.max(np.abs(step))) < EPS:
@@ -46,7 +46,7 @@ def minimise(problem: Problem, free: Array) -> tuple[Array, int]:
     raise CalibrationError(f"the search had not ended after {LARGEST_ITERATIONS} iterations, E = {terms.value:.3g}")
 
 
-def direction(terms: Terms, free: Array) -> Array:
+def newton_step(terms: Terms, free: Array) -> Array:
     """Newton's step with the Hessian made positive definite.
 
     Far from the minimum the second-order part of the Hessian makes it indefinite; there it is left out, and 2 J^T J
@@ -73,7 +73,7 @@ def line_search(value: Callable[[Array], float], y: Array, step: Array, e: float
     return y, 0.0
 
 
-def hold(parameters: int, axes: str) -> Array:
+def free_parameter_matrix(parameters: int, axes: str) -> Array:
     """(k, free) map x = hold y: m_AB and m_BA share one column for the accelerometers."""
     all_free = np.eye(parameters)
     if axes == MAGNETOMETER_AXES:

@@ -16,8 +16,8 @@ from groundstation.calibration.mwd_model import (
     POWERS,
     REFERENCE_TEMPERATURE,
     Triad,
-    down,
-    signs,
+    axis_signs,
+    vertical_directions,
 )
 
 Array = npt.NDArray[np.float64]
@@ -27,7 +27,7 @@ GROSS = 0.3  # of the reference, size error that is a wrong unit or a wrong row
 
 
 @dataclass(frozen=True, slots=True)
-class Record:
+class TriadRecord:
     """Static readings of one triad and their references, all (n,) but ``volts`` and ``axis`` (n, 3)."""
 
     volts: Array
@@ -52,7 +52,7 @@ class Record:
             self.size / unit,
             self.angle,
             self.axis,
-            signs(self.axes),
+            axis_signs(self.axes),
             1 if parameters == LOCAL else POWERS,
         )
 
@@ -69,11 +69,11 @@ class Record:
 
 def accelerometer_record(
     volts: Array, temperature: Array, tilt: Array, volts_per_g: float = ACCELEROMETER_VOLTS_PER_G
-) -> Record:
+) -> TriadRecord:
     """References of the accelerometers: 1 g, and the angle from the tool's axis."""
     n = len(volts)
     axis = np.tile([0.0, 0.0, 1.0], (n, 1))
-    return Record(volts, temperature, np.ones(n), axis, tilt, ACCELEROMETER_AXES, volts_per_g)
+    return TriadRecord(volts, temperature, np.ones(n), axis, tilt, ACCELEROMETER_AXES, volts_per_g)
 
 
 def magnetometer_record(
@@ -83,14 +83,16 @@ def magnetometer_record(
     size: Array | float,
     dip: Array | float,
     volts_per_microtesla: float = MAGNETOMETER_VOLTS_PER_MICROTESLA,
-) -> Record:
+) -> TriadRecord:
     """References of the magnetometers: the site's field, and its angle from the vertical."""
     sizes = np.broadcast_to(np.asarray(size, np.float64), (len(volts),))
     angles = np.broadcast_to(np.pi / 2.0 - np.asarray(dip, np.float64), (len(volts),))
-    return Record(volts, temperature, sizes, down(gravity), angles, MAGNETOMETER_AXES, volts_per_microtesla)
+    return TriadRecord(
+        volts, temperature, sizes, vertical_directions(gravity), angles, MAGNETOMETER_AXES, volts_per_microtesla
+    )
 
 
-def check(record: Record, parameters: int) -> None:
+def check_record(record: TriadRecord, parameters: int) -> None:
     """Refuse an invalid record.
 
     Raises

@@ -18,15 +18,28 @@ import numpy.typing as npt
 from groundstation.calibration.errors import CalibrationError
 from groundstation.calibration.jig import Jig
 from groundstation.calibration.mwd_cost import Problem
-from groundstation.calibration.mwd_design import POOR_LEVERAGE, covariance, predict, refuse_open, with_jig
-from groundstation.calibration.mwd_model import LOCAL, Triad, names, tool_face, turned, vectors
-from groundstation.calibration.mwd_newton import hold, minimise
+from groundstation.calibration.mwd_design import (
+    POOR_LEVERAGE,
+    parameter_covariance,
+    predicted_stds,
+    refuse_open,
+    with_jig,
+)
+from groundstation.calibration.mwd_model import (
+    LOCAL,
+    Triad,
+    coefficient_names,
+    tool_face,
+    turned_triad,
+    vectors_of_volts,
+)
+from groundstation.calibration.mwd_newton import free_parameter_matrix, minimise_cost
 from groundstation.calibration.mwd_record import (
     ACCELEROMETER_VOLTS_PER_G,
     MAGNETOMETER_VOLTS_PER_MICROTESLA,
-    Record,
+    TriadRecord,
     accelerometer_record,
-    check,
+    check_record,
     magnetometer_record,
 )
 
@@ -36,7 +49,7 @@ OUTLIER, OUTLIER_FLOOR = 15.0, 2e-3  # median residuals; of the reference or rad
 
 
 @dataclass(frozen=True, slots=True)
-class Errors:
+class MwdErrors:
     """Errors over the readings of a record: of the size (unit) and of the tilt or dip (rad)."""
 
     size_max: float
@@ -60,8 +73,8 @@ class MwdFit:
     cost: float
     coefficients: dict[str, float]
     standard_errors: dict[str, float]
-    before: Errors
-    after: Errors
+    before: MwdErrors
+    after: MwdErrors
     predicted_size_std: float
     predicted_angle_std: float
     temperatures: tuple[float, float]
@@ -87,14 +100,14 @@ def solve_accelerometers(
     CalibrationError
         When a reading cannot be, the design leaves a parameter open, or the search does not end.
     """
-    fit = solve(accelerometer_record(volts, temperature, tilt, volts_per_g), parameters, jig)
+    fit = fit_triad(accelerometer_record(volts, temperature, tilt, volts_per_g), parameters, jig)
     if tool_face_reference is None:
         return fit
     if tool_face_reference.shape != tilt.shape or not np.all(np.isfinite(tool_face_reference)):
         raise CalibrationError(f"expected a finite tool-face reference for each of the {len(tilt)} readings")
-    wrong = tool_face(vectors(fit.triad, volts, temperature)) - tool_face_reference
+    wrong = tool_face(vectors_of_volts(fit.triad, volts, temperature)) - tool_face_reference
     roll = float(np.angle(np.sum(np.sin(tilt) ** 2 * np.exp(1j * wrong))))
-    triad = turned(fit.triad, roll)
+    triad = turned_triad(fit.triad, roll)
     return replace(fit, triad=triad, coefficients=_named(triad, parameters))
 
 
@@ -117,24 +130,24 @@ def solve_magnetometers(
     CalibrationError
         As ``solve_accelerometers``.
     """
-    return solve(magnetometer_record(volts, temperature, gravity, size, dip, volts_per_microtesla), parameters)
+    return fit_triad(magnetometer_record(volts, temperature, gravity, size, dip, volts_per_microtesla), parameters)
 
 
-def solve(record: Record, parameters: int, jig: Jig | None = None) -> MwdFit:
+def fit_triad(record: TriadRecord, parameters: int, jig: Jig | None = None) -> MwdFit:
     """Minimise the cost of a record and judge the result; ``jig`` : errors of its reference angles."""
-    check(record, parameters)
-    problem, free = record.problem(parameters), hold(parameters, record.axes)
+    check_record(record, parameters)
+    problem, free = record.problem(parameters), free_parameter_matrix(parameters, record.axes)
     refuse_open(record, problem, free)
-    x, iterations = minimise(problem, free)
+    x, iterations = minimise_cost(problem, free)
     _refuse_outlier(problem, x)
-    cost, unit_cov = problem.value(x), covariance(problem, x, free)
+    cost, unit_cov = problem.value(x), parameter_covariance(problem, x, free)
     if unit_cov is None:
         raise CalibrationError("the solution leaves a coefficient open though the design should not")
     by_jig, noise = np.zeros_like(unit_cov), cost / _degrees(problem, free)
     if jig is not None:
         by_jig, noise = with_jig(problem, x, unit_cov, jig)
     cov = noise * unit_cov + by_jig
-    leverage, (size_std, angle_std) = max(predict(record, x, unit_cov)), predict(record, x, cov)
+    leverage, (size_std, angle_std) = max(predicted_stds(record, x, unit_cov)), predicted_stds(record, x, cov)
     triad = record.triad(x)
     return MwdFit(
         triad,
@@ -172,19 +185,19 @@ def _refuse_outlier(problem: Problem, x: Array) -> None:
         )
 
 
-def _errors(problem: Problem, x: Array, unit: float) -> Errors:
+def _errors(problem: Problem, x: Array, unit: float) -> MwdErrors:
     e_g, e_t = problem.errors(x)
     size, angle = unit * np.abs(e_g), np.abs(e_t)
     rms = [float(np.sqrt(np.mean(e**2))) for e in (size, angle)]
-    return Errors(float(size.max()), rms[0], float(angle.max()), rms[1])
+    return MwdErrors(float(size.max()), rms[0], float(angle.max()), rms[1])
 
 
 def _named(triad: Triad, parameters: int) -> dict[str, float]:
     every = triad.coefficients()
-    return {name: every[name] for name in names(triad.axes, parameters)}
+    return {name: every[name] for name in coefficient_names(triad.axes, parameters)}
 
 
-def _warnings(record: Record, parameters: int, leverage: float) -> list[str]:
+def _warnings(record: TriadRecord, parameters: int, leverage: float) -> list[str]:
     found = []
     span = float(np.ptp(record.temperature))
     if parameters == LOCAL and span > ONE_TEMPERATURE:

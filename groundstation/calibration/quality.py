@@ -28,7 +28,7 @@ STEEPEST = math.radians(1.0)  # inclination from which an azimuth means somethin
 
 
 @dataclass(frozen=True, slots=True)
-class Verdict:
+class QualityVerdict:
     """One quantity: what it spread over the tool faces and what it may."""
 
     name: str
@@ -50,7 +50,7 @@ class QualityReport:
     inclination: Array
     azimuth: Array
     gravity_size: Array
-    verdicts: tuple[Verdict, Verdict, Verdict]
+    verdicts: tuple[QualityVerdict, QualityVerdict, QualityVerdict]
 
     @property
     def passed(self) -> bool:
@@ -85,9 +85,9 @@ def judge_readings(readings: Readings) -> QualityReport:
     mean = float(np.angle(np.sum(np.exp(1j * azimuth))))
     about = np.angle(np.exp(1j * (azimuth - mean)))  # so that 359.9 deg and 0.1 deg are neighbours
     verdicts = (
-        Verdict("inclination", "rad", float(np.ptp(inclination)), INCLINATION_LIMIT),
-        Verdict("azimuth", "rad", float(np.ptp(about)), AZIMUTH_LIMIT),
-        Verdict("G_L", "g", float(np.ptp(size)), SIZE_LIMIT),
+        QualityVerdict("inclination", "rad", float(np.ptp(inclination)), INCLINATION_LIMIT),
+        QualityVerdict("azimuth", "rad", float(np.ptp(about)), AZIMUTH_LIMIT),
+        QualityVerdict("G_L", "g", float(np.ptp(size)), SIZE_LIMIT),
     )
     return QualityReport(face[order], inclination, azimuth, size, verdicts)
 
@@ -112,8 +112,8 @@ def _check(readings: Readings, face: Array) -> None:
         )
 
 
-def _shown(verdict: Verdict) -> Verdict:
+def _shown(verdict: QualityVerdict) -> QualityVerdict:
     """The verdict in degrees where it is an angle."""
     if verdict.unit != "rad":
         return verdict
-    return Verdict(verdict.name, "deg", math.degrees(verdict.spread), math.degrees(verdict.limit))
+    return QualityVerdict(verdict.name, "deg", math.degrees(verdict.spread), math.degrees(verdict.limit))

@@ -57,7 +57,7 @@ class TemperatureFit:
         return float(np.sqrt(np.mean(self.residuals**2)))
 
 
-def fit(
+def fit_temperature_polynomials(
     truth: Array,
     readings: Array,
     temperature: Array,

@@ -34,7 +34,7 @@ class Alignment:
         return float(np.sqrt(np.mean(self.residuals**2)))
 
 
-def align(positive: Array, negative: Array, reference: float) -> Alignment:
+def turntable_alignment(positive: Array, negative: Array, reference: float) -> Alignment:
     """Matrix and bias from two rotations per axis.
 
     M[s, r] = (T[r, s, +] - T[r, s, -]) / (2 ref) and b[s] = mean over r of (T[r, s, +] + T[r, s, -]) / 2.
@@ -61,7 +61,7 @@ def align(positive: Array, negative: Array, reference: float) -> Alignment:
     return Alignment(matrix, bias, biases - bias)
 
 
-def correct(readings: Array, matrix: Array, bias: Array) -> Array:
+def correct_readings(readings: Array, matrix: Array, bias: Array) -> Array:
     """True vectors (..., 3) of readings (..., 3): w = M^-1 (G - b)."""
     return np.asarray(np.linalg.solve(matrix, (readings - bias)[..., np.newaxis])[..., 0], dtype=np.float64)
 

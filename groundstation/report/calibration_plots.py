@@ -15,13 +15,13 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure, SubFigure
 from matplotlib.ticker import FixedLocator, NullLocator
 
-from groundstation.calibration.allan import AXES, LONGEST_IN_FIT, AllanResult
-from groundstation.calibration.attitudes import Fit
+from groundstation.calibration.allan_analysis import AXES, LONGEST_IN_FIT, AllanResult
+from groundstation.calibration.attitudes import AttitudeFit
 from groundstation.calibration.mwd_model import ACCELEROMETER_AXES, Triad, temperature_powers
 from groundstation.calibration.mwd_solve import MwdFit
 from groundstation.calibration.quality import QualityReport
 from groundstation.report.calibration_sheets import AttitudeErrors, TriadErrors
-from groundstation.report.panels import AFTER, BEFORE, COLOURS, LIMIT, Panel, row_of
+from groundstation.report.figure_panels import AFTER, BEFORE, COLOURS, LIMIT, Panel, row_of
 from groundstation.report.style import GREY as QUIET
 from groundstation.report.style import MARKERS
 
@@ -32,11 +32,11 @@ SMALLEST = 0.02  # of the median error after, below which none is drawn lower
 HEADROOM = 1.6  # of a limit, the half height of a panel that shows it
 
 
-def linear_panels(fit: Fit, at: AttitudeErrors) -> tuple[Panel, ...]:
+def linear_panels(fit: AttitudeFit, at: AttitudeErrors) -> tuple[Panel, ...]:
     """Residuals at each attitude, and the errors before and after."""
     pair = (f"|reading \N{MINUS SIGN} truth|, {at.unit}", at.before, at.after)
     return (
-        Panel("Residuals at each attitude", 2.3, lambda part: residuals(part, at.names, fit.residuals, at.unit)),
+        Panel("Residuals at each attitude", 2.3, lambda part: draw_residuals(part, at.names, fit.residuals, at.unit)),
         Panel("Errors before and after", 2.3, lambda part: before_after(part, at.names, [pair])),
     )
 
@@ -70,12 +70,12 @@ def triad_panels(
 
 def quality_panels(report: QualityReport) -> tuple[Panel, ...]:
     """The control over the tool face."""
-    return (Panel("Readings over the tool face", 2.3, lambda part: quality(part, report)),)
+    return (Panel("Readings over the tool face", 2.3, lambda part: draw_quality(part, report)),)
 
 
 def allan_panels(results: Sequence[AllanResult], unit: str) -> tuple[Panel, ...]:
     """The curves."""
-    return (Panel("Allan deviation", 2.9, lambda part: allan(part, results, unit)),)
+    return (Panel("Allan deviation", 2.9, lambda part: draw_allan_curves(part, results, unit)),)
 
 
 def before_after(part: Figure | SubFigure, names: Sequence[str], pairs: Sequence[tuple[str, Array, Array]]) -> None:
@@ -92,7 +92,7 @@ def before_after(part: Figure | SubFigure, names: Sequence[str], pairs: Sequence
         axes.legend(loc="lower left", bbox_to_anchor=(0.0, 1.0), ncols=2, borderaxespad=0.1, handletextpad=0.2)
 
 
-def residuals(part: Figure | SubFigure, names: Sequence[str], values: Array, unit: str) -> None:
+def draw_residuals(part: Figure | SubFigure, names: Sequence[str], values: Array, unit: str) -> None:
     """Residuals (n, 3) of each axis over the attitudes, with one root mean square on either side of zero."""
     (axes,) = row_of(part, 1)
     rms = float(np.sqrt(np.mean(values**2)))
@@ -146,7 +146,7 @@ def temperature_curves(
         axes.legend(loc="lower left", bbox_to_anchor=(0.0, 1.0), ncols=3, borderaxespad=0.1)
 
 
-def quality(part: Figure | SubFigure, report: QualityReport) -> None:
+def draw_quality(part: Figure | SubFigure, report: QualityReport) -> None:
     """Inclination, azimuth and G_L over the tool face about their middle, between the limits of the spread."""
     face = np.degrees(report.tool_face)
     mean = float(np.angle(np.sum(np.exp(1j * report.azimuth))))
@@ -172,7 +172,7 @@ def quality(part: Figure | SubFigure, report: QualityReport) -> None:
         )
 
 
-def allan(part: Figure | SubFigure, results: Sequence[AllanResult], unit: str) -> None:
+def draw_allan_curves(part: Figure | SubFigure, results: Sequence[AllanResult], unit: str) -> None:
     """Log-log curves with their confidence, the fit as far as it goes, and N and F read off it."""
     all_axes = row_of(part, len(results), sharey=True)
     for k, (axes, result) in enumerate(zip(all_axes, results, strict=True)):

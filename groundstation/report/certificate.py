@@ -12,7 +12,7 @@ from typing import Any, Literal
 import typst
 
 from groundstation.errors import GroundError
-from groundstation.report.panels import Panel, render
+from groundstation.report.figure_panels import Panel, render_panels
 from groundstation.report.sheet import Sheet
 
 TEMPLATE = Path(__file__).with_name("certificate.typ")
@@ -34,7 +34,7 @@ class Identity:
     software: str
 
 
-def source(sheet: Sheet, panels: Sequence[Panel], identity: Identity) -> str:
+def template_data(sheet: Sheet, panels: Sequence[Panel], identity: Identity) -> str:
     """Everything the template sets, as JSON; figures as SVG text."""
     return json.dumps(
         {
@@ -51,24 +51,24 @@ def source(sheet: Sheet, panels: Sequence[Panel], identity: Identity) -> str:
                 {"title": t.title, "columns": list(t.columns), "rows": [list(row) for row in t.rows]}
                 for t in sheet.tables
             ],
-            "figures": [{"caption": p.caption, "svg": render([p], "svg").decode()} for p in panels],
+            "figures": [{"caption": p.caption, "svg": render_panels([p], "svg").decode()} for p in panels],
         }
     )
 
 
-def typeset(data: str, day: date) -> bytes:
-    """PDF of the JSON of ``source``; ``day`` is the document's date."""
+def typeset_pdf(data: str, day: date) -> bytes:
+    """PDF of the JSON of ``template_data``; ``day`` is the document's date."""
     return _compiled(data, day, "pdf")[0]
 
 
-def pages(data: str, day: date, ppi: float = 110.0) -> list[bytes]:
+def typeset_png_pages(data: str, day: date, ppi: float = 110.0) -> list[bytes]:
     """The pages as PNG."""
     return _compiled(data, day, "png", ppi)
 
 
-def certificate(sheet: Sheet, panels: Sequence[Panel], identity: Identity) -> bytes:
+def certificate_pdf(sheet: Sheet, panels: Sequence[Panel], identity: Identity) -> bytes:
     """PDF of a sheet and its figures."""
-    return typeset(source(sheet, panels, identity), identity.day)
+    return typeset_pdf(template_data(sheet, panels, identity), identity.day)
 
 
 def _compiled(data: str, day: date, form: Literal["pdf", "png"], ppi: float | None = None) -> list[bytes]:

@@ -12,12 +12,12 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
-from groundstation.report.document import Document, Origin, Section
+from groundstation.report.document import Document, Origin, ReportSection
 from groundstation.report.plots import survey_figure
 from groundstation.report.style import svg_of
-from groundstation.survey.tools.instruments import Tool
-from groundstation.survey.wall.column_deviation import Design, Deviation, Tolerance, deviation
-from groundstation.survey.well.trajectory import Point
+from groundstation.survey.tools.instruments import SurveyTool
+from groundstation.survey.wall.column_deviation import ColumnDesign, Deviation, Tolerance, point_deviation
+from groundstation.survey.well.trajectory import TrajectoryPoint
 
 Array = npt.NDArray[np.float64]
 CONFIDENCE = 0.95
@@ -29,7 +29,7 @@ CLAUSES = {
 
 
 @dataclass(frozen=True, slots=True)
-class Site:
+class ReportSite:
     """What a report says of the place: project, client, north, and site coordinates (m) of the zero, if any."""
 
     project: str = ""
@@ -59,9 +59,9 @@ class Site:
 class ColumnRecord:
     """One column as a report needs it: stations (n,), positions (n, 3) against the zero and covariances (n, 3, 3)."""
 
-    design: Design
+    design: ColumnDesign
     state: str
-    tool: Tool
+    tool: SurveyTool
     serial: str
     calibration: str
     head_std: float
@@ -79,20 +79,20 @@ class ColumnRecord:
         found = []
         for md, place, cov in zip(self.md, self.positions, self.covs, strict=True):
             if md <= self.surveyed_md + 1e-6:
-                point = Point(float(md), self.design.axis, place, cov, np.zeros((3, 0)))
-                found.append(deviation(point, self.design))
+                point = TrajectoryPoint(float(md), self.design.axis, place, cov, np.zeros((3, 0)))
+                found.append(point_deviation(point, self.design))
         return found
 
 
-def column_report(record: ColumnRecord, site: Site, origin: Origin) -> Document:
+def column_report(record: ColumnRecord, site: ReportSite, origin: Origin) -> Document:
     """Report of one column."""
     found = record.deviations() if math.isfinite(record.surveyed_md) else []
     verdict, good = _verdict(record, found)
     sections = [
-        Section("Setting out and design", facts=_design_facts(record, site)),
-        Section("As built against design", (_tolerance_words(record.design),), **_table(record, found, site)),  # type: ignore[arg-type]
-        Section("What is to be done", record.actions or ("Nothing.",)),
-        Section("Instrument", facts=instrument_facts(record)),
+        ReportSection("Setting out and design", facts=_design_facts(record, site)),
+        ReportSection("As built against design", (_tolerance_words(record.design),), **_table(record, found, site)),  # type: ignore[arg-type]
+        ReportSection("What is to be done", record.actions or ("Nothing.",)),
+        ReportSection("Instrument", facts=instrument_facts(record)),
     ]
     if len(found) > 1:
         count, zero = len(found), np.array(record.design.head)
@@ -101,13 +101,13 @@ def column_report(record: ColumnRecord, site: Site, origin: Origin) -> Document:
             f"Column {record.design.name} from its head, {100.0 * CONFIDENCE:g} % regions",
             _from_its_head(record.design),
         )  # fmt: skip
-        sections.append(Section("Plan and sections", figure=svg_of(figure), new_page=True))
+        sections.append(ReportSection("Plan and sections", figure=svg_of(figure), new_page=True))
     title = f"Column {record.design.name}"
     return Document("Column report", title, site.project or "as built", verdict, good, site.facts(), sections, origin)
 
 
-def _from_its_head(design: Design) -> Design:
-    return Design(
+def _from_its_head(design: ColumnDesign) -> ColumnDesign:
+    return ColumnDesign(
         design.name, (0.0, 0.0, 0.0), design.inclination, design.azimuth, design.length, design.radius, design.tolerance
     )
 
@@ -127,20 +127,18 @@ def _verdict(record: ColumnRecord, found: Sequence[Deviation]) -> tuple[str, boo
     return f"Column {name} is within tolerance: {worst.ratio:.0%} of it at the most, at {worst.md:g} m", True
 
 
-def clause(rule: Tolerance) -> str:
+def tolerance_text(rule: Tolerance) -> str:
     """A tolerance in words."""
     parts = [f"{1e3 * rule.start:g} mm at the head"] if rule.start else []
     parts += [f"{100.0 * rule.growth:.3g} % of the length"] if rule.growth else []
     return CLAUSES.get(rule.name, f"{rule.name}: {' and '.join(parts)}")
 
 
-def _tolerance_words(design: Design) -> str:
-    return (
-        f"Tolerance: {clause(design.tolerance)}. Deviation is across the design axis; sigma is one standard deviation."
-    )
+def _tolerance_words(design: ColumnDesign) -> str:
+    return f"Tolerance: {tolerance_text(design.tolerance)}. Deviation is across the design axis; sigma is one standard deviation."
 
 
-def _design_facts(record: ColumnRecord, site: Site) -> list[tuple[str, str]]:
+def _design_facts(record: ColumnRecord, site: ReportSite) -> list[tuple[str, str]]:
     design = record.design
     north, east, down = design.head
     facts = [("Head as set out", f"north {north:.3f} m, east {east:.3f} m, down {down:.3f} m")]
@@ -174,7 +172,7 @@ def instrument_facts(record: ColumnRecord) -> list[tuple[str, str]]:
     ]
 
 
-def _table(record: ColumnRecord, found: Sequence[Deviation], site: Site) -> dict[str, object]:
+def _table(record: ColumnRecord, found: Sequence[Deviation], site: ReportSite) -> dict[str, object]:
     """Columns, rows and marked rows of the stations."""
     site_columns = ("N m", "E m", "height m") if site.zero is not None else ("north m", "east m", "down m")
     columns = ("MD m", "incl. deg", "azi. deg", *site_columns, "dev. mm", "sigma mm", "allowed mm", "used")

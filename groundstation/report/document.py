@@ -35,7 +35,7 @@ class Origin:
 
 
 @dataclass(frozen=True, slots=True)
-class Section:
+class ReportSection:
     """One heading: words, facts, a table of finished text (``marked`` rows stand out) and a figure as SVG."""
 
     title: str
@@ -58,7 +58,7 @@ class Document:
     verdict: str
     good: bool
     facts: Facts
-    sections: Sequence[Section]
+    sections: Sequence[ReportSection]
     origin: Origin
     signed_by: Sequence[str] = SIGNED_BY
 

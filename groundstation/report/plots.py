@@ -24,14 +24,14 @@ from groundstation.report.style import (
     NICE,
     SERIES,
     WRONG,
+    draw_covariance_ellipse,
     in_unit,
     log_if_needed,
     new_figure,
-    region,
     styled,
-    tidy,
+    tidy_ticks,
 )
-from groundstation.survey.wall.column_deviation import Design
+from groundstation.survey.wall.column_deviation import ColumnDesign
 from groundstation.survey.well.ellipsoid import coverage_radius
 
 Array = npt.NDArray[np.float64]
@@ -45,7 +45,7 @@ def _spread(n: int) -> list[int]:
 
 @styled
 def survey_figure(
-    md: Array, positions: Array, covs: Array, confidence: float, title: str, design: Design | None = None
+    md: Array, positions: Array, covs: Array, confidence: float, title: str, design: ColumnDesign | None = None
 ) -> Figure:
     """Plan, two sections and standard deviations of one hole.
 
@@ -106,10 +106,10 @@ def survey_figure(
         handles.append(Line2D([], [], color=GREY, ls="-.", lw=1.0, label="design axis"))
         handles.append(Line2D([], [], color=GREY, ls="--", lw=1.0, label=f"tolerance {at}"))
     figure.legend(handles=handles, loc="outside lower left", ncols=2)
-    return tidy(figure)
+    return tidy_ticks(figure)
 
 
-def _off_axis(position: Array, design: Design | None) -> tuple[float, float]:
+def _off_axis(position: Array, design: ColumnDesign | None) -> tuple[float, float]:
     """Distance (m) from the design axis and what is allowed there."""
     if design is None:
         return 0.0, math.inf
@@ -118,12 +118,14 @@ def _off_axis(position: Array, design: Design | None) -> tuple[float, float]:
     return math.hypot(across[0], across[1]), design.tolerance.at(max(float(offset @ design.axis), 0.0))
 
 
-def _plan(axes: Axes, positions: Array, covs: Array, sigma: float, design: Design | None, scale: float) -> None:
+def _plan(axes: Axes, positions: Array, covs: Array, sigma: float, design: ColumnDesign | None, scale: float) -> None:
     axes.set_aspect("equal", adjustable="datalim")
     axes.plot(scale * positions[:, 1], scale * positions[:, 0], ".-", color=INK, lw=1.0)
     for k in _spread(len(positions)):
         # the axes are east, north: both rows and columns the other way round
-        region(axes, scale * positions[k, 1::-1], scale**2 * covs[k, 1::-1, 1::-1], sigma, fc="none", ec=SERIES[0])
+        draw_covariance_ellipse(
+            axes, scale * positions[k, 1::-1], scale**2 * covs[k, 1::-1, 1::-1], sigma, fc="none", ec=SERIES[0]
+        )
     if design is not None:
         centre = np.array(design.head) + design.length * design.axis
         angle = np.linspace(0.0, math.tau, 121)
@@ -141,7 +143,7 @@ def _sections(
     positions: Array,
     covs: Array,
     sigma: float,
-    design: Design | None,
+    design: ColumnDesign | None,
     lengths: tuple[float, str],
 ) -> None:
     """North and east over depth, both exaggerated by the same factor."""
@@ -153,7 +155,7 @@ def _sections(
         axes.plot(scale * positions[:, c], positions[:, 2], ".-", color=INK, lw=1.0)
         for k in _spread(len(positions)):
             cov = covs[k][np.ix_(pair, pair)] * np.outer(unequal, unequal)
-            region(axes, positions[k, pair] * unequal, cov, sigma, fc="none", ec=SERIES[0])
+            draw_covariance_ellipse(axes, positions[k, pair] * unequal, cov, sigma, fc="none", ec=SERIES[0])
         if design is not None:
             _section_design(axes, design, c, scale)
         axes.autoscale_view()
@@ -168,7 +170,7 @@ def _sections(
         axes.set(xlabel=f"{name} ({unit}){note}", ylabel="TVD (m)", title=f"Section {name.lower()} and down")
 
 
-def _section_design(axes: Axes, design: Design, c: int, scale: float) -> None:
+def _section_design(axes: Axes, design: ColumnDesign, c: int, scale: float) -> None:
     along = np.linspace(0.0, design.length, 25)
     centre = np.array(design.head) + along[:, None] * design.axis
     # outermost points of the circle around the axis in the direction of this section

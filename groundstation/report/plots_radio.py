@@ -11,9 +11,9 @@ from matplotlib.colors import Normalize
 from matplotlib.figure import Figure
 from matplotlib.tri import Triangulation
 
-from groundstation.report.style import INK, MARKERS, SERIES, WRONG, new_figure, styled, tidy
-from telemetry.radio.steel import CARBON, TEMPERATURES, resistivity
-from telemetry.radio.waveguide import LOWEST, TE11, attenuation, cut_off, decibels
+from groundstation.report.style import INK, MARKERS, SERIES, WRONG, new_figure, styled, tidy_ticks
+from telemetry.radio.steel import CARBON, TEMPERATURES, steel_resistivity
+from telemetry.radio.waveguide import LOWEST, TE11, cut_off, nepers_to_decibels, wall_attenuation
 
 Array = npt.NDArray[np.float64]
 LEVEL = 5.0  # dB, from one shade to the next
@@ -45,7 +45,7 @@ def soil_map(sand: Array, clay: Array, margins: Mapping[float, Array], title: st
         axes.grid(visible=False)
     panels[0].set_ylabel("Clay (%)")
     figure.colorbar(shades, ax=list(panels), label="Margin (dB)", boundaries=levels)
-    return tidy(figure)
+    return tidy_ticks(figure)
 
 
 @styled
@@ -65,7 +65,7 @@ def soil_curves(distances: Array, powers: Mapping[str, Array], threshold: float,
     axes.axhline(threshold, color=WRONG, lw=1.0, ls="--", label="threshold")
     axes.set(xlabel="Distance (m)", ylabel="Received power (dBm)")
     axes.legend()
-    return tidy(figure)
+    return tidy_ticks(figure)
 
 
 @styled
@@ -91,7 +91,7 @@ def pipe_figure(
     for k, mode in enumerate(LOWEST):
         lowest = float(cut_off(mode, radius))
         f = np.geomspace(1.01 * lowest, top, FREQUENCIES)
-        lost = decibels(attenuation(mode, radius, f, rho))
+        lost = nepers_to_decibels(wall_attenuation(mode, radius, f, rho))
         over_frequency.plot(f * 1e-9, lost, color=SERIES[k], label=f"{mode}, from {lowest * 1e-9:.3f} GHz")
         over_frequency.axvline(lowest * 1e-9, color=SERIES[k], lw=0.7, ls=":")
         if published and str(mode) in published:
@@ -103,10 +103,10 @@ def pipe_figure(
     over_carbon.set_title(f"TE11 at {frequency * 1e-9:g} GHz")
     if frequency > float(cut_off(TE11, radius)):
         for k, warm in enumerate(TEMPERATURES.tolist()):
-            lost = decibels(attenuation(TE11, radius, frequency, resistivity(carbon, warm)))
+            lost = nepers_to_decibels(wall_attenuation(TE11, radius, frequency, steel_resistivity(carbon, warm)))
             look = {"color": SERIES[k], "marker": MARKERS[k], "markevery": 20}
             over_carbon.plot(carbon, lost, label=f"{warm:g} C", **look)
         over_carbon.set_ylim(top=1.12 * float(lost.max()))
         over_carbon.legend(loc="upper center", ncols=len(TEMPERATURES), columnspacing=1.0)
     over_carbon.set(xlabel="Carbon (% by weight)", ylabel="Attenuation (dB/m)")
-    return tidy(figure)
+    return tidy_ticks(figure)

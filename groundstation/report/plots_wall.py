@@ -18,11 +18,21 @@ from matplotlib.lines import Line2D
 from matplotlib.patches import Circle, Rectangle
 
 from groundstation.errors import SurveyError
-from groundstation.report.style import GREY, INK, LIGHT, SERIES, WRONG, new_figure, region, styled, tidy
-from groundstation.survey.wall.as_built import Columns, State
-from groundstation.survey.wall.column_joint import thickness
-from groundstation.survey.wall.wall_joints import ExtraColumn, Joints, pair_covariance, worst
-from groundstation.survey.wall.wall_verdict import stretches
+from groundstation.report.style import (
+    GREY,
+    INK,
+    LIGHT,
+    SERIES,
+    WRONG,
+    draw_covariance_ellipse,
+    new_figure,
+    styled,
+    tidy_ticks,
+)
+from groundstation.survey.wall.as_built import Columns, ColumnState
+from groundstation.survey.wall.column_joint import joint_thickness
+from groundstation.survey.wall.wall_joints import ExtraColumn, Joints, pair_covariance, worst_joint
+from groundstation.survey.wall.wall_verdict import true_runs
 from groundstation.survey.well.ellipsoid import coverage_radius
 
 Array = npt.NDArray[np.float64]
@@ -51,7 +61,7 @@ def band_of_thickness(columns: Columns, found: Joints, joint: int) -> tuple[Arra
     return size + wide, np.maximum(size - wide, 0.0)
 
 
-def ranking(found: Joints) -> npt.NDArray[np.intp]:
+def thinness_ranking(found: Joints) -> npt.NDArray[np.intp]:
     """Joints, the one that most probably is too thin first; of equals the thinnest."""
     probability = np.where(np.isfinite(found.probability), found.probability, -1.0).max(axis=1)
     thin = np.where(np.isfinite(found.thickness), found.thickness, np.inf).min(axis=1)
@@ -87,7 +97,7 @@ def wall_figure(
     """
     figure = new_figure(8.8, title)
     _draw(figure, columns, found, required, extra, shown=shown, allowed=allowed, shade=shade)
-    return tidy(figure)
+    return tidy_ticks(figure)
 
 
 def _draw(
@@ -112,7 +122,7 @@ def _draw(
     (over_depth, shades), (plan, zoom) = figure.subplots(2, 2, height_ratios=(1.15, 1.0))
     bad = np.max(np.where(np.isfinite(found.probability), found.probability, 0.0), axis=1) > allowed
     bad |= np.min(np.where(np.isfinite(found.thickness), found.thickness, np.inf), axis=1) < required
-    _thickness(over_depth, columns, found, required, ranking(found)[:shown], bad)
+    _thickness(over_depth, columns, found, required, thinness_ranking(found)[:shown], bad)
     _map(shades, columns, found, required, allowed, shade)
     _plan(plan, columns, found, bad)
     _zoom(zoom, columns, found, bad, extra)
@@ -135,7 +145,8 @@ def _thickness(
         if rank == 0:
             a, b = found.pairs[joint]
             low, high = (
-                thickness(d, columns.radii[a], columns.radii[b]) for d in band_of_thickness(columns, found, int(joint))
+                joint_thickness(d, columns.radii[a], columns.radii[b])
+                for d in band_of_thickness(columns, found, int(joint))
             )
             axes.fill_betweenx(
                 columns.depths, low, high, color=colour, alpha=0.18, lw=0.0, label=f"its {100.0 * BAND:g} % band"
@@ -148,7 +159,7 @@ def _thickness(
 
 def _missing_words(columns: Columns, found: Joints, joint: int) -> str:
     """Where a joint is not there, which has no thickness to draw."""
-    missing = np.flatnonzero(found.states[joint] == State.MISSING)
+    missing = np.flatnonzero(found.states[joint] == ColumnState.MISSING)
     return f", missing from {columns.depths[missing[0]]:g} m" if len(missing) else ""
 
 
@@ -167,7 +178,7 @@ def _map(axes: Axes, columns: Columns, found: Joints, required: float, allowed: 
             bounds, colours = [thin, *bounds], (WRONG, *colours)
     colormap = ListedColormap(list(colours))
     count, depths = len(found.pairs), columns.depths
-    edge, cells = pooled(values, np.nanmin if shade == "thickness" else np.nanmax)
+    edge, cells = pooled_cells(values, np.nanmin if shade == "thickness" else np.nanmax)
     middles = 0.5 * (depths[1:] + depths[:-1])
     edges = np.concatenate([depths[:1], middles, depths[-1:]])
     picture = axes.pcolormesh(
@@ -179,9 +190,10 @@ def _map(axes: Axes, columns: Columns, found: Joints, required: float, allowed: 
         rasterized=True,  # thousands of cells would make a vector file slow to open
     )
     missing, unsurveyed = (
-        _marked(axes, found.states == state, edge, edges, state) for state in (State.MISSING, State.UNSURVEYED)
+        _marked(axes, found.states == state, edge, edges, state)
+        for state in (ColumnState.MISSING, ColumnState.UNSURVEYED)
     )
-    joint, depth = worst(found)
+    joint, depth = worst_joint(found)
     axes.plot(joint, depths[depth], "o", ms=8.0, mfc="none", mec=INK, mew=1.4, clip_on=False, gid="worst")
     axes.grid(visible=False)
     axes.set_ylim(float(depths[-1]), float(depths[0]))
@@ -194,21 +206,21 @@ def _map(axes: Axes, columns: Columns, found: Joints, required: float, allowed: 
     bar.ax.set_xticks(bounds, [f"{b:.2g}" for b in bounds])
 
 
-def _marked(axes: Axes, flags: npt.NDArray[np.bool_], edge: Array, edges: Array, state: State) -> bool:
+def _marked(axes: Axes, flags: npt.NDArray[np.bool_], edge: Array, edges: Array, state: ColumnState) -> bool:
     """Draw over the cells (joints, depths) of a state what no shade of grey says; whether there are any."""
     look: dict[str, Any] = {"fc": "none", "ec": INK, "hatch": "////"}
-    if state == State.MISSING:
+    if state == ColumnState.MISSING:
         look = {"fc": WRONG, "ec": INK, "hatch": "xxxx"}
     step = -(-len(flags) // MOST_CELLS)
     for cell, k in enumerate(range(0, len(flags), step)):
-        for first, last in stretches(np.any(flags[k : k + step], axis=0)):
+        for first, last in true_runs(np.any(flags[k : k + step], axis=0)):
             size = float(edge[cell + 1] - edge[cell]), float(edges[last + 1] - edges[first])
             place = float(edge[cell]), float(edges[first])
             axes.add_patch(Rectangle(place, *size, lw=0.0, gid=state.name.lower(), **look))
     return bool(np.any(flags))
 
 
-def pooled(values: Array, worst_of: Callable[..., Any]) -> tuple[Array, Array]:
+def pooled_cells(values: Array, worst_of: Callable[..., Any]) -> tuple[Array, Array]:
     """Edges along the wall and cells (at most ``MOST_CELLS``, depths): joints that share one show their worst."""
     count = len(values)
     step = -(-count // MOST_CELLS)
@@ -226,12 +238,12 @@ def _frame(axes: Axes, title: str) -> None:
 
 def _plan(axes: Axes, columns: Columns, found: Joints, bad: npt.NDArray[np.bool_]) -> None:
     """Whole wall at the depth of the worst joint; what is missing there is a dashed ring at its design."""
-    _, depth = worst(found)
+    _, depth = worst_joint(found)
     touched = set(found.pairs[bad].ravel().tolist())
     missing = False
     for k, centre in enumerate(columns.drawn_centres[:, depth]):
         place, radius = (float(centre[1]), float(centre[0])), float(columns.radii[k, depth])
-        if columns.states[k, depth] == State.MISSING:
+        if columns.states[k, depth] == ColumnState.MISSING:
             missing = True
             axes.add_patch(Circle(place, radius, fc="none", ec=WRONG, lw=1.2, ls="--", gid="missing"))
         elif np.isfinite(columns.centres[k, depth, 0]):
@@ -248,7 +260,7 @@ def _plan(axes: Axes, columns: Columns, found: Joints, bad: npt.NDArray[np.bool_
 
 def _window(columns: Columns, found: Joints) -> tuple[Array, float]:
     """Middle and half width (m) of the surroundings of the worst joint."""
-    joint, depth = worst(found)
+    joint, depth = worst_joint(found)
     pair = found.pairs[joint]
     first, second = columns.drawn_centres[pair, depth]
     apart = float(np.hypot(*(second - first)))
@@ -257,7 +269,7 @@ def _window(columns: Columns, found: Joints) -> tuple[Array, float]:
 
 def _zoom(axes: Axes, columns: Columns, found: Joints, bad: npt.NDArray[np.bool_], extra: ExtraColumn | None) -> None:
     """Columns around the worst joint: from head to toe, and as circles where it is worst."""
-    joint, depth = worst(found)
+    joint, depth = worst_joint(found)
     a, b = (int(k) for k in found.pairs[joint])
     middle, half = _window(columns, found)
     colour = WRONG if bad[joint] else INK
@@ -289,7 +301,7 @@ def _zoom(axes: Axes, columns: Columns, found: Joints, bad: npt.NDArray[np.bool_
     if extra is not None:
         axes.add_patch(Circle((extra.east, extra.north), radius, fc="none", ec=SERIES[1], ls="--", lw=1.5, gid="extra"))
     kind = f"gap of {-thick:.2f} m" if thick <= 0.0 else f"{thick:.2f} m thick"
-    if found.states[joint, depth] == State.MISSING:
+    if found.states[joint, depth] == ColumnState.MISSING:
         kind = "column missing"
     _frame(axes, f"{joint_name(columns, found, joint)} at {columns.depths[depth]:.1f} m: {kind}")
     # automatic, so that the equal aspect may widen them
@@ -311,7 +323,9 @@ def _column(axes: Axes, columns: Columns, k: int, depth: int, known: npt.NDArray
         return
     axes.add_patch(Circle((east, north), radius, fc=LIGHT, ec=GREY, lw=0.8, alpha=0.5, gid="column"))
     cov = columns.covs[k, depth, ::-1, ::-1]
-    region(axes, np.array([east, north]), cov, coverage_radius(BAND, 2), fc="none", ec=SERIES[0], lw=1.0)
+    draw_covariance_ellipse(
+        axes, np.array([east, north]), cov, coverage_radius(BAND, 2), fc="none", ec=SERIES[0], lw=1.0
+    )
 
 
 def _legend(colour: str, extra: ExtraColumn | None) -> list[Any]:

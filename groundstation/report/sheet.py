@@ -11,7 +11,7 @@ import numpy.typing as npt
 
 
 @dataclass(frozen=True, slots=True)
-class Table:
+class SheetTable:
     """Heading, names of the columns and rows of finished text; the first column names the row."""
 
     title: str
@@ -25,17 +25,17 @@ class Sheet:
 
     title: str
     facts: Sequence[tuple[str, str]]
-    tables: Sequence[Table]
+    tables: Sequence[SheetTable]
     warnings: Sequence[str] = ()
 
 
-def column(values: Sequence[float] | npt.NDArray[np.float64], digits: int = 3) -> list[str]:
+def column_texts(values: Sequence[float] | npt.NDArray[np.float64], digits: int = 3) -> list[str]:
     """Numbers of one column with equal decimals, ``digits`` significant ones of the largest."""
     largest = max((abs(value) for value in values), default=0.0)
     decimals = max(digits - 1 - math.floor(math.log10(largest)), 0) if largest > 0.0 else digits
     return [f"{value + 0.0:.{decimals}f}".replace("-", "\N{MINUS SIGN}") for value in np.round(values, decimals)]
 
 
-def number(value: float, digits: int = 6) -> str:
+def number_text(value: float, digits: int = 6) -> str:
     """A number with ``digits`` significant digits, trailing zeros kept, and a true minus sign."""
     return f"{value:#.{digits}g}".removesuffix(".").replace("-", "\N{MINUS SIGN}")

@@ -24,7 +24,7 @@ from matplotlib.patches import Polygon
 from matplotlib.ticker import AutoLocator, FuncFormatter, MaxNLocator, NullFormatter
 
 from groundstation.errors import SurveyError
-from groundstation.survey.well.ellipsoid import outline
+from groundstation.survey.well.ellipsoid import ellipse_outline
 
 Array = npt.NDArray[np.float64]
 WIDTH = 7.4  # in, of every figure
@@ -65,7 +65,7 @@ MOST_ELLIPSES = 60
 styled = matplotlib.rc_context(STYLE)
 
 
-def save(figure: Figure, path: Path) -> None:
+def save_figure(figure: Figure, path: Path) -> None:
     """Write a figure by the suffix of the file: all of it or, when anything fails, the old file stays.
 
     Raises
@@ -104,20 +104,20 @@ def new_figure(height: float, title: str) -> Figure:
     return figure
 
 
-def plain(value: float) -> str:
+def tick_text(value: float) -> str:
     """A tick's number: as it is up to a million, as a power of ten beyond."""
     if value >= 1e6:
         return f"$10^{{{np.log10(value):.3g}}}$"
     return str(np.format_float_positional(value, 6, fractional=False, trim="-"))
 
 
-def tidy(figure: Figure) -> Figure:
+def tidy_ticks(figure: Figure) -> Figure:
     """Ticks at 1, 2 and 5 and their decades, written as plain numbers."""
     for axis in (axis for axes in figure.axes for axis in (axes.xaxis, axes.yaxis)):
         if isinstance(axis.get_major_locator(), AutoLocator):
             axis.set_major_locator(MaxNLocator(nbins=6, steps=[1, 2, 5, 10]))
         elif axis.get_scale() == "log":
-            axis.set_major_formatter(FuncFormatter(lambda value, _: plain(value)))
+            axis.set_major_formatter(FuncFormatter(lambda value, _: tick_text(value)))
             axis.set_minor_formatter(NullFormatter())
     return figure
 
@@ -142,9 +142,9 @@ def above_zero(values: Array) -> Array:
     return np.where(values > 0.0, values, np.nan)
 
 
-def region(axes: Axes, centre: Sequence[float] | Array, cov: Array, sigma: float, **look: Any) -> bool:
+def draw_covariance_ellipse(axes: Axes, centre: Sequence[float] | Array, cov: Array, sigma: float, **look: Any) -> bool:
     """Draw the ellipse of a covariance (2, 2) around ``centre``, in the order of the axes; False when it has none."""
     if not float(np.trace(cov)) > 0.0:
         return False
-    axes.add_patch(Polygon(np.asarray(centre) + outline(cov, sigma), closed=True, gid="ellipse", **look))
+    axes.add_patch(Polygon(np.asarray(centre) + ellipse_outline(cov, sigma), closed=True, gid="ellipse", **look))
     return True

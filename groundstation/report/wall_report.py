@@ -6,34 +6,34 @@ import math
 
 import numpy as np
 
-from groundstation.report.column_report import ColumnRecord, Site, clause, column_report
-from groundstation.report.document import Document, Origin, Section
+from groundstation.report.column_report import ColumnRecord, ReportSite, column_report, tolerance_text
+from groundstation.report.document import Document, Origin, ReportSection
 from groundstation.report.plots_wall import wall_figure
 from groundstation.report.style import svg_of
-from groundstation.survey.wall.as_built import State
+from groundstation.survey.wall.as_built import ColumnState
 from groundstation.survey.wall.wall_columns import state_words
 from groundstation.survey.wall.wall_file import Wall
-from groundstation.survey.wall.wall_joints import worst, worst_depths
-from groundstation.survey.wall.wall_verdict import Judgement, Verdict, joint_name
-from groundstation.survey.well.error_columns import covariance, error_columns
-from groundstation.survey.well.error_sources import Leg, Survey
-from groundstation.survey.well.methods import positions
+from groundstation.survey.wall.wall_joints import worst_depths, worst_joint
+from groundstation.survey.wall.wall_verdict import Judgement, WallVerdict, joint_name
+from groundstation.survey.well.error_columns import error_columns, position_covariance
+from groundstation.survey.well.error_sources import Leg, WellSurvey
+from groundstation.survey.well.methods import station_positions
 
 WORDS = {
-    Verdict.TIGHT: "tight",
-    Verdict.NOT_PROVEN: "not proven to be tight",
-    Verdict.NOT_TIGHT: "NOT TIGHT",
+    WallVerdict.TIGHT: "tight",
+    WallVerdict.NOT_PROVEN: "not proven to be tight",
+    WallVerdict.NOT_TIGHT: "NOT TIGHT",
 }
 
 
-def site_of(wall: Wall) -> Site:
+def site_of(wall: Wall) -> ReportSite:
     """What the wall's file says of the place."""
     file = wall.file
     depths = file.depth_reference
     if file.depths_read_from != depths:
         height = "by column" if file.reference_height is None else f"{file.reference_height:g} m above it"
         depths = f"{depths} (stations were read from the {file.depths_read_from}, {height})"
-    return Site(file.project, file.client, file.north, depths, file.height_datum, file.origin)
+    return ReportSite(file.project, file.client, file.north, depths, file.height_datum, file.origin)
 
 
 def column_records(wall: Wall, judgement: Judgement) -> list[ColumnRecord]:
@@ -46,12 +46,12 @@ def _record(wall: Wall, judgement: Judgement, k: int) -> ColumnRecord:
     name, count = plan.design.name, len(hole.md)
     places, covs = np.zeros((count, 3)), np.zeros((count, 3, 3))
     if count > 1:
-        places = positions(wall.file.assumed.method, hole.md, hole.inclination, hole.azimuth)
-        survey = Survey(hole.md, hole.inclination, hole.azimuth, places[:, 2])
-        covs = covariance(error_columns(survey, (Leg(plan.tool),), wall.file.assumed.site))
+        places = station_positions(wall.file.assumed.method, hole.md, hole.inclination, hole.azimuth)
+        survey = WellSurvey(hole.md, hole.inclination, hole.azimuth, places[:, 2])
+        covs = position_covariance(error_columns(survey, (Leg(plan.tool),), wall.file.assumed.site))
     covs = covs + plan.head_std**2 * np.diag([1.0, 1.0, 0.0])
     actions = [f.text[0].upper() + f.text[1:] + "." for f in judgement.findings if name in f.what.split("-")]
-    actions += remedies(wall, judgement, k)
+    actions += remedy_lines(wall, judgement, k)
     return ColumnRecord(
         plan.design, state_words(plan, built, k), plan.tool, plan.serial, plan.calibration, plan.head_std, hole.md,
         hole.inclination, hole.azimuth, np.array(plan.design.head) + places, covs,
@@ -60,7 +60,7 @@ def _record(wall: Wall, judgement: Judgement, k: int) -> ColumnRecord:
     )  # fmt: skip
 
 
-def remedies(wall: Wall, judgement: Judgement, of: int | None = None) -> list[str]:
+def remedy_lines(wall: Wall, judgement: Judgement, of: int | None = None) -> list[str]:
     """The columns that would close open joints, in words and in the site's frame; one that closes several stands once.
 
     ``of`` : a column, whose joints alone count
@@ -101,27 +101,27 @@ def wall_report(wall: Wall, judgement: Judgement, origin: Origin) -> Document:
         ("Columns and joints", f"{len(wall.plans)} columns, {len(wall.pairs)} joints, {file.layout}"),
         ("Radius of a column", f"{' and '.join(f'{r:g}' for r in radii)} m{_scatter(wall)}"),
         ("Required thickness of a joint", f"{file.thickness:g} m"),
-        ("Tolerance", clause(file.tolerance)),
+        ("Tolerance", tolerance_text(file.tolerance)),
         (
             "P(anything open or too thin)",
             f"{whole.probability:.2g} (standard error {whole.standard_error:.1g}), allowed {file.allowed:g}",
         ),
     ]
-    joint, _ = worst(judgement.joints)
+    joint, _ = worst_joint(judgement.joints)
     title = f"{len(wall.pairs)} joints: {WORDS[judgement.verdict].lower()}"
     extra = dict(judgement.extras).get(joint)
     picture = wall_figure(wall.built.columns, judgement.joints, file.thickness, extra, title)
     sections = [
-        Section("Reasons", [f.text[0].upper() + f.text[1:] + "." for f in judgement.findings] or ["None."]),
-        Section("What is to be done", remedies(wall, judgement) or ["Nothing."]),
+        ReportSection("Reasons", [f.text[0].upper() + f.text[1:] + "." for f in judgement.findings] or ["None."]),
+        ReportSection("What is to be done", remedy_lines(wall, judgement) or ["Nothing."]),
         _instruments_section(records),
         _columns_section(records),
         _joints_section(wall, judgement),
         *_voids_sections(wall, judgement),
         *_closing_sections(wall),
-        Section("Joints over depth, plan, and the worst joint", figure=svg_of(picture), new_page=True),
+        ReportSection("Joints over depth, plan, and the worst joint", figure=svg_of(picture), new_page=True),
     ]
-    good = judgement.verdict is Verdict.TIGHT
+    good = judgement.verdict is WallVerdict.TIGHT
     verdict = f"The wall is {WORDS[judgement.verdict]}"
     return Document("Wall report", file.name, site.project or "as built", verdict, good, facts, sections, origin)
 
@@ -133,7 +133,7 @@ def _scatter(wall: Wall) -> str:
     return f", coefficient of variation {' to '.join(f'{value:g}' for value in cv)}"
 
 
-def _columns_section(records: list[ColumnRecord]) -> Section:
+def _columns_section(records: list[ColumnRecord]) -> ReportSection:
     columns = (
         "column",
         "north m",
@@ -162,31 +162,33 @@ def _columns_section(records: list[ColumnRecord]) -> Section:
     words = (
         "Each column at the depth where it uses most of its tolerance; marked: beyond it, or not known to its toe.",
     )
-    return Section("Columns: set out, and as built", words, columns=columns, rows=rows, marked=marked, new_page=True)
+    return ReportSection(
+        "Columns: set out, and as built", words, columns=columns, rows=rows, marked=marked, new_page=True
+    )
 
 
-def _joints_section(wall: Wall, judgement: Judgement) -> Section:
+def _joints_section(wall: Wall, judgement: Judgement) -> ReportSection:
     judged, required = judgement.joints, wall.file.thickness
     doubtful = worst_depths(judged)
     thin = np.argmin(np.where(np.isfinite(judged.thickness), judged.thickness, np.inf), axis=1)
     rows, marked = [], []
     for j, pair in enumerate(judged.pairs):
         thickness, chance = float(judged.thickness[j, thin[j]]), float(judged.probability[j, doubtful[j]])
-        state = max((s for s in judged.states[j].tolist() if s != State.OUTSIDE), default=State.OUTSIDE)
-        if not thickness >= required or chance > wall.file.allowed or state != State.SURVEYED:
+        state = max((s for s in judged.states[j].tolist() if s != ColumnState.OUTSIDE), default=ColumnState.OUTSIDE)
+        if not thickness >= required or chance > wall.file.allowed or state != ColumnState.SURVEYED:
             marked.append(j)
         shown = f"{thickness:.3f}" if math.isfinite(thickness) else "open"
         depths = f"{wall.columns.depths[thin[j]]:g}", f"{wall.columns.depths[doubtful[j]]:g}"
         name = joint_name(wall.columns, pair)
-        rows.append((name, State(int(state)).name.lower(), shown, depths[0], f"{chance:.2g}", depths[1]))
+        rows.append((name, ColumnState(int(state)).name.lower(), shown, depths[0], f"{chance:.2g}", depths[1]))
     columns = ("joint", "known as", "thinnest m", "at m", "P(too thin)", "at m")
     words = (
         f"Required: {required:g} m; marked: thinner, open, not known, or P(too thin) above {wall.file.allowed:g}.",
     )
-    return Section("Joints", words, columns=columns, rows=rows, marked=marked)
+    return ReportSection("Joints", words, columns=columns, rows=rows, marked=marked)
 
 
-def _voids_sections(wall: Wall, judgement: Judgement) -> list[Section]:
+def _voids_sections(wall: Wall, judgement: Judgement) -> list[ReportSection]:
     """Voids of a grid: every depth that has one, or where one is likelier than allowed, and the likeliest."""
     chance, columns = judgement.void_chance, wall.columns
     if chance is None:
@@ -208,10 +210,10 @@ def _voids_sections(wall: Wall, judgement: Judgement) -> list[Section]:
         f"Depths with a void as surveyed, or with P(void) above {allowed:g}, marked; and the depth of the largest.",
     )
     heads = ("depth m", "area cm\u00b2", "P(void)", "likeliest between")
-    return [Section("Voids between the columns", words, columns=heads, rows=rows, marked=marked)]
+    return [ReportSection("Voids between the columns", words, columns=heads, rows=rows, marked=marked)]
 
 
-def _closing_sections(wall: Wall) -> list[Section]:
+def _closing_sections(wall: Wall) -> list[ReportSection]:
     """How it closed, a row a day of drilling."""
     rows = []
     for stage in wall.stages:
@@ -226,17 +228,17 @@ def _closing_sections(wall: Wall) -> list[Section]:
     words = (
         "Share of all joints and depths that are as thick as required, and the widest spacing of columns that stand.",
     )
-    return [Section("How it closed", words, columns=heads, rows=rows)] if rows else []
+    return [ReportSection("How it closed", words, columns=heads, rows=rows)] if rows else []
 
 
-def _instruments_section(records: list[ColumnRecord]) -> Section:
+def _instruments_section(records: list[ColumnRecord]) -> ReportSection:
     groups: dict[tuple[str, str, str], list[str]] = {}
     for record in (record for record in records if math.isfinite(record.surveyed_md)):
         key = (record.tool.name, record.serial or "not stated", record.calibration or "not stated")
         groups.setdefault(key, []).append(record.design.name)
     order = [record.design.name for record in records]
     rows = [(*key, _names(names, order)) for key, names in groups.items()]
-    return Section("Instruments", columns=("error model", "serial", "calibration", "columns"), rows=rows)
+    return ReportSection("Instruments", columns=("error model", "serial", "calibration", "columns"), rows=rows)
 
 
 def _names(names: list[str], order: list[str]) -> str:

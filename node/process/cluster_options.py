@@ -53,13 +53,13 @@ def cluster(
 
 def own_corrections(sensor: str, files: tuple[Path, ...], count: int) -> list[SensorParameters]:
     """Correction of one sensor of each of ``count`` IMUs; none without files."""
-    from telemetry.calibration import read, sensor_parameters
+    from telemetry.calibration import read_calibration, sensor_parameters
     from telemetry.errors import CalibrationError
     from telemetry.parameters import SensorParameters
 
     corrections = []
     for path in files:
-        calibration = read(path)
+        calibration = read_calibration(path)
         if calibration.sensor != sensor:
             raise CalibrationError(f"{path}: sensor: expected {sensor}, got {calibration.sensor}")
         corrections.append(sensor_parameters(calibration))

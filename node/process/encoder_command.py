@@ -7,7 +7,7 @@ from pathlib import Path
 import click
 
 from telemetry.runtime.command_line import plain_faults
-from telemetry.runtime.options import (
+from telemetry.runtime.process_options import (
     above_option,
     below_option,
     clock_option,
@@ -68,11 +68,11 @@ def encoder(
     from node.process.drivers.choice import encoder_source
     from node.process.host import run_encoder
     from telemetry.messages import ENCODER, Side
-    from telemetry.runtime.hosting import OwnTime, Place, chosen
+    from telemetry.runtime.hosting import OwnTime, Place, chosen_media
 
     media = {Side.UPPER: upper, Side.LOWER: lower}
     neighbours = own_neighbours(clock, ENCODER, ("--counter", counter), {Side.UPPER: above, Side.LOWER: below}, media)
     own_time = None if neighbours is None else OwnTime(neighbours)
     torque = TorqueSettings(torque_nm, trapped_fraction)
-    place = Place(rig_name, endpoint, folder, media=chosen(media), keys=keys_place)
+    place = Place(rig_name, endpoint, folder, media=chosen_media(media), keys=keys_place)
     run_encoder(place, encoder_source(counter) if counter else None, own_time, torque)

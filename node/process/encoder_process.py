@@ -17,8 +17,8 @@ from telemetry.application.seal_watch import SealWatch
 from telemetry.messages import ENCODER, Command, Event, Reply, Scalar, Severity, Side
 from telemetry.runtime.disk import MACHINE, Disk
 from telemetry.runtime.joint_watch import JointFault
-from telemetry.runtime.process import Process
-from telemetry.runtime.timing import CycleTiming, Stage
+from telemetry.runtime.process_interface import Process
+from telemetry.runtime.timing import CycleStage, CycleTiming
 from telemetry.unwritten import Content
 
 if TYPE_CHECKING:
@@ -90,20 +90,20 @@ class EncoderProcess(Process):
         """
         self._now = now
         sample = self._source.read(now) if self._source is not None else sample_of(data)
-        self._lap(Stage.READ)
+        self._lap(CycleStage.READ)
         if sample is not None:
             self.endpoint.send_aiding(self.encoder.on_cycle(sample, now, self.endpoint.clock.epoch), now)
         if self._timing is None:  # an own clock advances time between the cycles
             self.endpoint.advance(now)
         self._seal_watch.look(now)
-        self._lap(Stage.REPORT)
+        self._lap(CycleStage.REPORT)
 
     def on_joint_fault(self, fault: JointFault, now: float) -> None:
         """Something went wrong at a joint: tell the crew."""
         self._now = now
         self._send_event(Severity.WARNING, "joint_fault", fault.arguments)
 
-    def _lap(self, stage: Stage) -> None:
+    def _lap(self, stage: CycleStage) -> None:
         if self._timing is not None:
             self._timing.lap(stage)
 

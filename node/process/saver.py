@@ -16,7 +16,7 @@ from typing import Final
 from node.errors import SavedStateError
 from node.kernels.arithmetic.formats import Array
 from node.process.journal import SLOTS, Journal
-from telemetry.application.saved_state import STATE_LAYOUT, layout_of
+from telemetry.application.endpoint_state import STATE_LAYOUT, layout_of
 from telemetry.messages import Scalar, Severity
 from telemetry.runtime.disk import MACHINE, Disk
 

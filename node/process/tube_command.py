@@ -10,7 +10,7 @@ import click
 
 from node.process.cluster_options import cluster
 from telemetry.runtime.command_line import check_installed, plain_faults
-from telemetry.runtime.options import (
+from telemetry.runtime.process_options import (
     above_option,
     below_option,
     clock_option,
@@ -160,7 +160,7 @@ def node(
     from node.process.drivers.choice import imu_source
     from node.process.host import run_node
     from telemetry.messages import Side
-    from telemetry.runtime.hosting import OwnTime, Place, chosen
+    from telemetry.runtime.hosting import OwnTime, Place, chosen_media
 
     if any(source.startswith("mpu6500") for source in sources):
         check_installed("smbus2")
@@ -180,5 +180,5 @@ def node(
     media = {Side.UPPER: upper, Side.LOWER: lower}
     neighbours = own_neighbours(clock, tube, ("--imu", sources), {Side.UPPER: above, Side.LOWER: below}, media)
     own_time = None if neighbours is None else OwnTime(neighbours)
-    place = Place(rig_name, endpoint, folder, key_file, chosen(media), keys=keys_place)
+    place = Place(rig_name, endpoint, folder, key_file, chosen_media(media), keys=keys_place)
     run_node(place, settings, [imu_source(s) for s in sources], own_time)

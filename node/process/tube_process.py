@@ -50,8 +50,8 @@ from telemetry.messages import (
 from telemetry.presentation.msgpack_codec import encode
 from telemetry.runtime.disk import MACHINE, Disk
 from telemetry.runtime.joint_watch import JointFault
-from telemetry.runtime.process import Process
-from telemetry.runtime.timing import CycleTiming, Stage
+from telemetry.runtime.process_interface import Process
+from telemetry.runtime.timing import CycleStage, CycleTiming
 from telemetry.unwritten import Content
 
 if TYPE_CHECKING:
@@ -185,13 +185,13 @@ class TubeProcess(Process):
             start, samples = reading.start, [imu.read(reading.start, now) for imu in self._imus]
             first, *others = [reading_from(sample, start, now) for sample in samples]
             reading = replace(first, others=tuple(others))
-        self._lap(Stage.READ)
+        self._lap(CycleStage.READ)
         context = self._context(now)
         if context.synchronised:
             self._announce(context.rig_now, now)
             self._tell_of_silent_tubes()
         said = self.tube.on_cycle(reading, context)
-        self._lap(Stage.FILTER)
+        self._lap(CycleStage.FILTER)
         for message in said:
             if isinstance(message, Event) and message.code == "clock_jumped":
                 self.endpoint.clock.doubt(jump_of(message))
@@ -200,14 +200,14 @@ class TubeProcess(Process):
             self.endpoint.mail.send_status(status)
         if self._timing is None:  # an own clock advances time between the cycles
             self.endpoint.advance(now)
-        self._lap(Stage.REPORT)
+        self._lap(CycleStage.REPORT)
         if self._announced:
             self._saver.report(self._send_event)
             self._report_drops(now)
             self._seal_watch.look(now)
         self._saver.count_cycle(self.nodes)
         if self._save_if_due():
-            self._lap(Stage.SAVE)
+            self._lap(CycleStage.SAVE)
 
     def on_overrun(self, missed: int, now: float) -> None:
         """The cycle took so long that ``missed`` later ones are left out."""
@@ -230,7 +230,7 @@ class TubeProcess(Process):
         for source in self._sources:
             source.close()
 
-    def _lap(self, stage: Stage) -> None:
+    def _lap(self, stage: CycleStage) -> None:
         if self._timing is not None:
             self._timing.lap(stage)
 
@@ -243,7 +243,7 @@ class TubeProcess(Process):
             self.endpoint.ask_time(now)
             return
         if self._timing is not None:
-            self._timing.add_duration(Stage.AIDING, clock.rig_from_local(now) - aiding.valid_at)
+            self._timing.add_duration(CycleStage.AIDING, clock.rig_from_local(now) - aiding.valid_at)
         silent = self.endpoint.skipped
         if silent > len(self.settings.above):
             return  # over joints that nobody told this node of

@@ -11,7 +11,7 @@ from sim.campaign.chunk import Chunk, run_chunk
 from sim.campaign.store import code_digest
 from sim.errors import RigError
 from sim.one_thread import one_thread_each
-from sim.studies.pool import cores
+from sim.studies.pool import usable_cores
 
 if TYPE_CHECKING:
     from distributed import Client
@@ -42,7 +42,7 @@ def compute(scenario: bytes, ranges: Sequence[Range], engine: str, scheduler: st
 
 def on_this_machine(scenario: bytes, ranges: Sequence[Range]) -> Computed:
     """A process a core, each a chunk at a time."""
-    processes = min(cores(), len(ranges))
+    processes = min(usable_cores(), len(ranges))
     if processes < 2:
         for first, last in ranges:
             yield (first, last), run_chunk(scenario, first, last)
@@ -90,7 +90,7 @@ def cluster(scheduler: str | None, chunks: int) -> Iterator[Client]:
     connect: Callable[..., Any] = distributed.Client
 
     if scheduler is None:
-        workers = max(min(cores(), chunks), 1)
+        workers = max(min(usable_cores(), chunks), 1)
         made: Callable[..., Any] = distributed.LocalCluster
         with (
             made(n_workers=workers, threads_per_worker=1, host="127.0.0.1", dashboard_address=None) as local,

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 from matplotlib.figure import Figure
 
-from groundstation.report.style import GREY, MARKERS, SERIES, log_if_needed, new_figure, styled, tidy
+from groundstation.report.style import GREY, MARKERS, SERIES, log_if_needed, new_figure, styled, tidy_ticks
 
 Rows = Sequence[dict[str, Any]]
 
@@ -34,7 +34,7 @@ def honesty_figure(rows: Rows, title: str) -> Figure:
         axes.set(xlabel="Hop", ylabel=label)
     handles, labels = grid[0].get_legend_handles_labels()
     figure.legend(handles, labels, loc="outside lower left", ncols=2)
-    return tidy(figure)
+    return tidy_ticks(figure)
 
 
 @styled
@@ -51,4 +51,4 @@ def accuracy_figure(rows: Rows, title: str) -> Figure:
     axes.set(xlabel="Measured depth (m)", ylabel="Error of one survey, rms (deg)")
     log_if_needed(axes, [azimuth[np.isfinite(azimuth)], inclination])
     axes.legend()
-    return tidy(figure)
+    return tidy_ticks(figure)

@@ -29,7 +29,7 @@ class Delivery(NamedTuple):
 
 
 @dataclass(slots=True)
-class Controller:
+class WireController:
     """One controller: what it may receive, what waits in it and its error counter."""
 
     fd: bool
@@ -68,7 +68,7 @@ class CanWire:
 
     def __init__(self, rates: BitRates | None = None) -> None:
         self.rates = rates if rates is not None else BitRates()
-        self.controllers: dict[Hashable, Controller] = {}
+        self.controllers: dict[Hashable, WireController] = {}
         self.busy = 0.0  # s, that frames and error frames took
         self.frames = 0
         self.overruns = 0  # frames that found a full send buffer
@@ -79,7 +79,7 @@ class CanWire:
 
     def attach(self, name: Hashable, *, fd: bool = True, hears_itself: bool = True) -> None:
         """Join a controller."""
-        self.controllers[name] = Controller(fd, hears_itself)
+        self.controllers[name] = WireController(fd, hears_itself)
 
     def detach(self, name: Hashable) -> None:
         """Take a controller away; what waits in it is gone."""
@@ -120,7 +120,7 @@ class CanWire:
                 self._current = None
         return deliveries
 
-    def _is_able(self, name: Hashable, one: Controller) -> bool:
+    def _is_able(self, name: Hashable, one: WireController) -> bool:
         """Whether a controller with something to send may: not one that has learnt that it is alone."""
         return not one.is_off and not (one.unacknowledged and not self._listeners(name))
 

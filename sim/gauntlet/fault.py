@@ -11,9 +11,9 @@ from typing import Protocol
 
 import numpy as np
 
-from sim.gauntlet.channel import FaultyChannel
-from sim.gauntlet.disk import FaultyDisk
-from sim.gauntlet.world import FaultyWorld
+from sim.gauntlet.faulty_channel import FaultyChannel
+from sim.gauntlet.faulty_disk import FaultyDisk
+from sim.gauntlet.faulty_world import FaultyWorld
 from telemetry.messages import BASE, ENCODER, Side
 
 TUBES = (1, 2)
@@ -80,7 +80,7 @@ class FaultKind:
     recovery: float = 24.0
 
 
-def during(
+def draw_interval(
     random: np.random.Generator, begin: float, end: float, shortest: float, longest: float
 ) -> tuple[float, float]:
     """Begin and end (s) of something that lasts so long and is over by ``end``."""
@@ -88,17 +88,17 @@ def during(
     return at, min(at + float(random.uniform(shortest, longest)), end)
 
 
-def lasting(shortest: float, longest: float, begin_act: Act, end_act: Act) -> Draw:
+def lasting_fault(shortest: float, longest: float, begin_act: Act, end_act: Act) -> Draw:
     """One act, and another that takes it back."""
 
     def draw(random: np.random.Generator, begin: float, end: float) -> list[Step]:
-        on, off = during(random, begin, end, shortest, longest)
+        on, off = draw_interval(random, begin, end, shortest, longest)
         return [Step(on, begin_act), Step(off, end_act)]
 
     return draw
 
 
-def once(act: Callable[[Faulty, np.random.Generator], None]) -> Draw:
+def momentary_fault(act: Callable[[Faulty, np.random.Generator], None]) -> Draw:
     """One act, with draws of its own."""
 
     def draw(random: np.random.Generator, begin: float, end: float) -> list[Step]:

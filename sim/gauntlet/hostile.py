@@ -7,8 +7,8 @@ from itertools import pairwise
 
 import numpy as np
 
-from sim.gauntlet.fault import EVERYBODY, TUBES, Faulty, Step, drawn_tube, during
-from sim.gauntlet.power import delete
+from sim.gauntlet.fault import EVERYBODY, TUBES, Faulty, Step, draw_interval, drawn_tube
+from sim.gauntlet.power import delete_files
 from telemetry.messages import BASE, ENCODER, Aiding, Hello, Mode, Receipt, Side, TimeReply
 from telemetry.presentation.msgpack_codec import encode
 from telemetry.transport.hop import HopLink, pack_frame, parse_frame
@@ -17,7 +17,7 @@ REPEATS = 30
 STATE = ("slot-*",)
 
 
-def garbage(rig: Faulty, random: np.random.Generator) -> None:
+def inject_garbage(rig: Faulty, random: np.random.Generator) -> None:
     """Random bytes come at every port and key."""
     for _ in range(20):
         noise = random.bytes(int(random.integers(0, 300)))
@@ -47,13 +47,13 @@ def wild_numbers(rig: Faulty, random: np.random.Generator) -> None:
     _send(rig, link, tube, Side.UPPER)
 
 
-def replay(rig: Faulty, random: np.random.Generator) -> None:
+def replay_frames(rig: Faulty, random: np.random.Generator) -> None:
     """Frames that were recorded come again, at the port they were for."""
     for frame, address, side in _recorded(rig, random):
         rig.inject(address, side, frame)
 
 
-def splice(rig: Faulty, random: np.random.Generator) -> None:
+def splice_frames(rig: Faulty, random: np.random.Generator) -> None:
     """Payloads of recorded frames come under the header of another frame of the same port."""
     recorded = _recorded(rig, random)
     for (frame, address, side), (other, _, _) in pairwise(recorded):
@@ -64,7 +64,7 @@ def splice(rig: Faulty, random: np.random.Generator) -> None:
 
 def second_ground(random: np.random.Generator, begin: float, end: float) -> list[Step]:
     """A second base station speaks to the encoder in spite of the lease."""
-    at, until = during(random, begin, end, 3.0, 20.0)
+    at, until = draw_interval(random, begin, end, 3.0, 20.0)
     link = HopLink(BASE, int(random.integers(1, 2**31)))
 
     def speak(rig: Faulty) -> None:
@@ -77,7 +77,7 @@ def second_ground(random: np.random.Generator, begin: float, end: float) -> list
 def memory_lost_with_old_receipts(random: np.random.Generator, begin: float, end: float) -> list[Step]:
     """A node loses its saved state, and what was sent to it before arrives again."""
     tube = drawn_tube(random)
-    off, on = during(random, begin, end, 1.0, 10.0)
+    off, on = draw_interval(random, begin, end, 1.0, 10.0)
     old: list[bytes] = []
 
     def cut(rig: Faulty) -> None:
@@ -86,7 +86,7 @@ def memory_lost_with_old_receipts(random: np.random.Generator, begin: float, end
         rig.cut(tube)
 
     def start(rig: Faulty) -> None:
-        delete(*STATE)(rig, tube, random)
+        delete_files(*STATE)(rig, tube, random)
         rig.start(tube)
         for frame in old:
             rig.inject(tube, Side.UPPER, frame)

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from sim.gauntlet.fault import Step
-from sim.gauntlet.kinds import KINDS
+from sim.gauntlet.fault_kinds import KINDS
 from sim.world.streams import Stream, stream
 
 TOGETHER = 3.0  # kinds switched on in a seed, on the average

@@ -7,24 +7,24 @@ from collections.abc import Callable, Iterable
 
 import numpy as np
 
-from sim.gauntlet.fault import EVERYBODY, TUBES, Draw, Faulty, Step, drawn_tube, during, own_stream
+from sim.gauntlet.fault import EVERYBODY, TUBES, Draw, Faulty, Step, draw_interval, drawn_tube, own_stream
 from telemetry.messages import BASE, ENCODER
 
 Handle = Callable[[Faulty, int, np.random.Generator], None]
 REFUSALS = (errno.ENOSPC, errno.EROFS)
 
 
-def nothing(rig: Faulty, address: int, random: np.random.Generator) -> None:
+def keep_disk(rig: Faulty, address: int, random: np.random.Generator) -> None:
     """The disk stays as the cut left it."""
 
 
-def power_cut(addresses: Iterable[int], before_start: Handle = nothing) -> Draw:
+def power_cut(addresses: Iterable[int], before_start: Handle = keep_disk) -> Draw:
     """A process loses its power for a while; something may happen to its disk meanwhile."""
     choice = tuple(addresses)
 
     def draw(random: np.random.Generator, begin: float, end: float) -> list[Step]:
         address = int(random.choice(choice))
-        off, on = during(random, begin, end, 1.0, 30.0)
+        off, on = draw_interval(random, begin, end, 1.0, 30.0)
         drawn = own_stream(random)
 
         def start(rig: Faulty) -> None:
@@ -38,7 +38,7 @@ def power_cut(addresses: Iterable[int], before_start: Handle = nothing) -> Draw:
 
 def cut_all(random: np.random.Generator, begin: float, end: float) -> list[Step]:
     """Everything loses its power at once, and comes back one after the other."""
-    off, on = during(random, begin, end, 2.0, 20.0)
+    off, on = draw_interval(random, begin, end, 2.0, 20.0)
     steps = [Step(off, lambda rig, a=address: rig.cut(a)) for address in EVERYBODY]  # type: ignore[misc]
     for address in EVERYBODY:
         at = on - float(random.uniform(0.0, min(3.0, on - off)))
@@ -49,7 +49,7 @@ def cut_all(random: np.random.Generator, begin: float, end: float) -> list[Step]
 def cut_while_saving(random: np.random.Generator, begin: float, end: float) -> list[Step]:
     """The power of a process goes in the middle of what it writes next."""
     address = int(random.choice((BASE, *TUBES)))
-    armed, on = during(random, begin, end, 5.0, 30.0)
+    armed, on = draw_interval(random, begin, end, 5.0, 30.0)
     changes = int(random.integers(12))
 
     def start(rig: Faulty) -> None:
@@ -64,14 +64,14 @@ def cut_again_and_again(random: np.random.Generator, begin: float, end: float) -
     address = int(random.choice((BASE, ENCODER, *TUBES)))
     steps = []
     for _ in range(4):
-        off, on = during(random, begin, end, 1.0, 5.0)
+        off, on = draw_interval(random, begin, end, 1.0, 5.0)
         steps += [Step(off, lambda rig: rig.cut(address)), Step(on, lambda rig: rig.start(address))]
     return steps
 
 
 def encoder_from_zero(random: np.random.Generator, begin: float, end: float) -> list[Step]:
     """The encoder starts again and counts its time from zero."""
-    off, on = during(random, begin, end, 1.0, 10.0)
+    off, on = draw_interval(random, begin, end, 1.0, 10.0)
 
     def start(rig: Faulty) -> None:
         rig.world.zero = off
@@ -80,7 +80,7 @@ def encoder_from_zero(random: np.random.Generator, begin: float, end: float) -> 
     return [Step(off, lambda rig: rig.cut(ENCODER)), Step(on, start)]
 
 
-def delete(*patterns: str) -> Handle:
+def delete_files(*patterns: str) -> Handle:
     """Files are removed."""
 
     def act(rig: Faulty, address: int, _random: np.random.Generator) -> None:
@@ -91,7 +91,7 @@ def delete(*patterns: str) -> Handle:
     return act
 
 
-def damage(pattern: str) -> Handle:
+def damage_files(pattern: str) -> Handle:
     """The second half of files is other bytes."""
 
     def act(rig: Faulty, address: int, _random: np.random.Generator) -> None:
@@ -102,7 +102,7 @@ def damage(pattern: str) -> Handle:
     return act
 
 
-def rot(rig: Faulty, address: int, random: np.random.Generator) -> None:
+def rot_bytes(rig: Faulty, address: int, random: np.random.Generator) -> None:
     """Single bytes of what a process keeps change."""
     disk = rig.disk(address)
     for name, data in disk.held("*").items():
@@ -125,13 +125,13 @@ def refused_disk(*addresses: int) -> Draw:
 
     def draw(random: np.random.Generator, begin: float, end: float) -> list[Step]:
         address, refusal = int(random.choice(addresses)), int(random.choice(REFUSALS))
-        wrong, right = during(random, begin, end, 5.0, 60.0)
+        wrong, right = draw_interval(random, begin, end, 5.0, 60.0)
         steps = [
             Step(wrong, lambda rig: setattr(rig.disk(address), "refusal", refusal)),
             Step(right, lambda rig: setattr(rig.disk(address), "refusal", 0)),
         ]
         if random.random() < 0.5:
-            off, on = during(random, wrong, right, 1.0, 10.0) if right > wrong + 1.0 else (wrong, right)
+            off, on = draw_interval(random, wrong, right, 1.0, 10.0) if right > wrong + 1.0 else (wrong, right)
             steps += [Step(off, lambda rig: rig.cut(address)), Step(on, lambda rig: rig.start(address))]
         return steps
 
@@ -140,12 +140,12 @@ def refused_disk(*addresses: int) -> Draw:
 
 def swap_folders(random: np.random.Generator, begin: float, end: float) -> list[Step]:
     """Two tubes get each other's saved state."""
-    off, on = during(random, begin, end, 2.0, 10.0)
+    off, on = draw_interval(random, begin, end, 2.0, 10.0)
 
     def swap(rig: Faulty) -> None:
         found = {tube: rig.disk(tube).held("*") for tube in TUBES}
         for tube, other in (TUBES, TUBES[::-1]):
-            delete("*")(rig, tube, random)
+            delete_files("*")(rig, tube, random)
             for name, data in found[other].items():
                 rig.disk(tube).replace(name, data)
             rig.start(tube)
@@ -155,7 +155,7 @@ def swap_folders(random: np.random.Generator, begin: float, end: float) -> list[
 
 def same_number(random: np.random.Generator, begin: float, end: float) -> list[Step]:
     """For a while a tube's place is taken by another one with the number of its neighbour."""
-    off, on = during(random, begin, end, 5.0, 20.0)
+    off, on = draw_interval(random, begin, end, 5.0, 20.0)
     tube, number = (1, 2) if random.random() < 0.5 else (2, 1)
 
     def change(rig: Faulty) -> None:
@@ -169,10 +169,10 @@ def same_number(random: np.random.Generator, begin: float, end: float) -> list[S
     return [Step(off, change), Step(on, change_back)]
 
 
-def frozen(random: np.random.Generator, begin: float, end: float) -> list[Step]:
+def freeze_process(random: np.random.Generator, begin: float, end: float) -> list[Step]:
     """A process stands still for up to 30 s, and then goes on."""
     address = int(random.choice(EVERYBODY))
-    still, on = during(random, begin, end, 1.0, 30.0)
+    still, on = draw_interval(random, begin, end, 1.0, 30.0)
     return [Step(still, lambda rig: rig.freeze(address)), Step(on, lambda rig: rig.thaw(address))]
 
 

@@ -6,20 +6,20 @@ from collections.abc import Callable
 
 import numpy as np
 
-from sim.gauntlet.fault import Draw, Faulty, Step, drawn_tube, during, lasting
-from sim.gauntlet.world import Reading
+from sim.gauntlet.fault import Draw, Faulty, Step, draw_interval, drawn_tube, lasting_fault
+from sim.gauntlet.faulty_world import Reading
 from telemetry.messages import ENCODER, DepthReading
 from telemetry.presentation.msgpack_codec import encode
 
 COUNTS = 4096  # of a turn
 
 
-def sensor(spoil: Callable[[Reading], Reading]) -> Draw:
+def spoil_sensor(spoil: Callable[[Reading], Reading]) -> Draw:
     """Readings of a tube are spoiled for a while."""
 
     def draw(random: np.random.Generator, begin: float, end: float) -> list[Step]:
         tube = drawn_tube(random)
-        return lasting(
+        return lasting_fault(
             3.0,
             60.0,
             lambda rig: rig.world.spoilers.update({tube: spoil}),
@@ -85,12 +85,12 @@ def encoder_dead(random: np.random.Generator, begin: float, end: float) -> list[
     def stop(rig: Faulty) -> None:
         rig.world.stuck_at = rig.now
 
-    return lasting(5.0, 60.0, stop, lambda rig: setattr(rig.world, "stuck_at", None))(random, begin, end)
+    return lasting_fault(5.0, 60.0, stop, lambda rig: setattr(rig.world, "stuck_at", None))(random, begin, end)
 
 
 def depth_off(metres: float) -> Draw:
     """The depth is wrong for a while."""
-    return lasting(
+    return lasting_fault(
         2.0,
         60.0,
         lambda rig: setattr(rig.world, "depth_error", metres),
@@ -100,7 +100,7 @@ def depth_off(metres: float) -> Draw:
 
 def depth_lost(random: np.random.Generator, begin: float, end: float) -> list[Step]:
     """No depth is measured for a while, or never again."""
-    at, until = during(random, begin, end, 3.0, 60.0)
+    at, until = draw_interval(random, begin, end, 3.0, 60.0)
     steps = [Step(at, lambda rig: setattr(rig.world, "depth_hidden", True))]
     if random.random() < 0.7:
         steps.append(Step(until, lambda rig: setattr(rig.world, "depth_hidden", False)))
@@ -109,7 +109,7 @@ def depth_lost(random: np.random.Generator, begin: float, end: float) -> list[St
 
 def depth_backwards(random: np.random.Generator, begin: float, end: float) -> list[Step]:
     """The depth runs backwards by 0.6 m/s, and is then right again."""
-    at, until = during(random, begin, end, 3.0, 8.0)
+    at, until = draw_interval(random, begin, end, 3.0, 8.0)
     steps: list[Step] = []
     t, error = at, 0.0
     while t < until:

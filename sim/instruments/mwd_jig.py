@@ -53,7 +53,7 @@ class Heating(Enum):
 
 
 @dataclass(frozen=True, slots=True)
-class Design:
+class JigDesign:
     """Nominal attitudes (rad) and temperatures (C) in the order of the readings, (n,) each."""
 
     tilt: Array
@@ -69,21 +69,21 @@ class JigRecord:
     gravity_volts: Array
     field_volts: Array
     temperature: Array
-    design: Design
+    design: JigDesign
 
 
 @dataclass(frozen=True, slots=True)
-class Tool:
+class MwdTool:
     """True coefficients."""
 
     accelerometers: Triad
     magnetometers: Triad
 
 
-def draw_tool(seed: int) -> Tool:
+def draw_tool(seed: int) -> MwdTool:
     """A tool within the figures of its sensors."""
     random = stream(seed, JigStream.TOOL)
-    return Tool(
+    return MwdTool(
         _draw_triad(random, ACCELEROMETER_AXES, VOLTS_PER_G, 1.0),
         _draw_triad(random, MAGNETOMETER_AXES, VOLTS_PER_MICROTESLA, FIELD),
     )
@@ -106,7 +106,7 @@ def _polynomials(random: np.random.Generator, bound: float, tempco: float) -> Ar
     return polynomials
 
 
-def make_design(heating: Heating, seed: int = 0, tilts: int = 7) -> Design:
+def make_design(heating: Heating, seed: int = 0, tilts: int = 7) -> JigDesign:
     """Tilts 0..180 deg times tool faces, 12, or 24 while it heats; the jig's azimuth turns from tilt to tilt."""
     random = stream(seed, JigStream.DESIGN)
     rounds = 5 if heating is Heating.SOAK else 1
@@ -126,43 +126,45 @@ def make_design(heating: Heating, seed: int = 0, tilts: int = 7) -> Design:
     face = 2.0 * np.pi * np.concatenate(order) / faces
     columns = np.pi * k / (tilts - 1.0), face, 2.0 * np.pi * k / tilts
     tilt, tool_face, azimuth = (np.tile(c, rounds) for c in columns)
-    return Design(tilt, tool_face, azimuth, temperature)
+    return JigDesign(tilt, tool_face, azimuth, temperature)
 
 
-def fresh_design(seed: int, hot: bool, count: int = 400) -> Design:
+def fresh_design(seed: int, hot: bool, count: int = 400) -> JigDesign:
     """Attitudes uniform over the sphere that no calibration has seen."""
     random = stream(seed, JigStream.FRESH)
     tilt = np.arccos(random.uniform(-1.0, 1.0, count))
     face, azimuth = random.uniform(0.0, 2.0 * np.pi, (2, count))
     temperature = random.uniform(COLDEST, HOTTEST, count) if hot else np.full(count, COLDEST)
-    return Design(tilt, face, azimuth, temperature)
+    return JigDesign(tilt, face, azimuth, temperature)
 
 
-def control_design() -> Design:
+def control_design() -> JigDesign:
     """Twelve tool faces at the attitude of the quality control."""
     face = 2.0 * np.pi * np.arange(TOOL_FACES) / TOOL_FACES
     same = np.ones(TOOL_FACES)
-    return Design(CONTROL_INCLINATION * same, face, 0.5 * same, CONTROL_TEMPERATURE * same)
+    return JigDesign(CONTROL_INCLINATION * same, face, 0.5 * same, CONTROL_TEMPERATURE * same)
 
 
 def true_vectors(tilt: Array, tool_face: Array, azimuth: Array) -> tuple[Array, Array]:
     """Gravity (n, 3) g with C flipped and field (n, 3) microtesla that an ideal tool shows at the attitudes."""
-    ned_from_body = attitudes(tilt, tool_face, azimuth)
+    ned_from_body = attitude_matrices(tilt, tool_face, azimuth)
     return _seen(ned_from_body)
 
 
-def attitudes(tilt: Array, tool_face: Array, azimuth: Array) -> Array:
+def attitude_matrices(tilt: Array, tool_face: Array, azimuth: Array) -> Array:
     """(n, 3, 3) ned_from_body = Rz(azimuth) Ry(tilt) Rz(tool face)."""
     return np.asarray(_rotation(2, azimuth) @ _rotation(1, tilt) @ _rotation(2, tool_face))
 
 
-def measure(tool: Tool, design: Design, seed: int, *, noise: float = NOISE, jig_std: float = JIG_STD) -> JigRecord:
+def measure_tool(
+    tool: MwdTool, design: JigDesign, seed: int, *, noise: float = NOISE, jig_std: float = JIG_STD
+) -> JigRecord:
     """Readings of a tool; the jig stands a little beside its nominal attitudes."""
     random = stream(seed, JigStream.READINGS)
     n = len(design.tilt)
     wobble = jig_std * random.standard_normal((n, 3))
     turn = _rotation(0, wobble[:, 0]) @ _rotation(1, wobble[:, 1]) @ _rotation(2, wobble[:, 2])
-    gravity, field = _seen(turn @ attitudes(design.tilt, design.tool_face, design.azimuth))
+    gravity, field = _seen(turn @ attitude_matrices(design.tilt, design.tool_face, design.azimuth))
     gravity = gravity + noise * random.standard_normal((n, 3))
     field = field + noise * FIELD * random.standard_normal((n, 3))
     return JigRecord(
@@ -189,7 +191,7 @@ def _rotation(axis: int, angle: Array) -> Array:
     return rotation
 
 
-def records(seed: int) -> Records:
+def simulate_records(seed: int) -> Records:
     """A tool in its jig, in the oven and at its quality control."""
     tool = draw_tool(seed)
     designs = {
@@ -203,7 +205,7 @@ def records(seed: int) -> Records:
     }
     files = {}
     for name, (design, draw, words) in designs.items():
-        lines = [f"# Synthetic MWD tool {seed}, {words}. {UNITS}.", *record_lines(measure(tool, design, draw))]
+        lines = [f"# Synthetic MWD tool {seed}, {words}. {UNITS}.", *record_lines(measure_tool(tool, design, draw))]
         files[f"{name}.csv"] = ("\n".join(lines) + "\n").encode()
     truth = {
         "accelerometers": tool.accelerometers.coefficients(),

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
-from groundstation.calibration.records import ATTITUDES_HEADER, STANDARD_GRAVITY
+from groundstation.calibration.calibration_records import ATTITUDES_HEADER, STANDARD_GRAVITY
 from sim.instruments.instrument import InstrumentError, Records
 from sim.world.streams import Stream, stream
 
@@ -66,7 +66,7 @@ def robot_arm(
     return ArmRecord(pitch, roll, readings, mean_std**2 * np.eye(3))
 
 
-def records(seed: int) -> Records:
+def simulate_records(seed: int) -> Records:
     """Means of one accelerometer at twelve attitudes, m/s^2."""
     random = stream(seed, Stream.ROBOT_ARM)
     scale = np.eye(3) + MISALIGNMENT_STD * random.standard_normal((3, 3))

@@ -59,27 +59,27 @@ def static_record(axes: tuple[StaticNoise, ...], count: int, rate: float, seed: 
     return np.stack([_axis(axis, count, rate, s) for axis, s in zip(axes, streams, strict=True)], axis=1)
 
 
-def mpu6500() -> tuple[StaticNoise, ...]:
+def mpu6500_noise() -> tuple[StaticNoise, ...]:
     """The three axes of the node's own gyroscope, deg/s."""
     return tuple(StaticNoise(white=n, flicker=f) for n, f in zip(RANDOM_WALK, BIAS_INSTABILITY, strict=True))
 
 
-def records(seed: int) -> Records:
+def simulate_records(seed: int) -> Records:
     """Half an hour of that gyroscope at rest as an array of float32, deg/s."""
     content = io.BytesIO()
-    np.save(content, static_record(mpu6500(), round(DURATION * RATE), RATE, seed).astype(np.float32))
+    np.save(content, static_record(mpu6500_noise(), round(DURATION * RATE), RATE, seed).astype(np.float32))
     truth = {"random_walk_dps_rthz": RANDOM_WALK, "bias_instability_dps": BIAS_INSTABILITY, "rate_hz": RATE}
     return Records({"static.npy": content.getvalue()}, {"gyroscope": truth})
 
 
-def white(random: np.random.Generator, count: int, density: float, rate: float) -> Array:
+def white_noise(random: np.random.Generator, count: int, density: float, rate: float) -> Array:
     """Means (count,) over 1/rate of white noise of ``density`` N: standard deviation N sqrt(rate)."""
     return np.asarray(density * math.sqrt(rate) * random.standard_normal(count))
 
 
-def flicker(random: np.random.Generator, count: int, floor: float) -> Array:
+def flicker_noise(random: np.random.Generator, count: int, floor: float) -> Array:
     """Sample means (count,) of 1/f noise whose Allan deviation is ``floor`` at every averaging time."""
-    return floor * shaped(random, count, 2 * count, flicker_spectrum)
+    return floor * shaped_noise(random, count, 2 * count, flicker_spectrum)
 
 
 def gauss_markov(random: np.random.Generator, count: int, std: float, tau: float, rate: float) -> Array:
@@ -92,7 +92,7 @@ def gauss_markov(random: np.random.Generator, count: int, std: float, tau: float
 
     # the process has a mean over the circle, of variance spectrum(0) / length, which `shaped` leaves out
     mean = math.sqrt((1.0 + phi) / (1.0 - phi) / length) * random.standard_normal()
-    return std * (shaped(random, count, length, spectrum) + mean)
+    return std * (shaped_noise(random, count, length, spectrum) + mean)
 
 
 def random_walk(random: np.random.Generator, count: int, density: float, rate: float) -> Array:
@@ -105,7 +105,7 @@ def random_walk(random: np.random.Generator, count: int, density: float, rate: f
     return np.asarray(density / math.sqrt(rate) * (walk + 0.5 * ends + within / math.sqrt(12.0)))
 
 
-def shaped(random: np.random.Generator, count: int, length: int, spectrum: Callable[[Array], Array]) -> Array:
+def shaped_noise(random: np.random.Generator, count: int, length: int, spectrum: Callable[[Array], Array]) -> Array:
     """First ``count`` of a circle of ``length`` Gaussian samples with a two-sided power spectrum per sample, mean 0.
 
     Every frequency k / length has independent parts of variance S length / 2; autocovariance = inverse transform of S.
@@ -123,9 +123,9 @@ def _axis(noise: StaticNoise, count: int, rate: float, stream: np.random.SeedSeq
     randoms = [np.random.default_rng(s) for s in stream.spawn(len(COMPONENTS))]
     record = np.full(count, noise.constant)
     if noise.white:
-        record += white(randoms[0], count, noise.white, rate)
+        record += white_noise(randoms[0], count, noise.white, rate)
     if noise.flicker:
-        record += flicker(randoms[1], count, noise.flicker)
+        record += flicker_noise(randoms[1], count, noise.flicker)
     if noise.bias_std:
         record += gauss_markov(randoms[2], count, noise.bias_std, noise.bias_tau, rate)
     if noise.walk:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import numpy.typing as npt
 
-from groundstation.calibration.records import AXES, TURN_TABLE_HEADERS
+from groundstation.calibration.calibration_records import AXES, TURN_TABLE_HEADERS
 from sim.instruments.instrument import Records
 from sim.world.streams import Stream, stream
 
@@ -38,7 +38,7 @@ def turn_table(
     return table
 
 
-def records(seed: int) -> Records:
+def simulate_records(seed: int) -> Records:
     """Table of one gyroscope, deg/s."""
     random = stream(seed, Stream.TURN_TABLE)
     matrix = np.eye(3) + MISALIGNMENT_STD * random.standard_normal((3, 3))

@@ -15,8 +15,8 @@ from pathlib import Path
 
 from sim.rig.stepper import Acted, Answer, FrameEvent
 from telemetry import keys
-from telemetry.media.port import STEPPER, Frame, Port, TubeEnd
-from telemetry.media.table import open_medium
+from telemetry.media.media_table import open_medium
+from telemetry.media.port import STEPPER, Port, PortFrame, TubeEnd
 from telemetry.media.zenoh_bus import Publisher, ZenohBus
 from telemetry.messages import BASE, Side, address_name
 from telemetry.runtime.step_stream import StepListener, StepStream
@@ -93,7 +93,7 @@ class Seat:
     def put(self, side: Side, frame: bytes) -> None:
         """Hand a frame to an end of the process."""
         if side in self.far.ports:
-            self.far.ports[side].send(Frame(frame))
+            self.far.ports[side].send(PortFrame(frame))
         else:
             self.rx[side].put(frame)
 

@@ -8,8 +8,8 @@ from typing import Any
 
 import numpy as np
 
-from groundstation.calibration.field import inclination
-from groundstation.calibration.turntable import correct
+from groundstation.calibration.field_calibration import force_inclination
+from groundstation.calibration.turntable import correct_readings
 from sim.rig.report import rms
 from sim.world.world import World
 
@@ -40,8 +40,8 @@ def _inclination_before(row: dict[str, Any] | None, measurement: dict[str, Any])
     new, old = row["accelerometer"], row["accelerometer_before"]
     force = np.mean(np.array(measurement["forces_mps2"]), axis=0)
     reading = np.array(new["matrix"]) @ force + np.array(new["bias_mps2"])
-    corrected = correct(reading[np.newaxis], np.array(old["matrix"]), np.array(old["bias_mps2"]))
-    return math.degrees(float(inclination(corrected)[0]))
+    corrected = correct_readings(reading[np.newaxis], np.array(old["matrix"]), np.array(old["bias_mps2"]))
+    return math.degrees(float(force_inclination(corrected)[0]))
 
 
 def _tube(row: dict[str, Any]) -> dict[str, Any]:

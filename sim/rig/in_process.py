@@ -12,7 +12,7 @@ from sim.errors import RigError
 from sim.rig.scheduler import Progress
 from sim.rig.stepper import Acted, Answer, FrameEvent
 from telemetry.messages import address_name
-from telemetry.runtime.process import Process
+from telemetry.runtime.process_interface import Process
 from telemetry.runtime.stepped import Sent, run_step
 from telemetry.unwritten import Content
 

@@ -7,7 +7,7 @@ from typing import get_args
 
 from telemetry.application.endpoint import Endpoint
 from telemetry.messages import BASE, Kept, Side
-from telemetry.runtime.process import Process
+from telemetry.runtime.process_interface import Process
 from telemetry.unwritten import Content
 
 

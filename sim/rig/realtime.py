@@ -24,10 +24,10 @@ from telemetry.media.port import Medium
 from telemetry.media.zenoh_bus import open_router
 from telemetry.media.zenoh_port import ZenohMedium
 from telemetry.messages import BASE, ENCODER, NodeFlag, NodeState, Side, address_name
-from telemetry.runtime.event_loop import run as run_loop
+from telemetry.runtime.event_loop import run_event_loop as run_loop
 from telemetry.runtime.event_loop import stop_on_signals
 from telemetry.runtime.own_clock import OwnClock, OwnClockLoop
-from telemetry.runtime.process import Process
+from telemetry.runtime.process_interface import Process
 from telemetry.runtime.timing import CycleTiming
 from telemetry.unwritten import Content
 

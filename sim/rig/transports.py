@@ -7,7 +7,7 @@ from contextlib import contextmanager
 from dataclasses import dataclass
 from typing import Literal, TypeAlias
 
-from sim.can.hub import running_hub
+from sim.can.can_hub import running_hub
 from telemetry.media.can_loopback_protocol import INTERFACE
 from telemetry.messages import BASE, ENCODER, Side
 
@@ -38,7 +38,7 @@ class Transports:
         return any(transport != "zenoh" for transport in self.turn)
 
     def medium_of(self, address: int, side: Side) -> str | None:
-        """Medium of one end, as ``telemetry.media.table`` names it; None: the rig's zenoh session."""
+        """Medium of one end, as ``telemetry.media.media_table`` names it; None: the rig's zenoh session."""
         if address == BASE or (address, side) == (ENCODER, Side.UPPER):
             return None
         joint = len(self.turn) - 1 if address == ENCODER else address - (1 if side is Side.UPPER else 2)

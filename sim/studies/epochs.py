@@ -18,7 +18,7 @@ from node.kernels.record.filter_record import Scheme
 from sim.campaign.chunk import campaign_of
 from sim.rig.direct_string import DirectString
 from sim.studies.lab import ACCELERATION_DPS2, RATE_DPS, TURNS
-from sim.studies.scenarios import CALIBRATED, Tables, complete
+from sim.studies.scenarios import CALIBRATED, Tables, complete_string
 from sim.world.scenario import scenario_of
 from sim.world.world import World
 
@@ -26,7 +26,7 @@ Array = npt.NDArray[np.float64]
 BLOCKS = 3  # of turning and resting
 BEFORE_END = 10.0  # s
 RESTING: Tables = {
-    "rig": complete(1),
+    "rig": complete_string(1),
     "path": {"straight": {"inclination_deg": 2.0}},
     "schedule": {"add_s": 60.0, "stop_s": 60.0, "finish_s": 5.0, "blocks": BLOCKS},
     "rotation": {"turns": TURNS, "rate_dps": RATE_DPS, "acceleration_dps2": ACCELERATION_DPS2},
@@ -46,13 +46,13 @@ class EpochRun:
     turning: npt.NDArray[np.bool_]  # (epochs,)
 
 
-def resting(
+def resting_string(
     hops: int, scheme: Scheme = Scheme.FORWARD, kernel: str = "float64", blocks: int = BLOCKS, loss: float = 0.01
 ) -> Tables:
     """The string of ``hops`` tubes."""
     return {
         **RESTING,
-        "rig": complete(hops),
+        "rig": complete_string(hops),
         "schedule": {**RESTING["schedule"], "blocks": blocks},
         "medium": {"link": "off", "loss": loss},
         "node": {"scheme": scheme.name.lower(), "kernel": kernel},
@@ -63,7 +63,7 @@ def run_seed(job: tuple[Tables, int]) -> EpochRun:
     """One seed of one scenario, for a pool of processes."""
     tables, seed = job
     world = World(scenario_of(dict(tables)), seed)
-    return judge(DirectString(world))
+    return sample_epochs(DirectString(world))
 
 
 def run_campaign_seed(job: tuple[Tables, int]) -> EpochRun:
@@ -77,7 +77,7 @@ def run_campaign_seed(job: tuple[Tables, int]) -> EpochRun:
     return EpochRun(error, var, total_error, total_var, epochs["turning"].reshape(-1, tubes)[:, 0])
 
 
-def judge(string: DirectString) -> EpochRun:
+def sample_epochs(string: DirectString) -> EpochRun:
     """Drill a string and keep what its nodes knew at the fixed epochs."""
     at, turning = epochs_of(string.world)
     run = string.drill()

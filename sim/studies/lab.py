@@ -14,11 +14,11 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
-from groundstation.survey.fusion.resolve import angles, resolve
+from groundstation.survey.fusion.resolve import direction_angles, resolve_direction
 from node.kernels.arithmetic.angles import wrap
 from node.kernels.arithmetic.formats import PERIOD
 from sim.rig.direct_string import DirectString, StringRun, wrapped
-from sim.studies.scenarios import Tables, complete
+from sim.studies.scenarios import Tables, complete_string
 from sim.world.motion import Trapezoid
 from sim.world.scenario import scenario_of
 from sim.world.world import World
@@ -31,7 +31,7 @@ RUN_IN = 20.0  # s, of turning before the yaw is judged as rotating, and of rest
 TURNS, RATE_DPS, ACCELERATION_DPS2 = 20.0, 71.0, 35.0
 TURN = Trapezoid(TURNS * math.tau, math.radians(RATE_DPS), math.radians(ACCELERATION_DPS2))
 LAB: Tables = {
-    "rig": complete(1),
+    "rig": complete_string(1),
     "path": {"straight": {"inclination_deg": 2.0}},
     "schedule": {"add_s": STOP - TURN.duration, "stop_s": END - STOP, "finish_s": FINISH, "blocks": 1},
     "rotation": {"turns": TURNS, "rate_dps": RATE_DPS, "acceleration_dps2": ACCELERATION_DPS2},
@@ -77,11 +77,11 @@ def run_seed_of_each(job: tuple[Sequence[Tables], int]) -> list[LabRun]:
         if unaided not in worlds:
             worlds[unaided] = World(scenario, seed)
         world = worlds[unaided].aided_like(scenario)
-        runs.append(judge(world, DirectString(world).drill()))
+        runs.append(errors_by_hop(world, DirectString(world).drill()))
     return runs
 
 
-def judge(world: World, run: StringRun) -> LabRun:
+def errors_by_hop(world: World, run: StringRun) -> LabRun:
     """Errors hop by hop: the top tube is the first."""
     tubes = range(world.scenario.tubes, 0, -1)
     bias = np.stack([run.gyro_bias[:, tube - 1] - world.sensors.gyro_bias(tube) for tube in tubes], axis=1)
@@ -112,5 +112,5 @@ def _azimuth_of_survey(survey: SurveyMeasurement | None) -> float:
 
 def _azimuth(force: Array, cov: Array, yaw: float, yaw_var: float) -> float:
     """Azimuth of the tube in (-pi, pi]; the hole leans north, so it is the error."""
-    direction = resolve(force, cov, yaw, yaw_var).direction
-    return wrap(angles(direction.lean, direction.down)[1])
+    direction = resolve_direction(force, cov, yaw, yaw_var).direction
+    return wrap(direction_angles(direction.lean, direction.down)[1])

@@ -36,7 +36,7 @@ def over_cores(most: int, step: Step) -> Iterator[RunAll]:
     A process takes seconds to start, so a study keeps one pool for all its batches, many studies keep theirs in
     ``one_pool``, and `FEW` jobs need none.
     """
-    processes = min(cores(), most)
+    processes = min(usable_cores(), most)
     if most <= FEW or processes == 1:
         yield partial(_here, step)
         return
@@ -74,7 +74,7 @@ def _pool_of(processes: int) -> Iterator[Pool]:
             yield pool
         return
     if not kept:
-        kept.append(_started(cores()))
+        kept.append(_started(usable_cores()))
     yield kept[0]
 
 
@@ -83,7 +83,7 @@ def _started(processes: int) -> Pool:
     return multiprocessing.get_context("spawn").Pool(processes)
 
 
-def cores() -> int:
+def usable_cores() -> int:
     """Processes that a study may use: all cores, or as many as ``$BORECHAIN_CORES`` says.
 
     Raises
@@ -107,6 +107,6 @@ def _here(step: Step, work: Callable[[Job], Found], jobs: Iterable[Job]) -> list
     return results
 
 
-def seeded(setup: Job, count: int) -> list[tuple[Job, int]]:
+def seed_jobs(setup: Job, count: int) -> list[tuple[Job, int]]:
     """Jobs of one setup with the seeds 1..``count``."""
     return [(setup, seed) for seed in range(1, count + 1)]

@@ -8,7 +8,7 @@ from importlib import resources
 from pathlib import Path
 
 from groundstation.survey.files.survey_records import DisplacementRule, read_displacements
-from groundstation.survey.well.well_record import Record
+from groundstation.survey.well.well_record import SurveyRecord
 
 AXES = ("north", "east", "tvd")
 
@@ -18,7 +18,7 @@ def data_file(name: str) -> Path:
     return Path(str(resources.files("sim.studies") / "data" / name))
 
 
-def wellbore_1(rule: DisplacementRule = DisplacementRule.EXACT) -> Record:
+def wellbore_1(rule: DisplacementRule = DisplacementRule.EXACT) -> SurveyRecord:
     """Field record of thesis Table 4.1."""
     return read_displacements(data_file("wellbore_1.csv"), rule)
 

@@ -11,8 +11,8 @@ from typing import Any
 
 from sim.rig.plain_encoder import LINES
 from sim.studies.lab import REST, LabRun
-from sim.studies.scenarios import Tables, changed
-from sim.studies.trials import Trials, rms_deg, row
+from sim.studies.scenarios import Tables, change_sections
+from sim.studies.trials import Trials, interval_row, rms_deg
 
 DELAY_MS = 10.0
 EXPERIMENTS = ("update-modes", "single-updates", "two-nodes")
@@ -21,10 +21,10 @@ FORMS = ("published filter", "published scheme")
 
 def setup_of(setup: Tables, form: str) -> Tables:
     """A laboratory string with one of ``FORMS`` in place of ours."""
-    filtered = changed(setup, node={"kernel": "published", "scheme": "estimate"})
+    filtered = change_sections(setup, node={"kernel": "published", "scheme": "estimate"})
     if form == "published filter":
         return filtered
-    return changed(
+    return change_sections(
         filtered,
         medium={"delay_ms": DELAY_MS, "dated_by": "arrival"},
         encoder={"counts_per_turn": LINES, "edge_times": False},
@@ -43,6 +43,6 @@ def rows_of(cases: list[tuple[str, Tables, int, float | str | None]], run_all: T
                 last, runs = setup, run_all(setup_of(setup, form))
             yaw = rms_deg([r.error[REST, hop] for r in runs])
             azimuth = rms_deg([r.azimuth_error[hop : hop + 1] for r in runs])
-            rows.append(row(f"{name}, {form}", "yaw", yaw))
-            rows.append(row(f"{name}, {form}", "azimuth", azimuth, published=published))
+            rows.append(interval_row(f"{name}, {form}", "yaw", yaw))
+            rows.append(interval_row(f"{name}, {form}", "azimuth", azimuth, published=published))
     return rows

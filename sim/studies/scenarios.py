@@ -9,12 +9,12 @@ Tables = Mapping[str, Mapping[str, Any]]
 CALIBRATED = {"bias_std_deg": 0.002}  # of accelerometers, as a tilt
 
 
-def changed(tables: Tables, **sections: Mapping[str, Any]) -> Tables:
+def change_sections(tables: Tables, **sections: Mapping[str, Any]) -> Tables:
     """The same scenario with other values of some keys of some ``sections``."""
     return {**tables, **{name: {**tables.get(name, {}), **values} for name, values in sections.items()}}
 
 
-def complete(tubes: int) -> dict[str, Any]:
+def complete_string(tubes: int) -> dict[str, Any]:
     """The string is whole from the start."""
     return {"tubes": tubes, "tubes_at_start": tubes, "tube_length_m": 1.0}
 

@@ -1,4 +1,4 @@
-"""What a study is: how it is named, asked for, run, shown, kept and drawn. `sim.studies.table` lists them all.
+"""What a study is: how it is named, asked for, run, shown, kept and drawn. `sim.studies.study_table` lists them all.
 
 A study lives in a package of its own:
 
@@ -36,7 +36,7 @@ class Option:
 
 
 @dataclass(frozen=True, slots=True)
-class Table:
+class ResultTable:
     """Rows of a result: under which key, what of them is kept and shown.
 
     ``kept`` and ``shown`` are columns; none of either and the table is not kept or not shown. ``suffix`` is of its
@@ -63,7 +63,7 @@ class Study:
     name: str
     help: str
     module: str
-    tables: tuple[Table, ...]
+    tables: tuple[ResultTable, ...]
     takes: tuple[Option, ...] = ()
     fixed: Mapping[str, Any] = field(default_factory=lambda: MappingProxyType({}))
     counts: str = "runs"

@@ -11,7 +11,7 @@ import numpy as np
 import numpy.typing as npt
 
 from sim.studies.lab import ENDS, STOP, LabRun, run_seed
-from sim.studies.pool import Step, over_cores, seeded
+from sim.studies.pool import Step, over_cores, seed_jobs
 from sim.studies.scenarios import Tables
 
 Array = npt.NDArray[np.float64]
@@ -21,20 +21,20 @@ Trials = Callable[[Tables], list[LabRun]]
 
 
 @contextmanager
-def trials(seeds: int, step: Step) -> Iterator[Trials]:
+def over_seeds(seeds: int, step: Step) -> Iterator[Trials]:
     """Yield the function that runs the seeds 1..``seeds`` of a setup on all cores, in their order."""
     with over_cores(seeds, step) as run_all:
-        yield lambda setup: run_all(run_seed, seeded(setup, seeds))
+        yield lambda setup: run_all(run_seed, seed_jobs(setup, seeds))
 
 
 def rms_deg(errors: Sequence[Array]) -> tuple[float, float, float]:
     """Root mean square in degrees of one array (rad) a seed, with the ends of its interval (bootstrap over seeds)."""
     squares = np.array([float(np.mean(np.square(e))) for e in errors])
-    low, high = np.sqrt(bootstrap(squares))
+    low, high = np.sqrt(bootstrap_interval(squares))
     return math.degrees(math.sqrt(float(squares.mean()))), math.degrees(low), math.degrees(high)
 
 
-def bootstrap(values: Array) -> tuple[float, float]:
+def bootstrap_interval(values: Array) -> tuple[float, float]:
     """95 % interval of the mean of ``values`` (seeds,), by percentiles of resampled means."""
     random = np.random.Generator(np.random.Philox(len(values)))
     means = values[random.integers(0, len(values), (RESAMPLES, len(values)))].mean(axis=1)
@@ -42,7 +42,7 @@ def bootstrap(values: Array) -> tuple[float, float]:
     return float(low), float(high)
 
 
-def row(
+def interval_row(
     case: str,
     quantity: str,
     figure: tuple[float, float, float],
@@ -66,7 +66,7 @@ def row(
     }
 
 
-def trace(runs: list[LabRun], hop: int) -> dict[str, Array]:
+def yaw_error_trace(runs: list[LabRun], hop: int) -> dict[str, Array]:
     """Yaw error over time after the stop (s): of one seed, and rms over all (deg)."""
     error = np.degrees(np.array([run.error[:, hop] for run in runs]))
     return {"t": ENDS - STOP, "one": error[SHOWN_SEED], "rms": np.sqrt(np.mean(error**2, axis=0))}

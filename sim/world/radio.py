@@ -14,10 +14,10 @@ import numpy.typing as npt
 from sim.world.radio_section import LayerSection, PipeSection, RadioSection
 from sim.world.streams import Stream, stream
 from telemetry.errors import RadioError
-from telemetry.radio.path_loss import margin, packet_error_rate, path_loss, propagation, received
-from telemetry.radio.soil import PorosityWarning, Soil, permittivity
-from telemetry.radio.steel import resistivity
-from telemetry.radio.waveguide import TE11, attenuation, decibels
+from telemetry.radio.path_loss import link_margin, packet_error_rate, path_loss, propagation_constants, received_power
+from telemetry.radio.soil_dielectric import PorosityWarning, Soil, soil_permittivity
+from telemetry.radio.steel import steel_resistivity
+from telemetry.radio.waveguide import TE11, nepers_to_decibels, wall_attenuation
 
 Array = npt.NDArray[np.float64]
 LOOK_EVERY = 1.0  # s, between two looks at how deep the string stands
@@ -142,14 +142,17 @@ def layer_margins(section: RadioSection) -> list[float]:
         return []
     f = section.frequency_mhz * 1e6
     air = 1.0, 0.0
-    losses = [path_loss(*propagation(*eps, f), section.gap_m) for eps in (air, *(of_layer(s, f) for s in section.soil))]
-    return [float(margin(power_of(section, loss), section.threshold_dbm)) for loss in losses]
+    losses = [
+        path_loss(*propagation_constants(*eps, f), section.gap_m)
+        for eps in (air, *(of_layer(s, f) for s in section.soil))
+    ]
+    return [float(link_margin(power_of(section, loss), section.threshold_dbm)) for loss in losses]
 
 
 def of_layer(layer: LayerSection, frequency: float) -> tuple[float, float]:
     """Relative permittivity of a layer, real part and loss (Hz)."""
     soil = Soil(layer.sand, layer.clay, layer.bulk_density_g_cm3, layer.water, layer.temperature_c)
-    real, loss = permittivity(soil, frequency)
+    real, loss = soil_permittivity(soil, frequency)
     return float(real), float(loss)
 
 
@@ -164,16 +167,16 @@ def hop_margins(section: RadioSection, tube_length: float) -> list[float]:
     if section.mode == "soil":
         return []
     pipe = pipe_of(section)
-    rho = resistivity(pipe.carbon_percent, pipe.temperature_c)
-    wall = decibels(attenuation(TE11, pipe.radius_cm * 1e-2, section.frequency_mhz * 1e6, rho))
+    rho = steel_resistivity(pipe.carbon_percent, pipe.temperature_c)
+    wall = nepers_to_decibels(wall_attenuation(TE11, pipe.radius_cm * 1e-2, section.frequency_mhz * 1e6, rho))
     losses = (float(wall) * tube_length + pipe.joint_db) * np.arange(pipe.reach + 1.0)
-    margins: list[float] = margin(power_of(section, losses), section.threshold_dbm).tolist()
+    margins: list[float] = link_margin(power_of(section, losses), section.threshold_dbm).tolist()
     return margins
 
 
 def power_of(section: RadioSection, loss: npt.ArrayLike) -> Array:
     """Power (dBm) received over a loss (dB)."""
-    return received(loss, section.transmit_dbm, 2.0 * section.gain_dbi)
+    return received_power(loss, section.transmit_dbm, 2.0 * section.gain_dbi)
 
 
 def check_radio(section: RadioSection, tube_length: float) -> None:

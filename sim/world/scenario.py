@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Any
 
 from sim.errors import ScenarioError
-from sim.faults import KillNode, parse_fault
+from sim.node_kills import KillNode, parse_fault
 from sim.world.borehole import Borehole, read_displacements, read_stations
 from sim.world.parsing import read_toml, validate
 from sim.world.scenario_checks import check

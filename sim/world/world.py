@@ -15,7 +15,7 @@ from node.firmware.settings import TubeSettings
 from node.firmware.torque import TorqueSettings
 from node.kernels.record.filter_record import Scheme
 from sim.errors import ScenarioError
-from sim.faults import KillNode
+from sim.node_kills import KillNode
 from sim.world.drill_string import DrillString
 from sim.world.radio import RadioLinks
 from sim.world.scenario import Scenario

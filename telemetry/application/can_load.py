@@ -36,21 +36,21 @@ STATE = NodeState(
 
 
 @dataclass(frozen=True, slots=True)
-class Traffic:
+class RepeatedMessage:
     """A message that comes again and again."""
 
     message: Message
     rate: float  # 1/s
 
 
-def steady(tubes: int, cycle: float = CYCLE) -> list[Traffic]:
+def steady_traffic(tubes: int, cycle: float = CYCLE) -> list[RepeatedMessage]:
     """What crosses the joint above ``tubes`` tubes while the string turns."""
     return [
-        Traffic(AIDING, 1.0 / cycle),
-        Traffic(STATE, tubes / cycle),
-        Traffic(Hello(250, 7, 25, Mode.TRACKING, 0.99), 2.0 / HELLO_PERIOD),
-        Traffic(TimeRequest(5000.123456), 1.0 / SYNC_PERIOD),
-        Traffic(TimeReply(5000.1, 5000.2, 5000.3, 5000.4, 1.0000012, 1e-8), 1.0 / SYNC_PERIOD),
+        RepeatedMessage(AIDING, 1.0 / cycle),
+        RepeatedMessage(STATE, tubes / cycle),
+        RepeatedMessage(Hello(250, 7, 25, Mode.TRACKING, 0.99), 2.0 / HELLO_PERIOD),
+        RepeatedMessage(TimeRequest(5000.123456), 1.0 / SYNC_PERIOD),
+        RepeatedMessage(TimeReply(5000.1, 5000.2, 5000.3, 5000.4, 1.0000012, 1e-8), 1.0 / SYNC_PERIOD),
     ]
 
 
@@ -72,12 +72,12 @@ def frame_bytes(message: Message, profile: str, *, fd: bool, sealed: bool = Fals
     return [layout.length for layout in (native.fd if fd else native.classic).layouts]
 
 
-def duration(message: Message, profile: str, rates: BitRates, *, fd: bool, sealed: bool = False) -> float:
+def message_bus_time(message: Message, profile: str, rates: BitRates, *, fd: bool, sealed: bool = False) -> float:
     """Bus time of a message, s."""
     return sum(rates.duration(length, fd=fd) for length in frame_bytes(message, profile, fd=fd, sealed=sealed))
 
 
-def headers(profile: str, rates: BitRates, *, fd: bool, sealed: bool = False) -> float:
+def header_load(profile: str, rates: BitRates, *, fd: bool, sealed: bool = False) -> float:
     """Share of its time that the bus is busy with the headers that both ends of the native profile say again."""
     if sealed or profile == "tunnel":
         return 0.0
@@ -85,14 +85,14 @@ def headers(profile: str, rates: BitRates, *, fd: bool, sealed: bool = False) ->
     return 2.0 * sum(rates.duration(length, fd=fd) for length in header) / HEADER_EVERY
 
 
-def load(traffic: list[Traffic], profile: str, rates: BitRates, *, fd: bool, sealed: bool = False) -> float:
+def bus_load(traffic: list[RepeatedMessage], profile: str, rates: BitRates, *, fd: bool, sealed: bool = False) -> float:
     """Share of its time that the bus is busy, signs of life included; over 1: it cannot carry that."""
-    messages = sum(t.rate * duration(t.message, profile, rates, fd=fd, sealed=sealed) for t in traffic)
-    signs = presences(traffic, profile) * rates.duration(PRESENCE_BYTES, fd=fd)
-    return messages + headers(profile, rates, fd=fd, sealed=sealed) + signs
+    messages = sum(t.rate * message_bus_time(t.message, profile, rates, fd=fd, sealed=sealed) for t in traffic)
+    signs = presence_rate(traffic, profile) * rates.duration(PRESENCE_BYTES, fd=fd)
+    return messages + header_load(profile, rates, fd=fd, sealed=sealed) + signs
 
 
-def presences(traffic: list[Traffic], profile: str) -> float:
+def presence_rate(traffic: list[RepeatedMessage], profile: str) -> float:
     """Signs of life each second of the upper end, which sends little itself; the states below tell of the lower one."""
     states = sum(t.rate for t in traffic if isinstance(t.message, NodeState))
     own = sum(t.rate for t in traffic if isinstance(t.message, Aiding)) + 1.0 / HELLO_PERIOD
@@ -108,5 +108,5 @@ def load_table(
             for profile in PROFILES:
                 for bitrate in bitrates:
                     rates = BitRates(bitrate, data_ratio * bitrate)
-                    busy = load(steady(count), profile, rates, fd=frames == "fd", sealed=sealed)
+                    busy = bus_load(steady_traffic(count), profile, rates, fd=frames == "fd", sealed=sealed)
                     yield count, profile, frames, bitrate, busy

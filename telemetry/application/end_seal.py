@@ -45,7 +45,7 @@ class Pair(NamedTuple):
     base: int
 
 
-class Heard(Enum):
+class SealFinding(Enum):
     """What the base makes of a sealed payload."""
 
     NOTHING = 0  # it is of no effect
@@ -55,12 +55,12 @@ class Heard(Enum):
     @property
     def is_believed(self) -> bool:
         """Whether it is of effect."""
-        return self is not Heard.NOTHING
+        return self is not SealFinding.NOTHING
 
     @property
     def begins_session(self) -> bool:
         """Whether the tube has taken an offer just now."""
-        return self is Heard.BEGINS
+        return self is SealFinding.BEGINS
 
 
 class Sealed(NamedTuple):
@@ -108,7 +108,7 @@ def open_sealed(ring: KeyRing, purpose: str, way: bytes, payload: bytes, tube: i
     return Sealed(content, of_tube, of_base, newest)
 
 
-class TubeEnd:
+class SealingEnd:
     """The end of a tube, or of the encoder.
 
     Parameters
@@ -170,7 +170,7 @@ class Offer:
 
 
 @dataclass(slots=True)
-class Session:
+class EndSession:
     """What the base knows of a tube's end."""
 
     pair: Pair
@@ -191,7 +191,7 @@ class BaseEnd:
         self.counters: Counter[str] = Counter()
         self._ring = ring
         self._lot = lot
-        self._sessions: dict[int, Session] = {}
+        self._sessions: dict[int, EndSession] = {}
         self._offers: dict[int, list[Offer]] = {}  # by tube, the oldest first
         self._due: list[tuple[int, Offer]] = []
 
@@ -200,22 +200,22 @@ class BaseEnd:
         session = self._sessions.get(tube)
         return None if session is None else self._closed(content, tube, session.pair, session.newest)
 
-    def open(self, payload: bytes, tube: int, now: float) -> Heard:
+    def open(self, payload: bytes, tube: int, now: float) -> SealFinding:
         """What a payload of a tube is worth that came at ``now`` (s)."""
         sealed = open_sealed(self._ring(), "end", UP, payload, tube)
         if sealed is None:
             self.counters["seal_end_wrong_tag" if is_sealed(payload) else "seal_end_unsealed"] += 1
-            return Heard.NOTHING
+            return SealFinding.NOTHING
         session = self._sessions.get(tube)
         if session is not None and session.pair == (sealed.of_tube, sealed.of_base):
             session.newest = sealed.newest
-            return Heard.BELIEVED
+            return SealFinding.BELIEVED
         if self._is_proof(tube, sealed.pair):
-            self._sessions[tube] = Session(sealed.pair, sealed.newest)
+            self._sessions[tube] = EndSession(sealed.pair, sealed.newest)
             del self._offers[tube]
-            return Heard.BEGINS
+            return SealFinding.BEGINS
         self._offer(tube, sealed, now)
-        return Heard.NOTHING
+        return SealFinding.NOTHING
 
     def newest_of(self, tube: int) -> int | None:
         """Newest generation of keys that a tube has; None where there is no session with it."""

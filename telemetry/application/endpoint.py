@@ -12,13 +12,13 @@ from collections import Counter
 from typing import TYPE_CHECKING, NamedTuple
 
 from telemetry.application.clock import ClockFilter
-from telemetry.application.kinds import ONE_HOP, PRIORITIES, RELIABLE
-from telemetry.application.mail import Mail
-from telemetry.application.place import Place
-from telemetry.application.saved_state import parse_state
+from telemetry.application.delivery_rules import ONE_HOP, PRIORITIES, RELIABLE
+from telemetry.application.end_to_end import EndToEndDelivery
+from telemetry.application.endpoint_state import parse_state
+from telemetry.application.place import StringPlace
 from telemetry.application.standstill import Standstill, is_undated
 from telemetry.errors import DecodeError
-from telemetry.media.port import Frame, Priority
+from telemetry.media.port import PortFrame, Priority
 from telemetry.messages import (
     BASE,
     ENCODER,
@@ -97,12 +97,12 @@ class Endpoint:
         self.clock = ClockFilter(is_root=is_clock_root, epoch=boot_count)
         self.counters: Counter[str] = Counter()
         self.mode = Mode.BOOT
-        self.place = Place(address, reach, self.counters)
+        self.place = StringPlace(address, reach, self.counters)
         self._links = {side: HopLink(address, boot_count, self.place.nearest(side)) for side in sorted(sides)}
         toward_encoder = Side.LOWER if address == BASE else Side.UPPER
         self._sync_side = None if is_clock_root else toward_encoder
         links = self._links.get(Side.UPPER), self._links.get(Side.LOWER)
-        self.mail = Mail(address, boot_count, *links, self.counters, seals)
+        self.mail = EndToEndDelivery(address, boot_count, *links, self.counters, seals)
         self._passes_states = False  # whether a state is in the frame that is looked at
         self._hello_at = -math.inf
         self._sync_at = -math.inf
@@ -185,11 +185,11 @@ class Endpoint:
             self._links[self._sync_side].send_best_effort(unwritten(TimeRequest(now)), Kind.TIME_REQUEST, Priority.TIME)
         self.mail.send_due(now)
 
-    def take_frames(self, now: float) -> list[tuple[Side, Frame]]:
+    def take_frames(self, now: float) -> list[tuple[Side, PortFrame]]:
         """Frames to put on the wire now."""
         seals = self.seals
         if seals is None:
-            frames: list[tuple[Side, Frame]] = []
+            frames: list[tuple[Side, PortFrame]] = []
             for side, link in self._links.items():
                 if taken := link.take_frames(now):
                     frames += [(side, frame) for frame in taken]

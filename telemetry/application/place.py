@@ -22,7 +22,7 @@ class Neighbour(NamedTuple):
     last_heard: float
 
 
-class Place:
+class StringPlace:
     """What a process knows of its place.
 
     Parameters

@@ -9,10 +9,10 @@ from functools import partial
 from pathlib import Path
 
 from telemetry.application.depth_seal import open_depth
-from telemetry.application.end_seal import BaseEnd, Heard, TubeEnd, content_of_sealed, is_sealed
+from telemetry.application.end_seal import BaseEnd, SealFinding, SealingEnd, content_of_sealed, is_sealed
 from telemetry.application.measurement_seal import MeasurementSeal
 from telemetry.errors import KeyFileError
-from telemetry.media.port import Frame, Priority
+from telemetry.media.port import PortFrame, Priority
 from telemetry.messages import BASE, Message, NodeState, SessionOffer, Side
 from telemetry.presentation.msgpack_codec import encode
 from telemetry.transport.joint_seal import JointSeal
@@ -95,7 +95,7 @@ class Seals:
         ring = keys.current
         self.joints = {side: JointSeal(address, ring, lot) for side in sorted(sides)}
         self.base = BaseEnd(ring, lot) if address == BASE else None
-        self.tube = None if address == BASE else TubeEnd(address, ring, lot)
+        self.tube = None if address == BASE else SealingEnd(address, ring, lot)
         self.measurement = MeasurementSeal(ring)
         self._depth_counters: Counter[str] = Counter()
         self._depth_number = -1
@@ -106,9 +106,9 @@ class Seals:
         """What a payload says, its seal unread; a relay needs no more."""
         return content_of_sealed(payload)
 
-    def hear(self, payload: bytes, tube: int, now: float) -> Heard:
+    def hear(self, payload: bytes, tube: int, now: float) -> SealFinding:
         """What the base makes of a payload from a tube."""
-        return Heard.NOTHING if self.base is None else self.base.open(payload, tube, now)
+        return SealFinding.NOTHING if self.base is None else self.base.open(payload, tube, now)
 
     def is_told(self, payload: bytes, now: float, *, is_offer: bool) -> bool:
         """Whether a tube believes a payload from the base."""
@@ -181,13 +181,13 @@ class Seals:
         """Why the key file as it is now is not used, or what is odd about the keys in use; or empty."""
         return self._keys.fault or "; ".join(self._keys.ring.warnings)
 
-    def frames_of(self, side: Side, frames: Iterable[Frame], now: float) -> list[Frame]:
+    def frames_of(self, side: Side, frames: Iterable[PortFrame], now: float) -> list[PortFrame]:
         """Sealed frames of a link, and before them the call or answer that is due at ``now`` (s).
 
         What a link sends to nobody is dropped: a clock exchange must not wait, and the link repeats the rest.
         """
         joint = self.joints[side]
-        sealed = [Frame(payload, Priority.HELLO, "call") for payload in joint.own_frames(now)]
+        sealed = [PortFrame(payload, Priority.HELLO, "call") for payload in joint.own_frames(now)]
         for frame in frames:
             payload = joint.close(frame.payload)
             if payload is not None:

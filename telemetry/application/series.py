@@ -5,7 +5,7 @@ from __future__ import annotations
 SERIES_SHIFT = 24  # of a sequence number: below it the count, above it the start at which the count began
 
 
-class Series:
+class SequenceCounter:
     """Gives out numbers.
 
     Parameters

@@ -30,7 +30,7 @@ from telemetry.media.can_loopback import LoopbackBus, identifier_of
 TICK = 0.05  # s, that a controller is waited for
 
 
-class Controller(Protocol):
+class CanController(Protocol):
     """One controller; what fails raises ``can.CanError``, ``OSError`` or ``ValueError``."""
 
     def send(self, identifier: int, data: bytes) -> None:
@@ -43,7 +43,7 @@ class Controller(Protocol):
         """Let the bus go."""
 
 
-def controller_of(bus: can.BusABC, *, is_fd: bool, log: CanLog | None) -> Controller:
+def controller_of(bus: can.BusABC, *, is_fd: bool, log: CanLog | None) -> CanController:
     """The quickest way to the controller of ``bus``."""
     if log is None and isinstance(bus, LoopbackBus):
         return LoopbackController(bus, is_fd=is_fd)

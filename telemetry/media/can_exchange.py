@@ -13,11 +13,19 @@ from collections import Counter, deque
 from typing import NamedTuple
 
 from telemetry.errors import TelemetryError
-from telemetry.media.can_identifier import FLOW_CONTROL, PART_MASK, PRESENCE, PRIORITIES, SOURCE_SHIFT, TUNNEL, packed
+from telemetry.media.can_identifier import (
+    FLOW_CONTROL,
+    PART_MASK,
+    PRESENCE,
+    PRIORITIES,
+    SOURCE_SHIFT,
+    TUNNEL,
+    packed_identifier,
+)
 from telemetry.media.can_profile import NativePart, Profile, Split
 from telemetry.media.can_timing import CLASSIC_LARGEST, BitRates
 from telemetry.media.isotp import FLOW, Receiver, Sender, TransferError
-from telemetry.media.port import MAX_FRAME, Frame, Priority
+from telemetry.media.port import MAX_FRAME, PortFrame, Priority
 from telemetry.media.send_queue import SendQueue
 from telemetry.unwritten import Content
 
@@ -62,7 +70,7 @@ def part_data(part: NativePart, address: int) -> CanData:
 class Outgoing:
     """A payload on its way out: the parts that have a form of their own, then the rest by ISO-TP."""
 
-    def __init__(self, frame: Frame, split: Split, largest: int, now: float) -> None:
+    def __init__(self, frame: PortFrame, split: Split, largest: int, now: float) -> None:
         self.frame = frame
         self.moved_at = now
         self._parts = deque(split.parts)
@@ -84,7 +92,7 @@ class Outgoing:
             return part_data(self._parts.popleft(), address)
         if self._sender is None:
             raise ValueError("payload: expected something left to send, got none")
-        return CanData(packed(self.frame.priority, TUNNEL, address), self._sender.next_frame())
+        return CanData(packed_identifier(self.frame.priority, TUNNEL, address), self._sender.next_frame())
 
     def on_flow(self, data: bytes) -> None:
         """Take the receiver's answer, see ``isotp.Sender``."""
@@ -100,7 +108,7 @@ class Incoming:
         self.moved_at = -math.inf
 
 
-class Traffic:
+class BusLoadMeter:
     """Share of its time that the bus was busy lately, both directions: a mean that forgets with ``MEMORY``."""
 
     def __init__(self, rates: BitRates, *, fd: bool) -> None:
@@ -168,7 +176,7 @@ class CanExchange:
         self.budget = None if is_stepped else Budget()
         self._acknowledge_limit = STEPPED_LIMIT if is_stepped else ACKNOWLEDGE_LIMIT
         self._flow_limit = STEPPED_LIMIT if is_stepped else FLOW_LIMIT
-        self.traffic = Traffic(rates if rates is not None else BitRates(), fd=largest > CLASSIC_LARGEST)
+        self.traffic = BusLoadMeter(rates if rates is not None else BitRates(), fd=largest > CLASSIC_LARGEST)
         self.address, self.largest = address, largest
         self.queue = queue
         self.counters: Counter[str] = queue.counters
@@ -273,7 +281,7 @@ class CanExchange:
     def _presence(self, now: float) -> CanData:
         """Sign of life: how long this end is here (ms), and its nonce, by which two of one address are told apart."""
         age = min(int(1e3 * (now - self._begun)), 0xFFFFFFFF)
-        identifier = packed(Priority.HELLO, PRESENCE, self.address, self._nonce & PART_MASK)
+        identifier = packed_identifier(Priority.HELLO, PRESENCE, self.address, self._nonce & PART_MASK)
         return CanData(identifier, age.to_bytes(4) + self._nonce.to_bytes(4))
 
     def _start(self, now: float) -> CanData | None:
@@ -324,7 +332,7 @@ class CanExchange:
             self.counters[str(error)] += 1
         if (answer := incoming.receiver.flow) is not None:
             incoming.receiver.flow = None
-            self._answers[priority] = CanData(packed(priority, FLOW_CONTROL, self.address), answer)
+            self._answers[priority] = CanData(packed_identifier(priority, FLOW_CONTROL, self.address), answer)
         if payload is not None and self.profile is not None:
             self.profile.observe(payload)
         return payload

@@ -52,7 +52,7 @@ class CanFrame:
         return layout.pack(self.can_id, len(self.data), flags, OWN if self.own else 0, count & 0xFF, self.data)
 
 
-def unpack(datagram: bytes) -> tuple[CanFrame, int]:
+def unpack_frame(datagram: bytes) -> tuple[CanFrame, int]:
     """Frame and its number.
 
     Raises
@@ -70,12 +70,12 @@ def unpack(datagram: bytes) -> tuple[CanFrame, int]:
 
 
 def is_frame(datagram: bytes) -> bool:
-    """Whether ``unpack`` takes it."""
+    """Whether ``unpack_frame`` takes it."""
     return len(datagram) in (FD.size, CLASSIC.size) and datagram[LENGTH_AT] <= len(datagram) - HEADER
 
 
 def arrival_of(datagram: bytes) -> Arrival:
-    """What ``unpack`` finds, as a port takes it; of what is a frame."""
+    """What ``unpack_frame`` finds, as a port takes it; of what is a frame."""
     identifier, length = HEAD.unpack_from(datagram)
     return identifier | (OWN_FRAME if datagram[OWN_AT] & OWN else 0), datagram[HEADER : HEADER + length]
 

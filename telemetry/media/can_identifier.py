@@ -28,7 +28,7 @@ class Identifier(NamedTuple):
 
     def pack(self) -> int:
         """The 29 bits."""
-        return packed(self.priority, self.type, self.source, self.part, self.destination)
+        return packed_identifier(self.priority, self.type, self.source, self.part, self.destination)
 
     @classmethod
     def unpack(cls, bits: int) -> Identifier | None:
@@ -40,6 +40,6 @@ class Identifier(NamedTuple):
         return cls(PRIORITIES[priority], bits >> 21 & 0x1F, source, bits & PART_MASK, destination)
 
 
-def packed(priority: int, type_: int, source: int, part: int = 0, destination: int = EVERYBODY) -> int:
+def packed_identifier(priority: int, type_: int, source: int, part: int = 0, destination: int = EVERYBODY) -> int:
     """The 29 bits of an identifier of these parts."""
     return priority << 26 | type_ << 21 | source << SOURCE_SHIFT | destination << 5 | part

@@ -1,7 +1,7 @@
 """python-can's interface ``borechain_loopback``: a controller on a CAN segment that a hub on this machine simulates.
 
 For machines without CAN hardware. The channel is ``PORT/SEGMENT``: the hub's UDP port on 127.0.0.1 and any name.
-python-can finds the class by its entry point, or where the package is not installed after ``register``.
+python-can finds the class by its entry point, or where the package is not installed after ``register_loopback``.
 """
 
 from __future__ import annotations
@@ -28,7 +28,7 @@ from telemetry.media.can_frame import (
     arrival_of,
     error_frame,
     is_frame,
-    unpack,
+    unpack_frame,
 )
 from telemetry.media.can_loopback_protocol import (
     ATTACH,
@@ -48,7 +48,7 @@ OVERRUN = error_frame(ERROR_CONTROLLER, RX_OVERFLOW)
 ASK_EVERY = 0.5  # s of silence, after which a controller makes sure that its hub is still there
 
 
-def register() -> None:
+def register_loopback() -> None:
     """Make the interface known to python-can by its name, installed or not."""
     BACKENDS.setdefault(INTERFACE, (__name__, LoopbackBus.__name__))
 
@@ -157,7 +157,7 @@ class LoopbackBus(can.BusABC):
             self._make_sure_of_hub()
             return None, False
         datagram = self._next_datagram()
-        return None if datagram is None else message_of(unpack(datagram)[0], self.channel_info), False
+        return None if datagram is None else message_of(unpack_frame(datagram)[0], self.channel_info), False
 
     def _next_datagram(self) -> bytes | None:
         """The frame that waits, counted; None where there is none, or something else."""

@@ -25,7 +25,7 @@ import can
 
 from telemetry.errors import MediumError
 from telemetry.media.can_log import CanLog, log_path
-from telemetry.media.can_loopback import register
+from telemetry.media.can_loopback import register_loopback
 from telemetry.media.can_loopback_protocol import INTERFACE
 from telemetry.media.can_port import CanPort
 from telemetry.media.can_profile import NAMES, TUNNEL_ALONE, open_profile
@@ -155,7 +155,7 @@ def open_medium(where: str) -> Iterator[CanMedium]:
     MediumError
         When the settings are wrong.
     """
-    register()
+    register_loopback()
     medium = CanMedium(CanSettings.parse(where))
     try:
         yield medium

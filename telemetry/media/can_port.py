@@ -18,7 +18,7 @@ from functools import partial
 import can
 
 from telemetry.errors import MediumError
-from telemetry.media.can_controller import TICK, Controller, controller_of
+from telemetry.media.can_controller import TICK, CanController, controller_of
 from telemetry.media.can_exchange import CanExchange
 from telemetry.media.can_frame import (
     ERROR,
@@ -32,7 +32,7 @@ from telemetry.media.can_frame import (
 from telemetry.media.can_log import CanLog
 from telemetry.media.can_profile import Profile
 from telemetry.media.can_timing import CLASSIC_LARGEST, BitRates
-from telemetry.media.port import Frame
+from telemetry.media.port import PortFrame
 from telemetry.media.queued_port import QueuedPort
 from telemetry.unwritten import Content
 
@@ -76,8 +76,8 @@ class CanPort(QueuedPort):
         is_stepped: bool = False,
     ) -> None:
         super().__init__(name, limit=limit)
-        self._open = partial(opened, open_bus, name, largest > CLASSIC_LARGEST, log)
-        self._controller: Controller | None = self._open()
+        self._open = partial(open_controller, open_bus, name, largest > CLASSIC_LARGEST, log)
+        self._controller: CanController | None = self._open()
         nonce = random.getrandbits(32)
         begun = time.monotonic()
         self._exchange = CanExchange(address, largest, self._queue, nonce, begun, profile, rates, is_stepped=is_stepped)
@@ -95,7 +95,7 @@ class CanPort(QueuedPort):
         """One payload a frame: eight parts of a block in one would hold an aiding up for 0.5 s at 125 kbit/s."""
         return 0
 
-    def send(self, frame: Frame) -> bool:
+    def send(self, frame: PortFrame) -> bool:
         """Send a frame now, or as soon as the other end is there."""
         with self._lock:
             self._queue.limit = self._limit if self._exchange.is_alone(time.monotonic()) else self._busy_limit
@@ -217,7 +217,7 @@ class CanPort(QueuedPort):
             self._pump(time.monotonic())
 
 
-def opened(open_bus: OpenBus, name: str, is_fd: bool, log: CanLog | None) -> Controller:
+def open_controller(open_bus: OpenBus, name: str, is_fd: bool, log: CanLog | None) -> CanController:
     """The controller, its errors as ours.
 
     Raises

@@ -61,7 +61,7 @@ class Sender:
         if self._allowed is not None:
             self._allowed -= 1
         self.is_done = self._sent >= len(self._payload)
-        return padded(frame, self._largest)
+        return padded_frame(frame, self._largest)
 
     def on_flow(self, data: bytes) -> None:
         """Take the receiver's answer.
@@ -208,7 +208,7 @@ def flow_control(status: FlowStatus, block: int = 0) -> bytes:
     return bytes([FLOW << 4 | status, block, 0])
 
 
-def padded(frame: bytes, largest: int) -> bytes:
+def padded_frame(frame: bytes, largest: int) -> bytes:
     """Frame filled up to a length that CAN FD has; classic frames have every length."""
     if largest <= CLASSIC_LARGEST or len(frame) <= CLASSIC_LARGEST:
         return frame

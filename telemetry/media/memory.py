@@ -84,7 +84,7 @@ class MemoryPort(QueuedPort):
         return bytes(damaged)
 
 
-def joint(seed: int = 0, latency: float = 0.003, **faults: float) -> tuple[MemoryPort, MemoryPort]:
+def joined_ports(seed: int = 0, latency: float = 0.003, **faults: float) -> tuple[MemoryPort, MemoryPort]:
     """Two ends joined, with the same faults in both directions; ``latency`` in s."""
     upper = MemoryPort(2 * seed, latency, **faults)  # type: ignore[arg-type]
     lower = MemoryPort(2 * seed + 1, latency, **faults)  # type: ignore[arg-type]
@@ -100,16 +100,16 @@ class MemoryMedium:
 
     def open_port(self, end: TubeEnd) -> MemoryPort:
         """Port of one end."""
-        standing = self._ports.get(place(end))
+        standing = self._ports.get(end_identity(end))
         if standing is not None and not standing._closed:
             raise MediumError(f"port in memory: the {end.side.name.lower()} end of {end.address} is taken")
-        port = self._ports[place(end)] = MemoryPort()
-        if end.neighbour is not None and (other := self._ports.get(place(end.facing))) is not None:
+        port = self._ports[end_identity(end)] = MemoryPort()
+        if end.neighbour is not None and (other := self._ports.get(end_identity(end.facing))) is not None:
             port.other, other.other = other, port
         return port
 
 
-def place(end: TubeEnd) -> tuple[str, int, int]:
+def end_identity(end: TubeEnd) -> tuple[str, int, int]:
     """What makes an end the same end."""
     return end.rig, end.address, int(end.side)
 

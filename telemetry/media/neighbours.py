@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator, Mapping
 from contextlib import ExitStack, contextmanager
 
+from telemetry.media.media_table import open_medium
 from telemetry.media.port import STEPPER, Medium, Port, TubeEnd
-from telemetry.media.table import open_medium
 from telemetry.messages import Side
 
 

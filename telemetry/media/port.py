@@ -32,7 +32,7 @@ class Priority(IntEnum):
     BLOCK = 6
 
 
-class Frame(NamedTuple):
+class PortFrame(NamedTuple):
     """What a link hands to its port.
 
     Parameters
@@ -102,7 +102,7 @@ class Port(Protocol):
     def counters(self) -> Counter[str]:
         """Frames that did not leave, by reason: ``too_large``, ``replaced``, ``dropped``, ``outdated``."""
 
-    def send(self, frame: Frame) -> bool:
+    def send(self, frame: PortFrame) -> bool:
         """Send a frame now, or as soon as the other end is there; returns False for one that is too large.
 
         Raises

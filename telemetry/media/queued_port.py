@@ -6,7 +6,7 @@ from abc import ABC, abstractmethod
 from collections import Counter
 
 from telemetry.errors import MediumError
-from telemetry.media.port import MAX_FRAME, Frame
+from telemetry.media.port import MAX_FRAME, PortFrame
 from telemetry.media.send_queue import SEND_LIMIT, SendQueue
 
 
@@ -45,7 +45,7 @@ class QueuedPort(ABC):
         """Frames that did not leave, by reason."""
         return self._queue.counters
 
-    def send(self, frame: Frame) -> bool:
+    def send(self, frame: PortFrame) -> bool:
         """Send a frame now, or as soon as the other end is there."""
         accepted = self._queue.offer(frame)
         self.flush()

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Callable, Container
 
-from telemetry.media.port import Frame, Priority
+from telemetry.media.port import PortFrame, Priority
 
 SEND_LIMIT = 64  # frames
 
@@ -25,13 +25,13 @@ class SendQueue:
     def __init__(self, largest: int, limit: int = SEND_LIMIT) -> None:
         self.largest = largest
         self.limit = limit
-        self._waiting: list[Frame] = []  # by age
+        self._waiting: list[PortFrame] = []  # by age
         self.counters: Counter[str] = Counter()
 
     def __len__(self) -> int:
         return len(self._waiting)
 
-    def offer(self, frame: Frame) -> bool:
+    def offer(self, frame: PortFrame) -> bool:
         """Put a frame in; returns False for one that is too large."""
         if frame.is_larger_than(self.largest):
             self.counters["too_large"] += 1
@@ -50,7 +50,7 @@ class SendQueue:
                 put(frame.payload)
         self.forget_outdated()
 
-    def take(self, held: Container[Priority] = ()) -> Frame | None:
+    def take(self, held: Container[Priority] = ()) -> PortFrame | None:
         """The next frame, of a priority that is not ``held`` back; None where there is none."""
         chosen = None
         for place, frame in enumerate(self._waiting):
@@ -58,7 +58,7 @@ class SendQueue:
                 chosen = place
         return None if chosen is None else self._waiting.pop(chosen)
 
-    def put_back(self, frame: Frame) -> None:
+    def put_back(self, frame: PortFrame) -> None:
         """Put a frame that was taken to its place before the others again."""
         self._waiting.insert(0, frame)
         if len(self._waiting) > self.limit:
@@ -69,7 +69,7 @@ class SendQueue:
         if self._waiting:
             self._remove("outdated", [f for f in self._waiting if f.priority is Priority.TIME])
 
-    def _replace(self, frame: Frame) -> bool:
+    def _replace(self, frame: PortFrame) -> bool:
         """Put a frame into the place of the one of its topic, so that of many topics none is always last."""
         if frame.topic is None:
             return False
@@ -80,11 +80,11 @@ class SendQueue:
                 return True
         return False
 
-    def _most_dispensable(self) -> Frame:
+    def _most_dispensable(self) -> PortFrame:
         best_effort = [frame for frame in self._waiting if frame.topic is not None]
         return max(best_effort, key=lambda f: f.priority) if best_effort else self._waiting[-1]
 
-    def _remove(self, reason: str, frames: list[Frame]) -> None:
+    def _remove(self, reason: str, frames: list[PortFrame]) -> None:
         for frame in frames:
             self._waiting.remove(frame)
             self.counters[reason] += 1

@@ -28,7 +28,7 @@ ONE_POOL = (
 
 
 @dataclass(frozen=True, slots=True)
-class Reply:
+class QueryReply:
     """One answer to a query: a payload on a key, or an error text."""
 
     key: str
@@ -76,7 +76,7 @@ class Publisher:
 
     def close(self) -> None:
         """Stop publishing."""
-        undeclare(self._publisher)
+        end_declaration(self._publisher)
 
 
 class Subscription:
@@ -87,7 +87,7 @@ class Subscription:
 
     def close(self) -> None:
         """Stop the subscription."""
-        undeclare(self._subscriber)
+        end_declaration(self._subscriber)
 
 
 class Query:
@@ -165,7 +165,7 @@ class ZenohBus:
         """Hand queries that intersect ``pattern`` to ``handler`` on a foreign thread; ``Query.finish`` ends each."""
         self._declared.append(self._session.declare_queryable(pattern, lambda q: handler(Query(q)), complete=True))
 
-    def get(self, selector: str, timeout: float) -> list[Reply]:
+    def get(self, selector: str, timeout: float) -> list[QueryReply]:
         """All answers to ``selector`` within ``timeout`` wall seconds.
 
         Raises
@@ -309,13 +309,13 @@ def tls_of_client(credentials: Credentials) -> dict[str, Any]:
     return {"transport/link/tls": link}
 
 
-def undeclare(declared: Any) -> None:
+def end_declaration(declared: Any) -> None:
     """End a declaration; with its session it has ended already."""
     with suppress(zenoh.ZError):
         declared.undeclare()
 
 
-def intersects(selector_key: str, key: str) -> bool:
+def keys_intersect(selector_key: str, key: str) -> bool:
     """Whether two key expressions have a key in common; False for what is no key expression."""
     try:
         return bool(zenoh.KeyExpr(selector_key).intersects(zenoh.KeyExpr(key)))
@@ -344,11 +344,11 @@ def _config(mode: str, settings: dict[str, Any]) -> zenoh.Config:
     return config
 
 
-def _reply(reply: zenoh.Reply) -> Reply:
+def _reply(reply: zenoh.Reply) -> QueryReply:
     if reply.ok is not None:
-        return Reply(str(reply.ok.key_expr), reply.ok.payload.to_bytes())
+        return QueryReply(str(reply.ok.key_expr), reply.ok.payload.to_bytes())
     error = reply.err
-    return Reply("", b"", error.payload.to_string() if error is not None else "an empty reply")
+    return QueryReply("", b"", error.payload.to_string() if error is not None else "an empty reply")
 
 
 def _parameters(text: str) -> Iterator[tuple[str, str]]:

@@ -9,7 +9,7 @@ from pathlib import Path
 
 from telemetry import keys
 from telemetry.media.credentials import credentials_for
-from telemetry.media.port import Frame, TubeEnd
+from telemetry.media.port import PortFrame, TubeEnd
 from telemetry.media.queued_port import QueuedPort
 from telemetry.media.zenoh_bus import Subscription, ZenohBus, open_client
 
@@ -18,13 +18,13 @@ WITH_KEYS = ",keys="
 FRAMES = "application/octet-stream"
 
 
-class Hearing(threading.local):
+class DeliveryThread(threading.local):
     """Whether this thread is one of zenoh's, about to hand a frame out."""
 
     now = False
 
 
-hearing = Hearing()
+hearing = DeliveryThread()
 
 
 class ZenohPort(QueuedPort):
@@ -43,7 +43,7 @@ class ZenohPort(QueuedPort):
         self._publisher.watch()
         self._subscription: Subscription | None = None
 
-    def send(self, frame: Frame) -> bool:
+    def send(self, frame: PortFrame) -> bool:
         """Send a frame now, or as soon as the other end is there."""
         if len(self._queue) or self._closed or not self._publisher.is_heard:
             return super().send(frame)

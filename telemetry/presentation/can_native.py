@@ -10,7 +10,7 @@ from __future__ import annotations
 import math
 
 from telemetry.errors import DecodeError, EncodeError
-from telemetry.media.can_identifier import packed
+from telemetry.media.can_identifier import packed_identifier
 from telemetry.media.can_profile import NativePart, Split
 from telemetry.media.port import Priority
 from telemetry.messages import Message
@@ -40,7 +40,7 @@ HEADER_EVERY = 2.0  # s, after which an end that has lost it, or started anew, i
 BY_TYPE = {int(kind): native for kind, native in NATIVE.items()}
 HEADS = {
     kind: tuple(
-        [packed(PRIORITIES[kind], int(kind), 0, layout.part) for layout in native.form(fd=fd).layouts]
+        [packed_identifier(PRIORITIES[kind], int(kind), 0, layout.part) for layout in native.form(fd=fd).layouts]
         for fd in (False, True)
     )
     for kind, native in NATIVE.items()

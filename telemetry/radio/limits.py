@@ -16,7 +16,7 @@ ELECTRIC_CONSTANT: Final = 1.0 / (MAGNETIC_CONSTANT * SPEED_OF_LIGHT**2)  # F/m
 IMPEDANCE: Final = MAGNETIC_CONSTANT * SPEED_OF_LIGHT  # ohm, of free space
 
 
-class Range(NamedTuple):
+class ModelRange(NamedTuple):
     """Closed interval in which a model holds; ``scale`` and ``unit`` are those of its text."""
 
     low: float
@@ -28,7 +28,7 @@ class Range(NamedTuple):
         return f"{self.low * self.scale:g}..{self.high * self.scale:g} {self.unit}".rstrip()
 
 
-def within(name: str, values: npt.ArrayLike, limits: Range) -> Array:
+def values_within(name: str, values: npt.ArrayLike, limits: ModelRange) -> Array:
     """Values as floats, every one inside the limits.
 
     Raises
@@ -44,7 +44,7 @@ def within(name: str, values: npt.ArrayLike, limits: Range) -> Array:
     return array
 
 
-def positive(name: str, values: npt.ArrayLike, unit: str, scale: float = 1.0) -> Array:
+def positive_values(name: str, values: npt.ArrayLike, unit: str, scale: float = 1.0) -> Array:
     """Values as floats, every one finite and above zero.
 
     Raises

@@ -9,7 +9,7 @@ from typing import Any, Final
 import numpy as np
 import numpy.typing as npt
 
-from telemetry.radio.limits import SPEED_OF_LIGHT, Array, positive
+from telemetry.radio.limits import SPEED_OF_LIGHT, Array, positive_values
 
 TRANSMITTED: Final = 2.0  # dBm
 THRESHOLD: Final = -103.0  # dBm, below which the thesis counts a link as lost
@@ -19,7 +19,7 @@ DB_PER_NEPER: Final = 20.0 / math.log(10.0)
 Logarithm = Callable[[Any], Any]
 
 
-def propagation(real: npt.ArrayLike, loss: npt.ArrayLike, frequency: npt.ArrayLike) -> tuple[Array, Array]:
+def propagation_constants(real: npt.ArrayLike, loss: npt.ArrayLike, frequency: npt.ArrayLike) -> tuple[Array, Array]:
     """Attenuation ``alpha`` (Np/m) and phase constant ``beta`` (rad/m) of a plane wave in a lossy dielectric.
 
     ``alpha, beta = omega sqrt(mu eps'/2 (sqrt(1 + (eps''/eps')^2) -+ 1))``, without magnetism.
@@ -44,7 +44,7 @@ def path_loss(alpha: npt.ArrayLike, beta: npt.ArrayLike, distance: npt.ArrayLike
 
     Parameters
     ----------
-    alpha, beta : Np/m, rad/m, see ``propagation``
+    alpha, beta : Np/m, rad/m, see ``propagation_constants``
     distance : m
     log : log10; the figures in print follow with ``numpy.log``
 
@@ -53,16 +53,16 @@ def path_loss(alpha: npt.ArrayLike, beta: npt.ArrayLike, distance: npt.ArrayLike
     RadioError
         For a distance that is not above zero.
     """
-    d = positive("distance", distance, "m")
+    d = positive_values("distance", distance, "m")
     return np.asarray(6.4 + 20.0 * log(d) + 20.0 * log(np.asarray(beta, float)) + 8.69 * np.asarray(alpha, float) * d)
 
 
-def received(loss: npt.ArrayLike, transmitted: npt.ArrayLike = TRANSMITTED, gains: npt.ArrayLike = 0.0) -> Array:
+def received_power(loss: npt.ArrayLike, transmitted: npt.ArrayLike = TRANSMITTED, gains: npt.ArrayLike = 0.0) -> Array:
     """Received power, dBm: ``P_r = P_t + G_t + G_r - L``; ``gains`` is the sum of both antennas', dB."""
     return np.asarray(np.asarray(transmitted, float) + np.asarray(gains, float) - np.asarray(loss, float))
 
 
-def margin(power: npt.ArrayLike, threshold: npt.ArrayLike = THRESHOLD) -> Array:
+def link_margin(power: npt.ArrayLike, threshold: npt.ArrayLike = THRESHOLD) -> Array:
     """How far a received power (dBm) lies above the threshold, dB."""
     return np.asarray(np.asarray(power, float) - np.asarray(threshold, float))
 
@@ -77,5 +77,5 @@ def packet_error_rate(margin_db: npt.ArrayLike, width: float = WIDTH) -> Array:
     RadioError
         For a width that is not above zero.
     """
-    w = positive("width", width, "dB")
+    w = positive_values("width", width, "dB")
     return np.asarray(np.exp(-np.logaddexp(0.0, np.asarray(margin_db, float) / w)))

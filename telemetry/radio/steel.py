@@ -14,7 +14,7 @@ import numpy as np
 import numpy.typing as npt
 
 from telemetry.errors import RadioError
-from telemetry.radio.limits import Array, Range, within
+from telemetry.radio.limits import Array, ModelRange, values_within
 
 CARBON_PERCENT: Final = np.array([0.06, 0.08, 0.23, 0.42, 0.80, 1.22])
 TEMPERATURES: Final = np.array([20.0, 100.0, 200.0, 400.0])  # C
@@ -28,8 +28,8 @@ RESISTIVITY: Final = 1e-8 * np.array(  # ohm m, a row for each carbon content
         [19.6, 25.2, 33.3, 54.0],
     ]
 )
-CARBON: Final = Range(CARBON_PERCENT[0], CARBON_PERCENT[-1], 1.0, "%")
-TEMPERATURE: Final = Range(TEMPERATURES[0], TEMPERATURES[-1], 1.0, "C")
+CARBON: Final = ModelRange(CARBON_PERCENT[0], CARBON_PERCENT[-1], 1.0, "%")
+TEMPERATURE: Final = ModelRange(TEMPERATURES[0], TEMPERATURES[-1], 1.0, "C")
 API_5L: Final = MappingProxyType(  # grade of line pipe to its largest carbon content, % by weight
     {
         "A25": 0.21,
@@ -49,7 +49,7 @@ API_5L: Final = MappingProxyType(  # grade of line pipe to its largest carbon co
 )
 
 
-def resistivity(carbon_percent: npt.ArrayLike, temperature: npt.ArrayLike = 20.0) -> Array:
+def steel_resistivity(carbon_percent: npt.ArrayLike, temperature: npt.ArrayLike = 20.0) -> Array:
     """Resistivity of plain carbon steel, ohm m, bilinear between the measured points.
 
     Parameters
@@ -62,8 +62,8 @@ def resistivity(carbon_percent: npt.ArrayLike, temperature: npt.ArrayLike = 20.0
     RadioError
         With the valid range, for a value outside the measurements.
     """
-    carbon = within("carbon", carbon_percent, CARBON)
-    warm = within("temperature", temperature, TEMPERATURE)
+    carbon = values_within("carbon", carbon_percent, CARBON)
+    warm = values_within("temperature", temperature, TEMPERATURE)
     row, across = _place(CARBON_PERCENT, carbon)
     column, along = _place(TEMPERATURES, warm)
     cold_side = RESISTIVITY[row, column] * (1.0 - across) + RESISTIVITY[row + 1, column] * across

@@ -14,16 +14,24 @@ import numpy as np
 import numpy.typing as npt
 
 from telemetry.errors import RadioError
-from telemetry.radio.limits import IMPEDANCE, MAGNETIC_CONSTANT, SPEED_OF_LIGHT, Array, Range, positive, within
+from telemetry.radio.limits import (
+    IMPEDANCE,
+    MAGNETIC_CONSTANT,
+    SPEED_OF_LIGHT,
+    Array,
+    ModelRange,
+    positive_values,
+    values_within,
+)
 from telemetry.radio.path_loss import DB_PER_NEPER
 
 HIGHEST: Final = 20  # index of a mode
-FREQUENCY: Final = Range(1e6, 1e12, 1e-9, "GHz")
-RADIUS: Final = Range(1e-4, 10.0, 100.0, "cm")
+FREQUENCY: Final = ModelRange(1e6, 1e12, 1e-9, "GHz")
+RADIUS: Final = ModelRange(1e-4, 10.0, 100.0, "cm")
 
 
 @dataclass(frozen=True, slots=True)
-class Mode:
+class WaveguideMode:
     """A mode of the guide: transverse electric or magnetic, with ``m`` periods around and ``n`` zeros across.
 
     Raises
@@ -45,7 +53,7 @@ class Mode:
         return f"{self.kind}{self.m}{self.n}" if max(self.m, self.n) < 10 else f"{self.kind}{self.m},{self.n}"
 
     @classmethod
-    def parse(cls, text: str) -> Mode:
+    def parse(cls, text: str) -> WaveguideMode:
         """Mode of a text such as TE11 or TM0,12.
 
         Raises
@@ -67,11 +75,11 @@ class Mode:
         return float((jnp_zeros if self.kind == "TE" else jn_zeros)(self.m, self.n)[-1])
 
 
-TE11, TM01, TE21 = Mode("TE", 1, 1), Mode("TM", 0, 1), Mode("TE", 2, 1)
+TE11, TM01, TE21 = WaveguideMode("TE", 1, 1), WaveguideMode("TM", 0, 1), WaveguideMode("TE", 2, 1)
 LOWEST: Final = (TE11, TM01, TE21)
 
 
-def cut_off(mode: Mode, radius: npt.ArrayLike) -> Array:
+def cut_off(mode: WaveguideMode, radius: npt.ArrayLike) -> Array:
     """Frequency (Hz) below which a mode does not propagate: ``f_c = x c / (2 pi a)``.
 
     Parameters
@@ -83,16 +91,18 @@ def cut_off(mode: Mode, radius: npt.ArrayLike) -> Array:
     RadioError
         For a radius outside 0.1 mm..10 m.
     """
-    return np.asarray(mode.zero * SPEED_OF_LIGHT / (math.tau * within("radius", radius, RADIUS)))
+    return np.asarray(mode.zero * SPEED_OF_LIGHT / (math.tau * values_within("radius", radius, RADIUS)))
 
 
 def surface_resistance(resistivity: npt.ArrayLike, frequency: npt.ArrayLike) -> Array:
     """Resistance (ohm) of a metal's surface: ``R_s = sqrt(pi f mu rho)`` (ohm m, Hz), without magnetism."""
-    rho = positive("resistivity", resistivity, "ohm m")
+    rho = positive_values("resistivity", resistivity, "ohm m")
     return np.asarray(np.sqrt(math.pi * MAGNETIC_CONSTANT * np.asarray(frequency, float) * rho))
 
 
-def attenuation(mode: Mode, radius: npt.ArrayLike, frequency: npt.ArrayLike, resistivity: npt.ArrayLike) -> Array:
+def wall_attenuation(
+    mode: WaveguideMode, radius: npt.ArrayLike, frequency: npt.ArrayLike, resistivity: npt.ArrayLike
+) -> Array:
     """Attenuation of a mode by its wall, Np/m.
 
     ``alpha_TE = R_s/(a eta) ((f_c/f)^2 + m^2/(x'^2 - m^2)) / sqrt(1 - (f_c/f)^2)``,
@@ -109,7 +119,7 @@ def attenuation(mode: Mode, radius: npt.ArrayLike, frequency: npt.ArrayLike, res
     RadioError
         With the valid range; below the cut-off nothing propagates.
     """
-    a, f = within("radius", radius, RADIUS), within("frequency", frequency, FREQUENCY)
+    a, f = values_within("radius", radius, RADIUS), values_within("frequency", frequency, FREQUENCY)
     lowest = cut_off(mode, a)
     given, needed = np.broadcast_arrays(f, lowest)
     below = given <= needed
@@ -123,12 +133,12 @@ def attenuation(mode: Mode, radius: npt.ArrayLike, frequency: npt.ArrayLike, res
     return np.asarray(surface_resistance(resistivity, f) / (a * IMPEDANCE) * around / np.sqrt(1.0 - ratio))
 
 
-def decibels(nepers: npt.ArrayLike) -> Array:
+def nepers_to_decibels(nepers: npt.ArrayLike) -> Array:
     """Attenuation in dB/m of one in Np/m."""
     return np.asarray(DB_PER_NEPER * np.asarray(nepers, float))
 
 
-def reach(attenuation_db: npt.ArrayLike, budget_db: npt.ArrayLike) -> Array:
+def link_reach(attenuation_db: npt.ArrayLike, budget_db: npt.ArrayLike) -> Array:
     """Distance (m) over which an attenuation (dB/m) uses up a link budget (dB).
 
     Raises
@@ -136,4 +146,6 @@ def reach(attenuation_db: npt.ArrayLike, budget_db: npt.ArrayLike) -> Array:
     RadioError
         For a budget or an attenuation that is not above zero.
     """
-    return np.asarray(positive("budget", budget_db, "dB") / positive("attenuation", attenuation_db, "dB/m"))
+    return np.asarray(
+        positive_values("budget", budget_db, "dB") / positive_values("attenuation", attenuation_db, "dB/m")
+    )

@@ -57,7 +57,7 @@ def fault_of(error: Exception) -> click.ClickException | None:
     if isinstance(error, InputError):
         return InputFault(str(error))
     if isinstance(error, ModuleNotFoundError):
-        return EnvironmentFault(missing(error.name)) if error.name else None
+        return EnvironmentFault(missing_module_text(error.name)) if error.name else None
     if isinstance(error, BorechainError | OSError):
         return EnvironmentFault(str(error))
     return None
@@ -79,7 +79,7 @@ def plain_faults(command: Callable[P, R]) -> Callable[P, R]:
     return guarded
 
 
-def missing(module: str) -> str:
+def missing_module_text(module: str) -> str:
     """What to install for a module that is not here."""
     root = module.partition(".")[0]
     if root in PACKAGES:
@@ -90,7 +90,7 @@ def missing(module: str) -> str:
     return f"needs the extra {extra}: pip install 'borechain[{extra}]' ({root} is not installed)"
 
 
-def needs(*modules: str) -> Callable[[Callable[P, R]], Callable[P, R]]:
+def require_modules(*modules: str) -> Callable[[Callable[P, R]], Callable[P, R]]:
     """Refuse a command before it begins where one of ``modules`` is not installed."""
 
     def decorated(command: Callable[P, R]) -> Callable[P, R]:
@@ -114,10 +114,10 @@ def check_installed(*modules: str) -> None:
     """
     for module in modules:
         if importlib.util.find_spec(module) is None:
-            raise EnvironmentFault(missing(module))
+            raise EnvironmentFault(missing_module_text(module))
 
 
-def run(
+def run_command(
     command: click.Command, name: str, arguments: list[str] | None = None, packages: Sequence[str] = PACKAGES
 ) -> None:
     """Run a command under ``name`` and exit: 0 done, 1 the job could not be done here, 2 wrong arguments or input.

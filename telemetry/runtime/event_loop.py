@@ -12,7 +12,7 @@ from typing import Any, TypeVar
 T = TypeVar("T")
 
 
-def run(main: Coroutine[Any, Any, T]) -> T:
+def run_event_loop(main: Coroutine[Any, Any, T]) -> T:
     """Run ``main`` to its end on a loop of its own."""
     with asyncio.Runner(loop_factory=precise_loop) as runner:
         return runner.run(main)

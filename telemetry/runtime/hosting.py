@@ -28,10 +28,10 @@ from telemetry.media.zenoh_bus import ZenohBus, open_client, use_few_threads
 from telemetry.media.zenoh_port import CONNECT_TIMEOUT, WITH_KEYS, ZenohMedium
 from telemetry.messages import Side, address_name
 from telemetry.runtime.command_line import EnvironmentFault, InputFault, fault_of
-from telemetry.runtime.event_loop import run, stop_on_signals
+from telemetry.runtime.event_loop import run_event_loop, stop_on_signals
 from telemetry.runtime.own_clock import OwnClock, OwnClockLoop
-from telemetry.runtime.process import Process
-from telemetry.runtime.step_client import StepClient, serve
+from telemetry.runtime.process_interface import Process
+from telemetry.runtime.step_client import StepClient, serve_steps
 from telemetry.runtime.step_stream import StepStream, join_steps
 from telemetry.runtime.timing import CycleTiming
 
@@ -91,7 +91,7 @@ class OwnTime:
     offset: float = 0.0  # s, of its clock against the machine's
 
 
-def chosen(media: Mapping[Side, str | None]) -> dict[Side, str]:
+def chosen_media(media: Mapping[Side, str | None]) -> dict[Side, str]:
     """Media of the ends for which one was chosen."""
     return {side: medium for side, medium in media.items() if medium is not None}
 
@@ -106,8 +106,8 @@ def run_by_own_clock(
     """
     begin_process(name)
     use_few_threads()
-    with reporting(name):
-        run(live_by_own_clock(name, place, address, own_time, build, period))
+    with reporting_errors(name):
+        run_event_loop(live_by_own_clock(name, place, address, own_time, build, period))
 
 
 async def live_by_own_clock(
@@ -121,7 +121,7 @@ async def live_by_own_clock(
         contextlib.closing(build(timing)) as process,
         own_ports(place.rig, address, own_time.neighbours, media) as ports,
     ):
-        clock, report = OwnClock(own_time.offset), partial(complain, name)
+        clock, report = OwnClock(own_time.offset), partial(write_warning, name)
         loop = OwnClockLoop(process, ports, clock, timing, period, report, at_once=True)
 
         def write() -> None:
@@ -141,11 +141,11 @@ def run_stepped(name: str, place: Place, address: int, build: Callable[[], Proce
     What is wrong with its options, recordings or folder is found before anything is connected.
     """
     begin_process(name)
-    with reporting(name):
+    with reporting_errors(name):
         make_folder(place)
         process = build()
         with (
-            joined(place, file_name(address)) as bus,
+            rig_session(place, file_name(address)) as bus,
             stepped_ports_on(place.rig, address, place.media) as chosen,
             place.step_stream(address_name(address)) as stream,
         ):
@@ -153,11 +153,11 @@ def run_stepped(name: str, place: Place, address: int, build: Callable[[], Proce
             ports = chosen | stepped_ports(ZenohMedium(bus), place.rig, address, rest)
             client = StepClient(bus, place.rig, address, ports, stream)
             on_termination(client.stop)
-            serve(process, client, partial(complain, name))
+            serve_steps(process, client, partial(write_warning, name))
 
 
 @contextlib.contextmanager
-def joined(place: Place, name: str) -> Iterator[ZenohBus]:
+def rig_session(place: Place, name: str) -> Iterator[ZenohBus]:
     """Session of a process at its rig; a folder that cannot be made is reported before waiting for a router.
 
     ``name`` is that of its certificate.
@@ -200,10 +200,10 @@ def write_timing(folder: Path, report: dict[str, Any]) -> None:
 def warn_of_keys(name: str, seals: Seals | None) -> None:
     """Say what is odd about the keys of a process; it goes on."""
     for line in () if seals is None else seals.ring.warnings:
-        complain(name, line)
+        write_warning(name, line)
 
 
-def complain(name: str, line: str) -> None:
+def write_warning(name: str, line: str) -> None:
     """Write a warning to stderr; the process goes on."""
     sys.stderr.write(f"borechain {name}: {line}\n")
     sys.stderr.flush()
@@ -242,7 +242,7 @@ def on_termination(stop: Callable[[], None]) -> None:
 
 
 @contextlib.contextmanager
-def reporting(name: str) -> Iterator[None]:
+def reporting_errors(name: str) -> Iterator[None]:
     """In a forked process print one line for an expected error; a command of its own reports by itself."""
     try:
         yield

@@ -21,8 +21,8 @@ from telemetry.media.port import Port
 from telemetry.messages import Side
 from telemetry.runtime.inbox import Mailbox
 from telemetry.runtime.joint_watch import JointWatch
-from telemetry.runtime.process import Process
-from telemetry.runtime.timing import CycleTiming, Stage
+from telemetry.runtime.process_interface import Process
+from telemetry.runtime.timing import CycleStage, CycleTiming
 from telemetry.unwritten import Content
 
 FRAMES_TOGETHER = 16  # taken before what they made is sent, while more wait
@@ -224,7 +224,7 @@ class OwnClockLoop:
         while act is not None:
             self._timing.begin()
             act(self._process, now)
-            self._timing.lap(Stage.FRAME)
+            self._timing.lap(CycleStage.FRAME)
             self._unsent += 1
             now = self._clock.now()
             if self._unsent >= FRAMES_TOGETHER or now >= self._next_moment():
@@ -241,7 +241,7 @@ class OwnClockLoop:
         elif now >= self._next_moment():
             self._synchronise(now)
         else:
-            send(self._process, self._ports, now)
+            send_due_frames(self._process, self._ports, now)
         self._unsent = 0
 
     def _synchronise(self, now: float) -> None:
@@ -252,8 +252,8 @@ class OwnClockLoop:
         for fault in self._joints.find(self._ports, now):
             self._report(fault.line)
             self._process.on_joint_fault(fault, now)
-        send(self._process, self._ports, now)
-        self._timing.lap(Stage.SYNCHRONISE)
+        send_due_frames(self._process, self._ports, now)
+        self._timing.lap(CycleStage.SYNCHRONISE)
         self._synchronised = self._schedule.due
         for side in self._absence.find(self._process.endpoint.place.neighbours, now):
             state = "up" if self._ports[side].is_up else "down"
@@ -279,9 +279,9 @@ class OwnClockLoop:
                 return False
             self._timing.begin()
             self._process.on_frame(side, frame, now)
-            self._timing.lap(Stage.FRAME)
+            self._timing.lap(CycleStage.FRAME)
             now = self._clock.now()
-            send(self._process, self._ports, now)
+            send_due_frames(self._process, self._ports, now)
             if self._process.next_wake(now) < self._timer_due:
                 self._inbox.wake()
         except Exception as error:
@@ -306,12 +306,12 @@ def run_cycle(
 ) -> float:
     """The cycle that is due, over the readings since ``begin`` (s); returns their end, where the next one begins."""
     end = clock.now()
-    timing.add_duration(Stage.START, end - schedule.due)
+    timing.add_duration(CycleStage.START, end - schedule.due)
     timing.begin()
     process.on_cycle([begin], end)
     timing.begin()
-    send(process, ports, end)
-    timing.lap(Stage.SEND)
+    send_due_frames(process, ports, end)
+    timing.lap(CycleStage.SEND)
     now = clock.now()
     missed = schedule.finish(now)
     timing.end_cycle(now - end, missed, now)
@@ -320,7 +320,7 @@ def run_cycle(
     return end
 
 
-def send(process: Process, ports: Mapping[Side, Port], now: float) -> None:
+def send_due_frames(process: Process, ports: Mapping[Side, Port], now: float) -> None:
     """Put on the wire what is due; an end without a neighbour sends nothing."""
     for side, frame in process.take_frames(now):
         if side in ports:

@@ -1,4 +1,4 @@
-"""A process's end of a stepper, for a plain loop (``serve``) or an asyncio loop (``serve_stepped``).
+"""A process's end of a stepper, for a plain loop (``serve_steps``) or an asyncio loop (``serve_stepped``).
 
 Steps come and answers go by keys of the bus, or on a stream where the stepper is on the same machine.
 
@@ -17,11 +17,11 @@ from collections.abc import Callable, Mapping
 from functools import partial
 
 from telemetry import keys
-from telemetry.media.port import Frame, Port
+from telemetry.media.port import Port, PortFrame
 from telemetry.media.zenoh_bus import ZenohBus
 from telemetry.messages import Side, address_name
 from telemetry.runtime.inbox import Inbox
-from telemetry.runtime.process import Process
+from telemetry.runtime.process_interface import Process
 from telemetry.runtime.step_stream import StepStream
 from telemetry.runtime.stepped import Due, DueEvent, Sent, pack_done, run_step, unpack_step
 from telemetry.unwritten import Content
@@ -105,12 +105,12 @@ class StepEnd:
         number, events = step
         sent: list[Sent] = []
 
-        def send(what: Sent, frame: Frame) -> None:
+        def send(what: Sent, frame: PortFrame) -> None:
             if what.side in self._unheard:
                 self._unheard.discard(what.side)
                 wait_until_up(self._ports[what.side])
             # the stepper waits for every frame and in this order, so none may replace or overtake another
-            if self._ports[what.side].send(Frame(frame.payload)):
+            if self._ports[what.side].send(PortFrame(frame.payload)):
                 sent.append(what)
 
         wake_at = run_step(process, events, send)
@@ -215,7 +215,7 @@ def wait_until_up(port: Port) -> None:
         tick.wait(UP_TICK)
 
 
-def serve(process: Process, client: StepClient, report: Report = lambda line: None) -> None:
+def serve_steps(process: Process, client: StepClient, report: Report = lambda line: None) -> None:
     """Run ``process`` step by step until ``client.stop`` ends it; ``report`` takes a line when no first step comes.
 
     Raises
@@ -234,7 +234,7 @@ def serve(process: Process, client: StepClient, report: Report = lambda line: No
 
 
 async def serve_stepped(process: Process, client: AsyncStepClient, report: Report = lambda line: None) -> None:
-    """``serve`` on the running loop, whose other tasks get their turn between two steps.
+    """``serve_steps`` on the running loop, whose other tasks get their turn between two steps.
 
     Raises
     ------

@@ -15,9 +15,9 @@ from typing import Any, Final, NamedTuple
 import msgpack
 
 from telemetry.errors import MediumError
-from telemetry.media.port import Frame
+from telemetry.media.port import PortFrame
 from telemetry.messages import Side
-from telemetry.runtime.process import Process
+from telemetry.runtime.process_interface import Process
 from telemetry.unwritten import Content
 
 
@@ -82,19 +82,19 @@ def unpack_done(payload: bytes) -> tuple[int, list[Sent], float]:
 
 
 def run_step(
-    process: Process, events: Iterable[tuple[DueEvent, Content]], send: Callable[[Sent, Frame], None]
+    process: Process, events: Iterable[tuple[DueEvent, Content]], send: Callable[[Sent, PortFrame], None]
 ) -> float:
     """Hand ``process`` the events of a step and ``send`` what leaves it after each; returns its next timer (s)."""
     now = -math.inf
     for event, frame in events:
         now = event.at
-        dispatch(process, event, frame)
+        dispatch_event(process, event, frame)
         for side, outgoing in process.take_frames(now):
             send(Sent(side, now), outgoing)
     return process.next_wake(now)
 
 
-def dispatch(process: Process, event: DueEvent, frame: Content) -> None:
+def dispatch_event(process: Process, event: DueEvent, frame: Content) -> None:
     """Hand one event to the process; the data of a frame that came by radio are its margin (dB)."""
     kind, at, data = event
     side = SIDE_OF.get(kind)

@@ -17,7 +17,7 @@ SHORTEST = 1e-6  # s, upper edge of the first bin
 BIN_RATIO = 10.0 ** (1.0 / BINS_A_DECADE)
 
 
-class Stage(enum.Enum):
+class CycleStage(enum.Enum):
     """What is measured; behind it the number of the execution cycle's event (node specification section 1)."""
 
     SYNCHRONISE = "synchronise"  # 1: neighbours, hello, time request
@@ -81,7 +81,7 @@ class CycleTiming:
     """Durations of every stage of one process, its cycles and its overruns."""
 
     def __init__(self) -> None:
-        self.stages = {stage: Durations() for stage in Stage}
+        self.stages = {stage: Durations() for stage in CycleStage}
         self.cycles = 0
         self.overruns = 0  # cycles that had not ended when the next one was due
         self.missed = 0  # cycles that were therefore left out
@@ -92,19 +92,19 @@ class CycleTiming:
         """Start the watch that ``lap`` reads."""
         self._mark = time.perf_counter()
 
-    def lap(self, stage: Stage) -> None:
+    def lap(self, stage: CycleStage) -> None:
         """Give ``stage`` the time since the last ``begin`` or ``lap``."""
         now = time.perf_counter()
         self.stages[stage].add(now - self._mark)
         self._mark = now
 
-    def add_duration(self, stage: Stage, seconds: float) -> None:
+    def add_duration(self, stage: CycleStage, seconds: float) -> None:
         """Give ``stage`` a duration that was measured elsewhere."""
         self.stages[stage].add(seconds)
 
     def end_cycle(self, seconds: float, missed: int, now: float) -> None:
         """Count a cycle that took ``seconds`` and ended at ``now`` (s, own clock), ``missed`` deadlines later."""
-        self.stages[Stage.CYCLE].add(seconds)
+        self.stages[CycleStage.CYCLE].add(seconds)
         self.cycles += 1
         self.missed += missed
         self.overruns += missed > 0

@@ -23,7 +23,7 @@ FIELDS = struct.Struct("<HQIHH")  # tube, sequence, version, count, index
 KEY_SIZE = 32
 
 
-def seal(segment: BlockSegment, key: bytes) -> BlockSegment:
+def sealed_segment(segment: BlockSegment, key: bytes) -> BlockSegment:
     """The segment with its tag."""
     return replace(segment, tag=_tag(segment, key))
 

@@ -18,7 +18,7 @@ from typing import Any, NamedTuple
 
 import msgpack
 
-from telemetry.media.port import MAX_FRAME, Frame, Priority
+from telemetry.media.port import MAX_FRAME, PortFrame, Priority
 from telemetry.transport.nearest import Nearest
 from telemetry.unwritten import Content, Unwritten
 
@@ -202,16 +202,16 @@ class HopLink:
             entries = [(0, payload) for number, payload in entries if number == 0]
         return [payload for number, payload in entries if number == 0 or self._is_new(number, now)]
 
-    def take_frames(self, now: float) -> list[Frame]:
+    def take_frames(self, now: float) -> list[PortFrame]:
         """Frames that are due now."""
-        frames: list[Frame] = []
+        frames: list[PortFrame] = []
         if self._patient_until <= now:
             self.release(now)
         if not (self._best_effort or self._queue or self._outstanding or self._ack_due <= now):
             return frames  # as nearly always: it is asked after every event
         entries = self._due_entries(now)
         while len(entries) > 1:
-            count = bundled(entries, self.bundle_limit)
+            count = bundled_count(entries, self.bundle_limit)
             frames.append(self._build(entries[:count]))
             entries = entries[count:]
         if entries or self._ack_due <= now:
@@ -313,7 +313,7 @@ class HopLink:
             self._best_effort.clear()
         return entries
 
-    def _build(self, entries: list[Entry]) -> Frame:
+    def _build(self, entries: list[Entry]) -> PortFrame:
         self._frames += 1
         self._ack_due = math.inf
         self.counters["frames_sent"] += 1
@@ -321,9 +321,9 @@ class HopLink:
         header = Header(self._address, self.epoch, self._frames, peer_epoch, self._received, self._received_mask)
         if len(entries) == 1:  # as nearly always
             number, payload, priority, topic = entries[0]
-            return Frame(LinkFrame(header, [(number, payload)]), priority, None if topic is None else (topic,))
+            return PortFrame(LinkFrame(header, [(number, payload)]), priority, None if topic is None else (topic,))
         priority = min([entry.priority for entry in entries], default=Priority.COMMAND)
-        return Frame(LinkFrame(header, [entry[:2] for entry in entries]), priority, common_topic(entries))
+        return PortFrame(LinkFrame(header, [entry[:2] for entry in entries]), priority, common_topic(entries))
 
 
 def epoch_of(boot_count: int, session: int, address: int) -> int:
@@ -370,7 +370,7 @@ def common_topic(entries: Iterable[Entry]) -> Hashable | None:
     return None if None in topics else topics
 
 
-def bundled(entries: Iterable[Entry], limit: int) -> int:
+def bundled_count(entries: Iterable[Entry], limit: int) -> int:
     """How many of the first entries share a frame: at most ``limit`` bytes of them, but one in any case."""
     count = total = 0
     for entry in entries:

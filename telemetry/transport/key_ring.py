@@ -112,7 +112,7 @@ class KeyRing:
         return None if tube in self.revoked else found.keys.get(("block", tube))
 
 
-def derived(secret: Secret, purpose: str, *addresses: int, size: int = SEAL_KEY_SIZE) -> bytes:
+def derived_key(secret: Secret, purpose: str, *addresses: int, size: int = SEAL_KEY_SIZE) -> bytes:
     """Key of a purpose."""
     label = "|".join(["borechain keys 1", purpose, *map(str, addresses)])
     return hmac.digest(secret, label.encode(), "sha256")[:size]
@@ -121,18 +121,18 @@ def derived(secret: Secret, purpose: str, *addresses: int, size: int = SEAL_KEY_
 def keys_of(secret: Secret, address: int, revoked: Iterable[int] = ()) -> dict[tuple[str, int], bytes]:
     """Keys that the process ``address`` is given of a generation; none with those that are revoked."""
     if address == DEPTH_SOURCE:
-        return {("depth", 0): derived(secret, "depth")}
+        return {("depth", 0): derived_key(secret, "depth")}
     others = [other for other in ADDRESSES if other != address and other not in set(revoked)]
-    keys = {("joint", other): derived(secret, "joint", *sorted((address, other))) for other in others}
-    keys["call", 0] = derived(secret, "call")
-    keys["measurement", 0] = derived(secret, "measurement")
+    keys = {("joint", other): derived_key(secret, "joint", *sorted((address, other))) for other in others}
+    keys["call", 0] = derived_key(secret, "call")
+    keys["measurement", 0] = derived_key(secret, "measurement")
     tubes = [other for other in others if other != BASE] if address == BASE else [address]
     for tube in tubes:
-        keys["end", tube] = derived(secret, "end", tube)
+        keys["end", tube] = derived_key(secret, "end", tube)
         if tube != ENCODER:
-            keys["block", tube] = derived(secret, "block", tube, size=BLOCK_KEY_SIZE)
+            keys["block", tube] = derived_key(secret, "block", tube, size=BLOCK_KEY_SIZE)
     if address == BASE:
-        keys["depth", 0] = derived(secret, "depth")
+        keys["depth", 0] = derived_key(secret, "depth")
     return keys
 
 

@@ -7,14 +7,14 @@ import hashlib
 import msgpack
 
 from telemetry.messages import MAX_SEGMENTS, SEGMENT_SIZE, BlockSegment, BlockStatus, UploadPhase
-from telemetry.transport.authentication import seal
+from telemetry.transport.authentication import sealed_segment
 
 FIRST_RETRY = 10.0  # s
 LAST_RETRY = 60.0  # s
 UNTRUSTED_LIMIT = 3  # tags that the node found wrong, before the sender takes its key for the wrong one
 
 
-def split(block: bytes, tube: int, sequence: int, version: int, key: bytes) -> tuple[BlockSegment, ...]:
+def split_block(block: bytes, tube: int, sequence: int, version: int, key: bytes) -> tuple[BlockSegment, ...]:
     """Sealed segments of a block's bytes for ``tube``; ``sequence`` numbers the upload.
 
     Raises
@@ -27,7 +27,7 @@ def split(block: bytes, tube: int, sequence: int, version: int, key: bytes) -> t
         raise ValueError(f"block: expected 1..{MAX_SEGMENTS * SEGMENT_SIZE} bytes, got {len(block)}")
     digest = hashlib.sha256(block).digest()
     return tuple(
-        seal(BlockSegment(tube, sequence, version, digest, len(parts), index, part, b"\0" * 32), key)
+        sealed_segment(BlockSegment(tube, sequence, version, digest, len(parts), index, part, b"\0" * 32), key)
         for index, part in enumerate(parts)
     )
 

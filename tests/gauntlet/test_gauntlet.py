@@ -11,11 +11,11 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from borechain.cli.gauntlet.gauntlet import gauntlet
-from borechain.gauntlet.rig import WORLDS
-from borechain.gauntlet.run import ALL, USUAL, judged, run_seed
-from sim.gauntlet.kinds import KINDS
+from borechain.gauntlet.gauntlet_rig import WORLDS
+from borechain.gauntlet.gauntlet_run import ALL, USUAL, judge_seed, run_seed
+from sim.gauntlet.fault_kinds import KINDS
+from sim.gauntlet.faulty_world import MINUTE, FaultyWorld
 from sim.gauntlet.plan import drawn_kinds, steps_of
-from sim.gauntlet.world import MINUTE, FaultyWorld
 from sim.world.streams import stream
 from telemetry.messages import BASE, ENCODER
 
@@ -78,7 +78,7 @@ def test_seeds_hold_and_repeat_bit_for_bit(seed: int) -> None:
 def test_combined_seeds_hold(world: int, part: int) -> None:
     # whoever runs it works out one world, not all of them
     seeds = [seed for seed in range(1, COMBINED + 1) if seed % WORLDS == world][part::PARTS]
-    failed = [outcome for seed in seeds if (outcome := judged((seed, ALL, None, USUAL))).violations]
+    failed = [outcome for seed in seeds if (outcome := judge_seed((seed, ALL, None, USUAL))).violations]
     assert [(outcome.seed, outcome.kinds, outcome.violations) for outcome in failed] == []
 
 
@@ -176,7 +176,7 @@ def test_seeds_of_a_string_that_is_drilled_in_hold(seed: int) -> None:
 def test_two_thousand_seeds_hold(plan: str, count: int, block: int) -> None:
     first = 10_000 + count * block
     failed = [
-        outcome for seed in range(first, first + count) if (outcome := judged((seed, ALL, None, plan))).violations
+        outcome for seed in range(first, first + count) if (outcome := judge_seed((seed, ALL, None, plan))).violations
     ]
     assert [(outcome.seed, outcome.kinds, outcome.violations) for outcome in failed] == []
 

@@ -8,8 +8,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from borechain.gauntlet import rig as gauntlet_rig
-from borechain.gauntlet.run import run_seed, shrink
+from borechain.gauntlet import gauntlet_rig as gauntlet_rig
+from borechain.gauntlet.gauntlet_run import run_seed, shrink_outcome
 from groundstation.errors import StoreError
 from groundstation.service.disk import database
 from groundstation.service.disk.keeper import Keeper
@@ -24,10 +24,10 @@ from node.firmware.settings import TubeSettings
 from node.process import counter as counter_module
 from node.process.command_handlers import CommandHandlers
 from node.process.tube_process import TubeProcess
-from sim.gauntlet.disk import FaultyDisk
-from telemetry.application.answers import KEPT, Answers
+from sim.gauntlet.faulty_disk import FaultyDisk
 from telemetry.application.clock import ClockFilter
-from telemetry.application.mail import Mail
+from telemetry.application.end_to_end import EndToEndDelivery
+from telemetry.application.order_answers import KEPT, Answers
 from telemetry.application.outbox import LIMIT, Outbox, Parcel
 from telemetry.messages import (
     BASE,
@@ -56,7 +56,7 @@ def seeds(*kinds: str, first: int = 1, count: int = 12) -> Found:
         for seed in range(first, first + count):
             outcome = run_seed(seed, kinds=kinds)
             if outcome.violations:
-                worst = shrink(outcome)
+                worst = shrink_outcome(outcome)
                 assert worst.schedule
                 return worst.violations[0]
         return ""
@@ -130,7 +130,7 @@ def order_of_string_not_kept(patch: pytest.MonkeyPatch) -> None:
 
 
 def receipt_by_number(patch: pytest.MonkeyPatch) -> None:
-    patch.setattr(Mail, "_settle", lambda mail, receipt: mail._outbox.settle(receipt.sequence))
+    patch.setattr(EndToEndDelivery, "_settle", lambda mail, receipt: mail._outbox.settle(receipt.sequence))
 
 
 def order_not_saved(patch: pytest.MonkeyPatch) -> None:
@@ -245,9 +245,9 @@ def a_receipt_of_other_content_settles_nothing(folder: Path) -> str:
 
 
 def the_order_of_the_string_outlives_the_ground_station(folder: Path) -> str:
-    gauntlet_rig.started.cache_clear()  # what the disks hold at the start was made by the product as it was
+    gauntlet_rig.started_world.cache_clear()  # what the disks hold at the start was made by the product as it was
     rig = gauntlet_rig.new_rig("minute", 1, folder)
-    gauntlet_rig.started.cache_clear()
+    gauntlet_rig.started_world.cache_clear()
     rig.scheduler.advance(rig.world.begin + gauntlet_rig.RESTED + 10.0)
     assert rig.ground is not None
     before = list(rig.ground.model.string.tally.tubes)

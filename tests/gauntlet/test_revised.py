@@ -4,8 +4,8 @@ from pathlib import Path
 
 import pytest
 
-from borechain.gauntlet.oracles import Observer, violations
-from borechain.gauntlet.rig import GauntletRig, new_rig
+from borechain.gauntlet.gauntlet_rig import GauntletRig, new_rig
+from borechain.gauntlet.oracles import Observer, find_violations
 from telemetry.messages import BASE, ENCODER
 
 UNHEARD_FROM, SURVEYED = -8.0, 23.0  # s from the stop on
@@ -37,5 +37,5 @@ def test_a_survey_is_said_again_when_the_encoder_is_heard_in_the_same_rest(tmp_p
         assert row["sigma_yaw_deg"] < 0.05
     assert untrusted(rig) == []
     assert not observer.found
-    assert not violations(rig)
+    assert not find_violations(rig)
     rig.close()

@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 from pathlib import Path
 
-from borechain.recording.files import RecordingWriter, Sample
+from borechain.recording.recording_file import RecordedSample, RecordingWriter
 from groundstation.service.answers.paths import schemas
 from groundstation.service.process.ground_process import GroundProcess
 from groundstation.service.process.intake_tape import BEGIN, Intake, pack_intake
@@ -27,6 +27,6 @@ def write(path: Path, ground: GroundProcess) -> None:
     """A recording of all that is on the tape, and of some answers."""
     with RecordingWriter(path, "rig-1", shown()) as writer:
         for k, event in enumerate([begin_of(ground), *ground.tape.events]):
-            writer.write(Sample(INTAKE, 1_000 + k, pack_intake(event)))
+            writer.write(RecordedSample(INTAKE, 1_000 + k, pack_intake(event)))
         for path_of in ("status", "verdict", "nodes/1", "stations/1"):
-            writer.write(Sample(KEY + path_of, 9_000, json.dumps(ground.operator.ask(path_of)).encode()))
+            writer.write(RecordedSample(KEY + path_of, 9_000, json.dumps(ground.operator.ask(path_of)).encode()))

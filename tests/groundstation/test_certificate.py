@@ -3,15 +3,15 @@
 import json
 from datetime import date
 
-from groundstation.report.certificate import Identity, certificate, pages, source, typeset
-from groundstation.report.panels import Panel
-from groundstation.report.sheet import Sheet, Table, column, number
+from groundstation.report.certificate import Identity, certificate_pdf, template_data, typeset_pdf, typeset_png_pages
+from groundstation.report.figure_panels import Panel
+from groundstation.report.sheet import Sheet, SheetTable, column_texts, number_text
 
 RECORD, BLOCK = "ab" * 32, "cd" * 32
 SHEET = Sheet(
     "Calibration of *nothing* #1",
     (("Method", "[none] $x$ \\ @a"),),
-    (Table("Matrix", ("", "x"), [("x", number(-0.5, 3))]),),
+    (SheetTable("Matrix", ("", "x"), [("x", number_text(-0.5, 3))]),),
     ("a warning",),
 )
 IDENTITY = Identity("Tube 7", date(2024, 5, 31), "record.csv", RECORD, BLOCK, "0.1.0")
@@ -19,7 +19,7 @@ PANELS = (Panel("A line", 1.0, lambda part: part.subplots().plot([0.0, 1.0])),)
 
 
 def test_it_holds_both_hashes_the_day_and_the_software() -> None:
-    held = json.loads(source(SHEET, PANELS, IDENTITY))
+    held = json.loads(template_data(SHEET, PANELS, IDENTITY))
     assert held["record_sha256"] == RECORD
     assert held["block_sha256"] == BLOCK
     assert (held["day"], held["software"], held["subject"]) == ("2024-05-31", "0.1.0", "Tube 7")
@@ -27,19 +27,19 @@ def test_it_holds_both_hashes_the_day_and_the_software() -> None:
 
 
 def test_the_same_content_gives_the_same_bytes_and_another_day_gives_others() -> None:
-    first = certificate(SHEET, PANELS, IDENTITY)
+    first = certificate_pdf(SHEET, PANELS, IDENTITY)
     assert first.startswith(b"%PDF")
-    assert first == certificate(SHEET, PANELS, IDENTITY)
-    assert first != typeset(source(SHEET, PANELS, IDENTITY), date(2024, 6, 1))
+    assert first == certificate_pdf(SHEET, PANELS, IDENTITY)
+    assert first != typeset_pdf(template_data(SHEET, PANELS, IDENTITY), date(2024, 6, 1))
 
 
 def test_what_looks_like_markup_is_text_and_a_block_may_be_absent() -> None:
     bare = Identity("#panic()", date(2024, 5, 31), "*.csv", RECORD, None, "0.1.0")
-    (page,) = pages(source(SHEET, (), bare), bare.day)
+    (page,) = typeset_png_pages(template_data(SHEET, (), bare), bare.day)
     assert page.startswith(b"\x89PNG")
 
 
 def test_numbers_have_a_true_minus_and_columns_equal_decimals() -> None:
-    assert number(-0.0001234567, 3) == "\N{MINUS SIGN}0.000123"
-    assert column([-6.66e-16, 0.0159, -0.0141]) == ["0.0000", "0.0159", "\N{MINUS SIGN}0.0141"]
-    assert column([0.0]) == ["0.000"]
+    assert number_text(-0.0001234567, 3) == "\N{MINUS SIGN}0.000123"
+    assert column_texts([-6.66e-16, 0.0159, -0.0141]) == ["0.0000", "0.0159", "\N{MINUS SIGN}0.0141"]
+    assert column_texts([0.0]) == ["0.000"]

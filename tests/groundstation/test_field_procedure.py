@@ -11,7 +11,7 @@ from memory_rig import Rig
 from schemas import check_answer
 
 from groundstation.calibration.attitudes import true_vectors
-from groundstation.calibration.block import read
+from groundstation.calibration.block import read_calibration
 from groundstation.errors import SelectorError
 from groundstation.service.answers import key_fields
 from groundstation.service.orders.recalibration.procedure import FieldProcedure, Request
@@ -90,7 +90,7 @@ def check(rig: Field) -> None:
         assert row["hash"] == row["hash_proposed"] == process.tube.parameters.sha256().hex()
         np.testing.assert_allclose(row["accelerometer"]["matrix"], MATRIX, atol=1e-9)
         np.testing.assert_allclose(row["accelerometer"]["bias_mps2"], BIAS, atol=1e-9)
-        kept = read(rig.ground.config.calibrations / f"field-{row['tube']}-v{row['version']}.json")
+        kept = read_calibration(rig.ground.config.calibrations / f"field-{row['tube']}-v{row['version']}.json")
         np.testing.assert_allclose(kept.matrix, MATRIX, atol=1e-9)
 
 

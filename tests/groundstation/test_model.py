@@ -18,7 +18,7 @@ from groundstation.errors import SelectorError
 from groundstation.service.answers import alarm_views, column_views
 from groundstation.service.answers.model import RigModel
 from groundstation.service.string.stored import Stored
-from groundstation.survey.fusion.resolve import angles
+from groundstation.survey.fusion.resolve import direction_angles
 from groundstation.survey.well.ellipsoid import plan_ellipse
 from telemetry.messages import ImuMean, NodeFlag, SurveyMeasurement
 
@@ -66,7 +66,7 @@ def knowing(tmp_path: Path, measurements: list[Placed], tubes: int = 0, **settin
 
 def inclination_deg(model: RigModel, station: int) -> float:
     fused = model.hole.direction_of(model.hole.stations[station])
-    return angles(fused.lean, fused.down)[0] / DEG
+    return direction_angles(fused.lean, fused.down)[0] / DEG
 
 
 def test_readings_of_a_hole_that_stays_all_count(tmp_path: Path) -> None:

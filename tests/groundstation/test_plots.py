@@ -16,17 +16,17 @@ from matplotlib.figure import Figure
 
 from groundstation.errors import SurveyError
 from groundstation.report import plots, plots_wall, style
-from groundstation.report.plots_wall import band_of_thickness, joint_name, ranking
+from groundstation.report.plots_wall import band_of_thickness, joint_name, thinness_ranking
 from groundstation.survey.files.survey_records import DisplacementRule, read_record
 from groundstation.survey.fusion.fusion import POWERS, sequence_weights
 from groundstation.survey.tools.instruments import load_tool
-from groundstation.survey.wall.as_built import Columns, State
-from groundstation.survey.wall.column_deviation import PRESETS, Design
-from groundstation.survey.wall.column_joint import probability_beyond, thickness
-from groundstation.survey.wall.wall_joints import Joints, extra_column, joints, neighbours_in_line, worst
-from groundstation.survey.well.error_propagation import propagate
-from groundstation.survey.well.error_sources import Leg, Site, Survey
-from groundstation.survey.well.methods import Method, positions
+from groundstation.survey.wall.as_built import Columns, ColumnState
+from groundstation.survey.wall.column_deviation import PRESETS, ColumnDesign
+from groundstation.survey.wall.column_joint import joint_thickness, probability_beyond
+from groundstation.survey.wall.wall_joints import Joints, extra_column, judge_joints, neighbours_in_line, worst_joint
+from groundstation.survey.well.error_propagation import propagate_errors
+from groundstation.survey.well.error_sources import Leg, Site, WellSurvey
+from groundstation.survey.well.methods import Method, station_positions
 from sim.studies.coverage.figure import coverage_figure
 from sim.studies.region_of_uncertainty.figure import azimuth_error_figure, uncertainty_figure
 from sim.studies.weighting.figure import weighting_figure
@@ -55,24 +55,24 @@ INSTRUMENTS = ("rst-inclinometer", "vectornav-100t", "stim300", "ipst-rqh")
 
 
 @pytest.fixture(scope="module")
-def bore(tmp_path_factory: pytest.TempPathFactory) -> Survey:
+def bore(tmp_path_factory: pytest.TempPathFactory) -> WellSurvey:
     file = tmp_path_factory.mktemp("record") / "potsdam.csv"
     file.write_text(POTSDAM)
     record = read_record(file, DisplacementRule.THESIS)
-    place = positions(Method.BALANCED_TANGENTIAL, record.md, record.inclination, record.azimuth)
-    return Survey(record.md, record.inclination, record.azimuth, place[:, 2])
+    place = station_positions(Method.BALANCED_TANGENTIAL, record.md, record.inclination, record.azimuth)
+    return WellSurvey(record.md, record.inclination, record.azimuth, place[:, 2])
 
 
-def covariances(bore: Survey, name: str, *without: str) -> np.ndarray:
-    return propagate(bore, [Leg(load_tool(name).without(*without))], Site()).cov
+def covariances(bore: WellSurvey, name: str, *without: str) -> np.ndarray:
+    return propagate_errors(bore, [Leg(load_tool(name).without(*without))], Site()).cov
 
 
-def survey_of(bore: Survey, design: Design | None = None, name: str = "vectornav-100t") -> Figure:
-    place = positions(Method.BALANCED_TANGENTIAL, bore.md, bore.inclination, bore.azimuth)
+def survey_of(bore: WellSurvey, design: ColumnDesign | None = None, name: str = "vectornav-100t") -> Figure:
+    place = station_positions(Method.BALANCED_TANGENTIAL, bore.md, bore.inclination, bore.azimuth)
     return plots.survey_figure(bore.md, place, covariances(bore, name), 0.95, "Bore 1, Potsdam", design)
 
 
-def uncertainty_of(bore: Survey) -> Figure:
+def uncertainty_of(bore: WellSurvey) -> Figure:
     found = {}
     for name in INSTRUMENTS:
         stds = 200.0 * np.sqrt(np.diagonal(covariances(bore, name), axis1=1, axis2=2))[1:]
@@ -80,7 +80,7 @@ def uncertainty_of(bore: Survey) -> Figure:
     return uncertainty_figure(found, "Uncertainty of bore 1", ("B", "A", "TVD"))
 
 
-def azimuth_error_of(bore: Survey) -> Figure:
+def azimuth_error_of(bore: WellSurvey) -> Figure:
     found = {}
     for name in INSTRUMENTS:
         lateral = [
@@ -123,18 +123,18 @@ def made_wall(
     covs = np.einsum("z,ij->zij", (0.003 + spread * depths / 30.0) ** 2, np.diag([1.0, 1.5]))
     names = [f"P{k + 1:02d}" for k in range(count)]
     columns = Columns.surveyed(names, depths, centres, np.broadcast_to(covs, (count, *covs.shape)), heads, 0.6)
-    return columns, joints(columns, neighbours_in_line(count, closed=False), 0.8)
+    return columns, judge_joints(columns, neighbours_in_line(count, closed=False), 0.8)
 
 
 def wall_of(shade: str = "probability", **wall: Any) -> Figure:
     columns, found = made_wall(**wall)
-    extra = extra_column(columns, found, worst(found)[0], 0.8)
+    extra = extra_column(columns, found, worst_joint(found)[0], 0.8)
     return plots_wall.wall_figure(columns, found, 0.8, extra, "Wall A", shade=shade)
 
 
-BUILDERS: dict[str, Callable[[Survey], Figure]] = {
+BUILDERS: dict[str, Callable[[WellSurvey], Figure]] = {
     "survey": survey_of,
-    "survey_design": lambda bore: survey_of(bore, Design("P01", length=20.0)),
+    "survey_design": lambda bore: survey_of(bore, ColumnDesign("P01", length=20.0)),
     "uncertainty": uncertainty_of,
     "azimuth_error": azimuth_error_of,
     "weighting": lambda _: weighting_of(),
@@ -158,11 +158,11 @@ def drawn(axes: Axes, gid: str) -> list:
 
 @pytest.mark.slow
 @pytest.mark.parametrize("name", variants_in_study())
-def test_a_figure_is_the_same_bytes_twice_and_has_no_date(name: str, bore: Survey, tmp_path: Path) -> None:
+def test_a_figure_is_the_same_bytes_twice_and_has_no_date(name: str, bore: WellSurvey, tmp_path: Path) -> None:
     for suffix in (".png", ".svg") if name == "coverage" else (".svg",):
         files = [tmp_path / f"{k}{suffix}" for k in range(2)]
         for file in files:
-            style.save(BUILDERS[name](bore), file)
+            style.save_figure(BUILDERS[name](bore), file)
         first, second = (file.read_bytes() for file in files)
         assert len(first) > 10_000
         assert first == second
@@ -181,7 +181,7 @@ def test_a_figure_is_the_same_bytes_twice_and_has_no_date(name: str, bore: Surve
         ("wall", 4, 4),  # joints have names; the colours a label of their own
     ],
 )
-def test_labels_say_what_is_shown_and_its_unit(name: str, across: int, up: int, bore: Survey) -> None:
+def test_labels_say_what_is_shown_and_its_unit(name: str, across: int, up: int, bore: WellSurvey) -> None:
     axes = BUILDERS[name](bore).axes
     labels = [[a.get_xlabel() for a in axes if a.get_xlabel()], [a.get_ylabel() for a in axes if a.get_ylabel()]]
     assert [len(found) for found in labels] == [across, up]
@@ -205,7 +205,7 @@ def visible_texts(figure: Figure) -> list[tuple[str, np.ndarray]]:
 
 @pytest.mark.slow
 @pytest.mark.parametrize("name", variants_in_study())
-def test_no_text_lies_on_another_or_beyond_the_page(name: str, bore: Survey) -> None:
+def test_no_text_lies_on_another_or_beyond_the_page(name: str, bore: WellSurvey) -> None:
     from matplotlib.backends.backend_agg import FigureCanvasAgg
 
     figure = BUILDERS[name](bore)
@@ -235,7 +235,7 @@ def hidden_ticks(axis: matplotlib.axis.Axis) -> list[np.ndarray]:
     return out
 
 
-def test_survey_figure_has_an_ellipse_for_every_station_below_the_collar_in_each_view(bore: Survey) -> None:
+def test_survey_figure_has_an_ellipse_for_every_station_below_the_collar_in_each_view(bore: WellSurvey) -> None:
     figure = survey_of(bore)
     plan, stds, north, east = figure.axes
     assert [len(drawn(axes, "ellipse")) for axes in (plan, north, east, stds)] == [10, 10, 10, 0]
@@ -246,7 +246,7 @@ def test_survey_figure_has_an_ellipse_for_every_station_below_the_collar_in_each
     assert north.get_aspect() == east.get_aspect()
 
 
-def test_the_plan_has_east_to_the_right_and_the_ellipse_its_size(bore: Survey) -> None:
+def test_the_plan_has_east_to_the_right_and_the_ellipse_its_size(bore: WellSurvey) -> None:
     place = np.array([[0.0, 0.0, 0.0], [0.1, 0.3, 10.0]])
     covs = np.zeros((2, 3, 3))
     covs[1] = np.diag([0.01, 0.04, 0.02]) ** 2
@@ -257,33 +257,33 @@ def test_the_plan_has_east_to_the_right_and_the_ellipse_its_size(bore: Survey) -
 
 
 @pytest.mark.slow
-def test_exaggeration_in_the_label_is_that_of_the_drawing(bore: Survey, tmp_path: Path) -> None:
+def test_exaggeration_in_the_label_is_that_of_the_drawing(bore: WellSurvey, tmp_path: Path) -> None:
     figure = survey_of(bore)
-    style.save(figure, tmp_path / "a.png")
+    style.save_figure(figure, tmp_path / "a.png")
     north = figure.axes[2]
     factor = float(re.search(r"exaggerated (\d+) times", north.get_xlabel())[1])
     across, down = (north.transData.transform(p) - north.transData.transform((0.0, 0.0)) for p in ((100.0, 0), (0, 1)))
     assert across[0] / abs(down[1]) == pytest.approx(factor)  # a metre is 100 of the unit across and 1 down
 
 
-def test_ticks_of_a_logarithmic_axis_are_plain_short_numbers(bore: Survey) -> None:
+def test_ticks_of_a_logarithmic_axis_are_plain_short_numbers(bore: WellSurvey) -> None:
     axis = survey_of(bore).axes[1].yaxis
     assert [axis.get_major_formatter()(10.0**k) for k in (-5, -1, 0, 2)] == ["0.00001", "0.1", "1", "100"]
     assert axis.get_major_formatter()(9.999999999999999e-06) == "0.00001"
 
 
-def test_toe_out_of_tolerance_is_the_only_strong_colour(bore: Survey) -> None:
-    def strong(design: Design) -> bool:
+def test_toe_out_of_tolerance_is_the_only_strong_colour(bore: WellSurvey) -> None:
+    def strong(design: ColumnDesign) -> bool:
         return any(line.get_color() == style.WRONG for line in survey_of(bore, design).axes[0].lines)
 
-    assert strong(Design(length=20.0, tolerance=PRESETS["en-12716"]))
-    assert not strong(Design(length=20.0, inclination=np.radians(1.65), azimuth=np.radians(255.0)))
+    assert strong(ColumnDesign(length=20.0, tolerance=PRESETS["en-12716"]))
+    assert not strong(ColumnDesign(length=20.0, inclination=np.radians(1.65), azimuth=np.radians(255.0)))
 
 
-def test_many_stations_keep_few_ellipses_and_the_last(bore: Survey) -> None:
+def test_many_stations_keep_few_ellipses_and_the_last(bore: WellSurvey) -> None:
     md = np.linspace(0.0, 1000.0, 1001)
     inclination, azimuth = np.linspace(0.0, 1.2, 1001), np.full(1001, 0.7)
-    place = positions(Method.MINIMUM_CURVATURE, md, inclination, azimuth)
+    place = station_positions(Method.MINIMUM_CURVATURE, md, inclination, azimuth)
     covs = np.einsum("n,ij->nij", (1e-3 * md) ** 2, np.eye(3))
     figure = plots.survey_figure(md, place, covs, 0.95, "long")
     ellipses = drawn(figure.axes[0], "ellipse")
@@ -292,7 +292,7 @@ def test_many_stations_keep_few_ellipses_and_the_last(bore: Survey) -> None:
     assert "exaggerated" not in figure.axes[2].get_xlabel()
 
 
-def test_printed_values_are_dots_and_ours_lines(bore: Survey) -> None:
+def test_printed_values_are_dots_and_ours_lines(bore: WellSurvey) -> None:
     figure = uncertainty_of(bore)
     assert len(figure.axes) == 3
     for axes in figure.axes:
@@ -339,7 +339,7 @@ def test_coverage_marks_what_is_outside_the_band() -> None:
 
 def test_wall_figure_shows_the_worst_joint_its_columns_and_the_extra_one() -> None:
     columns, found = made_wall()
-    joint, depth = worst(found)
+    joint, depth = worst_joint(found)
     assert joint_name(columns, found, joint) == "P06–P07"
     figure = wall_of()
     over_depth, shades, plan, zoom = figure.axes[:4]
@@ -355,7 +355,7 @@ def test_wall_figure_shows_the_worst_joint_its_columns_and_the_extra_one() -> No
 @pytest.mark.parametrize("shade", ["probability", "thickness"])
 def test_what_is_missing_is_red_in_every_panel(shade: str) -> None:
     columns, found = made_wall(lean=0.0, spread=0.0, short=3)
-    joint, depth = worst(found)
+    joint, depth = worst_joint(found)
     assert (joint_name(columns, found, joint), columns.depths[depth]) == ("P03–P04", 18.5)
     _, shades, plan, zoom = wall_of(shade, lean=0.0, spread=0.0, short=3).axes[:4]
     assert "crossed: missing" in shades.get_title("left")
@@ -370,9 +370,9 @@ def test_what_is_missing_is_red_in_every_panel(shade: str) -> None:
 def test_what_is_not_surveyed_is_hatched() -> None:
     columns, _ = made_wall(lean=0.0, spread=0.0)
     states = columns.states.copy()
-    states[5, columns.depths > 20.0] = State.UNSURVEYED
+    states[5, columns.depths > 20.0] = ColumnState.UNSURVEYED
     columns = replace(columns, states=states)
-    found = joints(columns, neighbours_in_line(12, closed=False), 0.8)
+    found = judge_joints(columns, neighbours_in_line(12, closed=False), 0.8)
     shades = plots_wall.wall_figure(columns, found, 0.8, None, "Wall A").axes[1]
     assert len(drawn(shades, "unsurveyed")) == 2
     assert "hatched: not surveyed" in shades.get_title("left")
@@ -386,15 +386,15 @@ def test_a_good_wall_is_grey() -> None:
 
 def test_band_of_thickness_holds_its_share_of_sampled_walls() -> None:
     columns, found = made_wall()
-    joint, depth = worst(found)
+    joint, depth = worst_joint(found)
     a, b = found.pairs[joint]
     rng = np.random.default_rng(1)
     cov = columns.covs[a, depth] + columns.covs[b, depth]
     apart = (columns.centres[b] - columns.centres[a])[depth] + rng.multivariate_normal(np.zeros(2), cov, 40_000)
-    thick = thickness(np.hypot(*apart.T), 0.6)
-    low, high = (thickness(d, 0.6)[depth] for d in band_of_thickness(columns, found, joint))
+    thick = joint_thickness(np.hypot(*apart.T), 0.6)
+    low, high = (joint_thickness(d, 0.6)[depth] for d in band_of_thickness(columns, found, joint))
     assert np.mean((thick > low) & (thick < high)) == pytest.approx(0.95, abs=0.006)
-    assert ranking(found)[0] == joint
+    assert thinness_ranking(found)[0] == joint
     limit = 2.0 * np.sqrt(0.6**2 - 0.4**2)
     assert found.probability[joint, depth] == pytest.approx(
         probability_beyond((columns.centres[b] - columns.centres[a])[depth], cov, limit)
@@ -417,7 +417,7 @@ def test_survey_figure_refuses_arrays_that_do_not_fit() -> None:
 def test_save_is_whole_or_not_at_all(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     figure = coverage_of()
     file = tmp_path / "plot.svg"
-    style.save(figure, file)
+    style.save_figure(figure, file)
     good = file.read_bytes()
     assert [p.name for p in tmp_path.iterdir()] == ["plot.svg"]
 
@@ -426,7 +426,7 @@ def test_save_is_whole_or_not_at_all(tmp_path: Path, monkeypatch: pytest.MonkeyP
 
     monkeypatch.setattr(figure, "savefig", breaks)
     with pytest.raises(SurveyError, match=r"plot\.svg: No space left"):
-        style.save(figure, file)
+        style.save_figure(figure, file)
     assert file.read_bytes() == good
     assert [p.name for p in tmp_path.iterdir()] == ["plot.svg"]
 
@@ -435,7 +435,7 @@ def test_save_is_whole_or_not_at_all(tmp_path: Path, monkeypatch: pytest.MonkeyP
 def test_an_unknown_suffix_names_the_known_and_leaves_the_old_file(name: str, tmp_path: Path) -> None:
     (tmp_path / name).write_text("old")
     with pytest.raises(SurveyError, match=r"expected one of \.pdf, \.png, \.svg"):
-        style.save(coverage_of(), tmp_path / name)
+        style.save_figure(coverage_of(), tmp_path / name)
     assert (tmp_path / name).read_text() == "old"
     assert [p.name for p in tmp_path.iterdir()] == [name]
 
@@ -443,7 +443,7 @@ def test_an_unknown_suffix_names_the_known_and_leaves_the_old_file(name: str, tm
 @pytest.mark.slow
 def test_pdf_is_the_same_bytes_twice_and_a_missing_folder_is_named(tmp_path: Path) -> None:
     for name in ("a.pdf", "b.PDF"):
-        style.save(weighting_of(), tmp_path / name)
+        style.save_figure(weighting_of(), tmp_path / name)
     assert (tmp_path / "a.pdf").read_bytes() == (tmp_path / "b.PDF").read_bytes()
     with pytest.raises(SurveyError, match=r"nowhere.*expected a folder"):
-        style.save(weighting_of(), tmp_path / "nowhere" / "a.pdf")
+        style.save_figure(weighting_of(), tmp_path / "nowhere" / "a.pdf")

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from memory_rig import NOISELESS, Rig
 
-from groundstation.calibration.attitudes import fit
+from groundstation.calibration.attitudes import fit_attitudes
 from groundstation.calibration.block import Calibration, Provenance
 from groundstation.config import GroundConfig
 from groundstation.errors import ConfigurationError
@@ -294,7 +294,7 @@ def test_an_accelerometer_is_calibrated_from_the_surface_end_to_end(rig: Rig) ->
         rig.run(12.0, lambda: len(rig.ground.model.string.static_records) > len(readings))
         readings.append(rig.ground.model.string.static_records[-1])
     assert not any(record.moved for record in readings)
-    solved = fit(ATTITUDES, np.array([record.force for record in readings]))
+    solved = fit_attitudes(ATTITUDES, np.array([record.force for record in readings]))
     zeros = np.zeros((0, 3, 3)), np.zeros((0, 3))
     day = Provenance(
         "0" * 64, "2024-05-31", "8 attitudes", solved.residual_rms(), np.zeros((3, 3)), np.zeros(3), *zeros

@@ -10,7 +10,7 @@ import pytest
 from forked_commands import run
 
 from groundstation.report.column_report import ColumnRecord, column_report
-from groundstation.report.document import Document, Origin, Section, report_pages, report_pdf
+from groundstation.report.document import Document, Origin, ReportSection, report_pages, report_pdf
 from groundstation.report.wall_report import column_records, site_of, wall_report
 from groundstation.survey.wall.wall_file import Wall, judge_wall, read_wall
 from groundstation.survey.wall.wall_verdict import Judgement
@@ -64,7 +64,7 @@ def origin_of(wall: Wall) -> Origin:
     return Origin(DAY, "1.2.3", [("SHA-256 of wall.toml", hashlib.sha256(wall.file.path.read_bytes()).hexdigest())])
 
 
-def section(document: Document, title: str) -> Section:
+def section(document: Document, title: str) -> ReportSection:
     return next(s for s in document.sections if s.title.startswith(title))
 
 
@@ -178,7 +178,7 @@ def test_the_same_records_give_the_same_bytes_on_as_many_pages(judged: tuple[Wal
 def test_names_that_look_like_markup_are_set_as_they_are() -> None:
     nasty = '#panic(1) *a* $x$ @ref <b> \\ "'
     document = Document(
-        "k", nasty, nasty, nasty, True, [(nasty, nasty)], [Section(nasty, [nasty])], Origin(DAY, "1", [])
+        "k", nasty, nasty, nasty, True, [(nasty, nasty)], [ReportSection(nasty, [nasty])], Origin(DAY, "1", [])
     )
     assert report_pdf(document).startswith(b"%PDF-")
 

@@ -17,7 +17,7 @@ from groundstation.service.answers.model import RigModel
 from groundstation.service.hole.resolved_stops import ResolvedStop, ResolvedStops
 from groundstation.service.hole.resolving import Resolver
 from groundstation.service.hole.station import StationStops
-from groundstation.survey.fusion.resolve import Quality, angle_stds, angles
+from groundstation.survey.fusion.resolve import Quality, angle_stds, direction_angles
 from groundstation.survey.fusion.shared import SharedErrors
 from groundstation.survey.fusion.survey_trust import Trust
 from telemetry.messages import ImuMean, NodeFlag, SurveyMeasurement
@@ -110,7 +110,7 @@ def test_what_is_shown_of_many_surveys_is_what_each_of_them_says() -> None:
     rows = [table.append_stop(one, 0) for one in found]
     shown = measurement_rows(table, rows[::-1], [3, 1, 1, 2, 9])
     for view, one, station in zip(shown, known[::-1], (3, 1, 1, 2, 9), strict=True):
-        inclination, azimuth = angles(one.lean, one.down)
+        inclination, azimuth = direction_angles(one.lean, one.down)
         stds = angle_stds(one.lean, one.down, one.total_cov)
         assert (view["seq"], view["tube"], view["station"], view["md_m"]) == (one.number, one.tube, station, one.md)
         assert (view["inclination_deg"], view["azimuth_deg"]) == (math.degrees(inclination), math.degrees(azimuth))

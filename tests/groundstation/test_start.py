@@ -8,7 +8,7 @@ import pytest
 
 from borechain.load.crowd import ROUND_S
 from borechain.load.day import ADVANCES, BEGUN_AT, depth_of, write_day
-from borechain.load.learning import ASKED, Hearing, measure_learning
+from borechain.load.learning import ASKED, LearningLoad, measure_learning
 from groundstation.config import GroundConfig
 from groundstation.service.answers.model import RigModel
 from groundstation.service.answers.paths import find
@@ -30,7 +30,7 @@ def test_a_start_knows_to_the_last_byte_what_was_known_before_it(tmp_path: Path)
     """Surveys of a stop that came together, one by one, and with somebody asking after each of them."""
     config = GroundConfig(folder=tmp_path, tube_length=2.0, target=40.0)
     stored = write_day(config.url, STOPS, TUBES)
-    hearing = Hearing(config, TUBES, BEGUN_AT + ROUND_S * (STOPS + 1))
+    hearing = LearningLoad(config, TUBES, BEGUN_AT + ROUND_S * (STOPS + 1))
     taken = 0
     for stop, learn in enumerate((hearing.learn_together, hearing.learn_alone, hearing.learn_asked) * 2, 1):
         md = depth_of(TUBES, ADVANCES + (stop - 1) // 3)

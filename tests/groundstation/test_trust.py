@@ -14,7 +14,7 @@ from groundstation.config import GroundConfig
 from groundstation.service.answers import views
 from groundstation.service.answers.model import RigModel
 from groundstation.survey.fusion.fusion import Weighting
-from groundstation.survey.fusion.resolve import angles, resolve
+from groundstation.survey.fusion.resolve import direction_angles, resolve_direction
 from groundstation.survey.fusion.survey_trust import (
     EFFECTS,
     UNKNOWN_YAW_VAR,
@@ -118,11 +118,11 @@ def test_a_further_flag_never_gains_trust(one: int, other: int) -> None:
 @settings(suppress_health_check=[HealthCheck.function_scoped_fixture])
 def test_whatever_the_yaw_is_the_truth_is_within_the_uncertainty(yaw_error_deg: float, inclination_deg: float) -> None:
     force = force_at(inclination_deg)
-    true = resolve(force, np.array(COV), 0.0, 1e-8).direction
-    seen = with_unknown_yaw(resolve(force, np.array(COV), yaw_error_deg * DEG, 1e-8)).direction
+    true = resolve_direction(force, np.array(COV), 0.0, 1e-8).direction
+    seen = with_unknown_yaw(resolve_direction(force, np.array(COV), yaw_error_deg * DEG, 1e-8)).direction
     off = seen.lean - true.lean
     assert math.sqrt(off @ np.linalg.solve(seen.total_cov, off)) < 3.0
-    assert angles(seen.lean, seen.down)[0] == pytest.approx(inclination_deg * DEG, abs=1e-9)
+    assert direction_angles(seen.lean, seen.down)[0] == pytest.approx(inclination_deg * DEG, abs=1e-9)
 
 
 @given(st.floats(-2.0, 2.0), st.floats(0.01, 60.0), st.floats(0.01, 88.0))
@@ -135,15 +135,20 @@ def test_a_yaw_that_is_off_by_two_sigmas_leaves_the_truth_within_about_three(
     So would one of half a degree in a flat hole, where the force knows the length of a lean best.
     """
     force, yaw_var = force_at(inclination_deg), (sigma_deg * DEG) ** 2
-    true = resolve(force, np.array(COV), 0.0, 1e-8).direction
-    seen = with_uncertain_yaw(resolve(force, np.array(COV), sigmas * sigma_deg * DEG, yaw_var), yaw_var).direction
+    true = resolve_direction(force, np.array(COV), 0.0, 1e-8).direction
+    seen = with_uncertain_yaw(
+        resolve_direction(force, np.array(COV), sigmas * sigma_deg * DEG, yaw_var), yaw_var
+    ).direction
     off = seen.lean - true.lean
     assert math.sqrt(off @ np.linalg.solve(seen.total_cov, off)) < 3.2
 
 
 @pytest.mark.parametrize("sigma_deg", [1.0, 20.0, 60.0])
 def test_the_variance_along_the_lean_is_the_mean_square_of_what_the_circle_leaves_the_line_by(sigma_deg: float) -> None:
-    resolved, errors = resolve(force_at(30.0), np.array(COV), 0.0, 1e-8), np.random.default_rng(1).normal(size=200_000)
+    resolved, errors = (
+        resolve_direction(force_at(30.0), np.array(COV), 0.0, 1e-8),
+        np.random.default_rng(1).normal(size=200_000),
+    )
     spread = with_uncertain_yaw(resolved, (sigma_deg * DEG) ** 2).direction.cov - resolved.direction.cov
     assert spread[0, 0] == pytest.approx(np.mean((0.5 * (np.cos(errors * sigma_deg * DEG) - 1.0)) ** 2), rel=0.03)
     assert spread[1, 1] == pytest.approx(0.0, abs=1e-15)

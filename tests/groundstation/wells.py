@@ -4,9 +4,9 @@ import math
 
 import numpy as np
 
-from groundstation.survey.tools.instruments import Mode, Term, Tool, load_tool
-from groundstation.survey.well.error_sources import Site, Survey
-from groundstation.survey.well.methods import Method, positions
+from groundstation.survey.tools.instruments import PropagationMode, SurveyTool, Term, load_tool
+from groundstation.survey.well.error_sources import Site, WellSurvey
+from groundstation.survey.well.methods import Method, station_positions
 
 DEG = math.pi / 180.0
 SITE = Site(9.80665, 50_000.0, 72.0 * DEG, 3.0 * DEG, 60.0 * DEG)
@@ -15,19 +15,21 @@ MWD = load_tool("mwd-rev5.1")
 Angles = tuple[np.ndarray, np.ndarray, np.ndarray]
 
 
-def tool_of(*terms: Term, **more: object) -> Tool:
-    return Tool("mine", "My tool", terms, **more)  # type: ignore[arg-type]
+def tool_of(*terms: Term, **more: object) -> SurveyTool:
+    return SurveyTool("mine", "My tool", terms, **more)  # type: ignore[arg-type]
 
 
-def angle_term(name: str, sigma: float, mode: Mode, inclination: str = "0", azimuth: str = "0") -> Term:
+def angle_term(name: str, sigma: float, mode: PropagationMode, inclination: str = "0", azimuth: str = "0") -> Term:
     return Term(name, sigma, "rad", mode, ("0", inclination, azimuth))
 
 
-def survey_of(md: np.ndarray, inclination: np.ndarray, azimuth: np.ndarray) -> Survey:
-    return Survey(md, inclination, azimuth, positions(Method.MINIMUM_CURVATURE, md, inclination, azimuth)[..., 2])
+def survey_of(md: np.ndarray, inclination: np.ndarray, azimuth: np.ndarray) -> WellSurvey:
+    return WellSurvey(
+        md, inclination, azimuth, station_positions(Method.MINIMUM_CURVATURE, md, inclination, azimuth)[..., 2]
+    )
 
 
-def well_of(seed: int, count: int, steepest: float = 80.0 * DEG, first: float = 0.0) -> Survey:
+def well_of(seed: int, count: int, steepest: float = 80.0 * DEG, first: float = 0.0) -> WellSurvey:
     rng = np.random.default_rng(seed)
     md = np.concatenate([[0.0], np.cumsum(rng.uniform(1.0, 30.0, count - 1))])
     inclination = np.linspace(first, steepest, count)
@@ -61,7 +63,7 @@ def largest_difference(cov: np.ndarray, expected: np.ndarray) -> float:
     return float(np.max(np.abs(cov - expected)[..., 1:, :, :] / np.where(scale > 0.0, scale, 1.0)))
 
 
-def hand_well(count: int = 3) -> Survey:
+def hand_well(count: int = 3) -> WellSurvey:
     """Vertical, stations every 10 m; an inclination error of sigma moves the second station 5 sigma north."""
     md = 10.0 * np.arange(count)
-    return Survey(md, np.zeros(count), np.zeros(count), md)
+    return WellSurvey(md, np.zeros(count), np.zeros(count), md)

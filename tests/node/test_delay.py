@@ -14,7 +14,7 @@ from node.kernels.sensors.delay import date_window, make_up_delay
 from node.process.drivers.frame_clock import FrameClock
 from node.process.drivers.mpu6500 import DELAYS, Mpu6500
 from sim.studies.field.cases import CASES
-from sim.studies.field.run import row, run_seed
+from sim.studies.field.run import disturbance_row, run_seed
 
 RATES = st.floats(-70.0, 70.0).map(math.radians)
 LATE = st.floats(-0.01, 0.03)
@@ -71,7 +71,7 @@ def test_what_stays_of_a_dates_error_is_the_best_of_late(told_ms: list[float], l
 @pytest.mark.timeout(600)
 def test_an_mpu6500_with_delay_crystal_and_fifo_is_as_good_as_it_says_and_never_called_faulty() -> None:
     case = next(case for case in CASES if case.key == "mpu6500")
-    figures = row(case, [run_seed((case.setup, seed)) for seed in range(1, 101)])
+    figures = disturbance_row(case, [run_seed((case.setup, seed)) for seed in range(1, 101)])
     assert 0.8 < figures["nees_turning"] < 1.25
     assert 0.8 < figures["nees_rest"] < 1.25
     assert figures["gyro_step"] == figures["gyro_scale"] == figures["other_faults"] == 0

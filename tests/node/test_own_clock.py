@@ -11,10 +11,10 @@ from node.kernels.arithmetic.formats import PERIOD
 from node.process.drivers.timed import TimedImu
 from node.process.tube_process import TubeProcess
 from telemetry.application.endpoint import Endpoint
-from telemetry.media.memory import joint
+from telemetry.media.memory import joined_ports
 from telemetry.messages import BASE, Command, Event, NodeState, Reply, Side
-from telemetry.runtime.own_clock import OwnClock, Schedule, run_cycle, send
-from telemetry.runtime.timing import CycleTiming, Stage
+from telemetry.runtime.own_clock import OwnClock, Schedule, run_cycle, send_due_frames
+from telemetry.runtime.timing import CycleStage, CycleTiming
 
 BEGIN = 500.0
 STEP = 0.005  # s
@@ -47,7 +47,7 @@ class Pair:
         self.began = BEGIN
         self.heard: list[object] = []
         self._on_the_wire: list[bytes] = []
-        above, below = joint(latency=0.0)
+        above, below = joined_ports(latency=0.0)
         above.listen(self._on_the_wire.append)
         self._ports = {Side.UPPER: below}
 
@@ -63,7 +63,7 @@ class Pair:
             now += STEP
             for _, frame in self.base.take_frames(now):
                 self.process.on_frame(Side.UPPER, frame.payload, now)
-            send(self.process, self._ports, now)
+            send_due_frames(self.process, self._ports, now)
             for frame in self._on_the_wire:
                 self.heard += [received.message for received in self.base.receive(Side.LOWER, frame, now)]
             self._on_the_wire.clear()
@@ -88,7 +88,7 @@ def test_an_overrun_is_counted_told_once_and_covered_by_the_next_reading(tmp_pat
     assert [event.arguments for event in overruns] == [{"missed": 2, "overruns": 1}]
     assert pair.told(NodeState)[-1].overruns == 2
     assert "clock_jumped" not in {event.code for event in pair.told(Event)}
-    assert pair.timing.stages[Stage.START].largest == pytest.approx(0.001)
+    assert pair.timing.stages[CycleStage.START].largest == pytest.approx(0.001)
 
 
 @pytest.mark.parametrize("measured", [True, False])

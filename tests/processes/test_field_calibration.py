@@ -13,8 +13,8 @@ import pytest
 from forked_commands import run
 from rigs import REPOSITORY, ends, free_endpoint, running_rig
 
-from groundstation.calibration.block import read
-from groundstation.calibration.field import inclination
+from groundstation.calibration.block import read_calibration
+from groundstation.calibration.field_calibration import force_inclination
 from groundstation.service.disk.ground_store import Store
 from sim.rig.report import rms
 from sim.world.scenario import load_scenario
@@ -71,7 +71,7 @@ def test_a_power_cut_in_the_upload_leaves_the_old_block_until_it_is_asked_again(
 
 def test_every_calibration_lies_whole_in_its_file(calibrated: tuple[dict[str, Any], Path]) -> None:
     for tube in (1, 2, 3):
-        kept = read(calibrated[1] / "state" / "ground" / "calibrations" / f"field-{tube}-v1.json")
+        kept = read_calibration(calibrated[1] / "state" / "ground" / "calibrations" / f"field-{tube}-v1.json")
         assert kept.provenance.design.startswith("12 attitudes")
         assert 0.0 < kept.provenance.bias_std.max() < 0.002
 
@@ -90,7 +90,7 @@ def test_what_is_said_of_before_is_what_an_uncalibrated_rig_shows(
             if isinstance(stored.message, SurveyMeasurement) and stored.md is not None:
                 force = np.array([stored.message.imus[0].force])
                 truth = world.truth_station(stored.md)["inclination_deg"]
-                errors.append(math.degrees(inclination(force)[0]) - truth)
+                errors.append(math.degrees(force_inclination(force)[0]) - truth)
     assert len(errors) == 6
     said = calibrated[0]["calibration"]["inclination_rms_deg"]["before"]
     assert rms(errors) == pytest.approx(said, rel=0.02)

@@ -20,13 +20,13 @@ from node.kernels.arithmetic.formats import PERIOD
 from node.process.drivers.timed import TimedImu
 from node.process.tube_process import TubeProcess
 from telemetry.application.endpoint import Endpoint
+from telemetry.media.media_table import open_medium
 from telemetry.media.neighbours import neighbour_ports
-from telemetry.media.table import open_medium
 from telemetry.media.zenoh_bus import open_router
 from telemetry.messages import ENCODER, Side
 from telemetry.runtime.hosting import OwnTime, Place, live_by_own_clock
 from telemetry.runtime.own_clock import OwnClock, OwnClockLoop
-from telemetry.runtime.process import Process
+from telemetry.runtime.process_interface import Process
 from telemetry.runtime.timing import CycleTiming
 
 RIG = "own-clock"

@@ -28,7 +28,7 @@ from node.kernels.arithmetic.formats import PERIOD
 from node.process.encoder_command import encoder
 from node.process.tube_command import node
 from node.process.tube_process import TubeProcess
-from sim.can.hub import running_hub
+from sim.can.can_hub import running_hub
 from sim.world.recording import record, turning_once, yaw_error
 from telemetry.application.endpoint import Endpoint
 from telemetry.application.seals import Seals, seals_of
@@ -40,7 +40,7 @@ from telemetry.media.zenoh_port import ZenohMedium
 from telemetry.messages import BASE, ENCODER, EPOCH_UNKNOWN, Command, Event, NodeFlag, NodeState, Reply, Side
 from telemetry.runtime import event_loop
 from telemetry.runtime.own_clock import OwnClock, OwnClockLoop
-from telemetry.runtime.process import Process
+from telemetry.runtime.process_interface import Process
 from telemetry.runtime.timing import CycleTiming
 
 RIG = "own-clock"
@@ -139,7 +139,7 @@ def living(surface: Surface, bus: ZenohBus) -> Iterator[Surface]:
         running.put(loop)
         await loop.run()
 
-    thread = threading.Thread(target=lambda: event_loop.run(live()))
+    thread = threading.Thread(target=lambda: event_loop.run_event_loop(live()))
     thread.start()
     surface.loop = running.get(timeout=PATIENCE)
     yield surface

@@ -10,7 +10,7 @@ import pytest
 from rigs import running_rig
 
 from groundstation.service.disk.ground_store import Store
-from sim.faults import KillNode
+from sim.node_kills import KillNode
 from sim.world.scenario import load_scenario
 from sim.world.world import World
 from telemetry.messages import BASE, ENCODER

@@ -17,11 +17,11 @@ from mcap.writer import Writer
 from schemas import check_answers
 from tapes import INTAKE, KEY, shown, write
 
-from borechain.cli.ground.record import replay as replay_command
+from borechain.cli.ground.record_command import replay as replay_command
 from borechain.cli.rig.ground_settings import ground_settings
 from borechain.inline import InlineRig
-from borechain.recording.files import NAME, Recording, RecordingError, RecordingWriter, Sample
-from borechain.recording.replay import replay_file
+from borechain.recording.ground_replay import replay_file
+from borechain.recording.recording_file import NAME, RecordedSample, Recording, RecordingError, RecordingWriter
 from groundstation.service.answers.paths import schemas
 from groundstation.service.process.ground_process import GroundProcess
 from groundstation.service.process.intake_tape import IntakeError, pack_intake, unpack_intake
@@ -138,7 +138,7 @@ def test_no_more_than_two_chunks_are_lost_by_a_cut(drilled: tuple[Path, GroundPr
     with RecordingWriter(path, "rig-1", shown()) as writer:
         for event in ground.tape.events:
             payload = pack_intake(event)
-            writer.write(Sample(INTAKE, 1, payload))
+            writer.write(RecordedSample(INTAKE, 1, payload))
             written += len(payload) + 64
             if event.number % 97 == 0:
                 found = sum(len(sample.payload) + 64 for sample in Recording(path).samples())

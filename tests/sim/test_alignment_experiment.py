@@ -9,7 +9,7 @@ import pytest
 from click.testing import CliRunner
 
 from borechain.cli.experiment.experiment import experiment
-from sim.studies.alignment.run import BASE, PUBLISHED_DEG, Turn, base_rows, ratio, run_seed
+from sim.studies.alignment.run import BASE, PUBLISHED_DEG, Turn, base_rows, error_ratio, run_seed
 
 pytestmark = pytest.mark.slow
 
@@ -27,7 +27,7 @@ def test_the_published_errors_and_their_ratio_are_within_our_intervals(found: li
     for row, method in ((circle, "circle"), (extremes, "extremes")):
         assert row["low"] <= 1.05 * PUBLISHED_DEG[method]
         assert row["high"] >= 0.95 * PUBLISHED_DEG[method]
-    many, low, high = ratio(found)
+    many, low, high = error_ratio(found)
     assert low < 6.0 < high
     assert many > 4.0
 

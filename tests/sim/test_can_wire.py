@@ -13,7 +13,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from sim.can.hub import CanHub, running_hub
+from sim.can.can_hub import CanHub, running_hub
 from sim.can.wire import SEND_BUFFER, CanWire, Delivery
 from sim.errors import RigError
 from telemetry.media.can_frame import (
@@ -24,9 +24,9 @@ from telemetry.media.can_frame import (
     ERROR_PROTOCOL,
     EXTENDED,
     CanFrame,
-    unpack,
+    unpack_frame,
 )
-from telemetry.media.can_loopback import register
+from telemetry.media.can_loopback import register_loopback
 from telemetry.media.can_loopback_protocol import INTERFACE
 from telemetry.media.can_timing import FD_LENGTHS, BitRates, classic_bits, fd_bits, fd_length
 
@@ -82,13 +82,13 @@ def test_more_than_an_fd_frame_holds_is_refused() -> None:
 @given(st.integers(0, 2**29 - 1), st.binary(max_size=64), st.integers(0, 1000), st.booleans())
 def test_a_frame_survives_its_layout(identifier: int, data: bytes, count: int, own: bool) -> None:
     before = CanFrame(EXTENDED | identifier, data, len(data) > 8, own)
-    assert unpack(before.pack(count)) == (before, count % 256)
+    assert unpack_frame(before.pack(count)) == (before, count % 256)
 
 
 @given(st.binary(max_size=100))
 def test_bytes_that_are_no_frame_are_refused(datagram: bytes) -> None:
     try:
-        found, _ = unpack(datagram)
+        found, _ = unpack_frame(datagram)
     except ValueError:
         return
     assert len(datagram) in (16, 72)
@@ -227,7 +227,7 @@ def hub() -> Iterator[CanHub]:
 
 @pytest.fixture
 def open_bus(hub: CanHub) -> Iterator[Open]:
-    register()
+    register_loopback()
     with contextlib.ExitStack() as stack:
 
         def opened(segment: str = "joint", **options: Any) -> Any:
@@ -296,7 +296,7 @@ def test_what_finds_no_room_is_an_overrun_that_is_counted(open_bus: Open) -> Non
 
 
 def listen_until_killed(port: int, ready: Any) -> None:
-    register()
+    register_loopback()
     with can.Bus(f"{port}/joint", interface=INTERFACE, ignore_config=True) as bus:
         ready.set()
         while True:
@@ -320,7 +320,7 @@ def test_a_process_that_dies_leaves_the_segment(hub: CanHub, open_bus: Open) -> 
 
 
 def test_no_hub_is_one_line() -> None:
-    register()
+    register_loopback()
     with running_hub() as gone:
         port = gone.port
     with pytest.raises(can.CanInitializationError, match="no hub answers"):
@@ -329,7 +329,7 @@ def test_no_hub_is_one_line() -> None:
 
 @pytest.mark.parametrize("channel", ["can0", "7800", "/joint", "7800/"])
 def test_a_channel_that_is_none_is_named(channel: str) -> None:
-    register()
+    register_loopback()
     with pytest.raises(can.CanInitializationError, match="expected the channel PORT/SEGMENT, got"):
         can.Bus(channel, interface=INTERFACE, ignore_config=True)
 

@@ -7,9 +7,9 @@ from click.testing import CliRunner
 from borechain.cli.experiment.experiment import experiment
 from node.kernels.record.filter_record import Scheme
 from sim.rig.direct_string import DirectString
-from sim.studies.consistency.run import EVERY, run, setup_of, table, verdict
-from sim.studies.epochs import judge, run_seed
-from sim.studies.scenarios import Tables, changed
+from sim.studies.consistency.run import EVERY, epoch_rows, judge_cells, run_study, setup_of
+from sim.studies.epochs import run_seed, sample_epochs
+from sim.studies.scenarios import Tables, change_sections
 from sim.world.scenario import scenario_of
 from sim.world.world import World
 
@@ -19,7 +19,7 @@ FEW, SEEDS = 24, 40  # strings of two hops in `make test`; in `make study` two a
 
 
 def shorter(setup: Tables) -> Tables:
-    return changed(setup, schedule={"blocks": 1})
+    return change_sections(setup, schedule={"blocks": 1})
 
 
 @pytest.fixture(
@@ -30,7 +30,7 @@ def shorter(setup: Tables) -> Tables:
 def result(request: pytest.FixtureRequest) -> dict:
     hops, seeds = request.param
     stepped: list[None] = []
-    found = run(seeds, seeds, lambda: stepped.append(None), hops=hops)
+    found = run_study(seeds, seeds, lambda: stepped.append(None), hops=hops)
     assert len(stepped) == 3 * seeds
     return found
 
@@ -60,10 +60,10 @@ def test_intersection_is_too_wide(result: dict) -> None:
 
 
 def test_the_verdict_is_that_of_its_bounds() -> None:
-    assert verdict([1.0] * 19 + [1.2])["consistent"]
-    assert not verdict([1.0] * 9 + [1.2])["consistent"]  # a tenth outside
-    assert not verdict([1.0] * 99 + [1.3])["consistent"]
-    assert verdict([1.0, 0.5, 1.3])["worst"] == 0.5
+    assert judge_cells([1.0] * 19 + [1.2])["consistent"]
+    assert not judge_cells([1.0] * 9 + [1.2])["consistent"]  # a tenth outside
+    assert not judge_cells([1.0] * 99 + [1.3])["consistent"]
+    assert judge_cells([1.0, 0.5, 1.3])["worst"] == 0.5
 
 
 def test_clock_errors_are_felt() -> None:
@@ -72,9 +72,9 @@ def test_clock_errors_are_felt() -> None:
 
     def nees(factor: float) -> float:
         found = []
-        told = changed(setup, clocks={"stated_std_ms": 5.0 / factor})
+        told = change_sections(setup, clocks={"stated_std_ms": 5.0 / factor})
         for seed in range(1, 9):
-            run = judge(DirectString(World(scenario_of(dict(told)), seed)))
+            run = sample_epochs(DirectString(World(scenario_of(dict(told)), seed)))
             found.append(float((run.error**2 / run.var)[run.turning].mean()))
         return float(np.mean(found))
 
@@ -84,7 +84,7 @@ def test_clock_errors_are_felt() -> None:
 
 def test_a_table_has_a_row_an_epoch_and_hop() -> None:
     setup = shorter(setup_of(Scheme.FORWARD, 2))
-    rows = table(Scheme.FORWARD, [run_seed((setup, 1)), run_seed((setup, 2))])
+    rows = epoch_rows(Scheme.FORWARD, [run_seed((setup, 1)), run_seed((setup, 2))])
     assert [(r["state"], r["hop"]) for r in rows] == [("turning", 1), ("turning", 2), ("at rest", 1), ("at rest", 2)]
 
 
@@ -95,9 +95,9 @@ def test_the_command_refuses_no_seeds() -> None:
 
 
 def test_of_the_integer_kernel_forward_alone_is_judged_beside_the_reference() -> None:
-    fixed = run(2, 2, lambda: None, hops=2, kernel="fixed")
+    fixed = run_study(2, 2, lambda: None, hops=2, kernel="fixed")
     assert (fixed["experiment"], fixed["schemes"].keys()) == ("consistency-fixed", {"forward"})
-    reference = [r["nees"] for r in run(2, 2, lambda: None, hops=2)["cases"] if r["scheme"] == "forward"]
+    reference = [r["nees"] for r in run_study(2, 2, lambda: None, hops=2)["cases"] if r["scheme"] == "forward"]
     found = [r["nees"] for r in fixed["cases"]]
     assert found == pytest.approx(reference, rel=1e-2)
     assert found != reference  # it is another kernel

@@ -7,8 +7,8 @@ import pytest
 
 from node.kernels.record.filter_record import Scheme
 from sim.rig.direct_string import DirectString
-from sim.studies.epochs import resting, run_seed
-from sim.studies.relay.run import run, table
+from sim.studies.epochs import resting_string, run_seed
+from sim.studies.relay.run import hop_rows, run_study
 from sim.world.scenario import scenario_of
 from sim.world.world import World
 
@@ -19,7 +19,7 @@ SEEDS = 24
 
 @pytest.fixture(scope="module", params=[pytest.param(hops, marks=pytest.mark.statistical) for hops in (2, 4)])
 def result(request: pytest.FixtureRequest) -> dict:
-    return run(request.param, SEEDS, lambda: None)
+    return run_study(request.param, SEEDS, lambda: None)
 
 
 def rows(result: dict, scheme: str) -> list[dict]:
@@ -41,13 +41,13 @@ def test_estimate_is_caught_overconfident_beyond_the_first_hop(result: dict) -> 
 
 
 def test_one_seed_gives_one_result() -> None:
-    first, second, other = (run_seed((resting(2, blocks=1), seed)) for seed in (1, 1, 2))
+    first, second, other = (run_seed((resting_string(2, blocks=1), seed)) for seed in (1, 1, 2))
     assert np.array_equal(first.error, second.error)
     assert not np.array_equal(first.error, other.error)
 
 
 def test_a_lossy_string_stays_honest() -> None:
-    judged = table(Scheme.FORWARD, [run_seed((resting(3, loss=0.3), seed)) for seed in range(1, 13)])
+    judged = hop_rows(Scheme.FORWARD, [run_seed((resting_string(3, loss=0.3), seed)) for seed in range(1, 13)])
     for row in judged:
         assert row["yaw_rms_rest_deg"] < 0.05
         assert row["nees_rest"] < 2.5
@@ -56,7 +56,7 @@ def test_a_lossy_string_stays_honest() -> None:
 
 def test_innovations_are_white_enough_to_be_believed() -> None:
     """NIS: r^2 / S averaged over many updates, near 1 for a filter that knows its own size."""
-    string = DirectString(World(scenario_of(dict(resting(1))), 5))
+    string = DirectString(World(scenario_of(dict(resting_string(1))), 5))
     state, ratios = string.tubes[1].state, []
     before = float(state["last_aided"])
     for _ in string.steps():

@@ -7,17 +7,17 @@ import pytest
 
 from sim.rig.direct_string import DirectString, StringRun
 from sim.studies.field.cases import BLOCKS, CASES
-from sim.studies.field.run import FieldRun, chosen_cases, judge, row, run_seed
+from sim.studies.field.run import DisturbanceRun, chosen_cases, disturbance_row, judge_lowest_tube, run_seed
 from sim.world.scenario import scenario_of
 from sim.world.world import World
 
 
 @cache
-def drilled(key: str) -> tuple[World, StringRun, FieldRun]:
+def drilled(key: str) -> tuple[World, StringRun, DisturbanceRun]:
     (case,) = chosen_cases(key)
     world = World(scenario_of(dict(case.setup)), 1)
     run = DirectString(world, state_every=1).drill()
-    return world, run, judge(world, run)
+    return world, run, judge_lowest_tube(world, run)
 
 
 def codes(run: StringRun) -> list[str]:
@@ -73,7 +73,9 @@ def test_a_disc_off_its_centre_is_no_fault_of_the_gyroscope() -> None:
 def test_single_wrong_readings_make_a_rest_no_surer_than_it_is() -> None:
     runs = [run_seed((dict(chosen_cases("outliers-5")[0].setup), seed)) for seed in range(7, 11)]
     (case,) = chosen_cases("outliers-5")
-    made = row(case, runs)  # the four seeds that were worst: 7.1 at rest, and 15 % of a rest beyond three sigmas
+    made = disturbance_row(
+        case, runs
+    )  # the four seeds that were worst: 7.1 at rest, and 15 % of a rest beyond three sigmas
     assert made["nees_rest"] < 3.0
     assert made["unflagged_percent"] < 1.0
     assert not any((run.told & run.resting).any() for run in runs)
@@ -96,7 +98,7 @@ def test_single_wrong_readings_make_a_rest_no_surer_than_it_is() -> None:
 )
 def test_seeds_that_a_node_was_wrong_about_are_honest(key: str, seeds: tuple[int, ...]) -> None:
     (case,) = chosen_cases(key)
-    made = row(case, [run_seed((dict(case.setup), seed)) for seed in seeds])
+    made = disturbance_row(case, [run_seed((dict(case.setup), seed)) for seed in seeds])
     assert max(made["nees_turning"], made["nees_rest"]) <= 1.5
     assert made["unflagged_percent"] <= 1.0
     assert made["gyro_step"] == made["gyro_scale"] == made["other_faults"] == 0.0
@@ -106,7 +108,7 @@ def test_seeds_that_a_node_was_wrong_about_are_honest(key: str, seeds: tuple[int
 def test_a_row_says_what_it_saw() -> None:
     world, run, found = drilled("random-phase")
     (case,) = chosen_cases("random-phase")
-    made = row(case, [found, judge(world, run)])
+    made = disturbance_row(case, [found, judge_lowest_tube(world, run)])
     assert made["surveys_percent"] == 100.0
     assert made["gyro_step"] == made["gyro_scale"] == made["other_faults"] == 0.0
     rms = float(np.degrees(np.sqrt(np.mean(found.error[found.resting] ** 2))))
@@ -118,7 +120,7 @@ def test_a_row_says_what_it_saw() -> None:
 def test_a_bent_hole_is_judged_by_its_surveys_at_the_ground_station() -> None:
     """The node does not know what its string turns by, and its figures say so."""
     (case,) = chosen_cases("transport")
-    made = row(case, [run_seed((dict(case.setup), seed)) for seed in (1, 2, 3, 4)])
+    made = disturbance_row(case, [run_seed((dict(case.setup), seed)) for seed in (1, 2, 3, 4)])
     assert made["nees_rest"] > 1e4
     assert made["unflagged_percent"] == 100.0
     assert made["azimuth_rms_deg"] < 0.1

@@ -7,7 +7,7 @@ import sys
 import numpy as np
 import pytest
 
-from borechain.cli.rig.rig import PRELOAD
+from borechain.cli.rig.rig_command import PRELOAD
 from node.firmware.settings import KERNELS
 from node.kernels.arithmetic.formats import PERIOD
 from node.kernels.record.filter_record import Scheme
@@ -18,7 +18,7 @@ from sim.studies import published_form
 from sim.studies.ingredients import run as ingredients
 from sim.studies.lab import LAB, REST, ROTATING, LabRun, run_seed
 from sim.studies.modes import run as modes
-from sim.studies.scenarios import Tables, changed, on_off
+from sim.studies.scenarios import Tables, change_sections, on_off
 from sim.studies.trials import rms_deg
 from sim.world.imu_errors import SAMPLE_RATE_HZ, single_samples
 from sim.world.scenario_file import GyroSection, NodeSection
@@ -60,7 +60,7 @@ def test_a_published_node_hands_its_own_yaw_down() -> None:
 
 
 def test_published_rows_stand_beside_the_thesis_and_ours() -> None:
-    result = modes.run("two-nodes", 2, lambda: None)
+    result = modes.run_study("two-nodes", 2, lambda: None)
     rows = {(row["case"], row["quantity"]): row for row in result["cases"]}
     for case in modes.CASES["two-nodes"]:
         assert (case.name, "azimuth") in rows
@@ -83,8 +83,8 @@ def test_published_rows_stand_beside_the_thesis_and_ours() -> None:
     ],
 )
 def test_every_ingredient_is_missed(name: str, link: dict, window: np.ndarray, factor: float) -> None:
-    without = runs(changed(ingredients.INGREDIENTS[name], aiding=link))
-    assert yaw(without, window) > factor * yaw(runs(changed(LAB, aiding=link)), window)
+    without = runs(change_sections(ingredients.INGREDIENTS[name], aiding=link))
+    assert yaw(without, window) > factor * yaw(runs(change_sections(LAB, aiding=link)), window)
 
 
 def test_each_ingredient_is_off_alone() -> None:
@@ -135,7 +135,7 @@ def test_every_kernel_can_be_chosen_and_is_warmed_before_the_first_fork() -> Non
     assert [NodeSection(kernel=kernel).kernel for kernel in KERNELS] == list(KERNELS)
     assert set(PRELOAD) == set(KERNELS)
     program = (
-        "import borechain.warm_all\n"
+        "import borechain.preload_all\n"
         "from node.kernels.step import node_step as step\n"
         "from node.kernels.step import fixed_step as fixed\n"
         "from node.kernels.published import step as published\n"

@@ -5,16 +5,16 @@ import math
 import numpy as np
 import pytest
 
-from sim.studies.limits.bound import STATES, Course, Model, bound_of, step_of, updated
+from sim.studies.limits.bound import STATES, Model, NodeTimeline, bound_of, posterior_cov, step_of
 
 NOISE, AIDING = 1e-4, 3e-4  # rad/s/sqrt(Hz), rad
 WHITE = Model(NOISE, 1e-12, 1e6, 1e-12, 1e-12, 1e-12)  # nothing but white noise
 
 
-def course(count: int, dt: float, spin: float, heard: slice) -> Course:
+def course(count: int, dt: float, spin: float, heard: slice) -> NodeTimeline:
     var = np.full(count, np.inf)
     var[heard] = AIDING**2
-    return Course(dt * np.arange(1.0, count + 1.0), np.full(count, spin), np.full(count, spin), var)
+    return NodeTimeline(dt * np.arange(1.0, count + 1.0), np.full(count, spin), np.full(count, spin), var)
 
 
 def test_a_walk_that_is_measured_settles_where_riccati_says() -> None:
@@ -57,5 +57,5 @@ def test_errors_that_are_drawn_are_as_large_as_it_says() -> None:
             seen = errors @ row + AIDING * random.standard_normal(runs)
             gain = known @ row / (row @ known @ row + AIDING**2)
             errors -= seen[:, None] * gain
-            known = updated(known, row, AIDING**2)
+            known = posterior_cov(known, row, AIDING**2)
     assert np.var(errors[:, 0]) == pytest.approx(found.filtered[-1], rel=0.12)

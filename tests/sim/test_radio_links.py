@@ -15,13 +15,13 @@ from hypothesis import strategies as st
 from sim.errors import ScenarioError
 from sim.rig.link_channel import LinkChannel
 from sim.rig.radio_channel import RadioChannel, failures
-from sim.studies.soil_link.delivery_time import STEP, Joint, joint_delay, message_delay, quantile
+from sim.studies.soil_link.delivery_time import STEP, LossyJoint, joint_delay, message_delay, quantile
 from sim.world.radio import RadioLinks
 from sim.world.radio_section import RadioSection
 from sim.world.scenario import scenario_of
 from sim.world.world import World
 from telemetry.messages import Side
-from telemetry.radio.soil import PorosityWarning
+from telemetry.radio.soil_dielectric import PorosityWarning
 from telemetry.transport.hop import FIRST_TIMEOUT, HopLink
 
 DRY, WET = {"sand": 0.4, "clay": 0.1, "water": 0.05}, {"sand": 0.05, "clay": 0.47, "water": 0.4}
@@ -107,14 +107,14 @@ def test_pairs_of_ports_draw_apart_from_each_other_and_from_a_cable() -> None:
 
 
 def test_a_lossless_joint_takes_its_latency() -> None:
-    sure = Joint((0.0, 0.0), 2, 0.004, 0.003, 0.0)
+    sure = LossyJoint((0.0, 0.0), 2, 0.004, 0.003, 0.0)
     assert joint_delay(sure)[3] == pytest.approx(1.0)
     assert quantile(message_delay([sure] * 4), 0.99) == pytest.approx(0.012, abs=STEP)
 
 
 def test_a_lost_frame_comes_one_timeout_later() -> None:
     """One attempt of a half: again after 60 ms, then 120 ms, and so on."""
-    delay = joint_delay(Joint((0.5, 0.5), 1, 0.004, 0.003, 0.0))
+    delay = joint_delay(LossyJoint((0.5, 0.5), 1, 0.004, 0.003, 0.0))
     for k, at in enumerate((0.0, FIRST_TIMEOUT, 3.0 * FIRST_TIMEOUT, 7.0 * FIRST_TIMEOUT)):
         assert delay[round((at + 0.003) / STEP)] == pytest.approx(0.5 ** (k + 1))
 
@@ -128,7 +128,7 @@ def test_the_expected_delay_is_that_of_two_links_over_a_channel_with_bursts() ->
     channel = RadioChannel(joints, 5, 0.003, 0.0, 0.0, 0.0)
     times = np.array([time_over(channel, 10.0 * (k + 1)) for k in range(4000)])
     rates = tuple(joints.error_rate(m) for m in joints.states(1, 0.0))
-    expected = np.cumsum(joint_delay(Joint(rates, 1, 0.004, 0.003, 0.0, 0.25, 1.0)))  # type: ignore[arg-type]
+    expected = np.cumsum(joint_delay(LossyJoint(rates, 1, 0.004, 0.003, 0.0, 0.25, 1.0)))  # type: ignore[arg-type]
     for seconds in (0.01, 0.1, 0.3, 0.5, 1.0, 2.0, 4.0):
         came = np.mean(times <= seconds)
         assert came == pytest.approx(expected[round(seconds / STEP)], abs=0.025)

@@ -16,7 +16,7 @@ from borechain.cli.rig.ground_settings import ground_settings
 from borechain.inline import InlineRig
 from node.process.tube_process import TubeProcess
 from sim.rig.scheduler import Progress
-from sim.studies.soil_link.wet_clay import expected, largest_difference, surveys_of, wet_clay
+from sim.studies.soil_link.wet_clay import expected_delivery, largest_difference, surveys_of, wet_clay
 from sim.world.marks import wrap
 from sim.world.parsing import read_toml
 from sim.world.scenario import scenario_of
@@ -125,7 +125,7 @@ def test_surveys_come_through_wet_clay_as_late_as_expected() -> None:
     surveys = surveys_of(world)
     assert sorted((s.tube, s.hops) for s, _ in surveys) == [(1, 1), (1, 2), (1, 3), (2, 1), (2, 2), (3, 1)]
     times = np.array([seconds for _, seconds in surveys])
-    distribution = expected(world, surveys)
+    distribution = expected_delivery(world, surveys)
     assert distribution.sum() == pytest.approx(1.0, abs=1e-6)
     assert times.min() > 0.0
     assert largest_difference(times, distribution) < 0.725  # beyond which six draws fall once in a thousand

@@ -22,8 +22,8 @@ from sim.campaign.vibration import Vibration
 from sim.errors import ScenarioError
 from sim.rig.direct_string import DirectString, aiding_vector
 from sim.studies.epochs import epochs_of
-from sim.studies.scenarios import Tables, changed
-from sim.studies.worlds.run import rough
+from sim.studies.scenarios import Tables, change_sections
+from sim.studies.worlds.run import rough_world
 from sim.world.rough_imu import RoughImu, band_noise, low_passed
 from sim.world.scenario import Scenario, load_scenario, scenario_of
 from sim.world.world import World
@@ -47,7 +47,7 @@ QUIET = {
 
 def field_of(**sections: dict[str, Any]) -> Scenario:
     """The rough world of the studies upon the string, with other values of some keys."""
-    return scenario_of(dict(changed(rough(STRING), **sections)))
+    return scenario_of(dict(change_sections(rough_world(STRING), **sections)))
 
 
 def without_noise(scenario: Scenario) -> Scenario:

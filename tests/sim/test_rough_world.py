@@ -8,7 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from sim.errors import ScenarioError
-from sim.studies.scenarios import changed, complete
+from sim.studies.scenarios import change_sections, complete_string
 from sim.world.borehole import Borehole
 from sim.world.rough_disc import RoughDisc
 from sim.world.rough_imu import FORCE_CLIPPED, band_noise
@@ -19,7 +19,7 @@ from sim.world.scenario import scenario_of
 from sim.world.world import World
 
 SHORT = {
-    "rig": complete(1),
+    "rig": complete_string(1),
     "path": {"straight": {"inclination_deg": 2.0}},
     "schedule": {"add_s": 12.0, "stop_s": 25.0, "finish_s": 5.0, "blocks": 2},
     "rotation": {"turns": 2.0},
@@ -41,8 +41,8 @@ LINES = np.zeros(4096)
 
 
 def rough_world(*, seed: int = 3, hertz: float = 250.0, quiet: bool = True, **sections: dict[str, object]) -> World:
-    tables = changed(SHORT, rough={"samples_hz": hertz, **sections})
-    return World(scenario_of(dict(changed(tables, **QUIET) if quiet else tables)), seed)
+    tables = change_sections(SHORT, rough={"samples_hz": hertz, **sections})
+    return World(scenario_of(dict(change_sections(tables, **QUIET) if quiet else tables)), seed)
 
 
 @pytest.mark.slow
@@ -113,7 +113,7 @@ def test_a_shaft_in_a_bent_hole_turns_by_the_solid_angle() -> None:
     hole = Borehole.spiral(inclination, 0.0, turn, 10.0)
     assert transported(hole, np.array([10.0]))[0] == pytest.approx((1.0 - math.cos(inclination)) * turn, rel=1e-3)
     spiral = {"spiral": {"inclination_deg": 30.0, "turn_deg": 20.0}}
-    tables = changed(SHORT, **QUIET)
+    tables = change_sections(SHORT, **QUIET)
     shaft = World(scenario_of({**tables, "path": spiral, "rough": {"string": {"transport": "parallel"}}}), 3)
     turned = float(np.sum(shaft.sensors.samples(1)[:, 2])) / 1.9
     head = shaft.motion.drive(np.array([shaft.end]))[0][0] - shaft.first_angle
@@ -186,9 +186,12 @@ def test_a_front_end_is_late_and_clips() -> None:
 
 
 def test_the_eighths_of_a_cycle_are_what_the_string_turned_in_them() -> None:
-    told = changed(SHORT, **QUIET)
-    told = changed(told, gyroscope={"increments": True})
-    for world in (World(scenario_of(told), 3), World(scenario_of(changed(told, rough={"samples_hz": 1000.0})), 3)):
+    told = change_sections(SHORT, **QUIET)
+    told = change_sections(told, gyroscope={"increments": True})
+    for world in (
+        World(scenario_of(told), 3),
+        World(scenario_of(change_sections(told, rough={"samples_hz": 1000.0})), 3),
+    ):
         parts = world.sensors.parts(1)
         assert parts is not None
         borders = world.ends[:, None] + np.arange(-8, 1) / (8.0 * 1.9)
@@ -198,7 +201,7 @@ def test_the_eighths_of_a_cycle_are_what_the_string_turned_in_them() -> None:
 
 
 def test_the_noise_of_the_eighths_is_white_and_has_the_cycles_for_its_mean() -> None:
-    tables = changed(SHORT, gyroscope={"increments": True, "resolution_dps": 0.0})
+    tables = change_sections(SHORT, gyroscope={"increments": True, "resolution_dps": 0.0})
     alone, told = World(scenario_of(SHORT | {"gyroscope": {"resolution_dps": 0.0}}), 3), World(scenario_of(tables), 3)
     np.testing.assert_array_equal(told.sensors.samples(1), alone.sensors.samples(1))
     parts = told.sensors.parts(1)

@@ -3,7 +3,7 @@ from pathlib import Path
 import pytest
 
 from sim.errors import ScenarioError
-from sim.faults import KillNode, parse_fault
+from sim.node_kills import KillNode, parse_fault
 from sim.world.scenario import load_scenario
 from telemetry.messages import BASE, ENCODER
 

@@ -7,8 +7,8 @@ from pathlib import Path
 import pytest
 from click.testing import CliRunner
 
-from borechain.cli.rig.rig import rig
-from borechain.cli.survey.wall import wall
+from borechain.cli.rig.rig_command import rig
+from borechain.cli.survey.wall_command import wall
 from sim.errors import ScenarioError
 from sim.world.scenario import load_scenario, scenario_of
 

@@ -11,15 +11,15 @@ from sim.instruments.instrument import InstrumentError
 from sim.instruments.robot_arm import arm_truth, robot_arm
 from sim.instruments.static_records import (
     StaticNoise,
-    flicker,
+    flicker_noise,
     gauss_markov,
     random_walk,
-    shaped,
+    shaped_noise,
     static_record,
-    white,
+    white_noise,
 )
 from sim.instruments.turn_table import turn_table
-from sim.studies.allan.run import run
+from sim.studies.allan.run import run_study
 
 MATRIX = np.array([[0.99, -0.02, 0.003], [0.015, 1.01, -0.004], [-0.001, 0.007, 0.98]])
 BIAS = np.array([0.2, 3.8, -1.0])
@@ -30,7 +30,7 @@ def lagged(y: np.ndarray, lag: int) -> float:
 
 
 def test_white_noise_has_its_density() -> None:
-    y = white(np.random.default_rng(1), 200_000, 0.3, 50.0)
+    y = white_noise(np.random.default_rng(1), 200_000, 0.3, 50.0)
     assert np.std(y) == pytest.approx(0.3 * math.sqrt(50.0), rel=0.01)
     assert abs(lagged(y, 1)) < 0.01 * np.var(y)
 
@@ -60,7 +60,7 @@ def test_random_walk_grows_and_averages_like_brownian_motion() -> None:
 
 
 def test_flicker_is_flat_at_every_averaging_time() -> None:
-    y = np.concatenate([flicker(np.random.default_rng(s), 1 << 14, 2.0) for s in range(32)]).reshape(32, -1)
+    y = np.concatenate([flicker_noise(np.random.default_rng(s), 1 << 14, 2.0) for s in range(32)]).reshape(32, -1)
     for factor in (1, 8, 64, 512):
         means = y.reshape(32, -1, factor).mean(axis=2)
         assert 0.5 * np.mean(np.diff(means, axis=1) ** 2) == pytest.approx(4.0, rel=0.12)
@@ -69,7 +69,7 @@ def test_flicker_is_flat_at_every_averaging_time() -> None:
 @given(length=st.integers(2, 500), seed=st.integers(0, 2**32))
 @settings(max_examples=40, deadline=None)
 def test_shaped_is_real_finite_and_has_no_mean(length: int, seed: int) -> None:
-    full = shaped(np.random.default_rng(seed), length + length % 2, length, np.ones_like)
+    full = shaped_noise(np.random.default_rng(seed), length + length % 2, length, np.ones_like)
     assert np.all(np.isfinite(full))
     assert full.size == length + length % 2  # an odd circle has no Nyquist frequency: it is made even
     assert abs(full.mean()) < 1e-12 * max(1.0, np.abs(full).max())
@@ -77,7 +77,7 @@ def test_shaped_is_real_finite_and_has_no_mean(length: int, seed: int) -> None:
 
 def test_shaped_has_the_power_of_its_spectrum() -> None:
     random = np.random.default_rng(5)
-    power = np.mean([np.var(shaped(random, 8, 8, np.ones_like)) for _ in range(20_000)])
+    power = np.mean([np.var(shaped_noise(random, 8, 8, np.ones_like)) for _ in range(20_000)])
     assert power == pytest.approx(7.0 / 8.0, rel=0.02)  # of unit white noise, less its mean
 
 
@@ -166,7 +166,7 @@ def test_refuses_what_cannot_be() -> None:
 @pytest.mark.parametrize("records", [1, pytest.param(4, marks=pytest.mark.statistical)])
 def test_experiment_reaches_what_is_asked(records: int) -> None:
     steps: list[int] = []
-    result = run(records, lambda: steps.append(1))
+    result = run_study(records, lambda: steps.append(1))
     assert len(steps) == result["records"] == records
     assert [(c["axis"], c["quantity"]) for c in result["cases"][:2]] == [("x", "random_walk"), ("y", "random_walk")]
     assert len(result["cases"]) == 6

@@ -15,11 +15,11 @@ from borechain.cli.calibrate.calibrate import calibrate
 from borechain.cli.experiment.experiment import experiment
 from sim.errors import RigError, TableError
 from sim.instruments.instrument import Instrument
-from sim.instruments.table import INSTRUMENTS
+from sim.instruments.instrument_table import INSTRUMENTS
 from sim.named import by_name
-from sim.studies.pool import CORES, cores, one_pool, over_cores, seeded
-from sim.studies.study import Option, Study, Table
-from sim.studies.table import STUDIES
+from sim.studies.pool import CORES, one_pool, over_cores, seed_jobs, usable_cores
+from sim.studies.study import Option, ResultTable, Study
+from sim.studies.study_table import STUDIES
 
 RESULTS = Path(__file__).parents[2] / "docs" / "results"
 # the longest with two seeds; the modes share the code of two-nodes, the others have tests of their own
@@ -74,7 +74,7 @@ def test_a_study_is_added_by_its_line(place: Path, tmp_path: Path, monkeypatch: 
         "coin",
         "Whether a coin is fair.",
         "coin",
-        (Table("{throws} throws", columns, columns),),
+        (ResultTable("{throws} throws", columns, columns),),
         (Option("throws", 4, 1, 10),),
         full=("--throws 9",),
     )
@@ -183,9 +183,9 @@ def test_the_pool_keeps_the_order_of_its_seeds_and_tells_of_each(
     monkeypatch.setenv(CORES, cores)
     stepped: list[None] = []
     with over_cores(seeds, lambda: stepped.append(None)) as run_all:
-        assert run_all(times_seed, seeded(10, seeds)) == [10 * seed for seed in range(1, seeds + 1)]
+        assert run_all(times_seed, seed_jobs(10, seeds)) == [10 * seed for seed in range(1, seeds + 1)]
         assert len(stepped) == seeds
-        assert run_all(times_seed, seeded(7, 1)) == [7]
+        assert run_all(times_seed, seed_jobs(7, 1)) == [7]
 
 
 def process_of(_: tuple[None, int]) -> int:
@@ -199,16 +199,16 @@ def test_one_pool_is_kept_for_all_that_ask_inside_and_is_gone_after(monkeypatch:
         processes: set[int] = set()
         for _ in range(2):
             with over_cores(3, lambda: None) as run_all:
-                processes |= set(run_all(process_of, seeded(None, 20)))
+                processes |= set(run_all(process_of, seed_jobs(None, 20)))
         assert len(processes) <= 2
         assert all(Path("/proc", str(process)).exists() for process in processes)
     assert not any(Path("/proc", str(process)).exists() for process in processes)
     with over_cores(3, lambda: None) as run_all:
-        assert processes.isdisjoint(run_all(process_of, seeded(None, 3)))
+        assert processes.isdisjoint(run_all(process_of, seed_jobs(None, 3)))
 
 
 @pytest.mark.parametrize("given", ["0", "two", "-1", "1.5"])
 def test_a_number_of_cores_that_is_none_is_one_line(given: str, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv(CORES, given)
     with pytest.raises(RigError, match=f"{CORES}: expected a number of processes from 1 on, got '{given}'"):
-        cores()
+        usable_cores()

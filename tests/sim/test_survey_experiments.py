@@ -12,7 +12,7 @@ pytestmark = pytest.mark.slow
 
 
 def test_weights_reduce_the_error_as_published() -> None:
-    cases = {row["case"]: row for row in weighting.run(lambda: None)["cases"]}
+    cases = {row["case"]: row for row in weighting.run_study(lambda: None)["cases"]}
     for station, looks in ((2, 3), (3, 2)):
         for power, scheme in ((1, "linear"), (2, "quadratic"), (3, "cubic")):
             last = looks**power / sum(k**power for k in range(1, looks + 1))
@@ -24,7 +24,9 @@ def test_weights_reduce_the_error_as_published() -> None:
 
 
 def test_the_sweeps_grow_with_the_change_and_shrink_with_the_power() -> None:
-    rows = [r for r in weighting.run(lambda: None)["sweeps"] if r["changed"] == "inclination" and r["station"] == 2]
+    rows = [
+        r for r in weighting.run_study(lambda: None)["sweeps"] if r["changed"] == "inclination" and r["station"] == 2
+    ]
     for scheme in ("equal", "linear", "quadratic", "cubic"):
         errors = [math.hypot(r["north_cm"], r["east_cm"]) for r in rows if r["scheme"] == scheme]
         assert len(errors) == 18
@@ -34,7 +36,7 @@ def test_the_sweeps_grow_with_the_change_and_shrink_with_the_power() -> None:
 
 
 def test_every_printed_region_stands_beside_ours() -> None:
-    result = regions.run(lambda: None)
+    result = regions.run_study(lambda: None)
     assert len(result["cases"]) == 5 * 10 * 3
     for row in result["cases"]:
         assert row["ratio"] == pytest.approx(row["ours"] / row["published"])
@@ -48,7 +50,7 @@ def test_every_printed_region_stands_beside_ours() -> None:
 
 @pytest.mark.parametrize("wells", [100, pytest.param(500, marks=pytest.mark.statistical)])
 def test_claimed_ellipses_hold_the_truth_as_often_as_they_say(wells: int) -> None:
-    result = coverage.run(wells, 4, lambda: None)
+    result = coverage.run_study(wells, 4, lambda: None)
     for row in result["cases"]:
         claimed = row["published"] / 100.0
         allowed = 4.0 * math.sqrt(claimed * (1.0 - claimed) / wells)
@@ -57,6 +59,6 @@ def test_claimed_ellipses_hold_the_truth_as_often_as_they_say(wells: int) -> Non
 
 def test_one_seed_drills_one_well() -> None:
     pool = coverage.YawPool(*(0.0001 * (k + coverage.np.ones((coverage.TUBES, 3))) for k in range(2)))
-    first, second, other = (coverage.drill(seed, pool)[0] for seed in (1, 1, 2))
+    first, second, other = (coverage.drill_well(seed, pool)[0] for seed in (1, 1, 2))
     assert (first == second).all()
     assert not (first == other).all()

@@ -9,7 +9,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from groundstation.survey.fusion.resolve import angles, resolve
+from groundstation.survey.fusion.resolve import direction_angles, resolve_direction
 from node.kernels.arithmetic.formats import PERIOD
 from sim.world.borehole import Borehole
 from sim.world.marks import wrap
@@ -93,8 +93,8 @@ def test_specific_force_at_a_stop_resolves_to_the_exact_direction(name: str) -> 
         for tube in range(1, phase.tube + 1):
             t = np.array([phase.start + 20.0])
             truth = world.truth(tube)
-            direction = resolve(truth.force(t)[0], np.eye(3), float(truth.yaw(t)[0]), 0.0).direction
-            inclination, azimuth = angles(direction.lean, direction.down)
+            direction = resolve_direction(truth.force(t)[0], np.eye(3), float(truth.yaw(t)[0]), 0.0).direction
+            inclination, azimuth = direction_angles(direction.lean, direction.down)
             station = world.truth_station(world.bit_depth(float(t[0])) - (tube - 1) * 2.0)
             assert math.degrees(inclination) == pytest.approx(station["inclination_deg"], abs=1e-9)
             off = math.radians(math.degrees(azimuth) - station["azimuth_deg"])

@@ -7,34 +7,34 @@ import pytest
 
 from node.kernels.record.filter_record import Scheme
 from sim.studies.bridging.run import mean_of
-from sim.studies.consistency.run import setup_of, table
+from sim.studies.consistency.run import epoch_rows, setup_of
 from sim.studies.epochs import run_campaign_seed, run_seed
 from sim.studies.lab import LAB, run_seed_of_each
 from sim.studies.lab import run_seed as lab_seed
 from sim.studies.limits.bound import Model
-from sim.studies.scenarios import Tables, changed, on_off
-from sim.studies.worlds.run import jobs_of, rough, run, steps, twisted
+from sim.studies.scenarios import Tables, change_sections, on_off
+from sim.studies.worlds.run import count_steps, jobs_of, rough_world, run_study, shipped_rough_world
 from sim.world.parsing import read_toml
 from sim.world.shipped import shipped_folder
 
 SEEDS = 2
-FIRST, SECOND = changed(LAB, aiding=on_off(20.0, 10.0)), changed(LAB, aiding={"every_s": 5.0})
-UNLIKE = changed(LAB, path={"straight": {"inclination_deg": 3.0}})
+FIRST, SECOND = change_sections(LAB, aiding=on_off(20.0, 10.0)), change_sections(LAB, aiding={"every_s": 5.0})
+UNLIKE = change_sections(LAB, path={"straight": {"inclination_deg": 3.0}})
 
 
 def test_the_rough_world_is_the_one_that_is_shipped_but_for_its_untold_twist() -> None:
     shipped = read_toml(shipped_folder() / "rough.toml")
-    assert twisted(LAB) == {**LAB, "rough": shipped["rough"], "encoder": shipped["encoder"]}
+    assert shipped_rough_world(LAB) == {**LAB, "rough": shipped["rough"], "encoder": shipped["encoder"]}
     string = dict(shipped["rough"]["string"])
     assert string.pop("twist_deg") > 0.0
-    assert rough(LAB)["rough"] == {**shipped["rough"], "string": string}
+    assert rough_world(LAB)["rough"] == {**shipped["rough"], "string": string}
 
 
 @pytest.mark.parametrize("part", ["all", "update-modes", "single-updates", "two-nodes", "fifty-nodes", "consistency"])
 def test_every_part_runs_as_often_as_it_says(part: str) -> None:
     """The strings that have as many seeds run seed by seed, in either world."""
     jobs = jobs_of(part, 5, 3, 9, 7)
-    assert steps(part, 5, 3, 9, 7) == sum(2 * seeds for seeds in {job.seeds for job in jobs})
+    assert count_steps(part, 5, 3, 9, 7) == sum(2 * seeds for seeds in {job.seeds for job in jobs})
     assert {job.seeds for job in jobs} <= {3, 5, 9}
     assert all(case.hop < job.worlds["rough"]["rig"]["tubes"] <= 7 for job in jobs for case in job.cases)
 
@@ -42,10 +42,10 @@ def test_every_part_runs_as_often_as_it_says(part: str) -> None:
 @pytest.mark.slow
 def test_its_assumed_world_is_that_of_the_consistency_study() -> None:
     done: list[None] = []
-    found = run("consistency", SEEDS, SEEDS, SEEDS, 2, lambda: done.append(None))
-    assert len(done) == steps("consistency", SEEDS, SEEDS, SEEDS, 2)
+    found = run_study("consistency", SEEDS, SEEDS, SEEDS, 2, lambda: done.append(None))
+    assert len(done) == count_steps("consistency", SEEDS, SEEDS, SEEDS, 2)
     runs = [run_campaign_seed((setup_of(Scheme.FORWARD, 2), seed)) for seed in range(1, SEEDS + 1)]
-    expected = [row["nees_total"] for row in table(Scheme.FORWARD, runs)]
+    expected = [row["nees_total"] for row in epoch_rows(Scheme.FORWARD, runs)]
     assert [row["assumed_nees"] for row in found["consistency"]] == pytest.approx(expected)
     assert all(row["rough_nees"] > 0.0 and row["rough_deg"] != row["assumed_deg"] for row in found["consistency"])
 
@@ -62,9 +62,9 @@ def test_a_string_by_a_campaign_has_the_joints_and_the_epochs_of_the_string_of_i
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("of", [lambda setup: setup, rough], ids=["assumed", "rough"])
+@pytest.mark.parametrize("of", [lambda setup: setup, rough_world], ids=["assumed", "rough"])
 def test_aidings_that_share_a_world_are_those_that_have_one_each(of: Callable[[Tables], Tables]) -> None:
-    setups = [of(changed(setup, schedule={"blocks": 1})) for setup in (LAB, FIRST, SECOND, UNLIKE)]
+    setups = [of(change_sections(setup, schedule={"blocks": 1})) for setup in (LAB, FIRST, SECOND, UNLIKE)]
     shared = run_seed_of_each((setups, 4))
     for one, setup in zip(shared, setups, strict=True):
         alone = lab_seed((setup, 4))

@@ -17,8 +17,8 @@ import can
 from telemetry.application.endpoint import Endpoint
 from telemetry.media.can_frame import ERROR_BUS_OFF, ERROR_CONTROLLER, RX_OVERFLOW
 from telemetry.media.can_port import CanPort
+from telemetry.media.media_table import open_medium
 from telemetry.media.port import TubeEnd
-from telemetry.media.table import open_medium
 from telemetry.messages import ENCODER, Aiding, Event, Severity, Side
 from telemetry.presentation.can_native import rounded
 

@@ -19,7 +19,7 @@ from sealed_string import DOWN, SealedString, make_folder, messages_in
 
 from telemetry.application.end_seal import HEAD as END_HEAD
 from telemetry.application.end_seal import OVERHEAD as END_OVERHEAD
-from telemetry.application.mail import KEPT_WAIT
+from telemetry.application.end_to_end import KEPT_WAIT
 from telemetry.media.port import Priority
 from telemetry.messages import BASE, ENCODER, Side
 from telemetry.presentation.msgpack_codec import encode, open_payload

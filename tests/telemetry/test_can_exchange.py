@@ -20,7 +20,7 @@ from telemetry.media.can_exchange import (
     CanExchange,
 )
 from telemetry.media.can_identifier import FLOW_CONTROL, PRESENCE, TUNNEL, Identifier
-from telemetry.media.port import Frame, Priority
+from telemetry.media.port import PortFrame, Priority
 from telemetry.media.send_queue import SEND_LIMIT, SendQueue
 from telemetry.messages import Hello, Mode
 from telemetry.presentation.can_native import open_profile
@@ -97,12 +97,12 @@ def test_an_identifier_survives_and_urgent_ones_are_lower(
 def test_an_upload_delays_an_aiding_by_one_frame_and_no_more() -> None:
     upper, _, wire = joined()
     for k in range(8):
-        upper.queue.offer(Frame(bytes([k]) * 310, Priority.BLOCK))
+        upper.queue.offer(PortFrame(bytes([k]) * 310, Priority.BLOCK))
     delays = []
     random_times = random.Random(1)
     for _ in range(20):
         wire.run(random_times.uniform(0.01, 0.02))
-        upper.queue.offer(Frame(b"aiding", Priority.AIDING, "aiding"))
+        upper.queue.offer(PortFrame(b"aiding", Priority.AIDING, "aiding"))
         offered, before = wire.now, len(wire.sent)
         wire.run(3 * STEP)
         first = next(at for at, identifier in wire.sent[before:] if identifier.priority is Priority.AIDING)
@@ -118,8 +118,8 @@ def test_an_open_joint_keeps_little_and_hands_out_the_newest_first() -> None:
     wire.run(ACKNOWLEDGE_LIMIT + PRESENCE_EVERY + 0.01)
     assert not upper.is_up
     for k in range(1140):  # ten minutes of aidings and states
-        upper.queue.offer(Frame(b"aiding %d" % k, Priority.AIDING, "aiding"))
-        upper.queue.offer(Frame(b"state %d" % k, Priority.STATE, "state"))
+        upper.queue.offer(PortFrame(b"aiding %d" % k, Priority.AIDING, "aiding"))
+        upper.queue.offer(PortFrame(b"state %d" % k, Priority.STATE, "state"))
         wire.step()
     assert len(upper.queue) == 2 <= SEND_LIMIT
     wire.is_open = False
@@ -129,8 +129,8 @@ def test_an_open_joint_keeps_little_and_hands_out_the_newest_first() -> None:
 
 def test_what_must_not_be_lost_survives_a_joint_that_opens_in_its_middle() -> None:
     upper, _, wire = joined()
-    upper.queue.offer(Frame(bytes(500), Priority.SURVEY))
-    upper.queue.offer(Frame(bytes(300), Priority.STATE, "state"))
+    upper.queue.offer(PortFrame(bytes(500), Priority.SURVEY))
+    upper.queue.offer(PortFrame(bytes(300), Priority.STATE, "state"))
     wire.run(20 * STEP)
     wire.is_open = True
     wire.run(1.0)
@@ -143,7 +143,7 @@ def test_what_must_not_be_lost_survives_a_joint_that_opens_in_its_middle() -> No
 
 def test_a_transfer_goes_on_where_it_was_after_a_moment_in_which_nothing_moved() -> None:
     upper, lower, wire = joined()
-    upper.queue.offer(Frame(bytes(500), Priority.SURVEY))
+    upper.queue.offer(PortFrame(bytes(500), Priority.SURVEY))
     wire.run(20 * STEP)
     wire.is_open = True
     wire.run(ACKNOWLEDGE_LIMIT + 0.1)
@@ -161,7 +161,7 @@ def test_an_answer_waits_as_long_as_its_transfer() -> None:
         lower = end(1)
         assert lower.next_frame(0.0) is not None  # its sign of life
         lower.on_acknowledged(0.0)
-        lower.queue.offer(Frame(b"mine"))
+        lower.queue.offer(PortFrame(b"mine"))
         assert lower.next_frame(0.0) is not None
         lower.on_frame(*first, 0.0)
         lower.advance(pause)
@@ -203,8 +203,8 @@ def test_links_on_the_native_profile_lose_nothing_over_a_wire_that_does(largest:
 
 def test_a_missing_answer_ends_a_transfer_and_the_next_one_goes_on() -> None:
     upper, lower, wire = joined()
-    upper.queue.offer(Frame(bytes(100), Priority.SURVEY))
-    upper.queue.offer(Frame(b"next", Priority.SURVEY))
+    upper.queue.offer(PortFrame(bytes(100), Priority.SURVEY))
+    upper.queue.offer(PortFrame(b"next", Priority.SURVEY))
     deaf = wire.ends[1].on_frame
 
     def hear_no_first(bits: int, data: bytes, now: float) -> bytes | None:
@@ -242,14 +242,14 @@ def test_of_two_ends_with_one_address_the_younger_falls_silent() -> None:
     wire = Wire(older, other, younger)
     wire.now = 10.0
     for e in (older, younger):
-        e.queue.offer(Frame(b"%d" % e._nonce))
+        e.queue.offer(PortFrame(b"%d" % e._nonce))
     wire.run(1.0)
     assert (older.is_mute, younger.is_mute) == (False, True)
     assert not younger.is_up
     assert older.counters["same_address"] > 0
     before = len(wire.sent)
-    older.queue.offer(Frame(b"mine"))
-    younger.queue.offer(Frame(b"not mine"))
+    older.queue.offer(PortFrame(b"mine"))
+    younger.queue.offer(PortFrame(b"not mine"))
     wire.run(1.0)
     assert wire.heard[6][-1] == b"mine"
     assert b"not mine" not in wire.heard[6]
@@ -285,7 +285,7 @@ def test_whatever_comes_nothing_raises_and_sound_payloads_still_arrive(arriving:
     for bits, data, wait in arriving:
         now += wait
         if busy:
-            lower.queue.offer(Frame(bytes(100), Priority.STATE))
+            lower.queue.offer(PortFrame(bytes(100), Priority.STATE))
         lower.advance(now)
         if lower.next_frame(now) is not None:
             lower.on_acknowledged(now)

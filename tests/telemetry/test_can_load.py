@@ -10,13 +10,13 @@ import pytest
 
 from borechain.pki.rig_keys import add_tube, init_rig
 from sim.can.wire import CanWire
-from telemetry.application.can_load import AIDING, CYCLE, HEADER, STATE, load, load_table, steady
+from telemetry.application.can_load import AIDING, CYCLE, HEADER, STATE, bus_load, load_table, steady_traffic
 from telemetry.application.end_seal import content_of_sealed
 from telemetry.application.seals import Seals, seals_of
 from telemetry.media.can_exchange import CanExchange
 from telemetry.media.can_frame import EXTENDED, IDENTIFIER, CanFrame
 from telemetry.media.can_timing import BitRates
-from telemetry.media.port import MAX_FRAME, Frame, Priority
+from telemetry.media.port import MAX_FRAME, PortFrame, Priority
 from telemetry.media.send_queue import SendQueue
 from telemetry.messages import Aiding, Hello, NodeState, Side, TimeReply, TimeRequest
 from telemetry.presentation.can_native import open_profile
@@ -54,12 +54,14 @@ class SimulatedJoint:
         content = encode(message)  # type: ignore[arg-type]
         if self.seals is not None and isinstance(message, NodeState):
             content = self.seals[end].close_up(content)
-        self.ends[end].queue.offer(Frame(self._sealed(end, pack_frame(header, [(number, content)])), priority, topic))
+        self.ends[end].queue.offer(
+            PortFrame(self._sealed(end, pack_frame(header, [(number, content)])), priority, topic)
+        )
 
     def _sealed(self, end: int, payload: bytes) -> bytes:
         if self.seals is None:
             return payload
-        (sealed,) = self.seals[end].frames_of(SIDES[end], [Frame(payload)], self.now)
+        (sealed,) = self.seals[end].frames_of(SIDES[end], [PortFrame(payload)], self.now)
         return sealed.payload
 
     def _opened(self, end: int, payload: bytes) -> bytes | None:
@@ -122,7 +124,7 @@ def drill(joint: SimulatedJoint, tubes: int, seconds: float) -> None:
     joint.run(0.2)
     joint.wire.busy = 0.0
     begin, cycle = joint.now, 0
-    others = [t for t in steady(tubes) if t.message is not AIDING and t.message is not STATE]
+    others = [t for t in steady_traffic(tubes) if t.message is not AIDING and t.message is not STATE]
     sent = dict.fromkeys(range(len(others)), 0)
     while joint.now < begin + seconds:
         joint.send(0, replace(AIDING, sequence=AIDING.sequence + cycle), Priority.AIDING, "aiding")
@@ -146,7 +148,7 @@ def test_the_table_is_what_the_bus_carries(profile: str, fd: bool, tubes: int, s
     joint = SimulatedJoint(profile, fd=fd)
     drill(joint, tubes, seconds)
     measured = joint.wire.busy / (joint.now - 0.2)
-    assert measured == pytest.approx(load(steady(tubes), profile, RATES, fd=fd), rel=0.05)
+    assert measured == pytest.approx(bus_load(steady_traffic(tubes), profile, RATES, fd=fd), rel=0.05)
 
 
 @pytest.mark.slow
@@ -154,14 +156,14 @@ def test_the_table_is_what_the_bus_carries_under_keys(keys: Path) -> None:
     joint = SimulatedJoint("native", fd=True, keys=keys)
     drill(joint, 10, 10.0)
     measured = joint.wire.busy / (joint.now - 0.2)
-    assert measured == pytest.approx(load(steady(10), "native", RATES, fd=True, sealed=True), rel=0.05)
+    assert measured == pytest.approx(bus_load(steady_traffic(10), "native", RATES, fd=True, sealed=True), rel=0.05)
 
 
 @pytest.mark.slow
 def test_fifty_tubes_on_a_slow_joint_thin_themselves_under_keys(keys: Path) -> None:
     joint = SimulatedJoint("native", fd=True, thins=True, keys=keys)
     drill(joint, 50, 10.0)
-    assert load(steady(50), "native", RATES, fd=True, sealed=True) > 0.8
+    assert bus_load(steady_traffic(50), "native", RATES, fd=True, sealed=True) > 0.8
     assert joint.wire.busy / (joint.now - 0.2) <= 0.6
     assert len([m for _, m in joint.heard[1] if isinstance(m, Aiding)]) >= 10.0 / CYCLE - 2
 
@@ -184,7 +186,7 @@ def test_fifty_tubes_on_a_slow_joint_thin_themselves_and_lose_nothing_kept(
     for k in range(12):
         joint.send(1, replace(STATE, tube=200, cycles=k), Priority.SURVEY, None, kept=True)
     drill(joint, 50, seconds)
-    assert load(steady(50), profile, RATES, fd=fd) > 0.8
+    assert bus_load(steady_traffic(50), profile, RATES, fd=fd) > 0.8
     assert joint.wire.busy / (joint.now - 0.2) <= 0.6
     states = [m for _, m in joint.heard[0] if isinstance(m, NodeState)]
     assert [m.cycles for m in states if m.tube == 200] == list(range(12))

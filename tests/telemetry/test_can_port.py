@@ -13,10 +13,10 @@ import can
 import cantools
 import pytest
 
-from sim.can.hub import CanHub, running_hub
+from sim.can.can_hub import CanHub, running_hub
 from sim.can.wire import CanWire
 from telemetry.errors import MediumError
-from telemetry.media.can_controller import Controller, LibraryController, LoopbackController, controller_of
+from telemetry.media.can_controller import CanController, LibraryController, LoopbackController, controller_of
 from telemetry.media.can_frame import (
     ERROR,
     ERROR_CONTROLLER,
@@ -28,13 +28,13 @@ from telemetry.media.can_frame import (
 )
 from telemetry.media.can_identifier import TUNNEL, Identifier
 from telemetry.media.can_log import CanLog
-from telemetry.media.can_loopback import register
+from telemetry.media.can_loopback import register_loopback
 from telemetry.media.can_loopback_protocol import INTERFACE
 from telemetry.media.can_medium import segment_of
 from telemetry.media.can_port import CanPort
 from telemetry.media.can_timing import BitRates
-from telemetry.media.port import Frame, Priority, TubeEnd
-from telemetry.media.table import open_medium
+from telemetry.media.media_table import open_medium
+from telemetry.media.port import PortFrame, Priority, TubeEnd
 from telemetry.messages import Aiding, Side
 from telemetry.presentation.can_dbc import IDENTIFIER_MASK
 from telemetry.presentation.msgpack_codec import encode
@@ -90,7 +90,7 @@ def test_a_controller_that_goes_bus_off_comes_back_and_is_counted(stack: context
 
     hub.act(disturb, segment_of(UPPER))
     until(lambda: ends.upper.counters["bus_off"] + ends.lower.counters["bus_off"] == 1)
-    ends.upper.send(Frame(b"survey" * 50))
+    ends.upper.send(PortFrame(b"survey" * 50))
     until(lambda: ends.heard[1] == [b"survey" * 50])
     assert ends.upper.is_up
 
@@ -102,7 +102,7 @@ def test_a_bus_that_goes_away_and_comes_back_stops_nobody(stack: contextlib.Exit
         port = hub.port
     until(lambda: not ends.upper.is_up)
     for k in range(100):
-        ends.upper.send(Frame(b"%d" % k, Priority.AIDING, "aiding"))
+        ends.upper.send(PortFrame(b"%d" % k, Priority.AIDING, "aiding"))
         ends.upper.flush()
     with running_hub(port=port):
         until(lambda: ends.heard[1] == [b"99"])
@@ -120,10 +120,10 @@ def test_a_bus_that_goes_away_with_a_frame_stops_nobody(stack: contextlib.ExitSt
     until(lambda: ends.upper.is_up and ends.lower.is_up)
     hub.stop()
     serving.join()
-    ends.upper.send(Frame(b"lost", Priority.AIDING, "aiding"))
+    ends.upper.send(PortFrame(b"lost", Priority.AIDING, "aiding"))
     until(lambda: not ends.upper.is_up and not ends.lower.is_up)
     hub.close()
-    ends.upper.send(Frame(b"kept", Priority.AIDING, "aiding"))
+    ends.upper.send(PortFrame(b"kept", Priority.AIDING, "aiding"))
     with running_hub(port=hub.port):
         until(lambda: ends.heard[1] == [b"kept"])
         for end in ends.ports:
@@ -139,7 +139,7 @@ def test_a_bus_that_stands_still_for_a_moment_loses_nothing(stack: contextlib.Ex
     def give(some: list[bytes]) -> None:
         for frame in some:
             for end in ends.ports:
-                end.send(Frame(frame))
+                end.send(PortFrame(frame))
 
     def stand_still(_wire: CanWire) -> None:
         until(lambda: not ends.upper.is_up and not ends.lower.is_up)
@@ -155,7 +155,7 @@ def test_a_neighbour_without_fd_throws_the_controller_off_and_nobody_raises(
     stack: contextlib.ExitStack, hub: CanHub
 ) -> None:
     ends = Ends(stack, hub.port, ("fd", "classic"))
-    ends.upper.send(Frame(b"hello"))
+    ends.upper.send(PortFrame(b"hello"))
     until(lambda: ends.upper.counters["bus_off"] >= 2)
     assert ends.heard[1] == []
 
@@ -168,8 +168,8 @@ def test_a_node_of_the_same_number_is_found(stack: contextlib.ExitStack, hub: Ca
     )
     until(lambda: twin.counters["same_address"] and ends.upper.counters["same_address"])
     until(lambda: not twin.is_up)
-    twin.send(Frame(b"from the twin"))
-    ends.upper.send(Frame(b"from the older"))
+    twin.send(PortFrame(b"from the twin"))
+    ends.upper.send(PortFrame(b"from the older"))
     until(lambda: ends.heard[1])
     assert ends.heard[1] == [b"from the older"]
 
@@ -184,7 +184,7 @@ def test_a_flood_of_strangers_is_counted_and_the_neighbour_is_heard(stack: conte
     for k in range(300):
         stranger.send(can.Message(arbitration_id=identifier, data=b"\x02" + k.to_bytes(2), is_extended_id=True))
         stranger.send(can.Message(arbitration_id=k, data=b"x", is_extended_id=False))
-    ends.upper.send(Frame(b"sound"))
+    ends.upper.send(PortFrame(b"sound"))
     until(lambda: ends.heard[1] == [b"sound"])
     until(lambda: ends.lower.counters["third_talker"] == 300 and ends.lower.counters["unknown_identifier"] == 300)
 
@@ -194,8 +194,8 @@ def test_a_paced_bus_carries_an_aiding_between_the_parts_of_a_block(stack: conte
     ends = Ends(stack, hub.port, ("classic", "classic"))
     until(lambda: ends.upper.is_up and ends.lower.is_up)
     for k in range(8):
-        ends.upper.send(Frame(bytes([k]) * 310, Priority.BLOCK))
-    ends.upper.send(Frame(b"aiding", Priority.AIDING, "aiding"))
+        ends.upper.send(PortFrame(bytes([k]) * 310, Priority.BLOCK))
+    ends.upper.send(PortFrame(b"aiding", Priority.AIDING, "aiding"))
     until(lambda: len(ends.heard[1]) == 9)
     assert ends.heard[1].index(b"aiding") <= 1  # before the second block
     assert not {"dropped", "interrupted", "no_flow_control"} & set(ends.upper.counters)
@@ -287,7 +287,7 @@ def test_faults_of_a_joint_are_told_once_a_minute() -> None:
 def test_a_controller_says_the_same_with_and_without_messages_of_the_library(
     stack: contextlib.ExitStack, hub: CanHub, tmp_path: Path, is_fd: bool
 ) -> None:
-    register()
+    register_loopback()
     log = CanLog(tmp_path / "joint.asc", "end")
     stack.callback(log.close)
     ends = [controller_of(bus_on(hub.port, fd=is_fd), is_fd=is_fd, log=one) for one in (None, log)]
@@ -304,7 +304,7 @@ def test_a_controller_says_the_same_with_and_without_messages_of_the_library(
 
 
 def test_a_controller_tells_overruns_and_a_hub_that_has_gone(stack: contextlib.ExitStack) -> None:
-    register()
+    register_loopback()
     with running_hub() as hub:
         small = bus_on(hub.port, fd=True, receive_buffer=4096)
         slow = controller_of(small, is_fd=True, log=None)
@@ -327,7 +327,7 @@ def bus_on(port: int, **options: Any) -> can.BusABC:
     return can.Bus(f"{port}/joint", interface=INTERFACE, ignore_config=True, **{"receive_own_messages": True} | options)
 
 
-def arrived(controller: Controller) -> Arrival:
+def arrived(controller: CanController) -> Arrival:
     """The next frame."""
     found: list[Arrival | None] = []
     until(lambda: found.append(controller.receive()) or found[-1])

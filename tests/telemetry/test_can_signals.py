@@ -14,7 +14,7 @@ from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 from messages_of_schema import MESSAGES
 
-from telemetry.application.can_load import Traffic, steady
+from telemetry.application.can_load import RepeatedMessage, steady_traffic
 from telemetry.errors import DecodeError, EncodeError
 from telemetry.media.can_identifier import Identifier
 from telemetry.media.can_profile import NativePart
@@ -171,9 +171,9 @@ def test_compiled_and_field_by_field_say_the_same(message: Any, data: st.DataObj
     assert outcome(lambda: native.unpack(frames, fd=fd)) == heard
 
 
-@pytest.mark.parametrize("traffic", steady(1), ids=lambda traffic: type(traffic.message).__name__)
+@pytest.mark.parametrize("traffic", steady_traffic(1), ids=lambda traffic: type(traffic.message).__name__)
 @pytest.mark.parametrize("fd", [False, True])
-def test_what_comes_all_the_time_takes_the_compiled_way(traffic: Traffic, fd: bool) -> None:
+def test_what_comes_all_the_time_takes_the_compiled_way(traffic: RepeatedMessage, fd: bool) -> None:
     native = native_of(traffic.message)
     values = values_of_opened(open_payload(encode(traffic.message)))
     data = native.packers[fd](values, 17)

@@ -9,11 +9,11 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from sealed_string import state
 
+from telemetry.application.delivery_rules import PRIORITIES
+from telemetry.application.end_to_end import KEPT_WAIT
 from telemetry.application.endpoint import Endpoint, Received
-from telemetry.application.kinds import PRIORITIES
-from telemetry.application.mail import KEPT_WAIT
-from telemetry.media.memory import MemoryPort, joint
-from telemetry.media.port import Frame
+from telemetry.media.memory import MemoryPort, joined_ports
+from telemetry.media.port import PortFrame
 from telemetry.messages import (
     BASE,
     ENCODER,
@@ -60,7 +60,7 @@ class Chain:
         self.stations = {address: self.build(address, 1) for address in self.addresses}
         self.joints: list[tuple[MemoryPort, MemoryPort]] = []
         for k in range(len(self.addresses) - 1):
-            self.joints.append(joint(seed + k, **troubles))
+            self.joints.append(joined_ports(seed + k, **troubles))
         self.now = 1000.0
         self.got: dict[int, list[Message]] = {address: [] for address in self.addresses}
 
@@ -152,7 +152,7 @@ def test_a_tube_added_at_the_top_moves_all_others_down() -> None:
     chain.addresses.insert(2, 2)
     chain.stations[2] = chain.build(2, 1)
     chain.got[2] = []
-    chain.joints[1:] = [joint(50), joint(51)]
+    chain.joints[1:] = [joined_ports(50), joined_ports(51)]
     chain.run(8.0)
     assert [chain.stations[a].place.hops for a in (2, 1)] == [1, 2]
     lower = chain.stations[ENCODER].place.neighbours[Side.LOWER]
@@ -249,18 +249,18 @@ def test_aiding_goes_down_hop_by_hop_and_only_down() -> None:
 
 
 def test_a_relay_hands_on_the_very_bytes_that_came(monkeypatch: pytest.MonkeyPatch) -> None:
-    from telemetry.application import endpoint, mail
+    from telemetry.application import end_to_end, endpoint
 
     chain = Chain([2, 1])
     chain.run(5.0)
     encoded: list[int] = []
-    plain = mail.encode
+    plain = end_to_end.encode
 
     def counted(message: Message) -> bytes:
         encoded.extend([1] if isinstance(message, Event) else [])
         return plain(message)
 
-    for room in (endpoint, mail):
+    for room in (endpoint, end_to_end):
         monkeypatch.setattr(room, "encode", counted)
     event = Event(1, chain.stations[1].mail.series.take(), 100.0, Severity.INFO, "stopped")
     chain.stations[1].mail.submit(event, chain.local(1))
@@ -344,7 +344,7 @@ def test_what_is_no_warning_goes_up_with_the_next_states(
     told, to_the_base, with_events = len(chain.got[BASE]), chain.joints[0][1], []
     put = to_the_base.send
 
-    def counting(frame: Frame) -> bool:
+    def counting(frame: PortFrame) -> bool:
         _, entries = parse_frame(frame.payload) or (None, [])
         with_events.extend([frame] if any(open_payload(entry).kind is Kind.EVENT for _, entry in entries) else [])
         return put(frame)

@@ -8,7 +8,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from telemetry.media.memory import MemoryPort, joint
+from telemetry.media.memory import MemoryPort, joined_ports
 from telemetry.media.port import MAX_FRAME, Priority
 from telemetry.transport.hop import (
     ACK_DELAY,
@@ -36,7 +36,7 @@ class Pair:
     """Two links over one joint, on one clock."""
 
     def __init__(self, seed: int = 0, **troubles: float) -> None:
-        self.ports = joint(seed, **troubles)
+        self.ports = joined_ports(seed, **troubles)
         self.links = [HopLink(1, 1), HopLink(2, 1)]
         self.got: list[list[bytes]] = [[], []]
         self.now = 100.0

@@ -18,12 +18,12 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from sim.can.hub import running_hub
+from sim.can.can_hub import running_hub
 from telemetry.errors import MediumError
-from telemetry.media.memory import joint
-from telemetry.media.port import Frame, Priority, TubeEnd
+from telemetry.media.media_table import MEDIA, open_medium
+from telemetry.media.memory import joined_ports
+from telemetry.media.port import PortFrame, Priority, TubeEnd
 from telemetry.media.send_queue import SEND_LIMIT, SendQueue
-from telemetry.media.table import MEDIA, open_medium
 from telemetry.media.zenoh_bus import open_client, open_router
 from telemetry.messages import Side
 from telemetry.runtime.inbox import Inbox
@@ -138,8 +138,8 @@ class TestBackToBack:
         upper, lower = await tube_joint.pair()
         frames = [b"%d" % k for k in range(300)]
         for frame in frames:
-            assert upper.port.send(Frame(frame))
-            assert lower.port.send(Frame(frame + b" back"))
+            assert upper.port.send(PortFrame(frame))
+            assert lower.port.send(PortFrame(frame + b" back"))
         assert await lower.heard(300) == frames
         assert await upper.heard(300) == [frame + b" back" for frame in frames]
         assert not upper.port.counters
@@ -147,19 +147,19 @@ class TestBackToBack:
     async def test_the_largest_frame_passes_and_a_byte_more_is_refused(self, tube_joint: Joint) -> None:
         upper, lower = await tube_joint.pair()
         largest = random.Random(1).randbytes(upper.port.largest_payload)
-        assert not upper.port.send(Frame(largest + b"!"))
-        assert upper.port.send(Frame(largest))
+        assert not upper.port.send(PortFrame(largest + b"!"))
+        assert upper.port.send(PortFrame(largest))
         assert await lower.heard(1) == [largest]
         assert upper.port.counters == {"too_large": 1}
 
     async def test_an_absent_end_holds_nothing_up_and_gets_the_newest(self, tube_joint: Joint) -> None:
         upper = tube_joint.end(UPPER).listen()
         assert not upper.port.is_up
-        assert upper.port.send(Frame(b"state", Priority.STATE, "state of 1"))
-        assert upper.port.send(Frame(b"survey", Priority.SURVEY))
-        assert upper.port.send(Frame(b"what time is it", Priority.TIME, "time"))
+        assert upper.port.send(PortFrame(b"state", Priority.STATE, "state of 1"))
+        assert upper.port.send(PortFrame(b"survey", Priority.SURVEY))
+        assert upper.port.send(PortFrame(b"what time is it", Priority.TIME, "time"))
         for k in range(3 * SEND_LIMIT):
-            assert upper.port.send(Frame(b"aiding %d" % k, Priority.AIDING, "aiding"))
+            assert upper.port.send(PortFrame(b"aiding %d" % k, Priority.AIDING, "aiding"))
         lower = tube_joint.end(LOWER).listen()
         await upper.sees(up=True)
         upper.port.flush()
@@ -170,9 +170,9 @@ class TestBackToBack:
         upper = tube_joint.end(UPPER).listen()
         kept = [b"survey %d" % k for k in range(SEND_LIMIT - 2)]
         for k, frame in enumerate(kept):
-            upper.port.send(Frame(frame, Priority.SURVEY))
-            upper.port.send(Frame(b"state %d" % k, Priority.STATE, k))
-            upper.port.send(Frame(b"aiding", Priority.AIDING, "aiding"))
+            upper.port.send(PortFrame(frame, Priority.SURVEY))
+            upper.port.send(PortFrame(b"state %d" % k, Priority.STATE, k))
+            upper.port.send(PortFrame(b"aiding", Priority.AIDING, "aiding"))
         lower = tube_joint.end(LOWER).listen()
         await upper.sees(up=True)
         upper.port.flush()
@@ -184,7 +184,7 @@ class TestBackToBack:
     async def test_a_queue_full_of_what_must_not_be_lost_refuses_more(self, tube_joint: Joint) -> None:
         upper = tube_joint.end(UPPER).listen()
         for k in range(SEND_LIMIT + 5):
-            upper.port.send(Frame(b"%d" % k))
+            upper.port.send(PortFrame(b"%d" % k))
         lower = tube_joint.end(LOWER).listen()
         await upper.sees(up=True)
         upper.port.flush()
@@ -193,17 +193,17 @@ class TestBackToBack:
 
     async def test_an_end_that_comes_back_gets_what_waited(self, tube_joint: Joint) -> None:
         upper, lower = await tube_joint.pair()
-        upper.port.send(Frame(b"before"))
+        upper.port.send(PortFrame(b"before"))
         assert await lower.heard(1) == [b"before"]
         lower.leave()
         await upper.sees(up=False)
-        upper.port.send(Frame(b"old", Priority.HELLO, "hello"))
-        upper.port.send(Frame(b"new", Priority.HELLO, "hello"))
+        upper.port.send(PortFrame(b"old", Priority.HELLO, "hello"))
+        upper.port.send(PortFrame(b"new", Priority.HELLO, "hello"))
         again = tube_joint.end(LOWER).listen()
         await upper.sees(up=True)
-        upper.port.send(Frame(b"after", Priority.HELLO))
+        upper.port.send(PortFrame(b"after", Priority.HELLO))
         assert await again.heard(2) == [b"new", b"after"]
-        again.port.send(Frame(b"here again"))
+        again.port.send(PortFrame(b"here again"))
         assert await upper.heard(1) == [b"here again"]
 
     async def test_a_closed_end_refuses_and_is_seen_to_be_closed(self, tube_joint: Joint) -> None:
@@ -211,15 +211,15 @@ class TestBackToBack:
         lower.port.close()
         lower.port.close()
         with pytest.raises(MediumError, match="closed"):
-            lower.port.send(Frame(b"x"))
+            lower.port.send(PortFrame(b"x"))
         assert not lower.port.is_up
         await upper.sees(up=False)
 
     @pytest.mark.parametrize("garbage", [b"", b"\0", b"\xc1" * 40, random.Random(2).randbytes(500)])
     async def test_garbage_arrives_as_it_is_and_the_link_counts_it(self, tube_joint: Joint, garbage: bytes) -> None:
         upper, lower = await tube_joint.pair()
-        upper.port.send(Frame(garbage))
-        upper.port.send(Frame(b"sound"))
+        upper.port.send(PortFrame(garbage))
+        upper.port.send(PortFrame(b"sound"))
         assert await lower.heard(2) == [garbage, b"sound"]
         link = HopLink(1, 1)
         assert link.receive(garbage, 1.0) == []
@@ -230,8 +230,8 @@ class TestBackToBack:
         stranger = tube_joint.end(TubeEnd(RIG, 4, Side.LOWER, 3)).listen()
         beside = tube_joint.end(TubeEnd(RIG, 3, Side.UPPER, 4)).listen()
         await stranger.sees(up=True)
-        upper.port.send(Frame(b"one"))
-        stranger.port.send(Frame(b"two"))
+        upper.port.send(PortFrame(b"one"))
+        stranger.port.send(PortFrame(b"two"))
         assert await lower.heard(1) == [b"one"]
         assert await beside.heard(1) == [b"two"]
 
@@ -254,7 +254,7 @@ def test_a_medium_is_added_by_a_module_and_a_line(tmp_path: Path, monkeypatch: p
     with open_medium("pipe:a") as medium:
         upper, lower = medium.open_port(UPPER), medium.open_port(LOWER)
         lower.listen(heard.append)
-        upper.send(Frame(b"hello"))
+        upper.send(PortFrame(b"hello"))
         upper.close()
         lower.close()
     assert heard == [b"hello"]
@@ -319,12 +319,12 @@ def test_an_end_in_memory_has_one_port() -> None:
 
 def test_the_faults_of_a_joint_in_memory() -> None:
     def carried(**faults: float) -> list[bytes]:
-        upper, lower = joint(3, **faults)
+        upper, lower = joined_ports(3, **faults)
         upper.listen(lambda frame: None)
         heard: list[bytes] = []
         lower.listen(heard.append)
         for k in range(200):
-            upper.send(Frame(b"frame %3d" % k))
+            upper.send(PortFrame(b"frame %3d" % k))
         lower.advance(10.0)
         return heard
 
@@ -337,11 +337,11 @@ def test_the_faults_of_a_joint_in_memory() -> None:
     assert 0 < sum(a != b for a, b in zip(carried(corrupt=0.5), sent, strict=True)) < 200
 
 
-frames = st.builds(Frame, st.binary(max_size=4), st.sampled_from(Priority), st.one_of(st.none(), st.integers(0, 3)))
+frames = st.builds(PortFrame, st.binary(max_size=4), st.sampled_from(Priority), st.one_of(st.none(), st.integers(0, 3)))
 
 
 @given(st.lists(frames, max_size=40), st.integers(1, 8))
-def test_a_queue_is_bounded_and_accounts_for_every_frame(offered: list[Frame], limit: int) -> None:
+def test_a_queue_is_bounded_and_accounts_for_every_frame(offered: list[PortFrame], limit: int) -> None:
     queue = SendQueue(3, limit)
     for frame in offered:
         assert queue.offer(frame) is (len(frame.payload) <= 3)
@@ -357,7 +357,7 @@ def test_a_queue_is_bounded_and_accounts_for_every_frame(offered: list[Frame], l
 def test_a_port_that_goes_down_while_it_drains_keeps_the_rest() -> None:
     queue = SendQueue(10)
     for k in range(5):
-        queue.offer(Frame(b"%d" % k))
+        queue.offer(PortFrame(b"%d" % k))
     sent: list[bytes] = []
     queue.drain(lambda: len(sent) < 2, sent.append)
     assert (sent, len(queue)) == ([b"0", b"1"], 3)

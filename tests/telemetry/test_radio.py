@@ -10,10 +10,19 @@ from hypothesis import strategies as st
 
 from telemetry.errors import InputError, RadioError
 from telemetry.radio.limits import ELECTRIC_CONSTANT, IMPEDANCE, SPEED_OF_LIGHT
-from telemetry.radio.path_loss import margin, packet_error_rate, path_loss, propagation, received
-from telemetry.radio.soil import PorosityWarning, Soil, permittivity, water_permittivity
-from telemetry.radio.steel import API_5L, CARBON_PERCENT, RESISTIVITY, TEMPERATURES, carbon_of, resistivity
-from telemetry.radio.waveguide import TE11, TE21, TM01, Mode, attenuation, cut_off, decibels, reach
+from telemetry.radio.path_loss import link_margin, packet_error_rate, path_loss, propagation_constants, received_power
+from telemetry.radio.soil_dielectric import PorosityWarning, Soil, soil_permittivity, water_permittivity
+from telemetry.radio.steel import API_5L, CARBON_PERCENT, RESISTIVITY, TEMPERATURES, carbon_of, steel_resistivity
+from telemetry.radio.waveguide import (
+    TE11,
+    TE21,
+    TM01,
+    WaveguideMode,
+    cut_off,
+    link_reach,
+    nepers_to_decibels,
+    wall_attenuation,
+)
 
 F = 868e6
 FREQUENCIES = st.floats(0.3e9, 1.3e9)
@@ -29,8 +38,8 @@ def textures(draw: st.DrawFn) -> tuple[float, float]:
 def power(sand: float, clay: float, water: float, distance: float, log=np.log10, **more: float) -> float:
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", PorosityWarning)
-        eps = permittivity(Soil(sand, clay, water=water, **more), F)
-    return float(received(path_loss(*propagation(*eps, F), distance, log)))
+        eps = soil_permittivity(Soil(sand, clay, water=water, **more), F)
+    return float(received_power(path_loss(*propagation_constants(*eps, F), distance, log)))
 
 
 def test_constants_are_those_of_free_space() -> None:
@@ -52,7 +61,7 @@ def test_dry_soil_is_a_mixture_of_solids_and_air() -> None:
     """Without water the formula of the model is elementary: solids of 4.67 at 1.5 of 2.66 g/cm^3."""
     solid = (1.01 + 0.44 * 2.66) ** 2 - 0.062
     mixed = 1.0 + 1.5 / 2.66 * (solid**0.65 - 1.0)
-    real, loss = permittivity(Soil(0.3, 0.3, 1.5, 0.0), F)
+    real, loss = soil_permittivity(Soil(0.3, 0.3, 1.5, 0.0), F)
     assert real == pytest.approx(1.15 * mixed ** (1.0 / 0.65) - 0.68, rel=1e-6)
     assert loss == pytest.approx(0.0, abs=1e-4)
 
@@ -69,7 +78,7 @@ def test_moist_soil_is_that_of_the_formula_written_out() -> None:
     of_real, of_loss = 1.2748 - 0.519 * sand - 0.152 * clay, 1.33797 - 0.603 * sand - 0.166 * clay
     solid = (1.01 + 0.44 * 2.66) ** 2 - 0.062
     mixed = 1.0 + density / 2.66 * (solid**0.65 - 1.0) + water**of_real * water_real**0.65 - water
-    real, loss = permittivity(Soil(sand, clay, density, water, 20.0), f)
+    real, loss = soil_permittivity(Soil(sand, clay, density, water, 20.0), f)
     assert real == pytest.approx(1.15 * mixed ** (1.0 / 0.65) - 0.68, rel=1e-4)
     assert loss == pytest.approx((water**of_loss * water_loss**0.65) ** (1.0 / 0.65), rel=1e-4)
 
@@ -77,7 +86,7 @@ def test_moist_soil_is_that_of_the_formula_written_out() -> None:
 @given(FREQUENCIES, st.floats(0.01, 100.0))
 def test_without_soil_the_path_loss_is_that_of_free_space(frequency: float, distance: float) -> None:
     """Friis: 20 log10(4 pi d f / c), to the rounding of 6.4 dB."""
-    alpha, beta = propagation(1.0, 0.0, frequency)
+    alpha, beta = propagation_constants(1.0, 0.0, frequency)
     assert alpha == 0.0
     friis = 20.0 * math.log10(2.0 * math.tau * distance * frequency / SPEED_OF_LIGHT)
     assert path_loss(alpha, beta, distance) == pytest.approx(friis, abs=0.4)
@@ -86,7 +95,7 @@ def test_without_soil_the_path_loss_is_that_of_free_space(frequency: float, dist
 @given(st.floats(1.0, 80.0), st.floats(1e-6, 100.0), FREQUENCIES)
 def test_attenuation_and_phase_are_the_square_root_of_the_permittivity(real: float, loss: float, f: float) -> None:
     root = np.sqrt(complex(real, -loss)) * math.tau * f / SPEED_OF_LIGHT
-    alpha, beta = propagation(real, loss, f)
+    alpha, beta = propagation_constants(real, loss, f)
     assert beta == pytest.approx(root.real, rel=1e-9)
     assert alpha == pytest.approx(-root.imag, rel=1e-9)
 
@@ -122,20 +131,22 @@ def test_a_million_links_at_once_are_the_same_links_one_by_one() -> None:
     n, random = 1_000_000, np.random.default_rng(3)
     sand, clay, water = random.uniform(0.0, 0.5, n), random.uniform(0.0, 0.5, n), random.uniform(0.0, 0.3, n)
     f, distance = random.uniform(0.3e9, 1.3e9, n), random.uniform(0.1, 0.3, n)
-    eps = permittivity(Soil(sand, clay, 1.5, water), f)
-    over = margin(received(path_loss(*propagation(*eps, f), distance)))
-    rho = resistivity(random.uniform(0.06, 1.22, n), random.uniform(20.0, 400.0, n))
-    lost = attenuation(TE11, 0.03, 4.0 * f + 3e9, rho)
+    eps = soil_permittivity(Soil(sand, clay, 1.5, water), f)
+    over = link_margin(received_power(path_loss(*propagation_constants(*eps, f), distance)))
+    rho = steel_resistivity(random.uniform(0.06, 1.22, n), random.uniform(20.0, 400.0, n))
+    lost = wall_attenuation(TE11, 0.03, 4.0 * f + 3e9, rho)
     assert over.shape == lost.shape == (n,)
     for k in range(0, n, 250_000):
-        alone = permittivity(Soil(sand[k], clay[k], 1.5, water[k]), f[k])
-        assert margin(received(path_loss(*propagation(*alone, f[k]), distance[k]))) == pytest.approx(over[k])
-        assert attenuation(TE11, 0.03, 4.0 * f[k] + 3e9, rho[k]) == pytest.approx(lost[k])
+        alone = soil_permittivity(Soil(sand[k], clay[k], 1.5, water[k]), f[k])
+        assert link_margin(
+            received_power(path_loss(*propagation_constants(*alone, f[k]), distance[k]))
+        ) == pytest.approx(over[k])
+        assert wall_attenuation(TE11, 0.03, 4.0 * f[k] + 3e9, rho[k]) == pytest.approx(lost[k])
 
 
 def test_more_water_than_pores_is_answered_with_a_warning() -> None:
     with pytest.warns(PorosityWarning, match="holds at most 44 % by volume .its porosity., got 80 %"):
-        real, _ = permittivity(Soil(0.3, 0.3, 1.5, [0.2, 0.8]), F)
+        real, _ = soil_permittivity(Soil(0.3, 0.3, 1.5, [0.2, 0.8]), F)
     assert real[1] > real[0]
 
 
@@ -148,86 +159,89 @@ def test_packet_error_rate_is_logistic(over: float, width: float) -> None:
 
 
 @pytest.mark.parametrize(("mode", "ghz"), [(TE11, 2.928), (TM01, 3.825), (TE21, 4.858)], ids=["TE11", "TM01", "TE21"])
-def test_cut_offs_of_a_bore_of_three_centimetres(mode: Mode, ghz: float) -> None:
+def test_cut_offs_of_a_bore_of_three_centimetres(mode: WaveguideMode, ghz: float) -> None:
     assert cut_off(mode, 0.03) * 1e-9 == pytest.approx(ghz, abs=5e-4)
 
 
 @given(st.floats(1e-8, 1e-6))
 def test_the_modes_are_apart_by_a_factor_that_no_steel_changes(rho: float) -> None:
-    te, tm = (decibels(attenuation(mode, 0.03, 5e9, rho)) for mode in (TE11, TM01))
+    te, tm = (nepers_to_decibels(wall_attenuation(mode, 0.03, 5e9, rho)) for mode in (TE11, TM01))
     assert tm / te == pytest.approx(1.653, abs=5e-4)
 
 
 def test_the_printed_attenuation_and_reaches() -> None:
-    assert decibels(attenuation(TE11, 0.03, 5e9, 1.12e-7)) == pytest.approx(0.034, abs=1e-4)
-    assert reach(0.034, 110.0) == pytest.approx(3235.0, abs=0.5)
-    assert reach(0.030, 110.0) == pytest.approx(3666.0, abs=1.0)
+    assert nepers_to_decibels(wall_attenuation(TE11, 0.03, 5e9, 1.12e-7)) == pytest.approx(0.034, abs=1e-4)
+    assert link_reach(0.034, 110.0) == pytest.approx(3235.0, abs=0.5)
+    assert link_reach(0.030, 110.0) == pytest.approx(3666.0, abs=1.0)
 
 
 @given(st.floats(0.01, 0.5), st.floats(1.001, 50.0))
 def test_attenuation_of_tm_is_the_surface_over_the_guide(radius: float, over: float) -> None:
     """TM01 against the wave impedance and geometry, and least at sqrt(3) times the cut-off."""
     lowest = float(cut_off(TM01, radius))
-    best = attenuation(TM01, radius, math.sqrt(3.0) * lowest, 1e-7)
-    assert attenuation(TM01, radius, over * lowest, 1e-7) >= best * (1.0 - 1e-12)
+    best = wall_attenuation(TM01, radius, math.sqrt(3.0) * lowest, 1e-7)
+    assert wall_attenuation(TM01, radius, over * lowest, 1e-7) >= best * (1.0 - 1e-12)
 
 
 @pytest.mark.parametrize(
     ("carbon", "warm", "published"), [(0.10, 20.0, 14.3), (0.20, 20.0, 15.9), (0.40, 20.0, 17.1), (0.80, 100.0, 23.2)]
 )
 def test_resistivity_is_near_published_points(carbon: float, warm: float, published: float) -> None:
-    assert resistivity(carbon, warm) == pytest.approx(published * 1e-8, rel=0.03)
+    assert steel_resistivity(carbon, warm) == pytest.approx(published * 1e-8, rel=0.03)
 
 
 def test_resistivity_goes_through_its_measurements() -> None:
     carbon, warm = np.meshgrid(CARBON_PERCENT, TEMPERATURES, indexing="ij")
-    np.testing.assert_allclose(resistivity(carbon, warm), RESISTIVITY, rtol=1e-12)
+    np.testing.assert_allclose(steel_resistivity(carbon, warm), RESISTIVITY, rtol=1e-12)
 
 
 @given(st.floats(0.06, 1.21), st.floats(20.0, 399.0))
 def test_resistivity_rises_with_carbon_and_temperature(carbon: float, warm: float) -> None:
-    here = resistivity(carbon, warm)
-    assert resistivity(carbon + 0.01, warm) > here
-    assert resistivity(carbon, warm + 1.0) > here
+    here = steel_resistivity(carbon, warm)
+    assert steel_resistivity(carbon + 0.01, warm) > here
+    assert steel_resistivity(carbon, warm + 1.0) > here
 
 
 def test_every_grade_has_a_resistivity() -> None:
     assert carbon_of("X52 seamless") == 0.31
-    assert all(16e-8 < resistivity(carbon) < 18e-8 for carbon in API_5L.values())
+    assert all(16e-8 < steel_resistivity(carbon) < 18e-8 for carbon in API_5L.values())
 
 
-@pytest.mark.parametrize(("name", "mode"), [("TE11", TE11), ("TM0,12", Mode("TM", 0, 12))])
-def test_a_mode_is_named_as_it_is_read(name: str, mode: Mode) -> None:
-    assert Mode.parse(name) == mode
+@pytest.mark.parametrize(("name", "mode"), [("TE11", TE11), ("TM0,12", WaveguideMode("TM", 0, 12))])
+def test_a_mode_is_named_as_it_is_read(name: str, mode: WaveguideMode) -> None:
+    assert WaveguideMode.parse(name) == mode
     assert str(mode) == name
 
 
 @pytest.mark.parametrize(
     ("asked", "named"),
     [
-        (lambda: permittivity(Soil(0.3, 0.3), 2.4e9), "frequency: expected 0.3..1.3 GHz, got 2.4"),
-        (lambda: permittivity(Soil(0.3, 0.3), [1e9, 0.2e9]), "frequency: expected 0.3..1.3 GHz, got 0.2"),
-        (lambda: permittivity(Soil(0.3, 0.3), math.nan), "frequency: expected 0.3..1.3 GHz, got nan"),
-        (lambda: permittivity(Soil(-0.1, 0.3), F), "sand: expected 0..1, got -0.1"),
-        (lambda: permittivity(Soil(0.7, 0.6), F), "sand and clay: expected fractions of at most 1 together, got 1.3"),
-        (lambda: permittivity(Soil(0.3, 0.3, 3.0), F), "bulk density: expected 0.5..2.6 g/cm^3, got 3"),
-        (lambda: permittivity(Soil(0.3, 0.3, 1.5, 1.2), F), "water: expected 0..1, got 1.2"),
-        (lambda: permittivity(Soil(0.3, 0.3, temperature=50.0), F), "temperature: expected 0..40 C, got 50"),
+        (lambda: soil_permittivity(Soil(0.3, 0.3), 2.4e9), "frequency: expected 0.3..1.3 GHz, got 2.4"),
+        (lambda: soil_permittivity(Soil(0.3, 0.3), [1e9, 0.2e9]), "frequency: expected 0.3..1.3 GHz, got 0.2"),
+        (lambda: soil_permittivity(Soil(0.3, 0.3), math.nan), "frequency: expected 0.3..1.3 GHz, got nan"),
+        (lambda: soil_permittivity(Soil(-0.1, 0.3), F), "sand: expected 0..1, got -0.1"),
+        (
+            lambda: soil_permittivity(Soil(0.7, 0.6), F),
+            "sand and clay: expected fractions of at most 1 together, got 1.3",
+        ),
+        (lambda: soil_permittivity(Soil(0.3, 0.3, 3.0), F), "bulk density: expected 0.5..2.6 g/cm^3, got 3"),
+        (lambda: soil_permittivity(Soil(0.3, 0.3, 1.5, 1.2), F), "water: expected 0..1, got 1.2"),
+        (lambda: soil_permittivity(Soil(0.3, 0.3, temperature=50.0), F), "temperature: expected 0..40 C, got 50"),
         (lambda: path_loss(1.0, 1.0, -0.1), "distance: expected more than 0 m, got -0.1"),
         (lambda: packet_error_rate(3.0, 0.0), "width: expected more than 0 dB, got 0"),
         (
-            lambda: attenuation(TE11, 0.03, 2.4e9, 1e-7),
+            lambda: wall_attenuation(TE11, 0.03, 2.4e9, 1e-7),
             "frequency: expected more than 2.928 GHz, the cut-off of TE11 in this pipe, got 2.4; "
             "below it nothing propagates",
         ),
         (lambda: cut_off(TE11, -0.03), "radius: expected 0.01..1000 cm, got -3"),
-        (lambda: attenuation(TE11, 0.03, 5e9, 0.0), "resistivity: expected more than 0 ohm m, got 0"),
-        (lambda: reach(0.0, 110.0), "attenuation: expected more than 0 dB/m, got 0"),
-        (lambda: resistivity(2.0), "carbon: expected 0.06..1.22 %, got 2"),
-        (lambda: resistivity(0.2, 10.0), "temperature: expected 20..400 C, got 10"),
+        (lambda: wall_attenuation(TE11, 0.03, 5e9, 0.0), "resistivity: expected more than 0 ohm m, got 0"),
+        (lambda: link_reach(0.0, 110.0), "attenuation: expected more than 0 dB/m, got 0"),
+        (lambda: steel_resistivity(2.0), "carbon: expected 0.06..1.22 %, got 2"),
+        (lambda: steel_resistivity(0.2, 10.0), "temperature: expected 20..400 C, got 10"),
         (lambda: carbon_of("X80"), "grade: expected one of A25, A seamless"),
-        (lambda: Mode.parse("TEM"), "mode: expected a name such as TE11 or TM01, got 'TEM'"),
-        (lambda: Mode("TE", 1, 0), "mode: expected m of 0..20 and n of 1..20, got TE10"),
+        (lambda: WaveguideMode.parse("TEM"), "mode: expected a name such as TE11 or TM01, got 'TEM'"),
+        (lambda: WaveguideMode("TE", 1, 0), "mode: expected m of 0..20 and n of 1..20, got TE10"),
     ],
 )
 def test_what_lies_outside_a_model_is_refused_with_its_range(asked, named: str) -> None:

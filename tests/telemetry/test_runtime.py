@@ -25,7 +25,7 @@ from telemetry import keys
 from telemetry.application.endpoint import Endpoint
 from telemetry.errors import MediumError
 from telemetry.media.neighbours import neighbour_ports, stepped_ports
-from telemetry.media.port import Frame, Port, Priority, TubeEnd
+from telemetry.media.port import Port, PortFrame, Priority, TubeEnd
 from telemetry.media.zenoh_bus import JSON, Query, ZenohBus, open_client, open_router
 from telemetry.media.zenoh_port import ZenohMedium
 from telemetry.messages import ENCODER, Message, Side, TimeReply, TimeRequest
@@ -34,8 +34,8 @@ from telemetry.runtime import step_client
 from telemetry.runtime.hosting import Place
 from telemetry.runtime.inbox import INBOX_LIMIT, Inbox
 from telemetry.runtime.own_clock import ABSENT_LIMIT, AbsenceWatch, OwnClock, OwnClockLoop
-from telemetry.runtime.process import Process
-from telemetry.runtime.step_client import STEP, AsyncStepClient, StepAssembler, StepClient, serve, serve_stepped
+from telemetry.runtime.process_interface import Process
+from telemetry.runtime.step_client import STEP, AsyncStepClient, StepAssembler, StepClient, serve_stepped, serve_steps
 from telemetry.runtime.step_stream import StepStream
 from telemetry.runtime.stepped import Due, DueEvent, pack_step, run_step, unpack_step
 from telemetry.runtime.timing import CycleTiming
@@ -145,7 +145,7 @@ class TestSteps:
             stream_to(steps_at) as stream,
         ):
             client = StepClient(bus, RIG, ENCODER, stepped_ports(ZenohMedium(bus), RIG, ENCODER, Side), stream)
-            thread = threading.Thread(target=serve, args=(Plain(), client))
+            thread = threading.Thread(target=serve_steps, args=(Plain(), client))
             thread.start()
             try:
                 assert answers_of(stepper) == answers_in_memory()
@@ -180,7 +180,7 @@ class TestSteps:
         reported: Inbox[str] = Inbox()
         with open_client(router.endpoint, PATIENCE) as bus:
             plain, other = StepClient(bus, RIG, 1, {}), AsyncStepClient(bus, RIG, 2, {})
-            thread = threading.Thread(target=serve, args=(Plain(), plain, reported.put))
+            thread = threading.Thread(target=serve_steps, args=(Plain(), plain, reported.put))
             thread.start()
             serving = asyncio.create_task(serve_stepped(Plain(), other, reported.put))
             lines = [await asyncio.wait_for(reported.get(), PATIENCE) for _ in range(2)]
@@ -228,7 +228,7 @@ class TestSteps:
             stranger.shutdown(socket.SHUT_WR)
             with open_client(router.endpoint, PATIENCE) as bus, stream_to(place) as stream:
                 client = StepClient(bus, RIG, ENCODER, stepped_ports(ZenohMedium(bus), RIG, ENCODER, Side), stream)
-                thread = threading.Thread(target=serve, args=(Plain(), client))
+                thread = threading.Thread(target=serve_steps, args=(Plain(), client))
                 thread.start()
                 try:
                     assert answers_of(stepper) == answers_in_memory()
@@ -314,7 +314,7 @@ class TestOwnClock:
         sender = medium.open_port(TubeEnd(RIG, 1, Side.UPPER, ENCODER))
         await until(lambda: sender.is_up)
         for k in range(flood):
-            sender.send(Frame(b"%d" % k))
+            sender.send(PortFrame(b"%d" % k))
         await until(lambda: loop.losses()["inbox_dropped"] == flood - INBOX_LIMIT)
         assert loop.losses()["ports"]["lower"] == {"is_up": False, "not_sent": {}}
         running = asyncio.create_task(loop.run())
@@ -363,7 +363,7 @@ class TestOwnClock:
             meanwhile: list[int] = []
 
             def work(_process: Process, _now: float) -> None:
-                thread = threading.Thread(target=sender.send, args=(Frame(b"no frame"),))
+                thread = threading.Thread(target=sender.send, args=(PortFrame(b"no frame"),))
                 thread.start()
                 thread.join(PATIENCE)
                 meanwhile.extend(process.threads)
@@ -376,7 +376,7 @@ class TestOwnClock:
     async def test_an_error_on_the_thread_that_hears_ends_the_loop(self, router: Router) -> None:
         with pytest.raises(RuntimeError, match="no more"):
             async with running_at_once(Watched(), router.bus) as (_, sender):
-                await asyncio.to_thread(sender.send, Frame(b"refuse"))
+                await asyncio.to_thread(sender.send, PortFrame(b"refuse"))
 
     def test_a_silent_end_is_named_once_until_somebody_is_heard(self) -> None:
         watch = AbsenceWatch(Side, begin=100.0)

@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 from node.kernels.arithmetic.formats import PERIOD
 from telemetry.application.commands import STAGES
 from telemetry.runtime.own_clock import Schedule
-from telemetry.runtime.timing import BIN_RATIO, Durations, Stage
+from telemetry.runtime.timing import BIN_RATIO, CycleStage, Durations
 
 seconds = st.floats(2e-6, 50.0)
 
@@ -55,4 +55,4 @@ def test_deadlines_stay_on_their_grid_and_a_late_end_leaves_out_those_that_passe
 
 
 def test_the_table_of_commands_names_every_stage() -> None:
-    assert tuple(stage.value for stage in Stage) == STAGES
+    assert tuple(stage.value for stage in CycleStage) == STAGES

@@ -6,8 +6,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from telemetry.application.endpoint import Endpoint
+from telemetry.application.endpoint_state import STATE_LAYOUT
 from telemetry.application.outbox import LIMIT, Outbox
-from telemetry.application.saved_state import STATE_LAYOUT
 from telemetry.application.series import SERIES_SHIFT
 from telemetry.errors import DecodeError
 from telemetry.messages import (

@@ -9,15 +9,15 @@ from hypothesis import strategies as st
 
 from telemetry.errors import KeyFileError
 from telemetry.messages import MAX_SEGMENTS, SEGMENT_SIZE, BlockSegment, BlockStatus, UploadPhase
-from telemetry.transport.authentication import is_authentic, new_key, read_key, seal
-from telemetry.transport.upload import FIRST_RETRY, LAST_RETRY, UNTRUSTED_LIMIT, Assembly, Upload, split
+from telemetry.transport.authentication import is_authentic, new_key, read_key, sealed_segment
+from telemetry.transport.upload import FIRST_RETRY, LAST_RETRY, UNTRUSTED_LIMIT, Assembly, Upload, split_block
 
 KEY = bytes(range(32))
 BLOCK = bytes(k % 251 for k in range(800))
 
 
 def segments(block: bytes = BLOCK) -> tuple[BlockSegment, ...]:
-    return split(block, 3, 77, 5, KEY)
+    return split_block(block, 3, 77, 5, KEY)
 
 
 def status(phase: UploadPhase, received: int = 0, **change: object) -> BlockStatus:
@@ -83,7 +83,7 @@ def test_a_change_of_anything_breaks_the_tag(change: dict) -> None:
 
 
 def test_another_key_makes_another_tag() -> None:
-    assert not is_authentic(seal(segments()[0], bytes(32)), KEY)
+    assert not is_authentic(sealed_segment(segments()[0], bytes(32)), KEY)
 
 
 def test_all_are_sent_once_and_then_what_is_missing() -> None:

@@ -10,17 +10,17 @@ import sys
 
 def floats() -> None:
     """The usual kernel of a node and the string of the studies around it, the other kernels in floats, and surveys."""
-    from groundstation.survey.well.compiled_model import warm
+    from groundstation.survey.well.compiled_model import preload_models
     from node.firmware.settings import KERNELS
 
-    importlib.import_module("borechain.warm")
+    importlib.import_module("borechain.preload")
     from sim.studies.lab import LAB, run_seed
 
     run_seed((LAB, 1))
     for kernel in KERNELS:
         if kernel not in {"float64", "fixed"}:
             warm_kernel(kernel)
-    warm()
+    preload_models()
 
 
 def integers() -> None:

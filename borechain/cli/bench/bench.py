@@ -11,9 +11,9 @@ from typing import Any, cast
 
 import click
 
+from borechain.cli.console_tables import table_console
 from borechain.cli.faults import EnvironmentFault, InputFault, plain_faults
-from borechain.cli.options import json_option
-from borechain.cli.tables import console
+from borechain.cli.shared_options import json_option
 
 FOLDER = Path(__file__).parents[3] / "benchmarks"
 OWN = {
@@ -26,7 +26,7 @@ OWN = {
 }  # and the module of each
 
 
-def benches() -> list[str]:
+def bench_names() -> list[str]:
     """Names of the benchmarks: those of the repository, and those of the package."""
     return sorted([*(path.stem for path in FOLDER.glob("*.py")), *OWN])
 
@@ -37,7 +37,7 @@ class Benches(click.Group):
     def list_commands(self, ctx: click.Context) -> list[str]:
         """Names in order."""
         del ctx
-        return benches()
+        return bench_names()
 
     def get_command(self, ctx: click.Context, cmd_name: str) -> click.Command:
         """One of them.
@@ -50,8 +50,8 @@ class Benches(click.Group):
         del ctx
         if cmd_name not in OWN and not FOLDER.is_dir():
             raise EnvironmentFault(f"bench {cmd_name}: the benchmarks beside other libraries are in the repository")
-        if cmd_name not in benches():
-            raise InputFault(f"expected one of {', '.join(benches())}, got {cmd_name!r}")
+        if cmd_name not in bench_names():
+            raise InputFault(f"expected one of {', '.join(bench_names())}, got {cmd_name!r}")
         if cmd_name in OWN:
             module = importlib.import_module(f"borechain.cli.bench.{OWN[cmd_name]}")
             return cast("click.Command", getattr(module, cmd_name))
@@ -76,7 +76,7 @@ def bench(context: click.Context) -> None:
       borechain bench hour
     """
     if context.invoked_subcommand is None:
-        click.echo("\n".join(benches()))
+        click.echo("\n".join(bench_names()))
         if not FOLDER.is_dir():
             click.echo("the benchmarks beside other libraries are in the repository, not here", err=True)
 
@@ -102,7 +102,7 @@ def side_by_side(name: str) -> click.Command:
         if as_json:
             click.echo(json.dumps(result))
         else:
-            show(result)
+            show_ratios(result)
 
     return command
 
@@ -112,7 +112,7 @@ def subject_of(file: Path) -> str:
     return (ast.get_docstring(ast.parse(file.read_text())) or "").partition("\n")[0]
 
 
-def show(result: dict[str, Any]) -> None:
+def show_ratios(result: dict[str, Any]) -> None:
     """Table for people."""
     from rich.table import Table
 
@@ -121,11 +121,13 @@ def show(result: dict[str, Any]) -> None:
         table.add_column(heading, justify="right")
     for what, row in result["ratios"].items():
         ratio = row["ratio"]
-        table.add_row(what, seconds(row["ours"]), seconds(row["peer"]), "" if ratio is None else f"{ratio:.3g}")
-    console().print(table)
+        table.add_row(
+            what, duration_text(row["ours"]), duration_text(row["peer"]), "" if ratio is None else f"{ratio:.3g}"
+        )
+    table_console().print(table)
 
 
-def seconds(value: float | None) -> str:
+def duration_text(value: float | None) -> str:
     """A time with its unit."""
     if value is None:
         return ""

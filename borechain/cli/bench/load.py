@@ -9,9 +9,9 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from borechain.cli.faults import EnvironmentFault, needs, plain_faults
-from borechain.cli.options import json_option, seed_option
-from telemetry.runtime.options import endpoint_option
+from borechain.cli.faults import EnvironmentFault, plain_faults, require_modules
+from borechain.cli.shared_options import json_option, seed_option
+from telemetry.runtime.process_options import endpoint_option
 
 if TYPE_CHECKING:
     from groundstation.gateway.page.settings import PageSettings
@@ -31,7 +31,7 @@ page_option = click.option(
 @page_option
 @endpoint_option("Where its router listens.")
 @json_option
-@needs("orjson", "rich", "scipy", "sqlalchemy", "starlette", "uvicorn")
+@require_modules("orjson", "rich", "scipy", "sqlalchemy", "starlette", "uvicorn")
 @plain_faults
 def page(tubes: int, browsers: int, terminals: int, seconds: float, address: str, endpoint: str, as_json: bool) -> None:
     """Have a ground station with its page bear a shift: tubes at 1.9 Hz that drill and survey, readers, questions.
@@ -40,13 +40,13 @@ def page(tubes: int, browsers: int, terminals: int, seconds: float, address: str
     Example:
       borechain bench page --tubes 50 --browsers 3 --terminals 2
     """
-    from borechain.load.page import Load, measure
+    from borechain.load.page import Load, measure_load
 
     served = free_page(address, endpoint)
     load = Load(tubes, browsers, terminals, seconds)
     with tempfile.TemporaryDirectory(prefix="borechain-") as folder:
         result: dict[str, Any] = {"bench": "page", "tubes": tubes, "seconds": seconds}
-        result |= measure(load, endpoint, served, Path(folder))
+        result |= measure_load(load, endpoint, served, Path(folder))
     if as_json:
         click.echo(json.dumps(result))
         return
@@ -55,9 +55,9 @@ def page(tubes: int, browsers: int, terminals: int, seconds: float, address: str
     memory = f"{begin[1]:.1f} MB at first, {middle[1]:.1f} MB after {middle[0]:.0f} s, {end[1]:.1f} MB at the end"
     click.echo(f"ground station: {result['cpu_percent']:.1f} % of a core, {memory}")
     for name, what in (("browser", "news on the page"), ("terminal", "news on the keys")):
-        click.echo(line(f"{what}, {name}", result[f"{name}_late_ms"]))
-    click.echo(line(f"answers to questions, {result['unanswered']} without one", result["answer_ms"]))
-    click.echo(line("answers of a process that does nothing else", result["bare_ms"]))
+        click.echo(latency_line(f"{what}, {name}", result[f"{name}_late_ms"]))
+    click.echo(latency_line(f"answers to questions, {result['unanswered']} without one", result["answer_ms"]))
+    click.echo(latency_line("answers of a process that does nothing else", result["bare_ms"]))
     click.echo(f"{result['stations']} stations of {result['surveys']} surveys")
 
 
@@ -78,7 +78,7 @@ def free_page(address: str, endpoint: str) -> PageSettings:
 @page_option
 @endpoint_option("Where its router listens.")
 @json_option
-@needs("orjson", "rich", "scipy", "sqlalchemy", "starlette", "uvicorn")
+@require_modules("orjson", "rich", "scipy", "sqlalchemy", "starlette", "uvicorn")
 @plain_faults
 def day(hours: float, tubes: int, address: str, endpoint: str, as_json: bool) -> None:
     """Start a ground station upon the surveys of hours of drilling, and open its history on the page.
@@ -100,7 +100,7 @@ def day(hours: float, tubes: int, address: str, endpoint: str, as_json: bool) ->
     click.echo(f"{result['surveys']} surveys at {result['stations']} stations: {start}")
     again = f"asked again {result['history_ms']:.0f} ms"
     click.echo(f"page opened: {result['picture_ms']:.0f} ms until the history has come; {again}")
-    click.echo(line("an earlier moment", result["moment_ms"]))
+    click.echo(latency_line("an earlier moment", result["moment_ms"]))
     click.echo(f"memory: {result['private_mb']:.0f} MB")
 
 
@@ -110,7 +110,7 @@ def day(hours: float, tubes: int, address: str, endpoint: str, as_json: bool) ->
 # after 15 stops the bit is deeper than its string by what a ground station lets pass
 @click.option("--stops", type=click.IntRange(3, 15), default=12, show_default=True, help="That it learns more.")
 @json_option
-@needs("orjson", "rich", "scipy", "sqlalchemy")
+@require_modules("orjson", "rich", "scipy", "sqlalchemy")
 @plain_faults
 def learn(surveys: int, tubes: int, stops: int, as_json: bool) -> None:
     """What a ground station that has thousands of surveys needs to start, to learn one more and to answer, in CPU time.
@@ -119,7 +119,7 @@ def learn(surveys: int, tubes: int, stops: int, as_json: bool) -> None:
     Example:
       borechain bench learn --surveys 10000
     """
-    from borechain.cli.tables import show_table
+    from borechain.cli.console_tables import show_table
     from borechain.load.learning import measure_learning
     from groundstation.host import load_kernels
 
@@ -136,7 +136,7 @@ def learn(surveys: int, tubes: int, stops: int, as_json: bool) -> None:
     click.echo(f"database, for each survey: {sizes}")
 
 
-def line(what: str, figures: dict[str, Any]) -> str:
+def latency_line(what: str, figures: dict[str, Any]) -> str:
     """Figures for people."""
     if not figures["count"]:
         return f"{what}: none"
@@ -154,7 +154,7 @@ def line(what: str, figures: dict[str, Any]) -> str:
 @endpoint_option("Where its router listens.")
 @json_option
 @seed_option
-@needs("orjson", "rich", "scipy", "sqlalchemy")
+@require_modules("orjson", "rich", "scipy", "sqlalchemy")
 @plain_faults
 def killed(times: int, database: str | None, endpoint: str, as_json: bool, seed: int) -> None:
     """Kill a ground station at moments by lot while it takes events, and look whether what it receipted is kept.
@@ -166,19 +166,19 @@ def killed(times: int, database: str | None, endpoint: str, as_json: bool, seed:
       borechain bench killed --times 200
     """
     from borechain.load.killed import kill_again_and_again
-    from borechain.load.page import figures
+    from borechain.load.page import latency_quantiles
     from sim.rig.launcher import check_port_free
 
     check_port_free(endpoint)
     with tempfile.TemporaryDirectory(prefix="borechain-") as folder:
         outcome = kill_again_and_again(times, endpoint, Path(folder), database, seed)
-    back = figures(outcome.back_s[1:])
+    back = latency_quantiles(outcome.back_s[1:])
     result = {"bench": "killed", "times": times, "handed": outcome.handed}
     result |= {"lost": outcome.lost, "doubled": outcome.doubled, "back_ms": back}
     if as_json:
         click.echo(json.dumps(result))
     else:
         click.echo(f"{outcome.handed} events, {outcome.lost} lost, {outcome.doubled} doubled")
-        click.echo(line("killed until the next receipt", back))
+        click.echo(latency_line("killed until the next receipt", back))
     if not outcome.is_whole:
         raise EnvironmentFault(f"{outcome.lost} receipted events were lost, {outcome.doubled} are kept twice")

@@ -10,9 +10,9 @@ from typing import Any
 
 import click
 
-from borechain.cli.faults import needs, plain_faults
-from borechain.cli.options import json_option, seed_option
-from borechain.cli.tables import Columns, show_table, write_table
+from borechain.cli.console_tables import Columns, show_table, write_table
+from borechain.cli.faults import plain_faults, require_modules
+from borechain.cli.shared_options import json_option, seed_option
 from telemetry import keys
 
 RIG = "realtime"
@@ -55,7 +55,7 @@ COLUMNS: Columns = (
 @click.option("--out", type=click.Path(path_type=Path, file_okay=False), help="Folder for realtime.csv.")
 @json_option
 @seed_option
-@needs("orjson", "scipy", "sqlalchemy")
+@require_modules("orjson", "scipy", "sqlalchemy")
 @plain_faults
 def realtime(nodes: int, seconds: float, endpoint: str, out: Path | None, as_json: bool, seed: int) -> None:
     """Run a string of real node processes on their own clocks and measure it: overruns, jitter, memory, yaw.
@@ -69,7 +69,7 @@ def realtime(nodes: int, seconds: float, endpoint: str, out: Path | None, as_jso
 
     check_port_free(endpoint)
     with tempfile.TemporaryDirectory(prefix="borechain-") as place:
-        world, table = prepare(nodes, seconds, endpoint, Path(place), seed)
+        world, table = prepare_processes(nodes, seconds, endpoint, Path(place), seed)
         measured = run(world, table, RIG, endpoint, seconds, Path(place))
         result: dict[str, Any] = {"bench": "realtime", "nodes": nodes, "seconds": seconds} | measured
     if out is not None:
@@ -77,10 +77,10 @@ def realtime(nodes: int, seconds: float, endpoint: str, out: Path | None, as_jso
     if as_json:
         click.echo(json.dumps(result))
     else:
-        show(result)
+        show_realtime_table(result)
 
 
-def prepare(nodes: int, seconds: float, endpoint: str, folder: Path, seed: int) -> tuple[Any, Any]:
+def prepare_processes(nodes: int, seconds: float, endpoint: str, folder: Path, seed: int) -> tuple[Any, Any]:
     """Record the string and write the table of its processes."""
     from node.process.drivers.timed import TimedEncoder, TimedImu
     from node.process.host import run_encoder, run_node
@@ -109,10 +109,10 @@ def prepare(nodes: int, seconds: float, endpoint: str, folder: Path, seed: int) 
         else:
             imu = TimedImu(folder / f"tube-{address}.npy")
             specs[name] = Spec(run_node, (at, world.tube_settings(address), [imu], own_time))
-    return world, ProcessTable(specs, ["borechain.warm"])
+    return world, ProcessTable(specs, ["borechain.preload"])
 
 
-def show(result: dict[str, Any]) -> None:
+def show_realtime_table(result: dict[str, Any]) -> None:
     """Table for people: the worst of all, and the sums."""
     worst, total = result["worst"], result["total"]
     rows = [

@@ -10,11 +10,17 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from borechain.cli.calibrate.output import Outcome, file_argument, full_scale_option, located, output_options
+from borechain.cli.calibrate.calibration_output import (
+    CalibrationOutcome,
+    faults_of_file,
+    file_argument,
+    full_scale_option,
+    output_options,
+)
 from borechain.cli.faults import InputFault, plain_faults
 
 if TYPE_CHECKING:
-    from groundstation.calibration.attitudes import Fit
+    from groundstation.calibration.attitudes import AttitudeFit
     from groundstation.calibration.block import Calibration
     from groundstation.calibration.jig import Jig
     from groundstation.calibration.temperature import Array
@@ -46,10 +52,10 @@ def jig_of(jig_deg: tuple[float, float] | None) -> Jig | None:
 
 
 @dataclass(frozen=True, slots=True)
-class Linear:
+class LinearCalibration:
     """A record of G = M w + b and its fit: ``truth`` and ``readings`` (n, 3), SI of one unit of each."""
 
-    fit: Fit
+    fit: AttitudeFit
     names: Sequence[str]
     truth: Array
     readings: Array
@@ -84,7 +90,7 @@ def turntable(
     jig_deg: tuple[float, float] | None,
     temperature_c: float | None,
     full_scale: float,
-) -> Outcome:
+) -> CalibrationOutcome:
     """Matrix and bias of a triad from a turn-table record: a row per axis turned, two columns per sensor axis.
 
     \b
@@ -92,17 +98,17 @@ def turntable(
       borechain calibrate turntable tests/data/calibration/calibration_node_a1_gyro.csv --reference 720
       borechain calibrate turntable six-positions.csv --reference 1 --unit g --out accelerometer.json
     """
-    from groundstation.calibration.attitudes import fit
-    from groundstation.calibration.records import read_turn_table
-    from groundstation.calibration.turntable import SETTINGS, align, as_observations
+    from groundstation.calibration.attitudes import fit_attitudes
+    from groundstation.calibration.calibration_records import read_turn_table
+    from groundstation.calibration.turntable import SETTINGS, as_observations, turntable_alignment
 
     record = read_turn_table(file, reference, limit=full_scale)
     truth, readings = as_observations(record.positive, record.negative, reference)
-    with located(file):
-        aligned = align(record.positive, record.negative, reference)
+    with faults_of_file(file):
+        aligned = turntable_alignment(record.positive, record.negative, reference)
         # the same matrix and bias, with their standard errors; an axis is one setting, whichever way it is turned
-        errors = fit(truth, readings, jig=jig_of(jig_deg), settings=SETTINGS)
-    job = Linear(
+        errors = fit_attitudes(truth, readings, jig=jig_of(jig_deg), settings=SETTINGS)
+    job = LinearCalibration(
         fit=replace(errors, matrix=aligned.matrix, bias=aligned.bias),
         names=[f"{sign}{axis}" for sign in "+-" for axis in "xyz"],
         truth=truth,
@@ -115,7 +121,7 @@ def turntable(
         design=f"turn table, two rotations about each axis at {reference:g} {unit}",
         record_sha256=record.sha256,
     )
-    return outcome(job, day, temperature_c, {"reference": reference})
+    return linear_outcome(job, day, temperature_c, {"reference": reference})
 
 
 @click.command()
@@ -138,7 +144,7 @@ def attitudes(
     jig_deg: tuple[float, float] | None,
     temperature_c: float | None,
     full_scale: float,
-) -> Outcome:
+) -> CalibrationOutcome:
     """Matrix (m/s2 per g) and bias (m/s2) of an accelerometer from mean readings at preset pitch and roll.
 
     \b
@@ -146,22 +152,22 @@ def attitudes(
       borechain calibrate attitudes tests/data/calibration/calibration_vn100_accel.csv
       borechain calibrate attitudes accelerometer.csv --free-yaw mounting.toml --certificate accelerometer.pdf
     """
-    from groundstation.calibration.attitudes import fit, fit_free_yaw, true_vectors
+    from groundstation.calibration.attitudes import fit_attitudes, fit_free_yaw, true_vectors
+    from groundstation.calibration.calibration_records import read_attitudes
     from groundstation.calibration.matrix_files import read_matrix
-    from groundstation.calibration.records import read_attitudes
 
     record = read_attitudes(file, limit=full_scale)
     truth = true_vectors(record.pitch, record.roll)
     if free_yaw is not None and jig_deg is not None:
         raise InputFault("expected --free-yaw or --jig-deg, got both")
     like = None if free_yaw is None else read_matrix(free_yaw, STANDARD_GRAVITY)
-    with located(file):
+    with faults_of_file(file):
         found = (
-            fit(truth, record.readings, jig=jig_of(jig_deg))
+            fit_attitudes(truth, record.readings, jig=jig_of(jig_deg))
             if like is None
             else fit_free_yaw(truth, record.readings, like)
         )
-    job = Linear(
+    job = LinearCalibration(
         fit=found,
         names=record.names,
         truth=truth,
@@ -179,22 +185,24 @@ def attitudes(
         beside = [[None if math.isnan(v) else v for v in row] for row in (found.matrix - like).tolist()]
         extra = {"yaw_deg": math.degrees(found.yaw), "yaw_std_deg": math.degrees(found.yaw_std)}
         extra["reference_difference"] = beside
-    return outcome(job, day, temperature_c, extra)
+    return linear_outcome(job, day, temperature_c, extra)
 
 
-def outcome(job: Linear, day: str, temperature_c: float | None, extra: dict[str, Any]) -> Outcome:
+def linear_outcome(
+    job: LinearCalibration, day: str, temperature_c: float | None, extra: dict[str, Any]
+) -> CalibrationOutcome:
     """Block, JSON, sheet and figures of a matrix and a bias."""
     from groundstation.calibration.block import to_json
     from groundstation.calibration.coverage import COVERAGE
-    from groundstation.report.calibration_sheets import linear
+    from groundstation.report.calibration_sheets import linear_sheet
 
-    fit, at, calibration = job.fit, errors_of(job), block(job, day, temperature_c)
+    fit, at, calibration = job.fit, errors_of(job), linear_block(job, day, temperature_c)
     warmth = "not stated" if temperature_c is None else f"{temperature_c:g} \N{DEGREE SIGN}C"
     facts = [("Method", job.design), ("Temperature", warmth)]
     factor = fit.coverage_factor() if fit.combined is None else None
     if "yaw_deg" in extra:
         facts.append(("Yaw of the rig", f"{extra['yaw_deg']:.4f} deg, standard error {extra['yaw_std_deg']:.4f} deg"))
-    sheet = linear(f"Calibration of {job.sensor}", fit, at, job.matrix_unit, facts)
+    sheet = linear_sheet(f"Calibration of {job.sensor}", fit, at, job.matrix_unit, facts)
     result = {
         "sensor": job.sensor,
         "unit": job.unit,
@@ -230,25 +238,25 @@ def outcome(job: Linear, day: str, temperature_c: float | None, extra: dict[str,
 
         return linear_panels(fit, at)
 
-    return Outcome(result, to_json(calibration), calibration.sha256(), job.record_sha256, sheet, panels)
+    return CalibrationOutcome(result, to_json(calibration), calibration.sha256(), job.record_sha256, sheet, panels)
 
 
-def errors_of(job: Linear) -> AttitudeErrors:
+def errors_of(job: LinearCalibration) -> AttitudeErrors:
     """Lengths of the errors of the readings before and after, in their unit."""
     import numpy as np
 
-    from groundstation.calibration.turntable import correct
+    from groundstation.calibration.turntable import correct_readings
     from groundstation.report.calibration_sheets import AttitudeErrors
 
     scale = job.truth_si / job.reading_si
     c, s = math.cos(job.fit.yaw), math.sin(job.fit.yaw)
     turned = job.truth @ np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]]).T
     before = np.linalg.norm(job.readings - scale * job.truth, axis=1)
-    after = scale * np.linalg.norm(correct(job.readings, job.fit.matrix, job.fit.bias) - turned, axis=1)
+    after = scale * np.linalg.norm(correct_readings(job.readings, job.fit.matrix, job.fit.bias) - turned, axis=1)
     return AttitudeErrors(job.names, job.unit.replace("s2", "s\N{SUPERSCRIPT TWO}"), before, after)
 
 
-def block(job: Linear, day: str, temperature_c: float | None) -> Calibration:
+def linear_block(job: LinearCalibration, day: str, temperature_c: float | None) -> Calibration:
     """The parameters in SI with their provenance, as a node takes them."""
     import numpy as np
 

@@ -10,8 +10,13 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
+from borechain.cli.calibrate.calibration_output import (
+    CalibrationOutcome,
+    file_argument,
+    full_scale_option,
+    output_options,
+)
 from borechain.cli.calibrate.linear import jig_of, jig_option
-from borechain.cli.calibrate.output import Outcome, file_argument, full_scale_option, output_options
 from borechain.cli.faults import InputFault, plain_faults
 
 if TYPE_CHECKING:
@@ -19,7 +24,7 @@ if TYPE_CHECKING:
     from groundstation.calibration.mwd_block import TriadCalibration
     from groundstation.calibration.mwd_files import MwdRecord
     from groundstation.calibration.mwd_model import Triad
-    from groundstation.calibration.mwd_solve import Errors, MwdFit
+    from groundstation.calibration.mwd_solve import MwdErrors, MwdFit
     from groundstation.calibration.temperature import Array
     from groundstation.report.calibration_sheets import TriadErrors
 
@@ -51,7 +56,7 @@ def mwd(
     tool_face: bool,
     jig_deg: tuple[float, float] | None,
     full_scale: float,
-) -> Outcome:
+) -> CalibrationOutcome:
     """Coefficients of the accelerometers of an MWD tool from voltages at the tilts of a jig.
 
     \b
@@ -63,7 +68,7 @@ def mwd(
 
     record = read_mwd(file, full_scale)
     fit = solve_gravity(record, int(parameters), tool_face=tool_face, jig=jig_of(jig_deg))
-    return outcome(record, fit, day, errors_of_gravity(record, fit), {"reference": "1 g and the jig's tilt"})
+    return triad_outcome(record, fit, day, errors_of_gravity(record, fit), {"reference": "1 g and the jig's tilt"})
 
 
 @click.command()
@@ -89,7 +94,7 @@ def magnetometer(
     field_ut: float | None,
     dip_deg: float | None,
     full_scale: float,
-) -> Outcome:
+) -> CalibrationOutcome:
     """Coefficients of the magnetometers of an MWD tool, with the site's field and dip as references.
 
     The vertical comes from --accelerometers, or from accelerometers calibrated on the same record. Field and dip
@@ -101,22 +106,22 @@ def magnetometer(
     """
     from groundstation.calibration.errors import CalibrationError
     from groundstation.calibration.mwd_files import read_mwd
-    from groundstation.calibration.mwd_model import vectors
+    from groundstation.calibration.mwd_model import vectors_of_volts
     from groundstation.calibration.mwd_solve import solve_magnetometers
 
     record = read_mwd(file, full_scale)
     volts = record.magnetic_volts()
-    size, dip = site(record, field_ut, dip_deg)
+    size, dip = field_and_dip(record, field_ut, dip_deg)
     block = block_of(accelerometers, ACCELEROMETERS)
     other = block.triad() if block is not None else solve_gravity(record, int(parameters)).triad
-    gravity = vectors(other, record.gravity_volts, record.temperature)
+    gravity = vectors_of_volts(other, record.gravity_volts, record.temperature)
     try:
         fit = solve_magnetometers(volts, record.temperature, gravity, size, dip, int(parameters))
     except CalibrationError as error:
         raise record.located(error) from error
-    source = "the same record" if block is None else named(accelerometers, block)
+    source = "the same record" if block is None else calibration_label(accelerometers, block)
     extra = {"reference": f"field and dip of the site, vertical by accelerometers of {source}"}
-    return outcome(record, fit, day, errors_of_field(record, fit, gravity, size, dip), extra)
+    return triad_outcome(record, fit, day, errors_of_field(record, fit, gravity, size, dip), extra)
 
 
 @click.command()
@@ -128,7 +133,9 @@ def magnetometer(
 @full_scale_option
 @plain_faults
 @output_options
-def qc(file: Path, day: str, accelerometers: Path | None, magnetometers: Path | None, full_scale: float) -> Outcome:
+def qc(
+    file: Path, day: str, accelerometers: Path | None, magnetometers: Path | None, full_scale: float
+) -> CalibrationOutcome:
     """Check a tool: readings at twelve tool faces of one attitude must agree in inclination, azimuth and G_L.
 
     A triad without a calibration file has the nominal coefficients. The exit status is 0 whether the tool passes or
@@ -140,21 +147,24 @@ def qc(file: Path, day: str, accelerometers: Path | None, magnetometers: Path | 
     """
     from groundstation.calibration.errors import CalibrationError
     from groundstation.calibration.mwd_files import read_mwd
-    from groundstation.calibration.mwd_model import evaluate, nominal
+    from groundstation.calibration.mwd_model import nominal_triad, tool_readings
     from groundstation.calibration.mwd_record import ACCELEROMETER_VOLTS_PER_G, MAGNETOMETER_VOLTS_PER_MICROTESLA
     from groundstation.calibration.quality import judge_readings
-    from groundstation.report.calibration_sheets import quality
+    from groundstation.report.calibration_sheets import quality_sheet
 
     record = read_mwd(file, full_scale)
     a, m = block_of(accelerometers, ACCELEROMETERS), block_of(magnetometers, MAGNETOMETERS)
-    gravity = a.triad() if a is not None else nominal("ABC", ACCELEROMETER_VOLTS_PER_G)
-    field = m.triad() if m is not None else nominal("XYZ", MAGNETOMETER_VOLTS_PER_MICROTESLA)
-    seen = evaluate(gravity, field, record.gravity_volts, record.magnetic_volts(), record.temperature)
+    gravity = a.triad() if a is not None else nominal_triad("ABC", ACCELEROMETER_VOLTS_PER_G)
+    field = m.triad() if m is not None else nominal_triad("XYZ", MAGNETOMETER_VOLTS_PER_MICROTESLA)
+    seen = tool_readings(gravity, field, record.gravity_volts, record.magnetic_volts(), record.temperature)
     try:
         report = judge_readings(seen)
     except CalibrationError as error:
         raise record.located(error) from error
-    used = {"accelerometers": named(accelerometers, a), "magnetometers": named(magnetometers, m)}
+    used = {
+        "accelerometers": calibration_label(accelerometers, a),
+        "magnetometers": calibration_label(magnetometers, m),
+    }
     verdicts = [(v, (math.degrees(1.0), "deg") if v.unit == "rad" else (1.0, v.unit)) for v in report.verdicts]
     result = {
         "passed": report.passed,
@@ -170,14 +180,16 @@ def qc(file: Path, day: str, accelerometers: Path | None, magnetometers: Path | 
         "date": day,
         "record_sha256": record.sha256,
     }
-    sheet = quality(report, [("Accelerometers", used["accelerometers"]), ("Magnetometers", used["magnetometers"])])
+    sheet = quality_sheet(
+        report, [("Accelerometers", used["accelerometers"]), ("Magnetometers", used["magnetometers"])]
+    )
 
     def panels() -> Sequence[Any]:
         from groundstation.report.calibration_plots import quality_panels
 
         return quality_panels(report)
 
-    return Outcome(result, json.dumps(result, indent=1) + "\n", None, record.sha256, sheet, panels)
+    return CalibrationOutcome(result, json.dumps(result, indent=1) + "\n", None, record.sha256, sheet, panels)
 
 
 def solve_gravity(record: MwdRecord, parameters: int, *, tool_face: bool = False, jig: Jig | None = None) -> MwdFit:
@@ -201,12 +213,14 @@ def block_of(path: Path | None, sensor: str) -> TriadCalibration | None:
     return None if path is None else read_triad(path, sensor)
 
 
-def named(path: Path | None, block: TriadCalibration | None) -> str:
+def calibration_label(path: Path | None, block: TriadCalibration | None) -> str:
     """File and hash of a calibration that was applied."""
     return "nominal, not calibrated" if path is None or block is None else f"{path.name}, block {block.sha256()}"
 
 
-def site(record: MwdRecord, field_ut: float | None, dip_deg: float | None) -> tuple[Array | float, Array | float]:
+def field_and_dip(
+    record: MwdRecord, field_ut: float | None, dip_deg: float | None
+) -> tuple[Array | float, Array | float]:
     """Field (microtesla) and dip (rad) at the readings: what is given, else what the record holds."""
     size = field_ut if field_ut is not None else record.field
     dip = math.radians(dip_deg) if dip_deg is not None else record.dip
@@ -221,15 +235,17 @@ def errors_of_gravity(record: MwdRecord, fit: MwdFit) -> tuple[TriadErrors, Tria
     """Errors of |G| (g) and tilt (deg) before and after."""
     import numpy as np
 
-    from groundstation.calibration.mwd_model import nominal, tilt, vectors
+    from groundstation.calibration.mwd_model import gravity_inclination, nominal_triad, vectors_of_volts
     from groundstation.calibration.mwd_record import ACCELEROMETER_VOLTS_PER_G
     from groundstation.report.calibration_sheets import TriadErrors
 
     def errors(triad: Triad) -> TriadErrors:
-        gravity = vectors(triad, record.gravity_volts, record.temperature)
-        return TriadErrors(np.linalg.norm(gravity, axis=1) - 1.0, np.degrees(tilt(gravity) - record.tilt))
+        gravity = vectors_of_volts(triad, record.gravity_volts, record.temperature)
+        return TriadErrors(
+            np.linalg.norm(gravity, axis=1) - 1.0, np.degrees(gravity_inclination(gravity) - record.tilt)
+        )
 
-    return errors(nominal("ABC", ACCELEROMETER_VOLTS_PER_G)), errors(fit.triad)
+    return errors(nominal_triad("ABC", ACCELEROMETER_VOLTS_PER_G)), errors(fit.triad)
 
 
 def errors_of_field(
@@ -238,23 +254,23 @@ def errors_of_field(
     """Errors of |H| (microtesla) and dip (deg) before and after."""
     import numpy as np
 
-    from groundstation.calibration.mwd_model import dip, nominal, vectors
+    from groundstation.calibration.mwd_model import magnetic_dip, nominal_triad, vectors_of_volts
     from groundstation.calibration.mwd_record import MAGNETOMETER_VOLTS_PER_MICROTESLA
     from groundstation.report.calibration_sheets import TriadErrors
 
     def errors(triad: Triad) -> TriadErrors:
-        field = vectors(triad, record.magnetic_volts(), record.temperature)
-        return TriadErrors(np.linalg.norm(field, axis=1) - size, np.degrees(dip(gravity, field) - angle))
+        field = vectors_of_volts(triad, record.magnetic_volts(), record.temperature)
+        return TriadErrors(np.linalg.norm(field, axis=1) - size, np.degrees(magnetic_dip(gravity, field) - angle))
 
-    return errors(nominal("XYZ", MAGNETOMETER_VOLTS_PER_MICROTESLA)), errors(fit.triad)
+    return errors(nominal_triad("XYZ", MAGNETOMETER_VOLTS_PER_MICROTESLA)), errors(fit.triad)
 
 
-def outcome(
+def triad_outcome(
     record: MwdRecord, fit: MwdFit, day: str, errors: tuple[TriadErrors, TriadErrors], extra: dict[str, str]
-) -> Outcome:
+) -> CalibrationOutcome:
     """File, JSON, sheet and figures of a triad."""
     from groundstation.calibration.mwd_block import of_fit, to_json
-    from groundstation.report.calibration_sheets import triad
+    from groundstation.report.calibration_sheets import triad_sheet
 
     gravity = fit.triad.axes == "ABC"
     unit, angle = ("g", "tilt_deg") if gravity else ("ut", "dip_deg")
@@ -283,7 +299,7 @@ def outcome(
         "block_sha256": block.sha256(),
     }
     facts = [("Record of", design), ("Reference", extra["reference"])]
-    sheet = triad(f"Calibration of {block.sensor.replace('mwd', 'MWD')}", fit, facts)
+    sheet = triad_sheet(f"Calibration of {block.sensor.replace('mwd', 'MWD')}", fit, facts)
 
     def panels() -> Sequence[Any]:
         import numpy as np
@@ -295,10 +311,10 @@ def outcome(
         drawn = ACCELEROMETER_VOLTS_PER_G if gravity else MAGNETOMETER_VOLTS_PER_MICROTESLA
         return triad_panels(fit, around, record.temperature, *errors, drawn)
 
-    return Outcome(result, to_json(block), block.sha256(), record.sha256, sheet, panels)
+    return CalibrationOutcome(result, to_json(block), block.sha256(), record.sha256, sheet, panels)
 
 
-def errors_json(found: Errors, unit: str, angle: str) -> dict[str, float]:
+def errors_json(found: MwdErrors, unit: str, angle: str) -> dict[str, float]:
     """Errors over a record with their units in the names."""
     name, _, deg = angle.partition("_")
     return {

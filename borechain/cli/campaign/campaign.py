@@ -9,10 +9,10 @@ from typing import Any
 
 import click
 
-from borechain.cli.experiment.output import progress
+from borechain.cli.console_tables import show_table, write_table
+from borechain.cli.experiment.study_output import progress_bar
 from borechain.cli.faults import InputFault, plain_faults
-from borechain.cli.options import json_option, scenario_argument
-from borechain.cli.tables import show_table, write_table
+from borechain.cli.shared_options import json_option, scenario_argument
 from telemetry.runtime.command_line import check_installed
 
 LARGEST_RUN = 10**8 - 1  # that the names of the files hold
@@ -65,32 +65,32 @@ def campaign(
     loaded = load_scenario(scenario)
     name = scenario.stem
     folder = out or Path("out") / f"campaign-{name}"
-    with progress(runs, "runs", quiet=as_json) as step:
+    with progress_bar(runs, "runs", quiet=as_json) as step:
         began = time.monotonic()
         result = run_campaign(loaded, name, folder, first, runs, engine, scheduler, step)
         took = time.monotonic() - began
-    keep(folder, result)
+    write_campaign(folder, result)
     if as_json:
         click.echo(json.dumps(result))
         return
-    show(result, folder, took)
+    show_campaign(result, folder, took)
 
 
-def keep(folder: Path, result: dict[str, Any]) -> None:
+def write_campaign(folder: Path, result: dict[str, Any]) -> None:
     """Write tables and pictures beside the runs."""
-    from groundstation.report.style import save
+    from groundstation.report.style import save_figure
     from sim.campaign.figure import accuracy_figure, honesty_figure
     from sim.campaign.summary import ACCURACY, HONESTY
 
     title = f"{result['scenario']}, {result['runs']} runs"
     write_table(folder / "honesty.csv", result["honesty"], HONESTY)
-    save(honesty_figure(result["honesty"], f"Honesty of the nodes: {title}"), folder / "honesty.svg")
+    save_figure(honesty_figure(result["honesty"], f"Honesty of the nodes: {title}"), folder / "honesty.svg")
     if result["accuracy"]:
         write_table(folder / "accuracy.csv", result["accuracy"], ACCURACY)
-        save(accuracy_figure(result["accuracy"], f"Surveys: {title}"), folder / "accuracy.svg")
+        save_figure(accuracy_figure(result["accuracy"], f"Surveys: {title}"), folder / "accuracy.svg")
 
 
-def show(result: dict[str, Any], folder: Path, took: float) -> None:
+def show_campaign(result: dict[str, Any], folder: Path, took: float) -> None:
     """Print the tables, and how fast it went."""
     from sim.campaign.summary import ACCURACY, HONESTY
 

@@ -1,4 +1,4 @@
-"""``borechain experiment``: every study of the table `sim.studies.table` as a command, and the commands about all."""
+"""``borechain experiment``: every study of the table `sim.studies.study_table` as a command, and the commands about all."""
 
 from __future__ import annotations
 
@@ -10,11 +10,11 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from borechain.cli.experiment.output import keep, progress, show
-from borechain.cli.experiment.records import records
+from borechain.cli.experiment.laboratory_records import records
+from borechain.cli.experiment.study_output import progress_bar, show_study, write_study
 from borechain.cli.faults import plain_faults
-from borechain.cli.files import make_folder
-from borechain.cli.options import json_option
+from borechain.cli.shared_options import json_option
+from borechain.cli.whole_files import make_folder
 
 if TYPE_CHECKING:
     from sim.studies.study import Option, Study
@@ -26,9 +26,9 @@ out_option = click.option(
 
 
 @plain_faults
-def studies() -> dict[str, Study]:
+def load_studies() -> dict[str, Study]:
     """The table, loaded when a command asks for it."""
-    from sim.studies.table import STUDIES
+    from sim.studies.study_table import STUDIES
 
     return STUDIES
 
@@ -38,13 +38,13 @@ class Studies(click.Group):
 
     def list_commands(self, ctx: click.Context) -> list[str]:
         """Names in order."""
-        return sorted([*super().list_commands(ctx), *studies()])
+        return sorted([*super().list_commands(ctx), *load_studies()])
 
     def get_command(self, ctx: click.Context, cmd_name: str) -> click.Command | None:
         """One of them."""
         found = super().get_command(ctx, cmd_name)
-        if found is None and cmd_name in studies():
-            return command_of(studies()[cmd_name])
+        if found is None and cmd_name in load_studies():
+            return command_of(load_studies()[cmd_name])
         return found
 
 
@@ -90,7 +90,7 @@ def all_(context: click.Context, short: bool, out: Path | None) -> None:
 
     folder = [] if out is None else ["--out", str(out)]
     with one_pool():
-        for study in studies().values():
+        for study in load_studies().values():
             for words in (study.short,) if short else study.full:
                 click.echo(f"borechain experiment {study.name} {words}".rstrip(), err=True)
                 command_of(study).main([*shlex.split(words), *folder], standalone_mode=False, parent=context)
@@ -106,13 +106,13 @@ def command_of(study: Study) -> click.Command:
     def run(out: Path | None, as_json: bool, **given: Any) -> None:
         if out is not None:
             make_folder(out)
-        with progress(study.steps(given), study.counts, quiet=as_json) as step:
+        with progress_bar(study.steps(given), study.counts, quiet=as_json) as step:
             result = study.run(given, step)
-        keep(study, result, out)
+        write_study(study, result, out)
         if as_json:
             click.echo(json.dumps(study.told(result)))
         else:
-            show(study, given, result)
+            show_study(study, given, result)
 
     command: Callable[..., None] = json_option(out_option(run))
     for option in reversed(study.takes):

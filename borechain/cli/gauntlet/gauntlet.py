@@ -9,13 +9,13 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from borechain.cli.faults import EnvironmentFault, InputFault, needs, plain_faults
+from borechain.cli.faults import EnvironmentFault, InputFault, plain_faults, require_modules
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from borechain.gauntlet.run import Outcome
-    from borechain.gauntlet.soak import Sample
+    from borechain.gauntlet.gauntlet_run import SeedOutcome
+    from borechain.gauntlet.soak import SoakSample
 
 WORTH_A_PROCESS = 50  # seeds, for which a process more is started
 BATCH = 200  # seeds shown at a time
@@ -44,7 +44,7 @@ COLUMNS = tuple(
     "--out", type=click.Path(path_type=Path, file_okay=False), help="Folder for soak.csv and soak.svg; with --soak."
 )
 @click.option("--json", "as_json", is_flag=True, help="Print one JSON object a seed, and one of the whole.")
-@needs("scipy", "sqlalchemy")
+@require_modules("scipy", "sqlalchemy")
 @plain_faults
 def gauntlet(
     seeds: int,
@@ -66,8 +66,8 @@ def gauntlet(
       borechain gauntlet --seed 17 --exactly node-cut,loss
       borechain gauntlet --soak 24
     """
-    from borechain.gauntlet.run import ALL, judged
-    from sim.gauntlet.kinds import KINDS
+    from borechain.gauntlet.gauntlet_run import ALL, judge_seed
+    from sim.gauntlet.fault_kinds import KINDS
     from sim.studies.pool import over_cores
 
     if listed:
@@ -84,7 +84,7 @@ def gauntlet(
     failed, cpu_s = 0, 0.0
     with over_cores(len(numbers) // WORTH_A_PROCESS, lambda: None) as run_all:
         for batch in (numbers[k : k + BATCH] for k in range(0, len(numbers), BATCH)):
-            for outcome in run_all(judged, [(number, allowed, kinds, plan) for number in batch]):
+            for outcome in run_all(judge_seed, [(number, allowed, kinds, plan) for number in batch]):
                 failed += bool(outcome.violations)
                 cpu_s += outcome.cpu_s
                 _show(outcome, as_json=as_json)
@@ -94,7 +94,7 @@ def gauntlet(
 
 
 def _names(text: str | None, option: str, default: tuple[str, ...]) -> tuple[str, ...]:
-    from borechain.gauntlet.run import ALL
+    from borechain.gauntlet.gauntlet_run import ALL
 
     if text is None:
         return default
@@ -105,8 +105,8 @@ def _names(text: str | None, option: str, default: tuple[str, ...]) -> tuple[str
     return names
 
 
-def _show(outcome: Outcome, *, as_json: bool) -> None:
-    from borechain.gauntlet.run import USUAL
+def _show(outcome: SeedOutcome, *, as_json: bool) -> None:
+    from borechain.gauntlet.gauntlet_run import USUAL
 
     row: dict[str, Any] = {
         "seed": outcome.seed,
@@ -130,11 +130,11 @@ def _show(outcome: Outcome, *, as_json: bool) -> None:
 
 def _soak(hours: float, seed: int, out: Path | None, *, as_json: bool) -> None:
     """Show what a long run needs, a line now and then, and keep it."""
-    from borechain.gauntlet.soak import soak
+    from borechain.gauntlet.soak import run_soak
 
     found: tuple[str, ...] = ()
     samples = []
-    for sample in soak(hours, seed):
+    for sample in run_soak(hours, seed):
         found = sample.violations
         samples.append(sample)
         if as_json:
@@ -151,15 +151,15 @@ def _soak(hours: float, seed: int, out: Path | None, *, as_json: bool) -> None:
         raise EnvironmentFault(f"after {hours:g} h: {'; '.join(found)}")
 
 
-def _keep(samples: Sequence[Sample], out: Path) -> None:
+def _keep(samples: Sequence[SoakSample], out: Path) -> None:
     """Table and picture of a soak."""
-    from borechain.cli.tables import write_table
+    from borechain.cli.console_tables import write_table
     from borechain.gauntlet.soak_figure import soak_figure
-    from groundstation.report.style import save
+    from groundstation.report.style import save_figure
 
     out.mkdir(parents=True, exist_ok=True)
     write_table(out / "soak.csv", [asdict(sample) | {"wrong": len(sample.violations)} for sample in samples], COLUMNS)
-    save(soak_figure(samples), out / "soak.svg")
+    save_figure(soak_figure(samples), out / "soak.svg")
 
 
 def _show_figures(seeds: int, failed: int, cpu_s: float, *, as_json: bool) -> None:

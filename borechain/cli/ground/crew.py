@@ -7,10 +7,10 @@ from pathlib import Path
 
 import click
 
-from borechain.cli.faults import needs, plain_faults
+from borechain.cli.faults import plain_faults, require_modules
 from borechain.cli.ground.query import rig_option, role_option
 from telemetry import keys
-from telemetry.runtime.options import insecure_option, keys_option
+from telemetry.runtime.process_options import insecure_option, keys_option
 
 
 @click.command()
@@ -20,7 +20,7 @@ from telemetry.runtime.options import insecure_option, keys_option
 @keys_option
 @role_option
 @click.option("--by", help="Who orders, for the record  [default: the user's name]")
-@needs("textual")
+@require_modules("textual")
 @plain_faults
 def crew(rig_name: str, endpoint: str, keys_place: Path | None, role: str, by: str | None) -> None:
     """Show a running rig to its crew: verdict, plan, string, alarms, and the course of what is ordered.
@@ -35,10 +35,10 @@ def crew(rig_name: str, endpoint: str, keys_place: Path | None, role: str, by: s
     from borechain.crew.app import CrewApp
 
     with connect(endpoint, rig_name, keys_place=keys_place, role=role) as ground:
-        CrewApp(ground, rig_name, by or user()).run()
+        CrewApp(ground, rig_name, by or user_name()).run()
 
 
-def user() -> str:
+def user_name() -> str:
     """Name of the user of this machine."""
     try:
         return getpass.getuser()

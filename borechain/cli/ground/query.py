@@ -13,10 +13,10 @@ import click
 
 from borechain.cli.faults import EnvironmentFault, InputFault, plain_faults
 from telemetry import keys
-from telemetry.runtime.options import endpoint_option, insecure_option, keys_option
+from telemetry.runtime.process_options import endpoint_option, insecure_option, keys_option
 
 if TYPE_CHECKING:
-    from telemetry.media.zenoh_bus import Reply
+    from telemetry.media.zenoh_bus import QueryReply
 
 SILENCE = 5.0  # wall s without a sample before ``watch`` says so
 PATIENCE, ORDER_PATIENCE = 5.0, 40.0  # s; the ground station itself waits 30 s for a tube
@@ -78,14 +78,14 @@ def query(
     if not answers and replies:
         raise EnvironmentFault(f"{selector}: no answer within {patience:g} s; a longer --timeout may help")
     if not answers:
-        raise EnvironmentFault(f"{selector}: nobody at {endpoint} answers it; {there}. {known()}")
+        raise EnvironmentFault(f"{selector}: nobody at {endpoint} answers it; {there}. {known_keys()}")
     if as_csv:
         click.echo(csv_of(answers), nl=False)
         return
-    show({reply.key: value_of(reply.payload) for reply in answers}, as_json=as_json)
+    show_answers({reply.key: value_of(reply.payload) for reply in answers}, as_json=as_json)
 
 
-def csv_of(answers: list[Reply]) -> str:
+def csv_of(answers: list[QueryReply]) -> str:
     """The rows of one answer as CSV.
 
     Raises
@@ -152,11 +152,11 @@ def check_selector(selector: str) -> None:
     InputFault
         Naming the keys there are.
     """
-    from telemetry.media.zenoh_bus import intersects
+    from telemetry.media.zenoh_bus import keys_intersect
 
     key = selector.partition("?")[0]
-    if not intersects(key, key):
-        raise InputFault(f"{selector}: expected a key expression, as borechain/*/ground/status; {known()}")
+    if not keys_intersect(key, key):
+        raise InputFault(f"{selector}: expected a key expression, as borechain/*/ground/status; {known_keys()}")
 
 
 def next_sample(
@@ -174,7 +174,9 @@ def next_sample(
     try:
         return arrived.get(timeout=patience)
     except queue.Empty:
-        click.echo(f"nothing on {selector} for {patience:g} s; waiting, Ctrl-C ends it. {known('publish')}", err=True)
+        click.echo(
+            f"nothing on {selector} for {patience:g} s; waiting, Ctrl-C ends it. {known_keys('publish')}", err=True
+        )
     try:
         return arrived.get(timeout=None if timeout is None else max(0.0, begin + timeout - time.monotonic()))
     except queue.Empty:
@@ -197,12 +199,12 @@ def value_of(payload: bytes) -> Any:
     return value
 
 
-def known(kind: str = "query") -> str:
+def known_keys(kind: str = "query") -> str:
     """Which keys can be asked for, or are published."""
     return f"keys are {', '.join(key.template for key in keys.TABLE if kind in key.kind)}"
 
 
-def show(values: dict[str, Any], *, as_json: bool) -> None:
+def show_answers(values: dict[str, Any], *, as_json: bool) -> None:
     """Print answers: a single one bare, several by their key."""
     value = next(iter(values.values())) if len(values) == 1 else values
     pretty = not as_json and sys.stdout.isatty()

@@ -8,9 +8,9 @@ from typing import Any
 
 import click
 
+from borechain.cli.console_tables import show_table
 from borechain.cli.faults import InputFault, plain_faults
-from borechain.cli.options import json_option
-from borechain.cli.tables import show_table
+from borechain.cli.shared_options import json_option
 from telemetry.runtime.command_line import check_installed
 
 

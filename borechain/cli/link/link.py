@@ -6,7 +6,7 @@ import click
 
 from borechain.cli.link.can import dbc, load
 from borechain.cli.link.pipe import pipe
-from borechain.cli.link.soil import soil
+from borechain.cli.link.soil_command import soil
 
 
 @click.group()

@@ -7,9 +7,9 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from borechain.cli.faults import InputFault, needs, plain_faults
-from borechain.cli.link.output import check_plot, plot_option, tell
-from borechain.cli.options import json_option
+from borechain.cli.faults import InputFault, plain_faults, require_modules
+from borechain.cli.link.link_output import check_plot, plot_option, show_links
+from borechain.cli.shared_options import json_option
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -24,7 +24,7 @@ if TYPE_CHECKING:
 @click.option("--budget-db", type=float, default=110.0, show_default=True, help="What may be lost on the way.")
 @plot_option
 @json_option
-@needs("scipy")
+@require_modules("scipy")
 @plain_faults
 def pipe(
     radius_cm: float,
@@ -42,16 +42,16 @@ def pipe(
     Example:
       borechain link pipe --frequency-ghz 5 --grade "X52 seamless" --plot pipe.svg
     """
-    from telemetry.radio.steel import carbon_of, resistivity
-    from telemetry.radio.waveguide import LOWEST, TE11, attenuation, cut_off
+    from telemetry.radio.steel import carbon_of, steel_resistivity
+    from telemetry.radio.waveguide import LOWEST, TE11, cut_off, wall_attenuation
 
     check_plot(plot)
     if grade is not None and carbon_percent is not None:
         raise InputFault("--grade: expected either a grade or --carbon-percent, got both")
     carbon = carbon_of(grade) if grade is not None else 0.26 if carbon_percent is None else carbon_percent
-    rho = float(resistivity(carbon, temperature_c))
+    rho = float(steel_resistivity(carbon, temperature_c))
     radius, f = radius_cm * 1e-2, frequency_ghz * 1e9
-    attenuation(TE11, radius, f, rho)  # a pipe in which nothing propagates is refused
+    wall_attenuation(TE11, radius, f, rho)  # a pipe in which nothing propagates is refused
     links = [link_of(mode, float(cut_off(mode, radius)), radius, f, rho, budget_db) for mode in LOWEST]
 
     def figure() -> Figure:
@@ -61,16 +61,16 @@ def pipe(
 
     result = {"carbon_percent": carbon, "resistivity_ohm_m": rho, "links": links}
     title = f"Pipe of {radius_cm:g} cm at {frequency_ghz:g} GHz: {carbon:g} % carbon, {rho * 1e8:.3g}e-8 ohm m"
-    tell(title, result, as_json=as_json, plot=plot, figure=figure)
+    show_links(title, result, as_json=as_json, plot=plot, figure=figure)
 
 
 def link_of(mode: Any, lowest: float, radius: float, frequency: float, rho: float, budget: float) -> dict[str, Any]:
     """One line of the table; nothing is lost or reached where nothing propagates."""
-    from telemetry.radio.waveguide import attenuation, decibels, reach
+    from telemetry.radio.waveguide import link_reach, nepers_to_decibels, wall_attenuation
 
     row: dict[str, Any] = {"mode": str(mode), "cut_off_ghz": lowest * 1e-9, "attenuation_db_per_m": None}
     row["reach_m"] = None
     if frequency > lowest:
-        lost = decibels(attenuation(mode, radius, frequency, rho))
-        row |= {"attenuation_db_per_m": float(lost), "reach_m": float(reach(lost, budget))}
+        lost = nepers_to_decibels(wall_attenuation(mode, radius, frequency, rho))
+        row |= {"attenuation_db_per_m": float(lost), "reach_m": float(link_reach(lost, budget))}
     return row

@@ -10,12 +10,12 @@ from typing import TYPE_CHECKING
 
 import click
 
-from borechain.cli.faults import needs, plain_faults
-from borechain.cli.options import parse_speed
-from borechain.cli.rig.rig import Job, drill_in_processes, orderable, process_table, world_of
+from borechain.cli.faults import plain_faults, require_modules
+from borechain.cli.rig.rig_command import RigJob, drill_in_processes, page_with_password, process_table, world_of
+from borechain.cli.shared_options import parse_speed
 from groundstation.page_options import DEFAULT, page_settings
 from telemetry import keys
-from telemetry.runtime.options import insecure_option, secure_endpoint
+from telemetry.runtime.process_options import insecure_option, secure_endpoint
 
 if TYPE_CHECKING:
     from groundstation.gateway.page.settings import PageSettings
@@ -38,7 +38,7 @@ SCENARIO = Path("demo")
     help="Where the rig's router listens.",
 )
 @click.option("--rounds", type=click.IntRange(1), help="Holes to drill before it ends  [default: until Ctrl-C]")
-@needs("orjson", "rich", "scipy", "sqlalchemy", "starlette", "uvicorn")
+@require_modules("orjson", "rich", "scipy", "sqlalchemy", "starlette", "uvicorn")
 @plain_faults
 def demo(page: str, speed: float, endpoint: str, rounds: int | None) -> None:
     """Drill a hole with fifteen real processes and show it on a page, again and again until Ctrl-C.
@@ -50,7 +50,7 @@ def demo(page: str, speed: float, endpoint: str, rounds: int | None) -> None:
       borechain demo
       borechain demo --speed 2 --page 127.0.0.1:8090
     """
-    from borechain.host import opened_router
+    from borechain.rig_host import opened_router
     from groundstation.gateway.page.settings import listen
     from sim.rig.launcher import check_port_free
     from sim.world.shipped import find_scenario
@@ -60,18 +60,20 @@ def demo(page: str, speed: float, endpoint: str, rounds: int | None) -> None:
         return
     listen(settings).close()
     check_port_free(endpoint)
-    served = orderable(settings)
+    served = page_with_password(settings)
     click.echo(f"open {served.url} in a browser; Ctrl-C ends the demonstration")
     try:
         with opened_router(endpoint) as bus:
             for seed in itertools.count(1) if rounds is None else range(1, rounds + 1):
                 with tempfile.TemporaryDirectory(prefix="borechain-demo-") as folder:
-                    drill(Job(find_scenario(SCENARIO), seed, speed, endpoint=endpoint), bus, served, Path(folder))
+                    drill_demo_hole(
+                        RigJob(find_scenario(SCENARIO), seed, speed, endpoint=endpoint), bus, served, Path(folder)
+                    )
     except KeyboardInterrupt:
         click.echo("ended")
 
 
-def drill(job: Job, bus: ZenohBus, page: PageSettings, folder: Path) -> None:
+def drill_demo_hole(job: RigJob, bus: ZenohBus, page: PageSettings, folder: Path) -> None:
     """One hole."""
     world = world_of(job)
     drill_in_processes(world, job, bus, lambda _tick: None, None, partial(process_table, world, job, folder, page))

@@ -6,9 +6,9 @@ from pathlib import Path
 
 import click
 
-from borechain.cli.faults import needs, plain_faults
-from borechain.cli.options import fault_option, scenario_argument, seed_option, speed_option
-from telemetry.runtime.options import keys_option, place_options
+from borechain.cli.faults import plain_faults, require_modules
+from borechain.cli.shared_options import fault_option, scenario_argument, seed_option, speed_option
+from telemetry.runtime.process_options import keys_option, place_options
 
 
 @click.command()
@@ -19,7 +19,7 @@ from telemetry.runtime.options import keys_option, place_options
 @click.option("--router/--no-router", default=False, help="Be the router of this rig, instead of joining one.")
 @keys_option
 @place_options
-@needs("scipy")
+@require_modules("scipy")
 @plain_faults
 def medium(
     scenario: Path,
@@ -38,7 +38,7 @@ def medium(
     Example:
       borechain medium compose-2 --speed 1
     """
-    from borechain.host import run_medium
+    from borechain.rig_host import run_medium
     from telemetry.runtime.hosting import Place
 
     run_medium(Place(rig_name, endpoint, folder, keys=keys_place), scenario, seed, speed, faults, router)

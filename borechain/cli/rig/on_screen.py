@@ -14,7 +14,7 @@ from typing import IO
 import click
 
 from borechain.cli.faults import EnvironmentFault, InputFault
-from borechain.cli.ground.crew import user
+from borechain.cli.ground.crew import user_name
 from borechain.client import Ground, connect
 from telemetry.errors import MediumError
 
@@ -34,9 +34,9 @@ def drill_on_screen(arguments: Sequence[str], rig_name: str, endpoint: str, keys
     """
     with tempfile.TemporaryFile("w+") as written, rig_process(arguments, written) as process:
         click.echo(f"starting; the screen of the crew opens when {endpoint} can be joined, Ctrl-C ends it")
-        with joined(process, endpoint, rig_name, keys_place) as ground:
+        with join_ground(process, endpoint, rig_name, keys_place) as ground:
             if ground is not None:
-                show(ground, rig_name, process)
+                show_crew_screen(ground, rig_name, process)
         if process.poll() is None:
             process.send_signal(signal.SIGINT)
         process.wait(ENDS_WITHIN)
@@ -48,7 +48,7 @@ def drill_on_screen(arguments: Sequence[str], rig_name: str, endpoint: str, keys
 
 
 @contextlib.contextmanager
-def joined(
+def join_ground(
     process: subprocess.Popen[str], endpoint: str, rig_name: str, keys_place: Path | None
 ) -> Iterator[Ground | None]:
     """The ground station of a rig that is starting; None for one that has ended before it could be joined."""
@@ -62,11 +62,11 @@ def joined(
         yield ground
 
 
-def show(ground: Ground, rig_name: str, process: subprocess.Popen[str]) -> None:
+def show_crew_screen(ground: Ground, rig_name: str, process: subprocess.Popen[str]) -> None:
     """The screen, until its user leaves it or the rig ends."""
     from borechain.crew.app import CrewApp
 
-    app = CrewApp(ground, rig_name, user(), ended=lambda: process.poll() is not None)
+    app = CrewApp(ground, rig_name, user_name(), ended=lambda: process.poll() is not None)
     app.run()
 
 

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from borechain.cli.tables import console
+from borechain.cli.console_tables import table_console
 
 if TYPE_CHECKING:
     from sim.world.world import World
@@ -19,7 +19,7 @@ NAMED = 5  # surveys named that are missing
 ASKED = ("stations", "measurements", "column", "alarms", "recalibration", "wall")
 
 
-def ask(bus: ZenohBus, rig_name: str) -> dict[str, Any]:
+def ask_surveys(bus: ZenohBus, rig_name: str) -> dict[str, Any]:
     """Stations, trajectory and measurements as any operator would get them."""
     return {path: get_json(bus, selector_of(rig_name, path)) for path in ASKED}
 
@@ -65,7 +65,7 @@ def result_of(answers: dict[str, Any], world: World) -> dict[str, Any]:
     return result
 
 
-def lacking(missing: list[dict[str, Any]], measured: int, folder: Path) -> str:
+def missing_surveys_line(missing: list[dict[str, Any]], measured: int, folder: Path) -> str:
     """Line about surveys that the stops of a run asked for and nobody has."""
     named = ", ".join(f"tube {row['tube']} at {row['bit_md_m']:g} m of the bit" for row in missing[:NAMED])
     more = f" and {len(missing) - NAMED} more" if len(missing) > NAMED else ""
@@ -76,7 +76,7 @@ def show_result(result: dict[str, Any], folder: Path) -> None:
     """Station table beside the truth, and the figures, for people."""
     from rich.table import Table
 
-    paper = console(100)
+    paper = table_console(100)
     table = Table(title="Stations: measured, below it the truth")
     for name in ("#", "MD m", "looks", "incl deg", "azi deg", "north m", "east m", "TVD m", "sigma N cm", "sigma E cm"):
         table.add_column(name, justify="right")

@@ -7,7 +7,7 @@ from pathlib import Path
 import click
 
 from borechain.cli.faults import plain_faults
-from telemetry.runtime.options import endpoint_option, insecure_option, keys_option
+from telemetry.runtime.process_options import endpoint_option, insecure_option, keys_option
 
 
 @click.command()
@@ -25,6 +25,6 @@ def router(endpoint: str, keys_place: Path | None) -> None:
       borechain router --endpoint tcp/127.0.0.1:7447
       borechain router --endpoint tls/0.0.0.0:7447 --keys /etc/borechain
     """
-    from borechain.host import run_router
+    from borechain.rig_host import run_router
 
     run_router(endpoint, keys_place)

@@ -8,7 +8,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from borechain.cli.rig.rig import Job, drill, orderable
+from borechain.cli.rig.rig_command import RigJob, drill_job, page_with_password
 
 if TYPE_CHECKING:
     from borechain.crew.log import RunLog
@@ -20,12 +20,12 @@ WALL_FILE, HEADS_FILE, STATIONS_FILE = "wall.toml", "heads.csv", "stations.csv"
 Row = tuple[str, float, float, float]  # hole, measured depth (m), inclination and azimuth (deg)
 
 
-def has_site(job: Job) -> bool:
+def has_site(job: RigJob) -> bool:
     """Whether the scenario has holes of a wall; errors as ``load_scenario``."""
     return scenario_of(job).file.site is not None
 
 
-def scenario_of(job: Job) -> Scenario:
+def scenario_of(job: RigJob) -> Scenario:
     """Scenario of a job; what is odd about it is told when a hole of it is drilled."""
     from sim.world.scenario import load_scenario
 
@@ -35,7 +35,7 @@ def scenario_of(job: Job) -> Scenario:
 
 
 def drill_site(
-    job: Job, bus: ZenohBus | None, out: Path | None, page: PageSettings | None, log: RunLog | None, *, quiet: bool
+    job: RigJob, bus: ZenohBus | None, out: Path | None, page: PageSettings | None, log: RunLog | None, *, quiet: bool
 ) -> tuple[dict[str, Any], Path]:
     """Drill every hole, each in a folder of its own and with a seed of its own; result of the last and folder of all.
 
@@ -44,14 +44,14 @@ def drill_site(
     Raises
     ------
     EnvironmentFault, RigError
-        As ``drill``.
+        As ``drill_job``.
     """
     from sim.rig.launcher import next_run_folder, prepare_folder
 
     scenario = scenario_of(job)
     folder = out if out is not None else next_run_folder(Path("out") / job.scenario.stem)
     prepare_folder(folder)
-    page = None if page is None else orderable(page)
+    page = None if page is None else page_with_password(page)
     wall, surveyed = write_wall(folder, scenario), list[Row]()
     holes: list[dict[str, Any]] = []
     result: dict[str, Any] = {}
@@ -60,7 +60,7 @@ def drill_site(
             log.on_hole(hole.name)
         write_stations(folder, surveyed)
         own = replace(job, seed=job.seed + number, wall=wall, hole=hole.name)
-        result, _ = drill(own, bus, folder / hole.name, page, log, quiet=quiet)
+        result, _ = drill_job(own, bus, folder / hole.name, page, log, quiet=quiet)
         surveyed += rows_of(hole.name, result)
         holes.append({"hole": hole.name, "digest": result["digest"], "wall": result["wall"]})
     write_stations(folder, surveyed)

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from groundstation.survey.well.analysis import Analysis
-    from groundstation.survey.well.reference_frames import Frame
+    from groundstation.survey.well.reference_frames import ReferenceFrame
 
 FRAME = ("north", "depth_reference", "height_datum")  # of every row of a table
 
@@ -34,8 +34,8 @@ def station_rows(
                 "dogleg_severity_deg_per_30m": math.degrees(severity) * 30.0,
                 "closure_m": float(found.closure_distance[k]),
                 "vertical_section_m": float(found.vertical_section[k]),
-                "uncertainty": region(covs[k], sigma)
-                | highside(covs[k], sigma, found.record.inclination[k], found.azimuth[k]),
+                "uncertainty": uncertainty_region(covs[k], sigma)
+                | highside_region(covs[k], sigma, found.record.inclination[k], found.azimuth[k]),
             }
             | (
                 {}
@@ -46,7 +46,7 @@ def station_rows(
     return rows
 
 
-def region(cov: Any, sigma: float) -> dict[str, Any]:
+def uncertainty_region(cov: Any, sigma: float) -> dict[str, Any]:
     """Region of uncertainty: half-widths at ``sigma`` standard deviations, and the covariance (1 sigma)."""
     from groundstation.survey.well.ellipsoid import plan_ellipse
 
@@ -63,7 +63,7 @@ def region(cov: Any, sigma: float) -> dict[str, Any]:
     }
 
 
-def highside(cov: Any, sigma: float, inclination: float, azimuth: float) -> dict[str, Any]:
+def highside_region(cov: Any, sigma: float, inclination: float, azimuth: float) -> dict[str, Any]:
     """The same in the axes of the hole: highside, to the right of it, along."""
     from groundstation.survey.well.ellipsoid import hole_axes
 
@@ -78,21 +78,22 @@ def at_depth(found: Analysis, md: float, sigma: float) -> dict[str, Any]:
     """Position on the arc and its uncertainty at any depth."""
     import numpy as np
 
-    from groundstation.survey.well.methods import tangents
-    from groundstation.survey.well.trajectory import Point, interpolate
+    from groundstation.survey.well.methods import station_tangents
+    from groundstation.survey.well.trajectory import TrajectoryPoint, interpolate_point
 
-    directions = tangents(found.record.inclination, found.azimuth)
+    directions = station_tangents(found.record.inclination, found.azimuth)
     none, no_columns = np.zeros((3, 3)), np.zeros((3, 0))
     points = [
-        Point(float(m), t, p, none, no_columns) for m, t, p in zip(found.md, directions, found.positions, strict=True)
+        TrajectoryPoint(float(m), t, p, none, no_columns)
+        for m, t, p in zip(found.md, directions, found.positions, strict=True)
     ]
-    point = interpolate(points, md)
+    point = interpolate_point(points, md)
     north, east, tvd = point.position.tolist()
     place = {"md_m": md, "north_m": north, "east_m": east, "tvd_m": tvd}
-    return place | {"uncertainty": region(found.covariance_at(md), sigma)}
+    return place | {"uncertainty": uncertainty_region(found.covariance_at(md), sigma)}
 
 
-def sources(found: Analysis, sigma: float) -> list[dict[str, Any]]:
+def source_rows(found: Analysis, sigma: float) -> list[dict[str, Any]]:
     """Contribution of every source at the last station, largest first."""
     rows = []
     for name, cov in found.uncertainty.by_source().items():
@@ -115,12 +116,12 @@ def source_text(found: Analysis) -> str:
     return text.getvalue()
 
 
-def frame_words(frame: Frame) -> list[str]:
+def frame_words(frame: ReferenceFrame) -> list[str]:
     """North, depth reference and height datum, as every row of a table names them."""
     return [frame.answer, frame.depths.answer, frame.height_datum]
 
 
-def table_text(rows: list[dict[str, Any]], frame: Frame) -> str:
+def table_text(rows: list[dict[str, Any]], frame: ReferenceFrame) -> str:
     """Station table, a .csv file; every row names its frame."""
     text = io.StringIO()
     writer = csv.writer(text, lineterminator="\n")

@@ -11,19 +11,19 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
+from borechain.cli.console_tables import table_console
 from borechain.cli.faults import InputFault, plain_faults
-from borechain.cli.files import PLOT_FORMATS, check_suffix, write_whole
-from borechain.cli.options import json_option
-from borechain.cli.survey.answer import at_depth, source_text, sources, station_rows, table_text
-from borechain.cli.tables import console
+from borechain.cli.shared_options import json_option
+from borechain.cli.survey.answer import at_depth, source_rows, source_text, station_rows, table_text
+from borechain.cli.whole_files import PLOT_FORMATS, check_suffix, write_whole
 from telemetry.runtime.command_line import check_installed
 
 if TYPE_CHECKING:
-    from groundstation.survey.tools.instruments import Tool
+    from groundstation.survey.tools.instruments import SurveyTool
     from groundstation.survey.well.analysis import Analysis
     from groundstation.survey.well.depth_reference import DepthReference
-    from groundstation.survey.well.reference_frames import Frame
-    from groundstation.survey.well.well_record import Record
+    from groundstation.survey.well.reference_frames import ReferenceFrame
+    from groundstation.survey.well.well_record import SurveyRecord
 
 NORTHS = ("site", "true", "grid", "magnetic")
 DEPTHS_FROM = (
@@ -37,10 +37,10 @@ def list_tools(context: click.Context, _option: click.Parameter, value: bool) ->
     """Names of the error models, one a line."""
     if not value:
         return
-    from groundstation.survey.tools.instruments import load_tool, shipped
+    from groundstation.survey.tools.instruments import load_tool, shipped_tool_names
     from groundstation.survey.tools.owsg import owsg_names
 
-    for name in shipped():
+    for name in shipped_tool_names():
         click.echo(f"{name:28} {load_tool(name).title}")
     for name, title in owsg_names().items():
         click.echo(f"{name:28} OWSG: {title}")
@@ -237,7 +237,7 @@ def survey(
     from groundstation.survey.files.programme import read_programme, read_tie_on
     from groundstation.survey.files.survey_records import DisplacementRule, with_collar
     from groundstation.survey.tools.instruments import load_tool
-    from groundstation.survey.well.analysis import analyse, with_azimuth_error
+    from groundstation.survey.well.analysis import analyse_survey, with_azimuth_error
     from groundstation.survey.well.error_sources import Site
     from groundstation.survey.well.methods import Method
 
@@ -264,7 +264,7 @@ def survey(
     )
     tied = None if tie_on is None else read_tie_on(tie_on)
     site = Site(gravity, field_nt, math.radians(dip_deg), math.radians(declination_deg), math.radians(latitude_deg))
-    found = analyse(record, Method(method), legs or tool, site, math.radians(section_azimuth_deg), frame, tied)
+    found = analyse_survey(record, Method(method), legs or tool, site, math.radians(section_azimuth_deg), frame, tied)
     mds = found.md
     outside = [depth for depth in md if not mds[0] <= depth <= mds[-1]]
     if outside:
@@ -285,20 +285,20 @@ def survey(
         "at": [at_depth(found, depth, sigma) for depth in md],
         "closure_m": float(found.closure_distance[-1]),
         "closure_azimuth_deg": math.degrees(found.closure_azimuth[-1]),
-        "sources": sources(found, sigma),
+        "sources": source_rows(found, sigma),
     }
     if out is not None:
         write_whole(out, table_text(rows, found.frame))
     if by_source is not None:
         write_whole(by_source, source_text(found))
     if plot is not None:
-        draw(found, named, sigma, str(file), plot)
+        draw_survey(found, named, sigma, str(file), plot)
     if export_tool is not None:
-        export(tool, record, export_tool)
+        write_tool_json(tool, record, export_tool)
     if as_json:
         click.echo(json.dumps(result))
     else:
-        show(result)
+        show_survey(result)
 
 
 def check_together(
@@ -317,14 +317,14 @@ def check_together(
 
 def frame_of(
     north: str, answer: str | None, north_of_site_deg: float | None, convergence_deg: float, declination_deg: float
-) -> Frame:
+) -> ReferenceFrame:
     """Norths of the record and of the answer."""
-    from groundstation.survey.well.reference_frames import Frame, Norths
+    from groundstation.survey.well.reference_frames import Norths, ReferenceFrame
 
     angles = (math.radians(angle) for angle in (north_of_site_deg or 0.0, convergence_deg, declination_deg))
     if answer is None:
         answer = north if north_of_site_deg is None else "true"
-    return Frame(north, answer, Norths(*angles))
+    return ReferenceFrame(north, answer, Norths(*angles))
 
 
 def depths_of(
@@ -348,10 +348,10 @@ def depths_of(
     return found
 
 
-def draw(found: Analysis, instrument: str, sigma: float, title: str, path: Path) -> None:
+def draw_survey(found: Analysis, instrument: str, sigma: float, title: str, path: Path) -> None:
     """Plan view, sections and uncertainty."""
     from groundstation.report.plots import survey_figure
-    from groundstation.report.style import save
+    from groundstation.report.style import save_figure
     from groundstation.survey.well.ellipsoid import probability_of
 
     confidence = probability_of(sigma, 2)
@@ -359,10 +359,10 @@ def draw(found: Analysis, instrument: str, sigma: float, title: str, path: Path)
         f"{title}, {instrument}, {found.frame.answer} north, depth from {found.frame.depths.answer}, {sigma:g} sigma"
     )
     figure = survey_figure(found.md, found.positions, found.uncertainty.cov, confidence, words)
-    save(figure, path)
+    save_figure(figure, path)
 
 
-def export(tool: Tool, record: Record, path: Path) -> None:
+def write_tool_json(tool: SurveyTool, record: SurveyRecord, path: Path) -> None:
     """Instrument as ISCWSA JSON; one that asks for columns of a record, as a gyro with those of this one."""
     from groundstation.survey.tools.iscwsa_json import to_json
     from groundstation.survey.well.gyro_export import as_gyro, needs_record
@@ -378,11 +378,11 @@ def brought_words(result: dict[str, Any]) -> str:
     return "" if same else f" (read from {read['depth_reference']}, {read['height_m']:g} m above it)"
 
 
-def show(result: dict[str, Any]) -> None:
+def show_survey(result: dict[str, Any]) -> None:
     """Tables for people."""
     from rich.table import Table
 
-    paper = console(110)
+    paper = table_console(110)
     paper.print(result["read_as"], markup=False)
     words = (
         result["method"],

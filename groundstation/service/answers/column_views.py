@@ -13,8 +13,8 @@ from groundstation.service.answers.model import RigModel
 from groundstation.service.answers.thinning import FEWEST, largest_triangles
 from groundstation.service.hole.history import Moment
 from groundstation.survey.fusion.shared import KIND_NAMES
-from groundstation.survey.wall.column_deviation import Deviation, dominant
-from groundstation.survey.well.ellipsoid import Ellipse, axes, coverage_radius, plan_ellipses
+from groundstation.survey.wall.column_deviation import Deviation, lateral_errors
+from groundstation.survey.well.ellipsoid import Ellipse, coverage_radius, ellipsoid_axes, plan_ellipses
 
 Array = npt.NDArray[np.float64]
 View = dict[str, Any]
@@ -34,7 +34,7 @@ def uncertainty(k: RigModel, p: dict[str, str]) -> View:
     drawn, by_kind = k.hole.trajectory, k.hole.variances
     random = np.diagonal(drawn.covs, axis1=1, axis2=2) - by_kind.sum(axis=1)
     stds = np.sqrt(np.maximum(np.concatenate([random[:, None], by_kind], axis=1), 0.0))
-    sizes, directions = axes(drawn.covs, space)
+    sizes, directions = ellipsoid_axes(drawn.covs, space)
     columns = (drawn.md, drawn.covs, sizes, directions, stds)
     rows = zip(*(column.tolist() for column in columns), plan_ellipses(drawn.covs, plane), strict=True)
     return {
@@ -138,7 +138,7 @@ def _dominant(k: RigModel) -> View | None:
     leaning = [station for station in k.hole.stations if station.md > 0.0]
     if not leaning:
         return None
-    found = dominant(k.hole.direction_of(leaning[-1]), k.hole.trajectory[-1].md)
+    found = lateral_errors(k.hole.direction_of(leaning[-1]), k.hole.trajectory[-1].md)
     return {"angle": found.name, "by_inclination_m": found.by_inclination, "by_azimuth_m": found.by_azimuth}
 
 

@@ -21,7 +21,7 @@ from groundstation.service.answers.answer_fields import (
 from groundstation.service.orders.order_book import OrderState
 from groundstation.service.orders.recalibration.recalibration_progress import Phase, Stage
 from groundstation.survey.fusion.survey_trust import Trust
-from groundstation.survey.wall.as_built import State as ColumnState
+from groundstation.survey.wall.as_built import ColumnState
 from telemetry.messages import Mode, NodeFlag, Severity
 
 RIG_TIME = number("rig_time_s", "rig time now", null=True)

@@ -18,7 +18,7 @@ from groundstation.service.answers.row_texts import Numbers
 from groundstation.service.answers.streamed_rows import span
 from groundstation.service.answers.views import Parameters, Range, View, flag_names, streamed
 from groundstation.service.hole.resolved_stops import NO_NUMBER, ResolvedStops, forces_of
-from groundstation.survey.fusion.resolve import Quality, angle_stds_of_all, angles
+from groundstation.survey.fusion.resolve import Quality, angle_stds_of_all, direction_angles
 from groundstation.survey.fusion.survey_trust import Trust
 from telemetry.messages import NodeFlag
 
@@ -78,7 +78,7 @@ def measurement_rows(surveys: ResolvedStops, rows: Sequence[int], stations: Sequ
         return []
     table = surveys.rows[rows]
     downs = table["down"].tolist()
-    pointing = np.array([angles(*way) for way in zip(table["lean"], downs, strict=True)])
+    pointing = np.array([direction_angles(*way) for way in zip(table["lean"], downs, strict=True)])
     stds = np.array(angle_stds_of_all(table["lean"], downs, surveys.covs(rows)))
     columns = {
         "seq": table["number"],

@@ -16,8 +16,8 @@ from groundstation.service.answers.model import RigModel
 from groundstation.service.answers.streamed_rows import STREAMED, window
 from groundstation.service.hole.station import SurveyStation
 from groundstation.service.hole.surveyed_hole import Hole
-from groundstation.survey.fusion.resolve import angle_stds_of_all, angles
-from groundstation.survey.well.trajectory import Point, interpolate
+from groundstation.survey.fusion.resolve import angle_stds_of_all, direction_angles
+from groundstation.survey.well.trajectory import TrajectoryPoint, interpolate_point
 from telemetry.messages import Event, NodeFlag, NodeState, StaticRecord
 
 View = dict[str, Any]
@@ -170,7 +170,7 @@ def direction_views(hole: Hole, chosen: Sequence[SurveyStation]) -> list[View]:
     downs, covs = [one.down for one in found], np.array([one.total_cov for one in found])
     stds = angle_stds_of_all(np.array([one.lean for one in found]), downs, covs)
     return [
-        direction_view(s, angles(one.lean, one.down), own, hole.transport_of(s))
+        direction_view(s, direction_angles(one.lean, one.down), own, hole.transport_of(s))
         for s, one, own in zip(chosen, found, stds, strict=True)
     ]
 
@@ -210,7 +210,7 @@ def trajectory(k: RigModel, p: Parameters) -> View:
         wanted = Range.parse("md", p["md"])
         if wanted.single:
             try:
-                points = [interpolate(points, wanted.low)]
+                points = [interpolate_point(points, wanted.low)]
             except SurveyError as error:
                 raise SelectorError(f"parameter md: {error}") from error
         else:
@@ -273,7 +273,7 @@ def static_record(r: StaticRecord, seq: int) -> View:
     }
 
 
-def point_views(points: Sequence[Point]) -> list[View]:
+def point_views(points: Sequence[TrajectoryPoint]) -> list[View]:
     """Points of the trajectory."""
     if not points:
         return []
@@ -281,9 +281,9 @@ def point_views(points: Sequence[Point]) -> list[View]:
     return [point_view(*row) for row in zip(points, positions, strict=True)]
 
 
-def point_view(point: Point, position: View) -> View:
+def point_view(point: TrajectoryPoint, position: View) -> View:
     """One point of the trajectory."""
-    inclination, azimuth = angles(point.tangent[:2], float(point.tangent[2]))
+    inclination, azimuth = direction_angles(point.tangent[:2], float(point.tangent[2]))
     row: View = {
         "md_m": round(point.md, 6),
         "inclination_deg": math.degrees(inclination),

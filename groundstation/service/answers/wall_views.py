@@ -10,8 +10,8 @@ import numpy as np
 from groundstation.service.answers.model import RigModel
 from groundstation.service.answers.views import finite
 from groundstation.service.hole.live_wall import LiveWall, Neighbourhood
-from groundstation.survey.fusion.resolve import angles
-from groundstation.survey.wall.as_built import State
+from groundstation.survey.fusion.resolve import direction_angles
+from groundstation.survey.wall.as_built import ColumnState
 from groundstation.survey.wall.wall_joints import worst_depths
 from groundstation.survey.wall.wall_verdict import Judgement, joint_name
 
@@ -28,7 +28,7 @@ def wall(k: RigModel, _p: dict[str, str]) -> View:
 def stations_of(k: RigModel) -> list[tuple[float, float, float]]:
     """Measured depth (m), inclination and azimuth (rad) of the stations below the collar."""
     found = [(station.md, k.hole.direction_of(station)) for station in k.hole.stations if station.md > 0.0]
-    return [(md, *angles(direction.lean, direction.down)) for md, direction in found]
+    return [(md, *direction_angles(direction.lean, direction.down)) for md, direction in found]
 
 
 def neighbourhood(live: LiveWall, found: Neighbourhood) -> View:
@@ -69,15 +69,17 @@ def joint_view(found: Neighbourhood, judged: Judgement, n: int) -> View:
     doubtful = int(worst_depths(joints)[n])
     thickness = np.where(np.isfinite(joints.thickness[n]), joints.thickness[n], np.inf)
     thinnest = int(np.argmin(thickness))
-    states = [state for state in joints.states[n].tolist() if state != State.OUTSIDE]
-    closed = states.count(State.SURVEYED) / len(states) if states else 0.0
+    states = [state for state in joints.states[n].tolist() if state != ColumnState.OUTSIDE]
+    closed = states.count(ColumnState.SURVEYED) / len(states) if states else 0.0
     return {
         "joint": joint_name(columns, joints.pairs[n]),
-        "state": State(max(states, default=State.OUTSIDE)).name.lower(),
+        "state": ColumnState(max(states, default=ColumnState.OUTSIDE)).name.lower(),
         "surveyed_percent": round(100.0 * closed),
         "probability": float(joints.probability[n, doubtful]),
         "depth_m": float(columns.depths[doubtful]),
-        "probability_where_surveyed": probability_where(joints.probability[n], joints.states[n] == State.SURVEYED),
+        "probability_where_surveyed": probability_where(
+            joints.probability[n], joints.states[n] == ColumnState.SURVEYED
+        ),
         "thickness_m": None if math.isinf(thickness[thinnest]) else round(float(thickness[thinnest]), 4),
         "thinnest_at_m": float(columns.depths[thinnest]),
     }

@@ -45,7 +45,7 @@ from groundstation.service.disk.database_tables import (
 )
 from groundstation.service.string.depth import NEVER, Doubt, Instant
 from groundstation.service.string.stored import Stored
-from groundstation.survey.fusion.joint_angles import Joint, Pair
+from groundstation.survey.fusion.joint_angles import JointAngle, Pair
 from telemetry.errors import DecodeError
 from telemetry.messages import Event, Kept, Stand, StaticRecord, SurveyMeasurement
 from telemetry.parameters import ParameterBlock, unpack_block
@@ -165,7 +165,7 @@ class Store(Database):
                 f"database {self._where}: expected numbers of the depth, got {trusted!r}, {accepted!r} and {times!r}"
             ) from error
 
-    def keep_joints(self, joints: Mapping[Pair, Joint]) -> None:
+    def keep_joints(self, joints: Mapping[Pair, JointAngle]) -> None:
         """Store the angles of the joints, in the place of those stored before."""
         rows = [
             {"upper": upper, "lower": lower, "angle": joint.angle, "var": joint.var}
@@ -176,12 +176,12 @@ class Store(Database):
             if rows:
                 connection.execute(sa.insert(JOINTS), rows)
 
-    def joints(self) -> dict[Pair, Joint]:
+    def joints(self) -> dict[Pair, JointAngle]:
         """Angles of the joints."""
         if not self._has(JOINTS):
             return {}
         with self._refusing(), self._engine.connect() as connection:
-            return {(row.upper, row.lower): Joint(row.angle, row.var) for row in connection.execute(ALL_JOINTS)}
+            return {(row.upper, row.lower): JointAngle(row.angle, row.var) for row in connection.execute(ALL_JOINTS)}
 
     def epoch(self) -> int:
         """Epoch of rig time that was known last, 0 for none."""

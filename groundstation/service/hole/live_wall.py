@@ -13,9 +13,9 @@ from pathlib import Path
 import numpy as np
 
 from groundstation.errors import SurveyError
-from groundstation.survey.wall.wall_columns import ColumnPlan, Hole, Status, build
+from groundstation.survey.wall.wall_columns import ColumnPlan, ColumnStatus, ColumnSurvey, build_wall
 from groundstation.survey.wall.wall_file import Wall, read_wall
-from groundstation.survey.wall.wall_verdict import Judgement, judge
+from groundstation.survey.wall.wall_verdict import Judgement, judge_columns
 
 Station = tuple[float, float, float]  # measured depth (m), inclination, azimuth (rad)
 
@@ -88,9 +88,9 @@ class LiveWall:
         plans = [own_plan(self._wall.plans[0], stations, bit), *self._wall.plans[1:]]
         holes = [hole_of(stations), *self._wall.holes[1:]]
         try:
-            built = build(plans, holes, file.assumed)
+            built = build_wall(plans, holes, file.assumed)
             wall = replace(self._wall, plans=plans, holes=holes, built=built)
-            found = judge(built.columns, wall.pairs, file.thickness, allowed=file.allowed)
+            found = judge_columns(built.columns, wall.pairs, file.thickness, allowed=file.allowed)
         except SurveyError as error:
             return Neighbourhood(self._wall, None, str(error))
         return Neighbourhood(wall, found)
@@ -100,11 +100,11 @@ def own_plan(plan: ColumnPlan, stations: Sequence[Station], bit: float) -> Colum
     """The column as far as it is drilled now."""
     end = max([bit, *(md for md, _, _ in stations)])
     if end <= 0.0:
-        return replace(plan, status=Status.PLANNED, drilled=None)
-    return replace(plan, status=Status.UNSTATED, drilled=end)
+        return replace(plan, status=ColumnStatus.PLANNED, drilled=None)
+    return replace(plan, status=ColumnStatus.UNSTATED, drilled=end)
 
 
-def hole_of(stations: Sequence[Station]) -> Hole:
+def hole_of(stations: Sequence[Station]) -> ColumnSurvey:
     """Stations below the head, which is vertical as the ground station's trajectory begins."""
     rows = np.array([(0.0, 0.0, 0.0), *(row for row in stations if row[0] > 0.0)])
-    return Hole(*rows.T) if len(rows) > 1 else Hole(*np.zeros((3, 0)))
+    return ColumnSurvey(*rows.T) if len(rows) > 1 else ColumnSurvey(*np.zeros((3, 0)))

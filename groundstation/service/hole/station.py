@@ -11,7 +11,7 @@ import numpy as np
 import numpy.typing as npt
 
 from groundstation.service.hole.resolved_stops import ResolvedStop, ResolvedStops, Rows
-from groundstation.survey.fusion.fusion import Departure, GrowingBayes, Stack, Weighting, departure_from, weighted
+from groundstation.survey.fusion.fusion import Departure, GrowingBayes, Stack, Weighting, departure_from, fuse_by_scheme
 from groundstation.survey.fusion.resolve import Direction
 from groundstation.survey.fusion.survey_trust import UNKNOWN_YAW_VAR, Trust
 
@@ -220,7 +220,7 @@ class SurveyStation:
 
     def _fuse(self, weighting: Weighting) -> Direction:
         if weighting is not Weighting.BAYES:
-            return weighted([self.stops.direction(place) for place in self.counting], weighting)
+            return fuse_by_scheme([self.stops.direction(place) for place in self.counting], weighting)
         if not self.untrusted or len(self.counting) == self.count - self.first:
             return self._sum_of_all(self.count)
         if self._trusted is None:

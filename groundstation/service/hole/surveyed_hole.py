@@ -26,8 +26,8 @@ from groundstation.survey.fusion.fusion import DEPARTED, Evidence, Weighting, de
 from groundstation.survey.fusion.resolve import Direction
 from groundstation.survey.fusion.shared import SharedErrors
 from groundstation.survey.fusion.survey_trust import Trust
-from groundstation.survey.fusion.transport import Carried, carry
-from groundstation.survey.wall.column_deviation import Deviation, Deviations, deviations, project
+from groundstation.survey.fusion.transport import Carried, carry_directions
+from groundstation.survey.wall.column_deviation import Deviation, Deviations, axis_deviations, project_to_target
 from groundstation.survey.well.trajectory import Trajectory
 
 Array = npt.NDArray[np.float64]
@@ -213,7 +213,7 @@ class Hole:
         worst = self._deviations.worst(first=1)
         if worst is None:
             return
-        self._projection = project(self._trajectory[-1], self.direction_of(self._stations[-1]), self._design)
+        self._projection = project_to_target(self._trajectory[-1], self.direction_of(self._stations[-1]), self._design)
         self._alarms.judge_deviation("deviation", worst, self._newest_at)
         self._alarms.judge_deviation("projection", self._projection, self._newest_at)
 
@@ -231,13 +231,13 @@ class Hole:
             return []
         mds, directions = zip(*measured, strict=True)
         places = self._shared.transport_places(len(measured) + 1)
-        self._carried = dict(zip(mds, carry(self._config.collar, directions, places), strict=True))
+        self._carried = dict(zip(mds, carry_directions(self._config.collar, directions, places), strict=True))
         return [(md, carried.direction) for md, carried in self._carried.items()]
 
     def _deviate(self) -> Deviations:
         """Deviations of the trajectory as it is drawn."""
         drawn = self._trajectory
-        return deviations(drawn.md, drawn.positions, drawn.covs, self._design)
+        return axis_deviations(drawn.md, drawn.positions, drawn.covs, self._design)
 
     def _station_at(self, md: float) -> SurveyStation:
         tolerance = self._config.station_tolerance

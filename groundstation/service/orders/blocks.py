@@ -5,7 +5,7 @@ from __future__ import annotations
 import re
 from pathlib import Path
 
-from telemetry.calibration import Calibration, read, sensor_parameters
+from telemetry.calibration import Calibration, read_calibration, sensor_parameters
 from telemetry.errors import CalibrationError
 from telemetry.parameters import ParameterBlock, SensorParameters
 
@@ -45,4 +45,4 @@ def block_of_files(folder: Path, tube: int, version: int, gyroscope: str, accele
 def _read(folder: Path, name: str) -> Calibration | None:
     if not NAME.fullmatch(name):
         raise CalibrationError(f"expected the name of a file below {folder} without its .json, got {name!r:.80}")
-    return None if name == IDENTITY else read(folder / f"{name}.json")
+    return None if name == IDENTITY else read_calibration(folder / f"{name}.json")

@@ -7,7 +7,7 @@ from collections.abc import Callable
 
 from telemetry.messages import BlockSegment, BlockStatus
 from telemetry.parameters import ParameterBlock
-from telemetry.transport.upload import Upload, split
+from telemetry.transport.upload import Upload, split_block
 
 
 class Uploads:
@@ -30,7 +30,7 @@ class Uploads:
         key = self._key_of(block.tube)
         if key is None:
             return self.cancel(block.tube)
-        segments = split(block.canonical(), block.tube, number, block.version, key)
+        segments = split_block(block.canonical(), block.tube, number, block.version, key)
         ended = self.cancel(block.tube)
         self._running[block.tube] = Upload(segments, now)
         return ended

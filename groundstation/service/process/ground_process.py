@@ -43,7 +43,7 @@ from telemetry.messages import (
 )
 from telemetry.presentation.msgpack_codec import decode
 from telemetry.runtime.disk import MACHINE, Disk
-from telemetry.runtime.process import Process
+from telemetry.runtime.process_interface import Process
 from telemetry.transport.authentication import read_key
 from telemetry.unwritten import Content
 

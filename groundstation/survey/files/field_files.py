@@ -18,7 +18,7 @@ import numpy.typing as npt
 
 from groundstation.errors import SurveyError
 from groundstation.survey.files.survey_records import STATIONS, DisplacementRule, read_record, stations_of
-from groundstation.survey.well.well_record import Record
+from groundstation.survey.well.well_record import SurveyRecord
 
 Array = npt.NDArray[np.float64]
 NAMES = {
@@ -42,7 +42,7 @@ DECIMAL_COMMA = re.compile(r"[+-]?\d+,\d+")
 class Understood:
     """A record and the one line of how its file was read."""
 
-    record: Record
+    record: SurveyRecord
     line: str
 
 
@@ -227,5 +227,5 @@ def _numbers(path: Path, lines: list[int], name: str, cells: list[str], decimal:
     return np.array(values)
 
 
-def _extent(record: Record) -> str:
+def _extent(record: SurveyRecord) -> str:
     return f"{len(record.md)} stations from {record.md[0]:g} to {record.md[-1]:g} m"

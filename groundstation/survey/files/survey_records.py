@@ -14,8 +14,8 @@ import numpy as np
 import numpy.typing as npt
 
 from groundstation.errors import SurveyError
-from groundstation.survey.bearings import bearing
-from groundstation.survey.well.well_record import Record
+from groundstation.survey.bearings import wrap_azimuth
+from groundstation.survey.well.well_record import SurveyRecord
 
 Array = npt.NDArray[np.float64]
 DISPLACEMENTS = ("md_m", "a_cm", "b_cm")
@@ -30,7 +30,7 @@ class DisplacementRule(Enum):
     THESIS = "thesis"  # I = hypot(atan(a / L), atan(b / L)), which is how Table 4.1 was printed
 
 
-def read_record(path: Path, rule: DisplacementRule = DisplacementRule.EXACT) -> Record:
+def read_record(path: Path, rule: DisplacementRule = DisplacementRule.EXACT) -> SurveyRecord:
     """Record of either kind, distinguished by its header.
 
     Raises
@@ -50,19 +50,19 @@ def read_record(path: Path, rule: DisplacementRule = DisplacementRule.EXACT) -> 
     )
 
 
-def read_displacements(path: Path, rule: DisplacementRule = DisplacementRule.EXACT) -> Record:
+def read_displacements(path: Path, rule: DisplacementRule = DisplacementRule.EXACT) -> SurveyRecord:
     """Record of displacements; errors as ``read_record``."""
     table, lines = read_columns(path, DISPLACEMENTS)
     return _from_displacements(path, table, lines, rule)
 
 
-def read_stations(path: Path) -> Record:
+def read_stations(path: Path) -> SurveyRecord:
     """Record of stations; errors as ``read_record``."""
     table, lines = read_columns(path, STATIONS)
     return stations_of(path, table, lines)
 
 
-def with_collar(record: Record) -> Record:
+def with_collar(record: SurveyRecord) -> SurveyRecord:
     """The record with a vertical collar at 0 m before its first station; its further columns there are those of it.
 
     Raises
@@ -74,7 +74,7 @@ def with_collar(record: Record) -> Record:
         raise SurveyError(f"collar: expected a record that begins below 0 m, got {record.md[0]:g} m")
     columns = {name: np.concatenate([values[:1], values]) for name, values in record.columns.items()}
     md, inclination, azimuth = (np.concatenate([[0.0], a]) for a in (record.md, record.inclination, record.azimuth))
-    return Record(md, inclination, azimuth, [0, *record.lines], columns)
+    return SurveyRecord(md, inclination, azimuth, [0, *record.lines], columns)
 
 
 def read_columns(
@@ -176,7 +176,7 @@ def _check(path: Path, md: Array, lines: list[int]) -> None:
         )
 
 
-def stations_of(path: Path, table: dict[str, Array], lines: list[int]) -> Record:
+def stations_of(path: Path, table: dict[str, Array], lines: list[int]) -> SurveyRecord:
     """Record of the columns ``STATIONS`` and what stands beside them; errors as ``read_record``."""
     for name in STATIONS:
         _finite(path, name, table[name], lines)
@@ -186,10 +186,10 @@ def stations_of(path: Path, table: dict[str, Array], lines: list[int]) -> Record
         k = int(outside[0])
         raise SurveyError(f"{path}: line {lines[k]}: expected an inclination of 0..180 deg, got {inclination_deg[k]:g}")
     _check(path, md, lines)
-    return Record(md, np.radians(inclination_deg), np.radians(azimuth_deg), lines, _others(table, STATIONS))
+    return SurveyRecord(md, np.radians(inclination_deg), np.radians(azimuth_deg), lines, _others(table, STATIONS))
 
 
-def _from_displacements(path: Path, table: dict[str, Array], lines: list[int], rule: DisplacementRule) -> Record:
+def _from_displacements(path: Path, table: dict[str, Array], lines: list[int], rule: DisplacementRule) -> SurveyRecord:
     for name in DISPLACEMENTS:
         _finite(path, name, table[name], lines)
     md, a, b = table["md_m"], table["a_cm"] / 100.0, table["b_cm"] / 100.0
@@ -207,8 +207,8 @@ def _from_displacements(path: Path, table: dict[str, Array], lines: list[int], r
         )
     exact = rule is DisplacementRule.EXACT
     inclination = np.arcsin(lateral / length) if exact else np.hypot(np.arctan(a / length), np.arctan(b / length))
-    azimuth = bearing(np.arctan2(a, -b)) * (lateral > 0.0)
-    return Record(md, inclination, azimuth, lines, _others(table, DISPLACEMENTS))
+    azimuth = wrap_azimuth(np.arctan2(a, -b)) * (lateral > 0.0)
+    return SurveyRecord(md, inclination, azimuth, lines, _others(table, DISPLACEMENTS))
 
 
 def _others(table: dict[str, Array], taken: tuple[str, ...]) -> dict[str, Array]:

@@ -18,7 +18,7 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
-from groundstation.survey.fusion.resolve import Direction, resolve
+from groundstation.survey.fusion.resolve import Direction, resolve_direction
 
 Array = npt.NDArray[np.float64]
 Places = npt.NDArray[np.intp]
@@ -97,7 +97,7 @@ def look_of(
     size = float(np.linalg.norm(force))
     causes, places = shared[0], shared[1][:-AXES]
     columns = np.concatenate([causes[:, :1], np.repeat(causes[:, 1:2], len(places) - 1, axis=1)], axis=1)
-    by_force = resolve(force, var * np.eye(AXES), yaw, 0.0).by_force
+    by_force = resolve_direction(force, var * np.eye(AXES), yaw, 0.0).by_force
     return Look(
         station, tube, direction.lean, direction.cov, by_force, columns, places, force / size, size - gravity, var
     )  # fmt: skip

@@ -18,7 +18,7 @@ import numpy as np
 import numpy.typing as npt
 
 from groundstation.survey.fusion.resolve import Direction
-from groundstation.survey.fusion.shared import Fused, Packed, added, packed_each, stacked
+from groundstation.survey.fusion.shared import Fused, Packed, add_shared_errors, packed_each, stack_shared_errors
 
 Array = npt.NDArray[np.float64]
 # a departure in the plane is beyond this length as often (4.55 %) as one number is beyond two standard deviations
@@ -58,7 +58,7 @@ def stack_of(readings: Sequence[Direction]) -> Stack:
     """Readings side by side."""
     rows = [(one.lean, one.down, one.cov, one.information) for one in readings]
     lean, down, cov, information = map(np.array, zip(*rows, strict=True))
-    return Stack(lean, down, cov, information, stacked(readings, max(one.width for one in readings)))
+    return Stack(lean, down, cov, information, stack_shared_errors(readings, max(one.width for one in readings)))
 
 
 @dataclass(slots=True)
@@ -105,7 +105,7 @@ class StationFusion:
         covs = gains @ sums[:, 3:] @ gains
         rows = zip(fusions, gains, leans, covs, strict=True)
         return [
-            Fused(lean.copy(), vertical(lean, one._down), cov.copy(), one._shared.under(gain))
+            Fused(lean.copy(), vertical_part(lean, one._down), cov.copy(), one._shared.under(gain))
             for one, gain, lean, cov in rows
         ]
 
@@ -119,7 +119,7 @@ class GrowingBayes:
         self._known: Direction | None = None  # what they came to
 
     def of(self, begin: int, end: int, readings: Callable[[int, int], Iterable[Direction]]) -> Direction:
-        """The same as ``bayes`` of the readings from ``begin`` to before ``end``, bit for bit.
+        """The same as ``fuse_by_bayes`` of the readings from ``begin`` to before ``end``, bit for bit.
 
         ``readings(begin, end)`` gives those of such a range.
         """
@@ -154,12 +154,12 @@ class GrowingBayes:
             self._fusion, self._end, self._known = StationFusion(), self._begin, None
 
 
-def vertical(lean: Array, sense: float) -> float:
+def vertical_part(lean: Array, sense: float) -> float:
     """Vertical part of a unit vector with the horizontal part ``lean``, downward where ``sense`` is positive."""
     return math.copysign(math.sqrt(1.0 - min(float(lean @ lean), 1.0)), sense)
 
 
-def bayes(readings: Sequence[Direction]) -> Direction:
+def fuse_by_bayes(readings: Sequence[Direction]) -> Direction:
     """Recursive Bayes of at least one reading."""
     fusion = StationFusion()
     for reading in readings:
@@ -173,32 +173,32 @@ def sequence_weights(count: int, power: int) -> Array:
     return np.asarray(k / k.sum())
 
 
-def weighted(readings: Sequence[Direction], scheme: Weighting) -> Direction:
+def fuse_by_scheme(readings: Sequence[Direction], scheme: Weighting) -> Direction:
     """Readings of one station, oldest first, combined by a scheme."""
     if scheme is Weighting.BAYES:
-        return bayes(readings)
+        return fuse_by_bayes(readings)
     if scheme is Weighting.ADAPTIVE:
-        scheme = adapted(readings)
+        scheme = adaptive_weighting(readings)
     weights = sequence_weights(len(readings), POWERS[scheme])
     lean = np.sum([w * r.lean for w, r in zip(weights, readings, strict=True)], axis=0)
     cov = np.sum([w * w * r.cov for w, r in zip(weights, readings, strict=True)], axis=0)
     shared = np.zeros((2, 0))
     for w, r in zip(weights, readings, strict=True):
-        shared = added(shared, w * r.shared)
-    return Direction(lean, vertical(lean, sum(r.down for r in readings)), cov, shared)
+        shared = add_shared_errors(shared, w * r.shared)
+    return Direction(lean, vertical_part(lean, sum(r.down for r in readings)), cov, shared)
 
 
-def adapted(readings: Sequence[Direction]) -> Weighting:
+def adaptive_weighting(readings: Sequence[Direction]) -> Weighting:
     """Linear for a small departure of the newest reading, quadratic for a larger, cubic for a large one."""
-    size = departure(readings)[1]
+    size = newest_departure(readings)[1]
     if size <= DEPARTED:
         return Weighting.LINEAR
     return Weighting.QUADRATIC if size <= QUADRATIC_TO else Weighting.CUBIC
 
 
-def departure(readings: Sequence[Direction]) -> tuple[Array, float]:
+def newest_departure(readings: Sequence[Direction]) -> tuple[Array, float]:
     """How far the newest reading is from those before: vector (2,) and size in standard deviations; 0 for a first."""
-    return departure_from(bayes(readings[:-1]), readings[-1]) if len(readings) > 1 else (np.zeros(2), 0.0)
+    return departure_from(fuse_by_bayes(readings[:-1]), readings[-1]) if len(readings) > 1 else (np.zeros(2), 0.0)
 
 
 def departure_from(earlier: Direction, newest: Direction) -> tuple[Array, float]:
@@ -212,7 +212,7 @@ def departure_from(earlier: Direction, newest: Direction) -> tuple[Array, float]
 def departures_from(earlier: Sequence[Direction], newest: Stack) -> list[Departure]:
     """The same of several stations."""
     differences = newest.lean - np.array([one.lean for one in earlier])
-    apart = -stacked(earlier, max(newest.shared.shape[2], *(one.width for one in earlier)))
+    apart = -stack_shared_errors(earlier, max(newest.shared.shape[2], *(one.width for one in earlier)))
     apart[:, :, : newest.shared.shape[2]] += newest.shared
     covs = newest.cov + np.array([one.cov for one in earlier]) + apart @ apart.transpose(0, 2, 1)
     squares = differences[:, None] @ np.linalg.solve(covs, differences[:, :, None])
@@ -238,7 +238,9 @@ def moved_hole(station: Sequence[Direction], neighbours: Sequence[Sequence[Direc
 
     A neighbour agrees when its own newest reading departed too, to the same side; all that have one must.
     """
-    return judge_departure(departure(station), [departure(other) for other in neighbours if len(other) > 1])
+    return judge_departure(
+        newest_departure(station), [newest_departure(other) for other in neighbours if len(other) > 1]
+    )
 
 
 def judge_departure(departed: Departure, seen: Sequence[Departure]) -> Evidence:

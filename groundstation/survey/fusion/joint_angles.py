@@ -15,7 +15,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import pairwise
 
-from groundstation.survey.bearings import wrap
+from groundstation.survey.bearings import wrap_angle
 
 SIGMAS = 6.0
 SLACK = math.radians(2.0)  # of the twist of one tube and of a joint that settles
@@ -42,7 +42,7 @@ class JointChange:
 
 
 @dataclass(frozen=True, slots=True)
-class Joint:
+class JointAngle:
     """Angle (rad) at which a joint was known first, and its variance (rad^2)."""
 
     angle: float
@@ -61,7 +61,7 @@ class JointAngles:
     """
 
     def __init__(self) -> None:
-        self.known: dict[Pair, Joint] = {}
+        self.known: dict[Pair, JointAngle] = {}
         self._resting: dict[int, RestingYaw] = {}
         self._differing: dict[Pair, int] = {}  # readings in a row that differ from what is known
         self._departed: set[Pair] = set()
@@ -90,7 +90,9 @@ class JointAngles:
         above = self._resting.get(self._above[yaw.tube]) if yaw.tube in self._above else None
         if above is None or abs(above.at - yaw.at) > APART:
             return None
-        return self._compare((above.tube, yaw.tube), Joint(float(wrap(yaw.yaw - above.yaw)), above.var + yaw.var))
+        return self._compare(
+            (above.tube, yaw.tube), JointAngle(float(wrap_angle(yaw.yaw - above.yaw)), above.var + yaw.var)
+        )
 
     def accept(self) -> list[Pair]:
         """Forget the angles of the joints that differ, whose next reading is the known one; returns these joints."""
@@ -99,9 +101,9 @@ class JointAngles:
             self._forget(pair)
         return departed
 
-    def _compare(self, pair: Pair, seen: Joint) -> JointChange | None:
+    def _compare(self, pair: Pair, seen: JointAngle) -> JointChange | None:
         known = self.known.setdefault(pair, seen)
-        by = float(wrap(seen.angle - known.angle))
+        by = float(wrap_angle(seen.angle - known.angle))
         departs = abs(by) > SIGMAS * math.sqrt(seen.var + known.var) + SLACK
         self._differing[pair] = self._differing.get(pair, 0) + 1 if departs else 0
         if self._differing[pair] < AGREEING or pair in self._departed:

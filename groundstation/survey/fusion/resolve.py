@@ -78,7 +78,7 @@ class Direction:
         return np.asarray(np.linalg.inv(self.total_cov))
 
 
-def known(inclination: float, azimuth: float) -> Direction:
+def known_direction(inclination: float, azimuth: float) -> Direction:
     """A direction (rad) that is known."""
     lean = math.sin(inclination) * np.array([math.cos(azimuth), math.sin(azimuth)])
     return Direction(lean, math.cos(inclination), np.zeros((2, 2)), np.zeros((2, 0)))
@@ -100,7 +100,7 @@ class Resolved:
         return Direction(self.lean, float(self.down), self.cov, np.zeros((2, 0)))
 
 
-def resolve(force: Array, force_cov: Array, yaw: float, yaw_var: float) -> Resolved:
+def resolve_direction(force: Array, force_cov: Array, yaw: float, yaw_var: float) -> Resolved:
     """Direction from a mean specific force.
 
     Parameters
@@ -178,7 +178,7 @@ def _is_plainly_one(cov: list[list[float]]) -> bool:
     return is_symmetric and a > 0.0 and minor > 0.0 and det > PLAINLY * power
 
 
-def angles(lean: Array, down: float) -> tuple[float, float]:
+def direction_angles(lean: Array, down: float) -> tuple[float, float]:
     """Inclination in [0, pi] and azimuth in [0, 2 pi) of a direction (rad)."""
     inclination = math.atan2(math.hypot(lean[0], lean[1]), down)
     azimuth = math.atan2(lean[1], lean[0]) % (2.0 * math.pi)

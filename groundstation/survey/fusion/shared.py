@@ -222,7 +222,7 @@ class SharedErrors:
         return [*inner, ("drive", names[-1])]
 
 
-def stacked(directions: Sequence[Direction], width: int) -> Array:
+def stack_shared_errors(directions: Sequence[Direction], width: int) -> Array:
     """Columns (n, 2, width) of directions, with zeros for those that one does not know."""
     columns = np.zeros((len(directions), 2, width))
     for own, direction in zip(columns, directions, strict=True):
@@ -263,13 +263,13 @@ def weights_of(covs: Array, causes: Array, places: Sequence[Places], width: int)
     return np.asarray(np.linalg.inv(covs + shared @ shared.transpose(0, 2, 1)))
 
 
-def widened(shared: Array, columns: int) -> Array:
+def widen_shared_errors(shared: Array, columns: int) -> Array:
     """The same columns with zeros for those met later: (k, columns)."""
     missing = columns - shared.shape[1]
     return shared if missing == 0 else np.concatenate([shared, np.zeros((shared.shape[0], missing))], axis=1)
 
 
-def added(one: Array, other: Array) -> Array:
+def add_shared_errors(one: Array, other: Array) -> Array:
     """Sum of two sets of columns of different width."""
     columns = max(one.shape[1], other.shape[1])
-    return widened(one, columns) + widened(other, columns)
+    return widen_shared_errors(one, columns) + widen_shared_errors(other, columns)

@@ -24,7 +24,7 @@ import numpy as np
 import numpy.typing as npt
 
 from groundstation.survey.fusion.resolve import Direction
-from groundstation.survey.fusion.shared import stacked
+from groundstation.survey.fusion.shared import stack_shared_errors
 from groundstation.survey.fusion.survey_trust import UNKNOWN_YAW_VAR
 
 Array = npt.NDArray[np.float64]
@@ -55,7 +55,7 @@ class Legs:
     unseen: npt.NDArray[np.bool_]  # legs of which surveys say nothing
 
 
-def carry(head: Direction, measured: Sequence[Direction], places: Sequence[int]) -> list[Carried]:
+def carry_directions(head: Direction, measured: Sequence[Direction], places: Sequence[int]) -> list[Carried]:
     """Directions of stations in the hole, from those that their tubes measured with the yaw of the head.
 
     What the random errors of a station do to all stations below it is one column, so that covariances of positions
@@ -70,16 +70,16 @@ def carry(head: Direction, measured: Sequence[Direction], places: Sequence[int])
     leans = np.array([head.lean, *(one.lean for one in measured)])
     downs = np.array([head.down, *(one.down for one in measured)])
     covs = np.array([head.cov, *(one.cov for one in measured)])
-    legs = grown(leans, downs)
+    legs = gamma_increments(leans, downs)
     gammas = np.concatenate([[0.0], np.cumsum(legs.turned)])
     turns = _turns(gammas)
     carried = (turns @ leans[:, :, None])[:, :, 0]
     here = np.concatenate([np.zeros((1, 2)), legs.by_lower])  # what its lean does to gamma at a station
     below = here[:-1] + legs.by_upper  # and at those below
     sizes = np.sqrt(np.maximum(_squares(below, covs[:-1]), 0.0))
-    shared = stacked(measured, max([1 + max(places), *(one.width for one in measured)]))
+    shared = stack_shared_errors(measured, max([1 + max(places), *(one.width for one in measured)]))
     by_columns = _by_columns(legs, shared)
-    by_columns[:, places[0]] = np.cumsum(bent(np.column_stack([carried, downs]), legs.unseen))
+    by_columns[:, places[0]] = np.cumsum(gamma_bend_stds(np.column_stack([carried, downs]), legs.unseen))
     by_columns[:, list(places[1:])] = np.tril(np.tile(sizes, (len(sizes), 1)))
     stds = np.sqrt(_squares(here, covs)[1:] + np.sum(by_columns**2, axis=1))
     across = np.stack([-carried[1:, 1], carried[1:, 0]], axis=1)  # change of the lean for one rad of gamma
@@ -94,7 +94,7 @@ def carry(head: Direction, measured: Sequence[Direction], places: Sequence[int])
     return [Carried(*row) for row in zip(directions, gammas[1:].tolist(), stds.tolist(), strict=True)]
 
 
-def grown(leans: Array, downs: Array) -> Legs:
+def gamma_increments(leans: Array, downs: Array) -> Legs:
     """How gamma grows from station to station, from leans (n + 1, 2) as measured and vertical parts (n + 1,)."""
     base = np.maximum(1.0 + downs, UPWARD)
     level = np.copysign(np.maximum(np.abs(downs), LEVEL), downs)
@@ -110,7 +110,7 @@ def grown(leans: Array, downs: Array) -> Legs:
     return Legs(np.angle(left**2), by_upper * seen, by_lower * seen, unseen)
 
 
-def bent(tangents: Array, unseen: npt.NDArray[np.bool_]) -> Array:
+def gamma_bend_stds(tangents: Array, unseen: npt.NDArray[np.bool_]) -> Array:
     """How far gamma is off by each leg (n,) between tangents (n + 1, 3), for it is no arc of a great circle; rad.
 
     A path that bends out of its arc evenly, as legs bend against each other, encloses c^2 / 12 of the angle by which it

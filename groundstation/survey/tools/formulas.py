@@ -69,7 +69,7 @@ class _Writer:
     def _name(self, name: str) -> str:
         if name.lower() in CONSTANTS:
             return _token(CONSTANTS[name.lower()])
-        known = self._names.get(plain(name))
+        known = self._names.get(normalise_name(name))
         if known is None:
             own = ", ".join(self._parameters) or "it has none"
             raise ToolError(
@@ -144,12 +144,12 @@ def _number(token: str) -> float | None:
         return None
 
 
-def plain(name: str) -> str:
+def normalise_name(name: str) -> str:
     """A name as formulas compare it: published files write gxy_running_speed and GXYRunningSpeed."""
     return name.lower().replace("_", "")
 
 
-def parse(text: str) -> ast.expr:
+def parse_formula(text: str) -> ast.expr:
     """Tree of one formula.
 
     Raises
@@ -185,7 +185,7 @@ class Program:
     functions: list[str]
 
 
-def translate(formulas: Iterable[str], parameters: Sequence[str] = ()) -> Program:
+def translate_formulas(formulas: Iterable[str], parameters: Sequence[str] = ()) -> Program:
     """Code of many formulas in which a common part is computed once.
 
     Raises
@@ -193,12 +193,12 @@ def translate(formulas: Iterable[str], parameters: Sequence[str] = ()) -> Progra
     ToolError
         With the formula that cannot be translated.
     """
-    names = {plain(name): f"v{k}" for k, name in enumerate([*VARIABLES, *parameters])}
+    names = {normalise_name(name): f"v{k}" for k, name in enumerate([*VARIABLES, *parameters])}
     writer = _Writer(names, parameters)
     results = []
     for text in formulas:
         try:
-            results.append(writer.value(parse(text)))
+            results.append(writer.value(parse_formula(text)))
         except (ToolError, RecursionError) as error:
             reason = str(error) if isinstance(error, ToolError) else "expected fewer operations within each other"
             raise ToolError(f"formula {text!r:.80}: {reason}") from None
@@ -217,7 +217,7 @@ def compile_formulas(formulas: Iterable[str], parameters: Sequence[str] = ()) ->
     ToolError
         With the formula that cannot be compiled.
     """
-    program = translate(formulas, parameters)
+    program = translate_formulas(formulas, parameters)
     head = [f"{function} = m.{function[1:]}" for function in program.functions]
     taken = [f"v{k} = inputs[{k}]" for k in program.inputs]
     body = [*head, *taken, *program.lines, f"return [{', '.join(program.results)}]"]

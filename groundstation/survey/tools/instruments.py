@@ -19,7 +19,14 @@ from pathlib import Path
 from typing import Any
 
 from groundstation.errors import ToolError
-from groundstation.survey.tools.formulas import CONSTANTS, FUNCTIONS, VARIABLES, compile_formulas, is_zero, plain
+from groundstation.survey.tools.formulas import (
+    CONSTANTS,
+    FUNCTIONS,
+    VARIABLES,
+    compile_formulas,
+    is_zero,
+    normalise_name,
+)
 
 Triple = tuple[str, str, str]
 LARGEST = 1e300
@@ -29,7 +36,7 @@ EVERYWHERE: Window = (-math.inf, math.inf)
 PREVIOUS = "previous"  # the azimuth weight of the station before, of drift and random walk
 
 
-class Mode(Enum):
+class PropagationMode(Enum):
     """How far an error stays the same."""
 
     RANDOM = "random"  # another one at every station
@@ -55,7 +62,7 @@ class Term:
     name: str
     value: float
     unit: str
-    mode: Mode
+    mode: PropagationMode
     weights: Triple = ZERO  # of depth (m), inclination and azimuth (rad)
     singular: Triple | None = None  # north, east, down per metre of leg where the hole is vertical
     position: Triple | None = None  # north, east, down of the station itself
@@ -79,7 +86,7 @@ class Term:
 
 
 @dataclass(frozen=True, slots=True)
-class Tool:
+class SurveyTool:
     """One instrument. ``parameters`` are names for its formulas, SI."""
 
     name: str
@@ -115,22 +122,22 @@ class Tool:
             except ToolError as error:
                 raise ToolError(f"{self.name}: term {term.name}: {error}") from None
 
-    def without(self, *names: str) -> Tool:
+    def without(self, *names: str) -> SurveyTool:
         """The same tool less some terms."""
         return self.with_terms(tuple(term for term in self.terms if term.name not in names))
 
-    def with_terms(self, terms: tuple[Term, ...]) -> Tool:
+    def with_terms(self, terms: tuple[Term, ...]) -> SurveyTool:
         """The same tool with other terms."""
         return replace(self, terms=terms)
 
 
-def shipped() -> list[str]:
+def shipped_tool_names() -> list[str]:
     """Names of the tools that come with the program."""
     folder = resources.files("groundstation.survey.tools") / "models"
     return sorted(entry.name.removesuffix(".toml") for entry in folder.iterdir() if entry.name.endswith(".toml"))
 
 
-def load_tool(name_or_file: str, parameters: Mapping[str, float] | None = None) -> Tool:
+def load_tool(name_or_file: str, parameters: Mapping[str, float] | None = None) -> SurveyTool:
     """Tool by its name, of the OWSG set by its name there, or of a TOML or ISCWSA JSON file.
 
     ``parameters`` are those that it leaves out, or in place of its own.
@@ -140,7 +147,7 @@ def load_tool(name_or_file: str, parameters: Mapping[str, float] | None = None) 
     ToolError
         One line: file, term, what was expected and what came.
     """
-    if name_or_file in shipped():
+    if name_or_file in shipped_tool_names():
         text = (resources.files("groundstation.survey.tools") / "models" / f"{name_or_file}.toml").read_text("utf-8")
         return parse_toml(text, name_or_file, parameters)
     path = Path(name_or_file)
@@ -151,14 +158,16 @@ def load_tool(name_or_file: str, parameters: Mapping[str, float] | None = None) 
         if found is not None:
             return found
         raise ToolError(
-            f"{name_or_file}: no such instrument; expected one of {', '.join(shipped())}, one of the OWSG set such as "
+            f"{name_or_file}: no such instrument; expected one of {', '.join(shipped_tool_names())}, one of the OWSG set such as "
             "MWD+IFR1+SAG+MS or GYRO-NS-CT (borechain survey --tools), or a .toml or .json file"
         )
     try:
         text = path.read_text("utf-8")
     except (OSError, UnicodeDecodeError) as error:
         reason = getattr(error, "strerror", None) or "not a text file"
-        raise ToolError(f"{path}: {reason}; expected an instrument file or one of {', '.join(shipped())}") from error
+        raise ToolError(
+            f"{path}: {reason}; expected an instrument file or one of {', '.join(shipped_tool_names())}"
+        ) from error
     if path.suffix == ".json":
         from groundstation.survey.tools.iscwsa_json import parse_json
 
@@ -166,7 +175,7 @@ def load_tool(name_or_file: str, parameters: Mapping[str, float] | None = None) 
     return parse_toml(text, str(path), parameters)
 
 
-def parse_toml(text: str, where: str, replaced: Mapping[str, float] | None = None) -> Tool:
+def parse_toml(text: str, where: str, replaced: Mapping[str, float] | None = None) -> SurveyTool:
     """Tool of TOML text; errors as ``load_tool``, beginning with ``where``."""
     try:
         data = tomllib.loads(text)
@@ -184,13 +193,13 @@ def parse_toml(text: str, where: str, replaced: Mapping[str, float] | None = Non
     given = data.get("parameters", {})
     if not isinstance(given, dict) or not isinstance(data["term"], list):
         raise ToolError(f"{where}: term or parameters: expected a table [parameters] and terms [[term]]")
-    own = {name: number(where, f"parameters.{name}", value) for name, value in given.items()}
+    own = {name: finite_number(where, f"parameters.{name}", value) for name, value in given.items()}
     parameters = with_parameters(own, replaced or {})
     check_parameters(where, parameters)
-    limit = math.radians(number(where, "tool.inclination_max_deg", head.get("inclination_max_deg", 180.0)))
+    limit = math.radians(finite_number(where, "tool.inclination_max_deg", head.get("inclination_max_deg", 180.0)))
     terms = tuple(_term(where, k, row) for k, row in enumerate(data["term"], 1))
     try:
-        return Tool(
+        return SurveyTool(
             str(head["name"]),
             str(head["title"]),
             terms,
@@ -207,8 +216,8 @@ def parse_toml(text: str, where: str, replaced: Mapping[str, float] | None = Non
 
 def with_parameters(own: dict[str, float], given: Mapping[str, float]) -> dict[str, float]:
     """Parameters of a file with what was given in their place or beside them."""
-    names = {plain(name) for name in given}
-    return {name: value for name, value in own.items() if plain(name) not in names} | dict(given)
+    names = {normalise_name(name) for name in given}
+    return {name: value for name, value in own.items() if normalise_name(name) not in names} | dict(given)
 
 
 def check_parameters(where: str, parameters: dict[str, float]) -> None:
@@ -219,12 +228,12 @@ def check_parameters(where: str, parameters: dict[str, float]) -> None:
     ToolError
         Names file and parameter.
     """
-    taken = {plain(name) for name in (*VARIABLES, *CONSTANTS, *FUNCTIONS)}
+    taken = {normalise_name(name) for name in (*VARIABLES, *CONSTANTS, *FUNCTIONS)}
     for name in parameters:
-        if plain(name) in taken:
-            whose = "a variable" if plain(name) in {plain(v) for v in VARIABLES} else "something else"
+        if normalise_name(name) in taken:
+            whose = "a variable" if normalise_name(name) in {normalise_name(v) for v in VARIABLES} else "something else"
             raise ToolError(f"{where}: parameters.{name}: the name is that of {whose}; choose another")
-        taken.add(plain(name))
+        taken.add(normalise_name(name))
 
 
 TERM_KEYS = {
@@ -238,7 +247,7 @@ def _term(where: str, k: int, row: Any) -> Term:
     _keys(where, f"term {name}: ", row, TERM_KEYS, {"name", "value", "unit", "mode"})
     return Term(
         str(name),
-        number(where, f"term {name}: value", row["value"]),
+        finite_number(where, f"term {name}: value", row["value"]),
         str(row["unit"]),
         mode_of(where, str(name), str(row["mode"])),
         _triple(row, ("depth", "inclination", "azimuth")) or ZERO,
@@ -250,7 +259,7 @@ def _term(where: str, k: int, row: Any) -> Term:
 
 
 def _angle(where: str, name: str, row: dict[str, Any], key: str, default: float) -> float:
-    return math.radians(number(where, f"term {name}: {key}", row[key])) if key in row else default
+    return math.radians(finite_number(where, f"term {name}: {key}", row[key])) if key in row else default
 
 
 def _triple(row: dict[str, Any], names: tuple[str, str, str]) -> Triple | None:
@@ -260,7 +269,7 @@ def _triple(row: dict[str, Any], names: tuple[str, str, str]) -> Triple | None:
     return first, second, third
 
 
-def mode_of(where: str, term: str, text: str) -> Mode:
+def mode_of(where: str, term: str, text: str) -> PropagationMode:
     """Propagation mode by its name.
 
     Raises
@@ -269,13 +278,13 @@ def mode_of(where: str, term: str, text: str) -> Mode:
         Names file, term and the valid modes.
     """
     try:
-        return Mode(text.lower())
+        return PropagationMode(text.lower())
     except ValueError:
-        modes = ", ".join(mode.value for mode in Mode)
+        modes = ", ".join(mode.value for mode in PropagationMode)
         raise ToolError(f"{where}: term {term}: expected a mode of {modes}, got {text!r}") from None
 
 
-def number(where: str, what: str, value: Any) -> float:
+def finite_number(where: str, what: str, value: Any) -> float:
     """A finite number of a file.
 
     Raises

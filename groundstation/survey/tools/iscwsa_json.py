@@ -20,17 +20,17 @@ from dataclasses import replace
 from typing import Any
 
 from groundstation.errors import ToolError
-from groundstation.survey.tools.formulas import plain
+from groundstation.survey.tools.formulas import normalise_name
 from groundstation.survey.tools.instruments import (
     EVERYWHERE,
     ZERO,
-    Mode,
+    PropagationMode,
+    SurveyTool,
     Term,
-    Tool,
     Triple,
     check_parameters,
+    finite_number,
     mode_of,
-    number,
     with_parameters,
 )
 
@@ -60,7 +60,7 @@ KINDS = ("Magnetic", "Gyroscopic", "Inertial", "Unknown")
 TERM_KEYS = ("name", "value", "units", "propagation_mode", "depth_formula", "inclination_formula", "azimuth_formula")
 
 
-def parse_json(text: str, where: str, given: Mapping[str, float] | None = None) -> Tool:
+def parse_json(text: str, where: str, given: Mapping[str, float] | None = None) -> SurveyTool:
     """Tool of an ISCWSA JSON text; ``given`` are parameters that the file leaves out, or in place of its own.
 
     Raises
@@ -77,19 +77,21 @@ def parse_json(text: str, where: str, given: Mapping[str, float] | None = None) 
     return tool_of(data, where, given)
 
 
-def tool_of(data: dict[str, Any], where: str, given: Mapping[str, float] | None = None) -> Tool:
+def tool_of(data: dict[str, Any], where: str, given: Mapping[str, float] | None = None) -> SurveyTool:
     """Tool of the content of an ISCWSA JSON text; errors as ``parse_json``."""
     meta, stated = data.get("metadata", {}), data.get("parameters", {})
     for name, table in (("metadata", meta), ("parameters", stated)):
         if not isinstance(table, dict):
             raise ToolError(f"{where}: {name}: expected an object, got {table!r:.60}")
-    low, high = (math.radians(number(where, key, stated.get(key, d))) for key, d in (("inc_min", 0), ("inc_max", 180)))
+    low, high = (
+        math.radians(finite_number(where, key, stated.get(key, d))) for key, d in (("inc_min", 0), ("inc_max", 180))
+    )
     parameters = _parameters(where, stated, given or {})
-    end = next((parameters.pop(name) for name in list(parameters) if plain(name) == STATIC_END), math.inf)
+    end = next((parameters.pop(name) for name in list(parameters) if normalise_name(name) == STATIC_END), math.inf)
     rows = [_term(where, k, row) for k, row in enumerate(data["terms"], 1)]
     terms = tuple(term for row in rows for term in _in_modes(row, end))
     try:
-        return Tool(
+        return SurveyTool(
             str(meta.get("short_name") or where),
             str(meta.get("long_name") or where),
             terms,
@@ -106,9 +108,9 @@ def tool_of(data: dict[str, Any], where: str, given: Mapping[str, float] | None 
 
 def _parameters(where: str, stated: dict[str, Any], given: Mapping[str, float]) -> dict[str, float]:
     """Parameters of a file with what it leaves out."""
-    own = {k: number(where, f"parameters.{k}", v) for k, v in stated.items() if k not in ("inc_min", "inc_max")}
+    own = {k: finite_number(where, f"parameters.{k}", v) for k, v in stated.items() if k not in ("inc_min", "inc_max")}
     parameters = with_parameters(own, given)
-    names = {plain(name) for name in parameters}
+    names = {normalise_name(name) for name in parameters}
     if "xcltortuosity" not in names:
         parameters["XCLTortuosity"] = TORTUOSITY
     if REDUCTION not in names:
@@ -128,13 +130,13 @@ def _in_modes(term: Term, end: float) -> list[Term]:
         walks = "random_walk" in azimuth.lower()
         # a free gyro, whose drift runs from the collar, states no end
         window = (end, math.inf) if end < math.inf else EVERYWHERE
-        return [replace(term, weights=weights, window=window, mode=Mode.SECTION if walks else term.mode)]
+        return [replace(term, weights=weights, window=window, mode=PropagationMode.SECTION if walks else term.mode)]
     if end >= math.pi or not STATIONARY.match(term.name):
         return [term]
-    if term.mode is not Mode.RANDOM:
+    if term.mode is not PropagationMode.RANDOM:
         return [replace(term, window=(-math.inf, end), kept=True)]
     full = re.sub("NoiseReductionFactor *\\*", "", azimuth) if NOISE in term.name else azimuth
-    start = replace(term, name=f"{term.name}-INIT", mode=Mode.SECTION, window=(end, end), kept=True)
+    start = replace(term, name=f"{term.name}-INIT", mode=PropagationMode.SECTION, window=(end, end), kept=True)
     return [replace(term, weights=(*term.weights[:2], full), window=(-math.inf, end)), start]
 
 
@@ -146,7 +148,7 @@ def _term(where: str, k: int, row: Any) -> Term:
     if missing:
         raise ToolError(f"{where}: term {name}: {missing[0]} is missing")
     mode = mode_of(where, name, str(row["propagation_mode"]))
-    value = number(where, f"term {name}: value", row["value"])
+    value = finite_number(where, f"term {name}: value", row["value"])
     if name in XCL:
         return Term(name, value, str(row["units"]), mode, position=XCL[name])
     weights = tuple(str(row[key]) for key in ("depth_formula", "inclination_formula", "azimuth_formula"))
@@ -155,7 +157,7 @@ def _term(where: str, k: int, row: Any) -> Term:
     return Term(name, value, str(row["units"]), mode, weights, at_vertical)  # type: ignore[arg-type]
 
 
-def to_json(tool: Tool, date: datetime.date) -> str:
+def to_json(tool: SurveyTool, date: datetime.date) -> str:
     """ISCWSA JSON text of a tool.
 
     Raises
@@ -196,7 +198,7 @@ def to_json(tool: Tool, date: datetime.date) -> str:
     return json.dumps(model, indent=2) + "\n"
 
 
-def _row(tool: Tool, term: Term) -> dict[str, Any]:
+def _row(tool: SurveyTool, term: Term) -> dict[str, Any]:
     weights = term.weights
     if term.position is not None:
         if term.position != XCL.get(term.name) or term.weights != ZERO or term.singular is not None:
@@ -213,9 +215,9 @@ def _row(tool: Tool, term: Term) -> dict[str, Any]:
         "value": term.value,
         "units": unit,
         # correlation between stations of one leg, between legs of one well and between wells
-        "depth_factor": float(term.mode is not Mode.RANDOM),
-        "inclination_factor": float(term.mode in (Mode.WELL, Mode.GLOBAL)),
-        "azimuth_factor": float(term.mode is Mode.GLOBAL),
+        "depth_factor": float(term.mode is not PropagationMode.RANDOM),
+        "inclination_factor": float(term.mode in (PropagationMode.WELL, PropagationMode.GLOBAL)),
+        "azimuth_factor": float(term.mode is PropagationMode.GLOBAL),
         "propagation_mode": term.mode.value.capitalize(),
         "depth_formula": depth,
         "inclination_formula": inclination,
@@ -227,7 +229,7 @@ def _row(tool: Tool, term: Term) -> dict[str, Any]:
     return row | {"hash_value": _hash(row)}
 
 
-def _numbered(tool: Tool, term: Term, text: str) -> str:
+def _numbered(tool: SurveyTool, term: Term, text: str) -> str:
     """A formula with the tool's parameters as numbers."""
     known = {name.lower(): value for name, value in tool.parameters.items()}
     foreign = {"sigmayaw", "sigmasystematic", "sigmaforce", "readings", "time", "timeprev"} & {

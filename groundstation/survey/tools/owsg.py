@@ -12,7 +12,7 @@ from functools import lru_cache
 from importlib import resources
 from typing import Any
 
-from groundstation.survey.tools.instruments import Tool
+from groundstation.survey.tools.instruments import SurveyTool
 from groundstation.survey.tools.iscwsa_json import tool_of
 
 FORMULAS = ("depth_formula", "inclination_formula", "azimuth_formula")
@@ -28,7 +28,7 @@ def owsg_names() -> dict[str, str]:
     return {name: str(tool["title"]) for name, tool in _set()["tools"].items()}
 
 
-def owsg_tool(name: str, parameters: Mapping[str, float] | None = None) -> Tool | None:
+def owsg_tool(name: str, parameters: Mapping[str, float] | None = None) -> SurveyTool | None:
     """Tool of the set, or None where there is no such name, which is read without regard to case.
 
     Raises

@@ -12,14 +12,14 @@ from enum import IntEnum
 import numpy as np
 import numpy.typing as npt
 
-from groundstation.survey.wall.column_deviation import Design
+from groundstation.survey.wall.column_deviation import ColumnDesign
 from groundstation.survey.wall.plane_errors import PlaneErrors
 
 Array = npt.NDArray[np.float64]
 TOE = 0.05  # m, by which a column may end above the depth asked for: its last leg goes on
 
 
-class State(IntEnum):
+class ColumnState(IntEnum):
     """What is known of a column at a depth."""
 
     SURVEYED = 0
@@ -59,10 +59,10 @@ class Columns:
         """
         shape = centres.shape[:2]
         finite = np.isfinite(centres[..., 0])
-        states = np.where(finite, State.SURVEYED, State.MISSING).astype(np.int8)
+        states = np.where(finite, ColumnState.SURVEYED, ColumnState.MISSING).astype(np.int8)
         return cls(
             names, depths, centres, np.asarray(covs), designs, np.broadcast_to(designs[:, None, :], centres.shape),
-            states, PlaneErrors.of_planes(roots(np.asarray(covs))), PlaneErrors.of_planes(np.zeros((*shape, 2, 0))),
+            states, PlaneErrors.of_planes(covariance_roots(np.asarray(covs))), PlaneErrors.of_planes(np.zeros((*shape, 2, 0))),
             np.full(shape, radius), np.zeros(shape),
         )  # fmt: skip
 
@@ -85,21 +85,21 @@ class Columns:
         return np.zeros(len(self.depths), np.intp) if self.layers is None else self.layers
 
 
-def roots(cov: Array) -> Array:
+def covariance_roots(cov: Array) -> Array:
     """Symmetric root (..., k, k) of covariances."""
     values, vectors = np.linalg.eigh(cov)
     scaled = vectors * np.sqrt(np.maximum(values, 0.0))[..., None, :]
     return np.asarray(scaled @ np.swapaxes(vectors, -1, -2))
 
 
-def plane_frame(designs: list[Design]) -> Array:
+def plane_frame(designs: list[ColumnDesign]) -> Array:
     """Rows (3, 3): two axes across the mean of the design axes, and that mean: north, east, down of vertical ones."""
     mean = np.mean([design.axis for design in designs], axis=0)
     mean /= np.linalg.norm(mean)
     if abs(mean[2]) > 1.0 - 1e-12:
         return np.eye(3)
     inclination, azimuth = float(np.arccos(np.clip(mean[2], -1.0, 1.0))), float(np.arctan2(mean[1], mean[0]))
-    middle = Design(inclination=inclination, azimuth=azimuth)
+    middle = ColumnDesign(inclination=inclination, azimuth=azimuth)
     return np.concatenate([middle.across, middle.axis[None, :]])
 
 
@@ -124,7 +124,7 @@ class Cut:
         return errors[..., :2, :] - self.slope[..., :, None] * errors[..., 2:, :]
 
 
-def cut(positions: Array, tangents: Array, depths: Array) -> Cut:
+def intersect_planes(positions: Array, tangents: Array, depths: Array) -> Cut:
     """Where wells cross the planes of ``depths`` (z,), in a frame whose third axis is the normal of the planes.
 
     Positions and tangents (w, n, 3). Between stations the centre follows the cubic that has the stations' places and

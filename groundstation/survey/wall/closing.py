@@ -14,15 +14,15 @@ from datetime import date
 import numpy as np
 import numpy.typing as npt
 
-from groundstation.survey.wall.as_built import Columns, State
-from groundstation.survey.wall.column_joint import thickness
+from groundstation.survey.wall.as_built import Columns, ColumnState
+from groundstation.survey.wall.column_joint import joint_thickness
 from groundstation.survey.wall.wall_joints import Detour
 
 Array = npt.NDArray[np.float64]
 
 
 @dataclass(frozen=True, slots=True)
-class Stage:
+class ClosingDay:
     """What stood at the end of one day."""
 
     day: date
@@ -32,13 +32,13 @@ class Stage:
     widest: tuple[int, int, float] | None  # joint, depth (indices) and spacing (m) where both its columns stand
 
 
-def stages(
+def closing_by_day(
     columns: Columns,
     pairs: npt.NDArray[np.intp],
     required: float,
     days: Sequence[date | None],
     detours: Sequence[Detour] = (),
-) -> list[Stage]:
+) -> list[ClosingDay]:
     """What stood at the end of every day on which something was drilled.
 
     Parameters
@@ -53,7 +53,7 @@ def stages(
     for detour in detours:
         _, legs = _closing(columns, detour.pairs, required, order)
         closing[detour.joint] = np.minimum(closing[detour.joint], np.max(legs, axis=0))
-    asked = np.max(columns.states[pairs], axis=1) != State.OUTSIDE
+    asked = np.max(columns.states[pairs], axis=1) != ColumnState.OUTSIDE
     both = np.max(order[pairs], axis=1)
     found = []
     for day in sorted({day for day in days if day is not None}):
@@ -64,7 +64,7 @@ def stages(
         widest = (joint, depth, float(spacing[joint, depth])) if np.isfinite(spacing[joint, depth]) else None
         drilled = [name for name, that in zip(columns.names, days, strict=True) if that == day]
         closed = float(np.count_nonzero(shut & asked)) / max(int(np.count_nonzero(asked)), 1)
-        found.append(Stage(day, drilled, closed, int(np.count_nonzero(np.any(asked & ~shut, axis=1))), widest))
+        found.append(ClosingDay(day, drilled, closed, int(np.count_nonzero(np.any(asked & ~shut, axis=1))), widest))
     return found
 
 
@@ -73,7 +73,7 @@ def _closing(columns: Columns, pairs: npt.NDArray[np.intp], required: float, ord
     a, b = pairs[:, 0], pairs[:, 1]
     apart = columns.centres[b] - columns.centres[a]
     distance = np.hypot(apart[..., 0], apart[..., 1])
-    known = np.maximum(columns.states[a], columns.states[b]) <= State.UNSURVEYED
+    known = np.maximum(columns.states[a], columns.states[b]) <= ColumnState.UNSURVEYED
     with np.errstate(invalid="ignore"):
-        good = known & (thickness(distance, columns.radii[a], columns.radii[b]) >= required)
+        good = known & (joint_thickness(distance, columns.radii[a], columns.radii[b]) >= required)
     return distance, np.where(good, np.max(order[pairs], axis=1)[:, None], np.inf)

@@ -18,8 +18,8 @@ import numpy as np
 import numpy.typing as npt
 
 from groundstation.errors import SurveyError
-from groundstation.survey.fusion.resolve import Direction, angle_stds, angles
-from groundstation.survey.well.trajectory import Point
+from groundstation.survey.fusion.resolve import Direction, angle_stds, direction_angles
+from groundstation.survey.well.trajectory import TrajectoryPoint
 
 Array = npt.NDArray[np.float64]
 STEEPEST = 0.05  # cosine between hole and axis, below which the hole does not come to the target's depth
@@ -59,7 +59,7 @@ PARTS: list[tuple[str, Callable[[tuple[str, ...]], tuple[float, float]]]] = [
 ]
 
 
-def tolerance(name: str) -> Tolerance:
+def parse_tolerance(name: str) -> Tolerance:
     """Preset by its name, or a sum of parts: ``50 mm + 1:200``, ``75 mm at 20 m``, ``1.5 %``, ``0.3 deg``.
 
     Raises
@@ -86,7 +86,7 @@ def tolerance(name: str) -> Tolerance:
 
 
 @dataclass(frozen=True)  # with a dictionary, for what is worked out once
-class Design:
+class ColumnDesign:
     """Axis of a column and what it is to become."""
 
     name: str = "column"
@@ -183,7 +183,7 @@ class Deviations:
         return max([self[first + place] for place in near], key=attrgetter("ratio"))
 
 
-def deviations(md: Array, positions: Array, covs: Array, design: Design) -> Deviations:
+def axis_deviations(md: Array, positions: Array, covs: Array, design: ColumnDesign) -> Deviations:
     """Deviation of points at depths (n,), m, with positions (n, 3) and their covariances (n, 3, 3)."""
     offsets = positions - np.array(design.head)
     # number by number: in a product of matrices the last bits of one point depend on how many others there are
@@ -194,12 +194,12 @@ def deviations(md: Array, positions: Array, covs: Array, design: Design) -> Devi
     return Deviations(md.copy(), along, across, design.across @ covs @ design.across.T, limit)
 
 
-def deviation(point: Point, design: Design) -> Deviation:
+def point_deviation(point: TrajectoryPoint, design: ColumnDesign) -> Deviation:
     """Deviation of one point."""
-    return deviations(np.array([point.md]), point.position[None], point.cov[None], design)[0]
+    return axis_deviations(np.array([point.md]), point.position[None], point.cov[None], design)[0]
 
 
-def project(point: Point, direction: Direction, design: Design) -> Deviation:
+def project_to_target(point: TrajectoryPoint, direction: Direction, design: ColumnDesign) -> Deviation:
     """Deviation at the target if the hole goes on straight from a point; its uncertainty grows with the way.
 
     The direction's own error and that of the position are taken as one (fully correlated), for the last station is in
@@ -209,11 +209,11 @@ def project(point: Point, direction: Direction, design: Design) -> Deviation:
     axis, across = design.axis, design.across
     along = float(point.tangent @ axis)
     if along < STEEPEST:
-        return deviation(point, design)
+        return point_deviation(point, design)
     rest = (design.length - float(offset @ axis)) / along
     target = offset + rest * point.tangent
     if rest <= 0.0:
-        return deviation(point, design)
+        return point_deviation(point, design)
     # an error along the axis changes how far there is to go: what counts is its trace on the target's plane
     across = across @ (np.eye(3) - np.outer(point.tangent, axis) / along)
     down = math.copysign(max(abs(direction.down), 1e-6), direction.down)
@@ -250,8 +250,8 @@ class Dominant:
         return "azimuth" if self.by_azimuth > math.sqrt(2.0) * self.by_inclination else "inclination"
 
 
-def dominant(direction: Direction, length: float) -> Dominant:
+def lateral_errors(direction: Direction, length: float) -> Dominant:
     """Lateral errors L cos I sigma_I and L sin I sigma_A of a hole that leans all along like ``direction``."""
-    inclination, _ = angles(direction.lean, direction.down)
+    inclination, _ = direction_angles(direction.lean, direction.down)
     std_i, std_a = angle_stds(direction.lean, direction.down, direction.total_cov)
     return Dominant(length * abs(math.cos(inclination)) * std_i, length * math.sin(inclination) * std_a)

@@ -27,7 +27,7 @@ SIDEWAYS = ((-math.sqrt(3.0), 1.0 / 6.0), (0.0, 2.0 / 3.0), (math.sqrt(3.0), 1.0
 SMALLEST_LIMIT = 1e-6  # m, stands for radii that never make the joint
 
 
-def thickness(distance: Array, radius: Array | float, other: Array | float | None = None) -> Array:
+def joint_thickness(distance: Array, radius: Array | float, other: Array | float | None = None) -> Array:
     """Thickness (m) of a joint whose centres are ``distance`` apart; negative where they do not meet: the gap.
 
     ``other`` is the radius of the second column, that of the first by default. A column whose centre lies within the
@@ -41,7 +41,7 @@ def thickness(distance: Array, radius: Array | float, other: Array | float | Non
     return np.asarray(np.where(distance < first + second, joined, first + second - distance))
 
 
-def limits(radius: Array, other: Array, required: float) -> Array:
+def limit_distances(radius: Array, other: Array, required: float) -> Array:
     """Distance (m) at which the joint of two columns is just as thick as required; 0 where they never make such one."""
     half = 0.25 * required**2
     first, second = radius**2 - half, other**2 - half
@@ -62,7 +62,7 @@ def largest_distance(radius: float, required: float) -> float:
     return 2.0 * math.sqrt(radius**2 - 0.25 * required**2)
 
 
-def margin(radius: float, required: float, spacing: float, length: float) -> tuple[float, float]:
+def shift_margin(radius: float, required: float, spacing: float, length: float) -> tuple[float, float]:
     """How far (m) one centre may shift along the wall, and how much (rad) a column of ``length`` then deviates."""
     shift = largest_distance(radius, required) - spacing
     return shift, math.atan2(shift, length)
@@ -109,7 +109,7 @@ def probability_thin(mean: Array, cov: Array, radii: Array, radius_cov: Array, r
     radius_cov : (n, 2, 2) m^2, of the two radii; they err independently of the centres
     required : m
     """
-    limit = np.maximum(limits(radii[:, 0], radii[:, 1], required), SMALLEST_LIMIT)
+    limit = np.maximum(limit_distances(radii[:, 0], radii[:, 1], required), SMALLEST_LIMIT)
     found = np.asarray(probability_beyond(mean, cov, limit))
     uncertain = np.flatnonzero(np.trace(radius_cov, axis1=-2, axis2=-1) > 0.0)
     if len(uncertain):
@@ -133,7 +133,7 @@ def _over_radii(mean: Array, cov: Array, radii: Array, radius_cov: Array, requir
             density = weight * half * np.exp(-0.5 * t**2) / math.sqrt(math.tau)
             for sideways, share in SIDEWAYS:
                 drawn = radii + t[:, None] * main + sideways * across
-                limit = np.maximum(limits(drawn[:, 0], drawn[:, 1], required), SMALLEST_LIMIT)
+                limit = np.maximum(limit_distances(drawn[:, 0], drawn[:, 1], required), SMALLEST_LIMIT)
                 total += share * density * probability_beyond(mean, cov, limit)
     return np.clip(total, 0.0, 1.0)
 
@@ -157,7 +157,7 @@ def _step(mean: Array, cov: Array, radii: Array, main: Array, required: float) -
     for _ in range(40):
         t = 0.5 * (low + high)
         drawn = radii + t[:, None] * main
-        thin = limits(drawn[:, 0], drawn[:, 1], required) < distance
+        thin = limit_distances(drawn[:, 0], drawn[:, 1], required) < distance
         low, high = np.where(thin, t, low), np.where(thin, high, t)
     half = 0.25 * required**2
     gradient = radii / np.sqrt(np.maximum(radii**2 - half, 1e-6 * radii**2))

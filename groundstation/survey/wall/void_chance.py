@@ -14,9 +14,16 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
-from groundstation.survey.wall.as_built import Columns, State
+from groundstation.survey.wall.as_built import Columns, ColumnState
 from groundstation.survey.wall.voids import power_centre
-from groundstation.survey.wall.wall_errors import FURTHEST, Errors, Mixture, Point, add_radius, parted
+from groundstation.survey.wall.wall_errors import (
+    FURTHEST,
+    Mixture,
+    MostProbablePoint,
+    WallErrors,
+    add_radius,
+    batch_groups,
+)
 
 Array = npt.NDArray[np.float64]
 Indices = npt.NDArray[np.intp]
@@ -41,9 +48,9 @@ class VoidChance:
 
 def void_chance(columns: Columns, triples: npt.NDArray[np.intp], samples: int = SAMPLES) -> VoidChance:
     """P(any void) at every depth; ``triples`` (t, 3) are the columns between which one may open."""
-    errors = Errors.of(columns)
+    errors = WallErrors.of(columns)
     layer = columns.depth_layers()
-    points: list[Point] = []
+    points: list[MostProbablePoint] = []
     kept: list[tuple[list[int], list[int]]] = []
     for triple in triples:
         near = near_triple(columns, triple)
@@ -68,7 +75,7 @@ def void_chance(columns: Columns, triples: npt.NDArray[np.intp], samples: int = 
     mixture = Mixture(points, errors.size)
     cost = sum(2 + len(near) for _, near in kept) + len(columns.names)
     samples = int(np.clip(BUDGET / (cost * depths_count), FEWEST, samples))
-    parts = list(parted([[*three, *near] for three, near in kept], mixture.at_once(samples), depths_count))
+    parts = list(batch_groups([[*three, *near] for three, near in kept], mixture.at_once(samples), depths_count))
     for x, weight in mixture.batches(samples, np.random.default_rng(SEED)):
         any_open = np.zeros((len(x), depths_count), bool)
         for some, which in parts:
@@ -86,7 +93,7 @@ def void_chance(columns: Columns, triples: npt.NDArray[np.intp], samples: int = 
 
 
 def _answer(columns: Columns, probability: Array, error: Array, each: Array, kept: list[list[int]]) -> VoidChance:
-    missing = np.any(columns.states == State.MISSING, axis=0)
+    missing = np.any(columns.states == ColumnState.MISSING, axis=0)
     likeliest: list[tuple[int, int, int] | None] = [None] * len(columns.depths)
     places = np.full((len(columns.depths), 2), np.nan)
     for z in range(len(columns.depths)):
@@ -105,8 +112,8 @@ def _as_surveyed(columns: Columns, three: list[int], near: list[int]) -> npt.NDA
 
 
 def void_point(
-    errors: Errors, triple: npt.NDArray[np.intp], near: list[int], depths: npt.NDArray[np.intp]
-) -> Point | None:
+    errors: WallErrors, triple: npt.NDArray[np.intp], near: list[int], depths: npt.NDArray[np.intp]
+) -> MostProbablePoint | None:
     """The same for the point between three columns, at the likeliest of some ``depths``."""
     c = errors.columns
     centres, radii = np.swapaxes(c.centres[triple][:, depths], 0, 1), c.radii[triple][:, depths].T
@@ -121,8 +128,8 @@ def void_point(
 
 
 def _void_point_at(
-    errors: Errors, triple: npt.NDArray[np.intp], near: list[int], depth: int, middle: Array, weights: Array
-) -> Point:
+    errors: WallErrors, triple: npt.NDArray[np.intp], near: list[int], depth: int, middle: Array, weights: Array
+) -> MostProbablePoint:
     """Nearest x at which the middle of three columns is clear of them and of every other that covers it.
 
     With the barycentric weights w of the middle, its distance from the three grows by the sum of w times what each of
@@ -140,12 +147,14 @@ def _void_point_at(
     wanted, numbers = np.maximum(rests, 0.0), errors.numbers(about)
     shift = -np.linalg.pinv(np.array(rows), rcond=1e-9) @ wanted
     if np.any(-np.array(rows) @ shift < 0.5 * wanted):  # columns that cannot move
-        return Point(numbers, np.zeros(few.size), 0.0)
+        return MostProbablePoint(numbers, np.zeros(few.size), 0.0)
     size = float(np.linalg.norm(shift))
-    return Point(numbers, shift * min(1.0, FURTHEST / max(size, 1e-12)), 0.5 * math.erfc(size / math.sqrt(2.0)))
+    return MostProbablePoint(
+        numbers, shift * min(1.0, FURTHEST / max(size, 1e-12)), 0.5 * math.erfc(size / math.sqrt(2.0))
+    )
 
 
-def _away(errors: Errors, column: int, depth: int, middle: Array) -> Array:
+def _away(errors: WallErrors, column: int, depth: int, middle: Array) -> Array:
     """How much more a column covers a point for one standard deviation of each number: it comes nearer, or is wider."""
     c = errors.columns
     away = middle - c.centres[column, depth]

@@ -39,7 +39,7 @@ class Arc:
     next_disc: int
 
 
-def voids(centres: Array, radii: Array) -> list[Void]:
+def find_voids(centres: Array, radii: Array) -> list[Void]:
     """Voids between discs (n, 2) of radii (n,); discs without a centre (nan) are not there."""
     present = np.flatnonzero(np.isfinite(centres[:, 0]) & (radii > 0.0))
     arcs = [arc for disc in present.tolist() for arc in _exposed(disc, present, centres, radii)]

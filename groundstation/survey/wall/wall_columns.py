@@ -16,14 +16,14 @@ import numpy as np
 import numpy.typing as npt
 
 from groundstation.errors import SurveyError
-from groundstation.survey.tools.instruments import Mode, Tool
-from groundstation.survey.wall.as_built import TOE, Columns, State, cut, plane_frame
-from groundstation.survey.wall.column_deviation import Design
+from groundstation.survey.tools.instruments import PropagationMode, SurveyTool
+from groundstation.survey.wall.as_built import TOE, Columns, ColumnState, intersect_planes, plane_frame
+from groundstation.survey.wall.column_deviation import ColumnDesign
 from groundstation.survey.wall.plane_errors import PlaneErrors
 from groundstation.survey.well.ellipsoid import check_covariance
 from groundstation.survey.well.error_columns import ErrorColumns, error_columns
-from groundstation.survey.well.error_sources import Leg, Site, Survey
-from groundstation.survey.well.methods import Method, positions, tangents
+from groundstation.survey.well.error_sources import Leg, Site, WellSurvey
+from groundstation.survey.well.methods import Method, station_positions, station_tangents
 
 Array = npt.NDArray[np.float64]
 FLATTEST = 0.17  # cosine (80 deg) between a hole and the planes' normal, below which it is not cut by them
@@ -31,7 +31,7 @@ SAME_END = 1e-6  # m
 AT_ONCE = 256  # columns that are computed together: thousands would need hundreds of megabytes
 
 
-class Status(Enum):
+class ColumnStatus(Enum):
     """What the site says of a column."""
 
     UNSTATED = ""  # as far as it was surveyed
@@ -44,17 +44,17 @@ class Status(Enum):
 class ColumnPlan:
     """One column: what it is to be, who surveyed it, how far it was drilled."""
 
-    design: Design
-    tool: Tool
+    design: ColumnDesign
+    tool: SurveyTool
     serial: str = ""  # of the instrument; columns of one instrument share its systematic errors
-    status: Status = Status.UNSTATED
+    status: ColumnStatus = ColumnStatus.UNSTATED
     drilled: float | None = None  # m, measured depth of its end
     head_std: float = 0.0  # m, north and east, of setting out
     calibration: str = ""  # certificate of the instrument
 
 
 @dataclass(frozen=True, slots=True)
-class Hole:
+class ColumnSurvey:
     """Stations (n,) of one column from its head on; none where it was not surveyed."""
 
     md: Array
@@ -106,7 +106,7 @@ class BuiltWall:
     toe_covs: Array  # (columns, 3, 3)
 
 
-def build(plans: Sequence[ColumnPlan], holes: Sequence[Hole], assumed: Assumptions) -> BuiltWall:
+def build_wall(plans: Sequence[ColumnPlan], holes: Sequence[ColumnSurvey], assumed: Assumptions) -> BuiltWall:
     """Cut all columns by common planes.
 
     Raises
@@ -134,7 +134,7 @@ def build(plans: Sequence[ColumnPlan], holes: Sequence[Hole], assumed: Assumptio
             surveyed[k], ends[k] = turned[w, last, 2], turned[w, -1, 2]
             toes[k] = places[w, last]
             toe_covs[k] = sum(c.effects[w, last] @ c.effects[w, last].T for c in errors)
-        found = cut(turned, tangent, depths)
+        found = intersect_planes(turned, tangent, depths)
         centres[members] = found.centres
         book.cut(members, found.upper, found.share)
         for source in errors:
@@ -167,20 +167,20 @@ def state_words(plan: ColumnPlan, built: BuiltWall, k: int) -> str:
     return f"surveyed to {surveyed:g} m{drilled}"
 
 
-def _way(plan: ColumnPlan, hole: Hole) -> Way | None:
+def _way(plan: ColumnPlan, hole: ColumnSurvey) -> Way | None:
     """Stations to the end of the column; None for one that is not there."""
     name, n = plan.design.name, len(hole.md)
-    if plan.status in (Status.PLANNED, Status.NOT_DRILLED):
+    if plan.status in (ColumnStatus.PLANNED, ColumnStatus.NOT_DRILLED):
         if n or plan.drilled is not None:
             raise SurveyError(f"column {name}: stated as {plan.status.value}, yet it has a survey or a drilled depth")
         return None
     end = plan.drilled
-    if end is None and plan.status is Status.DRILLED:
+    if end is None and plan.status is ColumnStatus.DRILLED:
         end = max(plan.design.length, float(hole.md[-1]) if n else 0.0)
     if end is None and not n:
         return None
     if not n:  # drilled and not surveyed: the design is all there is to go by
-        hole = Hole(np.zeros(1), np.array([plan.design.inclination]), np.array([plan.design.azimuth]))
+        hole = ColumnSurvey(np.zeros(1), np.array([plan.design.inclination]), np.array([plan.design.azimuth]))
     last = float(hole.md[-1])
     end = last if end is None else end
     if end < last - SAME_END:
@@ -219,16 +219,16 @@ def _survey(some: list[tuple[ColumnPlan, Way]], assumed: Assumptions) -> tuple[A
     md, inclination, azimuth = (
         np.stack([getattr(way, name) for way in ways]) for name in ("md", "inclination", "azimuth")
     )
-    places = positions(assumed.method, md, inclination, azimuth)
-    survey = Survey(md, inclination, azimuth, places[..., 2])
-    return places, tangents(inclination, azimuth), error_columns(survey, (Leg(some[0][0].tool),), assumed.site)
+    places = station_positions(assumed.method, md, inclination, azimuth)
+    survey = WellSurvey(md, inclination, azimuth, places[..., 2])
+    return places, station_tangents(inclination, azimuth), error_columns(survey, (Leg(some[0][0].tool),), assumed.site)
 
 
 def _key(source: ErrorColumns, plan: ColumnPlan) -> str | None:
     """Name under which columns share a source; None where it is a column's own."""
-    if source.mode is Mode.GLOBAL:
+    if source.mode is PropagationMode.GLOBAL:
         return source.name
-    if source.mode in (Mode.RANDOM, Mode.SECTION) or not plan.serial:
+    if source.mode in (PropagationMode.RANDOM, PropagationMode.SECTION) or not plan.serial:
         return None
     return f"{plan.serial}/{source.name}"
 
@@ -260,7 +260,7 @@ class _Book:
         """All errors of the columns so far have come: their own become as few numbers as say the same."""
         for k, (own, shared) in self._open.items():
             stations = len(own[0] if own else next(iter(shared.values())))
-            self._own[k] = fewest(np.concatenate([np.zeros((stations, 2, 0)), *own], axis=-1))
+            self._own[k] = reduce_error_columns(np.concatenate([np.zeros((stations, 2, 0)), *own], axis=-1))
             self._shared[k] = list(shared), np.moveaxis(np.array([*shared.values()]).reshape(-1, stations, 2), 0, -1)
         self._open = {}
 
@@ -279,7 +279,7 @@ class _Book:
         )
 
 
-def fewest(errors: Array) -> Array:
+def reduce_error_columns(errors: Array) -> Array:
     """Errors (stations, 2, m) of one column by not more numbers than it has places that err.
 
     They are Gaussian and come to a plane by blending, so that all that counts is their covariance E E^T. With E^T = Q R
@@ -316,16 +316,16 @@ def _states(
     heads = np.array([plan.design.head for plan in plans])
     toes = heads + np.array([plan.design.length * plan.design.axis for plan in plans])
     top, bottom = (heads @ frame[2])[:, None], (toes @ frame[2])[:, None]
-    states = np.full(centres.shape[:2], State.MISSING, np.int8)
-    states[depths <= ends[:, None] + TOE] = State.UNSURVEYED
-    states[depths <= surveyed[:, None] + TOE] = State.SURVEYED
-    states[np.isnan(centres[..., 0])] = State.MISSING
+    states = np.full(centres.shape[:2], ColumnState.MISSING, np.int8)
+    states[depths <= ends[:, None] + TOE] = ColumnState.UNSURVEYED
+    states[depths <= surveyed[:, None] + TOE] = ColumnState.SURVEYED
+    states[np.isnan(centres[..., 0])] = ColumnState.MISSING
     outside = (depths < top - 1e-6) | (depths > bottom + 1e-6)
-    states[outside] = State.OUTSIDE
-    return np.where((states == State.MISSING)[..., None], np.nan, centres), states
+    states[outside] = ColumnState.OUTSIDE
+    return np.where((states == ColumnState.MISSING)[..., None], np.nan, centres), states
 
 
-def _design_centres(design: Design, frame: Array, depths: Array) -> Array:
+def _design_centres(design: ColumnDesign, frame: Array, depths: Array) -> Array:
     """Where a design axis crosses the planes (depths, 2)."""
     head, axis = frame @ np.array(design.head), frame @ design.axis
     if axis[2] < FLATTEST:

@@ -25,7 +25,7 @@ PLACES = 300_000  # columns times samples times depths at the most that are draw
 COLUMNS = 128  # at the most whose errors in planes are worked out together
 
 
-class Point(NamedTuple):
+class MostProbablePoint(NamedTuple):
     """The likeliest numbers at which something opens.
 
     Attributes
@@ -41,7 +41,7 @@ class Point(NamedTuple):
 
 
 @dataclass(frozen=True, slots=True)
-class Errors:
+class WallErrors:
     """Where each standard normal number acts: those shared, of each column alone, of radii by column and layer."""
 
     columns: Columns
@@ -50,13 +50,13 @@ class Errors:
     layers: int
 
     @classmethod
-    def of(cls, columns: Columns) -> Errors:
+    def of(cls, columns: Columns) -> WallErrors:
         """The errors of some columns."""
         return cls(columns, columns.shared.width, columns.own.width, int(columns.depth_layers().max()) + 1)
 
-    def among(self, which: Sequence[int]) -> Errors:
+    def among(self, which: Sequence[int]) -> WallErrors:
         """The errors of a few columns, numbered anew; ``numbers`` says which of all they are."""
-        return Errors(self.columns.subset(np.asarray(which, np.intp)), self.shared, self.own, self.layers)
+        return WallErrors(self.columns.subset(np.asarray(which, np.intp)), self.shared, self.own, self.layers)
 
     def numbers(self, which: Sequence[int]) -> Indices:
         """Place among all numbers of those that a few columns have, in the order of ``among``."""
@@ -108,7 +108,7 @@ def _by_number(errors: Array) -> Array:
     return np.ascontiguousarray(np.swapaxes(flat, 1, 2))
 
 
-def parted(groups: Sequence[Sequence[int]], samples: int, depths: int) -> Iterator[tuple[range, Indices]]:
+def batch_groups(groups: Sequence[Sequence[int]], samples: int, depths: int) -> Iterator[tuple[range, Indices]]:
     """Runs of groups of columns, and the columns of each, of which so many samples may be drawn together."""
     most = min(PLACES // max(samples * depths, 1), COLUMNS)
     begin, used = 0, set[int]()
@@ -121,7 +121,7 @@ def parted(groups: Sequence[Sequence[int]], samples: int, depths: int) -> Iterat
         yield range(begin, len(groups)), np.array(sorted(used), np.intp)
 
 
-def add_radius(errors: Errors, normal: Array, column: int, depth: int, slope: float) -> None:
+def add_radius(errors: WallErrors, normal: Array, column: int, depth: int, slope: float) -> None:
     """What the radius of a column adds to a normal: ``slope`` (m/m)."""
     c, layer = errors.columns, int(errors.columns.depth_layers()[depth])
     change, rho = slope * float(c.radius_stds[column, depth]), c.radius_correlation
@@ -129,11 +129,11 @@ def add_radius(errors: Errors, normal: Array, column: int, depth: int, slope: fl
     normal[errors.radius_index(column, layer)] += change * math.sqrt(1.0 - rho)
 
 
-def design_point(numbers: Indices, normal: Array, rest: float) -> Point:
+def design_point(numbers: Indices, normal: Array, rest: float) -> MostProbablePoint:
     """Point beta u of a half-space ``rest`` + normal x < 0, and Phi(-beta)."""
     size = max(float(np.linalg.norm(normal)), 1e-12)
     beta = min(max(rest / size, 0.0), FURTHEST)
-    return Point(numbers, -beta / size * normal, 0.5 * math.erfc(beta / math.sqrt(2.0)))
+    return MostProbablePoint(numbers, -beta / size * normal, 0.5 * math.erfc(beta / math.sqrt(2.0)))
 
 
 class Mixture:
@@ -143,7 +143,7 @@ class Mixture:
     importance sampling of unions, Owen, Maximov and Chertkov (2019).
     """
 
-    def __init__(self, points: Sequence[Point], size: int) -> None:
+    def __init__(self, points: Sequence[MostProbablePoint], size: int) -> None:
         from scipy.sparse import csr_array  # a survey alone needs none of it
 
         chances = np.array([point.chance for point in points])

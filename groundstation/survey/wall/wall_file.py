@@ -17,15 +17,15 @@ import numpy as np
 import numpy.typing as npt
 
 from groundstation.errors import SurveyError
-from groundstation.survey.tools.instruments import Tool, load_tool
+from groundstation.survey.tools.instruments import SurveyTool, load_tool
 from groundstation.survey.wall.as_built import Columns
-from groundstation.survey.wall.closing import Stage, stages
-from groundstation.survey.wall.column_deviation import Tolerance, tolerance
+from groundstation.survey.wall.closing import ClosingDay, closing_by_day
+from groundstation.survey.wall.column_deviation import Tolerance, parse_tolerance
 from groundstation.survey.wall.column_joint import largest_distance
-from groundstation.survey.wall.wall_columns import Assumptions, BuiltWall, ColumnPlan, Hole, Layer, build
+from groundstation.survey.wall.wall_columns import Assumptions, BuiltWall, ColumnPlan, ColumnSurvey, Layer, build_wall
 from groundstation.survey.wall.wall_joints import Detour, neighbours_in_grid, neighbours_in_line
 from groundstation.survey.wall.wall_tables import Defaults, Remedy, read_heads, read_holes
-from groundstation.survey.wall.wall_verdict import Judgement, judge
+from groundstation.survey.wall.wall_verdict import Judgement, judge_columns
 from groundstation.survey.well.depth_reference import DEPTHS_FROM
 from groundstation.survey.well.error_sources import Site
 from groundstation.survey.well.methods import Method
@@ -62,7 +62,7 @@ class WallFile:
     length: float | None
     allowed: float  # probability
     tolerance: Tolerance
-    tool: Tool
+    tool: SurveyTool
     serial: str
     head_std: float
     inclination: float
@@ -104,7 +104,7 @@ class Wall:
     built: BuiltWall
     pairs: npt.NDArray[np.intp]
     detours: list[Detour]
-    holes: list[Hole]
+    holes: list[ColumnSurvey]
     drilled_on: list[date | None]  # of every column
 
     @property
@@ -113,9 +113,9 @@ class Wall:
         return self.built.columns
 
     @property
-    def stages(self) -> list[Stage]:
+    def stages(self) -> list[ClosingDay]:
         """How it closed, day by day; none where no day of drilling is stated."""
-        return stages(self.columns, self.pairs, self.file.thickness, self.drilled_on, self.detours)
+        return closing_by_day(self.columns, self.pairs, self.file.thickness, self.drilled_on, self.detours)
 
     @property
     def grid_spacing(self) -> float | None:
@@ -153,7 +153,7 @@ def read_wall_file(path: Path) -> WallFile:
     method = Method(_one_of(path, values, "method", tuple(m.value for m in Method), Method.BALANCED_TANGENTIAL.value))
     try:
         largest_distance(values["radius_m"], values["thickness_m"])
-        allowed = tolerance(values.get("tolerance", "en-12716"))
+        allowed = parse_tolerance(values.get("tolerance", "en-12716"))
     except SurveyError as error:
         raise SurveyError(f"{path}: {error}") from None
     assumed = Assumptions(
@@ -175,7 +175,7 @@ def read_wall_file(path: Path) -> WallFile:
         values.get("length_m"),
         values.get("allowed_probability", 0.01),
         allowed,
-        load_tool(beside(path, values.get("instrument", "relay"))),
+        load_tool(instrument_path(path, values.get("instrument", "relay"))),
         values.get("serial", ""),
         values.get("head_sigma_m", 0.0),
         math.radians(values.get("inclination_deg", 0.0)),
@@ -205,7 +205,7 @@ def _origin(path: Path, values: dict[str, Any]) -> tuple[float, float, float] | 
     return float(values["northing_m"]), float(values["easting_m"]), float(values["height_m"])
 
 
-def beside(path: Path, instrument: str) -> str:
+def instrument_path(path: Path, instrument: str) -> str:
     """An instrument by its name, or the file of that name beside ``path``."""
     return str(path.parent / instrument) if instrument.endswith((".toml", ".json")) else instrument
 
@@ -275,7 +275,7 @@ def read_wall(path: Path) -> Wall:
         )
     plans = [row.plan(length) for row in rows]
     try:
-        built = build(plans, holes, file.assumed)
+        built = build_wall(plans, holes, file.assumed)
     except SurveyError as error:
         raise SurveyError(f"{path}: {error}") from None
     pairs = _pairs(file, [row.remedy for row in rows], built)
@@ -286,7 +286,7 @@ def read_wall(path: Path) -> Wall:
 
 def judge_wall(wall: Wall) -> Judgement:
     """Judge a wall by what its file requires."""
-    return judge(
+    return judge_columns(
         wall.columns,
         wall.pairs,
         wall.file.thickness,

@@ -12,8 +12,8 @@ import numpy as np
 import numpy.typing as npt
 
 from groundstation.errors import SurveyError
-from groundstation.survey.wall.as_built import Columns, State
-from groundstation.survey.wall.column_joint import largest_distance, probability_thin, thickness
+from groundstation.survey.wall.as_built import Columns, ColumnState
+from groundstation.survey.wall.column_joint import joint_thickness, largest_distance, probability_thin
 
 Array = npt.NDArray[np.float64]
 AT_ONCE = 64  # joints that are judged together
@@ -31,7 +31,7 @@ class Joints:
     states: npt.NDArray[np.int8]  # the worse of the two columns
 
 
-def joints(columns: Columns, pairs: npt.NDArray[np.intp], required: float) -> Joints:
+def judge_joints(columns: Columns, pairs: npt.NDArray[np.intp], required: float) -> Joints:
     """Judge every joint at every depth; ``required`` is the thickness in m."""
     parts = [_joints(columns, pairs[k : k + AT_ONCE], required) for k in range(0, max(len(pairs), 1), AT_ONCE)]
     return Joints(*(np.concatenate([getattr(part, name) for part in parts]) for name in Joints.__slots__))
@@ -43,13 +43,13 @@ def _joints(columns: Columns, pairs: npt.NDArray[np.intp], required: float) -> J
     apart = columns.centres[b] - columns.centres[a]
     distance = np.hypot(apart[..., 0], apart[..., 1])
     states = np.maximum(columns.states[a], columns.states[b])
-    known = states <= State.UNSURVEYED
-    probability = np.where(states == State.MISSING, 1.0, np.nan)
+    known = states <= ColumnState.UNSURVEYED
+    probability = np.where(states == ColumnState.MISSING, 1.0, np.nan)
     radii, radius_cov = pair_radii(columns, pairs)
     probability[known] = probability_thin(
         apart[known], pair_covariance(columns, pairs)[known], radii[known], radius_cov[known], required
     )
-    thick = np.where(known, thickness(distance, columns.radii[a], columns.radii[b]), np.nan)
+    thick = np.where(known, joint_thickness(distance, columns.radii[a], columns.radii[b]), np.nan)
     offset = apart - (columns.planned[b] - columns.planned[a])
     return Joints(pairs, np.where(known, distance, np.nan), thick, probability, offset, states)
 
@@ -69,8 +69,8 @@ def with_detours(columns: Columns, found: Joints, detours: Sequence[Detour], req
         states=found.states.copy(),
     )  # fmt: skip
     for detour in detours:
-        legs, j = joints(columns, detour.pairs, required), detour.joint
-        stands = np.all(legs.states <= State.UNSURVEYED, axis=0)
+        legs, j = judge_joints(columns, detour.pairs, required), detour.joint
+        stands = np.all(legs.states <= ColumnState.UNSURVEYED, axis=0)
         chance = np.minimum(np.sum(np.where(stands, legs.probability, 1.0), axis=0), 1.0)
         better = stands & (chance < np.where(np.isfinite(out.probability[j]), out.probability[j], -1.0))
         weakest = np.argmin(np.where(np.isfinite(legs.thickness), legs.thickness, -np.inf), axis=0)
@@ -101,12 +101,12 @@ def worst_depths(found: Joints) -> npt.NDArray[np.intp]:
     """Depth (index) of every joint at which it most probably is too thin; of equals the thinnest, then the first."""
     probability = np.where(np.isfinite(found.probability), found.probability, -1.0)
     thin = np.where(np.isfinite(found.thickness), found.thickness, np.inf)
-    thin = np.where(found.states == State.MISSING, -np.inf, thin)
+    thin = np.where(found.states == ColumnState.MISSING, -np.inf, thin)
     likeliest = probability >= np.max(probability, axis=1, keepdims=True) * (1.0 - 1e-9)
     return np.asarray(np.argmin(np.where(likeliest, thin, np.inf), axis=1), np.intp)
 
 
-def worst(found: Joints) -> tuple[int, int]:
+def worst_joint(found: Joints) -> tuple[int, int]:
     """Joint and depth (indices) that most probably is too thin; of equals the thinnest, one that is missing before all.
 
     Raises
@@ -140,11 +140,11 @@ def extra_column(columns: Columns, found: Joints, joint: int, required: float) -
 
     Where one of the two is missing, its design stands for it in the place of the new column.
     """
-    thin = np.flatnonzero((found.thickness[joint] < required) | (found.states[joint] == State.MISSING))
+    thin = np.flatnonzero((found.thickness[joint] < required) | (found.states[joint] == ColumnState.MISSING))
     if not len(thin):
         return None
     a, b = (int(k) for k in found.pairs[joint])
-    gone = [k for k in (a, b) if np.any(columns.states[k, thin] == State.MISSING)]
+    gone = [k for k in (a, b) if np.any(columns.states[k, thin] == ColumnState.MISSING)]
     if gone:
         north, east = columns.planned[gone[0], thin[0]]
         kept = [columns.centres[k, thin] for k in (a, b) if k not in gone]
@@ -172,7 +172,7 @@ def neighbours_in_grid(heads: Array, spacing: float) -> npt.NDArray[np.intp]:
     return np.asarray(pairs[np.lexsort((pairs[:, 1], pairs[:, 0]))], np.intp)
 
 
-def crossings(columns: Columns, pairs: npt.NDArray[np.intp]) -> list[tuple[int, int]]:
+def crossed_joints(columns: Columns, pairs: npt.NDArray[np.intp]) -> list[tuple[int, int]]:
     """Joints whose columns have changed sides, and the depth (index) where they first do: (joint, depth)."""
     a, b = pairs[:, 0], pairs[:, 1]
     wanted = columns.planned[b] - columns.planned[a]

@@ -20,10 +20,17 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
-from groundstation.survey.wall.as_built import Columns, State
-from groundstation.survey.wall.column_joint import limits
+from groundstation.survey.wall.as_built import Columns, ColumnState
+from groundstation.survey.wall.column_joint import limit_distances
 from groundstation.survey.wall.void_chance import VOID_DEPTHS, near_triple, void_open, void_point
-from groundstation.survey.wall.wall_errors import Errors, Mixture, Point, add_radius, design_point, parted
+from groundstation.survey.wall.wall_errors import (
+    Mixture,
+    MostProbablePoint,
+    WallErrors,
+    add_radius,
+    batch_groups,
+    design_point,
+)
 from groundstation.survey.wall.wall_joints import Detour, Joints
 
 Array = npt.NDArray[np.float64]
@@ -61,7 +68,7 @@ def system_probability(
     detours : ways by remedial columns
     samples : to draw at most; fewer where the wall is large
     """
-    if np.any(found.states == State.MISSING):
+    if np.any(found.states == ColumnState.MISSING):
         return SystemProbability(1.0, 0.0, certain=True)
     peak = np.where(np.isfinite(found.probability), found.probability, 0.0).max(axis=1)
     if float(peak.max()) > SURE:
@@ -69,7 +76,7 @@ def system_probability(
     kept = np.flatnonzero(peak >= NEGLIGIBLE)
     neglected = float(peak[peak < NEGLIGIBLE].sum())
     asked = _Asked.among(columns, found, kept, np.zeros((0, 3), np.intp) if triples is None else triples, detours)
-    errors = Errors.of(asked.columns)
+    errors = WallErrors.of(asked.columns)
     points = _design_points(errors, asked, required)
     if not points:
         return SystemProbability(min(neglected, 1.0), 0.0, certain=False)
@@ -128,7 +135,7 @@ class _Asked:
         )
 
 
-def _design_points(errors: Errors, asked: _Asked, required: float) -> list[Point]:
+def _design_points(errors: WallErrors, asked: _Asked, required: float) -> list[MostProbablePoint]:
     """Design points of every joint and every void, one a layer: between layers the radii err on their own."""
     points = []
     layer = errors.columns.depth_layers()
@@ -147,7 +154,7 @@ def _design_points(errors: Errors, asked: _Asked, required: float) -> list[Point
     return points
 
 
-def _joint_point(errors: Errors, pair: npt.NDArray[np.intp], depth: int, required: float) -> Point:
+def _joint_point(errors: WallErrors, pair: npt.NDArray[np.intp], depth: int, required: float) -> MostProbablePoint:
     """Most likely point at which a joint is just too thin, and about how likely it is."""
     both = pair.tolist()
     two = errors.among(both)
@@ -163,14 +170,14 @@ def _joint_point(errors: Errors, pair: npt.NDArray[np.intp], depth: int, require
     for k in range(2):
         r = float(c.radii[k, depth])
         add_radius(two, normal, k, depth, r / math.sqrt(max(r**2 - 0.25 * required**2, 1e-6 * r**2)))
-    limit = float(limits(c.radii[0, depth : depth + 1], c.radii[1, depth : depth + 1], required)[0])
+    limit = float(limit_distances(c.radii[0, depth : depth + 1], c.radii[1, depth : depth + 1], required)[0])
     return design_point(errors.numbers(both), normal, limit - distance)
 
 
 class _Judge:
     """Judges samples by the exact geometry, a part of the wall at a time; not more ``samples`` at once."""
 
-    def __init__(self, errors: Errors, asked: _Asked, required: float, samples: int) -> None:
+    def __init__(self, errors: WallErrors, asked: _Asked, required: float, samples: int) -> None:
         self._errors, self._asked, self._required = errors, asked, required
         joints = [
             [*pair, *(k for way in ways for leg in way for k in leg)]
@@ -178,7 +185,7 @@ class _Judge:
         ]
         voids = [[*triple, *near] for triple, near in zip(asked.triples.tolist(), asked.nearby, strict=True)]
         depths = len(errors.columns.depths)
-        self._joints, self._voids = (list(parted(groups, samples, depths)) for groups in (joints, voids))
+        self._joints, self._voids = (list(batch_groups(groups, samples, depths)) for groups in (joints, voids))
 
     def any_open(self, x: Array) -> npt.NDArray[np.bool_]:
         """Whether anything is open in each sample (n,)."""
@@ -209,6 +216,6 @@ class _Judge:
         a, b = place[pairs[:, 0]], place[pairs[:, 1]]
         apart = centres[b] - centres[a]
         with np.errstate(invalid="ignore"):
-            thick = np.hypot(apart[..., 0], apart[..., 1]) <= limits(radii[a], radii[b], self._required)
-        stands = np.all(self._errors.columns.states[pairs] <= State.UNSURVEYED, axis=1)
+            thick = np.hypot(apart[..., 0], apart[..., 1]) <= limit_distances(radii[a], radii[b], self._required)
+        stands = np.all(self._errors.columns.states[pairs] <= ColumnState.UNSURVEYED, axis=1)
         return np.asarray(~(thick & stands[:, None]))

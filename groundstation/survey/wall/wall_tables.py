@@ -16,9 +16,9 @@ import numpy.typing as npt
 
 from groundstation.errors import SurveyError
 from groundstation.survey.files.survey_records import read_columns
-from groundstation.survey.tools.instruments import Tool, load_tool
-from groundstation.survey.wall.column_deviation import Design, Tolerance, tolerance
-from groundstation.survey.wall.wall_columns import ColumnPlan, Hole, Status
+from groundstation.survey.tools.instruments import SurveyTool, load_tool
+from groundstation.survey.wall.column_deviation import ColumnDesign, Tolerance, parse_tolerance
+from groundstation.survey.wall.wall_columns import ColumnPlan, ColumnStatus, ColumnSurvey
 from groundstation.survey.well.depth_reference import DEPTHS_FROM, DepthReference, depth_reference
 from groundstation.survey.well.reference_frames import SAME_DEPTH
 
@@ -40,7 +40,7 @@ class Defaults:
     inclination: float
     azimuth: float
     tolerance: Tolerance
-    tool: Tool
+    tool: SurveyTool
     serial: str
     head_std: float
     folder: Path  # of instrument files
@@ -105,7 +105,7 @@ def read_heads(path: Path, defaults: Defaults) -> list[HeadRow]:
     wrong = np.flatnonzero(~np.isfinite(heads).all(axis=1))
     if len(wrong):
         raise SurveyError(f"{path}: line {lines[wrong[0]]}: expected finite north_m and east_m")
-    tools: dict[str, Tool] = {}
+    tools: dict[str, SurveyTool] = {}
     rows = []
     for k, (line, name) in enumerate(zip(lines, names, strict=True)):
         cells = {key: str(table[key][k]) for key in (*NUMBERS, *WORDS) if key in table}
@@ -114,17 +114,17 @@ def read_heads(path: Path, defaults: Defaults) -> list[HeadRow]:
 
 
 def _head(
-    where: str, name: str, head: Array, cells: dict[str, str], defaults: Defaults, tools: dict[str, Tool]
+    where: str, name: str, head: Array, cells: dict[str, str], defaults: Defaults, tools: dict[str, SurveyTool]
 ) -> HeadRow:
     values = {key: _number(where, key, cells[key]) for key in NUMBERS if cells.get(key)}
     status = _status(where, cells.get("state", ""))
     try:
-        allowed = tolerance(cells["tolerance"]) if cells.get("tolerance") else defaults.tolerance
+        allowed = parse_tolerance(cells["tolerance"]) if cells.get("tolerance") else defaults.tolerance
         read_from, answer, height = defaults.depths
         depths = depth_reference(read_from, answer, values.get("depth_reference_height_m", height))
     except SurveyError as error:
         raise SurveyError(f"{where}: {error}") from None
-    design = Design(
+    design = ColumnDesign(
         name,
         (float(head[0]), float(head[1]), values.get("down_m", 0.0)),
         math.radians(values["inclination_deg"]) if "inclination_deg" in values else defaults.inclination,
@@ -142,7 +142,7 @@ def _head(
         values.get("head_sigma_m", defaults.head_std), cells.get("calibration") or defaults.calibration,
     )  # fmt: skip
     day = _day(where, cells.get("drilled_on", ""))
-    if day is not None and status in (Status.PLANNED, Status.NOT_DRILLED):
+    if day is not None and status in (ColumnStatus.PLANNED, ColumnStatus.NOT_DRILLED):
         raise SurveyError(f"{where}: drilled_on: stated as {status.value}, yet drilled on {day}")
     return HeadRow(name, plan, values.get("length_m", defaults.length), _remedy(where, cells), day, depths)
 
@@ -167,15 +167,15 @@ def _number(where: str, key: str, text: str) -> float:
     return value
 
 
-def _status(where: str, text: str) -> Status:
+def _status(where: str, text: str) -> ColumnStatus:
     try:
-        return Status(text)
+        return ColumnStatus(text)
     except ValueError:
-        names = ", ".join(status.value for status in Status if status.value)
+        names = ", ".join(status.value for status in ColumnStatus if status.value)
         raise SurveyError(f"{where}: state: expected one of {names}, or nothing, got {text!r}") from None
 
 
-def _tool(name: str, defaults: Defaults, tools: dict[str, Tool]) -> Tool:
+def _tool(name: str, defaults: Defaults, tools: dict[str, SurveyTool]) -> SurveyTool:
     """Instrument of a row; the same object for the same name."""
     if not name:
         return defaults.tool
@@ -191,7 +191,7 @@ def _remedy(where: str, cells: dict[str, str]) -> Remedy:
     return Remedy(between, cells.get("replaces", ""))
 
 
-def read_holes(path: Path, names: list[str], heights: list[float]) -> list[Hole]:
+def read_holes(path: Path, names: list[str], heights: list[float]) -> list[ColumnSurvey]:
     """Stations of every column in the order of ``names``; none of one that was not surveyed.
 
     Depths of a column are brought to its head by ``heights`` (m), how far what they count from lies above it. A station
@@ -224,7 +224,7 @@ def read_holes(path: Path, names: list[str], heights: list[float]) -> list[Hole]
     md = np.where(at_reference | (np.abs(md - lift) < SAME_DEPTH), 0.0, md - lift)
     _check_depths(path, names, owner, line, md, starts[:-1][counts > 0])
     parts = [slice(a, b) for a, b in pairwise(starts)]
-    return [Hole(md[part], np.radians(inc[part]), np.radians(azi[part])) for part in parts]
+    return [ColumnSurvey(md[part], np.radians(inc[part]), np.radians(azi[part])) for part in parts]
 
 
 def _check_depths(

@@ -13,16 +13,16 @@ from enum import Enum
 import numpy as np
 import numpy.typing as npt
 
-from groundstation.survey.wall.as_built import Columns, State
+from groundstation.survey.wall.as_built import Columns, ColumnState
 from groundstation.survey.wall.void_chance import VoidChance, void_chance
-from groundstation.survey.wall.voids import Void, triples_of, voids
+from groundstation.survey.wall.voids import Void, find_voids, triples_of
 from groundstation.survey.wall.wall_joints import (
     Detour,
     ExtraColumn,
     Joints,
-    crossings,
+    crossed_joints,
     extra_column,
-    joints,
+    judge_joints,
     with_detours,
 )
 from groundstation.survey.wall.wall_system import SystemProbability, system_probability
@@ -31,7 +31,7 @@ Array = npt.NDArray[np.float64]
 DIAGONAL = 1.75  # spacings within which three columns may have a void between them
 
 
-class Verdict(Enum):
+class WallVerdict(Enum):
     """What may be signed."""
 
     TIGHT = "tight"
@@ -39,7 +39,7 @@ class Verdict(Enum):
     NOT_TIGHT = "not tight"
 
 
-class Kind(Enum):
+class FindingKind(Enum):
     """Why a wall is not tight, or not proven so."""
 
     MISSING = "missing"  # no column where one is required
@@ -51,14 +51,14 @@ class Kind(Enum):
     SYSTEM = "system"  # every joint good, the whole doubtful
 
 
-OPEN = (Kind.MISSING, Kind.THIN, Kind.VOID, Kind.CROSSING)
+OPEN = (FindingKind.MISSING, FindingKind.THIN, FindingKind.VOID, FindingKind.CROSSING)
 
 
 @dataclass(frozen=True, slots=True)
 class Finding:
     """One reason, with its place."""
 
-    kind: Kind
+    kind: FindingKind
     what: str  # column, joint, or columns around a void
     top: float  # m
     bottom: float
@@ -78,7 +78,7 @@ class VoidFinding:
 class Judgement:
     """All that was found."""
 
-    verdict: Verdict
+    verdict: WallVerdict
     findings: list[Finding]
     joints: Joints
     voids: list[VoidFinding]
@@ -87,7 +87,7 @@ class Judgement:
     void_chance: VoidChance | None = None  # of a grid
 
 
-def judge(
+def judge_columns(
     columns: Columns,
     pairs: npt.NDArray[np.intp],
     required: float,
@@ -105,7 +105,7 @@ def judge(
     grid_spacing : of a grid, m; its plane must be covered too
     detours : ways by remedial columns
     """
-    found = with_detours(columns, joints(columns, pairs, required), detours, required)
+    found = with_detours(columns, judge_joints(columns, pairs, required), detours, required)
     holes: list[VoidFinding] = []
     triples = chance = None
     if grid_spacing is not None:
@@ -122,23 +122,23 @@ def judge(
     ]
     if whole.probability > allowed and not findings:
         text = f"every joint is good, yet anything is open or too thin with a probability of {whole.probability:.2g}"
-        findings.append(Finding(Kind.SYSTEM, "wall", *_ends(columns.depths), text, whole.probability))
+        findings.append(Finding(FindingKind.SYSTEM, "wall", *_ends(columns.depths), text, whole.probability))
     proposals = [(j, extra_column(columns, found, j, required)) for j in range(len(pairs))]
     extras = [(j, extra) for j, extra in proposals if extra is not None]
     return Judgement(_verdict(findings), findings, found, holes, whole, extras, chance)
 
 
-def _verdict(findings: list[Finding]) -> Verdict:
+def _verdict(findings: list[Finding]) -> WallVerdict:
     if any(finding.kind in OPEN for finding in findings):
-        return Verdict.NOT_TIGHT
-    return Verdict.NOT_PROVEN if findings else Verdict.TIGHT
+        return WallVerdict.NOT_TIGHT
+    return WallVerdict.NOT_PROVEN if findings else WallVerdict.TIGHT
 
 
 def _ends(depths: Array) -> tuple[float, float]:
     return float(depths[0]), float(depths[-1])
 
 
-def stretches(flags: npt.NDArray[np.bool_]) -> list[tuple[int, int]]:
+def true_runs(flags: npt.NDArray[np.bool_]) -> list[tuple[int, int]]:
     """First and last index of every run of true values (n,)."""
     edges = np.diff(np.concatenate([[0], flags.astype(np.int8), [0]]))
     return list(zip(np.flatnonzero(edges == 1).tolist(), (np.flatnonzero(edges == -1) - 1).tolist(), strict=True))
@@ -146,10 +146,13 @@ def stretches(flags: npt.NDArray[np.bool_]) -> list[tuple[int, int]]:
 
 def _column_findings(columns: Columns) -> list[Finding]:
     found = []
-    words = {State.MISSING: (Kind.MISSING, "is missing"), State.UNSURVEYED: (Kind.UNSURVEYED, "is not surveyed")}
+    words = {
+        ColumnState.MISSING: (FindingKind.MISSING, "is missing"),
+        ColumnState.UNSURVEYED: (FindingKind.UNSURVEYED, "is not surveyed"),
+    }
     for name, states in zip(columns.names, columns.states, strict=True):
         for state, (kind, word) in words.items():
-            for first, last in stretches(states == state):
+            for first, last in true_runs(states == state):
                 top, bottom = float(columns.depths[first]), float(columns.depths[last])
                 found.append(Finding(kind, name, top, bottom, f"column {name} {word} from {top:g} to {bottom:g} m"))
     return found
@@ -165,7 +168,7 @@ def _joint_findings(columns: Columns, found: Joints, required: float, allowed: f
     for pair, thick, chance in zip(found.pairs, found.thickness, found.probability, strict=True):
         name, thin = joint_name(columns, pair), thick < required
         likely = np.isfinite(thick) & ~thin & (chance > allowed)
-        for first, last in stretches(thin):
+        for first, last in true_runs(thin):
             top, bottom, least = (
                 float(columns.depths[first]),
                 float(columns.depths[last]),
@@ -173,12 +176,12 @@ def _joint_findings(columns: Columns, found: Joints, required: float, allowed: f
             )
             word = f"opens by {-least:.3f} m" if least < 0.0 else f"is {least:.3f} m thick"
             text = f"joint {name} {word} at the least from {top:g} to {bottom:g} m; required {required:g} m"
-            out.append(Finding(Kind.THIN, name, top, bottom, text, float(np.max(chance[first : last + 1]))))
+            out.append(Finding(FindingKind.THIN, name, top, bottom, text, float(np.max(chance[first : last + 1]))))
         if np.any(likely) and not np.any(thin):
             first, last = int(np.argmax(likely)), int(np.flatnonzero(likely)[-1])
             top, bottom, most = float(columns.depths[first]), float(columns.depths[last]), float(np.max(chance[likely]))
             text = f"joint {name} is too thin with a probability of {most:.2g} between {top:g} and {bottom:g} m"
-            out.append(Finding(Kind.DOUBTFUL, name, top, bottom, text, most))
+            out.append(Finding(FindingKind.DOUBTFUL, name, top, bottom, text, most))
     return out
 
 
@@ -187,7 +190,7 @@ def _voids(columns: Columns) -> list[VoidFinding]:
     return [
         VoidFinding(float(depth), void)
         for z, depth in enumerate(columns.depths)
-        for void in voids(columns.centres[:, z], columns.radii[:, z])
+        for void in find_voids(columns.centres[:, z], columns.radii[:, z])
     ]
 
 
@@ -206,7 +209,7 @@ def _void_findings(columns: Columns, holes: list[VoidFinding]) -> list[Finding]:
             f"and a hole of {100.0 * largest.void.radius:.1f} cm radius at {largest.depth:g} m, "
             f"({largest.void.place[0]:.3f}, {largest.void.place[1]:.3f}) m"
         )
-        out.append(Finding(Kind.VOID, name, top, bottom, text))
+        out.append(Finding(FindingKind.VOID, name, top, bottom, text))
     return out
 
 
@@ -216,9 +219,11 @@ def _likely_voids(
     """Where there is no void as surveyed, yet one is more likely than allowed."""
     if chance is None:
         return []
-    known = np.isin(columns.depths, [hole.depth for hole in holes]) | np.any(columns.states == State.MISSING, axis=0)
+    known = np.isin(columns.depths, [hole.depth for hole in holes]) | np.any(
+        columns.states == ColumnState.MISSING, axis=0
+    )
     out = []
-    for first, last in stretches((chance.probability > allowed) & ~known):
+    for first, last in true_runs((chance.probability > allowed) & ~known):
         worst = first + int(np.argmax(chance.probability[first : last + 1]))
         three = chance.columns[worst]
         if three is None:
@@ -229,13 +234,15 @@ def _likely_voids(
             f"a void has a probability of {most:.2g} at {columns.depths[worst]:g} m, most of all between {name} at "
             f"({chance.places[worst][0]:.3f}, {chance.places[worst][1]:.3f}) m"
         )
-        out.append(Finding(Kind.DOUBTFUL, name, top, bottom, text, most))
+        out.append(Finding(FindingKind.DOUBTFUL, name, top, bottom, text, most))
     return out
 
 
 def _crossing_findings(columns: Columns, pairs: npt.NDArray[np.intp]) -> list[Finding]:
     out = []
-    for joint, depth in crossings(columns, pairs):
+    for joint, depth in crossed_joints(columns, pairs):
         name, at = joint_name(columns, pairs[joint]), float(columns.depths[depth])
-        out.append(Finding(Kind.CROSSING, name, at, at, f"columns {name} cross: they have changed sides at {at:g} m"))
+        out.append(
+            Finding(FindingKind.CROSSING, name, at, at, f"columns {name} cross: they have changed sides at {at:g} m")
+        )
     return out

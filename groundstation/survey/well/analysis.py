@@ -11,13 +11,13 @@ import numpy.typing as npt
 
 from groundstation.errors import SurveyError
 from groundstation.survey.tools.formulas import is_zero
-from groundstation.survey.tools.instruments import Mode, Term, Tool
-from groundstation.survey.well.compiled_model import locate
+from groundstation.survey.tools.instruments import PropagationMode, SurveyTool, Term
+from groundstation.survey.well.compiled_model import locate_stations
 from groundstation.survey.well.error_propagation import Uncertainty
-from groundstation.survey.well.error_sources import Leg, Site, Survey
-from groundstation.survey.well.methods import Method, closure, dogleg_severity, vertical_section
-from groundstation.survey.well.reference_frames import SAME_DEPTH, Frame, Norths, TieOn
-from groundstation.survey.well.well_record import Record
+from groundstation.survey.well.error_sources import Leg, Site, WellSurvey
+from groundstation.survey.well.methods import Method, dogleg_severity, horizontal_closure, vertical_section
+from groundstation.survey.well.reference_frames import SAME_DEPTH, Norths, ReferenceFrame, TieOn
+from groundstation.survey.well.well_record import SurveyRecord
 
 Array = npt.NDArray[np.float64]
 # Columns of a record that instrument models may ask for: variable, factor to SI
@@ -68,8 +68,8 @@ class Region:
 class Analysis:
     """Positions (n, 3) with what follows from them, all in one frame; m and rad, north east down."""
 
-    record: Record
-    frame: Frame
+    record: SurveyRecord
+    frame: ReferenceFrame
     azimuth: Array  # (n,) from the answer's north
     positions: Array
     uncertainty: Region
@@ -92,18 +92,18 @@ class Analysis:
 class Stretch:
     """Part of a survey that one tool took: measured depths from ``top`` on, to ``bottom`` where that is stated."""
 
-    tool: Tool
+    tool: SurveyTool
     top: float
     bottom: float | None = None
 
 
-def analyse(
-    record: Record,
+def analyse_survey(
+    record: SurveyRecord,
     method: Method,
-    tool: Tool | Sequence[Stretch],
+    tool: SurveyTool | Sequence[Stretch],
     site: Site,
     section_azimuth: float = 0.0,
-    frame: Frame | None = None,
+    frame: ReferenceFrame | None = None,
     tie_on: TieOn | None = None,
 ) -> Analysis:
     """Trajectory and uncertainty of a record.
@@ -125,7 +125,7 @@ def analyse(
         When the record is not a survey or begins nowhere, the tie-on contradicts it, parts leave a gap, or a tool
         cannot be used on it.
     """
-    frame = frame or Frame()
+    frame = frame or ReferenceFrame()
     height = frame.depths.height
     at_zero = abs(float(record.md[0]) - height) <= SAME_DEPTH  # of the answer's depths
     if tie_on is not None:
@@ -141,12 +141,12 @@ def analyse(
     if tie_on is not None:
         start = _turn(-frame.norths.of(frame.record)) @ tie_on.position
     extra = {name: record.columns[c] * f for c, (name, f) in RECORD_COLUMNS.items() if c in record.columns}
-    survey = Survey(record.md, record.inclination, azimuth, record.md, extra)
-    legs = [Leg(tool)] if isinstance(tool, Tool) else legs_of(tool, record.md)
+    survey = WellSurvey(record.md, record.inclination, azimuth, record.md, extra)
+    legs = [Leg(tool)] if isinstance(tool, SurveyTool) else legs_of(tool, record.md)
     allowance = tie_on is None and legs[0].tool.slot_allowance
-    places, found = locate(method, survey, legs, site, start, slot_allowance=allowance)
+    places, found = locate_stations(method, survey, legs, site, start, slot_allowance=allowance)
     turned = frame.turned(places)
-    distance, direction = closure(turned)
+    distance, direction = horizontal_closure(turned)
     tie_cov = np.zeros((3, 3))
     if tie_on is not None:
         from_record = frame.turn @ _turn(-frame.norths.of(frame.record))
@@ -166,10 +166,10 @@ def analyse(
 
 def _turn(angle: float) -> Array:
     """Matrix (3, 3) into axes whose north lies at ``angle`` (rad)."""
-    return Frame(answer="site", norths=Norths(site=angle)).turn
+    return ReferenceFrame(answer="site", norths=Norths(site=angle)).turn
 
 
-def _tied(record: Record, tie_on: TieOn) -> Record:
+def _tied(record: SurveyRecord, tie_on: TieOn) -> SurveyRecord:
     """The record from its tie-on down; what else it holds there is that of its first station."""
     keep = slice(1, None) if record.md[0] <= tie_on.md + SAME_DEPTH else slice(None)
     parts = ((tie_on.md, record.md), (tie_on.inclination, record.inclination), (tie_on.azimuth, record.azimuth))
@@ -177,7 +177,7 @@ def _tied(record: Record, tie_on: TieOn) -> Record:
     columns = {name: np.concatenate([values[:1], values[keep]]) for name, values in record.columns.items()}
     if len(md) < 2:
         raise SurveyError(f"tie-on: expected a station below {tie_on.md:g} m, got none")
-    return Record(md, inclination, azimuth, [0, *record.lines[keep]], columns)
+    return SurveyRecord(md, inclination, azimuth, [0, *record.lines[keep]], columns)
 
 
 def legs_of(parts: Sequence[Stretch], md: Array) -> list[Leg]:
@@ -206,12 +206,12 @@ def legs_of(parts: Sequence[Stretch], md: Array) -> list[Leg]:
     return [Leg(ordered[owner[first]].tool, first) for first in firsts]
 
 
-def with_azimuth_error(tool: Tool, azimuth_error: float) -> Tool:
+def with_azimuth_error(tool: SurveyTool, azimuth_error: float) -> SurveyTool:
     """The tool with one constant azimuth error (rad) in place of every term that turns the azimuth alone.
 
     This is the filtered against the unfiltered survey of thesis figures 4.24-4.27.
     """
-    constant = Term("AZIMUTH", azimuth_error, "rad", Mode.SYSTEMATIC, ("0", "0", "1"))
+    constant = Term("AZIMUTH", azimuth_error, "rad", PropagationMode.SYSTEMATIC, ("0", "0", "1"))
     gyro = [term.name for term in tool.terms if _turns_azimuth_alone(term)]
     return tool.with_terms((*tool.terms, constant)).without(*gyro)
 

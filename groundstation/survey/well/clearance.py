@@ -17,20 +17,20 @@ import numpy as np
 import numpy.typing as npt
 
 from groundstation.errors import SurveyError
-from groundstation.survey.tools.instruments import Mode
+from groundstation.survey.tools.instruments import PropagationMode
 from groundstation.survey.well.error_columns import ErrorColumns, error_columns
-from groundstation.survey.well.error_sources import Leg, Site, Survey
-from groundstation.survey.well.methods import tangents
+from groundstation.survey.well.error_sources import Leg, Site, WellSurvey
+from groundstation.survey.well.methods import station_tangents
 
 Array = npt.NDArray[np.float64]
 PIECES = 16  # of a leg, between which the nearest point is sought on a line
 
 
 @dataclass(frozen=True, slots=True)
-class Hole:
+class ClearanceHole:
     """A hole as surveyed: stations and positions (n, 3), its radius, and which instrument surveyed it."""
 
-    survey: Survey
+    survey: WellSurvey
     positions: Array
     legs: tuple[Leg, ...]
     radius: float  # m, of the open hole
@@ -57,7 +57,9 @@ class Clearance:
     independent_factor: Array  # the published rule: as if the two shared no error
 
 
-def clearance(reference: Hole, offset: Hole, site: Site, rule: Rule | None = None) -> Clearance:
+def clearance_between(
+    reference: ClearanceHole, offset: ClearanceHole, site: Site, rule: Rule | None = None
+) -> Clearance:
     """Clearance of every station of one hole from another.
 
     Raises
@@ -91,13 +93,17 @@ def clearance(reference: Hole, offset: Hole, site: Site, rule: Rule | None = Non
     return Clearance(offset_md, distance, sigma, factor, independent)
 
 
-Key = tuple[str, Mode]
+Key = tuple[str, PropagationMode]
 
 
-def _is_shared(key: Key, reference: Hole, offset: Hole) -> bool:
-    if key[1] is Mode.GLOBAL:
+def _is_shared(key: Key, reference: ClearanceHole, offset: ClearanceHole) -> bool:
+    if key[1] is PropagationMode.GLOBAL:
         return True
-    return key[1] in (Mode.SYSTEMATIC, Mode.WELL) and reference.serial != "" and reference.serial == offset.serial
+    return (
+        key[1] in (PropagationMode.SYSTEMATIC, PropagationMode.WELL)
+        and reference.serial != ""
+        and reference.serial == offset.serial
+    )
 
 
 def _along(columns: Sequence[ErrorColumns], direction: Array) -> list[tuple[Key, Array]]:
@@ -111,13 +117,13 @@ def _between(columns: Sequence[ErrorColumns], leg: npt.NDArray[np.int64], fracti
     return [ErrorColumns(c.name, c.mode, (1.0 - f) * c.effects[leg] + f * c.effects[leg + 1]) for c in columns]
 
 
-def _aside(hole: Hole) -> Array:
+def _aside(hole: ClearanceHole) -> Array:
     """A direction (n, 3) across each station, for where two holes meet."""
     inclination, azimuth = hole.survey.inclination, hole.survey.azimuth
     return np.stack([-np.sin(azimuth), np.cos(azimuth), np.zeros_like(inclination)], axis=-1)
 
 
-def _nearest(points: Array, hole: Hole) -> tuple[npt.NDArray[np.int64], Array, Array]:
+def _nearest(points: Array, hole: ClearanceHole) -> tuple[npt.NDArray[np.int64], Array, Array]:
     """Leg (n,), fraction of its length (n,) and place (n, 3) of the nearest point of a hole."""
     path, at = _path(hole)
     begin, step = path[:-1], np.diff(path, axis=0)
@@ -133,9 +139,9 @@ def _nearest(points: Array, hole: Hole) -> tuple[npt.NDArray[np.int64], Array, A
     return leg, place - leg, places
 
 
-def _path(hole: Hole) -> tuple[Array, Array]:
+def _path(hole: ClearanceHole) -> tuple[Array, Array]:
     """Points (s, 3) of the arcs of a hole, and the station that each is at, with its fraction."""
-    t = tangents(hole.survey.inclination, hole.survey.azimuth)
+    t = station_tangents(hole.survey.inclination, hole.survey.azimuth)
     f = np.arange(PIECES)[:, None, None] / PIECES
     p0, p1, d = hole.positions[:-1], hole.positions[1:], np.diff(hole.survey.md)[:, None]
     # the curve that has the two stations' positions and directions; between them an arc of the same bend

@@ -23,18 +23,18 @@ import numpy as np
 import numpy.typing as npt
 
 from groundstation.errors import SurveyError, ToolError
-from groundstation.survey.tools.instruments import Tool, load_tool
+from groundstation.survey.tools.instruments import SurveyTool, load_tool
 from groundstation.survey.well.compiled_source import CURVED, GIVEN, STRAIGHT, loop_sources, write_model
 from groundstation.survey.well.error_propagation import (
     Uncertainty,
     check_legs,
     depth_variance,
-    propagate,
+    propagate_errors,
     surface_covariance,
 )
-from groundstation.survey.well.error_sources import RECORD, SECONDS_A_METRE, Leg, Site, Survey
+from groundstation.survey.well.error_sources import RECORD, SECONDS_A_METRE, Leg, Site, WellSurvey
 from groundstation.survey.well.gyro_modes import TURNS, mode_weights, sections_of
-from groundstation.survey.well.methods import Method, check_stations, positions
+from groundstation.survey.well.methods import Method, check_stations, station_positions
 
 Array = npt.NDArray[np.float64]
 COMPILED_FROM = 100  # stations
@@ -53,7 +53,7 @@ class CompiledModel:
     by_source : whether it gives the covariance of every source too
     """
 
-    def __init__(self, tool: Tool, *, by_source: bool = False) -> None:
+    def __init__(self, tool: SurveyTool, *, by_source: bool = False) -> None:
         self.tool = tool
         self._sources = loop_sources(tool, by_source=by_source)
         self._in_modes = [source.rows[0] for source in self._sources if source.rows[0][2].by_mode]
@@ -70,11 +70,13 @@ class CompiledModel:
         SurveyError, ToolError
             When the arrays are not a survey, or a weight has no value at a station.
         """
-        found = self.locate(method, Survey(md, inclination, azimuth, md), site, slot_allowance=self.tool.slot_allowance)
+        found = self.locate(
+            method, WellSurvey(md, inclination, azimuth, md), site, slot_allowance=self.tool.slot_allowance
+        )
         return found[0], found[1]
 
     def locate(
-        self, method: Method, survey: Survey, site: Site, *, slot_allowance: bool
+        self, method: Method, survey: WellSurvey, site: Site, *, slot_allowance: bool
     ) -> tuple[Array, Array, dict[str, Array]]:
         """Positions (n, 3) of a well that begins at zero, their covariances, and those of the sources by name.
 
@@ -83,13 +85,13 @@ class CompiledModel:
         check_stations(survey.md, survey.inclination, survey.azimuth)
         path = PATHS.get(method, GIVEN)
         if path == GIVEN or self._in_modes:
-            places = positions(method, survey.md, survey.inclination, survey.azimuth)
+            places = station_positions(method, survey.md, survey.inclination, survey.azimuth)
             survey = replace(survey, tvd=places[:, 2])
             return places, *self.covariance(survey, site, slot_allowance=slot_allowance)
         places = np.zeros((len(survey.md), 3))
         return places, *self._run(path, places, survey, site, slot_allowance=slot_allowance)
 
-    def covariance(self, survey: Survey, site: Site, *, slot_allowance: bool) -> tuple[Array, dict[str, Array]]:
+    def covariance(self, survey: WellSurvey, site: Site, *, slot_allowance: bool) -> tuple[Array, dict[str, Array]]:
         """Covariances (n, 3, 3) of the positions of one well whose TVD is known, and those of its sources.
 
         The latter by name, of a model made ``by_source``. Errors as ``run``.
@@ -98,7 +100,9 @@ class CompiledModel:
         places[:, 2] = survey.tvd
         return self._run(GIVEN, places, survey, site, slot_allowance=slot_allowance)
 
-    def locate_many(self, method: Method, survey: Survey, site: Site, *, slot_allowance: bool) -> tuple[Array, Array]:
+    def locate_many(
+        self, method: Method, survey: WellSurvey, site: Site, *, slot_allowance: bool
+    ) -> tuple[Array, Array]:
         """Positions (w, n, 3) of wells (w, n) that begin at zero, and their covariances (w, n, 3, 3).
 
         The survey's own TVD is not looked at. Errors as ``run``; they name the well, from 0.
@@ -106,11 +110,11 @@ class CompiledModel:
         md, inclination, azimuth = (np.ascontiguousarray(x) for x in (survey.md, survey.inclination, survey.azimuth))
         check_stations(md, inclination, azimuth)
         if self._in_modes:
-            places = positions(method, md, inclination, azimuth)
+            places = station_positions(method, md, inclination, azimuth)
             survey = replace(survey, tvd=places[..., 2])
-            return places, propagate(survey, [Leg(self.tool)], site, slot_allowance=slot_allowance).cov
+            return places, propagate_errors(survey, [Leg(self.tool)], site, slot_allowance=slot_allowance).cov
         path = PATHS.get(method, GIVEN)
-        places = positions(method, md, inclination, azimuth) if path == GIVEN else np.zeros((*md.shape, 3))
+        places = station_positions(method, md, inclination, azimuth) if path == GIVEN else np.zeros((*md.shape, 3))
         cov = np.zeros((*md.shape, 3, 3))
         well, status = self._of_many(
             md, inclination, azimuth, path, slot_allowance, site.gravity, site.b_field, site.dip, site.declination,
@@ -121,15 +125,15 @@ class CompiledModel:
         cov[:, 0] = surface_covariance(md, inclination, azimuth, self.tool)
         return places, cov
 
-    def _refuse(self, status: int, survey: Survey, site: Site, where: str = "") -> NoReturn:
+    def _refuse(self, status: int, survey: WellSurvey, site: Site, where: str = "") -> NoReturn:
         """Say what is wrong with the station at which the loop ended."""
         if status > 0:
             raise SurveyError(f"survey: {where}station {status}: the hole turns straight back on itself")
-        propagate(survey, [Leg(self.tool)], site)  # names the term
+        propagate_errors(survey, [Leg(self.tool)], site)  # names the term
         raise ToolError(f"{self.tool.name}: {where}a weight has no value at station {-status}; give singular weights")
 
     def _run(
-        self, path: int, places: Array, survey: Survey, site: Site, *, slot_allowance: bool
+        self, path: int, places: Array, survey: WellSurvey, site: Site, *, slot_allowance: bool
     ) -> tuple[Array, dict[str, Array]]:
         count = len(survey.md)
         cov = np.zeros((count, 3, 3))
@@ -147,7 +151,7 @@ class CompiledModel:
             cov[0] = self._depth_variance * along[:, None] * along
         return cov, {source.name: part for source, part in zip(self._sources, parts, strict=False)}
 
-    def _modes(self, survey: Survey, site: Site) -> Array:
+    def _modes(self, survey: WellSurvey, site: Site) -> Array:
         """Weights (m, n - 1, 7) of the sources of a gyro's modes, and the section of every station."""
         out = np.zeros((len(self._in_modes), len(survey.md) - 1, TURNS + 1))
         if self._in_modes:
@@ -158,10 +162,10 @@ class CompiledModel:
         return out
 
 
-_held: dict[tuple[Tool, bool], CompiledModel] = {}
+_held: dict[tuple[SurveyTool, bool], CompiledModel] = {}
 
 
-def _model(tool: Tool, *, by_source: bool) -> CompiledModel:
+def _model(tool: SurveyTool, *, by_source: bool) -> CompiledModel:
     """Model of a tool, held from its first use on."""
     key = tool, by_source
     if key not in _held:
@@ -171,7 +175,7 @@ def _model(tool: Tool, *, by_source: bool) -> CompiledModel:
     return _held[key]
 
 
-def warm(names: Sequence[str] = COMPILED_BEFORE) -> None:
+def preload_models(names: Sequence[str] = COMPILED_BEFORE) -> None:
     """Compile instruments or load them from the cache, totals and sources, and hold them.
 
     Nobody's first survey waits for them then, and short surveys by them run compiled too.
@@ -183,8 +187,8 @@ def warm(names: Sequence[str] = COMPILED_BEFORE) -> None:
             model.run(Method.BALANCED_TANGENTIAL, md, zero, zero, Site())
 
 
-def locate(
-    method: Method, survey: Survey, legs: Sequence[Leg], site: Site, start: Array, *, slot_allowance: bool
+def locate_stations(
+    method: Method, survey: WellSurvey, legs: Sequence[Leg], site: Site, start: Array, *, slot_allowance: bool
 ) -> tuple[Array, Uncertainty]:
     """Positions (n, 3) of one well from ``start`` (3,) on, and their covariances with those of every source.
 
@@ -199,13 +203,13 @@ def locate(
     """
     is_long = len(survey.md) >= COMPILED_FROM
     if len(legs) != 1 or not (is_long or (legs[0].tool, False) in _held):
-        places = start + positions(method, survey.md, survey.inclination, survey.azimuth)
-        return places, propagate(replace(survey, tvd=places[:, 2]), legs, site, slot_allowance=slot_allowance)
+        places = start + station_positions(method, survey.md, survey.inclination, survey.azimuth)
+        return places, propagate_errors(replace(survey, tvd=places[:, 2]), legs, site, slot_allowance=slot_allowance)
     check_legs(survey, legs)
     tool = legs[0].tool
     model = _model(tool, by_source=False)
     if start.any():
-        places = start + positions(method, survey.md, survey.inclination, survey.azimuth)
+        places = start + station_positions(method, survey.md, survey.inclination, survey.azimuth)
         survey = replace(survey, tvd=places[:, 2])
         cov, _ = model.covariance(survey, site, slot_allowance=slot_allowance)
     else:
@@ -216,7 +220,7 @@ def locate(
 
 
 def locate_many(
-    method: Method, survey: Survey, tool: Tool, site: Site, *, slot_allowance: bool = False
+    method: Method, survey: WellSurvey, tool: SurveyTool, site: Site, *, slot_allowance: bool = False
 ) -> tuple[Array, Array]:
     """Positions (w, n, 3) of many wells (w, n) that begin at zero, and their covariances (w, n, 3, 3), at one go.
 
@@ -237,7 +241,7 @@ def compiled_parts(found: Uncertainty) -> dict[str, Array]:
     return model.covariance(found.survey, found.site, slot_allowance=found.slot_allowance)[1]
 
 
-def _record(survey: Survey) -> Array:
+def _record(survey: WellSurvey) -> Array:
     """Time and further columns (..., r, n) of a record, their defaults where it has none."""
     out = np.empty((*survey.md.shape[:-1], 1 + len(RECORD), survey.md.shape[-1]))
     out[..., 0, :] = survey.record.get("Time", SECONDS_A_METRE * survey.md)

@@ -8,16 +8,16 @@ from __future__ import annotations
 
 import re
 
-from groundstation.survey.tools.formulas import VARIABLES, is_zero, translate
-from groundstation.survey.tools.instruments import Tool
+from groundstation.survey.tools.formulas import VARIABLES, is_zero, translate_formulas
+from groundstation.survey.tools.instruments import SurveyTool
 from groundstation.survey.well.error_sources import (
     EARTH_RATE,
     NO_WEIGHT,
     RECORD,
     TINY,
     VERTICAL,
+    ErrorSource,
     Leg,
-    Source,
     merged_sources,
     sources_of,
 )
@@ -130,18 +130,18 @@ AXES = ("x", "y", "z")
 PAIRS = (("x", "x"), ("x", "y"), ("y", "y"), ("x", "z"), ("y", "z"), ("z", "z"))  # the covariance's entries, in order
 
 
-def loop_sources(tool: Tool, *, by_source: bool) -> list[Source]:
+def loop_sources(tool: SurveyTool, *, by_source: bool) -> list[ErrorSource]:
     """Sources of a loop: all of them, or those with one formula as one."""
     legs = (Leg(tool),)
     return sources_of(legs) if by_source else merged_sources(legs)
 
 
-def write_model(tool: Tool, *, by_source: bool = False) -> str:
+def write_model(tool: SurveyTool, *, by_source: bool = False) -> str:
     """Source of the compiled loop of a tool."""
     sources = loop_sources(tool, by_source=by_source)
     terms = [source.rows[0][2] for source in sources]
     formulas = [text for term in terms for text in (["0"] * 9 if term.by_mode else term.formulas)]
-    program = translate(formulas, tuple(tool.parameters))
+    program = translate_formulas(formulas, tuple(tool.parameters))
     states, body, after = [], [], []
     modes = 0
     for n, source in enumerate(sources):
@@ -181,7 +181,7 @@ def _parted(lines: list[str], fixed: set[str]) -> tuple[list[str], list[str]]:
 
 
 def _source_code(
-    n: int, source: Source, tokens: list[str], *, by_source: bool
+    n: int, source: ErrorSource, tokens: list[str], *, by_source: bool
 ) -> tuple[list[str], list[str], list[str]]:
     """Lines of one source: its state, what a station does with it, and what it leaves to the next."""
     _, _, term = source.rows[0]
@@ -246,7 +246,7 @@ def _own_part(n: int, pairs: list[tuple[int, str, str]], gone: str) -> list[str]
     return lines
 
 
-def _turn(n: int, source: Source, tokens: list[str], sigma: str) -> list[str]:
+def _turn(n: int, source: ErrorSource, tokens: list[str], sigma: str) -> list[str]:
     """Change of the tangent by one standard deviation of a source."""
     _, _, term = source.rows[0]
     axes = AXES[: source.axes]

@@ -76,7 +76,7 @@ def plan_ellipses(covs: Array, sigma: float = 1.0) -> list[Ellipse]:
     return [Ellipse(*row) for row in np.column_stack([semi[:, ::-1], azimuths]).tolist()]
 
 
-def axes(cov: Array, sigma: float = 1.0) -> tuple[Array, Array]:
+def ellipsoid_axes(cov: Array, sigma: float = 1.0) -> tuple[Array, Array]:
     """Semi-axes (..., 3) of ellipsoids, largest first, and their directions (..., 3, 3), one a row."""
     values, vectors = np.linalg.eigh(cov)
     return sigma * np.sqrt(np.maximum(values[..., ::-1], 0.0)), np.swapaxes(vectors[..., ::-1], -1, -2).copy()
@@ -91,7 +91,7 @@ def hole_axes(inclination: float, azimuth: float) -> Array:
     return np.array([[ci * ca, ci * sa, -si], [-sa, ca, 0.0], [si * ca, si * sa, ci]])
 
 
-def outline(cov: Array, sigma: float, points: int = 73) -> Array:
+def ellipse_outline(cov: Array, sigma: float, points: int = 73) -> Array:
     """Closed outline (points, 2) of the ellipse of a covariance (2, 2)."""
     values, vectors = np.linalg.eigh(cov)
     angle = np.linspace(0.0, math.tau, points)

@@ -12,9 +12,9 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
-from groundstation.survey.tools.instruments import Mode
+from groundstation.survey.tools.instruments import PropagationMode
 from groundstation.survey.well.error_propagation import Propagation
-from groundstation.survey.well.error_sources import Geometry, Leg, Site, Survey, sources_of
+from groundstation.survey.well.error_sources import Leg, Site, SurveyGeometry, WellSurvey, sources_of
 
 Array = npt.NDArray[np.float64]
 
@@ -24,11 +24,11 @@ class ErrorColumns:
     """One source: ``effects`` (..., n, 3, m), m = 1 but for what errs anew at every station or in every section."""
 
     name: str
-    mode: Mode
+    mode: PropagationMode
     effects: Array
 
 
-def error_columns(survey: Survey, legs: tuple[Leg, ...], site: Site) -> list[ErrorColumns]:
+def error_columns(survey: WellSurvey, legs: tuple[Leg, ...], site: Site) -> list[ErrorColumns]:
     """Effects of all sources on the positions of a survey (..., n); the sum of their squares is its covariance.
 
     The first station errs in nothing: what ties it to the ground is the caller's.
@@ -38,7 +38,7 @@ def error_columns(survey: Survey, legs: tuple[Leg, ...], site: Site) -> list[Err
     ToolError
         When a weight has no value at a station.
     """
-    geometry = Geometry(survey, slot_allowance=legs[0].tool.slot_allowance)
+    geometry = SurveyGeometry(survey, slot_allowance=legs[0].tool.slot_allowance)
     work = Propagation(survey, legs, site, geometry)
     found = []
     for source in sources_of(legs):
@@ -69,6 +69,6 @@ def _random(work: Propagation, axes: int) -> Array:
     return out
 
 
-def covariance(columns: list[ErrorColumns]) -> Array:
+def position_covariance(columns: list[ErrorColumns]) -> Array:
     """Covariance (..., n, 3, 3) of every position."""
     return np.asarray(sum(c.effects @ np.swapaxes(c.effects, -1, -2) for c in columns))

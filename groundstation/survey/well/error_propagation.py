@@ -24,15 +24,15 @@ import numpy.typing as npt
 
 from groundstation.errors import SurveyError, ToolError
 from groundstation.survey.tools.formulas import ARRAY, is_zero
-from groundstation.survey.tools.instruments import Mode, Term, Tool
+from groundstation.survey.tools.instruments import PropagationMode, SurveyTool, Term
 from groundstation.survey.well.error_sources import (
     NO_WEIGHT,
-    Geometry,
+    ErrorSource,
     Leg,
     Site,
-    Source,
-    Survey,
-    compiled,
+    SurveyGeometry,
+    WellSurvey,
+    compile_term_formulas,
     inputs_of,
     merged_sources,
     sources_of,
@@ -50,14 +50,16 @@ class Propagation:
     of a source that acts on two axes the first two rows alone are written.
     """
 
-    def __init__(self, survey: Survey, legs: Sequence[Leg], site: Site, geometry: Geometry) -> None:
+    def __init__(self, survey: WellSurvey, legs: Sequence[Leg], site: Site, geometry: SurveyGeometry) -> None:
         self._geometry = g = geometry
         self._legs = legs
         self._inclination = survey.inclination
         values = station_values(survey, site)
         self._weights = []
         for leg in legs:
-            function = compiled(tuple(term.formulas for term in leg.tool.terms), tuple(leg.tool.parameters))
+            function = compile_term_formulas(
+                tuple(term.formulas for term in leg.tool.terms), tuple(leg.tool.parameters)
+            )
             with np.errstate(all="ignore"):
                 weights = function(ARRAY, inputs_of(leg.tool, site, values))
             for t, found in mode_weights(leg, survey, site).items():
@@ -67,7 +69,7 @@ class Propagation:
         self.last = np.empty((3, *g.upper.shape))
         self._work = np.empty(g.upper.shape)
 
-    def evaluate(self, source: Source) -> None:
+    def evaluate(self, source: ErrorSource) -> None:
         """Write the effects of a source.
 
         Raises
@@ -159,7 +161,7 @@ def _summed(inner: Array, last: Array) -> Array:
 PAIRS = ((0, 0), (0, 1), (1, 1), (0, 2), (1, 2), (2, 2))  # the first three are those of the plane
 
 
-class Sums:
+class CovarianceSums:
     """Running sums of the products of effects: the upper halves of (..., n - 1, 3, 3), one array a pair of axes."""
 
     def __init__(self, shape: tuple[int, ...]) -> None:
@@ -167,7 +169,7 @@ class Sums:
         self._before = np.zeros((6, *shape))  # random ones of the stations that have both legs
         self._work = np.empty(shape)
 
-    def add_source(self, work: Propagation, source: Source) -> None:
+    def add_source(self, work: Propagation, source: ErrorSource) -> None:
         """Evaluate a source and add it."""
         work.evaluate(source)
         if source.random:
@@ -198,7 +200,7 @@ class Sums:
 class Uncertainty:
     """Covariance of every position and what it is made of."""
 
-    survey: Survey
+    survey: WellSurvey
     legs: tuple[Leg, ...]
     site: Site
     slot_allowance: bool
@@ -213,7 +215,7 @@ class Uncertainty:
         found: dict[str, Array] = {}
         for source in sources_of(self.legs):
             out = found.setdefault(source.name, np.zeros_like(self.cov))
-            sums = Sums(work.last.shape[1:])
+            sums = CovarianceSums(work.last.shape[1:])
             sums.add_source(work, source)
             sums.add_to(out)
         return found
@@ -236,7 +238,7 @@ class Uncertainty:
         return np.asarray(blend)
 
     def _propagation(self) -> Propagation:
-        geometry = Geometry(self.survey, slot_allowance=self.slot_allowance)
+        geometry = SurveyGeometry(self.survey, slot_allowance=self.slot_allowance)
         return Propagation(self.survey, self.legs, self.site, geometry)
 
     def _between(self, k: int) -> Array:
@@ -255,7 +257,9 @@ class Uncertainty:
         return across
 
 
-def propagate(survey: Survey, legs: Sequence[Leg], site: Site, *, slot_allowance: bool = False) -> Uncertainty:
+def propagate_errors(
+    survey: WellSurvey, legs: Sequence[Leg], site: Site, *, slot_allowance: bool = False
+) -> Uncertainty:
     """Covariance of the positions of a survey, or of many with as many stations.
 
     Raises
@@ -264,9 +268,9 @@ def propagate(survey: Survey, legs: Sequence[Leg], site: Site, *, slot_allowance
         When legs and survey do not fit, or a tool is used outside the inclinations it is made for.
     """
     check_legs(survey, legs)
-    g = Geometry(survey, slot_allowance=slot_allowance)
+    g = SurveyGeometry(survey, slot_allowance=slot_allowance)
     work = Propagation(survey, legs, site, g)
-    sums = Sums(g.upper.shape)
+    sums = CovarianceSums(g.upper.shape)
     with np.errstate(invalid="ignore", over="ignore"):  # what has no value is refused by what comes of it
         for source in merged_sources(tuple(legs)):
             sums.add_source(work, source)
@@ -276,7 +280,7 @@ def propagate(survey: Survey, legs: Sequence[Leg], site: Site, *, slot_allowance
     return Uncertainty(survey, tuple(legs), site, slot_allowance, cov)
 
 
-def check_legs(survey: Survey, legs: Sequence[Leg]) -> None:
+def check_legs(survey: WellSurvey, legs: Sequence[Leg]) -> None:
     """Refuse legs that do not fit the survey.
 
     Raises
@@ -292,7 +296,7 @@ def check_legs(survey: Survey, legs: Sequence[Leg]) -> None:
         check_inclination(leg.tool, float(inclination.min()), float(inclination.max()))
 
 
-def check_inclination(tool: Tool, least: float, most: float) -> None:
+def check_inclination(tool: SurveyTool, least: float, most: float) -> None:
     """Refuse inclinations (rad) that a tool is not made for.
 
     Raises
@@ -309,7 +313,7 @@ def check_inclination(tool: Tool, least: float, most: float) -> None:
         )
 
 
-def surface_covariance(md: Array, inclination: Array, azimuth: Array, tool: Tool) -> Array:
+def surface_covariance(md: Array, inclination: Array, azimuth: Array, tool: SurveyTool) -> Array:
     """Covariance (..., 3, 3) of the first station of (..., n): its own depth reading, if it is at the datum."""
     variance = depth_variance(tool) * (md[..., 0] == 0.0)
     sine, cosine = np.sin(inclination[..., 0]), np.cos(inclination[..., 0])
@@ -317,6 +321,6 @@ def surface_covariance(md: Array, inclination: Array, azimuth: Array, tool: Tool
     return np.asarray(variance[..., None, None] * along[..., :, None] * along[..., None, :])
 
 
-def depth_variance(tool: Tool) -> float:
+def depth_variance(tool: SurveyTool) -> float:
     """Variance (m^2) of one reading of the depth by a tool."""
-    return sum(term.sigma**2 for term in tool.terms if term.mode is Mode.RANDOM and term.weights[0] == "1")
+    return sum(term.sigma**2 for term in tool.terms if term.mode is PropagationMode.RANDOM and term.weights[0] == "1")

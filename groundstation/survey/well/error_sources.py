@@ -16,7 +16,7 @@ import numpy as np
 import numpy.typing as npt
 
 from groundstation.survey.tools.formulas import VARIABLES, Compiled, compile_formulas, is_zero
-from groundstation.survey.tools.instruments import ZERO, Mode, Term, Tool
+from groundstation.survey.tools.instruments import ZERO, PropagationMode, SurveyTool, Term
 
 Array = npt.NDArray[np.float64]
 VERTICAL = 1.75e-6  # rad, nearer than this to the vertical an azimuth has no value
@@ -46,7 +46,7 @@ class Site:
 
 
 @dataclass(frozen=True, slots=True)
-class Survey:
+class WellSurvey:
     """Stations of one well or of many: (..., n); ``record`` holds further columns by the name of their variable."""
 
     md: Array
@@ -60,17 +60,17 @@ class Survey:
 class Leg:
     """A part of the survey: the stations from ``first`` on, until the next leg begins, were taken with ``tool``."""
 
-    tool: Tool
+    tool: SurveyTool
     first: int = 1
 
 
 @lru_cache(maxsize=64)
-def compiled(formulas: tuple[tuple[str, ...], ...], parameters: tuple[str, ...]) -> Compiled:
+def compile_term_formulas(formulas: tuple[tuple[str, ...], ...], parameters: tuple[str, ...]) -> Compiled:
     """One function for the formulas of many terms."""
     return compile_formulas([text for row in formulas for text in row], parameters)
 
 
-def inputs_of(tool: Tool, site: Site, values: Mapping[str, Any]) -> list[Any]:
+def inputs_of(tool: SurveyTool, site: Site, values: Mapping[str, Any]) -> list[Any]:
     """Values of the variables and parameters in the order in which compiled formulas take them."""
     known = {
         "GField": site.gravity,
@@ -84,7 +84,7 @@ def inputs_of(tool: Tool, site: Site, values: Mapping[str, Any]) -> list[Any]:
     return [known[name] for name in VARIABLES] + list(tool.parameters.values())
 
 
-def station_values(survey: Survey, site: Site) -> dict[str, Array]:
+def station_values(survey: WellSurvey, site: Site) -> dict[str, Array]:
     """Variables of the stations from the second on, each with its predecessor: (..., n - 1)."""
     md, azimuth = survey.md, survey.azimuth
     inclination = np.maximum(survey.inclination, TINY)
@@ -99,14 +99,14 @@ def station_values(survey: Survey, site: Site) -> dict[str, Array]:
     return values
 
 
-class Geometry:
+class SurveyGeometry:
     """What propagation needs of a survey, once for all sources: (..., n - 1) and lengths in m.
 
     From revision 5 the industry's model allows the direction at the surface an error like that of the first station:
     ``slot_allowance`` gives the first station the whole first leg.
     """
 
-    def __init__(self, survey: Survey, *, slot_allowance: bool) -> None:
+    def __init__(self, survey: WellSurvey, *, slot_allowance: bool) -> None:
         sine, cosine = np.sin(survey.inclination), np.cos(survey.inclination)
         cos_a, sin_a = np.cos(survey.azimuth), np.sin(survey.azimuth)
         self.upper = 0.5 * np.diff(survey.md, axis=-1)  # weight in the leg above
@@ -124,34 +124,34 @@ class Geometry:
         self.any_vertical = bool(np.any(self.vertical))
 
 
-class Source:
+class ErrorSource:
     """One error source, wherever in the survey it acts: its rows are (leg, place in its tool, term)."""
 
     def __init__(self, rows: list[tuple[int, int, Term]]) -> None:
         self.rows = rows
         self.name = rows[0][2].name
-        self.random = rows[0][2].mode is Mode.RANDOM
-        self.renewed = rows[0][2].mode is Mode.SECTION and rows[0][2].by_mode
+        self.random = rows[0][2].mode is PropagationMode.RANDOM
+        self.renewed = rows[0][2].mode is PropagationMode.SECTION and rows[0][2].by_mode
         # what turns the azimuth alone moves nothing down
         flat = all(is_zero(t.weights[0]) and is_zero(t.weights[1]) and t.position is None for _, _, t in rows)
         self.axes = 2 if flat and all(is_zero((t.singular or ZERO)[2]) for _, _, t in rows) else 3
 
 
 @lru_cache(maxsize=64)
-def sources_of(legs: tuple[Leg, ...]) -> list[Source]:
+def sources_of(legs: tuple[Leg, ...]) -> list[ErrorSource]:
     """Sources of a survey: errors of a well or of all wells are one source in every leg that names them."""
     found: dict[tuple[str, int], list[tuple[int, int, Term]]] = {}
     for number, leg in enumerate(legs):
         for t, term in enumerate(leg.tool.terms):
-            everywhere = term.mode in (Mode.WELL, Mode.GLOBAL)
+            everywhere = term.mode in (PropagationMode.WELL, PropagationMode.GLOBAL)
             found.setdefault((term.name, -1 if everywhere else number), []).append((number, t, term))
-    return [Source(rows) for rows in found.values()]
+    return [ErrorSource(rows) for rows in found.values()]
 
 
 @lru_cache(maxsize=64)
-def merged_sources(legs: tuple[Leg, ...]) -> list[Source]:
+def merged_sources(legs: tuple[Leg, ...]) -> list[ErrorSource]:
     """The same sources for their sum alone: those with one formula are one, its variance the sum of theirs."""
-    found: dict[Any, list[Source]] = {}
+    found: dict[Any, list[ErrorSource]] = {}
     for k, source in enumerate(sources_of(legs)):
         number, _, term = source.rows[0]
         formula = (term.formulas, term.singular is None, term.position is None, term.unit, term.window, term.kept)
@@ -163,5 +163,7 @@ def merged_sources(legs: tuple[Leg, ...]) -> list[Source]:
         if len(group) == 1:
             out.append(group[0])
         else:
-            out.append(Source([(number, t, replace(term, value=math.hypot(*(s.rows[0][2].value for s in group))))]))
+            out.append(
+                ErrorSource([(number, t, replace(term, value=math.hypot(*(s.rows[0][2].value for s in group))))])
+            )
     return out

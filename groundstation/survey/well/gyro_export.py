@@ -13,22 +13,22 @@ from dataclasses import replace
 import numpy as np
 import numpy.typing as npt
 
-from groundstation.survey.tools.instruments import Term, Tool
+from groundstation.survey.tools.instruments import SurveyTool, Term
 from groundstation.survey.well.analysis import RECORD_COLUMNS
 from groundstation.survey.well.error_sources import RECORD
-from groundstation.survey.well.well_record import Record
+from groundstation.survey.well.well_record import SurveyRecord
 
 Array = npt.NDArray[np.float64]
 YAW = re.compile(r"\bSigmaYaw\b", re.IGNORECASE)
 
 
-def needs_record(tool: Tool) -> bool:
+def needs_record(tool: SurveyTool) -> bool:
     """Whether a tool asks for columns of a record."""
     text = " ".join(formula for term in tool.terms for formula in term.formulas).lower()
     return any(name.lower() in text for name in RECORD)
 
 
-def as_gyro(tool: Tool, record: Record) -> Tool:
+def as_gyro(tool: SurveyTool, record: SurveyRecord) -> SurveyTool:
     """The tool with the columns of one record as constants and a walk with depth."""
     sizes = {name: _size(record, name) for name in RECORD if name != "SigmaYaw"}
     reference, walk = _yaw(record)
@@ -44,7 +44,7 @@ def as_gyro(tool: Tool, record: Record) -> Tool:
     return replace(tool, name=f"{tool.name}-gyro", title=title, terms=tuple(terms), kind="Gyroscopic")
 
 
-def _size(record: Record, name: str) -> float:
+def _size(record: SurveyRecord, name: str) -> float:
     """Root mean square of a column from the second station on, or its default; of a count its harmonic mean."""
     values = _column(record, name)
     if values is None:
@@ -54,7 +54,7 @@ def _size(record: Record, name: str) -> float:
     return math.sqrt(float(np.mean(values[1:] ** 2)))
 
 
-def _yaw(record: Record) -> tuple[float, float]:
+def _yaw(record: SurveyRecord) -> tuple[float, float]:
     """A reference (rad) and a walk (rad / m^0.5) of the yaw."""
     values = _column(record, "SigmaYaw")
     if values is None:
@@ -66,7 +66,7 @@ def _yaw(record: Record) -> tuple[float, float]:
     return math.sqrt(rest), math.sqrt(slope)
 
 
-def _column(record: Record, name: str) -> Array | None:
+def _column(record: SurveyRecord, name: str) -> Array | None:
     for column, (variable, factor) in RECORD_COLUMNS.items():
         if variable == name and column in record.columns:
             return np.asarray(record.columns[column] * factor)

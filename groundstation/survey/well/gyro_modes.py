@@ -22,13 +22,21 @@ import numpy.typing as npt
 
 from groundstation.survey.tools.formulas import ARRAY
 from groundstation.survey.tools.instruments import PREVIOUS, Term
-from groundstation.survey.well.error_sources import TINY, Leg, Site, Survey, compiled, inputs_of, station_values
+from groundstation.survey.well.error_sources import (
+    TINY,
+    Leg,
+    Site,
+    WellSurvey,
+    compile_term_formulas,
+    inputs_of,
+    station_values,
+)
 
 Array = npt.NDArray[np.float64]
 TURNS = 6  # weights of depth, inclination and azimuth, and the singular ones
 
 
-def mode_weights(leg: Leg, survey: Survey, site: Site) -> dict[int, list[Array]]:
+def mode_weights(leg: Leg, survey: WellSurvey, site: Site) -> dict[int, list[Array]]:
     """Weights (..., n - 1), ``TURNS`` of them, of the terms of a leg that depend on the stations before, by place."""
     places = [t for t, term in enumerate(leg.tool.terms) if term.by_mode]
     if not places:
@@ -58,7 +66,7 @@ def sections_of(term: Term, inclination: Array) -> npt.NDArray[np.int64]:
     return np.cumsum(above[..., 1:] & ~above[..., :-1], axis=-1)
 
 
-def _inside(term: Term, survey: Survey) -> tuple[npt.NDArray[np.bool_], npt.NDArray[np.bool_]]:
+def _inside(term: Term, survey: WellSurvey) -> tuple[npt.NDArray[np.bool_], npt.NDArray[np.bool_]]:
     """Whether a station (..., n - 1) lies in the range of a term, and whether beyond it."""
     low, high = term.window
     inclination = survey.inclination[..., 1:]
@@ -66,12 +74,12 @@ def _inside(term: Term, survey: Survey) -> tuple[npt.NDArray[np.bool_], npt.NDAr
 
 
 def _weights(leg: Leg, term: Term, site: Site, values: Mapping[str, Any]) -> list[Any]:
-    function = compiled((term.formulas[:TURNS],), tuple(leg.tool.parameters))
+    function = compile_term_formulas((term.formulas[:TURNS],), tuple(leg.tool.parameters))
     with np.errstate(all="ignore"):
         return function(ARRAY, inputs_of(leg.tool, site, values))
 
 
-def _grown(leg: Leg, term: Term, survey: Survey, site: Site, values: Mapping[str, Array]) -> list[Array]:
+def _grown(leg: Leg, term: Term, survey: WellSurvey, site: Site, values: Mapping[str, Array]) -> list[Array]:
     """Weights of a drift or a random walk: from nothing where its range begins, kept beyond it or gone."""
     inside, beyond = _inside(term, survey)
     shape = inside.shape
@@ -86,7 +94,7 @@ def _grown(leg: Leg, term: Term, survey: Survey, site: Site, values: Mapping[str
     return [zero, zero, out, zero, zero, zero]
 
 
-def _held(leg: Leg, term: Term, survey: Survey, site: Site, values: Mapping[str, Array]) -> list[Array]:
+def _held(leg: Leg, term: Term, survey: WellSurvey, site: Site, values: Mapping[str, Array]) -> list[Array]:
     """Weights with which the hole last passed the end of the term's range, or with which the leg began beyond it."""
     gate = term.window[1]
     inclination, azimuth = survey.inclination, survey.azimuth

@@ -1,7 +1,7 @@
 """Trajectory methods: from measured depth, inclination and azimuth at the ends of a leg to its displacement.
 
 Every leg is D (sin a cos b, sin a sin b, cos c) with angles and lengths that the method defines; all are regular where
-inclination or azimuth does not change. ``leg`` is written once for scalars (``math``) and for whole wells (``numpy``).
+inclination or azimuth does not change. ``leg_displacement`` is written once for scalars (``math``) and for whole wells (``numpy``).
 Frame: north, east, down; rad and m. Source: thesis 2.1-2.3 and Appendix IV.
 """
 
@@ -15,7 +15,7 @@ import numpy as np
 import numpy.typing as npt
 
 from groundstation.errors import SurveyError
-from groundstation.survey.bearings import wrap
+from groundstation.survey.bearings import wrap_angle
 
 Array = npt.NDArray[np.float64]
 SMALL = 1e-4  # rad, below which a series is exact to the last digit
@@ -57,18 +57,18 @@ def dogleg(m: Any, i1: Any, a1: Any, i2: Any, a2: Any) -> Any:
     return 2.0 * m.asin(m.sqrt(half)) if m is not math else 2.0 * math.asin(math.sqrt(min(max(half, 0.0), 1.0)))
 
 
-def leg(m: Any, method: Method, length: Any, i1: Any, a1: Any, i2: Any, a2: Any) -> tuple[Any, Any, Any]:
+def leg_displacement(m: Any, method: Method, length: Any, i1: Any, a1: Any, i2: Any, a2: Any) -> tuple[Any, Any, Any]:
     """Displacement north, east and down (m) of one leg; ``m`` is ``math`` for numbers or ``numpy`` for arrays."""
     if method is Method.TANGENTIAL:
         return length * m.sin(i2) * m.cos(a2), length * m.sin(i2) * m.sin(a2), length * m.cos(i2)
     if method in (Method.AVERAGE_ANGLE, Method.RADIUS_OF_CURVATURE):
         a1, a2 = _where_leaning(m, i1, a1, a2), _where_leaning(m, i2, a2, a1)
-        mean_i, mean_a = 0.5 * (i1 + i2), a1 + 0.5 * wrap(a2 - a1)
+        mean_i, mean_a = 0.5 * (i1 + i2), a1 + 0.5 * wrap_angle(a2 - a1)
         along = length * m.sin(mean_i)
         if method is Method.AVERAGE_ANGLE:
             return along * m.cos(mean_a), along * m.sin(mean_a), length * m.cos(mean_i)
         # (cos I1 - cos I2) / (I2 - I1) = sin(mean I) sinc(dI / 2), and likewise for the azimuth
-        bent_i, bent_a = sinc(m, 0.5 * (i2 - i1)), sinc(m, 0.5 * wrap(a2 - a1))
+        bent_i, bent_a = sinc(m, 0.5 * (i2 - i1)), sinc(m, 0.5 * wrap_angle(a2 - a1))
         along = along * bent_i * bent_a
         return along * m.cos(mean_a), along * m.sin(mean_a), length * m.cos(mean_i) * bent_i
     half = 0.5 * length
@@ -129,7 +129,7 @@ def _is_survey(md: Array, inclination: Array, azimuth: Array) -> bool:
     )
 
 
-def positions(method: Method, md: Array, inclination: Array, azimuth: Array) -> Array:
+def station_positions(method: Method, md: Array, inclination: Array, azimuth: Array) -> Array:
     """Positions (..., n, 3) of the stations (..., n) of whole wells, from the first station.
 
     Raises
@@ -144,12 +144,12 @@ def positions(method: Method, md: Array, inclination: Array, azimuth: Array) -> 
         if len(back):
             raise SurveyError(f"survey: station {back[0][-1] + 1}: the hole turns straight back on itself")
     out = np.zeros((*md.shape, 3))
-    for axis, step in enumerate(leg(np, method, np.diff(md, axis=-1), i1, a1, i2, a2)):
+    for axis, step in enumerate(leg_displacement(np, method, np.diff(md, axis=-1), i1, a1, i2, a2)):
         np.cumsum(step, axis=-1, out=out[..., 1:, axis])
     return out
 
 
-def tangents(inclination: Array, azimuth: Array) -> Array:
+def station_tangents(inclination: Array, azimuth: Array) -> Array:
     """Downhole unit vectors (..., n, 3)."""
     sine = np.sin(inclination)
     return np.stack([sine * np.cos(azimuth), sine * np.sin(azimuth), np.cos(inclination)], axis=-1)
@@ -163,7 +163,7 @@ def dogleg_severity(md: Array, inclination: Array, azimuth: Array) -> Array:
     return np.asarray(2.0 * np.arcsin(np.sqrt(half)) / (md[..., 1:] - md[..., :-1]))
 
 
-def closure(position: Array) -> tuple[Array, Array]:
+def horizontal_closure(position: Array) -> tuple[Array, Array]:
     """Horizontal distance (m) and direction in [0, 2 pi) (rad) of positions (..., 3) from the collar."""
     distance = np.hypot(position[..., 0], position[..., 1])
     direction = np.arctan2(position[..., 1], position[..., 0])

@@ -45,7 +45,7 @@ class Norths:
 
 
 @dataclass(frozen=True, slots=True)
-class Frame:
+class ReferenceFrame:
     """North and depth reference of a record and those of the answer, and the datum of heights."""
 
     record: str = "site"

@@ -21,10 +21,10 @@ import numpy as np
 import numpy.typing as npt
 
 from groundstation.errors import SurveyError
-from groundstation.survey.fusion.resolve import Direction, angles
-from groundstation.survey.fusion.shared import Packed, added, packed_of
+from groundstation.survey.fusion.resolve import Direction, direction_angles
+from groundstation.survey.fusion.shared import Packed, add_shared_errors, packed_of
 from groundstation.survey.fusion.tangents import tangent_jacobians, tangents_of
-from groundstation.survey.well.methods import OPPOSITE, Method, dogleg, leg, ratio_factor
+from groundstation.survey.well.methods import OPPOSITE, Method, dogleg, leg_displacement, ratio_factor
 
 Array = npt.NDArray[np.float64]
 BLOCK = 64  # stations from mark to mark
@@ -35,7 +35,7 @@ FROM_ZERO: Final = np.zeros(1, np.intp)
 
 
 @dataclass(frozen=True, slots=True)
-class Point:
+class TrajectoryPoint:
     """One station of a trajectory."""
 
     md: float  # m
@@ -61,7 +61,7 @@ GROWTH = 8  # share of its rows by which a table grows
 
 
 @dataclass(frozen=True, slots=True)
-class Sums:
+class TrajectorySums:
     """What a hole has come to at a station: the running sums of the kernel, and the length of the last leg (m)."""
 
     own: Array  # (3, 3)
@@ -73,8 +73,8 @@ class Sums:
 class Followed:
     """What comes of going down a part of a hole."""
 
-    sums: Sums  # at its end
-    marks: list[Sums]  # after every `BLOCK` stations of the hole
+    sums: TrajectorySums  # at its end
+    marks: list[TrajectorySums]  # after every `BLOCK` stations of the hole
     runs: list[Array]  # (.., 3, s) shared columns of the positions, those with equally many together, if wanted
     covs: Array  # (n, 3, 3)
 
@@ -108,22 +108,22 @@ class Trajectory:
         self._insert(0, start_md, first)
         self._direct([0])
         self._kept = [UNKNOWN]  # shared columns of every point that is drawn
-        self._sums = Sums(np.zeros((3, 3)), np.zeros((3, 0)), 0.0)
+        self._sums = TrajectorySums(np.zeros((3, 3)), np.zeros((3, 0)), 0.0)
         self._marks = [self._sums]  # at the collar and every BLOCK stations from there
 
     def __len__(self) -> int:
         """How many points there are."""
         return len(self._directions)
 
-    def __getitem__(self, place: int) -> Point:
+    def __getitem__(self, place: int) -> TrajectoryPoint:
         place = range(len(self))[place]
         row = self._rows[place]
-        return Point(
+        return TrajectoryPoint(
             float(row["md"]), row["tangent"].copy(), row["position"].copy(), row["cov"].copy(), self._kept[place]
         )
 
     @property
-    def points(self) -> list[Point]:
+    def points(self) -> list[TrajectoryPoint]:
         """The collar and every station, made anew."""
         return [self[place] for place in range(len(self))]
 
@@ -142,7 +142,7 @@ class Trajectory:
         """Covariances (n, 3, 3) of the positions, m^2."""
         return np.asarray(self._rows["cov"][: len(self)])
 
-    def append(self, md: float, direction: Direction) -> Point:
+    def append(self, md: float, direction: Direction) -> TrajectoryPoint:
         """Add the station at ``md`` (m).
 
         Raises
@@ -255,7 +255,7 @@ class Trajectory:
         else:
             self._kept += [UNKNOWN] * (len(rows) - 1)
 
-    def _follow(self, sums: Sums, begin: int, end: int, *, with_columns: bool) -> Followed:
+    def _follow(self, sums: TrajectorySums, begin: int, end: int, *, with_columns: bool) -> Followed:
         """Go on with sums from one place to another."""
         from groundstation.survey.well.kernels.position_errors import (
             add_stations,  # whoever only reads needs no compiler
@@ -286,9 +286,9 @@ class Trajectory:
             int(marked[0]) if len(marked) else count, BLOCK, marks, own_marks, shared, covs,
         )  # fmt: skip
         return Followed(
-            Sums(own, passed, float(legs[-1])),
+            TrajectorySums(own, passed, float(legs[-1])),
             [
-                Sums(own_marks[number].copy(), marks[number, :, : int(widths[k])].copy(), float(legs[k]))
+                TrajectorySums(own_marks[number].copy(), marks[number, :, : int(widths[k])].copy(), float(legs[k]))
                 for number, k in enumerate(marked.tolist())
             ],
             runs_of(shared, widths) if with_columns else [],
@@ -302,12 +302,12 @@ class Trajectory:
         return np.array([self._leg(*ends) for ends in itertools.pairwise(rows)])
 
     def _leg(self, before: np.void, after: np.void) -> Array:
-        i1, a1 = angles(before["tangent"][:2], float(before["tangent"][2]))
-        i2, a2 = angles(after["tangent"][:2], float(after["tangent"][2]))
+        i1, a1 = direction_angles(before["tangent"][:2], float(before["tangent"][2]))
+        i2, a2 = direction_angles(after["tangent"][:2], float(after["tangent"][2]))
         md, below = float(before["md"]), float(after["md"])
         if self._method is Method.MINIMUM_CURVATURE and dogleg(math, i1, a1, i2, a2) > math.pi - OPPOSITE:
             raise SurveyError(f"trajectory: the hole turns back on itself between {md:g} and {below:g} m")
-        return np.array(leg(math, self._method, below - md, i1, a1, i2, a2))
+        return np.array(leg_displacement(math, self._method, below - md, i1, a1, i2, a2))
 
 
 def runs_of(shared: Array, widths: npt.NDArray[np.intp]) -> list[Array]:
@@ -316,7 +316,7 @@ def runs_of(shared: Array, widths: npt.NDArray[np.intp]) -> list[Array]:
     return [shared[a:b, :, : int(widths[a])] for a, b in itertools.pairwise(borders)]
 
 
-def interpolate(points: list[Point], md: float) -> Point:
+def interpolate_point(points: list[TrajectoryPoint], md: float) -> TrajectoryPoint:
     """Point on the arc between two stations at ``md`` (m); its covariance is interpolated between theirs.
 
     Raises
@@ -332,7 +332,7 @@ def interpolate(points: list[Point], md: float) -> Point:
     return points[-1]
 
 
-def on_arc(upper: Point, lower: Point, f: float) -> Point:
+def on_arc(upper: TrajectoryPoint, lower: TrajectoryPoint, f: float) -> TrajectoryPoint:
     """Fraction ``f`` of a leg along its arc, bent evenly so that it ends where the method put the lower station."""
     angle = math.atan2(
         float(np.linalg.norm(np.cross(upper.tangent, lower.tangent))), float(upper.tangent @ lower.tangent)
@@ -346,5 +346,5 @@ def on_arc(upper: Point, lower: Point, f: float) -> Point:
     whole = half * ratio_factor(math, angle) * (upper.tangent + lower.tangent)
     position = upper.position + arc + f * (lower.position - upper.position - whole)
     cov = (1.0 - f) * upper.cov + f * lower.cov
-    shared = added((1.0 - f) * upper.shared, f * lower.shared)
-    return Point(upper.md + f * (lower.md - upper.md), tangent, position, cov, shared)
+    shared = add_shared_errors((1.0 - f) * upper.shared, f * lower.shared)
+    return TrajectoryPoint(upper.md + f * (lower.md - upper.md), tangent, position, cov, shared)

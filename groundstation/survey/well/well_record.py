@@ -11,7 +11,7 @@ Array = npt.NDArray[np.float64]
 
 
 @dataclass(frozen=True, slots=True)
-class Record:
+class SurveyRecord:
     """A survey as read: (n,) m, rad and rad; ``lines`` are those of the file, ``columns`` what else it holds."""
 
     md: Array

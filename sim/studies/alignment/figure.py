@@ -9,11 +9,11 @@ import numpy as np
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
-from groundstation.report.style import GREY, MARKERS, SERIES, new_figure, styled, tidy
+from groundstation.report.style import GREY, MARKERS, SERIES, new_figure, styled, tidy_ticks
 from sim.studies.alignment.run import NAMES, PUBLISHED_DEG, SWEEPS
 
 
-def figures(result: dict[str, Any]) -> dict[str, Figure]:
+def draw_figures(result: dict[str, Any]) -> dict[str, Figure]:
     """One figure, a panel a sweep."""
     panels = {
         SWEEPS[name][0]: {NAMES[m]: [(p["x"], *p[m]) for p in points] for m in NAMES}
@@ -52,4 +52,4 @@ def alignment_figure(
     handles.append(Line2D([], [], color=GREY, lw=1.0, label="standard error as the node says"))
     handles.append(Line2D([], [], color=GREY, ls=":", lw=0.9, label="published"))
     figure.legend(handles=handles, loc="outside lower left", ncols=4)
-    return tidy(figure)
+    return tidy_ticks(figure)

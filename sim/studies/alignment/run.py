@@ -17,15 +17,15 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from groundstation.survey.fusion.resolve import angles, resolve
+from groundstation.survey.fusion.resolve import direction_angles, resolve_direction
 from node.firmware.alignment import METHODS, angles_of
 from node.firmware.settings import Kernel
 from node.kernels.arithmetic.formats import PERIOD
 from node.kernels.record.filter_record import default_config
 from sim.rig.direct_string import DirectString
-from sim.studies.pool import Step, over_cores, seeded
-from sim.studies.scenarios import Tables, complete
-from sim.studies.trials import bootstrap, row
+from sim.studies.pool import Step, over_cores, seed_jobs
+from sim.studies.scenarios import Tables, complete_string
+from sim.studies.trials import bootstrap_interval, interval_row
 from sim.world.scenario import scenario_of
 from sim.world.world import World
 
@@ -54,7 +54,7 @@ class Setup:
         """The scenario."""
         usual = float(default_config()[0]["force_std"])
         return {
-            "rig": complete(1),
+            "rig": complete_string(1),
             "path": {"straight": {"inclination_deg": self.inclination_deg}},
             "schedule": {"add_s": REST, "stop_s": STOP, "finish_s": 5.0, "blocks": 1},
             "rotation": {"turns": self.turns + 2.0 * SPARE, "rate_dps": self.rate_dps, "advance_m": 0.0},
@@ -71,7 +71,7 @@ class Setup:
 
 
 @dataclass(frozen=True, slots=True)
-class Outcome:
+class AlignmentOutcome:
     """What one method found from one seed; rad."""
 
     error: tuple[float, float]  # of pitch and roll
@@ -88,7 +88,7 @@ class Turn:
         self.world = World(scenario_of(dict(setup.tables())), seed)
         self.tilts = np.array(self.world.sensors.tilt(1))
 
-    def run(self, method: str) -> Outcome:
+    def run(self, method: str) -> AlignmentOutcome:
         """Let one node rest, turn and rest; ``method`` is of its alignment, ``none`` leaves the mount as it is."""
         string, asked_at = DirectString(self.world), self.world.begin + REST - ASKED
         for cycle in string.steps():
@@ -98,9 +98,9 @@ class Turn:
         mount = string.nodes[0]["mount"]
         pitch, roll = angles_of(mount["axis"][0])
         survey = string.run.surveys[-1].measurement.imus[0]
-        direction = resolve(np.array(survey.force), np.array(survey.force_cov), 0.0, 1e-12).direction
-        inclination = angles(direction.lean, direction.down)[0]
-        return Outcome(
+        direction = resolve_direction(np.array(survey.force), np.array(survey.force_cov), 0.0, 1e-12).direction
+        inclination = direction_angles(direction.lean, direction.down)[0]
+        return AlignmentOutcome(
             (pitch - float(self.tilts[0]), roll - float(self.tilts[1])),
             (float(mount["std"][0, 0]), float(mount["std"][0, 1])),
             inclination - math.radians(self._setup.inclination_deg),
@@ -119,20 +119,20 @@ SWEEPS: dict[str, tuple[str, tuple[Setup, ...]]] = {
 }
 
 
-def setups() -> list[Setup]:
+def all_setups() -> list[Setup]:
     """Every setup once, that of the published figures first."""
     return list(dict.fromkeys([BASE, *(s for _, sweep in SWEEPS.values() for s in sweep)]))
 
 
-def steps(seeds: int) -> int:
+def count_steps(seeds: int) -> int:
     """Runs of one seed."""
-    return seeds * len(setups())
+    return seeds * len(all_setups())
 
 
-def run(seeds: int, step: Step) -> dict[str, Any]:
+def run_study(seeds: int, step: Step) -> dict[str, Any]:
     """Rows of the published setup, then of the sweeps; ``sweeps`` holds what the figure shows."""
     with over_cores(seeds, step) as run_all:
-        found = {setup: run_all(run_seed, seeded(setup, seeds)) for setup in setups()}
+        found = {setup: run_all(run_seed, seed_jobs(setup, seeds)) for setup in all_setups()}
     cases = list(base_rows(found[BASE]))
     for name, (_, sweep) in SWEEPS.items():
         for setup in sweep:
@@ -143,45 +143,51 @@ def run(seeds: int, step: Step) -> dict[str, Any]:
     return {"experiment": "alignment", "seeds": seeds, "cases": cases, "sweeps": sweeps}
 
 
-def run_seed(job: tuple[Setup, int]) -> dict[str, Outcome]:
+def run_seed(job: tuple[Setup, int]) -> dict[str, AlignmentOutcome]:
     """All methods on the sensors of one seed, for a pool of processes."""
     setup, seed = job
     turn = Turn(setup, seed)
     return {method: turn.run(method) for method in (*METHODS, "none")}
 
 
-def base_rows(found: list[dict[str, Outcome]]) -> Iterator[dict[str, Any]]:
+def base_rows(found: list[dict[str, AlignmentOutcome]]) -> Iterator[dict[str, Any]]:
     """Offsets beside the published ones, their ratio and consistency, and the survey before and after."""
     for method in METHODS:
         yield offset_row(NAMES[method], found, method, published=PUBLISHED_DEG[method])
     published = PUBLISHED_DEG["extremes"] / PUBLISHED_DEG["circle"]
-    yield row("(max + min) / 2 over circle", "offset", ratio(found), unit="1", published=published)
+    yield interval_row("(max + min) / 2 over circle", "offset", error_ratio(found), unit="1", published=published)
     for method in METHODS:
-        squares = np.array([float(np.mean(np.square(o.error) / np.square(o.std))) for o in of(found, method)])
-        yield row(NAMES[method], "NEES of the offset", (float(squares.mean()), *bootstrap(squares)), unit="1")
+        squares = np.array([float(np.mean(np.square(o.error) / np.square(o.std))) for o in outcomes_of(found, method)])
+        yield interval_row(
+            NAMES[method], "NEES of the offset", (float(squares.mean()), *bootstrap_interval(squares)), unit="1"
+        )
     for method, name in {"none": "not aligned", **NAMES}.items():
-        yield row(
-            name, "inclination of the survey after", rms([np.array([o.inclination_error]) for o in of(found, method)])
+        yield interval_row(
+            name,
+            "inclination of the survey after",
+            rms_interval_deg([np.array([o.inclination_error]) for o in outcomes_of(found, method)]),
         )
 
 
 def offset_row(
-    case: str, found: list[dict[str, Outcome]], method: str, published: float | None = None
+    case: str, found: list[dict[str, AlignmentOutcome]], method: str, published: float | None = None
 ) -> dict[str, Any]:
     """Error of pitch and roll together."""
-    return row(case, "offset", rms([np.array(o.error) for o in of(found, method)]), published=published)
+    return interval_row(
+        case, "offset", rms_interval_deg([np.array(o.error) for o in outcomes_of(found, method)]), published=published
+    )
 
 
-def sweep_point(name: str, setup: Setup, found: list[dict[str, Outcome]]) -> dict[str, Any]:
+def sweep_point(name: str, setup: Setup, found: list[dict[str, AlignmentOutcome]]) -> dict[str, Any]:
     """One point of a figure: for each method the error with its interval, and what the node says of it; deg."""
     point: dict[str, Any] = {"x": getattr(setup, name)}
     for method in METHODS:
-        said = math.degrees(math.sqrt(float(np.mean([np.square(o.std) for o in of(found, method)]))))
-        point[method] = [*rms([np.array(o.error) for o in of(found, method)]), said]
+        said = math.degrees(math.sqrt(float(np.mean([np.square(o.std) for o in outcomes_of(found, method)]))))
+        point[method] = [*rms_interval_deg([np.array(o.error) for o in outcomes_of(found, method)]), said]
     return point
 
 
-def ratio(found: list[dict[str, Outcome]]) -> tuple[float, float, float]:
+def error_ratio(found: list[dict[str, AlignmentOutcome]]) -> tuple[float, float, float]:
     """Error of the extremes over that of the circle, with the ends of its interval (bootstrap over seeds)."""
     squares = np.array([[float(np.mean(np.square(o[m].error))) for m in ("circle", "extremes")] for o in found])
     random = np.random.Generator(np.random.Philox(len(found)))
@@ -191,13 +197,13 @@ def ratio(found: list[dict[str, Outcome]]) -> tuple[float, float, float]:
     return math.sqrt(float(both[1] / both[0])), float(low), float(high)
 
 
-def of(found: list[dict[str, Outcome]], method: str) -> list[Outcome]:
+def outcomes_of(found: list[dict[str, AlignmentOutcome]], method: str) -> list[AlignmentOutcome]:
     """Outcomes of one method."""
     return [outcomes[method] for outcomes in found]
 
 
-def rms(errors: list[Array]) -> tuple[float, float, float]:
+def rms_interval_deg(errors: list[Array]) -> tuple[float, float, float]:
     """Root mean square in degrees of one array (rad) a seed, with the ends of its interval."""
     squares = np.array([float(np.mean(np.square(e))) for e in errors])
-    low, high = np.degrees(np.sqrt(bootstrap(squares)))
+    low, high = np.degrees(np.sqrt(bootstrap_interval(squares)))
     return math.degrees(math.sqrt(float(squares.mean()))), float(low), float(high)

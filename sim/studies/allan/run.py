@@ -12,9 +12,9 @@ from typing import Any
 
 import numpy as np
 
-from groundstation.calibration.allan import AllanResult, analyse
+from groundstation.calibration.allan_analysis import AllanResult, analyse_allan_deviation
 from groundstation.calibration.allan_fit import Estimate
-from sim.instruments.static_records import BIAS_INSTABILITY, RANDOM_WALK, RATE, mpu6500, static_record
+from sim.instruments.static_records import BIAS_INSTABILITY, RANDOM_WALK, RATE, mpu6500_noise, static_record
 from sim.studies.pool import Step
 
 DURATION = 7200.0  # s
@@ -23,12 +23,12 @@ UNITS = {"random_walk": "deg/s/sqrt(Hz)", "bias_instability": "deg/s"}
 COVERAGE = 0.95
 
 
-def steps(records: int) -> int:
+def count_steps(records: int) -> int:
     """Records."""
     return records
 
 
-def run(records: int, step: Step) -> dict[str, Any]:
+def run_study(records: int, step: Step) -> dict[str, Any]:
     """Fit ``records`` synthetic records of three axes; ``step`` is called after each.
 
     Returns
@@ -40,7 +40,7 @@ def run(records: int, step: Step) -> dict[str, Any]:
     """
     fits: list[list[AllanResult]] = []
     for seed in range(1, records + 1):
-        fits.append(analyse(static_record(mpu6500(), round(DURATION * RATE), RATE, seed), RATE))
+        fits.append(analyse_allan_deviation(static_record(mpu6500_noise(), round(DURATION * RATE), RATE, seed), RATE))
         step()
     cases: list[dict[str, Any]] = []
     quantities: dict[str, dict[str, Any]] = {}
@@ -77,7 +77,7 @@ def _summary(table: np.ndarray[Any, np.dtype[np.float64]]) -> dict[str, float]:
     }
 
 
-def verdicts(result: dict[str, Any]) -> list[str]:
+def verdict_lines(result: dict[str, Any]) -> list[str]:
     """One line for N and one for F: its error and whether its intervals hold."""
     lines = []
     for name, q in result["quantities"].items():

@@ -18,15 +18,21 @@ import numpy as np
 import numpy.typing as npt
 
 from groundstation.survey.fusion.fusion import StationFusion
-from groundstation.survey.fusion.resolve import Direction, angle_stds, angles, known, resolve
+from groundstation.survey.fusion.resolve import (
+    Direction,
+    angle_stds,
+    direction_angles,
+    known_direction,
+    resolve_direction,
+)
 from groundstation.survey.fusion.shared import SharedErrors
-from groundstation.survey.fusion.transport import carry
+from groundstation.survey.fusion.transport import carry_directions
 from groundstation.survey.well.ellipsoid import coverage_radius
-from groundstation.survey.well.trajectory import Point, Trajectory
+from groundstation.survey.well.trajectory import Trajectory, TrajectoryPoint
 from node.kernels.arithmetic.angles import wrap
 from sim.rig.direct_string import DirectString, Survey
-from sim.studies.pool import Step, over_cores, seeded
-from sim.studies.scenarios import CALIBRATED, Tables, changed
+from sim.studies.pool import Step, over_cores, seed_jobs
+from sim.studies.scenarios import CALIBRATED, Tables, change_sections
 from sim.world.scenario import scenario_of
 from sim.world.world import World
 
@@ -61,28 +67,28 @@ class BentRun:
     between: float  # m, error of the toe that the true directions at the stations leave
 
 
-def cases() -> list[tuple[str, str, Tables]]:
+def hole_cases() -> list[tuple[str, str, Tables]]:
     """Hole, string and scenario."""
     found = []
     for hole, spiral in HOLES.items():
         for string in KINDS:
             rough = {"samples_hz": 50.0, "string": {"transport": string}}
-            found.append((hole, string, changed(BASE, path={"spiral": spiral}, rough=rough)))
+            found.append((hole, string, change_sections(BASE, path={"spiral": spiral}, rough=rough)))
     return found
 
 
-def steps(seeds: int) -> int:
+def count_steps(seeds: int) -> int:
     """Runs of all seeds."""
-    return seeds * len(cases())
+    return seeds * len(hole_cases())
 
 
-def run(seeds: int, step: Step) -> dict[str, Any]:
+def run_study(seeds: int, step: Step) -> dict[str, Any]:
     """A row for each hole, string and setting; ``step`` is called after each run."""
     rows = []
     with over_cores(seeds, step) as run_all:
-        for hole, string, tables in cases():
-            runs = run_all(run_seed, seeded(tables, seeds))
-            rows += [row(hole, string, told, runs) for told in KINDS]
+        for hole, string, tables in hole_cases():
+            runs = run_all(run_seed, seed_jobs(tables, seeds))
+            rows += [hole_row(hole, string, told, runs) for told in KINDS]
     return {"experiment": "bent-holes", "seeds": seeds, "cases": rows}
 
 
@@ -90,23 +96,23 @@ def run_seed(job: tuple[Tables, int]) -> BentRun:
     """One seed of one string, for a pool of processes."""
     tables, seed = job
     world = World(scenario_of(dict(tables)), seed)
-    return judge(world, DirectString(world).drill().surveys)
+    return trajectory_errors(world, DirectString(world).drill().surveys)
 
 
-def judge(world: World, surveys: Sequence[Survey]) -> BentRun:
+def trajectory_errors(world: World, surveys: Sequence[Survey]) -> BentRun:
     """What a ground station makes of all surveys, told either way, against the hole."""
     hole = world.scenario.hole
     shared = SharedErrors()
     stations = fused_stations(world, surveys, shared)
     true = [hole.direction(md) for md in stations]
-    collar = known(*hole.direction(0.0))
+    collar = known_direction(*hole.direction(0.0))
     exact = Trajectory(collar=collar)
-    exact.extend([(md, known(*one)) for md, one in zip(stations, true, strict=True)])
+    exact.extend([(md, known_direction(*one)) for md, one in zip(stations, true, strict=True)])
     toe = exact.points[-1].position
     found = BentRun({}, {}, {}, {}, float(np.linalg.norm(toe - hole.position(exact.points[-1].md))))
     for told in KINDS:
-        end, directions = located(collar, stations, shared, told)
-        azimuths = [angles(one.lean, one.down)[1] for one in directions]
+        end, directions = locate_toe(collar, stations, shared, told)
+        azimuths = [direction_angles(one.lean, one.down)[1] for one in directions]
         found.azimuth_error[told] = np.array([wrap(a - b[1]) for a, b in zip(azimuths, true, strict=True)])
         found.azimuth_std[told] = np.array([angle_stds(d.lean, d.down, d.total_cov)[1] for d in directions])
         error = end.position - toe
@@ -127,27 +133,27 @@ def fused_stations(world: World, surveys: Sequence[Survey], shared: SharedErrors
         md = round(world.bit_depth(m.station_at) - (m.tube - 1) * LENGTH, 6)
         if md <= 0.0:
             continue
-        resolved = resolve(np.array(m.imus[0].force), np.array(m.imus[0].force_cov), m.yaw, m.yaw_var)
+        resolved = resolve_direction(np.array(m.imus[0].force), np.array(m.imus[0].force_cov), m.yaw, m.yaw_var)
         above = range(m.tube + 1, top + 1)
         reading = shared.direction_of(resolved, m.tube, above, m.systematic_var, mount_var, bias_std)
         fusions.setdefault(md, StationFusion()).add_reading(reading)
     return {md: fusions[md].fused() for md in sorted(fusions)}
 
 
-def located(
+def locate_toe(
     collar: Direction, stations: dict[float, Direction], shared: SharedErrors, told: str
-) -> tuple[Point, list[Direction]]:
+) -> tuple[TrajectoryPoint, list[Direction]]:
     """Last point and directions of the stations, by what the ground station was told of the string."""
     directions = list(stations.values())
     if told == "parallel":
         places = shared.transport_places(len(directions) + 1)
-        directions = [carried.direction for carried in carry(collar, directions, places)]
+        directions = [carried.direction for carried in carry_directions(collar, directions, places)]
     trajectory = Trajectory(collar=collar)
     trajectory.extend(list(zip(stations, directions, strict=True)))
     return trajectory.points[-1], directions
 
 
-def row(hole: str, string: str, told: str, runs: Sequence[BentRun]) -> dict[str, Any]:
+def hole_row(hole: str, string: str, told: str, runs: Sequence[BentRun]) -> dict[str, Any]:
     """Figures of one hole, string and setting."""
     errors, stds = (np.concatenate([getattr(r, name)[told] for r in runs]) for name in ("azimuth_error", "azimuth_std"))
     toes = np.array([r.toe_distance[told] for r in runs])

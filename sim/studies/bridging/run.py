@@ -18,9 +18,9 @@ import numpy as np
 import numpy.typing as npt
 
 from sim.studies.epochs import BLOCKS
-from sim.studies.limits.bound import Bound, Model, bound_of, course_of, model_of
+from sim.studies.limits.bound import Bound, Model, bound_of, model_of, node_timeline
 from sim.studies.limits.run import CASES, SETTLED
-from sim.studies.pool import Step, over_cores, seeded
+from sim.studies.pool import Step, over_cores, seed_jobs
 from sim.studies.scenarios import Tables
 from sim.world.scenario import scenario_of
 from sim.world.world import World
@@ -31,17 +31,17 @@ POINTS = 32  # of a survey's mean force
 KINDS = ("turning", "at rest", "at the survey", "revised", "smoothed")
 
 
-def steps(seeds: int) -> int:
+def count_steps(seeds: int) -> int:
     """Runs of all seeds."""
     return seeds * len(CASES)
 
 
-def run(seeds: int, step: Step) -> dict[str, Any]:
+def run_study(seeds: int, step: Step) -> dict[str, Any]:
     """A row for every kind of figure of every case of the limits; ``step`` is called after each seed of each."""
     cases: list[dict[str, Any]] = []
     with over_cores(seeds, step) as run_all:
         for case in CASES:
-            jobs = [((setup, case.hops), seed) for setup, seed in seeded(case.setup, seeds)]
+            jobs = [((setup, case.hops), seed) for setup, seed in seed_jobs(case.setup, seeds)]
             cases += rows_of(case.name, case.setup, run_all(run_seed, jobs))
     return {"experiment": "bridging", "seeds": seeds, "together": TOGETHER, "cases": cases}
 
@@ -50,8 +50,10 @@ def run_seed(job: tuple[tuple[Tables, int], int]) -> Array:
     """Variances (2, kinds) rad^2 of one node and of one of ten, for a pool of processes."""
     (tables, hops), seed = job
     world = World(scenario_of(dict(tables)), seed)
-    model, course = model_of(world, hops), course_of(world)
-    return np.stack([judge(world, bound_of(one, course, world.begin)) for one in (model, mean_of(model, TOGETHER))])
+    model, course = model_of(world, hops), node_timeline(world)
+    return np.stack(
+        [mean_variances(world, bound_of(one, course, world.begin)) for one in (model, mean_of(model, TOGETHER))]
+    )
 
 
 def mean_of(model: Model, count: int) -> Model:
@@ -60,11 +62,11 @@ def mean_of(model: Model, count: int) -> Model:
     return replace(model, noise=part * model.noise, bias_std=part * model.bias_std, scale_std=part * model.scale_std)
 
 
-def judge(world: World, bound: Bound) -> Array:
+def mean_variances(world: World, bound: Bound) -> Array:
     """Mean variances (kinds,) rad^2: ``SETTLED`` after a start or a stop, and at surveys; the last rest is left out."""
     rests = [phase for phase in world.phases if phase.kind == "stop"][: BLOCKS - 1]
     turns = [phase for phase in world.phases if phase.kind == "drill"]
-    settled = [between(bound.times, phase.start + SETTLED, phase.end) for phase in (*turns, *rests)]
+    settled = [within_phase(bound.times, phase.start + SETTLED, phase.end) for phase in (*turns, *rests)]
     turning, resting = np.any(settled[: len(turns)], axis=0), np.any(settled[len(turns) :], axis=0)
     said = np.searchsorted(bound.times, [rest.start + SETTLED for rest in rests])
     ended = np.searchsorted(bound.times, [turn.start for turn in turns[1:]]) - 1
@@ -78,7 +80,7 @@ def judge(world: World, bound: Bound) -> Array:
     return np.array([one.mean() for one in variances])
 
 
-def between(times: Array, begin: float, end: float) -> npt.NDArray[np.bool_]:
+def within_phase(times: Array, begin: float, end: float) -> npt.NDArray[np.bool_]:
     """Which of the ``times`` (n,) are in a phase."""
     return (times >= begin) & (times <= end)
 
@@ -99,7 +101,7 @@ def rows_of(name: str, setup: Tables, runs: Sequence[Array]) -> list[dict[str, A
     return rows
 
 
-def verdicts(result: dict[str, Any]) -> list[str]:
+def verdict_lines(result: dict[str, Any]) -> list[str]:
     """What is gained at most in the azimuth of a survey, as it is said first and in the end."""
     lines = []
     for kind in KINDS[2:]:

@@ -10,7 +10,7 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 
-from groundstation.report.style import GREY, INK, LIGHT, MARKERS, SERIES, new_figure, styled, tidy
+from groundstation.report.style import GREY, INK, LIGHT, MARKERS, SERIES, new_figure, styled, tidy_ticks
 from sim.studies.consistency.run import EVERY
 
 
@@ -25,7 +25,7 @@ class SchemeNees:
     nees_total: float  # with the constant errors of joints and mounts
 
 
-def figures(result: dict[str, Any]) -> dict[str, Figure]:
+def draw_figures(result: dict[str, Any]) -> dict[str, Figure]:
     """One figure, a panel a state."""
     found = [
         SchemeNees(row["scheme"], row["state"], row["hop"], row["nees"], row["nees_total"]) for row in result["cases"]
@@ -60,4 +60,4 @@ def scheme_figure(found: Sequence[SchemeNees], bounds: tuple[float, float], titl
     handles.append(Line2D([], [], ls="", color=INK, marker="o", mfc="none", label="with joints and mounts"))
     handles_all = [*handles, Patch(color=LIGHT, alpha=0.6, label=f"{bounds[0]:g} to {bounds[1]:g}")]
     figure.legend(handles=handles_all, loc="outside lower left", ncols=3)
-    return tidy(figure)
+    return tidy_ticks(figure)

@@ -16,9 +16,9 @@ import numpy as np
 
 from node.firmware.settings import Kernel
 from node.kernels.record.filter_record import Scheme
-from sim.studies.epochs import EpochRun, resting, run_seed
-from sim.studies.pool import Step, over_cores, seeded
-from sim.studies.scenarios import Tables, changed, on_off
+from sim.studies.epochs import EpochRun, resting_string, run_seed
+from sim.studies.pool import Step, over_cores, seed_jobs
+from sim.studies.scenarios import Tables, change_sections, on_off
 
 HOPS = 50
 SHOWN = (1, 2, 5, 10, 25, 50)
@@ -31,8 +31,8 @@ STUDIED = {1: 1.0, 2: 2.6, 5: 10.0, 10: 27.0, 25: 83.0, 50: 178.0}  # NEES of ``
 
 def setup_of(scheme: Scheme, hops: int = HOPS, kernel: Kernel = "float64") -> Tables:
     """The string of one scheme; shorter ones lose as much a hop."""
-    string = resting(hops, scheme, kernel, blocks=2, loss=LOSS)
-    return changed(string, clocks={"joint_std_ms": 5.0}, aiding=on_off(20.0, 30.0))
+    string = resting_string(hops, scheme, kernel, blocks=2, loss=LOSS)
+    return change_sections(string, clocks={"joint_std_ms": 5.0}, aiding=on_off(20.0, 30.0))
 
 
 def schemes_of(kernel: Kernel) -> tuple[Scheme, ...]:
@@ -40,12 +40,12 @@ def schemes_of(kernel: Kernel) -> tuple[Scheme, ...]:
     return tuple(Scheme) if kernel == "float64" else (Scheme.FORWARD,)
 
 
-def steps(seeds: int, control_seeds: int | None, kernel: Kernel) -> int:
+def count_steps(seeds: int, control_seeds: int | None, kernel: Kernel) -> int:
     """Runs of one seed."""
     return seeds + (len(schemes_of(kernel)) - 1) * (control_seeds or seeds)
 
 
-def run(
+def run_study(
     seeds: int, control_seeds: int | None, step: Step, hops: int = HOPS, kernel: Kernel = "float64"
 ) -> dict[str, Any]:
     """Table of every scheme; ``step`` is called after each seed of each scheme.
@@ -66,15 +66,15 @@ def run(
     with over_cores(seeds, step) as run_all:
         for scheme in schemes_of(kernel):
             count = seeds if scheme is Scheme.FORWARD else control_seeds or seeds
-            rows = table(scheme, run_all(run_seed, seeded(setup_of(scheme, hops, kernel), count)))
+            rows = epoch_rows(scheme, run_all(run_seed, seed_jobs(setup_of(scheme, hops, kernel), count)))
             cases += rows
-            judged = verdict([row[name] for row in rows for name in ("nees", "nees_total")])
+            judged = judge_cells([row[name] for row in rows for name in ("nees", "nees_total")])
             schemes[scheme.name.lower()] = {**judged, "seeds": count, "standard_error": math.sqrt(2.0 / count)}
     name = "consistency" if kernel == "float64" else f"consistency-{kernel}"
     return {"experiment": name, "kernel": kernel, "seeds": seeds, "cases": cases, "schemes": schemes}
 
 
-def table(scheme: Scheme, runs: Sequence[EpochRun]) -> list[dict[str, Any]]:
+def epoch_rows(scheme: Scheme, runs: Sequence[EpochRun]) -> list[dict[str, Any]]:
     """One row an epoch and hop."""
     error, var = np.array([r.error for r in runs]), np.array([r.var for r in runs])
     total = np.array([r.total_error for r in runs]) ** 2 / np.array([r.total_var for r in runs])
@@ -102,7 +102,7 @@ def table(scheme: Scheme, runs: Sequence[EpochRun]) -> list[dict[str, Any]]:
     return rows
 
 
-def verdict(cells: Sequence[float]) -> dict[str, Any]:
+def judge_cells(cells: Sequence[float]) -> dict[str, Any]:
     """Whether the cells of a scheme are those of an honest filter."""
     outside = sum(not USUAL[0] <= cell <= USUAL[1] for cell in cells) / len(cells)
     worst = max(cells, key=lambda cell: abs(math.log(cell)))
@@ -113,7 +113,7 @@ def verdict(cells: Sequence[float]) -> dict[str, Any]:
     }
 
 
-def verdicts(result: dict[str, Any]) -> list[str]:
+def verdict_lines(result: dict[str, Any]) -> list[str]:
     """One line a scheme."""
     lines = []
     for scheme, found in result["schemes"].items():

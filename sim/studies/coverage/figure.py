@@ -11,12 +11,12 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
 from groundstation.errors import SurveyError
-from groundstation.report.style import GREY, LIGHT, MARKERS, SERIES, WRONG, new_figure, styled, tidy
+from groundstation.report.style import GREY, LIGHT, MARKERS, SERIES, WRONG, new_figure, styled, tidy_ticks
 
 Array = npt.NDArray[np.float64]
 
 
-def figures(result: dict[str, Any]) -> dict[str, Figure]:
+def draw_figures(result: dict[str, Any]) -> dict[str, Figure]:
     """One figure, of the toes."""
     toe = [row for row in result["cases"] if row["case"].startswith("plan ellipse, toe")]
     claimed, inside = (np.array([row[key] for row in toe]) / 100.0 for key in ("published", "ours"))
@@ -80,4 +80,4 @@ def coverage_figure(
     handles.append(Line2D([], [], color=LIGHT, lw=6.0, label=f"{100.0 * band:g} % of {trials} trials"))
     handles.append(Line2D([], [], ls="", marker="o", ms=9.0, mfc="none", mec=WRONG, mew=1.4, label="outside"))
     figure.legend(handles=handles, loc="outside lower left", ncols=5)
-    return tidy(figure)
+    return tidy_ticks(figure)

@@ -17,12 +17,12 @@ import numpy as np
 import numpy.typing as npt
 
 from groundstation.survey.fusion.fusion import StationFusion
-from groundstation.survey.fusion.resolve import resolve
+from groundstation.survey.fusion.resolve import resolve_direction
 from groundstation.survey.fusion.shared import SharedErrors
 from groundstation.survey.well.ellipsoid import coverage_radius
-from groundstation.survey.well.methods import tangents
+from groundstation.survey.well.methods import station_tangents
 from groundstation.survey.well.trajectory import Trajectory
-from sim.studies.epochs import resting, run_seed
+from sim.studies.epochs import resting_string, run_seed
 from sim.studies.pool import RunAll, Step, over_cores
 from sim.studies.published import wellbore_1
 from sim.studies.scenarios import CALIBRATED
@@ -50,7 +50,7 @@ class YawPool:
 
 def yaw_pool(strings: int, run_all: RunAll) -> YawPool:
     """Let the real filter run in ``strings`` simulated strings and keep what it knew at rest."""
-    runs = run_all(run_seed, [(resting(TUBES), FIRST_STRING + seed) for seed in range(strings)])
+    runs = run_all(run_seed, [(resting_string(TUBES), FIRST_STRING + seed) for seed in range(strings)])
     error, var = (np.concatenate([getattr(r, name)[~r.turning] for r in runs]).T for name in ("error", "var"))
     return YawPool(error, var)
 
@@ -84,13 +84,13 @@ class Rig:
         return np.asarray(self.gravity * up + self.biases[tube] + self.noise_std * self.random.standard_normal(3))
 
 
-def drill(seed: int, pool: YawPool) -> tuple[Array, Array, Array]:
+def drill_well(seed: int, pool: YawPool) -> tuple[Array, Array, Array]:
     """Positions claimed (n, 3), their covariances (n, 3, 3) and the true ones (n, 3) of one well."""
     rig = Rig(seed)
     record = wellbore_1()
     turned = record.azimuth + float(rig.random.uniform(0.0, math.tau))
     hole = Borehole(record.md, record.inclination, turned)
-    true = tangents(record.inclination, turned)
+    true = station_tangents(record.inclination, turned)
     shared = SharedErrors()
     stations = [StationFusion() for _ in range(TUBES + 1)]
     force_cov = rig.noise_std**2 * np.eye(3)
@@ -99,7 +99,7 @@ def drill(seed: int, pool: YawPool) -> tuple[Array, Array, Array]:
             station, hop = stop - tube + 1, stop - tube + 1
             draw = int(rig.random.integers(pool.error.shape[1]))
             yaw = float(rig.yaws[tube]) + rig.systematic(tube, stop) + float(pool.error[hop - 1, draw])
-            resolved = resolve(rig.force(true[station], tube), force_cov, yaw, float(pool.var[hop - 1, draw]))
+            resolved = resolve_direction(rig.force(true[station], tube), force_cov, yaw, float(pool.var[hop - 1, draw]))
             above = range(tube + 1, stop + 1)
             systematic_var = hop * rig.joint_std**2 + rig.mount_std**2
             stations[station].add_reading(
@@ -113,12 +113,12 @@ def drill(seed: int, pool: YawPool) -> tuple[Array, Array, Array]:
     return np.array([p.position for p in points]), np.array([p.cov for p in points]), truth
 
 
-def distances(job: tuple[range, YawPool]) -> Array:
+def normalised_distances(job: tuple[range, YawPool]) -> Array:
     """Normalised distances (wells, stations, 2) from claimed to true position, in the plane and in space."""
     seeds, pool = job
     out = np.empty((len(seeds), TUBES, 2))
     for row, seed in enumerate(seeds):
-        claimed, cov, truth = drill(seed, pool)
+        claimed, cov, truth = drill_well(seed, pool)
         error = claimed - truth
         for k in range(TUBES):
             plane, c = error[k, :2], cov[k]
@@ -127,17 +127,17 @@ def distances(job: tuple[range, YawPool]) -> Array:
     return out
 
 
-def steps(wells: int, strings: int) -> int:
+def count_steps(wells: int, strings: int) -> int:
     """Strings, then parcels of wells."""
     return strings + -(-wells // WELLS_A_JOB)
 
 
-def run(wells: int, strings: int, step: Step) -> dict[str, Any]:
+def run_study(wells: int, strings: int, step: Step) -> dict[str, Any]:
     """Observed share of true positions inside the claimed ellipses, with binomial 95 % intervals."""
     with over_cores(strings, step) as run_all:
         pool = yaw_pool(strings, run_all)
         jobs = [(range(k, min(k + WELLS_A_JOB, wells)), pool) for k in range(0, wells, WELLS_A_JOB)]
-        found = np.concatenate(run_all(distances, jobs))
+        found = np.concatenate(run_all(normalised_distances, jobs))
     cases = [_case("plan ellipse, toe", found[:, -1, 0], confidence) for confidence in CONFIDENCES]
     cases += [_case(f"plan ellipse, station {k + 1}", found[:, k, 0], JUDGED) for k in range(TUBES - 1)]
     return {"experiment": "coverage", "wells": wells, "strings": strings, "cases": cases}

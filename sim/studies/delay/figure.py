@@ -9,13 +9,13 @@ import numpy as np
 import numpy.typing as npt
 from matplotlib.figure import Figure
 
-from groundstation.report.style import GREY, INK, MARKERS, SERIES, new_figure, styled, tidy
+from groundstation.report.style import GREY, INK, MARKERS, SERIES, new_figure, styled, tidy_ticks
 from sim.studies.delay.run import DELAYS_MS, FORMS, STUDIED_DEG, TO_REACH_DEG
 
 Array = npt.NDArray[np.float64]
 
 
-def figures(result: dict[str, Any]) -> dict[str, Figure]:
+def draw_figures(result: dict[str, Any]) -> dict[str, Figure]:
     """One figure, a panel for rotating and one for rest."""
     panels: dict[str, dict[str, Any]] = {}
     for quantity, state in (("yaw, rotating", "Rotating"), ("yaw, at rest", "At rest")):
@@ -49,4 +49,4 @@ def delay_figure(
     grid[0].axhline(to_reach, color=INK, ls="--", lw=0.9, label="to reach, compensated")
     grid[0].set_ylabel("Yaw error, rms (deg)")
     figure.legend(*grid[0].get_legend_handles_labels(), loc="outside lower left", ncols=3)
-    return tidy(figure)
+    return tidy_ticks(figure)

@@ -15,12 +15,12 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from groundstation.survey.fusion.resolve import angle_stds, angles, known, resolve
-from groundstation.survey.fusion.transport import carry
+from groundstation.survey.fusion.resolve import angle_stds, direction_angles, known_direction, resolve_direction
+from groundstation.survey.fusion.transport import carry_directions
 from node.kernels.arithmetic.angles import wrap
 from sim.rig.direct_string import DirectString, StringRun
-from sim.studies.field.cases import ALL, BLOCKS, CASES, Case
-from sim.studies.pool import Step, over_cores, seeded
+from sim.studies.field.cases import ALL, BLOCKS, CASES, DisturbanceCase
+from sim.studies.pool import Step, over_cores, seed_jobs
 from sim.studies.scenarios import Tables
 from sim.world.scenario import scenario_of
 from sim.world.world import World
@@ -45,7 +45,7 @@ NEES, UNFLAGGED, FALSE = 1.5, 0.01, 0.02  # to reach
 
 
 @dataclass(frozen=True, slots=True)
-class FieldRun:
+class DisturbanceRun:
     """One seed: (cycles,) of the lowest tube."""
 
     error: Array  # rad, with all constant errors
@@ -59,33 +59,33 @@ class FieldRun:
     azimuth_std: Array  # (surveys,) rad, as it states it
 
 
-def steps(disturbance: str, seeds: int) -> int:
+def count_steps(disturbance: str, seeds: int) -> int:
     """Runs of all seeds."""
     return seeds * len(chosen_cases(disturbance))
 
 
-def chosen_cases(disturbance: str) -> list[Case]:
+def chosen_cases(disturbance: str) -> list[DisturbanceCase]:
     """The row of one disturbance, or all."""
     return [case for case in CASES if disturbance in (ALL, case.key)]
 
 
-def run(disturbance: str, seeds: int, step: Step) -> dict[str, Any]:
+def run_study(disturbance: str, seeds: int, step: Step) -> dict[str, Any]:
     """One row a disturbance; ``step`` is called after each run."""
     cases = []
     with over_cores(seeds, step) as run_all:
         for case in chosen_cases(disturbance):
-            cases.append(row(case, run_all(run_seed, seeded(case.setup, seeds))))
+            cases.append(disturbance_row(case, run_all(run_seed, seed_jobs(case.setup, seeds))))
     return {"experiment": "field", "seeds": seeds, "cases": cases}
 
 
-def run_seed(job: tuple[Tables, int]) -> FieldRun:
+def run_seed(job: tuple[Tables, int]) -> DisturbanceRun:
     """One seed of one disturbance, for a pool of processes."""
     tables, seed = job
     world = World(scenario_of(dict(tables)), seed)
-    return judge(world, DirectString(world, state_every=1).drill())
+    return judge_lowest_tube(world, DirectString(world, state_every=1).drill())
 
 
-def judge(world: World, run: StringRun) -> FieldRun:
+def judge_lowest_tube(world: World, run: StringRun) -> DisturbanceRun:
     """The lowest tube against the truth."""
     states = {cycle: state for cycle, state in run.states if state.tube == 1}
     flagged = np.array([bool(states[k].flags & DOUBTS) if k in states else True for k in range(world.cycles)])
@@ -97,8 +97,8 @@ def judge(world: World, run: StringRun) -> FieldRun:
     surveys = [survey.measurement for survey in run.surveys if survey.tube == 1]
     azimuth_error, azimuth_std = judge_azimuths(world, surveys)
     error, var = run.total_error[:, 0], run.total_var[:, 0]
-    turning, resting = judged(world)
-    return FieldRun(error, var, told, turning, resting, faults, len(surveys), azimuth_error, azimuth_std)
+    turning, resting = judged_cycles(world)
+    return DisturbanceRun(error, var, told, turning, resting, faults, len(surveys), azimuth_error, azimuth_std)
 
 
 def judge_azimuths(world: World, surveys: Sequence[SurveyMeasurement]) -> tuple[Array, Array]:
@@ -107,17 +107,20 @@ def judge_azimuths(world: World, surveys: Sequence[SurveyMeasurement]) -> tuple[
     found = []
     for one in surveys:
         force, cov = np.array(one.imus[0].force), np.array(one.imus[0].force_cov)
-        found.append(resolve(force, cov, one.yaw, one.yaw_var + one.systematic_var).direction)
+        found.append(resolve_direction(force, cov, one.yaw, one.yaw_var + one.systematic_var).direction)
     rough = world.scenario.file.rough
     if rough is not None and rough.string.transport == "parallel" and found:
-        found = [carried.direction for carried in carry(known(*hole.direction(0.0)), found, range(len(found) + 1))]
+        found = [
+            carried.direction
+            for carried in carry_directions(known_direction(*hole.direction(0.0)), found, range(len(found) + 1))
+        ]
     true = [hole.direction(world.bit_depth(one.station_at))[1] for one in surveys]
-    azimuths = [angles(one.lean, one.down)[1] for one in found]
+    azimuths = [direction_angles(one.lean, one.down)[1] for one in found]
     stds = [angle_stds(one.lean, one.down, one.total_cov)[1] for one in found]
     return np.array([wrap(a - b) for a, b in zip(azimuths, true, strict=True)]), np.array(stds)
 
 
-def judged(world: World) -> tuple[Mask, Mask]:
+def judged_cycles(world: World) -> tuple[Mask, Mask]:
     """Cycles in which the string turns or rests, its first seconds of either left out."""
     turning, resting = np.zeros((2, world.cycles), np.bool_)
     for phase in world.phases:
@@ -128,9 +131,9 @@ def judged(world: World) -> tuple[Mask, Mask]:
     return turning, resting
 
 
-def row(case: Case, runs: Sequence[FieldRun]) -> dict[str, Any]:
+def disturbance_row(case: DisturbanceCase, runs: Sequence[DisturbanceRun]) -> dict[str, Any]:
     """Figures of one disturbance."""
-    nees_turning, nees_rest = nees(runs, "turning"), nees(runs, "resting")
+    nees_turning, nees_rest = unflagged_nees(runs, "turning"), unflagged_nees(runs, "resting")
     lies = [(r.error**2 > SIGMAS**2 * r.var) & ~r.told for r in runs]
     unflagged = float(np.mean([np.mean(lie[r.turning | r.resting]) for lie, r in zip(lies, runs, strict=True)]))
     faults = {code: float(np.mean([r.faults[code] for r in runs])) for code in FAULTS if code not in case.true_faults}
@@ -163,20 +166,20 @@ def row(case: Case, runs: Sequence[FieldRun]) -> dict[str, Any]:
     }
 
 
-def rms_deg(runs: Sequence[FieldRun], when: str) -> float:
+def rms_deg(runs: Sequence[DisturbanceRun], when: str) -> float:
     """Root mean square of the yaw's error, deg; no more than half a turn."""
     squares = [r.error[getattr(r, when)] ** 2 for r in runs]
     return math.degrees(math.sqrt(float(np.nanmean(np.concatenate(squares)))))
 
 
-def nees(runs: Sequence[FieldRun], when: str) -> float:
+def unflagged_nees(runs: Sequence[DisturbanceRun], when: str) -> float:
     """Mean of error^2 / variance over the cycles that are not told of; NaN where all are."""
     chosen = [getattr(r, when) & ~r.told for r in runs]
     found = np.concatenate([r.error[c] ** 2 / r.var[c] for r, c in zip(runs, chosen, strict=True)])
     return float(np.mean(found)) if len(found) else math.nan
 
 
-def verdicts(result: dict[str, Any]) -> list[str]:
+def verdict_lines(result: dict[str, Any]) -> list[str]:
     """How many rows are reached, and which are not."""
     missed = [r["case"] for r in result["cases"] if not r["reached"]]
     unseen = [r["case"] for r in result["cases"] if not r["reached"] and r["unseen"]]

@@ -25,7 +25,7 @@ GRAVITY = 9.81
 
 
 @kernel
-def drive(state: Any, config: Any, rate: Array, force: Array, first: int) -> None:
+def drive_float64(state: Any, config: Any, rate: Array, force: Array, first: int) -> None:
     """Cycles of the float64 kernel, one for each row of ``rate`` (n, 3), each with an aiding."""
     for k in range(rate.shape[0]):
         start = 1000.0 + (first + k) * PERIOD
@@ -43,7 +43,7 @@ def drive_fixed(state: Any, config: Any, rate: Array, force: Array, first: int) 
         relay.offer_aiding(state, config, FIXED_YAW, FIXED_VAR, 0, 0, at, first + k, 0)
 
 
-def measure(cycles: int = 20_000, rounds: int = 7) -> list[dict[str, Any]]:
+def measure_cycle_costs(cycles: int = 20_000, rounds: int = 7) -> list[dict[str, Any]]:
     """Rows of kind of cycle, ns of either kernel (best of ``rounds``, taken in turns) and their ratio."""
     random = np.random.default_rng(1)
     config, force = default_config(), np.array([0.0, 0.0, -GRAVITY])
@@ -58,7 +58,7 @@ def measure(cycles: int = 20_000, rounds: int = 7) -> list[dict[str, Any]]:
             rate = 1e-5 * random.standard_normal((n, 3)) + np.array([0.0, 0.0, spin])
             fixed_rate = np.rint(rate * 2.0**RATE_Q).astype(np.int64)
             begin = time.process_time()
-            drive(state[0], config[0], rate, force, first)
+            drive_float64(state[0], config[0], rate, force, first)
             middle = time.process_time()
             drive_fixed(fixed_state[0], fixed_config[0], fixed_rate, fixed_force, first)
             floats.append((middle - begin) / n * 1e9)

@@ -21,9 +21,9 @@ from node.kernels.filter.float64.cycle import run_cycle
 from node.kernels.record.filter_record import Err, Scheme, default_config, new_state
 from node.kernels.step.fixed_node import FixedNode
 from node.kernels.string.relay import offer_aiding
-from sim.studies.epochs import resting, run_seed
-from sim.studies.pool import Step, over_cores, seeded
-from sim.studies.relay.run import table
+from sim.studies.epochs import resting_string, run_seed
+from sim.studies.pool import Step, over_cores, seed_jobs
+from sim.studies.relay.run import hop_rows
 
 NEES_HOPS = 5
 BLOCK = 400  # cycles of one turning and one rest
@@ -59,14 +59,14 @@ class Comparison:
     overflows: int
 
 
-def speed(k: int) -> float:
+def spin_share(k: int) -> float:
     """Share of the full spin in cycle ``k`` of a block: up, level, down, rest."""
     if k >= TURNING:
         return 0.0
     return min(1.0, (k + 0.5) / RAMP, (TURNING - k - 0.5) / RAMP)
 
 
-def inputs(cycles: int, seed: int) -> Iterator[Input]:
+def draw_inputs(cycles: int, seed: int) -> Iterator[Input]:
     """Readings and aiding of one node, drawn once for both kernels."""
     random = np.random.Generator(np.random.Philox(seed))
     config = default_config()[0]
@@ -82,7 +82,7 @@ def inputs(cycles: int, seed: int) -> Iterator[Input]:
             lean = float(random.uniform(0.5, 60.0)) * DEG if cycle % (25 * BLOCK) == 0 else lean
         if cycle % 50_000 == 49_999:
             now += 3.0 * PERIOD  # lost cycles, while the string stands
-        spin = SPIN * speed(k)
+        spin = SPIN * spin_share(k)
         bias = phi * bias + drive * random.standard_normal(3)
         rate = np.array([0.0, 0.0, spin * (1.0 + scale)]) + constant + bias + white * random.standard_normal(3)
         middle = yaw + 0.5 * spin * PERIOD
@@ -103,7 +103,7 @@ def inputs(cycles: int, seed: int) -> Iterator[Input]:
         now = end
 
 
-def compare(cycles: int, seed: int, step: Step = lambda: None) -> Comparison:
+def compare_kernels(cycles: int, seed: int, step: Step = lambda: None) -> Comparison:
     """Run both kernels side by side; ``step`` is called every thousand cycles."""
     config, reference = default_config()[0], new_state(default_config())[0]
     shadow, fixed = new_state(default_config())[0], FixedNode()
@@ -111,7 +111,7 @@ def compare(cycles: int, seed: int, step: Step = lambda: None) -> Comparison:
     turning, aided = np.zeros(cycles, np.bool_), np.zeros(cycles, np.bool_)
     differs, psi = 0, int(Err.YAW)
     rate, force = np.zeros(3), np.zeros(3)
-    for k, given in enumerate(inputs(cycles, seed)):
+    for k, given in enumerate(draw_inputs(cycles, seed)):
         rate[:], force[:] = given.rate, given.force
         status = run_cycle(reference, config, rate, force, given.start, given.end, given.joined)
         differs += status != fixed.run_cycle(shadow, config, rate, force, given.start, given.end, given.joined)
@@ -151,24 +151,24 @@ def rows_of(found: Comparison) -> list[dict[str, Any]]:
     return rows
 
 
-def consistency(hops: int, seeds: int, step: Step) -> list[dict[str, Any]]:
+def nees_by_kernel(hops: int, seeds: int, step: Step) -> list[dict[str, Any]]:
     """NEES of a short string with either kernel, one row a hop and kernel."""
     rows: list[dict[str, Any]] = []
     kernels: tuple[Kernel, ...] = ("float64", "fixed")
     with over_cores(seeds, step) as run_all:
         for kernel in kernels:
-            runs = run_all(run_seed, seeded(resting(hops, kernel=kernel), seeds))
-            rows.extend({"kernel": kernel, **row} for row in table(Scheme.FORWARD, runs))
+            runs = run_all(run_seed, seed_jobs(resting_string(hops, kernel=kernel), seeds))
+            rows.extend({"kernel": kernel, **row} for row in hop_rows(Scheme.FORWARD, runs))
     return rows
 
 
-def steps(cycles: int, seeds: int, seed: int) -> int:
+def count_steps(cycles: int, seeds: int, seed: int) -> int:
     """Thousands of cycles, then runs of one seed by either kernel."""
     del seed
     return cycles // 1000 + 2 * seeds
 
 
-def run(cycles: int, seeds: int, seed: int, step: Step) -> dict[str, Any]:
+def run_study(cycles: int, seeds: int, seed: int, step: Step) -> dict[str, Any]:
     """Table of the differences and of the consistency of both kernels.
 
     Returns
@@ -177,7 +177,7 @@ def run(cycles: int, seeds: int, seed: int, step: Step) -> dict[str, Any]:
         ``cases``: one row for each kind of cycle, with the overflows and differences of status of the whole run;
         ``nees``: one row a hop and kernel; ``within``, whether the limits hold.
     """
-    found = compare(cycles, seed, step)
+    found = compare_kernels(cycles, seed, step)
     within = bool(
         np.abs(found.yaw_deg).max() <= LIMITS["yaw_deg"]
         and np.abs(found.sigma).max() <= LIMITS["sigma"]
@@ -191,11 +191,11 @@ def run(cycles: int, seeds: int, seed: int, step: Step) -> dict[str, Any]:
             {**row, "overflows": found.overflows, "status_differs": found.status_differs} for row in rows_of(found)
         ],
         "within": within,
-        "nees": consistency(NEES_HOPS, seeds, step),
+        "nees": nees_by_kernel(NEES_HOPS, seeds, step),
     }
 
 
-def verdicts(result: dict[str, Any]) -> list[str]:
+def verdict_lines(result: dict[str, Any]) -> list[str]:
     """Whether the limits hold."""
     asked = f"yaw within {LIMITS['yaw_deg']:g} deg, sigma within {LIMITS['sigma']:.0%}, no overflow"
     return [f"{asked}: {'yes' if result['within'] else 'no'}"]

@@ -16,11 +16,11 @@ import numpy as np
 import numpy.typing as npt
 
 from groundstation.survey.fusion.force_biases import ForceBias, Look, look_of, solve_biases
-from groundstation.survey.fusion.resolve import angle_stds, angles, resolve
+from groundstation.survey.fusion.resolve import angle_stds, direction_angles, resolve_direction
 from groundstation.survey.fusion.shared import SharedErrors
 from node.kernels.arithmetic.angles import wrap
 from sim.rig.direct_string import DirectString, Survey
-from sim.studies.pool import Step, over_cores, seeded
+from sim.studies.pool import Step, over_cores, seed_jobs
 from sim.studies.scenarios import Tables
 from sim.world.scenario import scenario_of
 from sim.world.world import World
@@ -47,7 +47,7 @@ class BiasRun:
     bias_nees: list[float]  # of all three axes, mean over the tubes
 
 
-def scenario(inclination_deg: float) -> Tables:
+def straight_hole_scenario(inclination_deg: float) -> Tables:
     """A straight hole, drilled by a driller who stops anywhere."""
     return {
         "rig": {"tubes": STOPS, "tubes_at_start": 0, "tube_length_m": LENGTH},
@@ -62,18 +62,18 @@ def scenario(inclination_deg: float) -> Tables:
     }
 
 
-def steps(seeds: int) -> int:
+def count_steps(seeds: int) -> int:
     """Runs of all seeds."""
     return seeds * len(INCLINATIONS_DEG)
 
 
-def run(seeds: int, step: Step) -> dict[str, Any]:
+def run_study(seeds: int, step: Step) -> dict[str, Any]:
     """A row for each stop; ``step`` is called after each run."""
     rows = []
     with over_cores(seeds, step) as run_all:
         for inclination in INCLINATIONS_DEG:
-            runs = run_all(run_seed, seeded(scenario(inclination), seeds))
-            rows += [row(inclination, stop, runs) for stop in range(STOPS)]
+            runs = run_all(run_seed, seed_jobs(straight_hole_scenario(inclination), seeds))
+            rows += [stop_row(inclination, stop, runs) for stop in range(STOPS)]
     return {"experiment": "force-bias", "seeds": seeds, "cases": rows}
 
 
@@ -81,10 +81,10 @@ def run_seed(job: tuple[Tables, int]) -> BiasRun:
     """One seed, for a pool of processes."""
     tables, seed = job
     world = World(scenario_of(dict(tables)), seed)
-    return judge(world, DirectString(world).drill().surveys)
+    return judge_biases(world, DirectString(world).drill().surveys)
 
 
-def judge(world: World, surveys: Sequence[Survey]) -> BiasRun:
+def judge_biases(world: World, surveys: Sequence[Survey]) -> BiasRun:
     """Stop by stop, each with what was known after the one before."""
     found = BiasRun([], [], [], [], [], [])
     looks = looks_of(world, surveys)
@@ -113,7 +113,7 @@ def bias_of(world: World, tube: int) -> Array:
 def azimuth_error(world: World, look: Look, bias: Array) -> float:
     """Error (rad) of the azimuth of a survey of a straight hole that is read with a bias (3,) taken off."""
     lean = look.lean - look.by_force @ bias
-    return wrap(angles(lean, 1.0)[1] - world.scenario.hole.direction(0.0)[1])
+    return wrap(direction_angles(lean, 1.0)[1] - world.scenario.hole.direction(0.0)[1])
 
 
 def azimuth_std(look: Look, bias_cov: Array) -> float:
@@ -135,14 +135,14 @@ def looks_of(world: World, surveys: Sequence[Survey]) -> list[tuple[int, Look]]:
         if station < 1:
             continue
         force, cov = np.array(m.imus[0].force), np.array(m.imus[0].force_cov)
-        resolved = resolve(force, cov, m.yaw, m.yaw_var)
+        resolved = resolve_direction(force, cov, m.yaw, m.yaw_var)
         causes = shared.causes_of(resolved, m.tube, range(m.tube + 1, stop + 1), m.systematic_var, mount_var, 0.0)
         var = float(np.trace(cov)) / AXES
         found.append((stop, look_of(station, m.tube, resolved.direction, causes, force, var, m.yaw, GRAVITY)))
     return found
 
 
-def row(inclination_deg: float, stop: int, runs: Sequence[BiasRun]) -> dict[str, Any]:
+def stop_row(inclination_deg: float, stop: int, runs: Sequence[BiasRun]) -> dict[str, Any]:
     """Figures of one stop, from 0."""
     measured, corrected, stds = (
         np.concatenate([getattr(r, name)[stop] for r in runs]) for name in ("measured", "corrected", "corrected_std")
@@ -171,7 +171,7 @@ def milli_g(values: Array) -> float:
     return 1e3 * math.sqrt(float(np.mean(values**2))) / GRAVITY
 
 
-def verdicts(result: dict[str, Any]) -> list[str]:
+def verdict_lines(result: dict[str, Any]) -> list[str]:
     """What is left after five stops of the error of the first."""
     lines = []
     for first, last in zip(result["cases"][::STOPS], result["cases"][STOPS - 1 :: STOPS], strict=True):

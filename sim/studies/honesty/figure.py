@@ -9,7 +9,7 @@ from matplotlib.figure import Figure
 from sim.campaign.figure import honesty_figure
 
 
-def figures(result: dict[str, Any]) -> dict[str, Figure]:
+def draw_figures(result: dict[str, Any]) -> dict[str, Figure]:
     """One figure."""
     where = "" if result["world"] == "assumed" else f" in a {result['world']} world"
     title = f"Honesty of {result['hops']} nodes{where}, {result['runs']} strings"

@@ -23,13 +23,13 @@ from sim.studies.worlds.run import WORLDS
 from sim.world.scenario import scenario_of
 
 
-def steps(runs: int, hops: int, world: str) -> int:
+def count_steps(runs: int, hops: int, world: str) -> int:
     """Strings."""
     del hops, world
     return runs
 
 
-def run(runs: int, hops: int, world: str, step: Step) -> dict[str, Any]:
+def run_study(runs: int, hops: int, world: str, step: Step) -> dict[str, Any]:
     """Table of an honest relay; ``step`` is called after each string.
 
     Parameters
@@ -52,31 +52,31 @@ def run(runs: int, hops: int, world: str, step: Step) -> dict[str, Any]:
     return {"experiment": name, "world": world, "runs": runs, "hops": hops, "cases": cases, "traces": rows}
 
 
-def verdicts(result: dict[str, Any]) -> list[str]:
+def verdict_lines(result: dict[str, Any]) -> list[str]:
     """Whether the NEES are those of honest nodes, and what share of errors lies inside what is stated for 95 %."""
-    lines = honest(result) if result["world"] == "assumed" else careful(result)
-    least, most = between(result, "inside_95_percent")
+    lines = assumed_world_lines(result) if result["world"] == "assumed" else rough_world_lines(result)
+    least, most = column_range(result, "inside_95_percent")
     return [*lines, f"inside what is stated for 95 %: {least:.1f} to {most:.1f} %"]
 
 
-def honest(result: dict[str, Any]) -> list[str]:
+def assumed_world_lines(result: dict[str, Any]) -> list[str]:
     """In the world that the filter assumes: whether either NEES is 1 within what the other studies allow."""
     low, high = EVERY
     lines = []
     for of, words in (("nees", "NEES"), ("nees_total", "NEES with joints and mounts")):
-        least, most = between(result, of)
+        least, most = column_range(result, of)
         word = "honest" if low <= least and most <= high else "not honest"
         lines.append(f"{words}: {least:.3g} to {most:.3g} (allowed {low:g}..{high:g}): {word}")
     return lines
 
 
-def careful(result: dict[str, Any]) -> list[str]:
+def rough_world_lines(result: dict[str, Any]) -> list[str]:
     """In a rough world: from where to where the NEES goes of what a node states, its doubts included."""
-    least, most = between(result, "nees_total")
+    least, most = column_range(result, "nees_total")
     return [f"NEES with joints, mounts and doubts: {least:.3g} to {most:.3g} (1: honest, less: more careful than that)"]
 
 
-def between(result: dict[str, Any], of: str) -> tuple[float, float]:
+def column_range(result: dict[str, Any], of: str) -> tuple[float, float]:
     """Least and most of a column."""
     found = [row[of] for row in result["cases"]]
     return min(found), max(found)

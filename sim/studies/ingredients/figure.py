@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from matplotlib.figure import Figure
 
-from groundstation.report.style import MARKERS, SERIES, new_figure, styled, tidy
+from groundstation.report.style import MARKERS, SERIES, new_figure, styled, tidy_ticks
 
 
 @dataclass(frozen=True, slots=True)
@@ -22,7 +22,7 @@ class Bar:
     high: float
 
 
-def figures(result: dict[str, Any]) -> dict[str, Figure]:
+def draw_figures(result: dict[str, Any]) -> dict[str, Figure]:
     """One figure, a panel for rotating and one for rest."""
     panels: dict[str, dict[str, list[Bar]]] = {}
     for r in result["cases"]:
@@ -54,4 +54,4 @@ def ingredients_figure(panels: Mapping[str, Mapping[str, Sequence[Bar]]], title:
     for axes in figure.axes[1:]:
         axes.tick_params(labelleft=False)
     figure.legend(*figure.axes[0].get_legend_handles_labels(), loc="outside lower left", ncols=2)
-    return tidy(figure)
+    return tidy_ticks(figure)

@@ -15,23 +15,23 @@ from sim.rig.plain_encoder import LINES
 from sim.studies.lab import LAB, REST, ROTATING
 from sim.studies.pool import Step
 from sim.studies.published_form import DELAY_MS, FORMS, setup_of
-from sim.studies.scenarios import Tables, changed, on_off
-from sim.studies.trials import rms_deg, row, trials
+from sim.studies.scenarios import Tables, change_sections, on_off
+from sim.studies.trials import interval_row, over_seeds, rms_deg
 
 MODES = {"continuous": on_off(20.0, 0.0), "20 s on / 30 s off": on_off(20.0, 30.0)}
-LATE = changed(LAB, medium={"delay_ms": DELAY_MS, "dated_by": "arrival"}, node={"tuning": {"stamp_std": 0.0}})
+LATE = change_sections(LAB, medium={"delay_ms": DELAY_MS, "dated_by": "arrival"}, node={"tuning": {"stamp_std": 0.0}})
 INSTANTANEOUS = {"instantaneous": True}
-UNSTILL = changed(LAB, node={"tuning": {"still_rate": 0.0}})
+UNSTILL = change_sections(LAB, node={"tuning": {"still_rate": 0.0}})
 INGREDIENTS: dict[str, Tables] = {
     "as shipped": LAB,
-    "no scale-factor state": changed(LAB, node={"tuning": {"scale_std": 0.0}}),
-    "no delay compensation, instantaneous rate": changed(LATE, gyroscope=INSTANTANEOUS),
+    "no scale-factor state": change_sections(LAB, node={"tuning": {"scale_std": 0.0}}),
+    "no delay compensation, instantaneous rate": change_sections(LATE, gyroscope=INSTANTANEOUS),
     "no delay compensation": LATE,
-    "instantaneous rate": changed(LAB, gyroscope=INSTANTANEOUS),
-    "no edge times": changed(LAB, encoder={"counts_per_turn": 4 * LINES, "edge_times": False}),
-    "no edge times, no quadrature": changed(LAB, encoder={"counts_per_turn": LINES, "edge_times": False}),
+    "instantaneous rate": change_sections(LAB, gyroscope=INSTANTANEOUS),
+    "no edge times": change_sections(LAB, encoder={"counts_per_turn": 4 * LINES, "edge_times": False}),
+    "no edge times, no quadrature": change_sections(LAB, encoder={"counts_per_turn": LINES, "edge_times": False}),
     "no zero-rate update": UNSTILL,
-    "no zero-rate update, new measurements at rest": changed(UNSTILL, aiding={"renumbered": True}),
+    "no zero-rate update, new measurements at rest": change_sections(UNSTILL, aiding={"renumbered": True}),
     **{form: setup_of(LAB, form) for form in FORMS},
 }
 STUDIED_DEG: dict[str, tuple[float, float]] = {
@@ -42,21 +42,21 @@ STUDIED_DEG: dict[str, tuple[float, float]] = {
 WINDOWS = {"yaw, rotating": ROTATING, "yaw, at rest": REST}
 
 
-def steps(seeds: int) -> int:
+def count_steps(seeds: int) -> int:
     """Runs of one seed."""
     return seeds * len(MODES) * len(INGREDIENTS)
 
 
-def run(seeds: int, step: Step) -> dict[str, Any]:
+def run_study(seeds: int, step: Step) -> dict[str, Any]:
     """Rows of every ingredient, mode of aiding and window."""
     cases = []
-    with trials(seeds, step) as run_all:
+    with over_seeds(seeds, step) as run_all:
         for name, setup in INGREDIENTS.items():
             studied = "-".join(f"{end:g}" for end in STUDIED_DEG.get(name, ())) or None
             for mode, link in MODES.items():
-                runs = run_all(changed(setup, aiding=link))
+                runs = run_all(change_sections(setup, aiding=link))
                 for quantity, window in WINDOWS.items():
                     figure = rms_deg([r.error[window, 0] for r in runs])
                     beside = studied if window is REST else None
-                    cases.append({"mode": mode, **row(name, quantity, figure, published=beside)})
+                    cases.append({"mode": mode, **interval_row(name, quantity, figure, published=beside)})
     return {"experiment": "ingredients", "seeds": seeds, "cases": cases}

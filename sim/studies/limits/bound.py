@@ -39,7 +39,7 @@ class Model:
 
 
 @dataclass(frozen=True, slots=True)
-class Course:
+class NodeTimeline:
     """What happens to a node: ``times`` (n,) s, the mean spin before each (rad/s), and what is measured at it.
 
     ``var`` is that of an aiding (rad^2), infinite where there is none; ``rate`` is the spin at that moment.
@@ -70,7 +70,7 @@ def model_of(world: World, hops: int) -> Model:
     return Model(noise, bias, gyro.bias_tau_s, gyro.scale_factor_std, clock_var**0.5, walk_var**0.5)
 
 
-def course_of(world: World) -> Course:
+def node_timeline(world: World) -> NodeTimeline:
     """Cycles of a world that is plain, and the aidings of which nothing is lost."""
     measured, ends = measured_of(world), world.ends
     heard = aiding_passes(world.scenario.file.aiding, ends - world.begin, world.seed)
@@ -85,10 +85,10 @@ def course_of(world: World) -> Course:
     turned = world.motion.drive(times[order])[0]
     apart = np.diff(times[order], prepend=world.begin)
     spin = np.divide(np.diff(turned, prepend=turned[0]), apart, out=np.zeros(len(apart)), where=apart > 0.0)
-    return Course(times[order], spin, rate, var)
+    return NodeTimeline(times[order], spin, rate, var)
 
 
-def bound_of(model: Model, course: Course, begin: float) -> Bound:
+def bound_of(model: Model, course: NodeTimeline, begin: float) -> Bound:
     """Variances of the yaw by all that came before each time, and by all of the course; it begins at ``begin`` (s)."""
     count = len(course.times)
     before, after = np.empty((2, count, STATES, STATES))
@@ -98,9 +98,9 @@ def bound_of(model: Model, course: Course, begin: float) -> Bound:
         steps[k], noise = step_of(model, float(course.spin[k]), float(dt))
         before[k] = known = steps[k] @ known @ steps[k].T + noise
         if course.spin[k] == 0.0 and dt > 0.0:
-            known = updated(known, np.eye(STATES)[BIAS], model.noise**2 / float(dt))
+            known = posterior_cov(known, np.eye(STATES)[BIAS], model.noise**2 / float(dt))
         if np.isfinite(course.var[k]):
-            known = updated(known, np.array([1.0, 0.0, 0.0, course.rate[k]]), float(course.var[k]))
+            known = posterior_cov(known, np.array([1.0, 0.0, 0.0, course.rate[k]]), float(course.var[k]))
         after[k] = known
     smoothed = after.copy()
     for k in range(count - 2, -1, -1):
@@ -121,7 +121,7 @@ def step_of(model: Model, spin: float, dt: float) -> tuple[Array, Array]:
     return step, np.diag([model.noise**2 * dt * turning, bias_var, 0.0, model.stamp_walk**2 * dt])
 
 
-def updated(known: Array, row: Array, var: float) -> Array:
+def posterior_cov(known: Array, row: Array, var: float) -> Array:
     """Covariance after a scalar measurement ``row`` (4,) with the variance ``var``."""
     seen = known @ row
     return np.asarray(known - np.outer(seen, seen) / (row @ seen + var))

@@ -18,10 +18,10 @@ import numpy.typing as npt
 
 from sim.rig.direct_string import DirectString, StringRun, Survey
 from sim.studies.epochs import BLOCKS, RESTING
-from sim.studies.limits.bound import Bound, bound_of, course_of, model_of
-from sim.studies.pool import Step, over_cores, seeded
-from sim.studies.scenarios import Tables, changed, complete, on_off
-from sim.studies.trials import rms_deg, row
+from sim.studies.limits.bound import Bound, bound_of, model_of, node_timeline
+from sim.studies.pool import Step, over_cores, seed_jobs
+from sim.studies.scenarios import Tables, change_sections, complete_string, on_off
+from sim.studies.trials import interval_row, rms_deg
 from sim.world.scenario import scenario_of
 from sim.world.world import World
 
@@ -29,7 +29,7 @@ Array = npt.NDArray[np.float64]
 SETTLED = 20.0  # s after a stop
 KINDS = ("at rest", "at the survey", "revised", "smoothed")
 RATIO = 1.2  # of ours to the bound, at most
-BASE: Tables = changed(
+BASE: Tables = change_sections(
     RESTING,
     encoder={"phase": "random"},
     gyroscope={"increments": True},
@@ -39,7 +39,7 @@ BASE: Tables = changed(
 
 
 @dataclass(frozen=True, slots=True)
-class Case:
+class LimitCase:
     """A string and its aiding; ``reach`` is in deg, at rest, at the survey (revised) and smoothed."""
 
     name: str
@@ -49,12 +49,12 @@ class Case:
 
 
 CASES = (
-    Case("continuous", BASE, 1, (0.0052, None, 0.010)),
-    Case("20 s on / 30 s off", changed(BASE, aiding=on_off(20.0, 30.0)), 1, (0.013, None, 0.010)),
-    Case("20 s on / 60 s off", changed(BASE, aiding=on_off(20.0, 60.0)), 1, (0.036, 0.05, 0.010)),
-    Case(
+    LimitCase("continuous", BASE, 1, (0.0052, None, 0.010)),
+    LimitCase("20 s on / 30 s off", change_sections(BASE, aiding=on_off(20.0, 30.0)), 1, (0.013, None, 0.010)),
+    LimitCase("20 s on / 60 s off", change_sections(BASE, aiding=on_off(20.0, 60.0)), 1, (0.036, 0.05, 0.010)),
+    LimitCase(
         "hop 50, 20 s on / 30 s off",
-        changed(BASE, rig=complete(50), aiding=on_off(20.0, 30.0), clocks={"joint_std_ms": 5.0}),
+        change_sections(BASE, rig=complete_string(50), aiding=on_off(20.0, 30.0), clocks={"joint_std_ms": 5.0}),
         50,
         (0.026, 0.05, 0.010),
     ),
@@ -70,17 +70,17 @@ class LimitRun:
     best: dict[str, Array]
 
 
-def steps(seeds: int) -> int:
+def count_steps(seeds: int) -> int:
     """Runs of all seeds."""
     return seeds * len(CASES)
 
 
-def run(seeds: int, step: Step) -> dict[str, Any]:
+def run_study(seeds: int, step: Step) -> dict[str, Any]:
     """A row for every kind of figure of every case."""
     cases: list[dict[str, Any]] = []
     with over_cores(seeds, step) as run_all:
         for case in CASES:
-            cases += rows_of(case, run_all(run_seed, seeded(case.setup, seeds)))
+            cases += rows_of(case, run_all(run_seed, seed_jobs(case.setup, seeds)))
     return {"experiment": "limits", "seeds": seeds, "cases": cases}
 
 
@@ -89,10 +89,12 @@ def run_seed(job: tuple[Tables, int]) -> LimitRun:
     tables, seed = job
     world = World(scenario_of(dict(tables)), seed)
     hops = world.scenario.tubes
-    return judge(world, DirectString(world).drill(), bound_of(model_of(world, hops), course_of(world), world.begin))
+    return compare_with_bound(
+        world, DirectString(world).drill(), bound_of(model_of(world, hops), node_timeline(world), world.begin)
+    )
 
 
-def judge(world: World, run: StringRun, bound: Bound) -> LimitRun:
+def compare_with_bound(world: World, run: StringRun, bound: Bound) -> LimitRun:
     """The lowest node, tube 1, in every rest but the last."""
     rests = [phase for phase in world.phases if phase.kind == "stop"][: BLOCKS - 1]
     turns = [phase for phase in world.phases if phase.kind == "drill"][1:]
@@ -121,7 +123,7 @@ def last_word(run: StringRun, first: Survey, ends: Array, before: float) -> Surv
     return next((one for one in reversed(again) if ends[one.said] < before), first)
 
 
-def rows_of(case: Case, runs: Sequence[LimitRun]) -> list[dict[str, Any]]:
+def rows_of(case: LimitCase, runs: Sequence[LimitRun]) -> list[dict[str, Any]]:
     """Figures of one case; joints and mounts are exact."""
     reach = dict(zip(("at rest", "revised", "smoothed"), case.reach, strict=True))
     rows = []
@@ -129,12 +131,12 @@ def rows_of(case: Case, runs: Sequence[LimitRun]) -> list[dict[str, Any]]:
         figure = rms_deg([one.errors[kind] for one in runs])
         best = math.degrees(math.sqrt(float(np.mean([np.mean(one.best[kind]) for one in runs]))))
         nees = float(np.mean([np.mean(one.errors[kind] ** 2 / one.stated[kind]) for one in runs]))
-        told = row(case.name, f"yaw {kind}", figure, to_reach=reach.get(kind))
+        told = interval_row(case.name, f"yaw {kind}", figure, to_reach=reach.get(kind))
         rows.append(told | {"bound": best, "ratio": figure[0] / best, "nees": nees})
     return rows
 
 
-def verdicts(result: dict[str, Any]) -> list[str]:
+def verdict_lines(result: dict[str, Any]) -> list[str]:
     """Which figures are farther from the bound than they are to be."""
     far = [f"{one['case']}, {one['quantity']}: {one['ratio']:.2f}" for one in result["cases"] if one["ratio"] > RATIO]
     return [f"more than {RATIO:g} times the bound: {'; '.join(far)}" if far else f"within {RATIO:g} times the bound"]

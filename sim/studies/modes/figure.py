@@ -12,7 +12,7 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 
-from groundstation.report.style import GREY, INK, LIGHT, MARKERS, SERIES, WRONG, new_figure, styled, tidy
+from groundstation.report.style import GREY, INK, LIGHT, MARKERS, SERIES, WRONG, new_figure, styled, tidy_ticks
 from sim.studies.modes.run import CASES
 from sim.studies.published_form import FORMS
 
@@ -48,12 +48,12 @@ class Reach:
     simulated: tuple[float, ...] = ()  # the published filter and the published scheme
 
 
-def figures(result: dict[str, Any]) -> dict[str, Figure]:
+def draw_figures(result: dict[str, Any]) -> dict[str, Figure]:
     """Both figures of one of the tables."""
     name, seeds = result["experiment"], result["seeds"]
     return {
         name: yaw_figure(yaw_panels(result), f"Yaw error: {name}, {seeds} seeds"),
-        f"{name}-reach": reach_figure(reaches(result), f"Reach: {name}, {seeds} seeds"),
+        f"{name}-reach": reach_figure(reaches_by_quantity(result), f"Reach: {name}, {seeds} seeds"),
     }
 
 
@@ -69,7 +69,7 @@ def yaw_panels(result: dict[str, Any]) -> list[YawPanel]:
     return panels
 
 
-def reaches(result: dict[str, Any]) -> dict[str, list[Reach]]:
+def reaches_by_quantity(result: dict[str, Any]) -> dict[str, list[Reach]]:
     """Rows with a figure to reach, by quantity."""
     found: dict[str, list[Reach]] = {}
     ours = {(r["case"], r["quantity"]): r["ours"] for r in result["cases"]}
@@ -114,7 +114,7 @@ def yaw_figure(panels: Sequence[YawPanel], title: str) -> Figure:
     figure.legend(
         handles=[*handles, Patch(color=LIGHT, alpha=0.35, label="at rest")], loc="outside lower left", ncols=5
     )
-    return tidy(figure)
+    return tidy_ticks(figure)
 
 
 @styled
@@ -148,4 +148,4 @@ def reach_figure(panels: Mapping[str, Sequence[Reach]], title: str) -> Figure:
     if any(row.simulated for rows in panels.values() for row in rows):
         handles += [Line2D([], [], color=GREY, ls="", marker=m, mfc="none", label=n) for n, m in FORM_MARKERS.items()]
     figure.legend(handles=handles, loc="outside lower left", ncols=3)
-    return tidy(figure)
+    return tidy_ticks(figure)

@@ -17,15 +17,15 @@ import numpy as np
 from sim.studies.lab import LAB, ONCE_AIDED, REST, ROTATING, LabRun
 from sim.studies.pool import Step
 from sim.studies.published_form import EXPERIMENTS, FORMS, rows_of
-from sim.studies.scenarios import Tables, changed, complete, on_off
-from sim.studies.trials import rms_deg, row, trace, trials
+from sim.studies.scenarios import Tables, change_sections, complete_string, on_off
+from sim.studies.trials import interval_row, over_seeds, rms_deg, yaw_error_trace
 
 FIFTY_CLOCK_MS = 5.0  # each joint
 FIFTY_LOSS = 1.0 - 0.7 ** (1.0 / 50.0)  # each hop, so that 30 % is lost on the way to hop 50
 
 
 @dataclass(frozen=True, slots=True)
-class Case:
+class ModeCase:
     """One line of thesis 4.2 at one hop; deg. ``published`` is an azimuth rms."""
 
     name: str
@@ -37,25 +37,27 @@ class Case:
     rotating: float | None = None
 
 
-def _on_off(off: float, published: float, yaw: float, azimuth: float) -> Case:
-    return Case(f"20 s on / {off:g} s off", changed(LAB, aiding=on_off(20.0, off)), published, yaw, azimuth)
+def _on_off(off: float, published: float, yaw: float, azimuth: float) -> ModeCase:
+    return ModeCase(f"20 s on / {off:g} s off", change_sections(LAB, aiding=on_off(20.0, off)), published, yaw, azimuth)
 
 
-def _single(hertz: float, published: float | str, yaw: float, azimuth: float) -> Case:
-    return Case(f"single, {hertz:g} Hz", changed(LAB, aiding={"every_s": 1.0 / hertz}), published, yaw, azimuth)
+def _single(hertz: float, published: float | str, yaw: float, azimuth: float) -> ModeCase:
+    return ModeCase(
+        f"single, {hertz:g} Hz", change_sections(LAB, aiding={"every_s": 1.0 / hertz}), published, yaw, azimuth
+    )
 
 
-TWO = changed(LAB, rig=complete(2))
-FIFTY = changed(
+TWO = change_sections(LAB, rig=complete_string(2))
+FIFTY = change_sections(
     LAB,
-    rig=complete(50),
+    rig=complete_string(50),
     aiding=on_off(20.0, 30.0),
     clocks={"joint_std_ms": FIFTY_CLOCK_MS},
     medium={"loss": FIFTY_LOSS},
 )
 CASES = {
     "update-modes": (
-        Case("continuous 1.9 Hz", LAB, 0.029, 0.013, 0.035),
+        ModeCase("continuous 1.9 Hz", LAB, 0.029, 0.013, 0.035),
         _on_off(5.0, 0.250, 0.013, 0.035),
         _on_off(10.0, 0.384, 0.018, 0.038),
         _on_off(30.0, 0.351, 0.042, 0.050),
@@ -69,27 +71,27 @@ CASES = {
         _single(0.0167, "irregular", 0.095, 0.095),
     ),
     "two-nodes": (
-        Case("node 1 of 2", TWO, 0.442, 0.015, 0.040),
-        Case("node 2 of 2", TWO, 0.761, 0.015, 0.040, hop=1),
+        ModeCase("node 1 of 2", TWO, 0.442, 0.015, 0.040),
+        ModeCase("node 2 of 2", TWO, 0.761, 0.015, 0.040, hop=1),
     ),
-    "fifty-nodes": (Case("node 50 of 50", FIFTY, None, 0.03, None, hop=49, rotating=0.12),),
+    "fifty-nodes": (ModeCase("node 50 of 50", FIFTY, None, 0.03, None, hop=49, rotating=0.12),),
 }
 
 
-def steps(name: str, seeds: int) -> int:
+def count_steps(name: str, seeds: int) -> int:
     """Runs of one seed."""
     forms = len(FORMS) if name in EXPERIMENTS else 0
-    return seeds * (1 + forms) * len(list(setups(name)))
+    return seeds * (1 + forms) * len(list(cases_by_setup(name)))
 
 
-def setups(name: str) -> Iterator[tuple[Tables, list[Case]]]:
+def cases_by_setup(name: str) -> Iterator[tuple[Tables, list[ModeCase]]]:
     """Every setup with its cases, which stand one after the other."""
     for _, cases in groupby(CASES[name], key=lambda case: id(case.setup)):
         found = list(cases)
         yield found[0].setup, found
 
 
-def run(name: str, seeds: int, step: Step) -> dict[str, Any]:
+def run_study(name: str, seeds: int, step: Step) -> dict[str, Any]:
     """Table and traces of one of ``CASES``; ``step`` is called after each seed.
 
     Returns
@@ -99,30 +101,30 @@ def run(name: str, seeds: int, step: Step) -> dict[str, Any]:
     """
     cases: list[dict[str, Any]] = []
     traces: dict[str, Any] = {}
-    with trials(seeds, step) as run_all:
-        for setup, of_setup in setups(name):
+    with over_seeds(seeds, step) as run_all:
+        for setup, of_setup in cases_by_setup(name):
             runs = run_all(setup)
             for case in of_setup:
-                cases += table(case, runs)
-                traces[case.name] = trace(runs, case.hop)
+                cases += mode_rows(case, runs)
+                traces[case.name] = yaw_error_trace(runs, case.hop)
         if name in EXPERIMENTS:
             cases += rows_of([(case.name, case.setup, case.hop, case.published) for case in CASES[name]], run_all)
     return {"experiment": name, "seeds": seeds, "cases": cases, "traces": traces}
 
 
-def table(case: Case, runs: list[LabRun]) -> list[dict[str, Any]]:
+def mode_rows(case: ModeCase, runs: list[LabRun]) -> list[dict[str, Any]]:
     """Rows of one case."""
     name, hop = case.name, case.hop
     rows = [
-        row(name, "yaw", rms_deg([r.error[REST, hop] for r in runs]), to_reach=case.yaw),
-        row(name, "azimuth", rms_deg([r.azimuth_error[hop : hop + 1] for r in runs]), published=case.published,
+        interval_row(name, "yaw", rms_deg([r.error[REST, hop] for r in runs]), to_reach=case.yaw),
+        interval_row(name, "azimuth", rms_deg([r.azimuth_error[hop : hop + 1] for r in runs]), published=case.published,
             to_reach=case.azimuth),
     ]  # fmt: skip
     if case.rotating is not None:
         for words, when in (("rotating", ROTATING), ("rotating, once aided", ONCE_AIDED)):
             found = rms_deg([r.error[when, hop] for r in runs])
-            rows.append(row(name, f"yaw, {words}", found, to_reach=case.rotating))
+            rows.append(interval_row(name, f"yaw, {words}", found, to_reach=case.rotating))
     surveys = [r.survey_error[hop : hop + 1] for r in runs if np.isfinite(r.survey_error[hop])]
     if surveys:
-        rows.append(row(name, "azimuth, 32 points", rms_deg(surveys)))
+        rows.append(interval_row(name, "azimuth, 32 points", rms_deg(surveys)))
     return rows

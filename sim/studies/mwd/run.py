@@ -14,8 +14,14 @@ import numpy as np
 import numpy.typing as npt
 
 from groundstation.calibration.errors import CalibrationError
-from groundstation.calibration.mwd_model import Triad, evaluate, nominal, tilt, vectors
-from groundstation.calibration.mwd_newton import hold, minimise
+from groundstation.calibration.mwd_model import (
+    Triad,
+    gravity_inclination,
+    nominal_triad,
+    tool_readings,
+    vectors_of_volts,
+)
+from groundstation.calibration.mwd_newton import free_parameter_matrix, minimise_cost
 from groundstation.calibration.mwd_record import accelerometer_record
 from groundstation.calibration.mwd_solve import MwdFit, solve_accelerometers, solve_magnetometers
 from groundstation.calibration.quality import judge_readings
@@ -27,12 +33,12 @@ from sim.instruments.mwd_jig import (
     VOLTS_PER_MICROTESLA,
     Heating,
     JigRecord,
-    Tool,
+    MwdTool,
     control_design,
     draw_tool,
     fresh_design,
     make_design,
-    measure,
+    measure_tool,
 )
 from sim.studies.pool import Step
 
@@ -46,7 +52,7 @@ REACH = {  # size in g, tilt in deg, iterations
 
 
 @dataclass(frozen=True, slots=True)
-class Outcome:
+class ToolOutcome:
     """One tool at one design; errors are the largest of 400 fresh attitudes, g and deg, before and after."""
 
     accelerometers: MwdFit
@@ -57,38 +63,38 @@ class Outcome:
     passed_after: bool
 
 
-def calibrate(tool: Tool, heating: Heating, seed: int) -> Outcome:
+def calibrate_tool(tool: MwdTool, heating: Heating, seed: int) -> ToolOutcome:
     """Calibrate a tool in its jig and try it elsewhere."""
     parameters = 12 if heating is Heating.ROOM else 30
     design = make_design(heating, seed)
-    record = measure(tool, design, seed)
+    record = measure_tool(tool, design, seed)
     fit = solve_accelerometers(record.gravity_volts, record.temperature, design.tilt, parameters)
-    gravity = vectors(fit.triad, record.gravity_volts, record.temperature)
+    gravity = vectors_of_volts(fit.triad, record.gravity_volts, record.temperature)
     field = solve_magnetometers(record.field_volts, record.temperature, gravity, FIELD, DIP, parameters)
-    fresh = measure(tool, fresh_design(seed, parameters == 30), seed + FRESH, noise=0.0, jig_std=0.0)
-    control = measure(tool, control_design(), seed + CONTROL)
-    raw = nominal("ABC", VOLTS_PER_G), nominal("XYZ", VOLTS_PER_MICROTESLA)
-    return Outcome(
+    fresh = measure_tool(tool, fresh_design(seed, parameters == 30), seed + FRESH, noise=0.0, jig_std=0.0)
+    control = measure_tool(tool, control_design(), seed + CONTROL)
+    raw = nominal_triad("ABC", VOLTS_PER_G), nominal_triad("XYZ", VOLTS_PER_MICROTESLA)
+    return ToolOutcome(
         fit,
         field,
-        worst(raw[0], fresh),
-        worst(fit.triad, fresh),
-        passes(*raw, control),
-        passes(fit.triad, field.triad, control),
+        largest_errors(raw[0], fresh),
+        largest_errors(fit.triad, fresh),
+        passes_quality_control(*raw, control),
+        passes_quality_control(fit.triad, field.triad, control),
     )
 
 
-def passes(accelerometers: Triad, magnetometers: Triad, record: JigRecord) -> bool:
+def passes_quality_control(accelerometers: Triad, magnetometers: Triad, record: JigRecord) -> bool:
     """Quality control of a tool with these coefficients."""
-    seen = evaluate(accelerometers, magnetometers, record.gravity_volts, record.field_volts, record.temperature)
+    seen = tool_readings(accelerometers, magnetometers, record.gravity_volts, record.field_volts, record.temperature)
     return judge_readings(seen).passed
 
 
-def worst(triad: Triad, record: JigRecord) -> tuple[float, float]:
+def largest_errors(triad: Triad, record: JigRecord) -> tuple[float, float]:
     """Largest error of |G| (g) and of the tilt (deg) over a record without noise."""
-    gravity = vectors(triad, record.gravity_volts, record.temperature)
+    gravity = vectors_of_volts(triad, record.gravity_volts, record.temperature)
     size = np.abs(np.linalg.norm(gravity, axis=1) - 1.0)
-    return float(size.max()), math.degrees(float(np.abs(tilt(gravity) - record.design.tilt).max()))
+    return float(size.max()), math.degrees(float(np.abs(gravity_inclination(gravity) - record.design.tilt).max()))
 
 
 @dataclass(frozen=True, slots=True)
@@ -102,14 +108,14 @@ class Duel:
     other_seconds_alone: float
 
 
-def duel(tool: Tool, heating: Heating, seed: int) -> Duel:
+def compare_solvers(tool: MwdTool, heating: Heating, seed: int) -> Duel:
     """Ours against scipy's Levenberg-Marquardt from the same start."""
     from scipy.optimize import least_squares
 
     parameters = 12 if heating is Heating.ROOM else 30
-    record = measure(tool, make_design(heating, seed), seed)
+    record = measure_tool(tool, make_design(heating, seed), seed)
     problem = accelerometer_record(record.gravity_volts, record.temperature, record.design.tilt).problem(parameters)
-    free = hold(parameters, "ABC")
+    free = free_parameter_matrix(parameters, "ABC")
     start = np.zeros(free.shape[1])
 
     def residuals(y: Array) -> Array:
@@ -119,7 +125,7 @@ def duel(tool: Tool, heating: Heating, seed: int) -> Duel:
         return problem.residual_jacobian(free @ y) @ free
 
     clock = [time.perf_counter()]
-    cost = problem.value(minimise(problem, free)[0])
+    cost = problem.value(minimise_cost(problem, free)[0])
     clock.append(time.perf_counter())
     other = least_squares(residuals, start, jacobian, method="lm")
     clock.append(time.perf_counter())
@@ -128,12 +134,12 @@ def duel(tool: Tool, heating: Heating, seed: int) -> Duel:
     return Duel(cost, 2.0 * float(other.cost), *np.diff(clock).tolist())
 
 
-def steps(tools: int) -> int:
+def count_steps(tools: int) -> int:
     """Tools of every design."""
     return len(HEATINGS) * tools
 
 
-def run(tools: int, step: Step) -> dict[str, Any]:
+def run_study(tools: int, step: Step) -> dict[str, Any]:
     """Table of the designs over ``tools`` synthetic tools; ``step`` is called after each tool of each design.
 
     Returns
@@ -147,16 +153,16 @@ def run(tools: int, step: Step) -> dict[str, Any]:
         for seed in range(1, tools + 1):
             tool = draw_tool(seed)
             try:
-                outcomes.append(calibrate(tool, heating, seed))
+                outcomes.append(calibrate_tool(tool, heating, seed))
             except CalibrationError:
                 refused += 1
-            duels.append(duel(tool, heating, seed))
+            duels.append(compare_solvers(tool, heating, seed))
             step()
-        cases.append(row(heating, outcomes, duels, refused))
+        cases.append(design_row(heating, outcomes, duels, refused))
     return {"experiment": "mwd", "tools": tools, "cases": cases, "reach": REACH}
 
 
-def row(heating: Heating, outcomes: list[Outcome], duels: list[Duel], refused: int) -> dict[str, Any]:
+def design_row(heating: Heating, outcomes: list[ToolOutcome], duels: list[Duel], refused: int) -> dict[str, Any]:
     """One line of the table: medians, worst tools and shares."""
     iterations = np.array([o.accelerometers.iterations for o in outcomes])
     before, after = np.array([o.before for o in outcomes]), np.array([o.after for o in outcomes])

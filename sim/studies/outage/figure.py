@@ -11,13 +11,13 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 
-from groundstation.report.style import GREY, LIGHT, MARKERS, SERIES, WRONG, new_figure, styled, tidy
+from groundstation.report.style import GREY, LIGHT, MARKERS, SERIES, WRONG, new_figure, styled, tidy_ticks
 from sim.studies.outage.run import EVERY, HOPS, STATES
 
 Array = npt.NDArray[np.float64]
 
 
-def figures(result: dict[str, Any]) -> dict[str, Figure]:
+def draw_figures(result: dict[str, Any]) -> dict[str, Figure]:
     """One figure, rows of states and columns of outages."""
     panels: dict[tuple[str, str], dict[str, Any]] = {}
     for state in STATES:
@@ -64,4 +64,4 @@ def consistency_figure(
     handles.append(Line2D([], [], ls="", marker="o", ms=9.0, mfc="none", mec=WRONG, label="beyond the bounds"))
     handles_all = [*handles, Patch(color=LIGHT, alpha=0.6, label=f"{bounds[0]:g} to {bounds[1]:g}")]
     figure.legend(handles=handles_all, loc="outside lower left", ncols=5)
-    return tidy(figure)
+    return tidy_ticks(figure)

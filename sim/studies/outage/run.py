@@ -12,9 +12,9 @@ from typing import Any
 
 import numpy as np
 
-from sim.studies.epochs import BLOCKS, EpochRun, resting, run_seed
-from sim.studies.pool import Step, over_cores, seeded
-from sim.studies.scenarios import changed, on_off
+from sim.studies.epochs import BLOCKS, EpochRun, resting_string, run_seed
+from sim.studies.pool import Step, over_cores, seed_jobs
+from sim.studies.scenarios import change_sections, on_off
 
 HOPS = 5
 OUTAGES_S = (0.0, 20.0, 60.0)
@@ -25,19 +25,19 @@ OUTSIDE = 0.05  # share of cells that may lie outside the usual bounds
 STATES = ("at rest", "turning", "at rest, with joints")
 
 
-def steps(seeds: int) -> int:
+def count_steps(seeds: int) -> int:
     """Runs of one seed."""
     return seeds * len(OUTAGES_S) * len(LOSSES)
 
 
-def run(seeds: int, step: Step) -> dict[str, Any]:
+def run_study(seeds: int, step: Step) -> dict[str, Any]:
     """Rows of every outage and loss; ``outside`` is the share of cells outside the usual bounds."""
     cases = []
     with over_cores(seeds, step) as run_all:
         for off in OUTAGES_S:
             for loss in LOSSES:
-                setup = changed(resting(HOPS, loss=loss), aiding=on_off(20.0, off))
-                cases += table(off, loss, run_all(run_seed, seeded(setup, seeds)))
+                setup = change_sections(resting_string(HOPS, loss=loss), aiding=on_off(20.0, off))
+                cases += outage_rows(off, loss, run_all(run_seed, seed_jobs(setup, seeds)))
     cells = np.array([[r[f"hop_{k + 1}"] for k in range(HOPS)] for r in cases])
     outside = float(np.mean((cells < USUAL[0]) | (cells > USUAL[1])))
     # of the mean of squares of normal errors; a joint is drawn once a seed, a filter's error once an epoch
@@ -45,7 +45,7 @@ def run(seeds: int, step: Step) -> dict[str, Any]:
     return {"experiment": "outage", "seeds": seeds, "cases": cases, "outside": outside, "standard_errors": errors}
 
 
-def table(off: float, loss: float, runs: list[EpochRun]) -> list[dict[str, Any]]:
+def outage_rows(off: float, loss: float, runs: list[EpochRun]) -> list[dict[str, Any]]:
     """Rows of one string: at rest, turning, and at rest with the errors of joints and mounts."""
     turning = runs[0].turning
     nees = np.array([r.error**2 / r.var for r in runs])
@@ -70,7 +70,7 @@ def _row(off: float, loss: float, state: str, nees: np.ndarray[Any, np.dtype[np.
     }
 
 
-def verdicts(result: dict[str, Any]) -> list[str]:
+def verdict_lines(result: dict[str, Any]) -> list[str]:
     """Share of the cells outside, and how well a cell is known."""
     low, high = USUAL
     errors = result["standard_errors"]

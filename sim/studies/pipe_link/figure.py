@@ -10,7 +10,7 @@ from groundstation.report.plots_radio import pipe_figure
 from sim.studies.pipe_link.run import ATTENUATIONS_DB, FREQUENCIES, RADIUS, RHO
 
 
-def figures(result: dict[str, Any]) -> dict[str, Figure]:
+def draw_figures(result: dict[str, Any]) -> dict[str, Figure]:
     """The one figure."""
     del result
     printed = {name: (FREQUENCIES[1] * 1e-9, db) for name, db in ATTENUATIONS_DB.items()}

@@ -9,8 +9,17 @@ from typing import Any
 
 from sim.studies.pool import Step
 from telemetry.errors import RadioError
-from telemetry.radio.steel import API_5L, carbon_of, resistivity
-from telemetry.radio.waveguide import LOWEST, TE11, TM01, Mode, attenuation, cut_off, decibels, reach
+from telemetry.radio.steel import API_5L, carbon_of, steel_resistivity
+from telemetry.radio.waveguide import (
+    LOWEST,
+    TE11,
+    TM01,
+    WaveguideMode,
+    cut_off,
+    link_reach,
+    nepers_to_decibels,
+    wall_attenuation,
+)
 
 RADIUS = 0.03  # m
 FREQUENCIES = (2.4e9, 5e9)  # Hz
@@ -30,31 +39,32 @@ DATA_SHEETS = {
 WARM_C = (20.0, 100.0, 200.0)
 
 
-def steps() -> int:
+def count_steps() -> int:
     """All at once."""
     return 1
 
 
-def run(step: Step) -> dict[str, Any]:
+def run_study(step: Step) -> dict[str, Any]:
     """Published values beside ours, then every grade of API 5L over its temperature."""
-    result = {"experiment": "pipe-link", "cases": published(), "grades": grades()}
+    result = {"experiment": "pipe-link", "cases": published_values(), "grades": grade_rows()}
     step()
     return result
 
 
-def row(case: str, printed: float | None, ours: float, unit: str) -> dict[str, Any]:
+def comparison_row(case: str, printed: float | None, ours: float, unit: str) -> dict[str, Any]:
     """One line of the table."""
     difference = None if printed is None else 100.0 * (ours / printed - 1.0) if printed else 100.0 * ours
     return {"case": case, "published": printed, "ours": ours, "difference_percent": difference, "unit": unit}
 
 
-def published() -> list[dict[str, Any]]:
+def published_values() -> list[dict[str, Any]]:
     """Cut-offs, attenuations, reaches and resistivities."""
     rows = [
-        row(f"cut-off {mode}", CUT_OFFS_GHZ[str(mode)], float(cut_off(mode, RADIUS)) * 1e-9, "GHz") for mode in LOWEST
+        comparison_row(f"cut-off {mode}", CUT_OFFS_GHZ[str(mode)], float(cut_off(mode, RADIUS)) * 1e-9, "GHz")
+        for mode in LOWEST
     ]
     rows += [
-        row(
+        comparison_row(
             f"TE11 propagates at {f * 1e-9:g} GHz",
             PROPAGATES[f],
             float(loss_db(TE11, f, RHO) is not None),
@@ -62,29 +72,33 @@ def published() -> list[dict[str, Any]]:
         )
         for f in FREQUENCIES
     ]
-    lost = {mode: float(decibels(attenuation(mode, RADIUS, FREQUENCIES[1], RHO))) for mode in (TE11, TM01)}
-    rows += [row(f"{mode}, 5 GHz, 11.2e-8 ohm m", ATTENUATIONS_DB[str(mode)], lost[mode], "dB/m") for mode in lost]
-    printed = ATTENUATIONS_DB["TM01"] / ATTENUATIONS_DB["TE11"]
-    rows.append(row("TM01 over TE11, 5 GHz, of any steel", printed, lost[TM01] / lost[TE11], "1"))
+    lost = {
+        mode: float(nepers_to_decibels(wall_attenuation(mode, RADIUS, FREQUENCIES[1], RHO))) for mode in (TE11, TM01)
+    }
     rows += [
-        row(f"reach of 110 dB at {db:g} dB/m", metres, float(reach(db, BUDGET)), "m")
+        comparison_row(f"{mode}, 5 GHz, 11.2e-8 ohm m", ATTENUATIONS_DB[str(mode)], lost[mode], "dB/m") for mode in lost
+    ]
+    printed = ATTENUATIONS_DB["TM01"] / ATTENUATIONS_DB["TE11"]
+    rows.append(comparison_row("TM01 over TE11, 5 GHz, of any steel", printed, lost[TM01] / lost[TE11], "1"))
+    rows += [
+        comparison_row(f"reach of 110 dB at {db:g} dB/m", metres, float(link_reach(db, BUDGET)), "m")
         for db, metres in REACHES_M.items()
     ]
     rows += [
-        row(f"resistivity of {name}", given, float(resistivity(carbon, warm)) * 1e8, "1e-8 ohm m")
+        comparison_row(f"resistivity of {name}", given, float(steel_resistivity(carbon, warm)) * 1e8, "1e-8 ohm m")
         for name, (carbon, warm, given) in DATA_SHEETS.items()
     ]
     return rows
 
 
-def grades() -> list[dict[str, Any]]:
+def grade_rows() -> list[dict[str, Any]]:
     """Resistivity, attenuation of TE11 at 5 GHz and reach by grade and temperature."""
     rows = []
     for grade in API_5L:
         for warm in WARM_C:
             carbon = carbon_of(grade)
-            rho = resistivity(carbon, warm)
-            lost = decibels(attenuation(TE11, RADIUS, FREQUENCIES[1], rho))
+            rho = steel_resistivity(carbon, warm)
+            lost = nepers_to_decibels(wall_attenuation(TE11, RADIUS, FREQUENCIES[1], rho))
             rows.append(
                 {
                     "grade": grade,
@@ -92,21 +106,21 @@ def grades() -> list[dict[str, Any]]:
                     "temperature_c": warm,
                     "resistivity_1e_8_ohm_m": float(rho) * 1e8,
                     "te11_db_per_m": float(lost),
-                    "reach_m": float(reach(lost, BUDGET)),
+                    "reach_m": float(link_reach(lost, BUDGET)),
                 }
             )
     return rows
 
 
-def loss_db(mode: Mode, frequency: float, rho: float) -> float | None:
+def loss_db(mode: WaveguideMode, frequency: float, rho: float) -> float | None:
     """Attenuation in dB/m; None below the cut-off."""
     try:
-        return float(decibels(attenuation(mode, RADIUS, frequency, rho)))
+        return float(nepers_to_decibels(wall_attenuation(mode, RADIUS, frequency, rho)))
     except RadioError:
         return None
 
 
-def verdicts(result: dict[str, Any]) -> list[str]:
+def verdict_lines(result: dict[str, Any]) -> list[str]:
     """What the tables come to."""
     reaches = [line["reach_m"] for line in result["grades"]]
     worst = max(result["cases"], key=lambda line: abs(line["difference_percent"] or 0.0))

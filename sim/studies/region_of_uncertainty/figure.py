@@ -13,14 +13,14 @@ import numpy.typing as npt
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
-from groundstation.report.style import GREY, MARKERS, SERIES, above_zero, log_if_needed, new_figure, styled, tidy
+from groundstation.report.style import GREY, MARKERS, SERIES, above_zero, log_if_needed, new_figure, styled, tidy_ticks
 from sim.studies.published import AXES, wellbore_1
 from sim.studies.region_of_uncertainty.run import FILTERED_AZIMUTH_DEG
 
 Array = npt.NDArray[np.float64]
 
 
-def figures(result: dict[str, Any]) -> dict[str, Figure]:
+def draw_figures(result: dict[str, Any]) -> dict[str, Figure]:
     """Two figures: by instrument, and filtered against unfiltered."""
     md = wellbore_1().md
     tables = {}
@@ -81,7 +81,7 @@ def uncertainty_figure(
     if any(printed is not None for _, _, printed in instruments.values()):
         handles.append(Line2D([], [], color=GREY, ls="--", lw=0.8, marker="o", label="printed"))
     figure.legend(handles=handles, loc="outside lower left", ncols=4)
-    return tidy(figure)
+    return tidy_ticks(figure)
 
 
 @styled
@@ -115,4 +115,4 @@ def azimuth_error_figure(
         Line2D([], [], color=SERIES[0], marker="s", label=f"filtered: azimuth error {azimuth_error_deg:g} deg"),
     ]
     figure.legend(handles=handles, loc="outside lower left", ncols=2)
-    return tidy(figure)
+    return tidy_ticks(figure)

@@ -14,7 +14,7 @@ import numpy as np
 import numpy.typing as npt
 
 from groundstation.survey.tools.instruments import load_tool
-from groundstation.survey.well.analysis import analyse, magnetic_error, with_azimuth_error
+from groundstation.survey.well.analysis import analyse_survey, magnetic_error, with_azimuth_error
 from groundstation.survey.well.error_sources import Site
 from groundstation.survey.well.methods import Method
 from sim.studies.pool import Step
@@ -24,12 +24,12 @@ FILTERED_AZIMUTH_DEG = 0.25
 Array = npt.NDArray[np.float64]
 
 
-def steps() -> int:
+def count_steps() -> int:
     """All at once."""
     return 1
 
 
-def run(step: Step) -> dict[str, Any]:
+def run_study(step: Step) -> dict[str, Any]:
     """Table with one case for every instrument, station and axis, cm at the printed number of standard deviations."""
     printed = printed_regions()
     multiples = {row.instrument: row.multiple for row in printed}
@@ -52,8 +52,8 @@ def run(step: Step) -> dict[str, Any]:
     return {
         "experiment": "region-of-uncertainty",
         "cases": cases,
-        "filtered": filtered(multiples),
-        "magnetic": magnetic(),
+        "filtered": lateral_half_widths(multiples),
+        "magnetic": magnetic_azimuth_errors(),
     }
 
 
@@ -62,12 +62,12 @@ def half_widths_cm(instrument: str, multiple: float, azimuth_error_deg: float | 
     tool = load_tool(instrument)
     if azimuth_error_deg is not None:
         tool = with_azimuth_error(tool, math.radians(azimuth_error_deg))
-    found = analyse(wellbore_1(), Method.BALANCED_TANGENTIAL, tool, Site())
+    found = analyse_survey(wellbore_1(), Method.BALANCED_TANGENTIAL, tool, Site())
     variances = np.diagonal(found.uncertainty.cov, axis1=1, axis2=2)
     return np.asarray(100.0 * multiple * np.sqrt(variances))
 
 
-def filtered(multiples: dict[str, float]) -> list[dict[str, Any]]:
+def lateral_half_widths(multiples: dict[str, float]) -> list[dict[str, Any]]:
     """Lateral half-width of every station with the gyro's terms and with the filter's azimuth."""
     rows: list[dict[str, Any]] = []
     for name, multiple in multiples.items():
@@ -86,7 +86,7 @@ def filtered(multiples: dict[str, float]) -> list[dict[str, Any]]:
     return rows
 
 
-def magnetic() -> list[dict[str, Any]]:
+def magnetic_azimuth_errors() -> list[dict[str, Any]]:
     """Azimuth error of a magnetic survey at every station beside that of the filter (thesis Fig. 4.23), deg."""
     record = wellbore_1()
     errors = np.degrees(magnetic_error(record.inclination, record.azimuth))

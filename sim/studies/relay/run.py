@@ -12,20 +12,20 @@ from typing import Any
 import numpy as np
 
 from node.kernels.record.filter_record import Scheme
-from sim.studies.epochs import EpochRun, resting, run_seed
-from sim.studies.pool import Step, over_cores, seeded
+from sim.studies.epochs import EpochRun, resting_string, run_seed
+from sim.studies.pool import Step, over_cores, seed_jobs
 
 STUDIED_NEES_AT_REST = {1: 1.0, 2: 2.6, 5: 10.0, 10: 27.0}
 CONSISTENT = (0.5, 2.0)
 
 
-def steps(hops: int, seeds: int) -> int:
+def count_steps(hops: int, seeds: int) -> int:
     """Runs of one seed."""
     del hops
     return len(Scheme) * seeds
 
 
-def run(hops: int, seeds: int, step: Step) -> dict[str, Any]:
+def run_study(hops: int, seeds: int, step: Step) -> dict[str, Any]:
     """Table of both schemes; ``step`` is called after each seed of each scheme.
 
     Returns
@@ -37,7 +37,7 @@ def run(hops: int, seeds: int, step: Step) -> dict[str, Any]:
     consistent: dict[str, bool] = {}
     with over_cores(seeds, step) as run_all:
         for scheme in Scheme:
-            rows = table(scheme, run_all(run_seed, seeded(resting(hops, scheme), seeds)))
+            rows = hop_rows(scheme, run_all(run_seed, seed_jobs(resting_string(hops, scheme), seeds)))
             cases.extend(rows)
             low, high = CONSISTENT
             consistent[scheme.name.lower()] = all(
@@ -46,7 +46,7 @@ def run(hops: int, seeds: int, step: Step) -> dict[str, Any]:
     return {"experiment": "relay", "hops": hops, "seeds": seeds, "cases": cases, "consistent": consistent}
 
 
-def table(scheme: Scheme, runs: list[EpochRun]) -> list[dict[str, Any]]:
+def hop_rows(scheme: Scheme, runs: list[EpochRun]) -> list[dict[str, Any]]:
     """One row a hop."""
     error, var = np.array([r.error for r in runs]), np.array([r.var for r in runs])
     total, total_var = np.array([r.total_error for r in runs]), np.array([r.total_var for r in runs])
@@ -78,7 +78,7 @@ def rms_deg(errors: Any) -> float:
     return math.degrees(float(np.sqrt(np.mean(np.square(errors)))))
 
 
-def verdicts(result: dict[str, Any]) -> list[str]:
+def verdict_lines(result: dict[str, Any]) -> list[str]:
     """One line a scheme."""
     return [
         f"{scheme}: every NEES within [0.5, 2]: {'yes' if good else 'no'}"

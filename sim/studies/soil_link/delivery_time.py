@@ -26,7 +26,7 @@ CELLS = round(SPAN / STEP)
 
 
 @dataclass(frozen=True, slots=True)
-class Joint:
+class LossyJoint:
     """One joint as a message meets it.
 
     Parameters
@@ -47,7 +47,7 @@ class Joint:
 
 
 @lru_cache(maxsize=256)
-def joint_delay(joint: Joint) -> Array:
+def joint_delay(joint: LossyJoint) -> Array:
     """Distribution (CELLS,) of the time (s, in steps of STEP) over one joint, without its jitter."""
     rates = np.array(joint.error_rates)
     lost = rates**joint.attempts
@@ -67,15 +67,15 @@ def joint_delay(joint: Joint) -> Array:
     return found
 
 
-def message_delay(joints: Sequence[Joint]) -> Array:
+def message_delay(joints: Sequence[LossyJoint]) -> Array:
     """Distribution (CELLS,) of the time over joints that are independent of each other and jitter alike."""
-    total = jitter(len(joints), joints[0].jitter)
+    total = jitter_distribution(len(joints), joints[0].jitter)
     for joint in joints:
         total = fftconvolve(total, joint_delay(joint))[:CELLS]
     return np.maximum(total, 0.0)
 
 
-def jitter(joints: int, mean: float) -> Array:
+def jitter_distribution(joints: int, mean: float) -> Array:
     """Distribution (CELLS,) of the sum of as many exponentials, each to the nearest step."""
     if mean <= 0.0:
         return np.asarray(np.arange(CELLS) == 0, float)
@@ -89,7 +89,7 @@ def quantile(distribution: Array, share: float) -> float:
     return STEP * float(np.searchsorted(cumulative, share * cumulative[-1]))
 
 
-def _passed(state: Array, joint: Joint, seconds: float) -> Array:
+def _passed(state: Array, joint: LossyJoint, seconds: float) -> Array:
     """Probabilities of the two states after some time."""
     total = joint.begins + joint.ends
     balance = np.array([joint.ends, joint.begins]) / total * state.sum()

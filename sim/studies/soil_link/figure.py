@@ -8,11 +8,11 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from groundstation.report.plots_radio import soil_map
-from groundstation.report.style import INK, SERIES, new_figure, styled, tidy
+from groundstation.report.style import INK, SERIES, new_figure, styled, tidy_ticks
 from sim.studies.soil_link.delivery_time import STEP
 
 
-def figures(result: dict[str, Any]) -> dict[str, Figure]:
+def draw_figures(result: dict[str, Any]) -> dict[str, Figure]:
     """The map and the delivery."""
     traces = result["traces"]
     title = "Margin over -103 dBm through 0.3 m of soil, 868 MHz, 2 dBm"
@@ -38,4 +38,4 @@ def delivery_figure(times: Any, distribution: Any) -> Figure:
         ylabel="Share of the surveys",
     )
     axes.legend(loc="lower right")
-    return tidy(figure)
+    return tidy_ticks(figure)

@@ -13,9 +13,9 @@ import numpy.typing as npt
 
 from sim.studies.pool import Step
 from sim.studies.soil_link.delivery_time import STEP, quantile
-from sim.studies.soil_link.wet_clay import expected, largest_difference, surveys_of, wet_clay
-from telemetry.radio.path_loss import Logarithm, margin, path_loss, propagation, received
-from telemetry.radio.soil import PorosityWarning, Soil, permittivity
+from sim.studies.soil_link.wet_clay import expected_delivery, largest_difference, surveys_of, wet_clay
+from telemetry.radio.path_loss import Logarithm, link_margin, path_loss, propagation_constants, received_power
+from telemetry.radio.soil_dielectric import PorosityWarning, Soil, soil_permittivity
 
 Array = npt.NDArray[np.float64]
 FREQUENCY = 868e6  # Hz
@@ -37,53 +37,53 @@ GRID = 41  # textures along one side of the triangle
 SHARES = (0.5, 0.75, 0.9, 0.95)
 
 
-def power(soil: Soil, distance: npt.ArrayLike, log: Logarithm = np.log10) -> Array:
+def received_dbm(soil: Soil, distance: npt.ArrayLike, log: Logarithm = np.log10) -> Array:
     """Received power, dBm, without a word about water that no soil holds: the published case has it."""
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", PorosityWarning)
-        eps = permittivity(soil, FREQUENCY)
-    return received(path_loss(*propagation(*eps, FREQUENCY), distance, log))
+        eps = soil_permittivity(soil, FREQUENCY)
+    return received_power(path_loss(*propagation_constants(*eps, FREQUENCY), distance, log))
 
 
-def triangle() -> tuple[Array, Array]:
+def texture_triangle() -> tuple[Array, Array]:
     """Sand and clay fractions (n,) over all textures."""
     sand, clay = np.meshgrid(np.linspace(0.0, 1.0, GRID), np.linspace(0.0, 1.0, GRID))
     inside = sand + clay <= 1.0 + 1e-9
     return sand[inside], clay[inside]
 
 
-def steps(tubes: int) -> int:
+def count_steps(tubes: int) -> int:
     """The figures, then the drilling."""
     del tubes
     return 2
 
 
-def run(tubes: int, step: Step) -> dict[str, Any]:
+def run_study(tubes: int, step: Step) -> dict[str, Any]:
     """Published powers beside ours, the map of margins, and the delivery of every survey of the wet-clay scenario."""
-    sand, clay = triangle()
-    fields = {water: margin(power(Soil(sand, clay, DENSITY, water), DISTANCES[-1])) for water in WATERS}
+    sand, clay = texture_triangle()
+    fields = {water: link_margin(received_dbm(Soil(sand, clay, DENSITY, water), DISTANCES[-1])) for water in WATERS}
     step()
-    delivered, times, distribution = delivery(tubes)
+    delivered, times, distribution = measure_delivery(tubes)
     step()
     return {
         "experiment": "soil-link",
         "tubes": tubes,
-        "cases": published(),
-        "map": feasibility(),
+        "cases": published_powers(),
+        "map": feasibility_map(),
         "delivery": delivered,
         "surveys": len(times),
         "traces": {"sand": sand, "clay": clay, "margins": fields, "times": times, "expected": distribution},
     }
 
 
-def published() -> list[dict[str, Any]]:
+def published_powers() -> list[dict[str, Any]]:
     """The printed powers beside the range over all textures, with log10 and with the natural logarithm."""
-    sand, clay = triangle()
+    sand, clay = texture_triangle()
     rows = []
     for water, printed in PUBLISHED_DBM.items():
         low, high = STATED_DBM[water]
         for name, log in (("log10", np.log10), ("natural logarithm", np.log)):
-            found = power(Soil(sand, clay, DENSITY, water), DISTANCES[-1], log)
+            found = received_dbm(Soil(sand, clay, DENSITY, water), DISTANCES[-1], log)
             rows.append(
                 {
                     "case": f"{100.0 * water:g} % water, {name}",
@@ -103,13 +103,13 @@ def published() -> list[dict[str, Any]]:
     return rows
 
 
-def feasibility() -> list[dict[str, Any]]:
+def feasibility_map() -> list[dict[str, Any]]:
     """Received power and margin by texture, water and distance."""
     rows = []
     for texture, (sand, clay) in TEXTURES.items():
         for water in WATERS:
             for distance in DISTANCES:
-                dbm = float(power(Soil(sand, clay, DENSITY, water), distance))
+                dbm = float(received_dbm(Soil(sand, clay, DENSITY, water), distance))
                 rows.append(
                     {
                         "texture": texture,
@@ -118,18 +118,18 @@ def feasibility() -> list[dict[str, Any]]:
                         "water_percent": 100.0 * water,
                         "distance_m": distance,
                         "received_dbm": dbm,
-                        "margin_db": float(margin(dbm)),
+                        "margin_db": float(link_margin(dbm)),
                     }
                 )
     return rows
 
 
-def delivery(tubes: int) -> tuple[list[dict[str, Any]], Array, Array]:
+def measure_delivery(tubes: int) -> tuple[list[dict[str, Any]], Array, Array]:
     """Quantiles of the delivery time beside their expectation; the times (n,) and the distribution behind them."""
     world = wet_clay(tubes)
     surveys = surveys_of(world)
     times = np.array([seconds for _, seconds in surveys])
-    distribution = expected(world, surveys)
+    distribution = expected_delivery(world, surveys)
     made = tubes * (tubes + 1) // 2
     rows = [
         {"quantity": "surveys that arrived", "ours": float(len(times)), "expected": float(made), "unit": "1"},
@@ -155,7 +155,7 @@ def delivery(tubes: int) -> tuple[list[dict[str, Any]], Array, Array]:
     return rows, times, distribution
 
 
-def verdicts(result: dict[str, Any]) -> list[str]:
+def verdict_lines(result: dict[str, Any]) -> list[str]:
     """What the tables come to."""
     natural = [row for row in result["cases"] if "natural" in row["case"]]
     margins = [row["margin_db"] for row in result["map"]]

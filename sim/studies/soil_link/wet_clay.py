@@ -17,7 +17,7 @@ from sim.rig.in_process import Build, InProcessStepper
 from sim.rig.launcher import private_folder
 from sim.rig.plain_base import PlainBase
 from sim.rig.scheduler import Scheduler
-from sim.studies.soil_link.delivery_time import STEP, Joint, message_delay
+from sim.studies.soil_link.delivery_time import STEP, LossyJoint, message_delay
 from sim.world.parsing import read_toml
 from sim.world.scenario import scenario_of
 from sim.world.shipped import shipped_folder
@@ -41,7 +41,7 @@ def wet_clay(tubes: int) -> World:
 def surveys_of(world: World) -> list[tuple[SurveyMeasurement, float]]:
     """Every survey that came to the surface, with the time (s) that it took from the end of its average."""
     with tempfile.TemporaryDirectory() as place:
-        base = drill(world, Path(place))
+        base = drill_wet_clay(world, Path(place))
     found = []
     for message, at in base.arrived.values():
         if isinstance(message, SurveyMeasurement):
@@ -49,7 +49,7 @@ def surveys_of(world: World) -> list[tuple[SurveyMeasurement, float]]:
     return found
 
 
-def drill(world: World, folder: Path) -> PlainBase:
+def drill_wet_clay(world: World, folder: Path) -> PlainBase:
     """Run the string in this process to its end; its surface end."""
     base = PlainBase()
     builders: dict[int, Build] = {BASE: lambda: base}
@@ -62,13 +62,13 @@ def drill(world: World, folder: Path) -> PlainBase:
     return base
 
 
-def expected(world: World, surveys: list[tuple[SurveyMeasurement, float]]) -> Array:
+def expected_delivery(world: World, surveys: list[tuple[SurveyMeasurement, float]]) -> Array:
     """Distribution of the delivery time over all surveys of the run, each over the joints that hung above its tube."""
-    each = [message_delay([*joints_above(world, survey), cable(world)]) for survey, _ in surveys]
+    each = [message_delay([*joints_above(world, survey), cable_joint(world)]) for survey, _ in surveys]
     return np.asarray(np.mean(each, axis=0))
 
 
-def joints_above(world: World, survey: SurveyMeasurement) -> list[Joint]:
+def joints_above(world: World, survey: SurveyMeasurement) -> list[LossyJoint]:
     """Joints of a survey's way up, as they were when it was made.
 
     Raises
@@ -85,7 +85,7 @@ def joints_above(world: World, survey: SurveyMeasurement) -> list[Joint]:
     for joint in range(survey.tube, survey.tube + survey.hops):
         clear, burst = (links.error_rate(margin) for margin in links.states(joint, survey.station_at))
         joints.append(
-            Joint(
+            LossyJoint(
                 (clear, burst),
                 section.attempts,
                 section.attempt_ms * 1e-3,
@@ -98,10 +98,10 @@ def joints_above(world: World, survey: SurveyMeasurement) -> list[Joint]:
     return joints
 
 
-def cable(world: World) -> Joint:
+def cable_joint(world: World) -> LossyJoint:
     """The cable from the drive head to the base station."""
     medium = world.scenario.medium
-    return Joint((medium.loss, medium.loss), 1, 0.0, medium.latency, medium.jitter)
+    return LossyJoint((medium.loss, medium.loss), 1, 0.0, medium.latency, medium.jitter)
 
 
 def largest_difference(times: Array, distribution: Array) -> float:

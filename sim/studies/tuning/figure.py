@@ -10,13 +10,13 @@ import numpy.typing as npt
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
-from groundstation.report.style import GREY, SERIES, new_figure, styled, tidy
+from groundstation.report.style import GREY, SERIES, new_figure, styled, tidy_ticks
 from sim.studies.tuning.run import RESIDUAL_DPS
 
 Array = npt.NDArray[np.float64]
 
 
-def figures(result: dict[str, Any]) -> dict[str, Figure]:
+def draw_figures(result: dict[str, Any]) -> dict[str, Figure]:
     """One figure, a panel a factor."""
     series = {name: (trace["t"], trace["bias"]) for name, trace in result["traces"].items()}
     groups = {
@@ -49,4 +49,4 @@ def bias_figure(groups: Mapping[str, Mapping[str, tuple[Array, Array]]], residua
     figure.legend(
         handles=[Line2D([], [], color=GREY, ls="--", lw=0.9, label="left over by the boot")], loc="outside lower left"
     )
-    return tidy(figure)
+    return tidy_ticks(figure)

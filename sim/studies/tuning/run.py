@@ -16,8 +16,8 @@ import numpy.typing as npt
 
 from sim.studies.lab import END, ENDS, LAB, REST, STOP, LabRun
 from sim.studies.pool import Step
-from sim.studies.scenarios import Tables, changed
-from sim.studies.trials import rms_deg, trials
+from sim.studies.scenarios import Tables, change_sections
+from sim.studies.trials import over_seeds, rms_deg
 
 Array = npt.NDArray[np.float64]
 RESIDUAL_DPS = -0.02
@@ -38,18 +38,18 @@ FACTORS: tuple[tuple[str, str, float], ...] = (
 
 def setup_of(factor: str, value: float) -> Tables:
     """The laboratory string under one factor of the firmware's configuration."""
-    return changed(LAB, gyroscope={"bias_step_dps": RESIDUAL_DPS}, node={"tuning": {factor: value}})
+    return change_sections(LAB, gyroscope={"bias_step_dps": RESIDUAL_DPS}, node={"tuning": {factor: value}})
 
 
-def steps(seeds: int) -> int:
+def count_steps(seeds: int) -> int:
     """Runs of one seed."""
     return seeds * len(FACTORS)
 
 
-def run(seeds: int, step: Step) -> dict[str, Any]:
+def run_study(seeds: int, step: Step) -> dict[str, Any]:
     """Rows of every factor and ``traces`` of the bias error (deg/s), mean over seeds."""
     cases, traces = [], {}
-    with trials(seeds, step) as run_all:
+    with over_seeds(seeds, step) as run_all:
         for name, factor, value in FACTORS:
             runs = run_all(setup_of(factor, value))
             error = mean_error_dps(runs)
@@ -71,7 +71,7 @@ def settled_dps(error: Array) -> float:
     return float(np.mean(np.abs(error[(ENDS > END - SETTLED_FOR) & (ENDS <= END)])))
 
 
-def convergence(error: Array) -> float | None:
+def convergence_time(error: Array) -> float | None:
     """Time from the stop to convergence, s; None where there is none."""
     settled, start = settled_dps(error), abs(RESIDUAL_DPS)
     if settled > 0.5 * start:
@@ -86,7 +86,7 @@ def _row(name: str, runs: list[LabRun], error: Array) -> dict[str, Any]:
     return {
         "case": name,
         "published": PUBLISHED_S.get(name),
-        "ours": convergence(error),
+        "ours": convergence_time(error),
         "unit": "s after the stop",
         "to_reach": None,
         "reached": None,

@@ -11,7 +11,7 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
 from groundstation.errors import SurveyError
-from groundstation.report.style import GREY, MARKERS, SERIES, above_zero, new_figure, styled, tidy
+from groundstation.report.style import GREY, MARKERS, SERIES, above_zero, new_figure, styled, tidy_ticks
 from sim.studies.weighting.run import AZIMUTH_DEG, INCLINATION_DEG
 
 Array = npt.NDArray[np.float64]
@@ -19,7 +19,7 @@ BEFORE_DEG = {"inclination": INCLINATION_DEG, "azimuth": AZIMUTH_DEG}
 STATION = 2
 
 
-def figures(result: dict[str, Any]) -> dict[str, Figure]:
+def draw_figures(result: dict[str, Any]) -> dict[str, Figure]:
     """One figure an angle."""
     found = {}
     for angle, before in BEFORE_DEG.items():
@@ -76,4 +76,4 @@ def weighting_figure(
     remaining.set(ylabel="Remaining error (cm)", title="Remaining error")
     reduction.set(ylabel="Reduction against equal weights (%)", title="Reduction", ylim=(-2.0, 100.0))
     figure.legend(handles=handles, loc="outside lower left", ncols=6)
-    return tidy(figure)
+    return tidy_ticks(figure)

@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from groundstation.survey.fusion.fusion import Weighting, sequence_weights, weighted
+from groundstation.survey.fusion.fusion import Weighting, fuse_by_scheme, sequence_weights
 from groundstation.survey.fusion.resolve import Direction
 from groundstation.survey.well.trajectory import Trajectory
 from sim.studies.pool import Step
@@ -37,37 +37,37 @@ PUBLISHED_RATIO = {
 PUBLISHED_CM = {"north": 1.18, "east": 2.0}
 
 
-def lean(inclination_deg: float, azimuth_deg: float) -> Direction:
+def direction_reading(inclination_deg: float, azimuth_deg: float) -> Direction:
     """Reading of a direction."""
     i, a = math.radians(inclination_deg), math.radians(azimuth_deg)
     horizontal = math.sin(i) * np.array([math.cos(a), math.sin(a)])
     return Direction(horizontal, math.cos(i), READING_STD**2 * np.eye(2), np.zeros((2, 0)))
 
 
-def positions(changed: int, now: Direction, scheme: Weighting | None) -> Array:
+def station_positions(changed: int, now: Direction, scheme: Weighting | None) -> Array:
     """Positions (5, 3) at the fourth stop by a scheme, or the true ones for None; ``changed`` is a station from 1."""
-    before = lean(INCLINATION_DEG, AZIMUTH_DEG)
+    before = direction_reading(INCLINATION_DEG, AZIMUTH_DEG)
     trajectory = Trajectory()
     for station in range(1, STATIONS + 1):
         readings = [before] * (STATIONS - station + 1)
         if station == changed:
             readings[-1] = now
-        direction = readings[-1] if scheme is None else weighted(readings, scheme)
+        direction = readings[-1] if scheme is None else fuse_by_scheme(readings, scheme)
         trajectory.append(SPACING * station, direction)
     return np.array([point.position for point in trajectory.points])
 
 
 def errors_cm(changed: int, now: Direction, scheme: Weighting) -> Array:
     """Error (4, 3) of every station north, east and down, cm."""
-    return 100.0 * (positions(changed, now, scheme) - positions(changed, now, None))[1:]
+    return 100.0 * (station_positions(changed, now, scheme) - station_positions(changed, now, None))[1:]
 
 
-def steps() -> int:
+def count_steps() -> int:
     """All at once."""
     return 1
 
 
-def run(step: Step) -> dict[str, Any]:
+def run_study(step: Step) -> dict[str, Any]:
     """Error-reduction factors beside the published ones, and the sweeps behind the figures."""
     result = {
         "experiment": "weighting",
@@ -83,7 +83,7 @@ def run(step: Step) -> dict[str, Any]:
 
 def _reductions() -> list[dict[str, Any]]:
     rows = []
-    now = lean(INCLINATION_DEG + 2.0, AZIMUTH_DEG)
+    now = direction_reading(INCLINATION_DEG + 2.0, AZIMUTH_DEG)
     for station in (2, 3):
         equal = np.linalg.norm(errors_cm(station, now, Weighting.EQUAL)[station - 1])
         for scheme in SCHEMES[1:]:
@@ -100,7 +100,7 @@ def _reductions() -> list[dict[str, Any]]:
 
 
 def _worked() -> list[dict[str, Any]]:
-    error = errors_cm(2, lean(INCLINATION_DEG + 2.0, AZIMUTH_DEG), Weighting.EQUAL)[1]
+    error = errors_cm(2, direction_reading(INCLINATION_DEG + 2.0, AZIMUTH_DEG), Weighting.EQUAL)[1]
     return [
         {
             "case": f"+2 deg at station 2, {axis}",
@@ -115,7 +115,11 @@ def _worked() -> list[dict[str, Any]]:
 def _sweep(angle: str, values_deg: Array) -> list[dict[str, Any]]:
     rows = []
     for value in values_deg.tolist():
-        now = lean(value, AZIMUTH_DEG) if angle == "inclination" else lean(INCLINATION_DEG, value)
+        now = (
+            direction_reading(value, AZIMUTH_DEG)
+            if angle == "inclination"
+            else direction_reading(INCLINATION_DEG, value)
+        )
         for scheme in SCHEMES:
             error = errors_cm(2, now, scheme)
             for station in range(1, STATIONS + 1):

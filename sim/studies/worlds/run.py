@@ -22,9 +22,9 @@ from node.kernels.record.filter_record import Scheme
 from sim.studies import epochs, lab
 from sim.studies.consistency.run import SHOWN, setup_of
 from sim.studies.lab import LAB, REST, ROTATING, LabRun
-from sim.studies.modes.run import CASES, Case, setups
-from sim.studies.pool import Step, over_cores, seeded
-from sim.studies.scenarios import Tables, changed, complete
+from sim.studies.modes.run import CASES, ModeCase, cases_by_setup
+from sim.studies.pool import Step, over_cores, seed_jobs
+from sim.studies.scenarios import Tables, change_sections, complete_string
 from sim.studies.trials import rms_deg
 from sim.world.parsing import read_toml
 from sim.world.shipped import shipped_folder
@@ -32,54 +32,56 @@ from sim.world.shipped import shipped_folder
 World = Callable[[Tables], Tables]
 FILE = "rough.toml"
 FIRST, LONG = "update-modes", "fifty-nodes"
-TWIST = Case("continuous 1.9 Hz, untold twist", LAB, None, 0.013, 0.035)
+TWIST = ModeCase("continuous 1.9 Hz, untold twist", LAB, None, 0.013, 0.035)
 
 
-def assumed(setup: Tables) -> Tables:
+def assumed_world(setup: Tables) -> Tables:
     """The world of the filter's own model."""
     return setup
 
 
-def twisted(setup: Tables) -> Tables:
+def shipped_rough_world(setup: Tables) -> Tables:
     """The rough world as it is shipped."""
     shipped = read_toml(shipped_folder() / FILE)
-    return changed(setup, rough=shipped["rough"], encoder=shipped["encoder"])
+    return change_sections(setup, rough=shipped["rough"], encoder=shipped["encoder"])
 
 
-def rough(setup: Tables) -> Tables:
+def rough_world(setup: Tables) -> Tables:
     """The rough world without untold twist."""
-    tables = twisted(setup)
+    tables = shipped_rough_world(setup)
     string = {key: value for key, value in tables["rough"]["string"].items() if key != "twist_deg"}
-    return changed(tables, rough={"string": string})
+    return change_sections(tables, rough={"string": string})
 
 
-WORLDS: dict[str, World] = {"assumed": assumed, "rough": rough}
+WORLDS: dict[str, World] = {"assumed": assumed_world, "rough": rough_world}
 ALL, CONSISTENCY = "all", "consistency"
 
 
 @dataclass(frozen=True, slots=True)
-class Job:
+class WorldsJob:
     """A string in either world, how many of its seeds, and which figures are of it; none: its consistency."""
 
     worlds: dict[str, Tables]
     seeds: int
-    cases: tuple[Case, ...] = ()
+    cases: tuple[ModeCase, ...] = ()
 
 
-def jobs_of(part: str, seeds: int, string_seeds: int, strings: int, hops: int) -> list[Job]:
+def jobs_of(part: str, seeds: int, string_seeds: int, strings: int, hops: int) -> list[WorldsJob]:
     """What one part, or all, runs."""
     jobs = []
     for name in (name for name in CASES if part in (ALL, name)):
         if name == FIRST:
-            jobs.append(Job({"assumed": LAB, "rough": twisted(LAB)}, seeds, (TWIST,)))
-        for setup, cases in setups(name):
+            jobs.append(WorldsJob({"assumed": LAB, "rough": shipped_rough_world(LAB)}, seeds, (TWIST,)))
+        for setup, cases in cases_by_setup(name):
             if name == LONG:
-                of_last = tuple(shortened(case, hops) for case in cases)
-                jobs.append(Job(in_both(changed(setup, rig=complete(hops))), string_seeds, of_last))
+                of_last = tuple(last_node_case(case, hops) for case in cases)
+                jobs.append(
+                    WorldsJob(in_both(change_sections(setup, rig=complete_string(hops))), string_seeds, of_last)
+                )
             else:
-                jobs.append(Job(in_both(setup), seeds, tuple(cases)))
+                jobs.append(WorldsJob(in_both(setup), seeds, tuple(cases)))
     if part in (ALL, CONSISTENCY):
-        jobs.append(Job(in_both(setup_of(Scheme.FORWARD, hops)), strings))
+        jobs.append(WorldsJob(in_both(setup_of(Scheme.FORWARD, hops)), strings))
     return jobs
 
 
@@ -88,24 +90,24 @@ def in_both(setup: Tables) -> dict[str, Tables]:
     return {world: of(setup) for world, of in WORLDS.items()}
 
 
-def shortened(case: Case, hops: int) -> Case:
+def last_node_case(case: ModeCase, hops: int) -> ModeCase:
     """The last node of a string of so many."""
     return replace(case, name=f"node {hops} of {hops}", hop=hops - 1)
 
 
-def steps(part: str, seeds: int, string_seeds: int, strings: int, hops: int) -> int:
+def count_steps(part: str, seeds: int, string_seeds: int, strings: int, hops: int) -> int:
     """Seeds of either world: of all strings that are run together, and of the long one."""
     jobs = jobs_of(part, seeds, string_seeds, strings, hops)
     alone = [job.seeds for job in jobs if not job.cases]
-    return len(WORLDS) * sum([*(count for count, _ in together(jobs)), *alone])
+    return len(WORLDS) * sum([*(count for count, _ in group_by_seeds(jobs)), *alone])
 
 
-def run(part: str, seeds: int, string_seeds: int, strings: int, hops: int, step: Step) -> dict[str, Any]:
+def run_study(part: str, seeds: int, string_seeds: int, strings: int, hops: int, step: Step) -> dict[str, Any]:
     """Both tables; ``step`` is called after each seed.
 
     Parameters
     ----------
-    part : the name of a table of modes, ``consistency``, or ``all``
+    part : the name of a table of modes, ``nees_by_world``, or ``all``
     seeds : of strings of one and two nodes
     string_seeds : of the long string
     strings : of the long string whose NEES is told epoch by epoch, by a campaign
@@ -114,36 +116,36 @@ def run(part: str, seeds: int, string_seeds: int, strings: int, hops: int, step:
     Returns
     -------
     dict
-        ``cases``: a row for each figure asked; ``consistency``: one for each epoch and hop.
+        ``cases``: a row for each figure asked; ``nees_by_world``: one for each epoch and hop.
     """
     result: dict[str, Any] = {"experiment": "worlds", "seeds": seeds, "string_seeds": string_seeds, "hops": hops}
     result["strings"], result["cases"], result[CONSISTENCY] = strings, [], []
     jobs = jobs_of(part, seeds, string_seeds, strings, hops)
     with over_cores(max(seeds, string_seeds, strings), step) as run_all:
-        for count, some in together(jobs):
+        for count, some in group_by_seeds(jobs):
             runs: dict[str, list[list[LabRun]]] = {}
             for world in WORLDS:
-                runs[world] = run_all(lab.run_seed_of_each, seeded([job.worlds[world] for job in some], count))
+                runs[world] = run_all(lab.run_seed_of_each, seed_jobs([job.worlds[world] for job in some], count))
             for place, job in enumerate(some):
                 of_job = {world: [of_seed[place] for of_seed in found] for world, found in runs.items()}
                 result["cases"] += [row for case in job.cases for row in rows_of(case, of_job)]
         for job in (job for job in jobs if not job.cases):
-            result[CONSISTENCY] += consistency(
+            result[CONSISTENCY] += nees_by_world(
                 {
-                    world: run_all(epochs.run_campaign_seed, seeded(setup, job.seeds))
+                    world: run_all(epochs.run_campaign_seed, seed_jobs(setup, job.seeds))
                     for world, setup in job.worlds.items()
                 }
             )
     return result
 
 
-def together(jobs: Sequence[Job]) -> Iterator[tuple[int, list[Job]]]:
+def group_by_seeds(jobs: Sequence[WorldsJob]) -> Iterator[tuple[int, list[WorldsJob]]]:
     """Strings that stand one after the other and have as many seeds: they are run seed by seed, with their seeds."""
     for count, some in groupby((job for job in jobs if job.cases), key=lambda job: job.seeds):
         yield count, list(some)
 
 
-def rows_of(case: Case, runs: dict[str, list[LabRun]]) -> list[dict[str, Any]]:
+def rows_of(case: ModeCase, runs: dict[str, list[LabRun]]) -> list[dict[str, Any]]:
     """Figures of one case in either world."""
     hop = case.hop
     told: list[tuple[str, float | None, Callable[[LabRun], Any], Any]] = [
@@ -167,7 +169,7 @@ def nees_of(runs: Sequence[LabRun], when: lab.Mask, hop: int) -> float:
     return float(np.mean([one.error[when, hop] ** 2 / one.total_var[when, hop] for one in runs]))
 
 
-def consistency(found: dict[str, list[epochs.EpochRun]]) -> list[dict[str, Any]]:
+def nees_by_world(found: dict[str, list[epochs.EpochRun]]) -> list[dict[str, Any]]:
     """NEES at fixed epochs with the errors of joints and mounts, in either world: one row an epoch and hop."""
     turning = next(iter(found.values()))[0].turning
     rows = []
@@ -184,7 +186,7 @@ def consistency(found: dict[str, list[epochs.EpochRun]]) -> list[dict[str, Any]]
     return rows
 
 
-def verdicts(result: dict[str, Any]) -> list[str]:
+def verdict_lines(result: dict[str, Any]) -> list[str]:
     """In each world: how many figures are reached, and how far from 1 the NEES is."""
     lines = []
     asked = [row for row in result["cases"] if row["to_reach"] is not None]

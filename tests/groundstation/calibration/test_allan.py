@@ -7,17 +7,17 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from groundstation.calibration.allan import (
+from groundstation.calibration.allan_analysis import (
     allan_variance,
-    analyse,
-    confidence,
+    analyse_allan_deviation,
     curve_factors,
     filter_noise,
     filter_noise_of,
     fit_factors,
     gauss_markov_variance,
+    relative_standard_error,
 )
-from groundstation.calibration.allan_fit import design, fit, moments
+from groundstation.calibration.allan_fit import allan_design_matrix, fit_allan_variances, spectral_moments
 from groundstation.calibration.errors import CalibrationError
 from sim.instruments.static_records import StaticNoise, static_record
 
@@ -53,13 +53,13 @@ def test_is_half_the_mean_square_difference_of_neighbouring_means(factor: int) -
 
 def test_spectra_integrate_to_the_known_allan_variances() -> None:
     factors = (1, 2, 5, 16, 64)
-    assert moments(8192, factors)[0] == pytest.approx(design(np.array(factors)).T, rel=1e-4)
+    assert spectral_moments(8192, factors)[0] == pytest.approx(allan_design_matrix(np.array(factors)).T, rel=1e-4)
 
 
 def test_covariance_of_white_noise_at_factor_1_is_three_over_the_terms() -> None:
     # d = w2 - w1 has variance 2 and covariance -1 with its neighbour: var of mean d^2/2 is (4 + 2) / 2 over the terms
     count = 4000
-    assert moments(count, (1,))[1][0, 0, 0, 0] == pytest.approx(3.0 / (count - 1), rel=1e-9)
+    assert spectral_moments(count, (1,))[1][0, 0, 0, 0] == pytest.approx(3.0 / (count - 1), rel=1e-9)
 
 
 def second_differences(count: int, factor: int) -> np.ndarray:
@@ -84,7 +84,7 @@ def test_covariance_is_that_of_the_quadratic_forms(term: str) -> None:
     forms = [second_differences(count, n) @ process for n in factors]
     exact = np.array([[2.0 * np.sum(a * b.T) for b in forms] for a in forms])
     which = 0 if term == "white" else 2
-    theory = moments(count, factors)[1][which, which]
+    theory = spectral_moments(count, factors)[1][which, which]
     assert theory == pytest.approx(exact, rel=0.07)  # at a tenth of the record; far below it:
     assert theory[0] == pytest.approx(exact[0], rel=0.002)
 
@@ -100,7 +100,7 @@ def test_covariance_is_what_repeated_records_scatter_by() -> None:
         [[allan_variance(y, n) for n in factors] for y in static_record((noise,) * 1000, 640, 1.0, seed=3).T]
     )
     squares = np.array([1.0, 0.25, 0.0025])
-    theory = np.einsum("abmn,a,b->mn", moments(640, factors)[1], squares, squares)
+    theory = np.einsum("abmn,a,b->mn", spectral_moments(640, factors)[1], squares, squares)
     scatter = np.cov(table.T)
     assert np.diag(scatter) == pytest.approx(np.diag(theory), rel=0.2)  # 4 standard errors of a variance from 1000
     stds = np.sqrt(np.diag(theory))
@@ -112,11 +112,11 @@ def test_covariance_is_what_repeated_records_scatter_by() -> None:
 @settings(max_examples=30, deadline=None)
 def test_exact_variances_give_back_their_terms(n: float, f: float, k: float) -> None:
     factors = (1, 2, 4, 8, 16, 32, 64, 128, 256)
-    exact = design(np.array(factors)) @ np.array([n, f, 0.0]) ** 2
-    plain = fit(exact, factors, 4096)
+    exact = allan_design_matrix(np.array(factors)) @ np.array([n, f, 0.0]) ** 2
+    plain = fit_allan_variances(exact, factors, 4096)
     assert (plain.random_walk.value**2, plain.floor.value**2) == pytest.approx((n**2, f**2), rel=1e-6, abs=1e-9)
     assert plain.rate_walk is None
-    strong = fit(exact + (k + n + f) ** 2 * np.array(factors) / 3.0, factors, 4096)
+    strong = fit_allan_variances(exact + (k + n + f) ** 2 * np.array(factors) / 3.0, factors, 4096)
     assert strong.rate_walk is not None
     assert strong.rate_walk.value == pytest.approx(k + n + f, rel=1e-6)
 
@@ -125,7 +125,7 @@ def test_exact_variances_give_back_their_terms(n: float, f: float, k: float) -> 
 @settings(max_examples=15, deadline=None)
 def test_scales_with_the_unit_and_ignores_the_mean(scale: float, offset: float) -> None:
     y = record(MPU_X, 100.0)
-    one, other = analyse(y, RATE)[0], analyse(scale * (y + offset), RATE)[0]
+    one, other = analyse_allan_deviation(y, RATE)[0], analyse_allan_deviation(scale * (y + offset), RATE)[0]
     assert other.deviation == pytest.approx(scale * one.deviation, rel=1e-6, abs=0.0)
     for name in ("value", "std", "low", "high"):
         for term in ("random_walk", "floor"):
@@ -137,7 +137,7 @@ def test_scales_with_the_unit_and_ignores_the_mean(scale: float, offset: float) 
 @given(seed=st.integers(0, 10_000), rate=st.sampled_from([2.0, 20.0, 65.0]))
 @settings(max_examples=15, deadline=None)
 def test_white_noise_falls_with_slope_minus_one_half(seed: int, rate: float) -> None:
-    result = analyse(record(StaticNoise(white=0.3), 1000.0, rate, seed), rate)[0]
+    result = analyse_allan_deviation(record(StaticNoise(white=0.3), 1000.0, rate, seed), rate)[0]
     early = result.tau < 20.0
     slope = np.polyfit(np.log(result.tau[early]), np.log(result.deviation[early]), 1)[0]
     assert slope == pytest.approx(-0.5, abs=0.1)
@@ -147,7 +147,7 @@ def test_white_noise_falls_with_slope_minus_one_half(seed: int, rate: float) -> 
 
 def test_rate_only_names_the_seconds() -> None:
     y = record(StaticNoise(white=1.0, flicker=0.2, walk=0.3), 1000.0)
-    slow, fast = analyse(y, RATE)[0], analyse(y, 2.0)[0]
+    slow, fast = analyse_allan_deviation(y, RATE)[0], analyse_allan_deviation(y, 2.0)[0]
     assert slow.raw_at_1s.tau == fast.raw_at_1s.tau == 1.0
     assert slow.fit.rate_walk is not None
     assert slow.fit.rate_walk.low < 0.3 < slow.fit.rate_walk.high
@@ -158,7 +158,7 @@ def test_rate_only_names_the_seconds() -> None:
 def test_two_hours_at_65_hz_give_back_what_they_were_made_of() -> None:
     truths = ((8.9e-3, 7.9e-3), (6.9e-3, 3.83e-3), (7.38e-3, 3.33e-3))
     readings = static_record(tuple(StaticNoise(white=n, flicker=f) for n, f in truths), 468_000, 65.0, seed=5)
-    for result, (n, f) in zip(analyse(readings, 65.0), truths, strict=True):
+    for result, (n, f) in zip(analyse_allan_deviation(readings, 65.0), truths, strict=True):
         assert result.random_walk.value == pytest.approx(n, rel=0.0077)
         assert result.floor.value == pytest.approx(f, rel=0.042)
         assert result.floor.std < 0.03 * f
@@ -172,7 +172,7 @@ def test_intervals_hold_the_truth_as_often_as_they_say() -> None:
     held = []
     for noise in (MPU_X, MPU_Z):
         for y in static_record((noise,) * 60, 6000, RATE, seed=7).T:
-            result = analyse(y, RATE)[0]
+            result = analyse_allan_deviation(y, RATE)[0]
             held.append(
                 (
                     result.random_walk.low <= noise.white <= result.random_walk.high,
@@ -190,21 +190,21 @@ def test_floor_from_a_generator_of_another_kind() -> None:
     taps = np.concatenate([[1.0], np.cumprod((k - 0.5) / k)])
     drive = np.random.default_rng(11).standard_normal(1 << 16)
     y = np.fft.irfft(np.fft.rfft(taps, 1 << 17) * np.fft.rfft(drive, 1 << 17))[: 1 << 16]
-    result = analyse(y, 65.0)[0]
+    result = analyse_allan_deviation(y, 65.0)[0]
     assert result.floor.value == pytest.approx(math.sqrt(2.0 * math.log(2.0) / math.pi), rel=0.05)
 
 
 def test_other_shape_than_the_models_is_noticed() -> None:
     y = record(StaticNoise(white=8.538e-3, bias_std=1.2545e-2, bias_tau=15.87), 3600.0)
-    result = analyse(y, RATE)[0]
+    result = analyse_allan_deviation(y, RATE)[0]
     assert not result.fit.consistent
     assert result.random_walk.low < 8.538e-3 < result.random_walk.high  # wider for it
 
 
 def test_confidence_and_factors_of_the_curve() -> None:
-    result = analyse(record(MPU_X), RATE)[0]
+    result = analyse_allan_deviation(record(MPU_X), RATE)[0]
     assert result.confidence[0] == pytest.approx(1.0 / math.sqrt(2.0 * (12_000 - 1)))
-    assert confidence(90, 10) == pytest.approx(0.25)
+    assert relative_standard_error(90, 10) == pytest.approx(0.25)
     assert result.raw_minimum.confidence <= 0.25
     assert curve_factors(12_000)[:4] == [1, 2, 3, 4]
     assert curve_factors(12_000)[-1] <= 4_000
@@ -235,7 +235,7 @@ def test_gauss_markov_curve_has_its_peak_where_the_mapping_puts_it() -> None:
 
 
 def test_filter_noise_of_a_fit_meets_the_fitted_curve() -> None:
-    found = analyse(record(MPU_X), RATE)[0].fit
+    found = analyse_allan_deviation(record(MPU_X), RATE)[0].fit
     noise = filter_noise_of(found, 60.0)
     for tau in (1.0, 60.0):
         ours = noise.white**2 / tau + noise.bias_std**2 * gauss_markov_variance(tau, noise.bias_tau)
@@ -290,16 +290,16 @@ def spoiled(how: str) -> np.ndarray:
 )
 def test_refuses_what_is_no_static_record(how: str, message: str) -> None:
     with pytest.raises(CalibrationError, match=message):
-        analyse(spoiled(how), RATE)
+        analyse_allan_deviation(spoiled(how), RATE)
 
 
 @pytest.mark.parametrize("rate", [0.0, -1.0, math.nan, math.inf, 0.5])
 def test_refuses_a_rate_that_is_none(rate: float) -> None:
     with pytest.raises(CalibrationError, match="at least 1 Hz"):
-        analyse(np.zeros(5000), rate)
+        analyse_allan_deviation(np.zeros(5000), rate)
 
 
 def test_good_records_are_not_refused() -> None:
     noise = (MPU_X, MPU_Z, StaticNoise(white=1e-2), StaticNoise(flicker=1e-2), StaticNoise(white=1e-2, walk=1e-3))
     for y in static_record(noise * 40, 6000, RATE, seed=13).T:
-        analyse(y, RATE)
+        analyse_allan_deviation(y, RATE)

@@ -8,10 +8,10 @@ import pytest
 from hypothesis import assume, given
 from hypothesis import strategies as st
 
-from groundstation.calibration.attitudes import fit, fit_free_yaw, true_vectors
+from groundstation.calibration.attitudes import fit_attitudes, fit_free_yaw, true_vectors
+from groundstation.calibration.calibration_records import read_attitudes, read_turn_table
 from groundstation.calibration.errors import CalibrationError
-from groundstation.calibration.records import read_attitudes, read_turn_table
-from groundstation.calibration.turntable import align, as_observations
+from groundstation.calibration.turntable import as_observations, turntable_alignment
 
 DATA = Path(__file__).parents[2] / "data" / "calibration"
 VN100_MATRIX = [[-3.69569, 9.05279, 0.83102], [-9.05855, -3.69281, -0.86393], [-0.01440, 0.29226, 9.86523]]
@@ -51,14 +51,14 @@ def test_truth_of_presets() -> None:
 
 
 def test_the_exact_answer_of_the_drill_head() -> None:
-    result = fit(*vn100())
+    result = fit_attitudes(*vn100())
     assert np.abs(result.matrix - VN100_MATRIX).max() < 1e-5
     assert np.abs(result.bias - VN100_BIAS).max() < 1e-5
     assert result.rank == 4
 
 
 def test_the_home_position_carries_the_drill_head_with_a_lever_of_66() -> None:
-    result = fit(*vn100())
+    result = fit_attitudes(*vn100())
     assert result.levers[0] == pytest.approx(1.0 / (1.0 - math.cos(math.radians(10.0))), rel=1e-9)
     assert round(float(result.levers[0])) == 66
     assert result.levers[1:].max() < 10.0
@@ -72,9 +72,9 @@ def test_eight_positions_at_one_tilt_are_refused_and_home_is_named() -> None:
     with pytest.raises(
         CalibrationError, match=r"^attitudes: expected a design of rank 4, got 3 of 4: add the attitude "
     ):
-        fit(truth[1:], readings[1:])
+        fit_attitudes(truth[1:], readings[1:])
     with pytest.raises(CalibrationError, match=r"add the attitude home \(pitch 0, roll 0\)$"):
-        fit(truth[1:], readings[1:])
+        fit_attitudes(truth[1:], readings[1:])
 
 
 @pytest.mark.parametrize(
@@ -89,7 +89,7 @@ def test_eight_positions_at_one_tilt_are_refused_and_home_is_named() -> None:
 )
 def test_a_design_that_lacks_an_axis_says_which_attitude_it_lacks(truth: np.ndarray, rank: int, missing: str) -> None:
     with pytest.raises(CalibrationError, match=f"got {rank} of 4: add the {missing}"):
-        fit(truth, truth @ MATRIX.T + BIAS)
+        fit_attitudes(truth, truth @ MATRIX.T + BIAS)
 
 
 @pytest.mark.parametrize("keep", [[0, 1, 2, 3, 3], [1, 3, 4, 5, 1], [0, 2, 0, 2, 0]])
@@ -97,16 +97,16 @@ def test_the_attitudes_named_complete_the_design(keep: list[int]) -> None:
     named = {"home": (0, 0), "pitch 0, roll 90": (0, 90), "pitch 90 deg": (90, 0), "pitch 0, roll -90": (0, -90)}
     truth = SIX[keep]
     with pytest.raises(CalibrationError) as refused:
-        fit(truth, truth @ MATRIX.T + BIAS)
+        fit_attitudes(truth, truth @ MATRIX.T + BIAS)
     added = presets(*(preset for words, preset in named.items() if words in str(refused.value)))
     whole = np.vstack([truth, added])
-    np.testing.assert_allclose(fit(whole, whole @ MATRIX.T + BIAS).matrix, MATRIX, atol=1e-12)
+    np.testing.assert_allclose(fit_attitudes(whole, whole @ MATRIX.T + BIAS).matrix, MATRIX, atol=1e-12)
 
 
 def test_the_balanced_design_is_the_turn_table() -> None:
     table = read_turn_table(DATA / "calibration_node_a1_gyro.csv", 720.0)
-    basic = align(table.positive, table.negative, table.reference)
-    result = fit(*as_observations(table.positive, table.negative, table.reference))
+    basic = turntable_alignment(table.positive, table.negative, table.reference)
+    result = fit_attitudes(*as_observations(table.positive, table.negative, table.reference))
     assert np.abs(result.matrix - basic.matrix).max() < 1e-13
     assert np.abs(result.bias - basic.bias).max() < 1e-13
     np.testing.assert_allclose(result.residuals, np.tile(basic.residuals, (2, 1)), atol=1e-12)
@@ -122,7 +122,7 @@ def test_the_sensor_that_read_comes_back(angles: list[tuple[float, float]], entr
     values = np.linalg.svd(np.column_stack([np.ones(len(truth)), truth]), compute_uv=False)
     assume(values[-1] > 1e-2 * values[0])
     matrix, bias = 9.81 * np.eye(3) + np.array(entries[:9]).reshape(3, 3), np.array(entries[9:])
-    result = fit(truth, truth @ matrix.T + bias)
+    result = fit_attitudes(truth, truth @ matrix.T + bias)
     np.testing.assert_allclose(result.matrix, matrix, atol=1e-10)
     np.testing.assert_allclose(result.bias, bias, atol=1e-10)
 
@@ -139,7 +139,7 @@ def test_the_parameters_are_in_the_order_of_the_equation() -> None:
         weights[3 * k : 3 * k + 3, 3 * k : 3 * k + 3] = np.linalg.inv(cov)
     normal = design.T @ weights @ design
     expected = np.linalg.solve(normal, design.T @ weights @ readings.ravel())
-    result = fit(SCATTERED, readings, covs)
+    result = fit_attitudes(SCATTERED, readings, covs)
     np.testing.assert_allclose(np.concatenate([result.bias, result.matrix.ravel()]), expected, rtol=1e-9, atol=1e-9)
     np.testing.assert_allclose(result.cov, np.linalg.inv(normal), rtol=1e-8, atol=1e-9)
     np.testing.assert_allclose(result.residuals.ravel(), readings.ravel() - design @ expected, atol=1e-9)
@@ -149,7 +149,10 @@ def test_the_parameters_are_in_the_order_of_the_equation() -> None:
 
 def test_equal_covariances_weigh_as_none_do() -> None:
     truth, readings = vn100()
-    weighted, plain = fit(truth, readings, np.tile(1e-4 * np.eye(3), (9, 1, 1))), fit(truth, readings)
+    weighted, plain = (
+        fit_attitudes(truth, readings, np.tile(1e-4 * np.eye(3), (9, 1, 1))),
+        fit_attitudes(truth, readings),
+    )
     np.testing.assert_allclose(weighted.matrix, plain.matrix, atol=1e-10)
     np.testing.assert_allclose(weighted.bias, plain.bias, atol=1e-10)
 
@@ -158,9 +161,9 @@ def test_a_reading_nobody_trusts_does_not_count() -> None:
     readings = SCATTERED @ MATRIX.T + BIAS
     readings[3] += 5.0
     covs = np.tile(1e-6 * np.eye(3), (8, 1, 1))
-    assert np.abs(fit(SCATTERED, readings, covs).bias - BIAS).max() > 0.1
+    assert np.abs(fit_attitudes(SCATTERED, readings, covs).bias - BIAS).max() > 0.1
     covs[3] = 1e6 * np.eye(3)
-    np.testing.assert_allclose(fit(SCATTERED, readings, covs).bias, BIAS, atol=1e-9)
+    np.testing.assert_allclose(fit_attitudes(SCATTERED, readings, covs).bias, BIAS, atol=1e-9)
 
 
 @pytest.mark.parametrize("known", [True, False])
@@ -168,7 +171,7 @@ def test_the_standard_errors_are_those_of_many_repetitions(known: bool) -> None:
     rng, std = np.random.default_rng(11), np.array([0.01, 0.02, 0.05])
     covs = np.tile(np.diag(std**2), (8, 1, 1)) if known else None
     repetitions = [
-        fit(SCATTERED, SCATTERED @ MATRIX.T + BIAS + std * rng.normal(size=(8, 3)), covs) for _ in range(600)
+        fit_attitudes(SCATTERED, SCATTERED @ MATRIX.T + BIAS + std * rng.normal(size=(8, 3)), covs) for _ in range(600)
     ]
     scatter = np.std([np.concatenate([r.bias, r.matrix.ravel()]) for r in repetitions], axis=0)
     claimed = np.sqrt(np.mean([np.diag(r.cov) for r in repetitions], axis=0))
@@ -180,8 +183,8 @@ def test_four_attitudes_need_the_covariances_of_their_readings() -> None:
     truth = SIX[[0, 1, 3, 4]]
     readings = truth @ MATRIX.T + BIAS
     with pytest.raises(CalibrationError, match="expected covariances or 5 readings or more, got 4 of an axis"):
-        fit(truth, readings)
-    result = fit(truth, readings, np.tile(1e-4 * np.eye(3), (4, 1, 1)))
+        fit_attitudes(truth, readings)
+    result = fit_attitudes(truth, readings, np.tile(1e-4 * np.eye(3), (4, 1, 1)))
     np.testing.assert_allclose(result.matrix, MATRIX, atol=1e-12)
     # The z bias is half the sum of opposite readings along y, two readings of 0.01 each.
     np.testing.assert_allclose(result.bias_std(), 0.01 / math.sqrt(2.0))
@@ -198,7 +201,7 @@ def test_the_print_agrees_in_its_xy_block_after_a_yaw_of_the_rig_but_for_its_mis
     assert difference[0, 1] == pytest.approx(0.9, abs=0.005)  # 8.100 for 9.0..
     # The vertical column rests on one reading, and there the print is another sensor.
     assert difference[:2, 2].min() > 1.8
-    assert np.abs(fit(truth, readings).matrix - VN100_PRINTED)[[0, 1, 1], [0, 0, 1]].max() > 0.05
+    assert np.abs(fit_attitudes(truth, readings).matrix - VN100_PRINTED)[[0, 1, 1], [0, 0, 1]].max() > 0.05
 
 
 @given(yaw=st.floats(-3.1, 3.1), hidden=st.sampled_from([None, (0, 0), (0, 1), (1, 0), (1, 1)]))
@@ -215,7 +218,7 @@ def test_a_rig_that_stands_turned_is_found(yaw: float, hidden: tuple[int, int] |
 
 def test_a_free_yaw_changes_no_residual() -> None:
     truth, readings = vn100()
-    free, fixed = fit_free_yaw(truth, readings, VN100_PRINTED), fit(truth, readings)
+    free, fixed = fit_free_yaw(truth, readings, VN100_PRINTED), fit_attitudes(truth, readings)
     np.testing.assert_allclose(
         readings - (truth @ rotation(free.yaw).T @ free.matrix.T + free.bias), fixed.residuals, atol=1e-10
     )
@@ -254,4 +257,4 @@ def test_numbers_that_do_not_fit_are_refused(
     truth: np.ndarray, readings: np.ndarray, covs: np.ndarray | None, reason: str
 ) -> None:
     with pytest.raises(CalibrationError, match=reason):
-        fit(truth, readings, covs)
+        fit_attitudes(truth, readings, covs)

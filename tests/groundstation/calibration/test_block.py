@@ -240,42 +240,42 @@ def test_a_provenance_that_is_no_object_is_refused() -> None:
 def test_a_file_is_replaced_and_nothing_else_is_left(tmp_path: Path) -> None:
     path = tmp_path / "a1.json"
     path.write_text("old")
-    block.write(path, BLOCK)
-    assert block.read(path).sha256() == SHA256
+    block.write_calibration(path, BLOCK)
+    assert block.read_calibration(path).sha256() == SHA256
     assert list(tmp_path.iterdir()) == [path]
 
 
 @pytest.mark.parametrize("step", ["fsync", "replace"])
 def test_a_disk_that_fails_leaves_the_old_file(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, step: str) -> None:
     path = tmp_path / "a1.json"
-    block.write(path, BLOCK)
+    block.write_calibration(path, BLOCK)
 
     def fail(*_: object) -> None:
         raise OSError(28, "No space left on device")
 
     monkeypatch.setattr(*((os, "fsync") if step == "fsync" else (Path, "replace")), fail)
     with pytest.raises(CalibrationError, match="expected a place to write to, got No space left on device"):
-        block.write(path, replace(BLOCK, reference=50.0))
+        block.write_calibration(path, replace(BLOCK, reference=50.0))
     monkeypatch.undo()
     assert list(tmp_path.iterdir()) == [path]
-    assert block.read(path).reference == 25.0
+    assert block.read_calibration(path).reference == 25.0
 
 
 def test_a_folder_that_is_not_there(tmp_path: Path) -> None:
     with pytest.raises(CalibrationError, match=r"a1\.json: expected a place to write to, got No such file"):
-        block.write(tmp_path / "none" / "a1.json", BLOCK)
+        block.write_calibration(tmp_path / "none" / "a1.json", BLOCK)
     with pytest.raises(CalibrationError, match=r"a1\.json: expected a calibration, got .*No such file"):
-        block.read(tmp_path / "a1.json")
+        block.read_calibration(tmp_path / "a1.json")
     (tmp_path / "file").write_text("no folder")
     with pytest.raises(CalibrationError, match=r"a1\.json: expected a place to write to, got Not a directory"):
-        block.write(tmp_path / "file" / "a1.json", BLOCK)
+        block.write_calibration(tmp_path / "file" / "a1.json", BLOCK)
 
 
 def test_a_file_that_was_cut_is_refused_with_its_name(tmp_path: Path) -> None:
     path = tmp_path / "a1.json"
     path.write_text(to_json(BLOCK)[:100])
     with pytest.raises(CalibrationError, match=r"a1\.json: calibration: expected JSON"):
-        block.read(path)
+        block.read_calibration(path)
     path.write_bytes(b"\xff\xfe")
     with pytest.raises(CalibrationError, match=r"a1\.json: expected a calibration, got"):
-        block.read(path)
+        block.read_calibration(path)

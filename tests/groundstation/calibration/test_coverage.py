@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from scipy.special import stdtrit
 
-from groundstation.calibration.attitudes import fit, true_vectors
+from groundstation.calibration.attitudes import fit_attitudes, true_vectors
 from groundstation.calibration.coverage import coverage_factor
 from groundstation.calibration.turntable import as_observations
 
@@ -44,7 +44,7 @@ def test_the_stated_interval_covers_95_percent(name: str, degrees: int) -> None:
     held, narrow, axes = np.zeros(4), np.zeros(4), 0
     wanted, exact = np.column_stack([MATRIX, BIAS]), truth @ MATRIX.T + BIAS
     while axes < RUNS:
-        found = fit(truth, exact + rng.normal(0.0, 0.01, exact.shape))
+        found = fit_attitudes(truth, exact + rng.normal(0.0, 0.01, exact.shape))
         off = np.abs(np.column_stack([found.matrix, found.bias]) - wanted)
         std = np.column_stack([found.matrix_std(), found.bias_std()])
         held += np.count_nonzero(off <= found.coverage_factor() * std, axis=0)

@@ -9,7 +9,13 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from groundstation.calibration.errors import CalibrationError
-from groundstation.calibration.field import Rest, inclination, inclination_rms, solve, truths
+from groundstation.calibration.field_calibration import (
+    Rest,
+    calibrate_accelerometer,
+    force_inclination,
+    inclination_rms,
+    true_specific_forces,
+)
 from telemetry.messages import Matrix3, StaticRecord
 
 G, DAY = 9.81, "2024-05-31"
@@ -37,7 +43,7 @@ small = st.floats(-0.05, 0.05)
 @given(st.lists(small, min_size=9, max_size=9), st.lists(st.floats(-0.5, 0.5), min_size=3, max_size=3))
 def test_any_matrix_and_bias_come_back(off: list[float], offset: list[float]) -> None:
     matrix, bias = np.eye(3) + np.array(off).reshape(3, 3), np.array(offset)
-    result = solve(rests(matrix, bias), G, DAY)
+    result = calibrate_accelerometer(rests(matrix, bias), G, DAY)
     np.testing.assert_allclose(result.calibration.matrix, matrix, atol=1e-12)
     np.testing.assert_allclose(result.calibration.bias, bias, atol=1e-11)
     assert result.residual_rms < 1e-11
@@ -48,7 +54,7 @@ def test_standard_errors_are_those_of_repeated_calibrations() -> None:
     """The truth lies within the stated errors as often as it should, over 200 calibrations."""
     scores = []
     for seed in range(200):
-        solved = solve(rests(std=0.002, seed=seed), G, DAY)
+        solved = calibrate_accelerometer(rests(std=0.002, seed=seed), G, DAY)
         off = np.concatenate(
             [
                 solved.fit.bias / solved.fit.bias_std(),
@@ -62,14 +68,22 @@ def test_standard_errors_are_those_of_repeated_calibrations() -> None:
 
 
 def test_the_home_position_hangs() -> None:
-    np.testing.assert_allclose(truths(rests()[:1], G), [[0.0, 0.0, -G]])
-    assert inclination(truths(rests(), 1.0))[:5] == pytest.approx(np.radians([0.0, 45.0, 90.0, 135.0, 180.0]))
+    np.testing.assert_allclose(true_specific_forces(rests()[:1], G), [[0.0, 0.0, -G]])
+    assert force_inclination(true_specific_forces(rests(), 1.0))[:5] == pytest.approx(
+        np.radians([0.0, 45.0, 90.0, 135.0, 180.0])
+    )
 
 
 def test_a_calibration_says_where_it_comes_from_and_is_the_same_for_the_same_records() -> None:
-    one, other = solve(rests(std=1e-3), G, DAY).calibration, solve(rests(std=1e-3), G, DAY).calibration
+    one, other = (
+        calibrate_accelerometer(rests(std=1e-3), G, DAY).calibration,
+        calibrate_accelerometer(rests(std=1e-3), G, DAY).calibration,
+    )
     assert one.sha256() == other.sha256()
-    assert one.provenance.input_sha256 != solve(rests(std=1e-3, seed=1), G, DAY).calibration.provenance.input_sha256
+    assert (
+        one.provenance.input_sha256
+        != calibrate_accelerometer(rests(std=1e-3, seed=1), G, DAY).calibration.provenance.input_sha256
+    )
     assert "11 attitudes" in one.provenance.design
     assert (one.sensor, one.reference) == ("accelerometer", 25.0)
 
@@ -96,11 +110,11 @@ def spoil(place: int, **changes: object) -> list[Rest]:
 )  # fmt: skip
 def test_what_is_no_calibration_is_refused_with_the_reason(wrong: list[Rest], named: str) -> None:
     with pytest.raises(CalibrationError, match=named):
-        solve(wrong, G, DAY)
+        calibrate_accelerometer(wrong, G, DAY)
 
 
 def test_an_attitude_that_was_not_the_one_told_is_named() -> None:
     made = rests(std=0.001)
     made[5] = replace(made[5], roll=math.radians(-130.0))
     with pytest.raises(CalibrationError, match="roll -130 deg: was it this attitude"):
-        solve(made, G, DAY)
+        calibrate_accelerometer(made, G, DAY)

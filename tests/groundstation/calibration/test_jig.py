@@ -7,14 +7,14 @@ import math
 import numpy as np
 import pytest
 
-from groundstation.calibration.attitudes import fit, true_vectors
+from groundstation.calibration.attitudes import fit_attitudes, true_vectors
 from groundstation.calibration.coverage import coverage_factor
 from groundstation.calibration.errors import CalibrationError
-from groundstation.calibration.intervals import Interval, Spread, interval
-from groundstation.calibration.jig import Jig, cross, reading_errors, settings_of, spreads_of
+from groundstation.calibration.intervals import Interval, Spread, coverage_interval
+from groundstation.calibration.jig import Jig, cross_product_matrices, reading_errors, settings_of, spreads_of
 from groundstation.calibration.mwd_solve import solve_accelerometers
 from groundstation.calibration.turntable import SETTINGS, as_observations
-from sim.instruments.mwd_jig import Heating, draw_tool, make_design, measure
+from sim.instruments.mwd_jig import Heating, draw_tool, make_design, measure_tool
 
 MATRIX = np.array([[9.9, 0.2, -0.1], [-0.3, 9.7, 0.15], [0.05, -0.25, 9.85]])
 BIAS = np.array([0.1, -0.2, 0.3])
@@ -41,7 +41,7 @@ def intervals_of(name: str, jig: Jig) -> list[list[Interval]]:
     truth, settings = design(name)
     basis = np.column_stack([np.ones(len(truth)), truth])
     spreads = spreads_of(basis, reading_errors(truth, MATRIX, settings, jig))
-    return [[interval(spread) for spread in row] for row in spreads]
+    return [[coverage_interval(spread) for spread in row] for row in spreads]
 
 
 def held(name: str, share: float, runs: int, jig: Jig) -> np.ndarray:
@@ -78,19 +78,21 @@ def test_intervals_hold_95_percent_whatever_is_the_jigs(name: str) -> None:
 @pytest.mark.slow
 def test_the_fit_states_these_intervals_and_the_residuals_alone_hold_less() -> None:
     truth, settings = design("nine, nine times")
-    assert fit(truth, truth @ MATRIX.T + BIAS, jig=Jig(LEAN, 0.0), settings=settings).degrees == 77
+    assert fit_attitudes(truth, truth @ MATRIX.T + BIAS, jig=Jig(LEAN, 0.0), settings=settings).degrees == 77
     rng, blind = np.random.default_rng(15), []
     basis = np.column_stack([np.ones(len(truth)), truth])
     for run in range(25):
         turns = LEAN * rng.normal(size=(settings.max() + 1, 3))[settings]
         readings = (truth + np.cross(turns, truth)) @ MATRIX.T + BIAS + NOISE * rng.normal(size=truth.shape)
-        plain = fit(truth, readings)
+        plain = fit_attitudes(truth, readings)
         blind.append(np.abs(plain.matrix - MATRIX) <= plain.matrix_expanded())
         if run == 0:
-            found = fit(truth, readings, jig=Jig(LEAN, 0.0), settings=settings)
+            found = fit_attitudes(truth, readings, jig=Jig(LEAN, 0.0), settings=settings)
             spreads = spreads_of(basis, reading_errors(truth, found.matrix, settings, Jig(LEAN, 0.0)))
             squares = np.sum(found.residuals**2, axis=0)
-            mine = [[float(interval(s).half_width(squares[axis])) for axis, s in enumerate(row)] for row in spreads]
+            mine = [
+                [float(coverage_interval(s).half_width(squares[axis])) for axis, s in enumerate(row)] for row in spreads
+            ]
             np.testing.assert_allclose(np.vstack([found.bias_expanded(), found.matrix_expanded().T]), mine)
     assert np.mean(blind) < 0.85  # what the residuals alone call 95 %
 
@@ -103,7 +105,7 @@ def test_a_jig_common_and_random_in_part_is_held_too() -> None:
 @pytest.mark.parametrize("degrees", [1, 2, 5, 77])
 def test_without_a_jig_the_interval_is_students(degrees: int) -> None:
     none = np.zeros(0)
-    found = interval(Spread(2.0, 0.0, none, none, degrees)).half_width(np.array([4.0 * degrees]))
+    found = coverage_interval(Spread(2.0, 0.0, none, none, degrees)).half_width(np.array([4.0 * degrees]))
     np.testing.assert_allclose(found, math.sqrt(8.0) * coverage_factor(degrees), rtol=1e-9)
 
 
@@ -111,13 +113,15 @@ def test_without_a_jig_the_interval_is_students(degrees: int) -> None:
 def test_noise_far_beyond_the_jig_is_students_too(degrees: int) -> None:
     one = Spread(2.0, 1e-9, np.array([1e-9]), np.array([1e-9]), degrees)
     np.testing.assert_allclose(
-        interval(one).half_width(np.array([4.0 * degrees])), math.sqrt(8.0) * coverage_factor(degrees), rtol=0.1
+        coverage_interval(one).half_width(np.array([4.0 * degrees])),
+        math.sqrt(8.0) * coverage_factor(degrees),
+        rtol=0.1,
     )
 
 
 def test_a_known_jig_alone_is_normal_where_readings_are_many() -> None:
     spread = Spread(0.1, 9.0, np.zeros(0), np.zeros(0), 400)
-    np.testing.assert_allclose(interval(spread).half_width(np.array([1e-3])), 3.0 * 1.959964, rtol=0.01)
+    np.testing.assert_allclose(coverage_interval(spread).half_width(np.array([1e-3])), 3.0 * 1.959964, rtol=0.01)
 
 
 def test_a_lean_moves_readings_across_the_truth_and_by_the_sensors_matrix() -> None:
@@ -126,13 +130,13 @@ def test_a_lean_moves_readings_across_the_truth_and_by_the_sensors_matrix() -> N
     np.testing.assert_allclose(found[0, :, 0, :], 4e-6 * np.diag([1.0, 1.0, 0.0]), atol=1e-18)
     np.testing.assert_allclose(found[0, :, 1, :], found[0, :, 0, :])
     np.testing.assert_allclose(found[0, :, 2, :], 0.0, atol=1e-18)
-    np.testing.assert_allclose(cross(truth)[2] @ np.array([0.0, 1.0, 0.0]), [0.0, 0.0, 1.0])
+    np.testing.assert_allclose(cross_product_matrices(truth)[2] @ np.array([0.0, 1.0, 0.0]), [0.0, 0.0, 1.0])
 
 
 def test_a_stated_jig_without_errors_changes_nothing() -> None:
     truth, settings = design("nine attitudes")
     readings = truth @ MATRIX.T + BIAS + 0.01 * np.random.default_rng(3).normal(size=truth.shape)
-    plain, stated = fit(truth, readings), fit(truth, readings, jig=Jig(0.0, 0.0), settings=settings)
+    plain, stated = fit_attitudes(truth, readings), fit_attitudes(truth, readings, jig=Jig(0.0, 0.0), settings=settings)
     np.testing.assert_allclose(stated.matrix_std(), plain.matrix_std(), rtol=1e-9)
     np.testing.assert_allclose(stated.bias_expanded(), plain.bias_expanded(), rtol=2e-4)
 
@@ -149,7 +153,7 @@ SHOWN = 60  # runs solved without the jig too
 def mwd_runs(runs: int) -> tuple[dict[str, float], dict[str, float], dict[str, float]]:
     """Share of the z terms of an MWD tool in their intervals, and their scatter over both standard errors."""
     tool, nominal, lean = draw_tool(2), make_design(Heating.ROOM), 2e-4
-    exact = measure(tool, nominal, 0, noise=0.0, jig_std=0.0)
+    exact = measure_tool(tool, nominal, 0, noise=0.0, jig_std=0.0)
     truth = solve_accelerometers(exact.gravity_volts, exact.temperature, nominal.tilt, 12).coefficients
     names, rng = ("SF_C0", "B_C0"), np.random.default_rng(4)
     tilts, setting = np.unique(nominal.tilt, return_inverse=True)
@@ -157,7 +161,7 @@ def mwd_runs(runs: int) -> tuple[dict[str, float], dict[str, float], dict[str, f
     for seed in range(runs):
         lean_of = lean * rng.normal(size=len(tilts)) * ((tilts > 1e-6) & (tilts < math.pi - 1e-6))
         stood = dataclasses.replace(nominal, tilt=nominal.tilt + lean_of[setting])
-        record = measure(tool, stood, seed, jig_std=0.0)
+        record = measure_tool(tool, stood, seed, jig_std=0.0)
         readings = (record.gravity_volts, record.temperature, nominal.tilt, 12)
         found = solve_accelerometers(*readings, jig=Jig(lean, 0.0))
         off.append([found.coefficients[name] - truth[name] for name in names])

@@ -11,18 +11,18 @@ from groundstation.calibration.errors import CalibrationError
 from groundstation.calibration.mwd_model import (
     LocalModel,
     Triad,
-    azimuth,
-    dip,
-    evaluate,
-    names,
-    nominal,
-    signs,
-    tilt,
+    axis_signs,
+    coefficient_names,
+    gravity_inclination,
+    magnetic_azimuth,
+    magnetic_dip,
+    nominal_triad,
     tool_face,
-    turned,
-    vectors,
+    tool_readings,
+    turned_triad,
+    vectors_of_volts,
 )
-from sim.instruments.mwd_jig import DIP, FIELD, Heating, draw_tool, make_design, measure, true_vectors
+from sim.instruments.mwd_jig import DIP, FIELD, Heating, draw_tool, make_design, measure_tool, true_vectors
 
 DEG = math.pi / 180.0
 TINY = 1e-30  # imaginary, of a complex step
@@ -43,10 +43,10 @@ def difference(a: float, b: float) -> float:
 )
 def test_azimuth_is_exact_at_every_tool_face(inclination: float, face: float, azi: float) -> None:
     gravity, field = ideal(inclination, face, azi)
-    assert tilt(gravity)[0] == pytest.approx(inclination, abs=1e-12)
-    assert abs(difference(azimuth(gravity, field)[0], azi)) < 1e-11
+    assert gravity_inclination(gravity)[0] == pytest.approx(inclination, abs=1e-12)
+    assert abs(difference(magnetic_azimuth(gravity, field)[0], azi)) < 1e-11
     assert abs(difference(tool_face(gravity)[0], face)) < 1e-11
-    assert dip(gravity, field)[0] == pytest.approx(DIP, abs=1e-12)
+    assert magnetic_dip(gravity, field)[0] == pytest.approx(DIP, abs=1e-12)
 
 
 def test_the_printed_minus_would_spread_azimuth_over_the_tool_face() -> None:
@@ -61,8 +61,8 @@ def test_the_printed_minus_would_spread_azimuth_over_the_tool_face() -> None:
 @given(seed=st.integers(0, 10**6))
 def test_voltages_of_a_tool_lead_back_to_what_it_stood_in(seed: int) -> None:
     tool, design = draw_tool(seed), make_design(Heating.ALTERNATING)
-    record = measure(tool, design, seed, noise=0.0, jig_std=0.0)
-    seen = evaluate(
+    record = measure_tool(tool, design, seed, noise=0.0, jig_std=0.0)
+    seen = tool_readings(
         tool.accelerometers, tool.magnetometers, record.gravity_volts, record.field_volts, record.temperature
     )
     assert np.allclose(seen.tilt, design.tilt, atol=1e-7)  # arctan2 loses half the digits on the axis
@@ -75,8 +75,8 @@ def test_a_turned_triad_turns_its_outputs_and_nothing_else() -> None:
     random = np.random.default_rng(1)
     volts, temperature = 3.0 * random.standard_normal((20, 3)), random.uniform(20.0, 90.0, 20)
     c, s = math.cos(0.3), math.sin(0.3)
-    expected = vectors(triad, volts, temperature) @ np.array([[c, s, 0.0], [-s, c, 0.0], [0.0, 0.0, 1.0]])
-    assert np.allclose(vectors(turned(triad, 0.3), volts, temperature), expected, atol=1e-13)
+    expected = vectors_of_volts(triad, volts, temperature) @ np.array([[c, s, 0.0], [-s, c, 0.0], [0.0, 0.0, 1.0]])
+    assert np.allclose(vectors_of_volts(turned_triad(triad, 0.3), volts, temperature), expected, atol=1e-13)
 
 
 def test_sixty_coefficients_have_sixty_names_and_come_back_by_name() -> None:
@@ -87,11 +87,11 @@ def test_sixty_coefficients_have_sixty_names_and_come_back_by_name() -> None:
     back = Triad.of("ABC", tool.accelerometers.coefficients())
     assert np.array_equal(back.scale, tool.accelerometers.scale)
     assert np.array_equal(back.cross, tool.accelerometers.cross)
-    assert len(names("ABC", 12)) == 12
+    assert len(coefficient_names("ABC", 12)) == 12
 
 
 def test_missing_and_unknown_coefficients_are_named() -> None:
-    coefficients = nominal("XYZ", 0.06).coefficients()
+    coefficients = nominal_triad("XYZ", 0.06).coefficients()
     del coefficients["m_XZ"]
     with pytest.raises(CalibrationError, match=r"m_XZ.*SF_Q0"):
         Triad.of("XYZ", coefficients | {"SF_Q0": 1.0})
@@ -104,7 +104,7 @@ def local_point() -> tuple[np.ndarray, np.ndarray]:
 
 
 def local_at(w: np.ndarray, z: np.ndarray, axes: str) -> LocalModel:
-    return LocalModel.at(w, np.tile(z[:3], (len(w), 1)), np.tile(z[3:6], (len(w), 1)), z[6:], signs(axes))
+    return LocalModel.at(w, np.tile(z[:3], (len(w), 1)), np.tile(z[3:6], (len(w), 1)), z[6:], axis_signs(axes))
 
 
 @pytest.mark.parametrize("axes", ["ABC", "XYZ"])

@@ -11,13 +11,13 @@ from scipy.optimize import least_squares
 
 from groundstation.calibration.errors import CalibrationError
 from groundstation.calibration.mwd_cost import Problem
-from groundstation.calibration.mwd_design import covariance, refuse_open
-from groundstation.calibration.mwd_model import nominal, tool_face, vectors
-from groundstation.calibration.mwd_newton import direction, hold, minimise
+from groundstation.calibration.mwd_design import parameter_covariance, refuse_open
+from groundstation.calibration.mwd_model import nominal_triad, tool_face, vectors_of_volts
+from groundstation.calibration.mwd_newton import free_parameter_matrix, minimise_cost, newton_step
 from groundstation.calibration.mwd_record import accelerometer_record, magnetometer_record
 from groundstation.calibration.mwd_solve import solve_accelerometers, solve_magnetometers
-from sim.instruments.mwd_jig import DIP, FIELD, Heating, Tool, draw_tool, make_design, measure
-from sim.studies.mwd.run import Outcome, calibrate, run
+from sim.instruments.mwd_jig import DIP, FIELD, Heating, MwdTool, draw_tool, make_design, measure_tool
+from sim.studies.mwd.run import ToolOutcome, calibrate_tool, run_study
 
 TOOLS = 20
 FEW = 5  # of them in `make test`
@@ -25,19 +25,19 @@ DESIGNS = [Heating.ROOM, Heating.SHUFFLED, Heating.ALTERNATING]
 
 
 @pytest.fixture(scope="module", params=[FEW, pytest.param(TOOLS, marks=pytest.mark.statistical)])
-def outcomes(request: pytest.FixtureRequest) -> dict[Heating, list[Outcome]]:
+def outcomes(request: pytest.FixtureRequest) -> dict[Heating, list[ToolOutcome]]:
     """Every tool at every design; a tool that did not converge would raise here."""
     everything = [*DESIGNS, Heating.SINGLE_RAMP]
-    return {h: [calibrate(draw_tool(seed), h, seed) for seed in range(1, request.param + 1)] for h in everything}
+    return {h: [calibrate_tool(draw_tool(seed), h, seed) for seed in range(1, request.param + 1)] for h in everything}
 
 
 def problem_of(heating: Heating, seed: int = 1, axes: str = "ABC") -> Problem:
     tool, design = draw_tool(seed), make_design(heating, seed)
-    record = measure(tool, design, seed)
+    record = measure_tool(tool, design, seed)
     if axes == "ABC":
         made = accelerometer_record(record.gravity_volts, record.temperature, design.tilt)
     else:
-        gravity = vectors(tool.accelerometers, record.gravity_volts, record.temperature)
+        gravity = vectors_of_volts(tool.accelerometers, record.gravity_volts, record.temperature)
         made = magnetometer_record(record.field_volts, record.temperature, gravity, FIELD, DIP)
     return made.problem(12 if heating is Heating.ROOM else 30)
 
@@ -78,17 +78,17 @@ def test_derivatives_are_finite_and_smooth_on_the_axis() -> None:
 
 @pytest.mark.parametrize(("heating", "count"), [(Heating.ROOM, 12), (Heating.SHUFFLED, 30)])
 def test_one_direction_is_open_for_accelerometers_and_none_for_magnetometers(heating: Heating, count: int) -> None:
-    ideal, design = Tool(nominal("ABC", 3.0), nominal("XYZ", 0.06)), make_design(heating, 1)
-    record = measure(ideal, design, 1, noise=0.0, jig_std=0.0)
-    gravity = vectors(ideal.accelerometers, record.gravity_volts, record.temperature)
+    ideal, design = MwdTool(nominal_triad("ABC", 3.0), nominal_triad("XYZ", 0.06)), make_design(heating, 1)
+    record = measure_tool(ideal, design, 1, noise=0.0, jig_std=0.0)
+    gravity = vectors_of_volts(ideal.accelerometers, record.gravity_volts, record.temperature)
     accelerometers = accelerometer_record(record.gravity_volts, record.temperature, design.tilt).problem(count)
     magnetometers = magnetometer_record(record.field_volts, record.temperature, gravity, FIELD, DIP).problem(count)
     at_truth = np.zeros(count)
     roll = np.zeros(count)
     roll[count - 6], roll[count - 4] = 1.0, -1.0  # m_AB and m_BA against each other
-    assert covariance(accelerometers, at_truth, np.eye(count)) is None
-    assert covariance(accelerometers, at_truth, hold(count, "ABC")) is not None
-    assert covariance(magnetometers, at_truth, hold(count, "XYZ")) is not None
+    assert parameter_covariance(accelerometers, at_truth, np.eye(count)) is None
+    assert parameter_covariance(accelerometers, at_truth, free_parameter_matrix(count, "ABC")) is not None
+    assert parameter_covariance(magnetometers, at_truth, free_parameter_matrix(count, "XYZ")) is not None
     assert np.max(np.abs(accelerometers.terms(at_truth).hessian @ roll)) < 1e-12
     assert np.linalg.norm(magnetometers.terms(at_truth).hessian @ roll) > 1.0
 
@@ -96,10 +96,10 @@ def test_one_direction_is_open_for_accelerometers_and_none_for_magnetometers(hea
 def test_the_hessian_is_indefinite_at_the_start_and_the_step_leads_down_all_the_same() -> None:
     indefinite = 0
     for seed in range(TOOLS):
-        problem, free = problem_of(Heating.SINGLE_RAMP, seed), hold(30, "ABC")
+        problem, free = problem_of(Heating.SINGLE_RAMP, seed), free_parameter_matrix(30, "ABC")
         terms = problem.terms(np.zeros(30))
         indefinite += np.linalg.eigvalsh(free.T @ terms.hessian @ free)[0] < 0.0
-        assert terms.gradient @ free @ direction(terms, free) < 0.0
+        assert terms.gradient @ free @ newton_step(terms, free) < 0.0
     assert indefinite > TOOLS // 2
 
 
@@ -143,21 +143,21 @@ def test_control_fails_before_and_passes_after(outcomes: dict, heating: Heating)
 def test_an_independent_solver_ends_in_the_same_minimum(heating: Heating, tools: int) -> None:
     for seed in range(1, tools + 1):
         problem = problem_of(heating, seed)
-        free = hold(12 if problem.powers == 1 else 30, "ABC")
-        cost = problem.value(minimise(problem, free)[0])
+        free = free_parameter_matrix(12 if problem.powers == 1 else 30, "ABC")
+        cost = problem.value(minimise_cost(problem, free)[0])
         other = least_squares(lambda y, p=problem, z=free: p.residuals(z @ y), np.zeros(free.shape[1]))
         assert cost == pytest.approx(2.0 * other.cost, rel=1e-4)
 
 
 def test_without_noise_the_coefficients_come_back_themselves() -> None:
     tool, design = draw_tool(4), make_design(Heating.SHUFFLED, 4)
-    record = measure(tool, design, 4, noise=0.0, jig_std=0.0)
+    record = measure_tool(tool, design, 4, noise=0.0, jig_std=0.0)
     fit = solve_accelerometers(
         record.gravity_volts, record.temperature, design.tilt, tool_face_reference=design.tool_face
     )
     for name, value in tool.accelerometers.coefficients().items():
         assert fit.coefficients[name] == pytest.approx(value, abs=1e-8), name
-    gravity = vectors(fit.triad, record.gravity_volts, record.temperature)
+    gravity = vectors_of_volts(fit.triad, record.gravity_volts, record.temperature)
     field = solve_magnetometers(record.field_volts, record.temperature, gravity, FIELD, DIP)
     for name, value in tool.magnetometers.coefficients().items():
         assert field.coefficients[name] == pytest.approx(value, abs=1e-6), name
@@ -165,14 +165,14 @@ def test_without_noise_the_coefficients_come_back_themselves() -> None:
 
 def test_a_tool_face_reference_turns_the_triad_onto_it() -> None:
     tool, design = draw_tool(6), make_design(Heating.SHUFFLED, 6)
-    record = measure(tool, design, 6)
+    record = measure_tool(tool, design, 6)
     plain = solve_accelerometers(record.gravity_volts, record.temperature, design.tilt)
     held = solve_accelerometers(
         record.gravity_volts, record.temperature, design.tilt, tool_face_reference=design.tool_face + 0.1
     )
     assert plain.coefficients["m_AB"] == pytest.approx(plain.coefficients["m_BA"], abs=1e-15)
     level = np.sin(design.tilt) > 0.5
-    seen = tool_face(vectors(held.triad, record.gravity_volts, record.temperature))[level]
+    seen = tool_face(vectors_of_volts(held.triad, record.gravity_volts, record.temperature))[level]
     assert np.max(np.abs(np.angle(np.exp(1j * (seen - design.tool_face[level] - 0.1))))) < 2e-3
     assert held.cost == plain.cost
 
@@ -182,7 +182,7 @@ def test_standard_errors_are_what_repetition_scatters() -> None:
     tool, design = draw_tool(2), make_design(Heating.ROOM)
     fits = []
     for seed in range(60):
-        record = measure(tool, design, seed)
+        record = measure_tool(tool, design, seed)
         fits.append(solve_accelerometers(record.gravity_volts, record.temperature, design.tilt, 12))
     claimed = np.mean([list(f.standard_errors.values()) for f in fits], axis=0)
     scatter = np.std([list(f.coefficients.values()) for f in fits], axis=0, ddof=1)
@@ -196,14 +196,14 @@ def test_before_and_after_are_the_errors_of_the_nominal_and_the_fitted_tool(outc
     assert fit.before.size_max > 50.0 * fit.after.size_max
     assert fit.after.size_rms == pytest.approx(1e-4, rel=0.4)
     tool, design = draw_tool(1), make_design(Heating.ROOM, 1)
-    record = measure(tool, design, 1)
-    raw = np.linalg.norm(vectors(nominal("ABC", 3.0), record.gravity_volts, record.temperature), axis=1)
+    record = measure_tool(tool, design, 1)
+    raw = np.linalg.norm(vectors_of_volts(nominal_triad("ABC", 3.0), record.gravity_volts, record.temperature), axis=1)
     assert fit.before.size_max == pytest.approx(float(np.max(np.abs(raw - 1.0))), rel=1e-12)
 
 
 def test_twelve_parameters_over_a_range_of_temperatures_are_warned_about() -> None:
     tool, design = draw_tool(1), make_design(Heating.ALTERNATING)
-    record = measure(tool, design, 1)
+    record = measure_tool(tool, design, 1)
     fit = solve_accelerometers(record.gravity_volts, record.temperature, design.tilt, 12)
     assert any("one temperature" in w for w in fit.warnings)
 
@@ -211,7 +211,7 @@ def test_twelve_parameters_over_a_range_of_temperatures_are_warned_about() -> No
 @pytest.mark.slow
 def test_table_of_the_experiment_has_a_row_for_each_design() -> None:
     steps: list[int] = []
-    table = run(2, lambda: steps.append(1))
+    table = run_study(2, lambda: steps.append(1))
     assert len(steps) == 2 * len(table["cases"])
     assert all(row["converged"] == 1.0 and row["cost_difference_max"] < 1e-4 for row in table["cases"])
 
@@ -222,7 +222,7 @@ class TestRefusals:
     @pytest.fixture
     def record(self) -> dict[str, np.ndarray]:
         design = make_design(Heating.ROOM)
-        record = measure(draw_tool(1), design, 1)
+        record = measure_tool(draw_tool(1), design, 1)
         return {
             "volts": record.gravity_volts.copy(),
             "temperature": record.temperature.copy(),
@@ -288,7 +288,7 @@ class TestRefusals:
     def test_a_design_that_cannot_is_refused_before_the_search(self, record: dict) -> None:
         made = accelerometer_record(*(v[::6] for v in record.values()))
         with pytest.raises(CalibrationError, match="cannot tell"):
-            refuse_open(made, made.problem(12), hold(12, "ABC"))
+            refuse_open(made, made.problem(12), free_parameter_matrix(12, "ABC"))
 
 
 @pytest.mark.slow
@@ -296,9 +296,9 @@ class TestRefusals:
 @given(seed=st.integers(0, 10**6))
 def test_magnetometers_reach_the_accuracy_of_the_accelerometers(seed: int) -> None:
     tool, design = draw_tool(seed), make_design(Heating.SHUFFLED, seed)
-    record = measure(tool, design, seed)
+    record = measure_tool(tool, design, seed)
     fit = solve_accelerometers(record.gravity_volts, record.temperature, design.tilt)
-    gravity = vectors(fit.triad, record.gravity_volts, record.temperature)
+    gravity = vectors_of_volts(fit.triad, record.gravity_volts, record.temperature)
     field = solve_magnetometers(record.field_volts, record.temperature, gravity, FIELD, DIP)
     assert field.after.size_rms < 2e-4 * FIELD
     assert field.before.size_rms > 50.0 * field.after.size_rms

@@ -8,7 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from groundstation.calibration.errors import CalibrationError
-from groundstation.calibration.mwd_model import Readings, azimuth, tilt
+from groundstation.calibration.mwd_model import Readings, gravity_inclination, magnetic_azimuth
 from groundstation.calibration.quality import TOOL_FACES, judge_readings
 from sim.instruments.mwd_jig import true_vectors
 
@@ -20,7 +20,7 @@ def readings(inclination: np.ndarray | float, azi: np.ndarray | float, faces: np
     same = np.ones(len(faces))
     gravity, field = true_vectors(inclination * same, faces, azi * same)
     sizes = np.linalg.norm(gravity, axis=1), np.linalg.norm(field, axis=1)
-    return Readings(gravity, field, *sizes, tilt(gravity), azimuth(gravity, field))
+    return Readings(gravity, field, *sizes, gravity_inclination(gravity), magnetic_azimuth(gravity, field))
 
 
 def one_off(angle: float) -> np.ndarray:

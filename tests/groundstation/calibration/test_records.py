@@ -8,8 +8,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from groundstation.calibration.calibration_records import read_attitudes, read_static, read_turn_table
 from groundstation.calibration.errors import CalibrationError
-from groundstation.calibration.records import read_attitudes, read_static, read_turn_table
 from telemetry.errors import InputError
 
 DATA = Path(__file__).parents[2] / "data" / "calibration"

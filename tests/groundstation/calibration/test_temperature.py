@@ -7,7 +7,7 @@ from hypothesis import strategies as st
 
 from groundstation.calibration import attitudes
 from groundstation.calibration.errors import CalibrationError
-from groundstation.calibration.temperature import TemperatureModel, fit, from_datasheet
+from groundstation.calibration.temperature import TemperatureModel, fit_temperature_polynomials, from_datasheet
 
 SIX = np.concatenate([np.eye(3), -np.eye(3)])
 TEMPERATURES = np.array([0.0, 20.0, 40.0, 60.0])
@@ -32,7 +32,7 @@ def read(model: TemperatureModel, truth: np.ndarray, temperature: np.ndarray) ->
 
 
 def test_the_coefficients_come_back_whatever_the_axis() -> None:
-    result = fit(TRUTH, read(MODEL, TRUTH, HELD), HELD, bias_degree=2, matrix_degree=1)
+    result = fit_temperature_polynomials(TRUTH, read(MODEL, TRUTH, HELD), HELD, bias_degree=2, matrix_degree=1)
     np.testing.assert_allclose(result.model.bias[0], MODEL.bias[0], atol=1e-12)
     np.testing.assert_allclose(result.model.bias[1], MODEL.bias[1], atol=1e-13)
     np.testing.assert_allclose(result.model.bias[2], MODEL.bias[2], atol=1e-14)
@@ -53,8 +53,8 @@ def test_the_correction_undoes_the_sensor(temperature: float, truth: list[float]
 
 def test_without_slopes_the_fit_is_that_of_the_attitudes() -> None:
     readings = read(MODEL, SIX, np.full(6, 25.0)) + 0.01 * np.random.default_rng(1).normal(size=(6, 3))
-    result = fit(SIX, readings, np.full(6, 25.0), bias_degree=0, matrix_degree=0)
-    plain = attitudes.fit(SIX, readings)
+    result = fit_temperature_polynomials(SIX, readings, np.full(6, 25.0), bias_degree=0, matrix_degree=0)
+    plain = attitudes.fit_attitudes(SIX, readings)
     np.testing.assert_allclose(result.model.matrix[0], plain.matrix, atol=1e-13)
     np.testing.assert_allclose(result.model.bias[0], plain.bias, atol=1e-13)
     np.testing.assert_allclose(result.matrix_std[0], plain.matrix_std(), rtol=1e-9)
@@ -66,7 +66,10 @@ def test_the_standard_errors_are_those_of_many_repetitions(known: bool) -> None:
     rng, std = np.random.default_rng(2), np.array([0.01, 0.03, 0.02])
     exact = read(MODEL, TRUTH, HELD)
     covs = np.tile(np.diag(std**2), (24, 1, 1)) if known else None
-    fits = [fit(TRUTH, exact + std * rng.normal(size=exact.shape), HELD, bias_degree=2, covs=covs) for _ in range(300)]
+    fits = [
+        fit_temperature_polynomials(TRUTH, exact + std * rng.normal(size=exact.shape), HELD, bias_degree=2, covs=covs)
+        for _ in range(300)
+    ]
     for name in ("bias", "matrix"):
         scatter = np.std([getattr(f.model, name) for f in fits], axis=0)
         claimed = np.sqrt(np.mean([getattr(f, f"{name}_std") ** 2 for f in fits], axis=0))
@@ -76,7 +79,7 @@ def test_the_standard_errors_are_those_of_many_repetitions(known: bool) -> None:
 
 
 def test_a_linear_model_of_a_bent_bias_leaves_residuals() -> None:
-    bent = fit(TRUTH, read(MODEL, TRUTH, HELD), HELD, bias_degree=1, matrix_degree=1)
+    bent = fit_temperature_polynomials(TRUTH, read(MODEL, TRUTH, HELD), HELD, bias_degree=1, matrix_degree=1)
     assert bent.residual_rms() > 1e-3
 
 
@@ -94,7 +97,7 @@ def test_a_record_at_one_temperature_has_no_slopes() -> None:
     with pytest.raises(
         CalibrationError, match=r"expected a record that spans 10.0 K or slopes of a datasheet, got 3.5 K"
     ):
-        fit(TRUTH, read(MODEL, TRUTH, held), held)
+        fit_temperature_polynomials(TRUTH, read(MODEL, TRUTH, held), held)
 
 
 def test_attitudes_that_were_not_held_at_each_temperature_are_refused() -> None:
@@ -103,7 +106,7 @@ def test_attitudes_that_were_not_held_at_each_temperature_are_refused() -> None:
     with pytest.raises(
         CalibrationError, match=r"expected a design of rank 8, got 6: .* at 2 temperatures or more, 4 were"
     ):
-        fit(SIX, read(MODEL, SIX, held), held)
+        fit_temperature_polynomials(SIX, read(MODEL, SIX, held), held)
 
 
 def test_a_curve_through_two_temperatures_is_refused() -> None:
@@ -111,7 +114,7 @@ def test_a_curve_through_two_temperatures_is_refused() -> None:
     with pytest.raises(
         CalibrationError, match=r"expected a design of rank 9, got 8: .* at 3 temperatures or more, 2 were"
     ):
-        fit(truth, read(MODEL, truth, held), held, bias_degree=2)
+        fit_temperature_polynomials(truth, read(MODEL, truth, held), held, bias_degree=2)
 
 
 @pytest.mark.parametrize(
@@ -128,11 +131,11 @@ def test_numbers_that_do_not_fit_are_refused(
     truth: np.ndarray, readings: np.ndarray, temperature: np.ndarray, reason: str
 ) -> None:
     with pytest.raises(CalibrationError, match=reason):
-        fit(truth, readings, temperature)
+        fit_temperature_polynomials(truth, readings, temperature)
 
 
 def test_degrees_and_covariances_that_are_none_are_refused() -> None:
     with pytest.raises(CalibrationError, match="expected degrees of 0 or more, got -1 and 1"):
-        fit(TRUTH, TRUTH, HELD, bias_degree=-1)
+        fit_temperature_polynomials(TRUTH, TRUTH, HELD, bias_degree=-1)
     with pytest.raises(CalibrationError, match="expected a positive definite"):
-        fit(TRUTH, TRUTH, HELD, covs=np.zeros((24, 3, 3)))
+        fit_temperature_polynomials(TRUTH, TRUTH, HELD, covs=np.zeros((24, 3, 3)))

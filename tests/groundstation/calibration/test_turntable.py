@@ -7,9 +7,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from groundstation.calibration.calibration_records import STANDARD_GRAVITY, read_turn_table
 from groundstation.calibration.errors import CalibrationError
-from groundstation.calibration.records import STANDARD_GRAVITY, read_turn_table
-from groundstation.calibration.turntable import align, as_observations, check_invertible, correct
+from groundstation.calibration.turntable import as_observations, check_invertible, correct_readings, turntable_alignment
 
 DATA = Path(__file__).parents[2] / "data" / "calibration"
 A1_MATRIX = [
@@ -40,14 +40,14 @@ def table_of(matrix: np.ndarray, bias: np.ndarray, reference: float) -> tuple[np
 
 def test_every_printed_digit_of_node_a1() -> None:
     table = read_turn_table(DATA / "calibration_node_a1_gyro.csv", 720.0)
-    result = align(table.positive, table.negative, table.reference)
+    result = turntable_alignment(table.positive, table.negative, table.reference)
     assert np.abs(result.matrix - A1_MATRIX).max() < 1e-9
     assert np.abs(result.bias - A1_BIAS_DPS).max() < 1e-8
 
 
 def test_in_radians_the_matrix_stays_and_the_bias_turns_with_the_unit() -> None:
     table = read_turn_table(DATA / "calibration_node_a1_gyro.csv", 720.0, unit=np.pi / 180.0)
-    result = align(table.positive, table.negative, table.reference)
+    result = turntable_alignment(table.positive, table.negative, table.reference)
     assert table.reference == pytest.approx(4.0 * np.pi)
     assert np.abs(result.matrix - A1_MATRIX).max() < 1e-9
     assert np.abs(np.degrees(result.bias) - A1_BIAS_DPS).max() < 1e-8
@@ -55,7 +55,7 @@ def test_in_radians_the_matrix_stays_and_the_bias_turns_with_the_unit() -> None:
 
 def test_the_vn100_to_the_printed_decimals() -> None:
     table = read_turn_table(DATA / "calibration_vn100_gyro.csv", 200.0)
-    result = align(table.positive, table.negative, table.reference)
+    result = turntable_alignment(table.positive, table.negative, table.reference)
     # One bias is exactly half way between two decimals, and the print rounds it away from zero.
     assert np.abs(result.matrix - VN100_MATRIX).max() < 0.0005
     assert np.abs(result.bias - VN100_BIAS_DPS).max() < 0.0005 + 1e-12
@@ -63,8 +63,8 @@ def test_the_vn100_to_the_printed_decimals() -> None:
 
 def test_rows_read_as_sensor_axes_would_give_the_transpose_and_wrong_biases() -> None:
     table = read_turn_table(DATA / "calibration_node_a1_gyro.csv", 720.0)
-    right = align(table.positive, table.negative, table.reference)
-    wrong = align(table.positive.T, table.negative.T, table.reference)
+    right = turntable_alignment(table.positive, table.negative, table.reference)
+    wrong = turntable_alignment(table.positive.T, table.negative.T, table.reference)
     assert np.abs(wrong.matrix - right.matrix.T).max() < 1e-15
     assert np.abs(right.matrix - right.matrix.T).max() > 0.03
     assert np.abs(wrong.bias - A1_BIAS_DPS).max() > 1.0
@@ -73,7 +73,7 @@ def test_rows_read_as_sensor_axes_would_give_the_transpose_and_wrong_biases() ->
 @given(sensor=sensors(), reference=st.floats(0.5, 720.0))
 def test_the_sensor_that_made_the_table_comes_back(sensor: tuple[np.ndarray, np.ndarray], reference: float) -> None:
     matrix, bias = sensor
-    result = align(*table_of(matrix, bias, reference), reference)
+    result = turntable_alignment(*table_of(matrix, bias, reference), reference)
     np.testing.assert_allclose(result.matrix, matrix, atol=1e-13 * (1.0 + 10.0 / reference))
     np.testing.assert_allclose(result.bias, bias, atol=1e-12)
     assert result.residual_rms() < 1e-12
@@ -83,18 +83,20 @@ def test_the_sensor_that_made_the_table_comes_back(sensor: tuple[np.ndarray, np.
 def test_the_correction_undoes_the_sensor(sensor: tuple[np.ndarray, np.ndarray], truth: list[float]) -> None:
     matrix, bias = sensor
     vectors = np.array(truth).reshape(2, 3)
-    np.testing.assert_allclose(correct(vectors @ matrix.T + bias, matrix, bias), vectors, atol=1e-11)
+    np.testing.assert_allclose(correct_readings(vectors @ matrix.T + bias, matrix, bias), vectors, atol=1e-11)
 
 
 def test_one_reading_is_corrected_as_a_row_of_many() -> None:
     matrix, bias = np.array(A1_MATRIX), np.array(A1_BIAS_DPS)
     readings = np.array([[1.0, 2.0, 3.0], [4.0, 5.0, 6.0]])
-    np.testing.assert_array_equal(correct(readings[1], matrix, bias), correct(readings, matrix, bias)[1])
+    np.testing.assert_array_equal(
+        correct_readings(readings[1], matrix, bias), correct_readings(readings, matrix, bias)[1]
+    )
 
 
 def test_an_accelerometer_is_aligned_with_its_axes_up_and_down() -> None:
     matrix, bias = np.array([[1.01, 0.02, 0.0], [-0.01, 0.98, 0.03], [0.0, 0.01, 1.0]]), np.array([0.1, -0.2, 0.3])
-    result = align(*table_of(matrix, bias, STANDARD_GRAVITY), STANDARD_GRAVITY)
+    result = turntable_alignment(*table_of(matrix, bias, STANDARD_GRAVITY), STANDARD_GRAVITY)
     np.testing.assert_allclose(result.matrix, matrix, atol=1e-14)
     np.testing.assert_allclose(result.bias, bias, atol=1e-14)
 
@@ -102,7 +104,7 @@ def test_an_accelerometer_is_aligned_with_its_axes_up_and_down() -> None:
 def test_the_residuals_are_the_disagreement_of_the_three_biases() -> None:
     positive, negative = table_of(np.eye(3), np.zeros(3), 1.0)
     shifted = np.array([[0.3, 0.0, 0.0], [0.0, 0.0, 0.0], [0.0, 0.0, 0.0]])
-    result = align(positive + shifted, negative + shifted, 1.0)
+    result = turntable_alignment(positive + shifted, negative + shifted, 1.0)
     np.testing.assert_allclose(result.bias, [0.1, 0.0, 0.0], atol=1e-15)
     np.testing.assert_allclose(result.residuals[:, 0], [0.2, -0.1, -0.1], atol=1e-15)
     assert result.residual_rms() == pytest.approx(np.sqrt(0.06 / 9.0))
@@ -117,12 +119,12 @@ def test_observations_are_six_runs_with_their_truth() -> None:
 @pytest.mark.parametrize("reference", [0.0, -1.0, float("nan"), float("inf")])
 def test_a_reference_that_is_none_is_refused(reference: float) -> None:
     with pytest.raises(CalibrationError, match="expected a positive reference, got"):
-        align(np.eye(3), -np.eye(3), reference)
+        turntable_alignment(np.eye(3), -np.eye(3), reference)
 
 
 def test_readings_of_another_shape_are_refused() -> None:
     with pytest.raises(CalibrationError, match=r"expected \(3, 3\) readings, got \(2, 3\)"):
-        align(np.ones((2, 3)), np.ones((3, 3)), 1.0)
+        turntable_alignment(np.ones((2, 3)), np.ones((3, 3)), 1.0)
 
 
 @pytest.mark.parametrize(
@@ -132,4 +134,4 @@ def test_a_sensor_without_three_axes_is_refused(matrix: np.ndarray) -> None:
     with pytest.raises(CalibrationError, match="three independent sensor axes"):
         check_invertible(matrix)
     with pytest.raises(CalibrationError, match="three independent sensor axes"):
-        align(matrix.T, -matrix.T, 1.0)
+        turntable_alignment(matrix.T, -matrix.T, 1.0)

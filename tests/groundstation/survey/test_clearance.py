@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 
 from groundstation.errors import SurveyError
-from groundstation.survey.tools.instruments import Mode, Term, Tool, load_tool
-from groundstation.survey.well.clearance import Hole, Rule, clearance
-from groundstation.survey.well.error_sources import Leg, Site, Survey
+from groundstation.survey.tools.instruments import PropagationMode, SurveyTool, Term, load_tool
+from groundstation.survey.well.clearance import ClearanceHole, Rule, clearance_between
+from groundstation.survey.well.error_sources import Leg, Site, WellSurvey
 
 DATA = Path(__file__).parents[2] / "data" / "survey"
 DEG = math.pi / 180.0
@@ -19,14 +19,16 @@ RADII = {"reference": 0.4572}
 REV_4 = load_tool(str(DATA / "mwd-rev4.toml"))
 
 
-def published(name: str) -> tuple[Hole, np.ndarray]:
+def published(name: str) -> tuple[ClearanceHole, np.ndarray]:
     """A well of the standard set and the separation factors printed for it."""
     with (DATA / "iscwsa_clearance_wells.csv").open() as file:
         rows = [row for row in csv.DictReader(x for x in file if not x.startswith("#")) if row["well"] == name]
     keys = ("md", "inclination_deg", "azimuth_deg", "north", "east", "tvd")
     table = np.array([[float(row[key]) for key in keys] for row in rows if row["md"]])
     md, inclination, azimuth = table[:, 0], table[:, 1] * DEG, table[:, 2] * DEG
-    hole = Hole(Survey(md, inclination, azimuth, table[:, 5]), table[:, 3:], (Leg(REV_4),), RADII.get(name, 0.3048))
+    hole = ClearanceHole(
+        WellSurvey(md, inclination, azimuth, table[:, 5]), table[:, 3:], (Leg(REV_4),), RADII.get(name, 0.3048)
+    )
     return hole, np.array([float(row["sf"]) for row in rows if row["sf"]])
 
 
@@ -34,25 +36,27 @@ def published(name: str) -> tuple[Hole, np.ndarray]:
 def test_separation_factors_are_those_of_the_standard_set(name: str) -> None:
     reference, _ = published("reference")
     offset, expected = published(name)
-    found = clearance(reference, offset, SITE)
+    found = clearance_between(reference, offset, SITE)
     assert len(expected) == len(found.factor) == 100
     np.testing.assert_allclose(found.independent_factor, expected, rtol=3e-3)
 
 
-def straight(north: float, length: float = 100.0, azimuth: float = 0.0, serial: str = "", steep: float = 0.0) -> Hole:
+def straight(
+    north: float, length: float = 100.0, azimuth: float = 0.0, serial: str = "", steep: float = 0.0
+) -> ClearanceHole:
     """Hole that leans by ``steep``, with an azimuth error of 1 deg that one instrument makes."""
-    tool = Tool("t", "t", (Term("A", 1.0, "deg", Mode.SYSTEMATIC, ("0", "0", "1")),))
+    tool = SurveyTool("t", "t", (Term("A", 1.0, "deg", PropagationMode.SYSTEMATIC, ("0", "0", "1")),))
     md = np.linspace(0.0, length, 11)
     i, a = np.full(11, steep), np.full(11, azimuth)
     step = np.array([math.sin(steep) * math.cos(azimuth), math.sin(steep) * math.sin(azimuth), math.cos(steep)])
     places = np.array([north, 0.0, 0.0]) + md[:, None] * step
-    return Hole(Survey(md, i, a, places[:, 2]), places, (Leg(tool),), 0.5, serial)
+    return ClearanceHole(WellSurvey(md, i, a, places[:, 2]), places, (Leg(tool),), 0.5, serial)
 
 
 def test_parallel_holes_of_one_instrument_err_alike_and_of_two_do_not() -> None:
     steep = 30.0 * DEG
     alike, apart = (
-        clearance(straight(0.0, steep=steep, azimuth=1.5708, serial="7"), other, SITE)
+        clearance_between(straight(0.0, steep=steep, azimuth=1.5708, serial="7"), other, SITE)
         for other in (
             straight(5.0, steep=steep, azimuth=1.5708, serial="7"),
             straight(5.0, steep=steep, azimuth=1.5708, serial="8"),
@@ -72,13 +76,13 @@ def test_holes_against_each_other_err_against_each_other() -> None:
         straight(0.0, steep=steep, azimuth=1.5708, serial="7"),
         straight(5.0, steep=steep, azimuth=-1.5708, serial="7"),
     )
-    found = clearance(east, west, SITE, Rule(margin=0.0))
+    found = clearance_between(east, west, SITE, Rule(margin=0.0))
     assert np.all(found.factor <= found.independent_factor + 1e-12)
 
 
 def test_the_nearest_point_lies_between_stations() -> None:
     crossing = straight(3.0, steep=math.pi / 2, length=100.0, azimuth=math.pi)  # horizontal, towards the south
-    found = clearance(straight(0.0), crossing, SITE)
+    found = clearance_between(straight(0.0), crossing, SITE)
     np.testing.assert_allclose(found.distance, np.linspace(0.0, 100.0, 11), atol=1e-6)
     np.testing.assert_allclose(found.offset_md, 3.0, atol=1e-6)
 
@@ -86,4 +90,4 @@ def test_the_nearest_point_lies_between_stations() -> None:
 def test_a_negative_radius_is_refused() -> None:
     hole = straight(0.0)
     with pytest.raises(SurveyError, match="expected a radius of the hole of 0 m or more, got -1 m"):
-        clearance(hole, Hole(hole.survey, hole.positions, hole.legs, -1.0), SITE)
+        clearance_between(hole, ClearanceHole(hole.survey, hole.positions, hole.legs, -1.0), SITE)

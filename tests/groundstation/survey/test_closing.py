@@ -7,14 +7,14 @@ from pathlib import Path
 import pytest
 
 from groundstation.errors import SurveyError
-from groundstation.survey.wall.closing import Stage
+from groundstation.survey.wall.closing import ClosingDay
 from groundstation.survey.wall.wall_file import read_wall
 
 PIPES, ACROSS = 12, 2.4  # of a ring of freeze pipes; m, its diameter
 DAYS = [f"2026-11-{10 + k // 4}" for k in range(PIPES)]
 
 
-def ring(folder: Path, days: list[str], *, outward_deg: float = 0.0, more: str = "") -> list[Stage]:
+def ring(folder: Path, days: list[str], *, outward_deg: float = 0.0, more: str = "") -> list[ClosingDay]:
     """Stages of a ring whose pipes lean outward, frozen to 0.4 m around each; 12 m long."""
     heads, rows = "column,north_m,east_m,drilled_on,between,replaces\n", "column,md_m,inclination_deg,azimuth_deg\n"
     for k in range(PIPES):

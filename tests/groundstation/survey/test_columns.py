@@ -8,27 +8,29 @@ from hypothesis import assume, given
 from hypothesis import strategies as st
 
 from groundstation.errors import SurveyError
-from groundstation.survey.fusion.resolve import Direction, angles
+from groundstation.survey.fusion.resolve import Direction, direction_angles
 from groundstation.survey.wall.column_deviation import (
     PRESETS,
-    Design,
+    ColumnDesign,
     Deviation,
     Deviations,
-    deviation,
-    dominant,
-    project,
-    tolerance,
+    lateral_errors,
+    parse_tolerance,
+    point_deviation,
+    project_to_target,
 )
-from groundstation.survey.well.trajectory import Point
+from groundstation.survey.well.trajectory import TrajectoryPoint
 
 DEG = math.pi / 180.0
 COV = np.array([[4e-4, 1e-4, 2e-5], [1e-4, 1e-4, -3e-5], [2e-5, -3e-5, 2.5e-5]])
 Vector = st.tuples(st.floats(-5.0, 5.0), st.floats(-5.0, 5.0), st.floats(-5.0, 30.0))
 
 
-def point_at(position: np.ndarray, tangent: np.ndarray | None = None, cov: np.ndarray = COV, md: float = 10.0) -> Point:
+def point_at(
+    position: np.ndarray, tangent: np.ndarray | None = None, cov: np.ndarray = COV, md: float = 10.0
+) -> TrajectoryPoint:
     down = np.array([0.0, 0.0, 1.0])
-    return Point(md, down if tangent is None else tangent, np.asarray(position, float), cov, np.zeros((3, 0)))
+    return TrajectoryPoint(md, down if tangent is None else tangent, np.asarray(position, float), cov, np.zeros((3, 0)))
 
 
 def about_vertical(angle: float) -> np.ndarray:
@@ -52,14 +54,14 @@ def lean_of(inclination: float, azimuth: float, cov: np.ndarray) -> Direction:
     [("en-12716", 0.05, 0.65), ("5-cm", 0.05, 0.05), ("0.27-deg", 0.0, 0.14137)],
 )
 def test_presets_allow_what_their_source_allows(name: str, head: float, toe: float) -> None:
-    assert tolerance(name).name == name
-    assert tolerance(name).at(0.0) == pytest.approx(head)
-    assert tolerance(name).at(30.0) == pytest.approx(toe, abs=1e-5)
+    assert parse_tolerance(name).name == name
+    assert parse_tolerance(name).at(0.0) == pytest.approx(head)
+    assert parse_tolerance(name).at(30.0) == pytest.approx(toe, abs=1e-5)
 
 
 def test_an_unknown_tolerance_is_refused_and_told_the_known_ones() -> None:
     with pytest.raises(SurveyError, match=r"en-12716, 5-cm, 0\.27-deg, got 'en-1'"):
-        tolerance("en-1")
+        parse_tolerance("en-1")
 
 
 @pytest.mark.parametrize(
@@ -73,18 +75,18 @@ def test_an_unknown_tolerance_is_refused_and_told_the_known_ones() -> None:
     ],
 )
 def test_a_tolerance_of_a_project_is_a_sum_of_parts(text: str, start: float, growth: float) -> None:
-    found = tolerance(text)
+    found = parse_tolerance(text)
     assert (found.start, found.growth) == pytest.approx((start, growth))
 
 
 @pytest.mark.parametrize("text", ["1:0", "-5 cm", "50", "50 mm +", "", "0 deg"])
 def test_a_tolerance_that_nothing_meets_or_that_has_no_unit_is_refused(text: str) -> None:
     with pytest.raises(SurveyError, match="tolerance"):
-        tolerance(text)
+        parse_tolerance(text)
 
 
 def test_the_deviation_of_a_vertical_column_is_north_and_east() -> None:
-    found = deviation(point_at([0.03, -0.04, 10.0]), Design())
+    found = point_deviation(point_at([0.03, -0.04, 10.0]), ColumnDesign())
     np.testing.assert_allclose(found.offset, [0.03, -0.04], atol=1e-15)
     assert found.size == pytest.approx(0.05)
     assert found.along == pytest.approx(10.0)
@@ -96,28 +98,28 @@ def test_the_deviation_of_a_vertical_column_is_north_and_east() -> None:
 
 
 def test_the_deviation_is_from_the_head_of_the_column() -> None:
-    found = deviation(point_at([1.03, 2.0, 10.5]), Design(head=(1.0, 2.0, 0.5)))
+    found = point_deviation(point_at([1.03, 2.0, 10.5]), ColumnDesign(head=(1.0, 2.0, 0.5)))
     np.testing.assert_allclose(found.offset, [0.03, 0.0], atol=1e-12)
     assert found.along == pytest.approx(10.0)
 
 
 def test_a_column_inclined_to_the_north_lies_low_where_it_is_too_far_south() -> None:
-    design = Design(inclination=30.0 * DEG)
-    found = deviation(point_at([5.0, 0.2, 10.0 * math.cos(30.0 * DEG) + 0.1]), design)
+    design = ColumnDesign(inclination=30.0 * DEG)
+    found = point_deviation(point_at([5.0, 0.2, 10.0 * math.cos(30.0 * DEG) + 0.1]), design)
     np.testing.assert_allclose(found.offset, [-0.1 * math.sin(30.0 * DEG), 0.2], atol=1e-12)
     assert found.along == pytest.approx(10.0 + 0.1 * math.cos(30.0 * DEG))
 
 
 @given(st.floats(0.0, math.pi), st.floats(-7.0, 7.0), st.floats(-2.0, 40.0), Vector)
 def test_a_point_on_the_axis_has_no_deviation(inclination: float, azimuth: float, along: float, head: tuple) -> None:
-    design = Design(head=head, inclination=inclination, azimuth=azimuth)
-    found = deviation(point_at(np.array(head) + along * design.axis), design)
+    design = ColumnDesign(head=head, inclination=inclination, azimuth=azimuth)
+    found = point_deviation(point_at(np.array(head) + along * design.axis), design)
     assert found.size == pytest.approx(0.0, abs=1e-13 * (1.0 + abs(along) + float(np.linalg.norm(head))))
     assert found.along == pytest.approx(along, abs=1e-12)
 
 
 def test_a_point_above_the_head_has_the_limit_of_the_head() -> None:
-    assert deviation(point_at([0.0, 0.0, -3.0]), Design()).limit == pytest.approx(0.05)
+    assert point_deviation(point_at([0.0, 0.0, -3.0]), ColumnDesign()).limit == pytest.approx(0.05)
 
 
 @given(st.floats(0.0, 1.5), st.floats(-7.0, 7.0), st.floats(-7.0, 7.0), Vector)
@@ -125,9 +127,9 @@ def test_turning_everything_about_the_vertical_turns_the_offset(
     inclination: float, azimuth: float, angle: float, position: tuple
 ) -> None:
     turn = about_vertical(angle)
-    before = deviation(point_at(position), Design(inclination=inclination, azimuth=azimuth))
+    before = point_deviation(point_at(position), ColumnDesign(inclination=inclination, azimuth=azimuth))
     turned = point_at(turn @ position, cov=turn @ COV @ turn.T)
-    after = deviation(turned, Design(inclination=inclination, azimuth=azimuth + angle))
+    after = point_deviation(turned, ColumnDesign(inclination=inclination, azimuth=azimuth + angle))
     np.testing.assert_allclose(after.offset, turn[:2, :2] @ before.offset, atol=1e-12)
     np.testing.assert_allclose(after.cov, turn[:2, :2] @ before.cov @ turn[:2, :2].T, atol=1e-15)
     assert after.size == pytest.approx(before.size, abs=1e-12)
@@ -139,13 +141,14 @@ def test_turning_everything_anyhow_changes_no_size(
     inclination: float, azimuth: float, position: tuple, axis: tuple, angle: float
 ) -> None:
     assume(np.linalg.norm(axis) > 0.1)
-    turn, design = about_axis(np.array(axis), angle), Design(inclination=inclination, azimuth=azimuth)
-    before = deviation(point_at(position), design)
+    turn, design = about_axis(np.array(axis), angle), ColumnDesign(inclination=inclination, azimuth=azimuth)
+    before = point_deviation(point_at(position), design)
     assume(before.size > 1e-3)
     turned_axis = turn @ design.axis
-    new_inclination, new_azimuth = angles(turned_axis[:2], float(turned_axis[2]))
-    after = deviation(
-        point_at(turn @ position, cov=turn @ COV @ turn.T), Design(inclination=new_inclination, azimuth=new_azimuth)
+    new_inclination, new_azimuth = direction_angles(turned_axis[:2], float(turned_axis[2]))
+    after = point_deviation(
+        point_at(turn @ position, cov=turn @ COV @ turn.T),
+        ColumnDesign(inclination=new_inclination, azimuth=new_azimuth),
     )
     assert after.size == pytest.approx(before.size, abs=1e-9)
     assert after.along == pytest.approx(before.along, abs=1e-9)
@@ -158,15 +161,15 @@ def test_turning_everything_anyhow_changes_no_size(
     [(0.0, 0.0), (0.499, 0.0), (0.5, 0.5), (0.799, 0.5), (0.801, 0.8), (0.999, 0.8), (1.0, 1.0), (7.0, 1.0)],
 )
 def test_levels_are_reached_at_50_80_and_100_percent(used: float, level: float) -> None:
-    found = deviation(point_at([0.05 * used, 0.0, 10.0]), Design(tolerance=PRESETS["5-cm"]))
+    found = point_deviation(point_at([0.05 * used, 0.0, 10.0]), ColumnDesign(tolerance=PRESETS["5-cm"]))
     assert found.ratio == pytest.approx(used)
     assert found.level == level
 
 
 def test_where_no_deviation_is_allowed_any_is_too_much() -> None:
-    design = Design(tolerance=PRESETS["0.27-deg"])
-    assert deviation(point_at([0.0, 0.0, 0.0]), design).ratio == 0.0
-    off = deviation(point_at([0.001, 0.0, 0.0]), design)
+    design = ColumnDesign(tolerance=PRESETS["0.27-deg"])
+    assert point_deviation(point_at([0.0, 0.0, 0.0]), design).ratio == 0.0
+    off = point_deviation(point_at([0.001, 0.0, 0.0]), design)
     assert off.ratio == math.inf
     assert off.level == 1.0
 
@@ -180,7 +183,7 @@ def test_a_hole_is_projected_straight_ahead_to_the_target() -> None:
     tilt = 1.0 * DEG
     tangent = np.array([0.0, math.sin(tilt), math.cos(tilt)])
     point = point_at([0.02, 0.05, 10.0], tangent, md=10.1)
-    found = project(point, lean_of(tilt, 90.0 * DEG, 1e-6 * np.eye(2)), Design())
+    found = project_to_target(point, lean_of(tilt, 90.0 * DEG, 1e-6 * np.eye(2)), ColumnDesign())
     np.testing.assert_allclose(found.offset, [0.02, 0.05 + 20.0 * math.tan(tilt)], atol=1e-12)
     assert found.md == pytest.approx(10.1 + 20.0 / math.cos(tilt))
     assert found.along == 30.0
@@ -189,48 +192,51 @@ def test_a_hole_is_projected_straight_ahead_to_the_target() -> None:
 
 def test_the_uncertainty_of_a_projection_grows_with_the_way() -> None:
     direction, cov = lean_of(0.0, 0.0, 4e-6 * np.eye(2)), 9e-6 * np.eye(3)
-    stds = [project(point_at([0.0, 0.0, z], cov=cov), direction, Design()).std for z in (0.0, 10.0, 20.0, 29.0)]
+    stds = [
+        project_to_target(point_at([0.0, 0.0, z], cov=cov), direction, ColumnDesign()).std
+        for z in (0.0, 10.0, 20.0, 29.0)
+    ]
     np.testing.assert_allclose(stds, [0.003 + 0.002 * way for way in (30.0, 20.0, 10.0, 1.0)], rtol=1e-6)
 
 
 def test_a_projection_counts_what_the_direction_shares() -> None:
     direction = Direction(np.zeros(2), 1.0, 1e-6 * np.eye(2), np.array([[0.0], [3e-3]]))
-    found = project(point_at([0.0, 0.0, 20.0], cov=np.zeros((3, 3))), direction, Design())
+    found = project_to_target(point_at([0.0, 0.0, 20.0], cov=np.zeros((3, 3))), direction, ColumnDesign())
     np.testing.assert_allclose(found.cov, np.diag([1e-4, 1e-4 + 9e-4]), atol=1e-12)
 
 
 def test_beyond_the_target_nothing_is_projected() -> None:
     point = point_at([0.1, 0.0, 31.0], np.array([math.sin(0.1), 0.0, math.cos(0.1)]))
-    found = project(point, lean_of(0.1, 0.0, 1e-6 * np.eye(2)), Design())
+    found = project_to_target(point, lean_of(0.1, 0.0, 1e-6 * np.eye(2)), ColumnDesign())
     np.testing.assert_allclose(found.offset, [0.1, 0.0])
     assert found.along == pytest.approx(31.0)
 
 
 def test_a_hole_along_an_inclined_axis_stays_on_it() -> None:
-    design = Design(inclination=40.0 * DEG, azimuth=200.0 * DEG, length=25.0)
+    design = ColumnDesign(inclination=40.0 * DEG, azimuth=200.0 * DEG, length=25.0)
     direction = lean_of(40.0 * DEG, 200.0 * DEG, 1e-6 * np.eye(2))
-    found = project(point_at(10.0 * design.axis, design.axis), direction, design)
+    found = project_to_target(point_at(10.0 * design.axis, design.axis), direction, design)
     assert found.size == pytest.approx(0.0, abs=1e-12)
     assert found.md == pytest.approx(25.0)
 
 
 @pytest.mark.parametrize("off", [0.5 * DEG, 2.0 * DEG])
 def test_the_uncertainty_of_a_projection_is_the_slope_of_the_target(off: float) -> None:
-    design = Design(inclination=30.0 * DEG, azimuth=50.0 * DEG)
+    design = ColumnDesign(inclination=30.0 * DEG, azimuth=50.0 * DEG)
     inclination, azimuth, cov = 30.0 * DEG + off, 48.0 * DEG, np.array([[2e-6, 5e-7], [5e-7, 1e-6]])
 
     def target(north: float, east: float) -> np.ndarray:
         lean = lean_of(inclination, azimuth, cov).lean + np.array([north, east])
         direction = Direction(lean, math.sqrt(1.0 - float(lean @ lean)), cov, np.zeros((2, 0)))
         tangent = np.array([*lean, direction.down])
-        return project(point_at(5.0 * design.axis, tangent, np.zeros((3, 3))), direction, design).offset
+        return project_to_target(point_at(5.0 * design.axis, tangent, np.zeros((3, 3))), direction, design).offset
 
     step = 1e-6
     slope = np.stack([target(step, 0.0) - target(-step, 0.0), target(0.0, step) - target(0.0, -step)], axis=1)
     slope = slope / (2.0 * step)
     direction = lean_of(inclination, azimuth, cov)
     tangent = np.array([*direction.lean, direction.down])
-    found = project(point_at(5.0 * design.axis, tangent, np.zeros((3, 3))), direction, design)
+    found = project_to_target(point_at(5.0 * design.axis, tangent, np.zeros((3, 3))), direction, design)
     expected = slope @ cov @ slope.T
     np.testing.assert_allclose(found.cov, expected, atol=0.01 * float(np.trace(expected)))
 
@@ -242,20 +248,20 @@ def with_angle_stds(inclination: float, std_i: float, std_a: float) -> Direction
 
 
 def test_at_a_third_of_a_degree_a_third_of_a_degree_of_azimuth_is_a_millimetre() -> None:
-    found = dominant(with_angle_stds(0.3 * DEG, 0.02 * DEG, 0.36 * DEG), 30.0)
+    found = lateral_errors(with_angle_stds(0.3 * DEG, 0.02 * DEG, 0.36 * DEG), 30.0)
     assert found.by_azimuth == pytest.approx(0.001, abs=2e-5)
     assert found.by_inclination == pytest.approx(30.0 * 0.02 * DEG, rel=1e-3)
     assert found.name == "inclination"
 
 
 def test_in_a_flat_hole_the_azimuth_dominates() -> None:
-    found = dominant(with_angle_stds(60.0 * DEG, 0.2 * DEG, 0.2 * DEG), 30.0)
+    found = lateral_errors(with_angle_stds(60.0 * DEG, 0.2 * DEG, 0.2 * DEG), 30.0)
     assert found.name == "azimuth"
     assert found.by_azimuth / found.by_inclination == pytest.approx(math.tan(60.0 * DEG))
 
 
 def test_in_a_vertical_hole_the_azimuth_is_nothing() -> None:
-    found = dominant(lean_of(0.0, 0.0, 1e-6 * np.eye(2)), 30.0)
+    found = lateral_errors(lean_of(0.0, 0.0, 1e-6 * np.eye(2)), 30.0)
     assert found.name == "inclination"
     assert found.by_azimuth == 0.0
     assert found.by_inclination == pytest.approx(0.03)

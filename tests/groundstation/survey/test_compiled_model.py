@@ -9,14 +9,21 @@ import numpy as np
 import pytest
 
 from groundstation.errors import SurveyError, ToolError
-from groundstation.survey.tools.instruments import Mode, Term, Tool, load_tool, shipped
-from groundstation.survey.well.analysis import analyse
-from groundstation.survey.well.compiled_model import COMPILED_FROM, CompiledModel, _load, locate_many, warm, write_model
-from groundstation.survey.well.error_propagation import propagate
-from groundstation.survey.well.error_sources import Leg, Site, Survey
-from groundstation.survey.well.methods import Method, positions
-from groundstation.survey.well.reference_frames import Frame, Norths
-from groundstation.survey.well.well_record import Record
+from groundstation.survey.tools.instruments import PropagationMode, SurveyTool, Term, load_tool, shipped_tool_names
+from groundstation.survey.well.analysis import analyse_survey
+from groundstation.survey.well.compiled_model import (
+    COMPILED_FROM,
+    CompiledModel,
+    _load,
+    locate_many,
+    preload_models,
+    write_model,
+)
+from groundstation.survey.well.error_propagation import propagate_errors
+from groundstation.survey.well.error_sources import Leg, Site, WellSurvey
+from groundstation.survey.well.methods import Method, station_positions
+from groundstation.survey.well.reference_frames import Norths, ReferenceFrame
+from groundstation.survey.well.well_record import SurveyRecord
 from node.kernels.arithmetic import jit
 
 SITE = Site(9.80665, 50_300.0, math.radians(68.0), math.radians(2.0), math.radians(55.0))
@@ -36,17 +43,17 @@ def wells(seed: int) -> list[tuple[np.ndarray, np.ndarray, np.ndarray]]:
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("name", shipped())
+@pytest.mark.parametrize("name", shipped_tool_names())
 def test_a_compiled_tool_gives_what_the_arrays_give(name: str) -> None:
     tool = load_tool(name)
     model = CompiledModel(tool)
     for md, inclination, azimuth in wells(len(name)):
         for method in (Method.MINIMUM_CURVATURE, Method.BALANCED_TANGENTIAL):
             places, cov = model.run(method, md, inclination, azimuth, SITE)
-            expected = positions(method, md, inclination, azimuth)
+            expected = station_positions(method, md, inclination, azimuth)
             np.testing.assert_allclose(places, expected, rtol=0.0, atol=1e-9)
-            survey = Survey(md, inclination, azimuth, expected[:, 2])
-            wanted = propagate(survey, [Leg(tool)], SITE, slot_allowance=tool.slot_allowance).cov
+            survey = WellSurvey(md, inclination, azimuth, expected[:, 2])
+            wanted = propagate_errors(survey, [Leg(tool)], SITE, slot_allowance=tool.slot_allowance).cov
             scale = np.trace(wanted, axis1=1, axis2=2)[:, None, None] + 1e-30
             assert np.max(np.abs(cov - wanted) / scale) < 1e-11
 
@@ -61,10 +68,10 @@ def test_many_wells_at_one_go_are_what_each_is(name: str, method: Method) -> Non
     inclination, azimuth = random.uniform(0.0, 0.4, md.shape), random.uniform(0.0, math.tau, md.shape)
     record = {"SigmaYaw": random.uniform(0.001, 0.01, md.shape)}
     tool = load_tool(name)
-    survey = Survey(md, inclination, azimuth, md, record)
+    survey = WellSurvey(md, inclination, azimuth, md, record)
     places, cov = locate_many(method, survey, tool, SITE, slot_allowance=True)
     for w in range(len(md)):
-        alone = Survey(md[w], inclination[w], azimuth[w], md[w], {"SigmaYaw": record["SigmaYaw"][w]})
+        alone = WellSurvey(md[w], inclination[w], azimuth[w], md[w], {"SigmaYaw": record["SigmaYaw"][w]})
         expected, wanted, _ = CompiledModel(tool).locate(method, alone, SITE, slot_allowance=True)
         np.testing.assert_allclose(places[w], expected, rtol=0.0, atol=1e-9)
         np.testing.assert_allclose(cov[w], wanted, rtol=1e-9, atol=1e-15)
@@ -78,10 +85,10 @@ def test_a_well_of_many_that_cannot_be_is_named() -> None:
     deeper = md.copy()
     deeper[2] = 10.0, 20.0, 15.0
     with pytest.raises(SurveyError, match="well 1, station 1: the hole turns straight back"):
-        locate_many(method, Survey(md, back, zero, md), tool, SITE)
+        locate_many(method, WellSurvey(md, back, zero, md), tool, SITE)
     with pytest.raises(SurveyError, match="station 2: expected a depth beyond 20 m, got 15 m"):
         locate_many(
-            method, Survey(md + [[0.0], [0.0], [10.0]] * np.array([1.0, 1.0, -0.5]), zero, zero, md), tool, SITE
+            method, WellSurvey(md + [[0.0], [0.0], [10.0]] * np.array([1.0, 1.0, -0.5]), zero, zero, md), tool, SITE
         )
 
 
@@ -106,10 +113,10 @@ def test_every_compiled_source_is_that_of_the_arrays(name: str, every: int) -> N
     inclination = np.abs(np.radians(40.0) * np.sin(np.linspace(0.0, 7.0, len(md)))) * (
         inclination > 0.0
     )  # passes gates
-    places = positions(Method.RADIUS_OF_CURVATURE, md, inclination, azimuth)
+    places = station_positions(Method.RADIUS_OF_CURVATURE, md, inclination, azimuth)
     record = {"SigmaYaw": np.linspace(0.001, 0.01, len(md)), "Time": np.linspace(0.0, 9000.0, len(md))}
-    survey = Survey(md, inclination, azimuth, places[:, 2], record)
-    wanted = propagate(survey, [Leg(tool)], SITE, slot_allowance=True)
+    survey = WellSurvey(md, inclination, azimuth, places[:, 2], record)
+    wanted = propagate_errors(survey, [Leg(tool)], SITE, slot_allowance=True)
     cov, parts = model.covariance(survey, SITE, slot_allowance=True)
     scale = np.trace(wanted.cov, axis1=1, axis2=2)[:, None, None] + 1e-30
     assert list(parts) == [term.name for term in tool.terms]
@@ -132,7 +139,7 @@ def test_what_cannot_be_is_refused() -> None:
         model.run(Method.MINIMUM_CURVATURE, np.array([0.0, 10.0, 10.0]), zero, zero, SITE)
     with pytest.raises(SurveyError, match="station 1: the hole turns straight back"):
         model.run(Method.MINIMUM_CURVATURE, md, np.array([0.0, math.pi, math.pi]), zero, SITE)
-    endless = Tool("t", "t", (Term("A", 1.0, "deg", Mode.SYSTEMATIC, ("0", "1 / Sin(Inc)", "0")),))
+    endless = SurveyTool("t", "t", (Term("A", 1.0, "deg", PropagationMode.SYSTEMATIC, ("0", "1 / Sin(Inc)", "0")),))
     with pytest.raises(ToolError, match="term A: its weight has no value"):
         CompiledModel(endless).run(Method.MINIMUM_CURVATURE, md, zero, zero, SITE)
 
@@ -140,11 +147,13 @@ def test_what_cannot_be_is_refused() -> None:
 @pytest.mark.slow
 def test_a_long_survey_is_compiled_and_a_short_one_of_it_is_the_same() -> None:
     md = np.linspace(0.0, 400.0, COMPILED_FROM)
-    record = Record(md, np.linspace(0.0, 0.4, len(md)), np.linspace(0.5, 1.0, len(md)), list(range(len(md))), {})
-    short = Record(*(x[:-1] for x in (md, record.inclination, record.azimuth)), record.lines[:-1], {})
+    record = SurveyRecord(md, np.linspace(0.0, 0.4, len(md)), np.linspace(0.5, 1.0, len(md)), list(range(len(md))), {})
+    short = SurveyRecord(*(x[:-1] for x in (md, record.inclination, record.azimuth)), record.lines[:-1], {})
     tool, method = replace(load_tool("relay"), name="held by this test alone"), Method.MINIMUM_CURVATURE
-    frame = Frame("site", "true", Norths(site=0.2))
-    arrays, compiled, held = (analyse(r, method, tool, SITE, frame=frame).uncertainty for r in (short, record, short))
+    frame = ReferenceFrame("site", "true", Norths(site=0.2))
+    arrays, compiled, held = (
+        analyse_survey(r, method, tool, SITE, frame=frame).uncertainty for r in (short, record, short)
+    )
     assert compiled.model.quick_parts is not None
     assert arrays.model.quick_parts is None
     np.testing.assert_allclose(compiled.cov[:-2], arrays.cov[:-1], rtol=1e-9, atol=1e-15)
@@ -152,14 +161,16 @@ def test_a_long_survey_is_compiled_and_a_short_one_of_it_is_the_same() -> None:
     for name, cov in arrays.by_source().items():
         np.testing.assert_allclose(held.by_source()[name], cov, rtol=1e-9, atol=1e-15)
         np.testing.assert_allclose(compiled.by_source()[name][1:-2], cov[1:-1], rtol=1e-9, atol=1e-15)
-    assert analyse(short, method, tool, SITE).uncertainty.model.quick_parts is not None  # the long one asked for them
+    assert (
+        analyse_survey(short, method, tool, SITE).uncertainty.model.quick_parts is not None
+    )  # the long one asked for them
 
 
 @pytest.mark.slow
 def test_a_warmed_tool_serves_surveys_of_any_length() -> None:
-    warm(["relay"])
-    record = Record(np.array([0.0, 2.0, 4.0]), np.zeros(3), np.zeros(3), [0, 1, 2], {})
-    assert analyse(record, Method.BALANCED_TANGENTIAL, load_tool("relay"), SITE).uncertainty.model.quick_parts
+    preload_models(["relay"])
+    record = SurveyRecord(np.array([0.0, 2.0, 4.0]), np.zeros(3), np.zeros(3), [0, 1, 2], {})
+    assert analyse_survey(record, Method.BALANCED_TANGENTIAL, load_tool("relay"), SITE).uncertainty.model.quick_parts
 
 
 def test_an_instrument_stays_compiled_whatever_other_is_compiled_after_it(

@@ -10,10 +10,10 @@ from scipy.stats import chi2
 
 from groundstation.errors import SurveyError
 from groundstation.survey.well.ellipsoid import (
-    axes,
     check_covariance,
     coverage_radius,
-    outline,
+    ellipse_outline,
+    ellipsoid_axes,
     plan_ellipse,
     probability_of,
 )
@@ -56,7 +56,7 @@ def test_as_many_samples_lie_inside_as_the_confidence_says(probability: float, d
     count = 100_000
     half = np.array([[2.0, 0.0, 0.0], [0.7, 0.5, 0.0], [-0.3, 0.2, 0.1]])[:dimensions, :dimensions]
     samples = rng.standard_normal((count, dimensions)) @ half.T
-    sizes, directions = axes(half @ half.T, coverage_radius(probability, dimensions))
+    sizes, directions = ellipsoid_axes(half @ half.T, coverage_radius(probability, dimensions))
     inside = np.mean(np.sum((samples @ directions.T / sizes) ** 2, axis=1) <= 1.0)
     assert inside == pytest.approx(probability, abs=5.0 * math.sqrt(probability * (1.0 - probability) / count))
 
@@ -79,7 +79,7 @@ def test_a_probability_in_other_dimensions_is_refused(dimensions: int) -> None:
 @given(ENTRIES, st.floats(0.1, 4.0))
 def test_every_point_of_an_outline_lies_on_the_ellipse(entries: list[float], sigma: float) -> None:
     cov = covariance(entries, 2)
-    points = outline(cov, sigma, 37)
+    points = ellipse_outline(cov, sigma, 37)
     assert points.shape == (37, 2)
     np.testing.assert_allclose(points[0], points[-1], atol=1e-9)
     distance = np.einsum("ni,ij,nj->n", points, np.linalg.inv(cov), points)
@@ -90,7 +90,7 @@ def test_every_point_of_an_outline_lies_on_the_ellipse(entries: list[float], sig
 def test_the_plan_ellipse_is_the_outline_of_the_covariance_in_plan(entries: list[float], sigma: float) -> None:
     cov = covariance(entries)
     ellipse = plan_ellipse(cov, sigma)
-    radii = np.linalg.norm(outline(cov[:2, :2], sigma, 721), axis=1)
+    radii = np.linalg.norm(ellipse_outline(cov[:2, :2], sigma, 721), axis=1)
     assert ellipse.major == pytest.approx(float(radii.max()), rel=1e-4)
     assert ellipse.minor == pytest.approx(float(radii.min()), rel=1e-2)
     assert ellipse.major >= ellipse.minor > 0.0
@@ -118,14 +118,14 @@ def test_the_larger_axis_points_where_the_covariance_was_stretched(azimuth_deg: 
 @given(ENTRIES, st.floats(0.1, 4.0))
 def test_axes_put_together_are_the_covariance(entries: list[float], sigma: float) -> None:
     cov = covariance(entries)
-    sizes, directions = axes(cov, sigma)
+    sizes, directions = ellipsoid_axes(cov, sigma)
     assert np.all(np.diff(sizes) <= 0.0)
     np.testing.assert_allclose(directions @ directions.T, np.eye(3), atol=1e-12)
     np.testing.assert_allclose(directions.T @ np.diag((sizes / sigma) ** 2) @ directions, cov, atol=1e-10 * cov.max())
 
 
 def test_a_flat_region_has_an_axis_of_zero() -> None:
-    sizes, _ = axes(np.diag([4.0, 0.0, 1.0]))
+    sizes, _ = ellipsoid_axes(np.diag([4.0, 0.0, 1.0]))
     np.testing.assert_array_equal(sizes, [2.0, 1.0, 0.0])
     ellipse = plan_ellipse(np.array([[1.0, 1.0], [1.0, 1.0 - 1e-16]]))
     assert ellipse.minor == pytest.approx(0.0, abs=1e-7)

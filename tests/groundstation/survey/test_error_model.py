@@ -9,10 +9,10 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from groundstation.survey.tools.instruments import Mode, Term, Tool, load_tool, shipped
-from groundstation.survey.well.error_propagation import Uncertainty, propagate
-from groundstation.survey.well.error_sources import RECORD, Leg, Site, Survey
-from groundstation.survey.well.methods import Method, positions
+from groundstation.survey.tools.instruments import PropagationMode, SurveyTool, Term, load_tool, shipped_tool_names
+from groundstation.survey.well.error_propagation import Uncertainty, propagate_errors
+from groundstation.survey.well.error_sources import RECORD, Leg, Site, WellSurvey
+from groundstation.survey.well.methods import Method, station_positions
 
 with warnings.catch_warnings():
     warnings.simplefilter("ignore")
@@ -34,11 +34,11 @@ from wells import (
 
 def test_the_accelerometer_example_has_its_printed_digits() -> None:
     tool = tool_of(
-        Term("XY", 1.712168e-3, "m/s2", Mode.SYSTEMATIC, ("0", "Cos(Inc) / GField", "0")),
-        Term("Z", 1.494e-7, "m/s2", Mode.SYSTEMATIC, ("0", "Sin(Inc) / GField", "0")),
+        Term("XY", 1.712168e-3, "m/s2", PropagationMode.SYSTEMATIC, ("0", "Cos(Inc) / GField", "0")),
+        Term("Z", 1.494e-7, "m/s2", PropagationMode.SYSTEMATIC, ("0", "Sin(Inc) / GField", "0")),
     )
     survey = survey_of(np.array([0.0, 3.0]), np.full(2, 5.0 * DEG), np.full(2, 30.0 * DEG))
-    cov = propagate(survey, [Leg(tool)], Site(gravity=9.81)).cov[1]
+    cov = propagate_errors(survey, [Leg(tool)], Site(gravity=9.81)).cov[1]
     north, east, down = np.sqrt(np.diag(cov))
     assert (round(north, 6), round(east, 7), round(down, 8)) == (0.000225, 0.0001299, 0.00002273)
     assert cov[0, 1] == pytest.approx(north * east)
@@ -46,11 +46,11 @@ def test_the_accelerometer_example_has_its_printed_digits() -> None:
 
 
 def test_the_gyro_example_has_its_printed_digits() -> None:
-    tool = tool_of(Term("GD", 0.01, "deg/s", Mode.SYSTEMATIC, ("0", "0", "Time")))
+    tool = tool_of(Term("GD", 0.01, "deg/s", PropagationMode.SYSTEMATIC, ("0", "0", "Time")))
     angles = np.full(2, 5.0 * DEG), np.full(2, 30.0 * DEG)
     md = np.array([0.0, 3.0])
-    survey = Survey(md, *angles, md, {"Time": np.array([0.0, 100.0])})
-    north, east, down = np.sqrt(np.diag(propagate(survey, [Leg(tool)], SITE).cov[1]))
+    survey = WellSurvey(md, *angles, md, {"Time": np.array([0.0, 100.0])})
+    north, east, down = np.sqrt(np.diag(propagate_errors(survey, [Leg(tool)], SITE).cov[1]))
     # the print took the sine of the error of one degree, which the model, linear, does not
     bent = math.sin(1.0 * DEG) / (1.0 * DEG)
     assert (round(north * bent, 8), round(east * bent, 7), down) == (0.00114081, 0.0019759, 0.0)
@@ -58,10 +58,12 @@ def test_the_gyro_example_has_its_printed_digits() -> None:
 
 
 def test_a_survey_without_times_takes_a_hundred_seconds_for_a_rod_of_two_metres() -> None:
-    tool = tool_of(Term("GD", 1e-4, "rad", Mode.SYSTEMATIC, ("0", "0", "Time")))
+    tool = tool_of(Term("GD", 1e-4, "rad", PropagationMode.SYSTEMATIC, ("0", "0", "Time")))
     angles = np.full(2, 90.0 * DEG), np.zeros(2)
     md = np.array([0.0, 2.0])
-    assert propagate(Survey(md, *angles, md), [Leg(tool)], SITE).cov[1, 1, 1] == pytest.approx((1e-4 * 100.0) ** 2)
+    assert propagate_errors(WellSurvey(md, *angles, md), [Leg(tool)], SITE).cov[1, 1, 1] == pytest.approx(
+        (1e-4 * 100.0) ** 2
+    )
 
 
 @pytest.mark.slow
@@ -74,7 +76,7 @@ def test_every_source_of_the_mwd_model_agrees_with_the_independent_library() -> 
     for _ in range(WELLS):
         md, inclination, azimuth = random_well(rng)
         errors = welleng.survey.Survey(md, inclination, azimuth, header=header, error_model="ISCWSA MWD Rev5.11").err
-        ours = propagate(survey_of(md, inclination * DEG, azimuth * DEG), [Leg(MWD)], SITE, slot_allowance=True)
+        ours = propagate_errors(survey_of(md, inclination * DEG, azimuth * DEG), [Leg(MWD)], SITE, slot_allowance=True)
         by_source = ours.by_source()
         assert set(by_source) == set(errors.errors.errors)
         assert len(by_source) == 35
@@ -83,13 +85,13 @@ def test_every_source_of_the_mwd_model_agrees_with_the_independent_library() -> 
         assert largest_difference(ours.cov, errors.errors.cov_NEVs) < 1e-3
 
 
-@pytest.mark.parametrize("name", shipped())
+@pytest.mark.parametrize("name", shipped_tool_names())
 @pytest.mark.parametrize("slot_allowance", [False, True])
 def test_the_sources_add_up_to_the_whole(name: str, slot_allowance: bool) -> None:
     survey = well_of(11, 40, steepest=29.0 * DEG)
-    survey = Survey(survey.md, survey.inclination, survey.azimuth, survey.tvd, {"SigmaYaw": np.full(40, 0.01)})
+    survey = WellSurvey(survey.md, survey.inclination, survey.azimuth, survey.tvd, {"SigmaYaw": np.full(40, 0.01)})
     tool = load_tool(name)
-    found = propagate(survey, [Leg(tool)], SITE, slot_allowance=slot_allowance)
+    found = propagate_errors(survey, [Leg(tool)], SITE, slot_allowance=slot_allowance)
     by_source = found.by_source()
     assert list(by_source) == [term.name for term in tool.terms]
     np.testing.assert_allclose(sum(by_source.values())[1:], found.cov[1:], rtol=1e-10, atol=1e-15)  # type: ignore[index]
@@ -98,7 +100,7 @@ def test_the_sources_add_up_to_the_whole(name: str, slot_allowance: bool) -> Non
 def test_the_sources_of_several_legs_add_up_to_the_whole() -> None:
     survey = well_of(12, 30, steepest=29.0 * DEG)
     legs = [Leg(MWD), Leg(load_tool("rst-inclinometer"), 9), Leg(MWD, 17), Leg(load_tool("stim300"), 29)]
-    found = propagate(survey, legs, SITE)
+    found = propagate_errors(survey, legs, SITE)
     np.testing.assert_allclose(sum(found.by_source().values())[1:], found.cov[1:], rtol=1e-10, atol=1e-15)  # type: ignore[index]
 
 
@@ -106,14 +108,14 @@ def test_the_sources_of_several_legs_add_up_to_the_whole() -> None:
     ("mode", "expected"),
     # e_1 = 5 + 5, then + 5, and e*_k = 5: the print's sums by hand
     [
-        (Mode.RANDOM, [25.0, 100.0 + 25.0, 200.0 + 25.0]),
-        (Mode.SYSTEMATIC, [25.0, (10.0 + 5.0) ** 2, (20.0 + 5.0) ** 2]),
-        (Mode.WELL, [25.0, 225.0, 625.0]),
-        (Mode.GLOBAL, [25.0, 225.0, 625.0]),
+        (PropagationMode.RANDOM, [25.0, 100.0 + 25.0, 200.0 + 25.0]),
+        (PropagationMode.SYSTEMATIC, [25.0, (10.0 + 5.0) ** 2, (20.0 + 5.0) ** 2]),
+        (PropagationMode.WELL, [25.0, 225.0, 625.0]),
+        (PropagationMode.GLOBAL, [25.0, 225.0, 625.0]),
     ],
 )
-def test_a_hand_worked_well_has_its_variances_by_mode(mode: Mode, expected: list[float]) -> None:
-    cov = propagate(hand_well(4), [Leg(tool_of(angle_term("A", 0.01, mode, "1")))], SITE).cov
+def test_a_hand_worked_well_has_its_variances_by_mode(mode: PropagationMode, expected: list[float]) -> None:
+    cov = propagate_errors(hand_well(4), [Leg(tool_of(angle_term("A", 0.01, mode, "1")))], SITE).cov
     np.testing.assert_allclose(cov[1:, 0, 0], 1e-4 * np.array(expected))
     np.testing.assert_allclose(cov[:, 1:, 1:], 0.0, atol=1e-30)
     assert np.all(cov[0] == 0.0)
@@ -121,27 +123,35 @@ def test_a_hand_worked_well_has_its_variances_by_mode(mode: Mode, expected: list
 
 @pytest.mark.parametrize(
     ("mode", "expected"),
-    [(Mode.RANDOM, [100.0, 225.0 + 25.0]), (Mode.SYSTEMATIC, [100.0, (15.0 + 5.0) ** 2])],
+    [(PropagationMode.RANDOM, [100.0, 225.0 + 25.0]), (PropagationMode.SYSTEMATIC, [100.0, (15.0 + 5.0) ** 2])],
 )
-def test_the_slot_allowance_gives_the_first_station_the_whole_first_leg(mode: Mode, expected: list[float]) -> None:
+def test_the_slot_allowance_gives_the_first_station_the_whole_first_leg(
+    mode: PropagationMode, expected: list[float]
+) -> None:
     tool = tool_of(angle_term("A", 0.01, mode, "1"))
-    cov = propagate(hand_well(), [Leg(tool)], SITE, slot_allowance=True).cov
+    cov = propagate_errors(hand_well(), [Leg(tool)], SITE, slot_allowance=True).cov
     np.testing.assert_allclose(cov[1:, 0, 0], 1e-4 * np.array(expected))
 
 
 def test_a_hand_worked_well_has_its_variances_of_depth() -> None:
     survey = hand_well()
-    read = propagate(survey, [Leg(tool_of(Term("D", 0.2, "m", Mode.RANDOM, ("1", "0", "0"))))], SITE).cov
+    read = propagate_errors(
+        survey, [Leg(tool_of(Term("D", 0.2, "m", PropagationMode.RANDOM, ("1", "0", "0"))))], SITE
+    ).cov
     np.testing.assert_allclose(read[:, 2, 2], 0.04)
-    scale = propagate(survey, [Leg(tool_of(Term("D", 1e-3, "-", Mode.SYSTEMATIC, ("MD", "0", "0"))))], SITE).cov
+    scale = propagate_errors(
+        survey, [Leg(tool_of(Term("D", 1e-3, "-", PropagationMode.SYSTEMATIC, ("MD", "0", "0"))))], SITE
+    ).cov
     np.testing.assert_allclose(scale[:, 2, 2], [0.0, 1e-4, 4e-4])
     np.testing.assert_allclose(read[:, :2, :2], 0.0, atol=1e-30)
 
 
 def test_a_well_that_begins_below_the_datum_has_no_error_there() -> None:
     md = np.array([5.0, 15.0])
-    survey = Survey(md, np.zeros(2), np.zeros(2), md)
-    cov = propagate(survey, [Leg(tool_of(Term("D", 0.2, "m", Mode.RANDOM, ("1", "0", "0"))))], SITE).cov
+    survey = WellSurvey(md, np.zeros(2), np.zeros(2), md)
+    cov = propagate_errors(
+        survey, [Leg(tool_of(Term("D", 0.2, "m", PropagationMode.RANDOM, ("1", "0", "0"))))], SITE
+    ).cov
     np.testing.assert_allclose(cov[:, 2, 2], [0.0, 0.04])
 
 
@@ -149,32 +159,32 @@ def test_a_well_that_begins_below_the_datum_has_no_error_there() -> None:
     ("mode", "expected"),
     [
         # station 1 in the first leg, 2 and 3 in the second
-        (Mode.RANDOM, [25.0, 125.0, 225.0]),
-        (Mode.SYSTEMATIC, [25.0, 100.0 + 25.0, 100.0 + 225.0]),
-        (Mode.WELL, [25.0, 225.0, 625.0]),
-        (Mode.GLOBAL, [25.0, 225.0, 625.0]),
+        (PropagationMode.RANDOM, [25.0, 125.0, 225.0]),
+        (PropagationMode.SYSTEMATIC, [25.0, 100.0 + 25.0, 100.0 + 225.0]),
+        (PropagationMode.WELL, [25.0, 225.0, 625.0]),
+        (PropagationMode.GLOBAL, [25.0, 225.0, 625.0]),
     ],
 )
-def test_a_new_leg_begins_a_new_systematic_error_and_no_other(mode: Mode, expected: list[float]) -> None:
+def test_a_new_leg_begins_a_new_systematic_error_and_no_other(mode: PropagationMode, expected: list[float]) -> None:
     tool = tool_of(angle_term("A", 0.01, mode, "1"))
-    cov = propagate(hand_well(4), [Leg(tool), Leg(tool, 2)], SITE).cov
+    cov = propagate_errors(hand_well(4), [Leg(tool), Leg(tool, 2)], SITE).cov
     np.testing.assert_allclose(cov[1:, 0, 0], 1e-4 * np.array(expected))
 
 
 def test_errors_of_the_well_go_on_in_another_tool_by_their_name() -> None:
-    one = tool_of(angle_term("A", 0.01, Mode.WELL, "1"), angle_term("B", 0.02, Mode.WELL, "1"))
-    other = tool_of(angle_term("A", 0.03, Mode.WELL, "1"), angle_term("C", 0.01, Mode.WELL, "1"))
-    cov = propagate(hand_well(), [Leg(one), Leg(other, 2)], SITE).cov[2, 0, 0]
+    one = tool_of(angle_term("A", 0.01, PropagationMode.WELL, "1"), angle_term("B", 0.02, PropagationMode.WELL, "1"))
+    other = tool_of(angle_term("A", 0.03, PropagationMode.WELL, "1"), angle_term("C", 0.01, PropagationMode.WELL, "1"))
+    cov = propagate_errors(hand_well(), [Leg(one), Leg(other, 2)], SITE).cov[2, 0, 0]
     assert cov == pytest.approx((10 * 0.01 + 5 * 0.03) ** 2 + (10 * 0.02) ** 2 + (5 * 0.01) ** 2)
 
 
 @pytest.mark.parametrize("cuts", [[1, 2], [1, 10, 11, 25], [1, 29]])
 def test_two_legs_of_one_tool_are_one_where_nothing_is_systematic(cuts: list[int]) -> None:
-    kept = tuple(term for term in MWD.terms if term.mode is not Mode.SYSTEMATIC)
+    kept = tuple(term for term in MWD.terms if term.mode is not PropagationMode.SYSTEMATIC)
     tool = MWD.with_terms(kept)
     survey = well_of(13, 30)
-    whole = propagate(survey, [Leg(tool)], SITE, slot_allowance=True)
-    parts = propagate(survey, [Leg(tool, first) for first in cuts], SITE, slot_allowance=True)
+    whole = propagate_errors(survey, [Leg(tool)], SITE, slot_allowance=True)
+    parts = propagate_errors(survey, [Leg(tool, first) for first in cuts], SITE, slot_allowance=True)
     np.testing.assert_allclose(parts.cov, whole.cov, rtol=1e-11, atol=1e-15)
     for name, cov in whole.by_source().items():
         np.testing.assert_allclose(parts.by_source()[name], cov, rtol=1e-11, atol=1e-15)
@@ -183,23 +193,23 @@ def test_two_legs_of_one_tool_are_one_where_nothing_is_systematic(cuts: list[int
 @pytest.mark.parametrize("cut", [2, 7, 19])
 def test_the_legs_of_a_systematic_error_add_as_two_errors(cut: int) -> None:
     survey = well_of(14, 20)
-    term = Term("A", 0.01, "rad", Mode.SYSTEMATIC, ("0", "Cos(AzT)", "1"))
-    upper = tool_of(Term("A", 0.01, "rad", Mode.WELL, ("0", "Cos(AzT)", "1")))
-    lower = tool_of(Term("B", 0.01, "rad", Mode.WELL, ("0", "Cos(AzT)", "1")))
-    legs = propagate(survey, [Leg(tool_of(term)), Leg(tool_of(term), cut)], SITE)
-    apart = propagate(survey, [Leg(upper), Leg(lower, cut)], SITE)
+    term = Term("A", 0.01, "rad", PropagationMode.SYSTEMATIC, ("0", "Cos(AzT)", "1"))
+    upper = tool_of(Term("A", 0.01, "rad", PropagationMode.WELL, ("0", "Cos(AzT)", "1")))
+    lower = tool_of(Term("B", 0.01, "rad", PropagationMode.WELL, ("0", "Cos(AzT)", "1")))
+    legs = propagate_errors(survey, [Leg(tool_of(term)), Leg(tool_of(term), cut)], SITE)
+    apart = propagate_errors(survey, [Leg(upper), Leg(lower, cut)], SITE)
     np.testing.assert_allclose(legs.cov, apart.cov, rtol=1e-12, atol=1e-18)
 
 
 def moved_positions(
-    survey: Survey, depth: np.ndarray, inclination: np.ndarray, azimuth: np.ndarray, end: int
+    survey: WellSurvey, depth: np.ndarray, inclination: np.ndarray, azimuth: np.ndarray, end: int
 ) -> np.ndarray:
     """Position of station ``end`` by balanced tangential where the readings from the second on are moved."""
     zero = np.zeros((len(depth), 1))
     md = (survey.md + np.hstack([zero, depth]))[:, : end + 1]
     i = (survey.inclination + np.hstack([zero, inclination]))[:, : end + 1]
     a = (survey.azimuth + np.hstack([zero, azimuth]))[:, : end + 1]
-    return positions(Method.BALANCED_TANGENTIAL, md, i, a)[:, -1]
+    return station_positions(Method.BALANCED_TANGENTIAL, md, i, a)[:, -1]
 
 
 @pytest.mark.parametrize("end", [1, 4, 9])
@@ -209,13 +219,13 @@ def test_the_covariance_is_that_of_the_positions_of_drawn_surveys(end: int) -> N
     survey = well_of(16, 10, steepest=70.0 * DEG, first=10.0 * DEG)
     i, a, md = survey.inclination[1:], survey.azimuth[1:], survey.md[1:]
     tool = tool_of(
-        Term("D-R", 0.05, "m", Mode.RANDOM, ("1", "0", "0")),
-        Term("D-S", 3e-4, "-", Mode.SYSTEMATIC, ("MD", "0", "0")),
-        angle_term("I-R", 1e-3, Mode.RANDOM, "1"),
-        angle_term("I-S", 1e-3, Mode.SYSTEMATIC, "Sin(Inc)"),
-        angle_term("A-R", 2e-3, Mode.RANDOM, "0", "1"),
-        angle_term("IA-W", 1e-3, Mode.WELL, "Cos(AzT)", "-Sin(AzT)"),
-        angle_term("A-G", 1e-3, Mode.GLOBAL, "0", "1 / Sin(Inc)"),
+        Term("D-R", 0.05, "m", PropagationMode.RANDOM, ("1", "0", "0")),
+        Term("D-S", 3e-4, "-", PropagationMode.SYSTEMATIC, ("MD", "0", "0")),
+        angle_term("I-R", 1e-3, PropagationMode.RANDOM, "1"),
+        angle_term("I-S", 1e-3, PropagationMode.SYSTEMATIC, "Sin(Inc)"),
+        angle_term("A-R", 2e-3, PropagationMode.RANDOM, "0", "1"),
+        angle_term("IA-W", 1e-3, PropagationMode.WELL, "Cos(AzT)", "-Sin(AzT)"),
+        angle_term("A-G", 1e-3, PropagationMode.GLOBAL, "0", "1 / Sin(Inc)"),
     )
     each, one = (draws, 9), (draws, 1)
     common = 1e-3 * rng.standard_normal(one)
@@ -223,7 +233,7 @@ def test_the_covariance_is_that_of_the_positions_of_drawn_surveys(end: int) -> N
     inclination = 1e-3 * rng.standard_normal(each) + 1e-3 * rng.standard_normal(one) * np.sin(i) + common * np.cos(a)
     azimuth = 2e-3 * rng.standard_normal(each) + 1e-3 * rng.standard_normal(one) / np.sin(i) - common * np.sin(a)
     sampled = np.cov(moved_positions(survey, depth, inclination, azimuth, end).T)
-    cov = propagate(survey, [Leg(tool)], SITE).cov[end]
+    cov = propagate_errors(survey, [Leg(tool)], SITE).cov[end]
     half = np.linalg.cholesky(cov)
     white = np.linalg.solve(half, np.linalg.solve(half, sampled).T)
     # entries of a sampled unit covariance scatter by sqrt(2 / draws) on the diagonal and sqrt(1 / draws) beside it
@@ -231,14 +241,14 @@ def test_the_covariance_is_that_of_the_positions_of_drawn_surveys(end: int) -> N
 
 
 def test_the_covariance_at_a_station_is_the_stations() -> None:
-    found = propagate(well_of(17, 25), [Leg(MWD)], SITE, slot_allowance=True)
+    found = propagate_errors(well_of(17, 25), [Leg(MWD)], SITE, slot_allowance=True)
     for md, cov in zip(found.survey.md.tolist(), found.cov, strict=True):
         np.testing.assert_allclose(found.at(md), cov, rtol=1e-10, atol=1e-18)
 
 
 @given(st.floats(0.0, 1.0), st.integers(0, 3))
 def test_between_stations_the_covariance_is_one_and_goes_on(f: float, seed: int) -> None:
-    found = propagate(well_of(18 + seed, 12), [Leg(MWD)], SITE)
+    found = propagate_errors(well_of(18 + seed, 12), [Leg(MWD)], SITE)
     end = float(found.survey.md[-1])
     cov = found.at(f * end)
     np.testing.assert_allclose(cov, cov.T, atol=1e-15)
@@ -250,8 +260,10 @@ def test_between_stations_the_covariance_is_one_and_goes_on(f: float, seed: int)
 
 
 def test_between_stations_the_covariance_is_that_of_the_blended_position() -> None:
-    tool = tool_of(angle_term("R", 0.01, Mode.RANDOM, "1"), angle_term("S", 0.02, Mode.SYSTEMATIC, "1"))
-    found = propagate(hand_well(4), [Leg(tool)], SITE)
+    tool = tool_of(
+        angle_term("R", 0.01, PropagationMode.RANDOM, "1"), angle_term("S", 0.02, PropagationMode.SYSTEMATIC, "1")
+    )
+    found = propagate_errors(hand_well(4), [Leg(tool)], SITE)
     # halfway between stations 2 and 3: r_2 = 10 e_1 + 5 e_2, r_3 = 10 e_1 + 10 e_2 + 5 e_3
     random = 1e-4 * (10.0**2 + 7.5**2 + 2.5**2)
     systematic = 4e-4 * (0.5 * 15.0 + 0.5 * 25.0) ** 2
@@ -261,7 +273,7 @@ def test_between_stations_the_covariance_is_that_of_the_blended_position() -> No
 def test_between_stations_of_several_legs_it_goes_on_too() -> None:
     survey = well_of(19, 12, steepest=29.0 * DEG)
     legs = [Leg(MWD), Leg(load_tool("rst-inclinometer"), 4), Leg(MWD, 8)]
-    found = propagate(survey, legs, SITE)
+    found = propagate_errors(survey, legs, SITE)
     for k, md in enumerate(survey.md.tolist()):
         np.testing.assert_allclose(found.at(md), found.cov[k], rtol=1e-9, atol=1e-18)
         for near in (md - 1e-7, md + 1e-7):
@@ -269,20 +281,20 @@ def test_between_stations_of_several_legs_it_goes_on_too() -> None:
                 np.testing.assert_allclose(found.at(near), found.cov[k], rtol=1e-5, atol=1e-9)
 
 
-@pytest.mark.parametrize("name", shipped())
+@pytest.mark.parametrize("name", shipped_tool_names())
 def test_many_wells_at_once_give_what_each_gives(name: str) -> None:
     rng = np.random.default_rng(20)
     md = np.cumsum(rng.uniform(0.5, 30.0, (2, 3, 15)), axis=-1)
     inclination, azimuth = rng.uniform(0.0, 0.5, (2, 3, 15)), rng.uniform(0.0, math.tau, (2, 3, 15))
     inclination[0, :, :3] = 0.0
     yaw = rng.uniform(0.0, 0.01, (2, 3, 15))
-    tvd = positions(Method.MINIMUM_CURVATURE, md, inclination, azimuth)[..., 2]
+    tvd = station_positions(Method.MINIMUM_CURVATURE, md, inclination, azimuth)[..., 2]
     legs = [Leg(load_tool(name)), Leg(load_tool(name), 6)]
-    together = propagate(Survey(md, inclination, azimuth, tvd, {"SigmaYaw": yaw}), legs, SITE)
+    together = propagate_errors(WellSurvey(md, inclination, azimuth, tvd, {"SigmaYaw": yaw}), legs, SITE)
     sources = together.by_source()
     for at in np.ndindex(2, 3):
-        survey = Survey(md[at], inclination[at], azimuth[at], tvd[at], {"SigmaYaw": yaw[at]})
-        alone = propagate(survey, legs, SITE)
+        survey = WellSurvey(md[at], inclination[at], azimuth[at], tvd[at], {"SigmaYaw": yaw[at]})
+        alone = propagate_errors(survey, legs, SITE)
         np.testing.assert_allclose(together.cov[at], alone.cov, rtol=1e-10, atol=1e-15)
         for source, cov in alone.by_source().items():
             np.testing.assert_allclose(sources[source][at], cov, rtol=1e-10, atol=1e-15)
@@ -294,10 +306,10 @@ def least_share(found: Uncertainty) -> float:
     return float(np.min(np.linalg.eigvalsh(found.cov)[..., 0] / np.where(traces > 0.0, traces, 1.0)))
 
 
-@given(st.integers(0, 10_000), st.sampled_from(shipped()), st.integers(2, 30), st.booleans())
+@given(st.integers(0, 10_000), st.sampled_from(shipped_tool_names()), st.integers(2, 30), st.booleans())
 def test_every_covariance_is_one(seed: int, name: str, count: int, allowance: bool) -> None:
     survey = well_of(seed, count, steepest=29.0 * DEG)
-    found = propagate(survey, [Leg(load_tool(name))], SITE, slot_allowance=allowance)
+    found = propagate_errors(survey, [Leg(load_tool(name))], SITE, slot_allowance=allowance)
     assert np.all(np.isfinite(found.cov))
     np.testing.assert_array_equal(found.cov, np.swapaxes(found.cov, -1, -2))
     assert least_share(found) >= -1e-12
@@ -307,19 +319,19 @@ def test_every_covariance_is_one(seed: int, name: str, count: int, allowance: bo
 @given(st.integers(0, 10_000), st.floats(-7.0, 7.0))
 def test_turning_a_hole_turns_the_region_of_a_tool_that_knows_no_north(seed: int, angle: float) -> None:
     survey = well_of(seed, 12, first=1.0 * DEG)
-    turned = Survey(survey.md, survey.inclination, survey.azimuth + angle, survey.tvd)
+    turned = WellSurvey(survey.md, survey.inclination, survey.azimuth + angle, survey.tvd)
     c, s = math.cos(angle), math.sin(angle)
     turn = np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]])
     for name in ("stim300", "gyro-continuous", "relay"):
-        before, after = (propagate(one, [Leg(load_tool(name))], SITE).cov for one in (survey, turned))
+        before, after = (propagate_errors(one, [Leg(load_tool(name))], SITE).cov for one in (survey, turned))
         np.testing.assert_allclose(after, turn @ before @ turn.T, rtol=1e-7, atol=1e-12 * float(before.max()))
 
 
 @pytest.mark.parametrize("azimuth_deg", [0.0, 77.0])
 def test_a_vertical_hole_has_the_singular_weights_of_its_tool(azimuth_deg: float) -> None:
     md = 10.0 * np.arange(4)
-    survey = Survey(md, np.zeros(4), np.full(4, azimuth_deg * DEG), md)
-    by_source = propagate(survey, [Leg(MWD)], SITE).by_source()
+    survey = WellSurvey(md, np.zeros(4), np.full(4, azimuth_deg * DEG), md)
+    by_source = propagate_errors(survey, [Leg(MWD)], SITE).by_source()
     # misalignment: north and east by 0.3 deg a leg of 10 m, random
     sigma = 0.3 * DEG
     for name, axis in (("XYM3E", 0), ("XYM4E", 1)):
@@ -333,20 +345,20 @@ def test_a_vertical_hole_has_the_singular_weights_of_its_tool(azimuth_deg: float
         np.testing.assert_allclose(by_source[name], 0.0, atol=1e-12)
 
 
-@pytest.mark.parametrize("name", shipped())
+@pytest.mark.parametrize("name", shipped_tool_names())
 def test_from_vertical_to_nearly_vertical_the_region_goes_on(name: str) -> None:
     md = 10.0 * np.arange(5)
     tool = load_tool(name)
     regions = []
     for inclination in (0.0, 1e-7, 1.7e-6, 1.8e-6, 1e-5):
-        survey = Survey(md, np.full(5, inclination), np.full(5, 0.5), md, {"SigmaForce": np.full(5, 0.01)})
-        regions.append(propagate(survey, [Leg(tool)], SITE).cov)
+        survey = WellSurvey(md, np.full(5, inclination), np.full(5, 0.5), md, {"SigmaForce": np.full(5, 0.01)})
+        regions.append(propagate_errors(survey, [Leg(tool)], SITE).cov)
     assert tool.terms
     for cov in regions[1:]:
         np.testing.assert_allclose(cov, regions[0], rtol=2e-2, atol=2e-3 * float(np.max(regions[0])))
 
 
-NAMED: list[tuple[str, Callable[[Survey], np.ndarray]]] = [
+NAMED: list[tuple[str, Callable[[WellSurvey], np.ndarray]]] = [
     ("MD", lambda s: s.md[1:]),
     ("MDPrev", lambda s: s.md[:-1]),
     ("TVD", lambda s: s.tvd[1:]),
@@ -373,11 +385,13 @@ NAMED: list[tuple[str, Callable[[Survey], np.ndarray]]] = [
 
 
 @pytest.mark.parametrize(("name", "expected"), NAMED, ids=[name for name, _ in NAMED])
-def test_a_formula_sees_the_variables_of_its_station(name: str, expected: Callable[[Survey], np.ndarray]) -> None:
+def test_a_formula_sees_the_variables_of_its_station(name: str, expected: Callable[[WellSurvey], np.ndarray]) -> None:
     survey = well_of(24, 8, first=3.0 * DEG)
     record = {"Time": np.linspace(5.0, 900.0, 8), "SigmaYaw": np.linspace(0.01, 0.02, 8)}
-    survey = Survey(survey.md, survey.inclination, survey.azimuth, survey.tvd, record)
-    tool = Tool("mine", "", (Term("A", 1e-6, "m", Mode.RANDOM, position=("0", "0", name)),), {"Speed": 5.0})
-    cov = propagate(survey, [Leg(tool)], SITE).cov
+    survey = WellSurvey(survey.md, survey.inclination, survey.azimuth, survey.tvd, record)
+    tool = SurveyTool(
+        "mine", "", (Term("A", 1e-6, "m", PropagationMode.RANDOM, position=("0", "0", name)),), {"Speed": 5.0}
+    )
+    cov = propagate_errors(survey, [Leg(tool)], SITE).cov
     effects = 1e-6 * expected(survey)
     np.testing.assert_allclose(cov[1:, 2, 2], np.cumsum(effects**2), rtol=1e-7, atol=1e-30)

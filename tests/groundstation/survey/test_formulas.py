@@ -13,7 +13,7 @@ from hypothesis import example, given
 from hypothesis import strategies as st
 
 from groundstation.errors import ToolError
-from groundstation.survey.tools.formulas import ARRAY, FUNCTIONS, VARIABLES, compile_formulas, is_zero, parse
+from groundstation.survey.tools.formulas import ARRAY, FUNCTIONS, VARIABLES, compile_formulas, is_zero, parse_formula
 
 SCALAR = SimpleNamespace(  # the same functions of plain numbers
     sin=math.sin, cos=math.cos, tan=math.tan, sqrt=math.sqrt, abs=abs, max=max, min=min,
@@ -376,6 +376,6 @@ def test_every_function_is_that_of_plain_numbers() -> None:
 
 
 def test_parsing_takes_the_longest_formula_that_is_allowed() -> None:
-    assert isinstance(parse("Inc" + " " * 1997), ast.Name)
+    assert isinstance(parse_formula("Inc" + " " * 1997), ast.Name)
     with pytest.raises(ToolError, match="at most 2000 characters, got 2001"):
-        parse("Inc" + " " * 1998)
+        parse_formula("Inc" + " " * 1998)

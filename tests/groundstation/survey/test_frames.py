@@ -10,12 +10,12 @@ from wells import DEG, MWD
 from groundstation.errors import SurveyError
 from groundstation.survey.files.programme import read_programme, read_tie_on
 from groundstation.survey.tools.instruments import load_tool
-from groundstation.survey.well.analysis import Analysis, Stretch, analyse, legs_of
-from groundstation.survey.well.error_propagation import propagate
-from groundstation.survey.well.error_sources import Leg, Site, Survey
-from groundstation.survey.well.methods import Method, positions
-from groundstation.survey.well.reference_frames import Frame, Norths, TieOn
-from groundstation.survey.well.well_record import Record
+from groundstation.survey.well.analysis import Analysis, Stretch, analyse_survey, legs_of
+from groundstation.survey.well.error_propagation import propagate_errors
+from groundstation.survey.well.error_sources import Leg, Site, WellSurvey
+from groundstation.survey.well.methods import Method, station_positions
+from groundstation.survey.well.reference_frames import Norths, ReferenceFrame, TieOn
+from groundstation.survey.well.well_record import SurveyRecord
 
 SITE = Site(9.80665, 50_000.0, 72.0 * DEG, -4.0 * DEG, 60.0 * DEG)
 NORTH_OF_SITE = 10.0 * DEG
@@ -23,29 +23,29 @@ CURVED = Method.MINIMUM_CURVATURE
 GYRO = load_tool("gyro-continuous")
 
 
-def record(count: int = 20, first: float = 0.0) -> Record:
+def record(count: int = 20, first: float = 0.0) -> SurveyRecord:
     md = first + 30.0 * np.arange(count)
     inclination = np.linspace(0.0 if first == 0.0 else 30.0, 60.0, count) * DEG
-    return Record(md, inclination, np.linspace(40.0, 80.0, count) * DEG, list(range(2, count + 2)), {})
+    return SurveyRecord(md, inclination, np.linspace(40.0, 80.0, count) * DEG, list(range(2, count + 2)), {})
 
 
-def part(whole: Record, keep: slice) -> Record:
-    return Record(whole.md[keep], whole.inclination[keep], whole.azimuth[keep], whole.lines[keep], {})
+def part(whole: SurveyRecord, keep: slice) -> SurveyRecord:
+    return SurveyRecord(whole.md[keep], whole.inclination[keep], whole.azimuth[keep], whole.lines[keep], {})
 
 
-def turned_by_hand(given: Record, tool: object = MWD) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+def turned_by_hand(given: SurveyRecord, tool: object = MWD) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Azimuth, positions and covariances of a survey whose azimuths were turned before anything was computed."""
     azimuth = given.azimuth + NORTH_OF_SITE
-    places = positions(CURVED, given.md, given.inclination, azimuth)
-    survey = Survey(given.md, given.inclination, azimuth, places[:, 2])
-    return azimuth, places, propagate(survey, [Leg(tool)], SITE, slot_allowance=tool.slot_allowance).cov  # type: ignore[arg-type,attr-defined]
+    places = station_positions(CURVED, given.md, given.inclination, azimuth)
+    survey = WellSurvey(given.md, given.inclination, azimuth, places[:, 2])
+    return azimuth, places, propagate_errors(survey, [Leg(tool)], SITE, slot_allowance=tool.slot_allowance).cov  # type: ignore[arg-type,attr-defined]
 
 
 @pytest.mark.parametrize("tool", [MWD, GYRO], ids=["magnetic", "gyro"])
 def test_with_the_sites_north_at_ten_degrees_everything_is_in_one_frame(tool: object) -> None:
     given, section = record(), 55.0 * DEG
-    frame = Frame("site", "true", Norths(site=NORTH_OF_SITE))
-    found = analyse(given, CURVED, tool, SITE, section, frame)  # type: ignore[arg-type]
+    frame = ReferenceFrame("site", "true", Norths(site=NORTH_OF_SITE))
+    found = analyse_survey(given, CURVED, tool, SITE, section, frame)  # type: ignore[arg-type]
     azimuth, places, cov = turned_by_hand(given, tool)
     np.testing.assert_allclose(found.azimuth, azimuth, atol=1e-9)
     np.testing.assert_allclose(found.positions, places, atol=1e-9)
@@ -60,8 +60,8 @@ def test_with_the_sites_north_at_ten_degrees_everything_is_in_one_frame(tool: ob
 
 def test_the_answer_in_the_sites_north_is_the_same_hole_turned_back() -> None:
     norths = Norths(site=NORTH_OF_SITE)
-    site = analyse(record(), CURVED, MWD, SITE, frame=Frame("site", "site", norths))
-    true = analyse(record(), CURVED, MWD, SITE, frame=Frame("site", "true", norths))
+    site = analyse_survey(record(), CURVED, MWD, SITE, frame=ReferenceFrame("site", "site", norths))
+    true = analyse_survey(record(), CURVED, MWD, SITE, frame=ReferenceFrame("site", "true", norths))
     c, s = math.cos(NORTH_OF_SITE), math.sin(NORTH_OF_SITE)
     back = np.array([[c, s, 0.0], [-s, c, 0.0], [0.0, 0.0, 1.0]])
     np.testing.assert_allclose(site.positions, true.positions @ back.T, atol=1e-9)
@@ -77,19 +77,19 @@ def test_the_answer_in_the_sites_north_is_the_same_hole_turned_back() -> None:
 def test_a_record_of_any_north_is_the_same_hole(north: str, angle_deg: float) -> None:
     norths = Norths(NORTH_OF_SITE, -1.5 * DEG, -4.0 * DEG)
     given = record()
-    shifted = Record(given.md, given.inclination, given.azimuth - angle_deg * DEG, given.lines, {})
-    found = analyse(shifted, CURVED, MWD, SITE, frame=Frame(north, "true", norths))
-    expected = analyse(given, CURVED, MWD, SITE, frame=Frame("true", "true", norths))
+    shifted = SurveyRecord(given.md, given.inclination, given.azimuth - angle_deg * DEG, given.lines, {})
+    found = analyse_survey(shifted, CURVED, MWD, SITE, frame=ReferenceFrame(north, "true", norths))
+    expected = analyse_survey(given, CURVED, MWD, SITE, frame=ReferenceFrame("true", "true", norths))
     np.testing.assert_allclose(found.positions, expected.positions, atol=1e-9)
     np.testing.assert_allclose(found.uncertainty.cov, expected.uncertainty.cov, rtol=1e-9, atol=1e-12)
 
 
 def test_a_record_that_begins_below_its_collar_is_refused() -> None:
     with pytest.raises(SurveyError, match="begins at 500 m, so nothing says where that is; expected the collar"):
-        analyse(record(first=500.0), CURVED, MWD, SITE)
+        analyse_survey(record(first=500.0), CURVED, MWD, SITE)
 
 
-def tied(whole: Analysis, k: int, frame: Frame | None = None) -> TieOn:
+def tied(whole: Analysis, k: int, frame: ReferenceFrame | None = None) -> TieOn:
     at = whole.record
     return TieOn(
         float(at.md[k]), float(at.inclination[k]), float(at.azimuth[k]), whole.positions[k], whole.uncertainty.cov[k]
@@ -98,13 +98,15 @@ def tied(whole: Analysis, k: int, frame: Frame | None = None) -> TieOn:
 
 @pytest.mark.parametrize("shown", [True, False], ids=["station shown again", "station left out"])
 def test_tied_on_at_a_station_the_hole_goes_on_where_it_was(shown: bool) -> None:
-    whole = analyse(record(30), CURVED, MWD, SITE)
+    whole = analyse_survey(record(30), CURVED, MWD, SITE)
     k = 17  # 510 m
-    found = analyse(part(record(30), slice(k if shown else k + 1, None)), CURVED, GYRO, SITE, tie_on=tied(whole, k))
+    found = analyse_survey(
+        part(record(30), slice(k if shown else k + 1, None)), CURVED, GYRO, SITE, tie_on=tied(whole, k)
+    )
     np.testing.assert_allclose(found.positions, whole.positions[k:], atol=1e-9)
     lower = part(record(30), slice(k, None))
-    survey = Survey(lower.md, lower.inclination, lower.azimuth, whole.positions[k:, 2])
-    expected = whole.uncertainty.cov[k] + propagate(survey, [Leg(GYRO)], SITE).cov
+    survey = WellSurvey(lower.md, lower.inclination, lower.azimuth, whole.positions[k:, 2])
+    expected = whole.uncertainty.cov[k] + propagate_errors(survey, [Leg(GYRO)], SITE).cov
     np.testing.assert_allclose(found.uncertainty.cov, expected, rtol=1e-9)
     parts = found.uncertainty.by_source()
     np.testing.assert_allclose(sum(parts.values())[1:], found.uncertainty.cov[1:], rtol=1e-9)
@@ -112,11 +114,11 @@ def test_tied_on_at_a_station_the_hole_goes_on_where_it_was(shown: bool) -> None
 
 
 def test_a_tie_on_is_in_the_north_of_the_record() -> None:
-    whole, norths = analyse(record(30), CURVED, MWD, SITE), Norths(site=NORTH_OF_SITE)
+    whole, norths = analyse_survey(record(30), CURVED, MWD, SITE), Norths(site=NORTH_OF_SITE)
     tie = tied(whole, 17)
     lower = part(record(30), slice(17, None))
-    here = analyse(lower, CURVED, GYRO, SITE, frame=Frame("site", "site", norths), tie_on=tie)
-    there = analyse(lower, CURVED, GYRO, SITE, frame=Frame("site", "true", norths), tie_on=tie)
+    here = analyse_survey(lower, CURVED, GYRO, SITE, frame=ReferenceFrame("site", "site", norths), tie_on=tie)
+    there = analyse_survey(lower, CURVED, GYRO, SITE, frame=ReferenceFrame("site", "true", norths), tie_on=tie)
     c, s = math.cos(NORTH_OF_SITE), math.sin(NORTH_OF_SITE)
     turn = np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]])
     np.testing.assert_allclose(here.positions[0], tie.position, atol=1e-9)
@@ -134,22 +136,22 @@ def test_a_tie_on_is_in_the_north_of_the_record() -> None:
 )
 def test_a_tie_on_that_contradicts_the_first_station_is_refused(tie: TieOn, named: str) -> None:
     with pytest.raises(SurveyError, match=named):
-        analyse(record(first=500.0), CURVED, MWD, SITE, tie_on=tie)
+        analyse_survey(record(first=500.0), CURVED, MWD, SITE, tie_on=tie)
 
 
 def test_a_sidetrack_with_two_tools_is_two_legs_below_its_tie_on() -> None:
-    mother = analyse(record(20), CURVED, MWD, SITE)
+    mother = analyse_survey(record(20), CURVED, MWD, SITE)
     tie = tied(mother, 10)
     md = tie.md + 20.0 * np.arange(1, 15)
-    side = Record(md, np.linspace(32.0, 80.0, 14) * DEG, np.linspace(62.0, 20.0, 14) * DEG, list(range(14)), {})
+    side = SurveyRecord(md, np.linspace(32.0, 80.0, 14) * DEG, np.linspace(62.0, 20.0, 14) * DEG, list(range(14)), {})
     change = float(md[6])
-    found = analyse(side, CURVED, [Stretch(MWD, 0.0), Stretch(GYRO, change)], SITE, tie_on=tie)
+    found = analyse_survey(side, CURVED, [Stretch(MWD, 0.0), Stretch(GYRO, change)], SITE, tie_on=tie)
     inclination = np.concatenate([[tie.inclination], side.inclination])
     azimuth = np.concatenate([[tie.azimuth], side.azimuth])
     mds = np.concatenate([[tie.md], md])
-    places = tie.position + positions(CURVED, mds, inclination, azimuth)
+    places = tie.position + station_positions(CURVED, mds, inclination, azimuth)
     legs = [Leg(MWD), Leg(GYRO, 7)]
-    expected = tie.cov + propagate(Survey(mds, inclination, azimuth, places[:, 2]), legs, SITE).cov
+    expected = tie.cov + propagate_errors(WellSurvey(mds, inclination, azimuth, places[:, 2]), legs, SITE).cov
     np.testing.assert_allclose(found.positions, places, atol=1e-9)
     np.testing.assert_allclose(found.uncertainty.cov, expected, rtol=1e-9)
 

@@ -14,12 +14,12 @@ from groundstation.survey.fusion.fusion import (
     GrowingBayes,
     StationFusion,
     Weighting,
-    adapted,
-    bayes,
-    departure,
+    adaptive_weighting,
+    fuse_by_bayes,
+    fuse_by_scheme,
     moved_hole,
+    newest_departure,
     sequence_weights,
-    weighted,
 )
 from groundstation.survey.fusion.resolve import Direction
 from groundstation.survey.well.trajectory import Trajectory
@@ -67,13 +67,13 @@ def test_fusion_takes_any_order_and_never_averages_the_shared_error(
     leans = [lean_of(*reading) for reading in readings]
     shuffled = leans[:]
     shuffler.shuffle(shuffled)
-    first, second = bayes(leans), bayes(shuffled)
+    first, second = fuse_by_bayes(leans), fuse_by_bayes(shuffled)
     np.testing.assert_allclose(first.lean, second.lean, rtol=1e-9, atol=1e-12)
     np.testing.assert_allclose(first.cov, second.cov, rtol=1e-7, atol=1e-9 * float(np.trace(first.cov)))
     np.testing.assert_allclose(first.shared, second.shared, rtol=1e-7, atol=1e-9)
     assert first.down == pytest.approx(second.down)
     same = lean_of(0.1, 1.0, 1e-3, 0.01)
-    np.testing.assert_allclose(bayes([same] * len(readings)).shared, same.shared, rtol=1e-9)
+    np.testing.assert_allclose(fuse_by_bayes([same] * len(readings)).shared, same.shared, rtol=1e-9)
 
 
 @given(st.lists(st.tuples(st.booleans(), st.integers(1, 6)), min_size=1, max_size=12))
@@ -88,7 +88,7 @@ def test_readings_that_grow_come_to_what_all_of_them_come_to_bit_for_bit(course:
         growing.forget(place)
         begin = len(readings) // 3  # those before no longer count
         mine = growing.of(begin, len(readings), lambda begin, end: readings[begin:end])
-        all_at_once = bayes(readings[begin:])
+        all_at_once = fuse_by_bayes(readings[begin:])
         np.testing.assert_array_equal(mine.lean, all_at_once.lean)
         np.testing.assert_array_equal(mine.cov, all_at_once.cov)
         np.testing.assert_array_equal(mine.shared, all_at_once.shared)
@@ -107,7 +107,7 @@ def test_independent_readings_follow_recursive_bayes(readings: list[tuple[float,
         new, new_var = np.array(reading[:2]), np.array(reading[2:]) ** 2
         mean = (new_var * mean + var * new) / (var + new_var)  # eq. 3.39, 3.40
         var = 1.0 / (1.0 / var + 1.0 / new_var)  # eq. 3.41
-    fused = bayes([near_vertical(n, e, np.diag([sn**2, se**2])) for n, e, sn, se in readings])
+    fused = fuse_by_bayes([near_vertical(n, e, np.diag([sn**2, se**2])) for n, e, sn, se in readings])
     np.testing.assert_allclose(fused.lean, mean, rtol=1e-9, atol=1e-12)
     np.testing.assert_allclose(fused.cov, np.diag(var), rtol=1e-9, atol=1e-18)
     assert fused.lean @ fused.lean + fused.down**2 == pytest.approx(1.0)
@@ -115,7 +115,7 @@ def test_independent_readings_follow_recursive_bayes(readings: list[tuple[float,
 
 def test_covariances_that_are_not_round_weigh_by_their_information() -> None:
     first, second = np.array([[4e-6, 1e-6], [1e-6, 1e-6]]), np.array([[1e-6, -5e-7], [-5e-7, 3e-6]])
-    fused = bayes([near_vertical(0.01, 0.02, first), near_vertical(0.03, -0.01, second)])
+    fused = fuse_by_bayes([near_vertical(0.01, 0.02, first), near_vertical(0.03, -0.01, second)])
     cov = np.linalg.inv(np.linalg.inv(first) + np.linalg.inv(second))
     mean = cov @ (np.linalg.solve(first, [0.01, 0.02]) + np.linalg.solve(second, [0.03, -0.01]))
     np.testing.assert_allclose(fused.cov, cov, rtol=1e-9)
@@ -127,8 +127,8 @@ def test_a_shared_error_stays_and_errors_of_their_own_average_away(scheme: Weigh
     count, column = 9, np.array([[3e-3], [1e-3]])
     own = [np.concatenate([np.zeros((2, k)), column, np.zeros((2, count - 1 - k))], axis=1) for k in range(count)]
     cov = 1e-6 * np.eye(2)
-    all_share = weighted([near_vertical(0.01, 0.02, cov, column) for _ in range(count)], scheme)
-    none_shares = weighted([near_vertical(0.01, 0.02, cov, shared) for shared in own], scheme)
+    all_share = fuse_by_scheme([near_vertical(0.01, 0.02, cov, column) for _ in range(count)], scheme)
+    none_shares = fuse_by_scheme([near_vertical(0.01, 0.02, cov, shared) for shared in own], scheme)
     np.testing.assert_allclose(all_share.total_cov, cov / count + column @ column.T, rtol=1e-9)
     np.testing.assert_allclose(none_shares.total_cov, (cov + column @ column.T) / count, rtol=1e-9)
 
@@ -137,7 +137,7 @@ def test_readings_of_different_width_keep_their_columns_in_place() -> None:
     narrow, wide = np.array([[1e-3], [0.0]]), np.array([[1e-3, 0.0, 2e-3], [0.0, 0.0, 0.0]])
     cov = 1e-4 * np.eye(2)
     for order in ([narrow, wide], [wide, narrow]):
-        fused = weighted([near_vertical(0.0, 0.0, cov, shared) for shared in order], Weighting.EQUAL)
+        fused = fuse_by_scheme([near_vertical(0.0, 0.0, cov, shared) for shared in order], Weighting.EQUAL)
         np.testing.assert_allclose(fused.shared, [[1e-3, 0.0, 1e-3], [0.0, 0.0, 0.0]], atol=1e-18)
 
 
@@ -147,7 +147,7 @@ def test_the_fused_covariance_is_what_sampling_gives_when_some_errors_are_shared
     columns = [np.array([[2e-3, 0.0], [1e-3, 0.0]]), np.array([[2e-3, 0.0], [1e-3, 0.0]])]
     columns.append(np.array([[0.0, -1e-3], [0.0, 3e-3]]))
     covs = [np.diag([1e-6, 4e-6]), np.diag([9e-6, 1e-6]), np.diag([2e-6, 2e-6])]
-    claimed = bayes([near_vertical(0.0, 0.0, cov, shared) for cov, shared in zip(covs, columns, strict=True)])
+    claimed = fuse_by_bayes([near_vertical(0.0, 0.0, cov, shared) for cov, shared in zip(covs, columns, strict=True)])
     errors = []
     for _ in range(5000):
         common = generator.standard_normal(2)
@@ -155,7 +155,7 @@ def test_the_fused_covariance_is_what_sampling_gives_when_some_errors_are_shared
             near_vertical(*(shared @ common + np.sqrt(np.diag(cov)) * generator.standard_normal(2)), cov, shared)
             for cov, shared in zip(covs, columns, strict=True)
         ]
-        errors.append(bayes(readings).lean)
+        errors.append(fuse_by_bayes(readings).lean)
     np.testing.assert_allclose(np.cov(np.array(errors).T), claimed.total_cov, rtol=0.12, atol=1e-7)
 
 
@@ -191,7 +191,7 @@ def test_errors_shrink_as_in_figure_4_35(looks: int, scheme: Weighting, reductio
         changed = [lean_of(1.0 * DEG, a * DEG) for a in np.arange(125.0, 200.1, 5.0)]
     for now in changed:
         readings = [before] * (looks - 1) + [now]
-        errors = [float(np.linalg.norm(weighted(readings, s).lean - now.lean)) for s in (scheme, Weighting.EQUAL)]
+        errors = [float(np.linalg.norm(fuse_by_scheme(readings, s).lean - now.lean)) for s in (scheme, Weighting.EQUAL)]
         assert errors[0] / errors[1] == pytest.approx(reduction, abs=5e-4)
 
 
@@ -201,7 +201,7 @@ def test_errors_at_station_two_are_those_of_figure_4_29d() -> None:
     for station, md in enumerate(mds):
         looks = 4 - station
         readings = [before] * looks if station != 1 else [before] * (looks - 1) + [now]
-        fused.append(md, weighted(readings, Weighting.EQUAL))
+        fused.append(md, fuse_by_scheme(readings, Weighting.EQUAL))
         true.append(md, readings[-1])
     error_cm = 100.0 * (true.points[2].position - fused.points[2].position)
     assert error_cm[0] == pytest.approx(-1.16, abs=0.005)
@@ -224,29 +224,31 @@ def test_the_adaptive_scheme_leans_on_the_newest_the_more_it_departs(size: float
     cov = 1e-6 * np.eye(2)
     readings = [near_vertical(0.0, 0.0, cov), near_vertical(0.0, 0.0, cov)]
     readings.append(near_vertical(0.0, size * math.sqrt(1.5) * 1e-3, cov))
-    assert departure(readings)[1] == pytest.approx(size)
-    assert adapted(readings) is scheme
-    np.testing.assert_array_equal(weighted(readings, Weighting.ADAPTIVE).lean, weighted(readings, scheme).lean)
+    assert newest_departure(readings)[1] == pytest.approx(size)
+    assert adaptive_weighting(readings) is scheme
+    np.testing.assert_array_equal(
+        fuse_by_scheme(readings, Weighting.ADAPTIVE).lean, fuse_by_scheme(readings, scheme).lean
+    )
 
 
 @pytest.mark.parametrize("scheme", Weighting)
 def test_one_reading_alone_is_the_station(scheme: Weighting) -> None:
     reading = lean_of(0.2, 1.0, 1e-3, 0.01)
-    fused = weighted([reading], scheme)
+    fused = fuse_by_scheme([reading], scheme)
     np.testing.assert_allclose(fused.lean, reading.lean, rtol=1e-12)
     np.testing.assert_allclose(fused.total_cov, reading.total_cov, rtol=1e-9, atol=1e-18)
     assert fused.down == pytest.approx(reading.down)
 
 
 def test_a_hole_that_goes_up_stays_up() -> None:
-    fused = bayes([lean_of(3.0, 1.0), lean_of(3.01, 1.0)])
+    fused = fuse_by_bayes([lean_of(3.0, 1.0), lean_of(3.01, 1.0)])
     assert fused.down == pytest.approx(math.cos(3.005), abs=1e-4)
 
 
 def test_a_departure_is_measured_with_the_covariance_of_the_difference() -> None:
     earlier = [near_vertical(0.0, 0.0, np.diag([2e-6, 4e-6])), near_vertical(0.0, 0.0, np.diag([2e-6, 4e-6]))]
     newest = near_vertical(4e-3, 0.0, np.diag([3e-6, 1e-6]))
-    difference, size = departure([*earlier, newest])
+    difference, size = newest_departure([*earlier, newest])
     np.testing.assert_allclose(difference, [4e-3, 0.0], atol=1e-15)
     assert size == pytest.approx(4e-3 / math.sqrt(1e-6 + 3e-6))
 
@@ -256,13 +258,13 @@ def test_an_error_of_the_same_mount_cancels_in_a_departure_and_that_of_another_d
     before = near_vertical(0.0, 0.0, cov, np.concatenate([column, none], axis=1))
     same = near_vertical(0.0, 4e-3, cov, np.concatenate([column, none], axis=1))
     other = near_vertical(0.0, 4e-3, cov, np.concatenate([none, column], axis=1))
-    assert departure([before, same])[1] == pytest.approx(4e-3 / math.sqrt(2e-6))
-    assert departure([before, before, same])[1] == pytest.approx(4e-3 / math.sqrt(1.5e-6))
-    assert departure([before, other])[1] == pytest.approx(4e-3 / math.sqrt(2e-6 + 50e-6))
+    assert newest_departure([before, same])[1] == pytest.approx(4e-3 / math.sqrt(2e-6))
+    assert newest_departure([before, before, same])[1] == pytest.approx(4e-3 / math.sqrt(1.5e-6))
+    assert newest_departure([before, other])[1] == pytest.approx(4e-3 / math.sqrt(2e-6 + 50e-6))
 
 
 def test_a_first_reading_departs_from_nothing() -> None:
-    difference, size = departure([lean_of(0.1, 1.0)])
+    difference, size = newest_departure([lean_of(0.1, 1.0)])
     assert size == 0.0
     np.testing.assert_array_equal(difference, [0.0, 0.0])
 
@@ -324,7 +326,7 @@ def test_holes_that_never_moved_depart_as_often_as_said(trials: int) -> None:
 
     for _ in range(trials):
         own, upper, lower = station(), station(), station()
-        false_single += departure(own)[1] > DEPARTED
+        false_single += newest_departure(own)[1] > DEPARTED
         false_pair += moved_hole(own, [upper]).moved
         false_three += moved_hole(own, [upper, lower]).moved
     expected = math.erfc(math.sqrt(2.0))  # 4.55 %

@@ -7,13 +7,13 @@ import numpy as np
 import pytest
 
 from groundstation.errors import ToolError
-from groundstation.survey.tools.instruments import Mode, Term, Tool, load_tool, parse_toml
+from groundstation.survey.tools.instruments import PropagationMode, SurveyTool, Term, load_tool, parse_toml
 from groundstation.survey.tools.owsg import owsg_names
-from groundstation.survey.well.error_columns import covariance, error_columns
-from groundstation.survey.well.error_propagation import propagate
-from groundstation.survey.well.error_sources import EARTH_RATE, Leg, Site, Survey
+from groundstation.survey.well.error_columns import error_columns, position_covariance
+from groundstation.survey.well.error_propagation import propagate_errors
+from groundstation.survey.well.error_sources import EARTH_RATE, Leg, Site, WellSurvey
 from groundstation.survey.well.gyro_modes import mode_weights, sections_of
-from groundstation.survey.well.methods import Method, positions
+from groundstation.survey.well.methods import Method, station_positions
 
 with warnings.catch_warnings():
     warnings.simplefilter("ignore")
@@ -24,21 +24,25 @@ SITE = Site(9.80665, 50_000.0, 72.0 * DEG, 3.0 * DEG, 60.0 * DEG)
 INCLINATION = np.array([0.0, 10.0, 20.0, 30.0, 10.0, 0.0, 15.0, 25.0, 25.0]) * DEG
 
 
-def survey(inclination: np.ndarray = INCLINATION, azimuth: float | np.ndarray = 40.0 * DEG) -> Survey:
+def survey(inclination: np.ndarray = INCLINATION, azimuth: float | np.ndarray = 40.0 * DEG) -> WellSurvey:
     md = 30.0 * np.arange(len(inclination))
     azimuths = np.broadcast_to(azimuth, md.shape).copy()
-    return Survey(md, inclination, azimuths, positions(Method.MINIMUM_CURVATURE, md, inclination, azimuths)[:, 2])
+    return WellSurvey(
+        md, inclination, azimuths, station_positions(Method.MINIMUM_CURVATURE, md, inclination, azimuths)[:, 2]
+    )
 
 
-def azimuth_weight(term: Term, parameters: dict[str, float] | None = None, of: Survey | None = None) -> np.ndarray:
-    tool = Tool("g", "g", (term,), parameters or {})
+def azimuth_weight(term: Term, parameters: dict[str, float] | None = None, of: WellSurvey | None = None) -> np.ndarray:
+    tool = SurveyTool("g", "g", (term,), parameters or {})
     return mode_weights(Leg(tool), of or survey(), SITE)[0][2]
 
 
 def test_a_stationary_error_stops_at_its_gate_or_keeps_what_it_was_there() -> None:
     weights = ("0", "0", "Sin(Inc)")
-    gone = azimuth_weight(Term("B", 1.0, "deg", Mode.SYSTEMATIC, weights, window=(-math.inf, 17.0 * DEG)))
-    kept = azimuth_weight(Term("B", 1.0, "deg", Mode.SYSTEMATIC, weights, window=(-math.inf, 17.0 * DEG), kept=True))
+    gone = azimuth_weight(Term("B", 1.0, "deg", PropagationMode.SYSTEMATIC, weights, window=(-math.inf, 17.0 * DEG)))
+    kept = azimuth_weight(
+        Term("B", 1.0, "deg", PropagationMode.SYSTEMATIC, weights, window=(-math.inf, 17.0 * DEG), kept=True)
+    )
     live, gate = np.sin(INCLINATION[1:]), math.sin(17.0 * DEG)
     np.testing.assert_allclose(gone, live * (INCLINATION[1:] <= 17.0 * DEG), atol=1e-15)
     np.testing.assert_allclose(kept, np.where(INCLINATION[1:] <= 17.0 * DEG, live, gate), atol=1e-15)
@@ -47,7 +51,7 @@ def test_a_stationary_error_stops_at_its_gate_or_keeps_what_it_was_there() -> No
 def test_what_is_kept_has_the_azimuth_with_which_the_hole_passed_the_gate() -> None:
     inclination, azimuth = np.array([0.0, 0.0, 20.0, 30.0, 0.0, 0.0, 20.0]) * DEG, np.array([0.0, 0, 50, 60, 0, 0, 200])
     found = azimuth_weight(
-        Term("B", 1.0, "deg", Mode.SYSTEMATIC, ("0", "0", "AzT"), window=(-math.inf, 17.0 * DEG), kept=True),
+        Term("B", 1.0, "deg", PropagationMode.SYSTEMATIC, ("0", "0", "AzT"), window=(-math.inf, 17.0 * DEG), kept=True),
         of=survey(inclination, azimuth * DEG),
     )
     # from the vertical the arc runs towards the lower station, whatever azimuth stands at the upper one
@@ -56,7 +60,7 @@ def test_what_is_kept_has_the_azimuth_with_which_the_hole_passed_the_gate() -> N
 
 def test_a_survey_that_begins_beyond_the_gate_initialises_at_its_first_station() -> None:
     found = azimuth_weight(
-        Term("B", 1.0, "deg", Mode.SYSTEMATIC, ("0", "0", "Inc"), window=(-1.0, -1.0), kept=True),
+        Term("B", 1.0, "deg", PropagationMode.SYSTEMATIC, ("0", "0", "Inc"), window=(-1.0, -1.0), kept=True),
         of=survey(np.array([5.0, 9.0, 20.0]) * DEG),
     )
     np.testing.assert_allclose(found, 5.0 * DEG)
@@ -67,12 +71,24 @@ def test_drift_and_walk_grow_beyond_their_gate_and_begin_anew() -> None:
     mean = "Sin((Inc + IncPrev) / 2)"
     drift = azimuth_weight(
         Term(
-            "D", 1.0, "deg/hr", Mode.SYSTEMATIC, ("0", "0", f"Previous + (MD - MDPrev) / (Speed * {mean})"), window=gate
+            "D",
+            1.0,
+            "deg/hr",
+            PropagationMode.SYSTEMATIC,
+            ("0", "0", f"Previous + (MD - MDPrev) / (Speed * {mean})"),
+            window=gate,
         ),
         speed,
     )
     walk = azimuth_weight(
-        Term("W", 1.0, "deg/rthr", Mode.SECTION, ("0", "0", "Sqrt(Previous^2 + (MD - MDPrev) / Speed)"), window=gate),
+        Term(
+            "W",
+            1.0,
+            "deg/rthr",
+            PropagationMode.SECTION,
+            ("0", "0", "Sqrt(Previous^2 + (MD - MDPrev) / Speed)"),
+            window=gate,
+        ),
         speed,
     )
     steps = 30.0 / 1800.0 / np.sin(0.5 * (INCLINATION[1:] + INCLINATION[:-1]))
@@ -81,10 +97,10 @@ def test_drift_and_walk_grow_beyond_their_gate_and_begin_anew() -> None:
 
 
 def test_what_is_random_in_an_initialisation_is_another_error_in_every_section() -> None:
-    term = Term("N", 0.01, "rad", Mode.SECTION, ("0", "0", "1"), window=(17.0 * DEG, 17.0 * DEG), kept=True)
+    term = Term("N", 0.01, "rad", PropagationMode.SECTION, ("0", "0", "1"), window=(17.0 * DEG, 17.0 * DEG), kept=True)
     hole = survey()
     assert sections_of(term, hole.inclination).tolist() == [0, 1, 1, 1, 1, 1, 2, 2]
-    whole = propagate(hole, [Leg(Tool("g", "g", (term,)))], SITE).cov[-1]
+    whole = propagate_errors(hole, [Leg(SurveyTool("g", "g", (term,)))], SITE).cov[-1]
     legs, across = [], np.array([-math.sin(40.0 * DEG), math.cos(40.0 * DEG), 0.0])
     for stations in ((2, 3), (7, 8)):  # by hand: the effect of each section alone
         effect = np.zeros(3)
@@ -100,8 +116,8 @@ def test_columns_of_errors_are_those_of_the_covariance(model: str) -> None:
     tool = load_tool(model)
     hole = survey()
     columns = error_columns(hole, (Leg(tool),), SITE)
-    expected = propagate(hole, [Leg(tool)], SITE, slot_allowance=tool.slot_allowance).cov
-    np.testing.assert_allclose(covariance(columns)[1:], expected[1:], rtol=1e-9, atol=1e-12)
+    expected = propagate_errors(hole, [Leg(tool)], SITE, slot_allowance=tool.slot_allowance).cov
+    np.testing.assert_allclose(position_covariance(columns)[1:], expected[1:], rtol=1e-9, atol=1e-12)
 
 
 def test_a_hybrid_of_the_set_is_the_publishers_up_to_its_gate_and_its_drift_beyond() -> None:
@@ -114,9 +130,9 @@ def test_a_hybrid_of_the_set_is_the_publishers_up_to_its_gate_and_its_drift_beyo
     )  # fmt: skip
     theirs = welleng.survey.Survey(md, inclination, azimuth, header=header, error_model="GYRO-NS-CT").err.errors.errors
     i, a = np.radians(inclination), np.radians(azimuth)
-    hole = Survey(md, i, a, positions(Method.MINIMUM_CURVATURE, md, i, a)[:, 2])
+    hole = WellSurvey(md, i, a, station_positions(Method.MINIMUM_CURVATURE, md, i, a)[:, 2])
     tool = load_tool("gyro-ns-ct")
-    ours = propagate(hole, [Leg(tool)], SITE, slot_allowance=True).by_source()
+    ours = propagate_errors(hole, [Leg(tool)], SITE, slot_allowance=True).by_source()
     below = int(np.flatnonzero(inclination > 15.0)[0])
     for name in theirs:
         scale = np.trace(theirs[name].cov_NEV, axis1=1, axis2=2)[:, None, None] + 1e-12
@@ -147,14 +163,14 @@ def test_the_set_has_its_tools_by_name_and_says_what_it_lacks() -> None:
 def test_a_parameter_that_is_given_takes_the_place_of_the_files() -> None:
     slow, fast = (load_tool("GYRO-NS-CT", {"GXYRunningSpeed": speed}) for speed in (900.0, 3600.0))
     hole = survey(np.linspace(16.0, 60.0, 20) * DEG)
-    drifts = [propagate(hole, [Leg(tool)], SITE).by_source()["GXY-GD"][-1] for tool in (slow, fast)]
+    drifts = [propagate_errors(hole, [Leg(tool)], SITE).by_source()["GXY-GD"][-1] for tool in (slow, fast)]
     np.testing.assert_allclose(drifts[0], 16.0 * drifts[1], rtol=1e-12)
     assert load_tool("GYRO-NS").parameters["NoiseReductionFactor"] == 1.0
 
 
 def test_a_gyro_bias_is_what_the_earths_rotation_makes_of_it() -> None:
     hole = survey(np.full(3, 10.0) * DEG, 90.0 * DEG)
-    cov = propagate(hole, [Leg(load_tool("GYRO-NS"))], SITE).by_source()["GXY-G4"][-1]
+    cov = propagate_errors(hole, [Leg(load_tool("GYRO-NS"))], SITE).by_source()["GXY-G4"][-1]
     azimuth = 0.6 * DEG * math.tan(10.0 * DEG) / (EARTH_RATE * math.cos(60.0 * DEG))
     assert math.sqrt(cov[0, 0]) == pytest.approx(azimuth * 45.0 * math.sin(10.0 * DEG), rel=1e-9)
 

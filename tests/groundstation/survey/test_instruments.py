@@ -14,14 +14,14 @@ from hypothesis import strategies as st
 from groundstation.errors import ToolError
 from groundstation.survey.tools.instruments import (
     UNITS,
-    Mode,
+    PropagationMode,
+    SurveyTool,
     Term,
-    Tool,
+    finite_number,
     load_tool,
     mode_of,
-    number,
     parse_toml,
-    shipped,
+    shipped_tool_names,
 )
 
 DEG = math.pi / 180.0
@@ -37,41 +37,41 @@ SHIPPED = [
 ]
 # Every source of the published model, its magnitude at one standard deviation and how it propagates
 MWD = {
-    "DRFR": (0.35, "m", Mode.RANDOM),
-    "DSFS": (0.00056, "-", Mode.SYSTEMATIC),
-    "DSTG": (2.5e-7, "1/m", Mode.GLOBAL),
-    "ABXY-TI1S": (0.004, "m/s2", Mode.SYSTEMATIC),
-    "ABXY-TI2S": (0.004, "m/s2", Mode.SYSTEMATIC),
-    "ABZ": (0.004, "m/s2", Mode.SYSTEMATIC),
-    "ASXY-TI1S": (0.0005, "-", Mode.SYSTEMATIC),
-    "ASXY-TI2S": (0.0005, "-", Mode.SYSTEMATIC),
-    "ASXY-TI3S": (0.0005, "-", Mode.SYSTEMATIC),
-    "ASZ": (0.0005, "-", Mode.SYSTEMATIC),
-    "MBXY-TI1S": (70.0, "nT", Mode.SYSTEMATIC),
-    "MBXY-TI2S": (70.0, "nT", Mode.SYSTEMATIC),
-    "MBZ": (70.0, "nT", Mode.SYSTEMATIC),
-    "MSXY-TI1S": (0.0016, "-", Mode.SYSTEMATIC),
-    "MSXY-TI2S": (0.0016, "-", Mode.SYSTEMATIC),
-    "MSXY-TI3S": (0.0016, "-", Mode.SYSTEMATIC),
-    "MSZ": (0.0016, "-", Mode.SYSTEMATIC),
-    "DEC-U": (0.16, "deg", Mode.WELL),
-    "DEC-OS": (0.24, "deg", Mode.GLOBAL),
-    "DEC-OH": (0.21, "deg", Mode.GLOBAL),
-    "DEC-OI": (0.05, "deg", Mode.GLOBAL),
-    "DECR": (0.1, "deg", Mode.RANDOM),
-    "DBH-U": (2350.0, "deg.nT", Mode.WELL),
-    "DBH-OS": (3359.0, "deg.nT", Mode.GLOBAL),
-    "DBH-OH": (2840.0, "deg.nT", Mode.GLOBAL),
-    "DBH-OI": (356.0, "deg.nT", Mode.GLOBAL),
-    "DBHR": (3000.0, "deg.nT", Mode.RANDOM),
-    "AMIL": (220.0, "nT", Mode.SYSTEMATIC),
-    "SAGE": (0.2, "deg", Mode.SYSTEMATIC),
-    "XYM1": (0.1, "deg", Mode.SYSTEMATIC),
-    "XYM2": (0.1, "deg", Mode.SYSTEMATIC),
-    "XYM3E": (0.3, "deg", Mode.RANDOM),
-    "XYM4E": (0.3, "deg", Mode.RANDOM),
-    "XCLA": (0.167, "-", Mode.RANDOM),
-    "XCLH": (0.167, "-", Mode.RANDOM),
+    "DRFR": (0.35, "m", PropagationMode.RANDOM),
+    "DSFS": (0.00056, "-", PropagationMode.SYSTEMATIC),
+    "DSTG": (2.5e-7, "1/m", PropagationMode.GLOBAL),
+    "ABXY-TI1S": (0.004, "m/s2", PropagationMode.SYSTEMATIC),
+    "ABXY-TI2S": (0.004, "m/s2", PropagationMode.SYSTEMATIC),
+    "ABZ": (0.004, "m/s2", PropagationMode.SYSTEMATIC),
+    "ASXY-TI1S": (0.0005, "-", PropagationMode.SYSTEMATIC),
+    "ASXY-TI2S": (0.0005, "-", PropagationMode.SYSTEMATIC),
+    "ASXY-TI3S": (0.0005, "-", PropagationMode.SYSTEMATIC),
+    "ASZ": (0.0005, "-", PropagationMode.SYSTEMATIC),
+    "MBXY-TI1S": (70.0, "nT", PropagationMode.SYSTEMATIC),
+    "MBXY-TI2S": (70.0, "nT", PropagationMode.SYSTEMATIC),
+    "MBZ": (70.0, "nT", PropagationMode.SYSTEMATIC),
+    "MSXY-TI1S": (0.0016, "-", PropagationMode.SYSTEMATIC),
+    "MSXY-TI2S": (0.0016, "-", PropagationMode.SYSTEMATIC),
+    "MSXY-TI3S": (0.0016, "-", PropagationMode.SYSTEMATIC),
+    "MSZ": (0.0016, "-", PropagationMode.SYSTEMATIC),
+    "DEC-U": (0.16, "deg", PropagationMode.WELL),
+    "DEC-OS": (0.24, "deg", PropagationMode.GLOBAL),
+    "DEC-OH": (0.21, "deg", PropagationMode.GLOBAL),
+    "DEC-OI": (0.05, "deg", PropagationMode.GLOBAL),
+    "DECR": (0.1, "deg", PropagationMode.RANDOM),
+    "DBH-U": (2350.0, "deg.nT", PropagationMode.WELL),
+    "DBH-OS": (3359.0, "deg.nT", PropagationMode.GLOBAL),
+    "DBH-OH": (2840.0, "deg.nT", PropagationMode.GLOBAL),
+    "DBH-OI": (356.0, "deg.nT", PropagationMode.GLOBAL),
+    "DBHR": (3000.0, "deg.nT", PropagationMode.RANDOM),
+    "AMIL": (220.0, "nT", PropagationMode.SYSTEMATIC),
+    "SAGE": (0.2, "deg", PropagationMode.SYSTEMATIC),
+    "XYM1": (0.1, "deg", PropagationMode.SYSTEMATIC),
+    "XYM2": (0.1, "deg", PropagationMode.SYSTEMATIC),
+    "XYM3E": (0.3, "deg", PropagationMode.RANDOM),
+    "XYM4E": (0.3, "deg", PropagationMode.RANDOM),
+    "XCLA": (0.167, "-", PropagationMode.RANDOM),
+    "XCLH": (0.167, "-", PropagationMode.RANDOM),
 }
 HEAD = '[tool]\nname = "mine"\ntitle = "My tool"\n'
 TERM = '[[term]]\nname = "A"\nvalue = 0.1\nunit = "deg"\nmode = "systematic"\ninclination = "1"\n'
@@ -92,7 +92,7 @@ def shipped_data(name: str) -> dict[str, float]:
 
 
 def test_every_instrument_that_is_promised_is_shipped() -> None:
-    assert shipped() == SHIPPED
+    assert shipped_tool_names() == SHIPPED
 
 
 @pytest.mark.parametrize("name", SHIPPED)
@@ -162,7 +162,9 @@ def test_a_file_of_the_user_is_read(tmp_path: Path) -> None:
     tool = load_tool(str(path))
     assert (tool.name, tool.kind, tool.parameters) == ("mine", "Inertial", {"Speed": 2.0})
     assert tool.inclination_range == (0.0, pytest.approx(45.0 * DEG))
-    assert tool.terms == (Term("A", 0.1, "deg", Mode.SYSTEMATIC, ("0", "0", "Speed * MD"), ("0", "Speed", "0"), None),)
+    assert tool.terms == (
+        Term("A", 0.1, "deg", PropagationMode.SYSTEMATIC, ("0", "0", "Speed * MD"), ("0", "Speed", "0"), None),
+    )
 
 
 def test_terms_can_be_taken_out_and_the_rest_stays() -> None:
@@ -275,20 +277,20 @@ def test_a_file_that_is_no_text_is_refused(tmp_path: Path, suffix: str) -> None:
 
 
 def test_a_tool_made_in_code_is_checked_like_a_file() -> None:
-    good = Term("A", 1.0, "m", Mode.RANDOM, ("1", "0", "0"))
+    good = Term("A", 1.0, "m", PropagationMode.RANDOM, ("1", "0", "0"))
     with pytest.raises(ToolError, match="mine: term A stands there twice"):
-        Tool("mine", "", (good, good))
+        SurveyTool("mine", "", (good, good))
     with pytest.raises(ToolError, match="mine: term A: expected a finite value, got nan"):
-        Tool("mine", "", (Term("A", math.nan, "m", Mode.RANDOM, ("1", "0", "0")),))
+        SurveyTool("mine", "", (Term("A", math.nan, "m", PropagationMode.RANDOM, ("1", "0", "0")),))
     with pytest.raises(ToolError, match="mine: term A: formula 'Q': unknown name Q"):
-        Tool("mine", "", (Term("A", 1.0, "m", Mode.RANDOM, ("Q", "0", "0")),))
+        SurveyTool("mine", "", (Term("A", 1.0, "m", PropagationMode.RANDOM, ("Q", "0", "0")),))
     for place in ("singular", "position"):
         with pytest.raises(ToolError, match="mine: term A: formula 'Q'"):
-            Tool("mine", "", (Term("A", 1.0, "m", Mode.RANDOM, **{place: ("0", "0", "Q")}),))  # type: ignore[arg-type]
+            SurveyTool("mine", "", (Term("A", 1.0, "m", PropagationMode.RANDOM, **{place: ("0", "0", "Q")}),))  # type: ignore[arg-type]
 
 
-@pytest.mark.parametrize("mode", Mode)
-def test_a_mode_is_read_in_any_case(mode: Mode) -> None:
+@pytest.mark.parametrize("mode", PropagationMode)
+def test_a_mode_is_read_in_any_case(mode: PropagationMode) -> None:
     assert mode_of("f", "A", mode.value) is mode_of("f", "A", mode.value.upper()) is mode
 
 
@@ -302,11 +304,11 @@ VALUES: st.SearchStrategy[Any] = st.recursive(
 @given(VALUES)
 @example(10**400)
 def test_a_number_is_finite_or_refused(value: Any) -> None:
-    message = refusal(lambda: number("f", "x", value))
+    message = refusal(lambda: finite_number("f", "x", value))
     if message:
         assert message.startswith("f: x: expected a finite number")
     else:
-        assert number("f", "x", value) == value
+        assert finite_number("f", "x", value) == value
         assert math.isfinite(value)
 
 

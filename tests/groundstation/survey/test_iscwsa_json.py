@@ -15,11 +15,18 @@ from jsonschema import Draft202012Validator
 from referencing import Registry, Resource
 
 from groundstation.errors import ToolError
-from groundstation.survey.tools.instruments import Mode, Term, Tool, load_tool, parse_toml, shipped
+from groundstation.survey.tools.instruments import (
+    PropagationMode,
+    SurveyTool,
+    Term,
+    load_tool,
+    parse_toml,
+    shipped_tool_names,
+)
 from groundstation.survey.tools.iscwsa_json import XCL, parse_json, to_json
-from groundstation.survey.well.error_propagation import propagate
-from groundstation.survey.well.error_sources import Leg, Site, Survey
-from groundstation.survey.well.methods import Method, positions
+from groundstation.survey.well.error_propagation import propagate_errors
+from groundstation.survey.well.error_sources import Leg, Site, WellSurvey
+from groundstation.survey.well.methods import Method, station_positions
 
 with warnings.catch_warnings():
     warnings.simplefilter("ignore")
@@ -45,13 +52,13 @@ def well(steepest_deg: float, count: int = 12) -> tuple[np.ndarray, np.ndarray, 
     return md, np.linspace(0.0, steepest_deg, count), np.mod(330.0 + 7.0 * np.arange(count), 360.0) * (md > 0.0)
 
 
-def survey_of(md: np.ndarray, inclination: np.ndarray, azimuth: np.ndarray) -> Survey:
+def survey_of(md: np.ndarray, inclination: np.ndarray, azimuth: np.ndarray) -> WellSurvey:
     i, a = np.radians(inclination), np.radians(azimuth)
-    return Survey(md, i, a, positions(Method.MINIMUM_CURVATURE, md, i, a)[:, 2])
+    return WellSurvey(md, i, a, station_positions(Method.MINIMUM_CURVATURE, md, i, a)[:, 2])
 
 
-def covariance(tool: Tool, steepest_deg: float) -> np.ndarray:
-    return propagate(survey_of(*well(steepest_deg)), [Leg(tool)], SITE, slot_allowance=True).cov
+def covariance(tool: SurveyTool, steepest_deg: float) -> np.ndarray:
+    return propagate_errors(survey_of(*well(steepest_deg)), [Leg(tool)], SITE, slot_allowance=True).cov
 
 
 def row(**changed: Any) -> dict[str, Any]:
@@ -96,7 +103,9 @@ def test_published_models_give_the_regions_their_publisher_computes(path: Path) 
     theirs = welleng.survey.Survey(md, inclination, azimuth, header=header, error_model=model).err.errors.errors
     # the allowance for the direction of the slot came with revision 5
     allowance = model["metadata"]["revision_number"] >= 5
-    ours = propagate(survey_of(md, inclination, azimuth), [Leg(tool)], SITE, slot_allowance=allowance).by_source()
+    ours = propagate_errors(
+        survey_of(md, inclination, azimuth), [Leg(tool)], SITE, slot_allowance=allowance
+    ).by_source()
     assert set(ours) == set(theirs)
     for name, cov in ours.items():
         expected = theirs[name].cov_NEV[1:]
@@ -187,7 +196,7 @@ def test_what_is_written_obeys_the_published_schema(name: str) -> None:
 
 
 def test_a_tool_without_a_title_is_written_by_the_schema_too() -> None:
-    tool = Tool("mine", "", (Term("A", 1.0, "m", Mode.RANDOM, ("1", "0", "0")),))
+    tool = SurveyTool("mine", "", (Term("A", 1.0, "m", PropagationMode.RANDOM, ("1", "0", "0")),))
     errors = [error.message for error in validator().iter_errors(json.loads(to_json(tool, DATE)))]
     assert errors == []
 
@@ -206,7 +215,7 @@ def test_a_kind_the_schema_does_not_know_is_not_written() -> None:
 
 
 def test_every_shipped_tool_is_written_or_refused_by_its_term() -> None:
-    for name in shipped():
+    for name in shipped_tool_names():
         if name in exportable():
             assert json.loads(to_json(load_tool(name), DATE))["metadata"]["short_name"] == name
         else:
@@ -217,24 +226,33 @@ def test_every_shipped_tool_is_written_or_refused_by_its_term() -> None:
 @pytest.mark.parametrize(
     ("term", "message"),
     [
-        (Term("A", 1.0, "deg", Mode.RANDOM, ("0", "0", "SigmaYaw")), "the schema has no variable sigmayaw"),
-        (Term("A", 1.0, "deg", Mode.RANDOM, ("0", "Time + READINGS", "0")), "no variable readings, time"),
-        (Term("A", 1.0, "deg", Mode.RANDOM, ("0", "0", "1"), ("SigmaForce", "0", "0")), "no variable sigmaforce"),
-        (Term("A", 1.0, "deg/s", Mode.RANDOM, ("0", "1", "0")), "mine: term A: the schema has no unit deg/s"),
-        (Term("A", 1.0, "mm", Mode.RANDOM, ("1", "0", "0")), "mine: term A: the schema has no unit mm"),
-        (Term("A", 1.0, "m", Mode.RANDOM, position=("1", "0", "0")), "mine: term A: the schema has no term that acts"),
+        (Term("A", 1.0, "deg", PropagationMode.RANDOM, ("0", "0", "SigmaYaw")), "the schema has no variable sigmayaw"),
+        (Term("A", 1.0, "deg", PropagationMode.RANDOM, ("0", "Time + READINGS", "0")), "no variable readings, time"),
+        (
+            Term("A", 1.0, "deg", PropagationMode.RANDOM, ("0", "0", "1"), ("SigmaForce", "0", "0")),
+            "no variable sigmaforce",
+        ),
+        (
+            Term("A", 1.0, "deg/s", PropagationMode.RANDOM, ("0", "1", "0")),
+            "mine: term A: the schema has no unit deg/s",
+        ),
+        (Term("A", 1.0, "mm", PropagationMode.RANDOM, ("1", "0", "0")), "mine: term A: the schema has no unit mm"),
+        (
+            Term("A", 1.0, "m", PropagationMode.RANDOM, position=("1", "0", "0")),
+            "mine: term A: the schema has no term that acts",
+        ),
     ],
 )
 def test_a_term_that_the_schema_cannot_say_is_refused(term: Term, message: str) -> None:
     with pytest.raises(ToolError, match=message) as caught:
-        to_json(Tool("mine", "t", (term,)), DATE)
+        to_json(SurveyTool("mine", "t", (term,)), DATE)
     assert "term A" in str(caught.value)
 
 
 def test_a_term_of_depth_and_course_length_at_once_is_not_written_as_something_else() -> None:
-    own = Term("XCLA", 0.1, "-", Mode.RANDOM, ("1", "0", "0"), position=("MD", "0", "0"))
+    own = Term("XCLA", 0.1, "-", PropagationMode.RANDOM, ("1", "0", "0"), position=("MD", "0", "0"))
     with pytest.raises(ToolError, match="term XCLA"):
-        to_json(Tool("mine", "t", (own,)), DATE)
+        to_json(SurveyTool("mine", "t", (own,)), DATE)
 
 
 @pytest.mark.parametrize(
@@ -250,25 +268,31 @@ def test_a_term_of_depth_and_course_length_at_once_is_not_written_as_something_e
     ],
 )
 def test_parameters_are_written_as_numbers_with_their_sign(formula: str, value: float) -> None:
-    tool = Tool("mine", "t", (Term("A", 0.1, "deg", Mode.SYSTEMATIC, ("0", formula, "0")),), {"P": value})
+    tool = SurveyTool(
+        "mine", "t", (Term("A", 0.1, "deg", PropagationMode.SYSTEMATIC, ("0", formula, "0")),), {"P": value}
+    )
     again = parse_json(to_json(tool, DATE), "again.json")
     np.testing.assert_allclose(covariance(again, 40.0), covariance(tool, 40.0), rtol=1e-12, atol=1e-30)
 
 
 def test_a_parameter_named_like_the_exponent_of_a_number_leaves_numbers_alone() -> None:
-    tool = Tool("mine", "t", (Term("A", 0.1, "deg", Mode.SYSTEMATIC, ("0", "1e-1 * E * Inc", "0")),), {"E": 3.0})
+    tool = SurveyTool(
+        "mine", "t", (Term("A", 0.1, "deg", PropagationMode.SYSTEMATIC, ("0", "1e-1 * E * Inc", "0")),), {"E": 3.0}
+    )
     again = parse_json(to_json(tool, DATE), "again.json")
     np.testing.assert_allclose(covariance(again, 40.0), covariance(tool, 40.0), rtol=1e-12, atol=1e-30)
 
 
 def test_a_term_without_effect_in_a_vertical_hole_keeps_that() -> None:
-    own = Term("A", 0.1, "deg", Mode.SYSTEMATIC, ("0", "0", "Cos(Inc) / Sin(Inc)"), ("0", "0", "0"))
-    tool = Tool("mine", "t", (own,))
+    own = Term("A", 0.1, "deg", PropagationMode.SYSTEMATIC, ("0", "0", "Cos(Inc) / Sin(Inc)"), ("0", "0", "0"))
+    tool = SurveyTool("mine", "t", (own,))
     again = parse_json(to_json(tool, DATE), "again.json")
     md, zero = np.array([0.0, 10.0, 20.0]), np.array([0.0, 1e-7, 1e-7])
-    vertical = Survey(md, zero, np.ones(3), md)
+    vertical = WellSurvey(md, zero, np.ones(3), md)
     np.testing.assert_allclose(
-        propagate(vertical, [Leg(again)], SITE).cov, propagate(vertical, [Leg(tool)], SITE).cov, atol=1e-30
+        propagate_errors(vertical, [Leg(again)], SITE).cov,
+        propagate_errors(vertical, [Leg(tool)], SITE).cov,
+        atol=1e-30,
     )
 
 

@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from groundstation.survey.bearings import wrap
+from groundstation.survey.bearings import wrap_angle
 from groundstation.survey.fusion.joint_angles import AGREEING, JointAngles, JointChange, RestingYaw
 
 STRING = (4, 3, 2, 1)
@@ -21,7 +21,7 @@ def told(log: JointAngles, offsets: Sequence[float], head: Sequence[float], sinc
     changes = []
     for k, yaw in enumerate(head):
         for tube, offset in zip(STRING, offsets, strict=True):
-            change = log.on_yaw(STRING, RestingYaw(tube, since + k + 0.1 * tube, wrap(yaw + offset), STD**2))
+            change = log.on_yaw(STRING, RestingYaw(tube, since + k + 0.1 * tube, wrap_angle(yaw + offset), STD**2))
             changes += [] if change is None else [change]
     return changes
 
@@ -40,7 +40,7 @@ def test_the_joint_below_the_tube_that_lies_is_named_once(
     lied = [offset + lie if k >= place else offset for k, offset in enumerate(offsets)]
     (change,) = told(log, lied, [head] * (AGREEING + 3), since=100.0)
     assert change.pair == (STRING[place - 1], STRING[place])
-    assert wrap(change.by - lie) == pytest.approx(0.0, abs=1e-9)
+    assert wrap_angle(change.by - lie) == pytest.approx(0.0, abs=1e-9)
 
 
 def test_a_change_is_told_once_until_the_crew_accepts_the_angle() -> None:

@@ -8,21 +8,21 @@ from hypothesis import assume, example, given
 from hypothesis import strategies as st
 
 from groundstation.errors import SurveyError
-from groundstation.survey.bearings import wrap
+from groundstation.survey.bearings import wrap_angle
 from groundstation.survey.fusion.resolve import Direction
 from groundstation.survey.well.methods import (
     Method,
-    closure,
     dogleg,
     dogleg_severity,
-    leg,
-    positions,
+    horizontal_closure,
+    leg_displacement,
     ratio_factor,
     sinc,
-    tangents,
+    station_positions,
+    station_tangents,
     vertical_section,
 )
-from groundstation.survey.well.trajectory import Trajectory, interpolate
+from groundstation.survey.well.trajectory import Trajectory, interpolate_point
 
 DEG = math.pi / 180.0
 ARCS = [Method.MINIMUM_CURVATURE, Method.RADIUS_OF_CURVATURE]
@@ -58,7 +58,7 @@ def test_a_quarter_circle_in_a_vertical_plane_ends_one_radius_out_and_one_down(
 ) -> None:
     radius, azimuth = 250.0, azimuth_deg * DEG
     angle = np.linspace(0.0, 0.5 * math.pi, 10)
-    position = positions(method, radius * angle, angle, np.full(10, azimuth))
+    position = station_positions(method, radius * angle, angle, np.full(10, azimuth))
     expected = radius * np.stack(
         [(1 - np.cos(angle)) * math.cos(azimuth), (1 - np.cos(angle)) * math.sin(azimuth), np.sin(angle)], axis=-1
     )
@@ -67,14 +67,16 @@ def test_a_quarter_circle_in_a_vertical_plane_ends_one_radius_out_and_one_down(
 
 @pytest.mark.parametrize("method", ARCS)
 def test_one_leg_of_a_quarter_circle_is_enough(method: Method) -> None:
-    quarter = positions(method, np.array([0.0, 0.5 * math.pi]), np.array([0.0, 0.5 * math.pi]), np.zeros(2))
+    quarter = station_positions(method, np.array([0.0, 0.5 * math.pi]), np.array([0.0, 0.5 * math.pi]), np.zeros(2))
     np.testing.assert_allclose(quarter[-1], [1.0, 0.0, 1.0], atol=1e-15)
 
 
 @pytest.mark.parametrize("method", ARCS)
 def test_a_quarter_circle_in_the_horizontal_plane_ends_one_radius_ahead_and_one_aside(method: Method) -> None:
     azimuth = np.linspace(350.0, 440.0, 4) * DEG
-    position = positions(method, 100.0 * (azimuth - azimuth[0]), np.full(4, 0.5 * math.pi), np.mod(azimuth, math.tau))
+    position = station_positions(
+        method, 100.0 * (azimuth - azimuth[0]), np.full(4, 0.5 * math.pi), np.mod(azimuth, math.tau)
+    )
     np.testing.assert_allclose(turned(position[-1], -azimuth[0]), [100.0, 100.0, 0.0], atol=1e-11)
 
 
@@ -82,7 +84,7 @@ def test_a_quarter_circle_in_the_horizontal_plane_ends_one_radius_ahead_and_one_
 @pytest.mark.parametrize(("inclination", "azimuth"), [(0.0, 0.0), (0.3, 5.0), (0.5 * math.pi, 1.0), (math.pi, 0.0)])
 def test_a_straight_hole_is_straight(method: Method, inclination: float, azimuth: float) -> None:
     md = np.array([2.0, 2.5, 30.0, 31.0, 700.0])
-    position = positions(method, md, np.full(5, inclination), np.full(5, azimuth))
+    position = station_positions(method, md, np.full(5, inclination), np.full(5, azimuth))
     direction = [
         math.sin(inclination) * math.cos(azimuth),
         math.sin(inclination) * math.sin(azimuth),
@@ -94,7 +96,7 @@ def test_a_straight_hole_is_straight(method: Method, inclination: float, azimuth
 def test_balanced_tangential_gives_the_printed_steps_of_the_thesis() -> None:
     inclination, azimuth = np.array([0.0, 1.0, 1.0]) * DEG, np.array([0.0, 120.0, 120.0]) * DEG
     steps_cm = 100.0 * np.diff(
-        positions(Method.BALANCED_TANGENTIAL, np.array([0.0, 2.0, 4.0]), inclination, azimuth), axis=0
+        station_positions(Method.BALANCED_TANGENTIAL, np.array([0.0, 2.0, 4.0]), inclination, azimuth), axis=0
     )
     np.testing.assert_array_equal(np.round(steps_cm[:, :2], 3), [[-0.873, 1.511], [-1.745, 3.023]])
     # the print cuts 199.985 and has 199.97 twice
@@ -112,7 +114,7 @@ def test_balanced_tangential_gives_the_printed_steps_of_the_thesis() -> None:
 def test_one_leg_across_north_gives_what_the_textbook_gives(
     method: Method, expected: tuple[float, float, float]
 ) -> None:
-    got = leg(math, method, 30.0, 10.0 * DEG, 350.0 * DEG, 20.0 * DEG, 30.0 * DEG)
+    got = leg_displacement(math, method, 30.0, 10.0 * DEG, 350.0 * DEG, 20.0 * DEG, 30.0 * DEG)
     np.testing.assert_allclose(got, expected, atol=1e-6)
 
 
@@ -124,7 +126,7 @@ def test_radius_of_curvature_gives_the_textbook_formula_across_north() -> None:
         radial * (math.cos(a1) - math.cos(a2)),
         30.0 * (math.sin(i2) - math.sin(i1)) / (i2 - i1),
     ]
-    got = leg(math, Method.RADIUS_OF_CURVATURE, 30.0, i1, 350.0 * DEG, i2, a2)
+    got = leg_displacement(math, Method.RADIUS_OF_CURVATURE, 30.0, i1, 350.0 * DEG, i2, a2)
     np.testing.assert_allclose(got, expected, rtol=1e-13)
 
 
@@ -134,25 +136,25 @@ def test_turning_all_azimuths_turns_the_hole(
 ) -> None:
     md, inclination, azimuth = of_rows(rows)
     # half a turn within a leg has two sides and rounding chooses one
-    assume(np.all(np.abs(np.abs(wrap(np.diff(azimuth))) - math.pi) > 1e-6))
-    before = positions(method, md, inclination, azimuth)
-    after = positions(method, md, inclination, np.mod(azimuth + angle, math.tau))
+    assume(np.all(np.abs(np.abs(wrap_angle(np.diff(azimuth))) - math.pi) > 1e-6))
+    before = station_positions(method, md, inclination, azimuth)
+    after = station_positions(method, md, inclination, np.mod(azimuth + angle, math.tau))
     np.testing.assert_allclose(after, turned(before, angle), atol=1e-9)
 
 
 @given(ROWS, st.sampled_from(BOTH_ENDS))
 def test_a_hole_walked_backwards_ends_where_it_began(rows: list[tuple[float, float, float]], method: Method) -> None:
     md, inclination, azimuth = of_rows(rows)
-    assume(np.all(np.abs(np.abs(wrap(np.diff(azimuth))) - math.pi) > 1e-6))
-    there = positions(method, md, inclination, azimuth)
-    back = positions(method, md[-1] - md[::-1], math.pi - inclination[::-1], azimuth[::-1] + math.pi)
+    assume(np.all(np.abs(np.abs(wrap_angle(np.diff(azimuth))) - math.pi) > 1e-6))
+    there = station_positions(method, md, inclination, azimuth)
+    back = station_positions(method, md[-1] - md[::-1], math.pi - inclination[::-1], azimuth[::-1] + math.pi)
     np.testing.assert_allclose(there[::-1] - there[-1], back, atol=1e-9)
 
 
 @given(ROWS, st.sampled_from(Method))
 def test_no_leg_is_longer_than_its_measured_length(rows: list[tuple[float, float, float]], method: Method) -> None:
     md, inclination, azimuth = of_rows(rows)
-    chords = np.linalg.norm(np.diff(positions(method, md, inclination, azimuth), axis=0), axis=1)
+    chords = np.linalg.norm(np.diff(station_positions(method, md, inclination, azimuth), axis=0), axis=1)
     assert np.all(chords <= np.diff(md) * (1.0 + 1e-12) + 1e-12 * md[-1])
 
 
@@ -161,11 +163,11 @@ def test_a_little_change_of_one_reading_moves_the_toe_a_little(
     rows: list[tuple[float, float, float]], method: Method, at: int, more_i: float, more_a: float
 ) -> None:
     md, inclination, azimuth = of_rows(rows)
-    assume(np.all(np.abs(np.abs(wrap(np.diff(azimuth))) - math.pi) > 0.1))
-    before = positions(method, md, inclination, azimuth)
+    assume(np.all(np.abs(np.abs(wrap_angle(np.diff(azimuth))) - math.pi) > 0.1))
+    before = station_positions(method, md, inclination, azimuth)
     inclination[at % len(md)] += more_i
     azimuth[at % len(md)] += more_a
-    after = positions(method, md, inclination, azimuth)
+    after = station_positions(method, md, inclination, azimuth)
     # an arc of three radians, short of turning back, multiplies a change by its ratio factor squared
     assert float(np.max(np.abs(after - before))) <= 200.0 * 1e-7 * (md[-1] - md[0]) + 1e-9
 
@@ -175,9 +177,9 @@ def test_series_and_closed_form_meet(inclination: float, azimuth: float, more_i:
     for method in Method:
         other = (inclination + more_i, azimuth + more_a)
         assume(other[0] > 0.0)
-        number = leg(math, method, 30.0, inclination, azimuth, *other)
+        number = leg_displacement(math, method, 30.0, inclination, azimuth, *other)
         array = [np.array([x]) for x in (inclination, azimuth, *other)]
-        whole = leg(np, method, np.array([30.0]), *array)
+        whole = leg_displacement(np, method, np.array([30.0]), *array)
         np.testing.assert_allclose(np.concatenate(whole), number, atol=1e-13 * 30.0)
 
 
@@ -197,14 +199,14 @@ def test_sinc_and_ratio_factor_are_exact_when_small(x: float) -> None:
 
 @given(st.floats(-1e3, 1e3))
 def test_a_wrapped_angle_points_the_same_way(angle: float) -> None:
-    got = wrap(angle)
+    got = wrap_angle(angle)
     assert -math.pi <= got < math.pi
     assert math.cos(got - angle) == pytest.approx(1.0)
 
 
 @given(st.floats(0.0, math.pi), st.floats(-7.0, 7.0), st.floats(0.0, math.pi), st.floats(-7.0, 7.0))
 def test_the_dogleg_is_the_angle_between_the_tangents(i1: float, a1: float, i2: float, a2: float) -> None:
-    one, other = tangents(np.array([i1, i2]), np.array([a1, a2]))
+    one, other = station_tangents(np.array([i1, i2]), np.array([a1, a2]))
     expected = math.atan2(float(np.linalg.norm(np.cross(one, other))), float(one @ other))
     assert dogleg(math, i1, a1, i2, a2) == pytest.approx(expected, abs=3e-8)
     if expected < 3.0:
@@ -224,7 +226,9 @@ def test_dogleg_severity_is_angle_over_length() -> None:
 
 
 def test_closure_is_distance_and_bearing_from_the_collar() -> None:
-    distance, direction = closure(np.array([[3.0, 4.0, 9.0], [-3.0, 0.0, 1.0], [0.0, -2.0, 1.0], [1.0, -1e-30, 0.0]]))
+    distance, direction = horizontal_closure(
+        np.array([[3.0, 4.0, 9.0], [-3.0, 0.0, 1.0], [0.0, -2.0, 1.0], [1.0, -1e-30, 0.0]])
+    )
     np.testing.assert_allclose(distance, [5.0, 3.0, 2.0, 1.0])
     np.testing.assert_allclose(direction[:3], [math.atan2(4.0, 3.0), math.pi, 1.5 * math.pi])
     assert np.all((direction >= 0.0) & (direction < math.tau))
@@ -235,7 +239,7 @@ def test_vertical_section_is_the_part_of_the_closure_along_its_azimuth(
     north: float, east: float, azimuth: float
 ) -> None:
     position = np.array([[north, east, 5.0]])
-    distance, direction = closure(position)
+    distance, direction = horizontal_closure(position)
     expected = distance * np.cos(direction - azimuth)
     np.testing.assert_allclose(vertical_section(position, azimuth), expected, atol=1e-11)
 
@@ -243,12 +247,12 @@ def test_vertical_section_is_the_part_of_the_closure_along_its_azimuth(
 @given(ROWS, st.sampled_from(Method))
 def test_appending_one_by_one_gives_the_whole_hole(rows: list[tuple[float, float, float]], method: Method) -> None:
     md, inclination, azimuth = of_rows(rows)
-    assume(np.all(np.abs(np.abs(wrap(np.diff(azimuth))) - math.pi) > 1e-6))
+    assume(np.all(np.abs(np.abs(wrap_angle(np.diff(azimuth))) - math.pi) > 1e-6))
     trajectory = Trajectory(method, lean_of(inclination[0], azimuth[0]), float(md[0]))
     for row in zip(md[1:], inclination[1:], azimuth[1:], strict=True):
         trajectory.append(float(row[0]), lean_of(float(row[1]), float(row[2])))
     got = np.array([point.position for point in trajectory.points])
-    np.testing.assert_allclose(got, positions(method, md, inclination, azimuth), atol=1e-10)
+    np.testing.assert_allclose(got, station_positions(method, md, inclination, azimuth), atol=1e-10)
 
 
 @given(ROWS, st.floats(-7.0, 7.0), st.sampled_from(Method))
@@ -257,7 +261,7 @@ def test_turning_a_hole_below_a_vertical_collar_turns_its_trajectory(
     rows: list[tuple[float, float, float]], angle: float, method: Method
 ) -> None:
     md, inclination, azimuth = of_rows(rows)
-    assume(np.all(np.abs(np.abs(wrap(np.diff(azimuth))) - math.pi) > 1e-6))
+    assume(np.all(np.abs(np.abs(wrap_angle(np.diff(azimuth))) - math.pi) > 1e-6))
     one, other = Trajectory(method), Trajectory(method)
     for row in zip(md, inclination, azimuth, strict=True):
         one.append(float(row[0]), lean_of(float(row[1]), float(row[2])))
@@ -284,7 +288,7 @@ def test_between_stations_the_interpolated_point_lies_on_the_arc(
     for row in zip(md[1:], inclination[1:], azimuth[1:], strict=True):
         trajectory.append(float(row[0]), lean_of(float(row[1]), float(row[2])))
     at = min(float(md[0] + f * (md[-1] - md[0])), float(md[-1]))  # the sum may round beyond the end
-    point = interpolate(trajectory.points, at)
+    point = interpolate_point(trajectory.points, at)
     upper = max((p for p in trajectory.points if p.md <= at), key=lambda p: p.md)
     assert point.md == pytest.approx(at)
     assert np.linalg.norm(point.tangent) == pytest.approx(1.0, abs=1e-9)
@@ -299,11 +303,11 @@ def test_many_wells_at_once_give_what_each_gives(method: Method) -> None:
     rng = np.random.default_rng(22)
     md = np.cumsum(rng.uniform(0.1, 30.0, (3, 4, 20)), axis=-1)
     inclination, azimuth = rng.uniform(0.0, 2.0, (3, 4, 20)), rng.uniform(0.0, math.tau, (3, 4, 20))
-    together = positions(method, md, inclination, azimuth)
+    together = station_positions(method, md, inclination, azimuth)
     severity = dogleg_severity(md, inclination, azimuth)
     assert together.shape == (3, 4, 20, 3)
     for well in np.ndindex(3, 4):
-        alone = positions(method, md[well], inclination[well], azimuth[well])
+        alone = station_positions(method, md[well], inclination[well], azimuth[well])
         np.testing.assert_allclose(together[well], alone, rtol=0.0, atol=1e-12)
         np.testing.assert_allclose(severity[well], dogleg_severity(md[well], inclination[well], azimuth[well]))
 
@@ -328,14 +332,14 @@ def test_what_is_no_survey_is_refused_by_every_method(
     method: Method, md: list[float], inclination: list[float], azimuth: list[float], message: str
 ) -> None:
     with pytest.raises(SurveyError, match=message):
-        positions(method, np.array(md, float), np.array(inclination, float), np.array(azimuth, float))
+        station_positions(method, np.array(md, float), np.array(inclination, float), np.array(azimuth, float))
 
 
 def test_a_bad_station_is_named_within_many_wells() -> None:
     md = np.tile([0.0, 1.0, 2.0], (4, 1))
     md[2, 2] = 0.5
     with pytest.raises(SurveyError, match=r"station 2: expected a depth beyond 1 m, got 0\.5 m"):
-        positions(Method.TANGENTIAL, md, np.zeros((4, 3)), np.zeros((4, 3)))
+        station_positions(Method.TANGENTIAL, md, np.zeros((4, 3)), np.zeros((4, 3)))
 
 
 @given(st.floats(0.0, math.pi), st.floats(0.0, math.tau))
@@ -343,7 +347,7 @@ def test_an_arc_that_turns_straight_back_is_refused(inclination: float, azimuth:
     md = np.array([0.0, 10.0])
     there_and_back = np.array([inclination, math.pi - inclination]), np.array([azimuth, azimuth + math.pi])
     with pytest.raises(SurveyError, match="station 1: the hole turns straight back on itself"):
-        positions(Method.MINIMUM_CURVATURE, md, *there_and_back)
+        station_positions(Method.MINIMUM_CURVATURE, md, *there_and_back)
 
 
 @given(st.floats(0.0, math.pi), st.floats(0.0, math.tau))

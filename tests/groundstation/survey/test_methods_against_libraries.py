@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 import wellpathpy
 
-from groundstation.survey.well.methods import Method, dogleg_severity, positions
+from groundstation.survey.well.methods import Method, dogleg_severity, station_positions
 
 with warnings.catch_warnings():
     warnings.simplefilter("ignore")
@@ -42,7 +42,7 @@ def test_tangential_methods_agree_with_wellpathpy(method: Method, choice: str) -
         # a vertical end has no azimuth to average with; theirs takes what it is given
         leaning = np.maximum(inclination, 0.01) if method is Method.AVERAGE_ANGLE else inclination
         theirs = wellpathpy.deviation(md, leaning, azimuth).tan_method(choice)
-        ours = positions(method, md, np.radians(leaning), np.radians(azimuth))
+        ours = station_positions(method, md, np.radians(leaning), np.radians(azimuth))
         expected = np.stack([theirs.northing, theirs.easting, theirs.depth], axis=-1)
         np.testing.assert_allclose(ours, expected, rtol=0.0, atol=1e-9)
 
@@ -50,7 +50,7 @@ def test_tangential_methods_agree_with_wellpathpy(method: Method, choice: str) -
 def test_tangential_takes_the_direction_at_the_lower_station() -> None:
     for md, inclination, azimuth in random_wells():
         low = wellpathpy.deviation(md, np.roll(inclination, -1), np.roll(azimuth, -1)).tan_method("low")
-        ours = positions(Method.TANGENTIAL, md, np.radians(inclination), np.radians(azimuth))
+        ours = station_positions(Method.TANGENTIAL, md, np.radians(inclination), np.radians(azimuth))
         np.testing.assert_allclose(ours, np.stack([low.northing, low.easting, low.depth], axis=-1), rtol=0.0, atol=1e-9)
 
 
@@ -59,7 +59,7 @@ def test_radius_of_curvature_agrees_with_wellpathpy_where_that_divides_by_no_zer
         inclination = np.linspace(1.0, 90.0, len(md))
         azimuth = drawn[0] + 0.03 * np.arange(len(md))
         theirs = wellpathpy.deviation(md, inclination, azimuth).radius_curvature()
-        ours = positions(Method.RADIUS_OF_CURVATURE, md, np.radians(inclination), np.radians(azimuth))
+        ours = station_positions(Method.RADIUS_OF_CURVATURE, md, np.radians(inclination), np.radians(azimuth))
         expected = np.stack([theirs.northing, theirs.easting, theirs.depth], axis=-1)
         np.testing.assert_allclose(ours, expected, rtol=0.0, atol=1e-9)
 
@@ -67,7 +67,7 @@ def test_radius_of_curvature_agrees_with_wellpathpy_where_that_divides_by_no_zer
 def test_minimum_curvature_agrees_with_wellpathpy() -> None:
     for md, inclination, azimuth in random_wells():
         theirs = wellpathpy.deviation(md, inclination, azimuth).minimum_curvature()
-        ours = positions(Method.MINIMUM_CURVATURE, md, np.radians(inclination), np.radians(azimuth))
+        ours = station_positions(Method.MINIMUM_CURVATURE, md, np.radians(inclination), np.radians(azimuth))
         expected = np.stack([theirs.northing, theirs.easting, theirs.depth], axis=-1)
         np.testing.assert_allclose(ours, expected, rtol=0.0, atol=1e-9)
 
@@ -85,5 +85,5 @@ def test_minimum_curvature_agrees_with_welleng_across_north_too() -> None:
         across = np.mod(azimuth + rng.uniform(0.0, 360.0), 360.0)
         header = welleng.survey.SurveyHeader(b_total=50_000, dip=70, declination=0, convergence=0)
         theirs = welleng.survey.Survey(md, inclination, across, header=header)
-        ours = positions(Method.MINIMUM_CURVATURE, md, np.radians(inclination), np.radians(across))
+        ours = station_positions(Method.MINIMUM_CURVATURE, md, np.radians(inclination), np.radians(across))
         np.testing.assert_allclose(ours, np.stack([theirs.n, theirs.e, theirs.tvd], axis=-1), rtol=0.0, atol=1e-9)

@@ -10,10 +10,16 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from groundstation.survey.tools.instruments import load_tool
-from groundstation.survey.wall.column_deviation import Design
+from groundstation.survey.wall.column_deviation import ColumnDesign
 from groundstation.survey.wall.plane_errors import PlaneErrors
-from groundstation.survey.wall.wall_columns import Assumptions, ColumnPlan, Hole, build, fewest
-from groundstation.survey.wall.wall_errors import COLUMNS, PLACES, parted
+from groundstation.survey.wall.wall_columns import (
+    Assumptions,
+    ColumnPlan,
+    ColumnSurvey,
+    build_wall,
+    reduce_error_columns,
+)
+from groundstation.survey.wall.wall_errors import COLUMNS, PLACES, batch_groups
 from groundstation.survey.wall.wall_file import judge_wall, read_wall
 
 
@@ -21,7 +27,7 @@ from groundstation.survey.wall.wall_file import judge_wall, read_wall
 def test_the_fewest_numbers_say_the_same(seed: int, stations: int, numbers: int) -> None:
     errors = np.random.default_rng(seed).normal(0.0, 0.01, (stations, 2, numbers))
     errors[0] = 0.0
-    found = fewest(errors)
+    found = reduce_error_columns(errors)
     assert found.shape[-1] <= min(2 * (stations - 1), numbers)
     flat, before = found.reshape(2 * stations, -1), errors.reshape(2 * stations, -1)
     np.testing.assert_allclose(flat @ flat.T, before @ before.T, rtol=1e-9, atol=1e-15)
@@ -44,7 +50,7 @@ def test_errors_between_two_stations_are_theirs_blended_and_those_of_the_site_co
 
 @given(st.lists(st.lists(st.integers(0, 500), min_size=2, max_size=9), max_size=60), st.integers(1, 600))
 def test_parts_hold_every_group_once_and_its_columns(groups: list[list[int]], samples: int) -> None:
-    parts = list(parted(groups, samples, 60))
+    parts = list(batch_groups(groups, samples, 60))
     assert [k for some, _ in parts for k in some] == list(range(len(groups)))
     for some, which in parts:
         assert set(which.tolist()) == {column for k in some for column in groups[k]}
@@ -54,12 +60,12 @@ def test_parts_hold_every_group_once_and_its_columns(groups: list[list[int]], sa
 def test_columns_of_one_instrument_and_of_none_share_what_they_share() -> None:
     """Two of one serial number err alike, a third by itself; what each errs in all stays the same."""
     tool, md = load_tool("relay"), np.arange(0.0, 11.0, 2.0)
-    hole = Hole(md, np.full(6, math.radians(2.0)), np.full(6, 1.0))
+    hole = ColumnSurvey(md, np.full(6, math.radians(2.0)), np.full(6, 1.0))
     plans = [
-        ColumnPlan(Design(f"C{k}", (0.0, 0.8 * k, 0.0), length=10.0), tool, serial)
+        ColumnPlan(ColumnDesign(f"C{k}", (0.0, 0.8 * k, 0.0), length=10.0), tool, serial)
         for k, serial in enumerate(("S1", "S1", ""))
     ]
-    built = build(plans, [hole] * 3, Assumptions())
+    built = build_wall(plans, [hole] * 3, Assumptions())
     covs = built.columns.covs
     np.testing.assert_allclose(covs[0], covs[2], rtol=1e-9, atol=1e-15)
     shared = built.columns.shared.at(range(3))

@@ -11,9 +11,9 @@ import pytest
 
 from groundstation.survey.tools.instruments import load_tool
 from groundstation.survey.well.compiled_model import CompiledModel
-from groundstation.survey.well.error_propagation import Uncertainty, propagate
-from groundstation.survey.well.error_sources import Leg, Site, Survey
-from groundstation.survey.well.methods import Method, positions
+from groundstation.survey.well.error_propagation import Uncertainty, propagate_errors
+from groundstation.survey.well.error_sources import Leg, Site, WellSurvey
+from groundstation.survey.well.methods import Method, station_positions
 
 DATA = Path(__file__).parents[2] / "data" / "survey"
 DEG = math.pi / 180.0
@@ -36,17 +36,19 @@ def rows_of(name: str) -> Iterator[dict[str, str]]:
         yield from csv.DictReader(line for line in file if not line.startswith("#"))
 
 
-def well(name: str) -> Survey:
+def well(name: str) -> WellSurvey:
     table = [[float(row[key]) for key in ("md", "inclination_deg", "azimuth_deg")] for row in rows_of(name)]
     md, inclination, azimuth = np.array(table).T
     i, a = inclination * DEG, azimuth * DEG
-    return Survey(md, i, a, positions(Method.MINIMUM_CURVATURE, md, i, a)[:, 2])
+    return WellSurvey(md, i, a, station_positions(Method.MINIMUM_CURVATURE, md, i, a)[:, 2])
 
 
 @pytest.fixture(scope="module")
 def workbook() -> Uncertainty:
     site = Site(9.80665, 50_000.0, 72.0 * DEG, -4.0 * DEG, 60.0 * DEG)
-    return propagate(well("iscwsa_mwd_rev5.1_well_1.csv"), [Leg(load_tool("mwd-rev5.1"))], site, slot_allowance=True)
+    return propagate_errors(
+        well("iscwsa_mwd_rev5.1_well_1.csv"), [Leg(load_tool("mwd-rev5.1"))], site, slot_allowance=True
+    )
 
 
 def test_totals_at_all_stations_are_those_of_the_workbook(workbook: Uncertainty) -> None:
@@ -84,17 +86,17 @@ def test_every_source_at_the_checkpoints_is_that_of_the_workbook(workbook: Uncer
 
 
 @cache
-def covariance(number: str, model: str, deepest: float) -> tuple[Survey, np.ndarray]:
+def covariance(number: str, model: str, deepest: float) -> tuple[WellSurvey, np.ndarray]:
     """Of a gyro model down to a depth, in the axes of the tables."""
     name = "iscwsa_mwd_rev5.1_well_1.csv" if number == "1" else f"iscwsa_well_{number}.csv"
     whole = well(name)
     count = int(np.searchsorted(whole.md, deepest)) + 1
     turn = GRID_NORTH[number]
     azimuth = whole.azimuth[:count] + turn
-    survey = Survey(whole.md[:count], whole.inclination[:count], azimuth, whole.tvd[:count])
+    survey = WellSurvey(whole.md[:count], whole.inclination[:count], azimuth, whole.tvd[:count])
     tool = load_tool(str(DATA / f"spe90408-model-{model}.toml"))
     site = Site(9.80665, 50_000.0, 72.0 * DEG, 0.0, LATITUDES[number] * DEG)
-    cov = propagate(survey, [Leg(tool)], site, slot_allowance=tool.slot_allowance).cov
+    cov = propagate_errors(survey, [Leg(tool)], site, slot_allowance=tool.slot_allowance).cov
     c, s = math.cos(turn), math.sin(turn)
     axes = np.array([[c, s, 0.0], [-s, c, 0.0], [0.0, 0.0, 1.0]])
     return survey, axes @ cov @ axes.T

@@ -16,7 +16,7 @@ from groundstation.survey.files.survey_records import (
     read_record,
     read_stations,
 )
-from groundstation.survey.well.well_record import Record
+from groundstation.survey.well.well_record import SurveyRecord
 
 # A 20 m bore of the thesis, Table 4.1: md_m, b_cm, a_cm and the printed inclination and azimuth
 POTSDAM = [
@@ -231,7 +231,7 @@ def read_or_refuse(path: Path) -> None:
             assert str(path) in message
             continue
         record = read_record(path, rule)
-        assert isinstance(record, Record)
+        assert isinstance(record, SurveyRecord)
         assert len(record.md) == len(record.inclination) == len(record.azimuth) == len(record.lines) >= 2
         assert np.all(np.diff(record.md) > 0.0)
         assert np.all((record.inclination >= 0.0) & (record.inclination <= math.pi))

@@ -13,11 +13,11 @@ from groundstation.survey.fusion.resolve import (
     Direction,
     Quality,
     angle_stds,
-    angles,
     check_all,
     combine_imus,
+    direction_angles,
     is_covariance,
-    resolve,
+    resolve_direction,
 )
 
 G = 9.81
@@ -36,13 +36,13 @@ def force_at_rest(inclination: float, azimuth: float, yaw: float) -> np.ndarray:
 
 
 def direction_of(force: np.ndarray, yaw: float) -> Direction:
-    return resolve(force, np.eye(3) * 1e-9, yaw, 0.0).direction
+    return resolve_direction(force, np.eye(3) * 1e-9, yaw, 0.0).direction
 
 
 @pytest.mark.parametrize("azimuth_deg", [0.0, 90.0, 180.0, 270.0])
 def test_a_tube_leaning_north_has_azimuth_zero_and_leaning_east_ninety(azimuth_deg: float) -> None:
     direction = direction_of(force_at_rest(2.0 * DEG, azimuth_deg * DEG, yaw=0.0), 0.0)
-    inclination, azimuth = angles(direction.lean, direction.down)
+    inclination, azimuth = direction_angles(direction.lean, direction.down)
     assert inclination == pytest.approx(2.0 * DEG)
     assert azimuth == pytest.approx(azimuth_deg * DEG, abs=1e-9)
 
@@ -54,24 +54,24 @@ def test_a_tube_leaning_north_has_azimuth_zero_and_leaning_east_ninety(azimuth_d
 )
 def test_direction_comes_back_whatever_the_yaw(inclination: float, azimuth: float, yaw: float) -> None:
     direction = direction_of(force_at_rest(inclination, azimuth, yaw), yaw)
-    got = angles(direction.lean, direction.down)
+    got = direction_angles(direction.lean, direction.down)
     assert got[0] == pytest.approx(inclination, abs=1e-9)
     assert math.cos(got[1] - azimuth) == pytest.approx(1.0, abs=1e-12)
 
 
 @given(st.floats(-1.0, 1.0), st.floats(-1.0, 1.0), st.floats(-1.0, 1.0))
 def test_an_azimuth_is_never_a_whole_turn(north: float, east: float, down: float) -> None:
-    inclination, azimuth = angles(np.array([north, east]), down)
+    inclination, azimuth = direction_angles(np.array([north, east]), down)
     assert 0.0 <= azimuth < 2.0 * math.pi
     assert 0.0 <= inclination <= math.pi
 
 
 def test_an_azimuth_a_hair_west_of_north_is_north() -> None:
-    assert angles(np.array([1.0, -1e-300]), 0.0)[1] == 0.0
+    assert direction_angles(np.array([1.0, -1e-300]), 0.0)[1] == 0.0
 
 
 def test_a_vertical_tube_has_a_lean_of_zero_and_no_azimuth() -> None:
-    direction = resolve(np.array([0.0, 0.0, -G]), np.eye(3) * 1e-6, 1.0, 1e-4).direction
+    direction = resolve_direction(np.array([0.0, 0.0, -G]), np.eye(3) * 1e-6, 1.0, 1e-4).direction
     assert np.all(direction.lean == 0.0)
     _, sigma_azimuth = angle_stds(direction.lean, direction.down, direction.cov)
     assert sigma_azimuth == math.pi
@@ -88,7 +88,7 @@ def test_what_an_error_does_is_the_slope_of_the_direction(
     inclination: float, azimuth: float, yaw: float, size: float
 ) -> None:
     force, step = force_at_rest(inclination, azimuth, yaw) * size / G, 1e-5
-    found = resolve(force, np.eye(3), yaw, 0.0)
+    found = resolve_direction(force, np.eye(3), yaw, 0.0)
     by_yaw = (direction_of(force, yaw + step).lean - direction_of(force, yaw - step).lean) / (2.0 * step)
     np.testing.assert_allclose(found.by_yaw, by_yaw, atol=1e-8)
     for axis, unit in enumerate(np.eye(3) * step):
@@ -101,7 +101,7 @@ def test_covariance_of_the_lean_is_what_sampling_gives() -> None:
     generator = np.random.default_rng(1)
     inclination, azimuth, yaw = 3.0 * DEG, 70.0 * DEG, 200.0 * DEG
     force, force_std, yaw_std, joint_std = force_at_rest(inclination, azimuth, yaw), 3e-3, 0.3 * DEG, 0.2 * DEG
-    resolved = resolve(force, np.eye(3) * force_std**2, yaw, yaw_std**2)
+    resolved = resolve_direction(force, np.eye(3) * force_std**2, yaw, yaw_std**2)
     claimed = replace(resolved.direction, shared=joint_std * resolved.by_yaw[:, None])
     samples = np.array(
         [
@@ -114,12 +114,12 @@ def test_covariance_of_the_lean_is_what_sampling_gives() -> None:
     )
     both = claimed.total_cov
     np.testing.assert_allclose(np.cov(samples.T), both, rtol=0.05, atol=0.03 * float(np.trace(both)))
-    sampled = np.array([angles(lean, claimed.down) for lean in samples])
+    sampled = np.array([direction_angles(lean, claimed.down) for lean in samples])
     np.testing.assert_allclose(sampled.std(axis=0), angle_stds(claimed.lean, claimed.down, both), rtol=0.03)
 
 
 def test_a_direction_keeps_its_random_part_apart_from_what_it_shares() -> None:
-    resolved = resolve(force_at_rest(0.1, 1.0, 2.0), np.eye(3) * 1e-6, 2.0, 1e-6)
+    resolved = resolve_direction(force_at_rest(0.1, 1.0, 2.0), np.eye(3) * 1e-6, 2.0, 1e-6)
     assert resolved.direction.shared.shape == (2, 0)
     shared = np.array([[1e-3, 0.0], [0.0, 2e-3]])
     lean = replace(resolved.direction, shared=shared)
@@ -130,13 +130,13 @@ def test_a_direction_keeps_its_random_part_apart_from_what_it_shares() -> None:
 @pytest.mark.parametrize("force", [np.zeros(3), np.array([math.nan, 0.0, 1.0]), np.array([math.inf, 0.0, 1.0])])
 def test_no_force_is_no_survey(force: np.ndarray) -> None:
     with pytest.raises(SurveyError, match="specific force"):
-        resolve(force, np.eye(3), 0.0, 0.0)
+        resolve_direction(force, np.eye(3), 0.0, 0.0)
 
 
 @pytest.mark.parametrize("yaw", [math.nan, math.inf, -math.inf])
 def test_a_yaw_that_is_no_number_is_no_survey(yaw: float) -> None:
     with pytest.raises(SurveyError, match="yaw"):
-        resolve(np.array([0.0, 0.0, -G]), np.eye(3), yaw, 0.0)
+        resolve_direction(np.array([0.0, 0.0, -G]), np.eye(3), yaw, 0.0)
 
 
 @pytest.mark.parametrize(
@@ -178,7 +178,7 @@ def test_a_matrix_alone_is_judged_as_among_many(k: int, entries: list[float], ex
 
 def test_a_direction_without_uncertainty_across_the_lean_is_no_survey() -> None:
     with pytest.raises(SurveyError, match="lean"):
-        resolve(np.array([G, 0.0, 0.0]), np.eye(3) * 1e-6, 0.0, 1e-6)
+        resolve_direction(np.array([G, 0.0, 0.0]), np.eye(3) * 1e-6, 0.0, 1e-6)
 
 
 def test_quality_names_what_is_wrong() -> None:

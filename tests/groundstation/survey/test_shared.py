@@ -11,9 +11,16 @@ from hypothesis import given
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
-from groundstation.survey.fusion.fusion import bayes
-from groundstation.survey.fusion.resolve import Direction, Resolved, resolve
-from groundstation.survey.fusion.shared import KIND_NAMES, Fused, Packed, SharedErrors, added, widened
+from groundstation.survey.fusion.fusion import fuse_by_bayes
+from groundstation.survey.fusion.resolve import Direction, Resolved, resolve_direction
+from groundstation.survey.fusion.shared import (
+    KIND_NAMES,
+    Fused,
+    Packed,
+    SharedErrors,
+    add_shared_errors,
+    widen_shared_errors,
+)
 from groundstation.survey.well.ellipsoid import coverage_radius
 from groundstation.survey.well.trajectory import Trajectory
 
@@ -28,7 +35,7 @@ def force_at_rest(inclination: float, azimuth: float, yaw: float) -> np.ndarray:
 
 
 def stop(inclination: float = 0.2, azimuth: float = 1.0, yaw: float = 0.4) -> Resolved:
-    return resolve(force_at_rest(inclination, azimuth, yaw), np.eye(3) * 1e-6, yaw, 1e-6)
+    return resolve_direction(force_at_rest(inclination, azimuth, yaw), np.eye(3) * 1e-6, yaw, 1e-6)
 
 
 def common_yaw_var(one: Direction, other: Direction) -> float:
@@ -152,7 +159,7 @@ def test_the_constant_yaw_variance_of_a_reading_is_all_there_and_no_more(
 def test_the_kinds_add_up_to_the_whole(readings: list[tuple[int, list[int] | None, float, float, float]]) -> None:
     errors = SharedErrors()
     leans = [errors.direction_of(stop(), *reading) for reading in readings]
-    fused = bayes(leans)
+    fused = fuse_by_bayes(leans)
     for shared in (leans[0].shared, leans[-1].shared, fused.shared):
         kinds = by_kind(errors, shared)
         assert set(kinds) == {"mounts", "joints", "accelerometer_bias"}
@@ -194,8 +201,8 @@ def test_many_columns_of_which_few_are_known_take_little_room() -> None:
 
 def test_columns_met_later_are_zero_for_those_before() -> None:
     one, other = np.array([[1.0], [2.0]]), np.array([[10.0, 20.0, 30.0], [40.0, 50.0, 60.0]])
-    np.testing.assert_array_equal(widened(one, 3), [[1.0, 0.0, 0.0], [2.0, 0.0, 0.0]])
-    for total in (added(one, other), added(other, one)):
+    np.testing.assert_array_equal(widen_shared_errors(one, 3), [[1.0, 0.0, 0.0], [2.0, 0.0, 0.0]])
+    for total in (add_shared_errors(one, other), add_shared_errors(other, one)):
         np.testing.assert_array_equal(total, [[11.0, 20.0, 30.0], [42.0, 50.0, 60.0]])
 
 
@@ -242,12 +249,12 @@ def surveyed(drawn: Drawn, errors: SharedErrors) -> Trajectory:
             force = force_at_rest(*TRUE[station], yaw)
             force = force + drawn.constant(BIAS_STD, "bias", tube, count=3) + drawn.noise(FORCE_STD, 3)
             told = yaw + drawn.yaw_error(tube, above) + float(drawn.noise(YAW_STD)[0])
-            resolved = resolve(force, FORCE_STD**2 * np.eye(3), told, YAW_STD**2)
+            resolved = resolve_direction(force, FORCE_STD**2 * np.eye(3), told, YAW_STD**2)
             systematic_var = MOUNT_STD**2 + (len(above) + 1) * JOINT_STD**2
             readings[station].append(errors.direction_of(resolved, tube, above, systematic_var, MOUNT_STD**2, BIAS_STD))
     trajectory = Trajectory()
     for md, found in zip(MDS, readings, strict=True):
-        trajectory.append(md, bayes(found))
+        trajectory.append(md, fuse_by_bayes(found))
     return trajectory
 
 

@@ -11,13 +11,13 @@ from hypothesis import strategies as st
 
 from groundstation.errors import SurveyError
 from groundstation.survey.fusion.resolve import Direction
-from groundstation.survey.tools.instruments import Mode, Term, load_tool
-from groundstation.survey.well.analysis import analyse
+from groundstation.survey.tools.instruments import PropagationMode, Term, load_tool
+from groundstation.survey.well.analysis import analyse_survey
 from groundstation.survey.well.error_sources import Site
 from groundstation.survey.well.kernels.position_errors import add_stations, warm_up
 from groundstation.survey.well.methods import Method
-from groundstation.survey.well.trajectory import BLOCK, Trajectory, interpolate
-from groundstation.survey.well.well_record import Record
+from groundstation.survey.well.trajectory import BLOCK, Trajectory, interpolate_point
+from groundstation.survey.well.well_record import SurveyRecord
 
 DEG = math.pi / 180.0
 
@@ -204,13 +204,13 @@ def test_interpolation_runs_on_the_arc() -> None:
     radius = 30.0
     trajectory = Trajectory(Method.MINIMUM_CURVATURE)
     trajectory.append(radius * 1.2, lean_of(1.2, 0.0))
-    point = interpolate(trajectory.points, radius * 0.5)
+    point = interpolate_point(trajectory.points, radius * 0.5)
     np.testing.assert_allclose(point.position, [radius * (1.0 - math.cos(0.5)), 0.0, radius * math.sin(0.5)], atol=1e-9)
     np.testing.assert_allclose(point.tangent, [math.sin(0.5), 0.0, math.cos(0.5)], atol=1e-12)
     for end in trajectory.points:
-        np.testing.assert_allclose(interpolate(trajectory.points, end.md).position, end.position, atol=1e-12)
+        np.testing.assert_allclose(interpolate_point(trajectory.points, end.md).position, end.position, atol=1e-12)
     with pytest.raises(SurveyError, match=r"0\.\.36 m"):
-        interpolate(trajectory.points, 40.0)
+        interpolate_point(trajectory.points, 40.0)
 
 
 @pytest.mark.parametrize("method", Method)
@@ -219,15 +219,15 @@ def test_interpolation_meets_the_stations_of_every_method(method: Method) -> Non
     for md, inclination, azimuth in [(2.0, 0.02, 1.0), (5.0, 0.3, 1.5), (9.0, 0.5, 2.5)]:
         trajectory.append(md, lean_of(inclination, azimuth))
     for end in trajectory.points:
-        np.testing.assert_allclose(interpolate(trajectory.points, end.md).position, end.position, atol=1e-12)
-        before, after = (interpolate(trajectory.points, min(max(end.md + d, 0.0), 9.0)) for d in (-1e-9, 1e-9))
+        np.testing.assert_allclose(interpolate_point(trajectory.points, end.md).position, end.position, atol=1e-12)
+        before, after = (interpolate_point(trajectory.points, min(max(end.md + d, 0.0), 9.0)) for d in (-1e-9, 1e-9))
         np.testing.assert_allclose(before.position, after.position, atol=1e-8)
 
 
 def test_interpolation_in_a_straight_leg_is_the_straight_line() -> None:
     trajectory = Trajectory(collar=lean_of(0.2, 1.0))
     end = trajectory.append(10.0, lean_of(0.2, 1.0))
-    point = interpolate(trajectory.points, 2.5)
+    point = interpolate_point(trajectory.points, 2.5)
     np.testing.assert_allclose(point.position, 0.25 * end.position, atol=1e-12)
     np.testing.assert_allclose(point.tangent, end.tangent, atol=1e-12)
 
@@ -277,14 +277,14 @@ def test_the_stations_of_the_service_and_the_record_of_the_command_have_one_regi
     inclination, azimuth = np.radians([0.0, 3.0, 5.0, 8.0, 9.0]), np.radians([0.0, 40.0, 55.0, 60.0, 48.0])
     sizes = {"I": 2e-3, "A": 7e-3, "YAW": 0.02, "LEAN": 1e-3}
     terms = (
-        Term("I", sizes["I"], "rad", Mode.RANDOM, ("0", "1", "0")),
-        Term("A", sizes["A"], "rad", Mode.RANDOM, ("0", "0", "1")),
-        Term("YAW", sizes["YAW"], "rad", Mode.SYSTEMATIC, ("0", "0", "1")),
-        Term("LEAN", sizes["LEAN"], "rad", Mode.SYSTEMATIC, ("0", "1", "0")),
+        Term("I", sizes["I"], "rad", PropagationMode.RANDOM, ("0", "1", "0")),
+        Term("A", sizes["A"], "rad", PropagationMode.RANDOM, ("0", "0", "1")),
+        Term("YAW", sizes["YAW"], "rad", PropagationMode.SYSTEMATIC, ("0", "0", "1")),
+        Term("LEAN", sizes["LEAN"], "rad", PropagationMode.SYSTEMATIC, ("0", "1", "0")),
     )
     tool = replace(load_tool("relay"), terms=terms)
-    record = Record(md, inclination, azimuth, list(range(len(md))), {})
-    whole = analyse(record, Method.BALANCED_TANGENTIAL, tool, Site())
+    record = SurveyRecord(md, inclination, azimuth, list(range(len(md))), {})
+    whole = analyse_survey(record, Method.BALANCED_TANGENTIAL, tool, Site())
     trajectory = Trajectory()
     for depth, i, a in zip(md[1:].tolist(), inclination[1:].tolist(), azimuth[1:].tolist(), strict=True):
         ci, si, ca, sa = math.cos(i), math.sin(i), math.cos(a), math.sin(a)

@@ -13,15 +13,15 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
-from groundstation.survey.fusion.resolve import Direction, angle_stds, angles, known
-from groundstation.survey.fusion.transport import Carried, carry
+from groundstation.survey.fusion.resolve import Direction, angle_stds, direction_angles, known_direction
+from groundstation.survey.fusion.transport import Carried, carry_directions
 from groundstation.survey.well.trajectory import Trajectory
 from sim.world.borehole import Borehole
 from sim.world.truth import lean_rotation
 
 Array = npt.NDArray[np.float64]
 DEG = math.pi / 180.0
-VERTICAL = known(0.0, 0.0)
+VERTICAL = known_direction(0.0, 0.0)
 
 
 def tangent_of(one: Direction) -> Array:
@@ -55,12 +55,12 @@ def surveyed(hole: Borehole, mds: Array) -> tuple[Direction, list[Direction], Ar
     """Head, what is measured at depths (n,), and the true transport there, by a frame carried along the hole."""
     fine = np.unique(np.concatenate([np.linspace(0.0, hole.length, 4001), mds]))
     gammas = np.interp(mds, fine, carried_frame(hole.tangent(fine)[0]))
-    true = [known(*hole.direction(md)) for md in mds]
-    return known(*hole.direction(0.0)), measured(true, gammas), gammas
+    true = [known_direction(*hole.direction(md)) for md in mds]
+    return known_direction(*hole.direction(0.0)), measured(true, gammas), gammas
 
 
 def carried(head: Direction, stations: list[Direction]) -> list[Carried]:
-    return carry(head, stations, range(len(stations) + 1))
+    return carry_directions(head, stations, range(len(stations) + 1))
 
 
 @pytest.mark.parametrize("inclination_deg", [2.0, 30.0, 70.0, 120.0])
@@ -68,14 +68,14 @@ def test_a_helix_turns_by_one_less_its_cosine(inclination_deg: float) -> None:
     inclination, turn, count = inclination_deg * DEG, 50.0 * DEG, 500
     azimuths = turn * np.arange(1, count + 1) / count
     gammas = (1.0 - math.cos(inclination)) * azimuths
-    stations = measured([known(inclination, azimuth) for azimuth in azimuths], gammas)
-    found = carried(known(inclination, 0.0), stations)
+    stations = measured([known_direction(inclination, azimuth) for azimuth in azimuths], gammas)
+    found = carried(known_direction(inclination, 0.0), stations)
     assert [one.gamma for one in found] == pytest.approx(gammas.tolist(), abs=1e-6)
 
 
 def test_a_leg_turns_by_the_excess_of_its_triangle() -> None:
     """The vertical and two directions 90 degrees apart at 60 degrees: an excess by its angles (Girard)."""
-    upper, lower = known(60.0 * DEG, 0.0), known(60.0 * DEG, 90.0 * DEG)
+    upper, lower = known_direction(60.0 * DEG, 0.0), known_direction(60.0 * DEG, 90.0 * DEG)
     down = np.array([0.0, 0.0, 1.0])
     corners = [down, tangent_of(upper), tangent_of(lower)]
     inside = [
@@ -106,8 +106,8 @@ def test_surveys_give_back_the_hole_that_a_frame_was_carried_through(
 
 
 def test_a_hole_in_one_plane_turns_nothing() -> None:
-    stations = [known(k * 10.0 * DEG, 0.7) for k in range(1, 9)]
-    assert [one.gamma for one in carried(known(0.0, 0.0), stations)] == pytest.approx([0.0] * 8, abs=1e-14)
+    stations = [known_direction(k * 10.0 * DEG, 0.7) for k in range(1, 9)]
+    assert [one.gamma for one in carried(known_direction(0.0, 0.0), stations)] == pytest.approx([0.0] * 8, abs=1e-14)
 
 
 directions = st.tuples(st.floats(0.0, 60.0), st.floats(0.0, 360.0))
@@ -118,7 +118,8 @@ def test_a_hole_turned_about_the_vertical_is_turned_and_nothing_else(
     places: list[tuple[float, float]], turn: float
 ) -> None:
     plain, turned = (
-        carried(known(5.0 * DEG, by), [known(i * DEG, a * DEG + by) for i, a in places]) for by in (0.0, turn)
+        carried(known_direction(5.0 * DEG, by), [known_direction(i * DEG, a * DEG + by) for i, a in places])
+        for by in (0.0, turn)
     )
     assert [one.gamma for one in turned] == pytest.approx([one.gamma for one in plain], abs=1e-9)
 
@@ -127,15 +128,15 @@ def test_a_hole_turned_about_the_vertical_is_turned_and_nothing_else(
 def test_a_station_on_the_arc_between_two_changes_nothing(
     above: tuple[float, float], below: tuple[float, float], part: float
 ) -> None:
-    ends = [tangent_of(known(i * DEG, a * DEG)) for i, a in (above, below)]
+    ends = [tangent_of(known_direction(i * DEG, a * DEG)) for i, a in (above, below)]
     between = ends[0] * (1.0 - part) + ends[1] * part
     between /= np.linalg.norm(between)
     true = [Direction(t[:2], float(t[2]), np.zeros((2, 2)), np.zeros((2, 0))) for t in (between, ends[1])]
     gammas = np.array([_excess(ends[0], between), _excess(ends[0], ends[1])])
     stations = measured(true, gammas)
     with_it, without = (
-        carried(known(*(x * DEG for x in above)), stations),
-        carried(known(*(x * DEG for x in above)), stations[1:]),
+        carried(known_direction(*(x * DEG for x in above)), stations),
+        carried(known_direction(*(x * DEG for x in above)), stations[1:]),
     )
     assert with_it[1].gamma == pytest.approx(without[0].gamma, abs=1e-9)
     assert with_it[1].gamma == pytest.approx(gammas[1], abs=1e-9)
@@ -152,11 +153,11 @@ def noisy_hole() -> tuple[Direction, list[Direction]]:
     random = np.random.default_rng(5)
     stations = []
     for k in range(1, 11):
-        one = known((4.0 * k + 3.0 * random.standard_normal()) * DEG, 12.0 * k * DEG)
+        one = known_direction((4.0 * k + 3.0 * random.standard_normal()) * DEG, 12.0 * k * DEG)
         root = 3e-3 * random.standard_normal((2, 2))
         shared = 2e-3 * random.standard_normal((2, 3))
         stations.append(replace(one, cov=root @ root.T, shared=np.concatenate([np.zeros((2, 11)), shared], axis=1)))
-    return replace(known(3.0 * DEG, 1.0), cov=1e-5 * np.eye(2)), stations
+    return replace(known_direction(3.0 * DEG, 1.0), cov=1e-5 * np.eye(2)), stations
 
 
 def drawn(one: Direction, common: Array, random: np.random.Generator) -> Direction:
@@ -200,9 +201,9 @@ def without_between(one: Carried) -> Carried:
 
 
 def test_an_error_of_one_survey_does_not_grow_below_it() -> None:
-    head, true = known(40.0 * DEG, 0.0), [known(40.0 * DEG, k * DEG) for k in range(1, 60)]
+    head, true = known_direction(40.0 * DEG, 0.0), [known_direction(40.0 * DEG, k * DEG) for k in range(1, 60)]
     plain = carried(head, true)
-    wrong = carried(head, [*true[:20], known(41.0 * DEG, 21.5 * DEG), *true[21:]])
+    wrong = carried(head, [*true[:20], known_direction(41.0 * DEG, 21.5 * DEG), *true[21:]])
     off = [abs(a.gamma - b.gamma) / DEG for a, b in zip(plain, wrong, strict=True)]
     assert max(off[:20]) == 0.0
     assert max(off[21:]) < 0.02
@@ -211,8 +212,8 @@ def test_an_error_of_one_survey_does_not_grow_below_it() -> None:
 
 def test_a_turn_in_the_horizontal_is_not_known() -> None:
     """Gravity in the tubes and the yaw against the head stay as they are: no survey shows it."""
-    head = known(90.0 * DEG, 0.0)
-    found = carried(head, [replace(known(89.9 * DEG, 0.0), cov=1e-8 * np.eye(2)) for _ in range(3)])
+    head = known_direction(90.0 * DEG, 0.0)
+    found = carried(head, [replace(known_direction(89.9 * DEG, 0.0), cov=1e-8 * np.eye(2)) for _ in range(3)])
     assert all(angle_stds(o.direction.lean, o.direction.down, o.direction.total_cov)[1] > 1.5 for o in found)
 
 
@@ -221,7 +222,7 @@ def test_one_record_is_a_hole_by_either_setting() -> None:
     hole = Borehole.spiral(20.0 * DEG, 0.0, 50.0 * DEG, 40.0, 20.0 * DEG)
     mds = np.linspace(2.0, 40.0, 20)
     head, stations, _ = surveyed(hole, mds)
-    seen = np.array([angles(one.lean, one.down) for one in [head, *stations]])
+    seen = np.array([direction_angles(one.lean, one.down) for one in [head, *stations]])
     other = Borehole(np.concatenate([[0.0], mds]), seen[:, 0], seen[:, 1])
     for md, one in zip(mds.tolist(), stations, strict=True):
-        assert other.direction(md) == pytest.approx(angles(one.lean, one.down), abs=1e-9)
+        assert other.direction(md) == pytest.approx(direction_angles(one.lean, one.down), abs=1e-9)

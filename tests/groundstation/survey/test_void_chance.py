@@ -9,11 +9,11 @@ from hypothesis import given
 from hypothesis import strategies as st
 from walls_by_sampling import uncovered
 
-from groundstation.survey.wall.as_built import Columns, State
+from groundstation.survey.wall.as_built import Columns, ColumnState
 from groundstation.survey.wall.plane_errors import PlaneErrors
 from groundstation.survey.wall.void_chance import void_chance, void_open
 from groundstation.survey.wall.voids import power_centre, triples_of
-from groundstation.survey.wall.wall_verdict import Kind, Verdict, judge
+from groundstation.survey.wall.wall_verdict import FindingKind, WallVerdict, judge_columns
 
 RADIUS, SPACING = 0.6, 0.81
 HEADS = np.array([[0.0, 0.0], [0.0, SPACING], [SPACING, 0.0], [SPACING, SPACING]])
@@ -28,7 +28,7 @@ def four(stds: tuple[float, ...], cv: float = 0.0) -> Columns:
     centres = np.repeat(HEADS[:, None, :], planes, axis=1)
     return Columns(
         ["A", "B", "C", "D"], np.linspace(0.0, 20.0, planes), centres, own @ own, HEADS, centres.copy(),
-        np.full((4, planes), State.SURVEYED, np.int8), PlaneErrors.of_planes(own),
+        np.full((4, planes), ColumnState.SURVEYED, np.int8), PlaneErrors.of_planes(own),
         PlaneErrors.of_planes(np.zeros((4, planes, 2, 0))),
         np.full((4, planes), RADIUS), np.full((4, planes), RADIUS * cv), 0.0,
     )  # fmt: skip
@@ -66,18 +66,18 @@ def test_a_void_as_surveyed_is_certain_where_nothing_moves() -> None:
 def test_where_a_column_is_missing_the_plane_is_open() -> None:
     whole = four((0.01, 0.01))
     states, centres = whole.states.copy(), whole.centres.copy()
-    states[3, 1], centres[3, 1] = State.MISSING, math.nan
+    states[3, 1], centres[3, 1] = ColumnState.MISSING, math.nan
     found = void_chance(replace(whole, states=states, centres=centres), TRIPLES)
     assert found.probability[0] < 1e-3
     assert found.probability[1] == 1.0
 
 
 def test_a_void_that_is_only_likely_is_named_with_its_depth() -> None:
-    found = judge(four((0.005, 0.06)), SQUARE, 0.05, grid_spacing=SPACING)
+    found = judge_columns(four((0.005, 0.06)), SQUARE, 0.05, grid_spacing=SPACING)
     doubtful = [finding for finding in found.findings if "void" in finding.text]
-    assert [(finding.kind, finding.top) for finding in doubtful] == [(Kind.DOUBTFUL, 20.0)]
+    assert [(finding.kind, finding.top) for finding in doubtful] == [(FindingKind.DOUBTFUL, 20.0)]
     assert "at 20 m, most of all between" in doubtful[0].text
-    assert found.verdict is Verdict.NOT_PROVEN
+    assert found.verdict is WallVerdict.NOT_PROVEN
     assert found.void_chance is not None
     assert found.void_chance.probability[1] == doubtful[0].probability
 

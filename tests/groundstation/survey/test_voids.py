@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from groundstation.survey.wall.voids import power_centre, voids
+from groundstation.survey.wall.voids import find_voids, power_centre
 
 
 def square_grid(count: int, spacing: float) -> np.ndarray:
@@ -23,7 +23,7 @@ def square_void(spacing: float, radius: float) -> float:
 
 def test_a_square_grid_has_a_void_in_the_middle_of_every_cell() -> None:
     centres = square_grid(4, 0.9)
-    found = voids(centres, np.full(16, 0.6))
+    found = find_voids(centres, np.full(16, 0.6))
     assert len(found) == 9
     for void in found:
         assert len(void.columns) == 4
@@ -33,7 +33,7 @@ def test_a_square_grid_has_a_void_in_the_middle_of_every_cell() -> None:
 
 
 def test_a_grid_that_is_near_enough_has_none() -> None:
-    assert voids(square_grid(4, 0.84), np.full(16, 0.6)) == []
+    assert find_voids(square_grid(4, 0.84), np.full(16, 0.6)) == []
 
 
 def test_a_triangular_cell_opens_only_beyond_its_circumradius() -> None:
@@ -41,8 +41,8 @@ def test_a_triangular_cell_opens_only_beyond_its_circumradius() -> None:
         return np.array([[0.0, 0.0], [0.0, spacing], [spacing * math.sqrt(0.75), 0.5 * spacing]])
 
     edge = 0.6 * math.sqrt(3.0)
-    assert voids(cell(edge - 1e-4), np.full(3, 0.6)) == []
-    (void,) = voids(cell(edge + 0.01), np.full(3, 0.6))
+    assert find_voids(cell(edge - 1e-4), np.full(3, 0.6)) == []
+    (void,) = find_voids(cell(edge + 0.01), np.full(3, 0.6))
     assert void.columns == (0, 1, 2)
     assert void.radius == pytest.approx(0.01 / math.sqrt(3.0), rel=1e-6)
 
@@ -50,11 +50,11 @@ def test_a_triangular_cell_opens_only_beyond_its_circumradius() -> None:
 def test_a_ring_of_columns_encloses_its_inside_and_a_missing_one_opens_it() -> None:
     angle = np.linspace(0.0, math.tau, 30, endpoint=False)
     ring = 3.0 * np.stack([np.cos(angle), np.sin(angle)], axis=1)
-    (void,) = voids(ring, np.full(30, 0.4))
+    (void,) = find_voids(ring, np.full(30, 0.4))
     assert len(void.columns) == 30
     assert void.area > math.pi * 2.6**2
     ring[7] = np.nan
-    assert voids(ring, np.full(30, 0.4)) == []
+    assert find_voids(ring, np.full(30, 0.4)) == []
 
 
 @settings(max_examples=25)
@@ -69,7 +69,7 @@ def test_areas_are_those_of_a_fine_raster(seed: int) -> None:
     free = np.ones(x.shape, bool)
     for (cx, cy), r in zip(centres, radii, strict=True):
         free &= (x - cx) ** 2 + (y - cy) ** 2 >= r**2
-    area = sum(void.area for void in voids(centres, radii))
+    area = sum(void.area for void in find_voids(centres, radii))
     assert area > 0.0
     assert area == pytest.approx(np.count_nonzero(free) * step**2, rel=0.03, abs=0.004)
 
@@ -81,8 +81,8 @@ def test_turning_and_shifting_change_no_area(seed: int) -> None:
     centres, radii = square_grid(3, 0.9) + rng.normal(0.0, 0.05, (9, 2)), rng.uniform(0.5, 0.66, 9)
     angle = rng.uniform(0.0, math.tau)
     turn = np.array([[math.cos(angle), -math.sin(angle)], [math.sin(angle), math.cos(angle)]])
-    before = sorted(void.area for void in voids(centres, radii))
-    after = sorted(void.area for void in voids(centres @ turn.T + rng.uniform(-50.0, 50.0, 2), radii))
+    before = sorted(void.area for void in find_voids(centres, radii))
+    after = sorted(void.area for void in find_voids(centres @ turn.T + rng.uniform(-50.0, 50.0, 2), radii))
     np.testing.assert_allclose(after, before, rtol=1e-6, atol=2e-9)
 
 

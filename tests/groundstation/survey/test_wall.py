@@ -12,12 +12,18 @@ from scipy.special import ndtr
 from scipy.stats import ncx2
 
 from groundstation.errors import SurveyError
-from groundstation.survey.wall.as_built import Columns, Cut, cut
-from groundstation.survey.wall.column_joint import largest_distance, margin, probability_beyond, thickness
+from groundstation.survey.wall.as_built import Columns, Cut, intersect_planes
+from groundstation.survey.wall.column_joint import joint_thickness, largest_distance, probability_beyond, shift_margin
 from groundstation.survey.wall.plane_errors import PlaneErrors
-from groundstation.survey.wall.wall_joints import extra_column, joints, neighbours_in_grid, neighbours_in_line, worst
-from groundstation.survey.well.methods import Method, positions, tangents
-from groundstation.survey.well.trajectory import Point, on_arc
+from groundstation.survey.wall.wall_joints import (
+    extra_column,
+    judge_joints,
+    neighbours_in_grid,
+    neighbours_in_line,
+    worst_joint,
+)
+from groundstation.survey.well.methods import Method, station_positions, station_tangents
+from groundstation.survey.well.trajectory import TrajectoryPoint, on_arc
 
 DEG = math.pi / 180.0
 RADIUS, SPACING, REQUIRED, LENGTH = 0.60, 0.75, 0.80, 30.0
@@ -52,21 +58,21 @@ def along_the_wide_axis(mean: np.ndarray, std_a: float, std_b: float, limit: flo
 
 
 def test_the_margin_of_the_published_wall() -> None:
-    shift, angle = margin(RADIUS, REQUIRED, SPACING, LENGTH)
+    shift, angle = shift_margin(RADIUS, REQUIRED, SPACING, LENGTH)
     assert shift == pytest.approx(0.1444, abs=5e-5)
     assert math.degrees(angle) == pytest.approx(0.276, abs=5e-4)
 
 
 def test_half_the_margin_is_left_to_each_when_both_deviate() -> None:
-    shift, _ = margin(RADIUS, REQUIRED, SPACING, LENGTH)
+    shift, _ = shift_margin(RADIUS, REQUIRED, SPACING, LENGTH)
     for each in (0.5 * shift, 0.5 * shift + 1e-6):
-        both = thickness(np.array([SPACING + each + each]), RADIUS)[0]
+        both = joint_thickness(np.array([SPACING + each + each]), RADIUS)[0]
         assert both == pytest.approx(REQUIRED, abs=1e-5)
         assert bool(both >= REQUIRED - 1e-9) is (each <= 0.5 * shift)
 
 
 def test_a_column_that_deviates_too_little_to_begin_with_has_a_negative_margin() -> None:
-    shift, angle = margin(RADIUS, REQUIRED, 1.0, LENGTH)
+    shift, angle = shift_margin(RADIUS, REQUIRED, 1.0, LENGTH)
     assert shift == pytest.approx(LIMIT - 1.0)
     assert angle < 0.0
 
@@ -76,14 +82,14 @@ def test_a_column_that_deviates_too_little_to_begin_with_has_a_negative_margin()
     [(0.0, 1.2), (SPACING, 2.0 * math.sqrt(0.36 - 0.140625)), (LIMIT, 0.8), (1.2, 0.0), (1.3, -0.1), (3.0, -1.8)],
 )
 def test_a_joint_is_as_thick_as_its_lens_is_long_and_a_gap_is_negative(distance: float, expected: float) -> None:
-    assert thickness(np.array([distance]), RADIUS)[0] == pytest.approx(expected, abs=1e-12)
+    assert joint_thickness(np.array([distance]), RADIUS)[0] == pytest.approx(expected, abs=1e-12)
 
 
 @given(st.floats(0.1, 3.0), st.floats(0.0, 0.999))
 def test_the_largest_distance_makes_a_joint_of_just_the_thickness(radius: float, share: float) -> None:
     required = 2.0 * radius * share
     distance = largest_distance(radius, required)
-    assert thickness(np.array([distance]), radius)[0] == pytest.approx(required, abs=1e-6)
+    assert joint_thickness(np.array([distance]), radius)[0] == pytest.approx(required, abs=1e-6)
 
 
 @pytest.mark.parametrize("required", [1.2, 1.3, -0.1, math.nan])
@@ -210,12 +216,17 @@ def random_wells(count: int, stations: int) -> tuple[np.ndarray, np.ndarray, np.
     md = np.broadcast_to(2.0 * np.arange(stations), (count, stations))
     lean = np.cumsum(generator.normal(0.0, 0.3 * DEG, (count, stations, 2)), axis=1)
     inclination, azimuth = np.hypot(lean[..., 0], lean[..., 1]), np.arctan2(lean[..., 1], lean[..., 0])
-    return md, positions(Method.MINIMUM_CURVATURE, md, inclination, azimuth), tangents(inclination, azimuth)
+    return (
+        md,
+        station_positions(Method.MINIMUM_CURVATURE, md, inclination, azimuth),
+        station_tangents(inclination, azimuth),
+    )
 
 
 def centre_on_arc(md: np.ndarray, position: np.ndarray, tangent: np.ndarray, tvd: float) -> np.ndarray:
     points = [
-        Point(float(m), t, p, np.zeros((3, 3)), np.zeros((3, 0))) for m, p, t in zip(md, position, tangent, strict=True)
+        TrajectoryPoint(float(m), t, p, np.zeros((3, 3)), np.zeros((3, 0)))
+        for m, p, t in zip(md, position, tangent, strict=True)
     ]
     upper, lower = next((a, b) for a, b in pairwise(points) if tvd <= b.position[2])
     low, high = 0.0, 1.0
@@ -236,7 +247,7 @@ def in_planes(found: Cut, errors: np.ndarray) -> np.ndarray:
 def test_centres_at_a_depth_lie_on_the_arcs_of_the_wells() -> None:
     md, position, tangent = random_wells(6, 16)
     depths = np.linspace(0.0, 29.5, 60)
-    centres = cut(position, tangent, depths).centres
+    centres = intersect_planes(position, tangent, depths).centres
     for well in range(6):
         for depth, centre in zip(depths, centres[well], strict=True):
             np.testing.assert_allclose(
@@ -249,7 +260,7 @@ def test_centres_at_the_depths_of_stations_are_the_stations() -> None:
     generator = np.random.default_rng(10)
     root = generator.normal(0.0, 0.01, (1, 10, 3, 3))
     covs = root @ np.swapaxes(root, -1, -2)
-    found = cut(position, tangent, position[0, :, 2])
+    found = intersect_planes(position, tangent, position[0, :, 2])
     errors = in_planes(found, root)
     plane = errors @ np.swapaxes(errors, -1, -2)
     np.testing.assert_allclose(found.centres[0], position[0, :, :2], atol=1e-12)
@@ -262,8 +273,8 @@ def test_centres_at_the_depths_of_stations_are_the_stations() -> None:
 def test_below_its_toe_a_column_has_no_centre() -> None:
     inclination = np.zeros((2, 4))
     md = np.array([[0.0, 2.0, 4.0, 6.0], [0.0, 1.0, 2.0, 3.0]])
-    position = positions(Method.MINIMUM_CURVATURE, md, inclination, inclination)
-    centres = cut(position, tangents(inclination, inclination), np.arange(8.0)).centres
+    position = station_positions(Method.MINIMUM_CURVATURE, md, inclination, inclination)
+    centres = intersect_planes(position, station_tangents(inclination, inclination), np.arange(8.0)).centres
     np.testing.assert_array_equal(np.isnan(centres[0, :, 0]), np.arange(8.0) > 6.0)
     np.testing.assert_array_equal(np.isnan(centres[1, :, 1]), np.arange(8.0) > 3.0)
 
@@ -272,9 +283,9 @@ def test_an_error_of_depth_moves_the_centre_by_the_slope_of_the_hole() -> None:
     tilt = 20.0 * DEG
     inclination, azimuth = np.full((1, 3), tilt), np.full((1, 3), 90.0 * DEG)
     md = np.array([[0.0, 5.0, 10.0]])
-    position = positions(Method.MINIMUM_CURVATURE, md, inclination, azimuth)
+    position = station_positions(Method.MINIMUM_CURVATURE, md, inclination, azimuth)
     covs = np.broadcast_to(np.diag([1e-6, 4e-6, 9e-4]), (1, 3, 3, 3))
-    found = cut(position, tangents(inclination, azimuth), np.array([2.0, 7.0]))
+    found = intersect_planes(position, station_tangents(inclination, azimuth), np.array([2.0, 7.0]))
     errors = in_planes(found, np.sqrt(covs))
     plane = errors @ np.swapaxes(errors, -1, -2)
     np.testing.assert_allclose(found.centres[0], [[0.0, 2.0 * math.tan(tilt)], [0.0, 7.0 * math.tan(tilt)]], atol=1e-12)
@@ -298,8 +309,8 @@ def wall(deviating_deg: float = 0.5, std_per_m: float = 3e-4, count: int = 5) ->
 
 def test_the_worst_joint_is_told_by_name_depth_and_direction() -> None:
     columns, pairs = wall()
-    found = joints(columns, pairs, REQUIRED)
-    joint, depth = worst(found)
+    found = judge_joints(columns, pairs, REQUIRED)
+    joint, depth = worst_joint(found)
     assert [columns.names[k] for k in found.pairs[joint]] == ["C2", "C3"]
     assert columns.depths[depth] == 30.0
     np.testing.assert_allclose(found.offset[joint, depth], [0.0, 30.0 * math.tan(0.5 * DEG)], atol=1e-12)
@@ -311,7 +322,7 @@ def test_the_worst_joint_is_told_by_name_depth_and_direction() -> None:
 
 def test_a_joint_opens_where_the_column_has_used_up_the_margin() -> None:
     columns, pairs = wall()
-    found = joints(columns, pairs, REQUIRED)
+    found = judge_joints(columns, pairs, REQUIRED)
     opens = (LIMIT - SPACING) / math.tan(0.5 * DEG)
     np.testing.assert_array_equal(found.thickness[1] < REQUIRED, opens < DEPTHS)
     assert np.all(found.thickness[[0, 2, 3]] > REQUIRED)
@@ -321,7 +332,7 @@ def test_a_joint_opens_where_the_column_has_used_up_the_margin() -> None:
 
 def test_both_regions_of_uncertainty_count_towards_a_joint() -> None:
     columns, pairs = wall(0.0)
-    found = joints(columns, pairs, REQUIRED)
+    found = judge_joints(columns, pairs, REQUIRED)
     std = math.sqrt(2.0) * (3e-4 * 30.0 + 1e-4)
     expected = float(ncx2.sf((LIMIT / std) ** 2, 2, (SPACING / std) ** 2))
     np.testing.assert_allclose(found.probability[:, -1], expected, rtol=1e-6)
@@ -332,8 +343,8 @@ def test_the_more_probable_gap_is_worse_than_the_thinner_joint() -> None:
     covs = columns.covs.copy()
     covs[0] = 0.2**2 * np.eye(2)
     uncertain = Columns.surveyed(columns.names, DEPTHS, columns.centres, covs, columns.designs, RADIUS)
-    found = joints(uncertain, pairs, REQUIRED)
-    assert worst(found)[0] == 0
+    found = judge_joints(uncertain, pairs, REQUIRED)
+    assert worst_joint(found)[0] == 0
     assert found.thickness[1, -1] < found.thickness[0, -1]
 
 
@@ -341,9 +352,9 @@ def test_of_equally_probable_joints_the_thinnest_is_worst() -> None:
     columns, pairs = wall(0.05)
     covs = np.zeros_like(columns.covs)
     certain = Columns.surveyed(columns.names, DEPTHS, columns.centres, covs, columns.designs, RADIUS)
-    found = joints(certain, pairs, REQUIRED)
+    found = judge_joints(certain, pairs, REQUIRED)
     np.testing.assert_array_equal(found.probability, 0.0)
-    assert worst(found) == (1, len(DEPTHS) - 1)
+    assert worst_joint(found) == (1, len(DEPTHS) - 1)
 
 
 def test_below_the_end_of_a_column_its_joints_are_open() -> None:
@@ -351,12 +362,12 @@ def test_below_the_end_of_a_column_its_joints_are_open() -> None:
     centres = columns.centres.copy()
     centres[1, DEPTHS > 20.0] = np.nan
     short = Columns.surveyed(columns.names, DEPTHS, centres, columns.covs, columns.designs, RADIUS)
-    found = joints(short, pairs, REQUIRED)
+    found = judge_joints(short, pairs, REQUIRED)
     for joint in (0, 1):
         np.testing.assert_array_equal(np.isnan(found.thickness[joint]), DEPTHS > 20.0)
         np.testing.assert_array_equal(found.probability[joint] == 1.0, DEPTHS > 20.0)
     assert np.all(found.probability[2:] < 1e-9)
-    joint, depth = worst(found)
+    joint, depth = worst_joint(found)
     assert (joint, DEPTHS[depth]) == (0, 20.5)
     extra = extra_column(short, found, 0, REQUIRED)
     assert extra is not None
@@ -366,7 +377,7 @@ def test_below_the_end_of_a_column_its_joints_are_open() -> None:
 
 def test_an_extra_column_in_the_middle_closes_the_gap() -> None:
     columns, pairs = wall()
-    found = joints(columns, pairs, REQUIRED)
+    found = judge_joints(columns, pairs, REQUIRED)
     extra = extra_column(columns, found, 1, REQUIRED)
     assert extra is not None
     assert extra.closes
@@ -376,19 +387,19 @@ def test_an_extra_column_in_the_middle_closes_the_gap() -> None:
     assert extra.east == pytest.approx(1.5 * SPACING + 0.5 * (first + last))
     for k in (1, 2):
         far = np.abs(columns.centres[k, DEPTHS >= 17.0, 1] - extra.east)
-        assert np.all(thickness(far, RADIUS) >= REQUIRED)
+        assert np.all(joint_thickness(far, RADIUS) >= REQUIRED)
 
 
 def test_a_gap_that_is_too_wide_is_not_closed_by_one_more_column() -> None:
     columns, pairs = wall(3.0)
-    extra = extra_column(columns, joints(columns, pairs, REQUIRED), 1, REQUIRED)
+    extra = extra_column(columns, judge_joints(columns, pairs, REQUIRED), 1, REQUIRED)
     assert extra is not None
     assert not extra.closes
 
 
 def test_a_joint_that_is_thick_enough_needs_no_extra_column() -> None:
     columns, pairs = wall()
-    assert extra_column(columns, joints(columns, pairs, REQUIRED), 0, REQUIRED) is None
+    assert extra_column(columns, judge_joints(columns, pairs, REQUIRED), 0, REQUIRED) is None
 
 
 @pytest.mark.parametrize(

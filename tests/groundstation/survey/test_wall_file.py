@@ -7,9 +7,9 @@ import numpy as np
 import pytest
 
 from groundstation.errors import SurveyError
-from groundstation.survey.wall.as_built import State
+from groundstation.survey.wall.as_built import ColumnState
 from groundstation.survey.wall.wall_file import Wall, judge_wall, read_wall
-from groundstation.survey.wall.wall_verdict import Judgement, Kind, Verdict
+from groundstation.survey.wall.wall_verdict import FindingKind, Judgement, WallVerdict
 
 DEG = math.pi / 180.0
 HOLE = "{0},0,{1},{2}\n{0},10,{1},{2}\n{0},{3},{1},{2}\n"
@@ -48,16 +48,16 @@ def holes(count: int, depth: float = 20.0, *, without: tuple[int, ...] = ()) -> 
 
 def test_columns_as_designed_and_surveyed_to_their_toes_are_tight(tmp_path: Path) -> None:
     _, found = judged(made(tmp_path, row_of(4), holes(4)))
-    assert (found.verdict, found.findings, found.extras) == (Verdict.TIGHT, [], [])
+    assert (found.verdict, found.findings, found.extras) == (WallVerdict.TIGHT, [], [])
     assert found.system.probability < 1e-6
 
 
 def test_a_short_column_between_long_ones_opens_both_its_joints(tmp_path: Path) -> None:
     short = "C2,0,0,0\nC2,5,0,0\nC2,10,0,0\n"
     wall, found = judged(made(tmp_path, row_of(3), holes(3, without=(2,)) + short))
-    assert found.verdict is Verdict.NOT_TIGHT
+    assert found.verdict is WallVerdict.NOT_TIGHT
     (finding,) = found.findings
-    assert (finding.kind, finding.what, finding.top, finding.bottom) == (Kind.MISSING, "C2", 10.5, 20.0)
+    assert (finding.kind, finding.what, finding.top, finding.bottom) == (FindingKind.MISSING, "C2", 10.5, 20.0)
     assert found.system.certain
     assert np.all(found.joints.probability[:, wall.columns.depths > 10.0] == 1.0)
     assert [(j, extra.closes) for j, extra in found.extras] == [(0, True), (1, True)]
@@ -71,14 +71,18 @@ def test_short_missing_unsurveyed_and_not_drilled_columns_are_each_named(tmp_pat
     stations = holes(1) + "C2,0,0,0\nC2,5,0,0\nC2,12,0,0\n" + HOLE.format("C6", 0, 0, 12)
     stations += "C4,0,0,0\nC4,5,0,0\nC4,10,0,0\n"
     _, found = judged(made(tmp_path, heads, stations, more="length_m = 20"))
-    assert found.verdict is Verdict.NOT_TIGHT
-    assert {(f.kind, f.what, f.top, f.bottom) for f in found.findings if f.kind in (Kind.MISSING, Kind.UNSURVEYED)} == {
-        (Kind.MISSING, "C2", 12.5, 20.0),
-        (Kind.MISSING, "C3", 0.0, 20.0),
-        (Kind.UNSURVEYED, "C4", 10.5, 20.0),
-        (Kind.MISSING, "C5", 0.0, 20.0),
-        (Kind.UNSURVEYED, "C6", 12.5, 20.0),
-        (Kind.MISSING, "C7", 0.0, 20.0),
+    assert found.verdict is WallVerdict.NOT_TIGHT
+    assert {
+        (f.kind, f.what, f.top, f.bottom)
+        for f in found.findings
+        if f.kind in (FindingKind.MISSING, FindingKind.UNSURVEYED)
+    } == {
+        (FindingKind.MISSING, "C2", 12.5, 20.0),
+        (FindingKind.MISSING, "C3", 0.0, 20.0),
+        (FindingKind.UNSURVEYED, "C4", 10.5, 20.0),
+        (FindingKind.MISSING, "C5", 0.0, 20.0),
+        (FindingKind.UNSURVEYED, "C6", 12.5, 20.0),
+        (FindingKind.MISSING, "C7", 0.0, 20.0),
     }
 
 
@@ -86,7 +90,7 @@ def test_an_unsurveyed_end_goes_on_as_it_leans_and_grows_uncertain(tmp_path: Pat
     heads = "column,north_m,east_m,state\nC1,0,0,\nC2,0,0.75,drilled\n"
     stations = holes(1) + "C2,0,0.2,90\nC2,5,0.2,90\nC2,10,0.2,90\n"
     wall, found = judged(made(tmp_path, heads, stations, more="length_m = 20\nunsurveyed_percent = 1.5"))
-    assert found.verdict is Verdict.NOT_PROVEN
+    assert found.verdict is WallVerdict.NOT_PROVEN
     columns = wall.columns
     np.testing.assert_allclose(columns.centres[1, :, 1], 0.75 + columns.depths * math.tan(0.2 * DEG), atol=2e-4)
     std = np.sqrt(columns.covs[1, :, 1, 1])
@@ -97,8 +101,8 @@ def test_an_unsurveyed_end_goes_on_as_it_leans_and_grows_uncertain(tmp_path: Pat
 def test_a_drilled_column_without_any_survey_follows_its_design_and_is_named(tmp_path: Path) -> None:
     heads = "column,north_m,east_m,state\nC1,0,0,\nC2,0,0.75,drilled\n"
     wall, found = judged(made(tmp_path, heads, holes(1), more="length_m = 20"))
-    assert found.verdict is Verdict.NOT_PROVEN
-    assert np.all(wall.columns.states[1, 1:] == State.UNSURVEYED)
+    assert found.verdict is WallVerdict.NOT_PROVEN
+    assert np.all(wall.columns.states[1, 1:] == ColumnState.UNSURVEYED)
     assert np.sqrt(wall.columns.covs[1, -1, 0, 0]) == pytest.approx(0.2, rel=0.01)
 
 
@@ -110,8 +114,8 @@ def test_a_grid_with_good_joints_has_a_void_in_every_cell(tmp_path: Path) -> Non
     path = made(tmp_path, heads, holes(9), thickness=0.5, more='layout = "grid"\nspacing_m = 0.9\ndepth_step_m = 5')
     _, found = judged(path)
     assert not np.any(found.joints.thickness < 0.5)
-    assert found.verdict is Verdict.NOT_TIGHT
-    assert [finding.kind for finding in found.findings] == [Kind.VOID] * 4
+    assert found.verdict is WallVerdict.NOT_TIGHT
+    assert [finding.kind for finding in found.findings] == [FindingKind.VOID] * 4
     assert "hole of 3.6 cm radius" in found.findings[0].text
     assert found.system.probability > 0.99
 
@@ -121,7 +125,7 @@ def test_a_grid_that_covers_its_plane_is_tight(tmp_path: Path) -> None:
         f"C{3 * a + b + 1},{0.7 * a},{0.7 * b}\n" for a in range(3) for b in range(3)
     )
     _, found = judged(made(tmp_path, heads, holes(9), more='layout = "grid"\nspacing_m = 0.7\ndepth_step_m = 5'))
-    assert (found.verdict, found.findings) == (Verdict.TIGHT, [])
+    assert (found.verdict, found.findings) == (WallVerdict.TIGHT, [])
 
 
 def raked(folder: Path, more: str) -> Judgement:
@@ -141,7 +145,7 @@ def test_what_one_instrument_errs_in_all_columns_does_not_open_a_raked_wall(tmp_
     apart, together = raked(tmp_path, ""), raked(tmp_path, 'serial = "string 7"')
     assert float(np.nanmax(apart.joints.probability)) > 0.2
     assert float(np.nanmax(together.joints.probability)) < 1e-3
-    assert together.verdict is Verdict.TIGHT
+    assert together.verdict is WallVerdict.TIGHT
 
 
 def test_a_raked_column_on_its_design_is_on_it(tmp_path: Path) -> None:
@@ -149,8 +153,8 @@ def test_a_raked_column_on_its_design_is_on_it(tmp_path: Path) -> None:
     wall, found = judged(
         made(tmp_path, row_of(3), stations, more="inclination_deg = 15\nazimuth_deg = 40\nlength_m = 20")
     )
-    assert found.verdict is Verdict.TIGHT
-    within = wall.columns.states != State.OUTSIDE
+    assert found.verdict is WallVerdict.TIGHT
+    within = wall.columns.states != ColumnState.OUTSIDE
     np.testing.assert_allclose(wall.columns.centres[within], wall.columns.planned[within], atol=1e-9)
     assert np.all(np.count_nonzero(within, axis=1) >= 40)
     assert wall.columns.depths[-1] - wall.columns.depths[0] >= 20.0 - 1e-9
@@ -164,7 +168,7 @@ def test_a_horizontal_fan_is_cut_across_its_axis(tmp_path: Path) -> None:
     first, last = (np.hypot(*(wall.columns.centres[1, z] - wall.columns.centres[0, z])) for z in (0, -1))
     assert first == pytest.approx(0.75, abs=1e-9)
     assert last == pytest.approx(0.75 - 10.5 * math.tan(DEG), abs=0.01)  # azimuths converge southwards of 90 deg
-    assert found.verdict is Verdict.TIGHT
+    assert found.verdict is WallVerdict.TIGHT
 
 
 def test_layers_and_columns_have_their_own_radius(tmp_path: Path) -> None:
@@ -174,7 +178,7 @@ def test_layers_and_columns_have_their_own_radius(tmp_path: Path) -> None:
     np.testing.assert_array_equal(wall.columns.radii[:, 0], [0.6, 0.7, 0.6])
     np.testing.assert_array_equal(wall.columns.radii[:, -1], [0.45, 0.45, 0.45])
     np.testing.assert_allclose(wall.columns.radius_stds[:, -1], 0.036)
-    (first, second) = [f for f in found.findings if f.kind is Kind.THIN]
+    (first, second) = [f for f in found.findings if f.kind is FindingKind.THIN]
     assert (first.top, first.bottom, second.what) == (12.0, 20.0, "C2-C3")
 
 
@@ -191,8 +195,8 @@ def test_a_remedial_column_stands_in_for_one_that_is_not_there(tmp_path: Path) -
     )
     stations = "".join(HOLE.format(name, 0, 0, 20) for name in ("C1", "C3", "C4", "R2", "R3"))
     _, found = judged(made(tmp_path, heads, stations))
-    assert [f.kind for f in found.findings] == [Kind.MISSING]  # C2 is still not there, yet nothing is open
-    assert np.all(found.joints.states != State.MISSING)
+    assert [f.kind for f in found.findings] == [FindingKind.MISSING]  # C2 is still not there, yet nothing is open
+    assert np.all(found.joints.states != ColumnState.MISSING)
 
 
 @pytest.mark.parametrize(
@@ -221,5 +225,5 @@ def test_what_contradicts_itself_is_refused(tmp_path: Path, heads: str, stations
 def test_neighbours_that_cross_are_named(tmp_path: Path) -> None:
     stations = holes(3, without=(2,)) + HOLE.format("C2", 3.0, 270.0, 20.0)
     _, found = judged(made(tmp_path, row_of(3), stations))
-    assert found.verdict is Verdict.NOT_TIGHT
-    assert [f.what for f in found.findings if f.kind is Kind.CROSSING] == ["C1-C2"]
+    assert found.verdict is WallVerdict.NOT_TIGHT
+    assert [f.what for f in found.findings if f.kind is FindingKind.CROSSING] == ["C1-C2"]

@@ -6,13 +6,19 @@ import numpy as np
 import pytest
 from walls_by_sampling import joint_thickness, uncovered
 
-from groundstation.survey.wall.as_built import Columns, State
+from groundstation.survey.wall.as_built import Columns, ColumnState
 from groundstation.survey.wall.column_joint import largest_distance, probability_beyond, probability_thin
 from groundstation.survey.wall.plane_errors import PlaneErrors
 from groundstation.survey.wall.voids import triples_of
-from groundstation.survey.wall.wall_joints import Detour, joints, neighbours_in_grid, neighbours_in_line, pair_radii
+from groundstation.survey.wall.wall_joints import (
+    Detour,
+    judge_joints,
+    neighbours_in_grid,
+    neighbours_in_line,
+    pair_radii,
+)
 from groundstation.survey.wall.wall_system import system_probability
-from groundstation.survey.wall.wall_verdict import Kind, Verdict, judge
+from groundstation.survey.wall.wall_verdict import FindingKind, WallVerdict, judge_columns
 
 RADIUS, REQUIRED = 0.6, 0.8
 DRAWS = 200_000
@@ -37,7 +43,7 @@ def columns_of(
     shape = (count, planes)
     names = [f"C{k + 1}" for k in range(count)]
     return Columns(
-        names, depths, centres, covs, heads, centres.copy(), np.full(shape, State.SURVEYED, np.int8),
+        names, depths, centres, covs, heads, centres.copy(), np.full(shape, ColumnState.SURVEYED, np.int8),
         PlaneErrors.of_planes(mine), PlaneErrors.of_planes(ours), np.full(shape, RADIUS),
         np.full(shape, RADIUS * cv), correlation,
     )  # fmt: skip
@@ -57,7 +63,7 @@ def test_uncertain_radii_make_a_joint_as_doubtful_as_drawn_columns(cv: float, co
         6.8e-3, rel=0.01
     )
     columns = columns_of(line(2, 0.75), std / math.sqrt(2.0), cv=cv, correlation=correlation)
-    found = joints(columns, neighbours_in_line(2, closed=False), REQUIRED).probability[0, -1]
+    found = judge_joints(columns, neighbours_in_line(2, closed=False), REQUIRED).probability[0, -1]
     rng = np.random.default_rng(1)
     first, second = rng.normal(0.0, std / math.sqrt(2.0), (2, DRAWS, 2))
     common, alone = rng.standard_normal(DRAWS), rng.standard_normal((2, DRAWS))
@@ -72,7 +78,7 @@ def test_a_coefficient_of_variation_of_ten_percent_makes_a_good_joint_a_bad_one(
     chances = []
     for cv in (0.0, 0.03, 0.05, 0.10, 0.15):
         columns = columns_of(line(2, 0.75), 0.0408, cv=cv)
-        chances.append(joints(columns, neighbours_in_line(2, closed=False), REQUIRED).probability[0, -1])
+        chances.append(judge_joints(columns, neighbours_in_line(2, closed=False), REQUIRED).probability[0, -1])
     assert chances == pytest.approx([6.8e-3, 0.030, 0.080, 0.21, 0.29], rel=0.03)
 
 
@@ -80,7 +86,7 @@ def test_radii_known_exactly_at_a_certain_place_are_one_step() -> None:
     """The heads of columns whose places are known: only the radius decides."""
     columns = columns_of(line(2, 0.75), 0.0, cv=0.1)
     pairs = neighbours_in_line(2, closed=False)
-    found = joints(columns, pairs, REQUIRED).probability[0, 0]
+    found = judge_joints(columns, pairs, REQUIRED).probability[0, 0]
     needed = math.hypot(0.5 * 0.75, 0.5 * REQUIRED)
     expected = 0.5 * math.erfc((RADIUS - needed) / (0.1 * RADIUS) / math.sqrt(2.0))
     assert found == pytest.approx(expected, rel=1e-4)
@@ -93,10 +99,10 @@ def test_what_columns_share_does_not_open_their_joint() -> None:
     rake = 10.0 * math.tan(math.radians(15.0)) * math.radians(3.0)  # a yaw error of 3 deg on columns raked by 15 deg
     alike = np.broadcast_to(np.array([[0.0], [rake]]), (2, 2, 1))
     pairs = neighbours_in_line(2, closed=False)
-    shared = joints(columns_of(line(2, 0.75), 0.03, alike), pairs, REQUIRED).probability[0, -1]
+    shared = judge_joints(columns_of(line(2, 0.75), 0.03, alike), pairs, REQUIRED).probability[0, -1]
     apart = np.zeros((2, 2, 2))
     apart[0, 1, 0] = apart[1, 1, 1] = rake
-    independent = joints(columns_of(line(2, 0.75), 0.03, apart), pairs, REQUIRED).probability[0, -1]
+    independent = judge_joints(columns_of(line(2, 0.75), 0.03, apart), pairs, REQUIRED).probability[0, -1]
     assert shared == pytest.approx(
         float(probability_beyond(np.array([0.75, 0.0]), 2 * 0.03**2 * np.eye(2), 0.8944)), rel=2e-2
     )
@@ -121,7 +127,7 @@ def test_the_probability_of_any_opening_is_that_of_drawn_walls() -> None:
         PlaneErrors.of_planes(mine),        columns.shared, columns.radii, columns.radius_stds, rho,
     )  # fmt: skip
     pairs = neighbours_in_line(count, closed=False)
-    found = system_probability(columns, joints(columns, pairs, REQUIRED), REQUIRED)
+    found = system_probability(columns, judge_joints(columns, pairs, REQUIRED), REQUIRED)
     rng = np.random.default_rng(2)
     opened, draws = 0, 0
     for _ in range(20):
@@ -148,7 +154,9 @@ def test_the_probability_of_a_void_between_four_columns_is_that_of_drawn_ones() 
     columns = columns_of(heads, std)
     pairs = neighbours_in_grid(heads, spacing)
     required = 0.05  # the joints hold: only the middle can open
-    found = system_probability(columns, joints(columns, pairs, required), required, triples_of(heads, 1.75 * spacing))
+    found = system_probability(
+        columns, judge_joints(columns, pairs, required), required, triples_of(heads, 1.75 * spacing)
+    )
     rng = np.random.default_rng(3)
     n = 400_000
     centres = heads + rng.normal(0.0, std, (n, 4, 2))
@@ -164,7 +172,7 @@ def test_the_probability_of_a_void_between_four_columns_is_that_of_drawn_ones() 
 def test_small_probabilities_keep_their_relative_accuracy() -> None:
     columns = columns_of(line(2, 0.75), 0.0145)
     pairs = neighbours_in_line(2, closed=False)
-    found = joints(columns, pairs, REQUIRED)
+    found = judge_joints(columns, pairs, REQUIRED)
     assert 1e-13 < found.probability[0, -1] < 1e-6
     whole = system_probability(columns, found, REQUIRED)
     assert whole.probability == pytest.approx(found.probability[0, -1], rel=0.1)
@@ -173,22 +181,22 @@ def test_small_probabilities_keep_their_relative_accuracy() -> None:
 def test_good_joints_make_a_doubtful_wall_when_there_are_many() -> None:
     columns = columns_of(line(40, 0.75), 0.0305)
     pairs = neighbours_in_line(40, closed=False)
-    found = judge(columns, pairs, REQUIRED)
+    found = judge_columns(columns, pairs, REQUIRED)
     assert float(np.nanmax(found.joints.probability)) < 0.01 < found.system.probability
-    assert [finding.kind for finding in found.findings] == [Kind.SYSTEM]
-    assert found.verdict is Verdict.NOT_PROVEN
+    assert [finding.kind for finding in found.findings] == [FindingKind.SYSTEM]
+    assert found.verdict is WallVerdict.NOT_PROVEN
 
 
 def test_a_remedial_column_closes_an_opening_and_its_own_uncertainty_counts() -> None:
     heads = np.array([[0.0, 0.0], [0.0, 1.3], [0.0, 0.65]])
     columns = columns_of(heads, 0.01)
     pairs = np.array([[0, 1]])
-    assert judge(columns, pairs, REQUIRED).verdict is Verdict.NOT_TIGHT
+    assert judge_columns(columns, pairs, REQUIRED).verdict is WallVerdict.NOT_TIGHT
     detour = Detour(0, np.array([[0, 2], [2, 1]]))
-    closed = judge(columns, pairs, REQUIRED, detours=[detour])
-    assert closed.verdict is Verdict.TIGHT
-    doubtful = judge(columns_of(heads, 0.1), pairs, REQUIRED, detours=[detour])
-    assert doubtful.verdict is Verdict.NOT_PROVEN
+    closed = judge_columns(columns, pairs, REQUIRED, detours=[detour])
+    assert closed.verdict is WallVerdict.TIGHT
+    doubtful = judge_columns(columns_of(heads, 0.1), pairs, REQUIRED, detours=[detour])
+    assert doubtful.verdict is WallVerdict.NOT_PROVEN
     assert doubtful.system.probability == pytest.approx(drawn_detour(heads, 0.1), rel=0.1)
 
 

@@ -45,7 +45,7 @@ from node.kernels.step.node_step import (
 from node.kernels.step.shadow_words import learn_aiding, learn_inputs, learn_node, show_node
 from node.kernels.string.relay import offer_aiding
 from node.kernels.turns.doubts import noise_var
-from sim.studies.fixed_point.run import AIDING_VAR, LIMITS, compare, inputs, rows_of
+from sim.studies.fixed_point.run import AIDING_VAR, LIMITS, compare_kernels, draw_inputs, rows_of
 from telemetry.messages import Aiding, NodeState
 
 WORK_SPACE = {"h", "ph", "gain"}
@@ -54,7 +54,7 @@ G = 9.81
 
 @pytest.mark.slow
 def test_four_thousand_cycles_agree() -> None:
-    found = compare(4000, 3)
+    found = compare_kernels(4000, 3)
     rows = rows_of(found)
     assert [row["case"] for row in rows] == ["turning, aided", "turning, outage", "rest, aided", "rest, outage"]
     assert max(row["yaw_max_deg"] for row in rows) < LIMITS["yaw_deg"] / 100.0
@@ -66,7 +66,7 @@ def shown(cycles: int, seed: int) -> tuple[np.void, np.void, FixedNode]:
     """Both float64 records after the same inputs."""
     config, reference, shadow = default_config()[0], new_state(default_config())[0], new_state(default_config())[0]
     fixed = FixedNode()
-    for given in inputs(cycles, seed):
+    for given in draw_inputs(cycles, seed):
         reading = (np.array(given.rate), np.array(given.force), given.start, given.end, given.joined)
         run_cycle(reference, config, *reading)
         fixed.run_cycle(shadow, config, *reading)
@@ -188,7 +188,7 @@ def tube(kernel: str) -> Tube:
 def reports(kernel: str, *, forget: bool) -> list[NodeState]:
     node = tube(kernel)
     said = []
-    for k, given in enumerate(inputs(1300, 6)):
+    for k, given in enumerate(draw_inputs(1300, 6)):
         around = RigContext(True, 1, given.end, 1e-8, True)
         reading = ImuReading(given.start, given.end, given.rate, given.force)
         said += [message for message in node.on_cycle(reading, around) if isinstance(message, NodeState)]
@@ -269,7 +269,7 @@ def integers_in_parts(loop: Loop) -> Loop:
 def test_the_compiled_step_does_what_the_step_in_parts_does(kernel: str) -> None:
     whole, parts = tube(kernel), tube(kernel)
     parts._loop = (integers_in_parts if kernel == "fixed" else in_parts)(parts._loop)
-    for k, given in enumerate(inputs(1300, 8)):
+    for k, given in enumerate(draw_inputs(1300, 8)):
         around = RigContext(True, 1 + k // 900, given.end, 1e-8 * (1 + k // 500), True)
         rate = given.rate if k % 211 else (np.nan, 0.0, 0.0)
         reading = ImuReading(given.start, given.end, rate, given.force)

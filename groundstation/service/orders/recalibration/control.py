@@ -8,7 +8,7 @@ from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any
 
-from groundstation.calibration.block import from_json, write
+from groundstation.calibration.block import from_json, write_calibration
 from groundstation.calibration.errors import CalibrationError
 from groundstation.errors import SelectorError
 from groundstation.service.disk.ground_store import Store
@@ -92,6 +92,6 @@ class Recalibration:
         except OSError as error:
             raise CalibrationError(f"{self._folder}: expected a folder to write to, got {error.strerror}") from error
         for block, calibration in self.procedure.proposed(proposal):
-            write(self._folder / f"field-{block.tube}-v{block.version}.json", from_json(calibration))
+            write_calibration(self._folder / f"field-{block.tube}-v{block.version}.json", from_json(calibration))
             self._store.keep_block(block)
         self.procedure.confirm()

@@ -13,7 +13,7 @@ from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 
 from groundstation.calibration.errors import CalibrationError
-from groundstation.calibration.field import Rest
+from groundstation.calibration.field_calibration import Rest
 from groundstation.errors import SelectorError
 from groundstation.service.orders.recalibration.recalibration_progress import (
     Attitude,

@@ -9,7 +9,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from groundstation.calibration.block import Calibration, Provenance, to_json
-from groundstation.calibration.field import Rest, inclination_rms, solve
+from groundstation.calibration.field_calibration import Rest, calibrate_accelerometer, inclination_rms
 from groundstation.service.orders.blocks import block_of
 from groundstation.service.orders.recalibration.recalibration_progress import Found
 from groundstation.survey.fusion.force_biases import ForceBias
@@ -33,7 +33,7 @@ def propose(rests: Sequence[Rest], before: ParameterBlock, gravity: float, day: 
     CalibrationError
         When the records give no solution.
     """
-    result = solve(rests, gravity, day)
+    result = calibrate_accelerometer(rests, gravity, day)
     made, old = result.calibration, before.accelerometer
     block = replace(block_of(before.tube, before.version + 1, None, made), gyroscope=before.gyroscope)
     bias_std = result.fit.bias_std()

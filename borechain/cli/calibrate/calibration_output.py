@@ -1,0 +1,186 @@
+"""What every calibration command shares: its result, the files it lands whole or not at all, and what it prints."""
+
+from __future__ import annotations
+
+import contextlib
+import functools
+import json
+import os
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass
+from datetime import UTC, date, datetime
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import click
+
+from borechain import __version__
+from borechain.cli.console_tables import table_console
+from borechain.cli.faults import EnvironmentFault, InputFault
+from borechain.cli.shared_options import json_option
+from borechain.cli.whole_files import PLOT_FORMATS, check_suffix
+from telemetry.runtime.command_line import check_installed
+
+if TYPE_CHECKING:
+    from groundstation.report.figure_panels import Panel
+    from groundstation.report.sheet import Sheet
+
+file_argument = click.argument("file", type=click.Path(path_type=Path, dir_okay=False))
+full_scale_option = click.option(
+    "--full-scale",
+    type=click.FloatRange(0.0, min_open=True),
+    default=1e30,
+    help="Range of the sensor, in the unit of its readings; a saturated reading is refused.",
+)
+
+
+@dataclass(frozen=True, slots=True)
+class CalibrationOutcome:
+    """A calibration: the JSON object, the text of its file, its sheet and its figures, drawn when asked for."""
+
+    result: dict[str, Any]
+    document: str
+    block_sha256: str | None
+    record_sha256: str
+    sheet: Sheet
+    panels: Callable[[], Sequence[Panel]]
+
+
+@dataclass(frozen=True, slots=True)
+class Wanted:
+    """Files to write and how to print."""
+
+    file: Path
+    out: Path | None
+    plot: Path | None
+    certificate: Path | None
+    day: date
+    subject: str
+    as_json: bool
+
+    def check(self) -> None:
+        """Refuse paths that cannot be meant, before anything is computed."""
+        paths = [self.file, *filter(None, (self.out, self.plot, self.certificate))]
+        if len({path.resolve() for path in paths}) < len(paths):
+            raise InputFault("expected different files for the record, --out, --plot and --certificate")
+        check_suffix("--plot", self.plot, *PLOT_FORMATS)
+        check_suffix("--certificate", self.certificate, ".pdf")
+        check_suffix("--out", self.out, ".json")
+
+
+@contextlib.contextmanager
+def faults_of_file(file: Path) -> Iterator[None]:
+    """Put the name of the file in front of what the mathematics refuses."""
+    from groundstation.calibration.errors import CalibrationError
+
+    try:
+        yield
+    except CalibrationError as error:
+        raise InputFault(f"{file.name}: {error}") from error
+
+
+def output_options(command: Callable[..., CalibrationOutcome]) -> Callable[..., None]:
+    """Options --out, --plot, --certificate, --date, --subject and --json of a command that returns an `Outcome`."""
+
+    @functools.wraps(command)
+    def delivering(
+        file: Path,
+        out: Path | None,
+        plot: Path | None,
+        certificate: Path | None,
+        date: datetime | None,
+        subject: str | None,
+        as_json: bool,
+        **options: Any,
+    ) -> None:
+        day = (date or datetime.now(UTC)).date()
+        wanted = Wanted(file, out, plot, certificate, day, subject or file.stem, as_json)
+        wanted.check()
+        if plot is not None or certificate is not None:
+            check_installed("matplotlib", "typst")
+        deliver_outcome(command(file=file, day=day.isoformat(), **options), wanted)
+
+    path = click.Path(path_type=Path, dir_okay=False)
+    decorated: Callable[..., None] = delivering
+    for option in (
+        json_option,
+        click.option("--subject", help="What was calibrated, for the certificate.  [default: name of FILE]"),
+        click.option(
+            "--date", type=click.DateTime(["%Y-%m-%d"]), help="Day of the calibration.  [default: today, UTC]"
+        ),
+        click.option("--certificate", type=path, help="Certificate as PDF."),
+        click.option("--plot", type=path, help="Figures as .svg, .png or .pdf."),
+        click.option("--out", type=path, help="Result as a .json file, with the record it was made from."),
+    ):
+        decorated = option(decorated)
+    return decorated
+
+
+def deliver_outcome(outcome: CalibrationOutcome, wanted: Wanted) -> None:
+    """Make every file, land them all, then print."""
+    files: dict[Path, bytes] = {}
+    if wanted.out is not None:
+        files[wanted.out] = outcome.document.encode()
+    if wanted.plot is not None or wanted.certificate is not None:
+        files |= rendered_files(outcome, wanted)
+    write_files_whole(files)
+    if wanted.as_json:
+        click.echo(json.dumps(outcome.result, allow_nan=False))
+    else:
+        show_sheet(outcome.sheet, list(files))
+
+
+def rendered_files(outcome: CalibrationOutcome, wanted: Wanted) -> dict[Path, bytes]:
+    """Plot and certificate."""
+    from groundstation.report.certificate import Identity, certificate_pdf
+    from groundstation.report.figure_panels import render_panels
+
+    panels, files = outcome.panels(), {}
+    if wanted.plot is not None:
+        files[wanted.plot] = render_panels(panels, wanted.plot.suffix[1:])
+    if wanted.certificate is not None:
+        identity = Identity(
+            wanted.subject, wanted.day, wanted.file.name, outcome.record_sha256, outcome.block_sha256, __version__
+        )
+        files[wanted.certificate] = certificate_pdf(outcome.sheet, panels, identity)
+    return files
+
+
+def write_files_whole(files: dict[Path, bytes]) -> None:
+    """Write drafts of all files and rename them only when every one is on the disk."""
+    drafts = {path: path.with_name(f".{path.name}.{os.getpid()}.draft") for path in files}
+    try:
+        for path, content in files.items():
+            with drafts[path].open("wb") as file:
+                file.write(content)
+                file.flush()
+                os.fsync(file.fileno())
+        for path, draft in drafts.items():
+            draft.replace(path)
+    except OSError as error:
+        raise EnvironmentFault(f"{error.filename}: {error.strerror}; nothing was written") from error
+    finally:
+        for draft in drafts.values():
+            with contextlib.suppress(OSError):
+                draft.unlink()
+
+
+def show_sheet(sheet: Sheet, files: Sequence[Path]) -> None:
+    """Print a sheet for people."""
+    from rich.table import Table
+
+    paper = table_console(110)
+    paper.print(f"[bold]{sheet.title}[/bold]")
+    for name, value in sheet.facts:
+        paper.print(f"{name:24} {value}", soft_wrap=True, highlight=False, markup=False)
+    for given in sheet.tables:
+        table = Table(title=given.title, title_justify="left")
+        for k, column in enumerate(given.columns):
+            table.add_column(column, justify="right" if k else "left")
+        for row in given.rows:
+            table.add_row(*row)
+        paper.print(table)
+    for warning in sheet.warnings:
+        paper.print(f"warning: {warning}", style="yellow", soft_wrap=True, highlight=False)
+    for path in files:
+        paper.print(f"wrote {path}", soft_wrap=True, highlight=False, markup=False)

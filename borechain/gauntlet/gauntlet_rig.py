@@ -1,0 +1,237 @@
+"""A rig that faults may touch: firmware, links, ground station and store in this process, on disks in memory."""
+
+from __future__ import annotations
+
+import gc
+import itertools
+import math
+import tempfile
+from collections.abc import Callable, Iterable
+from functools import cache, partial
+from pathlib import Path
+from typing import Any, NamedTuple
+
+from borechain.inline import InlineRig
+from groundstation.service.process.ground_process import GroundProcess
+from node.process.tube_process import TubeProcess
+from sim.gauntlet.fault import EVERYBODY, Step
+from sim.gauntlet.faulty_channel import FaultyChannel
+from sim.gauntlet.faulty_disk import FaultyDisk
+from sim.gauntlet.faulty_stepper import FaultyStepper
+from sim.gauntlet.faulty_world import DRILLED_IN, MINUTE, TUBE_LENGTH, FaultyWorld
+from sim.rig.scheduler import Scheduler
+from sim.world.streams import Stream, stream
+from telemetry.messages import BASE, Side
+
+LOOK_EVERY = 5.0  # s between two looks of an observer
+WORLDS = 8  # of a schedule; what a world draws and measures is worked out once a process of the machine
+RESTED = 100.0  # s that the string of a short schedule has rested and been heard before everything starts again
+
+
+class Plan(NamedTuple):
+    """A schedule, and from when on faults may begin in it.
+
+    Attributes
+    ----------
+    tables : scenario
+    rested : s that pass before everything loses its power and the run begins, which is not judged; 0 for none
+    after_begin : s of the run in which no fault begins
+    settings : of the ground station
+    """
+
+    tables: dict[str, Any]
+    rested: float
+    after_begin: float
+    settings: dict[str, Any]
+
+
+PLANS = {
+    "minute": Plan(MINUTE, RESTED, 6.0, {"tube_length": TUBE_LENGTH, "survey_after": 38.0}),
+    "drilled-in": Plan(DRILLED_IN, 0.0, 15.0, {"tube_length": TUBE_LENGTH}),
+}
+
+
+class GauntletRig:
+    """A rig that faults may touch; see ``sim.gauntlet.fault.Faulty``.
+
+    Parameters
+    ----------
+    world : without faults yet
+    disks : of every process
+    settings : of the ground station
+    seed : of links and lots
+    folder : new; holds the key of the rig and nothing else
+    """
+
+    def __init__(
+        self, world: FaultyWorld, disks: dict[int, FaultyDisk], settings: dict[str, Any], seed: int, folder: Path
+    ) -> None:
+        self.world = world
+        self._disks = dict(disks)
+        self._settled = dict(disks)
+        lots = stream(seed, Stream.LOTS)
+        self.inline = InlineRig(
+            world, settings, "rig-1", folder, lambda below: int(lots.integers(below)), disk_of=self.disk
+        )
+        self.stepper = self.inline.stepper = FaultyStepper(self.inline.stepper.builders, world, self.cut)
+        self._builders = dict(self.stepper.builders)
+        self._folder, self._seed, self._strangers = folder, seed, itertools.count()
+        self.off: dict[int, float] = {}  # since when (s), by address
+        self.before_cut: list[Callable[[], None]] = []
+        self.after_step: list[Callable[[], None]] = []
+        self._numbers = {address: address for address in disks}  # that the processes in their places give themselves
+        self._spoke_until: dict[int, float] = {}  # s, by number
+        self._look_at = world.begin
+        self.scheduler = Scheduler(world, self.stepper, self.stepper.follow)
+        medium = world.scenario.medium
+        self.channel = FaultyChannel(seed, medium.latency, medium.jitter, medium.loss, medium.duplicate)
+        self.scheduler.channel = self.channel
+
+    @property
+    def now(self) -> float:
+        """Rig time of the truth, s."""
+        return self.scheduler.now
+
+    @property
+    def ground(self) -> GroundProcess | None:
+        """The ground station, where it has power."""
+        process = self.stepper.processes.get(BASE)
+        return process if isinstance(process, GroundProcess) else None
+
+    def cut(self, address: int) -> None:
+        """Power off; nothing where it is off already."""
+        if address not in self.scheduler.progress.wanted:
+            return
+        for listener in self.before_cut:
+            listener()
+        self._disks[address].cut()
+        if address == BASE and self.ground is not None:
+            self.ground.store.close()
+        self.stepper.drop(address)
+        self.scheduler.progress.wanted.remove(address)
+        self.off[address] = self._spoke_until[self._numbers[address]] = self.now
+
+    def silent_for(self, tube: int) -> float:
+        """Seconds for which no process of this number has had power; 0 while one has."""
+        if any(number == tube and address not in self.off for address, number in self._numbers.items()):
+            return 0.0
+        return self.now - self._spoke_until.get(tube, math.inf)
+
+    def start(self, address: int, tube: int | None = None) -> None:
+        """Power on, where it was cut."""
+        if address not in self.off:
+            return
+        del self.off[address]
+        self._take_place(address, tube)
+        self.scheduler.progress.wanted.append(address)
+        self.stepper.follow(self.scheduler.progress)
+
+    def begin(self, at: float) -> None:
+        """Power for everything at a rig time (s)."""
+        self._look_at = at + LOOK_EVERY
+        self.scheduler.begin(at)
+
+    def freeze(self, address: int) -> None:
+        """A process gets no events."""
+        self.stepper.freeze(address)
+
+    def thaw(self, address: int) -> None:
+        """It goes on."""
+        self.stepper.thaw(address)
+
+    def disk(self, address: int) -> FaultyDisk:
+        """What a process keeps."""
+        return self._disks[address]
+
+    def inject(self, address: int, side: Side, frame: bytes) -> None:
+        """A frame from nowhere."""
+        if (process := self.stepper.processes.get(address)) is not None:
+            process.on_frame(side, frame, self.world.local_clock(address, self.now))
+
+    def send_depth(self, payload: bytes) -> None:
+        """Bytes on the key of the depth."""
+        if self.ground is not None:
+            self.ground.on_depth(payload, self.world.local_clock(BASE, self.now))
+
+    def drill(self, steps: Iterable[Step], observe: Callable[[], None] = lambda: None) -> None:
+        """Drill to the end, doing each step at its time and having everything observed from time to time."""
+        for step in steps:
+            self.advance(step.at, observe)
+            step.act(self)
+            for listener in self.after_step:
+                listener()
+        self.advance(math.inf, observe)
+
+    def repair(self) -> None:
+        """Everything has power and a disk that takes, and the crew has looked at the depth."""
+        self.world.depth_hidden, self.world.depth_error = False, 0.0
+        self.world.forget()
+        for address in EVERYBODY:
+            self._disks[address].refusal, self._disks[address].writes_left = 0, -1
+            self.thaw(address)
+            self.start(address)
+        if self.ground is not None and self.ground.model.string.depths.jumped:
+            self.inline.command("accept_depth", {"action": "confirm"})
+
+    def close(self) -> None:
+        """Close the database."""
+        if self.ground is not None:
+            self.ground.store.close()
+
+    def advance(self, to: float, observe: Callable[[], None] = lambda: None) -> None:
+        """Let rig time pass to ``to`` (s), having everything observed from time to time."""
+        while self._look_at <= min(to, self.world.end):
+            self.scheduler.advance(self._look_at)
+            self._look_at += LOOK_EVERY
+            observe()
+        self.scheduler.advance(to)
+
+    def _take_place(self, address: int, tube: int | None) -> None:
+        """Put another tube with a blank disk in a place, or the one that belongs there."""
+        self._numbers[address] = address if tube is None else tube
+        if tube is None:
+            self._disks[address], self.stepper.builders[address] = self._settled[address], self._builders[address]
+            return
+        draws = stream(self._seed, Stream.GAUNTLET, 3, address, next(self._strangers))
+        self._disks[address] = FaultyDisk(draws)
+        settings, folder = self.world.tube_settings(tube), self._folder / "state" / "stranger"
+        self.stepper.builders[address] = partial(TubeProcess, settings, folder, disk=self._disks[address])
+
+
+def new_rig(plan: str, seed: int, folder: Path) -> GauntletRig:
+    """The rig of a seed, ready to be drilled with."""
+    chosen = PLANS[plan]
+    world, kept = started_world(plan, seed % WORLDS)
+    disks = {a: kept[a].copied(stream(seed, Stream.GAUNTLET, 4, a)) for a in EVERYBODY}
+    rig = GauntletRig(world.healthy(), disks, chosen.settings, seed, folder)
+    rig.begin(world.begin + chosen.rested)
+    return rig
+
+
+def make_ready(plan: str, seeds: Iterable[int]) -> None:
+    """Work out the worlds of these seeds, so that a seed's time is its own, and keep the collector from them."""
+    known = started_world.cache_info().currsize
+    for number in sorted({seed % WORLDS for seed in seeds}):
+        started_world(plan, number)
+    if started_world.cache_info().currsize > known:
+        gc.collect()
+        gc.freeze()
+
+
+@cache
+def started_world(plan: str, number: int) -> tuple[FaultyWorld, dict[int, FaultyDisk]]:
+    """A world, and what the disks hold when the power of everything comes.
+
+    The string of a short schedule has rested under power before, so its nodes know their sensors.
+    """
+    chosen = PLANS[plan]
+    world = FaultyWorld.of_tables(chosen.tables, number)
+    disks = {a: FaultyDisk(stream(number, Stream.GAUNTLET, 5, a)) for a in EVERYBODY}
+    if chosen.rested:
+        with tempfile.TemporaryDirectory(prefix="gauntlet-") as folder:
+            rig = GauntletRig(world.healthy(), disks, chosen.settings, number, Path(folder))
+            rig.begin(world.begin)
+            rig.scheduler.advance(world.begin + chosen.rested - 2.0)
+            for address in EVERYBODY:
+                rig.cut(address)
+    return world, disks

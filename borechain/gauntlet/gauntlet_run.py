@@ -1,0 +1,119 @@
+"""One seed of the gauntlet: what it draws, what came of it, and the fewest faults that still make it fail."""
+
+from __future__ import annotations
+
+import hashlib
+import shutil
+import tempfile
+import time
+import traceback
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+from borechain.gauntlet.fault_observability import FaultObservability
+from borechain.gauntlet.gauntlet_rig import PLANS, GauntletRig, make_ready, new_rig
+from borechain.gauntlet.oracles import Observer, find_violations
+from borechain.rare_collection import rare_collection
+from sim.gauntlet.fault_kinds import KINDS
+from sim.gauntlet.plan import drawn_kinds, steps_of
+from sim.rig.report import digest
+
+ALL = tuple(kind.name for kind in KINDS)
+USUAL = "minute"
+FEW = 2  # kinds of faults that may never mislead the crew without a word, whatever can be seen
+
+
+@dataclass(slots=True)
+class SeedOutcome:
+    """What became of a seed; ``schedule`` says when which fault did something, s of the run."""
+
+    seed: int
+    kinds: tuple[str, ...]
+    plan: str = USUAL
+    violations: list[str] = field(default_factory=list)
+    digest: str = ""
+    alarms: list[str] = field(default_factory=list)
+    cleared: list[str] = field(default_factory=list)
+    told: dict[str, float] = field(default_factory=dict)  # s after the first fault, by alarm
+    measurements: int = 0
+    schedule: list[str] = field(default_factory=list)
+    cpu_s: float = field(default=0.0, compare=False)
+
+
+def run_seed(
+    seed: int, allowed: Sequence[str] = ALL, kinds: Sequence[str] | None = None, plan: str = USUAL
+) -> SeedOutcome:
+    """Drill under the faults of a seed and judge; ``kinds`` overrules what the seed switches on."""
+    outcome = SeedOutcome(seed, tuple(drawn_kinds(seed, allowed) if kinds is None else kinds), plan)
+    make_ready(plan, [seed])
+    began = time.process_time()
+    folder = Path(tempfile.mkdtemp(prefix="gauntlet-"))
+    try:
+        with rare_collection():
+            rig = new_rig(plan, seed, folder)
+            _run(rig, outcome)
+            rig.close()
+    except Exception as error:
+        place = traceback.extract_tb(error.__traceback__)[-1]
+        outcome.violations.append(f"died: {type(error).__name__}: {error} ({Path(place.filename).name}:{place.lineno})")
+    finally:
+        shutil.rmtree(folder, ignore_errors=True)
+    outcome.cpu_s = time.process_time() - began
+    return outcome
+
+
+def judge_seed(job: tuple[int, Sequence[str], Sequence[str] | None, str]) -> SeedOutcome:
+    """Outcome of one seed, shrunk where it fails: seed, kinds to draw from, kinds to switch on instead, plan."""
+    outcome = run_seed(*job)
+    return shrink_outcome(outcome) if outcome.violations else outcome
+
+
+def shrink_outcome(outcome: SeedOutcome) -> SeedOutcome:
+    """The failing seed with as few kinds as still make it fail."""
+    kept, worst = list(outcome.kinds), outcome
+    for name in outcome.kinds:
+        fewer = [other for other in kept if other != name]
+        tried = run_seed(outcome.seed, kinds=fewer, plan=outcome.plan) if fewer else worst
+        if fewer and tried.violations:
+            kept, worst = fewer, tried
+    return worst
+
+
+def _run(rig: GauntletRig, outcome: SeedOutcome) -> None:
+    chosen, world = PLANS[outcome.plan], rig.world
+    begin = world.begin + chosen.rested
+    steps = steps_of(outcome.seed, outcome.kinds, begin + chosen.after_begin, world.end)
+    outcome.schedule = [f"{step.at - begin:.1f} s {name}" for name, step in steps]
+    is_of_few = len(outcome.kinds) <= FEW
+    observer, sight = Observer(rig, steps[0][1].at, of_few=is_of_few), FaultObservability(rig)
+    rig.drill([step for _, step in steps], observer.look)
+    outcome.told = observer.told
+    if rig.ground is None:
+        outcome.violations = ["the ground station is not there at the end"]
+        return
+    rows = _alarms(rig)
+    outcome.digest = hashlib.sha256(f"{digest(rig.inline.ask('stations')['stations'])}{rows}".encode()).hexdigest()
+    outcome.alarms = sorted({code for code, _, _, standing in rows if standing})
+    outcome.cleared = sorted({code for code, _, _, standing in rows if not standing})
+    outcome.measurements = len(rig.inline.ask("measurements")["measurements"])
+    outcome.violations = [
+        *observer.found,
+        *find_violations(
+            rig,
+            observer.told,
+            encoder_can_be_judged=is_of_few or (sight.has_seen and not sight.nobody_could_know),
+            depth_can_be_judged=is_of_few or not sight.has_believed_a_wrong_depth,
+        ),
+    ]
+
+
+def _alarms(rig: GauntletRig) -> list[tuple[str, str, int, bool]]:
+    """Code, subject and count of every alarm, and whether it stands."""
+    shown: dict[str, Any] = rig.inline.ask("alarms")
+    return [
+        (row["code"], row["subject"], row["count"], key == "rig")
+        for key in ("rig", "rig_cleared")
+        for row in shown[key]
+    ]
