@@ -1,6 +1,7 @@
 """What the fork server imports and compiles for nodes that run another kernel than the default one.
 
-It stands apart from ``preload``: to compile every kernel takes a fresh machine half a minute, which the usual rig saves.
+It stands apart from ``preload``: to compile every kernel takes a fresh machine half a minute, which the usual rig
+saves.
 """
 
 from __future__ import annotations

@@ -71,7 +71,7 @@ STUDY = Addition(
             "coin",
             "Whether a coin is fair.",
             f"{MODULES}.coin",
-            (Table("{throws} throws", (("case", "case"), ("ours", "ours")), (("case", "case"), ("ours", "ours"))),),
+            (ResultTable("{throws} throws", (("case", "case"), ("ours", "ours")), (("case", "case"), ("ours", "ours"))),),
             (Option("throws", 4, 1, 10),),
             drawn=False,
         ),
@@ -79,11 +79,11 @@ STUDY = Addition(
     files={
         "sim/studies/coin/__init__.py": "",
         "sim/studies/coin/run.py": """
-def steps(throws):
+def count_steps(throws):
     return throws
 
 
-def run(throws, step):
+def run_study(throws, step):
     for _ in range(throws):
         step()
     return {"experiment": "coin", "throws": throws, "cases": [{"case": "heads", "ours": 0.25}]}
@@ -101,11 +101,11 @@ INSTRUMENT = Addition(
 from sim.instruments.instrument import Records
 
 
-def records(seed):
+def simulate_records(seed):
     return Records({"plumb.csv": b"angle_deg\\n0\\n"}, {"plumb": {"seed": seed}})
 """
     },
-    named="records(seed)",
+    named="simulate_records(seed)",
 )
 ADDITIONS = (COMMAND, MEDIUM, STUDY, INSTRUMENT)
 
@@ -185,7 +185,7 @@ def test_a_tube_obeys_an_added_command_and_its_ranges_hold(copy: Path) -> None:
 
 def test_frames_cross_an_added_medium(copy: Path) -> None:
     out = run(copy, "-c", program("""
-        from telemetry.media.port import Frame, TubeEnd
+        from telemetry.media.port import PortFrame, TubeEnd
         from telemetry.media.media_table import open_medium
         from telemetry.messages import Side
 
@@ -193,7 +193,7 @@ def test_frames_cross_an_added_medium(copy: Path) -> None:
             lower_end = TubeEnd("rig", 2, Side.LOWER, 1)
             upper, lower = medium.open_port(lower_end), medium.open_port(lower_end.facing)
             lower.listen(print)
-            upper.send(Frame(b"hello"))
+            upper.send(PortFrame(b"hello"))
             upper.close()
             lower.close()
     """))  # fmt: skip

@@ -152,9 +152,9 @@ def fit_attitudes(
 def fit_free_yaw(truth: Array, readings: Array, like: Array, covs: Array | None = None) -> AttitudeFit:
     """Bias, matrix and the yaw of the rig: readings = b + K Rz(yaw) truth, with K nearest to ``like`` in x and y.
 
-    A full matrix swallows any yaw, so one sensor cannot separate the two and the residuals are those of ``fit_attitudes``: what
-    fixes the yaw is ``like`` (3, 3), the matrix of an earlier calibration or of the mounting. Only its first two rows
-    and columns count; an entry that is NaN is not known and does not count either.
+    A full matrix swallows any yaw, so one sensor cannot separate the two and the residuals are those of
+    ``fit_attitudes``: what fixes the yaw is ``like`` (3, 3), the matrix of an earlier calibration or of the mounting.
+    Only its first two rows and columns count; an entry that is NaN is not known and does not count either.
 
     Raises
     ------

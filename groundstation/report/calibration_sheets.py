@@ -109,8 +109,8 @@ def triad_sheet(title: str, fit: MwdFit, facts: Facts) -> Sheet:
         ("Search", f"{fit.iterations} iterations, E = {number_text(fit.cost, 4)}"),
         (
             "Largest error elsewhere",
-            f"{number_text(fit.predicted_size_std, 2)} {unit} and {number_text(math.degrees(fit.predicted_angle_std), 2)} deg, "
-            "one standard deviation",
+            f"{number_text(fit.predicted_size_std, 2)} {unit} and "
+            f"{number_text(math.degrees(fit.predicted_angle_std), 2)} deg, one standard deviation",
         ),
     )
     errors = SheetTable(

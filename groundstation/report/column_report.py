@@ -135,7 +135,8 @@ def tolerance_text(rule: Tolerance) -> str:
 
 
 def _tolerance_words(design: ColumnDesign) -> str:
-    return f"Tolerance: {tolerance_text(design.tolerance)}. Deviation is across the design axis; sigma is one standard deviation."
+    tolerance = tolerance_text(design.tolerance)
+    return f"Tolerance: {tolerance}. Deviation is across the design axis; sigma is one standard deviation."
 
 
 def _design_facts(record: ColumnRecord, site: ReportSite) -> list[tuple[str, str]]:

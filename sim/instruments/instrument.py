@@ -1,4 +1,4 @@
-"""What a synthetic instrument is: a name and a module whose ``records(seed)`` are the files it would have written."""
+"""What a synthetic instrument is: a name, and a module whose ``simulate_records(seed)`` makes its files."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ class Records:
 
 @dataclass(frozen=True, slots=True)
 class Instrument:
-    """One line of the table of instruments; ``module`` has ``records(seed) -> Records``."""
+    """One line of the table of instruments; ``module`` has ``simulate_records(seed) -> Records``."""
 
     name: str
     help: str
@@ -34,5 +34,5 @@ class Instrument:
 
     def records(self, seed: int) -> Records:
         """Its files for one seed."""
-        found: Records = importlib.import_module(self.module).records(seed)
+        found: Records = importlib.import_module(self.module).simulate_records(seed)
         return found

@@ -2,11 +2,11 @@
 
 A study lives in a package of its own:
 
-``run``     ``run(..., step) -> result`` takes what the study takes, by name, and calls ``step`` after each of the
-            ``steps(...)`` it announced; ``verdicts(result) -> lines``, where there is a verdict. The result is a dict
-            of plain values for JSON with ``experiment`` (the name its files get) and ``cases`` (rows of the main
-            table); ``traces`` holds arrays for figures and is neither printed nor kept.
-``figure``  ``figures(result) -> {file name without suffix: figure}``, where there is something to draw.
+``run``     ``run_study(..., step) -> result`` takes what the study takes, by name, and calls ``step`` after each of
+            the ``count_steps(...)`` it announced; ``verdict_lines(result) -> lines``, where there is a verdict. The
+            result is a dict of plain values for JSON with ``experiment`` (the name its files get) and ``cases`` (rows
+            of the main table); ``traces`` holds arrays for figures and is neither printed nor kept.
+``figure``  ``draw_figures(result) -> {file name without suffix: figure}``, where there is something to draw.
 """
 
 from __future__ import annotations
@@ -73,12 +73,12 @@ class Study:
 
     def run(self, given: Mapping[str, Any], step: Callable[[], None]) -> Result:
         """Run it with what was ``given``."""
-        result: Result = self._of("run", "run")(**self.fixed, **given, step=step)
+        result: Result = self._of("run", "run_study")(**self.fixed, **given, step=step)
         return result
 
     def steps(self, given: Mapping[str, Any]) -> int:
         """How often ``step`` will be called."""
-        count: int = self._of("run", "steps")(**self.fixed, **given)
+        count: int = self._of("run", "count_steps")(**self.fixed, **given)
         return count
 
     def told(self, result: Result) -> Result:
@@ -88,12 +88,12 @@ class Study:
     def verdicts(self, result: Result) -> list[str]:
         """Lines below the tables."""
         module = importlib.import_module(f"{self.module}.run")
-        lines: list[str] = module.verdicts(result) if hasattr(module, "verdicts") else []
+        lines: list[str] = module.verdict_lines(result) if hasattr(module, "verdict_lines") else []
         return lines
 
     def figures(self, result: Result) -> dict[str, Any]:
         """Figures by the name of their file."""
-        found: dict[str, Any] = self._of("figure", "figures")(result) if self.drawn else {}
+        found: dict[str, Any] = self._of("figure", "draw_figures")(result) if self.drawn else {}
         return found
 
     def _of(self, module: str, function: str) -> Callable[..., Any]:

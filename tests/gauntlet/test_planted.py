@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from borechain.gauntlet import gauntlet_rig as gauntlet_rig
+from borechain.gauntlet import gauntlet_rig
 from borechain.gauntlet.gauntlet_run import run_seed, shrink_outcome
 from groundstation.errors import StoreError
 from groundstation.service.disk import database

@@ -30,24 +30,24 @@ LONG = {
 STUDY = """
     from groundstation.report.style import new_figure
 
-    def steps(throws):
+    def count_steps(throws):
         return throws
 
-    def run(throws, step):
+    def run_study(throws, step):
         for _ in range(throws):
             step()
         return {"experiment": "coin", "throws": throws, "cases": [{"case": "heads", "published": 0.5, "ours": 0.25}]}
 
-    def verdicts(result):
+    def verdict_lines(result):
         return [f"{result['throws']} throws are few"]
 
-    def figures(result):
+    def draw_figures(result):
         return {"coin": new_figure(2.0, "A coin")}
 """
 INSTRUMENT = """
     from sim.instruments.instrument import Records
 
-    def records(seed):
+    def simulate_records(seed):
         return Records({"plumb.csv": b"angle_deg\\n0\\n"}, {"plumb": {"seed": seed}})
 """
 

@@ -22,7 +22,7 @@ OWN = {
     "day": "load",
     "learn": "load",
     "killed": "load",
-    "hour": "hour",
+    "hour": "hour_command",
 }  # and the module of each
 
 

@@ -1,4 +1,4 @@
-"""``borechain experiment``: every study of the table `sim.studies.study_table` as a command, and the commands about all."""
+"""``borechain experiment``: every study of the table as a command, and the commands about all."""
 
 from __future__ import annotations
 

@@ -158,8 +158,9 @@ def load_tool(name_or_file: str, parameters: Mapping[str, float] | None = None) 
         if found is not None:
             return found
         raise ToolError(
-            f"{name_or_file}: no such instrument; expected one of {', '.join(shipped_tool_names())}, one of the OWSG set such as "
-            "MWD+IFR1+SAG+MS or GYRO-NS-CT (borechain survey --tools), or a .toml or .json file"
+            f"{name_or_file}: no such instrument; expected one of {', '.join(shipped_tool_names())}, "
+            "one of the OWSG set such as MWD+IFR1+SAG+MS or GYRO-NS-CT (borechain survey --tools), "
+            "or a .toml or .json file"
         )
     try:
         text = path.read_text("utf-8")

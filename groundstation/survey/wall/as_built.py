@@ -62,7 +62,8 @@ class Columns:
         states = np.where(finite, ColumnState.SURVEYED, ColumnState.MISSING).astype(np.int8)
         return cls(
             names, depths, centres, np.asarray(covs), designs, np.broadcast_to(designs[:, None, :], centres.shape),
-            states, PlaneErrors.of_planes(covariance_roots(np.asarray(covs))), PlaneErrors.of_planes(np.zeros((*shape, 2, 0))),
+            states, PlaneErrors.of_planes(covariance_roots(np.asarray(covs))),
+            PlaneErrors.of_planes(np.zeros((*shape, 2, 0))),
             np.full(shape, radius), np.zeros(shape),
         )  # fmt: skip
 

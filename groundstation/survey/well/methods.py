@@ -1,8 +1,8 @@
 """Trajectory methods: from measured depth, inclination and azimuth at the ends of a leg to its displacement.
 
 Every leg is D (sin a cos b, sin a sin b, cos c) with angles and lengths that the method defines; all are regular where
-inclination or azimuth does not change. ``leg_displacement`` is written once for scalars (``math``) and for whole wells (``numpy``).
-Frame: north, east, down; rad and m. Source: thesis 2.1-2.3 and Appendix IV.
+inclination or azimuth does not change. ``leg_displacement`` is written once for scalars (``math``) and for whole wells
+(``numpy``). Frame: north, east, down; rad and m. Source: thesis 2.1-2.3 and Appendix IV.
 """
 
 from __future__ import annotations
