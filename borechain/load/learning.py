@@ -105,6 +105,11 @@ class LearningLoad:
             with self._timing("working out the hole then"):
                 self.ground.model.hole.settle()
 
+    def place_alone(self, survey: SurveyMeasurement, md: float) -> None:
+        """One comes by itself, and the hole is worked out after it."""
+        self._take([survey], md)
+        self.ground.model.hole.settle()
+
     def learn_asked(self, surveys: list[SurveyMeasurement], md: float) -> None:
         """Somebody asks after each of them; the first question waits until the hole is worked out."""
         for survey in surveys:

@@ -8,6 +8,7 @@ import pytest
 import sqlalchemy as sa
 from hand_fed import COV, Rig
 
+from borechain.load.placing_calls import CALLS_AT_MOST, TUBES, count_placing_calls
 from telemetry.messages import DepthReading, ImuMean, NodeFlag, Stand, SurveyMeasurement
 from telemetry.presentation.msgpack_codec import encode
 
@@ -92,3 +93,12 @@ def test_a_depth_that_is_doubted_before_the_survey_is_fused_is_taken_back(rig: R
     assert [one.md for one in model.placement.waiting] == [None]
     assert model.newest_row("measurements") == 0
     again.ground.close()
+
+
+@pytest.mark.slow
+def test_one_more_measurement_is_placed_in_three_hundred_calls(tmp_path: Path) -> None:
+    """From the arrival of its message to the hole that is worked out; the last tube of a stop costs as the first."""
+    counts = count_placing_calls(tmp_path)
+    assert len(counts) == TUBES
+    assert max(counts) <= CALLS_AT_MOST == 300
+    assert counts[-1] - min(counts) < 30
