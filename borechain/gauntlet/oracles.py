@@ -10,7 +10,7 @@ from typing import Any
 import msgpack
 
 from borechain.gauntlet.gauntlet_rig import GauntletRig
-from groundstation.service.hole.surveyed_hole import Hole
+from groundstation.service.hole.surveyed_hole import SurveyedHole
 from sim.gauntlet.fault import TUBES
 from sim.gauntlet.faulty_world import TUBE_LENGTH, FaultyWorld
 from sim.rig.report import wrap_deg
@@ -210,7 +210,7 @@ def _directions(rig: GauntletRig) -> Iterator[str]:
             yield f"station at {station['md_m']:.2f} m is {size:.1f} sigmas from the truth"
 
 
-def _flags(hole: Hole) -> Iterator[str]:
+def _flags(hole: SurveyedHole) -> Iterator[str]:
     """Flags have their effects: a faulty sensor's survey is not fused, and an unknown yaw gives no azimuth."""
     for station in hole.stations:
         for stop in station.stops:

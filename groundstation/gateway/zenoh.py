@@ -26,7 +26,7 @@ from groundstation.service.answers.paths import (
 )
 from groundstation.service.answers.revisions import BEATS
 from groundstation.service.answers.views import Parameters
-from groundstation.service.orders.order_book import Order
+from groundstation.service.orders.order_book import SentOrder
 from groundstation.service.process.ground_process import GroundProcess
 from groundstation.service.process.intake_tape import BEGIN, Intake, pack_intake
 from telemetry import keys
@@ -217,7 +217,7 @@ class ZenohGateway:
         self._awaited.add(task)
         task.add_done_callback(self._awaited.discard)
 
-    async def _reply_when_answered(self, query: Query, order: Order) -> None:
+    async def _reply_when_answered(self, query: Query, order: SentOrder) -> None:
         answered = asyncio.Event()
         order.when_answered(answered.set)
         name = order.spec.name

@@ -12,11 +12,11 @@ from borechain.gauntlet import gauntlet_rig
 from borechain.gauntlet.gauntlet_run import run_seed, shrink_outcome
 from groundstation.errors import StoreError
 from groundstation.service.disk import database
-from groundstation.service.disk.keeper import Keeper
+from groundstation.service.disk.keeper import StringKeeper
 from groundstation.service.hole import placement as placement_module
 from groundstation.service.process.ground_process import GroundProcess
 from groundstation.service.process.learner import Learner
-from groundstation.service.string import drill_string as string_module
+from groundstation.service.string import known_string as string_module
 from groundstation.service.string.depth import DepthLog
 from groundstation.service.string.stored import Stored
 from groundstation.survey.fusion.survey_trust import Trust
@@ -105,13 +105,13 @@ def refused_and_receipted(patch: pytest.MonkeyPatch) -> None:
 
 
 def synchronous_below_full(patch: pytest.MonkeyPatch) -> None:
-    plain = database._durable
+    plain = database._make_durable
 
     def not_durable(connection: object, record: object) -> None:
         plain(connection, record)  # type: ignore[arg-type]
         connection.execute("PRAGMA synchronous=NORMAL")  # type: ignore[attr-defined]
 
-    patch.setattr(database, "_durable", not_durable)
+    patch.setattr(database, "_make_durable", not_durable)
 
 
 def boots_not_forced(patch: pytest.MonkeyPatch) -> None:
@@ -126,7 +126,7 @@ def boots_not_forced(patch: pytest.MonkeyPatch) -> None:
 
 
 def order_of_string_not_kept(patch: pytest.MonkeyPatch) -> None:
-    patch.setattr(Keeper, "keep_tally", lambda keeper: None)
+    patch.setattr(StringKeeper, "keep_tally", lambda keeper: None)
 
 
 def receipt_by_number(patch: pytest.MonkeyPatch) -> None:

@@ -11,7 +11,7 @@ from groundstation.config import GroundConfig
 from groundstation.service.answers.model import RigModel
 from groundstation.service.answers.views import node, stations
 from groundstation.service.hole.resolving import force_vars
-from groundstation.service.orders.order_book import Order
+from groundstation.service.orders.order_book import SentOrder
 from groundstation.survey.fusion.resolve import combine_imus
 from node.firmware.imu_settings import ImuSettings
 from node.firmware.inputs import RigContext
@@ -42,7 +42,7 @@ class Bored(Rig):
             self.force[tube] = frame @ force
         super().cycle()
 
-    def ordered(self, **arguments: float | str) -> Order:
+    def ordered(self, **arguments: float | str) -> SentOrder:
         return self.order(1, "align", **arguments)
 
 

@@ -15,7 +15,11 @@ from groundstation.calibration.block import read_calibration
 from groundstation.errors import SelectorError
 from groundstation.service.answers import key_fields
 from groundstation.service.orders.recalibration.procedure import FieldProcedure, Request
-from groundstation.service.orders.recalibration.recalibration_progress import Phase, Progress, Stage
+from groundstation.service.orders.recalibration.recalibration_progress import (
+    RecalibrationProgress,
+    RecalibrationStage,
+    TubePhase,
+)
 from node.kernels.arithmetic.formats import DEG
 from telemetry.messages import BASE, BlockSegment, Reply, StaticRecord
 from telemetry.parameters import ParameterBlock, SensorParameters
@@ -381,8 +385,8 @@ def test_progress_comes_back_from_its_text(rig: Field) -> None:
     rig.collect(PRESETS)
     rig.command("solve")
     progress = rig.ground.model.recalibration.progress
-    assert Progress.from_json(progress.to_json()) == progress
-    assert (progress.stage, progress.tubes[1].phase) == (Stage.SOLVED, Phase.PROPOSED)
+    assert RecalibrationProgress.from_json(progress.to_json()) == progress
+    assert (progress.stage, progress.tubes[1].phase) == (RecalibrationStage.SOLVED, TubePhase.PROPOSED)
     assert rig.ground.store.progress() == progress.to_json()
 
 

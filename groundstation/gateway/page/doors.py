@@ -21,7 +21,7 @@ from groundstation.gateway.page.sessions import Session, Sessions, WrongPassword
 from groundstation.gateway.page.settings import PageSettings
 from groundstation.service.answers.csv_tables import table_of
 from groundstation.service.answers.paths import check_parameters, find
-from groundstation.service.orders.order_book import Order
+from groundstation.service.orders.order_book import SentOrder
 from groundstation.service.process.ground_process import GroundProcess
 from groundstation.service.process.operator_access import check_name
 from telemetry.errors import TelemetryError
@@ -224,7 +224,7 @@ async def give(send: Send, packet: bytes) -> None:
         await send({"type": "http.response.body", "body": packet, "more_body": True})
 
 
-async def answered(order: Order) -> None:
+async def answered(order: SentOrder) -> None:
     """Wait until an order is answered, for a time."""
     done = asyncio.Event()
     order.when_answered(done.set)

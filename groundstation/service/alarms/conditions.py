@@ -7,20 +7,20 @@ from collections.abc import Iterator
 from groundstation.service.alarms.crew_alarms import Condition
 from groundstation.service.alarms.rig_alarms import Level, RigAlarms
 from groundstation.service.alarms.verdict import FINEST_CM
-from groundstation.service.hole.deviation_alarms import Alarm
-from groundstation.service.hole.surveyed_hole import Hole
-from groundstation.service.string.drill_string import DrillString
+from groundstation.service.hole.deviation_alarms import DeviationAlarm
+from groundstation.service.hole.surveyed_hole import SurveyedHole
+from groundstation.service.string.known_string import KnownString
 from groundstation.survey.wall.column_deviation import LEVELS
 
 LEVEL_OF = dict(zip(LEVELS, (Level.NOTICE, Level.DEGRADED, Level.BAD), strict=True))
 
 
-def conditions_of(alarms: RigAlarms, string: DrillString, hole: Hole) -> list[Condition]:
+def conditions_of(alarms: RigAlarms, string: KnownString, hole: SurveyedHole) -> list[Condition]:
     """Everything that stands: one condition a kind of deviation, at the highest level reached."""
     return [*_of_the_rig(alarms, string), *_of_the_column(hole)]
 
 
-def _of_the_rig(alarms: RigAlarms, string: DrillString) -> Iterator[Condition]:
+def _of_the_rig(alarms: RigAlarms, string: KnownString) -> Iterator[Condition]:
     for alarm in alarms:
         kind = alarm.kind
         yield Condition(
@@ -28,8 +28,8 @@ def _of_the_rig(alarms: RigAlarms, string: DrillString) -> Iterator[Condition]:
         )
 
 
-def _of_the_column(hole: Hole) -> Iterator[Condition]:
-    highest: dict[str, Alarm] = {}
+def _of_the_column(hole: SurveyedHole) -> Iterator[Condition]:
+    highest: dict[str, DeviationAlarm] = {}
     for alarm in hole.alarms.active:
         if alarm.kind not in highest or alarm.level > highest[alarm.kind].level:
             highest[alarm.kind] = alarm
@@ -39,7 +39,7 @@ def _of_the_column(hole: Hole) -> Iterator[Condition]:
         yield Condition(kind, "column", LEVEL_OF[alarm.level], detail, alarm.md, alarm.direction, threshold)
 
 
-def _depth_of(string: DrillString, subject: str) -> float | None:
+def _depth_of(string: KnownString, subject: str) -> float | None:
     """Measured depth (m) of the node that an alarm is about."""
     name, _, number = subject.partition(" ")
     md = string.depth_of_node(int(number)) if name == "tube" and number.isdecimal() else None

@@ -7,20 +7,20 @@ from collections.abc import Iterator
 
 from groundstation.config import GroundConfig
 from groundstation.service.alarms.rig_alarms import RigAlarms
-from groundstation.service.alarms.verdict import Doubt, Known
-from groundstation.service.hole.surveyed_hole import Hole
-from groundstation.service.string.drill_string import DrillString
+from groundstation.service.alarms.verdict import Known, VerdictDoubt
+from groundstation.service.hole.surveyed_hole import SurveyedHole
+from groundstation.service.string.known_string import KnownString
 
 BEHIND = 1.5  # tubes by which the deepest survey may be behind the bit
 ALARMS = {
-    "depth_refused": Doubt.DEPTH,
-    "depth_contradicts": Doubt.DEPTH,
-    "depth_silent": Doubt.STALE,
-    "clock": Doubt.CLOCK,
+    "depth_refused": VerdictDoubt.DEPTH,
+    "depth_contradicts": VerdictDoubt.DEPTH,
+    "depth_silent": VerdictDoubt.STALE,
+    "clock": VerdictDoubt.CLOCK,
 }
 
 
-def known_of(config: GroundConfig, string: DrillString, hole: Hole, alarms: RigAlarms) -> Known:
+def known_of(config: GroundConfig, string: KnownString, hole: SurveyedHole, alarms: RigAlarms) -> Known:
     """What is known of the way of the hole."""
     design = config.design
     worst = hole.deviations.worst(first=1)
@@ -32,12 +32,14 @@ def known_of(config: GroundConfig, string: DrillString, hole: Hole, alarms: RigA
         projection=hole.projection if worst is not None else None,
         doubts=(
             *_doubts_of_time(string, alarms, config.stale_after),
-            *_doubts(string, hole, alarms, BEHIND * config.tube_length),
+            *_doubts_of_surveys(string, hole, alarms, BEHIND * config.tube_length),
         ),
     )
 
 
-def _doubts(string: DrillString, hole: Hole, alarms: RigAlarms, behind: float) -> Iterator[tuple[Doubt, str]]:
+def _doubts_of_surveys(
+    string: KnownString, hole: SurveyedHole, alarms: RigAlarms, behind: float
+) -> Iterator[tuple[VerdictDoubt, str]]:
     """What is doubtful of depth and surveys; the deepest may be ``behind`` the bit (m)."""
     for alarm in alarms:
         if alarm.kind.code in ALARMS:
@@ -47,20 +49,20 @@ def _doubts(string: DrillString, hole: Hole, alarms: RigAlarms, behind: float) -
         return
     deepest, bit = stations[-1], string.bit
     if bit is not None and bit - deepest.md > behind:
-        yield Doubt.STALE, f"the bit is at {bit:.1f} m, the deepest survey at {deepest.md:.1f} m"
+        yield VerdictDoubt.STALE, f"the bit is at {bit:.1f} m, the deepest survey at {deepest.md:.1f} m"
     if not deepest.is_trusted:
-        yield Doubt.YAW, f"the yaw of the survey at {deepest.md:.1f} m is untrusted"
+        yield VerdictDoubt.YAW, f"the yaw of the survey at {deepest.md:.1f} m is untrusted"
 
 
-def _doubts_of_time(string: DrillString, alarms: RigAlarms, stale_after: float) -> Iterator[tuple[Doubt, str]]:
+def _doubts_of_time(string: KnownString, alarms: RigAlarms, stale_after: float) -> Iterator[tuple[VerdictDoubt, str]]:
     """Silence is judged by when messages arrive."""
     if not string.time.is_known:
-        yield Doubt.CLOCK, "rig time is not known: the encoder is not heard"
+        yield VerdictDoubt.CLOCK, "rig time is not known: the encoder is not heard"
     if string.bit is None:
-        yield Doubt.DEPTH, "no depth of the bit is known"
+        yield VerdictDoubt.DEPTH, "no depth of the bit is known"
     elif string.depth_age > stale_after and not alarms.stands("depth_silent", "depth"):
-        yield Doubt.STALE, "no reading of the depth comes"
+        yield VerdictDoubt.STALE, "no reading of the depth comes"
     if silent := string.silent:
-        yield Doubt.STALE, f"silent: tube{'s' if len(silent) > 1 else ''} {', '.join(map(str, silent))}"
+        yield VerdictDoubt.STALE, f"silent: tube{'s' if len(silent) > 1 else ''} {', '.join(map(str, silent))}"
     elif not string.tubes:
-        yield Doubt.STALE, "no tube has been heard"
+        yield VerdictDoubt.STALE, "no tube has been heard"

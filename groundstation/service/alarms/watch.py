@@ -5,12 +5,12 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 
+from groundstation.service.alarms.encoder_cross_check import OFF_BEFORE, EncoderCrossCheck
 from groundstation.service.alarms.rig_alarms import RigAlarms
-from groundstation.service.alarms.witnesses import OFF_BEFORE, Witnesses
 from groundstation.service.hole.placement import UNTRUSTED, Placement
-from groundstation.service.hole.surveyed_hole import Hole
+from groundstation.service.hole.surveyed_hole import SurveyedHole
 from groundstation.service.string.depth import CONTRADICTION
-from groundstation.service.string.drill_string import DrillString
+from groundstation.service.string.known_string import KnownString
 from groundstation.service.string.message_numbers import Range
 from groundstation.survey.fusion.joint_angles import Pair, RestingYaw
 from groundstation.survey.fusion.shared_scale import shared_scale
@@ -54,7 +54,7 @@ class Watch:
     """
 
     def __init__(
-        self, string: DrillString, hole: Hole, placement: Placement, alarms: RigAlarms, stale_after: float
+        self, string: KnownString, hole: SurveyedHole, placement: Placement, alarms: RigAlarms, stale_after: float
     ) -> None:
         self._string, self._hole, self._placement = string, hole, placement
         self._time, self._states, self._alarms = string.time, string.states, alarms
@@ -64,7 +64,7 @@ class Watch:
         self._refused_in_a_row = 0
         self._contradictions = 0
         self._gaps: dict[int, Gap] = {}
-        self._witnesses = Witnesses()
+        self._witnesses = EncoderCrossCheck()
         self._told_unplaced: set[int] = set()  # tubes
         self._depth_due = math.inf  # s, own clock, since when tubes are known and a depth may be expected
 
@@ -106,7 +106,7 @@ class Watch:
         elif event.code == CODE:
             self._alarms.alert(CODE, tube, refusal_of(event.arguments))
         elif event.code == "joint_contradicts_marks":
-            angle, marks = (_number(event, name) for name in ("angle_deg", "marks_deg"))
+            angle, marks = (_event_number(event, name) for name in ("angle_deg", "marks_deg"))
             what = f"its angle by the yaws is {angle:.1f} deg, by its marks {marks:.1f} deg"
             self._alarms.alert("joint", f"joint above {tube}", f"{what}; see the command accept_joints")
 
@@ -275,7 +275,7 @@ class Watch:
                 self._alarms.hold("survey_missing", subject, f"tubes {missing}" if missing else "")
 
 
-def _number(event: Event, name: str) -> float:
+def _event_number(event: Event, name: str) -> float:
     """An argument of an event; NaN where it is none, for somebody may have made the event up."""
     value = event.arguments.get(name)
     return float(value) if isinstance(value, int | float) else math.nan

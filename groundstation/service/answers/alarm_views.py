@@ -7,10 +7,10 @@ from typing import Any
 
 from groundstation.service.alarms.crew_alarms import HOUR, CrewAlarm
 from groundstation.service.alarms.rig_alarms import RigAlarm
-from groundstation.service.alarms.verdict import wind
+from groundstation.service.alarms.verdict import compass_point
 from groundstation.service.answers.model import RigModel
 from groundstation.service.answers.views import finite, utc_text
-from groundstation.service.hole.deviation_alarms import Alarm
+from groundstation.service.hole.deviation_alarms import DeviationAlarm
 from groundstation.survey.wall.column_deviation import LEVELS
 
 View = dict[str, Any]
@@ -56,7 +56,7 @@ def rig_alarm_view(a: RigAlarm) -> View:
     }
 
 
-def alarm_view(a: Alarm) -> View:
+def alarm_view(a: DeviationAlarm) -> View:
     """One alarm with the threshold it passed."""
     return {
         "kind": a.kind,
@@ -83,7 +83,7 @@ def crew_alarm_view(k: RigModel, a: CrewAlarm) -> View:
         "threshold": what.threshold,
         "md_m": None if what.md is None else round(what.md, 2),
         "azimuth_deg": None if what.direction is None else round(math.degrees(what.direction)) % 360,
-        "wind": None if what.direction is None else wind(what.direction),
+        "wind": None if what.direction is None else compass_point(what.direction),
         "since_s": finite(a.since),
         "since_utc": utc_text(a.since_utc),
         "times": a.times,

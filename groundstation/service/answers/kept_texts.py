@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Hashable
 
 from groundstation.service.answers.row_texts import RowTexts
-from groundstation.service.hole.surveyed_hole import Hole
+from groundstation.service.hole.surveyed_hole import SurveyedHole
 
 
 class KeptTexts:
@@ -20,7 +20,7 @@ class KeptTexts:
     measurements : rows of every measurement
     """
 
-    def __init__(self, hole: Hole) -> None:
+    def __init__(self, hole: SurveyedHole) -> None:
         self.measurements = RowTexts(marks=2)
         self._hole = hole
         self._shown: dict[Hashable, tuple[int, bytes]] = {}

@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from groundstation.service.alarms.crew_alarms import State
+from groundstation.service.alarms.crew_alarms import AlarmState
 from groundstation.service.alarms.rig_alarms import KINDS, Health, Level
-from groundstation.service.alarms.verdict import WINDS, Doubt, Word
+from groundstation.service.alarms.verdict import WINDS, VerdictDoubt, Word
 from groundstation.service.answers.answer_fields import (
     Fields,
     group,
@@ -19,7 +19,7 @@ from groundstation.service.answers.answer_fields import (
     truth,
 )
 from groundstation.service.orders.order_book import OrderState
-from groundstation.service.orders.recalibration.recalibration_progress import Phase, Stage
+from groundstation.service.orders.recalibration.recalibration_progress import RecalibrationStage, TubePhase
 from groundstation.survey.fusion.survey_trust import Trust
 from groundstation.survey.wall.as_built import ColumnState
 from telemetry.messages import Mode, NodeFlag, Severity
@@ -80,7 +80,7 @@ VERDICT: Fields = (
     text("line", "all of it in a line"),
     text("todo", "what to do, in a line"),
     texts("why", "what it rests on, or why nobody knows"),
-    texts("doubts", "why nobody knows, as words", *(doubt.value for doubt in Doubt)),
+    texts("doubts", "why nobody knows, as words", *(doubt.value for doubt in VerdictDoubt)),
     number("bit_md_m", "measured depth of the bit", null=True),
     number("target_m", "length of the design axis"),
     text("what", "which deviation decided", "deviation", "projection", null=True),
@@ -323,7 +323,7 @@ RIG_ALARM: Fields = (
 )
 CREW_ALARM: Fields = (
     integer("number", "of the alarm, never used twice"),
-    text("state", "", *State),
+    text("state", "", *AlarmState),
     text("code", "kind: of the rig's, or deviation, projection", *(k.code for k in KINDS), "deviation", "projection"),
     text("level", "how much it matters", *(level.name.lower() for level in Level)),
     text("subject", "what it is about"),
@@ -366,7 +366,7 @@ ALARMS: Fields = (
 )
 SENSOR: Fields = (numbers("matrix", "row = sensor axis", 2), numbers("bias_mps2", "at the reference temperature"))
 RECALIBRATION: Fields = (
-    text("state", "", *Stage),
+    text("state", "", *RecalibrationStage),
     text("proposal", "hash to confirm"),
     rows(
         "attitudes",
@@ -382,7 +382,7 @@ RECALIBRATION: Fields = (
         "tubes",
         (
             TUBE,
-            text("phase", "", *Phase),
+            text("phase", "", *TubePhase),
             text("detail", "why it is refused, or what is missing"),
             integer("records", "at rest so far"),
             integer("asked", "records asked for"),

@@ -12,10 +12,10 @@ from groundstation.service.answers.kept_texts import KeptTexts
 from groundstation.service.answers.revisions import Revisions
 from groundstation.service.hole.live_wall import LiveWall
 from groundstation.service.hole.placement import Placement
-from groundstation.service.hole.surveyed_hole import Hole
+from groundstation.service.hole.surveyed_hole import SurveyedHole
 from groundstation.service.orders.order_book import OrderBook
 from groundstation.service.orders.recalibration.procedure import FieldProcedure
-from groundstation.service.string.drill_string import DrillString
+from groundstation.service.string.known_string import KnownString
 from groundstation.survey.fusion.shared import SharedErrors
 
 
@@ -27,8 +27,8 @@ class RigModel:
     """
 
     config: GroundConfig
-    string: DrillString
-    hole: Hole
+    string: KnownString
+    hole: SurveyedHole
     placement: Placement
     rig_alarms: RigAlarms
     crew_alarms: CrewAlarms
@@ -47,8 +47,8 @@ class RigModel:
         SurveyError
             When the wall of its configuration cannot be read.
         """
-        string, shared = DrillString(config), SharedErrors()
-        hole = Hole(config, shared)
+        string, shared = KnownString(config), SharedErrors()
+        hole = SurveyedHole(config, shared)
         return cls(
             config=config,
             string=string,

@@ -7,7 +7,7 @@ from typing import Any
 
 from groundstation.errors import SelectorError
 from groundstation.service.answers.model import RigModel
-from groundstation.service.orders.order_book import Order
+from groundstation.service.orders.order_book import SentOrder
 from telemetry.application.arguments import shown_values
 
 View = dict[str, Any]
@@ -26,7 +26,7 @@ def order(k: RigModel, number: int) -> View:
     return order_view(found)
 
 
-def order_view(order: Order) -> View:
+def order_view(order: SentOrder) -> View:
     """One order; ``values`` are what the table of commands promises."""
     return {
         "order": order.number,

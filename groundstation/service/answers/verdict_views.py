@@ -5,7 +5,14 @@ from __future__ import annotations
 import math
 from typing import Any
 
-from groundstation.service.alarms.verdict import FINEST_CM, Verdict, Word, direction, judge, wind
+from groundstation.service.alarms.verdict import (
+    FINEST_CM,
+    HoleVerdict,
+    Word,
+    compass_point,
+    deviation_azimuth,
+    judge_hole,
+)
 from groundstation.service.alarms.verdict_doubts import known_of
 from groundstation.service.answers.model import RigModel
 from groundstation.service.answers.rounding import rounded, rounded_std
@@ -25,7 +32,7 @@ PHRASES = {
 def verdict(k: RigModel, _p: dict[str, str]) -> View:
     """The verdict of this moment."""
     known = known_of(k.config, k.string, k.hole, k.rig_alarms)
-    found = judge(known)
+    found = judge_hole(known)
     way = None if found.about is None or found.act_before is None else steer(found.about, found)
     return {
         "rig": k.config.rig,
@@ -52,23 +59,23 @@ def off(d: Deviation) -> View:
         "sigma_cm": rounded_std(CM * d.std),
         "limit_cm": round(CM * d.limit, 1),
         "used_percent": round(100.0 * d.ratio) if math.isfinite(d.ratio) else None,
-        "azimuth_deg": round(math.degrees(direction(d))) % 360,
-        "wind": wind(direction(d)),
+        "azimuth_deg": round(math.degrees(deviation_azimuth(d))) % 360,
+        "wind": compass_point(deviation_azimuth(d)),
     }
 
 
-def steer(d: Deviation, found: Verdict) -> View:
+def steer(d: Deviation, found: HoleVerdict) -> View:
     """Where to, and until when."""
-    back = direction(d) + math.pi
+    back = deviation_azimuth(d) + math.pi
     return {
         "azimuth_deg": round(math.degrees(back)) % 360,
-        "wind": wind(back),
+        "wind": compass_point(back),
         "before_md_m": None if found.act_before is None else round(found.act_before, 1),
         "left_m": None if found.left is None else round(found.left, 1),
     }
 
 
-def line(found: Verdict) -> str:
+def line(found: HoleVerdict) -> str:
     """The verdict as one line for a screen."""
     phrase, d = PHRASES[found.word], found.about
     if found.word is Word.DONT_KNOW:
@@ -79,8 +86,8 @@ def line(found: Verdict) -> str:
     size = rounded(CM * d.size, spread) if spread >= 1.0 else CM * d.size  # rounded once, as it is written
     is_end = found.what == "projection"
     where = "ends" if is_end else f"at {d.md:.1f} m"
-    said = f"{phrase}: {where} {size:.1f} ± {spread:.1f} cm at {round(math.degrees(direction(d))) % 360} deg"
-    said += f" {wind(direction(d))}; limit {CM * d.limit:.0f} ({100.0 * d.ratio:.0f} %)"
+    said = f"{phrase}: {where} {size:.1f} ± {spread:.1f} cm at {round(math.degrees(deviation_azimuth(d))) % 360} deg"
+    said += f" {compass_point(deviation_azimuth(d))}; limit {CM * d.limit:.0f} ({100.0 * d.ratio:.0f} %)"
     if found.act_before is None or found.left is None or found.word is Word.OUT:
         return said
     return f"{said}; act " + (f"before {found.act_before:.1f} m" if found.left > 0.0 else "at once")

@@ -15,7 +15,7 @@ from groundstation.errors import SelectorError, SurveyError
 from groundstation.service.answers.model import RigModel
 from groundstation.service.answers.streamed_rows import STREAMED, window
 from groundstation.service.hole.station import SurveyStation
-from groundstation.service.hole.surveyed_hole import Hole
+from groundstation.service.hole.surveyed_hole import SurveyedHole
 from groundstation.survey.fusion.resolve import angle_stds_of_all, direction_angles
 from groundstation.survey.well.trajectory import TrajectoryPoint, interpolate_point
 from telemetry.messages import Event, NodeFlag, NodeState, StaticRecord
@@ -162,7 +162,7 @@ def station_rows(k: RigModel, numbers: Sequence[int]) -> list[View]:
     return [{"station": n, "md_m": round(s.md, 6)} | (s.shown or {}) | position for n, s, position in rows]
 
 
-def direction_views(hole: Hole, chosen: Sequence[SurveyStation]) -> list[View]:
+def direction_views(hole: SurveyedHole, chosen: Sequence[SurveyStation]) -> list[View]:
     """Directions of stations and what each is made of."""
     if not chosen:
         return []

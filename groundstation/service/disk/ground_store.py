@@ -43,7 +43,7 @@ from groundstation.service.disk.database_tables import (
     WHOLE_STRING,
     add_new,
 )
-from groundstation.service.string.depth import NEVER, Doubt, Instant
+from groundstation.service.string.depth import NEVER, DepthDoubt, Instant
 from groundstation.service.string.stored import Stored
 from groundstation.survey.fusion.joint_angles import JointAngle, Pair
 from telemetry.errors import DecodeError
@@ -139,23 +139,23 @@ class Store(Database):
         with self._writing() as connection:
             self._replace_meta(connection, {"epoch": str(epoch)})
 
-    def keep_depth_doubt(self, doubt: Doubt) -> None:
+    def keep_depth_doubt(self, doubt: DepthDoubt) -> None:
         """Store since when depths are refused, when the crew accepted one, and of which times none is believed."""
-        values = {"depth_accepted": _numbers(*doubt.accepted)}
+        values = {"depth_accepted": _join_numbers(*doubt.accepted)}
         if doubt.trusted is not None:
-            values["depth_trusted"] = _numbers(*doubt.trusted)
+            values["depth_trusted"] = _join_numbers(*doubt.trusted)
         if doubt.times:
-            values["depth_doubted"] = "; ".join(_numbers(*astuple(stand)) for stand in doubt.times)
+            values["depth_doubted"] = "; ".join(_join_numbers(*astuple(stand)) for stand in doubt.times)
         with self._writing() as connection:
             self._replace_meta(connection, values, without=["depth_trusted", "depth_doubted"])
 
-    def depth_doubt(self) -> Doubt:
+    def depth_doubt(self) -> DepthDoubt:
         """What was kept last of what is doubtful of the depth."""
         with self._refusing():
             meta = self._meta()
         trusted, accepted, times = (meta.get(f"depth_{name}") for name in ("trusted", "accepted", "doubted"))
         try:
-            return Doubt(
+            return DepthDoubt(
                 None if trusted is None else _reading_of(trusted),
                 NEVER if accepted is None else _instant_of(accepted),
                 () if times is None else tuple(map(_stand_of, times.split(";"))),
@@ -252,7 +252,7 @@ class Store(Database):
         return found
 
 
-def _numbers(*values: float) -> str:
+def _join_numbers(*values: float) -> str:
     return " ".join(map(repr, values))
 
 

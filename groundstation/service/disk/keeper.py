@@ -6,7 +6,7 @@ import contextlib
 
 from groundstation.errors import StoreError
 from groundstation.service.disk.ground_store import Store
-from groundstation.service.string.drill_string import DrillString
+from groundstation.service.string.known_string import KnownString
 from groundstation.service.string.stands import take_stand
 from telemetry.messages import DepthReading, Stand
 
@@ -16,7 +16,7 @@ def refusing_disk() -> contextlib.suppress:
     return contextlib.suppress(StoreError)
 
 
-class Keeper:
+class StringKeeper:
     """Keeps what is known of a string, and starts it with what was kept.
 
     Parameters
@@ -25,7 +25,7 @@ class Keeper:
     string : new; it goes on with what the store holds of it
     """
 
-    def __init__(self, store: Store, string: DrillString) -> None:
+    def __init__(self, store: Store, string: KnownString) -> None:
         self._store, self._string = store, string
         self._stand: Stand | None = None  # that was kept last
         string.time.epoch = store.epoch()

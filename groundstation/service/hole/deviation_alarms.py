@@ -16,7 +16,7 @@ CLEARED_BELOW = 0.02  # of the tolerance, under a level
 
 
 @dataclass(frozen=True, slots=True)
-class Alarm:
+class DeviationAlarm:
     """One level of one kind."""
 
     kind: str  # deviation or projection
@@ -34,10 +34,10 @@ class AlarmList:
     """Every alarm raised so far."""
 
     def __init__(self) -> None:
-        self.alarms: list[Alarm] = []
+        self.alarms: list[DeviationAlarm] = []
 
     @property
-    def active(self) -> list[Alarm]:
+    def active(self) -> list[DeviationAlarm]:
         """Alarms not cleared."""
         return [alarm for alarm in self.alarms if alarm.cleared_at is None]
 
@@ -51,7 +51,9 @@ class AlarmList:
             known = standing.get(level)
             if known is None and ratio >= level:
                 direction = math.atan2(deviation.offset[1], deviation.offset[0]) % math.tau
-                new = Alarm(kind, level, at, deviation.md, deviation.size, deviation.std, deviation.limit, direction)
+                new = DeviationAlarm(
+                    kind, level, at, deviation.md, deviation.size, deviation.std, deviation.limit, direction
+                )
                 self.alarms.append(new)
                 changed = True
             elif known is not None and ratio < level - CLEARED_BELOW:

@@ -7,8 +7,8 @@ from collections.abc import Sequence
 
 from groundstation.config import GroundConfig
 from groundstation.service.hole.resolving import Found, Resolver
-from groundstation.service.hole.surveyed_hole import Hole
-from groundstation.service.string.drill_string import DrillString
+from groundstation.service.hole.surveyed_hole import SurveyedHole
+from groundstation.service.string.known_string import KnownString
 from groundstation.service.string.stored import Stored
 from groundstation.survey.fusion.shared import SharedErrors
 from groundstation.survey.fusion.survey_trust import Trust, trust_of
@@ -36,7 +36,7 @@ class Placement:
     refused : measurements with invalid numbers
     """
 
-    def __init__(self, config: GroundConfig, string: DrillString, hole: Hole, shared: SharedErrors) -> None:
+    def __init__(self, config: GroundConfig, string: KnownString, hole: SurveyedHole, shared: SharedErrors) -> None:
         mount_var = math.radians(config.mount_std_deg) ** 2
         bias_std = math.radians(config.accelerometer_bias_std_deg) * config.gravity
         self._string, self._hole = string, hole

@@ -53,7 +53,7 @@ class PlacedStop(NamedTuple):
     station: SurveyStation
 
 
-class Hole:
+class SurveyedHole:
     """Every measurement of a hole that was placed, and what follows from them.
 
     Parameters

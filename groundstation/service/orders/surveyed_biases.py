@@ -8,7 +8,7 @@ from collections.abc import Collection, Iterator, Mapping
 import numpy as np
 
 from groundstation.config import SENSOR_BIAS_DEG, GroundConfig
-from groundstation.service.hole.surveyed_hole import Hole
+from groundstation.service.hole.surveyed_hole import SurveyedHole
 from groundstation.survey.fusion.force_biases import Look, SurveyedBiases, look_of, solve_biases
 from groundstation.survey.fusion.survey_trust import Trust
 from telemetry.messages import NodeState
@@ -17,7 +17,7 @@ GRAVITY_STD = 2e-3  # m/s^2, of what is entered for the site
 
 
 def surveyed_biases(
-    config: GroundConfig, hole: Hole, states: Mapping[int, NodeState], mixed: Collection[int]
+    config: GroundConfig, hole: SurveyedHole, states: Mapping[int, NodeState], mixed: Collection[int]
 ) -> SurveyedBiases:
     """What all surveys that count tell; those of tubes that get no block help to know the stations.
 
@@ -27,13 +27,13 @@ def surveyed_biases(
     mixed : tubes whose block was replaced after a survey of the hole
     """
     bias_std = math.radians(max(config.accelerometer_bias_std_deg, SENSOR_BIAS_DEG)) * config.gravity
-    looks = list(_looks(hole, config.gravity))
+    looks = list(_looks_of_hole(hole, config.gravity))
     found = solve_biases(looks, bias_std, GRAVITY_STD)
     refused = {tube: reason for tube in found if (reason := _why_not(hole, tube, states.get(tube), mixed))}
     return SurveyedBiases({tube: one for tube, one in found.items() if tube not in refused}, refused)
 
 
-def _looks(hole: Hole, gravity: float) -> Iterator[Look]:
+def _looks_of_hole(hole: SurveyedHole, gravity: float) -> Iterator[Look]:
     for station in hole.stations:
         if station.md <= 0.0:
             continue  # at the collar tubes may be anywhere
@@ -46,7 +46,7 @@ def _looks(hole: Hole, gravity: float) -> Iterator[Look]:
             yield look_of(where, stop.tube, stop, (stop.causes, stop.places), force, var, yaw, gravity)
 
 
-def _why_not(hole: Hole, tube: int, state: NodeState | None, mixed: Collection[int]) -> str:
+def _why_not(hole: SurveyedHole, tube: int, state: NodeState | None, mixed: Collection[int]) -> str:
     """Why the bias of a tube makes no block; empty where it does."""
     if state is not None and state.alignment[2] > 0.0:
         return "it is aligned, and another block would drop that"

@@ -17,12 +17,12 @@ from groundstation.service.alarms.watch import Watch
 from groundstation.service.answers.model import RigModel
 from groundstation.service.answers.revisions import BEATS
 from groundstation.service.disk.ground_store import Store
-from groundstation.service.disk.keeper import Keeper, refusing_disk
-from groundstation.service.orders.order_book import Order
+from groundstation.service.disk.keeper import StringKeeper, refusing_disk
+from groundstation.service.orders.order_book import SentOrder
 from groundstation.service.orders.uploads import Uploads
 from groundstation.service.process.intake_tape import DEPTH, MESSAGE, ORDER, TIMER, Tape
 from groundstation.service.process.learner import Learner
-from groundstation.service.process.operator_access import BlockUpload, Operator, Outgoing
+from groundstation.service.process.operator_access import BlockUpload, OperatorAccess, Outgoing
 from telemetry.application.endpoint import Endpoint
 from telemetry.application.seal_watch import SealWatch, refusal_of
 from telemetry.errors import DecodeError
@@ -119,9 +119,9 @@ class GroundProcess(Process):
         self._early: deque[DepthReading] = deque(maxlen=EARLY)
         self._beat_at = -math.inf
         self._plane = -1  # of the wall, that the bit has passed last
-        self._keeper = Keeper(self.store, model.string)
+        self._keeper = StringKeeper(self.store, model.string)
         self._learner = Learner(self.store, model, self.watch, self._keeper)
-        self.operator = Operator(config, self.model, self.store, self._uploads, start)
+        self.operator = OperatorAccess(config, self.model, self.store, self._uploads, start)
         self.operator.changed = self._publish
         self.operator.ended = self.endpoint.mail.withdraw
         self.operator.accepted = self._note_order
@@ -283,7 +283,7 @@ class GroundProcess(Process):
             return  # the tube is not known yet; the gap stays
         order.when_answered(lambda: self._on_resent(order))
 
-    def _on_resent(self, order: Order) -> None:
+    def _on_resent(self, order: SentOrder) -> None:
         values = order.values
         if order.done and order.tube is not None:
             sent, complete_from = int(str(values.get("sent", 0))), int(str(values.get("complete_from", 0)))

@@ -10,8 +10,8 @@ from groundstation.errors import StoreError
 from groundstation.service.alarms.watch import Watch
 from groundstation.service.answers.model import RigModel
 from groundstation.service.disk.ground_store import Store
-from groundstation.service.disk.keeper import Keeper
-from groundstation.service.hole.deviation_alarms import Alarm
+from groundstation.service.disk.keeper import StringKeeper
+from groundstation.service.hole.deviation_alarms import DeviationAlarm
 from groundstation.service.hole.resolving import Found
 from groundstation.service.string.stored import Stored
 from telemetry.messages import Event, Kept, StaticRecord, SurveyMeasurement
@@ -31,12 +31,16 @@ class Learner:
     keeper : of the order of the string, by which surveys are placed
     """
 
-    def __init__(self, store: Store, model: RigModel, watch: Watch, keeper: Keeper) -> None:
+    def __init__(self, store: Store, model: RigModel, watch: Watch, keeper: StringKeeper) -> None:
         self._store, self._watch, self._keeper = store, watch, keeper
         self._string, self._hole, self._placement = model.string, model.hole, model.placement
         self._orders, self._recalibration = model.orders, model.recalibration
         self._arrived: list[Stored[Kept]] = []  # since the last transaction
-        self._known: tuple[list[Alarm], int, int] = ([], 0, 0)  # alarms of the hole, moves and stops that were told
+        self._known: tuple[list[DeviationAlarm], int, int] = (
+            [],
+            0,
+            0,
+        )  # alarms of the hole, moves and stops that were told
         self._by_survey = CHANGED_BY_SURVEY if model.wall is None else (*CHANGED_BY_SURVEY, "wall")
 
     def take(self, message: Kept) -> None:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import replace
 
 from groundstation.service.string.depth import DepthLog
-from groundstation.service.string.stops import Stops, belongs
+from groundstation.service.string.stops import Stops, is_in_stand
 from telemetry.messages import Stand
 
 FIRST_EPOCH = 1  # of rig time: an encoder that has never started before
@@ -38,5 +38,5 @@ def take_stand(depths: DepthLog, stops: Stops, told: Stand) -> None:
 def take_survey(depths: DepthLog, stops: Stops, epoch: int, at: float) -> None:
     """The first stand that is known is a stop where a survey was taken in it (s): nobody heard how it began."""
     for first in depths.stands[:1]:
-        if belongs(first, epoch, at):
+        if is_in_stand(first, epoch, at):
             stops.on_stand(first)

@@ -58,7 +58,7 @@ class Stop:
 
     def covers(self, stand: Stand) -> bool:
         """Whether a stand is a part of the stop."""
-        return any(_covers(whole, stand) for whole in (self.stand, *self.later))
+        return any(_stand_covers(whole, stand) for whole in (self.stand, *self.later))
 
     def age(self, epoch: int, rig_now: float) -> float:
         """Seconds from its begin to ``rig_now`` (s) of an epoch, fewer where rig time began anew; infinite after it."""
@@ -125,7 +125,7 @@ class Stops:
 
     def know(self, stand: Stand) -> bool:
         """Whether a stand is that of a stop, or more of it."""
-        return any(_same(stop.stand, stand) for stop in self._stops)
+        return any(_is_same_stop(stop.stand, stand) for stop in self._stops)
 
     def is_too_short(self, stand: Stand) -> bool:
         """Whether a stand is that of a stop, or a part of it, in which no survey was owed."""
@@ -137,7 +137,7 @@ class Stops:
 
     def on_stand(self, stand: Stand) -> None:
         """A stand has begun, or lasted longer; the tubes are those that are known to hang while it lasts."""
-        known = next((stop for stop in reversed(self._stops) if _same(stop.stand, stand)), None)
+        known = next((stop for stop in reversed(self._stops) if _is_same_stop(stop.stand, stand)), None)
         if known is not None:
             known.stand = stand
             self._add_tubes(known)
@@ -173,15 +173,15 @@ class Stops:
             stop.tubes = tuple(dict.fromkeys((*stop.tubes, *self._tally.tubes_below(IN_THE_HOLE, stop.stand.md))))
 
 
-def belongs(stand: Stand, epoch: int, at: float) -> bool:
+def is_in_stand(stand: Stand, epoch: int, at: float) -> bool:
     """Whether a survey was taken during a stand."""
     return epoch == stand.epoch and stand.begun_at - AROUND <= at <= stand.ended_at + AROUND
 
 
-def _covers(whole: Stand, stand: Stand) -> bool:
+def _stand_covers(whole: Stand, stand: Stand) -> bool:
     is_within = whole.begun_at <= stand.begun_at and stand.ended_at <= whole.ended_at
     return (whole.epoch, whole.md) == (stand.epoch, stand.md) and is_within
 
 
-def _same(one: Stand, other: Stand) -> bool:
+def _is_same_stop(one: Stand, other: Stand) -> bool:
     return (one.epoch, one.md) == (other.epoch, other.md) and one.begun_at <= other.ended_at >= one.ended_at

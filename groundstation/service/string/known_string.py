@@ -7,7 +7,7 @@ from collections.abc import Sequence
 
 from groundstation.config import GroundConfig
 from groundstation.service.string.depth import DepthLog
-from groundstation.service.string.message_numbers import Numbers
+from groundstation.service.string.message_numbers import MessageNumbers
 from groundstation.service.string.node_states import NodeStates
 from groundstation.service.string.numbered_rows import NumberedRows
 from groundstation.service.string.rig_time import RigTime
@@ -24,7 +24,7 @@ ABOVE_COLLAR = 0.01  # m, of rounding; a node higher up is in no hole
 ALL_HEARD_WITHIN = 2.0  # s after the last tube that was new, of tubes that speak
 
 
-class DrillString:
+class KnownString:
     """What is known of the string; each part of it is a subject of its own.
 
     Parameters
@@ -48,7 +48,7 @@ class DrillString:
         self.states = NodeStates(self.time, config.stale_after)
         self.depths = DepthLog(config.depth_rate, config.depth_gap)
         self.stops = Stops(self.tally, config.survey_after)
-        self.numbers = Numbers()
+        self.numbers = MessageNumbers()
         self.joints = JointAngles()
         self.events: NumberedRows[Event] = NumberedRows(EVENTS_KEPT)
         self.static_records: NumberedRows[StaticRecord] = NumberedRows(STATIC_RECORDS_KEPT)
