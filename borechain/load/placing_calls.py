@@ -9,6 +9,7 @@ from __future__ import annotations
 import contextlib
 import sys
 from collections.abc import Callable, Iterator
+from functools import partial
 from pathlib import Path
 from types import FrameType
 from typing import Any
@@ -32,7 +33,7 @@ def count_placing_calls(folder: Path) -> list[int]:
     load = LearningLoad(config, TUBES, BEGUN_AT + ROUND_S * (STOPS + 1))
     with contextlib.closing(load.ground):
         md = depth_of(TUBES, ADVANCES)
-        return [_count_calls(lambda m=m: load.place_alone(m, md)) for m in load.drill(STOPS + 1, md)]
+        return [_count_calls(partial(load.place_alone, m, md)) for m in load.drill(STOPS + 1, md)]
 
 
 def _count_calls(act: Callable[[], None]) -> int:

@@ -64,7 +64,7 @@ class Watch:
         self._refused_in_a_row = 0
         self._contradictions = 0
         self._gaps: dict[int, Gap] = {}
-        self._witnesses = EncoderCrossCheck()
+        self._cross_check = EncoderCrossCheck()
         self._told_unplaced: set[int] = set()  # tubes
         self._depth_due = math.inf  # s, own clock, since when tubes are known and a depth may be expected
 
@@ -115,7 +115,7 @@ class Watch:
 
         One that the disk refuses is judged each time it comes: its warning must not wait for room on a disk.
         """
-        if against := self._witnesses.on_event(event, self._heard):
+        if against := self._cross_check.on_event(event, self._heard):
             self._alarms.alert("reference", "encoder", against)
 
     def on_measurement(self, measurement: SurveyMeasurement, outcome: str) -> None:
@@ -197,7 +197,7 @@ class Watch:
             self._alarms.hold("numbers_missing", f"tube {tube}", f"numbers {numbers[0]} to {numbers[1]}")
             state = self._states.newest.get(tube)
             doubts = state is not None and state.systematic_var >= DOUBTING_VAR
-            if against := self._witnesses.on_lost(tube, numbers, self._heard, doubts=doubts):
+            if against := self._cross_check.on_lost(tube, numbers, self._heard, doubts=doubts):
                 self._alarms.alert("reference", "encoder", against)
         return known
 
@@ -227,7 +227,7 @@ class Watch:
         if not self._string.knows_tubes:
             return  # a tube that ran all the while may not have been heard yet
         lately = [tube for tube in self._string.tubes if self._states.age(tube) <= OFF_BEFORE]
-        if nobody := self._witnesses.look(self._time.epoch, self._time.rig_now, lately):
+        if nobody := self._cross_check.look(self._time.epoch, self._time.rig_now, lately):
             self._alarms.alert("reference", "encoder", nobody)
 
     def _look_at_belt(self) -> None:
