@@ -1,4 +1,4 @@
-"""From messages to the model: stored first, all that came together at once, then learnt in their order."""
+"""From messages to what is known: stored first, all that came together at once, then learnt in their order."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ class Learner:
     store : open
     model : whose parts learn
     watch : that is told of it
-    keeper : of the order of the string, by which surveys are placed
+    keeper : of the order of the string, by which measurements are placed
     """
 
     def __init__(self, store: Store, model: RigModel, watch: Watch, keeper: StringKeeper) -> None:
@@ -36,15 +36,12 @@ class Learner:
         self._string, self._hole, self._placement = model.string, model.hole, model.placement
         self._orders, self._recalibration = model.orders, model.recalibration
         self._arrived: list[Stored[Kept]] = []  # since the last transaction
-        self._known: tuple[list[DeviationAlarm], int, int] = (
-            [],
-            0,
-            0,
-        )  # alarms of the hole, moves and stops that were told
+        # alarms of the hole, moves and stops of the string that were told
+        self._known: tuple[list[DeviationAlarm], int, int] = ([], 0, 0)
         self._by_survey = CHANGED_BY_SURVEY if model.wall is None else (*CHANGED_BY_SURVEY, "wall")
 
     def take(self, message: Kept) -> None:
-        """A message has come; it is stored with those that come beside it, a survey with the depth that it has now."""
+        """A message has come, to be stored with those that come beside it, a measurement with the depth it has now."""
         md = below = None
         if isinstance(message, SurveyMeasurement):
             below = self._string.length_below(message)
@@ -54,10 +51,10 @@ class Learner:
     def learn_arrived(self) -> tuple[list[Kept], list[str]]:
         """Store and learn what came together; returns what is on the disk now, to be acknowledged, and changed paths.
 
-        What was stored already changes nothing; what is not stored is not acknowledged, and comes again. A survey is
-        fused at the next reading or look, with all that came meanwhile and in their order: whether a reading brackets
-        its time already is a matter of a millisecond. Where one does, as nearly always, its row needs no second
-        transaction.
+        What was stored already changes nothing; what is not stored is not acknowledged, and comes again. A measurement
+        is fused at the next reading or look, with all that came meanwhile and in their order: whether a reading
+        brackets its time already is a matter of a millisecond. Where one does, as nearly always, its row needs no
+        second transaction.
         """
         if not self._arrived:
             return [], []  # as nearly always: it is asked after every event
@@ -113,7 +110,7 @@ class Learner:
     def find_consequences(self) -> list[str]:
         """Work out the hole, and return the paths of what changed with it: alarms of deviations, stops that ended.
 
-        Surveys come one by one, tube by tube: to be asked at every look, and not for each of them.
+        Measurements come one by one, tube by tube: to be asked at every look, and not for each of them.
         """
         hole = self._hole
         before, self._known = self._known, (list(hole.alarms.alarms), len(hole.moved), hole.history.count)
