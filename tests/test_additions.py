@@ -1,4 +1,4 @@
-"""A command, a medium, a study and an instrument are added by what they are and one line in a table.
+"""A command, a medium, a study, an instrument, an answer and a field are added by what they are and a line in a table.
 
 The additions are written into a copy of the packages, into the files that docs/architecture.md names and no others.
 """
@@ -30,6 +30,7 @@ class Addition:
     line: str
     files: dict[str, str]
     named: str  # how the row names the file or folder of what is added
+    imports: str = ""  # that the line needs
 
 
 COMMAND = Addition(
@@ -71,7 +72,7 @@ STUDY = Addition(
             "coin",
             "Whether a coin is fair.",
             f"{MODULES}.coin",
-            (ResultTable("{throws} throws", (("case", "case"), ("ours", "ours")), (("case", "case"), ("ours", "ours"))),),
+            (ResultTable("{throws} throws", (("case",) * 2, ("ours",) * 2), (("case",) * 2, ("ours",) * 2)),),
             (Option("throws", 4, 1, 10),),
             drawn=False,
         ),
@@ -107,7 +108,48 @@ def simulate_records(seed):
     },
     named="simulate_records(seed)",
 )
-ADDITIONS = (COMMAND, MEDIUM, STUDY, INSTRUMENT)
+ANSWER = Addition(
+    row="an answer of the ground station",
+    table="groundstation/service/answers/answer_table.py",
+    head="    for answer in (\n",
+    line='        AnswerKey("mud", MudAnswer, "the mud that comes back; ?tube=3", ("tube",), on_page=True),\n',
+    files={
+        "groundstation/service/answers/shapes/mud_shapes.py": """
+from typing import Annotated
+
+from groundstation.service.answers.shapes.answer_fields import OneOf, answer_class
+
+
+@answer_class
+class MudAnswer:
+    \"\"\"The mud that comes back.\"\"\"
+
+    colour: Annotated[str | None, "as it is seen", OneOf("grey", "brown")]
+    weights: Annotated[list[float], "of the samples"]
+""",
+        "groundstation/service/answers/string_views.py": """
+
+from groundstation.service.answers.shapes.mud_shapes import MudAnswer
+
+
+@view_of(MudAnswer)
+def answer_mud(k: RigModel, p: Parameters) -> MudAnswer:
+    \"\"\"The mud that comes back.\"\"\"
+    return MudAnswer("grey", [1.0, float(p.get("tube", 2))])
+""",
+    },
+    named="groundstation/service/answers/shapes",
+    imports="from groundstation.service.answers.shapes.mud_shapes import MudAnswer\n",
+)
+FIELD = Addition(
+    row="a field of an answer",
+    table="groundstation/service/answers/shapes/column_shapes.py",
+    head="    steer: Steer | None\n",
+    line='    mud_c: Annotated[float, "temperature of the mud"] = 12.5\n',
+    files={},
+    named="groundstation/service/answers/verdict_views.py",
+)
+ADDITIONS = (COMMAND, MEDIUM, STUDY, INSTRUMENT, ANSWER, FIELD)
 
 
 def add(folder: Path, addition: Addition) -> None:
@@ -117,7 +159,8 @@ def add(folder: Path, addition: Addition) -> None:
     if head.endswith("by_name(\n"):  # the list opens on one of the next lines
         opening, bracket, after = after.partition("[\n")
         head += opening + bracket
-    path.write_text(before + head + addition.line + after)
+    future = "from __future__ import annotations\n"
+    path.write_text(before.replace(future, future + addition.imports, 1) + head + addition.line + after)
     for name, text in addition.files.items():
         (folder / name).parent.mkdir(exist_ok=True)
         with (folder / name).open("a") as file:
@@ -130,6 +173,7 @@ def copy(tmp_path_factory: pytest.TempPathFactory) -> Path:
     folder = tmp_path_factory.mktemp("copy")
     for package in PACKAGES:
         shutil.copytree(ROOT / package, folder / package, ignore=shutil.ignore_patterns("__pycache__"))
+    shutil.copytree(ROOT / "docs", folder / "docs", ignore=shutil.ignore_patterns("decisions", "results", "*.png"))
     for addition in ADDITIONS:
         add(folder, addition)
     return folder
@@ -215,3 +259,66 @@ def test_an_added_instrument_writes_its_records(copy: Path) -> None:
         print(records.files["plumb.csv"], records.truth)
     """))  # fmt: skip
     assert out == "b'angle_deg\\n0\\n' {'plumb': {'seed': 3}}\n"
+
+
+DESCRIBED = """
+    import json, pathlib, sys, tempfile
+    sys.path.insert(0, "docs")
+    import make_asyncapi, make_page_types, make_tables
+    from borechain.client import AnsweredVerdict, shape_answer
+    from groundstation.config import GroundConfig
+    from groundstation.gateway.page.openapi import openapi_document
+    from groundstation.service.answers.model import RigModel
+    from groundstation.service.answers.paths import find_path
+
+    model = RigModel.begin(GroundConfig(folder=pathlib.Path(tempfile.mkdtemp())))
+    def answered(path, **parameters):
+        return json.loads(find_path(model, path).json(model, parameters))
+"""
+
+
+def test_an_added_field_is_wherever_its_answer_is_described(copy: Path) -> None:
+    """JSON, schema, OpenAPI, AsyncAPI, docs/keys.md, client and page's type, from one line in the class."""
+    out = run(copy, "-c", program(DESCRIBED) + program("""
+        verdict, schemas = answered("verdict"), answered("schema")["schemas"]
+        asked = openapi_document("1")["paths"]["/api/verdict"]["get"]["responses"]["200"]["content"]["application/json"]
+        told = make_asyncapi.document()["components"]["messages"]["verdict"]["payload"]
+        print(json.dumps({
+            "json": verdict["mud_c"],
+            "schemas": [schemas["verdict"], asked["schema"], told],
+            "page": make_tables.answers(),
+            "client": shape_answer(AnsweredVerdict, verdict).mud_c,
+            "types": make_page_types.types_text(),
+        }))
+    """))  # fmt: skip
+    found = json.loads(out)
+    assert (found["json"], found["client"]) == (12.5, 12.5)
+    for schema in found["schemas"]:
+        assert schema["properties"]["mud_c"] == {"type": "number", "description": "temperature of the mud"}
+        assert "mud_c" in schema["required"]
+    assert "| `mud_c` | number | temperature of the mud |" in found["page"]
+    assert "  /** temperature of the mud */\n  mud_c: number;\n" in found["types"]
+
+
+def test_an_added_answer_is_asked_for_followed_and_described(copy: Path) -> None:
+    out = run(copy, "-c", program(DESCRIBED) + program("""
+        print(json.dumps({
+            "json": [answered("mud"), answered("mud", tube="3")],
+            "schema": answered("schema")["schemas"]["mud"],
+            "parameters": openapi_document("1")["paths"]["/api/mud"]["get"]["parameters"],
+            "channel": make_asyncapi.document()["channels"]["mud"]["address"],
+            "heard": "hear_mud" in make_asyncapi.document()["operations"],
+            "keys": make_tables.key_table(),
+            "types": make_page_types.types_text(),
+        }))
+    """))  # fmt: skip
+    found = json.loads(out)
+    assert [answer["weights"] for answer in found["json"]] == [[1.0, 2.0], [1.0, 3.0]]
+    assert list(found["json"][0]) == ["revision", "utc", "rig_time_s", "colour", "weights"]
+    colour = {"anyOf": [{"type": "string", "enum": ["grey", "brown"]}, {"type": "null"}]}
+    assert found["schema"]["properties"]["colour"] == colour | {"description": "as it is seen"}
+    assert [parameter["name"] for parameter in found["parameters"]] == ["tube"]
+    assert (found["channel"], found["heard"]) == ("borechain/{rig}/ground/mud", True)
+    assert "| `borechain/{rig}/ground/mud` | query, publish | the mud that comes back; ?tube=3 |" in found["keys"]
+    assert '  colour: "grey" | "brown" | null;\n' in found["types"]
+    assert "  mud: AnswerHeader & MudAnswer;\n" in found["types"]

@@ -32,6 +32,7 @@ FORBIDDEN = [
     ("groundstation/service/orders/order_book.py", "import asyncio"),
     ("groundstation/service/string/tally.py", "import groundstation.service.hole.history"),
     ("groundstation/service/process/ground_process.py", "import telemetry.media.zenoh_bus"),
+    ("groundstation/service/answers/shapes/wall_shapes.py", "import groundstation.service.answers.model"),
     ("telemetry/application/clock.py", "import zenoh"),
     ("borechain/cli/shared_options.py", "import can"),
     ("node/kernels/record/filter_record.py", "import msgpack"),

@@ -18,7 +18,7 @@ from borechain.load.page import ASK_EVERY_S, GROUND, HEARD_WITHIN_S, RIG, ROUNDI
 from borechain.load.patience import wait_for
 from borechain.load.readers import CONNECT_S, read_lines
 from groundstation.config import checked_config
-from groundstation.gateway.page.settings import PageSettings
+from groundstation.gateway.page.page_settings import PageSettings
 from groundstation.host import run_ground
 from groundstation.service.disk.ground_store import Store
 from groundstation.service.string.stored import Stored

@@ -12,6 +12,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from groundstation.config import GroundConfig
+from groundstation.service.answers.answer_texts import plain_answer
 from groundstation.service.answers.measurement_views import measurement_rows
 from groundstation.service.answers.model import RigModel
 from groundstation.service.hole.resolved_stops import ResolvedStop, ResolvedStops
@@ -108,7 +109,7 @@ def test_what_is_shown_of_many_surveys_is_what_each_of_them_says() -> None:
     ]
     known = [one.stop(0) for one in found]
     rows = [table.append_stop(one, 0) for one in found]
-    shown = measurement_rows(table, rows[::-1], [3, 1, 1, 2, 9])
+    shown = plain_answer(measurement_rows(table, rows[::-1], [3, 1, 1, 2, 9]))
     for view, one, station in zip(shown, known[::-1], (3, 1, 1, 2, 9), strict=True):
         inclination, azimuth = direction_angles(one.lean, one.down)
         stds = angle_stds(one.lean, one.down, one.total_cov)

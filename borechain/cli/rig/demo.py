@@ -18,7 +18,7 @@ from telemetry import keys
 from telemetry.runtime.process_options import insecure_option, secure_endpoint
 
 if TYPE_CHECKING:
-    from groundstation.gateway.page.settings import PageSettings
+    from groundstation.gateway.page.page_settings import PageSettings
     from telemetry.media.zenoh_bus import ZenohBus
 
 SCENARIO = Path("demo")
@@ -51,14 +51,14 @@ def demo(page: str, speed: float, endpoint: str, rounds: int | None) -> None:
       borechain demo --speed 2 --page 127.0.0.1:8090
     """
     from borechain.rig_host import opened_router
-    from groundstation.gateway.page.settings import listen
+    from groundstation.gateway.page.page_settings import open_page_socket
     from sim.rig.launcher import check_port_free
     from sim.world.shipped import find_scenario
 
     settings = page_settings(page, None, None)
     if settings is None:
         return
-    listen(settings).close()
+    open_page_socket(settings).close()
     check_port_free(endpoint)
     served = page_with_password(settings)
     click.echo(f"open {served.url} in a browser; Ctrl-C ends the demonstration")

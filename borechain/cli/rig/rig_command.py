@@ -36,7 +36,7 @@ from telemetry import keys
 from telemetry.runtime.process_options import insecure_option, keys_option, secure_endpoint
 
 if TYPE_CHECKING:
-    from groundstation.gateway.page.settings import PageSettings
+    from groundstation.gateway.page.page_settings import PageSettings
     from sim.rig.launcher import Tick
     from sim.rig.processes import ProcessTable
     from sim.rig.scheduler import Progress
@@ -232,11 +232,11 @@ def check_page(page: PageSettings, *, inline: bool) -> None:
     PageError
         When its port is taken.
     """
-    from groundstation.gateway.page.settings import listen
+    from groundstation.gateway.page.page_settings import open_page_socket
 
     if inline:
         raise InputFault("--page: expected a rig of processes with it; nothing can be asked with --inline")
-    listen(page).close()
+    open_page_socket(page).close()
 
 
 def page_with_password(page: PageSettings) -> PageSettings:

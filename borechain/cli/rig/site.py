@@ -12,7 +12,7 @@ from borechain.cli.rig.rig_command import RigJob, drill_job, page_with_password
 
 if TYPE_CHECKING:
     from borechain.crew.log import RunLog
-    from groundstation.gateway.page.settings import PageSettings
+    from groundstation.gateway.page.page_settings import PageSettings
     from sim.world.scenario import Scenario
     from telemetry.media.zenoh_bus import ZenohBus
 

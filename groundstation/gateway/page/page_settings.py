@@ -79,7 +79,7 @@ def check_certificate(certificate: Path, key: Path) -> None:
         ) from error
 
 
-def listen(page: PageSettings) -> socket.socket:
+def open_page_socket(page: PageSettings) -> socket.socket:
     """Listening socket of the page.
 
     Raises

@@ -15,11 +15,11 @@ from typing import Any
 import orjson
 
 from groundstation.errors import SelectorError
-from groundstation.service.answers.paths import is_of_the_hole
+from groundstation.service.answers.answer_table import find_answer
+from groundstation.service.answers.paths import answered_paths
 from groundstation.service.process.ground_process import HEARTBEAT, GroundProcess
 
-PATHS = ("status", "verdict", "string", "column", "history", "uncertainty", "wall", "alarms", "orders")
-NODES, VERDICT = "nodes/", "verdict"
+VERDICT = "verdict"
 BEATS_MISSED = 2  # after which a ground station that is asked is not taken for live
 GATHER_S = 0.1  # for which changes are gathered into one packet
 
@@ -83,8 +83,9 @@ class Hub:
     def join(self) -> Reader:
         """A reader that is given the whole picture first; a verdict only if it is of this moment."""
         is_live = self._is_replay or time.monotonic() <= self._beat_at + BEATS_MISSED * HEARTBEAT
-        paths = PATHS if is_live else tuple(path for path in PATHS if path != VERDICT)
-        reader = Reader((*paths, *(f"{NODES}{tube}" for tube in sorted(self._process.model.string.states.newest))))
+        known = answered_paths(self._process.model)
+        followed = [path for path, one in known.items() if one.answer.on_page and (is_live or path != VERDICT)]
+        reader = Reader(followed)
         self._readers.add(reader)
         return reader
 
@@ -106,7 +107,7 @@ class Hub:
         if VERDICT in paths:
             self._beat_at = time.monotonic()
         for path in paths:
-            if path in PATHS or path.startswith(NODES):
+            if find_answer(path).on_page:
                 self._rendered.pop(path, None)
                 for reader in self._readers:
                     reader.note(path)
@@ -118,12 +119,12 @@ class Hub:
             answer = self._process.operator.ask_json(path)
         except SelectorError:
             return b""
-        rendered = event("answer", {"path": path, "answer": orjson.Fragment(answer)})
-        if not is_of_the_hole(path):  # what shows a long hole is long, and its text is kept already
+        rendered = server_sent_event("answer", {"path": path, "answer": orjson.Fragment(answer)})
+        if not find_answer(path).of_the_hole:  # what shows a long hole is long, and its text is kept already
             self._rendered[path] = rendered
         return rendered
 
 
-def event(kind: str, content: dict[str, Any]) -> bytes:
+def server_sent_event(kind: str, content: dict[str, Any]) -> bytes:
     """One server-sent event."""
     return b"event: %s\ndata: %s\n\n" % (kind.encode(), orjson.dumps(content))

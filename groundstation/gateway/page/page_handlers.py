@@ -13,14 +13,14 @@ from starlette.responses import JSONResponse, Response
 from starlette.types import Receive, Scope, Send
 
 from groundstation.errors import GroundError, SelectorError
-from groundstation.gateway.page.guard import RequestError, check_origin, json_body, text_of
-from groundstation.gateway.page.hub import Hub, event
+from groundstation.gateway.page.answer_hub import Hub, server_sent_event
+from groundstation.gateway.page.page_settings import PageSettings
 from groundstation.gateway.page.passwords import DRILLER, LONGEST, is_right
-from groundstation.gateway.page.reports import Reporter
-from groundstation.gateway.page.sessions import Session, Sessions, WrongPasswords, is_from
-from groundstation.gateway.page.settings import PageSettings
+from groundstation.gateway.page.reports import ReportTypesetter
+from groundstation.gateway.page.request_guard import RequestError, check_origin, json_body, text_of
+from groundstation.gateway.page.sessions import OperatorSession, Sessions, WrongPasswords, is_from
 from groundstation.service.answers.csv_tables import table_of
-from groundstation.service.answers.paths import check_parameters, find
+from groundstation.service.answers.paths import check_parameters, find_path
 from groundstation.service.orders.order_book import SentOrder
 from groundstation.service.process.ground_process import GroundProcess
 from groundstation.service.process.operator_access import check_name
@@ -36,7 +36,7 @@ CSRF = "x-csrf-token"
 Handler = Callable[[Request], Awaitable[Response]]
 
 
-class Doors:
+class PageHandlers:
     """Handlers of the page's addresses, all on the loop that drives the ground station.
 
     Parameters
@@ -52,7 +52,7 @@ class Doors:
         self._process, self._page, self._hub, self._build = process, page, hub, build
         self._sessions = Sessions()
         self._wrong = WrongPasswords()
-        self._reporter = Reporter(process.model, version)
+        self._reporter = ReportTypesetter(process.model, version)
         self._one_at_a_time = asyncio.Lock()  # hashes cost memory and a core
 
     async def answer(self, request: Request) -> Response:
@@ -61,7 +61,7 @@ class Doors:
         path = request.path_params["path"]
         parameters = dict(request.query_params)
         try:
-            found = find(self._process.model, path)
+            found = find_path(self._process.model, path)
             check_parameters([found], parameters)
             return Response(found.json(self._process.model, parameters), media_type="application/json")
         except SelectorError as error:
@@ -73,7 +73,7 @@ class Doors:
         path, model = request.path_params["path"], self._process.model
         parameters = dict(request.query_params)
         try:
-            found = find(model, path)
+            found = find_path(model, path)
             check_parameters([found], parameters)
             text = table_of(path, found.fields, found.show(model, parameters))
         except SelectorError as error:
@@ -91,14 +91,14 @@ class Doors:
         """``POST /api/cmd/NAME``: order something; ``?wait=true`` answers when the tube has."""
         session = self._check_driller(request)
         content = await json_body(request)
-        parameters = {name: shown(name, value) for name, value in content.items()}
+        parameters = {name: parameter_text(name, value) for name, value in content.items()}
         parameters.pop("by", None)
         try:
             order = self._process.operator.order(request.path_params["name"], parameters, session.name)
         except (GroundError, TelemetryError) as error:
             raise RequestError(400, str(error)) from error
         if request.query_params.get("wait") == "true":
-            await answered(order)
+            await await_answer(order)
         status = 200 if order.answered else 202
         return JSONResponse(self._process.operator.ask(f"orders/{order.number}"), status)
 
@@ -144,10 +144,12 @@ class Doors:
         try:
             headers = [(b"content-type", b"text/event-stream"), (b"cache-control", b"no-store")]
             await send({"type": "http.response.start", "status": 200, "headers": headers})
-            await give(send, b"retry: 1000\n\n" + event("hello", self._hello()) + self._hub.packet(reader.take()))
+            await send_chunk(
+                send, b"retry: 1000\n\n" + server_sent_event("hello", self._hello()) + self._hub.packet(reader.take())
+            )
             while not reader.is_closed:
                 changed = await reader.changes(SILENCE_S)
-                await give(send, self._hub.packet(changed) or b": nothing new\n\n")
+                await send_chunk(send, self._hub.packet(changed) or b": nothing new\n\n")
             await send({"type": "http.response.body", "body": b"", "more_body": False})
         except TimeoutError:
             self._process.endpoint.counters["slow_readers"] += 1  # its connection is ended by who keeps them
@@ -160,7 +162,7 @@ class Doors:
         names = {"rig": config.rig, "hole": config.hole, "replay": self._page.replay}
         return names | {"start": start, "build": self._build}
 
-    def _shown(self, session: Session | None) -> dict[str, Any]:
+    def _shown(self, session: OperatorSession | None) -> dict[str, Any]:
         return {
             "role": None if session is None else session.role,
             "name": None if session is None else session.name,
@@ -188,14 +190,14 @@ class Doors:
         times = "" if row == 1 else f", {row} in a row"
         raise RequestError(401, f"wrong password or role{times}; the next try is looked at in {hold:.0f} s")
 
-    def _session_of(self, request: Request) -> Session | None:
+    def _session_of(self, request: Request) -> OperatorSession | None:
         return self._sessions.find(request.cookies.get(COOKIE), time.monotonic())
 
     def _check_reader(self, request: Request) -> None:
         if not self._page.is_local and self._session_of(request) is None:
             raise RequestError(401, "sign in to read: this page can be reached over a network")
 
-    def _check_signed(self, request: Request) -> Session:
+    def _check_signed(self, request: Request) -> OperatorSession:
         check_origin(request)
         session = self._session_of(request)
         if session is None:
@@ -204,7 +206,7 @@ class Doors:
             raise RequestError(403, f"expected the header {CSRF} of this session")
         return session
 
-    def _check_driller(self, request: Request) -> Session:
+    def _check_driller(self, request: Request) -> OperatorSession:
         session = self._check_signed(request)
         if session.role != DRILLER:
             raise RequestError(403, f"the role {session.role} reads; expected a session of the role {DRILLER}")
@@ -218,13 +220,13 @@ async def gone_reader(receive: Receive, close: Callable[[], None]) -> None:
     close()
 
 
-async def give(send: Send, packet: bytes) -> None:
+async def send_chunk(send: Send, packet: bytes) -> None:
     """Send a part of a stream; TimeoutError where nobody takes it."""
     async with asyncio.timeout(SLOW_S):
         await send({"type": "http.response.body", "body": packet, "more_body": True})
 
 
-async def answered(order: SentOrder) -> None:
+async def await_answer(order: SentOrder) -> None:
     """Wait until an order is answered, for a time."""
     done = asyncio.Event()
     order.when_answered(done.set)
@@ -235,7 +237,7 @@ async def answered(order: SentOrder) -> None:
         return
 
 
-def shown(name: str, value: object) -> str:
+def parameter_text(name: str, value: object) -> str:
     """A parameter as an operator writes it.
 
     Raises
@@ -255,7 +257,7 @@ def address_of(request: Request) -> str:
 def is_known(process: GroundProcess, path: str) -> bool:
     """Whether there is an answer of this path, so that its parameters are what is wrong."""
     try:
-        find(process.model, path)
+        find_path(process.model, path)
     except SelectorError:
         return False
     return True

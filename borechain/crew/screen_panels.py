@@ -24,7 +24,7 @@ LEVEL_STYLES = {GRAVE: "bold red", SERIOUS: "yellow"}
 QUIET, OLD = "bright_black", "reverse bright_black"
 
 
-def header(picture: Picture, now: float) -> Text:
+def header_panel(picture: Picture, now: float) -> Text:
     """One line: which hole, how fresh, how deep, what stands."""
     status, verdict = picture.status, picture.verdict(now)
     live = f"live {picture.age(now):.1f}s" if picture.is_live(now) else "NOT LIVE"
@@ -32,20 +32,20 @@ def header(picture: Picture, now: float) -> Text:
     depth = f"MD {'-' if bit is None else f'{bit:.1f}'}/{'-' if target is None else f'{target:.1f}'} m"
     health, tubes = status.get("health", "-"), status.get("tubes", 0)
     line = f"HOLE {picture.rig} * {live}  {depth}  tubes {tubes}  health {health}  alarms {len(picture.alarms)}"
-    return fitted(line, "bold" if picture.is_live(now) else OLD)
+    return fit_line(line, "bold" if picture.is_live(now) else OLD)
 
 
-def verdict(picture: Picture, now: float) -> Text:
+def verdict_panel(picture: Picture, now: float) -> Text:
     """Three lines: the word and the numbers, what to do, why."""
     found = picture.verdict(now)
     style = STYLES[found["verdict"]]
     lines = [found["line"], found["todo"], "; ".join(found["why"])]
     if found["verdict"] == "dont_know" and found["by_surveys"] != "dont_know":
         lines[1] = f"the surveys alone said {found['by_surveys'].replace('_', ' ')}; do not count on it"
-    return Text("\n").join(fitted(f" {line}", style) for line in lines)
+    return Text("\n").join(fit_line(f" {line}", style) for line in lines)
 
 
-def plan(picture: Picture) -> Text:
+def plan_panel(picture: Picture) -> Text:
     """Seen from above: tolerance ring at the target, way of the hole, where it ends."""
     column = picture.answers.get("column")
     grid = [[" "] * PLAN_WIDTH for _ in range(PLAN_HEIGHT)]
@@ -75,7 +75,7 @@ def plan(picture: Picture) -> Text:
     return Text("\n".join("".join(row) for row in grid))
 
 
-def strip(picture: Picture) -> Text:
+def strip_panel(picture: Picture) -> Text:
     """Deviation over depth against the tolerance, the newest depths; marks at 50 and 80 percent."""
     column = picture.answers.get("column")
     rows = [] if column is None else column["stations"][1:][-(PLAN_HEIGHT - 2) :]
@@ -98,12 +98,12 @@ def strip_row(row: View, mark: str) -> Text:
     return Text(f"{name} |{''.join(bar)}|{used:4.0f}%".ljust(STRIP_WIDTH), style)
 
 
-def string(picture: Picture) -> Text:
+def string_panel(picture: Picture) -> Text:
     """A row a tube from the top down, grey where nothing is wrong; of a long string the tubes that are not well.
 
     Below it the joints with the neighbours, where the hole is a column of a wall.
     """
-    below = wall(picture)
+    below = wall_lines(picture)
     room = PLAN_HEIGHT - 1 - len(below)
     lines = [Text("tube yaw deg sigma age mode", "bold")]
     nodes = picture.nodes
@@ -114,7 +114,7 @@ def string(picture: Picture) -> Text:
     return Text("\n").join([*lines, *(tube_row(node) for node in nodes), *below])
 
 
-def wall(picture: Picture) -> list[Text]:
+def wall_lines(picture: Picture) -> list[Text]:
     """The joints with the neighbours, the worst first, two at most; none where there is no wall."""
     found = picture.answers.get("wall", {}).get("wall")
     if found is None:
@@ -145,7 +145,7 @@ def tube_row(node: View) -> Text:
     return Text(f"{node['tube']:3d} {node['yaw_deg']:6.1f} {node['sigma_yaw_deg']:5.2f} {age} {mode}", style)
 
 
-def alarms(picture: Picture, chosen: int, rows: int) -> Text:
+def alarms_panel(picture: Picture, chosen: int, rows: int) -> Text:
     """Open alarms, the worst first; the chosen one is marked."""
     found = picture.alarms
     load = picture.answers.get("alarms", {})
@@ -168,14 +168,14 @@ def alarm_row(alarm: View, *, is_chosen: bool) -> Text:
     state = f"ack {alarm['acknowledged_by']}" if alarm["state"] == "acknowledged" else alarm["state"]
     line = f"{'>' if is_chosen else ' '}{alarm['number']:3d} {state} {alarm['code']}{subject}{where}{way}"
     style = LEVEL_STYLES.get(alarm["level"], "") if alarm["state"] in ("raised", "latched") else QUIET
-    return fitted(f"{line}: {alarm['detail']}{threshold}", style)
+    return fit_line(f"{line}: {alarm['detail']}{threshold}", style)
 
 
-def actions(picture: Picture, rows: int) -> Text:
+def actions_panel(picture: Picture, rows: int) -> Text:
     """What was ordered here and what became of it, else the newest orders of anybody."""
     lines = [Text("ACTIONS", "bold")]
     course = picture.done[-(rows - 1) :] or [order_line(order) for order in picture.orders[-(rows - 1) :]]
-    return Text("\n").join([*lines, *(fitted(line, "") for line in course)])
+    return Text("\n").join([*lines, *(fit_line(line, "") for line in course)])
 
 
 def order_line(order: View) -> str:
@@ -186,7 +186,7 @@ def order_line(order: View) -> str:
     return f"{order['by']}: {order['command']}{action}{whom} {order['state']}{detail}"
 
 
-def fitted(line: str, style: str) -> Text:
+def fit_line(line: str, style: str) -> Text:
     """A line of exactly the width of the screen; what does not fit is cut with a mark."""
     shown = line if len(line) <= WIDTH else f"{line[: WIDTH - 1]}~"
     return Text(shown.ljust(WIDTH), style)
