@@ -13,7 +13,7 @@ station makes of it.
 Errors::
 
     ClientError
-    ├── NoAnswerError(TimeoutError)   nobody answered in time: is the ground station running, is the rig's name right?
+    ├── NoAnswerError(TimeoutError)   no answer in time: is the ground station running, is the rig's name right?
     ├── RefusedError(ValueError)      the ground station said what is wrong with the question or the order
     └── AnswerError(ValueError)       the answer lacks something that this version knows: the two do not fit
 """
@@ -69,7 +69,7 @@ class ClientError(BorechainError):
 
 
 class NoAnswerError(ClientError, TimeoutError):
-    """Nobody answered in time."""
+    """No answer came in time."""
 
 
 class RefusedError(ClientError, ValueError):

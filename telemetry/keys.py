@@ -53,14 +53,14 @@ TABLE: Final[tuple[Key, ...]] = (
     Key(
         INTAKE,
         "query, publish",
-        "everything that the ground station takes in, where somebody listens: for recordings (msgpack); ?since=17",
+        "everything that the ground station takes in, where there is a listener: for recordings (msgpack); ?since=17",
     ),
     Key(COMMAND, "query", "operator command to the ground station; the reply is its outcome"),
 )
 
 
 def is_order(selector: str) -> bool:
-    """Whether a selector orders something of the ground station."""
+    """Return whether a selector is an order to the ground station."""
     return selector.split("?", maxsplit=1)[0].split("/")[2:3] == ["cmd"]
 
 

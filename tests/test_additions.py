@@ -204,7 +204,7 @@ def test_the_guide_names_the_files(addition: Addition) -> None:
 def test_a_tube_obeys_an_added_command_and_its_ranges_hold(copy: Path) -> None:
     out = run(copy, "-c", program("""
         import pathlib, sys, tempfile
-        from node.firmware.settings import TubeSettings
+        from node.firmware.tube_settings import TubeSettings
         from node.process.command_handlers import CommandHandlers
         from node.process.tube_process import TubeProcess
         from telemetry.application.arguments import parse_parameters

@@ -10,7 +10,7 @@ if TYPE_CHECKING:
     from telemetry.parameters import SensorParameters
 
 
-def cluster(
+def imu_settings_of(
     sources: int,
     noises: tuple[float, ...],
     offsets_mm: tuple[tuple[float, float], ...],
@@ -26,7 +26,7 @@ def cluster(
     CalibrationError
         When a file is not a calibration of its sensor.
     """
-    from node.errors import ConfigurationError
+    from node.errors import NodeConfigurationError
     from node.firmware.imu_settings import ImuSettings
 
     given = {
@@ -39,7 +39,7 @@ def cluster(
     counts = {name: count for name, count in given.items() if count}
     if len(set(counts.values())) > 1:
         told = ", ".join(f"--{name} {count} times" for name, count in counts.items())
-        raise ConfigurationError(f"imus: expected as many of each option as there are IMUs, got {told}")
+        raise NodeConfigurationError(f"imus: expected as many of each option as there are IMUs, got {told}")
     count = max(counts.values(), default=1)
     rows = zip(
         [(1e-3 * x, 1e-3 * y) for x, y in offsets_mm or ((0.0, 0.0),) * count],

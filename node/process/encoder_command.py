@@ -66,7 +66,7 @@ def encoder(
     """
     from node.firmware.torque import TorqueSettings
     from node.process.drivers.choice import encoder_source
-    from node.process.host import run_encoder
+    from node.process.node_host import run_encoder
     from telemetry.messages import ENCODER, Side
     from telemetry.runtime.hosting import OwnTime, Place, chosen_media
 

@@ -8,7 +8,7 @@ from typing import Literal
 
 import click
 
-from node.process.cluster_options import cluster
+from node.process.cluster_options import imu_settings_of
 from telemetry.runtime.command_line import check_installed, plain_faults
 from telemetry.runtime.process_options import (
     above_option,
@@ -44,10 +44,10 @@ SCHEMES = ("forward", "estimate", "intersection")
 )
 @click.option(
     "--kernel",
-    type=click.Choice(["float64", "fixed", "published"]),
+    type=click.Choice(["float64", "fixed"]),
     default="float64",
     show_default=True,
-    help="Filter in floating point, in integers, or in its published form (for comparison only).",
+    help="Filter in floating point or in integers.",
 )
 @click.option(
     "--scheme",
@@ -125,7 +125,7 @@ def node(
     lower_joint_deg: float,
     joint_std_deg: float,
     mount_std_deg: float,
-    kernel: Literal["float64", "fixed", "published"],
+    kernel: Literal["float64", "fixed"],
     scheme: str,
     stiffness_nm: float,
     torsion: Literal["gate", "variance"],
@@ -155,10 +155,10 @@ def node(
       borechain node --tube 1 --clock own --imu mpu6500:1 --above 2 --folder state/tube-1
       borechain node --tube 2 --clock own --imu mpu6500:1 --upper can:can0 --lower can:can1
     """
-    from node.firmware.settings import Joint, TubeSettings
+    from node.firmware.tube_settings import MakeUpAngle, TubeSettings
     from node.kernels.record.filter_record import Scheme
     from node.process.drivers.choice import imu_source
-    from node.process.host import run_node
+    from node.process.node_host import run_node
     from telemetry.messages import Side
     from telemetry.runtime.hosting import OwnTime, Place, chosen_media
 
@@ -167,15 +167,15 @@ def node(
     joint_std = math.radians(joint_std_deg)
     settings = TubeSettings(
         tube=tube,
-        drive_joint=Joint(math.radians(drive_joint_deg), joint_std),
-        lower_joint=Joint(math.radians(lower_joint_deg), joint_std),
+        drive_joint=MakeUpAngle(math.radians(drive_joint_deg), joint_std),
+        lower_joint=MakeUpAngle(math.radians(lower_joint_deg), joint_std),
         mount_std=math.radians(mount_std_deg),
         scheme=Scheme[scheme.upper()],
         kernel=kernel,
         stiffness=stiffness_nm,
         torsion=torsion,
         joints=joints,
-        imus=cluster(len(sources), noises, offsets, gyroscopes, accelerometers),
+        imus=imu_settings_of(len(sources), noises, offsets, gyroscopes, accelerometers),
     )
     media = {Side.UPPER: upper, Side.LOWER: lower}
     neighbours = own_neighbours(clock, tube, ("--imu", sources), {Side.UPPER: above, Side.LOWER: below}, media)

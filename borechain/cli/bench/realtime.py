@@ -83,7 +83,7 @@ def realtime(nodes: int, seconds: float, endpoint: str, out: Path | None, as_jso
 def prepare_processes(nodes: int, seconds: float, endpoint: str, folder: Path, seed: int) -> tuple[Any, Any]:
     """Record the string and write the table of its processes."""
     from node.process.drivers.timed import TimedEncoder, TimedImu
-    from node.process.host import run_encoder, run_node
+    from node.process.node_host import run_encoder, run_node
     from sim.rig.processes import ProcessTable, Spec
     from sim.rig.realtime import clock_offset
     from sim.world.recording import record, turning_once

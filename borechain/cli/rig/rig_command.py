@@ -45,11 +45,7 @@ if TYPE_CHECKING:
     from sim.world.world import World
     from telemetry.media.zenoh_bus import ZenohBus
 
-PRELOAD = {
-    "float64": "borechain.preload",
-    "fixed": "borechain.preload_all",
-    "published": "borechain.preload_all",
-}  # by kernel
+PRELOAD = {"float64": "borechain.preload", "fixed": "borechain.preload_all"}  # by kernel
 
 
 @click.command()
@@ -122,7 +118,7 @@ def rig(
     from sim.rig.launcher import check_port_free
     from sim.world.shipped import find_scenario
 
-    find_scenario(scenario)  # a wrong name is told first: whoever mistypes it may well have a rig running
+    find_scenario(scenario)  # a wrong name is reported first: its user may well have a rig running
     if inline != (transport == "can-native") and transport is not None:
         raise InputFault(
             f"--transport {transport}: expected {'real processes' if inline else '--inline'} with it; "
@@ -133,7 +129,7 @@ def rig(
         check_page(served, inline=inline)
     if not inline:
         check_port_free(endpoint)
-    on_terminal = sys.stdout.isatty() and served is None  # whoever opens the page looks at no second screen
+    on_terminal = sys.stdout.isatty() and served is None  # with a page open no second screen is needed
     view = chosen_view(view, inline=inline, quiet=as_json, on_terminal=on_terminal)
     if view == "crew":
         from borechain.cli.rig.on_screen import drill_on_screen
@@ -141,7 +137,7 @@ def rig(
         drill_on_screen(sys.argv[1:], rig_name, endpoint, keys_place)
         return
     job = RigJob(scenario, seed, speed, faults, transport, rig_name, endpoint, keys_place)
-    # whoever wants to join can do so while the scenario is read and the kernels are loaded
+    # other processes can join while the scenario is read and the kernels are loaded
     with contextlib.nullcontext() if inline else opened_router(endpoint, keys_place) as bus:
         log = RunLog(print_line) if view == "log" else None
         run = drill_site if has_site(job) else drill_job
@@ -228,7 +224,7 @@ def check_page(page: PageSettings, *, inline: bool) -> None:
     Raises
     ------
     InputFault
-        With ``--inline``, where nobody can ask.
+        With ``--inline``, which answers no queries.
     PageError
         When its port is taken.
     """
@@ -240,7 +236,7 @@ def check_page(page: PageSettings, *, inline: bool) -> None:
 
 
 def page_with_password(page: PageSettings) -> PageSettings:
-    """The page of a simulated rig, on which somebody may order: without passwords with one by lot, which is told."""
+    """Page of a simulated rig that accepts orders: a random password is made and printed where none is set."""
     if page.passwords:
         return page
     from groundstation.gateway.page.passwords import DRILLER, drawn_password, hash_of
@@ -270,7 +266,7 @@ def chosen_view(view: str | None, *, inline: bool, quiet: bool, on_terminal: boo
 
 
 def print_line(line: str) -> None:
-    """Write a line at once, for whoever follows a file."""
+    """Write a line and flush it, so that a follower of the file sees it at once."""
     click.echo(line)
     sys.stdout.flush()
 
@@ -350,7 +346,7 @@ def process_table(
     """Every process of the rig, one line each; ``steps`` is the socket at which they meet their stepper."""
     from borechain.rig_host import run_medium
     from groundstation.host import run_ground
-    from node.process.host import run_encoder, run_node
+    from node.process.node_host import run_encoder, run_node
     from sim.rig.launcher import private_folder
     from sim.rig.processes import ProcessTable, Spec
     from telemetry.messages import BASE, ENCODER

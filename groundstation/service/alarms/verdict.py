@@ -30,7 +30,7 @@ class Word(enum.StrEnum):
 
 
 class VerdictDoubt(enum.StrEnum):
-    """Why nobody can tell."""
+    """Reason of the verdict "don't know"."""
 
     NO_SURVEY = "no_survey"
     STALE = "stale"

@@ -227,8 +227,8 @@ class Watch:
         if not self._string.knows_tubes:
             return  # a tube that ran all the while may not have been heard yet
         lately = [tube for tube in self._string.tubes if self._states.age(tube) <= OFF_BEFORE]
-        if nobody := self._cross_check.look(self._time.epoch, self._time.rig_now, lately):
-            self._alarms.alert("reference", "encoder", nobody)
+        if unwatched := self._cross_check.look(self._time.epoch, self._time.rig_now, lately):
+            self._alarms.alert("reference", "encoder", unwatched)
 
     def _look_at_belt(self) -> None:
         nodes = self._states.newest
@@ -276,7 +276,7 @@ class Watch:
 
 
 def _event_number(event: Event, name: str) -> float:
-    """An argument of an event; NaN where it is none, for somebody may have made the event up."""
+    """An argument of an event as a float; NaN if it is missing or no number, for the event may be forged."""
     value = event.arguments.get(name)
     return float(value) if isinstance(value, int | float) else math.nan
 

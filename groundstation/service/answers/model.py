@@ -1,4 +1,4 @@
-"""The parts of what a ground station knows of its rig, side by side: whoever shows something is given them all."""
+"""The parts of what a ground station knows of its rig, side by side, which views are given together."""
 
 from __future__ import annotations
 

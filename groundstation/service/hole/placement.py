@@ -61,7 +61,7 @@ class Placement:
     def take_placeable(self) -> list[tuple[Waiting, float]]:
         """Measurements that waited for their depth and have it now; they wait no more."""
         if not self.waiting:
-            return []  # as nearly always: it is asked at every reading
+            return []  # the usual case: called at every reading
         waiting, self.waiting, placeable = self.waiting, [], []
         for one in waiting:
             md = self._string.depth_of(one.message, one.below)

@@ -1,7 +1,7 @@
 """What tubes found at their stops: one resolved stop a measurement, packed as rows of one table. No I/O.
 
 A ground station keeps every measurement of a hole, ten thousand of them after a day. As objects each would take two
-kilobytes; as a row it takes a sixth of that, and is an object again where somebody looks at it. What is worked out for
+kilobytes; as a row it takes a sixth of that, and becomes an object again when it is read. What is worked out for
 many stops at once (weights, departures, fused directions) is read from the table's columns.
 """
 

@@ -77,7 +77,7 @@ Listener = Callable[[list[str]], None]  # takes the paths below ground/ that cha
 class GroundProcess(Process):
     """Everything the ground station does at each event of its link.
 
-    Whoever drives it and whoever comes in by ``operator`` does so on one thread.
+    Its driver and the callers of ``operator`` run on one thread.
 
     Parameters
     ----------

@@ -29,7 +29,7 @@ TRANSPORT = "transport"  # of columns that random errors share; they are of no k
 
 
 def put_columns(columns: Array, causes: Array, places: Places) -> None:
-    """Put the columns of a reading into zeros (2, s): mount, every joint alike, and the axes, from (2, 5)."""
+    """Write the columns of a reading into zeros (2, s): mount, every joint alike, and axes, from ``causes`` (2, 5)."""
     columns[:, places[0]] = causes[:, 0]
     columns[:, places[1:-AXES]] = causes[:, 1:2]
     columns[:, places[-AXES:]] = causes[:, -AXES:]
@@ -69,7 +69,7 @@ class Packed:
         self.width = int(columns.shape[1])
 
     def under(self, matrix: Array) -> Packed:
-        """What a matrix (j, k) makes of them: (j, s)."""
+        """Return the columns ``matrix`` (j, k) @ columns (k, s), of shape (j, s)."""
         made = Packed.__new__(Packed)
         made.places, made.values, made.width = self.places, matrix @ self.values, self.width
         return made
@@ -108,16 +108,16 @@ class Fused(Direction):
 
     @property
     def packed(self) -> Packed:
-        """Columns as they are kept."""
+        """Shared columns as they are stored."""
         return self._packed
 
     @property
     def width(self) -> int:
-        """How many columns there are."""
+        """Number s of shared columns."""
         return self._packed.width
 
     def fill(self, columns: Array) -> None:
-        """Put the columns into zeros (2, s or more)."""
+        """Write the shared columns into ``columns``, zeros (2, >= s)."""
         self._packed.fill(columns)
 
 
@@ -264,7 +264,7 @@ def weights_of(covs: Array, causes: Array, places: Sequence[Places], width: int)
 
 
 def widen_shared_errors(shared: Array, columns: int) -> Array:
-    """The same columns with zeros for those met later: (k, columns)."""
+    """Return the columns (k, s) with zeros for the errors met later: (k, columns)."""
     missing = columns - shared.shape[1]
     return shared if missing == 0 else np.concatenate([shared, np.zeros((shared.shape[0], missing))], axis=1)
 

@@ -45,7 +45,7 @@ class StatusAnswer:
     untrusted_measurements: Annotated[int, "surveys whose yaw is taken for unknown"]
     health: Annotated[
         str,
-        "the worst of the rig's alarms, or that nobody can tell",
+        "the worst of the rig's alarms; unknown where it cannot be told",
         OneOf(*(health.name.lower() for health in Health)),
     ]
     epoch: Annotated[int, "of rig time: starts of the encoder so far, 0 unknown"]

@@ -32,7 +32,7 @@ export interface StatusAnswer {
   set_aside_measurements: number;
   /** surveys whose yaw is taken for unknown */
   untrusted_measurements: number;
-  /** the worst of the rig's alarms, or that nobody can tell */
+  /** the worst of the rig's alarms; unknown where it cannot be told */
   health: "good" | "degraded" | "unknown" | "bad";
   /** of rig time: starts of the encoder so far, 0 unknown */
   epoch: number;
@@ -84,9 +84,9 @@ export interface Verdict {
   line: string;
   /** what to do, in a line */
   todo: string;
-  /** what it rests on, or why nobody knows */
+  /** what it rests on, or why it is not known */
   why: string[];
-  /** why nobody knows, as words */
+  /** why it is not known, as words */
   doubts: ("no_survey" | "stale" | "depth" | "clock" | "yaw" | "uncertain")[];
   /** measured depth of the bit */
   bit_md_m: number | null;

@@ -108,7 +108,7 @@ export function showOrders(orders) {
 }
 
 /**
- * The tubes that may be told to survey, the lowest chosen unless somebody chose another.
+ * The tubes that may be told to survey, the lowest chosen until the user chooses another.
  * @param {Picture} picture
  */
 export function showTubes(picture) {

@@ -7,7 +7,7 @@ const WORDS = { on_target: "ON TARGET", watch: "WATCH", steer: "STEER", out: "OU
 /** @typedef {import("./picture.js").Picture} Picture */
 
 /**
- * Show the verdict of this moment; that of a replay never has a colour on which somebody might count.
+ * Show the verdict of this moment; that of a replay has no colour, lest it be taken for the present one.
  * @param {Picture} picture
  */
 export function showVerdict(picture, now, { replay }) {
