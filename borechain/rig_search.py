@@ -13,6 +13,6 @@ def live_rigs(bus: ZenohBus, timeout: float = 1.0) -> list[str]:
 
 
 def who_is_there(bus: ZenohBus) -> str:
-    """Which rigs could have been meant, for a line to an operator who named another."""
+    """Line that lists the rigs with a ground station, for the error on an unknown rig."""
     rigs = live_rigs(bus)
     return f"rigs with a ground station: {', '.join(rigs)}" if rigs else "no rig has a ground station here"

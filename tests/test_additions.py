@@ -48,9 +48,9 @@ COMMAND = Addition(
 """,
     files={
         "node/process/command_handlers.py": """
-    def blink(self, arguments: Mapping[str, Any], _sequence: int) -> Outcome:
+    def blink(self, arguments: Mapping[str, Any], _sequence: int) -> CommandOutcome:
         \"\"\"Light the lamp.\"\"\"
-        return Outcome(True, "blinking", {"times": arguments["times"]})
+        return CommandOutcome(True, "blinking", {"times": arguments["times"]})
 """
     },
     named="node/process/command_handlers.py",

@@ -157,7 +157,7 @@ ANSWERS: Final = {
         AnswerKey(
             "changes",
             ChangesAnswer,
-            "when each answer changed last: a listener that a full line has cost one sees it and asks",
+            "when each answer changed last: a listener that lost one to a full line sees it and asks again",
         ),
         AnswerKey("schema", SchemaAnswer, "JSON schema of every answer below ground/", published=False),
         AnswerKey("nodes/{tube}", NodeAnswer, "last state of one node, stale or not", on_page=True),
