@@ -422,7 +422,7 @@ DESCRIBED = """
     from groundstation.service.answers.model import RigModel
     from groundstation.service.answers.paths import find_path
 
-    model = RigModel(GroundConfig(folder=pathlib.Path(tempfile.mkdtemp())))
+    model = RigModel.begin(GroundConfig(folder=pathlib.Path(tempfile.mkdtemp())))
     def answered(path, **parameters):
         return json.loads(find_path(model, path).json(model, parameters))
 """

@@ -32,6 +32,7 @@ FORBIDDEN = [
     ("sim/campaign/summary.py", "import sim.world.world"),
     ("groundstation/service/process/operator_access.py", "import groundstation.gateway.zenoh"),
     ("groundstation/service/orders/order_book.py", "import asyncio"),
+    ("groundstation/service/string/tally.py", "import groundstation.service.hole.history"),
     ("groundstation/service/process/ground_process.py", "import telemetry.media.zenoh_bus"),
     ("groundstation/service/answers/shapes/wall_shapes.py", "import groundstation.service.answers.model"),
     ("telemetry/application/clock.py", "import zenoh"),

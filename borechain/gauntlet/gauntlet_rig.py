@@ -170,7 +170,7 @@ class GauntletRig:
             self._disks[address].refusal, self._disks[address].writes_left = 0, -1
             self.thaw(address)
             self.start(address)
-        if self.ground is not None and self.ground.model.depths.jumped:
+        if self.ground is not None and self.ground.model.string.depths.jumped:
             self.inline.command("accept_depth", {"action": "confirm"})
 
     def close(self) -> None:

@@ -96,7 +96,7 @@ def _sample(rig: GauntletRig, observer: Observer) -> SoakSample:
         disks_mib=sum(rig.disk(address).size for address in EVERYBODY) / 2**20,
         handles=len(list(Path("/proc/self/fd").iterdir())),
         database_kib=len(rig.disk(BASE).kept("ground.sqlite")) / 1024.0,
-        surveys=0 if model is None else sum(station.count for station in model.stations),
+        surveys=0 if model is None else sum(station.count for station in model.hole.stations),
         violations=tuple(observer.found),
         cpu_s=used.ru_utime,
     )

@@ -19,7 +19,8 @@ from borechain.load.readers import CONNECT_S, read_lines
 from groundstation.config import checked_config
 from groundstation.gateway.page.page_settings import PageSettings
 from groundstation.host import run_ground
-from groundstation.service.disk.ground_store import Store, Stored
+from groundstation.service.disk.ground_store import Store
+from groundstation.service.string.stored import Stored
 from sim.errors import RigError
 from sim.rig.processes import ProcessTable, Spec
 from sim.rig.realtime import cpu_seconds, footprint, pids

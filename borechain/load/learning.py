@@ -106,6 +106,11 @@ class LearningLoad:
             with self._timing("working out the hole then"):
                 self.ground.model.hole.settle()
 
+    def place_alone(self, survey: SurveyMeasurement, md: float) -> None:
+        """One comes by itself, and the hole is worked out after it."""
+        self._take([survey], md)
+        self.ground.model.hole.settle()
+
     def learn_asked(self, surveys: list[SurveyMeasurement], md: float) -> None:
         """Take surveys one by one with a query after each; the first query waits for the computed hole."""
         for survey in surveys:
@@ -152,8 +157,8 @@ def measure_learning(surveys: int, tubes: int, stops: int, folder: Path) -> dict
     tenth, whole = (checked_config(rig=RIG, folder=folder / str(n), **settings) for n in (known // TENTH, known))
     sizes = [bytes_of_a_survey(config, n, tubes) for config, n in ((tenth, known // TENTH), (whole, known))]
     hearing = LearningLoad(whole, tubes, BEGUN_AT + ROUND_S * (known + 1))
-    model = hearing.ground.model
-    before = model.seen["measurements"]
+    hole = hearing.ground.model.hole
+    before = hole.newest
     with contextlib.closing(hearing.ground):
         courses = itertools.cycle((hearing.learn_together, hearing.learn_alone, hearing.learn_asked))
         learnt = 0
@@ -164,9 +169,9 @@ def measure_learning(surveys: int, tubes: int, stops: int, folder: Path) -> dict
                 hearing.ask_first()
             learn(taken, md)
             learnt += len(taken)
-        if model.seen["measurements"] != before + learnt:
-            raise RigError(f"{learnt} surveys came, {model.seen['measurements'] - before} were fused")
-        stations = len(model.stations)
+        if hole.newest != before + learnt:
+            raise RigError(f"{learnt} surveys came, {hole.newest - before} were fused")
+        stations = len(hole.stations)
     return {
         "surveys": before + learnt,
         "stations": stations,

@@ -39,7 +39,7 @@ class Served:
         """One event more."""
 
         def submit(rig: Rig) -> None:
-            number = 500 + rig.ground.model.seen["events"]
+            number = 500 + rig.ground.model.newest_row("events")
             rig.tube.mail.submit(Event(1, number, rig.now, Severity.INFO, "stopped"), rig.now)
             rig.run(2.0)
 

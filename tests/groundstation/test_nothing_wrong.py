@@ -173,7 +173,7 @@ def test_a_depth_from_the_future_changes_nothing(rig: Drilled) -> None:
     rig.ground.on_depth(forged, rig.world.local_clock(BASE, rig.scheduler.now))
     rig.finish()
     assert rig.surveys() == EVERY
-    assert rig.ground.model.depths.refusals["ahead of rig time"] == 1
+    assert rig.ground.model.string.depths.refusals["ahead of rig time"] == 1
 
 
 def empty(folder: Path) -> None:

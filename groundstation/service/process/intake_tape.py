@@ -83,10 +83,10 @@ def unpack_intake(payload: bytes) -> Intake:
     numbers = all(isinstance(value, int) and not isinstance(value, bool) for value in (number, epoch))
     if not numbers or kind not in KINDS or not isinstance(now, float) or not isinstance(rig_now, float):
         raise IntakeError(f"expected an event of an intake, got {row!s:.40}")
-    return Intake(number, kind, now, rig_now, epoch, _content(kind, content))
+    return Intake(number, kind, now, rig_now, epoch, _checked_content(kind, content))
 
 
-def _content(kind: str, content: Any) -> Any:
+def _checked_content(kind: str, content: Any) -> Any:
     if kind == MESSAGE:
         try:
             message: Message = decode(content)

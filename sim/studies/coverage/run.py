@@ -103,7 +103,7 @@ def drill_well(seed: int, pool: YawPool) -> tuple[Array, Array, Array]:
             above = range(tube + 1, stop + 1)
             systematic_var = hop * rig.joint_std**2 + rig.mount_std**2
             stations[station].add_reading(
-                shared.reading(resolved, tube, above, systematic_var, rig.mount_std**2, rig.bias_std)
+                shared.direction_of(resolved, tube, above, systematic_var, rig.mount_std**2, rig.bias_std)
             )
     trajectory = Trajectory()
     for k in range(1, TUBES + 1):

@@ -38,7 +38,7 @@ TIMES_KEPT = 20  # of a tube and epoch
 Times = dict[tuple[int, int], deque[tuple[float, float]]]  # s, rig time, by tube and epoch
 
 
-class Witnesses:
+class EncoderCrossCheck:
     """What the tubes' events say of the encoder."""
 
     def __init__(self) -> None:

@@ -6,7 +6,7 @@ from itertools import permutations
 
 import pytest
 
-from groundstation.service.alarms.witnesses import Witnesses
+from groundstation.service.alarms.encoder_cross_check import EncoderCrossCheck
 from telemetry.application.series import SERIES_SHIFT
 from telemetry.messages import Event, Scalar, Severity
 
@@ -19,8 +19,8 @@ BOTH_STARTED = [event(1, 0.0, "restored", 1), event(2, 0.0, "restored", 1)]
 
 
 def told(events: list[Event], heard: Collection[int] = (1, 2)) -> list[str]:
-    witnesses = Witnesses()
-    return [said for one in events if (said := witnesses.on_event(one, heard))]
+    check = EncoderCrossCheck()
+    return [said for one in events if (said := check.on_event(one, heard))]
 
 
 def test_two_settled_tubes_that_contradict_the_encoder_are_told_once() -> None:
@@ -95,11 +95,11 @@ def test_a_tube_whose_clock_is_gone_contradicts_when_it_began_to() -> None:
 def test_a_contradiction_whose_outcome_was_lost_with_the_database_counts(
     first_lost: int, other: Event, said: str
 ) -> None:
-    witnesses = Witnesses()
+    check = EncoderCrossCheck()
     for one in (*BOTH_STARTED, event(2, 100.0, "aiding_rejected", 11), other, event(2, 121.0, "stopped", 14)):
-        assert witnesses.on_event(one, (1, 2)) == ""
-    assert witnesses.on_lost(2, (first_lost, 13), (1, 2), doubts=False) == said
-    assert witnesses.on_lost(2, (first_lost, 13), (1, 2), doubts=False) == ""
+        assert check.on_event(one, (1, 2)) == ""
+    assert check.on_lost(2, (first_lost, 13), (1, 2), doubts=False) == said
+    assert check.on_lost(2, (first_lost, 13), (1, 2), doubts=False) == ""
 
 
 @pytest.mark.parametrize(
@@ -111,11 +111,11 @@ def test_a_contradiction_whose_outcome_was_lost_with_the_database_counts(
     ],
 )
 def test_a_tube_that_doubts_its_yaw_contradicts_where_its_words_are_lost(doubts: bool, other: Event, said: str) -> None:
-    witnesses = Witnesses()
+    check = EncoderCrossCheck()
     for one in (*BOTH_STARTED, event(2, 90.0, "stopped", 9), other, event(2, 121.0, "stopped", 14)):
-        assert witnesses.on_event(one, (1, 2)) == ""
+        assert check.on_event(one, (1, 2)) == ""
     for _ in range(2):
-        assert witnesses.on_lost(2, (10, 13), (1, 2), doubts=doubts) == said
+        assert check.on_lost(2, (10, 13), (1, 2), doubts=doubts) == said
         said = ""
 
 
@@ -263,21 +263,21 @@ VOID = [event(2, 22.0, "restored", 12, worth_h=0.0), event(1, 23.0, "restored", 
 def test_where_no_tube_has_kept_its_yaw_nobody_has_watched_the_encoder(
     events: list[Event], lately: Collection[int], said: str
 ) -> None:
-    witnesses = Witnesses()
+    check = EncoderCrossCheck()
     for one in (event(1, 1.0, "restored", 1, worth_h=3.0), event(2, 1.0, "booted", 1), *events):
-        assert witnesses.on_event(one, lately) == ""
-    assert witnesses.look(1, 30.0, lately) == ""  # a tube that watched may be heard yet
-    told = witnesses.look(1, 80.0, lately)
+        assert check.on_event(one, lately) == ""
+    assert check.look(1, 30.0, lately) == ""  # a tube that watched may be heard yet
+    told = check.look(1, 80.0, lately)
     assert told.startswith(said)
     assert bool(told) == bool(said)
-    assert witnesses.look(1, 81.0, lately) == ""  # once
+    assert check.look(1, 81.0, lately) == ""  # once
 
 
 def test_tubes_without_a_yaw_are_told_at_once_where_rig_time_has_begun_anew() -> None:
-    witnesses = Witnesses()
+    check = EncoderCrossCheck()
     for one in VOID:
-        witnesses.on_event(one, (1, 2))
-    assert witnesses.look(2, 3.0, (1, 2)).startswith("no tube watched")
+        check.on_event(one, (1, 2))
+    assert check.look(2, 3.0, (1, 2)).startswith("no tube watched")
 
 
 @pytest.mark.parametrize(("start", "growth"), [("booted", 5.0), ("restored", 20.0)])
@@ -286,8 +286,8 @@ def test_what_an_event_costs_while_a_string_starts_grows_with_its_tubes_or_with_
 ) -> None:
     """Tubes that only booted cannot speak together; of those that had saved their yaw one more has yet to say."""
     compared = []
-    is_beside = Witnesses._is_beside
-    monkeypatch.setattr(Witnesses, "_is_beside", lambda *of: compared.append(1) or is_beside(*of))
+    is_beside = EncoderCrossCheck._is_beside
+    monkeypatch.setattr(EncoderCrossCheck, "_is_beside", lambda *of: compared.append(1) or is_beside(*of))
 
     def comparisons_of_an_event(tubes: int) -> float:
         compared.clear()
