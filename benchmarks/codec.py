@@ -32,17 +32,18 @@ from groundstation.survey.well.compiled_model import locate_stations, preload_mo
 from groundstation.survey.well.error_propagation import propagate_errors
 from groundstation.survey.well.error_sources import Leg, Site, WellSurvey
 from groundstation.survey.well.methods import Method, station_positions
-from telemetry.messages import Aiding, Message, Mode, NodeFlag, NodeState
+from telemetry.messages import Aiding, Message, NodeFlag, NodeMode, NodeState
 from telemetry.presentation.can_checks import CHECKS
 from telemetry.presentation.can_messages import NATIVE
 from telemetry.presentation.message_codec import CODECS
-from telemetry.presentation.msgpack_codec import decode, encode
-from telemetry.schema import SPEC_OF, Kind
+from telemetry.presentation.msgpack_codec import decode_message, encode_message
+from telemetry.schema import SPEC_OF, MessageKind
 
 LEAST = 2.0  # times as fast
 ROUNDS, SPELL = 15, 0.01  # s of one round
 STATE = NodeState(
-    7, 123.456, 3, Mode.TRACKING, 1.5, 1e-6, 2e-6, (1e-4, 2e-4, 3e-4), 1e-4, 0.01, 1e-7, 0.5, 1e-9, NodeFlag.RESTORED,
+    7, 123.456, 3, NodeMode.TRACKING, 1.5, 1e-6, 2e-6, (1e-4, 2e-4, 3e-4), 1e-4, 0.01, 1e-7, 0.5, 1e-9,
+    NodeFlag.RESTORED,
     12345, 2, 1, b"12345678", (0.01, 0.02, 0.003), 3, 55,
 )  # fmt: skip
 AIDING = Aiding(1.0, 1e-8, 0.0, 0.0, 0.1, 100.0, 7, 0, epoch=1)
@@ -66,12 +67,12 @@ def run() -> dict[str, Any]:
 
 def msgpack_pairs() -> dict[str, Pair]:
     """A node's state by msgspec, and by msgpack with the check of each field by hand."""
-    payload = encode(STATE)
+    payload = encode_message(STATE)
     if decode_by_hand(payload) != STATE or encode_by_hand(STATE) != payload:
         raise RuntimeError("expected both ways to say the same")
     return {
-        "msgpack decode": (lambda: decode(payload), lambda: decode_by_hand(payload)),
-        "msgpack encode": (lambda: encode(STATE), lambda: encode_by_hand(STATE)),
+        "msgpack decode": (lambda: decode_message(payload), lambda: decode_by_hand(payload)),
+        "msgpack encode": (lambda: encode_message(STATE), lambda: encode_by_hand(STATE)),
     }
 
 
@@ -108,7 +109,7 @@ def can_pairs() -> dict[str, Pair]:
     """An aiding and a node's state, each on classic CAN and on CAN FD, compiled and signal by signal."""
     cases = [
         (NATIVE[kind], CODECS[type(message)].values_of(message), fd)
-        for kind, message in ((Kind.AIDING, AIDING), (Kind.NODE_STATE, STATE))
+        for kind, message in ((MessageKind.AIDING, AIDING), (MessageKind.NODE_STATE, STATE))
         for fd in (False, True)
     ]
     frames = [native.pack(values, 5, fd=fd) for native, values, fd in cases]

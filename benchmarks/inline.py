@@ -29,11 +29,11 @@ from borechain.cli.rig.rig_command import RigJob, drill_in_processes, process_ta
 from borechain.inline import InlineRig
 from borechain.load.hour import scenario_text
 from borechain.rig_host import opened_router
-from sim.rig.in_process import InProcessStepper, unwritten
+from sim.rig.in_process import InProcessStepper, carry_unwritten
 from sim.rig.launcher import Tick
 from sim.rig.processes import ProcessTable
-from sim.rig.realtime import cpu_seconds, footprint, pids
-from sim.rig.scheduler import Progress
+from sim.rig.realtime_run import cpu_seconds, memory_footprint, running_pids
+from sim.rig.scheduler import RigProgress
 from sim.rig.stepper import Answer, FrameEvent
 from telemetry.messages import BASE, ENCODER
 from telemetry.runtime.stepped import Due
@@ -116,7 +116,7 @@ class Meter:
         self.told = 0
         self.length = math.nan  # s of rig time
 
-    def follow(self, tick: Tick | Progress) -> None:
+    def follow(self, tick: Tick | RigProgress) -> None:
         """The rig has told how far it is."""
         self.told += 1
         self.length = tick.end - tick.begin
@@ -189,7 +189,7 @@ def drilled_inline(scenario: Path, folder: Path) -> tuple[Meter, Counting]:
     job = RigJob(scenario, 1, math.inf)
     world = world_of(job)
     rig = InlineRig(world, settings_of(world, job), job.rig_name, folder)
-    rig.stepper = counting = Counting(rig.stepper.builders, carry=unwritten)
+    rig.stepper = counting = Counting(rig.stepper.builders, carry=carry_unwritten)
     meter = Meter(time.process_time)
     rig.run(meter.follow)
     rig.close()
@@ -209,10 +209,10 @@ def drilled_by_processes(scenario: Path, folder: Path) -> tuple[Meter, dict[str,
         return tables[0]
 
     def spent() -> float:
-        return time.process_time() + sum(cpu_seconds(pid) for pid in pids(tables[0]).values())
+        return time.process_time() + sum(cpu_seconds(pid) for pid in running_pids(tables[0]).values())
 
     def weigh() -> None:
-        memory.update({name: footprint(pid)["pss_mb"] for name, pid in pids(tables[0]).items()})
+        memory.update({name: memory_footprint(pid)["pss_mb"] for name, pid in running_pids(tables[0]).items()})
 
     meter = Meter(spent, weigh)
     with opened_router(job.endpoint) as bus:

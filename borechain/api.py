@@ -96,8 +96,8 @@ def drill(scenario: Scenario, seed: int = 1, folder: Path | None = None) -> dict
 
 
 def _drill(scenario: Scenario, seed: int, folder: Path) -> dict[str, Any]:
-    from borechain.cli.rig.result import result_of
     from borechain.cli.rig.rig_command import RigJob, drill_inline
+    from borechain.cli.rig.rig_result import result_of
     from sim.rig.launcher import prepare_folder
     from sim.world.world import World
 

@@ -21,10 +21,10 @@ from node.process.encoder_process import EncoderProcess
 from node.process.node_host import seals_at
 from node.process.tube_process import TubeProcess
 from sim.errors import RigError
-from sim.rig.in_process import Build, InProcessStepper, unwritten
+from sim.rig.in_process import Build, InProcessStepper, carry_unwritten
 from sim.rig.launcher import private_folder
-from sim.rig.operator import Operator
-from sim.rig.scheduler import Progress, Scheduler
+from sim.rig.rack_operator import RackOperator
+from sim.rig.scheduler import RigProgress, Scheduler
 from sim.rig.stepper import Acted
 from sim.world.world import World
 from telemetry.errors import BorechainError
@@ -76,7 +76,7 @@ class InlineRig:
         for tube in range(1, world.scenario.tubes + 1):
             place = private_folder(folder, f"tube-{tube}")
             builders[tube] = partial(self._build_tube, tube, place, block_key, keys, disk_of(tube))
-        self.stepper = InProcessStepper(builders, self._act_on_cue, rounded_frame if native else unwritten)
+        self.stepper = InProcessStepper(builders, self._act_on_cue, rounded_frame if native else carry_unwritten)
 
     def _build_encoder(self, folder: Path, keys: Path | None, disk: Disk, lot: Callable[[int], int]) -> EncoderProcess:
         is_new, self._has_encoder_run = not self._has_encoder_run, True
@@ -98,7 +98,7 @@ class InlineRig:
             raise TypeError(f"expected the ground station at the base, got {type(process).__name__}")
         return process
 
-    def run(self, show: Callable[[Progress], None] = lambda _progress: None, speed: float = math.inf) -> None:
+    def run(self, show: Callable[[RigProgress], None] = lambda _progress: None, speed: float = math.inf) -> None:
         """Drill to the end of the schedule.
 
         Raises
@@ -107,7 +107,7 @@ class InlineRig:
             When the schedule asks for what the rig has not, or the ground station refuses the operator.
         """
 
-        def follow(progress: Progress) -> None:
+        def follow(progress: RigProgress) -> None:
             self.stepper.follow(progress)
             show(progress)
 
@@ -141,4 +141,4 @@ class InlineRig:
 
     def _act_on_cue(self, cue: str) -> Acted:
         rack = self.world.rack
-        return Acted.DONE if rack is None else Operator(rack, self.world.scenario.tubes).act_on_cue(self, cue)
+        return Acted.DONE if rack is None else RackOperator(rack, self.world.scenario.tubes).act_on_cue(self, cue)

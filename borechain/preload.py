@@ -5,7 +5,7 @@ from __future__ import annotations
 import gc
 
 import borechain.rig_host
-import groundstation.host
+import groundstation.ground_host
 import node.process.node_host
 import sim.rig.bus_stepper
 import sim.rig.scheduler

@@ -43,7 +43,7 @@ def run_medium(
     which one of the scenario's site is drilled.
     """
     from sim.rig.bus_stepper import BusStepper
-    from sim.rig.scheduler import Progress, Scheduler
+    from sim.rig.scheduler import RigProgress, Scheduler
     from sim.world.scenario import load_scenario
     from sim.world.world import World
     from telemetry.radio.soil_dielectric import PorosityWarning
@@ -65,7 +65,7 @@ def run_medium(
             medium_of = (transports or Transports()).medium_of
             stepper = BusStepper(bus, place.rig, medium_of=medium_of, steps=place.steps)
 
-            def tell(progress: Progress) -> None:
+            def tell(progress: RigProgress) -> None:
                 wanted.put(pack_progress(progress))
 
             absent = None if cued else say_absent
@@ -122,9 +122,9 @@ def opened_router(endpoint: str, keys_place: Path | None = None) -> AbstractCont
 
 def pack_progress(progress: object) -> bytes:
     """Wire form of the medium's progress, read by the launcher's ``Tick``."""
-    from sim.rig.scheduler import Progress
+    from sim.rig.scheduler import RigProgress
 
-    if not isinstance(progress, Progress):
+    if not isinstance(progress, RigProgress):
         raise TypeError(f"expected Progress, got {type(progress).__name__}")
     p = progress
     return bytes(msgpack.packb([p.phase, p.rig_time, p.begin, p.end, p.wanted, p.kill, p.finished, p.cue]))

@@ -138,7 +138,7 @@ def ground(
       borechain ground --folder state/ground --tube-length-m 2
       borechain ground --page 127.0.0.1:8080 --page-passwords passwords
     """
-    from groundstation.host import run_ground
+    from groundstation.ground_host import run_ground
     from telemetry.runtime.hosting import Place
 
     settings = {

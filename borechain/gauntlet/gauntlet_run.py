@@ -18,7 +18,7 @@ from borechain.gauntlet.oracles import Observer, find_violations
 from borechain.rare_collection import rare_collection
 from sim.gauntlet.fault_kinds import KINDS
 from sim.gauntlet.plan import drawn_kinds, steps_of
-from sim.rig.report import digest
+from sim.rig.report import station_digest
 
 ALL = tuple(kind.name for kind in KINDS)
 USUAL = "minute"
@@ -94,7 +94,9 @@ def _run(rig: GauntletRig, outcome: SeedOutcome) -> None:
         outcome.violations = ["the ground station is not there at the end"]
         return
     rows = _alarms(rig)
-    outcome.digest = hashlib.sha256(f"{digest(rig.inline.ask('stations')['stations'])}{rows}".encode()).hexdigest()
+    outcome.digest = hashlib.sha256(
+        f"{station_digest(rig.inline.ask('stations')['stations'])}{rows}".encode()
+    ).hexdigest()
     outcome.alarms = sorted({code for code, _, _, standing in rows if standing})
     outcome.cleared = sorted({code for code, _, _, standing in rows if not standing})
     outcome.measurements = len(rig.inline.ask("measurements")["measurements"])

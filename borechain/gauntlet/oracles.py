@@ -16,8 +16,8 @@ from sim.gauntlet.faulty_world import TUBE_LENGTH, FaultyWorld
 from sim.rig.report import wrap_deg
 from telemetry.application.outbox import LIMIT
 from telemetry.messages import BASE, NodeFlag, Receipt, Side
-from telemetry.presentation.msgpack_codec import decode
-from telemetry.schema import Kind
+from telemetry.presentation.msgpack_codec import decode_message
+from telemetry.schema import MessageKind
 from telemetry.transport.hop import BEST_EFFORT_LIMIT, QUEUE_LIMIT, WINDOW, parse_frame
 
 DEPTH_TOLERANCE = 0.05  # m
@@ -31,7 +31,7 @@ TOLD = frozenset(
 )
 DEPTH = frozenset({"depth_refused", "depth_contradicts"})  # alarms while which no depth since a gap is sure
 YAW = frozenset({"reference", "joint"})  # alarms while which no yaw is sure, where encoder or sensors have failed
-RECEIPT = msgpack.packb({"k": int(Kind.RECEIPT)})[1:]  # in every frame with a receipt
+RECEIPT = msgpack.packb({"k": int(MessageKind.RECEIPT)})[1:]  # in every frame with a receipt
 UNKNOWN_DEG = 20.0  # of an azimuth whose yaws are all unknown, at least
 
 
@@ -67,7 +67,7 @@ class Observer:
         if sender != BASE or RECEIPT not in frame or (parsed := parse_frame(frame)) is None:
             return
         for _, payload in parsed[1]:
-            message = decode(payload)
+            message = decode_message(payload)
             if isinstance(message, Receipt):
                 known = (message.tube, message.sequence, message.content.hex())
                 if known not in self._stored():

@@ -21,12 +21,12 @@ from borechain.load.crowd import ROUND_S, TUBE_LENGTH, state_of
 from borechain.load.day import ADVANCE, ADVANCES, BEGUN_AT, EPOCH, depth_of, surveys_at, up_to, write_day
 from borechain.recording.ground_replay import TapeClock
 from groundstation.config import GroundConfig, checked_config
-from groundstation.host import started
+from groundstation.ground_host import start_ground_process
 from sim.errors import RigError
 from telemetry.application.depth_source import DepthSource
 from telemetry.frozen import replace
 from telemetry.messages import SurveyMeasurement
-from telemetry.presentation.msgpack_codec import encode
+from telemetry.presentation.msgpack_codec import encode_message
 
 RIG = "load"
 READINGS, READ_EVERY_S = 20, 2.0  # of the depth at a stop
@@ -79,7 +79,7 @@ class LearningLoad:
         self._questions = itertools.cycle(ASKED)
         self.taken: dict[str, list[float]] = defaultdict(list)  # s of CPU
         with self._timing("start"):
-            self.ground = started(config)
+            self.ground = start_ground_process(config)
         self.ground.clock = self._clock
 
     def drill(self, number: int, md: float) -> list[SurveyMeasurement]:
@@ -135,7 +135,7 @@ class LearningLoad:
     def _read(self, md: float, after: float) -> None:
         self._now += after
         self._clock.rig_now = self._now
-        self.ground.on_depth(encode(self._source.measure(self._now, md)), self._now)
+        self.ground.on_depth(encode_message(self._source.measure(self._now, md)), self._now)
 
     @contextlib.contextmanager
     def _timing(self, what: str) -> Iterator[None]:

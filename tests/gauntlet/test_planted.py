@@ -29,18 +29,8 @@ from telemetry.application.clock import ClockFilter
 from telemetry.application.end_to_end import EndToEndDelivery
 from telemetry.application.order_answers import KEPT, Answers
 from telemetry.application.outbox import LIMIT, Outbox, Parcel
-from telemetry.messages import (
-    BASE,
-    ENCODER,
-    Command,
-    Hello,
-    Mode,
-    Receipt,
-    Reply,
-    Side,
-    TimeReply,
-)
-from telemetry.presentation.msgpack_codec import encode
+from telemetry.messages import BASE, ENCODER, Command, Hello, NodeMode, Receipt, Reply, Side, TimeReply
+from telemetry.presentation.msgpack_codec import encode_message
 from telemetry.runtime.disk import Disk
 from telemetry.transport import hop as hop_module
 from telemetry.transport.hop import HopLink
@@ -184,8 +174,8 @@ def order(process: TubeProcess, number: int) -> None:
     """Order a tube something from a neighbour above."""
     link = HopLink(ENCODER, 1)
     link.last_heard = math.inf
-    link.send_best_effort(encode(Hello(ENCODER, 1, 0, Mode.BOOT, 1.0)), "hello")
-    link.send_best_effort(encode(Command(1, number, "parameters", {})), "command")
+    link.send_best_effort(encode_message(Hello(ENCODER, 1, 0, NodeMode.BOOT, 1.0)), "hello")
+    link.send_best_effort(encode_message(Command(1, number, "parameters", {})), "command")
     for frame in link.take_frames(0.0):
         process.on_frame(Side.UPPER, frame.payload, 0.0)
 
@@ -237,7 +227,7 @@ def a_receipt_of_other_content_settles_nothing(folder: Path) -> str:
     link = HopLink(ENCODER, 1)
     link.last_heard = math.inf
     for number in range(1, 10):
-        link.send_best_effort(encode(Receipt(1, number, b"\1" * 16)), number)
+        link.send_best_effort(encode_message(Receipt(1, number, b"\1" * 16)), number)
     before = endpoint.mail.outbox_size
     for frame in link.take_frames(0.0):
         process.on_frame(Side.UPPER, frame.payload, 0.0)

@@ -18,7 +18,7 @@ from node.firmware.inputs import RigContext
 from node.firmware.tube_settings import TubeSettings
 from node.kernels.arithmetic.formats import DEG, PERIOD
 from node.process.tube_process import TubeProcess
-from telemetry.messages import ImuMean, Mode, NodeFlag, Stand, SurveyMeasurement
+from telemetry.messages import ImuMean, NodeFlag, NodeMode, Stand, SurveyMeasurement
 
 G = 9.81
 PITCH = 0.6 * DEG
@@ -57,8 +57,8 @@ def test_an_alignment_is_ordered_followed_and_shown_at_the_surface(tmp_path: Pat
     assert (reply.done, reply.values) == (True, {"method": "circle", "turns": 1.0})
     rig.spin = 10.0 * DEG
     rig.run(10.0)
-    assert rig.ground.model.string.states.newest[1].mode is Mode.ALIGNMENT
-    assert rig.ground.model.string.states.newest[2].mode is Mode.TRACKING
+    assert rig.ground.model.string.states.newest[1].mode is NodeMode.ALIGNMENT
+    assert rig.ground.model.string.states.newest[2].mode is NodeMode.TRACKING
     assert rig.ordered().detail == "an alignment is under way"
     rig.run(35.0)
     rig.spin = 0.0
@@ -68,7 +68,7 @@ def test_an_alignment_is_ordered_followed_and_shown_at_the_surface(tmp_path: Pat
     ]  # fmt: skip
     pitch, roll, _ = rig.ground.model.string.states.newest[1].alignment
     assert (pitch, roll) == pytest.approx((PITCH, 0.0), abs=1e-5)
-    assert rig.ground.model.string.states.newest[1].mode is Mode.STILL
+    assert rig.ground.model.string.states.newest[1].mode is NodeMode.STILL
 
 
 def test_two_imus_of_a_process_arrive_as_two_means(tmp_path: Path) -> None:

@@ -17,7 +17,7 @@ from sim.world.scenario import load_scenario, scenario_of
 from sim.world.world import World
 from telemetry.frozen import replace
 from telemetry.messages import BASE, ENCODER, DepthReading
-from telemetry.presentation.msgpack_codec import encode
+from telemetry.presentation.msgpack_codec import encode_message
 
 pytestmark = pytest.mark.slow
 
@@ -169,7 +169,7 @@ def test_a_ground_station_that_is_off_across_a_stop_places_its_surveys(rig: Dril
 
 def test_a_depth_from_the_future_changes_nothing(rig: Drilled) -> None:
     rig.drill(rig.stops[0] + 5.0)
-    forged = encode(DepthReading(1, rig.scheduler.now + 300.0, 1.0, ()))
+    forged = encode_message(DepthReading(1, rig.scheduler.now + 300.0, 1.0, ()))
     rig.ground.on_depth(forged, rig.world.local_clock(BASE, rig.scheduler.now))
     rig.finish()
     assert rig.surveys() == EVERY

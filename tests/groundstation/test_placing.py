@@ -10,7 +10,7 @@ from hand_fed import COV, Rig
 
 from borechain.load.placing_calls import CALLS_AT_MOST, TUBES, count_placing_calls
 from telemetry.messages import DepthReading, ImuMean, NodeFlag, Stand, SurveyMeasurement
-from telemetry.presentation.msgpack_codec import encode
+from telemetry.presentation.msgpack_codec import encode_message
 
 HERE, THERE = 2.0, 2.5  # m
 
@@ -88,7 +88,7 @@ def test_a_depth_that_is_doubted_before_the_survey_is_fused_is_taken_back(rig: R
     epoch, model = again.ground.model.string.time.epoch, again.ground.model
     other = Stand(epoch, at - 0.25, at + 0.25, THERE)
     again.now += 0.5
-    again.ground.on_depth(encode(DepthReading(1000, again.now, HERE, (other,), epoch)), again.now)
+    again.ground.on_depth(encode_message(DepthReading(1000, again.now, HERE, (other,), epoch)), again.now)
     assert stored(again) == [None]
     assert [one.md for one in model.placement.waiting] == [None]
     assert model.newest_row("measurements") == 0

@@ -15,7 +15,7 @@ import pytest
 from hand_fed import COV, VAR, Rig
 from schemas import check_answers
 
-from groundstation.host import answering
+from groundstation.ground_host import answering_operators
 from telemetry.frozen import replace
 from telemetry.media.zenoh_bus import ZenohBus, open_client, open_router
 from telemetry.messages import (
@@ -28,7 +28,7 @@ from telemetry.messages import (
     StaticRecord,
     SurveyMeasurement,
 )
-from telemetry.presentation.msgpack_codec import encode
+from telemetry.presentation.msgpack_codec import encode_message
 
 NO_COV = ((VAR, 5.0, 0.0), (5.0, VAR, 0.0), (0.0, 0.0, VAR))
 MEASUREMENT = SurveyMeasurement(
@@ -80,7 +80,7 @@ async def rig(tmp_path: Path, buses: tuple[ZenohBus, ZenohBus]) -> AsyncIterator
     server, operator = buses
     rig = Rig(tmp_path)
     with contextlib.closing(rig.ground):
-        async with answering(rig.ground, server):
+        async with answering_operators(rig.ground, server):
             rig.run(3.0)
             rig.depth(2.0)
             rig.state(1, 1)
@@ -249,7 +249,7 @@ def test_a_covariance_that_is_none_is_kept_and_counted_now_and_after_a_restart(s
 
 
 @pytest.mark.parametrize(
-    "payload", [b"", b"\x93\x01", b"\xc1", encode(Receipt(1, 2)), msgpack.packb([1.0, 2.0]), b"x" * 9000]
+    "payload", [b"", b"\x93\x01", b"\xc1", encode_message(Receipt(1, 2)), msgpack.packb([1.0, 2.0]), b"x" * 9000]
 )
 def test_bytes_that_are_no_depth_are_counted_and_told(start: Callable[[], Rig], payload: bytes) -> None:
     rig = start()
@@ -445,7 +445,7 @@ async def test_more_questions_than_can_wait_are_refused_at_once(
 ) -> None:
     monkeypatch.setattr("groundstation.gateway.zenoh.WAITING", 2)
     server, operator = buses
-    async with answering(start().ground, server):
+    async with answering_operators(start().ground, server):
         with ThreadPoolExecutor(4) as askers:
             asked = [askers.submit(operator.get, f"{GROUND}/status", 10.0) for _ in range(4)]
             refused = [future.result() for future in itertools.islice(as_completed(asked), 2)]  # the loop stands still

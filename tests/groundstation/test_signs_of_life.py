@@ -11,14 +11,14 @@ from groundstation.config import GroundConfig
 from groundstation.service.answers.model import RigModel
 from groundstation.service.process.ground_process import GroundProcess
 from telemetry.frozen import replace
-from telemetry.messages import EPOCH_UNKNOWN, Mode, NodeFlag, NodeState, Side
+from telemetry.messages import EPOCH_UNKNOWN, NodeFlag, NodeMode, NodeState, Side
 
 VAR = 1e-7
 
 
 def node_state(tube: int, at: float, cycles: int) -> NodeState:
     return NodeState(
-        tube, at, 1, Mode.STILL, 0.0, VAR, 0.0, (0.0, 0.0, 0.0), 0.0, 0.0, VAR, 0.5, 1e-8, NodeFlag.NONE, cycles, 0
+        tube, at, 1, NodeMode.STILL, 0.0, VAR, 0.0, (0.0, 0.0, 0.0), 0.0, 0.0, VAR, 0.5, 1e-8, NodeFlag.NONE, cycles, 0
     )
 
 

@@ -35,12 +35,12 @@ HOARDER = """
 import os, sys
 from borechain.load.crowd import survey_of
 from groundstation.service.disk.ground_store import Store, Stored
-from sim.rig.realtime import footprint
+from sim.rig.realtime_run import memory_footprint
 store = Store(sys.argv[1])
 def fill(stops):
     for stop in stops:
         store.add_messages([Stored(survey_of(tube, stop, 1.0, tube), 1.0, 1.0) for tube in range(1, 51)])
-    return footprint(os.getpid())["private_mb"]
+    return memory_footprint(os.getpid())["private_mb"]
 print(-fill(range(1, 11)) + fill(range(11, 51)))
 """
 

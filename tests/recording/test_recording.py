@@ -25,7 +25,7 @@ from borechain.recording.recording_file import NAME, RecordedSample, Recording, 
 from groundstation.service.answers.answer_table import schemas_by_path
 from groundstation.service.process.ground_process import GroundProcess
 from groundstation.service.process.intake_tape import IntakeError, pack_intake, unpack_intake
-from sim.rig.scheduler import Progress
+from sim.rig.scheduler import RigProgress
 from sim.world.scenario import load_scenario, scenario_of
 from sim.world.world import World
 
@@ -53,7 +53,7 @@ def drilled(tmp_path_factory: pytest.TempPathFactory) -> Iterator[tuple[Path, Gr
     rig = InlineRig(world, ground_settings(world), "rig-1", folder)
     seen: list[str] = []
 
-    def check(progress: Progress) -> None:
+    def check(progress: RigProgress) -> None:
         """Every answer has the fields of its key in every phase of the run, from the first one on."""
         if rig.is_begun and progress.phase not in seen:
             seen.append(progress.phase)

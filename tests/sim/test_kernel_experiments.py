@@ -20,7 +20,7 @@ from sim.studies.modes import run as modes
 from sim.studies.published_form import published_forms
 from sim.studies.scenarios import Tables, change_sections, on_off
 from sim.studies.trials import rms_deg
-from sim.world.disturbance.white_noise import SAMPLE_RATE_HZ, densities
+from sim.world.disturbance.white_noise import SAMPLE_RATE_HZ, noise_densities
 from sim.world.scenario_file import GyroSection, NodeSection
 
 pytestmark = pytest.mark.slow
@@ -124,7 +124,7 @@ def test_a_plain_encoder_reads_the_middle_of_its_count() -> None:
 
 def test_a_single_sample_has_the_noise_of_its_band() -> None:
     gyroscope = GyroSection()
-    single = densities(gyroscope.model_copy(update={"instantaneous": True}), PERIOD)
+    single = noise_densities(gyroscope.model_copy(update={"instantaneous": True}), PERIOD)
     for one, mean in zip(single, gyroscope.noise_dps_rthz, strict=True):
         assert one / math.sqrt(PERIOD) == pytest.approx(mean * math.sqrt(SAMPLE_RATE_HZ))
 

@@ -66,8 +66,8 @@ def weighed_rig(
     tubes: int, seconds: float, speed: float, endpoint: str, folder: Path
 ) -> tuple[list[Weight], dict[str, Any]]:
     """Drill for ``seconds`` of wall time; what the processes weighed, and what came of it."""
-    from borechain.cli.rig.result import result_of
     from borechain.cli.rig.rig_command import RigJob, drill_in_processes, process_table, world_of
+    from borechain.cli.rig.rig_result import result_of
     from borechain.load.hour import Scales, scenario_text
     from borechain.rig_host import opened_router
 

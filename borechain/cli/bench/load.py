@@ -124,7 +124,7 @@ def learn(surveys: int, tubes: int, stops: int, as_json: bool) -> None:
     from borechain.cli.console_tables import show_table
     from borechain.load.learning import measure_learning
     from borechain.load.placing_calls import CALLS_AT_MOST, count_placing_calls
-    from groundstation.host import load_kernels
+    from groundstation.ground_host import load_kernels
 
     load_kernels()
     with tempfile.TemporaryDirectory(prefix="borechain-") as folder:

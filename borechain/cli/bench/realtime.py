@@ -65,12 +65,12 @@ def realtime(nodes: int, seconds: float, endpoint: str, out: Path | None, as_jso
       borechain bench realtime --nodes 50 --seconds 120
     """
     from sim.rig.launcher import check_port_free
-    from sim.rig.realtime import run
+    from sim.rig.realtime_run import run_in_realtime
 
     check_port_free(endpoint)
     with tempfile.TemporaryDirectory(prefix="borechain-") as place:
         world, table = prepare_processes(nodes, seconds, endpoint, Path(place), seed)
-        measured = run(world, table, RIG, endpoint, seconds, Path(place))
+        measured = run_in_realtime(world, table, RIG, endpoint, seconds, Path(place))
         result: dict[str, Any] = {"bench": "realtime", "nodes": nodes, "seconds": seconds} | measured
     if out is not None:
         write_table(out / "realtime.csv", result["cases"], COLUMNS)
@@ -85,15 +85,15 @@ def prepare_processes(nodes: int, seconds: float, endpoint: str, folder: Path, s
     from node.process.drivers.timed import TimedEncoder, TimedImu
     from node.process.node_host import run_encoder, run_node
     from sim.rig.processes import ProcessTable, Spec
-    from sim.rig.realtime import clock_offset
-    from sim.world.recording import record, turning_once
+    from sim.rig.realtime_run import clock_offset
+    from sim.world.recording import record_sensors, turning_once
     from telemetry.messages import BASE, ENCODER, Side
     from telemetry.runtime.hosting import OwnTime, Place
 
     rest = START_ALLOWANCE * nodes + 0.5 * seconds
     length = rest + seconds + SPARE
     world = turning_once(nodes, time.monotonic(), rest, 0.25 * seconds, length, seed, CLOCK_STD)
-    record(world, folder)
+    record_sensors(world, folder)
     order = [BASE, ENCODER, *range(nodes, 0, -1)]
     specs = {}
     for place in range(1, len(order)):

@@ -154,7 +154,7 @@ def replay(file: Path, folder: Path | None, page: str | None, speed: float, as_j
 def replay_summary(recording: Any, folder: Path) -> dict[str, Any]:
     """What a ground station knows after a replay."""
     from borechain.recording.ground_replay import replay_file
-    from sim.rig.report import digest
+    from sim.rig.report import station_digest
 
     done = replay_file(recording, folder)
     ask = done.ground.operator.ask
@@ -168,7 +168,7 @@ def replay_summary(recording: Any, folder: Path) -> dict[str, Any]:
             "stations": stations,
             "verdict": ask("verdict"),
             "alarms": ask("alarms")["open"],
-            "digest": digest(stations),
+            "digest": station_digest(stations),
         }
     finally:
         done.ground.close()

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
     from sim.rig.launcher import Tick
-    from sim.rig.scheduler import Progress
+    from sim.rig.scheduler import RigProgress
     from sim.world.world import World
 
 
@@ -28,12 +28,12 @@ class progress:  # noqa: N801
         )
         self._task = self._bar.add_task("starting", total=world.end - world.begin)
 
-    def __enter__(self) -> Callable[[Tick | Progress], None]:
+    def __enter__(self) -> Callable[[Tick | RigProgress], None]:
         self._bar.start()
         return self._show
 
     def __exit__(self, *_: object) -> None:
         self._bar.stop()
 
-    def _show(self, tick: Tick | Progress) -> None:
+    def _show(self, tick: Tick | RigProgress) -> None:
         self._bar.update(self._task, completed=tick.rig_time - tick.begin, description=tick.phase)

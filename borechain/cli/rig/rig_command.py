@@ -20,7 +20,7 @@ from borechain.cli.faults import EnvironmentFault, InputFault, plain_faults, req
 from borechain.cli.notices import warnings_in_lines
 from borechain.cli.rig.drilling_bar import progress
 from borechain.cli.rig.ground_settings import ground_settings
-from borechain.cli.rig.result import (
+from borechain.cli.rig.rig_result import (
     ASKED,
     ask_surveys,
     get_json,
@@ -39,7 +39,7 @@ if TYPE_CHECKING:
     from groundstation.gateway.page.page_settings import PageSettings
     from sim.rig.launcher import Tick
     from sim.rig.processes import ProcessTable
-    from sim.rig.scheduler import Progress
+    from sim.rig.scheduler import RigProgress
     from sim.rig.stepper import Acted
     from sim.rig.transports import Transports
     from sim.world.world import World
@@ -284,16 +284,16 @@ def drill_in_processes(
     world: World,
     job: RigJob,
     bus: ZenohBus,
-    show: Callable[[Tick | Progress], None],
+    show: Callable[[Tick | RigProgress], None],
     log: RunLog | None,
     table_of: Callable[[Transports, Path], ProcessTable],
 ) -> Ran:
     """Drill with one real process a tube, beside a hub of CAN segments where a joint is on CAN."""
     from sim.rig.launcher import Launcher
-    from sim.rig.transports import carrying
+    from sim.rig.transports import open_transports
 
     with (
-        carrying(job.transport, world.scenario.medium.transports) as transports,
+        open_transports(job.transport, world.scenario.medium.transports) as transports,
         tempfile.TemporaryDirectory(prefix="borechain-") as steps,  # a socket's path must be short
     ):
         table = table_of(transports, Path(steps) / "steps")
@@ -318,7 +318,7 @@ def drill_inline(
     world: World,
     job: RigJob,
     folder: Path,
-    show: Callable[[Tick | Progress], None],
+    show: Callable[[Tick | RigProgress], None],
     log: RunLog | None = None,
     *,
     native: bool = False,
@@ -328,7 +328,7 @@ def drill_inline(
 
     rig = InlineRig(world, settings_of(world, job), job.rig_name, folder, native=native, keys=job.keys_place)
 
-    def follow(progress: Progress) -> None:
+    def follow(progress: RigProgress) -> None:
         show(progress)
         if log is not None and log.on_tick(progress, {}) and rig.is_begun:
             log.poll(rig.ask)
@@ -345,7 +345,7 @@ def process_table(
 ) -> ProcessTable:
     """Every process of the rig, one line each; ``steps`` is the socket at which they meet their stepper."""
     from borechain.rig_host import run_medium
-    from groundstation.host import run_ground
+    from groundstation.ground_host import run_ground
     from node.process.node_host import run_encoder, run_node
     from sim.rig.launcher import private_folder
     from sim.rig.processes import ProcessTable, Spec
@@ -375,13 +375,13 @@ def process_table(
 
 def operator_of(world: World, rig_name: str) -> Callable[[ZenohBus, str], Acted]:
     """Who steps the calibration in the field, where the scenario has one."""
-    from sim.rig.operator import BusDoors, Operator
+    from sim.rig.rack_operator import BusGroundClient, RackOperator
     from sim.rig.stepper import Acted
 
     if world.rack is None:
         return lambda _bus, _cue: Acted.DONE
-    operator = Operator(world.rack, world.scenario.tubes)
-    return lambda bus, cue: operator.act_on_cue(BusDoors(bus, rig_name), cue)
+    operator = RackOperator(world.rack, world.scenario.tubes)
+    return lambda bus, cue: operator.act_on_cue(BusGroundClient(bus, rig_name), cue)
 
 
 def settings_of(world: World, job: RigJob) -> dict[str, Any]:

@@ -17,7 +17,7 @@ from groundstation.survey.fusion.shared_scale import shared_scale
 from groundstation.survey.fusion.survey_trust import Trust, trust_of
 from telemetry.application.seal_watch import CODE, refusal_of
 from telemetry.application.series import SERIES_SHIFT
-from telemetry.messages import EPOCH_UNKNOWN, Event, Mode, NodeFlag, NodeState, SurveyMeasurement
+from telemetry.messages import EPOCH_UNKNOWN, Event, NodeFlag, NodeMode, NodeState, SurveyMeasurement
 
 LOOK_EVERY = 0.5  # s, own clock
 DOUBTING_VAR = math.radians(5.0) ** 2  # rad^2, systematic, of a yaw that may have jumped
@@ -28,7 +28,7 @@ ASK_EVERY = 120.0  # s between two orders to send a range again
 ASKED_AT_MOST = 3
 REFUSALS = 3  # readings of the depth refused in a row until that is told
 SENSOR = NodeFlag.SENSOR_FAULT | NodeFlag.YAW_UNTRUSTED | NodeFlag.RATE_EXCEEDED
-AT_REST = (Mode.STILL, Mode.SURVEY)
+AT_REST = (NodeMode.STILL, NodeMode.SURVEY)
 OF_THE_DISK = ("saved_state_lost", "boot_counter_lost", "parameters_fallback")
 
 

@@ -49,7 +49,7 @@ from telemetry.errors import DecodeError
 from telemetry.messages import Event, Kept, Stand, StaticRecord, SurveyMeasurement
 from telemetry.parameters import ParameterBlock, unpack_block
 from telemetry.presentation.content import content_of
-from telemetry.presentation.msgpack_codec import decode, encode
+from telemetry.presentation.msgpack_codec import decode_message, encode_message
 from telemetry.runtime.disk import MACHINE, Disk
 
 ALARMS_KEPT = 1000
@@ -84,7 +84,7 @@ class Store(Database):
 
     @staticmethod
     def _add(connection: sa.Connection, one: Stored[Kept]) -> bool:
-        payload = encode(one.message)
+        payload = encode_message(one.message)
         same = row_of(one.message, payload)
         kind = type(one.message).__name__
         row = {**same, "kind": kind, "md": one.md, "below": one.below, "payload": payload}
@@ -101,7 +101,7 @@ class Store(Database):
         """Store the depths (m) of messages that came earlier, or take them back (None): all or none."""
         rows = []
         for message, md in placed:
-            row = row_of(message, encode(message))
+            row = row_of(message, encode_message(message))
             rows.append({"depth": md, **{f"its_{name}": value for name, value in row.items()}})
         with self._writing() as connection:
             connection.execute(PLACE, rows)
@@ -119,7 +119,7 @@ class Store(Database):
         with self._refusing(), self._engine.connect() as connection:
             for payload, md, below in connection.execute(ALL_MESSAGES):
                 try:
-                    message = decode(payload)
+                    message = decode_message(payload)
                 except DecodeError:
                     self.damaged += 1
                     continue

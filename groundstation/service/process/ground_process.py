@@ -41,7 +41,7 @@ from telemetry.messages import (
     StaticRecord,
     SurveyMeasurement,
 )
-from telemetry.presentation.msgpack_codec import decode
+from telemetry.presentation.msgpack_codec import decode_message
 from telemetry.runtime.disk import MACHINE, Disk
 from telemetry.runtime.process_interface import Process
 from telemetry.transport.authentication import read_key
@@ -149,7 +149,7 @@ class GroundProcess(Process):
             return
         self._note(DEPTH, now, content)
         try:
-            reading = decode(content)
+            reading = decode_message(content)
         except DecodeError:
             reading = None
         if not isinstance(reading, DepthReading):

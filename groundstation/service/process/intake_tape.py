@@ -16,7 +16,7 @@ import msgpack
 from groundstation.errors import GroundError
 from telemetry.errors import DecodeError
 from telemetry.messages import Message
-from telemetry.presentation.msgpack_codec import decode, encode
+from telemetry.presentation.msgpack_codec import decode_message, encode_message
 
 KEPT = 4096  # events
 VERSION = 1
@@ -61,7 +61,7 @@ class Tape:
 
 def pack_intake(event: Intake) -> bytes:
     """An event on the wire."""
-    content = encode(event.content) if event.kind == MESSAGE else event.content
+    content = encode_message(event.content) if event.kind == MESSAGE else event.content
     return bytes(msgpack.packb([VERSION, event.number, event.kind, event.now, event.rig_now, event.epoch, content]))
 
 
@@ -89,7 +89,7 @@ def unpack_intake(payload: bytes) -> Intake:
 def _checked_content(kind: str, content: Any) -> Any:
     if kind == MESSAGE:
         try:
-            message: Message = decode(content)
+            message: Message = decode_message(content)
         except (DecodeError, TypeError) as error:
             raise IntakeError(f"expected a message, got {content!s:.40}") from error
         return message

@@ -41,7 +41,7 @@ def chain_forms(rows: Sequence[Disturbance], form: str) -> Any:
     for row in rows:
         act = getattr(row.compiled or Compiled(), form)
         if act is not None:
-            link = after_parts if form == "parts" else after
+            link = after_parts if form == "parts" else chain_row
             chain = link(chain, act, starts.get(row.name, 0))
     return chain
 
@@ -56,7 +56,7 @@ def do_nothing_apart(
     """Begin a chain of ``parts``."""
 
 
-def after(before: Any, act: Any, start: int) -> Any:
+def chain_row(before: Any, act: Any, start: int) -> Any:
     """Kernel of those ``before`` and one row more, whose lane begins at ``start``."""
 
     def act_in_order(shared: Any, tube: Any, now: Any, drawn: Array, row: Array) -> None:

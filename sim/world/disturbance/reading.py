@@ -14,7 +14,8 @@ from node.kernels.record.node_record import BEHIND, LATE, LATE_STD, SATURATED, S
 from node.kernels.sensors.correction import USUAL
 from sim.kernel import kernel, shared_body
 from sim.world.disturbance.chain import chain_forms, count_drawn
-from sim.world.disturbance.eighths import borders_of, eighths
+from sim.world.disturbance.disturbance_table import TABLE
+from sim.world.disturbance.eighths import borders_of, rates_of_eighths
 from sim.world.disturbance.fifo import (
     clipped_by_cycle,
     frames_of,
@@ -27,8 +28,7 @@ from sim.world.disturbance.frame_layout import FINER
 from sim.world.disturbance.gyroscope import GYROSCOPE
 from sim.world.disturbance.lanes import UNIFORM
 from sim.world.disturbance.row import ActsOn, Array, Constants, CycleNow, Flags, ImuSamples, OneImu, TubeMotion
-from sim.world.disturbance.table import TABLE
-from sim.world.disturbance.warm_up import warmth
+from sim.world.disturbance.warm_up import warm_fraction
 from sim.world.disturbance.window import add_shaking, cut_window, set_felt, shaking_span, shown_of, sum_until
 
 DRAWN: Final = count_drawn(TABLE)  # numbers of a node and cycle
@@ -57,7 +57,7 @@ def constants_of(imu: OneImu) -> Constants:
     return {row.name: None if row.draw is None else row.draw(imu) for row in TABLE}
 
 
-def disturb(acts_on: ActsOn, samples: ImuSamples | TubeMotion, imu: OneImu, drawn: Constants) -> None:
+def apply_rows(acts_on: ActsOn, samples: ImuSamples | TubeMotion, imu: OneImu, drawn: Constants) -> None:
     """Have every row of the table that acts there act, in its order."""
     for row in TABLE:
         if row.acts_on is acts_on and row.act is not None:
@@ -67,23 +67,23 @@ def disturb(acts_on: ActsOn, samples: ImuSamples | TubeMotion, imu: OneImu, draw
 def disturb_samples(samples: ImuSamples, imu: OneImu, drawn: Constants) -> Array:
     """Samples (n, 6) of the sensor, with all its errors."""
     samples.felt_force = samples.force
-    disturb(ActsOn.SAMPLES, samples, imu, drawn)
+    apply_rows(ActsOn.SAMPLES, samples, imu, drawn)
     return np.concatenate([samples.rate, samples.force], axis=1)
 
 
 def read_means(samples: ImuSamples, imu: OneImu) -> Array:
     """Readings (n, 6) of a plain world: of what a perfect sensor in the axis of the tube reads as ``samples``."""
     drawn = constants_of(imu)
-    disturb(ActsOn.FELT, samples, imu, drawn)
+    apply_rows(ActsOn.FELT, samples, imu, drawn)
     return disturb_samples(samples, imu, drawn)
 
 
 def read_grid(signal: ImuSamples, imu: OneImu) -> Cycles:
     """Readings of a rough world: of what a perfect sensor in the axis of the tube reads on the grid as ``signal``."""
     drawn, ends, sensor = constants_of(imu), signal.ends, imu.rough.sensor
-    disturb(ActsOn.FELT, signal, imu, drawn)
-    disturb(ActsOn.GRID, signal, imu, drawn)
-    temperature = USUAL + sensor.warm_up_c * warmth(imu, ends)
+    apply_rows(ActsOn.FELT, signal, imu, drawn)
+    apply_rows(ActsOn.GRID, signal, imu, drawn)
+    temperature = USUAL + sensor.warm_up_c * warm_fraction(imu, ends)
     hidden = clipped_by_cycle(signal)
     if sensor.frames_hz > 0.0:
         frames = frames_of(signal, imu)
@@ -102,7 +102,7 @@ def grid_eighths(signal: ImuSamples, mean: Array, stamps: Array, imu: OneImu, dr
     borders = np.append(borders.ravel(), stamps[-1])
     turned = (mean_between(signal.t, signal.rate[:, 2], borders) * np.diff(borders)).reshape(-1, PARTS)
     turned *= (PERIOD / np.diff(stamps))[:, None]
-    return eighths(mean, float(drawn[GYROSCOPE.name].matrix[2, 2]) * turned, imu)
+    return rates_of_eighths(mean, float(drawn[GYROSCOPE.name].matrix[2, 2]) * turned, imu)
 
 
 def read_eighths(mean: Array, ends: Array, imu: OneImu, truth: Any, frame: Array) -> Array:
@@ -117,12 +117,12 @@ def read_eighths(mean: Array, ends: Array, imu: OneImu, truth: Any, frame: Array
     shown = float((constants_of(imu)[GYROSCOPE.name].matrix @ frame[:, 2])[2])  # of a turn about the axis
     borders = borders_of(ends)
     turned = truth.turned(borders.ravel())[0].reshape(borders.shape)
-    return eighths(mean, shown * np.diff(turned, axis=1), imu)
+    return rates_of_eighths(mean, shown * np.diff(turned, axis=1), imu)
 
 
 def move_tube(motion: TubeMotion, imu: OneImu) -> Array:
     """Angle (n,) rad of a tube that is disturbed in its motion."""
-    disturb(ActsOn.MOTION, motion, imu, constants_of(imu))
+    apply_rows(ActsOn.MOTION, motion, imu, constants_of(imu))
     return motion.angle
 
 
@@ -147,7 +147,7 @@ def read_sensors(
     ----------
     shared, tube : of dtype ``SHARED`` and ``TUBE`` of ``sim.world.disturbance.records``
     is_first : what wanders begins anew
-    rates, forces, circle, shaken : see ``sim.string.readings.FeltTruth``
+    rates, forces, circle, shaken : see ``sim.string.reading_suppliers.FeltTruth``
     drawn : see ``sim.world.disturbance.lanes``
     """
     c, s = tube.cos, tube.sin
@@ -181,7 +181,7 @@ def read_frames(
     Parameters
     ----------
     shared, tube, is_first, drawn : see ``read_sensors``
-    field : ``sim.world.disturbance.frame_sums.Field``, with what ``draw_further`` has left in its desk
+    field : ``sim.world.disturbance.frame_sums.FrameField``, with what ``draw_further`` has left in its desk
     """
     front, fifo, row, desk = field.front_end[0], field.fifos[k], reading[0], field.desk
     place, borders, parts, moved, torsional = fifo.place, desk.borders, desk.noise, field.moved, field.torsional

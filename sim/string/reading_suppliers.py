@@ -115,7 +115,7 @@ def supply_readings(recorded: Any, drawn: Any, field: Any, schedule: Any, hops: 
     Parameters
     ----------
     recorded, drawn : ``RecordedReadings`` or ``DrawnReadings``; the other is None, and not compiled
-    field : ``sim.world.disturbance.frame_sums.Field`` of a rough world whose readings are drawn, else None
+    field : ``sim.world.disturbance.frame_sums.FrameField`` of a rough world whose readings are drawn, else None
     """
     if drawn is not None:
         draw_readings(drawn, field, schedule, hops, cycle)

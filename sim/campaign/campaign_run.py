@@ -7,10 +7,10 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
+from sim.campaign.campaign_folder import Folder
 from sim.campaign.chunk import campaign_of, scenario_digest
-from sim.campaign.engine import compute
-from sim.campaign.store import Folder
-from sim.campaign.summary import accuracy, honesty
+from sim.campaign.engine import compute_chunks
+from sim.campaign.summary import accuracy_rows, honesty_rows
 from sim.world.scenario import Scenario
 
 
@@ -31,7 +31,7 @@ def run_campaign(
     Returns
     -------
     dict
-        ``honesty`` and ``accuracy`` (``sim.campaign.summary``), ``runs``, of them
+        ``honesty_rows`` and ``accuracy_rows`` (``sim.campaign.summary``), ``runs``, of them
         ``computed`` now, ``node_cycles`` of one.
 
     Raises
@@ -48,7 +48,7 @@ def run_campaign(
     computed = sum(end - begin + 1 for begin, end in missing)
     for _ in range(runs - computed):
         step()
-    for (begin, end), chunk in compute(pickled, missing, engine, scheduler):
+    for (begin, end), chunk in compute_chunks(pickled, missing, engine, scheduler):
         folder.keep(begin, end, chunk)
         for _ in range(end - begin + 1):
             step()
@@ -58,6 +58,6 @@ def run_campaign(
         "runs": runs,
         "computed": computed,
         "node_cycles": node_cycles,
-        "honesty": honesty(folder.read("epochs", first, last)),
-        "accuracy": accuracy(folder.read("surveys", first, last)),
+        "honesty": honesty_rows(folder.read("epochs", first, last)),
+        "accuracy": accuracy_rows(folder.read("surveys", first, last)),
     }

@@ -109,7 +109,7 @@ class Folder:
         """
         for table, columns in (("surveys", chunk.surveys), ("epochs", chunk.epochs)):
             sink = pa.BufferOutputStream()
-            pq.write_table(arrow(columns, TABLES[table]), sink, compression="zstd")
+            pq.write_table(arrow_table(columns, TABLES[table]), sink, compression="zstd")
             write_whole(self._file(table, first, last), sink.getvalue().to_pybytes())
 
     def read(self, table: str, first: int, last: int) -> Iterator[Columns]:
@@ -135,7 +135,7 @@ class Folder:
         return self.path / f"{table}-{first:08d}-{last:08d}.parquet"
 
 
-def arrow(columns: Columns, described: Mapping[str, str]) -> pa.Table:
+def arrow_table(columns: Columns, described: Mapping[str, str]) -> pa.Table:
     """Columns with what each of them is as its metadata."""
     fields = [
         pa.field(name, pa.from_numpy_dtype(columns[name].dtype), metadata={"description": text})

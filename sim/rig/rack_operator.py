@@ -15,7 +15,7 @@ PATIENCE = 10.0  # wall s
 COMMAND = "recalibrate"
 
 
-class Doors(Protocol):
+class GroundClient(Protocol):
     """How an operator reaches the ground station; an answer of None means that it did not answer yet."""
 
     def ask(self, path: str) -> dict[str, Any] | None:
@@ -31,7 +31,7 @@ class Doors(Protocol):
         """
 
 
-class BusDoors:
+class BusGroundClient:
     """The ground station's keys on the bus."""
 
     def __init__(self, bus: ZenohBus, rig: str) -> None:
@@ -39,11 +39,11 @@ class BusDoors:
         self._rig = rig
 
     def ask(self, path: str) -> dict[str, Any] | None:
-        """See ``Doors``."""
+        """See ``GroundClient``."""
         return self._get(keys.GROUND.format(rig=self._rig, path=path))
 
     def command(self, name: str, parameters: dict[str, str]) -> dict[str, Any] | None:
-        """See ``Doors``."""
+        """See ``GroundClient``."""
         selector = keys.COMMAND.format(rig=self._rig, name=name)
         return self._get(f"{selector}?{';'.join(f'{key}={value}' for key, value in parameters.items())}")
 
@@ -56,7 +56,7 @@ class BusDoors:
         return dict(json.loads(replies[0].payload))
 
 
-class Operator:
+class RackOperator:
     """Asks for a calibration, enters each attitude, looks at the result and confirms it.
 
     Parameters
@@ -73,7 +73,7 @@ class Operator:
             self._commands[f"attitude {number}"] = entered | {"pitch_deg": f"{pitch:g}", "roll_deg": f"{roll:g}"}
         self._commands["solve"] = {"action": "solve"}
 
-    def act_on_cue(self, doors: Doors, cue: str) -> Acted:
+    def act_on_cue(self, doors: GroundClient, cue: str) -> Acted:
         """Do what ``cue`` names; too early as long as the ground station does not know the time of the rig.
 
         Raises

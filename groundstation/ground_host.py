@@ -53,13 +53,13 @@ def run_ground(
         config = checked_config(**given, **settings)
         load_kernels()
         with (
-            contextlib.closing(started(config)) as process,
+            contextlib.closing(start_ground_process(config)) as process,
             page_of(page) as serve_page,
             rig_session(place, file_name(BASE)) as bus,
         ):
             warn_of_keys(NAME, process.endpoint.seals)
             take_lease(bus, place.rig)
-            open_gateways = partial(answering, process, bus, serve_page)
+            open_gateways = partial(answering_operators, process, bus, serve_page)
             run_event_loop(
                 serve_by_own_clock(process, bus, open_gateways)
                 if own_clock
@@ -76,7 +76,7 @@ def load_kernels() -> None:
     warm_up()
 
 
-def started(config: GroundConfig) -> GroundProcess:
+def start_ground_process(config: GroundConfig) -> GroundProcess:
     """Return a ground station with everything computed and the longest answer made once, so that no first query waits.
 
     Nor does one wait for a garbage collection over what was imported and restored (0.1 s of ten thousand surveys).
@@ -116,7 +116,7 @@ async def serve_on_stepper(process: GroundProcess, bus: ZenohBus, place: Place, 
 
 
 @contextlib.asynccontextmanager
-async def answering(
+async def answering_operators(
     process: GroundProcess, bus: ZenohBus, serve_page: ServePage = no_page
 ) -> AsyncIterator[asyncio.Task[None]]:
     """Have operators on ``bus`` and on the page answered while the context lasts; yields the task of the bus."""

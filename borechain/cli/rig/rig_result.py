@@ -42,26 +42,26 @@ def get_json(bus: ZenohBus, selector: str) -> Any:
 
 def result_of(answers: dict[str, Any], world: World) -> dict[str, Any]:
     """The JSON object of the command."""
-    from sim.rig.calibration_report import calibration
-    from sim.rig.report import digest, figures, missing_surveys, station_table
+    from sim.rig.calibration_report import calibration_result
+    from sim.rig.report import figures_of_merit, missing_surveys, station_digest, station_table
 
     stations = station_table(answers["stations"]["stations"], world)
     measurements = answers["measurements"]["measurements"]
     result: dict[str, Any] = {
         "stations": stations,
-        "figures": figures(stations, measurements, world),
+        "figures": figures_of_merit(stations, measurements, world),
         "measurements": len(measurements),
         "column": {key: answers["column"][key] for key in ("worst", "projection", "dominant")},
         "missing": missing_surveys(measurements, world),
         "alarms": answers["alarms"]["active"],
         "rig_alarms": answers["alarms"]["rig"],
         "rig_s": round(world.end - world.begin, 3),
-        "digest": digest(stations),
+        "digest": station_digest(stations),
     }
     if "wall" in answers:
         result["wall"] = answers["wall"]["wall"]
     if world.rack is not None:
-        result["calibration"] = calibration(answers["recalibration"], measurements, world)
+        result["calibration"] = calibration_result(answers["recalibration"], measurements, world)
     return result
 
 

@@ -38,7 +38,7 @@ KIB, MIB = 1024.0, 1024.0**2
 
 
 @dataclass(slots=True)
-class Heard:
+class HeardYaw:
     """What the surface has heard of one node's yaw: pairs of its error and the variance it stated, rad and rad^2."""
 
     states: int = 0
@@ -60,7 +60,7 @@ class Surface(Process):
 
     def __init__(self, world: World, seconds: float, table: ProcessTable) -> None:
         self.endpoint = Endpoint(BASE, frozenset({Side.LOWER}), boot_count=1)
-        self.heard = {tube: Heard() for tube in range(1, world.scenario.tubes + 1)}
+        self.heard = {tube: HeardYaw() for tube in range(1, world.scenario.tubes + 1)}
         self.interrupted = False
         self.begun_at: float | None = None  # s, when the last node was heard first
         self.cpu_before: dict[str, float] = {}
@@ -92,7 +92,7 @@ class Surface(Process):
             raise RigError(f"process {ended[0]} ended before the run did; its message stands above")
         if self.begun_at is None and all(heard.states for heard in self.heard.values()):
             self.begun_at, self._until = now, now + self._seconds
-            self.cpu_before = {name: cpu_seconds(pid) for name, pid in pids(self._table).items()}
+            self.cpu_before = {name: cpu_seconds(pid) for name, pid in running_pids(self._table).items()}
         if now >= self._until and self._loop is not None:
             self._loop.stop()
 
@@ -103,7 +103,9 @@ class Surface(Process):
             self._loop.stop()
 
 
-def run(world: World, table: ProcessTable, rig: str, endpoint: str, seconds: float, folder: Path) -> dict[str, Any]:
+def run_in_realtime(
+    world: World, table: ProcessTable, rig: str, endpoint: str, seconds: float, folder: Path
+) -> dict[str, Any]:
     """Start every process of ``table``, let the string live for ``seconds`` once all are heard, and judge it.
 
     ``folder`` is where each process keeps ``NAME/timing.json``.
@@ -119,7 +121,7 @@ def run(world: World, table: ProcessTable, rig: str, endpoint: str, seconds: flo
     begun: dict[str, float] = {}
     try:
         table.warm()
-        with open_router(endpoint) as bus, interrupts(surface.interrupt):
+        with open_router(endpoint) as bus, handle_interrupts(surface.interrupt):
             for name in table.specs:
                 begun[name] = time.monotonic()
                 table.start(name)
@@ -133,9 +135,9 @@ def run(world: World, table: ProcessTable, rig: str, endpoint: str, seconds: flo
             costs = {
                 name: {
                     "cpu_percent": 100.0 * (cpu_seconds(pid) - surface.cpu_before[name]) / span,
-                    **footprint(pid),
+                    **memory_footprint(pid),
                 }
-                for name, pid in pids(table).items()
+                for name, pid in running_pids(table).items()
             }
             own = 100.0 * time.process_time() / (time.monotonic() - begun[next(iter(begun))])
             table.stop()
@@ -146,8 +148,15 @@ def run(world: World, table: ProcessTable, rig: str, endpoint: str, seconds: flo
         tube = ENCODER if name == "encoder" else int(name)
         report = json.loads((folder / name / "timing.json").read_text())
         first = report["first_cycle_at_s"] - clock_offset(world, tube) - begun[name]
-        rows.append(row(name, tube, world.scenario.tubes, report, first) | cost | yaw_figures(surface.heard.get(tube)))
-    return {"cases": rows, "worst": worst(rows), "total": total(rows), "router_and_base_cpu_percent": own}
+        rows.append(
+            timing_row(name, tube, world.scenario.tubes, report, first) | cost | yaw_figures(surface.heard.get(tube))
+        )
+    return {
+        "cases": rows,
+        "worst": worst_figures(rows),
+        "total": total_figures(rows),
+        "router_and_base_cpu_percent": own,
+    }
 
 
 def clock_offset(world: World, address: int) -> float:
@@ -155,7 +164,7 @@ def clock_offset(world: World, address: int) -> float:
     return world.local_clock(address, world.begin) - world.begin
 
 
-def row(name: str, tube: int, tubes: int, report: dict[str, Any], first: float) -> dict[str, Any]:
+def timing_row(name: str, tube: int, tubes: int, report: dict[str, Any], first: float) -> dict[str, Any]:
     """Times of one process, ms but for the first cycle."""
     start, cycle = report["stages_ms"]["start"], report["stages_ms"]["cycle"]
     return {
@@ -169,7 +178,7 @@ def row(name: str, tube: int, tubes: int, report: dict[str, Any], first: float) 
     }
 
 
-def yaw_figures(heard: Heard | None) -> dict[str, Any]:
+def yaw_figures(heard: HeardYaw | None) -> dict[str, Any]:
     """Whether the yaw is known at last, its rms error (deg) and how that compares with what the node stated of it.
 
     Nothing of the encoder.
@@ -179,11 +188,11 @@ def yaw_figures(heard: Heard | None) -> dict[str, Any]:
     figures: dict[str, Any] = {"yaw_known": heard.known}
     for when in PHASES:
         pairs = heard.resting if when == "rest" else heard.turning
-        figures |= {f"yaw_{when}_deg": rms_deg(pairs), f"yaw_{when}_nees": nees(pairs)}
+        figures |= {f"yaw_{when}_deg": rms_deg(pairs), f"yaw_{when}_nees": nees_of_pairs(pairs)}
     return figures
 
 
-def worst(rows: list[dict[str, Any]]) -> dict[str, Any]:
+def worst_figures(rows: list[dict[str, Any]]) -> dict[str, Any]:
     """The largest of every figure, the smallest of what is to be many."""
     found: dict[str, Any] = {}
     for key in rows[0]:
@@ -193,7 +202,7 @@ def worst(rows: list[dict[str, Any]]) -> dict[str, Any]:
     return found
 
 
-def total(rows: list[dict[str, Any]]) -> dict[str, Any]:
+def total_figures(rows: list[dict[str, Any]]) -> dict[str, Any]:
     """Sums of what adds up."""
     return {key: sum(r[key] for r in rows) for key in ("cycles", "overruns", "cpu_percent", "private_mb", "pss_mb")}
 
@@ -203,12 +212,12 @@ def rms_deg(pairs: list[tuple[float, float]]) -> float | None:
     return math.degrees(math.sqrt(sum(e * e for e, _ in pairs) / len(pairs))) if pairs else None
 
 
-def nees(pairs: list[tuple[float, float]]) -> float | None:
+def nees_of_pairs(pairs: list[tuple[float, float]]) -> float | None:
     """Mean of the squared errors over the variances stated of them; None of none."""
     return sum(e * e / stated for e, stated in pairs) / len(pairs) if pairs else None
 
 
-def pids(table: ProcessTable) -> dict[str, int]:
+def running_pids(table: ProcessTable) -> dict[str, int]:
     """Pid of every running process."""
     return {name: process.pid for name, process in table.running.items() if process.pid is not None}
 
@@ -219,7 +228,7 @@ def cpu_seconds(pid: int) -> float:
     return (int(fields[11]) + int(fields[12])) / TICKS
 
 
-def footprint(pid: int) -> dict[str, float]:
+def memory_footprint(pid: int) -> dict[str, float]:
     """Memory of a process: what it alone holds, and its share of what it holds with others; MB."""
     kib: dict[str, int] = {}
     for line in Path(f"/proc/{pid}/smaps_rollup").read_text().splitlines()[1:]:
@@ -230,7 +239,7 @@ def footprint(pid: int) -> dict[str, float]:
 
 
 @contextlib.contextmanager
-def interrupts(act: Callable[[], None]) -> Iterator[None]:
+def handle_interrupts(act: Callable[[], None]) -> Iterator[None]:
     """Have Ctrl-C and a termination request call ``act``."""
     before = {number: signal.signal(number, lambda _n, _f: act()) for number in (signal.SIGINT, signal.SIGTERM)}
     try:

@@ -1,7 +1,8 @@
 """Streams of random numbers: each consumer has one of its own, so that nothing else changes its draws.
 
-``Stream`` is the one table of purposes. A stream is named by the seed, its purpose and what parts it further (a tube,
-an IMU, a port), so that no draw depends on the order of others. A number once given is never used for another purpose.
+``RandomStream`` is the one table of purposes. A stream is named by the seed, its purpose and what parts it further (a
+tube, an IMU, a port), so that no draw depends on the order of others. A number once given is never used for another
+purpose.
 """
 
 from __future__ import annotations
@@ -11,7 +12,7 @@ from enum import IntEnum
 import numpy as np
 
 
-class Stream(IntEnum):
+class RandomStream(IntEnum):
     """Purpose of a stream."""
 
     JOINTS = 0  # 0: true angles, 1: errors of their readings
@@ -58,6 +59,6 @@ class JigStream(IntEnum):
     READINGS = 3  # noise, and the stand of the jig
 
 
-def stream(*key: int) -> np.random.Generator:
+def random_stream(*key: int) -> np.random.Generator:
     """The stream of a seed and whatever parts it from others; the same in every process and on every machine."""
     return np.random.Generator(np.random.Philox(np.random.SeedSequence(key)))
