@@ -302,6 +302,7 @@ OTHER: dict[str, Any] = {
     "aiding.off_s": 10.0,
     "aiding.every_s": 5.0,
     "node.tuning": {"gyro_noise": 1e-3},
+    "node.kernel": "fixed",
     "node.imus": 2,
     "node.imu_noise": [2.0],
     "design.length_m": 5.0,
