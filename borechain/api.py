@@ -19,6 +19,9 @@ from telemetry.errors import BorechainError, InputError, MediumError
 
 if TYPE_CHECKING:
     from groundstation.calibration.attitudes import AttitudeFit
+    from groundstation.survey.requests.clearance_request import ClearanceRequest
+    from groundstation.survey.requests.survey_answer import SurveyAnswer
+    from groundstation.survey.requests.survey_request import SurveyRequest
     from groundstation.survey.wall.wall_file import Wall
     from groundstation.survey.wall.wall_joints import Joints
     from groundstation.survey.wall.wall_verdict import Judgement
@@ -30,6 +33,8 @@ __all__ = [
     "BorechainError",
     "InputError",
     "JudgedWall",
+    "answer_clearance",
+    "answer_survey",
     "calibrate_attitudes",
     "calibrate_turntable",
     "drill",
@@ -49,6 +54,19 @@ class JudgedWall:
     joints: Joints
     worst: tuple[int, int]
     judgement: Judgement
+
+    @property
+    def is_tight(self) -> bool:
+        """Whether the wall is proven to be tight."""
+        from groundstation.survey.wall.wall_verdict import WallVerdict
+
+        return self.judgement.verdict is WallVerdict.TIGHT
+
+    def to_result(self) -> dict[str, Any]:
+        """The object that ``borechain wall --json`` prints."""
+        from groundstation.survey.requests.wall_result import wall_result
+
+        return wall_result(self.wall, self.judgement)
 
 
 def scenarios() -> list[str]:
@@ -139,6 +157,32 @@ def survey(
     place = site or Site(9.81, 50_000.0, math.radians(70.0), 0.0, math.radians(52.0))
     record = read_record(Path(file), DisplacementRule(displacement_rule))
     return analyse_survey(record, Method(method), load_tool(instrument), place, section_azimuth)
+
+
+def answer_survey(request: SurveyRequest) -> SurveyAnswer:
+    """A survey with everything that ``borechain survey`` may be asked for; ``result`` is the object of its ``--json``.
+
+    Raises
+    ------
+    SurveyError, ToolError
+        When the record, the instrument or a file cannot be used, or what is asked contradicts itself.
+    """
+    from groundstation.survey.requests import survey_answer
+
+    return survey_answer.answer_survey(request)
+
+
+def answer_clearance(request: ClearanceRequest) -> dict[str, Any]:
+    """How far two holes keep from each other: the object of ``borechain clearance --json``.
+
+    Raises
+    ------
+    SurveyError, ToolError
+        When a record or an instrument cannot be used.
+    """
+    from groundstation.survey.requests import clearance_answer
+
+    return clearance_answer.answer_clearance(request)
 
 
 def wall(file: str | Path) -> JudgedWall:
