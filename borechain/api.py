@@ -7,6 +7,7 @@ radians inside the values; names with a unit (``md_m``, ``inclination_deg``) mea
 
 from __future__ import annotations
 
+import datetime
 import json
 import math
 import tempfile
@@ -19,6 +20,8 @@ from telemetry.errors import BorechainError, InputError, MediumError
 
 if TYPE_CHECKING:
     from groundstation.calibration.attitudes import AttitudeFit
+    from groundstation.report.calibrations.calibration_outcome import CalibrationOutcome
+    from groundstation.report.calibrations.calibration_request import CalibrationRequest
     from groundstation.survey.requests.clearance_request import ClearanceRequest
     from groundstation.survey.requests.survey_answer import SurveyAnswer
     from groundstation.survey.requests.survey_request import SurveyRequest
@@ -35,6 +38,7 @@ __all__ = [
     "JudgedWall",
     "answer_clearance",
     "answer_survey",
+    "calibrate",
     "calibrate_attitudes",
     "calibrate_turntable",
     "drill",
@@ -233,6 +237,21 @@ def calibrate_attitudes(file: str | Path) -> AttitudeFit:
 
     record = read_attitudes(Path(file))
     return fit_attitudes(true_vectors(record.pitch, record.roll), record.readings)
+
+
+def calibrate(request: CalibrationRequest, day: datetime.date | None = None) -> CalibrationOutcome:
+    """What ``borechain calibrate`` and ``allan`` make of a record: ``result`` is the object of their ``--json``.
+
+    ``day`` of the calibration is that of today in UTC by default.
+
+    Raises
+    ------
+    CalibrationError
+        The file and line, what was expected and what came.
+    """
+    from groundstation.report.calibrations.calibration_answer import answer_calibration
+
+    return answer_calibration(request, (day or datetime.datetime.now(datetime.UTC).date()).isoformat())
 
 
 def query(selector: str, endpoint: str = keys.DEFAULT_ENDPOINT, timeout: float = 5.0) -> dict[str, Any]:
