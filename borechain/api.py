@@ -19,6 +19,7 @@ from telemetry import keys
 from telemetry.errors import BorechainError, InputError, MediumError
 
 if TYPE_CHECKING:
+    from borechain.drilling.rig_job import DrilledRig, RigJob, RigWatcher
     from groundstation.calibration.attitudes import AttitudeFit
     from groundstation.report.calibrations.calibration_outcome import CalibrationOutcome
     from groundstation.report.calibrations.calibration_request import CalibrationRequest
@@ -42,6 +43,7 @@ __all__ = [
     "calibrate_attitudes",
     "calibrate_turntable",
     "drill",
+    "drill_rig",
     "load",
     "query",
     "scenarios",
@@ -118,15 +120,32 @@ def drill(scenario: Scenario, seed: int = 1, folder: Path | None = None) -> dict
 
 
 def _drill(scenario: Scenario, seed: int, folder: Path) -> dict[str, Any]:
-    from borechain.cli.rig.result import result_of
-    from borechain.cli.rig.rig_command import RigJob, drill_inline
+    from borechain.drilling.drill_hole import drill_inline
+    from borechain.drilling.rig_job import RigJob, show_nothing
     from sim.rig.launcher import prepare_folder
+    from sim.rig.rig_result import rig_result
     from sim.world.world import World
 
     world = World(scenario, seed)
     prepare_folder(folder)
-    ran = drill_inline(world, RigJob(Path("scenario"), seed, math.inf), folder, lambda _progress: None)
-    return result_of(ran.answers, world)
+    run = drill_inline(world, RigJob(Path("scenario"), seed, math.inf, inline=True), folder, show_nothing)
+    return rig_result(run.answers, world)
+
+
+def drill_rig(job: RigJob, watcher: RigWatcher | None = None) -> DrilledRig:
+    """Drill as ``borechain rig`` does: a real process a tube, or inline; a scenario with a site hole by hole.
+
+    Raises
+    ------
+    ScenarioError
+        When the scenario cannot be drilled; nothing was written.
+    RigError, MediumError
+        When the folder or the endpoint cannot be used, a process fails, or on Ctrl-C.
+    """
+    from borechain.drilling import drill_rig as rigs
+    from borechain.drilling.rig_job import RigWatcher
+
+    return rigs.drill_rig(job, watcher or RigWatcher())
 
 
 def survey(

@@ -28,12 +28,17 @@ def gather_options(*options: Option, **objects: Callable[..., Any]) -> Option:
     def decorated(command: Command) -> Command:
         @functools.wraps(command)
         def gathering(*args: Any, **given: Any) -> Any:
-            used: set[str] = set()
+            made: dict[str, Any] = {}
+            taken_options, taken_objects = set[str](), set[str]()
             for name, make in objects.items():
-                own = {field: given[field] for field in fields[name] if field in given}
-                used |= own.keys()
-                given[name] = make(**own)
-            return command(*args, **{name: value for name, value in given.items() if name not in used})
+                parts = {field: made[field] for field in fields[name] if field in made}
+                plain = {field: given[field] for field in fields[name] if field in given and field not in made}
+                taken_objects |= parts.keys()
+                taken_options |= plain.keys()
+                made[name] = make(**parts, **plain)
+            own = {name: value for name, value in given.items() if name not in taken_options}
+            own |= {name: value for name, value in made.items() if name not in taken_objects}
+            return command(*args, **own)
 
         result: Command = gathering
         for option in reversed(options):

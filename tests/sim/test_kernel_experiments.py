@@ -7,7 +7,7 @@ import sys
 import numpy as np
 import pytest
 
-from borechain.cli.rig.rig_command import PRELOAD
+from borechain.drilling.rig_processes import PRELOAD
 from node.firmware.settings import KERNELS
 from node.kernels.arithmetic.formats import PERIOD
 from node.kernels.record.filter_record import Scheme

@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 import contextlib
+import datetime
 import json
 import os
 from collections.abc import Sequence
 from dataclasses import dataclass
-from datetime import UTC, datetime
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -21,8 +21,6 @@ from borechain.cli.whole_files import PLOT_FORMATS, check_suffix
 from telemetry.runtime.command_line import check_installed
 
 if TYPE_CHECKING:
-    from datetime import date as Day
-
     from groundstation.report.calibrations.calibration_outcome import CalibrationOutcome
     from groundstation.report.calibrations.calibration_request import CalibrationRequest
     from groundstation.report.sheet import Sheet
@@ -53,14 +51,14 @@ class WantedFiles:
     out: Path | None
     plot: Path | None
     certificate: Path | None
-    date: datetime | None
+    date: datetime.datetime | None
     subject: str | None
     as_json: bool
 
     @property
-    def day(self) -> Day:
+    def day(self) -> datetime.date:
         """Day of the calibration, that of today in UTC by default."""
-        return (self.date or datetime.now(UTC)).date()
+        return (self.date or datetime.datetime.now(datetime.UTC)).date()
 
     def check(self) -> None:
         """Refuse paths that cannot be meant, and what is not installed, before anything is computed."""
@@ -93,7 +91,7 @@ def deliver_calibration(request: CalibrationRequest, wanted: WantedFiles) -> Non
         show_sheet(outcome.sheet, list(files))
 
 
-def rendered_files(outcome: CalibrationOutcome, wanted: WantedFiles, day: Day) -> dict[Path, bytes]:
+def rendered_files(outcome: CalibrationOutcome, wanted: WantedFiles, day: datetime.date) -> dict[Path, bytes]:
     """Plot and certificate."""
     from groundstation.report.certificate import Identity, certificate_pdf
     from groundstation.report.figure_panels import render_panels

@@ -17,7 +17,7 @@ import click
 from borechain.cli.faults import EnvironmentFault, plain_faults, require_modules
 from borechain.cli.ground.query import rig_option, role_option
 from borechain.cli.shared_options import parse_speed
-from groundstation.page_options import page_settings
+from groundstation.page_options import PageRequest, page_settings
 from telemetry import keys
 from telemetry.media.credentials import Credentials, credentials_for
 from telemetry.runtime.process_options import insecure_option, keys_option
@@ -132,7 +132,7 @@ def replay(file: Path, folder: Path | None, page: str | None, speed: float, as_j
     recording = Recording(file)
     if folder is not None and folder.exists() and any(folder.iterdir()):
         raise EnvironmentFault(f"folder {folder}: expected a new or empty one, it holds something")
-    shown = page_settings(page, None, None)
+    shown = page_settings(PageRequest(page))
     with tempfile.TemporaryDirectory(prefix="borechain-") as place:
         if shown is not None:
             from borechain.recording.show import show_recording
