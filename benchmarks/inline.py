@@ -26,11 +26,11 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 from borechain.drilling.drill_hole import read_world
+from borechain.drilling.inline import InlineRig
+from borechain.drilling.rig_host import opened_router
 from borechain.drilling.rig_job import RigJob
 from borechain.drilling.rig_processes import drill_in_processes, process_table, settings_of
-from borechain.inline import InlineRig
 from borechain.load.hour import scenario_text
-from borechain.rig_host import opened_router
 from sim.rig.in_process import InProcessStepper, unwritten
 from sim.rig.launcher import Tick
 from sim.rig.processes import ProcessTable

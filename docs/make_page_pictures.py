@@ -18,7 +18,7 @@ sys.path[:0] = [str(DOCS.parent), str(DOCS.parent / "tests" / "tools")]
 from install_browser import find_browser  # noqa: E402
 from playwright.sync_api import expect, sync_playwright  # noqa: E402
 
-from borechain.inline import InlineRig  # noqa: E402
+from borechain.drilling.inline import InlineRig  # noqa: E402
 from groundstation.gateway.page.passwords import hash_of  # noqa: E402
 from groundstation.gateway.page.server import serving_page  # noqa: E402
 from groundstation.gateway.page.settings import PageSettings, listen  # noqa: E402

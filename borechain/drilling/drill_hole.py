@@ -10,9 +10,9 @@ from pathlib import Path
 
 from borechain.client import Ground
 from borechain.crew.log import RunLog
+from borechain.drilling.inline import InlineRig
 from borechain.drilling.rig_job import DrilledRig, RigJob, RigRun, RigWatcher, ShowProgress, say_on_stderr
 from borechain.drilling.rig_processes import drill_in_processes, process_table, settings_of
-from borechain.inline import InlineRig
 from groundstation.gateway.page.settings import PageSettings
 from sim.errors import RigError, ScenarioError
 from sim.rig.ground_answers import ASKED

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import contextlib
 
+from borechain.drilling.rig_host import opened_router
 from borechain.drilling.rig_job import DrilledRig, RigJob, RigWatcher
-from borechain.rig_host import opened_router
 
 
 def drill_rig(job: RigJob, watcher: RigWatcher) -> DrilledRig:

@@ -9,8 +9,8 @@ from pathlib import Path
 from typing import Any
 
 from borechain.crew.log import RunLog
+from borechain.drilling.rig_host import run_medium
 from borechain.drilling.rig_job import RigJob, RigRun, ShowProgress
-from borechain.rig_host import run_medium
 from groundstation.gateway.page.settings import PageSettings
 from groundstation.host import run_ground
 from node.process.host import run_encoder, run_node
@@ -28,9 +28,9 @@ from telemetry.runtime.hosting import Place
 from telemetry.transport.authentication import new_key
 
 PRELOAD = {
-    "float64": "borechain.preload",
-    "fixed": "borechain.preload_all",
-    "published": "borechain.preload_all",
+    "float64": "borechain.drilling.preload",
+    "fixed": "borechain.drilling.preload_all",
+    "published": "borechain.drilling.preload_all",
 }  # by kernel
 
 

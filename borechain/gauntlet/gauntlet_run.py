@@ -12,10 +12,10 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
+from borechain.drilling.rare_collection import rare_collection
 from borechain.gauntlet.fault_observability import FaultObservability
 from borechain.gauntlet.gauntlet_rig import PLANS, GauntletRig, make_ready, new_rig
 from borechain.gauntlet.oracles import Observer, find_violations
-from borechain.rare_collection import rare_collection
 from sim.gauntlet.fault_kinds import KINDS
 from sim.gauntlet.plan import drawn_kinds, steps_of
 from sim.rig.report import digest

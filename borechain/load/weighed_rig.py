@@ -6,10 +6,10 @@ from pathlib import Path
 from typing import Any
 
 from borechain.drilling.drill_hole import read_world
+from borechain.drilling.rig_host import opened_router
 from borechain.drilling.rig_job import RigJob
 from borechain.drilling.rig_processes import drill_in_processes, process_table
 from borechain.load.hour import Scales, Weight, scenario_text
-from borechain.rig_host import opened_router
 from sim.rig.processes import ProcessTable
 from sim.rig.rig_result import rig_result
 

@@ -12,7 +12,7 @@ import pytest
 from schemas import check_answers
 from test_model import survey
 
-from borechain.inline import InlineRig
+from borechain.drilling.inline import InlineRig
 from groundstation.config import GroundConfig
 from groundstation.service.answers import measurement_views, views
 from groundstation.service.answers.model import RigModel

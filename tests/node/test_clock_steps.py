@@ -8,7 +8,7 @@ from typing import Any
 
 import pytest
 
-from borechain.inline import InlineRig
+from borechain.drilling.inline import InlineRig
 from node.firmware.inputs import ImuReading, RigContext
 from node.firmware.sensor_limits import SensorLimits
 from node.firmware.settings import Joint, Kernel, TubeSettings

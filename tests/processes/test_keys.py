@@ -7,7 +7,7 @@ from pathlib import Path
 
 from rigs import REPOSITORY, free_endpoint, running_rig
 
-from borechain.inline import InlineRig
+from borechain.drilling.inline import InlineRig
 from borechain.pki.rig_keys import add_tube, init_rig, rotate_keys
 from sim.rig.ground_settings import ground_settings
 from sim.rig.rig_result import rig_result

@@ -18,7 +18,7 @@ from schemas import check_answers
 from tapes import INTAKE, KEY, shown, write
 
 from borechain.cli.ground.record_command import replay as replay_command
-from borechain.inline import InlineRig
+from borechain.drilling.inline import InlineRig
 from borechain.recording.ground_replay import replay_file
 from borechain.recording.recording_file import NAME, RecordedSample, Recording, RecordingError, RecordingWriter
 from groundstation.service.answers.paths import schemas

@@ -135,7 +135,7 @@ def test_every_kernel_can_be_chosen_and_is_warmed_before_the_first_fork() -> Non
     assert [NodeSection(kernel=kernel).kernel for kernel in KERNELS] == list(KERNELS)
     assert set(PRELOAD) == set(KERNELS)
     program = (
-        "import borechain.preload_all\n"
+        "import borechain.drilling.preload_all\n"
         "from node.kernels.step import node_step as step\n"
         "from node.kernels.step import fixed_step as fixed\n"
         "from node.kernels.published import step as published\n"

@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from borechain.inline import InlineRig
+from borechain.drilling.inline import InlineRig
 from node.process.tube_process import TubeProcess
 from sim.rig.ground_settings import ground_settings
 from sim.rig.scheduler import Progress

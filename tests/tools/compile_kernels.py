@@ -13,7 +13,7 @@ def floats() -> None:
     from groundstation.survey.well.compiled_model import preload_models
     from node.firmware.settings import KERNELS
 
-    importlib.import_module("borechain.preload")
+    importlib.import_module("borechain.drilling.preload")
     from sim.studies.lab import LAB, run_seed
 
     run_seed((LAB, 1))

@@ -10,7 +10,7 @@ import time
 from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import click
 
@@ -139,6 +139,8 @@ def replay(file: Path, folder: Path | None, page: str | None, speed: float, as_j
 
             show_recording(recording, folder or Path(place), replace(shown, replay=file.name), speed)
             return
+        from borechain.recording.ground_replay import replay_summary
+
         result = replay_summary(recording, folder or Path(place))
     if as_json:
         click.echo(json.dumps(result))
@@ -149,26 +151,3 @@ def replay(file: Path, folder: Path | None, page: str | None, speed: float, as_j
     click.echo(result["verdict"]["line"])
     click.echo(f"{result['events']} events, {result['missing']} missing; {'whole' if result['whole'] else 'cut'} file")
     click.echo(f"digest {result['digest']}")
-
-
-def replay_summary(recording: Any, folder: Path) -> dict[str, Any]:
-    """What a ground station knows after a replay."""
-    from borechain.recording.ground_replay import replay_file
-    from sim.rig.report import digest
-
-    done = replay_file(recording, folder)
-    ask = done.ground.operator.ask
-    try:
-        stations = ask("stations")["stations"]
-        return {
-            "rig": recording.rig,
-            "whole": recording.whole,
-            "events": done.events,
-            "missing": done.missing,
-            "stations": stations,
-            "verdict": ask("verdict"),
-            "alarms": ask("alarms")["open"],
-            "digest": digest(stations),
-        }
-    finally:
-        done.ground.close()

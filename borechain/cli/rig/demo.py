@@ -52,7 +52,7 @@ def demo(page: str, speed: float, endpoint: str, rounds: int | None) -> None:
       borechain demo --speed 2 --page 127.0.0.1:8090
     """
     from borechain.drilling.drill_hole import page_with_password
-    from borechain.rig_host import opened_router
+    from borechain.drilling.rig_host import opened_router
     from groundstation.gateway.page.settings import listen
     from sim.rig.launcher import check_port_free
     from sim.world.shipped import find_scenario

@@ -32,6 +32,6 @@ def medium(scenario: Path, seed: int, speed: float, faults: tuple[str, ...], rou
     Example:
       borechain medium compose-2 --speed 1
     """
-    from borechain.rig_host import run_medium
+    from borechain.drilling.rig_host import run_medium
 
     run_medium(place.to_place(), scenario, seed, speed, faults, router)
