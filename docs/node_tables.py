@@ -16,10 +16,9 @@ import numpy as np
 
 from node.firmware.event_table import EVENT_TABLE
 from node.kernels.arithmetic.formats import DEG
-from node.kernels.record import filter_record, node_record
+from node.kernels.record import filter_record, node_record, sensor_record
 from node.kernels.record.filter_record import default_config
 from node.kernels.record.node_record import NODE
-from node.kernels.sensors import alignment, static_average, sweep
 from node.kernels.string import encoder_step
 from node.kernels.string.encoder_step import ENCODER
 
@@ -40,7 +39,7 @@ UNITS: Final = (
     ),
     *("s/sqrt(s)", "rad/sqrt(s)", "counts", "counts^2", "cycles", "sigmas"),
 )
-MODULES: Final = (filter_record, alignment, sweep, static_average, node_record, encoder_step)
+MODULES: Final = (filter_record, sensor_record, node_record, encoder_step)
 PERIODS: Final = {"5 minutes": 300.0, "1 hour": 3600.0, "8 hours": 28800.0, "1 day": 86400.0, "30 days": 2592000.0}
 SIGMAS_DEG: Final = (0.01, 0.02, 0.05, 0.1)
 

@@ -19,6 +19,7 @@ from sim.studies.study_table import STUDIES
 
 ROOT = Path(__file__).parents[1]
 RESULTS = ROOT / "docs" / "results"
+DECISIONS = ROOT / "docs" / "decisions"
 MOST_PARAMETERS, MOST_LINES = 10, 40  # of the function of a command
 
 
@@ -77,13 +78,95 @@ def test_every_file_a_guide_names_is_there(document: str) -> None:
     assert [name for name in named if not (ROOT / name).exists()] == []
 
 
+def decisions() -> dict[int, Path]:
+    """Pages of the decisions by number."""
+    return {int(path.name[:4]): path for path in sorted(DECISIONS.glob("[0-9]*.md"))}
+
+
+def index_rows() -> list[tuple[str, str, str, str]]:
+    """Rows of the index of decisions: number, page, title, status."""
+    return re.findall(
+        r"^\| \[(\d+)\]\(([^)]+)\) \| (.+) \| (.+) \|$", (DECISIONS / "README.md").read_text(), re.MULTILINE
+    )
+
+
+def stated_status(page: Path) -> str:
+    """Status of a decision by the first line below its title, in the words of the index."""
+    first = next(line for line in page.read_text().splitlines()[1:] if line)
+    if not re.match(r"(Changed|Superseded) by ", first):
+        return "in force"
+    return f"{first.split()[0].lower()} by {', '.join(number for number, _ in successors(first))}"
+
+
+def successors(line: str) -> list[tuple[str, str]]:
+    return re.findall(r"\[(\d+)\]\((\d{4}-[a-z-]+\.md)\)", line)
+
+
 def test_every_decision_is_in_the_index() -> None:
-    folder = ROOT / "docs" / "decisions"
-    listed = re.findall(r"^\| \[(\d+)\]\(([^)]+)\) \| (.+) \|$", (folder / "README.md").read_text(), re.MULTILINE)
-    pages = sorted(path.name for path in folder.glob("0*.md"))
-    assert [page for _, page, _ in listed] == pages
-    for number, page, title in listed:
-        assert (folder / page).read_text().startswith(f"# {number}. {title}\n")
+    listed = index_rows()
+    assert [page for _, page, _, _ in listed] == [page.name for page in decisions().values()]
+    for number, page, title, _ in listed:
+        assert (DECISIONS / page).read_text().startswith(f"# {number}. {title}\n")
+
+
+@pytest.mark.parametrize("number", decisions())
+def test_a_decision_has_at_most_400_words(number: int) -> None:
+    assert len(decisions()[number].read_text().split()) <= 400
+
+
+def test_the_index_marks_what_a_page_says_of_its_successors() -> None:
+    assert {page: status for _, page, _, status in index_rows()} == {
+        page.name: stated_status(page) for page in decisions().values()
+    }
+
+
+@pytest.mark.parametrize("number", [int(row[0]) for row in index_rows() if row[3] != "in force"])
+def test_a_decision_that_no_longer_holds_as_it_stands_names_a_later_one(number: int) -> None:
+    """In the first line below the title, with a link to each later page and with what of it is another now."""
+    title, blank, first, after = decisions()[number].read_text().splitlines()[:4]
+    assert title.startswith("# ")
+    assert (blank, after) == ("", "")
+    assert re.fullmatch(r"(Changed|Superseded) by \[\d+\]\(.+\): \S.*\.", first)
+    named = successors(first)
+    assert named
+    for later, page in named:
+        assert int(later) > number
+        assert decisions()[int(later)].name == page
+
+
+def test_what_replaces_a_decision_is_named_by_it() -> None:
+    """A page that says that it replaces another one, or a part of it, stands in the first line of that one."""
+    replaced = [
+        (later, int(earlier))
+        for later, page in decisions().items()
+        for earlier in re.findall(r"[Rr]eplaces [^.]*?\[(\d+)\]\(", page.read_text())
+    ]
+    assert replaced
+    for later, earlier in replaced:
+        assert str(later) in re.findall(r"\d+", stated_status(decisions()[earlier]))
+
+
+def documents() -> list[Path]:
+    """Pages of the project in Markdown."""
+    return sorted([*ROOT.glob("*.md"), *(ROOT / "docs").rglob("*.md")])
+
+
+def anchors(page: Path) -> set[str]:
+    """Anchors of the headings of a page, as GitHub makes them."""
+    headings = re.findall(r"^#+ (.+)$", page.read_text(), re.MULTILINE)
+    return {re.sub(r"[^a-z0-9 _-]", "", heading.lower()).replace(" ", "-") for heading in headings}
+
+
+@pytest.mark.parametrize("page", documents(), ids=lambda path: path.relative_to(ROOT).as_posix())
+def test_every_link_of_a_document_leads_somewhere(page: Path) -> None:
+    """Files are there, and headings of pages in Markdown too."""
+    lost = []
+    for target in re.findall(r"\]\((?!https?:)([^)\s]+)\)", page.read_text()):
+        name, _, anchor = target.partition("#")
+        there = page.parent / name if name else page
+        if not there.exists() or (anchor and anchor not in anchors(there)):
+            lost.append(target)
+    assert lost == []
 
 
 def callbacks(command: click.Command, context: click.Context) -> Iterator[Callable[..., Any]]:
