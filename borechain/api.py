@@ -21,6 +21,7 @@ from telemetry.errors import BorechainError, InputError, MediumError
 if TYPE_CHECKING:
     from borechain.drilling.rig_job import DrilledRig, RigJob, RigWatcher
     from groundstation.calibration.attitudes import AttitudeFit
+    from groundstation.recording.recording_file import Recording
     from groundstation.report.calibrations.calibration_outcome import CalibrationOutcome
     from groundstation.report.calibrations.calibration_request import CalibrationRequest
     from groundstation.survey.requests.clearance_request import ClearanceRequest
@@ -46,6 +47,7 @@ __all__ = [
     "drill_rig",
     "load",
     "query",
+    "replay",
     "scenarios",
     "survey",
     "wall",
@@ -271,6 +273,21 @@ def calibrate(request: CalibrationRequest, day: datetime.date | None = None) -> 
     from groundstation.report.calibrations.calibration_answer import answer_calibration
 
     return answer_calibration(request, (day or datetime.datetime.now(datetime.UTC).date()).isoformat())
+
+
+def replay(recording: Recording, folder: Path) -> dict[str, Any]:
+    """What a new ground station in ``folder`` knows after a recording: the object of ``borechain replay --json``.
+
+    Raises
+    ------
+    RecordingError
+        When the recording holds no intake that can be replayed.
+    """
+    from groundstation.recording.ground_replay import replay_summary
+    from sim.rig.report import digest
+
+    known = replay_summary(recording, folder)
+    return known | {"digest": digest(known["stations"])}
 
 
 def query(selector: str, endpoint: str = keys.DEFAULT_ENDPOINT, timeout: float = 5.0) -> dict[str, Any]:

@@ -19,8 +19,8 @@ from tapes import INTAKE, KEY, shown, write
 
 from borechain.cli.ground.record_command import replay as replay_command
 from borechain.drilling.inline import InlineRig
-from borechain.recording.ground_replay import replay_file
-from borechain.recording.recording_file import NAME, RecordedSample, Recording, RecordingError, RecordingWriter
+from groundstation.recording.ground_replay import replay_file
+from groundstation.recording.recording_file import NAME, RecordedSample, Recording, RecordingError, RecordingWriter
 from groundstation.service.answers.paths import schemas
 from groundstation.service.process.ground_process import GroundProcess
 from groundstation.service.process.intake_tape import IntakeError, pack_intake, unpack_intake

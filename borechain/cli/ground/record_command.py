@@ -23,7 +23,7 @@ from telemetry.media.credentials import Credentials, credentials_for
 from telemetry.runtime.process_options import insecure_option, keys_option
 
 if TYPE_CHECKING:
-    from borechain.recording.recorder import RecordingSummary
+    from groundstation.recording.recorder import RecordingSummary
     from telemetry.media.zenoh_bus import ZenohBus
 
 ONE_TRY = 2.0  # wall s to join a router that may not be there yet
@@ -71,7 +71,7 @@ def record_rig(
     MediumError
         When no router is there by then.
     """
-    from borechain.recording.recorder import Recorder
+    from groundstation.recording.recorder import Recorder
 
     with contextlib.ExitStack() as stack:
         recorder = Recorder(stack.enter_context(patient_client(endpoint, wait, credentials)), rig_name, file)
@@ -127,7 +127,7 @@ def replay(file: Path, folder: Path | None, page: str | None, speed: float, as_j
       borechain replay shift.mcap --json
       borechain replay shift.mcap --page 127.0.0.1:8080 --speed 60
     """
-    from borechain.recording.recording_file import Recording
+    from groundstation.recording.recording_file import Recording
 
     recording = Recording(file)
     if folder is not None and folder.exists() and any(folder.iterdir()):
@@ -135,13 +135,13 @@ def replay(file: Path, folder: Path | None, page: str | None, speed: float, as_j
     shown = page_settings(PageRequest(page))
     with tempfile.TemporaryDirectory(prefix="borechain-") as place:
         if shown is not None:
-            from borechain.recording.show import show_recording
+            from groundstation.recording.show import show_recording
 
             show_recording(recording, folder or Path(place), replace(shown, replay=file.name), speed)
             return
-        from borechain.recording.ground_replay import replay_summary
+        from borechain import api
 
-        result = replay_summary(recording, folder or Path(place))
+        result = api.replay(recording, folder or Path(place))
     if as_json:
         click.echo(json.dumps(result))
         return

@@ -8,12 +8,11 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from borechain.recording.recording_file import Recording, RecordingError
 from groundstation.config import checked_config
 from groundstation.errors import GroundError
+from groundstation.recording.recording_file import Recording, RecordingError
 from groundstation.service.process.ground_process import GroundProcess
 from groundstation.service.process.intake_tape import BEGIN, DEPTH, MESSAGE, ORDER, Intake, IntakeError, unpack_intake
-from sim.rig.report import digest
 from telemetry import keys
 from telemetry.errors import BorechainError
 
@@ -128,20 +127,18 @@ def repeat_order(ground: GroundProcess, event: Intake) -> None:
 
 
 def replay_summary(recording: Recording, folder: Path) -> dict[str, Any]:
-    """The object that ``borechain replay --json`` prints: what a new ground station knows after a recording."""
+    """What a new ground station in ``folder`` knows after a recording; errors as ``open_replay``."""
     done = replay_file(recording, folder)
     ask = done.ground.operator.ask
     try:
-        stations = ask("stations")["stations"]
         return {
             "rig": recording.rig,
             "whole": recording.whole,
             "events": done.events,
             "missing": done.missing,
-            "stations": stations,
+            "stations": ask("stations")["stations"],
             "verdict": ask("verdict"),
             "alarms": ask("alarms")["open"],
-            "digest": digest(stations),
         }
     finally:
         done.ground.close()
